@@ -1,0 +1,10 @@
+//! The engine of quadfrog.
+
+pub mod control;
+pub mod optimize;
+pub mod realtime;
+pub mod recording;
+pub mod report;
+pub mod robot;
+pub mod session;
+pub mod sim;

@@ -1,0 +1,4 @@
+//! The real-time boundary: what crosses it (all `Copy`) and how.
+
+pub mod command;
+pub mod telemetry;

@@ -1,0 +1,97 @@
+//! What is true of one machine: bodies, joints, limits, stance. Read from a folder `robots/<name>/` that holds a
+//! URDF (bodies, joints, limits, collision shapes) and a `robot.toml` (what a URDF cannot say).
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::kinematics::LegGeometry;
+use super::{Joints, PerLeg};
+
+/// One rigid body. Frames are parallel to the body frame at zero joint angles.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Body {
+    /// Link name, for example `FR_thigh`.
+    pub name: String,
+    /// Mass, kg.
+    pub mass: f64,
+    /// Centre of mass in the link's frame, m.
+    pub com: Vector3<f64>,
+    /// Rotational inertia about the centre of mass in link axes, kg m^2.
+    pub inertia_com: Matrix3<f64>,
+    /// Shapes that can touch the ground, in the link's frame.
+    pub collision: Vec<Shape>,
+}
+
+/// A collision shape in the frame of its link.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Shape {
+    /// A sphere.
+    Sphere {
+        /// Centre, m.
+        center: Vector3<f64>,
+        /// Radius, m.
+        radius: f64,
+    },
+    /// A box.
+    Box {
+        /// Centre, m.
+        center: Vector3<f64>,
+        /// Rotation of the box's axes into link axes.
+        rotation: Matrix3<f64>,
+        /// Half of each edge, m.
+        half_extents: Vector3<f64>,
+    },
+    /// A cylinder along its own z axis.
+    Cylinder {
+        /// Centre, m.
+        center: Vector3<f64>,
+        /// Rotation of the cylinder's axes into link axes.
+        rotation: Matrix3<f64>,
+        /// Radius, m.
+        radius: f64,
+        /// Half of its length, m.
+        half_length: f64,
+    },
+}
+
+/// One leg: three bodies and the joints that carry them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LegDescription {
+    /// Hip, thigh and calf; the foot's mass is part of the calf.
+    pub bodies: [Body; 3],
+    /// Origin of each joint in its parent's frame, m.
+    pub joint_origin: [Vector3<f64>; 3],
+    /// Centre of the foot in the calf's frame, m.
+    pub foot_origin: Vector3<f64>,
+    /// Radius of the foot, m.
+    pub foot_radius: f64,
+}
+
+/// Hard limits of the twelve joints.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct JointLimits {
+    /// Lowest angles, rad.
+    pub min_position: Joints,
+    /// Highest angles, rad.
+    pub max_position: Joints,
+    /// Largest absolute torques, N m.
+    pub max_torque: Joints,
+    /// Largest absolute velocities, rad/s (the no-load speed of the motor).
+    pub max_velocity: Joints,
+}
+
+/// Everything that is constant about a machine.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RobotDescription {
+    /// Name, for example `go1`.
+    pub name: String,
+    /// The floating base.
+    pub trunk: Body,
+    /// Legs in the order FR, FL, RR, RL.
+    pub legs: PerLeg<LegDescription>,
+    /// Lengths for the closed-form leg kinematics, the same for all legs but for the side.
+    pub leg_geometry: LegGeometry,
+    /// Hard limits.
+    pub limits: JointLimits,
+    /// Joint angles of the machine lying folded on the floor, rad: where standing up starts and sitting down ends.
+    pub lying_position: Joints,
+}
