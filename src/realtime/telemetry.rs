@@ -6,7 +6,7 @@ use crate::realtime::command::Command;
 use crate::robot::{JointCommand, Joints, LEGS, PerLeg, RobotState, joint_name};
 
 /// What the machine is doing as a whole. One function, `control::mode::next`, owns the changes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 pub enum Mode {
     /// No state from the robot; nothing is sent.
     Offline,

@@ -1,1 +1,3 @@
-//! recording
+//! Sessions on disk: what is kept (`record`), how it is written and read back.
+
+pub mod record;
