@@ -1,6 +1,7 @@
 //! The engine of quadfrog.
 
 pub mod control;
+pub mod engine;
 pub mod optimize;
 pub mod realtime;
 pub mod recording;

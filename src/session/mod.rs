@@ -1,1 +1,3 @@
-//! session
+//! The life of a trial: proposed, approved, run, measured, judged.
+
+pub mod intent;
