@@ -109,6 +109,11 @@ impl Cycle {
         self.mode
     }
 
+    /// Age of the robot's newest state, ms; zero while it answers.
+    pub fn state_age_ms(&self) -> u32 {
+        self.state_age_ms
+    }
+
     /// What the last tick caused.
     pub fn events(&self) -> &Events {
         &self.events

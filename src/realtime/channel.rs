@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use super::command::Command;
-use super::telemetry::{Event, Snapshot, Tick};
+use super::telemetry::{Counters, Event, Snapshot, Tick};
 
 /// Commands that may wait.
 pub const COMMANDS: usize = 64;
@@ -69,6 +69,8 @@ pub struct ControlEnd {
     pub shown: rtrb::Producer<Tick>,
     /// The newest tick and the counters.
     pub snapshot: triple_buffer::Input<Snapshot>,
+    /// The counters, for the session.
+    pub counters: triple_buffer::Input<Counters>,
     /// What happened.
     pub events: rtrb::Producer<Event>,
 }
@@ -77,6 +79,8 @@ pub struct ControlEnd {
 pub struct SessionEnd {
     /// What it asks.
     pub commands: rtrb::Producer<Command>,
+    /// The newest counters.
+    pub counters: triple_buffer::Output<Counters>,
     /// What happened.
     pub events: rtrb::Consumer<Event>,
 }
@@ -100,6 +104,7 @@ pub fn channels() -> (ControlEnd, SessionEnd, ScreenEnd, rtrb::Consumer<Tick>) {
     let (shown_in, shown_out) = rtrb::RingBuffer::new(SHOWN_TICKS);
     let (event_in, event_out) = rtrb::RingBuffer::new(EVENTS);
     let (snapshot_in, snapshot_out) = triple_buffer::triple_buffer(&Snapshot::default());
+    let (counters_in, counters_out) = triple_buffer::triple_buffer(&Counters::default());
     let (stop, heartbeat) = (StopLatch::default(), Heartbeat::default());
     let control = ControlEnd {
         commands: command_out,
@@ -108,9 +113,10 @@ pub fn channels() -> (ControlEnd, SessionEnd, ScreenEnd, rtrb::Consumer<Tick>) {
         ticks: tick_in,
         shown: shown_in,
         snapshot: snapshot_in,
+        counters: counters_in,
         events: event_in,
     };
-    let session = SessionEnd { commands: command_in, events: event_out };
+    let session = SessionEnd { commands: command_in, counters: counters_out, events: event_out };
     let screen = ScreenEnd { stop, heartbeat, shown: shown_out, snapshot: snapshot_out };
     (control, session, screen, tick_out)
 }
