@@ -131,7 +131,9 @@ fn run(scenario: &Scenario<'_>, run: &Value, name: &str, tally: &mut Tally) -> [
     let (fixed_plan, states) = (&run["fixed"], run["s"].as_str().unwrap().as_bytes());
     let zombies: HashMap<u64, (usize, Option<u64>)> = scenario.file["zombie_plan"]
         .as_array()
-        .map(|plan| plan.iter().map(|z| (z[0].as_u64().unwrap(), (z[1].as_u64().unwrap() as usize, z[2].as_u64()))).collect())
+        .map(|plan| {
+            plan.iter().map(|z| (z[0].as_u64().unwrap(), (z[1].as_u64().unwrap() as usize, z[2].as_u64()))).collect()
+        })
         .unwrap_or_default();
     let mut trials: Vec<Trial> = Vec::new();
     for (index, theirs) in expected.iter().enumerate() {
@@ -203,7 +205,9 @@ fn units(file: &Value, after: &HashMap<String, [[f64; 2]; 2]>, tally: &mut Tally
     }
     let (q, a, b) = (floats(&file["ppf"]["q"]), floats(&file["ppf"]["a"]), floats(&file["ppf"]["b"]));
     for (i, theirs) in floats(&file["ppf"]["x"]).into_iter().enumerate() {
-        tally.compare(quantile(q[i], a[i], b[i]), theirs, b[i] - a[i], || format!("quantile {} of {}..{}", q[i], a[i], b[i]));
+        tally.compare(quantile(q[i], a[i], b[i]), theirs, b[i] - a[i], || {
+            format!("quantile {} of {}..{}", q[i], a[i], b[i])
+        });
     }
     for (run, next) in file["rng_after_run"].as_object().unwrap() {
         let [model, startup] = after.get(run).unwrap_or_else(|| panic!("no run `{run}` in the golden files"));
@@ -235,7 +239,10 @@ fn golden_tpe() {
         for one in runs {
             let next = run(&scenario, one, name, &mut tally);
             let multivariate = if one["multivariate"] == true { "True" } else { "False" };
-            after.insert(format!("{name}.json seed {} dim {} multivariate {multivariate}", one["seed"], one["dim"]), next);
+            after.insert(
+                format!("{name}.json seed {} dim {} multivariate {multivariate}", one["seed"], one["dim"]),
+                next,
+            );
         }
         println!(
             "golden_tpe: {name}: {} runs, {} suggestions, largest difference {:.1e} of the range",

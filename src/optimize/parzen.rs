@@ -53,7 +53,8 @@ impl Parzen {
     /// components first, then coordinate by coordinate.
     pub fn sample(&self, stream: &mut Mt19937, count: usize) -> Vec<Vec<f64>> {
         let kernels: Vec<usize> = (0..count).map(|_| choose(&self.weight, stream)).collect();
-        let draw = |axis: &Axis, k: usize, u: f64| quantile(u, axis.a[k], axis.b[k]) * axis.bandwidth[k] + axis.centre[k];
+        let draw =
+            |axis: &Axis, k: usize, u: f64| quantile(u, axis.a[k], axis.b[k]) * axis.bandwidth[k] + axis.centre[k];
         self.axes.iter().map(|axis| kernels.iter().map(|&k| draw(axis, k, stream.double())).collect()).collect()
     }
 
@@ -87,7 +88,8 @@ impl Axis {
         let mut bandwidth = bandwidths(observations, low, high);
         centre.push(0.5 * (low + high)); // the prior
         bandwidth.push(high - low);
-        let standardize = |bound: f64| -> Vec<f64> { centre.iter().zip(&bandwidth).map(|(m, s)| (bound - m) / s).collect() };
+        let standardize =
+            |bound: f64| -> Vec<f64> { centre.iter().zip(&bandwidth).map(|(m, s)| (bound - m) / s).collect() };
         let (a, b) = (standardize(low), standardize(high));
         let log_mass = a.iter().zip(&b).map(|(&a, &b)| log_mass(a, b)).collect();
         let log_bandwidth = bandwidth.iter().map(|s| log(*s)).collect();

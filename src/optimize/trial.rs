@@ -138,9 +138,8 @@ impl Trial {
 
     /// The joint sample announced for other workers, empty where there is none. Optuna writes it as JSON text in pieces.
     pub fn announced(&self) -> Vec<(String, f64)> {
-        let text: String = (0..)
-            .map_while(|i| self.system_attributes.get(&format!("{RELATIVE_PARAMS}:{i}"))?.as_str())
-            .collect();
+        let text: String =
+            (0..).map_while(|i| self.system_attributes.get(&format!("{RELATIVE_PARAMS}:{i}"))?.as_str()).collect();
         match serde_json::from_str(&text) {
             Ok(Value::Object(map)) => map.iter().filter_map(|(k, v)| Some((k.clone(), number_of(v)?))).collect(),
             _ => Vec::new(),
@@ -155,8 +154,12 @@ impl Trial {
     /// The sum of the positive constraint values, 0 if there are none: above 0 the trial is infeasible to Optuna.
     pub fn violation(&self) -> f64 {
         let positive = |v: &Value| number_of(v).unwrap_or(0.0).max(0.0);
-        let named: f64 =
-            self.system_attributes.iter().filter(|(k, _)| k.starts_with("constraints:")).map(|(_, v)| positive(v)).sum();
+        let named: f64 = self
+            .system_attributes
+            .iter()
+            .filter(|(k, _)| k.starts_with("constraints:"))
+            .map(|(_, v)| positive(v))
+            .sum();
         let listed: f64 = match self.system_attributes.get("constraints") {
             Some(Value::Array(list)) => list.iter().map(positive).sum(),
             _ => 0.0,
@@ -175,9 +178,11 @@ pub fn announcement(joint: &[(String, f64)]) -> Vec<(String, Value)> {
     if joint.is_empty() {
         return Vec::new();
     }
-    let members: Vec<String> = joint.iter().map(|(n, v)| format!("{}: {}", Value::from(n.as_str()), Value::from(*v))).collect();
+    let members: Vec<String> =
+        joint.iter().map(|(n, v)| format!("{}: {}", Value::from(n.as_str()), Value::from(*v))).collect();
     let text: Vec<char> = format!("{{{}}}", members.join(", ")).chars().collect();
-    let piece = |(i, c): (usize, &[char])| (format!("{RELATIVE_PARAMS}:{i}"), Value::from(c.iter().collect::<String>()));
+    let piece =
+        |(i, c): (usize, &[char])| (format!("{RELATIVE_PARAMS}:{i}"), Value::from(c.iter().collect::<String>()));
     text.chunks(2045).enumerate().map(piece).collect()
 }
 
