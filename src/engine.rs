@@ -197,7 +197,7 @@ impl Engine {
         let recording = prepare_folder(&options)?;
         let recording_name =
             recording.as_ref().and_then(|path| path.file_name()).map(|name| name.to_string_lossy().into_owned());
-        let life = open_life(&options, Durability::Disk, recording_name.as_deref().unwrap_or_default())?;
+        let life = open_life(&options, Durability::Synced, recording_name.as_deref().unwrap_or_default())?;
         let info = session_info(&options, &recording.as_ref().map(|p| p.display().to_string()).unwrap_or_default());
         let clock = MonotonicClock::start();
         let writer = match &recording {

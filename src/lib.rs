@@ -1,5 +1,6 @@
 //! The engine of quadfrog.
 
+pub mod config;
 pub mod control;
 pub mod engine;
 pub mod optimize;
