@@ -12,7 +12,7 @@ use std::time::Duration;
 use serde_json::json;
 
 use crate::config::{Backend, Config, ConfigError};
-use crate::optimize::journal::Durability;
+use crate::optimize::journal::{Durability, Journal, JournalFile, LOCK_GRACE};
 use crate::optimize::sampler::Direction;
 use crate::optimize::space::{Range, Space, SpaceError};
 use crate::optimize::study::{Storage, Study, StudyError, StudyOptions};
@@ -69,6 +69,12 @@ pub enum EngineError {
     /// The recording.
     #[error(transparent)]
     Recording(#[from] RecordingError),
+    /// A journal without a study of ours.
+    #[error("{}: holds no study of this program; give one that it made", file.display())]
+    NoStudy {
+        /// The file.
+        file: PathBuf,
+    },
     /// The folder of the study, or a thread.
     #[error("{what}: {source}")]
     System {
@@ -359,4 +365,28 @@ impl Drop for Handle {
     fn drop(&mut self) {
         self.end();
     }
+}
+
+/// A study that is on disk.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct StoredStudy {
+    /// Its task.
+    pub task: Task,
+    /// Its seed.
+    pub seed: u32,
+}
+
+/// What study `file` holds.
+///
+/// # Errors
+/// When the file cannot be read or holds no study of this program.
+pub fn stored_study(file: &std::path::Path) -> Result<StoredStudy, EngineError> {
+    let journal_file = JournalFile::new(file, Durability::Synced, LOCK_GRACE).map_err(StudyError::from)?;
+    let journal = Journal::open(journal_file).map_err(StudyError::from)?;
+    let ours = journal.replay().studies().iter().find_map(|study| {
+        let task = Task::from_name(study.user_attributes.get("task")?.as_str()?)?;
+        let seed = u32::try_from(study.user_attributes.get("seed")?.as_u64()?).ok()?;
+        Some(StoredStudy { task, seed })
+    });
+    ours.ok_or_else(|| EngineError::NoStudy { file: file.to_owned() })
 }

@@ -235,12 +235,7 @@ impl Config {
     ///
     /// # Errors
     /// When the stance of `task` is out of the robot's reach.
-    pub fn settings(
-        &self,
-        robot: &RobotDescription,
-        task: Task,
-        backend: Backend,
-    ) -> Result<Settings, ConfigError> {
+    pub fn settings(&self, robot: &RobotDescription, task: Task, backend: Backend) -> Result<Settings, ConfigError> {
         let chosen = self.task(task);
         self.check_stance(robot, task)?;
         let hardware = backend == Backend::Hardware;
