@@ -4,7 +4,7 @@
 mod checked;
 mod merge;
 
-pub use checked::{Backend, Config, ControlFile, OptimizeFile, SafetyFile, TaskControl};
+pub use checked::{Backend, Config, ControlFile, OptimizeFile, SafetyFile};
 
 use std::path::PathBuf;
 

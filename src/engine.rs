@@ -217,7 +217,7 @@ impl Engine {
         let (trial_ticks_in, trial_ticks) = channel();
         let recorder = Recorder::spawn(tick_end, recorder_records, writer, trial_ticks_in);
         let outlets = Outlets { recorder: to_recorder, screen: to_screen };
-        let status = recorder.status();
+        let status = recorder.watch();
         let closing = Arc::new(AtomicBool::new(false));
 
         let system = |what: &'static str| {

@@ -39,7 +39,7 @@
 //! engine     -> everything below                       wires
 //! config     -> everything below                       files to checked values
 //! report     -> recording, optimize                    draws what happened
-//! session    -> optimize, recording, control, sim, realtime    decides which trial, and whether it counts
+//! session    -> optimize, recording, control, sim, realtime, robot    decides which trial, and whether it counts
 //! recording  -> realtime, robot                        writes and reads what was known
 //! control    -> robot, realtime                        decides this millisecond's torques
 //! sim        -> robot                                  answers as the machine would

@@ -13,7 +13,7 @@ const MAY_USE: [(&str, &[&str]); 10] = [
     ("control", &["robot", "realtime"]),
     ("recording", &["realtime", "robot"]),
     ("report", &["recording", "optimize"]),
-    ("session", &["optimize", "recording", "control", "sim", "realtime", "robot", "config"]),
+    ("session", &["optimize", "recording", "control", "sim", "realtime", "robot"]),
     ("config", &["optimize", "recording", "control", "sim", "realtime", "robot"]),
     (
         "engine",

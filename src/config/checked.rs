@@ -11,14 +11,13 @@ use super::ConfigError;
 use super::merge::merge;
 use crate::control::estimator::GRAVITY;
 use crate::control::leg::stance_of;
-use crate::control::settings::{Fall, Gate, Ramp, Settings, Settle, Stand, Watchdog};
+use crate::control::settings::{Fall, Gate, Ramp, Settings, Settle, Stand, TaskControl, Watchdog};
 use crate::optimize::sampler::SamplerConfig;
-use crate::realtime::command::{Gains, Task};
+use crate::realtime::command::Task;
 use crate::recording::record::ParameterInfo;
 use crate::robot::Leg;
 use crate::robot::description::RobotDescription;
 use crate::sim::SimConfig;
-use nalgebra::Vector3;
 
 /// The files of a configuration folder and their defaults.
 const FILES: [(&str, &str); 5] = [
@@ -69,39 +68,6 @@ pub struct Countdown {
 pub struct Contact {
     /// Least force at its sensor, N.
     pub force_n: f64,
-}
-
-/// What one task's trials run with.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
-pub struct TaskControl {
-    /// Cartesian stiffness, N/m.
-    pub kp: f64,
-    /// Cartesian damping, N s/m.
-    pub kd: f64,
-    /// Joint damping, N m s/rad.
-    pub kd_joint: f64,
-    /// Attitude gain, N/m.
-    pub k_att: f64,
-    /// Nominal foot of a left leg, leg frame, m.
-    pub stance_m: [f64; 3],
-    /// Virtual Model Control on or off.
-    pub vmc: bool,
-    /// Jumps in a row.
-    pub jumps: u32,
-    /// Frequency between impulses, Hz.
-    pub f1_hz: f64,
-}
-
-impl TaskControl {
-    /// The gains.
-    pub fn gains(&self) -> Gains {
-        Gains { kp: self.kp, kd: self.kd, kd_joint: self.kd_joint, k_att: self.k_att }
-    }
-
-    /// The nominal foot of a left leg, leg frame, m.
-    pub fn stance_leg(&self) -> Vector3<f64> {
-        self.stance_m.into()
-    }
 }
 
 /// `safety.toml`.

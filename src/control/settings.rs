@@ -92,6 +92,40 @@ pub struct Watchdog {
     pub late_ms: f64,
 }
 
+/// What the trials of one task run with: a section `[tasks.<task>]` of `config/control.toml`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TaskControl {
+    /// Cartesian stiffness, N/m.
+    pub kp: f64,
+    /// Cartesian damping, N s/m.
+    pub kd: f64,
+    /// Joint damping, N m s/rad.
+    pub kd_joint: f64,
+    /// Attitude gain, N/m.
+    pub k_att: f64,
+    /// Nominal foot of a left leg, leg frame, m.
+    pub stance_m: [f64; 3],
+    /// Virtual Model Control on or off.
+    pub vmc: bool,
+    /// Jumps in a row.
+    pub jumps: u32,
+    /// Frequency between impulses, Hz.
+    pub f1_hz: f64,
+}
+
+impl TaskControl {
+    /// The gains.
+    pub fn gains(&self) -> Gains {
+        Gains { kp: self.kp, kd: self.kd, kd_joint: self.kd_joint, k_att: self.k_att }
+    }
+
+    /// The nominal foot of a left leg, leg frame, m.
+    pub fn stance_leg(&self) -> Vector3<f64> {
+        self.stance_m.into()
+    }
+}
+
 /// Everything that the control cycle is made with.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {

@@ -10,12 +10,12 @@ mod card;
 
 use std::collections::BTreeMap;
 
-use crate::config::TaskControl;
 use crate::optimize::study::{Outcome, Study, StudyError};
 use crate::optimize::trial::TrialState;
-use crate::realtime::command::{Gains, JumpParameters, Task, TrialSpec};
+use crate::control::settings::TaskControl;
+use crate::realtime::command::{ JumpParameters, Task, TrialSpec};
 use crate::realtime::telemetry::{Tick, TrialEnd};
-use crate::recording::record::{ParameterInfo, Proposal, Record, Source, Stage, StageInfo, TrialRecord, Verdict};
+use crate::recording::record::{ParameterInfo, Proposal, Record, Stage, StageInfo, TrialRecord, Verdict};
 
 use super::objective;
 use attributes::{Judgement, Origin};
@@ -518,7 +518,7 @@ impl Life {
                 fy_n: value("Fy"),
                 fz_n: value("Fz"),
             },
-            gains: Gains { ..control.gains() },
+            gains: control.gains(),
             stance_leg: control.stance_leg(),
             vmc: control.vmc,
             jumps: control.jumps,

@@ -13,7 +13,7 @@ use crate::realtime::telemetry::{Cause, Event, Mode, Tick, TrialEnd};
 use crate::recording::record::{
     CommandRecord, Level, LogRecord, Record, SessionInfo, Stage, Stamped, Transition, Verdict,
 };
-use crate::recording::recorder::{RecorderStatus, TrialTicks};
+use crate::recording::recorder::{RecorderWatch, TrialTicks};
 
 /// Ticks that go with a fault into the recording.
 const FAULT_TICKS: usize = 200;
@@ -43,7 +43,7 @@ pub struct Supervisor {
     control: SessionEnd,
     trial_ticks: Receiver<TrialTicks>,
     outlets: Outlets,
-    recorder: RecorderStatus,
+    recorder: RecorderWatch,
     mode: Mode,
     cause: Cause,
     /// How the running trial ended, until its ticks have arrived too.
@@ -62,7 +62,7 @@ impl Supervisor {
         control: SessionEnd,
         trial_ticks: Receiver<TrialTicks>,
         outlets: Outlets,
-        recorder: RecorderStatus,
+        recorder: RecorderWatch,
         info: SessionInfo,
         time_ns: u64,
     ) -> Supervisor {
@@ -101,7 +101,7 @@ impl Supervisor {
             self.measured.push_back(ticks);
         }
         self.measure(time_ns);
-        let complaint = self.recorder.error();
+        let complaint = self.recorder.get().error;
         if complaint != self.recorder_complaint {
             if let Some(complaint) = &complaint {
                 self.log(Level::Error, format!("the recording failed: {complaint}"), time_ns);
