@@ -40,6 +40,8 @@ pub struct SolverConfig {
     pub max_sweeps: u32,
     /// Share of a penetration taken back per step.
     pub penetration_recovery: f64,
+    /// Zero: Coulomb's law. More: sliding points leave the ground as in MuJoCo, with this time constant, s.
+    pub dilatancy_time_s: f64,
 }
 
 /// `[contact]`.
@@ -269,6 +271,8 @@ impl SimConfig {
         positive("solver.tolerance_m_s", self.solver.tolerance_m_s)?;
         count("solver.max_sweeps", self.solver.max_sweeps, 10_000, "give 1 to 10000")?;
         share("solver.penetration_recovery", self.solver.penetration_recovery)?;
+
+        not_negative("solver.dilatancy_time_s", self.solver.dilatancy_time_s)?;
 
         let terrain = &self.terrain;
         not_negative("terrain.friction", terrain.friction)?;

@@ -1,5 +1,10 @@
 //! Rigid unilateral contacts with Coulomb's cone, joint stops and dry joint friction, all solved together.
 //!
+//! MuJoCo and others relax Coulomb's law to a convex problem (Anitescu, "Optimization-based simulation of nonsmooth rigid
+//! multibody dynamics", Math. Program. 105, 2006; Todorov, "Convex and analytically-invertible dynamics with contacts and
+//! constraints", ICRA 2014). Its price: a point that slides also leaves the ground, v_n = mu |v_t| ("dilatancy"), reached in
+//! MuJoCo with the time constant of its contacts. `solver.dilatancy_time_s` switches that on for comparison; zero is Coulomb.
+//!
 //! Unknown are the impulses of one step. For every contact: 0 <= impulse_n, 0 <= gap after the step, one of them zero
 //! (Signorini, at the level of the position reached); and |impulse_t| <= mu impulse_n, opposed to the sliding velocity
 //! where there is any (Coulomb). A Gauss-Seidel sweep goes from contact to contact and solves each one exactly with the
@@ -74,6 +79,8 @@ pub(super) struct Contact {
     free: Vector3<f64>,
     /// Of Coulomb's equation; where the last search ended.
     slip: f64,
+    /// Share of mu |v_t| at which a sliding point leaves the ground.
+    lift: f64,
     impulse: Vector3<f64>,
 }
 
@@ -98,6 +105,8 @@ pub(super) struct ContactSolver {
     rows: Vec<Row>,
     /// Impulses of the last step in world axes, by [`ContactPoint::memory`].
     memory: Vec<Vector3<f64>>,
+    /// Share of mu |v_t| at which a sliding point leaves the ground within this step.
+    lift: f64,
 }
 
 impl ContactSolver {
@@ -107,19 +116,23 @@ impl ContactSolver {
             contacts: Vec::with_capacity(MAX_CONTACTS),
             rows: Vec::with_capacity(MAX_ROWS),
             memory: vec![Vector3::zeros(); memories],
+            lift: 0.0,
         }
     }
 
     /// Forgets the last step's impulses.
     pub fn reset(&mut self) {
-        self.clear();
+        self.contacts.clear();
+        self.rows.clear();
         self.memory.fill(Vector3::zeros());
     }
 
-    /// Starts a step.
-    pub fn clear(&mut self) {
+    /// Starts a step of `h` seconds.
+    pub fn start(&mut self, h: f64) {
         self.contacts.clear();
         self.rows.clear();
+        let time = self.config.dilatancy_time_s;
+        self.lift = if time > 0.0 { -(-h / time).exp_m1() } else { 0.0 };
     }
 
     pub fn is_empty(&self) -> bool {
@@ -180,6 +193,7 @@ impl ContactSolver {
             local_inverse: local.try_inverse().unwrap_or_else(Matrix3::zeros),
             free,
             slip: 0.0,
+            lift: self.lift,
             impulse,
         });
     }
@@ -274,38 +288,51 @@ impl Contact {
         if friction < 1e-9 {
             return Vector3::new(-c.x / a_nn, 0.0, 0.0);
         }
-        // Sliding: v_n = 0, v_t = -s p_t with s > 0 and |p_t| = mu p_n. With p_n eliminated
-        //   (B + s 1) p_t = -d,  B = A_tt - a a^T / a_nn,  d = c_t - a c_n / a_nn,  p_n = -(c_n + a . p_t) / a_nn.
-        let a = Vector2::new(self.local.m12, self.local.m13);
-        let d = Vector2::new(c.y, c.z) - a * (c.x / a_nn);
-        let b11 = self.local.m22 - a.x * a.x / a_nn;
-        let b12 = self.local.m23 - a.x * a.y / a_nn;
-        let b22 = self.local.m33 - a.y * a.y / a_nn;
-        let tangential = |s: f64| {
-            let (m11, m22) = (b11 + s, b22 + s);
-            let inverse = 1.0 / (m11 * m22 - b12 * b12);
-            let p = Vector2::new(b12 * d.y - m22 * d.x, b12 * d.x - m11 * d.y) * inverse;
-            // dp/ds = -(B + s 1)^-1 p
-            let dp = Vector2::new(b12 * p.y - m22 * p.x, b12 * p.x - m11 * p.y) * inverse;
-            (p, dp)
+        // Sliding: v_t = -s p_t with s > 0, |p_t| = mu p_n, and v_n = lift mu |v_t| = lift mu^2 s p_n:
+        //   (A + s D) p = -c,  D = diag(-lift mu^2, 1, 1).
+        let weight = -self.lift * friction * friction;
+        let m = &self.local;
+        // p(s), and dp/ds = -(A + s D)^-1 D p; none where A + s D is no longer positive: s is too large.
+        let at = |s: f64| {
+            let (m11, m22, m33) = (m.m11 + s * weight, m.m22 + s, m.m33 + s);
+            let (i11, i12, i13) =
+                (m22 * m33 - m.m23 * m.m23, m.m13 * m.m23 - m.m12 * m33, m.m12 * m.m23 - m.m13 * m22);
+            let determinant = m11 * i11 + m.m12 * i12 + m.m13 * i13;
+            if m11 <= 0.0 || determinant <= 0.0 {
+                return None;
+            }
+            let (i22, i23, i33) = (m11 * m33 - m.m13 * m.m13, m.m12 * m.m13 - m11 * m.m23, m11 * m22 - m.m12 * m.m12);
+            let solve = |v: Vector3<f64>| {
+                let product = Vector3::new(
+                    i11 * v.x + i12 * v.y + i13 * v.z,
+                    i12 * v.x + i22 * v.y + i23 * v.z,
+                    i13 * v.x + i23 * v.y + i33 * v.z,
+                );
+                product / -determinant
+            };
+            let p = solve(*c);
+            Some((p, solve(Vector3::new(weight * p.x, p.y, p.z))))
         };
-        let normal = |p: &Vector2<f64>| -(c.x + a.dot(p)) / a_nn;
         // f(s) = |p_t| - mu p_n has a root in (0, highest]: at 0 the force is outside the cone, at `highest` inside.
+        let a = Vector2::new(m.m12, m.m13);
+        let d = Vector2::new(c.y, c.z) - a * (c.x / a_nn);
         let (mut low, mut high) = (0.0, d.norm() * (a_nn + friction * a.norm()) / (friction * -c.x));
         let mut s = if self.slip > low && self.slip < high { self.slip } else { 0.0 };
+        let mut best = stick;
         for _ in 0..60 {
-            let (p, dp) = tangential(s);
-            let size = p.norm();
-            let f = size - friction * normal(&p);
+            let Some((p, dp)) = at(s) else {
+                high = s;
+                s = 0.5 * (low + high);
+                continue;
+            };
+            best = p;
+            let size = p.y.hypot(p.z);
+            let f = size - friction * p.x;
             if f.abs() <= 1e-14 * size {
                 break;
             }
-            if f > 0.0 {
-                low = s
-            } else {
-                high = s
-            }
-            let slope = p.dot(&dp) / size + friction * a.dot(&dp) / a_nn;
+            if f > 0.0 { low = s } else { high = s }
+            let slope = (p.y * dp.y + p.z * dp.z) / size - friction * dp.x;
             let newton = s - f / slope;
             let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
             if next == s {
@@ -314,8 +341,7 @@ impl Contact {
             s = next;
         }
         self.slip = s;
-        let (p, _) = tangential(s);
-        into_cone(&Vector3::new(normal(&p), p.x, p.y), friction)
+        into_cone(&best, friction)
     }
 }
 

@@ -5,6 +5,7 @@
 //! commands give the same bits. Nothing allocates after `new` and `place`.
 
 mod actuator;
+pub mod bench;
 mod collision;
 mod config;
 mod contact;
@@ -110,6 +111,11 @@ impl Simulator {
     pub fn smallest_gap(&self) -> f64 {
         let dynamics = Dynamics::new(&self.model, &self.state, &[0.0; JOINTS]);
         self.collider.smallest_gap(&dynamics, &self.state, &self.terrain)
+    }
+
+    /// Number of points that touched, or could have, in the last step.
+    pub fn contact_count(&self) -> usize {
+        self.solver.contacts().len()
     }
 
     /// The steps or blocks on the ground: centre, half edges and direction of the first edge in the horizontal plane, height

@@ -92,7 +92,7 @@ impl Simulator {
     }
 
     fn find_contacts(&mut self, dynamics: &Dynamics, free: &Velocity, dry_friction: &[f64; JOINTS], h: f64) {
-        self.solver.clear();
+        self.solver.start(h);
         let world_from_body = self.world_from_body();
         let (state, terrain, world_from_body) = (&self.state, &self.terrain, &world_from_body);
         let moment = Moment { dynamics, state, terrain, world_from_body, free, h };
