@@ -6,7 +6,7 @@ mod support;
 use nalgebra::{UnitQuaternion, Vector3};
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::robot::{JointCommand, Joints, Leg, MotorCommand, Placement, Robot};
-use quadfrog::sim::{GRAVITY, SimConfig, Simulator, State, TerrainKind};
+use quadfrog::sim::{ContactLaw, GRAVITY, SimConfig, Simulator, State, TerrainKind};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use support::Largest;
@@ -139,13 +139,14 @@ fn a_drop_from_half_a_metre_sinks_in_less_than_half_a_millimetre() {
     assert!(deepest.value < 5e-4);
 }
 
-/// Limp robots, thrown at random: the energy after any millisecond is no more than the most recent least.
+/// Limp robots, thrown at random: never more energy than at the start, and hardly ever more than the least so far. (The steps in
+/// contact are of first order: limbs that whirl at their stops exchange a little energy with the step.)
 #[test]
 fn no_energy_is_gained_in_a_thousand_drops() {
     let robot = go1();
     let mut random = ChaCha8Rng::seed_from_u64(11);
     let mut simulator = Simulator::new(&robot, &with_friction(0.6)).unwrap();
-    let mut gain = Largest::default();
+    let (mut gain, mut over) = (Largest::default(), Largest::default());
     for drop in 0..1000 {
         let limits = &robot.limits;
         let mut vector = |size: f64| Vector3::from_fn(|_, _| uniform(&mut random, -size, size));
@@ -167,18 +168,28 @@ fn no_energy_is_gained_in_a_thousand_drops() {
             let now = simulator.model().energy(simulator.state()).total();
             gain.see((now - energy).max(0.0) / scale, || format!("drop {drop}, {tick} ms"));
             energy = energy.min(now);
+            over.see((now - scale).max(0.0) / scale, || format!("drop {drop}, {tick} ms"));
         }
     }
-    println!("largest gain over the least energy so far, as a share of the start's: {gain}");
-    assert!(gain.value < 1e-3);
+    println!("largest gain over the start {over}, over the least so far {gain}, as shares of the start's");
+    assert!(over.value < 1e-9);
+    assert!(gain.value < 0.02);
 }
 
-/// A lying robot on a slope: sticks below atan(mu), slides above, and there at the rate that Coulomb's law gives.
+/// A lying robot on a slope sticks below atan(mu) and slides above, by Coulomb's law exactly at the rate that it gives, by the convex
+/// one, hopping a little, nearly so.
 #[test]
 fn friction_holds_below_its_angle_and_slips_above() {
+    for (law, tolerance) in [(ContactLaw::Coulomb, 1e-3), (ContactLaw::Convex, 0.1)] {
+        slide(law, tolerance);
+    }
+}
+
+fn slide(law: ContactLaw, tolerance: f64) {
     let friction: f64 = 0.5;
     let slid = |angle: f64| {
         let mut config = with_friction(friction);
+        config.contact.law = law;
         config.terrain.kind = TerrainKind::Slope;
         config.terrain.slope.angle_rad = angle;
         let robot = go1();
@@ -209,8 +220,8 @@ fn friction_holds_below_its_angle_and_slips_above() {
     let (_, acceleration) = slid(angle);
     // a = g (sin - mu cos)
     let expected = GRAVITY * (angle.sin() - friction * angle.cos());
-    println!("sliding at {acceleration} m/s^2, Coulomb gives {expected}");
-    assert!((acceleration / expected - 1.0).abs() < 0.02);
+    println!("{law:?}: sliding at {acceleration} m/s^2, Coulomb gives {expected}");
+    assert!((acceleration / expected - 1.0).abs() < tolerance);
 }
 
 #[test]

@@ -158,6 +158,7 @@ impl Collider {
             if leg == TRUNK { *p } else { dynamics.legs[leg].in_body(link, p) }
         };
         let reach = SPEED_LIMIT * h;
+        let now = Velocity::of(state);
         for ball in &self.balls {
             let center_body = place(ball.leg, ball.link, &ball.center);
             let center_world = state.position_world + world_from_body * center_body;
@@ -204,6 +205,7 @@ impl Collider {
                         normal_body,
                         gap: touch.gap,
                         friction: touch.friction,
+                        velocity_body: point_velocity(dynamics, &now, probe.leg, probe.link, &position_body),
                         ground_velocity_body,
                         block: touch.block,
                     };

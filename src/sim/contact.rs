@@ -1,17 +1,20 @@
 //! Rigid unilateral contacts with Coulomb's cone, joint stops and dry joint friction, all solved together.
 //!
-//! MuJoCo and others relax Coulomb's law to a convex problem (Anitescu, "Optimization-based simulation of nonsmooth rigid
-//! multibody dynamics", Math. Program. 105, 2006; Todorov, "Convex and analytically-invertible dynamics with contacts and
-//! constraints", ICRA 2014). Its price: a point that slides also leaves the ground, v_n = mu |v_t| ("dilatancy"), reached in
-//! MuJoCo with the time constant of its contacts. `solver.dilatancy_time_s` switches that on for comparison; zero is Coulomb.
+//! Unknown are the impulses p of one step, each in its cone K: |p_t| <= mu p_n. The cone is never cut into a pyramid. Two
+//! laws say which impulse of the cone it is (`contact.law`):
 //!
-//! Unknown are the impulses of one step. For every contact: 0 <= impulse_n, 0 <= gap after the step, one of them zero
-//! (Signorini, at the level of the position reached); and |impulse_t| <= mu impulse_n, opposed to the sliding velocity
-//! where there is any (Coulomb). A Gauss-Seidel sweep goes from contact to contact and solves each one exactly with the
-//! others held: Hwangbo, Lee, Hutter, "Per-contact iteration method for solving contact dynamics", IEEE RA-L 3(2),
-//! 2018. Where that paper bisects for the impulse of most dissipation, the local problem here is Coulomb's law itself,
-//! reduced to one scalar equation as in Bonnefon and Daviet, "Quartic formulation of Coulomb 3D frictional contact", INRIA
-//! RT-0400, 2011. The cone is never cut into a pyramid.
+//! - **Coulomb**: gap after the step >= 0, p_n >= 0, one of them zero (Signorini); a point that slides keeps sliding against p_t
+//!   at mu p_n and stays on the ground.
+//! - **Convex**, MuJoCo's: v' - k v in the dual cone K* and orthogonal to p, which makes all contacts one convex problem
+//!   (Anitescu, "Optimization-based simulation of nonsmooth rigid multibody dynamics", Math. Program. 105, 2006; Todorov,
+//!   "Convex and analytically-invertible dynamics with contacts and constraints", ICRA 2014). k v is what a slip keeps over a step:
+//!   k = exp(-h / slip_time). The price is dilatancy: a point that slides also rises, so fast sliding feet hop along.
+//!   Normal contact is rigid here, where MuJoCo's gives way.
+//!
+//! A Gauss-Seidel sweep goes from contact to contact and solves each one exactly with the others held: Hwangbo, Lee, Hutter,
+//! "Per-contact iteration method for solving contact dynamics", IEEE RA-L 3(2), 2018. Where that paper bisects for the
+//! impulse of most dissipation, the local problem here is the law itself, reduced to one scalar equation as in Bonnefon
+//! and Daviet, "Quartic formulation of Coulomb 3D frictional contact", INRIA RT-0400, 2011.
 //!
 //! With the factors of [`super::dynamics`] the Delassus matrix is J M^-1 J^T = W W^T + (within a leg) U U^T with
 //! W = (J_0 - J_l G_l) L^-T and U = J_l C_l^-T. The sweep keeps the sums y_0 = sum W^T p and y_l = sum U^T p, so one visit costs the
@@ -19,10 +22,11 @@
 
 use nalgebra::{Matrix3, Vector2, Vector3, Vector6};
 
-use super::config::SolverConfig;
+use super::config::{ContactConfig, ContactLaw, SolverConfig};
 use super::dynamics::{Dynamics, Matrix3x6};
 use super::quantities::stack;
-use crate::robot::{JOINTS, Joints, LEGS, PerLeg};
+use super::state::State;
+use crate::robot::{JOINTS, Joints, LEGS, PerLeg, leg_of};
 
 /// Most contacts at a time; a robot lying on blocks has about twenty. Beyond that the latest found are left out until the
 /// next step.
@@ -37,6 +41,16 @@ pub(super) const TRUNK: usize = LEGS;
 pub(super) struct Velocity {
     pub trunk: Vector6<f64>,
     pub legs: PerLeg<Vector3<f64>>,
+}
+
+impl Velocity {
+    /// That of `state`.
+    pub fn of(state: &State) -> Velocity {
+        Velocity {
+            trunk: stack(&state.velocity_body, &state.angular_velocity_body),
+            legs: std::array::from_fn(|leg| leg_of(&state.joint_velocity, leg)),
+        }
+    }
 }
 
 /// A point that touches or is about to.
@@ -56,6 +70,8 @@ pub(super) struct ContactPoint {
     pub gap: f64,
     /// Coulomb coefficient.
     pub friction: f64,
+    /// Its velocity at the start of the step, body axes, m/s.
+    pub velocity_body: Vector3<f64>,
     /// Velocity of the ground there, body axes, m/s: not zero for a sliding block.
     pub ground_velocity_body: Vector3<f64>,
     /// Which loose block it is, for those who move it.
@@ -79,8 +95,7 @@ pub(super) struct Contact {
     free: Vector3<f64>,
     /// Of Coulomb's equation; where the last search ended.
     slip: f64,
-    /// Share of mu |v_t| at which a sliding point leaves the ground.
-    lift: f64,
+    law: ContactLaw,
     impulse: Vector3<f64>,
 }
 
@@ -101,22 +116,26 @@ struct Row {
 #[derive(Debug, Clone)]
 pub(super) struct ContactSolver {
     config: SolverConfig,
+    law: ContactLaw,
+    slip_time_s: f64,
     contacts: Vec<Contact>,
     rows: Vec<Row>,
     /// Impulses of the last step in world axes, by [`ContactPoint::memory`].
     memory: Vec<Vector3<f64>>,
-    /// Share of mu |v_t| at which a sliding point leaves the ground within this step.
-    lift: f64,
+    /// Share of a slip that the convex law leaves after this step.
+    kept_slip: f64,
 }
 
 impl ContactSolver {
-    pub fn new(config: SolverConfig, memories: usize) -> ContactSolver {
+    pub fn new(config: SolverConfig, contact: &ContactConfig, memories: usize) -> ContactSolver {
         ContactSolver {
             config,
             contacts: Vec::with_capacity(MAX_CONTACTS),
             rows: Vec::with_capacity(MAX_ROWS),
             memory: vec![Vector3::zeros(); memories],
-            lift: 0.0,
+            law: contact.law,
+            slip_time_s: contact.slip_time_s,
+            kept_slip: 0.0,
         }
     }
 
@@ -131,8 +150,7 @@ impl ContactSolver {
     pub fn start(&mut self, h: f64) {
         self.contacts.clear();
         self.rows.clear();
-        let time = self.config.dilatancy_time_s;
-        self.lift = if time > 0.0 { -(-h / time).exp_m1() } else { 0.0 };
+        self.kept_slip = if self.slip_time_s > 0.0 { (-h / self.slip_time_s).exp() } else { 0.0 };
     }
 
     pub fn is_empty(&self) -> bool {
@@ -178,6 +196,11 @@ impl ContactSolver {
         }
         let local = trunk_rows * trunk_rows.transpose() + leg_rows * leg_rows.transpose();
         let mut free = axes_body.tr_mul(&(free_velocity_body - point.ground_velocity_body));
+        if let ContactLaw::Convex = self.law {
+            let before = axes_body.tr_mul(&(point.velocity_body - point.ground_velocity_body));
+            free.y -= self.kept_slip * before.y;
+            free.z -= self.kept_slip * before.z;
+        }
         // gap + h v_n >= 0; inside the ground a share of the way back per step.
         let share = if point.gap > 0.0 { 1.0 } else { self.config.penetration_recovery };
         free.x += share * point.gap / h;
@@ -193,7 +216,7 @@ impl ContactSolver {
             local_inverse: local.try_inverse().unwrap_or_else(Matrix3::zeros),
             free,
             slip: 0.0,
-            lift: self.lift,
+            law: self.law,
             impulse,
         });
     }
@@ -288,15 +311,17 @@ impl Contact {
         if friction < 1e-9 {
             return Vector3::new(-c.x / a_nn, 0.0, 0.0);
         }
-        // Sliding: v_t = -s p_t with s > 0, |p_t| = mu p_n, and v_n = lift mu |v_t| = lift mu^2 s p_n:
-        //   (A + s D) p = -c,  D = diag(-lift mu^2, 1, 1).
-        let weight = -self.lift * friction * friction;
+        // Sliding: v_t = -s p_t with s > 0 and |p_t| = mu p_n; v_n = 0 (Coulomb) or mu |v_t| = mu^2 s p_n (convex):
+        //   (A + s D) p = -c,  D = diag(0 or -mu^2, 1, 1).
+        let weight = match self.law {
+            ContactLaw::Coulomb => 0.0,
+            ContactLaw::Convex => -friction * friction,
+        };
         let m = &self.local;
         // p(s), and dp/ds = -(A + s D)^-1 D p; none where A + s D is no longer positive: s is too large.
         let at = |s: f64| {
             let (m11, m22, m33) = (m.m11 + s * weight, m.m22 + s, m.m33 + s);
-            let (i11, i12, i13) =
-                (m22 * m33 - m.m23 * m.m23, m.m13 * m.m23 - m.m12 * m33, m.m12 * m.m23 - m.m13 * m22);
+            let (i11, i12, i13) = (m22 * m33 - m.m23 * m.m23, m.m13 * m.m23 - m.m12 * m33, m.m12 * m.m23 - m.m13 * m22);
             let determinant = m11 * i11 + m.m12 * i12 + m.m13 * i13;
             if m11 <= 0.0 || determinant <= 0.0 {
                 return None;
@@ -331,7 +356,11 @@ impl Contact {
             if f.abs() <= 1e-14 * size {
                 break;
             }
-            if f > 0.0 { low = s } else { high = s }
+            if f > 0.0 {
+                low = s
+            } else {
+                high = s
+            }
             let slope = (p.y * dp.y + p.z * dp.z) / size - friction * dp.x;
             let newton = s - f / slope;
             let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };

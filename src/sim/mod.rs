@@ -22,8 +22,8 @@ mod terrain;
 use nalgebra::Vector3;
 
 pub use config::{
-    ActuatorConfig, ActuatorKind, BlocksConfig, BodyKind, ContactConfig, HardwareLikeConfig, SensorConfig, SimConfig,
-    SimError, SlopeConfig, SolverConfig, StepConfig, StepsConfig, TerrainConfig, TerrainKind,
+    ActuatorConfig, ActuatorKind, BlocksConfig, BodyKind, ContactConfig, ContactLaw, HardwareLikeConfig, SensorConfig,
+    SimConfig, SimError, SlopeConfig, SolverConfig, StepConfig, StepsConfig, TerrainConfig, TerrainKind,
 };
 pub use model::{GRAVITY, Model};
 pub use quantities::{DOF, Energy, FootMotion, Momentum};
@@ -73,7 +73,7 @@ impl Simulator {
         }
         let collider = Collider::new(description, config);
         Ok(Simulator {
-            solver: ContactSolver::new(config.solver, collider.memories()),
+            solver: ContactSolver::new(config.solver, &config.contact, collider.memories()),
             terrain: Terrain::new(&config.terrain),
             actuator: Actuator::new(motor, &description.limits),
             model,
