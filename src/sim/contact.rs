@@ -23,7 +23,7 @@
 use nalgebra::{Matrix3, Vector2, Vector3, Vector6};
 
 use super::config::{ContactConfig, ContactLaw, SolverConfig};
-use super::dynamics::{Dynamics, Matrix3x6};
+use super::dynamics::{Dynamics, Matrix6x3};
 use super::quantities::stack;
 use super::state::State;
 use crate::robot::{JOINTS, Joints, LEGS, PerLeg, leg_of};
@@ -58,22 +58,22 @@ impl Velocity {
 pub(super) struct ContactPoint {
     /// Which leg it is on; [`TRUNK`] for none.
     pub leg: usize,
-    /// Which link of the leg: 0 hip, 1 thigh, 2 calf.
-    pub link: usize,
     /// Where it remembers its impulse.
     pub memory: usize,
     /// The point, body axes, m.
     pub position_body: Vector3<f64>,
     /// Out of the ground, body axes.
     pub normal_body: Vector3<f64>,
+    /// J_l: its velocity per joint velocity of its leg, body axes; zero for the trunk.
+    pub leg_jacobian: Matrix3<f64>,
     /// Distance to the ground at the start of the step, m; negative where it is inside.
     pub gap: f64,
     /// Coulomb coefficient.
     pub friction: f64,
-    /// Its velocity at the start of the step, body axes, m/s.
-    pub velocity_body: Vector3<f64>,
-    /// Velocity of the ground there, body axes, m/s: not zero for a sliding block.
-    pub ground_velocity_body: Vector3<f64>,
+    /// Its velocity against the ground at the start of the step, body axes, m/s.
+    pub slip_body: Vector3<f64>,
+    /// The same at the end of the step if nothing touched.
+    pub free_slip_body: Vector3<f64>,
     /// Which loose block it is, for those who move it.
     pub block: Option<usize>,
 }
@@ -84,8 +84,8 @@ pub(super) struct Contact {
     pub point: ContactPoint,
     /// Columns normal, two tangents, body axes.
     axes_body: Matrix3<f64>,
-    /// W.
-    trunk_rows: Matrix3x6,
+    /// W^T.
+    trunk_rows: Matrix6x3,
     /// U; zero for the trunk.
     leg_rows: Matrix3<f64>,
     /// A = W W^T + U U^T and its inverse.
@@ -121,7 +121,9 @@ pub(super) struct ContactSolver {
     contacts: Vec<Contact>,
     rows: Vec<Row>,
     /// Impulses of the last step in world axes, by [`ContactPoint::memory`].
-    memory: Vec<Vector3<f64>>,
+    memory: Vec<Option<Vector3<f64>>>,
+    /// Which of them there are.
+    remembered: Vec<usize>,
     /// Share of a slip that the convex law leaves after this step.
     kept_slip: f64,
 }
@@ -132,7 +134,8 @@ impl ContactSolver {
             config,
             contacts: Vec::with_capacity(MAX_CONTACTS),
             rows: Vec::with_capacity(MAX_ROWS),
-            memory: vec![Vector3::zeros(); memories],
+            memory: vec![None; memories],
+            remembered: Vec::with_capacity(MAX_CONTACTS),
             law: contact.law,
             slip_time_s: contact.slip_time_s,
             kept_slip: 0.0,
@@ -143,7 +146,8 @@ impl ContactSolver {
     pub fn reset(&mut self) {
         self.contacts.clear();
         self.rows.clear();
-        self.memory.fill(Vector3::zeros());
+        self.memory.fill(None);
+        self.remembered.clear();
     }
 
     /// Starts a step of `h` seconds.
@@ -163,49 +167,41 @@ impl ContactSolver {
     }
 
     /// Adds a point; `world_from_body` turns its remembered impulse into place.
-    pub fn add_point(
-        &mut self,
-        dynamics: &Dynamics,
-        point: ContactPoint,
-        free_velocity_body: &Vector3<f64>,
-        world_from_body: &Matrix3<f64>,
-        h: f64,
-    ) {
+    pub fn add_point(&mut self, dynamics: &Dynamics, point: ContactPoint, world_from_body: &Matrix3<f64>, h: f64) {
         if self.contacts.len() == MAX_CONTACTS {
             return;
         }
         let axes_body = axes_about(&point.normal_body);
-        // Rows of J: n . (v + w x p) = n . v + (p x n) . w, and the leg's part.
-        let mut leg_jacobian = Matrix3::zeros();
-        if point.leg != TRUNK {
-            let leg = &dynamics.legs[point.leg];
-            leg_jacobian = axes_body.tr_mul(&leg.point_jacobian(point.link, &point.position_body));
-        }
-        let mut trunk_rows = Matrix3x6::zeros();
+        let [n, t1, t2] = [axes_body.column(0).into(), axes_body.column(1).into(), axes_body.column(2).into()];
+        let p: &Vector3<f64> = &point.position_body;
+        // Columns of J_0^T: axis . (v + w x p) = axis . v + (p x axis) . w
+        let mut columns =
+            Matrix6x3::from_columns(&[stack(&n, &p.cross(&n)), stack(&t1, &p.cross(&t1)), stack(&t2, &p.cross(&t2))]);
         let mut leg_rows = Matrix3::zeros();
-        for i in 0..3 {
-            let axis: Vector3<f64> = axes_body.column(i).into();
-            let mut row = stack(&axis, &point.position_body.cross(&axis));
-            if point.leg != TRUNK {
-                let leg = &dynamics.legs[point.leg];
-                let u: Vector3<f64> = leg_jacobian.row(i).transpose();
-                row -= leg.gain.tr_mul(&u);
-                leg_rows.set_row(i, &(leg.factor_inverse * u).transpose());
-            }
-            trunk_rows.set_row(i, &dynamics.solve_lower(&row).transpose());
+        if point.leg != TRUNK {
+            // J_0^T - G^T J_l^T and U = J_l C^-T
+            let leg = &dynamics.legs[point.leg];
+            let jacobian = axes_body.tr_mul(&point.leg_jacobian);
+            columns -= leg.gain.tr_mul(&jacobian.transpose());
+            leg_rows = jacobian * leg.factor_inverse.transpose();
         }
-        let local = trunk_rows * trunk_rows.transpose() + leg_rows * leg_rows.transpose();
-        let mut free = axes_body.tr_mul(&(free_velocity_body - point.ground_velocity_body));
-        if let ContactLaw::Convex = self.law {
-            let before = axes_body.tr_mul(&(point.velocity_body - point.ground_velocity_body));
-            free.y -= self.kept_slip * before.y;
-            free.z -= self.kept_slip * before.z;
-        }
+        // W = (L^-1 (J_0 - J_l G)^T)^T
+        let trunk_rows = dynamics.solve_lower_columns(columns);
+        let local = trunk_rows.tr_mul(&trunk_rows) + leg_rows * leg_rows.transpose();
+        let mut free = axes_body.tr_mul(&point.free_slip_body);
         // gap + h v_n >= 0; inside the ground a share of the way back per step.
         let share = if point.gap > 0.0 { 1.0 } else { self.config.penetration_recovery };
         free.x += share * point.gap / h;
+        if let ContactLaw::Convex = self.law {
+            let before = axes_body.tr_mul(&point.slip_body);
+            free.y -= self.kept_slip * before.y;
+            free.z -= self.kept_slip * before.z;
+        }
 
-        let remembered = axes_body.tr_mul(&world_from_body.tr_mul(&self.memory[point.memory]));
+        let remembered = match self.memory[point.memory] {
+            Some(impulse_world) => axes_body.tr_mul(&world_from_body.tr_mul(&impulse_world)),
+            None => Vector3::zeros(),
+        };
         let impulse = into_cone(&remembered, point.friction);
         self.contacts.push(Contact {
             point,
@@ -213,7 +209,7 @@ impl ContactSolver {
             trunk_rows,
             leg_rows,
             local,
-            local_inverse: local.try_inverse().unwrap_or_else(Matrix3::zeros),
+            local_inverse: symmetric_inverse(&local),
             free,
             slip: 0.0,
             law: self.law,
@@ -239,20 +235,20 @@ impl ContactSolver {
         let mut trunk = Vector6::zeros();
         let mut legs = [Vector3::zeros(); LEGS + 1];
         for contact in &self.contacts {
-            trunk += contact.trunk_rows.tr_mul(&contact.impulse);
+            trunk += contact.trunk_rows * contact.impulse;
             legs[contact.point.leg] += contact.leg_rows.tr_mul(&contact.impulse);
         }
         for _ in 0..self.config.max_sweeps {
             let mut change: f64 = 0.0;
             for contact in &mut self.contacts {
                 let leg = &mut legs[contact.point.leg];
-                let velocity = contact.free + contact.trunk_rows * trunk + contact.leg_rows * *leg;
+                let velocity = contact.free + contact.trunk_rows.tr_mul(&trunk) + contact.leg_rows * *leg;
                 // What the others alone would leave.
                 let others = velocity - contact.local * contact.impulse;
                 let impulse = contact.solve(&others);
                 let step = impulse - contact.impulse;
                 contact.impulse = impulse;
-                trunk += contact.trunk_rows.tr_mul(&step);
+                trunk += contact.trunk_rows * step;
                 *leg += contact.leg_rows.tr_mul(&step);
                 change = change.max((contact.local * step).amax());
             }
@@ -270,9 +266,12 @@ impl ContactSolver {
                 break;
             }
         }
-        self.memory.fill(Vector3::zeros());
+        for memory in self.remembered.drain(..) {
+            self.memory[memory] = None;
+        }
         for contact in &self.contacts {
-            self.memory[contact.point.memory] = world_from_body * contact.impulse_body();
+            self.memory[contact.point.memory] = Some(world_from_body * contact.impulse_body());
+            self.remembered.push(contact.point.memory);
         }
         // dv_0 = L^-T y_0,  ddq_l = C^-T y_l - G dv_0
         let trunk = dynamics.solve_upper(&trunk);
@@ -385,6 +384,18 @@ fn into_cone(impulse: &Vector3<f64>, friction: f64) -> Vector3<f64> {
         return *impulse;
     }
     Vector3::new(impulse.x, impulse.y * limit / size, impulse.z * limit / size)
+}
+
+/// The inverse of a symmetric positive matrix by cofactors.
+fn symmetric_inverse(m: &Matrix3<f64>) -> Matrix3<f64> {
+    let i11 = m.m22 * m.m33 - m.m23 * m.m23;
+    let i12 = m.m13 * m.m23 - m.m12 * m.m33;
+    let i13 = m.m12 * m.m23 - m.m13 * m.m22;
+    let i22 = m.m11 * m.m33 - m.m13 * m.m13;
+    let i23 = m.m12 * m.m13 - m.m11 * m.m23;
+    let i33 = m.m11 * m.m22 - m.m12 * m.m12;
+    let determinant = m.m11 * i11 + m.m12 * i12 + m.m13 * i13;
+    Matrix3::new(i11, i12, i13, i12, i22, i23, i13, i23, i33) / determinant
 }
 
 /// The normal and two tangents as columns (Duff et al., "Building an orthonormal basis, revisited", JCGT 6(1), 2017).
