@@ -1,20 +1,14 @@
 //! Smooth dynamics against Pinocchio (`golden/dynamics.json`) and a fine reference integration (`golden/flight.json`).
 //! The folder is that of the environment variable `QUADFROG_GOLDEN` where it is set.
 
-use nalgebra::{Quaternion, UnitQuaternion, Vector3};
-use quadfrog::robot::Leg;
-use quadfrog::robot::description::RobotDescription;
-use quadfrog::sim::{DOF, Model, State};
-use serde_json::Value;
+mod support;
 
-/// The file `name` of the golden folder.
-fn golden(name: &str) -> Value {
-    let folder = std::env::var("QUADFROG_GOLDEN")
-        .unwrap_or_else(|_| concat!(env!("CARGO_MANIFEST_DIR"), "/tests/golden").to_owned());
-    let file = std::path::Path::new(&folder).join(name);
-    let text = std::fs::read_to_string(&file).unwrap_or_else(|e| panic!("{}: {e}", file.display()));
-    serde_json::from_str(&text).unwrap_or_else(|e| panic!("{}: {e}", file.display()))
-}
+use nalgebra::{Quaternion, UnitQuaternion};
+use quadfrog::robot::description::RobotDescription;
+use quadfrog::robot::{JointCommand, Leg, Robot};
+use quadfrog::sim::{DOF, Model, SimConfig, Simulator, State};
+use serde_json::Value;
+use support::{Largest, golden};
 
 fn numbers(value: &Value) -> Vec<f64> {
     match value {
@@ -53,7 +47,7 @@ fn relative(found: &[f64], expected: &Value) -> f64 {
 #[test]
 fn golden_dynamics() {
     let model = Model::new(&RobotDescription::embedded("go1").unwrap());
-    let file = golden("dynamics.json");
+    let file = golden::<Value>("dynamics.json");
     let cases = file["cases"].as_array().unwrap();
     assert!(!cases.is_empty());
     let mut largest = (0.0, "nothing");
@@ -88,5 +82,32 @@ fn golden_dynamics() {
     }
     println!("golden_dynamics: {} cases, largest relative difference {:.1e} ({})", cases.len(), largest.0, largest.1);
     assert!(largest.0 < 1e-9, "{} differs by {:e}", largest.1, largest.0);
-    let _ = Vector3::<f64>::zeros();
+}
+
+#[test]
+fn golden_flight() {
+    // The reference has no joint stops.
+    let mut robot = RobotDescription::embedded("go1").unwrap();
+    (robot.limits.min_position, robot.limits.max_position) = ([-1e3; 12], [1e3; 12]);
+    let file = golden::<Value>("flight.json");
+    let cases = file["cases"].as_array().unwrap();
+    assert!(!cases.is_empty());
+    let (mut metres, mut radians) = (Largest::default(), Largest::default());
+    for (number, case) in cases.iter().enumerate() {
+        let mut simulator = Simulator::new(&robot, &SimConfig::default()).unwrap();
+        simulator.set_state(&state_of(&case["initial"]));
+        let command = JointCommand::torques(&array(&case["joint_tau"]));
+        for _ in 0..(1000.0 * case["seconds"].as_f64().unwrap()).round() as u32 {
+            simulator.write(&command).unwrap();
+        }
+        let (found, expected) = (*simulator.state(), state_of(&case["final"]));
+        metres.see((found.position_world - expected.position_world).norm(), || format!("case {number}"));
+        let turned = found.orientation_world.angle_to(&expected.orientation_world);
+        radians.see(turned, || format!("case {number}, orientation"));
+        for (i, (a, b)) in found.joint_position.iter().zip(&expected.joint_position).enumerate() {
+            radians.see(a - b, || format!("case {number}, joint {i}"));
+        }
+    }
+    println!("golden_flight: {} cases, largest differences {metres} m, {radians} rad", cases.len());
+    assert!(metres.value < 1e-3 && radians.value < 1e-3);
 }

@@ -206,6 +206,7 @@ impl Life {
         }
         self.write_judgement(number, false)?;
         self.study.tell(number, Outcome::Fail)?;
+        self.show_row(number);
         self.propose()?;
         Ok(())
     }

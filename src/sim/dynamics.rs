@@ -189,7 +189,7 @@ impl LegDynamics {
 
     /// A point of link `link` (0 hip, 1 thigh, 2 calf) from its frame to the trunk's.
     #[inline]
-    pub fn to_body(&self, link: usize, p: &Vector3<f64>) -> Vector3<f64> {
+    pub fn in_body(&self, link: usize, p: &Vector3<f64>) -> Vector3<f64> {
         let turned = match link {
             0 => *p,
             1 => self.thigh.y(p),

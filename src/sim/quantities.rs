@@ -139,7 +139,7 @@ impl Model {
         let dynamics = self.dynamics(state);
         let to_world = state.orientation_world.to_rotation_matrix().into_inner();
         std::array::from_fn::<_, LEGS, _>(|l| {
-            let foot_body = dynamics.legs[l].to_body(2, &self.legs[l].foot_origin);
+            let foot_body = dynamics.legs[l].in_body(2, &self.legs[l].foot_origin);
             let joints = dynamics.legs[l].point_jacobian(2, &foot_body);
             // Velocity of a point p of the trunk: v + w x p.
             let mut jacobian_world = SMatrix::<f64, 3, DOF>::zeros();

@@ -123,7 +123,11 @@ impl<'a> Document<'a> {
                 (2, []) => {}
                 (_, children) => {
                     let problem = format!("{} moving joints hang on this {}", children.len(), JOINT_NAMES[part]);
-                    return self.invalid(&group.body.name, problem, "a leg is hip, thigh, calf; make other joints fixed");
+                    return self.invalid(
+                        &group.body.name,
+                        problem,
+                        "a leg is hip, thigh, calf; make other joints fixed",
+                    );
                 }
             }
             chain.push(group.body);
@@ -155,14 +159,18 @@ impl<'a> Document<'a> {
         }
         if origin.rotation.angle() > TOLERANCE {
             let problem = format!("its frame is turned by {} rad", origin.rotation.angle());
-            return self.invalid(&element, problem, "all frames of legs must be parallel to the trunk's at zero angles");
+            return self.invalid(
+                &element,
+                problem,
+                "all frames of legs must be parallel to the trunk's at zero angles",
+            );
         }
         if !matches!(joint.joint_type, JointType::Revolute) {
             let problem = format!("is {:?}", joint.joint_type);
             return self.invalid(&element, problem, "a leg's joint is revolute and has limits");
         }
         let limit = &joint.limit;
-        if !(limit.lower < limit.upper) {
+        if limit.lower >= limit.upper || limit.lower.is_nan() || limit.upper.is_nan() {
             let problem = format!("limits lower {} and upper {} rad", limit.lower, limit.upper);
             return self.invalid(&element, problem, "lower must be less than upper");
         }
@@ -194,7 +202,8 @@ impl<'a> Document<'a> {
                         "at ({}, {}, {}) m from its parent where ({}, {}, {}) would match the leg FR",
                         is.x, is.y, is.z, wanted.x, wanted.y, wanted.z
                     );
-                    let remedy = "legs must be alike: the thigh joint beside the hip, calf joint and foot straight below";
+                    let remedy =
+                        "legs must be alike: the thigh joint beside the hip, calf joint and foot straight below";
                     return self.invalid(&format!("{} {what}", leg.name()), problem, remedy);
                 }
             }
