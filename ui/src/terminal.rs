@@ -167,7 +167,7 @@ impl Screen {
         enable_raw_mode()?;
         ENTERED.store(true, Ordering::Release);
         if let Some(terminal) = &mut self.terminal {
-            let writer = terminal.backend_mut().writer_mut();
+            let writer = terminal.backend_mut();
             queue!(writer, EnterAlternateScreen, EnableBracketedPaste, Hide, Clear(ClearType::All))?;
             terminal.clear()?;
         }
@@ -220,7 +220,7 @@ impl Screen {
     /// When the writing thread is gone.
     pub fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
         let Some(terminal) = &mut self.terminal else { return Ok(()) };
-        let writer = terminal.backend_mut().writer_mut();
+        let writer = terminal.backend_mut();
         writer.write_all(bytes)?;
         writer.flush()
     }
