@@ -8,6 +8,7 @@ use quadfrog::engine::{Engine, Options};
 use quadfrog::realtime::command::Task;
 use quadfrog_console::app::{self, ConsoleOptions};
 use quadfrog_console::feed::Feed;
+use quadfrog_console::settings::{ColourChoice, Settings};
 use quadfrog_console::terminal;
 
 use super::study::{Chosen, continued};
@@ -67,7 +68,7 @@ pub struct ConsoleArguments {
 pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
     let config = arguments.study.load_config()?;
     let robot = arguments.study.load_robot()?;
-    let console = options(&arguments.screen, &config)?;
+    let console = options(&arguments.screen, &config)?.with_robot(robot.clone());
     terminal::check().map_err(Failure::input)?;
     let (task, seed) = (arguments.task.map(Task::from), arguments.seed);
     let chosen = match &arguments.resume {
@@ -98,6 +99,14 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
 
 /// The console's options from the arguments and `console.toml`.
 pub fn options(screen: &ScreenArguments, config: &quadfrog::config::Config) -> Result<ConsoleOptions, Failure> {
-    let _ = (screen, config);
-    todo!()
+    let settings = Settings::from_table(&config.console)
+        .map_err(|error| config.refuse("console.toml", &error.key, &error.value, &error.reason))?;
+    let colours = match screen.color {
+        Colour::Auto => None,
+        Colour::Sixteen => Some(ColourChoice::Named),
+        Colour::TwoHundredFiftySix => Some(ColourChoice::Indexed),
+        Colour::True => Some(ColourChoice::True),
+        Colour::Never => Some(ColourChoice::None),
+    };
+    Ok(ConsoleOptions::new(settings, colours, screen.ascii, screen.low_bandwidth))
 }

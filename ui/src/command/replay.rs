@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use quadfrog::config::Config;
 use quadfrog::recording::player::Player;
+use quadfrog::robot::description::RobotDescription;
 use quadfrog_console::app;
 use quadfrog_console::feed::Feed;
 use quadfrog_console::terminal;
@@ -28,6 +29,11 @@ pub fn run(arguments: &ReplayArguments) -> Result<(), Failure> {
     let console = options(&arguments.screen, &config)?;
     let player = Player::open(&arguments.file).map_err(Failure::input)?;
     terminal::check().map_err(Failure::input)?;
+    let console = match RobotDescription::embedded(&player.session().robot) {
+        Ok(robot) => console.with_robot(robot),
+        // A model of the operator's own: the panels that need its limits say so.
+        Err(_) => console,
+    };
     app::run(Feed::replay(player), console)?;
     Ok(())
 }
