@@ -4,7 +4,7 @@
 #[path = "support/recording.rs"]
 mod support;
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
@@ -80,6 +80,14 @@ fn in_complete_chunks(bytes: &[u8]) -> usize {
     count
 }
 
+/// Like `assert_same` by `==`, which is quicker: there is no NaN and no -0.0 in this study.
+fn assert_equal(found: &[Played], expected: &[Played]) {
+    assert_eq!(found.len(), expected.len(), "another number of ticks and records");
+    for (index, (found, expected)) in found.iter().zip(expected).enumerate() {
+        assert!(found == expected, "number {index} differs\n   found: {found:?}\nexpected: {expected:?}");
+    }
+}
+
 fn file(folder: &Path, name: &str, bytes: &[u8]) -> PathBuf {
     let path = folder.join(name);
     fs::write(&path, bytes).unwrap();
@@ -102,7 +110,7 @@ fn cut_at(length: usize, of: &[u8]) {
     match (play_damaged(&path), expected) {
         (Ok((played, damage)), Some(expected)) => {
             assert_eq!(played.len(), expected, "cut after {length} bytes");
-            assert_same(&played, &whole().everything[..expected]);
+            assert_equal(&played, &whole().everything[..expected]);
             let damage = damage.expect("a cut file is not without fault");
             assert!(damage.starts_with(&path.display().to_string()), "{damage}");
             let recovered = recover(&path).unwrap();
@@ -111,7 +119,7 @@ fn cut_at(length: usize, of: &[u8]) {
             assert_eq!(recovered.ticks, ticks as u64);
             let (again, damage) = play_damaged(&recovered.path).unwrap();
             assert_eq!(damage, None);
-            assert_same(&again, &played);
+            assert_equal(&again, &played);
             let mut player = Player::open(&recovered.path).unwrap();
             assert_eq!(player.attachment("config.toml").unwrap().as_deref(), Some(&b"kp = 400.0\n"[..]));
             assert_eq!(fs::read(&path).unwrap(), &of[..length], "the old file is left as it was");
@@ -127,7 +135,7 @@ fn cut_at(length: usize, of: &[u8]) {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 40, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 20, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn a_file_cut_anywhere_plays_and_recovers_every_complete_chunk(place in 0.0..1.0_f64) {
@@ -156,10 +164,11 @@ proptest! {
         }
         let folder = tempfile::tempdir().unwrap();
         let path = file(folder.path(), "session.mcap", &bytes);
-        let everything: HashSet<_> = whole().everything.iter().map(|p| format!("{p:?}")).collect();
         if let Ok((played, _)) = play_damaged(&path) {
+            // In the order of time, as everything is, with holes.
+            let mut everything = whole().everything.iter();
             for played in &played {
-                prop_assert!(everything.contains(&format!("{played:?}")), "{played:?} was never recorded");
+                prop_assert!(everything.any(|recorded| recorded == played), "{played:?} was never recorded");
             }
         }
         let _ = recover(&path); // must not panic
@@ -177,14 +186,14 @@ fn a_damaged_chunk_is_left_out_and_said() {
     let (played, damage) = play_damaged(&path).unwrap();
     let missing = everything.len() - played.len();
     assert!((50..300).contains(&missing), "one chunk of ticks is missing, not {missing}");
-    assert_same(&played[..500], &everything[..500]);
-    assert_same(&played[played.len() - 500..], &everything[everything.len() - 500..]);
+    assert_equal(&played[..500], &everything[..500]);
+    assert_equal(&played[played.len() - 500..], &everything[everything.len() - 500..]);
     let damage = damage.unwrap();
     assert!(damage.contains("1 of ") && damage.contains("chunks are damaged and left out"), "{damage}");
     let recovered = recover(&path).unwrap();
     assert_eq!(recovered.path, folder.path().join("session.recovered.mcap"));
     assert!(recovered.lost.unwrap().starts_with("1 of "));
-    assert_same(&play_damaged(&recovered.path).unwrap().0, &played);
+    assert_equal(&play_damaged(&recovered.path).unwrap().0, &played);
 }
 
 #[test]
@@ -194,7 +203,7 @@ fn a_file_that_was_finished_and_never_renamed_is_whole() {
     assert_eq!(play_damaged(&path).unwrap().1, None);
     let recovered = recover(&path).unwrap();
     assert_eq!(recovered.lost, None);
-    assert_same(&play_damaged(&recovered.path).unwrap().0, &whole().everything);
+    assert_equal(&play_damaged(&recovered.path).unwrap().0, &whole().everything);
 }
 
 #[test]
@@ -208,7 +217,7 @@ fn a_file_with_a_hole_of_zeros_at_its_end_is_played_up_to_it() {
     let (played, damage) = play_damaged(&file(folder.path(), "hole.mcap.part", &bytes)).unwrap();
     assert!(damage.is_some());
     // The chunk that the cut went through is as long as it says, but its checksum is wrong.
-    assert_same(&played, &whole().everything[..expected]);
+    assert_equal(&played, &whole().everything[..expected]);
 }
 
 #[test]

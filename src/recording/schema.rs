@@ -393,3 +393,42 @@ fn from_risk(message: frog::Risk) -> Risk {
 fn one_of<T: Copy>(all: &[T], what: &'static str, number: i32) -> Result<T, DecodeError> {
     all.get(number as usize).copied().ok_or(DecodeError::Unknown(what, number))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::realtime::telemetry::{Mode, Phase};
+
+    /// `STAND UP` in the program is `STAND_UP` in the schema, `re-run` is `RE_RUN`.
+    fn assert_named(name: &str, in_schema: Option<&str>) {
+        assert_eq!(Some(name.to_uppercase().replace([' ', '-'], "_").as_str()), in_schema);
+    }
+
+    #[test]
+    fn enums_are_numbered_as_in_the_schema() {
+        for (number, mode) in (0..).zip(Mode::ALL) {
+            assert_eq!(mode as i32, number);
+            assert_named(mode.name(), frog::control_tick::Mode::try_from(number).ok().map(|m| m.as_str_name()));
+        }
+        for (number, phase) in (0..).zip(Phase::ALL) {
+            assert_eq!(phase as i32, number);
+            assert_named(phase.name(), frog::control_tick::Phase::try_from(number).ok().map(|p| p.as_str_name()));
+        }
+        for (number, stage) in (0..).zip(Stage::ALL) {
+            assert_eq!(stage as i32, number);
+            assert_named(stage.name(), frog::stage_info::Stage::try_from(number).ok().map(|s| s.as_str_name()));
+        }
+        for (number, source) in (0..).zip(Source::ALL) {
+            assert_eq!(source as i32, number);
+            assert_named(source.name(), frog::proposal::Source::try_from(number).ok().map(|s| s.as_str_name()));
+        }
+        for (number, verdict) in (0..).zip(Verdict::ALL) {
+            assert_eq!(verdict as i32, number);
+            assert_named(verdict.name(), frog::trial::Verdict::try_from(number).ok().map(|v| v.as_str_name()));
+        }
+        for topic in Topic::ALL {
+            assert_eq!(Topic::from_name(topic.name()), Some(topic));
+            assert_eq!(Topic::ALL[topic as usize], topic);
+        }
+    }
+}
