@@ -197,6 +197,32 @@ fn a_damaged_chunk_is_left_out_and_said() {
 }
 
 #[test]
+fn a_damaged_index_is_not_believed() {
+    // The index is where the finished file is longer; every byte of it is under a checksum.
+    let Whole { finished, part, everything } = whole();
+    let folder = tempfile::tempdir().unwrap();
+    for part_of_it in [0.2, 0.5, 0.9, 0.99, 0.999] {
+        let mut bytes = finished.clone();
+        let at = part.len() + (part_of_it * (finished.len() - part.len()) as f64) as usize;
+        bytes[at] ^= 0x10;
+        let (played, damage) = play_damaged(&file(folder.path(), "session.mcap", &bytes)).unwrap();
+        assert_eq!(damage, None, "all of the data is there");
+        assert_equal(&played, everything);
+    }
+}
+
+#[test]
+fn a_damaged_beginning_is_said() {
+    let mut bytes = whole().part.clone();
+    bytes[2000] ^= 0x10; // in the first chunk, after metadata and attachment
+    let folder = tempfile::tempdir().unwrap();
+    let path = file(folder.path(), "session.mcap.part", &bytes);
+    let error = Player::open(&path).err().expect("its channels are not known");
+    assert!(matches!(error, RecordingError::Head { .. }), "{error}");
+    assert!(matches!(recover(&path), Err(RecordingError::Head { .. })));
+}
+
+#[test]
 fn a_file_that_was_finished_and_never_renamed_is_whole() {
     let folder = tempfile::tempdir().unwrap();
     let path = file(folder.path(), "session.mcap.part", &whole().finished);

@@ -6,17 +6,18 @@ use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 use mcap::McapError;
-use mcap::read::LinearReader;
 use mcap::records::{Record, op};
-use mcap::sans_io::{self, LinearReadEvent, LinearReaderOptions};
+use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
 use super::error::RecordingError;
-use super::schema::Topic;
+use super::topic::Topic;
 
 /// Opcode (1 byte) and length (8 bytes) before each record.
 const RECORD_HEAD: u64 = 9;
 /// The footer record: head, two offsets and a checksum.
 const FOOTER_BYTES: u64 = RECORD_HEAD + 8 + 8 + 4;
+/// The record that ends the data: head and a checksum.
+const DATA_END_BYTES: u64 = RECORD_HEAD + 4;
 /// Larger chunks are not ours; a length that says so is damage, and must not be believed when memory is asked for.
 const LARGEST_CHUNK: usize = 256 * 1024 * 1024;
 
@@ -90,8 +91,11 @@ impl Container {
         };
         find(&mut container, bytes).map_err(|error| container.error(error))?;
         // The channels of our own files stand in their first chunk.
-        if let Some(chunk) = container.chunks.first().cloned() {
-            let _ = container.read_chunk(&chunk); // a damaged one is reported when it is played
+        if let Some(chunk) = container.chunks.first().cloned()
+            && let Err(source) = container.read_chunk(&chunk)
+            && container.topics.is_empty()
+        {
+            return Err(RecordingError::Head { path: path.into(), source });
         }
         Ok(container)
     }
@@ -110,10 +114,16 @@ impl Container {
         if footer.summary_start == 0 || footer.summary_start > footer_at {
             return Ok(false);
         }
-        let summary = self.read_at(footer.summary_start, footer_at - footer.summary_start)?;
+        // From the record before the index to the end of the file: only so is its checksum verified.
+        let from = footer.summary_start.saturating_sub(DATA_END_BYTES);
+        let summary = self.read_at(from, bytes - from)?;
+        let options = LinearReaderOptions::default()
+            .with_skip_start_magic(true)
+            .with_validate_summary_section_crc(true)
+            .with_record_length_limit(summary.len());
         let (mut chunks, mut attachments, mut metadata) = (Vec::new(), Vec::new(), Vec::new());
-        for record in LinearReader::sans_magic(&summary) {
-            match record? {
+        for record in records(&summary, options)? {
+            match record {
                 Record::Channel(channel) => self.add_channel(channel.id, &channel.topic),
                 Record::ChunkIndex(index) => chunks.push(Chunk {
                     span: span(index.chunk_start_offset, index.chunk_length),
@@ -171,7 +181,7 @@ impl Container {
         }
         self.cut = Some(match bytes - at {
             0 => "it was not finished; nothing after its last complete chunk was written".into(),
-            rest => format!("it was cut off: its last {rest} of {bytes} bytes are an incomplete chunk"),
+            rest => format!("it was cut off: its last {rest} of {bytes} bytes are an incomplete record"),
         });
         Ok(())
     }
@@ -187,22 +197,7 @@ impl Container {
             .with_skip_end_magic(true)
             .with_prevalidate_chunk_crcs(true)
             .with_record_length_limit(LARGEST_CHUNK);
-        let mut reader = sans_io::LinearReader::new_with_options(options);
-        let mut unread = bytes.as_slice();
-        let mut records = Vec::new();
-        while let Some(event) = reader.next_event() {
-            match event? {
-                LinearReadEvent::ReadRequest(wanted) => {
-                    let (now, later) = unread.split_at(wanted.min(unread.len()));
-                    reader.insert(now.len()).copy_from_slice(now);
-                    reader.notify_read(now.len());
-                    unread = later;
-                }
-                LinearReadEvent::Record { data, opcode } => {
-                    records.push(mcap::parse_record(opcode, data)?.into_owned());
-                }
-            }
-        }
+        let records = records(&bytes, options)?;
         for record in &records {
             if let Record::Channel(channel) = record {
                 self.add_channel(channel.id, &channel.topic);
@@ -270,6 +265,27 @@ impl Container {
             source => RecordingError::Mcap { path, source },
         }
     }
+}
+
+/// The records in `bytes`; those of a chunk in its place.
+fn records(bytes: &[u8], options: LinearReaderOptions) -> Result<Vec<Record<'static>>, McapError> {
+    let mut reader = LinearReader::new_with_options(options);
+    let mut unread = bytes;
+    let mut records = Vec::new();
+    while let Some(event) = reader.next_event() {
+        match event? {
+            LinearReadEvent::ReadRequest(wanted) => {
+                let (now, later) = unread.split_at(wanted.min(unread.len()));
+                reader.insert(now.len()).copy_from_slice(now);
+                reader.notify_read(now.len());
+                unread = later;
+            }
+            LinearReadEvent::Record { data, opcode } => {
+                records.push(mcap::parse_record(opcode, data)?.into_owned());
+            }
+        }
+    }
+    Ok(records)
 }
 
 /// Of a record in the index: offset and length with the head.

@@ -13,7 +13,8 @@ use prost::Message;
 use super::container::{Chunk, Container};
 use super::error::RecordingError;
 use super::record::{Record, SessionInfo, Stamped};
-use super::schema::{self, DecodeError, Topic};
+use super::schema::{self, DecodeError};
+use super::topic::Topic;
 use super::{frog, tick};
 use crate::realtime::telemetry::Tick;
 

@@ -11,7 +11,7 @@ use mcap::records::{Record, op};
 use super::container::Container;
 use super::error::RecordingError;
 use super::output::{Output, with_suffix};
-use super::schema::Topic;
+use super::topic::Topic;
 
 /// What was saved.
 #[derive(Debug, Clone, PartialEq)]
@@ -142,9 +142,9 @@ impl Copy {
                 }
             }
             Record::Message { mut header, data } => {
-                self.done.messages += 1;
-                self.done.ticks += u64::from(self.tick_channel == Some(header.channel_id));
                 if let Some(&id) = self.channels.get(&header.channel_id) {
+                    self.done.messages += 1;
+                    self.done.ticks += u64::from(self.tick_channel == Some(header.channel_id));
                     header.channel_id = id;
                     mcap.write_to_known_channel(&header, &data)?;
                 }
