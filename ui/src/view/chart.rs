@@ -180,7 +180,8 @@ impl Chart<'_> {
             self.draw_ghost(buffer, plot, ghost, (low, high));
         }
         let mut dots = Dots::new(plot, self.theme.glyphs);
-        let samples = self.history.window(self.axis.window_ns).map(|sample| (sample.time_ns, (self.signal.value)(sample)));
+        let samples =
+            self.history.window(self.axis.window_ns).map(|sample| (sample.time_ns, (self.signal.value)(sample)));
         self.trace(&mut dots, samples, (low, high));
         dots.draw(buffer, plot, self.theme.style(self.signal.role));
         self.shade(buffer, plot);
@@ -189,7 +190,8 @@ impl Chart<'_> {
 
     fn range(&self) -> (f32, f32) {
         let values = || self.history.window(self.axis.window_ns).map(|sample| (self.signal.value)(sample));
-        let fits = |&&(low, high): &&(f32, f32)| values().all(|value| !value.is_finite() || (low..=high).contains(&value));
+        let fits =
+            |&&(low, high): &&(f32, f32)| values().all(|value| !value.is_finite() || (low..=high).contains(&value));
         let widest = self.signal.ranges.last().copied().unwrap_or((-1.0, 1.0));
         self.signal.ranges.iter().find(fits).copied().unwrap_or(widest)
     }
@@ -208,7 +210,11 @@ impl Chart<'_> {
         let range = if low == -high {
             format!("{}{high}", self.theme.plus_minus())
         } else {
-            format!("{} to {}", number(f64::from(low)).trim_end_matches("000").trim_end_matches('.'), number(f64::from(high)).trim_end_matches("000").trim_end_matches('.'))
+            format!(
+                "{} to {}",
+                number(f64::from(low)).trim_end_matches("000").trim_end_matches('.'),
+                number(f64::from(high)).trim_end_matches("000").trim_end_matches('.')
+            )
         };
         let name = format!("{} ", self.signal.name);
         let width = usize::from(area.width);
