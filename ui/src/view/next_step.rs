@@ -131,7 +131,7 @@ fn in_dialog(model: &Model, dialog: &Dialog) -> NextStep {
     let plain = |lead: String| NextStep { lead, others: Vec::new() };
     match dialog {
         Dialog::Approve { trial, .. } => {
-            plain(format!("Press {} again to jump (trial {trial}). Any other key cancels.", model.keymap.key(Action::Approve)))
+            plain(format!("Press {} again to jump (trial #{trial}). Any other key cancels.", model.keymap.key(Action::Approve)))
         }
         Dialog::Arm => plain("Press y to stand the robot up. Any other key cancels.".to_owned()),
         Dialog::Quit => plain("Press y to quit. Any other key cancels.".to_owned()),
