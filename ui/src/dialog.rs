@@ -291,8 +291,9 @@ fn override_key(model: &mut Model, key: Key, mut form: OverrideForm) -> Vec<Effe
         KeyCode::PageDown => form.step(-0.1),
         KeyCode::PageUp => form.step(0.1),
         _ => {
-            let starts = matches!(key.typed(), Some('0'..='9' | '.' | ',' | '-' | '+'));
-            if form.typing.is_some() || starts {
+            // A number and nothing else can be typed here.
+            let digit = matches!(key.typed(), Some('0'..='9' | '.' | ',' | '-' | '+' | 'e'));
+            if digit || form.typing.is_some() && key.typed().is_none() {
                 form.problem = None;
                 edit(form.typing.get_or_insert_default(), key);
             }

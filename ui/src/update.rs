@@ -165,13 +165,13 @@ fn press(model: &mut Model, key: Key) -> Vec<Effect> {
     }
 }
 
-/// Stops the robot. Dialogs that lead to motion close; a half-written note stays.
+/// Stops the robot. What lies over the view closes, so that the robot is seen; a half-written note stays.
 fn stop(model: &mut Model, word: &str) -> Vec<Effect> {
     if model.replay.is_some() {
         say(model, Level::Info, "this is a replay: there is no robot to stop".to_owned());
         return Vec::new();
     }
-    if matches!(model.dialog, Some(Dialog::Approve { .. } | Dialog::Arm | Dialog::Palette { .. })) {
+    if !matches!(model.dialog, Some(Dialog::Field { .. })) {
         model.dialog = None;
     }
     say(model, Level::Warning, format!("{word}: damping"));
@@ -542,7 +542,10 @@ fn take_record(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
             if entered {
                 match info.stage {
                     Stage::Proposed => bells.push(BellCause::Proposal),
-                    Stage::Review => bells.push(BellCause::Verdict),
+                    Stage::Review => {
+                        bells.push(BellCause::Verdict);
+                        say_suggestion(model, info.trial);
+                    }
                     Stage::Running => {}
                     Stage::Finished => {
                         say(model, Level::Info, "the study is finished".to_owned());
@@ -563,7 +566,11 @@ fn take_record(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
                 bells.push(BellCause::Fall);
             }
             log_trial(model, time_ns, &trial);
-            model.trials.insert(trial.trial, trial);
+            let number = trial.trial;
+            model.trials.insert(number, trial);
+            if model.under_review().is_some_and(|trial| trial.trial == number && trial.hand_value.is_none()) {
+                say_suggestion(model, number);
+            }
         }
         Record::Command(command) => answer(model, time_ns, command),
         Record::Counters(counters) => model.snapshot.counters = counters,
@@ -581,6 +588,15 @@ fn take_record(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
     close_stale_dialog(model);
     let rings = bells.iter().any(|cause| model.bell.contains(cause)) && model.replay.is_none();
     if rings { vec![Effect::Bell] } else { Vec::new() }
+}
+
+/// What the rules think of the trial under review; its row and its stage come in either order.
+fn say_suggestion(model: &mut Model, trial: u32) {
+    let Some(row) = model.trials.get(&trial).filter(|row| row.verdict.is_none()) else { return };
+    let Some(suggested) = row.suggested else { return };
+    let level = if suggested == Verdict::Accept { Level::Info } else { Level::Warning };
+    let text = format!("trial #{trial} looks like {}: {}", suggested.name(), row.cause);
+    say(model, level, text);
 }
 
 fn answer(model: &mut Model, time_ns: u64, command: CommandRecord) {

@@ -11,7 +11,7 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::Style;
 
-use super::{cut, number};
+use super::cut;
 use crate::history::{History, Sample};
 use crate::settings::ChartMode;
 use crate::theme::{Glyphs, Role, Theme};
@@ -171,17 +171,12 @@ impl Chart<'_> {
         let plot = Rect { y: area.y + 1, height: area.height - 1, ..area };
         let (low, high) = self.range();
         self.draw_heading(buffer, Rect { height: 1, ..area }, (low, high));
-        if low < 0.0 && high > 0.0 && self.theme.glyphs != Glyphs::Ascii {
-            let row = (f32::from(plot.height) * high / (high - low)) as u16;
-            let line = self.theme.line().repeat(usize::from(plot.width));
-            buffer.set_string(plot.x, plot.y + row.min(plot.height - 1), line, self.theme.style(Role::Quiet));
-        }
+        self.draw_zero(buffer, plot, (low, high));
         if let Some(ghost) = self.ghost {
             self.draw_ghost(buffer, plot, ghost, (low, high));
         }
         let mut dots = Dots::new(plot, self.theme.glyphs);
-        let samples =
-            self.history.window(self.axis.window_ns).map(|sample| (sample.time_ns, (self.signal.value)(sample)));
+        let samples = self.history.window(self.axis.window_ns).map(|sample| (sample.time_ns, (self.signal.value)(sample)));
         self.trace(&mut dots, samples, (low, high));
         dots.draw(buffer, plot, self.theme.style(self.signal.role));
         self.shade(buffer, plot);
@@ -190,10 +185,19 @@ impl Chart<'_> {
 
     fn range(&self) -> (f32, f32) {
         let values = || self.history.window(self.axis.window_ns).map(|sample| (self.signal.value)(sample));
-        let fits =
-            |&&(low, high): &&(f32, f32)| values().all(|value| !value.is_finite() || (low..=high).contains(&value));
+        let fits = |&&(low, high): &&(f32, f32)| values().all(|value| !value.is_finite() || (low..=high).contains(&value));
         let widest = self.signal.ranges.last().copied().unwrap_or((-1.0, 1.0));
         self.signal.ranges.iter().find(fits).copied().unwrap_or(widest)
+    }
+
+    /// A dotted line at zero where zero is the middle; it stays below the curve.
+    fn draw_zero(&self, buffer: &mut Buffer, plot: Rect, (low, high): (f32, f32)) {
+        if low != -high || self.theme.glyphs == Glyphs::Ascii {
+            return;
+        }
+        for x in (plot.x..plot.right()).step_by(4) {
+            buffer.set_string(x, plot.y + plot.height / 2, "·", self.theme.style(Role::Quiet));
+        }
     }
 
     fn draw_heading(&self, buffer: &mut Buffer, area: Rect, (low, high): (f32, f32)) {
@@ -207,15 +211,7 @@ impl Chart<'_> {
             let value = if value.abs() < 0.0005 { 0.0 } else { value };
             if value.abs() >= 100.0 { format!("{value:+.0}") } else { format!("{value:+.3}") }
         });
-        let range = if low == -high {
-            format!("{}{high}", self.theme.plus_minus())
-        } else {
-            format!(
-                "{} to {}",
-                number(f64::from(low)).trim_end_matches("000").trim_end_matches('.'),
-                number(f64::from(high)).trim_end_matches("000").trim_end_matches('.')
-            )
-        };
+        let range = if low == -high { format!("{}{high}", self.theme.plus_minus()) } else { format!("{low} to {high}") };
         let name = format!("{} ", self.signal.name);
         let width = usize::from(area.width);
         buffer.set_string(area.x, area.y, cut(&name, width), self.theme.style(self.signal.role));

@@ -31,17 +31,11 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
             popup(frame, area, model, "Jump?", 60, approve(model, *trial, waited));
         }
         Dialog::Arm => {
-            let lines = vec![
-                Line::from("The robot will stand up. Is nobody near it?"),
-                Line::default(),
-                choice(model, "y", "stand up"),
-            ];
+            let lines = vec![Line::from("The robot will stand up. Is nobody near it?"), Line::default(), choice(model, "y", "stand up")];
             popup(frame, area, model, "Arm?", 52, lines);
         }
         Dialog::Quit => popup(frame, area, model, "Quit?", 58, quit(model)),
-        Dialog::Override(form) => {
-            popup(frame, area, model, &format!("Override trial {}", form.trial), 72, overrides(model, form))
-        }
+        Dialog::Override(form) => popup(frame, area, model, &format!("Override trial #{}", form.trial), 72, overrides(model, form)),
         Dialog::Field { purpose, input, problem } => {
             popup(frame, area, model, &field_title(*purpose), 64, field(model, *purpose, input, problem.as_deref()));
         }
@@ -54,7 +48,7 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
                     Line::from(vec![span(&model.theme, Role::Quiet, format!("{name:<15}")), Span::raw(value)])
                 };
                 let lines = rows.into_iter().map(line).collect();
-                popup(frame, area, model, &format!("Trial {trial}"), 72, lines);
+                popup(frame, area, model, &format!("Trial #{trial}"), 72, lines);
             }
         }
     }
@@ -74,12 +68,16 @@ fn open_box(frame: &mut Frame, area: Rect, theme: &Theme, title: &str, width: u1
     };
     let set = if theme.glyphs == Glyphs::Ascii { ASCII } else { border::PLAIN };
     let (width, height) = (width.min(area.width), height.min(area.height));
-    let at = Rect { x: area.x + (area.width - width) / 2, y: area.y + (area.height - height) / 2, width, height };
-    let block = Block::bordered().border_set(set).border_style(theme.style(Role::Heading)).title(span(
-        theme,
-        Role::Heading,
-        format!(" {title} "),
-    ));
+    let at = Rect {
+        x: area.x + (area.width - width) / 2,
+        y: area.y + (area.height - height) / 2,
+        width,
+        height,
+    };
+    let block = Block::bordered()
+        .border_set(set)
+        .border_style(theme.style(Role::Heading))
+        .title(span(theme, Role::Heading, format!(" {title} ")));
     let inner = block.inner(at);
     frame.render_widget(Clear, at);
     frame.render_widget(block, at);
@@ -117,7 +115,7 @@ fn approve(model: &Model, trial: u32, waited: bool) -> Vec<Line<'static>> {
                 format!("{} {} {unit}", p.name, number(p.value))
             })
             .collect();
-        lines.push(Line::from(format!("Trial {trial}: {}", values.join(", "))));
+        lines.push(Line::from(format!("Trial #{trial}: {}", values.join(", "))));
     }
     lines.push(Line::from("The area is clear, and nobody is near the robot?"));
     lines.push(Line::default());
@@ -135,7 +133,7 @@ fn quit(model: &Model) -> Vec<Line<'static>> {
         lines.push(Line::from("The robot is armed: it will sit down before the program ends."));
     }
     if let Some(trial) = model.under_review() {
-        lines.push(Line::from(format!("Trial {} has no verdict yet.", trial.trial)));
+        lines.push(Line::from(format!("Trial #{} has no verdict yet.", trial.trial)));
     }
     lines.push(Line::default());
     lines.push(choice(model, "y", "quit"));
@@ -148,10 +146,15 @@ fn overrides(model: &Model, form: &OverrideForm) -> Vec<Line<'static>> {
     for (index, row) in form.rows.iter().enumerate() {
         let selected = index == form.selected;
         let mark = if selected { ">" } else { " " };
-        let mut spans =
-            vec![span(theme, if selected { Role::Key } else { Role::Text }, format!("{mark} {:<4}", row.name))];
+        let mut spans = vec![
+            span(theme, if selected { Role::Key } else { Role::Text }, format!("{mark} {:<4}", row.name)),
+        ];
         match &form.typing {
-            Some(input) if selected => spans.extend(edited(theme, input)),
+            Some(input) if selected => {
+                // As wide as the number it replaces, so that the line does not jump.
+                spans.push(Span::raw(" ".repeat(8_usize.saturating_sub(input.value().chars().count() + 1))));
+                spans.extend(edited(theme, input));
+            }
             _ => spans.push(Span::raw(format!("{:>8}", number(row.value)))),
         }
         spans.push(span(theme, Role::Quiet, format!(" {:<3}", row.unit)));
@@ -166,11 +169,7 @@ fn overrides(model: &Model, form: &OverrideForm) -> Vec<Line<'static>> {
     lines.push(Line::default());
     match &form.problem {
         Some(problem) => lines.push(Line::from(span(theme, Role::Bad, problem.clone()))),
-        None => lines.push(Line::from(span(
-            theme,
-            Role::Quiet,
-            "Nothing moves by this: the changed proposal is approved as any other.",
-        ))),
+        None => lines.push(Line::from(span(theme, Role::Quiet, "Nothing moves by this: it is approved like any other proposal."))),
     }
     lines
 }
@@ -189,8 +188,8 @@ fn edited(theme: &Theme, input: &Input) -> Vec<Span<'static>> {
 
 fn field_title(purpose: Purpose) -> String {
     match purpose {
-        Purpose::Note(trial) => format!("Note on trial {trial}"),
-        Purpose::HandValue(trial) => format!("Trial {trial}, measured by hand"),
+        Purpose::Note(trial) => format!("Note on trial #{trial}"),
+        Purpose::HandValue(trial) => format!("Trial #{trial}, measured by hand"),
         Purpose::Continue => "How many more trials?".to_owned(),
         Purpose::TrialNumber => "Go to trial".to_owned(),
         Purpose::LogSearch => "Search the log".to_owned(),
@@ -205,9 +204,7 @@ fn field(model: &Model, purpose: Purpose, input: &Input, problem: Option<&str>) 
     }
     let below = match (problem, purpose) {
         (Some(problem), _) => span(theme, Role::Bad, problem.to_owned()),
-        (None, Purpose::HandValue(_)) => {
-            span(theme, Role::Quiet, "replaces the measured value; empty: back to the measured one")
-        }
+        (None, Purpose::HandValue(_)) => span(theme, Role::Quiet, "replaces the measured value; empty: back to the measured one"),
         (None, Purpose::LogSearch) => span(theme, Role::Quiet, "empty: all lines"),
         (None, Purpose::Note(_)) if model.robot_needs_us() => {
             span(theme, Role::Quiet, "the robot is armed: Space is STOP, _ writes a space")
@@ -219,7 +216,7 @@ fn field(model: &Model, purpose: Purpose, input: &Input, problem: Option<&str>) 
 
 fn render_palette(frame: &mut Frame, area: Rect, model: &Model, input: &Input, selected: usize) {
     let theme = &model.theme;
-    let inner = open_box(frame, area, theme, "Actions", 76, area.height.min(20));
+    let inner = open_box(frame, area, theme, "Actions", 80, area.height.min(24));
     let mut spans = vec![span(theme, Role::Key, ":")];
     spans.extend(edited(theme, input));
     frame.render_widget(Line::from(spans), Rect { height: 1, ..inner });
@@ -231,10 +228,10 @@ fn render_palette(frame: &mut Frame, area: Rect, model: &Model, input: &Input, s
         let (key, name) = (model.keymap.key(info.action), info.name);
         let text = match legal {
             Ok(()) => info.help.to_owned(),
-            Err(reason) => format!("not now: {reason}"),
+            Err(reason) => format!("({reason})"),
         };
         let role = if legal.is_ok() { Role::Text } else { Role::Quiet };
-        let text = cut(&format!("{key:<10}{name:<17}{text}"), usize::from(inner.width));
+        let text = cut(&format!("{key:<9} {name:<16}{text}"), usize::from(inner.width));
         let style = if index == selected { theme.style(Role::Selected) } else { theme.style(role) };
         frame.render_widget(Line::from(Span::styled(text, style)), area);
     }
@@ -245,11 +242,7 @@ fn render_help(frame: &mut Frame, area: Rect, model: &Model, scroll: usize) {
     let height = area.height.min(lines.len() as u16 + 2);
     let room = usize::from(height.saturating_sub(2));
     let scroll = scroll.min(lines.len().saturating_sub(room));
-    let more = if lines.len() > room {
-        format!("Keys ({}-{} of {}, Up Down)", scroll + 1, scroll + room, lines.len())
-    } else {
-        "Keys".to_owned()
-    };
+    let more = if lines.len() > room { format!("Keys ({}-{} of {}, Up Down)", scroll + 1, scroll + room, lines.len()) } else { "Keys".to_owned() };
     let inner = open_box(frame, area, &model.theme, &more, 78, height);
     let shown: Vec<Line> = lines.into_iter().skip(scroll).take(room).collect();
     frame.render_widget(Paragraph::new(shown), inner);

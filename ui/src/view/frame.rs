@@ -1,7 +1,7 @@
 //! The permanent frame: two lines at the top, the tabs, the answer line, and what remains of them on a small terminal.
 //!
 //! ```text
-//!  READY   SIM go1   forward   trial 8 of 20   best 0.642 m (#3)              REC 03:12
+//!  READY      SIM  forward   trial #8   7 of 20 judged   best 0.642 m (#3)       REC 03:12
 //!  STOP Space F12    loop 0 late, worst 0.1 ms    link 0 ms    motor 31 C    battery 87 %
 //! ```
 
@@ -64,7 +64,8 @@ fn identity(model: &Model) -> Vec<Span<'static>> {
     }
     spans.push(Span::raw(session.task.clone()));
     if let Some(info) = model.stage {
-        spans.push(Span::raw(format!("   trial {} of {}", ordinal(model, info.trial), session.budget)));
+        let finished = model.counted();
+        spans.push(Span::raw(format!("   trial #{}   {finished} of {} judged", info.trial, session.budget)));
     }
     if let Some((best, value)) = model.best().and_then(|best| Some((best, best.value?))) {
         spans.push(Span::raw("   best "));
@@ -72,12 +73,6 @@ fn identity(model: &Model) -> Vec<Span<'static>> {
         spans.push(span(theme, Role::Quiet, format!(" (#{})", best.trial)));
     }
     spans
-}
-
-/// Which of the budget's trials this is: voids do not use the budget up.
-fn ordinal(model: &Model, trial: u32) -> usize {
-    let judged = model.trials.get(&trial).is_some_and(|row| row.verdict.is_some());
-    model.counted() + usize::from(!judged)
 }
 
 fn recording(model: &Model) -> Vec<Span<'static>> {

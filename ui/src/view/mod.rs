@@ -1,8 +1,8 @@
 //! Drawing. Every panel is a free function of the model; nothing here changes it.
 //!
 //! ```text
-//!  READY   SIM go1   forward   trial 8 of 20   best 0.642 m (#3)              REC 03:12   <- frame, never covered
-//!  STOP Space F12    loop 0 late, worst 0.1 ms    link 0 ms    motor 31 C
+//!  READY      SIM  forward   trial #8   7 of 20 judged   best 0.642 m (#3)     REC 03:12  <- frame, never covered
+//!  STOP Space F12    loop 0 late, worst 0.1 ms    link 0 ms    motors 31 C
 //!  1 Live   2 Trials   3 Optimizer   4 Override   5 Health   6 Log        ? help : actions
 //! ┌─────────────────────────────────────────────────────────────────────────────────────┐
 //! │ the open view, with dialogs over it                                                  │
@@ -74,6 +74,8 @@ pub fn span(theme: &Theme, role: Role, text: impl Into<String>) -> Span<'static>
 /// A heading with a line to the right edge; returns the area below it.
 pub fn heading(frame: &mut Frame, area: Rect, theme: &Theme, title: &str, aside: &str) -> Rect {
     let [top, rest] = Layout::vertical([Constraint::Length(1), Constraint::Fill(1)]).areas(area);
+    // Where there is no room for both, the title stays.
+    let aside = if title.chars().count() + aside.chars().count() + 4 > usize::from(area.width) { "" } else { aside };
     let used = title.chars().count() + aside.chars().count() + 2 + usize::from(!aside.is_empty());
     let fill = theme.line().repeat(usize::from(area.width).saturating_sub(used));
     let mut spans = vec![span(theme, Role::Heading, title), Span::raw(" "), span(theme, Role::Quiet, fill)];

@@ -28,7 +28,7 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
         key(Action::Skip)
     );
     let (title, mut lines) = match model.proposal_on_table() {
-        Some(proposal) => (format!("Trial {}, by: {}", proposal.trial, proposal.source.name()), rows(model, proposal)),
+        Some(proposal) => (format!("Trial #{}, by: {}", proposal.trial, proposal.source.name()), rows(model, proposal)),
         None => ("Parameters".to_owned(), bounds(model)),
     };
     let body = heading(frame, area, theme, &title, &keys);

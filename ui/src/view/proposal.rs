@@ -2,7 +2,7 @@
 //! parameters when the study is finished.
 //!
 //! ```text
-//! Trial 8, by the sampler ───────      Trial 8, judge it ─────────────
+//! Trial #8, by the sampler ──────      Trial #8: judge it ────────────
 //!  f0    1.243 Hz   [----o-----]        J     0.642 m
 //!  Fx    118.2 N    [-------o--]        dx   +0.642 m   dy   -0.012 m
 //!  Fz    243.9 N    [---o------]        yaw  +0.031 rad
@@ -37,19 +37,19 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
 fn content(model: &Model, width: usize) -> (String, Vec<Line<'static>>) {
     let stage = model.stage.map(|info| info.stage);
     if let Some(trial) = model.under_review() {
-        return (format!("Trial {}: judge it", trial.trial), review(model, trial));
+        return (format!("Trial #{}: judge it", trial.trial), review(model, trial));
     }
     match (stage, &model.proposal) {
         (Some(Stage::Finished), _) => ("Study finished".to_owned(), finished(model, width)),
         (_, Some(proposal)) => {
             let running = stage == Some(Stage::Running);
             let title = match (running, proposal.source, proposal.parent) {
-                (true, _, _) => format!("Trial {} runs", proposal.trial),
-                (false, Source::Sampler, _) => format!("Trial {}, by the sampler", proposal.trial),
-                (false, Source::Operator, _) => format!("Trial {}, overridden", proposal.trial),
-                (false, Source::Rerun, Some(parent)) => format!("Trial {}, re-run of #{parent}", proposal.trial),
-                (false, Source::Rerun, None) => format!("Trial {}, a re-run", proposal.trial),
-                (false, Source::Queued, _) => format!("Trial {}, from the queue", proposal.trial),
+                (true, _, _) => format!("Trial #{} runs", proposal.trial),
+                (false, Source::Sampler, _) => format!("Trial #{}, by the sampler", proposal.trial),
+                (false, Source::Operator, _) => format!("Trial #{}, overridden", proposal.trial),
+                (false, Source::Rerun, Some(parent)) => format!("Trial #{}, re-run of #{parent}", proposal.trial),
+                (false, Source::Rerun, None) => format!("Trial #{}, a re-run", proposal.trial),
+                (false, Source::Queued, _) => format!("Trial #{}, from the queue", proposal.trial),
             };
             let mut lines: Vec<Line> = proposal.parameters.iter().map(|p| parameter(model, p, width)).collect();
             lines.push(risk(model, proposal.risk));
@@ -119,18 +119,18 @@ fn review(model: &Model, trial: &TrialRecord) -> Vec<Line<'static>> {
     }
     if let Some(m) = trial.measured {
         lines.push(Line::from(vec![
-            label(" dx  "),
+            label(" dx   "),
             Span::raw(format!("{:+.3} m", m.dx_m)),
-            label("   dy  "),
+            label("  dy  "),
             Span::raw(format!("{:+.3} m", m.dy_m)),
         ]));
         lines.push(Line::from(vec![
-            label(" apex"),
+            label(" apex "),
             Span::raw(format!("{:+.3} m", m.apex_m)),
-            label("   air "),
+            label("  air "),
             Span::raw(format!(" {:.3} s", m.air_s)),
         ]));
-        lines.push(Line::from(vec![label(" yaw "), Span::raw(format!("{:+.3} rad", m.dyaw_rad))]));
+        lines.push(Line::from(vec![label(" yaw  "), Span::raw(format!("{:+.3} rad", m.dyaw_rad))]));
     }
     if let Some(verdict) = trial.suggested {
         let role = if verdict == Verdict::Accept { Role::Good } else { Role::Bad };
@@ -162,7 +162,7 @@ fn finished(model: &Model, width: usize) -> Vec<Line<'static>> {
     let mut lines = vec![Line::from(vec![
         span(theme, Role::Quiet, " best "),
         span(theme, Role::Good, format!("{value} {}", model.session.unit)),
-        span(theme, Role::Quiet, format!(" (trial {})", best.trial)),
+        span(theme, Role::Quiet, format!(" (#{})", best.trial)),
     ])];
     for (name, value) in &best.parameters {
         let p = ProposedParameter { name: name.clone(), value: *value, proposed: *value };
