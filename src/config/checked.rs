@@ -17,7 +17,7 @@ use crate::realtime::command::Task;
 use crate::recording::record::ParameterInfo;
 use crate::robot::Leg;
 use crate::robot::description::RobotDescription;
-use crate::sim::SimConfig;
+use crate::sim::{SimConfig, SimError};
 
 /// The files of a configuration folder and their defaults.
 const FILES: [(&str, &str); 5] = [
@@ -244,7 +244,11 @@ impl Config {
     fn check(&self) -> Result<(), ConfigError> {
         self.check_control()?;
         self.check_safety()?;
-        self.check_optimize()
+        self.check_optimize()?;
+        self.simulator.check().map_err(|error| match error {
+            SimError::Value { key, value, remedy } => self.refuse("simulator.toml", key, value, remedy),
+            SimError::Syntax { reason } => ConfigError::Syntax { file: "simulator.toml".to_owned(), line: 1, message: reason },
+        })
     }
 
     fn check_control(&self) -> Result<(), ConfigError> {
