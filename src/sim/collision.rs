@@ -9,6 +9,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::config::{BodyKind, SimConfig, TerrainKind};
 use super::contact::{ContactPoint, ContactSolver, TRUNK, Velocity};
 use super::dynamics::Dynamics;
+use super::quantities::split;
 use super::state::State;
 use super::terrain::{MAX_TOUCHES, Terrain, Touch};
 use crate::robot::description::{Body, RobotDescription, Shape};
@@ -18,9 +19,6 @@ use crate::robot::{LEGS, Leg};
 const EDGE_SPACING: f64 = 0.1;
 /// Contacts are looked for as if points could be faster than they are by this much, m/s: what impulses of the same step may add.
 const SPEED_MARGIN: f64 = 2.0;
-/// No point of the machine moves faster than this when contacts are looked for, m/s.
-const SPEED_LIMIT: f64 = 20.0;
-
 /// A sphere or rim of the machine that can touch.
 #[derive(Debug, Clone, Copy)]
 enum Outline {
@@ -80,11 +78,13 @@ pub(super) struct Collider {
     /// The feet come first, one per leg.
     probes: Vec<Probe>,
     balls: Vec<Ball>,
+    /// No point is farther than this from the trunk's origin or from a joint that moves it, m.
+    extent: f64,
 }
 
 impl Collider {
     pub fn new(description: &RobotDescription, config: &SimConfig) -> Collider {
-        let mut collider = Collider { probes: Vec::new(), balls: Vec::new() };
+        let mut collider = Collider { probes: Vec::new(), balls: Vec::new(), extent: 0.0 };
         let spacing = match config.terrain.kind {
             TerrainKind::Flat | TerrainKind::Slope => f64::INFINITY,
             TerrainKind::Steps | TerrainKind::Blocks => EDGE_SPACING,
@@ -104,6 +104,12 @@ impl Collider {
                     collider.add_body(&part.bodies[link], leg, link, spacing);
                 }
             }
+        }
+        // Along a leg stretched out, and then across the shape at its end.
+        for ball in &collider.balls {
+            let origins = description.legs.get(ball.leg).map_or(&[][..], |leg| &leg.joint_origin[..=ball.link]);
+            let leg: f64 = origins.iter().map(|origin| origin.norm()).sum();
+            collider.extent = collider.extent.max(leg + ball.center.norm() + ball.radius);
         }
         collider
     }
@@ -160,7 +166,7 @@ impl Collider {
 
     /// Adds to `solver` every point that may touch in the step.
     pub fn find(&self, moment: &Moment, solver: &mut ContactSolver) {
-        let reach = SPEED_LIMIT * moment.h;
+        let reach = moment.h * (self.fastest(moment.free) + SPEED_MARGIN);
         let now = Velocity::of(moment.state);
         self.near(moment.dynamics, moment.state, moment.terrain, moment.world_from_body, reach, |probe, i, place| {
             for (k, touch) in moment.terrain.touches(&place.center_world, place.radius, reach).into_iter().enumerate() {
@@ -169,6 +175,13 @@ impl Collider {
                 }
             }
         });
+    }
+
+    /// A bound on the speed of any point: |v| + r |w| + l (|dq_1| + |dq_2| + |dq_3|), m/s.
+    fn fastest(&self, v: &Velocity) -> f64 {
+        let (linear, angular) = split(&v.trunk);
+        let legs = v.legs.iter().fold(0.0, |most: f64, dq| most.max(dq.abs().sum()));
+        linear.norm() + self.extent * (angular.norm() + legs)
     }
 
     /// The smallest gap of any probe to the ground, m.
@@ -288,8 +301,7 @@ fn add_touch(
 /// Velocity of a point at `p_body` on `leg`, body axes: v + w x p + J_l dq.
 #[inline]
 fn point_velocity(v: &Velocity, leg: usize, leg_jacobian: &Matrix3<f64>, p_body: &Vector3<f64>) -> Vector3<f64> {
-    let linear = Vector3::new(v.trunk[0], v.trunk[1], v.trunk[2]);
-    let angular = Vector3::new(v.trunk[3], v.trunk[4], v.trunk[5]);
+    let (linear, angular) = split(&v.trunk);
     let trunk = linear + angular.cross(p_body);
     if leg == TRUNK { trunk } else { trunk + leg_jacobian * v.legs[leg] }
 }

@@ -20,10 +20,10 @@
 //! W = (J_0 - J_l G_l) L^-T and U = J_l C_l^-T. The sweep keeps the sums y_0 = sum W^T p and y_l = sum U^T p, so one visit costs the
 //! same however many contacts there are.
 
-use nalgebra::{Matrix3, Vector2, Vector3, Vector6};
+use nalgebra::{Matrix3, Vector2, Vector3};
 
 use super::config::{ContactConfig, ContactLaw, SolverConfig};
-use super::dynamics::{Dynamics, Matrix6x3};
+use super::dynamics::{Dynamics, Six, add_scaled, dot};
 use super::quantities::stack;
 use super::state::State;
 use crate::robot::{JOINTS, Joints, LEGS, PerLeg, leg_of};
@@ -39,7 +39,7 @@ pub(super) const TRUNK: usize = LEGS;
 /// Velocities of trunk (linear, angular; axes of the body at the start of the step) and joints.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Velocity {
-    pub trunk: Vector6<f64>,
+    pub trunk: Six,
     pub legs: PerLeg<Vector3<f64>>,
 }
 
@@ -84,8 +84,8 @@ pub(super) struct Contact {
     pub point: ContactPoint,
     /// Columns normal, two tangents, body axes.
     axes_body: Matrix3<f64>,
-    /// W^T.
-    trunk_rows: Matrix6x3,
+    /// W.
+    trunk_rows: [Six; 3],
     /// U; zero for the trunk.
     leg_rows: Matrix3<f64>,
     /// A = W W^T + U U^T and its inverse.
@@ -103,7 +103,7 @@ pub(super) struct Contact {
 #[derive(Debug, Clone, Copy)]
 struct Row {
     leg: usize,
-    trunk_row: Vector6<f64>,
+    trunk_row: Six,
     leg_row: Vector3<f64>,
     local: f64,
     free: f64,
@@ -172,22 +172,36 @@ impl ContactSolver {
             return;
         }
         let axes_body = axes_about(&point.normal_body);
-        let [n, t1, t2] = [axes_body.column(0).into(), axes_body.column(1).into(), axes_body.column(2).into()];
-        let p: &Vector3<f64> = &point.position_body;
-        // Columns of J_0^T: axis . (v + w x p) = axis . v + (p x axis) . w
-        let mut columns =
-            Matrix6x3::from_columns(&[stack(&n, &p.cross(&n)), stack(&t1, &p.cross(&t1)), stack(&t2, &p.cross(&t2))]);
+        // Rows of J_0: axis . (v + w x p) = axis . v + (p x axis) . w
+        let mut trunk_rows = [0, 1, 2].map(|i| {
+            let axis: Vector3<f64> = axes_body.column(i).into();
+            stack(&axis, &point.position_body.cross(&axis))
+        });
         let mut leg_rows = Matrix3::zeros();
         if point.leg != TRUNK {
-            // J_0^T - G^T J_l^T and U = J_l C^-T
+            // J_0 - J_l G  and  U = J_l C^-T
             let leg = &dynamics.legs[point.leg];
             let jacobian = axes_body.tr_mul(&point.leg_jacobian);
-            columns -= leg.gain.tr_mul(&jacobian.transpose());
+            for (i, row) in trunk_rows.iter_mut().enumerate() {
+                for (j, gain) in leg.gain.iter().enumerate() {
+                    add_scaled(row, gain, -jacobian[(i, j)]);
+                }
+            }
             leg_rows = jacobian * leg.factor_inverse.transpose();
         }
-        // W = (L^-1 (J_0 - J_l G)^T)^T
-        let trunk_rows = dynamics.solve_lower_columns(columns);
-        let local = trunk_rows.tr_mul(&trunk_rows) + leg_rows * leg_rows.transpose();
+        // W = (J_0 - J_l G) L^-T
+        for row in &mut trunk_rows {
+            dynamics.solve_lower(row);
+        }
+        let [w1, w2, w3] = &trunk_rows;
+        let (a12, a13, a23) = (dot(w1, w2), dot(w1, w3), dot(w2, w3));
+        #[rustfmt::skip]
+        let trunk_part = Matrix3::new(
+            dot(w1, w1), a12,         a13,
+            a12,         dot(w2, w2), a23,
+            a13,         a23,         dot(w3, w3),
+        );
+        let local = trunk_part + leg_rows * leg_rows.transpose();
         let mut free = axes_body.tr_mul(&point.free_slip_body);
         // gap + h v_n >= 0; inside the ground a share of the way back per step.
         let share = if point.gap > 0.0 { 1.0 } else { self.config.penetration_recovery };
@@ -224,42 +238,38 @@ impl ContactSolver {
         let mut u = Vector3::zeros();
         u[part] = sign;
         let l = &dynamics.legs[leg];
-        let trunk_row = dynamics.solve_lower(&-l.gain.tr_mul(&u));
+        let mut trunk_row = l.gain[part].map(|g| -sign * g);
+        dynamics.solve_lower(&mut trunk_row);
         let leg_row = l.factor_inverse * u;
-        let local = trunk_row.norm_squared() + leg_row.norm_squared();
+        let local = dot(&trunk_row, &trunk_row) + leg_row.norm_squared();
         self.rows.push(Row { leg, trunk_row, leg_row, local, free, lowest, highest, impulse: 0.0 });
     }
 
     /// Solves for all impulses; returns the change of velocity that they make.
     pub fn solve(&mut self, dynamics: &Dynamics, world_from_body: &Matrix3<f64>) -> Velocity {
-        let mut trunk = Vector6::zeros();
-        let mut legs = [Vector3::zeros(); LEGS + 1];
+        // y_0 = sum W^T p,  y_l = sum U^T p
+        let mut sums = Sums { trunk: [0.0; 6], legs: [Vector3::zeros(); LEGS + 1] };
         for contact in &self.contacts {
-            trunk += contact.trunk_rows * contact.impulse;
-            legs[contact.point.leg] += contact.leg_rows.tr_mul(&contact.impulse);
+            contact.add(&mut sums, &contact.impulse);
         }
         for _ in 0..self.config.max_sweeps {
             let mut change: f64 = 0.0;
             for contact in &mut self.contacts {
-                let leg = &mut legs[contact.point.leg];
-                let velocity = contact.free + contact.trunk_rows.tr_mul(&trunk) + contact.leg_rows * *leg;
                 // What the others alone would leave.
-                let others = velocity - contact.local * contact.impulse;
+                let others = contact.velocity(&sums) - contact.local * contact.impulse;
                 let impulse = contact.solve(&others);
                 let step = impulse - contact.impulse;
                 contact.impulse = impulse;
-                trunk += contact.trunk_rows * step;
-                *leg += contact.leg_rows.tr_mul(&step);
+                contact.add(&mut sums, &step);
                 change = change.max((contact.local * step).amax());
             }
             for row in &mut self.rows {
-                let leg = &mut legs[row.leg];
-                let velocity = row.free + row.trunk_row.dot(&trunk) + row.leg_row.dot(leg);
+                let velocity = row.free + dot(&row.trunk_row, &sums.trunk) + row.leg_row.dot(&sums.legs[row.leg]);
                 let impulse = (row.impulse - velocity / row.local).clamp(row.lowest, row.highest);
                 let step = impulse - row.impulse;
                 row.impulse = impulse;
-                trunk += row.trunk_row * step;
-                *leg += row.leg_row * step;
+                add_scaled(&mut sums.trunk, &row.trunk_row, step);
+                sums.legs[row.leg] += row.leg_row * step;
                 change = change.max((row.local * step).abs());
             }
             if change < self.config.tolerance_m_s {
@@ -274,16 +284,40 @@ impl ContactSolver {
             self.remembered.push(contact.point.memory);
         }
         // dv_0 = L^-T y_0,  ddq_l = C^-T y_l - G dv_0
-        let trunk = dynamics.solve_upper(&trunk);
+        let mut trunk = sums.trunk;
+        dynamics.solve_upper(&mut trunk);
         let legs = std::array::from_fn(|l| {
             let leg = &dynamics.legs[l];
-            leg.factor_inverse.tr_mul(&legs[l]) - leg.gain * trunk
+            leg.follow(&leg.factor_inverse.tr_mul(&sums.legs[l]), &trunk)
         });
         Velocity { trunk, legs }
     }
 }
 
+/// y_0 and y_l; the last leg stands for the trunk and stays zero.
+struct Sums {
+    trunk: Six,
+    legs: [Vector3<f64>; LEGS + 1],
+}
+
 impl Contact {
+    /// W y_0 + U y_l + what it is without impulses.
+    #[inline]
+    fn velocity(&self, sums: &Sums) -> Vector3<f64> {
+        let [w1, w2, w3] = &self.trunk_rows;
+        let trunk = Vector3::new(dot(w1, &sums.trunk), dot(w2, &sums.trunk), dot(w3, &sums.trunk));
+        self.free + trunk + self.leg_rows * sums.legs[self.point.leg]
+    }
+
+    /// Adds the impulse `p` to the sums.
+    #[inline]
+    fn add(&self, sums: &mut Sums, p: &Vector3<f64>) {
+        for (row, p) in self.trunk_rows.iter().zip(p.iter()) {
+            add_scaled(&mut sums.trunk, row, *p);
+        }
+        sums.legs[self.point.leg] += self.leg_rows.tr_mul(p);
+    }
+
     /// The ground's impulse on the robot, body axes at the start of the step, N s.
     pub fn impulse_body(&self) -> Vector3<f64> {
         self.axes_body * self.impulse

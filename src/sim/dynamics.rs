@@ -16,17 +16,29 @@
 //! Each leg is worked out in the frame of its hip link, in which thigh and calf turn about the same fixed axis y.
 //! Six-vectors have the linear part first, in body axes at the trunk's origin.
 
-use nalgebra::{Matrix3, Matrix6, SMatrix, Vector3, Vector6};
+use nalgebra::{Matrix3, Vector3};
 
 use super::model::{GRAVITY, LegModel, Model};
 use super::spatial::{Force, Inertia, Motion, Turn};
 use super::state::{Acceleration, State};
 use crate::robot::{Joints, LEGS, PerLeg};
 
-/// 3x6: leg rows, trunk columns.
-pub(super) type Matrix3x6 = SMatrix<f64, 3, 6>;
-/// 6x3: trunk rows, leg columns.
-pub(super) type Matrix6x3 = SMatrix<f64, 6, 3>;
+/// A row over, or a column of, the trunk's six velocities. Plain arrays, which the compiler turns into vector instructions.
+pub(super) type Six = [f64; 6];
+
+/// a . b
+#[inline]
+pub(super) fn dot(a: &Six, b: &Six) -> f64 {
+    (a[0] * b[0] + a[2] * b[2] + a[4] * b[4]) + (a[1] * b[1] + a[3] * b[3] + a[5] * b[5])
+}
+
+/// y += s x
+#[inline]
+pub(super) fn add_scaled(y: &mut Six, x: &Six, s: f64) {
+    for (y, x) in y.iter_mut().zip(x) {
+        *y += s * x;
+    }
+}
 
 /// Where a leg's parts are and how they couple to the trunk.
 #[derive(Debug, Clone, Copy)]
@@ -40,14 +52,14 @@ pub(super) struct LegDynamics {
     pub origin_body: [Vector3<f64>; 3],
     /// H: mass matrix of the leg's joints, kg m^2.
     pub mass: Matrix3<f64>,
-    /// F: six rows of the trunk's frame by three joints.
-    pub coupling: Matrix6x3,
+    /// F: a column for each joint.
+    pub coupling: [Six; 3],
     /// c: torques that velocity and gravity ask for, N m.
     pub bias: Vector3<f64>,
     /// C^-1: inverse of the lower Cholesky factor of H.
     pub factor_inverse: Matrix3<f64>,
-    /// G = H^-1 F^T.
-    pub gain: Matrix3x6,
+    /// G = H^-1 F^T: a row for each joint.
+    pub gain: [Six; 3],
 }
 
 /// The equations at one state.
@@ -57,10 +69,10 @@ pub(super) struct Dynamics {
     /// I_0 as mass, first and second moment.
     pub composite: Inertia,
     /// b of the trunk's rows.
-    pub bias: Vector6<f64>,
-    /// L: lower Cholesky factor of I_A, with the reciprocals of its diagonal kept apart.
-    pub factor: Matrix6<f64>,
-    pub factor_diagonal_inverse: Vector6<f64>,
+    pub bias: Six,
+    /// L: lower Cholesky factor of I_A by columns, with the reciprocals of its diagonal kept apart.
+    factor: [Six; 6],
+    factor_diagonal_inverse: Six,
 }
 
 impl LegDynamics {
@@ -117,22 +129,20 @@ impl LegDynamics {
         let p2 = force(&link_thigh, &v2, &a2).plus(&p3);
         let p1 = force(&link_hip, &v1, &a1).plus(&p2);
 
-        let mut coupling = Matrix6x3::zeros();
-        for (j, f) in [f1, f2, f3].iter().enumerate() {
+        let column = |f: &Force| {
             let f = f.out_of(hip, &origin_hip);
-            coupling.fixed_view_mut::<3, 1>(0, j).copy_from(&f.linear);
-            coupling.fixed_view_mut::<3, 1>(3, j).copy_from(&f.angular);
-        }
+            [f.linear.x, f.linear.y, f.linear.z, f.angular.x, f.angular.y, f.angular.z]
+        };
         let dynamics = LegDynamics {
             hip,
             thigh,
             calf,
             origin_body: [origin_hip, origin_hip + hip.x(&origin_thigh), origin_hip + hip.x(&origin_calf)],
             mass: Matrix3::new(h11, h12, h13, h12, h22, h23, h13, h23, h33),
-            coupling,
+            coupling: [column(&f1), column(&f2), column(&f3)],
             bias: Vector3::new(p1.angular.x, s2.dot(&p2), s3.dot(&p3)),
             factor_inverse: Matrix3::zeros(),
-            gain: Matrix3x6::zeros(),
+            gain: [[0.0; 6]; 3],
         };
         (dynamics, composite_hip.turned_x(hip).moved(&origin_hip), p1.out_of(hip, &origin_hip))
     }
@@ -153,15 +163,22 @@ impl LegDynamics {
         let i31 = -(c31 * i11 + c32 * i21) * i33;
         self.factor_inverse = Matrix3::new(i11, 0.0, 0.0, i21, i22, 0.0, i31, i32, i33);
         // G = C^-T (C^-1 F^T)
-        let f = &self.coupling;
+        let [f1, f2, f3] = &self.coupling;
         for k in 0..6 {
-            let y1 = i11 * f[(k, 0)];
-            let y2 = i21 * f[(k, 0)] + i22 * f[(k, 1)];
-            let y3 = i31 * f[(k, 0)] + i32 * f[(k, 1)] + i33 * f[(k, 2)];
-            self.gain[(0, k)] = i11 * y1 + i21 * y2 + i31 * y3;
-            self.gain[(1, k)] = i22 * y2 + i32 * y3;
-            self.gain[(2, k)] = i33 * y3;
+            let y1 = i11 * f1[k];
+            let y2 = i21 * f1[k] + i22 * f2[k];
+            let y3 = i31 * f1[k] + i32 * f2[k] + i33 * f3[k];
+            self.gain[0][k] = i11 * y1 + i21 * y2 + i31 * y3;
+            self.gain[1][k] = i22 * y2 + i32 * y3;
+            self.gain[2][k] = i33 * y3;
         }
+    }
+
+    /// What the joints do when the trunk does `trunk`: -G a_0 added to `free`.
+    #[inline]
+    pub fn follow(&self, free: &Vector3<f64>, trunk: &Six) -> Vector3<f64> {
+        let [g1, g2, g3] = &self.gain;
+        Vector3::new(free.x - dot(g1, trunk), free.y - dot(g2, trunk), free.z - dot(g3, trunk))
     }
 
     /// H^-1 u = C^-T C^-1 u.
@@ -239,132 +256,97 @@ impl Dynamics {
             leg
         });
 
-        // I_A = I_0 - sum F G, only the lower triangle.
-        let mut articulated = lower_triangle(&composite);
+        // I_A = I_0 - sum F G, only the lower triangle counts.
+        let mut articulated = columns(&composite);
         for leg in &legs {
-            for j in 0..6 {
-                for i in j..6 {
-                    articulated[(i, j)] -= leg.coupling[(i, 0)] * leg.gain[(0, j)]
-                        + leg.coupling[(i, 1)] * leg.gain[(1, j)]
-                        + leg.coupling[(i, 2)] * leg.gain[(2, j)];
+            for (f, g) in leg.coupling.iter().zip(&leg.gain) {
+                for j in 0..6 {
+                    for i in j..6 {
+                        articulated[j][i] -= f[i] * g[j];
+                    }
                 }
             }
         }
         let factor_diagonal_inverse = cholesky(&mut articulated);
-        Dynamics {
-            legs,
-            composite,
-            bias: Vector6::new(
-                bias.linear.x,
-                bias.linear.y,
-                bias.linear.z,
-                bias.angular.x,
-                bias.angular.y,
-                bias.angular.z,
-            ),
-            factor: articulated,
-            factor_diagonal_inverse,
-        }
+        let (n, f) = (&bias.angular, &bias.linear);
+        Dynamics { legs, composite, bias: [f.x, f.y, f.z, n.x, n.y, n.z], factor: articulated, factor_diagonal_inverse }
     }
 
     /// a = M^-1 ([0; tau] - b).
     pub fn acceleration(&self, torque: &Joints) -> Acceleration {
         // z_l = H_l^-1 (tau_l - c_l);  I_A a_0 = -b_0 - sum F_l z_l;  ddq_l = z_l - G_l a_0
         let mut free = [Vector3::zeros(); LEGS];
-        let mut right = -self.bias;
+        let mut trunk = self.bias.map(|b| -b);
         for (l, leg) in self.legs.iter().enumerate() {
             let u = Vector3::new(torque[3 * l], torque[3 * l + 1], torque[3 * l + 2]) - leg.bias;
-            free[l] = leg.solve(&u);
-            right -= leg.coupling * free[l];
+            let z = leg.solve(&u);
+            for (column, z) in leg.coupling.iter().zip(z.iter()) {
+                add_scaled(&mut trunk, column, -z);
+            }
+            free[l] = z;
         }
-        let trunk = self.solve_trunk(&right);
+        self.solve_lower(&mut trunk);
+        self.solve_upper(&mut trunk);
         let mut joint = Joints::default();
         for (l, leg) in self.legs.iter().enumerate() {
-            let ddq = free[l] - leg.gain * trunk;
-            joint[3 * l..3 * l + 3].copy_from_slice(ddq.as_slice());
+            joint[3 * l..3 * l + 3].copy_from_slice(leg.follow(&free[l], &trunk).as_slice());
         }
         Acceleration {
-            linear_body: trunk.fixed_rows::<3>(0).into(),
-            angular_body: trunk.fixed_rows::<3>(3).into(),
+            linear_body: Vector3::new(trunk[0], trunk[1], trunk[2]),
+            angular_body: Vector3::new(trunk[3], trunk[4], trunk[5]),
             joint,
         }
     }
 
-    /// I_A^-1 x = L^-T L^-1 x.
+    /// x becomes L^-1 x.
     #[inline]
-    pub fn solve_trunk(&self, x: &Vector6<f64>) -> Vector6<f64> {
-        self.solve_upper(&self.solve_lower(x))
-    }
-
-    /// L^-1 x.
-    #[inline]
-    pub fn solve_lower(&self, x: &Vector6<f64>) -> Vector6<f64> {
-        let mut y = *x;
+    pub fn solve_lower(&self, x: &mut Six) {
         for j in 0..6 {
-            y[j] *= self.factor_diagonal_inverse[j];
+            x[j] *= self.factor_diagonal_inverse[j];
             for i in j + 1..6 {
-                y[i] -= self.factor[(i, j)] * y[j];
+                x[i] -= self.factor[j][i] * x[j];
             }
         }
-        y
     }
 
-    /// L^-1 X, three columns at once.
+    /// x becomes L^-T x.
     #[inline]
-    pub fn solve_lower_columns(&self, mut x: Matrix6x3) -> Matrix6x3 {
-        for k in 0..3 {
-            for j in 0..6 {
-                x[(j, k)] *= self.factor_diagonal_inverse[j];
-                for i in j + 1..6 {
-                    x[(i, k)] -= self.factor[(i, j)] * x[(j, k)];
-                }
-            }
-        }
-        x
-    }
-
-    /// L^-T x.
-    #[inline]
-    pub fn solve_upper(&self, x: &Vector6<f64>) -> Vector6<f64> {
-        let mut y = *x;
+    pub fn solve_upper(&self, x: &mut Six) {
         for j in (0..6).rev() {
             for i in j + 1..6 {
-                y[j] -= self.factor[(i, j)] * y[i];
+                x[j] -= self.factor[j][i] * x[i];
             }
-            y[j] *= self.factor_diagonal_inverse[j];
+            x[j] *= self.factor_diagonal_inverse[j];
         }
-        y
     }
 }
 
-/// The lower triangle of a spatial inertia as a 6x6 matrix, linear part first: [[m 1, -hx], [hx, I]].
-fn lower_triangle(inertia: &Inertia) -> Matrix6<f64> {
+/// A spatial inertia as the columns of a 6x6 matrix, linear part first: [[m 1, -hx], [hx, I]].
+fn columns(inertia: &Inertia) -> [Six; 6] {
     let (m, h, i) = (inertia.mass, &inertia.first, &inertia.second);
-    #[rustfmt::skip]
-    let matrix = Matrix6::new(
-        m,    0.0,  0.0,  0.0,  0.0,  0.0,
-        0.0,  m,    0.0,  0.0,  0.0,  0.0,
-        0.0,  0.0,  m,    0.0,  0.0,  0.0,
-        0.0,  -h.z, h.y,  i.xx, 0.0,  0.0,
-        h.z,  0.0,  -h.x, i.xy, i.yy, 0.0,
-        -h.y, h.x,  0.0,  i.xz, i.yz, i.zz,
-    );
-    matrix
+    [
+        [m, 0.0, 0.0, 0.0, h.z, -h.y],
+        [0.0, m, 0.0, -h.z, 0.0, h.x],
+        [0.0, 0.0, m, h.y, -h.x, 0.0],
+        [0.0, -h.z, h.y, i.xx, i.xy, i.xz],
+        [h.z, 0.0, -h.x, i.xy, i.yy, i.yz],
+        [-h.y, h.x, 0.0, i.xz, i.yz, i.zz],
+    ]
 }
 
-/// A = L L^T in place (lower triangle); returns the reciprocals of the diagonal of L.
+/// A = L L^T in place (columns, lower triangle); returns the reciprocals of the diagonal of L.
 #[inline]
-fn cholesky(a: &mut Matrix6<f64>) -> Vector6<f64> {
-    let mut inverse = Vector6::zeros();
+fn cholesky(a: &mut [Six; 6]) -> Six {
+    let mut inverse = [0.0; 6];
     for j in 0..6 {
-        let d = 1.0 / a[(j, j)].sqrt();
+        let d = 1.0 / a[j][j].sqrt();
         inverse[j] = d;
         for i in j..6 {
-            a[(i, j)] *= d;
+            a[j][i] *= d;
         }
         for k in j + 1..6 {
             for i in k..6 {
-                a[(i, k)] -= a[(i, j)] * a[(k, j)];
+                a[k][i] -= a[j][i] * a[j][k];
             }
         }
     }

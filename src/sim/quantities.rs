@@ -3,9 +3,9 @@
 //!
 //! Velocity vectors of 18 are ordered: linear velocity of the trunk's origin (body axes), angular velocity (body axes), joints.
 
-use nalgebra::{Matrix3, SMatrix, SVector, Vector3, Vector6};
+use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
-use super::dynamics::Dynamics;
+use super::dynamics::{Dynamics, Six, add_scaled};
 use super::model::{GRAVITY, Model};
 use super::spatial::Motion;
 use super::state::{Acceleration, State};
@@ -77,8 +77,9 @@ impl Model {
         matrix.fixed_view_mut::<3, 3>(3, 3).copy_from(&inertia);
         for (l, leg) in dynamics.legs.iter().enumerate() {
             let j = 6 + 3 * l;
-            matrix.fixed_view_mut::<6, 3>(0, j).copy_from(&leg.coupling);
-            matrix.fixed_view_mut::<3, 6>(j, 0).copy_from(&leg.coupling.transpose());
+            let coupling = SMatrix::<f64, 6, 3>::from(leg.coupling);
+            matrix.fixed_view_mut::<6, 3>(0, j).copy_from(&coupling);
+            matrix.fixed_view_mut::<3, 6>(j, 0).copy_from(&coupling.transpose());
             matrix.fixed_view_mut::<3, 3>(j, j).copy_from(&leg.mass);
         }
         for (i, rotor) in self.rotor_inertia.iter().enumerate() {
@@ -91,7 +92,7 @@ impl Model {
     pub fn bias(&self, state: &State) -> SVector<f64, DOF> {
         let dynamics = self.dynamics(state);
         let mut bias = SVector::<f64, DOF>::zeros();
-        bias.fixed_rows_mut::<6>(0).copy_from(&dynamics.bias);
+        bias.fixed_rows_mut::<6>(0).copy_from_slice(&dynamics.bias);
         for (l, leg) in dynamics.legs.iter().enumerate() {
             bias.fixed_rows_mut::<3>(6 + 3 * l).copy_from(&leg.bias);
         }
@@ -105,11 +106,10 @@ impl Model {
         let velocity = Motion { linear: state.velocity_body, angular: state.angular_velocity_body };
         let trunk = dynamics.composite.times(&velocity);
         let mut momentum = stack(&trunk.linear, &trunk.angular);
-        for (l, leg) in dynamics.legs.iter().enumerate() {
-            momentum += leg.coupling * leg_of(&state.joint_velocity, l);
+        for (column, speed) in dynamics.legs.iter().flat_map(|leg| &leg.coupling).zip(&state.joint_velocity) {
+            add_scaled(&mut momentum, column, *speed);
         }
-        let linear: Vector3<f64> = momentum.fixed_rows::<3>(0).into();
-        let angular: Vector3<f64> = momentum.fixed_rows::<3>(3).into();
+        let (linear, angular) = split(&momentum);
         let mass = dynamics.composite.mass;
         let com_body = dynamics.composite.first / mass;
         let to_world = &state.orientation_world;
@@ -158,7 +158,14 @@ impl Model {
     }
 }
 
-/// Linear and angular part in one vector.
-pub(super) fn stack(linear: &Vector3<f64>, angular: &Vector3<f64>) -> Vector6<f64> {
-    Vector6::new(linear.x, linear.y, linear.z, angular.x, angular.y, angular.z)
+/// Linear and angular part as one row.
+#[inline]
+pub(super) fn stack(linear: &Vector3<f64>, angular: &Vector3<f64>) -> Six {
+    [linear.x, linear.y, linear.z, angular.x, angular.y, angular.z]
+}
+
+/// Its linear and its angular part.
+#[inline]
+pub(super) fn split(six: &Six) -> (Vector3<f64>, Vector3<f64>) {
+    (Vector3::new(six[0], six[1], six[2]), Vector3::new(six[3], six[4], six[5]))
 }

@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::Simulator;
 use super::collision::{Collider, Moment};
 use super::contact::{Velocity, add_joints};
-use super::dynamics::Dynamics;
+use super::dynamics::{Dynamics, add_scaled};
 use super::integrate::{free_velocity, runge_kutta_4, semi_implicit_euler};
 use crate::robot::{JOINTS, JointCommand, PerLeg};
 
@@ -82,7 +82,7 @@ impl Simulator {
         if !self.solver.is_empty() {
             let world_from_body = self.world_from_body();
             let change = self.solver.solve(&dynamics, &world_from_body);
-            velocity.trunk += change.trunk;
+            add_scaled(&mut velocity.trunk, &change.trunk, 1.0);
             for (leg, change) in velocity.legs.iter_mut().zip(&change.legs) {
                 *leg += change;
             }
