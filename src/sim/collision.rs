@@ -8,12 +8,12 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::config::{BodyKind, SimConfig, TerrainKind};
 use super::contact::{ContactPoint, ContactSolver, TRUNK, Velocity};
-use super::dynamics::Dynamics;
+use super::dynamics::{Dynamics, Leg};
 use super::quantities::split;
 use super::state::State;
 use super::terrain::{MAX_TOUCHES, Terrain, Touch};
 use crate::robot::description::{Body, RobotDescription, Shape};
-use crate::robot::{LEGS, Leg};
+use crate::robot::{self, LEGS, PerLeg};
 
 /// Where boxes are to meet boxes, points along an edge are at most this far apart, m.
 const EDGE_SPACING: f64 = 0.1;
@@ -63,6 +63,7 @@ struct Ball {
 /// A step that is about to be made.
 pub(super) struct Moment<'a> {
     pub dynamics: &'a Dynamics,
+    pub legs: &'a PerLeg<Leg>,
     pub state: &'a State,
     pub terrain: &'a Terrain,
     pub world_from_body: &'a Matrix3<f64>,
@@ -120,8 +121,8 @@ impl Collider {
     }
 
     /// The leg whose foot this contact is; none for other parts.
-    pub fn foot_of(point: &ContactPoint) -> Option<Leg> {
-        Leg::ALL.get(point.memory / MAX_TOUCHES).copied()
+    pub fn foot_of(point: &ContactPoint) -> Option<robot::Leg> {
+        robot::Leg::ALL.get(point.memory / MAX_TOUCHES).copied()
     }
 
     fn add_body(&mut self, body: &Body, leg: usize, link: usize, spacing: f64) {
@@ -168,7 +169,7 @@ impl Collider {
     pub fn find(&self, moment: &Moment, solver: &mut ContactSolver) {
         let reach = moment.h * (self.fastest(moment.free) + SPEED_MARGIN);
         let now = Velocity::of(moment.state);
-        self.near(moment.dynamics, moment.state, moment.terrain, moment.world_from_body, reach, |probe, i, place| {
+        self.near(moment.legs, moment.state, moment.terrain, moment.world_from_body, reach, |probe, i, place| {
             for (k, touch) in moment.terrain.touches(&place.center_world, place.radius, reach).into_iter().enumerate() {
                 if let Some(touch) = touch {
                     add_touch(moment, &now, probe, MAX_TOUCHES * i + k, &place, &touch, solver);
@@ -185,10 +186,10 @@ impl Collider {
     }
 
     /// The smallest gap of any probe to the ground, m.
-    pub fn smallest_gap(&self, dynamics: &Dynamics, state: &State, terrain: &Terrain) -> f64 {
+    pub fn smallest_gap(&self, legs: &PerLeg<Leg>, state: &State, terrain: &Terrain) -> f64 {
         let world_from_body = state.orientation_world.to_rotation_matrix().into_inner();
         let mut smallest = f64::INFINITY;
-        self.near(dynamics, state, terrain, &world_from_body, f64::INFINITY, |_, _, place| {
+        self.near(legs, state, terrain, &world_from_body, f64::INFINITY, |_, _, place| {
             for touch in terrain.touches(&place.center_world, place.radius, f64::INFINITY).into_iter().flatten() {
                 smallest = smallest.min(touch.gap);
             }
@@ -200,7 +201,7 @@ impl Collider {
     #[inline]
     fn near(
         &self,
-        dynamics: &Dynamics,
+        legs: &PerLeg<Leg>,
         state: &State,
         terrain: &Terrain,
         world_from_body: &Matrix3<f64>,
@@ -213,7 +214,7 @@ impl Collider {
             // Height of a point p of the link: that of its frame's origin and up . p in the link's axes.
             let (origin_body, up_link) = match ball.leg {
                 TRUNK => (Vector3::zeros(), up_body),
-                leg => (dynamics.legs[leg].origin_body[ball.link], dynamics.legs[leg].into_link(ball.link, &up_body)),
+                leg => (legs[leg].origin_body[ball.link], legs[leg].into_link(ball.link, &up_body)),
             };
             let height = base + up_body.dot(&origin_body);
             if height + up_link.dot(&ball.center) > ball.radius + reach {
@@ -226,7 +227,7 @@ impl Collider {
                 let (center_link, radius) = probe.outline.lowest(&probe.center, &up_link);
                 let center_body = match ball.leg {
                     TRUNK => center_link,
-                    leg => dynamics.legs[leg].in_body(ball.link, &center_link),
+                    leg => legs[leg].in_body(ball.link, &center_link),
                 };
                 let center_world = state.position_world + world_from_body * center_body;
                 see(probe, i, Place { center_body, center_world, radius });
@@ -268,12 +269,12 @@ fn add_touch(
     touch: &Touch,
     solver: &mut ContactSolver,
 ) {
-    let Moment { dynamics, terrain, world_from_body, free, h, .. } = *moment;
+    let Moment { dynamics, legs, terrain, world_from_body, free, h, .. } = *moment;
     let normal_body = world_from_body.tr_mul(&touch.normal_world);
     let position_body = place.center_body - normal_body * (place.radius + touch.gap.min(0.0));
     let leg_jacobian = match probe.leg {
         TRUNK => Matrix3::zeros(),
-        leg => dynamics.legs[leg].point_jacobian(probe.link, &position_body),
+        leg => legs[leg].point_jacobian(probe.link, &position_body),
     };
     let ground_velocity_body = match touch.block {
         Some(block) => world_from_body.tr_mul(&terrain.block_velocity(block)),
@@ -295,7 +296,7 @@ fn add_touch(
         free_slip_body: free_velocity_body,
         block: touch.block,
     };
-    solver.add_point(dynamics, point, world_from_body, h);
+    solver.add_point(dynamics, legs, point, world_from_body, h);
 }
 
 /// Velocity of a point at `p_body` on `leg`, body axes: v + w x p + J_l dq.

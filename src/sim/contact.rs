@@ -23,7 +23,7 @@
 use nalgebra::{Matrix3, Vector2, Vector3};
 
 use super::config::{ContactConfig, ContactLaw, SolverConfig};
-use super::dynamics::{Dynamics, Six, add_scaled, dot};
+use super::dynamics::{Dynamics, Leg, Six, add_scaled, dot};
 use super::quantities::stack;
 use super::state::State;
 use crate::robot::{JOINTS, Joints, LEGS, PerLeg, leg_of};
@@ -167,7 +167,14 @@ impl ContactSolver {
     }
 
     /// Adds a point; `world_from_body` turns its remembered impulse into place.
-    pub fn add_point(&mut self, dynamics: &Dynamics, point: ContactPoint, world_from_body: &Matrix3<f64>, h: f64) {
+    pub fn add_point(
+        &mut self,
+        dynamics: &Dynamics,
+        legs: &PerLeg<Leg>,
+        point: ContactPoint,
+        world_from_body: &Matrix3<f64>,
+        h: f64,
+    ) {
         if self.contacts.len() == MAX_CONTACTS {
             return;
         }
@@ -180,7 +187,7 @@ impl ContactSolver {
         let mut leg_rows = Matrix3::zeros();
         if point.leg != TRUNK {
             // J_0 - J_l G  and  U = J_l C^-T
-            let leg = &dynamics.legs[point.leg];
+            let leg = &legs[point.leg];
             let jacobian = axes_body.tr_mul(&point.leg_jacobian);
             for (i, row) in trunk_rows.iter_mut().enumerate() {
                 for (j, gain) in leg.gain.iter().enumerate() {
@@ -237,7 +244,7 @@ impl ContactSolver {
         let (leg, part) = (joint / 3, joint % 3);
         let mut u = Vector3::zeros();
         u[part] = sign;
-        let l = &dynamics.legs[leg];
+        let l = dynamics.leg(leg);
         let mut trunk_row = l.gain[part].map(|g| -sign * g);
         dynamics.solve_lower(&mut trunk_row);
         let leg_row = l.factor_inverse * u;
@@ -286,10 +293,8 @@ impl ContactSolver {
         // dv_0 = L^-T y_0,  ddq_l = C^-T y_l - G dv_0
         let mut trunk = sums.trunk;
         dynamics.solve_upper(&mut trunk);
-        let legs = std::array::from_fn(|l| {
-            let leg = &dynamics.legs[l];
-            leg.follow(&leg.factor_inverse.tr_mul(&sums.legs[l]), &trunk)
-        });
+        let [fr, fl, rr, rl, _] = sums.legs;
+        let legs = dynamics.joint_change(&[fr, fl, rr, rl], &trunk);
         Velocity { trunk, legs }
     }
 }

@@ -75,12 +75,12 @@ impl Model {
         let i = &composite.second;
         let inertia = Matrix3::new(i.xx, i.xy, i.xz, i.xy, i.yy, i.yz, i.xz, i.yz, i.zz);
         matrix.fixed_view_mut::<3, 3>(3, 3).copy_from(&inertia);
-        for (l, leg) in dynamics.legs.iter().enumerate() {
+        for l in 0..LEGS {
             let j = 6 + 3 * l;
-            let coupling = SMatrix::<f64, 6, 3>::from(leg.coupling);
+            let coupling = SMatrix::<f64, 6, 3>::from(dynamics.coupling(l));
             matrix.fixed_view_mut::<6, 3>(0, j).copy_from(&coupling);
             matrix.fixed_view_mut::<3, 6>(j, 0).copy_from(&coupling.transpose());
-            matrix.fixed_view_mut::<3, 3>(j, j).copy_from(&leg.mass);
+            matrix.fixed_view_mut::<3, 3>(j, j).copy_from(&dynamics.leg_mass(l));
         }
         for (i, rotor) in self.rotor_inertia.iter().enumerate() {
             matrix[(6 + i, 6 + i)] += rotor;
@@ -93,9 +93,7 @@ impl Model {
         let dynamics = self.dynamics(state);
         let mut bias = SVector::<f64, DOF>::zeros();
         bias.fixed_rows_mut::<6>(0).copy_from_slice(&dynamics.bias);
-        for (l, leg) in dynamics.legs.iter().enumerate() {
-            bias.fixed_rows_mut::<3>(6 + 3 * l).copy_from(&leg.bias);
-        }
+        bias.fixed_rows_mut::<JOINTS>(6).copy_from_slice(&dynamics.joint_bias());
         bias
     }
 
@@ -106,8 +104,9 @@ impl Model {
         let velocity = Motion { linear: state.velocity_body, angular: state.angular_velocity_body };
         let trunk = dynamics.composite.times(&velocity);
         let mut momentum = stack(&trunk.linear, &trunk.angular);
-        for (column, speed) in dynamics.legs.iter().flat_map(|leg| &leg.coupling).zip(&state.joint_velocity) {
-            add_scaled(&mut momentum, column, *speed);
+        let columns = (0..LEGS).flat_map(|leg| dynamics.coupling(leg));
+        for (column, speed) in columns.zip(&state.joint_velocity) {
+            add_scaled(&mut momentum, &column, *speed);
         }
         let (linear, angular) = split(&momentum);
         let mass = dynamics.composite.mass;
@@ -139,8 +138,9 @@ impl Model {
         let dynamics = self.dynamics(state);
         let to_world = state.orientation_world.to_rotation_matrix().into_inner();
         std::array::from_fn::<_, LEGS, _>(|l| {
-            let foot_body = dynamics.legs[l].in_body(2, &self.legs[l].foot_origin);
-            let joints = dynamics.legs[l].point_jacobian(2, &foot_body);
+            let leg = dynamics.leg(l);
+            let foot_body = leg.in_body(2, &self.foot_origin[l]);
+            let joints = leg.point_jacobian(2, &foot_body);
             // Velocity of a point p of the trunk: v + w x p.
             let mut jacobian_world = SMatrix::<f64, 3, DOF>::zeros();
             jacobian_world.fixed_view_mut::<3, 3>(0, 0).copy_from(&to_world);

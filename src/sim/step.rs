@@ -99,7 +99,8 @@ impl Simulator {
         self.solver.start(h);
         let world_from_body = self.world_from_body();
         let (state, terrain, world_from_body) = (&self.state, &self.terrain, &world_from_body);
-        let moment = Moment { dynamics, state, terrain, world_from_body, free, h };
+        let legs = &std::array::from_fn(|leg| dynamics.leg(leg));
+        let moment = Moment { dynamics, legs, state, terrain, world_from_body, free, h };
         self.collider.find(&moment, &mut self.solver);
         let limits = (&self.limits.min_position, &self.limits.max_position);
         add_joints(&mut self.solver, dynamics, free, &self.state.joint_position, limits, dry_friction, h);
