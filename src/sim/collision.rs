@@ -120,9 +120,9 @@ impl Collider {
         self.probes.len() * MAX_TOUCHES
     }
 
-    /// The leg whose foot this contact is; none for other parts.
-    pub fn foot_of(point: &ContactPoint) -> Option<robot::Leg> {
-        robot::Leg::ALL.get(point.memory / MAX_TOUCHES).copied()
+    /// The leg whose foot remembers its impulse at `memory`; none for other parts.
+    pub fn foot_of(memory: usize) -> Option<robot::Leg> {
+        robot::Leg::ALL.get(memory / MAX_TOUCHES).copied()
     }
 
     fn add_body(&mut self, body: &Body, leg: usize, link: usize, spacing: f64) {
@@ -296,7 +296,7 @@ fn add_touch(
         free_slip_body: free_velocity_body,
         block: touch.block,
     };
-    solver.add_point(dynamics, legs, point, world_from_body, h);
+    solver.add_point(dynamics, legs, &point, world_from_body, h);
 }
 
 /// Velocity of a point at `p_body` on `leg`, body axes: v + w x p + J_l dq.

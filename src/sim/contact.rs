@@ -22,6 +22,7 @@
 
 use nalgebra::{Matrix3, Vector2, Vector3};
 
+use super::collision::Moment;
 use super::config::{ContactConfig, ContactLaw, SolverConfig};
 use super::dynamics::{Dynamics, Leg, Six, add_scaled, dot};
 use super::quantities::stack;
@@ -81,7 +82,13 @@ pub(super) struct ContactPoint {
 /// One contact in the coordinates normal, tangent, tangent.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Contact {
-    pub point: ContactPoint,
+    /// Which leg it is on; [`TRUNK`] for none.
+    leg: usize,
+    /// Where it remembers its impulse.
+    pub memory: usize,
+    friction: f64,
+    /// Which loose block it is on.
+    pub block: Option<usize>,
     /// Columns normal, two tangents, body axes.
     axes_body: Matrix3<f64>,
     /// W.
@@ -171,7 +178,7 @@ impl ContactSolver {
         &mut self,
         dynamics: &Dynamics,
         legs: &PerLeg<Leg>,
-        point: ContactPoint,
+        point: &ContactPoint,
         world_from_body: &Matrix3<f64>,
         h: f64,
     ) {
@@ -225,7 +232,10 @@ impl ContactSolver {
         };
         let impulse = into_cone(&remembered, point.friction);
         self.contacts.push(Contact {
-            point,
+            leg: point.leg,
+            memory: point.memory,
+            friction: point.friction,
+            block: point.block,
             axes_body,
             trunk_rows,
             leg_rows,
@@ -238,13 +248,13 @@ impl ContactSolver {
         });
     }
 
-    /// Adds a joint's stop or friction: the impulse that takes `free` to zero or above, between `lowest` and `highest`; `sign` is
-    /// the direction in which it acts on the joint.
-    pub fn add_joint(&mut self, dynamics: &Dynamics, joint: usize, sign: f64, free: f64, lowest: f64, highest: f64) {
+    /// Adds a joint's stop or friction.
+    fn add_joint(&mut self, dynamics: &Dynamics, legs: &PerLeg<Leg>, stop: &JointRow) {
+        let &JointRow { joint, sign, free, lowest, highest } = stop;
         let (leg, part) = (joint / 3, joint % 3);
         let mut u = Vector3::zeros();
         u[part] = sign;
-        let l = dynamics.leg(leg);
+        let l = &legs[leg];
         let mut trunk_row = l.gain[part].map(|g| -sign * g);
         dynamics.solve_lower(&mut trunk_row);
         let leg_row = l.factor_inverse * u;
@@ -287,8 +297,8 @@ impl ContactSolver {
             self.memory[memory] = None;
         }
         for contact in &self.contacts {
-            self.memory[contact.point.memory] = Some(world_from_body * contact.impulse_body());
-            self.remembered.push(contact.point.memory);
+            self.memory[contact.memory] = Some(world_from_body * contact.impulse_body());
+            self.remembered.push(contact.memory);
         }
         // dv_0 = L^-T y_0,  ddq_l = C^-T y_l - G dv_0
         let mut trunk = sums.trunk;
@@ -297,6 +307,18 @@ impl ContactSolver {
         let legs = dynamics.joint_change(&[fr, fl, rr, rl], &trunk);
         Velocity { trunk, legs }
     }
+}
+
+/// What a joint's stop or friction asks for.
+struct JointRow {
+    joint: usize,
+    /// The direction in which it acts on the joint.
+    sign: f64,
+    /// Velocity in that direction, to be taken to zero or above.
+    free: f64,
+    /// Bounds of the impulse, N m s.
+    lowest: f64,
+    highest: f64,
 }
 
 /// y_0 and y_l; the last leg stands for the trunk and stays zero.
@@ -311,7 +333,7 @@ impl Contact {
     fn velocity(&self, sums: &Sums) -> Vector3<f64> {
         let [w1, w2, w3] = &self.trunk_rows;
         let trunk = Vector3::new(dot(w1, &sums.trunk), dot(w2, &sums.trunk), dot(w3, &sums.trunk));
-        self.free + trunk + self.leg_rows * sums.legs[self.point.leg]
+        self.free + trunk + self.leg_rows * sums.legs[self.leg]
     }
 
     /// Adds the impulse `p` to the sums.
@@ -320,7 +342,7 @@ impl Contact {
         for (row, p) in self.trunk_rows.iter().zip(p.iter()) {
             add_scaled(&mut sums.trunk, row, *p);
         }
-        sums.legs[self.point.leg] += self.leg_rows.tr_mul(p);
+        sums.legs[self.leg] += self.leg_rows.tr_mul(p);
     }
 
     /// The ground's impulse on the robot, body axes at the start of the step, N s.
@@ -338,7 +360,7 @@ impl Contact {
         if c.x >= 0.0 {
             return Vector3::zeros();
         }
-        let friction = self.point.friction;
+        let friction = self.friction;
         // Sticking: v = A p + c = 0.
         let stick = -(self.local_inverse * c);
         if stick.x >= 0.0 && stick.y * stick.y + stick.z * stick.z <= (friction * stick.x).powi(2) {
@@ -389,7 +411,7 @@ impl Contact {
                 continue;
             };
             best = p;
-            let size = p.y.hypot(p.z);
+            let size = (p.y * p.y + p.z * p.z).sqrt();
             let f = size - friction * p.x;
             if f.abs() <= 1e-14 * size {
                 break;
@@ -417,7 +439,7 @@ fn into_cone(impulse: &Vector3<f64>, friction: f64) -> Vector3<f64> {
     if impulse.x <= 0.0 {
         return Vector3::zeros();
     }
-    let size = impulse.y.hypot(impulse.z);
+    let size = (impulse.y * impulse.y + impulse.z * impulse.z).sqrt();
     let limit = friction * impulse.x;
     if size <= limit {
         return *impulse;
@@ -451,16 +473,15 @@ fn axes_about(n: &Vector3<f64>) -> Matrix3<f64> {
     axes
 }
 
-/// The joint angles' stops and dry friction as the solver's rows.
+/// The joint angles' stops, `limits`, and dry friction (bounds, N m) as the solver's rows.
 pub(super) fn add_joints(
     solver: &mut ContactSolver,
-    dynamics: &Dynamics,
-    velocity: &Velocity,
-    position: &Joints,
+    moment: &Moment,
     limits: (&Joints, &Joints),
     dry_friction: &Joints,
-    h: f64,
 ) {
+    let Moment { dynamics, legs, free: velocity, h, .. } = *moment;
+    let position = &moment.state.joint_position;
     for joint in 0..JOINTS {
         let free = velocity.legs[joint / 3][joint % 3];
         for (sign, gap) in [(1.0, position[joint] - limits.0[joint]), (-1.0, limits.1[joint] - position[joint])] {
@@ -468,12 +489,14 @@ pub(super) fn add_joints(
             let share = if gap > 0.0 { 1.0 } else { solver.config.penetration_recovery };
             let approach = sign * free + share * gap / h;
             if gap + h * sign * free < 2e-3 {
-                solver.add_joint(dynamics, joint, sign, approach, 0.0, f64::INFINITY);
+                let stop = JointRow { joint, sign, free: approach, lowest: 0.0, highest: f64::INFINITY };
+                solver.add_joint(dynamics, legs, &stop);
             }
         }
         if dry_friction[joint] > 0.0 {
             let most = dry_friction[joint] * h;
-            solver.add_joint(dynamics, joint, 1.0, free, -most, most);
+            let friction = JointRow { joint, sign: 1.0, free, lowest: -most, highest: most };
+            solver.add_joint(dynamics, legs, &friction);
         }
     }
 }

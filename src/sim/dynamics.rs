@@ -328,19 +328,43 @@ impl Dynamics {
         std::array::from_fn(|l| Vector3::from_fn(|j, _| change[j].extract(l)))
     }
 
-    /// One leg by itself.
-    pub fn leg(&self, leg: usize) -> Leg {
+    /// Each leg by itself.
+    pub fn legs(&self) -> PerLeg<Leg> {
+        let turn = Turn { cos: 1.0, sin: 0.0 };
+        let mut out = [Leg {
+            hip: turn,
+            thigh: turn,
+            calf: turn,
+            origin_body: [Vector3::zeros(); 3],
+            factor_inverse: Matrix3::zeros(),
+            gain: [[0.0; 6]; 3],
+        }; LEGS];
+        // One quantity after the other: a row of lanes is dealt out to the four legs.
+        let mut deal = |x: Lanes, place: fn(&mut Leg, usize, usize) -> &mut f64, i: usize, j: usize| {
+            let x: [f64; LEGS] = x.into();
+            for (leg, x) in out.iter_mut().zip(x) {
+                *place(leg, i, j) = x;
+            }
+        };
         let legs = &self.legs;
-        let turn = |t: &Turn<Lanes>| Turn { cos: t.cos.extract(leg), sin: t.sin.extract(leg) };
-        let [i11, i21, i22, i31, i32, i33] = legs.factor_inverse.map(|x| x.extract(leg));
-        Leg {
-            hip: turn(&legs.hip),
-            thigh: turn(&legs.thigh),
-            calf: turn(&legs.calf),
-            origin_body: legs.origin_body.map(|o| o.map(|x| x.extract(leg))),
-            factor_inverse: Matrix3::new(i11, 0.0, 0.0, i21, i22, 0.0, i31, i32, i33),
-            gain: legs.gain.map(|row| row.map(|x| x.extract(leg))),
+        deal(legs.hip.cos, |leg, _, _| &mut leg.hip.cos, 0, 0);
+        deal(legs.hip.sin, |leg, _, _| &mut leg.hip.sin, 0, 0);
+        deal(legs.thigh.cos, |leg, _, _| &mut leg.thigh.cos, 0, 0);
+        deal(legs.thigh.sin, |leg, _, _| &mut leg.thigh.sin, 0, 0);
+        deal(legs.calf.cos, |leg, _, _| &mut leg.calf.cos, 0, 0);
+        deal(legs.calf.sin, |leg, _, _| &mut leg.calf.sin, 0, 0);
+        for j in 0..3 {
+            for k in 0..3 {
+                deal(legs.origin_body[j][k], |leg, j, k| &mut leg.origin_body[j][k], j, k);
+            }
+            for k in 0..6 {
+                deal(legs.gain[j][k], |leg, j, k| &mut leg.gain[j][k], j, k);
+            }
         }
+        for (n, (i, j)) in [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)].into_iter().enumerate() {
+            deal(legs.factor_inverse[n], |leg, i, j| &mut leg.factor_inverse[(i, j)], i, j);
+        }
+        out
     }
 
     /// F of one leg: a column for each joint.

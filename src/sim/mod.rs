@@ -110,8 +110,7 @@ impl Simulator {
     /// Smallest distance between the machine and the ground, m; negative where it is inside.
     pub fn smallest_gap(&self) -> f64 {
         let dynamics = Dynamics::new(&self.model, &self.state, &[0.0; JOINTS]);
-        let legs = std::array::from_fn(|leg| dynamics.leg(leg));
-        self.collider.smallest_gap(&legs, &self.state, &self.terrain)
+        self.collider.smallest_gap(&dynamics.legs(), &self.state, &self.terrain)
     }
 
     /// Number of points that touched, or could have, in the last step.

@@ -136,9 +136,10 @@ impl Model {
     /// The centres of the feet.
     pub fn feet(&self, state: &State) -> PerLeg<FootMotion> {
         let dynamics = self.dynamics(state);
+        let legs = dynamics.legs();
         let to_world = state.orientation_world.to_rotation_matrix().into_inner();
         std::array::from_fn::<_, LEGS, _>(|l| {
-            let leg = dynamics.leg(l);
+            let leg = &legs[l];
             let foot_body = leg.in_body(2, &self.foot_origin[l]);
             let joints = leg.point_jacobian(2, &foot_body);
             // Velocity of a point p of the trunk: v + w x p.

@@ -99,11 +99,11 @@ impl Simulator {
         self.solver.start(h);
         let world_from_body = self.world_from_body();
         let (state, terrain, world_from_body) = (&self.state, &self.terrain, &world_from_body);
-        let legs = &std::array::from_fn(|leg| dynamics.leg(leg));
+        let legs = &dynamics.legs();
         let moment = Moment { dynamics, legs, state, terrain, world_from_body, free, h };
         self.collider.find(&moment, &mut self.solver);
         let limits = (&self.limits.min_position, &self.limits.max_position);
-        add_joints(&mut self.solver, dynamics, free, &self.state.joint_position, limits, dry_friction, h);
+        add_joints(&mut self.solver, &moment, limits, dry_friction);
     }
 
     /// Sums up what was pressed, and pushes loose blocks.
@@ -116,7 +116,7 @@ impl Simulator {
                 continue;
             }
             let impulse_world = world_from_body * contact.impulse_body();
-            match Collider::foot_of(&contact.point) {
+            match Collider::foot_of(contact.memory) {
                 Some(leg) => {
                     self.touched.foot[leg as usize] = true;
                     self.touched.foot_impulse_world[leg as usize] += impulse_world;
@@ -124,7 +124,7 @@ impl Simulator {
                 }
                 None => self.touched.body = true,
             }
-            if let Some(block) = contact.point.block {
+            if let Some(block) = contact.block {
                 self.terrain.push_block(block, &-impulse_world, h);
                 pushed |= 1 << (block % 64);
             }
