@@ -36,6 +36,7 @@ use actuator::Actuator;
 use collision::Collider;
 use contact::ContactSolver;
 use dynamics::Dynamics;
+use sensors::Sensors;
 use step::Touched;
 use terrain::Terrain;
 
@@ -56,6 +57,9 @@ pub struct Simulator {
     specific_force_body: Vector3<f64>,
     /// Control periods since it was placed.
     ticks: u32,
+    sensors: Sensors,
+    /// What is read until the next control period.
+    reported: RobotState,
 }
 
 impl Simulator {
@@ -72,7 +76,7 @@ impl Simulator {
             model = model.with_rotor_inertia(description.rotor_inertia);
         }
         let collider = Collider::new(description, config);
-        Ok(Simulator {
+        let mut simulator = Simulator {
             solver: ContactSolver::new(config.solver, &config.contact, collider.memories()),
             terrain: Terrain::new(&config.terrain),
             actuator: Actuator::new(motor, &description.limits),
@@ -84,8 +88,12 @@ impl Simulator {
             touched: Touched::default(),
             specific_force_body: Vector3::new(0.0, 0.0, GRAVITY),
             ticks: 0,
+            sensors: Sensors::new(&config.sensors),
+            reported: RobotState::default(),
             config: config.clone(),
-        })
+        };
+        simulator.set_state(&State::default());
+        Ok(simulator)
     }
 
     /// What is constant about the machine.
@@ -105,6 +113,7 @@ impl Simulator {
         self.specific_force_body = state.orientation_world.inverse_transform_vector(&Vector3::new(0.0, 0.0, GRAVITY));
         self.solver.reset();
         self.actuator.reset();
+        self.report();
     }
 
     /// Smallest distance between the machine and the ground, m; negative where it is inside.
@@ -130,6 +139,27 @@ impl Simulator {
         self.state.orientation_world * v
     }
 
+    /// Has the sensors look.
+    fn report(&mut self) {
+        let state = &self.state;
+        let exact = RobotState {
+            robot_time_ms: self.ticks,
+            joint_position: state.joint_position,
+            joint_velocity: state.joint_velocity,
+            joint_torque: *self.actuator.torque(),
+            imu: Imu {
+                orientation_world: state.orientation_world,
+                gyro_body: state.angular_velocity_body,
+                accel_body: self.specific_force_body,
+            },
+            foot_force: self.touched.foot_normal_impulse.map(|impulse| impulse / CONTROL_PERIOD_S),
+            motor_enabled: [true; JOINTS],
+            truth: Some(self.truth()),
+            ..RobotState::default()
+        };
+        self.reported = self.sensors.measure(&exact);
+    }
+
     fn truth(&self) -> Truth {
         let state = &self.state;
         Truth {
@@ -146,22 +176,7 @@ impl Simulator {
 
 impl Robot for Simulator {
     fn read(&mut self) -> Result<RobotState, RobotError> {
-        let state = &self.state;
-        Ok(RobotState {
-            robot_time_ms: self.ticks,
-            joint_position: state.joint_position,
-            joint_velocity: state.joint_velocity,
-            joint_torque: *self.actuator.torque(),
-            imu: Imu {
-                orientation_world: state.orientation_world,
-                gyro_body: state.angular_velocity_body,
-                accel_body: self.specific_force_body,
-            },
-            foot_force: self.touched.foot_normal_impulse.map(|impulse| impulse / CONTROL_PERIOD_S),
-            motor_enabled: [true; JOINTS],
-            truth: Some(self.truth()),
-            ..RobotState::default()
-        })
+        Ok(self.reported)
     }
 
     fn write(&mut self, command: &JointCommand) -> Result<(), RobotError> {
@@ -170,6 +185,7 @@ impl Robot for Simulator {
         let acceleration = (self.imu_velocity_world() - before) / CONTROL_PERIOD_S;
         let specific_force = acceleration + Vector3::new(0.0, 0.0, GRAVITY);
         self.specific_force_body = self.state.orientation_world.inverse_transform_vector(&specific_force);
+        self.report();
         Ok(())
     }
 
@@ -188,6 +204,8 @@ impl Robot for Simulator {
             }
             state.position_world.z -= gap;
         }
+        self.sensors.reset(placement.seed);
+        self.report();
         true
     }
 }
