@@ -166,7 +166,7 @@ impl SceneRun {
     pub fn step(&mut self) {
         // Falling starts anew before it gets fast.
         if let Some(start) = self.start
-            && self.steps % 256 == 0
+            && self.steps.is_multiple_of(256)
         {
             self.simulator.set_state(&start);
         }

@@ -214,7 +214,7 @@ impl Collider {
             // Height of a point p of the link: that of its frame's origin and up . p in the link's axes.
             let (origin_body, up_link) = match ball.leg {
                 TRUNK => (Vector3::zeros(), up_body),
-                leg => (legs[leg].origin_body[ball.link], legs[leg].into_link(ball.link, &up_body)),
+                leg => (legs[leg].origin_body[ball.link], legs[leg].in_link(ball.link, &up_body)),
             };
             let height = base + up_body.dot(&origin_body);
             if height + up_link.dot(&ball.center) > ball.radius + reach {

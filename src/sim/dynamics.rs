@@ -243,7 +243,7 @@ impl Leg {
 
     /// A vector in the trunk's axes seen in the axes of link `link`.
     #[inline]
-    pub fn into_link(&self, link: usize, v_body: &Vector3<f64>) -> Vector3<f64> {
+    pub fn in_link(&self, link: usize, v_body: &Vector3<f64>) -> Vector3<f64> {
         let v = self.hip.x_back(v_body);
         match link {
             0 => v,
@@ -440,8 +440,8 @@ fn cholesky(a: &mut [Six; 6]) -> Six {
     for j in 0..6 {
         let d = 1.0 / a[j][j].sqrt();
         inverse[j] = d;
-        for i in j..6 {
-            a[j][i] *= d;
+        for x in &mut a[j][j..] {
+            *x *= d;
         }
         for k in j + 1..6 {
             for i in k..6 {

@@ -29,6 +29,7 @@ pub use model::{GRAVITY, Model};
 pub use quantities::{DOF, Energy, FootMotion, Momentum};
 pub use state::{Acceleration, State};
 pub use step::CONTROL_PERIOD_S;
+pub use terrain::TerrainBox;
 
 use crate::robot::description::{JointLimits, RobotDescription};
 use crate::robot::{Imu, JOINTS, JointCommand, Placement, Robot, RobotError, RobotState, Truth};
@@ -127,9 +128,8 @@ impl Simulator {
         self.solver.contacts().len()
     }
 
-    /// The steps or blocks on the ground: centre, half edges and direction of the first edge in the horizontal plane, height
-    /// of the top. World, m.
-    pub fn terrain_boxes(&self) -> impl Iterator<Item = ([f64; 2], [f64; 2], [f64; 2], f64)> + '_ {
+    /// The steps or blocks on the ground, where they are now.
+    pub fn terrain_boxes(&self) -> impl Iterator<Item = TerrainBox> + '_ {
         self.terrain.boxes()
     }
 

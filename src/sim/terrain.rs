@@ -23,6 +23,19 @@ pub(super) struct Touch {
     pub block: Option<usize>,
 }
 
+/// A step or block on the ground: an upright box.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TerrainBox {
+    /// Its centre in the world's horizontal plane, m.
+    pub center: [f64; 2],
+    /// Half of its two edges, m.
+    pub half_edges: [f64; 2],
+    /// Direction of the first edge.
+    pub axis: [f64; 2],
+    /// Height of its top, m.
+    pub top: f64,
+}
+
 /// An upright box on the ground.
 #[derive(Debug, Clone, Copy)]
 struct Block {
@@ -149,9 +162,14 @@ impl Terrain {
         Vector3::new(v.x, v.y, 0.0)
     }
 
-    /// Where every block lies: centre, half edges, direction of the first edge, height of its top. World, m.
-    pub fn boxes(&self) -> impl Iterator<Item = ([f64; 2], [f64; 2], [f64; 2], f64)> + '_ {
-        self.blocks.iter().map(|b| (b.center.into(), b.half.into(), b.axis.into(), b.top))
+    /// The steps or blocks.
+    pub fn boxes(&self) -> impl Iterator<Item = TerrainBox> + '_ {
+        self.blocks.iter().map(|b| TerrainBox {
+            center: b.center.into(),
+            half_edges: b.half.into(),
+            axis: b.axis.into(),
+            top: b.top,
+        })
     }
 
     /// A foot's impulse on loose block `block` (world, N s) in a step of `h` seconds: what of it friction on the floor does not
