@@ -17,13 +17,13 @@ pub enum Scene {
     Standing,
     /// Lying on the belly: four feet and four corners of the trunk.
     Lying,
-    /// The same with the knees down: four corners more.
-    Kneeling,
+    /// The same with the hips turned down: four hip cylinders more.
+    Sprawling,
 }
 
 impl Scene {
     /// All of them, by number of contacts.
-    pub const ALL: [Scene; 4] = [Scene::Flight, Scene::Standing, Scene::Lying, Scene::Kneeling];
+    pub const ALL: [Scene; 4] = [Scene::Flight, Scene::Standing, Scene::Lying, Scene::Sprawling];
 
     /// What it shows.
     pub const fn name(self) -> &'static str {
@@ -31,7 +31,7 @@ impl Scene {
             Scene::Flight => "0 contacts (flight)",
             Scene::Standing => "4 contacts (standing)",
             Scene::Lying => "8 contacts (lying)",
-            Scene::Kneeling => "12 contacts (lying, knees down)",
+            Scene::Sprawling => "12 contacts (lying, hips down)",
         }
     }
 
@@ -41,7 +41,7 @@ impl Scene {
             Scene::Flight => 0,
             Scene::Standing => 4,
             Scene::Lying => 8,
-            Scene::Kneeling => 12,
+            Scene::Sprawling => 12,
         }
     }
 }
@@ -112,8 +112,12 @@ impl Speed {
         let joint_position = match scene {
             Scene::Flight | Scene::Standing => standing(&self.robot.leg_geometry),
             Scene::Lying => folded,
-            // Thighs lowered until the knees are on the floor.
-            Scene::Kneeling => std::array::from_fn(|i| if i % 3 == 0 { 0.3 * folded[i] } else { folded[i] }),
+            // Hips turned inwards until their cylinders touch, feet folded up behind.
+            Scene::Sprawling => std::array::from_fn(|i| match i % 3 {
+                0 => -0.113 * Leg::ALL[i / 3].side(),
+                1 => 2.6,
+                _ => -2.75,
+            }),
         };
         simulator.place(&Placement { joint_position, lying: scene != Scene::Standing, seed: 0 });
         let mut command = JointCommand::default();
@@ -162,7 +166,7 @@ impl SceneRun {
     pub fn step(&mut self) {
         // Falling starts anew before it gets fast.
         if let Some(start) = self.start
-            && self.steps % 256 == 0
+            && self.steps.is_multiple_of(256)
         {
             self.simulator.set_state(&start);
         }

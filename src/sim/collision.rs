@@ -8,19 +8,17 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::config::{BodyKind, SimConfig, TerrainKind};
 use super::contact::{ContactPoint, ContactSolver, TRUNK, Velocity};
-use super::dynamics::Dynamics;
+use super::dynamics::{Dynamics, Leg};
+use super::quantities::split;
 use super::state::State;
 use super::terrain::{MAX_TOUCHES, Terrain, Touch};
 use crate::robot::description::{Body, RobotDescription, Shape};
-use crate::robot::{LEGS, Leg};
+use crate::robot::{self, LEGS, PerLeg};
 
 /// Where boxes are to meet boxes, points along an edge are at most this far apart, m.
 const EDGE_SPACING: f64 = 0.1;
 /// Contacts are looked for as if points could be faster than they are by this much, m/s: what impulses of the same step may add.
 const SPEED_MARGIN: f64 = 2.0;
-/// No point of the machine moves faster than this when contacts are looked for, m/s.
-const SPEED_LIMIT: f64 = 20.0;
-
 /// A sphere or rim of the machine that can touch.
 #[derive(Debug, Clone, Copy)]
 enum Outline {
@@ -65,6 +63,7 @@ struct Ball {
 /// A step that is about to be made.
 pub(super) struct Moment<'a> {
     pub dynamics: &'a Dynamics,
+    pub legs: &'a PerLeg<Leg>,
     pub state: &'a State,
     pub terrain: &'a Terrain,
     pub world_from_body: &'a Matrix3<f64>,
@@ -80,11 +79,13 @@ pub(super) struct Collider {
     /// The feet come first, one per leg.
     probes: Vec<Probe>,
     balls: Vec<Ball>,
+    /// No point is farther than this from the trunk's origin or from a joint that moves it, m.
+    extent: f64,
 }
 
 impl Collider {
     pub fn new(description: &RobotDescription, config: &SimConfig) -> Collider {
-        let mut collider = Collider { probes: Vec::new(), balls: Vec::new() };
+        let mut collider = Collider { probes: Vec::new(), balls: Vec::new(), extent: 0.0 };
         let spacing = match config.terrain.kind {
             TerrainKind::Flat | TerrainKind::Slope => f64::INFINITY,
             TerrainKind::Steps | TerrainKind::Blocks => EDGE_SPACING,
@@ -105,6 +106,12 @@ impl Collider {
                 }
             }
         }
+        // Along a leg stretched out, and then across the shape at its end.
+        for ball in &collider.balls {
+            let origins = description.legs.get(ball.leg).map_or(&[][..], |leg| &leg.joint_origin[..=ball.link]);
+            let leg: f64 = origins.iter().map(|origin| origin.norm()).sum();
+            collider.extent = collider.extent.max(leg + ball.center.norm() + ball.radius);
+        }
         collider
     }
 
@@ -113,9 +120,9 @@ impl Collider {
         self.probes.len() * MAX_TOUCHES
     }
 
-    /// The leg whose foot this contact is; none for other parts.
-    pub fn foot_of(point: &ContactPoint) -> Option<Leg> {
-        Leg::ALL.get(point.memory / MAX_TOUCHES).copied()
+    /// The leg whose foot remembers its impulse at `memory`; none for other parts.
+    pub fn foot_of(memory: usize) -> Option<robot::Leg> {
+        robot::Leg::ALL.get(memory / MAX_TOUCHES).copied()
     }
 
     fn add_body(&mut self, body: &Body, leg: usize, link: usize, spacing: f64) {
@@ -160,9 +167,9 @@ impl Collider {
 
     /// Adds to `solver` every point that may touch in the step.
     pub fn find(&self, moment: &Moment, solver: &mut ContactSolver) {
-        let reach = SPEED_LIMIT * moment.h;
+        let reach = moment.h * (self.fastest(moment.free) + SPEED_MARGIN);
         let now = Velocity::of(moment.state);
-        self.near(moment.dynamics, moment.state, moment.terrain, moment.world_from_body, reach, |probe, i, place| {
+        self.near(moment.legs, moment.state, moment.terrain, moment.world_from_body, reach, |probe, i, place| {
             for (k, touch) in moment.terrain.touches(&place.center_world, place.radius, reach).into_iter().enumerate() {
                 if let Some(touch) = touch {
                     add_touch(moment, &now, probe, MAX_TOUCHES * i + k, &place, &touch, solver);
@@ -171,11 +178,18 @@ impl Collider {
         });
     }
 
+    /// A bound on the speed of any point: |v| + r |w| + l (|dq_1| + |dq_2| + |dq_3|), m/s.
+    fn fastest(&self, v: &Velocity) -> f64 {
+        let (linear, angular) = split(&v.trunk);
+        let legs = v.legs.iter().fold(0.0, |most: f64, dq| most.max(dq.abs().sum()));
+        linear.norm() + self.extent * (angular.norm() + legs)
+    }
+
     /// The smallest gap of any probe to the ground, m.
-    pub fn smallest_gap(&self, dynamics: &Dynamics, state: &State, terrain: &Terrain) -> f64 {
+    pub fn smallest_gap(&self, legs: &PerLeg<Leg>, state: &State, terrain: &Terrain) -> f64 {
         let world_from_body = state.orientation_world.to_rotation_matrix().into_inner();
         let mut smallest = f64::INFINITY;
-        self.near(dynamics, state, terrain, &world_from_body, f64::INFINITY, |_, _, place| {
+        self.near(legs, state, terrain, &world_from_body, f64::INFINITY, |_, _, place| {
             for touch in terrain.touches(&place.center_world, place.radius, f64::INFINITY).into_iter().flatten() {
                 smallest = smallest.min(touch.gap);
             }
@@ -187,7 +201,7 @@ impl Collider {
     #[inline]
     fn near(
         &self,
-        dynamics: &Dynamics,
+        legs: &PerLeg<Leg>,
         state: &State,
         terrain: &Terrain,
         world_from_body: &Matrix3<f64>,
@@ -200,7 +214,7 @@ impl Collider {
             // Height of a point p of the link: that of its frame's origin and up . p in the link's axes.
             let (origin_body, up_link) = match ball.leg {
                 TRUNK => (Vector3::zeros(), up_body),
-                leg => (dynamics.legs[leg].origin_body[ball.link], dynamics.legs[leg].into_link(ball.link, &up_body)),
+                leg => (legs[leg].origin_body[ball.link], legs[leg].in_link(ball.link, &up_body)),
             };
             let height = base + up_body.dot(&origin_body);
             if height + up_link.dot(&ball.center) > ball.radius + reach {
@@ -213,7 +227,7 @@ impl Collider {
                 let (center_link, radius) = probe.outline.lowest(&probe.center, &up_link);
                 let center_body = match ball.leg {
                     TRUNK => center_link,
-                    leg => dynamics.legs[leg].in_body(ball.link, &center_link),
+                    leg => legs[leg].in_body(ball.link, &center_link),
                 };
                 let center_world = state.position_world + world_from_body * center_body;
                 see(probe, i, Place { center_body, center_world, radius });
@@ -255,12 +269,12 @@ fn add_touch(
     touch: &Touch,
     solver: &mut ContactSolver,
 ) {
-    let Moment { dynamics, terrain, world_from_body, free, h, .. } = *moment;
+    let Moment { dynamics, legs, terrain, world_from_body, free, h, .. } = *moment;
     let normal_body = world_from_body.tr_mul(&touch.normal_world);
     let position_body = place.center_body - normal_body * (place.radius + touch.gap.min(0.0));
     let leg_jacobian = match probe.leg {
         TRUNK => Matrix3::zeros(),
-        leg => dynamics.legs[leg].point_jacobian(probe.link, &position_body),
+        leg => legs[leg].point_jacobian(probe.link, &position_body),
     };
     let ground_velocity_body = match touch.block {
         Some(block) => world_from_body.tr_mul(&terrain.block_velocity(block)),
@@ -282,14 +296,13 @@ fn add_touch(
         free_slip_body: free_velocity_body,
         block: touch.block,
     };
-    solver.add_point(dynamics, point, world_from_body, h);
+    solver.add_point(dynamics, legs, &point, world_from_body, h);
 }
 
 /// Velocity of a point at `p_body` on `leg`, body axes: v + w x p + J_l dq.
 #[inline]
 fn point_velocity(v: &Velocity, leg: usize, leg_jacobian: &Matrix3<f64>, p_body: &Vector3<f64>) -> Vector3<f64> {
-    let linear = Vector3::new(v.trunk[0], v.trunk[1], v.trunk[2]);
-    let angular = Vector3::new(v.trunk[3], v.trunk[4], v.trunk[5]);
+    let (linear, angular) = split(&v.trunk);
     let trunk = linear + angular.cross(p_body);
     if leg == TRUNK { trunk } else { trunk + leg_jacobian * v.legs[leg] }
 }

@@ -136,8 +136,10 @@ pub struct StepsConfig {
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BlocksConfig {
-    /// How many.
+    /// How many, at most: those for which there is room.
     pub count: u32,
+    /// How many may lie on each other.
+    pub layers: u32,
     /// Height of each, m.
     pub thickness_m: f64,
     /// Shortest and longest edge, m.
@@ -297,6 +299,7 @@ impl SimConfig {
         count("terrain.steps.count", terrain.steps.count, 100, "give 1 to 100")?;
         let blocks = &terrain.blocks;
         count("terrain.blocks.count", blocks.count, 500, "give 1 to 500")?;
+        count("terrain.blocks.layers", blocks.layers, 10, "give 1 to 10")?;
         positive("terrain.blocks.thickness_m", blocks.thickness_m)?;
         positive("terrain.blocks.edge_m", blocks.edge_m[0])?;
         let ordered = blocks.edge_m[1] >= blocks.edge_m[0];

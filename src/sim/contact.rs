@@ -20,10 +20,11 @@
 //! W = (J_0 - J_l G_l) L^-T and U = J_l C_l^-T. The sweep keeps the sums y_0 = sum W^T p and y_l = sum U^T p, so one visit costs the
 //! same however many contacts there are.
 
-use nalgebra::{Matrix3, Vector2, Vector3, Vector6};
+use nalgebra::{Matrix3, Vector2, Vector3};
 
+use super::collision::Moment;
 use super::config::{ContactConfig, ContactLaw, SolverConfig};
-use super::dynamics::{Dynamics, Matrix6x3};
+use super::dynamics::{Dynamics, Leg, Six, add_scaled, dot};
 use super::quantities::stack;
 use super::state::State;
 use crate::robot::{JOINTS, Joints, LEGS, PerLeg, leg_of};
@@ -39,7 +40,7 @@ pub(super) const TRUNK: usize = LEGS;
 /// Velocities of trunk (linear, angular; axes of the body at the start of the step) and joints.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Velocity {
-    pub trunk: Vector6<f64>,
+    pub trunk: Six,
     pub legs: PerLeg<Vector3<f64>>,
 }
 
@@ -81,11 +82,17 @@ pub(super) struct ContactPoint {
 /// One contact in the coordinates normal, tangent, tangent.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Contact {
-    pub point: ContactPoint,
+    /// Which leg it is on; [`TRUNK`] for none.
+    leg: usize,
+    /// Where it remembers its impulse.
+    pub memory: usize,
+    friction: f64,
+    /// Which loose block it is on.
+    pub block: Option<usize>,
     /// Columns normal, two tangents, body axes.
     axes_body: Matrix3<f64>,
-    /// W^T.
-    trunk_rows: Matrix6x3,
+    /// W.
+    trunk_rows: [Six; 3],
     /// U; zero for the trunk.
     leg_rows: Matrix3<f64>,
     /// A = W W^T + U U^T and its inverse.
@@ -103,7 +110,7 @@ pub(super) struct Contact {
 #[derive(Debug, Clone, Copy)]
 struct Row {
     leg: usize,
-    trunk_row: Vector6<f64>,
+    trunk_row: Six,
     leg_row: Vector3<f64>,
     local: f64,
     free: f64,
@@ -167,27 +174,48 @@ impl ContactSolver {
     }
 
     /// Adds a point; `world_from_body` turns its remembered impulse into place.
-    pub fn add_point(&mut self, dynamics: &Dynamics, point: ContactPoint, world_from_body: &Matrix3<f64>, h: f64) {
+    pub fn add_point(
+        &mut self,
+        dynamics: &Dynamics,
+        legs: &PerLeg<Leg>,
+        point: &ContactPoint,
+        world_from_body: &Matrix3<f64>,
+        h: f64,
+    ) {
         if self.contacts.len() == MAX_CONTACTS {
             return;
         }
         let axes_body = axes_about(&point.normal_body);
-        let [n, t1, t2] = [axes_body.column(0).into(), axes_body.column(1).into(), axes_body.column(2).into()];
-        let p: &Vector3<f64> = &point.position_body;
-        // Columns of J_0^T: axis . (v + w x p) = axis . v + (p x axis) . w
-        let mut columns =
-            Matrix6x3::from_columns(&[stack(&n, &p.cross(&n)), stack(&t1, &p.cross(&t1)), stack(&t2, &p.cross(&t2))]);
+        // Rows of J_0: axis . (v + w x p) = axis . v + (p x axis) . w
+        let mut trunk_rows = [0, 1, 2].map(|i| {
+            let axis: Vector3<f64> = axes_body.column(i).into();
+            stack(&axis, &point.position_body.cross(&axis))
+        });
         let mut leg_rows = Matrix3::zeros();
         if point.leg != TRUNK {
-            // J_0^T - G^T J_l^T and U = J_l C^-T
-            let leg = &dynamics.legs[point.leg];
+            // J_0 - J_l G  and  U = J_l C^-T
+            let leg = &legs[point.leg];
             let jacobian = axes_body.tr_mul(&point.leg_jacobian);
-            columns -= leg.gain.tr_mul(&jacobian.transpose());
+            for (i, row) in trunk_rows.iter_mut().enumerate() {
+                for (j, gain) in leg.gain.iter().enumerate() {
+                    add_scaled(row, gain, -jacobian[(i, j)]);
+                }
+            }
             leg_rows = jacobian * leg.factor_inverse.transpose();
         }
-        // W = (L^-1 (J_0 - J_l G)^T)^T
-        let trunk_rows = dynamics.solve_lower_columns(columns);
-        let local = trunk_rows.tr_mul(&trunk_rows) + leg_rows * leg_rows.transpose();
+        // W = (J_0 - J_l G) L^-T
+        for row in &mut trunk_rows {
+            dynamics.solve_lower(row);
+        }
+        let [w1, w2, w3] = &trunk_rows;
+        let (a12, a13, a23) = (dot(w1, w2), dot(w1, w3), dot(w2, w3));
+        #[rustfmt::skip]
+        let trunk_part = Matrix3::new(
+            dot(w1, w1), a12,         a13,
+            a12,         dot(w2, w2), a23,
+            a13,         a23,         dot(w3, w3),
+        );
+        let local = trunk_part + leg_rows * leg_rows.transpose();
         let mut free = axes_body.tr_mul(&point.free_slip_body);
         // gap + h v_n >= 0; inside the ground a share of the way back per step.
         let share = if point.gap > 0.0 { 1.0 } else { self.config.penetration_recovery };
@@ -204,7 +232,10 @@ impl ContactSolver {
         };
         let impulse = into_cone(&remembered, point.friction);
         self.contacts.push(Contact {
-            point,
+            leg: point.leg,
+            memory: point.memory,
+            friction: point.friction,
+            block: point.block,
             axes_body,
             trunk_rows,
             leg_rows,
@@ -217,49 +248,45 @@ impl ContactSolver {
         });
     }
 
-    /// Adds a joint's stop or friction: the impulse that takes `free` to zero or above, between `lowest` and `highest`; `sign` is
-    /// the direction in which it acts on the joint.
-    pub fn add_joint(&mut self, dynamics: &Dynamics, joint: usize, sign: f64, free: f64, lowest: f64, highest: f64) {
+    /// Adds a joint's stop or friction.
+    fn add_joint(&mut self, dynamics: &Dynamics, legs: &PerLeg<Leg>, stop: &JointRow) {
+        let &JointRow { joint, sign, free, lowest, highest } = stop;
         let (leg, part) = (joint / 3, joint % 3);
         let mut u = Vector3::zeros();
         u[part] = sign;
-        let l = &dynamics.legs[leg];
-        let trunk_row = dynamics.solve_lower(&-l.gain.tr_mul(&u));
+        let l = &legs[leg];
+        let mut trunk_row = l.gain[part].map(|g| -sign * g);
+        dynamics.solve_lower(&mut trunk_row);
         let leg_row = l.factor_inverse * u;
-        let local = trunk_row.norm_squared() + leg_row.norm_squared();
+        let local = dot(&trunk_row, &trunk_row) + leg_row.norm_squared();
         self.rows.push(Row { leg, trunk_row, leg_row, local, free, lowest, highest, impulse: 0.0 });
     }
 
     /// Solves for all impulses; returns the change of velocity that they make.
     pub fn solve(&mut self, dynamics: &Dynamics, world_from_body: &Matrix3<f64>) -> Velocity {
-        let mut trunk = Vector6::zeros();
-        let mut legs = [Vector3::zeros(); LEGS + 1];
+        // y_0 = sum W^T p,  y_l = sum U^T p
+        let mut sums = Sums { trunk: [0.0; 6], legs: [Vector3::zeros(); LEGS + 1] };
         for contact in &self.contacts {
-            trunk += contact.trunk_rows * contact.impulse;
-            legs[contact.point.leg] += contact.leg_rows.tr_mul(&contact.impulse);
+            contact.add(&mut sums, &contact.impulse);
         }
         for _ in 0..self.config.max_sweeps {
             let mut change: f64 = 0.0;
             for contact in &mut self.contacts {
-                let leg = &mut legs[contact.point.leg];
-                let velocity = contact.free + contact.trunk_rows.tr_mul(&trunk) + contact.leg_rows * *leg;
                 // What the others alone would leave.
-                let others = velocity - contact.local * contact.impulse;
+                let others = contact.velocity(&sums) - contact.local * contact.impulse;
                 let impulse = contact.solve(&others);
                 let step = impulse - contact.impulse;
                 contact.impulse = impulse;
-                trunk += contact.trunk_rows * step;
-                *leg += contact.leg_rows.tr_mul(&step);
+                contact.add(&mut sums, &step);
                 change = change.max((contact.local * step).amax());
             }
             for row in &mut self.rows {
-                let leg = &mut legs[row.leg];
-                let velocity = row.free + row.trunk_row.dot(&trunk) + row.leg_row.dot(leg);
+                let velocity = row.free + dot(&row.trunk_row, &sums.trunk) + row.leg_row.dot(&sums.legs[row.leg]);
                 let impulse = (row.impulse - velocity / row.local).clamp(row.lowest, row.highest);
                 let step = impulse - row.impulse;
                 row.impulse = impulse;
-                trunk += row.trunk_row * step;
-                *leg += row.leg_row * step;
+                add_scaled(&mut sums.trunk, &row.trunk_row, step);
+                sums.legs[row.leg] += row.leg_row * step;
                 change = change.max((row.local * step).abs());
             }
             if change < self.config.tolerance_m_s {
@@ -270,20 +297,54 @@ impl ContactSolver {
             self.memory[memory] = None;
         }
         for contact in &self.contacts {
-            self.memory[contact.point.memory] = Some(world_from_body * contact.impulse_body());
-            self.remembered.push(contact.point.memory);
+            self.memory[contact.memory] = Some(world_from_body * contact.impulse_body());
+            self.remembered.push(contact.memory);
         }
         // dv_0 = L^-T y_0,  ddq_l = C^-T y_l - G dv_0
-        let trunk = dynamics.solve_upper(&trunk);
-        let legs = std::array::from_fn(|l| {
-            let leg = &dynamics.legs[l];
-            leg.factor_inverse.tr_mul(&legs[l]) - leg.gain * trunk
-        });
+        let mut trunk = sums.trunk;
+        dynamics.solve_upper(&mut trunk);
+        let [fr, fl, rr, rl, _] = sums.legs;
+        let legs = dynamics.joint_change(&[fr, fl, rr, rl], &trunk);
         Velocity { trunk, legs }
     }
 }
 
+/// What a joint's stop or friction asks for.
+struct JointRow {
+    joint: usize,
+    /// The direction in which it acts on the joint.
+    sign: f64,
+    /// Velocity in that direction, to be taken to zero or above.
+    free: f64,
+    /// Bounds of the impulse, N m s.
+    lowest: f64,
+    highest: f64,
+}
+
+/// y_0 and y_l; the last leg stands for the trunk and stays zero.
+struct Sums {
+    trunk: Six,
+    legs: [Vector3<f64>; LEGS + 1],
+}
+
 impl Contact {
+    /// W y_0 + U y_l + what it is without impulses.
+    #[inline]
+    fn velocity(&self, sums: &Sums) -> Vector3<f64> {
+        let [w1, w2, w3] = &self.trunk_rows;
+        let trunk = Vector3::new(dot(w1, &sums.trunk), dot(w2, &sums.trunk), dot(w3, &sums.trunk));
+        self.free + trunk + self.leg_rows * sums.legs[self.leg]
+    }
+
+    /// Adds the impulse `p` to the sums.
+    #[inline]
+    fn add(&self, sums: &mut Sums, p: &Vector3<f64>) {
+        for (row, p) in self.trunk_rows.iter().zip(p.iter()) {
+            add_scaled(&mut sums.trunk, row, *p);
+        }
+        sums.legs[self.leg] += self.leg_rows.tr_mul(p);
+    }
+
     /// The ground's impulse on the robot, body axes at the start of the step, N s.
     pub fn impulse_body(&self) -> Vector3<f64> {
         self.axes_body * self.impulse
@@ -299,7 +360,7 @@ impl Contact {
         if c.x >= 0.0 {
             return Vector3::zeros();
         }
-        let friction = self.point.friction;
+        let friction = self.friction;
         // Sticking: v = A p + c = 0.
         let stick = -(self.local_inverse * c);
         if stick.x >= 0.0 && stick.y * stick.y + stick.z * stick.z <= (friction * stick.x).powi(2) {
@@ -350,7 +411,7 @@ impl Contact {
                 continue;
             };
             best = p;
-            let size = p.y.hypot(p.z);
+            let size = (p.y * p.y + p.z * p.z).sqrt();
             let f = size - friction * p.x;
             if f.abs() <= 1e-14 * size {
                 break;
@@ -378,7 +439,7 @@ fn into_cone(impulse: &Vector3<f64>, friction: f64) -> Vector3<f64> {
     if impulse.x <= 0.0 {
         return Vector3::zeros();
     }
-    let size = impulse.y.hypot(impulse.z);
+    let size = (impulse.y * impulse.y + impulse.z * impulse.z).sqrt();
     let limit = friction * impulse.x;
     if size <= limit {
         return *impulse;
@@ -412,16 +473,15 @@ fn axes_about(n: &Vector3<f64>) -> Matrix3<f64> {
     axes
 }
 
-/// The joint angles' stops and dry friction as the solver's rows.
+/// The joint angles' stops, `limits`, and dry friction (bounds, N m) as the solver's rows.
 pub(super) fn add_joints(
     solver: &mut ContactSolver,
-    dynamics: &Dynamics,
-    velocity: &Velocity,
-    position: &Joints,
+    moment: &Moment,
     limits: (&Joints, &Joints),
     dry_friction: &Joints,
-    h: f64,
 ) {
+    let Moment { dynamics, legs, free: velocity, h, .. } = *moment;
+    let position = &moment.state.joint_position;
     for joint in 0..JOINTS {
         let free = velocity.legs[joint / 3][joint % 3];
         for (sign, gap) in [(1.0, position[joint] - limits.0[joint]), (-1.0, limits.1[joint] - position[joint])] {
@@ -429,12 +489,14 @@ pub(super) fn add_joints(
             let share = if gap > 0.0 { 1.0 } else { solver.config.penetration_recovery };
             let approach = sign * free + share * gap / h;
             if gap + h * sign * free < 2e-3 {
-                solver.add_joint(dynamics, joint, sign, approach, 0.0, f64::INFINITY);
+                let stop = JointRow { joint, sign, free: approach, lowest: 0.0, highest: f64::INFINITY };
+                solver.add_joint(dynamics, legs, &stop);
             }
         }
         if dry_friction[joint] > 0.0 {
             let most = dry_friction[joint] * h;
-            solver.add_joint(dynamics, joint, 1.0, free, -most, most);
+            let friction = JointRow { joint, sign: 1.0, free, lowest: -most, highest: most };
+            solver.add_joint(dynamics, legs, &friction);
         }
     }
 }

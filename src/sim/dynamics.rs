@@ -16,87 +16,115 @@
 //! Each leg is worked out in the frame of its hip link, in which thigh and calf turn about the same fixed axis y.
 //! Six-vectors have the linear part first, in body axes at the trunk's origin.
 
-use nalgebra::{Matrix3, Matrix6, SMatrix, Vector3, Vector6};
+use nalgebra::{Matrix3, Vector3};
+use simba::simd::{SimdComplexField, SimdValue};
 
-use super::model::{GRAVITY, LegModel, Model};
-use super::spatial::{Force, Inertia, Motion, Turn};
+use super::model::{GRAVITY, Lanes, LegsModel, Model};
+use super::spatial::{Force, Inertia, Motion, Symmetric, Turn};
 use super::state::{Acceleration, State};
-use crate::robot::{Joints, LEGS, PerLeg};
+use crate::robot::{JOINTS, Joints, LEGS, PerLeg};
 
-/// 3x6: leg rows, trunk columns.
-pub(super) type Matrix3x6 = SMatrix<f64, 3, 6>;
-/// 6x3: trunk rows, leg columns.
-pub(super) type Matrix6x3 = SMatrix<f64, 6, 3>;
+/// A row over, or a column of, the trunk's six velocities. Plain arrays, which the compiler turns into vector instructions.
+pub(super) type Six = [f64; 6];
 
-/// Where a leg's parts are and how they couple to the trunk.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct LegDynamics {
+/// a . b
+#[inline]
+pub(super) fn dot(a: &Six, b: &Six) -> f64 {
+    (a[0] * b[0] + a[2] * b[2] + a[4] * b[4]) + (a[1] * b[1] + a[3] * b[3] + a[5] * b[5])
+}
+
+/// y += s x
+#[inline]
+pub(super) fn add_scaled(y: &mut Six, x: &Six, s: f64) {
+    for (y, x) in y.iter_mut().zip(x) {
+        *y += s * x;
+    }
+}
+
+/// All legs: where their parts are and how they couple to the trunk. Every number is one per leg.
+#[derive(Debug, Clone)]
+pub(super) struct Legs {
     /// Rotation of the hip link about x.
-    pub hip: Turn,
+    hip: Turn<Lanes>,
     /// Rotation of thigh and calf about the hip link's y.
-    pub thigh: Turn,
-    pub calf: Turn,
+    thigh: Turn<Lanes>,
+    calf: Turn<Lanes>,
+    /// Joint origins in the trunk's frame, m.
+    origin_body: [Vector3<Lanes>; 3],
+    /// H: mass matrix of the leg's joints, kg m^2: 11, 12, 13, 22, 23, 33.
+    mass: [Lanes; 6],
+    /// F: a column for each joint.
+    coupling: [[Lanes; 6]; 3],
+    /// c: torques that velocity and gravity ask for, N m.
+    bias: [Lanes; 3],
+    /// C^-1: inverse of the lower Cholesky factor of H: 11, 21, 22, 31, 32, 33.
+    factor_inverse: [Lanes; 6],
+    /// G = H^-1 F^T: a row for each joint.
+    gain: [[Lanes; 6]; 3],
+}
+
+/// One leg, for points on it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Leg {
+    hip: Turn<f64>,
+    thigh: Turn<f64>,
+    calf: Turn<f64>,
     /// Joint origins in the trunk's frame, m.
     pub origin_body: [Vector3<f64>; 3],
-    /// H: mass matrix of the leg's joints, kg m^2.
-    pub mass: Matrix3<f64>,
-    /// F: six rows of the trunk's frame by three joints.
-    pub coupling: Matrix6x3,
-    /// c: torques that velocity and gravity ask for, N m.
-    pub bias: Vector3<f64>,
-    /// C^-1: inverse of the lower Cholesky factor of H.
+    /// C^-1.
     pub factor_inverse: Matrix3<f64>,
-    /// G = H^-1 F^T.
-    pub gain: Matrix3x6,
+    /// G: a row for each joint.
+    pub gain: [Six; 3],
 }
 
 /// The equations at one state.
 #[derive(Debug, Clone)]
 pub(super) struct Dynamics {
-    pub legs: PerLeg<LegDynamics>,
+    legs: Legs,
     /// I_0 as mass, first and second moment.
-    pub composite: Inertia,
+    pub composite: Inertia<f64>,
     /// b of the trunk's rows.
-    pub bias: Vector6<f64>,
-    /// L: lower Cholesky factor of I_A, with the reciprocals of its diagonal kept apart.
-    pub factor: Matrix6<f64>,
-    pub factor_diagonal_inverse: Vector6<f64>,
+    pub bias: Six,
+    /// L: lower Cholesky factor of I_A by columns, with the reciprocals of its diagonal kept apart.
+    factor: [Six; 6],
+    factor_diagonal_inverse: Six,
 }
 
-impl LegDynamics {
-    /// Fills pose, H, F and c of one leg; returns its composite inertia and bias force in the trunk's frame.
+/// Three numbers per joint of a leg as lanes.
+#[inline]
+fn joint_lanes(x: &Joints) -> [Lanes; 3] {
+    [0, 1, 2].map(|i| Lanes::from([x[i], x[3 + i], x[6 + i], x[9 + i]]))
+}
+
+impl Legs {
+    /// Fills everything; returns the legs' composite inertias and bias forces in the trunk's frame.
     #[inline]
     fn new(
-        leg: &LegModel,
-        q: [f64; 3],
-        dq: [f64; 3],
-        trunk_velocity: &Motion,
-        gravity_body: &Vector3<f64>,
-    ) -> (LegDynamics, Inertia, Force) {
+        model: &LegsModel,
+        q: [Lanes; 3],
+        dq: [Lanes; 3],
+        added: [Lanes; 3],
+        trunk_velocity: &Motion<Lanes>,
+        gravity_body: &Vector3<Lanes>,
+    ) -> (Legs, Inertia<Lanes>, Force<Lanes>) {
         let (hip, thigh, calf) = (Turn::by(q[0]), Turn::by(q[1]), Turn::by(q[1] + q[2]));
-        let origin_hip = leg.joint_origin[0];
-        let origin_thigh = leg.joint_origin[1];
-        let origin_calf = origin_thigh + thigh.y(&leg.joint_origin[2]);
+        let origin_hip = model.joint_origin[0];
+        let origin_thigh = model.joint_origin[1];
+        let origin_calf = origin_thigh + thigh.y(&model.joint_origin[2]);
 
         // Inertias about the hip's origin, hip axes, each with all that hangs on it (CRBA, Table 6.2: I^c).
-        let link_calf = leg.inertia[2].turned_y(calf).moved(&origin_calf);
-        let link_thigh = leg.inertia[1].turned_y(thigh).moved(&origin_thigh);
-        let link_hip = leg.inertia[0];
+        let link_calf = model.inertia[2].turned_y(calf).moved(&origin_calf);
+        let link_thigh = model.inertia[1].turned_y(thigh).moved(&origin_thigh);
+        let link_hip = model.inertia[0];
         let composite_thigh = link_thigh.plus(&link_calf);
         let composite_hip = link_hip.plus(&composite_thigh);
 
-        // Joint axes as spatial motions: s_1 = [x; 0], s_j = [y; o_j x y].
-        let about_y = |o: &Vector3<f64>| Motion { linear: Vector3::new(-o.z, 0.0, o.x), angular: Vector3::y() };
-        let s1 = Motion { linear: Vector3::zeros(), angular: Vector3::x() };
-        let s2 = about_y(&origin_thigh);
-        let s3 = about_y(&origin_calf);
-
-        // F_j = I_j^c s_j,  H_ij = s_i . F_j
-        let f1 = composite_hip.times(&s1);
-        let f2 = composite_thigh.times(&s2);
-        let f3 = link_calf.times(&s3);
+        // F_j = I_j^c s_j,  H_ij = s_i . F_j  with the joint axes s_1 = [x; 0], s_j = [y; o_j x y].
+        let f1 = composite_hip.times_x();
+        let f2 = composite_thigh.times_y(&origin_thigh);
+        let f3 = link_calf.times_y(&origin_calf);
         let (h11, h12, h13) = (f1.angular.x, f2.angular.x, f3.angular.x);
-        let (h22, h23, h33) = (s2.dot(&f2), s2.dot(&f3), s3.dot(&f3));
+        let (h22, h23, h33) = (f2.about_y(&origin_thigh), f3.about_y(&origin_thigh), f3.about_y(&origin_calf));
 
         // Newton-Euler with zero accelerations (Table 5.1): v_i = v_p + s_i dq_i,  a_i = a_p + v_i x s_i dq_i,
         // f_i = I_i a_i + v_i x* I_i v_i;  gravity enters as an upward acceleration of the trunk.
@@ -104,76 +132,91 @@ impl LegDynamics {
             linear: hip.x_back(&(trunk_velocity.linear + trunk_velocity.angular.cross(&origin_hip))),
             angular: hip.x_back(&trunk_velocity.angular),
         };
-        let a0 = Motion { linear: -hip.x_back(gravity_body), angular: Vector3::zeros() };
-        let force = |link: &Inertia, v: &Motion, a: &Motion| link.times(a).plus(&v.cross_force(&link.times(v)));
-        let (w1, w2, w3) = (s1.scaled(dq[0]), s2.scaled(dq[1]), s3.scaled(dq[2]));
-        let v1 = v0.plus(&w1);
-        let v2 = v1.plus(&w2);
-        let v3 = v2.plus(&w3);
-        let a1 = a0.plus(&v1.cross(&w1));
-        let a2 = a1.plus(&v2.cross(&w2));
-        let a3 = a2.plus(&v3.cross(&w3));
+        let (v1, mut a1) = v0.joined_x(dq[0]);
+        let (v2, c2) = v1.joined_y(dq[1], &origin_thigh);
+        let (v3, c3) = v2.joined_y(dq[2], &origin_calf);
+        a1.linear -= hip.x_back(gravity_body);
+        let a2 = a1.plus(&c2);
+        let a3 = a2.plus(&c3);
+        let force = |link: &Inertia<Lanes>, v: &Motion<Lanes>, a| link.times(a).plus(&v.cross_force(&link.times(v)));
         let p3 = force(&link_calf, &v3, &a3);
         let p2 = force(&link_thigh, &v2, &a2).plus(&p3);
         let p1 = force(&link_hip, &v1, &a1).plus(&p2);
 
-        let mut coupling = Matrix6x3::zeros();
-        for (j, f) in [f1, f2, f3].iter().enumerate() {
+        let column = |f: &Force<Lanes>| {
             let f = f.out_of(hip, &origin_hip);
-            coupling.fixed_view_mut::<3, 1>(0, j).copy_from(&f.linear);
-            coupling.fixed_view_mut::<3, 1>(3, j).copy_from(&f.angular);
-        }
-        let dynamics = LegDynamics {
+            [f.linear.x, f.linear.y, f.linear.z, f.angular.x, f.angular.y, f.angular.z]
+        };
+        let coupling = [column(&f1), column(&f2), column(&f3)];
+        let mass = [h11, h12, h13, h22, h23, h33];
+        let (factor_inverse, gain) = factor(&mass, &added, &coupling);
+        let legs = Legs {
             hip,
             thigh,
             calf,
             origin_body: [origin_hip, origin_hip + hip.x(&origin_thigh), origin_hip + hip.x(&origin_calf)],
-            mass: Matrix3::new(h11, h12, h13, h12, h22, h23, h13, h23, h33),
+            mass,
             coupling,
-            bias: Vector3::new(p1.angular.x, s2.dot(&p2), s3.dot(&p3)),
-            factor_inverse: Matrix3::zeros(),
-            gain: Matrix3x6::zeros(),
+            bias: [p1.angular.x, p2.about_y(&origin_thigh), p3.about_y(&origin_calf)],
+            factor_inverse,
+            gain,
         };
-        (dynamics, composite_hip.turned_x(hip).moved(&origin_hip), p1.out_of(hip, &origin_hip))
-    }
-
-    /// Factors H + diag(`added`) and fills C^-1 and G.
-    #[inline]
-    fn factor(&mut self, added: [f64; 3]) {
-        let m = &self.mass;
-        // H = C C^T, then C^-1 row by row.
-        let i11 = 1.0 / (m.m11 + added[0]).sqrt();
-        let c21 = m.m21 * i11;
-        let c31 = m.m31 * i11;
-        let i22 = 1.0 / (m.m22 + added[1] - c21 * c21).sqrt();
-        let c32 = (m.m32 - c31 * c21) * i22;
-        let i33 = 1.0 / (m.m33 + added[2] - c31 * c31 - c32 * c32).sqrt();
-        let i21 = -c21 * i11 * i22;
-        let i32 = -c32 * i22 * i33;
-        let i31 = -(c31 * i11 + c32 * i21) * i33;
-        self.factor_inverse = Matrix3::new(i11, 0.0, 0.0, i21, i22, 0.0, i31, i32, i33);
-        // G = C^-T (C^-1 F^T)
-        let f = &self.coupling;
-        for k in 0..6 {
-            let y1 = i11 * f[(k, 0)];
-            let y2 = i21 * f[(k, 0)] + i22 * f[(k, 1)];
-            let y3 = i31 * f[(k, 0)] + i32 * f[(k, 1)] + i33 * f[(k, 2)];
-            self.gain[(0, k)] = i11 * y1 + i21 * y2 + i31 * y3;
-            self.gain[(1, k)] = i22 * y2 + i32 * y3;
-            self.gain[(2, k)] = i33 * y3;
-        }
+        (legs, composite_hip.turned_x(hip).moved(&origin_hip), p1.out_of(hip, &origin_hip))
     }
 
     /// H^-1 u = C^-T C^-1 u.
     #[inline]
-    pub fn solve(&self, u: &Vector3<f64>) -> Vector3<f64> {
-        let c = &self.factor_inverse;
-        let y1 = c.m11 * u.x;
-        let y2 = c.m21 * u.x + c.m22 * u.y;
-        let y3 = c.m31 * u.x + c.m32 * u.y + c.m33 * u.z;
-        Vector3::new(c.m11 * y1 + c.m21 * y2 + c.m31 * y3, c.m22 * y2 + c.m32 * y3, c.m33 * y3)
+    fn solve(&self, u: &[Lanes; 3]) -> [Lanes; 3] {
+        let [i11, i21, i22, i31, i32, i33] = self.factor_inverse;
+        let y1 = i11 * u[0];
+        let y2 = i21 * u[0] + i22 * u[1];
+        let y3 = i31 * u[0] + i32 * u[1] + i33 * u[2];
+        [i11 * y1 + i21 * y2 + i31 * y3, i22 * y2 + i32 * y3, i33 * y3]
     }
 
+    /// What the joints do when the trunk does `trunk`: `free` - G a_0.
+    #[inline]
+    fn follow(&self, free: &[Lanes; 3], trunk: &Six) -> [Lanes; 3] {
+        [0, 1, 2].map(|j| {
+            let mut joint = free[j];
+            for (g, t) in self.gain[j].iter().zip(trunk) {
+                joint -= *g * Lanes::splat(*t);
+            }
+            joint
+        })
+    }
+}
+
+/// Factors H + diag(`added`): C^-1 and G = H^-1 F^T.
+#[inline]
+fn factor(m: &[Lanes; 6], added: &[Lanes; 3], coupling: &[[Lanes; 6]; 3]) -> ([Lanes; 6], [[Lanes; 6]; 3]) {
+    let [h11, h12, h13, h22, h23, h33] = *m;
+    let one = Lanes::splat(1.0);
+    // H = C C^T, then C^-1 row by row.
+    let i11 = one / (h11 + added[0]).simd_sqrt();
+    let c21 = h12 * i11;
+    let c31 = h13 * i11;
+    let i22 = one / (h22 + added[1] - c21 * c21).simd_sqrt();
+    let c32 = (h23 - c31 * c21) * i22;
+    let i33 = one / (h33 + added[2] - c31 * c31 - c32 * c32).simd_sqrt();
+    let i21 = -c21 * i11 * i22;
+    let i32 = -c32 * i22 * i33;
+    let i31 = -(c31 * i11 + c32 * i21) * i33;
+    // G = C^-T (C^-1 F^T)
+    let [f1, f2, f3] = coupling;
+    let mut gain = [[Lanes::splat(0.0); 6]; 3];
+    for k in 0..6 {
+        let y1 = i11 * f1[k];
+        let y2 = i21 * f1[k] + i22 * f2[k];
+        let y3 = i31 * f1[k] + i32 * f2[k] + i33 * f3[k];
+        gain[0][k] = i11 * y1 + i21 * y2 + i31 * y3;
+        gain[1][k] = i22 * y2 + i32 * y3;
+        gain[2][k] = i33 * y3;
+    }
+    ([i11, i21, i22, i31, i32, i33], gain)
+}
+
+impl Leg {
     /// Velocity of a point at `p_body` on the link `link` (0 hip, 1 thigh, 2 calf) per joint velocity, body axes.
     #[inline]
     pub fn point_jacobian(&self, link: usize, p_body: &Vector3<f64>) -> Matrix3<f64> {
@@ -200,7 +243,7 @@ impl LegDynamics {
 
     /// A vector in the trunk's axes seen in the axes of link `link`.
     #[inline]
-    pub fn into_link(&self, link: usize, v_body: &Vector3<f64>) -> Vector3<f64> {
+    pub fn in_link(&self, link: usize, v_body: &Vector3<f64>) -> Vector3<f64> {
         let v = self.hip.x_back(v_body);
         match link {
             0 => v,
@@ -216,155 +259,193 @@ impl Dynamics {
     pub fn new(model: &Model, state: &State, added: &Joints) -> Dynamics {
         let velocity = Motion { linear: state.velocity_body, angular: state.angular_velocity_body };
         let gravity_body = state.orientation_world.inverse_transform_vector(&Vector3::new(0.0, 0.0, -GRAVITY));
+        let (legs, leg_inertia, leg_force) = Legs::new(
+            &model.legs,
+            joint_lanes(&state.joint_position),
+            joint_lanes(&state.joint_velocity),
+            joint_lanes(added),
+            &Motion { linear: velocity.linear.map(Lanes::splat), angular: velocity.angular.map(Lanes::splat) },
+            &gravity_body.map(Lanes::splat),
+        );
 
-        // The trunk's own share: f_0 = I_0 a_0 + v_0 x* I_0 v_0
+        // The trunk's own share, f_0 = I_0 a_0 + v_0 x* I_0 v_0, and the legs'.
         let up = Motion { linear: -gravity_body, angular: Vector3::zeros() };
-        let mut composite = model.trunk;
-        let mut bias = model.trunk.times(&up).plus(&velocity.cross_force(&model.trunk.times(&velocity)));
-
-        let legs = std::array::from_fn::<_, LEGS, _>(|l| {
-            let joints = 3 * l..3 * l + 3;
-            let three = |x: &Joints| -> [f64; 3] { [x[3 * l], x[3 * l + 1], x[3 * l + 2]] };
-            let (mut leg, inertia, force) = LegDynamics::new(
-                &model.legs[l],
-                three(&state.joint_position),
-                three(&state.joint_velocity),
-                &velocity,
-                &gravity_body,
-            );
-            debug_assert_eq!(joints.len(), 3);
-            leg.factor(three(added));
-            composite = composite.plus(&inertia);
-            bias = bias.plus(&force);
-            leg
+        let own = model.trunk.times(&up).plus(&velocity.cross_force(&model.trunk.times(&velocity)));
+        let bias = own.plus(&Force { linear: sums(&leg_force.linear), angular: sums(&leg_force.angular) });
+        let s = &leg_inertia.second;
+        let composite = model.trunk.plus(&Inertia {
+            mass: sum(leg_inertia.mass),
+            first: sums(&leg_inertia.first),
+            second: Symmetric {
+                xx: sum(s.xx),
+                xy: sum(s.xy),
+                xz: sum(s.xz),
+                yy: sum(s.yy),
+                yz: sum(s.yz),
+                zz: sum(s.zz),
+            },
         });
 
-        // I_A = I_0 - sum F G, only the lower triangle.
-        let mut articulated = lower_triangle(&composite);
-        for leg in &legs {
-            for j in 0..6 {
-                for i in j..6 {
-                    articulated[(i, j)] -= leg.coupling[(i, 0)] * leg.gain[(0, j)]
-                        + leg.coupling[(i, 1)] * leg.gain[(1, j)]
-                        + leg.coupling[(i, 2)] * leg.gain[(2, j)];
-                }
+        // I_A = I_0 - sum F G, only the lower triangle counts.
+        let mut articulated = columns(&composite);
+        let ([f1, f2, f3], [g1, g2, g3]) = (&legs.coupling, &legs.gain);
+        for j in 0..6 {
+            for i in j..6 {
+                articulated[j][i] -= sum(f1[i] * g1[j] + f2[i] * g2[j] + f3[i] * g3[j]);
             }
         }
         let factor_diagonal_inverse = cholesky(&mut articulated);
-        Dynamics {
-            legs,
-            composite,
-            bias: Vector6::new(
-                bias.linear.x,
-                bias.linear.y,
-                bias.linear.z,
-                bias.angular.x,
-                bias.angular.y,
-                bias.angular.z,
-            ),
-            factor: articulated,
-            factor_diagonal_inverse,
-        }
+        let (f, n) = (&bias.linear, &bias.angular);
+        Dynamics { legs, composite, bias: [f.x, f.y, f.z, n.x, n.y, n.z], factor: articulated, factor_diagonal_inverse }
     }
 
     /// a = M^-1 ([0; tau] - b).
     pub fn acceleration(&self, torque: &Joints) -> Acceleration {
         // z_l = H_l^-1 (tau_l - c_l);  I_A a_0 = -b_0 - sum F_l z_l;  ddq_l = z_l - G_l a_0
-        let mut free = [Vector3::zeros(); LEGS];
-        let mut right = -self.bias;
-        for (l, leg) in self.legs.iter().enumerate() {
-            let u = Vector3::new(torque[3 * l], torque[3 * l + 1], torque[3 * l + 2]) - leg.bias;
-            free[l] = leg.solve(&u);
-            right -= leg.coupling * free[l];
+        let torque = joint_lanes(torque);
+        let free = self.legs.solve(&[0, 1, 2].map(|j| torque[j] - self.legs.bias[j]));
+        let [f1, f2, f3] = &self.legs.coupling;
+        let mut trunk = self.bias;
+        for (i, trunk) in trunk.iter_mut().enumerate() {
+            *trunk = -*trunk - sum(f1[i] * free[0] + f2[i] * free[1] + f3[i] * free[2]);
         }
-        let trunk = self.solve_trunk(&right);
-        let mut joint = Joints::default();
-        for (l, leg) in self.legs.iter().enumerate() {
-            let ddq = free[l] - leg.gain * trunk;
-            joint[3 * l..3 * l + 3].copy_from_slice(ddq.as_slice());
-        }
+        self.solve_lower(&mut trunk);
+        self.solve_upper(&mut trunk);
+        let joint = self.legs.follow(&free, &trunk);
         Acceleration {
-            linear_body: trunk.fixed_rows::<3>(0).into(),
-            angular_body: trunk.fixed_rows::<3>(3).into(),
-            joint,
+            linear_body: Vector3::new(trunk[0], trunk[1], trunk[2]),
+            angular_body: Vector3::new(trunk[3], trunk[4], trunk[5]),
+            joint: std::array::from_fn(|i| joint[i % 3].extract(i / 3)),
         }
     }
 
-    /// I_A^-1 x = L^-T L^-1 x.
-    #[inline]
-    pub fn solve_trunk(&self, x: &Vector6<f64>) -> Vector6<f64> {
-        self.solve_upper(&self.solve_lower(x))
+    /// The change of joint velocities that impulses make: C_l^-T y_l - G_l dv_0, with y_l = sum U^T p.
+    pub fn joint_change(&self, sums: &PerLeg<Vector3<f64>>, trunk: &Six) -> PerLeg<Vector3<f64>> {
+        let y = [0, 1, 2].map(|i| Lanes::from(sums.map(|sum| sum[i])));
+        let [i11, i21, i22, i31, i32, i33] = self.legs.factor_inverse;
+        let own = [i11 * y[0] + i21 * y[1] + i31 * y[2], i22 * y[1] + i32 * y[2], i33 * y[2]];
+        let change = self.legs.follow(&own, trunk);
+        std::array::from_fn(|l| Vector3::from_fn(|j, _| change[j].extract(l)))
     }
 
-    /// L^-1 x.
+    /// Each leg by itself.
+    pub fn legs(&self) -> PerLeg<Leg> {
+        let turn = Turn { cos: 1.0, sin: 0.0 };
+        let mut out = [Leg {
+            hip: turn,
+            thigh: turn,
+            calf: turn,
+            origin_body: [Vector3::zeros(); 3],
+            factor_inverse: Matrix3::zeros(),
+            gain: [[0.0; 6]; 3],
+        }; LEGS];
+        // One quantity after the other: a row of lanes is dealt out to the four legs.
+        let mut deal = |x: Lanes, place: fn(&mut Leg, usize, usize) -> &mut f64, i: usize, j: usize| {
+            let x: [f64; LEGS] = x.into();
+            for (leg, x) in out.iter_mut().zip(x) {
+                *place(leg, i, j) = x;
+            }
+        };
+        let legs = &self.legs;
+        deal(legs.hip.cos, |leg, _, _| &mut leg.hip.cos, 0, 0);
+        deal(legs.hip.sin, |leg, _, _| &mut leg.hip.sin, 0, 0);
+        deal(legs.thigh.cos, |leg, _, _| &mut leg.thigh.cos, 0, 0);
+        deal(legs.thigh.sin, |leg, _, _| &mut leg.thigh.sin, 0, 0);
+        deal(legs.calf.cos, |leg, _, _| &mut leg.calf.cos, 0, 0);
+        deal(legs.calf.sin, |leg, _, _| &mut leg.calf.sin, 0, 0);
+        for j in 0..3 {
+            for k in 0..3 {
+                deal(legs.origin_body[j][k], |leg, j, k| &mut leg.origin_body[j][k], j, k);
+            }
+            for k in 0..6 {
+                deal(legs.gain[j][k], |leg, j, k| &mut leg.gain[j][k], j, k);
+            }
+        }
+        for (n, (i, j)) in [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)].into_iter().enumerate() {
+            deal(legs.factor_inverse[n], |leg, i, j| &mut leg.factor_inverse[(i, j)], i, j);
+        }
+        out
+    }
+
+    /// F of one leg: a column for each joint.
+    pub fn coupling(&self, leg: usize) -> [Six; 3] {
+        self.legs.coupling.map(|column| column.map(|x| x.extract(leg)))
+    }
+
+    /// H of one leg, without what was added to its diagonal.
+    pub fn leg_mass(&self, leg: usize) -> Matrix3<f64> {
+        let [h11, h12, h13, h22, h23, h33] = self.legs.mass.map(|x| x.extract(leg));
+        Matrix3::new(h11, h12, h13, h12, h22, h23, h13, h23, h33)
+    }
+
+    /// b of the joints' rows.
+    pub fn joint_bias(&self) -> Joints {
+        let bias: [Lanes; 3] = self.legs.bias;
+        std::array::from_fn::<f64, JOINTS, _>(|i| bias[i % 3].extract(i / 3))
+    }
+
+    /// x becomes L^-1 x.
     #[inline]
-    pub fn solve_lower(&self, x: &Vector6<f64>) -> Vector6<f64> {
-        let mut y = *x;
+    pub fn solve_lower(&self, x: &mut Six) {
         for j in 0..6 {
-            y[j] *= self.factor_diagonal_inverse[j];
+            x[j] *= self.factor_diagonal_inverse[j];
             for i in j + 1..6 {
-                y[i] -= self.factor[(i, j)] * y[j];
+                x[i] -= self.factor[j][i] * x[j];
             }
         }
-        y
     }
 
-    /// L^-1 X, three columns at once.
+    /// x becomes L^-T x.
     #[inline]
-    pub fn solve_lower_columns(&self, mut x: Matrix6x3) -> Matrix6x3 {
-        for k in 0..3 {
-            for j in 0..6 {
-                x[(j, k)] *= self.factor_diagonal_inverse[j];
-                for i in j + 1..6 {
-                    x[(i, k)] -= self.factor[(i, j)] * x[(j, k)];
-                }
-            }
-        }
-        x
-    }
-
-    /// L^-T x.
-    #[inline]
-    pub fn solve_upper(&self, x: &Vector6<f64>) -> Vector6<f64> {
-        let mut y = *x;
+    pub fn solve_upper(&self, x: &mut Six) {
         for j in (0..6).rev() {
             for i in j + 1..6 {
-                y[j] -= self.factor[(i, j)] * y[i];
+                x[j] -= self.factor[j][i] * x[i];
             }
-            y[j] *= self.factor_diagonal_inverse[j];
+            x[j] *= self.factor_diagonal_inverse[j];
         }
-        y
     }
 }
 
-/// The lower triangle of a spatial inertia as a 6x6 matrix, linear part first: [[m 1, -hx], [hx, I]].
-fn lower_triangle(inertia: &Inertia) -> Matrix6<f64> {
-    let (m, h, i) = (inertia.mass, &inertia.first, &inertia.second);
-    #[rustfmt::skip]
-    let matrix = Matrix6::new(
-        m,    0.0,  0.0,  0.0,  0.0,  0.0,
-        0.0,  m,    0.0,  0.0,  0.0,  0.0,
-        0.0,  0.0,  m,    0.0,  0.0,  0.0,
-        0.0,  -h.z, h.y,  i.xx, 0.0,  0.0,
-        h.z,  0.0,  -h.x, i.xy, i.yy, 0.0,
-        -h.y, h.x,  0.0,  i.xz, i.yz, i.zz,
-    );
-    matrix
+/// The sum over the legs.
+#[inline]
+fn sum(x: Lanes) -> f64 {
+    let [a, b, c, d]: [f64; LEGS] = x.into();
+    (a + b) + (c + d)
 }
 
-/// A = L L^T in place (lower triangle); returns the reciprocals of the diagonal of L.
+/// The same for each component.
 #[inline]
-fn cholesky(a: &mut Matrix6<f64>) -> Vector6<f64> {
-    let mut inverse = Vector6::zeros();
+fn sums(v: &Vector3<Lanes>) -> Vector3<f64> {
+    Vector3::new(sum(v.x), sum(v.y), sum(v.z))
+}
+
+/// A spatial inertia as the columns of a 6x6 matrix, linear part first: [[m 1, -hx], [hx, I]].
+fn columns(inertia: &Inertia<f64>) -> [Six; 6] {
+    let (m, h, i) = (inertia.mass, &inertia.first, &inertia.second);
+    [
+        [m, 0.0, 0.0, 0.0, h.z, -h.y],
+        [0.0, m, 0.0, -h.z, 0.0, h.x],
+        [0.0, 0.0, m, h.y, -h.x, 0.0],
+        [0.0, -h.z, h.y, i.xx, i.xy, i.xz],
+        [h.z, 0.0, -h.x, i.xy, i.yy, i.yz],
+        [-h.y, h.x, 0.0, i.xz, i.yz, i.zz],
+    ]
+}
+
+/// A = L L^T in place (columns, lower triangle); returns the reciprocals of the diagonal of L.
+#[inline]
+fn cholesky(a: &mut [Six; 6]) -> Six {
+    let mut inverse = [0.0; 6];
     for j in 0..6 {
-        let d = 1.0 / a[(j, j)].sqrt();
+        let d = 1.0 / a[j][j].sqrt();
         inverse[j] = d;
-        for i in j..6 {
-            a[(i, j)] *= d;
+        for x in &mut a[j][j..] {
+            *x *= d;
         }
         for k in j + 1..6 {
             for i in k..6 {
-                a[(i, k)] -= a[(i, j)] * a[(k, j)];
+                a[k][i] -= a[j][i] * a[j][k];
             }
         }
     }

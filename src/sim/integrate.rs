@@ -5,6 +5,7 @@ use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use super::contact::Velocity;
 use super::dynamics::Dynamics;
 use super::model::Model;
+use super::quantities::{split, stack};
 use super::state::{Acceleration, State};
 use crate::robot::{JOINTS, Joints};
 
@@ -14,7 +15,7 @@ pub(super) fn free_velocity(state: &State, acceleration: &Acceleration, h: f64) 
     let linear = acceleration.linear_body + state.angular_velocity_body.cross(&state.velocity_body);
     let joint = |i: usize| state.joint_velocity[i] + h * acceleration.joint[i];
     Velocity {
-        trunk: super::quantities::stack(
+        trunk: stack(
             &(state.velocity_body + linear * h),
             &(state.angular_velocity_body + acceleration.angular_body * h),
         ),
@@ -24,8 +25,7 @@ pub(super) fn free_velocity(state: &State, acceleration: &Acceleration, h: f64) 
 
 /// Semi-implicit Euler: `velocity` (axes of the body at the start) holds from now on and carries the positions through the step.
 pub(super) fn semi_implicit_euler(state: &mut State, velocity: &Velocity, h: f64) {
-    let linear: Vector3<f64> = velocity.trunk.fixed_rows::<3>(0).into();
-    let angular: Vector3<f64> = velocity.trunk.fixed_rows::<3>(3).into();
+    let (linear, angular) = split(&velocity.trunk);
     // p' = p + h R v,  R' = R exp(h w);  the new body axes see the same velocity turned back.
     let turn = UnitQuaternion::from_scaled_axis(angular * h);
     state.position_world += state.orientation_world * (linear * h);

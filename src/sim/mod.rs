@@ -29,6 +29,7 @@ pub use model::{GRAVITY, Model};
 pub use quantities::{DOF, Energy, FootMotion, Momentum};
 pub use state::{Acceleration, State};
 pub use step::CONTROL_PERIOD_S;
+pub use terrain::TerrainBox;
 
 use crate::robot::description::{JointLimits, RobotDescription};
 use crate::robot::{Imu, JOINTS, JointCommand, Placement, Robot, RobotError, RobotState, Truth};
@@ -36,6 +37,7 @@ use actuator::Actuator;
 use collision::Collider;
 use contact::ContactSolver;
 use dynamics::Dynamics;
+use sensors::Sensors;
 use step::Touched;
 use terrain::Terrain;
 
@@ -56,6 +58,9 @@ pub struct Simulator {
     specific_force_body: Vector3<f64>,
     /// Control periods since it was placed.
     ticks: u32,
+    sensors: Sensors,
+    /// What is read until the next control period.
+    reported: RobotState,
 }
 
 impl Simulator {
@@ -72,7 +77,7 @@ impl Simulator {
             model = model.with_rotor_inertia(description.rotor_inertia);
         }
         let collider = Collider::new(description, config);
-        Ok(Simulator {
+        let mut simulator = Simulator {
             solver: ContactSolver::new(config.solver, &config.contact, collider.memories()),
             terrain: Terrain::new(&config.terrain),
             actuator: Actuator::new(motor, &description.limits),
@@ -84,8 +89,12 @@ impl Simulator {
             touched: Touched::default(),
             specific_force_body: Vector3::new(0.0, 0.0, GRAVITY),
             ticks: 0,
+            sensors: Sensors::new(&config.sensors),
+            reported: RobotState::default(),
             config: config.clone(),
-        })
+        };
+        simulator.set_state(&State::default());
+        Ok(simulator)
     }
 
     /// What is constant about the machine.
@@ -105,12 +114,13 @@ impl Simulator {
         self.specific_force_body = state.orientation_world.inverse_transform_vector(&Vector3::new(0.0, 0.0, GRAVITY));
         self.solver.reset();
         self.actuator.reset();
+        self.report();
     }
 
     /// Smallest distance between the machine and the ground, m; negative where it is inside.
     pub fn smallest_gap(&self) -> f64 {
         let dynamics = Dynamics::new(&self.model, &self.state, &[0.0; JOINTS]);
-        self.collider.smallest_gap(&dynamics, &self.state, &self.terrain)
+        self.collider.smallest_gap(&dynamics.legs(), &self.state, &self.terrain)
     }
 
     /// Number of points that touched, or could have, in the last step.
@@ -118,9 +128,8 @@ impl Simulator {
         self.solver.contacts().len()
     }
 
-    /// The steps or blocks on the ground: centre, half edges and direction of the first edge in the horizontal plane, height
-    /// of the top. World, m.
-    pub fn terrain_boxes(&self) -> impl Iterator<Item = ([f64; 2], [f64; 2], [f64; 2], f64)> + '_ {
+    /// The steps or blocks on the ground, where they are now.
+    pub fn terrain_boxes(&self) -> impl Iterator<Item = TerrainBox> + '_ {
         self.terrain.boxes()
     }
 
@@ -128,6 +137,27 @@ impl Simulator {
     fn imu_velocity_world(&self) -> Vector3<f64> {
         let v = self.state.velocity_body + self.state.angular_velocity_body.cross(&self.imu_origin);
         self.state.orientation_world * v
+    }
+
+    /// Has the sensors look.
+    fn report(&mut self) {
+        let state = &self.state;
+        let exact = RobotState {
+            robot_time_ms: self.ticks,
+            joint_position: state.joint_position,
+            joint_velocity: state.joint_velocity,
+            joint_torque: *self.actuator.torque(),
+            imu: Imu {
+                orientation_world: state.orientation_world,
+                gyro_body: state.angular_velocity_body,
+                accel_body: self.specific_force_body,
+            },
+            foot_force: self.touched.foot_normal_impulse.map(|impulse| impulse / CONTROL_PERIOD_S),
+            motor_enabled: [true; JOINTS],
+            truth: Some(self.truth()),
+            ..RobotState::default()
+        };
+        self.reported = self.sensors.measure(&exact);
     }
 
     fn truth(&self) -> Truth {
@@ -146,22 +176,7 @@ impl Simulator {
 
 impl Robot for Simulator {
     fn read(&mut self) -> Result<RobotState, RobotError> {
-        let state = &self.state;
-        Ok(RobotState {
-            robot_time_ms: self.ticks,
-            joint_position: state.joint_position,
-            joint_velocity: state.joint_velocity,
-            joint_torque: *self.actuator.torque(),
-            imu: Imu {
-                orientation_world: state.orientation_world,
-                gyro_body: state.angular_velocity_body,
-                accel_body: self.specific_force_body,
-            },
-            foot_force: self.touched.foot_normal_impulse.map(|impulse| impulse / CONTROL_PERIOD_S),
-            motor_enabled: [true; JOINTS],
-            truth: Some(self.truth()),
-            ..RobotState::default()
-        })
+        Ok(self.reported)
     }
 
     fn write(&mut self, command: &JointCommand) -> Result<(), RobotError> {
@@ -170,6 +185,7 @@ impl Robot for Simulator {
         let acceleration = (self.imu_velocity_world() - before) / CONTROL_PERIOD_S;
         let specific_force = acceleration + Vector3::new(0.0, 0.0, GRAVITY);
         self.specific_force_body = self.state.orientation_world.inverse_transform_vector(&specific_force);
+        self.report();
         Ok(())
     }
 
@@ -188,6 +204,8 @@ impl Robot for Simulator {
             }
             state.position_world.z -= gap;
         }
+        self.sensors.reset(placement.seed);
+        self.report();
         true
     }
 }

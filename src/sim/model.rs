@@ -2,29 +2,33 @@
 
 use nalgebra::Vector3;
 
-use super::spatial::Inertia;
+use super::spatial::{Inertia, Symmetric};
 use crate::robot::description::{Body, RobotDescription};
-use crate::robot::{JOINTS, Joints, LEGS, PerLeg};
+use crate::robot::{JOINTS, Joints, PerLeg};
 
 /// Acceleration of free fall, m/s^2, straight down.
 pub const GRAVITY: f64 = 9.81;
 
-/// One leg's constants.
+/// A number for each leg, in lanes.
+pub(super) type Lanes = simba::simd::WideF64x4;
+
+/// The legs' constants.
 #[derive(Debug, Clone)]
-pub(super) struct LegModel {
+pub(super) struct LegsModel {
     /// Origin of each joint in its parent's frame, m.
-    pub joint_origin: [Vector3<f64>; 3],
+    pub joint_origin: [Vector3<Lanes>; 3],
     /// Inertia of hip, thigh and calf about their joint's origin, link axes.
-    pub inertia: [Inertia; 3],
-    /// Centre of the foot in the calf's frame, m.
-    pub foot_origin: Vector3<f64>,
+    pub inertia: [Inertia<Lanes>; 3],
 }
 
 /// The machine as the equations see it. Built once; nothing here changes.
 #[derive(Debug, Clone)]
 pub struct Model {
-    pub(super) trunk: Inertia,
-    pub(super) legs: PerLeg<LegModel>,
+    pub(super) trunk: Inertia<f64>,
+    pub(super) legs: LegsModel,
+    /// Centre of each foot in its calf's frame, m.
+    pub(super) foot_origin: PerLeg<Vector3<f64>>,
+    mass: f64,
     /// Inertia that the motors' rotors add at each joint, kg m^2; zero for ideal motors.
     pub(super) rotor_inertia: Joints,
 }
@@ -33,16 +37,17 @@ impl Model {
     /// The rigid bodies of `description`, without rotor inertia.
     pub fn new(description: &RobotDescription) -> Model {
         let inertia = |body: &Body| Inertia::new(body.mass, &body.com, &body.inertia_com);
+        let legs = &description.legs;
+        let trunk = inertia(&description.trunk);
+        let links = legs.iter().flat_map(|leg| &leg.bodies);
         Model {
-            trunk: inertia(&description.trunk),
-            legs: std::array::from_fn::<_, LEGS, _>(|i| {
-                let leg = &description.legs[i];
-                LegModel {
-                    joint_origin: leg.joint_origin,
-                    inertia: [inertia(&leg.bodies[0]), inertia(&leg.bodies[1]), inertia(&leg.bodies[2])],
-                    foot_origin: leg.foot_origin,
-                }
-            }),
+            mass: trunk.mass + links.map(|body| body.mass).sum::<f64>(),
+            trunk,
+            legs: LegsModel {
+                joint_origin: [0, 1, 2].map(|i| vector_lanes(&legs.each_ref().map(|leg| leg.joint_origin[i]))),
+                inertia: [0, 1, 2].map(|i| inertia_lanes(&legs.each_ref().map(|leg| inertia(&leg.bodies[i])))),
+            },
+            foot_origin: legs.each_ref().map(|leg| leg.foot_origin),
             rotor_inertia: [0.0; JOINTS],
         }
     }
@@ -55,6 +60,27 @@ impl Model {
 
     /// Mass of the whole machine, kg.
     pub fn mass(&self) -> f64 {
-        self.trunk.mass + self.legs.iter().flat_map(|leg| &leg.inertia).map(|body| body.mass).sum::<f64>()
+        self.mass
+    }
+}
+
+/// One vector per leg as a vector of lanes.
+pub(super) fn vector_lanes(v: &PerLeg<Vector3<f64>>) -> Vector3<Lanes> {
+    Vector3::new(Lanes::from(v.map(|v| v.x)), Lanes::from(v.map(|v| v.y)), Lanes::from(v.map(|v| v.z)))
+}
+
+fn inertia_lanes(i: &PerLeg<Inertia<f64>>) -> Inertia<Lanes> {
+    let lanes = |f: fn(&Symmetric<f64>) -> f64| Lanes::from(i.each_ref().map(|i| f(&i.second)));
+    Inertia {
+        mass: Lanes::from(i.map(|i| i.mass)),
+        first: vector_lanes(&i.map(|i| i.first)),
+        second: Symmetric {
+            xx: lanes(|s| s.xx),
+            xy: lanes(|s| s.xy),
+            xz: lanes(|s| s.xz),
+            yy: lanes(|s| s.yy),
+            yz: lanes(|s| s.yz),
+            zz: lanes(|s| s.zz),
+        },
     }
 }

@@ -3,9 +3,9 @@
 //!
 //! Velocity vectors of 18 are ordered: linear velocity of the trunk's origin (body axes), angular velocity (body axes), joints.
 
-use nalgebra::{Matrix3, SMatrix, SVector, Vector3, Vector6};
+use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
-use super::dynamics::Dynamics;
+use super::dynamics::{Dynamics, Six, add_scaled};
 use super::model::{GRAVITY, Model};
 use super::spatial::Motion;
 use super::state::{Acceleration, State};
@@ -75,11 +75,12 @@ impl Model {
         let i = &composite.second;
         let inertia = Matrix3::new(i.xx, i.xy, i.xz, i.xy, i.yy, i.yz, i.xz, i.yz, i.zz);
         matrix.fixed_view_mut::<3, 3>(3, 3).copy_from(&inertia);
-        for (l, leg) in dynamics.legs.iter().enumerate() {
+        for l in 0..LEGS {
             let j = 6 + 3 * l;
-            matrix.fixed_view_mut::<6, 3>(0, j).copy_from(&leg.coupling);
-            matrix.fixed_view_mut::<3, 6>(j, 0).copy_from(&leg.coupling.transpose());
-            matrix.fixed_view_mut::<3, 3>(j, j).copy_from(&leg.mass);
+            let coupling = SMatrix::<f64, 6, 3>::from(dynamics.coupling(l));
+            matrix.fixed_view_mut::<6, 3>(0, j).copy_from(&coupling);
+            matrix.fixed_view_mut::<3, 6>(j, 0).copy_from(&coupling.transpose());
+            matrix.fixed_view_mut::<3, 3>(j, j).copy_from(&dynamics.leg_mass(l));
         }
         for (i, rotor) in self.rotor_inertia.iter().enumerate() {
             matrix[(6 + i, 6 + i)] += rotor;
@@ -91,10 +92,8 @@ impl Model {
     pub fn bias(&self, state: &State) -> SVector<f64, DOF> {
         let dynamics = self.dynamics(state);
         let mut bias = SVector::<f64, DOF>::zeros();
-        bias.fixed_rows_mut::<6>(0).copy_from(&dynamics.bias);
-        for (l, leg) in dynamics.legs.iter().enumerate() {
-            bias.fixed_rows_mut::<3>(6 + 3 * l).copy_from(&leg.bias);
-        }
+        bias.fixed_rows_mut::<6>(0).copy_from_slice(&dynamics.bias);
+        bias.fixed_rows_mut::<JOINTS>(6).copy_from_slice(&dynamics.joint_bias());
         bias
     }
 
@@ -105,11 +104,11 @@ impl Model {
         let velocity = Motion { linear: state.velocity_body, angular: state.angular_velocity_body };
         let trunk = dynamics.composite.times(&velocity);
         let mut momentum = stack(&trunk.linear, &trunk.angular);
-        for (l, leg) in dynamics.legs.iter().enumerate() {
-            momentum += leg.coupling * leg_of(&state.joint_velocity, l);
+        let columns = (0..LEGS).flat_map(|leg| dynamics.coupling(leg));
+        for (column, speed) in columns.zip(&state.joint_velocity) {
+            add_scaled(&mut momentum, &column, *speed);
         }
-        let linear: Vector3<f64> = momentum.fixed_rows::<3>(0).into();
-        let angular: Vector3<f64> = momentum.fixed_rows::<3>(3).into();
+        let (linear, angular) = split(&momentum);
         let mass = dynamics.composite.mass;
         let com_body = dynamics.composite.first / mass;
         let to_world = &state.orientation_world;
@@ -137,10 +136,12 @@ impl Model {
     /// The centres of the feet.
     pub fn feet(&self, state: &State) -> PerLeg<FootMotion> {
         let dynamics = self.dynamics(state);
+        let legs = dynamics.legs();
         let to_world = state.orientation_world.to_rotation_matrix().into_inner();
         std::array::from_fn::<_, LEGS, _>(|l| {
-            let foot_body = dynamics.legs[l].in_body(2, &self.legs[l].foot_origin);
-            let joints = dynamics.legs[l].point_jacobian(2, &foot_body);
+            let leg = &legs[l];
+            let foot_body = leg.in_body(2, &self.foot_origin[l]);
+            let joints = leg.point_jacobian(2, &foot_body);
             // Velocity of a point p of the trunk: v + w x p.
             let mut jacobian_world = SMatrix::<f64, 3, DOF>::zeros();
             jacobian_world.fixed_view_mut::<3, 3>(0, 0).copy_from(&to_world);
@@ -158,7 +159,14 @@ impl Model {
     }
 }
 
-/// Linear and angular part in one vector.
-pub(super) fn stack(linear: &Vector3<f64>, angular: &Vector3<f64>) -> Vector6<f64> {
-    Vector6::new(linear.x, linear.y, linear.z, angular.x, angular.y, angular.z)
+/// Linear and angular part as one row.
+#[inline]
+pub(super) fn stack(linear: &Vector3<f64>, angular: &Vector3<f64>) -> Six {
+    [linear.x, linear.y, linear.z, angular.x, angular.y, angular.z]
+}
+
+/// Its linear and its angular part.
+#[inline]
+pub(super) fn split(six: &Six) -> (Vector3<f64>, Vector3<f64>) {
+    (Vector3::new(six[0], six[1], six[2]), Vector3::new(six[3], six[4], six[5]))
 }

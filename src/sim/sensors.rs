@@ -1,1 +1,107 @@
-//! What the machine reports of its state.
+//! What the machine reports of its state: noise and bias of the inertial unit, encoder steps, coarse foot forces, delay. Drawn
+//! once per control period from the trial's seed, so reading twice reads the same.
+
+use nalgebra::{UnitQuaternion, Vector3};
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
+
+use super::config::SensorConfig;
+use crate::robot::RobotState;
+
+/// Longest delay, ms.
+pub(super) const MAX_DELAY: usize = 20;
+/// Time constant of the orientation's wandering error, ms. Ours: the order of an attitude filter's.
+const ORIENTATION_DRIFT_MS: f64 = 1000.0;
+
+/// The sensors and their errors.
+#[derive(Debug, Clone)]
+pub(super) struct Sensors {
+    config: SensorConfig,
+    random: ChaCha8Rng,
+    gyro_bias: Vector3<f64>,
+    accel_bias: Vector3<f64>,
+    /// Error of the orientation as a rotation vector, body axes, rad.
+    tilt: Vector3<f64>,
+    /// The last states measured, by time modulo their number.
+    past: [RobotState; MAX_DELAY + 1],
+    measured: usize,
+}
+
+impl Sensors {
+    pub fn new(config: &SensorConfig) -> Sensors {
+        Sensors {
+            config: *config,
+            random: ChaCha8Rng::seed_from_u64(0),
+            gyro_bias: Vector3::zeros(),
+            accel_bias: Vector3::zeros(),
+            tilt: Vector3::zeros(),
+            past: [RobotState::default(); MAX_DELAY + 1],
+            measured: 0,
+        }
+    }
+
+    /// Starts a trial: biases are drawn anew, and the past is forgotten.
+    pub fn reset(&mut self, seed: u64) {
+        // Another stream than the terrain's, which has the same seed.
+        self.random = ChaCha8Rng::seed_from_u64(seed);
+        self.random.set_stream(1);
+        self.measured = 0;
+        let config = self.config;
+        self.gyro_bias = self.normal(config.gyro_bias_rad_s);
+        self.accel_bias = self.normal(config.accel_bias_m_s2);
+        self.tilt = self.normal(config.orientation_noise_rad);
+    }
+
+    /// What is reported when the machine's state is `exact`; called once per control period. What the simulator alone knows
+    /// (`truth`) stays exact and new.
+    pub fn measure(&mut self, exact: &RobotState) -> RobotState {
+        if !self.config.enabled {
+            return *exact;
+        }
+        let now = self.distort(exact);
+        let slots = self.past.len();
+        self.past[self.measured % slots] = now;
+        let age = (self.config.delay_ms as usize).min(self.measured);
+        let old = self.past[(self.measured - age) % slots];
+        self.measured += 1;
+        RobotState { truth: exact.truth, ..old }
+    }
+
+    fn distort(&mut self, exact: &RobotState) -> RobotState {
+        let config = self.config;
+        let mut state = *exact;
+        state.imu.gyro_body += self.gyro_bias + self.normal(config.gyro_noise_rad_s);
+        state.imu.accel_body += self.accel_bias + self.normal(config.accel_noise_m_s2);
+        // Ornstein-Uhlenbeck: e' = e (1 - dt/T) + sigma sqrt(2 dt/T) n keeps the standard deviation sigma.
+        let share = 1.0 / ORIENTATION_DRIFT_MS;
+        self.tilt = self.tilt * (1.0 - share) + self.normal(config.orientation_noise_rad * (2.0 * share).sqrt());
+        state.imu.orientation_world *= UnitQuaternion::from_scaled_axis(self.tilt);
+        for q in &mut state.joint_position {
+            *q = rounded(*q, config.encoder_step_rad);
+        }
+        for dq in &mut state.joint_velocity {
+            *dq += self.sample(config.joint_velocity_noise_rad_s);
+        }
+        for force in &mut state.foot_force {
+            let noisy = *force + self.sample(config.foot_force_noise_n);
+            *force = rounded(noisy.max(0.0), config.foot_force_step_n);
+        }
+        state
+    }
+
+    fn sample(&mut self, deviation: f64) -> f64 {
+        let n: f64 = StandardNormal.sample(&mut self.random);
+        deviation * n
+    }
+
+    fn normal(&mut self, deviation: f64) -> Vector3<f64> {
+        let mut sample = || self.sample(deviation);
+        Vector3::new(sample(), sample(), sample())
+    }
+}
+
+/// `x` in whole steps; as it is where there are none.
+fn rounded(x: f64, step: f64) -> f64 {
+    if step > 0.0 { (x / step).round() * step } else { x }
+}

@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::Simulator;
 use super::collision::{Collider, Moment};
 use super::contact::{Velocity, add_joints};
-use super::dynamics::Dynamics;
+use super::dynamics::{Dynamics, add_scaled};
 use super::integrate::{free_velocity, runge_kutta_4, semi_implicit_euler};
 use crate::robot::{JOINTS, JointCommand, PerLeg};
 
@@ -82,7 +82,7 @@ impl Simulator {
         if !self.solver.is_empty() {
             let world_from_body = self.world_from_body();
             let change = self.solver.solve(&dynamics, &world_from_body);
-            velocity.trunk += change.trunk;
+            add_scaled(&mut velocity.trunk, &change.trunk, 1.0);
             for (leg, change) in velocity.legs.iter_mut().zip(&change.legs) {
                 *leg += change;
             }
@@ -99,10 +99,11 @@ impl Simulator {
         self.solver.start(h);
         let world_from_body = self.world_from_body();
         let (state, terrain, world_from_body) = (&self.state, &self.terrain, &world_from_body);
-        let moment = Moment { dynamics, state, terrain, world_from_body, free, h };
+        let legs = &dynamics.legs();
+        let moment = Moment { dynamics, legs, state, terrain, world_from_body, free, h };
         self.collider.find(&moment, &mut self.solver);
         let limits = (&self.limits.min_position, &self.limits.max_position);
-        add_joints(&mut self.solver, dynamics, free, &self.state.joint_position, limits, dry_friction, h);
+        add_joints(&mut self.solver, &moment, limits, dry_friction);
     }
 
     /// Sums up what was pressed, and pushes loose blocks.
@@ -115,7 +116,7 @@ impl Simulator {
                 continue;
             }
             let impulse_world = world_from_body * contact.impulse_body();
-            match Collider::foot_of(&contact.point) {
+            match Collider::foot_of(contact.memory) {
                 Some(leg) => {
                     self.touched.foot[leg as usize] = true;
                     self.touched.foot_impulse_world[leg as usize] += impulse_world;
@@ -123,7 +124,7 @@ impl Simulator {
                 }
                 None => self.touched.body = true,
             }
-            if let Some(block) = contact.point.block {
+            if let Some(block) = contact.block {
                 self.terrain.push_block(block, &-impulse_world, h);
                 pushed |= 1 << (block % 64);
             }

@@ -23,6 +23,19 @@ pub(super) struct Touch {
     pub block: Option<usize>,
 }
 
+/// A step or block on the ground: an upright box.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TerrainBox {
+    /// Its centre in the world's horizontal plane, m.
+    pub center: [f64; 2],
+    /// Half of its two edges, m.
+    pub half_edges: [f64; 2],
+    /// Direction of the first edge.
+    pub axis: [f64; 2],
+    /// Height of its top, m.
+    pub top: f64,
+}
+
 /// An upright box on the ground.
 #[derive(Debug, Clone, Copy)]
 struct Block {
@@ -85,18 +98,22 @@ impl Terrain {
     }
 
     fn lay_blocks(&mut self, seed: u64) {
-        let BlocksConfig { count, thickness_m, edge_m, reach_m, .. } = self.config.blocks;
+        let BlocksConfig { count, layers, thickness_m, edge_m, reach_m, .. } = self.config.blocks;
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let mut uniform = |low: f64, high: f64| low + (high - low) * unit_interval(&mut random);
-        for _ in 0..count {
+        let mut tries = 0;
+        while self.blocks.len() < count as usize && tries < 50 * count {
+            tries += 1;
             let center = Vector2::new(uniform(-reach_m, reach_m), uniform(-reach_m, reach_m));
             let half = Vector2::new(uniform(edge_m[0], edge_m[1]), uniform(edge_m[0], edge_m[1])) / 2.0;
             let (sin, cos) = uniform(0.0, std::f64::consts::PI).sin_cos();
             let mut block = Block { center, half, axis: Vector2::new(cos, sin), top: 0.0, velocity: Vector2::zeros() };
-            // It lies on the highest of those below it.
+            // It lies on the highest of those below it; where that is too high, it is laid elsewhere.
             let under = self.blocks.iter().filter(|other| block.overlaps(other)).fold(0.0_f64, |z, b| z.max(b.top));
             block.top = under + thickness_m;
-            self.blocks.push(block);
+            if block.top < (f64::from(layers) + 0.5) * thickness_m {
+                self.blocks.push(block);
+            }
         }
     }
 
@@ -149,9 +166,14 @@ impl Terrain {
         Vector3::new(v.x, v.y, 0.0)
     }
 
-    /// Where every block lies: centre, half edges, direction of the first edge, height of its top. World, m.
-    pub fn boxes(&self) -> impl Iterator<Item = ([f64; 2], [f64; 2], [f64; 2], f64)> + '_ {
-        self.blocks.iter().map(|b| (b.center.into(), b.half.into(), b.axis.into(), b.top))
+    /// The steps or blocks.
+    pub fn boxes(&self) -> impl Iterator<Item = TerrainBox> + '_ {
+        self.blocks.iter().map(|b| TerrainBox {
+            center: b.center.into(),
+            half_edges: b.half.into(),
+            axis: b.axis.into(),
+            top: b.top,
+        })
     }
 
     /// A foot's impulse on loose block `block` (world, N s) in a step of `h` seconds: what of it friction on the floor does not

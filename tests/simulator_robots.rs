@@ -1,0 +1,149 @@
+//! Robots from files: the two that come with the program, a user's own, and what is refused.
+
+use std::path::{Path, PathBuf};
+
+use nalgebra::Vector3;
+use quadfrog::robot::description::{DescriptionError, RobotDescription};
+use quadfrog::robot::{JointCommand, Leg, MotorCommand, Placement, Robot};
+use quadfrog::sim::{GRAVITY, SimConfig, Simulator};
+
+const GO1: &str = include_str!("../robots/go1/go1.urdf");
+const GO1_TOML: &str = include_str!("../robots/go1/robot.toml");
+
+/// A folder of its own with a robot's two files, removed at the end.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(name: &str, urdf: &str, toml: &str) -> Folder {
+        let path = std::env::temp_dir().join(format!("quadfrog-{name}-{}", std::process::id()));
+        std::fs::create_dir_all(&path).unwrap();
+        std::fs::write(path.join("go1.urdf"), urdf).unwrap();
+        std::fs::write(path.join("robot.toml"), toml).unwrap();
+        Folder(path)
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+fn refusal(name: &str, from: &str, to: &str) -> String {
+    assert!(GO1.contains(from), "{from}");
+    let folder = Folder::new(name, &GO1.replacen(from, to, 1), GO1_TOML);
+    RobotDescription::from_folder(&folder.0).unwrap_err().to_string()
+}
+
+#[test]
+fn the_go1_is_what_its_maker_says() {
+    let robot = RobotDescription::embedded("go1").unwrap();
+    let mass = robot.trunk.mass + robot.legs.iter().flat_map(|leg| &leg.bodies).map(|body| body.mass).sum::<f64>();
+    assert!((mass - 13.100528).abs() < 1e-9, "{mass} kg");
+    assert_eq!(robot.leg_geometry.abduction, 0.08);
+    assert_eq!(robot.leg_geometry.thigh, 0.213);
+    assert_eq!(robot.leg_geometry.calf, 0.213);
+    assert_eq!(robot.limits.max_torque[2], 35.55);
+    assert_eq!(robot.imu_origin, Vector3::new(-0.01592, -0.06659, -0.00617));
+    for leg in Leg::ALL {
+        let part = &robot.legs[leg as usize];
+        assert_eq!(part.bodies[1].name, format!("{}_thigh", leg.name()));
+        assert_eq!(part.foot_radius, 0.02);
+        assert!(part.bodies.iter().all(|body| body.collision.len() == 1), "the foot's sphere is kept apart");
+    }
+    assert!((robot.rotor_inertia[0] - 0.0044814).abs() < 1e-6);
+}
+
+#[test]
+fn a_folder_gives_the_same_as_the_embedded_copy() {
+    for name in RobotDescription::embedded_names() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots").join(name);
+        assert_eq!(RobotDescription::from_folder(&folder).unwrap(), RobotDescription::embedded(name).unwrap());
+    }
+}
+
+/// Every robot lies, stands on its weight, and jumps off the ground.
+#[test]
+fn every_robot_lies_stands_and_jumps() {
+    for name in RobotDescription::embedded_names() {
+        let robot = RobotDescription::embedded(name).unwrap();
+        let mut simulator = Simulator::new(&robot, &SimConfig::default()).unwrap();
+        simulator.place(&Placement { joint_position: robot.lying_position, lying: true, seed: 0 });
+        for _ in 0..1000 {
+            simulator.write(&JointCommand::damping(3.0)).unwrap();
+        }
+        let truth = simulator.read().unwrap().truth.unwrap();
+        assert!(truth.body_contact && truth.velocity_world.norm() < 0.02, "{name} does not lie still");
+
+        let mut joint_position = [0.0; 12];
+        for leg in Leg::ALL {
+            let foot = Vector3::new(0.0, leg.side() * 0.14, -0.25);
+            let q = robot.leg_geometry.inverse(&foot, leg.side()).unwrap();
+            joint_position[3 * leg as usize..][..3].copy_from_slice(q.as_slice());
+        }
+        simulator.place(&Placement { joint_position, lying: false, seed: 0 });
+        let mut command = JointCommand::default();
+        for (motor, position) in command.motor.iter_mut().zip(joint_position) {
+            *motor = MotorCommand { position, kp: 100.0, kd: 3.0, ..MotorCommand::default() };
+        }
+        for _ in 0..2000 {
+            simulator.write(&command).unwrap();
+        }
+        let truth = simulator.read().unwrap().truth.unwrap();
+        let force: f64 = truth.foot_force_world.iter().map(|f| f.z).sum();
+        assert!((force / (simulator.model().mass() * GRAVITY) - 1.0).abs() < 1e-3, "{name} stands on {force} N");
+        assert!(!truth.body_contact && truth.foot_contact == [true; 4]);
+
+        // Straight down with the feet: tau = J^T f.
+        let (start, mut highest) = (truth.position_world.z, 0.0_f64);
+        for tick in 0..600 {
+            let mut push = command;
+            let q = simulator.state().joint_position;
+            for leg in Leg::ALL {
+                let i = 3 * leg as usize;
+                let foot = robot.leg_geometry.foot(&Vector3::new(q[i], q[i + 1], q[i + 2]), leg.side());
+                let torque = foot.jacobian_leg.tr_mul(&Vector3::new(0.0, 0.0, -150.0));
+                for (motor, torque) in push.motor[i..i + 3].iter_mut().zip(torque.iter()) {
+                    *motor = MotorCommand { torque: *torque, kd: 0.5, ..MotorCommand::default() };
+                }
+            }
+            simulator.write(if tick < 100 { &push } else { &command }).unwrap();
+            highest = highest.max(simulator.state().position_world.z - start);
+        }
+        println!("{name}: {:.2} kg, jumps {highest:.3} m", simulator.model().mass());
+        assert!(highest > 0.2, "{name} rises only {highest} m");
+    }
+}
+
+#[test]
+fn impossible_robots_are_refused_by_name() {
+    let message = refusal("mass", "<mass value=\"5.561079999999999\"/>", "<mass value=\"0\"/>");
+    assert!(message.contains("go1.urdf") && message.contains("trunk") && message.contains("mass 0 kg"), "{message}");
+    let message =
+        refusal("foot", "<geometry><sphere radius=\"0.02\"/></geometry>", "<geometry><box size=\"1 1 1\"/></geometry>");
+    assert!(message.contains("FR_calf") && message.contains("no foot"), "{message}");
+    let message = refusal("axis", "<axis xyz=\"0 1 0\"/>", "<axis xyz=\"0 0 1\"/>");
+    assert!(message.contains("FR_thigh_joint") && message.contains("axis (0, 0, 1)"), "{message}");
+    let message = refusal("limits", "lower=\"-0.863\"", "lower=\"0.9\"");
+    assert!(message.contains("FR_hip_joint") && message.contains("0.9"), "{message}");
+    let message = refusal(
+        "legs",
+        "<joint name=\"FR_hip_joint\" type=\"revolute\">",
+        "<joint name=\"FR_hip_joint\" type=\"fixed\">",
+    );
+    assert!(message.contains("FR_thigh_joint") && message.contains("where a hip is"), "{message}");
+    let message =
+        refusal("lengths", "<origin xyz=\"0 0 -0.213\" rpy=\"0 0 0\"/>", "<origin xyz=\"0 0 -0.2\" rpy=\"0 0 0\"/>");
+    assert!(message.contains("calf joint") && message.contains("alike"), "{message}");
+    let message = refusal("xml", "</robot>", "");
+    assert!(message.contains("go1.urdf"), "{message}");
+
+    let error = RobotDescription::embedded("spot").unwrap_err();
+    assert!(matches!(error, DescriptionError::Unknown { .. }) && error.to_string().contains("go1"));
+    let missing = RobotDescription::from_folder(Path::new("/nowhere")).unwrap_err();
+    assert!(matches!(missing, DescriptionError::Read { .. }));
+    let folder = Folder::new("toml", GO1, &GO1_TOML.replace("gear_ratio", "gear_ration"));
+    assert!(RobotDescription::from_folder(&folder.0).unwrap_err().to_string().contains("gear_ration"));
+    let folder = Folder::new("pose", GO1, &GO1_TOML.replace("-2.75", "-3.0"));
+    assert!(RobotDescription::from_folder(&folder.0).unwrap_err().to_string().contains("-3 rad"));
+}

@@ -1,0 +1,140 @@
+//! Steps and rough ground: feet find them, blocks are the same for the same seed, loose ones move when kicked.
+
+use nalgebra::Vector3;
+use quadfrog::robot::description::RobotDescription;
+use quadfrog::robot::{JointCommand, Joints, Leg, MotorCommand, Placement, Robot};
+use quadfrog::sim::{SimConfig, Simulator, TerrainKind};
+
+fn config(kind: TerrainKind) -> SimConfig {
+    let mut config = SimConfig::default();
+    config.terrain.kind = kind;
+    config
+}
+
+fn stance(robot: &RobotDescription) -> Joints {
+    let mut joints = Joints::default();
+    for leg in Leg::ALL {
+        let foot = Vector3::new(0.0, leg.side() * 0.12, -0.26);
+        let q = robot.leg_geometry.inverse(&foot, leg.side()).unwrap();
+        joints[3 * leg as usize..][..3].copy_from_slice(q.as_slice());
+    }
+    joints
+}
+
+fn stand(config: &SimConfig, seed: u64) -> (Simulator, JointCommand) {
+    let robot = RobotDescription::embedded("go1").unwrap();
+    let joint_position = stance(&robot);
+    let mut simulator = Simulator::new(&robot, config).unwrap();
+    simulator.place(&Placement { joint_position, lying: false, seed });
+    let mut command = JointCommand::default();
+    for (motor, position) in command.motor.iter_mut().zip(joint_position) {
+        *motor = MotorCommand { position, kp: 100.0, kd: 3.0, ..MotorCommand::default() };
+    }
+    (simulator, command)
+}
+
+#[test]
+fn on_steps_the_front_feet_stand_higher() {
+    let mut config = config(TerrainKind::Steps);
+    config.terrain.steps.start_m = 0.0;
+    config.terrain.steps.rise_m = 0.05;
+    config.terrain.steps.run_m = 2.0;
+    let (mut simulator, command) = stand(&config, 0);
+    for _ in 0..2000 {
+        simulator.write(&command).unwrap();
+    }
+    let feet = simulator.model().feet(simulator.state());
+    let bottom = |leg: Leg| feet[leg as usize].position_world.z - 0.02;
+    for (leg, height) in [(Leg::FR, 0.05), (Leg::FL, 0.05), (Leg::RR, 0.0), (Leg::RL, 0.0)] {
+        assert!((bottom(leg) - height).abs() < 1e-4, "{} at {} m", leg.name(), bottom(leg));
+    }
+    assert_eq!(simulator.read().unwrap().truth.unwrap().foot_contact, [true; 4]);
+}
+
+/// Pushed against a riser, a foot stops there.
+#[test]
+fn a_riser_is_a_wall() {
+    let mut config = config(TerrainKind::Steps);
+    // The riser 5 mm ahead of the front feet, too high to step on.
+    config.terrain.steps.start_m = 0.1881 + 0.02 + 0.005;
+    config.terrain.steps.rise_m = 0.15;
+    config.terrain.friction = 0.1;
+    let (mut simulator, mut command) = stand(&config, 0);
+    // The thighs swing the front feet forward against the riser.
+    for leg in [Leg::FR, Leg::FL] {
+        command.motor[3 * leg as usize + 1].position -= 0.15;
+    }
+    for _ in 0..1500 {
+        simulator.write(&command).unwrap();
+        for foot in &simulator.model().feet(simulator.state())[..2] {
+            let front = foot.position_world.x + 0.02;
+            assert!(front < config.terrain.steps.start_m + 5e-4, "the foot is {front} m ahead, inside the step");
+        }
+    }
+}
+
+#[test]
+fn blocks_are_those_of_the_seed() {
+    let blocks = |seed| stand(&config(TerrainKind::Blocks), seed).0.terrain_boxes().collect::<Vec<_>>();
+    let first = blocks(1);
+    let expected = SimConfig::default().terrain.blocks;
+    assert_eq!(first.len(), expected.count as usize);
+    assert_eq!(first, blocks(1));
+    assert_ne!(first, blocks(2));
+    // Overlapping ones lie on each other: some are higher than one block, all by whole blocks.
+    let thickness = expected.thickness_m;
+    assert!(first.iter().all(|b| b.top < (f64::from(expected.layers) + 0.5) * thickness));
+    assert!(first.iter().any(|b| b.top > 1.5 * thickness));
+    assert!(first.iter().all(|b| (b.top / thickness - (b.top / thickness).round()).abs() < 1e-9));
+}
+
+#[test]
+fn a_robot_stands_on_blocks() {
+    // Now and then a calf leans on a block's edge with its foot in the air beside it.
+    let mut on_feet = 0;
+    for seed in 0..20 {
+        let (mut simulator, command) = stand(&config(TerrainKind::Blocks), seed);
+        assert!(simulator.smallest_gap().abs() < 1e-6, "seed {seed}: placed {} m off", simulator.smallest_gap());
+        for _ in 0..4000 {
+            simulator.write(&command).unwrap();
+        }
+        let state = simulator.read().unwrap();
+        let truth = state.truth.unwrap();
+        assert!(truth.velocity_world.norm() < 0.05, "seed {seed}: moves at {}", truth.velocity_world.norm());
+        let standing = truth.foot_contact.iter().filter(|&&contact| contact).count();
+        let (roll, pitch, _) = truth.orientation_world.euler_angles();
+        assert!(roll.abs() < 0.4 && pitch.abs() < 0.4, "seed {seed}: tilted by {roll} and {pitch} rad");
+        on_feet += usize::from(standing >= 3);
+        assert!(simulator.smallest_gap() > -1e-3, "seed {seed}: {} m deep", -simulator.smallest_gap());
+    }
+    assert!(on_feet >= 15, "only {on_feet} of 20 stood on three feet or more");
+}
+
+/// A foot dragged over a loose block takes it along; a fixed block stays.
+#[test]
+fn loose_blocks_move_when_kicked() {
+    let moved = |loose: bool| {
+        let mut config = config(TerrainKind::Blocks);
+        config.terrain.blocks.loose = loose;
+        config.terrain.blocks.count = 80;
+        config.terrain.blocks.reach_m = 0.5;
+        let (mut simulator, command) = stand(&config, 4);
+        let before: Vec<_> = simulator.terrain_boxes().collect();
+        for tick in 0..2000_u32 {
+            let mut kick = command;
+            let swing = 0.4 * (f64::from(tick) * 0.02).sin();
+            for leg in 0..4 {
+                kick.motor[3 * leg + 1].position += swing;
+            }
+            simulator.write(&kick).unwrap();
+        }
+        assert!(simulator.state().is_finite());
+        let moved = simulator
+            .terrain_boxes()
+            .zip(before)
+            .map(|(now, then)| (now.center[0] - then.center[0]).hypot(now.center[1] - then.center[1]));
+        moved.fold(0.0, f64::max)
+    };
+    assert_eq!(moved(false), 0.0);
+    assert!(moved(true) > 0.01, "moved {} m", moved(true));
+}
