@@ -24,8 +24,8 @@ use crate::recording::RecordingError;
 use crate::recording::record::{Record, SessionInfo, Stamped};
 use crate::recording::recorder::Recorder;
 use crate::recording::writer::Writer;
-use crate::robot::Robot;
 use crate::robot::description::RobotDescription;
+use crate::robot::{Placement, Robot};
 use crate::session::intent::Intent;
 use crate::session::life::{Life, Plan};
 use crate::session::supervisor::{Outlets, Supervisor};
@@ -193,13 +193,15 @@ impl Engine {
     /// When the configuration, the study, the recording or the system does not allow it; nothing runs then.
     pub fn start(options: Options) -> Result<Handle, EngineError> {
         let settings = options.config.settings(&options.robot, options.task, options.backend)?;
-        let robot: Box<dyn Robot> = match options.backend {
+        let mut robot: Box<dyn Robot> = match options.backend {
             Backend::Simulator => Box::new(Simulator::new(&options.robot, &options.config.simulator)?),
             Backend::Hardware => {
                 let reason = "this version drives the simulator only";
                 return Err(options.config.refuse("control.toml", "robot", "go1", reason).into());
             }
         };
+        // A simulated robot begins as a real one does: lying folded on its belly.
+        robot.place(&Placement { joint_position: settings.lying_position, lying: true, seed: u64::from(options.seed) });
         let recording = prepare_folder(&options)?;
         let recording_name =
             recording.as_ref().and_then(|path| path.file_name()).map(|name| name.to_string_lossy().into_owned());
@@ -224,9 +226,9 @@ impl Engine {
             move |source| EngineError::System { what: format!("the {what} thread could not be started"), source }
         };
         let thread = std::thread::Builder::new().name("control".into());
-        let (flag, mut cycle_robot) = (closing.clone(), robot);
+        let flag = closing.clone();
         let control = thread
-            .spawn(move || control_thread::run(&settings, control_end, &clock, &flag, &mut *cycle_robot))
+            .spawn(move || control_thread::run(&settings, control_end, &clock, &flag, &mut *robot))
             .map_err(system("control"))?;
 
         let (intents_in, intents) = channel();

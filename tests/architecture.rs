@@ -15,10 +15,7 @@ const MAY_USE: [(&str, &[&str]); 10] = [
     ("report", &["recording", "optimize"]),
     ("session", &["optimize", "recording", "control", "sim", "realtime", "robot"]),
     ("config", &["optimize", "recording", "control", "sim", "realtime", "robot"]),
-    (
-        "engine",
-        &["config", "session", "report", "optimize", "recording", "control", "sim", "realtime", "robot"],
-    ),
+    ("engine", &["config", "session", "report", "optimize", "recording", "control", "sim", "realtime", "robot"]),
 ];
 
 fn sources(folder: &Path) -> Vec<PathBuf> {
@@ -80,7 +77,8 @@ fn every_module_uses_only_what_it_may() {
 fn the_engine_knows_no_terminal() {
     let manifest = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("Cargo.toml")).unwrap();
     for name in ["ratatui", "crossterm", "clap", "indicatif", "tokio"] {
-        let depends = manifest.lines().any(|line| line.starts_with(&format!("{name} ")) || line.starts_with(&format!("{name}=")));
+        let depends =
+            manifest.lines().any(|line| line.starts_with(&format!("{name} ")) || line.starts_with(&format!("{name}=")));
         assert!(!depends, "the engine depends on {name}");
     }
 }

@@ -282,7 +282,11 @@ fn a_study_interrupted_after_every_verdict_equals_the_unbroken_one() {
         eventful(&mut life, step);
         drop(life);
         let resumed = open(broken.path());
-        assert_eq!(resumed.proposal().unwrap().parameters, unbroken.proposal().unwrap().parameters, "after step {step}");
+        assert_eq!(
+            resumed.proposal().unwrap().parameters,
+            unbroken.proposal().unwrap().parameters,
+            "after step {step}"
+        );
         let verdicts = |life: &Life| life.rows().map(|row| (row.trial, row.verdict, row.value)).collect::<Vec<_>>();
         assert_eq!(verdicts(&resumed), verdicts(&unbroken), "after step {step}");
     }

@@ -306,6 +306,7 @@ impl Config {
             &[
                 ("fall.roll_rad".to_owned(), safety.fall.roll_rad),
                 ("fall.pitch_rad".to_owned(), safety.fall.pitch_rad),
+                ("fall.body_contact_s".to_owned(), safety.fall.body_contact_s),
                 ("gate.torque_step_nm".to_owned(), safety.gate.torque_step_nm),
                 ("gate.kp_max".to_owned(), safety.gate.kp_max),
                 ("gate.kd_max".to_owned(), safety.gate.kd_max),

@@ -1,7 +1,7 @@
 //! One control tick: read, estimate, watch, decide, limit, write, publish. An ordinary call: the real-time thread makes
 //! it a thousand times a second, a rollout as fast as the machine goes.
 
-use super::jump::{Jump, Progress, fallen};
+use super::jump::{FallWatch, Jump, Progress};
 use super::leg::{self, LegTarget};
 use super::limits::Gate;
 use super::mode::{self, Request};
@@ -69,6 +69,8 @@ pub struct Cycle {
     gate: Gate,
     ramp: Option<PoseRamp>,
     jump: Option<Jump>,
+    /// Between a trial and its verdict.
+    fall: FallWatch,
     /// The trial that ended in this tick: the tick is still its own.
     ended: Option<Jump>,
     feet: PerLeg<Foot>,
@@ -90,6 +92,7 @@ impl Cycle {
             gate: Gate::default(),
             ramp: None,
             jump: None,
+            fall: FallWatch::default(),
             ended: None,
             feet: [Foot { position_leg: Vector3::zeros(), jacobian_leg: Matrix3::zeros() }; LEGS],
             state_age_ms: 0,
@@ -208,9 +211,9 @@ impl Cycle {
             }
             return;
         }
-        if self.mode == Mode::Review
-            && let Some(cause) = fallen(&self.tick.state, &self.tick.estimate, &self.settings)
-        {
+        if self.mode != Mode::Review {
+            self.fall = FallWatch::default();
+        } else if let Some(cause) = self.fall.observe(&self.tick.state, &self.tick.estimate, &self.settings) {
             self.request(Request::Fell, Cause::Fell(cause));
         }
         if inputs.operator_silent_ms > self.settings.watchdog.operator_silent_ms {

@@ -37,6 +37,7 @@ pub struct Jump {
     flown: bool,
     quiet: u32,
     phase: Phase,
+    fall: FallWatch,
 }
 
 /// A foot may lift for a moment in stance; only a longer absence of all four is a flight.
@@ -60,6 +61,7 @@ impl Jump {
             flown: false,
             quiet: 0,
             phase: Phase::Stance,
+            fall: FallWatch::default(),
         }
     }
 
@@ -105,7 +107,7 @@ impl Jump {
 
     /// Takes note of the newest state and says how far the trial has come. Called once per tick, before `target`.
     pub fn observe(&mut self, state: &RobotState, estimate: &Estimate, settings: &Settings) -> Progress {
-        if let Some(cause) = fallen(state, estimate, settings) {
+        if let Some(cause) = self.fall.observe(state, estimate, settings) {
             return Progress::Over(TrialEnd::Fell(cause));
         }
         let time_s = self.time_s();
@@ -156,15 +158,25 @@ impl Jump {
     }
 }
 
-/// Whether the robot has fallen, and by which sign (`specs/method.md`, "fall").
-pub fn fallen(state: &RobotState, estimate: &Estimate, settings: &Settings) -> Option<FallCause> {
-    let [roll, pitch, _] = estimate.roll_pitch_yaw.into();
-    if roll.abs() > settings.fall.roll_rad {
-        return Some(FallCause::Roll { measured_rad: roll, allowed_rad: settings.fall.roll_rad });
+/// Watches for a fall (`specs/method.md`, "fall").
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct FallWatch {
+    /// Ticks for which a part other than the feet has been on the ground.
+    touching: u32,
+}
+
+impl FallWatch {
+    /// Whether the robot has fallen by now, and by which sign. Called once per tick.
+    pub fn observe(&mut self, state: &RobotState, estimate: &Estimate, settings: &Settings) -> Option<FallCause> {
+        let touches = state.truth.is_some_and(|truth| truth.body_contact);
+        self.touching = if touches { self.touching + 1 } else { 0 };
+        let [roll, pitch, _] = estimate.roll_pitch_yaw.into();
+        if roll.abs() > settings.fall.roll_rad {
+            return Some(FallCause::Roll { measured_rad: roll, allowed_rad: settings.fall.roll_rad });
+        }
+        if pitch.abs() > settings.fall.pitch_rad {
+            return Some(FallCause::Pitch { measured_rad: pitch, allowed_rad: settings.fall.pitch_rad });
+        }
+        (self.touching >= ticks(settings.fall.body_contact_s)).then_some(FallCause::BodyContact)
     }
-    if pitch.abs() > settings.fall.pitch_rad {
-        return Some(FallCause::Pitch { measured_rad: pitch, allowed_rad: settings.fall.pitch_rad });
-    }
-    let touches = state.truth.is_some_and(|truth| truth.body_contact);
-    (settings.fall.body_contact && touches).then_some(FallCause::BodyContact)
 }

@@ -60,8 +60,8 @@ pub struct Fall {
     pub roll_rad: f64,
     /// Largest absolute pitch, rad.
     pub pitch_rad: f64,
-    /// Whether a part other than the feet on the ground is a fall (known in simulation only).
-    pub body_contact: bool,
+    /// For how long a part other than the feet must be on the ground, s (known in simulation only).
+    pub body_contact_s: f64,
 }
 
 /// The last gate before the motors.

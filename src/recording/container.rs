@@ -6,18 +6,20 @@ use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 use mcap::McapError;
-use mcap::read::{ChunkReader, LinearReader};
 use mcap::records::{Record, op};
+use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
 use super::error::RecordingError;
-use super::schema::Topic;
+use super::topic::Topic;
 
 /// Opcode (1 byte) and length (8 bytes) before each record.
 const RECORD_HEAD: u64 = 9;
 /// The footer record: head, two offsets and a checksum.
 const FOOTER_BYTES: u64 = RECORD_HEAD + 8 + 8 + 4;
+/// The record that ends the data: head and a checksum.
+const DATA_END_BYTES: u64 = RECORD_HEAD + 4;
 /// Larger chunks are not ours; a length that says so is damage, and must not be believed when memory is asked for.
-const LARGEST_CHUNK: u64 = 256 * 1024 * 1024;
+const LARGEST_CHUNK: usize = 256 * 1024 * 1024;
 
 /// Where a record is in the file.
 #[derive(Debug, Clone, Copy)]
@@ -89,8 +91,11 @@ impl Container {
         };
         find(&mut container, bytes).map_err(|error| container.error(error))?;
         // The channels of our own files stand in their first chunk.
-        if let Some(chunk) = container.chunks.first().cloned() {
-            let _ = container.read_chunk(&chunk); // a damaged one is reported when it is played
+        if let Some(chunk) = container.chunks.first().cloned()
+            && let Err(source) = container.read_chunk(&chunk)
+            && container.topics.is_empty()
+        {
+            return Err(RecordingError::Head { path: path.into(), source });
         }
         Ok(container)
     }
@@ -109,10 +114,16 @@ impl Container {
         if footer.summary_start == 0 || footer.summary_start > footer_at {
             return Ok(false);
         }
-        let summary = self.read_at(footer.summary_start, footer_at - footer.summary_start)?;
+        // From the record before the index to the end of the file: only so is its checksum verified.
+        let from = footer.summary_start.saturating_sub(DATA_END_BYTES);
+        let summary = self.read_at(from, bytes - from)?;
+        let options = LinearReaderOptions::default()
+            .with_skip_start_magic(true)
+            .with_validate_summary_section_crc(true)
+            .with_record_length_limit(summary.len());
         let (mut chunks, mut attachments, mut metadata) = (Vec::new(), Vec::new(), Vec::new());
-        for record in LinearReader::sans_magic(&summary) {
-            match record? {
+        for record in records(&summary, options)? {
+            match record {
                 Record::Channel(channel) => self.add_channel(channel.id, &channel.topic),
                 Record::ChunkIndex(index) => chunks.push(Chunk {
                     span: span(index.chunk_start_offset, index.chunk_length),
@@ -170,31 +181,51 @@ impl Container {
         }
         self.cut = Some(match bytes - at {
             0 => "it was not finished; nothing after its last complete chunk was written".into(),
-            rest => format!("it was cut off: its last {rest} of {bytes} bytes are an incomplete chunk"),
+            rest => format!("it was cut off: its last {rest} of {bytes} bytes are an incomplete record"),
         });
         Ok(())
     }
 
-    /// The records of one chunk.
+    /// The records of one chunk. Its checksum is verified before anything in it is believed.
     ///
     /// # Errors
     /// When it is damaged; of such a chunk nothing can be trusted.
     pub fn read_chunk(&mut self, chunk: &Chunk) -> Result<Vec<Record<'static>>, McapError> {
-        let body = self.read_record(chunk.span)?;
-        let Record::Chunk { header, data } = mcap::parse_record(op::CHUNK, &body)? else {
-            unreachable!("the opcode says what is parsed")
-        };
-        if header.uncompressed_size > LARGEST_CHUNK {
-            return Err(McapError::ChunkTooLarge(header.uncompressed_size));
-        }
-        let owned = |record: Result<Record, McapError>| record.map(Record::into_owned);
-        let records = ChunkReader::new(header, &data)?.map(owned).collect::<Result<Vec<_>, _>>()?;
+        let bytes = self.read_at(chunk.span.offset, RECORD_HEAD + chunk.span.bytes)?;
+        let options = LinearReaderOptions::default()
+            .with_skip_start_magic(true)
+            .with_skip_end_magic(true)
+            .with_prevalidate_chunk_crcs(true)
+            .with_record_length_limit(LARGEST_CHUNK);
+        let records = records(&bytes, options)?;
         for record in &records {
             if let Record::Channel(channel) = record {
                 self.add_channel(channel.id, &channel.topic);
             }
         }
         Ok(records)
+    }
+
+    /// An attached file; its checksum is verified.
+    pub fn read_attachment(&mut self, span: Span) -> Result<mcap::Attachment<'static>, McapError> {
+        let body = self.read_record(span)?;
+        // Log time, create time, name, media type, data, checksum: the lengths of the three in the middle must fit.
+        let name = 16;
+        let media_type = name + 4 + u64::from(length(&body, name));
+        let data = media_type + 4 + u64::from(length(&body, media_type));
+        if data + 8 + 4 > span.bytes {
+            return Err(McapError::BadAttachmentLength { header: data + 8 + 4, available: span.bytes });
+        }
+        match mcap::parse_record(op::ATTACHMENT, &body)? {
+            Record::Attachment { header, data, .. } => Ok(mcap::Attachment {
+                log_time: header.log_time,
+                create_time: header.create_time,
+                name: header.name,
+                media_type: header.media_type,
+                data: data.into_owned().into(),
+            }),
+            _ => unreachable!("the opcode says what is parsed"),
+        }
     }
 
     /// The body of a record.
@@ -236,9 +267,36 @@ impl Container {
     }
 }
 
+/// The records in `bytes`; those of a chunk in its place.
+fn records(bytes: &[u8], options: LinearReaderOptions) -> Result<Vec<Record<'static>>, McapError> {
+    let mut reader = LinearReader::new_with_options(options);
+    let mut unread = bytes;
+    let mut records = Vec::new();
+    while let Some(event) = reader.next_event() {
+        match event? {
+            LinearReadEvent::ReadRequest(wanted) => {
+                let (now, later) = unread.split_at(wanted.min(unread.len()));
+                reader.insert(now.len()).copy_from_slice(now);
+                reader.notify_read(now.len());
+                unread = later;
+            }
+            LinearReadEvent::Record { data, opcode } => {
+                records.push(mcap::parse_record(opcode, data)?.into_owned());
+            }
+        }
+    }
+    Ok(records)
+}
+
 /// Of a record in the index: offset and length with the head.
 fn span(offset: u64, length: u64) -> Span {
     Span { offset, bytes: length.saturating_sub(RECORD_HEAD) }
+}
+
+/// The length of a string; the largest where there is none.
+fn length(bytes: &[u8], at: u64) -> u32 {
+    let bytes = usize::try_from(at).ok().and_then(|at| bytes.get(at..at + 4)).and_then(|bytes| bytes.try_into().ok());
+    bytes.map_or(u32::MAX, u32::from_le_bytes)
 }
 
 fn number(bytes: &[u8], at: usize) -> Option<u64> {

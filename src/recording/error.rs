@@ -51,6 +51,14 @@ pub enum RecordingError {
         /// The file.
         path: PathBuf,
     },
+    /// The beginning, which says what the rest means, is damaged.
+    #[error("{}: damaged at its beginning ({source}); what follows cannot be understood without it", path.display())]
+    Head {
+        /// The file.
+        path: PathBuf,
+        /// How it is damaged.
+        source: mcap::McapError,
+    },
     /// Cut off before the first message.
     #[error("{}: cut off after {bytes} bytes, before the session's first message; nothing in it can be played", path.display())]
     TooShort {

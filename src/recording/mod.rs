@@ -14,6 +14,7 @@ pub mod recorder;
 pub mod recover;
 mod schema;
 mod tick;
+mod topic;
 pub mod writer;
 
 pub use error::RecordingError;

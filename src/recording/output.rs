@@ -13,7 +13,8 @@ use mcap::{McapError, WriteOptions};
 use prost::Message;
 
 use super::record::{Record, SessionInfo};
-use super::schema::{self, Topic};
+use super::schema;
+use super::topic::Topic;
 
 /// A chunk is closed once it holds this much, uncompressed: an eighth of a second of ticks. What a crash can take of
 /// the data that the system already has is the one open chunk.

@@ -7,14 +7,14 @@ use std::collections::{BTreeMap, VecDeque};
 use std::path::{Path, PathBuf};
 
 use foxglove::messages::JointStates;
-use mcap::McapError;
-use mcap::records::{MessageHeader, Record as McapRecord, op};
+use mcap::records::{MessageHeader, Record as McapRecord};
 use prost::Message;
 
 use super::container::{Chunk, Container};
 use super::error::RecordingError;
 use super::record::{Record, SessionInfo, Stamped};
-use super::schema::{self, DecodeError, Topic};
+use super::schema::{self, DecodeError};
+use super::topic::Topic;
 use super::{frog, tick};
 use crate::realtime::telemetry::Tick;
 
@@ -180,20 +180,15 @@ impl Player {
     /// When it cannot be read.
     pub fn attachment(&mut self, name: &str) -> Result<Option<Vec<u8>>, RecordingError> {
         for span in self.container.attachments.clone() {
-            let body = self.container.read_record(span).map_err(|source| self.mcap_error(source))?;
-            match mcap::parse_record(op::ATTACHMENT, &body) {
-                Ok(McapRecord::Attachment { header, data, .. }) if header.name == name => {
-                    return Ok(Some(data.into_owned()));
-                }
-                Ok(_) => {}
-                Err(source) => return Err(self.mcap_error(source)),
+            let attachment = self
+                .container
+                .read_attachment(span)
+                .map_err(|source| RecordingError::Mcap { path: self.path.clone(), source })?;
+            if attachment.name == name {
+                return Ok(Some(attachment.data.into_owned()));
             }
         }
         Ok(None)
-    }
-
-    fn mcap_error(&self, source: McapError) -> RecordingError {
-        RecordingError::Mcap { path: self.path.clone(), source }
     }
 
     /// The session, the markers and all events: from the chunks that hold any.

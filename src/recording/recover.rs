@@ -11,7 +11,7 @@ use mcap::records::{Record, op};
 use super::container::Container;
 use super::error::RecordingError;
 use super::output::{Output, with_suffix};
-use super::schema::Topic;
+use super::topic::Topic;
 
 /// What was saved.
 #[derive(Debug, Clone, PartialEq)]
@@ -57,9 +57,12 @@ pub fn recover(path: impl AsRef<Path>) -> Result<Recovered, RecordingError> {
         source => RecordingError::Mcap { path: path.into(), source },
     })?;
     fs::rename(&unfinished, &target).map_err(io("give the file its final name", &unfinished))?;
-    let damaged =
-        (copied.damaged > 0).then(|| format!("{} of {} chunks are damaged", copied.damaged, container.chunks.len()));
-    let lost: Vec<_> = container.cut.take().into_iter().chain(damaged).collect();
+    let damaged = [
+        (copied.damaged_chunks > 0)
+            .then(|| format!("{} of {} chunks are damaged", copied.damaged_chunks, container.chunks.len())),
+        (copied.damaged_extras > 0).then(|| format!("{} attachments are damaged", copied.damaged_extras)),
+    ];
+    let lost: Vec<_> = container.cut.take().into_iter().chain(damaged.into_iter().flatten()).collect();
     Ok(Recovered {
         path: target,
         ticks: copied.ticks,
@@ -81,7 +84,9 @@ struct Copy {
 struct Copied {
     ticks: u64,
     messages: u64,
-    damaged: usize,
+    damaged_chunks: usize,
+    /// Attachments and metadata.
+    damaged_extras: usize,
 }
 
 impl Copy {
@@ -93,20 +98,16 @@ impl Copy {
     /// Everything, metadata and attachments first.
     fn all(mut self, container: &mut Container) -> Result<Copied, McapError> {
         for span in container.metadata.clone() {
-            if let Record::Metadata(metadata) = mcap::parse_record(op::METADATA, &container.read_record(span)?)? {
-                self.out.mcap.write_metadata(&metadata)?;
+            let body = container.read_record(span)?;
+            match mcap::parse_record(op::METADATA, &body) {
+                Ok(Record::Metadata(metadata)) => self.out.mcap.write_metadata(&metadata)?,
+                _ => self.done.damaged_extras += 1,
             }
         }
         for span in container.attachments.clone() {
-            let body = container.read_record(span)?;
-            if let Ok(Record::Attachment { header, data, .. }) = mcap::parse_record(op::ATTACHMENT, &body) {
-                self.out.mcap.attach(&mcap::Attachment {
-                    log_time: header.log_time,
-                    create_time: header.create_time,
-                    name: header.name,
-                    media_type: header.media_type,
-                    data,
-                })?;
+            match container.read_attachment(span) {
+                Ok(attachment) => self.out.mcap.attach(&attachment)?,
+                Err(_) => self.done.damaged_extras += 1,
             }
         }
         for chunk in container.chunks.clone() {
@@ -118,7 +119,7 @@ impl Copy {
                     // A chunk of the old file is one of the new: it holds whole ticks.
                     self.out.mcap.flush()?;
                 }
-                Err(_) => self.done.damaged += 1,
+                Err(_) => self.done.damaged_chunks += 1,
             }
         }
         self.out.finish()?;
@@ -141,9 +142,9 @@ impl Copy {
                 }
             }
             Record::Message { mut header, data } => {
-                self.done.messages += 1;
-                self.done.ticks += u64::from(self.tick_channel == Some(header.channel_id));
                 if let Some(&id) = self.channels.get(&header.channel_id) {
+                    self.done.messages += 1;
+                    self.done.ticks += u64::from(self.tick_channel == Some(header.channel_id));
                     header.channel_id = id;
                     mcap.write_to_known_channel(&header, &data)?;
                 }

@@ -1,7 +1,6 @@
-//! The topics of a recording, and records as protobuf messages and back.
+//! Records as protobuf messages and back.
 
-use foxglove::messages::{FrameTransforms, JointStates, Log, PoseInFrame, log};
-use foxglove::{Encode, Schema};
+use foxglove::messages::{Log, log};
 use prost::Message;
 
 use super::frog;
@@ -10,10 +9,8 @@ use super::record::{
     Source, Stage, StageInfo, Transition, TrialRecord, Verdict,
 };
 use super::tick;
+use super::topic::Topic;
 use crate::realtime::telemetry::Counters;
-
-/// The description of `proto/frog.proto`, as every channel carries it.
-const FROG_DESCRIPTORS: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/frog.v1.bin"));
 
 /// A message that is not what the schema says.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -30,102 +27,6 @@ pub enum DecodeError {
     /// An array of another length than the machine has.
     #[error("{1} {0}: another number than this version expects")]
     Length(&'static str, usize),
-}
-
-/// A topic; its place in `ALL` plus one is its channel in files written here (readers go by the name).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Topic {
-    JointStates,
-    JointCommand,
-    Tick,
-    Pose,
-    Tf,
-    Counters,
-    Session,
-    Transition,
-    Stage,
-    Proposal,
-    Trial,
-    Command,
-    Log,
-    Fault,
-    Marker,
-}
-
-impl Topic {
-    pub const ALL: [Topic; 15] = [
-        Topic::JointStates,
-        Topic::JointCommand,
-        Topic::Tick,
-        Topic::Pose,
-        Topic::Tf,
-        Topic::Counters,
-        Topic::Session,
-        Topic::Transition,
-        Topic::Stage,
-        Topic::Proposal,
-        Topic::Trial,
-        Topic::Command,
-        Topic::Log,
-        Topic::Fault,
-        Topic::Marker,
-    ];
-
-    /// The name in the file.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Topic::JointStates => "/robot/joint_states",
-            Topic::JointCommand => "/robot/joint_cmd",
-            Topic::Tick => "/robot/tick",
-            Topic::Pose => "/robot/pose",
-            Topic::Tf => "/tf",
-            Topic::Counters => "/robot/counters",
-            Topic::Session => "/session",
-            Topic::Transition => "/fsm",
-            Topic::Stage => "/opt/stage",
-            Topic::Proposal => "/opt/proposal",
-            Topic::Trial => "/opt/trial",
-            Topic::Command => "/operator/command",
-            Topic::Log => "/log",
-            Topic::Fault => "/fault",
-            Topic::Marker => "/marker",
-        }
-    }
-
-    /// The topic of that name.
-    pub fn from_name(name: &str) -> Option<Topic> {
-        Topic::ALL.into_iter().find(|topic| topic.name() == name)
-    }
-
-    /// Whether its messages are few: events, of which a player keeps all at hand, unlike ticks and counters.
-    pub const fn is_event(self) -> bool {
-        !matches!(
-            self,
-            Topic::JointStates | Topic::JointCommand | Topic::Tick | Topic::Pose | Topic::Tf | Topic::Counters
-        )
-    }
-
-    /// What its messages look like.
-    pub fn schema(self) -> Schema {
-        let own = |name: &str| Schema::new(format!("frog.v1.{name}"), "protobuf", FROG_DESCRIPTORS);
-        match self {
-            Topic::JointStates => JointStates::get_schema().expect("foxglove's messages have schemas"),
-            Topic::Pose => PoseInFrame::get_schema().expect("foxglove's messages have schemas"),
-            Topic::Tf => FrameTransforms::get_schema().expect("foxglove's messages have schemas"),
-            Topic::Log => Log::get_schema().expect("foxglove's messages have schemas"),
-            Topic::JointCommand => own("JointCommand"),
-            Topic::Tick => own("ControlTick"),
-            Topic::Counters => own("Counters"),
-            Topic::Session => own("Session"),
-            Topic::Transition => own("Transition"),
-            Topic::Stage => own("StageInfo"),
-            Topic::Proposal => own("Proposal"),
-            Topic::Trial => own("Trial"),
-            Topic::Command => own("OperatorCommand"),
-            Topic::Fault => own("FaultTicks"),
-            Topic::Marker => own("Marker"),
-        }
-    }
 }
 
 /// The topic of a record; its message goes into `buffer`. `start_utc_ns` is the log time of engine time 0.
@@ -175,7 +76,7 @@ pub fn encode(record: &Record, start_utc_ns: u64, log_time: u64, buffer: &mut Ve
                 name: source.clone(),
                 ..Log::default()
             };
-            (Topic::Log, Message::encode(&message, buffer))
+            (Topic::Log, message.encode(buffer))
         }
         Record::FaultTicks(ticks) => {
             let message = frog::FaultTicks { ticks: ticks.iter().map(tick::whole).collect() };
@@ -220,7 +121,7 @@ pub fn decode(topic: Topic, data: &[u8]) -> Result<Option<Record>, DecodeError> 
             })
         }
         Topic::Log => {
-            let message = <Log as Message>::decode(data)?;
+            let message = Log::decode(data)?;
             let level = match message.level() {
                 log::Level::Unknown => return Err(DecodeError::Unknown("log level", message.level)),
                 log::Level::Debug | log::Level::Info => Level::Info,
@@ -392,4 +293,39 @@ fn from_risk(message: frog::Risk) -> Risk {
 /// The value of that number: enums are numbered in the order of their `ALL`, here and in `proto/frog.proto`.
 fn one_of<T: Copy>(all: &[T], what: &'static str, number: i32) -> Result<T, DecodeError> {
     all.get(number as usize).copied().ok_or(DecodeError::Unknown(what, number))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::realtime::telemetry::{Mode, Phase};
+
+    /// `STAND UP` in the program is `STAND_UP` in the schema, `re-run` is `RE_RUN`.
+    fn assert_named(name: &str, in_schema: Option<&str>) {
+        assert_eq!(Some(name.to_uppercase().replace([' ', '-'], "_").as_str()), in_schema);
+    }
+
+    #[test]
+    fn enums_are_numbered_as_in_the_schema() {
+        for (number, mode) in (0..).zip(Mode::ALL) {
+            assert_eq!(mode as i32, number);
+            assert_named(mode.name(), frog::control_tick::Mode::try_from(number).ok().map(|m| m.as_str_name()));
+        }
+        for (number, phase) in (0..).zip(Phase::ALL) {
+            assert_eq!(phase as i32, number);
+            assert_named(phase.name(), frog::control_tick::Phase::try_from(number).ok().map(|p| p.as_str_name()));
+        }
+        for (number, stage) in (0..).zip(Stage::ALL) {
+            assert_eq!(stage as i32, number);
+            assert_named(stage.name(), frog::stage_info::Stage::try_from(number).ok().map(|s| s.as_str_name()));
+        }
+        for (number, source) in (0..).zip(Source::ALL) {
+            assert_eq!(source as i32, number);
+            assert_named(source.name(), frog::proposal::Source::try_from(number).ok().map(|s| s.as_str_name()));
+        }
+        for (number, verdict) in (0..).zip(Verdict::ALL) {
+            assert_eq!(verdict as i32, number);
+            assert_named(verdict.name(), frog::trial::Verdict::try_from(number).ok().map(|v| v.as_str_name()));
+        }
+    }
 }

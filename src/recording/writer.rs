@@ -11,7 +11,7 @@ use super::error::RecordingError;
 pub use super::output::Sink;
 use super::output::{Output, with_suffix};
 use super::record::{Record, SessionInfo, Stamped};
-use super::schema::Topic;
+use super::topic::Topic;
 use super::{frames, frog, tick};
 use crate::realtime::telemetry::{Mode, Tick};
 use crate::robot::description::RobotDescription;

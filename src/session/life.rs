@@ -10,10 +10,10 @@ mod card;
 
 use std::collections::BTreeMap;
 
+use crate::control::settings::TaskControl;
 use crate::optimize::study::{Outcome, Study, StudyError};
 use crate::optimize::trial::TrialState;
-use crate::control::settings::TaskControl;
-use crate::realtime::command::{ JumpParameters, Task, TrialSpec};
+use crate::realtime::command::{JumpParameters, Task, TrialSpec};
 use crate::realtime::telemetry::{Tick, TrialEnd};
 use crate::recording::record::{ParameterInfo, Proposal, Record, Stage, StageInfo, TrialRecord, Verdict};
 

@@ -7,7 +7,7 @@ use crate::control::settings::{PERIOD_S, Settings};
 use crate::realtime::clock::SimulatedClock;
 use crate::realtime::command::{Command, TrialSpec};
 use crate::realtime::telemetry::{Event, Fault, Tick, TrialEnd};
-use crate::robot::Robot;
+use crate::robot::{Placement, Robot};
 
 /// A robot in simulated time.
 pub struct Rollout<R: Robot> {
@@ -24,6 +24,8 @@ impl<R: Robot> Rollout<R> {
 
     /// Runs one trial from its mark and says how it ended; the ticks are those of the trial, countdown included.
     pub fn run(&mut self, spec: &TrialSpec) -> (TrialEnd, &[Tick]) {
+        // The last trial may have left the robot on its back; a robot that is ready for a trial is not.
+        self.robot.place(&Placement { joint_position: self.settings.lying_position, lying: true, seed: spec.seed });
         let mut cycle = Cycle::ready(&self.settings);
         let mut inputs = Inputs { command: Some(Command::RunTrial(*spec)), ..Inputs::default() };
         self.ticks.clear();
@@ -36,7 +38,8 @@ impl<R: Robot> Rollout<R> {
             inputs.command = None;
             let ended = cycle.events().iter().find_map(|event| match event {
                 Event::TrialEnded { end, .. } => Some(end),
-                Event::Mode { .. } | Event::Refused { .. } => None,
+                Event::Refused { .. } => Some(TrialEnd::Cancelled),
+                Event::Mode { .. } => None,
             });
             if let Some(end) = ended {
                 return (end, &self.ticks);

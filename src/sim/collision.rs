@@ -10,7 +10,7 @@ use super::config::{BodyKind, SimConfig, TerrainKind};
 use super::contact::{ContactPoint, ContactSolver, TRUNK, Velocity};
 use super::dynamics::Dynamics;
 use super::state::State;
-use super::terrain::{MAX_TOUCHES, Terrain};
+use super::terrain::{MAX_TOUCHES, Terrain, Touch};
 use crate::robot::description::{Body, RobotDescription, Shape};
 use crate::robot::{LEGS, Leg};
 
@@ -42,6 +42,13 @@ struct Probe {
     /// Centre in the link's frame, m.
     center: Vector3<f64>,
     outline: Outline,
+}
+
+/// A sphere of the machine where it is now.
+struct Place {
+    center_body: Vector3<f64>,
+    center_world: Vector3<f64>,
+    radius: f64,
 }
 
 /// A run of probes in one ball.
@@ -153,102 +160,138 @@ impl Collider {
 
     /// Adds to `solver` every point that may touch in the step.
     pub fn find(&self, moment: &Moment, solver: &mut ContactSolver) {
-        let Moment { dynamics, state, terrain, world_from_body, free, h } = *moment;
-        let place = |leg: usize, link: usize, p: &Vector3<f64>| {
-            if leg == TRUNK { *p } else { dynamics.legs[leg].in_body(link, p) }
-        };
-        let reach = SPEED_LIMIT * h;
-        for ball in &self.balls {
-            let center_body = place(ball.leg, ball.link, &ball.center);
-            let center_world = state.position_world + world_from_body * center_body;
-            if terrain.clearance(&center_world) > ball.radius + reach {
-                continue;
-            }
-            for (i, probe) in self.probes.iter().enumerate().skip(ball.first).take(ball.count) {
-                let center_body = place(probe.leg, probe.link, &probe.center);
-                let center_world = state.position_world + world_from_body * center_body;
-                let (center_body, center_world, radius) = match probe.outline {
-                    Outline::Sphere { radius } => (center_body, center_world, radius),
-                    Outline::Rim { radius, axis } => {
-                        // The rim's lowest point: from the centre against the ground's normal, in the rim's plane.
-                        let rotation = if probe.leg == TRUNK {
-                            Matrix3::identity()
-                        } else {
-                            dynamics.legs[probe.leg].rotation(probe.link)
-                        };
-                        let axis = rotation * axis;
-                        let down = -world_from_body.tr_mul(&terrain.normal());
-                        let out = down - axis * axis.dot(&down);
-                        let size = out.norm();
-                        let offset = if size > 1e-9 { out * (radius / size) } else { Vector3::zeros() };
-                        let point = center_body + offset;
-                        (point, state.position_world + world_from_body * point, 0.0)
-                    }
-                };
-                for (k, touch) in terrain.touches(&center_world, radius, reach).into_iter().enumerate() {
-                    let Some(touch) = touch else { continue };
-                    let normal_body = world_from_body.tr_mul(&touch.normal_world);
-                    let position_body = center_body - normal_body * (radius + touch.gap.min(0.0));
-                    let velocity = point_velocity(dynamics, free, probe.leg, probe.link, &position_body);
-                    let ground = touch.block.map_or_else(Vector3::zeros, |b| terrain.block_velocity(b));
-                    let ground_velocity_body = world_from_body.tr_mul(&ground);
-                    let approach = normal_body.dot(&(velocity - ground_velocity_body));
-                    if touch.gap + h * (approach - SPEED_MARGIN) > 0.0 {
-                        continue;
-                    }
-                    let point = ContactPoint {
-                        leg: probe.leg,
-                        link: probe.link,
-                        memory: MAX_TOUCHES * i + k,
-                        position_body,
-                        normal_body,
-                        gap: touch.gap,
-                        friction: touch.friction,
-                        ground_velocity_body,
-                        block: touch.block,
-                    };
-                    solver.add_point(dynamics, point, &velocity, world_from_body, h);
+        let reach = SPEED_LIMIT * moment.h;
+        let now = Velocity::of(moment.state);
+        self.near(moment.dynamics, moment.state, moment.terrain, moment.world_from_body, reach, |probe, i, place| {
+            for (k, touch) in moment.terrain.touches(&place.center_world, place.radius, reach).into_iter().enumerate() {
+                if let Some(touch) = touch {
+                    add_touch(moment, &now, probe, MAX_TOUCHES * i + k, &place, &touch, solver);
                 }
             }
-        }
+        });
     }
 
-    /// The smallest gap of any probe to the ground, m; of the feet alone where `feet_only`.
+    /// The smallest gap of any probe to the ground, m.
     pub fn smallest_gap(&self, dynamics: &Dynamics, state: &State, terrain: &Terrain) -> f64 {
         let world_from_body = state.orientation_world.to_rotation_matrix().into_inner();
         let mut smallest = f64::INFINITY;
-        for probe in &self.probes {
-            let on_leg = probe.leg != TRUNK;
-            let center =
-                if on_leg { dynamics.legs[probe.leg].in_body(probe.link, &probe.center) } else { probe.center };
-            let (offset, radius) = match probe.outline {
-                Outline::Sphere { radius } => (Vector3::zeros(), radius),
-                Outline::Rim { radius, axis } => {
-                    let rotation =
-                        if on_leg { dynamics.legs[probe.leg].rotation(probe.link) } else { Matrix3::identity() };
-                    let axis = rotation * axis;
-                    let down = -world_from_body.tr_mul(&terrain.normal());
-                    let out = down - axis * axis.dot(&down);
-                    (out * (radius / out.norm().max(1e-9)), 0.0)
-                }
-            };
-            let world = state.position_world + world_from_body * (center + offset);
-            for touch in terrain.touches(&world, radius, f64::INFINITY).into_iter().flatten() {
+        self.near(dynamics, state, terrain, &world_from_body, f64::INFINITY, |_, _, place| {
+            for touch in terrain.touches(&place.center_world, place.radius, f64::INFINITY).into_iter().flatten() {
                 smallest = smallest.min(touch.gap);
             }
-        }
+        });
         smallest
+    }
+
+    /// Calls `see` with every probe that is nearer than `reach` to the height of the highest ground.
+    #[inline]
+    fn near(
+        &self,
+        dynamics: &Dynamics,
+        state: &State,
+        terrain: &Terrain,
+        world_from_body: &Matrix3<f64>,
+        reach: f64,
+        mut see: impl FnMut(&Probe, usize, Place),
+    ) {
+        let up_body = world_from_body.tr_mul(&terrain.normal());
+        let base = terrain.clearance(&state.position_world);
+        for ball in &self.balls {
+            // Height of a point p of the link: that of its frame's origin and up . p in the link's axes.
+            let (origin_body, up_link) = match ball.leg {
+                TRUNK => (Vector3::zeros(), up_body),
+                leg => (dynamics.legs[leg].origin_body[ball.link], dynamics.legs[leg].into_link(ball.link, &up_body)),
+            };
+            let height = base + up_body.dot(&origin_body);
+            if height + up_link.dot(&ball.center) > ball.radius + reach {
+                continue;
+            }
+            for (i, probe) in self.probes.iter().enumerate().skip(ball.first).take(ball.count) {
+                if height + up_link.dot(&probe.center) > probe.outline.radius() + reach {
+                    continue;
+                }
+                let (center_link, radius) = probe.outline.lowest(&probe.center, &up_link);
+                let center_body = match ball.leg {
+                    TRUNK => center_link,
+                    leg => dynamics.legs[leg].in_body(ball.link, &center_link),
+                };
+                let center_world = state.position_world + world_from_body * center_body;
+                see(probe, i, Place { center_body, center_world, radius });
+            }
+        }
     }
 }
 
-/// Velocity of a point at `p_body`, body axes.
+impl Outline {
+    fn radius(&self) -> f64 {
+        match *self {
+            Outline::Sphere { radius } | Outline::Rim { radius, .. } => radius,
+        }
+    }
+
+    /// Centre and radius of the sphere that meets the ground, link axes: for a rim its lowest point.
+    #[inline]
+    fn lowest(&self, center: &Vector3<f64>, up: &Vector3<f64>) -> (Vector3<f64>, f64) {
+        match *self {
+            Outline::Sphere { radius } => (*center, radius),
+            Outline::Rim { radius, axis } => {
+                // From the centre against the ground's normal, in the rim's plane.
+                let out = axis * axis.dot(up) - up;
+                let size = out.norm();
+                (if size > 1e-9 { center + out * (radius / size) } else { *center }, 0.0)
+            }
+        }
+    }
+}
+
+/// Adds a touch to `solver` if it may close within the step.
 #[inline]
-fn point_velocity(dynamics: &Dynamics, v: &Velocity, leg: usize, link: usize, p_body: &Vector3<f64>) -> Vector3<f64> {
-    // v + w x p + J_l dq
-    let linear: Vector3<f64> = v.trunk.fixed_rows::<3>(0).into();
-    let angular: Vector3<f64> = v.trunk.fixed_rows::<3>(3).into();
+fn add_touch(
+    moment: &Moment,
+    now: &Velocity,
+    probe: &Probe,
+    memory: usize,
+    place: &Place,
+    touch: &Touch,
+    solver: &mut ContactSolver,
+) {
+    let Moment { dynamics, terrain, world_from_body, free, h, .. } = *moment;
+    let normal_body = world_from_body.tr_mul(&touch.normal_world);
+    let position_body = place.center_body - normal_body * (place.radius + touch.gap.min(0.0));
+    let leg_jacobian = match probe.leg {
+        TRUNK => Matrix3::zeros(),
+        leg => dynamics.legs[leg].point_jacobian(probe.link, &position_body),
+    };
+    let ground_velocity_body = match touch.block {
+        Some(block) => world_from_body.tr_mul(&terrain.block_velocity(block)),
+        None => Vector3::zeros(),
+    };
+    let free_velocity_body = point_velocity(free, probe.leg, &leg_jacobian, &position_body) - ground_velocity_body;
+    if touch.gap + h * (normal_body.dot(&free_velocity_body) - SPEED_MARGIN) > 0.0 {
+        return;
+    }
+    let point = ContactPoint {
+        leg: probe.leg,
+        memory,
+        position_body,
+        normal_body,
+        leg_jacobian,
+        gap: touch.gap,
+        friction: touch.friction,
+        slip_body: point_velocity(now, probe.leg, &leg_jacobian, &position_body) - ground_velocity_body,
+        free_slip_body: free_velocity_body,
+        block: touch.block,
+    };
+    solver.add_point(dynamics, point, world_from_body, h);
+}
+
+/// Velocity of a point at `p_body` on `leg`, body axes: v + w x p + J_l dq.
+#[inline]
+fn point_velocity(v: &Velocity, leg: usize, leg_jacobian: &Matrix3<f64>, p_body: &Vector3<f64>) -> Vector3<f64> {
+    let linear = Vector3::new(v.trunk[0], v.trunk[1], v.trunk[2]);
+    let angular = Vector3::new(v.trunk[3], v.trunk[4], v.trunk[5]);
     let trunk = linear + angular.cross(p_body);
-    if leg == TRUNK { trunk } else { trunk + dynamics.legs[leg].point_jacobian(link, p_body) * v.legs[leg] }
+    if leg == TRUNK { trunk } else { trunk + leg_jacobian * v.legs[leg] }
 }
 
 /// The corners of a box, and points along its edges no farther apart than `spacing`.

@@ -46,8 +46,22 @@ pub struct SolverConfig {
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ContactConfig {
+    /// Which law.
+    pub law: ContactLaw,
+    /// Time constant with which the convex law stops a slip, s.
+    pub slip_time_s: f64,
     /// What can touch the ground besides the feet.
     pub bodies: Vec<BodyKind>,
+}
+
+/// Which impulse in the friction cone a contact gives.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ContactLaw {
+    /// Coulomb's and Signorini's laws.
+    Coulomb,
+    /// MuJoCo's convex relaxation.
+    Convex,
 }
 
 /// A kind of link.
@@ -269,6 +283,8 @@ impl SimConfig {
         positive("solver.tolerance_m_s", self.solver.tolerance_m_s)?;
         count("solver.max_sweeps", self.solver.max_sweeps, 10_000, "give 1 to 10000")?;
         share("solver.penetration_recovery", self.solver.penetration_recovery)?;
+
+        not_negative("contact.slip_time_s", self.contact.slip_time_s)?;
 
         let terrain = &self.terrain;
         not_negative("terrain.friction", terrain.friction)?;

@@ -1,12 +1,20 @@
 //! Rigid unilateral contacts with Coulomb's cone, joint stops and dry joint friction, all solved together.
 //!
-//! Unknown are the impulses of one step. For every contact: 0 <= impulse_n, 0 <= gap after the step, one of them zero
-//! (Signorini, at the level of the position reached); and |impulse_t| <= mu impulse_n, opposed to the sliding velocity
-//! where there is any (Coulomb). A Gauss-Seidel sweep goes from contact to contact and solves each one exactly with the
-//! others held: Hwangbo, Lee, Hutter, "Per-contact iteration method for solving contact dynamics", IEEE RA-L 3(2),
-//! 2018. Where that paper bisects for the impulse of most dissipation, the local problem here is Coulomb's law itself,
-//! reduced to one scalar equation as in Bonnefon and Daviet, "Quartic formulation of Coulomb 3D frictional contact", INRIA
-//! RT-0400, 2011. The cone is never cut into a pyramid.
+//! Unknown are the impulses p of one step, each in its cone K: |p_t| <= mu p_n. The cone is never cut into a pyramid. Two
+//! laws say which impulse of the cone it is (`contact.law`):
+//!
+//! - **Coulomb**: gap after the step >= 0, p_n >= 0, one of them zero (Signorini); a point that slides keeps sliding against p_t
+//!   at mu p_n and stays on the ground.
+//! - **Convex**, MuJoCo's: v' - k v in the dual cone K* and orthogonal to p, which makes all contacts one convex problem
+//!   (Anitescu, "Optimization-based simulation of nonsmooth rigid multibody dynamics", Math. Program. 105, 2006; Todorov,
+//!   "Convex and analytically-invertible dynamics with contacts and constraints", ICRA 2014). k v is what a slip keeps over a step:
+//!   k = exp(-h / slip_time). The price is dilatancy: a point that slides also rises, so fast sliding feet hop along.
+//!   Normal contact is rigid here, where MuJoCo's gives way.
+//!
+//! A Gauss-Seidel sweep goes from contact to contact and solves each one exactly with the others held: Hwangbo, Lee, Hutter,
+//! "Per-contact iteration method for solving contact dynamics", IEEE RA-L 3(2), 2018. Where that paper bisects for the
+//! impulse of most dissipation, the local problem here is the law itself, reduced to one scalar equation as in Bonnefon
+//! and Daviet, "Quartic formulation of Coulomb 3D frictional contact", INRIA RT-0400, 2011.
 //!
 //! With the factors of [`super::dynamics`] the Delassus matrix is J M^-1 J^T = W W^T + (within a leg) U U^T with
 //! W = (J_0 - J_l G_l) L^-T and U = J_l C_l^-T. The sweep keeps the sums y_0 = sum W^T p and y_l = sum U^T p, so one visit costs the
@@ -14,10 +22,11 @@
 
 use nalgebra::{Matrix3, Vector2, Vector3, Vector6};
 
-use super::config::SolverConfig;
-use super::dynamics::{Dynamics, Matrix3x6};
+use super::config::{ContactConfig, ContactLaw, SolverConfig};
+use super::dynamics::{Dynamics, Matrix6x3};
 use super::quantities::stack;
-use crate::robot::{JOINTS, Joints, LEGS, PerLeg};
+use super::state::State;
+use crate::robot::{JOINTS, Joints, LEGS, PerLeg, leg_of};
 
 /// Most contacts at a time; a robot lying on blocks has about twenty. Beyond that the latest found are left out until the
 /// next step.
@@ -34,25 +43,37 @@ pub(super) struct Velocity {
     pub legs: PerLeg<Vector3<f64>>,
 }
 
+impl Velocity {
+    /// That of `state`.
+    pub fn of(state: &State) -> Velocity {
+        Velocity {
+            trunk: stack(&state.velocity_body, &state.angular_velocity_body),
+            legs: std::array::from_fn(|leg| leg_of(&state.joint_velocity, leg)),
+        }
+    }
+}
+
 /// A point that touches or is about to.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct ContactPoint {
     /// Which leg it is on; [`TRUNK`] for none.
     pub leg: usize,
-    /// Which link of the leg: 0 hip, 1 thigh, 2 calf.
-    pub link: usize,
     /// Where it remembers its impulse.
     pub memory: usize,
     /// The point, body axes, m.
     pub position_body: Vector3<f64>,
     /// Out of the ground, body axes.
     pub normal_body: Vector3<f64>,
+    /// J_l: its velocity per joint velocity of its leg, body axes; zero for the trunk.
+    pub leg_jacobian: Matrix3<f64>,
     /// Distance to the ground at the start of the step, m; negative where it is inside.
     pub gap: f64,
     /// Coulomb coefficient.
     pub friction: f64,
-    /// Velocity of the ground there, body axes, m/s: not zero for a sliding block.
-    pub ground_velocity_body: Vector3<f64>,
+    /// Its velocity against the ground at the start of the step, body axes, m/s.
+    pub slip_body: Vector3<f64>,
+    /// The same at the end of the step if nothing touched.
+    pub free_slip_body: Vector3<f64>,
     /// Which loose block it is, for those who move it.
     pub block: Option<usize>,
 }
@@ -63,8 +84,8 @@ pub(super) struct Contact {
     pub point: ContactPoint,
     /// Columns normal, two tangents, body axes.
     axes_body: Matrix3<f64>,
-    /// W.
-    trunk_rows: Matrix3x6,
+    /// W^T.
+    trunk_rows: Matrix6x3,
     /// U; zero for the trunk.
     leg_rows: Matrix3<f64>,
     /// A = W W^T + U U^T and its inverse.
@@ -74,6 +95,7 @@ pub(super) struct Contact {
     free: Vector3<f64>,
     /// Of Coulomb's equation; where the last search ended.
     slip: f64,
+    law: ContactLaw,
     impulse: Vector3<f64>,
 }
 
@@ -94,32 +116,45 @@ struct Row {
 #[derive(Debug, Clone)]
 pub(super) struct ContactSolver {
     config: SolverConfig,
+    law: ContactLaw,
+    slip_time_s: f64,
     contacts: Vec<Contact>,
     rows: Vec<Row>,
     /// Impulses of the last step in world axes, by [`ContactPoint::memory`].
-    memory: Vec<Vector3<f64>>,
+    memory: Vec<Option<Vector3<f64>>>,
+    /// Which of them there are.
+    remembered: Vec<usize>,
+    /// Share of a slip that the convex law leaves after this step.
+    kept_slip: f64,
 }
 
 impl ContactSolver {
-    pub fn new(config: SolverConfig, memories: usize) -> ContactSolver {
+    pub fn new(config: SolverConfig, contact: &ContactConfig, memories: usize) -> ContactSolver {
         ContactSolver {
             config,
             contacts: Vec::with_capacity(MAX_CONTACTS),
             rows: Vec::with_capacity(MAX_ROWS),
-            memory: vec![Vector3::zeros(); memories],
+            memory: vec![None; memories],
+            remembered: Vec::with_capacity(MAX_CONTACTS),
+            law: contact.law,
+            slip_time_s: contact.slip_time_s,
+            kept_slip: 0.0,
         }
     }
 
     /// Forgets the last step's impulses.
     pub fn reset(&mut self) {
-        self.clear();
-        self.memory.fill(Vector3::zeros());
-    }
-
-    /// Starts a step.
-    pub fn clear(&mut self) {
         self.contacts.clear();
         self.rows.clear();
+        self.memory.fill(None);
+        self.remembered.clear();
+    }
+
+    /// Starts a step of `h` seconds.
+    pub fn start(&mut self, h: f64) {
+        self.contacts.clear();
+        self.rows.clear();
+        self.kept_slip = if self.slip_time_s > 0.0 { (-h / self.slip_time_s).exp() } else { 0.0 };
     }
 
     pub fn is_empty(&self) -> bool {
@@ -132,44 +167,41 @@ impl ContactSolver {
     }
 
     /// Adds a point; `world_from_body` turns its remembered impulse into place.
-    pub fn add_point(
-        &mut self,
-        dynamics: &Dynamics,
-        point: ContactPoint,
-        free_velocity_body: &Vector3<f64>,
-        world_from_body: &Matrix3<f64>,
-        h: f64,
-    ) {
+    pub fn add_point(&mut self, dynamics: &Dynamics, point: ContactPoint, world_from_body: &Matrix3<f64>, h: f64) {
         if self.contacts.len() == MAX_CONTACTS {
             return;
         }
         let axes_body = axes_about(&point.normal_body);
-        // Rows of J: n . (v + w x p) = n . v + (p x n) . w, and the leg's part.
-        let mut leg_jacobian = Matrix3::zeros();
-        if point.leg != TRUNK {
-            let leg = &dynamics.legs[point.leg];
-            leg_jacobian = axes_body.tr_mul(&leg.point_jacobian(point.link, &point.position_body));
-        }
-        let mut trunk_rows = Matrix3x6::zeros();
+        let [n, t1, t2] = [axes_body.column(0).into(), axes_body.column(1).into(), axes_body.column(2).into()];
+        let p: &Vector3<f64> = &point.position_body;
+        // Columns of J_0^T: axis . (v + w x p) = axis . v + (p x axis) . w
+        let mut columns =
+            Matrix6x3::from_columns(&[stack(&n, &p.cross(&n)), stack(&t1, &p.cross(&t1)), stack(&t2, &p.cross(&t2))]);
         let mut leg_rows = Matrix3::zeros();
-        for i in 0..3 {
-            let axis: Vector3<f64> = axes_body.column(i).into();
-            let mut row = stack(&axis, &point.position_body.cross(&axis));
-            if point.leg != TRUNK {
-                let leg = &dynamics.legs[point.leg];
-                let u: Vector3<f64> = leg_jacobian.row(i).transpose();
-                row -= leg.gain.tr_mul(&u);
-                leg_rows.set_row(i, &(leg.factor_inverse * u).transpose());
-            }
-            trunk_rows.set_row(i, &dynamics.solve_lower(&row).transpose());
+        if point.leg != TRUNK {
+            // J_0^T - G^T J_l^T and U = J_l C^-T
+            let leg = &dynamics.legs[point.leg];
+            let jacobian = axes_body.tr_mul(&point.leg_jacobian);
+            columns -= leg.gain.tr_mul(&jacobian.transpose());
+            leg_rows = jacobian * leg.factor_inverse.transpose();
         }
-        let local = trunk_rows * trunk_rows.transpose() + leg_rows * leg_rows.transpose();
-        let mut free = axes_body.tr_mul(&(free_velocity_body - point.ground_velocity_body));
+        // W = (L^-1 (J_0 - J_l G)^T)^T
+        let trunk_rows = dynamics.solve_lower_columns(columns);
+        let local = trunk_rows.tr_mul(&trunk_rows) + leg_rows * leg_rows.transpose();
+        let mut free = axes_body.tr_mul(&point.free_slip_body);
         // gap + h v_n >= 0; inside the ground a share of the way back per step.
         let share = if point.gap > 0.0 { 1.0 } else { self.config.penetration_recovery };
         free.x += share * point.gap / h;
+        if let ContactLaw::Convex = self.law {
+            let before = axes_body.tr_mul(&point.slip_body);
+            free.y -= self.kept_slip * before.y;
+            free.z -= self.kept_slip * before.z;
+        }
 
-        let remembered = axes_body.tr_mul(&world_from_body.tr_mul(&self.memory[point.memory]));
+        let remembered = match self.memory[point.memory] {
+            Some(impulse_world) => axes_body.tr_mul(&world_from_body.tr_mul(&impulse_world)),
+            None => Vector3::zeros(),
+        };
         let impulse = into_cone(&remembered, point.friction);
         self.contacts.push(Contact {
             point,
@@ -177,9 +209,10 @@ impl ContactSolver {
             trunk_rows,
             leg_rows,
             local,
-            local_inverse: local.try_inverse().unwrap_or_else(Matrix3::zeros),
+            local_inverse: symmetric_inverse(&local),
             free,
             slip: 0.0,
+            law: self.law,
             impulse,
         });
     }
@@ -202,20 +235,20 @@ impl ContactSolver {
         let mut trunk = Vector6::zeros();
         let mut legs = [Vector3::zeros(); LEGS + 1];
         for contact in &self.contacts {
-            trunk += contact.trunk_rows.tr_mul(&contact.impulse);
+            trunk += contact.trunk_rows * contact.impulse;
             legs[contact.point.leg] += contact.leg_rows.tr_mul(&contact.impulse);
         }
         for _ in 0..self.config.max_sweeps {
             let mut change: f64 = 0.0;
             for contact in &mut self.contacts {
                 let leg = &mut legs[contact.point.leg];
-                let velocity = contact.free + contact.trunk_rows * trunk + contact.leg_rows * *leg;
+                let velocity = contact.free + contact.trunk_rows.tr_mul(&trunk) + contact.leg_rows * *leg;
                 // What the others alone would leave.
                 let others = velocity - contact.local * contact.impulse;
                 let impulse = contact.solve(&others);
                 let step = impulse - contact.impulse;
                 contact.impulse = impulse;
-                trunk += contact.trunk_rows.tr_mul(&step);
+                trunk += contact.trunk_rows * step;
                 *leg += contact.leg_rows.tr_mul(&step);
                 change = change.max((contact.local * step).amax());
             }
@@ -233,9 +266,12 @@ impl ContactSolver {
                 break;
             }
         }
-        self.memory.fill(Vector3::zeros());
+        for memory in self.remembered.drain(..) {
+            self.memory[memory] = None;
+        }
         for contact in &self.contacts {
-            self.memory[contact.point.memory] = world_from_body * contact.impulse_body();
+            self.memory[contact.point.memory] = Some(world_from_body * contact.impulse_body());
+            self.remembered.push(contact.point.memory);
         }
         // dv_0 = L^-T y_0,  ddq_l = C^-T y_l - G dv_0
         let trunk = dynamics.solve_upper(&trunk);
@@ -274,29 +310,48 @@ impl Contact {
         if friction < 1e-9 {
             return Vector3::new(-c.x / a_nn, 0.0, 0.0);
         }
-        // Sliding: v_n = 0, v_t = -s p_t with s > 0 and |p_t| = mu p_n. With p_n eliminated
-        //   (B + s 1) p_t = -d,  B = A_tt - a a^T / a_nn,  d = c_t - a c_n / a_nn,  p_n = -(c_n + a . p_t) / a_nn.
-        let a = Vector2::new(self.local.m12, self.local.m13);
-        let d = Vector2::new(c.y, c.z) - a * (c.x / a_nn);
-        let b11 = self.local.m22 - a.x * a.x / a_nn;
-        let b12 = self.local.m23 - a.x * a.y / a_nn;
-        let b22 = self.local.m33 - a.y * a.y / a_nn;
-        let tangential = |s: f64| {
-            let (m11, m22) = (b11 + s, b22 + s);
-            let inverse = 1.0 / (m11 * m22 - b12 * b12);
-            let p = Vector2::new(b12 * d.y - m22 * d.x, b12 * d.x - m11 * d.y) * inverse;
-            // dp/ds = -(B + s 1)^-1 p
-            let dp = Vector2::new(b12 * p.y - m22 * p.x, b12 * p.x - m11 * p.y) * inverse;
-            (p, dp)
+        // Sliding: v_t = -s p_t with s > 0 and |p_t| = mu p_n; v_n = 0 (Coulomb) or mu |v_t| = mu^2 s p_n (convex):
+        //   (A + s D) p = -c,  D = diag(0 or -mu^2, 1, 1).
+        let weight = match self.law {
+            ContactLaw::Coulomb => 0.0,
+            ContactLaw::Convex => -friction * friction,
         };
-        let normal = |p: &Vector2<f64>| -(c.x + a.dot(p)) / a_nn;
+        let m = &self.local;
+        // p(s), and dp/ds = -(A + s D)^-1 D p; none where A + s D is no longer positive: s is too large.
+        let at = |s: f64| {
+            let (m11, m22, m33) = (m.m11 + s * weight, m.m22 + s, m.m33 + s);
+            let (i11, i12, i13) = (m22 * m33 - m.m23 * m.m23, m.m13 * m.m23 - m.m12 * m33, m.m12 * m.m23 - m.m13 * m22);
+            let determinant = m11 * i11 + m.m12 * i12 + m.m13 * i13;
+            if m11 <= 0.0 || determinant <= 0.0 {
+                return None;
+            }
+            let (i22, i23, i33) = (m11 * m33 - m.m13 * m.m13, m.m12 * m.m13 - m11 * m.m23, m11 * m22 - m.m12 * m.m12);
+            let solve = |v: Vector3<f64>| {
+                let product = Vector3::new(
+                    i11 * v.x + i12 * v.y + i13 * v.z,
+                    i12 * v.x + i22 * v.y + i23 * v.z,
+                    i13 * v.x + i23 * v.y + i33 * v.z,
+                );
+                product / -determinant
+            };
+            let p = solve(*c);
+            Some((p, solve(Vector3::new(weight * p.x, p.y, p.z))))
+        };
         // f(s) = |p_t| - mu p_n has a root in (0, highest]: at 0 the force is outside the cone, at `highest` inside.
+        let a = Vector2::new(m.m12, m.m13);
+        let d = Vector2::new(c.y, c.z) - a * (c.x / a_nn);
         let (mut low, mut high) = (0.0, d.norm() * (a_nn + friction * a.norm()) / (friction * -c.x));
         let mut s = if self.slip > low && self.slip < high { self.slip } else { 0.0 };
+        let mut best = stick;
         for _ in 0..60 {
-            let (p, dp) = tangential(s);
-            let size = p.norm();
-            let f = size - friction * normal(&p);
+            let Some((p, dp)) = at(s) else {
+                high = s;
+                s = 0.5 * (low + high);
+                continue;
+            };
+            best = p;
+            let size = p.y.hypot(p.z);
+            let f = size - friction * p.x;
             if f.abs() <= 1e-14 * size {
                 break;
             }
@@ -305,7 +360,7 @@ impl Contact {
             } else {
                 high = s
             }
-            let slope = p.dot(&dp) / size + friction * a.dot(&dp) / a_nn;
+            let slope = (p.y * dp.y + p.z * dp.z) / size - friction * dp.x;
             let newton = s - f / slope;
             let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
             if next == s {
@@ -314,8 +369,7 @@ impl Contact {
             s = next;
         }
         self.slip = s;
-        let (p, _) = tangential(s);
-        into_cone(&Vector3::new(normal(&p), p.x, p.y), friction)
+        into_cone(&best, friction)
     }
 }
 
@@ -330,6 +384,18 @@ fn into_cone(impulse: &Vector3<f64>, friction: f64) -> Vector3<f64> {
         return *impulse;
     }
     Vector3::new(impulse.x, impulse.y * limit / size, impulse.z * limit / size)
+}
+
+/// The inverse of a symmetric positive matrix by cofactors.
+fn symmetric_inverse(m: &Matrix3<f64>) -> Matrix3<f64> {
+    let i11 = m.m22 * m.m33 - m.m23 * m.m23;
+    let i12 = m.m13 * m.m23 - m.m12 * m.m33;
+    let i13 = m.m12 * m.m23 - m.m13 * m.m22;
+    let i22 = m.m11 * m.m33 - m.m13 * m.m13;
+    let i23 = m.m12 * m.m13 - m.m11 * m.m23;
+    let i33 = m.m11 * m.m22 - m.m12 * m.m12;
+    let determinant = m.m11 * i11 + m.m12 * i12 + m.m13 * i13;
+    Matrix3::new(i11, i12, i13, i12, i22, i23, i13, i23, i33) / determinant
 }
 
 /// The normal and two tangents as columns (Duff et al., "Building an orthonormal basis, revisited", JCGT 6(1), 2017).

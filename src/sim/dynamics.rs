@@ -198,12 +198,14 @@ impl LegDynamics {
         self.origin_body[link] + self.hip.x(&turned)
     }
 
-    /// Rotation from the axes of link `link` to the trunk's.
-    pub fn rotation(&self, link: usize) -> Matrix3<f64> {
+    /// A vector in the trunk's axes seen in the axes of link `link`.
+    #[inline]
+    pub fn into_link(&self, link: usize, v_body: &Vector3<f64>) -> Vector3<f64> {
+        let v = self.hip.x_back(v_body);
         match link {
-            0 => self.hip.matrix_x(),
-            1 => self.hip.matrix_x() * self.thigh.matrix_y(),
-            _ => self.hip.matrix_x() * self.calf.matrix_y(),
+            0 => v,
+            1 => self.thigh.y_back(&v),
+            _ => self.calf.y_back(&v),
         }
     }
 }
@@ -305,6 +307,20 @@ impl Dynamics {
             }
         }
         y
+    }
+
+    /// L^-1 X, three columns at once.
+    #[inline]
+    pub fn solve_lower_columns(&self, mut x: Matrix6x3) -> Matrix6x3 {
+        for k in 0..3 {
+            for j in 0..6 {
+                x[(j, k)] *= self.factor_diagonal_inverse[j];
+                for i in j + 1..6 {
+                    x[(i, k)] -= self.factor[(i, j)] * x[(j, k)];
+                }
+            }
+        }
+        x
     }
 
     /// L^-T x.

@@ -5,6 +5,7 @@
 //! commands give the same bits. Nothing allocates after `new` and `place`.
 
 mod actuator;
+pub mod bench;
 mod collision;
 mod config;
 mod contact;
@@ -21,8 +22,8 @@ mod terrain;
 use nalgebra::Vector3;
 
 pub use config::{
-    ActuatorConfig, ActuatorKind, BlocksConfig, BodyKind, ContactConfig, HardwareLikeConfig, SensorConfig, SimConfig,
-    SimError, SlopeConfig, SolverConfig, StepConfig, StepsConfig, TerrainConfig, TerrainKind,
+    ActuatorConfig, ActuatorKind, BlocksConfig, BodyKind, ContactConfig, ContactLaw, HardwareLikeConfig, SensorConfig,
+    SimConfig, SimError, SlopeConfig, SolverConfig, StepConfig, StepsConfig, TerrainConfig, TerrainKind,
 };
 pub use model::{GRAVITY, Model};
 pub use quantities::{DOF, Energy, FootMotion, Momentum};
@@ -72,7 +73,7 @@ impl Simulator {
         }
         let collider = Collider::new(description, config);
         Ok(Simulator {
-            solver: ContactSolver::new(config.solver, collider.memories()),
+            solver: ContactSolver::new(config.solver, &config.contact, collider.memories()),
             terrain: Terrain::new(&config.terrain),
             actuator: Actuator::new(motor, &description.limits),
             model,
@@ -110,6 +111,11 @@ impl Simulator {
     pub fn smallest_gap(&self) -> f64 {
         let dynamics = Dynamics::new(&self.model, &self.state, &[0.0; JOINTS]);
         self.collider.smallest_gap(&dynamics, &self.state, &self.terrain)
+    }
+
+    /// Number of points that touched, or could have, in the last step.
+    pub fn contact_count(&self) -> usize {
+        self.solver.contacts().len()
     }
 
     /// The steps or blocks on the ground: centre, half edges and direction of the first edge in the horizontal plane, height

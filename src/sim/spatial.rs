@@ -34,14 +34,10 @@ impl Turn {
         Vector3::new(self.cos * v.x + self.sin * v.z, v.y, self.cos * v.z - self.sin * v.x)
     }
 
-    /// Rx as a matrix.
-    pub fn matrix_x(self) -> Matrix3<f64> {
-        Matrix3::new(1.0, 0.0, 0.0, 0.0, self.cos, -self.sin, 0.0, self.sin, self.cos)
-    }
-
-    /// Ry as a matrix.
-    pub fn matrix_y(self) -> Matrix3<f64> {
-        Matrix3::new(self.cos, 0.0, self.sin, 0.0, 1.0, 0.0, -self.sin, 0.0, self.cos)
+    /// Ry^T v.
+    #[inline]
+    pub fn y_back(self, v: &Vector3<f64>) -> Vector3<f64> {
+        Vector3::new(self.cos * v.x - self.sin * v.z, v.y, self.sin * v.x + self.cos * v.z)
     }
 }
 

@@ -31,9 +31,13 @@ impl Simulator {
         self.touched = Touched::default();
         let contact_step = CONTROL_PERIOD_S / f64::from(self.config.step.contact_substeps);
         let flight_step = CONTROL_PERIOD_S / f64::from(self.config.step.flight_substeps);
-        // Free flight as long as nothing can touch within a step; from there on, contact steps to the period's end.
+        // Free flight as long as nothing can touch within a step; from there on, contact steps to the period's end. Where
+        // something touched in the last step, flight is not even tried.
         let mut flown = 0;
-        while flown < self.config.step.flight_substeps && self.flight_step(command, flight_step) {
+        while self.solver.is_empty()
+            && flown < self.config.step.flight_substeps
+            && self.flight_step(command, flight_step)
+        {
             flown += 1;
         }
         let remaining = f64::from(self.config.step.flight_substeps - flown) * flight_step;
@@ -92,7 +96,7 @@ impl Simulator {
     }
 
     fn find_contacts(&mut self, dynamics: &Dynamics, free: &Velocity, dry_friction: &[f64; JOINTS], h: f64) {
-        self.solver.clear();
+        self.solver.start(h);
         let world_from_body = self.world_from_body();
         let (state, terrain, world_from_body) = (&self.state, &self.terrain, &world_from_body);
         let moment = Moment { dynamics, state, terrain, world_from_body, free, h };

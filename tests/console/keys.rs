@@ -350,7 +350,9 @@ fn every_action_has_a_name_a_key_and_a_line_of_help() {
 
 #[test]
 fn key_names_are_read_as_they_are_shown() {
-    for name in ["g", "A", "?", "=", "-", "+", "Space", "Enter", "Esc", "Tab", "Shift-Tab", "PgUp", "F12", "Ctrl-C", "Alt-x"] {
+    for name in
+        ["g", "A", "?", "=", "-", "+", "Space", "Enter", "Esc", "Tab", "Shift-Tab", "PgUp", "F12", "Ctrl-C", "Alt-x"]
+    {
         let key: Key = name.parse().expect(name);
         assert_eq!(key.to_string(), name);
     }

@@ -121,7 +121,9 @@ fn ascii_is_ascii_on_every_screen() {
 fn the_review_shows_what_was_measured_and_what_the_rules_think() {
     let mut console = Console::review(Mode::Review, Verdict::Accept);
     let screen = console.screen(80, 24);
-    for part in ["Trial #0: judge it", "0.420 m", "apex +0.300 m", "looks like accept: landed and", "a accept (suggested)"] {
+    for part in
+        ["Trial #0: judge it", "0.420 m", "apex +0.300 m", "looks like accept: landed and", "a accept (suggested)"]
+    {
         assert!(screen.contains(part), "lacks {part}:\n{screen}");
     }
     console = Console::review(Mode::Damped, Verdict::Fall);

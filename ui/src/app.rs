@@ -47,7 +47,8 @@ impl ConsoleOptions {
     pub fn new(settings: Settings, colours: Option<ColourChoice>, ascii: bool, low_bandwidth: bool) -> ConsoleOptions {
         let mut settings = settings;
         if low_bandwidth {
-            settings.colours = if settings.colours == ColourChoice::None { ColourChoice::None } else { ColourChoice::Named };
+            settings.colours =
+                if settings.colours == ColourChoice::None { ColourChoice::None } else { ColourChoice::Named };
             settings.frames_per_second = settings.frames_per_second.min(LOW_BANDWIDTH_FRAMES);
             settings.chart_mode = ChartMode::Sweep;
         }

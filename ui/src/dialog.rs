@@ -148,8 +148,13 @@ impl OverrideForm {
                 true
             }
             Ok(value) => {
-                self.problem =
-                    Some(format!("{} = {value} {u} is outside {} to {} {u}", row.name, row.low, row.high, u = row.unit));
+                self.problem = Some(format!(
+                    "{} = {value} {u} is outside {} to {} {u}",
+                    row.name,
+                    row.low,
+                    row.high,
+                    u = row.unit
+                ));
                 false
             }
             Err(_) => {
@@ -271,9 +276,8 @@ fn override_key(model: &mut Model, key: Key, mut form: OverrideForm) -> Vec<Effe
         KeyCode::Enter => {
             if form.take_typed() {
                 let changed = form.rows.iter().filter(|row| row.value != row.before);
-                let intents: Vec<Intent> = changed
-                    .map(|row| Intent::Override { parameter: row.name.clone(), value: row.value })
-                    .collect();
+                let intents: Vec<Intent> =
+                    changed.map(|row| Intent::Override { parameter: row.name.clone(), value: row.value }).collect();
                 if intents.is_empty() {
                     return cancelled(model, "nothing was changed");
                 }
@@ -311,7 +315,9 @@ fn field_key(model: &mut Model, key: Key, purpose: Purpose, mut input: Input) ->
             }
         },
         // Space is STOP while the robot is armed, so a note needs another key for it.
-        KeyCode::Char('_') if key.typed().is_some() && model.robot_needs_us() && matches!(purpose, Purpose::Note(_)) => {
+        KeyCode::Char('_')
+            if key.typed().is_some() && model.robot_needs_us() && matches!(purpose, Purpose::Note(_)) =>
+        {
             input.handle(InputRequest::InsertChar(' '));
         }
         _ => edit(&mut input, key),
@@ -391,4 +397,3 @@ fn edit(input: &mut Input, key: Key) {
     };
     input.handle(request);
 }
-

@@ -84,7 +84,9 @@ impl Feed {
             Feed::Live(handle) => {
                 // Records before ticks: a tick may belong to a trial that a record opens.
                 news.extend(std::iter::from_fn(|| handle.next_record()).take(BATCH).map(Msg::Record));
-                news.extend(std::iter::from_fn(|| handle.next_tick()).take(BATCH).map(|tick| Msg::Tick(Box::new(tick))));
+                news.extend(
+                    std::iter::from_fn(|| handle.next_tick()).take(BATCH).map(|tick| Msg::Tick(Box::new(tick))),
+                );
                 news.push(Msg::Snapshot(Box::new(handle.snapshot())));
             }
             Feed::Replay(replay) => replay.take(elapsed_ns, &mut news),

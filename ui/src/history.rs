@@ -86,7 +86,10 @@ impl History {
         if let Some(trial) = sample.trial {
             let trace = self.traces.entry(trial).or_default();
             // A trial that starts again (a cancelled countdown, a replay) replaces its trace.
-            if trace.last().is_some_and(|last| last.time_ns >= sample.time_ns || last.trial_time_s > sample.trial_time_s) {
+            if trace
+                .last()
+                .is_some_and(|last| last.time_ns >= sample.time_ns || last.trial_time_s > sample.trial_time_s)
+            {
                 trace.clear();
             }
             if trace.len() < TRACE_CAPACITY {

@@ -103,7 +103,8 @@ impl FromStr for Key {
 
     fn from_str(text: &str) -> Result<Key, UnknownKey> {
         let unknown = || UnknownKey(text.to_owned());
-        let named = |name: &str| NAMES.iter().find(|(known, _)| known.eq_ignore_ascii_case(name)).map(|(_, code)| *code);
+        let named =
+            |name: &str| NAMES.iter().find(|(known, _)| known.eq_ignore_ascii_case(name)).map(|(_, code)| *code);
         let mut rest = text;
         let mut modifiers = KeyModifiers::NONE;
         let code = loop {

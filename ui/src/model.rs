@@ -32,8 +32,7 @@ pub enum View {
 
 impl View {
     /// All views in the order of their tabs.
-    pub const ALL: [View; 6] =
-        [View::Live, View::Trials, View::Optimizer, View::Override, View::Health, View::Log];
+    pub const ALL: [View; 6] = [View::Live, View::Trials, View::Optimizer, View::Override, View::Health, View::Log];
 
     /// The word on its tab.
     pub const fn name(self) -> &'static str {
@@ -338,7 +337,11 @@ impl Model {
 
     /// The trial that a note would be about.
     pub fn trial_for_note(&self) -> Option<&TrialRecord> {
-        if self.view == View::Trials { self.selected_trial() } else { self.under_review().or(self.trials.values().next_back()) }
+        if self.view == View::Trials {
+            self.selected_trial()
+        } else {
+            self.under_review().or(self.trials.values().next_back())
+        }
     }
 
     /// The lines of the log that its filter lets through, oldest first.

@@ -14,11 +14,11 @@ use std::time::Duration;
 
 use crossterm::cursor::{Hide, Show};
 use crossterm::event::{DisableBracketedPaste, EnableBracketedPaste};
+use crossterm::queue;
 use crossterm::style::ResetColor;
 use crossterm::terminal::{
     Clear, ClearType, EnterAlternateScreen, LeaveAlternateScreen, disable_raw_mode, enable_raw_mode, size,
 };
-use crossterm::queue;
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use ratatui::backend::{self, Backend, CrosstermBackend, WindowSize};
 use ratatui::buffer::Cell;
@@ -36,7 +36,9 @@ const HANG_UP_PERIOD_MS: u16 = 200;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum TerminalError {
     /// Input or output is no terminal.
-    #[error("the console needs a terminal, but {0} is none; over SSH use `ssh -t`, for a study without a screen use `quadfrog optimize`")]
+    #[error(
+        "the console needs a terminal, but {0} is none; over SSH use `ssh -t`, for a study without a screen use `quadfrog optimize`"
+    )]
     NoTerminal(
         /// Which of the two.
         &'static str,
@@ -45,7 +47,9 @@ pub enum TerminalError {
     #[error("the terminal does not say how large it is; set it with `stty rows {MIN_ROWS} columns {MIN_COLUMNS}`")]
     NoSize,
     /// Too small.
-    #[error("the terminal has {columns}x{rows} characters, the console needs at least {MIN_COLUMNS}x{MIN_ROWS}; enlarge it")]
+    #[error(
+        "the terminal has {columns}x{rows} characters, the console needs at least {MIN_COLUMNS}x{MIN_ROWS}; enlarge it"
+    )]
     TooSmall {
         /// Its columns.
         columns: u16,

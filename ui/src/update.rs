@@ -185,7 +185,11 @@ fn interrupt(model: &mut Model) -> Vec<Effect> {
         return vec![Effect::Quit];
     }
     let effects = stop(model, "STOP");
-    let text = if effects.is_empty() { "Ctrl-C again within 2 s quits" } else { "STOP: damping. Ctrl-C again within 2 s quits" };
+    let text = if effects.is_empty() {
+        "Ctrl-C again within 2 s quits"
+    } else {
+        "STOP: damping. Ctrl-C again within 2 s quits"
+    };
     say(model, Level::Warning, text.to_owned());
     effects
 }
@@ -508,7 +512,10 @@ fn take_record(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
     let mut bells = Vec::new();
     match stamped.record {
         Record::Session(info) => {
-            let text = format!("{} on {} ({}), {} {}, seed {}", info.task, info.robot, info.backend, info.sampler, info.version, info.seed);
+            let text = format!(
+                "{} on {} ({}), {} {}, seed {}",
+                info.task, info.robot, info.backend, info.sampler, info.version, info.seed
+            );
             model.session = info;
             log(model, time_ns, Level::Info, "session", text, false);
         }
@@ -521,7 +528,10 @@ fn take_record(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
             };
             if stopped {
                 model.stopped_because = change.cause.clone();
-                say(model, level, format!("{}: {}", change.to.name(), change.cause));
+                // The key that stopped has been answered already.
+                if !model.message.as_ref().is_some_and(|message| message.text.starts_with("STOP")) {
+                    say(model, level, format!("{}: {}", change.to.name(), change.cause));
+                }
             }
             if change.to == Mode::Fault {
                 bells.push(BellCause::Fault);
@@ -609,7 +619,8 @@ fn log_trial(model: &mut Model, time_ns: u64, trial: &TrialRecord) {
     let text = match (trial.verdict, trial.suggested) {
         (Some(verdict), _) if !known(|t| t.verdict) => {
             let value = trial.value.map(|v| format!(", J = {v:.3} {}", model.session.unit)).unwrap_or_default();
-            let source = if trial.source == Source::Sampler { String::new() } else { format!(" ({})", trial.source.name()) };
+            let source =
+                if trial.source == Source::Sampler { String::new() } else { format!(" ({})", trial.source.name()) };
             format!("trial {}{source}: {}{value}", trial.trial, verdict.name())
         }
         (None, Some(verdict)) if !known(|t| t.suggested) => {

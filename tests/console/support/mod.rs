@@ -125,7 +125,8 @@ impl Console {
 }
 
 pub fn session() -> SessionInfo {
-    let parameter = |name: &str, unit: &str, low, high| ParameterInfo { name: name.into(), unit: unit.into(), low, high };
+    let parameter =
+        |name: &str, unit: &str, low, high| ParameterInfo { name: name.into(), unit: unit.into(), low, high };
     SessionInfo {
         version: "0.1.0".into(),
         backend: "sim".into(),
@@ -174,7 +175,8 @@ pub fn trial(number: u32, verdict: Option<Verdict>, suggested: Option<Verdict>) 
         value,
         hand_value: None,
         suggested,
-        cause: if suggested == Some(Verdict::Fall) { "roll 1.20 rad, allowed 1.00" } else { "landed and settled" }.into(),
+        cause: if suggested == Some(Verdict::Fall) { "roll 1.20 rad, allowed 1.00" } else { "landed and settled" }
+            .into(),
         verdict,
         note: String::new(),
         risk: None,

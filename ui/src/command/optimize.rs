@@ -14,14 +14,14 @@ use quadfrog::engine::{self, EngineError, Options};
 use quadfrog::optimize::journal::Durability;
 use quadfrog::realtime::command::Task;
 use quadfrog::realtime::telemetry::Tick;
-use quadfrog::recording::record::{Record, Stamped, TrialRecord};
+use quadfrog::recording::record::{Measured, Record, Stamped, TrialRecord, Verdict};
 use quadfrog::recording::writer::Writer;
 use quadfrog::report::table;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::session::automatic;
 use quadfrog::session::rollout::Rollout;
 use quadfrog::sim::Simulator;
-use serde_json::{Map, Value, json};
+use serde::{Serialize, Serializer};
 
 use super::study::{Chosen, continued};
 use super::{Failure, StudyArguments, TaskName};
@@ -234,7 +234,6 @@ struct Printer {
     several: bool,
     bar: Option<ProgressBar>,
     units: HashMap<String, String>,
-    budget: u32,
     output: Mutex<()>,
 }
 
@@ -247,18 +246,23 @@ impl Printer {
             bar.with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
         });
         let units = Task::ALL.iter().flat_map(|task| config.parameters(*task)).map(|p| (p.name, p.unit)).collect();
-        Printer { json: arguments.json, several: studies.len() > 1, bar, units, budget, output: Mutex::new(()) }
+        Printer { json: arguments.json, several: studies.len() > 1, bar, units, output: Mutex::new(()) }
     }
 
     fn trial(&self, study: &Chosen, row: &TrialRecord) {
         let _alone = self.output.lock();
         if self.json {
-            let mut object = json_of(row);
-            if self.several {
-                object.insert("task".to_owned(), json!(study.task.name()));
-                object.insert("seed".to_owned(), json!(study.seed));
-            }
-            say(&Value::Object(object).to_string());
+            let line = JsonLine {
+                task: self.several.then(|| study.task.name()),
+                seed: self.several.then_some(study.seed),
+                trial: row.trial,
+                params: &row.parameters,
+                value: row.value,
+                verdict: row.verdict,
+                measured: row.measured,
+            };
+            // Numbers and names: there is nothing in it that JSON cannot say.
+            say(&serde_json::to_string(&line).unwrap_or_default());
         }
         let line = table::line(row, study.task.unit(), &self.units);
         match &self.bar {
@@ -284,7 +288,6 @@ impl Printer {
             None => "No trial was accepted.\n".to_owned(),
         };
         text += &format!("The study is in {}\n", study.folder.display());
-        debug_assert!(self.budget > 0);
         let print = || if self.json { eprint!("{text}") } else { say(text.trim_end()) };
         match &self.bar {
             Some(bar) => bar.suspend(print),
@@ -306,14 +309,21 @@ fn say(line: &str) {
     let _ = writeln!(std::io::stdout(), "{line}");
 }
 
-fn json_of(row: &TrialRecord) -> Map<String, Value> {
-    let parameters: Map<String, Value> =
-        row.parameters.iter().map(|(name, value)| (name.clone(), json!(value))).collect();
-    let mut object = Map::new();
-    object.insert("trial".to_owned(), json!(row.trial));
-    object.insert("params".to_owned(), Value::Object(parameters));
-    object.insert("value".to_owned(), json!(row.value));
-    object.insert("verdict".to_owned(), json!(row.verdict));
-    object.insert("measured".to_owned(), json!(row.measured));
-    object
+/// A finished trial as the JSON line says it; task and seed only where several studies run at once.
+#[derive(Serialize)]
+struct JsonLine<'a> {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    task: Option<&'a str>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    seed: Option<u32>,
+    trial: u32,
+    #[serde(serialize_with = "in_table_order")]
+    params: &'a [(String, f64)],
+    value: Option<f64>,
+    verdict: Option<Verdict>,
+    measured: Option<Measured>,
+}
+
+fn in_table_order<S: Serializer>(parameters: &&[(String, f64)], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_map(parameters.iter().map(|(name, value)| (name, value)))
 }

@@ -87,7 +87,9 @@ fn recording(model: &Model) -> Vec<Span<'static>> {
     match (model.session.recording.is_empty(), counters.ticks_not_recorded) {
         (true, _) => vec![span(theme, Role::Quiet, format!("not recording {elapsed} "))],
         (false, 0) => vec![span(theme, Role::Good, "REC "), Span::raw(format!("{elapsed} "))],
-        (false, lost) => vec![span(theme, Role::Bad, format!("REC {lost} ticks lost ")), Span::raw(format!("{elapsed} "))],
+        (false, lost) => {
+            vec![span(theme, Role::Bad, format!("REC {lost} ticks lost ")), Span::raw(format!("{elapsed} "))]
+        }
     }
 }
 

@@ -52,7 +52,11 @@ fn timing_rows(model: &Model) -> Vec<Row> {
     vec![
         row("ticks", tick.number.to_string(), false),
         row("late ticks", format!("{} ({:.3} %)", counters.late_ticks, share * 100.0), share > 0.001),
-        row("worst", format!("{:.2} ms late", counters.worst_lateness_ns as f64 / 1e6), counters.worst_lateness_ns > 10_000_000),
+        row(
+            "worst",
+            format!("{:.2} ms late", counters.worst_lateness_ns as f64 / 1e6),
+            counters.worst_lateness_ns > 10_000_000,
+        ),
         row("this tick", format!("{} late", micro(tick.stages.lateness_ns)), false),
         row("  read", micro(tick.stages.read_ns), false),
         row("  decide", micro(tick.stages.decide_ns), false),
@@ -65,7 +69,11 @@ fn recorder_rows(model: &Model) -> Vec<Row> {
     let file = if model.session.recording.is_empty() { "none" } else { &model.session.recording };
     vec![
         row("recording", file.to_owned(), model.session.recording.is_empty() && model.replay.is_none()),
-        row("study", if model.session.study.is_empty() { "none".to_owned() } else { model.session.study.clone() }, false),
+        row(
+            "study",
+            if model.session.study.is_empty() { "none".to_owned() } else { model.session.study.clone() },
+            false,
+        ),
         row("not recorded", format!("{} ticks", counters.ticks_not_recorded), counters.ticks_not_recorded > 0),
         row("not shown", format!("{} ticks", counters.ticks_not_shown), false),
         row("refused", format!("{} commands", counters.commands_refused), false),
@@ -75,7 +83,11 @@ fn recorder_rows(model: &Model) -> Vec<Row> {
 fn robot_rows(model: &Model) -> Vec<Row> {
     let tick = &model.snapshot.tick;
     let mut rows = vec![
-        row("state age", format!("{} ms", model.snapshot.counters.state_age_ms), model.snapshot.counters.state_age_ms > 5),
+        row(
+            "state age",
+            format!("{} ms", model.snapshot.counters.state_age_ms),
+            model.snapshot.counters.state_age_ms > 5,
+        ),
         row("robot's clock", format!("{:.1} s", f64::from(tick.state.robot_time_ms) / 1e3), false),
     ];
     match tick.state.battery {
@@ -86,7 +98,7 @@ fn robot_rows(model: &Model) -> Vec<Row> {
             rows.push(row("battery", format!("{:.0} %", battery.charge_percent), battery.charge_percent < 30.0));
             rows.push(row("", format!("{:.1} V, {:.1} A", battery.voltage_v, battery.current_a), false));
             if !cells.is_empty() {
-                rows.push(row("cells", format!("{low:.3} to {high:.3} V", ), high - low > 0.1));
+                rows.push(row("cells", format!("{low:.3} to {high:.3} V",), high - low > 0.1));
             }
         }
         None => rows.push(row("battery", "none".to_owned(), false)),

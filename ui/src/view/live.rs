@@ -58,13 +58,7 @@ fn signals(set: SeriesSet) -> [Signal; 6] {
                 ranges: &[(0.0, 0.5), (0.0, 1.0), (0.0, 2.0)],
                 role: SeriesA,
             },
-            Signal {
-                name: "oscillator",
-                unit: "rad",
-                value: |s| s.theta,
-                ranges: &[(0.0, 6.3)],
-                role: SeriesB,
-            },
+            Signal { name: "oscillator", unit: "rad", value: |s| s.theta, ranges: &[(0.0, 6.3)], role: SeriesB },
             force("FL force", |s| s.foot_force[Leg::FL as usize], SeriesA),
             force("FR force", |s| s.foot_force[Leg::FR as usize], SeriesA),
             force("RL force", |s| s.foot_force[Leg::RL as usize], SeriesB),
@@ -81,8 +75,7 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let [charts, _, side] =
         Layout::horizontal([Constraint::Fill(1), Constraint::Length(1), Constraint::Length(side)]).areas(upper);
     let card_rows = proposal::rows(model).min(side.height.saturating_sub(5));
-    let [card, objective_area] =
-        Layout::vertical([Constraint::Length(card_rows), Constraint::Fill(1)]).areas(side);
+    let [card, objective_area] = Layout::vertical([Constraint::Length(card_rows), Constraint::Fill(1)]).areas(side);
     if area.width >= 120 && charts.height >= 24 {
         let [charts, joints] = Layout::vertical([Constraint::Fill(1), Constraint::Length(9)]).areas(charts);
         render_charts(frame, charts, model);
@@ -107,9 +100,7 @@ fn render_charts(frame: &mut Frame, area: Rect, model: &Model) {
     let ghost = model.live.ghost.and_then(|trial| history.trace(trial));
     let cursor_ns = model.live.frozen.is_some().then_some(model.live.cursor_ns);
     let rows = Layout::vertical([Constraint::Fill(1); 3]).split(charts);
-    let columns = |area: Rect| -> [Rect; 2] {
-        Layout::horizontal([Constraint::Fill(1); 2]).spacing(1).areas(area)
-    };
+    let columns = |area: Rect| -> [Rect; 2] { Layout::horizontal([Constraint::Fill(1); 2]).spacing(1).areas(area) };
     for (index, signal) in signals(model.live.series).into_iter().enumerate() {
         let cell = columns(rows[index / 2])[index % 2];
         Chart { signal, axis, history, ghost, cursor_ns, theme }.draw(frame.buffer_mut(), cell);

@@ -76,8 +76,10 @@ fn render_scatter(frame: &mut Frame, area: Rect, model: &Model, index: usize) {
     buffer.set_string(right, scale.y, high, theme.style(Role::Quiet));
     if let Some(proposed) = proposed {
         let text = format!("{} now", number(proposed.value));
-        let at = (column(proposed.value).saturating_sub(text.len() as u16 / 2))
-            .clamp(scale.x + low.len() as u16 + 1, right.saturating_sub(text.len() as u16 + 1).max(scale.x + low.len() as u16 + 1));
+        let at = (column(proposed.value).saturating_sub(text.len() as u16 / 2)).clamp(
+            scale.x + low.len() as u16 + 1,
+            right.saturating_sub(text.len() as u16 + 1).max(scale.x + low.len() as u16 + 1),
+        );
         buffer.set_string(at, scale.y, text, theme.style(Role::Text));
     }
 }

@@ -46,7 +46,11 @@ fn rows(model: &Model, on_table: &Proposal) -> Vec<Line<'static>> {
         let Some(info) = model.parameter(&p.name) else { continue };
         let selected = index == model.override_row;
         let mut spans = vec![
-            span(theme, if selected { Role::Key } else { Role::Text }, format!("{} {:<5}", if selected { ">" } else { " " }, p.name)),
+            span(
+                theme,
+                if selected { Role::Key } else { Role::Text },
+                format!("{} {:<5}", if selected { ">" } else { " " }, p.name),
+            ),
             Span::raw(format!("{:>8} {:<4}", number(p.value), info.unit)),
             span(theme, Role::Quiet, format!("{:>8} ", number(info.low))),
             span(theme, Role::Quiet, proposal::place(theme, p.value, info.low, info.high, 30)),

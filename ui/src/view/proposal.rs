@@ -169,6 +169,10 @@ fn finished(model: &Model, width: usize) -> Vec<Line<'static>> {
         lines.push(parameter(model, &p, width));
     }
     let more = model.keymap.key(Action::Continue);
-    lines.push(Line::from(vec![Span::raw(" "), span(theme, Role::Key, more), span(theme, Role::Quiet, " gives it more trials")]));
+    lines.push(Line::from(vec![
+        Span::raw(" "),
+        span(theme, Role::Key, more),
+        span(theme, Role::Quiet, " gives it more trials"),
+    ]));
     lines
 }

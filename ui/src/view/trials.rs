@@ -52,7 +52,8 @@ fn summary(model: &Model) -> String {
 /// The columns between the number and the value: title and text of a trial.
 fn middle_columns(model: &Model) -> Vec<(String, Box<dyn Fn(&TrialRecord) -> String>)> {
     let measured = |title: &str, of: fn(&quadfrog::recording::record::Measured) -> f64| {
-        let text = move |trial: &TrialRecord| trial.measured.as_ref().map_or("-".to_owned(), |m| format!("{:+.3}", of(m)));
+        let text =
+            move |trial: &TrialRecord| trial.measured.as_ref().map_or("-".to_owned(), |m| format!("{:+.3}", of(m)));
         (title.to_owned(), Box::new(text) as Box<dyn Fn(&TrialRecord) -> String>)
     };
     match model.trials_view.columns {
@@ -63,7 +64,11 @@ fn middle_columns(model: &Model) -> Vec<(String, Box<dyn Fn(&TrialRecord) -> Str
             .map(|info| {
                 let name = info.name.clone();
                 let text = move |trial: &TrialRecord| {
-                    trial.parameters.iter().find(|(n, _)| *n == name).map_or("-".to_owned(), |(_, value)| number(*value))
+                    trial
+                        .parameters
+                        .iter()
+                        .find(|(n, _)| *n == name)
+                        .map_or("-".to_owned(), |(_, value)| number(*value))
                 };
                 (format!("{} {}", info.name, info.unit), Box::new(text) as Box<dyn Fn(&TrialRecord) -> String>)
             })
@@ -89,7 +94,12 @@ pub fn render_table(frame: &mut Frame, area: Rect, model: &Model, full: bool) {
     for (name, _) in &columns {
         title.push_str(&format!("{name:>8} "));
     }
-    title.push_str(&format!("{:>8}   {:<9} {:<9} cause, note", format!("J {}", model.session.unit), "verdict", "source"));
+    title.push_str(&format!(
+        "{:>8}   {:<9} {:<9} cause, note",
+        format!("J {}", model.session.unit),
+        "verdict",
+        "source"
+    ));
     let width = usize::from(area.width);
     frame.render_widget(Line::from(span(theme, Role::Heading, cut(&title, width))), Rect { height: 1, ..area });
     let rows: Vec<&TrialRecord> = if full { model.table() } else { model.trials.values().collect() };
@@ -201,7 +211,12 @@ pub fn as_text(trial: &TrialRecord, model: &Model) -> String {
     }
     let value = trial.value.map_or("-".to_owned(), |value| value.to_string());
     let verdict = trial.verdict.map_or("-", Verdict::name);
-    text.push_str(&format!("\tJ={value} {}\t{verdict}\t{}\t{}", model.session.unit, trial.source.name(), remark(trial)));
+    text.push_str(&format!(
+        "\tJ={value} {}\t{verdict}\t{}\t{}",
+        model.session.unit,
+        trial.source.name(),
+        remark(trial)
+    ));
     text
 }
 
