@@ -6,8 +6,8 @@
 use std::fs::File;
 use std::io::{self, IsTerminal, Write};
 use std::os::fd::AsFd;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, channel, sync_channel};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration;
@@ -20,7 +20,9 @@ use crossterm::terminal::{
     Clear, ClearType, EnterAlternateScreen, LeaveAlternateScreen, disable_raw_mode, enable_raw_mode, size,
 };
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
-use ratatui::backend::CrosstermBackend;
+use ratatui::backend::{self, Backend, CrosstermBackend, WindowSize};
+use ratatui::buffer::Cell;
+use ratatui::layout::{Position, Size};
 use ratatui::{Terminal, TerminalOptions, Viewport};
 
 use crate::view::{MIN_COLUMNS, MIN_ROWS};
@@ -80,8 +82,8 @@ pub fn check() -> Result<(), TerminalError> {
 /// What the frame writer and its owner share.
 #[derive(Default)]
 struct Shared {
-    /// A frame is on its way.
-    busy: AtomicBool,
+    /// Pieces of frames on their way to the terminal.
+    waiting: AtomicUsize,
     /// The terminal cannot be written to any more.
     broken: AtomicBool,
     /// Bytes written.
@@ -91,7 +93,7 @@ struct Shared {
 /// Takes the bytes of a frame and hands them to the writing thread when the frame is complete.
 pub struct FrameWriter {
     frame: Vec<u8>,
-    frames: SyncSender<Vec<u8>>,
+    frames: Sender<Vec<u8>>,
     shared: Arc<Shared>,
 }
 
@@ -104,7 +106,7 @@ impl Write for FrameWriter {
     /// Ends the frame.
     fn flush(&mut self) -> io::Result<()> {
         if !self.frame.is_empty() {
-            self.shared.busy.store(true, Ordering::Release);
+            self.shared.waiting.fetch_add(1, Ordering::AcqRel);
             let gone = |_| io::Error::from(io::ErrorKind::BrokenPipe);
             self.frames.send(std::mem::take(&mut self.frame)).map_err(gone)?;
         }
@@ -123,7 +125,59 @@ fn write_frames(frames: &Receiver<Vec<u8>>, shared: &Shared, mut terminal: File)
                 Err(_) => shared.broken.store(true, Ordering::Release),
             }
         }
-        shared.busy.store(false, Ordering::Release);
+        shared.waiting.fetch_sub(1, Ordering::AcqRel);
+    }
+}
+
+/// The terminal as something that is written to and never asked. ratatui asks for the cursor's position whenever it
+/// clears; the answer would have to come through the thread that reads keys, and over a slow link after a long wait.
+struct OneWay(CrosstermBackend<FrameWriter>);
+
+impl Backend for OneWay {
+    type Error = io::Error;
+
+    fn draw<'a, I>(&mut self, content: I) -> io::Result<()>
+    where
+        I: Iterator<Item = (u16, u16, &'a Cell)>,
+    {
+        self.0.draw(content)
+    }
+
+    fn hide_cursor(&mut self) -> io::Result<()> {
+        self.0.hide_cursor()
+    }
+
+    fn show_cursor(&mut self) -> io::Result<()> {
+        self.0.show_cursor()
+    }
+
+    /// The cursor is hidden and moved by every write: where it stands means nothing.
+    fn get_cursor_position(&mut self) -> io::Result<Position> {
+        Ok(Position::ORIGIN)
+    }
+
+    fn set_cursor_position<P: Into<Position>>(&mut self, position: P) -> io::Result<()> {
+        self.0.set_cursor_position(position)
+    }
+
+    fn clear(&mut self) -> io::Result<()> {
+        self.0.clear()
+    }
+
+    fn clear_region(&mut self, region: backend::ClearType) -> io::Result<()> {
+        self.0.clear_region(region)
+    }
+
+    fn size(&self) -> io::Result<Size> {
+        self.0.size()
+    }
+
+    fn window_size(&mut self) -> io::Result<WindowSize> {
+        self.0.window_size()
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Backend::flush(&mut self.0)
     }
 }
 
@@ -134,7 +188,7 @@ static PANICKED: Mutex<Option<String>> = Mutex::new(None);
 
 /// The terminal while the console has it. Dropping it gives it back.
 pub struct Screen {
-    terminal: Option<Terminal<CrosstermBackend<FrameWriter>>>,
+    terminal: Option<Terminal<OneWay>>,
     shared: Arc<Shared>,
     writer: Option<JoinHandle<()>>,
     hung_up: bool,
@@ -149,14 +203,15 @@ impl Screen {
     pub fn enter() -> io::Result<Screen> {
         let terminal = own_file()?;
         let shared = Arc::new(Shared::default());
-        // A frame at a time: `ready` is asked before the next one is drawn, so sending never waits.
-        let (frames, received) = sync_channel(4);
+        // `ready` is asked before a frame is drawn, so no more than one frame is ever in the channel.
+        let (frames, received) = channel();
         let for_writer = shared.clone();
         let writer = std::thread::Builder::new()
             .name("screen".into())
             .spawn(move || write_frames(&received, &for_writer, terminal))?;
         install_panic_hook();
-        let backend = CrosstermBackend::new(FrameWriter { frame: Vec::new(), frames, shared: shared.clone() });
+        let writer_end = FrameWriter { frame: Vec::new(), frames, shared: shared.clone() };
+        let backend = OneWay(CrosstermBackend::new(writer_end));
         let terminal = Terminal::with_options(backend, TerminalOptions { viewport: Viewport::Fullscreen })?;
         let mut screen = Screen { terminal: Some(terminal), shared, writer: Some(writer), hung_up: false };
         screen.take()?;
@@ -171,7 +226,7 @@ impl Screen {
         enable_raw_mode()?;
         ENTERED.store(true, Ordering::Release);
         if let Some(terminal) = &mut self.terminal {
-            let writer = terminal.backend_mut();
+            let writer = &mut terminal.backend_mut().0;
             queue!(writer, EnterAlternateScreen, EnableBracketedPaste, Hide, Clear(ClearType::All))?;
             terminal.clear()?;
         }
@@ -186,7 +241,7 @@ impl Screen {
 
     /// Whether the last frame is written, so that another can be drawn without waiting.
     pub fn ready(&self) -> bool {
-        !self.shared.busy.load(Ordering::Acquire)
+        self.shared.waiting.load(Ordering::Acquire) == 0
     }
 
     /// Whether writing to the terminal failed.
@@ -224,9 +279,9 @@ impl Screen {
     /// When the writing thread is gone.
     pub fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
         let Some(terminal) = &mut self.terminal else { return Ok(()) };
-        let writer = terminal.backend_mut();
+        let writer = &mut terminal.backend_mut().0;
         writer.write_all(bytes)?;
-        writer.flush()
+        Write::flush(writer)
     }
 
     /// The terminal is gone: nothing more is written to it, not even what would restore it.
@@ -285,8 +340,9 @@ fn give_back() {
         }
         let _ = done.send(());
     });
-    if writing.is_ok() && finished.recv_timeout(LEAVE_TIMEOUT) == Err(RecvTimeoutError::Timeout) {
-        // The bytes may still come out later, when somebody reads again.
+    if writing.is_ok() {
+        // After a time-out the bytes may still come out later, when somebody reads again.
+        let _ = finished.recv_timeout(LEAVE_TIMEOUT);
     }
     let _ = disable_raw_mode();
 }

@@ -528,7 +528,10 @@ fn take_record(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
             };
             if stopped {
                 model.stopped_because = change.cause.clone();
-                say(model, level, format!("{}: {}", change.to.name(), change.cause));
+                // The key that stopped has been answered already.
+                if !model.message.as_ref().is_some_and(|message| message.text.starts_with("STOP")) {
+                    say(model, level, format!("{}: {}", change.to.name(), change.cause));
+                }
             }
             if change.to == Mode::Fault {
                 bells.push(BellCause::Fault);

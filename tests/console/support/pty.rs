@@ -1,0 +1,210 @@
+//! The real program in a real terminal: a pseudo-terminal whose screen is kept by `vt100`.
+
+#![allow(dead_code, reason = "each test program uses a part")]
+
+use std::io::{Read, Write};
+use std::num::NonZeroU16;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard};
+use std::time::{Duration, Instant};
+
+use nix::sys::signal::{Signal, kill};
+use nix::unistd::Pid;
+use portable_pty::{Child, CommandBuilder, ExitStatus, MasterPty, PtySize, native_pty_system};
+
+/// Longer than anything a test waits for: only a defect takes this long.
+const PATIENCE: Duration = Duration::from_secs(30);
+
+/// What came out of the terminal so far.
+struct Output {
+    parser: vt100::Parser,
+    bytes: Vec<u8>,
+}
+
+/// A program in a terminal.
+pub struct Session {
+    master: Option<Box<dyn MasterPty + Send>>,
+    writer: Option<Box<dyn Write + Send>>,
+    child: Box<dyn Child + Send + Sync>,
+    output: Arc<Mutex<Output>>,
+    reading: Arc<AtomicBool>,
+    closed: Arc<AtomicBool>,
+    pub folder: PathBuf,
+}
+
+fn nonzero(value: u16) -> NonZeroU16 {
+    NonZeroU16::new(value).expect("a size")
+}
+
+impl Session {
+    /// Starts `quadfrog --output folder`, with further arguments.
+    pub fn start(folder: &Path, (columns, rows): (u16, u16), arguments: &[&str]) -> Session {
+        let mut command = CommandBuilder::new(env!("CARGO_BIN_EXE_quadfrog"));
+        command.arg("--output");
+        command.arg(folder);
+        command.args(arguments);
+        Session::run(folder, (columns, rows), command)
+    }
+
+    /// Starts any command.
+    pub fn run(folder: &Path, (columns, rows): (u16, u16), mut command: CommandBuilder) -> Session {
+        let size = PtySize { rows, cols: columns, pixel_width: 0, pixel_height: 0 };
+        let pair = native_pty_system().openpty(size).expect("a pseudo-terminal");
+        command.cwd(folder);
+        for (name, value) in [("TERM", "xterm-256color"), ("LANG", "C.UTF-8"), ("LC_ALL", "C.UTF-8")] {
+            command.env(name, value);
+        }
+        command.env_remove("NO_COLOR");
+        let child = pair.slave.spawn_command(command).expect("started");
+        drop(pair.slave);
+        let parser = vt100::Parser::new(nonzero(rows), nonzero(columns), 0);
+        let output = Arc::new(Mutex::new(Output { parser, bytes: Vec::new() }));
+        let reading = Arc::new(AtomicBool::new(true));
+        let mut reader = pair.master.try_clone_reader().expect("a reader");
+        let closed = Arc::new(AtomicBool::new(false));
+        let (kept, go_on, over) = (output.clone(), reading.clone(), closed.clone());
+        std::thread::spawn(move || {
+            let mut buffer = [0; 4096];
+            loop {
+                while !go_on.load(Ordering::Acquire) {
+                    std::thread::sleep(Duration::from_millis(5));
+                }
+                match reader.read(&mut buffer) {
+                    // The reader is an end of the terminal too: it must go for the terminal to hang up.
+                    Ok(0) | Err(_) => return,
+                    Ok(_) if over.load(Ordering::Acquire) => return,
+                    Ok(count) => {
+                        let mut kept = kept.lock().expect("output");
+                        kept.parser.process(&buffer[..count]);
+                        kept.bytes.extend_from_slice(&buffer[..count]);
+                    }
+                }
+            }
+        });
+        let writer = Some(pair.master.take_writer().expect("a writer"));
+        Session { master: Some(pair.master), writer, child, output, reading, closed, folder: folder.to_owned() }
+    }
+
+    fn output(&self) -> MutexGuard<'_, Output> {
+        self.output.lock().expect("output")
+    }
+
+    /// The screen as text.
+    pub fn screen(&self) -> String {
+        self.output().parser.screen().contents()
+    }
+
+    /// How many bytes were sent to the terminal.
+    pub fn bytes(&self) -> usize {
+        self.output().bytes.len()
+    }
+
+    /// Whether the bytes so far hold these.
+    pub fn sent(&self, bytes: &[u8]) -> bool {
+        self.output().bytes.windows(bytes.len()).any(|window| window == bytes)
+    }
+
+    /// Whether the terminal is as a shell wants it: the normal screen, a cursor, no special paste.
+    pub fn restored(&self) -> bool {
+        let output = self.output();
+        let screen = output.parser.screen();
+        !screen.alternate_screen() && !screen.hide_cursor() && !screen.bracketed_paste()
+    }
+
+    /// Whether the terminal's line discipline edits lines and makes signals, as a shell wants it.
+    pub fn cooked(&self) -> bool {
+        use nix::libc::{ECHO, ICANON, ISIG};
+        let attributes = self.master.as_ref().and_then(|master| master.get_termios());
+        let wanted = ICANON | ECHO | ISIG;
+        attributes.is_some_and(|attributes| attributes.local_flags.bits() & wanted == wanted)
+    }
+
+    /// Waits until the screen shows all of the texts.
+    pub fn wait_for(&self, texts: &[&str]) {
+        let begun = Instant::now();
+        loop {
+            let screen = self.screen();
+            if texts.iter().all(|text| screen.contains(text)) {
+                return;
+            }
+            assert!(begun.elapsed() < PATIENCE, "the screen never showed {texts:?}:\n{screen}");
+            std::thread::sleep(Duration::from_millis(10));
+        }
+    }
+
+    /// Waits until `condition` holds.
+    pub fn wait_until(&self, what: &str, condition: impl Fn() -> bool) {
+        let begun = Instant::now();
+        while !condition() {
+            assert!(begun.elapsed() < PATIENCE, "never: {what}\n{}", self.screen());
+            std::thread::sleep(Duration::from_millis(10));
+        }
+    }
+
+    /// Sends bytes as typed.
+    pub fn send(&mut self, bytes: &str) {
+        let writer = self.writer.as_mut().expect("the terminal is there");
+        writer.write_all(bytes.as_bytes()).expect("typed");
+        writer.flush().expect("typed");
+    }
+
+    /// Approves the jump: two presses, half a second apart.
+    pub fn approve(&mut self) {
+        self.send("g");
+        self.wait_for(&["Jump?"]);
+        std::thread::sleep(Duration::from_millis(500));
+        self.send("g");
+    }
+
+    pub fn resize(&self, columns: u16, rows: u16) {
+        let size = PtySize { rows, cols: columns, pixel_width: 0, pixel_height: 0 };
+        self.output().parser.set_size(nonzero(rows), nonzero(columns));
+        self.master.as_ref().expect("the terminal is there").resize(size).expect("resized");
+    }
+
+    /// Stops or goes on reading what the program writes.
+    pub fn read(&self, on: bool) {
+        self.reading.store(on, Ordering::Release);
+    }
+
+    pub fn pid(&self) -> Pid {
+        Pid::from_raw(self.child.process_id().expect("running") as i32)
+    }
+
+    pub fn signal(&self, signal: Signal) {
+        kill(self.pid(), signal).expect("signalled");
+    }
+
+    /// Closes the terminal's other end, as a lost connection does.
+    pub fn hang_up(&mut self) {
+        self.closed.store(true, Ordering::Release);
+        self.writer = None;
+        self.master = None;
+    }
+
+    pub fn finished(&mut self) -> Option<ExitStatus> {
+        self.child.try_wait().expect("asked")
+    }
+
+    /// Waits until the program has ended.
+    pub fn wait(&mut self) -> ExitStatus {
+        let begun = Instant::now();
+        loop {
+            if let Some(status) = self.finished() {
+                // The reader takes the rest.
+                std::thread::sleep(Duration::from_millis(100));
+                return status;
+            }
+            assert!(begun.elapsed() < PATIENCE, "the program did not end:\n{}", self.screen());
+            std::thread::sleep(Duration::from_millis(10));
+        }
+    }
+}
+
+impl Drop for Session {
+    fn drop(&mut self) {
+        // A failed test must not leave a program behind.
+        let _ = self.child.kill();
+    }
+}

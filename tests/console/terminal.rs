@@ -1,0 +1,244 @@
+//! The real program in a pseudo-terminal: a session by keys, and every way to lose or leave the terminal.
+
+#[path = "support/pty.rs"]
+mod pty;
+
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use nix::sys::signal::Signal;
+use portable_pty::CommandBuilder;
+use pty::Session;
+use quadfrog::realtime::telemetry::Mode;
+use quadfrog::recording::player::Player;
+use quadfrog::recording::record::{Record, Source, TrialRecord, Verdict};
+
+const SIZE: (u16, u16) = (100, 30);
+
+fn folder() -> tempfile::TempDir {
+    tempfile::tempdir().expect("a folder")
+}
+
+/// The one study that was made in the folder.
+fn study(folder: &Path) -> PathBuf {
+    let mut entries = std::fs::read_dir(folder).expect("the folder").map(|entry| entry.expect("an entry").path());
+    let study = entries.next().expect("a study");
+    assert!(entries.next().is_none(), "one study");
+    study
+}
+
+fn player(folder: &Path) -> Player {
+    Player::open(study(folder).join("session.mcap")).expect("a finished recording")
+}
+
+/// The newest row of each trial in the recording.
+fn rows(player: &Player) -> Vec<TrialRecord> {
+    let mut rows = std::collections::BTreeMap::new();
+    for event in player.events() {
+        if let Record::Trial(row) = &event.record {
+            rows.insert(row.trial, row.clone());
+        }
+    }
+    rows.into_values().collect()
+}
+
+/// When the mode became `mode` for the first time, s.
+fn entered(player: &Player, mode: Mode) -> f64 {
+    let at = player.events().iter().find_map(|event| match &event.record {
+        Record::Transition(change) if change.to == mode => Some(event.time_ns),
+        _ => None,
+    });
+    at.expect("the mode was entered") as f64 / 1e9
+}
+
+#[test]
+fn a_session_by_keys_is_what_the_recording_and_the_study_say() {
+    let folder = folder();
+    let mut session = Session::start(folder.path(), SIZE, &["--seed", "3"]);
+    session.wait_for(&["DISARMED", "SIM", "Press A to arm", "STOP  Space F12"]);
+    session.send("A");
+    session.wait_for(&["READY", "Press g twice to jump"]);
+    // Override Fx by hand.
+    session.send("o");
+    session.wait_for(&["Override trial #0"]);
+    session.send("\x1b[B120\r");
+    session.wait_for(&["Fx    120.0 N"]);
+    session.approve();
+    session.wait_for(&["Trial #0: judge it"]);
+    // A jump that the rules may think well of, marked a fall.
+    session.send("f");
+    session.wait_for(&["Trial #1, by the sampler"]);
+    if session.screen().contains("DISARMED") {
+        session.send("A");
+    }
+    session.wait_for(&["READY"]);
+    session.approve();
+    session.wait_for(&["Trial #1: judge it"]);
+    session.send("r");
+    session.wait_for(&["Trial #2, re-run of #1"]);
+    session.send("q");
+    session.wait_until("quitting asks or ends", || session.screen().contains("Quit?") || session.restored());
+    session.send("y");
+    assert!(session.wait().success(), "{}", session.screen());
+    assert!(session.restored() && session.cooked(), "the terminal is not as before");
+
+    let player = player(folder.path());
+    assert_eq!(player.damage(), None);
+    let rows = rows(&player);
+    let fx = |row: &TrialRecord| row.parameters.iter().find(|(name, _)| name == "Fx").map(|(_, value)| *value);
+    assert_eq!((rows[0].verdict, rows[0].value, rows[0].source), (Some(Verdict::Fall), Some(0.0), Source::Operator));
+    assert_eq!(fx(&rows[0]), Some(120.0));
+    assert_eq!((rows[1].verdict, rows[1].value), (Some(Verdict::Void), None));
+    let proposals: Vec<_> = player
+        .events()
+        .iter()
+        .filter_map(|event| match &event.record {
+            Record::Proposal(proposal) => Some(proposal),
+            _ => None,
+        })
+        .collect();
+    let last = proposals.last().expect("a proposal");
+    assert_eq!((last.trial, last.source, last.parent), (2, Source::Rerun, Some(1)));
+    let again: Vec<f64> = last.parameters.iter().map(|p| p.value).collect();
+    let before: Vec<f64> = rows[1].parameters.iter().map(|(_, value)| *value).collect();
+    assert_eq!(again, before, "the same parameters again");
+    let log = std::fs::read_to_string(study(folder.path()).join("study.log")).expect("the study");
+    assert!(log.contains("120.0"), "the study holds the overridden value");
+}
+
+#[test]
+fn stop_key_stops_at_once_and_k_acknowledges() {
+    let folder = folder();
+    let mut session = Session::start(folder.path(), SIZE, &[]);
+    session.wait_for(&["Press A to arm"]);
+    session.send("A");
+    session.wait_for(&["Press g twice"]);
+    session.send(" ");
+    session.wait_for(&["DAMPED", "then press k"]);
+    session.send("k");
+    session.wait_for(&["DISARMED", "Press A to arm"]);
+    session.send("q");
+    assert!(session.wait().success());
+}
+
+#[test]
+fn a_terminal_that_does_not_read_delays_no_stop() {
+    let folder = folder();
+    let mut session = Session::start(folder.path(), (200, 60), &[]);
+    session.wait_for(&["Press A to arm"]);
+    session.read(false);
+    session.send("A");
+    // Long enough for the frames to fill the terminal's buffer.
+    std::thread::sleep(Duration::from_secs(4));
+    session.send(" ");
+    std::thread::sleep(Duration::from_millis(500));
+    session.read(true);
+    session.wait_for(&["DAMPED"]);
+    session.send("kq");
+    assert!(session.wait().success());
+    let player = player(folder.path());
+    // Both keys would have been read at once, after the stall, if drawing had held them up.
+    let apart = entered(&player, Mode::Damped) - entered(&player, Mode::StandUp);
+    assert!(apart > 3.0, "arming and stopping came {apart:.2} s apart, typed 4 s apart");
+}
+
+#[test]
+fn resizing_at_any_moment_is_safe() {
+    let folder = folder();
+    let mut session = Session::start(folder.path(), SIZE, &[]);
+    session.wait_for(&["Press A to arm"]);
+    session.send("A");
+    for step in 0..60_u16 {
+        session.resize(20 + (step * 37) % 200, 5 + (step * 13) % 60);
+        session.send(["1", "2", "3", "4", "5", "6", "?", "\x1b"][usize::from(step) % 8]);
+        std::thread::sleep(Duration::from_millis(15));
+    }
+    session.send("\x1b1");
+    session.resize(40, 10);
+    session.wait_for(&["needed 80x24"]);
+    session.resize(80, 24);
+    session.wait_for(&["READY", "Press g twice"]);
+    session.send("qy");
+    assert!(session.wait().success());
+}
+
+#[test]
+fn signals_end_the_program_with_the_terminal_restored() {
+    for signal in [Signal::SIGTERM, Signal::SIGINT] {
+        let folder = folder();
+        let mut session = Session::start(folder.path(), SIZE, &[]);
+        session.wait_for(&["Press A to arm"]);
+        session.signal(signal);
+        if signal == Signal::SIGINT {
+            session.wait_for(&["Ctrl-C again within 2 s quits"]);
+            session.signal(signal);
+        }
+        assert!(session.wait().success(), "{signal}");
+        assert!(session.restored() && session.cooked(), "{signal}");
+        assert_eq!(player(folder.path()).damage(), None, "{signal}");
+    }
+}
+
+#[test]
+fn suspending_gives_the_terminal_back_and_continuing_takes_it() {
+    let folder = folder();
+    let mut session = Session::start(folder.path(), SIZE, &[]);
+    session.wait_for(&["Press A to arm"]);
+    session.send("\x1a");
+    session.wait_until("the terminal is given back", || session.restored() && session.cooked());
+    session.signal(Signal::SIGCONT);
+    session.wait_for(&["Press A to arm", "STOP  Space F12"]);
+    assert!(!session.restored());
+    // Armed, it is refused: a stopped process could not stop a robot.
+    session.send("A");
+    session.wait_for(&["Press g twice"]);
+    session.signal(Signal::SIGTSTP);
+    session.wait_for(&["suspend: the robot is armed"]);
+    session.send("qy");
+    assert!(session.wait().success());
+    assert!(session.restored() && session.cooked());
+}
+
+#[test]
+fn a_hang_up_closes_the_session_without_a_word() {
+    let folder = folder();
+    let mut session = Session::start(folder.path(), SIZE, &[]);
+    session.wait_for(&["Press A to arm"]);
+    session.hang_up();
+    session.wait();
+    assert!(!session.sent(b"\x1b[?1049l"), "nothing is written to a terminal that is gone");
+    assert_eq!(player(folder.path()).damage(), None);
+}
+
+#[test]
+fn a_hang_up_that_no_signal_tells_of_is_noticed() {
+    let folder = folder();
+    // In a session of its own the program has no controlling terminal, so nobody sends it SIGHUP.
+    let mut command = CommandBuilder::new("setsid");
+    command.args(["--wait", env!("CARGO_BIN_EXE_quadfrog"), "--output"]);
+    command.arg(folder.path());
+    let mut session = Session::run(folder.path(), SIZE, command);
+    session.wait_for(&["Press A to arm"]);
+    session.hang_up();
+    let recording = study(folder.path()).join("session.mcap");
+    session.wait_until("the recording is closed", || recording.exists());
+    assert_eq!(player(folder.path()).damage(), None);
+}
+
+#[test]
+fn a_small_terminal_and_none_are_refused_with_status_2() {
+    let folder = folder();
+    let mut session = Session::start(folder.path(), (40, 10), &[]);
+    assert_eq!(session.wait().exit_code(), 2);
+    let said: String = session.screen().split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(said.replace(' ', "").contains("40x10") && said.replace(' ', "").contains("80x24"), "{said}");
+    let output = std::process::Command::new(env!("CARGO_BIN_EXE_quadfrog"))
+        .current_dir(folder.path())
+        .stdin(std::process::Stdio::null())
+        .output()
+        .expect("run");
+    assert_eq!(output.status.code(), Some(2));
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(said.contains("needs a terminal"), "{said}");
+    assert_eq!(std::fs::read_dir(folder.path()).expect("the folder").count(), 0, "nothing is left behind");
+}
