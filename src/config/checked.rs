@@ -247,7 +247,9 @@ impl Config {
         self.check_optimize()?;
         self.simulator.check().map_err(|error| match error {
             SimError::Value { key, value, remedy } => self.refuse("simulator.toml", key, value, remedy),
-            SimError::Syntax { reason } => ConfigError::Syntax { file: "simulator.toml".to_owned(), line: 1, message: reason },
+            SimError::Syntax { reason } => {
+                ConfigError::Syntax { file: "simulator.toml".to_owned(), line: 1, message: reason }
+            }
         })
     }
 

@@ -45,7 +45,7 @@ pub fn run<C: Clock>(settings: &Settings, mut end: ControlEnd, clock: &C, closin
         counters.worst_lateness_ns = counters.worst_lateness_ns.max(instant.lateness_ns);
         counters.state_age_ms = cycle.state_age_ms();
         counters.ticks_not_recorded += u64::from(end.ticks.push(tick).is_err());
-        if tick.number % SHOWN_EVERY == 0 {
+        if tick.number.is_multiple_of(SHOWN_EVERY) {
             counters.ticks_not_shown += u64::from(end.shown.push(tick).is_err());
         }
         for event in cycle.events().iter() {
@@ -53,7 +53,7 @@ pub fn run<C: Clock>(settings: &Settings, mut end: ControlEnd, clock: &C, closin
             events_lost |= end.events.push(event).is_err();
         }
         end.snapshot.write(Snapshot { tick, counters });
-        if tick.number % COUNTERS_EVERY == 0 {
+        if tick.number.is_multiple_of(COUNTERS_EVERY) {
             end.counters.write(counters);
         }
         if closing.load(Ordering::Acquire) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }

@@ -9,6 +9,8 @@ use std::time::Duration;
 use nix::sys::signal::Signal;
 use portable_pty::CommandBuilder;
 use pty::Session;
+use quadfrog::optimize::journal::{Durability, Journal, JournalFile, LOCK_GRACE};
+use quadfrog::optimize::trial::{Trial, TrialState};
 use quadfrog::realtime::telemetry::Mode;
 use quadfrog::recording::player::Player;
 use quadfrog::recording::record::{Record, Source, TrialRecord, Verdict};
@@ -49,6 +51,13 @@ fn entered(player: &Player, mode: Mode) -> f64 {
         _ => None,
     });
     at.expect("the mode was entered") as f64 / 1e9
+}
+
+/// The trials of a study on disk.
+fn stored(file: &Path) -> Vec<Trial> {
+    let journal = JournalFile::new(file, Durability::Synced, LOCK_GRACE).expect("a journal");
+    let journal = Journal::open(journal).expect("a journal that can be read");
+    journal.replay().studies()[0].trials.clone()
 }
 
 #[test]
@@ -102,8 +111,23 @@ fn a_session_by_keys_is_what_the_recording_and_the_study_say() {
     let again: Vec<f64> = last.parameters.iter().map(|p| p.value).collect();
     let before: Vec<f64> = rows[1].parameters.iter().map(|(_, value)| *value).collect();
     assert_eq!(again, before, "the same parameters again");
-    let log = std::fs::read_to_string(study(folder.path()).join("study.log")).expect("the study");
-    assert!(log.contains("120.0"), "the study holds the overridden value");
+
+    let study = stored(&study(folder.path()).join("study.log"));
+    let states: Vec<_> = study.iter().map(|trial| (trial.state, trial.value)).collect();
+    assert_eq!(
+        states,
+        [(TrialState::Complete, Some(0.0)), (TrialState::Fail, None), (TrialState::Waiting, None)],
+        "the fall counts with 0, the re-run one is void, its repetition waits"
+    );
+    assert_eq!(study[0].parameter("Fx"), Some(120.0));
+    assert_eq!(study[0].fixed(), [("Fx".to_owned(), 120.0)], "an override is a fixed parameter to the sampler");
+    let queued: Vec<f64> = study[2].fixed().into_iter().map(|(_, value)| value).collect();
+    let ran: Vec<f64> = study[1].parameters.iter().map(|(_, value)| *value).collect();
+    let sorted = |mut values: Vec<f64>| {
+        values.sort_by(f64::total_cmp);
+        values
+    };
+    assert_eq!(sorted(queued), sorted(ran));
 }
 
 #[test]
