@@ -9,7 +9,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use std::f64::consts::PI;
 
 /// ln of the lengthscales' prior median and its width.
-const LENGTHSCALE_PRIOR: (f64, f64) = (-0.35, 0.8);
+const LENGTHSCALE_PRIOR: (f64, f64) = (-0.35, 0.5);
 /// ln of the signal variance's prior median and its width.
 const SIGNAL_PRIOR: (f64, f64) = (0.0, 1.0);
 /// ln of the noise variance's prior median and its width.
