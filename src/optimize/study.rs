@@ -6,7 +6,7 @@
 //! streams are kept with each trial.
 
 use super::journal::{
-    Durability, Effect, Journal, JournalError, JournalFile, LOCK_GRACE, Operation, StudyRecord, Template,
+    Durability, Effect, Journal, JournalError, JournalFile, JournalRedis, LOCK_GRACE, Operation, StudyRecord, Template,
 };
 use super::sampler::{Direction, Draws, SamplerConfig, Streams, propose};
 use super::space::{Parameter, Range, Space};
@@ -30,6 +30,8 @@ pub enum Storage {
     Memory,
     /// In a journal file, made if it does not exist.
     File(PathBuf),
+    /// On a Redis server, given as `redis://host:port/db`: for workers on many hosts.
+    Redis(String),
 }
 
 /// What a study is.
@@ -212,6 +214,7 @@ impl Study {
         let mut journal = match storage {
             Storage::Memory => Journal::in_memory(),
             Storage::File(path) => Journal::open(JournalFile::new(&path, options.durability, LOCK_GRACE)?)?,
+            Storage::Redis(url) => Journal::connect(JournalRedis::new(&url, "")?)?,
         };
         if journal.replay().find(&options.name).is_none() {
             journal.commit(|replay| {
@@ -379,7 +382,7 @@ impl Study {
             Some(t) if t.state == TrialState::Waiting && outcome != Outcome::Fail => {
                 Err(StudyError::State { trial, state: t.state, action: "it cannot have a value yet: begin it first" })
             }
-            _ => Ok(vec![Operation::SetState { trial: id, state, values, at: Some(Timestamp::now()) }]),
+            _ => Ok(vec![Operation::SetState { trial: id, state, values: values.clone(), at: Some(Timestamp::now()) }]),
         })?;
         Ok(if effects == [Effect::Accepted] { Told::Recorded } else { Told::AlreadyFinished })
     }
@@ -395,7 +398,7 @@ impl Study {
         let user: Map<String, Value> = attributes.iter().cloned().collect();
         let template = Some(Box::new(Template::waiting(fixed, user)));
         let create = Operation::CreateTrial { study: self.id, started: None, template };
-        let effects = self.journal.commit(|_| Ok::<_, JournalError>(vec![create]))?;
+        let effects = self.journal.commit(|_| Ok::<_, JournalError>(vec![create.clone()]))?;
         let created = effects.iter().find_map(|e| if let Effect::Created(id) = e { Some(*id) } else { None });
         let trial = created.and_then(|id| self.journal.replay().trial(id));
         trial.map(|t| t.number).ok_or_else(|| StudyError::Gone(self.options.name.clone()))
