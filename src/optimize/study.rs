@@ -239,6 +239,17 @@ impl Study {
         Ok(self.journal.refresh()?)
     }
 
+    /// The same study in memory: what is told to it reaches no disk, and its next proposal is the one that this study
+    /// would make if it were told the same.
+    pub fn fork(&self) -> Study {
+        Study {
+            journal: self.journal.fork(),
+            id: self.id,
+            options: self.options.clone(),
+            streams: self.streams.clone(),
+        }
+    }
+
     /// The next proposal, without any effect: twice gives the same. The enqueued trial of lowest number comes first.
     pub fn draft(&self) -> Draft {
         self.draft_with(&[])

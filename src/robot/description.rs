@@ -1,7 +1,15 @@
-//! What is true of one machine: bodies, joints, limits, stance. Read from a folder `robots/<name>/` that holds a
+//! What is true of one machine: bodies, joints, limits, poses. Read from a folder `robots/<name>/` that holds a
 //! URDF (bodies, joints, limits, collision shapes) and a `robot.toml` (what a URDF cannot say).
+//!
+//! Any quadruped with three joints a leg will do. Nothing is read from names: the root of the URDF is the trunk, its
+//! four chains of three revolute joints are the legs, told apart by where the hip is (in front or behind, left or right).
+
+mod files;
+mod urdf;
 
 use nalgebra::{Matrix3, Vector3};
+
+pub use files::DescriptionError;
 
 use super::kinematics::LegGeometry;
 use super::{Joints, PerLeg};
@@ -17,7 +25,7 @@ pub struct Body {
     pub com: Vector3<f64>,
     /// Rotational inertia about the centre of mass in link axes, kg m^2.
     pub inertia_com: Matrix3<f64>,
-    /// Shapes that can touch the ground, in the link's frame.
+    /// Shapes that can touch the ground, in the link's frame; a foot's sphere is not among them.
     pub collision: Vec<Shape>,
 }
 
@@ -94,4 +102,15 @@ pub struct RobotDescription {
     pub limits: JointLimits,
     /// Joint angles of the machine lying folded on the floor, rad: where standing up starts and sitting down ends.
     pub lying_position: Joints,
+    /// Inertia of each motor's rotor as felt at the joint (gear ratio squared times its own), kg m^2.
+    pub rotor_inertia: Joints,
+    /// Where the inertial unit sits, trunk frame, m; its axes are the trunk's.
+    pub imu_origin: Vector3<f64>,
+}
+
+impl RobotDescription {
+    /// Mass of the whole machine, kg.
+    pub fn total_mass(&self) -> f64 {
+        self.trunk.mass + self.legs.iter().flat_map(|leg| &leg.bodies).map(|body| body.mass).sum::<f64>()
+    }
 }

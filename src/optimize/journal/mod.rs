@@ -115,6 +115,11 @@ impl Journal {
         Ok(journal)
     }
 
+    /// The same state in memory: what happens to it reaches no disk and nobody else.
+    pub fn fork(&self) -> Self {
+        Journal { backend: Backend::Memory, worker: self.worker.clone(), replay: self.replay.clone() }
+    }
+
     /// The state as of the last refresh or commit.
     pub fn replay(&self) -> &Replay {
         &self.replay

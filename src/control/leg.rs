@@ -1,0 +1,59 @@
+//! The full leg controller: force profile, impedance and Virtual Model Control added up (paper, last equation of
+//! section II-C). Pure: numbers in, torques out.
+
+use nalgebra::{UnitQuaternion, Vector3};
+
+use super::{force_profile, impedance, vmc};
+use crate::realtime::command::Gains;
+use crate::robot::kinematics::{Foot, LegGeometry};
+use crate::robot::{Joints, LEGS, Leg, PerLeg, leg_of};
+
+/// What the legs are to do in this tick.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LegTarget {
+    /// Gains.
+    pub gains: Gains,
+    /// Nominal foot position of a left leg, leg frame, m; y is mirrored for right legs.
+    pub stance_leg: Vector3<f64>,
+    /// Whether Virtual Model Control acts.
+    pub vmc: bool,
+    /// Signed force amplitudes per leg, leg frame, N; zero outside an impulse.
+    pub amplitudes_leg: PerLeg<Vector3<f64>>,
+    /// Phase of the oscillator, rad.
+    pub theta_rad: f64,
+}
+
+/// The nominal foot position of `leg`: that of a left leg with y mirrored on the right, leg frame, m.
+pub fn stance_of(stance_leg: &Vector3<f64>, leg: Leg) -> Vector3<f64> {
+    Vector3::new(stance_leg.x, leg.side() * stance_leg.y, stance_leg.z)
+}
+
+/// Foot positions and Jacobians of all legs at the joint angles `q`, rad.
+pub fn feet(geometry: &LegGeometry, joint_position: &Joints) -> PerLeg<Foot> {
+    Leg::ALL.map(|leg| geometry.foot(&leg_of(joint_position, leg as usize), leg.side()))
+}
+
+/// Joint torques before the actuators' limits, N m: tau_i = tau_f,i + tau_imp,i + tau_VMC,i.
+pub fn torques(
+    target: &LegTarget,
+    feet: &PerLeg<Foot>,
+    joint_velocity: &Joints,
+    orientation_world: &UnitQuaternion<f64>,
+    contact: &PerLeg<bool>,
+) -> Joints {
+    let k_att = if target.vmc { target.gains.k_att } else { 0.0 };
+    let vmc_z = vmc::forces_leg_z(k_att, orientation_world, contact);
+    let mut torques = Joints::default();
+    for leg in Leg::ALL {
+        let i = leg as usize;
+        let dq = leg_of(joint_velocity, i);
+        let desired = stance_of(&target.stance_leg, leg);
+        let mut force = impedance::force_leg(&target.gains, &desired, &feet[i], &dq);
+        force += force_profile::force_leg(&target.amplitudes_leg[i], target.theta_rad);
+        force.z += vmc_z[i];
+        let torque = impedance::torque(&target.gains, &feet[i], &force, &dq);
+        torques[3 * i..3 * i + 3].copy_from_slice(torque.as_slice());
+    }
+    debug_assert_eq!(torques.len(), 3 * LEGS);
+    torques
+}

@@ -1,0 +1,341 @@
+//! From a URDF to bodies, legs and limits. Links joined by fixed joints are one body (Featherstone 2008, eq. 2.66,
+//! adds their inertias); what is left must be a trunk with four legs of hip, thigh and calf.
+
+use std::path::Path;
+
+use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
+use urdf_rs::{Geometry, Joint, JointType, Link, Pose, Robot};
+
+use super::{Body, DescriptionError, JointLimits, LegDescription, Shape};
+use crate::robot::kinematics::LegGeometry;
+use crate::robot::{JOINT_NAMES, JOINTS, Joints, Leg, PerLeg};
+
+/// What the URDF says.
+pub(super) struct Parts {
+    pub trunk: Body,
+    pub legs: PerLeg<LegDescription>,
+    pub leg_geometry: LegGeometry,
+    pub limits: JointLimits,
+    /// Origin of a link whose name has "imu" in it, trunk frame, m.
+    pub imu_origin: Option<Vector3<f64>>,
+}
+
+/// Lengths and directions that should be equal or zero may differ by this much, m: the digits of a drawing.
+const TOLERANCE: f64 = 1e-6;
+
+/// Links joined by fixed joints, in the frame of the first of them.
+struct Group<'a> {
+    body: Body,
+    /// Moving joints that hang on it, with their origin in its frame.
+    joints: Vec<(&'a Joint, Isometry3<f64>)>,
+    imu_origin: Option<Vector3<f64>>,
+}
+
+/// The document with its file name for messages.
+struct Document<'a> {
+    file: &'a Path,
+    robot: &'a Robot,
+}
+
+/// Reads the URDF in `text`; `file` is for messages.
+pub(super) fn parse(file: &Path, text: &str) -> Result<Parts, DescriptionError> {
+    let robot = urdf_rs::read_from_string(text)
+        .map_err(|e| DescriptionError::Syntax { file: file.to_owned(), reason: e.to_string() })?;
+    Document { file, robot: &robot }.parts()
+}
+
+impl<'a> Document<'a> {
+    fn invalid<T>(&self, element: &str, problem: String, remedy: &'static str) -> Result<T, DescriptionError> {
+        Err(DescriptionError::Invalid { file: self.file.to_owned(), element: element.to_owned(), problem, remedy })
+    }
+
+    fn link(&self, name: &str) -> Result<&'a Link, DescriptionError> {
+        match self.robot.links.iter().find(|link| link.name == name) {
+            Some(link) => Ok(link),
+            None => self.invalid(&format!("link {name}"), "a joint names it, but it is not there".into(), "add it"),
+        }
+    }
+
+    /// The one link that is nobody's child.
+    fn root(&self) -> Result<&'a Link, DescriptionError> {
+        let is_child = |link: &Link| self.robot.joints.iter().any(|joint| joint.child.link == link.name);
+        let roots: Vec<&Link> = self.robot.links.iter().filter(|link| !is_child(link)).collect();
+        match roots[..] {
+            [root] => Ok(root),
+            _ => self.invalid("robot", format!("{} links without a parent", roots.len()), "one must be, the trunk"),
+        }
+    }
+
+    fn parts(&self) -> Result<Parts, DescriptionError> {
+        let trunk = self.group(self.root()?)?;
+        if trunk.joints.len() != 4 {
+            let found = trunk.joints.iter().map(|(joint, _)| joint.name.as_str()).collect::<Vec<_>>().join(", ");
+            let problem = format!("{} moving joints on the trunk ({found})", trunk.joints.len());
+            return self.invalid(&format!("link {}", trunk.body.name), problem, "a quadruped has four, its hips");
+        }
+        let mut legs = [const { None }; 4];
+        let mut limits = JointLimits {
+            min_position: Joints::default(),
+            max_position: Joints::default(),
+            max_torque: Joints::default(),
+            max_velocity: Joints::default(),
+        };
+        for &(joint, origin) in &trunk.joints {
+            let hip = origin.translation.vector;
+            let Some(leg) = Leg::ALL.into_iter().find(|leg| leg.end() * hip.x > 0.0 && leg.side() * hip.y > 0.0) else {
+                let problem = format!("its origin ({}, {}) m is on an axis of the trunk", hip.x, hip.y);
+                return self.invalid(&joint.name, problem, "put the trunk's origin between the four hips");
+            };
+            if legs[leg as usize].is_some() {
+                let problem = format!("a second hip where {} is", leg.name());
+                return self.invalid(&joint.name, problem, "put the trunk's origin between the four hips");
+            }
+            legs[leg as usize] = Some(self.leg(leg, joint, origin, &mut limits)?);
+        }
+        // Four hips in four different quarters: every place is taken.
+        let legs = legs.map(|leg| leg.expect("four distinct legs"));
+        let leg_geometry = self.geometry(&legs)?;
+        Ok(Parts { trunk: trunk.body, legs, leg_geometry, limits, imu_origin: trunk.imu_origin })
+    }
+
+    /// The chain of three joints that starts with `hip`.
+    fn leg(
+        &self,
+        leg: Leg,
+        hip: &'a Joint,
+        origin: Isometry3<f64>,
+        limits: &mut JointLimits,
+    ) -> Result<LegDescription, DescriptionError> {
+        let mut chain = Vec::with_capacity(3);
+        let mut joint_origin = [Vector3::zeros(); 3];
+        let (mut joint, mut origin) = (hip, origin);
+        for part in 0..3 {
+            self.check_joint(joint, &origin, part)?;
+            joint_origin[part] = origin.translation.vector;
+            let i = 3 * leg as usize + part;
+            limits.min_position[i] = joint.limit.lower;
+            limits.max_position[i] = joint.limit.upper;
+            limits.max_torque[i] = joint.limit.effort;
+            limits.max_velocity[i] = joint.limit.velocity;
+            let group = self.group(self.link(&joint.child.link)?)?;
+            match (part, &group.joints[..]) {
+                (0 | 1, &[(next, next_origin)]) => (joint, origin) = (next, next_origin),
+                (2, []) => {}
+                (_, children) => {
+                    let problem = format!("{} moving joints hang on this {}", children.len(), JOINT_NAMES[part]);
+                    return self.invalid(
+                        &group.body.name,
+                        problem,
+                        "a leg is hip, thigh, calf; make other joints fixed",
+                    );
+                }
+            }
+            chain.push(group.body);
+        }
+        let [hip, thigh, mut calf]: [Body; 3] = chain.try_into().expect("three parts were pushed");
+
+        // The foot: the lowest sphere of the calf.
+        let sphere = |shape: &Shape| match *shape {
+            Shape::Sphere { center, radius } => Some((center, radius)),
+            _ => None,
+        };
+        let feet = calf.collision.iter().enumerate().filter_map(|(i, shape)| sphere(shape).map(|s| (i, s)));
+        let Some((i, (foot_origin, foot_radius))) = feet.min_by(|a, b| a.1.0.z.total_cmp(&b.1.0.z)) else {
+            let remedy = "add a link with a sphere as collision, fixed to the calf's end";
+            return self.invalid(&format!("link {}", calf.name), "has no foot".into(), remedy);
+        };
+        calf.collision.remove(i);
+        Ok(LegDescription { bodies: [hip, thigh, calf], joint_origin, foot_origin, foot_radius })
+    }
+
+    /// Whether `joint` is the hip (0), thigh (1) or calf (2) joint that the leg kinematics know, with usable limits.
+    fn check_joint(&self, joint: &Joint, origin: &Isometry3<f64>, part: usize) -> Result<(), DescriptionError> {
+        let element = format!("joint {}", joint.name);
+        let wanted = if part == 0 { Vector3::x() } else { Vector3::y() };
+        let axis = vector(&joint.axis.xyz.0);
+        if (axis - wanted).norm() > TOLERANCE {
+            let problem = format!("axis ({}, {}, {}) where a {} is", axis.x, axis.y, axis.z, JOINT_NAMES[part]);
+            return self.invalid(&element, problem, "a hip turns about 1 0 0, a thigh and a calf about 0 1 0");
+        }
+        if origin.rotation.angle() > TOLERANCE {
+            let problem = format!("its frame is turned by {} rad", origin.rotation.angle());
+            return self.invalid(
+                &element,
+                problem,
+                "all frames of legs must be parallel to the trunk's at zero angles",
+            );
+        }
+        if !matches!(joint.joint_type, JointType::Revolute) {
+            let problem = format!("is {:?}", joint.joint_type);
+            return self.invalid(&element, problem, "a leg's joint is revolute and has limits");
+        }
+        let limit = &joint.limit;
+        if limit.lower >= limit.upper || limit.lower.is_nan() || limit.upper.is_nan() {
+            let problem = format!("limits lower {} and upper {} rad", limit.lower, limit.upper);
+            return self.invalid(&element, problem, "lower must be less than upper");
+        }
+        for (name, value) in [("effort", limit.effort), ("velocity", limit.velocity)] {
+            if !(value.is_finite() && value > 0.0) {
+                return self.invalid(&element, format!("limit {name} is {value}"), "it must be more than zero");
+            }
+        }
+        Ok(())
+    }
+
+    /// The lengths of the closed-form kinematics, which all legs must share.
+    fn geometry(&self, legs: &PerLeg<LegDescription>) -> Result<LegGeometry, DescriptionError> {
+        let first = &legs[0];
+        let geometry = LegGeometry {
+            abduction: first.joint_origin[1].y.abs(),
+            thigh: -first.joint_origin[2].z,
+            calf: -first.foot_origin.z,
+        };
+        for (leg, found) in Leg::ALL.into_iter().zip(legs) {
+            let expected = [
+                (leg.side() * Vector3::y() * geometry.abduction, found.joint_origin[1], "thigh joint"),
+                (-Vector3::z() * geometry.thigh, found.joint_origin[2], "calf joint"),
+                (-Vector3::z() * geometry.calf, found.foot_origin, "foot"),
+            ];
+            for (wanted, is, what) in expected {
+                if (wanted - is).norm() > TOLERANCE {
+                    let problem = format!(
+                        "at ({}, {}, {}) m from its parent where ({}, {}, {}) would match the leg FR",
+                        is.x, is.y, is.z, wanted.x, wanted.y, wanted.z
+                    );
+                    let remedy =
+                        "legs must be alike: the thigh joint beside the hip, calf joint and foot straight below";
+                    return self.invalid(&format!("{} {what}", leg.name()), problem, remedy);
+                }
+            }
+        }
+        for (what, length) in [("thigh", geometry.thigh), ("calf", geometry.calf)] {
+            if length <= 0.0 {
+                return self.invalid(what, format!("its length is {length} m"), "it must point down at zero angles");
+            }
+        }
+        debug_assert_eq!(legs.len() * 3, JOINTS);
+        Ok(geometry)
+    }
+
+    /// `root` with everything that is fixed to it as one body.
+    fn group(&self, root: &'a Link) -> Result<Group<'a>, DescriptionError> {
+        let body = Body {
+            name: root.name.clone(),
+            mass: 0.0,
+            com: Vector3::zeros(),
+            inertia_com: Matrix3::zeros(),
+            collision: Vec::new(),
+        };
+        let mut group = Group { body, joints: Vec::new(), imu_origin: None };
+        self.add(root, Isometry3::identity(), &mut group, 0)?;
+        let element = format!("link {}", group.body.name);
+        let mass = group.body.mass;
+        if !(mass.is_finite() && mass > 0.0) {
+            return self.invalid(&element, format!("mass {mass} kg"), "a body needs a mass of more than zero");
+        }
+        // A rigid body's principal moments are positive and none exceeds the sum of the others.
+        let moments = group.body.inertia_com.symmetric_eigenvalues();
+        let (least, sum) = (moments.min(), moments.sum());
+        if !(least > 0.0 && moments.max() <= (sum - moments.max()) * (1.0 + 1e-6)) {
+            let problem = format!("principal moments of inertia {:.3e} {:.3e} {:.3e}", moments.x, moments.y, moments.z);
+            return self.invalid(&element, problem, "they must be positive, none more than the other two together");
+        }
+        Ok(group)
+    }
+
+    /// Adds `link`, whose frame is `pose` in the group's, and what is fixed to it.
+    fn add(
+        &self,
+        link: &'a Link,
+        pose: Isometry3<f64>,
+        group: &mut Group<'a>,
+        depth: usize,
+    ) -> Result<(), DescriptionError> {
+        if depth > self.robot.links.len() {
+            return self.invalid(&format!("link {}", link.name), "is its own ancestor".into(), "joints form a tree");
+        }
+        if link.inertial.mass.value < 0.0 {
+            let problem = format!("mass {} kg", link.inertial.mass.value);
+            return self.invalid(&format!("link {}", link.name), problem, "a mass is not negative");
+        }
+        merge_inertia(&mut group.body, &link.inertial, &pose);
+        if link.name.contains("imu") {
+            group.imu_origin = Some(pose.translation.vector);
+        }
+        for collision in &link.collision {
+            self.add_shapes(link, &collision.geometry, pose * isometry(&collision.origin), &mut group.body.collision)?;
+        }
+        for joint in self.robot.joints.iter().filter(|joint| joint.parent.link == link.name) {
+            let origin = pose * isometry(&joint.origin);
+            match joint.joint_type {
+                JointType::Fixed => self.add(self.link(&joint.child.link)?, origin, group, depth + 1)?,
+                _ => group.joints.push((joint, origin)),
+            }
+        }
+        Ok(())
+    }
+
+    fn add_shapes(
+        &self,
+        link: &Link,
+        geometry: &Geometry,
+        pose: Isometry3<f64>,
+        shapes: &mut Vec<Shape>,
+    ) -> Result<(), DescriptionError> {
+        let center = pose.translation.vector;
+        let rotation = pose.rotation.to_rotation_matrix().into_inner();
+        match *geometry {
+            Geometry::Box { size } => {
+                shapes.push(Shape::Box { center, rotation, half_extents: vector(&size.0) / 2.0 });
+            }
+            Geometry::Cylinder { radius, length } => {
+                shapes.push(Shape::Cylinder { center, rotation, radius, half_length: length / 2.0 });
+            }
+            // The ground touches a capsule at its two ends.
+            Geometry::Capsule { radius, length } => {
+                for half in [-0.5, 0.5] {
+                    let center = center + rotation.column(2) * (half * length);
+                    shapes.push(Shape::Sphere { center, radius });
+                }
+            }
+            Geometry::Sphere { radius } => shapes.push(Shape::Sphere { center, radius }),
+            Geometry::Mesh { ref filename, .. } => {
+                let remedy = "meshes do not collide here: describe the shape by boxes, cylinders, capsules or spheres";
+                return self.invalid(&format!("link {}", link.name), format!("collision mesh {filename}"), remedy);
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Adds a part's mass and inertia to `body`: both moved to the common centre of mass by the parallel-axis theorem.
+fn merge_inertia(body: &mut Body, part: &urdf_rs::Inertial, pose: &Isometry3<f64>) {
+    let mass = part.mass.value;
+    if mass == 0.0 {
+        return;
+    }
+    let pose = pose * isometry(&part.origin);
+    let rotation = pose.rotation.to_rotation_matrix().into_inner();
+    let i = &part.inertia;
+    let own = Matrix3::new(i.ixx, i.ixy, i.ixz, i.ixy, i.iyy, i.iyz, i.ixz, i.iyz, i.izz);
+    // I_C = R I R^T + m (d.d 1 - d d^T), d from the common centre of mass.
+    let shifted = |mass: f64, d: Vector3<f64>| (Matrix3::identity() * d.norm_squared() - d * d.transpose()) * mass;
+    let total = body.mass + mass;
+    let com = (body.com * body.mass + pose.translation.vector * mass) / total;
+    body.inertia_com += shifted(body.mass, body.com - com)
+        + rotation * own * rotation.transpose()
+        + shifted(mass, pose.translation.vector - com);
+    body.com = com;
+    body.mass = total;
+}
+
+fn vector(xyz: &[f64; 3]) -> Vector3<f64> {
+    Vector3::from_column_slice(xyz)
+}
+
+/// A URDF pose: roll, pitch, yaw about fixed axes, then the translation.
+fn isometry(pose: &Pose) -> Isometry3<f64> {
+    let [roll, pitch, yaw] = pose.rpy.0;
+    let rotation = UnitQuaternion::from_euler_angles(roll, pitch, yaw);
+    Isometry3::from_parts(Translation3::from(vector(&pose.xyz.0)), rotation)
+}

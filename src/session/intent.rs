@@ -1,0 +1,57 @@
+//! What an operator may wish of the session. Every intent is answered by a `CommandRecord`: carried out, or refused and
+//! why. STOP is not among them: it has its own latch (`engine::Handle::stop`).
+
+use crate::recording::record::Verdict;
+
+/// One wish.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Intent {
+    /// Energise the robot: it stands up.
+    Arm,
+    /// Sit down and disarm.
+    SitDown,
+    /// The damped or faulted robot has been looked at.
+    Acknowledge,
+    /// Run the proposal as it was seen: `trial` and `revision` are those of the card.
+    Approve {
+        /// Number of the proposed trial.
+        trial: u32,
+        /// Revision of the card.
+        revision: u32,
+    },
+    /// Cancel the countdown.
+    Cancel,
+    /// Refuse the proposal; the sampler proposes another.
+    Skip,
+    /// Set one parameter of the proposal.
+    Override {
+        /// Parameter name.
+        parameter: String,
+        /// New value, in the parameter's unit.
+        value: f64,
+    },
+    /// Back to what was proposed.
+    ClearOverrides,
+    /// Judge the trial under review.
+    Judge(Verdict),
+    /// Void the trial under review (or repeat an earlier one) and queue its parameters again.
+    Rerun {
+        /// The trial to repeat; none for the one under review.
+        trial: Option<u32>,
+    },
+    /// Take the last verdict back.
+    Undo,
+    /// Use a value measured by hand for the trial under review; none removes it.
+    HandValue(Option<f64>),
+    /// A note on a trial.
+    Note {
+        /// The trial.
+        trial: u32,
+        /// The text.
+        text: String,
+    },
+    /// Queue a point, in table order of the parameters.
+    Enqueue(Vec<(String, f64)>),
+    /// Raise the budget by this many trials.
+    Continue(u32),
+}

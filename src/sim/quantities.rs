@@ -1,0 +1,164 @@
+//! What can be asked of a model at a state: accelerations, mass matrix, momenta, energies, feet. For tests, displays and
+//! the truth of the simulator; the time step uses [`super::dynamics`] directly.
+//!
+//! Velocity vectors of 18 are ordered: linear velocity of the trunk's origin (body axes), angular velocity (body axes), joints.
+
+use nalgebra::{Matrix3, SMatrix, SVector, Vector3, Vector6};
+
+use super::dynamics::Dynamics;
+use super::model::{GRAVITY, Model};
+use super::spatial::Motion;
+use super::state::{Acceleration, State};
+use crate::robot::{JOINTS, Joints, LEGS, PerLeg, leg_of};
+
+/// Degrees of freedom: six of the trunk and twelve joints.
+pub const DOF: usize = 6 + JOINTS;
+
+/// Momentum of the whole machine.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Momentum {
+    /// Position of the centre of mass, world, m.
+    pub com_world: Vector3<f64>,
+    /// Velocity of the centre of mass, world, m/s.
+    pub com_velocity_world: Vector3<f64>,
+    /// Angular momentum about the centre of mass, world axes, kg m^2/s.
+    pub angular_world: Vector3<f64>,
+}
+
+/// Energy of the whole machine, J.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Energy {
+    /// Of motion, rotors included.
+    pub kinetic: f64,
+    /// Of height; zero with the centre of mass at z = 0.
+    pub potential: f64,
+}
+
+impl Energy {
+    /// Kinetic and potential energy together, J.
+    pub fn total(&self) -> f64 {
+        self.kinetic + self.potential
+    }
+}
+
+/// The centre of a foot.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FootMotion {
+    /// Position, world, m.
+    pub position_world: Vector3<f64>,
+    /// Velocity, world, m/s.
+    pub velocity_world: Vector3<f64>,
+    /// Velocity per unit of each of the 18 velocities, world.
+    pub jacobian_world: SMatrix<f64, 3, DOF>,
+}
+
+impl Model {
+    fn dynamics(&self, state: &State) -> Dynamics {
+        Dynamics::new(self, state, &self.rotor_inertia)
+    }
+
+    /// Accelerations under the joint torques `torque` (N m) and gravity, without contact, friction or joint stops.
+    pub fn forward_dynamics(&self, state: &State, torque: &Joints) -> Acceleration {
+        self.dynamics(state).acceleration(torque)
+    }
+
+    /// M(q): kg, kg m, kg m^2.
+    pub fn mass_matrix(&self, state: &State) -> SMatrix<f64, DOF, DOF> {
+        let dynamics = self.dynamics(state);
+        let composite = &dynamics.composite;
+        let mut matrix = SMatrix::<f64, DOF, DOF>::zeros();
+        // I_0 = [[m 1, -hx], [hx, I]]
+        matrix.fixed_view_mut::<3, 3>(0, 0).fill_diagonal(composite.mass);
+        let hx = composite.first.cross_matrix();
+        matrix.fixed_view_mut::<3, 3>(3, 0).copy_from(&hx);
+        matrix.fixed_view_mut::<3, 3>(0, 3).copy_from(&-hx);
+        let i = &composite.second;
+        let inertia = Matrix3::new(i.xx, i.xy, i.xz, i.xy, i.yy, i.yz, i.xz, i.yz, i.zz);
+        matrix.fixed_view_mut::<3, 3>(3, 3).copy_from(&inertia);
+        for (l, leg) in dynamics.legs.iter().enumerate() {
+            let j = 6 + 3 * l;
+            matrix.fixed_view_mut::<6, 3>(0, j).copy_from(&leg.coupling);
+            matrix.fixed_view_mut::<3, 6>(j, 0).copy_from(&leg.coupling.transpose());
+            matrix.fixed_view_mut::<3, 3>(j, j).copy_from(&leg.mass);
+        }
+        for (i, rotor) in self.rotor_inertia.iter().enumerate() {
+            matrix[(6 + i, 6 + i)] += rotor;
+        }
+        matrix
+    }
+
+    /// b(q, v): the generalised forces that velocity and gravity ask for; M a + b = [0; tau]. N, N m.
+    pub fn bias(&self, state: &State) -> SVector<f64, DOF> {
+        let dynamics = self.dynamics(state);
+        let mut bias = SVector::<f64, DOF>::zeros();
+        bias.fixed_rows_mut::<6>(0).copy_from(&dynamics.bias);
+        for (l, leg) in dynamics.legs.iter().enumerate() {
+            bias.fixed_rows_mut::<3>(6 + 3 * l).copy_from(&leg.bias);
+        }
+        bias
+    }
+
+    /// Centre of mass, its velocity, and the angular momentum about it.
+    pub fn momentum(&self, state: &State) -> Momentum {
+        let dynamics = self.dynamics(state);
+        // The first six rows of M v are the momentum about the trunk's origin.
+        let velocity = Motion { linear: state.velocity_body, angular: state.angular_velocity_body };
+        let trunk = dynamics.composite.times(&velocity);
+        let mut momentum = stack(&trunk.linear, &trunk.angular);
+        for (l, leg) in dynamics.legs.iter().enumerate() {
+            momentum += leg.coupling * leg_of(&state.joint_velocity, l);
+        }
+        let linear: Vector3<f64> = momentum.fixed_rows::<3>(0).into();
+        let angular: Vector3<f64> = momentum.fixed_rows::<3>(3).into();
+        let mass = dynamics.composite.mass;
+        let com_body = dynamics.composite.first / mass;
+        let to_world = &state.orientation_world;
+        Momentum {
+            com_world: state.position_world + to_world * com_body,
+            com_velocity_world: to_world * (linear / mass),
+            // k_G = k_O - c x p
+            angular_world: to_world * (angular - com_body.cross(&linear)),
+        }
+    }
+
+    /// Kinetic and potential energy.
+    pub fn energy(&self, state: &State) -> Energy {
+        let mut v = SVector::<f64, DOF>::zeros();
+        v.fixed_rows_mut::<3>(0).copy_from(&state.velocity_body);
+        v.fixed_rows_mut::<3>(3).copy_from(&state.angular_velocity_body);
+        v.fixed_rows_mut::<JOINTS>(6).copy_from_slice(&state.joint_velocity);
+        Energy {
+            // T = v^T M v / 2,  V = m g z
+            kinetic: 0.5 * v.dot(&(self.mass_matrix(state) * v)),
+            potential: self.mass() * GRAVITY * self.momentum(state).com_world.z,
+        }
+    }
+
+    /// The centres of the feet.
+    pub fn feet(&self, state: &State) -> PerLeg<FootMotion> {
+        let dynamics = self.dynamics(state);
+        let to_world = state.orientation_world.to_rotation_matrix().into_inner();
+        std::array::from_fn::<_, LEGS, _>(|l| {
+            let foot_body = dynamics.legs[l].in_body(2, &self.legs[l].foot_origin);
+            let joints = dynamics.legs[l].point_jacobian(2, &foot_body);
+            // Velocity of a point p of the trunk: v + w x p.
+            let mut jacobian_world = SMatrix::<f64, 3, DOF>::zeros();
+            jacobian_world.fixed_view_mut::<3, 3>(0, 0).copy_from(&to_world);
+            jacobian_world.fixed_view_mut::<3, 3>(0, 3).copy_from(&(to_world * -foot_body.cross_matrix()));
+            jacobian_world.fixed_view_mut::<3, 3>(0, 6 + 3 * l).copy_from(&(to_world * joints));
+            let velocity_body = state.velocity_body
+                + state.angular_velocity_body.cross(&foot_body)
+                + joints * leg_of(&state.joint_velocity, l);
+            FootMotion {
+                position_world: state.position_world + to_world * foot_body,
+                velocity_world: to_world * velocity_body,
+                jacobian_world,
+            }
+        })
+    }
+}
+
+/// Linear and angular part in one vector.
+pub(super) fn stack(linear: &Vector3<f64>, angular: &Vector3<f64>) -> Vector6<f64> {
+    Vector6::new(linear.x, linear.y, linear.z, angular.x, angular.y, angular.z)
+}

@@ -1,0 +1,1 @@
+//! What the machine reports of its state.

@@ -1,0 +1,133 @@
+//! One control period, read from the top: drive, free motion, what can touch, impulses, positions.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::Simulator;
+use super::collision::{Collider, Moment};
+use super::contact::{Velocity, add_joints};
+use super::dynamics::Dynamics;
+use super::integrate::{free_velocity, runge_kutta_4, semi_implicit_euler};
+use crate::robot::{JOINTS, JointCommand, PerLeg};
+
+/// One control period, s: a command holds for this long.
+pub const CONTROL_PERIOD_S: f64 = 1e-3;
+
+/// What the ground did during one control period.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Touched {
+    /// Whether each foot was pressed in the last step.
+    pub foot: PerLeg<bool>,
+    /// Impulse on each foot over the period, world, N s.
+    pub foot_impulse_world: PerLeg<Vector3<f64>>,
+    /// Its part out of the ground, N s.
+    pub foot_normal_impulse: PerLeg<f64>,
+    /// Whether any other part was pressed.
+    pub body: bool,
+}
+
+impl Simulator {
+    /// Advances by one control period under `command`.
+    pub(super) fn control_period(&mut self, command: &JointCommand) {
+        self.touched = Touched::default();
+        let contact_step = CONTROL_PERIOD_S / f64::from(self.config.step.contact_substeps);
+        let flight_step = CONTROL_PERIOD_S / f64::from(self.config.step.flight_substeps);
+        // Free flight as long as nothing can touch within a step; from there on, contact steps to the period's end. Where
+        // something touched in the last step, flight is not even tried.
+        let mut flown = 0;
+        while self.solver.is_empty()
+            && flown < self.config.step.flight_substeps
+            && self.flight_step(command, flight_step)
+        {
+            flown += 1;
+        }
+        let remaining = f64::from(self.config.step.flight_substeps - flown) * flight_step;
+        let steps = (remaining / contact_step - 1e-9).ceil().max(0.0);
+        for _ in 0..steps as u32 {
+            self.contact_step(command, remaining / steps);
+        }
+        self.ticks += 1;
+    }
+
+    /// A step of free flight; false, with nothing changed, where something can touch or the motors do not give a constant
+    /// torque.
+    fn flight_step(&mut self, command: &JointCommand, h: f64) -> bool {
+        let before = self.actuator.clone();
+        let drive = self.actuator.drive(command, &self.state.joint_position, &self.state.joint_velocity, h);
+        let smooth = drive.damping == [0.0; JOINTS] && drive.dry_friction == [0.0; JOINTS];
+        if !smooth {
+            self.actuator = before;
+            return false;
+        }
+        let dynamics = Dynamics::new(&self.model, &self.state, &self.model.rotor_inertia);
+        let acceleration = dynamics.acceleration(&drive.torque);
+        self.find_contacts(&dynamics, &free_velocity(&self.state, &acceleration, h), &drive.dry_friction, h);
+        if !self.solver.is_empty() {
+            self.actuator = before;
+            return false;
+        }
+        self.state = runge_kutta_4(&self.model, &self.state, acceleration, &drive.torque, h);
+        self.terrain.advance(|_| false, h);
+        true
+    }
+
+    /// A step with whatever touches.
+    fn contact_step(&mut self, command: &JointCommand, h: f64) {
+        let drive = self.actuator.drive(command, &self.state.joint_position, &self.state.joint_velocity, h);
+        // (M + h D) (v' - v) = h (tau - b): damping taken at the end of the step.
+        let added = std::array::from_fn(|i| self.model.rotor_inertia[i] + h * drive.damping[i]);
+        let dynamics = Dynamics::new(&self.model, &self.state, &added);
+        let acceleration = dynamics.acceleration(&drive.torque);
+        let mut velocity = free_velocity(&self.state, &acceleration, h);
+        self.find_contacts(&dynamics, &velocity, &drive.dry_friction, h);
+        if !self.solver.is_empty() {
+            let world_from_body = self.world_from_body();
+            let change = self.solver.solve(&dynamics, &world_from_body);
+            velocity.trunk += change.trunk;
+            for (leg, change) in velocity.legs.iter_mut().zip(&change.legs) {
+                *leg += change;
+            }
+            self.note_touches(&world_from_body, h);
+        }
+        semi_implicit_euler(&mut self.state, &velocity, h);
+    }
+
+    fn world_from_body(&self) -> Matrix3<f64> {
+        self.state.orientation_world.to_rotation_matrix().into_inner()
+    }
+
+    fn find_contacts(&mut self, dynamics: &Dynamics, free: &Velocity, dry_friction: &[f64; JOINTS], h: f64) {
+        self.solver.start(h);
+        let world_from_body = self.world_from_body();
+        let (state, terrain, world_from_body) = (&self.state, &self.terrain, &world_from_body);
+        let moment = Moment { dynamics, state, terrain, world_from_body, free, h };
+        self.collider.find(&moment, &mut self.solver);
+        let limits = (&self.limits.min_position, &self.limits.max_position);
+        add_joints(&mut self.solver, dynamics, free, &self.state.joint_position, limits, dry_friction, h);
+    }
+
+    /// Sums up what was pressed, and pushes loose blocks.
+    fn note_touches(&mut self, world_from_body: &Matrix3<f64>, h: f64) {
+        self.touched.foot = [false; 4];
+        let mut pushed = 0u64;
+        for contact in self.solver.contacts() {
+            let normal = contact.normal_impulse();
+            if normal <= 0.0 {
+                continue;
+            }
+            let impulse_world = world_from_body * contact.impulse_body();
+            match Collider::foot_of(&contact.point) {
+                Some(leg) => {
+                    self.touched.foot[leg as usize] = true;
+                    self.touched.foot_impulse_world[leg as usize] += impulse_world;
+                    self.touched.foot_normal_impulse[leg as usize] += normal;
+                }
+                None => self.touched.body = true,
+            }
+            if let Some(block) = contact.point.block {
+                self.terrain.push_block(block, &-impulse_world, h);
+                pushed |= 1 << (block % 64);
+            }
+        }
+        self.terrain.advance(|block| pushed >> (block % 64) & 1 == 1, h);
+    }
+}

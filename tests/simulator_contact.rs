@@ -1,0 +1,266 @@
+//! Properties of contact: forces sum to the weight, feet do not creep, the cone holds, nothing pulls, nothing sinks in, no
+//! energy comes from nowhere, friction holds and slips where it should.
+
+mod support;
+
+use nalgebra::{UnitQuaternion, Vector3};
+use quadfrog::robot::description::RobotDescription;
+use quadfrog::robot::{JointCommand, Joints, Leg, MotorCommand, Placement, Robot};
+use quadfrog::sim::{ContactLaw, GRAVITY, SimConfig, Simulator, State, TerrainKind};
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
+use support::Largest;
+
+fn go1() -> RobotDescription {
+    RobotDescription::embedded("go1").unwrap()
+}
+
+fn with_friction(friction: f64) -> SimConfig {
+    let mut config = SimConfig::default();
+    config.terrain.friction = friction;
+    config
+}
+
+/// Feet under the hips, `y` out and `depth` down, m.
+fn stance(robot: &RobotDescription, y: f64, depth: f64) -> Joints {
+    let mut joints = Joints::default();
+    for leg in Leg::ALL {
+        let foot = Vector3::new(0.0, leg.side() * y, -depth);
+        let q = robot.leg_geometry.inverse(&foot, leg.side()).unwrap();
+        joints[3 * leg as usize..][..3].copy_from_slice(q.as_slice());
+    }
+    joints
+}
+
+/// Motors that hold these angles.
+fn hold(position: &Joints, kp: f64, kd: f64) -> JointCommand {
+    let mut command = JointCommand::default();
+    for (motor, &position) in command.motor.iter_mut().zip(position) {
+        *motor = MotorCommand { position, kp, kd, ..MotorCommand::default() };
+    }
+    command
+}
+
+fn standing(config: &SimConfig) -> (Simulator, JointCommand) {
+    let robot = go1();
+    let joint_position = stance(&robot, 0.1, 0.26);
+    let mut simulator = Simulator::new(&robot, config).unwrap();
+    simulator.place(&Placement { joint_position, lying: false, seed: 1 });
+    (simulator, hold(&joint_position, 100.0, 3.0))
+}
+
+fn uniform(random: &mut ChaCha8Rng, low: f64, high: f64) -> f64 {
+    low + (high - low) * (random.next_u64() >> 11) as f64 / (1u64 << 53) as f64
+}
+
+#[test]
+fn placed_feet_just_touch() {
+    let (mut simulator, _) = standing(&SimConfig::default());
+    assert!(simulator.smallest_gap().abs() < 1e-9);
+    let state = simulator.read().unwrap();
+    assert_eq!(state.truth.unwrap().velocity_world, Vector3::zeros());
+}
+
+#[test]
+fn standing_forces_sum_to_the_weight() {
+    let (mut simulator, command) = standing(&SimConfig::default());
+    for _ in 0..3000 {
+        simulator.write(&command).unwrap();
+    }
+    let force: f64 = simulator.read().unwrap().truth.unwrap().foot_force_world.iter().map(|f| f.z).sum();
+    let weight = simulator.model().mass() * GRAVITY;
+    println!("{force} N of {weight} N");
+    assert!((force / weight - 1.0).abs() < 1e-3);
+}
+
+#[test]
+fn feet_do_not_creep() {
+    let (mut simulator, command) = standing(&with_friction(0.6));
+    for _ in 0..2000 {
+        simulator.write(&command).unwrap();
+    }
+    let before = simulator.model().feet(simulator.state());
+    for _ in 0..10_000 {
+        simulator.write(&command).unwrap();
+    }
+    let mut creep = Largest::default();
+    for (leg, (a, b)) in before.iter().zip(simulator.model().feet(simulator.state())).enumerate() {
+        creep.see((a.position_world - b.position_world).xy().norm(), || format!("foot {leg}"));
+    }
+    println!("creep in 10 s: {creep} m");
+    assert!(creep.value < 1e-4);
+}
+
+/// Through a wild fall: every force is inside the cone and pushes.
+#[test]
+fn forces_stay_inside_the_cone_and_never_pull() {
+    let friction = 0.6;
+    let mut random = ChaCha8Rng::seed_from_u64(3);
+    let robot = go1();
+    let mut pressed = 0;
+    for _ in 0..20 {
+        let mut simulator = Simulator::new(&robot, &with_friction(friction)).unwrap();
+        let joint_position = stance(&robot, 0.12, 0.24);
+        simulator.place(&Placement { joint_position, lying: false, seed: 0 });
+        for _ in 0..500 {
+            let torque = std::array::from_fn(|_| uniform(&mut random, -20.0, 20.0));
+            simulator.write(&JointCommand::torques(&torque)).unwrap();
+            for force in simulator.read().unwrap().truth.unwrap().foot_force_world {
+                // A period's force is a sum of forces in one and the same cone, so it is in the cone as well.
+                assert!(force.z >= 0.0, "pulls with {} N", force.z);
+                assert!(force.xy().norm() <= friction * force.z * (1.0 + 1e-9) + 1e-9, "{force} leaves the cone");
+                pressed += usize::from(force.z > 1.0);
+            }
+        }
+    }
+    assert!(pressed > 1000, "only {pressed} forces seen");
+}
+
+#[test]
+fn a_drop_from_half_a_metre_sinks_in_less_than_half_a_millimetre() {
+    let robot = go1();
+    let joint_position = stance(&robot, 0.1, 0.26);
+    let mut deepest = Largest::default();
+    for (case, tilt) in [0.0, 0.2, 0.5].into_iter().enumerate() {
+        let mut simulator = Simulator::new(&robot, &SimConfig::default()).unwrap();
+        simulator.place(&Placement { joint_position, lying: false, seed: 0 });
+        let mut state = *simulator.state();
+        state.orientation_world = UnitQuaternion::from_euler_angles(tilt, -tilt, 0.0);
+        simulator.set_state(&state);
+        state.position_world.z += 0.5 - simulator.smallest_gap();
+        simulator.set_state(&state);
+        let command = hold(&joint_position, 60.0, 2.0);
+        for tick in 0..1500 {
+            simulator.write(&command).unwrap();
+            deepest.see(simulator.smallest_gap().min(0.0), || format!("drop {case}, {tick} ms"));
+        }
+    }
+    println!("deepest: {deepest} m");
+    assert!(deepest.value < 5e-4);
+}
+
+/// Limp robots, thrown at random: never more energy than at the start, and hardly ever more than the least so far. (The steps in
+/// contact are of first order: limbs that whirl at their stops exchange a little energy with the step.)
+#[test]
+fn no_energy_is_gained_in_a_thousand_drops() {
+    let robot = go1();
+    let mut random = ChaCha8Rng::seed_from_u64(11);
+    let mut simulator = Simulator::new(&robot, &with_friction(0.6)).unwrap();
+    let (mut gain, mut over) = (Largest::default(), Largest::default());
+    for drop in 0..1000 {
+        let limits = &robot.limits;
+        let mut vector = |size: f64| Vector3::from_fn(|_, _| uniform(&mut random, -size, size));
+        let orientation_world = UnitQuaternion::from_scaled_axis(vector(2.0));
+        let (velocity_body, angular_velocity_body) = (vector(1.0), vector(2.0));
+        let mut state = State { orientation_world, velocity_body, angular_velocity_body, ..State::default() };
+        for i in 0..12 {
+            state.joint_position[i] = uniform(&mut random, limits.min_position[i], limits.max_position[i]);
+            state.joint_velocity[i] = uniform(&mut random, -3.0, 3.0);
+        }
+        simulator.set_state(&state);
+        state.position_world.z = uniform(&mut random, 0.02, 0.3) - simulator.smallest_gap();
+        simulator.set_state(&state);
+        let mut energy = simulator.model().energy(simulator.state()).total();
+        let scale = energy;
+        for tick in 0..400 {
+            simulator.write(&JointCommand::default()).unwrap();
+            assert!(simulator.state().is_finite());
+            let now = simulator.model().energy(simulator.state()).total();
+            gain.see((now - energy).max(0.0) / scale, || format!("drop {drop}, {tick} ms"));
+            energy = energy.min(now);
+            over.see((now - scale).max(0.0) / scale, || format!("drop {drop}, {tick} ms"));
+        }
+    }
+    println!("largest gain over the start {over}, over the least so far {gain}, as shares of the start's");
+    assert!(over.value < 1e-9);
+    assert!(gain.value < 0.02);
+}
+
+/// A lying robot on a slope sticks below atan(mu) and slides above, by Coulomb's law exactly at the rate that it gives, by the convex
+/// one, hopping a little, nearly so.
+#[test]
+fn friction_holds_below_its_angle_and_slips_above() {
+    for (law, tolerance) in [(ContactLaw::Coulomb, 1e-3), (ContactLaw::Convex, 0.1)] {
+        slide(law, tolerance);
+    }
+}
+
+fn slide(law: ContactLaw, tolerance: f64) {
+    let friction: f64 = 0.5;
+    let slid = |angle: f64| {
+        let mut config = with_friction(friction);
+        config.contact.law = law;
+        config.terrain.kind = TerrainKind::Slope;
+        config.terrain.slope.angle_rad = angle;
+        let robot = go1();
+        let mut simulator = Simulator::new(&robot, &config).unwrap();
+        let joint_position = robot.lying_position;
+        simulator.place(&Placement { joint_position, lying: true, seed: 0 });
+        let mut state = *simulator.state();
+        state.orientation_world = UnitQuaternion::from_euler_angles(0.0, -angle, 0.0);
+        state.position_world.z += 1.0;
+        simulator.set_state(&state);
+        state.position_world.z -= simulator.smallest_gap() / angle.cos();
+        simulator.set_state(&state);
+        let command = hold(&joint_position, 100.0, 3.0);
+        for _ in 0..300 {
+            simulator.write(&command).unwrap();
+        }
+        let (start, before) = (simulator.state().position_world, simulator.state().velocity_body);
+        for _ in 0..500 {
+            simulator.write(&command).unwrap();
+        }
+        let acceleration = (simulator.state().velocity_body - before).norm() / 0.5;
+        ((simulator.state().position_world - start).norm(), acceleration)
+    };
+    let critical = friction.atan();
+    let (held, _) = slid(critical - 0.02);
+    assert!(held < 1e-4, "slid {held} m below the angle of friction");
+    let angle = critical + 0.05;
+    let (_, acceleration) = slid(angle);
+    // a = g (sin - mu cos)
+    let expected = GRAVITY * (angle.sin() - friction * angle.cos());
+    println!("{law:?}: sliding at {acceleration} m/s^2, Coulomb gives {expected}");
+    assert!((acceleration / expected - 1.0).abs() < tolerance);
+}
+
+#[test]
+fn joint_stops_hold() {
+    let robot = go1();
+    let mut simulator = Simulator::new(&robot, &SimConfig::default()).unwrap();
+    let mut state = State { joint_position: stance(&robot, 0.1, 0.26), ..State::default() };
+    state.position_world.z = 3.0;
+    let mut over = Largest::default();
+    for sign in [-1.0, 1.0] {
+        simulator.set_state(&state);
+        for tick in 0..500 {
+            simulator.write(&JointCommand::torques(&[sign * 20.0; 12])).unwrap();
+            let limits = &robot.limits;
+            for (i, q) in simulator.state().joint_position.iter().enumerate() {
+                let beyond = (limits.min_position[i] - q).max(q - limits.max_position[i]).max(0.0);
+                over.see(beyond, || format!("joint {i}, {tick} ms"));
+            }
+        }
+    }
+    println!("beyond a stop by at most {over} rad");
+    assert!(over.value < 1e-3);
+}
+
+#[test]
+fn a_fallen_robot_lies_on_its_body_and_says_so() {
+    let robot = go1();
+    let mut simulator = Simulator::new(&robot, &SimConfig::default()).unwrap();
+    simulator.place(&Placement { joint_position: robot.lying_position, lying: true, seed: 0 });
+    let mut state = *simulator.state();
+    state.orientation_world = UnitQuaternion::from_euler_angles(2.5, 0.3, 0.0);
+    state.position_world.z = 0.6;
+    simulator.set_state(&state);
+    for _ in 0..4000 {
+        simulator.write(&JointCommand::damping(2.0)).unwrap();
+    }
+    let state = simulator.read().unwrap();
+    let truth = state.truth.unwrap();
+    assert!(truth.body_contact);
+    assert!(truth.velocity_world.norm() < 0.05, "still moves at {} m/s", truth.velocity_world.norm());
+    assert!(simulator.smallest_gap() > -5e-4);
+}

@@ -1,0 +1,86 @@
+//! Properties of motion without contact: momentum and energy are kept, the error falls with the step at the integrator's order.
+
+use nalgebra::{UnitQuaternion, Vector3};
+use quadfrog::robot::description::RobotDescription;
+use quadfrog::robot::{JointCommand, Robot};
+use quadfrog::sim::{SimConfig, Simulator, State};
+
+/// A limp robot that tumbles high up, without joint stops.
+fn tumbling(flight_substeps: u32) -> Simulator {
+    let mut robot = RobotDescription::embedded("go1").unwrap();
+    (robot.limits.min_position, robot.limits.max_position) = ([-1e3; 12], [1e3; 12]);
+    let mut config = SimConfig::default();
+    config.step.flight_substeps = flight_substeps;
+    let mut simulator = Simulator::new(&robot, &config).unwrap();
+    simulator.set_state(&State {
+        position_world: Vector3::new(0.3, -0.2, 5.0),
+        orientation_world: UnitQuaternion::from_euler_angles(0.4, -0.3, 1.0),
+        joint_position: std::array::from_fn(|i| [0.1, 0.8, -1.6][i % 3]),
+        velocity_body: Vector3::new(1.0, -0.5, 0.8),
+        angular_velocity_body: Vector3::new(3.0, -4.0, 5.0),
+        joint_velocity: std::array::from_fn(|i| if i % 2 == 0 { 6.0 } else { -4.0 }),
+    });
+    simulator
+}
+
+#[test]
+fn momentum_and_energy_are_kept() {
+    let mut simulator = tumbling(1);
+    let before = (simulator.model().momentum(simulator.state()), simulator.model().energy(simulator.state()).total());
+    for _ in 0..500 {
+        simulator.write(&JointCommand::default()).unwrap();
+    }
+    let after = (simulator.model().momentum(simulator.state()), simulator.model().energy(simulator.state()).total());
+    let turned = (after.0.angular_world - before.0.angular_world).norm() / before.0.angular_world.norm();
+    let gained = (after.1 - before.1).abs() / before.1;
+    println!("in 0.5 s: angular momentum {turned:.1e}, energy {gained:.1e} relative");
+    assert!(turned < 1e-6);
+    assert!(gained < 1e-6);
+}
+
+#[test]
+fn the_error_falls_with_the_fourth_power_of_the_step() {
+    let after = |substeps: u32| {
+        let mut simulator = tumbling(substeps);
+        for _ in 0..200 {
+            simulator.write(&JointCommand::default()).unwrap();
+        }
+        simulator.state().joint_position
+    };
+    let reference = after(16);
+    let error = |substeps| {
+        let found = after(substeps);
+        found.iter().zip(&reference).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
+    };
+    let (whole, half) = (error(1), error(2));
+    let order = (whole / half).log2();
+    println!("error {whole:.1e} rad at 1 ms, {half:.1e} at 0.5 ms: order {order:.2}");
+    assert!((3.7..4.3).contains(&order));
+}
+
+/// The same seed and commands, the same bits; also from a used simulator and from a copy.
+#[test]
+fn a_run_repeats_bit_for_bit() {
+    let run = |simulator: &mut Simulator| {
+        let robot = RobotDescription::embedded("go1").unwrap();
+        let placement = quadfrog::robot::Placement { joint_position: robot.lying_position, lying: true, seed: 7 };
+        simulator.place(&placement);
+        let mut bits = Vec::new();
+        for tick in 0..600 {
+            let torque = std::array::from_fn(|i| 15.0 * (f64::from(tick) * 0.02 + i as f64).sin());
+            simulator.write(&JointCommand::torques(&torque)).unwrap();
+            let state = simulator.read().unwrap();
+            bits.extend(state.joint_position.iter().chain(state.imu.accel_body.iter()).map(|x| x.to_bits()));
+        }
+        bits
+    };
+    let mut config = SimConfig::default();
+    config.sensors.enabled = true;
+    let robot = RobotDescription::embedded("go1").unwrap();
+    let mut simulator = Simulator::new(&robot, &config).unwrap();
+    let first = run(&mut simulator);
+    assert_eq!(first, run(&mut simulator));
+    assert_eq!(first, run(&mut simulator.clone()));
+    let in_thread = std::thread::spawn(move || run(&mut Simulator::new(&robot, &config).unwrap()));
+    assert_eq!(first, in_thread.join().unwrap());
+}
