@@ -5,6 +5,7 @@
 //! lines in one write and reads them back; so what it decides on is what it appends to.
 
 mod file;
+mod json;
 mod operation;
 mod redis;
 mod replay;
