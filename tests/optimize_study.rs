@@ -69,7 +69,10 @@ fn one_trial(study: &mut Study, overrides: &[(String, f64)]) {
     assert_eq!(study.tell(trial, outcome).unwrap(), Told::Recorded);
 }
 
-fn table(study: &Study) -> Vec<(u32, TrialState, Vec<(String, f64)>, Option<f64>, Value)> {
+/// What must be the same bit for bit: number, state, parameters, value, positions of the random streams.
+type Row = (u32, TrialState, Vec<(String, f64)>, Option<f64>, Value);
+
+fn table(study: &Study) -> Vec<Row> {
     let row = |t: &quadfrog::optimize::trial::Trial| {
         (t.number, t.state, t.parameters.clone(), t.value, t.system_attributes["quadfrog:draws"].clone())
     };

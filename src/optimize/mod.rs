@@ -1,9 +1,13 @@
 //! The optimizer: ask and tell over plain numbers. It does not know what a robot is.
 
+pub mod gp;
+pub mod insight;
 pub mod journal;
 pub mod mt19937;
 pub mod parzen;
+pub mod repeats;
 pub mod sampler;
+pub mod sobol;
 pub mod space;
 pub mod study;
 pub mod tpe;

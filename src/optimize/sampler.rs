@@ -1,7 +1,9 @@
 //! What a sampler is told and what it answers; which sampler is used is a setting.
 
+use super::gp;
 use super::mt19937::Mt19937;
-use super::space::Space;
+use super::sobol::Sobol;
+use super::space::{Parameter, Space};
 use super::tpe;
 use super::trial::Trial;
 use serde::{Deserialize, Serialize};
@@ -32,8 +34,12 @@ pub enum SamplerKind {
     /// Tree-structured Parzen estimator, as Optuna 5.0.
     #[default]
     Tpe,
+    /// Gaussian process with expected improvement: better where there are only some tens of trials.
+    Gp,
     /// Uniform random points.
     Random,
+    /// Points of the Sobol sequence: even, but blind to results.
+    Sobol,
 }
 
 /// The settings of `[sampler]` in `config/optimize.toml`.
@@ -47,14 +53,23 @@ pub struct SamplerConfig {
     /// Seed of the random streams.
     pub seed: u32,
     /// How many finished trials are needed before the model proposes; until then points are drawn over the whole space.
-    pub startup_trials: usize,
+    /// Left out: 10 for TPE, as Optuna; two more than there are parameters for the Gaussian process.
+    pub startup_trials: Option<usize>,
     /// TPE: how many candidates are drawn from l(x) for one proposal.
     pub candidates: usize,
 }
 
 impl Default for SamplerConfig {
     fn default() -> Self {
-        SamplerConfig { kind: SamplerKind::Tpe, multivariate: true, seed: 0, startup_trials: 10, candidates: 24 }
+        SamplerConfig { kind: SamplerKind::Tpe, multivariate: true, seed: 0, startup_trials: None, candidates: 24 }
+    }
+}
+
+impl SamplerConfig {
+    /// How many finished trials are needed before the model proposes.
+    pub fn startup_trials(&self, space: &Space) -> usize {
+        let usual = if self.kind == SamplerKind::Gp { space.parameters().len() + 2 } else { 10 };
+        self.startup_trials.unwrap_or(usual)
     }
 }
 
@@ -116,15 +131,35 @@ pub fn propose(
 ) -> Proposal {
     match config.kind {
         SamplerKind::Tpe => tpe::propose(config, streams, trials, space, fixed, direction),
+        SamplerKind::Gp => gp::propose(config, streams, trials, space, fixed, direction),
         SamplerKind::Random => random(streams, space, fixed),
+        SamplerKind::Sobol => startup_point(config.seed, streams, space, fixed),
     }
 }
 
 fn random(streams: &mut Streams, space: &Space, fixed: &[(String, f64)]) -> Proposal {
-    let value = |p: &super::space::Parameter| match fixed.iter().find(|(n, _)| *n == p.name) {
-        Some((_, given)) => *given,
-        None if p.range.is_point() => p.range.low,
-        None => tpe::uniform(&p.range, &mut streams.startup),
-    };
+    let value = |p: &Parameter| given(p, fixed).unwrap_or_else(|| tpe::uniform(&p.range, &mut streams.startup));
     Proposal { values: space.parameters().iter().map(value).collect(), joint: Vec::new() }
+}
+
+/// The next point of the seed's Sobol sequence; takes one double per parameter, unless all are given.
+pub(super) fn startup_point(seed: u32, streams: &mut Streams, space: &Space, fixed: &[(String, f64)]) -> Proposal {
+    let parameters = space.parameters();
+    let mut values: Vec<Option<f64>> = parameters.iter().map(|p| given(p, fixed)).collect();
+    if values.iter().any(Option::is_none) {
+        // The shift is the seed's; only the position moves on.
+        let sequence = Sobol::new(parameters.len(), &mut Mt19937::new(seed));
+        let index = streams.startup.drawn() / parameters.len() as u64;
+        streams.startup.advance_to((index + 1) * parameters.len() as u64);
+        for ((value, p), u) in values.iter_mut().zip(parameters).zip(sequence.point(index as u32)) {
+            value.get_or_insert_with(|| p.range.unscale(u));
+        }
+    }
+    Proposal { values: values.into_iter().flatten().collect(), joint: Vec::new() }
+}
+
+/// The value that a parameter has without being chosen: a given one, or the only one there is.
+fn given(parameter: &Parameter, fixed: &[(String, f64)]) -> Option<f64> {
+    let value = fixed.iter().find(|(n, _)| *n == parameter.name).map(|(_, v)| *v);
+    value.or(parameter.range.is_point().then_some(parameter.range.low))
 }

@@ -141,7 +141,7 @@ pub fn propose(
     fixed: &[(String, f64)],
     direction: Direction,
 ) -> Proposal {
-    let startup = trials.iter().filter(|t| t.state.is_observed()).count() < config.startup_trials;
+    let startup = trials.iter().filter(|t| t.state.is_observed()).count() < config.startup_trials(space);
     let mut parts: Option<Split<'_>> = None;
     let mut joint: Option<Vec<(String, f64)>> = None;
     let mut values = Vec::with_capacity(space.parameters().len());

@@ -136,6 +136,11 @@ impl Trial {
         }
     }
 
+    /// Whether the robot fell: its attribute `verdict` says `fall`.
+    pub fn is_fall(&self) -> bool {
+        self.user_attributes.get(VERDICT).and_then(Value::as_str) == Some(FALL)
+    }
+
     /// The joint sample announced for other workers, empty where there is none. Optuna writes it as JSON text in pieces.
     pub fn announced(&self) -> Vec<(String, f64)> {
         let text: String =
@@ -168,6 +173,10 @@ impl Trial {
     }
 }
 
+/// Trial user attribute: what the operator, or the machine for him, judged.
+pub const VERDICT: &str = "verdict";
+/// The verdict of a trial that ended on the floor. It is told with a value, but what the value says is where not to go.
+pub const FALL: &str = "fall";
 /// Trial system attribute: the fixed parameters, an object.
 pub const FIXED_PARAMS: &str = "fixed_params";
 /// Trial system attribute: the announced joint sample, with `:0`, `:1` ... for its pieces.

@@ -5,9 +5,12 @@
 //! lines in one write and reads them back; so what it decides on is what it appends to.
 
 mod file;
+mod json;
 mod operation;
+mod redis;
 mod replay;
 
+pub use self::redis::JournalRedis;
 pub use file::{Durability, JournalFile, LOCK_GRACE};
 pub use operation::{Operation, Template};
 pub use replay::{Effect, Replay, StudyRecord};
@@ -53,6 +56,16 @@ pub enum JournalError {
         /// Bytes it has now.
         has: u64,
     },
+    /// The Redis server refused or was not there.
+    #[error("cannot {action} the journal on the Redis server {address}: {source}")]
+    Redis {
+        /// What was tried.
+        action: &'static str,
+        /// The server, without any password.
+        address: String,
+        /// Why not.
+        source: ::redis::RedisError,
+    },
 }
 
 impl JournalError {
@@ -66,6 +79,7 @@ impl JournalError {
 enum Backend {
     Memory,
     File(JournalFile),
+    Redis(JournalRedis),
 }
 
 /// A journal: its state and the way to change it.
@@ -88,6 +102,16 @@ impl Journal {
     /// [`JournalError`] if the file cannot be read.
     pub fn open(file: JournalFile) -> Result<Self, JournalError> {
         let mut journal = Journal { backend: Backend::File(file), worker: worker_id(), replay: Replay::default() };
+        journal.refresh()?;
+        Ok(journal)
+    }
+
+    /// The journal on a Redis server.
+    ///
+    /// # Errors
+    /// [`JournalError`] if the server cannot be reached or its journal not be read.
+    pub fn connect(redis: JournalRedis) -> Result<Self, JournalError> {
+        let mut journal = Journal { backend: Backend::Redis(redis), worker: worker_id(), replay: Replay::default() };
         journal.refresh()?;
         Ok(journal)
     }
@@ -115,17 +139,19 @@ impl Journal {
         match &mut self.backend {
             Backend::Memory => Ok(()),
             Backend::File(file) => file.read(|line| accept(&mut self.replay, line).map(drop)).map(drop),
+            Backend::Redis(redis) => redis.read(|line| accept(&mut self.replay, line).map(drop)),
         }
     }
 
-    /// Decides on the newest state and appends: `decide` sees the journal as it is while nobody else can write, and says
-    /// which operations to append, none if nothing is to be done. Returns what became of each operation.
+    /// Decides on the newest state and appends: `decide` sees the journal exactly as it is before its operations are
+    /// appended, and says which, none if nothing is to be done. It is asked again if another writer of a Redis journal was
+    /// faster. Returns what became of each operation.
     ///
     /// # Errors
     /// What `decide` refuses, with nothing written; [`JournalError`] if the journal cannot be read or written.
     pub fn commit<E: From<JournalError>>(
         &mut self,
-        decide: impl FnOnce(&Replay) -> Result<Vec<Operation>, E>,
+        mut decide: impl FnMut(&Replay) -> Result<Vec<Operation>, E>,
     ) -> Result<Vec<Effect>, E> {
         match &mut self.backend {
             Backend::Memory => {
@@ -143,15 +169,23 @@ impl Journal {
                 file.append(&lock, &rest, &lines)?;
                 drop(lock);
                 let mut effects = Vec::with_capacity(operations.len());
-                file.read(|line| {
-                    let (worker, effect) = accept(&mut self.replay, line)?;
-                    if worker == self.worker {
-                        effects.push(effect);
-                    }
-                    Ok(())
-                })?;
+                file.read(|line| collect(&mut self.replay, line, &self.worker, &mut effects))?;
                 Ok(effects)
             }
+            Backend::Redis(redis) => loop {
+                redis.read(|line| accept(&mut self.replay, line).map(drop))?;
+                let operations = decide(&self.replay)?;
+                if operations.is_empty() {
+                    return Ok(Vec::new());
+                }
+                let lines: Vec<String> = operations.iter().map(|o| o.to_line(&self.worker)).collect();
+                if redis.append(&lines)? {
+                    let mut effects = Vec::with_capacity(operations.len());
+                    redis.read(|line| collect(&mut self.replay, line, &self.worker, &mut effects))?;
+                    return Ok(effects);
+                }
+                std::thread::sleep(std::time::Duration::from_millis(1));
+            },
         }
     }
 }
@@ -160,6 +194,15 @@ fn accept(replay: &mut Replay, line: &str) -> Result<(String, Effect), String> {
     let (worker, operation) = Operation::parse(line)?;
     let effect = replay.apply(operation, &worker);
     Ok((worker, effect))
+}
+
+/// Accepts a line and keeps its effect if it is our own.
+fn collect(replay: &mut Replay, line: &str, own: &str, effects: &mut Vec<Effect>) -> Result<(), String> {
+    let (worker, effect) = accept(replay, line)?;
+    if worker == own {
+        effects.push(effect);
+    }
+    Ok(())
 }
 
 fn worker_id() -> String {

@@ -1,10 +1,10 @@
 //! One line of the journal: an operation and who wrote it, to and from JSON text.
 
+use super::json::{Fields, json, number, numbers, parse_json, text, time};
 use crate::optimize::space::Range;
 use crate::optimize::trial::{Distribution, TrialState, number_of};
 use jiff::Timestamp;
 use serde_json::{Map, Value};
-use std::borrow::Cow;
 use std::fmt::Write as _;
 
 /// What a line of the journal does. Codes and fields are Optuna's; see its `JournalStorage`.
@@ -340,66 +340,6 @@ impl Template {
     }
 }
 
-/// The members of a line, with errors that name the member.
-struct Fields<'a>(&'a Map<String, Value>);
-
-impl Fields<'_> {
-    fn get(&self, key: &str) -> Result<&Value, String> {
-        self.0.get(key).ok_or_else(|| format!("`{key}` is missing"))
-    }
-
-    fn text(&self, key: &str) -> Result<&str, String> {
-        self.get(key)?.as_str().ok_or_else(|| format!("`{key}` is not text"))
-    }
-
-    fn index(&self, key: &str) -> Result<u64, String> {
-        self.get(key)?.as_u64().ok_or_else(|| format!("`{key}` is not a whole number"))
-    }
-
-    fn number(&self, key: &str) -> Result<f64, String> {
-        number_of(self.get(key)?).ok_or_else(|| format!("`{key}` is not a number"))
-    }
-
-    fn numbers(&self, key: &str) -> Result<Option<Vec<f64>>, String> {
-        match self.get(key)? {
-            Value::Null => Ok(None),
-            Value::Array(list) => {
-                let numbers = list.iter().map(|v| number_of(v).ok_or_else(|| format!("`{key}` holds no number")));
-                numbers.collect::<Result<_, _>>().map(Some)
-            }
-            _ => Err(format!("`{key}` is neither a list nor null")),
-        }
-    }
-
-    fn time(&self, key: &str) -> Result<Option<Timestamp>, String> {
-        match self.get(key)? {
-            Value::Null => Ok(None),
-            Value::String(text) => text.parse().map(Some).map_err(|e| format!("`{key}`: {e}")),
-            _ => Err(format!("`{key}` is neither a time nor null")),
-        }
-    }
-
-    fn state(&self) -> Result<TrialState, String> {
-        match self.index("state")? {
-            0 => Ok(TrialState::Running),
-            1 => Ok(TrialState::Complete),
-            2 => Ok(TrialState::Pruned),
-            3 => Ok(TrialState::Fail),
-            4 => Ok(TrialState::Waiting),
-            other => Err(format!("state {other} is not one of 0 to 4")),
-        }
-    }
-
-    fn attribute(&self, key: &str) -> Result<(String, Value), String> {
-        let map = self.get(key)?.as_object().ok_or_else(|| format!("`{key}` is not an object"))?;
-        let mut members = map.iter();
-        match (members.next(), members.next()) {
-            (Some((name, value)), None) => Ok((name.clone(), value.clone())),
-            _ => Err(format!("`{key}` must have exactly one member, not {}", map.len())),
-        }
-    }
-}
-
 fn distribution_text(distribution: &Distribution) -> String {
     match distribution {
         Distribution::Float(Range { low, high, log }) => format!(
@@ -421,85 +361,4 @@ fn parse_distribution(text: &str) -> Result<Distribution, String> {
         return Ok(Distribution::Float(Range { low: bound("low")?, high: bound("high")?, log }));
     }
     Ok(Distribution::Foreign { kind: kind.to_owned(), text: text.to_owned() })
-}
-
-fn text(value: &str) -> String {
-    Value::from(value).to_string()
-}
-
-/// A number as Python's JSON writes it, which has tokens for what is not finite.
-fn number(value: f64) -> String {
-    match value {
-        v if v.is_nan() => "NaN".to_owned(),
-        f64::INFINITY => "Infinity".to_owned(),
-        f64::NEG_INFINITY => "-Infinity".to_owned(),
-        v => Value::from(v).to_string(),
-    }
-}
-
-fn numbers(values: Option<&[f64]>) -> String {
-    match values {
-        None => "null".to_owned(),
-        Some(values) => format!("[{}]", values.iter().map(|v| number(*v)).collect::<Vec<_>>().join(",")),
-    }
-}
-
-fn json(value: &Value) -> String {
-    value.to_string()
-}
-
-fn time(at: Option<Timestamp>) -> String {
-    at.map_or_else(|| "null".to_owned(), |at| format!("\"{}\"", at.strftime("%Y-%m-%dT%H:%M:%S.%6f+00:00")))
-}
-
-/// Reads JSON as Python's `json` writes it: the bare tokens Infinity, -Infinity and NaN become text, and halves of
-/// surrogate pairs without the other half become U+FFFD.
-fn parse_json(text: &str) -> Result<Value, String> {
-    serde_json::from_str(text)
-        .or_else(|strict| serde_json::from_str(&strictly(text)).map_err(|_| strict))
-        .map_err(|e| format!("not JSON: {e}"))
-}
-
-fn strictly(text: &str) -> Cow<'_, str> {
-    let mut out = String::with_capacity(text.len() + 16);
-    let mut rest = text;
-    let mut quoted = false;
-    while let Some(c) = rest.chars().next() {
-        let token = ["-Infinity", "Infinity", "NaN"].into_iter().find(|t| !quoted && rest.starts_with(t));
-        let taken = match (token, c) {
-            (Some(token), _) => {
-                let _ = write!(out, "\"{token}\"");
-                token.len()
-            }
-            (None, '\\') if quoted => {
-                let (escape, replacement) = escape(rest);
-                out.push_str(replacement);
-                escape
-            }
-            (None, _) => {
-                quoted ^= c == '"';
-                out.push(c);
-                c.len_utf8()
-            }
-        };
-        rest = &rest[taken..];
-    }
-    Cow::Owned(out)
-}
-
-/// Length of the escape at the start of `rest` and what stands for it.
-fn escape(rest: &str) -> (usize, &str) {
-    let code = |at: usize| {
-        let hex = rest.get(at..at + 6)?.strip_prefix("\\u")?;
-        u16::from_str_radix(hex, 16).ok()
-    };
-    match code(0) {
-        Some(0xD800..=0xDBFF) if matches!(code(6), Some(0xDC00..=0xDFFF)) => (12, &rest[..12]),
-        Some(0xD800..=0xDFFF) => (6, "\\ufffd"),
-        Some(_) => (6, &rest[..6]),
-        None => {
-            let length = 1 + rest[1..].chars().next().map_or(0, char::len_utf8);
-            (length, &rest[..length])
-        }
-    }
 }

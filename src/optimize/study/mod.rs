@@ -5,12 +5,20 @@
 //! lines are in the journal, so that a study killed at any moment continues where it was: the positions of the random
 //! streams are kept with each trial.
 
-use super::journal::{
-    Durability, Effect, Journal, JournalError, JournalFile, LOCK_GRACE, Operation, StudyRecord, Template,
+mod check;
+mod draft;
+mod error;
+mod notes;
+
+pub use draft::{Draft, Suggestion};
+pub use error::StudyError;
+
+use crate::optimize::journal::{
+    Durability, Effect, Journal, JournalError, JournalFile, JournalRedis, LOCK_GRACE, Operation, StudyRecord, Template,
 };
-use super::sampler::{Direction, Draws, SamplerConfig, Streams, propose};
-use super::space::{Parameter, Range, Space};
-use super::trial::{Distribution, FIXED_PARAMS, Trial, TrialState, announcement};
+use crate::optimize::sampler::{Direction, Draws, SamplerConfig, Streams, propose};
+use crate::optimize::space::{Parameter, Range, Space};
+use crate::optimize::trial::{Distribution, FIXED_PARAMS, Trial, TrialState, announcement};
 use jiff::Timestamp;
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
@@ -20,8 +28,6 @@ use std::path::PathBuf;
 pub const DRAWS: &str = "quadfrog:draws";
 /// Study system attribute: names of the objectives, as Optuna and its dashboard know it.
 const METRIC_NAMES: &str = "study:metric_names";
-/// The dashboard reads notes in pieces of this many characters.
-const NOTE_PIECE: usize = 2045;
 
 /// Where a study is kept.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,6 +36,8 @@ pub enum Storage {
     Memory,
     /// In a journal file, made if it does not exist.
     File(PathBuf),
+    /// On a Redis server, given as `redis://host:port/db`: for workers on many hosts.
+    Redis(String),
 }
 
 /// What a study is.
@@ -51,46 +59,6 @@ pub struct StudyOptions {
     pub durability: Durability,
 }
 
-/// A parameter of a proposal.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Suggestion {
-    /// Name.
-    pub name: String,
-    /// Proposed value, in the parameter's own unit.
-    pub value: f64,
-    /// Whether the value was given (enqueued), not suggested by the sampler.
-    pub fixed: bool,
-    /// Lower bound.
-    pub low: f64,
-    /// Upper bound.
-    pub high: f64,
-    /// Whether the search is logarithmic.
-    pub log: bool,
-}
-
-/// A proposal that has had no effect yet.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Draft {
-    /// The number that the trial will have, unless another worker begins one first.
-    pub number: u32,
-    /// The parameters in the order of the space.
-    pub parameters: Vec<Suggestion>,
-    /// Whether it is an enqueued trial.
-    pub enqueued: bool,
-    /// User attributes that the enqueued trial brought along.
-    pub attributes: BTreeMap<String, Value>,
-    /// The joint sample that TPE drew, by name; announced to other workers.
-    pub joint: Vec<(String, f64)>,
-    /// Seed of the streams behind it.
-    pub seed: u32,
-    /// Where the streams stood before.
-    pub before: Draws,
-    /// Where they will stand after it has begun.
-    pub after: Draws,
-    /// The waiting trial behind it.
-    waiting: Option<u64>,
-}
-
 /// How a trial ends.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Outcome {
@@ -107,89 +75,6 @@ pub enum Told {
     Recorded,
     /// Somebody else, for example at the dashboard, had finished the trial already; theirs stands.
     AlreadyFinished,
-}
-
-/// What can go wrong with a study.
-#[derive(Debug, thiserror::Error)]
-pub enum StudyError {
-    /// The journal could not be read or written.
-    #[error(transparent)]
-    Journal(#[from] JournalError),
-    /// The stored study is of another kind.
-    #[error(
-        "study `{name}` is stored with direction {stored}, asked for is {asked}: continue it so, or choose another name"
-    )]
-    Direction {
-        /// Its name.
-        name: String,
-        /// As stored.
-        stored: String,
-        /// As asked for.
-        asked: &'static str,
-    },
-    /// A parameter was searched on another scale before.
-    #[error(
-        "study `{name}`: parameter `{parameter}` was stored as {stored} before and is {asked} now; only its bounds may change within a study: choose another study name"
-    )]
-    Incompatible {
-        /// Name of the study.
-        name: String,
-        /// Name of the parameter.
-        parameter: String,
-        /// As stored.
-        stored: String,
-        /// As asked for.
-        asked: &'static str,
-    },
-    /// A parameter that the study does not have.
-    #[error("study `{study}` has no parameter `{parameter}`: it has {known}")]
-    UnknownParameter {
-        /// Name of the study.
-        study: String,
-        /// The name that was given.
-        parameter: String,
-        /// The names that there are.
-        known: String,
-    },
-    /// A value that no parameter or objective can have.
-    #[error("{what} cannot be {value}: give a {expected}")]
-    Value {
-        /// What was to be set.
-        what: String,
-        /// To what.
-        value: f64,
-        /// What it can be.
-        expected: &'static str,
-    },
-    /// The number of no trial.
-    #[error("study `{study}` has no trial {trial}: it has {count}")]
-    UnknownTrial {
-        /// Name of the study.
-        study: String,
-        /// The number.
-        trial: u32,
-        /// How many trials there are.
-        count: usize,
-    },
-    /// A trial that cannot be changed as asked.
-    #[error("trial {trial} is {state:?}, so {action}")]
-    State {
-        /// Number of the trial.
-        trial: u32,
-        /// Its state.
-        state: TrialState,
-        /// What that excludes.
-        action: &'static str,
-    },
-    /// The draft was made before something else began.
-    #[error("the proposal for trial {trial} is out of date: the study has moved on since; ask for a new draft")]
-    StaleDraft {
-        /// The number that it was drafted for.
-        trial: u32,
-    },
-    /// The study was deleted meanwhile.
-    #[error("study `{0}` is no longer in the journal: it was deleted or renamed by another program")]
-    Gone(String),
 }
 
 /// A study, open for asking and telling.
@@ -212,6 +97,7 @@ impl Study {
         let mut journal = match storage {
             Storage::Memory => Journal::in_memory(),
             Storage::File(path) => Journal::open(JournalFile::new(&path, options.durability, LOCK_GRACE)?)?,
+            Storage::Redis(url) => Journal::connect(JournalRedis::new(&url, "")?)?,
         };
         if journal.replay().find(&options.name).is_none() {
             journal.commit(|replay| {
@@ -390,7 +276,7 @@ impl Study {
             Some(t) if t.state == TrialState::Waiting && outcome != Outcome::Fail => {
                 Err(StudyError::State { trial, state: t.state, action: "it cannot have a value yet: begin it first" })
             }
-            _ => Ok(vec![Operation::SetState { trial: id, state, values, at: Some(Timestamp::now()) }]),
+            _ => Ok(vec![Operation::SetState { trial: id, state, values: values.clone(), at: Some(Timestamp::now()) }]),
         })?;
         Ok(if effects == [Effect::Accepted] { Told::Recorded } else { Told::AlreadyFinished })
     }
@@ -406,43 +292,10 @@ impl Study {
         let user: Map<String, Value> = attributes.iter().cloned().collect();
         let template = Some(Box::new(Template::waiting(fixed, user)));
         let create = Operation::CreateTrial { study: self.id, started: None, template };
-        let effects = self.journal.commit(|_| Ok::<_, JournalError>(vec![create]))?;
+        let effects = self.journal.commit(|_| Ok::<_, JournalError>(vec![create.clone()]))?;
         let created = effects.iter().find_map(|e| if let Effect::Created(id) = e { Some(*id) } else { None });
         let trial = created.and_then(|id| self.journal.replay().trial(id));
         trial.map(|t| t.number).ok_or_else(|| StudyError::Gone(self.options.name.clone()))
-    }
-
-    /// Writes the note (Markdown) that the dashboard shows with a trial; finished trials can have one too. Replaces an
-    /// earlier note.
-    ///
-    /// # Errors
-    /// [`StudyError::UnknownTrial`], or journal errors.
-    pub fn note(&mut self, trial: u32, text: &str) -> Result<(), StudyError> {
-        let id = self.trial(trial)?.id;
-        let study = self.id;
-        self.journal.commit(|replay| {
-            let attributes = &replay.studies()[study].system_attributes;
-            let version = format!("dashboard:{id}:note_ver");
-            let next = attributes.get(&version).and_then(Value::as_u64).map_or(1, |v| v + 1);
-            let characters: Vec<char> = text.chars().collect();
-            let mut pieces: Vec<String> = characters.chunks(NOTE_PIECE).map(|c| c.iter().collect()).collect();
-            let key = |i: usize| format!("dashboard:{id}:note_str:{i}");
-            while attributes.contains_key(&key(pieces.len())) {
-                pieces.push(String::new()); // pieces of a longer note that was here before
-            }
-            let set = |key, value| Operation::StudySystemAttribute { study, key, value };
-            let pieces = pieces.into_iter().enumerate().map(|(i, piece)| set(key(i), Value::from(piece)));
-            Ok::<_, JournalError>(std::iter::once(set(version.clone(), Value::from(next))).chain(pieces).collect())
-        })?;
-        Ok(())
-    }
-
-    /// The note of a trial, empty if it has none.
-    pub fn note_of(&self, trial: u32) -> String {
-        let Ok(trial) = self.trial(trial) else { return String::new() };
-        let attributes = &self.record().system_attributes;
-        let piece = |i| attributes.get(&format!("dashboard:{}:note_str:{i}", trial.id))?.as_str();
-        (0..).map_while(piece).collect()
     }
 
     /// Sets user attributes of the study itself.
@@ -520,51 +373,6 @@ impl Study {
             .iter()
             .filter_map(ours)
             .fold(Draws::default(), |a, b| Draws { model: a.model.max(b.model), startup: a.startup.max(b.startup) })
-    }
-
-    fn check_compatible(&self) -> Result<(), StudyError> {
-        let StudyOptions { name, direction, space, .. } = &self.options;
-        let words = ["not set", "minimize", "maximize"];
-        let record = self.record();
-        if record.directions != [*direction as u64] {
-            let word = |d: &u64| words.get(*d as usize).map_or_else(|| d.to_string(), |w| (*w).to_owned());
-            let stored = record.directions.iter().map(word).collect::<Vec<_>>().join(", ");
-            return Err(StudyError::Direction { name: name.clone(), stored, asked: words[*direction as usize] });
-        }
-        for Parameter { name: parameter, range } in space.parameters() {
-            let scale = |log: bool| if log { "a logarithmic float" } else { "a linear float" };
-            let stored = match record.trials.iter().find_map(|t| t.distribution(parameter)) {
-                Some(Distribution::Float(stored)) if stored.log != range.log => scale(stored.log).to_owned(),
-                Some(Distribution::Foreign { kind, .. }) if kind != "FloatDistribution" => kind.clone(),
-                _ => continue,
-            };
-            let (name, parameter) = (name.clone(), parameter.clone());
-            return Err(StudyError::Incompatible { name, parameter, stored, asked: scale(range.log) });
-        }
-        Ok(())
-    }
-
-    fn check_parameters(&self, parameters: &[(String, f64)]) -> Result<(), StudyError> {
-        for (name, value) in parameters {
-            let Some(range) = self.options.space.range(name) else {
-                let known =
-                    self.options.space.parameters().iter().map(|p| p.name.as_str()).collect::<Vec<_>>().join(", ");
-                return Err(StudyError::UnknownParameter {
-                    study: self.options.name.clone(),
-                    parameter: name.clone(),
-                    known,
-                });
-            };
-            let what = || format!("parameter `{name}`");
-            if !value.is_finite() {
-                return Err(StudyError::Value { what: what(), value: *value, expected: "finite number" });
-            }
-            if range.log && *value <= 0.0 {
-                let expected = "number above 0, for it is searched in its logarithm";
-                return Err(StudyError::Value { what: what(), value: *value, expected });
-            }
-        }
-        Ok(())
     }
 }
 

@@ -1,0 +1,148 @@
+//! JSON as Python's `json` module writes it, and the members of a journal line.
+
+use crate::optimize::trial::{TrialState, number_of};
+use jiff::Timestamp;
+use serde_json::{Map, Value};
+use std::borrow::Cow;
+use std::fmt::Write as _;
+
+/// The members of a line, with errors that name the member.
+pub struct Fields<'a>(pub &'a Map<String, Value>);
+
+impl Fields<'_> {
+    pub fn get(&self, key: &str) -> Result<&Value, String> {
+        self.0.get(key).ok_or_else(|| format!("`{key}` is missing"))
+    }
+
+    pub fn text(&self, key: &str) -> Result<&str, String> {
+        self.get(key)?.as_str().ok_or_else(|| format!("`{key}` is not text"))
+    }
+
+    pub fn index(&self, key: &str) -> Result<u64, String> {
+        self.get(key)?.as_u64().ok_or_else(|| format!("`{key}` is not a whole number"))
+    }
+
+    pub fn number(&self, key: &str) -> Result<f64, String> {
+        number_of(self.get(key)?).ok_or_else(|| format!("`{key}` is not a number"))
+    }
+
+    pub fn numbers(&self, key: &str) -> Result<Option<Vec<f64>>, String> {
+        match self.get(key)? {
+            Value::Null => Ok(None),
+            Value::Array(list) => {
+                let numbers = list.iter().map(|v| number_of(v).ok_or_else(|| format!("`{key}` holds no number")));
+                numbers.collect::<Result<_, _>>().map(Some)
+            }
+            _ => Err(format!("`{key}` is neither a list nor null")),
+        }
+    }
+
+    pub fn time(&self, key: &str) -> Result<Option<Timestamp>, String> {
+        match self.get(key)? {
+            Value::Null => Ok(None),
+            Value::String(text) => text.parse().map(Some).map_err(|e| format!("`{key}`: {e}")),
+            _ => Err(format!("`{key}` is neither a time nor null")),
+        }
+    }
+
+    pub fn state(&self) -> Result<TrialState, String> {
+        match self.index("state")? {
+            0 => Ok(TrialState::Running),
+            1 => Ok(TrialState::Complete),
+            2 => Ok(TrialState::Pruned),
+            3 => Ok(TrialState::Fail),
+            4 => Ok(TrialState::Waiting),
+            other => Err(format!("state {other} is not one of 0 to 4")),
+        }
+    }
+
+    pub fn attribute(&self, key: &str) -> Result<(String, Value), String> {
+        let map = self.get(key)?.as_object().ok_or_else(|| format!("`{key}` is not an object"))?;
+        let mut members = map.iter();
+        match (members.next(), members.next()) {
+            (Some((name, value)), None) => Ok((name.clone(), value.clone())),
+            _ => Err(format!("`{key}` must have exactly one member, not {}", map.len())),
+        }
+    }
+}
+
+pub fn text(value: &str) -> String {
+    Value::from(value).to_string()
+}
+
+/// A number as Python's JSON writes it, which has tokens for what is not finite.
+pub fn number(value: f64) -> String {
+    match value {
+        v if v.is_nan() => "NaN".to_owned(),
+        f64::INFINITY => "Infinity".to_owned(),
+        f64::NEG_INFINITY => "-Infinity".to_owned(),
+        v => Value::from(v).to_string(),
+    }
+}
+
+pub fn numbers(values: Option<&[f64]>) -> String {
+    match values {
+        None => "null".to_owned(),
+        Some(values) => format!("[{}]", values.iter().map(|v| number(*v)).collect::<Vec<_>>().join(",")),
+    }
+}
+
+pub fn json(value: &Value) -> String {
+    value.to_string()
+}
+
+pub fn time(at: Option<Timestamp>) -> String {
+    at.map_or_else(|| "null".to_owned(), |at| format!("\"{}\"", at.strftime("%Y-%m-%dT%H:%M:%S.%6f+00:00")))
+}
+
+/// Reads JSON as Python's `json` writes it: the bare tokens Infinity, -Infinity and NaN become text, and halves of
+/// surrogate pairs without the other half become U+FFFD.
+pub fn parse_json(text: &str) -> Result<Value, String> {
+    serde_json::from_str(text)
+        .or_else(|strict| serde_json::from_str(&strictly(text)).map_err(|_| strict))
+        .map_err(|e| format!("not JSON: {e}"))
+}
+
+fn strictly(text: &str) -> Cow<'_, str> {
+    let mut out = String::with_capacity(text.len() + 16);
+    let mut rest = text;
+    let mut quoted = false;
+    while let Some(c) = rest.chars().next() {
+        let token = ["-Infinity", "Infinity", "NaN"].into_iter().find(|t| !quoted && rest.starts_with(t));
+        let taken = match (token, c) {
+            (Some(token), _) => {
+                let _ = write!(out, "\"{token}\"");
+                token.len()
+            }
+            (None, '\\') if quoted => {
+                let (escape, replacement) = escape(rest);
+                out.push_str(replacement);
+                escape
+            }
+            (None, _) => {
+                quoted ^= c == '"';
+                out.push(c);
+                c.len_utf8()
+            }
+        };
+        rest = &rest[taken..];
+    }
+    Cow::Owned(out)
+}
+
+/// Length of the escape at the start of `rest` and what stands for it.
+fn escape(rest: &str) -> (usize, &str) {
+    let code = |at: usize| {
+        let hex = rest.get(at..at + 6)?.strip_prefix("\\u")?;
+        u16::from_str_radix(hex, 16).ok()
+    };
+    match code(0) {
+        Some(0xD800..=0xDBFF) if matches!(code(6), Some(0xDC00..=0xDFFF)) => (12, &rest[..12]),
+        Some(0xD800..=0xDFFF) => (6, "\\ufffd"),
+        Some(_) => (6, &rest[..6]),
+        None => {
+            let length = 1 + rest[1..].chars().next().map_or(0, char::len_utf8);
+            (length, &rest[..length])
+        }
+    }
+}

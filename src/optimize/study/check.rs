@@ -1,0 +1,52 @@
+//! What a study refuses.
+
+use super::{Study, StudyError, StudyOptions};
+use crate::optimize::space::Parameter;
+use crate::optimize::trial::Distribution;
+
+impl Study {
+    pub(super) fn check_compatible(&self) -> Result<(), StudyError> {
+        let StudyOptions { name, direction, space, .. } = &self.options;
+        let words = ["not set", "minimize", "maximize"];
+        let record = self.record();
+        if record.directions != [*direction as u64] {
+            let word = |d: &u64| words.get(*d as usize).map_or_else(|| d.to_string(), |w| (*w).to_owned());
+            let stored = record.directions.iter().map(word).collect::<Vec<_>>().join(", ");
+            return Err(StudyError::Direction { name: name.clone(), stored, asked: words[*direction as usize] });
+        }
+        for Parameter { name: parameter, range } in space.parameters() {
+            let scale = |log: bool| if log { "a logarithmic float" } else { "a linear float" };
+            let stored = match record.trials.iter().find_map(|t| t.distribution(parameter)) {
+                Some(Distribution::Float(stored)) if stored.log != range.log => scale(stored.log).to_owned(),
+                Some(Distribution::Foreign { kind, .. }) if kind != "FloatDistribution" => kind.clone(),
+                _ => continue,
+            };
+            let (name, parameter) = (name.clone(), parameter.clone());
+            return Err(StudyError::Incompatible { name, parameter, stored, asked: scale(range.log) });
+        }
+        Ok(())
+    }
+
+    pub(super) fn check_parameters(&self, parameters: &[(String, f64)]) -> Result<(), StudyError> {
+        for (name, value) in parameters {
+            let Some(range) = self.options.space.range(name) else {
+                let known =
+                    self.options.space.parameters().iter().map(|p| p.name.as_str()).collect::<Vec<_>>().join(", ");
+                return Err(StudyError::UnknownParameter {
+                    study: self.options.name.clone(),
+                    parameter: name.clone(),
+                    known,
+                });
+            };
+            let what = || format!("parameter `{name}`");
+            if !value.is_finite() {
+                return Err(StudyError::Value { what: what(), value: *value, expected: "finite number" });
+            }
+            if range.log && *value <= 0.0 {
+                let expected = "number above 0, for it is searched in its logarithm";
+                return Err(StudyError::Value { what: what(), value: *value, expected });
+            }
+        }
+        Ok(())
+    }
+}
