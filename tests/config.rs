@@ -49,6 +49,16 @@ fn a_file_replaces_key_by_key() {
 }
 
 #[test]
+fn a_key_that_the_defaults_leave_out_may_be_given() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("optimize.toml"), "[sampler]\nkind = \"gp\"\nstartup_trials = 5\n").unwrap();
+    let config = Config::load(Some(folder.path())).unwrap();
+    assert_eq!(config.optimize.sampler.startup_trials, Some(5));
+    let error = refused("optimize.toml", "[sampler]\nstartup_trials = \"ten\"\n");
+    assert!(error.contains("sampler.startup_trials") && error.contains("whole number"), "{error}");
+}
+
+#[test]
 fn an_unknown_key_is_refused_with_line_and_nearest_key() {
     let error = refused("control.toml", "# mine\n\n[tasks.forward]\nkpp = 300.0\n");
     assert!(

@@ -24,7 +24,7 @@ fn study(storage: Storage) -> Study {
             direction: Direction::Maximize,
             metric: "J (m)".into(),
             space: Space::new(ranges).unwrap(),
-            sampler: SamplerConfig { startup_trials: 3, ..SamplerConfig::default() },
+            sampler: SamplerConfig { startup_trials: Some(3), ..SamplerConfig::default() },
             attributes: Vec::new(),
             durability: Durability::Buffered,
         },

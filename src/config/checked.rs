@@ -28,6 +28,9 @@ const FILES: [(&str, &str); 5] = [
     ("console.toml", include_str!("../../config/console.toml")),
 ];
 
+/// Keys that may be given though the defaults leave them out, each with an example of its kind.
+const OPTIONAL: [(&str, &str); 1] = [("optimize.toml", "[sampler]\nstartup_trials = 10\n")];
+
 /// Which machine stands behind the controller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Backend {
@@ -150,13 +153,15 @@ impl Config {
         let mut tables = HashMap::new();
         for (name, default_text) in FILES {
             let embedded = format!("config/{name}");
-            let default = merge(&embedded, default_text, &template(default_text))?;
+            let optional = OPTIONAL.iter().find(|(file, _)| *file == name).map_or("", |(_, example)| example);
+            let optional = template(optional);
+            let default = merge(&embedded, default_text, &template(default_text), &optional)?;
             let (table, place) = match folder.map(|folder| folder.join(name)).filter(|path| path.exists()) {
                 Some(path) => {
                     let text = std::fs::read_to_string(&path)
                         .map_err(|source| ConfigError::Read { path: path.clone(), source })?;
                     let file = path.display().to_string();
-                    let merged = merge(&file, &text, &default.table)?;
+                    let merged = merge(&file, &text, &default.table, &optional)?;
                     (merged.table, Place { file, lines: merged.lines })
                 }
                 None => (default.table, Place { file: embedded, lines: default.lines }),

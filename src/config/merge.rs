@@ -15,11 +15,11 @@ pub struct Merged {
     pub lines: HashMap<String, usize>,
 }
 
-/// Lays the text of `file` over `default`.
+/// Lays the text of `file` over `default`. Keys of `optional` may be given too, though the default leaves them out.
 ///
 /// # Errors
 /// When it is not TOML, or a key is unknown or of another kind than the default's.
-pub fn merge(file: &str, text: &str, default: &Table) -> Result<Merged, ConfigError> {
+pub fn merge(file: &str, text: &str, default: &Table, optional: &Table) -> Result<Merged, ConfigError> {
     let line_of = |offset: usize| text[..offset.min(text.len())].matches('\n').count() + 1;
     let parsed = DeTable::parse(text).map_err(|error| ConfigError::Syntax {
         file: file.to_owned(),
@@ -28,7 +28,7 @@ pub fn merge(file: &str, text: &str, default: &Table) -> Result<Merged, ConfigEr
     })?;
     let mut merged = Merged { table: default.clone(), lines: HashMap::new() };
     let place = Place { file, line_of: &line_of };
-    place.lay(parsed.get_ref(), &mut merged.table, "", &mut merged.lines)?;
+    place.lay(parsed.get_ref(), &mut merged.table, optional, "", &mut merged.lines)?;
     Ok(merged)
 }
 
@@ -42,18 +42,27 @@ impl Place<'_> {
         &self,
         over: &DeTable<'_>,
         under: &mut Table,
+        optional: &Table,
         tables: &str,
         lines: &mut HashMap<String, usize>,
     ) -> Result<(), ConfigError> {
         for (name, value) in over {
             let key = format!("{tables}{}", name.get_ref());
             let line = (self.line_of)(name.span().start);
+            let example = optional.get(name.get_ref().as_ref());
+            if let (false, Some(example)) = (under.contains_key(name.get_ref().as_ref()), example) {
+                under.insert(name.get_ref().to_string(), example.clone());
+            }
             let Some(known) = under.get_mut(name.get_ref().as_ref()) else {
                 return Err(self.unknown(&key, line, tables, name.get_ref(), under));
             };
             lines.insert(key.clone(), line);
             match (value.get_ref(), known) {
-                (DeValue::Table(over), Value::Table(under)) => self.lay(over, under, &format!("{key}."), lines)?,
+                (DeValue::Table(over), Value::Table(under)) => {
+                    let nothing = Table::new();
+                    let optional = example.and_then(Value::as_table).unwrap_or(&nothing);
+                    self.lay(over, under, optional, &format!("{key}."), lines)?;
+                }
                 (given, known) => {
                     let given = plain(given);
                     if !same_kind(&given, known) {
