@@ -1,37 +1,394 @@
-//! Wires the threads; computes nothing.
+//! Wires the threads; computes nothing. `Engine::start` takes a checked configuration and gives a screen its [`Handle`].
 
-use crate::realtime::telemetry::{Snapshot, Tick};
-use crate::recording::record::Stamped;
+mod control_thread;
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use serde_json::json;
+
+use crate::config::{Backend, Config, ConfigError};
+use crate::optimize::journal::{Durability, Journal, JournalFile, LOCK_GRACE};
+use crate::optimize::sampler::Direction;
+use crate::optimize::space::{Range, Space, SpaceError};
+use crate::optimize::study::{Storage, Study, StudyError, StudyOptions};
+use crate::realtime::channel::{Heartbeat, ScreenEnd, StopLatch, channels};
+use crate::realtime::clock::{Clock, MonotonicClock};
+use crate::realtime::command::{Command, Task};
+use crate::realtime::telemetry::{Mode, Snapshot, Tick};
+use crate::recording::RecordingError;
+use crate::recording::record::{Record, SessionInfo, Stamped};
+use crate::recording::recorder::Recorder;
+use crate::recording::writer::Writer;
+use crate::robot::description::RobotDescription;
+use crate::robot::{Placement, Robot};
 use crate::session::intent::Intent;
+use crate::session::life::{Life, Plan};
+use crate::session::supervisor::{Outlets, Supervisor};
+use crate::sim::{SimError, Simulator};
 
-/// What a screen holds of a running engine: it draws from it and asks through it, and decides nothing.
-pub struct Handle {}
+/// What an engine is started with.
+pub struct Options {
+    /// The configuration.
+    pub config: Config,
+    /// The machine.
+    pub robot: RobotDescription,
+    /// What stands behind the controller.
+    pub backend: Backend,
+    /// The task.
+    pub task: Task,
+    /// Seed of the study.
+    pub seed: u32,
+    /// Trials that are to count; none takes the configuration's.
+    pub trials: Option<u32>,
+    /// The folder of the study, made if it does not exist: study.log, session.mcap, config/. None keeps nothing.
+    pub folder: Option<PathBuf>,
+    /// Whether the session only looks.
+    pub observe: bool,
+}
+
+/// Why an engine does not start.
+#[derive(Debug, thiserror::Error)]
+pub enum EngineError {
+    /// A value of the configuration.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// The simulator's configuration.
+    #[error(transparent)]
+    Simulator(#[from] SimError),
+    /// The search space.
+    #[error(transparent)]
+    Space(#[from] SpaceError),
+    /// The study.
+    #[error(transparent)]
+    Study(#[from] StudyError),
+    /// The recording.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
+    /// A journal without a study of ours.
+    #[error("{}: holds no study of this program; give one that it made", file.display())]
+    NoStudy {
+        /// The file.
+        file: PathBuf,
+    },
+    /// The folder of the study, or a thread.
+    #[error("{what}: {source}")]
+    System {
+        /// What was attempted.
+        what: String,
+        /// What the system says.
+        source: std::io::Error,
+    },
+}
+
+/// Opens the study of `options` as a life of trials: what console and `optimize` have in common.
+///
+/// # Errors
+/// When the study cannot be read, or is of another task.
+pub fn open_life(options: &Options, durability: Durability, recording: &str) -> Result<Life, EngineError> {
+    let parameters = options.config.parameters(options.task);
+    let space = Space::new(parameters.iter().map(|p| (p.name.clone(), Range::linear(p.low, p.high))))?;
+    let mut sampler = options.config.optimize.sampler.clone();
+    sampler.seed = options.seed;
+    let storage = match &options.folder {
+        Some(folder) => Storage::File(folder.join(STUDY_FILE)),
+        None => Storage::Memory,
+    };
+    let name = format!("{}-seed{}", options.task.name(), options.seed);
+    let study = Study::open(
+        storage,
+        StudyOptions {
+            name,
+            direction: Direction::Maximize,
+            metric: format!("J_{} ({})", options.task.name(), options.task.unit()),
+            space,
+            sampler,
+            attributes: vec![
+                ("task".to_owned(), json!(options.task.name())),
+                ("robot".to_owned(), json!(options.robot.name)),
+                ("seed".to_owned(), json!(options.seed)),
+                ("sampler".to_owned(), json!(options.config.optimize.sampler)),
+                ("version".to_owned(), json!(env!("CARGO_PKG_VERSION"))),
+            ],
+            durability,
+        },
+    )?;
+    let plan = Plan {
+        task: options.task,
+        control: *options.config.task(options.task),
+        parameters,
+        seed: u64::from(options.seed),
+        budget: options.trials.unwrap_or(options.config.optimize.trials),
+        recording: recording.to_owned(),
+    };
+    Ok(Life::open(plan, study)?)
+}
+
+/// What a session of `options` is called in its recording.
+pub fn session_info(options: &Options, recording: &str) -> SessionInfo {
+    SessionInfo {
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        backend: match options.backend {
+            Backend::Simulator => "sim",
+            Backend::Hardware => "go1",
+        }
+        .to_owned(),
+        robot: options.robot.name.clone(),
+        task: options.task.name().to_owned(),
+        unit: options.task.unit().to_owned(),
+        sampler: format!("{:?}", options.config.optimize.sampler.kind).to_lowercase(),
+        seed: u64::from(options.seed),
+        budget: options.trials.unwrap_or(options.config.optimize.trials),
+        parameters: options.config.parameters(options.task),
+        study: options.folder.as_ref().map(|folder| folder.join(STUDY_FILE).display().to_string()).unwrap_or_default(),
+        recording: recording.to_owned(),
+        started: jiff::Timestamp::now().to_string(),
+        observe: options.observe,
+    }
+}
+
+/// The study's file in its folder.
+pub const STUDY_FILE: &str = "study.log";
+
+/// Makes the folder of `options`, keeps the configuration in it as it runs, and names the next recording there:
+/// `session.mcap`, `session-2.mcap`, ...; none without a folder.
+///
+/// # Errors
+/// When the folder cannot be made or written.
+pub fn prepare_folder(options: &Options) -> Result<Option<PathBuf>, EngineError> {
+    let Some(folder) = &options.folder else { return Ok(None) };
+    let system = |what: String| move |source| EngineError::System { what, source };
+    let config = folder.join("config");
+    std::fs::create_dir_all(&config).map_err(system(format!("{}: cannot be made", config.display())))?;
+    for (name, text) in &options.config.as_run {
+        let path = config.join(name);
+        std::fs::write(&path, text).map_err(system(format!("{}: cannot be written", path.display())))?;
+    }
+    let taken = |path: &PathBuf| path.exists() || path.with_extension("mcap.part").exists();
+    let names = std::iter::once("session.mcap".to_owned()).chain((2..).map(|n| format!("session-{n}.mcap")));
+    Ok(names.map(|name| folder.join(name)).find(|path| !taken(path)))
+}
+
+/// The attachments of a recording: the configuration as it runs.
+pub fn attachments(config: &Config) -> Vec<(&str, &str, &[u8])> {
+    config.as_run.iter().map(|(name, text)| (name.as_str(), "application/toml", text.as_bytes())).collect()
+}
+
+/// The present time, UTC, ns since 1970.
+pub fn utc_ns() -> u64 {
+    u64::try_from(jiff::Timestamp::now().as_nanosecond()).unwrap_or(0)
+}
+
+/// A running engine: control, recorder and session threads.
+pub struct Engine;
+
+impl Engine {
+    /// Starts the threads.
+    ///
+    /// # Errors
+    /// When the configuration, the study, the recording or the system does not allow it; nothing runs then.
+    pub fn start(options: Options) -> Result<Handle, EngineError> {
+        let settings = options.config.settings(&options.robot, options.task, options.backend)?;
+        let mut robot: Box<dyn Robot> = match options.backend {
+            Backend::Simulator => Box::new(Simulator::new(&options.robot, &options.config.simulator)?),
+            Backend::Hardware => {
+                let reason = "this version drives the simulator only";
+                return Err(options.config.refuse("control.toml", "robot", "go1", reason).into());
+            }
+        };
+        // A simulated robot begins as a real one does: lying folded on its belly.
+        robot.place(&Placement { joint_position: settings.lying_position, lying: true, seed: u64::from(options.seed) });
+        let recording = prepare_folder(&options)?;
+        let recording_name =
+            recording.as_ref().and_then(|path| path.file_name()).map(|name| name.to_string_lossy().into_owned());
+        let life = open_life(&options, Durability::Synced, recording_name.as_deref().unwrap_or_default())?;
+        let info = session_info(&options, &recording.as_ref().map(|p| p.display().to_string()).unwrap_or_default());
+        let clock = MonotonicClock::start();
+        let writer = match &recording {
+            Some(path) => Some(Writer::create(path, &info, utc_ns(), &attachments(&options.config))?),
+            None => None,
+        };
+
+        let (control_end, session_end, screen_end, tick_end) = channels();
+        let (to_recorder, recorder_records) = channel();
+        let (to_screen, screen_records) = channel();
+        let (trial_ticks_in, trial_ticks) = channel();
+        let recorder = Recorder::spawn(tick_end, recorder_records, writer, trial_ticks_in);
+        let outlets = Outlets { recorder: to_recorder, screen: to_screen };
+        let status = recorder.watch();
+        let closing = Arc::new(AtomicBool::new(false));
+
+        let system = |what: &'static str| {
+            move |source| EngineError::System { what: format!("the {what} thread could not be started"), source }
+        };
+        let thread = std::thread::Builder::new().name("control".into());
+        let flag = closing.clone();
+        let control = thread
+            .spawn(move || control_thread::run(&settings, control_end, &clock, &flag, &mut *robot))
+            .map_err(system("control"))?;
+
+        let (intents_in, intents) = channel();
+        let supervisor = Supervisor::new(life, session_end, trial_ticks, outlets, status, info, clock.now_ns());
+        let sits_down = options.backend == Backend::Hardware;
+        let session = std::thread::Builder::new()
+            .name("session".into())
+            .spawn(move || run_session(supervisor, &intents, &clock, sits_down))
+            .map_err(system("session"))?;
+
+        Ok(Handle {
+            screen: screen_end,
+            intents: Some(intents_in),
+            records: screen_records,
+            closing,
+            control: Some(control),
+            session: Some(session),
+            recorder: Some(recorder),
+        })
+    }
+}
+
+/// How often the session looks for events.
+const SESSION_PERIOD: Duration = Duration::from_millis(5);
+/// How long sitting down at the end may take.
+const LONGEST_GOODBYE: Duration = Duration::from_secs(6);
+
+/// The session thread: intents as they come, events every few milliseconds, until the screen lets go of its handle.
+fn run_session(mut supervisor: Supervisor, intents: &Receiver<Intent>, clock: &MonotonicClock, sits_down: bool) {
+    loop {
+        supervisor.attend(clock.now_ns());
+        if supervisor.mode() == Mode::Observe {
+            supervisor.take_control();
+        }
+        match intents.recv_timeout(SESSION_PERIOD) {
+            Ok(intent) => supervisor.carry_out(&intent, clock.now_ns()),
+            Err(RecvTimeoutError::Timeout) => {}
+            Err(RecvTimeoutError::Disconnected) => break,
+        }
+    }
+    // Nobody is there any more: a standing robot sits down before its motors are let go.
+    if sits_down && supervisor.command(Command::SitDown).is_ok() {
+        let begun = clock.now_ns();
+        loop {
+            supervisor.attend(clock.now_ns());
+            let waited = Duration::from_nanos(clock.now_ns() - begun);
+            if !supervisor.mode().energised() || waited > LONGEST_GOODBYE {
+                break;
+            }
+            std::thread::sleep(SESSION_PERIOD);
+        }
+    }
+    supervisor.close(clock.now_ns());
+}
+
+/// What a screen holds of a running engine: it draws from it and asks through it, and decides nothing. Dropping it ends
+/// the engine as `shutdown` does.
+pub struct Handle {
+    screen: ScreenEnd,
+    intents: Option<Sender<Intent>>,
+    records: Receiver<Stamped>,
+    closing: Arc<AtomicBool>,
+    control: Option<JoinHandle<()>>,
+    session: Option<JoinHandle<()>>,
+    recorder: Option<crate::recording::recorder::RecorderHandle>,
+}
 
 impl Handle {
     /// Stops the robot: damping in the next tick, whatever the mode. Never waits, never fails.
-    pub fn stop(&self) {}
+    pub fn stop(&self) {
+        self.screen.stop.set();
+    }
+
+    /// The stop latch itself, for a thread that must be able to stop without the screen.
+    pub fn stop_latch(&self) -> StopLatch {
+        self.screen.stop.clone()
+    }
 
     /// The screen is alive; to be called at least ten times a second.
-    pub fn beat(&self) {}
+    pub fn beat(&self) {
+        self.screen.heartbeat.beat();
+    }
+
+    /// The sign of life itself, for a screen that beats elsewhere.
+    pub fn heartbeat(&self) -> Heartbeat {
+        self.screen.heartbeat.clone()
+    }
 
     /// Wishes something. The answer comes as a `CommandRecord`.
-    pub fn wish(&self, _intent: Intent) {}
+    pub fn wish(&self, intent: Intent) {
+        if let Some(intents) = &self.intents {
+            // A session that has ended answers nothing; the screen sees that its records end.
+            let _ = intents.send(intent);
+        }
+    }
 
     /// The newest tick and counters.
     pub fn snapshot(&mut self) -> Snapshot {
-        Snapshot::default()
+        *self.screen.snapshot.read()
     }
 
     /// The next of the ticks for charts, 200 a second.
     pub fn next_tick(&mut self) -> Option<Tick> {
-        None
+        self.screen.shown.pop().ok()
     }
 
     /// The next record that the screen has not seen.
     pub fn next_record(&mut self) -> Option<Stamped> {
-        None
+        self.records.try_recv().ok()
     }
 
-    /// Sits the robot down if it stands, closes the recording and ends the threads.
-    pub fn shutdown(self) {}
+    /// Sits the robot down if it stands, closes the recording and ends the threads. Returns the records of the end.
+    pub fn shutdown(mut self) -> Vec<Stamped> {
+        self.end();
+        self.records.try_iter().filter(|stamped| !matches!(stamped.record, Record::Counters(_))).collect()
+    }
+
+    fn end(&mut self) {
+        self.intents = None;
+        // Each thread ends with what feeds it: the session, then control, then the recorder. A thread that panicked has
+        // said so already.
+        if let Some(session) = self.session.take() {
+            let _ = session.join();
+        }
+        self.closing.store(true, Ordering::Release);
+        if let Some(control) = self.control.take() {
+            let _ = control.join();
+        }
+        if let Some(recorder) = self.recorder.take() {
+            let _ = recorder.join();
+        }
+    }
+}
+
+impl Drop for Handle {
+    fn drop(&mut self) {
+        self.end();
+    }
+}
+
+/// A study that is on disk.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct StoredStudy {
+    /// Its task.
+    pub task: Task,
+    /// Its seed.
+    pub seed: u32,
+}
+
+/// What study `file` holds.
+///
+/// # Errors
+/// When the file cannot be read or holds no study of this program.
+pub fn stored_study(file: &std::path::Path) -> Result<StoredStudy, EngineError> {
+    let journal_file = JournalFile::new(file, Durability::Synced, LOCK_GRACE).map_err(StudyError::from)?;
+    let journal = Journal::open(journal_file).map_err(StudyError::from)?;
+    let ours = journal.replay().studies().iter().find_map(|study| {
+        let task = Task::from_name(study.user_attributes.get("task")?.as_str()?)?;
+        let seed = u32::try_from(study.user_attributes.get("seed")?.as_u64()?).ok()?;
+        Some(StoredStudy { task, seed })
+    });
+    ours.ok_or_else(|| EngineError::NoStudy { file: file.to_owned() })
 }

@@ -1,5 +1,66 @@
-//! The engine of quadfrog.
+//! The engine of quadfrog: everything but the terminal.
+//!
+//! quadfrog optimizes the jumps of a quadruped on the robot itself. A control thread drives the machine, or the built-in
+//! simulator, at 1 kHz; an optimizer proposes a few parameters of a force profile; the robot jumps; an operator judges;
+//! everything is recorded. The method is that of *Quadruped-Frog: Rapid Online Optimization of Continuous Quadruped
+//! Jumping* (ICRA 2024); equations and sections in comments are the paper's.
+//!
+//! # Frames and units
+//!
+//! SI and radians everywhere; a name says its frame.
+//!
+//! | suffix | frame |
+//! |---|---|
+//! | `_world` | z up |
+//! | `_body` | the trunk's: x forward, y left, z up |
+//! | `_leg` | origin at the leg's hip joint, axes of the body |
+//!
+//! Legs are FR, FL, RR, RL; joints hip, thigh, calf; index `3 * leg + joint`. Forces in the controller are those that
+//! the *foot* exerts, as in the paper.
+//!
+//! # Threads
+//!
+//! ```text
+//!  screen (the program's main thread)                     recorder
+//!    │  intents            records │ ▲ ticks, snapshot       ▲ every tick
+//!    ▼                             ▼ │                       │
+//!  session ── commands ──────────► control, 1 kHz ───────────┘
+//!          ◄─ events ─────────────
+//! ```
+//!
+//! What crosses to and from `control` is `Copy` and goes through wait-free channels ([`realtime::channel`]); nothing in a
+//! tick allocates, locks, logs or touches a file. STOP is a latch of its own that the tick reads before it acts. Simulated
+//! time is the same [`control::cycle::Cycle::tick`] called without a thread ([`session::rollout`]).
+//!
+//! # Who may use whom
+//!
+//! ```text
+//! ui         -> the engine's public interface          draws and asks; decides nothing
+//! engine     -> everything below                       wires
+//! config     -> everything below                       files to checked values
+//! report     -> recording, optimize                    draws what happened
+//! session    -> optimize, recording, control, sim, realtime, robot    decides which trial, and whether it counts
+//! recording  -> realtime, robot                        writes and reads what was known
+//! control    -> robot, realtime                        decides this millisecond's torques
+//! sim        -> robot                                  answers as the machine would
+//! realtime   -> robot                                  carries
+//! optimize, robot -> nothing of ours                   numbers | the machine
+//! ```
+//!
+//! `tests/architecture.rs` checks the arrows.
+//!
+//! # Where this differs from the first plan of the house
+//!
+//! * *The next proposal is drafted, not asked for.* A verdict stays open to undo until the next trial begins, yet the
+//!   operator should see the next proposal at once. So a proposal is a [`optimize::study::Draft`] without effect, made on
+//!   a fork of the study in which the verdict is told already; verdict and proposal become final together, on approval.
+//! * *A study has a folder* (`study.log`, `config/`, one `session.mcap` per run of the program), because a study can be
+//!   continued by another session.
+//! * *A simulated robot is carried back to its mark before each trial*, as a person does it with a real one. A trial is
+//!   then a function of its parameters and seed alone: the console, `optimize` and a replay agree bit for bit.
+//! * `config` stands beside `engine`: it turns files into the settings of every part, so it must know them all.
 
+pub mod config;
 pub mod control;
 pub mod engine;
 pub mod optimize;

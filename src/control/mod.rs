@@ -1,7 +1,15 @@
 //! The 1 kHz cycle: read, estimate, watch, decide, limit, write, publish. Pure functions and one `tick()`; no thread,
 //! no file, no lock, no allocation.
 
+pub mod cycle;
+pub mod estimator;
 pub mod force_profile;
 pub mod impedance;
+pub mod jump;
 pub mod leg;
+pub mod limits;
+pub mod mode;
+pub mod ramp;
+pub mod settings;
 pub mod vmc;
+pub mod watchdog;

@@ -119,6 +119,8 @@ pub struct TrialSpec {
 /// What the session asks of the control thread. STOP does not travel here: it has its own latch.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Command {
+    /// The operator takes control of a robot that was only observed: damping is sent from now on.
+    TakeControl,
     /// Energise: checks, then stand up.
     Arm,
     /// Sit down and disarm.
@@ -131,6 +133,4 @@ pub enum Command {
     EndReview,
     /// A damped or faulted robot has been looked at: back to disarmed.
     Acknowledge,
-    /// Damp, sit and end the thread.
-    Shutdown,
 }

@@ -1,3 +1,26 @@
-//! Sessions on disk: what is kept (`record`), how it is written and read back.
+//! Sessions on disk: what is kept (`record`), how it is written (`writer`, `recorder`), read back (`player`) and saved
+//! after a crash (`recover`).
+//!
+//! A recording is an MCAP file of protobuf messages; `recordings/README.md` lists its topics, `proto/frog.proto` its
+//! fields. While it grows it is named `*.mcap.part`; only a finished one is named `*.mcap`.
 
+mod container;
+mod error;
+mod frames;
+mod output;
+pub mod player;
 pub mod record;
+pub mod recorder;
+pub mod recover;
+mod schema;
+mod tick;
+mod topic;
+pub mod writer;
+
+pub use error::RecordingError;
+
+/// The messages of `proto/frog.proto` as Rust types.
+#[allow(missing_docs, clippy::all, reason = "generated; the fields are explained in proto/frog.proto")]
+mod frog {
+    include!(concat!(env!("OUT_DIR"), "/frog.v1.rs"));
+}

@@ -1,1 +1,3 @@
-//! report
+//! What happened, as tables.
+
+pub mod table;

@@ -107,3 +107,10 @@ pub struct RobotDescription {
     /// Where the inertial unit sits, trunk frame, m; its axes are the trunk's.
     pub imu_origin: Vector3<f64>,
 }
+
+impl RobotDescription {
+    /// Mass of the whole machine, kg.
+    pub fn total_mass(&self) -> f64 {
+        self.trunk.mass + self.legs.iter().flat_map(|leg| &leg.bodies).map(|body| body.mass).sum::<f64>()
+    }
+}

@@ -1,3 +1,8 @@
 //! The life of a trial: proposed, approved, run, measured, judged.
 
+pub mod automatic;
 pub mod intent;
+pub mod life;
+pub mod objective;
+pub mod rollout;
+pub mod supervisor;

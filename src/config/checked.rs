@@ -1,0 +1,434 @@
+//! The files as values, and every check that needs more than a key's kind.
+
+use std::collections::{BTreeMap, HashMap};
+use std::path::Path;
+
+use serde::Deserialize;
+use serde::de::DeserializeOwned;
+use toml::Table;
+
+use super::ConfigError;
+use super::merge::merge;
+use crate::control::estimator::GRAVITY;
+use crate::control::leg::stance_of;
+use crate::control::settings::{Fall, Gate, Ramp, Settings, Settle, Stand, TaskControl, Watchdog};
+use crate::optimize::sampler::SamplerConfig;
+use crate::realtime::command::Task;
+use crate::recording::record::ParameterInfo;
+use crate::robot::Leg;
+use crate::robot::description::RobotDescription;
+use crate::sim::SimConfig;
+
+/// The files of a configuration folder and their defaults.
+const FILES: [(&str, &str); 5] = [
+    ("control.toml", include_str!("../../config/control.toml")),
+    ("safety.toml", include_str!("../../config/safety.toml")),
+    ("optimize.toml", include_str!("../../config/optimize.toml")),
+    ("simulator.toml", include_str!("../../config/simulator.toml")),
+    ("console.toml", include_str!("../../config/console.toml")),
+];
+
+/// Which machine stands behind the controller.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Backend {
+    /// The built-in simulator.
+    Simulator,
+    /// A robot over its network.
+    Hardware,
+}
+
+/// `control.toml`.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub struct ControlFile {
+    /// Standing up.
+    pub stand_up: Ramp,
+    /// Sitting down.
+    pub sit_down: Ramp,
+    /// From approval to the impulse.
+    pub countdown: Countdown,
+    /// When a trial is over.
+    pub settle: Settle,
+    /// When a foot is on the ground.
+    pub contact: Contact,
+    /// What each task's trials run with.
+    pub tasks: BTreeMap<String, TaskControl>,
+}
+
+/// From approval to the impulse, standing still.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+pub struct Countdown {
+    /// On the simulator, s.
+    pub simulator_s: f64,
+    /// On hardware, s.
+    pub hardware_s: f64,
+}
+
+/// When a foot is on the ground.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+pub struct Contact {
+    /// Least force at its sensor, N.
+    pub force_n: f64,
+}
+
+/// `safety.toml`.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub struct SafetyFile {
+    /// When the robot counts as fallen.
+    pub fall: Fall,
+    /// The last gate.
+    pub gate: Gate,
+    /// What trips the watchdog.
+    pub watchdog: WatchdogFile,
+    /// The widest bounds of each parameter.
+    pub parameters: BTreeMap<String, [f64; 2]>,
+}
+
+/// The watchdog, with the values that differ between simulator and hardware.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+pub struct WatchdogFile {
+    /// Largest tilt while standing, rad.
+    pub stance_tilt_rad: f64,
+    /// Oldest state, ms.
+    pub state_age_ms: u32,
+    /// Longest silence of the screen, ms.
+    pub operator_silent_ms: u32,
+    /// Latest tick on the simulator, ms; 0 only counts.
+    pub simulator_late_ms: f64,
+    /// Latest tick on hardware, ms; 0 only counts.
+    pub hardware_late_ms: f64,
+}
+
+/// `optimize.toml`.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub struct OptimizeFile {
+    /// Trials that count.
+    pub trials: u32,
+    /// Bounds of each parameter.
+    pub bounds: BTreeMap<String, [f64; 2]>,
+    /// Which parameters each task optimizes.
+    pub parameters: BTreeMap<String, Vec<String>>,
+    /// The sampler.
+    pub sampler: SamplerConfig,
+}
+
+/// All files, checked.
+#[derive(Debug, Clone)]
+pub struct Config {
+    /// `control.toml`.
+    pub control: ControlFile,
+    /// `safety.toml`.
+    pub safety: SafetyFile,
+    /// `optimize.toml`.
+    pub optimize: OptimizeFile,
+    /// `simulator.toml`.
+    pub simulator: SimConfig,
+    /// `console.toml`, for the console to read.
+    pub console: Table,
+    /// Every file as it is in force, to be kept with what it produced: name and text.
+    pub as_run: Vec<(String, String)>,
+    places: HashMap<&'static str, Place>,
+}
+
+/// Where a file came from, for messages.
+#[derive(Debug, Clone)]
+struct Place {
+    file: String,
+    lines: HashMap<String, usize>,
+}
+
+impl Config {
+    /// The defaults, or the files of `folder` laid over them.
+    ///
+    /// # Errors
+    /// When a file cannot be read or holds a key or a value that cannot be; the message names it.
+    pub fn load(folder: Option<&Path>) -> Result<Config, ConfigError> {
+        if let Some(folder) = folder {
+            refuse_strangers(folder)?;
+        }
+        let mut places = HashMap::new();
+        let mut as_run = Vec::new();
+        let mut tables = HashMap::new();
+        for (name, default_text) in FILES {
+            let embedded = format!("config/{name}");
+            let default = merge(&embedded, default_text, &template(default_text))?;
+            let (table, place) = match folder.map(|folder| folder.join(name)).filter(|path| path.exists()) {
+                Some(path) => {
+                    let text = std::fs::read_to_string(&path)
+                        .map_err(|source| ConfigError::Read { path: path.clone(), source })?;
+                    let file = path.display().to_string();
+                    let merged = merge(&file, &text, &default.table)?;
+                    (merged.table, Place { file, lines: merged.lines })
+                }
+                None => (default.table, Place { file: embedded, lines: default.lines }),
+            };
+            as_run.push((name.to_owned(), table.to_string()));
+            places.insert(name, place);
+            tables.insert(name, table);
+        }
+        let mut take = |name: &'static str| (name, tables.remove(name).unwrap_or_default());
+        let config = Config {
+            control: parse(&places, take("control.toml"))?,
+            safety: parse(&places, take("safety.toml"))?,
+            optimize: parse(&places, take("optimize.toml"))?,
+            simulator: parse(&places, take("simulator.toml"))?,
+            console: take("console.toml").1,
+            as_run,
+            places,
+        };
+        config.check()?;
+        Ok(config)
+    }
+
+    /// What `task`'s trials run with.
+    pub fn task(&self, task: Task) -> &TaskControl {
+        // `check` has seen that every task is there.
+        &self.control.tasks[task.name()]
+    }
+
+    /// The parameters of `task` with their bounds, in table order.
+    pub fn parameters(&self, task: Task) -> Vec<ParameterInfo> {
+        self.optimize.parameters[task.name()]
+            .iter()
+            .map(|name| {
+                let [low, high] = self.optimize.bounds[name];
+                let unit = if name.starts_with('f') { "Hz" } else { "N" };
+                ParameterInfo { name: name.clone(), unit: unit.to_owned(), low, high }
+            })
+            .collect()
+    }
+
+    /// What the control cycle is made with.
+    ///
+    /// # Errors
+    /// When the stance of `task` is out of the robot's reach.
+    pub fn settings(&self, robot: &RobotDescription, task: Task, backend: Backend) -> Result<Settings, ConfigError> {
+        let chosen = self.task(task);
+        self.check_stance(robot, task)?;
+        let hardware = backend == Backend::Hardware;
+        let watchdog = &self.safety.watchdog;
+        Ok(Settings {
+            geometry: robot.leg_geometry,
+            hip_origin_body: Leg::ALL.map(|leg| robot.legs[leg as usize].joint_origin[0]),
+            min_position: robot.limits.min_position,
+            max_position: robot.limits.max_position,
+            max_torque: robot.limits.max_torque,
+            lying_position: robot.lying_position,
+            weight_n: robot.total_mass() * GRAVITY,
+            stand: Stand { gains: chosen.gains(), stance_leg: chosen.stance_leg(), vmc: chosen.vmc },
+            stand_up: self.control.stand_up,
+            sit_down: self.control.sit_down,
+            countdown_s: if hardware { self.control.countdown.hardware_s } else { self.control.countdown.simulator_s },
+            settle: self.control.settle,
+            fall: self.safety.fall,
+            contact_force_n: self.control.contact.force_n,
+            gate: self.safety.gate,
+            watchdog: Watchdog {
+                stance_tilt_rad: watchdog.stance_tilt_rad,
+                state_age_ms: watchdog.state_age_ms,
+                operator_silent_ms: watchdog.operator_silent_ms,
+                late_ms: if hardware { watchdog.hardware_late_ms } else { watchdog.simulator_late_ms },
+            },
+        })
+    }
+
+    /// Says where `key` of `file` stands, and what is wrong with it.
+    pub fn refuse(&self, file: &'static str, key: &str, value: impl ToString, reason: impl ToString) -> ConfigError {
+        let place = &self.places[file];
+        let file = match place.lines.get(key) {
+            Some(line) => format!("{}:{line}", place.file),
+            None => place.file.clone(),
+        };
+        ConfigError::Value { file, key: key.to_owned(), value: value.to_string(), reason: reason.to_string() }
+    }
+
+    fn check(&self) -> Result<(), ConfigError> {
+        self.check_control()?;
+        self.check_safety()?;
+        self.check_optimize()
+    }
+
+    fn check_control(&self) -> Result<(), ConfigError> {
+        const FILE: &str = "control.toml";
+        let control = &self.control;
+        let mut positive = vec![
+            ("countdown.hardware_s".to_owned(), control.countdown.hardware_s),
+            ("settle.quiet_s".to_owned(), control.settle.quiet_s),
+            ("settle.cap_s".to_owned(), control.settle.cap_s),
+            ("settle.speed_m_s".to_owned(), control.settle.speed_m_s),
+            ("settle.rate_rad_s".to_owned(), control.settle.rate_rad_s),
+            ("contact.force_n".to_owned(), control.contact.force_n),
+        ];
+        for (name, ramp) in [("stand_up", &control.stand_up), ("sit_down", &control.sit_down)] {
+            for (key, value) in [
+                ("duration_s", ramp.duration_s),
+                ("kp", ramp.kp),
+                ("kd", ramp.kd),
+                ("tolerance_rad", ramp.tolerance_rad),
+                ("timeout_s", ramp.timeout_s),
+            ] {
+                positive.push((format!("{name}.{key}"), value));
+            }
+        }
+        for task in Task::ALL {
+            let chosen = self.task(task);
+            let tables = format!("tasks.{}", task.name());
+            positive.push((format!("{tables}.kp"), chosen.kp));
+            for (key, value) in [("kd", chosen.kd), ("kd_joint", chosen.kd_joint), ("k_att", chosen.k_att)] {
+                if !(value >= 0.0 && value.is_finite()) {
+                    return Err(self.refuse(FILE, &format!("{tables}.{key}"), value, "must be 0 or more"));
+                }
+            }
+            if chosen.jumps == 0 || chosen.jumps > 100 {
+                let reason = "must be 1 to 100 jumps";
+                return Err(self.refuse(FILE, &format!("{tables}.jumps"), chosen.jumps, reason));
+            }
+            let f1_is_parameter = self.optimize.parameters[task.name()].iter().any(|name| name == "f1");
+            if chosen.jumps > 1 && chosen.f1_hz <= 0.0 && !f1_is_parameter {
+                let reason = "several jumps in a row need a frequency between them; give one above 0 Hz, or make f1 a parameter in optimize.toml";
+                return Err(self.refuse(FILE, &format!("{tables}.f1_hz"), chosen.f1_hz, reason));
+            }
+            if !(chosen.f1_hz >= 0.0 && chosen.f1_hz.is_finite()) {
+                return Err(self.refuse(FILE, &format!("{tables}.f1_hz"), chosen.f1_hz, "must be 0 or more"));
+            }
+        }
+        if !(control.countdown.simulator_s >= 0.0 && control.countdown.simulator_s <= 60.0) {
+            let reason = "must be 0 to 60 s";
+            return Err(self.refuse(FILE, "countdown.simulator_s", control.countdown.simulator_s, reason));
+        }
+        self.all_positive(FILE, &positive)
+    }
+
+    fn check_safety(&self) -> Result<(), ConfigError> {
+        const FILE: &str = "safety.toml";
+        let safety = &self.safety;
+        self.all_positive(
+            FILE,
+            &[
+                ("fall.roll_rad".to_owned(), safety.fall.roll_rad),
+                ("fall.pitch_rad".to_owned(), safety.fall.pitch_rad),
+                ("fall.body_contact_s".to_owned(), safety.fall.body_contact_s),
+                ("gate.torque_step_nm".to_owned(), safety.gate.torque_step_nm),
+                ("gate.kp_max".to_owned(), safety.gate.kp_max),
+                ("gate.kd_max".to_owned(), safety.gate.kd_max),
+                ("gate.damping_kd".to_owned(), safety.gate.damping_kd),
+                ("watchdog.stance_tilt_rad".to_owned(), safety.watchdog.stance_tilt_rad),
+                ("watchdog.state_age_ms".to_owned(), f64::from(safety.watchdog.state_age_ms)),
+                ("watchdog.operator_silent_ms".to_owned(), f64::from(safety.watchdog.operator_silent_ms)),
+            ],
+        )?;
+        if safety.gate.damping_kd > safety.gate.kd_max {
+            let reason = format!("is above gate.kd_max = {}: the stop itself would be cut", safety.gate.kd_max);
+            return Err(self.refuse(FILE, "gate.damping_kd", safety.gate.damping_kd, reason));
+        }
+        for (name, [low, high]) in &safety.parameters {
+            if !(low.is_finite() && high.is_finite() && low < high && *low >= 0.0) {
+                let reason = "must be [lowest, highest] with 0 <= lowest < highest";
+                return Err(self.refuse(FILE, &format!("parameters.{name}"), format!("[{low}, {high}]"), reason));
+            }
+        }
+        Ok(())
+    }
+
+    fn check_optimize(&self) -> Result<(), ConfigError> {
+        const FILE: &str = "optimize.toml";
+        if self.optimize.trials == 0 {
+            return Err(self.refuse(FILE, "trials", 0, "a study needs at least one trial"));
+        }
+        for (name, [low, high]) in &self.optimize.bounds {
+            let key = format!("bounds.{name}");
+            let value = format!("[{low}, {high}]");
+            let [least, most] = self.safety.parameters[name];
+            if !(low.is_finite() && high.is_finite() && low <= high) {
+                return Err(self.refuse(FILE, &key, value, "must be [lower, upper] with lower <= upper"));
+            }
+            if *low < least || *high > most {
+                let reason = format!(
+                    "outside the robot's limits [{least}, {most}] of safety.toml, [parameters] {name}; narrow the bounds"
+                );
+                return Err(self.refuse(FILE, &key, value, reason));
+            }
+        }
+        for (task, names) in &self.optimize.parameters {
+            let key = format!("parameters.{task}");
+            if names.is_empty() {
+                return Err(self.refuse(FILE, &key, "[]", "a task needs at least one parameter"));
+            }
+            for (i, name) in names.iter().enumerate() {
+                if !self.optimize.bounds.contains_key(name) {
+                    let known: Vec<_> = self.optimize.bounds.keys().map(String::as_str).collect();
+                    let reason = format!("there is no parameter `{name}`; the parameters are {}", known.join(", "));
+                    return Err(self.refuse(FILE, &key, format!("{names:?}"), reason));
+                }
+                if names[..i].contains(name) {
+                    return Err(self.refuse(FILE, &key, format!("{names:?}"), format!("`{name}` stands there twice")));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn check_stance(&self, robot: &RobotDescription, task: Task) -> Result<(), ConfigError> {
+        let key = format!("tasks.{}.stance_m", task.name());
+        let chosen = self.task(task);
+        let value = format!("{:?}", chosen.stance_m);
+        for leg in Leg::ALL {
+            let foot = stance_of(&chosen.stance_leg(), leg);
+            let q = robot
+                .leg_geometry
+                .inverse(&foot, leg.side())
+                .map_err(|error| self.refuse("control.toml", &key, &value, error))?;
+            for (joint, angle) in q.iter().enumerate() {
+                let i = 3 * leg as usize + joint;
+                let (least, most) = (robot.limits.min_position[i], robot.limits.max_position[i]);
+                if *angle < least || *angle > most {
+                    let reason = format!(
+                        "needs {} at {angle:.3} rad, which the robot's limits [{least}, {most}] forbid",
+                        crate::robot::joint_name(i)
+                    );
+                    return Err(self.refuse("control.toml", &key, &value, reason));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn all_positive(&self, file: &'static str, values: &[(String, f64)]) -> Result<(), ConfigError> {
+        match values.iter().find(|(_, value)| !(*value > 0.0 && value.is_finite())) {
+            Some((key, value)) => Err(self.refuse(file, key, value, "must be a number above 0")),
+            None => Ok(()),
+        }
+    }
+}
+
+/// The defaults are their own template: what they hold is what may be given.
+fn template(text: &str) -> Table {
+    text.parse().unwrap_or_default()
+}
+
+fn parse<T: DeserializeOwned>(
+    places: &HashMap<&'static str, Place>,
+    (name, table): (&'static str, Table),
+) -> Result<T, ConfigError> {
+    table.try_into().map_err(|error: toml::de::Error| ConfigError::Syntax {
+        file: places[name].file.clone(),
+        line: 1,
+        message: error.message().to_owned(),
+    })
+}
+
+/// A folder must exist, and a TOML file in it that no one reads is probably a misspelt name.
+fn refuse_strangers(folder: &Path) -> Result<(), ConfigError> {
+    let entries = match std::fs::read_dir(folder) {
+        Ok(entries) => entries,
+        Err(_) => return Err(ConfigError::NoFolder { path: folder.to_owned() }),
+    };
+    for entry in entries {
+        let path = entry.map_err(|source| ConfigError::Read { path: folder.to_owned(), source })?.path();
+        let known = path.file_name().is_some_and(|name| FILES.iter().any(|(file, _)| name == *file));
+        if path.extension().is_some_and(|extension| extension == "toml") && !known {
+            let known = FILES.map(|(file, _)| file).join(", ");
+            return Err(ConfigError::UnknownFile { path, known });
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,437 @@
+//! One control tick: read, estimate, watch, decide, limit, write, publish. An ordinary call: the real-time thread makes
+//! it a thousand times a second, a rollout as fast as the machine goes.
+
+use super::jump::{FallWatch, Jump, Progress};
+use super::leg::{self, LegTarget};
+use super::limits::Gate;
+use super::mode::{self, Request};
+use super::ramp::{PoseRamp, RampProgress};
+use super::settings::Settings;
+use super::watchdog::{self, Circumstances};
+use crate::control::estimator::Estimator;
+use crate::realtime::clock::Clock;
+use crate::realtime::command::{Command, TrialSpec};
+use crate::realtime::telemetry::{Cause, Event, Fault, Mode, Phase, Tick, TrialEnd};
+use crate::robot::kinematics::Foot;
+use crate::robot::{JointCommand, Joints, LEGS, Leg, PerLeg, Placement, Robot, RobotError};
+use nalgebra::{Matrix3, Vector3};
+
+/// What a tick is told from outside.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Inputs {
+    /// Planned start of the tick, ns since the engine started.
+    pub time_ns: u64,
+    /// How late it really started, ns.
+    pub lateness_ns: u64,
+    /// The stop latch.
+    pub stop: bool,
+    /// How long the operator's screen has been silent, ms.
+    pub operator_silent_ms: u32,
+    /// The next waiting command.
+    pub command: Option<Command>,
+    /// The ring of events was full: the session does not listen.
+    pub events_lost: bool,
+}
+
+/// Events of one tick; there is room for all that one tick can cause.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Events {
+    list: [Option<Event>; Events::MOST],
+    count: usize,
+}
+
+impl Events {
+    /// The most that one tick can cause: a refusal, two changes of mode, the end of a trial, and one to spare.
+    const MOST: usize = 8;
+
+    fn push(&mut self, event: Event) {
+        debug_assert!(self.count < Self::MOST, "a tick caused more than {} events", Self::MOST);
+        if let Some(place) = self.list.get_mut(self.count) {
+            *place = Some(event);
+            self.count += 1;
+        }
+    }
+
+    /// The events, in the order in which they happened.
+    pub fn iter(&self) -> impl Iterator<Item = Event> + '_ {
+        self.list.iter().flatten().copied()
+    }
+}
+
+/// The control cycle of one robot.
+#[derive(Debug, Clone)]
+pub struct Cycle {
+    settings: Settings,
+    mode: Mode,
+    /// Why the mode is what it is.
+    cause: Cause,
+    estimator: Estimator,
+    gate: Gate,
+    ramp: Option<PoseRamp>,
+    jump: Option<Jump>,
+    /// Between a trial and its verdict.
+    fall: FallWatch,
+    /// The trial that ended in this tick: the tick is still its own.
+    ended: Option<Jump>,
+    feet: PerLeg<Foot>,
+    state_age_ms: u32,
+    /// The screen fell silent during a jump: sit down as soon as it has landed.
+    operator_lost: bool,
+    tick: Tick,
+    events: Events,
+}
+
+impl Cycle {
+    /// A cycle that has not heard of its robot yet.
+    pub fn new(settings: &Settings) -> Cycle {
+        Cycle {
+            settings: *settings,
+            mode: Mode::Offline,
+            cause: Cause::Course,
+            estimator: Estimator::default(),
+            gate: Gate::default(),
+            ramp: None,
+            jump: None,
+            fall: FallWatch::default(),
+            ended: None,
+            feet: [Foot { position_leg: Vector3::zeros(), jacobian_leg: Matrix3::zeros() }; LEGS],
+            state_age_ms: 0,
+            operator_lost: false,
+            tick: Tick::default(),
+            events: Events { list: [None; Events::MOST], count: 0 },
+        }
+    }
+
+    /// A cycle whose robot stands ready for a trial: for rollouts, in which nobody arms.
+    pub fn ready(settings: &Settings) -> Cycle {
+        Cycle { mode: Mode::Ready, ..Cycle::new(settings) }
+    }
+
+    /// The mode in which the last tick ended.
+    pub fn mode(&self) -> Mode {
+        self.mode
+    }
+
+    /// Age of the robot's newest state, ms; zero while it answers.
+    pub fn state_age_ms(&self) -> u32 {
+        self.state_age_ms
+    }
+
+    /// What the last tick caused.
+    pub fn events(&self) -> &Events {
+        &self.events
+    }
+
+    /// The last tick.
+    pub fn last(&self) -> &Tick {
+        &self.tick
+    }
+
+    /// Does one tick.
+    pub fn tick<C: Clock, R: Robot + ?Sized>(&mut self, inputs: &Inputs, clock: &C, robot: &mut R) -> &Tick {
+        let started_ns = clock.now_ns();
+        self.events.count = 0;
+        self.events.list = [None; Events::MOST];
+        let previous_robot_time_ms = self.tick.state.robot_time_ms;
+
+        self.read(robot);
+        let read_ns = clock.now_ns();
+        self.estimate();
+        self.watch(inputs, previous_robot_time_ms);
+        if let Some(command) = inputs.command {
+            self.obey(&command, robot);
+        }
+        if inputs.stop {
+            self.request(Request::Stop, Cause::Stop);
+        }
+        let wanted = self.decide();
+        let passed = self.gate.pass(&wanted, &self.tick.state, &self.settings);
+        let mut sent = passed.command;
+        if let Some(fault) = passed.fault {
+            self.request(Request::Fault, Cause::Fault(fault));
+            sent = JointCommand::damping(self.settings.gate.damping_kd);
+        }
+        let decided_ns = clock.now_ns();
+        if !matches!(self.mode, Mode::Offline | Mode::Observe)
+            && let Err(RobotError::Send { errno }) = robot.write(&sent)
+        {
+            self.request(Request::Fault, Cause::Fault(Fault::Send { errno }));
+        }
+        let written_ns = clock.now_ns();
+
+        self.publish(inputs, sent, passed.limited);
+        let stages = &mut self.tick.stages;
+        stages.lateness_ns = clamp_ns(inputs.lateness_ns);
+        stages.read_ns = clamp_ns(read_ns.saturating_sub(started_ns));
+        stages.decide_ns = clamp_ns(decided_ns.saturating_sub(read_ns));
+        stages.write_ns = clamp_ns(written_ns.saturating_sub(decided_ns));
+        if let Some(jump) = &mut self.jump {
+            jump.advance();
+        }
+        &self.tick
+    }
+
+    /// The newest state, or one more millisecond of silence.
+    fn read<R: Robot + ?Sized>(&mut self, robot: &mut R) {
+        match robot.read() {
+            Ok(state) => {
+                self.tick.state = state;
+                self.state_age_ms = 0;
+                if self.mode == Mode::Offline {
+                    self.request(Request::Heard, Cause::Connected);
+                }
+            }
+            Err(RobotError::Silent { age_ms }) => self.state_age_ms = age_ms,
+            Err(RobotError::Send { errno }) => {
+                self.request(Request::Fault, Cause::Fault(Fault::Send { errno }));
+            }
+        }
+    }
+
+    /// Feet, Jacobians, base.
+    fn estimate(&mut self) {
+        self.feet = leg::feet(&self.settings.geometry, &self.tick.state.joint_position);
+        self.tick.estimate = *self.estimator.update(&self.tick.state, &self.feet, &self.settings);
+    }
+
+    /// Limits and watchdogs; a robot that fell; an operator who is gone.
+    fn watch(&mut self, inputs: &Inputs, previous_robot_time_ms: u32) {
+        if inputs.events_lost {
+            self.request(Request::Fault, Cause::Fault(Fault::EventsLost));
+        }
+        let around = Circumstances {
+            mode: self.mode,
+            state_age_ms: self.state_age_ms,
+            previous_robot_time_ms,
+            lateness_ns: inputs.lateness_ns,
+        };
+        if let Some(fault) = watchdog::check(&self.tick.state, &self.tick.estimate, &around, &self.settings) {
+            if self.mode != Mode::Fault {
+                self.request(Request::Fault, Cause::Fault(fault));
+            }
+            return;
+        }
+        if self.mode != Mode::Review {
+            self.fall = FallWatch::default();
+        } else if let Some(cause) = self.fall.observe(&self.tick.state, &self.tick.estimate, &self.settings) {
+            self.request(Request::Fell, Cause::Fell(cause));
+        }
+        if inputs.operator_silent_ms > self.settings.watchdog.operator_silent_ms {
+            let fault = Fault::OperatorLost { silent_ms: inputs.operator_silent_ms };
+            match self.mode {
+                Mode::StandUp | Mode::Ready | Mode::Countdown | Mode::Review => {
+                    self.request(Request::SitDown, Cause::Fault(fault));
+                }
+                Mode::Jump => self.operator_lost = true,
+                _ => {}
+            }
+        } else if self.mode == Mode::Ready {
+            self.operator_lost = false;
+        }
+    }
+
+    /// One command of the session: carried out, or refused and said so.
+    fn obey<R: Robot + ?Sized>(&mut self, command: &Command, robot: &mut R) {
+        let request = match command {
+            Command::TakeControl => Request::TakeControl,
+            Command::Arm => Request::Arm,
+            Command::SitDown => Request::SitDown,
+            Command::RunTrial(_) => Request::Approve,
+            Command::Cancel => Request::Cancel,
+            // A robot that fell was judged: looked at, that is. It still has to be armed anew.
+            Command::EndReview if matches!(self.cause, Cause::Fell(_)) => Request::Acknowledge,
+            Command::EndReview => Request::EndReview,
+            Command::Acknowledge => Request::Acknowledge,
+        };
+        if mode::next(self.mode, request).is_none() {
+            self.events.push(Event::Refused { command: *command, mode: self.mode });
+            return;
+        }
+        match command {
+            Command::RunTrial(spec) => {
+                self.place(robot, spec);
+                self.jump = Some(Jump::begin(spec, &self.settings));
+            }
+            Command::Arm if self.needs_placing() => {
+                let lying = Placement { joint_position: self.settings.lying_position, lying: true, seed: 0 };
+                self.put(robot, &lying);
+            }
+            _ => {}
+        }
+        self.request(request, Cause::Command);
+    }
+
+    /// Whether a robot that is to stand up lies in a way from which it cannot.
+    fn needs_placing(&self) -> bool {
+        let [roll, pitch, _] = self.tick.estimate.roll_pitch_yaw.into();
+        roll.abs().max(pitch.abs()) > self.settings.watchdog.stance_tilt_rad
+    }
+
+    /// Puts a simulated robot on its mark, feet at the trial's stance.
+    fn place<R: Robot + ?Sized>(&mut self, robot: &mut R, spec: &TrialSpec) {
+        let mut joint_position = self.tick.state.joint_position;
+        for leg in Leg::ALL {
+            let foot = leg::stance_of(&spec.stance_leg, leg);
+            // The session has checked that the stance can be reached; a leg that cannot stays as it is.
+            if let Ok(q) = self.settings.geometry.inverse(&foot, leg.side()) {
+                joint_position[3 * leg as usize..3 * leg as usize + 3].copy_from_slice(q.as_slice());
+            }
+        }
+        self.put(robot, &Placement { joint_position, lying: false, seed: spec.seed });
+    }
+
+    fn put<R: Robot + ?Sized>(&mut self, robot: &mut R, placement: &Placement) {
+        if robot.place(placement) {
+            self.estimator.reset();
+            self.gate.reset();
+            self.read(robot);
+            self.estimate();
+        }
+    }
+
+    /// What the motors are to do in this mode, and the course of things that needs no command.
+    fn decide(&mut self) -> JointCommand {
+        if let Some(jump) = &mut self.jump {
+            let progress = jump.observe(&self.tick.state, &self.tick.estimate, &self.settings);
+            match (self.mode, progress) {
+                (Mode::Countdown, Progress::Jump | Progress::Settle) => {
+                    self.request(Request::CountdownOver, Cause::Course);
+                }
+                (Mode::Jump, Progress::Settle) => self.request(Request::Landed, Cause::Course),
+                (_, Progress::Over(TrialEnd::Fell(cause))) => self.request(Request::Fell, Cause::Fell(cause)),
+                (_, Progress::Over(end)) => {
+                    // A jump may be over without a moment of settling.
+                    if self.mode == Mode::Jump {
+                        self.request(Request::Landed, Cause::Course);
+                    }
+                    self.finish_trial(if self.operator_lost {
+                        TrialEnd::Fault(Fault::OperatorLost { silent_ms: self.settings.watchdog.operator_silent_ms })
+                    } else {
+                        end
+                    });
+                    self.request(Request::Settled, Cause::Course);
+                }
+                _ => {}
+            }
+        }
+        if let Some(ramp) = &mut self.ramp {
+            match ramp.progress(&self.tick.state.joint_position) {
+                RampProgress::Moving => {}
+                RampProgress::Reached => self.request(Request::PoseReached, Cause::Course),
+                RampProgress::Late { .. } if self.mode == Mode::SitDown => {
+                    // Lying down is where the floor stops it: damping is safe from here.
+                    self.request(Request::PoseReached, Cause::Course);
+                }
+                RampProgress::Late { error_rad } => {
+                    self.request(Request::Fault, Cause::Fault(Fault::PoseTimeout { error_rad }));
+                }
+            }
+        }
+        self.tick.torque_demanded = Joints::default();
+        match (self.mode, &mut self.ramp, &self.jump) {
+            (Mode::StandUp | Mode::SitDown, Some(ramp), _) => ramp.command(),
+            (Mode::Countdown | Mode::Jump | Mode::Settle, _, Some(jump)) => {
+                let target = jump.target();
+                self.legs(&target)
+            }
+            (Mode::Ready | Mode::Review, _, _) => {
+                let stand = &self.settings.stand;
+                self.legs(&LegTarget {
+                    gains: stand.gains,
+                    stance_leg: stand.stance_leg,
+                    vmc: stand.vmc,
+                    amplitudes_leg: [Vector3::zeros(); LEGS],
+                    theta_rad: 0.0,
+                })
+            }
+            _ => JointCommand::damping(self.settings.gate.damping_kd),
+        }
+    }
+
+    fn legs(&mut self, target: &LegTarget) -> JointCommand {
+        let (state, estimate) = (&self.tick.state, &self.tick.estimate);
+        let torques =
+            leg::torques(target, &self.feet, &state.joint_velocity, &estimate.orientation_world, &estimate.contact);
+        self.tick.torque_demanded = torques;
+        JointCommand::torques(&torques)
+    }
+
+    /// The only place where the mode changes.
+    fn request(&mut self, request: Request, cause: Cause) {
+        let Some(to) = mode::next(self.mode, request) else { return };
+        let from = self.mode;
+        if to == from {
+            return;
+        }
+        self.mode = to;
+        self.cause = cause;
+        self.events.push(Event::Mode { from, to, cause, time_ns: self.tick.time_ns });
+        self.ramp = match to {
+            Mode::StandUp => Some(PoseRamp::begin(&self.tick.state, &self.standing_pose(), &self.settings.stand_up)),
+            Mode::SitDown => {
+                Some(PoseRamp::begin(&self.tick.state, &self.settings.lying_position, &self.settings.sit_down))
+            }
+            _ => None,
+        };
+        if !matches!(to, Mode::Countdown | Mode::Jump | Mode::Settle) {
+            self.finish_trial(match cause {
+                Cause::Stop => TrialEnd::Stopped,
+                Cause::Fell(cause) => TrialEnd::Fell(cause),
+                Cause::Fault(fault) => TrialEnd::Fault(fault),
+                Cause::Command | Cause::Course | Cause::Connected => TrialEnd::Cancelled,
+            });
+        }
+    }
+
+    /// The trial is over, if one runs.
+    fn finish_trial(&mut self, end: TrialEnd) {
+        if let Some(jump) = self.jump.take() {
+            self.events.push(Event::TrialEnded { trial: jump.spec().trial, end });
+            self.ended = Some(jump);
+        }
+    }
+
+    /// Joint angles of standing: the nominal stance, lowered to where the springs carry the weight, so that nothing
+    /// jerks when impedance control takes over. 4 kp dz = m g.
+    fn standing_pose(&self) -> Joints {
+        let stand = &self.settings.stand;
+        let sag = self.settings.weight_n / (LEGS as f64 * stand.gains.kp);
+        let mut pose = self.settings.lying_position;
+        for leg in Leg::ALL {
+            let i = 3 * leg as usize;
+            let foot = leg::stance_of(&stand.stance_leg, leg) + Vector3::new(0.0, 0.0, sag);
+            if let Ok(q) = self.settings.geometry.inverse(&foot, leg.side()) {
+                pose[i..i + 3].copy_from_slice(q.as_slice());
+            }
+        }
+        pose
+    }
+
+    /// Fills the tick that everybody else sees.
+    fn publish(&mut self, inputs: &Inputs, sent: JointCommand, limited: u16) {
+        let tick = &mut self.tick;
+        tick.number += 1;
+        tick.time_ns = inputs.time_ns;
+        tick.mode = self.mode;
+        tick.command = sent;
+        tick.limited = limited;
+        match self.jump.or(self.ended.take()) {
+            Some(jump) => {
+                tick.phase = jump.phase();
+                tick.trial = Some(jump.spec().trial);
+                tick.trial_time_s = jump.time_s();
+                tick.theta_rad = jump.theta_rad();
+            }
+            None => {
+                tick.phase = Phase::Stance;
+                tick.trial = None;
+                tick.trial_time_s = 0.0;
+                tick.theta_rad = 0.0;
+            }
+        }
+    }
+}
+
+fn clamp_ns(ns: u64) -> u32 {
+    u32::try_from(ns).unwrap_or(u32::MAX)
+}

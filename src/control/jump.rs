@@ -1,0 +1,182 @@
+//! One trial: stand still, impulse, flight, landing, settle. Settings are latched when it begins.
+
+use super::force_profile::Oscillator;
+use super::leg::LegTarget;
+use super::limits::ticks;
+use super::settings::{PERIOD_S, Settings};
+use crate::realtime::command::TrialSpec;
+use crate::realtime::telemetry::{Estimate, FallCause, Phase, TrialEnd};
+use crate::robot::{LEGS, PerLeg, RobotState};
+use nalgebra::Vector3;
+
+/// How far a trial has come.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Progress {
+    /// Standing still before the impulse.
+    Countdown,
+    /// Impulse or flight.
+    Jump,
+    /// Feet down, not yet quiet.
+    Settle,
+    /// Over.
+    Over(TrialEnd),
+}
+
+/// A running trial.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Jump {
+    spec: TrialSpec,
+    oscillator: Oscillator,
+    amplitudes_leg: PerLeg<Vector3<f64>>,
+    /// Ticks since the trial began; the oscillator enters pi at `countdown`.
+    elapsed: u32,
+    countdown: u32,
+    /// Ticks without any foot on the ground since the last one.
+    airborne: u32,
+    /// Whether it has flown and touched down again since the last impulse.
+    flown: bool,
+    quiet: u32,
+    phase: Phase,
+    fall: FallWatch,
+}
+
+/// A foot may lift for a moment in stance; only a longer absence of all four is a flight.
+const SHORTEST_FLIGHT_S: f64 = 0.02;
+/// After an impulse that does not leave the ground within this time, the jump counts as landed.
+const LATEST_TAKEOFF_S: f64 = 0.1;
+
+impl Jump {
+    /// Begins a trial: everything that it runs with is fixed from here on.
+    pub fn begin(spec: &TrialSpec, settings: &Settings) -> Jump {
+        Jump {
+            spec: *spec,
+            oscillator: Oscillator {
+                f0_hz: spec.jump.f0_hz,
+                f1_hz: if spec.jumps > 1 { spec.jump.f1_hz } else { 0.0 },
+            },
+            amplitudes_leg: spec.jump.amplitudes_leg(spec.task),
+            elapsed: 0,
+            countdown: ticks(settings.countdown_s),
+            airborne: 0,
+            flown: false,
+            quiet: 0,
+            phase: Phase::Stance,
+            fall: FallWatch::default(),
+        }
+    }
+
+    /// What the trial runs with.
+    pub fn spec(&self) -> &TrialSpec {
+        &self.spec
+    }
+
+    /// Time since the oscillator entered pi, s; negative during the countdown.
+    pub fn time_s(&self) -> f64 {
+        (f64::from(self.elapsed) - f64::from(self.countdown)) * PERIOD_S
+    }
+
+    /// Time at which the last impulse ends, s.
+    fn impulses_end_s(&self) -> f64 {
+        let before = self.spec.jumps.saturating_sub(1);
+        let waited = if before == 0 { 0.0 } else { f64::from(before) * self.oscillator.period_s() };
+        waited + self.oscillator.impulse_s()
+    }
+
+    /// Phase of the oscillator, rad; zero once the last impulse is over.
+    pub fn theta_rad(&self) -> f64 {
+        let time_s = self.time_s();
+        if time_s < self.impulses_end_s() { self.oscillator.theta_rad(time_s) } else { 0.0 }
+    }
+
+    /// Where in the jump the robot is.
+    pub fn phase(&self) -> Phase {
+        self.phase
+    }
+
+    /// What the legs are to do now.
+    pub fn target(&self) -> LegTarget {
+        let theta_rad = self.theta_rad();
+        LegTarget {
+            gains: self.spec.gains,
+            stance_leg: self.spec.stance_leg,
+            vmc: self.spec.vmc,
+            amplitudes_leg: self.amplitudes_leg,
+            theta_rad,
+        }
+    }
+
+    /// Takes note of the newest state and says how far the trial has come. Called once per tick, before `target`.
+    pub fn observe(&mut self, state: &RobotState, estimate: &Estimate, settings: &Settings) -> Progress {
+        if let Some(cause) = self.fall.observe(state, estimate, settings) {
+            return Progress::Over(TrialEnd::Fell(cause));
+        }
+        let time_s = self.time_s();
+        if time_s < 0.0 {
+            return Progress::Countdown;
+        }
+        let feet_down = estimate.contact.iter().filter(|&&down| down).count();
+        if feet_down == 0 {
+            self.airborne += 1;
+        } else {
+            self.flown |= self.airborne >= ticks(SHORTEST_FLIGHT_S);
+            self.airborne = 0;
+        }
+        let impulse = self.theta_rad() >= std::f64::consts::PI;
+        if impulse {
+            self.flown = false;
+        }
+        self.phase = match (impulse, feet_down, self.flown) {
+            (true, _, _) => Phase::Impulse,
+            (false, 0, _) => Phase::Flight,
+            (false, _, true) => Phase::Landing,
+            (false, _, false) => Phase::Stance,
+        };
+        let since_impulse_s = time_s - self.impulses_end_s();
+        if since_impulse_s < 0.0 {
+            return Progress::Jump;
+        }
+        let stayed = self.airborne == 0 && since_impulse_s > LATEST_TAKEOFF_S;
+        if !self.flown && !stayed && since_impulse_s < settings.settle.cap_s {
+            return Progress::Jump;
+        }
+        let quiet = feet_down == LEGS
+            && estimate.velocity_world.norm() < settings.settle.speed_m_s
+            && estimate.angular_velocity_body.norm() < settings.settle.rate_rad_s;
+        self.quiet = if quiet { self.quiet + 1 } else { 0 };
+        if self.quiet >= ticks(settings.settle.quiet_s) {
+            Progress::Over(TrialEnd::Settled)
+        } else if since_impulse_s >= settings.settle.cap_s {
+            Progress::Over(TrialEnd::NotQuiet)
+        } else {
+            Progress::Settle
+        }
+    }
+
+    /// One tick has passed.
+    pub fn advance(&mut self) {
+        self.elapsed += 1;
+    }
+}
+
+/// Watches for a fall (`specs/method.md`, "fall").
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct FallWatch {
+    /// Ticks for which a part other than the feet has been on the ground.
+    touching: u32,
+}
+
+impl FallWatch {
+    /// Whether the robot has fallen by now, and by which sign. Called once per tick.
+    pub fn observe(&mut self, state: &RobotState, estimate: &Estimate, settings: &Settings) -> Option<FallCause> {
+        let touches = state.truth.is_some_and(|truth| truth.body_contact);
+        self.touching = if touches { self.touching + 1 } else { 0 };
+        let [roll, pitch, _] = estimate.roll_pitch_yaw.into();
+        if roll.abs() > settings.fall.roll_rad {
+            return Some(FallCause::Roll { measured_rad: roll, allowed_rad: settings.fall.roll_rad });
+        }
+        if pitch.abs() > settings.fall.pitch_rad {
+            return Some(FallCause::Pitch { measured_rad: pitch, allowed_rad: settings.fall.pitch_rad });
+        }
+        (self.touching >= ticks(settings.fall.body_contact_s)).then_some(FallCause::BodyContact)
+    }
+}

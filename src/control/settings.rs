@@ -1,0 +1,164 @@
+//! What is chosen about the control cycle: the sections of `config/control.toml` and `config/safety.toml`, and what the
+//! cycle needs of the machine's description. Every key is explained in those files.
+
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+use crate::realtime::command::Gains;
+use crate::robot::kinematics::LegGeometry;
+use crate::robot::{Joints, PerLeg};
+
+/// Control period, s: the paper's 1 kHz.
+pub const PERIOD_S: f64 = 0.001;
+
+/// How the robot stands while nothing else is asked: gains, nominal feet, Virtual Model Control.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Stand {
+    /// Gains of the leg controller.
+    pub gains: Gains,
+    /// Nominal foot position of a left leg, leg frame, m.
+    pub stance_leg: Vector3<f64>,
+    /// Whether Virtual Model Control acts.
+    pub vmc: bool,
+}
+
+/// Standing up and sitting down: a ramp of joint targets from the measured pose.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Ramp {
+    /// Duration, s.
+    pub duration_s: f64,
+    /// Joint stiffness, N m/rad.
+    pub kp: f64,
+    /// Joint damping, N m s/rad.
+    pub kd: f64,
+    /// Largest joint error at which the pose counts as reached, rad.
+    pub tolerance_rad: f64,
+    /// How long after the ramp the pose may take to be reached, s.
+    pub timeout_s: f64,
+}
+
+/// When a trial is over.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Settle {
+    /// How long all feet must be down and the body quiet, s.
+    pub quiet_s: f64,
+    /// Longest wait after the impulse, s.
+    pub cap_s: f64,
+    /// Quiet: speed of the trunk at most, m/s.
+    pub speed_m_s: f64,
+    /// Quiet: angular speed of the trunk at most, rad/s.
+    pub rate_rad_s: f64,
+}
+
+/// When the robot counts as fallen.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Fall {
+    /// Largest absolute roll, rad.
+    pub roll_rad: f64,
+    /// Largest absolute pitch, rad.
+    pub pitch_rad: f64,
+    /// For how long a part other than the feet must be on the ground, s (known in simulation only).
+    pub body_contact_s: f64,
+}
+
+/// The last gate before the motors.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Gate {
+    /// Largest change of a joint's torque from one tick to the next, N m.
+    pub torque_step_nm: f64,
+    /// Largest joint stiffness that may be sent, N m/rad.
+    pub kp_max: f64,
+    /// Largest joint damping that may be sent, N m s/rad.
+    pub kd_max: f64,
+    /// Damping that is sent when the robot is stopped, N m s/rad.
+    pub damping_kd: f64,
+}
+
+/// What trips the watchdog.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Watchdog {
+    /// Largest tilt while standing, rad.
+    pub stance_tilt_rad: f64,
+    /// Oldest state of the robot that may be acted on, ms.
+    pub state_age_ms: u32,
+    /// Longest silence of the operator's screen, ms: then land, sit down and disarm.
+    pub operator_silent_ms: u32,
+    /// Latest start of a tick, ms; zero only counts late ticks (the simulator's default).
+    pub late_ms: f64,
+}
+
+/// What the trials of one task run with: a section `[tasks.<task>]` of `config/control.toml`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TaskControl {
+    /// Cartesian stiffness, N/m.
+    pub kp: f64,
+    /// Cartesian damping, N s/m.
+    pub kd: f64,
+    /// Joint damping, N m s/rad.
+    pub kd_joint: f64,
+    /// Attitude gain, N/m.
+    pub k_att: f64,
+    /// Nominal foot of a left leg, leg frame, m.
+    pub stance_m: [f64; 3],
+    /// Virtual Model Control on or off.
+    pub vmc: bool,
+    /// Jumps in a row.
+    pub jumps: u32,
+    /// Frequency between impulses, Hz.
+    pub f1_hz: f64,
+}
+
+impl TaskControl {
+    /// The gains.
+    pub fn gains(&self) -> Gains {
+        Gains { kp: self.kp, kd: self.kd, kd_joint: self.kd_joint, k_att: self.k_att }
+    }
+
+    /// The nominal foot of a left leg, leg frame, m.
+    pub fn stance_leg(&self) -> Vector3<f64> {
+        self.stance_m.into()
+    }
+}
+
+/// Everything that the control cycle is made with.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// Leg lengths.
+    pub geometry: LegGeometry,
+    /// Hip joints in the body frame, m.
+    pub hip_origin_body: PerLeg<Vector3<f64>>,
+    /// Lowest joint angles, rad.
+    pub min_position: Joints,
+    /// Highest joint angles, rad.
+    pub max_position: Joints,
+    /// Largest joint torques, N m.
+    pub max_torque: Joints,
+    /// Joint angles of the machine lying folded, rad.
+    pub lying_position: Joints,
+    /// Weight, N.
+    pub weight_n: f64,
+    /// How it stands between trials.
+    pub stand: Stand,
+    /// Standing up.
+    pub stand_up: Ramp,
+    /// Sitting down.
+    pub sit_down: Ramp,
+    /// From approval to the impulse, standing still, s.
+    pub countdown_s: f64,
+    /// When a trial is over.
+    pub settle: Settle,
+    /// When the robot counts as fallen.
+    pub fall: Fall,
+    /// Least force at a foot's sensor that counts as contact, N.
+    pub contact_force_n: f64,
+    /// The last gate.
+    pub gate: Gate,
+    /// The watchdog.
+    pub watchdog: Watchdog,
+}

@@ -1,0 +1,602 @@
+//! A study: what has been tried, what to try next, and the journal that remembers it.
+//!
+//! A proposal is made in two steps. [`Study::draft`] computes it without any effect, so that the operator can look at it
+//! while the last verdict may still be undone; [`Study::begin`] commits it. After every call that changes the study its
+//! lines are in the journal, so that a study killed at any moment continues where it was: the positions of the random
+//! streams are kept with each trial.
+
+use super::journal::{
+    Durability, Effect, Journal, JournalError, JournalFile, LOCK_GRACE, Operation, StudyRecord, Template,
+};
+use super::sampler::{Direction, Draws, SamplerConfig, Streams, propose};
+use super::space::{Parameter, Range, Space};
+use super::trial::{Distribution, FIXED_PARAMS, Trial, TrialState, announcement};
+use jiff::Timestamp;
+use serde_json::{Map, Value};
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+/// Trial system attribute: seed of the streams and how far they had been read when the trial began.
+pub const DRAWS: &str = "quadfrog:draws";
+/// Study system attribute: names of the objectives, as Optuna and its dashboard know it.
+const METRIC_NAMES: &str = "study:metric_names";
+/// The dashboard reads notes in pieces of this many characters.
+const NOTE_PIECE: usize = 2045;
+
+/// Where a study is kept.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Storage {
+    /// Nowhere: it ends with the program.
+    Memory,
+    /// In a journal file, made if it does not exist.
+    File(PathBuf),
+}
+
+/// What a study is.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StudyOptions {
+    /// Name, unique within its journal.
+    pub name: String,
+    /// Whether the objective is to grow or to shrink.
+    pub direction: Direction,
+    /// Name of the objective, with its unit: shown by the dashboard.
+    pub metric: String,
+    /// What is searched. It may differ from that of earlier sessions: trials outside it stay in the history.
+    pub space: Space,
+    /// Which sampler proposes, with its seed.
+    pub sampler: SamplerConfig,
+    /// User attributes that a new study gets; one that is continued keeps its own.
+    pub attributes: Vec<(String, Value)>,
+    /// Whether calls wait for the disk.
+    pub durability: Durability,
+}
+
+/// A parameter of a proposal.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Suggestion {
+    /// Name.
+    pub name: String,
+    /// Proposed value, in the parameter's own unit.
+    pub value: f64,
+    /// Whether the value was given (enqueued), not suggested by the sampler.
+    pub fixed: bool,
+    /// Lower bound.
+    pub low: f64,
+    /// Upper bound.
+    pub high: f64,
+    /// Whether the search is logarithmic.
+    pub log: bool,
+}
+
+/// A proposal that has had no effect yet.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Draft {
+    /// The number that the trial will have, unless another worker begins one first.
+    pub number: u32,
+    /// The parameters in the order of the space.
+    pub parameters: Vec<Suggestion>,
+    /// Whether it is an enqueued trial.
+    pub enqueued: bool,
+    /// User attributes that the enqueued trial brought along.
+    pub attributes: BTreeMap<String, Value>,
+    /// The joint sample that TPE drew, by name; announced to other workers.
+    pub joint: Vec<(String, f64)>,
+    /// Seed of the streams behind it.
+    pub seed: u32,
+    /// Where the streams stood before.
+    pub before: Draws,
+    /// Where they will stand after it has begun.
+    pub after: Draws,
+    /// The waiting trial behind it.
+    waiting: Option<u64>,
+}
+
+/// How a trial ends.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Outcome {
+    /// With a value of the objective.
+    Complete(f64),
+    /// Without one: the samplers will not see it.
+    Fail,
+}
+
+/// What became of an outcome.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Told {
+    /// It was recorded.
+    Recorded,
+    /// Somebody else, for example at the dashboard, had finished the trial already; theirs stands.
+    AlreadyFinished,
+}
+
+/// What can go wrong with a study.
+#[derive(Debug, thiserror::Error)]
+pub enum StudyError {
+    /// The journal could not be read or written.
+    #[error(transparent)]
+    Journal(#[from] JournalError),
+    /// The stored study is of another kind.
+    #[error(
+        "study `{name}` is stored with direction {stored}, asked for is {asked}: continue it so, or choose another name"
+    )]
+    Direction {
+        /// Its name.
+        name: String,
+        /// As stored.
+        stored: String,
+        /// As asked for.
+        asked: &'static str,
+    },
+    /// A parameter was searched on another scale before.
+    #[error(
+        "study `{name}`: parameter `{parameter}` was stored as {stored} before and is {asked} now; only its bounds may change within a study: choose another study name"
+    )]
+    Incompatible {
+        /// Name of the study.
+        name: String,
+        /// Name of the parameter.
+        parameter: String,
+        /// As stored.
+        stored: String,
+        /// As asked for.
+        asked: &'static str,
+    },
+    /// A parameter that the study does not have.
+    #[error("study `{study}` has no parameter `{parameter}`: it has {known}")]
+    UnknownParameter {
+        /// Name of the study.
+        study: String,
+        /// The name that was given.
+        parameter: String,
+        /// The names that there are.
+        known: String,
+    },
+    /// A value that no parameter or objective can have.
+    #[error("{what} cannot be {value}: give a {expected}")]
+    Value {
+        /// What was to be set.
+        what: String,
+        /// To what.
+        value: f64,
+        /// What it can be.
+        expected: &'static str,
+    },
+    /// The number of no trial.
+    #[error("study `{study}` has no trial {trial}: it has {count}")]
+    UnknownTrial {
+        /// Name of the study.
+        study: String,
+        /// The number.
+        trial: u32,
+        /// How many trials there are.
+        count: usize,
+    },
+    /// A trial that cannot be changed as asked.
+    #[error("trial {trial} is {state:?}, so {action}")]
+    State {
+        /// Number of the trial.
+        trial: u32,
+        /// Its state.
+        state: TrialState,
+        /// What that excludes.
+        action: &'static str,
+    },
+    /// The draft was made before something else began.
+    #[error("the proposal for trial {trial} is out of date: the study has moved on since; ask for a new draft")]
+    StaleDraft {
+        /// The number that it was drafted for.
+        trial: u32,
+    },
+    /// The study was deleted meanwhile.
+    #[error("study `{0}` is no longer in the journal: it was deleted or renamed by another program")]
+    Gone(String),
+}
+
+/// A study, open for asking and telling.
+#[derive(Debug)]
+pub struct Study {
+    journal: Journal,
+    id: usize,
+    options: StudyOptions,
+    streams: Streams,
+}
+
+impl Study {
+    /// Creates the study, or continues the one of that name where it stands. Trials left running by a session that was
+    /// killed are still running then; see [`Study::running`].
+    ///
+    /// # Errors
+    /// If the journal cannot be read or written, or holds a study of that name with another direction or another scale of
+    /// a parameter.
+    pub fn open(storage: Storage, options: StudyOptions) -> Result<Study, StudyError> {
+        let mut journal = match storage {
+            Storage::Memory => Journal::in_memory(),
+            Storage::File(path) => Journal::open(JournalFile::new(&path, options.durability, LOCK_GRACE)?)?,
+        };
+        if journal.replay().find(&options.name).is_none() {
+            journal.commit(|replay| {
+                let exists = replay.find(&options.name).is_some();
+                let id = replay.studies().len();
+                Ok::<_, JournalError>(if exists { Vec::new() } else { creation(id, &options) })
+            })?;
+        }
+        let Some(id) = journal.replay().find(&options.name) else { return Err(StudyError::Gone(options.name)) };
+        let streams = Streams::new(options.sampler.seed);
+        let mut study = Study { journal, id, options, streams };
+        study.check_compatible()?;
+        study.streams.advance_to(study.draws_so_far());
+        Ok(study)
+    }
+
+    /// Takes in what other writers have appended.
+    ///
+    /// # Errors
+    /// If the journal cannot be read.
+    pub fn refresh(&mut self) -> Result<(), StudyError> {
+        Ok(self.journal.refresh()?)
+    }
+
+    /// The same study in memory: what is told to it reaches no disk, and its next proposal is the one that this study
+    /// would make if it were told the same.
+    pub fn fork(&self) -> Study {
+        Study {
+            journal: self.journal.fork(),
+            id: self.id,
+            options: self.options.clone(),
+            streams: self.streams.clone(),
+        }
+    }
+
+    /// The next proposal, without any effect: twice gives the same. The enqueued trial of lowest number comes first.
+    pub fn draft(&self) -> Draft {
+        self.draft_with(&[])
+    }
+
+    /// The next proposal if the parameters `fixed` are given: what Optuna suggests for a partly fixed trial. In the startup
+    /// phase and in univariate mode the other parameters may then differ from those of [`Study::draft`], because given
+    /// ones use no random numbers.
+    pub fn draft_with(&self, fixed: &[(String, f64)]) -> Draft {
+        let trials = self.trials();
+        let waiting = trials.iter().find(|t| t.state == TrialState::Waiting);
+        let given = merged(waiting.map(Trial::fixed).unwrap_or_default(), fixed);
+        let before = self.streams.draws();
+        let mut streams = self.streams.clone();
+        let StudyOptions { sampler, space, direction, .. } = &self.options;
+        let proposal = propose(sampler, &mut streams, trials, space, &given, *direction);
+        let suggest = |(p, value): (&Parameter, f64)| Suggestion {
+            name: p.name.clone(),
+            value,
+            fixed: given.iter().any(|(n, _)| *n == p.name),
+            low: p.range.low,
+            high: p.range.high,
+            log: p.range.log,
+        };
+        Draft {
+            number: waiting.map_or(trials.len() as u32, |t| t.number),
+            parameters: space.parameters().iter().zip(proposal.values).map(suggest).collect(),
+            enqueued: waiting.is_some(),
+            attributes: waiting.map(|t| t.user_attributes.clone()).unwrap_or_default(),
+            joint: proposal.joint,
+            seed: sampler.seed,
+            before,
+            after: streams.draws(),
+            waiting: waiting.map(|t| t.id),
+        }
+    }
+
+    /// Begins the trial of a draft: from here on it is running, in the journal too. Values in `overrides` replace those of
+    /// the draft and are recorded as fixed; the others are as drafted. A draft of which everything is given uses no random
+    /// numbers. Returns the number of the trial.
+    ///
+    /// # Errors
+    /// [`StudyError::StaleDraft`] if another trial has begun from the same streams, or the enqueued trial was taken by
+    /// another worker; [`StudyError::UnknownParameter`] or [`StudyError::Value`] for an override that cannot be;
+    /// journal errors. Nothing has changed then.
+    pub fn begin(
+        &mut self,
+        draft: &Draft,
+        overrides: &[(String, f64)],
+        attributes: &[(String, Value)],
+    ) -> Result<u32, StudyError> {
+        self.check_parameters(overrides)?;
+        let stale = || StudyError::StaleDraft { trial: draft.number };
+        if draft.before != self.streams.draws() || draft.seed != self.options.sampler.seed {
+            return Err(stale());
+        }
+        let given: Vec<(String, f64)> =
+            merged(draft.parameters.iter().filter(|s| s.fixed).map(|s| (s.name.clone(), s.value)).collect(), overrides);
+        let nothing_drawn = draft.parameters.iter().all(|s| given.iter().any(|(n, _)| *n == s.name) || s.low == s.high);
+        let draws = if nothing_drawn { draft.before } else { draft.after };
+        let (study, seed) = (self.id, draft.seed);
+        let mut id = 0;
+        self.journal.commit(|replay| {
+            let now = Timestamp::now();
+            let mut operations = Vec::new();
+            match draft.waiting {
+                Some(waiting) => {
+                    id = waiting;
+                    if replay.trial(id).is_none_or(|t| t.state != TrialState::Waiting) {
+                        return Err(stale());
+                    }
+                    let state = TrialState::Running;
+                    operations.push(Operation::SetState { trial: id, state, values: None, at: Some(now) });
+                }
+                None => {
+                    id = replay.next_trial_id();
+                    operations.push(Operation::CreateTrial { study, started: Some(now), template: None });
+                }
+            }
+            let mut system = announcement(&draft.joint);
+            if !given.is_empty() {
+                let object = given.iter().map(|(n, v)| (n.clone(), Value::from(*v))).collect();
+                system.push((FIXED_PARAMS.to_owned(), Value::Object(object)));
+            }
+            system.push((DRAWS.to_owned(), draws_value(seed, draws)));
+            operations.extend(system.into_iter().map(|(key, value)| Operation::TrialSystemAttribute {
+                trial: id,
+                key,
+                value,
+            }));
+            operations.extend(draft.parameters.iter().map(|s| {
+                let value = overrides.iter().find(|(n, _)| *n == s.name).map_or(s.value, |(_, v)| *v);
+                let range = Range { low: s.low, high: s.high, log: s.log };
+                Operation::SetParameter {
+                    trial: id,
+                    name: s.name.clone(),
+                    value,
+                    distribution: Distribution::Float(range),
+                }
+            }));
+            operations.extend(user_attributes(id, attributes));
+            Ok(operations)
+        })?;
+        self.streams.advance_to(draws);
+        self.journal.replay().trial(id).map(|t| t.number).ok_or_else(|| StudyError::Gone(self.options.name.clone()))
+    }
+
+    /// Sets user attributes of a trial that is running or waiting: verdict, cause, measured terms.
+    ///
+    /// # Errors
+    /// [`StudyError::State`] if the trial is finished, for nothing of it can change then; use [`Study::note`].
+    pub fn annotate(&mut self, trial: u32, attributes: &[(String, Value)]) -> Result<(), StudyError> {
+        let id = self.trial(trial)?.id;
+        self.journal.commit(|replay| match replay.trial(id) {
+            Some(t) if t.state.is_finished() => Err(StudyError::State {
+                trial,
+                state: t.state,
+                action: "its attributes cannot change any more: write a note instead",
+            }),
+            _ => Ok(user_attributes(id, attributes).collect()),
+        })?;
+        Ok(())
+    }
+
+    /// Ends a trial. If somebody else has ended it meanwhile, theirs stands and [`Told::AlreadyFinished`] says so.
+    ///
+    /// # Errors
+    /// [`StudyError::Value`] if the value is not a number; [`StudyError::State`] if the trial has not begun.
+    pub fn tell(&mut self, trial: u32, outcome: Outcome) -> Result<Told, StudyError> {
+        let id = self.trial(trial)?.id;
+        let (state, values) = match outcome {
+            Outcome::Complete(value) if value.is_nan() => {
+                let what = format!("the value of trial {trial}");
+                return Err(StudyError::Value { what, value, expected: "number, or end the trial as failed" });
+            }
+            Outcome::Complete(value) => (TrialState::Complete, Some(vec![value])),
+            Outcome::Fail => (TrialState::Fail, None),
+        };
+        let effects = self.journal.commit(|replay| match replay.trial(id) {
+            Some(t) if t.state.is_finished() => Ok(Vec::new()),
+            Some(t) if t.state == TrialState::Waiting && outcome != Outcome::Fail => {
+                Err(StudyError::State { trial, state: t.state, action: "it cannot have a value yet: begin it first" })
+            }
+            _ => Ok(vec![Operation::SetState { trial: id, state, values, at: Some(Timestamp::now()) }]),
+        })?;
+        Ok(if effects == [Effect::Accepted] { Told::Recorded } else { Told::AlreadyFinished })
+    }
+
+    /// Queues a trial with the given parameters; those that are not given will be suggested when it is its turn. Returns
+    /// its number.
+    ///
+    /// # Errors
+    /// [`StudyError::UnknownParameter`] or [`StudyError::Value`] for a parameter that cannot be.
+    pub fn enqueue(&mut self, parameters: &[(String, f64)], attributes: &[(String, Value)]) -> Result<u32, StudyError> {
+        self.check_parameters(parameters)?;
+        let fixed: Map<String, Value> = parameters.iter().map(|(n, v)| (n.clone(), Value::from(*v))).collect();
+        let user: Map<String, Value> = attributes.iter().cloned().collect();
+        let template = Some(Box::new(Template::waiting(fixed, user)));
+        let create = Operation::CreateTrial { study: self.id, started: None, template };
+        let effects = self.journal.commit(|_| Ok::<_, JournalError>(vec![create]))?;
+        let created = effects.iter().find_map(|e| if let Effect::Created(id) = e { Some(*id) } else { None });
+        let trial = created.and_then(|id| self.journal.replay().trial(id));
+        trial.map(|t| t.number).ok_or_else(|| StudyError::Gone(self.options.name.clone()))
+    }
+
+    /// Writes the note (Markdown) that the dashboard shows with a trial; finished trials can have one too. Replaces an
+    /// earlier note.
+    ///
+    /// # Errors
+    /// [`StudyError::UnknownTrial`], or journal errors.
+    pub fn note(&mut self, trial: u32, text: &str) -> Result<(), StudyError> {
+        let id = self.trial(trial)?.id;
+        let study = self.id;
+        self.journal.commit(|replay| {
+            let attributes = &replay.studies()[study].system_attributes;
+            let version = format!("dashboard:{id}:note_ver");
+            let next = attributes.get(&version).and_then(Value::as_u64).map_or(1, |v| v + 1);
+            let characters: Vec<char> = text.chars().collect();
+            let mut pieces: Vec<String> = characters.chunks(NOTE_PIECE).map(|c| c.iter().collect()).collect();
+            let key = |i: usize| format!("dashboard:{id}:note_str:{i}");
+            while attributes.contains_key(&key(pieces.len())) {
+                pieces.push(String::new()); // pieces of a longer note that was here before
+            }
+            let set = |key, value| Operation::StudySystemAttribute { study, key, value };
+            let pieces = pieces.into_iter().enumerate().map(|(i, piece)| set(key(i), Value::from(piece)));
+            Ok::<_, JournalError>(std::iter::once(set(version.clone(), Value::from(next))).chain(pieces).collect())
+        })?;
+        Ok(())
+    }
+
+    /// The note of a trial, empty if it has none.
+    pub fn note_of(&self, trial: u32) -> String {
+        let Ok(trial) = self.trial(trial) else { return String::new() };
+        let attributes = &self.record().system_attributes;
+        let piece = |i| attributes.get(&format!("dashboard:{}:note_str:{i}", trial.id))?.as_str();
+        (0..).map_while(piece).collect()
+    }
+
+    /// Sets user attributes of the study itself.
+    ///
+    /// # Errors
+    /// Journal errors.
+    pub fn annotate_study(&mut self, attributes: &[(String, Value)]) -> Result<(), StudyError> {
+        let study = self.id;
+        let set = |(key, value): &(String, Value)| {
+            let (key, value) = (key.clone(), value.clone());
+            Operation::StudyUserAttribute { study, key, value }
+        };
+        self.journal.commit(|_| Ok::<_, JournalError>(attributes.iter().map(set).collect()))?;
+        Ok(())
+    }
+
+    /// All trials by number.
+    pub fn trials(&self) -> &[Trial] {
+        &self.record().trials
+    }
+
+    /// The trial of that number.
+    ///
+    /// # Errors
+    /// [`StudyError::UnknownTrial`] if there is none.
+    pub fn trial(&self, number: u32) -> Result<&Trial, StudyError> {
+        let (study, count) = (self.options.name.clone(), self.trials().len());
+        self.trials().get(number as usize).ok_or(StudyError::UnknownTrial { study, trial: number, count })
+    }
+
+    /// The complete trial with the best value, the earliest of equal ones.
+    pub fn best(&self) -> Option<&Trial> {
+        let direction = self.options.direction;
+        let complete = self.trials().iter().filter(|t| t.state == TrialState::Complete && t.violation() <= 0.0);
+        complete.min_by(|a, b| direction.best_first(a.value.unwrap_or(f64::NAN), b.value.unwrap_or(f64::NAN)))
+    }
+
+    /// Trials that have begun and not ended: of other workers, or left by a session that was killed.
+    pub fn running(&self) -> impl Iterator<Item = &Trial> {
+        self.trials().iter().filter(|t| t.state == TrialState::Running)
+    }
+
+    /// Trials that wait to be run, in the order in which they will be.
+    pub fn waiting(&self) -> impl Iterator<Item = &Trial> {
+        self.trials().iter().filter(|t| t.state == TrialState::Waiting)
+    }
+
+    /// What the study is.
+    pub fn options(&self) -> &StudyOptions {
+        &self.options
+    }
+
+    /// User attributes of the study.
+    pub fn attributes(&self) -> &BTreeMap<String, Value> {
+        &self.record().user_attributes
+    }
+
+    /// This session's identity as a writer: the `worker` of the trials that it began.
+    pub fn worker(&self) -> &str {
+        self.journal.worker()
+    }
+
+    fn record(&self) -> &StudyRecord {
+        &self.journal.replay().studies()[self.id]
+    }
+
+    /// How far streams of our seed have been read by all sessions so far.
+    fn draws_so_far(&self) -> Draws {
+        let ours = |t: &Trial| {
+            let value = t.system_attributes.get(DRAWS)?;
+            (value["seed"].as_u64()? == u64::from(self.options.sampler.seed)).then_some(())?;
+            Some(Draws { model: value["model"].as_u64()?, startup: value["startup"].as_u64()? })
+        };
+        self.trials()
+            .iter()
+            .filter_map(ours)
+            .fold(Draws::default(), |a, b| Draws { model: a.model.max(b.model), startup: a.startup.max(b.startup) })
+    }
+
+    fn check_compatible(&self) -> Result<(), StudyError> {
+        let StudyOptions { name, direction, space, .. } = &self.options;
+        let words = ["not set", "minimize", "maximize"];
+        let record = self.record();
+        if record.directions != [*direction as u64] {
+            let word = |d: &u64| words.get(*d as usize).map_or_else(|| d.to_string(), |w| (*w).to_owned());
+            let stored = record.directions.iter().map(word).collect::<Vec<_>>().join(", ");
+            return Err(StudyError::Direction { name: name.clone(), stored, asked: words[*direction as usize] });
+        }
+        for Parameter { name: parameter, range } in space.parameters() {
+            let scale = |log: bool| if log { "a logarithmic float" } else { "a linear float" };
+            let stored = match record.trials.iter().find_map(|t| t.distribution(parameter)) {
+                Some(Distribution::Float(stored)) if stored.log != range.log => scale(stored.log).to_owned(),
+                Some(Distribution::Foreign { kind, .. }) if kind != "FloatDistribution" => kind.clone(),
+                _ => continue,
+            };
+            let (name, parameter) = (name.clone(), parameter.clone());
+            return Err(StudyError::Incompatible { name, parameter, stored, asked: scale(range.log) });
+        }
+        Ok(())
+    }
+
+    fn check_parameters(&self, parameters: &[(String, f64)]) -> Result<(), StudyError> {
+        for (name, value) in parameters {
+            let Some(range) = self.options.space.range(name) else {
+                let known =
+                    self.options.space.parameters().iter().map(|p| p.name.as_str()).collect::<Vec<_>>().join(", ");
+                return Err(StudyError::UnknownParameter {
+                    study: self.options.name.clone(),
+                    parameter: name.clone(),
+                    known,
+                });
+            };
+            let what = || format!("parameter `{name}`");
+            if !value.is_finite() {
+                return Err(StudyError::Value { what: what(), value: *value, expected: "finite number" });
+            }
+            if range.log && *value <= 0.0 {
+                let expected = "number above 0, for it is searched in its logarithm";
+                return Err(StudyError::Value { what: what(), value: *value, expected });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The operations that make a study.
+fn creation(study: usize, options: &StudyOptions) -> Vec<Operation> {
+    let create = Operation::CreateStudy { name: options.name.clone(), directions: vec![options.direction as u64] };
+    let metric = Operation::StudySystemAttribute {
+        study,
+        key: METRIC_NAMES.to_owned(),
+        value: Value::from(vec![options.metric.clone()]),
+    };
+    let attribute = |(key, value): &(String, Value)| {
+        let (key, value) = (key.clone(), value.clone());
+        Operation::StudyUserAttribute { study, key, value }
+    };
+    [create, metric].into_iter().chain(options.attributes.iter().map(attribute)).collect()
+}
+
+fn user_attributes(trial: u64, attributes: &[(String, Value)]) -> impl Iterator<Item = Operation> {
+    attributes.iter().map(move |(key, value)| {
+        let (key, value) = (key.clone(), value.clone());
+        Operation::TrialUserAttribute { trial, key, value }
+    })
+}
+
+/// `base` with the values of `over` replacing or joining its own.
+fn merged(mut base: Vec<(String, f64)>, over: &[(String, f64)]) -> Vec<(String, f64)> {
+    base.retain(|(n, _)| over.iter().all(|(m, _)| m != n));
+    base.extend_from_slice(over);
+    base
+}
+
+fn draws_value(seed: u32, draws: Draws) -> Value {
+    serde_json::json!({ "seed": seed, "model": draws.model, "startup": draws.startup })
+}

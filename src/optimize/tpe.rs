@@ -1,0 +1,186 @@
+//! The tree-structured Parzen estimator, equal to Optuna 5.0's `TPESampler` for float parameters.
+//!
+//! Bergstra et al., NeurIPS 2011; Watanabe, "Tree-structured Parzen estimator", arXiv:2304.11127. Finished trials are
+//! split into the good and the bad; l(x) and g(x) are the Parzen estimators of the two; of 24 candidates drawn from l
+//! the one with the largest l(x)/g(x) is proposed. Trials still running count as bad (the constant liar), so that
+//! workers do not crowd.
+
+use super::mt19937::Mt19937;
+use super::parzen::Parzen;
+use super::sampler::{Direction, Proposal, SamplerConfig, Streams};
+use super::space::{Parameter, Range, Space};
+use super::trial::{Trial, TrialState};
+use std::cmp::Ordering;
+
+/// How many of `n` finished trials are good: min(ceil(0.1 n), 25).
+pub fn good_count(n: usize) -> usize {
+    ((0.1 * n as f64).ceil() as usize).min(25)
+}
+
+/// Trials split into good and bad, each in the order of their numbers.
+#[derive(Debug)]
+pub struct Split<'a> {
+    /// The best tenth.
+    pub good: Vec<&'a Trial>,
+    /// The rest, and those still running.
+    pub bad: Vec<&'a Trial>,
+}
+
+/// Splits the history; trials that failed or wait are in neither part.
+pub fn split(trials: &[Trial], direction: Direction) -> Split<'_> {
+    let observed = trials.iter().filter(|t| t.state.is_observed());
+    let places = good_count(observed.clone().count());
+    let (feasible, mut infeasible): (Vec<&Trial>, Vec<&Trial>) = observed.partition(|t| t.violation() <= 0.0);
+    let (mut complete, mut pruned): (Vec<&Trial>, Vec<&Trial>) =
+        feasible.into_iter().partition(|t| t.state == TrialState::Complete);
+    // Stable sorts: equal trials stay in the order of their numbers.
+    complete.sort_by(|a, b| direction.best_first(a.value.unwrap_or(f64::NAN), b.value.unwrap_or(f64::NAN)));
+    pruned.sort_by(|a, b| pruned_order(a, b, direction));
+    infeasible.sort_by(|a, b| a.violation().total_cmp(&b.violation()));
+    let ranked: Vec<&Trial> = complete.into_iter().chain(pruned).chain(infeasible).collect();
+    let (good, bad) = ranked.split_at(places.min(ranked.len()));
+    let (mut good, mut bad) = (good.to_vec(), bad.to_vec());
+    bad.extend(trials.iter().filter(|t| t.state == TrialState::Running));
+    good.sort_by_key(|t| t.number);
+    bad.sort_by_key(|t| t.number);
+    Split { good, bad }
+}
+
+/// Pruned trials: the one that went farthest first, then by its last intermediate value; silent ones last.
+fn pruned_order(a: &Trial, b: &Trial, direction: Direction) -> Ordering {
+    let key = |t: &Trial| match t.intermediate.last_key_value() {
+        None => (1, 0.0),
+        Some((step, v)) if v.is_nan() => (-step, f64::INFINITY),
+        Some((step, v)) => (-step, if direction == Direction::Maximize { -v } else { *v }),
+    };
+    let ((step_a, value_a), (step_b, value_b)) = (key(a), key(b));
+    step_a.cmp(&step_b).then(value_a.partial_cmp(&value_b).unwrap_or(Ordering::Equal))
+}
+
+/// The parameters that every finished trial has with the very same range, sorted by name: those sampled jointly.
+pub fn joint_space(trials: &[Trial]) -> Vec<Parameter> {
+    let mut observed = trials.iter().filter(|t| t.state.is_observed());
+    let Some(first) = observed.next() else { return Vec::new() };
+    let mut joint: Vec<Parameter> = first
+        .parameters
+        .iter()
+        .zip(&first.distributions)
+        .filter_map(|((name, _), d)| Some(Parameter { name: name.clone(), range: d.range()? }))
+        .collect();
+    for trial in observed {
+        joint.retain(|p| trial.distribution(&p.name).and_then(|d| d.range()) == Some(p.range));
+    }
+    joint.retain(|p| !p.range.is_point());
+    joint.sort_by(|a, b| a.name.cmp(&b.name));
+    joint
+}
+
+/// The two densities over `parameters` for the present history.
+pub struct Model {
+    parameters: Vec<Parameter>,
+    /// l(x), of the good trials.
+    pub good: Parzen,
+    /// g(x), of the bad ones.
+    pub bad: Parzen,
+}
+
+impl Model {
+    /// Fits both densities. `announced`: whether joint samples announced by running trials stand in for parameters that
+    /// they have not set yet.
+    pub fn fit(split: &Split<'_>, parameters: &[Parameter], announced: bool) -> Self {
+        let bounds: Vec<(f64, f64)> = parameters.iter().map(|p| p.range.inner_bounds()).collect();
+        let fit = |trials: &[&Trial]| Parzen::new(&observations(trials, parameters, announced), &bounds);
+        Model { parameters: parameters.to_vec(), good: fit(&split.good), bad: fit(&split.bad) }
+    }
+
+    /// The best of `candidates` drawn from l, in the parameters' own units and in their order.
+    pub fn propose(&self, stream: &mut Mt19937, candidates: usize) -> Vec<f64> {
+        let drawn = self.good.sample(stream, candidates);
+        let ranges: Vec<Range> = self.parameters.iter().map(|p| p.range).collect();
+        let values: Vec<Vec<f64>> =
+            drawn.iter().zip(&ranges).map(|(column, r)| column.iter().map(|&x| r.outer(x)).collect()).collect();
+        // Scored at the value that will be proposed: for logarithmic parameters ln of the rounded exp.
+        let scored: Vec<Vec<f64>> =
+            values.iter().zip(&ranges).map(|(column, r)| column.iter().map(|&v| r.inner(v)).collect()).collect();
+        let (log_l, log_g) = (self.good.log_density(&scored), self.bad.log_density(&scored));
+        let mut best = 0;
+        for i in 1..candidates {
+            if log_l[i] - log_g[i] > log_l[best] - log_g[best] {
+                best = i;
+            }
+        }
+        values.iter().map(|column| column[best]).collect()
+    }
+}
+
+/// The search coordinates of the trials that have every parameter, by parameter.
+fn observations(trials: &[&Trial], parameters: &[Parameter], announced: bool) -> Vec<Vec<f64>> {
+    let mut columns = vec![Vec::with_capacity(trials.len()); parameters.len()];
+    let mut row = Vec::with_capacity(parameters.len());
+    for trial in trials {
+        let promised = if announced && trial.state == TrialState::Running { trial.announced() } else { Vec::new() };
+        row.clear();
+        row.extend(parameters.iter().map_while(|p| {
+            let promise = || promised.iter().find(|(n, _)| *n == p.name).map(|(_, v)| *v);
+            trial.parameter(&p.name).or_else(promise).map(|v| p.range.inner(v))
+        }));
+        if row.len() == parameters.len() {
+            columns.iter_mut().zip(&row).for_each(|(column, x)| column.push(*x));
+        }
+    }
+    columns
+}
+
+/// The next point, parameter by parameter as Optuna asks for them. `trials` must not hold the trial that is being asked
+/// for; `fixed` are its given parameters.
+pub fn propose(
+    config: &SamplerConfig,
+    streams: &mut Streams,
+    trials: &[Trial],
+    space: &Space,
+    fixed: &[(String, f64)],
+    direction: Direction,
+) -> Proposal {
+    let startup = trials.iter().filter(|t| t.state.is_observed()).count() < config.startup_trials;
+    let mut parts: Option<Split<'_>> = None;
+    let mut joint: Option<Vec<(String, f64)>> = None;
+    let mut values = Vec::with_capacity(space.parameters().len());
+    for parameter in space.parameters() {
+        let Parameter { name, range } = parameter;
+        let value = if let Some((_, given)) = fixed.iter().find(|(n, _)| n == name) {
+            *given
+        } else if range.is_point() {
+            range.low
+        } else if startup {
+            uniform(range, &mut streams.startup)
+        } else {
+            let parts = parts.get_or_insert_with(|| split(trials, direction));
+            let joint = joint.get_or_insert_with(|| {
+                let together = if config.multivariate { joint_space(trials) } else { Vec::new() };
+                if together.is_empty() {
+                    return Vec::new();
+                }
+                let point = Model::fit(parts, &together, true).propose(&mut streams.model, config.candidates);
+                together.into_iter().map(|p| p.name).zip(point).collect()
+            });
+            match joint.iter().find(|(n, v)| n == name && range.contains(*v)) {
+                Some((_, v)) => *v,
+                None => {
+                    let alone = Model::fit(parts, std::slice::from_ref(parameter), config.multivariate);
+                    alone.propose(&mut streams.model, config.candidates)[0]
+                }
+            }
+        };
+        values.push(value);
+    }
+    Proposal { values, joint: joint.unwrap_or_default() }
+}
+
+/// One uniform draw over the search coordinate; never the upper bound itself.
+pub fn uniform(range: &Range, stream: &mut Mt19937) -> f64 {
+    let (a, b) = range.inner_bounds();
+    // x = a + (b - a) u
+    let x = a + (b - a) * stream.double();
+    let x = if range.log { range.outer(x).max(range.low) } else { x };
+    x.min(range.high.next_down())
+}

@@ -1,0 +1,122 @@
+//! The wait-free channels over the real-time boundary. Each endpoint is handed out once: whoever was not given one cannot
+//! send.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+
+use super::command::Command;
+use super::telemetry::{Counters, Event, Snapshot, Tick};
+
+/// Commands that may wait.
+pub const COMMANDS: usize = 64;
+/// Ticks that may wait for the recorder: four seconds.
+pub const TICKS: usize = 4096;
+/// Decimated ticks that may wait for the screen.
+pub const SHOWN_TICKS: usize = 1024;
+/// Every n-th tick goes to the screen's charts.
+pub const SHOWN_EVERY: u64 = 5;
+/// Events that may wait for the session.
+pub const EVENTS: usize = 256;
+
+/// STOP: anyone sets it, control reads it first in every tick, and it is cleared by an acknowledgement alone.
+#[derive(Debug, Clone, Default)]
+pub struct StopLatch(Arc<AtomicBool>);
+
+impl StopLatch {
+    /// Stops. Cannot queue, wait or fail.
+    pub fn set(&self) {
+        self.0.store(true, Ordering::Release);
+    }
+
+    /// Whether it is set.
+    pub fn is_set(&self) -> bool {
+        self.0.load(Ordering::Acquire)
+    }
+
+    /// Only the control thread clears it, on an acknowledgement.
+    pub fn clear(&self) {
+        self.0.store(false, Ordering::Release);
+    }
+}
+
+/// A sign of life of the operator's screen.
+#[derive(Debug, Clone, Default)]
+pub struct Heartbeat(Arc<AtomicU64>);
+
+impl Heartbeat {
+    /// The screen is alive.
+    pub fn beat(&self) {
+        self.0.fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// How often it was said to be.
+    pub fn count(&self) -> u64 {
+        self.0.load(Ordering::Relaxed)
+    }
+}
+
+/// The control thread's ends.
+pub struct ControlEnd {
+    /// What the session asks.
+    pub commands: rtrb::Consumer<Command>,
+    /// STOP.
+    pub stop: StopLatch,
+    /// The screen's sign of life.
+    pub heartbeat: Heartbeat,
+    /// Every tick, for the recorder.
+    pub ticks: rtrb::Producer<Tick>,
+    /// Every n-th tick, for the screen.
+    pub shown: rtrb::Producer<Tick>,
+    /// The newest tick and the counters.
+    pub snapshot: triple_buffer::Input<Snapshot>,
+    /// The counters, for the session.
+    pub counters: triple_buffer::Input<Counters>,
+    /// What happened.
+    pub events: rtrb::Producer<Event>,
+}
+
+/// The session's ends.
+pub struct SessionEnd {
+    /// What it asks.
+    pub commands: rtrb::Producer<Command>,
+    /// The newest counters.
+    pub counters: triple_buffer::Output<Counters>,
+    /// What happened.
+    pub events: rtrb::Consumer<Event>,
+}
+
+/// The screen's ends.
+pub struct ScreenEnd {
+    /// STOP.
+    pub stop: StopLatch,
+    /// Its sign of life.
+    pub heartbeat: Heartbeat,
+    /// Ticks for charts.
+    pub shown: rtrb::Consumer<Tick>,
+    /// The newest tick and the counters.
+    pub snapshot: triple_buffer::Output<Snapshot>,
+}
+
+/// All channels of one engine; the last is the recorder's end.
+pub fn channels() -> (ControlEnd, SessionEnd, ScreenEnd, rtrb::Consumer<Tick>) {
+    let (command_in, command_out) = rtrb::RingBuffer::new(COMMANDS);
+    let (tick_in, tick_out) = rtrb::RingBuffer::new(TICKS);
+    let (shown_in, shown_out) = rtrb::RingBuffer::new(SHOWN_TICKS);
+    let (event_in, event_out) = rtrb::RingBuffer::new(EVENTS);
+    let (snapshot_in, snapshot_out) = triple_buffer::triple_buffer(&Snapshot::default());
+    let (counters_in, counters_out) = triple_buffer::triple_buffer(&Counters::default());
+    let (stop, heartbeat) = (StopLatch::default(), Heartbeat::default());
+    let control = ControlEnd {
+        commands: command_out,
+        stop: stop.clone(),
+        heartbeat: heartbeat.clone(),
+        ticks: tick_in,
+        shown: shown_in,
+        snapshot: snapshot_in,
+        counters: counters_in,
+        events: event_in,
+    };
+    let session = SessionEnd { commands: command_in, counters: counters_out, events: event_out };
+    let screen = ScreenEnd { stop, heartbeat, shown: shown_out, snapshot: snapshot_out };
+    (control, session, screen, tick_out)
+}

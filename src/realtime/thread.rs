@@ -1,0 +1,58 @@
+//! Pacing: a body called at absolute instants, one per period, and how late each call was.
+
+use std::ops::ControlFlow;
+use std::time::Duration;
+
+use nix::sys::time::TimeSpec;
+use nix::time::{ClockId, ClockNanosleepFlags, clock_gettime, clock_nanosleep};
+
+/// The instant of one call.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Instant {
+    /// Planned start since the loop began, ns.
+    pub planned_ns: u64,
+    /// How much later it really started, ns.
+    pub lateness_ns: u64,
+}
+
+/// A loop that is this many periods behind (the process was suspended, the machine slept) starts counting anew instead
+/// of calling its body without a pause until it has caught up.
+const FORGIVEN_PERIODS: u64 = 20;
+
+/// Calls `body` once per period until it breaks.
+///
+/// # Errors
+/// When the system's monotonic clock cannot be read or waited on.
+pub fn pace(period: Duration, mut body: impl FnMut(Instant) -> ControlFlow<()>) -> Result<(), nix::Error> {
+    let period_ns = period.as_nanos() as u64;
+    let mut start_ns = monotonic_ns()?;
+    let mut count = 0u64;
+    let mut skipped_ns = 0;
+    loop {
+        let planned_ns = start_ns + count * period_ns;
+        let wake = TimeSpec::new((planned_ns / 1_000_000_000) as i64, (planned_ns % 1_000_000_000) as i64);
+        loop {
+            match clock_nanosleep(ClockId::CLOCK_MONOTONIC, ClockNanosleepFlags::TIMER_ABSTIME, &wake) {
+                Ok(_) => break,
+                // A signal woke the thread early: sleep on.
+                Err(nix::Error::EINTR) => {}
+                Err(error) => return Err(error),
+            }
+        }
+        let lateness_ns = monotonic_ns()?.saturating_sub(planned_ns);
+        let instant = Instant { planned_ns: count * period_ns + skipped_ns, lateness_ns };
+        if body(instant).is_break() {
+            return Ok(());
+        }
+        count += 1;
+        if lateness_ns > FORGIVEN_PERIODS * period_ns {
+            start_ns += lateness_ns;
+            skipped_ns += lateness_ns;
+        }
+    }
+}
+
+fn monotonic_ns() -> Result<u64, nix::Error> {
+    let now = clock_gettime(ClockId::CLOCK_MONOTONIC)?;
+    Ok(now.tv_sec() as u64 * 1_000_000_000 + now.tv_nsec() as u64)
+}

@@ -1,0 +1,322 @@
+//! Reads an MCAP file that may have been cut off anywhere: where its chunks are, and one chunk at a time. Layout of
+//! the records: the MCAP specification, "Records" (<https://mcap.dev/spec>).
+
+use std::fs::File;
+use std::io::{self, Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+
+use mcap::McapError;
+use mcap::records::{Record, op};
+use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
+
+use super::error::RecordingError;
+use super::topic::Topic;
+
+/// Opcode (1 byte) and length (8 bytes) before each record.
+const RECORD_HEAD: u64 = 9;
+/// The footer record: head, two offsets and a checksum.
+const FOOTER_BYTES: u64 = RECORD_HEAD + 8 + 8 + 4;
+/// The record that ends the data: head and a checksum.
+const DATA_END_BYTES: u64 = RECORD_HEAD + 4;
+/// Larger chunks are not ours; a length that says so is damage, and must not be believed when memory is asked for.
+const LARGEST_CHUNK: usize = 256 * 1024 * 1024;
+
+/// Where a record is in the file.
+#[derive(Debug, Clone, Copy)]
+pub struct Span {
+    /// Of the record's head.
+    pub offset: u64,
+    /// Of its body.
+    pub bytes: u64,
+}
+
+/// Where a chunk is and what is in it.
+#[derive(Debug, Clone)]
+pub struct Chunk {
+    /// The chunk's record.
+    pub span: Span,
+    /// Log time of its earliest message, ns UTC.
+    pub start: u64,
+    /// Log time of its latest message, ns UTC.
+    pub end: u64,
+    /// The channels of its messages; none where the index after the chunk was cut off.
+    pub channels: Option<Vec<u16>>,
+}
+
+/// What is where in a file.
+pub struct Container {
+    file: File,
+    path: PathBuf,
+    /// Chunks that are there as a whole, in the order of the file.
+    pub chunks: Vec<Chunk>,
+    /// Attachments in the order of the file.
+    pub attachments: Vec<Span>,
+    /// Metadata in the order of the file.
+    pub metadata: Vec<Span>,
+    /// What is missing of the file itself, in words; none for a finished one.
+    pub cut: Option<String>,
+    topics: Vec<Option<Topic>>,
+}
+
+impl Container {
+    /// Finds the chunks, through the file's own index where it was finished, else by going from record to record.
+    pub fn open(path: &Path) -> Result<Container, RecordingError> {
+        Container::with(path, |container, bytes| match container.read_index(bytes) {
+            Ok(true) => Ok(()),
+            Ok(false) | Err(_) => container.scan(bytes),
+        })
+    }
+
+    /// Finds the chunks by going from record to record, whatever the file's index says.
+    pub fn open_by_scanning(path: &Path) -> Result<Container, RecordingError> {
+        Container::with(path, Container::scan)
+    }
+
+    fn with(
+        path: &Path,
+        find: impl FnOnce(&mut Container, u64) -> Result<(), McapError>,
+    ) -> Result<Container, RecordingError> {
+        let io = |doing| move |source| RecordingError::Io { path: path.into(), doing, source };
+        let mut file = File::open(path).map_err(io("open the file"))?;
+        let bytes = file.seek(SeekFrom::End(0)).map_err(io("read its length"))?;
+        check_magic(&mut file, bytes, path)?;
+        let mut container = Container {
+            file,
+            path: path.into(),
+            chunks: Vec::new(),
+            attachments: Vec::new(),
+            metadata: Vec::new(),
+            cut: None,
+            topics: Vec::new(),
+        };
+        find(&mut container, bytes).map_err(|error| container.error(error))?;
+        // The channels of our own files stand in their first chunk.
+        if let Some(chunk) = container.chunks.first().cloned()
+            && let Err(source) = container.read_chunk(&chunk)
+            && container.topics.is_empty()
+        {
+            return Err(RecordingError::Head { path: path.into(), source });
+        }
+        Ok(container)
+    }
+
+    /// The file's own index; false where there is none, or not all of it.
+    fn read_index(&mut self, bytes: u64) -> Result<bool, McapError> {
+        let magic = mcap::MAGIC.len() as u64;
+        if bytes < 2 * magic + FOOTER_BYTES || self.read_at(bytes - magic, magic)? != mcap::MAGIC {
+            return Ok(false);
+        }
+        let footer_at = bytes - magic - FOOTER_BYTES;
+        let footer = self.read_at(footer_at, FOOTER_BYTES)?;
+        let Record::Footer(footer) = mcap::parse_record(footer[0], &footer[RECORD_HEAD as usize..])? else {
+            return Ok(false);
+        };
+        if footer.summary_start == 0 || footer.summary_start > footer_at {
+            return Ok(false);
+        }
+        // From the record before the index to the end of the file: only so is its checksum verified.
+        let from = footer.summary_start.saturating_sub(DATA_END_BYTES);
+        let summary = self.read_at(from, bytes - from)?;
+        let options = LinearReaderOptions::default()
+            .with_skip_start_magic(true)
+            .with_validate_summary_section_crc(true)
+            .with_record_length_limit(summary.len());
+        let (mut chunks, mut attachments, mut metadata) = (Vec::new(), Vec::new(), Vec::new());
+        for record in records(&summary, options)? {
+            match record {
+                Record::Channel(channel) => self.add_channel(channel.id, &channel.topic),
+                Record::ChunkIndex(index) => chunks.push(Chunk {
+                    span: span(index.chunk_start_offset, index.chunk_length),
+                    start: index.message_start_time,
+                    end: index.message_end_time,
+                    channels: Some(index.message_index_offsets.into_keys().collect()),
+                }),
+                Record::AttachmentIndex(index) => attachments.push(span(index.offset, index.length)),
+                Record::MetadataIndex(index) => metadata.push(span(index.offset, index.length)),
+                _ => {}
+            }
+        }
+        (self.chunks, self.attachments, self.metadata) = (chunks, attachments, metadata);
+        Ok(true)
+    }
+
+    /// From record to record, as far as they go.
+    fn scan(&mut self, bytes: u64) -> Result<(), McapError> {
+        let mut at = mcap::MAGIC.len() as u64;
+        while bytes - at >= RECORD_HEAD {
+            let head = self.read_at(at, RECORD_HEAD)?;
+            let length = u64::from_le_bytes(head[1..].try_into().expect("eight bytes"));
+            if length > bytes - at - RECORD_HEAD {
+                break;
+            }
+            let span = Span { offset: at, bytes: length };
+            match head[0] {
+                op::CHUNK => {
+                    // Start and end are the first two numbers of a chunk.
+                    let times = self.read_at(at + RECORD_HEAD, 16.min(length))?;
+                    let (Some(start), Some(end)) = (number(&times, 0), number(&times, 8)) else { break };
+                    self.chunks.push(Chunk { span, start, end, channels: Some(Vec::new()) });
+                }
+                op::MESSAGE_INDEX => {
+                    let id = self.read_at(at + RECORD_HEAD, 2.min(length))?;
+                    let (Some(chunk), &[low, high]) = (self.chunks.last_mut(), id.as_slice()) else { break };
+                    chunk.channels.get_or_insert_default().push(u16::from_le_bytes([low, high]));
+                }
+                op::ATTACHMENT => self.attachments.push(span),
+                op::METADATA => self.metadata.push(span),
+                op::DATA_END => {
+                    let left = bytes - at - RECORD_HEAD - length;
+                    if self.read_at(bytes - 8, 8)? != mcap::MAGIC || left < FOOTER_BYTES {
+                        self.cut = Some("its index at the end is missing; all of its data is there".into());
+                    }
+                    return Ok(());
+                }
+                0 => break, // no record: a hole that a crashed file system left
+                _ => {}
+            }
+            at += RECORD_HEAD + length;
+        }
+        if let Some(last) = self.chunks.last_mut() {
+            last.channels = None;
+        }
+        self.cut = Some(match bytes - at {
+            0 => "it was not finished; nothing after its last complete chunk was written".into(),
+            rest => format!("it was cut off: its last {rest} of {bytes} bytes are an incomplete record"),
+        });
+        Ok(())
+    }
+
+    /// The records of one chunk. Its checksum is verified before anything in it is believed.
+    ///
+    /// # Errors
+    /// When it is damaged; of such a chunk nothing can be trusted.
+    pub fn read_chunk(&mut self, chunk: &Chunk) -> Result<Vec<Record<'static>>, McapError> {
+        let bytes = self.read_at(chunk.span.offset, RECORD_HEAD + chunk.span.bytes)?;
+        let options = LinearReaderOptions::default()
+            .with_skip_start_magic(true)
+            .with_skip_end_magic(true)
+            .with_prevalidate_chunk_crcs(true)
+            .with_record_length_limit(LARGEST_CHUNK);
+        let records = records(&bytes, options)?;
+        for record in &records {
+            if let Record::Channel(channel) = record {
+                self.add_channel(channel.id, &channel.topic);
+            }
+        }
+        Ok(records)
+    }
+
+    /// An attached file; its checksum is verified.
+    pub fn read_attachment(&mut self, span: Span) -> Result<mcap::Attachment<'static>, McapError> {
+        let body = self.read_record(span)?;
+        // Log time, create time, name, media type, data, checksum: the lengths of the three in the middle must fit.
+        let name = 16;
+        let media_type = name + 4 + u64::from(length(&body, name));
+        let data = media_type + 4 + u64::from(length(&body, media_type));
+        if data + 8 + 4 > span.bytes {
+            return Err(McapError::BadAttachmentLength { header: data + 8 + 4, available: span.bytes });
+        }
+        match mcap::parse_record(op::ATTACHMENT, &body)? {
+            Record::Attachment { header, data, .. } => Ok(mcap::Attachment {
+                log_time: header.log_time,
+                create_time: header.create_time,
+                name: header.name,
+                media_type: header.media_type,
+                data: data.into_owned().into(),
+            }),
+            _ => unreachable!("the opcode says what is parsed"),
+        }
+    }
+
+    /// The body of a record.
+    pub fn read_record(&mut self, span: Span) -> Result<Vec<u8>, McapError> {
+        self.read_at(span.offset + RECORD_HEAD, span.bytes)
+    }
+
+    /// The topic of a channel; none for one that is not ours.
+    pub fn topic(&self, channel: u16) -> Option<Topic> {
+        self.topics.get(usize::from(channel)).copied().flatten()
+    }
+
+    fn add_channel(&mut self, id: u16, topic: &str) {
+        let id = usize::from(id);
+        if self.topics.len() <= id {
+            self.topics.resize(id + 1, None);
+        }
+        self.topics[id] = Topic::from_name(topic);
+    }
+
+    fn read_at(&mut self, offset: u64, bytes: u64) -> Result<Vec<u8>, McapError> {
+        // A length is only believed as far as the file goes: memory is asked for after that.
+        let end = self.file.seek(SeekFrom::End(0))?;
+        if offset.checked_add(bytes).is_none_or(|last| last > end) {
+            return Err(io::Error::from(io::ErrorKind::UnexpectedEof).into());
+        }
+        let mut buffer = vec![0; bytes as usize];
+        self.file.seek(SeekFrom::Start(offset))?;
+        self.file.read_exact(&mut buffer)?;
+        Ok(buffer)
+    }
+
+    fn error(&self, error: McapError) -> RecordingError {
+        let path = self.path.clone();
+        match error {
+            McapError::Io(source) => RecordingError::Io { path, doing: "read", source },
+            source => RecordingError::Mcap { path, source },
+        }
+    }
+}
+
+/// The records in `bytes`; those of a chunk in its place.
+fn records(bytes: &[u8], options: LinearReaderOptions) -> Result<Vec<Record<'static>>, McapError> {
+    let mut reader = LinearReader::new_with_options(options);
+    let mut unread = bytes;
+    let mut records = Vec::new();
+    while let Some(event) = reader.next_event() {
+        match event? {
+            LinearReadEvent::ReadRequest(wanted) => {
+                let (now, later) = unread.split_at(wanted.min(unread.len()));
+                reader.insert(now.len()).copy_from_slice(now);
+                reader.notify_read(now.len());
+                unread = later;
+            }
+            LinearReadEvent::Record { data, opcode } => {
+                records.push(mcap::parse_record(opcode, data)?.into_owned());
+            }
+        }
+    }
+    Ok(records)
+}
+
+/// Of a record in the index: offset and length with the head.
+fn span(offset: u64, length: u64) -> Span {
+    Span { offset, bytes: length.saturating_sub(RECORD_HEAD) }
+}
+
+/// The length of a string; the largest where there is none.
+fn length(bytes: &[u8], at: u64) -> u32 {
+    let bytes = usize::try_from(at).ok().and_then(|at| bytes.get(at..at + 4)).and_then(|bytes| bytes.try_into().ok());
+    bytes.map_or(u32::MAX, u32::from_le_bytes)
+}
+
+fn number(bytes: &[u8], at: usize) -> Option<u64> {
+    bytes.get(at..at + 8).and_then(|bytes| bytes.try_into().ok()).map(u64::from_le_bytes)
+}
+
+fn check_magic(file: &mut File, bytes: u64, path: &Path) -> Result<(), RecordingError> {
+    let mut magic = [0; 8];
+    let length = magic.len().min(bytes as usize);
+    let io = |source| RecordingError::Io { path: path.into(), doing: "read", source };
+    file.seek(SeekFrom::Start(0)).map_err(io)?;
+    file.read_exact(&mut magic[..length]).map_err(io)?;
+    let path = path.to_path_buf();
+    match &magic[..length] {
+        [] => Err(RecordingError::Empty { path }),
+        found if !mcap::MAGIC.starts_with(found) => {
+            let found = found.iter().map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().join(" ");
+            Err(RecordingError::NotMcap { path, found })
+        }
+        found if found.len() < mcap::MAGIC.len() => Err(RecordingError::TooShort { path, bytes }),
+        _ => Ok(()),
+    }
+}

@@ -1,0 +1,156 @@
+//! Makes a proper file of a recording that was not finished.
+
+use std::collections::{BTreeMap, HashMap};
+use std::fs::{self, File};
+use std::io;
+use std::path::{Path, PathBuf};
+
+use mcap::McapError;
+use mcap::records::{Record, op};
+
+use super::container::Container;
+use super::error::RecordingError;
+use super::output::{Output, with_suffix};
+use super::topic::Topic;
+
+/// What was saved.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Recovered {
+    /// The new file. The old one is left as it was.
+    pub path: PathBuf,
+    /// Ticks in it.
+    pub ticks: u64,
+    /// Messages in it, the ticks' among them.
+    pub messages: u64,
+    /// What could not be saved, in words; none if only the file's own index was missing.
+    pub lost: Option<String>,
+}
+
+/// Copies everything readable of `path` (`*.mcap.part`, or a finished file that was damaged later) into a new file with
+/// an index: `x.mcap` for `x.mcap.part`, `x.recovered.mcap` for `x.mcap`. Nothing is overwritten and nothing deleted.
+///
+/// # Errors
+/// When there is nothing to recover, when the new file exists already, or when the disk refuses.
+pub fn recover(path: impl AsRef<Path>) -> Result<Recovered, RecordingError> {
+    let path = path.as_ref();
+    let mut container = Container::open_by_scanning(path)?;
+    let target = match path.extension() {
+        Some(extension) if extension == "part" => path.with_extension(""),
+        _ => path.with_extension("recovered.mcap"),
+    };
+    if target.exists() {
+        return Err(RecordingError::Exists { path: target });
+    }
+    if container.chunks.is_empty() {
+        let bytes = fs::metadata(path).map(|metadata| metadata.len()).unwrap_or_default();
+        return Err(RecordingError::TooShort { path: path.into(), bytes });
+    }
+    let unfinished = with_suffix(&target, ".recovering");
+    let io = |doing, path: &Path| {
+        let path = path.to_path_buf();
+        move |source: io::Error| RecordingError::Io { path, doing, source }
+    };
+    let file = File::create(&unfinished).map_err(io("create the file", &unfinished))?;
+    let copy = Output::new(Box::new(file)).and_then(|out| Copy::new(out).all(&mut container));
+    let copied = copy.map_err(|error| match error {
+        McapError::Io(source) => RecordingError::Io { path: unfinished.clone(), doing: "write", source },
+        source => RecordingError::Mcap { path: path.into(), source },
+    })?;
+    fs::rename(&unfinished, &target).map_err(io("give the file its final name", &unfinished))?;
+    let damaged = [
+        (copied.damaged_chunks > 0)
+            .then(|| format!("{} of {} chunks are damaged", copied.damaged_chunks, container.chunks.len())),
+        (copied.damaged_extras > 0).then(|| format!("{} attachments are damaged", copied.damaged_extras)),
+    ];
+    let lost: Vec<_> = container.cut.take().into_iter().chain(damaged.into_iter().flatten()).collect();
+    Ok(Recovered {
+        path: target,
+        ticks: copied.ticks,
+        messages: copied.messages,
+        lost: (!lost.is_empty()).then(|| lost.join("; ")),
+    })
+}
+
+/// Copies records, giving schemas and channels the numbers of the new file.
+struct Copy {
+    out: Output,
+    schemas: HashMap<u16, u16>,
+    channels: HashMap<u16, u16>,
+    tick_channel: Option<u16>,
+    done: Copied,
+}
+
+#[derive(Default)]
+struct Copied {
+    ticks: u64,
+    messages: u64,
+    damaged_chunks: usize,
+    /// Attachments and metadata.
+    damaged_extras: usize,
+}
+
+impl Copy {
+    fn new(out: Output) -> Copy {
+        let (schemas, channels) = (HashMap::new(), HashMap::new());
+        Copy { out, schemas, channels, tick_channel: None, done: Copied::default() }
+    }
+
+    /// Everything, metadata and attachments first.
+    fn all(mut self, container: &mut Container) -> Result<Copied, McapError> {
+        for span in container.metadata.clone() {
+            let body = container.read_record(span)?;
+            match mcap::parse_record(op::METADATA, &body) {
+                Ok(Record::Metadata(metadata)) => self.out.mcap.write_metadata(&metadata)?,
+                _ => self.done.damaged_extras += 1,
+            }
+        }
+        for span in container.attachments.clone() {
+            match container.read_attachment(span) {
+                Ok(attachment) => self.out.mcap.attach(&attachment)?,
+                Err(_) => self.done.damaged_extras += 1,
+            }
+        }
+        for chunk in container.chunks.clone() {
+            match container.read_chunk(&chunk) {
+                Ok(records) => {
+                    for record in records {
+                        self.record(record)?;
+                    }
+                    // A chunk of the old file is one of the new: it holds whole ticks.
+                    self.out.mcap.flush()?;
+                }
+                Err(_) => self.done.damaged_chunks += 1,
+            }
+        }
+        self.out.finish()?;
+        Ok(self.done)
+    }
+
+    fn record(&mut self, record: Record<'static>) -> Result<(), McapError> {
+        let mcap = &mut self.out.mcap;
+        match record {
+            Record::Schema { header, data } => {
+                let id = mcap.add_schema(&header.name, &header.encoding, &data)?;
+                self.schemas.insert(header.id, id);
+            }
+            Record::Channel(channel) => {
+                let schema = self.schemas.get(&channel.schema_id).copied().unwrap_or_default();
+                let id = mcap.add_channel(schema, &channel.topic, &channel.message_encoding, &BTreeMap::new())?;
+                self.channels.insert(channel.id, id);
+                if channel.topic == Topic::Tick.name() {
+                    self.tick_channel = Some(channel.id);
+                }
+            }
+            Record::Message { mut header, data } => {
+                if let Some(&id) = self.channels.get(&header.channel_id) {
+                    self.done.messages += 1;
+                    self.done.ticks += u64::from(self.tick_channel == Some(header.channel_id));
+                    header.channel_id = id;
+                    mcap.write_to_known_channel(&header, &data)?;
+                }
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,331 @@
+//! Records as protobuf messages and back.
+
+use foxglove::messages::{Log, log};
+use prost::Message;
+
+use super::frog;
+use super::record::{
+    CommandRecord, Level, LogRecord, Measured, ParameterInfo, Proposal, ProposedParameter, Record, Risk, SessionInfo,
+    Source, Stage, StageInfo, Transition, TrialRecord, Verdict,
+};
+use super::tick;
+use super::topic::Topic;
+use crate::realtime::telemetry::Counters;
+
+/// A message that is not what the schema says.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum DecodeError {
+    /// Not protobuf, or not of this message.
+    #[error("not a message of its schema: {0}")]
+    Protobuf(#[from] prost::DecodeError),
+    /// A part that must be there is not.
+    #[error("{0} is missing")]
+    Missing(&'static str),
+    /// A number without a meaning.
+    #[error("{1} is no {0} that this version knows")]
+    Unknown(&'static str, i32),
+    /// An array of another length than the machine has.
+    #[error("{1} {0}: another number than this version expects")]
+    Length(&'static str, usize),
+}
+
+/// The topic of a record; its message goes into `buffer`. `start_utc_ns` is the log time of engine time 0.
+pub fn encode(record: &Record, start_utc_ns: u64, log_time: u64, buffer: &mut Vec<u8>) -> Topic {
+    buffer.clear();
+    let (topic, encoded) = match record {
+        Record::Session(info) => (Topic::Session, session(info, start_utc_ns).encode(buffer)),
+        Record::Transition(transition) => {
+            let message = frog::Transition {
+                from: transition.from as i32,
+                to: transition.to as i32,
+                cause: transition.cause.clone(),
+            };
+            (Topic::Transition, message.encode(buffer))
+        }
+        Record::Stage(StageInfo { stage, trial, can_undo }) => {
+            let message = frog::StageInfo { stage: *stage as i32, trial: *trial, can_undo: *can_undo };
+            (Topic::Stage, message.encode(buffer))
+        }
+        Record::Proposal(value) => (Topic::Proposal, proposal(value).encode(buffer)),
+        Record::Trial(value) => (Topic::Trial, trial(value).encode(buffer)),
+        Record::Command(CommandRecord { wish, accepted, answer }) => {
+            let message = frog::OperatorCommand { wish: wish.clone(), accepted: *accepted, answer: answer.clone() };
+            (Topic::Command, message.encode(buffer))
+        }
+        Record::Counters(counters) => {
+            let message = frog::Counters {
+                late_ticks: counters.late_ticks,
+                worst_lateness_ns: counters.worst_lateness_ns,
+                ticks_not_recorded: counters.ticks_not_recorded,
+                ticks_not_shown: counters.ticks_not_shown,
+                commands_refused: counters.commands_refused,
+                state_age_ms: counters.state_age_ms,
+            };
+            (Topic::Counters, message.encode(buffer))
+        }
+        Record::Log(LogRecord { level, source, message }) => {
+            let level = match level {
+                Level::Info => log::Level::Info,
+                Level::Warning => log::Level::Warning,
+                Level::Error => log::Level::Error,
+            };
+            let message = Log {
+                timestamp: Some(tick::timestamp(log_time)),
+                level: level as i32,
+                message: message.clone(),
+                name: source.clone(),
+                ..Log::default()
+            };
+            (Topic::Log, message.encode(buffer))
+        }
+        Record::FaultTicks(ticks) => {
+            let message = frog::FaultTicks { ticks: ticks.iter().map(tick::whole).collect() };
+            (Topic::Fault, message.encode(buffer))
+        }
+    };
+    encoded.expect("a Vec grows as far as it must");
+    topic
+}
+
+/// The record of a message; none on a topic that holds no records.
+pub fn decode(topic: Topic, data: &[u8]) -> Result<Option<Record>, DecodeError> {
+    Ok(Some(match topic {
+        Topic::Session => Record::Session(from_session(frog::Session::decode(data)?)),
+        Topic::Transition => {
+            let message = frog::Transition::decode(data)?;
+            Record::Transition(Transition {
+                from: tick::mode(message.from)?,
+                to: tick::mode(message.to)?,
+                cause: message.cause,
+            })
+        }
+        Topic::Stage => {
+            let frog::StageInfo { stage, trial, can_undo } = frog::StageInfo::decode(data)?;
+            Record::Stage(StageInfo { stage: one_of(&Stage::ALL, "stage", stage)?, trial, can_undo })
+        }
+        Topic::Proposal => Record::Proposal(from_proposal(frog::Proposal::decode(data)?)?),
+        Topic::Trial => Record::Trial(from_trial(frog::Trial::decode(data)?)?),
+        Topic::Command => {
+            let frog::OperatorCommand { wish, accepted, answer } = frog::OperatorCommand::decode(data)?;
+            Record::Command(CommandRecord { wish, accepted, answer })
+        }
+        Topic::Counters => {
+            let message = frog::Counters::decode(data)?;
+            Record::Counters(Counters {
+                late_ticks: message.late_ticks,
+                worst_lateness_ns: message.worst_lateness_ns,
+                ticks_not_recorded: message.ticks_not_recorded,
+                ticks_not_shown: message.ticks_not_shown,
+                commands_refused: message.commands_refused,
+                state_age_ms: message.state_age_ms,
+            })
+        }
+        Topic::Log => {
+            let message = Log::decode(data)?;
+            let level = match message.level() {
+                log::Level::Unknown => return Err(DecodeError::Unknown("log level", message.level)),
+                log::Level::Debug | log::Level::Info => Level::Info,
+                log::Level::Warning => Level::Warning,
+                log::Level::Error | log::Level::Fatal => Level::Error,
+            };
+            Record::Log(LogRecord { level, source: message.name, message: message.message })
+        }
+        Topic::Fault => {
+            let message = frog::FaultTicks::decode(data)?;
+            Record::FaultTicks(message.ticks.iter().map(tick::from_whole).collect::<Result<_, _>>()?)
+        }
+        Topic::JointStates | Topic::JointCommand | Topic::Tick | Topic::Pose | Topic::Tf | Topic::Marker => {
+            return Ok(None);
+        }
+    }))
+}
+
+fn session(info: &SessionInfo, start_utc_ns: u64) -> frog::Session {
+    let bounds = |parameter: &ParameterInfo| frog::Bounds {
+        name: parameter.name.clone(),
+        unit: parameter.unit.clone(),
+        low: Some(parameter.low),
+        high: Some(parameter.high),
+    };
+    frog::Session {
+        version: info.version.clone(),
+        backend: info.backend.clone(),
+        robot: info.robot.clone(),
+        task: info.task.clone(),
+        unit: info.unit.clone(),
+        sampler: info.sampler.clone(),
+        seed: info.seed,
+        budget: info.budget,
+        parameters: info.parameters.iter().map(bounds).collect(),
+        study: info.study.clone(),
+        recording: info.recording.clone(),
+        started: info.started.clone(),
+        observe: info.observe,
+        start_utc_ns,
+    }
+}
+
+fn from_session(message: frog::Session) -> SessionInfo {
+    let bounds = |bounds: frog::Bounds| ParameterInfo {
+        name: bounds.name,
+        unit: bounds.unit,
+        low: tick::number(bounds.low),
+        high: tick::number(bounds.high),
+    };
+    SessionInfo {
+        version: message.version,
+        backend: message.backend,
+        robot: message.robot,
+        task: message.task,
+        unit: message.unit,
+        sampler: message.sampler,
+        seed: message.seed,
+        budget: message.budget,
+        parameters: message.parameters.into_iter().map(bounds).collect(),
+        study: message.study,
+        recording: message.recording,
+        started: message.started,
+        observe: message.observe,
+    }
+}
+
+fn proposal(value: &Proposal) -> frog::Proposal {
+    let parameter = |parameter: &ProposedParameter| frog::proposal::Parameter {
+        name: parameter.name.clone(),
+        value: Some(parameter.value),
+        proposed: Some(parameter.proposed),
+    };
+    frog::Proposal {
+        trial: value.trial,
+        revision: value.revision,
+        source: value.source as i32,
+        parent: value.parent,
+        parameters: value.parameters.iter().map(parameter).collect(),
+        risk: value.risk.as_ref().map(risk),
+    }
+}
+
+fn from_proposal(message: frog::Proposal) -> Result<Proposal, DecodeError> {
+    let parameter = |parameter: frog::proposal::Parameter| ProposedParameter {
+        name: parameter.name,
+        value: tick::number(parameter.value),
+        proposed: tick::number(parameter.proposed),
+    };
+    Ok(Proposal {
+        trial: message.trial,
+        revision: message.revision,
+        source: one_of(&Source::ALL, "source", message.source)?,
+        parent: message.parent,
+        parameters: message.parameters.into_iter().map(parameter).collect(),
+        risk: message.risk.map(from_risk),
+    })
+}
+
+fn trial(value: &TrialRecord) -> frog::Trial {
+    let parameter = |(name, value): &(String, f64)| frog::trial::Parameter { name: name.clone(), value: Some(*value) };
+    let measured = |measured: &Measured| frog::trial::Measured {
+        dx: Some(measured.dx_m),
+        dy: Some(measured.dy_m),
+        dyaw: Some(measured.dyaw_rad),
+        apex: Some(measured.apex_m),
+        air: Some(measured.air_s),
+    };
+    frog::Trial {
+        trial: value.trial,
+        source: value.source as i32,
+        parent: value.parent,
+        parameters: value.parameters.iter().map(parameter).collect(),
+        measured: value.measured.as_ref().map(measured),
+        value: value.value,
+        hand_value: value.hand_value,
+        suggested: value.suggested.map(|verdict| verdict as i32),
+        cause: value.cause.clone(),
+        verdict: value.verdict.map(|verdict| verdict as i32),
+        note: value.note.clone(),
+        risk: value.risk.as_ref().map(risk),
+    }
+}
+
+fn from_trial(message: frog::Trial) -> Result<TrialRecord, DecodeError> {
+    let verdict = |verdict: Option<i32>| verdict.map(|verdict| one_of(&Verdict::ALL, "verdict", verdict)).transpose();
+    let measured = |measured: frog::trial::Measured| Measured {
+        dx_m: tick::number(measured.dx),
+        dy_m: tick::number(measured.dy),
+        dyaw_rad: tick::number(measured.dyaw),
+        apex_m: tick::number(measured.apex),
+        air_s: tick::number(measured.air),
+    };
+    let parameter = |parameter: frog::trial::Parameter| (parameter.name, tick::number(parameter.value));
+    Ok(TrialRecord {
+        trial: message.trial,
+        source: one_of(&Source::ALL, "source", message.source)?,
+        parent: message.parent,
+        parameters: message.parameters.into_iter().map(parameter).collect(),
+        measured: message.measured.map(measured),
+        value: message.value,
+        hand_value: message.hand_value,
+        suggested: verdict(message.suggested)?,
+        cause: message.cause,
+        verdict: verdict(message.verdict)?,
+        note: message.note,
+        risk: message.risk.map(from_risk),
+    })
+}
+
+fn risk(risk: &Risk) -> frog::Risk {
+    frog::Risk {
+        nearest_fall: risk.nearest_fall,
+        nearest_fall_trial: risk.nearest_fall_trial,
+        falls: risk.falls,
+        neighbours: risk.neighbours,
+    }
+}
+
+fn from_risk(message: frog::Risk) -> Risk {
+    Risk {
+        nearest_fall: message.nearest_fall,
+        nearest_fall_trial: message.nearest_fall_trial,
+        falls: message.falls,
+        neighbours: message.neighbours,
+    }
+}
+
+/// The value of that number: enums are numbered in the order of their `ALL`, here and in `proto/frog.proto`.
+fn one_of<T: Copy>(all: &[T], what: &'static str, number: i32) -> Result<T, DecodeError> {
+    all.get(number as usize).copied().ok_or(DecodeError::Unknown(what, number))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::realtime::telemetry::{Mode, Phase};
+
+    /// `STAND UP` in the program is `STAND_UP` in the schema, `re-run` is `RE_RUN`.
+    fn assert_named(name: &str, in_schema: Option<&str>) {
+        assert_eq!(Some(name.to_uppercase().replace([' ', '-'], "_").as_str()), in_schema);
+    }
+
+    #[test]
+    fn enums_are_numbered_as_in_the_schema() {
+        for (number, mode) in (0..).zip(Mode::ALL) {
+            assert_eq!(mode as i32, number);
+            assert_named(mode.name(), frog::control_tick::Mode::try_from(number).ok().map(|m| m.as_str_name()));
+        }
+        for (number, phase) in (0..).zip(Phase::ALL) {
+            assert_eq!(phase as i32, number);
+            assert_named(phase.name(), frog::control_tick::Phase::try_from(number).ok().map(|p| p.as_str_name()));
+        }
+        for (number, stage) in (0..).zip(Stage::ALL) {
+            assert_eq!(stage as i32, number);
+            assert_named(stage.name(), frog::stage_info::Stage::try_from(number).ok().map(|s| s.as_str_name()));
+        }
+        for (number, source) in (0..).zip(Source::ALL) {
+            assert_eq!(source as i32, number);
+            assert_named(source.name(), frog::proposal::Source::try_from(number).ok().map(|s| s.as_str_name()));
+        }
+        for (number, verdict) in (0..).zip(Verdict::ALL) {
+            assert_eq!(verdict as i32, number);
+            assert_named(verdict.name(), frog::trial::Verdict::try_from(number).ok().map(|v| v.as_str_name()));
+        }
+    }
+}

@@ -1,0 +1,235 @@
+//! Writes a recording: a session as it happens, or a single rollout at once.
+
+use std::fs::{self, OpenOptions};
+use std::io;
+use std::path::{Path, PathBuf};
+
+use foxglove::messages::JointStates;
+use mcap::McapError;
+
+use super::error::RecordingError;
+pub use super::output::Sink;
+use super::output::{Output, with_suffix};
+use super::record::{Record, SessionInfo, Stamped};
+use super::topic::Topic;
+use super::{frames, frog, tick};
+use crate::realtime::telemetry::{Mode, Tick};
+use crate::robot::description::RobotDescription;
+
+/// `/robot/pose` and `/tf` are written every 10 ms: they are for the eye, and follow from the ticks.
+const FRAMES_PERIOD_NS: u64 = 10_000_000;
+
+/// Writes one recording. Dropped without [`finish`](Writer::finish), the file keeps its name `*.mcap.part` and what was
+/// written until then.
+pub struct Writer {
+    out: Output,
+    joints: JointStates,
+    robot: Option<RobotDescription>,
+    start_utc_ns: u64,
+    /// Whether a tick had which trial and mode last: a change of them is a marker.
+    last: Option<(Option<u32>, Mode)>,
+    last_frames: Option<u64>,
+    records: u32,
+    ticks: u64,
+    part: PathBuf,
+    path: PathBuf,
+}
+
+impl Writer {
+    /// Begins the recording `path` (`*.mcap`); until it is finished it is named `*.mcap.part`. Missing folders are made.
+    /// Metadata, attachments and the session's first message are on the disk when this returns.
+    ///
+    /// `start_utc_ns` is the time of day, UTC, at engine time 0, ns since 1970; `attachments` are (name, media type, bytes).
+    ///
+    /// # Errors
+    /// When the name does not end in `.mcap`, when one of the two files exists already, or when the disk refuses.
+    pub fn create(
+        path: impl AsRef<Path>,
+        session: &SessionInfo,
+        start_utc_ns: u64,
+        attachments: &[(&str, &str, &[u8])],
+    ) -> Result<Writer, RecordingError> {
+        let path = path.as_ref();
+        if path.extension().is_none_or(|extension| extension != "mcap") {
+            return Err(RecordingError::Name { path: path.into() });
+        }
+        if path.exists() {
+            return Err(RecordingError::Exists { path: path.into() });
+        }
+        let io = |path: &Path, doing| {
+            let path = path.to_path_buf();
+            move |source: io::Error| match source.kind() {
+                io::ErrorKind::AlreadyExists => RecordingError::Exists { path },
+                _ => RecordingError::Io { path, doing, source },
+            }
+        };
+        if let Some(folder) = path.parent() {
+            fs::create_dir_all(folder).map_err(io(folder, "make the folder"))?;
+        }
+        let part = with_suffix(path, ".part");
+        let file = OpenOptions::new().write(true).create_new(true).open(&part).map_err(io(&part, "create the file"))?;
+        Writer::begin(Box::new(file), path, part, session, start_utc_ns, attachments)
+    }
+
+    /// Like [`create`](Writer::create), into anything else than a file. `path` is for messages alone; nothing is renamed.
+    ///
+    /// # Errors
+    /// When the sink refuses.
+    pub fn into_sink(
+        sink: Box<dyn Sink>,
+        path: impl AsRef<Path>,
+        session: &SessionInfo,
+        start_utc_ns: u64,
+        attachments: &[(&str, &str, &[u8])],
+    ) -> Result<Writer, RecordingError> {
+        let path = path.as_ref();
+        Writer::begin(sink, path, path.into(), session, start_utc_ns, attachments)
+    }
+
+    fn begin(
+        sink: Box<dyn Sink>,
+        path: &Path,
+        part: PathBuf,
+        session: &SessionInfo,
+        start_utc_ns: u64,
+        attachments: &[(&str, &str, &[u8])],
+    ) -> Result<Writer, RecordingError> {
+        let mut writer = Writer {
+            out: Output::new(sink).map_err(|error| error_at(&part, error))?,
+            joints: tick::named_joints(),
+            robot: None,
+            start_utc_ns,
+            last: None,
+            last_frames: None,
+            records: 0,
+            ticks: 0,
+            part,
+            path: path.into(),
+        };
+        let part = writer.part.clone();
+        writer.out.head(session, start_utc_ns, attachments).map_err(|error| error_at(&part, error))?;
+        writer.record(&Stamped { time_ns: 0, record: Record::Session(session.clone()) })?;
+        writer.sync()?;
+        Ok(writer)
+    }
+
+    /// From now on `/tf` is written too: the frames of this robot's links, for viewers in three dimensions.
+    pub fn show_links_of(&mut self, robot: RobotDescription) {
+        self.robot = Some(robot);
+    }
+
+    /// Writes one tick.
+    ///
+    /// # Errors
+    /// When the disk refuses; the recording is then at its end.
+    pub fn tick(&mut self, tick: &Tick) -> Result<(), RecordingError> {
+        self.write_tick(tick).map_err(|error| error_at(&self.part, error))
+    }
+
+    fn write_tick(&mut self, tick: &Tick) -> Result<(), McapError> {
+        let log_time = self.start_utc_ns.saturating_add(tick.time_ns);
+        let sequence = tick.number as u32; // the player knows the three messages of a tick by it
+        self.mark(tick, log_time)?;
+        tick::joint_states(&tick.state, log_time, &mut self.joints);
+        self.out.message(Topic::JointStates, sequence, log_time, &self.joints)?;
+        self.out.message(Topic::JointCommand, sequence, log_time, &tick::joint_command(tick))?;
+        self.out.message(Topic::Tick, sequence, log_time, &tick::control_tick(tick))?;
+        let period = tick.time_ns / FRAMES_PERIOD_NS;
+        if self.last_frames != Some(period) {
+            self.last_frames = Some(period);
+            self.out.message(Topic::Pose, sequence, log_time, &frames::pose(tick, log_time))?;
+            if let Some(robot) = &self.robot {
+                self.out.message(Topic::Tf, sequence, log_time, &frames::transforms(tick, robot, log_time))?;
+            }
+        }
+        self.ticks += 1;
+        // Only here, never between the messages of a tick: a chunk holds whole ticks.
+        self.out.close_full_chunk()
+    }
+
+    /// A marker where a trial or a fault begins.
+    fn mark(&mut self, tick: &Tick, log_time: u64) -> Result<(), McapError> {
+        let (last_trial, last_mode) = self.last.replace((tick.trial, tick.mode)).unwrap_or((None, Mode::Offline));
+        if tick.trial.is_some() && tick.trial != last_trial {
+            let marker = frog::Marker { kind: frog::marker::Kind::Trial as i32, trial: tick.trial };
+            self.out.message(Topic::Marker, 0, log_time, &marker)?;
+        }
+        if tick.mode == Mode::Fault && last_mode != Mode::Fault {
+            let marker = frog::Marker { kind: frog::marker::Kind::Fault as i32, trial: tick.trial };
+            self.out.message(Topic::Marker, 0, log_time, &marker)?;
+        }
+        Ok(())
+    }
+
+    /// Writes one record.
+    ///
+    /// # Errors
+    /// When the disk refuses; the recording is then at its end.
+    pub fn record(&mut self, stamped: &Stamped) -> Result<(), RecordingError> {
+        let log_time = self.start_utc_ns.saturating_add(stamped.time_ns);
+        self.records = self.records.wrapping_add(1);
+        self.out
+            .record(&stamped.record, self.start_utc_ns, self.records, log_time)
+            .and_then(|()| self.out.close_full_chunk())
+            .map_err(|error| error_at(&self.part, error))
+    }
+
+    /// Hands everything to the operating system: it then survives the end of this program, however it ends.
+    ///
+    /// # Errors
+    /// When the disk refuses.
+    pub fn flush(&mut self) -> Result<(), RecordingError> {
+        self.out.close_chunk().map_err(|error| error_at(&self.part, error))
+    }
+
+    /// Waits until everything is on the disk: it then survives a power cut. Takes milliseconds.
+    ///
+    /// # Errors
+    /// When the disk refuses.
+    pub fn sync(&mut self) -> Result<(), RecordingError> {
+        self.flush()?;
+        self.out.sync().map_err(|error| error_at(&self.part, error))
+    }
+
+    /// Completes the file with its index, waits until it is on the disk, and gives it its final name, which is returned.
+    ///
+    /// # Errors
+    /// When the disk refuses, or when another file took the name meanwhile; the recording then keeps the name `*.part`.
+    pub fn finish(mut self) -> Result<PathBuf, RecordingError> {
+        self.out.finish().map_err(|error| error_at(&self.part, error))?;
+        if self.part != self.path {
+            if self.path.exists() {
+                return Err(RecordingError::Exists { path: self.path.clone() });
+            }
+            fs::rename(&self.part, &self.path).map_err(|source| RecordingError::Io {
+                path: self.part.clone(),
+                doing: "give the file its final name",
+                source,
+            })?;
+        }
+        Ok(self.path.clone())
+    }
+
+    /// Ticks written so far.
+    pub fn ticks(&self) -> u64 {
+        self.ticks
+    }
+
+    /// Bytes handed to the disk so far; the open chunk is not among them.
+    pub fn bytes(&self) -> u64 {
+        self.out.bytes()
+    }
+
+    /// The final name.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+}
+
+fn error_at(path: &Path, error: McapError) -> RecordingError {
+    let path = path.to_path_buf();
+    match error {
+        McapError::Io(source) => RecordingError::Io { path, doing: "write", source },
+        source => RecordingError::Mcap { path, source },
+    }
+}

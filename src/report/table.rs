@@ -1,0 +1,77 @@
+//! The trial table as text.
+
+use std::collections::HashMap;
+use std::fmt::Write;
+
+use crate::recording::record::{ParameterInfo, TrialRecord, Verdict};
+
+/// One trial in a line: number, parameters with their units, value, verdict and why.
+pub fn line(row: &TrialRecord, unit: &str, units: &HashMap<String, String>) -> String {
+    let mut text = format!("trial {:>3}", row.trial);
+    for (name, value) in &row.parameters {
+        let of = units.get(name).map_or("", String::as_str);
+        let _ = write!(text, "  {name} {value:.*} {of}", digits(of));
+    }
+    let _ = write!(text, "  {}", outcome(row, unit));
+    text
+}
+
+/// The value and verdict of a trial in words.
+fn outcome(row: &TrialRecord, unit: &str) -> String {
+    match (row.verdict, row.value) {
+        (Some(Verdict::Accept), Some(value)) => format!("{value:.3} {unit}  accept"),
+        (Some(verdict), _) if row.cause.is_empty() => verdict.name().to_owned(),
+        (Some(verdict), _) => format!("{}: {}", verdict.name(), row.cause),
+        (None, _) => "not judged".to_owned(),
+    }
+}
+
+/// All trials as an aligned table; the best is marked.
+pub fn table(rows: &[TrialRecord], parameters: &[ParameterInfo], unit: &str) -> String {
+    let mut header: Vec<String> = vec!["trial".into()];
+    header.extend(parameters.iter().map(|p| format!("{} ({})", p.name, p.unit)));
+    header.extend([format!("J ({unit})"), "rise (m)".into(), "air (s)".into(), "source".into(), "verdict".into()]);
+    let accepted = |row: &&TrialRecord| row.verdict == Some(Verdict::Accept);
+    let best = rows.iter().filter(accepted).filter_map(|row| row.value).fold(f64::NEG_INFINITY, f64::max);
+    let mut lines = vec![header];
+    for row in rows {
+        let mark = if row.verdict == Some(Verdict::Accept) && row.value == Some(best) { "*" } else { "" };
+        let mut cells = vec![format!("{mark}{}", row.trial)];
+        for parameter in parameters {
+            let value = row.parameters.iter().find(|(name, _)| *name == parameter.name);
+            cells.push(value.map_or_else(String::new, |(_, v)| format!("{v:.*}", digits(&parameter.unit))));
+        }
+        cells.push(row.value.map_or_else(|| "-".into(), |value| format!("{value:.3}")));
+        cells.push(row.measured.map_or_else(|| "-".into(), |measured| format!("{:.3}", measured.apex_m)));
+        cells.push(row.measured.map_or_else(|| "-".into(), |measured| format!("{:.3}", measured.air_s)));
+        cells.push(row.source.name().into());
+        cells.push(match row.verdict {
+            Some(Verdict::Accept) => "accept".into(),
+            Some(verdict) => format!("{}: {}", verdict.name(), row.cause),
+            None => "not judged".into(),
+        });
+        lines.push(cells);
+    }
+    let columns = lines[0].len();
+    let width = |column: usize| lines.iter().map(|line| line[column].chars().count()).max().unwrap_or(0);
+    let widths: Vec<_> = (0..columns).map(width).collect();
+    let mut text = String::new();
+    for line in &lines {
+        for (column, cell) in line.iter().enumerate() {
+            // Numbers to the right; the words of the last two columns to the left.
+            let words = column + 2 >= columns;
+            let pad = " ".repeat(widths[column] - cell.chars().count());
+            let cell = if words { format!("{cell}{pad}") } else { format!("{pad}{cell}") };
+            text.push_str(&cell);
+            text.push_str("  ");
+        }
+        text.truncate(text.trim_end().len());
+        text.push('\n');
+    }
+    text
+}
+
+/// Digits after the point that a parameter of that unit deserves.
+fn digits(unit: &str) -> usize {
+    if unit == "Hz" { 3 } else { 1 }
+}

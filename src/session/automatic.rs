@@ -1,0 +1,40 @@
+//! A study without a person: every proposal is approved, every suggested verdict is the verdict.
+
+use super::life::{Life, Refusal};
+use super::rollout::Rollout;
+use crate::realtime::telemetry::Tick;
+use crate::recording::record::{Stage, TrialRecord, Verdict};
+use crate::robot::Robot;
+
+/// After this many void trials in a row nothing will come of the study: something is wrong that no parameter mends.
+const VOIDS_IN_A_ROW: u32 = 10;
+
+/// Runs trials until the study has its budget; `each` is given every judged trial with its ticks.
+///
+/// # Errors
+/// When the study cannot be read or written, or one trial after the other is void.
+pub fn run<R: Robot>(
+    life: &mut Life,
+    rollout: &mut Rollout<R>,
+    mut each: impl FnMut(&TrialRecord, &[Tick]),
+) -> Result<(), Refusal> {
+    let mut voids = 0;
+    while life.stage() == Stage::Proposed {
+        let Some(card) = life.proposal() else { break };
+        let spec = life.approve(card.trial, card.revision)?;
+        let (end, ticks) = rollout.run(&spec);
+        life.ended(spec.trial, &end, ticks);
+        let suggested = life.row(spec.trial).and_then(|row| row.suggested).unwrap_or(Verdict::Void);
+        life.judge(suggested, false)?;
+        voids = if suggested == Verdict::Void { voids + 1 } else { 0 };
+        if let Some(row) = life.row(spec.trial) {
+            each(row, ticks);
+            if voids >= VOIDS_IN_A_ROW {
+                let cause = row.cause.clone();
+                life.close()?;
+                return Err(Refusal::NotNow(format!("{voids} trials in a row were void, the last because: {cause}")));
+            }
+        }
+    }
+    Ok(life.close()?)
+}

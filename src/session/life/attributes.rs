@@ -1,0 +1,195 @@
+//! What of a trial is kept in the study as attributes, so that the study alone tells the whole story: names, and both ways
+//! between attributes and rows of the table.
+
+use std::collections::BTreeMap;
+
+use serde_json::{Value, json};
+
+use crate::optimize::study::Outcome;
+use crate::optimize::trial::{Trial, TrialState};
+use crate::recording::record::{Measured, ParameterInfo, Proposal, Risk, Source, TrialRecord, Verdict};
+
+const SOURCE: &str = "source";
+const PARENT: &str = "parent";
+const SEED: &str = "seed";
+const RECORDING: &str = "recording";
+const VERSION: &str = "version";
+const VERDICT: &str = "verdict";
+const SUGGESTED: &str = "suggested";
+const CAUSE: &str = "cause";
+const VALUE: &str = "value";
+const HAND_VALUE: &str = "hand_value";
+const RERUN: &str = "rerun";
+const RISK: &str = "risk";
+
+type Attributes = Vec<(String, Value)>;
+
+/// Where a queued point comes from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Origin {
+    /// Who chose it.
+    pub source: Source,
+    /// The trial that it repeats.
+    pub parent: Option<u32>,
+    /// The seed that it is to run with; none for one of its own.
+    pub seed: Option<u64>,
+}
+
+impl Origin {
+    /// The sampler's own.
+    pub fn sampler() -> Origin {
+        Origin { source: Source::Sampler, parent: None, seed: None }
+    }
+
+    /// A point that somebody queued.
+    pub fn queued() -> Origin {
+        Origin { source: Source::Queued, parent: None, seed: None }
+    }
+
+    /// A repetition with noise of its own.
+    pub fn rerun_of(trial: u32) -> Origin {
+        Origin { source: Source::Rerun, parent: Some(trial), seed: None }
+    }
+
+    /// The same trial once more, after a crash, as if nothing had happened.
+    pub fn interrupted(trial: &Trial) -> Origin {
+        Origin { source: Source::Rerun, parent: Some(trial.number), seed: seed_of(trial) }
+    }
+
+    /// As kept with the queued trial; without attributes it was queued by another program.
+    pub fn of(attributes: &BTreeMap<String, Value>) -> Origin {
+        Origin {
+            source: named(attributes.get(SOURCE), Source::ALL, Source::name).unwrap_or(Source::Queued),
+            parent: number(attributes.get(PARENT)),
+            seed: attributes.get(SEED).and_then(seed_from),
+        }
+    }
+
+    /// To be kept with the queued trial.
+    pub fn attributes(&self) -> Attributes {
+        let mut kept = vec![(SOURCE.to_owned(), json!(self.source.name()))];
+        if let Some(parent) = self.parent {
+            kept.push((PARENT.to_owned(), json!(parent)));
+        }
+        if let Some(seed) = self.seed {
+            kept.push((SEED.to_owned(), seed_text(seed)));
+        }
+        kept
+    }
+}
+
+/// A verdict that was on disk when the program ended.
+pub struct Judgement {
+    /// What the study is to be told.
+    pub outcome: Outcome,
+    /// Whether the parameters are to be queued again.
+    pub rerun: bool,
+}
+
+impl Judgement {
+    /// The judgement kept with a running trial, if there is one.
+    pub fn of(trial: &Trial) -> Option<Judgement> {
+        let kept = &trial.user_attributes;
+        let verdict = named(kept.get(VERDICT), Verdict::ALL, Verdict::name)?;
+        let outcome = match verdict {
+            Verdict::Void => Outcome::Fail,
+            Verdict::Accept | Verdict::Fall => Outcome::Complete(kept.get(VALUE).and_then(Value::as_f64)?),
+        };
+        Some(Judgement { outcome, rerun: kept.get(RERUN).and_then(Value::as_bool).unwrap_or(false) })
+    }
+}
+
+/// What is kept when a trial begins.
+pub fn began(proposal: &Proposal, seed: u64, recording: &str) -> Attributes {
+    let mut kept = Origin { source: proposal.source, parent: proposal.parent, seed: Some(seed) }.attributes();
+    kept.push((VERSION.to_owned(), json!(env!("CARGO_PKG_VERSION"))));
+    if !recording.is_empty() {
+        kept.push((RECORDING.to_owned(), json!(recording)));
+    }
+    if let Some(risk) = &proposal.risk {
+        kept.push((RISK.to_owned(), json!(risk)));
+    }
+    kept
+}
+
+/// What is kept when a trial is judged; a verdict that was taken back is kept as null.
+pub fn judged(row: &TrialRecord, rerun: bool) -> Attributes {
+    let mut kept = vec![
+        (VERDICT.to_owned(), json!(row.verdict.map(Verdict::name))),
+        (SUGGESTED.to_owned(), json!(row.suggested.map(Verdict::name))),
+        (CAUSE.to_owned(), json!(row.cause)),
+        (VALUE.to_owned(), json!(row.value)),
+        (HAND_VALUE.to_owned(), json!(row.hand_value)),
+        (RERUN.to_owned(), json!(rerun)),
+    ];
+    if let Some(Measured { dx_m, dy_m, dyaw_rad, apex_m, air_s }) = row.measured {
+        // Numeric columns of their own, so that the dashboard can sort by them.
+        let terms = [("dx_m", dx_m), ("dy_m", dy_m), ("dyaw_rad", dyaw_rad), ("apex_m", apex_m), ("air_s", air_s)];
+        kept.extend(terms.map(|(name, value)| (name.to_owned(), json!(value))));
+    }
+    kept
+}
+
+/// What is kept of a trial whose program ended before the verdict.
+pub fn interrupted(cause: &str) -> Attributes {
+    vec![(VERDICT.to_owned(), json!(Verdict::Void.name())), (CAUSE.to_owned(), json!(cause))]
+}
+
+/// The seed that a trial ran with.
+pub fn seed_of(trial: &Trial) -> Option<u64> {
+    trial.user_attributes.get(SEED).and_then(seed_from)
+}
+
+/// The row of a trial that is in the study. A trial of another program has no verdict of its own: if it is complete, it
+/// counts as accepted.
+pub fn row_of(trial: &Trial, note: String, order: &[ParameterInfo]) -> TrialRecord {
+    let kept = &trial.user_attributes;
+    let number_of = |name: &str| kept.get(name).and_then(Value::as_f64);
+    let origin = Origin::of(kept);
+    let measured = (|| {
+        Some(Measured {
+            dx_m: number_of("dx_m")?,
+            dy_m: number_of("dy_m")?,
+            dyaw_rad: number_of("dyaw_rad")?,
+            apex_m: number_of("apex_m")?,
+            air_s: number_of("air_s")?,
+        })
+    })();
+    let default_verdict = match trial.state {
+        TrialState::Complete => Some(Verdict::Accept),
+        TrialState::Fail | TrialState::Pruned => Some(Verdict::Void),
+        TrialState::Running | TrialState::Waiting => None,
+    };
+    TrialRecord {
+        trial: trial.number,
+        source: origin.source,
+        parent: origin.parent,
+        parameters: order.iter().filter_map(|p| Some((p.name.clone(), trial.parameter(&p.name)?))).collect(),
+        measured,
+        value: trial.value,
+        hand_value: number_of(HAND_VALUE),
+        suggested: named(kept.get(SUGGESTED), Verdict::ALL, Verdict::name),
+        cause: kept.get(CAUSE).and_then(Value::as_str).unwrap_or_default().to_owned(),
+        verdict: named(kept.get(VERDICT), Verdict::ALL, Verdict::name).or(default_verdict),
+        note,
+        risk: kept.get(RISK).and_then(|risk| serde_json::from_value::<Risk>(risk.clone()).ok()),
+    }
+}
+
+/// A seed as text: JSON numbers of other programs do not hold 64 bits.
+fn seed_text(seed: u64) -> Value {
+    json!(seed.to_string())
+}
+
+fn seed_from(value: &Value) -> Option<u64> {
+    value.as_str()?.parse().ok()
+}
+
+fn number(value: Option<&Value>) -> Option<u32> {
+    u32::try_from(value?.as_u64()?).ok()
+}
+
+fn named<T: Copy, const N: usize>(value: Option<&Value>, all: [T; N], name: fn(T) -> &'static str) -> Option<T> {
+    let text = value?.as_str()?;
+    all.into_iter().find(|item| name(*item) == text)
+}

@@ -1,0 +1,63 @@
+//! What a jump is worth: a pure function of the trial's recorded ticks, so that a replay computes the same number.
+
+use nalgebra::{Rotation3, Vector3};
+
+use crate::control::settings::PERIOD_S;
+use crate::realtime::command::Task;
+use crate::realtime::telemetry::{Tick, TrialEnd};
+use crate::recording::record::{Measured, Verdict};
+
+/// Measures a trial from its ticks; none if they end before the impulse begins.
+///
+/// x, y and yaw are read when the oscillator enters pi (t = 0) and at the last tick; displacements are in the world
+/// frame turned so that the trial starts at yaw 0 (`specs/method.md`, "Timing of a trial").
+pub fn measure(ticks: &[Tick]) -> Option<Measured> {
+    let first = ticks.iter().position(|tick| tick.trial_time_s >= 0.0 && tick.trial.is_some())?;
+    let (start, end) = (&ticks[first].estimate, &ticks.last()?.estimate);
+    let yaw_init = start.roll_pitch_yaw.z;
+    let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), -yaw_init);
+    let displacement = turn * (end.position_world - start.position_world);
+    let apex_m =
+        ticks[first..].iter().map(|tick| tick.estimate.position_world.z - start.position_world.z).fold(0.0, f64::max);
+    let mut longest = 0;
+    let mut left = None;
+    for tick in &ticks[first..] {
+        if tick.estimate.contact.iter().any(|&down| down) {
+            left = None;
+        } else {
+            let since = *left.get_or_insert(tick.number);
+            longest = longest.max(tick.number - since + 1);
+        }
+    }
+    Some(Measured {
+        dx_m: displacement.x,
+        dy_m: displacement.y,
+        dyaw_rad: end.roll_pitch_yaw.z - yaw_init,
+        apex_m,
+        air_s: longest as f64 * PERIOD_S,
+    })
+}
+
+/// The objective J, maximised: m for forward and lateral, rad for twist (paper, section II-D); mean per jump.
+pub fn value(task: Task, measured: &Measured, jumps: u32) -> f64 {
+    let whole = match task {
+        Task::Forward => measured.dx_m,
+        Task::LateralLeft => measured.dy_m,
+        Task::LateralRight => -measured.dy_m,
+        Task::TwistCcw => measured.dyaw_rad,
+        Task::TwistCw => -measured.dyaw_rad,
+    };
+    whole / f64::from(jumps.max(1))
+}
+
+/// What the rules suggest, and why in words.
+pub fn suggest(end: &TrialEnd) -> (Verdict, String) {
+    match end {
+        TrialEnd::Settled => (Verdict::Accept, "landed and settled".into()),
+        TrialEnd::NotQuiet => (Verdict::Fall, "did not come to rest".into()),
+        TrialEnd::Fell(cause) => (Verdict::Fall, cause.to_string()),
+        TrialEnd::Stopped => (Verdict::Void, "stopped by the operator".into()),
+        TrialEnd::Cancelled => (Verdict::Void, "cancelled by the operator".into()),
+        TrialEnd::Fault(fault) => (Verdict::Void, fault.to_string()),
+    }
+}

@@ -1,0 +1,51 @@
+//! The same cycle and simulator on simulated time: no thread, as fast as the machine goes, bit-for-bit repeatable for a
+//! seed.
+
+use crate::control::cycle::{Cycle, Inputs};
+use crate::control::limits::ticks;
+use crate::control::settings::{PERIOD_S, Settings};
+use crate::realtime::clock::SimulatedClock;
+use crate::realtime::command::{Command, TrialSpec};
+use crate::realtime::telemetry::{Event, Fault, Tick, TrialEnd};
+use crate::robot::{Placement, Robot};
+
+/// A robot in simulated time.
+pub struct Rollout<R: Robot> {
+    robot: R,
+    settings: Settings,
+    ticks: Vec<Tick>,
+}
+
+impl<R: Robot> Rollout<R> {
+    /// A rollout of that robot, which must be one that can be put in place.
+    pub fn new(robot: R, settings: &Settings) -> Rollout<R> {
+        Rollout { robot, settings: *settings, ticks: Vec::new() }
+    }
+
+    /// Runs one trial from its mark and says how it ended; the ticks are those of the trial, countdown included.
+    pub fn run(&mut self, spec: &TrialSpec) -> (TrialEnd, &[Tick]) {
+        // The last trial may have left the robot on its back; a robot that is ready for a trial is not.
+        self.robot.place(&Placement { joint_position: self.settings.lying_position, lying: true, seed: spec.seed });
+        let mut cycle = Cycle::ready(&self.settings);
+        let mut inputs = Inputs { command: Some(Command::RunTrial(*spec)), ..Inputs::default() };
+        self.ticks.clear();
+        // A trial ends by itself `cap_s` after its last impulse; anything longer is a fault of ours, and said so.
+        let profile_s = f64::from(spec.jumps) * (0.5 / spec.jump.f0_hz + 0.5 / spec.jump.f1_hz.max(0.05));
+        let most = ticks(self.settings.countdown_s + profile_s + self.settings.settle.cap_s + 1.0);
+        for number in 0..most {
+            inputs.time_ns = u64::from(number) * (PERIOD_S * 1e9) as u64;
+            self.ticks.push(*cycle.tick(&inputs, &SimulatedClock, &mut self.robot));
+            inputs.command = None;
+            let ended = cycle.events().iter().find_map(|event| match event {
+                Event::TrialEnded { end, .. } => Some(end),
+                Event::Refused { .. } => Some(TrialEnd::Cancelled),
+                Event::Mode { .. } => None,
+            });
+            if let Some(end) = ended {
+                return (end, &self.ticks);
+            }
+        }
+        let silent = TrialEnd::Fault(Fault::StateAge { age_ms: most, allowed_ms: most });
+        (silent, &self.ticks)
+    }
+}

@@ -1,0 +1,336 @@
+//! The session thread's work: an operator's intents in, commands to the control thread, events and measured ticks back,
+//! records to the screen and the recording. Every intent is answered, carried out or refused and why.
+
+use std::collections::VecDeque;
+use std::sync::mpsc::{Receiver, Sender};
+
+use super::intent::Intent;
+use super::life::{Life, Refusal};
+use crate::control::mode::{self, Request};
+use crate::realtime::channel::SessionEnd;
+use crate::realtime::command::Command;
+use crate::realtime::telemetry::{Cause, Event, Mode, Tick, TrialEnd};
+use crate::recording::record::{
+    CommandRecord, Level, LogRecord, Record, SessionInfo, Stage, Stamped, Transition, Verdict,
+};
+use crate::recording::recorder::{RecorderWatch, TrialTicks};
+
+/// Ticks that go with a fault into the recording.
+const FAULT_TICKS: usize = 200;
+
+/// How often the counters are told to the screen and the recording, ns.
+const COUNTERS_PERIOD_NS: u64 = 100_000_000;
+
+/// Where the records go: the recorder and the screen receive the same.
+pub struct Outlets {
+    /// To the recorder.
+    pub recorder: Sender<Stamped>,
+    /// To the screen.
+    pub screen: Sender<Stamped>,
+}
+
+impl Outlets {
+    fn put(&self, stamped: Stamped) {
+        // A screen or recorder that is gone takes nothing any more: the session ends with them, not because of them.
+        let _ = self.screen.send(stamped.clone());
+        let _ = self.recorder.send(stamped);
+    }
+}
+
+/// The session.
+pub struct Supervisor {
+    life: Life,
+    control: SessionEnd,
+    trial_ticks: Receiver<TrialTicks>,
+    outlets: Outlets,
+    recorder: RecorderWatch,
+    mode: Mode,
+    cause: Cause,
+    /// How the running trial ended, until its ticks have arrived too.
+    ended: Option<(u32, TrialEnd)>,
+    measured: VecDeque<TrialTicks>,
+    recorder_complaint: Option<String>,
+    observe: bool,
+    asked_for_control: bool,
+    counters_ns: u64,
+}
+
+impl Supervisor {
+    /// A session over a study; `info` becomes the first record.
+    pub fn new(
+        life: Life,
+        control: SessionEnd,
+        trial_ticks: Receiver<TrialTicks>,
+        outlets: Outlets,
+        recorder: RecorderWatch,
+        info: SessionInfo,
+        time_ns: u64,
+    ) -> Supervisor {
+        let observe = info.observe;
+        let mut supervisor = Supervisor {
+            life,
+            control,
+            trial_ticks,
+            outlets,
+            recorder,
+            mode: Mode::Offline,
+            cause: Cause::Course,
+            ended: None,
+            measured: VecDeque::new(),
+            recorder_complaint: None,
+            observe,
+            asked_for_control: false,
+            counters_ns: 0,
+        };
+        supervisor.say(Record::Session(info), time_ns);
+        supervisor.publish(time_ns);
+        supervisor
+    }
+
+    /// The mode as far as the session has heard.
+    pub fn mode(&self) -> Mode {
+        self.mode
+    }
+
+    /// Takes in what happened since the last call; to be called every few milliseconds.
+    pub fn attend(&mut self, time_ns: u64) {
+        while let Ok(event) = self.control.events.pop() {
+            self.event(event, time_ns);
+        }
+        while let Ok(ticks) = self.trial_ticks.try_recv() {
+            self.measured.push_back(ticks);
+        }
+        self.measure(time_ns);
+        let complaint = self.recorder.get().error;
+        if complaint != self.recorder_complaint {
+            if let Some(complaint) = &complaint {
+                self.log(Level::Error, format!("the recording failed: {complaint}"), time_ns);
+            }
+            self.recorder_complaint = complaint;
+        }
+        if time_ns >= self.counters_ns + COUNTERS_PERIOD_NS {
+            self.counters_ns = time_ns;
+            let counters = *self.control.counters.read();
+            self.say(Record::Counters(counters), time_ns);
+        }
+        self.publish(time_ns);
+    }
+
+    /// Carries out one intent, or says why not.
+    pub fn carry_out(&mut self, intent: &Intent, time_ns: u64) {
+        let answer = if self.observe { Err("this session only observes".to_owned()) } else { self.obey(intent) };
+        let (accepted, answer) = match answer {
+            Ok(answer) => (true, answer),
+            Err(reason) => (false, reason),
+        };
+        self.say(Record::Command(CommandRecord { wish: describe(intent), accepted, answer }), time_ns);
+        self.publish(time_ns);
+    }
+
+    /// The last ticks before a fault, for the recording.
+    pub fn keep_fault_ticks(&mut self, ticks: Vec<Tick>, time_ns: u64) {
+        self.say(Record::FaultTicks(ticks), time_ns);
+    }
+
+    /// The session ends: what was judged is told.
+    pub fn close(&mut self, time_ns: u64) {
+        if let Err(error) = self.life.close() {
+            self.log(Level::Error, format!("the study could not be written: {error}"), time_ns);
+        }
+        self.publish(time_ns);
+    }
+
+    /// A robot that answers is taken control of, unless this session only looks.
+    pub fn take_control(&mut self) {
+        if !self.observe && !self.asked_for_control {
+            self.asked_for_control = self.command(Command::TakeControl).is_ok();
+        }
+    }
+
+    /// Asks the control thread for something that no operator asked for: taking control at the start, sitting down at
+    /// the end.
+    pub fn command(&mut self, command: Command) -> Result<(), String> {
+        self.control.commands.push(command).map_err(|_| "the control thread does not take commands".to_owned())
+    }
+
+    fn obey(&mut self, intent: &Intent) -> Result<String, String> {
+        let words = |refusal: Refusal| refusal.to_string();
+        match intent {
+            Intent::Arm => self.ask(Request::Arm, Command::Arm, "the robot stands up"),
+            Intent::SitDown => self.ask(Request::SitDown, Command::SitDown, "the robot sits down"),
+            Intent::Acknowledge => self.ask(Request::Acknowledge, Command::Acknowledge, "acknowledged; arm when ready"),
+            Intent::Cancel => self.ask(Request::Cancel, Command::Cancel, "the countdown is cancelled"),
+            Intent::Approve { trial, revision } => {
+                if self.mode != Mode::Ready {
+                    return Err(format!("the robot is {}, not READY{}", self.mode.name(), way_to_ready(self.mode)));
+                }
+                if let Some(complaint) = &self.recorder_complaint {
+                    return Err(format!(
+                        "nothing is recorded ({complaint}); a jump without a recording is not measured"
+                    ));
+                }
+                let spec = self.life.approve(*trial, *revision).map_err(words)?;
+                self.command(Command::RunTrial(spec))?;
+                Ok(format!("trial {} runs", spec.trial))
+            }
+            Intent::Skip => self.life.skip().map_err(words).map(|()| "skipped; here is another".to_owned()),
+            Intent::Override { parameter, value } => {
+                self.life.set_parameter(parameter, *value).map_err(words)?;
+                Ok(format!("{parameter} will be {value}"))
+            }
+            Intent::ClearOverrides => {
+                self.life.clear_overrides().map_err(words).map(|()| "as it was proposed".to_owned())
+            }
+            Intent::Judge(verdict) => {
+                self.life.judge(*verdict, false).map_err(words)?;
+                self.end_review()?;
+                Ok(format!("{}; u takes it back until the next jump is approved", verdict.name()))
+            }
+            Intent::Rerun { trial: None } => {
+                self.life.judge(Verdict::Void, true).map_err(words)?;
+                self.end_review()?;
+                Ok("void, and its parameters are on the table again".to_owned())
+            }
+            Intent::Rerun { trial: Some(trial) } => {
+                self.life.repeat(*trial).map_err(words)?;
+                Ok(format!("the parameters of trial {trial} are queued"))
+            }
+            Intent::Undo => self.life.undo().map_err(words).map(|()| "the verdict is taken back".to_owned()),
+            Intent::HandValue(value) => {
+                self.life.set_hand_value(*value).map_err(words)?;
+                Ok(match value {
+                    Some(value) => format!("{value} counts instead of the measured value"),
+                    None => "the measured value counts".to_owned(),
+                })
+            }
+            Intent::Note { trial, text } => {
+                self.life.note(*trial, text).map_err(words)?;
+                Ok("noted".to_owned())
+            }
+            Intent::Enqueue(parameters) => {
+                self.life.enqueue(parameters).map_err(words)?;
+                Ok("queued".to_owned())
+            }
+            Intent::Continue(trials) => {
+                self.life.extend(*trials).map_err(words)?;
+                Ok(format!("the study now has {} trials", self.life.budget()))
+            }
+        }
+    }
+
+    /// Sends `command` if the mode allows `request`.
+    fn ask(&mut self, request: Request, command: Command, answer: &str) -> Result<String, String> {
+        if mode::next(self.mode, request).is_none() {
+            return Err(format!("not while the robot is {}", self.mode.name()));
+        }
+        self.command(command)?;
+        Ok(answer.to_owned())
+    }
+
+    /// The verdict is given: a standing robot is ready again, a fallen one is disarmed and must be armed anew.
+    fn end_review(&mut self) -> Result<(), String> {
+        let fallen = self.mode == Mode::Damped && matches!(self.cause, Cause::Fell(_));
+        if self.mode == Mode::Review || fallen { self.command(Command::EndReview) } else { Ok(()) }
+    }
+
+    fn event(&mut self, event: Event, time_ns: u64) {
+        match event {
+            Event::Mode { from, to, cause, time_ns } => {
+                self.mode = to;
+                self.cause = cause;
+                self.say(Record::Transition(Transition { from, to, cause: cause.to_string() }), time_ns);
+            }
+            Event::TrialEnded { trial, end } => self.ended = Some((trial, end)),
+            Event::Refused { command, mode } => {
+                let message =
+                    format!("the control thread refused {} while {}", describe_command(&command), mode.name());
+                self.log(Level::Warning, message, time_ns);
+                if let Command::RunTrial(spec) = command {
+                    self.ended = Some((spec.trial, TrialEnd::Cancelled));
+                    self.measured.push_back(TrialTicks { trial: spec.trial, ticks: Vec::new() });
+                }
+            }
+        }
+    }
+
+    /// Once a trial has ended and its ticks are here, it is measured.
+    fn measure(&mut self, time_ns: u64) {
+        let Some((trial, end)) = self.ended else { return };
+        let Some(place) = self.measured.iter().position(|ticks| ticks.trial == trial) else { return };
+        let Some(TrialTicks { ticks, .. }) = self.measured.remove(place) else { return };
+        self.measured.clear();
+        self.ended = None;
+        if matches!(end, TrialEnd::Fault(_)) {
+            let kept = ticks[ticks.len().saturating_sub(FAULT_TICKS)..].to_vec();
+            self.keep_fault_ticks(kept, time_ns);
+        }
+        self.life.ended(trial, &end, &ticks);
+        if self.life.stage() == Stage::Review && matches!(self.mode, Mode::Damped | Mode::Fault) {
+            let message = format!("trial {trial} ended in {}: {}", self.mode.name(), self.cause);
+            self.log(Level::Warning, message, time_ns);
+        }
+    }
+
+    /// What the study's life has to say.
+    fn publish(&mut self, time_ns: u64) {
+        for record in self.life.take_records() {
+            self.outlets.put(Stamped { time_ns, record });
+        }
+    }
+
+    fn say(&mut self, record: Record, time_ns: u64) {
+        self.outlets.put(Stamped { time_ns, record });
+    }
+
+    fn log(&mut self, level: Level, message: String, time_ns: u64) {
+        self.say(Record::Log(LogRecord { level, source: "session".to_owned(), message }), time_ns);
+    }
+}
+
+/// What leads to READY from here, in words.
+fn way_to_ready(mode: Mode) -> &'static str {
+    match mode {
+        Mode::Disarmed => "; arm it first",
+        Mode::Damped | Mode::Fault => "; acknowledge, then arm",
+        Mode::Review => "; judge the last trial first",
+        Mode::Offline => "; there is no robot",
+        _ => "; wait until it is",
+    }
+}
+
+fn describe(intent: &Intent) -> String {
+    match intent {
+        Intent::Arm => "arm".to_owned(),
+        Intent::SitDown => "sit down".to_owned(),
+        Intent::Acknowledge => "acknowledge".to_owned(),
+        Intent::Approve { trial, .. } => format!("approve trial {trial}"),
+        Intent::Cancel => "cancel the countdown".to_owned(),
+        Intent::Skip => "skip the proposal".to_owned(),
+        Intent::Override { parameter, value } => format!("override {parameter} = {value}"),
+        Intent::ClearOverrides => "clear the overrides".to_owned(),
+        Intent::Judge(verdict) => verdict.name().to_owned(),
+        Intent::Rerun { trial: None } => "re-run".to_owned(),
+        Intent::Rerun { trial: Some(trial) } => format!("re-run trial {trial}"),
+        Intent::Undo => "undo the verdict".to_owned(),
+        Intent::HandValue(Some(value)) => format!("value measured by hand {value}"),
+        Intent::HandValue(None) => "no value measured by hand".to_owned(),
+        Intent::Note { trial, text } => format!("note on trial {trial}: {text}"),
+        Intent::Enqueue(point) => {
+            let words: Vec<_> = point.iter().map(|(name, value)| format!("{name} = {value}")).collect();
+            format!("queue {}", words.join(", "))
+        }
+        Intent::Continue(trials) => format!("continue for {trials} trials"),
+    }
+}
+
+fn describe_command(command: &Command) -> String {
+    match command {
+        Command::TakeControl => "to be controlled".to_owned(),
+        Command::Arm => "to stand up".to_owned(),
+        Command::SitDown => "to sit down".to_owned(),
+        Command::RunTrial(spec) => format!("trial {}", spec.trial),
+        Command::Cancel => "to cancel".to_owned(),
+        Command::EndReview => "to end the review".to_owned(),
+        Command::Acknowledge => "the acknowledgement".to_owned(),
+    }
+}

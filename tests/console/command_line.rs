@@ -1,0 +1,262 @@
+//! The command line as a user has it: whole runs of the program, its output, its exit status.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+
+use serde_json::Value;
+
+fn quadfrog(folder: &Path) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_quadfrog"));
+    command.current_dir(folder).stdin(Stdio::null()).env("NO_COLOR", "1");
+    command
+}
+
+fn run(folder: &Path, arguments: &[&str]) -> Output {
+    quadfrog(folder).args(arguments).output().unwrap()
+}
+
+/// The message of a run that must be refused with status 2.
+fn refused(folder: &Path, arguments: &[&str]) -> String {
+    let output = run(folder, arguments);
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
+    message
+}
+
+/// The study folders below `recordings/`.
+fn studies(folder: &Path) -> Vec<PathBuf> {
+    fs::read_dir(folder.join("recordings"))
+        .map(|entries| entries.map(|entry| entry.unwrap().path()).collect())
+        .unwrap_or_default()
+}
+
+fn lines(output: &[u8]) -> Vec<Value> {
+    String::from_utf8_lossy(output).lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+}
+
+#[test]
+fn optimize_prints_one_json_object_per_trial_in_the_promised_form() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = run(folder.path(), &["optimize", "--task", "twist-cw", "--trials", "3", "--seed", "1", "--json"]);
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    let trials = lines(&output.stdout);
+    assert_eq!(trials.len(), 3);
+    for (number, trial) in trials.iter().enumerate() {
+        assert_eq!(trial["trial"], number);
+        for name in ["f0", "Fy", "Fz"] {
+            assert!(trial["params"][name].is_f64(), "{trial}");
+        }
+        for name in ["dx_m", "dy_m", "dyaw_rad", "apex_m", "air_s"] {
+            assert!(trial["measured"][name].is_f64(), "{trial}");
+        }
+        let verdict = trial["verdict"].as_str().unwrap();
+        let measured = -trial["measured"]["dyaw_rad"].as_f64().unwrap();
+        let expected = if verdict == "fall" { 0.0 } else { measured };
+        assert_eq!(trial["value"].as_f64().unwrap(), expected, "{trial}");
+    }
+    let [study] = studies(folder.path()).try_into().expect("one study");
+    assert!(study.join("study.log").is_file() && study.join("session.mcap").is_file());
+    assert!(study.join("config/control.toml").is_file());
+}
+
+#[test]
+fn without_a_terminal_optimize_prints_plain_lines_a_table_and_the_best() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = run(folder.path(), &["optimize", "--trials", "3", "--record", "none"]);
+    assert_eq!(output.status.code(), Some(0));
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert!(text.lines().next().unwrap().starts_with("trial   0"), "{text}");
+    assert!(text.contains("f0 (Hz)") && text.contains("Best: trial"), "{text}");
+    assert!(!text.contains('\u{1b}'), "escape sequences without a terminal: {text:?}");
+    let [study] = studies(folder.path()).try_into().expect("one study");
+    assert!(!study.join("session.mcap").exists());
+}
+
+#[test]
+fn the_same_seed_prints_the_same_bytes_on_any_number_of_threads() {
+    let folder = tempfile::tempdir().unwrap();
+    let sorted = |jobs: &str| {
+        let arguments =
+            ["optimize", "--task", "forward,lateral-left", "--seed", "0-1", "--trials", "3", "--json", "--jobs", jobs];
+        let output = run(folder.path(), &arguments);
+        assert_eq!(output.status.code(), Some(0));
+        let mut lines: Vec<String> = String::from_utf8_lossy(&output.stdout).lines().map(str::to_owned).collect();
+        lines.sort();
+        lines
+    };
+    let one = sorted("1");
+    assert_eq!(one.len(), 12);
+    assert_eq!(one, sorted("2"));
+}
+
+/// Killed in the middle with SIGKILL, then continued: nothing that was judged is lost, and the trials are those of the
+/// unbroken run.
+#[test]
+fn a_study_killed_in_the_middle_is_continued_as_if_nothing_had_happened() {
+    let folder = tempfile::tempdir().unwrap();
+    const TRIALS: &str = "16";
+    let whole = run(folder.path(), &["optimize", "--trials", TRIALS, "--seed", "5", "--json", "--output", "whole"]);
+    assert_eq!(whole.status.code(), Some(0));
+    let whole = lines(&whole.stdout);
+
+    let mut printed = Vec::new();
+    let mut resumed = None;
+    // Killed after the third and after the twelfth trial: in the random and in the model's part.
+    for after in [3, 12] {
+        let mut command = quadfrog(folder.path());
+        command.args(["optimize", "--trials", TRIALS, "--json"]);
+        match &resumed {
+            None => command.args(["--seed", "5", "--output", "broken"]),
+            Some(study) => command.arg("--resume").arg(study),
+        };
+        let mut child = command.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
+        for line in BufReader::new(child.stdout.take().unwrap()).lines() {
+            printed.push(serde_json::from_str::<Value>(&line.unwrap()).unwrap());
+            if printed.len() >= after {
+                break;
+            }
+        }
+        child.kill().unwrap();
+        child.wait().unwrap();
+        let [study] = fs::read_dir(folder.path().join("broken"))
+            .unwrap()
+            .map(|entry| entry.unwrap().path())
+            .collect::<Vec<_>>()
+            .try_into()
+            .expect("one study");
+        resumed = Some(study);
+    }
+    let study = resumed.unwrap();
+    let rest = run(folder.path(), &["optimize", "--trials", TRIALS, "--json", "--resume", study.to_str().unwrap()]);
+    assert_eq!(rest.status.code(), Some(0), "{}", String::from_utf8_lossy(&rest.stderr));
+
+    // What counts, in order: a trial that was killed before its verdict came again under another number.
+    let counted = |trials: &[Value]| -> Vec<(Value, Value, Value)> {
+        trials.iter().map(|t| (t["params"].clone(), t["value"].clone(), t["verdict"].clone())).collect()
+    };
+    let table: BTreeMap<u64, Value> = journal_trials(&study.join("study.log"));
+    let ours: Vec<(Value, Value)> = table.values().map(|t| (t["params"].clone(), t["value"].clone())).collect();
+    let theirs: Vec<(Value, Value)> = counted(&whole).into_iter().map(|(p, v, _)| (p, v)).collect();
+    assert_eq!(ours, theirs);
+    for trial in &printed {
+        let kept = &table[&trial["trial"].as_u64().unwrap()];
+        assert_eq!((&kept["params"], &kept["value"]), (&trial["params"], &trial["value"]), "a judged trial changed");
+    }
+}
+
+/// The complete trials of a journal, by number: read as the format says, without this project's reader.
+fn journal_trials(path: &Path) -> BTreeMap<u64, Value> {
+    let mut trials: BTreeMap<u64, Value> = BTreeMap::new();
+    let mut created = 0;
+    for line in fs::read_to_string(path).unwrap().lines() {
+        let operation: Value = serde_json::from_str(line).unwrap();
+        let id = operation["trial_id"].as_u64();
+        match operation["op_code"].as_u64().unwrap() {
+            4 => {
+                trials.insert(created, serde_json::json!({"params": {}, "value": null}));
+                created += 1;
+            }
+            5 => {
+                let name = operation["param_name"].as_str().unwrap();
+                trials.get_mut(&id.unwrap()).unwrap()["params"][name] = operation["param_value_internal"].clone();
+            }
+            6 if operation["state"] == 1 => {
+                trials.get_mut(&id.unwrap()).unwrap()["value"] = operation["values"][0].clone();
+            }
+            _ => {}
+        }
+    }
+    trials.retain(|_, trial| !trial["value"].is_null());
+    trials
+}
+
+#[test]
+fn bad_input_is_refused_with_file_key_value_and_nothing_is_made() {
+    let folder = tempfile::tempdir().unwrap();
+    let config = folder.path().join("mine");
+    fs::create_dir(&config).unwrap();
+    let write = |name: &str, text: &str| fs::write(config.join(name), text).unwrap();
+
+    write("control.toml", "[tasks.forward]\nkpp = 3.0\n");
+    let message = refused(folder.path(), &["optimize", "--config", "mine"]);
+    assert!(
+        message.contains("mine/control.toml:2") && message.contains("kpp") && message.contains("kp`?"),
+        "{message}"
+    );
+    fs::remove_file(config.join("control.toml")).unwrap();
+
+    write("optimize.toml", "[bounds]\nFz = [150.0, 900.0]\n");
+    let message = refused(folder.path(), &["optimize", "--config", "mine"]);
+    assert!(
+        message.contains("mine/optimize.toml:2") && message.contains("900") && message.contains("400"),
+        "{message}"
+    );
+    fs::remove_file(config.join("optimize.toml")).unwrap();
+
+    write("simulator.toml", "[terrain]\nfriction = -1.0\n");
+    let message = refused(folder.path(), &["optimize", "--config", "mine"]);
+    assert!(message.contains("simulator.toml") && message.contains("friction") && message.contains("-1"), "{message}");
+
+    let message = refused(folder.path(), &["optimize", "--config", "elsewhere"]);
+    assert!(message.contains("elsewhere"), "{message}");
+    let message = refused(folder.path(), &["optimize", "--model", "spot"]);
+    assert!(message.contains("spot") && message.contains("go1"), "{message}");
+    let message = refused(folder.path(), &["optimize", "--task", "backward"]);
+    assert!(message.contains("backward") && message.contains("forward"), "{message}");
+    let message = refused(folder.path(), &["optimize", "--seed", "minus"]);
+    assert!(message.contains("minus"), "{message}");
+    let message = refused(folder.path(), &["optimize", "--resume", "mine"]);
+    assert!(message.contains("mine") && message.contains("study.log"), "{message}");
+    assert!(studies(folder.path()).is_empty(), "something was made: {:?}", studies(folder.path()));
+}
+
+#[test]
+fn a_urdf_without_a_foot_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let model = folder.path().join("cripple");
+    fs::create_dir(&model).unwrap();
+    let ours = Path::new(env!("CARGO_MANIFEST_DIR")).join("../robots/go1");
+    fs::copy(ours.join("robot.toml"), model.join("robot.toml")).unwrap();
+    let urdf = fs::read_to_string(ours.join("go1.urdf")).unwrap();
+    let without = urdf.replace("FL_foot", "FL_nothing");
+    assert_ne!(urdf, without);
+    // The link and joint of one foot are cut out.
+    let cut = |text: &str, start: &str, end: &str| match text.find(start) {
+        Some(from) => {
+            let to = text[from..].find(end).unwrap() + from + end.len();
+            format!("{}{}", &text[..from], &text[to..])
+        }
+        None => panic!("{start} is not in the URDF"),
+    };
+    let link = urdf.lines().find(|line| line.contains("<link") && line.contains("FL_foot")).unwrap().trim().to_owned();
+    let joint =
+        urdf.lines().find(|line| line.contains("<joint") && line.contains("FL_foot")).unwrap().trim().to_owned();
+    let text = cut(&cut(&urdf, &link, "</link>"), &joint, "</joint>");
+    fs::write(model.join("cripple.urdf"), text).unwrap();
+    let message = refused(folder.path(), &["optimize", "--model", "cripple"]);
+    assert!(message.contains("cripple.urdf") && message.contains("foot"), "{message}");
+}
+
+#[test]
+fn a_recording_that_is_none_or_is_cut_is_refused_or_played_with_a_word() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("noise.mcap"), b"this is no recording").unwrap();
+    let message = refused(folder.path(), &["replay", "noise.mcap"]);
+    assert!(message.contains("noise.mcap"), "{message}");
+    let message = refused(folder.path(), &["replay", "nothing.mcap"]);
+    assert!(message.contains("nothing.mcap"), "{message}");
+    fs::write(folder.path().join("empty.mcap"), b"").unwrap();
+    let message = refused(folder.path(), &["replay", "empty.mcap"]);
+    assert!(message.contains("empty.mcap"), "{message}");
+}
+
+#[test]
+fn without_a_terminal_the_console_says_what_to_do() {
+    let folder = tempfile::tempdir().unwrap();
+    let message = refused(folder.path(), &[]);
+    assert!(message.contains("terminal") && message.contains("optimize"), "{message}");
+    assert!(studies(folder.path()).is_empty());
+}

@@ -1,0 +1,402 @@
+//! Keys in, wishes out: what the operator's keys can and cannot do, on every screen.
+
+mod support;
+
+use quadfrog::realtime::telemetry::Mode;
+use quadfrog::recording::record::{Record, Stage, StageInfo, Verdict};
+use quadfrog::session::intent::Intent;
+use quadfrog_console::action::{ACTIONS, Action};
+use quadfrog_console::dialog::Dialog;
+use quadfrog_console::keymap::{Key, Keymap};
+use quadfrog_console::model::View;
+use quadfrog_console::settings::{DEFAULT, Settings};
+use quadfrog_console::update::{Effect, Msg};
+use support::{Console, proposal, session, trial};
+
+fn wishes(effects: &[Effect]) -> Vec<Intent> {
+    effects
+        .iter()
+        .filter_map(|effect| match effect {
+            Effect::Wish(intent) => Some(intent.clone()),
+            _ => None,
+        })
+        .collect()
+}
+
+fn approval(trial: u32, revision: u32) -> Vec<Intent> {
+    vec![Intent::Approve { trial, revision }]
+}
+
+#[test]
+fn a_jump_needs_two_presses_at_two_moments() {
+    let mut console = Console::ready();
+    assert_eq!(console.press(&["g"]), []);
+    assert!(console.screen(80, 24).contains("Jump?"));
+    // 100 ms later: too soon, and it starts the pause again.
+    assert_eq!(console.press(&["g"]), []);
+    console.wait(150);
+    assert_eq!(console.press(&["g"]), [], "250 ms after the press before");
+    console.wait(200);
+    assert_eq!(wishes(&console.press(&["g"])), approval(0, 0));
+    assert!(console.model.dialog.is_none());
+}
+
+#[test]
+fn every_key_but_the_approving_one_cancels_an_approval() {
+    for key in ["Enter", "Esc", "y", "A", "a", "1", "Tab", "Up", "F5"] {
+        let mut console = Console::ready();
+        console.press(&["g"]);
+        console.wait(1000);
+        assert_eq!(console.press(&[key]), [], "{key}");
+        assert!(console.model.dialog.is_none(), "{key} leaves the question open");
+        assert_eq!(console.said(), "cancelled: no jump", "{key}");
+    }
+}
+
+#[test]
+fn an_approval_is_of_the_card_that_was_seen() {
+    let mut console = Console::ready();
+    console.press(&["g"]);
+    console.wait(1000);
+    console.record(Record::Proposal(proposal(0, 1)));
+    assert!(console.model.dialog.is_none(), "the card has changed under the question");
+    assert_eq!(console.press(&["g"]), [], "this is the first press for the new card");
+    console.wait(400);
+    assert_eq!(wishes(&console.press(&["g"])), approval(0, 1));
+}
+
+#[test]
+fn an_approval_ends_with_readiness() {
+    for mode in [Mode::Damped, Mode::Fault, Mode::SitDown, Mode::Disarmed] {
+        let mut console = Console::ready();
+        console.press(&["g"]);
+        console.mode(mode);
+        console.wait(1000);
+        assert_eq!(wishes(&console.press(&["g"])), [], "{mode:?}");
+    }
+}
+
+#[test]
+fn stop_works_on_every_screen_and_over_every_dialog() {
+    for stop in ["Space", "F12"] {
+        for mode in Mode::ALL {
+            for view in ["1", "2", "3", "4", "5", "6"] {
+                let mut console = Console::proposed();
+                console.press(&[view]);
+                console.mode(mode);
+                assert!(console.press(&[stop]).contains(&Effect::Stop), "{stop} in {mode:?}, view {view}");
+            }
+        }
+        for opening in ["g", "o", "m", ":", "?", "q", "Enter"] {
+            let mut console = Console::ready();
+            console.record(Record::Trial(trial(0, Some(Verdict::Accept), None)));
+            console.press(&[opening]);
+            assert!(console.model.dialog.is_some(), "{opening} opens a dialog");
+            assert!(console.press(&[stop]).contains(&Effect::Stop), "{stop} over the dialog of {opening}");
+        }
+    }
+}
+
+#[test]
+fn a_text_field_takes_space_only_while_the_robot_is_not_armed() {
+    let note = |mode: Mode, keys: &[&str]| {
+        let mut console = Console::review(mode, Verdict::Accept);
+        console.press(&["m"]);
+        let effects = console.press(keys);
+        (effects, console)
+    };
+    let (effects, _) = note(Mode::Disarmed, &["o", "k", "Space", "y", "Enter"]);
+    assert_eq!(wishes(&effects), [Intent::Note { trial: 0, text: "ok y".into() }]);
+    let (effects, console) = note(Mode::Review, &["o", "k", "Space"]);
+    assert_eq!(effects, [Effect::Stop]);
+    assert!(matches!(console.model.dialog, Some(Dialog::Field { .. })), "the half-written note stays");
+    let (effects, _) = note(Mode::Review, &["o", "k", "_", "y", "Enter"]);
+    assert_eq!(wishes(&effects), [Intent::Note { trial: 0, text: "ok y".into() }]);
+    let (effects, _) = note(Mode::Disarmed, &["F12"]);
+    assert_eq!(effects, [Effect::Stop], "F12 is STOP in a field too");
+}
+
+#[test]
+fn any_key_cancels_a_countdown_and_stop_stops_it() {
+    for key in ["x", "g", "Enter", "Esc", "1", "q"] {
+        let mut console = Console::ready();
+        console.mode(Mode::Countdown);
+        assert_eq!(wishes(&console.press(&[key])), [Intent::Cancel], "{key}");
+    }
+    let mut console = Console::ready();
+    console.mode(Mode::Countdown);
+    assert_eq!(console.press(&["Space"]), [Effect::Stop]);
+}
+
+#[test]
+fn the_first_interrupt_stops_and_the_second_quits() {
+    let mut console = Console::ready();
+    assert_eq!(console.press(&["Ctrl-C"]), [Effect::Stop]);
+    assert_eq!(console.press(&["Ctrl-C"]), [Effect::Quit]);
+    let mut console = Console::ready();
+    console.press(&["Ctrl-C"]);
+    console.wait(2000);
+    assert_eq!(console.press(&["Ctrl-C"]), [Effect::Stop], "two seconds later it is a first one again");
+}
+
+#[test]
+fn quitting_asks_while_the_robot_is_armed_or_a_trial_waits() {
+    assert_eq!(Console::proposed().press(&["q"]), [Effect::Quit]);
+    for mut console in [Console::ready(), Console::review(Mode::Disarmed, Verdict::Fall)] {
+        assert_eq!(console.press(&["q"]), []);
+        assert_eq!(console.press(&["Enter"]), [], "Cancel is the default");
+        console.press(&["q"]);
+        assert_eq!(console.press(&["y"]), [Effect::Quit]);
+    }
+}
+
+#[test]
+fn verdicts_are_legal_in_review_alone() {
+    let verdicts = [
+        ("a", Intent::Judge(Verdict::Accept)),
+        ("f", Intent::Judge(Verdict::Fall)),
+        ("v", Intent::Judge(Verdict::Void)),
+        ("r", Intent::Rerun { trial: None }),
+    ];
+    for (key, intent) in verdicts {
+        for mode in [Mode::Review, Mode::Damped, Mode::Disarmed] {
+            let mut console = Console::review(mode, Verdict::Accept);
+            assert_eq!(wishes(&console.press(&[key])), [intent.clone()], "{key} in {mode:?}");
+        }
+        let mut console = Console::ready();
+        assert_eq!(console.press(&[key]), [], "{key} with a proposal on the table");
+        assert!(console.said().contains("no trial waits"), "{}", console.said());
+    }
+}
+
+#[test]
+fn undo_is_offered_while_the_session_says_so() {
+    let mut console = Console::ready();
+    assert_eq!(console.press(&["u"]), []);
+    console.record(Record::Stage(StageInfo { stage: Stage::Proposed, trial: 0, can_undo: true }));
+    assert_eq!(wishes(&console.press(&["u"])), [Intent::Undo]);
+}
+
+#[test]
+fn an_override_is_checked_and_leaves_on_enter() {
+    let mut console = Console::ready();
+    assert_eq!(console.press(&["o", "Down", "1", "2", "0", ".", "5"]), [], "nothing is sent while it is typed");
+    let sent = wishes(&console.press(&["Enter"]));
+    assert_eq!(sent, [Intent::Override { parameter: "Fx".into(), value: 120.5 }]);
+
+    let mut console = Console::ready();
+    assert_eq!(console.press(&["o", "Down", "1", "8", "0", "Enter"]), []);
+    assert!(console.screen(80, 24).contains("Fx = 180 N is outside 0 to 150 N"), "{}", console.screen(80, 24));
+    assert_eq!(console.press(&["Esc", "Esc"]), [], "and nothing was sent");
+
+    // 1 % and 10 % of the range of Fx, 150 N, from 75 N.
+    let mut console = Console::ready();
+    let sent = wishes(&console.press(&["o", "Down", "Right", "PgUp", "Left", "Right", "Enter"]));
+    let [Intent::Override { parameter, value }] = sent.as_slice() else { panic!("{sent:?}") };
+    assert_eq!(parameter, "Fx");
+    assert!((value - 91.5).abs() < 1e-9, "{value}");
+
+    // Steps end at the bound.
+    let mut console = Console::ready();
+    let keys: Vec<&str> = ["o", "Down"].into_iter().chain(["PgUp"; 12]).chain(["Enter"]).collect();
+    assert_eq!(wishes(&console.press(&keys)), [Intent::Override { parameter: "Fx".into(), value: 150.0 }]);
+}
+
+#[test]
+fn letters_are_not_typed_into_an_override() {
+    let mut console = Console::ready();
+    console.press(&["o", "9", "k", "q", "0"]);
+    let sent = wishes(&console.press(&["Enter"]));
+    assert_eq!(sent, [], "90 Hz is outside of the bounds");
+    assert!(console.screen(80, 24).contains("f0 = 90 Hz is outside"), "{}", console.screen(80, 24));
+}
+
+#[test]
+fn a_refusal_is_said_with_its_reason_and_logged() {
+    let mut console = Console::ready();
+    console.answer("override Fx = 120", false, "the trial runs already");
+    let text = "override Fx = 120: refused: the trial runs already";
+    assert!(console.screen(80, 24).contains(text));
+    console.press(&["6"]);
+    assert!(console.screen(120, 24).contains(&format!("W operator  {text}")), "{}", console.screen(120, 24));
+}
+
+#[test]
+fn a_stopped_robot_is_acknowledged_with_k_or_enter() {
+    for key in ["k", "Enter"] {
+        for mode in [Mode::Damped, Mode::Fault] {
+            let mut console = Console::proposed();
+            console.mode(mode);
+            assert_eq!(wishes(&console.press(&[key])), [Intent::Acknowledge]);
+        }
+    }
+    let mut console = Console::proposed();
+    assert_eq!(console.press(&["k"]), []);
+}
+
+#[test]
+fn an_observer_and_a_replay_send_nothing() {
+    let all = ["A", "g", "o", "O", "n", "a", "f", "v", "r", "u", "m", "=", "D", "k", "C", "Enter"];
+    let mut observer = Console::new();
+    observer.record(Record::Session(quadfrog::recording::record::SessionInfo { observe: true, ..session() }));
+    observer.record(Record::Proposal(proposal(0, 0)));
+    observer.stage(Stage::Proposed, 0);
+    let mut replay = Console::proposed();
+    replay.tell(Msg::Replay(quadfrog_console::model::ReplayStatus {
+        file: "session.mcap".into(),
+        playing: true,
+        speed: 1.0,
+        time_ns: 0,
+        duration_ns: 1,
+    }));
+    for (name, console) in [("observer", &mut observer), ("replay", &mut replay)] {
+        for mode in Mode::ALL {
+            console.mode(mode);
+            for stage in Stage::ALL {
+                console.stage(stage, 0);
+                for key in all {
+                    let sent = wishes(&console.press(&[key]));
+                    assert_eq!(sent, [], "{name}, {key} in {mode:?}, {stage:?}");
+                }
+            }
+        }
+    }
+    assert_eq!(replay.press(&["Space"]), [], "there is no robot to stop");
+    assert_eq!(observer.press(&["Space"]), [Effect::Stop], "STOP is everybody's");
+}
+
+#[test]
+fn energising_keys_do_nothing_in_the_wrong_mode() {
+    for mode in Mode::ALL {
+        let mut console = Console::proposed();
+        console.mode(mode);
+        let armed = wishes(&console.press(&["A"]));
+        assert_eq!(armed.contains(&Intent::Arm), mode == Mode::Disarmed, "A in {mode:?}");
+        let mut console = Console::proposed();
+        console.mode(mode);
+        console.press(&["g"]);
+        console.wait(400);
+        let sent = wishes(&console.press(&["g"]));
+        let approved = sent.iter().any(|intent| matches!(intent, Intent::Approve { .. }));
+        assert_eq!(approved, mode == Mode::Ready, "g g in {mode:?}");
+    }
+}
+
+#[test]
+fn the_palette_says_why_not_and_never_moves_the_robot_with_enter() {
+    let mut console = Console::proposed();
+    console.press(&[":", "a", "p", "p", "r", "o", "v", "e"]);
+    let screen = console.screen(80, 24);
+    assert!(screen.contains("(the robot is not standing: press A first)"), "{screen}");
+    console.press(&["Esc"]);
+    assert_eq!(console.press(&[":", "a", "r", "m", "Enter"]), [], "arming is asked again");
+    assert_eq!(console.press(&["Enter"]), []);
+    console.press(&[":", "a", "r", "m", "Enter"]);
+    assert_eq!(wishes(&console.press(&["y"])), [Intent::Arm]);
+}
+
+#[test]
+fn pasted_text_is_never_read_as_keys() {
+    let mut console = Console::ready();
+    assert_eq!(console.tell(Msg::Paste("ggA q".into())), []);
+    assert!(console.model.dialog.is_none());
+    let mut console = Console::review(Mode::Review, Verdict::Accept);
+    console.press(&["m"]);
+    console.tell(Msg::Paste("slid on the mat\n".into()));
+    let sent = wishes(&console.press(&["Enter"]));
+    assert_eq!(sent, [Intent::Note { trial: 0, text: "slid on the mat".into() }]);
+}
+
+#[test]
+fn numbers_and_tab_change_the_view() {
+    let mut console = Console::proposed();
+    for (key, view) in ["1", "2", "3", "4", "5", "6"].into_iter().zip(View::ALL) {
+        console.press(&[key]);
+        assert_eq!(console.model.view, view);
+    }
+    console.press(&["Tab"]);
+    assert_eq!(console.model.view, View::Live);
+    console.press(&["Shift-Tab"]);
+    assert_eq!(console.model.view, View::Log);
+}
+
+#[test]
+fn suspending_is_refused_while_the_robot_is_armed() {
+    assert_eq!(Console::proposed().press(&["Ctrl-Z"]), [Effect::Suspend]);
+    let mut console = Console::ready();
+    assert_eq!(console.tell(Msg::Suspend), []);
+    assert!(console.said().contains("the robot is armed; D sits it down"), "{}", console.said());
+}
+
+#[test]
+fn the_bell_rings_when_the_operator_is_needed() {
+    let mut console = Console::ready();
+    console.stage(Stage::Running, 0);
+    console.record(Record::Trial(trial(0, None, None)));
+    assert_eq!(console.stage(Stage::Review, 0), [Effect::Bell]);
+    assert_eq!(console.stage(Stage::Review, 0), [], "once");
+}
+
+#[test]
+fn every_action_has_a_name_a_key_and_a_line_of_help() {
+    let keymap = Settings::built_in().keymap;
+    for (index, info) in ACTIONS.iter().enumerate() {
+        assert!(!info.help.is_empty() && !info.keys.is_empty(), "{}", info.name);
+        assert!(ACTIONS[..index].iter().all(|other| other.name != info.name && other.action != info.action));
+        let keys: Vec<String> = keymap.keys(info.action).map(|key| key.to_string()).collect();
+        assert_eq!(keys, info.keys, "console.toml and the table of actions disagree on {}", info.name);
+    }
+}
+
+#[test]
+fn key_names_are_read_as_they_are_shown() {
+    for name in
+        ["g", "A", "?", "=", "-", "+", "Space", "Enter", "Esc", "Tab", "Shift-Tab", "PgUp", "F12", "Ctrl-C", "Alt-x"]
+    {
+        let key: Key = name.parse().expect(name);
+        assert_eq!(key.to_string(), name);
+    }
+    for wrong in ["", "F13", "Hyper-x", "Ctrl-", "gg"] {
+        assert!(wrong.parse::<Key>().is_err(), "{wrong}");
+    }
+}
+
+fn keymap_of(choices: &[(&str, &[&str])]) -> Result<Keymap, String> {
+    let owned: Vec<(&str, Vec<String>)> =
+        choices.iter().map(|(name, keys)| (*name, keys.iter().map(|key| (*key).to_owned()).collect())).collect();
+    Keymap::new(owned.iter().map(|(name, keys)| (*name, keys.as_slice()))).map_err(|error| error.to_string())
+}
+
+#[test]
+fn rebinding_refuses_collisions_and_stop() {
+    let keymap = keymap_of(&[("accept", &["Y", "F2"])]).expect("free keys");
+    assert_eq!(keymap.action("F2".parse().unwrap()), Some(Action::Accept));
+    assert_eq!(keymap.action("a".parse().unwrap()), None);
+    let message = keymap_of(&[("accept", &["f"])]).expect_err("taken by fall");
+    assert!(message.contains("`accept`") && message.contains("`fall`"), "{message}");
+    let message = keymap_of(&[("stop", &["s"])]).expect_err("STOP stays");
+    assert!(message.contains("Space and F12"), "{message}");
+    assert!(keymap_of(&[("acept", &["y"])]).is_err());
+    assert!(keymap_of(&[("accept", &[])]).is_err());
+    assert!(keymap_of(&[("accept", &["Hyper-y"])]).is_err());
+}
+
+#[test]
+fn settings_out_of_range_are_refused_by_name() {
+    let with = |key: &str, value: toml::Value| {
+        let mut table: toml::Table = DEFAULT.parse().expect("the defaults");
+        table.insert(key.into(), value);
+        Settings::from_table(&table).map(|_| ()).map_err(|error| error.to_string())
+    };
+    assert_eq!(with("frames_per_second", 10.into()), Ok(()));
+    for (key, value) in [
+        ("frames_per_second", toml::Value::from(0)),
+        ("chart_window_s", 0.5.into()),
+        ("colours", "pink".into()),
+        ("glyphs", "runes".into()),
+        ("bell", vec!["noon"].into()),
+    ] {
+        let message = with(key, value).expect_err(key);
+        assert!(message.contains(key), "{message}");
+    }
+}

@@ -1,0 +1,220 @@
+//! What the screen shows: always the mode, STOP and the next step, at every size and in every state.
+
+mod support;
+
+use quadfrog::realtime::telemetry::{Mode, Phase};
+use quadfrog::recording::record::{Record, Stage, Verdict};
+use quadfrog_console::settings::Settings;
+use quadfrog_console::theme::{Colours, Glyphs, Theme};
+use quadfrog_console::update::Msg;
+use support::{Console, tick, trial};
+
+const SIZES: [(u16, u16); 3] = [(80, 24), (120, 40), (200, 60)];
+
+#[test]
+fn mode_backend_stop_and_next_step_are_on_every_screen() {
+    let leads = [
+        (Mode::Offline, "Waiting for the robot"),
+        (Mode::Disarmed, "Press A to arm"),
+        (Mode::StandUp, "Standing up"),
+        (Mode::Ready, "Press g twice to jump."),
+        (Mode::Countdown, "any key cancels"),
+        (Mode::Jump, "Jumping"),
+        (Mode::Settle, "Landed"),
+        (Mode::SitDown, "Sitting down"),
+        (Mode::Damped, "then press k"),
+        (Mode::Fault, "then press k"),
+    ];
+    for (columns, rows) in SIZES {
+        for (mode, lead) in leads {
+            for view in ["1", "2", "3", "4", "5", "6"] {
+                let mut console = Console::proposed();
+                console.press(&[view]);
+                console.mode(mode);
+                let screen = console.screen(columns, rows);
+                let first = screen.lines().next().unwrap_or_default();
+                assert!(first.contains(mode.name()) && first.contains("SIM"), "{first}");
+                assert!(screen.lines().nth(1).is_some_and(|line| line.contains("STOP  Space F12")), "{screen}");
+                let last = screen.lines().last().unwrap_or_default();
+                assert!(last.contains(lead), "{mode:?} {columns}x{rows}: {last}");
+            }
+        }
+    }
+}
+
+#[test]
+fn no_dialog_covers_the_frame_the_answer_or_the_next_step() {
+    for opening in ["g", "o", "m", ":", "?", "q", "Enter"] {
+        for (columns, rows) in SIZES {
+            let mut console = Console::ready();
+            console.record(Record::Trial(trial(0, Some(Verdict::Accept), None)));
+            console.answer("override Fx = 120", true, "done");
+            console.press(&[opening]);
+            assert!(console.model.dialog.is_some(), "{opening}");
+            let screen = console.screen(columns, rows);
+            let lines: Vec<&str> = screen.lines().collect();
+            assert!(lines[0].contains("READY") && lines[1].contains("STOP"), "{screen}");
+            assert!(lines[lines.len() - 2].contains("override Fx = 120: done"), "{opening}: {screen}");
+            assert!(!lines[lines.len() - 1].trim().is_empty(), "{opening}: {screen}");
+        }
+    }
+}
+
+#[test]
+fn a_small_terminal_shows_mode_stop_and_the_size_needed() {
+    let console = Console::ready();
+    for (columns, rows) in [(79, 24), (80, 23), (40, 10), (20, 6)] {
+        let screen = console.screen(columns, rows);
+        for part in ["READY", "STOP", "Space F12", "needed 80x24"] {
+            assert!(screen.contains(part), "{columns}x{rows} lacks {part}:\n{screen}");
+        }
+    }
+}
+
+#[test]
+fn no_size_makes_drawing_fail() {
+    for glyphs in [Glyphs::Braille, Glyphs::Ascii] {
+        for view in ["1", "2", "3", "4", "5", "6"] {
+            let mut console = Console::with(Settings::built_in(), Theme { colours: Colours::None, glyphs });
+            for time_ms in (0..9000).step_by(5) {
+                console.tell(Msg::Tick(Box::new(tick(time_ms, (time_ms as f64 / 300.0).sin(), None))));
+            }
+            console.record(Record::Session(support::session()));
+            for number in 0..30 {
+                console.record(Record::Trial(trial(number, Some(Verdict::ALL[number as usize % 3]), None)));
+            }
+            console.press(&[view]);
+            for (columns, rows) in [(1, 1), (0, 0), (3, 200), (300, 2), (80, 24), (81, 25), (300, 100), (500, 24)] {
+                console.screen(columns, rows);
+            }
+        }
+    }
+}
+
+#[test]
+fn ascii_is_ascii_on_every_screen() {
+    for view in ["1", "2", "3", "4", "5", "6"] {
+        for opening in ["", "g", "o", ":", "?"] {
+            let theme = Theme { colours: Colours::None, glyphs: Glyphs::Ascii };
+            let mut console = Console::with(Settings::built_in(), theme);
+            console.record(Record::Session(support::session()));
+            console.record(Record::Proposal(support::proposal(3, 0)));
+            for number in 0..3 {
+                console.record(Record::Trial(trial(number, Some(Verdict::ALL[number as usize]), None)));
+            }
+            console.stage(Stage::Proposed, 3);
+            for time_ms in (0..9000).step_by(5) {
+                console.tell(Msg::Tick(Box::new(tick(time_ms, (time_ms as f64 / 300.0).sin(), None))));
+            }
+            console.mode(Mode::Ready);
+            console.press(&[view]);
+            if !opening.is_empty() {
+                console.press(&[opening]);
+            }
+            let screen = console.screen(120, 40);
+            assert!(screen.is_ascii(), "view {view}, dialog {opening}:\n{screen}");
+        }
+    }
+}
+
+#[test]
+fn the_review_shows_what_was_measured_and_what_the_rules_think() {
+    let mut console = Console::review(Mode::Review, Verdict::Accept);
+    let screen = console.screen(80, 24);
+    for part in
+        ["Trial #0: judge it", "0.420 m", "apex +0.300 m", "looks like accept: landed and", "a accept (suggested)"]
+    {
+        assert!(screen.contains(part), "lacks {part}:\n{screen}");
+    }
+    console = Console::review(Mode::Damped, Verdict::Fall);
+    let screen = console.screen(80, 24);
+    for part in ["DAMPED", "looks like fall: roll 1.20 rad", "f fall (suggested)", "fall?"] {
+        assert!(screen.contains(part), "lacks {part}:\n{screen}");
+    }
+}
+
+#[test]
+fn a_sweeping_chart_changes_only_near_its_cursor() {
+    let mut console = Console::ready();
+    for time_ms in (0..20_000).step_by(5) {
+        console.tell(Msg::Tick(Box::new(tick(time_ms, 0.2 * (time_ms as f64 / 300.0).sin(), None))));
+    }
+    let before = console.screen(80, 24);
+    for time_ms in (20_000..20_100).step_by(5) {
+        console.tell(Msg::Tick(Box::new(tick(time_ms, 0.2 * (time_ms as f64 / 300.0).sin(), None))));
+    }
+    let after = console.screen(80, 24);
+    let changed = before.chars().zip(after.chars()).filter(|(a, b)| a != b).count();
+    assert!(changed < 60, "{changed} of 1920 characters changed in a tenth of a second");
+    assert!(changed > 0);
+}
+
+#[test]
+fn a_jump_is_marked_in_letters_under_the_charts() {
+    let mut console = Console::ready();
+    for time_ms in (0..7_000).step_by(5) {
+        let jump = match time_ms {
+            2_000..2_500 => Some(Phase::Impulse),
+            2_500..3_000 => Some(Phase::Flight),
+            3_000..3_800 => Some(Phase::Landing),
+            _ => None,
+        };
+        let trial = jump.map(|phase| (0, (time_ms as f64 - 2_000.0) / 1e3, phase));
+        console.tell(Msg::Tick(Box::new(tick(time_ms, 0.0, trial))));
+    }
+    let screen = console.screen(120, 40);
+    assert!(screen.lines().any(|line| line.contains("iif") && line.contains("ffl")), "{screen}");
+}
+
+#[test]
+fn the_trial_table_sorts_and_filters() {
+    let mut console = Console::ready();
+    for number in 0..12 {
+        console.record(Record::Trial(trial(number, Some(Verdict::ALL[number as usize % 3]), None)));
+    }
+    console.press(&["2"]);
+    let numbers = |console: &Console| console.model.table().iter().map(|row| row.trial).collect::<Vec<_>>();
+    assert_eq!(numbers(&console), (0..12).collect::<Vec<_>>());
+    console.press(&["s"]);
+    assert_eq!(numbers(&console)[..4], [9, 6, 3, 0], "accepted ones by value");
+    assert_eq!(numbers(&console)[8..], [2, 5, 8, 11], "voids, without a value, come last");
+    console.press(&["F"]);
+    assert_eq!(numbers(&console), [9, 6, 3, 0]);
+    console.press(&["F"]);
+    assert_eq!(numbers(&console), [1, 4, 7, 10]);
+    console.press(&["F", "F", "b"]);
+    let mut best = numbers(&console);
+    best.sort_unstable();
+    assert_eq!(best, [0, 3, 6, 9]);
+}
+
+#[test]
+fn colours_follow_the_terminal_and_no_color() {
+    use quadfrog_console::settings::{ColourChoice, GlyphChoice};
+    let theme = |pairs: &[(&str, &str)]| {
+        let pairs: Vec<(String, String)> = pairs.iter().map(|(k, v)| ((*k).into(), (*v).into())).collect();
+        Theme::detect(ColourChoice::Auto, GlyphChoice::Auto, |name| {
+            pairs.iter().find(|(known, _)| known == name).map(|(_, value)| value.clone())
+        })
+    };
+    assert_eq!(theme(&[("TERM", "xterm-256color"), ("LANG", "en_US.UTF-8")]).colours, Colours::Indexed);
+    assert_eq!(theme(&[("TERM", "xterm"), ("COLORTERM", "truecolor")]).colours, Colours::True);
+    assert_eq!(theme(&[("TERM", "xterm"), ("NO_COLOR", "1"), ("COLORTERM", "truecolor")]).colours, Colours::None);
+    assert_eq!(theme(&[("TERM", "linux"), ("LANG", "C.UTF-8")]).glyphs, Glyphs::Dots);
+    assert_eq!(theme(&[("TERM", "xterm"), ("LANG", "C")]).glyphs, Glyphs::Ascii);
+    assert_eq!(theme(&[("TERM", "xterm"), ("LC_ALL", "C"), ("LANG", "en_US.UTF-8")]).glyphs, Glyphs::Ascii);
+    assert_eq!(theme(&[("TERM", "xterm"), ("LANG", "de_DE.utf8")]).glyphs, Glyphs::Braille);
+}
+
+#[test]
+fn without_colours_no_cell_is_coloured() {
+    use ratatui::style::Color;
+    let mut console = Console::with(Settings::built_in(), Theme { colours: Colours::None, glyphs: Glyphs::Braille });
+    console.record(Record::Session(support::session()));
+    console.mode(Mode::Fault);
+    let mut terminal = ratatui::Terminal::new(ratatui::backend::TestBackend::new(120, 40)).expect("a screen");
+    terminal.draw(|frame| quadfrog_console::view::render(frame, &console.model)).expect("drawn");
+    for cell in terminal.backend().buffer().content() {
+        assert_eq!((cell.fg, cell.bg), (Color::Reset, Color::Reset));
+    }
+}

@@ -1,0 +1,199 @@
+//! A console without a terminal: keys and records in, effects and the screen as text out.
+
+#![allow(dead_code, reason = "each test program uses a part")]
+
+use std::time::Duration;
+
+use quadfrog::realtime::telemetry::{Mode, Phase, Snapshot, Tick};
+use quadfrog::recording::record::{
+    CommandRecord, Measured, ParameterInfo, Proposal, ProposedParameter, Record, SessionInfo, Source, Stage, StageInfo,
+    Stamped, Transition, TrialRecord, Verdict,
+};
+use quadfrog_console::keymap::Key;
+use quadfrog_console::model::Model;
+use quadfrog_console::settings::Settings;
+use quadfrog_console::theme::{Colours, Glyphs, Theme};
+use quadfrog_console::update::{Effect, Msg, update};
+use quadfrog_console::view;
+use ratatui::Terminal;
+use ratatui::backend::TestBackend;
+
+/// A console under test.
+pub struct Console {
+    pub model: Model,
+}
+
+impl Console {
+    /// Braille, 16 colours, nothing known yet.
+    pub fn new() -> Console {
+        Console::with(Settings::built_in(), Theme { colours: Colours::Named, glyphs: Glyphs::Braille })
+    }
+
+    pub fn with(settings: Settings, theme: Theme) -> Console {
+        Console { model: Model::new(settings, theme, None) }
+    }
+
+    /// A session of the forward task on the simulator, robot disarmed, trial 0 proposed.
+    pub fn proposed() -> Console {
+        let mut console = Console::new();
+        console.record(Record::Session(session()));
+        console.record(Record::Proposal(proposal(0, 0)));
+        console.stage(Stage::Proposed, 0);
+        console.mode(Mode::Disarmed);
+        console
+    }
+
+    /// As [`Console::proposed`], the robot standing.
+    pub fn ready() -> Console {
+        let mut console = Console::proposed();
+        console.mode(Mode::Ready);
+        console
+    }
+
+    /// Trial 0 ran and waits for its verdict, the robot in `mode`.
+    pub fn review(mode: Mode, suggested: Verdict) -> Console {
+        let mut console = Console::ready();
+        console.stage(Stage::Running, 0);
+        console.record(Record::Trial(trial(0, None, Some(suggested))));
+        console.stage(Stage::Review, 0);
+        console.mode(mode);
+        console
+    }
+
+    pub fn tell(&mut self, msg: Msg) -> Vec<Effect> {
+        update(&mut self.model, msg)
+    }
+
+    pub fn wait(&mut self, milliseconds: u64) {
+        let now = self.model.clock + Duration::from_millis(milliseconds);
+        self.tell(Msg::Clock(now));
+    }
+
+    /// Presses keys by their names, a tenth of a second apart.
+    pub fn press(&mut self, keys: &[&str]) -> Vec<Effect> {
+        keys.iter()
+            .flat_map(|name| {
+                self.wait(100);
+                let key: Key = name.parse().expect("a key's name");
+                self.tell(Msg::Key(key))
+            })
+            .collect()
+    }
+
+    pub fn record(&mut self, record: Record) -> Vec<Effect> {
+        self.tell(Msg::Record(Stamped { time_ns: self.model.snapshot.tick.time_ns, record }))
+    }
+
+    pub fn stage(&mut self, stage: Stage, trial: u32) -> Vec<Effect> {
+        self.record(Record::Stage(StageInfo { stage, trial, can_undo: false }))
+    }
+
+    pub fn answer(&mut self, wish: &str, accepted: bool, answer: &str) {
+        self.record(Record::Command(CommandRecord { wish: wish.into(), accepted, answer: answer.into() }));
+    }
+
+    pub fn mode(&mut self, mode: Mode) {
+        let from = self.model.mode();
+        self.record(Record::Transition(Transition { from, to: mode, cause: "test".into() }));
+        let tick = Tick { mode, ..self.model.snapshot.tick };
+        self.tell(Msg::Snapshot(Box::new(Snapshot { tick, ..self.model.snapshot })));
+    }
+
+    /// The screen as text, a line per row, without trailing spaces.
+    pub fn screen(&self, columns: u16, rows: u16) -> String {
+        let mut terminal = Terminal::new(TestBackend::new(columns, rows)).expect("a screen in memory");
+        terminal.draw(|frame| view::render(frame, &self.model)).expect("drawn");
+        let buffer = terminal.backend().buffer();
+        let mut text = String::new();
+        for y in 0..rows {
+            let line: String = (0..columns).map(|x| buffer[(x, y)].symbol()).collect();
+            text.push_str(line.trim_end());
+            text.push('\n');
+        }
+        text
+    }
+
+    /// What is said in answer to the operator.
+    pub fn said(&self) -> &str {
+        self.model.message.as_ref().map_or("", |message| message.text.as_str())
+    }
+
+    /// The last line of the screen.
+    pub fn next_step(&self) -> String {
+        view::next_step::next_step(&self.model).lead
+    }
+}
+
+pub fn session() -> SessionInfo {
+    let parameter =
+        |name: &str, unit: &str, low, high| ParameterInfo { name: name.into(), unit: unit.into(), low, high };
+    SessionInfo {
+        version: "0.1.0".into(),
+        backend: "sim".into(),
+        robot: "go1".into(),
+        task: "forward".into(),
+        unit: "m".into(),
+        sampler: "tpe".into(),
+        seed: 0,
+        budget: 20,
+        parameters: vec![
+            parameter("f0", "Hz", 0.75, 1.75),
+            parameter("Fx", "N", 0.0, 150.0),
+            parameter("Fz", "N", 150.0, 350.0),
+        ],
+        study: "recordings/forward/study.log".into(),
+        recording: "recordings/forward/session.mcap".into(),
+        started: "2026-11-21T03:00:00Z".into(),
+        observe: false,
+    }
+}
+
+pub fn proposal(trial: u32, revision: u32) -> Proposal {
+    let parameter = |name: &str, value| ProposedParameter { name: name.into(), value, proposed: value };
+    Proposal {
+        trial,
+        revision,
+        source: Source::Sampler,
+        parent: None,
+        parameters: vec![parameter("f0", 1.25), parameter("Fx", 75.0), parameter("Fz", 250.0)],
+        risk: None,
+    }
+}
+
+pub fn trial(number: u32, verdict: Option<Verdict>, suggested: Option<Verdict>) -> TrialRecord {
+    let value = match verdict {
+        Some(Verdict::Accept) => Some(0.4 + 0.01 * f64::from(number)),
+        Some(Verdict::Fall) => Some(0.0),
+        _ => None,
+    };
+    TrialRecord {
+        trial: number,
+        source: Source::Sampler,
+        parent: None,
+        parameters: vec![("f0".into(), 1.25), ("Fx".into(), 75.0), ("Fz".into(), 250.0)],
+        measured: Some(Measured { dx_m: 0.42, dy_m: -0.01, dyaw_rad: 0.02, apex_m: 0.3, air_s: 0.25 }),
+        value,
+        hand_value: None,
+        suggested,
+        cause: if suggested == Some(Verdict::Fall) { "roll 1.20 rad, allowed 1.00" } else { "landed and settled" }
+            .into(),
+        verdict,
+        note: String::new(),
+        risk: None,
+    }
+}
+
+/// A tick for the charts at a time.
+pub fn tick(time_ms: u64, roll: f64, trial: Option<(u32, f64, Phase)>) -> Tick {
+    let mut tick = Tick { number: time_ms, time_ns: time_ms * 1_000_000, mode: Mode::Ready, ..Tick::default() };
+    tick.estimate.roll_pitch_yaw.x = roll;
+    for foot in &mut tick.estimate.foot_position_leg {
+        foot.z = -0.2;
+    }
+    if let Some((number, time_s, phase)) = trial {
+        tick.trial = Some(number);
+        tick.trial_time_s = time_s;
+        tick.phase = phase;
+    }
+    tick
+}

@@ -1,0 +1,266 @@
+//! Every suggestion of Optuna 5.0.0's TPE in `golden/tpe`, closed loop: the objective is computed here, so one wrong
+//! suggestion would lead all later ones astray. `QUADFROG_GOLDEN` names another folder of golden data.
+
+use quadfrog::optimize::mt19937::Mt19937;
+use quadfrog::optimize::parzen::observation_weights;
+use quadfrog::optimize::sampler::{Direction, SamplerConfig, Streams, propose};
+use quadfrog::optimize::space::{Range, Space};
+use quadfrog::optimize::tpe::good_count;
+use quadfrog::optimize::trial::{Distribution, Trial, TrialState};
+use quadfrog::optimize::truncnorm::{log_cdf, log_mass, quantile};
+use serde_json::Value;
+use std::collections::HashMap;
+use std::path::PathBuf;
+
+/// Largest difference allowed, as a share of the parameter's range.
+const TOLERANCE: f64 = 1e-10;
+
+fn golden(name: &str) -> Option<Value> {
+    let root = std::env::var_os("QUADFROG_GOLDEN")
+        .map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/golden"), PathBuf::from);
+    let path = [root.join("tpe").join(name), root.join(name)].into_iter().find(|p| p.exists())?;
+    let text = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+    Some(serde_json::from_str(&text).unwrap_or_else(|e| panic!("{}: {e}", path.display())))
+}
+
+fn floats(value: &Value) -> Vec<f64> {
+    value.as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect()
+}
+
+/// What a file of runs has in common.
+struct Scenario<'a> {
+    file: &'a Value,
+    direction: Direction,
+    log: Vec<&'a str>,
+}
+
+impl<'a> Scenario<'a> {
+    fn new(file: &'a Value) -> Self {
+        let direction = if file["direction"] == "minimize" { Direction::Minimize } else { Direction::Maximize };
+        let log = file["log_params"].as_array().unwrap().iter().map(|v| v.as_str().unwrap()).collect();
+        Scenario { file, direction, log }
+    }
+
+    fn range(&self, name: &str) -> Range {
+        let bounds = floats(&self.file["ranges"][name]);
+        Range { low: bounds[0], high: bounds[1], log: self.log.contains(&name) }
+    }
+
+    fn names(&self, dim: &str) -> Vec<&'a str> {
+        self.file["param_order"][dim].as_array().unwrap().iter().map(|v| v.as_str().unwrap()).collect()
+    }
+
+    /// The parameters of the trial that is run again at `index`: the file's plan counts from the best. They are those of
+    /// our own trial, not of the file, which may differ in the last bit: a re-run is equal to what was run.
+    fn rerun(&self, index: usize, trials: &[Trial]) -> Option<Vec<(String, f64)>> {
+        let plan = self.file["rerun_plan"].as_array()?;
+        let rank = plan.iter().find(|entry| entry[0] == index)?[1].as_u64()? as usize;
+        let mut complete: Vec<&Trial> = trials.iter().filter(|t| t.state == TrialState::Complete).collect();
+        complete.sort_by(|a, b| self.direction.best_first(a.value.unwrap(), b.value.unwrap()));
+        Some(complete[rank].parameters.clone())
+    }
+
+    /// The objective of the file's `formula`; what it says of numbers that fail or are pruned comes back as a state.
+    fn evaluate(&self, trial: &Trial) -> (TrialState, Option<f64>) {
+        let x = |name: &str| trial.parameter(name).unwrap();
+        let u = |name: &str| (x(name) - self.range(name).low) / (self.range(name).high - self.range(name).low);
+        let lateral = trial.parameter("Fy").is_some();
+        let value = match self.file["objective"].as_str().unwrap() {
+            "g_smooth" => {
+                let (a, b, c) = (u("f0") - 0.35, u("Fx") - 0.6, u("Fz") - 0.25 - 0.5 * u("Fx"));
+                let mut s = 1.0 + 4.0 * a * a + 3.0 * b * b + 5.0 * c * c;
+                if lateral {
+                    let e = u("Fy") - 0.4;
+                    s += 2.0 * e * e;
+                }
+                100.0 / s
+            }
+            "g_states" => {
+                if trial.number % 9 == 4 {
+                    return (TrialState::Fail, None);
+                } else if trial.number % 17 == 11 {
+                    return (TrialState::Pruned, None);
+                } else if x("Fz") + 0.5 * x("Fx") < 190.0 * x("f0") {
+                    0.0
+                } else {
+                    let a = x("Fz") / 200.0 - x("f0");
+                    let v = x("f0") * (40.0 + x("Fx")) / (1.0 + a * a);
+                    let e = if lateral { u("Fy") - 0.7 } else { 0.0 };
+                    if lateral { v / (1.0 + 6.0 * e * e) } else { v }
+                }
+            }
+            "g_log_min" => {
+                let (a, b) = (x("f0") * x("Fz") / 250.0 - 1.1, u("Fx") - 0.3);
+                let v = 7.0 * a * a + b * b;
+                let e = if lateral { u("Fy") - 0.8 } else { 0.0 };
+                if lateral { v + 0.5 * e * e } else { v }
+            }
+            other => panic!("objective {other} is not known to this test"),
+        };
+        (TrialState::Complete, Some(value))
+    }
+}
+
+/// Largest difference and number of suggestions compared.
+#[derive(Default)]
+struct Tally {
+    compared: usize,
+    largest: f64,
+}
+
+impl Tally {
+    fn compare(&mut self, ours: f64, theirs: f64, scale: f64, what: impl Fn() -> String) {
+        let difference = (ours - theirs).abs() / scale;
+        self.compared += 1;
+        self.largest = self.largest.max(difference);
+        assert!(difference <= TOLERANCE, "{}: ours {ours:e}, Optuna's {theirs:e}", what());
+    }
+}
+
+/// Replays one run and compares every suggestion; returns the next doubles of both streams.
+fn run(scenario: &Scenario<'_>, run: &Value, name: &str, tally: &mut Tally) -> [[f64; 2]; 2] {
+    let dim = run["dim"].to_string();
+    let names = scenario.names(&dim);
+    let config = SamplerConfig {
+        multivariate: run["multivariate"].as_bool().unwrap(),
+        seed: run["seed"].as_u64().unwrap() as u32,
+        ..SamplerConfig::default()
+    };
+    let mut streams = Streams::new(config.seed);
+    let expected = run["x"].as_array().unwrap();
+    let (fixed_plan, states) = (&run["fixed"], run["s"].as_str().unwrap().as_bytes());
+    let zombies: HashMap<u64, (usize, Option<u64>)> = scenario.file["zombie_plan"]
+        .as_array()
+        .map(|plan| {
+            plan.iter().map(|z| (z[0].as_u64().unwrap(), (z[1].as_u64().unwrap() as usize, z[2].as_u64()))).collect()
+        })
+        .unwrap_or_default();
+    let mut trials: Vec<Trial> = Vec::new();
+    for (index, theirs) in expected.iter().enumerate() {
+        for (&late, _) in zombies.iter().filter(|(_, (_, told))| *told == Some(index as u64)) {
+            let trial = &mut trials[late as usize];
+            (trial.state, trial.value) = scenario.evaluate(trial);
+        }
+        let fixed: Vec<(String, f64)> = fixed_plan[index.to_string()]
+            .as_object()
+            .map(|map| map.iter().map(|(k, v)| (k.clone(), v.as_f64().unwrap())).collect())
+            .unwrap_or_default();
+        let fixed = scenario.rerun(index, &trials).unwrap_or(fixed);
+        let zombie = zombies.get(&(index as u64));
+        let asked = &names[..zombie.map_or(names.len(), |(suggested, _)| *suggested)];
+        let space = Space::new(asked.iter().map(|n| ((*n).to_owned(), scenario.range(n)))).unwrap();
+        let proposal = propose(&config, &mut streams, &trials, &space, &fixed, scenario.direction);
+        let mut trial = Trial::new(index as u32, TrialState::Running);
+        for (k, (&parameter, value)) in asked.iter().zip(&proposal.values).enumerate() {
+            let range = scenario.range(parameter);
+            tally.compare(*value, theirs[k].as_f64().unwrap(), range.high - range.low, || {
+                format!("{name} {config:?} dim {dim} trial {index} {parameter}")
+            });
+            trial.set(parameter, *value, Distribution::Float(range));
+        }
+        trial.announce(&proposal.joint);
+        if zombie.is_none() {
+            (trial.state, trial.value) = scenario.evaluate(&trial);
+            let told = match trial.state {
+                TrialState::Complete => b'C',
+                TrialState::Fail => b'F',
+                _ => b'P',
+            };
+            assert_eq!(states[index], told, "{name}: state of trial {index}");
+        }
+        trials.push(trial);
+    }
+    [[streams.model.double(), streams.model.double()], [streams.startup.double(), streams.startup.double()]]
+}
+
+fn units(file: &Value, after: &HashMap<String, [[f64; 2]; 2]>, tally: &mut Tally) {
+    for (seed, doubles) in file["mt19937_doubles"].as_object().unwrap() {
+        let mut stream = Mt19937::new(seed.parse().unwrap());
+        let ours: Vec<f64> = floats(doubles).iter().map(|_| stream.double()).collect();
+        assert_eq!(ours, floats(doubles), "doubles of seed {seed}");
+        tally.compared += ours.len();
+    }
+    let later = &file["mt19937_after_700_doubles"];
+    let mut stream = Mt19937::new(later["seed"].as_u64().unwrap() as u32);
+    stream.advance_to(700);
+    assert_eq!(floats(&later["next"]).iter().map(|_| stream.double()).collect::<Vec<_>>(), floats(&later["next"]));
+    for (n, good) in file["gamma"].as_object().unwrap() {
+        assert_eq!(good_count(n.parse().unwrap()) as u64, good.as_u64().unwrap(), "good trials of {n}");
+        tally.compared += 1;
+    }
+    for (m, weights) in file["weights"].as_object().unwrap() {
+        let ours = observation_weights(m.parse().unwrap());
+        assert_eq!(ours.len(), weights.as_array().unwrap().len());
+        for (i, (ours, theirs)) in ours.iter().zip(floats(weights)).enumerate() {
+            tally.compare(*ours, theirs, 1.0, || format!("weight {i} of {m}"));
+        }
+    }
+    let relative = |x: f64| x.abs().max(f64::MIN_POSITIVE);
+    for (x, theirs) in floats(&file["log_ndtr"][0]).into_iter().zip(floats(&file["log_ndtr"][1])) {
+        tally.compare(log_cdf(x), theirs, relative(theirs), || format!("ln Phi({x})"));
+    }
+    for (ab, theirs) in file["log_gauss_mass"][0].as_array().unwrap().iter().zip(floats(&file["log_gauss_mass"][1])) {
+        let ab = floats(ab);
+        tally.compare(log_mass(ab[0], ab[1]), theirs, theirs.abs().max(1.0), || format!("mass of {ab:?}"));
+    }
+    let (q, a, b) = (floats(&file["ppf"]["q"]), floats(&file["ppf"]["a"]), floats(&file["ppf"]["b"]));
+    for (i, theirs) in floats(&file["ppf"]["x"]).into_iter().enumerate() {
+        tally.compare(quantile(q[i], a[i], b[i]), theirs, b[i] - a[i], || {
+            format!("quantile {} of {}..{}", q[i], a[i], b[i])
+        });
+    }
+    for (run, next) in file["rng_after_run"].as_object().unwrap() {
+        let [model, startup] = after.get(run).unwrap_or_else(|| panic!("no run `{run}` in the golden files"));
+        assert_eq!(floats(&next["tpe_rng_next"]), model, "{run}: model stream");
+        assert_eq!(floats(&next["random_sampler_rng_next"]), startup, "{run}: startup stream");
+        tally.compared += 4;
+    }
+}
+
+/// The component choice of `units.json`: with one observation per component and their weights given, only the count of
+/// cumulative weights not above u decides.
+fn choice(file: &Value, tally: &mut Tally) {
+    let (p, mut stream) = (floats(&file["choice"]["p"]), Mt19937::new(file["choice"]["seed"].as_u64().unwrap() as u32));
+    for theirs in file["choice"]["idx"].as_array().unwrap() {
+        assert_eq!(quadfrog::optimize::parzen::choose(&p, &mut stream) as u64, theirs.as_u64().unwrap());
+        tally.compared += 1;
+    }
+}
+
+#[test]
+fn golden_tpe() {
+    let mut total = Tally::default();
+    let mut after = HashMap::new();
+    for name in ["smooth", "states", "enqueue", "logmin", "running", "rerun_stable"] {
+        let Some(file) = golden(&format!("{name}.json")) else { continue };
+        let scenario = Scenario::new(&file);
+        let mut tally = Tally::default();
+        let runs = file["runs"].as_array().unwrap();
+        for one in runs {
+            let next = run(&scenario, one, name, &mut tally);
+            let multivariate = if one["multivariate"] == true { "True" } else { "False" };
+            after.insert(
+                format!("{name}.json seed {} dim {} multivariate {multivariate}", one["seed"], one["dim"]),
+                next,
+            );
+        }
+        println!(
+            "golden_tpe: {name}: {} runs, {} suggestions, largest difference {:.1e} of the range",
+            runs.len(),
+            tally.compared,
+            tally.largest
+        );
+        total.compared += tally.compared;
+        total.largest = total.largest.max(tally.largest);
+    }
+    if let Some(file) = golden("units.json") {
+        let mut tally = Tally::default();
+        units(&file, &after, &mut tally);
+        choice(&file, &mut tally);
+        println!("golden_tpe: units: {} values, largest difference {:.1e}", tally.compared, tally.largest);
+        total.compared += tally.compared;
+        total.largest = total.largest.max(tally.largest);
+    }
+    assert!(total.compared > 0, "no golden data of the TPE found: is QUADFROG_GOLDEN right?");
+    println!("golden_tpe: {} cases compared, largest difference {:.1e}", total.compared, total.largest);
+}

@@ -1,0 +1,305 @@
+//! The study: proposals without effect, interruptions without loss, other writers.
+
+use quadfrog::optimize::journal::Durability;
+use quadfrog::optimize::sampler::{Direction, SamplerConfig};
+use quadfrog::optimize::space::{Range, Space};
+use quadfrog::optimize::study::{Outcome, Storage, Study, StudyError, StudyOptions, Told};
+use quadfrog::optimize::trial::TrialState;
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+
+fn options(seed: u32, multivariate: bool) -> StudyOptions {
+    StudyOptions {
+        name: "forward".into(),
+        direction: Direction::Maximize,
+        metric: "distance [m]".into(),
+        space: Space::new([
+            ("f0".into(), Range::linear(0.75, 1.75)),
+            ("Fx".into(), Range::linear(0.0, 150.0)),
+            ("Fz".into(), Range::logarithmic(150.0, 350.0)),
+        ])
+        .unwrap(),
+        sampler: SamplerConfig { seed, multivariate, ..SamplerConfig::default() },
+        attributes: vec![("robot".into(), json!("go1"))],
+        durability: Durability::Buffered,
+    }
+}
+
+/// A folder of the test's own, removed when it passes.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(name: &str) -> Self {
+        let path = std::env::temp_dir().join(format!("quadfrog-{name}-{}", std::process::id()));
+        let _ = std::fs::remove_dir_all(&path);
+        std::fs::create_dir_all(&path).unwrap();
+        Folder(path)
+    }
+
+    fn file(&self, name: &str) -> PathBuf {
+        self.0.join(name)
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        if !std::thread::panicking() {
+            let _ = std::fs::remove_dir_all(&self.0);
+        }
+    }
+}
+
+fn objective(parameters: &[(String, f64)]) -> f64 {
+    let x = |name: &str| parameters.iter().find(|(n, _)| n == name).unwrap().1;
+    let (a, b, c) = (x("f0") - 1.1, x("Fx") / 150.0 - 0.6, x("Fz") / 350.0 - 0.7);
+    1.0 / (1.0 + 4.0 * a * a + 3.0 * b * b + 5.0 * c * c)
+}
+
+/// One trial from proposal to value; every third is a fall and every seventh fails.
+fn one_trial(study: &mut Study, overrides: &[(String, f64)]) {
+    let draft = study.draft();
+    let trial = study.begin(&draft, overrides, &[("source".into(), json!("sampler"))]).unwrap();
+    let value = objective(&study.trial(trial).unwrap().parameters);
+    study.annotate(trial, &[("verdict".into(), json!("accept"))]).unwrap();
+    let outcome = match trial {
+        n if n % 7 == 6 => Outcome::Fail,
+        n if n % 3 == 2 => Outcome::Complete(0.0),
+        _ => Outcome::Complete(value),
+    };
+    assert_eq!(study.tell(trial, outcome).unwrap(), Told::Recorded);
+}
+
+fn table(study: &Study) -> Vec<(u32, TrialState, Vec<(String, f64)>, Option<f64>, Value)> {
+    let row = |t: &quadfrog::optimize::trial::Trial| {
+        (t.number, t.state, t.parameters.clone(), t.value, t.system_attributes["quadfrog:draws"].clone())
+    };
+    study.trials().iter().map(row).collect()
+}
+
+fn open(path: &Path, seed: u32, multivariate: bool) -> Study {
+    Study::open(Storage::File(path.to_owned()), options(seed, multivariate)).unwrap()
+}
+
+#[test]
+fn a_draft_has_no_effect_and_is_what_begins() {
+    let folder = Folder::new("draft");
+    let path = folder.file("study.log");
+    let mut study = open(&path, 5, true);
+    for _ in 0..14 {
+        let before = std::fs::read(&path).unwrap();
+        let draft = study.draft();
+        assert_eq!(study.draft(), draft);
+        assert_eq!(std::fs::read(&path).unwrap(), before);
+        let trial = study.begin(&draft, &[], &[]).unwrap();
+        let begun = study.trial(trial).unwrap().clone();
+        let drafted: Vec<_> = draft.parameters.iter().map(|s| (s.name.clone(), s.value)).collect();
+        assert_eq!((begun.number, begun.state, &begun.parameters), (draft.number, TrialState::Running, &drafted));
+        assert!(matches!(study.begin(&draft, &[], &[]), Err(StudyError::StaleDraft { .. })));
+        let value = objective(&begun.parameters);
+        study.tell(trial, Outcome::Complete(value)).unwrap();
+    }
+}
+
+#[test]
+fn interrupted_at_every_trial_it_equals_the_unbroken_one() {
+    for (seed, multivariate) in [(0, true), (1, false), (4_000_000_000, true)] {
+        let folder = Folder::new(&format!("resume-{seed}"));
+        let mut unbroken = Study::open(Storage::Memory, options(seed, multivariate)).unwrap();
+        for number in 0..30 {
+            let override_fx = [("Fx".to_owned(), 75.0)];
+            let overrides: &[_] = if number % 5 == 4 { &override_fx } else { &[] };
+            one_trial(&mut unbroken, overrides);
+            let mut broken = open(&folder.file("study.log"), seed, multivariate);
+            one_trial(&mut broken, overrides);
+        }
+        assert_eq!(table(&open(&folder.file("study.log"), seed, multivariate)), table(&unbroken));
+    }
+}
+
+#[test]
+fn a_verdict_given_before_a_crash_is_there_afterwards() {
+    let folder = Folder::new("crash");
+    let path = folder.file("study.log");
+    let mut study = open(&path, 0, true);
+    let draft = study.draft();
+    let trial = study.begin(&draft, &[], &[]).unwrap();
+    study.annotate(trial, &[("verdict".into(), json!("fall")), ("value".into(), json!(0.0))]).unwrap();
+    drop(study); // as killed: nothing is told
+
+    let mut study = open(&path, 0, true);
+    let left: Vec<u32> = study.running().map(|t| t.number).collect();
+    assert_eq!(left, [trial]);
+    assert_eq!(study.trial(trial).unwrap().user_attributes["verdict"], json!("fall"));
+    assert_eq!(study.tell(trial, Outcome::Complete(0.0)).unwrap(), Told::Recorded);
+    assert_eq!(study.running().count(), 0);
+}
+
+#[test]
+fn the_operators_values_are_recorded_as_fixed() {
+    let mut study = Study::open(Storage::Memory, options(0, true)).unwrap();
+    let draft = study.draft();
+    let trial = study.begin(&draft, &[("Fz".into(), 200.0)], &[]).unwrap();
+    let trial = study.trial(trial).unwrap();
+    assert_eq!(trial.parameter("Fz"), Some(200.0));
+    assert_eq!(trial.parameter("f0"), Some(draft.parameters[0].value), "what was not overridden is as it was shown");
+    assert_eq!(trial.fixed(), [("Fz".to_owned(), 200.0)]);
+
+    // a trial of which everything is given uses no random numbers: the next one draws what this one would have
+    let before = study.draft();
+    let all: Vec<_> = before.parameters.iter().map(|s| (s.name.clone(), s.low)).collect();
+    study.begin(&before, &all, &[]).unwrap();
+    assert_eq!(study.draft().parameters, before.parameters);
+}
+
+#[test]
+fn refusals_say_what_is_wrong() {
+    let mut study = Study::open(Storage::Memory, options(0, true)).unwrap();
+    let draft = study.draft();
+    let error = |e: Result<u32, StudyError>| e.unwrap_err().to_string();
+    let unknown = error(study.begin(&draft, &[("Fq".into(), 1.0)], &[]));
+    assert!(unknown.contains("`Fq`") && unknown.contains("f0, Fx, Fz"), "{unknown}");
+    let nan = error(study.enqueue(&[("f0".into(), f64::NAN)], &[]));
+    assert!(nan.contains("`f0`") && nan.contains("NaN"), "{nan}");
+    let log = error(study.enqueue(&[("Fz".into(), 0.0)], &[]));
+    assert!(log.contains("`Fz`") && log.contains("above 0"), "{log}");
+    assert_eq!(study.trials().len(), 0, "nothing of a refused call remains");
+    let trial = study.begin(&draft, &[], &[]).unwrap();
+    assert!(matches!(study.tell(trial, Outcome::Complete(f64::NAN)), Err(StudyError::Value { .. })));
+    study.tell(trial, Outcome::Complete(1.0)).unwrap();
+    assert_eq!(study.tell(trial, Outcome::Complete(2.0)).unwrap(), Told::AlreadyFinished);
+    assert_eq!(study.trial(trial).unwrap().value, Some(1.0));
+    let late = study.annotate(trial, &[("verdict".into(), json!("fall"))]).unwrap_err().to_string();
+    assert!(late.contains("note"), "{late}");
+    assert!(matches!(study.trial(9), Err(StudyError::UnknownTrial { trial: 9, .. })));
+}
+
+#[test]
+fn enqueued_trials_come_first_in_their_order_and_keep_their_numbers() {
+    let mut study = Study::open(Storage::Memory, options(0, true)).unwrap();
+    let draft = study.draft();
+    let first =
+        study.enqueue(&[("f0".into(), 1.0), ("Fx".into(), 1.5), ("Fz".into(), 160.0)], &[("by".into(), json!("A"))]);
+    let second = study.enqueue(&[("Fx".into(), 99.0)], &[]);
+    assert_eq!((first.unwrap(), second.unwrap()), (0, 1));
+    assert!(study.draft().enqueued);
+    let taken = study.draft();
+    assert_eq!((taken.number, taken.attributes["by"].clone()), (0, json!("A")));
+    assert_eq!(
+        taken.parameters.iter().map(|s| (s.value, s.fixed)).collect::<Vec<_>>(),
+        [(1.0, true), (1.5, true), (160.0, true)]
+    );
+    study.begin(&taken, &[], &[]).unwrap();
+    let partly = study.draft();
+    assert_eq!(partly.number, 1);
+    assert_eq!(partly.parameters[1].value, 99.0);
+    assert_eq!(partly.parameters[0].value, draft.parameters[0].value, "the first random number is still unused");
+    study.begin(&partly, &[], &[]).unwrap();
+    assert_eq!(study.waiting().count(), 0);
+}
+
+#[test]
+fn a_torn_last_line_is_cut_off_and_kept_aside() {
+    for torn in [
+        "{\"op_code\":6,\"worker_id\":\"x\",\"tri",
+        "garbage\n",
+        "\n",
+        "garbage\n{\"op",
+        "{\"op_code\":8,\"worker_id\":\"\u{e9}",
+    ] {
+        let folder = Folder::new("torn");
+        let path = folder.file("study.log");
+        let mut study = open(&path, 0, true);
+        one_trial(&mut study, &[]);
+        let before = table(&study);
+        let whole = std::fs::read(&path).unwrap();
+        std::fs::write(&path, [&whole, torn.as_bytes()].concat()).unwrap();
+
+        let mut resumed = open(&path, 0, true);
+        assert_eq!(table(&resumed), before, "readers ignore {torn:?}");
+        study.refresh().unwrap();
+        assert_eq!(table(&study), before);
+        one_trial(&mut resumed, &[]);
+        assert_eq!(std::fs::read(folder.file("study.log.torn-0")).unwrap(), torn.as_bytes());
+        study.refresh().unwrap();
+        assert_eq!(study.trials().len(), 2, "the other session reads on");
+        assert_eq!(table(&open(&path, 0, true)), table(&study));
+    }
+}
+
+#[test]
+fn an_unreadable_line_in_the_middle_is_named() {
+    let folder = Folder::new("middle");
+    let path = folder.file("study.log");
+    let mut study = open(&path, 0, true);
+    one_trial(&mut study, &[]);
+    let mut text = std::fs::read_to_string(&path).unwrap();
+    text.insert_str(text.find('\n').unwrap() + 1, "{\"op_code\":77,\"worker_id\":\"x\"}\n");
+    std::fs::write(&path, text).unwrap();
+    let error = Study::open(Storage::File(path.clone()), options(0, true)).unwrap_err().to_string();
+    assert!(error.contains("study.log, line 2") && error.contains("77"), "{error}");
+}
+
+#[test]
+fn a_file_that_became_shorter_is_noticed() {
+    let folder = Folder::new("shorter");
+    let path = folder.file("study.log");
+    let mut study = open(&path, 0, true);
+    one_trial(&mut study, &[]);
+    std::fs::write(&path, "").unwrap();
+    let error = study.refresh().unwrap_err().to_string();
+    assert!(error.contains("shortened or replaced"), "{error}");
+}
+
+#[test]
+fn what_json_lacks_is_read_and_written_as_python_does() {
+    let folder = Folder::new("infinite");
+    let path = folder.file("study.log");
+    let mut study = open(&path, 0, true);
+    let draft = study.draft();
+    let trial = study.begin(&draft, &[], &[]).unwrap();
+    study.tell(trial, Outcome::Complete(f64::NEG_INFINITY)).unwrap();
+    let text = std::fs::read_to_string(&path).unwrap();
+    assert!(text.contains("\"values\":[-Infinity]"), "{text}");
+    let draft = study.draft();
+    let trial = study.begin(&draft, &[], &[]).unwrap();
+    let id = study.trial(trial).unwrap().id;
+    let lines = format!(
+        "{{\"op_code\":7,\"worker_id\":\"p\",\"trial_id\":{id},\"step\":1,\"intermediate_value\":NaN}}\n\
+         {{\"op_code\":8,\"worker_id\":\"p\",\"trial_id\":{id},\"user_attr\":{{\"a\":[Infinity, \"NaN \\\" Infinity \\ud800\"]}}}}\r\n"
+    );
+    std::fs::write(&path, [text.as_bytes(), &std::fs::read(&path).unwrap()[text.len()..], lines.as_bytes()].concat())
+        .unwrap();
+    study.refresh().unwrap();
+    assert_eq!(study.trials()[0].value, Some(f64::NEG_INFINITY));
+    assert!(study.trial(trial).unwrap().intermediate[&1].is_nan());
+    assert_eq!(study.trial(trial).unwrap().user_attributes["a"], json!(["Infinity", "NaN \" Infinity \u{fffd}"]));
+}
+
+#[test]
+fn notes_can_be_written_on_finished_trials_and_shortened() {
+    let folder = Folder::new("notes");
+    let path = folder.file("study.log");
+    let mut study = open(&path, 0, true);
+    one_trial(&mut study, &[]);
+    let long = "é".repeat(5000);
+    study.note(0, &long).unwrap();
+    assert_eq!(study.note_of(0), long);
+    study.note(0, "short").unwrap();
+    assert_eq!(open(&path, 0, true).note_of(0), "short");
+}
+
+#[test]
+fn a_study_of_another_kind_is_refused() {
+    let folder = Folder::new("kind");
+    let path = folder.file("study.log");
+    one_trial(&mut open(&path, 0, true), &[]);
+    let refuse = |options: StudyOptions| Study::open(Storage::File(path.clone()), options).unwrap_err().to_string();
+    let direction = refuse(StudyOptions { direction: Direction::Minimize, ..options(0, true) });
+    assert!(direction.contains("maximize") && direction.contains("another name"), "{direction}");
+    let space = Space::new([("Fz".into(), Range::linear(150.0, 350.0))]).unwrap();
+    let scale = refuse(StudyOptions { space, ..options(0, true) });
+    assert!(scale.contains("`Fz`") && scale.contains("logarithmic"), "{scale}");
+    // other bounds are no other kind
+    let space = Space::new([("Fz".into(), Range::logarithmic(200.0, 300.0))]).unwrap();
+    Study::open(Storage::File(path.clone()), StudyOptions { space, ..options(0, true) }).unwrap();
+}

@@ -1,0 +1,183 @@
+//! A recording as the independent Python reader sees it: every topic, its count, and values that agree.
+
+#[path = "support/recording.rs"]
+mod support;
+
+use std::process::Command;
+
+use nalgebra::Vector3;
+use quadfrog::realtime::telemetry::{Mode, Tick};
+use quadfrog::recording::record::{Level, LogRecord, Record, Stamped};
+use quadfrog::recording::writer::Writer;
+use quadfrog::robot::description::{Body, JointLimits, LegDescription, RobotDescription};
+use quadfrog::robot::kinematics::LegGeometry;
+use quadfrog::robot::{JOINTS, Leg, joint_name};
+use serde_json::{Value, json};
+use support::*;
+
+/// A robot of the Go1's size, by its leg geometry alone.
+fn robot() -> RobotDescription {
+    let body = |name: &str| Body {
+        name: name.into(),
+        mass: 1.0,
+        com: Vector3::zeros(),
+        inertia_com: nalgebra::Matrix3::identity(),
+        collision: Vec::new(),
+    };
+    let leg = |leg: Leg| LegDescription {
+        bodies: ["hip", "thigh", "calf"].map(|name| body(&format!("{}_{name}", leg.name()))),
+        joint_origin: [
+            Vector3::new(0.1881 * leg.end(), 0.04675 * leg.side(), 0.0),
+            Vector3::new(0.0, 0.08 * leg.side(), 0.0),
+            Vector3::new(0.0, 0.0, -0.213),
+        ],
+        foot_origin: Vector3::new(0.0, 0.0, -0.213),
+        foot_radius: 0.02,
+    };
+    let limit = |value| [value; JOINTS];
+    RobotDescription {
+        name: "go1".into(),
+        trunk: body("trunk"),
+        legs: Leg::ALL.map(leg),
+        leg_geometry: LegGeometry { abduction: 0.08, thigh: 0.213, calf: 0.213 },
+        limits: JointLimits {
+            min_position: limit(-3.0),
+            max_position: limit(3.0),
+            max_torque: limit(30.0),
+            max_velocity: limit(30.0),
+        },
+        lying_position: limit(0.0),
+    }
+}
+
+/// Runs the reader; none where Python or its packages lack.
+fn python_reads(path: &std::path::Path) -> Option<Value> {
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/support/read_mcap.py");
+    let output = match Command::new("python3").arg(script).arg(path).output() {
+        Ok(output) => output,
+        Err(error) => {
+            println!("skipped: python3 cannot be started: {error}");
+            return None;
+        }
+    };
+    let said = String::from_utf8_lossy(&output.stderr);
+    if output.status.code() == Some(77) {
+        println!("skipped: pip install mcap mcap-protobuf-support ({})", said.trim());
+        return None;
+    }
+    assert!(output.status.success(), "{said}");
+    Some(serde_json::from_slice(&output.stdout).unwrap())
+}
+
+#[test]
+fn python_reads_every_topic() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("session.mcap");
+    let (mut ticks, mut records) = study(4);
+    ticks[3990..].iter_mut().for_each(|tick| tick.mode = Mode::Fault);
+    let stamped = |ms: u64, record| Stamped { time_ns: ms * MS, record };
+    let log = LogRecord { level: Level::Warning, source: "link".into(), message: "späte Antwort \u{1f438}".into() };
+    records.push(stamped(3995, Record::Log(log)));
+    records.push(stamped(3996, Record::FaultTicks(ticks[3900..3990].to_vec())));
+    let attachment: [(&str, &str, &[u8]); 1] = [("config.toml", "application/toml", b"kp = 400.0\n")];
+    let mut writer = Writer::create(&path, &session(), START_UTC_NS, &attachment).unwrap();
+    writer.show_links_of(robot());
+    let everything = in_order(&ticks, &records);
+    for played in &everything {
+        match played {
+            quadfrog::recording::player::Played::Tick(tick) => writer.tick(tick).unwrap(),
+            quadfrog::recording::player::Played::Record(stamped) => writer.record(stamped).unwrap(),
+        }
+    }
+    writer.finish().unwrap();
+    assert_same(&play(&path), &everything);
+    let Some(found) = python_reads(&path) else { return };
+
+    let of = |wanted: fn(&Record) -> bool| records.iter().filter(|stamped| wanted(&stamped.record)).count();
+    let counts = json!({
+        "/robot/joint_states": 4000, "/robot/joint_cmd": 4000, "/robot/tick": 4000,
+        "/robot/pose": 400, "/tf": 400,
+        "/robot/counters": of(|record| matches!(record, Record::Counters(_))),
+        "/session": 1, "/log": 1, "/fault": 1,
+        "/opt/stage": of(|record| matches!(record, Record::Stage(_))),
+        "/opt/proposal": of(|record| matches!(record, Record::Proposal(_))),
+        "/opt/trial": of(|record| matches!(record, Record::Trial(_))),
+        "/marker": 3, // two trials and a fault
+    });
+    assert_eq!(found["counts"], counts);
+    let total: u64 = counts.as_object().unwrap().values().map(|count| count.as_u64().unwrap()).sum();
+    assert_eq!(found["message_count"], total);
+    assert_eq!((&found["profile"], &found["in_order"]), (&json!(""), &json!(true)));
+    let schemas = [
+        ("/robot/joint_states", "foxglove.JointStates"),
+        ("/robot/joint_cmd", "frog.v1.JointCommand"),
+        ("/robot/tick", "frog.v1.ControlTick"),
+        ("/robot/pose", "foxglove.PoseInFrame"),
+        ("/tf", "foxglove.FrameTransforms"),
+        ("/opt/trial", "frog.v1.Trial"),
+        ("/log", "foxglove.Log"),
+    ];
+    for (topic, schema) in schemas {
+        assert_eq!(found["schemas"][topic], schema, "{topic}");
+    }
+    assert_eq!(found["attachments"], json!({ "config.toml": "kp = 400.0\n" }));
+    assert_eq!(found["metadata"]["session"]["task"], "forward");
+    assert_eq!(found["metadata"]["session"]["start_utc_ns"], START_UTC_NS.to_string());
+    assert_eq!(
+        found["session"],
+        json!({
+            "robot": "go1", "seed": 7, "start_utc_ns": START_UTC_NS,
+            "parameters": [["f0", 0.75, 1.75], ["Fx", 0.0, 150.0], ["Fz", 150.0, 350.0]],
+        })
+    );
+    let some: [&Tick; 3] = [&ticks[0], &ticks[2000], &ticks[3999]];
+    for (index, tick) in some.into_iter().enumerate() {
+        let force = tick.state.truth.unwrap().foot_force_world[0].z;
+        let mode = tick.mode.name().replace(' ', "_");
+        let [roll, foot_z] = [tick.estimate.roll_pitch_yaw.x, tick.estimate.foot_position_leg[3].z];
+        let expected = json!([START_UTC_NS + tick.time_ns, tick.number, roll, foot_z, force, mode]);
+        assert_eq!(found["ticks"][index], expected);
+        let joint = |i: usize| json!([joint_name(i), tick.state.joint_position[i], tick.state.joint_torque[i]]);
+        assert_eq!(found["joints"][index], (0..JOINTS).map(joint).collect::<Value>());
+        assert_eq!(found["commands"][index], json!(tick.torque_demanded));
+    }
+    let trials = json!([
+        [0, { "f0": 1.25, "Fx": 100.0, "Fz": 250.0 }, null, null],
+        [0, { "f0": 1.25, "Fx": 100.0, "Fz": 250.0 }, 0.0, 0],
+        [1, { "f0": 1.25, "Fx": 101.0, "Fz": 250.0 }, null, null],
+        [1, { "f0": 1.25, "Fx": 101.0, "Fz": 250.0 }, 0.1, 0],
+    ]);
+    assert_eq!(found["trials"], trials);
+    let warning = 3; // foxglove.Log.Level.WARNING
+    assert_eq!(found["logs"], json!([[warning, "link", "späte Antwort \u{1f438}", START_UTC_NS + 3995 * MS]]));
+    assert_eq!(found["faults"], json!([(3900..3990).collect::<Vec<u64>>()]));
+    frames_reach_the_feet(&found["first_frames"], &ticks[0]);
+    println!("Python read {total} messages on {} topics and agrees", found["counts"].as_object().unwrap().len());
+}
+
+/// The frames, chained from the trunk, put each foot where the closed-form kinematics has it.
+fn frames_reach_the_feet(frames: &Value, tick: &Tick) {
+    use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
+    let frames = frames.as_array().unwrap();
+    assert_eq!(frames.len(), 17);
+    let number = |value: &Value| value.as_f64().unwrap();
+    let mut leg_frames = frames[1..].iter();
+    assert_eq!((&frames[0][0], &frames[0][1]), (&json!("world"), &json!("base")));
+    for (leg, description) in Leg::ALL.into_iter().zip(robot().legs) {
+        let mut foot = Isometry3::identity();
+        let mut parent = json!("base");
+        for name in ["hip", "thigh", "calf", "foot"] {
+            let frame = leg_frames.next().unwrap();
+            assert_eq!((&frame[0], &frame[1]), (&parent, &json!(format!("{}_{name}", leg.name()))));
+            parent = frame[1].clone();
+            let at = |i: usize| number(&frame[2][i]);
+            let q = |i: usize| number(&frame[3][i]);
+            let rotation = UnitQuaternion::from_quaternion(Quaternion::new(q(3), q(0), q(1), q(2)));
+            foot *= Isometry3::from_parts(Translation3::new(at(0), at(1), at(2)), rotation);
+        }
+        let angles = quadfrog::robot::leg_of(&tick.state.joint_position, leg as usize);
+        let position_leg = robot().leg_geometry.foot(&angles, leg.side()).position_leg;
+        let difference = foot.translation.vector - (description.joint_origin[0] + position_leg);
+        assert!(difference.norm() < 1e-12, "{}: {difference:?}", leg.name());
+    }
+}

@@ -1,0 +1,175 @@
+//! The recorder thread: nothing is lost, trials are handed on, a failing disk stops the recording alone.
+
+#[path = "support/recording.rs"]
+mod support;
+
+use std::io::{self, Write};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, mpsc};
+
+use quadfrog::realtime::telemetry::Tick;
+use quadfrog::recording::player::Player;
+use quadfrog::recording::record::Stamped;
+use quadfrog::recording::recorder::{Recorder, RecorderHandle, TrialTicks};
+use quadfrog::recording::writer::{Sink, Writer};
+use support::*;
+
+/// A recorder that is given everything, live, and then its end.
+fn record(writer: Option<Writer>, ticks: &[Tick], records: &[Stamped]) -> (RecorderHandle, Vec<TrialTicks>) {
+    let (mut ring, consumer) = rtrb::RingBuffer::new(64);
+    let (sender, receiver) = mpsc::channel();
+    let (trial_sender, trials) = mpsc::channel();
+    let handle = Recorder::spawn(consumer, receiver, writer, trial_sender);
+    let mut records = records.iter().peekable();
+    for tick in ticks {
+        while let Some(stamped) = records.next_if(|stamped| stamped.time_ns <= tick.time_ns) {
+            sender.send(stamped.clone()).unwrap();
+        }
+        while ring.is_full() {
+            std::thread::yield_now();
+        }
+        ring.push(*tick).unwrap();
+    }
+    drop((ring, sender));
+    // The channel ends when the thread does.
+    let trials = trials.into_iter().collect();
+    (handle, trials)
+}
+
+/// The trials as they stand in the ticks.
+fn trials_of(ticks: &[Tick]) -> Vec<TrialTicks> {
+    let runs = ticks.chunk_by(|a, b| a.trial == b.trial);
+    runs.filter_map(|run| run[0].trial.map(|trial| TrialTicks { trial, ticks: run.to_vec() })).collect()
+}
+
+#[test]
+fn a_session_is_recorded_in_whole_and_in_order() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("session.mcap");
+    let (mut ticks, records) = study(6);
+    // A trial that follows another without a pause, and one that the end cuts off.
+    ticks[2000..2500].iter_mut().for_each(|tick| tick.trial = Some(40));
+    ticks[5990..].iter_mut().for_each(|tick| tick.trial = Some(41));
+    let writer = Writer::create(&path, &session(), START_UTC_NS, &[]).unwrap();
+    let (handle, trials) = record(Some(writer), &ticks, &records);
+    let status = handle.join();
+    assert_eq!((status.ticks, status.error.clone(), status.finished), (6000, None, true), "{status:?}");
+    assert!(status.bytes > 0 && status.bytes <= std::fs::metadata(&path).unwrap().len());
+    assert_same(&play(&path), &in_order(&ticks, &records));
+    assert_eq!(trials.iter().map(|trial| trial.trial).collect::<Vec<_>>(), [0, 40, 1, 2, 41]);
+    assert_same(&trials, &trials_of(&ticks));
+}
+
+#[test]
+fn without_a_writer_trials_are_still_handed_on() {
+    let (ticks, records) = study(4);
+    let (handle, trials) = record(None, &ticks, &records);
+    let status = handle.join();
+    assert_eq!((status.bytes, status.ticks, status.error, status.finished), (0, 0, None, false));
+    assert_same(&trials, &trials_of(&ticks));
+}
+
+/// A disk that is full after some bytes, and counts how often it was to sync.
+struct SmallDisk {
+    left: usize,
+    syncs: Arc<AtomicUsize>,
+}
+
+impl Write for SmallDisk {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        match self.left.min(bytes.len()) {
+            0 => Err(io::Error::from(io::ErrorKind::StorageFull)),
+            taken => {
+                self.left -= taken;
+                Ok(taken)
+            }
+        }
+    }
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+impl Sink for SmallDisk {
+    fn sync(&mut self) -> io::Result<()> {
+        self.syncs.fetch_add(1, Ordering::Relaxed);
+        Ok(())
+    }
+}
+
+fn on_small_disk(bytes: usize) -> (Writer, Arc<AtomicUsize>) {
+    let syncs = Arc::new(AtomicUsize::new(0));
+    let disk = SmallDisk { left: bytes, syncs: syncs.clone() };
+    (Writer::into_sink(Box::new(disk), "small-disk.mcap", &session(), START_UTC_NS, &[]).unwrap(), syncs)
+}
+
+#[test]
+fn a_failing_disk_is_announced_and_trials_are_still_handed_on() {
+    let (ticks, records) = study(4);
+    for bytes in [100_000, 300_000, 1_000_000] {
+        let (writer, _) = on_small_disk(bytes);
+        let (handle, trials) = record(Some(writer), &ticks, &records);
+        let status = handle.join();
+        let error = status.error.expect("the disk is full");
+        assert!(error.starts_with("small-disk.mcap: could not write: "), "{error}");
+        assert!(
+            !status.finished && status.ticks < 4000 && status.bytes <= bytes as u64,
+            "{} {}",
+            status.ticks,
+            status.bytes
+        );
+        assert_same(&trials, &trials_of(&ticks));
+    }
+}
+
+#[test]
+fn a_disk_that_fails_in_the_last_moment_is_announced_too() {
+    let (writer, _) = on_small_disk(1_000_000);
+    let (handle, trials) = record(Some(writer), &study(1).0[..40], &[]);
+    let whole = handle.join();
+    assert_eq!((whole.error, whole.finished, trials.len()), (None, true, 0));
+    // The same, but the disk is full one byte before the end of the file.
+    let file = tempfile::tempdir().unwrap();
+    let path = file.path().join("small-disk.mcap");
+    let mut writer = Writer::create(&path, &session(), START_UTC_NS, &[]).unwrap();
+    study(1).0[..40].iter().for_each(|tick| writer.tick(tick).unwrap());
+    writer.finish().unwrap();
+    let (writer, _) = on_small_disk(std::fs::metadata(&path).unwrap().len() as usize - 1);
+    let status = record(Some(writer), &study(1).0[..40], &[]).0.join();
+    assert!(status.error.is_some() && !status.finished, "{status:?}");
+}
+
+#[test]
+fn a_judged_trial_is_synced_to_the_disk() {
+    let (ticks, records) = study(6);
+    let (writer, syncs) = on_small_disk(usize::MAX);
+    let before = syncs.load(Ordering::Relaxed);
+    record(Some(writer), &ticks, &records).0.join();
+    // Three trials were judged; finishing syncs once more.
+    assert_eq!(syncs.load(Ordering::Relaxed) - before, 3 + 1);
+}
+
+#[test]
+fn a_recording_of_a_session_that_runs_can_be_played() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("session.mcap");
+    let writer = Writer::create(&path, &session(), START_UTC_NS, &[]).unwrap();
+    let (mut ring, consumer) = rtrb::RingBuffer::new(2048);
+    let (sender, receiver) = mpsc::channel();
+    let (trial_sender, _trials) = mpsc::channel();
+    let handle = Recorder::spawn(consumer, receiver, Some(writer), trial_sender);
+    for number in 0..500 {
+        ring.push(moving_tick(number)).unwrap();
+    }
+    // Within the second after which everything is flushed, however slow this machine is.
+    let part = folder.path().join("session.mcap.part");
+    while Player::open(&part).unwrap().count() < 501 {
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    }
+    assert!(Player::open(&part).unwrap().damage().is_some_and(|damage| damage.contains("not finished")));
+    assert!(!handle.is_finished());
+    assert_eq!(handle.status().error, None);
+    drop((ring, sender));
+    assert_eq!(handle.join().ticks, 500);
+    assert_eq!(play(&path).len(), 500);
+}

@@ -1,0 +1,340 @@
+//! The life of a trial through its public interface: what an operator may do, what the study is told, what a crash costs.
+
+use std::path::Path;
+
+use quadfrog::control::settings::TaskControl;
+use quadfrog::optimize::journal::Durability;
+use quadfrog::optimize::sampler::{Direction, SamplerConfig};
+use quadfrog::optimize::space::{Range, Space};
+use quadfrog::optimize::study::{Storage, Study, StudyOptions};
+use quadfrog::optimize::trial::TrialState;
+use quadfrog::realtime::command::{Task, TrialSpec};
+use quadfrog::realtime::telemetry::{FallCause, Tick, TrialEnd};
+use quadfrog::recording::record::{ParameterInfo, Record, Source, Stage, Verdict};
+use quadfrog::session::life::{Life, Plan};
+
+const BOUNDS: [(&str, f64, f64); 3] = [("f0", 0.75, 1.75), ("Fx", 0.0, 150.0), ("Fz", 150.0, 350.0)];
+
+fn study(storage: Storage) -> Study {
+    let ranges = BOUNDS.map(|(name, low, high)| (name.to_owned(), Range::linear(low, high)));
+    Study::open(
+        storage,
+        StudyOptions {
+            name: "test".into(),
+            direction: Direction::Maximize,
+            metric: "J (m)".into(),
+            space: Space::new(ranges).unwrap(),
+            sampler: SamplerConfig { startup_trials: 3, ..SamplerConfig::default() },
+            attributes: Vec::new(),
+            durability: Durability::Buffered,
+        },
+    )
+    .unwrap()
+}
+
+fn plan(budget: u32) -> Plan {
+    Plan {
+        task: Task::Forward,
+        control: TaskControl {
+            kp: 400.0,
+            kd: 8.0,
+            kd_joint: 0.8,
+            k_att: 200.0,
+            stance_m: [0.0, 0.14, -0.25],
+            vmc: true,
+            jumps: 1,
+            f1_hz: 0.0,
+        },
+        parameters: BOUNDS
+            .map(|(name, low, high)| ParameterInfo { name: name.into(), unit: "N".into(), low, high })
+            .to_vec(),
+        seed: 0,
+        budget,
+        recording: String::new(),
+    }
+}
+
+fn life(budget: u32) -> Life {
+    Life::open(plan(budget), study(Storage::Memory)).unwrap()
+}
+
+/// A jump that goes as far as the parameters say: smooth, and different everywhere.
+fn far(spec: &TrialSpec) -> f64 {
+    let (f, x, z) = (spec.jump.f0_hz - 1.2, spec.jump.fx_n / 150.0 - 0.7, spec.jump.fz_n / 350.0 - 0.6);
+    0.7 - f * f - x * x - z * z
+}
+
+/// The ticks of a trial that ends `dx_m` in front of its start.
+fn ticks(trial: u32, dx_m: f64) -> Vec<Tick> {
+    [0.0, dx_m]
+        .map(|x| {
+            let mut tick = Tick { trial: Some(trial), ..Tick::default() };
+            tick.estimate.position_world.x = x;
+            tick
+        })
+        .to_vec()
+}
+
+/// Approves what is on the table, lets it end as `end` and brings it to review.
+fn run(life: &mut Life, end: TrialEnd) -> TrialSpec {
+    let card = life.proposal().expect("a proposal");
+    let spec = life.approve(card.trial, card.revision).unwrap();
+    life.ended(spec.trial, &end, &ticks(spec.trial, far(&spec)));
+    assert_eq!(life.stage(), Stage::Review);
+    spec
+}
+
+fn accept(life: &mut Life) -> TrialSpec {
+    let spec = run(life, TrialEnd::Settled);
+    life.judge(Verdict::Accept, false).unwrap();
+    spec
+}
+
+fn parameters(life: &Life) -> Vec<f64> {
+    life.proposal().unwrap().parameters.iter().map(|p| p.value).collect()
+}
+
+#[test]
+fn an_accepted_trial_counts_with_its_measured_value() {
+    let mut life = life(5);
+    let spec = accept(&mut life);
+    let row = life.row(spec.trial).unwrap();
+    assert_eq!(row.verdict, Some(Verdict::Accept));
+    assert_eq!(row.value, Some(far(&spec)));
+    assert_eq!(life.best().unwrap().trial, spec.trial);
+}
+
+#[test]
+fn a_fall_counts_with_zero_and_is_never_the_best() {
+    let mut life = life(5);
+    let cause = FallCause::Roll { measured_rad: 1.2, allowed_rad: 1.0 };
+    let spec = run(&mut life, TrialEnd::Fell(cause));
+    assert_eq!(life.row(spec.trial).unwrap().suggested, Some(Verdict::Fall));
+    assert!(life.row(spec.trial).unwrap().cause.contains("roll 1.20"));
+    life.judge(Verdict::Fall, false).unwrap();
+    assert_eq!(life.row(spec.trial).unwrap().value, Some(0.0));
+    assert!(life.best().is_none());
+    assert_eq!(life.counted(), 1);
+}
+
+#[test]
+fn a_void_trial_does_not_count_and_a_rerun_repeats_its_parameters() {
+    let mut life = life(5);
+    let before = parameters(&life);
+    let first = run(&mut life, TrialEnd::Stopped);
+    life.judge(Verdict::Void, true).unwrap();
+    assert_eq!(life.counted(), 0);
+    let card = life.proposal().unwrap();
+    assert_eq!((card.source, card.parent), (Source::Rerun, Some(first.trial)));
+    assert_eq!(parameters(&life), before);
+    let second = accept(&mut life);
+    assert_eq!(second.jump, first.jump);
+    assert_ne!(second.seed, first.seed, "a repetition has noise of its own");
+}
+
+#[test]
+fn an_override_outside_the_bounds_is_refused_with_the_bounds() {
+    let mut life = life(5);
+    let error = life.set_parameter("Fx", 151.0).unwrap_err().to_string();
+    assert!(error.contains("Fx = 151") && error.contains("0 to 150"), "{error}");
+    let error = life.set_parameter("Fx", f64::NAN).unwrap_err().to_string();
+    assert!(error.contains("outside its bounds"), "{error}");
+    let error = life.set_parameter("Fw", 1.0).unwrap_err().to_string();
+    assert!(error.contains("f0, Fx, Fz"), "{error}");
+    assert!(parameters(&life)[1] != 151.0);
+}
+
+#[test]
+fn an_override_runs_as_the_operators_and_keeps_what_was_proposed() {
+    let mut life = life(5);
+    let proposed = life.proposal().unwrap();
+    life.set_parameter("Fx", 120.0).unwrap();
+    let card = life.proposal().unwrap();
+    assert_eq!(card.source, Source::Operator);
+    assert_eq!(card.parameters[1].value, 120.0);
+    assert_eq!(card.parameters[1].proposed, proposed.parameters[1].proposed);
+    let spec = accept(&mut life);
+    assert_eq!(spec.jump.fx_n, 120.0);
+    assert_eq!(life.row(spec.trial).unwrap().source, Source::Operator);
+}
+
+#[test]
+fn an_approval_of_an_earlier_card_is_refused() {
+    let mut life = life(5);
+    let seen = life.proposal().unwrap();
+    life.set_parameter("Fx", 120.0).unwrap();
+    let error = life.approve(seen.trial, seen.revision).unwrap_err().to_string();
+    assert!(error.contains("look at the card again"), "{error}");
+    assert_eq!(life.stage(), Stage::Proposed);
+}
+
+#[test]
+fn a_verdict_can_be_undone_until_the_next_trial_begins() {
+    let mut life = life(5);
+    let spec = accept(&mut life);
+    let after_accept = parameters(&life);
+    life.undo().unwrap();
+    assert_eq!(life.stage(), Stage::Review);
+    assert_eq!(life.row(spec.trial).unwrap().verdict, None);
+    life.judge(Verdict::Accept, false).unwrap();
+    assert_eq!(parameters(&life), after_accept);
+    accept(&mut life);
+    life.undo().unwrap();
+    life.judge(Verdict::Fall, false).unwrap();
+    let card = life.proposal().unwrap();
+    life.approve(card.trial, card.revision).unwrap();
+    assert!(life.undo().is_err(), "the verdict was told when the next trial began");
+}
+
+#[test]
+fn a_trial_in_which_nothing_was_measured_cannot_be_accepted_without_a_hand_measured_value() {
+    let mut life = life(5);
+    let card = life.proposal().unwrap();
+    let spec = life.approve(card.trial, card.revision).unwrap();
+    life.ended(spec.trial, &TrialEnd::Settled, &[]);
+    let error = life.judge(Verdict::Accept, false).unwrap_err().to_string();
+    assert!(error.contains("nothing was measured"), "{error}");
+    life.set_hand_value(Some(0.42)).unwrap();
+    life.judge(Verdict::Accept, false).unwrap();
+    assert_eq!(life.row(spec.trial).unwrap().value, Some(0.42));
+}
+
+#[test]
+fn a_hand_measured_value_replaces_the_measured_one_and_both_are_kept() {
+    let mut life = life(5);
+    let spec = run(&mut life, TrialEnd::Settled);
+    life.set_hand_value(Some(0.5)).unwrap();
+    life.judge(Verdict::Accept, false).unwrap();
+    let row = life.row(spec.trial).unwrap();
+    assert_eq!((row.value, row.hand_value), (Some(0.5), Some(0.5)));
+    assert_eq!(row.measured.unwrap().dx_m, far(&spec));
+}
+
+#[test]
+fn a_skipped_proposal_is_not_told_and_another_follows() {
+    let mut life = life(5);
+    let before = parameters(&life);
+    life.skip().unwrap();
+    assert_ne!(parameters(&life), before);
+    assert_eq!(life.counted(), 0);
+    assert_eq!(life.row(0).unwrap().verdict, Some(Verdict::Void));
+}
+
+#[test]
+fn the_budget_ends_the_study_and_can_be_raised() {
+    let mut life = life(2);
+    accept(&mut life);
+    accept(&mut life);
+    assert_eq!(life.stage(), Stage::Finished);
+    assert!(life.proposal().is_none());
+    life.extend(1).unwrap();
+    assert_eq!(life.stage(), Stage::Proposed);
+}
+
+#[test]
+fn falls_nearby_are_shown_as_a_risk() {
+    let mut life = life(5);
+    let spec = run(&mut life, TrialEnd::Fell(FallCause::BodyContact));
+    life.judge(Verdict::Fall, false).unwrap();
+    life.set_parameter("f0", spec.jump.f0_hz).unwrap();
+    life.set_parameter("Fx", spec.jump.fx_n).unwrap();
+    life.set_parameter("Fz", spec.jump.fz_n).unwrap();
+    let risk = life.proposal().unwrap().risk.unwrap();
+    assert_eq!(risk.nearest_fall, Some(0.0));
+    assert_eq!((risk.falls, risk.neighbours), (1, 1));
+}
+
+/// The same study with an operator's odd moments: override, fall, re-run, void, skip, undo.
+fn eventful(life: &mut Life, step: u32) {
+    match step % 7 {
+        1 => {
+            life.set_parameter("Fx", 60.0 + f64::from(step)).unwrap();
+            accept(life);
+        }
+        3 => {
+            run(life, TrialEnd::Fell(FallCause::BodyContact));
+            life.judge(Verdict::Fall, false).unwrap();
+        }
+        4 => {
+            run(life, TrialEnd::Settled);
+            life.judge(Verdict::Void, true).unwrap();
+        }
+        5 => life.skip().unwrap(),
+        _ => {
+            accept(life);
+        }
+    }
+}
+
+fn open(folder: &Path) -> Life {
+    Life::open(plan(1000), study(Storage::File(folder.join("study.log")))).unwrap()
+}
+
+/// The study is killed (dropped without a word) between any two steps; verdicts given before survive, and the next
+/// proposal is the one of the unbroken run.
+#[test]
+fn a_study_interrupted_after_every_verdict_equals_the_unbroken_one() {
+    let (broken, whole) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let mut unbroken = open(whole.path());
+    for step in 0..28 {
+        eventful(&mut unbroken, step);
+        let mut life = open(broken.path());
+        eventful(&mut life, step);
+        drop(life);
+        let resumed = open(broken.path());
+        assert_eq!(
+            resumed.proposal().unwrap().parameters,
+            unbroken.proposal().unwrap().parameters,
+            "after step {step}"
+        );
+        let verdicts = |life: &Life| life.rows().map(|row| (row.trial, row.verdict, row.value)).collect::<Vec<_>>();
+        assert_eq!(verdicts(&resumed), verdicts(&unbroken), "after step {step}");
+    }
+}
+
+/// Killed while a trial runs: the trial is void, and its parameters come first, with the same seed.
+#[test]
+fn a_trial_interrupted_in_mid_jump_is_void_and_comes_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut life = open(folder.path());
+    accept(&mut life);
+    let card = life.proposal().unwrap();
+    let spec = life.approve(card.trial, card.revision).unwrap();
+    drop(life);
+    let mut life = open(folder.path());
+    let row = life.row(spec.trial).unwrap();
+    assert_eq!(row.verdict, Some(Verdict::Void));
+    assert!(row.cause.contains("interrupted"), "{}", row.cause);
+    let card = life.proposal().unwrap();
+    assert_eq!((card.source, card.parent), (Source::Rerun, Some(spec.trial)));
+    let again = life.approve(card.trial, card.revision).unwrap();
+    assert_eq!((again.jump, again.seed), (spec.jump, spec.seed));
+    assert!(again.trial > spec.trial);
+}
+
+/// What the screen is shown and what the study holds are the same.
+#[test]
+fn the_records_tell_what_the_study_holds() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut life = open(folder.path());
+    for step in 0..10 {
+        eventful(&mut life, step);
+    }
+    life.close().unwrap();
+    let mut shown = std::collections::BTreeMap::new();
+    for record in life.take_records() {
+        if let Record::Trial(row) = record {
+            shown.insert(row.trial, row);
+        }
+    }
+    let study = study(Storage::File(folder.path().join("study.log")));
+    let finished: Vec<_> = study.trials().iter().filter(|t| t.state.is_finished()).collect();
+    assert_eq!(finished.len(), shown.len());
+    for trial in finished {
+        let row = &shown[&trial.number];
+        let state = if row.verdict == Some(Verdict::Void) { TrialState::Fail } else { TrialState::Complete };
+        assert_eq!(trial.state, state, "trial {}", trial.number);
+        assert_eq!(trial.value, row.value, "trial {}", trial.number);
+        assert_eq!(trial.parameters, row.parameters, "trial {}", trial.number);
+    }
+}

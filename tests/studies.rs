@@ -1,0 +1,82 @@
+//! Whole studies on the built-in simulator: they reach what the method reaches, and the same seed gives the same bits.
+
+use quadfrog::config::{Backend, Config};
+use quadfrog::engine::{Options, open_life};
+use quadfrog::optimize::journal::Durability;
+use quadfrog::realtime::command::Task;
+use quadfrog::recording::record::TrialRecord;
+use quadfrog::robot::description::RobotDescription;
+use quadfrog::session::automatic;
+use quadfrog::session::rollout::Rollout;
+use quadfrog::sim::Simulator;
+
+const TRIALS: u32 = 20;
+
+/// A study of 20 trials without a screen: its rows and its best value.
+fn study(task: Task, seed: u32) -> (Vec<TrialRecord>, f64) {
+    let config = Config::load(None).unwrap();
+    let robot = RobotDescription::embedded("go1").unwrap();
+    let options = Options {
+        config,
+        robot,
+        backend: Backend::Simulator,
+        task,
+        seed,
+        trials: Some(TRIALS),
+        folder: None,
+        observe: false,
+    };
+    let settings = options.config.settings(&options.robot, task, Backend::Simulator).unwrap();
+    let simulator = Simulator::new(&options.robot, &options.config.simulator).unwrap();
+    let mut rollout = Rollout::new(simulator, &settings);
+    let mut life = open_life(&options, Durability::Buffered, "").unwrap();
+    automatic::run(&mut life, &mut rollout, |_, _| {}).unwrap();
+    let best = life.best().and_then(|row| row.value).unwrap_or(0.0);
+    (life.rows().cloned().collect(), best)
+}
+
+/// Best values of seeds 0 to 4; prints them beside what MuJoCo reaches with the same controller.
+fn bests(task: Task, mujoco: &str) -> Vec<f64> {
+    let bests: Vec<f64> = (0..5).map(|seed| study(task, seed).1).collect();
+    println!("{}: best of {TRIALS} trials, seeds 0-4: {bests:.3?} {}; MuJoCo {mujoco}", task.name(), task.unit());
+    bests
+}
+
+#[test]
+fn forward_reaches_half_a_metre_in_every_seed() {
+    let bests = bests(Task::Forward, "0.68-0.72 m");
+    assert!(bests.iter().all(|&best| best >= 0.5), "{bests:?}");
+}
+
+#[test]
+fn lateral_reaches_a_quarter_of_a_metre_in_four_of_five_seeds() {
+    let bests = bests(Task::LateralLeft, "0.32-0.37 m");
+    assert!(bests.iter().filter(|&&best| best >= 0.25).count() >= 4, "{bests:?}");
+}
+
+#[test]
+fn twist_reaches_two_radians_in_four_of_five_seeds() {
+    let bests = bests(Task::TwistCcw, "2.7-2.9 rad");
+    assert!(bests.iter().filter(|&&best| best >= 2.0).count() >= 4, "{bests:?}");
+}
+
+/// Right and clockwise are the mirror images: they learn as well.
+#[test]
+fn the_mirrored_tasks_learn_too() {
+    let (_, right) = study(Task::LateralRight, 0);
+    let (_, clockwise) = study(Task::TwistCw, 0);
+    assert!(right >= 0.2, "lateral-right {right}");
+    assert!(clockwise >= 2.0, "twist-cw {clockwise}");
+}
+
+#[test]
+fn the_same_seed_gives_the_same_table_bit_for_bit() {
+    let (first, _) = study(Task::Forward, 3);
+    let (second, _) = std::thread::spawn(|| study(Task::Forward, 3)).join().unwrap();
+    assert_eq!(first.len(), second.len());
+    for (a, b) in first.iter().zip(&second) {
+        assert_eq!(a, b);
+        let bits = |row: &TrialRecord| row.value.map(f64::to_bits);
+        assert_eq!(bits(a), bits(b), "trial {}", a.trial);
+    }
+}

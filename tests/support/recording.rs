@@ -1,0 +1,423 @@
+//! Arbitrary ticks and records for the tests of recordings, and a session that looks like a real one.
+#![allow(dead_code, reason = "each test uses its own part")]
+
+use std::path::Path;
+
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use proptest::prelude::*;
+use quadfrog::realtime::telemetry::{Counters, Estimate, Mode, Phase, StageTimes, Tick};
+use quadfrog::recording::player::{Played, Player};
+use quadfrog::recording::record::*;
+use quadfrog::recording::writer::Writer;
+use quadfrog::robot::{Battery, Imu, JointCommand, MotorCommand, RobotState, Truth};
+
+/// Log time of engine time 0 in these tests: 2026-11-21 00:00 UTC.
+pub const START_UTC_NS: u64 = 1_795_219_200_000_000_000;
+
+/// One millisecond in ns.
+pub const MS: u64 = 1_000_000;
+
+/// Values drawn from words that proptest chose.
+#[derive(Debug)]
+struct Draw {
+    words: std::vec::IntoIter<u64>,
+    text: String,
+}
+
+impl Draw {
+    fn word(&mut self) -> u64 {
+        self.words.next().expect("enough words were drawn")
+    }
+
+    /// Any bit pattern; the awkward ones often.
+    fn number(&mut self) -> f64 {
+        let word = self.word();
+        match word % 16 {
+            0 => 0.0,
+            1 => -0.0,
+            2 => f64::from_bits(0x7ff8_0000_0000_0000 | word >> 13),
+            3 => f64::NEG_INFINITY,
+            4 => f64::from_bits(1),
+            5 => f64::MAX,
+            _ => f64::from_bits(word),
+        }
+    }
+
+    fn numbers<const N: usize>(&mut self) -> [f64; N] {
+        std::array::from_fn(|_| self.number())
+    }
+
+    fn yes(&mut self) -> bool {
+        self.word() % 2 == 1
+    }
+
+    fn vector(&mut self) -> Vector3<f64> {
+        self.numbers::<3>().into()
+    }
+
+    fn rotation(&mut self) -> UnitQuaternion<f64> {
+        UnitQuaternion::new_unchecked(Quaternion::from(self.numbers::<4>()))
+    }
+
+    fn one_of<T: Copy>(&mut self, all: &[T]) -> T {
+        all[self.word() as usize % all.len()]
+    }
+
+    fn option<T>(&mut self, value: impl FnOnce(&mut Draw) -> T) -> Option<T> {
+        let value = value(self);
+        self.yes().then_some(value)
+    }
+
+    fn several<T>(&mut self, mut value: impl FnMut(&mut Draw) -> T) -> Vec<T> {
+        (0..self.word() % 4).map(|_| value(self)).collect()
+    }
+
+    /// Some characters of the text that proptest chose, from anywhere in it.
+    fn string(&mut self) -> String {
+        let skip = self.word() as usize % (self.text.chars().count() + 1);
+        self.text.chars().skip(skip).collect()
+    }
+
+    fn tick(&mut self) -> Tick {
+        Tick {
+            number: self.word(),
+            time_ns: self.word() >> 2,
+            mode: self.one_of(&Mode::ALL),
+            phase: self.one_of(&Phase::ALL),
+            trial: self.option(|d| d.word() as u32),
+            trial_time_s: self.number(),
+            theta_rad: self.number(),
+            state: RobotState {
+                robot_time_ms: self.word() as u32,
+                joint_position: self.numbers(),
+                joint_velocity: self.numbers(),
+                joint_torque: self.numbers(),
+                imu: Imu { orientation_world: self.rotation(), gyro_body: self.vector(), accel_body: self.vector() },
+                foot_force: self.numbers(),
+                motor_temperature_c: self.numbers(),
+                motor_enabled: std::array::from_fn(|_| self.yes()),
+                battery: self.option(|d| Battery {
+                    charge_percent: d.number(),
+                    voltage_v: d.number(),
+                    current_a: d.number(),
+                    cell_v: d.numbers(),
+                }),
+                truth: self.option(|d| Truth {
+                    position_world: d.vector(),
+                    velocity_world: d.vector(),
+                    orientation_world: d.rotation(),
+                    angular_velocity_body: d.vector(),
+                    foot_contact: std::array::from_fn(|_| d.yes()),
+                    foot_force_world: std::array::from_fn(|_| d.vector()),
+                    body_contact: d.yes(),
+                }),
+            },
+            estimate: Estimate {
+                position_world: self.vector(),
+                velocity_world: self.vector(),
+                orientation_world: self.rotation(),
+                angular_velocity_body: self.vector(),
+                roll_pitch_yaw: self.vector(),
+                contact: std::array::from_fn(|_| self.yes()),
+                foot_position_leg: std::array::from_fn(|_| self.vector()),
+            },
+            torque_demanded: self.numbers(),
+            command: JointCommand {
+                motor: std::array::from_fn(|_| MotorCommand {
+                    position: self.number(),
+                    velocity: self.number(),
+                    kp: self.number(),
+                    kd: self.number(),
+                    torque: self.number(),
+                }),
+            },
+            limited: self.word() as u16,
+            stages: StageTimes {
+                lateness_ns: self.word() as u32,
+                read_ns: self.word() as u32,
+                decide_ns: self.word() as u32,
+                write_ns: self.word() as u32,
+            },
+        }
+    }
+
+    fn risk(&mut self) -> Option<Risk> {
+        self.option(|d| Risk {
+            nearest_fall: d.option(Draw::number),
+            nearest_fall_trial: d.option(|d| d.word() as u32),
+            falls: d.word() as u32,
+            neighbours: d.word() as u32,
+        })
+    }
+
+    /// A record of the kind `kind` of nine.
+    fn record(&mut self, kind: usize) -> Record {
+        match kind {
+            0 => Record::Session(SessionInfo {
+                version: self.string(),
+                backend: self.string(),
+                robot: self.string(),
+                task: self.string(),
+                unit: self.string(),
+                sampler: self.string(),
+                seed: self.word(),
+                budget: self.word() as u32,
+                parameters: self.several(|d| ParameterInfo {
+                    name: d.string(),
+                    unit: d.string(),
+                    low: d.number(),
+                    high: d.number(),
+                }),
+                study: self.string(),
+                recording: self.string(),
+                started: self.string(),
+                observe: self.yes(),
+            }),
+            1 => Record::Transition(Transition {
+                from: self.one_of(&Mode::ALL),
+                to: self.one_of(&Mode::ALL),
+                cause: self.string(),
+            }),
+            2 => Record::Stage(StageInfo {
+                stage: self.one_of(&Stage::ALL),
+                trial: self.word() as u32,
+                can_undo: self.yes(),
+            }),
+            3 => Record::Proposal(Proposal {
+                trial: self.word() as u32,
+                revision: self.word() as u32,
+                source: self.one_of(&Source::ALL),
+                parent: self.option(|d| d.word() as u32),
+                parameters: self.several(|d| ProposedParameter {
+                    name: d.string(),
+                    value: d.number(),
+                    proposed: d.number(),
+                }),
+                risk: self.risk(),
+            }),
+            4 => Record::Trial(TrialRecord {
+                trial: self.word() as u32,
+                source: self.one_of(&Source::ALL),
+                parent: self.option(|d| d.word() as u32),
+                parameters: self.several(|d| (d.string(), d.number())),
+                measured: self.option(|d| Measured {
+                    dx_m: d.number(),
+                    dy_m: d.number(),
+                    dyaw_rad: d.number(),
+                    apex_m: d.number(),
+                    air_s: d.number(),
+                }),
+                value: self.option(Draw::number),
+                hand_value: self.option(Draw::number),
+                suggested: self.option(|d| d.one_of(&Verdict::ALL)),
+                cause: self.string(),
+                verdict: self.option(|d| d.one_of(&Verdict::ALL)),
+                note: self.string(),
+                risk: self.risk(),
+            }),
+            5 => Record::Command(CommandRecord { wish: self.string(), accepted: self.yes(), answer: self.string() }),
+            6 => Record::Counters(Counters {
+                late_ticks: self.word(),
+                worst_lateness_ns: self.word(),
+                ticks_not_recorded: self.word(),
+                ticks_not_shown: self.word(),
+                commands_refused: self.word(),
+                state_age_ms: self.word() as u32,
+            }),
+            7 => Record::Log(LogRecord {
+                level: self.one_of(&[Level::Info, Level::Warning, Level::Error]),
+                source: self.string(),
+                message: self.string(),
+            }),
+            _ => Record::FaultTicks(vec![self.tick(), self.tick()]),
+        }
+    }
+}
+
+fn draw(words: usize) -> impl Strategy<Value = Draw> {
+    (prop::collection::vec(any::<u64>(), words), any::<String>())
+        .prop_map(|(words, text)| Draw { words: words.into_iter(), text })
+}
+
+/// Any tick at all: every bit pattern in every number.
+pub fn any_tick() -> impl Strategy<Value = Tick> {
+    draw(400).prop_map(|mut draw| draw.tick())
+}
+
+/// Any record; every kind is as likely.
+pub fn any_record() -> impl Strategy<Value = Record> {
+    (0..9_usize, draw(800)).prop_map(|(kind, mut draw)| draw.record(kind))
+}
+
+/// A session as a study in the simulator begins it.
+pub fn session() -> SessionInfo {
+    let parameter =
+        |name: &str, unit: &str, low, high| ParameterInfo { name: name.into(), unit: unit.into(), low, high };
+    SessionInfo {
+        version: "0.1.0".into(),
+        backend: "sim".into(),
+        robot: "go1".into(),
+        task: "forward".into(),
+        unit: "m".into(),
+        sampler: "tpe".into(),
+        seed: 7,
+        budget: 20,
+        parameters: vec![
+            parameter("f0", "Hz", 0.75, 1.75),
+            parameter("Fx", "N", 0.0, 150.0),
+            parameter("Fz", "N", 150.0, 350.0),
+        ],
+        study: "study.log".into(),
+        recording: "session.mcap".into(),
+        started: "2026-11-21T00:00:00Z".into(),
+        observe: false,
+    }
+}
+
+/// Tick `number` of a robot that moves smoothly, with a little noise in every number, as a simulator gives it.
+pub fn moving_tick(number: u64) -> Tick {
+    let time = number as f64 * 1e-3;
+    let mut state = number.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
+    let mut noise = move || {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        (state >> 11) as f64 / (1_u64 << 53) as f64 * 1e-3
+    };
+    let mut wave = |phase: f64| (3.0 * time + phase).sin() + noise();
+    let mut vector = |phase: f64| Vector3::new(wave(phase), wave(phase + 1.0), wave(phase + 2.0));
+    let orientation = UnitQuaternion::from_scaled_axis(vector(0.1) * 0.1);
+    let truth = Truth {
+        position_world: vector(0.2),
+        velocity_world: vector(0.3),
+        orientation_world: orientation,
+        angular_velocity_body: vector(0.4),
+        foot_contact: [true, false, true, false],
+        foot_force_world: std::array::from_fn(|leg| vector(leg as f64) * 30.0),
+        body_contact: false,
+    };
+    let estimate = Estimate {
+        position_world: vector(0.5),
+        velocity_world: vector(0.6),
+        orientation_world: orientation,
+        angular_velocity_body: vector(0.7),
+        roll_pitch_yaw: vector(0.8),
+        contact: truth.foot_contact,
+        foot_position_leg: std::array::from_fn(|leg| vector(leg as f64)),
+    };
+    let imu = Imu { orientation_world: orientation, gyro_body: vector(0.9), accel_body: vector(1.0) };
+    let mut joints = |phase: f64| std::array::from_fn(|joint| wave(phase + joint as f64));
+    let torque: [f64; 12] = joints(0.0);
+    Tick {
+        number,
+        time_ns: number * MS,
+        mode: Mode::Ready,
+        phase: Phase::Stance,
+        state: RobotState {
+            robot_time_ms: number as u32,
+            joint_position: joints(1.1),
+            joint_velocity: joints(1.2),
+            joint_torque: joints(1.3),
+            imu,
+            foot_force: [wave(1.0), wave(2.0), wave(3.0), wave(4.0)],
+            motor_temperature_c: [35.0; 12],
+            motor_enabled: [true; 12],
+            battery: None,
+            truth: Some(truth),
+        },
+        estimate,
+        torque_demanded: torque,
+        command: JointCommand::torques(&torque),
+        stages: StageTimes { lateness_ns: 900, read_ns: 1_200, decide_ns: 2_500, write_ns: 20_000 },
+        ..Tick::default()
+    }
+}
+
+/// What a jump study records: trials of a second from 1 s on, every 2 s, with the events that belong to them; `events`
+/// are in the order of time.
+pub fn study(seconds: u64) -> (Vec<Tick>, Vec<Stamped>) {
+    let mut ticks: Vec<_> = (0..seconds * 1000).map(moving_tick).collect();
+    let mut records = Vec::new();
+    for (trial, start) in (0_u32..).zip((1000..seconds * 1000).step_by(2000)) {
+        for tick in ticks.iter_mut().skip(start as usize).take(1000) {
+            (tick.trial, tick.mode) = (Some(trial), Mode::Jump);
+        }
+        let mut add = |ms: u64, record| records.push(Stamped { time_ns: ms * MS, record });
+        let stage = |stage| Record::Stage(StageInfo { stage, trial, can_undo: trial > 0 });
+        let row = |verdict: Option<Verdict>| {
+            Record::Trial(TrialRecord {
+                trial,
+                source: Source::Sampler,
+                parent: None,
+                parameters: vec![("f0".into(), 1.25), ("Fx".into(), 100.0 + f64::from(trial)), ("Fz".into(), 250.0)],
+                measured: None,
+                value: verdict.map(|_| 0.1 * f64::from(trial)),
+                hand_value: None,
+                suggested: None,
+                cause: String::new(),
+                verdict,
+                note: String::new(),
+                risk: None,
+            })
+        };
+        add(start - 500, stage(Stage::Proposed));
+        add(
+            start - 500,
+            Record::Proposal(Proposal {
+                trial,
+                revision: 0,
+                source: Source::Sampler,
+                parent: None,
+                parameters: vec![ProposedParameter { name: "Fx".into(), value: 100.0, proposed: 100.0 }],
+                risk: None,
+            }),
+        );
+        add(start, stage(Stage::Running));
+        add(start, row(None));
+        add(start + 100, Record::Counters(Counters { late_ticks: u64::from(trial), ..Counters::default() }));
+        if start + 999 < seconds * 1000 {
+            add(start + 999, row(Some(Verdict::Accept)));
+        }
+    }
+    (ticks, records)
+}
+
+/// Both in the order of time; a record stands before a tick of the same time.
+pub fn in_order(ticks: &[Tick], records: &[Stamped]) -> Vec<Played> {
+    let mut all: Vec<_> = records.iter().cloned().map(Played::Record).collect();
+    all.extend(ticks.iter().copied().map(Played::Tick));
+    all.sort_by_key(Played::time_ns);
+    all
+}
+
+/// Writes everything to `path` in the given order, and finishes the file.
+pub fn write(path: &Path, everything: &[Played]) {
+    let mut writer = Writer::create(path, &session(), START_UTC_NS, &[]).unwrap();
+    for played in everything {
+        match played {
+            Played::Tick(tick) => writer.tick(tick).unwrap(),
+            Played::Record(stamped) => writer.record(stamped).unwrap(),
+        }
+    }
+    assert_eq!(writer.finish().unwrap(), path);
+}
+
+/// What the player gives, without the session's own first record.
+pub fn play(path: &Path) -> Vec<Played> {
+    let mut player = Player::open(path).unwrap_or_else(|error| panic!("{error}"));
+    let first = player.next();
+    assert_eq!(first, Some(Played::Record(Stamped { time_ns: 0, record: Record::Session(session()) })));
+    let rest = player.by_ref().collect();
+    assert_eq!(player.damage(), None);
+    rest
+}
+
+/// Asserts that both are the same, bit for bit but for the payload of a NaN. `Debug` shows every field, the sign of zero
+/// and as many digits as tell two numbers apart; `==` would call NaN unlike itself and 0.0 like -0.0.
+pub fn assert_same<T: std::fmt::Debug>(found: &[T], expected: &[T]) {
+    assert_eq!(found.len(), expected.len(), "another number of ticks and records");
+    for (index, (found, expected)) in found.iter().zip(expected).enumerate() {
+        let (found, expected) = (format!("{found:?}"), format!("{expected:?}"));
+        assert!(found == expected, "number {index} differs\n   found: {found}\nexpected: {expected}");
+    }
+}

@@ -1,0 +1,349 @@
+//! The loop: take keys, take the feed, update, draw.
+//!
+//! Keys go before the feed and the feed before drawing, so that a slow link or a busy engine never delays an answer to
+//! the operator. Nothing in the loop waits for the terminal, the engine or a disk other than where a table is exported.
+
+use std::io;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use color_eyre::eyre::{WrapErr, eyre};
+use crossterm::clipboard::CopyToClipboard;
+use crossterm::event::{Event, KeyEventKind};
+use nix::sys::signal::{Signal, raise};
+use quadfrog::realtime::channel::StopLatch;
+use quadfrog::recording::record::Level;
+use quadfrog::robot::description::RobotDescription;
+use tokio::signal::unix::{SignalKind, signal};
+use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
+use tokio::time::{MissedTickBehavior, interval};
+
+use crate::action::Action;
+use crate::feed::Feed;
+use crate::keymap::{Key, Keymap};
+use crate::model::Model;
+use crate::settings::{ChartMode, ColourChoice, GlyphChoice, Settings};
+use crate::terminal::{self, Screen};
+use crate::theme::Theme;
+use crate::update::{Effect, Msg, say, update};
+use crate::view;
+
+/// The loop wakes at least this often: for the sign of life, twenty times a second.
+const PULSE: Duration = Duration::from_millis(50);
+/// Frames per second at most over a slow link.
+const LOW_BANDWIDTH_FRAMES: u32 = 4;
+
+/// How the console looks and behaves.
+#[derive(Debug, Clone)]
+pub struct ConsoleOptions {
+    /// `console.toml`.
+    pub settings: Settings,
+    /// The machine, for limits; none where it is not known.
+    pub robot: Option<RobotDescription>,
+}
+
+impl ConsoleOptions {
+    /// The settings with what the command line says on top.
+    pub fn new(settings: Settings, colours: Option<ColourChoice>, ascii: bool, low_bandwidth: bool) -> ConsoleOptions {
+        let mut settings = settings;
+        if low_bandwidth {
+            settings.colours =
+                if settings.colours == ColourChoice::None { ColourChoice::None } else { ColourChoice::Named };
+            settings.frames_per_second = settings.frames_per_second.min(LOW_BANDWIDTH_FRAMES);
+            settings.chart_mode = ChartMode::Sweep;
+        }
+        if let Some(colours) = colours {
+            settings.colours = colours;
+        }
+        if ascii {
+            settings.glyphs = GlyphChoice::Ascii;
+        }
+        ConsoleOptions { settings, robot: None }
+    }
+
+    /// With the machine's limits and lengths.
+    #[must_use]
+    pub fn with_robot(mut self, robot: RobotDescription) -> ConsoleOptions {
+        self.robot = Some(robot);
+        self
+    }
+}
+
+/// How the console ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Ended {
+    /// The operator quit.
+    Quit,
+    /// SIGTERM.
+    Terminated,
+    /// The terminal is gone: there is nowhere to print to.
+    HungUp,
+}
+
+/// What reached the process besides the feed.
+enum Input {
+    Key(Key),
+    Paste(String),
+    Resize(u16, u16),
+    HungUp,
+}
+
+/// Opens the console on the feed and runs it until the operator or the system ends it. The session behind a live feed is
+/// ended with it.
+///
+/// # Errors
+/// When the terminal cannot be used, or a thread of the program panicked; the robot was stopped then.
+pub fn run(feed: Feed, options: ConsoleOptions) -> color_eyre::Result<Ended> {
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().wrap_err("event loop")?;
+    runtime.block_on(Console::open(feed, options)?.run())
+}
+
+struct Console {
+    feed: Feed,
+    model: Model,
+    screen: Screen,
+    started: Instant,
+    frame_period: Duration,
+    last_frame: Option<Instant>,
+    last_feed: Instant,
+    redraw: bool,
+    ended: Option<Ended>,
+}
+
+impl Console {
+    fn open(feed: Feed, options: ConsoleOptions) -> color_eyre::Result<Console> {
+        let settings = options.settings;
+        let theme = Theme::detect(settings.colours, settings.glyphs, |name| std::env::var(name).ok());
+        let frame_period = Duration::from_secs(1) / settings.frames_per_second.max(1);
+        let mut model = Model::new(settings, theme, options.robot);
+        let (columns, rows) = crossterm::terminal::size().wrap_err("the terminal's size")?;
+        update(&mut model, Msg::Resize(columns, rows));
+        let screen = Screen::enter().wrap_err("the terminal cannot be used")?;
+        let now = Instant::now();
+        Ok(Console {
+            feed,
+            model,
+            screen,
+            started: now,
+            frame_period,
+            last_frame: None,
+            last_feed: now,
+            redraw: true,
+            ended: None,
+        })
+    }
+
+    async fn run(mut self) -> color_eyre::Result<Ended> {
+        let (input, mut inputs) = unbounded_channel();
+        read_input(input.clone(), self.model.keymap.clone(), self.feed.stop_latch())?;
+        terminal::watch_for_hang_up(move || drop(input.send(Input::HungUp))).wrap_err("hang-up watcher")?;
+        let mut interrupted = signal(SignalKind::interrupt())?;
+        let mut terminated = signal(SignalKind::terminate())?;
+        let mut hung_up = signal(SignalKind::hangup())?;
+        let mut suspended = signal(SignalKind::from_raw(Signal::SIGTSTP as i32))?;
+        let mut pulse = interval(PULSE.min(self.frame_period));
+        pulse.set_missed_tick_behavior(MissedTickBehavior::Skip);
+        while self.ended.is_none() {
+            self.feed.beat();
+            tokio::select! {
+                biased;
+                Some(input) = inputs.recv() => self.take_input(input, &mut inputs),
+                _ = hung_up.recv() => self.hang_up(),
+                _ = terminated.recv() => self.end(Ended::Terminated),
+                _ = interrupted.recv() => {
+                    let key = self.model.keymap.keys(Action::Interrupt).next();
+                    self.tell(key.map(Msg::Key));
+                }
+                _ = suspended.recv() => self.tell([Msg::Suspend]),
+                _ = pulse.tick() => {}
+            }
+            if let Some(thread) = terminal::panicked() {
+                self.feed.stop();
+                self.screen.hang_up();
+                self.feed.shutdown();
+                return Err(eyre!("the thread `{thread}` panicked; the robot was stopped and the session was ended"));
+            }
+            self.take_feed();
+            self.draw_if_due()?;
+        }
+        self.close(&mut inputs)
+    }
+
+    /// One input and all that wait behind it.
+    fn take_input(&mut self, input: Input, inputs: &mut UnboundedReceiver<Input>) {
+        let mut next = Some(input);
+        while let Some(input) = next {
+            match input {
+                Input::Key(key) => self.tell([Msg::Key(key)]),
+                Input::Paste(text) => self.tell([Msg::Paste(text)]),
+                Input::Resize(columns, rows) => self.tell([Msg::Resize(columns, rows)]),
+                Input::HungUp => self.hang_up(),
+            }
+            self.redraw = true;
+            next = inputs.try_recv().ok();
+        }
+    }
+
+    fn take_feed(&mut self) {
+        let now = Instant::now();
+        let elapsed = now.duration_since(self.last_feed);
+        self.last_feed = now;
+        let news = self.feed.take(u64::try_from(elapsed.as_nanos()).unwrap_or(0));
+        self.tell(news);
+    }
+
+    /// Updates the model and does what follows of it.
+    fn tell(&mut self, messages: impl IntoIterator<Item = Msg>) {
+        update(&mut self.model, Msg::Clock(self.started.elapsed()));
+        for message in messages {
+            for effect in update(&mut self.model, message) {
+                self.carry_out(effect);
+            }
+        }
+    }
+
+    fn carry_out(&mut self, effect: Effect) {
+        match effect {
+            Effect::Stop => self.feed.stop(),
+            Effect::Wish(intent) => self.feed.wish(intent),
+            Effect::Replay(command) => self.feed.command(command),
+            Effect::Bell => self.send(b"\x07"),
+            Effect::Copy(text) => {
+                let mut bytes = Vec::new();
+                // Writing to memory does not fail.
+                let _ = crossterm::queue!(bytes, CopyToClipboard::to_clipboard_from(text));
+                self.send(&bytes);
+            }
+            Effect::Export => self.export(),
+            Effect::Redraw => {
+                // A failure shows with the next frame.
+                let _ = self.screen.clear();
+            }
+            Effect::Suspend => self.suspend(),
+            Effect::Quit => self.end(Ended::Quit),
+        }
+    }
+
+    /// A bell that a stalled terminal does not take is a bell that nobody hears: not worth waiting for.
+    fn send(&mut self, bytes: &[u8]) {
+        if self.screen.ready() {
+            let _ = self.screen.send(bytes);
+        }
+    }
+
+    fn export(&mut self) {
+        let folder = Path::new(&self.model.session.study).parent().filter(|folder| folder.is_dir());
+        let folder = folder.map_or_else(PathBuf::new, Path::to_owned);
+        let files = [
+            (folder.join("trials.csv"), view::trials::as_csv(&self.model)),
+            (folder.join("trials.md"), view::trials::as_markdown(&self.model)),
+        ];
+        let written = files.iter().try_for_each(|(path, text)| {
+            std::fs::write(path, text).map_err(|error| format!("{}: {error}", path.display()))
+        });
+        match written {
+            Ok(()) => {
+                let text = format!("written: {} and trials.md beside it", files[0].0.display());
+                say(&mut self.model, Level::Info, text);
+            }
+            Err(error) => say(&mut self.model, Level::Error, format!("not exported: {error}")),
+        }
+    }
+
+    /// Gives the terminal back and stops this process, as Ctrl-Z does, until it is continued.
+    fn suspend(&mut self) {
+        self.screen.release();
+        // SIGSTOP cannot fail to be sent to oneself; if it did, the screen comes back at once.
+        let _ = raise(Signal::SIGSTOP);
+        if self.screen.take().is_err() {
+            self.hang_up();
+        }
+        self.last_feed = Instant::now();
+        self.redraw = true;
+    }
+
+    fn hang_up(&mut self) {
+        self.screen.hang_up();
+        self.end(Ended::HungUp);
+    }
+
+    fn end(&mut self, ended: Ended) {
+        self.ended.get_or_insert(ended);
+    }
+
+    fn draw_if_due(&mut self) -> color_eyre::Result<()> {
+        let due = self.redraw || self.last_frame.is_none_or(|last| last.elapsed() + PULSE / 4 >= self.frame_period);
+        if !due || !self.screen.ready() || self.ended == Some(Ended::HungUp) {
+            return Ok(());
+        }
+        if self.screen.broken() {
+            self.hang_up();
+            return Ok(());
+        }
+        self.redraw = false;
+        self.last_frame = Some(Instant::now());
+        let model = &self.model;
+        self.screen.draw(|frame| view::render(frame, model)).wrap_err("drawing")
+    }
+
+    /// Ends the session while the operator can still see and stop: sitting down takes seconds.
+    fn close(mut self, inputs: &mut UnboundedReceiver<Input>) -> color_eyre::Result<Ended> {
+        let ended = self.ended.unwrap_or(Ended::Quit);
+        let (heartbeat, stop) = (self.feed.heartbeat(), self.feed.stop_latch());
+        if self.model.robot_needs_us() {
+            say(&mut self.model, Level::Info, "the robot sits down, then the program ends".to_owned());
+        }
+        self.redraw = true;
+        self.draw_if_due()?;
+        let feed = self.feed;
+        let closing = std::thread::Builder::new().name("close".into()).spawn(move || feed.shutdown())?;
+        while !closing.is_finished() {
+            if let Some(heartbeat) = &heartbeat {
+                heartbeat.beat();
+            }
+            while let Ok(input) = inputs.try_recv() {
+                if let (Input::Key(key), Some(stop)) = (input, &stop)
+                    && matches!(self.model.keymap.action(key), Some(Action::Stop | Action::Interrupt))
+                {
+                    stop.set();
+                }
+            }
+            std::thread::sleep(PULSE / 5);
+        }
+        match closing.join() {
+            Ok(_) => Ok(ended),
+            Err(_) => Err(eyre!("ending the session panicked")),
+        }
+    }
+}
+
+/// Reads the terminal in a thread of its own. STOP keys that mean nothing else anywhere go to the latch from here, even
+/// if the loop should hang.
+fn read_input(inputs: UnboundedSender<Input>, keymap: Keymap, stop: Option<StopLatch>) -> io::Result<()> {
+    let read = move || {
+        loop {
+            let input = match crossterm::event::read() {
+                Ok(Event::Key(event)) if event.kind != KeyEventKind::Release => {
+                    let key = Key::from_event(event);
+                    let stops = matches!(keymap.action(key), Some(Action::Stop | Action::Interrupt));
+                    if let Some(stop) = &stop
+                        && stops
+                        && key.typed().is_none()
+                    {
+                        stop.set();
+                    }
+                    Input::Key(key)
+                }
+                Ok(Event::Paste(text)) => Input::Paste(text),
+                Ok(Event::Resize(columns, rows)) => Input::Resize(columns, rows),
+                Ok(_) => continue,
+                Err(_) => Input::HungUp,
+            };
+            let gone = matches!(input, Input::HungUp);
+            if inputs.send(input).is_err() || gone {
+                return;
+            }
+        }
+    };
+    std::thread::Builder::new().name("keys".into()).spawn(read).map(|_| ())
+}

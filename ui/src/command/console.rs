@@ -1,0 +1,112 @@
+//! The console on a running engine.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use quadfrog::config::Backend;
+use quadfrog::engine::{Engine, Options};
+use quadfrog::realtime::command::Task;
+use quadfrog_console::app::{self, ConsoleOptions};
+use quadfrog_console::feed::Feed;
+use quadfrog_console::settings::{ColourChoice, Settings};
+use quadfrog_console::terminal;
+
+use super::study::{Chosen, continued};
+use super::{Failure, StudyArguments, TaskName};
+
+/// How many colours are used.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Colour {
+    /// As many as the terminal says it has; none with NO_COLOR
+    Auto,
+    /// 16 colours
+    #[value(name = "16")]
+    Sixteen,
+    /// 256 colours
+    #[value(name = "256")]
+    TwoHundredFiftySix,
+    /// 24 bits
+    True,
+    /// None
+    Never,
+}
+
+/// How the console looks, live and in replay.
+#[derive(Debug, Clone, Args)]
+pub struct ScreenArguments {
+    /// Only ASCII characters, for consoles without braille
+    #[arg(long)]
+    pub ascii: bool,
+    /// Colours
+    #[arg(long, value_name = "WHICH", default_value = "auto")]
+    pub color: Colour,
+    /// Fewer frames and colours, for a slow link
+    #[arg(long)]
+    pub low_bandwidth: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct ConsoleArguments {
+    /// What the robot is to learn [default: forward]
+    #[arg(long, value_name = "TASK")]
+    task: Option<TaskName>,
+    /// Seed of the study [default: that of optimize.toml]
+    #[arg(long, value_name = "N")]
+    seed: Option<u32>,
+    #[command(flatten)]
+    study: StudyArguments,
+    /// Continue the study in this folder
+    #[arg(long, value_name = "DIR")]
+    resume: Option<PathBuf>,
+    /// Look, and change nothing
+    #[arg(long)]
+    observe: bool,
+    #[command(flatten)]
+    screen: ScreenArguments,
+}
+
+pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
+    let config = arguments.study.load_config()?;
+    let robot = arguments.study.load_robot()?;
+    let console = options(&arguments.screen, &config)?.with_robot(robot.clone());
+    terminal::check().map_err(Failure::input)?;
+    let (task, seed) = (arguments.task.map(Task::from), arguments.seed);
+    let chosen = match &arguments.resume {
+        Some(folder) => continued(folder, task, seed)?,
+        None => {
+            let task = task.unwrap_or(Task::Forward);
+            let seed = seed.unwrap_or(config.optimize.sampler.seed);
+            Chosen { task, seed, folder: arguments.study.new_folder(task, seed) }
+        }
+    };
+    let folder = chosen.folder.clone();
+    let handle = Engine::start(Options {
+        config,
+        robot,
+        backend: Backend::Simulator,
+        task: chosen.task,
+        seed: chosen.seed,
+        trials: arguments.study.trials,
+        folder: Some(chosen.folder),
+        observe: arguments.observe,
+    })?;
+    app::run(Feed::live(handle), console)?;
+    println!("The study and its recording are in {}", folder.display());
+    println!("  continue it:  quadfrog --resume {}", folder.display());
+    println!("  look at it:   quadfrog replay {}", folder.join("session.mcap").display());
+    Ok(())
+}
+
+/// The console's options from the arguments and `console.toml`.
+pub fn options(screen: &ScreenArguments, config: &quadfrog::config::Config) -> Result<ConsoleOptions, Failure> {
+    let settings = Settings::from_table(&config.console)
+        .map_err(|error| config.refuse("console.toml", &error.key, &error.value, &error.reason))?;
+    let colours = match screen.color {
+        Colour::Auto => None,
+        Colour::Sixteen => Some(ColourChoice::Named),
+        Colour::TwoHundredFiftySix => Some(ColourChoice::Indexed),
+        Colour::True => Some(ColourChoice::True),
+        Colour::Never => Some(ColourChoice::None),
+    };
+    Ok(ConsoleOptions::new(settings, colours, screen.ascii, screen.low_bandwidth))
+}

@@ -1,0 +1,39 @@
+//! The console on a recorded session.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use quadfrog::config::Config;
+use quadfrog::recording::player::Player;
+use quadfrog::robot::description::RobotDescription;
+use quadfrog_console::app;
+use quadfrog_console::feed::Feed;
+use quadfrog_console::terminal;
+
+use super::Failure;
+use super::console::{ScreenArguments, options};
+
+#[derive(Debug, Args)]
+pub struct ReplayArguments {
+    /// The recording: a session.mcap, also one that was cut short
+    file: PathBuf,
+    /// Folder with a console.toml of your own
+    #[arg(long, value_name = "DIR")]
+    config: Option<PathBuf>,
+    #[command(flatten)]
+    screen: ScreenArguments,
+}
+
+pub fn run(arguments: &ReplayArguments) -> Result<(), Failure> {
+    let config = Config::load(arguments.config.as_deref())?;
+    let console = options(&arguments.screen, &config)?;
+    let player = Player::open(&arguments.file).map_err(Failure::input)?;
+    terminal::check().map_err(Failure::input)?;
+    let console = match RobotDescription::embedded(&player.session().robot) {
+        Ok(robot) => console.with_robot(robot),
+        // A model of the operator's own: the panels that need its limits say so.
+        Err(_) => console,
+    };
+    app::run(Feed::replay(player), console)?;
+    Ok(())
+}

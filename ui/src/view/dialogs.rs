@@ -1,0 +1,249 @@
+//! What lies over the view. A dialog stays inside the view's area: the frame, the answer and the next step remain.
+//!
+//! ```text
+//!          ┌ Jump? ──────────────────────────────────────────┐
+//!          │ Trial 8: f0 1.243 Hz, Fx 118.2 N, Fz 243.9 N    │
+//!          │ The area is clear and nobody is near the robot? │
+//!          │                                                 │
+//!          │ [Cancel: Enter]     g jump                      │
+//!          └─────────────────────────────────────────────────┘
+//! ```
+
+use ratatui::Frame;
+use ratatui::layout::Rect;
+use ratatui::symbols::border;
+use ratatui::text::{Line, Span};
+use ratatui::widgets::{Block, Clear, Paragraph, Wrap};
+use tui_input::Input;
+
+use super::{cut, help, number, proposal, span, trials};
+use crate::action::Action;
+use crate::dialog::{APPROVAL_PAUSE, Dialog, OverrideForm, Purpose, palette_rows};
+use crate::model::Model;
+use crate::theme::{Glyphs, Role, Theme};
+
+/// Draws the open dialog.
+pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
+    let Some(dialog) = &model.dialog else { return };
+    match dialog {
+        Dialog::Approve { trial, pressed_at, .. } => {
+            let waited = model.clock.saturating_sub(*pressed_at) >= APPROVAL_PAUSE;
+            popup(frame, area, model, "Jump?", 60, approve(model, *trial, waited));
+        }
+        Dialog::Arm => {
+            let lines = vec![Line::from("The robot will stand up. Is nobody near it?"), Line::default(), choice(model, "y", "stand up")];
+            popup(frame, area, model, "Arm?", 52, lines);
+        }
+        Dialog::Quit => popup(frame, area, model, "Quit?", 58, quit(model)),
+        Dialog::Override(form) => popup(frame, area, model, &format!("Override trial #{}", form.trial), 72, overrides(model, form)),
+        Dialog::Field { purpose, input, problem } => {
+            popup(frame, area, model, &field_title(*purpose), 64, field(model, *purpose, input, problem.as_deref()));
+        }
+        Dialog::Palette { input, selected } => render_palette(frame, area, model, input, *selected),
+        Dialog::Help { scroll } => render_help(frame, area, model, *scroll),
+        Dialog::Details { trial } => {
+            if let Some(record) = model.trials.get(trial) {
+                let rows = trials::details(model, record);
+                let line = |(name, value): (String, String)| {
+                    Line::from(vec![span(&model.theme, Role::Quiet, format!("{name:<15}")), Span::raw(value)])
+                };
+                let lines = rows.into_iter().map(line).collect();
+                popup(frame, area, model, &format!("Trial #{trial}"), 72, lines);
+            }
+        }
+    }
+}
+
+/// A box with a line around it; returns its inside.
+fn open_box(frame: &mut Frame, area: Rect, theme: &Theme, title: &str, width: u16, height: u16) -> Rect {
+    const ASCII: border::Set = border::Set {
+        top_left: "+",
+        top_right: "+",
+        bottom_left: "+",
+        bottom_right: "+",
+        vertical_left: "|",
+        vertical_right: "|",
+        horizontal_top: "-",
+        horizontal_bottom: "-",
+    };
+    let set = if theme.glyphs == Glyphs::Ascii { ASCII } else { border::PLAIN };
+    let (width, height) = (width.min(area.width), height.min(area.height));
+    let at = Rect {
+        x: area.x + (area.width - width) / 2,
+        y: area.y + (area.height - height) / 2,
+        width,
+        height,
+    };
+    let block = Block::bordered()
+        .border_set(set)
+        .border_style(theme.style(Role::Heading))
+        .title(span(theme, Role::Heading, format!(" {title} ")));
+    let inner = block.inner(at);
+    frame.render_widget(Clear, at);
+    frame.render_widget(block, at);
+    Rect { x: inner.x + 1, width: inner.width.saturating_sub(2), ..inner }
+}
+
+fn popup(frame: &mut Frame, area: Rect, model: &Model, title: &str, width: u16, lines: Vec<Line<'static>>) {
+    let inside = usize::from(width.saturating_sub(4)).max(1);
+    let rows: usize = lines.iter().map(|line| line.width().div_ceil(inside).max(1)).sum();
+    let inner = open_box(frame, area, &model.theme, title, width, rows as u16 + 2);
+    frame.render_widget(Paragraph::new(lines).wrap(Wrap { trim: false }), inner);
+}
+
+/// The two answers; Cancel is the default and comes first.
+fn choice(model: &Model, key: &str, text: &str) -> Line<'static> {
+    let theme = &model.theme;
+    Line::from(vec![
+        span(theme, Role::Selected, " Cancel "),
+        span(theme, Role::Quiet, " Enter, or any other key     "),
+        span(theme, Role::Key, key.to_owned()),
+        span(theme, Role::Text, format!(" {text}")),
+    ])
+}
+
+fn approve(model: &Model, trial: u32, waited: bool) -> Vec<Line<'static>> {
+    let theme = &model.theme;
+    let key = model.keymap.key(Action::Approve);
+    let mut lines = Vec::new();
+    if let Some(proposal) = &model.proposal {
+        let values: Vec<String> = proposal
+            .parameters
+            .iter()
+            .map(|p| {
+                let unit = model.parameter(&p.name).map_or("", |info| info.unit.as_str());
+                format!("{} {} {unit}", p.name, number(p.value))
+            })
+            .collect();
+        lines.push(Line::from(format!("Trial #{trial}: {}", values.join(", "))));
+    }
+    lines.push(Line::from("The area is clear, and nobody is near the robot?"));
+    lines.push(Line::default());
+    let mut answer = choice(model, &key, "jump");
+    if !waited {
+        answer.push_span(span(theme, Role::Quiet, " (in a moment)"));
+    }
+    lines.push(answer);
+    lines
+}
+
+fn quit(model: &Model) -> Vec<Line<'static>> {
+    let mut lines = Vec::new();
+    if model.robot_needs_us() {
+        lines.push(Line::from("The robot is armed: it will sit down before the program ends."));
+    }
+    if let Some(trial) = model.under_review() {
+        lines.push(Line::from(format!("Trial #{} has no verdict yet.", trial.trial)));
+    }
+    lines.push(Line::default());
+    lines.push(choice(model, "y", "quit"));
+    lines
+}
+
+fn overrides(model: &Model, form: &OverrideForm) -> Vec<Line<'static>> {
+    let theme = &model.theme;
+    let mut lines = Vec::new();
+    for (index, row) in form.rows.iter().enumerate() {
+        let selected = index == form.selected;
+        let mark = if selected { ">" } else { " " };
+        let mut spans = vec![
+            span(theme, if selected { Role::Key } else { Role::Text }, format!("{mark} {:<4}", row.name)),
+        ];
+        match &form.typing {
+            Some(input) if selected => {
+                // As wide as the number it replaces, so that the line does not jump.
+                spans.push(Span::raw(" ".repeat(8_usize.saturating_sub(input.value().chars().count() + 1))));
+                spans.extend(edited(theme, input));
+            }
+            _ => spans.push(Span::raw(format!("{:>8}", number(row.value)))),
+        }
+        spans.push(span(theme, Role::Quiet, format!(" {:<3}", row.unit)));
+        spans.push(span(theme, Role::Quiet, format!(" {:>6} ", number(row.low))));
+        spans.push(span(theme, Role::Quiet, proposal::place(theme, row.value, row.low, row.high, 20)));
+        spans.push(span(theme, Role::Quiet, format!(" {:<6}", number(row.high))));
+        if row.value != row.before {
+            spans.push(span(theme, Role::Warning, format!(" was {}", number(row.before))));
+        }
+        lines.push(Line::from(spans));
+    }
+    lines.push(Line::default());
+    match &form.problem {
+        Some(problem) => lines.push(Line::from(span(theme, Role::Bad, problem.clone()))),
+        None => lines.push(Line::from(span(theme, Role::Quiet, "Nothing moves by this: it is approved like any other proposal."))),
+    }
+    lines
+}
+
+/// A line of text with its cursor.
+fn edited(theme: &Theme, input: &Input) -> Vec<Span<'static>> {
+    let text: Vec<char> = input.value().chars().collect();
+    let at = input.cursor().min(text.len());
+    let part = |chars: &[char]| chars.iter().collect::<String>();
+    vec![
+        Span::raw(part(&text[..at])),
+        span(theme, Role::Selected, text.get(at).map_or(" ".to_owned(), char::to_string)),
+        Span::raw(text.get(at + 1..).map(part).unwrap_or_default()),
+    ]
+}
+
+fn field_title(purpose: Purpose) -> String {
+    match purpose {
+        Purpose::Note(trial) => format!("Note on trial #{trial}"),
+        Purpose::HandValue(trial) => format!("Trial #{trial}, measured by hand"),
+        Purpose::Continue => "How many more trials?".to_owned(),
+        Purpose::TrialNumber => "Go to trial".to_owned(),
+        Purpose::LogSearch => "Search the log".to_owned(),
+    }
+}
+
+fn field(model: &Model, purpose: Purpose, input: &Input, problem: Option<&str>) -> Vec<Line<'static>> {
+    let theme = &model.theme;
+    let mut spans = edited(theme, input);
+    if matches!(purpose, Purpose::HandValue(_)) {
+        spans.push(span(theme, Role::Quiet, format!(" {}", model.session.unit)));
+    }
+    let below = match (problem, purpose) {
+        (Some(problem), _) => span(theme, Role::Bad, problem.to_owned()),
+        (None, Purpose::HandValue(_)) => span(theme, Role::Quiet, "replaces the measured value; empty: back to the measured one"),
+        (None, Purpose::LogSearch) => span(theme, Role::Quiet, "empty: all lines"),
+        (None, Purpose::Note(_)) if model.robot_needs_us() => {
+            span(theme, Role::Quiet, "the robot is armed: Space is STOP, _ writes a space")
+        }
+        _ => span(theme, Role::Quiet, ""),
+    };
+    vec![Line::from(spans), Line::default(), Line::from(below)]
+}
+
+fn render_palette(frame: &mut Frame, area: Rect, model: &Model, input: &Input, selected: usize) {
+    let theme = &model.theme;
+    let inner = open_box(frame, area, theme, "Actions", 80, area.height.min(24));
+    let mut spans = vec![span(theme, Role::Key, ":")];
+    spans.extend(edited(theme, input));
+    frame.render_widget(Line::from(spans), Rect { height: 1, ..inner });
+    let rows = palette_rows(input.value(), model);
+    let space = usize::from(inner.height.saturating_sub(2)).max(1);
+    let first = selected.saturating_sub(space - 1);
+    for (line, (index, (info, legal))) in rows.iter().enumerate().skip(first).take(space).enumerate() {
+        let area = Rect { y: inner.y + 2 + line as u16, height: 1, ..inner };
+        let (key, name) = (model.keymap.key(info.action), info.name);
+        let text = match legal {
+            Ok(()) => info.help.to_owned(),
+            Err(reason) => format!("({reason})"),
+        };
+        let role = if legal.is_ok() { Role::Text } else { Role::Quiet };
+        let text = cut(&format!("{key:<9} {name:<16}{text}"), usize::from(inner.width));
+        let style = if index == selected { theme.style(Role::Selected) } else { theme.style(role) };
+        frame.render_widget(Line::from(Span::styled(text, style)), area);
+    }
+}
+
+fn render_help(frame: &mut Frame, area: Rect, model: &Model, scroll: usize) {
+    let lines = help::lines(model);
+    let height = area.height.min(lines.len() as u16 + 2);
+    let room = usize::from(height.saturating_sub(2));
+    let scroll = scroll.min(lines.len().saturating_sub(room));
+    let more = if lines.len() > room { format!("Keys ({}-{} of {}, Up Down)", scroll + 1, scroll + room, lines.len()) } else { "Keys".to_owned() };
+    let inner = open_box(frame, area, &model.theme, &more, 78, height);
+    let shown: Vec<Line> = lines.into_iter().skip(scroll).take(room).collect();
+    frame.render_widget(Paragraph::new(shown), inner);
+}

@@ -1,0 +1,191 @@
+//! The permanent frame: two lines at the top, the tabs, the answer line, and what remains of them on a small terminal.
+//!
+//! ```text
+//!  READY      SIM  forward   trial #8   7 of 20 judged   best 0.642 m (#3)       REC 03:12
+//!  STOP Space F12    loop 0 late, worst 0.1 ms    link 0 ms    motor 31 C    battery 87 %
+//! ```
+
+use quadfrog::realtime::telemetry::Mode;
+use quadfrog::recording::record::Level;
+use ratatui::Frame;
+use ratatui::layout::{Alignment, Rect};
+use ratatui::text::{Line, Span};
+use ratatui::widgets::Paragraph;
+
+use super::{MIN_COLUMNS, MIN_ROWS, clock, cut, number, span};
+use crate::action::Action;
+use crate::model::{Model, View};
+use crate::theme::Role;
+
+/// Age of the newest tick at which the numbers on the screen are called old, ms.
+const STALE_MS: u128 = 500;
+
+/// The two lines that nothing covers.
+pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
+    let [first, second] = rows(area);
+    frame.render_widget(Line::from(identity(model)), first);
+    frame.render_widget(Line::from(recording(model)).alignment(Alignment::Right), first);
+    frame.render_widget(Line::from(condition(model)), second);
+}
+
+fn rows(area: Rect) -> [Rect; 2] {
+    [Rect { height: 1, ..area }, Rect { y: area.y + 1, height: area.height.saturating_sub(1).min(1), ..area }]
+}
+
+/// The mode as a word on its colour.
+pub fn mode_span(model: &Model) -> Span<'static> {
+    let mode = model.mode();
+    let role = match mode {
+        Mode::Damped | Mode::Fault => Role::Alarm,
+        Mode::Ready | Mode::Review => Role::Good,
+        Mode::StandUp | Mode::Countdown | Mode::Jump | Mode::Settle | Mode::SitDown => Role::Warning,
+        Mode::Offline | Mode::Observe | Mode::Disarmed => Role::Key,
+    };
+    span(&model.theme, role, format!(" {:<9} ", mode.name()))
+}
+
+/// What is being driven: never a guess, and never by colour alone.
+fn backend(model: &Model) -> Span<'static> {
+    let theme = &model.theme;
+    match model.session.backend.as_str() {
+        _ if model.replay.is_some() => span(theme, Role::Heading, "REPLAY"),
+        "" => span(theme, Role::Quiet, "starting"),
+        "sim" => span(theme, Role::Heading, "SIM"),
+        hardware => span(theme, Role::Hardware, format!(" {} ", hardware.to_uppercase())),
+    }
+}
+
+fn identity(model: &Model) -> Vec<Span<'static>> {
+    let theme = &model.theme;
+    let mut spans = vec![mode_span(model), Span::raw(" "), backend(model), Span::raw("  ")];
+    let session = &model.session;
+    if session.observe {
+        spans.push(span(theme, Role::Warning, "OBSERVING  "));
+    }
+    spans.push(Span::raw(session.task.clone()));
+    if let Some(info) = model.stage {
+        let finished = model.counted();
+        spans.push(Span::raw(format!("   trial #{}   {finished} of {} judged", info.trial, session.budget)));
+    }
+    if let Some((best, value)) = model.best().and_then(|best| Some((best, best.value?))) {
+        spans.push(Span::raw("   best "));
+        spans.push(span(theme, Role::Good, format!("{} {}", number(value), session.unit)));
+        spans.push(span(theme, Role::Quiet, format!(" (#{})", best.trial)));
+    }
+    spans
+}
+
+fn recording(model: &Model) -> Vec<Span<'static>> {
+    let theme = &model.theme;
+    if let Some(replay) = &model.replay {
+        let state = if replay.playing { format!("x{}", replay.speed) } else { "paused".to_owned() };
+        let text = format!("{} / {}  {state} ", clock(replay.time_ns), clock(replay.duration_ns));
+        return vec![span(theme, Role::Text, text)];
+    }
+    let counters = &model.snapshot.counters;
+    let elapsed = clock(model.snapshot.tick.time_ns);
+    match (model.session.recording.is_empty(), counters.ticks_not_recorded) {
+        (true, _) => vec![span(theme, Role::Quiet, format!("not recording {elapsed} "))],
+        (false, 0) => vec![span(theme, Role::Good, "REC "), Span::raw(format!("{elapsed} "))],
+        (false, lost) => {
+            vec![span(theme, Role::Bad, format!("REC {lost} ticks lost ")), Span::raw(format!("{elapsed} "))]
+        }
+    }
+}
+
+fn condition(model: &Model) -> Vec<Span<'static>> {
+    let theme = &model.theme;
+    let mut spans = vec![
+        Span::raw(" "),
+        span(theme, Role::Alarm, " STOP "),
+        Span::raw(" "),
+        span(theme, Role::Key, model.keymap.all_keys(Action::Stop)),
+        Span::raw("   "),
+    ];
+    let snapshot = &model.snapshot;
+    let counters = &snapshot.counters;
+    let late = format!("{} late, worst {:.1} ms", counters.late_ticks, counters.worst_lateness_ns as f64 / 1e6);
+    let late_share = counters.late_ticks as f64 / snapshot.tick.number.max(1) as f64;
+    spans.push(span(theme, Role::Quiet, "loop "));
+    spans.push(span(theme, if late_share > 0.001 { Role::Warning } else { Role::Text }, late));
+    if model.session.backend != "sim" && model.replay.is_none() && !model.session.backend.is_empty() {
+        let age = counters.state_age_ms;
+        spans.push(span(theme, Role::Quiet, "   link "));
+        spans.push(span(theme, if age > 5 { Role::Bad } else { Role::Text }, format!("{age} ms")));
+    }
+    let hottest = snapshot.tick.state.motor_temperature_c.iter().copied().fold(0.0, f64::max);
+    if hottest > 0.0 {
+        let role = if hottest >= 60.0 { Role::Bad } else { Role::Text };
+        spans.push(span(theme, Role::Quiet, "   motors "));
+        spans.push(span(theme, role, format!("{hottest:.0} C")));
+    }
+    if let Some(battery) = snapshot.tick.state.battery {
+        let role = if battery.charge_percent < 30.0 { Role::Bad } else { Role::Text };
+        spans.push(span(theme, Role::Quiet, "   battery "));
+        spans.push(span(theme, role, format!("{:.0} %", battery.charge_percent)));
+    }
+    let age_ms = model.clock.saturating_sub(model.snapshot_at).as_millis();
+    if age_ms > STALE_MS && model.replay.is_none() {
+        spans.push(span(theme, Role::Bad, format!("   OLD: nothing new for {:.1} s", age_ms as f64 / 1e3)));
+    }
+    spans
+}
+
+/// The tabs, and at the right what the charts do.
+pub fn render_tabs(frame: &mut Frame, area: Rect, model: &Model) {
+    let theme = &model.theme;
+    let actions = [
+        Action::LiveView,
+        Action::TrialsView,
+        Action::OptimizerView,
+        Action::OverrideView,
+        Action::HealthView,
+        Action::LogView,
+    ];
+    let mut spans = Vec::new();
+    for (view, action) in View::ALL.into_iter().zip(actions) {
+        let text = format!(" {} {} ", model.keymap.key(action), view.name());
+        let role = if view == model.view { Role::Selected } else { Role::Quiet };
+        spans.push(span(theme, role, text));
+    }
+    frame.render_widget(Line::from(spans), area);
+    let help = vec![
+        span(theme, Role::Key, model.keymap.key(Action::Help)),
+        span(theme, Role::Quiet, " help  "),
+        span(theme, Role::Key, model.keymap.key(Action::Palette)),
+        span(theme, Role::Quiet, " actions "),
+    ];
+    frame.render_widget(Line::from(help).alignment(Alignment::Right), area);
+}
+
+/// The newest answer to the operator.
+pub fn render_message(frame: &mut Frame, area: Rect, model: &Model) {
+    let Some(message) = &model.message else { return };
+    let role = match message.level {
+        Level::Info => Role::Text,
+        Level::Warning => Role::Warning,
+        Level::Error => Role::Bad,
+    };
+    let text = cut(&message.text, usize::from(area.width).saturating_sub(1));
+    frame.render_widget(Line::from(vec![Span::raw(" "), span(&model.theme, role, text)]), area);
+}
+
+/// What remains on a terminal that is too small: the mode, STOP, the link and the size that is needed.
+pub fn render_small(frame: &mut Frame, area: Rect, model: &Model) {
+    let theme = &model.theme;
+    let keys = model.keymap.all_keys(Action::Stop);
+    let link = if model.session.backend == "sim" {
+        Span::raw("")
+    } else {
+        Span::raw(format!("link {} ms", model.snapshot.counters.state_age_ms))
+    };
+    let lines = vec![
+        Line::from(vec![mode_span(model), Span::raw(" "), backend(model)]),
+        Line::from(vec![span(theme, Role::Alarm, " STOP "), Span::raw(" "), span(theme, Role::Key, keys)]),
+        Line::from(link),
+        Line::from(format!("terminal {}x{}", area.width, area.height)),
+        Line::from(format!("needed {MIN_COLUMNS}x{MIN_ROWS}")),
+        Line::from(span(theme, Role::Quiet, "keys still work")),
+    ];
+    frame.render_widget(Paragraph::new(lines), area);
+}

@@ -1,0 +1,37 @@
+//! The help overlay, made of the active keymap.
+//!
+//! ```text
+//! ┌ Keys ─────────────────────────────────────────────────────┐
+//! │ Robot                                                     │
+//! │   Space F12   STOP: damp all motors at once, any screen   │
+//! │   A           arm: the robot stands up                    │
+//! └───────────────────────────────────────────────────────────┘
+//! ```
+
+use ratatui::text::Line;
+
+use super::span;
+use crate::action::{ACTIONS, Group};
+use crate::model::Model;
+use crate::theme::Role;
+
+/// The lines of the help.
+pub fn lines(model: &Model) -> Vec<Line<'static>> {
+    let theme = &model.theme;
+    let mut lines = Vec::new();
+    for group in Group::ALL {
+        if !lines.is_empty() {
+            lines.push(Line::default());
+        }
+        lines.push(Line::from(span(theme, Role::Heading, group.title())));
+        for info in ACTIONS.iter().filter(|info| info.group == group) {
+            let legal = (info.legal)(model).is_ok();
+            let (key, text) = if legal { (Role::Key, Role::Text) } else { (Role::Quiet, Role::Quiet) };
+            lines.push(Line::from(vec![
+                span(theme, key, format!("  {:<10} ", model.keymap.all_keys(info.action))),
+                span(theme, text, info.help),
+            ]));
+        }
+    }
+    lines
+}

@@ -1,0 +1,65 @@
+//! View 6, Log: what happened, every command and its outcome, and markers at trials and faults.
+//!
+//! ```text
+//! Log ─────────────────────────────────── 214 lines; F all levels; / search
+//! 00:12.420   operator  approve trial 7: done
+//! 00:15.902 > trial     trial 7: accept, J = 0.642 m
+//! 00:16.110 W operator  override Fx = 180: refused: outside 0 to 150 N
+//! ```
+
+use quadfrog::recording::record::Level;
+use ratatui::Frame;
+use ratatui::layout::Rect;
+use ratatui::text::{Line, Span};
+
+use super::{cut, heading, span};
+use crate::action::Action;
+use crate::model::{LogLine, Model};
+use crate::theme::Role;
+
+/// Draws the view.
+pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
+    let lines: Vec<&LogLine> = model.log_lines().collect();
+    let body = heading(frame, area, &model.theme, "Log", &summary(model, lines.len()));
+    let space = usize::from(body.height);
+    let last = lines.len().saturating_sub(model.log_view.back).max(space.min(lines.len()));
+    let first = last.saturating_sub(space);
+    for (row, line) in lines[first..last].iter().enumerate() {
+        let area = Rect { y: body.y + row as u16, height: 1, ..body };
+        frame.render_widget(line_of(model, line, usize::from(body.width)), area);
+    }
+}
+
+fn summary(model: &Model, shown: usize) -> String {
+    let view = &model.log_view;
+    let level = match view.level {
+        None | Some(Level::Info) => "all levels",
+        Some(Level::Warning) => "warnings and errors",
+        Some(Level::Error) => "errors",
+    };
+    let search = if view.search.is_empty() { "search".to_owned() } else { format!("with \"{}\"", view.search) };
+    let back = if view.back > 0 { format!("; {} back", view.back) } else { String::new() };
+    let key = |action| model.keymap.key(action);
+    format!("{shown} lines{back}; {level} ({}), {search} ({})", key(Action::Filter), key(Action::Search))
+}
+
+fn line_of(model: &Model, line: &LogLine, width: usize) -> Line<'static> {
+    let theme = &model.theme;
+    let ms = line.time_ns / 1_000_000;
+    let time = format!("{:>3}:{:02}.{:03} ", ms / 60_000, ms / 1000 % 60, ms % 1000);
+    let (mark, role) = match line.level {
+        Level::Error => ("E", Role::Bad),
+        Level::Warning => ("W", Role::Warning),
+        Level::Info if line.marker => (">", Role::Heading),
+        Level::Info => (" ", Role::Text),
+    };
+    Line::from(vec![
+        span(theme, Role::Quiet, time),
+        span(theme, role, format!("{mark} ")),
+        span(theme, Role::Quiet, format!("{:<9} ", cut(&line.source, 9))),
+        match line.level {
+            Level::Info => Span::raw(cut(&line.text, width.saturating_sub(23))),
+            _ => span(theme, role, cut(&line.text, width.saturating_sub(23))),
+        },
+    ])
+}

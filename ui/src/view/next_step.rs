@@ -1,0 +1,169 @@
+//! The last line: what the operator can do next, in words.
+//!
+//! ```text
+//!  Press g twice to jump  ·  o override  ·  n skip  ·  D sit down
+//! ```
+
+use quadfrog::realtime::telemetry::Mode;
+use quadfrog::recording::record::{Stage, Verdict};
+use ratatui::Frame;
+use ratatui::layout::Rect;
+use ratatui::text::{Line, Span};
+
+use super::span;
+use crate::action::Action;
+use crate::dialog::{Dialog, Purpose};
+use crate::model::Model;
+use crate::theme::Role;
+
+/// The most likely next step, and the others.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct NextStep {
+    /// The step itself, a sentence.
+    pub lead: String,
+    /// Key and what it does.
+    pub others: Vec<(String, &'static str)>,
+}
+
+/// What can be done next.
+pub fn next_step(model: &Model) -> NextStep {
+    match &model.dialog {
+        Some(dialog) => in_dialog(model, dialog),
+        None if model.replay.is_some() => replay(model),
+        None if model.session.observe => step("Observing: this session can change nothing.", model, &[(Action::Quit, "quit")]),
+        None => live(model),
+    }
+}
+
+fn step(lead: impl Into<String>, model: &Model, others: &[(Action, &'static str)]) -> NextStep {
+    let others = others
+        .iter()
+        .filter(|(action, _)| action.legal(model).is_ok())
+        .map(|(action, text)| (model.keymap.key(*action), *text))
+        .collect();
+    NextStep { lead: lead.into(), others }
+}
+
+fn live(model: &Model) -> NextStep {
+    let key = |action| model.keymap.key(action);
+    let quit = (Action::Quit, "quit");
+    match model.mode() {
+        Mode::Countdown => return step("Jump in a moment: any key cancels it.", model, &[]),
+        Mode::StandUp => return step("Standing up.", model, &[(Action::SitDown, "sit down")]),
+        Mode::Jump => return step("Jumping.", model, &[]),
+        Mode::Settle => return step("Landed; waiting until the robot is quiet.", model, &[]),
+        Mode::SitDown => return step("Sitting down.", model, &[]),
+        _ => {}
+    }
+    let stage = model.stage.map(|info| info.stage);
+    if stage == Some(Stage::Review) {
+        return review(model);
+    }
+    match model.mode() {
+        Mode::Damped | Mode::Fault => {
+            let because = if model.stopped_because.is_empty() { "stopped" } else { &model.stopped_because };
+            step(format!("{because}. Look at the robot, then press {}.", key(Action::Acknowledge)), model, &[(Action::Undo, "undo"), quit])
+        }
+        Mode::Offline | Mode::Observe => step("Waiting for the robot to answer.", model, &[quit]),
+        Mode::Disarmed if stage == Some(Stage::Finished) => step(
+            "The study is finished.",
+            model,
+            &[(Action::Continue, "more trials"), (Action::Undo, "undo"), (Action::TrialsView, "table"), quit],
+        ),
+        Mode::Disarmed => step(
+            format!("Press {} to arm: the robot stands up.", key(Action::Arm)),
+            model,
+            &[(Action::Override, "override"), (Action::Undo, "undo"), (Action::Help, "help"), quit],
+        ),
+        Mode::Ready if stage == Some(Stage::Finished) => step(
+            "The study is finished.",
+            model,
+            &[(Action::Continue, "more trials"), (Action::SitDown, "sit down"), (Action::Undo, "undo"), (Action::TrialsView, "table")],
+        ),
+        Mode::Ready if model.proposal_on_table().is_some() => step(
+            format!("Press {} twice to jump.", key(Action::Approve)),
+            model,
+            &[(Action::Override, "override"), (Action::Skip, "skip"), (Action::Undo, "undo"), (Action::SitDown, "sit down")],
+        ),
+        _ => step("The sampler is choosing the next trial.", model, &[(Action::SitDown, "sit down")]),
+    }
+}
+
+fn review(model: &Model) -> NextStep {
+    let key = |action| model.keymap.key(action);
+    let lead = match model.under_review().and_then(|trial| trial.suggested) {
+        Some(Verdict::Accept) => format!("Judge it: {} accept (suggested)", key(Action::Accept)),
+        Some(Verdict::Fall) => format!("Judge it: {} fall (suggested)", key(Action::Fall)),
+        Some(Verdict::Void) => format!("Judge it: {} void (suggested)", key(Action::Void)),
+        None => "Judge it".to_owned(),
+    };
+    let suggested = model.under_review().and_then(|trial| trial.suggested);
+    let mut verdicts = vec![(Action::Accept, "accept"), (Action::Fall, "fall"), (Action::Void, "void")];
+    verdicts.retain(|(action, _)| {
+        !matches!(
+            (action, suggested),
+            (Action::Accept, Some(Verdict::Accept)) | (Action::Fall, Some(Verdict::Fall)) | (Action::Void, Some(Verdict::Void))
+        )
+    });
+    verdicts.extend([(Action::Rerun, "re-run"), (Action::HandValue, "own value"), (Action::Note, "note")]);
+    step(lead, model, &verdicts)
+}
+
+fn replay(model: &Model) -> NextStep {
+    let playing = model.replay.as_ref().is_some_and(|replay| replay.playing);
+    let key = model.keymap.key(Action::PlayPause);
+    step(
+        format!("{key} {}", if playing { "pauses" } else { "plays" }),
+        model,
+        &[
+            (Action::StepBack, "step back"),
+            (Action::StepForward, "step"),
+            (Action::PreviousMarker, "last trial"),
+            (Action::NextMarker, "next trial"),
+            (Action::Slower, "slower"),
+            (Action::Faster, "faster"),
+            (Action::Quit, "quit"),
+        ],
+    )
+}
+
+fn in_dialog(model: &Model, dialog: &Dialog) -> NextStep {
+    let plain = |lead: String| NextStep { lead, others: Vec::new() };
+    match dialog {
+        Dialog::Approve { trial, .. } => {
+            plain(format!("Press {} again to jump (trial #{trial}). Any other key cancels.", model.keymap.key(Action::Approve)))
+        }
+        Dialog::Arm => plain("Press y to stand the robot up. Any other key cancels.".to_owned()),
+        Dialog::Quit => plain("Press y to quit. Any other key cancels.".to_owned()),
+        Dialog::Override(form) if form.typing.is_some() => plain("Enter takes the value and applies. Esc drops it.".to_owned()),
+        Dialog::Override(_) => {
+            plain("Type a value, or Left Right 1 %, PgUp PgDn 10 %. Enter applies, Esc cancels.".to_owned())
+        }
+        Dialog::Field { purpose: Purpose::Note(_), .. } if model.robot_needs_us() => {
+            plain("Enter keeps the note, Esc cancels. Armed: Space is STOP, _ writes a space.".to_owned())
+        }
+        Dialog::Field { .. } => plain("Enter confirms, Esc cancels.".to_owned()),
+        Dialog::Palette { .. } => plain("Type to filter, Up Down choose, Enter does it, Esc closes.".to_owned()),
+        Dialog::Help { .. } => plain("Up Down scroll, any other key closes.".to_owned()),
+        Dialog::Details { .. } => plain("Up Down other trials, Esc closes.".to_owned()),
+    }
+}
+
+/// Draws the line.
+pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
+    let theme = &model.theme;
+    let next = next_step(model);
+    let mut left = usize::from(area.width).saturating_sub(next.lead.chars().count() + 1);
+    let mut spans = vec![Span::raw(" "), span(theme, Role::Key, next.lead)];
+    for (key, text) in next.others {
+        let width = key.chars().count() + text.chars().count() + 4;
+        let Some(rest) = left.checked_sub(width) else { break };
+        left = rest;
+        spans.extend([
+            span(theme, Role::Quiet, format!(" {} ", theme.dot())),
+            span(theme, Role::Key, key),
+            span(theme, Role::Quiet, format!(" {text}")),
+        ]);
+    }
+    frame.render_widget(Line::from(spans), area);
+}

@@ -1,0 +1,120 @@
+//! View 3, Optimizer: how the study goes, what each parameter does, and where the robot landed.
+//!
+//! ```text
+//! J over trials ──────── best 0.642 m   Landings, from above ─── x forward, y left
+//!         *───                                  o
+//!    o──                                      o * x
+//! f0 ─────────────  Fx ────────────────  Fz ───────────────
+//!    o  *             o   *                o *
+//! x      x          x   x               x      x
+//! 0.75       1.75   0         150       150        350
+//! ```
+
+use quadfrog::recording::record::Verdict;
+use ratatui::Frame;
+use ratatui::layout::{Constraint, Layout, Rect};
+
+use super::objective::sign;
+use super::{heading, number, objective};
+use crate::model::Model;
+use crate::theme::Role;
+
+/// Draws the view.
+pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
+    let [upper, lower] = Layout::vertical([Constraint::Fill(1); 2]).areas(area);
+    let [history, _, landings] =
+        Layout::horizontal([Constraint::Fill(3), Constraint::Length(2), Constraint::Fill(2)]).areas(upper);
+    objective::render(frame, history, model);
+    render_landings(frame, landings, model);
+    let parameters = &model.session.parameters;
+    if parameters.is_empty() {
+        return;
+    }
+    let columns = Layout::horizontal(vec![Constraint::Fill(1); parameters.len()]).spacing(2).split(lower);
+    for (index, column) in columns.iter().enumerate() {
+        render_scatter(frame, *column, model, index);
+    }
+}
+
+/// Every judged trial's value over one parameter; the proposal as a line.
+fn render_scatter(frame: &mut Frame, area: Rect, model: &Model, index: usize) {
+    let theme = &model.theme;
+    let info = &model.session.parameters[index];
+    let body = heading(frame, area, theme, &format!("J over {}", info.name), &info.unit);
+    let [plot, scale] = Layout::vertical([Constraint::Fill(1), Constraint::Length(1)]).areas(body);
+    if plot.height == 0 || plot.width < 8 {
+        return;
+    }
+    let high = model.trials.values().filter_map(|trial| trial.value).fold(1e-3, f64::max);
+    let low = model.trials.values().filter_map(|trial| trial.value).fold(0.0, f64::min);
+    let column = |value: f64| {
+        let share = ((value - info.low) / (info.high - info.low)).clamp(0.0, 1.0);
+        plot.x + (share * f64::from(plot.width - 1)).round() as u16
+    };
+    let row = |value: f64| {
+        let share = ((high - value) / (high - low)).clamp(0.0, 1.0);
+        plot.y + (share * f64::from(plot.height - 1)).round() as u16
+    };
+    let buffer = frame.buffer_mut();
+    let proposed = model.proposal_on_table().and_then(|p| p.parameters.iter().find(|p| p.name == info.name));
+    if let Some(proposed) = proposed {
+        for y in plot.y..plot.bottom() {
+            buffer.set_string(column(proposed.value), y, theme.bar(), theme.style(Role::Quiet));
+        }
+    }
+    let best = model.best().map(|trial| trial.trial);
+    for trial in model.trials.values().filter(|trial| trial.verdict != Some(Verdict::Void)) {
+        let Some((_, value)) = trial.parameters.iter().find(|(name, _)| *name == info.name) else { continue };
+        let Some(objective) = trial.value else { continue };
+        let (mark, role) = sign(trial.verdict);
+        let mark = if best == Some(trial.trial) { "*" } else { mark };
+        buffer.set_string(column(*value), row(objective), mark, theme.style(role));
+    }
+    let (low, high) = (number(info.low), number(info.high));
+    buffer.set_string(scale.x, scale.y, &low, theme.style(Role::Quiet));
+    let right = scale.right().saturating_sub(high.len() as u16);
+    buffer.set_string(right, scale.y, high, theme.style(Role::Quiet));
+    if let Some(proposed) = proposed {
+        let text = format!("{} now", number(proposed.value));
+        let at = (column(proposed.value).saturating_sub(text.len() as u16 / 2)).clamp(
+            scale.x + low.len() as u16 + 1,
+            right.saturating_sub(text.len() as u16 + 1).max(scale.x + low.len() as u16 + 1),
+        );
+        buffer.set_string(at, scale.y, text, theme.style(Role::Text));
+    }
+}
+
+/// Where the trunk came to rest, from above: forward is up, left is left, the start is `+`.
+fn render_landings(frame: &mut Frame, area: Rect, model: &Model) {
+    let theme = &model.theme;
+    let landed = || model.trials.values().filter_map(|trial| Some((trial, trial.measured?)));
+    let body = heading(frame, area, theme, "Landings, from above", "forward is up");
+    if body.height < 3 || body.width < 10 {
+        return;
+    }
+    // A character is about twice as high as wide; the same metres per length both ways.
+    let reach = landed().fold(0.2_f64, |reach, (_, m)| reach.max(m.dx_m.abs()).max(m.dy_m.abs()));
+    let ahead = landed().fold(0.1_f64, |ahead, (_, m)| ahead.max(m.dx_m));
+    let behind = landed().fold(0.1_f64, |behind, (_, m)| behind.max(-m.dx_m));
+    let sideways = landed().fold(0.1_f64, |side, (_, m)| side.max(m.dy_m.abs()));
+    let per_row = ((ahead + behind) / f64::from(body.height - 1)).max(2.0 * 2.0 * sideways / f64::from(body.width - 1));
+    let zero_row = f64::from(body.height - 1) * ahead / (ahead + behind);
+    let place = |dx: f64, dy: f64| {
+        let x = f64::from(body.width - 1) / 2.0 - dy / (per_row / 2.0);
+        let y = zero_row - dx / per_row;
+        let clamp = |v: f64, max: u16| v.round().clamp(0.0, f64::from(max - 1)) as u16;
+        (body.x + clamp(x, body.width), body.y + clamp(y, body.height))
+    };
+    let buffer = frame.buffer_mut();
+    let (x, y) = place(0.0, 0.0);
+    buffer.set_string(x, y, "+", theme.style(Role::Quiet));
+    let best = model.best().map(|trial| trial.trial);
+    for (trial, m) in landed() {
+        let (mark, role) = sign(trial.verdict);
+        let mark = if best == Some(trial.trial) { "*" } else { mark };
+        let (x, y) = place(m.dx_m, m.dy_m);
+        buffer.set_string(x, y, mark, theme.style(role));
+    }
+    let text = format!("{} m", number(reach));
+    buffer.set_string(body.x, body.y, text, theme.style(Role::Quiet));
+}
