@@ -1,4 +1,8 @@
 //! The simulator's speed, measured the same way by `benches/simulator.rs` and by the program's own bench.
+//!
+//! A step on four contacts that takes three sweeps does 11,800 floating-point operations in 22,800 instructions (callgrind, x86-64
+//! without extensions: two lanes). At 1.8 us that is 6.6 of the 12 Gflop/s that two such additions or multiplications a
+//! cycle give at 3 GHz: about half of the machine's limit. The rest is moving numbers between lanes and legs.
 
 use std::time::Instant;
 
