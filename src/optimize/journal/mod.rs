@@ -111,7 +111,8 @@ impl Journal {
     /// # Errors
     /// [`JournalError`] if the server cannot be reached or its journal not be read.
     pub fn connect(redis: JournalRedis) -> Result<Self, JournalError> {
-        let mut journal = Journal { backend: Backend::Redis(Box::new(redis)), worker: worker_id(), replay: Replay::default() };
+        let mut journal =
+            Journal { backend: Backend::Redis(Box::new(redis)), worker: worker_id(), replay: Replay::default() };
         journal.refresh()?;
         Ok(journal)
     }
