@@ -263,7 +263,7 @@ fn the_lock_of_a_dead_writer_is_broken() {
     let file = JournalFile::new(&path, Durability::Buffered, Duration::from_millis(200)).unwrap();
     let mut journal = Journal::open(file).unwrap();
     let create = Operation::CreateStudy { name: "after".into(), directions: vec![2] };
-    journal.commit(|_| Ok::<_, JournalError>(vec![create])).unwrap();
+    journal.commit(|_| Ok::<_, JournalError>(vec![create.clone()])).unwrap();
     assert_eq!(journal.replay().find("after"), Some(0));
     assert!(std::fs::symlink_metadata(path.with_extension("log.lock")).is_err(), "the lock is gone");
 }

@@ -1,4 +1,15 @@
 //! The optimizer: ask and tell over plain numbers. It does not know what a robot is.
+//!
+//! | module | what it is |
+//! |---|---|
+//! | [`space`], [`trial`] | what is searched, what was tried |
+//! | [`sampler`] | the settings, and who proposes: [`tpe`] (on [`parzen`], [`truncnorm`]), [`gp`], [`sobol`] |
+//! | [`mt19937`] | the random streams, equal to NumPy's |
+//! | [`study`] | draft, begin, tell: what has been tried and what comes next |
+//! | [`journal`] | the study on disk or on a Redis server, in Optuna's format |
+//! | [`insight`], [`repeats`] | for the operator: densities, risk; repeats of a point, confirming the best |
+//!
+//! `README.md` beside this file compares the samplers and says where equality with Optuna ends.
 
 pub mod gp;
 pub mod insight;

@@ -79,7 +79,7 @@ impl JournalError {
 enum Backend {
     Memory,
     File(JournalFile),
-    Redis(JournalRedis),
+    Redis(Box<JournalRedis>),
 }
 
 /// A journal: its state and the way to change it.
@@ -111,7 +111,8 @@ impl Journal {
     /// # Errors
     /// [`JournalError`] if the server cannot be reached or its journal not be read.
     pub fn connect(redis: JournalRedis) -> Result<Self, JournalError> {
-        let mut journal = Journal { backend: Backend::Redis(redis), worker: worker_id(), replay: Replay::default() };
+        let mut journal =
+            Journal { backend: Backend::Redis(Box::new(redis)), worker: worker_id(), replay: Replay::default() };
         journal.refresh()?;
         Ok(journal)
     }
