@@ -31,7 +31,7 @@ use crate::view;
 /// The loop wakes at least this often: for the sign of life, twenty times a second.
 const PULSE: Duration = Duration::from_millis(50);
 /// Frames per second at most over a slow link.
-const LOW_BANDWIDTH_FRAMES: u32 = 4;
+const LOW_BANDWIDTH_FRAMES: u32 = 2;
 
 /// How the console looks and behaves.
 #[derive(Debug, Clone)]

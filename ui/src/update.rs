@@ -529,7 +529,7 @@ fn take_record(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
             if stopped {
                 model.stopped_because = change.cause.clone();
                 // The key that stopped has been answered already.
-                if !model.message.as_ref().is_some_and(|message| message.text.starts_with("STOP")) {
+                if change.cause != "STOP" || !model.message.as_ref().is_some_and(|message| message.text.starts_with("STOP")) {
                     say(model, level, format!("{}: {}", change.to.name(), change.cause));
                 }
             }
