@@ -176,7 +176,8 @@ impl Chart<'_> {
             self.draw_ghost(buffer, plot, ghost, (low, high));
         }
         let mut dots = Dots::new(plot, self.theme.glyphs);
-        let samples = self.history.window(self.axis.window_ns).map(|sample| (sample.time_ns, (self.signal.value)(sample)));
+        let samples =
+            self.history.window(self.axis.window_ns).map(|sample| (sample.time_ns, (self.signal.value)(sample)));
         self.trace(&mut dots, samples, (low, high));
         dots.draw(buffer, plot, self.theme.style(self.signal.role));
         self.shade(buffer, plot);
@@ -185,7 +186,8 @@ impl Chart<'_> {
 
     fn range(&self) -> (f32, f32) {
         let values = || self.history.window(self.axis.window_ns).map(|sample| (self.signal.value)(sample));
-        let fits = |&&(low, high): &&(f32, f32)| values().all(|value| !value.is_finite() || (low..=high).contains(&value));
+        let fits =
+            |&&(low, high): &&(f32, f32)| values().all(|value| !value.is_finite() || (low..=high).contains(&value));
         let widest = self.signal.ranges.last().copied().unwrap_or((-1.0, 1.0));
         self.signal.ranges.iter().find(fits).copied().unwrap_or(widest)
     }
@@ -211,7 +213,8 @@ impl Chart<'_> {
             let value = if value.abs() < 0.0005 { 0.0 } else { value };
             if value.abs() >= 100.0 { format!("{value:+.0}") } else { format!("{value:+.3}") }
         });
-        let range = if low == -high { format!("{}{high}", self.theme.plus_minus()) } else { format!("{low} to {high}") };
+        let range =
+            if low == -high { format!("{}{high}", self.theme.plus_minus()) } else { format!("{low} to {high}") };
         let name = format!("{} ", self.signal.name);
         let width = usize::from(area.width);
         buffer.set_string(area.x, area.y, cut(&name, width), self.theme.style(self.signal.role));
