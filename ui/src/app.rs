@@ -46,6 +46,7 @@ impl ConsoleOptions {
     /// The settings with what the command line says on top.
     pub fn new(settings: Settings, colours: Option<ColourChoice>, ascii: bool, low_bandwidth: bool) -> ConsoleOptions {
         let mut settings = settings;
+        settings.low_bandwidth = low_bandwidth;
         if low_bandwidth {
             settings.colours =
                 if settings.colours == ColourChoice::None { ColourChoice::None } else { ColourChoice::Named };

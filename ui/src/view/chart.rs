@@ -158,6 +158,8 @@ pub struct Chart<'a> {
     pub ghost: Option<&'a [Sample]>,
     /// The time that the heading's value is read at; the newest without it.
     pub cursor_ns: Option<u64>,
+    /// Whether the sweep's cursor is drawn as a line.
+    pub cursor_line: bool,
     /// Colours and characters.
     pub theme: Theme,
 }
@@ -280,7 +282,7 @@ impl Chart<'_> {
         let width = usize::from(plot.width);
         let (column, role) = match self.cursor_ns {
             Some(time_ns) => (self.axis.column(time_ns, width), Role::Key),
-            None if self.axis.mode == ChartMode::Sweep => {
+            None if self.axis.mode == ChartMode::Sweep && self.cursor_line => {
                 (self.axis.column(self.axis.newest_ns, width).map(|column| (column + 1) % width), Role::Quiet)
             }
             None => return,

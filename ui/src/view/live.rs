@@ -109,7 +109,8 @@ fn render_charts(frame: &mut Frame, area: Rect, model: &Model) {
     let columns = |area: Rect| -> [Rect; 2] { Layout::horizontal([Constraint::Fill(1); 2]).spacing(1).areas(area) };
     for (index, signal) in signals(model.live.series).into_iter().enumerate() {
         let cell = columns(rows[index / 2])[index % 2];
-        Chart { signal, axis, history, ghost, cursor_ns, theme }.draw(frame.buffer_mut(), cell);
+        Chart { signal, axis, history, ghost, cursor_ns, cursor_line: model.live.cursor_line, theme }
+            .draw(frame.buffer_mut(), cell);
     }
     for cell in columns(strip) {
         draw_phases(frame.buffer_mut(), cell, &axis, history, &theme);
