@@ -50,7 +50,11 @@ fn entered(player: &Player, mode: Mode) -> f64 {
         Record::Transition(change) if change.to == mode => Some(event.time_ns),
         _ => None,
     });
-    at.expect("the mode was entered") as f64 / 1e9
+    let Some(at) = at else {
+        let events: Vec<_> = player.events().iter().map(|event| &event.record).collect();
+        panic!("{mode:?} was never entered: {events:#?}");
+    };
+    at as f64 / 1e9
 }
 
 /// The trials of a study on disk.

@@ -31,7 +31,7 @@ use crate::view;
 /// The loop wakes at least this often: for the sign of life, twenty times a second.
 const PULSE: Duration = Duration::from_millis(50);
 /// Frames per second at most over a slow link.
-const LOW_BANDWIDTH_FRAMES: u32 = 4;
+const LOW_BANDWIDTH_FRAMES: u32 = 2;
 
 /// How the console looks and behaves.
 #[derive(Debug, Clone)]
@@ -46,6 +46,7 @@ impl ConsoleOptions {
     /// The settings with what the command line says on top.
     pub fn new(settings: Settings, colours: Option<ColourChoice>, ascii: bool, low_bandwidth: bool) -> ConsoleOptions {
         let mut settings = settings;
+        settings.low_bandwidth = low_bandwidth;
         if low_bandwidth {
             settings.colours =
                 if settings.colours == ColourChoice::None { ColourChoice::None } else { ColourChoice::Named };

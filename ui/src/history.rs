@@ -31,6 +31,10 @@ pub struct Sample {
     pub pitch: f32,
     /// Height of the trunk's origin over the world's zero, m.
     pub height: f32,
+    /// From the planned start of the tick to its real start, ns.
+    pub lateness_ns: u32,
+    /// From its start to its end, ns.
+    pub busy_ns: u32,
     /// Phase of the oscillator, rad.
     pub theta: f32,
     /// z of each foot in its leg frame, m.
@@ -57,6 +61,8 @@ impl From<&Tick> for Sample {
             roll: rpy.x as f32,
             pitch: rpy.y as f32,
             height: tick.estimate.position_world.z as f32,
+            lateness_ns: tick.stages.lateness_ns,
+            busy_ns: tick.stages.read_ns.saturating_add(tick.stages.decide_ns).saturating_add(tick.stages.write_ns),
             theta: tick.theta_rad as f32,
             foot_z,
             foot_force: tick.state.foot_force.map(|force| force as f32),

@@ -93,6 +93,8 @@ pub struct LiveView {
     pub mode: ChartMode,
     /// Time that a chart shows, s.
     pub window_s: f64,
+    /// Whether the sweep's cursor is drawn as a line; the gap before it says the same with less to send.
+    pub cursor_line: bool,
     /// Which set of series is drawn.
     pub series: SeriesSet,
     /// The history as it was when the charts were frozen, and when (console's clock).
@@ -237,6 +239,7 @@ impl Model {
             live: LiveView {
                 mode: settings.chart_mode,
                 window_s: settings.chart_window_s,
+                cursor_line: !settings.low_bandwidth,
                 series: SeriesSet::Attitude,
                 frozen: None,
                 cursor_ns: 0,

@@ -28,6 +28,8 @@ pub struct Settings {
     pub chart_window_s: f64,
     /// What rings the terminal's bell.
     pub bell: Vec<BellCause>,
+    /// Whether a slow link is to be spared; said on the command line, not in the file.
+    pub low_bandwidth: bool,
     /// The keys.
     pub keymap: Keymap,
 }
@@ -132,6 +134,7 @@ impl Settings {
             chart_mode: read(table, "chart_mode")?,
             chart_window_s,
             bell: read(table, "bell")?,
+            low_bandwidth: false,
             keymap,
         })
     }

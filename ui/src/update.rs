@@ -16,6 +16,7 @@ use crate::settings::{BellCause, ChartMode};
 pub const INTERRUPT_WINDOW: Duration = Duration::from_secs(2);
 
 /// Something that happened.
+#[expect(clippy::large_enum_variant, reason = "records are few; the many ticks are boxed")]
 #[derive(Debug, Clone)]
 pub enum Msg {
     /// Time since the console started.
@@ -529,7 +530,9 @@ fn take_record(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
             if stopped {
                 model.stopped_because = change.cause.clone();
                 // The key that stopped has been answered already.
-                if !model.message.as_ref().is_some_and(|message| message.text.starts_with("STOP")) {
+                if change.cause != "STOP"
+                    || !model.message.as_ref().is_some_and(|message| message.text.starts_with("STOP"))
+                {
                     say(model, level, format!("{}: {}", change.to.name(), change.cause));
                 }
             }

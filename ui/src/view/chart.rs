@@ -158,6 +158,8 @@ pub struct Chart<'a> {
     pub ghost: Option<&'a [Sample]>,
     /// The time that the heading's value is read at; the newest without it.
     pub cursor_ns: Option<u64>,
+    /// Whether the sweep's cursor is drawn as a line.
+    pub cursor_line: bool,
     /// Colours and characters.
     pub theme: Theme,
 }
@@ -176,7 +178,8 @@ impl Chart<'_> {
             self.draw_ghost(buffer, plot, ghost, (low, high));
         }
         let mut dots = Dots::new(plot, self.theme.glyphs);
-        let samples = self.history.window(self.axis.window_ns).map(|sample| (sample.time_ns, (self.signal.value)(sample)));
+        let samples =
+            self.history.window(self.axis.window_ns).map(|sample| (sample.time_ns, (self.signal.value)(sample)));
         self.trace(&mut dots, samples, (low, high));
         dots.draw(buffer, plot, self.theme.style(self.signal.role));
         self.shade(buffer, plot);
@@ -185,7 +188,8 @@ impl Chart<'_> {
 
     fn range(&self) -> (f32, f32) {
         let values = || self.history.window(self.axis.window_ns).map(|sample| (self.signal.value)(sample));
-        let fits = |&&(low, high): &&(f32, f32)| values().all(|value| !value.is_finite() || (low..=high).contains(&value));
+        let fits =
+            |&&(low, high): &&(f32, f32)| values().all(|value| !value.is_finite() || (low..=high).contains(&value));
         let widest = self.signal.ranges.last().copied().unwrap_or((-1.0, 1.0));
         self.signal.ranges.iter().find(fits).copied().unwrap_or(widest)
     }
@@ -211,7 +215,8 @@ impl Chart<'_> {
             let value = if value.abs() < 0.0005 { 0.0 } else { value };
             if value.abs() >= 100.0 { format!("{value:+.0}") } else { format!("{value:+.3}") }
         });
-        let range = if low == -high { format!("{}{high}", self.theme.plus_minus()) } else { format!("{low} to {high}") };
+        let range =
+            if low == -high { format!("{}{high}", self.theme.plus_minus()) } else { format!("{low} to {high}") };
         let name = format!("{} ", self.signal.name);
         let width = usize::from(area.width);
         buffer.set_string(area.x, area.y, cut(&name, width), self.theme.style(self.signal.role));
@@ -277,7 +282,7 @@ impl Chart<'_> {
         let width = usize::from(plot.width);
         let (column, role) = match self.cursor_ns {
             Some(time_ns) => (self.axis.column(time_ns, width), Role::Key),
-            None if self.axis.mode == ChartMode::Sweep => {
+            None if self.axis.mode == ChartMode::Sweep && self.cursor_line => {
                 (self.axis.column(self.axis.newest_ns, width).map(|column| (column + 1) % width), Role::Quiet)
             }
             None => return,

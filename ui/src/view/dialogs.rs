@@ -31,11 +31,17 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
             popup(frame, area, model, "Jump?", 60, approve(model, *trial, waited));
         }
         Dialog::Arm => {
-            let lines = vec![Line::from("The robot will stand up. Is nobody near it?"), Line::default(), choice(model, "y", "stand up")];
+            let lines = vec![
+                Line::from("The robot will stand up. Is nobody near it?"),
+                Line::default(),
+                choice(model, "y", "stand up"),
+            ];
             popup(frame, area, model, "Arm?", 52, lines);
         }
         Dialog::Quit => popup(frame, area, model, "Quit?", 58, quit(model)),
-        Dialog::Override(form) => popup(frame, area, model, &format!("Override trial #{}", form.trial), 72, overrides(model, form)),
+        Dialog::Override(form) => {
+            popup(frame, area, model, &format!("Override trial #{}", form.trial), 72, overrides(model, form))
+        }
         Dialog::Field { purpose, input, problem } => {
             popup(frame, area, model, &field_title(*purpose), 64, field(model, *purpose, input, problem.as_deref()));
         }
@@ -68,16 +74,12 @@ fn open_box(frame: &mut Frame, area: Rect, theme: &Theme, title: &str, width: u1
     };
     let set = if theme.glyphs == Glyphs::Ascii { ASCII } else { border::PLAIN };
     let (width, height) = (width.min(area.width), height.min(area.height));
-    let at = Rect {
-        x: area.x + (area.width - width) / 2,
-        y: area.y + (area.height - height) / 2,
-        width,
-        height,
-    };
-    let block = Block::bordered()
-        .border_set(set)
-        .border_style(theme.style(Role::Heading))
-        .title(span(theme, Role::Heading, format!(" {title} ")));
+    let at = Rect { x: area.x + (area.width - width) / 2, y: area.y + (area.height - height) / 2, width, height };
+    let block = Block::bordered().border_set(set).border_style(theme.style(Role::Heading)).title(span(
+        theme,
+        Role::Heading,
+        format!(" {title} "),
+    ));
     let inner = block.inner(at);
     frame.render_widget(Clear, at);
     frame.render_widget(block, at);
@@ -146,9 +148,8 @@ fn overrides(model: &Model, form: &OverrideForm) -> Vec<Line<'static>> {
     for (index, row) in form.rows.iter().enumerate() {
         let selected = index == form.selected;
         let mark = if selected { ">" } else { " " };
-        let mut spans = vec![
-            span(theme, if selected { Role::Key } else { Role::Text }, format!("{mark} {:<4}", row.name)),
-        ];
+        let mut spans =
+            vec![span(theme, if selected { Role::Key } else { Role::Text }, format!("{mark} {:<4}", row.name))];
         match &form.typing {
             Some(input) if selected => {
                 // As wide as the number it replaces, so that the line does not jump.
@@ -169,7 +170,11 @@ fn overrides(model: &Model, form: &OverrideForm) -> Vec<Line<'static>> {
     lines.push(Line::default());
     match &form.problem {
         Some(problem) => lines.push(Line::from(span(theme, Role::Bad, problem.clone()))),
-        None => lines.push(Line::from(span(theme, Role::Quiet, "Nothing moves by this: it is approved like any other proposal."))),
+        None => lines.push(Line::from(span(
+            theme,
+            Role::Quiet,
+            "Nothing moves by this: it is approved like any other proposal.",
+        ))),
     }
     lines
 }
@@ -204,7 +209,9 @@ fn field(model: &Model, purpose: Purpose, input: &Input, problem: Option<&str>) 
     }
     let below = match (problem, purpose) {
         (Some(problem), _) => span(theme, Role::Bad, problem.to_owned()),
-        (None, Purpose::HandValue(_)) => span(theme, Role::Quiet, "replaces the measured value; empty: back to the measured one"),
+        (None, Purpose::HandValue(_)) => {
+            span(theme, Role::Quiet, "replaces the measured value; empty: back to the measured one")
+        }
         (None, Purpose::LogSearch) => span(theme, Role::Quiet, "empty: all lines"),
         (None, Purpose::Note(_)) if model.robot_needs_us() => {
             span(theme, Role::Quiet, "the robot is armed: Space is STOP, _ writes a space")
@@ -242,7 +249,11 @@ fn render_help(frame: &mut Frame, area: Rect, model: &Model, scroll: usize) {
     let height = area.height.min(lines.len() as u16 + 2);
     let room = usize::from(height.saturating_sub(2));
     let scroll = scroll.min(lines.len().saturating_sub(room));
-    let more = if lines.len() > room { format!("Keys ({}-{} of {}, Up Down)", scroll + 1, scroll + room, lines.len()) } else { "Keys".to_owned() };
+    let more = if lines.len() > room {
+        format!("Keys ({}-{} of {}, Up Down)", scroll + 1, scroll + room, lines.len())
+    } else {
+        "Keys".to_owned()
+    };
     let inner = open_box(frame, area, &model.theme, &more, 78, height);
     let shown: Vec<Line> = lines.into_iter().skip(scroll).take(room).collect();
     frame.render_widget(Paragraph::new(shown), inner);

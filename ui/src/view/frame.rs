@@ -8,7 +8,7 @@
 use quadfrog::realtime::telemetry::Mode;
 use quadfrog::recording::record::Level;
 use ratatui::Frame;
-use ratatui::layout::{Alignment, Rect};
+use ratatui::layout::{Alignment, Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
 
@@ -23,8 +23,11 @@ const STALE_MS: u128 = 500;
 /// The two lines that nothing covers.
 pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let [first, second] = rows(area);
-    frame.render_widget(Line::from(identity(model)), first);
-    frame.render_widget(Line::from(recording(model)).alignment(Alignment::Right), first);
+    let recording = Line::from(recording(model));
+    let width = recording.width() as u16;
+    let [left, right] = Layout::horizontal([Constraint::Fill(1), Constraint::Length(width)]).spacing(1).areas(first);
+    frame.render_widget(Line::from(identity(model)), left);
+    frame.render_widget(recording, right);
     frame.render_widget(Line::from(condition(model)), second);
 }
 

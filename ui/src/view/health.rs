@@ -2,8 +2,8 @@
 //!
 //! ```text
 //! Loop ──────────────────────────   Motors ────────────────────────────
-//! lateness   12 us, worst 0.1 ms    FR_hip     31 C  on
-//! stages     read 3 decide 9 ...    ...
+//! late ticks   0 (0.000 %)          FR_hip       31 C  -0.33 rad  +4.4 Nm on
+//!   wakes late p50 61 us, p99 94 us ...
 //! ```
 
 use quadfrog::robot::{JOINTS, joint_name};
@@ -13,19 +13,34 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
 
 use super::{heading, span};
+use crate::history::Sample;
 use crate::model::Model;
 use crate::theme::Role;
 
 /// Draws the view.
 pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let [left, right] = Layout::horizontal([Constraint::Fill(1); 2]).spacing(2).areas(area);
-    let [timing, recording, robot] =
-        Layout::vertical([Constraint::Length(8), Constraint::Length(6), Constraint::Fill(1)]).areas(left);
+    // The histogram needs rows that 80x24 does not have.
+    let lateness_rows_shown = if area.height >= 30 { 9 } else { 0 };
+    let [timing, lateness, recording, robot] = Layout::vertical([
+        Constraint::Length(7),
+        Constraint::Length(lateness_rows_shown),
+        Constraint::Length(6),
+        Constraint::Fill(1),
+    ])
+    .areas(left);
     panel(frame, timing, model, "Loop", timing_rows(model));
+    if lateness_rows_shown > 0 {
+        let rows = lateness_rows(model, usize::from(lateness.width));
+        panel(frame, lateness, model, "How late ticks wake, last minute", rows);
+    }
     panel(frame, recording, model, "Recorder and screen", recorder_rows(model));
     panel(frame, robot, model, "Robot", robot_rows(model));
     panel(frame, right, model, "Motors", motor_rows(model));
 }
+
+/// Width of the names at the left of a panel.
+const NAME_WIDTH: usize = 13;
 
 /// A line of a panel: name, value, and whether it needs a look.
 type Row = (String, String, bool);
@@ -35,7 +50,7 @@ fn panel(frame: &mut Frame, area: Rect, model: &Model, title: &str, rows: Vec<Ro
     let body = heading(frame, area, theme, title, "");
     let line = |(name, value, look): Row| {
         let value = if look { span(theme, Role::Warning, format!("{value} !")) } else { Span::raw(value) };
-        Line::from(vec![span(theme, Role::Quiet, format!("{name:<14}")), value])
+        Line::from(vec![span(theme, Role::Quiet, format!("{name:<NAME_WIDTH$}")), value])
     };
     frame.render_widget(Paragraph::new(rows.into_iter().map(line).collect::<Vec<_>>()), body);
 }
@@ -44,36 +59,69 @@ fn row(name: &str, value: String, look: bool) -> Row {
     (name.to_owned(), value, look)
 }
 
+/// Upper ends of the histogram's classes, microseconds; the last class has none.
+const CLASSES_US: [u32; 6] = [20, 50, 100, 200, 500, 1000];
+
+/// The value below which the given share of the sorted values lies.
+fn percentile(sorted: &[u32], share: f64) -> f64 {
+    let last = sorted.len().saturating_sub(1) as f64;
+    sorted.get((last * share).round() as usize).copied().map_or(0.0, f64::from)
+}
+
 fn timing_rows(model: &Model) -> Vec<Row> {
     let tick = &model.snapshot.tick;
     let counters = &model.snapshot.counters;
-    let micro = |ns: u32| format!("{:.1} us", f64::from(ns) / 1e3);
     let share = counters.late_ticks as f64 / tick.number.max(1) as f64;
+    let sorted = |value: fn(&Sample) -> u32| {
+        let mut values: Vec<u32> = model.history.samples().map(value).collect();
+        values.sort_unstable();
+        values
+    };
+    let (late, busy) = (sorted(|sample| sample.lateness_ns), sorted(|sample| sample.busy_ns));
+    let micro = |values: &[u32]| {
+        let [p50, p99] = [0.5, 0.99].map(|share| percentile(values, share) / 1e3);
+        format!("p50 {p50:.0} us, p99 {p99:.0} us")
+    };
+    let worst_ms = counters.worst_lateness_ns as f64 / 1e6;
     vec![
         row("ticks", tick.number.to_string(), false),
         row("late ticks", format!("{} ({:.3} %)", counters.late_ticks, share * 100.0), share > 0.001),
-        row(
-            "worst",
-            format!("{:.2} ms late", counters.worst_lateness_ns as f64 / 1e6),
-            counters.worst_lateness_ns > 10_000_000,
-        ),
-        row("this tick", format!("{} late", micro(tick.stages.lateness_ns)), false),
-        row("  read", micro(tick.stages.read_ns), false),
-        row("  decide", micro(tick.stages.decide_ns), false),
-        row("  write", micro(tick.stages.write_ns), false),
+        row("worst", format!("{worst_ms:.2} ms late"), worst_ms > 10.0),
+        row("last minute:", String::new(), false),
+        row("  wakes late", micro(&late), percentile(&late, 0.99) > 5e5),
+        row("  tick takes", micro(&busy), percentile(&busy, 0.99) > 5e5),
     ]
+}
+
+/// How late the ticks of the last minute woke, as bars.
+fn lateness_rows(model: &Model, width: usize) -> Vec<Row> {
+    let mut counts = [0_u32; CLASSES_US.len() + 1];
+    for sample in model.history.samples() {
+        let class = CLASSES_US.iter().position(|limit| sample.lateness_ns < limit * 1000);
+        counts[class.unwrap_or(CLASSES_US.len())] += 1;
+    }
+    let total = f64::from(counts.iter().sum::<u32>().max(1));
+    let (full, _) = model.theme.fill();
+    let room = width.saturating_sub(NAME_WIDTH + 8) as f64;
+    let bar = |(class, count): (usize, u32)| {
+        let name = CLASSES_US.get(class).map_or("1 ms or more".to_owned(), |limit| format!("< {limit} us"));
+        let share = f64::from(count) / total;
+        (name, format!("{:5.1} % {}", share * 100.0, full.repeat((share * room) as usize)), false)
+    };
+    counts.into_iter().enumerate().map(bar).collect()
 }
 
 fn recorder_rows(model: &Model) -> Vec<Row> {
     let counters = &model.snapshot.counters;
-    let file = if model.session.recording.is_empty() { "none" } else { &model.session.recording };
+    let name = |path: &str| match path.rsplit_once('/') {
+        // The end of the path says which study and which recording it is; more has no room.
+        Some((folder, file)) => format!("{file} in {}", folder.rsplit('/').next().unwrap_or_default()),
+        None if path.is_empty() => "none".to_owned(),
+        None => path.to_owned(),
+    };
     vec![
-        row("recording", file.to_owned(), model.session.recording.is_empty() && model.replay.is_none()),
-        row(
-            "study",
-            if model.session.study.is_empty() { "none".to_owned() } else { model.session.study.clone() },
-            false,
-        ),
+        row("recording", name(&model.session.recording), model.session.recording.is_empty() && model.replay.is_none()),
+        row("study", name(&model.session.study), false),
         row("not recorded", format!("{} ticks", counters.ticks_not_recorded), counters.ticks_not_recorded > 0),
         row("not shown", format!("{} ticks", counters.ticks_not_shown), false),
         row("refused", format!("{} commands", counters.commands_refused), false),
@@ -88,7 +136,7 @@ fn robot_rows(model: &Model) -> Vec<Row> {
             format!("{} ms", model.snapshot.counters.state_age_ms),
             model.snapshot.counters.state_age_ms > 5,
         ),
-        row("robot's clock", format!("{:.1} s", f64::from(tick.state.robot_time_ms) / 1e3), false),
+        row("robot clock", format!("{:.1} s", f64::from(tick.state.robot_time_ms) / 1e3), false),
     ];
     match tick.state.battery {
         Some(battery) => {
@@ -111,10 +159,10 @@ fn motor_rows(model: &Model) -> Vec<Row> {
     let mut rows = Vec::new();
     for joint in 0..JOINTS {
         let temperature = tick.state.motor_temperature_c[joint];
-        let state = if tick.state.motor_enabled[joint] { "follows" } else { "off" };
+        let state = if tick.state.motor_enabled[joint] { "on" } else { "off" };
         let limited = if tick.limited & (1 << joint) != 0 { " limited" } else { "" };
         let (q, torque) = (tick.state.joint_position[joint], tick.state.joint_torque[joint]);
-        let text = format!("{temperature:3.0} C {q:+7.3} rad {torque:+6.1} Nm {state}{limited}");
+        let text = format!("{temperature:3.0} C{q:+7.2} rad{torque:+6.1} Nm {state}{limited}");
         rows.push((joint_name(joint), text, temperature >= 60.0));
     }
     rows

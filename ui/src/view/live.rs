@@ -18,7 +18,7 @@ use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
 
 use super::chart::{Chart, Signal, TimeAxis, draw_phases};
-use super::{heading, objective, proposal, span, trials};
+use super::{heading, objective, proposal, span, trials, wireframe};
 use crate::model::{Model, SeriesSet};
 use crate::settings::ChartMode;
 use crate::theme::Role;
@@ -75,7 +75,10 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let [charts, _, side] =
         Layout::horizontal([Constraint::Fill(1), Constraint::Length(1), Constraint::Length(side)]).areas(upper);
     let card_rows = proposal::rows(model).min(side.height.saturating_sub(5));
-    let [card, objective_area] = Layout::vertical([Constraint::Length(card_rows), Constraint::Fill(1)]).areas(side);
+    let picture_rows = if side.height >= card_rows + 18 { 12 } else { 0 };
+    let [card, objective_area, picture] =
+        Layout::vertical([Constraint::Length(card_rows), Constraint::Fill(1), Constraint::Length(picture_rows)])
+            .areas(side);
     if area.width >= 120 && charts.height >= 24 {
         let [charts, joints] = Layout::vertical([Constraint::Fill(1), Constraint::Length(9)]).areas(charts);
         render_charts(frame, charts, model);
@@ -85,6 +88,9 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     }
     proposal::render(frame, card, model);
     objective::render(frame, objective_area, model);
+    if picture_rows > 0 {
+        wireframe::render(frame, picture, model);
+    }
     trials::render_table(frame, table, model, false);
 }
 
@@ -103,7 +109,8 @@ fn render_charts(frame: &mut Frame, area: Rect, model: &Model) {
     let columns = |area: Rect| -> [Rect; 2] { Layout::horizontal([Constraint::Fill(1); 2]).spacing(1).areas(area) };
     for (index, signal) in signals(model.live.series).into_iter().enumerate() {
         let cell = columns(rows[index / 2])[index % 2];
-        Chart { signal, axis, history, ghost, cursor_ns, theme }.draw(frame.buffer_mut(), cell);
+        Chart { signal, axis, history, ghost, cursor_ns, cursor_line: model.live.cursor_line, theme }
+            .draw(frame.buffer_mut(), cell);
     }
     for cell in columns(strip) {
         draw_phases(frame.buffer_mut(), cell, &axis, history, &theme);
@@ -127,15 +134,11 @@ fn render_axis(frame: &mut Frame, strip: Rect, model: &Model) {
     frame.render_widget(Line::from(span(&model.theme, role, text)), area);
 }
 
-/// Torque and speed of each joint as bars against their limits, and the contact of each foot.
+/// Torque and speed of each joint as bars against their limits; `!` where the last gate cut the command.
 fn render_joints(frame: &mut Frame, area: Rect, model: &Model) {
     let theme = &model.theme;
     let tick = &model.snapshot.tick;
-    let mut aside = String::from("contact");
-    for (leg, touches) in Leg::ALL.iter().zip(tick.estimate.contact) {
-        aside.push_str(&format!(" {}{}", leg.name(), if touches { "#" } else { "." }));
-    }
-    let body = heading(frame, area, theme, "Joints", &aside);
+    let body = heading(frame, area, theme, "Joints", "torque in N m, speed in rad/s, of their limits");
     let Some(robot) = &model.robot else {
         frame.render_widget(Line::from(span(theme, Role::Quiet, "the robot's limits are not known here")), body);
         return;
@@ -151,13 +154,13 @@ fn render_joints(frame: &mut Frame, area: Rect, model: &Model) {
         let torque = tick.state.joint_torque[joint];
         let speed = tick.state.joint_velocity[joint];
         let limits = &robot.limits;
-        let width = usize::from(column.width).saturating_sub(29) / 2;
+        let width = usize::from(column.width).saturating_sub(24) / 2;
         let limited = if tick.limited & (1 << joint) != 0 { "!" } else { " " };
-        let mut spans = vec![span(theme, Role::Quiet, format!("{:<8}", joint_name(joint)))];
+        let mut spans = vec![span(theme, Role::Quiet, format!("{:<9}", joint_name(joint).replace('_', " ")))];
         spans.extend(bar(model, torque / limits.max_torque[joint], width));
-        spans.push(Span::raw(format!("{torque:6.1} Nm{limited}")));
+        spans.push(Span::raw(format!("{torque:6.1}{limited} ")));
         spans.extend(bar(model, speed / limits.max_velocity[joint], width));
-        spans.push(Span::raw(format!("{speed:6.1} rad/s")));
+        spans.push(Span::raw(format!("{speed:6.1}")));
         frame.render_widget(Line::from(spans), Rect { y: column.y + row, height: 1, ..column });
     }
 }

@@ -24,6 +24,7 @@ pub mod optimizer;
 pub mod overrides;
 pub mod proposal;
 pub mod trials;
+pub mod wireframe;
 
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};

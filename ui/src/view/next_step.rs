@@ -30,7 +30,9 @@ pub fn next_step(model: &Model) -> NextStep {
     match &model.dialog {
         Some(dialog) => in_dialog(model, dialog),
         None if model.replay.is_some() => replay(model),
-        None if model.session.observe => step("Observing: this session can change nothing.", model, &[(Action::Quit, "quit")]),
+        None if model.session.observe => {
+            step("Observing: this session can change nothing.", model, &[(Action::Quit, "quit")])
+        }
         None => live(model),
     }
 }
@@ -62,7 +64,11 @@ fn live(model: &Model) -> NextStep {
     match model.mode() {
         Mode::Damped | Mode::Fault => {
             let because = if model.stopped_because.is_empty() { "stopped" } else { &model.stopped_because };
-            step(format!("{because}. Look at the robot, then press {}.", key(Action::Acknowledge)), model, &[(Action::Undo, "undo"), quit])
+            step(
+                format!("{because}. Look at the robot, then press {}.", key(Action::Acknowledge)),
+                model,
+                &[(Action::Undo, "undo"), quit],
+            )
         }
         Mode::Offline | Mode::Observe => step("Waiting for the robot to answer.", model, &[quit]),
         Mode::Disarmed if stage == Some(Stage::Finished) => step(
@@ -78,12 +84,22 @@ fn live(model: &Model) -> NextStep {
         Mode::Ready if stage == Some(Stage::Finished) => step(
             "The study is finished.",
             model,
-            &[(Action::Continue, "more trials"), (Action::SitDown, "sit down"), (Action::Undo, "undo"), (Action::TrialsView, "table")],
+            &[
+                (Action::Continue, "more trials"),
+                (Action::SitDown, "sit down"),
+                (Action::Undo, "undo"),
+                (Action::TrialsView, "table"),
+            ],
         ),
         Mode::Ready if model.proposal_on_table().is_some() => step(
             format!("Press {} twice to jump.", key(Action::Approve)),
             model,
-            &[(Action::Override, "override"), (Action::Skip, "skip"), (Action::Undo, "undo"), (Action::SitDown, "sit down")],
+            &[
+                (Action::Override, "override"),
+                (Action::Skip, "skip"),
+                (Action::Undo, "undo"),
+                (Action::SitDown, "sit down"),
+            ],
         ),
         _ => step("The sampler is choosing the next trial.", model, &[(Action::SitDown, "sit down")]),
     }
@@ -102,7 +118,9 @@ fn review(model: &Model) -> NextStep {
     verdicts.retain(|(action, _)| {
         !matches!(
             (action, suggested),
-            (Action::Accept, Some(Verdict::Accept)) | (Action::Fall, Some(Verdict::Fall)) | (Action::Void, Some(Verdict::Void))
+            (Action::Accept, Some(Verdict::Accept))
+                | (Action::Fall, Some(Verdict::Fall))
+                | (Action::Void, Some(Verdict::Void))
         )
     });
     verdicts.extend([(Action::Rerun, "re-run"), (Action::HandValue, "own value"), (Action::Note, "note")]);
@@ -118,7 +136,7 @@ fn replay(model: &Model) -> NextStep {
         &[
             (Action::StepBack, "step back"),
             (Action::StepForward, "step"),
-            (Action::PreviousMarker, "last trial"),
+            (Action::PreviousMarker, "previous trial"),
             (Action::NextMarker, "next trial"),
             (Action::Slower, "slower"),
             (Action::Faster, "faster"),
@@ -130,12 +148,15 @@ fn replay(model: &Model) -> NextStep {
 fn in_dialog(model: &Model, dialog: &Dialog) -> NextStep {
     let plain = |lead: String| NextStep { lead, others: Vec::new() };
     match dialog {
-        Dialog::Approve { trial, .. } => {
-            plain(format!("Press {} again to jump (trial #{trial}). Any other key cancels.", model.keymap.key(Action::Approve)))
-        }
+        Dialog::Approve { trial, .. } => plain(format!(
+            "Press {} again to jump (trial #{trial}). Any other key cancels.",
+            model.keymap.key(Action::Approve)
+        )),
         Dialog::Arm => plain("Press y to stand the robot up. Any other key cancels.".to_owned()),
         Dialog::Quit => plain("Press y to quit. Any other key cancels.".to_owned()),
-        Dialog::Override(form) if form.typing.is_some() => plain("Enter takes the value and applies. Esc drops it.".to_owned()),
+        Dialog::Override(form) if form.typing.is_some() => {
+            plain("Enter takes the value and applies. Esc drops it.".to_owned())
+        }
         Dialog::Override(_) => {
             plain("Type a value, or Left Right 1 %, PgUp PgDn 10 %. Enter applies, Esc cancels.".to_owned())
         }

@@ -49,8 +49,11 @@ fn summary(model: &Model) -> String {
     )
 }
 
+/// Title of a column and its text for a trial.
+type Column = (String, Box<dyn Fn(&TrialRecord) -> String>);
+
 /// The columns between the number and the value: title and text of a trial.
-fn middle_columns(model: &Model) -> Vec<(String, Box<dyn Fn(&TrialRecord) -> String>)> {
+fn middle_columns(model: &Model) -> Vec<Column> {
     let measured = |title: &str, of: fn(&quadfrog::recording::record::Measured) -> f64| {
         let text =
             move |trial: &TrialRecord| trial.measured.as_ref().map_or("-".to_owned(), |m| format!("{:+.3}", of(m)));

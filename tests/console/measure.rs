@@ -1,0 +1,119 @@
+//! Measurements of the console, printed and not judged: timing decides no test. They run when asked for:
+//! `cargo test --release -p quadfrog-console --test measure -- --ignored --nocapture --test-threads 1`.
+
+#[path = "support/pty.rs"]
+mod pty;
+mod support;
+
+use std::time::{Duration, Instant};
+
+use pty::Session;
+use quadfrog::recording::record::{Record, Verdict};
+use quadfrog_console::update::Msg;
+use support::{Console, tick, trial};
+
+/// The given share of sorted durations.
+fn percentile(sorted: &[Duration], share: f64) -> Duration {
+    sorted[((sorted.len() - 1) as f64 * share).round() as usize]
+}
+
+/// Processor time that a process has used so far, s.
+fn processor_time(pid: i32) -> f64 {
+    let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).expect("its state");
+    // Fields 14 and 15 (user and system time in 1/100 s) count from behind the name, which may hold spaces.
+    let fields: Vec<&str> = stat.rsplit(')').next().expect("fields").split_whitespace().collect();
+    fields[11..13].iter().map(|ticks| ticks.parse::<f64>().expect("a number") / 100.0).sum()
+}
+
+/// A minute of a session with two jumps; prints what it costs.
+fn minute(name: &str, size: (u16, u16), arguments: &[&str]) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut session = Session::start(folder.path(), size, arguments);
+    session.wait_for(&["Press A to arm"]);
+    session.send("A");
+    session.wait_for(&["Press g twice"]);
+    let (begun, bytes, used) = (Instant::now(), session.bytes(), processor_time(session.pid().as_raw()));
+    for _ in 0..2 {
+        session.approve();
+        session.wait_for(&["judge it"]);
+        session.send("v");
+        session.wait_until("the next proposal", || !session.screen().contains("judge it"));
+        if session.screen().contains("DAMPED") {
+            session.send("k");
+            session.wait_for(&["Press A to arm"]);
+        }
+        if session.screen().contains("DISARMED") {
+            session.send("A");
+        }
+        session.wait_for(&["Press g twice"]);
+    }
+    std::thread::sleep(Duration::from_secs(60).saturating_sub(begun.elapsed()));
+    let seconds = begun.elapsed().as_secs_f64();
+    let kilobits = (session.bytes() - bytes) as f64 * 8.0 / 1e3 / seconds;
+    let share = (processor_time(session.pid().as_raw()) - used) / seconds * 100.0;
+    println!("{name}: {kilobits:.1} kbit/s, {share:.0} % of one core with simulator and recorder, over {seconds:.0} s");
+    session.send("qy");
+    session.wait();
+}
+
+#[test]
+#[ignore = "a measurement of two minutes"]
+fn bytes_on_the_wire_and_processor() {
+    minute("80x24 sweep", (80, 24), &[]);
+    minute("80x24 low bandwidth", (80, 24), &["--low-bandwidth"]);
+}
+
+#[test]
+#[ignore = "a measurement"]
+fn key_to_screen() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut session = Session::start(folder.path(), (80, 24), &[]);
+    session.wait_for(&["Press A to arm"]);
+    let mut times = Vec::new();
+    for round in 0..200 {
+        let (key, shown) = if round % 2 == 0 { ("?", "Keys (1") } else { ("\x1b", "Press A to arm") };
+        let begun = Instant::now();
+        session.send(key);
+        while !session.screen().contains(shown) {
+            std::thread::sleep(Duration::from_micros(200));
+        }
+        times.push(begun.elapsed());
+        std::thread::sleep(Duration::from_millis(37));
+    }
+    times.sort();
+    println!(
+        "key to screen: p50 {:.1} ms, p99 {:.1} ms, longest {:.1} ms of {}",
+        percentile(&times, 0.5).as_secs_f64() * 1e3,
+        percentile(&times, 0.99).as_secs_f64() * 1e3,
+        times[times.len() - 1].as_secs_f64() * 1e3,
+        times.len()
+    );
+    session.send("q");
+    session.wait();
+}
+
+#[test]
+#[ignore = "a measurement"]
+fn drawing_a_frame() {
+    let mut console = Console::ready();
+    for number in 0..100 {
+        console.record(Record::Trial(trial(number, Some(Verdict::ALL[number as usize % 3]), None)));
+    }
+    for time_ms in (0..60_000).step_by(5) {
+        console.tell(Msg::Tick(Box::new(tick(time_ms, 0.3 * (time_ms as f64 / 300.0).sin(), None))));
+    }
+    let mut terminal = ratatui::Terminal::new(ratatui::backend::TestBackend::new(200, 60)).expect("a screen");
+    for view in ["1", "2", "3", "4", "5", "6"] {
+        console.press(&[view]);
+        let mut times: Vec<Duration> = (0..500)
+            .map(|_| {
+                let begun = Instant::now();
+                terminal.draw(|frame| quadfrog_console::view::render(frame, &console.model)).expect("drawn");
+                begun.elapsed()
+            })
+            .collect();
+        times.sort();
+        let ms = |share| percentile(&times, share).as_secs_f64() * 1e3;
+        println!("view {view} at 200x60: p50 {:.2} ms, p99 {:.2} ms", ms(0.5), ms(0.99));
+    }
+}

@@ -1,0 +1,123 @@
+//! Every view of a recorded session, as text, at three sizes. The recording is of the real program on the simulator:
+//! `cargo test -p quadfrog-console --test recorded -- --ignored` makes it anew, and
+//! `INSTA_UPDATE=always cargo test -p quadfrog-console --test recorded` accepts what the screens show then.
+
+#[path = "support/pty.rs"]
+mod pty;
+mod support;
+
+use std::path::{Path, PathBuf};
+
+use portable_pty::CommandBuilder;
+use pty::Session;
+use quadfrog::recording::player::{Played, Player};
+use quadfrog::recording::record::Record;
+use quadfrog::recording::writer::Writer;
+use quadfrog_console::feed::Feed;
+use quadfrog_console::settings::Settings;
+use quadfrog_console::theme::{Colours, Glyphs, Theme};
+use support::Console;
+
+const VIEWS: [(&str, &str); 6] =
+    [("1", "live"), ("2", "trials"), ("3", "optimizer"), ("4", "override"), ("5", "health"), ("6", "log")];
+
+fn recording() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/console/session.mcap")
+}
+
+/// A console at the end of the recorded session: two trials judged, the third under review.
+fn console(glyphs: Glyphs) -> Console {
+    let mut console = Console::with(Settings::built_in(), Theme { colours: Colours::Named, glyphs });
+    let player = Player::open(recording()).expect("the recorded session");
+    let robot = quadfrog::robot::description::RobotDescription::embedded(&player.session().robot).expect("its robot");
+    console.model.robot = Some(robot);
+    let mut feed = Feed::replay(player);
+    // Longer than the recording, at the speed of time.
+    for msg in feed.take(3_600_000_000_000) {
+        console.tell(msg);
+    }
+    console
+}
+
+#[test]
+fn views_of_a_recorded_session() {
+    for (columns, rows) in [(80, 24), (120, 40), (200, 60)] {
+        let mut console = console(Glyphs::Braille);
+        for (key, name) in VIEWS {
+            console.press(&[key]);
+            insta::assert_snapshot!(format!("{name}-{columns}x{rows}"), console.screen(columns, rows));
+        }
+    }
+}
+
+#[test]
+fn views_of_a_recorded_session_in_ascii() {
+    let mut console = console(Glyphs::Ascii);
+    for (key, name) in VIEWS {
+        console.press(&[key]);
+        insta::assert_snapshot!(format!("{name}-ascii"), console.screen(80, 24));
+    }
+}
+
+#[test]
+fn a_replay_shows_every_trial_and_can_be_left() {
+    let console = console(Glyphs::Braille);
+    assert_eq!(console.model.trials.len(), 3);
+    let screen = console.screen(80, 24);
+    assert!(screen.contains("REPLAY") && screen.contains("Trial #2: judge it"), "{screen}");
+}
+
+#[test]
+#[ignore = "makes the recording that the other tests read"]
+fn record_the_session() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut command = CommandBuilder::new(env!("CARGO_BIN_EXE_quadfrog"));
+    command.args(["--output", "recordings", "--seed", "3"]);
+    let mut session = Session::run(folder.path(), (100, 30), command);
+    session.wait_for(&["Press A to arm"]);
+    for (trial, verdict) in [(0, "a"), (1, "v"), (2, "q")] {
+        if session.screen().contains("DAMPED") {
+            session.send("k");
+        }
+        session.wait_until("the next", || ["DISARMED", "READY"].iter().any(|mode| session.screen().contains(mode)));
+        if session.screen().contains("DISARMED") {
+            session.send("A");
+        }
+        session.wait_for(&["Press g twice"]);
+        if trial == 1 {
+            session.send("o");
+            session.wait_for(&["Override trial #1"]);
+            session.send("\x1b[B120\r");
+            session.wait_for(&["120.0"]);
+        }
+        session.approve();
+        session.wait_for(&[&format!("Trial #{trial}: judge it")]);
+        session.send(verdict);
+    }
+    session.wait_for(&["Quit?"]);
+    session.send("y");
+    assert!(session.wait().success());
+
+    let recordings = std::fs::read_dir(folder.path().join("recordings")).expect("recordings");
+    let study = recordings.map(|entry| entry.expect("an entry").path()).next().expect("a study");
+    let mut player = Player::open(study.join("session.mcap")).expect("a recording");
+    let info = player.session().clone();
+    // What the screen needs: the ticks of the last charts as the screen takes them, and every record.
+    let charts_from_ns = player.duration_ns().saturating_sub(5_000_000_000);
+    let _ = std::fs::remove_file(recording());
+    let mut writer = Writer::create(recording(), &info, player.start_utc_ns(), &[]).expect("the shorter recording");
+    for played in player.by_ref() {
+        match played {
+            Played::Tick(tick) if tick.time_ns >= charts_from_ns && tick.number % 5 == 0 => {
+                writer.tick(&tick).expect("written")
+            }
+            Played::Record(stamped)
+                if !matches!(stamped.record, Record::Counters(_)) || stamped.time_ns >= charts_from_ns =>
+            {
+                writer.record(&stamped).expect("written");
+            }
+            _ => {}
+        }
+    }
+    writer.finish().expect("closed");
+}

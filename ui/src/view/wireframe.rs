@@ -1,0 +1,100 @@
+//! The robot as lines, from the side and from above, by the model's own kinematics.
+//!
+//! ```text
+//! Robot ─────────────── FR# FL# RR# RL#
+//!      ⡤⠤⠤⠤⠤⠤⠤⠤⡄          ⡏⠉⠉⠉⠉⢹
+//!     ⢰⠁      ⢰⠁          ⡇    ⢸
+//!      ⠣⡀      ⠣⡀         ⣇⣀⣀⣀⣀⣸
+//! ```
+
+use nalgebra::{UnitQuaternion, Vector3};
+use quadfrog::robot::description::RobotDescription;
+use quadfrog::robot::{LEGS, Leg, leg_of};
+use ratatui::Frame;
+use ratatui::layout::{Constraint, Layout, Rect};
+
+use super::chart::Dots;
+use super::heading;
+use crate::model::Model;
+use crate::theme::Role;
+
+/// Half of the width that a picture shows, m: the robot with its legs stretched.
+const REACH: f64 = 0.45;
+
+/// Hip, thigh joint, knee and foot of a leg in the body frame, m.
+fn leg_points(robot: &RobotDescription, leg: Leg, q: &Vector3<f64>) -> [Vector3<f64>; 4] {
+    let geometry = &robot.leg_geometry;
+    let hip = robot.legs[leg as usize].joint_origin[0];
+    let l1 = leg.side() * geometry.abduction;
+    let ((s1, c1), (s2, c2)) = (q.x.sin_cos(), q.y.sin_cos());
+    // As the foot in `robot::kinematics`, with the calf's part left out: a = l2 cos q2.
+    let a = geometry.thigh * c2;
+    let thigh_leg = Vector3::new(0.0, l1 * c1, l1 * s1);
+    let knee_leg = Vector3::new(-geometry.thigh * s2, l1 * c1 + a * s1, l1 * s1 - a * c1);
+    let foot_leg = geometry.foot(q, leg.side()).position_leg;
+    [hip, hip + thigh_leg, hip + knee_leg, hip + foot_leg]
+}
+
+/// Draws the panel.
+pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
+    let theme = &model.theme;
+    let tick = &model.snapshot.tick;
+    let lamps =
+        Leg::ALL.map(|leg| format!("{}{}", leg.name(), if tick.estimate.contact[leg as usize] { "#" } else { "." }));
+    let body = heading(frame, area, theme, "Robot", &lamps.join(" "));
+    let Some(robot) = &model.robot else { return };
+    if body.height < 4 || body.width < 20 {
+        return;
+    }
+    let [side, above] = Layout::horizontal([Constraint::Fill(1); 2]).spacing(1).areas(body);
+    // Without the yaw: the pictures turn with the robot.
+    let rpy = tick.estimate.roll_pitch_yaw;
+    let tilt = UnitQuaternion::from_euler_angles(rpy.x, rpy.y, 0.0);
+    let height = tick.estimate.position_world.z;
+    let mut lines: Vec<[Vector3<f64>; 2]> = Vec::with_capacity(4 * LEGS + 5);
+    let legs =
+        Leg::ALL.map(|leg| leg_points(robot, leg, &leg_of(&tick.state.joint_position, leg as usize)).map(|p| tilt * p));
+    for points in &legs {
+        lines.extend(points.windows(2).map(|pair| [pair[0], pair[1]]));
+    }
+    // The trunk: its hips joined around, FR FL RL RR.
+    for (from, to) in [(0, 1), (1, 3), (3, 2), (2, 0)] {
+        lines.push([legs[from][0], legs[to][0]]);
+    }
+    draw(frame, side, model, &lines, |p| (p.x, p.z), Some(-height));
+    // From above: forward up, left to the left.
+    draw(frame, above, model, &lines, |p| (-p.y, p.x), None);
+}
+
+/// Draws lines projected to (right, up), in m around the trunk; `floor` is the height of the ground there.
+fn draw(
+    frame: &mut Frame,
+    area: Rect,
+    model: &Model,
+    lines: &[[Vector3<f64>; 2]],
+    project: impl Fn(&Vector3<f64>) -> (f64, f64),
+    floor: Option<f64>,
+) {
+    let mut dots = Dots::new(area, model.theme.glyphs);
+    let (across, down) = (dots.size.0 as f64, dots.size.1 as f64);
+    // A character is about twice as high as wide, so the area is `width` by `2 height` in the same unit.
+    let (width, height) = (f64::from(area.width), 2.0 * f64::from(area.height));
+    let per_metre = (width / (2.0 * REACH)).min(height / (2.0 * REACH));
+    // From the side there is more below the trunk than above it.
+    let middle = if floor.is_some() { 0.35 } else { 0.5 };
+    let place = |(right, up): (f64, f64)| {
+        let x = (0.5 * width + right * per_metre) / width * across;
+        let y = (middle * height - up * per_metre) / height * down;
+        (x, y)
+    };
+    if let Some(floor) = floor {
+        let y = place((0.0, floor)).1 as i64;
+        for x in (0..dots.size.0).step_by(3) {
+            dots.set(x as i64, y);
+        }
+    }
+    for [from, to] in lines {
+        dots.line(place(project(from)), place(project(to)));
+    }
+    dots.draw(frame.buffer_mut(), area, model.theme.style(Role::SeriesA));
+}
