@@ -5,50 +5,13 @@ mod support;
 
 use std::process::Command;
 
-use nalgebra::Vector3;
 use quadfrog::realtime::telemetry::{Mode, Tick};
 use quadfrog::recording::record::{Level, LogRecord, Record, Stamped};
 use quadfrog::recording::writer::Writer;
-use quadfrog::robot::description::{Body, JointLimits, LegDescription, RobotDescription};
-use quadfrog::robot::kinematics::LegGeometry;
+use quadfrog::robot::description::RobotDescription;
 use quadfrog::robot::{JOINTS, Leg, joint_name};
 use serde_json::{Value, json};
 use support::*;
-
-/// A robot of the Go1's size, by its leg geometry alone.
-fn robot() -> RobotDescription {
-    let body = |name: &str| Body {
-        name: name.into(),
-        mass: 1.0,
-        com: Vector3::zeros(),
-        inertia_com: nalgebra::Matrix3::identity(),
-        collision: Vec::new(),
-    };
-    let leg = |leg: Leg| LegDescription {
-        bodies: ["hip", "thigh", "calf"].map(|name| body(&format!("{}_{name}", leg.name()))),
-        joint_origin: [
-            Vector3::new(0.1881 * leg.end(), 0.04675 * leg.side(), 0.0),
-            Vector3::new(0.0, 0.08 * leg.side(), 0.0),
-            Vector3::new(0.0, 0.0, -0.213),
-        ],
-        foot_origin: Vector3::new(0.0, 0.0, -0.213),
-        foot_radius: 0.02,
-    };
-    let limit = |value| [value; JOINTS];
-    RobotDescription {
-        name: "go1".into(),
-        trunk: body("trunk"),
-        legs: Leg::ALL.map(leg),
-        leg_geometry: LegGeometry { abduction: 0.08, thigh: 0.213, calf: 0.213 },
-        limits: JointLimits {
-            min_position: limit(-3.0),
-            max_position: limit(3.0),
-            max_torque: limit(30.0),
-            max_velocity: limit(30.0),
-        },
-        lying_position: limit(0.0),
-    }
-}
 
 /// Runs the reader; none where Python or its packages lack.
 fn python_reads(path: &std::path::Path) -> Option<Value> {
@@ -81,7 +44,7 @@ fn python_reads_every_topic() {
     records.push(stamped(3996, Record::FaultTicks(ticks[3900..3990].to_vec())));
     let attachment: [(&str, &str, &[u8]); 1] = [("config.toml", "application/toml", b"kp = 400.0\n")];
     let mut writer = Writer::create(&path, &session(), START_UTC_NS, &attachment).unwrap();
-    writer.show_links_of(robot());
+    writer.show_links_of(RobotDescription::embedded("go1").unwrap());
     let everything = in_order(&ticks, &records);
     for played in &everything {
         match played {
@@ -163,7 +126,7 @@ fn frames_reach_the_feet(frames: &Value, tick: &Tick) {
     let number = |value: &Value| value.as_f64().unwrap();
     let mut leg_frames = frames[1..].iter();
     assert_eq!((&frames[0][0], &frames[0][1]), (&json!("world"), &json!("base")));
-    for (leg, description) in Leg::ALL.into_iter().zip(robot().legs) {
+    for (leg, description) in Leg::ALL.into_iter().zip(RobotDescription::embedded("go1").unwrap().legs) {
         let mut foot = Isometry3::identity();
         let mut parent = json!("base");
         for name in ["hip", "thigh", "calf", "foot"] {
@@ -176,7 +139,7 @@ fn frames_reach_the_feet(frames: &Value, tick: &Tick) {
             foot *= Isometry3::from_parts(Translation3::new(at(0), at(1), at(2)), rotation);
         }
         let angles = quadfrog::robot::leg_of(&tick.state.joint_position, leg as usize);
-        let position_leg = robot().leg_geometry.foot(&angles, leg.side()).position_leg;
+        let position_leg = RobotDescription::embedded("go1").unwrap().leg_geometry.foot(&angles, leg.side()).position_leg;
         let difference = foot.translation.vector - (description.joint_origin[0] + position_leg);
         assert!(difference.norm() < 1e-12, "{}: {difference:?}", leg.name());
     }
