@@ -63,10 +63,8 @@ fn golden_controller() {
         let orientation = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
         let feet = leg::feet(&geometry, &case.joint_q);
         let torques = leg::torques(&target, &feet, &case.joint_v, &orientation, &case.contact);
-        for joint in 0..12 {
-            torque.see(torques[joint] - case.expect.torque_unclamped_nm[joint], || {
-                format!("case {number} joint {joint}")
-            });
+        for (joint, (torque_nm, expected)) in torques.iter().zip(&case.expect.torque_unclamped_nm).enumerate() {
+            torque.see(torque_nm - expected, || format!("case {number} joint {joint}"));
         }
         for (leg, expect) in case.expect.feet.iter().enumerate() {
             let velocity = feet[leg].jacobian_leg * quadfrog::robot::leg_of(&case.joint_v, leg);

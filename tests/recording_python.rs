@@ -139,7 +139,8 @@ fn frames_reach_the_feet(frames: &Value, tick: &Tick) {
             foot *= Isometry3::from_parts(Translation3::new(at(0), at(1), at(2)), rotation);
         }
         let angles = quadfrog::robot::leg_of(&tick.state.joint_position, leg as usize);
-        let position_leg = RobotDescription::embedded("go1").unwrap().leg_geometry.foot(&angles, leg.side()).position_leg;
+        let position_leg =
+            RobotDescription::embedded("go1").unwrap().leg_geometry.foot(&angles, leg.side()).position_leg;
         let difference = foot.translation.vector - (description.joint_origin[0] + position_leg);
         assert!(difference.norm() < 1e-12, "{}: {difference:?}", leg.name());
     }

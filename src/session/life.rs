@@ -135,7 +135,7 @@ impl Life {
 
     /// The card on the table.
     pub fn proposal(&self) -> Option<Proposal> {
-        self.card.as_ref().map(|card| card.proposal(&self.rows, &self.plan.parameters))
+        self.card.as_ref().map(Card::proposal)
     }
 
     /// How many trials count so far.
@@ -386,8 +386,7 @@ impl Life {
                 self.enqueue_rerun(&mut fork, pending.trial)?;
             }
         }
-        let draft = fork.draft();
-        let card = Card::new(draft, self.card.as_ref());
+        let card = Card::new(fork, self.card.as_ref());
         let number = card.number();
         self.card = Some(card);
         self.show_card();
@@ -399,7 +398,7 @@ impl Life {
     fn begin(&mut self) -> Result<u32, StudyError> {
         self.tell_pending()?;
         let Some(card) = self.card.take() else { unreachable!("callers have looked at the card") };
-        let proposal = card.proposal(&self.rows, &self.plan.parameters);
+        let proposal = card.proposal();
         let origin = card.origin();
         let seed = origin.seed.unwrap_or_else(|| trial_seed(self.plan.seed, card.number()));
         let began = attributes::began(&proposal, seed, &self.plan.recording);

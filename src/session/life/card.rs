@@ -3,11 +3,9 @@
 use std::collections::BTreeMap;
 
 use super::attributes::Origin;
-use crate::optimize::study::Draft;
-use crate::recording::record::{ParameterInfo, Proposal, ProposedParameter, Risk, Source, TrialRecord, Verdict};
-
-/// How many nearest judged trials the share of falls is taken over.
-const NEIGHBOURS: usize = 5;
+use crate::optimize::insight;
+use crate::optimize::study::{Draft, Study};
+use crate::recording::record::{Proposal, ProposedParameter, Risk, Source};
 
 /// A card.
 pub struct Card {
@@ -15,13 +13,16 @@ pub struct Card {
     pub draft: Draft,
     /// Changes with every change of the card.
     pub revision: u32,
+    /// The study as it will be when the trial begins: what is not told yet is told in it.
+    outlook: Study,
     changed: BTreeMap<String, f64>,
 }
 
 impl Card {
-    /// A card of a new draft; revisions go on counting, so that no approval of an earlier card fits.
-    pub fn new(draft: Draft, previous: Option<&Card>) -> Card {
-        Card { draft, revision: previous.map_or(1, |card| card.revision + 1), changed: BTreeMap::new() }
+    /// A card of the next draft of `outlook`; revisions go on counting, so that no approval of an earlier card fits.
+    pub fn new(outlook: Study, previous: Option<&Card>) -> Card {
+        let revision = previous.map_or(1, |card| card.revision + 1);
+        Card { draft: outlook.draft(), revision, outlook, changed: BTreeMap::new() }
     }
 
     /// The number that the trial will have.
@@ -57,7 +58,7 @@ impl Card {
     }
 
     /// What the operator sees.
-    pub fn proposal(&self, rows: &BTreeMap<u32, TrialRecord>, bounds: &[ParameterInfo]) -> Proposal {
+    pub fn proposal(&self) -> Proposal {
         let value = |name: &str, proposed: f64| self.changed.get(name).copied().unwrap_or(proposed);
         let parameters: Vec<_> = self
             .draft
@@ -71,35 +72,20 @@ impl Card {
             revision: self.revision,
             source: if self.changed.is_empty() { origin.source } else { Source::Operator },
             parent: origin.parent,
-            risk: risk(&parameters, rows, bounds),
+            risk: self.risk(&parameters),
             parameters,
         }
     }
-}
 
-/// How near the point is to earlier falls, in parameters scaled to their bounds.
-fn risk(point: &[ProposedParameter], rows: &BTreeMap<u32, TrialRecord>, bounds: &[ParameterInfo]) -> Option<Risk> {
-    let distance = |row: &TrialRecord| {
-        let squares = point.iter().map(|p| {
-            let range = bounds.iter().find(|b| b.name == p.name).map_or(1.0, |b| b.high - b.low);
-            let other = row.parameters.iter().find(|(name, _)| *name == p.name).map_or(p.value, |(_, value)| *value);
-            if range > 0.0 { ((p.value - other) / range).powi(2) } else { 0.0 }
-        });
-        squares.sum::<f64>().sqrt()
-    };
-    let judged = rows.values().filter(|row| matches!(row.verdict, Some(Verdict::Accept | Verdict::Fall)));
-    let mut nearest: Vec<_> = judged.map(|row| (distance(row), row)).collect();
-    if nearest.is_empty() {
-        return None;
+    /// How near earlier falls are; none before the first trial that counts.
+    fn risk(&self, point: &[ProposedParameter]) -> Option<Risk> {
+        let point: Vec<_> = point.iter().map(|p| (p.name.clone(), p.value)).collect();
+        let risk = insight::Risk::of(&point, self.outlook.trials(), &self.outlook.options().space);
+        (risk.neighbours > 0).then(|| Risk {
+            nearest_fall: risk.falls.first().map(|(_, distance)| *distance),
+            nearest_fall_trial: risk.falls.first().map(|(trial, _)| *trial),
+            falls: risk.fell_near as u32,
+            neighbours: risk.neighbours as u32,
+        })
     }
-    nearest.sort_by(|(a, _), (b, _)| a.total_cmp(b));
-    let fell = |row: &TrialRecord| row.verdict == Some(Verdict::Fall);
-    let fall = nearest.iter().find(|(_, row)| fell(row));
-    let around = &nearest[..nearest.len().min(NEIGHBOURS)];
-    Some(Risk {
-        nearest_fall: fall.map(|(distance, _)| *distance),
-        nearest_fall_trial: fall.map(|(_, row)| row.trial),
-        falls: around.iter().filter(|(_, row)| fell(row)).count() as u32,
-        neighbours: around.len() as u32,
-    })
 }
