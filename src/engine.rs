@@ -18,7 +18,7 @@ use crate::optimize::space::{Range, Space, SpaceError};
 use crate::optimize::study::{Storage, Study, StudyError, StudyOptions};
 use crate::realtime::channel::{Heartbeat, ScreenEnd, StopLatch, channels};
 use crate::realtime::clock::{Clock, MonotonicClock};
-use crate::realtime::command::{Command, Task};
+use crate::realtime::command::Task;
 use crate::realtime::telemetry::{Mode, Snapshot, Tick};
 use crate::recording::RecordingError;
 use crate::recording::record::{Record, SessionInfo, Stamped};
@@ -241,6 +241,7 @@ impl Engine {
 
         Ok(Handle {
             screen: screen_end,
+            recording,
             intents: Some(intents_in),
             records: screen_records,
             closing,
@@ -269,17 +270,10 @@ fn run_session(mut supervisor: Supervisor, intents: &Receiver<Intent>, clock: &M
             Err(RecvTimeoutError::Disconnected) => break,
         }
     }
-    // Nobody is there any more: a standing robot sits down before its motors are let go.
-    if sits_down && supervisor.command(Command::SitDown).is_ok() {
-        let begun = clock.now_ns();
-        loop {
-            supervisor.attend(clock.now_ns());
-            let waited = Duration::from_nanos(clock.now_ns() - begun);
-            if !supervisor.mode().energised() || waited > LONGEST_GOODBYE {
-                break;
-            }
-            std::thread::sleep(SESSION_PERIOD);
-        }
+    let begun = clock.now_ns();
+    while sits_down && supervisor.say_goodbye() && clock.now_ns() - begun < LONGEST_GOODBYE.as_nanos() as u64 {
+        std::thread::sleep(SESSION_PERIOD);
+        supervisor.attend(clock.now_ns());
     }
     supervisor.close(clock.now_ns());
 }
@@ -288,6 +282,7 @@ fn run_session(mut supervisor: Supervisor, intents: &Receiver<Intent>, clock: &M
 /// the engine as `shutdown` does.
 pub struct Handle {
     screen: ScreenEnd,
+    recording: Option<PathBuf>,
     intents: Option<Sender<Intent>>,
     records: Receiver<Stamped>,
     closing: Arc<AtomicBool>,
@@ -305,6 +300,11 @@ impl Handle {
     /// The stop latch itself, for a thread that must be able to stop without the screen.
     pub fn stop_latch(&self) -> StopLatch {
         self.screen.stop.clone()
+    }
+
+    /// The recording of this session; none where nothing is kept.
+    pub fn recording(&self) -> Option<&std::path::Path> {
+        self.recording.as_deref()
     }
 
     /// The screen is alive; to be called at least ten times a second.

@@ -33,6 +33,11 @@ impl Gate {
     /// feed-forward part is changed so that this stays inside the joint's limit and its rate.
     pub fn pass(&mut self, wanted: &JointCommand, state: &RobotState, settings: &Settings) -> Passed {
         let damping = JointCommand::damping(settings.gate.damping_kd);
+        if *wanted == damping {
+            // The safe command needs no measured number, and passes even when there is none.
+            self.reset();
+            return Passed { command: damping, limited: 0, fault: None };
+        }
         let mut passed = Passed { command: *wanted, limited: 0, fault: None };
         let mut torques = Joints::default();
         for joint in 0..JOINTS {
@@ -49,6 +54,11 @@ impl Gate {
             motor.kd = motor.kd.clamp(0.0, settings.gate.kd_max);
             // tau_motor = tau + kp (q_d - q) + kd (dq_d - dq)
             let feedback = motor.torque_at(state.joint_position[joint], state.joint_velocity[joint]) - motor.torque;
+            if !feedback.is_finite() {
+                self.reset();
+                let fault = Some(Fault::NotFinite { what: "a joint's angle or velocity" });
+                return Passed { command: damping, limited: u16::MAX >> (16 - JOINTS), fault };
+            }
             let mut torque = (motor.torque + feedback).clamp(-settings.max_torque[joint], settings.max_torque[joint]);
             if let Some(last) = self.last_torque {
                 let step = settings.gate.torque_step_nm;

@@ -118,6 +118,8 @@ impl Supervisor {
 
     /// Carries out one intent, or says why not.
     pub fn carry_out(&mut self, intent: &Intent, time_ns: u64) {
+        // The screen may have seen a change of mode that is still on its way here.
+        self.attend(time_ns);
         let answer = if self.observe { Err("this session only observes".to_owned()) } else { self.obey(intent) };
         let (accepted, answer) = match answer {
             Ok(answer) => (true, answer),
@@ -147,9 +149,17 @@ impl Supervisor {
         }
     }
 
-    /// Asks the control thread for something that no operator asked for: taking control at the start, sitting down at
-    /// the end.
-    pub fn command(&mut self, command: Command) -> Result<(), String> {
+    /// Nobody is there any more: a robot that stands sits down, one that jumps as soon as it has landed. False once
+    /// nothing is energised.
+    pub fn say_goodbye(&mut self) -> bool {
+        if mode::next(self.mode, Request::SitDown).is_some() {
+            // A full ring is emptied a thousand times a second: the next call will get through.
+            let _ = self.command(Command::SitDown);
+        }
+        self.mode.energised()
+    }
+
+    fn command(&mut self, command: Command) -> Result<(), String> {
         self.control.commands.push(command).map_err(|_| "the control thread does not take commands".to_owned())
     }
 
@@ -184,7 +194,7 @@ impl Supervisor {
             Intent::Judge(verdict) => {
                 self.life.judge(*verdict, false).map_err(words)?;
                 self.end_review()?;
-                Ok(format!("{}; u takes it back until the next jump is approved", verdict.name()))
+                Ok("u takes it back until the next jump is approved".to_owned())
             }
             Intent::Rerun { trial: None } => {
                 self.life.judge(Verdict::Void, true).map_err(words)?;

@@ -252,6 +252,24 @@ fn a_recording_that_is_none_or_is_cut_is_refused_or_played_with_a_word() {
 }
 
 #[test]
+fn a_recording_cut_short_is_named_and_can_be_made_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = run(folder.path(), &["optimize", "--trials", "1", "--record", "all"]);
+    assert_eq!(output.status.code(), Some(0));
+    let [study] = studies(folder.path()).try_into().expect("one study");
+    let bytes = fs::read(study.join("session.mcap")).unwrap();
+    let cut = folder.path().join("cut.mcap");
+    fs::write(&cut, &bytes[..bytes.len() * 2 / 3]).unwrap();
+    let message = refused(folder.path(), &["replay", "cut.mcap"]);
+    assert!(message.contains("cut.mcap") && message.contains("quadfrog recover cut.mcap"), "{message}");
+    let output = run(folder.path(), &["recover", "cut.mcap"]);
+    let said = String::from_utf8_lossy(&output.stdout);
+    assert_eq!(output.status.code(), Some(0), "{said}");
+    assert!(said.contains("cut.recovered.mcap") && said.contains("ticks"), "{said}");
+    assert!(cut.is_file(), "nothing is lost");
+}
+
+#[test]
 fn without_a_terminal_the_console_says_what_to_do() {
     let folder = tempfile::tempdir().unwrap();
     let message = refused(folder.path(), &[]);

@@ -1,12 +1,12 @@
 //! The console on a running engine.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use quadfrog::config::Backend;
 use quadfrog::engine::{Engine, Options};
 use quadfrog::realtime::command::Task;
-use quadfrog_console::app::{self, ConsoleOptions};
+use quadfrog_console::app::{self, ConsoleOptions, Ended};
 use quadfrog_console::feed::Feed;
 use quadfrog_console::settings::{ColourChoice, Settings};
 use quadfrog_console::terminal;
@@ -80,6 +80,7 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
         }
     };
     let folder = chosen.folder.clone();
+    let cut_short = left_behind(&folder);
     let handle = Engine::start(Options {
         config,
         robot,
@@ -90,11 +91,27 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
         folder: Some(chosen.folder),
         observe: arguments.observe,
     })?;
-    app::run(Feed::live(handle), console)?;
+    let recording = handle.recording().map(Path::to_owned);
+    if app::run(Feed::live(handle), console)? == Ended::HungUp {
+        // There is nowhere to print to.
+        return Ok(());
+    }
     println!("The study and its recording are in {}", folder.display());
     println!("  continue it:  quadfrog --resume {}", folder.display());
-    println!("  look at it:   quadfrog replay {}", folder.join("session.mcap").display());
+    if let Some(recording) = recording {
+        println!("  look at it:   quadfrog replay {}", recording.display());
+    }
+    for part in cut_short {
+        println!("  an earlier recording was cut short; make it whole:  quadfrog recover {}", part.display());
+    }
     Ok(())
+}
+
+/// Recordings that an earlier session of this study could not finish.
+fn left_behind(folder: &Path) -> Vec<PathBuf> {
+    let Ok(entries) = std::fs::read_dir(folder) else { return Vec::new() };
+    let paths = entries.filter_map(|entry| Some(entry.ok()?.path()));
+    paths.filter(|path| path.extension().is_some_and(|extension| extension == "part")).collect()
 }
 
 /// The console's options from the arguments and `console.toml`.

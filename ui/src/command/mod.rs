@@ -1,7 +1,9 @@
 //! The command line: one file per subcommand; without one, the console opens.
 
+mod bench;
 mod console;
 mod optimize;
+mod recover;
 mod replay;
 mod study;
 
@@ -31,6 +33,10 @@ enum Subcommands {
     Optimize(optimize::OptimizeArguments),
     /// Play a recorded session in the console's panels
     Replay(replay::ReplayArguments),
+    /// Make a whole file of a recording that was cut short
+    Recover(recover::RecoverArguments),
+    /// Measure the simulator's speed on this machine
+    Bench(bench::BenchArguments),
 }
 
 /// What ends the program before its time.
@@ -145,5 +151,7 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
         None => console::run(&arguments.console),
         Some(Subcommands::Optimize(optimize)) => optimize::run(&optimize),
         Some(Subcommands::Replay(replay)) => replay::run(&replay),
+        Some(Subcommands::Recover(recover)) => recover::run(&recover),
+        Some(Subcommands::Bench(bench)) => bench::run(&bench),
     }
 }

@@ -6,7 +6,7 @@ use clap::Args;
 use quadfrog::config::Config;
 use quadfrog::recording::player::Player;
 use quadfrog::robot::description::RobotDescription;
-use quadfrog_console::app;
+use quadfrog_console::app::{self, Ended};
 use quadfrog_console::feed::Feed;
 use quadfrog_console::terminal;
 
@@ -28,12 +28,22 @@ pub fn run(arguments: &ReplayArguments) -> Result<(), Failure> {
     let config = Config::load(arguments.config.as_deref())?;
     let console = options(&arguments.screen, &config)?;
     let player = Player::open(&arguments.file).map_err(Failure::input)?;
-    terminal::check().map_err(Failure::input)?;
+    // A recording that was cut short is played as far as it goes, but never as if it were whole: the exit status says so.
+    let damage = player.damage().map(|damage| {
+        let file = arguments.file.display();
+        format!("{file}: {damage}; what is left can be played, and quadfrog recover {file} makes a whole file of it")
+    });
+    terminal::check().map_err(|error| match &damage {
+        Some(damage) => Failure::Input(format!("{damage}\n{error}")),
+        None => Failure::input(error),
+    })?;
     let console = match RobotDescription::embedded(&player.session().robot) {
         Ok(robot) => console.with_robot(robot),
         // A model of the operator's own: the panels that need its limits say so.
         Err(_) => console,
     };
-    app::run(Feed::replay(player), console)?;
-    Ok(())
+    match (app::run(Feed::replay(player), console)?, damage) {
+        (Ended::HungUp, _) | (_, None) => Ok(()),
+        (_, Some(damage)) => Err(Failure::Input(damage)),
+    }
 }
