@@ -37,25 +37,25 @@ pub fn run(arguments: &BenchArguments) -> Result<(), Failure> {
     }
     println!();
     let figures = Speed::new().measure(arguments.seconds * 5.0);
-    println!("accelerations from torques           {:8.2} us", figures.dynamics_s * 1e6);
+    println!("accelerations from torques                {:8.2} us", figures.dynamics_s * 1e6);
     for (scene, seconds) in Scene::ALL.iter().zip(figures.step_s) {
-        println!("1 ms step, {:<26}{:8.2} us  {:8.0} steps/s", scene.name(), seconds * 1e6, 1.0 / seconds);
+        println!("1 ms step, {:<31}{:8.2} us  {:8.0} steps/s", scene.name(), seconds * 1e6, 1.0 / seconds);
     }
     if let Some(script) = &arguments.mujoco {
         let theirs = mujoco(script, arguments.seconds)?;
         // Scene::ALL[1] is standing on four feet, as the script's robot does.
         let ours = 1.0 / figures.step_s[1];
         println!(
-            "MuJoCo, 1 ms step, standing on four feet          {theirs:8.0} steps/s: this one is {:.1} times as fast",
+            "MuJoCo, 1 ms step, standing on four feet  {:8.2} us  {theirs:8.0} steps/s; ours: {:.1} times as many",
             ours / theirs
         );
     }
     println!();
     let seconds = studies(&["--trials", "20"])?;
-    println!("optimize, 20 trials, start to finish {seconds:8.2} s");
+    println!("optimize, 20 trials, start to finish      {seconds:8.2} s");
     if arguments.long {
         let several = ["--task", "forward,lateral-left,twist-ccw", "--seed", "0-4", "--trials", "100"];
-        println!("optimize, 5 seeds of 3 tasks of 100  {:8.2} s", studies(&several)?);
+        println!("optimize, 5 seeds of 3 tasks of 100 trials{:8.2} s", studies(&several)?);
     }
     Ok(())
 }
