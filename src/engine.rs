@@ -2,7 +2,7 @@
 
 mod control_thread;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
@@ -74,6 +74,12 @@ pub enum EngineError {
     NoStudy {
         /// The file.
         file: PathBuf,
+    },
+    /// Another session has the study.
+    #[error("{}: another session is running in this folder; end it first, or look at it with optuna-dashboard", folder.display())]
+    InUse {
+        /// The folder.
+        folder: PathBuf,
     },
     /// The folder of the study, or a thread.
     #[error("{what}: {source}")]
@@ -159,18 +165,56 @@ pub const STUDY_FILE: &str = "study.log";
 ///
 /// # Errors
 /// When the folder cannot be made or written.
-pub fn prepare_folder(options: &Options) -> Result<Option<PathBuf>, EngineError> {
-    let Some(folder) = &options.folder else { return Ok(None) };
+pub fn prepare_folder(options: &Options) -> Result<Prepared, EngineError> {
+    let Some(folder) = &options.folder else { return Ok(Prepared { recording: None, _lock: None }) };
     let system = |what: String| move |source| EngineError::System { what, source };
-    let config = folder.join("config");
-    std::fs::create_dir_all(&config).map_err(system(format!("{}: cannot be made", config.display())))?;
-    for (name, text) in &options.config.as_run {
-        let path = config.join(name);
-        std::fs::write(&path, text).map_err(system(format!("{}: cannot be written", path.display())))?;
+    std::fs::create_dir_all(folder).map_err(system(format!("{}: cannot be made", folder.display())))?;
+    // The operating system lets go of the lock however the session ends.
+    let path = folder.join("session.lock");
+    let lock = std::fs::File::create(&path).map_err(system(format!("{}: cannot be made", path.display())))?;
+    match lock.try_lock() {
+        Ok(()) => {}
+        Err(std::fs::TryLockError::WouldBlock) => return Err(EngineError::InUse { folder: folder.clone() }),
+        Err(std::fs::TryLockError::Error(source)) => {
+            return Err(system(format!("{}: cannot be locked", path.display()))(source));
+        }
     }
+    keep_config(options, folder)?;
     let taken = |path: &PathBuf| path.exists() || path.with_extension("mcap.part").exists();
     let names = std::iter::once("session.mcap".to_owned()).chain((2..).map(|n| format!("session-{n}.mcap")));
-    Ok(names.map(|name| folder.join(name)).find(|path| !taken(path)))
+    let recording = names.map(|name| folder.join(name)).find(|path| !taken(path));
+    Ok(Prepared { recording, _lock: Some(lock) })
+}
+
+/// A study's folder that this session alone may use, as long as this lives.
+pub struct Prepared {
+    /// Where the recording goes.
+    pub recording: Option<PathBuf>,
+    _lock: Option<std::fs::File>,
+}
+
+/// Keeps the configuration as it runs in `config/`, or in `config-2/`, ... where an earlier session ran with another.
+fn keep_config(options: &Options, folder: &Path) -> Result<(), EngineError> {
+    let system = |what: String| move |source| EngineError::System { what, source };
+    let names = std::iter::once("config".to_owned()).chain((2..).map(|n| format!("config-{n}")));
+    for config in names.map(|name| folder.join(name)) {
+        let same = |(name, text): &(String, String)| {
+            std::fs::read_to_string(config.join(name)).is_ok_and(|kept| kept == *text)
+        };
+        if config.is_dir() {
+            if options.config.as_run.iter().all(same) {
+                return Ok(());
+            }
+            continue;
+        }
+        std::fs::create_dir(&config).map_err(system(format!("{}: cannot be made", config.display())))?;
+        for (name, text) in &options.config.as_run {
+            let path = config.join(name);
+            std::fs::write(&path, text).map_err(system(format!("{}: cannot be written", path.display())))?;
+        }
+        return Ok(());
+    }
+    Ok(())
 }
 
 /// The attachments of a recording: the configuration as it runs.
@@ -202,7 +246,8 @@ impl Engine {
         };
         // A simulated robot begins as a real one does: lying folded on its belly.
         robot.place(&Placement { joint_position: settings.lying_position, lying: true, seed: u64::from(options.seed) });
-        let recording = prepare_folder(&options)?;
+        let prepared = prepare_folder(&options)?;
+        let recording = prepared.recording.clone();
         let recording_name =
             recording.as_ref().and_then(|path| path.file_name()).map(|name| name.to_string_lossy().into_owned());
         let life = open_life(&options, Durability::Synced, recording_name.as_deref().unwrap_or_default())?;
@@ -242,6 +287,7 @@ impl Engine {
         Ok(Handle {
             screen: screen_end,
             recording,
+            _prepared: prepared,
             intents: Some(intents_in),
             records: screen_records,
             closing,
@@ -258,14 +304,14 @@ const SESSION_PERIOD: Duration = Duration::from_millis(5);
 const LONGEST_GOODBYE: Duration = Duration::from_secs(6);
 
 /// The session thread: intents as they come, events every few milliseconds, until the screen lets go of its handle.
-fn run_session(mut supervisor: Supervisor, intents: &Receiver<Intent>, clock: &MonotonicClock, sits_down: bool) {
+fn run_session(mut supervisor: Supervisor, intents: &Receiver<(Intent, u64)>, clock: &MonotonicClock, sits_down: bool) {
     loop {
         supervisor.attend(clock.now_ns());
         if supervisor.mode() == Mode::Observe {
             supervisor.take_control();
         }
         match intents.recv_timeout(SESSION_PERIOD) {
-            Ok(intent) => supervisor.carry_out(&intent, clock.now_ns()),
+            Ok((intent, stops)) => supervisor.carry_out(&intent, stops, clock.now_ns()),
             Err(RecvTimeoutError::Timeout) => {}
             Err(RecvTimeoutError::Disconnected) => break,
         }
@@ -283,7 +329,8 @@ fn run_session(mut supervisor: Supervisor, intents: &Receiver<Intent>, clock: &M
 pub struct Handle {
     screen: ScreenEnd,
     recording: Option<PathBuf>,
-    intents: Option<Sender<Intent>>,
+    _prepared: Prepared,
+    intents: Option<Sender<(Intent, u64)>>,
     records: Receiver<Stamped>,
     closing: Arc<AtomicBool>,
     control: Option<JoinHandle<()>>,
@@ -303,7 +350,7 @@ impl Handle {
     }
 
     /// The recording of this session; none where nothing is kept.
-    pub fn recording(&self) -> Option<&std::path::Path> {
+    pub fn recording(&self) -> Option<&Path> {
         self.recording.as_deref()
     }
 
@@ -321,7 +368,7 @@ impl Handle {
     pub fn wish(&self, intent: Intent) {
         if let Some(intents) = &self.intents {
             // A session that has ended answers nothing; the screen sees that its records end.
-            let _ = intents.send(intent);
+            let _ = intents.send((intent, self.screen.stop.count()));
         }
     }
 
@@ -376,19 +423,22 @@ pub struct StoredStudy {
     pub task: Task,
     /// Its seed.
     pub seed: u32,
+    /// The robot model that it was made with.
+    pub robot: String,
 }
 
 /// What study `file` holds.
 ///
 /// # Errors
 /// When the file cannot be read or holds no study of this program.
-pub fn stored_study(file: &std::path::Path) -> Result<StoredStudy, EngineError> {
+pub fn stored_study(file: &Path) -> Result<StoredStudy, EngineError> {
     let journal_file = JournalFile::new(file, Durability::Synced, LOCK_GRACE).map_err(StudyError::from)?;
     let journal = Journal::open(journal_file).map_err(StudyError::from)?;
     let ours = journal.replay().studies().iter().find_map(|study| {
         let task = Task::from_name(study.user_attributes.get("task")?.as_str()?)?;
         let seed = u32::try_from(study.user_attributes.get("seed")?.as_u64()?).ok()?;
-        Some(StoredStudy { task, seed })
+        let robot = study.user_attributes.get("robot")?.as_str()?.to_owned();
+        Some(StoredStudy { task, seed, robot })
     });
     ours.ok_or_else(|| EngineError::NoStudy { file: file.to_owned() })
 }

@@ -103,6 +103,17 @@ fn a_parameter_that_does_not_exist_is_refused_with_those_that_do() {
     assert!(error.contains("Fw") && error.contains("Fx"), "{error}");
 }
 
+/// (A defect once: without f0 the impulse never ended.)
+#[test]
+fn a_task_without_f0_or_a_frequency_of_zero_is_refused() {
+    let error = refused("optimize.toml", "[parameters]\nforward = [\"Fx\", \"Fz\"]\n");
+    assert!(error.contains("parameters.forward") && error.contains("needs f0"), "{error}");
+    let error = refused("optimize.toml", "[bounds]\nf1 = [0.0, 1.0]\n");
+    assert!(error.contains("bounds.f1") && error.contains("above 0 Hz"), "{error}");
+    let error = refused("safety.toml", "[watchdog]\nhardware_late_ms = -10.0\n");
+    assert!(error.contains("hardware_late_ms"), "{error}");
+}
+
 #[test]
 fn a_negative_duration_is_refused() {
     let error = refused("control.toml", "[stand_up]\nduration_s = -1.0\n");

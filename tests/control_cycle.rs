@@ -160,7 +160,7 @@ fn a_stopped_robot_stays_damped_until_it_is_acknowledged_and_armed_anew() {
         let tick = bench.command(command);
         assert_eq!(tick.mode, Mode::Damped, "{command:?}");
     }
-    assert_eq!(bench.command(Command::Acknowledge).mode, Mode::Disarmed);
+    assert_eq!(bench.command(Command::Acknowledge { stops: 0 }).mode, Mode::Disarmed);
     assert_eq!(bench.command(Command::RunTrial(bench.spec())).mode, Mode::Disarmed);
     assert_eq!(bench.command(Command::Arm).mode, Mode::StandUp);
 }
@@ -305,7 +305,7 @@ fn any_command(spec: TrialSpec) -> impl Strategy<Value = Option<Command>> {
         2 => Just(Some(Command::RunTrial(spec))),
         1 => Just(Some(Command::Cancel)),
         1 => Just(Some(Command::EndReview)),
-        1 => Just(Some(Command::Acknowledge)),
+        1 => Just(Some(Command::Acknowledge { stops: 0 })),
     ]
 }
 
@@ -348,4 +348,17 @@ proptest! {
             }
         }
     }
+}
+
+/// (A defect once: an acknowledgement that had waited in a queue erased a STOP that was pressed after it.)
+#[test]
+fn a_stop_outlives_an_acknowledgement_of_an_earlier_one() {
+    let latch = quadfrog::realtime::channel::StopLatch::default();
+    latch.set();
+    let seen = latch.count();
+    latch.set();
+    latch.acknowledge(seen);
+    assert!(latch.is_set(), "the second STOP was not looked after");
+    latch.acknowledge(latch.count());
+    assert!(!latch.is_set());
 }

@@ -312,6 +312,49 @@ fn a_trial_interrupted_in_mid_jump_is_void_and_comes_again() {
     assert!(again.trial > spec.trial);
 }
 
+/// Killed between the verdict and its telling, a re-run is not forgotten; killed once more, it does not come twice.
+#[test]
+fn a_rerun_survives_every_moment_of_a_kill_and_comes_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut life = open(folder.path());
+    let spec = run(&mut life, TrialEnd::Settled);
+    life.judge(Verdict::Void, true).unwrap();
+    drop(life);
+    for _ in 0..3 {
+        let life = open(folder.path());
+        let card = life.proposal().unwrap();
+        assert_eq!((card.source, card.parent), (Source::Rerun, Some(spec.trial)));
+        let waiting = study(Storage::File(folder.path().join("study.log"))).waiting().count();
+        assert_eq!(waiting, 1);
+    }
+}
+
+/// (A defect once: after an undo the revisions began anew, and an old approval fitted a card that nobody had seen.)
+#[test]
+fn an_approval_from_before_an_undo_is_refused() {
+    let mut life = life(5);
+    accept(&mut life);
+    let seen = life.proposal().unwrap();
+    life.undo().unwrap();
+    life.judge(Verdict::Fall, false).unwrap();
+    assert_eq!(life.proposal().unwrap().trial, seen.trial);
+    assert!(life.approve(seen.trial, seen.revision).is_err());
+}
+
+/// A trial of which ticks were lost is not measured, and says so.
+#[test]
+fn a_trial_with_lost_ticks_is_suggested_void() {
+    let mut life = life(5);
+    let card = life.proposal().unwrap();
+    let spec = life.approve(card.trial, card.revision).unwrap();
+    let mut lossy = ticks(spec.trial, 0.6);
+    lossy[1].number = 40;
+    life.ended(spec.trial, &TrialEnd::Settled, &lossy);
+    let row = life.row(spec.trial).unwrap();
+    assert_eq!((row.suggested, row.measured), (Some(Verdict::Void), None));
+    assert!(row.cause.contains("39 ticks"), "{}", row.cause);
+}
+
 /// What the screen is shown and what the study holds are the same.
 #[test]
 fn the_records_tell_what_the_study_holds() {

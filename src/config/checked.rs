@@ -327,6 +327,14 @@ impl Config {
                 ("watchdog.operator_silent_ms".to_owned(), f64::from(safety.watchdog.operator_silent_ms)),
             ],
         )?;
+        for (key, value) in [
+            ("watchdog.simulator_late_ms", safety.watchdog.simulator_late_ms),
+            ("watchdog.hardware_late_ms", safety.watchdog.hardware_late_ms),
+        ] {
+            if !(value >= 0.0 && value.is_finite()) {
+                return Err(self.refuse(FILE, key, value, "must be a number of milliseconds, or 0 to only count"));
+            }
+        }
         if safety.gate.damping_kd > safety.gate.kd_max {
             let reason = format!("is above gate.kd_max = {}: the stop itself would be cut", safety.gate.kd_max);
             return Err(self.refuse(FILE, "gate.damping_kd", safety.gate.damping_kd, reason));
@@ -352,6 +360,9 @@ impl Config {
             if !(low.is_finite() && high.is_finite() && low <= high) {
                 return Err(self.refuse(FILE, &key, value, "must be [lower, upper] with lower <= upper"));
             }
+            if name.starts_with('f') && *low <= 0.0 {
+                return Err(self.refuse(FILE, &key, value, "a frequency must be above 0 Hz"));
+            }
             if *low < least || *high > most {
                 let reason = format!(
                     "outside the robot's limits [{least}, {most}] of safety.toml, [parameters] {name}; narrow the bounds"
@@ -363,6 +374,10 @@ impl Config {
             let key = format!("parameters.{task}");
             if names.is_empty() {
                 return Err(self.refuse(FILE, &key, "[]", "a task needs at least one parameter"));
+            }
+            if !names.iter().any(|name| name == "f0") {
+                let reason = "a jump needs f0, the frequency of its impulse; add it (equal bounds fix it)";
+                return Err(self.refuse(FILE, &key, format!("{names:?}"), reason));
             }
             for (i, name) in names.iter().enumerate() {
                 if !self.optimize.bounds.contains_key(name) {
@@ -391,7 +406,7 @@ impl Config {
             for (joint, angle) in q.iter().enumerate() {
                 let i = 3 * leg as usize + joint;
                 let (least, most) = (robot.limits.min_position[i], robot.limits.max_position[i]);
-                if *angle < least || *angle > most {
+                if !(least..=most).contains(angle) {
                     let reason = format!(
                         "needs {} at {angle:.3} rad, which the robot's limits [{least}, {most}] forbid",
                         crate::robot::joint_name(i)

@@ -241,7 +241,7 @@ impl Cycle {
             // A robot that fell was judged: looked at, that is. It still has to be armed anew.
             Command::EndReview if matches!(self.cause, Cause::Fell(_)) => Request::Acknowledge,
             Command::EndReview => Request::EndReview,
-            Command::Acknowledge => Request::Acknowledge,
+            Command::Acknowledge { .. } => Request::Acknowledge,
         };
         if mode::next(self.mode, request).is_none() {
             self.events.push(Event::Refused { command: *command, mode: self.mode });

@@ -54,6 +54,11 @@ impl Estimator {
         } else {
             yaw
         };
+        if !unwrapped.is_finite() {
+            // The watchdog stops the robot; one bad number must not spoil every later yaw.
+            estimate.roll_pitch_yaw = Vector3::new(roll, pitch, previous_yaw);
+            return &self.estimate;
+        }
         self.started = true;
         estimate.roll_pitch_yaw = Vector3::new(roll, pitch, unwrapped);
         &self.estimate

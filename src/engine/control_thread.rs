@@ -9,7 +9,7 @@ use crate::control::settings::{PERIOD_S, Settings};
 use crate::realtime::channel::{ControlEnd, SHOWN_EVERY};
 use crate::realtime::clock::Clock;
 use crate::realtime::command::Command;
-use crate::realtime::telemetry::{Counters, Event, Snapshot};
+use crate::realtime::telemetry::{Counters, Event, Mode, Snapshot};
 use crate::realtime::thread::pace;
 use crate::robot::Robot;
 
@@ -27,8 +27,10 @@ pub fn run<C: Clock>(settings: &Settings, mut end: ControlEnd, clock: &C, closin
     let half_period_ns = period.as_nanos() as u64 / 2;
     let paced = pace(period, |instant| {
         let command = end.commands.pop().ok();
-        if command == Some(Command::Acknowledge) {
-            end.stop.clear();
+        if let Some(Command::Acknowledge { stops }) = command
+            && matches!(cycle.mode(), Mode::Damped | Mode::Fault)
+        {
+            end.stop.acknowledge(stops);
         }
         let time_ns = start_ns + instant.planned_ns;
         let inputs = Inputs {

@@ -2,7 +2,7 @@
 //! send.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::command::Command;
 use super::telemetry::{Counters, Event, Snapshot, Tick};
@@ -19,23 +19,36 @@ pub const SHOWN_EVERY: u64 = 5;
 pub const EVENTS: usize = 256;
 
 /// STOP: anyone sets it, control reads it first in every tick, and it is cleared by an acknowledgement alone.
+///
+/// Stops are counted, and an acknowledgement names the stops that it has seen: a newer STOP outlives it.
 #[derive(Debug, Clone, Default)]
-pub struct StopLatch(Arc<AtomicBool>);
+pub struct StopLatch(Arc<Stops>);
+
+#[derive(Debug, Default)]
+struct Stops {
+    pressed: AtomicU64,
+    acknowledged: AtomicU64,
+}
 
 impl StopLatch {
     /// Stops. Cannot queue, wait or fail.
     pub fn set(&self) {
-        self.0.store(true, Ordering::Release);
+        self.0.pressed.fetch_add(1, Ordering::AcqRel);
+    }
+
+    /// How often it was pressed.
+    pub fn count(&self) -> u64 {
+        self.0.pressed.load(Ordering::Acquire)
     }
 
     /// Whether it is set.
     pub fn is_set(&self) -> bool {
-        self.0.load(Ordering::Acquire)
+        self.count() > self.0.acknowledged.load(Ordering::Acquire)
     }
 
-    /// Only the control thread clears it, on an acknowledgement.
-    pub fn clear(&self) {
-        self.0.store(false, Ordering::Release);
+    /// The control thread takes note that somebody has looked after the first `stops` of them.
+    pub fn acknowledge(&self, stops: u64) {
+        self.0.acknowledged.fetch_max(stops, Ordering::AcqRel);
     }
 }
 
@@ -79,6 +92,8 @@ pub struct ControlEnd {
 pub struct SessionEnd {
     /// What it asks.
     pub commands: rtrb::Producer<Command>,
+    /// STOP, to see whether one came after a wish.
+    pub stop: StopLatch,
     /// The newest counters.
     pub counters: triple_buffer::Output<Counters>,
     /// What happened.
@@ -116,7 +131,7 @@ pub fn channels() -> (ControlEnd, SessionEnd, ScreenEnd, rtrb::Consumer<Tick>) {
         counters: counters_in,
         events: event_in,
     };
-    let session = SessionEnd { commands: command_in, counters: counters_out, events: event_out };
+    let session = SessionEnd { commands: command_in, stop: stop.clone(), counters: counters_out, events: event_out };
     let screen = ScreenEnd { stop, heartbeat, shown: shown_out, snapshot: snapshot_out };
     (control, session, screen, tick_out)
 }

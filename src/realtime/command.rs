@@ -132,5 +132,8 @@ pub enum Command {
     /// The verdict is given: the review is over.
     EndReview,
     /// A damped or faulted robot has been looked at: back to disarmed.
-    Acknowledge,
+    Acknowledge {
+        /// How often STOP had been pressed by then; a later STOP outlives this.
+        stops: u64,
+    },
 }

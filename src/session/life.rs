@@ -18,7 +18,7 @@ use crate::realtime::telemetry::{Tick, TrialEnd};
 use crate::recording::record::{ParameterInfo, Proposal, Record, Stage, StageInfo, TrialRecord, Verdict};
 
 use super::objective;
-use attributes::{Judgement, Origin};
+use attributes::Origin;
 use card::Card;
 
 /// Why a wish cannot be carried out, in words for the operator.
@@ -71,6 +71,8 @@ pub struct Life {
     /// The trial that runs or is under review.
     current: u32,
     card: Option<Card>,
+    /// How many cards and changes of cards there were: no approval of an earlier one fits a later one.
+    revisions: u32,
     pending: Option<Pending>,
     outbox: Vec<Record>,
 }
@@ -89,6 +91,7 @@ impl Life {
             stage: Stage::Finished,
             current: 0,
             card: None,
+            revisions: 0,
             pending: None,
             outbox: Vec::new(),
         };
@@ -158,7 +161,8 @@ impl Life {
         if !(value >= *low && value <= *high) {
             return not_now(format!("{name} = {value} {unit} is outside its bounds {low} to {high} {unit}"));
         }
-        card.set(name, value);
+        self.revisions += 1;
+        card.set(name, value, self.revisions);
         self.show_card();
         Ok(())
     }
@@ -169,7 +173,8 @@ impl Life {
     /// When there is no proposal.
     pub fn clear_overrides(&mut self) -> Result<(), Refusal> {
         let Some(card) = &mut self.card else { return not_now("there is no proposal to change") };
-        card.clear();
+        self.revisions += 1;
+        card.clear(self.revisions);
         self.show_card();
         Ok(())
     }
@@ -216,9 +221,13 @@ impl Life {
         if self.stage != Stage::Running || self.current != trial {
             return;
         }
-        let (suggested, cause) = objective::suggest(end);
+        let (mut suggested, mut cause) = objective::suggest(end);
+        let missing = objective::missing(ticks);
+        if missing > 0 {
+            (suggested, cause) = (Verdict::Void, format!("{missing} ticks of it were not recorded: not measured"));
+        }
         if let Some(row) = self.rows.get_mut(&trial) {
-            row.measured = objective::measure(ticks);
+            row.measured = if missing == 0 { objective::measure(ticks) } else { None };
             row.suggested = Some(suggested);
             row.cause = cause;
             row.value = value_of(row, suggested, &self.plan);
@@ -386,7 +395,8 @@ impl Life {
                 self.enqueue_rerun(&mut fork, pending.trial)?;
             }
         }
-        let card = Card::new(fork, self.card.as_ref());
+        self.revisions += 1;
+        let card = Card::new(fork, self.revisions);
         let number = card.number();
         self.card = Some(card);
         self.show_card();
@@ -397,12 +407,13 @@ impl Life {
     /// The card becomes a running trial of the study.
     fn begin(&mut self) -> Result<u32, StudyError> {
         self.tell_pending()?;
-        let Some(card) = self.card.take() else { unreachable!("callers have looked at the card") };
+        let Some(card) = &self.card else { unreachable!("callers have looked at the card") };
         let proposal = card.proposal();
         let origin = card.origin();
         let seed = origin.seed.unwrap_or_else(|| trial_seed(self.plan.seed, card.number()));
         let began = attributes::began(&proposal, seed, &self.plan.recording);
         let number = self.study.begin(&card.draft, &card.overrides(), &began)?;
+        self.card = None;
         let row = TrialRecord {
             trial: number,
             source: proposal.source,
@@ -423,12 +434,14 @@ impl Life {
     }
 
     fn tell_pending(&mut self) -> Result<(), StudyError> {
-        let Some(pending) = self.pending.take() else { return Ok(()) };
+        let Some(pending) = self.pending.clone() else { return Ok(()) };
         self.study.tell(pending.trial, pending.outcome)?;
         if pending.rerun {
             let (parameters, origin) = self.rerun_of(pending.trial);
             self.study.enqueue(&parameters, &origin.attributes())?;
         }
+        // Only now: what could not be written is still to be told.
+        self.pending = None;
         Ok(())
     }
 
@@ -446,23 +459,32 @@ impl Life {
     fn close_interrupted(&mut self) -> Result<(), StudyError> {
         let running: Vec<_> = self.study.running().cloned().collect();
         for trial in running {
-            match Judgement::of(&trial) {
-                Some(judgement) => {
-                    self.study.tell(trial.number, judgement.outcome)?;
-                    if judgement.rerun {
-                        self.study.enqueue(&trial.parameters, &Origin::rerun_of(trial.number).attributes())?;
-                    }
+            match attributes::judgement_of(&trial) {
+                Some(outcome) => {
+                    self.study.tell(trial.number, outcome)?;
                     self.log(format!("trial {} was judged before the interruption: it counts", trial.number));
                 }
                 None => {
+                    // Queued again below, or by the next session if this one is killed before it gets there.
                     let cause = "interrupted: the program ended before the verdict";
                     self.study.annotate(trial.number, &attributes::interrupted(cause))?;
                     self.study.tell(trial.number, Outcome::Fail)?;
-                    // The same seed as before: the study goes on as if nothing had happened.
-                    let origin = Origin::interrupted(&trial);
-                    self.study.enqueue(&trial.parameters, &origin.attributes())?;
                     self.log(format!("trial {} was interrupted: it is void and queued again", trial.number));
                 }
+            }
+        }
+        // A void trial whose parameters were to come again, and did not get to.
+        let owed: Vec<_> = self.study.trials().iter().filter(|trial| attributes::is_owed(trial)).cloned().collect();
+        for trial in owed {
+            if !self.study.trials().iter().any(|other| Origin::of(&other.user_attributes).parent == Some(trial.number))
+            {
+                let origin = if attributes::was_interrupted(&trial) {
+                    // The same seed as before: the study goes on as if nothing had happened.
+                    Origin::interrupted(&trial)
+                } else {
+                    Origin::rerun_of(trial.number)
+                };
+                self.study.enqueue(&trial.parameters, &origin.attributes())?;
             }
         }
         Ok(())

@@ -21,6 +21,9 @@ const FAULT_TICKS: usize = 200;
 /// How often the counters are told to the screen and the recording, ns.
 const COUNTERS_PERIOD_NS: u64 = 100_000_000;
 
+/// How long the recorder may take to hand over a trial's ticks, ns.
+const LONGEST_WAIT_FOR_TICKS_NS: u64 = 10_000_000_000;
+
 /// Where the records go: the recorder and the screen receive the same.
 pub struct Outlets {
     /// To the recorder.
@@ -48,6 +51,8 @@ pub struct Supervisor {
     cause: Cause,
     /// How the running trial ended, until its ticks have arrived too.
     ended: Option<(u32, TrialEnd)>,
+    /// When it ended, ns: its ticks are not waited for for ever.
+    ended_ns: u64,
     measured: VecDeque<TrialTicks>,
     recorder_complaint: Option<String>,
     observe: bool,
@@ -76,6 +81,7 @@ impl Supervisor {
             mode: Mode::Offline,
             cause: Cause::Course,
             ended: None,
+            ended_ns: 0,
             measured: VecDeque::new(),
             recorder_complaint: None,
             observe,
@@ -116,11 +122,19 @@ impl Supervisor {
         self.publish(time_ns);
     }
 
-    /// Carries out one intent, or says why not.
-    pub fn carry_out(&mut self, intent: &Intent, time_ns: u64) {
+    /// Carries out one intent, or says why not. `stops` is how often STOP had been pressed when it was wished: what
+    /// energises is not carried out if STOP came after it.
+    pub fn carry_out(&mut self, intent: &Intent, stops: u64, time_ns: u64) {
         // The screen may have seen a change of mode that is still on its way here.
         self.attend(time_ns);
-        let answer = if self.observe { Err("this session only observes".to_owned()) } else { self.obey(intent) };
+        let energises = matches!(intent, Intent::Arm | Intent::Approve { .. });
+        let answer = if self.observe {
+            Err("this session only observes".to_owned())
+        } else if energises && self.control.stop.count() != stops {
+            Err("STOP was pressed after it".to_owned())
+        } else {
+            self.obey(intent, stops)
+        };
         let (accepted, answer) = match answer {
             Ok(answer) => (true, answer),
             Err(reason) => (false, reason),
@@ -163,12 +177,14 @@ impl Supervisor {
         self.control.commands.push(command).map_err(|_| "the control thread does not take commands".to_owned())
     }
 
-    fn obey(&mut self, intent: &Intent) -> Result<String, String> {
+    fn obey(&mut self, intent: &Intent, stops: u64) -> Result<String, String> {
         let words = |refusal: Refusal| refusal.to_string();
         match intent {
             Intent::Arm => self.ask(Request::Arm, Command::Arm, "the robot stands up"),
             Intent::SitDown => self.ask(Request::SitDown, Command::SitDown, "the robot sits down"),
-            Intent::Acknowledge => self.ask(Request::Acknowledge, Command::Acknowledge, "acknowledged; arm when ready"),
+            Intent::Acknowledge => {
+                self.ask(Request::Acknowledge, Command::Acknowledge { stops }, "acknowledged; arm when ready")
+            }
             Intent::Cancel => self.ask(Request::Cancel, Command::Cancel, "the countdown is cancelled"),
             Intent::Approve { trial, revision } => {
                 if self.mode != Mode::Ready {
@@ -180,7 +196,10 @@ impl Supervisor {
                     ));
                 }
                 let spec = self.life.approve(*trial, *revision).map_err(words)?;
-                self.command(Command::RunTrial(spec))?;
+                if let Err(reason) = self.command(Command::RunTrial(spec)) {
+                    self.life.ended(spec.trial, &TrialEnd::Cancelled, &[]);
+                    return Err(reason);
+                }
                 Ok(format!("trial {} runs", spec.trial))
             }
             Intent::Skip => self.life.skip().map_err(words).map(|()| "skipped; here is another".to_owned()),
@@ -250,7 +269,10 @@ impl Supervisor {
                 self.cause = cause;
                 self.say(Record::Transition(Transition { from, to, cause: cause.to_string() }), time_ns);
             }
-            Event::TrialEnded { trial, end } => self.ended = Some((trial, end)),
+            Event::TrialEnded { trial, end } => {
+                self.ended = Some((trial, end));
+                self.ended_ns = time_ns;
+            }
             Event::Refused { command, mode } => {
                 let message =
                     format!("the control thread refused {} while {}", describe_command(&command), mode.name());
@@ -266,8 +288,14 @@ impl Supervisor {
     /// Once a trial has ended and its ticks are here, it is measured.
     fn measure(&mut self, time_ns: u64) {
         let Some((trial, end)) = self.ended else { return };
-        let Some(place) = self.measured.iter().position(|ticks| ticks.trial == trial) else { return };
-        let Some(TrialTicks { ticks, .. }) = self.measured.remove(place) else { return };
+        let ticks = match self.measured.iter().position(|ticks| ticks.trial == trial) {
+            Some(place) => self.measured.remove(place).map(|found| found.ticks).unwrap_or_default(),
+            None if time_ns < self.ended_ns + LONGEST_WAIT_FOR_TICKS_NS => return,
+            None => {
+                self.log(Level::Error, format!("the ticks of trial {trial} never came from the recorder"), time_ns);
+                Vec::new()
+            }
+        };
         self.measured.clear();
         self.ended = None;
         if matches!(end, TrialEnd::Fault(_)) {
@@ -341,6 +369,6 @@ fn describe_command(command: &Command) -> String {
         Command::RunTrial(spec) => format!("trial {}", spec.trial),
         Command::Cancel => "to cancel".to_owned(),
         Command::EndReview => "to end the review".to_owned(),
-        Command::Acknowledge => "the acknowledgement".to_owned(),
+        Command::Acknowledge { .. } => "the acknowledgement".to_owned(),
     }
 }

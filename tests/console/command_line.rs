@@ -269,6 +269,29 @@ fn a_recording_cut_short_is_named_and_can_be_made_whole() {
     assert!(cut.is_file(), "nothing is lost");
 }
 
+/// A study goes on with its own configuration and robot, and belongs to one session at a time.
+#[test]
+fn a_continued_study_keeps_its_configuration_and_robot() {
+    let folder = tempfile::tempdir().unwrap();
+    let config = folder.path().join("mine");
+    fs::create_dir(&config).unwrap();
+    fs::write(config.join("optimize.toml"), "trials = 3\n[bounds]\nFz = [200.0, 300.0]\n").unwrap();
+    let output = run(folder.path(), &["optimize", "--config", "mine", "--json", "--record", "none"]);
+    assert_eq!(lines(&output.stdout).len(), 3);
+    let [study] = studies(folder.path()).try_into().expect("one study");
+    let study = study.to_str().unwrap();
+    let message = refused(folder.path(), &["optimize", "--resume", study, "--model", "a1"]);
+    assert!(message.contains("--model a1") && message.contains("go1"), "{message}");
+    let output = run(folder.path(), &["optimize", "--resume", study, "--trials", "5", "--json", "--record", "none"]);
+    let rest = lines(&output.stdout);
+    assert_eq!(rest.len(), 2);
+    assert!(rest.iter().all(|trial| (200.0..=300.0).contains(&trial["params"]["Fz"].as_f64().unwrap())));
+    let held = fs::File::open(Path::new(study).join("session.lock")).unwrap();
+    held.lock().unwrap();
+    let message = refused(folder.path(), &["optimize", "--resume", study, "--trials", "6"]);
+    assert!(message.contains("another session"), "{message}");
+}
+
 #[test]
 fn without_a_terminal_the_console_says_what_to_do() {
     let folder = tempfile::tempdir().unwrap();

@@ -20,6 +20,7 @@ const CAUSE: &str = "cause";
 const VALUE: &str = "value";
 const HAND_VALUE: &str = "hand_value";
 const RERUN: &str = "rerun";
+const INTERRUPTED: &str = "interrupted";
 const RISK: &str = "risk";
 
 type Attributes = Vec<(String, Value)>;
@@ -78,24 +79,12 @@ impl Origin {
     }
 }
 
-/// A verdict that was on disk when the program ended.
-pub struct Judgement {
-    /// What the study is to be told.
-    pub outcome: Outcome,
-    /// Whether the parameters are to be queued again.
-    pub rerun: bool,
-}
-
-impl Judgement {
-    /// The judgement kept with a running trial, if there is one.
-    pub fn of(trial: &Trial) -> Option<Judgement> {
-        let kept = &trial.user_attributes;
-        let verdict = named(kept.get(VERDICT), Verdict::ALL, Verdict::name)?;
-        let outcome = match verdict {
-            Verdict::Void => Outcome::Fail,
-            Verdict::Accept | Verdict::Fall => Outcome::Complete(kept.get(VALUE).and_then(Value::as_f64)?),
-        };
-        Some(Judgement { outcome, rerun: kept.get(RERUN).and_then(Value::as_bool).unwrap_or(false) })
+/// What the study is to be told of a running trial whose verdict was on disk when the program ended; none without one.
+pub fn judgement_of(trial: &Trial) -> Option<Outcome> {
+    let kept = &trial.user_attributes;
+    match named(kept.get(VERDICT), Verdict::ALL, Verdict::name)? {
+        Verdict::Void => Some(Outcome::Fail),
+        Verdict::Accept | Verdict::Fall => kept.get(VALUE).and_then(Value::as_f64).map(Outcome::Complete),
     }
 }
 
@@ -132,7 +121,22 @@ pub fn judged(row: &TrialRecord, rerun: bool) -> Attributes {
 
 /// What is kept of a trial whose program ended before the verdict.
 pub fn interrupted(cause: &str) -> Attributes {
-    vec![(VERDICT.to_owned(), json!(Verdict::Void.name())), (CAUSE.to_owned(), json!(cause))]
+    vec![
+        (VERDICT.to_owned(), json!(Verdict::Void.name())),
+        (CAUSE.to_owned(), json!(cause)),
+        (RERUN.to_owned(), json!(true)),
+        (INTERRUPTED.to_owned(), json!(true)),
+    ]
+}
+
+/// Whether the parameters of a finished trial are to come again.
+pub fn is_owed(trial: &Trial) -> bool {
+    trial.state == TrialState::Fail && trial.user_attributes.get(RERUN).and_then(Value::as_bool) == Some(true)
+}
+
+/// Whether a trial is void because its program ended before the verdict.
+pub fn was_interrupted(trial: &Trial) -> bool {
+    trial.user_attributes.get(INTERRUPTED).and_then(Value::as_bool) == Some(true)
 }
 
 /// The seed that a trial ran with.

@@ -19,9 +19,8 @@ pub struct Card {
 }
 
 impl Card {
-    /// A card of the next draft of `outlook`; revisions go on counting, so that no approval of an earlier card fits.
-    pub fn new(outlook: Study, previous: Option<&Card>) -> Card {
-        let revision = previous.map_or(1, |card| card.revision + 1);
+    /// A card of the next draft of `outlook`; `revision` must be one that no earlier card had.
+    pub fn new(outlook: Study, revision: u32) -> Card {
         Card { draft: outlook.draft(), revision, outlook, changed: BTreeMap::new() }
     }
 
@@ -31,20 +30,20 @@ impl Card {
     }
 
     /// Changes one parameter; the proposed value is no change.
-    pub fn set(&mut self, name: &str, value: f64) {
+    pub fn set(&mut self, name: &str, value: f64, revision: u32) {
         let proposed = self.draft.parameters.iter().any(|p| p.name == name && p.value == value);
         if proposed {
             self.changed.remove(name);
         } else {
             self.changed.insert(name.to_owned(), value);
         }
-        self.revision += 1;
+        self.revision = revision;
     }
 
     /// Takes all changes back.
-    pub fn clear(&mut self) {
+    pub fn clear(&mut self, revision: u32) {
         self.changed.clear();
-        self.revision += 1;
+        self.revision = revision;
     }
 
     /// The changed parameters.

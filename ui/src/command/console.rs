@@ -66,13 +66,13 @@ pub struct ConsoleArguments {
 }
 
 pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
-    let config = arguments.study.load_config()?;
+    let config = arguments.study.load_config(arguments.resume.as_deref())?;
     let robot = arguments.study.load_robot()?;
     let console = options(&arguments.screen, &config)?.with_robot(robot.clone());
     terminal::check().map_err(Failure::input)?;
     let (task, seed) = (arguments.task.map(Task::from), arguments.seed);
     let chosen = match &arguments.resume {
-        Some(folder) => continued(folder, task, seed)?,
+        Some(folder) => continued(folder, task, seed, &robot)?,
         None => {
             let task = task.unwrap_or(Task::Forward);
             let seed = seed.unwrap_or(config.optimize.sampler.seed);
@@ -88,12 +88,16 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
         task: chosen.task,
         seed: chosen.seed,
         trials: arguments.study.trials,
-        folder: Some(chosen.folder),
+        // Who only looks leaves nothing behind.
+        folder: (!arguments.observe).then_some(chosen.folder),
         observe: arguments.observe,
     })?;
     let recording = handle.recording().map(Path::to_owned);
     if app::run(Feed::live(handle), console)? == Ended::HungUp {
         // There is nowhere to print to.
+        return Ok(());
+    }
+    if arguments.observe {
         return Ok(());
     }
     println!("The study and its recording are in {}", folder.display());

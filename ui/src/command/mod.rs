@@ -119,8 +119,10 @@ pub struct StudyArguments {
 }
 
 impl StudyArguments {
-    fn load_config(&self) -> Result<Config, Failure> {
-        Ok(Config::load(self.config.as_deref())?)
+    /// The configuration asked for; a study that is continued goes on with its own.
+    fn load_config(&self, resume: Option<&Path>) -> Result<Config, Failure> {
+        let own = resume.map(|folder| folder.join("config")).filter(|config| config.is_dir());
+        Ok(Config::load(self.config.as_deref().or(own.as_deref()))?)
     }
 
     fn load_robot(&self) -> Result<RobotDescription, Failure> {

@@ -86,9 +86,9 @@ fn parse_seeds(text: &str) -> Result<Seeds, String> {
 }
 
 pub fn run(arguments: &OptimizeArguments) -> Result<(), Failure> {
-    let config = arguments.study.load_config()?;
+    let config = arguments.study.load_config(arguments.resume.as_deref())?;
     let robot = arguments.study.load_robot()?;
-    let studies = choose(arguments, &config)?;
+    let studies = choose(arguments, &config, &robot)?;
     let printer = Printer::new(arguments, &config, &studies);
     let failures = Mutex::new(Vec::new());
     let next = AtomicUsize::new(0);
@@ -115,7 +115,7 @@ pub fn run(arguments: &OptimizeArguments) -> Result<(), Failure> {
 }
 
 /// The studies that the arguments ask for: every task with every seed.
-fn choose(arguments: &OptimizeArguments, config: &Config) -> Result<Vec<Chosen>, Failure> {
+fn choose(arguments: &OptimizeArguments, config: &Config, robot: &RobotDescription) -> Result<Vec<Chosen>, Failure> {
     let one = |task: &TaskName| Task::from(*task);
     if let Some(folder) = &arguments.resume {
         let seed = match arguments.seed.as_ref().map(|seeds| seeds.0.as_slice()) {
@@ -123,13 +123,16 @@ fn choose(arguments: &OptimizeArguments, config: &Config) -> Result<Vec<Chosen>,
             Some([seed]) => Some(*seed),
             Some(_) => return Err(Failure::input("--seed: a study that is continued has one seed")),
         };
-        return Ok(vec![continued(folder, arguments.task.first().map(one), seed)?]);
+        return Ok(vec![continued(folder, arguments.task.first().map(one), seed, robot)?]);
     }
     let tasks: Vec<Task> =
         if arguments.task.is_empty() { vec![Task::Forward] } else { arguments.task.iter().map(one).collect() };
     let seeds = arguments.seed.as_ref().map_or_else(|| vec![config.optimize.sampler.seed], |seeds| seeds.0.clone());
-    let every = tasks.iter().flat_map(|task| seeds.iter().map(|seed| (*task, *seed)));
-    Ok(every.map(|(task, seed)| Chosen { task, seed, folder: arguments.study.new_folder(task, seed) }).collect())
+    let distinct = |(place, item): (usize, &(Task, u32)), all: &[(Task, u32)]| !all[..place].contains(item);
+    let every: Vec<_> = tasks.iter().flat_map(|task| seeds.iter().map(|seed| (*task, *seed))).collect();
+    let once =
+        every.iter().enumerate().filter(|(place, item)| distinct((*place, *item), &every)).map(|(_, item)| *item);
+    Ok(once.map(|(task, seed)| Chosen { task, seed, folder: arguments.study.new_folder(task, seed) }).collect())
 }
 
 fn run_one(
@@ -152,7 +155,8 @@ fn run_one(
     let settings = config.settings(robot, study.task, Backend::Simulator)?;
     let simulator = Simulator::new(robot, &config.simulator).map_err(EngineError::from)?;
     let mut rollout = Rollout::new(simulator, &settings);
-    let recording = engine::prepare_folder(&options)?.filter(|_| arguments.record != Kept::None);
+    let prepared = engine::prepare_folder(&options)?;
+    let recording = prepared.recording.clone().filter(|_| arguments.record != Kept::None);
     let name = recording.as_ref().and_then(|path| path.file_name()).map(|name| name.to_string_lossy().into_owned());
     // The trial is on its way to the disk when it is judged, and on it before the next one is proposed.
     let mut life = engine::open_life(&options, Durability::Synced, name.as_deref().unwrap_or_default())?;
@@ -165,6 +169,7 @@ fn run_one(
     let mut best: Option<(TrialRecord, Vec<Tick>)> = None;
     let ran = automatic::run(&mut life, &mut rollout, |row, ticks| {
         printer.trial(study, row);
+        let accepted = row.verdict == Some(Verdict::Accept);
         let better = |best: &(TrialRecord, Vec<Tick>)| row.value > best.0.value;
         match kept {
             Kept::All => {
@@ -174,7 +179,7 @@ fn run_one(
                     failed.get_or_insert(error);
                 }
             }
-            Kept::Best if best.as_ref().is_none_or(better) => best = Some((row.clone(), ticks.to_vec())),
+            Kept::Best if accepted && best.as_ref().is_none_or(better) => best = Some((row.clone(), ticks.to_vec())),
             Kept::Best | Kept::None => {}
         }
     });

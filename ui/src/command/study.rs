@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use quadfrog::engine::{STUDY_FILE, stored_study};
 use quadfrog::realtime::command::Task;
+use quadfrog::robot::description::RobotDescription;
 
 use super::Failure;
 
@@ -18,7 +19,12 @@ pub struct Chosen {
 }
 
 /// The study that `folder` holds, whatever was asked for besides, as long as it does not contradict.
-pub fn continued(folder: &Path, task: Option<Task>, seed: Option<u32>) -> Result<Chosen, Failure> {
+pub fn continued(
+    folder: &Path,
+    task: Option<Task>,
+    seed: Option<u32>,
+    robot: &RobotDescription,
+) -> Result<Chosen, Failure> {
     let file = folder.join(STUDY_FILE);
     if !file.is_file() {
         let message = format!(
@@ -41,6 +47,16 @@ pub fn continued(folder: &Path, task: Option<Task>, seed: Option<u32>) -> Result
             "--seed: {} holds a study of seed {}; leave --seed away to continue it",
             file.display(),
             stored.seed
+        );
+        return Err(Failure::Input(message));
+    }
+    if robot.name != stored.robot {
+        let message = format!(
+            "--model {}: {} holds a study of the {}; give --model {}",
+            robot.name,
+            file.display(),
+            stored.robot,
+            stored.robot
         );
         return Err(Failure::Input(message));
     }
