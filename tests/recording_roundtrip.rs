@@ -50,7 +50,8 @@ proptest! {
             if index % 25 == 0 && let Some(late) = late.get(index / 25) {
                 let text = format!("line {index}");
                 let log = LogRecord { level: quadfrog::recording::record::Level::Info, source: "test".into(), message: text };
-                let time_ns = tick.time_ns.saturating_sub(*late as u64 * MS) + 500;
+                // Each at an instant of its own: records of the very same nanosecond have no order.
+                let time_ns = tick.time_ns.saturating_sub(*late as u64 * MS) + 500 + index as u64;
                 records.push(Stamped { time_ns, record: Record::Log(log) });
                 writer.record(records.last().unwrap()).unwrap();
             }

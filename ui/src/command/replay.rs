@@ -31,7 +31,7 @@ pub fn run(arguments: &ReplayArguments) -> Result<(), Failure> {
     // A recording that was cut short is played as far as it goes, but never as if it were whole: the exit status says so.
     let damage = player.damage().map(|damage| {
         let file = arguments.file.display();
-        format!("{file}: {damage}; what is left can be played, and quadfrog recover {file} makes a whole file of it")
+        format!("{damage}; what is left can be played, and quadfrog recover {file} makes a whole file of it")
     });
     terminal::check().map_err(|error| match &damage {
         Some(damage) => Failure::Input(format!("{damage}\n{error}")),
