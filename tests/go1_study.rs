@@ -35,6 +35,9 @@ fn config() -> Config {
     let mut config = Config::load(None).unwrap();
     // As long as in the simulator: nobody has to step back.
     config.control.countdown.hardware_s = config.control.countdown.simulator_s;
+    // Ten threads at 1 kHz on a machine that does other things too: what is a hiccup here would be a fault at a robot.
+    config.safety.watchdog.hardware_late_ms = 30.0;
+    config.safety.watchdog.state_age_ms = 60;
     config
 }
 
@@ -227,13 +230,12 @@ fn tell(seed: u32, outcome: &Outcome) {
     println!("seed {seed}: best {:.3} m, {} stops, {:?}", outcome.best, outcome.stops, outcome.link);
 }
 
-/// Twenty trials on each of five robots over loopback, millisecond by millisecond: the median of the best jumps is the simulator's
-/// within 10 %.
-#[test]
-fn a_study_over_the_network_step_by_step_ends_as_one_in_the_simulator() {
+/// Twenty trials on each of five robots over loopback, millisecond by millisecond; their best jumps beside the simulator's.
+fn step_by_step(watched: bool) -> (Vec<f64>, Vec<f64>) {
     let mut bests = (Vec::new(), Vec::new());
     for seed in 0..5 {
-        let (over, rows) = in_simulated_time(Backend::Hardware, seed, |config| Lockstep::new(config, seed.into()));
+        let robot = |config: &SimConfig| Lockstep { watched, ..Lockstep::new(config, seed.into()) };
+        let (over, rows) = in_simulated_time(Backend::Hardware, seed, robot);
         let (alone, alone_rows) = in_the_simulator(seed);
         let row = |row: &TrialRecord| format!("{:.3} {}", row.value.unwrap_or(f64::NAN), row.cause);
         for (over, alone) in rows.iter().zip(&alone_rows) {
@@ -242,7 +244,21 @@ fn a_study_over_the_network_step_by_step_ends_as_one_in_the_simulator() {
         bests.0.push(over);
         bests.1.push(alone);
     }
-    compare(&bests.0, &bests.1);
+    bests
+}
+
+/// What the link itself changes: with cameras that tell where the robot is, nothing but a millisecond and the fixed point.
+#[test]
+fn the_link_takes_nothing_from_a_study() {
+    let (network, simulator) = step_by_step(true);
+    compare(&network, &simulator);
+}
+
+/// The whole of it: the robot's own sensors alone say how far it jumped.
+#[test]
+fn a_study_over_the_network_ends_as_one_in_the_simulator() {
+    let (network, simulator) = step_by_step(false);
+    compare(&network, &simulator);
 }
 
 /// Within 10 % in the median.
@@ -265,7 +281,7 @@ fn three_trials_run_from_end_to_end() {
 /// Twenty trials on each of five robots at once: the median of the best jumps is the simulator's within 10 %.
 #[test]
 #[ignore = "takes three minutes in real time; .ci/run runs it"]
-fn a_study_over_the_network_ends_as_one_in_the_simulator() {
+fn a_study_in_real_time_ends_as_one_in_the_simulator() {
     let studies: Vec<_> =
         (0..5).map(|seed| std::thread::spawn(move || (seed, over_the_network(seed, TRIALS)))).collect();
     let outcomes: Vec<_> = studies.into_iter().map(|study| study.join().unwrap()).collect();

@@ -33,18 +33,24 @@ pub fn pair(config: &SimConfig, seed: u64) -> (Emulator, Go1) {
 pub struct Lockstep {
     pub emulator: Emulator,
     pub go1: Go1,
+    /// Cameras tell where the robot is: what is left to see is the link alone.
+    pub watched: bool,
 }
 
 impl Lockstep {
     pub fn new(config: &SimConfig, seed: u64) -> Lockstep {
         let (emulator, go1) = pair(config, seed);
-        Lockstep { emulator, go1 }
+        Lockstep { emulator, go1, watched: false }
     }
 }
 
 impl Robot for Lockstep {
     fn read(&mut self) -> Result<RobotState, RobotError> {
-        self.go1.read()
+        let mut state = self.go1.read()?;
+        if self.watched {
+            state.truth = self.emulator.status().truth;
+        }
+        Ok(state)
     }
 
     fn write(&mut self, command: &JointCommand) -> Result<(), RobotError> {
