@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use quadfrog::realtime::telemetry::{Mode, Snapshot};
 use quadfrog::recording::record::{
-    Level, ParameterInfo, Proposal, SessionInfo, Source, Stage, StageInfo, TrialRecord, Verdict,
+    Level, ParameterInfo, PreArmCheck, Proposal, SessionInfo, Source, Stage, StageInfo, TrialRecord, Verdict,
 };
 use quadfrog::robot::description::RobotDescription;
 
@@ -185,6 +185,8 @@ pub struct Model {
     pub stage: Option<StageInfo>,
     /// The proposal on the table.
     pub proposal: Option<Proposal>,
+    /// The pre-arm list as it was shown last; empty before the robot was disarmed for the first time.
+    pub pre_arm: Vec<PreArmCheck>,
     /// The study.
     pub trials: BTreeMap<u32, TrialRecord>,
     /// What the charts draw.
@@ -229,6 +231,7 @@ impl Model {
             snapshot_at: Duration::ZERO,
             stage: None,
             proposal: None,
+            pre_arm: Vec::new(),
             trials: BTreeMap::new(),
             history: History::default(),
             log: VecDeque::new(),
