@@ -6,6 +6,7 @@
 //! thigh (about y), calf (about y). SI units and radians throughout.
 
 pub mod description;
+pub mod go1;
 pub mod kinematics;
 
 use nalgebra::{UnitQuaternion, Vector3};
