@@ -4,7 +4,7 @@
 mod checked;
 mod merge;
 
-pub use checked::{Backend, Config, ControlFile, OptimizeFile, SafetyFile};
+pub use checked::{Backend, Config, ConfirmFile, ControlFile, OptimizeFile, SafetyFile, WorkersFile};
 
 use std::path::PathBuf;
 

@@ -7,6 +7,7 @@
 mod container;
 mod error;
 mod frames;
+mod optimizing;
 mod output;
 pub mod player;
 pub mod record;

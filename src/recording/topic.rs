@@ -24,10 +24,13 @@ pub enum Topic {
     Log,
     Fault,
     Marker,
+    Search,
+    Insight,
+    Points,
 }
 
 impl Topic {
-    pub const ALL: [Topic; 15] = [
+    pub const ALL: [Topic; 18] = [
         Topic::JointStates,
         Topic::JointCommand,
         Topic::Tick,
@@ -43,6 +46,9 @@ impl Topic {
         Topic::Log,
         Topic::Fault,
         Topic::Marker,
+        Topic::Search,
+        Topic::Insight,
+        Topic::Points,
     ];
 
     /// The name in the file.
@@ -63,6 +69,9 @@ impl Topic {
             Topic::Log => "/log",
             Topic::Fault => "/fault",
             Topic::Marker => "/marker",
+            Topic::Search => "/opt/search",
+            Topic::Insight => "/opt/insight",
+            Topic::Points => "/opt/points",
         }
     }
 
@@ -98,6 +107,9 @@ impl Topic {
             Topic::Command => own("OperatorCommand"),
             Topic::Fault => own("FaultTicks"),
             Topic::Marker => own("Marker"),
+            Topic::Search => own("Search"),
+            Topic::Insight => own("Insight"),
+            Topic::Points => own("Points"),
         }
     }
 }

@@ -172,6 +172,13 @@ impl Draw {
                 recording: self.string(),
                 started: self.string(),
                 observe: self.yes(),
+                gains: self.several(|d| ParameterInfo {
+                    name: d.string(),
+                    unit: d.string(),
+                    low: d.number(),
+                    high: d.number(),
+                }),
+                approve: self.string(),
             }),
             1 => Record::Transition(Transition {
                 from: self.one_of(&Mode::ALL),
@@ -194,6 +201,11 @@ impl Draw {
                     proposed: d.number(),
                 }),
                 risk: self.risk(),
+                gains: self.several(|d| ProposedParameter {
+                    name: d.string(),
+                    value: d.number(),
+                    proposed: d.number(),
+                }),
             }),
             4 => Record::Trial(TrialRecord {
                 trial: self.word() as u32,
@@ -214,6 +226,7 @@ impl Draw {
                 verdict: self.option(|d| d.one_of(&Verdict::ALL)),
                 note: self.string(),
                 risk: self.risk(),
+                gains: self.several(|d| (d.string(), d.number())),
             }),
             5 => Record::Command(CommandRecord { wish: self.string(), accepted: self.yes(), answer: self.string() }),
             6 => Record::Counters(Counters {
@@ -229,7 +242,40 @@ impl Draw {
                 source: self.string(),
                 message: self.string(),
             }),
-            _ => Record::FaultTicks(vec![self.tick(), self.tick()]),
+            8 => Record::FaultTicks(vec![self.tick(), self.tick()]),
+            9 => Record::Search(Search {
+                budget: self.word() as u32,
+                counted: self.word() as u32,
+                parameters: self.several(|d| SearchedParameter {
+                    name: d.string(),
+                    low: d.number(),
+                    high: d.number(),
+                    least: d.number(),
+                    most: d.number(),
+                    fixed: d.option(|d| Fixed { value: d.number(), trials: d.word() as u32 }),
+                }),
+                confirming: self.option(|d| d.word() as u32),
+            }),
+            10 => Record::Insight(Insight {
+                trial: self.word() as u32,
+                parameters: self.several(|d| ParameterInsight {
+                    name: d.string(),
+                    proposed: d.number(),
+                    importance: d.option(Draw::number),
+                    at: d.several(Draw::number),
+                    good: d.several(Draw::number),
+                    bad: d.several(Draw::number),
+                }),
+            }),
+            _ => Record::Points(self.several(|d| PointRecord {
+                parameters: d.several(|d| (d.string(), d.number())),
+                trials: d.several(|d| d.word() as u32),
+                stood: d.word() as u32,
+                mean: d.number(),
+                deviation: d.option(Draw::number),
+                contender: d.yes(),
+                confidence: d.option(Draw::number),
+            })),
         }
     }
 }
@@ -246,7 +292,7 @@ pub fn any_tick() -> impl Strategy<Value = Tick> {
 
 /// Any record; every kind is as likely.
 pub fn any_record() -> impl Strategy<Value = Record> {
-    (0..9_usize, draw(800)).prop_map(|(kind, mut draw)| draw.record(kind))
+    (0..12_usize, draw(800)).prop_map(|(kind, mut draw)| draw.record(kind))
 }
 
 /// A session as a study in the simulator begins it.
@@ -271,6 +317,8 @@ pub fn session() -> SessionInfo {
         recording: "session.mcap".into(),
         started: "2026-11-21T00:00:00Z".into(),
         observe: false,
+        gains: vec![parameter("kp", "N/m", 100.0, 1000.0)],
+        approve: "each".into(),
     }
 }
 
@@ -358,6 +406,7 @@ pub fn study(seconds: u64) -> (Vec<Tick>, Vec<Stamped>) {
                 verdict,
                 note: String::new(),
                 risk: None,
+                gains: Vec::new(),
             })
         };
         add(start - 500, stage(Stage::Proposed));
@@ -370,6 +419,7 @@ pub fn study(seconds: u64) -> (Vec<Tick>, Vec<Stamped>) {
                 parent: None,
                 parameters: vec![ProposedParameter { name: "Fx".into(), value: 100.0, proposed: 100.0 }],
                 risk: None,
+                gains: Vec::new(),
             }),
         );
         add(start, stage(Stage::Running));
