@@ -587,6 +587,8 @@ fn take_record(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
             log(model, time_ns, line.level, &line.source, line.message, false);
         }
         Record::PreArm(list) => model.pre_arm = list,
+        // Of these the newest counts, and the newest is asked for where it is drawn.
+        Record::Search(_) | Record::Insight(_) | Record::Points(_) => {}
         Record::FaultTicks(ticks) => {
             let text = format!("the last {} ticks before the fault are in the recording", ticks.len());
             log(model, time_ns, Level::Error, "control", text, false);
