@@ -25,6 +25,8 @@ use crate::recording::record::{Record, SessionInfo, Stamped};
 use crate::recording::recorder::Recorder;
 use crate::recording::writer::Writer;
 use crate::robot::description::RobotDescription;
+use crate::robot::go1::Go1;
+use crate::robot::go1::link::LinkError;
 use crate::robot::{Placement, Robot};
 use crate::session::approval::Approval;
 use crate::session::intent::Intent;
@@ -64,6 +66,9 @@ pub enum EngineError {
     /// The simulator's configuration.
     #[error(transparent)]
     Simulator(#[from] SimError),
+    /// The link to the robot.
+    #[error(transparent)]
+    Link(#[from] LinkError),
     /// The search space.
     #[error(transparent)]
     Space(#[from] SpaceError),
@@ -269,10 +274,7 @@ impl Engine {
         let settings = options.config.settings(&options.robot, options.task, options.backend)?;
         let mut robot: Box<dyn Robot> = match options.backend {
             Backend::Simulator => Box::new(Simulator::new(&options.robot, &options.config.simulator)?),
-            Backend::Hardware => {
-                let reason = "this version drives the simulator only";
-                return Err(options.config.refuse("control.toml", "robot", "go1", reason).into());
-            }
+            Backend::Hardware => Box::new(Go1::open(&options.robot, options.observe)?),
         };
         // A simulated robot begins as a real one does: lying folded on its belly.
         robot.place(&Placement { joint_position: settings.lying_position, lying: true, seed: u64::from(options.seed) });
