@@ -23,6 +23,7 @@ pub mod objective;
 pub mod optimizer;
 pub mod overrides;
 pub mod proposal;
+pub mod trial_text;
 pub mod trials;
 pub mod wireframe;
 
@@ -37,6 +38,9 @@ use crate::theme::{Role, Theme};
 pub const MIN_COLUMNS: u16 = 80;
 /// Rows that the console needs.
 pub const MIN_ROWS: u16 = 24;
+
+/// The row of the tabs, below the frame.
+pub const TABS_ROW: u16 = 2;
 
 /// Draws everything.
 pub fn render(frame: &mut Frame, model: &Model) {
