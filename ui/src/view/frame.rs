@@ -12,7 +12,7 @@ use ratatui::layout::{Alignment, Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
 
-use super::{MIN_COLUMNS, MIN_ROWS, clock, cut, number, span};
+use super::{MIN_COLUMNS, MIN_ROWS, clock, clock_ms, cut, number, span};
 use crate::action::Action;
 use crate::model::{Model, View};
 use crate::theme::Role;
@@ -87,8 +87,11 @@ fn identity(model: &Model, width: u16) -> Vec<Span<'static>> {
 fn recording(model: &Model) -> Vec<Span<'static>> {
     let theme = &model.theme;
     if let Some(replay) = &model.replay {
-        let state = if replay.playing { format!("x{}", replay.speed) } else { "paused".to_owned() };
-        let text = format!("{} / {}  {state} ", clock(replay.time_ns), clock(replay.duration_ns));
+        // Steps are milliseconds; while it plays they would only flicker.
+        let at = if replay.playing { clock(replay.time_ns) } else { clock_ms(replay.time_ns) };
+        let speed = if replay.playing || replay.speed != 1.0 { format!(" x{}", replay.speed) } else { String::new() };
+        let paused = if replay.playing { "" } else { " paused" };
+        let text = format!("{at} / {}{paused}{speed} ", clock(replay.duration_ns));
         return vec![span(theme, Role::Text, text)];
     }
     let counters = &model.snapshot.counters;

@@ -109,6 +109,11 @@ pub fn clock(time_ns: u64) -> String {
     if h > 0 { format!("{h}:{m:02}:{s:02}") } else { format!("{m:02}:{s:02}") }
 }
 
+/// As [`clock`], with milliseconds.
+pub fn clock_ms(time_ns: u64) -> String {
+    format!("{}.{:03}", clock(time_ns), time_ns / 1_000_000 % 1000)
+}
+
 /// The text cut to a number of characters, with a mark where something is missing.
 pub fn cut(text: &str, width: usize) -> String {
     if text.chars().count() <= width {

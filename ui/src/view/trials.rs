@@ -128,7 +128,12 @@ pub fn render_table(frame: &mut Frame, area: Rect, model: &Model, full: bool) {
         let style = if selected { theme.style(Role::Selected) } else { Style::new() };
         let area = Rect { y: area.y + 1 + line as u16, height: 1, ..area };
         let ghost = [model.live.ghost, model.live.comparison.as_ref().map(|c| c.b)].contains(&Some(trial.trial));
-        let mut spans = vec![Span::raw(format!("{:>4}{}", trial.trial, if ghost { "~" } else { " " }))];
+        let mut spans = vec![Span::raw(format!(
+            "{}{:>3}{}",
+            if selected { ">" } else { " " },
+            trial.trial,
+            if ghost { "~" } else { " " }
+        ))];
         for column in &columns {
             let (text, role) = cell(model, trial, column, best == Some(trial.trial));
             spans.push(span(theme, role, padded(&text, column.width)));
