@@ -139,6 +139,16 @@ struct Place {
     lines: HashMap<String, usize>,
 }
 
+impl Place {
+    fn refuse(&self, key: &str, value: impl ToString, reason: impl ToString) -> ConfigError {
+        let file = match self.lines.get(key) {
+            Some(line) => format!("{}:{line}", self.file),
+            None => self.file.clone(),
+        };
+        ConfigError::Value { file, key: key.to_owned(), value: value.to_string(), reason: reason.to_string() }
+    }
+}
+
 impl Config {
     /// The defaults, or the files of `folder` laid over them.
     ///
@@ -238,12 +248,7 @@ impl Config {
 
     /// Says where `key` of `file` stands, and what is wrong with it.
     pub fn refuse(&self, file: &'static str, key: &str, value: impl ToString, reason: impl ToString) -> ConfigError {
-        let place = &self.places[file];
-        let file = match place.lines.get(key) {
-            Some(line) => format!("{}:{line}", place.file),
-            None => place.file.clone(),
-        };
-        ConfigError::Value { file, key: key.to_owned(), value: value.to_string(), reason: reason.to_string() }
+        self.places[file].refuse(key, value, reason)
     }
 
     fn check(&self) -> Result<(), ConfigError> {
@@ -435,11 +440,21 @@ fn parse<T: DeserializeOwned>(
     places: &HashMap<&'static str, Place>,
     (name, table): (&'static str, Table),
 ) -> Result<T, ConfigError> {
-    table.try_into().map_err(|error: toml::de::Error| ConfigError::Syntax {
-        file: places[name].file.clone(),
-        line: 1,
-        message: error.message().to_owned(),
+    let place = &places[name];
+    serde_path_to_error::deserialize(toml::Value::Table(table.clone())).map_err(|error| {
+        let key = error.path().to_string();
+        // An entry of a list stands where its list does.
+        let key = key.split('[').next().unwrap_or(&key);
+        let value = lookup(&table, key).map(toml::Value::to_string).unwrap_or_default();
+        place.refuse(key, value, error.inner().message())
     })
+}
+
+/// The value of a key with its tables.
+fn lookup<'a>(table: &'a Table, key: &str) -> Option<&'a toml::Value> {
+    let mut parts = key.split('.');
+    let first = table.get(parts.next()?)?;
+    parts.try_fold(first, |value, part| value.get(part))
 }
 
 /// A folder must exist, and a TOML file in it that no one reads is probably a misspelt name.

@@ -46,6 +46,7 @@ pub fn run<C: Clock>(settings: &Settings, mut end: ControlEnd, clock: &C, closin
         counters.late_ticks += u64::from(instant.lateness_ns > half_period_ns);
         counters.worst_lateness_ns = counters.worst_lateness_ns.max(instant.lateness_ns);
         counters.state_age_ms = cycle.state_age_ms();
+        counters.link = robot.link();
         counters.ticks_not_recorded += u64::from(end.ticks.push(tick).is_err());
         if tick.number.is_multiple_of(SHOWN_EVERY) {
             counters.ticks_not_shown += u64::from(end.shown.push(tick).is_err());

@@ -3,7 +3,7 @@
 use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::realtime::command::Command;
-use crate::robot::{JointCommand, Joints, LEGS, PerLeg, RobotState, joint_name};
+use crate::robot::{JointCommand, Joints, LEGS, LinkStatus, PerLeg, RobotState, joint_name};
 
 /// What the machine is doing as a whole. One function, `control::mode::next`, owns the changes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
@@ -228,6 +228,8 @@ pub struct Counters {
     pub commands_refused: u64,
     /// Age of the robot's newest valid state, ms.
     pub state_age_ms: u32,
+    /// The link to the robot; none for the simulator.
+    pub link: Option<LinkStatus>,
 }
 
 /// The newest tick and the counters: what a screen draws from.

@@ -11,6 +11,7 @@ use super::record::{
 use super::tick;
 use super::topic::Topic;
 use crate::realtime::telemetry::Counters;
+use crate::robot::LinkStatus;
 
 /// A message that is not what the schema says.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -60,6 +61,7 @@ pub fn encode(record: &Record, start_utc_ns: u64, log_time: u64, buffer: &mut Ve
                 ticks_not_shown: counters.ticks_not_shown,
                 commands_refused: counters.commands_refused,
                 state_age_ms: counters.state_age_ms,
+                link: counters.link.as_ref().map(link),
             };
             (Topic::Counters, message.encode(buffer))
         }
@@ -118,6 +120,7 @@ pub fn decode(topic: Topic, data: &[u8]) -> Result<Option<Record>, DecodeError> 
                 ticks_not_shown: message.ticks_not_shown,
                 commands_refused: message.commands_refused,
                 state_age_ms: message.state_age_ms,
+                link: message.link.as_ref().map(from_link),
             })
         }
         Topic::Log => {
@@ -293,6 +296,46 @@ fn from_risk(message: frog::Risk) -> Risk {
 /// The value of that number: enums are numbered in the order of their `ALL`, here and in `proto/frog.proto`.
 fn one_of<T: Copy>(all: &[T], what: &'static str, number: i32) -> Result<T, DecodeError> {
     all.get(number as usize).copied().ok_or(DecodeError::Unknown(what, number))
+}
+
+fn link(link: &LinkStatus) -> frog::Link {
+    frog::Link {
+        received: link.received,
+        lost: link.lost,
+        late: link.late,
+        duplicate: link.duplicate,
+        corrupt: link.corrupt,
+        wrong_length: link.wrong_length,
+        foreign: link.foreign,
+        reboots: link.reboots,
+        sent: link.sent,
+        send_errors: link.send_errors,
+        state_age_ms: link.state_age_ms,
+        rate_hz: link.rate_hz,
+        recent_received: link.recent_received,
+        recent_lost: link.recent_lost,
+        recent_corrupt: link.recent_corrupt,
+    }
+}
+
+fn from_link(link: &frog::Link) -> LinkStatus {
+    LinkStatus {
+        received: link.received,
+        lost: link.lost,
+        late: link.late,
+        duplicate: link.duplicate,
+        corrupt: link.corrupt,
+        wrong_length: link.wrong_length,
+        foreign: link.foreign,
+        reboots: link.reboots,
+        sent: link.sent,
+        send_errors: link.send_errors,
+        state_age_ms: link.state_age_ms,
+        rate_hz: link.rate_hz,
+        recent_received: link.recent_received,
+        recent_lost: link.recent_lost,
+        recent_corrupt: link.recent_corrupt,
+    }
 }
 
 #[cfg(test)]

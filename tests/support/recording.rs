@@ -9,7 +9,7 @@ use quadfrog::realtime::telemetry::{Counters, Estimate, Mode, Phase, StageTimes,
 use quadfrog::recording::player::{Played, Player};
 use quadfrog::recording::record::*;
 use quadfrog::recording::writer::Writer;
-use quadfrog::robot::{Battery, Imu, JointCommand, MotorCommand, RobotState, Truth};
+use quadfrog::robot::{Battery, Imu, JointCommand, LinkStatus, MotorCommand, RobotState, Truth};
 
 /// Log time of engine time 0 in these tests: 2026-11-21 00:00 UTC.
 pub const START_UTC_NS: u64 = 1_795_219_200_000_000_000;
@@ -141,6 +141,26 @@ impl Draw {
         }
     }
 
+    fn link(&mut self) -> LinkStatus {
+        LinkStatus {
+            received: self.word(),
+            lost: self.word(),
+            late: self.word(),
+            duplicate: self.word(),
+            corrupt: self.word(),
+            wrong_length: self.word(),
+            foreign: self.word(),
+            reboots: self.word(),
+            sent: self.word(),
+            send_errors: self.word(),
+            state_age_ms: self.word() as u32,
+            rate_hz: self.word() as u32,
+            recent_received: self.word() as u32,
+            recent_lost: self.word() as u32,
+            recent_corrupt: self.word() as u32,
+        }
+    }
+
     fn risk(&mut self) -> Option<Risk> {
         self.option(|d| Risk {
             nearest_fall: d.option(Draw::number),
@@ -223,6 +243,7 @@ impl Draw {
                 ticks_not_shown: self.word(),
                 commands_refused: self.word(),
                 state_age_ms: self.word() as u32,
+                link: self.option(Draw::link),
             }),
             7 => Record::Log(LogRecord {
                 level: self.one_of(&[Level::Info, Level::Warning, Level::Error]),

@@ -1,0 +1,3 @@
+//! The Unitree Go1 over its low-level UDP protocol.
+
+pub mod packet;
