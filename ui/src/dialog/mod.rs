@@ -1,18 +1,22 @@
 //! What can lie over a view: questions, text fields, help. Each is data; keys reach it through [`key`].
 
+mod choice;
+mod override_form;
+
 use std::time::Duration;
 
 use crossterm::event::KeyCode;
-use quadfrog::recording::record::{Level, Proposal};
+use quadfrog::recording::record::Level;
 use quadfrog::session::intent::Intent;
 use tui_input::{Input, InputRequest};
 
 use crate::action::{ACTIONS, Action, ActionInfo};
-use crate::column::Column;
 use crate::keymap::Key;
-use crate::model::{Message, Model, Panel};
-use crate::series::SIGNALS;
+use crate::model::{Message, Model};
 use crate::update::{Effect, perform, wish};
+
+pub use choice::Choice;
+pub use override_form::{OverrideForm, OverrideRow};
 
 /// Two presses nearer than this are one: the second moment of an approval comes later.
 pub const APPROVAL_PAUSE: Duration = Duration::from_millis(300);
@@ -85,146 +89,6 @@ pub enum Purpose {
     LogSearch,
 }
 
-/// What a list of switches is about.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Choice {
-    /// The series of the charts.
-    Series,
-    /// The columns of the trial table.
-    Columns,
-}
-
-impl Choice {
-    /// Each thing's name, what it is, and whether it is on.
-    pub fn rows(self, model: &Model) -> Vec<(&'static str, &'static str, bool)> {
-        match self {
-            Choice::Series => {
-                let on = |series| model.live.series.contains(&series);
-                SIGNALS.iter().map(|signal| (signal.name, signal.unit, on(signal.series))).collect()
-            }
-            Choice::Columns => {
-                let on = |column| model.trials_view.columns.contains(&column);
-                Column::ALL.into_iter().map(|column| (column.name(), column.help(), on(column))).collect()
-            }
-        }
-    }
-
-    /// Switches one; the last one stays on. They keep the order of their table.
-    fn toggle(self, model: &mut Model, index: usize) {
-        match self {
-            Choice::Series => {
-                model.live.panel = Panel::Charts;
-                toggle(&mut model.live.series, SIGNALS.map(|signal| signal.series), index);
-            }
-            Choice::Columns => toggle(&mut model.trials_view.columns, Column::ALL, index),
-        }
-    }
-}
-
-fn toggle<T: Copy + PartialEq, const N: usize>(on: &mut Vec<T>, all: [T; N], index: usize) {
-    let Some(chosen) = all.get(index) else { return };
-    let wanted = |item: &T| on.contains(item) != (item == chosen);
-    let switched: Vec<T> = all.into_iter().filter(wanted).collect();
-    if !switched.is_empty() {
-        *on = switched;
-    }
-}
-
-/// The proposal being changed. Nothing leaves it before Enter, and nothing moves before an approval.
-#[derive(Debug, Clone)]
-pub struct OverrideForm {
-    /// Number of the proposal.
-    pub trial: u32,
-    /// The parameters.
-    pub rows: Vec<OverrideRow>,
-    /// The chosen one.
-    pub selected: usize,
-    /// A value being typed.
-    pub typing: Option<Input>,
-    /// What is wrong with it.
-    pub problem: Option<String>,
-}
-
-/// One parameter of the form.
-#[derive(Debug, Clone, PartialEq)]
-pub struct OverrideRow {
-    /// Name.
-    pub name: String,
-    /// Unit.
-    pub unit: String,
-    /// Lower bound.
-    pub low: f64,
-    /// Upper bound.
-    pub high: f64,
-    /// The value of the proposal when the form was opened.
-    pub before: f64,
-    /// The value now.
-    pub value: f64,
-}
-
-impl OverrideForm {
-    /// The form for a proposal; parameters without known bounds are left out.
-    pub fn new(proposal: &Proposal, model: &Model) -> OverrideForm {
-        let row = |p: &quadfrog::recording::record::ProposedParameter| {
-            let info = model.parameter(&p.name)?;
-            Some(OverrideRow {
-                name: p.name.clone(),
-                unit: info.unit.clone(),
-                low: info.low,
-                high: info.high,
-                before: p.value,
-                value: p.value,
-            })
-        };
-        let rows: Vec<OverrideRow> = proposal.parameters.iter().filter_map(row).collect();
-        let selected = model.override_row.min(rows.len().saturating_sub(1));
-        OverrideForm { trial: proposal.trial, rows, selected, typing: None, problem: None }
-    }
-
-    /// Moves the chosen value by `share` of its range, stopping at the bounds.
-    fn step(&mut self, share: f64) {
-        self.typing = None;
-        self.problem = None;
-        if let Some(row) = self.rows.get_mut(self.selected) {
-            row.value = (row.value + share * (row.high - row.low)).clamp(row.low, row.high);
-        }
-    }
-
-    /// Takes the typed value over; false if it is not possible, and then `problem` says why.
-    fn take_typed(&mut self) -> bool {
-        let Some(input) = &self.typing else { return true };
-        let Some(row) = self.rows.get_mut(self.selected) else { return true };
-        match input.value().trim().replace(',', ".").parse::<f64>() {
-            Ok(value) if (row.low..=row.high).contains(&value) => {
-                row.value = value;
-                self.typing = None;
-                self.problem = None;
-                true
-            }
-            Ok(value) => {
-                self.problem = Some(format!(
-                    "{} = {value} {u} is outside {} to {} {u}",
-                    row.name,
-                    row.low,
-                    row.high,
-                    u = row.unit
-                ));
-                false
-            }
-            Err(_) => {
-                self.problem = Some(format!("`{}` is not a number", input.value()));
-                false
-            }
-        }
-    }
-
-    fn select(&mut self, selected: usize) {
-        if self.take_typed() {
-            self.selected = selected.min(self.rows.len().saturating_sub(1));
-        }
-    }
-}
-
 impl Dialog {
     /// An empty field.
     pub fn field(purpose: Purpose, text: &str) -> Dialog {
@@ -264,7 +128,7 @@ pub fn key(model: &mut Model, key: Key) -> Vec<Effect> {
             Some('y' | 'Y') => vec![Effect::Quit],
             _ => cancelled(model, "not quit"),
         },
-        Dialog::Override(form) => override_key(model, key, form),
+        Dialog::Override(form) => override_form::key(model, key, form),
         Dialog::Field { purpose, input, .. } => field_key(model, key, purpose, input),
         Dialog::Palette { input, selected } => palette_key(model, key, input, selected),
         Dialog::Help { scroll } => {
@@ -280,7 +144,7 @@ pub fn key(model: &mut Model, key: Key) -> Vec<Effect> {
             model.dialog = Some(Dialog::Help { scroll });
             Vec::new()
         }
-        Dialog::Choose { what, selected } => choose_key(model, key, what, selected),
+        Dialog::Choose { what, selected } => choice::key(model, key, what, selected),
         Dialog::Details { trial } => {
             let neighbour = match key.code() {
                 KeyCode::Up => model.trials.range(..trial).next_back(),
@@ -319,44 +183,6 @@ fn approve_key(model: &mut Model, key: Key, (trial, revision, pressed_at): (u32,
             Vec::new()
         }
     }
-}
-
-fn override_key(model: &mut Model, key: Key, mut form: OverrideForm) -> Vec<Effect> {
-    match key.code() {
-        KeyCode::Esc if form.typing.is_some() => {
-            form.typing = None;
-            form.problem = None;
-        }
-        KeyCode::Esc => return cancelled(model, "nothing was changed"),
-        KeyCode::Enter => {
-            if form.take_typed() {
-                let changed = form.rows.iter().filter(|row| row.value != row.before);
-                let intents: Vec<Intent> =
-                    changed.map(|row| Intent::Override { parameter: row.name.clone(), value: row.value }).collect();
-                if intents.is_empty() {
-                    return cancelled(model, "nothing was changed");
-                }
-                return intents.into_iter().flat_map(|intent| wish(model, intent)).collect();
-            }
-        }
-        KeyCode::Up => form.select(form.selected.saturating_sub(1)),
-        KeyCode::Down | KeyCode::Tab => form.select(form.selected + 1),
-        KeyCode::Left if form.typing.is_none() => form.step(-0.01),
-        KeyCode::Right if form.typing.is_none() => form.step(0.01),
-        KeyCode::PageDown => form.step(-0.1),
-        KeyCode::PageUp => form.step(0.1),
-        _ => {
-            // A number and nothing else can be typed here.
-            let digit = matches!(key.typed(), Some('0'..='9' | '.' | ',' | '-' | '+' | 'e'));
-            if digit || form.typing.is_some() && key.typed().is_none() {
-                form.problem = None;
-                edit(form.typing.get_or_insert_default(), key);
-            }
-        }
-    }
-    model.override_row = form.selected;
-    model.dialog = Some(Dialog::Override(form));
-    Vec::new()
 }
 
 fn field_key(model: &mut Model, key: Key, purpose: Purpose, mut input: Input) -> Vec<Effect> {
@@ -408,22 +234,6 @@ fn submit(model: &mut Model, purpose: Purpose, text: &str) -> Result<Vec<Effect>
             Ok(Vec::new())
         }
     }
-}
-
-/// The list stays open while things are switched; what is switched shows at once.
-fn choose_key(model: &mut Model, key: Key, what: Choice, mut selected: usize) -> Vec<Effect> {
-    let last = what.rows(model).len().saturating_sub(1);
-    match key.code() {
-        KeyCode::Esc | KeyCode::Enter => return Vec::new(),
-        KeyCode::Up => selected = selected.saturating_sub(1),
-        KeyCode::Down => selected = (selected + 1).min(last),
-        KeyCode::Home => selected = 0,
-        KeyCode::End => selected = last,
-        KeyCode::Left | KeyCode::Right | KeyCode::Char('x') => what.toggle(model, selected),
-        _ => {}
-    }
-    model.dialog = Some(Dialog::Choose { what, selected });
-    Vec::new()
 }
 
 fn palette_key(model: &mut Model, key: Key, mut input: Input, mut selected: usize) -> Vec<Effect> {
