@@ -28,7 +28,8 @@ use crate::robot::description::RobotDescription;
 use crate::robot::{Placement, Robot};
 use crate::session::intent::Intent;
 use crate::session::life::{Life, Plan};
-use crate::session::supervisor::{Outlets, Supervisor};
+use crate::session::pre_arm::PreArmList;
+use crate::session::supervisor::{Outlets, Parts, Supervisor};
 use crate::sim::{SimError, Simulator};
 
 /// What an engine is started with.
@@ -222,6 +223,16 @@ pub fn attachments(config: &Config) -> Vec<(&str, &str, &[u8])> {
     config.as_run.iter().map(|(name, text)| (name.as_str(), "application/toml", text.as_bytes())).collect()
 }
 
+/// A short name of the configuration as it runs, for an operator to compare: FNV-1a of all files, 64 bits (Fowler, Noll and
+/// Vo, draft-eastlake-fnv).
+pub fn fingerprint(config: &Config) -> String {
+    let texts = config.as_run.iter().flat_map(|(name, text)| [name.as_bytes(), text.as_bytes()]);
+    let hash = texts
+        .flatten()
+        .fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01b3));
+    format!("{hash:016x}")
+}
+
 /// The present time, UTC, ns since 1970.
 pub fn utc_ns() -> u64 {
     u64::try_from(jiff::Timestamp::now().as_nanosecond()).unwrap_or(0)
@@ -277,7 +288,10 @@ impl Engine {
             .map_err(system("control"))?;
 
         let (intents_in, intents) = channel();
-        let supervisor = Supervisor::new(life, session_end, trial_ticks, outlets, status, info, clock.now_ns());
+        let folder = recording.as_ref().and(options.folder.clone());
+        let pre_arm = PreArmList::new(&settings, fingerprint(&options.config), folder);
+        let parts = Parts { life, control: session_end, trial_ticks, outlets, recorder: status, pre_arm, info };
+        let supervisor = Supervisor::new(parts, clock.now_ns());
         let sits_down = options.backend == Backend::Hardware;
         let session = std::thread::Builder::new()
             .name("session".into())

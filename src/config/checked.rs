@@ -9,9 +9,10 @@ use toml::Table;
 
 use super::ConfigError;
 use super::merge::merge;
+use super::safety::SafetyFile;
 use crate::control::estimator::GRAVITY;
 use crate::control::leg::stance_of;
-use crate::control::settings::{Fall, Gate, Ramp, Settings, Settle, Stand, TaskControl, Watchdog};
+use crate::control::settings::{Ramp, Settings, Settle, Stand, TaskControl};
 use crate::optimize::sampler::SamplerConfig;
 use crate::realtime::command::Task;
 use crate::recording::record::ParameterInfo;
@@ -71,34 +72,6 @@ pub struct Countdown {
 pub struct Contact {
     /// Least force at its sensor, N.
     pub force_n: f64,
-}
-
-/// `safety.toml`.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-pub struct SafetyFile {
-    /// When the robot counts as fallen.
-    pub fall: Fall,
-    /// The last gate.
-    pub gate: Gate,
-    /// What trips the watchdog.
-    pub watchdog: WatchdogFile,
-    /// The widest bounds of each parameter.
-    pub parameters: BTreeMap<String, [f64; 2]>,
-}
-
-/// The watchdog, with the values that differ between simulator and hardware.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
-pub struct WatchdogFile {
-    /// Largest tilt while standing, rad.
-    pub stance_tilt_rad: f64,
-    /// Oldest state, ms.
-    pub state_age_ms: u32,
-    /// Longest silence of the screen, ms.
-    pub operator_silent_ms: u32,
-    /// Latest tick on the simulator, ms; 0 only counts.
-    pub simulator_late_ms: f64,
-    /// Latest tick on hardware, ms; 0 only counts.
-    pub hardware_late_ms: f64,
 }
 
 /// `optimize.toml`.
@@ -220,14 +193,17 @@ impl Config {
         let chosen = self.task(task);
         self.check_stance(robot, task)?;
         let hardware = backend == Backend::Hardware;
-        let watchdog = &self.safety.watchdog;
+        let SafetyFile { watchdog, fall, .. } = &self.safety;
+        let (min_position, max_position) = robot.allowed_positions();
         Ok(Settings {
             geometry: robot.leg_geometry,
             hip_origin_body: Leg::ALL.map(|leg| robot.legs[leg as usize].joint_origin[0]),
-            min_position: robot.limits.min_position,
-            max_position: robot.limits.max_position,
+            min_position,
+            max_position,
             max_torque: robot.limits.max_torque,
-            lying_position: robot.lying_position,
+            max_velocity: robot.limits.max_velocity,
+            // A folded leg rests on its mechanical stop; what is asked of the motors ends at the limit.
+            lying_position: std::array::from_fn(|i| robot.lying_position[i].clamp(min_position[i], max_position[i])),
             weight_n: robot.total_mass() * GRAVITY,
             stand: Stand { gains: chosen.gains(), stance_leg: chosen.stance_leg(), vmc: chosen.vmc },
             stand_up: self.control.stand_up,
@@ -235,14 +211,15 @@ impl Config {
             countdown_s: if hardware { self.control.countdown.hardware_s } else { self.control.countdown.simulator_s },
             settle: self.control.settle,
             fall: self.safety.fall,
+            flight_tilt_rad: if hardware { fall.hardware_flight_rad } else { fall.simulator_flight_rad },
             contact_force_n: self.control.contact.force_n,
             gate: self.safety.gate,
-            watchdog: Watchdog {
-                stance_tilt_rad: watchdog.stance_tilt_rad,
-                state_age_ms: watchdog.state_age_ms,
-                operator_silent_ms: watchdog.operator_silent_ms,
-                late_ms: if hardware { watchdog.hardware_late_ms } else { watchdog.simulator_late_ms },
-            },
+            hardware,
+            pre_arm: self.safety.pre_arm,
+            approval: self.safety.approval,
+            watchdog: *watchdog,
+            late_ms: if hardware { watchdog.hardware_late_ms } else { watchdog.simulator_late_ms },
+            idle_s: if hardware { watchdog.hardware_idle_s } else { watchdog.simulator_idle_s },
         })
     }
 
@@ -314,45 +291,6 @@ impl Config {
         self.all_positive(FILE, &positive)
     }
 
-    fn check_safety(&self) -> Result<(), ConfigError> {
-        const FILE: &str = "safety.toml";
-        let safety = &self.safety;
-        self.all_positive(
-            FILE,
-            &[
-                ("fall.roll_rad".to_owned(), safety.fall.roll_rad),
-                ("fall.pitch_rad".to_owned(), safety.fall.pitch_rad),
-                ("fall.body_contact_s".to_owned(), safety.fall.body_contact_s),
-                ("gate.torque_step_nm".to_owned(), safety.gate.torque_step_nm),
-                ("gate.kp_max".to_owned(), safety.gate.kp_max),
-                ("gate.kd_max".to_owned(), safety.gate.kd_max),
-                ("gate.damping_kd".to_owned(), safety.gate.damping_kd),
-                ("watchdog.stance_tilt_rad".to_owned(), safety.watchdog.stance_tilt_rad),
-                ("watchdog.state_age_ms".to_owned(), f64::from(safety.watchdog.state_age_ms)),
-                ("watchdog.operator_silent_ms".to_owned(), f64::from(safety.watchdog.operator_silent_ms)),
-            ],
-        )?;
-        for (key, value) in [
-            ("watchdog.simulator_late_ms", safety.watchdog.simulator_late_ms),
-            ("watchdog.hardware_late_ms", safety.watchdog.hardware_late_ms),
-        ] {
-            if !(value >= 0.0 && value.is_finite()) {
-                return Err(self.refuse(FILE, key, value, "must be a number of milliseconds, or 0 to only count"));
-            }
-        }
-        if safety.gate.damping_kd > safety.gate.kd_max {
-            let reason = format!("is above gate.kd_max = {}: the stop itself would be cut", safety.gate.kd_max);
-            return Err(self.refuse(FILE, "gate.damping_kd", safety.gate.damping_kd, reason));
-        }
-        for (name, [low, high]) in &safety.parameters {
-            if !(low.is_finite() && high.is_finite() && low < high && *low >= 0.0) {
-                let reason = "must be [lowest, highest] with 0 <= lowest < highest";
-                return Err(self.refuse(FILE, &format!("parameters.{name}"), format!("[{low}, {high}]"), reason));
-            }
-        }
-        Ok(())
-    }
-
     fn check_optimize(&self) -> Result<(), ConfigError> {
         const FILE: &str = "optimize.toml";
         if self.optimize.trials == 0 {
@@ -402,6 +340,7 @@ impl Config {
         let key = format!("tasks.{}.stance_m", task.name());
         let chosen = self.task(task);
         let value = format!("{:?}", chosen.stance_m);
+        let (min_position, max_position) = robot.allowed_positions();
         for leg in Leg::ALL {
             let foot = stance_of(&chosen.stance_leg(), leg);
             let q = robot
@@ -410,7 +349,7 @@ impl Config {
                 .map_err(|error| self.refuse("control.toml", &key, &value, error))?;
             for (joint, angle) in q.iter().enumerate() {
                 let i = 3 * leg as usize + joint;
-                let (least, most) = (robot.limits.min_position[i], robot.limits.max_position[i]);
+                let (least, most) = (min_position[i], max_position[i]);
                 if !(least..=most).contains(angle) {
                     let reason = format!(
                         "needs {} at {angle:.3} rad, which the robot's limits [{least}, {most}] forbid",
@@ -423,7 +362,7 @@ impl Config {
         Ok(())
     }
 
-    fn all_positive(&self, file: &'static str, values: &[(String, f64)]) -> Result<(), ConfigError> {
+    pub(super) fn all_positive(&self, file: &'static str, values: &[(String, f64)]) -> Result<(), ConfigError> {
         match values.iter().find(|(_, value)| !(*value > 0.0 && value.is_finite())) {
             Some((key, value)) => Err(self.refuse(file, key, value, "must be a number above 0")),
             None => Ok(()),

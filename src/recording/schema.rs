@@ -5,11 +5,12 @@ use prost::Message;
 
 use super::frog;
 use super::record::{
-    CommandRecord, Level, LogRecord, Measured, ParameterInfo, Proposal, ProposedParameter, Record, Risk, SessionInfo,
-    Source, Stage, StageInfo, Transition, TrialRecord, Verdict,
+    CommandRecord, Level, LogRecord, Measured, ParameterInfo, PreArmCheck, Proposal, ProposedParameter, Record, Risk,
+    SessionInfo, Source, Stage, StageInfo, Transition, TrialRecord, Verdict,
 };
 use super::tick;
 use super::topic::Topic;
+use crate::realtime::pre_arm::{Check, CheckState};
 use crate::realtime::telemetry::Counters;
 use crate::robot::LinkStatus;
 
@@ -84,6 +85,15 @@ pub fn encode(record: &Record, start_utc_ns: u64, log_time: u64, buffer: &mut Ve
             let message = frog::FaultTicks { ticks: ticks.iter().map(tick::whole).collect() };
             (Topic::Fault, message.encode(buffer))
         }
+        Record::PreArm(list) => {
+            let item = |item: &PreArmCheck| frog::pre_arm::Item {
+                check: item.check as i32,
+                state: item.state as i32,
+                found: item.found.clone(),
+                needed: item.needed.clone(),
+            };
+            (Topic::PreArm, frog::PreArm { items: list.iter().map(item).collect() }.encode(buffer))
+        }
     };
     encoded.expect("a Vec grows as far as it must");
     topic
@@ -136,6 +146,18 @@ pub fn decode(topic: Topic, data: &[u8]) -> Result<Option<Record>, DecodeError> 
         Topic::Fault => {
             let message = frog::FaultTicks::decode(data)?;
             Record::FaultTicks(message.ticks.iter().map(tick::from_whole).collect::<Result<_, _>>()?)
+        }
+        Topic::PreArm => {
+            let item = |item: frog::pre_arm::Item| {
+                Ok(PreArmCheck {
+                    check: one_of(&Check::ALL, "check", item.check)?,
+                    state: one_of(&CheckState::ALL, "state of a check", item.state)?,
+                    found: item.found,
+                    needed: item.needed,
+                })
+            };
+            let items = frog::PreArm::decode(data)?.items;
+            Record::PreArm(items.into_iter().map(item).collect::<Result<_, DecodeError>>()?)
         }
         Topic::JointStates | Topic::JointCommand | Topic::Tick | Topic::Pose | Topic::Tf | Topic::Marker => {
             return Ok(None);
@@ -369,6 +391,15 @@ mod tests {
         for (number, verdict) in (0..).zip(Verdict::ALL) {
             assert_eq!(verdict as i32, number);
             assert_named(verdict.name(), frog::trial::Verdict::try_from(number).ok().map(|v| v.as_str_name()));
+        }
+        // Their names are sentences; their numbers and count are what matters.
+        for (number, check) in (0..).zip(Check::ALL) {
+            assert_eq!(check as i32, number);
+            assert!(frog::pre_arm::Check::try_from(number).is_ok(), "{check:?}");
+        }
+        for (number, state) in (0..).zip(CheckState::ALL) {
+            assert_eq!(state as i32, number);
+            assert_named(state.name(), frog::pre_arm::State::try_from(number).ok().map(|s| s.as_str_name()));
         }
     }
 }

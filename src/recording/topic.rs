@@ -24,10 +24,11 @@ pub enum Topic {
     Log,
     Fault,
     Marker,
+    PreArm,
 }
 
 impl Topic {
-    pub const ALL: [Topic; 15] = [
+    pub const ALL: [Topic; 16] = [
         Topic::JointStates,
         Topic::JointCommand,
         Topic::Tick,
@@ -43,6 +44,7 @@ impl Topic {
         Topic::Log,
         Topic::Fault,
         Topic::Marker,
+        Topic::PreArm,
     ];
 
     /// The name in the file.
@@ -63,6 +65,7 @@ impl Topic {
             Topic::Log => "/log",
             Topic::Fault => "/fault",
             Topic::Marker => "/marker",
+            Topic::PreArm => "/safety/pre_arm",
         }
     }
 
@@ -98,6 +101,7 @@ impl Topic {
             Topic::Command => own("OperatorCommand"),
             Topic::Fault => own("FaultTicks"),
             Topic::Marker => own("Marker"),
+            Topic::PreArm => own("PreArm"),
         }
     }
 }

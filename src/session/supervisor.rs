@@ -6,12 +6,13 @@ use std::sync::mpsc::{Receiver, Sender};
 
 use super::intent::Intent;
 use super::life::{Life, Refusal};
+use super::pre_arm::{PreArmList, objections};
 use crate::control::mode::{self, Request};
 use crate::realtime::channel::SessionEnd;
 use crate::realtime::command::Command;
 use crate::realtime::telemetry::{Cause, Event, Mode, Tick, TrialEnd};
 use crate::recording::record::{
-    CommandRecord, Level, LogRecord, Record, SessionInfo, Stage, Stamped, Transition, Verdict,
+    CommandRecord, Level, LogRecord, PreArmCheck, Record, SessionInfo, Stage, Stamped, Transition, Verdict,
 };
 use crate::recording::recorder::{RecorderWatch, TrialTicks};
 
@@ -20,6 +21,9 @@ const FAULT_TICKS: usize = 200;
 
 /// How often the counters are told to the screen and the recording, ns.
 const COUNTERS_PERIOD_NS: u64 = 100_000_000;
+
+/// How often the pre-arm list is shown again though no item changed its state, ns.
+const PRE_ARM_PERIOD_NS: u64 = 500_000_000;
 
 /// How long the recorder may take to hand over a trial's ticks, ns.
 const LONGEST_WAIT_FOR_TICKS_NS: u64 = 10_000_000_000;
@@ -40,6 +44,24 @@ impl Outlets {
     }
 }
 
+/// What a session is made of.
+pub struct Parts {
+    /// The study's life.
+    pub life: Life,
+    /// To the control thread.
+    pub control: SessionEnd,
+    /// The ticks of each trial, from the recorder.
+    pub trial_ticks: Receiver<TrialTicks>,
+    /// Where the records go.
+    pub outlets: Outlets,
+    /// How the recorder is doing.
+    pub recorder: RecorderWatch,
+    /// What must hold before the robot is energised.
+    pub pre_arm: PreArmList,
+    /// What this session is: its first record.
+    pub info: SessionInfo,
+}
+
 /// The session.
 pub struct Supervisor {
     life: Life,
@@ -58,19 +80,16 @@ pub struct Supervisor {
     observe: bool,
     asked_for_control: bool,
     counters_ns: u64,
+    pre_arm: PreArmList,
+    /// The list as it was shown last, and when.
+    shown_list: Vec<PreArmCheck>,
+    shown_list_ns: u64,
 }
 
 impl Supervisor {
-    /// A session over a study; `info` becomes the first record.
-    pub fn new(
-        life: Life,
-        control: SessionEnd,
-        trial_ticks: Receiver<TrialTicks>,
-        outlets: Outlets,
-        recorder: RecorderWatch,
-        info: SessionInfo,
-        time_ns: u64,
-    ) -> Supervisor {
+    /// A session over a study.
+    pub fn new(parts: Parts, time_ns: u64) -> Supervisor {
+        let Parts { life, control, trial_ticks, outlets, recorder, pre_arm, info } = parts;
         let observe = info.observe;
         let mut supervisor = Supervisor {
             life,
@@ -87,6 +106,9 @@ impl Supervisor {
             observe,
             asked_for_control: false,
             counters_ns: 0,
+            pre_arm,
+            shown_list: Vec::new(),
+            shown_list_ns: 0,
         };
         supervisor.say(Record::Session(info), time_ns);
         supervisor.publish(time_ns);
@@ -118,6 +140,7 @@ impl Supervisor {
             self.counters_ns = time_ns;
             let counters = *self.control.counters.read();
             self.say(Record::Counters(counters), time_ns);
+            self.show_pre_arm(time_ns);
         }
         self.publish(time_ns);
     }
@@ -180,7 +203,22 @@ impl Supervisor {
     fn obey(&mut self, intent: &Intent, stops: u64) -> Result<String, String> {
         let words = |refusal: Refusal| refusal.to_string();
         match intent {
-            Intent::Arm => self.ask(Request::Arm, Command::Arm, "the robot stands up"),
+            Intent::Arm if mode::next(self.mode, Request::Arm).is_some() => {
+                let findings = *self.control.findings.read();
+                match objections(&self.pre_arm.look(&findings, &self.recorder.get())) {
+                    Some(objections) => Err(objections),
+                    None => self.ask(Request::Arm, Command::Arm, "the robot stands up"),
+                }
+            }
+            Intent::Arm => Err(format!("not while the robot is {}", self.mode.name())),
+            Intent::Confirm(check) if self.mode.energised() => {
+                Err(format!("{} is asked before the robot is armed", check.check().name()))
+            }
+            Intent::Confirm(check) => {
+                self.pre_arm.confirm(*check);
+                self.shown_list_ns = 0;
+                Ok("confirmed".to_owned())
+            }
             Intent::SitDown => self.ask(Request::SitDown, Command::SitDown, "the robot sits down"),
             Intent::Acknowledge => {
                 self.ask(Request::Acknowledge, Command::Acknowledge { stops }, "acknowledged; arm when ready")
@@ -267,15 +305,17 @@ impl Supervisor {
             Event::Mode { from, to, cause, time_ns } => {
                 self.mode = to;
                 self.cause = cause;
+                self.pre_arm.mode_changed(from, to, &cause);
+                self.shown_list.clear();
                 self.say(Record::Transition(Transition { from, to, cause: cause.to_string() }), time_ns);
             }
             Event::TrialEnded { trial, end } => {
                 self.ended = Some((trial, end));
                 self.ended_ns = time_ns;
             }
-            Event::Refused { command, mode } => {
-                let message =
-                    format!("the control thread refused {} while {}", describe_command(&command), mode.name());
+            Event::Refused { command, mode, because } => {
+                let command_name = describe_command(&command);
+                let message = format!("the control thread refused {command_name} while {}: {because}", mode.name());
                 self.log(Level::Warning, message, time_ns);
                 if let Command::RunTrial(spec) = command {
                     self.ended = Some((spec.trial, TrialEnd::Cancelled));
@@ -309,6 +349,26 @@ impl Supervisor {
         }
     }
 
+    /// The pre-arm list, while the robot is disarmed: to the screen twice a second, to both when an item changes its state.
+    fn show_pre_arm(&mut self, time_ns: u64) {
+        if self.mode != Mode::Disarmed || self.observe {
+            return;
+        }
+        let findings = *self.control.findings.read();
+        let list = self.pre_arm.look(&findings, &self.recorder.get());
+        let states = |list: &[PreArmCheck]| list.iter().map(|item| item.state).collect::<Vec<_>>();
+        let stamped = Stamped { time_ns, record: Record::PreArm(list.clone()) };
+        if states(&list) != states(&self.shown_list) {
+            self.outlets.put(stamped);
+        } else if time_ns >= self.shown_list_ns + PRE_ARM_PERIOD_NS {
+            let _ = self.outlets.screen.send(stamped);
+        } else {
+            return;
+        }
+        self.shown_list_ns = time_ns;
+        self.shown_list = list;
+    }
+
     /// What the study's life has to say.
     fn publish(&mut self, time_ns: u64) {
         for record in self.life.take_records() {
@@ -339,6 +399,7 @@ fn way_to_ready(mode: Mode) -> &'static str {
 fn describe(intent: &Intent) -> String {
     match intent {
         Intent::Arm => "arm".to_owned(),
+        Intent::Confirm(check) => format!("confirm {}", check.check().name()),
         Intent::SitDown => "sit down".to_owned(),
         Intent::Acknowledge => "acknowledge".to_owned(),
         Intent::Approve { trial, .. } => format!("approve trial {trial}"),

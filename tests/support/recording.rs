@@ -5,6 +5,7 @@ use std::path::Path;
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use proptest::prelude::*;
+use quadfrog::realtime::pre_arm::{Check, CheckState};
 use quadfrog::realtime::telemetry::{Counters, Estimate, Mode, Phase, StageTimes, Tick};
 use quadfrog::recording::player::{Played, Player};
 use quadfrog::recording::record::*;
@@ -170,7 +171,7 @@ impl Draw {
         })
     }
 
-    /// A record of the kind `kind` of nine.
+    /// A record of the kind `kind` of ten.
     fn record(&mut self, kind: usize) -> Record {
         match kind {
             0 => Record::Session(SessionInfo {
@@ -250,6 +251,12 @@ impl Draw {
                 source: self.string(),
                 message: self.string(),
             }),
+            8 => Record::PreArm(self.several(|d| PreArmCheck {
+                check: d.one_of(&Check::ALL),
+                found: d.string(),
+                needed: d.string(),
+                state: d.one_of(&CheckState::ALL),
+            })),
             _ => Record::FaultTicks(vec![self.tick(), self.tick()]),
         }
     }
@@ -267,7 +274,7 @@ pub fn any_tick() -> impl Strategy<Value = Tick> {
 
 /// Any record; every kind is as likely.
 pub fn any_record() -> impl Strategy<Value = Record> {
-    (0..9_usize, draw(800)).prop_map(|(kind, mut draw)| draw.record(kind))
+    (0..10_usize, draw(800)).prop_map(|(kind, mut draw)| draw.record(kind))
 }
 
 /// A session as a study in the simulator begins it.

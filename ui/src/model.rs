@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use quadfrog::realtime::telemetry::{Mode, Snapshot};
 use quadfrog::recording::record::{
-    Level, ParameterInfo, Proposal, SessionInfo, Source, Stage, StageInfo, TrialRecord, Verdict,
+    Level, ParameterInfo, PreArmCheck, Proposal, SessionInfo, Source, Stage, StageInfo, TrialRecord, Verdict,
 };
 use quadfrog::robot::description::RobotDescription;
 
@@ -225,6 +225,8 @@ pub struct Model {
     pub stage: Option<StageInfo>,
     /// The proposal on the table.
     pub proposal: Option<Proposal>,
+    /// The pre-arm list as it was shown last; empty before the robot was disarmed for the first time.
+    pub pre_arm: Vec<PreArmCheck>,
     /// The study.
     pub trials: BTreeMap<u32, TrialRecord>,
     /// When the trials of this session ran.
@@ -275,6 +277,7 @@ impl Model {
             snapshot_at: Duration::ZERO,
             stage: None,
             proposal: None,
+            pre_arm: Vec::new(),
             trials: BTreeMap::new(),
             ran: BTreeMap::new(),
             history: History::default(),

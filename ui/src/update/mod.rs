@@ -143,6 +143,7 @@ pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
             model.history.clear();
             model.trials.clear();
             model.ran.clear();
+            model.pre_arm.clear();
             model.log.clear();
             model.log_view.back = 0;
             model.stage = None;

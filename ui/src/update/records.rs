@@ -109,6 +109,7 @@ pub(super) fn take(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
             }
             log(model, time_ns, line.level, &line.source, line.message, false);
         }
+        Record::PreArm(list) => model.pre_arm = list,
         Record::FaultTicks(ticks) => {
             let text = format!("the last {} ticks before the fault are in the recording", ticks.len());
             log(model, time_ns, Level::Error, "control", text, false);
