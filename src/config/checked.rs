@@ -11,7 +11,9 @@ use super::ConfigError;
 use super::merge::merge;
 use crate::control::estimator::GRAVITY;
 use crate::control::leg::stance_of;
-use crate::control::settings::{Fall, Gate, Ramp, Settings, Settle, Stand, TaskControl, Watchdog};
+use crate::control::settings::{
+    EstimatorSettings, Fall, Gate, ObjectiveSource, Ramp, Settings, Settle, Stand, TaskControl, Watchdog,
+};
 use crate::optimize::sampler::SamplerConfig;
 use crate::realtime::command::Task;
 use crate::recording::record::ParameterInfo;
@@ -29,7 +31,8 @@ const FILES: [(&str, &str); 5] = [
 ];
 
 /// Keys that may be given though the defaults leave them out, each with an example of its kind.
-const OPTIONAL: [(&str, &str); 1] = [("optimize.toml", "[sampler]\nstartup_trials = 10\n")];
+const OPTIONAL: [(&str, &str); 1] =
+    [("optimize.toml", "objective = \"truth\"\n[sampler]\nstartup_trials = 10\n")];
 
 /// Which machine stands behind the controller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -53,6 +56,8 @@ pub struct ControlFile {
     pub settle: Settle,
     /// When a foot is on the ground.
     pub contact: Contact,
+    /// How the base's state is estimated.
+    pub estimator: EstimatorSettings,
     /// What each task's trials run with.
     pub tasks: BTreeMap<String, TaskControl>,
 }
@@ -66,10 +71,10 @@ pub struct Countdown {
     pub hardware_s: f64,
 }
 
-/// When a foot is on the ground.
+/// When a foot is on the ground, by the simulator's own knowledge.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 pub struct Contact {
-    /// Least force at its sensor, N.
+    /// Least force of the ground on it, N.
     pub force_n: f64,
 }
 
@@ -106,6 +111,8 @@ pub struct WatchdogFile {
 pub struct OptimizeFile {
     /// Trials that count.
     pub trials: u32,
+    /// Name of what the objective is measured from; none takes what the backend has.
+    pub objective: Option<String>,
     /// Bounds of each parameter.
     pub bounds: BTreeMap<String, [f64; 2]>,
     /// Which parameters each task optimizes.
@@ -202,10 +209,31 @@ impl Config {
             .collect()
     }
 
+    /// What the objective is measured from: as chosen, or else the truth on the simulator and the estimate on hardware.
+    ///
+    /// # Errors
+    /// When it is something else than those two, or the truth is asked of hardware, which does not know it.
+    pub fn objective(&self, backend: Backend) -> Result<ObjectiveSource, ConfigError> {
+        let refuse = |name: &str, reason| self.refuse("optimize.toml", "objective", format!("\"{name}\""), reason);
+        let Some(name) = &self.optimize.objective else {
+            return Ok(match backend {
+                Backend::Simulator => ObjectiveSource::Truth,
+                Backend::Hardware => ObjectiveSource::Estimate,
+            });
+        };
+        match (ObjectiveSource::from_name(name), backend) {
+            (None, _) => Err(refuse(name, "must be \"truth\" or \"estimate\", or be left out")),
+            (Some(ObjectiveSource::Truth), Backend::Hardware) => {
+                Err(refuse(name, "a robot does not know the truth, only a simulator does; take \"estimate\" or leave it out"))
+            }
+            (Some(source), _) => Ok(source),
+        }
+    }
+
     /// What the control cycle is made with.
     ///
     /// # Errors
-    /// When the stance of `task` is out of the robot's reach.
+    /// When the stance of `task` is out of the robot's reach, or the objective cannot be measured on `backend`.
     pub fn settings(&self, robot: &RobotDescription, task: Task, backend: Backend) -> Result<Settings, ConfigError> {
         let chosen = self.task(task);
         self.check_stance(robot, task)?;
@@ -214,6 +242,8 @@ impl Config {
         Ok(Settings {
             geometry: robot.leg_geometry,
             hip_origin_body: Leg::ALL.map(|leg| robot.legs[leg as usize].joint_origin[0]),
+            imu_origin_body: robot.imu_origin,
+            foot_radius: robot.legs[0].foot_radius,
             min_position: robot.limits.min_position,
             max_position: robot.limits.max_position,
             max_torque: robot.limits.max_torque,
@@ -226,6 +256,8 @@ impl Config {
             settle: self.control.settle,
             fall: self.safety.fall,
             contact_force_n: self.control.contact.force_n,
+            objective: self.objective(backend)?,
+            estimator: self.control.estimator,
             gate: self.safety.gate,
             watchdog: Watchdog {
                 stance_tilt_rad: watchdog.stance_tilt_rad,
@@ -306,6 +338,12 @@ impl Config {
             let reason = "must be 0 to 60 s";
             return Err(self.refuse(FILE, "countdown.simulator_s", control.countdown.simulator_s, reason));
         }
+        let estimator = &control.estimator;
+        positive.extend(estimator.numbers().map(|(key, value)| (format!("estimator.{key}"), value)));
+        if estimator.contact_off_n >= estimator.contact_on_n {
+            let reason = format!("must be below estimator.contact_on_n = {}", estimator.contact_on_n);
+            return Err(self.refuse(FILE, "estimator.contact_off_n", estimator.contact_off_n, reason));
+        }
         self.all_positive(FILE, &positive)
     }
 
@@ -350,6 +388,7 @@ impl Config {
 
     fn check_optimize(&self) -> Result<(), ConfigError> {
         const FILE: &str = "optimize.toml";
+        self.objective(Backend::Simulator)?;
         if self.optimize.trials == 0 {
             return Err(self.refuse(FILE, "trials", 0, "a study needs at least one trial"));
         }
