@@ -28,9 +28,11 @@ use crate::robot::description::RobotDescription;
 use crate::robot::go1::Go1;
 use crate::robot::go1::link::LinkError;
 use crate::robot::{Placement, Robot};
+use crate::session::approval::Approval;
 use crate::session::intent::Intent;
 use crate::session::life::{Life, Plan};
-use crate::session::supervisor::{Outlets, Supervisor};
+use crate::session::pre_arm::PreArmList;
+use crate::session::supervisor::{Outlets, Parts, Supervisor};
 use crate::sim::{SimError, Simulator};
 
 /// What an engine is started with.
@@ -51,6 +53,8 @@ pub struct Options {
     pub folder: Option<PathBuf>,
     /// Whether the session only looks.
     pub observe: bool,
+    /// Who approves and judges.
+    pub approve: Approval,
 }
 
 /// Why an engine does not start.
@@ -74,6 +78,11 @@ pub enum EngineError {
     /// The recording.
     #[error(transparent)]
     Recording(#[from] RecordingError),
+    /// A robot that may hurt somebody is not left to itself.
+    #[error(
+        "--approve auto: only on the simulator; a jump of the robot is approved by a person: give each or falls-only"
+    )]
+    Unattended,
     /// A journal without a study of ours.
     #[error("{}: holds no study of this program; give one that it made", file.display())]
     NoStudy {
@@ -135,6 +144,12 @@ pub fn open_life(options: &Options, durability: Durability, recording: &str) -> 
         seed: u64::from(options.seed),
         budget: options.trials.unwrap_or(options.config.optimize.trials),
         recording: recording.to_owned(),
+        widest: options.config.widest(options.task),
+        gains: options.config.gains(),
+        contenders: options.config.optimize.confirm.contenders,
+        confidence: options.config.optimize.confirm.confidence,
+        worker: 0,
+        abandoned: Duration::from_secs_f64(options.config.optimize.workers.abandoned_s),
     };
     Ok(Life::open(plan, study)?)
 }
@@ -159,6 +174,8 @@ pub fn session_info(options: &Options, recording: &str) -> SessionInfo {
         recording: recording.to_owned(),
         started: jiff::Timestamp::now().to_string(),
         observe: options.observe,
+        gains: options.config.gains(),
+        approve: options.approve.name().to_owned(),
     }
 }
 
@@ -227,6 +244,16 @@ pub fn attachments(config: &Config) -> Vec<(&str, &str, &[u8])> {
     config.as_run.iter().map(|(name, text)| (name.as_str(), "application/toml", text.as_bytes())).collect()
 }
 
+/// A short name of the configuration as it runs, for an operator to compare: FNV-1a of all files, 64 bits (Fowler, Noll and
+/// Vo, draft-eastlake-fnv).
+pub fn fingerprint(config: &Config) -> String {
+    let texts = config.as_run.iter().flat_map(|(name, text)| [name.as_bytes(), text.as_bytes()]);
+    let hash = texts
+        .flatten()
+        .fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01b3));
+    format!("{hash:016x}")
+}
+
 /// The present time, UTC, ns since 1970.
 pub fn utc_ns() -> u64 {
     u64::try_from(jiff::Timestamp::now().as_nanosecond()).unwrap_or(0)
@@ -241,6 +268,9 @@ impl Engine {
     /// # Errors
     /// When the configuration, the study, the recording or the system does not allow it; nothing runs then.
     pub fn start(options: Options) -> Result<Handle, EngineError> {
+        if options.approve == Approval::Auto && options.backend == Backend::Hardware {
+            return Err(EngineError::Unattended);
+        }
         let settings = options.config.settings(&options.robot, options.task, options.backend)?;
         let mut robot: Box<dyn Robot> = match options.backend {
             Backend::Simulator => Box::new(Simulator::new(&options.robot, &options.config.simulator)?),
@@ -279,7 +309,11 @@ impl Engine {
             .map_err(system("control"))?;
 
         let (intents_in, intents) = channel();
-        let supervisor = Supervisor::new(life, session_end, trial_ticks, outlets, status, info, clock.now_ns());
+        let folder = recording.as_ref().and(options.folder.clone());
+        let pre_arm = PreArmList::new(&settings, fingerprint(&options.config), folder);
+        let parts = Parts { life, control: session_end, trial_ticks, outlets, recorder: status, pre_arm, info };
+        let simulated = options.backend == Backend::Simulator;
+        let supervisor = Supervisor::new(parts, clock.now_ns()).approving(options.approve, simulated);
         let sits_down = options.backend == Backend::Hardware;
         let session = std::thread::Builder::new()
             .name("session".into())

@@ -5,13 +5,15 @@ use super::jump::{FallWatch, Jump, Progress};
 use super::leg::{self, LegTarget};
 use super::limits::Gate;
 use super::mode::{self, Request};
+use super::pre_arm::{self, PreArm};
 use super::ramp::{PoseRamp, RampProgress};
 use super::settings::Settings;
 use super::watchdog::{self, Circumstances};
 use crate::control::estimator::Estimator;
 use crate::realtime::clock::Clock;
 use crate::realtime::command::{Command, TrialSpec};
-use crate::realtime::telemetry::{Cause, Event, Fault, Mode, Phase, Tick, TrialEnd};
+use crate::realtime::pre_arm::Findings;
+use crate::realtime::telemetry::{Cause, Event, Fault, Mode, Objection, Phase, Tick, TrialEnd};
 use crate::robot::kinematics::Foot;
 use crate::robot::{JointCommand, Joints, LEGS, Leg, PerLeg, Placement, Robot, RobotError};
 use nalgebra::{Matrix3, Vector3};
@@ -66,6 +68,8 @@ pub struct Cycle {
     /// Why the mode is what it is.
     cause: Cause,
     estimator: Estimator,
+    pre_arm: PreArm,
+    findings: Findings,
     gate: Gate,
     ramp: Option<PoseRamp>,
     jump: Option<Jump>,
@@ -89,6 +93,8 @@ impl Cycle {
             mode: Mode::Offline,
             cause: Cause::Course,
             estimator: Estimator::default(),
+            pre_arm: PreArm::default(),
+            findings: Findings::default(),
             gate: Gate::default(),
             ramp: None,
             jump: None,
@@ -117,6 +123,11 @@ impl Cycle {
         self.state_age_ms
     }
 
+    /// How the checks of the pre-arm list stood in the last tick in which the robot was disarmed.
+    pub fn findings(&self) -> &Findings {
+        &self.findings
+    }
+
     /// What the last tick caused.
     pub fn events(&self) -> &Events {
         &self.events
@@ -138,6 +149,7 @@ impl Cycle {
         let read_ns = clock.now_ns();
         self.estimate();
         self.watch(inputs, previous_robot_time_ms);
+        self.check_pre_arm(inputs, robot);
         if let Some(command) = inputs.command {
             self.obey(&command, robot);
         }
@@ -230,6 +242,20 @@ impl Cycle {
         }
     }
 
+    /// How the pre-arm list stands: looked at while it matters, from the newest state.
+    fn check_pre_arm<R: Robot + ?Sized>(&mut self, inputs: &Inputs, robot: &R) {
+        self.pre_arm.observe(inputs.lateness_ns, &self.tick.state, &self.settings);
+        if self.mode == Mode::Disarmed {
+            let seen = pre_arm::Seen {
+                state: &self.tick.state,
+                estimate: &self.tick.estimate,
+                state_age_ms: self.state_age_ms,
+                link: robot.link(),
+            };
+            self.findings = self.pre_arm.findings(&seen, &self.settings);
+        }
+    }
+
     /// One command of the session: carried out, or refused and said so.
     fn obey<R: Robot + ?Sized>(&mut self, command: &Command, robot: &mut R) {
         let request = match command {
@@ -244,7 +270,13 @@ impl Cycle {
             Command::Acknowledge { .. } => Request::Acknowledge,
         };
         if mode::next(self.mode, request).is_none() {
-            self.events.push(Event::Refused { command: *command, mode: self.mode });
+            self.events.push(Event::Refused { command: *command, mode: self.mode, because: Objection::Mode });
+            return;
+        }
+        let failing = self.findings.failing();
+        if matches!(command, Command::Arm) && !failing.is_empty() {
+            let because = Objection::Checks(failing);
+            self.events.push(Event::Refused { command: *command, mode: self.mode, because });
             return;
         }
         match command {

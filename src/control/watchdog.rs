@@ -31,8 +31,8 @@ pub fn check(state: &RobotState, estimate: &Estimate, around: &Circumstances, se
         return Some(Fault::Reboot);
     }
     let late_ms = around.lateness_ns as f64 * 1e-6;
-    if limits.late_ms > 0.0 && late_ms > limits.late_ms {
-        return Some(Fault::Late { measured_ms: late_ms, allowed_ms: limits.late_ms });
+    if settings.late_ms > 0.0 && late_ms > settings.late_ms {
+        return Some(Fault::Late { measured_ms: late_ms, allowed_ms: settings.late_ms });
     }
     if matches!(around.mode, Mode::StandUp | Mode::Ready | Mode::Countdown) {
         let [roll, pitch, _] = estimate.roll_pitch_yaw.into();

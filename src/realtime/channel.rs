@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::command::Command;
+use super::pre_arm::Findings;
 use super::telemetry::{Counters, Event, Snapshot, Tick};
 
 /// Commands that may wait.
@@ -84,6 +85,8 @@ pub struct ControlEnd {
     pub snapshot: triple_buffer::Input<Snapshot>,
     /// The counters, for the session.
     pub counters: triple_buffer::Input<Counters>,
+    /// How the checks of the pre-arm list stand, for the session.
+    pub findings: triple_buffer::Input<Findings>,
     /// What happened.
     pub events: rtrb::Producer<Event>,
 }
@@ -96,6 +99,8 @@ pub struct SessionEnd {
     pub stop: StopLatch,
     /// The newest counters.
     pub counters: triple_buffer::Output<Counters>,
+    /// How the control thread's checks of the pre-arm list stand.
+    pub findings: triple_buffer::Output<Findings>,
     /// What happened.
     pub events: rtrb::Consumer<Event>,
 }
@@ -120,6 +125,7 @@ pub fn channels() -> (ControlEnd, SessionEnd, ScreenEnd, rtrb::Consumer<Tick>) {
     let (event_in, event_out) = rtrb::RingBuffer::new(EVENTS);
     let (snapshot_in, snapshot_out) = triple_buffer::triple_buffer(&Snapshot::default());
     let (counters_in, counters_out) = triple_buffer::triple_buffer(&Counters::default());
+    let (findings_in, findings_out) = triple_buffer::triple_buffer(&Findings::default());
     let (stop, heartbeat) = (StopLatch::default(), Heartbeat::default());
     let control = ControlEnd {
         commands: command_out,
@@ -129,9 +135,16 @@ pub fn channels() -> (ControlEnd, SessionEnd, ScreenEnd, rtrb::Consumer<Tick>) {
         shown: shown_in,
         snapshot: snapshot_in,
         counters: counters_in,
+        findings: findings_in,
         events: event_in,
     };
-    let session = SessionEnd { commands: command_in, stop: stop.clone(), counters: counters_out, events: event_out };
+    let session = SessionEnd {
+        commands: command_in,
+        stop: stop.clone(),
+        counters: counters_out,
+        findings: findings_out,
+        events: event_out,
+    };
     let screen = ScreenEnd { stop, heartbeat, shown: shown_out, snapshot: snapshot_out };
     (control, session, screen, tick_out)
 }

@@ -3,6 +3,7 @@
 use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::realtime::command::Command;
+use crate::realtime::pre_arm::CheckSet;
 use crate::robot::{JointCommand, Joints, LEGS, LinkStatus, PerLeg, RobotState, joint_name};
 
 /// What the machine is doing as a whole. One function, `control::mode::next`, owns the changes.
@@ -298,6 +299,13 @@ pub enum Fault {
         /// Allowed, ms.
         allowed_ms: u32,
     },
+    /// The robot has been silent for so long that its link counts as lost.
+    LinkLost {
+        /// Age of its newest state, ms.
+        age_ms: u32,
+        /// Allowed, ms.
+        allowed_ms: u32,
+    },
     /// The robot's clock went backwards.
     Reboot,
     /// A motor left servo mode.
@@ -360,6 +368,9 @@ impl std::fmt::Display for Fault {
             }
             Fault::StateAge { age_ms, allowed_ms } => {
                 write!(f, "no state from the robot for {age_ms} ms, allowed {allowed_ms}")
+            }
+            Fault::LinkLost { age_ms, allowed_ms } => {
+                write!(f, "the link to the robot is lost: no state for {age_ms} ms, allowed {allowed_ms}")
             }
             Fault::Reboot => write!(f, "the robot's clock went backwards: it restarted"),
             Fault::MotorMode { joint: j } => write!(f, "motor {} left servo mode", joint(j)),
@@ -448,11 +459,24 @@ pub enum Event {
         /// How it ended.
         end: TrialEnd,
     },
-    /// A command was not legal in the present mode.
+    /// A command was not carried out.
     Refused {
         /// The command.
         command: Command,
-        /// The mode that forbids it.
+        /// The mode at that moment.
         mode: Mode,
+        /// Why.
+        because: Objection,
     },
+}
+
+/// Why the control thread does not carry out a command.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum Objection {
+    /// The present mode forbids it.
+    #[error("not in this mode")]
+    Mode,
+    /// Checks of the pre-arm list fail.
+    #[error("these checks fail: {0}")]
+    Checks(CheckSet),
 }

@@ -4,12 +4,14 @@ use foxglove::messages::{Log, log};
 use prost::Message;
 
 use super::frog;
+use super::optimizing;
 use super::record::{
-    CommandRecord, Level, LogRecord, Measured, ParameterInfo, Proposal, ProposedParameter, Record, Risk, SessionInfo,
-    Source, Stage, StageInfo, Transition, TrialRecord, Verdict,
+    CommandRecord, Level, LogRecord, Measured, ParameterInfo, PreArmCheck, Proposal, ProposedParameter, Record, Risk,
+    SessionInfo, Source, Stage, StageInfo, Transition, TrialRecord, Verdict,
 };
 use super::tick;
 use super::topic::Topic;
+use crate::realtime::pre_arm::{Check, CheckState};
 use crate::realtime::telemetry::Counters;
 use crate::robot::LinkStatus;
 
@@ -84,6 +86,18 @@ pub fn encode(record: &Record, start_utc_ns: u64, log_time: u64, buffer: &mut Ve
             let message = frog::FaultTicks { ticks: ticks.iter().map(tick::whole).collect() };
             (Topic::Fault, message.encode(buffer))
         }
+        Record::PreArm(list) => {
+            let item = |item: &PreArmCheck| frog::pre_arm::Item {
+                check: item.check as i32,
+                state: item.state as i32,
+                found: item.found.clone(),
+                needed: item.needed.clone(),
+            };
+            (Topic::PreArm, frog::PreArm { items: list.iter().map(item).collect() }.encode(buffer))
+        }
+        Record::Search(value) => (Topic::Search, optimizing::search(value).encode(buffer)),
+        Record::Insight(value) => (Topic::Insight, optimizing::insight(value).encode(buffer)),
+        Record::Points(value) => (Topic::Points, optimizing::points(value).encode(buffer)),
     };
     encoded.expect("a Vec grows as far as it must");
     topic
@@ -137,6 +151,21 @@ pub fn decode(topic: Topic, data: &[u8]) -> Result<Option<Record>, DecodeError> 
             let message = frog::FaultTicks::decode(data)?;
             Record::FaultTicks(message.ticks.iter().map(tick::from_whole).collect::<Result<_, _>>()?)
         }
+        Topic::PreArm => {
+            let item = |item: frog::pre_arm::Item| {
+                Ok(PreArmCheck {
+                    check: one_of(&Check::ALL, "check", item.check)?,
+                    state: one_of(&CheckState::ALL, "state of a check", item.state)?,
+                    found: item.found,
+                    needed: item.needed,
+                })
+            };
+            let items = frog::PreArm::decode(data)?.items;
+            Record::PreArm(items.into_iter().map(item).collect::<Result<_, DecodeError>>()?)
+        }
+        Topic::Search => Record::Search(optimizing::from_search(frog::Search::decode(data)?)),
+        Topic::Insight => Record::Insight(optimizing::from_insight(frog::Insight::decode(data)?)),
+        Topic::Points => Record::Points(optimizing::from_points(frog::Points::decode(data)?)),
         Topic::JointStates | Topic::JointCommand | Topic::Tick | Topic::Pose | Topic::Tf | Topic::Marker => {
             return Ok(None);
         }
@@ -165,6 +194,8 @@ fn session(info: &SessionInfo, start_utc_ns: u64) -> frog::Session {
         started: info.started.clone(),
         observe: info.observe,
         start_utc_ns,
+        gains: info.gains.iter().map(bounds).collect(),
+        approve: info.approve.clone(),
     }
 }
 
@@ -189,6 +220,8 @@ fn from_session(message: frog::Session) -> SessionInfo {
         recording: message.recording,
         started: message.started,
         observe: message.observe,
+        gains: message.gains.into_iter().map(bounds).collect(),
+        approve: message.approve,
     }
 }
 
@@ -205,6 +238,7 @@ fn proposal(value: &Proposal) -> frog::Proposal {
         parent: value.parent,
         parameters: value.parameters.iter().map(parameter).collect(),
         risk: value.risk.as_ref().map(risk),
+        gains: value.gains.iter().map(parameter).collect(),
     }
 }
 
@@ -221,6 +255,7 @@ fn from_proposal(message: frog::Proposal) -> Result<Proposal, DecodeError> {
         parent: message.parent,
         parameters: message.parameters.into_iter().map(parameter).collect(),
         risk: message.risk.map(from_risk),
+        gains: message.gains.into_iter().map(parameter).collect(),
     })
 }
 
@@ -246,6 +281,7 @@ fn trial(value: &TrialRecord) -> frog::Trial {
         verdict: value.verdict.map(|verdict| verdict as i32),
         note: value.note.clone(),
         risk: value.risk.as_ref().map(risk),
+        gains: value.gains.iter().map(parameter).collect(),
     }
 }
 
@@ -272,6 +308,7 @@ fn from_trial(message: frog::Trial) -> Result<TrialRecord, DecodeError> {
         verdict: verdict(message.verdict)?,
         note: message.note,
         risk: message.risk.map(from_risk),
+        gains: message.gains.into_iter().map(parameter).collect(),
     })
 }
 
@@ -369,6 +406,15 @@ mod tests {
         for (number, verdict) in (0..).zip(Verdict::ALL) {
             assert_eq!(verdict as i32, number);
             assert_named(verdict.name(), frog::trial::Verdict::try_from(number).ok().map(|v| v.as_str_name()));
+        }
+        // Their names are sentences; their numbers and count are what matters.
+        for (number, check) in (0..).zip(Check::ALL) {
+            assert_eq!(check as i32, number);
+            assert!(frog::pre_arm::Check::try_from(number).is_ok(), "{check:?}");
+        }
+        for (number, state) in (0..).zip(CheckState::ALL) {
+            assert_eq!(state as i32, number);
+            assert_named(state.name(), frog::pre_arm::State::try_from(number).ok().map(|s| s.as_str_name()));
         }
     }
 }

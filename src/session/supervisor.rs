@@ -1,25 +1,34 @@
 //! The session thread's work: an operator's intents in, commands to the control thread, events and measured ticks back,
 //! records to the screen and the recording. Every intent is answered, carried out or refused and why.
 
+mod unattended;
+
 use std::collections::VecDeque;
 use std::sync::mpsc::{Receiver, Sender};
 
 use super::intent::Intent;
 use super::life::{Life, Refusal};
+use super::pre_arm::{PreArmList, objections};
 use crate::control::mode::{self, Request};
 use crate::realtime::channel::SessionEnd;
 use crate::realtime::command::Command;
 use crate::realtime::telemetry::{Cause, Event, Mode, Tick, TrialEnd};
 use crate::recording::record::{
-    CommandRecord, Level, LogRecord, Record, SessionInfo, Stage, Stamped, Transition, Verdict,
+    CommandRecord, Level, LogRecord, PreArmCheck, Record, SessionInfo, Stage, Stamped, Transition, Verdict,
 };
 use crate::recording::recorder::{RecorderWatch, TrialTicks};
+use unattended::Unattended;
 
 /// Ticks that go with a fault into the recording.
 const FAULT_TICKS: usize = 200;
 
 /// How often the counters are told to the screen and the recording, ns.
 const COUNTERS_PERIOD_NS: u64 = 100_000_000;
+
+/// How often the pre-arm list is shown again though no item changed its state, ns.
+const PRE_ARM_PERIOD_NS: u64 = 500_000_000;
+/// How often the study is looked at for what other programs have written, ns.
+const LOOK_PERIOD_NS: u64 = 500_000_000;
 
 /// How long the recorder may take to hand over a trial's ticks, ns.
 const LONGEST_WAIT_FOR_TICKS_NS: u64 = 10_000_000_000;
@@ -40,6 +49,24 @@ impl Outlets {
     }
 }
 
+/// What a session is made of.
+pub struct Parts {
+    /// The study's life.
+    pub life: Life,
+    /// To the control thread.
+    pub control: SessionEnd,
+    /// The ticks of each trial, from the recorder.
+    pub trial_ticks: Receiver<TrialTicks>,
+    /// Where the records go.
+    pub outlets: Outlets,
+    /// How the recorder is doing.
+    pub recorder: RecorderWatch,
+    /// What must hold before the robot is energised.
+    pub pre_arm: PreArmList,
+    /// What this session is: its first record.
+    pub info: SessionInfo,
+}
+
 /// The session.
 pub struct Supervisor {
     life: Life,
@@ -58,19 +85,18 @@ pub struct Supervisor {
     observe: bool,
     asked_for_control: bool,
     counters_ns: u64,
+    pre_arm: PreArmList,
+    /// The list as it was shown last, and when.
+    shown_list: Vec<PreArmCheck>,
+    shown_list_ns: u64,
+    looked_ns: u64,
+    unattended: Unattended,
 }
 
 impl Supervisor {
-    /// A session over a study; `info` becomes the first record.
-    pub fn new(
-        life: Life,
-        control: SessionEnd,
-        trial_ticks: Receiver<TrialTicks>,
-        outlets: Outlets,
-        recorder: RecorderWatch,
-        info: SessionInfo,
-        time_ns: u64,
-    ) -> Supervisor {
+    /// A session over a study.
+    pub fn new(parts: Parts, time_ns: u64) -> Supervisor {
+        let Parts { life, control, trial_ticks, outlets, recorder, pre_arm, info } = parts;
         let observe = info.observe;
         let mut supervisor = Supervisor {
             life,
@@ -87,6 +113,11 @@ impl Supervisor {
             observe,
             asked_for_control: false,
             counters_ns: 0,
+            pre_arm,
+            shown_list: Vec::new(),
+            shown_list_ns: 0,
+            looked_ns: 0,
+            unattended: Unattended::default(),
         };
         supervisor.say(Record::Session(info), time_ns);
         supervisor.publish(time_ns);
@@ -118,8 +149,16 @@ impl Supervisor {
             self.counters_ns = time_ns;
             let counters = *self.control.counters.read();
             self.say(Record::Counters(counters), time_ns);
+            self.show_pre_arm(time_ns);
+        }
+        if time_ns >= self.looked_ns + LOOK_PERIOD_NS {
+            self.looked_ns = time_ns;
+            if let Err(error) = self.life.look() {
+                self.log(Level::Error, format!("the study could not be read: {error}"), time_ns);
+            }
         }
         self.publish(time_ns);
+        self.act_by_itself(time_ns);
     }
 
     /// Carries out one intent, or says why not. `stops` is how often STOP had been pressed when it was wished: what
@@ -133,6 +172,7 @@ impl Supervisor {
         } else if energises && self.control.stop.count() != stops {
             Err("STOP was pressed after it".to_owned())
         } else {
+            self.noticed(intent);
             self.obey(intent, stops)
         };
         let (accepted, answer) = match answer {
@@ -180,7 +220,22 @@ impl Supervisor {
     fn obey(&mut self, intent: &Intent, stops: u64) -> Result<String, String> {
         let words = |refusal: Refusal| refusal.to_string();
         match intent {
-            Intent::Arm => self.ask(Request::Arm, Command::Arm, "the robot stands up"),
+            Intent::Arm if mode::next(self.mode, Request::Arm).is_some() => {
+                let findings = *self.control.findings.read();
+                match objections(&self.pre_arm.look(&findings, &self.recorder.get())) {
+                    Some(objections) => Err(objections),
+                    None => self.ask(Request::Arm, Command::Arm, "the robot stands up"),
+                }
+            }
+            Intent::Arm => Err(format!("not while the robot is {}", self.mode.name())),
+            Intent::Confirm(check) if self.mode.energised() => {
+                Err(format!("{} is asked before the robot is armed", check.check().name()))
+            }
+            Intent::Confirm(check) => {
+                self.pre_arm.confirm(*check);
+                self.shown_list_ns = 0;
+                Ok("confirmed".to_owned())
+            }
             Intent::SitDown => self.ask(Request::SitDown, Command::SitDown, "the robot sits down"),
             Intent::Acknowledge => {
                 self.ask(Request::Acknowledge, Command::Acknowledge { stops }, "acknowledged; arm when ready")
@@ -209,6 +264,30 @@ impl Supervisor {
             }
             Intent::ClearOverrides => {
                 self.life.clear_overrides().map_err(words).map(|()| "as it was proposed".to_owned())
+            }
+            Intent::OverrideGain { gain, value } => {
+                self.life.set_gain(gain, *value).map_err(words)?;
+                Ok(format!("{gain} will be {value} in this trial"))
+            }
+            Intent::Fix { parameter, value, trials } => {
+                self.life.fix(parameter, *value, *trials).map_err(words)?;
+                Ok(format!("{parameter} is {value} for the next {trials} trials that count"))
+            }
+            Intent::Unfix { parameter } => {
+                self.life.unfix(parameter).map_err(words)?;
+                Ok(format!("{parameter} is searched again"))
+            }
+            Intent::NarrowBounds { parameter, low, high } => {
+                self.life.narrow_bounds(parameter, *low, *high).map_err(words)?;
+                Ok(format!("{parameter} is searched from {low} to {high}"))
+            }
+            Intent::ConfirmBest { repeats } => {
+                let trials = self.life.confirm_best(*repeats).map_err(words)?;
+                let trials: Vec<String> = trials.iter().map(u32::to_string).collect();
+                Ok(match trials.len() {
+                    0 => "no more repeats".to_owned(),
+                    _ => format!("the points of trials {} are repeated, at most {repeats} times", trials.join(", ")),
+                })
             }
             Intent::Judge(verdict) => {
                 self.life.judge(*verdict, false).map_err(words)?;
@@ -267,15 +346,18 @@ impl Supervisor {
             Event::Mode { from, to, cause, time_ns } => {
                 self.mode = to;
                 self.cause = cause;
+                self.pre_arm.mode_changed(from, to, &cause);
+                self.shown_list.clear();
+                self.unattended.mode_changed(to, cause);
                 self.say(Record::Transition(Transition { from, to, cause: cause.to_string() }), time_ns);
             }
             Event::TrialEnded { trial, end } => {
                 self.ended = Some((trial, end));
                 self.ended_ns = time_ns;
             }
-            Event::Refused { command, mode } => {
-                let message =
-                    format!("the control thread refused {} while {}", describe_command(&command), mode.name());
+            Event::Refused { command, mode, because } => {
+                let command_name = describe_command(&command);
+                let message = format!("the control thread refused {command_name} while {}: {because}", mode.name());
                 self.log(Level::Warning, message, time_ns);
                 if let Command::RunTrial(spec) = command {
                     self.ended = Some((spec.trial, TrialEnd::Cancelled));
@@ -309,6 +391,26 @@ impl Supervisor {
         }
     }
 
+    /// The pre-arm list, while the robot is disarmed: to the screen twice a second, to both when an item changes its state.
+    fn show_pre_arm(&mut self, time_ns: u64) {
+        if self.mode != Mode::Disarmed || self.observe {
+            return;
+        }
+        let findings = *self.control.findings.read();
+        let list = self.pre_arm.look(&findings, &self.recorder.get());
+        let states = |list: &[PreArmCheck]| list.iter().map(|item| item.state).collect::<Vec<_>>();
+        let stamped = Stamped { time_ns, record: Record::PreArm(list.clone()) };
+        if states(&list) != states(&self.shown_list) {
+            self.outlets.put(stamped);
+        } else if time_ns >= self.shown_list_ns + PRE_ARM_PERIOD_NS {
+            let _ = self.outlets.screen.send(stamped);
+        } else {
+            return;
+        }
+        self.shown_list_ns = time_ns;
+        self.shown_list = list;
+    }
+
     /// What the study's life has to say.
     fn publish(&mut self, time_ns: u64) {
         for record in self.life.take_records() {
@@ -339,13 +441,20 @@ fn way_to_ready(mode: Mode) -> &'static str {
 fn describe(intent: &Intent) -> String {
     match intent {
         Intent::Arm => "arm".to_owned(),
+        Intent::Confirm(check) => format!("confirm {}", check.check().name()),
         Intent::SitDown => "sit down".to_owned(),
         Intent::Acknowledge => "acknowledge".to_owned(),
         Intent::Approve { trial, .. } => format!("approve trial {trial}"),
         Intent::Cancel => "cancel the countdown".to_owned(),
         Intent::Skip => "skip the proposal".to_owned(),
         Intent::Override { parameter, value } => format!("override {parameter} = {value}"),
+        Intent::OverrideGain { gain, value } => format!("set the gain {gain} = {value}"),
         Intent::ClearOverrides => "clear the overrides".to_owned(),
+        Intent::Fix { parameter, value, trials } => format!("fix {parameter} = {value} for {trials} trials"),
+        Intent::Unfix { parameter } => format!("search {parameter} again"),
+        Intent::NarrowBounds { parameter, low, high } => format!("search {parameter} from {low} to {high}"),
+        Intent::ConfirmBest { repeats: 0 } => "end the repeats".to_owned(),
+        Intent::ConfirmBest { repeats } => format!("confirm the best with {repeats} repeats"),
         Intent::Judge(verdict) => verdict.name().to_owned(),
         Intent::Rerun { trial: None } => "re-run".to_owned(),
         Intent::Rerun { trial: Some(trial) } => format!("re-run trial {trial}"),

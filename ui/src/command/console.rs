@@ -7,6 +7,7 @@ use clap::{Args, ValueEnum};
 use quadfrog::config::Backend;
 use quadfrog::engine::{Engine, Options};
 use quadfrog::realtime::command::Task;
+use quadfrog::session::approval::Approval;
 use quadfrog_console::app::{self, ConsoleOptions, Ended};
 use quadfrog_console::feed::Feed;
 use quadfrog_console::settings::{ColourChoice, Settings};
@@ -30,6 +31,27 @@ pub enum Colour {
     True,
     /// None
     Never,
+}
+
+/// What the person at the console is asked.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Asked {
+    /// Approve and judge each jump
+    Each,
+    /// Judge falls and what is odd; the rest is accepted, and on the simulator approved, by itself
+    FallsOnly,
+    /// Nothing: on the simulator only
+    Auto,
+}
+
+impl From<Asked> for Approval {
+    fn from(asked: Asked) -> Approval {
+        match asked {
+            Asked::Each => Approval::Each,
+            Asked::FallsOnly => Approval::FallsOnly,
+            Asked::Auto => Approval::Auto,
+        }
+    }
 }
 
 /// How the console looks, live and in replay.
@@ -77,6 +99,9 @@ pub struct ConsoleArguments {
     /// Look, and change nothing
     #[arg(long)]
     observe: bool,
+    /// What is asked of you: every jump, only falls, or (on the simulator) nothing
+    #[arg(long, value_name = "WHAT", default_value = "each")]
+    approve: Asked,
     #[command(flatten)]
     screen: ScreenArguments,
 }
@@ -119,6 +144,7 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
         // Who only looks leaves nothing behind.
         folder: (!arguments.observe).then_some(chosen.folder),
         observe: arguments.observe,
+        approve: arguments.approve.into(),
     })?;
     let recording = handle.recording().map(Path::to_owned);
     if app::run(Feed::live(handle), console)? == Ended::HungUp {
