@@ -6,7 +6,7 @@ use quadfrog::realtime::telemetry::{Mode, Snapshot, Tick};
 use quadfrog::recording::record::{CommandRecord, Level, Record, Source, Stage, Stamped, TrialRecord, Verdict};
 use quadfrog::session::intent::Intent;
 
-use crate::action::{Action, may_wish};
+use crate::action::{Action, may_acknowledge, may_wish};
 use crate::dialog::{self, Dialog, OverrideForm, Purpose};
 use crate::keymap::Key;
 use crate::model::{Columns, LOG_LINES, LogLine, Message, Model, ReplayStatus, SeriesSet, SortBy, View};
@@ -197,7 +197,8 @@ fn interrupt(model: &mut Model) -> Vec<Effect> {
 
 /// Asks the session, if this console may ask at all: the one gate for replays and observers.
 pub fn wish(model: &mut Model, intent: Intent) -> Vec<Effect> {
-    match may_wish(model) {
+    let allowed = if intent == Intent::Acknowledge { may_acknowledge(model) } else { may_wish(model) };
+    match allowed {
         Ok(()) => vec![Effect::Wish(intent)],
         Err(reason) => {
             say(model, Level::Warning, format!("refused: {reason}"));
@@ -351,7 +352,7 @@ fn open_override(model: &mut Model) -> Vec<Effect> {
 
 /// Enter: what lies nearest, as long as nothing moves by it.
 fn open_details(model: &mut Model) -> Vec<Effect> {
-    if matches!(model.mode(), Mode::Damped | Mode::Fault) && may_wish(model).is_ok() {
+    if may_acknowledge(model).is_ok() {
         return wish(model, Intent::Acknowledge);
     }
     if model.view == View::Override && Action::Override.legal(model).is_ok() {
