@@ -29,7 +29,7 @@ use crate::robot::go1::Go1;
 use crate::robot::go1::link::LinkError;
 use crate::robot::{Placement, Robot};
 use crate::session::approval::Approval;
-use crate::session::intent::Intent;
+use crate::session::intent::{Intent, Wish};
 use crate::session::life::{Life, Plan};
 use crate::session::pre_arm::PreArmList;
 use crate::session::supervisor::{Outlets, Parts, Supervisor};
@@ -293,8 +293,8 @@ impl Engine {
         let (control_end, session_end, screen_end, tick_end) = channels();
         let (to_recorder, recorder_records) = channel();
         let (to_screen, screen_records) = channel();
-        let (trial_ticks_in, trial_ticks) = channel();
-        let recorder = Recorder::spawn(tick_end, recorder_records, writer, trial_ticks_in);
+        let (handed_in, handed) = channel();
+        let recorder = Recorder::spawn(tick_end, recorder_records, writer, handed_in);
         let outlets = Outlets { recorder: to_recorder, screen: to_screen };
         let status = recorder.watch();
         let closing = Arc::new(AtomicBool::new(false));
@@ -311,7 +311,7 @@ impl Engine {
         let (intents_in, intents) = channel();
         let folder = recording.as_ref().and(options.folder.clone());
         let pre_arm = PreArmList::new(&settings, fingerprint(&options.config), folder);
-        let parts = Parts { life, control: session_end, trial_ticks, outlets, recorder: status, pre_arm, info };
+        let parts = Parts { life, control: session_end, handed, outlets, recorder: status, pre_arm, info };
         let simulated = options.backend == Backend::Simulator;
         let supervisor = Supervisor::new(parts, clock.now_ns()).approving(options.approve, simulated);
         let sits_down = options.backend == Backend::Hardware;
@@ -325,6 +325,7 @@ impl Engine {
             recording,
             _prepared: prepared,
             intents: Some(intents_in),
+            clock,
             records: screen_records,
             closing,
             control: Some(control),
@@ -340,14 +341,14 @@ const SESSION_PERIOD: Duration = Duration::from_millis(5);
 const LONGEST_GOODBYE: Duration = Duration::from_secs(6);
 
 /// The session thread: intents as they come, events every few milliseconds, until the screen lets go of its handle.
-fn run_session(mut supervisor: Supervisor, intents: &Receiver<(Intent, u64)>, clock: &MonotonicClock, sits_down: bool) {
+fn run_session(mut supervisor: Supervisor, intents: &Receiver<Wish>, clock: &MonotonicClock, sits_down: bool) {
     loop {
         supervisor.attend(clock.now_ns());
         if supervisor.mode() == Mode::Observe {
             supervisor.take_control();
         }
         match intents.recv_timeout(SESSION_PERIOD) {
-            Ok((intent, stops)) => supervisor.carry_out(&intent, stops, clock.now_ns()),
+            Ok(wish) => supervisor.carry_out(&wish, clock.now_ns()),
             Err(RecvTimeoutError::Timeout) => {}
             Err(RecvTimeoutError::Disconnected) => break,
         }
@@ -366,7 +367,8 @@ pub struct Handle {
     screen: ScreenEnd,
     recording: Option<PathBuf>,
     _prepared: Prepared,
-    intents: Option<Sender<(Intent, u64)>>,
+    intents: Option<Sender<Wish>>,
+    clock: MonotonicClock,
     records: Receiver<Stamped>,
     closing: Arc<AtomicBool>,
     control: Option<JoinHandle<()>>,
@@ -404,7 +406,8 @@ impl Handle {
     pub fn wish(&self, intent: Intent) {
         if let Some(intents) = &self.intents {
             // A session that has ended answers nothing; the screen sees that its records end.
-            let _ = intents.send((intent, self.screen.stop.count()));
+            let wish = Wish { intent, stops: self.screen.stop.count(), time_ns: self.clock.now_ns() };
+            let _ = intents.send(wish);
         }
     }
 

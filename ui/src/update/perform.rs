@@ -1,12 +1,11 @@
 //! What each action does.
 
-use quadfrog::realtime::telemetry::Mode;
 use quadfrog::recording::record::{Level, Stage, Verdict};
 use quadfrog::session::intent::Intent;
 
 use super::navigate::{filter, freeze, ghost, move_by, move_cursor, next_mode, next_series, next_sort, zoom};
 use super::{Effect, ReplayCommand, interrupt, say, stop, wish};
-use crate::action::{Action, may_wish};
+use crate::action::{Action, may_acknowledge};
 use crate::dialog::{Choice, Dialog, OverrideForm, Purpose};
 use crate::model::{Model, View};
 
@@ -143,7 +142,7 @@ fn open_override(model: &mut Model) -> Vec<Effect> {
 
 /// Enter: what lies nearest, as long as nothing moves by it.
 fn open_details(model: &mut Model) -> Vec<Effect> {
-    if matches!(model.mode(), Mode::Damped | Mode::Fault) && may_wish(model).is_ok() {
+    if may_acknowledge(model).is_ok() {
         return wish(model, Intent::Acknowledge);
     }
     if model.view == View::Override && Action::Override.legal(model).is_ok() {
