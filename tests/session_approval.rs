@@ -22,6 +22,7 @@ fn options(approve: Approval, backend: Backend) -> Options {
         folder: None,
         observe: false,
         approve,
+        join: None,
     }
 }
 

@@ -27,6 +27,7 @@ fn study(task: Task, seed: u32) -> (Vec<TrialRecord>, f64) {
         folder: None,
         observe: false,
         approve: Approval::Each,
+        join: None,
     };
     let settings = options.config.settings(&options.robot, task, Backend::Simulator).unwrap();
     let simulator = Simulator::new(&options.robot, &options.config.simulator).unwrap();

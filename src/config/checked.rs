@@ -12,7 +12,7 @@ use super::merge::merge;
 use crate::control::estimator::GRAVITY;
 use crate::control::leg::stance_of;
 use crate::control::settings::{Fall, Gate, Ramp, Settings, Settle, Stand, TaskControl, Watchdog};
-use crate::optimize::sampler::SamplerConfig;
+use crate::optimize::sampler::{SamplerConfig, SamplerKind};
 use crate::realtime::command::Task;
 use crate::recording::record::ParameterInfo;
 use crate::robot::Leg;
@@ -207,6 +207,20 @@ impl Config {
         };
         config.check()?;
         Ok(config)
+    }
+
+    /// Another sampler than the file says; the configuration that is kept says so too.
+    pub fn choose_sampler(&mut self, kind: SamplerKind) {
+        self.optimize.sampler.kind = kind;
+        let name = toml::Value::try_from(kind);
+        let kept = self.as_run.iter_mut().find(|(file, _)| file == "optimize.toml");
+        if let (Ok(name), Some((_, text))) = (name, kept)
+            && let Ok(mut table) = text.parse::<Table>()
+            && let Some(toml::Value::Table(sampler)) = table.get_mut("sampler")
+        {
+            sampler.insert("kind".to_owned(), name);
+            *text = table.to_string();
+        }
     }
 
     /// What `task`'s trials run with.

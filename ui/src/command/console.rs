@@ -12,7 +12,7 @@ use quadfrog_console::feed::Feed;
 use quadfrog_console::settings::{ColourChoice, Settings};
 use quadfrog_console::terminal;
 
-use super::study::{Chosen, continued};
+use super::chosen::{Chosen, continued};
 use super::{Failure, StudyArguments, TaskName};
 
 /// How many colours are used.
@@ -101,7 +101,7 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
         None => {
             let task = task.unwrap_or(Task::Forward);
             let seed = seed.unwrap_or(config.optimize.sampler.seed);
-            Chosen { task, seed, folder: arguments.study.new_folder(task, seed) }
+            Chosen { task, seed, folder: arguments.study.new_folder(task, seed), budget: None }
         }
     };
     let folder = chosen.folder.clone();
@@ -117,6 +117,7 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
         folder: (!arguments.observe).then_some(chosen.folder),
         observe: arguments.observe,
         approve: arguments.approve.into(),
+        join: None,
     })?;
     let recording = handle.recording().map(Path::to_owned);
     if app::run(Feed::live(handle), console)? == Ended::HungUp {
