@@ -19,10 +19,13 @@ const JUMPS: u32 = 100;
 const SEED: u64 = 0;
 
 fn accuracy(_: &mut Criterion) {
-    println!("Error of the estimate over {JUMPS} jumps with random parameters within the bounds, sensors with their errors");
+    println!(
+        "Error of the estimate over {JUMPS} jumps with random parameters within the bounds, sensors with their errors"
+    );
     println!("                             landed | displacement, cm    | yaw, rad      | apex, cm");
     println!("                             of     | median  95 %   max  | 95 %    max   | median  95 %");
-    for (world, name) in [(World::Ideal, "ideal motors, friction 1.0"), (World::HardwareLike, "hardware-like, friction 0.6")]
+    for (world, name) in
+        [(World::Ideal, "ideal motors, friction 1.0"), (World::HardwareLike, "hardware-like, friction 0.6")]
     {
         let (landed, fallen) = jumps(world, JUMPS, SEED);
         line(name, &landed.iter().collect::<Vec<_>>(), fallen.len());

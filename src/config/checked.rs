@@ -13,7 +13,7 @@ use super::safety::SafetyFile;
 use crate::control::estimator::GRAVITY;
 use crate::control::leg::stance_of;
 use crate::control::settings::{EstimatorSettings, ObjectiveSource, Ramp, Settings, Settle, Stand, TaskControl};
-use crate::optimize::sampler::SamplerConfig;
+use crate::optimize::sampler::{SamplerConfig, SamplerKind};
 use crate::realtime::command::Task;
 use crate::recording::record::ParameterInfo;
 use crate::robot::Leg;
@@ -33,8 +33,7 @@ const FILES: [(&str, &str); 5] = [
 const GAINS: [(&str, &str); 4] = [("kp", "N/m"), ("kd", "N s/m"), ("kd_joint", "N m s/rad"), ("k_att", "N/m")];
 
 /// Keys that may be given though the defaults leave them out, each with an example of its kind.
-const OPTIONAL: [(&str, &str); 1] =
-    [("optimize.toml", "objective = \"truth\"\n[sampler]\nstartup_trials = 10\n")];
+const OPTIONAL: [(&str, &str); 1] = [("optimize.toml", "objective = \"truth\"\n[sampler]\nstartup_trials = 10\n")];
 
 /// Which machine stands behind the controller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -195,6 +194,20 @@ impl Config {
         Ok(config)
     }
 
+    /// Another sampler than the file says; the configuration that is kept says so too.
+    pub fn choose_sampler(&mut self, kind: SamplerKind) {
+        self.optimize.sampler.kind = kind;
+        let name = toml::Value::try_from(kind);
+        let kept = self.as_run.iter_mut().find(|(file, _)| file == "optimize.toml");
+        if let (Ok(name), Some((_, text))) = (name, kept)
+            && let Ok(mut table) = text.parse::<Table>()
+            && let Some(toml::Value::Table(sampler)) = table.get_mut("sampler")
+        {
+            sampler.insert("kind".to_owned(), name);
+            *text = table.to_string();
+        }
+    }
+
     /// What `task`'s trials run with.
     pub fn task(&self, task: Task) -> &TaskControl {
         // `check` has seen that every task is there.
@@ -247,9 +260,10 @@ impl Config {
         };
         match (ObjectiveSource::from_name(name), backend) {
             (None, _) => Err(refuse(name, "must be \"truth\" or \"estimate\", or be left out")),
-            (Some(ObjectiveSource::Truth), Backend::Hardware) => {
-                Err(refuse(name, "a robot does not know the truth, only a simulator does; take \"estimate\" or leave it out"))
-            }
+            (Some(ObjectiveSource::Truth), Backend::Hardware) => Err(refuse(
+                name,
+                "a robot does not know the truth, only a simulator does; take \"estimate\" or leave it out",
+            )),
             (Some(source), _) => Ok(source),
         }
     }
