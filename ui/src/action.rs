@@ -13,6 +13,7 @@ pub enum Action {
     Stop,
     Interrupt,
     Arm,
+    PreArm,
     Approve,
     SitDown,
     Acknowledge,
@@ -173,13 +174,14 @@ const fn fixed(info: ActionInfo) -> ActionInfo {
 
 /// Every action, once.
 #[rustfmt::skip]
-pub const ACTIONS: [ActionInfo; 62] = {
+pub const ACTIONS: [ActionInfo; 63] = {
     use Action as A;
     use Group as G;
     [
         fixed(row(A::Stop, "stop", &["Space", "F12"], G::Robot, "STOP: damp all motors at once, from any screen", always)),
         fixed(row(A::Interrupt, "interrupt", &["Ctrl-C"], G::Robot, "STOP; again within 2 s: quit", always)),
         row(A::Arm, "arm", &["A"], G::Robot, "arm: the robot stands up", may_arm),
+        row(A::PreArm, "pre-arm", &["P"], G::Robot, "the pre-arm list, and your word on what only you can see", always),
         row(A::SitDown, "sit-down", &["D"], G::Robot, "sit down and disarm", may_sit_down),
         row(A::Acknowledge, "acknowledge", &["k"], G::Robot, "acknowledge a stop or a fault: back to DISARMED", may_acknowledge),
 
@@ -292,7 +294,13 @@ fn may_arm(model: &Model) -> Legality {
     match model.mode() {
         mode if busy(mode).is_some() => refuse(busy(mode).unwrap_or_default()),
         Mode::Disarmed if stage_is(model, Stage::Review) => refuse("the last trial waits for its verdict"),
-        Mode::Disarmed => Ok(()),
+        Mode::Disarmed => match model.pre_arm_failing().count() {
+            0 => Ok(()),
+            count => refuse(format!(
+                "{count} checks of the pre-arm list do not hold: {} shows them",
+                model.keymap.key(Action::PreArm)
+            )),
+        },
         _ => refuse("the robot is armed already"),
     }
 }

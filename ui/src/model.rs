@@ -335,6 +335,16 @@ impl Model {
         self.proposal.as_ref().filter(|proposal| proposal.trial == info.trial)
     }
 
+    /// The items of the pre-arm list that forbid arming.
+    pub fn pre_arm_failing(&self) -> impl Iterator<Item = &PreArmCheck> + '_ {
+        self.pre_arm.iter().filter(|item| !item.state.allows())
+    }
+
+    /// Whether a machine is driven that can hurt somebody.
+    pub fn is_hardware(&self) -> bool {
+        !matches!(self.session.backend.as_str(), "" | "sim")
+    }
+
     /// The parameter of that name with its bounds.
     pub fn parameter(&self, name: &str) -> Option<&ParameterInfo> {
         self.session.parameters.iter().find(|parameter| parameter.name == name)

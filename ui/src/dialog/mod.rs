@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use crossterm::event::KeyCode;
 use quadfrog::recording::record::Level;
-use quadfrog::session::intent::Intent;
+use quadfrog::session::intent::{Intent, OperatorCheck};
 use tui_input::{Input, InputRequest};
 
 use crate::action::{ACTIONS, Action, ActionInfo};
@@ -33,8 +33,16 @@ pub enum Dialog {
         /// When the approving key was pressed last.
         pressed_at: Duration,
     },
-    /// Stand the robot up? Asked where arming was chosen with Enter.
-    Arm,
+    /// Stand the robot up? Asked on hardware, and where arming was chosen with Enter.
+    Arm {
+        /// Letters of the confirming word that were typed.
+        typed: usize,
+    },
+    /// The pre-arm list.
+    PreArm {
+        /// The operator's own item that the key is about.
+        selected: usize,
+    },
     /// End the program although the robot is armed or a trial waits?
     Quit,
     /// Change parameters of the proposal.
@@ -120,10 +128,8 @@ pub fn key(model: &mut Model, key: Key) -> Vec<Effect> {
     let Some(dialog) = model.dialog.take() else { return Vec::new() };
     match dialog {
         Dialog::Approve { trial, revision, pressed_at } => approve_key(model, key, (trial, revision, pressed_at)),
-        Dialog::Arm => match key.typed() {
-            Some('y' | 'Y') => wish(model, Intent::Arm),
-            _ => cancelled(model, "not armed"),
-        },
+        Dialog::Arm { typed } => arm_key(model, key, typed),
+        Dialog::PreArm { selected } => pre_arm_key(model, key, selected),
         Dialog::Quit => match key.typed() {
             Some('y' | 'Y') => vec![Effect::Quit],
             _ => cancelled(model, "not quit"),
@@ -164,6 +170,52 @@ pub fn key(model: &mut Model, key: Key) -> Vec<Effect> {
 fn cancelled(model: &mut Model, text: &str) -> Vec<Effect> {
     model.message = Some(Message { level: Level::Info, text: format!("cancelled: {text}") });
     Vec::new()
+}
+
+/// The word whose letters, in order, arm the robot: on hardware one that nobody types by accident.
+pub fn arming_word(model: &Model) -> &'static str {
+    if model.is_hardware() { "stand" } else { "y" }
+}
+
+fn arm_key(model: &mut Model, key: Key, typed: usize) -> Vec<Effect> {
+    let word = arming_word(model);
+    if key.typed() != word.chars().nth(typed) {
+        return cancelled(model, "not armed");
+    }
+    if typed + 1 < word.len() {
+        model.dialog = Some(Dialog::Arm { typed: typed + 1 });
+        return Vec::new();
+    }
+    match Action::Arm.legal(model) {
+        Ok(()) => wish(model, Intent::Arm),
+        Err(reason) => {
+            model.message = Some(Message { level: Level::Warning, text: format!("not armed: {reason}") });
+            Vec::new()
+        }
+    }
+}
+
+fn pre_arm_key(model: &mut Model, key: Key, mut selected: usize) -> Vec<Effect> {
+    let last = OperatorCheck::ALL.len() - 1;
+    let effects = match key.code() {
+        KeyCode::Esc | KeyCode::Enter => return Vec::new(),
+        KeyCode::Up => {
+            selected = selected.saturating_sub(1);
+            Vec::new()
+        }
+        KeyCode::Down => {
+            selected = (selected + 1).min(last);
+            Vec::new()
+        }
+        KeyCode::Char('x') => wish(model, Intent::Confirm(OperatorCheck::ALL[selected.min(last)])),
+        // Arming from the list that says whether it is possible.
+        _ if model.keymap.action(key) == Some(Action::Arm) && Action::Arm.legal(model).is_ok() => {
+            return perform(model, Action::Arm);
+        }
+        _ => Vec::new(),
+    };
+    model.dialog = Some(Dialog::PreArm { selected });
+    effects
 }
 
 /// The second moment of an approval. Only the approving key approves, and only after a pause: a bounced key or one
@@ -246,7 +298,7 @@ fn palette_key(model: &mut Model, key: Key, mut input: Input, mut selected: usiz
             return match rows.get(selected) {
                 // Enter never starts motion: arming is asked again, approving opens its dialog by itself.
                 Some((info, Ok(()))) if info.action == Action::Arm => {
-                    model.dialog = Some(Dialog::Arm);
+                    model.dialog = Some(Dialog::Arm { typed: 0 });
                     Vec::new()
                 }
                 Some((info, _)) => perform(model, info.action),

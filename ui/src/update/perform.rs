@@ -14,12 +14,20 @@ use crate::model::{Model, View};
 pub fn perform(model: &mut Model, action: Action) -> Vec<Effect> {
     if let Err(reason) = action.legal(model) {
         say(model, Level::Warning, format!("{}: {reason}", action.info().name));
+        // What stands in the way of arming is shown at once, all of it.
+        let shown = action == Action::Arm && model.mode() == Mode::Disarmed && model.pre_arm_failing().count() > 0;
+        if shown && may_wish(model).is_ok() {
+            return open(model, Dialog::PreArm { selected: 0 });
+        }
         return Vec::new();
     }
     match action {
         Action::Stop => stop(model, "STOP"),
         Action::Interrupt => interrupt(model),
+        // A machine that can hurt somebody is asked about with a word, not with a key that lies under a finger.
+        Action::Arm if model.is_hardware() => open(model, Dialog::Arm { typed: 0 }),
         Action::Arm => wish(model, Intent::Arm),
+        Action::PreArm => open(model, Dialog::PreArm { selected: 0 }),
         Action::SitDown => wish(model, Intent::SitDown),
         Action::Acknowledge => wish(model, Intent::Acknowledge),
         Action::Approve => open_approval(model),

@@ -18,7 +18,7 @@ pub(super) fn close_stale_dialog(model: &mut Model) {
             let on_table = model.proposal.as_ref().map(|p| (p.trial, p.revision));
             on_table != Some((*trial, *revision)) || Action::Approve.legal(model).is_err()
         }
-        Some(Dialog::Arm) => Action::Arm.legal(model).is_err(),
+        Some(Dialog::Arm { .. }) => Action::Arm.legal(model).is_err(),
         Some(Dialog::Override(form)) => {
             model.proposal.as_ref().is_none_or(|p| p.trial != form.trial) || Action::Override.legal(model).is_err()
         }

@@ -9,6 +9,7 @@
 //!          └─────────────────────────────────────────────────┘
 //! ```
 
+use quadfrog::session::intent::OperatorCheck;
 use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::symbols::border;
@@ -16,9 +17,9 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::{Block, Clear, Paragraph, Wrap};
 use tui_input::Input;
 
-use super::{cut, help, number, proposal, span, trial_text};
+use super::{cut, help, number, pre_arm, proposal, span, trial_text};
 use crate::action::Action;
-use crate::dialog::{APPROVAL_PAUSE, Choice, Dialog, OverrideForm, Purpose, palette_rows};
+use crate::dialog::{APPROVAL_PAUSE, Choice, Dialog, OverrideForm, Purpose, arming_word, palette_rows};
 use crate::model::Model;
 use crate::theme::{Glyphs, Role, Theme};
 
@@ -30,13 +31,11 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
             let waited = model.clock.saturating_sub(*pressed_at) >= APPROVAL_PAUSE;
             popup(frame, area, model, "Jump?", 60, approve(model, *trial, waited));
         }
-        Dialog::Arm => {
-            let lines = vec![
-                Line::from("The robot will stand up. Is nobody near it?"),
-                Line::default(),
-                choice(model, "y", "stand up"),
-            ];
-            popup(frame, area, model, "Arm?", 52, lines);
+        Dialog::Arm { typed } => popup(frame, area, model, "Arm?", 60, arm(model, *typed)),
+        Dialog::PreArm { selected } => {
+            let chosen = OperatorCheck::ALL.get(*selected).copied();
+            let lines = pre_arm::lines(model, 74, usize::from(area.height.saturating_sub(2)), chosen);
+            popup(frame, area, model, &format!("Pre-arm list: {}", pre_arm::summary(model)), 78, lines);
         }
         Dialog::Quit => popup(frame, area, model, "Quit?", 58, quit(model)),
         Dialog::Override(form) => {
@@ -103,6 +102,25 @@ fn choice(model: &Model, key: &str, text: &str) -> Line<'static> {
         span(theme, Role::Key, key.to_owned()),
         span(theme, Role::Text, format!(" {text}")),
     ])
+}
+
+fn arm(model: &Model, typed: usize) -> Vec<Line<'static>> {
+    let theme = &model.theme;
+    let word = arming_word(model);
+    let mut lines = vec![Line::from("The robot will stand up. Is nobody near it?"), Line::default()];
+    if word.len() == 1 {
+        lines.push(choice(model, word, "stand up"));
+    } else {
+        let (done, left) = word.split_at(typed.min(word.len()));
+        lines.push(Line::from(vec![
+            span(theme, Role::Selected, " Cancel "),
+            span(theme, Role::Quiet, " Enter, or any other key     type "),
+            span(theme, Role::Good, done),
+            span(theme, Role::Key, left),
+            span(theme, Role::Text, " to arm"),
+        ]));
+    }
+    lines
 }
 
 fn approve(model: &Model, trial: u32, waited: bool) -> Vec<Line<'static>> {

@@ -22,6 +22,7 @@ pub mod next_step;
 pub mod objective;
 pub mod optimizer;
 pub mod overrides;
+pub mod pre_arm;
 pub mod proposal;
 pub mod trial_text;
 pub mod trials;
