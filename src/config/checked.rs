@@ -29,6 +29,9 @@ const FILES: [(&str, &str); 5] = [
     ("console.toml", include_str!("../../config/console.toml")),
 ];
 
+/// The gains of the controller, in table order, with their units.
+const GAINS: [(&str, &str); 4] = [("kp", "N/m"), ("kd", "N s/m"), ("kd_joint", "N m s/rad"), ("k_att", "N/m")];
+
 /// Keys that may be given though the defaults leave them out, each with an example of its kind.
 const OPTIONAL: [(&str, &str); 1] = [("optimize.toml", "[sampler]\nstartup_trials = 10\n")];
 
@@ -85,6 +88,26 @@ pub struct OptimizeFile {
     pub parameters: BTreeMap<String, Vec<String>>,
     /// The sampler.
     pub sampler: SamplerConfig,
+    /// Repeats of the best points.
+    pub confirm: ConfirmFile,
+    /// Several programs on one study.
+    pub workers: WorkersFile,
+}
+
+/// When the best point counts as confirmed.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+pub struct ConfirmFile {
+    /// How many points are repeated.
+    pub contenders: u32,
+    /// Confidence at which one leads, 0.5 to 1.
+    pub confidence: f64,
+}
+
+/// Several programs on one study.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+pub struct WorkersFile {
+    /// After how long a running trial of another worker counts as dead, s.
+    pub abandoned_s: f64,
 }
 
 /// All files, checked.
@@ -185,6 +208,26 @@ impl Config {
             .collect()
     }
 
+    /// The same parameters with the widest bounds that they may be given.
+    pub fn widest(&self, task: Task) -> Vec<ParameterInfo> {
+        let widest = |parameter: ParameterInfo| {
+            let [low, high] = self.safety.parameters[&parameter.name];
+            ParameterInfo { low, high, ..parameter }
+        };
+        self.parameters(task).into_iter().map(widest).collect()
+    }
+
+    /// The controller's gains with the ranges in which they may be set, in table order.
+    pub fn gains(&self) -> Vec<ParameterInfo> {
+        GAINS
+            .iter()
+            .map(|(name, unit)| {
+                let [low, high] = self.safety.gains[*name];
+                ParameterInfo { name: (*name).to_owned(), unit: (*unit).to_owned(), low, high }
+            })
+            .collect()
+    }
+
     /// What the control cycle is made with.
     ///
     /// # Errors
@@ -265,10 +308,14 @@ impl Config {
         for task in Task::ALL {
             let chosen = self.task(task);
             let tables = format!("tasks.{}", task.name());
-            positive.push((format!("{tables}.kp"), chosen.kp));
-            for (key, value) in [("kd", chosen.kd), ("kd_joint", chosen.kd_joint), ("k_att", chosen.k_att)] {
-                if !(value >= 0.0 && value.is_finite()) {
-                    return Err(self.refuse(FILE, &format!("{tables}.{key}"), value, "must be 0 or more"));
+            for (key, value) in
+                [("kp", chosen.kp), ("kd", chosen.kd), ("kd_joint", chosen.kd_joint), ("k_att", chosen.k_att)]
+            {
+                let [least, most] = self.safety.gains[key];
+                if !(value >= least && value <= most) {
+                    let reason =
+                        format!("must be within the safe range [{least}, {most}] of safety.toml, [gains] {key}");
+                    return Err(self.refuse(FILE, &format!("{tables}.{key}"), value, reason));
                 }
             }
             if chosen.jumps == 0 || chosen.jumps > 100 {
@@ -296,6 +343,14 @@ impl Config {
         if self.optimize.trials == 0 {
             return Err(self.refuse(FILE, "trials", 0, "a study needs at least one trial"));
         }
+        let ConfirmFile { contenders, confidence } = self.optimize.confirm;
+        if !(2..=10).contains(&contenders) {
+            return Err(self.refuse(FILE, "confirm.contenders", contenders, "must be 2 to 10 points"));
+        }
+        if !(confidence > 0.5 && confidence < 1.0) {
+            return Err(self.refuse(FILE, "confirm.confidence", confidence, "must be above 0.5 and below 1"));
+        }
+        self.all_positive(FILE, &[("workers.abandoned_s".to_owned(), self.optimize.workers.abandoned_s)])?;
         for (name, [low, high]) in &self.optimize.bounds {
             let key = format!("bounds.{name}");
             let value = format!("[{low}, {high}]");

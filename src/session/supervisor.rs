@@ -1,6 +1,8 @@
 //! The session thread's work: an operator's intents in, commands to the control thread, events and measured ticks back,
 //! records to the screen and the recording. Every intent is answered, carried out or refused and why.
 
+mod unattended;
+
 use std::collections::VecDeque;
 use std::sync::mpsc::{Receiver, Sender};
 
@@ -15,6 +17,7 @@ use crate::recording::record::{
     CommandRecord, Level, LogRecord, PreArmCheck, Record, SessionInfo, Stage, Stamped, Transition, Verdict,
 };
 use crate::recording::recorder::{RecorderWatch, TrialTicks};
+use unattended::Unattended;
 
 /// Ticks that go with a fault into the recording.
 const FAULT_TICKS: usize = 200;
@@ -24,6 +27,8 @@ const COUNTERS_PERIOD_NS: u64 = 100_000_000;
 
 /// How often the pre-arm list is shown again though no item changed its state, ns.
 const PRE_ARM_PERIOD_NS: u64 = 500_000_000;
+/// How often the study is looked at for what other programs have written, ns.
+const LOOK_PERIOD_NS: u64 = 500_000_000;
 
 /// How long the recorder may take to hand over a trial's ticks, ns.
 const LONGEST_WAIT_FOR_TICKS_NS: u64 = 10_000_000_000;
@@ -84,6 +89,8 @@ pub struct Supervisor {
     /// The list as it was shown last, and when.
     shown_list: Vec<PreArmCheck>,
     shown_list_ns: u64,
+    looked_ns: u64,
+    unattended: Unattended,
 }
 
 impl Supervisor {
@@ -109,6 +116,8 @@ impl Supervisor {
             pre_arm,
             shown_list: Vec::new(),
             shown_list_ns: 0,
+            looked_ns: 0,
+            unattended: Unattended::default(),
         };
         supervisor.say(Record::Session(info), time_ns);
         supervisor.publish(time_ns);
@@ -142,7 +151,14 @@ impl Supervisor {
             self.say(Record::Counters(counters), time_ns);
             self.show_pre_arm(time_ns);
         }
+        if time_ns >= self.looked_ns + LOOK_PERIOD_NS {
+            self.looked_ns = time_ns;
+            if let Err(error) = self.life.look() {
+                self.log(Level::Error, format!("the study could not be read: {error}"), time_ns);
+            }
+        }
         self.publish(time_ns);
+        self.act_by_itself(time_ns);
     }
 
     /// Carries out one intent, or says why not. `stops` is how often STOP had been pressed when it was wished: what
@@ -156,6 +172,7 @@ impl Supervisor {
         } else if energises && self.control.stop.count() != stops {
             Err("STOP was pressed after it".to_owned())
         } else {
+            self.noticed(intent);
             self.obey(intent, stops)
         };
         let (accepted, answer) = match answer {
@@ -248,6 +265,30 @@ impl Supervisor {
             Intent::ClearOverrides => {
                 self.life.clear_overrides().map_err(words).map(|()| "as it was proposed".to_owned())
             }
+            Intent::OverrideGain { gain, value } => {
+                self.life.set_gain(gain, *value).map_err(words)?;
+                Ok(format!("{gain} will be {value} in this trial"))
+            }
+            Intent::Fix { parameter, value, trials } => {
+                self.life.fix(parameter, *value, *trials).map_err(words)?;
+                Ok(format!("{parameter} is {value} for the next {trials} trials that count"))
+            }
+            Intent::Unfix { parameter } => {
+                self.life.unfix(parameter).map_err(words)?;
+                Ok(format!("{parameter} is searched again"))
+            }
+            Intent::NarrowBounds { parameter, low, high } => {
+                self.life.narrow_bounds(parameter, *low, *high).map_err(words)?;
+                Ok(format!("{parameter} is searched from {low} to {high}"))
+            }
+            Intent::ConfirmBest { repeats } => {
+                let trials = self.life.confirm_best(*repeats).map_err(words)?;
+                let trials: Vec<String> = trials.iter().map(u32::to_string).collect();
+                Ok(match trials.len() {
+                    0 => "no more repeats".to_owned(),
+                    _ => format!("the points of trials {} are repeated, at most {repeats} times", trials.join(", ")),
+                })
+            }
             Intent::Judge(verdict) => {
                 self.life.judge(*verdict, false).map_err(words)?;
                 self.end_review()?;
@@ -307,6 +348,7 @@ impl Supervisor {
                 self.cause = cause;
                 self.pre_arm.mode_changed(from, to, &cause);
                 self.shown_list.clear();
+                self.unattended.mode_changed(to, cause);
                 self.say(Record::Transition(Transition { from, to, cause: cause.to_string() }), time_ns);
             }
             Event::TrialEnded { trial, end } => {
@@ -406,7 +448,13 @@ fn describe(intent: &Intent) -> String {
         Intent::Cancel => "cancel the countdown".to_owned(),
         Intent::Skip => "skip the proposal".to_owned(),
         Intent::Override { parameter, value } => format!("override {parameter} = {value}"),
+        Intent::OverrideGain { gain, value } => format!("set the gain {gain} = {value}"),
         Intent::ClearOverrides => "clear the overrides".to_owned(),
+        Intent::Fix { parameter, value, trials } => format!("fix {parameter} = {value} for {trials} trials"),
+        Intent::Unfix { parameter } => format!("search {parameter} again"),
+        Intent::NarrowBounds { parameter, low, high } => format!("search {parameter} from {low} to {high}"),
+        Intent::ConfirmBest { repeats: 0 } => "end the repeats".to_owned(),
+        Intent::ConfirmBest { repeats } => format!("confirm the best with {repeats} repeats"),
         Intent::Judge(verdict) => verdict.name().to_owned(),
         Intent::Rerun { trial: None } => "re-run".to_owned(),
         Intent::Rerun { trial: Some(trial) } => format!("re-run trial {trial}"),

@@ -184,6 +184,13 @@ pub fn session() -> SessionInfo {
         recording: "recordings/forward/session.mcap".into(),
         started: "2026-11-21T03:00:00Z".into(),
         observe: false,
+        gains: vec![
+            parameter("kp", "N/m", 100.0, 1000.0),
+            parameter("kd", "N s/m", 0.0, 30.0),
+            parameter("kd_joint", "N m s/rad", 0.0, 3.0),
+            parameter("k_att", "N/m", 0.0, 600.0),
+        ],
+        approve: "each".into(),
     }
 }
 
@@ -196,6 +203,12 @@ pub fn proposal(trial: u32, revision: u32) -> Proposal {
         parent: None,
         parameters: vec![parameter("f0", 1.25), parameter("Fx", 75.0), parameter("Fz", 250.0)],
         risk: None,
+        gains: vec![
+            parameter("kp", 400.0),
+            parameter("kd", 8.0),
+            parameter("kd_joint", 0.8),
+            parameter("k_att", 200.0),
+        ],
     }
 }
 
@@ -219,6 +232,7 @@ pub fn trial(number: u32, verdict: Option<Verdict>, suggested: Option<Verdict>) 
         verdict,
         note: String::new(),
         risk: None,
+        gains: Vec::new(),
     }
 }
 

@@ -83,7 +83,7 @@ pub enum Dialog {
 }
 
 /// What a text field is for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Purpose {
     /// A note on this trial.
     Note(u32),
@@ -91,6 +91,20 @@ pub enum Purpose {
     HandValue(u32),
     /// More trials for a finished study.
     Continue,
+    /// For how many trials a parameter is fixed.
+    Fix {
+        /// Its place in the session's list.
+        parameter: usize,
+        /// The value that it keeps, in its unit.
+        value: f64,
+    },
+    /// Between which bounds a parameter is searched.
+    Bounds {
+        /// Its place in the session's list.
+        parameter: usize,
+    },
+    /// How often the best points are repeated.
+    ConfirmBest,
     /// Jump to a trial.
     TrialNumber,
     /// Search the log.
@@ -272,6 +286,21 @@ fn submit(model: &mut Model, purpose: Purpose, text: &str) -> Result<Vec<Effect>
             Ok(more @ 1..=1000) => Ok(wish(model, Intent::Continue(more))),
             _ => Err(format!("`{text}` is not a number of trials from 1 to 1000")),
         },
+        Purpose::Fix { parameter, value } => match (text.parse::<u32>(), model.session.parameters.get(parameter)) {
+            (Ok(trials @ 1..=1000), Some(info)) => {
+                let intent = Intent::Fix { parameter: info.name.clone(), value, trials };
+                Ok(wish(model, intent))
+            }
+            _ => Err(format!("`{text}` is not a number of trials from 1 to 1000")),
+        },
+        Purpose::Bounds { parameter } => {
+            let intent = bounds_of(model, parameter, text)?;
+            Ok(wish(model, intent))
+        }
+        Purpose::ConfirmBest => match text.parse::<u32>() {
+            Ok(repeats @ 1..=1000) => Ok(wish(model, Intent::ConfirmBest { repeats })),
+            _ => Err(format!("`{text}` is not a number of repeats from 1 to 1000")),
+        },
         Purpose::TrialNumber => {
             let number = text.parse::<u32>().map_err(|_| format!("`{text}` is not a trial's number"))?;
             if !model.trials.contains_key(&number) {
@@ -285,6 +314,24 @@ fn submit(model: &mut Model, purpose: Purpose, text: &str) -> Result<Vec<Effect>
             model.log_view.back = 0;
             Ok(Vec::new())
         }
+    }
+}
+
+/// Bounds typed as `low..high`, checked as far as the screen can know; the session checks all of it again.
+fn bounds_of(model: &Model, parameter: usize, text: &str) -> Result<Intent, String> {
+    let Some(info) = model.session.parameters.get(parameter) else { return Err("there is no such parameter".into()) };
+    let (name, unit) = (&info.name, &info.unit);
+    let number = |text: &str| text.trim().parse::<f64>().ok().filter(|value| value.is_finite());
+    let ends = text.split_once("..").and_then(|(low, high)| Some((number(low)?, number(high)?)));
+    let Some((low, high)) = ends else { return Err(format!("`{text}` is no range; write it as 50..120")) };
+    if low >= high {
+        return Err(format!("{low} is not below {high}"));
+    }
+    match model.searched(name) {
+        Some(p) if low < p.least || high > p.most => {
+            Err(format!("{name} may be searched from {} to {} {unit} (safety.toml)", p.least, p.most))
+        }
+        _ => Ok(Intent::NarrowBounds { parameter: name.clone(), low, high }),
     }
 }
 

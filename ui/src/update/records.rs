@@ -110,6 +110,9 @@ pub(super) fn take(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
             log(model, time_ns, line.level, &line.source, line.message, false);
         }
         Record::PreArm(list) => model.pre_arm = list,
+        Record::Search(search) => model.search = Some(search),
+        Record::Insight(insight) => model.insight = Some(insight),
+        Record::Points(points) => model.points = points,
         Record::FaultTicks(ticks) => {
             let text = format!("the last {} ticks before the fault are in the recording", ticks.len());
             log(model, time_ns, Level::Error, "control", text, false);

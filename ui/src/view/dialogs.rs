@@ -39,10 +39,17 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
         }
         Dialog::Quit => popup(frame, area, model, "Quit?", 58, quit(model)),
         Dialog::Override(form) => {
-            popup(frame, area, model, &format!("Override trial #{}", form.trial), 72, overrides(model, form))
+            popup(frame, area, model, &format!("Override trial #{}", form.trial), 78, overrides(model, form))
         }
         Dialog::Field { purpose, input, problem } => {
-            popup(frame, area, model, &field_title(*purpose), 64, field(model, *purpose, input, problem.as_deref()));
+            popup(
+                frame,
+                area,
+                model,
+                &field_title(model, *purpose),
+                64,
+                field(model, *purpose, input, problem.as_deref()),
+            );
         }
         Dialog::Palette { input, selected } => render_palette(frame, area, model, input, *selected),
         Dialog::Choose { what, selected } => render_choice(frame, area, model, *what, *selected),
@@ -132,7 +139,7 @@ fn approve(model: &Model, trial: u32, waited: bool) -> Vec<Line<'static>> {
             .parameters
             .iter()
             .map(|p| {
-                let unit = model.parameter(&p.name).map_or("", |info| info.unit.as_str());
+                let unit = model.parameter(&p.name).map_or(String::new(), |info| info.unit);
                 format!("{} {} {unit}", p.name, number(p.value))
             })
             .collect();
@@ -165,10 +172,13 @@ fn overrides(model: &Model, form: &OverrideForm) -> Vec<Line<'static>> {
     let theme = &model.theme;
     let mut lines = Vec::new();
     for (index, row) in form.rows.iter().enumerate() {
+        if row.gain && !form.rows[index.saturating_sub(1)].gain {
+            lines.push(Line::from(span(theme, Role::Quiet, "  gains of the controller, for this trial alone")));
+        }
         let selected = index == form.selected;
         let mark = if selected { ">" } else { " " };
         let mut spans =
-            vec![span(theme, if selected { Role::Key } else { Role::Text }, format!("{mark} {:<4}", row.name))];
+            vec![span(theme, if selected { Role::Key } else { Role::Text }, format!("{mark} {:<8}", row.name))];
         match &form.typing {
             Some(input) if selected => {
                 // As wide as the number it replaces, so that the line does not jump.
@@ -177,9 +187,9 @@ fn overrides(model: &Model, form: &OverrideForm) -> Vec<Line<'static>> {
             }
             _ => spans.push(Span::raw(format!("{:>8}", number(row.value)))),
         }
-        spans.push(span(theme, Role::Quiet, format!(" {:<3}", row.unit)));
+        spans.push(span(theme, Role::Quiet, format!(" {:<9}", row.unit)));
         spans.push(span(theme, Role::Quiet, format!(" {:>6} ", number(row.low))));
-        spans.push(span(theme, Role::Quiet, proposal::place(theme, row.value, row.low, row.high, 20)));
+        spans.push(span(theme, Role::Quiet, proposal::place(theme, row.value, row.low, row.high, 14)));
         spans.push(span(theme, Role::Quiet, format!(" {:<6}", number(row.high))));
         if row.value != row.before {
             spans.push(span(theme, Role::Warning, format!(" was {}", number(row.before))));
@@ -210,11 +220,20 @@ fn edited(theme: &Theme, input: &Input) -> Vec<Span<'static>> {
     ]
 }
 
-fn field_title(purpose: Purpose) -> String {
+fn field_title(model: &Model, purpose: Purpose) -> String {
     match purpose {
         Purpose::Note(trial) => format!("Note on trial #{trial}"),
         Purpose::HandValue(trial) => format!("Trial #{trial}, measured by hand"),
         Purpose::Continue => "How many more trials?".to_owned(),
+        Purpose::Fix { parameter, value } => {
+            let info = model.session.parameters.get(parameter);
+            let (name, unit) = info.map_or(("", ""), |info| (&info.name, &info.unit));
+            format!("Fix {name} at {} {unit} for how many trials?", number(value))
+        }
+        Purpose::Bounds { parameter } => {
+            format!("Search {} from .. to", model.session.parameters.get(parameter).map_or("", |info| &info.name))
+        }
+        Purpose::ConfirmBest => "How many repeats at most, to confirm the best?".to_owned(),
         Purpose::TrialNumber => "Go to trial".to_owned(),
         Purpose::LogSearch => "Search the log".to_owned(),
     }
@@ -231,6 +250,18 @@ fn field(model: &Model, purpose: Purpose, input: &Input, problem: Option<&str>) 
         (None, Purpose::HandValue(_)) => {
             span(theme, Role::Quiet, "replaces the measured value; empty: back to the measured one")
         }
+        (None, Purpose::Bounds { parameter }) => {
+            let info = model.session.parameters.get(parameter);
+            let searched = info.and_then(|info| model.searched(&info.name));
+            let allowed = searched.map_or(String::new(), |p| format!("; safety.toml allows {} to {}", p.least, p.most));
+            span(theme, Role::Quiet, format!("write it as 50..120{allowed}; past trials stay"))
+        }
+        (None, Purpose::Fix { .. }) => span(theme, Role::Quiet, "the others are still proposed by the sampler"),
+        (None, Purpose::ConfirmBest) => span(
+            theme,
+            Role::Quiet,
+            "the best points run again until one leads; each repeat is approved like any other",
+        ),
         (None, Purpose::LogSearch) => span(theme, Role::Quiet, "empty: all lines"),
         (None, Purpose::Note(_)) if model.robot_needs_us() => {
             span(theme, Role::Quiet, "the robot is armed: Space is STOP, _ writes a space")

@@ -66,11 +66,14 @@ fn identity(model: &Model, width: u16) -> Vec<Span<'static>> {
     if session.observe {
         spans.push(span(theme, Role::Warning, "OBSERVING  "));
     }
+    if !matches!(session.approve.as_str(), "" | "each") && model.replay.is_none() {
+        spans.push(span(theme, Role::Warning, format!("APPROVE {}  ", session.approve.to_uppercase())));
+    }
     spans.push(Span::raw(session.task.clone()));
     // A narrow terminal has room for the best value only if the words are left out.
     let narrow = width < 100;
     if let Some(info) = model.stage {
-        let (finished, budget) = (model.counted(), session.budget);
+        let (finished, budget) = (model.counted(), model.budget());
         let text = match narrow {
             true => format!("  trial #{}  {finished}/{budget}", info.trial),
             false => format!("   trial #{}   {finished} of {budget} judged", info.trial),

@@ -6,7 +6,9 @@
 //!   wakes late p50 61 us, p99 94 us ...
 //! ```
 
+use quadfrog::realtime::pre_arm::Check;
 use quadfrog::realtime::telemetry::StageTimes;
+use quadfrog::recording::recorder::RecorderStatus;
 use quadfrog::robot::{JOINTS, LinkStatus, joint_name};
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
@@ -28,7 +30,7 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let [timing, lateness, recording, robot] = Layout::vertical([
         Constraint::Length(timing_rows.len() as u16 + 1),
         Constraint::Length(lateness_rows_shown),
-        Constraint::Length(6),
+        Constraint::Length(8),
         Constraint::Fill(1),
     ])
     .areas(left);
@@ -141,6 +143,12 @@ fn recorder_rows(model: &Model) -> Vec<Row> {
     vec![
         row("recording", name(&model.session.recording), model.session.recording.is_empty() && model.replay.is_none()),
         row("study", name(&model.session.study), false),
+        match &model.recorder {
+            Some(RecorderStatus { error: Some(error), .. }) => row("writing", error.clone(), true),
+            Some(status) => row("written", written(status, model.snapshot.tick.time_ns), false),
+            None => row("written", "-".to_owned(), false),
+        },
+        disk_row(model),
         row("not recorded", format!("{} ticks", counters.ticks_not_recorded), counters.ticks_not_recorded > 0),
         row("not shown", format!("{} ticks", counters.ticks_not_shown), false),
         row("refused", format!("{} commands", counters.commands_refused), false),
@@ -173,6 +181,22 @@ fn robot_rows(model: &Model) -> Vec<Row> {
         None => rows.push(row("battery", "none".to_owned(), false)),
     }
     rows
+}
+
+/// How much is on the disk, and how fast it grew.
+fn written(status: &RecorderStatus, time_ns: u64) -> String {
+    let megabytes = status.bytes as f64 / 1e6;
+    let rate = status.bytes as f64 / 1e3 / (time_ns as f64 / 1e9).max(1.0);
+    format!("{megabytes:.1} MB, {rate:.0} kB/s, {} ticks", status.ticks)
+}
+
+/// The room on the disk, as the pre-arm list found it.
+fn disk_row(model: &Model) -> Row {
+    let disk = model.pre_arm.iter().find(|item| item.check == Check::Disk);
+    match disk {
+        Some(disk) => row("disk", disk.found.clone(), !disk.state.allows()),
+        None => row("disk", "-".to_owned(), false),
+    }
 }
 
 /// Share of the states of the last five seconds that never came, %.

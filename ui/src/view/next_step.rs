@@ -179,7 +179,8 @@ fn in_dialog(model: &Model, dialog: &Dialog) -> NextStep {
             plain("Enter takes the value and applies. Esc drops it.".to_owned())
         }
         Dialog::Override(_) => {
-            plain("Type a value, or Left Right 1 %, PgUp PgDn 10 %. Enter applies, Esc cancels.".to_owned())
+            let queue = model.keymap.key(Action::QueuePoint);
+            plain(format!("Type, or Left Right 1 %, PgUp PgDn 10 %. Enter applies, {queue} queues, Esc cancels."))
         }
         Dialog::Field { purpose: Purpose::Note(_), .. } if model.robot_needs_us() => {
             plain("Enter keeps the note, Esc cancels. Armed: Space is STOP, _ writes a space.".to_owned())
