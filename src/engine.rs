@@ -22,7 +22,7 @@ use crate::realtime::command::Task;
 use crate::realtime::telemetry::{Mode, Snapshot, Tick};
 use crate::recording::RecordingError;
 use crate::recording::record::{Record, SessionInfo, Stamped};
-use crate::recording::recorder::Recorder;
+use crate::recording::recorder::{Recorder, RecorderStatus};
 use crate::recording::writer::Writer;
 use crate::robot::description::RobotDescription;
 use crate::robot::go1::Go1;
@@ -432,6 +432,11 @@ impl Handle {
     /// The recording of this session; none where nothing is kept.
     pub fn recording(&self) -> Option<&Path> {
         self.recording.as_deref()
+    }
+
+    /// How the recorder is doing; none where nothing is kept.
+    pub fn recorder(&self) -> Option<RecorderStatus> {
+        self.recording.as_ref().and(self.recorder.as_ref()).map(|recorder| recorder.status())
     }
 
     /// The screen is alive; to be called at least ten times a second.

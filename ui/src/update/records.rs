@@ -18,7 +18,7 @@ pub(super) fn close_stale_dialog(model: &mut Model) {
             let on_table = model.proposal.as_ref().map(|p| (p.trial, p.revision));
             on_table != Some((*trial, *revision)) || Action::Approve.legal(model).is_err()
         }
-        Some(Dialog::Arm) => Action::Arm.legal(model).is_err(),
+        Some(Dialog::Arm { .. }) => Action::Arm.legal(model).is_err(),
         Some(Dialog::Override(form)) => {
             model.proposal.as_ref().is_none_or(|p| p.trial != form.trial) || Action::Override.legal(model).is_err()
         }
@@ -110,8 +110,9 @@ pub(super) fn take(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
             log(model, time_ns, line.level, &line.source, line.message, false);
         }
         Record::PreArm(list) => model.pre_arm = list,
-        // Of these the newest counts, and the newest is asked for where it is drawn.
-        Record::Search(_) | Record::Insight(_) | Record::Points(_) => {}
+        Record::Search(search) => model.search = Some(search),
+        Record::Insight(insight) => model.insight = Some(insight),
+        Record::Points(points) => model.points = points,
         Record::FaultTicks(ticks) => {
             let text = format!("the last {} ticks before the fault are in the recording", ticks.len());
             log(model, time_ns, Level::Error, "control", text, false);
