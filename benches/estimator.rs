@@ -9,7 +9,9 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use estimation::{JumpError, World, jumps, percentile, settings};
 use quadfrog::control::estimator::Estimator;
 use quadfrog::control::leg::feet;
+use quadfrog::control::settings::ObjectiveSource;
 use quadfrog::realtime::command::Task;
+use quadfrog::realtime::telemetry::TrialEnd;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::robot::{JointCommand, Placement, Robot};
 use quadfrog::sim::Simulator;
@@ -19,12 +21,25 @@ const JUMPS: u32 = 100;
 const SEED: u64 = 0;
 
 fn accuracy(_: &mut Criterion) {
-    println!("Error of the estimate over {JUMPS} jumps with random parameters within the bounds, sensors with their errors");
+    println!(
+        "Error of the estimate over {JUMPS} jumps with random parameters within the bounds, sensors with their errors"
+    );
     println!("                             landed | displacement, cm    | yaw, rad      | apex, cm");
     println!("                             of     | median  95 %   max  | 95 %    max   | median  95 %");
-    for (world, name) in [(World::Ideal, "ideal motors, friction 1.0"), (World::HardwareLike, "hardware-like, friction 0.6")]
-    {
-        let (landed, fallen) = jumps(world, JUMPS, SEED);
+    let worlds = [
+        (World::Ideal, "ideal motors, friction 1.0"),
+        (World::HardwareLike, "hardware-like, friction 0.6"),
+        (World::Imperfect, "  badly calibrated besides"),
+    ];
+    for (world, name) in worlds {
+        let (landed, fallen) = jumps(world, ObjectiveSource::Estimate, JUMPS, SEED);
+        let (_, fallen_in_truth) = jumps(world, ObjectiveSource::Truth, JUMPS, SEED);
+        println!(
+            "(of the same jumps with the controller on the truth {} fall: {:?}, {:?})",
+            fallen_in_truth.len(),
+            fallen_in_truth.iter().filter(|e| matches!(e, TrialEnd::NotQuiet)).count(),
+            fallen.iter().filter(|e| matches!(e, TrialEnd::NotQuiet)).count()
+        );
         line(name, &landed.iter().collect::<Vec<_>>(), fallen.len());
         for task in Task::ALL {
             let of_task: Vec<_> = landed.iter().filter(|jump| jump.task == task).collect();

@@ -31,8 +31,7 @@ const FILES: [(&str, &str); 5] = [
 ];
 
 /// Keys that may be given though the defaults leave them out, each with an example of its kind.
-const OPTIONAL: [(&str, &str); 1] =
-    [("optimize.toml", "objective = \"truth\"\n[sampler]\nstartup_trials = 10\n")];
+const OPTIONAL: [(&str, &str); 1] = [("optimize.toml", "objective = \"truth\"\n[sampler]\nstartup_trials = 10\n")];
 
 /// Which machine stands behind the controller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -223,9 +222,10 @@ impl Config {
         };
         match (ObjectiveSource::from_name(name), backend) {
             (None, _) => Err(refuse(name, "must be \"truth\" or \"estimate\", or be left out")),
-            (Some(ObjectiveSource::Truth), Backend::Hardware) => {
-                Err(refuse(name, "a robot does not know the truth, only a simulator does; take \"estimate\" or leave it out"))
-            }
+            (Some(ObjectiveSource::Truth), Backend::Hardware) => Err(refuse(
+                name,
+                "a robot does not know the truth, only a simulator does; take \"estimate\" or leave it out",
+            )),
             (Some(source), _) => Ok(source),
         }
     }
