@@ -99,8 +99,8 @@ fn the_same_jumps_give_the_same_bits() {
     assert_eq!(std::thread::spawn(bits).join().unwrap(), first);
 }
 
-/// A minute in READY with biased, noisy sensors. Places of feet do not drift, so neither does the robot: the bound is what the
-/// orientation's error of 2 mrad (0.4 mm at this height, four deviations) and the creep that feet are allowed leave.
+/// A minute in READY with biased, noisy sensors. By its gyro's bias alone (3.5 mrad/s, 0.2 m above the feet) the robot would
+/// seem to move 4 cm; the places of its feet hold it, but for what they are allowed to creep.
 #[test]
 fn a_robot_that_stands_for_a_minute_stays_where_it_is() {
     let settings = settings(Task::Forward);
@@ -121,7 +121,7 @@ fn a_robot_that_stands_for_a_minute_stays_where_it_is() {
         fastest = fastest.max(tick.estimate.velocity_world.norm());
     }
     println!("drift in 58 s {farthest:.5} m, largest velocity {fastest:.4} m/s");
-    assert!(farthest < 0.005, "drifted by {farthest} m");
+    assert!(farthest < 0.01, "drifted by {farthest} m");
     assert!(fastest < settings.settle.speed_m_s / 2.0, "moves at {fastest} m/s: would hardly count as quiet");
 }
 
@@ -142,7 +142,7 @@ fn a_flight_is_ballistic() {
     feed.state.foot_force = [0.0; LEGS];
     feed.state.imu.accel_body = Vector3::zeros();
     let estimate = feed.run(400);
-    // The first milliseconds count as standing: the force is smoothed, and feet that do not move do not contradict.
+    // The first two milliseconds count as standing, and feet that do not move do not contradict.
     assert_eq!(estimate.contact, [false; LEGS]);
     assert!((estimate.velocity_world.z + GRAVITY * 0.4).abs() < 0.15, "{}", estimate.velocity_world);
     assert!((estimate.position_world.z - start.z + GRAVITY * 0.08).abs() < 0.05, "{}", estimate.position_world);
@@ -289,11 +289,11 @@ fn contact_does_not_flicker_in_the_noise_of_a_sensor() {
         }
     }
     assert_eq!(changes, 0, "wrong contacts in 20 s of noise on four feet");
-    // And a landing is seen within two milliseconds.
+    // A tap of one millisecond is none; a landing and the end of a push are seen in two.
     let mut gate = ContactGate::default();
-    gate.update(&[0.0; LEGS], 1e-3, &settings.estimator);
-    gate.update(&[60.0; LEGS], 1e-3, &settings.estimator);
-    assert_eq!(gate.update(&[60.0; LEGS], 1e-3, &settings.estimator), [true; LEGS]);
+    let mut feel = |force_n| gate.update(&[force_n; LEGS], 1e-3, &settings.estimator)[0];
+    let forces = [0.0, 180.0, 0.0, 60.0, 100.0, 100.0, 0.0, 100.0, 0.0, 0.0];
+    assert_eq!(forces.map(&mut feel), [false, false, false, false, true, true, true, true, true, false]);
 }
 
 #[test]
