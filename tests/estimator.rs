@@ -364,7 +364,7 @@ fn a_source_or_weight_that_cannot_be_is_refused() {
     assert!(error.contains("optimize.toml:1") && error.contains("\"guess\"") && error.contains("estimate"), "{error}");
     let error = refused("control.toml", "[estimator]\ngate_sigma = 0.0\n");
     assert!(error.contains("control.toml:2") && error.contains("estimator.gate_sigma"), "{error}");
-    let error = refused("control.toml", "[estimator]\ncontact_off_n = 15.0\n");
+    let error = refused("control.toml", "[estimator]\ncontact_off_n = 40.0\n");
     assert!(error.contains("estimator.contact_off_n") && error.contains("contact_on_n"), "{error}");
 }
 
