@@ -1,11 +1,12 @@
 //! What each action does.
 
+use quadfrog::realtime::telemetry::Mode;
 use quadfrog::recording::record::{Level, Stage, Verdict};
 use quadfrog::session::intent::Intent;
 
 use super::navigate::{filter, freeze, ghost, move_by, move_cursor, next_mode, next_series, next_sort, zoom};
 use super::{Effect, ReplayCommand, interrupt, say, stop, wish};
-use crate::action::{Action, may_acknowledge};
+use crate::action::{Action, may_acknowledge, may_wish};
 use crate::dialog::{Choice, Dialog, OverrideForm, Purpose};
 use crate::model::{Model, View};
 
