@@ -5,7 +5,7 @@ mod checked;
 mod merge;
 mod safety;
 
-pub use checked::{Backend, Config, ControlFile, OptimizeFile};
+pub use checked::{Backend, Config, ConfirmFile, ControlFile, OptimizeFile, WorkersFile};
 pub use safety::SafetyFile;
 
 use std::path::PathBuf;

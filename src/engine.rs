@@ -25,7 +25,10 @@ use crate::recording::record::{Record, SessionInfo, Stamped};
 use crate::recording::recorder::Recorder;
 use crate::recording::writer::Writer;
 use crate::robot::description::RobotDescription;
+use crate::robot::go1::Go1;
+use crate::robot::go1::link::LinkError;
 use crate::robot::{Placement, Robot};
+use crate::session::approval::Approval;
 use crate::session::intent::{Intent, Wish};
 use crate::session::life::{Life, Plan};
 use crate::session::pre_arm::PreArmList;
@@ -50,6 +53,8 @@ pub struct Options {
     pub folder: Option<PathBuf>,
     /// Whether the session only looks.
     pub observe: bool,
+    /// Who approves and judges.
+    pub approve: Approval,
 }
 
 /// Why an engine does not start.
@@ -61,6 +66,9 @@ pub enum EngineError {
     /// The simulator's configuration.
     #[error(transparent)]
     Simulator(#[from] SimError),
+    /// The link to the robot.
+    #[error(transparent)]
+    Link(#[from] LinkError),
     /// The search space.
     #[error(transparent)]
     Space(#[from] SpaceError),
@@ -70,6 +78,11 @@ pub enum EngineError {
     /// The recording.
     #[error(transparent)]
     Recording(#[from] RecordingError),
+    /// A robot that may hurt somebody is not left to itself.
+    #[error(
+        "--approve auto: only on the simulator; a jump of the robot is approved by a person: give each or falls-only"
+    )]
+    Unattended,
     /// A journal without a study of ours.
     #[error("{}: holds no study of this program; give one that it made", file.display())]
     NoStudy {
@@ -131,6 +144,12 @@ pub fn open_life(options: &Options, durability: Durability, recording: &str) -> 
         seed: u64::from(options.seed),
         budget: options.trials.unwrap_or(options.config.optimize.trials),
         recording: recording.to_owned(),
+        widest: options.config.widest(options.task),
+        gains: options.config.gains(),
+        contenders: options.config.optimize.confirm.contenders,
+        confidence: options.config.optimize.confirm.confidence,
+        worker: 0,
+        abandoned: Duration::from_secs_f64(options.config.optimize.workers.abandoned_s),
     };
     Ok(Life::open(plan, study)?)
 }
@@ -155,6 +174,8 @@ pub fn session_info(options: &Options, recording: &str) -> SessionInfo {
         recording: recording.to_owned(),
         started: jiff::Timestamp::now().to_string(),
         observe: options.observe,
+        gains: options.config.gains(),
+        approve: options.approve.name().to_owned(),
     }
 }
 
@@ -247,13 +268,13 @@ impl Engine {
     /// # Errors
     /// When the configuration, the study, the recording or the system does not allow it; nothing runs then.
     pub fn start(options: Options) -> Result<Handle, EngineError> {
+        if options.approve == Approval::Auto && options.backend == Backend::Hardware {
+            return Err(EngineError::Unattended);
+        }
         let settings = options.config.settings(&options.robot, options.task, options.backend)?;
         let mut robot: Box<dyn Robot> = match options.backend {
             Backend::Simulator => Box::new(Simulator::new(&options.robot, &options.config.simulator)?),
-            Backend::Hardware => {
-                let reason = "this version drives the simulator only";
-                return Err(options.config.refuse("control.toml", "robot", "go1", reason).into());
-            }
+            Backend::Hardware => Box::new(Go1::open(&options.robot, options.observe)?),
         };
         // A simulated robot begins as a real one does: lying folded on its belly.
         robot.place(&Placement { joint_position: settings.lying_position, lying: true, seed: u64::from(options.seed) });
@@ -291,7 +312,8 @@ impl Engine {
         let folder = recording.as_ref().and(options.folder.clone());
         let pre_arm = PreArmList::new(&settings, fingerprint(&options.config), folder);
         let parts = Parts { life, control: session_end, handed, outlets, recorder: status, pre_arm, info };
-        let supervisor = Supervisor::new(parts, clock.now_ns());
+        let simulated = options.backend == Backend::Simulator;
+        let supervisor = Supervisor::new(parts, clock.now_ns()).approving(options.approve, simulated);
         let sits_down = options.backend == Backend::Hardware;
         let session = std::thread::Builder::new()
             .name("session".into())

@@ -16,6 +16,7 @@ use quadfrog::recording::record::{CommandRecord, PreArmCheck, Record, Stamped};
 use quadfrog::recording::recorder::RecorderWatch;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::robot::{Battery, JointCommand, LinkStatus, Placement, Robot, RobotError, RobotState};
+use quadfrog::session::approval::Approval;
 use quadfrog::session::intent::{Intent, OperatorCheck, Wish};
 use quadfrog::session::pre_arm::PreArmList;
 use quadfrog::session::supervisor::{Outlets, Parts, Supervisor};
@@ -70,6 +71,7 @@ impl Session {
             trials: Some(5),
             folder: None,
             observe: false,
+            approve: Approval::Each,
         };
         let settings: Settings = options.config.settings(&options.robot, options.task, backend).unwrap();
         let mut simulator = Simulator::new(&options.robot, &options.config.simulator).unwrap();

@@ -6,6 +6,7 @@ use quadfrog::optimize::journal::Durability;
 use quadfrog::realtime::command::Task;
 use quadfrog::recording::record::TrialRecord;
 use quadfrog::robot::description::RobotDescription;
+use quadfrog::session::approval::Approval;
 use quadfrog::session::automatic;
 use quadfrog::session::rollout::Rollout;
 use quadfrog::sim::Simulator;
@@ -25,6 +26,7 @@ fn study(task: Task, seed: u32) -> (Vec<TrialRecord>, f64) {
         trials: Some(TRIALS),
         folder: None,
         observe: false,
+        approve: Approval::Each,
     };
     let settings = options.config.settings(&options.robot, task, Backend::Simulator).unwrap();
     let simulator = Simulator::new(&options.robot, &options.config.simulator).unwrap();

@@ -12,7 +12,7 @@ use super::merge::merge;
 use super::safety::SafetyFile;
 use crate::control::estimator::GRAVITY;
 use crate::control::leg::stance_of;
-use crate::control::settings::{Ramp, Settings, Settle, Stand, TaskControl};
+use crate::control::settings::{EstimatorSettings, ObjectiveSource, Ramp, Settings, Settle, Stand, TaskControl};
 use crate::optimize::sampler::SamplerConfig;
 use crate::realtime::command::Task;
 use crate::recording::record::ParameterInfo;
@@ -29,8 +29,11 @@ const FILES: [(&str, &str); 5] = [
     ("console.toml", include_str!("../../config/console.toml")),
 ];
 
+/// The gains of the controller, in table order, with their units.
+const GAINS: [(&str, &str); 4] = [("kp", "N/m"), ("kd", "N s/m"), ("kd_joint", "N m s/rad"), ("k_att", "N/m")];
+
 /// Keys that may be given though the defaults leave them out, each with an example of its kind.
-const OPTIONAL: [(&str, &str); 1] = [("optimize.toml", "[sampler]\nstartup_trials = 10\n")];
+const OPTIONAL: [(&str, &str); 1] = [("optimize.toml", "objective = \"truth\"\n[sampler]\nstartup_trials = 10\n")];
 
 /// Which machine stands behind the controller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -54,6 +57,8 @@ pub struct ControlFile {
     pub settle: Settle,
     /// When a foot is on the ground.
     pub contact: Contact,
+    /// How the base's state is estimated.
+    pub estimator: EstimatorSettings,
     /// What each task's trials run with.
     pub tasks: BTreeMap<String, TaskControl>,
 }
@@ -67,10 +72,10 @@ pub struct Countdown {
     pub hardware_s: f64,
 }
 
-/// When a foot is on the ground.
+/// When a foot is on the ground, by the simulator's own knowledge.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 pub struct Contact {
-    /// Least force at its sensor, N.
+    /// Least force of the ground on it, N.
     pub force_n: f64,
 }
 
@@ -79,12 +84,34 @@ pub struct Contact {
 pub struct OptimizeFile {
     /// Trials that count.
     pub trials: u32,
+    /// Name of what the objective is measured from; none takes what the backend has.
+    pub objective: Option<String>,
     /// Bounds of each parameter.
     pub bounds: BTreeMap<String, [f64; 2]>,
     /// Which parameters each task optimizes.
     pub parameters: BTreeMap<String, Vec<String>>,
     /// The sampler.
     pub sampler: SamplerConfig,
+    /// Repeats of the best points.
+    pub confirm: ConfirmFile,
+    /// Several programs on one study.
+    pub workers: WorkersFile,
+}
+
+/// When the best point counts as confirmed.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+pub struct ConfirmFile {
+    /// How many points are repeated.
+    pub contenders: u32,
+    /// Confidence at which one leads, 0.5 to 1.
+    pub confidence: f64,
+}
+
+/// Several programs on one study.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+pub struct WorkersFile {
+    /// After how long a running trial of another worker counts as dead, s.
+    pub abandoned_s: f64,
 }
 
 /// All files, checked.
@@ -185,10 +212,52 @@ impl Config {
             .collect()
     }
 
+    /// The same parameters with the widest bounds that they may be given.
+    pub fn widest(&self, task: Task) -> Vec<ParameterInfo> {
+        let widest = |parameter: ParameterInfo| {
+            let [low, high] = self.safety.parameters[&parameter.name];
+            ParameterInfo { low, high, ..parameter }
+        };
+        self.parameters(task).into_iter().map(widest).collect()
+    }
+
+    /// The controller's gains with the ranges in which they may be set, in table order.
+    pub fn gains(&self) -> Vec<ParameterInfo> {
+        GAINS
+            .iter()
+            .map(|(name, unit)| {
+                let [low, high] = self.safety.gains[*name];
+                ParameterInfo { name: (*name).to_owned(), unit: (*unit).to_owned(), low, high }
+            })
+            .collect()
+    }
+
+    /// What the objective is measured from: as chosen, or else the truth on the simulator and the estimate on hardware.
+    ///
+    /// # Errors
+    /// When it is something else than those two, or the truth is asked of hardware, which does not know it.
+    pub fn objective(&self, backend: Backend) -> Result<ObjectiveSource, ConfigError> {
+        let refuse = |name: &str, reason| self.refuse("optimize.toml", "objective", format!("\"{name}\""), reason);
+        let Some(name) = &self.optimize.objective else {
+            return Ok(match backend {
+                Backend::Simulator => ObjectiveSource::Truth,
+                Backend::Hardware => ObjectiveSource::Estimate,
+            });
+        };
+        match (ObjectiveSource::from_name(name), backend) {
+            (None, _) => Err(refuse(name, "must be \"truth\" or \"estimate\", or be left out")),
+            (Some(ObjectiveSource::Truth), Backend::Hardware) => Err(refuse(
+                name,
+                "a robot does not know the truth, only a simulator does; take \"estimate\" or leave it out",
+            )),
+            (Some(source), _) => Ok(source),
+        }
+    }
+
     /// What the control cycle is made with.
     ///
     /// # Errors
-    /// When the stance of `task` is out of the robot's reach.
+    /// When the stance of `task` is out of the robot's reach, or the objective cannot be measured on `backend`.
     pub fn settings(&self, robot: &RobotDescription, task: Task, backend: Backend) -> Result<Settings, ConfigError> {
         let chosen = self.task(task);
         self.check_stance(robot, task)?;
@@ -198,6 +267,8 @@ impl Config {
         Ok(Settings {
             geometry: robot.leg_geometry,
             hip_origin_body: Leg::ALL.map(|leg| robot.legs[leg as usize].joint_origin[0]),
+            imu_origin_body: robot.imu_origin,
+            foot_radius: robot.legs[0].foot_radius,
             min_position,
             max_position,
             max_torque: robot.limits.max_torque,
@@ -213,6 +284,8 @@ impl Config {
             fall: self.safety.fall,
             flight_tilt_rad: if hardware { fall.hardware_flight_rad } else { fall.simulator_flight_rad },
             contact_force_n: self.control.contact.force_n,
+            objective: self.objective(backend)?,
+            estimator: self.control.estimator,
             gate: self.safety.gate,
             hardware,
             pre_arm: self.safety.pre_arm,
@@ -265,10 +338,14 @@ impl Config {
         for task in Task::ALL {
             let chosen = self.task(task);
             let tables = format!("tasks.{}", task.name());
-            positive.push((format!("{tables}.kp"), chosen.kp));
-            for (key, value) in [("kd", chosen.kd), ("kd_joint", chosen.kd_joint), ("k_att", chosen.k_att)] {
-                if !(value >= 0.0 && value.is_finite()) {
-                    return Err(self.refuse(FILE, &format!("{tables}.{key}"), value, "must be 0 or more"));
+            for (key, value) in
+                [("kp", chosen.kp), ("kd", chosen.kd), ("kd_joint", chosen.kd_joint), ("k_att", chosen.k_att)]
+            {
+                let [least, most] = self.safety.gains[key];
+                if !(value >= least && value <= most) {
+                    let reason =
+                        format!("must be within the safe range [{least}, {most}] of safety.toml, [gains] {key}");
+                    return Err(self.refuse(FILE, &format!("{tables}.{key}"), value, reason));
                 }
             }
             if chosen.jumps == 0 || chosen.jumps > 100 {
@@ -288,14 +365,29 @@ impl Config {
             let reason = "must be 0 to 60 s";
             return Err(self.refuse(FILE, "countdown.simulator_s", control.countdown.simulator_s, reason));
         }
+        let estimator = &control.estimator;
+        positive.extend(estimator.numbers().map(|(key, value)| (format!("estimator.{key}"), value)));
+        if estimator.contact_off_n >= estimator.contact_on_n {
+            let reason = format!("must be below estimator.contact_on_n = {}", estimator.contact_on_n);
+            return Err(self.refuse(FILE, "estimator.contact_off_n", estimator.contact_off_n, reason));
+        }
         self.all_positive(FILE, &positive)
     }
 
     fn check_optimize(&self) -> Result<(), ConfigError> {
         const FILE: &str = "optimize.toml";
+        self.objective(Backend::Simulator)?;
         if self.optimize.trials == 0 {
             return Err(self.refuse(FILE, "trials", 0, "a study needs at least one trial"));
         }
+        let ConfirmFile { contenders, confidence } = self.optimize.confirm;
+        if !(2..=10).contains(&contenders) {
+            return Err(self.refuse(FILE, "confirm.contenders", contenders, "must be 2 to 10 points"));
+        }
+        if !(confidence > 0.5 && confidence < 1.0) {
+            return Err(self.refuse(FILE, "confirm.confidence", confidence, "must be above 0.5 and below 1"));
+        }
+        self.all_positive(FILE, &[("workers.abandoned_s".to_owned(), self.optimize.workers.abandoned_s)])?;
         for (name, [low, high]) in &self.optimize.bounds {
             let key = format!("bounds.{name}");
             let value = format!("[{low}, {high}]");

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::Deserialize;
 
 use super::{Config, ConfigError};
-use crate::control::settings::{Approval, Fall, Gate, PreArm, Watchdog};
+use crate::control::settings::{ApprovalLimits, Fall, Gate, PreArm, Watchdog};
 
 /// `safety.toml`.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -17,18 +17,20 @@ pub struct SafetyFile {
     /// What must hold before the robot is energised.
     pub pre_arm: PreArm,
     /// How long an approval holds.
-    pub approval: Approval,
+    pub approval: ApprovalLimits,
     /// What trips the watchdog.
     pub watchdog: Watchdog,
     /// The widest bounds of each parameter.
     pub parameters: BTreeMap<String, [f64; 2]>,
+    /// The range of each gain of the controller.
+    pub gains: BTreeMap<String, [f64; 2]>,
 }
 
 const FILE: &str = "safety.toml";
 
 impl Config {
     pub(super) fn check_safety(&self) -> Result<(), ConfigError> {
-        let SafetyFile { fall, gate, pre_arm, approval, watchdog, parameters } = &self.safety;
+        let SafetyFile { fall, gate, pre_arm, approval, watchdog, parameters, gains } = &self.safety;
         let positive = [
             ("fall.roll_rad", fall.roll_rad),
             ("fall.pitch_rad", fall.pitch_rad),
@@ -116,6 +118,12 @@ impl Config {
         ] {
             if value > limit {
                 return Err(self.refuse(FILE, key, value, format!("must not be above {stops} = {limit}")));
+            }
+        }
+        for (name, [low, high]) in gains {
+            if !(low.is_finite() && high.is_finite() && low <= high && *low >= 0.0) {
+                let reason = "must be [lowest, highest] with 0 <= lowest <= highest";
+                return Err(self.refuse(FILE, &format!("gains.{name}"), format!("[{low}, {high}]"), reason));
             }
         }
         for (name, [low, high]) in parameters {

@@ -8,6 +8,7 @@ mod container;
 pub mod disk;
 mod error;
 mod frames;
+mod optimizing;
 mod output;
 pub mod player;
 pub mod record;

@@ -4,6 +4,7 @@ use foxglove::messages::{Log, log};
 use prost::Message;
 
 use super::frog;
+use super::optimizing;
 use super::record::{
     CommandRecord, Level, LogRecord, Measured, ParameterInfo, PreArmCheck, Proposal, ProposedParameter, Record, Risk,
     SessionInfo, Source, Stage, StageInfo, Transition, TrialRecord, Verdict,
@@ -94,6 +95,9 @@ pub fn encode(record: &Record, start_utc_ns: u64, log_time: u64, buffer: &mut Ve
             };
             (Topic::PreArm, frog::PreArm { items: list.iter().map(item).collect() }.encode(buffer))
         }
+        Record::Search(value) => (Topic::Search, optimizing::search(value).encode(buffer)),
+        Record::Insight(value) => (Topic::Insight, optimizing::insight(value).encode(buffer)),
+        Record::Points(value) => (Topic::Points, optimizing::points(value).encode(buffer)),
     };
     encoded.expect("a Vec grows as far as it must");
     topic
@@ -159,6 +163,9 @@ pub fn decode(topic: Topic, data: &[u8]) -> Result<Option<Record>, DecodeError> 
             let items = frog::PreArm::decode(data)?.items;
             Record::PreArm(items.into_iter().map(item).collect::<Result<_, DecodeError>>()?)
         }
+        Topic::Search => Record::Search(optimizing::from_search(frog::Search::decode(data)?)),
+        Topic::Insight => Record::Insight(optimizing::from_insight(frog::Insight::decode(data)?)),
+        Topic::Points => Record::Points(optimizing::from_points(frog::Points::decode(data)?)),
         Topic::JointStates | Topic::JointCommand | Topic::Tick | Topic::Pose | Topic::Tf | Topic::Marker => {
             return Ok(None);
         }
@@ -187,6 +194,8 @@ fn session(info: &SessionInfo, start_utc_ns: u64) -> frog::Session {
         started: info.started.clone(),
         observe: info.observe,
         start_utc_ns,
+        gains: info.gains.iter().map(bounds).collect(),
+        approve: info.approve.clone(),
     }
 }
 
@@ -211,6 +220,8 @@ fn from_session(message: frog::Session) -> SessionInfo {
         recording: message.recording,
         started: message.started,
         observe: message.observe,
+        gains: message.gains.into_iter().map(bounds).collect(),
+        approve: message.approve,
     }
 }
 
@@ -227,6 +238,7 @@ fn proposal(value: &Proposal) -> frog::Proposal {
         parent: value.parent,
         parameters: value.parameters.iter().map(parameter).collect(),
         risk: value.risk.as_ref().map(risk),
+        gains: value.gains.iter().map(parameter).collect(),
     }
 }
 
@@ -243,6 +255,7 @@ fn from_proposal(message: frog::Proposal) -> Result<Proposal, DecodeError> {
         parent: message.parent,
         parameters: message.parameters.into_iter().map(parameter).collect(),
         risk: message.risk.map(from_risk),
+        gains: message.gains.into_iter().map(parameter).collect(),
     })
 }
 
@@ -268,6 +281,7 @@ fn trial(value: &TrialRecord) -> frog::Trial {
         verdict: value.verdict.map(|verdict| verdict as i32),
         note: value.note.clone(),
         risk: value.risk.as_ref().map(risk),
+        gains: value.gains.iter().map(parameter).collect(),
     }
 }
 
@@ -294,6 +308,7 @@ fn from_trial(message: frog::Trial) -> Result<TrialRecord, DecodeError> {
         verdict: verdict(message.verdict)?,
         note: message.note,
         risk: message.risk.map(from_risk),
+        gains: message.gains.into_iter().map(parameter).collect(),
     })
 }
 

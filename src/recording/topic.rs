@@ -25,10 +25,13 @@ pub enum Topic {
     Fault,
     Marker,
     PreArm,
+    Search,
+    Insight,
+    Points,
 }
 
 impl Topic {
-    pub const ALL: [Topic; 16] = [
+    pub const ALL: [Topic; 19] = [
         Topic::JointStates,
         Topic::JointCommand,
         Topic::Tick,
@@ -45,6 +48,9 @@ impl Topic {
         Topic::Fault,
         Topic::Marker,
         Topic::PreArm,
+        Topic::Search,
+        Topic::Insight,
+        Topic::Points,
     ];
 
     /// The name in the file.
@@ -66,6 +72,9 @@ impl Topic {
             Topic::Fault => "/fault",
             Topic::Marker => "/marker",
             Topic::PreArm => "/safety/pre_arm",
+            Topic::Search => "/opt/search",
+            Topic::Insight => "/opt/insight",
+            Topic::Points => "/opt/points",
         }
     }
 
@@ -102,6 +111,9 @@ impl Topic {
             Topic::Fault => own("FaultTicks"),
             Topic::Marker => own("Marker"),
             Topic::PreArm => own("PreArm"),
+            Topic::Search => own("Search"),
+            Topic::Insight => own("Insight"),
+            Topic::Points => own("Points"),
         }
     }
 }

@@ -11,6 +11,7 @@ use nalgebra::{Matrix3, Vector3};
 
 pub use files::DescriptionError;
 
+use super::go1::Network;
 use super::kinematics::LegGeometry;
 use super::{JOINTS, Joints, PerLeg};
 
@@ -109,6 +110,8 @@ pub struct RobotDescription {
     pub rotor_inertia: Joints,
     /// Where the inertial unit sits, trunk frame, m; its axes are the trunk's.
     pub imu_origin: Vector3<f64>,
+    /// How the machine is reached; none for one that cannot be driven.
+    pub network: Option<Network>,
 }
 
 impl RobotDescription {

@@ -70,8 +70,43 @@ pub enum Intent {
         /// New value, in the parameter's unit.
         value: f64,
     },
-    /// Back to what was proposed.
+    /// Set one of the controller's gains for the proposed trial.
+    OverrideGain {
+        /// `kp`, `kd`, `kd_joint` or `k_att`.
+        gain: String,
+        /// New value, in the gain's unit.
+        value: f64,
+    },
+    /// Back to what was proposed, gains too.
     ClearOverrides,
+    /// Fix a parameter for the next trials; the others are still proposed.
+    Fix {
+        /// Parameter name.
+        parameter: String,
+        /// Its value, in the parameter's unit.
+        value: f64,
+        /// For how many trials.
+        trials: u32,
+    },
+    /// Let a fixed parameter be searched again.
+    Unfix {
+        /// Parameter name.
+        parameter: String,
+    },
+    /// Search a parameter within these bounds from now on; the configured ones undo it.
+    NarrowBounds {
+        /// Parameter name.
+        parameter: String,
+        /// Lower bound, in the parameter's unit.
+        low: f64,
+        /// Upper bound.
+        high: f64,
+    },
+    /// Repeat the best points until one leads with enough confidence, at most so often in all; 0 ends that.
+    ConfirmBest {
+        /// Most repeats.
+        repeats: u32,
+    },
     /// Judge the trial under review.
     Judge(Verdict),
     /// Void the trial under review (or repeat an earlier one) and queue its parameters again.

@@ -1,5 +1,6 @@
 //! The life of a trial: proposed, approved, run, measured, judged.
 
+pub mod approval;
 pub mod automatic;
 pub mod intent;
 pub mod life;

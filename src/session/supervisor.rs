@@ -1,6 +1,8 @@
 //! The session thread's work: an operator's intents in, commands to the control thread, events and measured ticks back,
 //! records to the screen and the recording. Every intent is answered, carried out or refused and why.
 
+mod unattended;
+
 use std::collections::VecDeque;
 use std::sync::mpsc::{Receiver, Sender};
 
@@ -9,12 +11,13 @@ use super::life::{Life, Refusal};
 use super::pre_arm::{PreArmList, objections};
 use crate::control::mode::{self, Request};
 use crate::realtime::channel::SessionEnd;
-use crate::realtime::command::{Approval, Command};
+use crate::realtime::command::{Command, Permit};
 use crate::realtime::telemetry::{Cause, Event, Mode, TrialEnd};
 use crate::recording::record::{
     CommandRecord, Level, LogRecord, PreArmCheck, Record, SessionInfo, Stage, Stamped, Transition, Verdict,
 };
 use crate::recording::recorder::{Handed, RecorderWatch, TrialTicks};
+use unattended::Unattended;
 
 /// How often the counters are told to the screen and the recording, ns.
 const COUNTERS_PERIOD_NS: u64 = 100_000_000;
@@ -24,6 +27,8 @@ const CAUTION_PERIOD_NS: u64 = 10_000_000_000;
 
 /// How often the pre-arm list is shown again though no item changed its state, ns.
 const PRE_ARM_PERIOD_NS: u64 = 500_000_000;
+/// How often the study is looked at for what other programs have written, ns.
+const LOOK_PERIOD_NS: u64 = 500_000_000;
 
 /// How long the recorder may take to hand over a trial's ticks, ns.
 const LONGEST_WAIT_FOR_TICKS_NS: u64 = 10_000_000_000;
@@ -91,6 +96,8 @@ pub struct Supervisor {
     /// The list as it was shown last, and when.
     shown_list: Vec<PreArmCheck>,
     shown_list_ns: u64,
+    looked_ns: u64,
+    unattended: Unattended,
 }
 
 impl Supervisor {
@@ -120,6 +127,8 @@ impl Supervisor {
             pre_arm,
             shown_list: Vec::new(),
             shown_list_ns: 0,
+            looked_ns: 0,
+            unattended: Unattended::default(),
         };
         supervisor.say(Record::Session(info), time_ns);
         supervisor.publish(time_ns);
@@ -158,7 +167,14 @@ impl Supervisor {
             self.show_pre_arm(time_ns);
             self.warn(time_ns);
         }
+        if time_ns >= self.looked_ns + LOOK_PERIOD_NS {
+            self.looked_ns = time_ns;
+            if let Err(error) = self.life.look() {
+                self.log(Level::Error, format!("the study could not be read: {error}"), time_ns);
+            }
+        }
         self.publish(time_ns);
+        self.act_by_itself(time_ns);
     }
 
     /// Carries out one wish, or says why not.
@@ -173,6 +189,7 @@ impl Supervisor {
         } else if energises && self.control.stop.count() != *stops {
             Err("STOP was pressed after it".to_owned())
         } else {
+            self.noticed(intent);
             self.obey(wish)
         };
         let (accepted, answer) = match answer {
@@ -251,8 +268,8 @@ impl Supervisor {
                     return Err(hold);
                 }
                 let spec = self.life.approve(*trial, *revision).map_err(words)?;
-                let approval = Approval { mode_changes: self.mode_changes, given_ns: wish.time_ns };
-                if let Err(reason) = self.command(Command::RunTrial(spec, approval)) {
+                let permit = Permit { mode_changes: self.mode_changes, given_ns: wish.time_ns };
+                if let Err(reason) = self.command(Command::RunTrial(spec, permit)) {
                     self.life.ended(spec.trial, &TrialEnd::Cancelled, &[]);
                     return Err(reason);
                 }
@@ -265,6 +282,30 @@ impl Supervisor {
             }
             Intent::ClearOverrides => {
                 self.life.clear_overrides().map_err(words).map(|()| "as it was proposed".to_owned())
+            }
+            Intent::OverrideGain { gain, value } => {
+                self.life.set_gain(gain, *value).map_err(words)?;
+                Ok(format!("{gain} will be {value} in this trial"))
+            }
+            Intent::Fix { parameter, value, trials } => {
+                self.life.fix(parameter, *value, *trials).map_err(words)?;
+                Ok(format!("{parameter} is {value} for the next {trials} trials that count"))
+            }
+            Intent::Unfix { parameter } => {
+                self.life.unfix(parameter).map_err(words)?;
+                Ok(format!("{parameter} is searched again"))
+            }
+            Intent::NarrowBounds { parameter, low, high } => {
+                self.life.narrow_bounds(parameter, *low, *high).map_err(words)?;
+                Ok(format!("{parameter} is searched from {low} to {high}"))
+            }
+            Intent::ConfirmBest { repeats } => {
+                let trials = self.life.confirm_best(*repeats).map_err(words)?;
+                let trials: Vec<String> = trials.iter().map(u32::to_string).collect();
+                Ok(match trials.len() {
+                    0 => "no more repeats".to_owned(),
+                    _ => format!("the points of trials {} are repeated, at most {repeats} times", trials.join(", ")),
+                })
             }
             Intent::Judge(verdict) => {
                 self.life.judge(*verdict, false).map_err(words)?;
@@ -327,6 +368,7 @@ impl Supervisor {
                 self.letting_go = false;
                 self.pre_arm.mode_changed(from, to, &cause);
                 self.shown_list.clear();
+                self.unattended.mode_changed(to, cause);
                 self.say(Record::Transition(Transition { from, to, cause: cause.to_string() }), time_ns);
             }
             Event::TrialEnded { trial, end } => {
@@ -451,7 +493,13 @@ fn describe(intent: &Intent) -> String {
         Intent::Cancel => "cancel the countdown".to_owned(),
         Intent::Skip => "skip the proposal".to_owned(),
         Intent::Override { parameter, value } => format!("override {parameter} = {value}"),
+        Intent::OverrideGain { gain, value } => format!("set the gain {gain} = {value}"),
         Intent::ClearOverrides => "clear the overrides".to_owned(),
+        Intent::Fix { parameter, value, trials } => format!("fix {parameter} = {value} for {trials} trials"),
+        Intent::Unfix { parameter } => format!("search {parameter} again"),
+        Intent::NarrowBounds { parameter, low, high } => format!("search {parameter} from {low} to {high}"),
+        Intent::ConfirmBest { repeats: 0 } => "end the repeats".to_owned(),
+        Intent::ConfirmBest { repeats } => format!("confirm the best with {repeats} repeats"),
         Intent::Judge(verdict) => verdict.name().to_owned(),
         Intent::Rerun { trial: None } => "re-run".to_owned(),
         Intent::Rerun { trial: Some(trial) } => format!("re-run trial {trial}"),

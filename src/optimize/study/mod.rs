@@ -23,6 +23,7 @@ use jiff::Timestamp;
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
+use std::time::Duration;
 
 /// Trial system attribute: seed of the streams and how far they had been read when the trial began.
 pub const DRAWS: &str = "quadfrog:draws";
@@ -170,6 +171,23 @@ impl Study {
         }
     }
 
+    /// Searches `space` from now on; its parameters must be those of before, only bounds may differ. As in Optuna, a
+    /// parameter whose bounds have changed leaves the joint space and is sampled by itself from then on; earlier trials
+    /// outside the new bounds stay in the history.
+    ///
+    /// # Errors
+    /// [`StudyError::Incompatible`] if the scale of a parameter differs from the stored one. The old space stands then.
+    pub fn search(&mut self, space: Space) -> Result<(), StudyError> {
+        let before = std::mem::replace(&mut self.options.space, space);
+        self.check_compatible().inspect_err(|_| self.options.space = before)
+    }
+
+    /// The draft for another waiting trial: one that was queued in a fork, and then in this study too.
+    pub fn redirected(&self, draft: &Draft, waiting: u32) -> Result<Draft, StudyError> {
+        let id = self.trial(waiting)?.id;
+        Ok(Draft { number: waiting, waiting: Some(id), ..draft.clone() })
+    }
+
     /// Begins the trial of a draft: from here on it is running, in the journal too. Values in `overrides` replace those of
     /// the draft and are recorded as fixed; the others are as drafted. A draft of which everything is given uses no random
     /// numbers. Returns the number of the trial.
@@ -184,6 +202,21 @@ impl Study {
         overrides: &[(String, f64)],
         attributes: &[(String, Value)],
     ) -> Result<u32, StudyError> {
+        self.begin_if(draft, overrides, attributes, |_| true)
+    }
+
+    /// [`Study::begin`] if `room` says, of all trials at the very moment, that there is room for one more: workers on a
+    /// shared journal can keep a budget to the trial.
+    ///
+    /// # Errors
+    /// As [`Study::begin`]; [`StudyError::Full`] if there is no room.
+    pub fn begin_if(
+        &mut self,
+        draft: &Draft,
+        overrides: &[(String, f64)],
+        attributes: &[(String, Value)],
+        room: impl Fn(&[Trial]) -> bool,
+    ) -> Result<u32, StudyError> {
         self.check_parameters(overrides)?;
         let stale = || StudyError::StaleDraft { trial: draft.number };
         if draft.before != self.streams.draws() || draft.seed != self.options.sampler.seed {
@@ -196,6 +229,9 @@ impl Study {
         let (study, seed) = (self.id, draft.seed);
         let mut id = 0;
         self.journal.commit(|replay| {
+            if !replay.studies().get(study).is_some_and(|record| room(&record.trials)) {
+                return Err(StudyError::Full);
+            }
             let now = Timestamp::now();
             let mut operations = Vec::new();
             match draft.waiting {
@@ -287,15 +323,33 @@ impl Study {
     /// # Errors
     /// [`StudyError::UnknownParameter`] or [`StudyError::Value`] for a parameter that cannot be.
     pub fn enqueue(&mut self, parameters: &[(String, f64)], attributes: &[(String, Value)]) -> Result<u32, StudyError> {
+        let queued = self.enqueue_unless(parameters, attributes, |_| false)?;
+        queued.ok_or_else(|| StudyError::Gone(self.options.name.clone()))
+    }
+
+    /// [`Study::enqueue`] unless `done` says, of all trials at the very moment, that it is not needed any more: of several
+    /// programs that see the same need one queues. None if it was not needed.
+    ///
+    /// # Errors
+    /// As [`Study::enqueue`].
+    pub fn enqueue_unless(
+        &mut self,
+        parameters: &[(String, f64)],
+        attributes: &[(String, Value)],
+        done: impl Fn(&[Trial]) -> bool,
+    ) -> Result<Option<u32>, StudyError> {
         self.check_parameters(parameters)?;
         let fixed: Map<String, Value> = parameters.iter().map(|(n, v)| (n.clone(), Value::from(*v))).collect();
         let user: Map<String, Value> = attributes.iter().cloned().collect();
         let template = Some(Box::new(Template::waiting(fixed, user)));
-        let create = Operation::CreateTrial { study: self.id, started: None, template };
-        let effects = self.journal.commit(|_| Ok::<_, JournalError>(vec![create.clone()]))?;
+        let study = self.id;
+        let create = Operation::CreateTrial { study, started: None, template };
+        let effects = self.journal.commit(|replay| {
+            let needed = replay.studies().get(study).is_some_and(|record| !done(&record.trials));
+            Ok::<_, JournalError>(if needed { vec![create.clone()] } else { Vec::new() })
+        })?;
         let created = effects.iter().find_map(|e| if let Effect::Created(id) = e { Some(*id) } else { None });
-        let trial = created.and_then(|id| self.journal.replay().trial(id));
-        trial.map(|t| t.number).ok_or_else(|| StudyError::Gone(self.options.name.clone()))
+        Ok(created.and_then(|id| self.journal.replay().trial(id)).map(|t| t.number))
     }
 
     /// Sets user attributes of the study itself.
@@ -336,6 +390,13 @@ impl Study {
     /// Trials that have begun and not ended: of other workers, or left by a session that was killed.
     pub fn running(&self) -> impl Iterator<Item = &Trial> {
         self.trials().iter().filter(|t| t.state == TrialState::Running)
+    }
+
+    /// For how long a trial has been running, by this machine's clock; none if nobody has said when it began. A clock that
+    /// was set back makes it 0.
+    pub fn age(trial: &Trial) -> Option<Duration> {
+        let elapsed = Timestamp::now().duration_since(trial.started?);
+        Some(Duration::try_from(elapsed).unwrap_or_default())
     }
 
     /// Trials that wait to be run, in the order in which they will be.

@@ -18,6 +18,7 @@ use quadfrog::recording::record::{Measured, Record, Stamped, TrialRecord, Verdic
 use quadfrog::recording::writer::Writer;
 use quadfrog::report::table;
 use quadfrog::robot::description::RobotDescription;
+use quadfrog::session::approval::Approval;
 use quadfrog::session::automatic;
 use quadfrog::session::rollout::Rollout;
 use quadfrog::sim::Simulator;
@@ -151,6 +152,7 @@ fn run_one(
         trials: arguments.study.trials,
         folder: Some(study.folder.clone()),
         observe: false,
+        approve: Approval::Each,
     };
     let settings = config.settings(robot, study.task, Backend::Simulator)?;
     let simulator = Simulator::new(robot, &config.simulator).map_err(EngineError::from)?;

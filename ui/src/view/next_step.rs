@@ -165,6 +165,7 @@ fn in_dialog(model: &Model, dialog: &Dialog) -> NextStep {
         }
         Dialog::Field { .. } => plain("Enter confirms, Esc cancels.".to_owned()),
         Dialog::Palette { .. } => plain("Type to filter, Up Down choose, Enter does it, Esc closes.".to_owned()),
+        Dialog::Choose { .. } => plain("Up Down choose, x switches it on or off, Enter closes.".to_owned()),
         Dialog::Help { .. } => plain("Up Down scroll, any other key closes.".to_owned()),
         Dialog::Details { .. } => plain("Up Down other trials, Esc closes.".to_owned()),
     }
