@@ -71,7 +71,7 @@ const LIVE: &[Row] = &[
     row(Action::Fix, "X", Shows("Fix f0 at"), ("3\r", "fixed at")),
     row(Action::Fix, "X", Hides("fixed at"), ("", "")),
     row(Action::Bounds, "B", Shows("Search f0 from .. to"), ("\x151.0..1.5\r", "began 0.750..1.750")),
-    row(Action::QueuePoint, "Q", Shows("queue the point"), ("1", "8 s sweep")),
+    row(Action::QueuePoint, "Q", Shows("queue f0 ="), ("1", "8 s sweep")),
     row(Action::Interrupt, "Ctrl-C", Shows("Ctrl-C again within 2 s quits"), ("", "DAMPED")),
     row(Action::Quit, "q", Shows("The study and its recording are in"), ("", "")),
 ];
