@@ -12,7 +12,7 @@ use std::time::Duration;
 use serde_json::json;
 
 use crate::config::{Backend, Config, ConfigError};
-use crate::optimize::journal::{Durability, Journal, JournalFile, LOCK_GRACE};
+use crate::optimize::journal::{Durability, StudyRecord};
 use crate::optimize::sampler::Direction;
 use crate::optimize::space::{Range, Space, SpaceError};
 use crate::optimize::study::{Storage, Study, StudyError, StudyOptions};
@@ -29,7 +29,7 @@ use crate::robot::go1::Go1;
 use crate::robot::go1::link::LinkError;
 use crate::robot::{Placement, Robot};
 use crate::session::approval::Approval;
-use crate::session::intent::Intent;
+use crate::session::intent::{Intent, Wish};
 use crate::session::life::{Life, Plan};
 use crate::session::pre_arm::PreArmList;
 use crate::session::supervisor::{Outlets, Parts, Supervisor};
@@ -55,6 +55,30 @@ pub struct Options {
     pub observe: bool,
     /// Who approves and judges.
     pub approve: Approval,
+    /// A journal in which to take part as one more worker, instead of the study of the folder.
+    pub join: Option<Storage>,
+}
+
+impl Options {
+    /// A study of `task` with seed 0 that keeps nothing and in which a person approves and judges.
+    pub fn new(config: Config, robot: RobotDescription, backend: Backend, task: Task) -> Options {
+        Options {
+            config,
+            robot,
+            backend,
+            task,
+            seed: 0,
+            trials: None,
+            folder: None,
+            observe: false,
+            approve: Approval::Each,
+            join: None,
+        }
+    }
+
+    fn budget(&self) -> u32 {
+        self.trials.unwrap_or(self.config.optimize.trials)
+    }
 }
 
 /// Why an engine does not start.
@@ -114,15 +138,16 @@ pub fn open_life(options: &Options, durability: Durability, recording: &str) -> 
     let space = Space::new(parameters.iter().map(|p| (p.name.clone(), Range::linear(p.low, p.high))))?;
     let mut sampler = options.config.optimize.sampler.clone();
     sampler.seed = options.seed;
-    let storage = match &options.folder {
-        Some(folder) => Storage::File(folder.join(STUDY_FILE)),
-        None => Storage::Memory,
+    let storage = match (&options.join, &options.folder) {
+        (Some(storage), _) => storage.clone(),
+        (None, Some(folder)) => Storage::File(folder.join(STUDY_FILE)),
+        (None, None) => Storage::Memory,
     };
-    let name = format!("{}-seed{}", options.task.name(), options.seed);
-    let study = Study::open(
+    let budget = options.budget();
+    let mut study = Study::open(
         storage,
         StudyOptions {
-            name,
+            name: study_name(options.task, options.seed),
             direction: Direction::Maximize,
             metric: format!("J_{} ({})", options.task.name(), options.task.unit()),
             space,
@@ -133,25 +158,38 @@ pub fn open_life(options: &Options, durability: Durability, recording: &str) -> 
                 ("seed".to_owned(), json!(options.seed)),
                 ("sampler".to_owned(), json!(options.config.optimize.sampler)),
                 ("version".to_owned(), json!(env!("CARGO_PKG_VERSION"))),
+                (BUDGET.to_owned(), json!(budget)),
             ],
             durability,
         },
     )?;
+    let worker = if options.join.is_some() { study.join()? } else { 0 };
+    if worker == 0 && study.attributes().get(BUDGET) != Some(&json!(budget)) {
+        study.annotate_study(&[(BUDGET.to_owned(), json!(budget))])?;
+    }
     let plan = Plan {
         task: options.task,
         control: *options.config.task(options.task),
         parameters,
         seed: u64::from(options.seed),
-        budget: options.trials.unwrap_or(options.config.optimize.trials),
+        budget,
         recording: recording.to_owned(),
         widest: options.config.widest(options.task),
         gains: options.config.gains(),
         contenders: options.config.optimize.confirm.contenders,
         confidence: options.config.optimize.confirm.confidence,
-        worker: 0,
+        worker,
         abandoned: Duration::from_secs_f64(options.config.optimize.workers.abandoned_s),
     };
     Ok(Life::open(plan, study)?)
+}
+
+/// Study attribute: how many trials are to count. Workers that join know it from here.
+const BUDGET: &str = "budget";
+
+/// The name of a study in its journal.
+pub fn study_name(task: Task, seed: u32) -> String {
+    format!("{}-seed{seed}", task.name())
 }
 
 /// What a session of `options` is called in its recording.
@@ -168,9 +206,13 @@ pub fn session_info(options: &Options, recording: &str) -> SessionInfo {
         unit: options.task.unit().to_owned(),
         sampler: format!("{:?}", options.config.optimize.sampler.kind).to_lowercase(),
         seed: u64::from(options.seed),
-        budget: options.trials.unwrap_or(options.config.optimize.trials),
+        budget: options.budget(),
         parameters: options.config.parameters(options.task),
-        study: options.folder.as_ref().map(|folder| folder.join(STUDY_FILE).display().to_string()).unwrap_or_default(),
+        study: match (&options.join, &options.folder) {
+            (Some(storage), _) => storage.to_string(),
+            (None, Some(folder)) => folder.join(STUDY_FILE).display().to_string(),
+            (None, None) => String::new(),
+        },
         recording: recording.to_owned(),
         started: jiff::Timestamp::now().to_string(),
         observe: options.observe,
@@ -293,8 +335,8 @@ impl Engine {
         let (control_end, session_end, screen_end, tick_end) = channels();
         let (to_recorder, recorder_records) = channel();
         let (to_screen, screen_records) = channel();
-        let (trial_ticks_in, trial_ticks) = channel();
-        let recorder = Recorder::spawn(tick_end, recorder_records, writer, trial_ticks_in);
+        let (handed_in, handed) = channel();
+        let recorder = Recorder::spawn(tick_end, recorder_records, writer, handed_in);
         let outlets = Outlets { recorder: to_recorder, screen: to_screen };
         let status = recorder.watch();
         let closing = Arc::new(AtomicBool::new(false));
@@ -311,7 +353,7 @@ impl Engine {
         let (intents_in, intents) = channel();
         let folder = recording.as_ref().and(options.folder.clone());
         let pre_arm = PreArmList::new(&settings, fingerprint(&options.config), folder);
-        let parts = Parts { life, control: session_end, trial_ticks, outlets, recorder: status, pre_arm, info };
+        let parts = Parts { life, control: session_end, handed, outlets, recorder: status, pre_arm, info };
         let simulated = options.backend == Backend::Simulator;
         let supervisor = Supervisor::new(parts, clock.now_ns()).approving(options.approve, simulated);
         let sits_down = options.backend == Backend::Hardware;
@@ -325,6 +367,7 @@ impl Engine {
             recording,
             _prepared: prepared,
             intents: Some(intents_in),
+            clock,
             records: screen_records,
             closing,
             control: Some(control),
@@ -340,14 +383,14 @@ const SESSION_PERIOD: Duration = Duration::from_millis(5);
 const LONGEST_GOODBYE: Duration = Duration::from_secs(6);
 
 /// The session thread: intents as they come, events every few milliseconds, until the screen lets go of its handle.
-fn run_session(mut supervisor: Supervisor, intents: &Receiver<(Intent, u64)>, clock: &MonotonicClock, sits_down: bool) {
+fn run_session(mut supervisor: Supervisor, intents: &Receiver<Wish>, clock: &MonotonicClock, sits_down: bool) {
     loop {
         supervisor.attend(clock.now_ns());
         if supervisor.mode() == Mode::Observe {
             supervisor.take_control();
         }
         match intents.recv_timeout(SESSION_PERIOD) {
-            Ok((intent, stops)) => supervisor.carry_out(&intent, stops, clock.now_ns()),
+            Ok(wish) => supervisor.carry_out(&wish, clock.now_ns()),
             Err(RecvTimeoutError::Timeout) => {}
             Err(RecvTimeoutError::Disconnected) => break,
         }
@@ -366,7 +409,8 @@ pub struct Handle {
     screen: ScreenEnd,
     recording: Option<PathBuf>,
     _prepared: Prepared,
-    intents: Option<Sender<(Intent, u64)>>,
+    intents: Option<Sender<Wish>>,
+    clock: MonotonicClock,
     records: Receiver<Stamped>,
     closing: Arc<AtomicBool>,
     control: Option<JoinHandle<()>>,
@@ -409,7 +453,8 @@ impl Handle {
     pub fn wish(&self, intent: Intent) {
         if let Some(intents) = &self.intents {
             // A session that has ended answers nothing; the screen sees that its records end.
-            let _ = intents.send((intent, self.screen.stop.count()));
+            let wish = Wish { intent, stops: self.screen.stop.count(), time_ns: self.clock.now_ns() };
+            let _ = intents.send(wish);
         }
     }
 
@@ -457,7 +502,7 @@ impl Drop for Handle {
     }
 }
 
-/// A study that is on disk.
+/// A study of this program that is on disk, or on a server.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct StoredStudy {
     /// Its task.
@@ -466,6 +511,18 @@ pub struct StoredStudy {
     pub seed: u32,
     /// The robot model that it was made with.
     pub robot: String,
+    /// How many trials are to count; none where an older version made it.
+    pub budget: Option<u32>,
+}
+
+/// The studies of this program that `storage` holds; a file that does not exist holds none.
+///
+/// # Errors
+/// When it cannot be read.
+pub fn stored_studies(storage: &Storage) -> Result<Vec<StoredStudy>, EngineError> {
+    let journal = storage.journal(Durability::Synced).map_err(StudyError::from)?;
+    let living = journal.replay().studies().iter().filter(|study| !study.deleted);
+    Ok(living.filter_map(stored).collect())
 }
 
 /// What study `file` holds.
@@ -473,13 +530,17 @@ pub struct StoredStudy {
 /// # Errors
 /// When the file cannot be read or holds no study of this program.
 pub fn stored_study(file: &Path) -> Result<StoredStudy, EngineError> {
-    let journal_file = JournalFile::new(file, Durability::Synced, LOCK_GRACE).map_err(StudyError::from)?;
-    let journal = Journal::open(journal_file).map_err(StudyError::from)?;
-    let ours = journal.replay().studies().iter().find_map(|study| {
-        let task = Task::from_name(study.user_attributes.get("task")?.as_str()?)?;
-        let seed = u32::try_from(study.user_attributes.get("seed")?.as_u64()?).ok()?;
-        let robot = study.user_attributes.get("robot")?.as_str()?.to_owned();
-        Some(StoredStudy { task, seed, robot })
-    });
-    ours.ok_or_else(|| EngineError::NoStudy { file: file.to_owned() })
+    let studies = stored_studies(&Storage::File(file.to_owned()))?;
+    studies.into_iter().next().ok_or_else(|| EngineError::NoStudy { file: file.to_owned() })
+}
+
+fn stored(study: &StudyRecord) -> Option<StoredStudy> {
+    let attribute = |name: &str| study.user_attributes.get(name);
+    let number = |name: &str| u32::try_from(attribute(name)?.as_u64()?).ok();
+    Some(StoredStudy {
+        task: Task::from_name(attribute("task")?.as_str()?)?,
+        seed: number("seed")?,
+        robot: attribute("robot")?.as_str()?.to_owned(),
+        budget: number(BUDGET),
+    })
 }

@@ -12,8 +12,8 @@ use super::merge::merge;
 use super::safety::SafetyFile;
 use crate::control::estimator::GRAVITY;
 use crate::control::leg::stance_of;
-use crate::control::settings::{Ramp, Settings, Settle, Stand, TaskControl};
-use crate::optimize::sampler::SamplerConfig;
+use crate::control::settings::{EstimatorSettings, ObjectiveSource, Ramp, Settings, Settle, Stand, TaskControl};
+use crate::optimize::sampler::{SamplerConfig, SamplerKind};
 use crate::realtime::command::Task;
 use crate::recording::record::ParameterInfo;
 use crate::robot::Leg;
@@ -33,7 +33,7 @@ const FILES: [(&str, &str); 5] = [
 const GAINS: [(&str, &str); 4] = [("kp", "N/m"), ("kd", "N s/m"), ("kd_joint", "N m s/rad"), ("k_att", "N/m")];
 
 /// Keys that may be given though the defaults leave them out, each with an example of its kind.
-const OPTIONAL: [(&str, &str); 1] = [("optimize.toml", "[sampler]\nstartup_trials = 10\n")];
+const OPTIONAL: [(&str, &str); 1] = [("optimize.toml", "objective = \"truth\"\n[sampler]\nstartup_trials = 10\n")];
 
 /// Which machine stands behind the controller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -57,6 +57,8 @@ pub struct ControlFile {
     pub settle: Settle,
     /// When a foot is on the ground.
     pub contact: Contact,
+    /// How the base's state is estimated.
+    pub estimator: EstimatorSettings,
     /// What each task's trials run with.
     pub tasks: BTreeMap<String, TaskControl>,
 }
@@ -70,10 +72,10 @@ pub struct Countdown {
     pub hardware_s: f64,
 }
 
-/// When a foot is on the ground.
+/// When a foot is on the ground, by the simulator's own knowledge.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 pub struct Contact {
-    /// Least force at its sensor, N.
+    /// Least force of the ground on it, N.
     pub force_n: f64,
 }
 
@@ -82,6 +84,8 @@ pub struct Contact {
 pub struct OptimizeFile {
     /// Trials that count.
     pub trials: u32,
+    /// Name of what the objective is measured from; none takes what the backend has.
+    pub objective: Option<String>,
     /// Bounds of each parameter.
     pub bounds: BTreeMap<String, [f64; 2]>,
     /// Which parameters each task optimizes.
@@ -190,6 +194,20 @@ impl Config {
         Ok(config)
     }
 
+    /// Another sampler than the file says; the configuration that is kept says so too.
+    pub fn choose_sampler(&mut self, kind: SamplerKind) {
+        self.optimize.sampler.kind = kind;
+        let name = toml::Value::try_from(kind);
+        let kept = self.as_run.iter_mut().find(|(file, _)| file == "optimize.toml");
+        if let (Ok(name), Some((_, text))) = (name, kept)
+            && let Ok(mut table) = text.parse::<Table>()
+            && let Some(toml::Value::Table(sampler)) = table.get_mut("sampler")
+        {
+            sampler.insert("kind".to_owned(), name);
+            *text = table.to_string();
+        }
+    }
+
     /// What `task`'s trials run with.
     pub fn task(&self, task: Task) -> &TaskControl {
         // `check` has seen that every task is there.
@@ -228,10 +246,32 @@ impl Config {
             .collect()
     }
 
+    /// What the objective is measured from: as chosen, or else the truth on the simulator and the estimate on hardware.
+    ///
+    /// # Errors
+    /// When it is something else than those two, or the truth is asked of hardware, which does not know it.
+    pub fn objective(&self, backend: Backend) -> Result<ObjectiveSource, ConfigError> {
+        let refuse = |name: &str, reason| self.refuse("optimize.toml", "objective", format!("\"{name}\""), reason);
+        let Some(name) = &self.optimize.objective else {
+            return Ok(match backend {
+                Backend::Simulator => ObjectiveSource::Truth,
+                Backend::Hardware => ObjectiveSource::Estimate,
+            });
+        };
+        match (ObjectiveSource::from_name(name), backend) {
+            (None, _) => Err(refuse(name, "must be \"truth\" or \"estimate\", or be left out")),
+            (Some(ObjectiveSource::Truth), Backend::Hardware) => Err(refuse(
+                name,
+                "a robot does not know the truth, only a simulator does; take \"estimate\" or leave it out",
+            )),
+            (Some(source), _) => Ok(source),
+        }
+    }
+
     /// What the control cycle is made with.
     ///
     /// # Errors
-    /// When the stance of `task` is out of the robot's reach.
+    /// When the stance of `task` is out of the robot's reach, or the objective cannot be measured on `backend`.
     pub fn settings(&self, robot: &RobotDescription, task: Task, backend: Backend) -> Result<Settings, ConfigError> {
         let chosen = self.task(task);
         self.check_stance(robot, task)?;
@@ -241,6 +281,8 @@ impl Config {
         Ok(Settings {
             geometry: robot.leg_geometry,
             hip_origin_body: Leg::ALL.map(|leg| robot.legs[leg as usize].joint_origin[0]),
+            imu_origin_body: robot.imu_origin,
+            foot_radius: robot.legs[0].foot_radius,
             min_position,
             max_position,
             max_torque: robot.limits.max_torque,
@@ -256,6 +298,8 @@ impl Config {
             fall: self.safety.fall,
             flight_tilt_rad: if hardware { fall.hardware_flight_rad } else { fall.simulator_flight_rad },
             contact_force_n: self.control.contact.force_n,
+            objective: self.objective(backend)?,
+            estimator: self.control.estimator,
             gate: self.safety.gate,
             hardware,
             pre_arm: self.safety.pre_arm,
@@ -335,11 +379,18 @@ impl Config {
             let reason = "must be 0 to 60 s";
             return Err(self.refuse(FILE, "countdown.simulator_s", control.countdown.simulator_s, reason));
         }
+        let estimator = &control.estimator;
+        positive.extend(estimator.numbers().map(|(key, value)| (format!("estimator.{key}"), value)));
+        if estimator.contact_off_n >= estimator.contact_on_n {
+            let reason = format!("must be below estimator.contact_on_n = {}", estimator.contact_on_n);
+            return Err(self.refuse(FILE, "estimator.contact_off_n", estimator.contact_off_n, reason));
+        }
         self.all_positive(FILE, &positive)
     }
 
     fn check_optimize(&self) -> Result<(), ConfigError> {
         const FILE: &str = "optimize.toml";
+        self.objective(Backend::Simulator)?;
         if self.optimize.trials == 0 {
             return Err(self.refuse(FILE, "trials", 0, "a study needs at least one trial"));
         }

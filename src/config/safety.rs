@@ -113,6 +113,8 @@ impl Config {
                 f64::from(watchdog.state_age_ms),
             ),
             ("watchdog.stance_tilt_rad", watchdog.stance_tilt_rad, "watchdog.tilt_rad", watchdog.tilt_rad),
+            ("fall.roll_rad", fall.roll_rad, "watchdog.tilt_rad", watchdog.tilt_rad),
+            ("fall.pitch_rad", fall.pitch_rad, "watchdog.tilt_rad", watchdog.tilt_rad),
         ] {
             if value > limit {
                 return Err(self.refuse(FILE, key, value, format!("must not be above {stops} = {limit}")));

@@ -173,6 +173,89 @@ pub struct Watchdog {
     pub hardware_idle_s: f64,
 }
 
+/// Where the base's position, velocity and orientation come from, and with them the objective.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ObjectiveSource {
+    /// The simulator's own knowledge.
+    Truth,
+    /// The sensors, as on hardware.
+    Estimate,
+}
+
+impl ObjectiveSource {
+    /// The word that `config/optimize.toml` has for it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            ObjectiveSource::Truth => "truth",
+            ObjectiveSource::Estimate => "estimate",
+        }
+    }
+
+    /// The source of that name.
+    pub fn from_name(name: &str) -> Option<ObjectiveSource> {
+        [ObjectiveSource::Truth, ObjectiveSource::Estimate].into_iter().find(|source| source.name() == name)
+    }
+}
+
+/// How the sensors are weighed against each other: section `[estimator]` of `config/control.toml`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct EstimatorSettings {
+    /// Force from which a foot in the air is down, N.
+    pub contact_on_n: f64,
+    /// Force below which a foot on the ground is in the air, N.
+    pub contact_off_n: f64,
+    /// How long the sensor must have said so, s.
+    pub contact_time_s: f64,
+    /// Standard deviation of an accelerometer sample at 1 kHz, m/s^2.
+    pub accel_noise_m_s2: f64,
+    /// Its error in proportion to the acceleration.
+    pub accel_error_share: f64,
+    /// Standard deviation of the accelerometer's bias before anything is known of it, m/s^2.
+    pub accel_bias_m_s2: f64,
+    /// How fast the bias wanders, m/s^2 per square root of a second.
+    pub accel_bias_walk: f64,
+    /// Standard deviation of a foot's place by encoders and orientation, m.
+    pub foot_position_m: f64,
+    /// Standard deviation of a foot's velocity by encoders and gyro, m/s.
+    pub foot_velocity_m_s: f64,
+    /// Its error in proportion to the velocity.
+    pub foot_velocity_share: f64,
+    /// How fast a standing foot creeps, m per square root of a second.
+    pub foot_creep: f64,
+    /// A foot that disagrees by more standard deviations than this slips.
+    pub gate_sigma: f64,
+    /// Standard deviation of the velocity where nothing is known of it, m/s.
+    pub start_velocity_m_s: f64,
+    /// All feet down may slip for this long; then the velocity is forgotten, s.
+    pub longest_slip_s: f64,
+    /// No foot down for longer than this is no flight: the robot hangs, s.
+    pub longest_flight_s: f64,
+}
+
+impl EstimatorSettings {
+    /// Every number with its key.
+    pub fn numbers(&self) -> [(&'static str, f64); 15] {
+        [
+            ("contact_on_n", self.contact_on_n),
+            ("contact_off_n", self.contact_off_n),
+            ("contact_time_s", self.contact_time_s),
+            ("accel_noise_m_s2", self.accel_noise_m_s2),
+            ("accel_error_share", self.accel_error_share),
+            ("accel_bias_m_s2", self.accel_bias_m_s2),
+            ("accel_bias_walk", self.accel_bias_walk),
+            ("foot_position_m", self.foot_position_m),
+            ("foot_velocity_m_s", self.foot_velocity_m_s),
+            ("foot_velocity_share", self.foot_velocity_share),
+            ("foot_creep", self.foot_creep),
+            ("gate_sigma", self.gate_sigma),
+            ("start_velocity_m_s", self.start_velocity_m_s),
+            ("longest_slip_s", self.longest_slip_s),
+            ("longest_flight_s", self.longest_flight_s),
+        ]
+    }
+}
+
 /// What the trials of one task run with: a section `[tasks.<task>]` of `config/control.toml`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -214,6 +297,10 @@ pub struct Settings {
     pub geometry: LegGeometry,
     /// Hip joints in the body frame, m.
     pub hip_origin_body: PerLeg<Vector3<f64>>,
+    /// Where the inertial unit sits, body frame, m.
+    pub imu_origin_body: Vector3<f64>,
+    /// Radius of a foot, m.
+    pub foot_radius: f64,
     /// Lowest joint angles, rad: the higher of the URDF's and the maker's own.
     pub min_position: Joints,
     /// Highest joint angles, rad: the lower of the URDF's and the maker's own.
@@ -240,8 +327,12 @@ pub struct Settings {
     pub fall: Fall,
     /// Largest absolute roll or pitch with no foot down, rad.
     pub flight_tilt_rad: f64,
-    /// Least force at a foot's sensor that counts as contact, N.
+    /// Least force on a foot that counts as contact where the truth is known, N.
     pub contact_force_n: f64,
+    /// Where the base's state comes from.
+    pub objective: ObjectiveSource,
+    /// How it is estimated from the sensors.
+    pub estimator: EstimatorSettings,
     /// The last gate.
     pub gate: Gate,
     /// A machine that can hurt somebody: the whole pre-arm list holds.

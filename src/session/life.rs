@@ -258,7 +258,16 @@ impl Life {
         };
         row.verdict = Some(verdict);
         row.value = value;
-        self.write_judgement(trial, rerun)?;
+        match self.write_judgement(trial, rerun) {
+            // It took so long that another worker has closed it and queued it again, or somebody has ended it by hand.
+            Err(StudyError::State { .. }) => {
+                self.log(format!("trial {trial} was ended by somebody else meanwhile: what they say stands"));
+                self.rows.remove(&trial);
+                self.stage = Stage::Finished;
+                return Ok(self.propose()?);
+            }
+            written => written?,
+        }
         self.show_row(trial);
         self.pending = Some(Pending { trial, outcome, rerun });
         self.propose()?;

@@ -182,7 +182,7 @@ impl Emulator {
             status: EmulatorStatus::default(),
             shared: Arc::default(),
         };
-        emulator.place();
+        emulator.lay_down();
         Ok(emulator)
     }
 
@@ -229,13 +229,18 @@ impl Emulator {
             Fault::Speed { joint, radians_per_s } => defects.speed[joint] = Some(radians_per_s),
             Fault::NotANumber { joint } => defects.angle[joint] = Some(f64::NAN),
             Fault::Tilt(radians) => defects.tilt_rad = radians,
-            Fault::Place => self.place(),
+            Fault::Place => self.lay_down(),
             Fault::Clear => {
                 self.conditions = Conditions::default();
                 self.defects = Defects::default();
             }
         }
         self.status.faults += 1;
+    }
+
+    /// Puts the robot on its mark in any pose.
+    pub fn place(&mut self, placement: &Placement) {
+        self.simulator.place(placement);
     }
 
     /// One millisecond: commands in, motors and body, a state out.
@@ -359,10 +364,9 @@ impl Emulator {
     }
 
     /// A person puts the robot on its mark, lying.
-    fn place(&mut self) {
-        let placement =
-            Placement { joint_position: self.lying_position, lying: true, seed: self.seed.wrapping_add(self.placed) };
-        self.simulator.place(&placement);
+    fn lay_down(&mut self) {
+        let seed = self.seed.wrapping_add(self.placed);
+        self.place(&Placement { joint_position: self.lying_position, lying: true, seed });
         self.placed += 1;
     }
 }

@@ -324,8 +324,11 @@ fn may_sit_down(model: &Model) -> Legality {
     }
 }
 
-fn may_acknowledge(model: &Model) -> Legality {
-    may_wish(model)?;
+/// Whether there is something to acknowledge. An observer may, too: STOP is everybody's, and so is letting go afterwards.
+pub fn may_acknowledge(model: &Model) -> Legality {
+    if !model.session.observe {
+        may_wish(model)?;
+    }
     match model.mode() {
         Mode::Damped | Mode::Fault => Ok(()),
         _ => refuse("nothing waits to be acknowledged"),

@@ -14,7 +14,7 @@ use quadfrog::recording::record::{Level, Stamped};
 use quadfrog::recording::recorder::RecorderStatus;
 use quadfrog::session::intent::Intent;
 
-use crate::action::{Action, may_wish};
+use crate::action::{Action, may_acknowledge, may_wish};
 use crate::dialog::{self, Dialog};
 use crate::keymap::Key;
 use crate::model::{Message, Model, ReplayStatus};
@@ -226,7 +226,8 @@ fn interrupt(model: &mut Model) -> Vec<Effect> {
 
 /// Asks the session, if this console may ask at all: the one gate for replays and observers.
 pub fn wish(model: &mut Model, intent: Intent) -> Vec<Effect> {
-    match may_wish(model) {
+    let allowed = if intent == Intent::Acknowledge { may_acknowledge(model) } else { may_wish(model) };
+    match allowed {
         Ok(()) => vec![Effect::Wish(intent)],
         Err(reason) => {
             say(model, Level::Warning, format!("refused: {reason}"));

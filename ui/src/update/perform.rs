@@ -6,7 +6,7 @@ use quadfrog::session::intent::Intent;
 
 use super::navigate::{filter, freeze, ghost, move_by, move_cursor, next_mode, next_series, next_sort, zoom};
 use super::{Effect, ReplayCommand, interrupt, say, stop, wish};
-use crate::action::{Action, may_wish};
+use crate::action::{Action, may_acknowledge, may_wish};
 use crate::dialog::{Choice, Dialog, OverrideForm, Purpose};
 use crate::model::{Model, View};
 
@@ -181,7 +181,7 @@ fn queue_point(model: &mut Model) -> Vec<Effect> {
 
 /// Enter: what lies nearest, as long as nothing moves by it.
 fn open_details(model: &mut Model) -> Vec<Effect> {
-    if matches!(model.mode(), Mode::Damped | Mode::Fault) && may_wish(model).is_ok() {
+    if may_acknowledge(model).is_ok() {
         return wish(model, Intent::Acknowledge);
     }
     if model.view == View::Override && Action::Override.legal(model).is_ok() {

@@ -30,7 +30,7 @@ pub fn next_step(model: &Model) -> NextStep {
     match &model.dialog {
         Some(dialog) => in_dialog(model, dialog),
         None if model.replay.is_some() => replay(model),
-        None if model.session.observe => {
+        None if model.session.observe && Action::Acknowledge.legal(model).is_err() => {
             step("Observing: this session can change nothing.", model, &[(Action::Quit, "quit")])
         }
         None => live(model),
