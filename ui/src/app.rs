@@ -248,10 +248,7 @@ impl Console {
 
     fn export_best(&mut self) {
         let written = export::best(&self.model);
-        self.say_written(written, |path| {
-            let path = path.display();
-            format!("written: {path}; quadfrog --config {path} searches around the best")
-        });
+        self.say_written(written, |path| format!("written: {}, for --config", path.display()));
     }
 
     fn say_written(&mut self, written: Result<PathBuf, ExportError>, words: impl FnOnce(&Path) -> String) {

@@ -66,12 +66,17 @@ fn identity(model: &Model, width: u16) -> Vec<Span<'static>> {
     if session.observe {
         spans.push(span(theme, Role::Warning, "OBSERVING  "));
     }
-    if !matches!(session.approve.as_str(), "" | "each") && model.replay.is_none() {
-        spans.push(span(theme, Role::Warning, format!("APPROVE {}  ", session.approve.to_uppercase())));
-    }
-    spans.push(Span::raw(session.task.clone()));
     // A narrow terminal has room for the best value only if the words are left out.
     let narrow = width < 100;
+    if !matches!(session.approve.as_str(), "" | "each") && model.replay.is_none() {
+        let approve = session.approve.to_uppercase();
+        spans.push(span(
+            theme,
+            Role::Warning,
+            if narrow { format!("{approve}  ") } else { format!("APPROVE {approve}  ") },
+        ));
+    }
+    spans.push(Span::raw(session.task.clone()));
     if let Some(info) = model.stage {
         let (finished, budget) = (model.counted(), model.budget());
         let text = match narrow {
