@@ -3,8 +3,10 @@
 
 mod checked;
 mod merge;
+mod safety;
 
-pub use checked::{Backend, Config, ControlFile, OptimizeFile, SafetyFile};
+pub use checked::{Backend, Config, ConfirmFile, ControlFile, OptimizeFile, WorkersFile};
+pub use safety::SafetyFile;
 
 use std::path::PathBuf;
 

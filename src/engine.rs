@@ -12,7 +12,7 @@ use std::time::Duration;
 use serde_json::json;
 
 use crate::config::{Backend, Config, ConfigError};
-use crate::optimize::journal::{Durability, Journal, JournalFile, LOCK_GRACE};
+use crate::optimize::journal::{Durability, StudyRecord};
 use crate::optimize::sampler::Direction;
 use crate::optimize::space::{Range, Space, SpaceError};
 use crate::optimize::study::{Storage, Study, StudyError, StudyOptions};
@@ -25,10 +25,14 @@ use crate::recording::record::{Record, SessionInfo, Stamped};
 use crate::recording::recorder::Recorder;
 use crate::recording::writer::Writer;
 use crate::robot::description::RobotDescription;
+use crate::robot::go1::Go1;
+use crate::robot::go1::link::LinkError;
 use crate::robot::{Placement, Robot};
-use crate::session::intent::Intent;
+use crate::session::approval::Approval;
+use crate::session::intent::{Intent, Wish};
 use crate::session::life::{Life, Plan};
-use crate::session::supervisor::{Outlets, Supervisor};
+use crate::session::pre_arm::PreArmList;
+use crate::session::supervisor::{Outlets, Parts, Supervisor};
 use crate::sim::{SimError, Simulator};
 
 /// What an engine is started with.
@@ -49,6 +53,32 @@ pub struct Options {
     pub folder: Option<PathBuf>,
     /// Whether the session only looks.
     pub observe: bool,
+    /// Who approves and judges.
+    pub approve: Approval,
+    /// A journal in which to take part as one more worker, instead of the study of the folder.
+    pub join: Option<Storage>,
+}
+
+impl Options {
+    /// A study of `task` with seed 0 that keeps nothing and in which a person approves and judges.
+    pub fn new(config: Config, robot: RobotDescription, backend: Backend, task: Task) -> Options {
+        Options {
+            config,
+            robot,
+            backend,
+            task,
+            seed: 0,
+            trials: None,
+            folder: None,
+            observe: false,
+            approve: Approval::Each,
+            join: None,
+        }
+    }
+
+    fn budget(&self) -> u32 {
+        self.trials.unwrap_or(self.config.optimize.trials)
+    }
 }
 
 /// Why an engine does not start.
@@ -60,6 +90,9 @@ pub enum EngineError {
     /// The simulator's configuration.
     #[error(transparent)]
     Simulator(#[from] SimError),
+    /// The link to the robot.
+    #[error(transparent)]
+    Link(#[from] LinkError),
     /// The search space.
     #[error(transparent)]
     Space(#[from] SpaceError),
@@ -69,6 +102,11 @@ pub enum EngineError {
     /// The recording.
     #[error(transparent)]
     Recording(#[from] RecordingError),
+    /// A robot that may hurt somebody is not left to itself.
+    #[error(
+        "--approve auto: only on the simulator; a jump of the robot is approved by a person: give each or falls-only"
+    )]
+    Unattended,
     /// A journal without a study of ours.
     #[error("{}: holds no study of this program; give one that it made", file.display())]
     NoStudy {
@@ -100,15 +138,16 @@ pub fn open_life(options: &Options, durability: Durability, recording: &str) -> 
     let space = Space::new(parameters.iter().map(|p| (p.name.clone(), Range::linear(p.low, p.high))))?;
     let mut sampler = options.config.optimize.sampler.clone();
     sampler.seed = options.seed;
-    let storage = match &options.folder {
-        Some(folder) => Storage::File(folder.join(STUDY_FILE)),
-        None => Storage::Memory,
+    let storage = match (&options.join, &options.folder) {
+        (Some(storage), _) => storage.clone(),
+        (None, Some(folder)) => Storage::File(folder.join(STUDY_FILE)),
+        (None, None) => Storage::Memory,
     };
-    let name = format!("{}-seed{}", options.task.name(), options.seed);
-    let study = Study::open(
+    let budget = options.budget();
+    let mut study = Study::open(
         storage,
         StudyOptions {
-            name,
+            name: study_name(options.task, options.seed),
             direction: Direction::Maximize,
             metric: format!("J_{} ({})", options.task.name(), options.task.unit()),
             space,
@@ -119,19 +158,38 @@ pub fn open_life(options: &Options, durability: Durability, recording: &str) -> 
                 ("seed".to_owned(), json!(options.seed)),
                 ("sampler".to_owned(), json!(options.config.optimize.sampler)),
                 ("version".to_owned(), json!(env!("CARGO_PKG_VERSION"))),
+                (BUDGET.to_owned(), json!(budget)),
             ],
             durability,
         },
     )?;
+    let worker = if options.join.is_some() { study.join()? } else { 0 };
+    if worker == 0 && study.attributes().get(BUDGET) != Some(&json!(budget)) {
+        study.annotate_study(&[(BUDGET.to_owned(), json!(budget))])?;
+    }
     let plan = Plan {
         task: options.task,
         control: *options.config.task(options.task),
         parameters,
         seed: u64::from(options.seed),
-        budget: options.trials.unwrap_or(options.config.optimize.trials),
+        budget,
         recording: recording.to_owned(),
+        widest: options.config.widest(options.task),
+        gains: options.config.gains(),
+        contenders: options.config.optimize.confirm.contenders,
+        confidence: options.config.optimize.confirm.confidence,
+        worker,
+        abandoned: Duration::from_secs_f64(options.config.optimize.workers.abandoned_s),
     };
     Ok(Life::open(plan, study)?)
+}
+
+/// Study attribute: how many trials are to count. Workers that join know it from here.
+const BUDGET: &str = "budget";
+
+/// The name of a study in its journal.
+pub fn study_name(task: Task, seed: u32) -> String {
+    format!("{}-seed{seed}", task.name())
 }
 
 /// What a session of `options` is called in its recording.
@@ -148,12 +206,18 @@ pub fn session_info(options: &Options, recording: &str) -> SessionInfo {
         unit: options.task.unit().to_owned(),
         sampler: format!("{:?}", options.config.optimize.sampler.kind).to_lowercase(),
         seed: u64::from(options.seed),
-        budget: options.trials.unwrap_or(options.config.optimize.trials),
+        budget: options.budget(),
         parameters: options.config.parameters(options.task),
-        study: options.folder.as_ref().map(|folder| folder.join(STUDY_FILE).display().to_string()).unwrap_or_default(),
+        study: match (&options.join, &options.folder) {
+            (Some(storage), _) => storage.to_string(),
+            (None, Some(folder)) => folder.join(STUDY_FILE).display().to_string(),
+            (None, None) => String::new(),
+        },
         recording: recording.to_owned(),
         started: jiff::Timestamp::now().to_string(),
         observe: options.observe,
+        gains: options.config.gains(),
+        approve: options.approve.name().to_owned(),
     }
 }
 
@@ -222,6 +286,16 @@ pub fn attachments(config: &Config) -> Vec<(&str, &str, &[u8])> {
     config.as_run.iter().map(|(name, text)| (name.as_str(), "application/toml", text.as_bytes())).collect()
 }
 
+/// A short name of the configuration as it runs, for an operator to compare: FNV-1a of all files, 64 bits (Fowler, Noll and
+/// Vo, draft-eastlake-fnv).
+pub fn fingerprint(config: &Config) -> String {
+    let texts = config.as_run.iter().flat_map(|(name, text)| [name.as_bytes(), text.as_bytes()]);
+    let hash = texts
+        .flatten()
+        .fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01b3));
+    format!("{hash:016x}")
+}
+
 /// The present time, UTC, ns since 1970.
 pub fn utc_ns() -> u64 {
     u64::try_from(jiff::Timestamp::now().as_nanosecond()).unwrap_or(0)
@@ -236,13 +310,13 @@ impl Engine {
     /// # Errors
     /// When the configuration, the study, the recording or the system does not allow it; nothing runs then.
     pub fn start(options: Options) -> Result<Handle, EngineError> {
+        if options.approve == Approval::Auto && options.backend == Backend::Hardware {
+            return Err(EngineError::Unattended);
+        }
         let settings = options.config.settings(&options.robot, options.task, options.backend)?;
         let mut robot: Box<dyn Robot> = match options.backend {
             Backend::Simulator => Box::new(Simulator::new(&options.robot, &options.config.simulator)?),
-            Backend::Hardware => {
-                let reason = "this version drives the simulator only";
-                return Err(options.config.refuse("control.toml", "robot", "go1", reason).into());
-            }
+            Backend::Hardware => Box::new(Go1::open(&options.robot, options.observe)?),
         };
         // A simulated robot begins as a real one does: lying folded on its belly.
         robot.place(&Placement { joint_position: settings.lying_position, lying: true, seed: u64::from(options.seed) });
@@ -261,8 +335,8 @@ impl Engine {
         let (control_end, session_end, screen_end, tick_end) = channels();
         let (to_recorder, recorder_records) = channel();
         let (to_screen, screen_records) = channel();
-        let (trial_ticks_in, trial_ticks) = channel();
-        let recorder = Recorder::spawn(tick_end, recorder_records, writer, trial_ticks_in);
+        let (handed_in, handed) = channel();
+        let recorder = Recorder::spawn(tick_end, recorder_records, writer, handed_in);
         let outlets = Outlets { recorder: to_recorder, screen: to_screen };
         let status = recorder.watch();
         let closing = Arc::new(AtomicBool::new(false));
@@ -277,7 +351,11 @@ impl Engine {
             .map_err(system("control"))?;
 
         let (intents_in, intents) = channel();
-        let supervisor = Supervisor::new(life, session_end, trial_ticks, outlets, status, info, clock.now_ns());
+        let folder = recording.as_ref().and(options.folder.clone());
+        let pre_arm = PreArmList::new(&settings, fingerprint(&options.config), folder);
+        let parts = Parts { life, control: session_end, handed, outlets, recorder: status, pre_arm, info };
+        let simulated = options.backend == Backend::Simulator;
+        let supervisor = Supervisor::new(parts, clock.now_ns()).approving(options.approve, simulated);
         let sits_down = options.backend == Backend::Hardware;
         let session = std::thread::Builder::new()
             .name("session".into())
@@ -289,6 +367,7 @@ impl Engine {
             recording,
             _prepared: prepared,
             intents: Some(intents_in),
+            clock,
             records: screen_records,
             closing,
             control: Some(control),
@@ -304,14 +383,14 @@ const SESSION_PERIOD: Duration = Duration::from_millis(5);
 const LONGEST_GOODBYE: Duration = Duration::from_secs(6);
 
 /// The session thread: intents as they come, events every few milliseconds, until the screen lets go of its handle.
-fn run_session(mut supervisor: Supervisor, intents: &Receiver<(Intent, u64)>, clock: &MonotonicClock, sits_down: bool) {
+fn run_session(mut supervisor: Supervisor, intents: &Receiver<Wish>, clock: &MonotonicClock, sits_down: bool) {
     loop {
         supervisor.attend(clock.now_ns());
         if supervisor.mode() == Mode::Observe {
             supervisor.take_control();
         }
         match intents.recv_timeout(SESSION_PERIOD) {
-            Ok((intent, stops)) => supervisor.carry_out(&intent, stops, clock.now_ns()),
+            Ok(wish) => supervisor.carry_out(&wish, clock.now_ns()),
             Err(RecvTimeoutError::Timeout) => {}
             Err(RecvTimeoutError::Disconnected) => break,
         }
@@ -330,7 +409,8 @@ pub struct Handle {
     screen: ScreenEnd,
     recording: Option<PathBuf>,
     _prepared: Prepared,
-    intents: Option<Sender<(Intent, u64)>>,
+    intents: Option<Sender<Wish>>,
+    clock: MonotonicClock,
     records: Receiver<Stamped>,
     closing: Arc<AtomicBool>,
     control: Option<JoinHandle<()>>,
@@ -368,7 +448,8 @@ impl Handle {
     pub fn wish(&self, intent: Intent) {
         if let Some(intents) = &self.intents {
             // A session that has ended answers nothing; the screen sees that its records end.
-            let _ = intents.send((intent, self.screen.stop.count()));
+            let wish = Wish { intent, stops: self.screen.stop.count(), time_ns: self.clock.now_ns() };
+            let _ = intents.send(wish);
         }
     }
 
@@ -416,7 +497,7 @@ impl Drop for Handle {
     }
 }
 
-/// A study that is on disk.
+/// A study of this program that is on disk, or on a server.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct StoredStudy {
     /// Its task.
@@ -425,6 +506,18 @@ pub struct StoredStudy {
     pub seed: u32,
     /// The robot model that it was made with.
     pub robot: String,
+    /// How many trials are to count; none where an older version made it.
+    pub budget: Option<u32>,
+}
+
+/// The studies of this program that `storage` holds; a file that does not exist holds none.
+///
+/// # Errors
+/// When it cannot be read.
+pub fn stored_studies(storage: &Storage) -> Result<Vec<StoredStudy>, EngineError> {
+    let journal = storage.journal(Durability::Synced).map_err(StudyError::from)?;
+    let living = journal.replay().studies().iter().filter(|study| !study.deleted);
+    Ok(living.filter_map(stored).collect())
 }
 
 /// What study `file` holds.
@@ -432,13 +525,17 @@ pub struct StoredStudy {
 /// # Errors
 /// When the file cannot be read or holds no study of this program.
 pub fn stored_study(file: &Path) -> Result<StoredStudy, EngineError> {
-    let journal_file = JournalFile::new(file, Durability::Synced, LOCK_GRACE).map_err(StudyError::from)?;
-    let journal = Journal::open(journal_file).map_err(StudyError::from)?;
-    let ours = journal.replay().studies().iter().find_map(|study| {
-        let task = Task::from_name(study.user_attributes.get("task")?.as_str()?)?;
-        let seed = u32::try_from(study.user_attributes.get("seed")?.as_u64()?).ok()?;
-        let robot = study.user_attributes.get("robot")?.as_str()?.to_owned();
-        Some(StoredStudy { task, seed, robot })
-    });
-    ours.ok_or_else(|| EngineError::NoStudy { file: file.to_owned() })
+    let studies = stored_studies(&Storage::File(file.to_owned()))?;
+    studies.into_iter().next().ok_or_else(|| EngineError::NoStudy { file: file.to_owned() })
+}
+
+fn stored(study: &StudyRecord) -> Option<StoredStudy> {
+    let attribute = |name: &str| study.user_attributes.get(name);
+    let number = |name: &str| u32::try_from(attribute(name)?.as_u64()?).ok();
+    Some(StoredStudy {
+        task: Task::from_name(attribute("task")?.as_str()?)?,
+        seed: number("seed")?,
+        robot: attribute("robot")?.as_str()?.to_owned(),
+        budget: number(BUDGET),
+    })
 }

@@ -1,98 +1,14 @@
 //! The life of a trial through its public interface: what an operator may do, what the study is told, what a crash costs.
 
-use std::path::Path;
+#[path = "support/life.rs"]
+mod support;
 
-use quadfrog::control::settings::TaskControl;
-use quadfrog::optimize::journal::Durability;
-use quadfrog::optimize::sampler::{Direction, SamplerConfig};
-use quadfrog::optimize::space::{Range, Space};
-use quadfrog::optimize::study::{Storage, Study, StudyOptions};
+use quadfrog::optimize::study::Storage;
 use quadfrog::optimize::trial::TrialState;
-use quadfrog::realtime::command::{Task, TrialSpec};
-use quadfrog::realtime::telemetry::{FallCause, Tick, TrialEnd};
-use quadfrog::recording::record::{ParameterInfo, Record, Source, Stage, Verdict};
-use quadfrog::session::life::{Life, Plan};
-
-const BOUNDS: [(&str, f64, f64); 3] = [("f0", 0.75, 1.75), ("Fx", 0.0, 150.0), ("Fz", 150.0, 350.0)];
-
-fn study(storage: Storage) -> Study {
-    let ranges = BOUNDS.map(|(name, low, high)| (name.to_owned(), Range::linear(low, high)));
-    Study::open(
-        storage,
-        StudyOptions {
-            name: "test".into(),
-            direction: Direction::Maximize,
-            metric: "J (m)".into(),
-            space: Space::new(ranges).unwrap(),
-            sampler: SamplerConfig { startup_trials: Some(3), ..SamplerConfig::default() },
-            attributes: Vec::new(),
-            durability: Durability::Buffered,
-        },
-    )
-    .unwrap()
-}
-
-fn plan(budget: u32) -> Plan {
-    Plan {
-        task: Task::Forward,
-        control: TaskControl {
-            kp: 400.0,
-            kd: 8.0,
-            kd_joint: 0.8,
-            k_att: 200.0,
-            stance_m: [0.0, 0.14, -0.25],
-            vmc: true,
-            jumps: 1,
-            f1_hz: 0.0,
-        },
-        parameters: BOUNDS
-            .map(|(name, low, high)| ParameterInfo { name: name.into(), unit: "N".into(), low, high })
-            .to_vec(),
-        seed: 0,
-        budget,
-        recording: String::new(),
-    }
-}
-
-fn life(budget: u32) -> Life {
-    Life::open(plan(budget), study(Storage::Memory)).unwrap()
-}
-
-/// A jump that goes as far as the parameters say: smooth, and different everywhere.
-fn far(spec: &TrialSpec) -> f64 {
-    let (f, x, z) = (spec.jump.f0_hz - 1.2, spec.jump.fx_n / 150.0 - 0.7, spec.jump.fz_n / 350.0 - 0.6);
-    0.7 - f * f - x * x - z * z
-}
-
-/// The ticks of a trial that ends `dx_m` in front of its start.
-fn ticks(trial: u32, dx_m: f64) -> Vec<Tick> {
-    [0.0, dx_m]
-        .map(|x| {
-            let mut tick = Tick { trial: Some(trial), ..Tick::default() };
-            tick.estimate.position_world.x = x;
-            tick
-        })
-        .to_vec()
-}
-
-/// Approves what is on the table, lets it end as `end` and brings it to review.
-fn run(life: &mut Life, end: TrialEnd) -> TrialSpec {
-    let card = life.proposal().expect("a proposal");
-    let spec = life.approve(card.trial, card.revision).unwrap();
-    life.ended(spec.trial, &end, &ticks(spec.trial, far(&spec)));
-    assert_eq!(life.stage(), Stage::Review);
-    spec
-}
-
-fn accept(life: &mut Life) -> TrialSpec {
-    let spec = run(life, TrialEnd::Settled);
-    life.judge(Verdict::Accept, false).unwrap();
-    spec
-}
-
-fn parameters(life: &Life) -> Vec<f64> {
-    life.proposal().unwrap().parameters.iter().map(|p| p.value).collect()
-}
+use quadfrog::realtime::telemetry::{FallCause, TrialEnd};
+use quadfrog::recording::record::{Record, Source, Stage, Verdict};
+use quadfrog::session::life::Life;
+use support::{accept, far, life, open, parameters, run, study, ticks};
 
 #[test]
 fn an_accepted_trial_counts_with_its_measured_value() {
@@ -264,10 +180,6 @@ fn eventful(life: &mut Life, step: u32) {
             accept(life);
         }
     }
-}
-
-fn open(folder: &Path) -> Life {
-    Life::open(plan(1000), study(Storage::File(folder.join("study.log")))).unwrap()
 }
 
 /// The study is killed (dropped without a word) between any two steps; verdicts given before survive, and the next

@@ -9,12 +9,11 @@ use toml::Table;
 
 use super::ConfigError;
 use super::merge::merge;
+use super::safety::SafetyFile;
 use crate::control::estimator::GRAVITY;
 use crate::control::leg::stance_of;
-use crate::control::settings::{
-    EstimatorSettings, Fall, Gate, ObjectiveSource, Ramp, Settings, Settle, Stand, TaskControl, Watchdog,
-};
-use crate::optimize::sampler::SamplerConfig;
+use crate::control::settings::{EstimatorSettings, ObjectiveSource, Ramp, Settings, Settle, Stand, TaskControl};
+use crate::optimize::sampler::{SamplerConfig, SamplerKind};
 use crate::realtime::command::Task;
 use crate::recording::record::ParameterInfo;
 use crate::robot::Leg;
@@ -29,6 +28,9 @@ const FILES: [(&str, &str); 5] = [
     ("simulator.toml", include_str!("../../config/simulator.toml")),
     ("console.toml", include_str!("../../config/console.toml")),
 ];
+
+/// The gains of the controller, in table order, with their units.
+const GAINS: [(&str, &str); 4] = [("kp", "N/m"), ("kd", "N s/m"), ("kd_joint", "N m s/rad"), ("k_att", "N/m")];
 
 /// Keys that may be given though the defaults leave them out, each with an example of its kind.
 const OPTIONAL: [(&str, &str); 1] = [("optimize.toml", "objective = \"truth\"\n[sampler]\nstartup_trials = 10\n")];
@@ -77,34 +79,6 @@ pub struct Contact {
     pub force_n: f64,
 }
 
-/// `safety.toml`.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-pub struct SafetyFile {
-    /// When the robot counts as fallen.
-    pub fall: Fall,
-    /// The last gate.
-    pub gate: Gate,
-    /// What trips the watchdog.
-    pub watchdog: WatchdogFile,
-    /// The widest bounds of each parameter.
-    pub parameters: BTreeMap<String, [f64; 2]>,
-}
-
-/// The watchdog, with the values that differ between simulator and hardware.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
-pub struct WatchdogFile {
-    /// Largest tilt while standing, rad.
-    pub stance_tilt_rad: f64,
-    /// Oldest state, ms.
-    pub state_age_ms: u32,
-    /// Longest silence of the screen, ms.
-    pub operator_silent_ms: u32,
-    /// Latest tick on the simulator, ms; 0 only counts.
-    pub simulator_late_ms: f64,
-    /// Latest tick on hardware, ms; 0 only counts.
-    pub hardware_late_ms: f64,
-}
-
 /// `optimize.toml`.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct OptimizeFile {
@@ -118,6 +92,26 @@ pub struct OptimizeFile {
     pub parameters: BTreeMap<String, Vec<String>>,
     /// The sampler.
     pub sampler: SamplerConfig,
+    /// Repeats of the best points.
+    pub confirm: ConfirmFile,
+    /// Several programs on one study.
+    pub workers: WorkersFile,
+}
+
+/// When the best point counts as confirmed.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+pub struct ConfirmFile {
+    /// How many points are repeated.
+    pub contenders: u32,
+    /// Confidence at which one leads, 0.5 to 1.
+    pub confidence: f64,
+}
+
+/// Several programs on one study.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+pub struct WorkersFile {
+    /// After how long a running trial of another worker counts as dead, s.
+    pub abandoned_s: f64,
 }
 
 /// All files, checked.
@@ -143,6 +137,16 @@ pub struct Config {
 struct Place {
     file: String,
     lines: HashMap<String, usize>,
+}
+
+impl Place {
+    fn refuse(&self, key: &str, value: impl ToString, reason: impl ToString) -> ConfigError {
+        let file = match self.lines.get(key) {
+            Some(line) => format!("{}:{line}", self.file),
+            None => self.file.clone(),
+        };
+        ConfigError::Value { file, key: key.to_owned(), value: value.to_string(), reason: reason.to_string() }
+    }
 }
 
 impl Config {
@@ -190,6 +194,20 @@ impl Config {
         Ok(config)
     }
 
+    /// Another sampler than the file says; the configuration that is kept says so too.
+    pub fn choose_sampler(&mut self, kind: SamplerKind) {
+        self.optimize.sampler.kind = kind;
+        let name = toml::Value::try_from(kind);
+        let kept = self.as_run.iter_mut().find(|(file, _)| file == "optimize.toml");
+        if let (Ok(name), Some((_, text))) = (name, kept)
+            && let Ok(mut table) = text.parse::<Table>()
+            && let Some(toml::Value::Table(sampler)) = table.get_mut("sampler")
+        {
+            sampler.insert("kind".to_owned(), name);
+            *text = table.to_string();
+        }
+    }
+
     /// What `task`'s trials run with.
     pub fn task(&self, task: Task) -> &TaskControl {
         // `check` has seen that every task is there.
@@ -204,6 +222,26 @@ impl Config {
                 let [low, high] = self.optimize.bounds[name];
                 let unit = if name.starts_with('f') { "Hz" } else { "N" };
                 ParameterInfo { name: name.clone(), unit: unit.to_owned(), low, high }
+            })
+            .collect()
+    }
+
+    /// The same parameters with the widest bounds that they may be given.
+    pub fn widest(&self, task: Task) -> Vec<ParameterInfo> {
+        let widest = |parameter: ParameterInfo| {
+            let [low, high] = self.safety.parameters[&parameter.name];
+            ParameterInfo { low, high, ..parameter }
+        };
+        self.parameters(task).into_iter().map(widest).collect()
+    }
+
+    /// The controller's gains with the ranges in which they may be set, in table order.
+    pub fn gains(&self) -> Vec<ParameterInfo> {
+        GAINS
+            .iter()
+            .map(|(name, unit)| {
+                let [low, high] = self.safety.gains[*name];
+                ParameterInfo { name: (*name).to_owned(), unit: (*unit).to_owned(), low, high }
             })
             .collect()
     }
@@ -238,16 +276,19 @@ impl Config {
         let chosen = self.task(task);
         self.check_stance(robot, task)?;
         let hardware = backend == Backend::Hardware;
-        let watchdog = &self.safety.watchdog;
+        let SafetyFile { watchdog, fall, .. } = &self.safety;
+        let (min_position, max_position) = robot.allowed_positions();
         Ok(Settings {
             geometry: robot.leg_geometry,
             hip_origin_body: Leg::ALL.map(|leg| robot.legs[leg as usize].joint_origin[0]),
             imu_origin_body: robot.imu_origin,
             foot_radius: robot.legs[0].foot_radius,
-            min_position: robot.limits.min_position,
-            max_position: robot.limits.max_position,
+            min_position,
+            max_position,
             max_torque: robot.limits.max_torque,
-            lying_position: robot.lying_position,
+            max_velocity: robot.limits.max_velocity,
+            // A folded leg rests on its mechanical stop; what is asked of the motors ends at the limit.
+            lying_position: std::array::from_fn(|i| robot.lying_position[i].clamp(min_position[i], max_position[i])),
             weight_n: robot.total_mass() * GRAVITY,
             stand: Stand { gains: chosen.gains(), stance_leg: chosen.stance_leg(), vmc: chosen.vmc },
             stand_up: self.control.stand_up,
@@ -255,27 +296,23 @@ impl Config {
             countdown_s: if hardware { self.control.countdown.hardware_s } else { self.control.countdown.simulator_s },
             settle: self.control.settle,
             fall: self.safety.fall,
+            flight_tilt_rad: if hardware { fall.hardware_flight_rad } else { fall.simulator_flight_rad },
             contact_force_n: self.control.contact.force_n,
             objective: self.objective(backend)?,
             estimator: self.control.estimator,
             gate: self.safety.gate,
-            watchdog: Watchdog {
-                stance_tilt_rad: watchdog.stance_tilt_rad,
-                state_age_ms: watchdog.state_age_ms,
-                operator_silent_ms: watchdog.operator_silent_ms,
-                late_ms: if hardware { watchdog.hardware_late_ms } else { watchdog.simulator_late_ms },
-            },
+            hardware,
+            pre_arm: self.safety.pre_arm,
+            approval: self.safety.approval,
+            watchdog: *watchdog,
+            late_ms: if hardware { watchdog.hardware_late_ms } else { watchdog.simulator_late_ms },
+            idle_s: if hardware { watchdog.hardware_idle_s } else { watchdog.simulator_idle_s },
         })
     }
 
     /// Says where `key` of `file` stands, and what is wrong with it.
     pub fn refuse(&self, file: &'static str, key: &str, value: impl ToString, reason: impl ToString) -> ConfigError {
-        let place = &self.places[file];
-        let file = match place.lines.get(key) {
-            Some(line) => format!("{}:{line}", place.file),
-            None => place.file.clone(),
-        };
-        ConfigError::Value { file, key: key.to_owned(), value: value.to_string(), reason: reason.to_string() }
+        self.places[file].refuse(key, value, reason)
     }
 
     fn check(&self) -> Result<(), ConfigError> {
@@ -315,10 +352,14 @@ impl Config {
         for task in Task::ALL {
             let chosen = self.task(task);
             let tables = format!("tasks.{}", task.name());
-            positive.push((format!("{tables}.kp"), chosen.kp));
-            for (key, value) in [("kd", chosen.kd), ("kd_joint", chosen.kd_joint), ("k_att", chosen.k_att)] {
-                if !(value >= 0.0 && value.is_finite()) {
-                    return Err(self.refuse(FILE, &format!("{tables}.{key}"), value, "must be 0 or more"));
+            for (key, value) in
+                [("kp", chosen.kp), ("kd", chosen.kd), ("kd_joint", chosen.kd_joint), ("k_att", chosen.k_att)]
+            {
+                let [least, most] = self.safety.gains[key];
+                if !(value >= least && value <= most) {
+                    let reason =
+                        format!("must be within the safe range [{least}, {most}] of safety.toml, [gains] {key}");
+                    return Err(self.refuse(FILE, &format!("{tables}.{key}"), value, reason));
                 }
             }
             if chosen.jumps == 0 || chosen.jumps > 100 {
@@ -347,51 +388,20 @@ impl Config {
         self.all_positive(FILE, &positive)
     }
 
-    fn check_safety(&self) -> Result<(), ConfigError> {
-        const FILE: &str = "safety.toml";
-        let safety = &self.safety;
-        self.all_positive(
-            FILE,
-            &[
-                ("fall.roll_rad".to_owned(), safety.fall.roll_rad),
-                ("fall.pitch_rad".to_owned(), safety.fall.pitch_rad),
-                ("fall.body_contact_s".to_owned(), safety.fall.body_contact_s),
-                ("gate.torque_step_nm".to_owned(), safety.gate.torque_step_nm),
-                ("gate.kp_max".to_owned(), safety.gate.kp_max),
-                ("gate.kd_max".to_owned(), safety.gate.kd_max),
-                ("gate.damping_kd".to_owned(), safety.gate.damping_kd),
-                ("watchdog.stance_tilt_rad".to_owned(), safety.watchdog.stance_tilt_rad),
-                ("watchdog.state_age_ms".to_owned(), f64::from(safety.watchdog.state_age_ms)),
-                ("watchdog.operator_silent_ms".to_owned(), f64::from(safety.watchdog.operator_silent_ms)),
-            ],
-        )?;
-        for (key, value) in [
-            ("watchdog.simulator_late_ms", safety.watchdog.simulator_late_ms),
-            ("watchdog.hardware_late_ms", safety.watchdog.hardware_late_ms),
-        ] {
-            if !(value >= 0.0 && value.is_finite()) {
-                return Err(self.refuse(FILE, key, value, "must be a number of milliseconds, or 0 to only count"));
-            }
-        }
-        if safety.gate.damping_kd > safety.gate.kd_max {
-            let reason = format!("is above gate.kd_max = {}: the stop itself would be cut", safety.gate.kd_max);
-            return Err(self.refuse(FILE, "gate.damping_kd", safety.gate.damping_kd, reason));
-        }
-        for (name, [low, high]) in &safety.parameters {
-            if !(low.is_finite() && high.is_finite() && low < high && *low >= 0.0) {
-                let reason = "must be [lowest, highest] with 0 <= lowest < highest";
-                return Err(self.refuse(FILE, &format!("parameters.{name}"), format!("[{low}, {high}]"), reason));
-            }
-        }
-        Ok(())
-    }
-
     fn check_optimize(&self) -> Result<(), ConfigError> {
         const FILE: &str = "optimize.toml";
         self.objective(Backend::Simulator)?;
         if self.optimize.trials == 0 {
             return Err(self.refuse(FILE, "trials", 0, "a study needs at least one trial"));
         }
+        let ConfirmFile { contenders, confidence } = self.optimize.confirm;
+        if !(2..=10).contains(&contenders) {
+            return Err(self.refuse(FILE, "confirm.contenders", contenders, "must be 2 to 10 points"));
+        }
+        if !(confidence > 0.5 && confidence < 1.0) {
+            return Err(self.refuse(FILE, "confirm.confidence", confidence, "must be above 0.5 and below 1"));
+        }
+        self.all_positive(FILE, &[("workers.abandoned_s".to_owned(), self.optimize.workers.abandoned_s)])?;
         for (name, [low, high]) in &self.optimize.bounds {
             let key = format!("bounds.{name}");
             let value = format!("[{low}, {high}]");
@@ -436,6 +446,7 @@ impl Config {
         let key = format!("tasks.{}.stance_m", task.name());
         let chosen = self.task(task);
         let value = format!("{:?}", chosen.stance_m);
+        let (min_position, max_position) = robot.allowed_positions();
         for leg in Leg::ALL {
             let foot = stance_of(&chosen.stance_leg(), leg);
             let q = robot
@@ -444,7 +455,7 @@ impl Config {
                 .map_err(|error| self.refuse("control.toml", &key, &value, error))?;
             for (joint, angle) in q.iter().enumerate() {
                 let i = 3 * leg as usize + joint;
-                let (least, most) = (robot.limits.min_position[i], robot.limits.max_position[i]);
+                let (least, most) = (min_position[i], max_position[i]);
                 if !(least..=most).contains(angle) {
                     let reason = format!(
                         "needs {} at {angle:.3} rad, which the robot's limits [{least}, {most}] forbid",
@@ -457,7 +468,7 @@ impl Config {
         Ok(())
     }
 
-    fn all_positive(&self, file: &'static str, values: &[(String, f64)]) -> Result<(), ConfigError> {
+    pub(super) fn all_positive(&self, file: &'static str, values: &[(String, f64)]) -> Result<(), ConfigError> {
         match values.iter().find(|(_, value)| !(*value > 0.0 && value.is_finite())) {
             Some((key, value)) => Err(self.refuse(file, key, value, "must be a number above 0")),
             None => Ok(()),
@@ -474,11 +485,21 @@ fn parse<T: DeserializeOwned>(
     places: &HashMap<&'static str, Place>,
     (name, table): (&'static str, Table),
 ) -> Result<T, ConfigError> {
-    table.try_into().map_err(|error: toml::de::Error| ConfigError::Syntax {
-        file: places[name].file.clone(),
-        line: 1,
-        message: error.message().to_owned(),
+    let place = &places[name];
+    serde_path_to_error::deserialize(toml::Value::Table(table.clone())).map_err(|error| {
+        let key = error.path().to_string();
+        // An entry of a list stands where its list does.
+        let key = key.split('[').next().unwrap_or(&key);
+        let value = lookup(&table, key).map(toml::Value::to_string).unwrap_or_default();
+        place.refuse(key, value, error.inner().message())
     })
+}
+
+/// The value of a key with its tables.
+fn lookup<'a>(table: &'a Table, key: &str) -> Option<&'a toml::Value> {
+    let mut parts = key.split('.');
+    let first = table.get(parts.next()?)?;
+    parts.try_fold(first, |value, part| value.get(part))
 }
 
 /// A folder must exist, and a TOML file in it that no one reads is probably a misspelt name.

@@ -1,5 +1,6 @@
 //! Why a point was proposed and how near the edge it is: for the operator's eyes, never for the sampler's.
 
+use super::importance;
 use super::sampler::{Direction, SamplerConfig};
 use super::space::{Parameter, Space};
 use super::tpe::{Model, joint_space, split};
@@ -53,6 +54,20 @@ pub fn densities(
         Density { name: p.name.clone(), at, good, bad }
     };
     space.parameters().iter().filter(|p| !p.range.is_point()).map(density).collect()
+}
+
+/// How many finished trials are needed before a share of importance is told: with fewer the best tenth is one trial.
+pub const IMPORTANCE_TRIALS: usize = 11;
+
+/// The share of each parameter in reaching the best tenth of the trials, all together 1, in the order of the space; empty
+/// while there are fewer than [`IMPORTANCE_TRIALS`] finished trials or nothing can be told.
+pub fn importances(trials: &[Trial], space: &Space, direction: Direction) -> Vec<(String, f64)> {
+    if trials.iter().filter(|t| t.state.is_observed()).count() < IMPORTANCE_TRIALS {
+        return Vec::new();
+    }
+    let divergences = importance::divergences(trials, space, direction);
+    let sum: f64 = divergences.iter().map(|(_, d)| d).sum();
+    if sum > 0.0 { divergences.into_iter().map(|(name, d)| (name, d / sum)).collect() } else { Vec::new() }
 }
 
 /// How near a point is to trials that fell.

@@ -7,11 +7,12 @@
 //! | [`mt19937`] | the random streams, equal to NumPy's |
 //! | [`study`] | draft, begin, tell: what has been tried and what comes next |
 //! | [`journal`] | the study on disk or on a Redis server, in Optuna's format |
-//! | [`insight`], [`repeats`] | for the operator: densities, risk; repeats of a point, confirming the best |
+//! | [`insight`], [`importance`], [`repeats`] | for the operator: densities, risk; what matters; repeats of a point, confirming the best |
 //!
 //! `README.md` beside this file compares the samplers and says where equality with Optuna ends.
 
 pub mod gp;
+pub mod importance;
 pub mod insight;
 pub mod journal;
 pub mod mt19937;

@@ -1,12 +1,13 @@
 //! Several trials of one point: what they amount to together, and which point to repeat to be sure of the best.
 //!
-//! The rule: complete trials whose parameters are equal to the bit are repeats of one point. Its value is the mean of
+//! The rule: complete trials whose parameters (and gains, where they are kept) are equal to the bit are repeats of one
+//! point. Its value is the mean of
 //! all their values, falls included with the value that they were told with; it is shown as k/n, k of n repeats stood,
 //! with the standard deviation of a single repeat. TPE sees every repeat as a trial of its own, as Optuna does; the
 //! Gaussian process weighs them by the noise that it estimates.
 
 use super::sampler::Direction;
-use super::trial::{Trial, TrialState};
+use super::trial::{GAINS, Trial, TrialState};
 use std::f64::consts::PI;
 
 /// Repeats that a contender must have before anything is concluded from its spread.
@@ -53,7 +54,11 @@ pub fn points(trials: &[Trial]) -> Vec<Point> {
     let mut points: Vec<Point> = Vec::new();
     let complete = trials.iter().filter(|t| t.state == TrialState::Complete);
     for (trial, value) in complete.filter_map(|t| Some((t, t.value?))) {
-        let known = points.iter_mut().find(|p| same(&p.parameters, &trial.parameters));
+        let first = |p: &Point| trials.iter().find(|t| t.number == p.trials[0]);
+        let conditions = |t: &Trial| t.user_attributes.get(GAINS).cloned();
+        let known = points
+            .iter_mut()
+            .find(|p| same(&p.parameters, &trial.parameters) && first(p).map(conditions) == Some(conditions(trial)));
         let stood = usize::from(!trial.is_fall());
         match known {
             Some(point) => {
@@ -110,10 +115,34 @@ pub fn confirm(contenders: &[Point], direction: Direction, confidence: f64) -> C
     if contenders[fewest].repeats() < LEAST_REPEATS {
         return Confirmation::Repeat(fewest);
     }
+    let Standing { leader, confidence: reached, rival } = standing(contenders, direction);
+    if reached >= confidence {
+        return Confirmation::Leads(leader, reached);
+    }
+    let leader_has_fewer = contenders[leader].repeats() <= contenders[rival].repeats();
+    Confirmation::Repeat(if leader_has_fewer { leader } else { rival })
+}
+
+/// Who is ahead, and how surely.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Standing {
+    /// Index of the contender with the best mean.
+    pub leader: usize,
+    /// Confidence in it over all others together; 0 while there is no spread to tell it from.
+    pub confidence: f64,
+    /// Index of the contender that may best be better; the leader itself where there is no other.
+    pub rival: usize,
+}
+
+/// Who is ahead of some contenders (at least one), by the test of [`confirm`].
+pub fn standing(contenders: &[Point], direction: Direction) -> Standing {
     let mut order: Vec<usize> = (0..contenders.len()).collect();
     order.sort_by(|a, b| direction.best_first(contenders[*a].mean(), contenders[*b].mean()));
     let leader = order[0];
     let freedom = contenders.iter().map(|p| p.repeats() - 1).sum::<usize>();
+    if freedom == 0 {
+        return Standing { leader, confidence: 0.0, rival: order.get(1).copied().unwrap_or(leader) };
+    }
     // s^2 = sum_i sum_j (y_ij - mean_i)^2 / sum_i (n_i - 1)
     let variance = contenders.iter().map(Point::squares).sum::<f64>() / freedom as f64;
     let doubt = |rival: usize| {
@@ -124,13 +153,9 @@ pub fn confirm(contenders: &[Point], direction: Direction, confidence: f64) -> C
         if error > 0.0 { 1.0 - student_cdf(difference / error, freedom) } else { 0.0 }
     };
     let doubts: Vec<(usize, f64)> = order[1..].iter().map(|&rival| (rival, doubt(rival))).collect();
-    let reached = 1.0 - doubts.iter().map(|(_, d)| d).sum::<f64>();
-    if reached >= confidence {
-        return Confirmation::Leads(leader, reached);
-    }
-    let closest = doubts.into_iter().max_by(|a, b| a.1.total_cmp(&b.1)).map_or(leader, |(rival, _)| rival);
-    let leader_has_fewer = contenders[leader].repeats() <= contenders[closest].repeats();
-    Confirmation::Repeat(if leader_has_fewer { leader } else { closest })
+    let confidence = (1.0 - doubts.iter().map(|(_, d)| d).sum::<f64>()).max(0.0);
+    let rival = doubts.into_iter().max_by(|a, b| a.1.total_cmp(&b.1)).map_or(leader, |(rival, _)| rival);
+    Standing { leader, confidence, rival }
 }
 
 /// Distribution function of Student's t for t >= 0 and a whole number of degrees of freedom

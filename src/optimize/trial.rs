@@ -177,6 +177,8 @@ impl Trial {
 pub const VERDICT: &str = "verdict";
 /// The verdict of a trial that ended on the floor. It is told with a value, but what the value says is where not to go.
 pub const FALL: &str = "fall";
+/// Trial user attribute: under which conditions besides its parameters it ran, an object. Trials with others are no repeats.
+pub const GAINS: &str = "gains";
 /// Trial system attribute: the fixed parameters, an object.
 pub const FIXED_PARAMS: &str = "fixed_params";
 /// Trial system attribute: the announced joint sample, with `:0`, `:1` ... for its pieces.

@@ -155,8 +155,8 @@ impl Player {
         self.next_chunk = chunks.iter().position(|chunk| chunk.end >= log_time).unwrap_or(chunks.len());
     }
 
-    /// The records that define what a screen shows at `time_ns`: the session, the newest stage and proposal, and the
-    /// newest row of each trial, in the order of time.
+    /// The records that define what a screen shows at `time_ns`: the session, the newest stage, proposal and what
+    /// belongs to them, and the newest row of each trial, in the order of time.
     pub fn state_at(&self, time_ns: u64) -> Vec<Stamped> {
         let mut newest = BTreeMap::new();
         for (index, event) in self.events.iter().enumerate().take_while(|(_, event)| event.time_ns <= time_ns) {
@@ -165,6 +165,9 @@ impl Player {
                 Record::Stage(_) => (1, 0),
                 Record::Proposal(_) => (2, 0),
                 Record::Trial(row) => (3, row.trial),
+                Record::Search(_) => (4, 0),
+                Record::Insight(_) => (5, 0),
+                Record::Points(_) => (6, 0),
                 _ => continue,
             };
             newest.insert(key, index);

@@ -3,6 +3,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::realtime::pre_arm::{Check, CheckState};
 use crate::realtime::telemetry::{Counters, Mode, Tick};
 
 /// A record and when it happened.
@@ -35,6 +36,28 @@ pub enum Record {
     Log(LogRecord),
     /// The last ticks before a fault, oldest first.
     FaultTicks(Vec<Tick>),
+    /// The whole pre-arm list. The screen sees it twice a second while the robot is disarmed, the recording when an item
+    /// changes its state.
+    PreArm(Vec<PreArmCheck>),
+    /// What is searched, and how far the study is.
+    Search(Search),
+    /// Why the proposal was made: told with each that the sampler makes.
+    Insight(Insight),
+    /// What repeated points amount to; all of them, each time that one of them changes.
+    Points(Vec<PointRecord>),
+}
+
+/// An item of the pre-arm list and how it stands.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PreArmCheck {
+    /// The item.
+    pub check: Check,
+    /// What was found, in words with a unit.
+    pub found: String,
+    /// What is needed, in words with a unit.
+    pub needed: String,
+    /// How it stands.
+    pub state: CheckState,
 }
 
 /// What a session is: written first into a recording, shown in the frame.
@@ -66,6 +89,10 @@ pub struct SessionInfo {
     pub started: String,
     /// Whether this session may only look.
     pub observe: bool,
+    /// The controller's gains with the ranges in which an operator may set them, in table order.
+    pub gains: Vec<ParameterInfo>,
+    /// Who approves and judges: `each`, `falls-only` or `auto`.
+    pub approve: String,
 }
 
 /// One optimized parameter.
@@ -143,11 +170,13 @@ pub enum Source {
     Rerun,
     /// A point queued beforehand, by the operator or by another program.
     Queued,
+    /// A repeat of one of the best points, to be sure of the best; beyond the budget.
+    Confirm,
 }
 
 impl Source {
     /// All sources.
-    pub const ALL: [Source; 4] = [Source::Sampler, Source::Operator, Source::Rerun, Source::Queued];
+    pub const ALL: [Source; 5] = [Source::Sampler, Source::Operator, Source::Rerun, Source::Queued, Source::Confirm];
 
     /// The word that the operator sees and that files hold.
     pub const fn name(self) -> &'static str {
@@ -156,6 +185,7 @@ impl Source {
             Source::Operator => "operator",
             Source::Rerun => "re-run",
             Source::Queued => "queued",
+            Source::Confirm => "confirm",
         }
     }
 }
@@ -175,6 +205,8 @@ pub struct Proposal {
     pub parameters: Vec<ProposedParameter>,
     /// How near earlier falls are; none before the first judged trial.
     pub risk: Option<Risk>,
+    /// The controller's gains, in table order; `proposed` is what the trial would run with if nobody had changed them.
+    pub gains: Vec<ProposedParameter>,
 }
 
 /// One value of a proposal.
@@ -269,6 +301,8 @@ pub struct TrialRecord {
     pub note: String,
     /// How near earlier falls were when it was approved.
     pub risk: Option<Risk>,
+    /// The controller's gains that it ran with, by name; empty for a trial of another program.
+    pub gains: Vec<(String, f64)>,
 }
 
 /// An operator's wish and what became of it.
@@ -302,4 +336,89 @@ pub struct LogRecord {
     pub source: String,
     /// The line.
     pub message: String,
+}
+
+/// What is searched at present, and how far the study is.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Search {
+    /// How many trials are to count.
+    pub budget: u32,
+    /// How many count so far: accepted or fallen, repeats that confirm the best left out.
+    pub counted: u32,
+    /// Every parameter, in table order.
+    pub parameters: Vec<SearchedParameter>,
+    /// How many repeats are left to confirm the best; none while nothing is being confirmed.
+    pub confirming: Option<u32>,
+}
+
+/// One parameter as it is searched at present.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SearchedParameter {
+    /// Name.
+    pub name: String,
+    /// Present lower bound, in the parameter's unit.
+    pub low: f64,
+    /// Present upper bound.
+    pub high: f64,
+    /// The least lower bound that it may be given (`safety.toml`).
+    pub least: f64,
+    /// The greatest upper bound that it may be given.
+    pub most: f64,
+    /// Its value for the next trials, if the operator has fixed it.
+    pub fixed: Option<Fixed>,
+}
+
+/// A parameter that is not searched for some trials.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Fixed {
+    /// Its value, in the parameter's unit.
+    pub value: f64,
+    /// For how many trials more, the proposed one among them.
+    pub trials: u32,
+}
+
+/// Why a point was proposed.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Insight {
+    /// The proposed trial.
+    pub trial: u32,
+    /// Every parameter, in table order.
+    pub parameters: Vec<ParameterInsight>,
+}
+
+/// Why a parameter has the proposed value, and what it matters.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ParameterInsight {
+    /// Name.
+    pub name: String,
+    /// The proposed value, in the parameter's unit.
+    pub proposed: f64,
+    /// Share of this parameter in reaching the best tenth of the trials, 0 to 1, all together 1 (PED-ANOVA); none while
+    /// there are too few trials to tell.
+    pub importance: Option<f64>,
+    /// Where the densities are known, from the lower to the upper bound; empty where TPE does not propose.
+    pub at: Vec<f64>,
+    /// TPE's l(x), of the good trials, per unit of the parameter.
+    pub good: Vec<f64>,
+    /// TPE's g(x), of the others.
+    pub bad: Vec<f64>,
+}
+
+/// A point that was run more than once, or is about to be: its repeats are aggregated as `optimize::repeats` says.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PointRecord {
+    /// Parameters by name, in table order.
+    pub parameters: Vec<(String, f64)>,
+    /// Its trials that count, ascending: n is their number.
+    pub trials: Vec<u32>,
+    /// k: how many of them did not fall.
+    pub stood: u32,
+    /// Mean value, falls included.
+    pub mean: f64,
+    /// Standard deviation of a single repeat, from two repeats on.
+    pub deviation: Option<f64>,
+    /// Whether it is one of those among which the best is being confirmed, or was.
+    pub contender: bool,
+    /// The confidence that it is the best of the contenders; of the leading one alone.
+    pub confidence: Option<f64>,
 }

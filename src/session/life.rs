@@ -7,19 +7,29 @@
 
 mod attributes;
 mod card;
+mod confirming;
+mod gains;
+mod proposing;
+mod recovery;
+mod searching;
+mod wishes;
 
 use std::collections::BTreeMap;
+use std::time::Duration;
 
 use crate::control::settings::TaskControl;
 use crate::optimize::study::{Outcome, Study, StudyError};
-use crate::optimize::trial::TrialState;
-use crate::realtime::command::{JumpParameters, Task, TrialSpec};
+use crate::realtime::command::{Task, TrialSpec};
 use crate::realtime::telemetry::{Tick, TrialEnd};
-use crate::recording::record::{ParameterInfo, Proposal, Record, Stage, StageInfo, TrialRecord, Verdict};
+use crate::recording::record::{
+    Level, LogRecord, ParameterInfo, PointRecord, Proposal, Record, Search, Source, Stage, StageInfo, TrialRecord,
+    Verdict,
+};
 
 use super::objective;
-use attributes::Origin;
 use card::Card;
+use confirming::Confirmed;
+use searching::Searched;
 
 /// Why a wish cannot be carried out, in words for the operator.
 #[derive(Debug, thiserror::Error)]
@@ -27,6 +37,9 @@ pub enum Refusal {
     /// It does not fit the present stage or the bounds.
     #[error("{0}")]
     NotNow(String),
+    /// Another worker was faster; the next proposal is on the table.
+    #[error("another worker was faster: the proposal for trial {0} does not hold any more; look at the new one")]
+    Overtaken(u32),
     /// The study could not be read or written.
     #[error(transparent)]
     Study(#[from] StudyError),
@@ -51,6 +64,18 @@ pub struct Plan {
     pub budget: u32,
     /// Name of the recording that the trials go into; empty without one.
     pub recording: String,
+    /// The same parameters with the widest bounds that they may be given.
+    pub widest: Vec<ParameterInfo>,
+    /// The controller's gains with the ranges in which they may be set.
+    pub gains: Vec<ParameterInfo>,
+    /// How many of the best points are repeated to confirm the best.
+    pub contenders: u32,
+    /// Confidence at which one of them is the best.
+    pub confidence: f64,
+    /// Who this is among the workers on the study: 0 has the study's folder, and with it what a crash left behind.
+    pub worker: u32,
+    /// After how long a running trial of another worker counts as dead.
+    pub abandoned: Duration,
 }
 
 /// A verdict that can still be undone.
@@ -74,7 +99,18 @@ pub struct Life {
     /// How many cards and changes of cards there were: no approval of an earlier one fits a later one.
     revisions: u32,
     pending: Option<Pending>,
+    searched: Searched,
+    confirmed: Option<Confirmed>,
     outbox: Vec<Record>,
+    /// What was said last of search and points: said again only if it has changed.
+    said: Said,
+}
+
+/// What the screen knows already.
+#[derive(Default)]
+struct Said {
+    search: Option<Search>,
+    points: Vec<PointRecord>,
 }
 
 impl Life {
@@ -93,16 +129,12 @@ impl Life {
             card: None,
             revisions: 0,
             pending: None,
+            searched: Searched::default(),
+            confirmed: None,
             outbox: Vec::new(),
+            said: Said::default(),
         };
         life.close_interrupted()?;
-        for trial in life.study.trials() {
-            if trial.state != TrialState::Waiting {
-                let row = attributes::row_of(trial, life.study.note_of(trial.number), &life.plan.parameters);
-                life.outbox.push(Record::Trial(row.clone()));
-                life.rows.insert(trial.number, row);
-            }
-        }
         life.propose()?;
         Ok(life)
     }
@@ -141,42 +173,12 @@ impl Life {
         self.card.as_ref().map(Card::proposal)
     }
 
-    /// How many trials count so far.
+    /// How many trials count so far; repeats that confirm the best are beyond the budget.
     pub fn counted(&self) -> u32 {
-        let counts = |row: &&TrialRecord| matches!(row.verdict, Some(Verdict::Accept | Verdict::Fall));
-        self.rows.values().filter(counts).count() as u32
-    }
-
-    /// Sets one parameter of the proposal.
-    ///
-    /// # Errors
-    /// When there is no proposal, no such parameter, or the value is outside its bounds.
-    pub fn set_parameter(&mut self, name: &str, value: f64) -> Result<(), Refusal> {
-        let Some(card) = &mut self.card else { return not_now("there is no proposal to change") };
-        let Some(parameter) = self.plan.parameters.iter().find(|parameter| parameter.name == name) else {
-            let known: Vec<_> = self.plan.parameters.iter().map(|parameter| parameter.name.as_str()).collect();
-            return not_now(format!("there is no parameter {name}; the parameters are {}", known.join(", ")));
+        let counts = |row: &&TrialRecord| {
+            matches!(row.verdict, Some(Verdict::Accept | Verdict::Fall)) && row.source != Source::Confirm
         };
-        let ParameterInfo { unit, low, high, .. } = parameter;
-        if !(value >= *low && value <= *high) {
-            return not_now(format!("{name} = {value} {unit} is outside its bounds {low} to {high} {unit}"));
-        }
-        self.revisions += 1;
-        card.set(name, value, self.revisions);
-        self.show_card();
-        Ok(())
-    }
-
-    /// Back to what was proposed.
-    ///
-    /// # Errors
-    /// When there is no proposal.
-    pub fn clear_overrides(&mut self) -> Result<(), Refusal> {
-        let Some(card) = &mut self.card else { return not_now("there is no proposal to change") };
-        self.revisions += 1;
-        card.clear(self.revisions);
-        self.show_card();
-        Ok(())
+        self.rows.values().filter(counts).count() as u32
     }
 
     /// Approves the card as it was seen: it becomes a running trial, on disk before this returns.
@@ -256,7 +258,16 @@ impl Life {
         };
         row.verdict = Some(verdict);
         row.value = value;
-        self.write_judgement(trial, rerun)?;
+        match self.write_judgement(trial, rerun) {
+            // It took so long that another worker has closed it and queued it again, or somebody has ended it by hand.
+            Err(StudyError::State { .. }) => {
+                self.log(format!("trial {trial} was ended by somebody else meanwhile: what they say stands"));
+                self.rows.remove(&trial);
+                self.stage = Stage::Finished;
+                return Ok(self.propose()?);
+            }
+            written => written?,
+        }
         self.show_row(trial);
         self.pending = Some(Pending { trial, outcome, rerun });
         self.propose()?;
@@ -303,60 +314,6 @@ impl Life {
         Ok(())
     }
 
-    /// Queues the parameters of an earlier trial again.
-    ///
-    /// # Errors
-    /// When there is no such trial, a trial is under way, or the study cannot be written.
-    pub fn repeat(&mut self, trial: u32) -> Result<(), Refusal> {
-        let Some(row) = self.rows.get(&trial) else { return not_now(format!("there is no trial {trial}")) };
-        let parameters = row.parameters.clone();
-        self.queue(&parameters, &Origin::rerun_of(trial))
-    }
-
-    /// Queues a point.
-    ///
-    /// # Errors
-    /// When a value is outside its bounds, a trial is under way, or the study cannot be written.
-    pub fn enqueue(&mut self, parameters: &[(String, f64)]) -> Result<(), Refusal> {
-        for (name, value) in parameters {
-            match self.plan.parameters.iter().find(|parameter| parameter.name == *name) {
-                Some(p) if *value >= p.low && *value <= p.high => {}
-                Some(p) => {
-                    return not_now(format!(
-                        "{name} = {value} is outside its bounds {} to {} {}",
-                        p.low, p.high, p.unit
-                    ));
-                }
-                None => return not_now(format!("there is no parameter {name}")),
-            }
-        }
-        self.queue(parameters, &Origin::queued())
-    }
-
-    /// A note on a trial, also on one that was told long ago.
-    ///
-    /// # Errors
-    /// When there is no such trial or the study cannot be written.
-    pub fn note(&mut self, trial: u32, text: &str) -> Result<(), Refusal> {
-        let Some(row) = self.rows.get_mut(&trial) else { return not_now(format!("there is no trial {trial}")) };
-        row.note = text.to_owned();
-        self.study.note(trial, text)?;
-        self.show_row(trial);
-        Ok(())
-    }
-
-    /// Raises the budget.
-    ///
-    /// # Errors
-    /// When the study cannot be read.
-    pub fn extend(&mut self, trials: u32) -> Result<(), Refusal> {
-        self.plan.budget += trials;
-        if self.stage == Stage::Finished {
-            self.propose()?;
-        }
-        Ok(())
-    }
-
     /// How many trials are to count.
     pub fn budget(&self) -> u32 {
         self.plan.budget
@@ -367,127 +324,7 @@ impl Life {
     /// # Errors
     /// When the study cannot be written.
     pub fn close(&mut self) -> Result<(), StudyError> {
-        self.tell_pending()
-    }
-
-    fn queue(&mut self, parameters: &[(String, f64)], origin: &Origin) -> Result<(), Refusal> {
-        if matches!(self.stage, Stage::Running | Stage::Review) {
-            return not_now("finish the present trial first");
-        }
-        self.study.enqueue(parameters, &origin.attributes())?;
-        self.propose()?;
-        Ok(())
-    }
-
-    /// Puts the next card on the table, or finishes.
-    fn propose(&mut self) -> Result<(), StudyError> {
-        if self.counted() >= self.plan.budget {
-            self.card = None;
-            let last = self.rows.keys().next_back().copied().unwrap_or(0);
-            self.enter(Stage::Finished, last);
-            return Ok(());
-        }
-        self.study.refresh()?;
-        let mut fork = self.study.fork();
-        if let Some(pending) = &self.pending {
-            fork.tell(pending.trial, pending.outcome)?;
-            if pending.rerun {
-                self.enqueue_rerun(&mut fork, pending.trial)?;
-            }
-        }
-        self.revisions += 1;
-        let card = Card::new(fork, self.revisions);
-        let number = card.number();
-        self.card = Some(card);
-        self.show_card();
-        self.enter(Stage::Proposed, number);
-        Ok(())
-    }
-
-    /// The card becomes a running trial of the study.
-    fn begin(&mut self) -> Result<u32, StudyError> {
-        self.tell_pending()?;
-        let Some(card) = &self.card else { unreachable!("callers have looked at the card") };
-        let proposal = card.proposal();
-        let origin = card.origin();
-        let seed = origin.seed.unwrap_or_else(|| trial_seed(self.plan.seed, card.number()));
-        let began = attributes::began(&proposal, seed, &self.plan.recording);
-        let number = self.study.begin(&card.draft, &card.overrides(), &began)?;
-        self.card = None;
-        let row = TrialRecord {
-            trial: number,
-            source: proposal.source,
-            parent: proposal.parent,
-            parameters: proposal.parameters.iter().map(|p| (p.name.clone(), p.value)).collect(),
-            measured: None,
-            value: None,
-            hand_value: None,
-            suggested: None,
-            cause: String::new(),
-            verdict: None,
-            note: String::new(),
-            risk: proposal.risk,
-        };
-        self.rows.insert(number, row);
-        self.show_row(number);
-        Ok(number)
-    }
-
-    fn tell_pending(&mut self) -> Result<(), StudyError> {
-        let Some(pending) = self.pending.clone() else { return Ok(()) };
-        self.study.tell(pending.trial, pending.outcome)?;
-        if pending.rerun {
-            let (parameters, origin) = self.rerun_of(pending.trial);
-            self.study.enqueue(&parameters, &origin.attributes())?;
-        }
-        // Only now: what could not be written is still to be told.
-        self.pending = None;
-        Ok(())
-    }
-
-    fn enqueue_rerun(&self, study: &mut Study, trial: u32) -> Result<(), StudyError> {
-        let (parameters, origin) = self.rerun_of(trial);
-        study.enqueue(&parameters, &origin.attributes()).map(|_| ())
-    }
-
-    fn rerun_of(&self, trial: u32) -> (Vec<(String, f64)>, Origin) {
-        let parameters = self.rows.get(&trial).map(|row| row.parameters.clone()).unwrap_or_default();
-        (parameters, Origin::rerun_of(trial))
-    }
-
-    /// What a crash left behind.
-    fn close_interrupted(&mut self) -> Result<(), StudyError> {
-        let running: Vec<_> = self.study.running().cloned().collect();
-        for trial in running {
-            match attributes::judgement_of(&trial) {
-                Some(outcome) => {
-                    self.study.tell(trial.number, outcome)?;
-                    self.log(format!("trial {} was judged before the interruption: it counts", trial.number));
-                }
-                None => {
-                    // Queued again below, or by the next session if this one is killed before it gets there.
-                    let cause = "interrupted: the program ended before the verdict";
-                    self.study.annotate(trial.number, &attributes::interrupted(cause))?;
-                    self.study.tell(trial.number, Outcome::Fail)?;
-                    self.log(format!("trial {} was interrupted: it is void and queued again", trial.number));
-                }
-            }
-        }
-        // A void trial whose parameters were to come again, and did not get to.
-        let owed: Vec<_> = self.study.trials().iter().filter(|trial| attributes::is_owed(trial)).cloned().collect();
-        for trial in owed {
-            if !self.study.trials().iter().any(|other| Origin::of(&other.user_attributes).parent == Some(trial.number))
-            {
-                let origin = if attributes::was_interrupted(&trial) {
-                    // The same seed as before: the study goes on as if nothing had happened.
-                    Origin::interrupted(&trial)
-                } else {
-                    Origin::rerun_of(trial.number)
-                };
-                self.study.enqueue(&trial.parameters, &origin.attributes())?;
-            }
-        }
-        Ok(())
+        self.tell_pending().map(drop)
     }
 
     fn write_judgement(&mut self, trial: u32, rerun: bool) -> Result<(), StudyError> {
@@ -516,36 +353,7 @@ impl Life {
     }
 
     fn log(&mut self, message: String) {
-        self.outbox.push(Record::Log(crate::recording::record::LogRecord {
-            level: crate::recording::record::Level::Info,
-            source: "study".to_owned(),
-            message,
-        }));
-    }
-
-    /// What the control thread is given for the trial `number`.
-    fn spec(&self, number: u32) -> TrialSpec {
-        let row = &self.rows[&number];
-        let control = &self.plan.control;
-        let value = |name: &str| row.parameters.iter().find(|(n, _)| n == name).map_or(0.0, |(_, value)| *value);
-        let has_f1 = self.plan.parameters.iter().any(|parameter| parameter.name == "f1");
-        let seed = self.study.trials().iter().find(|trial| trial.number == number).and_then(attributes::seed_of);
-        TrialSpec {
-            trial: number,
-            task: self.plan.task,
-            jump: JumpParameters {
-                f0_hz: value("f0"),
-                f1_hz: if has_f1 { value("f1") } else { control.f1_hz },
-                fx_n: value("Fx"),
-                fy_n: value("Fy"),
-                fz_n: value("Fz"),
-            },
-            gains: control.gains(),
-            stance_leg: control.stance_leg(),
-            vmc: control.vmc,
-            jumps: control.jumps,
-            seed: seed.unwrap_or_else(|| trial_seed(self.plan.seed, number)),
-        }
+        self.outbox.push(Record::Log(LogRecord { level: Level::Info, source: "study".to_owned(), message }));
     }
 }
 
@@ -559,12 +367,4 @@ fn value_of(row: &TrialRecord, verdict: Verdict, plan: &Plan) -> Option<f64> {
             row.measured.as_ref().map(|measured| objective::value(plan.task, measured, plan.control.jumps))
         }),
     }
-}
-
-/// The seed of one trial's noise and terrain: the study's seed and the number, mixed (SplitMix64 finalizer, Steele et al. 2014).
-fn trial_seed(study: u64, trial: u32) -> u64 {
-    let mut z = study.wrapping_add(u64::from(trial).wrapping_add(1).wrapping_mul(0x9E37_79B9_7F4A_7C15));
-    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-    z ^ (z >> 31)
 }

@@ -5,11 +5,12 @@ use std::path::Path;
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use proptest::prelude::*;
+use quadfrog::realtime::pre_arm::{Check, CheckState};
 use quadfrog::realtime::telemetry::{Counters, Estimate, Mode, Phase, StageTimes, Tick};
 use quadfrog::recording::player::{Played, Player};
 use quadfrog::recording::record::*;
 use quadfrog::recording::writer::Writer;
-use quadfrog::robot::{Battery, Imu, JointCommand, MotorCommand, RobotState, Truth};
+use quadfrog::robot::{Battery, Imu, JointCommand, LinkStatus, MotorCommand, RobotState, Truth};
 
 /// Log time of engine time 0 in these tests: 2026-11-21 00:00 UTC.
 pub const START_UTC_NS: u64 = 1_795_219_200_000_000_000;
@@ -141,6 +142,26 @@ impl Draw {
         }
     }
 
+    fn link(&mut self) -> LinkStatus {
+        LinkStatus {
+            received: self.word(),
+            lost: self.word(),
+            late: self.word(),
+            duplicate: self.word(),
+            corrupt: self.word(),
+            wrong_length: self.word(),
+            foreign: self.word(),
+            reboots: self.word(),
+            sent: self.word(),
+            send_errors: self.word(),
+            state_age_ms: self.word() as u32,
+            rate_hz: self.word() as u32,
+            recent_received: self.word() as u32,
+            recent_lost: self.word() as u32,
+            recent_corrupt: self.word() as u32,
+        }
+    }
+
     fn risk(&mut self) -> Option<Risk> {
         self.option(|d| Risk {
             nearest_fall: d.option(Draw::number),
@@ -150,7 +171,7 @@ impl Draw {
         })
     }
 
-    /// A record of the kind `kind` of nine.
+    /// A record of the kind `kind`.
     fn record(&mut self, kind: usize) -> Record {
         match kind {
             0 => Record::Session(SessionInfo {
@@ -172,6 +193,13 @@ impl Draw {
                 recording: self.string(),
                 started: self.string(),
                 observe: self.yes(),
+                gains: self.several(|d| ParameterInfo {
+                    name: d.string(),
+                    unit: d.string(),
+                    low: d.number(),
+                    high: d.number(),
+                }),
+                approve: self.string(),
             }),
             1 => Record::Transition(Transition {
                 from: self.one_of(&Mode::ALL),
@@ -194,6 +222,11 @@ impl Draw {
                     proposed: d.number(),
                 }),
                 risk: self.risk(),
+                gains: self.several(|d| ProposedParameter {
+                    name: d.string(),
+                    value: d.number(),
+                    proposed: d.number(),
+                }),
             }),
             4 => Record::Trial(TrialRecord {
                 trial: self.word() as u32,
@@ -214,6 +247,7 @@ impl Draw {
                 verdict: self.option(|d| d.one_of(&Verdict::ALL)),
                 note: self.string(),
                 risk: self.risk(),
+                gains: self.several(|d| (d.string(), d.number())),
             }),
             5 => Record::Command(CommandRecord { wish: self.string(), accepted: self.yes(), answer: self.string() }),
             6 => Record::Counters(Counters {
@@ -223,13 +257,53 @@ impl Draw {
                 ticks_not_shown: self.word(),
                 commands_refused: self.word(),
                 state_age_ms: self.word() as u32,
+                link: self.option(Draw::link),
             }),
             7 => Record::Log(LogRecord {
                 level: self.one_of(&[Level::Info, Level::Warning, Level::Error]),
                 source: self.string(),
                 message: self.string(),
             }),
-            _ => Record::FaultTicks(vec![self.tick(), self.tick()]),
+            8 => Record::PreArm(self.several(|d| PreArmCheck {
+                check: d.one_of(&Check::ALL),
+                found: d.string(),
+                needed: d.string(),
+                state: d.one_of(&CheckState::ALL),
+            })),
+            9 => Record::FaultTicks(vec![self.tick(), self.tick()]),
+            10 => Record::Search(Search {
+                budget: self.word() as u32,
+                counted: self.word() as u32,
+                parameters: self.several(|d| SearchedParameter {
+                    name: d.string(),
+                    low: d.number(),
+                    high: d.number(),
+                    least: d.number(),
+                    most: d.number(),
+                    fixed: d.option(|d| Fixed { value: d.number(), trials: d.word() as u32 }),
+                }),
+                confirming: self.option(|d| d.word() as u32),
+            }),
+            11 => Record::Insight(Insight {
+                trial: self.word() as u32,
+                parameters: self.several(|d| ParameterInsight {
+                    name: d.string(),
+                    proposed: d.number(),
+                    importance: d.option(Draw::number),
+                    at: d.several(Draw::number),
+                    good: d.several(Draw::number),
+                    bad: d.several(Draw::number),
+                }),
+            }),
+            _ => Record::Points(self.several(|d| PointRecord {
+                parameters: d.several(|d| (d.string(), d.number())),
+                trials: d.several(|d| d.word() as u32),
+                stood: d.word() as u32,
+                mean: d.number(),
+                deviation: d.option(Draw::number),
+                contender: d.yes(),
+                confidence: d.option(Draw::number),
+            })),
         }
     }
 }
@@ -246,7 +320,7 @@ pub fn any_tick() -> impl Strategy<Value = Tick> {
 
 /// Any record; every kind is as likely.
 pub fn any_record() -> impl Strategy<Value = Record> {
-    (0..9_usize, draw(800)).prop_map(|(kind, mut draw)| draw.record(kind))
+    (0..13_usize, draw(800)).prop_map(|(kind, mut draw)| draw.record(kind))
 }
 
 /// A session as a study in the simulator begins it.
@@ -271,6 +345,8 @@ pub fn session() -> SessionInfo {
         recording: "session.mcap".into(),
         started: "2026-11-21T00:00:00Z".into(),
         observe: false,
+        gains: vec![parameter("kp", "N/m", 100.0, 1000.0)],
+        approve: "each".into(),
     }
 }
 
@@ -358,6 +434,7 @@ pub fn study(seconds: u64) -> (Vec<Tick>, Vec<Stamped>) {
                 verdict,
                 note: String::new(),
                 risk: None,
+                gains: Vec::new(),
             })
         };
         add(start - 500, stage(Stage::Proposed));
@@ -370,6 +447,7 @@ pub fn study(seconds: u64) -> (Vec<Tick>, Vec<Stamped>) {
                 parent: None,
                 parameters: vec![ProposedParameter { name: "Fx".into(), value: 100.0, proposed: 100.0 }],
                 risk: None,
+                gains: Vec::new(),
             }),
         );
         add(start, stage(Stage::Running));

@@ -49,8 +49,10 @@ pub enum Action {
     ZoomOut,
     ChartMode,
     Series,
+    ChooseSeries,
     Ghost,
     Sort,
+    Reverse,
     Filter,
     Columns,
     BestOnly,
@@ -66,6 +68,7 @@ pub enum Action {
     NextMarker,
     Palette,
     Help,
+    Mouse,
     Redraw,
     Suspend,
     Quit,
@@ -170,7 +173,7 @@ const fn fixed(info: ActionInfo) -> ActionInfo {
 
 /// Every action, once.
 #[rustfmt::skip]
-pub const ACTIONS: [ActionInfo; 59] = {
+pub const ACTIONS: [ActionInfo; 62] = {
     use Action as A;
     use Group as G;
     [
@@ -216,12 +219,14 @@ pub const ACTIONS: [ActionInfo; 59] = {
         row(A::ZoomIn, "zoom-in", &["+"], G::Charts, "shorter time window", always),
         row(A::ZoomOut, "zoom-out", &["-"], G::Charts, "longer time window", always),
         row(A::ChartMode, "chart-mode", &["w"], G::Charts, "sweep or scroll", always),
-        row(A::Series, "series", &["t"], G::Charts, "next set of series", always),
-        row(A::Ghost, "ghost", &["c"], G::Charts, "lay the best (Trials: the selected) trial under the charts", may_ghost),
+        row(A::Series, "series", &["t"], G::Charts, "next set: attitude and feet, forces, joints", always),
+        row(A::ChooseSeries, "choose-series", &["T"], G::Charts, "choose the series of the charts", always),
+        row(A::Ghost, "ghost", &["c"], G::Charts, "lay the best (Trials: the selected) trial under the charts; a second one: compare the two", may_ghost),
 
         row(A::Sort, "sort", &["s"], G::Tables, "sort by the next column", in_trials),
+        row(A::Reverse, "reverse", &["S"], G::Tables, "turn the order round", in_trials),
         row(A::Filter, "filter", &["F"], G::Tables, "Trials: only a verdict; Log: only a level", in_table),
-        row(A::Columns, "columns", &["x"], G::Tables, "next set of columns", in_trials),
+        row(A::Columns, "columns", &["x"], G::Tables, "choose the columns", in_trials),
         row(A::BestOnly, "best-only", &["b"], G::Tables, "only trials that were the best so far", in_trials),
         row(A::Search, "search", &["/"], G::Tables, "Trials: jump to a number; Log: search", in_table),
         row(A::Copy, "copy", &["y"], G::Tables, "copy the row to the clipboard of your terminal", in_trials),
@@ -237,6 +242,7 @@ pub const ACTIONS: [ActionInfo; 59] = {
 
         row(A::Palette, "palette", &[":"], G::Program, "all actions, and why some are not possible now", always),
         row(A::Help, "help", &["?"], G::Program, "this help", always),
+        row(A::Mouse, "mouse", &["M"], G::Program, "mouse on or off: tabs, rows, wheel", always),
         row(A::Redraw, "redraw", &["Ctrl-L"], G::Program, "draw the whole screen again", always),
         row(A::Suspend, "suspend", &["Ctrl-Z"], G::Program, "suspend the program (only while the robot is not armed)", may_suspend),
         row(A::Quit, "quit", &["q"], G::Program, "quit; asks if the robot is armed", always),
@@ -300,8 +306,11 @@ fn may_sit_down(model: &Model) -> Legality {
     }
 }
 
-fn may_acknowledge(model: &Model) -> Legality {
-    may_wish(model)?;
+/// Whether there is something to acknowledge. An observer may, too: STOP is everybody's, and so is letting go afterwards.
+pub fn may_acknowledge(model: &Model) -> Legality {
+    if !model.session.observe {
+        may_wish(model)?;
+    }
     match model.mode() {
         Mode::Damped | Mode::Fault => Ok(()),
         _ => refuse("nothing waits to be acknowledged"),

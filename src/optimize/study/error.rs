@@ -81,6 +81,9 @@ pub enum StudyError {
         /// The number that it was drafted for.
         trial: u32,
     },
+    /// No trial more may begin at present.
+    #[error("the study has as many trials as it may have, those still running counted")]
+    Full,
     /// The study was deleted meanwhile.
     #[error("study `{0}` is no longer in the journal: it was deleted or renamed by another program")]
     Gone(String),

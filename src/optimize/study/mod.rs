@@ -23,9 +23,12 @@ use jiff::Timestamp;
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
+use std::time::Duration;
 
 /// Trial system attribute: seed of the streams and how far they had been read when the trial began.
 pub const DRAWS: &str = "quadfrog:draws";
+/// Study system attribute: how many workers have joined so far.
+const WORKERS: &str = "quadfrog:workers";
 /// Study system attribute: names of the objectives, as Optuna and its dashboard know it.
 const METRIC_NAMES: &str = "study:metric_names";
 
@@ -38,6 +41,34 @@ pub enum Storage {
     File(PathBuf),
     /// On a Redis server, given as `redis://host:port/db`: for workers on many hosts.
     Redis(String),
+}
+
+impl Storage {
+    /// The journal that is kept there.
+    ///
+    /// # Errors
+    /// If it cannot be read.
+    pub fn journal(&self, durability: Durability) -> Result<Journal, JournalError> {
+        match self {
+            Storage::Memory => Ok(Journal::in_memory()),
+            Storage::File(path) => Journal::open(JournalFile::new(path, durability, LOCK_GRACE)?),
+            Storage::Redis(url) => Journal::connect(JournalRedis::new(url, "")?),
+        }
+    }
+}
+
+impl std::fmt::Display for Storage {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Storage::Memory => write!(f, "memory"),
+            Storage::File(path) => write!(f, "{}", path.display()),
+            // An address may hold a password before an @.
+            Storage::Redis(url) => match url.rsplit_once('@') {
+                Some((_, address)) => write!(f, "redis://{address}"),
+                None => write!(f, "{url}"),
+            },
+        }
+    }
 }
 
 /// What a study is.
@@ -94,11 +125,7 @@ impl Study {
     /// If the journal cannot be read or written, or holds a study of that name with another direction or another scale of
     /// a parameter.
     pub fn open(storage: Storage, options: StudyOptions) -> Result<Study, StudyError> {
-        let mut journal = match storage {
-            Storage::Memory => Journal::in_memory(),
-            Storage::File(path) => Journal::open(JournalFile::new(&path, options.durability, LOCK_GRACE)?)?,
-            Storage::Redis(url) => Journal::connect(JournalRedis::new(&url, "")?)?,
-        };
+        let mut journal = storage.journal(options.durability)?;
         if journal.replay().find(&options.name).is_none() {
             journal.commit(|replay| {
                 let exists = replay.find(&options.name).is_some();
@@ -112,6 +139,26 @@ impl Study {
         study.check_compatible()?;
         study.streams.advance_to(study.draws_so_far());
         Ok(study)
+    }
+
+    /// Takes part as one more worker: gets the next free number, from 1 (0 is the session that made the study), and
+    /// proposes from then on with streams of its own seed, [`worker_seed`].
+    ///
+    /// # Errors
+    /// If the journal cannot be read or written.
+    pub fn join(&mut self) -> Result<u32, StudyError> {
+        let study = self.id;
+        let mut worker = 0;
+        self.journal.commit(|replay| {
+            let joined = replay.studies().get(study).and_then(|record| record.system_attributes.get(WORKERS)?.as_u64());
+            worker = joined.unwrap_or(0) as u32 + 1;
+            let key = WORKERS.to_owned();
+            Ok::<_, JournalError>(vec![Operation::StudySystemAttribute { study, key, value: Value::from(worker) }])
+        })?;
+        self.options.sampler.seed = worker_seed(self.options.sampler.seed, worker);
+        self.streams = Streams::new(self.options.sampler.seed);
+        self.streams.advance_to(self.draws_so_far());
+        Ok(worker)
     }
 
     /// Takes in what other writers have appended.
@@ -170,6 +217,23 @@ impl Study {
         }
     }
 
+    /// Searches `space` from now on; its parameters must be those of before, only bounds may differ. As in Optuna, a
+    /// parameter whose bounds have changed leaves the joint space and is sampled by itself from then on; earlier trials
+    /// outside the new bounds stay in the history.
+    ///
+    /// # Errors
+    /// [`StudyError::Incompatible`] if the scale of a parameter differs from the stored one. The old space stands then.
+    pub fn search(&mut self, space: Space) -> Result<(), StudyError> {
+        let before = std::mem::replace(&mut self.options.space, space);
+        self.check_compatible().inspect_err(|_| self.options.space = before)
+    }
+
+    /// The draft for another waiting trial: one that was queued in a fork, and then in this study too.
+    pub fn redirected(&self, draft: &Draft, waiting: u32) -> Result<Draft, StudyError> {
+        let id = self.trial(waiting)?.id;
+        Ok(Draft { number: waiting, waiting: Some(id), ..draft.clone() })
+    }
+
     /// Begins the trial of a draft: from here on it is running, in the journal too. Values in `overrides` replace those of
     /// the draft and are recorded as fixed; the others are as drafted. A draft of which everything is given uses no random
     /// numbers. Returns the number of the trial.
@@ -184,6 +248,21 @@ impl Study {
         overrides: &[(String, f64)],
         attributes: &[(String, Value)],
     ) -> Result<u32, StudyError> {
+        self.begin_if(draft, overrides, attributes, |_| true)
+    }
+
+    /// [`Study::begin`] if `room` says, of all trials at the very moment, that there is room for one more: workers on a
+    /// shared journal can keep a budget to the trial.
+    ///
+    /// # Errors
+    /// As [`Study::begin`]; [`StudyError::Full`] if there is no room.
+    pub fn begin_if(
+        &mut self,
+        draft: &Draft,
+        overrides: &[(String, f64)],
+        attributes: &[(String, Value)],
+        room: impl Fn(&[Trial]) -> bool,
+    ) -> Result<u32, StudyError> {
         self.check_parameters(overrides)?;
         let stale = || StudyError::StaleDraft { trial: draft.number };
         if draft.before != self.streams.draws() || draft.seed != self.options.sampler.seed {
@@ -196,6 +275,9 @@ impl Study {
         let (study, seed) = (self.id, draft.seed);
         let mut id = 0;
         self.journal.commit(|replay| {
+            if !replay.studies().get(study).is_some_and(|record| room(&record.trials)) {
+                return Err(StudyError::Full);
+            }
             let now = Timestamp::now();
             let mut operations = Vec::new();
             match draft.waiting {
@@ -287,15 +369,33 @@ impl Study {
     /// # Errors
     /// [`StudyError::UnknownParameter`] or [`StudyError::Value`] for a parameter that cannot be.
     pub fn enqueue(&mut self, parameters: &[(String, f64)], attributes: &[(String, Value)]) -> Result<u32, StudyError> {
+        let queued = self.enqueue_unless(parameters, attributes, |_| false)?;
+        queued.ok_or_else(|| StudyError::Gone(self.options.name.clone()))
+    }
+
+    /// [`Study::enqueue`] unless `done` says, of all trials at the very moment, that it is not needed any more: of several
+    /// programs that see the same need one queues. None if it was not needed.
+    ///
+    /// # Errors
+    /// As [`Study::enqueue`].
+    pub fn enqueue_unless(
+        &mut self,
+        parameters: &[(String, f64)],
+        attributes: &[(String, Value)],
+        done: impl Fn(&[Trial]) -> bool,
+    ) -> Result<Option<u32>, StudyError> {
         self.check_parameters(parameters)?;
         let fixed: Map<String, Value> = parameters.iter().map(|(n, v)| (n.clone(), Value::from(*v))).collect();
         let user: Map<String, Value> = attributes.iter().cloned().collect();
         let template = Some(Box::new(Template::waiting(fixed, user)));
-        let create = Operation::CreateTrial { study: self.id, started: None, template };
-        let effects = self.journal.commit(|_| Ok::<_, JournalError>(vec![create.clone()]))?;
+        let study = self.id;
+        let create = Operation::CreateTrial { study, started: None, template };
+        let effects = self.journal.commit(|replay| {
+            let needed = replay.studies().get(study).is_some_and(|record| !done(&record.trials));
+            Ok::<_, JournalError>(if needed { vec![create.clone()] } else { Vec::new() })
+        })?;
         let created = effects.iter().find_map(|e| if let Effect::Created(id) = e { Some(*id) } else { None });
-        let trial = created.and_then(|id| self.journal.replay().trial(id));
-        trial.map(|t| t.number).ok_or_else(|| StudyError::Gone(self.options.name.clone()))
+        Ok(created.and_then(|id| self.journal.replay().trial(id)).map(|t| t.number))
     }
 
     /// Sets user attributes of the study itself.
@@ -338,6 +438,13 @@ impl Study {
         self.trials().iter().filter(|t| t.state == TrialState::Running)
     }
 
+    /// For how long a trial has been running, by this machine's clock; none if nobody has said when it began. A clock that
+    /// was set back makes it 0.
+    pub fn age(trial: &Trial) -> Option<Duration> {
+        let elapsed = Timestamp::now().duration_since(trial.started?);
+        Some(Duration::try_from(elapsed).unwrap_or_default())
+    }
+
     /// Trials that wait to be run, in the order in which they will be.
     pub fn waiting(&self) -> impl Iterator<Item = &Trial> {
         self.trials().iter().filter(|t| t.state == TrialState::Waiting)
@@ -374,6 +481,18 @@ impl Study {
             .filter_map(ours)
             .fold(Draws::default(), |a, b| Draws { model: a.model.max(b.model), startup: a.startup.max(b.startup) })
     }
+}
+
+/// The seed of a worker's streams: that of the study for worker 0; for the others the upper half of a mix of both
+/// (SplitMix64 finalizer, Steele et al. 2014), so that no two workers propose the same points.
+pub fn worker_seed(study: u32, worker: u32) -> u32 {
+    if worker == 0 {
+        return study;
+    }
+    let mut z = (u64::from(worker) << 32 | u64::from(study)).wrapping_add(0x9E37_79B9_7F4A_7C15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    (z >> 32) as u32
 }
 
 /// The operations that make a study.

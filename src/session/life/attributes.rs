@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 
 use serde_json::{Value, json};
 
-use crate::optimize::study::Outcome;
-use crate::optimize::trial::{Trial, TrialState};
+use crate::optimize::study::{DRAWS, Outcome};
+use crate::optimize::trial::{GAINS, Trial, TrialState};
 use crate::recording::record::{Measured, ParameterInfo, Proposal, Risk, Source, TrialRecord, Verdict};
 
 const SOURCE: &str = "source";
@@ -22,6 +22,8 @@ const HAND_VALUE: &str = "hand_value";
 const RERUN: &str = "rerun";
 const INTERRUPTED: &str = "interrupted";
 const RISK: &str = "risk";
+const FIXED: &str = "fixed";
+const WORKER: &str = "worker";
 
 type Attributes = Vec<(String, Value)>;
 
@@ -34,27 +36,37 @@ pub struct Origin {
     pub parent: Option<u32>,
     /// The seed that it is to run with; none for one of its own.
     pub seed: Option<u64>,
+    /// The gains that it is to run with; empty for those of the configuration.
+    pub gains: Vec<(String, f64)>,
 }
 
 impl Origin {
     /// The sampler's own.
     pub fn sampler() -> Origin {
-        Origin { source: Source::Sampler, parent: None, seed: None }
+        Origin { source: Source::Sampler, parent: None, seed: None, gains: Vec::new() }
     }
 
     /// A point that somebody queued.
     pub fn queued() -> Origin {
-        Origin { source: Source::Queued, parent: None, seed: None }
+        Origin { source: Source::Queued, ..Origin::sampler() }
     }
 
-    /// A repetition with noise of its own.
-    pub fn rerun_of(trial: u32) -> Origin {
-        Origin { source: Source::Rerun, parent: Some(trial), seed: None }
+    /// A repetition with the same gains and with noise of its own. What confirmed the best still does.
+    pub fn rerun_of(row: &TrialRecord) -> Origin {
+        let source = if row.source == Source::Confirm { Source::Confirm } else { Source::Rerun };
+        Origin { source, parent: Some(row.trial), seed: None, gains: row.gains.clone() }
+    }
+
+    /// A repeat of a point that may be the best, with the gains of its first trial.
+    pub fn confirming(first: &Trial) -> Origin {
+        Origin { source: Source::Confirm, parent: Some(first.number), seed: None, gains: gains_of(first) }
     }
 
     /// The same trial once more, after a crash, as if nothing had happened.
     pub fn interrupted(trial: &Trial) -> Origin {
-        Origin { source: Source::Rerun, parent: Some(trial.number), seed: seed_of(trial) }
+        let confirms = source_of(trial) == Source::Confirm;
+        let source = if confirms { Source::Confirm } else { Source::Rerun };
+        Origin { source, parent: Some(trial.number), seed: seed_of(trial), gains: gains_of(trial) }
     }
 
     /// As kept with the queued trial; without attributes it was queued by another program.
@@ -63,6 +75,7 @@ impl Origin {
             source: named(attributes.get(SOURCE), Source::ALL, Source::name).unwrap_or(Source::Queued),
             parent: number(attributes.get(PARENT)),
             seed: attributes.get(SEED).and_then(seed_from),
+            gains: numbers(attributes.get(GAINS)),
         }
     }
 
@@ -74,6 +87,9 @@ impl Origin {
         }
         if let Some(seed) = self.seed {
             kept.push((SEED.to_owned(), seed_text(seed)));
+        }
+        if !self.gains.is_empty() {
+            kept.push((GAINS.to_owned(), object(&self.gains)));
         }
         kept
     }
@@ -89,16 +105,34 @@ pub fn judgement_of(trial: &Trial) -> Option<Outcome> {
 }
 
 /// What is kept when a trial begins.
-pub fn began(proposal: &Proposal, seed: u64, recording: &str) -> Attributes {
-    let mut kept = Origin { source: proposal.source, parent: proposal.parent, seed: Some(seed) }.attributes();
+pub fn began(proposal: &Proposal, began: &Began<'_>) -> Attributes {
+    let gains = proposal.gains.iter().map(|gain| (gain.name.clone(), gain.value)).collect();
+    let origin = Origin { source: proposal.source, parent: proposal.parent, seed: Some(began.seed), gains };
+    let mut kept = origin.attributes();
     kept.push((VERSION.to_owned(), json!(env!("CARGO_PKG_VERSION"))));
-    if !recording.is_empty() {
-        kept.push((RECORDING.to_owned(), json!(recording)));
+    kept.push((WORKER.to_owned(), json!(began.worker)));
+    if !began.recording.is_empty() {
+        kept.push((RECORDING.to_owned(), json!(began.recording)));
     }
     if let Some(risk) = &proposal.risk {
         kept.push((RISK.to_owned(), json!(risk)));
     }
+    if !began.fixed.is_empty() {
+        kept.push((FIXED.to_owned(), object(began.fixed)));
+    }
     kept
+}
+
+/// What is kept with a trial besides its proposal.
+pub struct Began<'a> {
+    /// Its seed.
+    pub seed: u64,
+    /// Who runs it: 0 is the session that has the study's folder.
+    pub worker: u32,
+    /// Where it is recorded; empty where it is not.
+    pub recording: &'a str,
+    /// Parameters that the operator had fixed for some trials.
+    pub fixed: &'a [(String, f64)],
 }
 
 /// What is kept when a trial is judged; a verdict that was taken back is kept as null.
@@ -139,6 +173,27 @@ pub fn was_interrupted(trial: &Trial) -> bool {
     trial.user_attributes.get(INTERRUPTED).and_then(Value::as_bool) == Some(true)
 }
 
+/// Who chose a trial's parameters.
+pub fn source_of(trial: &Trial) -> Source {
+    named(trial.user_attributes.get(SOURCE), Source::ALL, Source::name).unwrap_or(Source::Queued)
+}
+
+/// The gains that a trial ran with; empty where nobody has kept them.
+pub fn gains_of(trial: &Trial) -> Vec<(String, f64)> {
+    numbers(trial.user_attributes.get(GAINS))
+}
+
+/// Whether `name` was fixed at `value` for this trial.
+pub fn was_fixed(trial: &Trial, name: &str, value: f64) -> bool {
+    numbers(trial.user_attributes.get(FIXED)).iter().any(|(n, v)| n == name && *v == value)
+}
+
+/// Which worker of this program runs a trial; none for a trial of another program.
+pub fn worker_of(trial: &Trial) -> Option<u32> {
+    trial.system_attributes.get(DRAWS)?;
+    Some(number(trial.user_attributes.get(WORKER)).unwrap_or(0))
+}
+
 /// The seed that a trial ran with.
 pub fn seed_of(trial: &Trial) -> Option<u64> {
     trial.user_attributes.get(SEED).and_then(seed_from)
@@ -177,7 +232,19 @@ pub fn row_of(trial: &Trial, note: String, order: &[ParameterInfo]) -> TrialReco
         verdict: named(kept.get(VERDICT), Verdict::ALL, Verdict::name).or(default_verdict),
         note,
         risk: kept.get(RISK).and_then(|risk| serde_json::from_value::<Risk>(risk.clone()).ok()),
+        gains: gains_of(trial),
     }
+}
+
+/// Numbers by name, as an attribute.
+pub fn object(list: &[(String, f64)]) -> Value {
+    Value::Object(list.iter().map(|(name, value)| (name.clone(), json!(value))).collect())
+}
+
+/// Numbers by name of an attribute; empty where it is none.
+pub fn numbers(value: Option<&Value>) -> Vec<(String, f64)> {
+    let Some(Value::Object(map)) = value else { return Vec::new() };
+    map.iter().filter_map(|(name, value)| Some((name.clone(), value.as_f64()?))).collect()
 }
 
 /// A seed as text: JSON numbers of other programs do not hold 64 bits.

@@ -3,8 +3,11 @@
 use std::collections::BTreeMap;
 
 use super::attributes::Origin;
+use super::gains::listed;
 use crate::optimize::insight;
 use crate::optimize::study::{Draft, Study};
+use crate::optimize::trial::Trial;
+use crate::realtime::command::Gains;
 use crate::recording::record::{Proposal, ProposedParameter, Risk, Source};
 
 /// A card.
@@ -16,12 +19,34 @@ pub struct Card {
     /// The study as it will be when the trial begins: what is not told yet is told in it.
     outlook: Study,
     changed: BTreeMap<String, f64>,
+    /// The gains that the trial runs with if nobody changes them, in table order.
+    gains: Vec<(String, f64)>,
+    changed_gains: BTreeMap<String, f64>,
+    /// Parameters that the operator has fixed for some trials, as far as they are in the draft.
+    held: Vec<(String, f64)>,
 }
 
 impl Card {
-    /// A card of the next draft of `outlook`; `revision` must be one that no earlier card had.
-    pub fn new(outlook: Study, revision: u32) -> Card {
-        Card { draft: outlook.draft(), revision, outlook, changed: BTreeMap::new() }
+    /// A card of the next draft of `outlook`, in which the parameters `fixed` are not searched unless the draft was queued
+    /// with values of its own. `gains` are those of the configuration; `revision` must be one that no earlier card had.
+    pub fn new(outlook: Study, fixed: &[(String, f64)], gains: &Gains, revision: u32) -> Card {
+        let queued = outlook.waiting().next().map(Trial::fixed).unwrap_or_default();
+        let fixed: Vec<_> = fixed.iter().filter(|(name, _)| queued.iter().all(|(n, _)| n != name)).cloned().collect();
+        let draft = outlook.draft_with(&fixed);
+        let mut card = Card {
+            draft,
+            revision,
+            outlook,
+            changed: BTreeMap::new(),
+            gains: listed(gains),
+            changed_gains: BTreeMap::new(),
+            held: fixed,
+        };
+        let brought = card.origin().gains;
+        for (name, value) in &mut card.gains {
+            *value = brought.iter().find(|(n, _)| n == name).map_or(*value, |(_, brought)| *brought);
+        }
+        card
     }
 
     /// The number that the trial will have.
@@ -40,15 +65,52 @@ impl Card {
         self.revision = revision;
     }
 
+    /// Changes one gain; the one that it would have anyway is no change.
+    pub fn set_gain(&mut self, name: &str, value: f64, revision: u32) {
+        if self.gains.iter().any(|(n, v)| n == name && *v == value) {
+            self.changed_gains.remove(name);
+        } else {
+            self.changed_gains.insert(name.to_owned(), value);
+        }
+        self.revision = revision;
+    }
+
+    /// Makes the changes of an earlier card, as far as `keeps` lets them through.
+    pub fn inherit(&mut self, earlier: &Card, keeps: impl Fn(&str, f64) -> bool) {
+        let kept = earlier.changed.iter().filter(|(name, value)| keeps(name, **value));
+        for (name, value) in kept {
+            self.set(name, *value, self.revision);
+        }
+        for (name, value) in &earlier.changed_gains {
+            self.set_gain(name, *value, self.revision);
+        }
+    }
+
+    /// Whether the operator has changed anything.
+    pub fn is_changed(&self) -> bool {
+        !self.changed.is_empty() || !self.changed_gains.is_empty()
+    }
+
+    /// The study as it will be when the trial begins.
+    pub fn outlook(&self) -> &Study {
+        &self.outlook
+    }
+
     /// Takes all changes back.
     pub fn clear(&mut self, revision: u32) {
         self.changed.clear();
+        self.changed_gains.clear();
         self.revision = revision;
     }
 
     /// The changed parameters.
     pub fn overrides(&self) -> Vec<(String, f64)> {
         self.changed.iter().map(|(name, value)| (name.clone(), *value)).collect()
+    }
+
+    /// The fixed parameters that this trial runs with: those that were not changed for it alone.
+    pub fn held(&self) -> Vec<(String, f64)> {
+        self.held.iter().filter(|(name, _)| !self.changed.contains_key(name)).cloned().collect()
     }
 
     /// Where the draft comes from.
@@ -69,11 +131,17 @@ impl Card {
         Proposal {
             trial: self.number(),
             revision: self.revision,
-            source: if self.changed.is_empty() { origin.source } else { Source::Operator },
+            source: if self.is_changed() { Source::Operator } else { origin.source },
             parent: origin.parent,
             risk: self.risk(&parameters),
             parameters,
+            gains: self.gains.iter().map(|(name, value)| self.gain(name, *value)).collect(),
         }
+    }
+
+    fn gain(&self, name: &str, proposed: f64) -> ProposedParameter {
+        let value = self.changed_gains.get(name).copied().unwrap_or(proposed);
+        ProposedParameter { name: name.to_owned(), value, proposed }
     }
 
     /// How near earlier falls are; none before the first trial that counts.

@@ -16,9 +16,9 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::{Block, Clear, Paragraph, Wrap};
 use tui_input::Input;
 
-use super::{cut, help, number, proposal, span, trials};
+use super::{cut, help, number, proposal, span, trial_text};
 use crate::action::Action;
-use crate::dialog::{APPROVAL_PAUSE, Dialog, OverrideForm, Purpose, palette_rows};
+use crate::dialog::{APPROVAL_PAUSE, Choice, Dialog, OverrideForm, Purpose, palette_rows};
 use crate::model::Model;
 use crate::theme::{Glyphs, Role, Theme};
 
@@ -46,10 +46,11 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
             popup(frame, area, model, &field_title(*purpose), 64, field(model, *purpose, input, problem.as_deref()));
         }
         Dialog::Palette { input, selected } => render_palette(frame, area, model, input, *selected),
+        Dialog::Choose { what, selected } => render_choice(frame, area, model, *what, *selected),
         Dialog::Help { scroll } => render_help(frame, area, model, *scroll),
         Dialog::Details { trial } => {
             if let Some(record) = model.trials.get(trial) {
-                let rows = trials::details(model, record);
+                let rows = trial_text::details(model, record);
                 let line = |(name, value): (String, String)| {
                     Line::from(vec![span(&model.theme, Role::Quiet, format!("{name:<15}")), Span::raw(value)])
                 };
@@ -241,6 +242,32 @@ fn render_palette(frame: &mut Frame, area: Rect, model: &Model, input: &Input, s
         let text = cut(&format!("{key:<9} {name:<16}{text}"), usize::from(inner.width));
         let style = if index == selected { theme.style(Role::Selected) } else { theme.style(role) };
         frame.render_widget(Line::from(Span::styled(text, style)), area);
+    }
+}
+
+fn render_choice(frame: &mut Frame, area: Rect, model: &Model, what: Choice, selected: usize) {
+    let theme = &model.theme;
+    let title = match what {
+        Choice::Series => "Series of the charts",
+        Choice::Columns => "Columns of the trial table",
+    };
+    let rows = what.rows(model);
+    let inner = open_box(frame, area, theme, title, 66, rows.len() as u16 + 2);
+    // A terminal that is too low shows the lines around the chosen one.
+    let first = (selected + 1).saturating_sub(usize::from(inner.height));
+    for (line, (index, (name, help, on))) in rows.iter().enumerate().skip(first).enumerate() {
+        if line >= usize::from(inner.height) {
+            break;
+        }
+        let area = Rect { y: inner.y + line as u16, height: 1, ..inner };
+        let mark = if *on { "[x]" } else { "[ ]" };
+        let text = cut(&format!("{mark} {name:<11} {help}"), usize::from(inner.width));
+        let role = match (index == selected, on) {
+            (true, _) => Role::Selected,
+            (false, true) => Role::Text,
+            (false, false) => Role::Quiet,
+        };
+        frame.render_widget(Line::from(span(theme, role, text)), area);
     }
 }
 

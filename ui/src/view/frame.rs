@@ -12,7 +12,7 @@ use ratatui::layout::{Alignment, Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
 
-use super::{MIN_COLUMNS, MIN_ROWS, clock, cut, number, span};
+use super::{MIN_COLUMNS, MIN_ROWS, clock, clock_ms, cut, number, span};
 use crate::action::Action;
 use crate::model::{Model, View};
 use crate::theme::Role;
@@ -26,7 +26,7 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let recording = Line::from(recording(model));
     let width = recording.width() as u16;
     let [left, right] = Layout::horizontal([Constraint::Fill(1), Constraint::Length(width)]).spacing(1).areas(first);
-    frame.render_widget(Line::from(identity(model)), left);
+    frame.render_widget(Line::from(identity(model, area.width)), left);
     frame.render_widget(recording, right);
     frame.render_widget(Line::from(condition(model)), second);
 }
@@ -58,7 +58,7 @@ fn backend(model: &Model) -> Span<'static> {
     }
 }
 
-fn identity(model: &Model) -> Vec<Span<'static>> {
+fn identity(model: &Model, width: u16) -> Vec<Span<'static>> {
     let theme = &model.theme;
     let mut spans = vec![mode_span(model), Span::raw(" "), backend(model), Span::raw("  ")];
     let session = &model.session;
@@ -66,12 +66,18 @@ fn identity(model: &Model) -> Vec<Span<'static>> {
         spans.push(span(theme, Role::Warning, "OBSERVING  "));
     }
     spans.push(Span::raw(session.task.clone()));
+    // A narrow terminal has room for the best value only if the words are left out.
+    let narrow = width < 100;
     if let Some(info) = model.stage {
-        let finished = model.counted();
-        spans.push(Span::raw(format!("   trial #{}   {finished} of {} judged", info.trial, session.budget)));
+        let (finished, budget) = (model.counted(), session.budget);
+        let text = match narrow {
+            true => format!("  trial #{}  {finished}/{budget}", info.trial),
+            false => format!("   trial #{}   {finished} of {budget} judged", info.trial),
+        };
+        spans.push(Span::raw(text));
     }
     if let Some((best, value)) = model.best().and_then(|best| Some((best, best.value?))) {
-        spans.push(Span::raw("   best "));
+        spans.push(Span::raw(if narrow { "  best " } else { "   best " }));
         spans.push(span(theme, Role::Good, format!("{} {}", number(value), session.unit)));
         spans.push(span(theme, Role::Quiet, format!(" (#{})", best.trial)));
     }
@@ -81,8 +87,11 @@ fn identity(model: &Model) -> Vec<Span<'static>> {
 fn recording(model: &Model) -> Vec<Span<'static>> {
     let theme = &model.theme;
     if let Some(replay) = &model.replay {
-        let state = if replay.playing { format!("x{}", replay.speed) } else { "paused".to_owned() };
-        let text = format!("{} / {}  {state} ", clock(replay.time_ns), clock(replay.duration_ns));
+        // Steps are milliseconds; while it plays they would only flicker.
+        let at = if replay.playing { clock(replay.time_ns) } else { clock_ms(replay.time_ns) };
+        let speed = if replay.playing || replay.speed != 1.0 { format!(" x{}", replay.speed) } else { String::new() };
+        let paused = if replay.playing { "" } else { " paused" };
+        let text = format!("{at} / {}{paused}{speed} ", clock(replay.duration_ns));
         return vec![span(theme, Role::Text, text)];
     }
     let counters = &model.snapshot.counters;
@@ -134,9 +143,8 @@ fn condition(model: &Model) -> Vec<Span<'static>> {
     spans
 }
 
-/// The tabs, and at the right what the charts do.
-pub fn render_tabs(frame: &mut Frame, area: Rect, model: &Model) {
-    let theme = &model.theme;
+/// The tabs with their actions.
+fn tabs(model: &Model) -> impl Iterator<Item = (View, Action, String)> + '_ {
     let actions = [
         Action::LiveView,
         Action::TrialsView,
@@ -145,20 +153,44 @@ pub fn render_tabs(frame: &mut Frame, area: Rect, model: &Model) {
         Action::HealthView,
         Action::LogView,
     ];
-    let mut spans = Vec::new();
-    for (view, action) in View::ALL.into_iter().zip(actions) {
-        let text = format!(" {} {} ", model.keymap.key(action), view.name());
-        let role = if view == model.view { Role::Selected } else { Role::Quiet };
-        spans.push(span(theme, role, text));
-    }
+    View::ALL
+        .into_iter()
+        .zip(actions)
+        .map(|(view, action)| (view, action, format!(" {} {} ", model.keymap.key(action), view.name())))
+}
+
+/// The action of the tab in a column of the terminal.
+pub fn tab_at(model: &Model, column: u16) -> Option<Action> {
+    let mut end = 0;
+    tabs(model).find_map(|(_, action, text)| {
+        end += text.chars().count();
+        (usize::from(column) < end).then_some(action)
+    })
+}
+
+/// The tabs, and at the right where help is; while the charts are frozen, that they are, in every view.
+pub fn render_tabs(frame: &mut Frame, area: Rect, model: &Model) {
+    let theme = &model.theme;
+    let spans: Vec<Span> = tabs(model)
+        .map(|(view, _, text)| span(theme, if view == model.view { Role::Selected } else { Role::Quiet }, text))
+        .collect();
     frame.render_widget(Line::from(spans), area);
-    let help = vec![
-        span(theme, Role::Key, model.keymap.key(Action::Help)),
-        span(theme, Role::Quiet, " help  "),
-        span(theme, Role::Key, model.keymap.key(Action::Palette)),
-        span(theme, Role::Quiet, " actions "),
-    ];
-    frame.render_widget(Line::from(help).alignment(Alignment::Right), area);
+    let aside = match &model.live.frozen {
+        Some((_, at)) => {
+            let ago_s = model.clock.saturating_sub(*at).as_secs_f64();
+            vec![
+                span(theme, Role::Hardware, format!(" VIEW FROZEN -{ago_s:.1} s ")),
+                span(theme, Role::Key, format!(" {}", model.keymap.key(Action::Freeze))),
+            ]
+        }
+        None => vec![
+            span(theme, Role::Key, model.keymap.key(Action::Help)),
+            span(theme, Role::Quiet, " help  "),
+            span(theme, Role::Key, model.keymap.key(Action::Palette)),
+            span(theme, Role::Quiet, " actions "),
+        ],
+    };
+    frame.render_widget(Line::from(aside).alignment(Alignment::Right), area);
 }
 
 /// The newest answer to the operator.

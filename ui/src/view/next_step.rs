@@ -30,7 +30,7 @@ pub fn next_step(model: &Model) -> NextStep {
     match &model.dialog {
         Some(dialog) => in_dialog(model, dialog),
         None if model.replay.is_some() => replay(model),
-        None if model.session.observe => {
+        None if model.session.observe && Action::Acknowledge.legal(model).is_err() => {
             step("Observing: this session can change nothing.", model, &[(Action::Quit, "quit")])
         }
         None => live(model),
@@ -165,6 +165,7 @@ fn in_dialog(model: &Model, dialog: &Dialog) -> NextStep {
         }
         Dialog::Field { .. } => plain("Enter confirms, Esc cancels.".to_owned()),
         Dialog::Palette { .. } => plain("Type to filter, Up Down choose, Enter does it, Esc closes.".to_owned()),
+        Dialog::Choose { .. } => plain("Up Down choose, x switches it on or off, Enter closes.".to_owned()),
         Dialog::Help { .. } => plain("Up Down scroll, any other key closes.".to_owned()),
         Dialog::Details { .. } => plain("Up Down other trials, Esc closes.".to_owned()),
     }

@@ -49,6 +49,7 @@ fn content(model: &Model, width: usize) -> (String, Vec<Line<'static>>) {
                 (false, Source::Operator, _) => format!("Trial #{}, overridden", proposal.trial),
                 (false, Source::Rerun, Some(parent)) => format!("Trial #{}, re-run of #{parent}", proposal.trial),
                 (false, Source::Rerun, None) => format!("Trial #{}, a re-run", proposal.trial),
+                (false, Source::Confirm, _) => format!("Trial #{}, to confirm the best", proposal.trial),
                 (false, Source::Queued, _) => format!("Trial #{}, from the queue", proposal.trial),
             };
             let mut lines: Vec<Line> = proposal.parameters.iter().map(|p| parameter(model, p, width)).collect();

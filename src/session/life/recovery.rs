@@ -1,0 +1,155 @@
+//! What a program that ended in mid-trial has left behind: judged trials count, others are void and come again.
+//!
+//! Whose trial is whose: the session that has the study's folder (worker 0) closes at its start the trials that worker 0
+//! began, for it is the only one. Trials of joined workers are closed by whoever sees them, once they have run for longer
+//! than any simulated trial takes (`[workers] abandoned_s`). Trials of other programs are left to those.
+
+use std::time::Duration;
+
+use super::attributes::{self, Origin};
+use super::{Life, Refusal};
+use crate::optimize::study::{Outcome, Study, StudyError, Told};
+use crate::optimize::trial::{Trial, TrialState};
+use crate::recording::record::{Record, Source};
+
+impl Life {
+    /// What a crash of this session's forerunner left behind.
+    pub(super) fn close_interrupted(&mut self) -> Result<(), StudyError> {
+        let me = self.plan.worker;
+        let left = |trial: &&Trial| me == 0 && attributes::worker_of(trial) == Some(0);
+        let running: Vec<Trial> = self.study.running().filter(left).cloned().collect();
+        for trial in running {
+            self.close_trial(&trial, "interrupted: the program ended before the verdict")?;
+        }
+        self.queue_owed()
+    }
+
+    /// Closes what joined workers have left behind that are dead by now.
+    pub(super) fn close_abandoned(&mut self) -> Result<(), StudyError> {
+        let theirs = |trial: &&Trial| attributes::worker_of(trial).is_some_and(|worker| worker > 0);
+        let dead = |trial: &&Trial| theirs(trial) && !self.is_mine(trial) && !self.is_alive(trial);
+        let dead: Vec<Trial> = self.study.running().filter(dead).cloned().collect();
+        if dead.is_empty() {
+            return Ok(());
+        }
+        for trial in dead {
+            self.close_trial(&trial, "interrupted: its worker has not ended it in time")?;
+        }
+        self.queue_owed()
+    }
+
+    /// Whether this session runs the trial, or has judged it and not told it yet.
+    fn is_mine(&self, trial: &Trial) -> bool {
+        attributes::worker_of(trial) == Some(self.plan.worker) && trial.worker == self.study.worker()
+    }
+
+    /// Whether a running trial may still be run by somebody.
+    fn is_alive(&self, trial: &Trial) -> bool {
+        is_alive(trial, self.plan.abandoned)
+    }
+
+    /// Whether other workers run trials: until they end it is not known whether the study is finished. Trials that
+    /// nobody has ended in time are not waited for.
+    pub fn others_run(&self) -> bool {
+        self.study.running().any(|trial| !self.is_mine(trial) && self.is_alive(trial))
+    }
+
+    fn close_trial(&mut self, trial: &Trial, cause: &str) -> Result<(), StudyError> {
+        match attributes::judgement_of(trial) {
+            Some(outcome) => {
+                if self.study.tell(trial.number, outcome)? == Told::Recorded {
+                    self.log(format!("trial {} was judged before the interruption: it counts", trial.number));
+                }
+            }
+            None => {
+                // Queued again below, or by the next session if this one is killed before it gets there.
+                let marked = self.study.annotate(trial.number, &attributes::interrupted(cause));
+                match marked {
+                    // Somebody else was faster.
+                    Err(StudyError::State { .. }) => return Ok(()),
+                    other => other?,
+                }
+                if self.study.tell(trial.number, Outcome::Fail)? == Told::Recorded {
+                    self.log(format!("trial {} was interrupted: it is void and queued again", trial.number));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Queues void trials whose parameters were to come again, and did not get to.
+    fn queue_owed(&mut self) -> Result<(), StudyError> {
+        let owed: Vec<Trial> = self.study.trials().iter().filter(|trial| attributes::is_owed(trial)).cloned().collect();
+        for trial in owed {
+            let origin = if attributes::was_interrupted(&trial) {
+                // The same seed as before: the study goes on as if nothing had happened.
+                Origin::interrupted(&trial)
+            } else {
+                let row = attributes::row_of(&trial, String::new(), &self.plan.parameters);
+                Origin::rerun_of(&row)
+            };
+            let comes = |other: &Trial| Origin::of(&other.user_attributes).parent == Some(trial.number);
+            self.study.enqueue_unless(&trial.parameters, &origin.attributes(), |trials| trials.iter().any(comes))?;
+        }
+        Ok(())
+    }
+
+    /// Takes in what other programs have done: their trials join the table, and a point that they have queued comes next
+    /// if the operator has not changed the card. To be called now and then.
+    ///
+    /// # Errors
+    /// When the study cannot be read or written.
+    pub fn look(&mut self) -> Result<(), Refusal> {
+        if !self.is_idle() {
+            return Ok(());
+        }
+        self.study.refresh()?;
+        self.close_abandoned()?;
+        self.take_rows();
+        let Some(card) = &self.card else {
+            let room = occupied(self.study.trials(), self.plan.abandoned) < self.plan.budget;
+            let queued = self.study.waiting().any(|trial| attributes::source_of(trial) == Source::Confirm);
+            return if room || queued { Ok(self.propose()?) } else { Ok(()) };
+        };
+        let next = self.study.waiting().next().map(|trial| trial.number);
+        let on_the_table = card.draft.enqueued.then_some(card.number());
+        // A re-run of our own waits in the outlook alone; it has the number that a foreign point may have taken.
+        let ours = card.draft.enqueued && next.is_none();
+        if next != on_the_table && !ours && !card.is_changed() {
+            self.log("another program has changed the queue: here is what comes next".to_owned());
+            self.propose()?;
+        }
+        Ok(())
+    }
+
+    /// Rows of trials that other programs have run or are running.
+    pub(super) fn take_rows(&mut self) {
+        for trial in self.study.trials() {
+            let news = match self.rows.get(&trial.number) {
+                None => trial.state != TrialState::Waiting,
+                Some(row) => trial.state.is_finished() && row.verdict.is_none(),
+            };
+            if news {
+                let row = attributes::row_of(trial, self.study.note_of(trial.number), &self.plan.parameters);
+                self.outbox.push(Record::Trial(row.clone()));
+                self.rows.insert(trial.number, row);
+            }
+        }
+    }
+}
+
+/// How many of `trials` take a place of the budget: those that count, and those that run and may still count.
+pub(super) fn occupied(trials: &[Trial], abandoned: Duration) -> u32 {
+    let takes = |trial: &&Trial| match trial.state {
+        TrialState::Complete => true,
+        // A person may take any time to judge; the session that has the folder closes its own.
+        TrialState::Running => attributes::worker_of(trial) == Some(0) || is_alive(trial, abandoned),
+        _ => false,
+    };
+    let budgeted = |trial: &&Trial| attributes::source_of(trial) != Source::Confirm;
+    trials.iter().filter(takes).filter(budgeted).count() as u32
+}
+
+fn is_alive(trial: &Trial, abandoned: Duration) -> bool {
+    Study::age(trial).is_none_or(|age| age < abandoned)
+}

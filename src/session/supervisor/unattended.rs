@@ -1,0 +1,86 @@
+//! What the session does without being asked: nothing, unless it was started with `falls-only` or `auto`.
+//!
+//! A person's hand outranks it: after STOP, a fault, a cancelled countdown, an undone verdict or a wish to sit down it holds
+//! still until a person arms or approves again. It never acknowledges a stop.
+
+use super::{Intent, Supervisor, Wish};
+use crate::realtime::telemetry::{Cause, Mode};
+use crate::recording::record::{Level, Stage, Verdict};
+use crate::session::approval::Approval;
+
+/// Whether and how the session acts by itself.
+#[derive(Debug, Default)]
+pub struct Unattended {
+    approval: Approval,
+    simulated: bool,
+    /// A person has stopped the course of things.
+    held: bool,
+    /// Arming was asked for and the answer is not here yet.
+    arming: bool,
+}
+
+impl Unattended {
+    /// STOP, a fault, and a robot that sits down although nobody asked it to (its operator is silent) end the course.
+    pub fn mode_changed(&mut self, to: Mode, cause: Cause) {
+        self.arming &= to == Mode::Disarmed;
+        if matches!(cause, Cause::Stop | Cause::Fault(_)) || to == Mode::SitDown {
+            self.held = true;
+        }
+    }
+}
+
+impl Supervisor {
+    /// The same session with another rule of approval.
+    pub fn approving(mut self, approval: Approval, simulated: bool) -> Supervisor {
+        self.unattended = Unattended { approval, simulated, ..Unattended::default() };
+        self
+    }
+
+    /// A person has wished something.
+    pub(super) fn noticed(&mut self, intent: &Intent) {
+        match intent {
+            Intent::Cancel | Intent::SitDown | Intent::Undo | Intent::Acknowledge => self.unattended.held = true,
+            // Towards more energy only: a verdict given after a stop does not set the robot going.
+            Intent::Arm | Intent::Approve { .. } => self.unattended.held = false,
+            _ => {}
+        }
+    }
+
+    /// One step of the course, if it is one that this session takes by itself.
+    pub(super) fn act_by_itself(&mut self, time_ns: u64) {
+        let Unattended { approval, simulated, held, arming } = self.unattended;
+        if approval == Approval::Each || held || self.observe || self.ended.is_some() {
+            return;
+        }
+        let auto = approval == Approval::Auto && simulated;
+        let stops = self.control.stop.count();
+        let step = match self.life.stage() {
+            Stage::Review => {
+                let suggested = self.life.rows().last().and_then(|row| row.suggested).unwrap_or(Verdict::Void);
+                // What was cancelled or stopped in mid-jump waits for a person, whatever the rule.
+                let judged = if auto { suggested != Verdict::Void } else { suggested == Verdict::Accept };
+                judged.then_some(Intent::Judge(suggested))
+            }
+            Stage::Proposed if self.mode == Mode::Ready && simulated => {
+                self.life.proposal().map(|card| Intent::Approve { trial: card.trial, revision: card.revision })
+            }
+            Stage::Proposed if self.mode == Mode::Disarmed && auto && !arming => Some(Intent::Arm),
+            _ => None,
+        };
+        let Some(intent) = step else { return };
+        self.unattended.arming = intent == Intent::Arm;
+        let wish = Wish { intent, stops, time_ns };
+        match self.obey(&wish) {
+            Ok(answer) => {
+                let wish = super::describe(&wish.intent);
+                self.log(Level::Info, format!("{}: {wish}: {answer}", approval.name()), time_ns);
+            }
+            Err(reason) => {
+                // Said once: a person must look.
+                self.unattended.held = true;
+                self.log(Level::Warning, format!("{} waits for a person: {reason}", approval.name()), time_ns);
+            }
+        }
+        self.publish(time_ns);
+    }
+}

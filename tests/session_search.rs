@@ -1,0 +1,332 @@
+//! What an operator may change of the search through the public interface of a life: gains, fixed parameters, bounds, the
+//! confirmation of the best, and what other programs do meanwhile.
+
+#[path = "support/life.rs"]
+mod support;
+
+use std::collections::BTreeMap;
+
+use quadfrog::optimize::insight::IMPORTANCE_TRIALS;
+use quadfrog::optimize::study::Storage;
+use quadfrog::realtime::telemetry::{FallCause, TrialEnd};
+use quadfrog::recording::record::{Fixed, Insight, PointRecord, Record, Search, Source, Stage, Verdict};
+use quadfrog::session::life::Life;
+use support::{accept, far, life, open, run, study, ticks};
+
+/// The newest of what the screen is told.
+#[derive(Default)]
+struct Told {
+    search: Option<Search>,
+    insight: Option<Insight>,
+    points: Vec<PointRecord>,
+    log: Vec<String>,
+}
+
+fn told(life: &mut Life, told: &mut Told) {
+    for record in life.take_records() {
+        match record {
+            Record::Search(search) => told.search = Some(search),
+            Record::Insight(insight) => told.insight = Some(insight),
+            Record::Points(points) => told.points = points,
+            Record::Log(line) => told.log.push(line.message),
+            _ => {}
+        }
+    }
+}
+
+fn search(life: &mut Life) -> Search {
+    let mut news = Told::default();
+    told(life, &mut news);
+    news.search.expect("the search has changed")
+}
+
+fn several(life: &mut Life, trials: usize) {
+    for _ in 0..trials {
+        accept(life);
+    }
+}
+
+fn value(life: &Life, name: &str) -> f64 {
+    life.proposal().unwrap().parameters.iter().find(|p| p.name == name).unwrap().value
+}
+
+#[test]
+fn a_gain_is_checked_runs_in_one_trial_alone_and_stays_with_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut life = open(folder.path());
+    let error = life.set_gain("kp", 1001.0).unwrap_err().to_string();
+    assert!(error.contains("kp = 1001") && error.contains("100 to 1000"), "{error}");
+    let error = life.set_gain("ki", 1.0).unwrap_err().to_string();
+    assert!(error.contains("kp, kd, kd_joint, k_att"), "{error}");
+    assert!(life.set_gain("kd", f64::NAN).is_err());
+
+    life.set_gain("kp", 500.0).unwrap();
+    let card = life.proposal().unwrap();
+    assert_eq!(card.source, Source::Operator);
+    let kp = &card.gains[0];
+    assert_eq!((kp.name.as_str(), kp.value, kp.proposed), ("kp", 500.0, 400.0));
+    let spec = accept(&mut life);
+    assert_eq!((spec.gains.kp, spec.gains.kd), (500.0, 8.0));
+    let next = accept(&mut life);
+    assert_eq!(next.gains.kp, 400.0, "the next trial has the configured gains again");
+
+    // The table of a later session knows, and a re-run has the same gains.
+    let mut life = open(folder.path());
+    let row = life.row(spec.trial).unwrap();
+    assert_eq!(row.gains.iter().find(|(name, _)| name == "kp").unwrap().1, 500.0);
+    assert!(row.note.contains("kp 500 (configured 400)"), "{}", row.note);
+    assert!(life.row(next.trial).unwrap().note.is_empty());
+    life.repeat(spec.trial).unwrap();
+    let again = accept(&mut life);
+    assert_eq!((again.jump, again.gains), (spec.jump, spec.gains));
+}
+
+#[test]
+fn changes_of_a_card_are_taken_back_together() {
+    let mut life = life(5);
+    life.set_gain("kp", 500.0).unwrap();
+    life.set_parameter("Fx", 100.0).unwrap();
+    life.clear_overrides().unwrap();
+    let card = life.proposal().unwrap();
+    assert_eq!((card.source, card.gains[0].value), (Source::Sampler, 400.0));
+}
+
+#[test]
+fn a_fixed_parameter_has_its_value_for_so_many_trials_and_the_others_are_still_proposed() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut life = open(folder.path());
+    several(&mut life, 4);
+    life.fix("Fx", 60.0, 3).unwrap();
+    assert_eq!(search(&mut life).parameters[1].fixed, Some(Fixed { value: 60.0, trials: 3 }));
+    let mut others = Vec::new();
+    for left in [3, 2, 2, 1] {
+        // Interrupted in between, it goes on.
+        let mut life = open(folder.path());
+        assert_eq!(search(&mut life).parameters[1].fixed, Some(Fixed { value: 60.0, trials: left }));
+        assert_eq!(life.proposal().unwrap().source, Source::Sampler);
+        let spec = run(&mut life, TrialEnd::Settled);
+        assert_eq!(spec.jump.fx_n, 60.0);
+        others.push(spec.jump.fz_n);
+        // A void trial uses up none.
+        let verdict = if others.len() == 2 { Verdict::Void } else { Verdict::Accept };
+        life.judge(verdict, false).unwrap();
+        life.close().unwrap();
+    }
+    others.dedup();
+    assert_eq!(others.len(), 4, "the other parameters are proposed: {others:?}");
+    let mut life = open(folder.path());
+    assert_eq!(search(&mut life).parameters[1].fixed, None);
+    assert_ne!(value(&life, "Fx"), 60.0);
+}
+
+#[test]
+fn a_fixed_parameter_can_be_freed_and_overridden_and_leaves_queued_points_alone() {
+    let mut life = life(20);
+    life.fix("Fx", 60.0, 5).unwrap();
+    life.set_parameter("Fx", 70.0).unwrap();
+    assert_eq!(accept(&mut life).jump.fx_n, 70.0);
+    life.enqueue(&[("Fx".into(), 80.0)]).unwrap();
+    assert_eq!(accept(&mut life).jump.fx_n, 80.0);
+    assert_eq!(value(&life, "Fx"), 60.0);
+    life.unfix("Fx").unwrap();
+    assert_ne!(value(&life, "Fx"), 60.0);
+    assert!(life.unfix("Fx").unwrap_err().to_string().contains("not fixed"));
+    let error = life.fix("Fx", 200.0, 1).unwrap_err().to_string();
+    assert!(error.contains("0 to 150"), "{error}");
+    assert!(life.fix("Fx", 60.0, 0).is_err());
+    life.fix("Fx", 60.0, 2).unwrap();
+    life.fix("f0", 1.0, 2).unwrap();
+    let error = life.fix("Fz", 200.0, 2).unwrap_err().to_string();
+    assert!(error.contains("nothing would be left"), "{error}");
+}
+
+#[test]
+fn bounds_are_changed_within_what_safety_allows_and_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut life = open(folder.path());
+    several(&mut life, 5);
+    for (low, high, words) in
+        [(110.0, 40.0, "no range"), (0.0, 301.0, "safety.toml allows: 0 to 300"), (0.0, f64::NAN, "")]
+    {
+        let error = life.narrow_bounds("Fx", low, high).unwrap_err().to_string();
+        assert!(error.contains(words), "{error}");
+    }
+    life.set_parameter("Fz", 200.0).unwrap();
+    life.narrow_bounds("Fx", 40.0, 50.0).unwrap();
+    assert_eq!(value(&life, "Fz"), 200.0, "what was set on the card stays");
+    life.clear_overrides().unwrap();
+    for _ in 0..6 {
+        let mut life = open(folder.path());
+        let fx = value(&life, "Fx");
+        assert!((40.0..=50.0).contains(&fx), "{fx}");
+        assert!(life.set_parameter("Fx", 60.0).is_err());
+        accept(&mut life);
+        life.close().unwrap();
+    }
+    let mut life = open(folder.path());
+    life.fix("Fx", 45.0, 1).unwrap();
+    assert!(life.narrow_bounds("Fx", 46.0, 50.0).unwrap_err().to_string().contains("fixed at 45"));
+    life.unfix("Fx").unwrap();
+    // Wider than configured, though not than safe; and back.
+    life.narrow_bounds("Fx", 0.0, 300.0).unwrap();
+    life.set_parameter("Fx", 250.0).unwrap();
+    life.narrow_bounds("Fx", 0.0, 150.0).unwrap();
+    let now = search(&mut life);
+    let fx = &now.parameters[1];
+    assert_eq!((fx.low, fx.high, fx.least, fx.most), (0.0, 150.0, 0.0, 300.0));
+    assert!(value(&life, "Fx") <= 150.0, "a value that the bounds exclude does not stay on the card");
+}
+
+/// A jump whose length is what its parameters say, plus noise of its seed.
+fn jump(life: &mut Life, noise: f64) {
+    let card = life.proposal().expect("a proposal");
+    let spec = life.approve(card.trial, card.revision).unwrap();
+    let u = (spec.seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5;
+    life.ended(spec.trial, &TrialEnd::Settled, &ticks(spec.trial, far(&spec) + noise * u));
+    life.judge(Verdict::Accept, false).unwrap();
+}
+
+#[test]
+fn the_best_of_a_finished_study_is_confirmed_beyond_its_budget() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut life = open(folder.path());
+    assert!(life.confirm_best(5).unwrap_err().to_string().contains("nothing to compare"));
+    (0..12).for_each(|_| jump(&mut life, 0.02));
+    let counted = life.counted();
+    let trials = life.confirm_best(60).unwrap();
+    assert_eq!(trials.len(), 3);
+    let mut news = Told::default();
+    let mut repeats = 0;
+    loop {
+        told(&mut life, &mut news);
+        if news.search.as_ref().unwrap().confirming.is_none() {
+            break;
+        }
+        assert_eq!(news.search.as_ref().unwrap().confirming, Some(60 - repeats));
+        let card = life.proposal().unwrap();
+        assert_eq!(card.source, Source::Confirm);
+        assert!(trials.contains(&card.parent.unwrap()));
+        jump(&mut life, 0.02);
+        repeats += 1;
+        // Ended and taken up again in between: that costs nothing.
+        told(&mut life, &mut news);
+        life.close().unwrap();
+        life = open(folder.path());
+    }
+    assert!((6..60).contains(&repeats), "each is run three times at least: {repeats}");
+    assert_eq!(life.counted(), counted, "repeats are beyond the budget");
+    let leader: Vec<_> = news.points.iter().filter(|point| point.confidence.is_some()).collect();
+    assert_eq!(leader.len(), 1);
+    assert!(leader[0].contender && leader[0].confidence.unwrap() >= 0.95 && leader[0].deviation.unwrap() > 0.0);
+    assert_eq!(leader[0].stood as usize, leader[0].trials.len());
+    assert_eq!(news.points.iter().filter(|point| point.contender).count(), 3);
+    let words = news.log.iter().find(|line| line.starts_with("confirmed")).expect("it is said");
+    assert!(words.contains("% confidence") && words.contains("stood"), "{words}");
+    assert_eq!(life.proposal().unwrap().source, Source::Sampler, "the search goes on");
+}
+
+#[test]
+fn repeats_end_with_their_budget_or_when_they_are_called_off() {
+    let mut life = life(6);
+    (0..6).for_each(|_| jump(&mut life, 0.02));
+    assert_eq!(life.stage(), Stage::Finished);
+    life.confirm_best(4).unwrap();
+    let mut news = Told::default();
+    for _ in 0..4 {
+        assert_eq!(life.stage(), Stage::Proposed);
+        jump(&mut life, 50.0);
+    }
+    told(&mut life, &mut news);
+    assert_eq!(life.stage(), Stage::Finished);
+    assert!(news.log.iter().any(|line| line.contains("used up") && line.contains("short of 95 %")), "{:?}", news.log);
+    life.confirm_best(4).unwrap();
+    assert_eq!(life.stage(), Stage::Proposed);
+    assert!(life.confirm_best(0).unwrap().is_empty());
+    assert_eq!(life.stage(), Stage::Finished);
+    assert!(life.confirm_best(0).unwrap_err().to_string().contains("nothing is being confirmed"));
+}
+
+/// The last repeat can be judged otherwise: what was concluded from it is then concluded anew.
+#[test]
+fn the_verdict_that_ended_a_confirmation_can_be_undone() {
+    let mut life = life(6);
+    several(&mut life, 6);
+    life.confirm_best(40).unwrap();
+    let mut news = Told::default();
+    while life.stage() == Stage::Proposed {
+        accept(&mut life);
+    }
+    told(&mut life, &mut news);
+    assert!(news.log.iter().any(|line| line.starts_with("confirmed")));
+    life.undo().unwrap();
+    life.judge(Verdict::Void, false).unwrap();
+    assert_eq!(life.stage(), Stage::Proposed, "one repeat is missing again");
+    accept(&mut life);
+    assert_eq!(life.stage(), Stage::Finished);
+}
+
+#[test]
+fn a_proposal_comes_with_its_densities_and_what_matters() {
+    let mut life = life(40);
+    let mut news = Told::default();
+    for _ in 0..IMPORTANCE_TRIALS - 1 {
+        accept(&mut life);
+    }
+    told(&mut life, &mut news);
+    assert!(news.insight.as_ref().unwrap().parameters.iter().all(|p| p.importance.is_none()));
+    several(&mut life, 5);
+    told(&mut life, &mut news);
+    let insight = news.insight.unwrap();
+    let card = life.proposal().unwrap();
+    assert_eq!(insight.trial, card.trial);
+    let shares: f64 = insight.parameters.iter().filter_map(|p| p.importance).sum();
+    assert!((shares - 1.0).abs() < 1e-12, "{shares}");
+    let bounds: BTreeMap<&str, (f64, f64)> = support::BOUNDS.iter().map(|(n, low, high)| (*n, (*low, *high))).collect();
+    for (parameter, proposed) in insight.parameters.iter().zip(&card.parameters) {
+        assert_eq!((&parameter.name, parameter.proposed), (&proposed.name, proposed.proposed));
+        let (low, high) = bounds[parameter.name.as_str()];
+        assert_eq!((parameter.at[0], *parameter.at.last().unwrap()), (low, high));
+        // Both are densities over the range.
+        let step = (high - low) / (parameter.at.len() - 1) as f64;
+        for density in [&parameter.good, &parameter.bad] {
+            let mass = step * (density.iter().sum::<f64>() - (density[0] + density.last().unwrap()) / 2.0);
+            assert!((mass - 1.0).abs() < 0.02, "{}: {mass}", parameter.name);
+        }
+    }
+}
+
+/// Another program (a dashboard, Python, `quadfrog study enqueue`) queues a point while a proposal is on the table.
+#[test]
+fn a_point_queued_by_another_program_comes_next() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut life = open(folder.path());
+    accept(&mut life);
+    let mut other = study(Storage::File(folder.path().join("study.log")));
+    other.enqueue(&[("Fx".into(), 77.0)], &[]).unwrap();
+    life.look().unwrap();
+    assert_eq!((life.proposal().unwrap().source, value(&life, "Fx")), (Source::Queued, 77.0));
+    // Not over the operator's head.
+    let mut other = study(Storage::File(folder.path().join("study.log")));
+    accept(&mut life);
+    life.set_parameter("Fz", 200.0).unwrap();
+    other.enqueue(&[("Fx".into(), 78.0)], &[]).unwrap();
+    life.look().unwrap();
+    assert_eq!(value(&life, "Fz"), 200.0);
+    assert_eq!(accept(&mut life).jump.fz_n, 200.0);
+    assert_eq!(value(&life, "Fx"), 78.0);
+}
+
+/// (A danger once: a re-run waits in a fork of the study, and another program may take the number that it has there.)
+#[test]
+fn a_rerun_runs_its_own_parameters_though_another_program_queues_a_point_at_the_same_moment() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut life = open(folder.path());
+    let spec = run(&mut life, TrialEnd::Fell(FallCause::BodyContact));
+    life.judge(Verdict::Void, true).unwrap();
+    let mut other = study(Storage::File(folder.path().join("study.log")));
+    other.enqueue(&[("Fx".into(), 77.0)], &[]).unwrap();
+    let again = accept(&mut life);
+    assert_eq!(again.jump, spec.jump);
+    assert_eq!(life.row(again.trial).unwrap().parent, Some(spec.trial));
+    assert_eq!(value(&life, "Fx"), 77.0);
+}

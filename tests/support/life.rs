@@ -1,0 +1,115 @@
+//! A study without a robot: jumps that go as far as their parameters say.
+#![allow(dead_code, reason = "each test uses its own part")]
+
+use std::path::Path;
+use std::time::Duration;
+
+use quadfrog::control::settings::TaskControl;
+use quadfrog::optimize::journal::Durability;
+use quadfrog::optimize::sampler::{Direction, SamplerConfig};
+use quadfrog::optimize::space::{Range, Space};
+use quadfrog::optimize::study::{Storage, Study, StudyOptions};
+use quadfrog::realtime::command::{Task, TrialSpec};
+use quadfrog::realtime::telemetry::{Tick, TrialEnd};
+use quadfrog::recording::record::{ParameterInfo, Stage, Verdict};
+use quadfrog::session::life::{Life, Plan};
+
+pub const BOUNDS: [(&str, f64, f64); 3] = [("f0", 0.75, 1.75), ("Fx", 0.0, 150.0), ("Fz", 150.0, 350.0)];
+
+pub fn study(storage: Storage) -> Study {
+    let ranges = BOUNDS.map(|(name, low, high)| (name.to_owned(), Range::linear(low, high)));
+    Study::open(
+        storage,
+        StudyOptions {
+            name: "test".into(),
+            direction: Direction::Maximize,
+            metric: "J (m)".into(),
+            space: Space::new(ranges).unwrap(),
+            sampler: SamplerConfig { startup_trials: Some(3), ..SamplerConfig::default() },
+            attributes: Vec::new(),
+            durability: Durability::Buffered,
+        },
+    )
+    .unwrap()
+}
+
+pub fn plan(budget: u32) -> Plan {
+    Plan {
+        task: Task::Forward,
+        control: TaskControl {
+            kp: 400.0,
+            kd: 8.0,
+            kd_joint: 0.8,
+            k_att: 200.0,
+            stance_m: [0.0, 0.14, -0.25],
+            vmc: true,
+            jumps: 1,
+            f1_hz: 0.0,
+        },
+        parameters: bounds(|low, high| (low, high)),
+        seed: 0,
+        budget,
+        recording: String::new(),
+        widest: bounds(|low, high| (0.5 * low, 2.0 * high)),
+        gains: [("kp", 100.0, 1000.0), ("kd", 2.0, 30.0), ("kd_joint", 0.1, 3.0), ("k_att", 0.0, 500.0)]
+            .map(|(name, low, high)| ParameterInfo { name: name.into(), unit: "N/m".into(), low, high })
+            .to_vec(),
+        contenders: 3,
+        confidence: 0.95,
+        worker: 0,
+        abandoned: Duration::from_secs(60),
+    }
+}
+
+pub fn bounds(of: impl Fn(f64, f64) -> (f64, f64)) -> Vec<ParameterInfo> {
+    let info = |(name, low, high): (&str, f64, f64)| {
+        let (low, high) = of(low, high);
+        ParameterInfo { name: name.into(), unit: "N".into(), low, high }
+    };
+    BOUNDS.map(info).to_vec()
+}
+
+pub fn life(budget: u32) -> Life {
+    Life::open(plan(budget), study(Storage::Memory)).unwrap()
+}
+
+/// A jump that goes as far as the parameters say: smooth, and different everywhere.
+pub fn far(spec: &TrialSpec) -> f64 {
+    let (f, x, z) = (spec.jump.f0_hz - 1.2, spec.jump.fx_n / 150.0 - 0.7, spec.jump.fz_n / 350.0 - 0.6);
+    0.7 - f * f - x * x - z * z
+}
+
+/// The ticks of a trial that ends `dx_m` in front of its start.
+pub fn ticks(trial: u32, dx_m: f64) -> Vec<Tick> {
+    [0.0, dx_m]
+        .map(|x| {
+            let mut tick = Tick { trial: Some(trial), ..Tick::default() };
+            tick.estimate.position_world.x = x;
+            tick
+        })
+        .to_vec()
+}
+
+/// Approves what is on the table, lets it end as `end` and brings it to review.
+pub fn run(life: &mut Life, end: TrialEnd) -> TrialSpec {
+    let card = life.proposal().expect("a proposal");
+    let spec = life.approve(card.trial, card.revision).unwrap();
+    life.ended(spec.trial, &end, &ticks(spec.trial, far(&spec)));
+    assert_eq!(life.stage(), Stage::Review);
+    spec
+}
+
+pub fn accept(life: &mut Life) -> TrialSpec {
+    let spec = run(life, TrialEnd::Settled);
+    life.judge(Verdict::Accept, false).unwrap();
+    spec
+}
+
+pub fn parameters(life: &Life) -> Vec<f64> {
+    life.proposal().unwrap().parameters.iter().map(|p| p.value).collect()
+}
+
+/// The study in `folder`, taken up as a session does it.
+pub fn open(folder: &Path) -> Life {
+    Life::open(plan(1000), study(Storage::File(folder.join("study.log")))).unwrap()
+}
