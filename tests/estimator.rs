@@ -376,7 +376,7 @@ fn study(source: &str, seed: u32) -> (TrialRecord, f64) {
     ]);
     let robot = RobotDescription::embedded("go1").unwrap();
     let (task, backend) = (Task::Forward, Backend::Simulator);
-    let options = Options { config, robot, backend, task, seed, trials: Some(20), folder: None, observe: false };
+    let options = Options { seed, trials: Some(20), ..Options::new(config, robot, backend, task) };
     let settings = options.config.settings(&options.robot, task, backend).unwrap();
     let simulator = Simulator::new(&options.robot, &options.config.simulator).unwrap();
     let mut life = open_life(&options, Durability::Buffered, "").unwrap();
