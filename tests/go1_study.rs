@@ -20,7 +20,6 @@ use quadfrog::recording::record::{Proposal, Record, Stage, StageInfo, TrialRecor
 
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::robot::{LinkStatus, Robot};
-use quadfrog::session::approval::Approval;
 use quadfrog::session::automatic;
 use quadfrog::session::intent::{Intent, OperatorCheck};
 use quadfrog::session::rollout::Rollout;
@@ -47,17 +46,7 @@ fn config() -> Config {
 }
 
 fn options(config: Config, robot: RobotDescription, backend: Backend, seed: u32, trials: u32) -> Options {
-    Options {
-        config,
-        robot,
-        backend,
-        task: TASK,
-        seed,
-        trials: Some(trials),
-        folder: None,
-        observe: false,
-        approve: Approval::Each,
-    }
+    Options { seed, trials: Some(trials), ..Options::new(config, robot, backend, TASK) }
 }
 
 /// An emulated robot in real time on a thread of its own, until dropped.

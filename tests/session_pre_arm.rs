@@ -16,8 +16,7 @@ use quadfrog::recording::record::{CommandRecord, PreArmCheck, Record, Stamped};
 use quadfrog::recording::recorder::RecorderWatch;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::robot::{Battery, JointCommand, LinkStatus, Placement, Robot, RobotError, RobotState};
-use quadfrog::session::approval::Approval;
-use quadfrog::session::intent::{Intent, OperatorCheck};
+use quadfrog::session::intent::{Intent, OperatorCheck, Wish};
 use quadfrog::session::pre_arm::PreArmList;
 use quadfrog::session::supervisor::{Outlets, Parts, Supervisor};
 use quadfrog::sim::Simulator;
@@ -62,28 +61,18 @@ impl Session {
     fn new(backend: Backend, folder: Option<std::path::PathBuf>) -> Session {
         let config = Config::load(None).unwrap();
         let robot = RobotDescription::embedded("go1").unwrap();
-        let options = Options {
-            config,
-            robot,
-            backend,
-            task: Task::Forward,
-            seed: 0,
-            trials: Some(5),
-            folder: None,
-            observe: false,
-            approve: Approval::Each,
-        };
+        let options = Options { trials: Some(5), ..Options::new(config, robot, backend, Task::Forward) };
         let settings: Settings = options.config.settings(&options.robot, options.task, backend).unwrap();
         let mut simulator = Simulator::new(&options.robot, &options.config.simulator).unwrap();
         simulator.place(&Placement { joint_position: settings.lying_position, lying: true, seed: 0 });
         let (control, session_end, _screen, _ticks) = channels();
         let (to_recorder, _) = channel();
         let (to_screen, screen) = channel();
-        let (_, trial_ticks) = channel();
+        let (_, handed) = channel();
         let parts = Parts {
             life: open_life(&options, Durability::Buffered, "").unwrap(),
             control: session_end,
-            trial_ticks,
+            handed,
             outlets: Outlets { recorder: to_recorder, screen: to_screen },
             recorder: RecorderWatch::default(),
             pre_arm: PreArmList::new(&settings, fingerprint(&options.config), folder),
@@ -121,7 +110,7 @@ impl Session {
             for event in self.cycle.events().iter() {
                 self.control.events.push(event).unwrap();
             }
-            self.control.findings.write(*self.cycle.findings());
+            self.control.readiness.write(self.cycle.readiness());
             self.supervisor.attend(self.time_ms * 1_000_000);
             self.records.extend(self.screen.try_iter().map(|stamped| stamped.record));
         }
@@ -129,7 +118,8 @@ impl Session {
 
     /// Wishes and gives back the answer.
     fn wish(&mut self, intent: Intent) -> CommandRecord {
-        self.supervisor.carry_out(&intent, self.control.stop.count(), self.time_ms * 1_000_000);
+        let time_ns = self.time_ms * 1_000_000;
+        self.supervisor.carry_out(&Wish { intent, stops: self.control.stop.count(), time_ns }, time_ns);
         let mut records = self.screen.try_iter().map(|stamped| stamped.record);
         let answer = records.find_map(|record| match record {
             Record::Command(command) => Some(command),

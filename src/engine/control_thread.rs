@@ -58,7 +58,7 @@ pub fn run<C: Clock>(settings: &Settings, mut end: ControlEnd, clock: &C, closin
         end.snapshot.write(Snapshot { tick, counters });
         if tick.number.is_multiple_of(COUNTERS_EVERY) {
             end.counters.write(counters);
-            end.findings.write(*cycle.findings());
+            end.readiness.write(cycle.readiness());
         }
         if closing.load(Ordering::Acquire) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     });

@@ -5,8 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::command::Command;
-use super::pre_arm::Findings;
-use super::telemetry::{Counters, Event, Snapshot, Tick};
+use super::telemetry::{Counters, Event, Readiness, Snapshot, Tick};
 
 /// Commands that may wait.
 pub const COMMANDS: usize = 64;
@@ -85,8 +84,8 @@ pub struct ControlEnd {
     pub snapshot: triple_buffer::Input<Snapshot>,
     /// The counters, for the session.
     pub counters: triple_buffer::Input<Counters>,
-    /// How the checks of the pre-arm list stand, for the session.
-    pub findings: triple_buffer::Input<Findings>,
+    /// What speaks against the next arming and the next trial, for the session.
+    pub readiness: triple_buffer::Input<Readiness>,
     /// What happened.
     pub events: rtrb::Producer<Event>,
 }
@@ -99,8 +98,8 @@ pub struct SessionEnd {
     pub stop: StopLatch,
     /// The newest counters.
     pub counters: triple_buffer::Output<Counters>,
-    /// How the control thread's checks of the pre-arm list stand.
-    pub findings: triple_buffer::Output<Findings>,
+    /// What the control thread has against the next arming and the next trial.
+    pub readiness: triple_buffer::Output<Readiness>,
     /// What happened.
     pub events: rtrb::Consumer<Event>,
 }
@@ -125,7 +124,7 @@ pub fn channels() -> (ControlEnd, SessionEnd, ScreenEnd, rtrb::Consumer<Tick>) {
     let (event_in, event_out) = rtrb::RingBuffer::new(EVENTS);
     let (snapshot_in, snapshot_out) = triple_buffer::triple_buffer(&Snapshot::default());
     let (counters_in, counters_out) = triple_buffer::triple_buffer(&Counters::default());
-    let (findings_in, findings_out) = triple_buffer::triple_buffer(&Findings::default());
+    let (readiness_in, readiness_out) = triple_buffer::triple_buffer(&Readiness::default());
     let (stop, heartbeat) = (StopLatch::default(), Heartbeat::default());
     let control = ControlEnd {
         commands: command_out,
@@ -135,14 +134,14 @@ pub fn channels() -> (ControlEnd, SessionEnd, ScreenEnd, rtrb::Consumer<Tick>) {
         shown: shown_in,
         snapshot: snapshot_in,
         counters: counters_in,
-        findings: findings_in,
+        readiness: readiness_in,
         events: event_in,
     };
     let session = SessionEnd {
         commands: command_in,
         stop: stop.clone(),
         counters: counters_out,
-        findings: findings_out,
+        readiness: readiness_out,
         events: event_out,
     };
     let screen = ScreenEnd { stop, heartbeat, shown: shown_out, snapshot: snapshot_out };

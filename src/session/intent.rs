@@ -30,7 +30,18 @@ impl OperatorCheck {
     }
 }
 
-/// One wish.
+/// An intent with what makes it good: what energises is not carried out if STOP came after it, or too late.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Wish {
+    /// What is wished.
+    pub intent: Intent,
+    /// How often STOP had been pressed when it was wished.
+    pub stops: u64,
+    /// When it was wished, ns since the engine started.
+    pub time_ns: u64,
+}
+
+/// What may be wished.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Intent {
     /// Energise the robot: it stands up.

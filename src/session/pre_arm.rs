@@ -24,6 +24,8 @@ enum StopTest {
 #[derive(Debug, Clone)]
 pub struct PreArmList {
     limits: PreArm,
+    /// Free space that a trial needs, MB.
+    trial_mb: u32,
     hardware: bool,
     /// Fingerprint of the configuration.
     configuration: String,
@@ -40,6 +42,7 @@ impl PreArmList {
     pub fn new(settings: &Settings, configuration: String, folder: Option<PathBuf>) -> PreArmList {
         PreArmList {
             limits: settings.pre_arm,
+            trial_mb: settings.watchdog.disk_free_mb,
             hardware: settings.hardware,
             configuration,
             folder,
@@ -86,6 +89,14 @@ impl PreArmList {
             self.stop_tested(),
         ];
         found.chain(own).collect()
+    }
+
+    /// Says so if the disk is too full for another trial.
+    pub fn disk_low(&self) -> Option<String> {
+        let free = disk::free_mb(self.folder.as_ref()?).ok()?;
+        let needed = u64::from(self.trial_mb);
+        (free < needed)
+            .then(|| format!("{free} MB free where the recording goes, at least {needed} for a trial; make room"))
     }
 
     fn words_of(&self, finding: &Finding) -> PreArmCheck {
