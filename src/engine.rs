@@ -1,6 +1,9 @@
 //! Wires the threads; computes nothing. `Engine::start` takes a checked configuration and gives a screen its [`Handle`].
 
 mod control_thread;
+mod stored;
+
+pub use stored::{Opened, StoredStudy, open_stored, stored_studies, stored_study, study_files};
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -12,7 +15,7 @@ use std::time::Duration;
 use serde_json::json;
 
 use crate::config::{Backend, Config, ConfigError};
-use crate::optimize::journal::{Durability, Journal, JournalFile, LOCK_GRACE};
+use crate::optimize::journal::Durability;
 use crate::optimize::sampler::Direction;
 use crate::optimize::space::{Range, Space, SpaceError};
 use crate::optimize::study::{Storage, Study, StudyError, StudyOptions};
@@ -22,7 +25,7 @@ use crate::realtime::command::Task;
 use crate::realtime::telemetry::{Mode, Snapshot, Tick};
 use crate::recording::RecordingError;
 use crate::recording::record::{Record, SessionInfo, Stamped};
-use crate::recording::recorder::Recorder;
+use crate::recording::recorder::{Recorder, RecorderStatus};
 use crate::recording::writer::Writer;
 use crate::robot::description::RobotDescription;
 use crate::robot::go1::Go1;
@@ -55,6 +58,30 @@ pub struct Options {
     pub observe: bool,
     /// Who approves and judges.
     pub approve: Approval,
+    /// A journal in which to take part as one more worker, instead of the study of the folder.
+    pub join: Option<Storage>,
+}
+
+impl Options {
+    /// A study of `task` with seed 0 that keeps nothing and in which a person approves and judges.
+    pub fn new(config: Config, robot: RobotDescription, backend: Backend, task: Task) -> Options {
+        Options {
+            config,
+            robot,
+            backend,
+            task,
+            seed: 0,
+            trials: None,
+            folder: None,
+            observe: false,
+            approve: Approval::Each,
+            join: None,
+        }
+    }
+
+    fn budget(&self) -> u32 {
+        self.trials.unwrap_or(self.config.optimize.trials)
+    }
 }
 
 /// Why an engine does not start.
@@ -83,6 +110,38 @@ pub enum EngineError {
         "--approve auto: only on the simulator; a jump of the robot is approved by a person: give each or falls-only"
     )]
     Unattended,
+    /// A journal that is not there.
+    #[error("{}: there is no such journal; give a study's folder, its study.log, a journal file or redis://HOST:PORT/DB", file.display())]
+    NoJournal {
+        /// The file.
+        file: PathBuf,
+    },
+    /// A journal with several studies.
+    #[error("{journal}: several studies are in it: say with --name which: {names}")]
+    WhichStudy {
+        /// The journal.
+        journal: String,
+        /// Their names.
+        names: String,
+    },
+    /// A study that is not there.
+    #[error("{journal}: there is no such study in it{}", if names.is_empty() { String::new() } else { format!("; there is {names}") })]
+    NoSuchStudy {
+        /// The journal.
+        journal: String,
+        /// The names that there are.
+        names: String,
+    },
+    /// A study that this program cannot use.
+    #[error(
+        "{journal}: study {name} has no real-valued parameter yet, or several objectives; this program knows neither"
+    )]
+    Unusable {
+        /// The journal.
+        journal: String,
+        /// Its name.
+        name: String,
+    },
     /// A journal without a study of ours.
     #[error("{}: holds no study of this program; give one that it made", file.display())]
     NoStudy {
@@ -114,15 +173,16 @@ pub fn open_life(options: &Options, durability: Durability, recording: &str) -> 
     let space = Space::new(parameters.iter().map(|p| (p.name.clone(), Range::linear(p.low, p.high))))?;
     let mut sampler = options.config.optimize.sampler.clone();
     sampler.seed = options.seed;
-    let storage = match &options.folder {
-        Some(folder) => Storage::File(folder.join(STUDY_FILE)),
-        None => Storage::Memory,
+    let storage = match (&options.join, &options.folder) {
+        (Some(storage), _) => storage.clone(),
+        (None, Some(folder)) => Storage::File(folder.join(STUDY_FILE)),
+        (None, None) => Storage::Memory,
     };
-    let name = format!("{}-seed{}", options.task.name(), options.seed);
-    let study = Study::open(
+    let budget = options.budget();
+    let mut study = Study::open(
         storage,
         StudyOptions {
-            name,
+            name: study_name(options.task, options.seed),
             direction: Direction::Maximize,
             metric: format!("J_{} ({})", options.task.name(), options.task.unit()),
             space,
@@ -133,25 +193,49 @@ pub fn open_life(options: &Options, durability: Durability, recording: &str) -> 
                 ("seed".to_owned(), json!(options.seed)),
                 ("sampler".to_owned(), json!(options.config.optimize.sampler)),
                 ("version".to_owned(), json!(env!("CARGO_PKG_VERSION"))),
+                (BUDGET.to_owned(), json!(budget)),
             ],
             durability,
         },
     )?;
+    if options.join.is_none() && study.trials().is_empty() {
+        enqueue_first(&mut study, &options.config.first(options.task))?;
+    }
+    let worker = if options.join.is_some() { study.join()? } else { 0 };
+    if worker == 0 && study.attributes().get(BUDGET) != Some(&json!(budget)) {
+        study.annotate_study(&[(BUDGET.to_owned(), json!(budget))])?;
+    }
     let plan = Plan {
         task: options.task,
         control: *options.config.task(options.task),
         parameters,
         seed: u64::from(options.seed),
-        budget: options.trials.unwrap_or(options.config.optimize.trials),
+        budget,
         recording: recording.to_owned(),
         widest: options.config.widest(options.task),
         gains: options.config.gains(),
         contenders: options.config.optimize.confirm.contenders,
         confidence: options.config.optimize.confirm.confidence,
-        worker: 0,
+        worker,
         abandoned: Duration::from_secs_f64(options.config.optimize.workers.abandoned_s),
     };
     Ok(Life::open(plan, study)?)
+}
+
+/// The point that the configuration asks to begin with.
+fn enqueue_first(study: &mut Study, point: &[(String, f64)]) -> Result<(), StudyError> {
+    if point.is_empty() {
+        return Ok(());
+    }
+    study.enqueue_unless(point, &[("source".to_owned(), json!("queued"))], |trials| !trials.is_empty()).map(drop)
+}
+
+/// Study attribute: how many trials are to count. Workers that join know it from here.
+const BUDGET: &str = "budget";
+
+/// The name of a study in its journal.
+pub fn study_name(task: Task, seed: u32) -> String {
+    format!("{}-seed{seed}", task.name())
 }
 
 /// What a session of `options` is called in its recording.
@@ -168,9 +252,13 @@ pub fn session_info(options: &Options, recording: &str) -> SessionInfo {
         unit: options.task.unit().to_owned(),
         sampler: format!("{:?}", options.config.optimize.sampler.kind).to_lowercase(),
         seed: u64::from(options.seed),
-        budget: options.trials.unwrap_or(options.config.optimize.trials),
+        budget: options.budget(),
         parameters: options.config.parameters(options.task),
-        study: options.folder.as_ref().map(|folder| folder.join(STUDY_FILE).display().to_string()).unwrap_or_default(),
+        study: match (&options.join, &options.folder) {
+            (Some(storage), _) => storage.to_string(),
+            (None, Some(folder)) => folder.join(STUDY_FILE).display().to_string(),
+            (None, None) => String::new(),
+        },
         recording: recording.to_owned(),
         started: jiff::Timestamp::now().to_string(),
         observe: options.observe,
@@ -420,6 +508,11 @@ impl Handle {
         self.recording.as_deref()
     }
 
+    /// How the recorder is doing; none where nothing is kept.
+    pub fn recorder(&self) -> Option<RecorderStatus> {
+        self.recording.as_ref().and(self.recorder.as_ref()).map(|recorder| recorder.status())
+    }
+
     /// The screen is alive; to be called at least ten times a second.
     pub fn beat(&self) {
         self.screen.heartbeat.beat();
@@ -480,31 +573,4 @@ impl Drop for Handle {
     fn drop(&mut self) {
         self.end();
     }
-}
-
-/// A study that is on disk.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct StoredStudy {
-    /// Its task.
-    pub task: Task,
-    /// Its seed.
-    pub seed: u32,
-    /// The robot model that it was made with.
-    pub robot: String,
-}
-
-/// What study `file` holds.
-///
-/// # Errors
-/// When the file cannot be read or holds no study of this program.
-pub fn stored_study(file: &Path) -> Result<StoredStudy, EngineError> {
-    let journal_file = JournalFile::new(file, Durability::Synced, LOCK_GRACE).map_err(StudyError::from)?;
-    let journal = Journal::open(journal_file).map_err(StudyError::from)?;
-    let ours = journal.replay().studies().iter().find_map(|study| {
-        let task = Task::from_name(study.user_attributes.get("task")?.as_str()?)?;
-        let seed = u32::try_from(study.user_attributes.get("seed")?.as_u64()?).ok()?;
-        let robot = study.user_attributes.get("robot")?.as_str()?.to_owned();
-        Some(StoredStudy { task, seed, robot })
-    });
-    ours.ok_or_else(|| EngineError::NoStudy { file: file.to_owned() })
 }

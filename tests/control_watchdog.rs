@@ -555,15 +555,9 @@ fn whole_studies_on_the_simulator_trip_no_limit() {
     let (mut beyond, mut speed, mut torque) = ([0.0_f64; 3], 0.0_f64, 0.0_f64);
     for task in [Task::Forward, Task::LateralLeft, Task::TwistCcw] {
         let options = Options {
-            config: Config::load(None).unwrap(),
-            robot: robot.clone(),
-            backend: Backend::Simulator,
-            task,
             seed: 1,
             trials: Some(20),
-            folder: None,
-            approve: quadfrog::session::approval::Approval::Each,
-            observe: false,
+            ..Options::new(Config::load(None).unwrap(), robot.clone(), Backend::Simulator, task)
         };
         let settings = options.config.settings(&robot, task, Backend::Simulator).unwrap();
         let simulator = Simulator::new(&robot, &options.config.simulator).unwrap();

@@ -20,7 +20,6 @@ use quadfrog::recording::record::{Proposal, Record, Stage, StageInfo, TrialRecor
 
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::robot::{LinkStatus, Robot};
-use quadfrog::session::approval::Approval;
 use quadfrog::session::automatic;
 use quadfrog::session::intent::Intent;
 use quadfrog::session::rollout::Rollout;
@@ -43,8 +42,7 @@ fn config() -> Config {
 }
 
 fn options(config: Config, robot: RobotDescription, backend: Backend, seed: u32, trials: u32) -> Options {
-    let approve = Approval::Each;
-    Options { config, robot, backend, task: TASK, seed, trials: Some(trials), folder: None, observe: false, approve }
+    Options { seed, trials: Some(trials), ..Options::new(config, robot, backend, TASK) }
 }
 
 /// An emulated robot in real time on a thread of its own, until dropped.

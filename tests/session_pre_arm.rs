@@ -16,7 +16,6 @@ use quadfrog::recording::record::{CommandRecord, PreArmCheck, Record, Stamped};
 use quadfrog::recording::recorder::RecorderWatch;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::robot::{Battery, JointCommand, LinkStatus, Placement, Robot, RobotError, RobotState};
-use quadfrog::session::approval::Approval;
 use quadfrog::session::intent::{Intent, OperatorCheck, Wish};
 use quadfrog::session::pre_arm::PreArmList;
 use quadfrog::session::supervisor::{Outlets, Parts, Supervisor};
@@ -63,17 +62,7 @@ impl Session {
     fn new(backend: Backend, folder: Option<std::path::PathBuf>) -> Session {
         let config = Config::load(None).unwrap();
         let robot = RobotDescription::embedded("go1").unwrap();
-        let options = Options {
-            config,
-            robot,
-            backend,
-            task: Task::Forward,
-            seed: 0,
-            trials: Some(5),
-            folder: None,
-            observe: false,
-            approve: Approval::Each,
-        };
+        let options = Options { trials: Some(5), ..Options::new(config, robot, backend, Task::Forward) };
         let settings: Settings = options.config.settings(&options.robot, options.task, backend).unwrap();
         let mut simulator = Simulator::new(&options.robot, &options.config.simulator).unwrap();
         simulator.place(&Placement { joint_position: settings.lying_position, lying: true, seed: 0 });

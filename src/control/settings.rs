@@ -201,11 +201,11 @@ impl ObjectiveSource {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct EstimatorSettings {
-    /// Smoothed force from which a foot in the air is down, N.
+    /// Force from which a foot in the air is down, N.
     pub contact_on_n: f64,
-    /// Smoothed force below which a foot on the ground is in the air, N.
+    /// Force below which a foot on the ground is in the air, N.
     pub contact_off_n: f64,
-    /// Time constant of the smoothing, s.
+    /// How long the sensor must have said so, s.
     pub contact_time_s: f64,
     /// Standard deviation of an accelerometer sample at 1 kHz, m/s^2.
     pub accel_noise_m_s2: f64,

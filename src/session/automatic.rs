@@ -1,4 +1,10 @@
 //! A study without a person: every proposal is approved, every suggested verdict is the verdict.
+//!
+//! On a shared study this is one worker of several. The budget is that of all together: a trial begins only while those
+//! that count and those that run are fewer, seen under the journal's lock, so it is met to the trial; a worker that finds
+//! no room waits until the others' trials have ended, for one of them may come to nothing.
+
+use std::time::Duration;
 
 use super::life::{Life, Refusal};
 use super::rollout::Rollout;
@@ -8,6 +14,8 @@ use crate::robot::Robot;
 
 /// After this many void trials in a row nothing will come of the study: something is wrong that no parameter mends.
 const VOIDS_IN_A_ROW: u32 = 10;
+/// How often a worker without work looks whether there is some.
+const LOOK_PERIOD: Duration = Duration::from_millis(50);
 
 /// Runs trials until the study has its budget; `each` is given every judged trial with its ticks.
 ///
@@ -19,9 +27,23 @@ pub fn run<R: Robot>(
     mut each: impl FnMut(&TrialRecord, &[Tick]),
 ) -> Result<(), Refusal> {
     let mut voids = 0;
-    while life.stage() == Stage::Proposed {
-        let Some(card) = life.proposal() else { break };
-        let spec = life.approve(card.trial, card.revision)?;
+    loop {
+        // Nobody looks at them.
+        life.take_records();
+        let Some(card) = life.proposal().filter(|_| life.stage() == Stage::Proposed) else {
+            // What is judged must be told before it is waited for others, or they wait for us.
+            life.close()?;
+            if !life.others_run() {
+                return Ok(());
+            }
+            std::thread::sleep(LOOK_PERIOD);
+            life.look()?;
+            continue;
+        };
+        let spec = match life.approve(card.trial, card.revision) {
+            Err(Refusal::Overtaken(_)) => continue,
+            approved => approved?,
+        };
         let (end, ticks) = rollout.run(&spec);
         life.ended(spec.trial, &end, ticks);
         let suggested = life.row(spec.trial).and_then(|row| row.suggested).unwrap_or(Verdict::Void);
@@ -36,5 +58,4 @@ pub fn run<R: Robot>(
             }
         }
     }
-    Ok(life.close()?)
 }

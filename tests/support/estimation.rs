@@ -11,6 +11,7 @@ use quadfrog::realtime::command::{JumpParameters, Task, TrialSpec};
 use quadfrog::realtime::telemetry::{Tick, TrialEnd};
 use quadfrog::recording::record::{Measured, Verdict};
 use quadfrog::robot::description::RobotDescription;
+use quadfrog::robot::{JOINTS, JointCommand, Joints, LEGS, PerLeg, Placement, Robot, RobotError, RobotState};
 use quadfrog::session::objective;
 use quadfrog::session::rollout::Rollout;
 use quadfrog::sim::{ActuatorKind, SimConfig, Simulator};
@@ -24,6 +25,8 @@ pub enum World {
     Ideal,
     /// Motors with lag, friction and a torque-speed curve; friction 0.6, so that feet slip.
     HardwareLike,
+    /// That, and what no data sheet tells: see [`Imperfect`].
+    Imperfect,
 }
 
 impl World {
@@ -31,7 +34,7 @@ impl World {
     pub fn config(self) -> SimConfig {
         let mut config = Config::load(None).unwrap().simulator;
         config.sensors.enabled = true;
-        if self == World::HardwareLike {
+        if self != World::Ideal {
             config.actuator.kind = ActuatorKind::HardwareLike;
             config.terrain.friction = 0.6;
         }
@@ -41,10 +44,95 @@ impl World {
 
 /// The shipped settings with the controller on the estimate.
 pub fn settings(task: Task) -> Settings {
+    settings_of(task, ObjectiveSource::Estimate)
+}
+
+/// The shipped settings with the controller on `source`.
+pub fn settings_of(task: Task, source: ObjectiveSource) -> Settings {
     let config = Config::load(None).unwrap();
     let robot = RobotDescription::embedded("go1").unwrap();
     let settings = config.settings(&robot, task, Backend::Simulator).unwrap();
-    Settings { objective: ObjectiveSource::Estimate, ..settings }
+    Settings { objective: source, ..settings }
+}
+
+/// A simulator whose machine was badly calibrated: joint zeros off by 0.01 rad (5 mm at the foot), an accelerometer with 1 %
+/// of scale error that clips at 8 g, joint velocities that lag by 3 ms, foot sensors with a gain of 0.7 to 1.3 and up to 5 N
+/// of offset. What is wrong is drawn anew for every trial.
+pub struct Imperfect {
+    robot: Simulator,
+    random: ChaCha8Rng,
+    joint_zero: Joints,
+    joint_velocity: Joints,
+    accel_scale: f64,
+    force_gain: PerLeg<f64>,
+    force_offset: PerLeg<f64>,
+    reported: RobotState,
+}
+
+impl Imperfect {
+    pub fn new(robot: Simulator) -> Imperfect {
+        Imperfect {
+            robot,
+            random: ChaCha8Rng::seed_from_u64(0),
+            joint_zero: [0.0; JOINTS],
+            joint_velocity: [0.0; JOINTS],
+            accel_scale: 1.0,
+            force_gain: [1.0; LEGS],
+            force_offset: [0.0; LEGS],
+            reported: RobotState::default(),
+        }
+    }
+
+    /// Evenly drawn between -1 and 1.
+    fn draw(&mut self) -> f64 {
+        2.0 * even(&mut self.random) - 1.0
+    }
+
+    fn look(&mut self) {
+        let mut state = self.robot.read().unwrap();
+        for (q, zero) in state.joint_position.iter_mut().zip(&self.joint_zero) {
+            *q += zero;
+        }
+        for (lagging, dq) in self.joint_velocity.iter_mut().zip(&mut state.joint_velocity) {
+            *lagging += (*dq - *lagging) * (1.0 - (-1.0_f64 / 3.0).exp());
+            *dq = *lagging;
+        }
+        state.imu.accel_body = (state.imu.accel_body * self.accel_scale).map(|a| a.clamp(-80.0, 80.0));
+        for (force, (gain, offset)) in state.foot_force.iter_mut().zip(self.force_gain.iter().zip(&self.force_offset)) {
+            *force = *force * gain + offset;
+        }
+        self.reported = state;
+    }
+}
+
+impl Robot for Imperfect {
+    fn read(&mut self) -> Result<RobotState, RobotError> {
+        Ok(self.reported)
+    }
+
+    fn write(&mut self, command: &JointCommand) -> Result<(), RobotError> {
+        self.robot.write(command)?;
+        self.look();
+        Ok(())
+    }
+
+    fn place(&mut self, placement: &Placement) -> bool {
+        self.random = ChaCha8Rng::seed_from_u64(placement.seed);
+        // Even between -a and a has a standard deviation of a / sqrt(3).
+        self.joint_zero = std::array::from_fn(|_| 0.01 * 3.0_f64.sqrt() * self.draw());
+        self.joint_velocity = [0.0; JOINTS];
+        self.accel_scale = 1.0 + 0.01 * self.draw();
+        self.force_gain = std::array::from_fn(|_| 1.0 + 0.3 * self.draw());
+        self.force_offset = std::array::from_fn(|_| 5.0 * self.draw().abs());
+        let placed = self.robot.place(placement);
+        self.look();
+        placed
+    }
+}
+
+/// Evenly drawn between 0 and 1.
+fn even(random: &mut ChaCha8Rng) -> f64 {
+    f64::from(random.next_u32()) / f64::from(u32::MAX)
 }
 
 /// One jump that did not fall: what the estimate makes of it less what it was.
@@ -75,7 +163,7 @@ impl JumpError {
 
 /// Makes `count` jumps of the five tasks in turn, with parameters drawn evenly within the shipped bounds. Returns those that
 /// landed, and how the others ended.
-pub fn jumps(world: World, count: u32, seed: u64) -> (Vec<JumpError>, Vec<TrialEnd>) {
+pub fn jumps(world: World, source: ObjectiveSource, count: u32, seed: u64) -> (Vec<JumpError>, Vec<TrialEnd>) {
     let config = Config::load(None).unwrap();
     let robot = RobotDescription::embedded("go1").unwrap();
     let mut random = ChaCha8Rng::seed_from_u64(seed);
@@ -85,7 +173,7 @@ pub fn jumps(world: World, count: u32, seed: u64) -> (Vec<JumpError>, Vec<TrialE
         let mut draw = |name: &str| {
             let [low, high] = config.optimize.bounds[name];
             let chosen = config.optimize.parameters[task.name()].iter().any(|parameter| parameter == name);
-            let share = f64::from(random.next_u32()) / f64::from(u32::MAX);
+            let share = even(&mut random);
             if chosen { low + share * (high - low) } else { 0.0 }
         };
         let jump =
@@ -101,8 +189,13 @@ pub fn jumps(world: World, count: u32, seed: u64) -> (Vec<JumpError>, Vec<TrialE
             jumps: 1,
             seed: seed.wrapping_add(u64::from(trial)),
         };
-        let settings = settings(task);
-        let mut rollout = Rollout::new(Simulator::new(&robot, &world.config()).unwrap(), &settings);
+        let settings = settings_of(task, source);
+        let simulator = Simulator::new(&robot, &world.config()).unwrap();
+        let machine: Box<dyn Robot> = match world {
+            World::Imperfect => Box::new(Imperfect::new(simulator)),
+            World::Ideal | World::HardwareLike => Box::new(simulator),
+        };
+        let mut rollout = Rollout::new(machine, &settings);
         let (end, ticks) = rollout.run(&spec);
         if objective::suggest(&end).0 != Verdict::Accept {
             fallen.push(end);

@@ -18,12 +18,12 @@ def objective(params):
     return 1.0 - (u[0] - 0.35) ** 2 - (u[1] - 0.6) ** 2 - (u[2] - 0.55) ** 2
 
 
-def load(path, seed=0, multivariate=True):
+def load(path, seed=0, multivariate=True, name="forward"):
     backend = JournalRedisBackend(path) if path.startswith("redis:") else JournalFileBackend(path)
     storage = JournalStorage(backend)
     sampler = optuna.samplers.TPESampler(seed=seed, multivariate=multivariate)
     return optuna.create_study(
-        storage=storage, study_name="forward", direction="maximize", sampler=sampler, load_if_exists=True
+        storage=storage, study_name=name, direction="maximize", sampler=sampler, load_if_exists=True
     )
 
 
@@ -54,9 +54,9 @@ def enqueue(path, params):
     load(path).enqueue_trial(json.loads(params), user_attrs={"by": "python"})
 
 
-def proceed(path, count, seed):
+def proceed(path, count, seed, name="forward"):
     """Runs `count` trials; answers with their numbers and parameters."""
-    study = load(path, int(seed))
+    study = load(path, int(seed), name=name)
     done = []
     for _ in range(int(count)):
         trial = study.ask(SPACE)

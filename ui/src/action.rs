@@ -2,7 +2,7 @@
 //! words. Dispatch, the help overlay, the palette and the next-step line are all made of it.
 
 use quadfrog::realtime::telemetry::Mode;
-use quadfrog::recording::record::Stage;
+use quadfrog::recording::record::{Stage, Verdict};
 
 use crate::model::{Model, View};
 
@@ -13,6 +13,7 @@ pub enum Action {
     Stop,
     Interrupt,
     Arm,
+    PreArm,
     Approve,
     SitDown,
     Acknowledge,
@@ -25,8 +26,13 @@ pub enum Action {
     Note,
     Override,
     ClearOverrides,
+    Fix,
+    Bounds,
+    QueuePoint,
     Skip,
     Continue,
+    ConfirmBest,
+    ExportBest,
     Open,
     LiveView,
     TrialsView,
@@ -173,21 +179,27 @@ const fn fixed(info: ActionInfo) -> ActionInfo {
 
 /// Every action, once.
 #[rustfmt::skip]
-pub const ACTIONS: [ActionInfo; 62] = {
+pub const ACTIONS: [ActionInfo; 68] = {
     use Action as A;
     use Group as G;
     [
         fixed(row(A::Stop, "stop", &["Space", "F12"], G::Robot, "STOP: damp all motors at once, from any screen", always)),
         fixed(row(A::Interrupt, "interrupt", &["Ctrl-C"], G::Robot, "STOP; again within 2 s: quit", always)),
         row(A::Arm, "arm", &["A"], G::Robot, "arm: the robot stands up", may_arm),
+        row(A::PreArm, "pre-arm", &["P"], G::Robot, "the pre-arm list, and your word on what only you can see", always),
         row(A::SitDown, "sit-down", &["D"], G::Robot, "sit down and disarm", may_sit_down),
         row(A::Acknowledge, "acknowledge", &["k"], G::Robot, "acknowledge a stop or a fault: back to DISARMED", may_acknowledge),
 
         row(A::Approve, "approve", &["g"], G::Proposal, "approve the jump; again after 0.3 s: countdown and jump", may_approve),
-        row(A::Override, "override", &["o"], G::Proposal, "change parameters of the proposal", may_change_proposal),
+        row(A::Override, "override", &["o"], G::Proposal, "change parameters and gains of the proposal", may_change_proposal),
         row(A::ClearOverrides, "clear-overrides", &["O"], G::Proposal, "back to what was proposed", may_clear_overrides),
+        row(A::Fix, "fix", &["X"], G::Proposal, "Override: fix the parameter for the next trials, or search it again", may_fix),
+        row(A::Bounds, "bounds", &["B"], G::Proposal, "Override: search the parameter within other bounds", may_bound),
+        row(A::QueuePoint, "queue-point", &["Q"], G::Proposal, "queue this point; it comes before the sampler's", may_queue),
         row(A::Skip, "skip", &["n"], G::Proposal, "refuse the proposal and ask for another", may_change_proposal),
         row(A::Continue, "continue", &["C"], G::Proposal, "give a finished study more trials", may_continue),
+        row(A::ConfirmBest, "confirm-best", &["K"], G::Proposal, "repeat the best points until one leads; again: end that", may_confirm),
+        row(A::ExportBest, "export-best", &["E"], G::Proposal, "write the best parameters as a configuration beside the study", may_export_best),
 
         row(A::Accept, "accept", &["a"], G::Verdict, "accept: it counts with its value", may_judge),
         row(A::Fall, "fall", &["f"], G::Verdict, "fall: it counts as J = 0", may_judge),
@@ -292,7 +304,13 @@ fn may_arm(model: &Model) -> Legality {
     match model.mode() {
         mode if busy(mode).is_some() => refuse(busy(mode).unwrap_or_default()),
         Mode::Disarmed if stage_is(model, Stage::Review) => refuse("the last trial waits for its verdict"),
-        Mode::Disarmed => Ok(()),
+        Mode::Disarmed => match model.pre_arm_failing().count() {
+            0 => Ok(()),
+            count => refuse(format!(
+                "{count} checks of the pre-arm list do not hold: {} shows them",
+                model.keymap.key(Action::PreArm)
+            )),
+        },
         _ => refuse("the robot is armed already"),
     }
 }
@@ -339,10 +357,60 @@ fn may_change_proposal(model: &Model) -> Legality {
     }
 }
 
+/// Whether the search may be changed: not while a trial is under way.
+fn may_search(model: &Model) -> Legality {
+    may_wish(model)?;
+    match model.stage.map(|info| info.stage) {
+        Some(Stage::Proposed | Stage::Finished) => Ok(()),
+        Some(Stage::Review) => refuse("the last trial waits for its verdict"),
+        Some(Stage::Running) => refuse("a trial is running"),
+        None => refuse("the session has not begun"),
+    }
+}
+
+fn may_bound(model: &Model) -> Legality {
+    may_search(model)?;
+    if model.view != View::Override {
+        return refuse("only in the view Override");
+    }
+    match model.override_parameter() {
+        Some(_) => Ok(()),
+        None => refuse("gains are not searched"),
+    }
+}
+
+fn may_fix(model: &Model) -> Legality {
+    may_bound(model)?;
+    let fixed = model.override_parameter().and_then(|info| model.searched(&info.name)?.fixed);
+    match (fixed, model.override_value()) {
+        (None, None) => refuse("there is no proposal whose value could be kept"),
+        _ => Ok(()),
+    }
+}
+
+fn may_queue(model: &Model) -> Legality {
+    may_change_proposal(model)
+}
+
+fn may_confirm(model: &Model) -> Legality {
+    may_search(model)?;
+    let stood = model.trials.values().filter(|trial| trial.verdict == Some(Verdict::Accept));
+    if stood.count() < 2 { refuse("two accepted trials are needed to compare") } else { Ok(()) }
+}
+
+fn may_export_best(model: &Model) -> Legality {
+    may_wish(model)?;
+    match (model.best(), model.session.study.is_empty()) {
+        (None, _) => refuse("no trial was accepted yet"),
+        (_, true) => refuse("this session keeps no study"),
+        _ => Ok(()),
+    }
+}
+
 fn may_clear_overrides(model: &Model) -> Legality {
     may_change_proposal(model)?;
     match model.proposal_on_table() {
-        Some(proposal) if proposal.parameters.iter().any(|p| p.value != p.proposed) => Ok(()),
+        Some(proposal) if proposal.parameters.iter().chain(&proposal.gains).any(|p| p.value != p.proposed) => Ok(()),
         _ => refuse("nothing was overridden"),
     }
 }

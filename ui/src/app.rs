@@ -19,6 +19,7 @@ use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
 use tokio::time::{MissedTickBehavior, interval};
 
 use crate::action::Action;
+use crate::export::{self, ExportError};
 use crate::feed::Feed;
 use crate::keymap::{Key, Keymap};
 use crate::model::Model;
@@ -223,6 +224,7 @@ impl Console {
                 let _ = self.screen.mouse(on);
             }
             Effect::Export => self.export(),
+            Effect::ExportBest => self.export_best(),
             Effect::Redraw => {
                 // A failure shows with the next frame.
                 let _ = self.screen.clear();
@@ -240,21 +242,19 @@ impl Console {
     }
 
     fn export(&mut self) {
-        let folder = Path::new(&self.model.session.study).parent().filter(|folder| folder.is_dir());
-        let folder = folder.map_or_else(PathBuf::new, Path::to_owned);
-        let files = [
-            (folder.join("trials.csv"), view::trial_text::as_csv(&self.model)),
-            (folder.join("trials.md"), view::trial_text::as_markdown(&self.model)),
-        ];
-        let written = files.iter().try_for_each(|(path, text)| {
-            std::fs::write(path, text).map_err(|error| format!("{}: {error}", path.display()))
-        });
+        let written = export::table(&self.model);
+        self.say_written(written, |path| format!("written: {} and trials.md beside it", path.display()));
+    }
+
+    fn export_best(&mut self) {
+        let written = export::best(&self.model);
+        self.say_written(written, |path| format!("written: {}, for --config", path.display()));
+    }
+
+    fn say_written(&mut self, written: Result<PathBuf, ExportError>, words: impl FnOnce(&Path) -> String) {
         match written {
-            Ok(()) => {
-                let text = format!("written: {} and trials.md beside it", files[0].0.display());
-                say(&mut self.model, Level::Info, text);
-            }
-            Err(error) => say(&mut self.model, Level::Error, format!("not exported: {error}")),
+            Ok(path) => say(&mut self.model, Level::Info, words(&path)),
+            Err(error) => say(&mut self.model, Level::Error, format!("not written: {error}")),
         }
     }
 

@@ -13,6 +13,7 @@ pub mod action;
 pub mod app;
 pub mod column;
 pub mod dialog;
+pub mod export;
 pub mod feed;
 pub mod history;
 pub mod keymap;

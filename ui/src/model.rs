@@ -5,8 +5,10 @@ use std::time::Duration;
 
 use quadfrog::realtime::telemetry::{Mode, Snapshot};
 use quadfrog::recording::record::{
-    Level, ParameterInfo, PreArmCheck, Proposal, SessionInfo, Source, Stage, StageInfo, TrialRecord, Verdict,
+    Insight, Level, ParameterInfo, PointRecord, PreArmCheck, Proposal, Search, SearchedParameter, SessionInfo, Source,
+    Stage, StageInfo, TrialRecord, Verdict,
 };
+use quadfrog::recording::recorder::RecorderStatus;
 use quadfrog::robot::description::RobotDescription;
 
 use crate::column::{Column, SortBy, descending, measured, verdict_rank};
@@ -227,6 +229,14 @@ pub struct Model {
     pub proposal: Option<Proposal>,
     /// The pre-arm list as it was shown last; empty before the robot was disarmed for the first time.
     pub pre_arm: Vec<PreArmCheck>,
+    /// What is searched at present; none before the session has said so.
+    pub search: Option<Search>,
+    /// Why the newest proposal of the sampler was made.
+    pub insight: Option<Insight>,
+    /// Points that were run more than once.
+    pub points: Vec<PointRecord>,
+    /// How the recorder is doing; none in a replay.
+    pub recorder: Option<RecorderStatus>,
     /// The study.
     pub trials: BTreeMap<u32, TrialRecord>,
     /// When the trials of this session ran.
@@ -278,6 +288,10 @@ impl Model {
             stage: None,
             proposal: None,
             pre_arm: Vec::new(),
+            search: None,
+            insight: None,
+            points: Vec::new(),
+            recorder: None,
             trials: BTreeMap::new(),
             ran: BTreeMap::new(),
             history: History::default(),
@@ -335,9 +349,34 @@ impl Model {
         self.proposal.as_ref().filter(|proposal| proposal.trial == info.trial)
     }
 
-    /// The parameter of that name with its bounds.
-    pub fn parameter(&self, name: &str) -> Option<&ParameterInfo> {
-        self.session.parameters.iter().find(|parameter| parameter.name == name)
+    /// The items of the pre-arm list that forbid arming.
+    pub fn pre_arm_failing(&self) -> impl Iterator<Item = &PreArmCheck> + '_ {
+        self.pre_arm.iter().filter(|item| !item.state.allows())
+    }
+
+    /// Whether a machine is driven that can hurt somebody.
+    pub fn is_hardware(&self) -> bool {
+        !matches!(self.session.backend.as_str(), "" | "sim")
+    }
+
+    /// The parameter of that name with its present bounds.
+    pub fn parameter(&self, name: &str) -> Option<ParameterInfo> {
+        let info = self.session.parameters.iter().find(|parameter| parameter.name == name)?;
+        Some(match self.searched(name) {
+            Some(searched) => ParameterInfo { low: searched.low, high: searched.high, ..info.clone() },
+            None => info.clone(),
+        })
+    }
+
+    /// The gain of that name with the range in which it may be set.
+    pub fn gain(&self, name: &str) -> Option<&ParameterInfo> {
+        self.session.gains.iter().find(|gain| gain.name == name)
+    }
+
+    /// The value on the card of the parameter that the chosen row of view Override is about.
+    pub fn override_value(&self) -> Option<f64> {
+        let name = &self.override_parameter()?.name;
+        self.proposal_on_table()?.parameters.iter().find(|p| p.name == *name).map(|p| p.value)
     }
 
     /// The accepted trial with the highest value; the earlier one of equals.
@@ -357,9 +396,28 @@ impl Model {
         })
     }
 
-    /// How many trials count for the budget: those with a verdict other than void.
+    /// How many trials count for the budget: as the session says, or else those with a verdict other than void.
     pub fn counted(&self) -> usize {
-        self.trials.values().filter(|trial| matches!(trial.verdict, Some(Verdict::Accept | Verdict::Fall))).count()
+        let judged = |trial: &&TrialRecord| matches!(trial.verdict, Some(Verdict::Accept | Verdict::Fall));
+        match &self.search {
+            Some(search) => search.counted as usize,
+            None => self.trials.values().filter(judged).count(),
+        }
+    }
+
+    /// How many trials the study is to have.
+    pub fn budget(&self) -> u32 {
+        self.search.as_ref().map_or(self.session.budget, |search| search.budget)
+    }
+
+    /// The parameter as it is searched at present.
+    pub fn searched(&self, name: &str) -> Option<&SearchedParameter> {
+        self.search.as_ref()?.parameters.iter().find(|parameter| parameter.name == name)
+    }
+
+    /// The parameter that the chosen row of view Override is about; none for a gain.
+    pub fn override_parameter(&self) -> Option<&ParameterInfo> {
+        self.session.parameters.get(self.override_row)
     }
 
     /// The rows of the trial table as sorted and filtered.

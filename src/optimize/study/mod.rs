@@ -8,6 +8,7 @@
 mod check;
 mod draft;
 mod error;
+mod import;
 mod notes;
 
 pub use draft::{Draft, Suggestion};
@@ -27,6 +28,8 @@ use std::time::Duration;
 
 /// Trial system attribute: seed of the streams and how far they had been read when the trial began.
 pub const DRAWS: &str = "quadfrog:draws";
+/// Study system attribute: how many workers have joined so far.
+const WORKERS: &str = "quadfrog:workers";
 /// Study system attribute: names of the objectives, as Optuna and its dashboard know it.
 const METRIC_NAMES: &str = "study:metric_names";
 
@@ -39,6 +42,34 @@ pub enum Storage {
     File(PathBuf),
     /// On a Redis server, given as `redis://host:port/db`: for workers on many hosts.
     Redis(String),
+}
+
+impl Storage {
+    /// The journal that is kept there.
+    ///
+    /// # Errors
+    /// If it cannot be read.
+    pub fn journal(&self, durability: Durability) -> Result<Journal, JournalError> {
+        match self {
+            Storage::Memory => Ok(Journal::in_memory()),
+            Storage::File(path) => Journal::open(JournalFile::new(path, durability, LOCK_GRACE)?),
+            Storage::Redis(url) => Journal::connect(JournalRedis::new(url, "")?),
+        }
+    }
+}
+
+impl std::fmt::Display for Storage {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Storage::Memory => write!(f, "memory"),
+            Storage::File(path) => write!(f, "{}", path.display()),
+            // An address may hold a password before an @.
+            Storage::Redis(url) => match url.rsplit_once('@') {
+                Some((_, address)) => write!(f, "redis://{address}"),
+                None => write!(f, "{url}"),
+            },
+        }
+    }
 }
 
 /// What a study is.
@@ -95,11 +126,7 @@ impl Study {
     /// If the journal cannot be read or written, or holds a study of that name with another direction or another scale of
     /// a parameter.
     pub fn open(storage: Storage, options: StudyOptions) -> Result<Study, StudyError> {
-        let mut journal = match storage {
-            Storage::Memory => Journal::in_memory(),
-            Storage::File(path) => Journal::open(JournalFile::new(&path, options.durability, LOCK_GRACE)?)?,
-            Storage::Redis(url) => Journal::connect(JournalRedis::new(&url, "")?)?,
-        };
+        let mut journal = storage.journal(options.durability)?;
         if journal.replay().find(&options.name).is_none() {
             journal.commit(|replay| {
                 let exists = replay.find(&options.name).is_some();
@@ -113,6 +140,26 @@ impl Study {
         study.check_compatible()?;
         study.streams.advance_to(study.draws_so_far());
         Ok(study)
+    }
+
+    /// Takes part as one more worker: gets the next free number, from 1 (0 is the session that made the study), and
+    /// proposes from then on with streams of its own seed, [`worker_seed`].
+    ///
+    /// # Errors
+    /// If the journal cannot be read or written.
+    pub fn join(&mut self) -> Result<u32, StudyError> {
+        let study = self.id;
+        let mut worker = 0;
+        self.journal.commit(|replay| {
+            let joined = replay.studies().get(study).and_then(|record| record.system_attributes.get(WORKERS)?.as_u64());
+            worker = joined.unwrap_or(0) as u32 + 1;
+            let key = WORKERS.to_owned();
+            Ok::<_, JournalError>(vec![Operation::StudySystemAttribute { study, key, value: Value::from(worker) }])
+        })?;
+        self.options.sampler.seed = worker_seed(self.options.sampler.seed, worker);
+        self.streams = Streams::new(self.options.sampler.seed);
+        self.streams.advance_to(self.draws_so_far());
+        Ok(worker)
     }
 
     /// Takes in what other writers have appended.
@@ -435,6 +482,18 @@ impl Study {
             .filter_map(ours)
             .fold(Draws::default(), |a, b| Draws { model: a.model.max(b.model), startup: a.startup.max(b.startup) })
     }
+}
+
+/// The seed of a worker's streams: that of the study for worker 0; for the others the upper half of a mix of both
+/// (SplitMix64 finalizer, Steele et al. 2014), so that no two workers propose the same points.
+pub fn worker_seed(study: u32, worker: u32) -> u32 {
+    if worker == 0 {
+        return study;
+    }
+    let mut z = (u64::from(worker) << 32 | u64::from(study)).wrapping_add(0x9E37_79B9_7F4A_7C15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    (z >> 32) as u32
 }
 
 /// The operations that make a study.

@@ -7,7 +7,7 @@ use super::searching::Searched;
 use super::{Life, Refusal, gains, not_now, recovery};
 use crate::optimize::insight;
 use crate::optimize::sampler::SamplerKind;
-use crate::optimize::study::{Study, StudyError};
+use crate::optimize::study::{Study, StudyError, Told};
 use crate::optimize::trial::Trial;
 use crate::realtime::command::{JumpParameters, TrialSpec};
 use crate::recording::record::{Insight, ParameterInsight, Record, Source, Stage, TrialRecord};
@@ -84,7 +84,7 @@ impl Life {
         if let Some(pending) = &self.pending {
             fork.tell(pending.trial, pending.outcome)?;
             if pending.rerun {
-                let (parameters, origin) = self.rerun_of(pending.trial);
+                let (parameters, origin) = self.rerun_of(pending.trial)?;
                 fork.enqueue(&parameters, &origin.attributes())?;
             }
         }
@@ -158,10 +158,13 @@ impl Life {
             self.write_confirmed()?;
             return Ok(None);
         };
-        self.study.tell(pending.trial, pending.outcome)?;
+        if self.study.tell(pending.trial, pending.outcome)? == Told::AlreadyFinished {
+            // Theirs stands: it is read again with the next proposal.
+            self.rows.remove(&pending.trial);
+        }
         let mut queued = None;
         if pending.rerun {
-            let (parameters, origin) = self.rerun_of(pending.trial);
+            let (parameters, origin) = self.rerun_of(pending.trial)?;
             queued = Some(self.study.enqueue(&parameters, &origin.attributes())?);
         }
         // Only now: what could not be written is still to be told.
@@ -170,11 +173,10 @@ impl Life {
         Ok(queued)
     }
 
-    fn rerun_of(&self, trial: u32) -> (Vec<(String, f64)>, Origin) {
-        match self.rows.get(&trial) {
-            Some(row) => (row.parameters.clone(), Origin::rerun_of(row)),
-            None => unreachable!("a trial that was judged has a row"),
-        }
+    fn rerun_of(&self, trial: u32) -> Result<(Vec<(String, f64)>, Origin), StudyError> {
+        let trial = self.study.trial(trial)?;
+        let row = attributes::row_of(trial, String::new(), &self.plan.parameters);
+        Ok((trial.parameters.clone(), Origin::rerun_of(&row)))
     }
 
     /// Queues a point, and proposes what is next then.

@@ -107,7 +107,9 @@ impl Life {
         self.close_abandoned()?;
         self.take_rows();
         let Some(card) = &self.card else {
-            return Ok(self.propose()?);
+            let room = occupied(self.study.trials(), self.plan.abandoned) < self.plan.budget;
+            let queued = self.study.waiting().any(|trial| attributes::source_of(trial) == Source::Confirm);
+            return if room || queued { Ok(self.propose()?) } else { Ok(()) };
         };
         let next = self.study.waiting().next().map(|trial| trial.number);
         let on_the_table = card.draft.enqueued.then_some(card.number());

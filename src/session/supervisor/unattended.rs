@@ -1,7 +1,7 @@
 //! What the session does without being asked: nothing, unless it was started with `falls-only` or `auto`.
 //!
 //! A person's hand outranks it: after STOP, a fault, a cancelled countdown, an undone verdict or a wish to sit down it holds
-//! still until a person approves, arms or judges again. It never acknowledges a stop.
+//! still until a person arms or approves again. It never acknowledges a stop.
 
 use super::{Intent, Supervisor, Wish};
 use crate::realtime::telemetry::{Cause, Mode};
@@ -40,7 +40,8 @@ impl Supervisor {
     pub(super) fn noticed(&mut self, intent: &Intent) {
         match intent {
             Intent::Cancel | Intent::SitDown | Intent::Undo | Intent::Acknowledge => self.unattended.held = true,
-            Intent::Arm | Intent::Approve { .. } | Intent::Judge(_) => self.unattended.held = false,
+            // Towards more energy only: a verdict given after a stop does not set the robot going.
+            Intent::Arm | Intent::Approve { .. } => self.unattended.held = false,
             _ => {}
         }
     }

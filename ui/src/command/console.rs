@@ -13,7 +13,7 @@ use quadfrog_console::feed::Feed;
 use quadfrog_console::settings::{ColourChoice, Settings};
 use quadfrog_console::terminal;
 
-use super::study::{Chosen, continued};
+use super::chosen::{Chosen, continued};
 use super::{Failure, StudyArguments, TaskName};
 
 /// How many colours are used.
@@ -129,22 +129,19 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
         None => {
             let task = task.unwrap_or(Task::Forward);
             let seed = seed.unwrap_or(config.optimize.sampler.seed);
-            Chosen { task, seed, folder: arguments.study.new_folder(task, seed) }
+            Chosen { task, seed, folder: arguments.study.new_folder(task, seed), budget: None }
         }
     };
     let folder = chosen.folder.clone();
     let cut_short = left_behind(&folder);
     let handle = Engine::start(Options {
-        config,
-        robot,
-        backend,
-        task: chosen.task,
         seed: chosen.seed,
         trials: arguments.study.trials,
         // Who only looks leaves nothing behind.
         folder: (!arguments.observe).then_some(chosen.folder),
         observe: arguments.observe,
         approve: arguments.approve.into(),
+        ..Options::new(config, robot, backend, chosen.task)
     })?;
     let recording = handle.recording().map(Path::to_owned);
     if app::run(Feed::live(handle), console)? == Ended::HungUp {

@@ -1,6 +1,7 @@
 //! The command line: one file per subcommand; without one, the console opens.
 
 mod bench;
+mod chosen;
 mod console;
 mod emulate;
 mod optimize;
@@ -13,7 +14,11 @@ use std::path::{Path, PathBuf};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use quadfrog::config::{Config, ConfigError};
 use quadfrog::engine::EngineError;
+use quadfrog::optimize::journal::JournalError;
+use quadfrog::optimize::sampler::SamplerKind;
+use quadfrog::optimize::study::StudyError;
 use quadfrog::realtime::command::Task;
+use quadfrog::recording::RecordingError;
 use quadfrog::robot::description::RobotDescription;
 
 /// Optimize the jumps of a quadruped, on the robot or on the built-in simulator.
@@ -40,6 +45,8 @@ enum Subcommands {
     Emulate(emulate::EmulateArguments),
     /// Measure the simulator's speed on this machine
     Bench(bench::BenchArguments),
+    /// Look at studies, take them elsewhere, bring trials in, queue a point
+    Study(study::StudyCommand),
 }
 
 /// What ends the program before its time.
@@ -64,10 +71,21 @@ impl From<ConfigError> for Failure {
 
 impl From<EngineError> for Failure {
     fn from(error: EngineError) -> Failure {
-        match error {
+        // A disk or a server that does not do its part is nobody's input.
+        match &error {
             EngineError::System { .. } => Failure::Other(error.into()),
+            EngineError::Study(StudyError::Journal(JournalError::Io { .. } | JournalError::Redis { .. })) => {
+                Failure::Other(error.into())
+            }
+            EngineError::Recording(RecordingError::Io { .. }) => Failure::Other(error.into()),
             _ => Failure::input(error),
         }
+    }
+}
+
+impl From<StudyError> for Failure {
+    fn from(error: StudyError) -> Failure {
+        EngineError::from(error).into()
     }
 }
 
@@ -104,6 +122,30 @@ impl From<TaskName> for Task {
     }
 }
 
+/// A sampler on the command line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum SamplerName {
+    /// Tree-structured Parzen estimator, as Optuna
+    Tpe,
+    /// Gaussian process: better where there are some tens of trials
+    Gp,
+    /// Blind, uniform
+    Random,
+    /// Blind, even
+    Sobol,
+}
+
+impl From<SamplerName> for SamplerKind {
+    fn from(name: SamplerName) -> SamplerKind {
+        match name {
+            SamplerName::Tpe => SamplerKind::Tpe,
+            SamplerName::Gp => SamplerKind::Gp,
+            SamplerName::Random => SamplerKind::Random,
+            SamplerName::Sobol => SamplerKind::Sobol,
+        }
+    }
+}
+
 /// What console and `optimize` share.
 #[derive(Debug, Clone, Args)]
 pub struct StudyArguments {
@@ -116,6 +158,9 @@ pub struct StudyArguments {
     /// Robot model: go1, a1, or a folder with a URDF and a robot.toml
     #[arg(long, value_name = "MODEL", default_value = "go1")]
     model: String,
+    /// Who proposes [default: that of optimize.toml]
+    #[arg(long, value_name = "SAMPLER")]
+    sampler: Option<SamplerName>,
     /// Where the folders of new studies are made
     #[arg(long, value_name = "DIR", default_value = "recordings")]
     output: PathBuf,
@@ -125,7 +170,11 @@ impl StudyArguments {
     /// The configuration asked for; a study that is continued goes on with its own.
     fn load_config(&self, resume: Option<&Path>) -> Result<Config, Failure> {
         let own = resume.map(|folder| folder.join("config")).filter(|config| config.is_dir());
-        Ok(Config::load(self.config.as_deref().or(own.as_deref()))?)
+        let mut config = Config::load(self.config.as_deref().or(own.as_deref()))?;
+        if let Some(sampler) = self.sampler {
+            config.choose_sampler(sampler.into());
+        }
+        Ok(config)
     }
 
     fn load_robot(&self) -> Result<RobotDescription, Failure> {
@@ -159,5 +208,6 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
         Some(Subcommands::Recover(recover)) => recover::run(&recover),
         Some(Subcommands::Emulate(emulate)) => emulate::run(&emulate),
         Some(Subcommands::Bench(bench)) => bench::run(&bench),
+        Some(Subcommands::Study(study)) => study::run(&study),
     }
 }

@@ -1,4 +1,4 @@
-//! `quadfrog optimize`: whole studies on the simulator without a screen.
+//! `quadfrog optimize`: whole studies on the simulator without a screen, alone or as one more worker on a shared one.
 
 use std::collections::HashMap;
 use std::io::{IsTerminal, Write};
@@ -12,6 +12,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use quadfrog::config::{Backend, Config};
 use quadfrog::engine::{self, EngineError, Options};
 use quadfrog::optimize::journal::Durability;
+use quadfrog::optimize::study::Storage;
 use quadfrog::realtime::command::Task;
 use quadfrog::realtime::telemetry::Tick;
 use quadfrog::recording::record::{Measured, Record, Stamped, TrialRecord, Verdict};
@@ -24,7 +25,7 @@ use quadfrog::session::rollout::Rollout;
 use quadfrog::sim::Simulator;
 use serde::{Serialize, Serializer};
 
-use super::study::{Chosen, continued};
+use super::chosen::{Chosen, continued, joined, journal};
 use super::{Failure, StudyArguments, TaskName};
 
 /// What is recorded.
@@ -51,13 +52,17 @@ pub struct OptimizeArguments {
     /// Continue the study in this folder
     #[arg(long, value_name = "DIR", conflicts_with = "output")]
     resume: Option<PathBuf>,
+    /// Take part in the study of this folder, journal file or redis://HOST:PORT/DB as one more worker; --trials is the
+    /// budget of all workers together
+    #[arg(long, value_name = "JOURNAL", conflicts_with = "resume")]
+    join: Option<String>,
     /// One JSON object per finished trial on standard output; table and messages go to standard error
     #[arg(long)]
     json: bool,
     /// What is recorded
     #[arg(long, value_name = "WHAT", default_value = "best")]
     record: Kept,
-    /// Studies that run at the same time [default: the number of cores]
+    /// Studies that run at the same time [default: the number of cores]; with --join: workers [default: 1]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     jobs: Option<u16>,
 }
@@ -87,32 +92,75 @@ fn parse_seeds(text: &str) -> Result<Seeds, String> {
 }
 
 pub fn run(arguments: &OptimizeArguments) -> Result<(), Failure> {
-    let config = arguments.study.load_config(arguments.resume.as_deref())?;
+    let joined = arguments.join.as_deref().map(journal);
+    let beside = match &joined {
+        Some(Storage::File(file)) => file.parent(),
+        _ => arguments.resume.as_deref(),
+    };
+    let config = arguments.study.load_config(beside)?;
     let robot = arguments.study.load_robot()?;
-    let studies = choose(arguments, &config, &robot)?;
+    let studies = match &joined {
+        Some(storage) => workers(arguments, storage, &config, &robot)?,
+        None => choose(arguments, &config, &robot)?,
+    };
     let printer = Printer::new(arguments, &config, &studies);
     let failures = Mutex::new(Vec::new());
     let next = AtomicUsize::new(0);
     let jobs = match arguments.jobs {
         Some(jobs) => usize::from(jobs),
+        None if joined.is_some() => 1,
         None => std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
     };
     std::thread::scope(|scope| {
         for _ in 0..jobs.min(studies.len()) {
             scope.spawn(|| {
                 while let Some(study) = studies.get(next.fetch_add(1, Ordering::Relaxed)) {
-                    if let Err(failure) = run_one(arguments, &config, &robot, study, &printer) {
+                    if let Err(failure) = run_one(arguments, joined.as_ref(), &config, &robot, study, &printer) {
                         failures.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push(failure);
                     }
                 }
             });
         }
     });
-    let failures = failures.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
-    match failures.into_iter().next() {
-        Some(failure) => Err(failure),
-        None => Ok(()),
+    let mut failures = failures.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+    drop(printer);
+    // Every one of them is said; the last decides the exit status, unless an earlier one is graver than bad input.
+    failures.sort_by_key(|failure| matches!(failure, Failure::Other(_)));
+    let last = failures.pop();
+    for failure in failures {
+        match failure {
+            Failure::Input(message) => eprintln!("quadfrog: {message}"),
+            Failure::Other(report) => eprintln!("quadfrog: {report:?}"),
+        }
     }
+    last.map_or(Ok(()), Err)
+}
+
+/// As many workers on the study of `storage` as `--jobs` says, each with a folder of its own.
+fn workers(
+    arguments: &OptimizeArguments,
+    storage: &Storage,
+    config: &Config,
+    robot: &RobotDescription,
+) -> Result<Vec<Chosen>, Failure> {
+    let several = || Failure::input("--join: a worker takes part in one study; give one --task and one --seed");
+    let task = match arguments.task.as_slice() {
+        [] => None,
+        [task] => Some(Task::from(*task)),
+        _ => return Err(several()),
+    };
+    let seed = match arguments.seed.as_ref().map(|seeds| seeds.0.as_slice()) {
+        None => None,
+        Some([seed]) => Some(*seed),
+        Some(_) => return Err(several()),
+    };
+    let usual = (Task::Forward, config.optimize.sampler.seed);
+    let folder = |worker: u16| {
+        let name = arguments.study.new_folder(task.unwrap_or(usual.0), seed.unwrap_or(usual.1));
+        // Many may begin in the same second.
+        PathBuf::from(format!("{}-joined-{}-{worker}", name.display(), std::process::id()))
+    };
+    (0..arguments.jobs.unwrap_or(1)).map(|worker| joined(storage, task, seed, robot, usual, folder(worker))).collect()
 }
 
 /// The studies that the arguments ask for: every task with every seed.
@@ -133,33 +181,37 @@ fn choose(arguments: &OptimizeArguments, config: &Config, robot: &RobotDescripti
     let every: Vec<_> = tasks.iter().flat_map(|task| seeds.iter().map(|seed| (*task, *seed))).collect();
     let once =
         every.iter().enumerate().filter(|(place, item)| distinct((*place, *item), &every)).map(|(_, item)| *item);
-    Ok(once.map(|(task, seed)| Chosen { task, seed, folder: arguments.study.new_folder(task, seed) }).collect())
+    let new = |(task, seed)| Chosen { task, seed, folder: arguments.study.new_folder(task, seed), budget: None };
+    Ok(once.map(new).collect())
 }
 
 fn run_one(
     arguments: &OptimizeArguments,
+    join: Option<&Storage>,
     config: &Config,
     robot: &RobotDescription,
     study: &Chosen,
     printer: &Printer,
 ) -> Result<(), Failure> {
     let options = Options {
-        config: config.clone(),
-        robot: robot.clone(),
-        backend: Backend::Simulator,
-        task: study.task,
         seed: study.seed,
-        trials: arguments.study.trials,
+        trials: arguments.study.trials.or(study.budget.filter(|_| join.is_some())),
         folder: Some(study.folder.clone()),
-        observe: false,
-        approve: Approval::Each,
+        approve: Approval::Auto,
+        join: join.cloned(),
+        ..Options::new(config.clone(), robot.clone(), Backend::Simulator, study.task)
     };
     let settings = config.settings(robot, study.task, Backend::Simulator)?;
     let simulator = Simulator::new(robot, &config.simulator).map_err(EngineError::from)?;
     let mut rollout = Rollout::new(simulator, &settings);
     let prepared = engine::prepare_folder(&options)?;
     let recording = prepared.recording.clone().filter(|_| arguments.record != Kept::None);
-    let name = recording.as_ref().and_then(|path| path.file_name()).map(|name| name.to_string_lossy().into_owned());
+    let name = match &recording {
+        // Beside other workers' recordings the name alone says nothing.
+        Some(path) if join.is_some() => Some(path.display().to_string()),
+        Some(path) => path.file_name().map(|name| name.to_string_lossy().into_owned()),
+        None => None,
+    };
     // The trial is on its way to the disk when it is judged, and on it before the next one is proposed.
     let mut life = engine::open_life(&options, Durability::Synced, name.as_deref().unwrap_or_default())?;
     let mut recorder = match &recording {
@@ -197,7 +249,10 @@ fn run_one(
     if let Some(error) = failed {
         return Err(EngineError::from(error).into());
     }
-    ran.map_err(|refusal| Failure::Other(eyre!("{}: {refusal}", study.folder.display())))?;
+    if let Err(refusal) = ran {
+        let place = join.map_or_else(|| study.folder.display().to_string(), ToString::to_string);
+        return Err(Failure::Other(eyre!("{place}: {refusal}")));
+    }
     printer.finished(study, &life.rows().cloned().collect::<Vec<_>>(), life.best(), &options);
     Ok(())
 }
@@ -294,7 +349,10 @@ impl Printer {
             Some(best) => format!("Best: {}\n", table::line(best, study.task.unit(), &self.units)),
             None => "No trial was accepted.\n".to_owned(),
         };
-        text += &format!("The study is in {}\n", study.folder.display());
+        text += &match &options.join {
+            Some(storage) => format!("The study is in {storage}; this worker's part in {}\n", study.folder.display()),
+            None => format!("The study is in {}\n", study.folder.display()),
+        };
         let print = || if self.json { eprint!("{text}") } else { say(text.trim_end()) };
         match &self.bar {
             Some(bar) => bar.suspend(print),

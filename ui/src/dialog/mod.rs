@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use crossterm::event::KeyCode;
 use quadfrog::recording::record::Level;
-use quadfrog::session::intent::Intent;
+use quadfrog::session::intent::{Intent, OperatorCheck};
 use tui_input::{Input, InputRequest};
 
 use crate::action::{ACTIONS, Action, ActionInfo};
@@ -33,8 +33,16 @@ pub enum Dialog {
         /// When the approving key was pressed last.
         pressed_at: Duration,
     },
-    /// Stand the robot up? Asked where arming was chosen with Enter.
-    Arm,
+    /// Stand the robot up? Asked on hardware, and where arming was chosen with Enter.
+    Arm {
+        /// Letters of the confirming word that were typed.
+        typed: usize,
+    },
+    /// The pre-arm list.
+    PreArm {
+        /// The operator's own item that the key is about.
+        selected: usize,
+    },
     /// End the program although the robot is armed or a trial waits?
     Quit,
     /// Change parameters of the proposal.
@@ -75,7 +83,7 @@ pub enum Dialog {
 }
 
 /// What a text field is for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Purpose {
     /// A note on this trial.
     Note(u32),
@@ -83,6 +91,20 @@ pub enum Purpose {
     HandValue(u32),
     /// More trials for a finished study.
     Continue,
+    /// For how many trials a parameter is fixed.
+    Fix {
+        /// Its place in the session's list.
+        parameter: usize,
+        /// The value that it keeps, in its unit.
+        value: f64,
+    },
+    /// Between which bounds a parameter is searched.
+    Bounds {
+        /// Its place in the session's list.
+        parameter: usize,
+    },
+    /// How often the best points are repeated.
+    ConfirmBest,
     /// Jump to a trial.
     TrialNumber,
     /// Search the log.
@@ -120,10 +142,8 @@ pub fn key(model: &mut Model, key: Key) -> Vec<Effect> {
     let Some(dialog) = model.dialog.take() else { return Vec::new() };
     match dialog {
         Dialog::Approve { trial, revision, pressed_at } => approve_key(model, key, (trial, revision, pressed_at)),
-        Dialog::Arm => match key.typed() {
-            Some('y' | 'Y') => wish(model, Intent::Arm),
-            _ => cancelled(model, "not armed"),
-        },
+        Dialog::Arm { typed } => arm_key(model, key, typed),
+        Dialog::PreArm { selected } => pre_arm_key(model, key, selected),
         Dialog::Quit => match key.typed() {
             Some('y' | 'Y') => vec![Effect::Quit],
             _ => cancelled(model, "not quit"),
@@ -164,6 +184,52 @@ pub fn key(model: &mut Model, key: Key) -> Vec<Effect> {
 fn cancelled(model: &mut Model, text: &str) -> Vec<Effect> {
     model.message = Some(Message { level: Level::Info, text: format!("cancelled: {text}") });
     Vec::new()
+}
+
+/// The word whose letters, in order, arm the robot: on hardware one that nobody types by accident.
+pub fn arming_word(model: &Model) -> &'static str {
+    if model.is_hardware() { "stand" } else { "y" }
+}
+
+fn arm_key(model: &mut Model, key: Key, typed: usize) -> Vec<Effect> {
+    let word = arming_word(model);
+    if key.typed() != word.chars().nth(typed) {
+        return cancelled(model, "not armed");
+    }
+    if typed + 1 < word.len() {
+        model.dialog = Some(Dialog::Arm { typed: typed + 1 });
+        return Vec::new();
+    }
+    match Action::Arm.legal(model) {
+        Ok(()) => wish(model, Intent::Arm),
+        Err(reason) => {
+            model.message = Some(Message { level: Level::Warning, text: format!("not armed: {reason}") });
+            Vec::new()
+        }
+    }
+}
+
+fn pre_arm_key(model: &mut Model, key: Key, mut selected: usize) -> Vec<Effect> {
+    let last = OperatorCheck::ALL.len() - 1;
+    let effects = match key.code() {
+        KeyCode::Esc | KeyCode::Enter => return Vec::new(),
+        KeyCode::Up => {
+            selected = selected.saturating_sub(1);
+            Vec::new()
+        }
+        KeyCode::Down => {
+            selected = (selected + 1).min(last);
+            Vec::new()
+        }
+        KeyCode::Char('x') => wish(model, Intent::Confirm(OperatorCheck::ALL[selected.min(last)])),
+        // Arming from the list that says whether it is possible.
+        _ if model.keymap.action(key) == Some(Action::Arm) && Action::Arm.legal(model).is_ok() => {
+            return perform(model, Action::Arm);
+        }
+        _ => Vec::new(),
+    };
+    model.dialog = Some(Dialog::PreArm { selected });
+    effects
 }
 
 /// The second moment of an approval. Only the approving key approves, and only after a pause: a bounced key or one
@@ -220,6 +286,21 @@ fn submit(model: &mut Model, purpose: Purpose, text: &str) -> Result<Vec<Effect>
             Ok(more @ 1..=1000) => Ok(wish(model, Intent::Continue(more))),
             _ => Err(format!("`{text}` is not a number of trials from 1 to 1000")),
         },
+        Purpose::Fix { parameter, value } => match (text.parse::<u32>(), model.session.parameters.get(parameter)) {
+            (Ok(trials @ 1..=1000), Some(info)) => {
+                let intent = Intent::Fix { parameter: info.name.clone(), value, trials };
+                Ok(wish(model, intent))
+            }
+            _ => Err(format!("`{text}` is not a number of trials from 1 to 1000")),
+        },
+        Purpose::Bounds { parameter } => {
+            let intent = bounds_of(model, parameter, text)?;
+            Ok(wish(model, intent))
+        }
+        Purpose::ConfirmBest => match text.parse::<u32>() {
+            Ok(repeats @ 1..=1000) => Ok(wish(model, Intent::ConfirmBest { repeats })),
+            _ => Err(format!("`{text}` is not a number of repeats from 1 to 1000")),
+        },
         Purpose::TrialNumber => {
             let number = text.parse::<u32>().map_err(|_| format!("`{text}` is not a trial's number"))?;
             if !model.trials.contains_key(&number) {
@@ -236,6 +317,24 @@ fn submit(model: &mut Model, purpose: Purpose, text: &str) -> Result<Vec<Effect>
     }
 }
 
+/// Bounds typed as `low..high`, checked as far as the screen can know; the session checks all of it again.
+fn bounds_of(model: &Model, parameter: usize, text: &str) -> Result<Intent, String> {
+    let Some(info) = model.session.parameters.get(parameter) else { return Err("there is no such parameter".into()) };
+    let (name, unit) = (&info.name, &info.unit);
+    let number = |text: &str| text.trim().parse::<f64>().ok().filter(|value| value.is_finite());
+    let ends = text.split_once("..").and_then(|(low, high)| Some((number(low)?, number(high)?)));
+    let Some((low, high)) = ends else { return Err(format!("`{text}` is no range; write it as 50..120")) };
+    if low >= high {
+        return Err(format!("{low} is not below {high}"));
+    }
+    match model.searched(name) {
+        Some(p) if low < p.least || high > p.most => {
+            Err(format!("{name} may be searched from {} to {} {unit} (safety.toml)", p.least, p.most))
+        }
+        _ => Ok(Intent::NarrowBounds { parameter: name.clone(), low, high }),
+    }
+}
+
 fn palette_key(model: &mut Model, key: Key, mut input: Input, mut selected: usize) -> Vec<Effect> {
     let rows = palette_rows(input.value(), model);
     match key.code() {
@@ -246,7 +345,7 @@ fn palette_key(model: &mut Model, key: Key, mut input: Input, mut selected: usiz
             return match rows.get(selected) {
                 // Enter never starts motion: arming is asked again, approving opens its dialog by itself.
                 Some((info, Ok(()))) if info.action == Action::Arm => {
-                    model.dialog = Some(Dialog::Arm);
+                    model.dialog = Some(Dialog::Arm { typed: 0 });
                     Vec::new()
                 }
                 Some((info, _)) => perform(model, info.action),

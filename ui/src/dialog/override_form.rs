@@ -1,11 +1,12 @@
 //! The form in which an operator changes a proposal.
 
 use crossterm::event::KeyCode;
-use quadfrog::recording::record::Proposal;
+use quadfrog::recording::record::{ParameterInfo, Proposal, ProposedParameter};
 use quadfrog::session::intent::Intent;
 use tui_input::Input;
 
 use super::{Dialog, cancelled, edit};
+use crate::action::Action;
 use crate::keymap::Key;
 use crate::model::Model;
 use crate::update::{Effect, wish};
@@ -40,23 +41,35 @@ pub struct OverrideRow {
     pub before: f64,
     /// The value now.
     pub value: f64,
+    /// Whether it is a gain of the controller, not a parameter that is searched.
+    pub gain: bool,
+}
+
+impl OverrideRow {
+    /// What asks the session for the value.
+    fn intent(&self) -> Intent {
+        match self.gain {
+            true => Intent::OverrideGain { gain: self.name.clone(), value: self.value },
+            false => Intent::Override { parameter: self.name.clone(), value: self.value },
+        }
+    }
 }
 
 impl OverrideForm {
     /// The form for a proposal; parameters without known bounds are left out.
     pub fn new(proposal: &Proposal, model: &Model) -> OverrideForm {
-        let row = |p: &quadfrog::recording::record::ProposedParameter| {
-            let info = model.parameter(&p.name)?;
-            Some(OverrideRow {
-                name: p.name.clone(),
-                unit: info.unit.clone(),
-                low: info.low,
-                high: info.high,
-                before: p.value,
-                value: p.value,
-            })
+        let row = |p: &ProposedParameter, info: ParameterInfo, gain| OverrideRow {
+            name: p.name.clone(),
+            unit: info.unit,
+            low: info.low,
+            high: info.high,
+            before: p.value,
+            value: p.value,
+            gain,
         };
-        let rows: Vec<OverrideRow> = proposal.parameters.iter().filter_map(row).collect();
+        let parameters = proposal.parameters.iter().filter_map(|p| Some(row(p, model.parameter(&p.name)?, false)));
+        let gains = proposal.gains.iter().filter_map(|p| Some(row(p, model.gain(&p.name)?.clone(), true)));
+        let rows: Vec<OverrideRow> = parameters.chain(gains).collect();
         let selected = model.override_row.min(rows.len().saturating_sub(1));
         OverrideForm { trial: proposal.trial, rows, selected, typing: None, problem: None }
     }
@@ -116,12 +129,19 @@ pub(super) fn key(model: &mut Model, key: Key, mut form: OverrideForm) -> Vec<Ef
         KeyCode::Enter => {
             if form.take_typed() {
                 let changed = form.rows.iter().filter(|row| row.value != row.before);
-                let intents: Vec<Intent> =
-                    changed.map(|row| Intent::Override { parameter: row.name.clone(), value: row.value }).collect();
+                let intents: Vec<Intent> = changed.map(OverrideRow::intent).collect();
                 if intents.is_empty() {
                     return cancelled(model, "nothing was changed");
                 }
                 return intents.into_iter().flat_map(|intent| wish(model, intent)).collect();
+            }
+        }
+        // The point as it stands in the form waits its turn; the card stays as it is.
+        _ if model.keymap.action(key) == Some(Action::QueuePoint) => {
+            if form.take_typed() {
+                let parameters = form.rows.iter().filter(|row| !row.gain);
+                let point = parameters.map(|row| (row.name.clone(), row.value)).collect();
+                return wish(model, Intent::Enqueue(point));
             }
         }
         KeyCode::Up => form.select(form.selected.saturating_sub(1)),

@@ -11,6 +11,7 @@ use std::time::Duration;
 
 use quadfrog::realtime::telemetry::{Mode, Snapshot, Tick};
 use quadfrog::recording::record::{Level, Stamped};
+use quadfrog::recording::recorder::RecorderStatus;
 use quadfrog::session::intent::Intent;
 
 use crate::action::{Action, may_acknowledge, may_wish};
@@ -40,6 +41,8 @@ pub enum Msg {
     Mouse(Mouse),
     /// The newest tick and counters, for numbers and the mode.
     Snapshot(Box<Snapshot>),
+    /// How the recorder is doing.
+    Recorder(RecorderStatus),
     /// One of the ticks for the charts.
     Tick(Box<Tick>),
     /// A record of the session.
@@ -69,6 +72,8 @@ pub enum Effect {
     Copy(String),
     /// Write the trial table to files beside the study.
     Export,
+    /// Write the best parameters as a configuration beside the study.
+    ExportBest,
     /// Draw everything again.
     Redraw,
     /// Ask the terminal for the mouse's clicks, or leave them to it.
@@ -130,6 +135,10 @@ pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
             records::close_stale_dialog(model);
             Vec::new()
         }
+        Msg::Recorder(status) => {
+            model.recorder = Some(status);
+            Vec::new()
+        }
         Msg::Tick(tick) => {
             model.history.push(&tick);
             Vec::new()
@@ -144,6 +153,9 @@ pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
             model.trials.clear();
             model.ran.clear();
             model.pre_arm.clear();
+            model.search = None;
+            model.insight = None;
+            model.points.clear();
             model.log.clear();
             model.log_view.back = 0;
             model.stage = None;

@@ -30,7 +30,8 @@ pub(super) fn move_by(model: &mut Model, step: isize) -> Vec<Effect> {
             };
         }
         View::Override => {
-            let last = model.session.parameters.len().saturating_sub(1);
+            let rows = model.session.parameters.len() + model.session.gains.len();
+            let last = rows.saturating_sub(1);
             model.override_row = model.override_row.saturating_add_signed(step).min(last);
         }
         View::Optimizer | View::Health => {}

@@ -1,11 +1,12 @@
 //! What each action does.
 
+use quadfrog::realtime::telemetry::Mode;
 use quadfrog::recording::record::{Level, Stage, Verdict};
 use quadfrog::session::intent::Intent;
 
 use super::navigate::{filter, freeze, ghost, move_by, move_cursor, next_mode, next_series, next_sort, zoom};
 use super::{Effect, ReplayCommand, interrupt, say, stop, wish};
-use crate::action::{Action, may_acknowledge};
+use crate::action::{Action, may_acknowledge, may_wish};
 use crate::dialog::{Choice, Dialog, OverrideForm, Purpose};
 use crate::model::{Model, View};
 
@@ -13,19 +14,35 @@ use crate::model::{Model, View};
 pub fn perform(model: &mut Model, action: Action) -> Vec<Effect> {
     if let Err(reason) = action.legal(model) {
         say(model, Level::Warning, format!("{}: {reason}", action.info().name));
+        // What stands in the way of arming is shown at once, all of it.
+        let shown = action == Action::Arm && model.mode() == Mode::Disarmed && model.pre_arm_failing().count() > 0;
+        if shown && may_wish(model).is_ok() {
+            return open(model, Dialog::PreArm { selected: 0 });
+        }
         return Vec::new();
     }
     match action {
         Action::Stop => stop(model, "STOP"),
         Action::Interrupt => interrupt(model),
+        // A machine that can hurt somebody is asked about with a word, not with a key that lies under a finger.
+        Action::Arm if model.is_hardware() => open(model, Dialog::Arm { typed: 0 }),
         Action::Arm => wish(model, Intent::Arm),
+        Action::PreArm => open(model, Dialog::PreArm { selected: 0 }),
         Action::SitDown => wish(model, Intent::SitDown),
         Action::Acknowledge => wish(model, Intent::Acknowledge),
         Action::Approve => open_approval(model),
         Action::Override => open_override(model),
         Action::ClearOverrides => wish(model, Intent::ClearOverrides),
+        Action::Fix => fix(model),
+        Action::Bounds => bounds(model),
+        Action::QueuePoint => queue_point(model),
         Action::Skip => wish(model, Intent::Skip),
         Action::Continue => open(model, Dialog::field(Purpose::Continue, "20")),
+        Action::ConfirmBest => match model.search.as_ref().and_then(|search| search.confirming) {
+            Some(_) => wish(model, Intent::ConfirmBest { repeats: 0 }),
+            None => open(model, Dialog::field(Purpose::ConfirmBest, "10")),
+        },
+        Action::ExportBest => vec![Effect::ExportBest],
         Action::Accept => wish(model, Intent::Judge(Verdict::Accept)),
         Action::Fall => wish(model, Intent::Judge(Verdict::Fall)),
         Action::Void => wish(model, Intent::Judge(Verdict::Void)),
@@ -138,6 +155,28 @@ fn open_override(model: &mut Model) -> Vec<Effect> {
     let Some(proposal) = model.proposal.clone() else { return Vec::new() };
     let form = OverrideForm::new(&proposal, model);
     open(model, Dialog::Override(form))
+}
+
+/// Asks for how many trials the chosen parameter keeps the card's value; a fixed one is searched again.
+fn fix(model: &mut Model) -> Vec<Effect> {
+    let Some(name) = model.override_parameter().map(|info| info.name.clone()) else { return Vec::new() };
+    if model.searched(&name).is_some_and(|searched| searched.fixed.is_some()) {
+        return wish(model, Intent::Unfix { parameter: name });
+    }
+    let Some(value) = model.override_value() else { return Vec::new() };
+    open(model, Dialog::field(Purpose::Fix { parameter: model.override_row, value }, "5"))
+}
+
+fn bounds(model: &mut Model) -> Vec<Effect> {
+    let Some(info) = model.override_parameter().and_then(|info| model.parameter(&info.name)) else { return Vec::new() };
+    let text = format!("{}..{}", info.low, info.high);
+    open(model, Dialog::field(Purpose::Bounds { parameter: model.override_row }, &text))
+}
+
+fn queue_point(model: &mut Model) -> Vec<Effect> {
+    let Some(proposal) = model.proposal_on_table() else { return Vec::new() };
+    let point = proposal.parameters.iter().map(|p| (p.name.clone(), p.value)).collect();
+    wish(model, Intent::Enqueue(point))
 }
 
 /// Enter: what lies nearest, as long as nothing moves by it.

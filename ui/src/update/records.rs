@@ -18,7 +18,7 @@ pub(super) fn close_stale_dialog(model: &mut Model) {
             let on_table = model.proposal.as_ref().map(|p| (p.trial, p.revision));
             on_table != Some((*trial, *revision)) || Action::Approve.legal(model).is_err()
         }
-        Some(Dialog::Arm) => Action::Arm.legal(model).is_err(),
+        Some(Dialog::Arm { .. }) => Action::Arm.legal(model).is_err(),
         Some(Dialog::Override(form)) => {
             model.proposal.as_ref().is_none_or(|p| p.trial != form.trial) || Action::Override.legal(model).is_err()
         }
@@ -77,8 +77,13 @@ pub(super) fn take(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
                     }
                     Stage::Running => {}
                     Stage::Finished => {
-                        say(model, Level::Info, "the study is finished".to_owned());
-                        log(model, time_ns, Level::Info, "study", "finished".to_owned(), true);
+                        let best = model.best().and_then(|best| Some((best.trial, best.value?)));
+                        let best = best.map_or("no trial was accepted".to_owned(), |(trial, value)| {
+                            format!("the best is trial {trial}, J = {value:.3} {}", model.session.unit)
+                        });
+                        let text = format!("the study is finished: {best}");
+                        say(model, Level::Info, text.clone());
+                        log(model, time_ns, Level::Info, "study", text, true);
                     }
                 }
             }
@@ -110,8 +115,9 @@ pub(super) fn take(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
             log(model, time_ns, line.level, &line.source, line.message, false);
         }
         Record::PreArm(list) => model.pre_arm = list,
-        // Of these the newest counts, and the newest is asked for where it is drawn.
-        Record::Search(_) | Record::Insight(_) | Record::Points(_) => {}
+        Record::Search(search) => model.search = Some(search),
+        Record::Insight(insight) => model.insight = Some(insight),
+        Record::Points(points) => model.points = points,
         Record::FaultTicks(ticks) => {
             let text = format!("the last {} ticks before the fault are in the recording", ticks.len());
             log(model, time_ns, Level::Error, "control", text, false);

@@ -7,12 +7,13 @@
 
 use quadfrog::realtime::telemetry::Mode;
 use quadfrog::recording::record::Level;
+use quadfrog::robot::joint_name;
 use ratatui::Frame;
 use ratatui::layout::{Alignment, Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
 
-use super::{MIN_COLUMNS, MIN_ROWS, clock, clock_ms, cut, number, span};
+use super::{MIN_COLUMNS, MIN_ROWS, clock, clock_ms, cut, health, number, span};
 use crate::action::Action;
 use crate::model::{Model, View};
 use crate::theme::Role;
@@ -28,7 +29,7 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let [left, right] = Layout::horizontal([Constraint::Fill(1), Constraint::Length(width)]).spacing(1).areas(first);
     frame.render_widget(Line::from(identity(model, area.width)), left);
     frame.render_widget(recording, right);
-    frame.render_widget(Line::from(condition(model)), second);
+    frame.render_widget(Line::from(condition(model, area.width)), second);
 }
 
 fn rows(area: Rect) -> [Rect; 2] {
@@ -65,11 +66,19 @@ fn identity(model: &Model, width: u16) -> Vec<Span<'static>> {
     if session.observe {
         spans.push(span(theme, Role::Warning, "OBSERVING  "));
     }
-    spans.push(Span::raw(session.task.clone()));
     // A narrow terminal has room for the best value only if the words are left out.
     let narrow = width < 100;
+    if !matches!(session.approve.as_str(), "" | "each") && model.replay.is_none() {
+        let approve = session.approve.to_uppercase();
+        spans.push(span(
+            theme,
+            Role::Warning,
+            if narrow { format!("{approve}  ") } else { format!("APPROVE {approve}  ") },
+        ));
+    }
+    spans.push(Span::raw(session.task.clone()));
     if let Some(info) = model.stage {
-        let (finished, budget) = (model.counted(), session.budget);
+        let (finished, budget) = (model.counted(), model.budget());
         let text = match narrow {
             true => format!("  trial #{}  {finished}/{budget}", info.trial),
             false => format!("   trial #{}   {finished} of {budget} judged", info.trial),
@@ -105,42 +114,61 @@ fn recording(model: &Model) -> Vec<Span<'static>> {
     }
 }
 
-fn condition(model: &Model) -> Vec<Span<'static>> {
+fn condition(model: &Model, width: u16) -> Vec<Span<'static>> {
     let theme = &model.theme;
+    let narrow = width < 100;
     let mut spans = vec![
         Span::raw(" "),
         span(theme, Role::Alarm, " STOP "),
         Span::raw(" "),
         span(theme, Role::Key, model.keymap.all_keys(Action::Stop)),
-        Span::raw("   "),
     ];
+    let gap = if narrow { "  " } else { "   " };
+    let mut part = |name: &str, role, value: String| {
+        spans.push(span(theme, Role::Quiet, format!("{gap}{name}")));
+        spans.push(span(theme, role, value));
+    };
     let snapshot = &model.snapshot;
     let counters = &snapshot.counters;
-    let late = format!("{} late, worst {:.1} ms", counters.late_ticks, counters.worst_lateness_ns as f64 / 1e6);
     let late_share = counters.late_ticks as f64 / snapshot.tick.number.max(1) as f64;
-    spans.push(span(theme, Role::Quiet, "loop "));
-    spans.push(span(theme, if late_share > 0.001 { Role::Warning } else { Role::Text }, late));
-    if model.session.backend != "sim" && model.replay.is_none() && !model.session.backend.is_empty() {
-        let age = counters.state_age_ms;
-        spans.push(span(theme, Role::Quiet, "   link "));
-        spans.push(span(theme, if age > 5 { Role::Bad } else { Role::Text }, format!("{age} ms")));
+    let late = match narrow {
+        true => format!("{} late", counters.late_ticks),
+        false => format!("{} late, worst {:.1} ms", counters.late_ticks, counters.worst_lateness_ns as f64 / 1e6),
+    };
+    part("loop ", look(late_share > 0.001), late);
+    match (counters.link, model.session.backend.as_str()) {
+        (_, "") => {}
+        (None, "sim") => part("link ", Role::Quiet, "none: SIM".to_owned()),
+        (None, _) => part("link ", bad(counters.state_age_ms > 5), format!("{} ms", counters.state_age_ms)),
+        (Some(link), _) => {
+            let loss = health::loss_percent(&link);
+            let role = bad(link.state_age_ms > 5 || loss >= 1.0 || link.rate_hz == 0);
+            part("link ", role, format!("{} ms, {loss:.1} % lost", link.state_age_ms));
+        }
     }
-    let hottest = snapshot.tick.state.motor_temperature_c.iter().copied().fold(0.0, f64::max);
-    if hottest > 0.0 {
-        let role = if hottest >= 60.0 { Role::Bad } else { Role::Text };
-        spans.push(span(theme, Role::Quiet, "   motors "));
-        spans.push(span(theme, role, format!("{hottest:.0} C")));
+    let temperatures = snapshot.tick.state.motor_temperature_c;
+    let hottest = temperatures.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1));
+    if let Some((joint, hottest)) = hottest.filter(|(_, hottest)| *hottest > 0.0) {
+        let joint = if narrow { String::new() } else { format!(" {}", joint_name(joint)) };
+        part(if narrow { "motor " } else { "hottest " }, bad(hottest >= 60.0), format!("{hottest:.0} C{joint}"));
     }
     if let Some(battery) = snapshot.tick.state.battery {
-        let role = if battery.charge_percent < 30.0 { Role::Bad } else { Role::Text };
-        spans.push(span(theme, Role::Quiet, "   battery "));
-        spans.push(span(theme, role, format!("{:.0} %", battery.charge_percent)));
+        let charge = battery.charge_percent;
+        part(if narrow { "bat " } else { "battery " }, bad(charge < 30.0), format!("{charge:.0} %"));
     }
     let age_ms = model.clock.saturating_sub(model.snapshot_at).as_millis();
     if age_ms > STALE_MS && model.replay.is_none() {
-        spans.push(span(theme, Role::Bad, format!("   OLD: nothing new for {:.1} s", age_ms as f64 / 1e3)));
+        part("", Role::Bad, format!("OLD: nothing new for {:.1} s", age_ms as f64 / 1e3));
     }
     spans
+}
+
+fn look(worth_it: bool) -> Role {
+    if worth_it { Role::Warning } else { Role::Text }
+}
+
+fn bad(it_is: bool) -> Role {
+    if it_is { Role::Bad } else { Role::Text }
 }
 
 /// The tabs with their actions.
@@ -209,10 +237,10 @@ pub fn render_message(frame: &mut Frame, area: Rect, model: &Model) {
 pub fn render_small(frame: &mut Frame, area: Rect, model: &Model) {
     let theme = &model.theme;
     let keys = model.keymap.all_keys(Action::Stop);
-    let link = if model.session.backend == "sim" {
-        Span::raw("")
-    } else {
-        Span::raw(format!("link {} ms", model.snapshot.counters.state_age_ms))
+    let link = match (model.snapshot.counters.link, model.is_hardware()) {
+        (Some(link), _) => format!("link {} ms, {:.1} % lost", link.state_age_ms, health::loss_percent(&link)),
+        (None, true) => format!("link {} ms", model.snapshot.counters.state_age_ms),
+        (None, false) => "link none: SIM".to_owned(),
     };
     let lines = vec![
         Line::from(vec![mode_span(model), Span::raw(" "), backend(model)]),

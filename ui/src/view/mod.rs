@@ -12,6 +12,7 @@
 //! ```
 
 pub mod chart;
+pub mod densities;
 pub mod dialogs;
 pub mod frame;
 pub mod health;
@@ -22,6 +23,8 @@ pub mod next_step;
 pub mod objective;
 pub mod optimizer;
 pub mod overrides;
+pub mod points;
+pub mod pre_arm;
 pub mod proposal;
 pub mod trial_text;
 pub mod trials;

@@ -8,7 +8,7 @@
 
 use quadfrog::recording::record::{TrialRecord, Verdict};
 
-use super::{clock, proposal};
+use super::{clock, points, proposal};
 use crate::model::Model;
 
 /// Cause and note on one line.
@@ -48,6 +48,9 @@ pub fn details(model: &Model, trial: &TrialRecord) -> Vec<(String, String)> {
     let source = trial.parent.map_or(String::new(), |parent| format!(" of trial {parent}"));
     row("source", format!("{}{source}", trial.source.name()));
     row("attempt", attempt(model, trial).to_string());
+    if let Some(repeats) = points::repeats_of(model, trial.trial) {
+        row("repeats", repeats);
+    }
     if let Some(ran) = model.ran.get(&trial.trial) {
         let took = ran.ended_ns.map_or("still runs".to_owned(), |ended| {
             format!("took {:.1} s", ended.saturating_sub(ran.begun_ns) as f64 / 1e9)
@@ -56,9 +59,13 @@ pub fn details(model: &Model, trial: &TrialRecord) -> Vec<(String, String)> {
     }
     for (name, value) in &trial.parameters {
         let info = model.parameter(name);
-        let unit = info.map_or("", |info| info.unit.as_str());
-        let bounds = info.map_or(String::new(), |info| format!("  ({} to {})", info.low, info.high));
+        let unit = info.as_ref().map_or("", |info| info.unit.as_str());
+        let bounds = info.as_ref().map_or(String::new(), |info| format!("  ({} to {})", info.low, info.high));
         row(name, format!("{value:.5} {unit}{bounds}"));
+    }
+    if !trial.gains.is_empty() {
+        let gain = |(name, value): &(String, f64)| format!("{name} {value}");
+        row("gains", trial.gains.iter().map(gain).collect::<Vec<_>>().join(", "));
     }
     if let Some(m) = trial.measured {
         row("displacement", format!("{:+.4} m forward, {:+.4} m left", m.dx_m, m.dy_m));
