@@ -4,8 +4,10 @@
 mod checked;
 mod export;
 mod merge;
+mod safety;
 
-pub use checked::{Backend, Config, ConfirmFile, ControlFile, OptimizeFile, SafetyFile, WorkersFile};
+pub use checked::{Backend, Config, ConfirmFile, ControlFile, OptimizeFile, WorkersFile};
+pub use safety::SafetyFile;
 
 use std::path::PathBuf;
 

@@ -25,14 +25,17 @@ use crate::realtime::command::Task;
 use crate::realtime::telemetry::{Mode, Snapshot, Tick};
 use crate::recording::RecordingError;
 use crate::recording::record::{Record, SessionInfo, Stamped};
-use crate::recording::recorder::Recorder;
+use crate::recording::recorder::{Recorder, RecorderStatus};
 use crate::recording::writer::Writer;
 use crate::robot::description::RobotDescription;
+use crate::robot::go1::Go1;
+use crate::robot::go1::link::LinkError;
 use crate::robot::{Placement, Robot};
 use crate::session::approval::Approval;
-use crate::session::intent::Intent;
+use crate::session::intent::{Intent, Wish};
 use crate::session::life::{Life, Plan};
-use crate::session::supervisor::{Outlets, Supervisor};
+use crate::session::pre_arm::PreArmList;
+use crate::session::supervisor::{Outlets, Parts, Supervisor};
 use crate::sim::{SimError, Simulator};
 
 /// What an engine is started with.
@@ -60,6 +63,22 @@ pub struct Options {
 }
 
 impl Options {
+    /// A study of `task` with seed 0 that keeps nothing and in which a person approves and judges.
+    pub fn new(config: Config, robot: RobotDescription, backend: Backend, task: Task) -> Options {
+        Options {
+            config,
+            robot,
+            backend,
+            task,
+            seed: 0,
+            trials: None,
+            folder: None,
+            observe: false,
+            approve: Approval::Each,
+            join: None,
+        }
+    }
+
     fn budget(&self) -> u32 {
         self.trials.unwrap_or(self.config.optimize.trials)
     }
@@ -74,6 +93,9 @@ pub enum EngineError {
     /// The simulator's configuration.
     #[error(transparent)]
     Simulator(#[from] SimError),
+    /// The link to the robot.
+    #[error(transparent)]
+    Link(#[from] LinkError),
     /// The search space.
     #[error(transparent)]
     Space(#[from] SpaceError),
@@ -310,6 +332,16 @@ pub fn attachments(config: &Config) -> Vec<(&str, &str, &[u8])> {
     config.as_run.iter().map(|(name, text)| (name.as_str(), "application/toml", text.as_bytes())).collect()
 }
 
+/// A short name of the configuration as it runs, for an operator to compare: FNV-1a of all files, 64 bits (Fowler, Noll and
+/// Vo, draft-eastlake-fnv).
+pub fn fingerprint(config: &Config) -> String {
+    let texts = config.as_run.iter().flat_map(|(name, text)| [name.as_bytes(), text.as_bytes()]);
+    let hash = texts
+        .flatten()
+        .fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01b3));
+    format!("{hash:016x}")
+}
+
 /// The present time, UTC, ns since 1970.
 pub fn utc_ns() -> u64 {
     u64::try_from(jiff::Timestamp::now().as_nanosecond()).unwrap_or(0)
@@ -330,10 +362,7 @@ impl Engine {
         let settings = options.config.settings(&options.robot, options.task, options.backend)?;
         let mut robot: Box<dyn Robot> = match options.backend {
             Backend::Simulator => Box::new(Simulator::new(&options.robot, &options.config.simulator)?),
-            Backend::Hardware => {
-                let reason = "this version drives the simulator only";
-                return Err(options.config.refuse("control.toml", "robot", "go1", reason).into());
-            }
+            Backend::Hardware => Box::new(Go1::open(&options.robot, options.observe)?),
         };
         // A simulated robot begins as a real one does: lying folded on its belly.
         robot.place(&Placement { joint_position: settings.lying_position, lying: true, seed: u64::from(options.seed) });
@@ -352,8 +381,8 @@ impl Engine {
         let (control_end, session_end, screen_end, tick_end) = channels();
         let (to_recorder, recorder_records) = channel();
         let (to_screen, screen_records) = channel();
-        let (trial_ticks_in, trial_ticks) = channel();
-        let recorder = Recorder::spawn(tick_end, recorder_records, writer, trial_ticks_in);
+        let (handed_in, handed) = channel();
+        let recorder = Recorder::spawn(tick_end, recorder_records, writer, handed_in);
         let outlets = Outlets { recorder: to_recorder, screen: to_screen };
         let status = recorder.watch();
         let closing = Arc::new(AtomicBool::new(false));
@@ -368,9 +397,11 @@ impl Engine {
             .map_err(system("control"))?;
 
         let (intents_in, intents) = channel();
+        let folder = recording.as_ref().and(options.folder.clone());
+        let pre_arm = PreArmList::new(&settings, fingerprint(&options.config), folder);
+        let parts = Parts { life, control: session_end, handed, outlets, recorder: status, pre_arm, info };
         let simulated = options.backend == Backend::Simulator;
-        let supervisor = Supervisor::new(life, session_end, trial_ticks, outlets, status, info, clock.now_ns())
-            .approving(options.approve, simulated);
+        let supervisor = Supervisor::new(parts, clock.now_ns()).approving(options.approve, simulated);
         let sits_down = options.backend == Backend::Hardware;
         let session = std::thread::Builder::new()
             .name("session".into())
@@ -382,6 +413,7 @@ impl Engine {
             recording,
             _prepared: prepared,
             intents: Some(intents_in),
+            clock,
             records: screen_records,
             closing,
             control: Some(control),
@@ -397,14 +429,14 @@ const SESSION_PERIOD: Duration = Duration::from_millis(5);
 const LONGEST_GOODBYE: Duration = Duration::from_secs(6);
 
 /// The session thread: intents as they come, events every few milliseconds, until the screen lets go of its handle.
-fn run_session(mut supervisor: Supervisor, intents: &Receiver<(Intent, u64)>, clock: &MonotonicClock, sits_down: bool) {
+fn run_session(mut supervisor: Supervisor, intents: &Receiver<Wish>, clock: &MonotonicClock, sits_down: bool) {
     loop {
         supervisor.attend(clock.now_ns());
         if supervisor.mode() == Mode::Observe {
             supervisor.take_control();
         }
         match intents.recv_timeout(SESSION_PERIOD) {
-            Ok((intent, stops)) => supervisor.carry_out(&intent, stops, clock.now_ns()),
+            Ok(wish) => supervisor.carry_out(&wish, clock.now_ns()),
             Err(RecvTimeoutError::Timeout) => {}
             Err(RecvTimeoutError::Disconnected) => break,
         }
@@ -423,7 +455,8 @@ pub struct Handle {
     screen: ScreenEnd,
     recording: Option<PathBuf>,
     _prepared: Prepared,
-    intents: Option<Sender<(Intent, u64)>>,
+    intents: Option<Sender<Wish>>,
+    clock: MonotonicClock,
     records: Receiver<Stamped>,
     closing: Arc<AtomicBool>,
     control: Option<JoinHandle<()>>,
@@ -447,6 +480,11 @@ impl Handle {
         self.recording.as_deref()
     }
 
+    /// How the recorder is doing; none where nothing is kept.
+    pub fn recorder(&self) -> Option<RecorderStatus> {
+        self.recording.as_ref().and(self.recorder.as_ref()).map(|recorder| recorder.status())
+    }
+
     /// The screen is alive; to be called at least ten times a second.
     pub fn beat(&self) {
         self.screen.heartbeat.beat();
@@ -461,7 +499,8 @@ impl Handle {
     pub fn wish(&self, intent: Intent) {
         if let Some(intents) = &self.intents {
             // A session that has ended answers nothing; the screen sees that its records end.
-            let _ = intents.send((intent, self.screen.stop.count()));
+            let wish = Wish { intent, stops: self.screen.stop.count(), time_ns: self.clock.now_ns() };
+            let _ = intents.send(wish);
         }
     }
 

@@ -147,3 +147,14 @@ fn a_stop_that_the_gate_would_cut_is_refused() {
     let error = refused("safety.toml", "[gate]\ndamping_kd = 20.0\n");
     assert!(error.contains("gate.damping_kd") && error.contains("kd_max"), "{error}");
 }
+
+/// (A defect once: such values were said to stand in line 1.)
+#[test]
+fn values_that_no_kind_can_hold_are_refused_with_their_line_key_and_value() {
+    let error = refused("optimize.toml", "# mine\n\ntrials = -3\n");
+    assert!(error.contains(":3") && error.contains("`trials` = -3"), "{error}");
+    let error = refused("control.toml", "\n[tasks.forward]\nstance_m = [0.0, 0.14]\n");
+    assert!(error.contains(":3") && error.contains("tasks.forward.stance_m") && error.contains("0.14"), "{error}");
+    let error = refused("optimize.toml", "[sampler]\nkind = \"cma\"\n");
+    assert!(error.contains(":2") && error.contains("sampler.kind") && error.contains("cma"), "{error}");
+}

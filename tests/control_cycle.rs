@@ -5,7 +5,7 @@ use quadfrog::config::{Backend, Config};
 use quadfrog::control::cycle::{Cycle, Inputs};
 use quadfrog::control::settings::Settings;
 use quadfrog::realtime::clock::SimulatedClock;
-use quadfrog::realtime::command::{Command, JumpParameters, Task, TrialSpec};
+use quadfrog::realtime::command::{Approval, Command, JumpParameters, Task, TrialSpec};
 use quadfrog::realtime::telemetry::{Event, Mode, Tick, TrialEnd};
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::robot::{JointCommand, Placement, Robot, RobotError, RobotState};
@@ -67,6 +67,16 @@ impl Bench {
         }
     }
 
+    /// An approval given now, by somebody who has heard of every change of mode.
+    fn approval(&self) -> Approval {
+        let changes = self.events.iter().filter(|event| matches!(event, Event::Mode { .. })).count();
+        Approval { mode_changes: changes as u64, given_ns: self.time_ms * 1_000_000 }
+    }
+
+    fn approved(&self) -> Command {
+        Command::RunTrial(self.spec(), self.approval())
+    }
+
     /// Brings the machine into `mode` on the way that an operator takes.
     fn reach(&mut self, mode: Mode) {
         if mode == Mode::Offline {
@@ -78,7 +88,7 @@ impl Bench {
             (Mode::Disarmed, Some(Command::TakeControl)),
             (Mode::StandUp, Some(Command::Arm)),
             (Mode::Ready, None),
-            (Mode::Countdown, Some(Command::RunTrial(self.spec()))),
+            (Mode::Countdown, Some(Command::RunTrial(self.spec(), Approval::default()))),
             (Mode::Jump, None),
             (Mode::Settle, None),
             (Mode::Review, None),
@@ -86,6 +96,8 @@ impl Bench {
         ];
         for (step, command) in way {
             match command {
+                // Given at this moment: an approval dies with every change of mode.
+                Some(Command::RunTrial(..)) => drop(self.command(self.approved())),
                 Some(command) => drop(self.command(command)),
                 None if self.cycle.mode() != step => drop(self.until(step)),
                 None => {}
@@ -145,7 +157,7 @@ fn stop_from_every_mode_damps_in_the_same_tick() {
 fn a_stop_and_an_approval_in_one_tick_stop() {
     let mut bench = Bench::new();
     bench.reach(Mode::Ready);
-    let command = Some(Command::RunTrial(bench.spec()));
+    let command = Some(bench.approved());
     let tick = bench.tick(Inputs { stop: true, command, ..Inputs::default() });
     assert_eq!(tick.mode, Mode::Damped);
     assert!(is_damping(&tick.command, &bench.settings));
@@ -156,12 +168,12 @@ fn a_stopped_robot_stays_damped_until_it_is_acknowledged_and_armed_anew() {
     let mut bench = Bench::new();
     bench.reach(Mode::Ready);
     bench.tick(Inputs { stop: true, ..Inputs::default() });
-    for command in [Command::Arm, Command::RunTrial(bench.spec()), Command::EndReview, Command::Cancel] {
+    for command in [Command::Arm, bench.approved(), Command::EndReview, Command::Cancel] {
         let tick = bench.command(command);
         assert_eq!(tick.mode, Mode::Damped, "{command:?}");
     }
     assert_eq!(bench.command(Command::Acknowledge { stops: 0 }).mode, Mode::Disarmed);
-    assert_eq!(bench.command(Command::RunTrial(bench.spec())).mode, Mode::Disarmed);
+    assert_eq!(bench.command(bench.approved()).mode, Mode::Disarmed);
     assert_eq!(bench.command(Command::Arm).mode, Mode::StandUp);
 }
 
@@ -252,7 +264,8 @@ fn a_fallen_robot_is_damped_and_comes_to_rest() {
     bench.reach(Mode::Ready);
     let mut spec = bench.spec();
     spec.jump = JumpParameters { f0_hz: 0.8, f1_hz: 0.0, fx_n: 150.0, fy_n: 0.0, fz_n: 160.0 };
-    bench.command(Command::RunTrial(spec));
+    let approval = bench.approval();
+    bench.command(Command::RunTrial(spec, approval));
     bench.until(Mode::Damped);
     let fell = bench.events.iter().any(|event| matches!(event, Event::TrialEnded { end: TrialEnd::Fell(_), .. }));
     assert!(fell, "{:?}", bench.events);
@@ -302,7 +315,7 @@ fn any_command(spec: TrialSpec) -> impl Strategy<Value = Option<Command>> {
         1 => Just(Some(Command::TakeControl)),
         2 => Just(Some(Command::Arm)),
         1 => Just(Some(Command::SitDown)),
-        2 => Just(Some(Command::RunTrial(spec))),
+        2 => Just(Some(Command::RunTrial(spec, Approval::default()))),
         1 => Just(Some(Command::Cancel)),
         1 => Just(Some(Command::EndReview)),
         1 => Just(Some(Command::Acknowledge { stops: 0 })),
@@ -324,8 +337,13 @@ proptest! {
             for n in 0..ticks {
                 let command = command.filter(|_| n == 0);
                 let before = bench.cycle.mode();
+                // Half of the approvals are given now, the others are of a time when the robot was in another mode.
+                let command = match command {
+                    Some(Command::RunTrial(..)) if ticks % 2 == 0 => Some(bench.approved()),
+                    command => command,
+                };
                 armed |= command == Some(Command::Arm) && before == Mode::Disarmed;
-                approved |= matches!(command, Some(Command::RunTrial(_))) && before == Mode::Ready;
+                approved |= command == Some(bench.approved()) && before == Mode::Ready;
                 let tick = bench.tick(Inputs { command, stop: stop && n == 0, ..Inputs::default() });
                 if tick.mode.energised() {
                     prop_assert!(armed, "{:?} without arm", tick.mode);

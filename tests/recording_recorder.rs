@@ -7,10 +7,10 @@ use std::io::{self, Write};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, mpsc};
 
-use quadfrog::realtime::telemetry::Tick;
+use quadfrog::realtime::telemetry::{Mode, Tick};
 use quadfrog::recording::player::Player;
 use quadfrog::recording::record::Stamped;
-use quadfrog::recording::recorder::{Recorder, RecorderHandle, TrialTicks};
+use quadfrog::recording::recorder::{FAULT_TICKS, Handed, Recorder, RecorderHandle, TrialTicks};
 use quadfrog::recording::writer::{Sink, Writer};
 use support::*;
 
@@ -32,8 +32,11 @@ fn record(writer: Option<Writer>, ticks: &[Tick], records: &[Stamped]) -> (Recor
     }
     drop((ring, sender));
     // The channel ends when the thread does.
-    let trials = trials.into_iter().collect();
-    (handle, trials)
+    let trials = trials.into_iter().filter_map(|handed| match handed {
+        Handed::Trial(trial) => Some(trial),
+        Handed::Fault(_) => None,
+    });
+    (handle, trials.collect())
 }
 
 /// The trials as they stand in the ticks.
@@ -172,4 +175,29 @@ fn a_recording_of_a_session_that_runs_can_be_played() {
     drop((ring, sender));
     assert_eq!(handle.join().ticks, 500);
     assert_eq!(play(&path).len(), 500);
+}
+
+/// The last ticks go with a fault, in a trial or outside of one, and again with the next fault.
+#[test]
+fn the_last_200_ticks_are_handed_on_with_each_fault() {
+    let (mut ring, consumer) = rtrb::RingBuffer::new(4096);
+    let (sender, receiver) = mpsc::channel();
+    let (handed_in, handed) = mpsc::channel();
+    let handle = Recorder::spawn(consumer, receiver, None, handed_in);
+    for number in 0..1000 {
+        let faulty = (100..150).contains(&number) || (700..800).contains(&number);
+        let mode = if faulty { Mode::Fault } else { Mode::Disarmed };
+        ring.push(Tick { number, mode, ..Tick::default() }).unwrap();
+    }
+    drop((ring, sender));
+    let kept: Vec<Vec<u64>> = handed
+        .into_iter()
+        .map(|handed| match handed {
+            Handed::Fault(ticks) => ticks.iter().map(|tick| tick.number).collect(),
+            Handed::Trial(trial) => panic!("there was no trial, and here is {}", trial.trial),
+        })
+        .collect();
+    handle.join();
+    assert_eq!(kept, [(0..=100).collect::<Vec<_>>(), (501..=700).collect()]);
+    assert_eq!(kept[1].len(), FAULT_TICKS);
 }

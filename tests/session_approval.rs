@@ -12,18 +12,9 @@ use quadfrog::session::approval::Approval;
 use quadfrog::session::intent::Intent;
 
 fn options(approve: Approval, backend: Backend) -> Options {
-    Options {
-        config: Config::load(None).unwrap(),
-        robot: RobotDescription::embedded("go1").unwrap(),
-        backend,
-        task: Task::Forward,
-        seed: 0,
-        trials: Some(3),
-        folder: None,
-        observe: false,
-        approve,
-        join: None,
-    }
+    let config = Config::load(None).unwrap();
+    let robot = RobotDescription::embedded("go1").unwrap();
+    Options { trials: Some(3), approve, ..Options::new(config, robot, backend, Task::Forward) }
 }
 
 /// A screen that is alive and presses nothing of itself.

@@ -6,7 +6,6 @@ use quadfrog::optimize::journal::Durability;
 use quadfrog::realtime::command::Task;
 use quadfrog::recording::record::TrialRecord;
 use quadfrog::robot::description::RobotDescription;
-use quadfrog::session::approval::Approval;
 use quadfrog::session::automatic;
 use quadfrog::session::rollout::Rollout;
 use quadfrog::sim::Simulator;
@@ -17,18 +16,7 @@ const TRIALS: u32 = 20;
 fn study(task: Task, seed: u32) -> (Vec<TrialRecord>, f64) {
     let config = Config::load(None).unwrap();
     let robot = RobotDescription::embedded("go1").unwrap();
-    let options = Options {
-        config,
-        robot,
-        backend: Backend::Simulator,
-        task,
-        seed,
-        trials: Some(TRIALS),
-        folder: None,
-        observe: false,
-        approve: Approval::Each,
-        join: None,
-    };
+    let options = Options { seed, trials: Some(TRIALS), ..Options::new(config, robot, Backend::Simulator, task) };
     let settings = options.config.settings(&options.robot, task, Backend::Simulator).unwrap();
     let simulator = Simulator::new(&options.robot, &options.config.simulator).unwrap();
     let mut rollout = Rollout::new(simulator, &settings);

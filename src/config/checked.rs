@@ -9,9 +9,10 @@ use toml::Table;
 
 use super::ConfigError;
 use super::merge::merge;
+use super::safety::SafetyFile;
 use crate::control::estimator::GRAVITY;
 use crate::control::leg::stance_of;
-use crate::control::settings::{Fall, Gate, Ramp, Settings, Settle, Stand, TaskControl, Watchdog};
+use crate::control::settings::{EstimatorSettings, ObjectiveSource, Ramp, Settings, Settle, Stand, TaskControl};
 use crate::optimize::sampler::{SamplerConfig, SamplerKind};
 use crate::realtime::command::Task;
 use crate::recording::record::ParameterInfo;
@@ -34,7 +35,8 @@ const GAINS: [(&str, &str); 4] = [("kp", "N/m"), ("kd", "N s/m"), ("kd_joint", "
 /// Keys that may be given though the defaults leave them out, each with an example of its kind.
 const OPTIONAL: [(&str, &str); 1] = [(
     "optimize.toml",
-    "[sampler]
+    "objective = \"truth\"
+[sampler]
 startup_trials = 10
 [first]
 forward = { f0 = 1.0, f1 = 1.0, Fx = 1.0, Fy = 1.0, Fz = 1.0 }
@@ -67,6 +69,8 @@ pub struct ControlFile {
     pub settle: Settle,
     /// When a foot is on the ground.
     pub contact: Contact,
+    /// How the base's state is estimated.
+    pub estimator: EstimatorSettings,
     /// What each task's trials run with.
     pub tasks: BTreeMap<String, TaskControl>,
 }
@@ -80,41 +84,11 @@ pub struct Countdown {
     pub hardware_s: f64,
 }
 
-/// When a foot is on the ground.
+/// When a foot is on the ground, by the simulator's own knowledge.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 pub struct Contact {
-    /// Least force at its sensor, N.
+    /// Least force of the ground on it, N.
     pub force_n: f64,
-}
-
-/// `safety.toml`.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-pub struct SafetyFile {
-    /// When the robot counts as fallen.
-    pub fall: Fall,
-    /// The last gate.
-    pub gate: Gate,
-    /// What trips the watchdog.
-    pub watchdog: WatchdogFile,
-    /// The widest bounds of each parameter.
-    pub parameters: BTreeMap<String, [f64; 2]>,
-    /// The range of each gain of the controller.
-    pub gains: BTreeMap<String, [f64; 2]>,
-}
-
-/// The watchdog, with the values that differ between simulator and hardware.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
-pub struct WatchdogFile {
-    /// Largest tilt while standing, rad.
-    pub stance_tilt_rad: f64,
-    /// Oldest state, ms.
-    pub state_age_ms: u32,
-    /// Longest silence of the screen, ms.
-    pub operator_silent_ms: u32,
-    /// Latest tick on the simulator, ms; 0 only counts.
-    pub simulator_late_ms: f64,
-    /// Latest tick on hardware, ms; 0 only counts.
-    pub hardware_late_ms: f64,
 }
 
 /// `optimize.toml`.
@@ -122,6 +96,8 @@ pub struct WatchdogFile {
 pub struct OptimizeFile {
     /// Trials that count.
     pub trials: u32,
+    /// Name of what the objective is measured from; none takes what the backend has.
+    pub objective: Option<String>,
     /// Bounds of each parameter.
     pub bounds: BTreeMap<String, [f64; 2]>,
     /// Which parameters each task optimizes.
@@ -176,6 +152,16 @@ pub struct Config {
 struct Place {
     file: String,
     lines: HashMap<String, usize>,
+}
+
+impl Place {
+    fn refuse(&self, key: &str, value: impl ToString, reason: impl ToString) -> ConfigError {
+        let file = match self.lines.get(key) {
+            Some(line) => format!("{}:{line}", self.file),
+            None => self.file.clone(),
+        };
+        ConfigError::Value { file, key: key.to_owned(), value: value.to_string(), reason: reason.to_string() }
+    }
 }
 
 impl Config {
@@ -282,22 +268,49 @@ impl Config {
             .collect()
     }
 
+    /// What the objective is measured from: as chosen, or else the truth on the simulator and the estimate on hardware.
+    ///
+    /// # Errors
+    /// When it is something else than those two, or the truth is asked of hardware, which does not know it.
+    pub fn objective(&self, backend: Backend) -> Result<ObjectiveSource, ConfigError> {
+        let refuse = |name: &str, reason| self.refuse("optimize.toml", "objective", format!("\"{name}\""), reason);
+        let Some(name) = &self.optimize.objective else {
+            return Ok(match backend {
+                Backend::Simulator => ObjectiveSource::Truth,
+                Backend::Hardware => ObjectiveSource::Estimate,
+            });
+        };
+        match (ObjectiveSource::from_name(name), backend) {
+            (None, _) => Err(refuse(name, "must be \"truth\" or \"estimate\", or be left out")),
+            (Some(ObjectiveSource::Truth), Backend::Hardware) => Err(refuse(
+                name,
+                "a robot does not know the truth, only a simulator does; take \"estimate\" or leave it out",
+            )),
+            (Some(source), _) => Ok(source),
+        }
+    }
+
     /// What the control cycle is made with.
     ///
     /// # Errors
-    /// When the stance of `task` is out of the robot's reach.
+    /// When the stance of `task` is out of the robot's reach, or the objective cannot be measured on `backend`.
     pub fn settings(&self, robot: &RobotDescription, task: Task, backend: Backend) -> Result<Settings, ConfigError> {
         let chosen = self.task(task);
         self.check_stance(robot, task)?;
         let hardware = backend == Backend::Hardware;
-        let watchdog = &self.safety.watchdog;
+        let SafetyFile { watchdog, fall, .. } = &self.safety;
+        let (min_position, max_position) = robot.allowed_positions();
         Ok(Settings {
             geometry: robot.leg_geometry,
             hip_origin_body: Leg::ALL.map(|leg| robot.legs[leg as usize].joint_origin[0]),
-            min_position: robot.limits.min_position,
-            max_position: robot.limits.max_position,
+            imu_origin_body: robot.imu_origin,
+            foot_radius: robot.legs[0].foot_radius,
+            min_position,
+            max_position,
             max_torque: robot.limits.max_torque,
-            lying_position: robot.lying_position,
+            max_velocity: robot.limits.max_velocity,
+            // A folded leg rests on its mechanical stop; what is asked of the motors ends at the limit.
+            lying_position: std::array::from_fn(|i| robot.lying_position[i].clamp(min_position[i], max_position[i])),
             weight_n: robot.total_mass() * GRAVITY,
             stand: Stand { gains: chosen.gains(), stance_leg: chosen.stance_leg(), vmc: chosen.vmc },
             stand_up: self.control.stand_up,
@@ -305,25 +318,23 @@ impl Config {
             countdown_s: if hardware { self.control.countdown.hardware_s } else { self.control.countdown.simulator_s },
             settle: self.control.settle,
             fall: self.safety.fall,
+            flight_tilt_rad: if hardware { fall.hardware_flight_rad } else { fall.simulator_flight_rad },
             contact_force_n: self.control.contact.force_n,
+            objective: self.objective(backend)?,
+            estimator: self.control.estimator,
             gate: self.safety.gate,
-            watchdog: Watchdog {
-                stance_tilt_rad: watchdog.stance_tilt_rad,
-                state_age_ms: watchdog.state_age_ms,
-                operator_silent_ms: watchdog.operator_silent_ms,
-                late_ms: if hardware { watchdog.hardware_late_ms } else { watchdog.simulator_late_ms },
-            },
+            hardware,
+            pre_arm: self.safety.pre_arm,
+            approval: self.safety.approval,
+            watchdog: *watchdog,
+            late_ms: if hardware { watchdog.hardware_late_ms } else { watchdog.simulator_late_ms },
+            idle_s: if hardware { watchdog.hardware_idle_s } else { watchdog.simulator_idle_s },
         })
     }
 
     /// Says where `key` of `file` stands, and what is wrong with it.
     pub fn refuse(&self, file: &'static str, key: &str, value: impl ToString, reason: impl ToString) -> ConfigError {
-        let place = &self.places[file];
-        let file = match place.lines.get(key) {
-            Some(line) => format!("{}:{line}", place.file),
-            None => place.file.clone(),
-        };
-        ConfigError::Value { file, key: key.to_owned(), value: value.to_string(), reason: reason.to_string() }
+        self.places[file].refuse(key, value, reason)
     }
 
     fn check(&self) -> Result<(), ConfigError> {
@@ -390,56 +401,18 @@ impl Config {
             let reason = "must be 0 to 60 s";
             return Err(self.refuse(FILE, "countdown.simulator_s", control.countdown.simulator_s, reason));
         }
+        let estimator = &control.estimator;
+        positive.extend(estimator.numbers().map(|(key, value)| (format!("estimator.{key}"), value)));
+        if estimator.contact_off_n >= estimator.contact_on_n {
+            let reason = format!("must be below estimator.contact_on_n = {}", estimator.contact_on_n);
+            return Err(self.refuse(FILE, "estimator.contact_off_n", estimator.contact_off_n, reason));
+        }
         self.all_positive(FILE, &positive)
-    }
-
-    fn check_safety(&self) -> Result<(), ConfigError> {
-        const FILE: &str = "safety.toml";
-        let safety = &self.safety;
-        self.all_positive(
-            FILE,
-            &[
-                ("fall.roll_rad".to_owned(), safety.fall.roll_rad),
-                ("fall.pitch_rad".to_owned(), safety.fall.pitch_rad),
-                ("fall.body_contact_s".to_owned(), safety.fall.body_contact_s),
-                ("gate.torque_step_nm".to_owned(), safety.gate.torque_step_nm),
-                ("gate.kp_max".to_owned(), safety.gate.kp_max),
-                ("gate.kd_max".to_owned(), safety.gate.kd_max),
-                ("gate.damping_kd".to_owned(), safety.gate.damping_kd),
-                ("watchdog.stance_tilt_rad".to_owned(), safety.watchdog.stance_tilt_rad),
-                ("watchdog.state_age_ms".to_owned(), f64::from(safety.watchdog.state_age_ms)),
-                ("watchdog.operator_silent_ms".to_owned(), f64::from(safety.watchdog.operator_silent_ms)),
-            ],
-        )?;
-        for (key, value) in [
-            ("watchdog.simulator_late_ms", safety.watchdog.simulator_late_ms),
-            ("watchdog.hardware_late_ms", safety.watchdog.hardware_late_ms),
-        ] {
-            if !(value >= 0.0 && value.is_finite()) {
-                return Err(self.refuse(FILE, key, value, "must be a number of milliseconds, or 0 to only count"));
-            }
-        }
-        if safety.gate.damping_kd > safety.gate.kd_max {
-            let reason = format!("is above gate.kd_max = {}: the stop itself would be cut", safety.gate.kd_max);
-            return Err(self.refuse(FILE, "gate.damping_kd", safety.gate.damping_kd, reason));
-        }
-        for (name, [low, high]) in &safety.gains {
-            if !(low.is_finite() && high.is_finite() && low <= high && *low >= 0.0) {
-                let reason = "must be [lowest, highest] with 0 <= lowest <= highest";
-                return Err(self.refuse(FILE, &format!("gains.{name}"), format!("[{low}, {high}]"), reason));
-            }
-        }
-        for (name, [low, high]) in &safety.parameters {
-            if !(low.is_finite() && high.is_finite() && low < high && *low >= 0.0) {
-                let reason = "must be [lowest, highest] with 0 <= lowest < highest";
-                return Err(self.refuse(FILE, &format!("parameters.{name}"), format!("[{low}, {high}]"), reason));
-            }
-        }
-        Ok(())
     }
 
     fn check_optimize(&self) -> Result<(), ConfigError> {
         const FILE: &str = "optimize.toml";
+        self.objective(Backend::Simulator)?;
         if self.optimize.trials == 0 {
             return Err(self.refuse(FILE, "trials", 0, "a study needs at least one trial"));
         }
@@ -504,6 +477,7 @@ impl Config {
         let key = format!("tasks.{}.stance_m", task.name());
         let chosen = self.task(task);
         let value = format!("{:?}", chosen.stance_m);
+        let (min_position, max_position) = robot.allowed_positions();
         for leg in Leg::ALL {
             let foot = stance_of(&chosen.stance_leg(), leg);
             let q = robot
@@ -512,7 +486,7 @@ impl Config {
                 .map_err(|error| self.refuse("control.toml", &key, &value, error))?;
             for (joint, angle) in q.iter().enumerate() {
                 let i = 3 * leg as usize + joint;
-                let (least, most) = (robot.limits.min_position[i], robot.limits.max_position[i]);
+                let (least, most) = (min_position[i], max_position[i]);
                 if !(least..=most).contains(angle) {
                     let reason = format!(
                         "needs {} at {angle:.3} rad, which the robot's limits [{least}, {most}] forbid",
@@ -525,7 +499,7 @@ impl Config {
         Ok(())
     }
 
-    fn all_positive(&self, file: &'static str, values: &[(String, f64)]) -> Result<(), ConfigError> {
+    pub(super) fn all_positive(&self, file: &'static str, values: &[(String, f64)]) -> Result<(), ConfigError> {
         match values.iter().find(|(_, value)| !(*value > 0.0 && value.is_finite())) {
             Some((key, value)) => Err(self.refuse(file, key, value, "must be a number above 0")),
             None => Ok(()),
@@ -542,11 +516,21 @@ fn parse<T: DeserializeOwned>(
     places: &HashMap<&'static str, Place>,
     (name, table): (&'static str, Table),
 ) -> Result<T, ConfigError> {
-    table.try_into().map_err(|error: toml::de::Error| ConfigError::Syntax {
-        file: places[name].file.clone(),
-        line: 1,
-        message: error.message().to_owned(),
+    let place = &places[name];
+    serde_path_to_error::deserialize(toml::Value::Table(table.clone())).map_err(|error| {
+        let key = error.path().to_string();
+        // An entry of a list stands where its list does.
+        let key = key.split('[').next().unwrap_or(&key);
+        let value = lookup(&table, key).map(toml::Value::to_string).unwrap_or_default();
+        place.refuse(key, value, error.inner().message())
     })
+}
+
+/// The value of a key with its tables.
+fn lookup<'a>(table: &'a Table, key: &str) -> Option<&'a toml::Value> {
+    let mut parts = key.split('.');
+    let first = table.get(parts.next()?)?;
+    parts.try_fold(first, |value, part| value.get(part))
 }
 
 /// A folder must exist, and a TOML file in it that no one reads is probably a misspelt name.

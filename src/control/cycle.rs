@@ -3,18 +3,23 @@
 
 use super::jump::{FallWatch, Jump, Progress};
 use super::leg::{self, LegTarget};
-use super::limits::Gate;
+use super::limits::{Gate, ticks};
 use super::mode::{self, Request};
+use super::pre_arm::{self, PreArm};
 use super::ramp::{PoseRamp, RampProgress};
 use super::settings::Settings;
-use super::watchdog::{self, Circumstances};
+use super::watchdog::{self, Level, Watchdog};
 use crate::control::estimator::Estimator;
 use crate::realtime::clock::Clock;
-use crate::realtime::command::{Command, TrialSpec};
-use crate::realtime::telemetry::{Cause, Event, Fault, Mode, Phase, Tick, TrialEnd};
+use crate::realtime::command::{Approval, Command, TrialSpec};
+use crate::realtime::pre_arm::Findings;
+use crate::realtime::telemetry::{Cause, Caution, Event, Fault, Mode, Objection, Phase, Readiness, Tick, TrialEnd};
 use crate::robot::kinematics::Foot;
 use crate::robot::{JointCommand, Joints, LEGS, Leg, PerLeg, Placement, Robot, RobotError};
 use nalgebra::{Matrix3, Vector3};
+
+/// For how many ticks a caution is told, so that a session that looks ten times a second misses none.
+const CAUTION_TICKS: u32 = 1000;
 
 /// What a tick is told from outside.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -65,7 +70,18 @@ pub struct Cycle {
     mode: Mode,
     /// Why the mode is what it is.
     cause: Cause,
+    /// How often it changed.
+    mode_changes: u64,
+    /// Ticks since it changed.
+    mode_ticks: u32,
     estimator: Estimator,
+    watchdog: Watchdog,
+    /// What trips in this tick.
+    standing: Option<Fault>,
+    /// The newest caution and for how many ticks it is still told.
+    caution: Option<(Caution, u32)>,
+    pre_arm: PreArm,
+    findings: Findings,
     gate: Gate,
     ramp: Option<PoseRamp>,
     jump: Option<Jump>,
@@ -75,6 +91,8 @@ pub struct Cycle {
     ended: Option<Jump>,
     feet: PerLeg<Foot>,
     state_age_ms: u32,
+    /// The system's error number, if the robot could not be reached last time.
+    send_error: Option<i32>,
     /// The screen fell silent during a jump: sit down as soon as it has landed.
     operator_lost: bool,
     tick: Tick,
@@ -88,7 +106,14 @@ impl Cycle {
             settings: *settings,
             mode: Mode::Offline,
             cause: Cause::Course,
+            mode_changes: 0,
+            mode_ticks: 0,
             estimator: Estimator::default(),
+            watchdog: Watchdog::default(),
+            standing: None,
+            caution: None,
+            pre_arm: PreArm::default(),
+            findings: Findings::default(),
             gate: Gate::default(),
             ramp: None,
             jump: None,
@@ -96,6 +121,7 @@ impl Cycle {
             ended: None,
             feet: [Foot { position_leg: Vector3::zeros(), jacobian_leg: Matrix3::zeros() }; LEGS],
             state_age_ms: 0,
+            send_error: None,
             operator_lost: false,
             tick: Tick::default(),
             events: Events { list: [None; Events::MOST], count: 0 },
@@ -117,6 +143,15 @@ impl Cycle {
         self.state_age_ms
     }
 
+    /// What speaks against the next arming and the next trial.
+    pub fn readiness(&self) -> Readiness {
+        Readiness {
+            findings: self.findings,
+            hold: watchdog::hold(&self.tick.state, &self.settings),
+            caution: self.caution.map(|(caution, _)| caution),
+        }
+    }
+
     /// What the last tick caused.
     pub fn events(&self) -> &Events {
         &self.events
@@ -133,13 +168,15 @@ impl Cycle {
         self.events.count = 0;
         self.events.list = [None; Events::MOST];
         let previous_robot_time_ms = self.tick.state.robot_time_ms;
+        self.mode_ticks = self.mode_ticks.saturating_add(1);
 
         self.read(robot);
         let read_ns = clock.now_ns();
         self.estimate();
-        self.watch(inputs, previous_robot_time_ms);
+        self.watch(inputs, previous_robot_time_ms, robot);
+        self.check_pre_arm(inputs, robot);
         if let Some(command) = inputs.command {
-            self.obey(&command, robot);
+            self.obey(&command, inputs.time_ns, robot);
         }
         if inputs.stop {
             self.request(Request::Stop, Cause::Stop);
@@ -155,7 +192,8 @@ impl Cycle {
         if !matches!(self.mode, Mode::Offline | Mode::Observe)
             && let Err(RobotError::Send { errno }) = robot.write(&sent)
         {
-            self.request(Request::Fault, Cause::Fault(Fault::Send { errno }));
+            // The watchdog of the next tick says so: this one has no command left to change.
+            self.send_error = Some(errno);
         }
         let written_ns = clock.now_ns();
 
@@ -182,9 +220,7 @@ impl Cycle {
                 }
             }
             Err(RobotError::Silent { age_ms }) => self.state_age_ms = age_ms,
-            Err(RobotError::Send { errno }) => {
-                self.request(Request::Fault, Cause::Fault(Fault::Send { errno }));
-            }
+            Err(RobotError::Send { errno }) => self.send_error = Some(errno),
         }
     }
 
@@ -194,61 +230,110 @@ impl Cycle {
         self.tick.estimate = *self.estimator.update(&self.tick.state, &self.feet, &self.settings);
     }
 
-    /// Limits and watchdogs; a robot that fell; an operator who is gone.
-    fn watch(&mut self, inputs: &Inputs, previous_robot_time_ms: u32) {
-        if inputs.events_lost {
-            self.request(Request::Fault, Cause::Fault(Fault::EventsLost));
-        }
-        let around = Circumstances {
+    /// The table of watchdogs; a robot that fell; one that stood waiting for too long.
+    fn watch<R: Robot + ?Sized>(&mut self, inputs: &Inputs, previous_robot_time_ms: u32, robot: &R) {
+        self.watchdog.begin(inputs.time_ns, inputs.lateness_ns, &self.settings);
+        let seen = watchdog::Seen {
             mode: self.mode,
+            state: &self.tick.state,
+            estimate: &self.tick.estimate,
             state_age_ms: self.state_age_ms,
             previous_robot_time_ms,
+            link: robot.link(),
             lateness_ns: inputs.lateness_ns,
+            send_error: self.send_error.take(),
+            operator_silent_ms: inputs.operator_silent_ms,
+            events_lost: inputs.events_lost,
         };
-        if let Some(fault) = watchdog::check(&self.tick.state, &self.tick.estimate, &around, &self.settings) {
-            if self.mode != Mode::Fault {
-                self.request(Request::Fault, Cause::Fault(fault));
+        let trip = self.watchdog.check(&seen, &self.settings);
+        self.caution = match (watchdog::caution(&seen, &self.settings), self.caution) {
+            (Some(caution), _) => Some((caution, CAUTION_TICKS)),
+            (None, Some((caution, left))) if left > 1 => Some((caution, left - 1)),
+            _ => None,
+        };
+        self.standing = None;
+        match trip {
+            Some(trip) if trip.level == Level::Cut => {
+                self.standing = Some(trip.fault);
+                self.cut(trip.fault);
+                return;
             }
-            return;
+            Some(trip) => self.land(trip.fault),
+            None if self.mode == Mode::Ready => self.operator_lost = false,
+            None => {}
         }
         if self.mode != Mode::Review {
             self.fall = FallWatch::default();
         } else if let Some(cause) = self.fall.observe(&self.tick.state, &self.tick.estimate, &self.settings) {
             self.request(Request::Fell, Cause::Fell(cause));
         }
-        if inputs.operator_silent_ms > self.settings.watchdog.operator_silent_ms {
-            let fault = Fault::OperatorLost { silent_ms: inputs.operator_silent_ms };
-            match self.mode {
-                Mode::StandUp | Mode::Ready | Mode::Countdown | Mode::Review => {
-                    self.request(Request::SitDown, Cause::Fault(fault));
-                }
-                Mode::Jump => self.operator_lost = true,
-                _ => {}
+        let allowed_s = self.settings.idle_s;
+        if self.mode == Mode::Ready && allowed_s > 0.0 && self.mode_ticks > ticks(allowed_s) {
+            self.request(Request::SitDown, Cause::Idle { allowed_s });
+        }
+    }
+
+    /// Damping now. The first cause keeps its name, but a gap that turns out to be a lost link is called one.
+    fn cut(&mut self, fault: Fault) {
+        let gap = matches!(self.cause, Cause::Fault(Fault::StateAge { .. }));
+        if self.mode != Mode::Fault {
+            self.request(Request::Fault, Cause::Fault(fault));
+        } else if gap && matches!(fault, Fault::LinkLost { .. }) {
+            self.change(Mode::Fault, Cause::Fault(fault));
+        }
+    }
+
+    /// Down as soon as the robot has its feet on the ground.
+    fn land(&mut self, fault: Fault) {
+        match self.mode {
+            Mode::StandUp | Mode::Ready | Mode::Countdown | Mode::Review => {
+                self.request(Request::SitDown, Cause::Fault(fault));
             }
-        } else if self.mode == Mode::Ready {
-            self.operator_lost = false;
+            Mode::Jump => {
+                self.operator_lost = true;
+                if let Some(jump) = &mut self.jump {
+                    jump.land();
+                }
+            }
+            // It has landed: the trial is measured to its end. It sits down already, or lies.
+            _ => {}
+        }
+    }
+
+    /// How the pre-arm list stands: looked at while it matters, from the newest state.
+    fn check_pre_arm<R: Robot + ?Sized>(&mut self, inputs: &Inputs, robot: &R) {
+        self.pre_arm.observe(inputs.lateness_ns, &self.tick.state, &self.settings);
+        if self.mode == Mode::Disarmed {
+            let seen = pre_arm::Seen {
+                state: &self.tick.state,
+                estimate: &self.tick.estimate,
+                state_age_ms: self.state_age_ms,
+                link: robot.link(),
+            };
+            self.findings = self.pre_arm.findings(&seen, &self.settings);
         }
     }
 
     /// One command of the session: carried out, or refused and said so.
-    fn obey<R: Robot + ?Sized>(&mut self, command: &Command, robot: &mut R) {
+    fn obey<R: Robot + ?Sized>(&mut self, command: &Command, time_ns: u64, robot: &mut R) {
         let request = match command {
             Command::TakeControl => Request::TakeControl,
+            Command::Release => Request::Release,
             Command::Arm => Request::Arm,
             Command::SitDown => Request::SitDown,
-            Command::RunTrial(_) => Request::Approve,
+            Command::RunTrial(..) => Request::Approve,
             Command::Cancel => Request::Cancel,
             // A robot that fell was judged: looked at, that is. It still has to be armed anew.
             Command::EndReview if matches!(self.cause, Cause::Fell(_)) => Request::Acknowledge,
             Command::EndReview => Request::EndReview,
             Command::Acknowledge { .. } => Request::Acknowledge,
         };
-        if mode::next(self.mode, request).is_none() {
-            self.events.push(Event::Refused { command: *command, mode: self.mode });
+        if let Err(because) = self.may(command, request, time_ns) {
+            self.events.push(Event::Refused { command: *command, mode: self.mode, because });
             return;
         }
         match command {
-            Command::RunTrial(spec) => {
+            Command::RunTrial(spec, _) => {
                 self.place(robot, spec);
                 self.jump = Some(Jump::begin(spec, &self.settings));
             }
@@ -259,6 +344,32 @@ impl Cycle {
             _ => {}
         }
         self.request(request, Cause::Command);
+    }
+
+    /// What speaks against a command, if anything does.
+    fn may(&self, command: &Command, request: Request, time_ns: u64) -> Result<(), Objection> {
+        if mode::next(self.mode, request).is_none() {
+            return Err(Objection::Mode);
+        }
+        match *command {
+            Command::Arm => match self.findings.failing() {
+                failing if failing.is_empty() => Ok(()),
+                failing => Err(Objection::Checks(failing)),
+            },
+            Command::Acknowledge { .. } => self.standing.map_or(Ok(()), |fault| Err(Objection::Standing(fault))),
+            Command::RunTrial(_, Approval { mode_changes, given_ns }) => {
+                let age_s = time_ns.saturating_sub(given_ns) as f64 * 1e-9;
+                let allowed_s = self.settings.approval.expires_s;
+                if mode_changes != self.mode_changes {
+                    Err(Objection::Stale)
+                } else if age_s > allowed_s {
+                    Err(Objection::Expired { age_s, allowed_s })
+                } else {
+                    watchdog::hold(&self.tick.state, &self.settings).map_or(Ok(()), |hold| Err(Objection::Hold(hold)))
+                }
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Whether a robot that is to stand up lies in a way from which it cannot.
@@ -292,7 +403,13 @@ impl Cycle {
     /// What the motors are to do in this mode, and the course of things that needs no command.
     fn decide(&mut self) -> JointCommand {
         if let Some(jump) = &mut self.jump {
-            let progress = jump.observe(&self.tick.state, &self.tick.estimate, &self.settings);
+            let progress = match jump.observe(&self.tick.state, &self.tick.estimate, &self.settings) {
+                // Nobody watches: it need not become quiet, only stand.
+                Progress::Settle if self.operator_lost && jump.landed_s() >= self.settings.watchdog.land_s => {
+                    Progress::Over(TrialEnd::NotQuiet)
+                }
+                progress => progress,
+            };
             match (self.mode, progress) {
                 (Mode::Countdown, Progress::Jump | Progress::Settle) => {
                     self.request(Request::CountdownOver, Cause::Course);
@@ -358,13 +475,17 @@ impl Cycle {
 
     /// The only place where the mode changes.
     fn request(&mut self, request: Request, cause: Cause) {
-        let Some(to) = mode::next(self.mode, request) else { return };
-        let from = self.mode;
-        if to == from {
-            return;
+        if let Some(to) = mode::next(self.mode, request).filter(|to| *to != self.mode) {
+            self.change(to, cause);
         }
+    }
+
+    fn change(&mut self, to: Mode, cause: Cause) {
+        let from = self.mode;
         self.mode = to;
         self.cause = cause;
+        self.mode_changes += 1;
+        self.mode_ticks = 0;
         self.events.push(Event::Mode { from, to, cause, time_ns: self.tick.time_ns });
         self.ramp = match to {
             Mode::StandUp => Some(PoseRamp::begin(&self.tick.state, &self.standing_pose(), &self.settings.stand_up)),
@@ -378,7 +499,7 @@ impl Cycle {
                 Cause::Stop => TrialEnd::Stopped,
                 Cause::Fell(cause) => TrialEnd::Fell(cause),
                 Cause::Fault(fault) => TrialEnd::Fault(fault),
-                Cause::Command | Cause::Course | Cause::Connected => TrialEnd::Cancelled,
+                Cause::Command | Cause::Course | Cause::Connected | Cause::Idle { .. } => TrialEnd::Cancelled,
             });
         }
     }

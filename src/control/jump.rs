@@ -35,6 +35,8 @@ pub struct Jump {
     airborne: u32,
     /// Whether it has flown and touched down again since the last impulse.
     flown: bool,
+    /// Ticks since the touchdown after the last impulse.
+    landed: u32,
     quiet: u32,
     phase: Phase,
     fall: FallWatch,
@@ -59,6 +61,7 @@ impl Jump {
             countdown: ticks(settings.countdown_s),
             airborne: 0,
             flown: false,
+            landed: 0,
             quiet: 0,
             phase: Phase::Stance,
             fall: FallWatch::default(),
@@ -80,6 +83,19 @@ impl Jump {
         let before = self.spec.jumps.saturating_sub(1);
         let waited = if before == 0 { 0.0 } else { f64::from(before) * self.oscillator.period_s() };
         waited + self.oscillator.impulse_s()
+    }
+
+    /// No further impulse after the one under way, or the one that has just been: the robot is to land.
+    pub fn land(&mut self) {
+        let period_s = self.oscillator.period_s();
+        let begun =
+            if self.time_s() < 0.0 || self.spec.jumps <= 1 { 1.0 } else { (self.time_s() / period_s).floor() + 1.0 };
+        self.spec.jumps = self.spec.jumps.min(begun as u32);
+    }
+
+    /// How long it has been on the ground since the last flight, s; zero before it has landed.
+    pub fn landed_s(&self) -> f64 {
+        f64::from(self.landed) * PERIOD_S
     }
 
     /// Phase of the oscillator, rad; zero once the last impulse is over.
@@ -139,6 +155,7 @@ impl Jump {
         if !self.flown && !stayed && since_impulse_s < settings.settle.cap_s {
             return Progress::Jump;
         }
+        self.landed += 1;
         let quiet = feet_down == LEGS
             && estimate.velocity_world.norm() < settings.settle.speed_m_s
             && estimate.angular_velocity_body.norm() < settings.settle.rate_rad_s;
@@ -171,11 +188,15 @@ impl FallWatch {
         let touches = state.truth.is_some_and(|truth| truth.body_contact);
         self.touching = if touches { self.touching + 1 } else { 0 };
         let [roll, pitch, _] = estimate.roll_pitch_yaw.into();
-        if roll.abs() > settings.fall.roll_rad {
-            return Some(FallCause::Roll { measured_rad: roll, allowed_rad: settings.fall.roll_rad });
+        // In the air nothing can be put right any more: what is tilted there lands on its side.
+        let airborne = estimate.contact.iter().all(|&down| !down);
+        let allowed = |limit: f64| if airborne { limit.min(settings.flight_tilt_rad) } else { limit };
+        let (allowed_roll, allowed_pitch) = (allowed(settings.fall.roll_rad), allowed(settings.fall.pitch_rad));
+        if roll.abs() > allowed_roll {
+            return Some(FallCause::Roll { measured_rad: roll, allowed_rad: allowed_roll });
         }
-        if pitch.abs() > settings.fall.pitch_rad {
-            return Some(FallCause::Pitch { measured_rad: pitch, allowed_rad: settings.fall.pitch_rad });
+        if pitch.abs() > allowed_pitch {
+            return Some(FallCause::Pitch { measured_rad: pitch, allowed_rad: allowed_pitch });
         }
         (self.touching >= ticks(settings.fall.body_contact_s)).then_some(FallCause::BodyContact)
     }

@@ -9,6 +9,8 @@ pub enum Request {
     Heard,
     /// The operator takes control.
     TakeControl,
+    /// The robot is let go of: it is only observed.
+    Release,
     /// The operator energises.
     Arm,
     /// A ramp has reached its pose.
@@ -39,9 +41,10 @@ pub enum Request {
 
 impl Request {
     /// All requests.
-    pub const ALL: [Request; 15] = [
+    pub const ALL: [Request; 16] = [
         Request::Heard,
         Request::TakeControl,
+        Request::Release,
         Request::Arm,
         Request::PoseReached,
         Request::SitDown,
@@ -75,6 +78,7 @@ pub fn next(mode: Mode, request: Request) -> Option<Mode> {
         (mode, Request::Fell) if mode.energised() => Some(Damped),
         (Offline, Request::Heard) => Some(Observe),
         (Observe, Request::TakeControl) => Some(Disarmed),
+        (Disarmed, Request::Release) => Some(Observe),
         (Disarmed, Request::Arm) => Some(StandUp),
         (StandUp, Request::PoseReached) => Some(Ready),
         (Ready, Request::Approve) => Some(Countdown),
@@ -102,7 +106,7 @@ mod tests {
         let table: [(Mode, &[(Request, Mode)]); 12] = [
             (Offline, &[(R::Heard, Observe), (R::Stop, Damped)]),
             (Observe, &[(R::TakeControl, Disarmed), (R::Stop, Damped)]),
-            (Disarmed, &[(R::Arm, StandUp), (R::Stop, Damped), (R::Fault, Fault)]),
+            (Disarmed, &[(R::Release, Observe), (R::Arm, StandUp), (R::Stop, Damped), (R::Fault, Fault)]),
             (
                 StandUp,
                 &[

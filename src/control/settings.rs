@@ -62,6 +62,10 @@ pub struct Fall {
     pub pitch_rad: f64,
     /// For how long a part other than the feet must be on the ground, s (known in simulation only).
     pub body_contact_s: f64,
+    /// Largest absolute roll or pitch in flight on the simulator, rad.
+    pub simulator_flight_rad: f64,
+    /// Largest absolute roll or pitch in flight on hardware, rad.
+    pub hardware_flight_rad: f64,
 }
 
 /// The last gate before the motors.
@@ -78,18 +82,178 @@ pub struct Gate {
     pub damping_kd: f64,
 }
 
-/// What trips the watchdog.
+/// What must hold before the robot is energised.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PreArm {
+    /// Oldest state, ms.
+    pub state_age_ms: u32,
+    /// Largest share of states lost in the last 5 s.
+    pub loss_share: f64,
+    /// Most corrupt datagrams in the last 5 s.
+    pub corrupt: u32,
+    /// Largest roll or pitch, rad.
+    pub tilt_rad: f64,
+    /// How far a joint may lie beyond its limit, rad.
+    pub joint_margin_rad: f64,
+    /// Largest distance of a joint from the lying pose, rad.
+    pub lying_tolerance_rad: f64,
+    /// Least charge, percent.
+    pub battery_percent: f64,
+    /// Hottest motor, degrees Celsius.
+    pub motor_c: f64,
+    /// Largest angular velocity, rad/s ...
+    pub gyro_rad_s: f64,
+    /// ... for this long, s.
+    pub still_s: f64,
+    /// Ticks that begin later than this are late, ms.
+    pub late_ms: f64,
+    /// Largest share of late ticks in the last 5 s.
+    pub late_share: f64,
+    /// Least free space where the recording goes, MB.
+    pub disk_free_mb: u32,
+}
+
+/// How long an approval holds.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Approval {
+    /// From the key press to the countdown at most, s.
+    pub expires_s: f64,
+}
+
+/// What trips the watchdog: the section `[watchdog]` of `config/safety.toml`. CUT damps in the same tick, LAND finishes the
+/// landing and sits down, HOLD finishes the trial and refuses approvals.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Watchdog {
-    /// Largest tilt while standing, rad.
+    /// Largest tilt while standing, rad: CUT.
     pub stance_tilt_rad: f64,
-    /// Oldest state of the robot that may be acted on, ms.
+    /// Largest tilt while energised, rad: CUT.
+    pub tilt_rad: f64,
+    /// Age of the robot's state that is worth a word, ms.
+    pub state_age_warn_ms: u32,
+    /// Oldest state of the robot that may be acted on, ms: CUT.
     pub state_age_ms: u32,
-    /// Longest silence of the operator's screen, ms: then land, sit down and disarm.
+    /// Age of the state from which the link counts as lost, ms.
+    pub link_lost_ms: u32,
+    /// How far a joint may go beyond its limit, rad: CUT.
+    pub joint_margin_rad: f64,
+    /// Largest joint velocity, times the motor's no-load speed: CUT.
+    pub velocity_factor: f64,
+    /// Largest joint torque as the motor estimates it, times the joint's limit: CUT.
+    pub torque_factor: f64,
+    /// Warm motor, degrees Celsius: HOLD.
+    pub motor_warm_c: f64,
+    /// Hottest motor, degrees Celsius: CUT.
+    pub motor_c: f64,
+    /// Least charge, percent: HOLD.
+    pub battery_percent: f64,
+    /// Most corrupt datagrams in the last 5 s: CUT.
+    pub corrupt: u32,
+    /// Longest time between two ticks, periods ...
+    pub period_factor: f64,
+    /// ... for this many ticks in a row: CUT, where late ticks trip at all.
+    pub period_ticks: u32,
+    /// Silence of the operator's screen that is worth a word, ms.
+    pub operator_warn_ms: u32,
+    /// Longest silence of the operator's screen, ms: LAND.
     pub operator_silent_ms: u32,
-    /// Latest start of a tick, ms; zero only counts late ticks (the simulator's default).
-    pub late_ms: f64,
+    /// From touchdown until a robot that is to land sits down, s.
+    pub land_s: f64,
+    /// Least free space where the recording goes, MB: HOLD.
+    pub disk_free_mb: u32,
+    /// Latest start of a tick on the simulator, ms; zero only counts late ticks.
+    pub simulator_late_ms: f64,
+    /// Latest start of a tick on hardware, ms: CUT; zero only counts late ticks.
+    pub hardware_late_ms: f64,
+    /// Longest wait in READY on the simulator, s; zero waits for ever.
+    pub simulator_idle_s: f64,
+    /// Longest wait in READY on hardware, s: sit down; zero waits for ever.
+    pub hardware_idle_s: f64,
+}
+
+/// Where the base's position, velocity and orientation come from, and with them the objective.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ObjectiveSource {
+    /// The simulator's own knowledge.
+    Truth,
+    /// The sensors, as on hardware.
+    Estimate,
+}
+
+impl ObjectiveSource {
+    /// The word that `config/optimize.toml` has for it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            ObjectiveSource::Truth => "truth",
+            ObjectiveSource::Estimate => "estimate",
+        }
+    }
+
+    /// The source of that name.
+    pub fn from_name(name: &str) -> Option<ObjectiveSource> {
+        [ObjectiveSource::Truth, ObjectiveSource::Estimate].into_iter().find(|source| source.name() == name)
+    }
+}
+
+/// How the sensors are weighed against each other: section `[estimator]` of `config/control.toml`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct EstimatorSettings {
+    /// Force from which a foot in the air is down, N.
+    pub contact_on_n: f64,
+    /// Force below which a foot on the ground is in the air, N.
+    pub contact_off_n: f64,
+    /// How long the sensor must have said so, s.
+    pub contact_time_s: f64,
+    /// Standard deviation of an accelerometer sample at 1 kHz, m/s^2.
+    pub accel_noise_m_s2: f64,
+    /// Its error in proportion to the acceleration.
+    pub accel_error_share: f64,
+    /// Standard deviation of the accelerometer's bias before anything is known of it, m/s^2.
+    pub accel_bias_m_s2: f64,
+    /// How fast the bias wanders, m/s^2 per square root of a second.
+    pub accel_bias_walk: f64,
+    /// Standard deviation of a foot's place by encoders and orientation, m.
+    pub foot_position_m: f64,
+    /// Standard deviation of a foot's velocity by encoders and gyro, m/s.
+    pub foot_velocity_m_s: f64,
+    /// Its error in proportion to the velocity.
+    pub foot_velocity_share: f64,
+    /// How fast a standing foot creeps, m per square root of a second.
+    pub foot_creep: f64,
+    /// A foot that disagrees by more standard deviations than this slips.
+    pub gate_sigma: f64,
+    /// Standard deviation of the velocity where nothing is known of it, m/s.
+    pub start_velocity_m_s: f64,
+    /// All feet down may slip for this long; then the velocity is forgotten, s.
+    pub longest_slip_s: f64,
+    /// No foot down for longer than this is no flight: the robot hangs, s.
+    pub longest_flight_s: f64,
+}
+
+impl EstimatorSettings {
+    /// Every number with its key.
+    pub fn numbers(&self) -> [(&'static str, f64); 15] {
+        [
+            ("contact_on_n", self.contact_on_n),
+            ("contact_off_n", self.contact_off_n),
+            ("contact_time_s", self.contact_time_s),
+            ("accel_noise_m_s2", self.accel_noise_m_s2),
+            ("accel_error_share", self.accel_error_share),
+            ("accel_bias_m_s2", self.accel_bias_m_s2),
+            ("accel_bias_walk", self.accel_bias_walk),
+            ("foot_position_m", self.foot_position_m),
+            ("foot_velocity_m_s", self.foot_velocity_m_s),
+            ("foot_velocity_share", self.foot_velocity_share),
+            ("foot_creep", self.foot_creep),
+            ("gate_sigma", self.gate_sigma),
+            ("start_velocity_m_s", self.start_velocity_m_s),
+            ("longest_slip_s", self.longest_slip_s),
+            ("longest_flight_s", self.longest_flight_s),
+        ]
+    }
 }
 
 /// What the trials of one task run with: a section `[tasks.<task>]` of `config/control.toml`.
@@ -133,12 +297,18 @@ pub struct Settings {
     pub geometry: LegGeometry,
     /// Hip joints in the body frame, m.
     pub hip_origin_body: PerLeg<Vector3<f64>>,
-    /// Lowest joint angles, rad.
+    /// Where the inertial unit sits, body frame, m.
+    pub imu_origin_body: Vector3<f64>,
+    /// Radius of a foot, m.
+    pub foot_radius: f64,
+    /// Lowest joint angles, rad: the higher of the URDF's and the maker's own.
     pub min_position: Joints,
-    /// Highest joint angles, rad.
+    /// Highest joint angles, rad: the lower of the URDF's and the maker's own.
     pub max_position: Joints,
     /// Largest joint torques, N m.
     pub max_torque: Joints,
+    /// No-load speeds of the joints, rad/s.
+    pub max_velocity: Joints,
     /// Joint angles of the machine lying folded, rad.
     pub lying_position: Joints,
     /// Weight, N.
@@ -155,10 +325,26 @@ pub struct Settings {
     pub settle: Settle,
     /// When the robot counts as fallen.
     pub fall: Fall,
-    /// Least force at a foot's sensor that counts as contact, N.
+    /// Largest absolute roll or pitch with no foot down, rad.
+    pub flight_tilt_rad: f64,
+    /// Least force on a foot that counts as contact where the truth is known, N.
     pub contact_force_n: f64,
+    /// Where the base's state comes from.
+    pub objective: ObjectiveSource,
+    /// How it is estimated from the sensors.
+    pub estimator: EstimatorSettings,
     /// The last gate.
     pub gate: Gate,
+    /// A machine that can hurt somebody: the whole pre-arm list holds.
+    pub hardware: bool,
+    /// Before the robot is energised.
+    pub pre_arm: PreArm,
+    /// How long an approval holds.
+    pub approval: Approval,
     /// The watchdog.
     pub watchdog: Watchdog,
+    /// Latest start of a tick, ms; zero only counts late ticks.
+    pub late_ms: f64,
+    /// Longest wait in READY, s; zero waits for ever.
+    pub idle_s: f64,
 }

@@ -1,45 +1,250 @@
-//! What must never pass: each check names the quantity, the measured and the allowed value.
+//! The table of watchdogs: what may never be passed, in which modes it is watched, and what happens then. Table and reasons:
+//! `research/operators.md` D.4; every threshold is a key of `config/safety.toml`, `[watchdog]`.
+//!
+//! A fall in the course of a trial is not here: it is an outcome of the trial (`jump::FallWatch`), and damps as well.
 
 use super::limits;
-use super::settings::Settings;
-use crate::realtime::telemetry::{Estimate, Fault, Mode};
-use crate::robot::RobotState;
+use super::settings::{PERIOD_S, Settings};
+use crate::realtime::telemetry::{Caution, Estimate, Fault, Hold, Mode};
+use crate::robot::{JOINTS, LinkStatus, RobotState};
 
-/// What is known about the tick besides the robot's state.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Circumstances {
+/// What one tick knows.
+#[derive(Debug, Clone, Copy)]
+pub struct Seen<'a> {
     /// Mode at the start of the tick.
     pub mode: Mode,
-    /// Age of the robot's newest state, ms; zero while it answers.
+    /// The newest state.
+    pub state: &'a RobotState,
+    /// What the controller makes of it.
+    pub estimate: &'a Estimate,
+    /// Age of that state, ms; zero while the robot answers.
     pub state_age_ms: u32,
     /// The robot's clock in the state before, ms.
     pub previous_robot_time_ms: u32,
+    /// The link; none for a machine without one.
+    pub link: Option<LinkStatus>,
     /// How late the tick started, ns.
     pub lateness_ns: u64,
+    /// The system's error number, if the robot could not be reached in this tick.
+    pub send_error: Option<i32>,
+    /// How long the operator's screen has been silent, ms.
+    pub operator_silent_ms: u32,
+    /// The session does not take events.
+    pub events_lost: bool,
 }
 
-/// The first limit that is broken; none if all is well.
-pub fn check(state: &RobotState, estimate: &Estimate, around: &Circumstances, settings: &Settings) -> Option<Fault> {
+/// What happens when a row trips.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Level {
+    /// Damping in the same tick, latched as a fault.
+    Cut,
+    /// The landing is finished, then the robot sits down and is disarmed.
+    Land,
+}
+
+/// A row that tripped.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Trip {
+    /// What happens.
+    pub level: Level,
+    /// What was measured and what is allowed.
+    pub fault: Fault,
+}
+
+/// One row of the table.
+struct Row {
+    level: Level,
+    /// The modes in which it is watched.
+    watched: fn(Mode) -> bool,
+    /// The fault, if it is one now.
+    trips: fn(&Watchdog, &Seen, &Settings) -> Option<Fault>,
+}
+
+/// The table. The first row that trips counts, so what makes the numbers below it worthless stands above them.
+const TABLE: [Row; 16] = [
+    Row { level: Level::Cut, watched: connected, trips: events_lost },
+    Row { level: Level::Cut, watched: connected, trips: link_lost },
+    Row { level: Level::Cut, watched: connected, trips: state_age },
+    Row { level: Level::Cut, watched: connected, trips: not_finite },
+    Row { level: Level::Cut, watched: connected, trips: reboot },
+    Row { level: Level::Cut, watched: connected, trips: corrupt },
+    Row { level: Level::Cut, watched: connected, trips: send_error },
+    Row { level: Level::Cut, watched: connected, trips: late },
+    Row { level: Level::Cut, watched: connected, trips: slow },
+    Row { level: Level::Cut, watched: connected, trips: motor_hot },
+    Row { level: Level::Cut, watched: Mode::energised, trips: motor_mode },
+    Row { level: Level::Cut, watched: Mode::energised, trips: joint_position },
+    Row { level: Level::Cut, watched: Mode::energised, trips: joint_velocity },
+    Row { level: Level::Cut, watched: Mode::energised, trips: joint_torque },
+    Row { level: Level::Cut, watched: outside_a_trial, trips: tilt },
+    Row { level: Level::Land, watched: Mode::energised, trips: operator_silent },
+];
+
+/// The robot is spoken to.
+const fn connected(mode: Mode) -> bool {
+    !matches!(mode, Mode::Offline | Mode::Observe)
+}
+
+/// Energised, and no trial or its verdict that a fall belongs to.
+const fn outside_a_trial(mode: Mode) -> bool {
+    matches!(mode, Mode::StandUp | Mode::Ready | Mode::Countdown | Mode::SitDown)
+}
+
+/// The watchdog: the table and what it must remember from tick to tick.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Watchdog {
+    /// When the tick before began, ns.
+    began_ns: Option<u64>,
+    /// Time since then, ms.
+    period_ms: f64,
+    /// Ticks in a row that came too long after the one before.
+    slow: u32,
+}
+
+impl Watchdog {
+    /// Once per tick, first: the pace.
+    pub fn begin(&mut self, time_ns: u64, lateness_ns: u64, settings: &Settings) {
+        let began_ns = time_ns + lateness_ns;
+        self.period_ms = self.began_ns.map_or(0.0, |before| began_ns.saturating_sub(before) as f64 * 1e-6);
+        self.began_ns = Some(began_ns);
+        let slow = self.period_ms > settings.watchdog.period_factor * PERIOD_S * 1e3;
+        self.slow = if slow { self.slow + 1 } else { 0 };
+    }
+
+    /// The first row that trips; none if all is well.
+    pub fn check(&self, seen: &Seen, settings: &Settings) -> Option<Trip> {
+        TABLE.iter().filter(|row| (row.watched)(seen.mode)).find_map(|row| {
+            let fault = (row.trips)(self, seen, settings)?;
+            Some(Trip { level: row.level, fault })
+        })
+    }
+}
+
+/// What lets a trial finish but forbids the next: none if nothing does.
+pub fn hold(state: &RobotState, settings: &Settings) -> Option<Hold> {
     let limits = &settings.watchdog;
-    if around.state_age_ms > limits.state_age_ms {
-        return Some(Fault::StateAge { age_ms: around.state_age_ms, allowed_ms: limits.state_age_ms });
+    let low = state.battery.map(|battery| battery.charge_percent).filter(|charge| *charge < limits.battery_percent);
+    if let Some(measured_percent) = low {
+        return Some(Hold::BatteryLow { measured_percent, allowed_percent: limits.battery_percent });
     }
-    if let Err(fault) = limits::finite(state) {
-        return Some(fault);
+    let (joint, measured_c) = hottest(state);
+    (measured_c >= limits.motor_warm_c).then_some(Hold::MotorWarm { joint, measured_c, allowed_c: limits.motor_warm_c })
+}
+
+/// What is only worth a word: none if nothing is.
+pub fn caution(seen: &Seen, settings: &Settings) -> Option<Caution> {
+    let limits = &settings.watchdog;
+    if connected(seen.mode) && seen.state_age_ms > limits.state_age_warn_ms {
+        Some(Caution::StateAge { age_ms: seen.state_age_ms, allowed_ms: limits.state_age_warn_ms })
+    } else if seen.mode.energised() && seen.operator_silent_ms > limits.operator_warn_ms {
+        Some(Caution::OperatorQuiet { silent_ms: seen.operator_silent_ms, allowed_ms: limits.operator_warn_ms })
+    } else {
+        None
     }
-    if state.robot_time_ms < around.previous_robot_time_ms {
-        return Some(Fault::Reboot);
-    }
-    let late_ms = around.lateness_ns as f64 * 1e-6;
-    if limits.late_ms > 0.0 && late_ms > limits.late_ms {
-        return Some(Fault::Late { measured_ms: late_ms, allowed_ms: limits.late_ms });
-    }
-    if matches!(around.mode, Mode::StandUp | Mode::Ready | Mode::Countdown) {
-        let [roll, pitch, _] = estimate.roll_pitch_yaw.into();
-        let tilt = roll.abs().max(pitch.abs());
-        if tilt > limits.stance_tilt_rad {
-            return Some(Fault::Tilt { measured_rad: tilt, allowed_rad: limits.stance_tilt_rad });
-        }
-    }
-    None
+}
+
+fn events_lost(_: &Watchdog, seen: &Seen, _: &Settings) -> Option<Fault> {
+    seen.events_lost.then_some(Fault::EventsLost)
+}
+
+fn link_lost(_: &Watchdog, seen: &Seen, settings: &Settings) -> Option<Fault> {
+    let (age_ms, allowed_ms) = (seen.state_age_ms, settings.watchdog.link_lost_ms);
+    (age_ms > allowed_ms).then_some(Fault::LinkLost { age_ms, allowed_ms })
+}
+
+fn state_age(_: &Watchdog, seen: &Seen, settings: &Settings) -> Option<Fault> {
+    let (age_ms, allowed_ms) = (seen.state_age_ms, settings.watchdog.state_age_ms);
+    (age_ms > allowed_ms).then_some(Fault::StateAge { age_ms, allowed_ms })
+}
+
+fn not_finite(_: &Watchdog, seen: &Seen, _: &Settings) -> Option<Fault> {
+    limits::finite(seen.state).err()
+}
+
+fn reboot(_: &Watchdog, seen: &Seen, _: &Settings) -> Option<Fault> {
+    (seen.state.robot_time_ms < seen.previous_robot_time_ms).then_some(Fault::Reboot)
+}
+
+fn corrupt(_: &Watchdog, seen: &Seen, settings: &Settings) -> Option<Fault> {
+    let (count, allowed) = (seen.link?.recent_corrupt, settings.watchdog.corrupt);
+    (count > allowed).then_some(Fault::Corrupt { count, allowed })
+}
+
+fn send_error(_: &Watchdog, seen: &Seen, _: &Settings) -> Option<Fault> {
+    seen.send_error.map(|errno| Fault::Send { errno })
+}
+
+fn late(_: &Watchdog, seen: &Seen, settings: &Settings) -> Option<Fault> {
+    let (measured_ms, allowed_ms) = (seen.lateness_ns as f64 * 1e-6, settings.late_ms);
+    (allowed_ms > 0.0 && measured_ms > allowed_ms).then_some(Fault::Late { measured_ms, allowed_ms })
+}
+
+fn slow(watchdog: &Watchdog, _: &Seen, settings: &Settings) -> Option<Fault> {
+    let limits = &settings.watchdog;
+    let slow = settings.late_ms > 0.0 && watchdog.slow >= limits.period_ticks;
+    slow.then_some(Fault::Slow {
+        ticks: watchdog.slow,
+        measured_ms: watchdog.period_ms,
+        allowed_ms: limits.period_factor * PERIOD_S * 1e3,
+    })
+}
+
+fn motor_hot(_: &Watchdog, seen: &Seen, settings: &Settings) -> Option<Fault> {
+    let ((joint, measured_c), allowed_c) = (hottest(seen.state), settings.watchdog.motor_c);
+    (measured_c >= allowed_c).then_some(Fault::MotorTemperature { joint, measured_c, allowed_c })
+}
+
+fn motor_mode(_: &Watchdog, seen: &Seen, _: &Settings) -> Option<Fault> {
+    let joint = seen.state.motor_enabled.iter().position(|enabled| !enabled)?;
+    Some(Fault::MotorMode { joint: joint as u8 })
+}
+
+fn joint_position(_: &Watchdog, seen: &Seen, settings: &Settings) -> Option<Fault> {
+    let margin = settings.watchdog.joint_margin_rad;
+    (0..JOINTS).find_map(|joint| {
+        let measured_rad = seen.state.joint_position[joint];
+        let (least, most) = (settings.min_position[joint] - margin, settings.max_position[joint] + margin);
+        let allowed_rad = measured_rad.clamp(least, most);
+        let fault = Fault::JointPosition { joint: joint as u8, measured_rad, allowed_rad };
+        (measured_rad != allowed_rad).then_some(fault)
+    })
+}
+
+fn joint_velocity(_: &Watchdog, seen: &Seen, settings: &Settings) -> Option<Fault> {
+    (0..JOINTS).find_map(|joint| {
+        let measured_rad_s = seen.state.joint_velocity[joint];
+        let allowed_rad_s = settings.max_velocity[joint] * settings.watchdog.velocity_factor;
+        let fault = Fault::JointVelocity { joint: joint as u8, measured_rad_s, allowed_rad_s };
+        (measured_rad_s.abs() > allowed_rad_s).then_some(fault)
+    })
+}
+
+fn joint_torque(_: &Watchdog, seen: &Seen, settings: &Settings) -> Option<Fault> {
+    (0..JOINTS).find_map(|joint| {
+        let measured_nm = seen.state.joint_torque[joint];
+        let allowed_nm = settings.max_torque[joint] * settings.watchdog.torque_factor;
+        let fault = Fault::JointTorque { joint: joint as u8, measured_nm, allowed_nm };
+        // Written so that what is not a number trips.
+        (!(measured_nm.abs() <= allowed_nm)).then_some(fault)
+    })
+}
+
+fn tilt(_: &Watchdog, seen: &Seen, settings: &Settings) -> Option<Fault> {
+    let [roll, pitch, _] = seen.estimate.roll_pitch_yaw.into();
+    let measured_rad = roll.abs().max(pitch.abs());
+    // Who sits down may lean; who stands must not.
+    let limits = &settings.watchdog;
+    let allowed_rad = if seen.mode == Mode::SitDown { limits.tilt_rad } else { limits.stance_tilt_rad };
+    (measured_rad > allowed_rad).then_some(Fault::Tilt { measured_rad, allowed_rad })
+}
+
+fn operator_silent(_: &Watchdog, seen: &Seen, settings: &Settings) -> Option<Fault> {
+    let silent_ms = seen.operator_silent_ms;
+    (silent_ms > settings.watchdog.operator_silent_ms).then_some(Fault::OperatorLost { silent_ms })
+}
+
+/// The hottest motor and its temperature, degrees Celsius.
+fn hottest(state: &RobotState) -> (u8, f64) {
+    let temperatures = state.motor_temperature_c.iter().enumerate();
+    temperatures.fold((0, f64::MIN), |hottest, (joint, &c)| if c > hottest.1 { (joint as u8, c) } else { hottest })
 }

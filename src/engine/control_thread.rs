@@ -46,6 +46,7 @@ pub fn run<C: Clock>(settings: &Settings, mut end: ControlEnd, clock: &C, closin
         counters.late_ticks += u64::from(instant.lateness_ns > half_period_ns);
         counters.worst_lateness_ns = counters.worst_lateness_ns.max(instant.lateness_ns);
         counters.state_age_ms = cycle.state_age_ms();
+        counters.link = robot.link();
         counters.ticks_not_recorded += u64::from(end.ticks.push(tick).is_err());
         if tick.number.is_multiple_of(SHOWN_EVERY) {
             counters.ticks_not_shown += u64::from(end.shown.push(tick).is_err());
@@ -57,6 +58,7 @@ pub fn run<C: Clock>(settings: &Settings, mut end: ControlEnd, clock: &C, closin
         end.snapshot.write(Snapshot { tick, counters });
         if tick.number.is_multiple_of(COUNTERS_EVERY) {
             end.counters.write(counters);
+            end.readiness.write(cycle.readiness());
         }
         if closing.load(Ordering::Acquire) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     });

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::command::Command;
-use super::telemetry::{Counters, Event, Snapshot, Tick};
+use super::telemetry::{Counters, Event, Readiness, Snapshot, Tick};
 
 /// Commands that may wait.
 pub const COMMANDS: usize = 64;
@@ -84,6 +84,8 @@ pub struct ControlEnd {
     pub snapshot: triple_buffer::Input<Snapshot>,
     /// The counters, for the session.
     pub counters: triple_buffer::Input<Counters>,
+    /// What speaks against the next arming and the next trial, for the session.
+    pub readiness: triple_buffer::Input<Readiness>,
     /// What happened.
     pub events: rtrb::Producer<Event>,
 }
@@ -96,6 +98,8 @@ pub struct SessionEnd {
     pub stop: StopLatch,
     /// The newest counters.
     pub counters: triple_buffer::Output<Counters>,
+    /// What the control thread has against the next arming and the next trial.
+    pub readiness: triple_buffer::Output<Readiness>,
     /// What happened.
     pub events: rtrb::Consumer<Event>,
 }
@@ -120,6 +124,7 @@ pub fn channels() -> (ControlEnd, SessionEnd, ScreenEnd, rtrb::Consumer<Tick>) {
     let (event_in, event_out) = rtrb::RingBuffer::new(EVENTS);
     let (snapshot_in, snapshot_out) = triple_buffer::triple_buffer(&Snapshot::default());
     let (counters_in, counters_out) = triple_buffer::triple_buffer(&Counters::default());
+    let (readiness_in, readiness_out) = triple_buffer::triple_buffer(&Readiness::default());
     let (stop, heartbeat) = (StopLatch::default(), Heartbeat::default());
     let control = ControlEnd {
         commands: command_out,
@@ -129,9 +134,16 @@ pub fn channels() -> (ControlEnd, SessionEnd, ScreenEnd, rtrb::Consumer<Tick>) {
         shown: shown_in,
         snapshot: snapshot_in,
         counters: counters_in,
+        readiness: readiness_in,
         events: event_in,
     };
-    let session = SessionEnd { commands: command_in, stop: stop.clone(), counters: counters_out, events: event_out };
+    let session = SessionEnd {
+        commands: command_in,
+        stop: stop.clone(),
+        counters: counters_out,
+        readiness: readiness_out,
+        events: event_out,
+    };
     let screen = ScreenEnd { stop, heartbeat, shown: shown_out, snapshot: snapshot_out };
     (control, session, screen, tick_out)
 }

@@ -116,17 +116,28 @@ pub struct TrialSpec {
     pub seed: u64,
 }
 
+/// What makes an approval good for one trial, once, now: it dies with any change of mode, and of age.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Approval {
+    /// How often the mode had changed, as far as the session had heard when it was given.
+    pub mode_changes: u64,
+    /// When the operator gave it, ns since the engine started.
+    pub given_ns: u64,
+}
+
 /// What the session asks of the control thread. STOP does not travel here: it has its own latch.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Command {
     /// The operator takes control of a robot that was only observed: damping is sent from now on.
     TakeControl,
+    /// Nothing is sent any more: back to observing.
+    Release,
     /// Energise: checks, then stand up.
     Arm,
     /// Sit down and disarm.
     SitDown,
-    /// Run this trial: countdown, jump, settle. Carries the approval.
-    RunTrial(TrialSpec),
+    /// Run this trial: countdown, jump, settle.
+    RunTrial(TrialSpec, Approval),
     /// Cancel a countdown.
     Cancel,
     /// The verdict is given: the review is over.

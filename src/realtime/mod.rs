@@ -3,5 +3,6 @@
 pub mod channel;
 pub mod clock;
 pub mod command;
+pub mod pre_arm;
 pub mod telemetry;
 pub mod thread;

@@ -3,7 +3,8 @@
 use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::realtime::command::Command;
-use crate::robot::{JointCommand, Joints, LEGS, PerLeg, RobotState, joint_name};
+use crate::realtime::pre_arm::{CheckSet, Findings};
+use crate::robot::{JointCommand, Joints, LEGS, LinkStatus, PerLeg, RobotState, joint_name};
 
 /// What the machine is doing as a whole. One function, `control::mode::next`, owns the changes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
@@ -228,6 +229,8 @@ pub struct Counters {
     pub commands_refused: u64,
     /// Age of the robot's newest valid state, ms.
     pub state_age_ms: u32,
+    /// The link to the robot; none for the simulator.
+    pub link: Option<LinkStatus>,
 }
 
 /// The newest tick and the counters: what a screen draws from.
@@ -289,12 +292,35 @@ pub enum Fault {
         /// Allowed, rad/s.
         allowed_rad_s: f64,
     },
+    /// A joint's torque, as the motor estimates it, is larger than it may be.
+    JointTorque {
+        /// Index 0..12.
+        joint: u8,
+        /// Measured, N m.
+        measured_nm: f64,
+        /// Allowed, N m.
+        allowed_nm: f64,
+    },
     /// The robot's state is too old.
     StateAge {
         /// Age, ms.
         age_ms: u32,
         /// Allowed, ms.
         allowed_ms: u32,
+    },
+    /// The robot has been silent for so long that its link counts as lost.
+    LinkLost {
+        /// Age of its newest state, ms.
+        age_ms: u32,
+        /// Allowed, ms.
+        allowed_ms: u32,
+    },
+    /// Too many datagrams arrive corrupt.
+    Corrupt {
+        /// In the last five seconds.
+        count: u32,
+        /// Allowed.
+        allowed: u32,
     },
     /// The robot's clock went backwards.
     Reboot,
@@ -322,6 +348,15 @@ pub enum Fault {
     /// The control thread is too late.
     Late {
         /// Measured period or lateness, ms.
+        measured_ms: f64,
+        /// Allowed, ms.
+        allowed_ms: f64,
+    },
+    /// Too many ticks in a row came too long after the one before.
+    Slow {
+        /// Ticks in a row.
+        ticks: u32,
+        /// Time between the last two, ms.
         measured_ms: f64,
         /// Allowed, ms.
         allowed_ms: f64,
@@ -356,8 +391,17 @@ impl std::fmt::Display for Fault {
             Fault::JointVelocity { joint: j, measured_rad_s, allowed_rad_s } => {
                 write!(f, "{} at {measured_rad_s:.1} rad/s, allowed {allowed_rad_s:.1}", joint(j))
             }
+            Fault::JointTorque { joint: j, measured_nm, allowed_nm } => {
+                write!(f, "{} at {measured_nm:.1} N m, allowed {allowed_nm:.1}", joint(j))
+            }
             Fault::StateAge { age_ms, allowed_ms } => {
                 write!(f, "no state from the robot for {age_ms} ms, allowed {allowed_ms}")
+            }
+            Fault::LinkLost { age_ms, allowed_ms } => {
+                write!(f, "the link to the robot is lost: no state for {age_ms} ms, allowed {allowed_ms}")
+            }
+            Fault::Corrupt { count, allowed } => {
+                write!(f, "{count} states arrived corrupt within 5 s, allowed {allowed}")
             }
             Fault::Reboot => write!(f, "the robot's clock went backwards: it restarted"),
             Fault::MotorMode { joint: j } => write!(f, "motor {} left servo mode", joint(j)),
@@ -369,6 +413,9 @@ impl std::fmt::Display for Fault {
             }
             Fault::Late { measured_ms, allowed_ms } => {
                 write!(f, "control thread {measured_ms:.1} ms late, allowed {allowed_ms:.1}")
+            }
+            Fault::Slow { ticks, measured_ms, allowed_ms } => {
+                write!(f, "{ticks} control periods in a row of {measured_ms:.1} ms, allowed {allowed_ms:.1}")
             }
             Fault::PoseTimeout { error_rad } => write!(f, "the pose was not reached: {error_rad:.2} rad missing"),
             Fault::OperatorLost { silent_ms } => write!(f, "the operator's screen was silent for {silent_ms} ms"),
@@ -410,6 +457,11 @@ pub enum Cause {
     Fell(FallCause),
     /// A limit or a watchdog.
     Fault(Fault),
+    /// The robot stood waiting for too long.
+    Idle {
+        /// Allowed, s.
+        allowed_s: f64,
+    },
 }
 
 impl std::fmt::Display for Cause {
@@ -421,6 +473,7 @@ impl std::fmt::Display for Cause {
             Cause::Connected => write!(f, "the robot answers"),
             Cause::Fell(cause) => write!(f, "fell: {cause}"),
             Cause::Fault(fault) => write!(f, "fault: {fault}"),
+            Cause::Idle { allowed_s } => write!(f, "idle: nothing was approved for {allowed_s:.0} s"),
         }
     }
 }
@@ -446,11 +499,96 @@ pub enum Event {
         /// How it ended.
         end: TrialEnd,
     },
-    /// A command was not legal in the present mode.
+    /// A command was not carried out.
     Refused {
         /// The command.
         command: Command,
-        /// The mode that forbids it.
+        /// The mode at that moment.
         mode: Mode,
+        /// Why.
+        because: Objection,
     },
+}
+
+/// Why the control thread does not carry out a command.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum Objection {
+    /// The present mode forbids it.
+    #[error("not in this mode")]
+    Mode,
+    /// Checks of the pre-arm list fail.
+    #[error("these checks fail: {0}")]
+    Checks(CheckSet),
+    /// What tripped is still so: acknowledging it would change nothing.
+    #[error("it is still so: {0}")]
+    Standing(Fault),
+    /// A trial must not begin.
+    #[error("{0}")]
+    Hold(Hold),
+    /// The mode changed between the approval and the command.
+    #[error("the robot's mode changed after the approval; look again, and approve again")]
+    Stale,
+    /// The approval is too old.
+    #[error("the approval is {age_s:.0} s old, allowed {allowed_s:.0}; look again, and approve again")]
+    Expired {
+        /// Its age, s.
+        age_s: f64,
+        /// Allowed, s.
+        allowed_s: f64,
+    },
+}
+
+/// What lets the running trial finish but forbids the next one.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum Hold {
+    /// The battery is low.
+    #[error("battery at {measured_percent:.0} %, at least {allowed_percent:.0} % for a jump; charge or change it")]
+    BatteryLow {
+        /// Measured, percent.
+        measured_percent: f64,
+        /// Allowed at least, percent.
+        allowed_percent: f64,
+    },
+    /// A motor is warm.
+    #[error("motor {} at {measured_c:.0} degrees Celsius, allowed below {allowed_c:.0} for a jump; sit down and wait", joint_name(*.joint as usize))]
+    MotorWarm {
+        /// Index 0..12.
+        joint: u8,
+        /// Measured, degrees Celsius.
+        measured_c: f64,
+        /// Allowed below, degrees Celsius.
+        allowed_c: f64,
+    },
+}
+
+/// What is worth a word before a watchdog trips.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum Caution {
+    /// The robot's state is getting old.
+    #[error("no state from the robot for {age_ms} ms, usual are {allowed_ms}")]
+    StateAge {
+        /// Age, ms.
+        age_ms: u32,
+        /// Usual at most, ms.
+        allowed_ms: u32,
+    },
+    /// The operator's screen is quiet.
+    #[error("the operator's screen has been silent for {silent_ms} ms, usual are {allowed_ms}")]
+    OperatorQuiet {
+        /// Silence, ms.
+        silent_ms: u32,
+        /// Usual at most, ms.
+        allowed_ms: u32,
+    },
+}
+
+/// What the control thread thinks of the next arming and the next trial.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Readiness {
+    /// How its checks of the pre-arm list stood when the robot was disarmed last.
+    pub findings: Findings,
+    /// What forbids the next trial.
+    pub hold: Option<Hold>,
+    /// The newest caution of the last second.
+    pub caution: Option<Caution>,
 }

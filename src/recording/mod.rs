@@ -5,6 +5,7 @@
 //! fields. While it grows it is named `*.mcap.part`; only a finished one is named `*.mcap`.
 
 mod container;
+pub mod disk;
 mod error;
 mod frames;
 mod optimizing;

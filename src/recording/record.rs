@@ -3,6 +3,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::realtime::pre_arm::{Check, CheckState};
 use crate::realtime::telemetry::{Counters, Mode, Tick};
 
 /// A record and when it happened.
@@ -35,12 +36,28 @@ pub enum Record {
     Log(LogRecord),
     /// The last ticks before a fault, oldest first.
     FaultTicks(Vec<Tick>),
+    /// The whole pre-arm list. The screen sees it twice a second while the robot is disarmed, the recording when an item
+    /// changes its state.
+    PreArm(Vec<PreArmCheck>),
     /// What is searched, and how far the study is.
     Search(Search),
     /// Why the proposal was made: told with each that the sampler makes.
     Insight(Insight),
     /// What repeated points amount to; all of them, each time that one of them changes.
     Points(Vec<PointRecord>),
+}
+
+/// An item of the pre-arm list and how it stands.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PreArmCheck {
+    /// The item.
+    pub check: Check,
+    /// What was found, in words with a unit.
+    pub found: String,
+    /// What is needed, in words with a unit.
+    pub needed: String,
+    /// How it stands.
+    pub state: CheckState,
 }
 
 /// What a session is: written first into a recording, shown in the frame.

@@ -11,7 +11,7 @@ use rtrb::Consumer;
 use super::error::RecordingError;
 use super::record::{Record, Stamped};
 use super::writer::Writer;
-use crate::realtime::telemetry::Tick;
+use crate::realtime::telemetry::{Mode, Tick};
 
 /// How long the thread sleeps when there is nothing to write; the ring holds several seconds.
 const IDLE: Duration = Duration::from_millis(2);
@@ -25,6 +25,18 @@ pub struct TrialTicks {
     pub trial: u32,
     /// All ticks that carried it and reached the recorder.
     pub ticks: Vec<Tick>,
+}
+
+/// Ticks that are handed on with a fault, the first faulty one among them.
+pub const FAULT_TICKS: usize = 200;
+
+/// What the recorder hands to the session.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Handed {
+    /// A trial's ticks, once it is over.
+    Trial(TrialTicks),
+    /// The last ticks up to the first in FAULT, oldest first.
+    Fault(Vec<Tick>),
 }
 
 /// How the recording is doing.
@@ -56,8 +68,10 @@ pub struct Recorder {
     ticks: Consumer<Tick>,
     records: Receiver<Stamped>,
     writer: Option<Writer>,
-    trial_ticks: Sender<TrialTicks>,
+    handed: Sender<Handed>,
     trial: Option<TrialTicks>,
+    /// The last ticks.
+    last: VecDeque<Tick>,
     /// Records that came and are not written yet.
     waiting: VecDeque<Stamped>,
     flushed: Instant,
@@ -72,8 +86,8 @@ pub struct RecorderHandle {
 
 impl Recorder {
     /// Starts the thread. It ends, and completes the file, once the ring's producer and every sender of records are
-    /// gone and everything from them is written. Without a writer it records nothing and only hands on trials' ticks:
-    /// those of a trial when the ticks stop carrying its number.
+    /// gone and everything from them is written. Without a writer it records nothing and only hands on ticks: those
+    /// of a trial when the ticks stop carrying its number, and the last ones at a fault.
     ///
     /// # Panics
     /// When the system has no thread left.
@@ -81,15 +95,16 @@ impl Recorder {
         ticks: Consumer<Tick>,
         records: Receiver<Stamped>,
         writer: Option<Writer>,
-        trial_ticks: Sender<TrialTicks>,
+        handed: Sender<Handed>,
     ) -> RecorderHandle {
         let status = Arc::new(Mutex::new(RecorderStatus::default()));
         let mut recorder = Recorder {
             ticks,
             records,
             writer,
-            trial_ticks,
+            handed,
             trial: None,
+            last: VecDeque::with_capacity(FAULT_TICKS),
             waiting: VecDeque::new(),
             flushed: Instant::now(),
             status: status.clone(),
@@ -196,11 +211,19 @@ impl Recorder {
         if let Some(trial) = &mut self.trial {
             trial.ticks.push(*tick);
         }
+        if self.last.len() == FAULT_TICKS {
+            self.last.pop_front();
+        }
+        let before = self.last.back().map(|last| last.mode);
+        self.last.push_back(*tick);
+        if tick.mode == Mode::Fault && before != Some(Mode::Fault) {
+            let _ = self.handed.send(Handed::Fault(self.last.iter().copied().collect())); // as with a trial's
+        }
     }
 
     fn hand_on_trial(&mut self) {
         if let Some(trial) = self.trial.take() {
-            let _ = self.trial_ticks.send(trial); // nobody measures any more: nothing is lost, the file has them
+            let _ = self.handed.send(Handed::Trial(trial)); // nobody measures any more: nothing is lost, the file has them
         }
     }
 }

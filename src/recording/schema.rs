@@ -6,12 +6,14 @@ use prost::Message;
 use super::frog;
 use super::optimizing;
 use super::record::{
-    CommandRecord, Level, LogRecord, Measured, ParameterInfo, Proposal, ProposedParameter, Record, Risk, SessionInfo,
-    Source, Stage, StageInfo, Transition, TrialRecord, Verdict,
+    CommandRecord, Level, LogRecord, Measured, ParameterInfo, PreArmCheck, Proposal, ProposedParameter, Record, Risk,
+    SessionInfo, Source, Stage, StageInfo, Transition, TrialRecord, Verdict,
 };
 use super::tick;
 use super::topic::Topic;
+use crate::realtime::pre_arm::{Check, CheckState};
 use crate::realtime::telemetry::Counters;
+use crate::robot::LinkStatus;
 
 /// A message that is not what the schema says.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -61,6 +63,7 @@ pub fn encode(record: &Record, start_utc_ns: u64, log_time: u64, buffer: &mut Ve
                 ticks_not_shown: counters.ticks_not_shown,
                 commands_refused: counters.commands_refused,
                 state_age_ms: counters.state_age_ms,
+                link: counters.link.as_ref().map(link),
             };
             (Topic::Counters, message.encode(buffer))
         }
@@ -82,6 +85,15 @@ pub fn encode(record: &Record, start_utc_ns: u64, log_time: u64, buffer: &mut Ve
         Record::FaultTicks(ticks) => {
             let message = frog::FaultTicks { ticks: ticks.iter().map(tick::whole).collect() };
             (Topic::Fault, message.encode(buffer))
+        }
+        Record::PreArm(list) => {
+            let item = |item: &PreArmCheck| frog::pre_arm::Item {
+                check: item.check as i32,
+                state: item.state as i32,
+                found: item.found.clone(),
+                needed: item.needed.clone(),
+            };
+            (Topic::PreArm, frog::PreArm { items: list.iter().map(item).collect() }.encode(buffer))
         }
         Record::Search(value) => (Topic::Search, optimizing::search(value).encode(buffer)),
         Record::Insight(value) => (Topic::Insight, optimizing::insight(value).encode(buffer)),
@@ -122,6 +134,7 @@ pub fn decode(topic: Topic, data: &[u8]) -> Result<Option<Record>, DecodeError> 
                 ticks_not_shown: message.ticks_not_shown,
                 commands_refused: message.commands_refused,
                 state_age_ms: message.state_age_ms,
+                link: message.link.as_ref().map(from_link),
             })
         }
         Topic::Log => {
@@ -137,6 +150,18 @@ pub fn decode(topic: Topic, data: &[u8]) -> Result<Option<Record>, DecodeError> 
         Topic::Fault => {
             let message = frog::FaultTicks::decode(data)?;
             Record::FaultTicks(message.ticks.iter().map(tick::from_whole).collect::<Result<_, _>>()?)
+        }
+        Topic::PreArm => {
+            let item = |item: frog::pre_arm::Item| {
+                Ok(PreArmCheck {
+                    check: one_of(&Check::ALL, "check", item.check)?,
+                    state: one_of(&CheckState::ALL, "state of a check", item.state)?,
+                    found: item.found,
+                    needed: item.needed,
+                })
+            };
+            let items = frog::PreArm::decode(data)?.items;
+            Record::PreArm(items.into_iter().map(item).collect::<Result<_, DecodeError>>()?)
         }
         Topic::Search => Record::Search(optimizing::from_search(frog::Search::decode(data)?)),
         Topic::Insight => Record::Insight(optimizing::from_insight(frog::Insight::decode(data)?)),
@@ -310,6 +335,46 @@ fn one_of<T: Copy>(all: &[T], what: &'static str, number: i32) -> Result<T, Deco
     all.get(number as usize).copied().ok_or(DecodeError::Unknown(what, number))
 }
 
+fn link(link: &LinkStatus) -> frog::Link {
+    frog::Link {
+        received: link.received,
+        lost: link.lost,
+        late: link.late,
+        duplicate: link.duplicate,
+        corrupt: link.corrupt,
+        wrong_length: link.wrong_length,
+        foreign: link.foreign,
+        reboots: link.reboots,
+        sent: link.sent,
+        send_errors: link.send_errors,
+        state_age_ms: link.state_age_ms,
+        rate_hz: link.rate_hz,
+        recent_received: link.recent_received,
+        recent_lost: link.recent_lost,
+        recent_corrupt: link.recent_corrupt,
+    }
+}
+
+fn from_link(link: &frog::Link) -> LinkStatus {
+    LinkStatus {
+        received: link.received,
+        lost: link.lost,
+        late: link.late,
+        duplicate: link.duplicate,
+        corrupt: link.corrupt,
+        wrong_length: link.wrong_length,
+        foreign: link.foreign,
+        reboots: link.reboots,
+        sent: link.sent,
+        send_errors: link.send_errors,
+        state_age_ms: link.state_age_ms,
+        rate_hz: link.rate_hz,
+        recent_received: link.recent_received,
+        recent_lost: link.recent_lost,
+        recent_corrupt: link.recent_corrupt,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -341,6 +406,15 @@ mod tests {
         for (number, verdict) in (0..).zip(Verdict::ALL) {
             assert_eq!(verdict as i32, number);
             assert_named(verdict.name(), frog::trial::Verdict::try_from(number).ok().map(|v| v.as_str_name()));
+        }
+        // Their names are sentences; their numbers and count are what matters.
+        for (number, check) in (0..).zip(Check::ALL) {
+            assert_eq!(check as i32, number);
+            assert!(frog::pre_arm::Check::try_from(number).is_ok(), "{check:?}");
+        }
+        for (number, state) in (0..).zip(CheckState::ALL) {
+            assert_eq!(state as i32, number);
+            assert_named(state.name(), frog::pre_arm::State::try_from(number).ok().map(|s| s.as_str_name()));
         }
     }
 }

@@ -24,13 +24,14 @@ pub enum Topic {
     Log,
     Fault,
     Marker,
+    PreArm,
     Search,
     Insight,
     Points,
 }
 
 impl Topic {
-    pub const ALL: [Topic; 18] = [
+    pub const ALL: [Topic; 19] = [
         Topic::JointStates,
         Topic::JointCommand,
         Topic::Tick,
@@ -46,6 +47,7 @@ impl Topic {
         Topic::Log,
         Topic::Fault,
         Topic::Marker,
+        Topic::PreArm,
         Topic::Search,
         Topic::Insight,
         Topic::Points,
@@ -69,6 +71,7 @@ impl Topic {
             Topic::Log => "/log",
             Topic::Fault => "/fault",
             Topic::Marker => "/marker",
+            Topic::PreArm => "/safety/pre_arm",
             Topic::Search => "/opt/search",
             Topic::Insight => "/opt/insight",
             Topic::Points => "/opt/points",
@@ -107,6 +110,7 @@ impl Topic {
             Topic::Command => own("OperatorCommand"),
             Topic::Fault => own("FaultTicks"),
             Topic::Marker => own("Marker"),
+            Topic::PreArm => own("PreArm"),
             Topic::Search => own("Search"),
             Topic::Insight => own("Insight"),
             Topic::Points => own("Points"),

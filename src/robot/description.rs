@@ -11,8 +11,9 @@ use nalgebra::{Matrix3, Vector3};
 
 pub use files::DescriptionError;
 
+use super::go1::Network;
 use super::kinematics::LegGeometry;
-use super::{Joints, PerLeg};
+use super::{JOINTS, Joints, PerLeg};
 
 /// One rigid body. Frames are parallel to the body frame at zero joint angles.
 #[derive(Debug, Clone, PartialEq)]
@@ -100,17 +101,36 @@ pub struct RobotDescription {
     pub leg_geometry: LegGeometry,
     /// Hard limits.
     pub limits: JointLimits,
+    /// Joint angles that the maker's own controller library allows: hip, thigh, calf of every leg, `[lowest, highest]`, rad;
+    /// none where they are not known.
+    pub maker_limits: Option<[[f64; 2]; 3]>,
     /// Joint angles of the machine lying folded on the floor, rad: where standing up starts and sitting down ends.
     pub lying_position: Joints,
     /// Inertia of each motor's rotor as felt at the joint (gear ratio squared times its own), kg m^2.
     pub rotor_inertia: Joints,
     /// Where the inertial unit sits, trunk frame, m; its axes are the trunk's.
     pub imu_origin: Vector3<f64>,
+    /// How the machine is reached; none for one that cannot be driven.
+    pub network: Option<Network>,
 }
 
 impl RobotDescription {
     /// Mass of the whole machine, kg.
     pub fn total_mass(&self) -> f64 {
         self.trunk.mass + self.legs.iter().flat_map(|leg| &leg.bodies).map(|body| body.mass).sum::<f64>()
+    }
+
+    /// Lowest and highest joint angles that a controller may ask for, rad: what both the URDF and the maker's own library
+    /// allow.
+    pub fn allowed_positions(&self) -> (Joints, Joints) {
+        let (mut lowest, mut highest) = (self.limits.min_position, self.limits.max_position);
+        if let Some(maker) = self.maker_limits {
+            for i in 0..JOINTS {
+                let [low, high] = maker[i % 3];
+                lowest[i] = lowest[i].max(low);
+                highest[i] = highest[i].min(high);
+            }
+        }
+        (lowest, highest)
     }
 }

@@ -6,6 +6,7 @@
 //! thigh (about y), calf (about y). SI units and radians throughout.
 
 pub mod description;
+pub mod go1;
 pub mod kinematics;
 
 use nalgebra::{UnitQuaternion, Vector3};
@@ -243,6 +244,49 @@ pub enum RobotError {
     },
 }
 
+/// How the link to a robot is doing: what came, what did not, and what was not fit to use. Counts are since the start.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct LinkStatus {
+    /// Valid states that were newer than all before.
+    pub received: u64,
+    /// States that never came, from gaps in the robot's clock; one that comes late after all is not lost.
+    pub lost: u64,
+    /// Valid states that were older than the newest: overtaken on the way.
+    pub late: u64,
+    /// Valid states with the time of the newest one: sent twice, or by a robot whose clock stands still.
+    pub duplicate: u64,
+    /// Datagrams whose checksum is wrong.
+    pub corrupt: u64,
+    /// Datagrams too short for a state.
+    pub wrong_length: u64,
+    /// Datagrams with another header than a low-level state's.
+    pub foreign: u64,
+    /// How often the robot's clock began anew.
+    pub reboots: u64,
+    /// Commands handed to the network.
+    pub sent: u64,
+    /// Commands that the operating system refused to send.
+    pub send_errors: u64,
+    /// Age of the newest valid state, ms.
+    pub state_age_ms: u32,
+    /// Valid states in the last second: their rate, Hz.
+    pub rate_hz: u32,
+    /// Of the last five seconds: valid states.
+    pub recent_received: u32,
+    /// Of the last five seconds: lost states.
+    pub recent_lost: u32,
+    /// Of the last five seconds: corrupt datagrams.
+    pub recent_corrupt: u32,
+}
+
+impl LinkStatus {
+    /// Share of the states of the last five seconds that were lost, 0 to 1.
+    pub fn loss_share(&self) -> f64 {
+        let all = self.recent_received + self.recent_lost;
+        if all == 0 { 0.0 } else { f64::from(self.recent_lost) / f64::from(all) }
+    }
+}
+
 /// The machine: hardware or simulator. Both calls are made once per tick from the control thread and neither
 /// allocates, locks nor blocks.
 pub trait Robot: Send {
@@ -254,6 +298,11 @@ pub trait Robot: Send {
 
     /// Puts the machine in place for a trial; false where only a person can (hardware).
     fn place(&mut self, placement: &Placement) -> bool;
+
+    /// How the link is doing; none for a machine without one.
+    fn link(&self) -> Option<LinkStatus> {
+        None
+    }
 }
 
 impl<R: Robot + ?Sized> Robot for Box<R> {
@@ -265,5 +314,8 @@ impl<R: Robot + ?Sized> Robot for Box<R> {
     }
     fn place(&mut self, placement: &Placement) -> bool {
         (**self).place(placement)
+    }
+    fn link(&self) -> Option<LinkStatus> {
+        (**self).link()
     }
 }

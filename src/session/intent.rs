@@ -1,13 +1,53 @@
 //! What an operator may wish of the session. Every intent is answered by a `CommandRecord`: carried out, or refused and
 //! why. STOP is not among them: it has its own latch (`engine::Handle::stop`).
 
+use crate::realtime::pre_arm::Check;
 use crate::recording::record::Verdict;
 
-/// One wish.
+/// What only an operator can know: an item of the pre-arm list that takes their word.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum OperatorCheck {
+    /// The robot is in low-level mode, and was damped with the remote before.
+    LowLevel,
+    /// The configuration that is shown is the one that is meant.
+    Configuration,
+    /// Nobody is near the robot, and the remote is in hand. Holds for one arming.
+    AreaClear,
+}
+
+impl OperatorCheck {
+    /// All of them.
+    pub const ALL: [OperatorCheck; 3] =
+        [OperatorCheck::LowLevel, OperatorCheck::Configuration, OperatorCheck::AreaClear];
+
+    /// The item of the list.
+    pub const fn check(self) -> Check {
+        match self {
+            OperatorCheck::LowLevel => Check::LowLevel,
+            OperatorCheck::Configuration => Check::Configuration,
+            OperatorCheck::AreaClear => Check::AreaClear,
+        }
+    }
+}
+
+/// An intent with what makes it good: what energises is not carried out if STOP came after it, or too late.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Wish {
+    /// What is wished.
+    pub intent: Intent,
+    /// How often STOP had been pressed when it was wished.
+    pub stops: u64,
+    /// When it was wished, ns since the engine started.
+    pub time_ns: u64,
+}
+
+/// What may be wished.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Intent {
     /// Energise the robot: it stands up.
     Arm,
+    /// The operator's word on an item of the pre-arm list.
+    Confirm(OperatorCheck),
     /// Sit down and disarm.
     SitDown,
     /// The damped or faulted robot has been looked at.

@@ -5,5 +5,6 @@ pub mod automatic;
 pub mod intent;
 pub mod life;
 pub mod objective;
+pub mod pre_arm;
 pub mod rollout;
 pub mod supervisor;

@@ -6,24 +6,27 @@ mod unattended;
 use std::collections::VecDeque;
 use std::sync::mpsc::{Receiver, Sender};
 
-use super::intent::Intent;
+use super::intent::{Intent, Wish};
 use super::life::{Life, Refusal};
+use super::pre_arm::{PreArmList, objections};
 use crate::control::mode::{self, Request};
 use crate::realtime::channel::SessionEnd;
-use crate::realtime::command::Command;
-use crate::realtime::telemetry::{Cause, Event, Mode, Tick, TrialEnd};
+use crate::realtime::command::{Approval, Command};
+use crate::realtime::telemetry::{Cause, Event, Mode, TrialEnd};
 use crate::recording::record::{
-    CommandRecord, Level, LogRecord, Record, SessionInfo, Stage, Stamped, Transition, Verdict,
+    CommandRecord, Level, LogRecord, PreArmCheck, Record, SessionInfo, Stage, Stamped, Transition, Verdict,
 };
-use crate::recording::recorder::{RecorderWatch, TrialTicks};
+use crate::recording::recorder::{Handed, RecorderWatch, TrialTicks};
 use unattended::Unattended;
-
-/// Ticks that go with a fault into the recording.
-const FAULT_TICKS: usize = 200;
 
 /// How often the counters are told to the screen and the recording, ns.
 const COUNTERS_PERIOD_NS: u64 = 100_000_000;
 
+/// Cautions are said no more often than this, ns.
+const CAUTION_PERIOD_NS: u64 = 10_000_000_000;
+
+/// How often the pre-arm list is shown again though no item changed its state, ns.
+const PRE_ARM_PERIOD_NS: u64 = 500_000_000;
 /// How often the study is looked at for what other programs have written, ns.
 const LOOK_PERIOD_NS: u64 = 500_000_000;
 
@@ -46,15 +49,40 @@ impl Outlets {
     }
 }
 
+/// What a session is made of.
+pub struct Parts {
+    /// The study's life.
+    pub life: Life,
+    /// To the control thread.
+    pub control: SessionEnd,
+    /// The ticks of each trial and of each fault, from the recorder.
+    pub handed: Receiver<Handed>,
+    /// Where the records go.
+    pub outlets: Outlets,
+    /// How the recorder is doing.
+    pub recorder: RecorderWatch,
+    /// What must hold before the robot is energised.
+    pub pre_arm: PreArmList,
+    /// What this session is: its first record.
+    pub info: SessionInfo,
+}
+
 /// The session.
 pub struct Supervisor {
     life: Life,
     control: SessionEnd,
-    trial_ticks: Receiver<TrialTicks>,
+    handed: Receiver<Handed>,
     outlets: Outlets,
     recorder: RecorderWatch,
     mode: Mode,
     cause: Cause,
+    /// How often the mode changed, as far as the session has heard.
+    mode_changes: u64,
+    /// An observer's robot was stopped and acknowledged: it is being let go of.
+    letting_go: bool,
+    /// What forbade the next trial when that was said last.
+    held: Option<String>,
+    caution_ns: Option<u64>,
     /// How the running trial ended, until its ticks have arrived too.
     ended: Option<(u32, TrialEnd)>,
     /// When it ended, ns: its ticks are not waited for for ever.
@@ -64,30 +92,31 @@ pub struct Supervisor {
     observe: bool,
     asked_for_control: bool,
     counters_ns: u64,
+    pre_arm: PreArmList,
+    /// The list as it was shown last, and when.
+    shown_list: Vec<PreArmCheck>,
+    shown_list_ns: u64,
     looked_ns: u64,
     unattended: Unattended,
 }
 
 impl Supervisor {
-    /// A session over a study; `info` becomes the first record.
-    pub fn new(
-        life: Life,
-        control: SessionEnd,
-        trial_ticks: Receiver<TrialTicks>,
-        outlets: Outlets,
-        recorder: RecorderWatch,
-        info: SessionInfo,
-        time_ns: u64,
-    ) -> Supervisor {
+    /// A session over a study.
+    pub fn new(parts: Parts, time_ns: u64) -> Supervisor {
+        let Parts { life, control, handed, outlets, recorder, pre_arm, info } = parts;
         let observe = info.observe;
         let mut supervisor = Supervisor {
             life,
             control,
-            trial_ticks,
+            handed,
             outlets,
             recorder,
             mode: Mode::Offline,
             cause: Cause::Course,
+            mode_changes: 0,
+            letting_go: false,
+            held: None,
+            caution_ns: None,
             ended: None,
             ended_ns: 0,
             measured: VecDeque::new(),
@@ -95,6 +124,9 @@ impl Supervisor {
             observe,
             asked_for_control: false,
             counters_ns: 0,
+            pre_arm,
+            shown_list: Vec::new(),
+            shown_list_ns: 0,
             looked_ns: 0,
             unattended: Unattended::default(),
         };
@@ -113,9 +145,13 @@ impl Supervisor {
         while let Ok(event) = self.control.events.pop() {
             self.event(event, time_ns);
         }
-        while let Ok(ticks) = self.trial_ticks.try_recv() {
-            self.measured.push_back(ticks);
+        while let Ok(handed) = self.handed.try_recv() {
+            match handed {
+                Handed::Trial(ticks) => self.measured.push_back(ticks),
+                Handed::Fault(ticks) => self.say(Record::FaultTicks(ticks), time_ns),
+            }
         }
+        self.let_go();
         self.measure(time_ns);
         let complaint = self.recorder.get().error;
         if complaint != self.recorder_complaint {
@@ -128,6 +164,8 @@ impl Supervisor {
             self.counters_ns = time_ns;
             let counters = *self.control.counters.read();
             self.say(Record::Counters(counters), time_ns);
+            self.show_pre_arm(time_ns);
+            self.warn(time_ns);
         }
         if time_ns >= self.looked_ns + LOOK_PERIOD_NS {
             self.looked_ns = time_ns;
@@ -139,19 +177,20 @@ impl Supervisor {
         self.act_by_itself(time_ns);
     }
 
-    /// Carries out one intent, or says why not. `stops` is how often STOP had been pressed when it was wished: what
-    /// energises is not carried out if STOP came after it.
-    pub fn carry_out(&mut self, intent: &Intent, stops: u64, time_ns: u64) {
+    /// Carries out one wish, or says why not.
+    pub fn carry_out(&mut self, wish: &Wish, time_ns: u64) {
+        let Wish { intent, stops, .. } = wish;
         // The screen may have seen a change of mode that is still on its way here.
         self.attend(time_ns);
         let energises = matches!(intent, Intent::Arm | Intent::Approve { .. });
-        let answer = if self.observe {
+        // Who only looks may stop the robot, as everybody may, and then let go of it again.
+        let answer = if self.observe && *intent != Intent::Acknowledge {
             Err("this session only observes".to_owned())
-        } else if energises && self.control.stop.count() != stops {
+        } else if energises && self.control.stop.count() != *stops {
             Err("STOP was pressed after it".to_owned())
         } else {
             self.noticed(intent);
-            self.obey(intent, stops)
+            self.obey(wish)
         };
         let (accepted, answer) = match answer {
             Ok(answer) => (true, answer),
@@ -159,11 +198,6 @@ impl Supervisor {
         };
         self.say(Record::Command(CommandRecord { wish: describe(intent), accepted, answer }), time_ns);
         self.publish(time_ns);
-    }
-
-    /// The last ticks before a fault, for the recording.
-    pub fn keep_fault_ticks(&mut self, ticks: Vec<Tick>, time_ns: u64) {
-        self.say(Record::FaultTicks(ticks), time_ns);
     }
 
     /// The session ends: what was judged is told.
@@ -195,14 +229,31 @@ impl Supervisor {
         self.control.commands.push(command).map_err(|_| "the control thread does not take commands".to_owned())
     }
 
-    fn obey(&mut self, intent: &Intent, stops: u64) -> Result<String, String> {
+    fn obey(&mut self, wish: &Wish) -> Result<String, String> {
         let words = |refusal: Refusal| refusal.to_string();
-        match intent {
-            Intent::Arm => self.ask(Request::Arm, Command::Arm, "the robot stands up"),
-            Intent::SitDown => self.ask(Request::SitDown, Command::SitDown, "the robot sits down"),
-            Intent::Acknowledge => {
-                self.ask(Request::Acknowledge, Command::Acknowledge { stops }, "acknowledged; arm when ready")
+        match &wish.intent {
+            Intent::Arm if mode::next(self.mode, Request::Arm).is_some() => {
+                let findings = self.control.readiness.read().findings;
+                match objections(&self.pre_arm.look(&findings, &self.recorder.get())) {
+                    Some(objections) => Err(objections),
+                    None => self.ask(Request::Arm, Command::Arm, "the robot stands up"),
+                }
             }
+            Intent::Arm => Err(format!("not while the robot is {}", self.mode.name())),
+            Intent::Confirm(check) if self.mode.energised() => {
+                Err(format!("{} is asked before the robot is armed", check.check().name()))
+            }
+            Intent::Confirm(check) => {
+                self.pre_arm.confirm(*check);
+                self.shown_list_ns = 0;
+                Ok("confirmed".to_owned())
+            }
+            Intent::SitDown => self.ask(Request::SitDown, Command::SitDown, "the robot sits down"),
+            Intent::Acknowledge => self.ask(
+                Request::Acknowledge,
+                Command::Acknowledge { stops: wish.stops },
+                "acknowledged; arm when ready",
+            ),
             Intent::Cancel => self.ask(Request::Cancel, Command::Cancel, "the countdown is cancelled"),
             Intent::Approve { trial, revision } => {
                 if self.mode != Mode::Ready {
@@ -213,8 +264,12 @@ impl Supervisor {
                         "nothing is recorded ({complaint}); a jump without a recording is not measured"
                     ));
                 }
+                if let Some(hold) = self.hold() {
+                    return Err(hold);
+                }
                 let spec = self.life.approve(*trial, *revision).map_err(words)?;
-                if let Err(reason) = self.command(Command::RunTrial(spec)) {
+                let approval = Approval { mode_changes: self.mode_changes, given_ns: wish.time_ns };
+                if let Err(reason) = self.command(Command::RunTrial(spec, approval)) {
                     self.life.ended(spec.trial, &TrialEnd::Cancelled, &[]);
                     return Err(reason);
                 }
@@ -309,6 +364,10 @@ impl Supervisor {
             Event::Mode { from, to, cause, time_ns } => {
                 self.mode = to;
                 self.cause = cause;
+                self.mode_changes += 1;
+                self.letting_go = false;
+                self.pre_arm.mode_changed(from, to, &cause);
+                self.shown_list.clear();
                 self.unattended.mode_changed(to, cause);
                 self.say(Record::Transition(Transition { from, to, cause: cause.to_string() }), time_ns);
             }
@@ -316,11 +375,11 @@ impl Supervisor {
                 self.ended = Some((trial, end));
                 self.ended_ns = time_ns;
             }
-            Event::Refused { command, mode } => {
-                let message =
-                    format!("the control thread refused {} while {}", describe_command(&command), mode.name());
+            Event::Refused { command, mode, because } => {
+                let command_name = describe_command(&command);
+                let message = format!("the control thread refused {command_name} while {}: {because}", mode.name());
                 self.log(Level::Warning, message, time_ns);
-                if let Command::RunTrial(spec) = command {
+                if let Command::RunTrial(spec, _) = command {
                     self.ended = Some((spec.trial, TrialEnd::Cancelled));
                     self.measured.push_back(TrialTicks { trial: spec.trial, ticks: Vec::new() });
                 }
@@ -341,15 +400,60 @@ impl Supervisor {
         };
         self.measured.clear();
         self.ended = None;
-        if matches!(end, TrialEnd::Fault(_)) {
-            let kept = ticks[ticks.len().saturating_sub(FAULT_TICKS)..].to_vec();
-            self.keep_fault_ticks(kept, time_ns);
-        }
         self.life.ended(trial, &end, &ticks);
         if self.life.stage() == Stage::Review && matches!(self.mode, Mode::Damped | Mode::Fault) {
             let message = format!("trial {trial} ended in {}: {}", self.mode.name(), self.cause);
             self.log(Level::Warning, message, time_ns);
         }
+    }
+
+    /// What forbids the next trial, in words; none if nothing does.
+    fn hold(&mut self) -> Option<String> {
+        let hold = self.control.readiness.read().hold.map(|hold| hold.to_string());
+        hold.or_else(|| self.pre_arm.disk_low())
+    }
+
+    /// What stands out, said once: what forbids the next trial, and what a watchdog will soon act on.
+    fn warn(&mut self, time_ns: u64) {
+        let hold = self.hold();
+        if let Some(reason) = &hold
+            && self.held.is_none()
+        {
+            self.log(Level::Warning, format!("no further trial can be approved: {reason}"), time_ns);
+        }
+        self.held = hold;
+        let due = self.caution_ns.is_none_or(|said_ns| time_ns >= said_ns + CAUTION_PERIOD_NS);
+        if let Some(caution) = self.control.readiness.read().caution.filter(|_| due) {
+            self.caution_ns = Some(time_ns);
+            self.log(Level::Warning, caution.to_string(), time_ns);
+        }
+    }
+
+    /// An observer's STOP was acknowledged: the robot is whose it was.
+    fn let_go(&mut self) {
+        if self.observe && self.mode == Mode::Disarmed && !self.letting_go {
+            self.letting_go = self.command(Command::Release).is_ok();
+        }
+    }
+
+    /// The pre-arm list, while the robot is disarmed: to the screen twice a second, to both when an item changes its state.
+    fn show_pre_arm(&mut self, time_ns: u64) {
+        if self.mode != Mode::Disarmed || self.observe {
+            return;
+        }
+        let findings = self.control.readiness.read().findings;
+        let list = self.pre_arm.look(&findings, &self.recorder.get());
+        let states = |list: &[PreArmCheck]| list.iter().map(|item| item.state).collect::<Vec<_>>();
+        let stamped = Stamped { time_ns, record: Record::PreArm(list.clone()) };
+        if states(&list) != states(&self.shown_list) {
+            self.outlets.put(stamped);
+        } else if time_ns >= self.shown_list_ns + PRE_ARM_PERIOD_NS {
+            let _ = self.outlets.screen.send(stamped);
+        } else {
+            return;
+        }
+        self.shown_list_ns = time_ns;
+        self.shown_list = list;
     }
 
     /// What the study's life has to say.
@@ -382,6 +486,7 @@ fn way_to_ready(mode: Mode) -> &'static str {
 fn describe(intent: &Intent) -> String {
     match intent {
         Intent::Arm => "arm".to_owned(),
+        Intent::Confirm(check) => format!("confirm {}", check.check().name()),
         Intent::SitDown => "sit down".to_owned(),
         Intent::Acknowledge => "acknowledge".to_owned(),
         Intent::Approve { trial, .. } => format!("approve trial {trial}"),
@@ -413,9 +518,10 @@ fn describe(intent: &Intent) -> String {
 fn describe_command(command: &Command) -> String {
     match command {
         Command::TakeControl => "to be controlled".to_owned(),
+        Command::Release => "to be let go of".to_owned(),
         Command::Arm => "to stand up".to_owned(),
         Command::SitDown => "to sit down".to_owned(),
-        Command::RunTrial(spec) => format!("trial {}", spec.trial),
+        Command::RunTrial(spec, _) => format!("trial {}", spec.trial),
         Command::Cancel => "to cancel".to_owned(),
         Command::EndReview => "to end the review".to_owned(),
         Command::Acknowledge { .. } => "the acknowledgement".to_owned(),

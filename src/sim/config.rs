@@ -18,6 +18,8 @@ pub struct SimConfig {
     pub actuator: ActuatorConfig,
     /// The sensors.
     pub sensors: SensorConfig,
+    /// What else a robot on a network does: for `quadfrog emulate` alone.
+    pub emulator: EmulatorConfig,
 }
 
 /// `[step]`.
@@ -221,6 +223,24 @@ pub struct SensorConfig {
     pub delay_ms: u32,
 }
 
+/// `[emulator]`.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct EmulatorConfig {
+    /// After this long without a command the motors brake, ms.
+    pub command_timeout_ms: u32,
+    /// How strongly a motor brakes that is not in servo mode, N m s/rad.
+    pub braking_kd: f64,
+    /// How long a restart takes, ms.
+    pub reboot_ms: u32,
+    /// Length of a state datagram, bytes.
+    pub state_length: usize,
+    /// Temperature of the motors, degrees Celsius.
+    pub motor_temperature_c: f64,
+    /// State of charge of the battery, percent.
+    pub battery_percent: f64,
+}
+
 /// A value that the simulator cannot run with.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SimError {
@@ -327,6 +347,19 @@ impl SimConfig {
         not_negative("sensors.foot_force_noise_n", sensors.foot_force_noise_n)?;
         not_negative("sensors.foot_force_step_n", sensors.foot_force_step_n)?;
         let delay = f64::from(sensors.delay_ms);
-        check("sensors.delay_ms", delay, sensors.delay_ms <= 20, "give 0 to 20 ms")
+        check("sensors.delay_ms", delay, sensors.delay_ms <= 20, "give 0 to 20 ms")?;
+
+        let emulator = &self.emulator;
+        let ms = "give 1 to 60000 ms";
+        count("emulator.command_timeout_ms", emulator.command_timeout_ms, 60_000, ms)?;
+        count("emulator.reboot_ms", emulator.reboot_ms, 60_000, ms)?;
+        not_negative("emulator.braking_kd", emulator.braking_kd)?;
+        let length = emulator.state_length;
+        check("emulator.state_length", length as f64, (807..=1400).contains(&length), "give 807 to 1400 bytes")?;
+        let temperature = emulator.motor_temperature_c;
+        let known = (-40.0..=120.0).contains(&temperature);
+        check("emulator.motor_temperature_c", temperature, known, "give -40 to 120 degrees Celsius")?;
+        let charge = emulator.battery_percent;
+        check("emulator.battery_percent", charge, (0.0..=100.0).contains(&charge), "give 0 to 100 percent")
     }
 }

@@ -10,6 +10,7 @@ mod collision;
 mod config;
 mod contact;
 mod dynamics;
+pub mod emulator;
 mod integrate;
 mod model;
 mod quantities;
@@ -22,8 +23,9 @@ mod terrain;
 use nalgebra::Vector3;
 
 pub use config::{
-    ActuatorConfig, ActuatorKind, BlocksConfig, BodyKind, ContactConfig, ContactLaw, HardwareLikeConfig, SensorConfig,
-    SimConfig, SimError, SlopeConfig, SolverConfig, StepConfig, StepsConfig, TerrainConfig, TerrainKind,
+    ActuatorConfig, ActuatorKind, BlocksConfig, BodyKind, ContactConfig, ContactLaw, EmulatorConfig,
+    HardwareLikeConfig, SensorConfig, SimConfig, SimError, SlopeConfig, SolverConfig, StepConfig, StepsConfig,
+    TerrainConfig, TerrainKind,
 };
 pub use model::{GRAVITY, Model};
 pub use quantities::{DOF, Energy, FootMotion, Momentum};

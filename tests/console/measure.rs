@@ -3,14 +3,10 @@
 
 #[path = "support/pty.rs"]
 mod pty;
-mod support;
 
 use std::time::{Duration, Instant};
 
 use pty::Session;
-use quadfrog::recording::record::{Record, Verdict};
-use quadfrog_console::update::Msg;
-use support::{Console, tick, trial};
 
 /// The given share of sorted durations.
 fn percentile(sorted: &[Duration], share: f64) -> Duration {
@@ -90,30 +86,4 @@ fn key_to_screen() {
     );
     session.send("q");
     session.wait();
-}
-
-#[test]
-#[ignore = "a measurement"]
-fn drawing_a_frame() {
-    let mut console = Console::ready();
-    for number in 0..100 {
-        console.record(Record::Trial(trial(number, Some(Verdict::ALL[number as usize % 3]), None)));
-    }
-    for time_ms in (0..60_000).step_by(5) {
-        console.tell(Msg::Tick(Box::new(tick(time_ms, 0.3 * (time_ms as f64 / 300.0).sin(), None))));
-    }
-    let mut terminal = ratatui::Terminal::new(ratatui::backend::TestBackend::new(200, 60)).expect("a screen");
-    for view in ["1", "2", "3", "4", "5", "6"] {
-        console.press(&[view]);
-        let mut times: Vec<Duration> = (0..500)
-            .map(|_| {
-                let begun = Instant::now();
-                terminal.draw(|frame| quadfrog_console::view::render(frame, &console.model)).expect("drawn");
-                begun.elapsed()
-            })
-            .collect();
-        times.sort();
-        let ms = |share| percentile(&times, share).as_secs_f64() * 1e3;
-        println!("view {view} at 200x60: p50 {:.2} ms, p99 {:.2} ms", ms(0.5), ms(0.99));
-    }
 }

@@ -26,8 +26,8 @@ fn recording() -> PathBuf {
 }
 
 /// A console at the end of the recorded session: two trials judged, the third under review.
-fn console(glyphs: Glyphs) -> Console {
-    let mut console = Console::with(Settings::built_in(), Theme { colours: Colours::Named, glyphs });
+fn console(colours: Colours, glyphs: Glyphs) -> Console {
+    let mut console = Console::with(Settings::built_in(), Theme { colours, glyphs });
     let player = Player::open(recording()).expect("the recorded session");
     let robot = quadfrog::robot::description::RobotDescription::embedded(&player.session().robot).expect("its robot");
     console.model.robot = Some(robot);
@@ -39,10 +39,12 @@ fn console(glyphs: Glyphs) -> Console {
     console
 }
 
+const SIZES: [(u16, u16); 3] = [(80, 24), (120, 40), (200, 60)];
+
 #[test]
 fn views_of_a_recorded_session() {
-    for (columns, rows) in [(80, 24), (120, 40), (200, 60)] {
-        let mut console = console(Glyphs::Braille);
+    for (columns, rows) in SIZES {
+        let mut console = console(Colours::Named, Glyphs::Braille);
         for (key, name) in VIEWS {
             console.press(&[key]);
             insta::assert_snapshot!(format!("{name}-{columns}x{rows}"), console.screen(columns, rows));
@@ -52,16 +54,31 @@ fn views_of_a_recorded_session() {
 
 #[test]
 fn views_of_a_recorded_session_in_ascii() {
-    let mut console = console(Glyphs::Ascii);
-    for (key, name) in VIEWS {
-        console.press(&[key]);
-        insta::assert_snapshot!(format!("{name}-ascii"), console.screen(80, 24));
+    for (columns, rows) in SIZES {
+        let mut console = console(Colours::None, Glyphs::Ascii);
+        for (key, name) in VIEWS {
+            console.press(&[key]);
+            let screen = console.screen(columns, rows);
+            assert!(screen.is_ascii(), "{name} at {columns}x{rows}:\n{screen}");
+            insta::assert_snapshot!(format!("{name}-{columns}x{rows}-ascii"), screen);
+        }
+    }
+}
+
+#[test]
+fn views_of_a_recorded_session_in_colour() {
+    for (columns, rows) in SIZES {
+        let mut console = console(Colours::True, Glyphs::Braille);
+        for (key, name) in VIEWS {
+            console.press(&[key]);
+            insta::assert_snapshot!(format!("{name}-{columns}x{rows}-colour"), console.colours(columns, rows));
+        }
     }
 }
 
 #[test]
 fn a_replay_shows_every_trial_and_can_be_left() {
-    let console = console(Glyphs::Braille);
+    let console = console(Colours::Named, Glyphs::Braille);
     assert_eq!(console.model.trials.len(), 3);
     let screen = console.screen(80, 24);
     assert!(screen.contains("REPLAY") && screen.contains("Trial #2: judge it"), "{screen}");

@@ -14,6 +14,9 @@ use quadfrog::optimize::trial::{Trial, TrialState};
 use quadfrog::realtime::telemetry::Mode;
 use quadfrog::recording::player::Player;
 use quadfrog::recording::record::{Record, Source, TrialRecord, Verdict};
+use quadfrog_console::app::{self, ConsoleOptions};
+use quadfrog_console::feed::Feed;
+use quadfrog_console::settings::Settings;
 
 const SIZE: (u16, u16) = (100, 30);
 
@@ -251,6 +254,33 @@ fn a_hang_up_that_no_signal_tells_of_is_noticed() {
     let recording = study(folder.path()).join("session.mcap");
     session.wait_until("the recording is closed", || recording.exists());
     assert_eq!(player(folder.path()).damage(), None);
+}
+
+#[test]
+fn a_panic_in_any_thread_restores_the_terminal_and_says_which() {
+    let folder = folder();
+    let mut command = CommandBuilder::new(std::env::current_exe().expect("this program"));
+    command.args(["--ignored", "--exact", "a_console_one_of_whose_threads_panics", "--nocapture"]);
+    let mut session = Session::run(folder.path(), (100, 30), command);
+    session.wait_for(&["REPLAY", "STOP"]);
+    assert!(!session.wait().success());
+    assert!(session.restored() && session.cooked());
+    assert!(session.sent(b"an injected defect") && session.sent(b"`injected` panicked"), "{}", session.screen());
+}
+
+#[test]
+#[ignore = "a program that another test runs in a terminal"]
+fn a_console_one_of_whose_threads_panics() {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/console/session.mcap");
+    let player = Player::open(file).expect("the recorded session");
+    let options = ConsoleOptions::new(Settings::built_in(), None, false, false);
+    let defect = || {
+        std::thread::sleep(Duration::from_secs(1));
+        panic!("an injected defect");
+    };
+    std::thread::Builder::new().name("injected".into()).spawn(defect).expect("a thread");
+    let ended = app::run(Feed::replay(player), options);
+    panic!("{}", ended.expect_err("the console ends with an error"));
 }
 
 #[test]

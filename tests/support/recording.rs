@@ -5,11 +5,12 @@ use std::path::Path;
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use proptest::prelude::*;
+use quadfrog::realtime::pre_arm::{Check, CheckState};
 use quadfrog::realtime::telemetry::{Counters, Estimate, Mode, Phase, StageTimes, Tick};
 use quadfrog::recording::player::{Played, Player};
 use quadfrog::recording::record::*;
 use quadfrog::recording::writer::Writer;
-use quadfrog::robot::{Battery, Imu, JointCommand, MotorCommand, RobotState, Truth};
+use quadfrog::robot::{Battery, Imu, JointCommand, LinkStatus, MotorCommand, RobotState, Truth};
 
 /// Log time of engine time 0 in these tests: 2026-11-21 00:00 UTC.
 pub const START_UTC_NS: u64 = 1_795_219_200_000_000_000;
@@ -141,6 +142,26 @@ impl Draw {
         }
     }
 
+    fn link(&mut self) -> LinkStatus {
+        LinkStatus {
+            received: self.word(),
+            lost: self.word(),
+            late: self.word(),
+            duplicate: self.word(),
+            corrupt: self.word(),
+            wrong_length: self.word(),
+            foreign: self.word(),
+            reboots: self.word(),
+            sent: self.word(),
+            send_errors: self.word(),
+            state_age_ms: self.word() as u32,
+            rate_hz: self.word() as u32,
+            recent_received: self.word() as u32,
+            recent_lost: self.word() as u32,
+            recent_corrupt: self.word() as u32,
+        }
+    }
+
     fn risk(&mut self) -> Option<Risk> {
         self.option(|d| Risk {
             nearest_fall: d.option(Draw::number),
@@ -150,7 +171,7 @@ impl Draw {
         })
     }
 
-    /// A record of the kind `kind` of nine.
+    /// A record of the kind `kind`.
     fn record(&mut self, kind: usize) -> Record {
         match kind {
             0 => Record::Session(SessionInfo {
@@ -236,14 +257,21 @@ impl Draw {
                 ticks_not_shown: self.word(),
                 commands_refused: self.word(),
                 state_age_ms: self.word() as u32,
+                link: self.option(Draw::link),
             }),
             7 => Record::Log(LogRecord {
                 level: self.one_of(&[Level::Info, Level::Warning, Level::Error]),
                 source: self.string(),
                 message: self.string(),
             }),
-            8 => Record::FaultTicks(vec![self.tick(), self.tick()]),
-            9 => Record::Search(Search {
+            8 => Record::PreArm(self.several(|d| PreArmCheck {
+                check: d.one_of(&Check::ALL),
+                found: d.string(),
+                needed: d.string(),
+                state: d.one_of(&CheckState::ALL),
+            })),
+            9 => Record::FaultTicks(vec![self.tick(), self.tick()]),
+            10 => Record::Search(Search {
                 budget: self.word() as u32,
                 counted: self.word() as u32,
                 parameters: self.several(|d| SearchedParameter {
@@ -256,7 +284,7 @@ impl Draw {
                 }),
                 confirming: self.option(|d| d.word() as u32),
             }),
-            10 => Record::Insight(Insight {
+            11 => Record::Insight(Insight {
                 trial: self.word() as u32,
                 parameters: self.several(|d| ParameterInsight {
                     name: d.string(),
@@ -292,7 +320,7 @@ pub fn any_tick() -> impl Strategy<Value = Tick> {
 
 /// Any record; every kind is as likely.
 pub fn any_record() -> impl Strategy<Value = Record> {
-    (0..12_usize, draw(800)).prop_map(|(kind, mut draw)| draw.record(kind))
+    (0..13_usize, draw(800)).prop_map(|(kind, mut draw)| draw.record(kind))
 }
 
 /// A session as a study in the simulator begins it.

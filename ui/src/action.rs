@@ -2,7 +2,7 @@
 //! words. Dispatch, the help overlay, the palette and the next-step line are all made of it.
 
 use quadfrog::realtime::telemetry::Mode;
-use quadfrog::recording::record::Stage;
+use quadfrog::recording::record::{Stage, Verdict};
 
 use crate::model::{Model, View};
 
@@ -13,6 +13,7 @@ pub enum Action {
     Stop,
     Interrupt,
     Arm,
+    PreArm,
     Approve,
     SitDown,
     Acknowledge,
@@ -25,8 +26,13 @@ pub enum Action {
     Note,
     Override,
     ClearOverrides,
+    Fix,
+    Bounds,
+    QueuePoint,
     Skip,
     Continue,
+    ConfirmBest,
+    ExportBest,
     Open,
     LiveView,
     TrialsView,
@@ -49,8 +55,10 @@ pub enum Action {
     ZoomOut,
     ChartMode,
     Series,
+    ChooseSeries,
     Ghost,
     Sort,
+    Reverse,
     Filter,
     Columns,
     BestOnly,
@@ -66,6 +74,7 @@ pub enum Action {
     NextMarker,
     Palette,
     Help,
+    Mouse,
     Redraw,
     Suspend,
     Quit,
@@ -170,21 +179,27 @@ const fn fixed(info: ActionInfo) -> ActionInfo {
 
 /// Every action, once.
 #[rustfmt::skip]
-pub const ACTIONS: [ActionInfo; 59] = {
+pub const ACTIONS: [ActionInfo; 68] = {
     use Action as A;
     use Group as G;
     [
         fixed(row(A::Stop, "stop", &["Space", "F12"], G::Robot, "STOP: damp all motors at once, from any screen", always)),
         fixed(row(A::Interrupt, "interrupt", &["Ctrl-C"], G::Robot, "STOP; again within 2 s: quit", always)),
         row(A::Arm, "arm", &["A"], G::Robot, "arm: the robot stands up", may_arm),
+        row(A::PreArm, "pre-arm", &["P"], G::Robot, "the pre-arm list, and your word on what only you can see", always),
         row(A::SitDown, "sit-down", &["D"], G::Robot, "sit down and disarm", may_sit_down),
         row(A::Acknowledge, "acknowledge", &["k"], G::Robot, "acknowledge a stop or a fault: back to DISARMED", may_acknowledge),
 
         row(A::Approve, "approve", &["g"], G::Proposal, "approve the jump; again after 0.3 s: countdown and jump", may_approve),
-        row(A::Override, "override", &["o"], G::Proposal, "change parameters of the proposal", may_change_proposal),
+        row(A::Override, "override", &["o"], G::Proposal, "change parameters and gains of the proposal", may_change_proposal),
         row(A::ClearOverrides, "clear-overrides", &["O"], G::Proposal, "back to what was proposed", may_clear_overrides),
+        row(A::Fix, "fix", &["X"], G::Proposal, "Override: fix the parameter for the next trials, or search it again", may_fix),
+        row(A::Bounds, "bounds", &["B"], G::Proposal, "Override: search the parameter within other bounds", may_bound),
+        row(A::QueuePoint, "queue-point", &["Q"], G::Proposal, "queue this point; it comes before the sampler's", may_queue),
         row(A::Skip, "skip", &["n"], G::Proposal, "refuse the proposal and ask for another", may_change_proposal),
         row(A::Continue, "continue", &["C"], G::Proposal, "give a finished study more trials", may_continue),
+        row(A::ConfirmBest, "confirm-best", &["K"], G::Proposal, "repeat the best points until one leads; again: end that", may_confirm),
+        row(A::ExportBest, "export-best", &["E"], G::Proposal, "write the best parameters as a configuration beside the study", may_export_best),
 
         row(A::Accept, "accept", &["a"], G::Verdict, "accept: it counts with its value", may_judge),
         row(A::Fall, "fall", &["f"], G::Verdict, "fall: it counts as J = 0", may_judge),
@@ -216,12 +231,14 @@ pub const ACTIONS: [ActionInfo; 59] = {
         row(A::ZoomIn, "zoom-in", &["+"], G::Charts, "shorter time window", always),
         row(A::ZoomOut, "zoom-out", &["-"], G::Charts, "longer time window", always),
         row(A::ChartMode, "chart-mode", &["w"], G::Charts, "sweep or scroll", always),
-        row(A::Series, "series", &["t"], G::Charts, "next set of series", always),
-        row(A::Ghost, "ghost", &["c"], G::Charts, "lay the best (Trials: the selected) trial under the charts", may_ghost),
+        row(A::Series, "series", &["t"], G::Charts, "next set: attitude and feet, forces, joints", always),
+        row(A::ChooseSeries, "choose-series", &["T"], G::Charts, "choose the series of the charts", always),
+        row(A::Ghost, "ghost", &["c"], G::Charts, "lay the best (Trials: the selected) trial under the charts; a second one: compare the two", may_ghost),
 
         row(A::Sort, "sort", &["s"], G::Tables, "sort by the next column", in_trials),
+        row(A::Reverse, "reverse", &["S"], G::Tables, "turn the order round", in_trials),
         row(A::Filter, "filter", &["F"], G::Tables, "Trials: only a verdict; Log: only a level", in_table),
-        row(A::Columns, "columns", &["x"], G::Tables, "next set of columns", in_trials),
+        row(A::Columns, "columns", &["x"], G::Tables, "choose the columns", in_trials),
         row(A::BestOnly, "best-only", &["b"], G::Tables, "only trials that were the best so far", in_trials),
         row(A::Search, "search", &["/"], G::Tables, "Trials: jump to a number; Log: search", in_table),
         row(A::Copy, "copy", &["y"], G::Tables, "copy the row to the clipboard of your terminal", in_trials),
@@ -237,6 +254,7 @@ pub const ACTIONS: [ActionInfo; 59] = {
 
         row(A::Palette, "palette", &[":"], G::Program, "all actions, and why some are not possible now", always),
         row(A::Help, "help", &["?"], G::Program, "this help", always),
+        row(A::Mouse, "mouse", &["M"], G::Program, "mouse on or off: tabs, rows, wheel", always),
         row(A::Redraw, "redraw", &["Ctrl-L"], G::Program, "draw the whole screen again", always),
         row(A::Suspend, "suspend", &["Ctrl-Z"], G::Program, "suspend the program (only while the robot is not armed)", may_suspend),
         row(A::Quit, "quit", &["q"], G::Program, "quit; asks if the robot is armed", always),
@@ -286,7 +304,13 @@ fn may_arm(model: &Model) -> Legality {
     match model.mode() {
         mode if busy(mode).is_some() => refuse(busy(mode).unwrap_or_default()),
         Mode::Disarmed if stage_is(model, Stage::Review) => refuse("the last trial waits for its verdict"),
-        Mode::Disarmed => Ok(()),
+        Mode::Disarmed => match model.pre_arm_failing().count() {
+            0 => Ok(()),
+            count => refuse(format!(
+                "{count} checks of the pre-arm list do not hold: {} shows them",
+                model.keymap.key(Action::PreArm)
+            )),
+        },
         _ => refuse("the robot is armed already"),
     }
 }
@@ -300,8 +324,11 @@ fn may_sit_down(model: &Model) -> Legality {
     }
 }
 
-fn may_acknowledge(model: &Model) -> Legality {
-    may_wish(model)?;
+/// Whether there is something to acknowledge. An observer may, too: STOP is everybody's, and so is letting go afterwards.
+pub fn may_acknowledge(model: &Model) -> Legality {
+    if !model.session.observe {
+        may_wish(model)?;
+    }
     match model.mode() {
         Mode::Damped | Mode::Fault => Ok(()),
         _ => refuse("nothing waits to be acknowledged"),
@@ -330,10 +357,60 @@ fn may_change_proposal(model: &Model) -> Legality {
     }
 }
 
+/// Whether the search may be changed: not while a trial is under way.
+fn may_search(model: &Model) -> Legality {
+    may_wish(model)?;
+    match model.stage.map(|info| info.stage) {
+        Some(Stage::Proposed | Stage::Finished) => Ok(()),
+        Some(Stage::Review) => refuse("the last trial waits for its verdict"),
+        Some(Stage::Running) => refuse("a trial is running"),
+        None => refuse("the session has not begun"),
+    }
+}
+
+fn may_bound(model: &Model) -> Legality {
+    may_search(model)?;
+    if model.view != View::Override {
+        return refuse("only in the view Override");
+    }
+    match model.override_parameter() {
+        Some(_) => Ok(()),
+        None => refuse("gains are not searched"),
+    }
+}
+
+fn may_fix(model: &Model) -> Legality {
+    may_bound(model)?;
+    let fixed = model.override_parameter().and_then(|info| model.searched(&info.name)?.fixed);
+    match (fixed, model.override_value()) {
+        (None, None) => refuse("there is no proposal whose value could be kept"),
+        _ => Ok(()),
+    }
+}
+
+fn may_queue(model: &Model) -> Legality {
+    may_change_proposal(model)
+}
+
+fn may_confirm(model: &Model) -> Legality {
+    may_search(model)?;
+    let stood = model.trials.values().filter(|trial| trial.verdict == Some(Verdict::Accept));
+    if stood.count() < 2 { refuse("two accepted trials are needed to compare") } else { Ok(()) }
+}
+
+fn may_export_best(model: &Model) -> Legality {
+    may_wish(model)?;
+    match (model.best(), model.session.study.is_empty()) {
+        (None, _) => refuse("no trial was accepted yet"),
+        (_, true) => refuse("this session keeps no study"),
+        _ => Ok(()),
+    }
+}
+
 fn may_clear_overrides(model: &Model) -> Legality {
     may_change_proposal(model)?;
     match model.proposal_on_table() {
-        Some(proposal) if proposal.parameters.iter().any(|p| p.value != p.proposed) => Ok(()),
+        Some(proposal) if proposal.parameters.iter().chain(&proposal.gains).any(|p| p.value != p.proposed) => Ok(()),
         _ => refuse("nothing was overridden"),
     }
 }

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use color_eyre::eyre::{WrapErr, eyre};
 use crossterm::clipboard::CopyToClipboard;
-use crossterm::event::{Event, KeyEventKind};
+use crossterm::event::{Event, KeyEventKind, MouseButton, MouseEvent, MouseEventKind};
 use nix::sys::signal::{Signal, raise};
 use quadfrog::realtime::channel::StopLatch;
 use quadfrog::recording::record::Level;
@@ -19,13 +19,14 @@ use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
 use tokio::time::{MissedTickBehavior, interval};
 
 use crate::action::Action;
+use crate::export::{self, ExportError};
 use crate::feed::Feed;
 use crate::keymap::{Key, Keymap};
 use crate::model::Model;
 use crate::settings::{ChartMode, ColourChoice, GlyphChoice, Settings};
 use crate::terminal::{self, Screen};
 use crate::theme::Theme;
-use crate::update::{Effect, Msg, say, update};
+use crate::update::{Effect, Mouse, Msg, say, update};
 use crate::view;
 
 /// The loop wakes at least this often: for the sign of life, twenty times a second.
@@ -85,6 +86,7 @@ pub enum Ended {
 enum Input {
     Key(Key),
     Paste(String),
+    Mouse(Mouse),
     Resize(u16, u16),
     HungUp,
 }
@@ -119,7 +121,8 @@ impl Console {
         let mut model = Model::new(settings, theme, options.robot);
         let (columns, rows) = crossterm::terminal::size().wrap_err("the terminal's size")?;
         update(&mut model, Msg::Resize(columns, rows));
-        let screen = Screen::enter().wrap_err("the terminal cannot be used")?;
+        let mut screen = Screen::enter().wrap_err("the terminal cannot be used")?;
+        screen.mouse(model.mouse).wrap_err("the terminal cannot be used")?;
         let now = Instant::now();
         Ok(Console {
             feed,
@@ -177,6 +180,7 @@ impl Console {
             match input {
                 Input::Key(key) => self.tell([Msg::Key(key)]),
                 Input::Paste(text) => self.tell([Msg::Paste(text)]),
+                Input::Mouse(event) => self.tell([Msg::Mouse(event)]),
                 Input::Resize(columns, rows) => self.tell([Msg::Resize(columns, rows)]),
                 Input::HungUp => self.hang_up(),
             }
@@ -215,7 +219,12 @@ impl Console {
                 let _ = crossterm::queue!(bytes, CopyToClipboard::to_clipboard_from(text));
                 self.send(&bytes);
             }
+            Effect::Mouse(on) => {
+                // A failure shows with the next frame.
+                let _ = self.screen.mouse(on);
+            }
             Effect::Export => self.export(),
+            Effect::ExportBest => self.export_best(),
             Effect::Redraw => {
                 // A failure shows with the next frame.
                 let _ = self.screen.clear();
@@ -233,21 +242,22 @@ impl Console {
     }
 
     fn export(&mut self) {
-        let folder = Path::new(&self.model.session.study).parent().filter(|folder| folder.is_dir());
-        let folder = folder.map_or_else(PathBuf::new, Path::to_owned);
-        let files = [
-            (folder.join("trials.csv"), view::trials::as_csv(&self.model)),
-            (folder.join("trials.md"), view::trials::as_markdown(&self.model)),
-        ];
-        let written = files.iter().try_for_each(|(path, text)| {
-            std::fs::write(path, text).map_err(|error| format!("{}: {error}", path.display()))
+        let written = export::table(&self.model);
+        self.say_written(written, |path| format!("written: {} and trials.md beside it", path.display()));
+    }
+
+    fn export_best(&mut self) {
+        let written = export::best(&self.model);
+        self.say_written(written, |path| {
+            let path = path.display();
+            format!("written: {path}; quadfrog --config {path} searches around the best")
         });
+    }
+
+    fn say_written(&mut self, written: Result<PathBuf, ExportError>, words: impl FnOnce(&Path) -> String) {
         match written {
-            Ok(()) => {
-                let text = format!("written: {} and trials.md beside it", files[0].0.display());
-                say(&mut self.model, Level::Info, text);
-            }
-            Err(error) => say(&mut self.model, Level::Error, format!("not exported: {error}")),
+            Ok(path) => say(&mut self.model, Level::Info, words(&path)),
+            Err(error) => say(&mut self.model, Level::Error, format!("not written: {error}")),
         }
     }
 
@@ -256,7 +266,7 @@ impl Console {
         self.screen.release();
         // SIGSTOP cannot fail to be sent to oneself; if it did, the screen comes back at once.
         let _ = raise(Signal::SIGSTOP);
-        if self.screen.take().is_err() {
+        if self.screen.take().and_then(|()| self.screen.mouse(self.model.mouse)).is_err() {
             self.hang_up();
         }
         self.last_feed = Instant::now();
@@ -336,6 +346,10 @@ fn read_input(inputs: UnboundedSender<Input>, keymap: Keymap, stop: Option<StopL
                     Input::Key(key)
                 }
                 Ok(Event::Paste(text)) => Input::Paste(text),
+                Ok(Event::Mouse(event)) => match mouse(event) {
+                    Some(event) => Input::Mouse(event),
+                    None => continue,
+                },
                 Ok(Event::Resize(columns, rows)) => Input::Resize(columns, rows),
                 Ok(_) => continue,
                 Err(_) => Input::HungUp,
@@ -347,4 +361,14 @@ fn read_input(inputs: UnboundedSender<Input>, keymap: Keymap, stop: Option<StopL
         }
     };
     std::thread::Builder::new().name("keys".into()).spawn(read).map(|_| ())
+}
+
+/// What the console takes of a mouse's event; moving and releasing mean nothing to it.
+fn mouse(event: MouseEvent) -> Option<Mouse> {
+    match event.kind {
+        MouseEventKind::Down(MouseButton::Left) => Some(Mouse::Click { column: event.column, row: event.row }),
+        MouseEventKind::ScrollUp => Some(Mouse::WheelUp),
+        MouseEventKind::ScrollDown => Some(Mouse::WheelDown),
+        _ => None,
+    }
 }

@@ -88,6 +88,7 @@ impl Feed {
                     std::iter::from_fn(|| handle.next_tick()).take(BATCH).map(|tick| Msg::Tick(Box::new(tick))),
                 );
                 news.push(Msg::Snapshot(Box::new(handle.snapshot())));
+                news.extend(handle.recorder().map(Msg::Recorder));
             }
             Feed::Replay(replay) => replay.take(elapsed_ns, &mut news),
         }

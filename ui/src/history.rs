@@ -71,6 +71,12 @@ impl From<&Tick> for Sample {
     }
 }
 
+/// The sample whose time within its trial is nearest.
+pub fn at_trial_time(trace: &[Sample], trial_time_s: f32) -> Option<&Sample> {
+    let distance = |sample: &&Sample| (sample.trial_time_s - trial_time_s).abs();
+    trace.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)))
+}
+
 /// The newest samples, oldest first, and the trials' traces.
 #[derive(Debug, Clone, Default)]
 pub struct History {
@@ -105,6 +111,11 @@ impl History {
                 self.traces.pop_first();
             }
         }
+    }
+
+    /// The samples of one trace.
+    pub fn of_trace(trace: &[Sample]) -> History {
+        History { samples: trace.iter().copied().collect(), traces: BTreeMap::new() }
     }
 
     /// Forgets the samples, not the traces: time has jumped.

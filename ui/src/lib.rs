@@ -11,11 +11,14 @@
 
 pub mod action;
 pub mod app;
+pub mod column;
 pub mod dialog;
+pub mod export;
 pub mod feed;
 pub mod history;
 pub mod keymap;
 pub mod model;
+pub mod series;
 pub mod settings;
 pub mod terminal;
 pub mod theme;

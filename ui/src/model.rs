@@ -5,13 +5,17 @@ use std::time::Duration;
 
 use quadfrog::realtime::telemetry::{Mode, Snapshot};
 use quadfrog::recording::record::{
-    Level, ParameterInfo, Proposal, SessionInfo, Source, Stage, StageInfo, TrialRecord, Verdict,
+    Insight, Level, ParameterInfo, PointRecord, PreArmCheck, Proposal, Search, SearchedParameter, SessionInfo, Source,
+    Stage, StageInfo, TrialRecord, Verdict,
 };
+use quadfrog::recording::recorder::RecorderStatus;
 use quadfrog::robot::description::RobotDescription;
 
+use crate::column::{Column, SortBy, descending, measured, verdict_rank};
 use crate::dialog::Dialog;
-use crate::history::History;
+use crate::history::{History, Sample};
 use crate::keymap::Keymap;
+use crate::series::Series;
 use crate::settings::{BellCause, ChartMode, Settings};
 use crate::theme::Theme;
 
@@ -95,23 +99,72 @@ pub struct LiveView {
     pub window_s: f64,
     /// Whether the sweep's cursor is drawn as a line; the gap before it says the same with less to send.
     pub cursor_line: bool,
-    /// Which set of series is drawn.
-    pub series: SeriesSet,
+    /// Charts, or the joints in their place.
+    pub panel: Panel,
+    /// The series that are drawn, in the order of the charts.
+    pub series: Vec<Series>,
     /// The history as it was when the charts were frozen, and when (console's clock).
     pub frozen: Option<(History, Duration)>,
     /// Time under the cursor while frozen, ns.
     pub cursor_ns: u64,
-    /// The trial laid under the charts.
+    /// The trial laid under the charts of a jump.
     pub ghost: Option<u32>,
+    /// Two trials in place of the present; none shows the present.
+    pub comparison: Option<Comparison>,
 }
 
-/// What the charts of the live view show.
+/// Two trials on one axis, aligned where their impulses begin.
+#[derive(Debug, Clone)]
+pub struct Comparison {
+    /// Trial A.
+    pub a: u32,
+    /// Trial B.
+    pub b: u32,
+    /// A's trace.
+    pub history_a: History,
+    /// B's trace.
+    pub trace_b: Vec<Sample>,
+    /// Start of A's impulse, ns, on A's clock.
+    pub start_ns: u64,
+    /// The time under the cursor, ns, on A's clock.
+    pub cursor_ns: u64,
+}
+
+impl Comparison {
+    /// The traces of two trials; none where one of them was not seen.
+    pub fn new(history: &History, a: u32, b: u32) -> Option<Comparison> {
+        let (trace_a, trace_b) = (history.trace(a)?, history.trace(b)?.to_vec());
+        let start_ns = impulse_start_ns(trace_a.last()?);
+        Some(Comparison { a, b, history_a: History::of_trace(trace_a), trace_b, start_ns, cursor_ns: start_ns })
+    }
+
+    /// First and last time of both, ns, on A's clock.
+    pub fn span_ns(&self) -> (u64, u64) {
+        let on_a = |sample: &Sample| time_after(self.start_ns, sample.trial_time_s);
+        let ends_a = self.history_a.samples().next().map(|s| s.time_ns).zip(Some(self.history_a.newest_ns()));
+        let ends_b = self.trace_b.first().map(on_a).zip(self.trace_b.last().map(on_a));
+        let ends = [ends_a, ends_b].into_iter().flatten();
+        ends.fold((self.start_ns, self.start_ns), |(first, last), (from, to)| (first.min(from), last.max(to)))
+    }
+}
+
+/// When the impulse of a sample's trial began, ns.
+pub fn impulse_start_ns(sample: &Sample) -> u64 {
+    time_after(sample.time_ns, -sample.trial_time_s)
+}
+
+/// A time some seconds after another, ns.
+pub fn time_after(time_ns: u64, seconds: f32) -> u64 {
+    (time_ns as f64 + f64::from(seconds) * 1e9).max(0.0) as u64
+}
+
+/// What the large area of the live view shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum SeriesSet {
-    /// Roll, pitch and the four foot heights.
-    Attitude,
-    /// Base height, oscillator phase and the four foot forces.
-    Forces,
+pub enum Panel {
+    /// Signals over time.
+    Charts,
+    /// Torque and speed of the joints, and the robot as a wireframe.
+    Joints,
 }
 
 /// State of the trial table.
@@ -119,36 +172,25 @@ pub enum SeriesSet {
 pub struct TrialsView {
     /// The chosen trial; none follows the newest.
     pub selected: Option<u32>,
-    /// Column that the rows are sorted by.
+    /// What the rows are sorted by.
     pub sort: SortBy,
+    /// Whether the order is turned round; rows without a value stay last.
+    pub reversed: bool,
     /// Only this verdict.
     pub filter: Option<Verdict>,
     /// Only trials that were the best when they ran.
     pub best_only: bool,
-    /// Whether the measured terms stand in place of the parameters.
-    pub columns: Columns,
+    /// The columns beside the number.
+    pub columns: Vec<Column>,
 }
 
-/// What the trial table is sorted by.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum SortBy {
-    /// Number, oldest first.
-    #[default]
-    Number,
-    /// Value, best first; trials without a value last.
-    Value,
-    /// Verdict.
-    Verdict,
-}
-
-/// Which columns the trial table has.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Columns {
-    /// The parameters.
-    #[default]
-    Parameters,
-    /// The measured terms.
-    Measured,
+/// When a trial of this session ran, ns since the engine started.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RunTime {
+    /// Its approval.
+    pub begun_ns: u64,
+    /// The end of its measurement; none while it runs.
+    pub ended_ns: Option<u64>,
 }
 
 /// State of the log view.
@@ -185,8 +227,20 @@ pub struct Model {
     pub stage: Option<StageInfo>,
     /// The proposal on the table.
     pub proposal: Option<Proposal>,
+    /// The pre-arm list as it was shown last; empty before the robot was disarmed for the first time.
+    pub pre_arm: Vec<PreArmCheck>,
+    /// What is searched at present; none before the session has said so.
+    pub search: Option<Search>,
+    /// Why the newest proposal of the sampler was made.
+    pub insight: Option<Insight>,
+    /// Points that were run more than once.
+    pub points: Vec<PointRecord>,
+    /// How the recorder is doing; none in a replay.
+    pub recorder: Option<RecorderStatus>,
     /// The study.
     pub trials: BTreeMap<u32, TrialRecord>,
+    /// When the trials of this session ran.
+    pub ran: BTreeMap<u32, RunTime>,
     /// What the charts draw.
     pub history: History,
     /// What happened, oldest first.
@@ -211,8 +265,12 @@ pub struct Model {
     pub replay: Option<ReplayStatus>,
     /// When Ctrl-C was pressed last.
     pub interrupted_at: Option<Duration>,
+    /// The terminal's columns and rows.
+    pub size: (u16, u16),
     /// Rows that page up and page down move by, from the terminal's height.
     pub page: usize,
+    /// Whether clicks and the wheel reach the console; otherwise the terminal keeps them for selecting and copying.
+    pub mouse: bool,
 }
 
 impl Model {
@@ -229,7 +287,13 @@ impl Model {
             snapshot_at: Duration::ZERO,
             stage: None,
             proposal: None,
+            pre_arm: Vec::new(),
+            search: None,
+            insight: None,
+            points: Vec::new(),
+            recorder: None,
             trials: BTreeMap::new(),
+            ran: BTreeMap::new(),
             history: History::default(),
             log: VecDeque::new(),
             message: None,
@@ -240,17 +304,21 @@ impl Model {
                 mode: settings.chart_mode,
                 window_s: settings.chart_window_s,
                 cursor_line: !settings.low_bandwidth,
-                series: SeriesSet::Attitude,
+                panel: Panel::Charts,
+                series: settings.chart_series,
                 frozen: None,
                 cursor_ns: 0,
                 ghost: None,
+                comparison: None,
             },
-            trials_view: TrialsView::default(),
+            trials_view: TrialsView { columns: settings.trial_columns, ..TrialsView::default() },
             override_row: 0,
             log_view: LogView::default(),
             replay: None,
             interrupted_at: None,
+            size: (0, 0),
             page: 10,
+            mouse: settings.mouse,
         }
     }
 
@@ -281,9 +349,34 @@ impl Model {
         self.proposal.as_ref().filter(|proposal| proposal.trial == info.trial)
     }
 
-    /// The parameter of that name with its bounds.
-    pub fn parameter(&self, name: &str) -> Option<&ParameterInfo> {
-        self.session.parameters.iter().find(|parameter| parameter.name == name)
+    /// The items of the pre-arm list that forbid arming.
+    pub fn pre_arm_failing(&self) -> impl Iterator<Item = &PreArmCheck> + '_ {
+        self.pre_arm.iter().filter(|item| !item.state.allows())
+    }
+
+    /// Whether a machine is driven that can hurt somebody.
+    pub fn is_hardware(&self) -> bool {
+        !matches!(self.session.backend.as_str(), "" | "sim")
+    }
+
+    /// The parameter of that name with its present bounds.
+    pub fn parameter(&self, name: &str) -> Option<ParameterInfo> {
+        let info = self.session.parameters.iter().find(|parameter| parameter.name == name)?;
+        Some(match self.searched(name) {
+            Some(searched) => ParameterInfo { low: searched.low, high: searched.high, ..info.clone() },
+            None => info.clone(),
+        })
+    }
+
+    /// The gain of that name with the range in which it may be set.
+    pub fn gain(&self, name: &str) -> Option<&ParameterInfo> {
+        self.session.gains.iter().find(|gain| gain.name == name)
+    }
+
+    /// The value on the card of the parameter that the chosen row of view Override is about.
+    pub fn override_value(&self) -> Option<f64> {
+        let name = &self.override_parameter()?.name;
+        self.proposal_on_table()?.parameters.iter().find(|p| p.name == *name).map(|p| p.value)
     }
 
     /// The accepted trial with the highest value; the earlier one of equals.
@@ -303,9 +396,28 @@ impl Model {
         })
     }
 
-    /// How many trials count for the budget: those with a verdict other than void.
+    /// How many trials count for the budget: as the session says, or else those with a verdict other than void.
     pub fn counted(&self) -> usize {
-        self.trials.values().filter(|trial| matches!(trial.verdict, Some(Verdict::Accept | Verdict::Fall))).count()
+        let judged = |trial: &&TrialRecord| matches!(trial.verdict, Some(Verdict::Accept | Verdict::Fall));
+        match &self.search {
+            Some(search) => search.counted as usize,
+            None => self.trials.values().filter(judged).count(),
+        }
+    }
+
+    /// How many trials the study is to have.
+    pub fn budget(&self) -> u32 {
+        self.search.as_ref().map_or(self.session.budget, |search| search.budget)
+    }
+
+    /// The parameter as it is searched at present.
+    pub fn searched(&self, name: &str) -> Option<&SearchedParameter> {
+        self.search.as_ref()?.parameters.iter().find(|parameter| parameter.name == name)
+    }
+
+    /// The parameter that the chosen row of view Override is about; none for a gain.
+    pub fn override_parameter(&self) -> Option<&ParameterInfo> {
+        self.session.parameters.get(self.override_row)
     }
 
     /// The rows of the trial table as sorted and filtered.
@@ -316,18 +428,46 @@ impl Model {
         } else {
             self.trials.values().filter(|trial| view.filter.is_none() || trial.verdict == view.filter).collect()
         };
-        match view.sort {
-            SortBy::Number => {}
-            // Without a value last: -inf is below every value.
-            SortBy::Value => rows.sort_by(|a, b| {
-                let value = |trial: &TrialRecord| trial.value.unwrap_or(f64::NEG_INFINITY);
-                value(b).total_cmp(&value(a))
-            }),
-            SortBy::Verdict => rows.sort_by_key(|trial| {
-                trial.verdict.map_or(usize::MAX, |verdict| Verdict::ALL.iter().position(|v| *v == verdict).unwrap_or(0))
-            }),
+        let order = |a: &&TrialRecord, b: &&TrialRecord| match view.sort {
+            SortBy::Number => descending(Some(f64::from(b.trial)), Some(f64::from(a.trial))),
+            SortBy::Parameter(index) => descending(self.nth_parameter(a, index), self.nth_parameter(b, index)),
+            SortBy::Column(Column::Verdict) => verdict_rank(a.verdict).cmp(&verdict_rank(b.verdict)),
+            SortBy::Column(Column::Source | Column::Parameters) => a.source.name().cmp(b.source.name()),
+            SortBy::Column(Column::Cause) => a.cause.cmp(&b.cause),
+            SortBy::Column(Column::Value) => descending(a.value, b.value),
+            SortBy::Column(Column::Risk) => descending(risk_share(a), risk_share(b)),
+            SortBy::Column(Column::Time) => {
+                let begun = |trial: &TrialRecord| self.ran.get(&trial.trial).map(|ran| -(ran.begun_ns as f64));
+                descending(begun(a), begun(b))
+            }
+            SortBy::Column(column) => descending(measured(a, column), measured(b, column)),
+        };
+        rows.sort_by(order);
+        if view.reversed {
+            // Rows that have nothing to be sorted by stay last.
+            let sorted_ones = rows.iter().take_while(|row| self.sorts(row)).count();
+            rows[..sorted_ones].reverse();
         }
         rows
+    }
+
+    fn nth_parameter(&self, trial: &TrialRecord, index: usize) -> Option<f64> {
+        let name = &self.session.parameters.get(index)?.name;
+        trial.parameters.iter().find(|(known, _)| known == name).map(|(_, value)| *value)
+    }
+
+    /// Whether the row has what the table is sorted by.
+    fn sorts(&self, trial: &TrialRecord) -> bool {
+        match self.trials_view.sort {
+            SortBy::Number => true,
+            SortBy::Parameter(index) => self.nth_parameter(trial, index).is_some(),
+            SortBy::Column(Column::Value) => trial.value.is_some_and(|value| !value.is_nan()),
+            SortBy::Column(Column::Verdict) => trial.verdict.is_some(),
+            SortBy::Column(Column::Risk) => risk_share(trial).is_some(),
+            SortBy::Column(Column::Time) => self.ran.contains_key(&trial.trial),
+            SortBy::Column(Column::Source | Column::Parameters | Column::Cause) => true,
+            SortBy::Column(column) => measured(trial, column).is_some(),
+        }
     }
 
     /// The row of the trial table that actions are about: the chosen one, or the newest.
@@ -366,6 +506,12 @@ impl Model {
     pub fn by_hand(trial: &TrialRecord) -> bool {
         trial.source != Source::Sampler
     }
+}
+
+/// Share of falls among the nearest trials before it ran.
+fn risk_share(trial: &TrialRecord) -> Option<f64> {
+    let risk = trial.risk.filter(|risk| risk.neighbours > 0)?;
+    Some(f64::from(risk.falls) / f64::from(risk.neighbours))
 }
 
 /// The value of an accepted trial.

@@ -8,7 +8,9 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use toml::{Table, Value};
 
+use crate::column::Column;
 use crate::keymap::Keymap;
+use crate::series::{SIGNALS, Series};
 
 /// The defaults, and the documentation of every key.
 pub const DEFAULT: &str = include_str!("../../config/console.toml");
@@ -26,6 +28,12 @@ pub struct Settings {
     pub chart_mode: ChartMode,
     /// Time that a chart shows, s.
     pub chart_window_s: f64,
+    /// The series that the live view begins with, in the order of the charts.
+    pub chart_series: Vec<Series>,
+    /// The columns that the trial table begins with.
+    pub trial_columns: Vec<Column>,
+    /// Whether clicks and the wheel reach the console.
+    pub mouse: bool,
     /// What rings the terminal's bell.
     pub bell: Vec<BellCause>,
     /// Whether a slow link is to be spared; said on the command line, not in the file.
@@ -133,6 +141,9 @@ impl Settings {
             glyphs: read(table, "glyphs")?,
             chart_mode: read(table, "chart_mode")?,
             chart_window_s,
+            chart_series: named(table, "chart_series", Series::from_name, SIGNALS.map(|signal| signal.name))?,
+            trial_columns: named(table, "trial_columns", Column::from_name, Column::ALL.map(Column::name))?,
+            mouse: read(table, "mouse")?,
             bell: read(table, "bell")?,
             low_bandwidth: false,
             keymap,
@@ -147,4 +158,28 @@ fn refused(key: &str, value: impl Display, reason: impl Display) -> SettingsErro
 fn read<T: DeserializeOwned>(table: &Table, key: &'static str) -> Result<T, SettingsError> {
     let value = table.get(key).ok_or_else(|| refused(key, "nothing", "is missing"))?;
     Value::try_into(value.clone()).map_err(|error: toml::de::Error| refused(key, value, error.message()))
+}
+
+/// A list of names, each of something that is known, without repetition.
+fn named<T: PartialEq, const N: usize>(
+    table: &Table,
+    key: &'static str,
+    find: impl Fn(&str) -> Option<T>,
+    known: [&'static str; N],
+) -> Result<Vec<T>, SettingsError> {
+    let names: Vec<String> = read(table, key)?;
+    let mut found = Vec::with_capacity(names.len());
+    for name in names {
+        let Some(item) = find(&name) else {
+            return Err(refused(key, name, format!("is not one of {}", known.join(", "))));
+        };
+        if found.contains(&item) {
+            return Err(refused(key, name, "is named twice"));
+        }
+        found.push(item);
+    }
+    if found.is_empty() {
+        return Err(refused(key, "[]", format!("needs at least one of {}", known.join(", "))));
+    }
+    Ok(found)
 }

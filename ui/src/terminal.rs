@@ -13,7 +13,7 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use crossterm::cursor::{Hide, Show};
-use crossterm::event::{DisableBracketedPaste, EnableBracketedPaste};
+use crossterm::event::{DisableBracketedPaste, DisableMouseCapture, EnableBracketedPaste, EnableMouseCapture};
 use crossterm::queue;
 use crossterm::style::ResetColor;
 use crossterm::terminal::{
@@ -191,6 +191,7 @@ pub struct Screen {
     terminal: Option<Terminal<OneWay>>,
     shared: Arc<Shared>,
     writer: Option<JoinHandle<()>>,
+    mouse: bool,
     hung_up: bool,
 }
 
@@ -213,7 +214,8 @@ impl Screen {
         let writer_end = FrameWriter { frame: Vec::new(), frames, shared: shared.clone() };
         let backend = OneWay(CrosstermBackend::new(writer_end));
         let terminal = Terminal::with_options(backend, TerminalOptions { viewport: Viewport::Fullscreen })?;
-        let mut screen = Screen { terminal: Some(terminal), shared, writer: Some(writer), hung_up: false };
+        let mut screen =
+            Screen { terminal: Some(terminal), shared, writer: Some(writer), mouse: false, hung_up: false };
         screen.take()?;
         Ok(screen)
     }
@@ -271,6 +273,22 @@ impl Screen {
     /// When the writing thread is gone.
     pub fn clear(&mut self) -> io::Result<()> {
         self.terminal.as_mut().map_or(Ok(()), Terminal::clear)
+    }
+
+    /// Asks the terminal for the mouse's clicks, or leaves them to it.
+    ///
+    /// # Errors
+    /// When the writing thread is gone.
+    pub fn mouse(&mut self, on: bool) -> io::Result<()> {
+        let Some(terminal) = &mut self.terminal else { return Ok(()) };
+        let writer = &mut terminal.backend_mut().0;
+        if on {
+            queue!(writer, EnableMouseCapture)?;
+        } else if self.mouse {
+            queue!(writer, DisableMouseCapture)?;
+        }
+        self.mouse = on;
+        Write::flush(writer)
     }
 
     /// Sends bytes that are not part of a frame: a bell, the clipboard.
@@ -335,7 +353,7 @@ fn give_back() {
         if let Ok(mut terminal) = own_file() {
             let mut bytes = Vec::new();
             // Writing to memory does not fail.
-            let _ = queue!(bytes, ResetColor, DisableBracketedPaste, LeaveAlternateScreen, Show);
+            let _ = queue!(bytes, ResetColor, DisableMouseCapture, DisableBracketedPaste, LeaveAlternateScreen, Show);
             let _ = terminal.write_all(&bytes);
         }
         let _ = done.send(());

@@ -180,6 +180,16 @@ impl Theme {
         if self.glyphs == Glyphs::Ascii { "+-" } else { "±" }
     }
 
+    /// A lamp: on, off.
+    pub fn lamp(&self, on: bool) -> &'static str {
+        match (on, self.glyphs == Glyphs::Ascii) {
+            (true, false) => "●",
+            (false, false) => "○",
+            (true, true) => "#",
+            (false, true) => ".",
+        }
+    }
+
     /// The filled and the empty part of a bar.
     pub fn fill(&self) -> (&'static str, &'static str) {
         if self.glyphs == Glyphs::Ascii { ("#", ".") } else { ("█", "░") }

@@ -6,6 +6,7 @@ use nalgebra::Vector3;
 use serde::Deserialize;
 
 use super::{RobotDescription, urdf};
+use crate::robot::go1::Network;
 use crate::robot::{JOINTS, Joints, Leg};
 
 /// The robots that the program carries: name, `robot.toml`, URDF.
@@ -63,6 +64,8 @@ struct RobotToml {
     urdf: String,
     motor: MotorToml,
     pose: PoseToml,
+    maker_limits: Option<MakerLimitsToml>,
+    network: Option<Network>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -70,6 +73,14 @@ struct RobotToml {
 struct MotorToml {
     rotor_inertia_kgm2: f64,
     gear_ratio: [f64; 3],
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct MakerLimitsToml {
+    hip_rad: [f64; 2],
+    thigh_rad: [f64; 2],
+    calf_rad: [f64; 2],
 }
 
 #[derive(Debug, Deserialize)]
@@ -131,6 +142,10 @@ impl RobotDescription {
             return invalid("motor.gear_ratio", format!("{ratio}"), "give rotor turns per joint turn, more than zero");
         }
 
+        if let Some((element, value, remedy)) = robot.network.and_then(|network| network.problem()) {
+            return invalid(element, value, remedy);
+        }
+
         let urdf_text = read_urdf(&robot.urdf)?;
         let parts = urdf::parse(&folder.join(&robot.urdf), &urdf_text)?;
 
@@ -146,8 +161,18 @@ impl RobotDescription {
                 return invalid("pose.lying_rad", problem, "give hip, thigh and calf of a left leg within them");
             }
         }
+        let maker_limits = robot.maker_limits.map(|limits| [limits.hip_rad, limits.thigh_rad, limits.calf_rad]);
+        for (i, [low, high]) in maker_limits.iter().flatten().copied().enumerate() {
+            let (lowest, highest) = (parts.limits.min_position[i], parts.limits.max_position[i]);
+            // Written so that what is not a number is refused.
+            if !(low.max(lowest) < high.min(highest)) {
+                let problem = format!("[{low}, {high}] rad leaves nothing of the URDF's {lowest}..{highest}");
+                return invalid("maker_limits", problem, "give [lowest, highest] of hip, thigh and calf");
+            }
+        }
         Ok(RobotDescription {
             name: robot.name,
+            maker_limits,
             trunk: parts.trunk,
             legs: parts.legs,
             leg_geometry: parts.leg_geometry,
@@ -155,6 +180,7 @@ impl RobotDescription {
             lying_position,
             rotor_inertia,
             imu_origin: parts.imu_origin.unwrap_or_else(Vector3::zeros),
+            network: robot.network,
         })
     }
 }

@@ -3,7 +3,7 @@
 //! A person's hand outranks it: after STOP, a fault, a cancelled countdown, an undone verdict or a wish to sit down it holds
 //! still until a person arms or approves again. It never acknowledges a stop.
 
-use super::{Intent, Supervisor};
+use super::{Intent, Supervisor, Wish};
 use crate::realtime::telemetry::{Cause, Mode};
 use crate::recording::record::{Level, Stage, Verdict};
 use crate::session::approval::Approval;
@@ -69,9 +69,10 @@ impl Supervisor {
         };
         let Some(intent) = step else { return };
         self.unattended.arming = intent == Intent::Arm;
-        match self.obey(&intent, stops) {
+        let wish = Wish { intent, stops, time_ns };
+        match self.obey(&wish) {
             Ok(answer) => {
-                let wish = super::describe(&intent);
+                let wish = super::describe(&wish.intent);
                 self.log(Level::Info, format!("{}: {wish}: {answer}", approval.name()), time_ns);
             }
             Err(reason) => {

@@ -17,6 +17,7 @@ use quadfrog_console::update::{Effect, Msg, update};
 use quadfrog_console::view;
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
+use ratatui::style::Color;
 
 /// A console under test.
 pub struct Console {
@@ -109,6 +110,44 @@ impl Console {
             let line: String = (0..columns).map(|x| buffer[(x, y)].symbol()).collect();
             text.push_str(line.trim_end());
             text.push('\n');
+        }
+        text
+    }
+
+    /// The colours of the screen: a letter for each style that occurs, in the place of each cell that has it, and what
+    /// the letters mean. Cells in the terminal's own style are blank.
+    pub fn colours(&self, columns: u16, rows: u16) -> String {
+        let mut terminal = Terminal::new(TestBackend::new(columns, rows)).expect("a screen in memory");
+        terminal.draw(|frame| view::render(frame, &self.model)).expect("drawn");
+        let buffer = terminal.backend().buffer();
+        let colour = |colour: Color| match colour {
+            Color::Rgb(r, g, b) => format!("{r},{g},{b}"),
+            other => format!("{other:?}").to_lowercase(),
+        };
+        let mut styles: Vec<String> = Vec::new();
+        let mut text = String::new();
+        for y in 0..rows {
+            let letters: String = (0..columns)
+                .map(|x| {
+                    let cell = &buffer[(x, y)];
+                    // A colour that no ink shows is none.
+                    let plain = cell.bg == Color::Reset && cell.modifier.is_empty();
+                    if plain && (cell.fg == Color::Reset || cell.symbol() == " ") {
+                        return ' ';
+                    }
+                    let style = format!("{} on {} {:?}", colour(cell.fg), colour(cell.bg), cell.modifier);
+                    let index = styles.iter().position(|known| *known == style).unwrap_or_else(|| {
+                        styles.push(style);
+                        styles.len() - 1
+                    });
+                    char::from(b'a' + u8::try_from(index).expect("few styles"))
+                })
+                .collect();
+            text.push_str(letters.trim_end());
+            text.push('\n');
+        }
+        for (index, style) in styles.iter().enumerate() {
+            text.push_str(&format!("{}: {}\n", char::from(b'a' + index as u8), style.trim_end_matches(" NONE")));
         }
         text
     }

@@ -105,6 +105,11 @@ impl Session {
         self.output().bytes.windows(bytes.len()).any(|window| window == bytes)
     }
 
+    /// Whether the bytes after the first `from` hold these.
+    pub fn sent_after(&self, from: usize, bytes: &[u8]) -> bool {
+        self.output().bytes[from..].windows(bytes.len()).any(|window| window == bytes)
+    }
+
     /// Whether the terminal is as a shell wants it: the normal screen, a cursor, no special paste.
     pub fn restored(&self) -> bool {
         let output = self.output();

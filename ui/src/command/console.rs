@@ -1,5 +1,6 @@
 //! The console on a running engine.
 
+use std::net::{SocketAddr, ToSocketAddrs};
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
@@ -67,8 +68,23 @@ pub struct ScreenArguments {
     pub low_bandwidth: bool,
 }
 
+/// Which machine is driven.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Machine {
+    /// The built-in simulator
+    Sim,
+    /// A Unitree Go1 over its network, or `quadfrog emulate`
+    Go1,
+}
+
 #[derive(Debug, Args)]
 pub struct ConsoleArguments {
+    /// Which machine is driven
+    #[arg(long, value_name = "WHICH", default_value = "sim")]
+    robot: Machine,
+    /// Where the robot listens, with `--robot go1` [default: that of its robot.toml]
+    #[arg(long, value_name = "HOST:PORT")]
+    address: Option<String>,
     /// What the robot is to learn [default: forward]
     #[arg(long, value_name = "TASK")]
     task: Option<TaskName>,
@@ -92,7 +108,19 @@ pub struct ConsoleArguments {
 
 pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
     let config = arguments.study.load_config(arguments.resume.as_deref())?;
-    let robot = arguments.study.load_robot()?;
+    let mut robot = arguments.study.load_robot()?;
+    let backend = match arguments.robot {
+        Machine::Sim => Backend::Simulator,
+        Machine::Go1 => Backend::Hardware,
+    };
+    match (&arguments.address, &mut robot.network) {
+        (Some(text), _) if backend == Backend::Simulator => {
+            return Err(Failure::input(format!("--address {text}: the simulator has none; add --robot go1")));
+        }
+        (Some(text), Some(network)) => network.address = address(text)?,
+        // A robot without a network is refused by the engine, with or without an address.
+        _ => {}
+    }
     let console = options(&arguments.screen, &config)?.with_robot(robot.clone());
     terminal::check().map_err(Failure::input)?;
     let (task, seed) = (arguments.task.map(Task::from), arguments.seed);
@@ -107,17 +135,13 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
     let folder = chosen.folder.clone();
     let cut_short = left_behind(&folder);
     let handle = Engine::start(Options {
-        config,
-        robot,
-        backend: Backend::Simulator,
-        task: chosen.task,
         seed: chosen.seed,
         trials: arguments.study.trials,
         // Who only looks leaves nothing behind.
         folder: (!arguments.observe).then_some(chosen.folder),
         observe: arguments.observe,
         approve: arguments.approve.into(),
-        join: None,
+        ..Options::new(config, robot, backend, chosen.task)
     })?;
     let recording = handle.recording().map(Path::to_owned);
     if app::run(Feed::live(handle), console)? == Ended::HungUp {
@@ -136,6 +160,15 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
         println!("  an earlier recording was cut short; make it whole:  quadfrog recover {}", part.display());
     }
     Ok(())
+}
+
+/// The address that `HOST:PORT` means.
+fn address(text: &str) -> Result<SocketAddr, Failure> {
+    let no_address = |reason: String| {
+        Failure::input(format!("--address {text}: {reason}; give HOST:PORT, for example 192.168.123.10:8007"))
+    };
+    let mut found = text.to_socket_addrs().map_err(|error| no_address(error.to_string()))?;
+    found.next().ok_or_else(|| no_address("no such host".to_owned()))
 }
 
 /// Recordings that an earlier session of this study could not finish.

@@ -3,6 +3,7 @@
 mod bench;
 mod chosen;
 mod console;
+mod emulate;
 mod optimize;
 mod recover;
 mod replay;
@@ -40,6 +41,8 @@ enum Subcommands {
     Replay(replay::ReplayArguments),
     /// Make a whole file of a recording that was cut short
     Recover(recover::RecoverArguments),
+    /// Serve the simulator as a Go1 on the network, with faults on demand
+    Emulate(emulate::EmulateArguments),
     /// Measure the simulator's speed on this machine
     Bench(bench::BenchArguments),
     /// Look at studies, take them elsewhere, bring trials in, queue a point
@@ -203,6 +206,7 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
         Some(Subcommands::Optimize(optimize)) => optimize::run(&optimize),
         Some(Subcommands::Replay(replay)) => replay::run(&replay),
         Some(Subcommands::Recover(recover)) => recover::run(&recover),
+        Some(Subcommands::Emulate(emulate)) => emulate::run(&emulate),
         Some(Subcommands::Bench(bench)) => bench::run(&bench),
         Some(Subcommands::Study(study)) => study::run(&study),
     }

@@ -194,16 +194,12 @@ fn run_one(
     printer: &Printer,
 ) -> Result<(), Failure> {
     let options = Options {
-        config: config.clone(),
-        robot: robot.clone(),
-        backend: Backend::Simulator,
-        task: study.task,
         seed: study.seed,
         trials: arguments.study.trials.or(study.budget.filter(|_| join.is_some())),
         folder: Some(study.folder.clone()),
-        observe: false,
         approve: Approval::Auto,
         join: join.cloned(),
+        ..Options::new(config.clone(), robot.clone(), Backend::Simulator, study.task)
     };
     let settings = config.settings(robot, study.task, Backend::Simulator)?;
     let simulator = Simulator::new(robot, &config.simulator).map_err(EngineError::from)?;

@@ -12,24 +12,11 @@ use ratatui::layout::Rect;
 use ratatui::style::Style;
 
 use super::cut;
-use crate::history::{History, Sample};
+use crate::history::{History, Sample, at_trial_time};
+use crate::model::time_after;
+use crate::series::Signal;
 use crate::settings::ChartMode;
 use crate::theme::{Glyphs, Role, Theme};
-
-/// What a chart shows.
-#[derive(Clone, Copy)]
-pub struct Signal {
-    /// Its name.
-    pub name: &'static str,
-    /// Its unit.
-    pub unit: &'static str,
-    /// Its value in a sample.
-    pub value: fn(&Sample) -> f32,
-    /// Ranges to choose from, narrowest first: the first one that holds the window's values is drawn.
-    pub ranges: &'static [(f32, f32)],
-    /// Its colour.
-    pub role: Role,
-}
 
 /// How time is laid out, the same for all charts of a view.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -146,6 +133,19 @@ impl Dots {
     }
 }
 
+/// A trial laid under the charts.
+#[derive(Clone, Copy)]
+pub struct Ghost<'a> {
+    /// Its samples.
+    pub trace: &'a [Sample],
+    /// Where its impulse begins on the charts' axis, ns.
+    pub start_ns: u64,
+    /// How its line is drawn.
+    pub role: Role,
+    /// Whether its value stands beside the other in the heading.
+    pub named: bool,
+}
+
 /// A chart with its heading line; below two rows nothing is drawn.
 pub struct Chart<'a> {
     /// What it shows.
@@ -154,8 +154,10 @@ pub struct Chart<'a> {
     pub axis: TimeAxis,
     /// Where the samples come from.
     pub history: &'a History,
-    /// A trial to lay under the samples of the trial that runs.
-    pub ghost: Option<&'a [Sample]>,
+    /// The phase of each column, as [`phases`] finds them.
+    pub phases: &'a [Option<Phase>],
+    /// A trial to lay under the samples.
+    pub ghost: Option<Ghost<'a>>,
     /// The time that the heading's value is read at; the newest without it.
     pub cursor_ns: Option<u64>,
     /// Whether the sweep's cursor is drawn as a line.
@@ -186,12 +188,16 @@ impl Chart<'_> {
         self.draw_cursor(buffer, plot);
     }
 
+    /// The first of the signal's ranges that holds what is drawn.
     fn range(&self) -> (f32, f32) {
-        let values = || self.history.window(self.axis.window_ns).map(|sample| (self.signal.value)(sample));
-        let fits =
-            |&&(low, high): &&(f32, f32)| values().all(|value| !value.is_finite() || (low..=high).contains(&value));
-        let widest = self.signal.ranges.last().copied().unwrap_or((-1.0, 1.0));
-        self.signal.ranges.iter().find(fits).copied().unwrap_or(widest)
+        let ghost = self.ghost.iter().flat_map(|ghost| ghost.trace);
+        let values = self.history.window(self.axis.window_ns).chain(ghost).map(|sample| (self.signal.value)(sample));
+        let (low, high) = values
+            .filter(|value| value.is_finite())
+            .fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
+        let ranges = self.signal.ranges;
+        let widest = ranges.last().copied().unwrap_or((-1.0, 1.0));
+        ranges.iter().find(|range| low >= range.0 && high <= range.1).copied().unwrap_or(widest)
     }
 
     /// A dotted line at zero where zero is the middle; it stays below the curve.
@@ -204,30 +210,53 @@ impl Chart<'_> {
         }
     }
 
+    /// Name, contact lamp, value and, where there is room, the range.
     fn draw_heading(&self, buffer: &mut Buffer, area: Rect, (low, high): (f32, f32)) {
+        let theme = &self.theme;
         let sample = match self.cursor_ns {
             Some(time_ns) => self.history.at(time_ns),
             None => self.history.samples().next_back(),
         };
-        let value = sample.map_or("-".to_owned(), |sample| {
-            let value = (self.signal.value)(sample);
-            // -0.000 would flicker with +0.000.
-            let value = if value.abs() < 0.0005 { 0.0 } else { value };
-            if value.abs() >= 100.0 { format!("{value:+.0}") } else { format!("{value:+.3}") }
+        let lamp = match (self.signal.foot, sample) {
+            (Some(leg), Some(sample)) => theme.lamp(sample.contact[leg as usize]),
+            (Some(_), None) => " ",
+            (None, _) => "",
+        };
+        let value = sample.map_or("-".to_owned(), |sample| self.number(sample));
+        let ghost = self.ghost.filter(|ghost| ghost.named).zip(self.cursor_ns).map(|(ghost, time_ns)| {
+            let time_s = (time_ns as f64 - ghost.start_ns as f64) / 1e9;
+            let sample = at_trial_time(ghost.trace, time_s as f32);
+            (sample.map_or("-".to_owned(), |sample| self.number(sample)), ghost.role)
         });
-        let range =
-            if low == -high { format!("{}{high}", self.theme.plus_minus()) } else { format!("{low} to {high}") };
-        let name = format!("{} ", self.signal.name);
+        let unit = self.signal.unit;
+        let mut pieces = vec![(format!("{}{lamp} ", self.signal.name), self.signal.role)];
+        match ghost {
+            Some((other, role)) => {
+                pieces.push((format!("A {value} "), Role::Text));
+                pieces.push((format!("B {other} {unit}"), role));
+            }
+            None => pieces.push((format!("{value} {unit}"), Role::Text)),
+        }
         let width = usize::from(area.width);
-        buffer.set_string(area.x, area.y, cut(&name, width), self.theme.style(self.signal.role));
-        let at = area.x + name.chars().count() as u16;
-        let value = format!("{value} {}", self.signal.unit);
-        buffer.set_string(at, area.y, &value, self.theme.style(Role::Text));
-        let used = name.chars().count() + value.chars().count();
+        let mut used = 0;
+        for (text, role) in pieces {
+            let text = cut(&text, width - used);
+            buffer.set_string(area.x + used as u16, area.y, &text, theme.style(role));
+            used += text.chars().count();
+        }
+        let range = if low == -high { format!("{}{high}", theme.plus_minus()) } else { format!("{low} to {high}") };
         let range_width = range.chars().count();
         if used + range_width + 2 <= width {
-            buffer.set_string(area.right() - range_width as u16, area.y, range, self.theme.style(Role::Quiet));
+            buffer.set_string(area.right() - range_width as u16, area.y, range, theme.style(Role::Quiet));
         }
+    }
+
+    /// The signal's value with as many digits as are worth reading.
+    fn number(&self, sample: &Sample) -> String {
+        let value = (self.signal.value)(sample);
+        // -0.000 would flicker with +0.000.
+        let value = if value.abs() < 0.0005 { 0.0 } else { value };
+        if value.abs() >= 100.0 { format!("{value:+.0}") } else { format!("{value:+.3}") }
     }
 
     /// Sets the dots of a line through the points, as far as the axis shows them.
@@ -252,22 +281,20 @@ impl Chart<'_> {
         }
     }
 
-    /// The ghost's samples at the time that they would have if its impulse had begun with the drawn trial's.
-    fn draw_ghost(&self, buffer: &mut Buffer, plot: Rect, ghost: &[Sample], range: (f32, f32)) {
-        let Some(trial) = self.history.samples().rev().find(|sample| sample.trial.is_some()) else { return };
-        let start_ns = trial.time_ns as f64 - f64::from(trial.trial_time_s) * 1e9;
+    /// The ghost's samples at the time that they would have if its impulse had begun where the axis says.
+    fn draw_ghost(&self, buffer: &mut Buffer, plot: Rect, ghost: Ghost, range: (f32, f32)) {
         let mut dots = Dots::new(plot, self.theme.glyphs);
-        let points = ghost.iter().map(|sample| {
-            let time_ns = start_ns + f64::from(sample.trial_time_s) * 1e9;
-            (time_ns.max(0.0) as u64, (self.signal.value)(sample))
-        });
+        let points = ghost
+            .trace
+            .iter()
+            .map(|sample| (time_after(ghost.start_ns, sample.trial_time_s), (self.signal.value)(sample)));
         self.trace(&mut dots, points, range);
-        dots.draw(buffer, plot, self.theme.style(Role::Ghost));
+        dots.draw(buffer, plot, self.theme.style(ghost.role));
     }
 
     /// Colours the columns of a jump's phases; [`draw_phases`] says the same in letters.
     fn shade(&self, buffer: &mut Buffer, plot: Rect) {
-        for (column, phase) in phases(&self.axis, self.history, plot.width).into_iter().enumerate() {
+        for (column, phase) in self.phases.iter().enumerate().take(usize::from(plot.width)) {
             let role = match phase {
                 Some(Phase::Impulse) => Role::ShadeImpulse,
                 Some(Phase::Flight) => Role::ShadeFlight,
@@ -295,7 +322,7 @@ impl Chart<'_> {
 }
 
 /// The phase that is drawn in each column; the one of a jump wins over stance.
-fn phases(axis: &TimeAxis, history: &History, width: u16) -> Vec<Option<Phase>> {
+pub fn phases(axis: &TimeAxis, history: &History, width: u16) -> Vec<Option<Phase>> {
     let mut phases = vec![None; usize::from(width)];
     for sample in history.window(axis.window_ns) {
         if let Some(column) = axis.column(sample.time_ns, usize::from(width)) {
@@ -309,8 +336,8 @@ fn phases(axis: &TimeAxis, history: &History, width: u16) -> Vec<Option<Phase>> 
 }
 
 /// A line of letters under charts: `i` impulse, `f` flight, `l` landing.
-pub fn draw_phases(buffer: &mut Buffer, area: Rect, axis: &TimeAxis, history: &History, theme: &Theme) {
-    for (column, phase) in phases(axis, history, area.width).into_iter().enumerate() {
+pub fn draw_phases(buffer: &mut Buffer, area: Rect, phases: &[Option<Phase>], theme: &Theme) {
+    for (column, phase) in phases.iter().enumerate().take(usize::from(area.width)) {
         let letter = match phase {
             Some(Phase::Impulse) => "i",
             Some(Phase::Flight) => "f",

@@ -9,6 +9,7 @@
 //!          └─────────────────────────────────────────────────┘
 //! ```
 
+use quadfrog::session::intent::OperatorCheck;
 use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::symbols::border;
@@ -16,9 +17,9 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::{Block, Clear, Paragraph, Wrap};
 use tui_input::Input;
 
-use super::{cut, help, number, proposal, span, trials};
+use super::{cut, help, number, pre_arm, proposal, span, trial_text};
 use crate::action::Action;
-use crate::dialog::{APPROVAL_PAUSE, Dialog, OverrideForm, Purpose, palette_rows};
+use crate::dialog::{APPROVAL_PAUSE, Choice, Dialog, OverrideForm, Purpose, arming_word, palette_rows};
 use crate::model::Model;
 use crate::theme::{Glyphs, Role, Theme};
 
@@ -30,26 +31,32 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
             let waited = model.clock.saturating_sub(*pressed_at) >= APPROVAL_PAUSE;
             popup(frame, area, model, "Jump?", 60, approve(model, *trial, waited));
         }
-        Dialog::Arm => {
-            let lines = vec![
-                Line::from("The robot will stand up. Is nobody near it?"),
-                Line::default(),
-                choice(model, "y", "stand up"),
-            ];
-            popup(frame, area, model, "Arm?", 52, lines);
+        Dialog::Arm { typed } => popup(frame, area, model, "Arm?", 60, arm(model, *typed)),
+        Dialog::PreArm { selected } => {
+            let chosen = OperatorCheck::ALL.get(*selected).copied();
+            let lines = pre_arm::lines(model, 74, usize::from(area.height.saturating_sub(2)), chosen);
+            popup(frame, area, model, &format!("Pre-arm list: {}", pre_arm::summary(model)), 78, lines);
         }
         Dialog::Quit => popup(frame, area, model, "Quit?", 58, quit(model)),
         Dialog::Override(form) => {
-            popup(frame, area, model, &format!("Override trial #{}", form.trial), 72, overrides(model, form))
+            popup(frame, area, model, &format!("Override trial #{}", form.trial), 78, overrides(model, form))
         }
         Dialog::Field { purpose, input, problem } => {
-            popup(frame, area, model, &field_title(*purpose), 64, field(model, *purpose, input, problem.as_deref()));
+            popup(
+                frame,
+                area,
+                model,
+                &field_title(model, *purpose),
+                64,
+                field(model, *purpose, input, problem.as_deref()),
+            );
         }
         Dialog::Palette { input, selected } => render_palette(frame, area, model, input, *selected),
+        Dialog::Choose { what, selected } => render_choice(frame, area, model, *what, *selected),
         Dialog::Help { scroll } => render_help(frame, area, model, *scroll),
         Dialog::Details { trial } => {
             if let Some(record) = model.trials.get(trial) {
-                let rows = trials::details(model, record);
+                let rows = trial_text::details(model, record);
                 let line = |(name, value): (String, String)| {
                     Line::from(vec![span(&model.theme, Role::Quiet, format!("{name:<15}")), Span::raw(value)])
                 };
@@ -104,6 +111,25 @@ fn choice(model: &Model, key: &str, text: &str) -> Line<'static> {
     ])
 }
 
+fn arm(model: &Model, typed: usize) -> Vec<Line<'static>> {
+    let theme = &model.theme;
+    let word = arming_word(model);
+    let mut lines = vec![Line::from("The robot will stand up. Is nobody near it?"), Line::default()];
+    if word.len() == 1 {
+        lines.push(choice(model, word, "stand up"));
+    } else {
+        let (done, left) = word.split_at(typed.min(word.len()));
+        lines.push(Line::from(vec![
+            span(theme, Role::Selected, " Cancel "),
+            span(theme, Role::Quiet, " Enter, or any other key     type "),
+            span(theme, Role::Good, done),
+            span(theme, Role::Key, left),
+            span(theme, Role::Text, " to arm"),
+        ]));
+    }
+    lines
+}
+
 fn approve(model: &Model, trial: u32, waited: bool) -> Vec<Line<'static>> {
     let theme = &model.theme;
     let key = model.keymap.key(Action::Approve);
@@ -113,7 +139,7 @@ fn approve(model: &Model, trial: u32, waited: bool) -> Vec<Line<'static>> {
             .parameters
             .iter()
             .map(|p| {
-                let unit = model.parameter(&p.name).map_or("", |info| info.unit.as_str());
+                let unit = model.parameter(&p.name).map_or(String::new(), |info| info.unit);
                 format!("{} {} {unit}", p.name, number(p.value))
             })
             .collect();
@@ -146,10 +172,13 @@ fn overrides(model: &Model, form: &OverrideForm) -> Vec<Line<'static>> {
     let theme = &model.theme;
     let mut lines = Vec::new();
     for (index, row) in form.rows.iter().enumerate() {
+        if row.gain && !form.rows[index.saturating_sub(1)].gain {
+            lines.push(Line::from(span(theme, Role::Quiet, "  gains of the controller, for this trial alone")));
+        }
         let selected = index == form.selected;
         let mark = if selected { ">" } else { " " };
         let mut spans =
-            vec![span(theme, if selected { Role::Key } else { Role::Text }, format!("{mark} {:<4}", row.name))];
+            vec![span(theme, if selected { Role::Key } else { Role::Text }, format!("{mark} {:<8}", row.name))];
         match &form.typing {
             Some(input) if selected => {
                 // As wide as the number it replaces, so that the line does not jump.
@@ -158,9 +187,9 @@ fn overrides(model: &Model, form: &OverrideForm) -> Vec<Line<'static>> {
             }
             _ => spans.push(Span::raw(format!("{:>8}", number(row.value)))),
         }
-        spans.push(span(theme, Role::Quiet, format!(" {:<3}", row.unit)));
+        spans.push(span(theme, Role::Quiet, format!(" {:<9}", row.unit)));
         spans.push(span(theme, Role::Quiet, format!(" {:>6} ", number(row.low))));
-        spans.push(span(theme, Role::Quiet, proposal::place(theme, row.value, row.low, row.high, 20)));
+        spans.push(span(theme, Role::Quiet, proposal::place(theme, row.value, row.low, row.high, 14)));
         spans.push(span(theme, Role::Quiet, format!(" {:<6}", number(row.high))));
         if row.value != row.before {
             spans.push(span(theme, Role::Warning, format!(" was {}", number(row.before))));
@@ -191,11 +220,20 @@ fn edited(theme: &Theme, input: &Input) -> Vec<Span<'static>> {
     ]
 }
 
-fn field_title(purpose: Purpose) -> String {
+fn field_title(model: &Model, purpose: Purpose) -> String {
     match purpose {
         Purpose::Note(trial) => format!("Note on trial #{trial}"),
         Purpose::HandValue(trial) => format!("Trial #{trial}, measured by hand"),
         Purpose::Continue => "How many more trials?".to_owned(),
+        Purpose::Fix { parameter, value } => {
+            let info = model.session.parameters.get(parameter);
+            let (name, unit) = info.map_or(("", ""), |info| (&info.name, &info.unit));
+            format!("Fix {name} at {} {unit} for how many trials?", number(value))
+        }
+        Purpose::Bounds { parameter } => {
+            format!("Search {} from .. to", model.session.parameters.get(parameter).map_or("", |info| &info.name))
+        }
+        Purpose::ConfirmBest => "How many repeats at most, to confirm the best?".to_owned(),
         Purpose::TrialNumber => "Go to trial".to_owned(),
         Purpose::LogSearch => "Search the log".to_owned(),
     }
@@ -212,6 +250,18 @@ fn field(model: &Model, purpose: Purpose, input: &Input, problem: Option<&str>) 
         (None, Purpose::HandValue(_)) => {
             span(theme, Role::Quiet, "replaces the measured value; empty: back to the measured one")
         }
+        (None, Purpose::Bounds { parameter }) => {
+            let info = model.session.parameters.get(parameter);
+            let searched = info.and_then(|info| model.searched(&info.name));
+            let allowed = searched.map_or(String::new(), |p| format!("; safety.toml allows {} to {}", p.least, p.most));
+            span(theme, Role::Quiet, format!("write it as 50..120{allowed}; past trials stay"))
+        }
+        (None, Purpose::Fix { .. }) => span(theme, Role::Quiet, "the others are still proposed by the sampler"),
+        (None, Purpose::ConfirmBest) => span(
+            theme,
+            Role::Quiet,
+            "the best points run again until one leads; each repeat is approved like any other",
+        ),
         (None, Purpose::LogSearch) => span(theme, Role::Quiet, "empty: all lines"),
         (None, Purpose::Note(_)) if model.robot_needs_us() => {
             span(theme, Role::Quiet, "the robot is armed: Space is STOP, _ writes a space")
@@ -241,6 +291,32 @@ fn render_palette(frame: &mut Frame, area: Rect, model: &Model, input: &Input, s
         let text = cut(&format!("{key:<9} {name:<16}{text}"), usize::from(inner.width));
         let style = if index == selected { theme.style(Role::Selected) } else { theme.style(role) };
         frame.render_widget(Line::from(Span::styled(text, style)), area);
+    }
+}
+
+fn render_choice(frame: &mut Frame, area: Rect, model: &Model, what: Choice, selected: usize) {
+    let theme = &model.theme;
+    let title = match what {
+        Choice::Series => "Series of the charts",
+        Choice::Columns => "Columns of the trial table",
+    };
+    let rows = what.rows(model);
+    let inner = open_box(frame, area, theme, title, 66, rows.len() as u16 + 2);
+    // A terminal that is too low shows the lines around the chosen one.
+    let first = (selected + 1).saturating_sub(usize::from(inner.height));
+    for (line, (index, (name, help, on))) in rows.iter().enumerate().skip(first).enumerate() {
+        if line >= usize::from(inner.height) {
+            break;
+        }
+        let area = Rect { y: inner.y + line as u16, height: 1, ..inner };
+        let mark = if *on { "[x]" } else { "[ ]" };
+        let text = cut(&format!("{mark} {name:<11} {help}"), usize::from(inner.width));
+        let role = match (index == selected, on) {
+            (true, _) => Role::Selected,
+            (false, true) => Role::Text,
+            (false, false) => Role::Quiet,
+        };
+        frame.render_widget(Line::from(span(theme, role, text)), area);
     }
 }
 

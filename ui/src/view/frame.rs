@@ -7,12 +7,13 @@
 
 use quadfrog::realtime::telemetry::Mode;
 use quadfrog::recording::record::Level;
+use quadfrog::robot::joint_name;
 use ratatui::Frame;
 use ratatui::layout::{Alignment, Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
 
-use super::{MIN_COLUMNS, MIN_ROWS, clock, cut, number, span};
+use super::{MIN_COLUMNS, MIN_ROWS, clock, clock_ms, cut, health, number, span};
 use crate::action::Action;
 use crate::model::{Model, View};
 use crate::theme::Role;
@@ -26,9 +27,9 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let recording = Line::from(recording(model));
     let width = recording.width() as u16;
     let [left, right] = Layout::horizontal([Constraint::Fill(1), Constraint::Length(width)]).spacing(1).areas(first);
-    frame.render_widget(Line::from(identity(model)), left);
+    frame.render_widget(Line::from(identity(model, area.width)), left);
     frame.render_widget(recording, right);
-    frame.render_widget(Line::from(condition(model)), second);
+    frame.render_widget(Line::from(condition(model, area.width)), second);
 }
 
 fn rows(area: Rect) -> [Rect; 2] {
@@ -58,20 +59,29 @@ fn backend(model: &Model) -> Span<'static> {
     }
 }
 
-fn identity(model: &Model) -> Vec<Span<'static>> {
+fn identity(model: &Model, width: u16) -> Vec<Span<'static>> {
     let theme = &model.theme;
     let mut spans = vec![mode_span(model), Span::raw(" "), backend(model), Span::raw("  ")];
     let session = &model.session;
     if session.observe {
         spans.push(span(theme, Role::Warning, "OBSERVING  "));
     }
+    if !matches!(session.approve.as_str(), "" | "each") && model.replay.is_none() {
+        spans.push(span(theme, Role::Warning, format!("APPROVE {}  ", session.approve.to_uppercase())));
+    }
     spans.push(Span::raw(session.task.clone()));
+    // A narrow terminal has room for the best value only if the words are left out.
+    let narrow = width < 100;
     if let Some(info) = model.stage {
-        let finished = model.counted();
-        spans.push(Span::raw(format!("   trial #{}   {finished} of {} judged", info.trial, session.budget)));
+        let (finished, budget) = (model.counted(), model.budget());
+        let text = match narrow {
+            true => format!("  trial #{}  {finished}/{budget}", info.trial),
+            false => format!("   trial #{}   {finished} of {budget} judged", info.trial),
+        };
+        spans.push(Span::raw(text));
     }
     if let Some((best, value)) = model.best().and_then(|best| Some((best, best.value?))) {
-        spans.push(Span::raw("   best "));
+        spans.push(Span::raw(if narrow { "  best " } else { "   best " }));
         spans.push(span(theme, Role::Good, format!("{} {}", number(value), session.unit)));
         spans.push(span(theme, Role::Quiet, format!(" (#{})", best.trial)));
     }
@@ -81,8 +91,11 @@ fn identity(model: &Model) -> Vec<Span<'static>> {
 fn recording(model: &Model) -> Vec<Span<'static>> {
     let theme = &model.theme;
     if let Some(replay) = &model.replay {
-        let state = if replay.playing { format!("x{}", replay.speed) } else { "paused".to_owned() };
-        let text = format!("{} / {}  {state} ", clock(replay.time_ns), clock(replay.duration_ns));
+        // Steps are milliseconds; while it plays they would only flicker.
+        let at = if replay.playing { clock(replay.time_ns) } else { clock_ms(replay.time_ns) };
+        let speed = if replay.playing || replay.speed != 1.0 { format!(" x{}", replay.speed) } else { String::new() };
+        let paused = if replay.playing { "" } else { " paused" };
+        let text = format!("{at} / {}{paused}{speed} ", clock(replay.duration_ns));
         return vec![span(theme, Role::Text, text)];
     }
     let counters = &model.snapshot.counters;
@@ -96,47 +109,65 @@ fn recording(model: &Model) -> Vec<Span<'static>> {
     }
 }
 
-fn condition(model: &Model) -> Vec<Span<'static>> {
+fn condition(model: &Model, width: u16) -> Vec<Span<'static>> {
     let theme = &model.theme;
+    let narrow = width < 100;
     let mut spans = vec![
         Span::raw(" "),
         span(theme, Role::Alarm, " STOP "),
         Span::raw(" "),
         span(theme, Role::Key, model.keymap.all_keys(Action::Stop)),
-        Span::raw("   "),
     ];
+    let gap = if narrow { "  " } else { "   " };
+    let mut part = |name: &str, role, value: String| {
+        spans.push(span(theme, Role::Quiet, format!("{gap}{name}")));
+        spans.push(span(theme, role, value));
+    };
     let snapshot = &model.snapshot;
     let counters = &snapshot.counters;
-    let late = format!("{} late, worst {:.1} ms", counters.late_ticks, counters.worst_lateness_ns as f64 / 1e6);
     let late_share = counters.late_ticks as f64 / snapshot.tick.number.max(1) as f64;
-    spans.push(span(theme, Role::Quiet, "loop "));
-    spans.push(span(theme, if late_share > 0.001 { Role::Warning } else { Role::Text }, late));
-    if model.session.backend != "sim" && model.replay.is_none() && !model.session.backend.is_empty() {
-        let age = counters.state_age_ms;
-        spans.push(span(theme, Role::Quiet, "   link "));
-        spans.push(span(theme, if age > 5 { Role::Bad } else { Role::Text }, format!("{age} ms")));
+    let late = match narrow {
+        true => format!("{} late", counters.late_ticks),
+        false => format!("{} late, worst {:.1} ms", counters.late_ticks, counters.worst_lateness_ns as f64 / 1e6),
+    };
+    part("loop ", look(late_share > 0.001), late);
+    match (counters.link, model.session.backend.as_str()) {
+        (_, "") => {}
+        (None, "sim") => part("link ", Role::Quiet, "none: SIM".to_owned()),
+        (None, _) => part("link ", bad(counters.state_age_ms > 5), format!("{} ms", counters.state_age_ms)),
+        (Some(link), _) => {
+            let loss = health::loss_percent(&link);
+            let role = bad(link.state_age_ms > 5 || loss >= 1.0 || link.rate_hz == 0);
+            part("link ", role, format!("{} ms, {loss:.1} % lost", link.state_age_ms));
+        }
     }
-    let hottest = snapshot.tick.state.motor_temperature_c.iter().copied().fold(0.0, f64::max);
-    if hottest > 0.0 {
-        let role = if hottest >= 60.0 { Role::Bad } else { Role::Text };
-        spans.push(span(theme, Role::Quiet, "   motors "));
-        spans.push(span(theme, role, format!("{hottest:.0} C")));
+    let temperatures = snapshot.tick.state.motor_temperature_c;
+    let hottest = temperatures.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1));
+    if let Some((joint, hottest)) = hottest.filter(|(_, hottest)| *hottest > 0.0) {
+        let joint = if narrow { String::new() } else { format!(" {}", joint_name(joint)) };
+        part(if narrow { "motor " } else { "hottest " }, bad(hottest >= 60.0), format!("{hottest:.0} C{joint}"));
     }
     if let Some(battery) = snapshot.tick.state.battery {
-        let role = if battery.charge_percent < 30.0 { Role::Bad } else { Role::Text };
-        spans.push(span(theme, Role::Quiet, "   battery "));
-        spans.push(span(theme, role, format!("{:.0} %", battery.charge_percent)));
+        let charge = battery.charge_percent;
+        part(if narrow { "bat " } else { "battery " }, bad(charge < 30.0), format!("{charge:.0} %"));
     }
     let age_ms = model.clock.saturating_sub(model.snapshot_at).as_millis();
     if age_ms > STALE_MS && model.replay.is_none() {
-        spans.push(span(theme, Role::Bad, format!("   OLD: nothing new for {:.1} s", age_ms as f64 / 1e3)));
+        part("", Role::Bad, format!("OLD: nothing new for {:.1} s", age_ms as f64 / 1e3));
     }
     spans
 }
 
-/// The tabs, and at the right what the charts do.
-pub fn render_tabs(frame: &mut Frame, area: Rect, model: &Model) {
-    let theme = &model.theme;
+fn look(worth_it: bool) -> Role {
+    if worth_it { Role::Warning } else { Role::Text }
+}
+
+fn bad(it_is: bool) -> Role {
+    if it_is { Role::Bad } else { Role::Text }
+}
+
+/// The tabs with their actions.
+fn tabs(model: &Model) -> impl Iterator<Item = (View, Action, String)> + '_ {
     let actions = [
         Action::LiveView,
         Action::TrialsView,
@@ -145,20 +176,44 @@ pub fn render_tabs(frame: &mut Frame, area: Rect, model: &Model) {
         Action::HealthView,
         Action::LogView,
     ];
-    let mut spans = Vec::new();
-    for (view, action) in View::ALL.into_iter().zip(actions) {
-        let text = format!(" {} {} ", model.keymap.key(action), view.name());
-        let role = if view == model.view { Role::Selected } else { Role::Quiet };
-        spans.push(span(theme, role, text));
-    }
+    View::ALL
+        .into_iter()
+        .zip(actions)
+        .map(|(view, action)| (view, action, format!(" {} {} ", model.keymap.key(action), view.name())))
+}
+
+/// The action of the tab in a column of the terminal.
+pub fn tab_at(model: &Model, column: u16) -> Option<Action> {
+    let mut end = 0;
+    tabs(model).find_map(|(_, action, text)| {
+        end += text.chars().count();
+        (usize::from(column) < end).then_some(action)
+    })
+}
+
+/// The tabs, and at the right where help is; while the charts are frozen, that they are, in every view.
+pub fn render_tabs(frame: &mut Frame, area: Rect, model: &Model) {
+    let theme = &model.theme;
+    let spans: Vec<Span> = tabs(model)
+        .map(|(view, _, text)| span(theme, if view == model.view { Role::Selected } else { Role::Quiet }, text))
+        .collect();
     frame.render_widget(Line::from(spans), area);
-    let help = vec![
-        span(theme, Role::Key, model.keymap.key(Action::Help)),
-        span(theme, Role::Quiet, " help  "),
-        span(theme, Role::Key, model.keymap.key(Action::Palette)),
-        span(theme, Role::Quiet, " actions "),
-    ];
-    frame.render_widget(Line::from(help).alignment(Alignment::Right), area);
+    let aside = match &model.live.frozen {
+        Some((_, at)) => {
+            let ago_s = model.clock.saturating_sub(*at).as_secs_f64();
+            vec![
+                span(theme, Role::Hardware, format!(" VIEW FROZEN -{ago_s:.1} s ")),
+                span(theme, Role::Key, format!(" {}", model.keymap.key(Action::Freeze))),
+            ]
+        }
+        None => vec![
+            span(theme, Role::Key, model.keymap.key(Action::Help)),
+            span(theme, Role::Quiet, " help  "),
+            span(theme, Role::Key, model.keymap.key(Action::Palette)),
+            span(theme, Role::Quiet, " actions "),
+        ],
+    };
+    frame.render_widget(Line::from(aside).alignment(Alignment::Right), area);
 }
 
 /// The newest answer to the operator.
@@ -177,10 +232,10 @@ pub fn render_message(frame: &mut Frame, area: Rect, model: &Model) {
 pub fn render_small(frame: &mut Frame, area: Rect, model: &Model) {
     let theme = &model.theme;
     let keys = model.keymap.all_keys(Action::Stop);
-    let link = if model.session.backend == "sim" {
-        Span::raw("")
-    } else {
-        Span::raw(format!("link {} ms", model.snapshot.counters.state_age_ms))
+    let link = match (model.snapshot.counters.link, model.is_hardware()) {
+        (Some(link), _) => format!("link {} ms, {:.1} % lost", link.state_age_ms, health::loss_percent(&link)),
+        (None, true) => format!("link {} ms", model.snapshot.counters.state_age_ms),
+        (None, false) => "link none: SIM".to_owned(),
     };
     let lines = vec![
         Line::from(vec![mode_span(model), Span::raw(" "), backend(model)]),

@@ -6,13 +6,17 @@
 //!   wakes late p50 61 us, p99 94 us ...
 //! ```
 
-use quadfrog::robot::{JOINTS, joint_name};
+use quadfrog::realtime::pre_arm::Check;
+use quadfrog::realtime::telemetry::StageTimes;
+use quadfrog::recording::recorder::RecorderStatus;
+use quadfrog::robot::{JOINTS, LinkStatus, joint_name};
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
 
-use super::{heading, span};
+use super::{heading, pre_arm, span};
+use crate::action::Action;
 use crate::history::Sample;
 use crate::model::Model;
 use crate::theme::Role;
@@ -22,21 +26,27 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let [left, right] = Layout::horizontal([Constraint::Fill(1); 2]).spacing(2).areas(area);
     // The histogram needs rows that 80x24 does not have.
     let lateness_rows_shown = if area.height >= 30 { 9 } else { 0 };
+    let timing_rows = timing_rows(model);
     let [timing, lateness, recording, robot] = Layout::vertical([
-        Constraint::Length(7),
+        Constraint::Length(timing_rows.len() as u16 + 1),
         Constraint::Length(lateness_rows_shown),
-        Constraint::Length(6),
+        Constraint::Length(8),
         Constraint::Fill(1),
     ])
     .areas(left);
-    panel(frame, timing, model, "Loop", timing_rows(model));
+    panel(frame, timing, model, "Loop", timing_rows);
     if lateness_rows_shown > 0 {
         let rows = lateness_rows(model, usize::from(lateness.width));
         panel(frame, lateness, model, "How late ticks wake, last minute", rows);
     }
     panel(frame, recording, model, "Recorder and screen", recorder_rows(model));
-    panel(frame, robot, model, "Robot", robot_rows(model));
-    panel(frame, right, model, "Motors", motor_rows(model));
+    panel(frame, robot, model, "Link and battery", robot_rows(model));
+    let [motors, checks] = Layout::vertical([Constraint::Length(JOINTS as u16 + 1), Constraint::Fill(1)]).areas(right);
+    panel(frame, motors, model, "Motors", motor_rows(model));
+    let aside = format!("{} ({})", pre_arm::summary(model), model.keymap.key(Action::PreArm));
+    let body = heading(frame, checks, &model.theme, "Pre-arm list", &aside);
+    let lines = pre_arm::lines(model, usize::from(body.width), usize::from(body.height), None);
+    frame.render_widget(Paragraph::new(lines), body);
 }
 
 /// Width of the names at the left of a panel.
@@ -87,10 +97,21 @@ fn timing_rows(model: &Model) -> Vec<Row> {
         row("ticks", tick.number.to_string(), false),
         row("late ticks", format!("{} ({:.3} %)", counters.late_ticks, share * 100.0), share > 0.001),
         row("worst", format!("{worst_ms:.2} ms late"), worst_ms > 10.0),
-        row("last minute:", String::new(), false),
-        row("  wakes late", micro(&late), percentile(&late, 0.99) > 5e5),
-        row("  tick takes", micro(&busy), percentile(&busy, 0.99) > 5e5),
+        row("wakes late", micro(&late), percentile(&late, 0.99) > 5e5),
+        row("tick takes", micro(&busy), percentile(&busy, 0.99) > 5e5),
+        row("the last one", stages(&tick.stages), false),
     ]
+}
+
+/// The stages of a tick, each on its own.
+fn stages(stages: &StageTimes) -> String {
+    let micro = |ns: u32| f64::from(ns) / 1e3;
+    format!(
+        "{:.0} read {:.0} decide {:.0} write us",
+        micro(stages.read_ns),
+        micro(stages.decide_ns),
+        micro(stages.write_ns)
+    )
 }
 
 /// How late the ticks of the last minute woke, as bars.
@@ -122,6 +143,12 @@ fn recorder_rows(model: &Model) -> Vec<Row> {
     vec![
         row("recording", name(&model.session.recording), model.session.recording.is_empty() && model.replay.is_none()),
         row("study", name(&model.session.study), false),
+        match &model.recorder {
+            Some(RecorderStatus { error: Some(error), .. }) => row("writing", error.clone(), true),
+            Some(status) => row("written", written(status, model.snapshot.tick.time_ns), false),
+            None => row("written", "-".to_owned(), false),
+        },
+        disk_row(model),
         row("not recorded", format!("{} ticks", counters.ticks_not_recorded), counters.ticks_not_recorded > 0),
         row("not shown", format!("{} ticks", counters.ticks_not_shown), false),
         row("refused", format!("{} commands", counters.commands_refused), false),
@@ -130,14 +157,16 @@ fn recorder_rows(model: &Model) -> Vec<Row> {
 
 fn robot_rows(model: &Model) -> Vec<Row> {
     let tick = &model.snapshot.tick;
-    let mut rows = vec![
-        row(
-            "state age",
-            format!("{} ms", model.snapshot.counters.state_age_ms),
-            model.snapshot.counters.state_age_ms > 5,
-        ),
-        row("robot clock", format!("{:.1} s", f64::from(tick.state.robot_time_ms) / 1e3), false),
-    ];
+    let counters = &model.snapshot.counters;
+    let mut rows = Vec::new();
+    match counters.link {
+        Some(link) => rows.extend(link_rows(&link)),
+        None if model.is_hardware() => {
+            rows.push(row("state age", format!("{} ms", counters.state_age_ms), counters.state_age_ms > 5));
+        }
+        None => rows.push(row("link", "SIM: no link".to_owned(), false)),
+    }
+    rows.push(row("robot clock", format!("{:.1} s", f64::from(tick.state.robot_time_ms) / 1e3), false));
     match tick.state.battery {
         Some(battery) => {
             let cells: Vec<f64> = battery.cell_v.into_iter().filter(|v| *v > 0.0).collect();
@@ -152,6 +181,44 @@ fn robot_rows(model: &Model) -> Vec<Row> {
         None => rows.push(row("battery", "none".to_owned(), false)),
     }
     rows
+}
+
+/// How much is on the disk, and how fast it grew.
+fn written(status: &RecorderStatus, time_ns: u64) -> String {
+    let megabytes = status.bytes as f64 / 1e6;
+    let rate = status.bytes as f64 / 1e3 / (time_ns as f64 / 1e9).max(1.0);
+    format!("{megabytes:.1} MB, {rate:.0} kB/s, {} ticks", status.ticks)
+}
+
+/// The room on the disk, as the pre-arm list found it.
+fn disk_row(model: &Model) -> Row {
+    let disk = model.pre_arm.iter().find(|item| item.check == Check::Disk);
+    match disk {
+        Some(disk) => row("disk", disk.found.clone(), !disk.state.allows()),
+        None => row("disk", "-".to_owned(), false),
+    }
+}
+
+/// Share of the states of the last five seconds that never came, %.
+pub fn loss_percent(link: &LinkStatus) -> f64 {
+    let all = link.recent_received + link.recent_lost;
+    100.0 * f64::from(link.recent_lost) / f64::from(all.max(1))
+}
+
+fn link_rows(link: &LinkStatus) -> Vec<Row> {
+    let loss = loss_percent(link);
+    vec![
+        row("states", format!("{} Hz, newest {} ms old", link.rate_hz, link.state_age_ms), link.state_age_ms > 5),
+        row("lost", format!("{loss:.2} % of 5 s, {} in all", link.lost), loss >= 1.0),
+        row("odd ones", format!("{} late, {} twice, {} foreign", link.late, link.duplicate, link.foreign), false),
+        row(
+            "broken",
+            format!("{} corrupt ({} in 5 s), {} short", link.corrupt, link.recent_corrupt, link.wrong_length),
+            link.recent_corrupt > 0,
+        ),
+        row("sent", format!("{}, {} not", link.sent, link.send_errors), link.send_errors > 0),
+        row("restarts", link.reboots.to_string(), link.reboots > 0),
+    ]
 }
 
 fn motor_rows(model: &Model) -> Vec<Row> {

@@ -12,60 +12,22 @@
 //!    7  1.243   118.2   243.9   0.642   accept   sampler
 //! ```
 
-use quadfrog::robot::{JOINTS, LEGS, Leg, joint_name};
+use quadfrog::robot::{JOINTS, LEGS, joint_name};
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
 
-use super::chart::{Chart, Signal, TimeAxis, draw_phases};
+use super::chart::{Chart, Ghost, TimeAxis, draw_phases, phases};
 use super::{heading, objective, proposal, span, trials, wireframe};
-use crate::model::{Model, SeriesSet};
+use crate::history::History;
+use crate::model::{Comparison, Model, Panel, impulse_start_ns};
 use crate::settings::ChartMode;
 use crate::theme::Role;
 
 /// Width of the right-hand side.
 const SIDE: u16 = 32;
-
-const TILT: &[(f32, f32)] = &[(-0.25, 0.25), (-0.5, 0.5), (-1.0, 1.0), (-3.2, 3.2)];
-const FOOT: &[(f32, f32)] = &[(-0.35, -0.05), (-0.45, 0.05)];
-const FORCE: &[(f32, f32)] = &[(0.0, 100.0), (0.0, 400.0), (0.0, 1000.0)];
-
-const fn foot(name: &'static str, value: fn(&crate::history::Sample) -> f32, role: Role) -> Signal {
-    Signal { name, unit: "m", value, ranges: FOOT, role }
-}
-
-const fn force(name: &'static str, value: fn(&crate::history::Sample) -> f32, role: Role) -> Signal {
-    Signal { name, unit: "N", value, ranges: FORCE, role }
-}
-
-/// The charts of a set, two in a row, laid out as the feet are seen from above.
-fn signals(set: SeriesSet) -> [Signal; 6] {
-    use Role::{SeriesA, SeriesB};
-    match set {
-        SeriesSet::Attitude => [
-            Signal { name: "roll", unit: "rad", value: |s| s.roll, ranges: TILT, role: SeriesA },
-            Signal { name: "pitch", unit: "rad", value: |s| s.pitch, ranges: TILT, role: SeriesB },
-            foot("FL foot", |s| s.foot_z[Leg::FL as usize], SeriesA),
-            foot("FR foot", |s| s.foot_z[Leg::FR as usize], SeriesA),
-            foot("RL foot", |s| s.foot_z[Leg::RL as usize], SeriesB),
-            foot("RR foot", |s| s.foot_z[Leg::RR as usize], SeriesB),
-        ],
-        SeriesSet::Forces => [
-            Signal {
-                name: "height",
-                unit: "m",
-                value: |s| s.height,
-                ranges: &[(0.0, 0.5), (0.0, 1.0), (0.0, 2.0)],
-                role: SeriesA,
-            },
-            Signal { name: "oscillator", unit: "rad", value: |s| s.theta, ranges: &[(0.0, 6.3)], role: SeriesB },
-            force("FL force", |s| s.foot_force[Leg::FL as usize], SeriesA),
-            force("FR force", |s| s.foot_force[Leg::FR as usize], SeriesA),
-            force("RL force", |s| s.foot_force[Leg::RL as usize], SeriesB),
-            force("RR force", |s| s.foot_force[Leg::RR as usize], SeriesB),
-        ],
-    }
-}
+/// Rows of a chart with its heading, at least.
+const CHART_ROWS: u16 = 3;
 
 /// Draws the view.
 pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
@@ -75,11 +37,22 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let [charts, _, side] =
         Layout::horizontal([Constraint::Fill(1), Constraint::Length(1), Constraint::Length(side)]).areas(upper);
     let card_rows = proposal::rows(model).min(side.height.saturating_sub(5));
-    let picture_rows = if side.height >= card_rows + 18 { 12 } else { 0 };
+    let joints_only = model.live.panel == Panel::Joints;
+    let room = side.height - card_rows;
+    // Where there is no room for both, the panel of the joints has the robot and the others the objective.
+    let picture_rows = if room >= 18 {
+        12
+    } else if joints_only {
+        room
+    } else {
+        0
+    };
     let [card, objective_area, picture] =
         Layout::vertical([Constraint::Length(card_rows), Constraint::Fill(1), Constraint::Length(picture_rows)])
             .areas(side);
-    if area.width >= 120 && charts.height >= 24 {
+    if joints_only {
+        render_joints(frame, charts, model);
+    } else if area.width >= 120 && charts.height >= 24 {
         let [charts, joints] = Layout::vertical([Constraint::Fill(1), Constraint::Length(9)]).areas(charts);
         render_charts(frame, charts, model);
         render_joints(frame, joints, model);
@@ -94,41 +67,97 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     trials::render_table(frame, table, model, false);
 }
 
+/// What all charts of the view draw from.
+struct Source<'a> {
+    history: &'a History,
+    axis: TimeAxis,
+    ghost: Option<Ghost<'a>>,
+    cursor_ns: Option<u64>,
+}
+
+impl<'a> Source<'a> {
+    fn of(model: &'a Model) -> Source<'a> {
+        match &model.live.comparison {
+            Some(comparison) => Source::compared(comparison),
+            None => Source::running(model),
+        }
+    }
+
+    /// The present, or what was frozen of it.
+    fn running(model: &'a Model) -> Source<'a> {
+        let history = model.charted();
+        let axis = TimeAxis {
+            mode: model.live.mode,
+            window_ns: (model.live.window_s * 1e9) as u64,
+            newest_ns: history.newest_ns(),
+        };
+        let trace = model.live.ghost.and_then(|trial| model.history.trace(trial));
+        let under = history.samples().rev().find(|sample| sample.trial.is_some()).map(impulse_start_ns);
+        let ghost =
+            trace.zip(under).map(|(trace, start_ns)| Ghost { trace, start_ns, role: Role::Ghost, named: false });
+        let cursor_ns = model.live.frozen.is_some().then_some(model.live.cursor_ns);
+        Source { history, axis, ghost, cursor_ns }
+    }
+
+    /// Two trials, from the first sample to the last.
+    fn compared(comparison: &'a Comparison) -> Source<'a> {
+        let (first, last) = comparison.span_ns();
+        let axis = TimeAxis { mode: ChartMode::Scroll, window_ns: last - first + 1, newest_ns: last };
+        let ghost = Ghost { trace: &comparison.trace_b, start_ns: comparison.start_ns, role: Role::Good, named: true };
+        Source { history: &comparison.history_a, axis, ghost: Some(ghost), cursor_ns: Some(comparison.cursor_ns) }
+    }
+}
+
 fn render_charts(frame: &mut Frame, area: Rect, model: &Model) {
     let theme = model.theme;
     let [charts, strip] = Layout::vertical([Constraint::Fill(1), Constraint::Length(1)]).areas(area);
-    let history = model.charted();
-    let axis = TimeAxis {
-        mode: model.live.mode,
-        window_ns: (model.live.window_s * 1e9) as u64,
-        newest_ns: history.newest_ns(),
-    };
-    let ghost = model.live.ghost.and_then(|trial| history.trace(trial));
-    let cursor_ns = model.live.frozen.is_some().then_some(model.live.cursor_ns);
-    let rows = Layout::vertical([Constraint::Fill(1); 3]).split(charts);
-    let columns = |area: Rect| -> [Rect; 2] { Layout::horizontal([Constraint::Fill(1); 2]).spacing(1).areas(area) };
-    for (index, signal) in signals(model.live.series).into_iter().enumerate() {
-        let cell = columns(rows[index / 2])[index % 2];
-        Chart { signal, axis, history, ghost, cursor_ns, cursor_line: model.live.cursor_line, theme }
-            .draw(frame.buffer_mut(), cell);
+    let source = Source::of(model);
+    let series = &model.live.series;
+    let across = if series.len() == 1 { 1 } else { 2 };
+    let down = series.len().div_ceil(across).min(usize::from(charts.height / CHART_ROWS)).max(1);
+    let columns = |area: Rect| Layout::horizontal(vec![Constraint::Fill(1); across]).spacing(1).split(area);
+    let of_columns: Vec<_> =
+        columns(strip).iter().map(|cell| (*cell, phases(&source.axis, source.history, cell.width))).collect();
+    let rows = Layout::vertical(vec![Constraint::Fill(1); down]).split(charts);
+    for (index, series) in series.iter().enumerate().take(across * down) {
+        let chart = Chart {
+            signal: series.signal(),
+            axis: source.axis,
+            history: source.history,
+            phases: &of_columns[index % across].1,
+            ghost: source.ghost,
+            cursor_ns: source.cursor_ns,
+            cursor_line: model.live.cursor_line,
+            theme,
+        };
+        chart.draw(frame.buffer_mut(), columns(rows[index / across])[index % across]);
     }
-    for cell in columns(strip) {
-        draw_phases(frame.buffer_mut(), cell, &axis, history, &theme);
+    for (cell, phases) in &of_columns {
+        draw_phases(frame.buffer_mut(), *cell, phases, &theme);
     }
-    render_axis(frame, strip, model);
+    render_axis(frame, strip, model, series.len().saturating_sub(across * down));
 }
 
-/// What the time axis is, at the right end of the strip under the charts.
-fn render_axis(frame: &mut Frame, strip: Rect, model: &Model) {
-    let mode = if model.live.mode == ChartMode::Sweep { "sweep" } else { "scroll" };
-    let (role, text) = match &model.live.frozen {
-        Some((history, at)) => {
-            let ago = model.clock.saturating_sub(*at).as_secs_f64();
-            let back = (history.newest_ns().saturating_sub(model.live.cursor_ns)) as f64 / 1e9;
-            (Role::Warning, format!(" FROZEN {ago:.0} s ago, cursor -{back:.2} s "))
+/// What the time axis is, at the right end of the strip under the charts, and how many charts have no room.
+fn render_axis(frame: &mut Frame, strip: Rect, model: &Model, without_room: usize) {
+    let live = &model.live;
+    let (role, mut text) = match (&live.comparison, &live.frozen) {
+        (Some(c), _) => {
+            let at_s = (c.cursor_ns as f64 - c.start_ns as f64) / 1e9;
+            (Role::Warning, format!(" A #{} coloured, B #{} green, at {at_s:+.2} s ", c.a, c.b))
         }
-        None => (Role::Quiet, format!(" {} s {mode} ", model.live.window_s)),
+        (None, Some((history, _))) => {
+            let back = (history.newest_ns().saturating_sub(live.cursor_ns)) as f64 / 1e9;
+            (Role::Warning, format!(" cursor -{back:.2} s "))
+        }
+        (None, None) => {
+            let mode = if live.mode == ChartMode::Sweep { "sweep" } else { "scroll" };
+            (Role::Quiet, format!(" {} s {mode} ", live.window_s))
+        }
     };
+    if without_room > 0 {
+        text = format!(" {without_room} more have no room {} {}", model.theme.dot(), text.trim_start());
+    }
     let width = (text.chars().count() as u16).min(strip.width);
     let area = Rect { x: strip.right() - width, width, ..strip };
     frame.render_widget(Line::from(span(&model.theme, role, text)), area);
@@ -138,16 +167,20 @@ fn render_axis(frame: &mut Frame, strip: Rect, model: &Model) {
 fn render_joints(frame: &mut Frame, area: Rect, model: &Model) {
     let theme = &model.theme;
     let tick = &model.snapshot.tick;
-    let body = heading(frame, area, theme, "Joints", "torque in N m, speed in rad/s, of their limits");
+    let aside =
+        if area.width >= 60 { "torque in N m, speed in rad/s, of their limits" } else { "N m, rad/s of limits" };
+    let body = heading(frame, area, theme, "Joints", aside);
     let Some(robot) = &model.robot else {
         frame.render_widget(Line::from(span(theme, Role::Quiet, "the robot's limits are not known here")), body);
         return;
     };
-    let columns = Layout::horizontal([Constraint::Fill(1); 2]).spacing(2).split(body);
-    let half = JOINTS / 2;
+    // Two legs beside the other two where the bars stay long enough to be read.
+    let across = if body.width >= 90 { 2 } else { 1 };
+    let columns = Layout::horizontal(vec![Constraint::Fill(1); across]).spacing(2).split(body);
+    let down = JOINTS / across;
     for joint in 0..LEGS * 3 {
-        let column = columns[joint / half];
-        let row = (joint % half) as u16;
+        let column = columns[joint / down];
+        let row = (joint % down) as u16;
         if row >= column.height {
             continue;
         }

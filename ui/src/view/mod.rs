@@ -12,6 +12,7 @@
 //! ```
 
 pub mod chart;
+pub mod densities;
 pub mod dialogs;
 pub mod frame;
 pub mod health;
@@ -22,7 +23,10 @@ pub mod next_step;
 pub mod objective;
 pub mod optimizer;
 pub mod overrides;
+pub mod points;
+pub mod pre_arm;
 pub mod proposal;
+pub mod trial_text;
 pub mod trials;
 pub mod wireframe;
 
@@ -37,6 +41,9 @@ use crate::theme::{Role, Theme};
 pub const MIN_COLUMNS: u16 = 80;
 /// Rows that the console needs.
 pub const MIN_ROWS: u16 = 24;
+
+/// The row of the tabs, below the frame.
+pub const TABS_ROW: u16 = 2;
 
 /// Draws everything.
 pub fn render(frame: &mut Frame, model: &Model) {
@@ -103,6 +110,11 @@ pub fn clock(time_ns: u64) -> String {
     let seconds = time_ns / 1_000_000_000;
     let (h, m, s) = (seconds / 3600, seconds / 60 % 60, seconds % 60);
     if h > 0 { format!("{h}:{m:02}:{s:02}") } else { format!("{m:02}:{s:02}") }
+}
+
+/// As [`clock`], with milliseconds.
+pub fn clock_ms(time_ns: u64) -> String {
+    format!("{}.{:03}", clock(time_ns), time_ns / 1_000_000 % 1000)
 }
 
 /// The text cut to a number of characters, with a mark where something is missing.

@@ -12,7 +12,7 @@ use ratatui::text::{Line, Span};
 
 use super::span;
 use crate::action::Action;
-use crate::dialog::{Dialog, Purpose};
+use crate::dialog::{Dialog, Purpose, arming_word};
 use crate::model::Model;
 use crate::theme::Role;
 
@@ -30,7 +30,7 @@ pub fn next_step(model: &Model) -> NextStep {
     match &model.dialog {
         Some(dialog) => in_dialog(model, dialog),
         None if model.replay.is_some() => replay(model),
-        None if model.session.observe => {
+        None if model.session.observe && Action::Acknowledge.legal(model).is_err() => {
             step("Observing: this session can change nothing.", model, &[(Action::Quit, "quit")])
         }
         None => live(model),
@@ -75,6 +75,15 @@ fn live(model: &Model) -> NextStep {
             "The study is finished.",
             model,
             &[(Action::Continue, "more trials"), (Action::Undo, "undo"), (Action::TrialsView, "table"), quit],
+        ),
+        Mode::Disarmed if model.pre_arm_failing().count() > 0 => step(
+            format!(
+                "Not ready to arm: {} checks. {} shows them.",
+                model.pre_arm_failing().count(),
+                key(Action::PreArm)
+            ),
+            model,
+            &[(Action::Override, "override"), (Action::Undo, "undo"), (Action::Help, "help"), quit],
         ),
         Mode::Disarmed => step(
             format!("Press {} to arm: the robot stands up.", key(Action::Arm)),
@@ -152,19 +161,33 @@ fn in_dialog(model: &Model, dialog: &Dialog) -> NextStep {
             "Press {} again to jump (trial #{trial}). Any other key cancels.",
             model.keymap.key(Action::Approve)
         )),
-        Dialog::Arm => plain("Press y to stand the robot up. Any other key cancels.".to_owned()),
+        Dialog::Arm { typed } => {
+            let word = arming_word(model);
+            let left = word.get(*typed..).unwrap_or_default();
+            plain(format!("Type {left} to stand the robot up. Any other key cancels."))
+        }
+        Dialog::PreArm { .. } => {
+            let arm = if Action::Arm.legal(model).is_ok() {
+                format!(" {} arms.", model.keymap.key(Action::Arm))
+            } else {
+                String::new()
+            };
+            plain(format!("Up Down choose your items, x gives your word, Enter closes.{arm}"))
+        }
         Dialog::Quit => plain("Press y to quit. Any other key cancels.".to_owned()),
         Dialog::Override(form) if form.typing.is_some() => {
             plain("Enter takes the value and applies. Esc drops it.".to_owned())
         }
         Dialog::Override(_) => {
-            plain("Type a value, or Left Right 1 %, PgUp PgDn 10 %. Enter applies, Esc cancels.".to_owned())
+            let queue = model.keymap.key(Action::QueuePoint);
+            plain(format!("Type, or Left Right 1 %, PgUp PgDn 10 %. Enter applies, {queue} queues, Esc cancels."))
         }
         Dialog::Field { purpose: Purpose::Note(_), .. } if model.robot_needs_us() => {
             plain("Enter keeps the note, Esc cancels. Armed: Space is STOP, _ writes a space.".to_owned())
         }
         Dialog::Field { .. } => plain("Enter confirms, Esc cancels.".to_owned()),
         Dialog::Palette { .. } => plain("Type to filter, Up Down choose, Enter does it, Esc closes.".to_owned()),
+        Dialog::Choose { .. } => plain("Up Down choose, x switches it on or off, Enter closes.".to_owned()),
         Dialog::Help { .. } => plain("Up Down scroll, any other key closes.".to_owned()),
         Dialog::Details { .. } => plain("Up Down other trials, Esc closes.".to_owned()),
     }

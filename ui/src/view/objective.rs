@@ -49,7 +49,7 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let bottom = plot.bottom() - 1;
     buffer.set_string(plot.x, bottom, if low < 0.0 { number(low) } else { "0".to_owned() }, theme.style(Role::Quiet));
     let last = model.trials.keys().next_back().map_or(0, |trial| trial + 1);
-    let slots = usize::try_from(last.max(model.session.budget).max(1)).unwrap_or(1);
+    let slots = usize::try_from(last.max(model.budget()).max(1)).unwrap_or(1);
     let width = usize::from(plot.width - SCALE);
     // Whole columns per trial while they fit, so that the distance between points does not wobble.
     let column = |trial: u32| {

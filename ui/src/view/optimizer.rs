@@ -13,32 +13,49 @@
 use quadfrog::recording::record::Verdict;
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
+use ratatui::widgets::Paragraph;
 
 use super::objective::sign;
-use super::{heading, number, objective};
+use super::{densities, heading, number, objective, points};
 use crate::model::Model;
 use crate::theme::Role;
 
 /// Draws the view.
 pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
-    let [upper, lower] = Layout::vertical([Constraint::Fill(1); 2]).areas(area);
+    let repeated = points::lines(model);
+    // Repeats have rows of their own where there are any to spare.
+    let repeat_rows = if repeated.is_empty() || area.height < 30 { 0 } else { repeated.len().min(5) as u16 + 1 };
+    let [upper, repeats, scatters, why] = Layout::vertical([
+        Constraint::Fill(1),
+        Constraint::Length(repeat_rows),
+        Constraint::Fill(1),
+        Constraint::Fill(1),
+    ])
+    .areas(area);
     let [history, _, landings] =
         Layout::horizontal([Constraint::Fill(3), Constraint::Length(2), Constraint::Fill(2)]).areas(upper);
     objective::render(frame, history, model);
     render_landings(frame, landings, model);
+    if repeat_rows > 0 {
+        let body = heading(frame, repeats, &model.theme, "Repeated points", "stood of repeats, mean, spread");
+        frame.render_widget(Paragraph::new(repeated), body);
+    }
     let parameters = &model.session.parameters;
     if parameters.is_empty() {
         return;
     }
-    let columns = Layout::horizontal(vec![Constraint::Fill(1); parameters.len()]).spacing(2).split(lower);
-    for (index, column) in columns.iter().enumerate() {
-        render_scatter(frame, *column, model, index);
+    let columns = |area: Rect| Layout::horizontal(vec![Constraint::Fill(1); parameters.len()]).spacing(2).split(area);
+    let (above, below) = (columns(scatters), columns(why));
+    for (index, info) in parameters.iter().enumerate() {
+        render_scatter(frame, above[index], model, index);
+        densities::render(frame, below[index], model, &info.name);
     }
 }
 
 /// Every judged trial's value over one parameter; the proposal as a line.
 fn render_scatter(frame: &mut Frame, area: Rect, model: &Model, index: usize) {
     let theme = &model.theme;
+    // The study's own bounds: past trials stay where they were when the search is narrowed.
     let info = &model.session.parameters[index];
     let body = heading(frame, area, theme, &format!("J over {}", info.name), &info.unit);
     let [plot, scale] = Layout::vertical([Constraint::Fill(1), Constraint::Length(1)]).areas(body);

@@ -1,18 +1,23 @@
-//! View 4, Override: the proposal, its bounds and what can be done about it.
+//! View 4, Override: the proposal with its bounds, the controller's gains, and what can be done about the chosen one.
 //!
 //! ```text
-//! Proposal of trial 8, by the sampler ───────────────────── o change   O back   n skip
+//! Trial #8, by: sampler ─────────────────────────────────────────────────
 //!   f0    1.243 Hz     0.750 [-----o-----] 1.750
-//! > Fx    120.0 N      0.000 [--------o--] 150.0    was 118.2
+//! > Fx    120.0 N      0.000 [--------o--] 150.0    proposed was 118.2
+//! Gains of the controller, for this trial ───────────────────────────────
+//!   kp    400.0 N/m    100.0 [---o-------] 1000
+//! What can be done ──────────────────────────────────────────────────────
+//!   o  change values and gains
+//!   X  fix Fx at 120.0 N for the next trials
 //! ```
 
-use quadfrog::recording::record::Proposal;
+use quadfrog::recording::record::{ParameterInfo, ProposedParameter};
 use ratatui::Frame;
-use ratatui::layout::Rect;
+use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
 
-use super::{heading, number, proposal, span};
+use super::{cut, heading, number, proposal, span};
 use crate::action::Action;
 use crate::model::Model;
 use crate::theme::Role;
@@ -20,53 +25,118 @@ use crate::theme::Role;
 /// Draws the view.
 pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let theme = &model.theme;
-    let key = |action| model.keymap.key(action);
-    let keys = format!(
-        "{} change, {} back to the proposed, {} skip",
-        key(Action::Override),
-        key(Action::ClearOverrides),
-        key(Action::Skip)
-    );
-    let (title, mut lines) = match model.proposal_on_table() {
-        Some(proposal) => (format!("Trial #{}, by: {}", proposal.trial, proposal.source.name()), rows(model, proposal)),
-        None => ("Parameters".to_owned(), bounds(model)),
+    let on_table = model.proposal_on_table();
+    let values = |card: Option<&[ProposedParameter]>, name: &str| {
+        card.and_then(|card| card.iter().find(|p| p.name == *name)).cloned()
     };
-    let body = heading(frame, area, theme, &title, &keys);
+    let mut rows: Vec<Line> = Vec::new();
+    let parameters = &model.session.parameters;
+    for (index, info) in parameters.iter().enumerate() {
+        let value = values(on_table.map(|card| card.parameters.as_slice()), &info.name);
+        let present = model.parameter(&info.name).unwrap_or_else(|| info.clone());
+        let mut spans = row(model, index, &present, value.as_ref());
+        spans.extend(search_state(model, info));
+        rows.push(Line::from(spans));
+    }
+    let mut gains: Vec<Line> = Vec::new();
+    for (index, info) in model.session.gains.iter().enumerate() {
+        let value = values(on_table.map(|card| card.gains.as_slice()), &info.name);
+        gains.push(Line::from(row(model, parameters.len() + index, info, value.as_ref())));
+    }
+    let title = match on_table {
+        Some(proposal) => format!("Trial #{}, by: {}", proposal.trial, proposal.source.name()),
+        None => "Parameters".to_owned(),
+    };
+    let gain_rows = if gains.is_empty() { 0 } else { gains.len() as u16 + 1 };
+    let [upper, middle, lower] = Layout::vertical([
+        Constraint::Length(rows.len() as u16 + 1),
+        Constraint::Length(gain_rows),
+        Constraint::Fill(1),
+    ])
+    .areas(area);
+    let body = heading(frame, upper, theme, &title, "present bounds");
+    frame.render_widget(Paragraph::new(rows), body);
+    if gain_rows > 0 {
+        let body = heading(frame, middle, theme, "Gains of the controller, for this trial", "safe ranges");
+        frame.render_widget(Paragraph::new(gains), body);
+    }
+    let body = heading(frame, lower, theme, "What can be done", "nothing moves before it is approved");
+    frame.render_widget(Paragraph::new(deeds(model, usize::from(body.width))), body);
+}
+
+/// One value with its place in its range.
+fn row(model: &Model, index: usize, info: &ParameterInfo, p: Option<&ProposedParameter>) -> Vec<Span<'static>> {
+    let theme = &model.theme;
+    let selected = index == model.override_row;
+    let mut spans = vec![
+        span(
+            theme,
+            if selected { Role::Key } else { Role::Text },
+            format!("{} {:<8}", if selected { ">" } else { " " }, info.name),
+        ),
+        Span::raw(format!("{:>7} {:<9}", p.map_or("-".to_owned(), |p| number(p.value)), info.unit)),
+        span(theme, Role::Quiet, format!("{:>6} ", number(info.low))),
+        match p {
+            Some(p) => span(theme, Role::Quiet, proposal::place(theme, p.value, info.low, info.high, 16)),
+            None => span(theme, Role::Quiet, format!("{:^16}", "to")),
+        },
+        span(theme, Role::Quiet, format!(" {:<6}", number(info.high))),
+    ];
+    if let Some(p) = p.filter(|p| p.value != p.proposed) {
+        spans.push(span(theme, Role::Warning, format!(" was {}", number(p.proposed))));
+    }
+    spans
+}
+
+/// Whether a parameter is fixed, or searched within other bounds than the study began with.
+fn search_state(model: &Model, info: &ParameterInfo) -> Option<Span<'static>> {
+    let theme = &model.theme;
+    let searched = model.searched(&info.name)?;
+    match searched.fixed {
+        Some(fixed) => {
+            Some(span(theme, Role::Warning, format!(" fixed at {}, {} more", number(fixed.value), fixed.trials)))
+        }
+        None if (searched.low, searched.high) != (info.low, info.high) => {
+            let (low, high) = (number(info.low), number(info.high));
+            Some(span(theme, Role::Warning, format!(" began {low}..{high}")))
+        }
+        None => None,
+    }
+}
+
+/// What can be done, each with its key; and why some of it not now.
+fn deeds(model: &Model, width: usize) -> Vec<Line<'static>> {
+    let theme = &model.theme;
+    let chosen = model.override_parameter();
+    let name = chosen.map_or("the parameter", |info| info.name.as_str());
+    let unit = chosen.map_or("", |info| info.unit.as_str());
+    let is_fixed = chosen.and_then(|info| model.searched(&info.name)?.fixed).is_some();
+    let fix = match (is_fixed, model.override_value()) {
+        (true, _) => format!("search {name} again"),
+        (false, Some(value)) => format!("fix {name} at {} {unit} for the next trials", number(value)),
+        (false, None) => format!("fix {name} for the next trials"),
+    };
+    let deeds = [
+        (Action::Override, "change values and gains: typed, or in steps of 1 % and 10 %".to_owned()),
+        (Action::ClearOverrides, "back to what was proposed".to_owned()),
+        (Action::Fix, fix),
+        (Action::Bounds, format!("search {name} within other bounds")),
+        (Action::QueuePoint, "queue this point; it comes before the sampler's".to_owned()),
+        (Action::Skip, "refuse the proposal and ask for another".to_owned()),
+    ];
+    let line = |(action, text): (Action, String)| {
+        let key = model.keymap.key(action);
+        match action.legal(model) {
+            Ok(()) => Line::from(vec![span(theme, Role::Key, format!("  {key:<3}")), Span::raw(text)]),
+            Err(reason) => {
+                let text = cut(&format!("  {key:<3}{text} ({reason})"), width);
+                Line::from(span(theme, Role::Quiet, text))
+            }
+        }
+    };
+    let mut lines: Vec<Line> = deeds.into_iter().map(line).collect();
     if let Err(reason) = Action::Override.legal(model) {
-        lines.push(Line::default());
         lines.push(Line::from(span(theme, Role::Quiet, format!("  Nothing can be changed now: {reason}."))));
     }
-    frame.render_widget(Paragraph::new(lines), body);
-}
-
-fn rows(model: &Model, on_table: &Proposal) -> Vec<Line<'static>> {
-    let theme = &model.theme;
-    let mut lines = Vec::new();
-    for (index, p) in on_table.parameters.iter().enumerate() {
-        let Some(info) = model.parameter(&p.name) else { continue };
-        let selected = index == model.override_row;
-        let mut spans = vec![
-            span(
-                theme,
-                if selected { Role::Key } else { Role::Text },
-                format!("{} {:<5}", if selected { ">" } else { " " }, p.name),
-            ),
-            Span::raw(format!("{:>8} {:<4}", number(p.value), info.unit)),
-            span(theme, Role::Quiet, format!("{:>8} ", number(info.low))),
-            span(theme, Role::Quiet, proposal::place(theme, p.value, info.low, info.high, 30)),
-            span(theme, Role::Quiet, format!(" {:<8}", number(info.high))),
-        ];
-        if p.value != p.proposed {
-            spans.push(span(theme, Role::Warning, format!("proposed was {}", number(p.proposed))));
-        }
-        lines.push(Line::from(spans));
-    }
     lines
-}
-
-fn bounds(model: &Model) -> Vec<Line<'static>> {
-    let line = |info: &quadfrog::recording::record::ParameterInfo| {
-        Line::from(format!("  {:<5} {} to {} {}", info.name, number(info.low), number(info.high), info.unit))
-    };
-    model.session.parameters.iter().map(line).collect()
 }

@@ -10,13 +10,13 @@
 //!  nearest is #3 at 0.21                looks like accept
 //! ```
 
-use quadfrog::recording::record::{ProposedParameter, Risk, Source, Stage, TrialRecord, Verdict};
+use quadfrog::recording::record::{Proposal, ProposedParameter, Risk, Source, Stage, TrialRecord, Verdict};
 use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Paragraph, Wrap};
 
-use super::{heading, number, span};
+use super::{heading, number, points, span};
 use crate::action::Action;
 use crate::model::Model;
 use crate::theme::Role;
@@ -24,7 +24,15 @@ use crate::theme::Role;
 /// Rows that the card wants.
 pub fn rows(model: &Model) -> u16 {
     let parameters = model.session.parameters.len().clamp(3, 6) as u16;
-    parameters + 4
+    let changed = |proposal: &Proposal| proposal.gains.iter().filter(|gain| gain.value != gain.proposed).count();
+    let gains = model.proposal_on_table().map_or(0, changed) as u16;
+    // Repeats are shown while the best is being confirmed and when the study is finished.
+    let confirming = model.search.as_ref().is_some_and(|search| search.confirming.is_some());
+    let repeats = match confirming || model.stage_is(Stage::Finished) {
+        true => model.points.len().min(4) as u16 + u16::from(confirming),
+        false => 0,
+    };
+    parameters + 4 + gains + repeats
 }
 
 /// Draws the card.
@@ -53,7 +61,13 @@ fn content(model: &Model, width: usize) -> (String, Vec<Line<'static>>) {
                 (false, Source::Queued, _) => format!("Trial #{}, from the queue", proposal.trial),
             };
             let mut lines: Vec<Line> = proposal.parameters.iter().map(|p| parameter(model, p, width)).collect();
+            let changed = proposal.gains.iter().filter(|gain| gain.value != gain.proposed);
+            lines.extend(changed.map(|gain| parameter(model, gain, width)));
             lines.push(risk(model, proposal.risk));
+            if let Some(left) = model.search.as_ref().and_then(|search| search.confirming) {
+                lines.push(Line::from(span(&model.theme, Role::Warning, format!(" confirming the best: {left} left"))));
+                lines.extend(points::lines(model));
+            }
             (title, lines)
         }
         _ => ("Proposal".to_owned(), vec![Line::from(span(&model.theme, Role::Quiet, " none yet"))]),
@@ -63,8 +77,8 @@ fn content(model: &Model, width: usize) -> (String, Vec<Line<'static>>) {
 /// One parameter with its place between the bounds.
 fn parameter(model: &Model, p: &ProposedParameter, width: usize) -> Line<'static> {
     let theme = &model.theme;
-    let info = model.parameter(&p.name);
-    let unit = info.map_or("", |info| info.unit.as_str());
+    let info = model.parameter(&p.name).or_else(|| model.gain(&p.name).cloned());
+    let unit = info.as_ref().map_or("", |info| info.unit.as_str());
     let mut spans = vec![
         span(theme, Role::Quiet, format!(" {:<4}", p.name)),
         Span::raw(format!("{:>7}", number(p.value))),
@@ -73,7 +87,7 @@ fn parameter(model: &Model, p: &ProposedParameter, width: usize) -> Line<'static
     let room = width.saturating_sub(18).min(24);
     if p.value != p.proposed {
         spans.push(span(theme, Role::Warning, format!(" was {}", number(p.proposed))));
-    } else if let Some(info) = info
+    } else if let Some(info) = &info
         && room >= 6
     {
         spans.extend([Span::raw(" "), span(theme, Role::Quiet, place(theme, p.value, info.low, info.high, room))]);
@@ -169,11 +183,17 @@ fn finished(model: &Model, width: usize) -> Vec<Line<'static>> {
         let p = ProposedParameter { name: name.clone(), value: *value, proposed: *value };
         lines.push(parameter(model, &p, width));
     }
-    let more = model.keymap.key(Action::Continue);
-    lines.push(Line::from(vec![
-        Span::raw(" "),
-        span(theme, Role::Key, more),
-        span(theme, Role::Quiet, " gives it more trials"),
-    ]));
+    let deed = |action: Action, text: &'static str| {
+        vec![
+            Span::raw(" "),
+            span(theme, Role::Key, model.keymap.key(action)),
+            span(theme, Role::Quiet, format!(" {text}")),
+        ]
+    };
+    let mut last = deed(Action::Continue, "more trials");
+    last.extend(deed(Action::ConfirmBest, "confirm"));
+    last.extend(deed(Action::ExportBest, "export"));
+    lines.push(Line::from(last));
+    lines.extend(points::lines(model));
     lines
 }

@@ -12,11 +12,14 @@ use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::style::Style;
 use ratatui::text::{Line, Span};
+use ratatui::widgets::Paragraph;
 
 use super::objective::sign;
-use super::{cut, heading, number, proposal, span};
+use super::trial_text::remark;
+use super::{clock, cut, heading, number, span};
 use crate::action::Action;
-use crate::model::{Columns, Model, SortBy};
+use crate::column::{Column, SortBy, measured};
+use crate::model::Model;
 use crate::theme::Role;
 
 /// Draws the view.
@@ -36,55 +39,70 @@ fn summary(model: &Model) -> String {
         (false, None) => "all".to_owned(),
     };
     let sort = match view.sort {
-        SortBy::Number => "by number",
-        SortBy::Value => "by value",
-        SortBy::Verdict => "by verdict",
+        SortBy::Number => "number",
+        SortBy::Parameter(index) => model.session.parameters.get(index).map_or("number", |info| info.name.as_str()),
+        SortBy::Column(column) => column.name(),
     };
+    let turned = if view.reversed { " reversed" } else { "" };
     let key = |action| model.keymap.key(action);
     format!(
-        "{counts}; {sort} ({}), {shown} ({}), columns ({})",
+        "{counts}; by {sort}{turned} ({}), {shown} ({}), columns ({})",
         key(Action::Sort),
         key(Action::Filter),
         key(Action::Columns)
     )
 }
 
-/// Title of a column and its text for a trial.
-type Column = (String, Box<dyn Fn(&TrialRecord) -> String>);
-
-/// The columns between the number and the value: title and text of a trial.
-fn middle_columns(model: &Model) -> Vec<Column> {
-    let measured = |title: &str, of: fn(&quadfrog::recording::record::Measured) -> f64| {
-        let text =
-            move |trial: &TrialRecord| trial.measured.as_ref().map_or("-".to_owned(), |m| format!("{:+.3}", of(m)));
-        (title.to_owned(), Box::new(text) as Box<dyn Fn(&TrialRecord) -> String>)
-    };
-    match model.trials_view.columns {
-        Columns::Parameters => model
-            .session
-            .parameters
-            .iter()
-            .map(|info| {
-                let name = info.name.clone();
-                let text = move |trial: &TrialRecord| {
-                    trial
-                        .parameters
-                        .iter()
-                        .find(|(n, _)| *n == name)
-                        .map_or("-".to_owned(), |(_, value)| number(*value))
-                };
-                (format!("{} {}", info.name, info.unit), Box::new(text) as Box<dyn Fn(&TrialRecord) -> String>)
-            })
-            .collect(),
-        Columns::Measured => vec![
-            measured("dx m", |m| m.dx_m),
-            measured("dy m", |m| m.dy_m),
-            measured("yaw rad", |m| m.dyaw_rad),
-            measured("apex m", |m| m.apex_m),
-            measured("air s", |m| m.air_s),
-        ],
-    }
+/// One column as drawn.
+struct Shown {
+    title: String,
+    width: usize,
+    cell: Cell,
 }
+
+/// Where a cell's text comes from.
+enum Cell {
+    Parameter(String),
+    Of(Column),
+}
+
+/// The columns as the operator has chosen them, as far as `width` characters take them.
+fn shown_columns(model: &Model, width: usize) -> Vec<Shown> {
+    let mut shown = Vec::new();
+    for column in &model.trials_view.columns {
+        let (title, width) = match column {
+            Column::Parameters => {
+                shown.extend(model.session.parameters.iter().map(|info| Shown {
+                    title: format!("{:>7}", format!("{} {}", info.name, info.unit)),
+                    width: 7,
+                    cell: Cell::Parameter(info.name.clone()),
+                }));
+                continue;
+            }
+            Column::Dx | Column::Dy => (format!("{:>7}", format!("{} m", column.name())), 7),
+            Column::Yaw => (format!("{:>7}", "yaw rad"), 7),
+            Column::Apex => (format!("{:>7}", "apex m"), 7),
+            Column::Air => (format!("{:>7}", "air s"), 7),
+            Column::Value => (format!("{:>8}", format!("J {}", model.session.unit)), 9),
+            Column::Verdict => ("  verdict".to_owned(), 10),
+            Column::Source => ("source".to_owned(), 9),
+            Column::Risk => ("fell".to_owned(), 4),
+            Column::Time => ("   ran".to_owned(), 7),
+            Column::Cause => ("cause, note".to_owned(), usize::MAX),
+        };
+        shown.push(Shown { title, width, cell: Cell::Of(*column) });
+    }
+    let mut left = width.saturating_sub(NUMBER_WIDTH);
+    for column in &mut shown {
+        column.width = column.width.min(left);
+        left = left.saturating_sub(column.width + 1);
+    }
+    shown.retain(|column| column.width >= column.title.trim().len().min(4));
+    shown
+}
+
+/// Width of the trial's number and the space behind it.
+const NUMBER_WIDTH: usize = 5;
 
 /// The table, scrolled so that the chosen row is seen. `full` shows the choice; without it the newest rows are shown.
 pub fn render_table(frame: &mut Frame, area: Rect, model: &Model, full: bool) {
@@ -92,190 +110,148 @@ pub fn render_table(frame: &mut Frame, area: Rect, model: &Model, full: bool) {
         return;
     }
     let theme = &model.theme;
-    let columns = middle_columns(model);
-    let mut title = format!("{:>4} ", "#");
-    for (name, _) in &columns {
-        title.push_str(&format!("{name:>8} "));
-    }
-    title.push_str(&format!(
-        "{:>8}   {:<9} {:<9} cause, note",
-        format!("J {}", model.session.unit),
-        "verdict",
-        "source"
-    ));
     let width = usize::from(area.width);
+    let columns = shown_columns(model, width);
+    let titles: Vec<String> = columns.iter().map(|column| padded(&column.title, column.width)).collect();
+    let title = format!("{:>4} {}", "#", titles.join(" "));
     frame.render_widget(Line::from(span(theme, Role::Heading, cut(&title, width))), Rect { height: 1, ..area });
     let rows: Vec<&TrialRecord> = if full { model.table() } else { model.trials.values().collect() };
-    let space = usize::from(area.height) - 1;
     if rows.is_empty() {
-        let text = if model.trials.is_empty() { "     no trial yet" } else { "     no trial passes the filter" };
-        let line = Rect { y: area.y + 1, height: 1, ..area };
-        frame.render_widget(Line::from(span(theme, Role::Quiet, text)), line);
-        return;
+        let below = Rect { y: area.y + 1, height: area.height - 1, ..area };
+        return render_empty(frame, below, model);
     }
     let chosen = if full { model.selected_trial().map(|trial| trial.trial) } else { None };
-    let at = chosen.and_then(|number| rows.iter().position(|row| row.trial == number)).unwrap_or(rows.len() - 1);
-    // The chosen row stands in the middle where there are rows on both sides.
-    let first = at.saturating_sub(space / 2).min(rows.len().saturating_sub(space));
+    let first = first_row(&rows, chosen, usize::from(area.height) - 1);
     let best = model.best().map(|trial| trial.trial);
-    for (line, trial) in rows.iter().skip(first).take(space).enumerate() {
+    for (line, trial) in rows.iter().skip(first).take(usize::from(area.height) - 1).enumerate() {
         let selected = chosen == Some(trial.trial);
         let style = if selected { theme.style(Role::Selected) } else { Style::new() };
         let area = Rect { y: area.y + 1 + line as u16, height: 1, ..area };
-        let mut spans = vec![Span::raw(format!("{:>4} ", trial.trial))];
-        spans.extend(columns.iter().map(|(_, text)| Span::raw(format!("{:>8} ", text(trial)))));
-        spans.extend(outcome(model, trial, best == Some(trial.trial), width));
+        let ghost = [model.live.ghost, model.live.comparison.as_ref().map(|c| c.b)].contains(&Some(trial.trial));
+        let mut spans = vec![Span::raw(format!(
+            "{}{:>3}{}",
+            if selected { ">" } else { " " },
+            trial.trial,
+            if ghost { "~" } else { " " }
+        ))];
+        for column in &columns {
+            let (text, role) = cell(model, trial, column, best == Some(trial.trial));
+            spans.push(span(theme, role, padded(&text, column.width)));
+            spans.push(Span::raw(" "));
+        }
         frame.render_widget(Line::from(spans).style(style), area);
     }
 }
 
-/// Value, verdict, source, cause and note.
-fn outcome(model: &Model, trial: &TrialRecord, best: bool, width: usize) -> Vec<Span<'static>> {
+/// The row that stands first: the chosen one, or else the newest, is seen, in the middle where it can be.
+fn first_row(rows: &[&TrialRecord], chosen: Option<u32>, space: usize) -> usize {
+    let last = rows.len().saturating_sub(1);
+    let at = chosen.and_then(|number| rows.iter().position(|row| row.trial == number)).unwrap_or(last);
+    at.saturating_sub(space / 2).min(rows.len().saturating_sub(space))
+}
+
+/// The trial that the view Trials shows in a row of the terminal.
+pub fn trial_at(model: &Model, row: u16) -> Option<u32> {
+    // Below the frame, the tabs, the heading and the titles; above the answer and the next step.
+    let (top, bottom) = (super::TABS_ROW + 3, model.size.1.checked_sub(2)?);
+    let line = row.checked_sub(top).filter(|_| row < bottom)?;
+    let rows = model.table();
+    let chosen = model.selected_trial().map(|trial| trial.trial);
+    let first = first_row(&rows, chosen, usize::from(bottom - top));
+    rows.get(first + usize::from(line)).map(|trial| trial.trial)
+}
+
+/// Text as wide as its column.
+fn padded(text: &str, width: usize) -> String {
+    let text = cut(text, width);
+    // The last column takes all that is left and needs no filling.
+    if width > 40 { text } else { format!("{text:<width$}") }
+}
+
+/// What stands in place of the rows while there are none: before the first trial, how one goes.
+fn render_empty(frame: &mut Frame, area: Rect, model: &Model) {
     let theme = &model.theme;
-    let (mark, role) = sign(trial.verdict);
-    let value = trial.value.map_or("-".to_owned(), number);
-    let hand = if trial.hand_value.is_some() { "h" } else { " " };
-    let verdict = match (trial.verdict, trial.suggested) {
-        (Some(verdict), _) => verdict.name().to_owned(),
-        (None, Some(suggested)) => format!("{}?", suggested.name()),
-        (None, None) => "runs".to_owned(),
-    };
-    let star = if best { "*" } else { " " };
-    let source = match trial.parent {
-        Some(parent) => format!("{} #{parent}", trial.source.name()),
-        None => trial.source.name().to_owned(),
-    };
-    vec![
-        Span::raw(format!("{value:>8}{hand}")),
-        span(theme, role, format!("{mark} {verdict:<7}{star}")),
-        span(theme, Role::Quiet, format!(" {source:<10}")),
-        span(theme, Role::Quiet, cut(&remark(trial), width.saturating_sub(60).max(10))),
-    ]
-}
-
-/// Cause and note on one line.
-fn remark(trial: &TrialRecord) -> String {
-    match (trial.cause.as_str(), trial.note.as_str()) {
-        (cause, "") => cause.to_owned(),
-        ("", note) => format!("| {note}"),
-        (cause, note) => format!("{cause} | {note}"),
+    if !model.trials.is_empty() {
+        return frame.render_widget(Line::from(span(theme, Role::Quiet, "     no trial passes the filter")), area);
     }
-}
-
-/// All about one trial, one thing in a line.
-pub fn details(model: &Model, trial: &TrialRecord) -> Vec<(String, String)> {
-    let unit = &model.session.unit;
-    let mut rows: Vec<(String, String)> = Vec::new();
-    let mut row = |name: &str, value: String| rows.push((name.to_owned(), value));
-    let verdict = trial.verdict.map_or("not judged".to_owned(), |verdict| verdict.name().to_owned());
-    row("verdict", verdict);
-    if let Some(suggested) = trial.suggested {
-        let cause = if trial.cause.is_empty() { String::new() } else { format!(": {}", trial.cause) };
-        row("the rules said", format!("{}{cause}", suggested.name()));
+    if model.replay.is_some() || model.session.observe {
+        return frame.render_widget(Line::from(span(theme, Role::Quiet, "     no trial yet")), area);
     }
-    row("objective told", trial.value.map_or("none".to_owned(), |value| format!("{value:.4} {unit}")));
-    if let Some(value) = trial.hand_value {
-        row("by hand", format!("{value:.4} {unit}"));
-    }
-    if let Some(value) = proposal::objective(model, &TrialRecord { value: None, ..trial.clone() }) {
-        row("measured", format!("{value:.4} {unit}"));
-    }
-    let source = trial.parent.map_or(String::new(), |parent| format!(" of trial {parent}"));
-    row("source", format!("{}{source}", trial.source.name()));
-    for (name, value) in &trial.parameters {
-        let info = model.parameter(name);
-        let unit = info.map_or("", |info| info.unit.as_str());
-        let bounds = info.map_or(String::new(), |info| format!("  ({} to {})", info.low, info.high));
-        row(name, format!("{value:.5} {unit}{bounds}"));
-    }
-    if let Some(m) = trial.measured {
-        row("displacement", format!("{:+.4} m forward, {:+.4} m left", m.dx_m, m.dy_m));
-        row("turn", format!("{:+.4} rad", m.dyaw_rad));
-        row("apex, air", format!("{:.4} m, {:.3} s", m.apex_m, m.air_s));
-    }
-    if let Some(risk) = trial.risk.filter(|risk| risk.neighbours > 0) {
-        let nearest = match (risk.nearest_fall_trial, risk.nearest_fall) {
-            (Some(trial), Some(distance)) => format!("; nearest fall #{trial} at {distance:.3}"),
-            _ => String::new(),
-        };
-        row("risk before", format!("{} of the {} nearest fell{nearest}", risk.falls, risk.neighbours));
-    }
-    if !trial.note.is_empty() {
-        row("note", trial.note.clone());
-    }
-    rows
-}
-
-/// A trial as one line of text, for the clipboard.
-pub fn as_text(trial: &TrialRecord, model: &Model) -> String {
-    let mut text = format!("trial {}", trial.trial);
-    for (name, value) in &trial.parameters {
-        text.push_str(&format!("\t{name}={value}"));
-    }
-    let value = trial.value.map_or("-".to_owned(), |value| value.to_string());
-    let verdict = trial.verdict.map_or("-", Verdict::name);
-    text.push_str(&format!(
-        "\tJ={value} {}\t{verdict}\t{}\t{}",
-        model.session.unit,
-        trial.source.name(),
-        remark(trial)
-    ));
-    text
-}
-
-/// The names of the exported columns and the rows of the table as shown.
-fn export_cells(model: &Model) -> (Vec<String>, Vec<Vec<String>>) {
-    let mut names = vec!["trial".to_owned()];
-    names.extend(model.session.parameters.iter().map(|info| info.name.clone()));
-    let rest = ["value", "hand_value", "verdict", "suggested", "cause", "source", "parent"];
-    names.extend(rest.map(str::to_owned));
-    names.extend(["dx_m", "dy_m", "dyaw_rad", "apex_m", "air_s", "note"].map(str::to_owned));
-    let optional = |value: Option<f64>| value.map(|value| value.to_string()).unwrap_or_default();
-    let row = |trial: &&TrialRecord| {
-        let mut cells = vec![trial.trial.to_string()];
-        for info in &model.session.parameters {
-            cells.push(optional(trial.parameters.iter().find(|(name, _)| *name == info.name).map(|(_, value)| *value)));
+    let step = |number: &str, words: &[(Action, &'static str)]| {
+        let mut spans = vec![span(theme, Role::Quiet, format!("   {number} "))];
+        for (action, text) in words {
+            spans.push(span(theme, Role::Key, model.keymap.all_keys(*action)));
+            spans.push(span(theme, Role::Quiet, format!(" {text}   ")));
         }
-        cells.extend([
-            optional(trial.value),
-            optional(trial.hand_value),
-            trial.verdict.map_or("", Verdict::name).to_owned(),
-            trial.suggested.map_or("", Verdict::name).to_owned(),
-            trial.cause.clone(),
-            trial.source.name().to_owned(),
-            trial.parent.map(|parent| parent.to_string()).unwrap_or_default(),
-        ]);
-        let m = trial.measured;
-        cells.extend([
-            optional(m.map(|m| m.dx_m)),
-            optional(m.map(|m| m.dy_m)),
-            optional(m.map(|m| m.dyaw_rad)),
-            optional(m.map(|m| m.apex_m)),
-            optional(m.map(|m| m.air_s)),
-            trial.note.clone(),
-        ]);
-        cells
+        Line::from(spans)
     };
-    (names, model.table().iter().map(row).collect())
+    let stop = Line::from(vec![
+        span(theme, Role::Quiet, "   always "),
+        span(theme, Role::Key, model.keymap.all_keys(Action::Stop)),
+        span(theme, Role::Quiet, " STOP: damp all motors at once   "),
+        span(theme, Role::Key, model.keymap.key(Action::Quit)),
+        span(theme, Role::Quiet, " quit   "),
+        span(theme, Role::Key, model.keymap.key(Action::Help)),
+        span(theme, Role::Quiet, " all keys"),
+    ]);
+    let lines = vec![
+        step("before", &[(Action::Arm, "arm: it stands up"), (Action::Override, "override"), (Action::Skip, "skip")]),
+        step("jump  ", &[(Action::Approve, "approve; again after 0.3 s: the robot jumps")]),
+        step(
+            "after ",
+            &[
+                (Action::Accept, "accept"),
+                (Action::Fall, "fall"),
+                (Action::Void, "void"),
+                (Action::Rerun, "re-run"),
+                (Action::Undo, "undo"),
+            ],
+        ),
+        stop,
+    ];
+    frame.render_widget(Paragraph::new(lines), area);
 }
 
-/// The table as shown, as comma-separated values (RFC 4180).
-pub fn as_csv(model: &Model) -> String {
-    let (names, rows) = export_cells(model);
-    let quote = |cell: &String| {
-        if cell.contains([',', '"', '\n', '\r']) { format!("\"{}\"", cell.replace('"', "\"\"")) } else { cell.clone() }
+/// A cell's text and how it is drawn.
+fn cell(model: &Model, trial: &TrialRecord, column: &Shown, best: bool) -> (String, Role) {
+    let (mark, role) = sign(trial.verdict);
+    let column = match &column.cell {
+        Cell::Parameter(name) => {
+            let value = trial.parameters.iter().find(|(known, _)| known == name);
+            return (format!("{:>7}", value.map_or("-".to_owned(), |(_, value)| number(*value))), Role::Text);
+        }
+        Cell::Of(column) => *column,
     };
-    let line = |cells: &Vec<String>| cells.iter().map(quote).collect::<Vec<_>>().join(",") + "\r\n";
-    std::iter::once(&names).chain(&rows).map(line).collect()
-}
-
-/// The table as shown, as a Markdown table.
-pub fn as_markdown(model: &Model) -> String {
-    let (names, rows) = export_cells(model);
-    let line = |cells: &Vec<String>| {
-        let cells: Vec<String> = cells.iter().map(|cell| cell.replace('|', "\\|").replace('\n', " ")).collect();
-        format!("| {} |\n", cells.join(" | "))
-    };
-    let ruler = format!("|{}\n", " --- |".repeat(names.len()));
-    line(&names) + &ruler + &rows.iter().map(line).collect::<String>()
+    match column {
+        Column::Parameters => (String::new(), Role::Text),
+        Column::Dx | Column::Dy | Column::Yaw | Column::Apex | Column::Air => {
+            let value = measured(trial, column).map_or("-".to_owned(), |value| format!("{value:+.3}"));
+            (format!("{value:>7}"), Role::Text)
+        }
+        Column::Value => {
+            let hand = if trial.hand_value.is_some() { "h" } else { " " };
+            (format!("{:>8}{hand}", trial.value.map_or("-".to_owned(), number)), Role::Text)
+        }
+        Column::Verdict => {
+            let verdict = match (trial.verdict, trial.suggested) {
+                (Some(verdict), _) => verdict.name().to_owned(),
+                (None, Some(suggested)) => format!("{}?", suggested.name()),
+                (None, None) => "runs".to_owned(),
+            };
+            (format!("{mark} {verdict:<7}{}", if best { "*" } else { " " }), role)
+        }
+        Column::Source => {
+            let parent = trial.parent.map_or(String::new(), |parent| format!(" {parent}"));
+            (format!("{}{parent}", trial.source.name()), Role::Quiet)
+        }
+        Column::Risk => {
+            let risk = trial.risk.filter(|risk| risk.neighbours > 0);
+            (risk.map_or("-".to_owned(), |risk| format!("{}/{}", risk.falls, risk.neighbours)), Role::Quiet)
+        }
+        Column::Time => {
+            let begun = model.ran.get(&trial.trial).map(|ran| clock(ran.begun_ns));
+            (format!("{:>6}", begun.unwrap_or("-".to_owned())), Role::Quiet)
+        }
+        Column::Cause => (remark(trial), Role::Quiet),
+    }
 }

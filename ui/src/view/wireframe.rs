@@ -39,8 +39,7 @@ fn leg_points(robot: &RobotDescription, leg: Leg, q: &Vector3<f64>) -> [Vector3<
 pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let theme = &model.theme;
     let tick = &model.snapshot.tick;
-    let lamps =
-        Leg::ALL.map(|leg| format!("{}{}", leg.name(), if tick.estimate.contact[leg as usize] { "#" } else { "." }));
+    let lamps = Leg::ALL.map(|leg| format!("{}{}", leg.name(), theme.lamp(tick.estimate.contact[leg as usize])));
     let body = heading(frame, area, theme, "Robot", &lamps.join(" "));
     let Some(robot) = &model.robot else { return };
     if body.height < 4 || body.width < 20 {

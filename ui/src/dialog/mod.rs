@@ -1,16 +1,22 @@
 //! What can lie over a view: questions, text fields, help. Each is data; keys reach it through [`key`].
 
+mod choice;
+mod override_form;
+
 use std::time::Duration;
 
 use crossterm::event::KeyCode;
-use quadfrog::recording::record::{Level, Proposal};
-use quadfrog::session::intent::Intent;
+use quadfrog::recording::record::Level;
+use quadfrog::session::intent::{Intent, OperatorCheck};
 use tui_input::{Input, InputRequest};
 
 use crate::action::{ACTIONS, Action, ActionInfo};
 use crate::keymap::Key;
 use crate::model::{Message, Model};
 use crate::update::{Effect, perform, wish};
+
+pub use choice::Choice;
+pub use override_form::{OverrideForm, OverrideRow};
 
 /// Two presses nearer than this are one: the second moment of an approval comes later.
 pub const APPROVAL_PAUSE: Duration = Duration::from_millis(300);
@@ -27,8 +33,16 @@ pub enum Dialog {
         /// When the approving key was pressed last.
         pressed_at: Duration,
     },
-    /// Stand the robot up? Asked where arming was chosen with Enter.
-    Arm,
+    /// Stand the robot up? Asked on hardware, and where arming was chosen with Enter.
+    Arm {
+        /// Letters of the confirming word that were typed.
+        typed: usize,
+    },
+    /// The pre-arm list.
+    PreArm {
+        /// The operator's own item that the key is about.
+        selected: usize,
+    },
     /// End the program although the robot is armed or a trial waits?
     Quit,
     /// Change parameters of the proposal.
@@ -54,6 +68,13 @@ pub enum Dialog {
         /// Lines scrolled off.
         scroll: usize,
     },
+    /// Things to switch on and off.
+    Choose {
+        /// What.
+        what: Choice,
+        /// The line that the key is about.
+        selected: usize,
+    },
     /// All about one trial.
     Details {
         /// Its number.
@@ -62,7 +83,7 @@ pub enum Dialog {
 }
 
 /// What a text field is for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Purpose {
     /// A note on this trial.
     Note(u32),
@@ -70,105 +91,24 @@ pub enum Purpose {
     HandValue(u32),
     /// More trials for a finished study.
     Continue,
+    /// For how many trials a parameter is fixed.
+    Fix {
+        /// Its place in the session's list.
+        parameter: usize,
+        /// The value that it keeps, in its unit.
+        value: f64,
+    },
+    /// Between which bounds a parameter is searched.
+    Bounds {
+        /// Its place in the session's list.
+        parameter: usize,
+    },
+    /// How often the best points are repeated.
+    ConfirmBest,
     /// Jump to a trial.
     TrialNumber,
     /// Search the log.
     LogSearch,
-}
-
-/// The proposal being changed. Nothing leaves it before Enter, and nothing moves before an approval.
-#[derive(Debug, Clone)]
-pub struct OverrideForm {
-    /// Number of the proposal.
-    pub trial: u32,
-    /// The parameters.
-    pub rows: Vec<OverrideRow>,
-    /// The chosen one.
-    pub selected: usize,
-    /// A value being typed.
-    pub typing: Option<Input>,
-    /// What is wrong with it.
-    pub problem: Option<String>,
-}
-
-/// One parameter of the form.
-#[derive(Debug, Clone, PartialEq)]
-pub struct OverrideRow {
-    /// Name.
-    pub name: String,
-    /// Unit.
-    pub unit: String,
-    /// Lower bound.
-    pub low: f64,
-    /// Upper bound.
-    pub high: f64,
-    /// The value of the proposal when the form was opened.
-    pub before: f64,
-    /// The value now.
-    pub value: f64,
-}
-
-impl OverrideForm {
-    /// The form for a proposal; parameters without known bounds are left out.
-    pub fn new(proposal: &Proposal, model: &Model) -> OverrideForm {
-        let row = |p: &quadfrog::recording::record::ProposedParameter| {
-            let info = model.parameter(&p.name)?;
-            Some(OverrideRow {
-                name: p.name.clone(),
-                unit: info.unit.clone(),
-                low: info.low,
-                high: info.high,
-                before: p.value,
-                value: p.value,
-            })
-        };
-        let rows: Vec<OverrideRow> = proposal.parameters.iter().filter_map(row).collect();
-        let selected = model.override_row.min(rows.len().saturating_sub(1));
-        OverrideForm { trial: proposal.trial, rows, selected, typing: None, problem: None }
-    }
-
-    /// Moves the chosen value by `share` of its range, stopping at the bounds.
-    fn step(&mut self, share: f64) {
-        self.typing = None;
-        self.problem = None;
-        if let Some(row) = self.rows.get_mut(self.selected) {
-            row.value = (row.value + share * (row.high - row.low)).clamp(row.low, row.high);
-        }
-    }
-
-    /// Takes the typed value over; false if it is not possible, and then `problem` says why.
-    fn take_typed(&mut self) -> bool {
-        let Some(input) = &self.typing else { return true };
-        let Some(row) = self.rows.get_mut(self.selected) else { return true };
-        match input.value().trim().replace(',', ".").parse::<f64>() {
-            Ok(value) if (row.low..=row.high).contains(&value) => {
-                row.value = value;
-                self.typing = None;
-                self.problem = None;
-                true
-            }
-            Ok(value) => {
-                self.problem = Some(format!(
-                    "{} = {value} {u} is outside {} to {} {u}",
-                    row.name,
-                    row.low,
-                    row.high,
-                    u = row.unit
-                ));
-                false
-            }
-            Err(_) => {
-                self.problem = Some(format!("`{}` is not a number", input.value()));
-                false
-            }
-        }
-    }
-
-    fn select(&mut self, selected: usize) {
-        if self.take_typed() {
-            self.selected = selected.min(self.rows.len().saturating_sub(1));
-        }
-    }
 }
 
 impl Dialog {
@@ -202,15 +142,13 @@ pub fn key(model: &mut Model, key: Key) -> Vec<Effect> {
     let Some(dialog) = model.dialog.take() else { return Vec::new() };
     match dialog {
         Dialog::Approve { trial, revision, pressed_at } => approve_key(model, key, (trial, revision, pressed_at)),
-        Dialog::Arm => match key.typed() {
-            Some('y' | 'Y') => wish(model, Intent::Arm),
-            _ => cancelled(model, "not armed"),
-        },
+        Dialog::Arm { typed } => arm_key(model, key, typed),
+        Dialog::PreArm { selected } => pre_arm_key(model, key, selected),
         Dialog::Quit => match key.typed() {
             Some('y' | 'Y') => vec![Effect::Quit],
             _ => cancelled(model, "not quit"),
         },
-        Dialog::Override(form) => override_key(model, key, form),
+        Dialog::Override(form) => override_form::key(model, key, form),
         Dialog::Field { purpose, input, .. } => field_key(model, key, purpose, input),
         Dialog::Palette { input, selected } => palette_key(model, key, input, selected),
         Dialog::Help { scroll } => {
@@ -226,6 +164,7 @@ pub fn key(model: &mut Model, key: Key) -> Vec<Effect> {
             model.dialog = Some(Dialog::Help { scroll });
             Vec::new()
         }
+        Dialog::Choose { what, selected } => choice::key(model, key, what, selected),
         Dialog::Details { trial } => {
             let neighbour = match key.code() {
                 KeyCode::Up => model.trials.range(..trial).next_back(),
@@ -247,6 +186,52 @@ fn cancelled(model: &mut Model, text: &str) -> Vec<Effect> {
     Vec::new()
 }
 
+/// The word whose letters, in order, arm the robot: on hardware one that nobody types by accident.
+pub fn arming_word(model: &Model) -> &'static str {
+    if model.is_hardware() { "stand" } else { "y" }
+}
+
+fn arm_key(model: &mut Model, key: Key, typed: usize) -> Vec<Effect> {
+    let word = arming_word(model);
+    if key.typed() != word.chars().nth(typed) {
+        return cancelled(model, "not armed");
+    }
+    if typed + 1 < word.len() {
+        model.dialog = Some(Dialog::Arm { typed: typed + 1 });
+        return Vec::new();
+    }
+    match Action::Arm.legal(model) {
+        Ok(()) => wish(model, Intent::Arm),
+        Err(reason) => {
+            model.message = Some(Message { level: Level::Warning, text: format!("not armed: {reason}") });
+            Vec::new()
+        }
+    }
+}
+
+fn pre_arm_key(model: &mut Model, key: Key, mut selected: usize) -> Vec<Effect> {
+    let last = OperatorCheck::ALL.len() - 1;
+    let effects = match key.code() {
+        KeyCode::Esc | KeyCode::Enter => return Vec::new(),
+        KeyCode::Up => {
+            selected = selected.saturating_sub(1);
+            Vec::new()
+        }
+        KeyCode::Down => {
+            selected = (selected + 1).min(last);
+            Vec::new()
+        }
+        KeyCode::Char('x') => wish(model, Intent::Confirm(OperatorCheck::ALL[selected.min(last)])),
+        // Arming from the list that says whether it is possible.
+        _ if model.keymap.action(key) == Some(Action::Arm) && Action::Arm.legal(model).is_ok() => {
+            return perform(model, Action::Arm);
+        }
+        _ => Vec::new(),
+    };
+    model.dialog = Some(Dialog::PreArm { selected });
+    effects
+}
+
 /// The second moment of an approval. Only the approving key approves, and only after a pause: a bounced key or one
 /// that lies on the keyboard starts the pause again. Everything else, Enter first of all, is Cancel.
 fn approve_key(model: &mut Model, key: Key, (trial, revision, pressed_at): (u32, u32, Duration)) -> Vec<Effect> {
@@ -264,44 +249,6 @@ fn approve_key(model: &mut Model, key: Key, (trial, revision, pressed_at): (u32,
             Vec::new()
         }
     }
-}
-
-fn override_key(model: &mut Model, key: Key, mut form: OverrideForm) -> Vec<Effect> {
-    match key.code() {
-        KeyCode::Esc if form.typing.is_some() => {
-            form.typing = None;
-            form.problem = None;
-        }
-        KeyCode::Esc => return cancelled(model, "nothing was changed"),
-        KeyCode::Enter => {
-            if form.take_typed() {
-                let changed = form.rows.iter().filter(|row| row.value != row.before);
-                let intents: Vec<Intent> =
-                    changed.map(|row| Intent::Override { parameter: row.name.clone(), value: row.value }).collect();
-                if intents.is_empty() {
-                    return cancelled(model, "nothing was changed");
-                }
-                return intents.into_iter().flat_map(|intent| wish(model, intent)).collect();
-            }
-        }
-        KeyCode::Up => form.select(form.selected.saturating_sub(1)),
-        KeyCode::Down | KeyCode::Tab => form.select(form.selected + 1),
-        KeyCode::Left if form.typing.is_none() => form.step(-0.01),
-        KeyCode::Right if form.typing.is_none() => form.step(0.01),
-        KeyCode::PageDown => form.step(-0.1),
-        KeyCode::PageUp => form.step(0.1),
-        _ => {
-            // A number and nothing else can be typed here.
-            let digit = matches!(key.typed(), Some('0'..='9' | '.' | ',' | '-' | '+' | 'e'));
-            if digit || form.typing.is_some() && key.typed().is_none() {
-                form.problem = None;
-                edit(form.typing.get_or_insert_default(), key);
-            }
-        }
-    }
-    model.override_row = form.selected;
-    model.dialog = Some(Dialog::Override(form));
-    Vec::new()
 }
 
 fn field_key(model: &mut Model, key: Key, purpose: Purpose, mut input: Input) -> Vec<Effect> {
@@ -339,6 +286,21 @@ fn submit(model: &mut Model, purpose: Purpose, text: &str) -> Result<Vec<Effect>
             Ok(more @ 1..=1000) => Ok(wish(model, Intent::Continue(more))),
             _ => Err(format!("`{text}` is not a number of trials from 1 to 1000")),
         },
+        Purpose::Fix { parameter, value } => match (text.parse::<u32>(), model.session.parameters.get(parameter)) {
+            (Ok(trials @ 1..=1000), Some(info)) => {
+                let intent = Intent::Fix { parameter: info.name.clone(), value, trials };
+                Ok(wish(model, intent))
+            }
+            _ => Err(format!("`{text}` is not a number of trials from 1 to 1000")),
+        },
+        Purpose::Bounds { parameter } => {
+            let intent = bounds_of(model, parameter, text)?;
+            Ok(wish(model, intent))
+        }
+        Purpose::ConfirmBest => match text.parse::<u32>() {
+            Ok(repeats @ 1..=1000) => Ok(wish(model, Intent::ConfirmBest { repeats })),
+            _ => Err(format!("`{text}` is not a number of repeats from 1 to 1000")),
+        },
         Purpose::TrialNumber => {
             let number = text.parse::<u32>().map_err(|_| format!("`{text}` is not a trial's number"))?;
             if !model.trials.contains_key(&number) {
@@ -355,6 +317,24 @@ fn submit(model: &mut Model, purpose: Purpose, text: &str) -> Result<Vec<Effect>
     }
 }
 
+/// Bounds typed as `low..high`, checked as far as the screen can know; the session checks all of it again.
+fn bounds_of(model: &Model, parameter: usize, text: &str) -> Result<Intent, String> {
+    let Some(info) = model.session.parameters.get(parameter) else { return Err("there is no such parameter".into()) };
+    let (name, unit) = (&info.name, &info.unit);
+    let number = |text: &str| text.trim().parse::<f64>().ok().filter(|value| value.is_finite());
+    let ends = text.split_once("..").and_then(|(low, high)| Some((number(low)?, number(high)?)));
+    let Some((low, high)) = ends else { return Err(format!("`{text}` is no range; write it as 50..120")) };
+    if low >= high {
+        return Err(format!("{low} is not below {high}"));
+    }
+    match model.searched(name) {
+        Some(p) if low < p.least || high > p.most => {
+            Err(format!("{name} may be searched from {} to {} {unit} (safety.toml)", p.least, p.most))
+        }
+        _ => Ok(Intent::NarrowBounds { parameter: name.clone(), low, high }),
+    }
+}
+
 fn palette_key(model: &mut Model, key: Key, mut input: Input, mut selected: usize) -> Vec<Effect> {
     let rows = palette_rows(input.value(), model);
     match key.code() {
@@ -365,7 +345,7 @@ fn palette_key(model: &mut Model, key: Key, mut input: Input, mut selected: usiz
             return match rows.get(selected) {
                 // Enter never starts motion: arming is asked again, approving opens its dialog by itself.
                 Some((info, Ok(()))) if info.action == Action::Arm => {
-                    model.dialog = Some(Dialog::Arm);
+                    model.dialog = Some(Dialog::Arm { typed: 0 });
                     Vec::new()
                 }
                 Some((info, _)) => perform(model, info.action),

@@ -1,0 +1,140 @@
+//! The checks of the pre-arm list that a tick can make: from the newest state, the link and the pace of the last seconds.
+//! `Cycle` refuses to arm while one of them fails, whatever the session says. List: `research/operators.md` D.4.
+
+use super::limits::ticks;
+use super::recent::Recent;
+use super::settings::Settings;
+use crate::realtime::pre_arm::{Check, CheckState, Finding, Findings};
+use crate::realtime::telemetry::Estimate;
+use crate::robot::{JOINTS, LinkStatus, RobotState};
+
+/// Fewer ticks than this say nothing about the pace.
+const PACE_KNOWN_TICKS: u32 = 1000;
+
+/// What the checks remember from tick to tick.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct PreArm {
+    /// Ticks that began later than they may.
+    late: Recent,
+    /// Ticks for which the gyroscope has been still.
+    still: u32,
+}
+
+/// What one tick knows.
+#[derive(Debug, Clone, Copy)]
+pub struct Seen<'a> {
+    /// The newest state.
+    pub state: &'a RobotState,
+    /// What the controller makes of it.
+    pub estimate: &'a Estimate,
+    /// Age of that state, ms.
+    pub state_age_ms: u32,
+    /// The link; none for a machine without one.
+    pub link: Option<LinkStatus>,
+}
+
+impl PreArm {
+    /// Once per tick: the pace, and whether the robot lies still.
+    pub fn observe(&mut self, lateness_ns: u64, state: &RobotState, settings: &Settings) {
+        let allowed = &settings.pre_arm;
+        self.late.tick(u32::from(lateness_ns as f64 * 1e-6 > allowed.late_ms));
+        let still = state.imu.gyro_body.norm() <= allowed.gyro_rad_s;
+        self.still = if still { self.still.saturating_add(1) } else { 0 };
+    }
+
+    /// How each check stands now.
+    pub fn findings(&self, seen: &Seen, settings: &Settings) -> Findings {
+        let mut findings = Findings(std::array::from_fn(|i| self.find(Check::ALL[i], seen, settings)));
+        if !settings.hardware {
+            for finding in findings.0.iter_mut().filter(|finding| !finding.check.needed_in_simulation()) {
+                finding.state = CheckState::NotNeeded;
+            }
+        }
+        findings
+    }
+
+    fn find(&self, check: Check, seen: &Seen, settings: &Settings) -> Finding {
+        let allowed = &settings.pre_arm;
+        let state = seen.state;
+        let at_most = |measured: f64, allowed: f64| Finding {
+            check,
+            // Written so that what is not a number fails.
+            state: if measured <= allowed { CheckState::Passed } else { CheckState::Failed },
+            measured,
+            allowed,
+            joint: None,
+        };
+        // The joint that is worst by `value`.
+        let worst = |value: &dyn Fn(usize) -> f64, allowed: f64| {
+            let first = Finding { joint: Some(0), ..at_most(value(0), allowed) };
+            (1..JOINTS).fold(first, |worst, joint| {
+                let here = value(joint);
+                // A number that is none stays the worst of all.
+                if here <= worst.measured || worst.measured.is_nan() {
+                    worst
+                } else {
+                    Finding { joint: Some(joint as u8), ..at_most(here, allowed) }
+                }
+            })
+        };
+        match check {
+            Check::StateFresh => at_most(f64::from(seen.state_age_ms), f64::from(allowed.state_age_ms)),
+            // A machine without a link loses nothing on the way.
+            Check::Loss => at_most(seen.link.map_or(0.0, |link| link.loss_share()), allowed.loss_share),
+            Check::Checksums => {
+                at_most(seen.link.map_or(0.0, |link| f64::from(link.recent_corrupt)), f64::from(allowed.corrupt))
+            }
+            Check::Upright => {
+                let [roll, pitch, _] = seen.estimate.roll_pitch_yaw.into();
+                // `max` would prefer the number to the one that is none.
+                let tilt = if (roll + pitch).is_nan() { f64::NAN } else { roll.abs().max(pitch.abs()) };
+                at_most(tilt, allowed.tilt_rad)
+            }
+            Check::JointsInside => {
+                let beyond = |joint: usize| {
+                    let q = state.joint_position[joint];
+                    let (least, most) = (settings.min_position[joint], settings.max_position[joint]);
+                    if q.is_nan() { q } else { (least - q).max(q - most) }
+                };
+                worst(&beyond, allowed.joint_margin_rad)
+            }
+            Check::LyingDown => {
+                let away = |joint: usize| (state.joint_position[joint] - settings.lying_position[joint]).abs();
+                worst(&away, allowed.lying_tolerance_rad)
+            }
+            Check::Battery => {
+                let charge = state.battery.map_or(f64::NAN, |battery| battery.charge_percent);
+                let passed = charge >= allowed.battery_percent;
+                Finding {
+                    state: if passed { CheckState::Passed } else { CheckState::Failed },
+                    ..at_most(charge, allowed.battery_percent)
+                }
+            }
+            Check::MotorsCool => worst(&|joint| state.motor_temperature_c[joint], allowed.motor_c),
+            Check::GyroStill => {
+                let finding = at_most(state.imu.gyro_body.norm(), allowed.gyro_rad_s);
+                if self.still < ticks(allowed.still_s) {
+                    Finding { state: CheckState::Failed, ..finding }
+                } else {
+                    finding
+                }
+            }
+            Check::OnTime => {
+                let finding =
+                    at_most(f64::from(self.late.sum()) / f64::from(self.late.span().max(1)), allowed.late_share);
+                if self.late.span() < PACE_KNOWN_TICKS {
+                    Finding { state: CheckState::Failed, measured: f64::NAN, ..finding }
+                } else {
+                    finding
+                }
+            }
+            // Not this thread's: what is not looked at has not passed.
+            Check::Recorder
+            | Check::Disk
+            | Check::LowLevel
+            | Check::Configuration
+            | Check::AreaClear
+            | Check::StopTested => at_most(f64::NAN, f64::NAN),
+        }
+    }
+}

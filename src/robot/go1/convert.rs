@@ -1,0 +1,141 @@
+//! Between what the controller speaks and what the datagrams say. Pure functions; the conventions are those of
+//! `specs/go1-wire.md`, section 7.
+//!
+//! Motor order, joint signs and frames are the engine's own: the engine took them from this robot. Order FR, FL, RR, RL x hip,
+//! thigh, calf; quaternion w, x, y, z from body to world. That the inertial unit's axes are the trunk's, the feet's order that of
+//! the legs, and the current's sign ours (negative while discharging) is assumed; `robots/go1/README.md` says what to check.
+
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use zerocopy::little_endian::F32;
+
+use super::packet::{CommandError, CrcForm, LowCmd, LowState, MODE_SERVO, MotorTarget, POSITION_STOP, VELOCITY_STOP};
+use crate::robot::{Battery, Imu, JOINTS, JointCommand, MotorCommand, RobotState};
+
+/// How far the norm of a reported orientation may be from 1; what is farther is no rotation.
+const QUATERNION_TOLERANCE: f32 = 0.1;
+
+/// The datagram of `command`; motors 12 to 19 brake without a target.
+///
+/// Every motor is in servo mode, also while the robot is damped: damping is the gain `kd` alone. The motor's own braking (mode
+/// 0x00) is of unknown strength and may differ from joint to joint, where `kd` is the law that the controller was tested
+/// with; and a motor that reports another mode has then always left servo mode by itself. Without a stiffness there is no position target, without
+/// a damping no velocity target: the words that mean so are sent, never a position that a motor could run to.
+///
+/// # Errors
+/// When a number is not finite or does not fit the datagram.
+pub fn low_cmd(command: &JointCommand, form: CrcForm) -> Result<LowCmd, CommandError> {
+    let mut datagram = LowCmd::damping(form);
+    for (motor, command) in command.motor.iter().enumerate() {
+        datagram.set(motor, &target(motor, command)?)?;
+    }
+    datagram.seal(form);
+    Ok(datagram)
+}
+
+fn target(motor: usize, command: &MotorCommand) -> Result<MotorTarget, CommandError> {
+    let finite = |quantity, value: f64| {
+        let value = value as f32;
+        if value.is_finite() { Ok(value) } else { Err(CommandError::NotFinite { quantity, motor, value }) }
+    };
+    let (position, velocity) = (finite("position", command.position)?, finite("velocity", command.velocity)?);
+    Ok(MotorTarget {
+        mode: MODE_SERVO,
+        position: if command.kp == 0.0 { POSITION_STOP } else { position },
+        velocity: if command.kd == 0.0 { VELOCITY_STOP } else { velocity },
+        torque: command.torque as f32,
+        kp: command.kp as f32,
+        kd: command.kd as f32,
+    })
+}
+
+/// What a motor makes of its target; none outside of servo mode. The view from the other side, for the emulator.
+pub fn motor_command(target: &MotorTarget) -> Option<MotorCommand> {
+    if target.mode != MODE_SERVO {
+        return None;
+    }
+    let mut command = MotorCommand { torque: target.torque.into(), ..MotorCommand::default() };
+    if target.position != POSITION_STOP {
+        (command.position, command.kp) = (target.position.into(), target.kp.into());
+    }
+    if target.velocity != VELOCITY_STOP {
+        (command.velocity, command.kd) = (target.velocity.into(), target.kd.into());
+    }
+    Some(command)
+}
+
+/// The state that a datagram tells. `foot_force_n` is the force of one step of a foot's sensor, N.
+///
+/// `motor_enabled` is whether the motor reports servo mode. An orientation that is no rotation (all zero, for example) becomes
+/// one that is not finite: the watchdog stops at it by name.
+pub fn robot_state(state: &LowState, foot_force_n: f64) -> RobotState {
+    let joints = |value: fn(&super::packet::MotorRecord) -> f64| std::array::from_fn(|i| value(&state.motor[i]));
+    let imu = &state.imu;
+    let [w, x, y, z] = imu.quaternion.map(F32::get);
+    let norm = (w * w + x * x + y * y + z * z).sqrt();
+    let orientation_world = if (norm - 1.0).abs() < QUATERNION_TOLERANCE {
+        UnitQuaternion::new_normalize(Quaternion::new(w.into(), x.into(), y.into(), z.into()))
+    } else {
+        UnitQuaternion::new_unchecked(Quaternion::new(f64::NAN, f64::NAN, f64::NAN, f64::NAN))
+    };
+    let cell_v = state.battery.cell_v().map(f64::from);
+    RobotState {
+        robot_time_ms: state.tick.get(),
+        joint_position: joints(|motor| motor.position.get().into()),
+        joint_velocity: joints(|motor| motor.velocity.get().into()),
+        joint_torque: joints(|motor| motor.torque().into()),
+        imu: Imu { orientation_world, gyro_body: vector(&imu.gyroscope), accel_body: vector(&imu.accelerometer) },
+        foot_force: state.foot_force.map(|force| f64::from(force.get()) * foot_force_n),
+        motor_temperature_c: joints(|motor| motor.temperature.into()),
+        motor_enabled: std::array::from_fn(|i| state.motor[i].mode == MODE_SERVO),
+        battery: Some(Battery {
+            charge_percent: state.battery.charge.into(),
+            voltage_v: cell_v.iter().sum(),
+            current_a: f64::from(state.battery.current.get()) * 1e-3,
+            cell_v,
+        }),
+        truth: None,
+    }
+}
+
+/// The datagram of a state: the inverse of [`robot_state`] for the emulator, but for the checksum, which is the caller's to make.
+pub fn low_state(state: &RobotState, foot_force_n: f64) -> LowState {
+    let mut datagram = LowState::zero();
+    datagram.tick = state.robot_time_ms.into();
+    let orientation = &state.imu.orientation_world;
+    let [x, y, z, w]: [f64; 4] = orientation.coords.into();
+    datagram.imu.quaternion = [w, x, y, z].map(float);
+    datagram.imu.gyroscope = floats(&state.imu.gyro_body);
+    datagram.imu.accelerometer = floats(&state.imu.accel_body);
+    let (roll, pitch, yaw) = orientation.euler_angles();
+    datagram.imu.roll_pitch_yaw = [roll, pitch, yaw].map(float);
+    for i in 0..JOINTS {
+        let motor = &mut datagram.motor[i];
+        motor.mode = if state.motor_enabled[i] { MODE_SERVO } else { super::packet::MODE_DAMPING };
+        motor.position = float(state.joint_position[i]);
+        motor.velocity = float(state.joint_velocity[i]);
+        motor.position_raw = motor.position;
+        motor.velocity_raw = motor.velocity;
+        motor.set_torque(state.joint_torque[i] as f32);
+        motor.temperature = state.motor_temperature_c[i].round() as i8;
+    }
+    if let Some(battery) = &state.battery {
+        datagram.battery.charge = battery.charge_percent.round() as u8;
+        datagram.battery.current = ((battery.current_a * 1e3).round() as i32).into();
+        datagram.battery.set_cell_v(&battery.cell_v.map(|v| v as f32));
+    }
+    datagram.foot_force = state.foot_force.map(|force| ((force / foot_force_n).round() as i16).into());
+    datagram.foot_force_estimated = datagram.foot_force;
+    datagram
+}
+
+fn float(value: f64) -> F32 {
+    (value as f32).into()
+}
+
+fn floats(vector: &Vector3<f64>) -> [F32; 3] {
+    [vector.x, vector.y, vector.z].map(float)
+}
+
+fn vector(floats: &[F32; 3]) -> Vector3<f64> {
+    Vector3::from(floats.map(|value| f64::from(value.get())))
+}

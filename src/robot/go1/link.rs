@@ -1,0 +1,238 @@
+//! The UDP link: one socket, every datagram judged, every loss counted.
+//!
+//! The official endpoint reads the queue to its end and judges the last datagram alone; one corrupt datagram then hides all the good
+//! ones before it. Here each is judged, and the newest valid one is kept.
+//!
+//! Time is counted in calls of [`Link::receive`], one a millisecond: the tick reads no other clock, and a test that calls it
+//! by hand sees the same ages on a machine of any speed. A thread that is itself late is the watchdog's to notice.
+
+use std::io::ErrorKind;
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, UdpSocket};
+
+use super::packet::{LOW_LEVEL, LowCmd, LowState, Rejection};
+use super::window::Window;
+use crate::robot::LinkStatus;
+
+/// Datagrams judged in one call at most, so that a flood cannot hold the tick; what is left waits for the next call. A robot sends
+/// one.
+const MOST_PER_CALL: usize = 32;
+/// Room for a datagram; a longer one than the robot's is cut, and judged on its beginning.
+const BUFFER: usize = 2048;
+
+/// Why a link cannot be opened.
+#[derive(Debug, thiserror::Error)]
+pub enum LinkError {
+    /// The local port is not to be had.
+    #[error(
+        "local UDP port {port}: {source}; end the program that drives the robot already, or set network.local_port in robot.toml"
+    )]
+    Bind {
+        /// The port.
+        port: u16,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// There is no way to the robot's address.
+    #[error(
+        "no way to the robot at {address}: {source}; is the cable in, and has this machine an address in the robot's network?"
+    )]
+    Connect {
+        /// The robot's address.
+        address: SocketAddr,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// The description of the robot has no network.
+    #[error("{robot}: its robot.toml has no section [network]; only a robot with one can be driven")]
+    NoNetwork {
+        /// The robot's name.
+        robot: String,
+    },
+}
+
+/// What a link is opened with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LinkOptions {
+    /// The robot.
+    pub address: SocketAddr,
+    /// The port of this machine; 0 takes any.
+    pub local_port: u16,
+    /// Time between two states on the robot's clock, ms.
+    pub state_period_ms: u32,
+    /// A state older than the newest by more than this begins a new life of the robot, ms.
+    pub restart_ms: u32,
+}
+
+/// The link.
+#[derive(Debug)]
+pub struct Link {
+    socket: UdpSocket,
+    options: LinkOptions,
+    newest: Option<LowState>,
+    /// Of the last 64 ms before the newest state: bit k is set if the state of k ms before came.
+    seen: u64,
+    status: LinkStatus,
+    window: Window,
+    buffer: [u8; BUFFER],
+}
+
+impl Link {
+    /// Binds and connects: only datagrams from exactly the robot's address and port are seen.
+    ///
+    /// # Errors
+    /// When the port is taken or there is no way to the address.
+    pub fn open(options: &LinkOptions) -> Result<Link, LinkError> {
+        let any: IpAddr = match options.address {
+            SocketAddr::V4(_) => Ipv4Addr::UNSPECIFIED.into(),
+            SocketAddr::V6(_) => Ipv6Addr::UNSPECIFIED.into(),
+        };
+        let port = options.local_port;
+        let socket = UdpSocket::bind((any, port)).map_err(|source| LinkError::Bind { port, source })?;
+        let connected = socket.connect(options.address).and_then(|()| socket.set_nonblocking(true));
+        connected.map_err(|source| LinkError::Connect { address: options.address, source })?;
+        Ok(Link {
+            socket,
+            options: *options,
+            newest: None,
+            seen: 0,
+            status: LinkStatus::default(),
+            window: Window::default(),
+            buffer: [0; BUFFER],
+        })
+    }
+
+    /// The address of this end.
+    ///
+    /// # Errors
+    /// When the system does not say.
+    pub fn local_address(&self) -> std::io::Result<SocketAddr> {
+        self.socket.local_addr()
+    }
+
+    /// How the link is doing.
+    pub fn status(&self) -> &LinkStatus {
+        &self.status
+    }
+
+    /// Whether a valid state ever came.
+    pub fn heard(&self) -> bool {
+        self.newest.is_some()
+    }
+
+    /// Judges what has come since the last call, a millisecond ago. The newest valid state if it is a new one, otherwise none.
+    pub fn receive(&mut self) -> Option<&LowState> {
+        self.window.advance();
+        self.status.state_age_ms = self.status.state_age_ms.saturating_add(1);
+        let mut is_new = false;
+        for _ in 0..MOST_PER_CALL {
+            match self.socket.recv(&mut self.buffer) {
+                Ok(length) => is_new |= self.judge(length),
+                // Nothing more; anything else (nobody listens at the robot's port, the cable is out) shows as silence.
+                Err(error) if error.kind() == ErrorKind::WouldBlock => break,
+                Err(_) => {}
+            }
+        }
+        let total = self.window.total();
+        self.status.recent_received = total.received;
+        self.status.recent_lost = total.lost;
+        self.status.recent_corrupt = total.corrupt;
+        self.status.rate_hz = self.window.received_in_the_last_second();
+        if is_new { self.newest.as_ref() } else { None }
+    }
+
+    /// Judges the datagram in the buffer; true if it is a state newer than all before.
+    fn judge(&mut self, length: usize) -> bool {
+        let state = match LowState::judge(&self.buffer[..length]) {
+            Ok(state) => *state,
+            Err(rejection) => {
+                match rejection {
+                    Rejection::Length { .. } => self.status.wrong_length += 1,
+                    Rejection::Crc { .. } => {
+                        self.status.corrupt += 1;
+                        self.window.now().corrupt += 1;
+                    }
+                    Rejection::Head { .. } | Rejection::BatteryOff => self.status.foreign += 1,
+                }
+                return false;
+            }
+        };
+        // A high-level state has another layout: its numbers would be taken for others.
+        if state.header.level != LOW_LEVEL {
+            self.status.foreign += 1;
+            return false;
+        }
+        if !self.place_in_time(state.tick.get()) {
+            return false;
+        }
+        self.newest = Some(state);
+        self.status.received += 1;
+        self.status.state_age_ms = 0;
+        self.window.now().received += 1;
+        true
+    }
+
+    /// Where a valid state of the robot's time `tick` stands among the others; true if it is newer.
+    fn place_in_time(&mut self, tick: u32) -> bool {
+        let Some(newest) = &self.newest else {
+            self.seen = 1;
+            return true;
+        };
+        // The robot's clock runs for 49 days before it begins anew: the difference is right across that, too.
+        let newer_by = tick.wrapping_sub(newest.tick.get()) as i32;
+        let older_by = newer_by.unsigned_abs();
+        if newer_by > 0 {
+            let gap = (older_by / self.options.state_period_ms).saturating_sub(1);
+            self.status.lost += u64::from(gap);
+            self.window.now().lost += gap;
+            self.seen = self.seen.checked_shl(older_by).unwrap_or(0) | 1;
+            true
+        } else if older_by > self.options.restart_ms {
+            self.status.reboots += 1;
+            self.seen = 1;
+            true
+        } else {
+            let bit = 1u64.checked_shl(older_by).unwrap_or(0);
+            if self.seen & bit != 0 {
+                self.status.duplicate += 1;
+            } else {
+                self.status.late += 1;
+                if bit != 0 {
+                    // It was counted as lost when the gap was seen.
+                    self.seen |= bit;
+                    self.status.lost = self.status.lost.saturating_sub(1);
+                    self.window.now().lost = self.window.now().lost.saturating_sub(1);
+                }
+            }
+            false
+        }
+    }
+
+    /// Sends a command.
+    ///
+    /// # Errors
+    /// The system's error number, where it cannot be sent. That nobody listened to an earlier datagram, or that the system has no
+    /// room for this one, is no error but counted: the robot's silence says the first, the next millisecond mends the second.
+    pub fn send(&mut self, command: &LowCmd) -> Result<(), i32> {
+        // A port where nobody listens is reported at the next call in place of sending: the second try sends.
+        let refused = |sent: &std::io::Result<usize>| {
+            sent.as_ref().is_err_and(|error| error.kind() == ErrorKind::ConnectionRefused)
+        };
+        let mut sent = self.socket.send(command.bytes());
+        if refused(&sent) {
+            sent = self.socket.send(command.bytes());
+        }
+        match sent {
+            Ok(_) => {
+                self.status.sent += 1;
+                Ok(())
+            }
+            Err(error) => {
+                self.status.send_errors += 1;
+                match error.kind() {
+                    ErrorKind::ConnectionRefused | ErrorKind::WouldBlock => Ok(()),
+                    _ => Err(error.raw_os_error().unwrap_or(0)),
+                }
+            }
+        }
+    }
+}

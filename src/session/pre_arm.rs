@@ -1,0 +1,195 @@
+//! The whole pre-arm list in words: what the control thread found, what the session sees, what the operator says.
+
+use std::path::PathBuf;
+
+use crate::control::settings::{PreArm, Settings};
+use crate::realtime::pre_arm::{Check, CheckSet, CheckState, Finding, Findings};
+use crate::realtime::telemetry::{Cause, Fault, Mode};
+use crate::recording::disk;
+use crate::recording::record::PreArmCheck;
+use crate::recording::recorder::RecorderStatus;
+use crate::robot::joint_name;
+
+use super::intent::OperatorCheck;
+
+/// How far the test of the STOP key has come.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum StopTest {
+    Open,
+    Pressed,
+    Passed,
+}
+
+/// What the list is made with and what it remembers of this session.
+#[derive(Debug, Clone)]
+pub struct PreArmList {
+    limits: PreArm,
+    /// Free space that a trial needs, MB.
+    trial_mb: u32,
+    hardware: bool,
+    /// Fingerprint of the configuration.
+    configuration: String,
+    /// Where the recording goes; none where nothing is kept.
+    folder: Option<PathBuf>,
+    /// What the operator has given their word on.
+    words: CheckSet,
+    stop: StopTest,
+}
+
+impl PreArmList {
+    /// A list of which nothing is confirmed. `configuration` is shown beside the operator's word on it; `folder` is where
+    /// the recording goes, none where nothing is kept.
+    pub fn new(settings: &Settings, configuration: String, folder: Option<PathBuf>) -> PreArmList {
+        PreArmList {
+            limits: settings.pre_arm,
+            trial_mb: settings.watchdog.disk_free_mb,
+            hardware: settings.hardware,
+            configuration,
+            folder,
+            words: CheckSet::EMPTY,
+            stop: StopTest::Open,
+        }
+    }
+
+    /// The operator gives their word.
+    pub fn confirm(&mut self, check: OperatorCheck) {
+        self.words.insert(check.check());
+    }
+
+    /// The mode changed: a word that the change makes worthless is taken back, and a STOP may have been a test.
+    pub fn mode_changed(&mut self, from: Mode, to: Mode, cause: &Cause) {
+        if from.energised() && !to.energised() {
+            // Somebody will now go to the robot.
+            self.words.remove(Check::AreaClear);
+        }
+        if let Cause::Fault(Fault::Reboot | Fault::MotorMode { .. } | Fault::LinkLost { .. }) = cause {
+            // A robot that restarted is not in low-level mode any more.
+            self.words.remove(Check::LowLevel);
+            self.words.remove(Check::AreaClear);
+        }
+        self.stop = match (self.stop, from, to, cause) {
+            (StopTest::Open, Mode::Offline | Mode::Observe | Mode::Disarmed, Mode::Damped, Cause::Stop) => {
+                StopTest::Pressed
+            }
+            (StopTest::Pressed, Mode::Damped, Mode::Disarmed, _) => StopTest::Passed,
+            (StopTest::Pressed, ..) => StopTest::Open,
+            (state, ..) => state,
+        };
+    }
+
+    /// How every item stands now.
+    pub fn look(&self, findings: &Findings, recorder: &RecorderStatus) -> Vec<PreArmCheck> {
+        let found = findings.0.iter().map(|finding| self.words_of(finding));
+        let own = [
+            self.recorder(recorder),
+            self.disk(),
+            self.word(OperatorCheck::LowLevel, String::new(), "remote L2+A, L2+A, L2+B, L1+L2+START; your word"),
+            self.word(OperatorCheck::Configuration, format!("{}, ", self.configuration), "your word on config/"),
+            self.word(OperatorCheck::AreaClear, String::new(), "nobody within 2 m; your word"),
+            self.stop_tested(),
+        ];
+        found.chain(own).collect()
+    }
+
+    /// Says so if the disk is too full for another trial.
+    pub fn disk_low(&self) -> Option<String> {
+        let free = disk::free_mb(self.folder.as_ref()?).ok()?;
+        let needed = u64::from(self.trial_mb);
+        (free < needed)
+            .then(|| format!("{free} MB free where the recording goes, at least {needed} for a trial; make room"))
+    }
+
+    fn words_of(&self, finding: &Finding) -> PreArmCheck {
+        let Finding { check, state, measured, .. } = *finding;
+        let limits = &self.limits;
+        let joint = finding.joint.map(|joint| joint_name(joint as usize)).unwrap_or_default();
+        let (found, needed) = match check {
+            Check::StateFresh => (format!("{measured:.0} ms old"), format!("at most {} ms", limits.state_age_ms)),
+            Check::Loss => {
+                (format!("{:.1} % lost", measured * 100.0), format!("at most {} % in 5 s", limits.loss_share * 100.0))
+            }
+            Check::Checksums => (format!("{measured:.0} corrupt"), format!("at most {} in 5 s", limits.corrupt)),
+            Check::Upright => (format!("tilted {measured:.2} rad"), format!("at most {:.2} rad", limits.tilt_rad)),
+            Check::JointsInside => {
+                let found = if measured > 0.0 { format!("{joint} {measured:.2} rad beyond") } else { "all".to_owned() };
+                (found, format!("at most {:.2} rad beyond", limits.joint_margin_rad))
+            }
+            Check::LyingDown => {
+                (format!("{joint} {measured:.2} rad away"), format!("at most {:.2} rad", limits.lying_tolerance_rad))
+            }
+            Check::Battery => (format!("{measured:.0} %"), format!("at least {:.0} %", limits.battery_percent)),
+            Check::MotorsCool => (format!("{joint} {measured:.0} C"), format!("at most {:.0} C", limits.motor_c)),
+            Check::GyroStill => (
+                format!("{measured:.2} rad/s"),
+                format!("at most {:.2} rad/s for {} s", limits.gyro_rad_s, limits.still_s),
+            ),
+            Check::OnTime => (
+                format!("{:.1} % of ticks late", measured * 100.0),
+                format!("at most {} % later than {} ms", limits.late_share * 100.0, limits.late_ms),
+            ),
+            _ => (String::new(), String::new()),
+        };
+        let found = if measured.is_finite() { found } else { "not known yet".to_owned() };
+        self.item(check, state, found, needed)
+    }
+
+    fn recorder(&self, status: &RecorderStatus) -> PreArmCheck {
+        let (state, found) = match (&status.error, &self.folder) {
+            (Some(error), _) => (CheckState::Failed, error.clone()),
+            (None, Some(_)) if status.finished => (CheckState::Failed, "has ended".to_owned()),
+            (None, Some(_)) => (CheckState::Passed, "recording".to_owned()),
+            // Who asks for no recording of a simulation gets none; a real robot's jumps are always kept.
+            (None, None) if self.hardware => (CheckState::Failed, "nothing is kept".to_owned()),
+            (None, None) => (CheckState::NotNeeded, "nothing is to be kept".to_owned()),
+        };
+        self.item(Check::Recorder, state, found, "every tick is recorded".to_owned())
+    }
+
+    fn disk(&self) -> PreArmCheck {
+        let needed = format!("at least {} MB", self.limits.disk_free_mb);
+        let (state, found) = match &self.folder {
+            None => (CheckState::NotNeeded, "nothing is to be kept".to_owned()),
+            Some(folder) => match disk::free_mb(folder) {
+                Ok(free) if free >= u64::from(self.limits.disk_free_mb) => (CheckState::Passed, format!("{free} MB")),
+                Ok(free) => (CheckState::Failed, format!("{free} MB")),
+                Err(error) => (CheckState::Failed, error.to_string()),
+            },
+        };
+        self.item(Check::Disk, state, found, needed)
+    }
+
+    fn word(&self, check: OperatorCheck, about: String, needed: &str) -> PreArmCheck {
+        let check = check.check();
+        let given = self.words.contains(check);
+        let state = if given { CheckState::Passed } else { CheckState::Waiting };
+        let found = format!("{about}{}", if given { "confirmed" } else { "not confirmed" });
+        self.item(check, state, found, needed.to_owned())
+    }
+
+    fn stop_tested(&self) -> PreArmCheck {
+        let (state, found) = match self.stop {
+            StopTest::Open => (CheckState::Waiting, "not in this session"),
+            StopTest::Pressed => (CheckState::Waiting, "pressed, not acknowledged"),
+            StopTest::Passed => (CheckState::Passed, "pressed and acknowledged"),
+        };
+        self.item(Check::StopTested, state, found.to_owned(), "press STOP, then acknowledge".to_owned())
+    }
+
+    fn item(&self, check: Check, state: CheckState, found: String, needed: String) -> PreArmCheck {
+        if self.hardware || check.needed_in_simulation() {
+            PreArmCheck { check, found, needed, state }
+        } else {
+            PreArmCheck { check, found, needed: "not needed in simulation".to_owned(), state: CheckState::NotNeeded }
+        }
+    }
+}
+
+/// What stands in the way of arming, all of it, in words; none if nothing does.
+pub fn objections(list: &[PreArmCheck]) -> Option<String> {
+    let open: Vec<String> = list
+        .iter()
+        .filter(|item| !item.state.allows())
+        .map(|item| format!("{}: {}, needed: {}", item.check.name(), item.found, item.needed))
+        .collect();
+    (!open.is_empty()).then(|| open.join("; "))
+}

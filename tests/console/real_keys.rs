@@ -1,0 +1,218 @@
+//! Every key of the active keymap, pressed in a real terminal on the real program: each does something that is seen.
+//!
+//! The table is checked against the keymap, so a key without a row fails.
+
+#[path = "support/pty.rs"]
+mod pty;
+
+use std::collections::BTreeSet;
+use std::path::Path;
+use std::time::Duration;
+
+use nix::sys::signal::Signal;
+use portable_pty::CommandBuilder;
+use pty::Session;
+use quadfrog_console::action::{ACTIONS, Action};
+use quadfrog_console::settings::Settings;
+
+/// What a key makes of the terminal.
+enum Seen {
+    /// The text, not on the screen before.
+    Shows(&'static str),
+    /// The text, on the screen before, goes.
+    Hides(&'static str),
+    /// Anything on a screen that stands still.
+    Changes,
+    /// These bytes are sent.
+    Sends(&'static [u8]),
+    /// The program gives the terminal back and stops until it is continued.
+    Suspends,
+}
+
+use Seen::{Changes, Hides, Sends, Shows, Suspends};
+
+/// An action, the key that is pressed, what is seen of it, and how the story goes on.
+struct Row {
+    action: Action,
+    key: &'static str,
+    seen: Seen,
+    /// Keys typed afterwards, and what is waited for then.
+    after: (&'static str, &'static str),
+}
+
+const fn row(action: Action, key: &'static str, seen: Seen, after: (&'static str, &'static str)) -> Row {
+    Row { action, key, seen, after }
+}
+
+/// A session of one trial on the simulator, in this order.
+const LIVE: &[Row] = &[
+    row(Action::Override, "o", Shows("Override trial #0"), ("\x1b[B120\r", "was 106.2")),
+    row(Action::ClearOverrides, "O", Hides("was 106.2"), ("", "")),
+    row(Action::Skip, "n", Hides("106.2 N"), ("", "Press A to arm")),
+    row(Action::Suspend, "Ctrl-Z", Suspends, ("", "Press A to arm")),
+    row(Action::Arm, "A", Shows("STAND UP"), ("", "READY")),
+    row(Action::SitDown, "D", Shows("SIT DOWN"), ("", "DISARMED")),
+    row(Action::Stop, "F12", Shows("DAMPED"), ("", "then press k")),
+    row(Action::Acknowledge, "k", Hides("DAMPED"), ("A", "READY")),
+    row(Action::Stop, "Space", Shows("DAMPED"), ("kA", "READY")),
+    row(Action::Approve, "g", Shows("Jump?"), ("", "")),
+    row(Action::Approve, "g", Hides("Jump?"), ("", "Trial #1: judge it")),
+    row(Action::HandValue, "=", Shows("measured by hand"), ("0.5\r", "by hand")),
+    row(Action::Note, "m", Shows("Note on trial #1"), ("slid\r", "note on trial 1")),
+    row(Action::Void, "v", Hides("judge it"), ("", "undo")),
+    row(Action::Undo, "u", Shows("judge it"), ("", "")),
+    row(Action::Rerun, "r", Shows("re-run of #1"), ("u", "judge it")),
+    row(Action::Fall, "f", Shows("Study finished"), ("u", "judge it")),
+    row(Action::Accept, "a", Shows("Study finished"), ("", "")),
+    row(Action::Continue, "C", Shows("How many more trials?"), ("\r", "Trial #2")),
+    row(Action::Interrupt, "Ctrl-C", Shows("Ctrl-C again within 2 s quits"), ("", "DAMPED")),
+    row(Action::Quit, "q", Shows("The study and its recording are in"), ("", "")),
+];
+
+/// The recorded session, played and then paused at its end.
+const REPLAY: &[Row] = &[
+    row(Action::PlayPause, "p", Shows("paused"), ("", "")),
+    row(Action::NextMarker, "]", Changes, ("", "")),
+    row(Action::PreviousMarker, "[", Changes, ("]]]]", "Trial #2: judge it")),
+    row(Action::StepBack, ",", Changes, ("", "")),
+    row(Action::StepForward, ".", Changes, ("", "")),
+    row(Action::Slower, "<", Shows("x0.5"), ("", "")),
+    row(Action::Faster, ">", Hides("x0.5"), ("", "")),
+    row(Action::Freeze, "z", Shows("VIEW FROZEN"), ("", "")),
+    row(Action::Left, "Left", Shows("cursor -0.08 s"), ("", "")),
+    row(Action::Right, "Right", Shows("cursor -0.00 s"), ("z", "8 s sweep")),
+    row(Action::ZoomIn, "+", Shows("4 s sweep"), ("", "")),
+    row(Action::ZoomOut, "-", Shows("8 s sweep"), ("", "")),
+    row(Action::ChartMode, "w", Shows("8 s scroll"), ("w", "8 s sweep")),
+    row(Action::Series, "t", Shows("FL force"), ("tt", "FL foot")),
+    row(Action::ChooseSeries, "T", Shows("Series of the charts"), ("\x1b", "8 s sweep")),
+    row(Action::TrialsView, "2", Shows("by number"), ("", "")),
+    row(Action::First, "Home", Changes, ("", "")),
+    row(Action::Down, "Down", Changes, ("", "")),
+    row(Action::Up, "Up", Changes, ("", "")),
+    row(Action::Last, "End", Changes, ("", "")),
+    row(Action::PageUp, "PgUp", Changes, ("", "")),
+    row(Action::PageDown, "PgDn", Changes, ("", "")),
+    row(Action::Ghost, "c", Shows("is laid under the charts"), ("", "")),
+    row(Action::Open, "Enter", Shows("objective told"), ("\x1b", "by number")),
+    row(Action::Sort, "s", Shows("by value"), ("", "")),
+    row(Action::Reverse, "S", Shows("by value reversed"), ("", "")),
+    row(Action::Filter, "F", Shows("only accept"), ("FFF", "all (F)")),
+    row(Action::BestOnly, "b", Shows("best only"), ("b", "all (F)")),
+    row(Action::Columns, "x", Shows("Columns of the trial table"), ("\x1b", "by value")),
+    row(Action::Search, "/", Shows("Go to trial"), ("1\r", "by value")),
+    row(Action::Copy, "y", Sends(b"\x1b]52;c;"), ("", "")),
+    row(Action::Export, "e", Shows("written: "), ("", "")),
+    row(Action::OptimizerView, "3", Shows("Landings"), ("", "")),
+    row(Action::OverrideView, "4", Shows("Nothing can be changed now"), ("", "")),
+    row(Action::HealthView, "5", Shows("Recorder"), ("", "")),
+    row(Action::LogView, "6", Shows("all levels"), ("", "")),
+    row(Action::NextView, "Tab", Shows("8 s sweep"), ("", "")),
+    row(Action::PreviousView, "Shift-Tab", Shows("all levels"), ("", "")),
+    row(Action::LiveView, "1", Shows("8 s sweep"), ("", "")),
+    row(Action::Palette, ":", Shows("Actions"), ("\x1b", "8 s sweep")),
+    row(Action::Help, "?", Shows("Keys (1"), ("\x1b", "8 s sweep")),
+    row(Action::Mouse, "M", Shows("mouse on"), ("M", "mouse off")),
+    row(Action::Redraw, "Ctrl-L", Shows("the screen was drawn again"), ("", "")),
+];
+
+/// What a terminal sends for a key.
+fn typed(key: &str) -> String {
+    let named = match key {
+        "Space" => " ",
+        "Enter" => "\r",
+        "Esc" => "\x1b",
+        "Tab" => "\t",
+        "Shift-Tab" => "\x1b[Z",
+        "Up" => "\x1b[A",
+        "Down" => "\x1b[B",
+        "Right" => "\x1b[C",
+        "Left" => "\x1b[D",
+        "Home" => "\x1b[H",
+        "End" => "\x1b[F",
+        "PgUp" => "\x1b[5~",
+        "PgDn" => "\x1b[6~",
+        "F12" => "\x1b[24~",
+        _ => "",
+    };
+    match (named, key.strip_prefix("Ctrl-").and_then(|letter| letter.bytes().next())) {
+        ("", Some(letter)) => char::from(letter & 0x1f).to_string(),
+        ("", None) => key.to_owned(),
+        (named, _) => named.to_owned(),
+    }
+}
+
+fn play(session: &mut Session, rows: &[Row]) {
+    for row in rows {
+        let name = row.action.info().name;
+        let (before, bytes) = (session.screen(), session.bytes());
+        session.send(&typed(row.key));
+        match row.seen {
+            Shows(text) => {
+                assert!(!before.contains(text), "{name}: `{text}` was there before {}:\n{before}", row.key);
+                session.wait_for(&[text]);
+            }
+            Hides(text) => {
+                assert!(before.contains(text), "{name}: `{text}` was not there before {}:\n{before}", row.key);
+                session.wait_until(&format!("{name} hides `{text}`"), || !session.screen().contains(text));
+            }
+            Changes => session.wait_until(&format!("{name} changes the screen"), || session.screen() != before),
+            Sends(wanted) => {
+                session.wait_until(&format!("{name} sends its bytes"), || session.sent_after(bytes, wanted));
+            }
+            Suspends => {
+                session.wait_until("the terminal is given back", || session.restored() && session.cooked());
+                session.signal(Signal::SIGCONT);
+                session.wait_until("the terminal is taken again", || !session.restored());
+            }
+        }
+        if row.action == Action::Approve {
+            // The second moment of an approval.
+            std::thread::sleep(Duration::from_millis(500));
+        }
+        let (keys, text) = row.after;
+        for key in keys.split_inclusive(|_: char| !keys.contains('\x1b')) {
+            session.send(key);
+            std::thread::sleep(Duration::from_millis(50));
+        }
+        if !text.is_empty() {
+            session.wait_for(&[text]);
+        }
+    }
+}
+
+#[test]
+fn every_key_of_the_keymap_has_a_row() {
+    let keymap = Settings::built_in().keymap;
+    let wanted: BTreeSet<(&str, String)> =
+        ACTIONS.iter().flat_map(|info| keymap.keys(info.action).map(|key| (info.name, key.to_string()))).collect();
+    let rows: BTreeSet<(&str, String)> =
+        LIVE.iter().chain(REPLAY).map(|row| (row.action.info().name, row.key.to_owned())).collect();
+    assert_eq!(wanted.difference(&rows).collect::<Vec<_>>(), Vec::<&(&str, String)>::new(), "keys without a row");
+    assert_eq!(rows.difference(&wanted).collect::<Vec<_>>(), Vec::<&(&str, String)>::new(), "rows without a key");
+}
+
+#[test]
+fn every_key_of_a_live_session_is_seen() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut session = Session::start(folder.path(), (120, 40), &["--trials", "1", "--seed", "3"]);
+    session.wait_for(&["Press A to arm"]);
+    play(&mut session, LIVE);
+    assert!(session.wait().success());
+    assert!(session.restored() && session.cooked());
+}
+
+#[test]
+fn every_key_of_a_replay_is_seen() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut command = CommandBuilder::new(env!("CARGO_BIN_EXE_quadfrog"));
+    command.arg("replay");
+    command.arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/console/session.mcap"));
+    let mut session = Session::run(folder.path(), (120, 40), command);
+    session.wait_for(&["p pauses"]);
+    play(&mut session, REPLAY);
+    let exported = std::fs::read_to_string(folder.path().join("trials.csv")).expect("the exported table");
+    assert_eq!(exported.lines().count(), 4, "{exported}");
+    session.send("q");
+    assert!(session.wait().success());
+}

@@ -1,0 +1,564 @@
+//! What the keys of the views do: charts, trial table, mouse, replay. Keys in, screen out.
+
+mod support;
+
+use std::path::Path;
+
+use quadfrog::realtime::telemetry::{Mode, Phase};
+use quadfrog::recording::player::Player;
+use quadfrog::recording::record::{Record, Stage, TrialRecord, Verdict};
+use quadfrog_console::dialog::Dialog;
+use quadfrog_console::feed::Feed;
+use quadfrog_console::model::View;
+use quadfrog_console::settings::{BellCause, DEFAULT, Settings};
+use quadfrog_console::theme::{Colours, Glyphs, Theme};
+use quadfrog_console::update::{Effect, Mouse, Msg};
+use quadfrog_console::view::trial_text;
+use support::{Console, tick, trial};
+
+/// A console that has seen the jumps of some trials, each a second after the one before; roll says which one it was.
+fn jumped(trials: &[u32]) -> Console {
+    let mut console = Console::ready();
+    for (index, number) in trials.iter().enumerate() {
+        let from_ms = 1_000 + 2_000 * index as u64;
+        for time_ms in (0..1_000).step_by(5) {
+            let phase = match time_ms {
+                0..200 => Phase::Stance,
+                200..400 => Phase::Impulse,
+                400..700 => Phase::Flight,
+                _ => Phase::Landing,
+            };
+            let jump = Some((*number, time_ms as f64 / 1e3 - 0.2, phase));
+            let roll = 0.01 * f64::from(*number) + 0.1 * (time_ms as f64 / 200.0).sin();
+            console.tell(Msg::Tick(Box::new(tick(from_ms + time_ms, roll, jump))));
+        }
+        console.record(Record::Trial(trial(*number, Some(Verdict::Accept), None)));
+    }
+    console
+}
+
+fn first_screen_line_with(screen: &str, text: &str) -> String {
+    screen.lines().find(|line| line.contains(text)).unwrap_or_else(|| panic!("no {text} in\n{screen}")).to_owned()
+}
+
+#[test]
+fn frozen_charts_stand_still_and_every_view_says_for_how_long() {
+    let mut console = jumped(&[0]);
+    console.press(&["z"]);
+    let before = console.screen(80, 24);
+    for time_ms in (5_000..9_000).step_by(5) {
+        console.tell(Msg::Tick(Box::new(tick(time_ms, 0.2, None))));
+    }
+    console.wait(12_300);
+    let after = console.screen(80, 24);
+    assert!(after.contains("VIEW FROZEN -12.3 s"), "{after}");
+    let charts = |screen: &str| screen.lines().skip(3).take(14).collect::<Vec<_>>().join("\n");
+    assert_eq!(charts(&before), charts(&after));
+    for view in ["2", "3", "4", "5", "6"] {
+        console.press(&[view]);
+        assert!(console.screen(80, 24).contains("VIEW FROZEN"), "view {view}");
+    }
+    console.press(&["1", "z"]);
+    let running = console.screen(80, 24);
+    assert!(!running.contains("FROZEN") && charts(&running) != charts(&before), "{running}");
+}
+
+#[test]
+fn the_cursor_reads_the_values_of_its_time() {
+    let mut console = Console::ready();
+    for time_ms in (0..8_000).step_by(5) {
+        console.tell(Msg::Tick(Box::new(tick(time_ms, time_ms as f64 * 1e-5, None))));
+    }
+    assert!(console.screen(80, 24).contains("roll +0.080 rad"));
+    // Each step is a hundredth of the window of 8 s.
+    console.press(&["Left", "Left", "Left", "Left", "Left"]);
+    let screen = console.screen(80, 24);
+    assert!(screen.contains("roll +0.076 rad") && screen.contains("cursor -0.40 s"), "{screen}");
+    console.press(&["Right", "Right", "Right", "Right", "Right", "Right"]);
+    assert!(console.screen(80, 24).contains("cursor -0.00 s"), "not beyond the newest sample");
+}
+
+#[test]
+fn zooming_halves_and_doubles_the_window_from_1_to_60_s() {
+    let mut console = Console::ready();
+    assert!(console.screen(80, 24).contains("8 s sweep"));
+    console.press(&["+"]);
+    assert!(console.screen(80, 24).contains("4 s sweep"));
+    console.press(&["+", "+", "+", "+"]);
+    assert!(console.screen(80, 24).contains(" 1 s sweep"));
+    console.press(&["-"; 10]);
+    assert!(console.screen(80, 24).contains("60 s sweep"));
+}
+
+#[test]
+fn sweep_and_scroll_draw_the_same_samples_at_different_places() {
+    let mut console = jumped(&[0]);
+    let sweep = console.screen(120, 40);
+    console.press(&["w"]);
+    let scroll = console.screen(120, 40);
+    assert!(sweep.contains("8 s sweep") && scroll.contains("8 s scroll"));
+    let newest = |screen: &str| first_screen_line_with(screen, "fll").find("fll");
+    assert!(newest(&sweep) < newest(&scroll), "a jump just seen is at the right edge when scrolling:\n{scroll}");
+}
+
+#[test]
+fn the_keys_of_the_series_change_what_is_drawn() {
+    let mut console = jumped(&[0]);
+    let shows = |console: &Console, texts: &[&str]| {
+        let screen = console.screen(80, 24);
+        for text in texts {
+            assert!(screen.contains(text), "no {text}:\n{screen}");
+        }
+    };
+    shows(&console, &["roll ", "pitch ", "FL foot", "RR foot"]);
+    console.press(&["t"]);
+    shows(&console, &["height ", "oscillator ", "FL force", "RR force"]);
+    console.press(&["t"]);
+    shows(&console, &["Joints", "limits are not known", "Robot"]);
+    console.press(&["t"]);
+    shows(&console, &["roll "]);
+    // The dialog: roll off, height on; the charts behind it follow at once.
+    console.press(&["T"]);
+    shows(&console, &["Series of the charts", "[x] roll", "[ ] height"]);
+    console.press(&["x", "Down", "Down", "Down", "Down", "Down", "Down", "x", "Enter"]);
+    let screen = console.screen(80, 24);
+    assert!(!screen.contains("roll ") && screen.contains("height "), "{screen}");
+    // The last one cannot be switched off.
+    console.press(&["T"]);
+    for _ in 0..12 {
+        console.press(&["x", "Down"]);
+    }
+    console.press(&["Home"]);
+    for _ in 0..12 {
+        console.press(&["x", "Down"]);
+    }
+    console.press(&["Enter"]);
+    assert!(!console.model.live.series.is_empty());
+}
+
+#[test]
+fn charts_without_room_are_counted() {
+    let mut console = Console::ready();
+    console.press(&["T"]);
+    for _ in 0..6 {
+        console.press(&["Down"]);
+    }
+    for _ in 0..6 {
+        console.press(&["x", "Down"]);
+    }
+    console.press(&["Esc"]);
+    assert_eq!(console.model.live.series.len(), 12);
+    assert!(console.screen(80, 24).contains("4 more have no room"), "{}", console.screen(80, 24));
+    assert!(!console.screen(120, 60).contains("no room"));
+}
+
+#[test]
+fn joints_contact_and_wireframe_are_there_at_every_size() {
+    for (columns, rows) in [(80, 24), (120, 40), (200, 60)] {
+        let mut console = jumped(&[0]);
+        let robot = quadfrog::robot::description::RobotDescription::embedded("go1").expect("the robot");
+        console.model.robot = Some(robot);
+        let mut newest = tick(9_000, 0.0, None);
+        newest.state.joint_torque[1] = -20.0;
+        newest.limited = 0b10;
+        newest.estimate.contact = [true, false, true, false];
+        let counters = console.model.snapshot.counters;
+        let snapshot = quadfrog::realtime::telemetry::Snapshot { tick: newest, counters };
+        console.tell(Msg::Snapshot(Box::new(snapshot)));
+        console.press(&["t", "t"]);
+        let screen = console.screen(columns, rows);
+        assert!(screen.contains("FR● FL○ RR● RL○"), "{screen}");
+        let thigh = first_screen_line_with(&screen, "FR thigh");
+        assert!(thigh.contains("-20.0!") && thigh.contains('█'), "{thigh}");
+        for joint in ["FR hip", "FL calf", "RR thigh", "RL calf"] {
+            assert!(screen.contains(joint), "no {joint}:\n{screen}");
+        }
+    }
+}
+
+#[test]
+fn a_ghost_lies_under_the_jump_that_runs() {
+    let mut console = jumped(&[0, 1]);
+    let without = console.screen(120, 40);
+    console.press(&["c"]);
+    assert_eq!(console.said(), "trial 1 is laid under the charts of a jump; a second one in Trials compares the two");
+    console.press(&["2", "Home", "1"]);
+    assert_ne!(console.screen(120, 40), without);
+    console.press(&["c"]);
+    assert_eq!(console.model.live.ghost, None, "the same key takes it away");
+}
+
+#[test]
+fn any_two_trials_are_compared_in_live() {
+    let mut console = jumped(&[0, 1, 2]);
+    console.press(&["2", "Home", "c", "End", "c"]);
+    assert_eq!(console.said(), "A is trial 0, B is trial 2: 1 shows both in Live");
+    assert!(first_screen_line_with(&console.screen(80, 24), "   0~").contains("accept"));
+    console.press(&["1"]);
+    let screen = console.screen(120, 40);
+    assert!(screen.contains("A #0 coloured, B #2 green, at +0.00 s"), "{screen}");
+    // At the start of the impulse, 0.2 s in: 0.1 sin 1 = 0.084; B is 0.02 above A.
+    assert!(first_screen_line_with(&screen, "roll").contains("A +0.084 B +0.104 rad"), "{screen}");
+    // 1 s of both is the window; a step is a hundredth of it.
+    let steps: Vec<&str> = ["Right"; 20].to_vec();
+    console.press(&steps);
+    let screen = console.screen(120, 40);
+    assert!(screen.contains("at +0.20 s"), "{screen}");
+    console.press(&["c"]);
+    assert!(!console.screen(120, 40).contains("coloured"));
+    // The same trial twice is no comparison.
+    console.press(&["2", "End", "c", "c"]);
+    assert_eq!(console.said(), "no trial is laid under the charts");
+}
+
+#[test]
+fn a_trial_without_a_trace_cannot_be_a_ghost() {
+    let mut console = jumped(&[1]);
+    console.record(Record::Trial(trial(0, Some(Verdict::Accept), None)));
+    console.press(&["2", "Home", "c"]);
+    assert_eq!(console.said(), "no trace of that trial: this console did not see its jump");
+}
+
+/// Twelve trials: accept, fall, void in turn.
+fn twelve() -> Console {
+    let mut console = Console::ready();
+    for number in 0..12 {
+        console.record(Record::Trial(trial(number, Some(Verdict::ALL[number as usize % 3]), None)));
+    }
+    console.press(&["2"]);
+    console
+}
+
+fn numbers(console: &Console) -> Vec<u32> {
+    console.model.table().iter().map(|row| row.trial).collect()
+}
+
+#[test]
+fn sorting_puts_what_has_no_value_last_both_ways() {
+    let mut console = twelve();
+    let odd = TrialRecord { value: Some(f64::NAN), ..trial(12, Some(Verdict::Accept), None) };
+    console.record(Record::Trial(odd));
+    console.press(&["s"]);
+    assert!(console.screen(80, 24).contains("by value (s)"), "{}", console.screen(80, 24));
+    assert_eq!(numbers(&console)[..4], [9, 6, 3, 0]);
+    assert_eq!(numbers(&console)[8..], [2, 5, 8, 11, 12], "voids and what is no number");
+    console.press(&["S"]);
+    assert!(console.screen(80, 24).contains("by value reversed"));
+    assert_eq!(numbers(&console)[4..8], [0, 3, 6, 9]);
+    assert_eq!(numbers(&console)[8..], [2, 5, 8, 11, 12], "still last");
+}
+
+#[test]
+fn the_sorting_key_goes_through_all_shown_columns() {
+    let mut console = twelve();
+    let mut seen = Vec::new();
+    for _ in 0..8 {
+        console.press(&["s"]);
+        let line = first_screen_line_with(&console.screen(200, 60), "; by ");
+        let by = line.split("; by ").nth(1).and_then(|rest| rest.split(" (").next()).expect("a column").to_owned();
+        seen.push(by);
+    }
+    assert_eq!(seen, ["value", "verdict", "f0", "Fx", "Fz", "source", "cause", "number"]);
+}
+
+#[test]
+fn columns_are_chosen_in_a_dialog_and_in_the_settings() {
+    let mut console = twelve();
+    assert!(console.screen(80, 24).contains("Fx N"));
+    console.press(&["x"]);
+    assert!(console.screen(80, 24).contains("Columns of the trial table"));
+    console.press(&["x", "Down", "x", "Enter"]);
+    let screen = console.screen(80, 24);
+    assert!(!screen.contains("Fx N") && screen.contains("dx m"), "{screen}");
+    assert!(first_screen_line_with(&screen, "   0 ").contains("+0.420"), "{screen}");
+
+    let mut table: toml::Table = DEFAULT.parse().expect("the defaults");
+    table.insert("trial_columns".into(), vec!["apex", "value"].into());
+    table.insert("chart_series".into(), vec!["height"].into());
+    let settings = Settings::from_table(&table).expect("columns that exist");
+    let mut console = Console::with(settings, Theme { colours: Colours::None, glyphs: Glyphs::Ascii });
+    console.record(Record::Trial(trial(0, Some(Verdict::Accept), None)));
+    console.press(&["2"]);
+    let screen = console.screen(80, 24);
+    assert!(screen.contains("apex m") && !screen.contains("verdict  source"), "{screen}");
+    for (key, wrong) in [("trial_columns", "colour"), ("chart_series", "mood")] {
+        let mut table: toml::Table = DEFAULT.parse().expect("the defaults");
+        table.insert(key.into(), vec![wrong].into());
+        let error = Settings::from_table(&table).expect_err(wrong).to_string();
+        assert!(error.contains(key) && error.contains(wrong) && error.contains("is not one of"), "{error}");
+        table.insert(key.into(), toml::Value::Array(Vec::new()));
+        assert!(Settings::from_table(&table).is_err(), "no column at all");
+    }
+}
+
+#[test]
+fn the_filter_the_best_and_a_number_find_rows() {
+    let mut console = twelve();
+    console.press(&["F"]);
+    assert_eq!(numbers(&console), [0, 3, 6, 9]);
+    console.press(&["F", "F"]);
+    assert_eq!(numbers(&console), [2, 5, 8, 11]);
+    console.press(&["F", "b"]);
+    assert_eq!(numbers(&console), [0, 3, 6, 9], "each was the best so far");
+    console.press(&["b", "/", "7", "Enter"]);
+    assert_eq!(console.model.trials_view.selected, Some(7));
+    console.press(&["/", "9", "9", "Enter"]);
+    assert!(console.screen(80, 24).contains("there is no trial 99"), "{}", console.screen(80, 24));
+}
+
+#[test]
+fn details_tell_everything_that_is_known_of_a_trial() {
+    let mut console = Console::ready();
+    let first = TrialRecord { note: "slid on the mat".into(), ..trial(0, Some(Verdict::Void), Some(Verdict::Fall)) };
+    console.record(Record::Trial(first));
+    let again = TrialRecord { parent: Some(0), hand_value: Some(0.37), ..trial(1, Some(Verdict::Accept), None) };
+    console.tell(Msg::Record(quadfrog::recording::record::Stamped {
+        time_ns: 61_000_000_000,
+        record: Record::Stage(quadfrog::recording::record::StageInfo {
+            stage: Stage::Running,
+            trial: 1,
+            can_undo: false,
+        }),
+    }));
+    console.tell(Msg::Record(quadfrog::recording::record::Stamped {
+        time_ns: 64_500_000_000,
+        record: Record::Stage(quadfrog::recording::record::StageInfo {
+            stage: Stage::Review,
+            trial: 1,
+            can_undo: false,
+        }),
+    }));
+    console.record(Record::Trial(again));
+    console.press(&["2", "Home", "Enter"]);
+    let screen = console.screen(80, 24);
+    for part in
+        ["Trial #0", "void", "the rules said", "fall: roll 1.20 rad", "75.00000 N", "(0 to 150)", "slid on the mat"]
+    {
+        assert!(screen.contains(part), "no {part}:\n{screen}");
+    }
+    console.press(&["Down"]);
+    let screen = console.screen(80, 24);
+    for part in ["Trial #1", "of trial 0", "by hand", "0.3700 m", "at 01:01 of the session, took 3.5 s"] {
+        assert!(screen.contains(part), "no {part}:\n{screen}");
+    }
+    assert!(first_screen_line_with(&screen, "attempt").contains('2'), "{screen}");
+}
+
+#[test]
+fn a_row_is_copied_and_the_table_is_written_as_shown() {
+    let mut console = twelve();
+    console.press(&["Home"]);
+    let effects = console.press(&["y"]);
+    let [Effect::Copy(text)] = effects.as_slice() else { panic!("{effects:?}") };
+    assert!(text.starts_with("trial 0\tf0=1.25\tFx=75\tFz=250\tJ=0.4 m\taccept"), "{text}");
+    assert_eq!(console.press(&["e"]), [Effect::Export]);
+    console.press(&["F", "F"]);
+    let csv = trial_text::as_csv(&console.model);
+    let lines: Vec<&str> = csv.lines().collect();
+    assert_eq!(lines.len(), 5, "a heading and the four falls that the filter shows");
+    assert!(lines[0].starts_with("trial,f0,Fx,Fz,value") && lines[1].starts_with("1,1.25,75,250,0,"), "{csv}");
+    let columns = |line: &str| line.split(',').count();
+    assert!(lines.iter().all(|line| columns(line) == columns(lines[0])), "{csv}");
+    let markdown = trial_text::as_markdown(&console.model);
+    assert!(markdown.starts_with("| trial | f0 |") && markdown.lines().nth(1).is_some_and(|l| l.contains(" --- |")));
+}
+
+#[test]
+fn csv_cells_with_commas_and_quotes_are_quoted() {
+    let mut console = Console::ready();
+    let row = TrialRecord { note: "slid, \"a bit\"".into(), ..trial(0, Some(Verdict::Accept), None) };
+    console.record(Record::Trial(row));
+    let csv = trial_text::as_csv(&console.model);
+    assert!(csv.contains("\"slid, \"\"a bit\"\"\""), "{csv}");
+}
+
+#[test]
+fn the_mouse_is_off_until_it_is_asked_for_and_never_commands() {
+    let mut console = twelve();
+    console.tell(Msg::Resize(80, 24));
+    let click = |column, row| Msg::Mouse(Mouse::Click { column, row });
+    console.tell(click(2, 2));
+    assert_eq!(console.model.view, View::Trials, "off");
+    assert_eq!(console.press(&["M"]), [Effect::Mouse(true)]);
+    // Tabs.
+    let tabs = console.screen(80, 24).lines().nth(2).expect("tabs").to_owned();
+    for (view, name) in View::ALL.into_iter().zip(["Live", "Trials", "Optimizer", "Override", "Health", "Log"]) {
+        let column = tabs.find(name).expect(name) as u16;
+        assert_eq!(console.tell(click(column, 2)), []);
+        assert_eq!(console.model.view, view);
+    }
+    // Rows of the table, as they stand on the screen.
+    console.press(&["2"]);
+    let screen = console.screen(80, 24);
+    for number in [0_u32, 5, 11] {
+        let row = screen
+            .lines()
+            .position(|line| line.get(1..).is_some_and(|line| line.starts_with(&format!("{number:>3} "))))
+            .expect("its row");
+        console.tell(click(10, row as u16));
+        assert_eq!(console.model.selected_trial().map(|trial| trial.trial), Some(number));
+    }
+    // The wheel.
+    console.press(&["Home"]);
+    console.tell(Msg::Mouse(Mouse::WheelDown));
+    assert_eq!(console.model.trials_view.selected, Some(3));
+    console.tell(Msg::Mouse(Mouse::WheelUp));
+    assert_eq!(console.model.trials_view.selected, Some(0));
+    // Wherever it is clicked, in whatever mode: nothing leaves for the robot.
+    for mode in Mode::ALL {
+        console.mode(mode);
+        for key in ["1", "2", "4"] {
+            console.press(&[key]);
+            for row in 0..24 {
+                for column in (0..80).step_by(4) {
+                    assert_eq!(console.tell(click(column, row)), [], "{mode:?} at {column}, {row}");
+                }
+            }
+        }
+    }
+    assert_eq!(console.press(&["M"]), [Effect::Mouse(false)]);
+}
+
+#[test]
+fn the_mouse_leaves_dialogs_alone() {
+    let mut console = Console::ready();
+    console.press(&["M", "g"]);
+    console.tell(Msg::Mouse(Mouse::Click { column: 2, row: 2 }));
+    assert!(matches!(console.model.dialog, Some(Dialog::Approve { .. })));
+}
+
+#[test]
+fn each_cause_rings_the_bell_only_where_the_settings_name_it() {
+    let all = [BellCause::Fault, BellCause::Fall, BellCause::Verdict, BellCause::Proposal];
+    for named in all {
+        let mut console = Console::ready();
+        console.model.bell = vec![named];
+        let mut rung = Vec::new();
+        let fault = Record::Transition(quadfrog::recording::record::Transition {
+            from: Mode::Ready,
+            to: Mode::Fault,
+            cause: "test".into(),
+        });
+        if console.record(fault).contains(&Effect::Bell) {
+            rung.push(BellCause::Fault);
+        }
+        if console.record(Record::Trial(trial(0, None, Some(Verdict::Fall)))).contains(&Effect::Bell) {
+            rung.push(BellCause::Fall);
+        }
+        if console.stage(Stage::Review, 0).contains(&Effect::Bell) {
+            rung.push(BellCause::Verdict);
+        }
+        if console.stage(Stage::Proposed, 1).contains(&Effect::Bell) {
+            rung.push(BellCause::Proposal);
+        }
+        assert_eq!(rung, [named]);
+    }
+}
+
+#[test]
+fn the_first_screen_names_every_key_that_a_newcomer_needs() {
+    let console = Console::proposed();
+    let screen = console.screen(80, 24);
+    for part in [
+        "STOP  Space F12",
+        "Press A to arm",
+        "o override",
+        "g approve; again after 0.3 s: the robot jumps",
+        "a accept   f fall   v void   r re-run",
+        "q quit",
+        "? all keys",
+    ] {
+        assert!(screen.contains(part), "no {part}:\n{screen}");
+    }
+}
+
+/// The recorded session, played as the program plays it.
+struct Played {
+    console: Console,
+    feed: Feed,
+}
+
+impl Played {
+    fn new() -> Played {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/console/session.mcap");
+        let mut played =
+            Played { console: Console::new(), feed: Feed::replay(Player::open(file).expect("the recorded session")) };
+        played.wait(0);
+        played
+    }
+
+    /// Lets time pass.
+    fn wait(&mut self, milliseconds: u64) {
+        for msg in self.feed.take(milliseconds * 1_000_000) {
+            self.console.tell(msg);
+        }
+    }
+
+    fn press(&mut self, key: &str) {
+        for effect in self.console.press(&[key]) {
+            let Effect::Replay(command) = effect else { panic!("{key}: {effect:?}") };
+            self.feed.command(command);
+        }
+        self.wait(0);
+    }
+
+    fn time_ms(&self) -> u64 {
+        self.console.model.replay.as_ref().expect("a replay").time_ns / 1_000_000
+    }
+}
+
+#[test]
+fn a_replay_plays_pauses_steps_and_changes_its_speed() {
+    let mut played = Played::new();
+    played.wait(1_000);
+    assert_eq!(played.time_ms(), 1_000);
+    assert!(played.console.screen(80, 24).contains("p pauses"));
+    played.press("p");
+    played.wait(1_000);
+    assert_eq!(played.time_ms(), 1_000, "paused");
+    assert!(played.console.screen(80, 24).contains("paused") && played.console.screen(80, 24).contains("p plays"));
+    played.press(".");
+    assert_eq!(played.time_ms(), 1_005, "a tick of the charts");
+    played.press(",");
+    played.press(",");
+    assert_eq!(played.time_ms(), 995);
+    played.press("p");
+    played.press(">");
+    played.wait(1_000);
+    assert_eq!(played.time_ms(), 2_995, "twice the speed");
+    assert!(played.console.screen(80, 24).contains(" x2"));
+    played.press("<");
+    played.press("<");
+    played.wait(1_000);
+    assert_eq!(played.time_ms(), 3_495, "half of it");
+    assert!(played.console.screen(80, 24).contains(" x0.5"));
+}
+
+#[test]
+fn markers_take_a_replay_from_trial_to_trial_and_to_the_end() {
+    let mut played = Played::new();
+    played.press("p");
+    let mut times = vec![played.time_ms()];
+    for _ in 0..20 {
+        played.press("]");
+        times.push(played.time_ms());
+    }
+    times.dedup();
+    assert!(times.len() == 4 && times.is_sorted(), "{times:?}");
+    assert_eq!(played.console.model.trials.len(), 3, "all trials at the end");
+    played.press("[");
+    let marker = played.time_ms();
+    assert!(times.contains(&marker) && marker < times[times.len() - 1]);
+    for _ in 0..20 {
+        played.press("[");
+    }
+    assert_eq!(played.time_ms(), 0);
+    assert_eq!(played.console.model.trials.len(), 0, "what was not yet, is not shown");
+    // From the end, playing starts over.
+    for _ in 0..20 {
+        played.press("]");
+    }
+    played.press("p");
+    played.wait(500);
+    assert_eq!(played.time_ms(), 500);
+}

@@ -1,0 +1,171 @@
+//! The control thread's own checks before arming: it refuses whatever the session says, and each item fails by itself.
+
+use nalgebra::{UnitQuaternion, Vector3};
+use quadfrog::config::{Backend, Config};
+use quadfrog::control::cycle::{Cycle, Inputs};
+use quadfrog::control::settings::Settings;
+use quadfrog::realtime::clock::SimulatedClock;
+use quadfrog::realtime::command::{Command, Task};
+use quadfrog::realtime::pre_arm::Check;
+use quadfrog::realtime::telemetry::{Event, Mode, Objection};
+use quadfrog::robot::description::RobotDescription;
+use quadfrog::robot::{Battery, JointCommand, LinkStatus, Placement, Robot, RobotError, RobotState};
+
+/// A robot that reports what it is told to.
+struct Told {
+    state: Result<RobotState, RobotError>,
+    link: LinkStatus,
+}
+
+impl Robot for Told {
+    fn read(&mut self) -> Result<RobotState, RobotError> {
+        if let Ok(state) = &mut self.state {
+            state.robot_time_ms += 1;
+        }
+        self.state
+    }
+    fn write(&mut self, _: &JointCommand) -> Result<(), RobotError> {
+        Ok(())
+    }
+    fn place(&mut self, _: &Placement) -> bool {
+        false
+    }
+    fn link(&self) -> Option<LinkStatus> {
+        Some(self.link)
+    }
+}
+
+struct Bench {
+    cycle: Cycle,
+    robot: Told,
+    settings: Settings,
+    time_ns: u64,
+    lateness_ns: u64,
+}
+
+impl Bench {
+    /// Lies, disarmed, and has been looked at for a while: everything holds.
+    fn new() -> Bench {
+        let description = RobotDescription::embedded("go1").unwrap();
+        let config = Config::load(None).unwrap();
+        let settings = config.settings(&description, Task::Forward, Backend::Hardware).unwrap();
+        let state = RobotState {
+            joint_position: settings.lying_position,
+            motor_enabled: [true; 12],
+            motor_temperature_c: [30.0; 12],
+            battery: Some(Battery { charge_percent: 80.0, voltage_v: 24.0, current_a: 0.0, cell_v: [0.0; 10] }),
+            ..RobotState::default()
+        };
+        let robot = Told { state: Ok(state), link: LinkStatus { recent_received: 5000, ..LinkStatus::default() } };
+        let mut bench = Bench { cycle: Cycle::new(&settings), robot, settings, time_ns: 0, lateness_ns: 0 };
+        bench.tick(None);
+        bench.tick(Some(Command::TakeControl));
+        bench.ticks(6000);
+        bench
+    }
+
+    fn tick(&mut self, command: Option<Command>) {
+        self.time_ns += 1_000_000;
+        let inputs = Inputs { time_ns: self.time_ns, lateness_ns: self.lateness_ns, command, ..Inputs::default() };
+        self.cycle.tick(&inputs, &SimulatedClock, &mut self.robot);
+    }
+
+    fn ticks(&mut self, count: u32) {
+        for _ in 0..count {
+            self.tick(None);
+        }
+    }
+
+    fn state(&mut self) -> &mut RobotState {
+        self.robot.state.as_mut().unwrap()
+    }
+
+    /// Asks to stand up: the checks that were named, none if it stands up.
+    fn arm(&mut self) -> Vec<Check> {
+        self.tick(Some(Command::Arm));
+        let refused = self.cycle.events().iter().find_map(|event| match event {
+            Event::Refused { because: Objection::Checks(checks), .. } => Some(checks),
+            _ => None,
+        });
+        assert_eq!(refused.is_none(), self.cycle.mode() == Mode::StandUp);
+        refused.map(|checks| checks.iter().collect()).unwrap_or_default()
+    }
+}
+
+#[test]
+fn a_sound_robot_is_armed() {
+    assert_eq!(Bench::new().arm(), []);
+}
+
+/// Each item is broken alone, is named alone, and holds again once it is mended.
+#[test]
+fn each_item_forbids_arming_by_itself() {
+    type Breaks = fn(&mut Bench);
+    let table: [(Check, Breaks); 13] = [
+        (Check::StateFresh, |b| b.robot.state = Err(RobotError::Silent { age_ms: 12 })),
+        (Check::Loss, |b| b.robot.link.recent_lost = 60),
+        (Check::Checksums, |b| b.robot.link.recent_corrupt = 1),
+        (Check::Upright, |b| {
+            b.state().imu.orientation_world = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), 0.25);
+        }),
+        (Check::JointsInside, |b| b.state().joint_position[2] = -2.83),
+        (Check::LyingDown, |b| b.state().joint_position[4] = 0.6),
+        (Check::Battery, |b| b.state().battery.as_mut().unwrap().charge_percent = 29.0),
+        (Check::Battery, |b| b.state().battery = None),
+        (Check::MotorsCool, |b| b.state().motor_temperature_c[11] = 61.0),
+        (Check::GyroStill, |b| b.state().imu.gyro_body.y = 0.2),
+        (Check::OnTime, |b| {
+            b.lateness_ns = 600_000;
+            b.ticks(60);
+            b.lateness_ns = 0;
+        }),
+        (Check::MotorsCool, |b| b.state().motor_temperature_c[3] = f64::NAN),
+        (Check::Battery, |b| b.state().battery.as_mut().unwrap().charge_percent = f64::NAN),
+    ];
+    for (check, breaks) in table {
+        let mut bench = Bench::new();
+        breaks(&mut bench);
+        assert_eq!(bench.arm(), [check]);
+        assert_eq!(bench.cycle.mode(), Mode::Disarmed);
+    }
+}
+
+#[test]
+fn all_that_fails_is_named_at_once() {
+    let mut bench = Bench::new();
+    bench.robot.link.recent_corrupt = 3;
+    bench.state().battery = None;
+    bench.state().imu.gyro_body.z = 1.0;
+    assert_eq!(bench.arm(), [Check::Checksums, Check::Battery, Check::GyroStill]);
+}
+
+/// One still moment is not enough, and five seconds later the late ticks are forgotten.
+#[test]
+fn stillness_must_last_and_lateness_is_forgotten() {
+    let mut bench = Bench::new();
+    bench.state().imu.gyro_body.z = 1.0;
+    bench.lateness_ns = 2_000_000;
+    bench.ticks(100);
+    bench.state().imu.gyro_body.z = 0.0;
+    bench.lateness_ns = 0;
+    bench.ticks(900);
+    assert_eq!(bench.arm(), [Check::GyroStill, Check::OnTime]);
+    bench.ticks(200);
+    assert_eq!(bench.arm(), [Check::OnTime]);
+    bench.ticks(5000);
+    assert_eq!(bench.arm(), []);
+}
+
+/// What both the URDF and the official SDK allow, joint by joint.
+#[test]
+fn joint_limits_are_the_intersection_of_the_urdf_and_the_official_sdk() {
+    let Bench { settings, .. } = Bench::new();
+    for leg in 0..4 {
+        let limits = |joint: usize| (settings.min_position[3 * leg + joint], settings.max_position[3 * leg + joint]);
+        assert_eq!(limits(0), (-0.863, 0.863), "hip: the URDF's");
+        assert_eq!(limits(1), (-0.663, 2.966), "thigh: the SDK's");
+        assert_eq!(limits(2), (-2.721, -0.888), "calf: the lower of the SDK's, the upper of the URDF's");
+    }
+    let (lying, min) = (settings.lying_position, settings.min_position);
+    assert!((0..12).all(|i| lying[i] >= min[i]), "sitting down asks for nothing beyond a limit: {lying:?}");
+}

@@ -1,0 +1,695 @@
+//! The table of watchdogs, row by row: what trips, in which modes, how soon damping is sent, and what the fault says. And that a
+//! sound robot that jumps trips none.
+
+use std::collections::BTreeSet;
+
+use nalgebra::{UnitQuaternion, Vector3};
+use proptest::prelude::*;
+use quadfrog::config::{Backend, Config};
+use quadfrog::control::cycle::{Cycle, Inputs};
+use quadfrog::control::settings::Settings;
+use quadfrog::engine::{Options, open_life};
+use quadfrog::optimize::journal::Durability;
+use quadfrog::realtime::clock::SimulatedClock;
+use quadfrog::realtime::command::{Approval, Command, JumpParameters, Task, TrialSpec};
+use quadfrog::realtime::telemetry::{Cause, Event, FallCause, Fault, Hold, Mode, Objection, Tick, TrialEnd};
+use quadfrog::robot::description::RobotDescription;
+use quadfrog::robot::{Battery, JOINTS, JointCommand, LEGS, LinkStatus, Placement, Robot, RobotError, RobotState};
+use quadfrog::session::automatic;
+use quadfrog::session::rollout::Rollout;
+use quadfrog::sim::Simulator;
+
+/// The simulator, seen as a Go1 over a link, whose reports can be tampered with and whose commands are kept.
+struct Tampered {
+    simulator: Simulator,
+    tamper: fn(&mut RobotState),
+    silent_ms: u32,
+    send_errno: Option<i32>,
+    link: LinkStatus,
+    /// Commands since the tampering began.
+    sent: Vec<JointCommand>,
+}
+
+impl Robot for Tampered {
+    fn read(&mut self) -> Result<RobotState, RobotError> {
+        if self.silent_ms > 0 {
+            self.silent_ms += 1;
+            return Err(RobotError::Silent { age_ms: self.silent_ms });
+        }
+        let mut state = self.simulator.read()?;
+        state.motor_temperature_c = [35.0; JOINTS];
+        state.battery = Some(Battery { charge_percent: 80.0, voltage_v: 24.0, current_a: -2.0, cell_v: [0.0; 10] });
+        (self.tamper)(&mut state);
+        Ok(state)
+    }
+    fn write(&mut self, command: &JointCommand) -> Result<(), RobotError> {
+        self.sent.push(*command);
+        self.simulator.write(command)?;
+        self.send_errno.map_or(Ok(()), |errno| Err(RobotError::Send { errno }))
+    }
+    fn place(&mut self, _: &Placement) -> bool {
+        false
+    }
+    fn link(&self) -> Option<LinkStatus> {
+        Some(self.link)
+    }
+}
+
+struct Bench {
+    settings: Settings,
+    cycle: Cycle,
+    robot: Tampered,
+    inputs: Inputs,
+    events: Vec<Event>,
+    config: Config,
+}
+
+impl Bench {
+    /// A robot on hardware's terms, lying, disarmed, with everything checked.
+    fn new() -> Bench {
+        let config = Config::load(None).unwrap();
+        let description = RobotDescription::embedded("go1").unwrap();
+        let settings = config.settings(&description, Task::Forward, Backend::Hardware).unwrap();
+        let mut simulator = Simulator::new(&description, &config.simulator).unwrap();
+        simulator.place(&Placement { joint_position: settings.lying_position, lying: true, seed: 0 });
+        let robot = Tampered {
+            simulator,
+            tamper: |_| {},
+            silent_ms: 0,
+            send_errno: None,
+            link: LinkStatus { recent_received: 5000, ..LinkStatus::default() },
+            sent: Vec::new(),
+        };
+        let cycle = Cycle::new(&settings);
+        let mut bench = Bench { settings, cycle, robot, inputs: Inputs::default(), events: Vec::new(), config };
+        bench.tick(None);
+        bench.tick(Some(Command::TakeControl));
+        bench.ticks(1500);
+        bench
+    }
+
+    /// Stands in `mode`, reached as an operator reaches it.
+    fn in_mode(mode: Mode) -> Bench {
+        let mut bench = Bench::new();
+        if mode == Mode::Disarmed {
+            return bench;
+        }
+        bench.tick(Some(Command::Arm));
+        assert_eq!(bench.cycle.mode(), Mode::StandUp);
+        for step in [Mode::StandUp, Mode::Ready, Mode::Countdown, Mode::Jump, Mode::Settle, Mode::Review, Mode::SitDown]
+        {
+            match step {
+                Mode::Countdown => drop(bench.tick(Some(bench.approved()))),
+                Mode::SitDown => drop(bench.tick(Some(Command::SitDown))),
+                _ => bench.until(step),
+            }
+            assert_eq!(bench.cycle.mode(), step);
+            if step == mode {
+                return bench;
+            }
+        }
+        bench.inputs.stop = true;
+        bench.tick(None);
+        bench.inputs.stop = false;
+        assert_eq!(bench.cycle.mode(), mode);
+        bench
+    }
+
+    fn airborne() -> Bench {
+        let mut bench = Bench::in_mode(Mode::Jump);
+        for _ in 0..2000 {
+            if bench.tick(None).estimate.contact == [false; LEGS] {
+                bench.ticks(20);
+                assert_eq!(bench.cycle.last().estimate.contact, [false; LEGS]);
+                return bench;
+            }
+        }
+        panic!("it never flew");
+    }
+
+    fn tick(&mut self, command: Option<Command>) -> Tick {
+        self.inputs.time_ns += 1_000_000;
+        let inputs = Inputs { command, ..self.inputs };
+        let tick = *self.cycle.tick(&inputs, &SimulatedClock, &mut self.robot);
+        self.events.extend(self.cycle.events().iter());
+        tick
+    }
+
+    fn ticks(&mut self, count: u32) {
+        for _ in 0..count {
+            self.tick(None);
+        }
+    }
+
+    fn until(&mut self, mode: Mode) {
+        for _ in 0..20_000 {
+            if self.cycle.mode() == mode {
+                return;
+            }
+            self.tick(None);
+        }
+        panic!("never {mode:?}; last {:?}: {:?}", self.cycle.mode(), self.events.last());
+    }
+
+    fn spec(&self) -> TrialSpec {
+        let control = self.config.task(Task::Forward);
+        TrialSpec {
+            trial: 3,
+            task: Task::Forward,
+            jump: JumpParameters { f0_hz: 1.3, f1_hz: 0.0, fx_n: 60.0, fy_n: 0.0, fz_n: 270.0 },
+            gains: control.gains(),
+            stance_leg: control.stance_leg(),
+            vmc: control.vmc,
+            jumps: 1,
+            seed: 0,
+        }
+    }
+
+    fn approval(&self) -> Approval {
+        let changes = self.events.iter().filter(|event| matches!(event, Event::Mode { .. })).count();
+        Approval { mode_changes: changes as u64, given_ns: self.inputs.time_ns }
+    }
+
+    fn approved(&self) -> Command {
+        Command::RunTrial(self.spec(), self.approval())
+    }
+
+    /// From here on only `count` ticks matter: the tick of them in which damping was sent for the first time, from 1.
+    fn ticks_until_damping(&mut self, count: u32) -> Option<u32> {
+        self.robot.sent.clear();
+        self.events.clear();
+        let damping = JointCommand::damping(self.settings.gate.damping_kd);
+        let mut first = None;
+        for n in 1..=count {
+            let tick = self.tick(None);
+            let damped = self.robot.sent.last() == Some(&damping);
+            if damped {
+                first.get_or_insert(n);
+            }
+            assert!(first.is_none() || (damped && !tick.mode.energised()), "damping goes on being sent");
+        }
+        first
+    }
+
+    fn fault(&self) -> Option<Fault> {
+        self.events.iter().find_map(|event| match event {
+            Event::Mode { to: Mode::Fault, cause: Cause::Fault(fault), .. } => Some(*fault),
+            _ => None,
+        })
+    }
+
+    fn refusal(&self) -> Option<Objection> {
+        self.cycle.events().iter().find_map(|event| match event {
+            Event::Refused { because, .. } => Some(because),
+            _ => None,
+        })
+    }
+}
+
+/// Every CUT row: injected where the robot stands ready, damping on the wire within two ticks of the first bad one, the
+/// fault named with what was measured and what is allowed.
+#[test]
+fn every_cut_row_damps_within_two_ticks_and_names_its_fault() {
+    type Inject = fn(&mut Bench);
+    let rows: [(&str, Inject, &str); 16] = [
+        ("NaN", |b| b.robot.tamper = |s| s.joint_velocity[4] = f64::NAN, "a joint velocity is not a finite number"),
+        ("position high", |b| b.robot.tamper = |s| s.joint_position[2] = -0.7, "FR_calf at -0.700 rad, allowed -0.788"),
+        ("position low", |b| b.robot.tamper = |s| s.joint_position[7] = -0.8, "RR_thigh at -0.800 rad, allowed -0.763"),
+        ("velocity", |b| b.robot.tamper = |s| s.joint_velocity[11] = -41.0, "RL_calf at -41.0 rad/s, allowed 40.1"),
+        ("torque", |b| b.robot.tamper = |s| s.joint_torque[0] = 29.0, "FR_hip at 29.0 N m, allowed 28.4"),
+        ("torque is no number", |b| b.robot.tamper = |s| s.joint_torque[3] = f64::NAN, "FL_hip at NaN N m"),
+        ("motor mode", |b| b.robot.tamper = |s| s.motor_enabled[5] = false, "motor FL_calf left servo mode"),
+        (
+            "hot motor",
+            |b| b.robot.tamper = |s| s.motor_temperature_c[9] = 80.0,
+            "RL_hip at 80 degrees Celsius, allowed 80",
+        ),
+        ("corrupt", |b| b.robot.link.recent_corrupt = 11, "11 states arrived corrupt within 5 s, allowed 10"),
+        ("reboot", |b| b.robot.tamper = |s| s.robot_time_ms = 5, "the robot's clock went backwards"),
+        ("send", |b| b.robot.send_errno = Some(111), "could not be sent (error 111)"),
+        ("late", |b| b.inputs.lateness_ns = 10_100_000, "control thread 10.1 ms late, allowed 10.0"),
+        ("events", |b| b.inputs.events_lost = true, "the session does not take events"),
+        ("roll", |b| b.robot.tamper = |s| tilt(s, Vector3::x_axis(), 0.36), "tilted by 0.36 rad, allowed 0.35"),
+        ("pitch", |b| b.robot.tamper = |s| tilt(s, Vector3::y_axis(), -0.36), "tilted by 0.36 rad, allowed 0.35"),
+        (
+            "accelerometer",
+            |b| b.robot.tamper = |s| s.imu.accel_body.x = f64::INFINITY,
+            "the acceleration is not a finite",
+        ),
+    ];
+    for (name, inject, words) in rows {
+        let mut bench = Bench::in_mode(Mode::Ready);
+        inject(&mut bench);
+        let damped = bench.ticks_until_damping(50);
+        assert!(damped.is_some_and(|ticks| ticks <= 2), "{name}: damping after {damped:?} ticks");
+        let fault = bench.fault().unwrap_or_else(|| panic!("{name}: no fault")).to_string();
+        assert!(fault.contains(words), "{name}: {fault}");
+        assert_eq!(bench.cycle.mode(), Mode::Fault, "{name}: latched");
+    }
+}
+
+fn tilt(state: &mut RobotState, axis: nalgebra::Unit<Vector3<f64>>, angle: f64) {
+    let tilted = UnitQuaternion::from_axis_angle(&axis, angle);
+    state.imu.orientation_world = tilted;
+    if let Some(truth) = &mut state.truth {
+        truth.orientation_world = tilted;
+    }
+}
+
+/// A state that does not come: nothing at 20 ms, damping in the tick of 21, a lost link by name from 200 ms on.
+#[test]
+fn a_gap_is_cut_at_its_limit_and_becomes_a_lost_link() {
+    let mut bench = Bench::in_mode(Mode::Ready);
+    bench.robot.silent_ms = 1;
+    let damped = bench.ticks_until_damping(300);
+    // The first silent tick reports 2 ms.
+    assert_eq!(damped, Some(bench.settings.watchdog.state_age_ms));
+    assert!(matches!(bench.fault(), Some(Fault::StateAge { age_ms: 21, allowed_ms: 20 })), "{:?}", bench.fault());
+    let lost = bench.events.iter().any(|event| {
+        matches!(
+            event,
+            Event::Mode {
+                from: Mode::Fault,
+                to: Mode::Fault,
+                cause: Cause::Fault(Fault::LinkLost { age_ms: 201, .. }),
+                ..
+            }
+        )
+    });
+    assert!(lost, "{:?}", bench.events);
+}
+
+/// Five control periods in a row of more than twice the period; four are forgiven.
+#[test]
+fn slow_periods_are_counted_and_cut() {
+    let slow = |ticks: u64| {
+        let mut bench = Bench::in_mode(Mode::Ready);
+        for n in 1..=ticks {
+            // 1.5 ms later each time: periods of 2.5 ms.
+            bench.inputs.lateness_ns = n * 1_500_000;
+            bench.tick(None);
+        }
+        bench.inputs.lateness_ns = 0;
+        bench.tick(None);
+        bench
+    };
+    assert_eq!(slow(4).cycle.mode(), Mode::Ready);
+    let bench = slow(5);
+    assert_eq!(bench.cycle.mode(), Mode::Fault);
+    let fault = bench.fault().unwrap().to_string();
+    assert!(fault.contains("5 control periods in a row of 2.5 ms, allowed 2.0"), "{fault}");
+}
+
+/// In simulation a late tick is counted and shown but trips nothing, unless asked.
+#[test]
+fn lateness_trips_nothing_in_simulation_unless_asked() {
+    for (late_ms, expected) in [(0.0, Mode::Ready), (10.0, Mode::Fault)] {
+        let mut bench = Bench::in_mode(Mode::Ready);
+        let settings = Settings { late_ms, hardware: false, ..bench.settings };
+        bench.cycle = Cycle::ready(&settings);
+        bench.tick(None);
+        bench.inputs.lateness_ns = 500_000_000;
+        bench.tick(None);
+        assert_eq!(bench.cycle.mode(), expected, "late_ms = {late_ms}");
+    }
+}
+
+/// A flight that tilts too far is cut before it lands, and counts as a fall: its parameters are to blame.
+#[test]
+fn a_flight_that_tilts_is_cut_as_a_fall() {
+    let mut bench = Bench::airborne();
+    bench.robot.tamper = |state| tilt(state, Vector3::y_axis(), 0.79);
+    bench.ticks(2);
+    assert_eq!(bench.cycle.mode(), Mode::Jump);
+    bench.robot.tamper = |state| tilt(state, Vector3::y_axis(), 0.81);
+    assert_eq!(bench.ticks_until_damping(20), Some(1));
+    let ended = bench.events.iter().find_map(|event| match event {
+        Event::TrialEnded { end, .. } => Some(*end),
+        _ => None,
+    });
+    match ended {
+        Some(TrialEnd::Fell(FallCause::Pitch { allowed_rad, .. })) => assert_eq!(allowed_rad, 0.8),
+        other => panic!("{other:?}"),
+    }
+}
+
+/// Who sits down may lean, but not fall over.
+#[test]
+fn sitting_down_is_cut_at_the_outer_tilt() {
+    let mut bench = Bench::in_mode(Mode::SitDown);
+    bench.robot.tamper = |state| tilt(state, Vector3::x_axis(), 0.9);
+    bench.ticks(10);
+    assert_eq!(bench.cycle.mode(), Mode::SitDown);
+    bench.robot.tamper = |state| tilt(state, Vector3::x_axis(), 1.01);
+    assert_eq!(bench.ticks_until_damping(10), Some(1));
+    assert!(matches!(bench.fault(), Some(Fault::Tilt { allowed_rad: 1.0, .. })));
+}
+
+/// An operator bends the legs of a disarmed robot by hand: that is no fault. What concerns the link is one in every mode.
+#[test]
+fn a_disarmed_robot_may_be_handled() {
+    let mut bench = Bench::in_mode(Mode::Disarmed);
+    bench.robot.tamper = |state| {
+        state.joint_position[2] = -0.5;
+        state.joint_velocity[2] = 40.0;
+        state.motor_enabled[2] = false;
+        tilt(state, Vector3::x_axis(), 1.5);
+    };
+    bench.ticks(100);
+    assert_eq!(bench.cycle.mode(), Mode::Disarmed);
+    bench.robot.link.recent_corrupt = 11;
+    bench.ticks(1);
+    assert_eq!(bench.cycle.mode(), Mode::Fault);
+}
+
+/// A fault that is still so cannot be acknowledged away; one that is over can, and the robot is damped all along.
+#[test]
+fn a_standing_fault_cannot_be_acknowledged() {
+    let mut bench = Bench::in_mode(Mode::Ready);
+    bench.robot.tamper = |state| state.motor_temperature_c[0] = 85.0;
+    bench.ticks(5);
+    bench.tick(Some(Command::Acknowledge { stops: 0 }));
+    assert!(matches!(bench.refusal(), Some(Objection::Standing(Fault::MotorTemperature { joint: 0, .. }))));
+    assert_eq!(bench.cycle.mode(), Mode::Fault);
+    bench.robot.tamper = |_| {};
+    bench.ticks(1);
+    bench.tick(Some(Command::Acknowledge { stops: 0 }));
+    assert_eq!(bench.cycle.mode(), Mode::Disarmed);
+}
+
+/// Battery and warm motors: the trial that runs is finished, the next is refused, and the refusal says why.
+#[test]
+fn what_holds_lets_the_trial_finish_and_refuses_the_next() {
+    let holds: [(fn(&mut RobotState), fn(Hold) -> bool); 2] = [
+        (
+            |state| state.battery.as_mut().unwrap().charge_percent = 14.0,
+            |hold| matches!(hold, Hold::BatteryLow { measured_percent, .. } if measured_percent == 14.0),
+        ),
+        (
+            |state| state.motor_temperature_c[6] = 72.0,
+            |hold| matches!(hold, Hold::MotorWarm { joint: 6, measured_c, .. } if measured_c == 72.0),
+        ),
+    ];
+    for (tamper, is_it) in holds {
+        let mut bench = Bench::in_mode(Mode::Jump);
+        bench.robot.tamper = tamper;
+        bench.until(Mode::Review);
+        let settled = bench.events.iter().any(|e| matches!(e, Event::TrialEnded { end: TrialEnd::Settled, .. }));
+        assert!(settled, "{:?}", bench.events.last());
+        bench.tick(Some(Command::EndReview));
+        assert_eq!(bench.cycle.mode(), Mode::Ready);
+        bench.tick(Some(bench.approved()));
+        assert!(matches!(bench.refusal(), Some(Objection::Hold(hold)) if is_it(hold)), "{:?}", bench.refusal());
+        assert_eq!(bench.cycle.mode(), Mode::Ready);
+        assert!(bench.cycle.readiness().hold.is_some_and(is_it));
+    }
+}
+
+/// The operator is gone in mid-flight: landed with the nominal controller, and down soon after touchdown, quiet or not.
+#[test]
+fn an_operator_lost_in_flight_is_landed_and_sat_down() {
+    let mut bench = Bench::airborne();
+    bench.inputs.operator_silent_ms = 1001;
+    let (mut touchdown, mut modes) = (None, vec![Mode::Jump]);
+    for n in 0..8000_u32 {
+        let tick = bench.tick(None);
+        if tick.mode == Mode::Settle {
+            touchdown.get_or_insert(n);
+        }
+        if *modes.last().unwrap() != tick.mode {
+            modes.push(tick.mode);
+        }
+        if tick.mode == Mode::SitDown {
+            let settled = n - touchdown.expect("it landed before");
+            assert!(settled <= 610, "sat down {settled} ms after touchdown");
+            break;
+        }
+    }
+    assert_eq!(modes, [Mode::Jump, Mode::Settle, Mode::Review, Mode::SitDown]);
+    bench.until(Mode::Disarmed);
+    let end = bench.events.iter().find_map(|event| match event {
+        Event::TrialEnded { end, .. } => Some(*end),
+        _ => None,
+    });
+    assert!(matches!(end, Some(TrialEnd::Fault(Fault::OperatorLost { .. }))), "{end:?}");
+}
+
+/// A trial that had landed already when the operator was lost is measured to its end and counts.
+#[test]
+fn a_trial_that_had_landed_counts_though_the_operator_is_lost() {
+    let mut bench = Bench::in_mode(Mode::Settle);
+    bench.inputs.operator_silent_ms = 1001;
+    bench.until(Mode::Disarmed);
+    let settled = bench.events.iter().any(|e| matches!(e, Event::TrialEnded { end: TrialEnd::Settled, .. }));
+    assert!(settled, "{:?}", bench.events);
+}
+
+/// Several jumps in a row end with the one under way.
+#[test]
+fn an_operator_lost_between_jumps_ends_the_series() {
+    let mut bench = Bench::in_mode(Mode::Ready);
+    let mut spec = bench.spec();
+    (spec.jumps, spec.jump.f1_hz, spec.jump.fx_n) = (5, 0.5, 20.0);
+    let approval = bench.approval();
+    bench.tick(Some(Command::RunTrial(spec, approval)));
+    bench.until(Mode::Jump);
+    bench.ticks(100);
+    bench.inputs.operator_silent_ms = 1001;
+    let mut impulses = BTreeSet::new();
+    while bench.cycle.mode() != Mode::SitDown {
+        let tick = bench.tick(None);
+        assert!(tick.number < 60_000, "never sat down: {:?}", tick.mode);
+        if tick.theta_rad >= std::f64::consts::PI {
+            impulses.insert((tick.trial_time_s / 1.385).floor() as u32);
+        }
+    }
+    assert_eq!(impulses.into_iter().collect::<Vec<_>>(), [0], "one impulse, and no other began");
+}
+
+/// A robot that stands and waits sits down after its time, on hardware.
+#[test]
+fn an_idle_robot_sits_down() {
+    let mut bench = Bench::in_mode(Mode::Ready);
+    bench.ticks((bench.settings.idle_s * 1000.0) as u32 - 10);
+    assert_eq!(bench.cycle.mode(), Mode::Ready);
+    bench.ticks(20);
+    assert_eq!(bench.cycle.mode(), Mode::SitDown);
+    assert!(bench.events.iter().any(|event| matches!(event, Event::Mode { cause: Cause::Idle { .. }, .. })));
+}
+
+/// An approval is for once, now, and this mode: used up, outlived or overtaken it starts nothing.
+#[test]
+fn an_approval_is_single_use_expires_and_dies_with_a_change_of_mode() {
+    let mut bench = Bench::in_mode(Mode::Ready);
+    let approval = bench.approved();
+    bench.tick(Some(approval));
+    bench.tick(Some(Command::Cancel));
+    assert_eq!(bench.cycle.mode(), Mode::Ready, "any key cancels the countdown");
+    bench.tick(Some(approval));
+    assert_eq!((bench.cycle.mode(), bench.refusal()), (Mode::Ready, Some(Objection::Stale)), "used up");
+
+    let approval = bench.approved();
+    bench.ticks(30_001);
+    bench.tick(Some(approval));
+    assert!(matches!(bench.refusal(), Some(Objection::Expired { .. })), "{:?}", bench.refusal());
+    assert_eq!(bench.cycle.mode(), Mode::Ready);
+
+    let mut bench = Bench::in_mode(Mode::Ready);
+    let approval = bench.approved();
+    bench.tick(Some(Command::SitDown));
+    bench.until(Mode::Disarmed);
+    bench.ticks(1500);
+    bench.tick(Some(Command::Arm));
+    bench.until(Mode::Ready);
+    bench.tick(Some(approval));
+    assert_eq!((bench.cycle.mode(), bench.refusal()), (Mode::Ready, Some(Objection::Stale)), "another standing");
+    bench.tick(Some(bench.approved()));
+    assert_eq!(bench.cycle.mode(), Mode::Countdown);
+}
+
+/// After a fall: damping, the verdict or an acknowledgement, the checks again, and only then standing up, from where the
+/// joints are.
+#[test]
+fn after_a_fall_the_robot_stands_up_from_its_measured_pose_once_it_is_upright_again() {
+    let mut bench = Bench::airborne();
+    bench.robot.tamper = |state| tilt(state, Vector3::y_axis(), 1.2);
+    bench.ticks(2);
+    assert_eq!(bench.cycle.mode(), Mode::Damped);
+    bench.robot.tamper = |_| {};
+    bench.ticks(4000);
+    bench.tick(Some(Command::Arm));
+    assert_eq!(bench.cycle.mode(), Mode::Damped, "not without a look at it");
+    bench.tick(Some(Command::Acknowledge { stops: 0 }));
+    assert_eq!(bench.cycle.mode(), Mode::Disarmed);
+    bench.robot.tamper = |state| tilt(state, Vector3::x_axis(), 0.6);
+    bench.ticks(1500);
+    bench.tick(Some(Command::Arm));
+    assert!(matches!(bench.refusal(), Some(Objection::Checks(_))), "it lies on its side");
+    // The operator turns it over, folded again.
+    bench.robot.tamper = |_| {};
+    let lying_position = bench.settings.lying_position;
+    bench.robot.simulator.place(&Placement { joint_position: lying_position, lying: true, seed: 1 });
+    bench.tick(None);
+    if bench.cycle.mode() == Mode::Fault {
+        // A robot that is put somewhere has a new clock: as after a restart.
+        bench.tick(Some(Command::Acknowledge { stops: 0 }));
+    }
+    bench.ticks(1500);
+    let before = bench.cycle.last().state.joint_position;
+    let tick = bench.tick(Some(Command::Arm));
+    assert_eq!(tick.mode, Mode::StandUp);
+    for (joint, motor) in tick.command.motor.iter().enumerate() {
+        // What is asked for ends at the limit, also where a folded leg rests beyond it.
+        let measured = before[joint].clamp(bench.settings.min_position[joint], bench.settings.max_position[joint]);
+        assert!((motor.position - measured).abs() < 0.01, "joint {joint} begins at its measured angle");
+    }
+    bench.until(Mode::Ready);
+}
+
+/// Sound robots that learn to jump trip no limit; prints how near they come.
+#[test]
+fn whole_studies_on_the_simulator_trip_no_limit() {
+    let robot = RobotDescription::embedded("go1").unwrap();
+    let (mut beyond, mut speed, mut torque) = ([0.0_f64; 3], 0.0_f64, 0.0_f64);
+    for task in [Task::Forward, Task::LateralLeft, Task::TwistCcw] {
+        let options = Options {
+            seed: 1,
+            trials: Some(20),
+            ..Options::new(Config::load(None).unwrap(), robot.clone(), Backend::Simulator, task)
+        };
+        let settings = options.config.settings(&robot, task, Backend::Simulator).unwrap();
+        let simulator = Simulator::new(&robot, &options.config.simulator).unwrap();
+        let mut life = open_life(&options, Durability::Buffered, "").unwrap();
+        automatic::run(&mut life, &mut Rollout::new(simulator, &settings), |row, ticks| {
+            let faulty = ticks.iter().find(|tick| tick.mode == Mode::Fault);
+            assert!(faulty.is_none(), "{}, trial {}: {}", task.name(), row.trial, row.cause);
+            for tick in ticks.iter().filter(|tick| tick.mode.energised()) {
+                for i in 0..JOINTS {
+                    let q = tick.state.joint_position[i];
+                    beyond[i % 3] = beyond[i % 3].max(settings.min_position[i] - q).max(q - settings.max_position[i]);
+                    speed = speed.max(tick.state.joint_velocity[i].abs() / settings.max_velocity[i]);
+                    torque = torque.max(tick.state.joint_torque[i].abs() / settings.max_torque[i]);
+                }
+            }
+        })
+        .unwrap();
+    }
+    println!(
+        "60 trials: beyond the limits by at most {beyond:.3?} rad (hip, thigh, calf), {speed:.2} times the no-load speed, \
+         {torque:.2} times the largest torque"
+    );
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Step {
+    Nothing,
+    Plain(Command),
+    FreshApproval,
+    /// The newest approval that was given before, again.
+    OldApproval,
+    Stop,
+    Silence,
+    Tamper(fn(&mut RobotState)),
+    Mend,
+}
+
+fn any_step() -> impl Strategy<Value = Step> {
+    let tampers: [fn(&mut RobotState); 6] = [
+        |state| state.joint_velocity[1] = f64::NAN,
+        |state| state.motor_enabled[3] = false,
+        |state| state.motor_temperature_c[3] = 75.0,
+        |state| state.battery = None,
+        |state| state.imu.gyro_body.z = 0.5,
+        |state| tilt(state, Vector3::x_axis(), 0.3),
+    ];
+    prop_oneof![
+        3 => Just(Step::Nothing),
+        2 => Just(Step::Plain(Command::TakeControl)),
+        4 => Just(Step::Plain(Command::Arm)),
+        1 => Just(Step::Plain(Command::SitDown)),
+        1 => Just(Step::Plain(Command::Cancel)),
+        1 => Just(Step::Plain(Command::EndReview)),
+        1 => Just(Step::Plain(Command::Release)),
+        3 => Just(Step::Plain(Command::Acknowledge { stops: 0 })),
+        4 => Just(Step::FreshApproval),
+        2 => Just(Step::OldApproval),
+        1 => Just(Step::Stop),
+        1 => Just(Step::Silence),
+        2 => (0..tampers.len()).prop_map(move |i| Step::Tamper(tampers[i])),
+        3 => Just(Step::Mend),
+    ]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 32, failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// Whatever comes in whatever order on hardware's terms: a motor does more than damp only after an arm command in a tick in
+    /// which every check held, a jump begins only after an approval that was given since the last change of mode and used
+    /// by nobody, and what is sent is finite.
+    #[test]
+    fn no_sequence_energises_without_arm_fresh_checks_and_approval(
+        steps in proptest::collection::vec((any_step(), 1..2500_u32), 1..20)
+    ) {
+        let mut bench = Bench::new();
+        let (mut armed, mut jumping, mut old) = (false, false, None);
+        for (step, ticks) in steps {
+            bench.inputs.stop = false;
+            let command = match step {
+                Step::Plain(command) => Some(command),
+                Step::FreshApproval => {
+                    let approval = bench.approved();
+                    old.get_or_insert(approval);
+                    Some(approval)
+                }
+                Step::OldApproval => old,
+                _ => None,
+            };
+            match step {
+                Step::Stop => bench.inputs.stop = true,
+                Step::Silence => bench.robot.silent_ms = 1,
+                Step::Tamper(tamper) => bench.robot.tamper = tamper,
+                Step::Mend => {
+                    bench.robot.tamper = |_| {};
+                    bench.robot.silent_ms = 0;
+                }
+                _ => {}
+            }
+            for n in 0..ticks {
+                let before = bench.cycle.mode();
+                let fresh = command == Some(bench.approved()) && matches!(command, Some(Command::RunTrial(..)));
+                let sent_before = bench.robot.sent.len();
+                let tick = bench.tick(command.filter(|_| n == 0));
+                if tick.mode == Mode::StandUp && before != Mode::StandUp {
+                    prop_assert!(n == 0 && command == Some(Command::Arm), "it stands up by itself");
+                    prop_assert_eq!(before, Mode::Disarmed);
+                    prop_assert!(bench.cycle.readiness().findings.failing().is_empty());
+                    let state = &tick.state;
+                    prop_assert!(state.imu.gyro_body.norm() < 0.1 && state.battery.is_some());
+                    prop_assert!(tick.estimate.roll_pitch_yaw.xy().norm() < 0.2);
+                    armed = true;
+                }
+                let trial = matches!(tick.mode, Mode::Countdown | Mode::Jump | Mode::Settle);
+                if trial && !jumping {
+                    prop_assert!(n == 0 && fresh && before == Mode::Ready, "{:?} without a fresh approval", tick.mode);
+                }
+                jumping = trial;
+                let damping = JointCommand::damping(bench.settings.gate.damping_kd);
+                let sent = &bench.robot.sent[sent_before..];
+                if tick.mode.energised() {
+                    prop_assert!(armed, "{:?} without arm", tick.mode);
+                } else {
+                    armed = false;
+                    prop_assert!(sent.iter().all(|command| *command == damping), "{:?}", tick.mode);
+                }
+                for motor in sent.iter().flat_map(|command| &command.motor) {
+                    let numbers = [motor.position, motor.velocity, motor.kp, motor.kd, motor.torque];
+                    prop_assert!(numbers.iter().all(|number| number.is_finite()));
+                }
+                if bench.inputs.stop {
+                    prop_assert!(matches!(tick.mode, Mode::Damped | Mode::Fault));
+                }
+            }
+            bench.robot.sent.clear();
+        }
+    }
+}

@@ -1,0 +1,244 @@
+//! The pre-arm list as the session gives it to an operator: all failing items at once, the operator's word, the test of STOP.
+
+use std::sync::mpsc::{Receiver, channel};
+
+use quadfrog::config::{Backend, Config};
+use quadfrog::control::cycle::{Cycle, Inputs};
+use quadfrog::control::settings::Settings;
+use quadfrog::engine::{Options, fingerprint, open_life, session_info};
+use quadfrog::optimize::journal::Durability;
+use quadfrog::realtime::channel::{ControlEnd, channels};
+use quadfrog::realtime::clock::SimulatedClock;
+use quadfrog::realtime::command::{Command, Task};
+use quadfrog::realtime::pre_arm::{Check, CheckState};
+use quadfrog::realtime::telemetry::Mode;
+use quadfrog::recording::record::{CommandRecord, PreArmCheck, Record, Stamped};
+use quadfrog::recording::recorder::RecorderWatch;
+use quadfrog::robot::description::RobotDescription;
+use quadfrog::robot::{Battery, JointCommand, LinkStatus, Placement, Robot, RobotError, RobotState};
+use quadfrog::session::intent::{Intent, OperatorCheck, Wish};
+use quadfrog::session::pre_arm::PreArmList;
+use quadfrog::session::supervisor::{Outlets, Parts, Supervisor};
+use quadfrog::sim::Simulator;
+
+/// The simulator, seen as a robot over a link that reports its battery and cannot be put in place.
+struct Go1Like {
+    simulator: Simulator,
+    charge_percent: f64,
+}
+
+impl Robot for Go1Like {
+    fn read(&mut self) -> Result<RobotState, RobotError> {
+        let mut state = self.simulator.read()?;
+        state.truth = None;
+        state.battery =
+            Some(Battery { charge_percent: self.charge_percent, voltage_v: 24.0, current_a: -1.0, cell_v: [0.0; 10] });
+        Ok(state)
+    }
+    fn write(&mut self, command: &JointCommand) -> Result<(), RobotError> {
+        self.simulator.write(command)
+    }
+    fn place(&mut self, _: &Placement) -> bool {
+        false
+    }
+    fn link(&self) -> Option<LinkStatus> {
+        Some(LinkStatus { recent_received: 5000, ..LinkStatus::default() })
+    }
+}
+
+/// A session and a control cycle that share channels, on one thread and in simulated time.
+struct Session {
+    supervisor: Supervisor,
+    control: ControlEnd,
+    cycle: Cycle,
+    robot: Go1Like,
+    screen: Receiver<Stamped>,
+    records: Vec<Record>,
+    time_ms: u64,
+}
+
+impl Session {
+    fn new(backend: Backend, folder: Option<std::path::PathBuf>) -> Session {
+        let config = Config::load(None).unwrap();
+        let robot = RobotDescription::embedded("go1").unwrap();
+        let options = Options { trials: Some(5), ..Options::new(config, robot, backend, Task::Forward) };
+        let settings: Settings = options.config.settings(&options.robot, options.task, backend).unwrap();
+        let mut simulator = Simulator::new(&options.robot, &options.config.simulator).unwrap();
+        simulator.place(&Placement { joint_position: settings.lying_position, lying: true, seed: 0 });
+        let (control, session_end, _screen, _ticks) = channels();
+        let (to_recorder, _) = channel();
+        let (to_screen, screen) = channel();
+        let (_, handed) = channel();
+        let parts = Parts {
+            life: open_life(&options, Durability::Buffered, "").unwrap(),
+            control: session_end,
+            handed,
+            outlets: Outlets { recorder: to_recorder, screen: to_screen },
+            recorder: RecorderWatch::default(),
+            pre_arm: PreArmList::new(&settings, fingerprint(&options.config), folder),
+            info: session_info(&options, ""),
+        };
+        let mut session = Session {
+            supervisor: Supervisor::new(parts, 0),
+            control,
+            cycle: Cycle::new(&settings),
+            robot: Go1Like { simulator, charge_percent: 90.0 },
+            screen,
+            records: Vec::new(),
+            time_ms: 0,
+        };
+        session.ticks(10);
+        session.supervisor.take_control();
+        session.ticks(1500);
+        session
+    }
+
+    fn ticks(&mut self, count: u32) {
+        for _ in 0..count {
+            self.time_ms += 1;
+            let command = self.control.commands.pop().ok();
+            if let Some(Command::Acknowledge { stops }) = command {
+                self.control.stop.acknowledge(stops);
+            }
+            let inputs = Inputs {
+                time_ns: self.time_ms * 1_000_000,
+                stop: self.control.stop.is_set(),
+                command,
+                ..Inputs::default()
+            };
+            self.cycle.tick(&inputs, &SimulatedClock, &mut self.robot);
+            for event in self.cycle.events().iter() {
+                self.control.events.push(event).unwrap();
+            }
+            self.control.readiness.write(self.cycle.readiness());
+            self.supervisor.attend(self.time_ms * 1_000_000);
+            self.records.extend(self.screen.try_iter().map(|stamped| stamped.record));
+        }
+    }
+
+    /// Wishes and gives back the answer.
+    fn wish(&mut self, intent: Intent) -> CommandRecord {
+        let time_ns = self.time_ms * 1_000_000;
+        self.supervisor.carry_out(&Wish { intent, stops: self.control.stop.count(), time_ns }, time_ns);
+        let mut records = self.screen.try_iter().map(|stamped| stamped.record);
+        let answer = records.find_map(|record| match record {
+            Record::Command(command) => Some(command),
+            _ => None,
+        });
+        self.ticks(5);
+        answer.expect("every wish is answered")
+    }
+
+    fn list(&self) -> Vec<PreArmCheck> {
+        let list = self.records.iter().rev().find_map(|record| match record {
+            Record::PreArm(list) => Some(list.clone()),
+            _ => None,
+        });
+        list.expect("the list is shown while the robot is disarmed")
+    }
+
+    fn state(&self, check: Check) -> CheckState {
+        self.list().iter().find(|item| item.check == check).expect("every check is on the list").state
+    }
+
+    fn test_stop(&mut self) {
+        self.control.stop.set();
+        self.ticks(5);
+        assert_eq!(self.cycle.mode(), Mode::Damped);
+        assert!(self.wish(Intent::Acknowledge).accepted);
+        self.ticks(1500);
+        assert_eq!(self.cycle.mode(), Mode::Disarmed);
+    }
+}
+
+#[test]
+fn a_simulated_robot_is_armed_without_ceremony() {
+    let mut session = Session::new(Backend::Simulator, None);
+    assert_eq!(session.list().len(), Check::ALL.len());
+    let needed: Vec<_> = session.list().into_iter().filter(|item| item.state != CheckState::NotNeeded).collect();
+    assert_eq!(needed.iter().map(|item| item.check).collect::<Vec<_>>(), [Check::StateFresh]);
+    let answer = session.wish(Intent::Arm);
+    assert!(answer.accepted, "{answer:?}");
+    assert_eq!(session.cycle.mode(), Mode::StandUp);
+}
+
+/// All failing items at once: the refusal names each with what was found and what is needed.
+#[test]
+fn a_real_robot_is_not_armed_before_every_item_holds_and_the_refusal_names_all() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut session = Session::new(Backend::Hardware, Some(folder.path().to_owned()));
+    session.robot.charge_percent = 20.0;
+    session.ticks(10);
+    let answer = session.wish(Intent::Arm);
+    assert!(!answer.accepted);
+    for words in [
+        "battery: 20 %, needed: at least 30 %",
+        "low-level mode, damped: not confirmed",
+        "configuration: ",
+        "area clear, remote in hand: not confirmed",
+        "STOP tested: not in this session",
+    ] {
+        assert!(answer.answer.contains(words), "{words}: {}", answer.answer);
+    }
+    session.robot.charge_percent = 90.0;
+    for check in OperatorCheck::ALL {
+        assert!(session.wish(Intent::Confirm(check)).accepted);
+    }
+    session.ticks(600);
+    let answer = session.wish(Intent::Arm);
+    assert!(!answer.accepted && answer.answer.starts_with("STOP tested") && !answer.answer.contains(';'), "{answer:?}");
+    session.test_stop();
+    assert_eq!(session.state(Check::StopTested), CheckState::Passed);
+    let answer = session.wish(Intent::Arm);
+    assert!(answer.accepted, "{answer:?}");
+    assert_eq!(session.cycle.mode(), Mode::StandUp);
+}
+
+/// The word that the area is clear holds for one arming: afterwards somebody has been at the robot.
+#[test]
+fn the_area_is_asked_about_before_each_arming() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut session = Session::new(Backend::Hardware, Some(folder.path().to_owned()));
+    session.test_stop();
+    for check in OperatorCheck::ALL {
+        session.wish(Intent::Confirm(check));
+    }
+    assert!(session.wish(Intent::Arm).accepted);
+    assert!(!session.wish(Intent::Confirm(OperatorCheck::AreaClear)).accepted, "not while it is armed");
+    session.control.stop.set();
+    session.ticks(3000);
+    session.wish(Intent::Acknowledge);
+    session.ticks(1500);
+    assert_eq!(session.state(Check::AreaClear), CheckState::Waiting);
+    assert_eq!(session.state(Check::LowLevel), CheckState::Passed);
+    assert_eq!(session.state(Check::StopTested), CheckState::Passed);
+    let answer = session.wish(Intent::Arm);
+    assert!(!answer.accepted && answer.answer.contains("area clear"), "{answer:?}");
+}
+
+/// Every item with its value, twice a second while the robot is disarmed, and at once when one changes.
+#[test]
+fn the_list_is_shown_twice_a_second_and_on_change() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut session = Session::new(Backend::Hardware, Some(folder.path().to_owned()));
+    let lists = |session: &Session| session.records.iter().filter(|r| matches!(r, Record::PreArm(_))).count();
+    let before = lists(&session);
+    session.ticks(2000);
+    assert!((3..=5).contains(&(lists(&session) - before)), "{} lists in 2 s", lists(&session) - before);
+    assert_eq!(session.state(Check::Battery), CheckState::Passed);
+    let before = lists(&session);
+    session.robot.charge_percent = 29.0;
+    session.ticks(110);
+    assert!(lists(&session) > before);
+    let battery = session.list().into_iter().find(|item| item.check == Check::Battery).unwrap();
+    assert_eq!((battery.found.as_str(), battery.state), ("29 %", CheckState::Failed));
+}
+
+#[test]
+fn a_full_disk_and_a_missing_recording_are_named() {
+    let session = Session::new(Backend::Hardware, None);
+    assert_eq!(session.state(Check::Recorder), CheckState::Failed);
+    let gone = std::path::PathBuf::from("/no/such/folder");
+    let session = Session::new(Backend::Simulator, Some(gone));
+    assert_eq!(session.state(Check::Disk), CheckState::Failed);
+}

@@ -1,0 +1,88 @@
+//! What drawing one frame costs: `cargo bench -p quadfrog-console --bench draw`.
+//!
+//! Prints, for each view at 200x60 with a full minute of telemetry, a hundred trials and all series on, the time until
+//! the frame is in the buffer and compared with the one before. Wall time includes whatever else the machine does in that
+//! time; the processor time of the drawing thread does not.
+
+#[path = "../../tests/console/support/mod.rs"]
+mod support;
+
+use std::time::{Duration, Instant};
+
+use nix::time::{ClockId, clock_gettime};
+use quadfrog::realtime::telemetry::{Phase, Snapshot};
+use quadfrog::recording::record::{Record, Verdict};
+use quadfrog::robot::description::RobotDescription;
+use quadfrog_console::model::View;
+use quadfrog_console::series::SIGNALS;
+use quadfrog_console::update::Msg;
+use ratatui::Terminal;
+use ratatui::backend::TestBackend;
+use support::{Console, tick, trial};
+
+/// Frames that are drawn of each view.
+const FRAMES: u64 = 2_000;
+
+/// Processor time of this thread.
+fn processor_time() -> Duration {
+    Duration::from(clock_gettime(ClockId::CLOCK_THREAD_CPUTIME_ID).expect("the system has this clock"))
+}
+
+/// One of the ticks of a session that jumps every four seconds.
+fn sample(time_ms: u64) -> quadfrog::realtime::telemetry::Tick {
+    let in_jump_ms = time_ms % 4_000;
+    let phase = match in_jump_ms {
+        0..300 => Some(Phase::Impulse),
+        300..600 => Some(Phase::Flight),
+        600..1_500 => Some(Phase::Landing),
+        _ => None,
+    };
+    let jump = phase.map(|phase| ((time_ms / 4_000) as u32, in_jump_ms as f64 / 1e3, phase));
+    tick(time_ms, 0.3 * (time_ms as f64 / 300.0).sin(), jump)
+}
+
+fn main() {
+    let mut console = Console::ready();
+    console.model.robot = Some(RobotDescription::embedded("go1").expect("the built-in robot"));
+    console.model.live.series = SIGNALS.map(|signal| signal.series).to_vec();
+    for number in 0..100 {
+        console.record(Record::Trial(trial(number, Some(Verdict::ALL[number as usize % 3]), None)));
+    }
+    for time_ms in (0..60_000).step_by(5) {
+        console.tell(Msg::Tick(Box::new(sample(time_ms))));
+    }
+    console.press(&["c"]);
+    let mut terminal = Terminal::new(TestBackend::new(200, 60)).expect("a screen in memory");
+    let mut time_ms = 60_000;
+    for view in View::ALL {
+        console.model.view = view;
+        let (mut wall, mut processor) = (Vec::new(), Vec::new());
+        for _ in 0..FRAMES {
+            // Ten frames a second: twenty new ticks in each.
+            for _ in 0..20 {
+                time_ms += 5;
+                console.tell(Msg::Tick(Box::new(sample(time_ms))));
+            }
+            let snapshot = Snapshot { tick: sample(time_ms), ..console.model.snapshot };
+            console.tell(Msg::Snapshot(Box::new(snapshot)));
+            let (begun, used) = (Instant::now(), processor_time());
+            terminal.draw(|frame| quadfrog_console::view::render(frame, &console.model)).expect("drawn");
+            processor.push(processor_time() - used);
+            wall.push(begun.elapsed());
+        }
+        wall.sort_unstable();
+        processor.sort_unstable();
+        let ms = |sorted: &[Duration], share: f64| {
+            sorted[((sorted.len() - 1) as f64 * share).round() as usize].as_secs_f64() * 1e3
+        };
+        println!(
+            "{:<9} at 200x60: processor p50 {:.2} ms, p99 {:.2} ms; wall p50 {:.2} ms, p99 {:.2} ms, longest {:.2} ms",
+            view.name(),
+            ms(&processor, 0.5),
+            ms(&processor, 0.99),
+            ms(&wall, 0.5),
+            ms(&wall, 0.99),
+            ms(&wall, 1.0),
+        );
+    }
+}

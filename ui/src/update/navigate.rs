@@ -1,0 +1,187 @@
+//! Moving about: rows, pages, the charts' cursor, freezing, zooming, ghosts, sorting and filtering.
+
+use quadfrog::recording::record::{Level, Verdict};
+
+use super::{Effect, say};
+use crate::action::Action;
+use crate::column::{Column, SortBy};
+use crate::model::{Comparison, Model, Panel, View};
+use crate::series::Series;
+use crate::settings::ChartMode;
+
+/// Moves through the rows of the open view; `isize::MIN` and `MAX` go to the ends.
+pub(super) fn move_by(model: &mut Model, step: isize) -> Vec<Effect> {
+    match model.view {
+        View::Trials | View::Live => {
+            let rows: Vec<u32> = model.table().iter().map(|trial| trial.trial).collect();
+            let Some(last) = rows.len().checked_sub(1) else { return Vec::new() };
+            let at = model.trials_view.selected.and_then(|n| rows.iter().position(|row| *row == n)).unwrap_or(last);
+            let to = at.saturating_add_signed(step).min(last);
+            // Standing on the newest row follows it.
+            let follow = to == last && model.trials_view.sort == SortBy::Number && !model.trials_view.reversed;
+            model.trials_view.selected = if follow { None } else { Some(rows[to]) };
+        }
+        View::Log => {
+            let last = model.log_lines().count().saturating_sub(1);
+            model.log_view.back = match step {
+                isize::MIN => last,
+                isize::MAX => 0,
+                step => model.log_view.back.saturating_add_signed(-step).min(last),
+            };
+        }
+        View::Override => {
+            let rows = model.session.parameters.len() + model.session.gains.len();
+            let last = rows.saturating_sub(1);
+            model.override_row = model.override_row.saturating_add_signed(step).min(last);
+        }
+        View::Optimizer | View::Health => {}
+    }
+    Vec::new()
+}
+
+/// Moves the charts' cursor; the first move freezes them.
+pub(super) fn move_cursor(model: &mut Model, step: i64) -> Vec<Effect> {
+    if model.view != View::Live {
+        return Vec::new();
+    }
+    if let Some(comparison) = &mut model.live.comparison {
+        let (first, last) = comparison.span_ns();
+        let step_ns = (last - first) as i64 / 100 * step;
+        comparison.cursor_ns = comparison.cursor_ns.saturating_add_signed(step_ns).clamp(first, last);
+        return Vec::new();
+    }
+    if model.live.frozen.is_none() {
+        freeze(model);
+    }
+    // A hundredth of the window: about one character of a chart.
+    let step_ns = (model.live.window_s * 1e7) as i64 * step;
+    let newest = model.charted().newest_ns();
+    let oldest = newest.saturating_sub((model.live.window_s * 1e9) as u64);
+    model.live.cursor_ns = model.live.cursor_ns.saturating_add_signed(step_ns).clamp(oldest, newest);
+    Vec::new()
+}
+
+pub(super) fn freeze(model: &mut Model) -> Vec<Effect> {
+    model.live.frozen = match model.live.frozen.take() {
+        Some(_) => None,
+        None => {
+            model.live.cursor_ns = model.history.newest_ns();
+            Some((model.history.clone(), model.clock))
+        }
+    };
+    Vec::new()
+}
+
+pub(super) fn zoom(model: &mut Model, factor: f64) -> Vec<Effect> {
+    model.live.window_s = (model.live.window_s * factor).clamp(1.0, 60.0);
+    Vec::new()
+}
+
+/// Lays a trial under the charts of a jump: the selected one in Trials, else the best. In Trials a second one compares the
+/// two; the same again, or the key in Live, ends it.
+pub(super) fn ghost(model: &mut Model) -> Vec<Effect> {
+    let text = match (model.view, model.live.ghost, model.live.comparison.is_some()) {
+        (View::Trials, Some(a), false) => second_ghost(model, a),
+        (View::Trials, _, _) => {
+            model.live.comparison = None;
+            let chosen = model.selected_trial().map(|trial| trial.trial);
+            first_ghost(model, chosen)
+        }
+        (_, None, false) => {
+            let best = model.best().map(|trial| trial.trial);
+            first_ghost(model, best)
+        }
+        _ => no_ghost(model),
+    };
+    say(model, Level::Info, text);
+    Vec::new()
+}
+
+fn no_ghost(model: &mut Model) -> String {
+    model.live.ghost = None;
+    model.live.comparison = None;
+    "no trial is laid under the charts".to_owned()
+}
+
+fn first_ghost(model: &mut Model, trial: Option<u32>) -> String {
+    model.live.ghost = trial.filter(|trial| model.history.trace(*trial).is_some());
+    match model.live.ghost {
+        Some(trial) => {
+            format!("trial {trial} is laid under the charts of a jump; a second one in Trials compares the two")
+        }
+        None => "no trace of that trial: this console did not see its jump".to_owned(),
+    }
+}
+
+fn second_ghost(model: &mut Model, a: u32) -> String {
+    let Some(b) = model.selected_trial().map(|trial| trial.trial).filter(|b| *b != a) else { return no_ghost(model) };
+    model.live.comparison = Comparison::new(&model.history, a, b);
+    match model.live.comparison {
+        Some(_) => {
+            let live = model.keymap.key(Action::LiveView);
+            format!("A is trial {a}, B is trial {b}: {live} shows both in Live")
+        }
+        None => format!("no trace of trial {b}: this console did not see its jump"),
+    }
+}
+
+/// The next set of series: attitude and feet, forces, joints.
+pub(super) fn next_series(model: &mut Model) -> Vec<Effect> {
+    let live = &mut model.live;
+    (live.panel, live.series) = match (live.panel, live.series == Series::ATTITUDE) {
+        (Panel::Charts, true) => (Panel::Charts, Series::FORCES.to_vec()),
+        (Panel::Charts, false) if live.series == Series::FORCES => (Panel::Joints, live.series.clone()),
+        _ => (Panel::Charts, Series::ATTITUDE.to_vec()),
+    };
+    Vec::new()
+}
+
+/// Sweep or scroll.
+pub(super) fn next_mode(model: &mut Model) -> Vec<Effect> {
+    model.live.mode = match model.live.mode {
+        ChartMode::Sweep => ChartMode::Scroll,
+        ChartMode::Scroll => ChartMode::Sweep,
+    };
+    Vec::new()
+}
+
+/// Sorts by the next shown column: number, value and verdict first, then the others from left to right.
+pub(super) fn next_sort(model: &mut Model) -> Vec<Effect> {
+    let view = &model.trials_view;
+    let mut orders = vec![SortBy::Number];
+    let shown = |column: &Column| view.columns.contains(column);
+    let first = [Column::Value, Column::Verdict];
+    orders.extend(first.into_iter().filter(shown).map(SortBy::Column));
+    for column in Column::ALL.into_iter().filter(shown).filter(|column| !first.contains(column)) {
+        match column {
+            Column::Parameters => orders.extend((0..model.session.parameters.len()).map(SortBy::Parameter)),
+            column => orders.push(SortBy::Column(column)),
+        }
+    }
+    let at = orders.iter().position(|order| *order == view.sort).unwrap_or(0);
+    model.trials_view.sort = orders[(at + 1) % orders.len()];
+    model.trials_view.reversed = false;
+    Vec::new()
+}
+
+pub(super) fn filter(model: &mut Model) -> Vec<Effect> {
+    match model.view {
+        View::Log => {
+            model.log_view.back = 0;
+            model.log_view.level = match model.log_view.level {
+                None => Some(Level::Warning),
+                Some(Level::Warning) => Some(Level::Error),
+                Some(_) => None,
+            };
+        }
+        _ => {
+            model.trials_view.filter = match model.trials_view.filter {
+                None => Some(Verdict::Accept),
+                Some(Verdict::Accept) => Some(Verdict::Fall),
+                Some(Verdict::Fall) => Some(Verdict::Void),
+                Some(Verdict::Void) => None,
+            };
+        }
+    }
+    Vec::new()
+}

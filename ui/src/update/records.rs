@@ -1,0 +1,189 @@
+//! What a record of the session changes on the screen: rows, the log, the answer to the operator, the bell.
+
+use quadfrog::realtime::telemetry::Mode;
+use quadfrog::recording::record::{
+    CommandRecord, Level, Record, Source, Stage, StageInfo, Stamped, TrialRecord, Verdict,
+};
+
+use super::{Effect, say};
+use crate::action::Action;
+use crate::dialog::Dialog;
+use crate::model::{LOG_LINES, LogLine, Model, RunTime};
+use crate::settings::BellCause;
+
+/// An approval holds for the card that was on the screen and while the robot stands; anything else closes the question.
+pub(super) fn close_stale_dialog(model: &mut Model) {
+    let stale = match &model.dialog {
+        Some(Dialog::Approve { trial, revision, .. }) => {
+            let on_table = model.proposal.as_ref().map(|p| (p.trial, p.revision));
+            on_table != Some((*trial, *revision)) || Action::Approve.legal(model).is_err()
+        }
+        Some(Dialog::Arm { .. }) => Action::Arm.legal(model).is_err(),
+        Some(Dialog::Override(form)) => {
+            model.proposal.as_ref().is_none_or(|p| p.trial != form.trial) || Action::Override.legal(model).is_err()
+        }
+        _ => false,
+    };
+    if stale {
+        model.dialog = None;
+        say(model, Level::Warning, "the question was closed: the situation has changed".to_owned());
+    }
+}
+
+pub(super) fn take(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
+    let time_ns = stamped.time_ns;
+    let mut bells = Vec::new();
+    match stamped.record {
+        Record::Session(info) => {
+            let text = format!(
+                "{} on {} ({}), {} {}, seed {}",
+                info.task, info.robot, info.backend, info.sampler, info.version, info.seed
+            );
+            model.session = info;
+            log(model, time_ns, Level::Info, "session", text, false);
+        }
+        Record::Transition(change) => {
+            let stopped = matches!(change.to, Mode::Damped | Mode::Fault);
+            let level = match change.to {
+                Mode::Fault => Level::Error,
+                Mode::Damped => Level::Warning,
+                _ => Level::Info,
+            };
+            if stopped {
+                model.stopped_because = change.cause.clone();
+                // The key that stopped has been answered already.
+                if change.cause != "STOP"
+                    || !model.message.as_ref().is_some_and(|message| message.text.starts_with("STOP"))
+                {
+                    say(model, level, format!("{}: {}", change.to.name(), change.cause));
+                }
+            }
+            if change.to == Mode::Fault {
+                bells.push(BellCause::Fault);
+            }
+            let text = format!("{} {} {}: {}", change.from.name(), model.theme.arrow(), change.to.name(), change.cause);
+            log(model, time_ns, level, "mode", text, change.to == Mode::Fault);
+        }
+        Record::Stage(info) => {
+            let entered = model.stage.is_none_or(|before| (before.stage, before.trial) != (info.stage, info.trial));
+            model.stage = Some(info);
+            if entered {
+                note_time(model, info, time_ns);
+                match info.stage {
+                    Stage::Proposed => bells.push(BellCause::Proposal),
+                    Stage::Review => {
+                        bells.push(BellCause::Verdict);
+                        say_suggestion(model, info.trial);
+                    }
+                    Stage::Running => {}
+                    Stage::Finished => {
+                        say(model, Level::Info, "the study is finished".to_owned());
+                        log(model, time_ns, Level::Info, "study", "finished".to_owned(), true);
+                    }
+                }
+            }
+        }
+        Record::Proposal(proposal) => {
+            let values: Vec<String> =
+                proposal.parameters.iter().map(|p| format!("{} {:.4}", p.name, p.value)).collect();
+            let text = format!("trial {} ({}): {}", proposal.trial, proposal.source.name(), values.join(", "));
+            log(model, time_ns, Level::Info, "proposal", text, proposal.revision == 0);
+            model.proposal = Some(proposal);
+        }
+        Record::Trial(trial) => {
+            if trial.verdict.is_none() && trial.suggested == Some(Verdict::Fall) {
+                bells.push(BellCause::Fall);
+            }
+            log_trial(model, time_ns, &trial);
+            let number = trial.trial;
+            model.trials.insert(number, trial);
+            if model.under_review().is_some_and(|trial| trial.trial == number && trial.hand_value.is_none()) {
+                say_suggestion(model, number);
+            }
+        }
+        Record::Command(command) => answer(model, time_ns, command),
+        Record::Counters(counters) => model.snapshot.counters = counters,
+        Record::Log(line) => {
+            if line.level > Level::Info {
+                say(model, line.level, line.message.clone());
+            }
+            log(model, time_ns, line.level, &line.source, line.message, false);
+        }
+        Record::PreArm(list) => model.pre_arm = list,
+        Record::Search(search) => model.search = Some(search),
+        Record::Insight(insight) => model.insight = Some(insight),
+        Record::Points(points) => model.points = points,
+        Record::FaultTicks(ticks) => {
+            let text = format!("the last {} ticks before the fault are in the recording", ticks.len());
+            log(model, time_ns, Level::Error, "control", text, false);
+        }
+    }
+    close_stale_dialog(model);
+    let rings = bells.iter().any(|cause| model.bell.contains(cause)) && model.replay.is_none();
+    if rings { vec![Effect::Bell] } else { Vec::new() }
+}
+
+/// Keeps when a trial began and ended.
+fn note_time(model: &mut Model, info: StageInfo, time_ns: u64) {
+    match info.stage {
+        Stage::Running => {
+            model.ran.insert(info.trial, RunTime { begun_ns: time_ns, ended_ns: None });
+        }
+        Stage::Review => {
+            if let Some(ran) = model.ran.get_mut(&info.trial) {
+                ran.ended_ns.get_or_insert(time_ns);
+            }
+        }
+        Stage::Proposed | Stage::Finished => {}
+    }
+}
+
+/// What the rules think of the trial under review; its row and its stage come in either order.
+fn say_suggestion(model: &mut Model, trial: u32) {
+    let Some(row) = model.trials.get(&trial).filter(|row| row.verdict.is_none()) else { return };
+    let Some(suggested) = row.suggested else { return };
+    let level = if suggested == Verdict::Accept { Level::Info } else { Level::Warning };
+    let text = format!("trial #{trial} looks like {}: {}", suggested.name(), row.cause);
+    say(model, level, text);
+}
+
+fn answer(model: &mut Model, time_ns: u64, command: CommandRecord) {
+    let (level, outcome) = if command.accepted { (Level::Info, "") } else { (Level::Warning, "refused: ") };
+    let text = match command.answer.as_str() {
+        "" => command.wish.clone(),
+        answer => format!("{}: {outcome}{answer}", command.wish),
+    };
+    say(model, level, text.clone());
+    log(model, time_ns, level, "operator", text, false);
+}
+
+/// A line where a trial's verdict or suggestion is new; rows repeat for other reasons too.
+fn log_trial(model: &mut Model, time_ns: u64, trial: &TrialRecord) {
+    let before = model.trials.get(&trial.trial);
+    let known = |field: fn(&TrialRecord) -> Option<Verdict>| before.and_then(field) == field(trial);
+    let text = match (trial.verdict, trial.suggested) {
+        (Some(verdict), _) if !known(|t| t.verdict) => {
+            let value = trial.value.map(|v| format!(", J = {v:.3} {}", model.session.unit)).unwrap_or_default();
+            let source =
+                if trial.source == Source::Sampler { String::new() } else { format!(" ({})", trial.source.name()) };
+            format!("trial {}{source}: {}{value}", trial.trial, verdict.name())
+        }
+        (None, Some(verdict)) if !known(|t| t.suggested) => {
+            let cause = if trial.cause.is_empty() { String::new() } else { format!(": {}", trial.cause) };
+            format!("trial {} looks like {}{cause}", trial.trial, verdict.name())
+        }
+        _ => return,
+    };
+    log(model, time_ns, Level::Info, "trial", text, trial.verdict.is_some());
+}
+
+fn log(model: &mut Model, time_ns: u64, level: Level, source: &str, text: String, marker: bool) {
+    if model.log.len() == LOG_LINES {
+        model.log.pop_front();
+    }
+    model.log.push_back(LogLine { time_ns, level, source: source.to_owned(), text, marker });
+    // A reader who has scrolled back stays on the same lines.
+    if model.log_view.back > 0 {
+        model.log_view.back += 1;
+    }
+}

@@ -1,0 +1,78 @@
+//! Why the sampler proposed a value: TPE's two densities along a parameter, l(x) of the good trials and g(x) of the others,
+//! with the proposal where it lies. A proposal is where l is high and g is low.
+//!
+//! ```text
+//! f0 l(x), g(x) ──────────── matters 62 %
+//!      l⡠⠒⢄│             g
+//!    ⡠⠊   ⠈│⢄      ⡠⠒⠒⠤⡀
+//! 0.75    1.243             1.75
+//! ```
+
+use quadfrog::recording::record::ParameterInsight;
+use ratatui::Frame;
+use ratatui::layout::{Constraint, Layout, Rect};
+
+use super::chart::Dots;
+use super::{heading, number};
+use crate::model::Model;
+use crate::theme::Role;
+
+/// Draws the panel of one parameter.
+pub fn render(frame: &mut Frame, area: Rect, model: &Model, name: &str) {
+    let theme = &model.theme;
+    let insight = model.insight.as_ref().and_then(|insight| insight.parameters.iter().find(|p| p.name == *name));
+    let importance = insight.and_then(|insight| insight.importance);
+    let aside = importance.map_or(String::new(), |share| format!("matters {:.0} %", share * 100.0));
+    let body = heading(frame, area, theme, &format!("Why {name}"), &aside);
+    let [plot, scale] = Layout::vertical([Constraint::Fill(1), Constraint::Length(1)]).areas(body);
+    if plot.height < 2 || plot.width < 8 {
+        return;
+    }
+    let Some(insight) = insight.filter(|insight| insight.at.len() > 1) else {
+        let text = if insight.is_some() { "drawn without a model" } else { "no proposal yet" };
+        let text = super::cut(text, usize::from(plot.width));
+        frame.buffer_mut().set_string(plot.x, plot.y, text, theme.style(Role::Quiet));
+        return;
+    };
+    let (low, high) = (insight.at[0], insight.at[insight.at.len() - 1]);
+    let top = insight.good.iter().chain(&insight.bad).copied().fold(0.0, f64::max);
+    let buffer = frame.buffer_mut();
+    for (density, role, label) in [(&insight.bad, Role::SeriesB, "g"), (&insight.good, Role::Good, "l")] {
+        let mut dots = Dots::new(plot, theme.glyphs);
+        let (across, down) = (dots.size.0 as f64 - 1.0, dots.size.1 as f64 - 1.0);
+        let place = |(x, y): (f64, f64)| ((x - low) / (high - low) * across, (1.0 - y / top) * down);
+        let points: Vec<(f64, f64)> = insight.at.iter().copied().zip(density.iter().copied()).map(place).collect();
+        if top > 0.0 {
+            points.windows(2).for_each(|pair| dots.line(pair[0], pair[1]));
+        }
+        dots.draw(buffer, plot, theme.style(role));
+        // The letter stands at the curve's peak: the two are told apart without colours.
+        let peak = insight.at.iter().zip(density).max_by(|a, b| a.1.total_cmp(b.1));
+        if let Some((x, y)) = peak {
+            let column = ((x - low) / (high - low) * f64::from(plot.width - 1)).round() as u16;
+            let row = ((1.0 - y / top.max(f64::MIN_POSITIVE)) * f64::from(plot.height - 1)).round() as u16;
+            buffer.set_string(plot.x + column, plot.y + row, label, theme.style(role));
+        }
+    }
+    let column = column_of(insight, (low, high), plot.width);
+    for y in plot.y..plot.bottom() {
+        buffer.set_string(plot.x + column, y, theme.bar(), theme.style(Role::Key));
+    }
+    let (left, right) = (number(low), number(high));
+    buffer.set_string(scale.x, scale.y, &left, theme.style(Role::Quiet));
+    let at = scale.right().saturating_sub(right.len() as u16);
+    buffer.set_string(at, scale.y, &right, theme.style(Role::Quiet));
+    let now = number(insight.proposed);
+    let free = scale.width.saturating_sub((left.len() + right.len() + now.len()) as u16 + 2);
+    if free > 0 {
+        let x = (scale.x + column).saturating_sub(now.len() as u16 / 2);
+        let x = x.clamp(scale.x + left.len() as u16 + 1, at.saturating_sub(now.len() as u16 + 1));
+        buffer.set_string(x, scale.y, now, theme.style(Role::Key));
+    }
+}
+
+/// The column of the proposal.
+fn column_of(insight: &ParameterInsight, (low, high): (f64, f64), width: u16) -> u16 {
+    let share = ((insight.proposed - low) / (high - low)).clamp(0.0, 1.0);
+    (share * f64::from(width - 1)).round() as u16
+}

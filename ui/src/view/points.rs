@@ -1,0 +1,53 @@
+//! Points that were run more than once: how often they stood, their mean and spread, and which one leads.
+//!
+//! ```text
+//! #3    3/3  0.641 m +-0.012  leads, 96 %
+//! #11   2/3  0.520 m +-0.301
+//! ```
+
+use quadfrog::recording::record::PointRecord;
+use ratatui::text::{Line, Span};
+
+use super::{number, span};
+use crate::model::Model;
+use crate::theme::Role;
+
+/// A line for each repeated point, best mean first.
+pub fn lines(model: &Model) -> Vec<Line<'static>> {
+    let mut points: Vec<&PointRecord> = model.points.iter().filter(|point| !point.trials.is_empty()).collect();
+    points.sort_by(|a, b| b.mean.total_cmp(&a.mean));
+    points.into_iter().map(|point| line(model, point)).collect()
+}
+
+fn line(model: &Model, point: &PointRecord) -> Line<'static> {
+    let theme = &model.theme;
+    let first = point.trials.first().copied().unwrap_or(0);
+    let spread = point.deviation.map_or(String::new(), |sd| format!(" {}{}", theme.plus_minus(), number(sd)));
+    let mut spans = vec![
+        span(theme, Role::Quiet, format!(" {:<5}", format!("#{first}"))),
+        Span::raw(format!("{}/{} ", point.stood, point.trials.len())),
+        Span::raw(format!(" {} {}", number(point.mean), model.session.unit)),
+        span(theme, Role::Quiet, spread),
+    ];
+    if let Some(confidence) = point.confidence {
+        spans.push(span(theme, Role::Good, format!("  leads, {:.0} %", confidence * 100.0)));
+    } else if point.contender {
+        spans.push(span(theme, Role::Quiet, "  contends"));
+    }
+    Line::from(spans)
+}
+
+/// How a trial's point did over its repeats, in words; none where it ran once.
+pub fn repeats_of(model: &Model, trial: u32) -> Option<String> {
+    let point = model.points.iter().find(|point| point.trials.contains(&trial) && point.trials.len() > 1)?;
+    let spread = point.deviation.map_or(String::new(), |sd| format!(" {} {:.4}", model.theme.plus_minus(), sd));
+    let trials: Vec<String> = point.trials.iter().map(|trial| format!("#{trial}")).collect();
+    Some(format!(
+        "{}/{} stood, {:.4}{spread} {} ({})",
+        point.stood,
+        point.trials.len(),
+        point.mean,
+        model.session.unit,
+        trials.join(" ")
+    ))
+}

@@ -1,0 +1,68 @@
+//! The pre-arm list: every item with what was found and what is needed, all failing ones at once.
+//!
+//! ```text
+//! ok    upright                     0.02 rad              at most 0.2 rad
+//! FAIL  battery                     21 %                  at least 30 %
+//! >word area clear, remote in hand  x gives your word
+//! ```
+
+use quadfrog::realtime::pre_arm::CheckState;
+use quadfrog::recording::record::PreArmCheck;
+use quadfrog::session::intent::OperatorCheck;
+use ratatui::text::{Line, Span};
+
+use super::{cut, span};
+use crate::model::Model;
+use crate::theme::Role;
+
+/// A word and a role for how a check stands.
+fn mark(state: CheckState) -> (&'static str, Role) {
+    match state {
+        CheckState::Passed => ("ok", Role::Good),
+        CheckState::Failed => ("FAIL", Role::Bad),
+        CheckState::Waiting => ("you", Role::Warning),
+        CheckState::NotNeeded => ("-", Role::Quiet),
+    }
+}
+
+/// One line for each item, failing ones first where `few` lines are all that there is room for. `chosen` is the item that
+/// the operator is about to give their word on.
+pub fn lines(model: &Model, width: usize, few: usize, chosen: Option<OperatorCheck>) -> Vec<Line<'static>> {
+    let theme = &model.theme;
+    let mut items: Vec<&PreArmCheck> = model.pre_arm.iter().collect();
+    if items.len() > few {
+        items.sort_by_key(|item| item.state.allows());
+        items.truncate(few);
+    }
+    let line = |item: &PreArmCheck| {
+        let (word, role) = mark(item.state);
+        let selected = chosen.is_some_and(|check| check.check() == item.check);
+        let text = match (item.found.as_str(), item.needed.as_str()) {
+            (found, "") => found.to_owned(),
+            ("", needed) => needed.to_owned(),
+            (found, needed) => format!("{found:<20} {needed}"),
+        };
+        let text = cut(&text, width.saturating_sub(32));
+        Line::from(vec![
+            Span::raw(if selected { ">" } else { " " }),
+            span(theme, role, format!("{word:<5}")),
+            span(theme, if selected { Role::Selected } else { Role::Text }, item.check.name()),
+            Span::raw(" ".repeat(27_usize.saturating_sub(item.check.name().chars().count()))),
+            span(theme, Role::Quiet, text),
+        ])
+    };
+    if items.is_empty() {
+        let text = " not looked at yet: the list is made while the robot is disarmed";
+        return vec![Line::from(span(theme, Role::Quiet, cut(text, width)))];
+    }
+    items.into_iter().map(line).collect()
+}
+
+/// How many items forbid arming, in words.
+pub fn summary(model: &Model) -> String {
+    match (model.pre_arm.is_empty(), model.pre_arm_failing().count()) {
+        (true, _) => String::new(),
+        (false, 0) => "all passed".to_owned(),
+        (false, count) => format!("{count} of {} not yet", model.pre_arm.len()),
+    }
+}
