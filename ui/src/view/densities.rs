@@ -22,8 +22,8 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model, name: &str) {
     let theme = &model.theme;
     let insight = model.insight.as_ref().and_then(|insight| insight.parameters.iter().find(|p| p.name == *name));
     let title = match &model.insight {
-        Some(insight) => format!("Why {name} (#{})", insight.trial),
-        None => format!("Why {name}"),
+        Some(insight) if area.width >= 36 => format!("Why {name} (#{})", insight.trial),
+        _ => format!("Why {name}"),
     };
     let importance = insight.and_then(|insight| insight.importance);
     let aside = importance.map_or(String::new(), |share| format!("matters {:.0} %", share * 100.0));
