@@ -2,6 +2,7 @@
 //! them, whole or key by key. A key that the defaults do not have is refused, with file, line and the nearest known key.
 
 mod checked;
+mod export;
 mod merge;
 mod safety;
 
@@ -30,6 +31,14 @@ pub enum ConfigError {
     /// The file cannot be read.
     #[error("{}: {source}", path.display())]
     Read {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// The file cannot be written, or is there already.
+    #[error("{}: cannot be written: {source}; give a new folder", path.display())]
+    Write {
         /// The file.
         path: PathBuf,
         /// What the system says.

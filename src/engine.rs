@@ -1,6 +1,9 @@
 //! Wires the threads; computes nothing. `Engine::start` takes a checked configuration and gives a screen its [`Handle`].
 
 mod control_thread;
+mod stored;
+
+pub use stored::{Opened, StoredStudy, open_stored, stored_studies, stored_study, study_files};
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -12,7 +15,7 @@ use std::time::Duration;
 use serde_json::json;
 
 use crate::config::{Backend, Config, ConfigError};
-use crate::optimize::journal::{Durability, StudyRecord};
+use crate::optimize::journal::Durability;
 use crate::optimize::sampler::Direction;
 use crate::optimize::space::{Range, Space, SpaceError};
 use crate::optimize::study::{Storage, Study, StudyError, StudyOptions};
@@ -107,6 +110,38 @@ pub enum EngineError {
         "--approve auto: only on the simulator; a jump of the robot is approved by a person: give each or falls-only"
     )]
     Unattended,
+    /// A journal that is not there.
+    #[error("{}: there is no such journal; give a study's folder, its study.log, a journal file or redis://HOST:PORT/DB", file.display())]
+    NoJournal {
+        /// The file.
+        file: PathBuf,
+    },
+    /// A journal with several studies.
+    #[error("{journal}: several studies are in it: say with --name which: {names}")]
+    WhichStudy {
+        /// The journal.
+        journal: String,
+        /// Their names.
+        names: String,
+    },
+    /// A study that is not there.
+    #[error("{journal}: there is no such study in it{}", if names.is_empty() { String::new() } else { format!("; there is {names}") })]
+    NoSuchStudy {
+        /// The journal.
+        journal: String,
+        /// The names that there are.
+        names: String,
+    },
+    /// A study that this program cannot use.
+    #[error(
+        "{journal}: study {name} has no real-valued parameter yet, or several objectives; this program knows neither"
+    )]
+    Unusable {
+        /// The journal.
+        journal: String,
+        /// Its name.
+        name: String,
+    },
     /// A journal without a study of ours.
     #[error("{}: holds no study of this program; give one that it made", file.display())]
     NoStudy {
@@ -163,6 +198,9 @@ pub fn open_life(options: &Options, durability: Durability, recording: &str) -> 
             durability,
         },
     )?;
+    if options.join.is_none() && study.trials().is_empty() {
+        enqueue_first(&mut study, &options.config.first(options.task))?;
+    }
     let worker = if options.join.is_some() { study.join()? } else { 0 };
     if worker == 0 && study.attributes().get(BUDGET) != Some(&json!(budget)) {
         study.annotate_study(&[(BUDGET.to_owned(), json!(budget))])?;
@@ -182,6 +220,14 @@ pub fn open_life(options: &Options, durability: Durability, recording: &str) -> 
         abandoned: Duration::from_secs_f64(options.config.optimize.workers.abandoned_s),
     };
     Ok(Life::open(plan, study)?)
+}
+
+/// The point that the configuration asks to begin with.
+fn enqueue_first(study: &mut Study, point: &[(String, f64)]) -> Result<(), StudyError> {
+    if point.is_empty() {
+        return Ok(());
+    }
+    study.enqueue_unless(point, &[("source".to_owned(), json!("queued"))], |trials| !trials.is_empty()).map(drop)
 }
 
 /// Study attribute: how many trials are to count. Workers that join know it from here.
@@ -500,47 +546,4 @@ impl Drop for Handle {
     fn drop(&mut self) {
         self.end();
     }
-}
-
-/// A study of this program that is on disk, or on a server.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct StoredStudy {
-    /// Its task.
-    pub task: Task,
-    /// Its seed.
-    pub seed: u32,
-    /// The robot model that it was made with.
-    pub robot: String,
-    /// How many trials are to count; none where an older version made it.
-    pub budget: Option<u32>,
-}
-
-/// The studies of this program that `storage` holds; a file that does not exist holds none.
-///
-/// # Errors
-/// When it cannot be read.
-pub fn stored_studies(storage: &Storage) -> Result<Vec<StoredStudy>, EngineError> {
-    let journal = storage.journal(Durability::Synced).map_err(StudyError::from)?;
-    let living = journal.replay().studies().iter().filter(|study| !study.deleted);
-    Ok(living.filter_map(stored).collect())
-}
-
-/// What study `file` holds.
-///
-/// # Errors
-/// When the file cannot be read or holds no study of this program.
-pub fn stored_study(file: &Path) -> Result<StoredStudy, EngineError> {
-    let studies = stored_studies(&Storage::File(file.to_owned()))?;
-    studies.into_iter().next().ok_or_else(|| EngineError::NoStudy { file: file.to_owned() })
-}
-
-fn stored(study: &StudyRecord) -> Option<StoredStudy> {
-    let attribute = |name: &str| study.user_attributes.get(name);
-    let number = |name: &str| u32::try_from(attribute(name)?.as_u64()?).ok();
-    Some(StoredStudy {
-        task: Task::from_name(attribute("task")?.as_str()?)?,
-        seed: number("seed")?,
-        robot: attribute("robot")?.as_str()?.to_owned(),
-        budget: number(BUDGET),
-    })
 }

@@ -33,7 +33,19 @@ const FILES: [(&str, &str); 5] = [
 const GAINS: [(&str, &str); 4] = [("kp", "N/m"), ("kd", "N s/m"), ("kd_joint", "N m s/rad"), ("k_att", "N/m")];
 
 /// Keys that may be given though the defaults leave them out, each with an example of its kind.
-const OPTIONAL: [(&str, &str); 1] = [("optimize.toml", "objective = \"truth\"\n[sampler]\nstartup_trials = 10\n")];
+const OPTIONAL: [(&str, &str); 1] = [(
+    "optimize.toml",
+    "objective = \"truth\"
+[sampler]
+startup_trials = 10
+[first]
+forward = { f0 = 1.0, f1 = 1.0, Fx = 1.0, Fy = 1.0, Fz = 1.0 }
+lateral-left = { f0 = 1.0, f1 = 1.0, Fx = 1.0, Fy = 1.0, Fz = 1.0 }
+lateral-right = { f0 = 1.0, f1 = 1.0, Fx = 1.0, Fy = 1.0, Fz = 1.0 }
+twist-ccw = { f0 = 1.0, f1 = 1.0, Fx = 1.0, Fy = 1.0, Fz = 1.0 }
+twist-cw = { f0 = 1.0, f1 = 1.0, Fx = 1.0, Fy = 1.0, Fz = 1.0 }
+",
+)];
 
 /// Which machine stands behind the controller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -96,6 +108,9 @@ pub struct OptimizeFile {
     pub confirm: ConfirmFile,
     /// Several programs on one study.
     pub workers: WorkersFile,
+    /// The point that a new study of each task begins with, as `export to config` writes it.
+    #[serde(default)]
+    pub first: BTreeMap<String, BTreeMap<String, f64>>,
 }
 
 /// When the best point counts as confirmed.
@@ -224,6 +239,13 @@ impl Config {
                 ParameterInfo { name: name.clone(), unit: unit.to_owned(), low, high }
             })
             .collect()
+    }
+
+    /// The point that a new study of `task` begins with; empty where none is given.
+    pub fn first(&self, task: Task) -> Vec<(String, f64)> {
+        let Some(point) = self.optimize.first.get(task.name()) else { return Vec::new() };
+        let names = &self.optimize.parameters[task.name()];
+        names.iter().filter_map(|name| Some((name.clone(), *point.get(name)?))).collect()
     }
 
     /// The same parameters with the widest bounds that they may be given.
@@ -417,6 +439,15 @@ impl Config {
                     "outside the robot's limits [{least}, {most}] of safety.toml, [parameters] {name}; narrow the bounds"
                 );
                 return Err(self.refuse(FILE, &key, value, reason));
+            }
+        }
+        for (task, point) in &self.optimize.first {
+            for (name, value) in point {
+                let [low, high] = self.optimize.bounds[name];
+                if !(*value >= low && *value <= high) {
+                    let reason = format!("outside its bounds [{low}, {high}]: a study could not begin with it");
+                    return Err(self.refuse(FILE, &format!("first.{task}.{name}"), value, reason));
+                }
             }
         }
         for (task, names) in &self.optimize.parameters {

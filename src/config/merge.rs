@@ -51,7 +51,9 @@ impl Place<'_> {
             let line = (self.line_of)(name.span().start);
             let example = optional.get(name.get_ref().as_ref());
             if let (false, Some(example)) = (under.contains_key(name.get_ref().as_ref()), example) {
-                under.insert(name.get_ref().to_string(), example.clone());
+                // Of a table only the keys that are given; of a value its kind.
+                let nothing = if example.is_table() { Value::Table(Table::new()) } else { example.clone() };
+                under.insert(name.get_ref().to_string(), nothing);
             }
             let Some(known) = under.get_mut(name.get_ref().as_ref()) else {
                 return Err(self.unknown(&key, line, tables, name.get_ref(), under));

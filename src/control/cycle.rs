@@ -11,7 +11,7 @@ use super::settings::Settings;
 use super::watchdog::{self, Level, Watchdog};
 use crate::control::estimator::Estimator;
 use crate::realtime::clock::Clock;
-use crate::realtime::command::{Approval, Command, TrialSpec};
+use crate::realtime::command::{Command, Permit, TrialSpec};
 use crate::realtime::pre_arm::Findings;
 use crate::realtime::telemetry::{Cause, Caution, Event, Fault, Mode, Objection, Phase, Readiness, Tick, TrialEnd};
 use crate::robot::kinematics::Foot;
@@ -357,7 +357,7 @@ impl Cycle {
                 failing => Err(Objection::Checks(failing)),
             },
             Command::Acknowledge { .. } => self.standing.map_or(Ok(()), |fault| Err(Objection::Standing(fault))),
-            Command::RunTrial(_, Approval { mode_changes, given_ns }) => {
+            Command::RunTrial(_, Permit { mode_changes, given_ns }) => {
                 let age_s = time_ns.saturating_sub(given_ns) as f64 * 1e-9;
                 let allowed_s = self.settings.approval.expires_s;
                 if mode_changes != self.mode_changes {

@@ -38,7 +38,7 @@ pub fn divergences(trials: &[Trial], space: &Space, direction: Direction) -> Vec
     let worst = value(ranked[(BEST * all.len() as f64).ceil() as usize - 1]);
     // Equals of the worst among the best are among the best too.
     let is_best = |t: &&Trial| direction.best_first(value(t), worst).is_le();
-    let best_count = all.iter().copied().filter(|t| is_best(&t)).count() as f64;
+    let best_count = all.iter().copied().filter(|t| is_best(t)).count() as f64;
     let gamma = best_count / all.len() as f64;
     let importance = |name: &str| {
         let mut sum = 0.0;
@@ -50,7 +50,7 @@ pub fn divergences(trials: &[Trial], space: &Space, direction: Direction) -> Vec
             seen.push(range);
             let with: Vec<&Trial> =
                 all.iter().copied().filter(|t| t.distribution(name).and_then(|d| d.range()) == Some(range)).collect();
-            let best: Vec<&Trial> = with.iter().copied().filter(|t| is_best(&t)).collect();
+            let best: Vec<&Trial> = with.iter().copied().filter(|t| is_best(t)).collect();
             if with.len() < FEWEST || best.is_empty() {
                 continue;
             }

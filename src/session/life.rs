@@ -18,7 +18,9 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use crate::control::settings::TaskControl;
+use crate::optimize::exchange::TableTrial;
 use crate::optimize::study::{Outcome, Study, StudyError};
+use crate::optimize::trial::TrialState;
 use crate::realtime::command::{Task, TrialSpec};
 use crate::realtime::telemetry::{Tick, TrialEnd};
 use crate::recording::record::{
@@ -355,6 +357,24 @@ impl Life {
     fn log(&mut self, message: String) {
         self.outbox.push(Record::Log(LogRecord { level: Level::Info, source: "study".to_owned(), message }));
     }
+}
+
+/// The trial table of a study that is only looked at: every trial but those that wait.
+pub fn rows_of(study: &Study, order: &[ParameterInfo]) -> Vec<TrialRecord> {
+    let begun = study.trials().iter().filter(|trial| trial.state != TrialState::Waiting);
+    begun.map(|trial| attributes::row_of(trial, study.note_of(trial.number), order)).collect()
+}
+
+/// Adds finished trials of another study: what an operator of that study still wanted is not owed here.
+///
+/// # Errors
+/// As [`Study::import`].
+pub fn import(study: &mut Study, trials: Vec<TableTrial>) -> Result<Vec<u32>, StudyError> {
+    let trials: Vec<TableTrial> = trials
+        .into_iter()
+        .map(|trial| TableTrial { attributes: attributes::elsewhere(trial.attributes), ..trial })
+        .collect();
+    study.import(&trials)
 }
 
 /// What a verdict makes of a row: 0 for a fall (paper, section II-D), nothing for a void, else the value measured by hand

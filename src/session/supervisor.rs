@@ -11,7 +11,7 @@ use super::life::{Life, Refusal};
 use super::pre_arm::{PreArmList, objections};
 use crate::control::mode::{self, Request};
 use crate::realtime::channel::SessionEnd;
-use crate::realtime::command::{Approval, Command};
+use crate::realtime::command::{Command, Permit};
 use crate::realtime::telemetry::{Cause, Event, Mode, TrialEnd};
 use crate::recording::record::{
     CommandRecord, Level, LogRecord, PreArmCheck, Record, SessionInfo, Stage, Stamped, Transition, Verdict,
@@ -268,8 +268,8 @@ impl Supervisor {
                     return Err(hold);
                 }
                 let spec = self.life.approve(*trial, *revision).map_err(words)?;
-                let approval = Approval { mode_changes: self.mode_changes, given_ns: wish.time_ns };
-                if let Err(reason) = self.command(Command::RunTrial(spec, approval)) {
+                let permit = Permit { mode_changes: self.mode_changes, given_ns: wish.time_ns };
+                if let Err(reason) = self.command(Command::RunTrial(spec, permit)) {
                     self.life.ended(spec.trial, &TrialEnd::Cancelled, &[]);
                     return Err(reason);
                 }

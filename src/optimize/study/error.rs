@@ -55,6 +55,18 @@ pub enum StudyError {
         /// What it can be.
         expected: &'static str,
     },
+    /// A value outside the bounds.
+    #[error("{parameter} = {value} is outside its bounds {low} to {high}")]
+    Outside {
+        /// The parameter.
+        parameter: String,
+        /// Its value.
+        value: f64,
+        /// Its lower bound.
+        low: f64,
+        /// Its upper bound.
+        high: f64,
+    },
     /// The number of no trial.
     #[error("study `{study}` has no trial {trial}: it has {count}")]
     UnknownTrial {

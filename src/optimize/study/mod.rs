@@ -8,6 +8,7 @@
 mod check;
 mod draft;
 mod error;
+mod import;
 mod notes;
 
 pub use draft::{Draft, Suggestion};

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 use crate::optimize::study::{DRAWS, Outcome};
 use crate::optimize::trial::{GAINS, Trial, TrialState};
@@ -161,6 +161,14 @@ pub fn interrupted(cause: &str) -> Attributes {
         (RERUN.to_owned(), json!(true)),
         (INTERRUPTED.to_owned(), json!(true)),
     ]
+}
+
+/// What of the attributes still holds in another study: not its numbers, and no debt.
+pub fn elsewhere(mut attributes: Map<String, Value>) -> Map<String, Value> {
+    for name in [PARENT, WORKER, RERUN, INTERRUPTED] {
+        attributes.remove(name);
+    }
+    attributes
 }
 
 /// Whether the parameters of a finished trial are to come again.

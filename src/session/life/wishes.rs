@@ -89,7 +89,7 @@ impl Life {
     pub fn narrow_bounds(&mut self, name: &str, low: f64, high: f64) -> Result<(), Refusal> {
         self.must_be_idle()?;
         let widest = known(&self.plan.widest, "parameter", name)?;
-        if !(low < high) {
+        if low >= high || low.is_nan() || high.is_nan() {
             return not_now(format!(
                 "{name}: {low} to {high} is no range; the lower bound must be below the upper one"
             ));

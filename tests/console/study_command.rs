@@ -1,0 +1,238 @@
+//! `quadfrog study`: the same files from outside, as a person or a script has them.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+
+use serde_json::Value;
+
+fn quadfrog(folder: &Path, arguments: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_quadfrog"));
+    command.args(arguments).current_dir(folder).stdin(Stdio::null()).env("NO_COLOR", "1").output().unwrap()
+}
+
+fn text(folder: &Path, arguments: &[&str]) -> String {
+    let output = quadfrog(folder, arguments);
+    assert_eq!(output.status.code(), Some(0), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).unwrap()
+}
+
+fn refused(folder: &Path, arguments: &[&str]) -> String {
+    let output = quadfrog(folder, arguments);
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
+    message
+}
+
+/// A folder with a finished study of six trials, and the study's folder.
+fn study(task: &str) -> (tempfile::TempDir, String) {
+    let folder = tempfile::tempdir().unwrap();
+    text(folder.path(), &["optimize", "--task", task, "--trials", "6", "--record", "none"]);
+    let study = made(folder.path()).pop().unwrap();
+    (folder, study.to_str().unwrap().to_owned())
+}
+
+fn made(folder: &Path) -> Vec<PathBuf> {
+    let mut all: Vec<PathBuf> =
+        fs::read_dir(folder.join("recordings")).unwrap().map(|entry| entry.unwrap().path()).collect();
+    all.sort();
+    all
+}
+
+#[test]
+fn studies_are_listed_and_shown() {
+    let (folder, study) = study("forward");
+    let list = text(folder.path(), &["study", "list"]);
+    let mut lines = list.lines();
+    assert!(lines.next().unwrap().starts_with("study"), "{list}");
+    let line = lines.next().unwrap();
+    assert!(line.contains("forward") && line.contains(" m"), "{list}");
+    let name = Path::new(&study).file_name().unwrap().to_str().unwrap();
+    assert!(line.contains(name), "{list}");
+    let show = text(folder.path(), &["study", "show", &study]);
+    assert!(
+        show.contains("forward-seed0") && show.contains("robot: go1") && show.contains("Fz from 150 to 350 N"),
+        "{show}"
+    );
+    assert!(show.contains("f0 (Hz)") && show.contains("Best: trial"), "{show}");
+    let best = text(folder.path(), &["study", "best", &format!("{study}/study.log")]);
+    assert!(show.ends_with(&best), "{best}");
+    assert!(text(folder.path(), &["study", "list", "."]).contains("no study"));
+    assert!(refused(folder.path(), &["study", "list", "elsewhere"]).contains("elsewhere"));
+    assert!(refused(folder.path(), &["study", "show", "elsewhere"]).contains("no such journal"));
+    assert!(!folder.path().join("elsewhere").exists());
+    assert!(refused(folder.path(), &["study", "show", &study, "--name", "other"]).contains("forward-seed0"));
+}
+
+#[test]
+fn a_study_goes_out_and_comes_back_the_same_in_both_forms() {
+    let (folder, first) = study("forward");
+    for form in ["csv", "json"] {
+        let file = format!("table.{form}");
+        text(folder.path(), &["study", "export", &first, "--output", &file]);
+        let printed = text(folder.path(), &["study", "export", &first, "--format", form]);
+        assert_eq!(printed, fs::read_to_string(folder.path().join(&file)).unwrap());
+        // Into a study of one trial.
+        let output = format!("other-{form}");
+        text(folder.path(), &["optimize", "--trials", "1", "--seed", "7", "--record", "none", "--output", &output]);
+        let other = fs::read_dir(folder.path().join(&output)).unwrap().next().unwrap().unwrap().path();
+        let other = other.to_str().unwrap();
+        let said = text(folder.path(), &["study", "import", other, &file]);
+        assert!(said.starts_with("6 trials"), "{said}");
+        let trials = |study: &str| -> Vec<Value> {
+            let Value::Array(all) =
+                serde_json::from_str(&text(folder.path(), &["study", "export", study, "--format", "json"])).unwrap()
+            else {
+                panic!("no array")
+            };
+            all
+        };
+        let (theirs, ours) = (trials(other), trials(&first));
+        assert_eq!(theirs.len(), 7);
+        for (theirs, ours) in theirs[1..].iter().zip(&ours) {
+            for key in ["state", "value", "params", "datetime_start", "datetime_complete"] {
+                assert_eq!(theirs[key], ours[key], "{key}");
+            }
+            // A table has no null, and what was owed or numbered in the one study is not in the other.
+            for (name, value) in ours["user_attrs"].as_object().unwrap() {
+                let left_out = value.is_null() || ["worker", "rerun"].contains(&name.as_str());
+                let same = theirs["user_attrs"].get(name).filter(|value| !value.is_null()) == Some(value);
+                assert!(same != left_out, "{name}: {value}");
+            }
+        }
+        // What came in counts: the study has its seven trials and runs no more.
+        let rest =
+            quadfrog(folder.path(), &["optimize", "--resume", other, "--trials", "7", "--json", "--record", "none"]);
+        assert!(rest.status.success() && rest.stdout.is_empty());
+    }
+}
+
+#[test]
+fn a_table_that_cannot_be_is_refused_whole_with_its_row_and_column() {
+    let (folder, study) = study("forward");
+    let import = |name: &str, table: &str, words: &[&str]| {
+        fs::write(folder.path().join(name), table).unwrap();
+        let message = refused(folder.path(), &["study", "import", &study, name]);
+        for word in words.iter().chain([&name]) {
+            assert!(message.contains(word), "{message}");
+        }
+    };
+    let head = "params_f0,params_Fx,params_Fz,value,state\n";
+    import(
+        "text.csv",
+        &format!("{head}1.0,60,200,0.5,COMPLETE\n1.0,much,200,0.5,COMPLETE\n"),
+        &["trial 2", "params_Fx", "much"],
+    );
+    import(
+        "outside.csv",
+        &format!("{head}1.0,60,200,0.5,COMPLETE\n1.0,160,200,0.5,COMPLETE\n"),
+        &["Fx = 160", "0 to 150"],
+    );
+    import("stranger.csv", "params_speed,value\n1.0,0.5\n", &["speed", "f0, Fx, Fz"]);
+    import("state.csv", &format!("{head}1.0,60,200,0.5,DONE\n"), &["state", "DONE", "COMPLETE"]);
+    import("nothing.csv", "a,b\n1,2\n", &["params_<name>"]);
+    import("ragged.csv", &format!("{head}1.0\n"), &["CSV"]);
+    import("object.json", "{}", &["JSON", "array"]);
+    import("value.json", "[{\"params\":{\"f0\":1},\"state\":\"COMPLETE\"}]", &["trial 1", "value"]);
+    import("none.csv", "", &["params_<name>"]);
+    let left = text(folder.path(), &["study", "export", &study, "--format", "csv"]);
+    assert_eq!(left.lines().count(), 7, "nothing was added: {left}");
+}
+
+#[test]
+fn a_queued_point_runs_next_and_points_of_a_table_can_be_queued() {
+    let (folder, study) = study("forward");
+    for (setting, words) in
+        [("Fx=151", "0 to 150"), ("Fw=1", "f0, Fx, Fz"), ("Fx=NaN", "finite"), ("Fx", "Fx=120"), ("Fx=much", "much")]
+    {
+        let message = refused(folder.path(), &["study", "enqueue", &study, setting]);
+        assert!(message.contains(words), "{message}");
+    }
+    assert!(refused(folder.path(), &["study", "enqueue", &study, "Fx=1", "Fx=2"]).contains("twice"));
+    // A session that runs in the folder does not mind.
+    let held = fs::File::open(Path::new(&study).join("session.lock")).unwrap();
+    held.lock().unwrap();
+    assert!(text(folder.path(), &["study", "enqueue", &study, "Fx=77", "Fz=222.5"]).contains("trial 6"));
+    drop(held);
+    fs::write(folder.path().join("points.csv"), "params_f0,params_Fx,params_Fz\n1.25,66,211\n").unwrap();
+    assert!(text(folder.path(), &["study", "import", &study, "points.csv", "--queue"]).contains("1 points"));
+    assert!(text(folder.path(), &["study", "show", &study]).contains("2 queued"));
+    let output = text(folder.path(), &["optimize", "--resume", &study, "--trials", "8", "--json", "--record", "none"]);
+    let trials: Vec<Value> = output.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    assert_eq!((&trials[0]["params"]["Fx"], &trials[0]["params"]["Fz"]), (&77.0.into(), &222.5.into()));
+    assert_eq!((&trials[1]["params"]["f0"], &trials[1]["params"]["Fx"]), (&1.25.into(), &66.0.into()));
+}
+
+/// A study's best as a configuration: the next study begins with it.
+#[test]
+fn the_best_begins_the_next_study() {
+    let (folder, study) = study("twist-cw");
+    let said = text(folder.path(), &["study", "best", &study, "--config", "found"]);
+    assert!(said.contains("--config found"), "{said}");
+    let output = text(
+        folder.path(),
+        &[
+            "optimize", "--task", "twist-cw", "--config", "found", "--trials", "2", "--seed", "5", "--json",
+            "--record", "none",
+        ],
+    );
+    let first: Value = serde_json::from_str(output.lines().next().unwrap()).unwrap();
+    let trials: Value =
+        serde_json::from_str(&text(folder.path(), &["study", "export", &study, "--format", "json"])).unwrap();
+    let best = trials.as_array().unwrap().iter().max_by(|a, b| {
+        let value = |t: &Value| t["value"].as_f64().unwrap_or(f64::NEG_INFINITY);
+        value(a).total_cmp(&value(b))
+    });
+    assert_eq!(first["params"], best.unwrap()["params"]);
+    // Nothing is overwritten, and what is written by hand is checked.
+    assert!(refused(folder.path(), &["study", "best", &study, "--config", "found"]).contains("new folder"));
+    fs::create_dir(folder.path().join("mine")).unwrap();
+    let write = |text: &str| fs::write(folder.path().join("mine/optimize.toml"), text).unwrap();
+    write("[first.forward]\nFx = 151.0\n");
+    let message = refused(folder.path(), &["optimize", "--config", "mine"]);
+    assert!(message.contains("mine/optimize.toml:2") && message.contains("[0, 150]"), "{message}");
+    write("[first.backward]\nFx = 1.0\n");
+    assert!(refused(folder.path(), &["optimize", "--config", "mine"]).contains("first.backward"));
+}
+
+#[test]
+fn a_reader_that_goes_away_ends_nothing_in_panic() {
+    let (folder, study) = study("forward");
+    for arguments in [&["study", "export", &study][..], &["study", "show", &study], &["study", "list"]] {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_quadfrog"));
+        command.args(arguments).current_dir(folder.path()).stdin(Stdio::null());
+        let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        drop(child.stdout.take());
+        let output = child.wait_with_output().unwrap();
+        let errors = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success() && !errors.contains("panicked"), "{errors}");
+    }
+}
+
+/// A journal that Python made, with its table, both ways.
+#[test]
+fn python_reads_our_table_and_we_read_its_journal_and_its_table() {
+    let has = Command::new("python3").args(["-c", "import optuna, pandas"]).stderr(Stdio::null()).status();
+    if !has.is_ok_and(|status| status.success()) {
+        println!("skipped: python3 has no optuna with pandas");
+        return;
+    }
+    let (folder, ours) = study("forward");
+    let script = "import sys, optuna, pandas\n\
+        from optuna.storages import JournalStorage\n\
+        from optuna.storages.journal import JournalFileBackend\n\
+        study = optuna.create_study(storage=JournalStorage(JournalFileBackend('python.log')), study_name='theirs', direction='maximize')\n\
+        study.optimize(lambda t: -(t.suggest_float('Fx', 0, 150) - 60) ** 2 + t.suggest_float('f0', 0.75, 1.75), n_trials=5)\n\
+        study.trials_dataframe().to_csv('python.csv', index=False)\n\
+        table = pandas.read_csv('ours.csv')\n\
+        assert len(table) == 6 and table['params_Fx'].between(0, 150).all() and (table['state'] == 'COMPLETE').any()\n";
+    text(folder.path(), &["study", "export", &ours, "--output", "ours.csv"]);
+    let python = Command::new("python3").args(["-c", script]).current_dir(folder.path()).output().unwrap();
+    assert!(python.status.success(), "{}", String::from_utf8_lossy(&python.stderr));
+    let show = text(folder.path(), &["study", "show", "python.log"]);
+    assert!(show.contains("theirs") && show.contains("Fx from 0 to 150"), "{show}");
+    assert_eq!(text(folder.path(), &["study", "export", "python.log"]).lines().count(), 6);
+    let said = text(folder.path(), &["study", "import", &ours, "python.csv"]);
+    assert!(said.starts_with("5 trials"), "{said}");
+    assert!(text(folder.path(), &["study", "enqueue", "python.log", "Fx=60"]).contains("trial 5"));
+}
