@@ -67,6 +67,11 @@ impl Body {
         if tick.number.is_multiple_of(SHOWN_EVERY) {
             counters.ticks_not_shown += u64::from(end.shown.push(tick).is_err());
         }
+        // Before the events: who hears of a change finds what goes with it.
+        let changed = cycle.events().iter().any(|event| matches!(event, Event::Mode { .. }));
+        if changed || tick.number.is_multiple_of(COUNTERS_EVERY) {
+            end.readiness.write(cycle.readiness());
+        }
         for event in cycle.events().iter() {
             counters.commands_refused += u64::from(matches!(event, Event::Refused { .. }));
             self.events_lost |= end.events.push(event).is_err();
@@ -74,7 +79,6 @@ impl Body {
         end.snapshot.write(Snapshot { tick, counters: *counters });
         if tick.number.is_multiple_of(COUNTERS_EVERY) {
             end.counters.write(*counters);
-            end.readiness.write(cycle.readiness());
         }
         cycle.last()
     }
