@@ -304,6 +304,7 @@ fn may_arm(model: &Model) -> Legality {
     match model.mode() {
         mode if busy(mode).is_some() => refuse(busy(mode).unwrap_or_default()),
         Mode::Disarmed if stage_is(model, Stage::Review) => refuse("the last trial waits for its verdict"),
+        Mode::Disarmed if model.pre_arm.is_empty() => refuse("the pre-arm list is still being made"),
         Mode::Disarmed => match model.pre_arm_failing().count() {
             0 => Ok(()),
             count => refuse(format!(

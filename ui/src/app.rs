@@ -266,6 +266,7 @@ impl Console {
         if self.screen.take().and_then(|()| self.screen.mouse(self.model.mouse)).is_err() {
             self.hang_up();
         }
+        update(&mut self.model, Msg::Resumed);
         self.last_feed = Instant::now();
         self.redraw = true;
     }

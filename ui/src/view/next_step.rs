@@ -82,6 +82,11 @@ fn live(model: &Model) -> NextStep {
                 quit,
             ],
         ),
+        Mode::Disarmed if model.pre_arm.is_empty() => step(
+            "Checking the robot.",
+            model,
+            &[(Action::Override, "override"), (Action::Undo, "undo"), (Action::Help, "help"), quit],
+        ),
         Mode::Disarmed if model.pre_arm_failing().count() > 0 => step(
             format!(
                 "Not ready to arm: {} checks. {} shows them.",
