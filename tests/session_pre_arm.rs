@@ -53,6 +53,7 @@ struct Session {
     cycle: Cycle,
     robot: Go1Like,
     screen: Receiver<Stamped>,
+    _recorder: Receiver<Stamped>,
     records: Vec<Record>,
     time_ms: u64,
 }
@@ -66,7 +67,7 @@ impl Session {
         let mut simulator = Simulator::new(&options.robot, &options.config.simulator).unwrap();
         simulator.place(&Placement { joint_position: settings.lying_position, lying: true, seed: 0 });
         let (control, session_end, _screen, _ticks) = channels();
-        let (to_recorder, _) = channel();
+        let (to_recorder, recorder) = channel();
         let (to_screen, screen) = channel();
         let (_, handed) = channel();
         let parts = Parts {
@@ -84,6 +85,7 @@ impl Session {
             cycle: Cycle::new(&settings),
             robot: Go1Like { simulator, charge_percent: 90.0 },
             screen,
+            _recorder: recorder,
             records: Vec::new(),
             time_ms: 0,
         };
