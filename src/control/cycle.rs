@@ -300,10 +300,11 @@ impl Cycle {
         }
     }
 
-    /// How the pre-arm list stands: looked at while it matters, from the newest state.
+    /// How the pre-arm list stands: looked at while the robot is heard and not energised, so that it is known in the tick in
+    /// which the robot becomes disarmed.
     fn check_pre_arm<R: Robot + ?Sized>(&mut self, inputs: &Inputs, robot: &R) {
         self.pre_arm.observe(inputs.lateness_ns, &self.tick.state, &self.settings);
-        if self.mode == Mode::Disarmed {
+        if self.mode != Mode::Offline && !self.mode.energised() {
             let seen = pre_arm::Seen {
                 state: &self.tick.state,
                 estimate: &self.tick.estimate,
