@@ -10,7 +10,7 @@ use crate::realtime::telemetry::{Counters, Event, Mode, Snapshot, Tick};
 use crate::realtime::thread::Instant;
 use crate::robot::Robot;
 
-/// The session is told the counters ten times a second.
+/// The session is told the counters, and what speaks against arming, ten times a second and with every event.
 const COUNTERS_EVERY: u64 = 100;
 
 /// A control cycle at its ends of the channels.
@@ -67,15 +67,17 @@ impl Body {
         if tick.number.is_multiple_of(SHOWN_EVERY) {
             counters.ticks_not_shown += u64::from(end.shown.push(tick).is_err());
         }
+        let told = cycle.events().iter().next().is_some();
+        if told || tick.number.is_multiple_of(COUNTERS_EVERY) {
+            // Before the events: who hears that the robot is disarmed also knows what speaks against arming it.
+            end.counters.write(*counters);
+            end.readiness.write(cycle.readiness());
+        }
         for event in cycle.events().iter() {
             counters.commands_refused += u64::from(matches!(event, Event::Refused { .. }));
             self.events_lost |= end.events.push(event).is_err();
         }
         end.snapshot.write(Snapshot { tick, counters: *counters });
-        if tick.number.is_multiple_of(COUNTERS_EVERY) {
-            end.counters.write(*counters);
-            end.readiness.write(cycle.readiness());
-        }
         cycle.last()
     }
 

@@ -174,7 +174,8 @@ impl Cycle {
         let read_ns = clock.now_ns();
         self.estimate();
         self.watch(inputs, previous_robot_time_ms, robot);
-        self.check_pre_arm(inputs, robot);
+        self.pre_arm.observe(inputs.lateness_ns, &self.tick.state, &self.settings);
+        self.check_pre_arm(robot);
         if let Some(command) = inputs.command {
             self.obey(&command, inputs.time_ns, robot);
         }
@@ -196,6 +197,10 @@ impl Cycle {
             self.send_error = Some(errno);
         }
         let written_ns = clock.now_ns();
+        if self.mode_ticks == 0 {
+            // Disarmed just now: whoever hears of it finds the list as it is, not as it was before.
+            self.check_pre_arm(robot);
+        }
 
         self.publish(inputs, sent, passed.limited);
         let stages = &mut self.tick.stages;
@@ -301,8 +306,7 @@ impl Cycle {
     }
 
     /// How the pre-arm list stands: looked at while it matters, from the newest state.
-    fn check_pre_arm<R: Robot + ?Sized>(&mut self, inputs: &Inputs, robot: &R) {
-        self.pre_arm.observe(inputs.lateness_ns, &self.tick.state, &self.settings);
+    fn check_pre_arm<R: Robot + ?Sized>(&mut self, robot: &R) {
         if self.mode == Mode::Disarmed {
             let seen = pre_arm::Seen {
                 state: &self.tick.state,

@@ -66,9 +66,15 @@ fn times() -> Times {
 
 /// What one turn measured.
 struct Measured {
+    /// Of all ticks.
     lateness: Times,
+    /// Of the ticks before which the thread slept. A tick that makes up for a stall follows the one before at once: it is
+    /// late, but nothing woke late; cyclictest leaves such periods out.
+    wake_up: Times,
     /// The same in whole microseconds, as cyclictest counts.
-    lateness_floor: Times,
+    wake_up_floor: Times,
+    /// When the last tick ended, ns after the pace began.
+    ended_ns: u64,
     tick: Times,
     read: Times,
     decide: Times,
@@ -81,14 +87,26 @@ struct Measured {
 impl Measured {
     fn new() -> Measured {
         let lateness = times();
-        let [lateness_floor, tick, read, decide, write] = std::array::from_fn(|_| lateness.clone());
-        Measured { lateness, lateness_floor, tick, read, decide, write, elsewhere: 0, granted: None }
+        let [wake_up, wake_up_floor, tick, read, decide, write] = std::array::from_fn(|_| lateness.clone());
+        Measured {
+            lateness,
+            wake_up,
+            wake_up_floor,
+            ended_ns: 0,
+            tick,
+            read,
+            decide,
+            write,
+            elsewhere: 0,
+            granted: None,
+        }
     }
 
     fn add(&mut self, other: Measured) -> Result<(), Failure> {
         for (mine, theirs) in [
             (&mut self.lateness, &other.lateness),
-            (&mut self.lateness_floor, &other.lateness_floor),
+            (&mut self.wake_up, &other.wake_up),
+            (&mut self.wake_up_floor, &other.wake_up_floor),
             (&mut self.tick, &other.tick),
             (&mut self.read, &other.read),
             (&mut self.decide, &other.decide),
@@ -103,7 +121,11 @@ impl Measured {
 
     fn take(&mut self, instant: Instant, cost_ns: u64, tick: &Tick) {
         self.lateness.saturating_record(instant.lateness_ns.max(1));
-        self.lateness_floor.saturating_record((instant.lateness_ns / 1000 * 1000).max(1));
+        if instant.planned_ns >= self.ended_ns {
+            self.wake_up.saturating_record(instant.lateness_ns.max(1));
+            self.wake_up_floor.saturating_record((instant.lateness_ns / 1000 * 1000).max(1));
+        }
+        self.ended_ns = instant.planned_ns + instant.lateness_ns + cost_ns;
         self.tick.saturating_record(cost_ns.max(1));
         let stages = &tick.stages;
         for (times, ns) in
@@ -155,18 +177,20 @@ fn report(arguments: &LoopArguments, ours: &Measured, theirs: &Times) {
         let at = |quantile| us(times.value_at_quantile(quantile));
         println!("{name:<26}{:>10.1}{:>10.1}{:>10.1}{:>10.1}", at(0.5), at(0.99), at(0.999), us(times.max()));
     };
-    line("wake-up lateness", &ours.lateness);
+    line("wake-up lateness", &ours.wake_up);
     if arguments.cyclictest {
         line("cyclictest", theirs);
     }
+    line("start of all ticks", &ours.lateness);
     line("tick", &ours.tick);
     line("  read", &ours.read);
     line("  estimate, watch, decide", &ours.decide);
     line(if arguments.with_link { "  send" } else { "  write (its physics)" }, &ours.write);
     println!();
-    println!("{} ticks, {} of them not in READY", ours.lateness.len(), ours.elsewhere);
+    let (ticks, slept) = (ours.lateness.len(), ours.wake_up.len());
+    println!("{ticks} ticks, {} of them made up for a stall, {} not in READY", ticks - slept, ours.elsewhere);
     if arguments.cyclictest {
-        let (own, other) = (ours.lateness_floor.value_at_quantile(0.999), theirs.value_at_quantile(0.999));
+        let (own, other) = (ours.wake_up_floor.value_at_quantile(0.999), theirs.value_at_quantile(0.999));
         let ratio = own.max(1000) as f64 / other.max(1000) as f64;
         println!("p99.9 of the wake-up: {ratio:.2} times cyclictest's, in whole us (asked: at most {RATIO_ASKED})");
     }
