@@ -73,7 +73,7 @@ impl Session {
     fn begin(backend: Backend, folder: Option<std::path::PathBuf>, observe: bool) -> Session {
         let config = Config::load(None).unwrap();
         let robot = RobotDescription::embedded("go1").unwrap();
-        let options = Options { trials: Some(5), ..Options::new(config, robot, backend, Task::Forward) };
+        let options = Options { trials: Some(5), observe, ..Options::new(config, robot, backend, Task::Forward) };
         let settings: Settings = options.config.settings(&options.robot, options.task, backend).unwrap();
         let mut simulator = Simulator::new(&options.robot, &options.config.simulator).unwrap();
         simulator.place(&Placement { joint_position: settings.lying_position, lying: true, seed: 0 });
