@@ -47,11 +47,17 @@ fn run(study: &mut Study) {
 fn ask(c: &mut Criterion) {
     let mut group = c.benchmark_group("ask, 4 parameters");
     for multivariate in [true, false] {
-        for trials in [20, 1000] {
+        for trials in [20, 200, 1000] {
             let study = history(SamplerConfig { multivariate, ..SamplerConfig::default() }, trials);
             let mode = if multivariate { "multivariate" } else { "univariate" };
             group.bench_function(format!("tpe {mode}, {trials} trials"), |b| b.iter(|| black_box(study.draft())));
         }
+    }
+    // The fit grows with the cube of the trials: what it is made for is some tens of them.
+    group.sample_size(10);
+    for trials in [20, 50, 200] {
+        let study = history(SamplerConfig { kind: SamplerKind::Gp, ..SamplerConfig::default() }, trials);
+        group.bench_function(format!("gp, {trials} trials"), |b| b.iter(|| black_box(study.draft())));
     }
 }
 

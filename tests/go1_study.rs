@@ -177,12 +177,11 @@ impl Operator {
             assert!(begun.elapsed() < PATIENCE, "still {} at {:?} after {PATIENCE:?}", mode.name(), self.stage);
             let here = (mode, self.stage.map(|stage| stage.stage), self.stage.map_or(0, |stage| stage.trial));
             // Once is enough, unless nothing comes of it.
-            if self.wished_in != Some(here) || wished_at.elapsed() > Duration::from_secs(3) {
-                if let Some(intent) = self.act(mode) {
-                    self.engine.wish(intent);
-                    wished_at = Instant::now();
-                    self.wished_in = Some(here);
-                }
+            let wishes = self.wished_in != Some(here) || wished_at.elapsed() > Duration::from_secs(3);
+            if wishes && let Some(intent) = self.act(mode) {
+                self.engine.wish(intent);
+                wished_at = Instant::now();
+                self.wished_in = Some(here);
             }
             std::thread::sleep(Duration::from_millis(20));
         }
@@ -245,7 +244,7 @@ fn median(values: &[f64]) -> f64 {
 fn tell(seed: u32, outcome: &Outcome) {
     for row in &outcome.rows {
         let value = row.value.map_or_else(|| "     ".to_owned(), |value| format!("{value:.3}"));
-        println!("seed {seed} trial {:>2} {value} {:?}: {}", row.trial, row.verdict, row.cause);
+        println!("seed {seed} trial {:>2} {value} {:?}: {}; {:?}", row.trial, row.verdict, row.cause, row.measured);
     }
     println!("seed {seed}: best {:.3} m, {} stops, {:?}", outcome.best, outcome.stops, outcome.link);
 }

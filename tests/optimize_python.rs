@@ -1,6 +1,7 @@
 //! The same journal in the hands of Python's Optuna 5 and optuna-dashboard. Where Python lacks them the tests say so and
 //! skip; `pip install optuna==5.0.0 optuna-dashboard` installs them.
 
+use quadfrog::optimize::importance::divergences;
 use quadfrog::optimize::journal::{Durability, Journal, JournalError, JournalFile, Operation};
 use quadfrog::optimize::sampler::{Direction, SamplerConfig, Streams, propose};
 use quadfrog::optimize::space::{Range, Space};
@@ -247,6 +248,35 @@ fn three_writers_at_once_lose_nothing() {
     assert_eq!(study.trials().iter().filter(|t| t.state == TrialState::Complete).count(), 300);
     assert_eq!(optuna(&["summary", &journal])["trials"].as_array().unwrap().len(), 300);
     assert!(!folder.0.join("study.log.lock").exists());
+}
+
+/// PED-ANOVA's divergences equal those of Optuna's evaluator, also after the bounds have changed in mid-study.
+#[test]
+fn importances_are_optunas() {
+    if !python_has("optuna", "5.") {
+        return;
+    }
+    let folder = Folder::new("importance");
+    let (path, journal) = folder.journal();
+    let mut study = open(&path, 3);
+    for trials in [12, 30, 80, 110] {
+        while study.trials().len() < trials {
+            run(&mut study, &[]);
+        }
+        if trials == 80 {
+            let narrow = [("f0", 0.75, 1.75), ("Fx", 40.0, 110.0), ("Fz", 150.0, 350.0)];
+            let narrow = narrow.map(|(n, low, high)| (n.to_owned(), Range::linear(low, high)));
+            study.search(Space::new(narrow).unwrap()).unwrap();
+        }
+        let theirs = optuna(&["importances", &journal]);
+        for (name, ours) in divergences(study.trials(), &study.options().space, Direction::Maximize) {
+            let theirs = theirs[&name].as_f64().unwrap();
+            assert!(
+                (ours - theirs).abs() <= 1e-9 * theirs.abs().max(1e-6),
+                "{trials} trials, {name}: {ours} is not {theirs}"
+            );
+        }
+    }
 }
 
 /// A lock as a writer leaves it that was killed while it held it.

@@ -30,7 +30,7 @@ impl Screen {
 
     /// Waits until `wanted` of all records so far; the time-out only ends a test that fails.
     fn until(&mut self, what: &str, wanted: impl Fn(&[Record]) -> bool) {
-        let end = Instant::now() + Duration::from_secs(120);
+        let end = Instant::now() + Duration::from_secs(60);
         while !wanted(&self.records) {
             assert!(Instant::now() < end, "{what} did not happen: {:#?}", self.tail());
             self.step();

@@ -65,7 +65,7 @@ const LIVE: &[Row] = &[
     row(Action::Rerun, "r", Shows("re-run of #1"), ("u", "judge it")),
     row(Action::Fall, "f", Shows("Study finished"), ("u", "judge it")),
     row(Action::Accept, "a", Shows("Study finished"), ("", "")),
-    row(Action::ExportBest, "E", Shows("best, for --config"), ("", "")),
+    row(Action::ExportBest, "E", Shows("for --config: "), ("", "")),
     row(Action::Continue, "C", Shows("How many more trials?"), ("\r", "Trial #2")),
     row(Action::ConfirmBest, "K", Shows("two accepted trials are needed"), ("4", "What can be done")),
     row(Action::Fix, "X", Shows("Fix Fx at"), ("3\r", "fixed at")),

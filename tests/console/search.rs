@@ -289,19 +289,19 @@ fn the_best_is_written_as_a_configuration_that_the_program_takes() {
     let mut console = finished();
     console.record(Record::Session(SessionInfo { study: study.display().to_string(), ..session() }));
     let best = export::best(&console.model).expect("written");
-    assert_eq!(best, folder.path().join("best"));
+    assert_eq!(best, folder.path().join("best-trial-2"));
     let config = Config::load(Some(&best)).expect("a configuration");
-    let bounds = config.parameters(Task::Forward);
-    let bounds: Vec<(&str, f64, f64)> = bounds.iter().map(|p| (p.name.as_str(), p.low, p.high)).collect();
-    assert_eq!(bounds, [("f0", 1.15, 1.35), ("Fx", 60.0, 90.0), ("Fz", 230.0, 270.0)], "a tenth to either side");
+    let first: Vec<(String, f64)> = vec![("f0".into(), 1.25), ("Fx".into(), 75.0), ("Fz".into(), 250.0)];
+    assert_eq!(config.first(Task::Forward), first, "the point that a study begins with");
     let gains = config.task(Task::Forward);
     assert_eq!((gains.kp, gains.kd), (450.0, 8.0));
+    assert!(export::best(&console.model).expect_err("once").to_string().contains("best-trial-2"), "nothing is lost");
     let table = export::table(&console.model).expect("written");
     assert_eq!(std::fs::read_to_string(table).expect("the table").lines().count(), 5);
     // A folder that cannot be written is named.
     console.record(Record::Session(SessionInfo { study: "/proc/study.log".into(), ..session() }));
     let error = export::best(&console.model).expect_err("no such place").to_string();
-    assert!(error.contains("/proc/best"), "{error}");
+    assert!(error.contains("/proc/best-trial-2"), "{error}");
 }
 
 /// A Go1 that lies disarmed with this pre-arm list.

@@ -83,6 +83,15 @@ def bounds(path, seed, multivariate):
     return suggested
 
 
+def importances(path):
+    """PED-ANOVA's divergences, as Optuna reports them before it makes them sum to 1."""
+    study = load(path)
+    values = optuna.importance.get_param_importances(
+        study, evaluator=optuna.importance.PedAnovaImportanceEvaluator(), normalize=False
+    )
+    return {name: float(value) for name, value in values.items()}
+
+
 if __name__ == "__main__":
-    command = {"summary": summary, "enqueue": enqueue, "continue": proceed, "bounds": bounds}[sys.argv[1]]
+    command = {"summary": summary, "enqueue": enqueue, "continue": proceed, "bounds": bounds, "importances": importances}[sys.argv[1]]
     print(json.dumps(command(*sys.argv[2:])))

@@ -248,7 +248,7 @@ impl Console {
 
     fn export_best(&mut self) {
         let written = export::best(&self.model);
-        self.say_written(written, |path| format!("written: {}, for --config", path.display()));
+        self.say_written(written, |path| format!("for --config: {}", path.display()));
     }
 
     fn say_written(&mut self, written: Result<PathBuf, ExportError>, words: impl FnOnce(&Path) -> String) {

@@ -10,67 +10,28 @@ mod draft;
 mod error;
 mod import;
 mod notes;
+mod storage;
+mod telling;
+mod workers;
 
 pub use draft::{Draft, Suggestion};
 pub use error::StudyError;
+pub use storage::Storage;
+pub use workers::worker_seed;
 
-use crate::optimize::journal::{
-    Durability, Effect, Journal, JournalError, JournalFile, JournalRedis, LOCK_GRACE, Operation, StudyRecord, Template,
-};
+use crate::optimize::journal::{Durability, Journal, JournalError, Operation, StudyRecord};
 use crate::optimize::sampler::{Direction, Draws, SamplerConfig, Streams, propose};
 use crate::optimize::space::{Parameter, Range, Space};
 use crate::optimize::trial::{Distribution, FIXED_PARAMS, Trial, TrialState, announcement};
 use jiff::Timestamp;
-use serde_json::{Map, Value};
+use serde_json::Value;
 use std::collections::BTreeMap;
-use std::path::PathBuf;
 use std::time::Duration;
 
 /// Trial system attribute: seed of the streams and how far they had been read when the trial began.
 pub const DRAWS: &str = "quadfrog:draws";
-/// Study system attribute: how many workers have joined so far.
-const WORKERS: &str = "quadfrog:workers";
 /// Study system attribute: names of the objectives, as Optuna and its dashboard know it.
 const METRIC_NAMES: &str = "study:metric_names";
-
-/// Where a study is kept.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Storage {
-    /// Nowhere: it ends with the program.
-    Memory,
-    /// In a journal file, made if it does not exist.
-    File(PathBuf),
-    /// On a Redis server, given as `redis://host:port/db`: for workers on many hosts.
-    Redis(String),
-}
-
-impl Storage {
-    /// The journal that is kept there.
-    ///
-    /// # Errors
-    /// If it cannot be read.
-    pub fn journal(&self, durability: Durability) -> Result<Journal, JournalError> {
-        match self {
-            Storage::Memory => Ok(Journal::in_memory()),
-            Storage::File(path) => Journal::open(JournalFile::new(path, durability, LOCK_GRACE)?),
-            Storage::Redis(url) => Journal::connect(JournalRedis::new(url, "")?),
-        }
-    }
-}
-
-impl std::fmt::Display for Storage {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Storage::Memory => write!(f, "memory"),
-            Storage::File(path) => write!(f, "{}", path.display()),
-            // An address may hold a password before an @.
-            Storage::Redis(url) => match url.rsplit_once('@') {
-                Some((_, address)) => write!(f, "redis://{address}"),
-                None => write!(f, "{url}"),
-            },
-        }
-    }
-}
 
 /// What a study is.
 #[derive(Debug, Clone, PartialEq)]
@@ -140,26 +101,6 @@ impl Study {
         study.check_compatible()?;
         study.streams.advance_to(study.draws_so_far());
         Ok(study)
-    }
-
-    /// Takes part as one more worker: gets the next free number, from 1 (0 is the session that made the study), and
-    /// proposes from then on with streams of its own seed, [`worker_seed`].
-    ///
-    /// # Errors
-    /// If the journal cannot be read or written.
-    pub fn join(&mut self) -> Result<u32, StudyError> {
-        let study = self.id;
-        let mut worker = 0;
-        self.journal.commit(|replay| {
-            let joined = replay.studies().get(study).and_then(|record| record.system_attributes.get(WORKERS)?.as_u64());
-            worker = joined.unwrap_or(0) as u32 + 1;
-            let key = WORKERS.to_owned();
-            Ok::<_, JournalError>(vec![Operation::StudySystemAttribute { study, key, value: Value::from(worker) }])
-        })?;
-        self.options.sampler.seed = worker_seed(self.options.sampler.seed, worker);
-        self.streams = Streams::new(self.options.sampler.seed);
-        self.streams.advance_to(self.draws_so_far());
-        Ok(worker)
     }
 
     /// Takes in what other writers have appended.
@@ -323,96 +264,6 @@ impl Study {
         self.journal.replay().trial(id).map(|t| t.number).ok_or_else(|| StudyError::Gone(self.options.name.clone()))
     }
 
-    /// Sets user attributes of a trial that is running or waiting: verdict, cause, measured terms.
-    ///
-    /// # Errors
-    /// [`StudyError::State`] if the trial is finished, for nothing of it can change then; use [`Study::note`].
-    pub fn annotate(&mut self, trial: u32, attributes: &[(String, Value)]) -> Result<(), StudyError> {
-        let id = self.trial(trial)?.id;
-        self.journal.commit(|replay| match replay.trial(id) {
-            Some(t) if t.state.is_finished() => Err(StudyError::State {
-                trial,
-                state: t.state,
-                action: "its attributes cannot change any more: write a note instead",
-            }),
-            _ => Ok(user_attributes(id, attributes).collect()),
-        })?;
-        Ok(())
-    }
-
-    /// Ends a trial. If somebody else has ended it meanwhile, theirs stands and [`Told::AlreadyFinished`] says so.
-    ///
-    /// # Errors
-    /// [`StudyError::Value`] if the value is not a number; [`StudyError::State`] if the trial has not begun.
-    pub fn tell(&mut self, trial: u32, outcome: Outcome) -> Result<Told, StudyError> {
-        let id = self.trial(trial)?.id;
-        let (state, values) = match outcome {
-            Outcome::Complete(value) if value.is_nan() => {
-                let what = format!("the value of trial {trial}");
-                return Err(StudyError::Value { what, value, expected: "number, or end the trial as failed" });
-            }
-            Outcome::Complete(value) => (TrialState::Complete, Some(vec![value])),
-            Outcome::Fail => (TrialState::Fail, None),
-        };
-        let effects = self.journal.commit(|replay| match replay.trial(id) {
-            Some(t) if t.state.is_finished() => Ok(Vec::new()),
-            Some(t) if t.state == TrialState::Waiting && outcome != Outcome::Fail => {
-                Err(StudyError::State { trial, state: t.state, action: "it cannot have a value yet: begin it first" })
-            }
-            _ => Ok(vec![Operation::SetState { trial: id, state, values: values.clone(), at: Some(Timestamp::now()) }]),
-        })?;
-        Ok(if effects == [Effect::Accepted] { Told::Recorded } else { Told::AlreadyFinished })
-    }
-
-    /// Queues a trial with the given parameters; those that are not given will be suggested when it is its turn. Returns
-    /// its number.
-    ///
-    /// # Errors
-    /// [`StudyError::UnknownParameter`] or [`StudyError::Value`] for a parameter that cannot be.
-    pub fn enqueue(&mut self, parameters: &[(String, f64)], attributes: &[(String, Value)]) -> Result<u32, StudyError> {
-        let queued = self.enqueue_unless(parameters, attributes, |_| false)?;
-        queued.ok_or_else(|| StudyError::Gone(self.options.name.clone()))
-    }
-
-    /// [`Study::enqueue`] unless `done` says, of all trials at the very moment, that it is not needed any more: of several
-    /// programs that see the same need one queues. None if it was not needed.
-    ///
-    /// # Errors
-    /// As [`Study::enqueue`].
-    pub fn enqueue_unless(
-        &mut self,
-        parameters: &[(String, f64)],
-        attributes: &[(String, Value)],
-        done: impl Fn(&[Trial]) -> bool,
-    ) -> Result<Option<u32>, StudyError> {
-        self.check_parameters(parameters)?;
-        let fixed: Map<String, Value> = parameters.iter().map(|(n, v)| (n.clone(), Value::from(*v))).collect();
-        let user: Map<String, Value> = attributes.iter().cloned().collect();
-        let template = Some(Box::new(Template::waiting(fixed, user)));
-        let study = self.id;
-        let create = Operation::CreateTrial { study, started: None, template };
-        let effects = self.journal.commit(|replay| {
-            let needed = replay.studies().get(study).is_some_and(|record| !done(&record.trials));
-            Ok::<_, JournalError>(if needed { vec![create.clone()] } else { Vec::new() })
-        })?;
-        let created = effects.iter().find_map(|e| if let Effect::Created(id) = e { Some(*id) } else { None });
-        Ok(created.and_then(|id| self.journal.replay().trial(id)).map(|t| t.number))
-    }
-
-    /// Sets user attributes of the study itself.
-    ///
-    /// # Errors
-    /// Journal errors.
-    pub fn annotate_study(&mut self, attributes: &[(String, Value)]) -> Result<(), StudyError> {
-        let study = self.id;
-        let set = |(key, value): &(String, Value)| {
-            let (key, value) = (key.clone(), value.clone());
-            Operation::StudyUserAttribute { study, key, value }
-        };
-        self.journal.commit(|_| Ok::<_, JournalError>(attributes.iter().map(set).collect()))?;
-        Ok(())
-    }
-
     /// All trials by number.
     pub fn trials(&self) -> &[Trial] {
         &self.record().trials
@@ -482,18 +333,6 @@ impl Study {
             .filter_map(ours)
             .fold(Draws::default(), |a, b| Draws { model: a.model.max(b.model), startup: a.startup.max(b.startup) })
     }
-}
-
-/// The seed of a worker's streams: that of the study for worker 0; for the others the upper half of a mix of both
-/// (SplitMix64 finalizer, Steele et al. 2014), so that no two workers propose the same points.
-pub fn worker_seed(study: u32, worker: u32) -> u32 {
-    if worker == 0 {
-        return study;
-    }
-    let mut z = (u64::from(worker) << 32 | u64::from(study)).wrapping_add(0x9E37_79B9_7F4A_7C15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-    (z >> 32) as u32
 }
 
 /// The operations that make a study.

@@ -17,7 +17,14 @@ pub struct Unattended {
     held: bool,
     /// Arming was asked for and the answer is not here yet.
     arming: bool,
+    /// When arming is tried again, ns: what must hold before it may take a moment.
+    again_ns: u64,
+    /// Why it was refused when that was said last.
+    refused: String,
 }
+
+/// How long a refused arming is waited with, ns.
+const AGAIN_NS: u64 = 500_000_000;
 
 impl Unattended {
     /// STOP, a fault, and a robot that sits down although nobody asked it to (its operator is silent) end the course.
@@ -48,7 +55,7 @@ impl Supervisor {
 
     /// One step of the course, if it is one that this session takes by itself.
     pub(super) fn act_by_itself(&mut self, time_ns: u64) {
-        let Unattended { approval, simulated, held, arming } = self.unattended;
+        let Unattended { approval, simulated, held, arming, again_ns, .. } = self.unattended;
         if approval == Approval::Each || held || self.observe || self.ended.is_some() {
             return;
         }
@@ -64,7 +71,9 @@ impl Supervisor {
             Stage::Proposed if self.mode == Mode::Ready && simulated => {
                 self.life.proposal().map(|card| Intent::Approve { trial: card.trial, revision: card.revision })
             }
-            Stage::Proposed if self.mode == Mode::Disarmed && auto && !arming => Some(Intent::Arm),
+            Stage::Proposed if self.mode == Mode::Disarmed && auto && !arming && time_ns >= again_ns => {
+                Some(Intent::Arm)
+            }
             _ => None,
         };
         let Some(intent) = step else { return };
@@ -74,6 +83,14 @@ impl Supervisor {
             Ok(answer) => {
                 let wish = super::describe(&wish.intent);
                 self.log(Level::Info, format!("{}: {wish}: {answer}", approval.name()), time_ns);
+            }
+            Err(reason) if wish.intent == Intent::Arm => {
+                self.unattended.arming = false;
+                self.unattended.again_ns = time_ns + AGAIN_NS;
+                if self.unattended.refused != reason {
+                    self.log(Level::Info, format!("{} cannot arm yet: {reason}", approval.name()), time_ns);
+                    self.unattended.refused = reason;
+                }
             }
             Err(reason) => {
                 // Said once: a person must look.

@@ -1,29 +1,28 @@
 //! `quadfrog optimize`: whole studies on the simulator without a screen, alone or as one more worker on a shared one.
 
-use std::collections::HashMap;
-use std::io::{IsTerminal, Write};
+mod printer;
+
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 use clap::{Args, ValueEnum};
 use color_eyre::eyre::eyre;
-use indicatif::{ProgressBar, ProgressStyle};
 use quadfrog::config::{Backend, Config};
 use quadfrog::engine::{self, EngineError, Options};
 use quadfrog::optimize::journal::Durability;
 use quadfrog::optimize::study::Storage;
 use quadfrog::realtime::command::Task;
 use quadfrog::realtime::telemetry::Tick;
-use quadfrog::recording::record::{Measured, Record, Stamped, TrialRecord, Verdict};
+use quadfrog::recording::record::{Record, Stamped, TrialRecord, Verdict};
 use quadfrog::recording::writer::Writer;
-use quadfrog::report::table;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::session::approval::Approval;
 use quadfrog::session::automatic;
 use quadfrog::session::rollout::Rollout;
 use quadfrog::sim::Simulator;
-use serde::{Serialize, Serializer};
+
+use printer::Printer;
 
 use super::chosen::{Chosen, continued, joined, journal};
 use super::{Failure, StudyArguments, TaskName};
@@ -116,13 +115,16 @@ pub fn run(arguments: &OptimizeArguments) -> Result<(), Failure> {
             scope.spawn(|| {
                 while let Some(study) = studies.get(next.fetch_add(1, Ordering::Relaxed)) {
                     if let Err(failure) = run_one(arguments, joined.as_ref(), &config, &robot, study, &printer) {
-                        failures.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push(failure);
+                        failures.lock().unwrap_or_else(PoisonError::into_inner).push(failure);
                     }
                 }
             });
         }
     });
-    let mut failures = failures.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+    if joined.is_none() {
+        printer.summary();
+    }
+    let mut failures = failures.into_inner().unwrap_or_else(PoisonError::into_inner);
     drop(printer);
     // Every one of them is said; the last decides the exit status, unless an earlier one is graver than bad input.
     failures.sort_by_key(|failure| matches!(failure, Failure::Other(_)));
@@ -288,107 +290,4 @@ impl StudyRecorder {
     fn finish(self) -> Result<(), quadfrog::recording::RecordingError> {
         self.writer.finish().map(|_| ())
     }
-}
-
-/// What the operator sees: a bar on a terminal, lines elsewhere, JSON if asked for.
-struct Printer {
-    json: bool,
-    several: bool,
-    bar: Option<ProgressBar>,
-    units: HashMap<String, String>,
-    output: Mutex<()>,
-}
-
-impl Printer {
-    fn new(arguments: &OptimizeArguments, config: &Config, studies: &[Chosen]) -> Printer {
-        let budget = arguments.study.trials.unwrap_or(config.optimize.trials);
-        let bar = std::io::stderr().is_terminal().then(|| {
-            let bar = ProgressBar::new(u64::from(budget) * studies.len() as u64);
-            let style = ProgressStyle::with_template("{bar:30} {pos}/{len} trials  {msg}");
-            bar.with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
-        });
-        let units = Task::ALL.iter().flat_map(|task| config.parameters(*task)).map(|p| (p.name, p.unit)).collect();
-        Printer { json: arguments.json, several: studies.len() > 1, bar, units, output: Mutex::new(()) }
-    }
-
-    fn trial(&self, study: &Chosen, row: &TrialRecord) {
-        let _alone = self.output.lock();
-        if self.json {
-            let line = JsonLine {
-                task: self.several.then(|| study.task.name()),
-                seed: self.several.then_some(study.seed),
-                trial: row.trial,
-                params: &row.parameters,
-                value: row.value,
-                verdict: row.verdict,
-                measured: row.measured,
-            };
-            // Numbers and names: there is nothing in it that JSON cannot say.
-            say(&serde_json::to_string(&line).unwrap_or_default());
-        }
-        let line = table::line(row, study.task.unit(), &self.units);
-        match &self.bar {
-            Some(bar) => {
-                bar.inc(1);
-                bar.set_message(line);
-            }
-            None if self.json => {}
-            None if self.several => say(&format!("{} seed {}: {line}", study.task.name(), study.seed)),
-            None => say(&line),
-        }
-    }
-
-    fn finished(&self, study: &Chosen, rows: &[TrialRecord], best: Option<&TrialRecord>, options: &Options) {
-        let _alone = self.output.lock();
-        let mut text = String::new();
-        if self.several {
-            text += &format!("{} seed {}\n", study.task.name(), study.seed);
-        }
-        text += &table::table(rows, &options.config.parameters(study.task), study.task.unit());
-        text += &match best {
-            Some(best) => format!("Best: {}\n", table::line(best, study.task.unit(), &self.units)),
-            None => "No trial was accepted.\n".to_owned(),
-        };
-        text += &match &options.join {
-            Some(storage) => format!("The study is in {storage}; this worker's part in {}\n", study.folder.display()),
-            None => format!("The study is in {}\n", study.folder.display()),
-        };
-        let print = || if self.json { eprint!("{text}") } else { say(text.trim_end()) };
-        match &self.bar {
-            Some(bar) => bar.suspend(print),
-            None => print(),
-        }
-    }
-}
-
-impl Drop for Printer {
-    fn drop(&mut self) {
-        if let Some(bar) = &self.bar {
-            bar.finish_and_clear();
-        }
-    }
-}
-
-/// One line on standard output; a reader that has gone away (`| head`) wants no more.
-fn say(line: &str) {
-    let _ = writeln!(std::io::stdout(), "{line}");
-}
-
-/// A finished trial as the JSON line says it; task and seed only where several studies run at once.
-#[derive(Serialize)]
-struct JsonLine<'a> {
-    #[serde(skip_serializing_if = "Option::is_none")]
-    task: Option<&'a str>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    seed: Option<u32>,
-    trial: u32,
-    #[serde(serialize_with = "in_table_order")]
-    params: &'a [(String, f64)],
-    value: Option<f64>,
-    verdict: Option<Verdict>,
-    measured: Option<Measured>,
-}
-
-fn in_table_order<S: Serializer>(parameters: &&[(String, f64)], serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.collect_map(parameters.iter().map(|(name, value)| (name, value)))
 }

@@ -27,7 +27,7 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let recording = Line::from(recording(model));
     let width = recording.width() as u16;
     let [left, right] = Layout::horizontal([Constraint::Fill(1), Constraint::Length(width)]).spacing(1).areas(first);
-    frame.render_widget(Line::from(identity(model, area.width)), left);
+    frame.render_widget(identity(model, area.width, usize::from(left.width)), left);
     frame.render_widget(recording, right);
     frame.render_widget(Line::from(condition(model, area.width)), second);
 }
@@ -59,7 +59,8 @@ fn backend(model: &Model) -> Span<'static> {
     }
 }
 
-fn identity(model: &Model, width: u16) -> Vec<Span<'static>> {
+/// What runs where, as far as `room` characters take it: a number is shown whole or not at all.
+fn identity(model: &Model, width: u16, room: usize) -> Line<'static> {
     let theme = &model.theme;
     let mut spans = vec![mode_span(model), Span::raw(" "), backend(model), Span::raw("  ")];
     let session = &model.session;
@@ -86,11 +87,17 @@ fn identity(model: &Model, width: u16) -> Vec<Span<'static>> {
         spans.push(Span::raw(text));
     }
     if let Some((best, value)) = model.best().and_then(|best| Some((best, best.value?))) {
+        let before = spans.len();
         spans.push(Span::raw(if narrow { "  best " } else { "   best " }));
         spans.push(span(theme, Role::Good, format!("{} {}", number(value), session.unit)));
         spans.push(span(theme, Role::Quiet, format!(" (#{})", best.trial)));
+        for kept in [before + 2, before] {
+            if spans.iter().map(Span::width).sum::<usize>() > room {
+                spans.truncate(kept);
+            }
+        }
     }
-    spans
+    Line::from(spans)
 }
 
 fn recording(model: &Model) -> Vec<Span<'static>> {
