@@ -392,8 +392,14 @@ impl Engine {
         };
         let thread = std::thread::Builder::new().name("control".into());
         let flag = closing.clone();
+        let scheduling = options.config.scheduling(options.backend);
+        let (told, granted) = channel();
         let control = thread
-            .spawn(move || control_thread::run(&settings, control_end, &clock, &flag, &mut *robot))
+            .spawn(move || {
+                let start =
+                    control_thread::Start { settings: &settings, scheduling, told, clock: &clock, closing: &flag };
+                control_thread::run(start, control_end, &mut *robot);
+            })
             .map_err(system("control"))?;
 
         let (intents_in, intents) = channel();
@@ -401,7 +407,10 @@ impl Engine {
         let pre_arm = PreArmList::new(&settings, fingerprint(&options.config), folder);
         let parts = Parts { life, control: session_end, handed, outlets, recorder: status, pre_arm, info };
         let simulated = options.backend == Backend::Simulator;
-        let supervisor = Supervisor::new(parts, clock.now_ns()).approving(options.approve, simulated);
+        let mut supervisor = Supervisor::new(parts, clock.now_ns()).approving(options.approve, simulated);
+        if let Ok((favours, shortfalls)) = granted.recv() {
+            supervisor.tell_scheduling(&favours, &shortfalls, clock.now_ns());
+        }
         let sits_down = options.backend == Backend::Hardware;
         let session = std::thread::Builder::new()
             .name("session".into())
@@ -425,11 +434,19 @@ impl Engine {
 
 /// How often the session looks for events.
 const SESSION_PERIOD: Duration = Duration::from_millis(5);
-/// How long sitting down at the end may take.
-const LONGEST_GOODBYE: Duration = Duration::from_secs(6);
+/// How long landing and sitting down at the end may take.
+const LONGEST_GOODBYE: Duration = Duration::from_secs(10);
+/// For how long damping is sent to a real robot before nothing is: it sinks softly in that time.
+const DAMPING_AT_THE_END: Duration = Duration::from_millis(500);
 
 /// The session thread: intents as they come, events every few milliseconds, until the screen lets go of its handle.
-fn run_session(mut supervisor: Supervisor, intents: &Receiver<Wish>, clock: &MonotonicClock, sits_down: bool) {
+/// Gives back the session's ends of the channels: a control thread whose session is gone takes that for a breakdown.
+fn run_session(
+    mut supervisor: Supervisor,
+    intents: &Receiver<Wish>,
+    clock: &MonotonicClock,
+    sits_down: bool,
+) -> Supervisor {
     loop {
         supervisor.attend(clock.now_ns());
         if supervisor.mode() == Mode::Observe {
@@ -446,7 +463,18 @@ fn run_session(mut supervisor: Supervisor, intents: &Receiver<Wish>, clock: &Mon
         std::thread::sleep(SESSION_PERIOD);
         supervisor.attend(clock.now_ns());
     }
+    if sits_down {
+        if supervisor.mode().energised() {
+            supervisor.stop();
+        }
+        let begun = clock.now_ns();
+        while clock.now_ns() - begun < DAMPING_AT_THE_END.as_nanos() as u64 {
+            std::thread::sleep(SESSION_PERIOD);
+            supervisor.attend(clock.now_ns());
+        }
+    }
     supervisor.close(clock.now_ns());
+    supervisor
 }
 
 /// What a screen holds of a running engine: it draws from it and asks through it, and decides nothing. Dropping it ends
@@ -460,7 +488,7 @@ pub struct Handle {
     records: Receiver<Stamped>,
     closing: Arc<AtomicBool>,
     control: Option<JoinHandle<()>>,
-    session: Option<JoinHandle<()>>,
+    session: Option<JoinHandle<Supervisor>>,
     recorder: Option<crate::recording::recorder::RecorderHandle>,
 }
 
@@ -529,13 +557,12 @@ impl Handle {
         self.intents = None;
         // Each thread ends with what feeds it: the session, then control, then the recorder. A thread that panicked has
         // said so already.
-        if let Some(session) = self.session.take() {
-            let _ = session.join();
-        }
+        let session = self.session.take().map(JoinHandle::join);
         self.closing.store(true, Ordering::Release);
         if let Some(control) = self.control.take() {
             let _ = control.join();
         }
+        drop(session);
         if let Some(recorder) = self.recorder.take() {
             let _ = recorder.join();
         }

@@ -5,7 +5,7 @@ use quadfrog::config::{Backend, Config};
 use quadfrog::control::cycle::{Cycle, Inputs};
 use quadfrog::control::settings::Settings;
 use quadfrog::realtime::clock::SimulatedClock;
-use quadfrog::realtime::command::{Approval, Command, JumpParameters, Task, TrialSpec};
+use quadfrog::realtime::command::{Command, JumpParameters, Permit, Task, TrialSpec};
 use quadfrog::realtime::telemetry::{Event, Mode, Tick, TrialEnd};
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::robot::{JointCommand, Placement, Robot, RobotError, RobotState};
@@ -68,9 +68,9 @@ impl Bench {
     }
 
     /// An approval given now, by somebody who has heard of every change of mode.
-    fn approval(&self) -> Approval {
+    fn approval(&self) -> Permit {
         let changes = self.events.iter().filter(|event| matches!(event, Event::Mode { .. })).count();
-        Approval { mode_changes: changes as u64, given_ns: self.time_ms * 1_000_000 }
+        Permit { mode_changes: changes as u64, given_ns: self.time_ms * 1_000_000 }
     }
 
     fn approved(&self) -> Command {
@@ -88,7 +88,7 @@ impl Bench {
             (Mode::Disarmed, Some(Command::TakeControl)),
             (Mode::StandUp, Some(Command::Arm)),
             (Mode::Ready, None),
-            (Mode::Countdown, Some(Command::RunTrial(self.spec(), Approval::default()))),
+            (Mode::Countdown, Some(Command::RunTrial(self.spec(), Permit::default()))),
             (Mode::Jump, None),
             (Mode::Settle, None),
             (Mode::Review, None),
@@ -315,7 +315,7 @@ fn any_command(spec: TrialSpec) -> impl Strategy<Value = Option<Command>> {
         1 => Just(Some(Command::TakeControl)),
         2 => Just(Some(Command::Arm)),
         1 => Just(Some(Command::SitDown)),
-        2 => Just(Some(Command::RunTrial(spec, Approval::default()))),
+        2 => Just(Some(Command::RunTrial(spec, Permit::default()))),
         1 => Just(Some(Command::Cancel)),
         1 => Just(Some(Command::EndReview)),
         1 => Just(Some(Command::Acknowledge { stops: 0 })),

@@ -11,7 +11,7 @@ use quadfrog::control::settings::Settings;
 use quadfrog::engine::{Options, open_life};
 use quadfrog::optimize::journal::Durability;
 use quadfrog::realtime::clock::SimulatedClock;
-use quadfrog::realtime::command::{Approval, Command, JumpParameters, Task, TrialSpec};
+use quadfrog::realtime::command::{Command, JumpParameters, Permit, Task, TrialSpec};
 use quadfrog::realtime::telemetry::{Cause, Event, FallCause, Fault, Hold, Mode, Objection, Tick, TrialEnd};
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::robot::{Battery, JOINTS, JointCommand, LEGS, LinkStatus, Placement, Robot, RobotError, RobotState};
@@ -165,9 +165,9 @@ impl Bench {
         }
     }
 
-    fn approval(&self) -> Approval {
+    fn approval(&self) -> Permit {
         let changes = self.events.iter().filter(|event| matches!(event, Event::Mode { .. })).count();
-        Approval { mode_changes: changes as u64, given_ns: self.inputs.time_ns }
+        Permit { mode_changes: changes as u64, given_ns: self.inputs.time_ns }
     }
 
     fn approved(&self) -> Command {
@@ -380,7 +380,9 @@ fn a_standing_fault_cannot_be_acknowledged() {
 /// Battery and warm motors: the trial that runs is finished, the next is refused, and the refusal says why.
 #[test]
 fn what_holds_lets_the_trial_finish_and_refuses_the_next() {
-    let holds: [(fn(&mut RobotState), fn(Hold) -> bool); 2] = [
+    type Tamper = fn(&mut RobotState);
+    type IsIt = fn(Hold) -> bool;
+    let holds: [(Tamper, IsIt); 2] = [
         (
             |state| state.battery.as_mut().unwrap().charge_percent = 14.0,
             |hold| matches!(hold, Hold::BatteryLow { measured_percent, .. } if measured_percent == 14.0),

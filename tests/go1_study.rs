@@ -21,13 +21,15 @@ use quadfrog::recording::record::{Proposal, Record, Stage, StageInfo, TrialRecor
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::robot::{LinkStatus, Robot};
 use quadfrog::session::automatic;
-use quadfrog::session::intent::Intent;
+use quadfrog::session::intent::{Intent, OperatorCheck};
 use quadfrog::session::rollout::Rollout;
 use quadfrog::sim::emulator::{Emulator, EmulatorHandle, Fault};
 use quadfrog::sim::{SimConfig, Simulator};
 
 const TASK: Task = Task::Forward;
 const TRIALS: u32 = 20;
+/// How long a robot must lie still before it may be armed, and a little more.
+const STILL: Duration = Duration::from_millis(1300);
 /// Nobody waits longer for a study of a few minutes.
 const PATIENCE: Duration = Duration::from_secs(1200);
 
@@ -38,6 +40,8 @@ fn config() -> Config {
     // Ten threads at 1 kHz on a machine that does other things too: what is a hiccup here would be a fault at a robot.
     config.safety.watchdog.hardware_late_ms = 30.0;
     config.safety.watchdog.state_age_ms = 60;
+    config.safety.watchdog.period_ticks = 1000;
+    config.safety.pre_arm.late_share = 1.0;
     config
 }
 
@@ -99,6 +103,8 @@ struct Operator {
     /// The mode in which something was wished last: once a mode is enough.
     wished_in: Option<(Mode, Option<Stage>, u32)>,
     stops: u32,
+    stop_tested: bool,
+    lies_since: Option<Instant>,
 }
 
 impl Operator {
@@ -137,10 +143,20 @@ impl Operator {
             }
             (Mode::Damped | Mode::Fault, Some(Stage::Proposed | Stage::Finished)) => Some(Intent::Acknowledge),
             (Mode::Disarmed, Some(Stage::Proposed)) => {
-                self.robot.apply(Fault::Place);
-                // Steps back before arming.
-                std::thread::sleep(Duration::from_millis(100));
-                Some(Intent::Arm)
+                if !self.stop_tested {
+                    self.stop_tested = true;
+                    self.engine.stop();
+                    return None;
+                }
+                if self.lies_since.is_none_or(|since| since.elapsed() > STILL * 2) {
+                    self.robot.apply(Fault::Place);
+                    self.lies_since = Some(Instant::now());
+                    for word in OperatorCheck::ALL {
+                        self.engine.wish(Intent::Confirm(word));
+                    }
+                }
+                let still = self.lies_since.is_some_and(|since| since.elapsed() > STILL);
+                still.then_some(Intent::Arm)
             }
             (Mode::Ready, Some(Stage::Proposed)) => {
                 let card = self.card.as_ref()?;
@@ -161,12 +177,11 @@ impl Operator {
             assert!(begun.elapsed() < PATIENCE, "still {} at {:?} after {PATIENCE:?}", mode.name(), self.stage);
             let here = (mode, self.stage.map(|stage| stage.stage), self.stage.map_or(0, |stage| stage.trial));
             // Once is enough, unless nothing comes of it.
-            if self.wished_in != Some(here) || wished_at.elapsed() > Duration::from_secs(3) {
-                if let Some(intent) = self.act(mode) {
-                    self.engine.wish(intent);
-                    wished_at = Instant::now();
-                    self.wished_in = Some(here);
-                }
+            let wishes = self.wished_in != Some(here) || wished_at.elapsed() > Duration::from_secs(3);
+            if wishes && let Some(intent) = self.act(mode) {
+                self.engine.wish(intent);
+                wished_at = Instant::now();
+                self.wished_in = Some(here);
             }
             std::thread::sleep(Duration::from_millis(20));
         }
@@ -177,7 +192,9 @@ impl Operator {
 fn over_the_network(seed: u32, trials: u32) -> Outcome {
     let config = config();
     let robot = LivingRobot::new(&config, seed.into());
-    let options = options(config, robot.description.clone(), Backend::Hardware, seed, trials);
+    let folder = tempfile::tempdir().unwrap();
+    let mut options = options(config, robot.description.clone(), Backend::Hardware, seed, trials);
+    options.folder = Some(folder.path().join("study"));
     let mut operator = Operator {
         engine: Engine::start(options).unwrap(),
         robot: robot.handle.clone(),
@@ -186,6 +203,8 @@ fn over_the_network(seed: u32, trials: u32) -> Outcome {
         rows: Default::default(),
         wished_in: None,
         stops: 0,
+        stop_tested: false,
+        lies_since: None,
     };
     let link = operator.run();
     let accepted = operator.rows.values().filter(|row| row.verdict == Some(Verdict::Accept));
@@ -225,7 +244,7 @@ fn median(values: &[f64]) -> f64 {
 fn tell(seed: u32, outcome: &Outcome) {
     for row in &outcome.rows {
         let value = row.value.map_or_else(|| "     ".to_owned(), |value| format!("{value:.3}"));
-        println!("seed {seed} trial {:>2} {value} {:?}: {}", row.trial, row.verdict, row.cause);
+        println!("seed {seed} trial {:>2} {value} {:?}: {}; {:?}", row.trial, row.verdict, row.cause, row.measured);
     }
     println!("seed {seed}: best {:.3} m, {} stops, {:?}", outcome.best, outcome.stops, outcome.link);
 }
@@ -235,7 +254,8 @@ fn step_by_step(watched: bool) -> (Vec<f64>, Vec<f64>) {
     let mut bests = (Vec::new(), Vec::new());
     for seed in 0..5 {
         let robot = |config: &SimConfig| Lockstep { watched, ..Lockstep::new(config, seed.into()) };
-        let (over, rows) = in_simulated_time(Backend::Hardware, seed, robot);
+        let backend = if watched { Backend::Simulator } else { Backend::Hardware };
+        let (over, rows) = in_simulated_time(backend, seed, robot);
         let (alone, alone_rows) = in_the_simulator(seed);
         let row = |row: &TrialRecord| format!("{:.3} {}", row.value.unwrap_or(f64::NAN), row.cause);
         for (over, alone) in rows.iter().zip(&alone_rows) {

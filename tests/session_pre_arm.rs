@@ -25,6 +25,8 @@ use quadfrog::sim::Simulator;
 struct Go1Like {
     simulator: Simulator,
     charge_percent: f64,
+    /// Commands that were sent.
+    writes: u32,
 }
 
 impl Robot for Go1Like {
@@ -36,6 +38,7 @@ impl Robot for Go1Like {
         Ok(state)
     }
     fn write(&mut self, command: &JointCommand) -> Result<(), RobotError> {
+        self.writes += 1;
         self.simulator.write(command)
     }
     fn place(&mut self, _: &Placement) -> bool {
@@ -53,20 +56,29 @@ struct Session {
     cycle: Cycle,
     robot: Go1Like,
     screen: Receiver<Stamped>,
+    _recorder: Receiver<Stamped>,
     records: Vec<Record>,
     time_ms: u64,
 }
 
 impl Session {
     fn new(backend: Backend, folder: Option<std::path::PathBuf>) -> Session {
+        let mut session = Session::begin(backend, folder, false);
+        session.ticks(10);
+        session.supervisor.take_control();
+        session.ticks(1500);
+        session
+    }
+
+    fn begin(backend: Backend, folder: Option<std::path::PathBuf>, observe: bool) -> Session {
         let config = Config::load(None).unwrap();
         let robot = RobotDescription::embedded("go1").unwrap();
-        let options = Options { trials: Some(5), ..Options::new(config, robot, backend, Task::Forward) };
+        let options = Options { trials: Some(5), observe, ..Options::new(config, robot, backend, Task::Forward) };
         let settings: Settings = options.config.settings(&options.robot, options.task, backend).unwrap();
         let mut simulator = Simulator::new(&options.robot, &options.config.simulator).unwrap();
         simulator.place(&Placement { joint_position: settings.lying_position, lying: true, seed: 0 });
         let (control, session_end, _screen, _ticks) = channels();
-        let (to_recorder, _) = channel();
+        let (to_recorder, recorder) = channel();
         let (to_screen, screen) = channel();
         let (_, handed) = channel();
         let parts = Parts {
@@ -78,19 +90,16 @@ impl Session {
             pre_arm: PreArmList::new(&settings, fingerprint(&options.config), folder),
             info: session_info(&options, ""),
         };
-        let mut session = Session {
+        Session {
             supervisor: Supervisor::new(parts, 0),
             control,
             cycle: Cycle::new(&settings),
-            robot: Go1Like { simulator, charge_percent: 90.0 },
+            robot: Go1Like { simulator, charge_percent: 90.0, writes: 0 },
             screen,
+            _recorder: recorder,
             records: Vec::new(),
             time_ms: 0,
-        };
-        session.ticks(10);
-        session.supervisor.take_control();
-        session.ticks(1500);
-        session
+        }
     }
 
     fn ticks(&mut self, count: u32) {
@@ -241,4 +250,24 @@ fn a_full_disk_and_a_missing_recording_are_named() {
     let gone = std::path::PathBuf::from("/no/such/folder");
     let session = Session::new(Backend::Simulator, Some(gone));
     assert_eq!(session.state(Check::Disk), CheckState::Failed);
+}
+
+/// STOP is everybody's: who only looks may press it, damping is sent then, and an acknowledgement gives the robot back to whose
+/// it is. (A defect once: a session that only observes was damping for ever after its STOP.)
+#[test]
+fn an_observer_may_stop_and_then_lets_go_of_the_robot() {
+    let mut session = Session::begin(Backend::Hardware, None, true);
+    session.ticks(100);
+    assert_eq!((session.cycle.mode(), session.robot.writes), (Mode::Observe, 0));
+    session.control.stop.set();
+    session.ticks(50);
+    assert_eq!((session.cycle.mode(), session.robot.writes), (Mode::Damped, 50));
+    let answer = session.wish(Intent::Arm);
+    assert!(!answer.accepted && answer.answer.contains("only observes"), "{answer:?}");
+    assert!(session.wish(Intent::Acknowledge).accepted);
+    session.ticks(10);
+    assert_eq!(session.cycle.mode(), Mode::Observe);
+    let writes = session.robot.writes;
+    session.ticks(100);
+    assert_eq!(session.robot.writes, writes, "nothing is sent any more");
 }

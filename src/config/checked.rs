@@ -15,6 +15,7 @@ use crate::control::leg::stance_of;
 use crate::control::settings::{EstimatorSettings, ObjectiveSource, Ramp, Settings, Settle, Stand, TaskControl};
 use crate::optimize::sampler::{SamplerConfig, SamplerKind};
 use crate::realtime::command::Task;
+use crate::realtime::scheduling::Scheduling;
 use crate::recording::record::ParameterInfo;
 use crate::robot::Leg;
 use crate::robot::description::RobotDescription;
@@ -71,8 +72,23 @@ pub struct ControlFile {
     pub contact: Contact,
     /// How the base's state is estimated.
     pub estimator: EstimatorSettings,
+    /// What the control thread asks of the system.
+    pub realtime: RealtimeFile,
     /// What each task's trials run with.
     pub tasks: BTreeMap<String, TaskControl>,
+}
+
+/// What the control thread asks of the system.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+pub struct RealtimeFile {
+    /// Priority under SCHED_FIFO on hardware; 0 asks for nothing.
+    pub hardware_priority: u8,
+    /// The same on the simulator.
+    pub simulator_priority: u8,
+    /// The core to stay on; -1 leaves the choice to the system.
+    pub core: i64,
+    /// Whether the program's memory is locked.
+    pub lock_memory: bool,
 }
 
 /// From approval to the impulse, standing still.
@@ -332,6 +348,19 @@ impl Config {
         })
     }
 
+    /// What the control thread asks of the system.
+    pub fn scheduling(&self, backend: Backend) -> Scheduling {
+        let realtime = &self.control.realtime;
+        Scheduling {
+            priority: match backend {
+                Backend::Hardware => realtime.hardware_priority,
+                Backend::Simulator => realtime.simulator_priority,
+            },
+            core: usize::try_from(realtime.core).ok(),
+            lock_memory: realtime.lock_memory,
+        }
+    }
+
     /// Says where `key` of `file` stands, and what is wrong with it.
     pub fn refuse(&self, file: &'static str, key: &str, value: impl ToString, reason: impl ToString) -> ConfigError {
         self.places[file].refuse(key, value, reason)
@@ -406,6 +435,19 @@ impl Config {
         if estimator.contact_off_n >= estimator.contact_on_n {
             let reason = format!("must be below estimator.contact_on_n = {}", estimator.contact_on_n);
             return Err(self.refuse(FILE, "estimator.contact_off_n", estimator.contact_off_n, reason));
+        }
+        let realtime = &control.realtime;
+        for (key, value) in [
+            ("realtime.hardware_priority", realtime.hardware_priority),
+            ("realtime.simulator_priority", realtime.simulator_priority),
+        ] {
+            if value > 99 {
+                return Err(self.refuse(FILE, key, value, "must be 1 to 99, or 0 to ask for nothing"));
+            }
+        }
+        if realtime.core < -1 {
+            let reason = "must be the number of a core, from 0, or -1 for any";
+            return Err(self.refuse(FILE, "realtime.core", realtime.core, reason));
         }
         self.all_positive(FILE, &positive)
     }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::Deserialize;
 
 use super::{Config, ConfigError};
-use crate::control::settings::{Approval, Fall, Gate, PreArm, Watchdog};
+use crate::control::settings::{ApprovalLimits, Fall, Gate, PreArm, Watchdog};
 
 /// `safety.toml`.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -17,7 +17,7 @@ pub struct SafetyFile {
     /// What must hold before the robot is energised.
     pub pre_arm: PreArm,
     /// How long an approval holds.
-    pub approval: Approval,
+    pub approval: ApprovalLimits,
     /// What trips the watchdog.
     pub watchdog: Watchdog,
     /// The widest bounds of each parameter.

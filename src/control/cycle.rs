@@ -11,7 +11,7 @@ use super::settings::Settings;
 use super::watchdog::{self, Level, Watchdog};
 use crate::control::estimator::Estimator;
 use crate::realtime::clock::Clock;
-use crate::realtime::command::{Approval, Command, TrialSpec};
+use crate::realtime::command::{Command, Permit, TrialSpec};
 use crate::realtime::pre_arm::Findings;
 use crate::realtime::telemetry::{Cause, Caution, Event, Fault, Mode, Objection, Phase, Readiness, Tick, TrialEnd};
 use crate::robot::kinematics::Foot;
@@ -174,7 +174,8 @@ impl Cycle {
         let read_ns = clock.now_ns();
         self.estimate();
         self.watch(inputs, previous_robot_time_ms, robot);
-        self.check_pre_arm(inputs, robot);
+        self.pre_arm.observe(inputs.lateness_ns, &self.tick.state, &self.settings);
+        self.check_pre_arm(robot);
         if let Some(command) = inputs.command {
             self.obey(&command, inputs.time_ns, robot);
         }
@@ -196,6 +197,10 @@ impl Cycle {
             self.send_error = Some(errno);
         }
         let written_ns = clock.now_ns();
+        if self.mode_ticks == 0 {
+            // Disarmed just now: whoever hears of it finds the list as it is, not as it was before.
+            self.check_pre_arm(robot);
+        }
 
         self.publish(inputs, sent, passed.limited);
         let stages = &mut self.tick.stages;
@@ -301,8 +306,7 @@ impl Cycle {
     }
 
     /// How the pre-arm list stands: looked at while it matters, from the newest state.
-    fn check_pre_arm<R: Robot + ?Sized>(&mut self, inputs: &Inputs, robot: &R) {
-        self.pre_arm.observe(inputs.lateness_ns, &self.tick.state, &self.settings);
+    fn check_pre_arm<R: Robot + ?Sized>(&mut self, robot: &R) {
         if self.mode == Mode::Disarmed {
             let seen = pre_arm::Seen {
                 state: &self.tick.state,
@@ -357,7 +361,7 @@ impl Cycle {
                 failing => Err(Objection::Checks(failing)),
             },
             Command::Acknowledge { .. } => self.standing.map_or(Ok(()), |fault| Err(Objection::Standing(fault))),
-            Command::RunTrial(_, Approval { mode_changes, given_ns }) => {
+            Command::RunTrial(_, Permit { mode_changes, given_ns }) => {
                 let age_s = time_ns.saturating_sub(given_ns) as f64 * 1e-9;
                 let allowed_s = self.settings.approval.expires_s;
                 if mode_changes != self.mode_changes {

@@ -1,6 +1,7 @@
 //! The 1 kHz cycle: read, estimate, watch, decide, limit, write, publish. Pure functions and one `tick()`; no thread,
 //! no file, no lock, no allocation.
 
+pub mod body;
 pub mod cycle;
 pub mod estimator;
 pub mod force_profile;

@@ -117,7 +117,7 @@ pub struct PreArm {
 /// How long an approval holds.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Approval {
+pub struct ApprovalLimits {
     /// From the key press to the countdown at most, s.
     pub expires_s: f64,
 }
@@ -340,7 +340,7 @@ pub struct Settings {
     /// Before the robot is energised.
     pub pre_arm: PreArm,
     /// How long an approval holds.
-    pub approval: Approval,
+    pub approval: ApprovalLimits,
     /// The watchdog.
     pub watchdog: Watchdog,
     /// Latest start of a tick, ms; zero only counts late ticks.

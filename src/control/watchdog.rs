@@ -224,8 +224,7 @@ fn joint_torque(_: &Watchdog, seen: &Seen, settings: &Settings) -> Option<Fault>
         let measured_nm = seen.state.joint_torque[joint];
         let allowed_nm = settings.max_torque[joint] * settings.watchdog.torque_factor;
         let fault = Fault::JointTorque { joint: joint as u8, measured_nm, allowed_nm };
-        // Written so that what is not a number trips.
-        (!(measured_nm.abs() <= allowed_nm)).then_some(fault)
+        (measured_nm.is_nan() || measured_nm.abs() > allowed_nm).then_some(fault)
     })
 }
 

@@ -118,7 +118,7 @@ pub struct TrialSpec {
 
 /// What makes an approval good for one trial, once, now: it dies with any change of mode, and of age.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Approval {
+pub struct Permit {
     /// How often the mode had changed, as far as the session had heard when it was given.
     pub mode_changes: u64,
     /// When the operator gave it, ns since the engine started.
@@ -137,7 +137,7 @@ pub enum Command {
     /// Sit down and disarm.
     SitDown,
     /// Run this trial: countdown, jump, settle.
-    RunTrial(TrialSpec, Approval),
+    RunTrial(TrialSpec, Permit),
     /// Cancel a countdown.
     Cancel,
     /// The verdict is given: the review is over.

@@ -5,7 +5,7 @@ use crate::control::cycle::{Cycle, Inputs};
 use crate::control::limits::ticks;
 use crate::control::settings::{PERIOD_S, Settings};
 use crate::realtime::clock::SimulatedClock;
-use crate::realtime::command::{Approval, Command, TrialSpec};
+use crate::realtime::command::{Command, Permit, TrialSpec};
 use crate::realtime::telemetry::{Event, Fault, Tick, TrialEnd};
 use crate::robot::{Placement, Robot};
 
@@ -27,7 +27,7 @@ impl<R: Robot> Rollout<R> {
         // The last trial may have left the robot on its back; a robot that is ready for a trial is not.
         self.robot.place(&Placement { joint_position: self.settings.lying_position, lying: true, seed: spec.seed });
         let mut cycle = Cycle::ready(&self.settings);
-        let mut inputs = Inputs { command: Some(Command::RunTrial(*spec, Approval::default())), ..Inputs::default() };
+        let mut inputs = Inputs { command: Some(Command::RunTrial(*spec, Permit::default())), ..Inputs::default() };
         self.ticks.clear();
         // A trial ends by itself `cap_s` after its last impulse; anything longer is a fault of ours, and said so.
         let profile_s = f64::from(spec.jumps) * (0.5 / spec.jump.f0_hz + 0.5 / spec.jump.f1_hz.max(0.05));

@@ -11,7 +11,8 @@ use super::life::{Life, Refusal};
 use super::pre_arm::{PreArmList, objections};
 use crate::control::mode::{self, Request};
 use crate::realtime::channel::SessionEnd;
-use crate::realtime::command::{Approval, Command};
+use crate::realtime::command::{Command, Permit};
+use crate::realtime::scheduling::{Favour, Shortfall};
 use crate::realtime::telemetry::{Cause, Event, Mode, TrialEnd};
 use crate::recording::record::{
     CommandRecord, Level, LogRecord, PreArmCheck, Record, SessionInfo, Stage, Stamped, Transition, Verdict,
@@ -21,6 +22,9 @@ use unattended::Unattended;
 
 /// How often the counters are told to the screen and the recording, ns.
 const COUNTERS_PERIOD_NS: u64 = 100_000_000;
+
+/// Said of a recorder that broke down without a word.
+const RECORDER_GONE: &str = "the recorder's thread has ended";
 
 /// Cautions are said no more often than this, ns.
 const CAUTION_PERIOD_NS: u64 = 10_000_000_000;
@@ -42,10 +46,10 @@ pub struct Outlets {
 }
 
 impl Outlets {
-    fn put(&self, stamped: Stamped) {
-        // A screen or recorder that is gone takes nothing any more: the session ends with them, not because of them.
+    /// Whether the recorder took it. A screen that is gone takes nothing any more: the session ends with it, not because of it.
+    fn put(&self, stamped: Stamped) -> bool {
         let _ = self.screen.send(stamped.clone());
-        let _ = self.recorder.send(stamped);
+        self.recorder.send(stamped).is_ok()
     }
 }
 
@@ -89,6 +93,8 @@ pub struct Supervisor {
     ended_ns: u64,
     measured: VecDeque<TrialTicks>,
     recorder_complaint: Option<String>,
+    /// The recorder's thread takes no records any more.
+    recorder_gone: bool,
     observe: bool,
     asked_for_control: bool,
     counters_ns: u64,
@@ -121,6 +127,7 @@ impl Supervisor {
             ended_ns: 0,
             measured: VecDeque::new(),
             recorder_complaint: None,
+            recorder_gone: false,
             observe,
             asked_for_control: false,
             counters_ns: 0,
@@ -133,6 +140,17 @@ impl Supervisor {
         supervisor.say(Record::Session(info), time_ns);
         supervisor.publish(time_ns);
         supervisor
+    }
+
+    /// What the control thread got of what it asked of the system, and what it did not.
+    pub fn tell_scheduling(&mut self, favours: &[Favour], shortfalls: &[Shortfall], time_ns: u64) {
+        if !favours.is_empty() {
+            let granted: Vec<_> = favours.iter().map(ToString::to_string).collect();
+            self.log(Level::Info, format!("control thread: {}", granted.join(", ")), time_ns);
+        }
+        for shortfall in shortfalls {
+            self.log(Level::Warning, format!("control thread: {shortfall}"), time_ns);
+        }
     }
 
     /// The mode as far as the session has heard.
@@ -153,7 +171,7 @@ impl Supervisor {
         }
         self.let_go();
         self.measure(time_ns);
-        let complaint = self.recorder.get().error;
+        let complaint = self.recorder.get().error.or_else(|| self.recorder_gone.then(|| RECORDER_GONE.to_owned()));
         if complaint != self.recorder_complaint {
             if let Some(complaint) = &complaint {
                 self.log(Level::Error, format!("the recording failed: {complaint}"), time_ns);
@@ -215,6 +233,11 @@ impl Supervisor {
         }
     }
 
+    /// STOP, by the session itself: the end has come and the robot is still energised.
+    pub fn stop(&self) {
+        self.control.stop.set();
+    }
+
     /// Nobody is there any more: a robot that stands sits down, one that jumps as soon as it has landed. False once
     /// nothing is energised.
     pub fn say_goodbye(&mut self) -> bool {
@@ -268,8 +291,8 @@ impl Supervisor {
                     return Err(hold);
                 }
                 let spec = self.life.approve(*trial, *revision).map_err(words)?;
-                let approval = Approval { mode_changes: self.mode_changes, given_ns: wish.time_ns };
-                if let Err(reason) = self.command(Command::RunTrial(spec, approval)) {
+                let permit = Permit { mode_changes: self.mode_changes, given_ns: wish.time_ns };
+                if let Err(reason) = self.command(Command::RunTrial(spec, permit)) {
                     self.life.ended(spec.trial, &TrialEnd::Cancelled, &[]);
                     return Err(reason);
                 }
@@ -446,7 +469,7 @@ impl Supervisor {
         let states = |list: &[PreArmCheck]| list.iter().map(|item| item.state).collect::<Vec<_>>();
         let stamped = Stamped { time_ns, record: Record::PreArm(list.clone()) };
         if states(&list) != states(&self.shown_list) {
-            self.outlets.put(stamped);
+            self.recorder_gone |= !self.outlets.put(stamped);
         } else if time_ns >= self.shown_list_ns + PRE_ARM_PERIOD_NS {
             let _ = self.outlets.screen.send(stamped);
         } else {
@@ -459,12 +482,12 @@ impl Supervisor {
     /// What the study's life has to say.
     fn publish(&mut self, time_ns: u64) {
         for record in self.life.take_records() {
-            self.outlets.put(Stamped { time_ns, record });
+            self.recorder_gone |= !self.outlets.put(Stamped { time_ns, record });
         }
     }
 
     fn say(&mut self, record: Record, time_ns: u64) {
-        self.outlets.put(Stamped { time_ns, record });
+        self.recorder_gone |= !self.outlets.put(Stamped { time_ns, record });
     }
 
     fn log(&mut self, level: Level, message: String, time_ns: u64) {

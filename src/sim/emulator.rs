@@ -105,6 +105,7 @@ struct Defects {
     stuck_at: [Option<f64>; JOINTS],
     angle: [Option<f64>; JOINTS],
     speed: [Option<f64>; JOINTS],
+    torque: [Option<f64>; JOINTS],
     tilt_rad: f64,
 }
 
@@ -227,6 +228,7 @@ impl Emulator {
             Fault::Stuck { joint } => defects.stuck_at[joint] = Some(self.simulator.state().joint_position[joint]),
             Fault::Angle { joint, radians } => defects.angle[joint] = Some(radians),
             Fault::Speed { joint, radians_per_s } => defects.speed[joint] = Some(radians_per_s),
+            Fault::Torque { joint, newton_metres } => defects.torque[joint] = Some(newton_metres),
             Fault::NotANumber { joint } => defects.angle[joint] = Some(f64::NAN),
             Fault::Tilt(radians) => defects.tilt_rad = radians,
             Fault::Place => self.lay_down(),
@@ -340,6 +342,8 @@ impl Emulator {
             *position = self.defects.angle[joint].unwrap_or(*position);
             let velocity = &mut state.joint_velocity[joint];
             *velocity = self.defects.speed[joint].unwrap_or(*velocity);
+            let torque = &mut state.joint_torque[joint];
+            *torque = self.defects.torque[joint].unwrap_or(*torque);
         }
         state.imu.orientation_world *= UnitQuaternion::from_axis_angle(&Vector3::x_axis(), self.defects.tilt_rad);
         let mut datagram = convert::low_state(&state, self.network.foot_force_n);

@@ -317,6 +317,24 @@ fn a_continued_study_keeps_its_configuration_and_robot() {
     assert!(message.contains("another session"), "{message}");
 }
 
+/// Whatever the machine: each item has a line that says ok or warn, a warning says what to do, and the simulator is usable.
+#[test]
+fn the_doctor_says_how_the_machine_stands_item_by_item() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = run(folder.path(), &["doctor"]);
+    let said = String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.success(), "{said}");
+    for item in
+        ["kernel", "real-time priority", "locked memory", "cores", "timer", "wake-up lateness", "characters", "disk"]
+    {
+        let line = said.lines().find(|line| line.get(6..).is_some_and(|rest| rest.starts_with(item)));
+        let line = line.unwrap_or_else(|| panic!("no line on {item}: {said}"));
+        assert!(line.starts_with("ok ") || line.starts_with("warn "), "{line}");
+    }
+    let warnings = said.lines().filter(|line| line.starts_with("warn ")).count();
+    assert_eq!(said.lines().filter(|line| line.trim_start().starts_with("-> ")).count(), warnings, "{said}");
+}
+
 #[test]
 fn without_a_terminal_the_console_says_what_to_do() {
     let folder = tempfile::tempdir().unwrap();

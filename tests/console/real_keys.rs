@@ -48,6 +48,7 @@ const fn row(action: Action, key: &'static str, seen: Seen, after: (&'static str
 const LIVE: &[Row] = &[
     row(Action::Override, "o", Shows("Override trial #0"), ("\x1b[B120\r", "was 106.2")),
     row(Action::ClearOverrides, "O", Hides("was 106.2"), ("", "")),
+    row(Action::PreArm, "P", Shows("Pre-arm list: all passed"), ("\x1b", "Press A to arm")),
     row(Action::Skip, "n", Hides("106.2 N"), ("", "Press A to arm")),
     row(Action::Suspend, "Ctrl-Z", Suspends, ("", "Press A to arm")),
     row(Action::Arm, "A", Shows("STAND UP"), ("", "READY")),
@@ -64,7 +65,13 @@ const LIVE: &[Row] = &[
     row(Action::Rerun, "r", Shows("re-run of #1"), ("u", "judge it")),
     row(Action::Fall, "f", Shows("Study finished"), ("u", "judge it")),
     row(Action::Accept, "a", Shows("Study finished"), ("", "")),
+    row(Action::ExportBest, "E", Shows("for --config: "), ("", "")),
     row(Action::Continue, "C", Shows("How many more trials?"), ("\r", "Trial #2")),
+    row(Action::ConfirmBest, "K", Shows("two accepted trials are needed"), ("4", "What can be done")),
+    row(Action::Fix, "X", Shows("Fix Fx at"), ("3\r", "fixed at")),
+    row(Action::Fix, "X", Hides("fixed at"), ("", "")),
+    row(Action::Bounds, "B", Shows("Search Fx from .. to"), ("\x1520..120\r", "began 0.000..150.0")),
+    row(Action::QueuePoint, "Q", Shows("queue f0 ="), ("1", "8 s sweep")),
     row(Action::Interrupt, "Ctrl-C", Shows("Ctrl-C again within 2 s quits"), ("", "DAMPED")),
     row(Action::Quit, "q", Shows("The study and its recording are in"), ("", "")),
 ];

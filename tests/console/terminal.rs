@@ -199,6 +199,9 @@ fn signals_end_the_program_with_the_terminal_restored() {
         let folder = folder();
         let mut session = Session::start(folder.path(), SIZE, &[]);
         session.wait_for(&["Press A to arm"]);
+        // The mouse, too, is the terminal's own again afterwards.
+        session.send("M");
+        session.wait_for(&["mouse on"]);
         session.signal(signal);
         if signal == Signal::SIGINT {
             session.wait_for(&["Ctrl-C again within 2 s quits"]);

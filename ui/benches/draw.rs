@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 
 use nix::time::{ClockId, clock_gettime};
 use quadfrog::realtime::telemetry::{Phase, Snapshot};
-use quadfrog::recording::record::{Record, Verdict};
+use quadfrog::recording::record::{Insight, ParameterInsight, Record, Verdict};
 use quadfrog::robot::description::RobotDescription;
 use quadfrog_console::model::View;
 use quadfrog_console::series::SIGNALS;
@@ -41,6 +41,14 @@ fn sample(time_ms: u64) -> quadfrog::realtime::telemetry::Tick {
     tick(time_ms, 0.3 * (time_ms as f64 / 300.0).sin(), jump)
 }
 
+/// Two densities of a hundred points, as the optimizer tells them with a proposal.
+fn insight(name: &str) -> ParameterInsight {
+    let at: Vec<f64> = (0..100).map(|i| 0.75 + 0.01 * f64::from(i)).collect();
+    let bump = |middle: f64| at.iter().map(|x| (-((x - middle) / 0.1).powi(2)).exp()).collect();
+    let (good, bad) = (bump(1.0), bump(1.5));
+    ParameterInsight { name: name.into(), proposed: 1.0, importance: Some(0.5), at, good, bad }
+}
+
 fn main() {
     let mut console = Console::ready();
     console.model.robot = Some(RobotDescription::embedded("go1").expect("the built-in robot"));
@@ -52,6 +60,7 @@ fn main() {
         console.tell(Msg::Tick(Box::new(sample(time_ms))));
     }
     console.press(&["c"]);
+    console.record(Record::Insight(Insight { trial: 0, parameters: ["f0", "Fx", "Fz"].map(insight).to_vec() }));
     let mut terminal = Terminal::new(TestBackend::new(200, 60)).expect("a screen in memory");
     let mut time_ms = 60_000;
     for view in View::ALL {

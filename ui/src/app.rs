@@ -248,10 +248,7 @@ impl Console {
 
     fn export_best(&mut self) {
         let written = export::best(&self.model);
-        self.say_written(written, |path| {
-            let path = path.display();
-            format!("written: {path}; quadfrog --config {path} searches around the best")
-        });
+        self.say_written(written, |path| format!("for --config: {}", path.display()));
     }
 
     fn say_written(&mut self, written: Result<PathBuf, ExportError>, words: impl FnOnce(&Path) -> String) {
@@ -269,6 +266,7 @@ impl Console {
         if self.screen.take().and_then(|()| self.screen.mouse(self.model.mouse)).is_err() {
             self.hang_up();
         }
+        update(&mut self.model, Msg::Resumed);
         self.last_feed = Instant::now();
         self.redraw = true;
     }

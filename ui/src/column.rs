@@ -4,6 +4,8 @@ use std::cmp::Ordering;
 
 use quadfrog::recording::record::{TrialRecord, Verdict};
 
+use crate::model::Model;
+
 /// A column, or the group of the parameters' columns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Column {
@@ -129,4 +131,62 @@ pub fn descending(a: Option<f64>, b: Option<f64>) -> Ordering {
 /// The order of verdicts: accept, fall, void, none yet.
 pub fn verdict_rank(verdict: Option<Verdict>) -> usize {
     verdict.and_then(|verdict| Verdict::ALL.iter().position(|v| *v == verdict)).unwrap_or(Verdict::ALL.len())
+}
+
+impl Model {
+    /// The rows of the trial table as sorted and filtered.
+    pub fn table(&self) -> Vec<&TrialRecord> {
+        let view = &self.trials_view;
+        let mut rows: Vec<&TrialRecord> = if view.best_only {
+            self.best_so_far().collect()
+        } else {
+            self.trials.values().filter(|trial| view.filter.is_none() || trial.verdict == view.filter).collect()
+        };
+        let order = |a: &&TrialRecord, b: &&TrialRecord| match view.sort {
+            SortBy::Number => descending(Some(f64::from(b.trial)), Some(f64::from(a.trial))),
+            SortBy::Parameter(index) => descending(self.nth_parameter(a, index), self.nth_parameter(b, index)),
+            SortBy::Column(Column::Verdict) => verdict_rank(a.verdict).cmp(&verdict_rank(b.verdict)),
+            SortBy::Column(Column::Source | Column::Parameters) => a.source.name().cmp(b.source.name()),
+            SortBy::Column(Column::Cause) => a.cause.cmp(&b.cause),
+            SortBy::Column(Column::Value) => descending(a.value, b.value),
+            SortBy::Column(Column::Risk) => descending(risk_share(a), risk_share(b)),
+            SortBy::Column(Column::Time) => {
+                let begun = |trial: &TrialRecord| self.ran.get(&trial.trial).map(|ran| -(ran.begun_ns as f64));
+                descending(begun(a), begun(b))
+            }
+            SortBy::Column(column) => descending(measured(a, column), measured(b, column)),
+        };
+        rows.sort_by(order);
+        if view.reversed {
+            // Rows that have nothing to be sorted by stay last.
+            let sorted_ones = rows.iter().take_while(|row| self.sorts(row)).count();
+            rows[..sorted_ones].reverse();
+        }
+        rows
+    }
+
+    fn nth_parameter(&self, trial: &TrialRecord, index: usize) -> Option<f64> {
+        let name = &self.session.parameters.get(index)?.name;
+        trial.parameters.iter().find(|(known, _)| known == name).map(|(_, value)| *value)
+    }
+
+    /// Whether the row has what the table is sorted by.
+    fn sorts(&self, trial: &TrialRecord) -> bool {
+        match self.trials_view.sort {
+            SortBy::Number => true,
+            SortBy::Parameter(index) => self.nth_parameter(trial, index).is_some(),
+            SortBy::Column(Column::Value) => trial.value.is_some_and(|value| !value.is_nan()),
+            SortBy::Column(Column::Verdict) => trial.verdict.is_some(),
+            SortBy::Column(Column::Risk) => risk_share(trial).is_some(),
+            SortBy::Column(Column::Time) => self.ran.contains_key(&trial.trial),
+            SortBy::Column(Column::Source | Column::Parameters | Column::Cause) => true,
+            SortBy::Column(column) => measured(trial, column).is_some(),
+        }
+    }
+}
+
+/// Share of falls among the nearest trials before it ran.
+fn risk_share(trial: &TrialRecord) -> Option<f64> {
+    let risk = trial.risk.filter(|risk| risk.neighbours > 0)?;
+    Some(f64::from(risk.falls) / f64::from(risk.neighbours))
 }

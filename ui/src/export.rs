@@ -3,13 +3,11 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-use quadfrog::recording::record::TrialRecord;
+use quadfrog::config::{Config, ConfigError};
+use quadfrog::realtime::command::Task;
 
 use crate::model::Model;
 use crate::view::trial_text;
-
-/// Share of a parameter's range to either side of the best value that an exported configuration searches.
-const AROUND: f64 = 0.1;
 
 /// A file that could not be written.
 #[derive(Debug, thiserror::Error)]
@@ -22,6 +20,9 @@ pub enum ExportError {
         /// What the system says.
         source: io::Error,
     },
+    /// The configuration cannot be read or written.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
     /// There is nothing to write.
     #[error("no trial was accepted yet")]
     NoBest,
@@ -48,49 +49,19 @@ pub fn table(model: &Model) -> Result<PathBuf, ExportError> {
     Ok(csv)
 }
 
-/// Writes the best parameters as a folder `best` that `quadfrog --config` takes: bounds around them, and the gains that
-/// the best trial ran with. Returns the folder.
+/// Writes the configuration of the study with its best point and the gains that it ran with, as a folder
+/// `best-trial-<number>` that `quadfrog --config` takes: a new study begins there. Returns the folder; nothing is
+/// overwritten.
 ///
 /// # Errors
-/// When no trial was accepted, or a file cannot be written.
+/// When no trial was accepted, the study's configuration cannot be read, or a file is there already or cannot be written.
 pub fn best(model: &Model) -> Result<PathBuf, ExportError> {
     let best = model.best().ok_or(ExportError::NoBest)?;
-    let folder = folder(model).join("best");
-    std::fs::create_dir_all(&folder).map_err(|source| ExportError::System { path: folder.clone(), source })?;
-    write(&folder.join("optimize.toml"), &bounds(model, best))?;
-    if !best.gains.is_empty() {
-        write(&folder.join("control.toml"), &gains(model, best))?;
-    }
+    let task = Task::from_name(&model.session.task).ok_or(ExportError::NoBest)?;
+    let study = folder(model);
+    let as_run = Some(study.join("config")).filter(|config| config.is_dir());
+    let config = Config::load(as_run.as_deref())?;
+    let folder = study.join(format!("best-trial-{}", best.trial));
+    config.export(&folder, task, &best.parameters, &best.gains)?;
     Ok(folder)
-}
-
-/// `optimize.toml`: a tenth of each range to either side of the best value, within the study's bounds.
-fn bounds(model: &Model, best: &TrialRecord) -> String {
-    let session = &model.session;
-    let value = best.value.map_or("none".to_owned(), |value| format!("{value:.4} {}", session.unit));
-    let mut text = format!(
-        "# Around the best of {} trials of {} on {}: trial {}, J = {value}.\n\n[bounds]\n",
-        model.trials.len(),
-        session.task,
-        session.robot,
-        best.trial
-    );
-    for (name, value) in &best.parameters {
-        let Some(info) = session.parameters.iter().find(|info| info.name == *name) else { continue };
-        let reach = AROUND * (info.high - info.low);
-        let (low, high) = ((value - reach).max(info.low), (value + reach).min(info.high));
-        // Rust writes the shortest digits that read back to the same number; TOML wants a point in a float.
-        text.push_str(&format!("{name} = [{low:?}, {high:?}] # {}; the best is {value:?}\n", info.unit));
-    }
-    text
-}
-
-/// `control.toml`: the gains of the best trial, for its task.
-fn gains(model: &Model, best: &TrialRecord) -> String {
-    let mut text = format!("# The gains of trial {}.\n\n[tasks.{}]\n", best.trial, model.session.task);
-    for (name, value) in &best.gains {
-        let unit = model.gain(name).map_or("", |info| info.unit.as_str());
-        text.push_str(&format!("{name} = {value:?} # {unit}\n"));
-    }
-    text
 }

@@ -12,6 +12,7 @@
 pub mod action;
 pub mod app;
 pub mod column;
+pub mod comparison;
 pub mod dialog;
 pub mod export;
 pub mod feed;

@@ -11,9 +11,10 @@ use quadfrog::recording::record::{
 use quadfrog::recording::recorder::RecorderStatus;
 use quadfrog::robot::description::RobotDescription;
 
-use crate::column::{Column, SortBy, descending, measured, verdict_rank};
+use crate::column::{Column, SortBy};
+use crate::comparison::Comparison;
 use crate::dialog::Dialog;
-use crate::history::{History, Sample};
+use crate::history::History;
 use crate::keymap::Keymap;
 use crate::series::Series;
 use crate::settings::{BellCause, ChartMode, Settings};
@@ -111,51 +112,6 @@ pub struct LiveView {
     pub ghost: Option<u32>,
     /// Two trials in place of the present; none shows the present.
     pub comparison: Option<Comparison>,
-}
-
-/// Two trials on one axis, aligned where their impulses begin.
-#[derive(Debug, Clone)]
-pub struct Comparison {
-    /// Trial A.
-    pub a: u32,
-    /// Trial B.
-    pub b: u32,
-    /// A's trace.
-    pub history_a: History,
-    /// B's trace.
-    pub trace_b: Vec<Sample>,
-    /// Start of A's impulse, ns, on A's clock.
-    pub start_ns: u64,
-    /// The time under the cursor, ns, on A's clock.
-    pub cursor_ns: u64,
-}
-
-impl Comparison {
-    /// The traces of two trials; none where one of them was not seen.
-    pub fn new(history: &History, a: u32, b: u32) -> Option<Comparison> {
-        let (trace_a, trace_b) = (history.trace(a)?, history.trace(b)?.to_vec());
-        let start_ns = impulse_start_ns(trace_a.last()?);
-        Some(Comparison { a, b, history_a: History::of_trace(trace_a), trace_b, start_ns, cursor_ns: start_ns })
-    }
-
-    /// First and last time of both, ns, on A's clock.
-    pub fn span_ns(&self) -> (u64, u64) {
-        let on_a = |sample: &Sample| time_after(self.start_ns, sample.trial_time_s);
-        let ends_a = self.history_a.samples().next().map(|s| s.time_ns).zip(Some(self.history_a.newest_ns()));
-        let ends_b = self.trace_b.first().map(on_a).zip(self.trace_b.last().map(on_a));
-        let ends = [ends_a, ends_b].into_iter().flatten();
-        ends.fold((self.start_ns, self.start_ns), |(first, last), (from, to)| (first.min(from), last.max(to)))
-    }
-}
-
-/// When the impulse of a sample's trial began, ns.
-pub fn impulse_start_ns(sample: &Sample) -> u64 {
-    time_after(sample.time_ns, -sample.trial_time_s)
-}
-
-/// A time some seconds after another, ns.
-pub fn time_after(time_ns: u64, seconds: f32) -> u64 {
-    (time_ns as f64 + f64::from(seconds) * 1e9).max(0.0) as u64
 }
 
 /// What the large area of the live view shows.
@@ -420,56 +376,6 @@ impl Model {
         self.session.parameters.get(self.override_row)
     }
 
-    /// The rows of the trial table as sorted and filtered.
-    pub fn table(&self) -> Vec<&TrialRecord> {
-        let view = &self.trials_view;
-        let mut rows: Vec<&TrialRecord> = if view.best_only {
-            self.best_so_far().collect()
-        } else {
-            self.trials.values().filter(|trial| view.filter.is_none() || trial.verdict == view.filter).collect()
-        };
-        let order = |a: &&TrialRecord, b: &&TrialRecord| match view.sort {
-            SortBy::Number => descending(Some(f64::from(b.trial)), Some(f64::from(a.trial))),
-            SortBy::Parameter(index) => descending(self.nth_parameter(a, index), self.nth_parameter(b, index)),
-            SortBy::Column(Column::Verdict) => verdict_rank(a.verdict).cmp(&verdict_rank(b.verdict)),
-            SortBy::Column(Column::Source | Column::Parameters) => a.source.name().cmp(b.source.name()),
-            SortBy::Column(Column::Cause) => a.cause.cmp(&b.cause),
-            SortBy::Column(Column::Value) => descending(a.value, b.value),
-            SortBy::Column(Column::Risk) => descending(risk_share(a), risk_share(b)),
-            SortBy::Column(Column::Time) => {
-                let begun = |trial: &TrialRecord| self.ran.get(&trial.trial).map(|ran| -(ran.begun_ns as f64));
-                descending(begun(a), begun(b))
-            }
-            SortBy::Column(column) => descending(measured(a, column), measured(b, column)),
-        };
-        rows.sort_by(order);
-        if view.reversed {
-            // Rows that have nothing to be sorted by stay last.
-            let sorted_ones = rows.iter().take_while(|row| self.sorts(row)).count();
-            rows[..sorted_ones].reverse();
-        }
-        rows
-    }
-
-    fn nth_parameter(&self, trial: &TrialRecord, index: usize) -> Option<f64> {
-        let name = &self.session.parameters.get(index)?.name;
-        trial.parameters.iter().find(|(known, _)| known == name).map(|(_, value)| *value)
-    }
-
-    /// Whether the row has what the table is sorted by.
-    fn sorts(&self, trial: &TrialRecord) -> bool {
-        match self.trials_view.sort {
-            SortBy::Number => true,
-            SortBy::Parameter(index) => self.nth_parameter(trial, index).is_some(),
-            SortBy::Column(Column::Value) => trial.value.is_some_and(|value| !value.is_nan()),
-            SortBy::Column(Column::Verdict) => trial.verdict.is_some(),
-            SortBy::Column(Column::Risk) => risk_share(trial).is_some(),
-            SortBy::Column(Column::Time) => self.ran.contains_key(&trial.trial),
-            SortBy::Column(Column::Source | Column::Parameters | Column::Cause) => true,
-            SortBy::Column(column) => measured(trial, column).is_some(),
-        }
-    }
-
     /// The row of the trial table that actions are about: the chosen one, or the newest.
     pub fn selected_trial(&self) -> Option<&TrialRecord> {
         match self.trials_view.selected {
@@ -506,12 +412,6 @@ impl Model {
     pub fn by_hand(trial: &TrialRecord) -> bool {
         trial.source != Source::Sampler
     }
-}
-
-/// Share of falls among the nearest trials before it ran.
-fn risk_share(trial: &TrialRecord) -> Option<f64> {
-    let risk = trial.risk.filter(|risk| risk.neighbours > 0)?;
-    Some(f64::from(risk.falls) / f64::from(risk.neighbours))
 }
 
 /// The value of an accepted trial.

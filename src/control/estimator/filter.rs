@@ -202,7 +202,9 @@ impl Filter {
         let Some(root) = (variance + Matrix3::from_diagonal_element(noise * noise)).cholesky() else { return false };
         let lower = root.l_dirty();
         let Some(whitened) = lower.solve_lower_triangular(residual) else { return false };
-        if !(whitened.norm() <= gate) {
+        // Also false for a residual that is no number.
+        let believable = whitened.norm() <= gate;
+        if !believable {
             return false;
         }
         // With S = L L^T and U = P H^T L^-T: x += U L^-1 e, P -= U U^T. This form keeps P symmetric to the bit.

@@ -164,8 +164,7 @@ impl RobotDescription {
         let maker_limits = robot.maker_limits.map(|limits| [limits.hip_rad, limits.thigh_rad, limits.calf_rad]);
         for (i, [low, high]) in maker_limits.iter().flatten().copied().enumerate() {
             let (lowest, highest) = (parts.limits.min_position[i], parts.limits.max_position[i]);
-            // Written so that what is not a number is refused.
-            if !(low.max(lowest) < high.min(highest)) {
+            if !(low.is_finite() && high.is_finite()) || low.max(lowest) >= high.min(highest) {
                 let problem = format!("[{low}, {high}] rad leaves nothing of the URDF's {lowest}..{highest}");
                 return invalid("maker_limits", problem, "give [lowest, highest] of hip, thigh and calf");
             }

@@ -56,6 +56,13 @@ pub enum Fault {
         /// Velocity, rad/s.
         radians_per_s: f64,
     },
+    /// A motor reports this torque, N m.
+    Torque {
+        /// Joint, 0..12.
+        joint: usize,
+        /// Torque, N m.
+        newton_metres: f64,
+    },
     /// An encoder reports an angle that is no number.
     NotANumber {
         /// Joint, 0..12.
@@ -82,7 +89,7 @@ enum Operands {
 use Operands::{Joint, JointNumber, Number};
 
 /// Every word, its operands, and what it does: read by the parser and by `help`.
-const WORDS: [(&str, Operands, &str); 18] = [
+const WORDS: [(&str, Operands, &str); 19] = [
     ("loss", Number(Fault::Loss, "PERCENT", 0.0, 100.0), "the network loses this share of the datagrams, each way"),
     ("delay", Number(Fault::Delay, "MS", 0.0, 1000.0), "every datagram is under way for so long, each way"),
     ("jitter", Number(Fault::Jitter, "MS", 0.0, 1000.0), "and up to so much longer, at random"),
@@ -108,6 +115,11 @@ const WORDS: [(&str, Operands, &str); 18] = [
         "speed",
         JointNumber(|joint, radians_per_s| Fault::Speed { joint, radians_per_s }, "RAD/S", -1000.0, 1000.0),
         "an encoder reports this velocity",
+    ),
+    (
+        "torque",
+        JointNumber(|joint, newton_metres| Fault::Torque { joint, newton_metres }, "NM", -120.0, 120.0),
+        "a motor reports this torque",
     ),
     ("nan", Joint(|joint| Fault::NotANumber { joint }), "an encoder reports an angle that is no number"),
     ("tilt", Number(Fault::Tilt, "RAD", -3.2, 3.2), "the inertial unit reports so much more roll"),
@@ -200,4 +212,37 @@ fn usage(word: &str, operands: Operands) -> String {
 pub fn help() -> String {
     let line = |(word, operands, what): &(&str, Operands, &str)| format!("  {:<20} {what}\n", usage(word, *operands));
     WORDS.iter().map(line).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_word_is_read_as_help_writes_it() {
+        for (word, operands, _) in &WORDS {
+            let line = usage(word, *operands).replace("JOINT", "RL_thigh");
+            let value = |unit: &str| line.replace(unit, "3");
+            let parsed = match operands {
+                Number(_, unit, ..) | JointNumber(_, unit, ..) => value(unit).parse::<Fault>(),
+                Operands::None(_) | Joint(_) => line.parse(),
+            };
+            assert!(parsed.is_ok(), "{line}: {parsed:?}");
+            assert!(help().contains(&usage(word, *operands)));
+        }
+        assert_eq!("hot fr_CALF 82".parse(), Ok(Fault::Hot { joint: 2, celsius: 82.0 }));
+    }
+
+    #[test]
+    fn what_cannot_be_is_refused_with_what_can() {
+        let said = |line: &str| line.parse::<Fault>().unwrap_err().to_string();
+        assert!(said("los 5").contains("\"los\"") && said("los 5").contains("loss"));
+        assert_eq!(said("loss"), "write it as: loss PERCENT");
+        assert_eq!(said("hot FR_calf"), "write it as: hot JOINT CELSIUS");
+        assert!(said("loss 101").contains("give 0 to 100 (PERCENT)"));
+        assert!(said("loss nan").contains("nan"));
+        assert!(said("stuck FR_knee").contains("FR_hip"));
+        assert!(said("clear now").contains("write it as: clear"));
+        assert!(said("").contains("the words are"));
+    }
 }

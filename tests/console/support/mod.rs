@@ -4,10 +4,11 @@
 
 use std::time::Duration;
 
+use quadfrog::realtime::pre_arm::{Check, CheckState};
 use quadfrog::realtime::telemetry::{Mode, Phase, Snapshot, Tick};
 use quadfrog::recording::record::{
-    CommandRecord, Measured, ParameterInfo, Proposal, ProposedParameter, Record, SessionInfo, Source, Stage, StageInfo,
-    Stamped, Transition, TrialRecord, Verdict,
+    CommandRecord, Measured, ParameterInfo, PreArmCheck, Proposal, ProposedParameter, Record, SessionInfo, Source,
+    Stage, StageInfo, Stamped, Transition, TrialRecord, Verdict,
 };
 use quadfrog_console::keymap::Key;
 use quadfrog_console::model::Model;
@@ -41,6 +42,12 @@ impl Console {
         console.record(Record::Proposal(proposal(0, 0)));
         console.stage(Stage::Proposed, 0);
         console.mode(Mode::Disarmed);
+        console.record(Record::PreArm(vec![PreArmCheck {
+            check: Check::StateFresh,
+            found: "0 ms old".into(),
+            needed: "at most 10 ms".into(),
+            state: CheckState::Passed,
+        }]));
         console
     }
 

@@ -110,11 +110,12 @@ impl Session {
         self.output().bytes[from..].windows(bytes.len()).any(|window| window == bytes)
     }
 
-    /// Whether the terminal is as a shell wants it: the normal screen, a cursor, no special paste.
+    /// Whether the terminal is as a shell wants it: the normal screen, a cursor, no special paste, its own mouse.
     pub fn restored(&self) -> bool {
         let output = self.output();
         let screen = output.parser.screen();
-        !screen.alternate_screen() && !screen.hide_cursor() && !screen.bracketed_paste()
+        let own_mouse = screen.mouse_protocol_mode() == vt100::MouseProtocolMode::None;
+        !screen.alternate_screen() && !screen.hide_cursor() && !screen.bracketed_paste() && own_mouse
     }
 
     /// Whether the terminal's line discipline edits lines and makes signals, as a shell wants it.

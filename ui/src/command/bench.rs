@@ -4,14 +4,23 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Instant;
 
-use clap::Args;
+use clap::{Args, Subcommand};
 use color_eyre::eyre::{WrapErr, eyre};
 use quadfrog::sim::bench::{Scene, Speed};
 
 use super::Failure;
 
+#[derive(Debug, Subcommand)]
+enum Which {
+    /// How late the control thread wakes and what a tick costs
+    Loop(super::bench_loop::LoopArguments),
+}
+
 #[derive(Debug, Args)]
+#[command(args_conflicts_with_subcommands = true)]
 pub struct BenchArguments {
+    #[command(subcommand)]
+    which: Option<Which>,
     /// How long each figure is measured, s
     #[arg(long, value_name = "S", default_value_t = 3.0)]
     seconds: f64,
@@ -24,6 +33,9 @@ pub struct BenchArguments {
 }
 
 pub fn run(arguments: &BenchArguments) -> Result<(), Failure> {
+    if let Some(Which::Loop(arguments)) = &arguments.which {
+        return super::bench_loop::run(arguments);
+    }
     if !(arguments.seconds > 0.0 && arguments.seconds <= 600.0) {
         return Err(Failure::input(format!("--seconds {}: give more than 0 and at most 600", arguments.seconds)));
     }
@@ -98,7 +110,7 @@ fn mujoco(script: &Path, seconds: f64) -> Result<f64, Failure> {
 }
 
 /// The processor's name, as the system gives it.
-fn machine() -> String {
+pub fn machine() -> String {
     let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let model = text.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':'));
     model.map_or_else(|| std::env::consts::ARCH.to_owned(), |(_, name)| name.trim().to_owned())

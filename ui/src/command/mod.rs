@@ -1,8 +1,10 @@
 //! The command line: one file per subcommand; without one, the console opens.
 
 mod bench;
+mod bench_loop;
 mod chosen;
 mod console;
+mod doctor;
 mod emulate;
 mod optimize;
 mod recover;
@@ -45,6 +47,8 @@ enum Subcommands {
     Emulate(emulate::EmulateArguments),
     /// Measure the simulator's speed on this machine
     Bench(bench::BenchArguments),
+    /// Say what this machine can do for a robot and a console, and what to do about the rest
+    Doctor(doctor::DoctorArguments),
     /// Look at studies, take them elsewhere, bring trials in, queue a point
     Study(study::StudyCommand),
 }
@@ -208,6 +212,7 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
         Some(Subcommands::Recover(recover)) => recover::run(&recover),
         Some(Subcommands::Emulate(emulate)) => emulate::run(&emulate),
         Some(Subcommands::Bench(bench)) => bench::run(&bench),
+        Some(Subcommands::Doctor(doctor)) => doctor::run(&doctor),
         Some(Subcommands::Study(study)) => study::run(&study),
     }
 }

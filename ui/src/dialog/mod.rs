@@ -21,6 +21,9 @@ pub use override_form::{OverrideForm, OverrideRow};
 /// Two presses nearer than this are one: the second moment of an approval comes later.
 pub const APPROVAL_PAUSE: Duration = Duration::from_millis(300);
 
+/// Lines that a page of a trial's details moves by; there are never more than two pages of them.
+const DETAILS_PAGE: usize = 10;
+
 /// What lies over the view.
 #[derive(Debug, Clone)]
 pub enum Dialog {
@@ -79,6 +82,8 @@ pub enum Dialog {
     Details {
         /// Its number.
         trial: u32,
+        /// Lines scrolled off.
+        scroll: usize,
     },
 }
 
@@ -165,8 +170,16 @@ pub fn key(model: &mut Model, key: Key) -> Vec<Effect> {
             Vec::new()
         }
         Dialog::Choose { what, selected } => choice::key(model, key, what, selected),
-        Dialog::Details { trial } => {
+        Dialog::Details { trial, scroll } => {
             let neighbour = match key.code() {
+                KeyCode::PageUp | KeyCode::PageDown => {
+                    // The drawing stops at the last line.
+                    let page = DETAILS_PAGE;
+                    let scroll =
+                        if key.code() == KeyCode::PageUp { scroll.saturating_sub(page) } else { scroll + page };
+                    model.dialog = Some(Dialog::Details { trial, scroll: scroll.min(DETAILS_PAGE * 2) });
+                    return Vec::new();
+                }
                 KeyCode::Up => model.trials.range(..trial).next_back(),
                 KeyCode::Down => model.trials.range(trial + 1..).next(),
                 KeyCode::Esc | KeyCode::Enter => return Vec::new(),
@@ -175,7 +188,7 @@ pub fn key(model: &mut Model, key: Key) -> Vec<Effect> {
             };
             let trial = neighbour.map_or(trial, |(number, _)| *number);
             model.trials_view.selected = Some(trial);
-            model.dialog = Some(Dialog::Details { trial });
+            model.dialog = Some(Dialog::Details { trial, scroll: 0 });
             Vec::new()
         }
     }

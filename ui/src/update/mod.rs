@@ -55,6 +55,8 @@ pub enum Msg {
     Terminate,
     /// SIGTSTP or its key.
     Suspend,
+    /// The process was stopped and goes on: what was checked before is old.
+    Resumed,
 }
 
 /// Something to be done to the world.
@@ -164,6 +166,10 @@ pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
         }
         Msg::Terminate => vec![Effect::Quit],
         Msg::Suspend => perform(model, Action::Suspend),
+        Msg::Resumed => {
+            model.pre_arm.clear();
+            Vec::new()
+        }
     }
 }
 

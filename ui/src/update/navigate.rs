@@ -5,7 +5,8 @@ use quadfrog::recording::record::{Level, Verdict};
 use super::{Effect, say};
 use crate::action::Action;
 use crate::column::{Column, SortBy};
-use crate::model::{Comparison, Model, Panel, View};
+use crate::comparison::Comparison;
+use crate::model::{Model, Panel, View};
 use crate::series::Series;
 use crate::settings::ChartMode;
 

@@ -192,7 +192,7 @@ fn open_details(model: &mut Model) -> Vec<Effect> {
         _ => model.under_review().or(model.trials.values().next_back()),
     };
     match trial.map(|trial| trial.trial) {
-        Some(trial) => open(model, Dialog::Details { trial }),
+        Some(trial) => open(model, Dialog::Details { trial, scroll: 0 }),
         None => {
             say(model, Level::Info, "there is no trial yet".to_owned());
             Vec::new()

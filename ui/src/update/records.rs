@@ -77,8 +77,13 @@ pub(super) fn take(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
                     }
                     Stage::Running => {}
                     Stage::Finished => {
-                        say(model, Level::Info, "the study is finished".to_owned());
-                        log(model, time_ns, Level::Info, "study", "finished".to_owned(), true);
+                        let best = model.best().and_then(|best| Some((best.trial, best.value?)));
+                        let best = best.map_or("no trial was accepted".to_owned(), |(trial, value)| {
+                            format!("the best is trial {trial}, J = {value:.3} {}", model.session.unit)
+                        });
+                        let text = format!("the study is finished: {best}");
+                        say(model, Level::Info, text.clone());
+                        log(model, time_ns, Level::Info, "study", text, true);
                     }
                 }
             }

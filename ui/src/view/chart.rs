@@ -12,8 +12,8 @@ use ratatui::layout::Rect;
 use ratatui::style::Style;
 
 use super::cut;
+use crate::comparison::time_after;
 use crate::history::{History, Sample, at_trial_time};
-use crate::model::time_after;
 use crate::series::Signal;
 use crate::settings::ChartMode;
 use crate::theme::{Glyphs, Role, Theme};

@@ -21,9 +21,13 @@ use crate::theme::Role;
 pub fn render(frame: &mut Frame, area: Rect, model: &Model, name: &str) {
     let theme = &model.theme;
     let insight = model.insight.as_ref().and_then(|insight| insight.parameters.iter().find(|p| p.name == *name));
+    let title = match &model.insight {
+        Some(insight) if area.width >= 36 => format!("Why {name} (#{})", insight.trial),
+        _ => format!("Why {name}"),
+    };
     let importance = insight.and_then(|insight| insight.importance);
     let aside = importance.map_or(String::new(), |share| format!("matters {:.0} %", share * 100.0));
-    let body = heading(frame, area, theme, &format!("Why {name}"), &aside);
+    let body = heading(frame, area, theme, &title, &aside);
     let [plot, scale] = Layout::vertical([Constraint::Fill(1), Constraint::Length(1)]).areas(body);
     if plot.height < 2 || plot.width < 8 {
         return;
@@ -37,7 +41,11 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model, name: &str) {
     let (low, high) = (insight.at[0], insight.at[insight.at.len() - 1]);
     let top = insight.good.iter().chain(&insight.bad).copied().fold(0.0, f64::max);
     let buffer = frame.buffer_mut();
-    for (density, role, label) in [(&insight.bad, Role::SeriesB, "g"), (&insight.good, Role::Good, "l")] {
+    // Before the first trials both are the prior.
+    let equal = insight.good.iter().zip(&insight.bad).all(|(l, g)| (l - g).abs() <= 1e-9 * top);
+    let good_label = if equal { "l = g" } else { "l" };
+    let curves = [(&insight.bad, Role::SeriesB, "g"), (&insight.good, Role::Good, good_label)];
+    for (density, role, _) in curves {
         let mut dots = Dots::new(plot, theme.glyphs);
         let (across, down) = (dots.size.0 as f64 - 1.0, dots.size.1 as f64 - 1.0);
         let place = |(x, y): (f64, f64)| ((x - low) / (high - low) * across, (1.0 - y / top) * down);
@@ -46,17 +54,18 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model, name: &str) {
             points.windows(2).for_each(|pair| dots.line(pair[0], pair[1]));
         }
         dots.draw(buffer, plot, theme.style(role));
-        // The letter stands at the curve's peak: the two are told apart without colours.
-        let peak = insight.at.iter().zip(density).max_by(|a, b| a.1.total_cmp(b.1));
-        if let Some((x, y)) = peak {
-            let column = ((x - low) / (high - low) * f64::from(plot.width - 1)).round() as u16;
-            let row = ((1.0 - y / top.max(f64::MIN_POSITIVE)) * f64::from(plot.height - 1)).round() as u16;
-            buffer.set_string(plot.x + column, plot.y + row, label, theme.style(role));
-        }
     }
     let column = column_of(insight, (low, high), plot.width);
     for y in plot.y..plot.bottom() {
         buffer.set_string(plot.x + column, y, theme.bar(), theme.style(Role::Key));
+    }
+    // A letter stands at each curve's peak, above all else: the two are told apart without colours.
+    for (density, role, label) in curves {
+        let Some((x, y)) = insight.at.iter().zip(density).max_by(|a, b| a.1.total_cmp(b.1)) else { continue };
+        let column = ((x - low) / (high - low) * f64::from(plot.width - 1)).round() as u16;
+        let column = column.min(plot.width.saturating_sub(label.len() as u16));
+        let row = ((1.0 - y / top.max(f64::MIN_POSITIVE)) * f64::from(plot.height - 1)).round() as u16;
+        buffer.set_string(plot.x + column, plot.y + row, label, theme.style(role));
     }
     let (left, right) = (number(low), number(high));
     buffer.set_string(scale.x, scale.y, &left, theme.style(Role::Quiet));

@@ -54,17 +54,33 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
         Dialog::Palette { input, selected } => render_palette(frame, area, model, input, *selected),
         Dialog::Choose { what, selected } => render_choice(frame, area, model, *what, *selected),
         Dialog::Help { scroll } => render_help(frame, area, model, *scroll),
-        Dialog::Details { trial } => {
-            if let Some(record) = model.trials.get(trial) {
-                let rows = trial_text::details(model, record);
-                let line = |(name, value): (String, String)| {
-                    Line::from(vec![span(&model.theme, Role::Quiet, format!("{name:<15}")), Span::raw(value)])
-                };
-                let lines = rows.into_iter().map(line).collect();
-                popup(frame, area, model, &format!("Trial #{trial}"), 72, lines);
-            }
-        }
+        Dialog::Details { trial, scroll } => render_details(frame, area, model, *trial, *scroll),
     }
+}
+
+/// All about a trial; what does not fit is reached with the paging keys.
+fn render_details(frame: &mut Frame, area: Rect, model: &Model, trial: u32, scroll: usize) {
+    let Some(record) = model.trials.get(&trial) else { return };
+    const WIDTH: u16 = 76;
+    let inside = usize::from(WIDTH - 4);
+    let mut lines: Vec<Line> = Vec::new();
+    for (name, value) in trial_text::details(model, record) {
+        // Long causes and notes go on below themselves.
+        let chars: Vec<char> = value.chars().collect();
+        let mut pieces = chars.chunks(inside - 15);
+        let first: String = pieces.next().unwrap_or_default().iter().collect();
+        lines.push(Line::from(vec![span(&model.theme, Role::Quiet, format!("{name:<15}")), Span::raw(first)]));
+        lines.extend(pieces.map(|piece| Line::from(format!("{:15}{}", "", piece.iter().collect::<String>()))));
+    }
+    let room = usize::from(area.height.saturating_sub(2));
+    let more = lines.len().saturating_sub(room);
+    let title = match more {
+        0 => format!("Trial #{trial}"),
+        _ => format!("Trial #{trial} (PgUp PgDn: {} lines)", lines.len()),
+    };
+    let shown: Vec<Line> = lines.into_iter().skip(scroll.min(more)).take(room).collect();
+    let inner = open_box(frame, area, &model.theme, &title, WIDTH, shown.len() as u16 + 2);
+    frame.render_widget(Paragraph::new(shown), inner);
 }
 
 /// A box with a line around it; returns its inside.

@@ -27,7 +27,7 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let recording = Line::from(recording(model));
     let width = recording.width() as u16;
     let [left, right] = Layout::horizontal([Constraint::Fill(1), Constraint::Length(width)]).spacing(1).areas(first);
-    frame.render_widget(Line::from(identity(model, area.width)), left);
+    frame.render_widget(identity(model, area.width, usize::from(left.width)), left);
     frame.render_widget(recording, right);
     frame.render_widget(Line::from(condition(model, area.width)), second);
 }
@@ -59,19 +59,25 @@ fn backend(model: &Model) -> Span<'static> {
     }
 }
 
-fn identity(model: &Model, width: u16) -> Vec<Span<'static>> {
+/// What runs where, as far as `room` characters take it: a number is shown whole or not at all.
+fn identity(model: &Model, width: u16, room: usize) -> Line<'static> {
     let theme = &model.theme;
     let mut spans = vec![mode_span(model), Span::raw(" "), backend(model), Span::raw("  ")];
     let session = &model.session;
     if session.observe {
         spans.push(span(theme, Role::Warning, "OBSERVING  "));
     }
-    if !matches!(session.approve.as_str(), "" | "each") && model.replay.is_none() {
-        spans.push(span(theme, Role::Warning, format!("APPROVE {}  ", session.approve.to_uppercase())));
-    }
-    spans.push(Span::raw(session.task.clone()));
     // A narrow terminal has room for the best value only if the words are left out.
     let narrow = width < 100;
+    if !matches!(session.approve.as_str(), "" | "each") && model.replay.is_none() {
+        let approve = session.approve.to_uppercase();
+        spans.push(span(
+            theme,
+            Role::Warning,
+            if narrow { format!("{approve}  ") } else { format!("APPROVE {approve}  ") },
+        ));
+    }
+    spans.push(Span::raw(session.task.clone()));
     if let Some(info) = model.stage {
         let (finished, budget) = (model.counted(), model.budget());
         let text = match narrow {
@@ -81,11 +87,17 @@ fn identity(model: &Model, width: u16) -> Vec<Span<'static>> {
         spans.push(Span::raw(text));
     }
     if let Some((best, value)) = model.best().and_then(|best| Some((best, best.value?))) {
+        let before = spans.len();
         spans.push(Span::raw(if narrow { "  best " } else { "   best " }));
         spans.push(span(theme, Role::Good, format!("{} {}", number(value), session.unit)));
         spans.push(span(theme, Role::Quiet, format!(" (#{})", best.trial)));
+        for kept in [before + 2, before] {
+            if spans.iter().map(Span::width).sum::<usize>() > room {
+                spans.truncate(kept);
+            }
+        }
     }
-    spans
+    Line::from(spans)
 }
 
 fn recording(model: &Model) -> Vec<Span<'static>> {

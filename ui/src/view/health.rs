@@ -42,7 +42,7 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     panel(frame, recording, model, "Recorder and screen", recorder_rows(model));
     panel(frame, robot, model, "Link and battery", robot_rows(model));
     let [motors, checks] = Layout::vertical([Constraint::Length(JOINTS as u16 + 1), Constraint::Fill(1)]).areas(right);
-    panel(frame, motors, model, "Motors", motor_rows(model));
+    panel_named(frame, motors, model, ("Motors", MOTOR_NAME_WIDTH), motor_rows(model));
     let aside = format!("{} ({})", pre_arm::summary(model), model.keymap.key(Action::PreArm));
     let body = heading(frame, checks, &model.theme, "Pre-arm list", &aside);
     let lines = pre_arm::lines(model, usize::from(body.width), usize::from(body.height), None);
@@ -51,16 +51,23 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
 
 /// Width of the names at the left of a panel.
 const NAME_WIDTH: usize = 13;
+/// Width of the joints' names.
+const MOTOR_NAME_WIDTH: usize = 9;
 
 /// A line of a panel: name, value, and whether it needs a look.
 type Row = (String, String, bool);
 
 fn panel(frame: &mut Frame, area: Rect, model: &Model, title: &str, rows: Vec<Row>) {
+    panel_named(frame, area, model, (title, NAME_WIDTH), rows);
+}
+
+/// A panel with its title and the width of its names.
+fn panel_named(frame: &mut Frame, area: Rect, model: &Model, (title, name_width): (&str, usize), rows: Vec<Row>) {
     let theme = &model.theme;
     let body = heading(frame, area, theme, title, "");
     let line = |(name, value, look): Row| {
         let value = if look { span(theme, Role::Warning, format!("{value} !")) } else { Span::raw(value) };
-        Line::from(vec![span(theme, Role::Quiet, format!("{name:<NAME_WIDTH$}")), value])
+        Line::from(vec![span(theme, Role::Quiet, format!("{name:<name_width$}")), value])
     };
     frame.render_widget(Paragraph::new(rows.into_iter().map(line).collect::<Vec<_>>()), body);
 }
@@ -99,7 +106,7 @@ fn timing_rows(model: &Model) -> Vec<Row> {
         row("worst", format!("{worst_ms:.2} ms late"), worst_ms > 10.0),
         row("wakes late", micro(&late), percentile(&late, 0.99) > 5e5),
         row("tick takes", micro(&busy), percentile(&busy, 0.99) > 5e5),
-        row("the last one", stages(&tick.stages), false),
+        row("stages, us", stages(&tick.stages), false),
     ]
 }
 
@@ -107,7 +114,7 @@ fn timing_rows(model: &Model) -> Vec<Row> {
 fn stages(stages: &StageTimes) -> String {
     let micro = |ns: u32| f64::from(ns) / 1e3;
     format!(
-        "{:.0} read {:.0} decide {:.0} write us",
+        "read {:.0}, decide {:.0}, write {:.0}",
         micro(stages.read_ns),
         micro(stages.decide_ns),
         micro(stages.write_ns)
@@ -229,7 +236,7 @@ fn motor_rows(model: &Model) -> Vec<Row> {
         let state = if tick.state.motor_enabled[joint] { "on" } else { "off" };
         let limited = if tick.limited & (1 << joint) != 0 { " limited" } else { "" };
         let (q, torque) = (tick.state.joint_position[joint], tick.state.joint_torque[joint]);
-        let text = format!("{temperature:3.0} C{q:+7.2} rad{torque:+6.1} Nm {state}{limited}");
+        let text = format!("{temperature:3.0} C {state:<3}{q:+6.2} rad{torque:+6.1} Nm{limited}");
         rows.push((joint_name(joint), text, temperature >= 60.0));
     }
     rows

@@ -19,8 +19,9 @@ use ratatui::text::{Line, Span};
 
 use super::chart::{Chart, Ghost, TimeAxis, draw_phases, phases};
 use super::{heading, objective, proposal, span, trials, wireframe};
+use crate::comparison::{Comparison, impulse_start_ns};
 use crate::history::History;
-use crate::model::{Comparison, Model, Panel, impulse_start_ns};
+use crate::model::{Model, Panel};
 use crate::settings::ChartMode;
 use crate::theme::Role;
 

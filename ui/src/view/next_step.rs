@@ -74,7 +74,18 @@ fn live(model: &Model) -> NextStep {
         Mode::Disarmed if stage == Some(Stage::Finished) => step(
             "The study is finished.",
             model,
-            &[(Action::Continue, "more trials"), (Action::Undo, "undo"), (Action::TrialsView, "table"), quit],
+            &[
+                (Action::Continue, "more trials"),
+                (Action::ConfirmBest, "confirm best"),
+                (Action::ExportBest, "export"),
+                (Action::Undo, "undo"),
+                quit,
+            ],
+        ),
+        Mode::Disarmed if model.pre_arm.is_empty() => step(
+            "Checking the robot.",
+            model,
+            &[(Action::Override, "override"), (Action::Undo, "undo"), (Action::Help, "help"), quit],
         ),
         Mode::Disarmed if model.pre_arm_failing().count() > 0 => step(
             format!(
@@ -95,9 +106,10 @@ fn live(model: &Model) -> NextStep {
             model,
             &[
                 (Action::Continue, "more trials"),
+                (Action::ConfirmBest, "confirm best"),
+                (Action::ExportBest, "export"),
                 (Action::SitDown, "sit down"),
                 (Action::Undo, "undo"),
-                (Action::TrialsView, "table"),
             ],
         ),
         Mode::Ready if model.proposal_on_table().is_some() => step(

@@ -41,6 +41,9 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     if plot.height < 2 || plot.width <= SCALE {
         return;
     }
+    if model.trials.is_empty() {
+        return;
+    }
     let values = || model.trials.values().filter_map(|trial| trial.value);
     let low = values().fold(0.0, f64::min);
     let high = values().fold(0.0, f64::max).max(low + 1e-3);

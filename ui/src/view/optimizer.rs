@@ -22,7 +22,7 @@ use crate::theme::Role;
 
 /// Draws the view.
 pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
-    let repeated = points::lines(model);
+    let repeated = points::lines(model, usize::from(area.width));
     // Repeats have rows of their own where there are any to spare.
     let repeat_rows = if repeated.is_empty() || area.height < 30 { 0 } else { repeated.len().min(5) as u16 + 1 };
     let [upper, repeats, scatters, why] = Layout::vertical([
@@ -80,7 +80,10 @@ fn render_scatter(frame: &mut Frame, area: Rect, model: &Model, index: usize) {
         }
     }
     let best = model.best().map(|trial| trial.trial);
-    for trial in model.trials.values().filter(|trial| trial.verdict != Some(Verdict::Void)) {
+    // The best last: its repeats lie at the same place.
+    let mut trials: Vec<_> = model.trials.values().filter(|trial| trial.verdict != Some(Verdict::Void)).collect();
+    trials.sort_by_key(|trial| best == Some(trial.trial));
+    for trial in trials {
         let Some((_, value)) = trial.parameters.iter().find(|(name, _)| *name == info.name) else { continue };
         let Some(objective) = trial.value else { continue };
         let (mark, role) = sign(trial.verdict);
@@ -126,12 +129,14 @@ fn render_landings(frame: &mut Frame, area: Rect, model: &Model) {
     let (x, y) = place(0.0, 0.0);
     buffer.set_string(x, y, "+", theme.style(Role::Quiet));
     let best = model.best().map(|trial| trial.trial);
-    for (trial, m) in landed() {
+    let mut marks: Vec<_> = landed().collect();
+    marks.sort_by_key(|(trial, _)| best == Some(trial.trial));
+    for (trial, m) in marks {
         let (mark, role) = sign(trial.verdict);
         let mark = if best == Some(trial.trial) { "*" } else { mark };
         let (x, y) = place(m.dx_m, m.dy_m);
         buffer.set_string(x, y, mark, theme.style(role));
     }
-    let text = format!("{} m", number(reach));
+    let text = if landed().next().is_none() { "none yet".to_owned() } else { format!("farthest {} m", number(reach)) };
     buffer.set_string(body.x, body.y, text, theme.style(Role::Quiet));
 }

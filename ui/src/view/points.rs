@@ -12,14 +12,14 @@ use super::{number, span};
 use crate::model::Model;
 use crate::theme::Role;
 
-/// A line for each repeated point, best mean first.
-pub fn lines(model: &Model) -> Vec<Line<'static>> {
+/// A line for each repeated point, best mean first; narrow ones leave words out.
+pub fn lines(model: &Model, width: usize) -> Vec<Line<'static>> {
     let mut points: Vec<&PointRecord> = model.points.iter().filter(|point| !point.trials.is_empty()).collect();
     points.sort_by(|a, b| b.mean.total_cmp(&a.mean));
-    points.into_iter().map(|point| line(model, point)).collect()
+    points.into_iter().map(|point| line(model, point, width)).collect()
 }
 
-fn line(model: &Model, point: &PointRecord) -> Line<'static> {
+fn line(model: &Model, point: &PointRecord, width: usize) -> Line<'static> {
     let theme = &model.theme;
     let first = point.trials.first().copied().unwrap_or(0);
     let spread = point.deviation.map_or(String::new(), |sd| format!(" {}{}", theme.plus_minus(), number(sd)));
@@ -30,8 +30,9 @@ fn line(model: &Model, point: &PointRecord) -> Line<'static> {
         span(theme, Role::Quiet, spread),
     ];
     if let Some(confidence) = point.confidence {
-        spans.push(span(theme, Role::Good, format!("  leads, {:.0} %", confidence * 100.0)));
-    } else if point.contender {
+        let leads = if width < 40 { " " } else { "  leads, " };
+        spans.push(span(theme, Role::Good, format!("{leads}{:.0} %", confidence * 100.0)));
+    } else if point.contender && width >= 40 {
         spans.push(span(theme, Role::Quiet, "  contends"));
     }
     Line::from(spans)

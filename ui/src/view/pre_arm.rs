@@ -34,20 +34,25 @@ pub fn lines(model: &Model, width: usize, few: usize, chosen: Option<OperatorChe
         items.sort_by_key(|item| item.state.allows());
         items.truncate(few);
     }
+    // Half of a narrow terminal has room for what was found alone.
+    let name_width = if width < 60 { 1 } else { 27 };
     let line = |item: &PreArmCheck| {
         let (word, role) = mark(item.state);
         let selected = chosen.is_some_and(|check| check.check() == item.check);
+        let name = item.check.name();
+        let gap = name_width.max(name.chars().count() + 1) - name.chars().count();
         let text = match (item.found.as_str(), item.needed.as_str()) {
-            (found, "") => found.to_owned(),
-            ("", needed) => needed.to_owned(),
+            (found, needed) if item.state == CheckState::NotNeeded || width < 60 || needed.is_empty() => {
+                if found.is_empty() { needed.to_owned() } else { found.to_owned() }
+            }
             (found, needed) => format!("{found:<20} {needed}"),
         };
-        let text = cut(&text, width.saturating_sub(32));
+        let text = cut(&text, width.saturating_sub(6 + name.chars().count() + gap));
         Line::from(vec![
             Span::raw(if selected { ">" } else { " " }),
             span(theme, role, format!("{word:<5}")),
-            span(theme, if selected { Role::Selected } else { Role::Text }, item.check.name()),
-            Span::raw(" ".repeat(27_usize.saturating_sub(item.check.name().chars().count()))),
+            span(theme, if selected { Role::Selected } else { Role::Text }, name),
+            Span::raw(" ".repeat(gap)),
             span(theme, Role::Quiet, text),
         ])
     };

@@ -66,7 +66,7 @@ fn content(model: &Model, width: usize) -> (String, Vec<Line<'static>>) {
             lines.push(risk(model, proposal.risk));
             if let Some(left) = model.search.as_ref().and_then(|search| search.confirming) {
                 lines.push(Line::from(span(&model.theme, Role::Warning, format!(" confirming the best: {left} left"))));
-                lines.extend(points::lines(model));
+                lines.extend(points::lines(model, width));
             }
             (title, lines)
         }
@@ -187,13 +187,13 @@ fn finished(model: &Model, width: usize) -> Vec<Line<'static>> {
         vec![
             Span::raw(" "),
             span(theme, Role::Key, model.keymap.key(action)),
-            span(theme, Role::Quiet, format!(" {text}")),
+            span(theme, Role::Quiet, format!(" {text} ")),
         ]
     };
-    let mut last = deed(Action::Continue, "more trials");
+    let mut last = deed(Action::Continue, "more");
     last.extend(deed(Action::ConfirmBest, "confirm"));
     last.extend(deed(Action::ExportBest, "export"));
     lines.push(Line::from(last));
-    lines.extend(points::lines(model));
+    lines.extend(points::lines(model, width));
     lines
 }

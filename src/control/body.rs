@@ -1,0 +1,105 @@
+//! The control thread's body: inputs from the channels, one tick, and what it gave to the channels. Called once a millisecond
+//! by the engine's thread, and by a test or a bench as they like; nothing here allocates, locks or waits.
+
+use super::cycle::{Cycle, Inputs};
+use super::settings::{PERIOD_S, Settings};
+use crate::realtime::channel::{ControlEnd, SHOWN_EVERY};
+use crate::realtime::clock::Clock;
+use crate::realtime::command::Command;
+use crate::realtime::telemetry::{Counters, Event, Mode, Snapshot, Tick};
+use crate::realtime::thread::Instant;
+use crate::robot::Robot;
+
+/// The session is told the counters, and what speaks against arming, ten times a second and with every event.
+const COUNTERS_EVERY: u64 = 100;
+
+/// A control cycle at its ends of the channels.
+pub struct Body {
+    cycle: Cycle,
+    end: ControlEnd,
+    counters: Counters,
+    beats: Beats,
+    events_lost: bool,
+    /// Time of the clock at which the pace began, ns.
+    start_ns: u64,
+}
+
+impl Body {
+    /// A body whose instants count from `start_ns`.
+    pub fn new(settings: &Settings, end: ControlEnd, start_ns: u64) -> Body {
+        Body {
+            cycle: Cycle::new(settings),
+            end,
+            counters: Counters::default(),
+            beats: Beats::default(),
+            events_lost: false,
+            start_ns,
+        }
+    }
+
+    /// One tick.
+    pub fn tick<C: Clock, R: Robot + ?Sized>(&mut self, instant: Instant, clock: &C, robot: &mut R) -> &Tick {
+        let Body { cycle, end, counters, .. } = self;
+        // A session that broke down takes no more events, though there is room for some.
+        self.events_lost |= end.events.is_abandoned();
+        let command = end.commands.pop().ok();
+        if let Some(Command::Acknowledge { stops }) = command
+            && matches!(cycle.mode(), Mode::Damped | Mode::Fault)
+        {
+            end.stop.acknowledge(stops);
+        }
+        let time_ns = self.start_ns + instant.planned_ns;
+        let inputs = Inputs {
+            time_ns,
+            lateness_ns: instant.lateness_ns,
+            stop: end.stop.is_set(),
+            operator_silent_ms: self.beats.silent_ms(end.heartbeat.count(), time_ns),
+            command,
+            events_lost: self.events_lost,
+        };
+        let tick = *cycle.tick(&inputs, clock, robot);
+
+        counters.late_ticks += u64::from(instant.lateness_ns as f64 > PERIOD_S * 1e9 / 2.0);
+        counters.worst_lateness_ns = counters.worst_lateness_ns.max(instant.lateness_ns);
+        counters.state_age_ms = cycle.state_age_ms();
+        counters.link = robot.link();
+        counters.ticks_not_recorded += u64::from(end.ticks.push(tick).is_err());
+        if tick.number.is_multiple_of(SHOWN_EVERY) {
+            counters.ticks_not_shown += u64::from(end.shown.push(tick).is_err());
+        }
+        let told = cycle.events().iter().next().is_some();
+        if told || tick.number.is_multiple_of(COUNTERS_EVERY) {
+            // Before the events: who hears that the robot is disarmed also knows what speaks against arming it.
+            end.counters.write(*counters);
+            end.readiness.write(cycle.readiness());
+        }
+        for event in cycle.events().iter() {
+            counters.commands_refused += u64::from(matches!(event, Event::Refused { .. }));
+            self.events_lost |= end.events.push(event).is_err();
+        }
+        end.snapshot.write(Snapshot { tick, counters: *counters });
+        cycle.last()
+    }
+
+    /// The mode in which the last tick ended.
+    pub fn mode(&self) -> Mode {
+        self.cycle.mode()
+    }
+}
+
+/// How long the screen has been silent. A screen that was never heard is as silent as one that is gone.
+#[derive(Default)]
+struct Beats {
+    count: u64,
+    heard_ns: u64,
+}
+
+impl Beats {
+    fn silent_ms(&mut self, count: u64, now_ns: u64) -> u32 {
+        if count != self.count {
+            self.count = count;
+            self.heard_ns = now_ns;
+        }
+        u32::try_from(now_ns.saturating_sub(self.heard_ns) / 1_000_000).unwrap_or(u32::MAX)
+    }
+}

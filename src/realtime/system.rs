@@ -1,0 +1,98 @@
+//! What this machine can do for a control thread: what `quadfrog doctor` explains and `scheduling` asks before it acts.
+
+use std::fs::read_to_string;
+
+use nix::sys::resource::{RLIM_INFINITY, Resource, getrlimit};
+
+/// Whether the kernel is built for real time (PREEMPT_RT): it says so itself.
+pub fn kernel_is_realtime() -> bool {
+    read_to_string("/sys/kernel/realtime").is_ok_and(|text| text.trim() == "1") || kernel_build().contains("PREEMPT_RT")
+}
+
+/// The kernel's release, for example `6.12.0-rt`.
+pub fn kernel_release() -> String {
+    read_to_string("/proc/sys/kernel/osrelease").unwrap_or_default().trim().to_owned()
+}
+
+/// How the kernel was built, for example `#1 SMP PREEMPT_DYNAMIC`.
+pub fn kernel_build() -> String {
+    read_to_string("/proc/sys/kernel/version").unwrap_or_default().trim().to_owned()
+}
+
+/// The highest real-time priority that this process may take; 99 with the capability CAP_SYS_NICE.
+pub fn priority_limit() -> u64 {
+    if has_capability(23) {
+        return 99;
+    }
+    getrlimit(Resource::RLIMIT_RTPRIO).map_or(0, |(soft, _)| soft.min(99))
+}
+
+/// How many bytes this process may lock; none without a limit, as with the capability CAP_IPC_LOCK.
+pub fn memlock_limit() -> Option<u64> {
+    if has_capability(14) {
+        return None;
+    }
+    let soft = getrlimit(Resource::RLIMIT_MEMLOCK).map_or(0, |(soft, _)| soft);
+    (soft != RLIM_INFINITY).then_some(soft)
+}
+
+/// Cores that the kernel keeps ordinary threads away from (boot parameter `isolcpus`).
+pub fn isolated_cores() -> Vec<usize> {
+    cores(&read_to_string("/sys/devices/system/cpu/isolated").unwrap_or_default())
+}
+
+/// The frequency governors in use, each named once; empty where the system does not say (a virtual machine).
+pub fn governors() -> Vec<String> {
+    let mut found = Vec::new();
+    let count = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+    for core in 0..count {
+        let path = format!("/sys/devices/system/cpu/cpu{core}/cpufreq/scaling_governor");
+        if let Ok(governor) = read_to_string(path) {
+            let governor = governor.trim().to_owned();
+            if !found.contains(&governor) {
+                found.push(governor);
+            }
+        }
+    }
+    found
+}
+
+/// Resolution of the clock that the control thread sleeps by, ns.
+///
+/// # Errors
+/// When the system does not say.
+pub fn timer_resolution_ns() -> Result<u64, nix::Error> {
+    let resolution = nix::time::clock_getres(nix::time::ClockId::CLOCK_MONOTONIC)?;
+    Ok(resolution.tv_sec() as u64 * 1_000_000_000 + resolution.tv_nsec() as u64)
+}
+
+/// Whether this process has capability number `bit` in effect (Linux, include/uapi/linux/capability.h).
+fn has_capability(bit: u32) -> bool {
+    let status = read_to_string("/proc/self/status").unwrap_or_default();
+    let effective = status.lines().find_map(|line| line.strip_prefix("CapEff:"));
+    effective.and_then(|hex| u64::from_str_radix(hex.trim(), 16).ok()).is_some_and(|set| set & (1 << bit) != 0)
+}
+
+/// A list of cores as the kernel writes it: `0,2-4`.
+fn cores(list: &str) -> Vec<usize> {
+    let mut found = Vec::new();
+    for part in list.trim().split(',').filter(|part| !part.is_empty()) {
+        let (first, last) = part.split_once('-').unwrap_or((part, part));
+        if let (Ok(first), Ok(last)) = (first.parse::<usize>(), last.parse::<usize>()) {
+            found.extend(first..=last);
+        }
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lists_of_cores_are_read_as_the_kernel_writes_them() {
+        assert!(cores("\n").is_empty());
+        assert_eq!(cores("3\n"), [3]);
+        assert_eq!(cores("0,2-4,7\n"), [0, 2, 3, 4, 7]);
+    }
+}

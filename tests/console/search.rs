@@ -1,0 +1,464 @@
+//! What the operator sees and changes of the search and of the machine's fitness: view Override, why a point was proposed,
+//! repeats, a finished study, the pre-arm list, the link.
+
+mod support;
+
+use quadfrog::config::Config;
+use quadfrog::realtime::command::Task;
+use quadfrog::realtime::pre_arm::{Check, CheckState};
+use quadfrog::realtime::telemetry::{Counters, Mode, Snapshot};
+use quadfrog::recording::record::{
+    Fixed, Insight, ParameterInsight, PointRecord, PreArmCheck, Record, Search, SearchedParameter, SessionInfo, Stage,
+    TrialRecord, Verdict,
+};
+use quadfrog::recording::recorder::RecorderStatus;
+use quadfrog::robot::{Battery, LinkStatus};
+use quadfrog::session::intent::{Intent, OperatorCheck};
+use quadfrog_console::dialog::Dialog;
+use quadfrog_console::export;
+use quadfrog_console::model::View;
+use quadfrog_console::update::{Effect, Msg};
+use support::{Console, session, tick, trial};
+
+fn wishes(effects: &[Effect]) -> Vec<Intent> {
+    let wish = |effect: &Effect| match effect {
+        Effect::Wish(intent) => Some(intent.clone()),
+        _ => None,
+    };
+    effects.iter().filter_map(wish).collect()
+}
+
+fn line_with(screen: &str, text: &str) -> String {
+    screen.lines().find(|line| line.contains(text)).unwrap_or_else(|| panic!("no {text} in\n{screen}")).to_owned()
+}
+
+/// What is searched: Fx as given, the others as the session began.
+fn search(fx: (f64, f64), fixed: Option<Fixed>) -> Search {
+    let parameter = |name: &str, (low, high), (least, most), fixed| SearchedParameter {
+        name: name.into(),
+        low,
+        high,
+        least,
+        most,
+        fixed,
+    };
+    Search {
+        budget: 20,
+        counted: 0,
+        parameters: vec![
+            parameter("f0", (0.75, 1.75), (0.5, 3.0), None),
+            parameter("Fx", fx, (0.0, 200.0), fixed),
+            parameter("Fz", (150.0, 350.0), (0.0, 400.0), None),
+        ],
+        confirming: None,
+    }
+}
+
+/// View Override with a proposal on the table and Fx chosen.
+fn overriding() -> Console {
+    let mut console = Console::proposed();
+    console.record(Record::Search(search((0.0, 150.0), None)));
+    console.press(&["4", "Down"]);
+    console
+}
+
+#[test]
+fn gains_are_set_within_their_own_safe_ranges() {
+    let mut console = overriding();
+    let screen = console.screen(80, 24);
+    for part in ["Gains of the controller", "kp        400.0 N/m", "k_att     200.0 N/m", "600.0"] {
+        assert!(screen.contains(part), "no {part}:\n{screen}");
+    }
+    // From f0 down to kp, past the three parameters.
+    let sent = console.press(&["Up", "o", "Down", "Down", "Down", "5", "0", "0", "Enter"]);
+    assert_eq!(wishes(&sent), [Intent::OverrideGain { gain: "kp".into(), value: 500.0 }]);
+    console.press(&["o", "Down", "2", "0", "0", "0", "Enter"]);
+    let screen = console.screen(80, 24);
+    assert!(screen.contains("is outside"), "{screen}");
+    assert!(matches!(console.model.dialog, Some(Dialog::Override(_))), "a refusal keeps the form open");
+}
+
+#[test]
+fn a_parameter_is_fixed_for_some_trials_and_searched_again() {
+    let mut console = overriding();
+    assert!(line_with(&console.screen(80, 24), "  X  ").contains("fix Fx at 75.00 N for the next trials"));
+    assert_eq!(console.press(&["X"]), []);
+    assert!(console.screen(80, 24).contains("Fix Fx at 75.00 N for how many trials?"), "{}", console.screen(80, 24));
+    let sent = wishes(&console.press(&["Backspace", "3", "Enter"]));
+    assert_eq!(sent, [Intent::Fix { parameter: "Fx".into(), value: 75.0, trials: 3 }]);
+    console.record(Record::Search(search((0.0, 150.0), Some(Fixed { value: 75.0, trials: 3 }))));
+    let screen = console.screen(80, 24);
+    assert!(line_with(&screen, "Fx  ").contains("fixed at 75.00, 3 more"), "{screen}");
+    assert!(line_with(&screen, "  X  ").contains("search Fx again"), "{screen}");
+    assert_eq!(wishes(&console.press(&["X"])), [Intent::Unfix { parameter: "Fx".into() }]);
+    for wrong in ["0", "-1", "many"] {
+        let mut console = overriding();
+        console.press(&["X", "Backspace"]);
+        for c in wrong.chars() {
+            console.press(&[&c.to_string()]);
+        }
+        assert_eq!(console.press(&["Enter"]), [], "{wrong}");
+        assert!(console.screen(80, 24).contains("is not a number of trials"), "{wrong}");
+    }
+}
+
+#[test]
+fn bounds_are_checked_and_each_refusal_is_explained() {
+    let typed = |text: &str| {
+        let mut console = overriding();
+        console.press(&["B", "Ctrl-U"]);
+        for c in text.chars() {
+            console.press(&[&c.to_string()]);
+        }
+        let sent = wishes(&console.press(&["Enter"]));
+        (sent, console.screen(80, 24))
+    };
+    let (sent, _) = typed("50..120.5");
+    assert_eq!(sent, [Intent::NarrowBounds { parameter: "Fx".into(), low: 50.0, high: 120.5 }]);
+    for (text, reason) in [
+        ("120..50", "120 is not below 50"),
+        ("50", "is no range; write it as 50..120"),
+        ("50..fast", "is no range"),
+        ("50..220", "Fx may be searched from 0 to 200 N (safety.toml)"),
+    ] {
+        let (sent, screen) = typed(text);
+        assert_eq!(sent, [], "{text}");
+        assert!(screen.contains(reason), "{text}: no {reason}:\n{screen}");
+    }
+    let mut console = overriding();
+    console.record(Record::Search(search((50.0, 120.0), None)));
+    let screen = console.screen(80, 24);
+    assert!(line_with(&screen, "Fx  ").contains("began 0.000..150.0"), "{screen}");
+}
+
+#[test]
+fn an_override_outside_narrowed_bounds_is_refused_with_the_present_ones() {
+    let mut console = overriding();
+    console.record(Record::Search(search((50.0, 120.0), None)));
+    assert_eq!(console.press(&["o", "1", "3", "0", "Enter"]), []);
+    assert!(console.screen(80, 24).contains("Fx = 130 N is outside 50 to 120 N"), "{}", console.screen(80, 24));
+}
+
+#[test]
+fn the_point_on_the_card_or_in_the_form_can_be_queued() {
+    let point = |fx: f64| Intent::Enqueue(vec![("f0".into(), 1.25), ("Fx".into(), fx), ("Fz".into(), 250.0)]);
+    let mut console = overriding();
+    assert_eq!(wishes(&console.press(&["Q"])), [point(75.0)]);
+    let sent = wishes(&console.press(&["o", "1", "0", "0", "Q"]));
+    assert_eq!(sent, [point(100.0)], "as typed; the card stays as it is");
+    assert!(console.model.dialog.is_none());
+}
+
+#[test]
+fn the_search_cannot_be_changed_while_a_trial_is_under_way() {
+    for stage in [Stage::Running, Stage::Review] {
+        let mut console = overriding();
+        console.stage(stage, 0);
+        for key in ["X", "B", "Q", "K"] {
+            assert_eq!(console.press(&[key]), [], "{key} in {stage:?}");
+            assert!(console.model.dialog.is_none(), "{key} in {stage:?}");
+            assert!(!console.said().is_empty(), "{key} in {stage:?} says why");
+        }
+    }
+    // Gains are not searched.
+    let mut console = overriding();
+    console.press(&["End", "X"]);
+    assert_eq!(console.said(), "fix: gains are not searched");
+    console.press(&["1", "B"]);
+    assert_eq!(console.said(), "bounds: only in the view Override");
+}
+
+fn insight() -> Insight {
+    let at: Vec<f64> = (0..=40).map(|i| 0.75 + f64::from(i) / 40.0).collect();
+    let bump = |middle: f64| at.iter().map(|x| (-((x - middle) / 0.1).powi(2)).exp()).collect::<Vec<f64>>();
+    Insight {
+        trial: 12,
+        parameters: vec![ParameterInsight {
+            name: "f0".into(),
+            proposed: 1.0,
+            importance: Some(0.62),
+            good: bump(1.0),
+            bad: bump(1.5),
+            at,
+        }],
+    }
+}
+
+#[test]
+fn densities_say_why_a_point_was_proposed_without_colours_too() {
+    for (columns, rows) in [(80, 24), (120, 40), (200, 60)] {
+        let mut console = Console::proposed();
+        console.record(Record::Insight(insight()));
+        console.press(&["3"]);
+        let screen = console.screen(columns, rows);
+        let why = line_with(&screen, "Why f0");
+        assert_eq!(why.contains("(#12)"), columns > 80, "{why}");
+        assert!(why.contains("matters 62 %"), "{why}");
+        assert!(line_with(&screen, "Why Fx").contains("Why Fz"));
+        // Peak and proposal of l are at a quarter of the panel, g's peak at three quarters.
+        let width = why.find("Why Fx").map(|_| usize::from(columns) / 3).expect("three panels");
+        let letter = |letter: &str| {
+            let at = screen.lines().skip_while(|line| !line.contains("Why f0")).skip(1);
+            at.filter_map(|line| line.chars().take(width).position(|c| c.to_string() == letter)).next()
+        };
+        let g = letter("g").expect("g");
+        assert!(g > width / 2 && g < width, "{g} of {width}:\n{screen}");
+        assert!(letter("│").expect("the proposal") < width / 2, "{screen}");
+    }
+}
+
+#[test]
+fn before_the_first_trials_both_densities_are_the_prior() {
+    let mut console = Console::proposed();
+    let mut insight = insight();
+    insight.parameters[0].bad = insight.parameters[0].good.clone();
+    insight.parameters[0].importance = None;
+    console.record(Record::Insight(insight));
+    console.press(&["3"]);
+    let screen = console.screen(120, 40);
+    assert!(screen.contains("l = g") && !screen.contains("matters"), "{screen}");
+}
+
+/// A finished study of four trials; trial 2 is the best.
+fn finished() -> Console {
+    let mut console = Console::ready();
+    console.record(Record::Session(SessionInfo { budget: 4, ..session() }));
+    for (number, value) in [(0, 0.3), (1, 0.2), (2, 0.61), (3, 0.4)] {
+        let row = TrialRecord {
+            value: Some(value),
+            gains: vec![("kp".into(), 450.0), ("kd".into(), 8.0)],
+            ..trial(number, Some(Verdict::Accept), None)
+        };
+        console.record(Record::Trial(row));
+    }
+    console.stage(Stage::Finished, 3);
+    console
+}
+
+#[test]
+fn a_finished_study_says_so_and_what_comes_next() {
+    let mut console = finished();
+    assert_eq!(console.said(), "the study is finished: the best is trial 2, J = 0.610 m");
+    let screen = console.screen(80, 24);
+    for part in ["Study finished", "best 0.610 m (#2)", "C more", "K confirm", "E export", "The study is finished."] {
+        assert!(screen.contains(part), "no {part}:\n{screen}");
+    }
+    console.press(&["C"]);
+    assert_eq!(wishes(&console.press(&["Enter"])), [Intent::Continue(20)]);
+    console.press(&["K"]);
+    assert!(console.screen(80, 24).contains("How many repeats at most"));
+    assert_eq!(wishes(&console.press(&["Enter"])), [Intent::ConfirmBest { repeats: 10 }]);
+    console.record(Record::Search(Search { confirming: Some(7), ..search((0.0, 150.0), None) }));
+    assert_eq!(wishes(&console.press(&["K"])), [Intent::ConfirmBest { repeats: 0 }], "the same key ends it");
+    assert_eq!(console.press(&["E"]), [Effect::ExportBest]);
+}
+
+#[test]
+fn repeats_are_shown_as_k_of_n_with_their_spread() {
+    let mut console = finished();
+    let point = |trials: Vec<u32>, stood, mean, deviation, confidence| PointRecord {
+        parameters: vec![("f0".into(), 1.25)],
+        trials,
+        stood,
+        mean,
+        deviation,
+        contender: true,
+        confidence,
+    };
+    console.record(Record::Points(vec![
+        point(vec![0, 5, 6], 2, 0.41, Some(0.05), None),
+        point(vec![2, 4], 2, 0.6, Some(0.012), Some(0.96)),
+    ]));
+    let screen = console.screen(80, 24);
+    assert!(
+        screen.contains("#2   2/2  0.600 m ±0.012 96 %") && screen.contains("#0   2/3  0.410 m ±0.050"),
+        "{screen}"
+    );
+    console.press(&["3"]);
+    let screen = console.screen(120, 40);
+    assert!(screen.contains("2/2  0.600 m ±0.012  leads, 96 %"), "{screen}");
+    console.press(&["2", "/", "2", "Enter", "Enter"]);
+    let screen = console.screen(80, 24);
+    assert!(line_with(&screen, "repeats").contains("2/2 stood, 0.6000 ± 0.0120 m (#2 #4)"), "{screen}");
+}
+
+#[test]
+fn the_best_is_written_as_a_configuration_that_the_program_takes() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let study = folder.path().join("study.log");
+    let mut console = finished();
+    console.record(Record::Session(SessionInfo { study: study.display().to_string(), ..session() }));
+    let best = export::best(&console.model).expect("written");
+    assert_eq!(best, folder.path().join("best-trial-2"));
+    let config = Config::load(Some(&best)).expect("a configuration");
+    let first: Vec<(String, f64)> = vec![("f0".into(), 1.25), ("Fx".into(), 75.0), ("Fz".into(), 250.0)];
+    assert_eq!(config.first(Task::Forward), first, "the point that a study begins with");
+    let gains = config.task(Task::Forward);
+    assert_eq!((gains.kp, gains.kd), (450.0, 8.0));
+    assert!(export::best(&console.model).expect_err("once").to_string().contains("best-trial-2"), "nothing is lost");
+    let table = export::table(&console.model).expect("written");
+    assert_eq!(std::fs::read_to_string(table).expect("the table").lines().count(), 5);
+    // A folder that cannot be written is named.
+    console.record(Record::Session(SessionInfo { study: "/proc/study.log".into(), ..session() }));
+    let error = export::best(&console.model).expect_err("no such place").to_string();
+    assert!(error.contains("/proc/best-trial-2"), "{error}");
+}
+
+/// A Go1 that lies disarmed with this pre-arm list.
+fn on_hardware(list: Vec<PreArmCheck>) -> Console {
+    let mut console = Console::proposed();
+    console.record(Record::Session(SessionInfo { backend: "go1".into(), ..session() }));
+    console.record(Record::PreArm(list));
+    console
+}
+
+fn item(check: Check, state: CheckState, found: &str, needed: &str) -> PreArmCheck {
+    PreArmCheck { check, state, found: found.into(), needed: needed.into() }
+}
+
+#[test]
+fn arming_shows_every_check_that_fails_and_takes_the_operators_word() {
+    let mut console = on_hardware(vec![
+        item(Check::StateFresh, CheckState::Passed, "2 ms", "at most 10 ms"),
+        item(Check::Battery, CheckState::Failed, "21 %", "at least 30 %"),
+        item(Check::MotorsCool, CheckState::Failed, "FR_calf 64 C", "below 60 C"),
+        item(Check::AreaClear, CheckState::Waiting, "", "your word"),
+    ]);
+    assert_eq!(console.next_step(), "Not ready to arm: 3 checks. P shows them.");
+    let mut resumed = on_hardware(vec![item(Check::StateFresh, CheckState::Passed, "2 ms", "at most 10 ms")]);
+    resumed.tell(Msg::Resumed);
+    assert_eq!(resumed.next_step(), "Checking the robot.");
+    assert_eq!(resumed.press(&["A"]), [], "what was checked before the program was stopped is old");
+    assert_eq!(console.press(&["A"]), [], "nothing is armed");
+    let screen = console.screen(80, 24);
+    for part in [
+        "3 of 4 not yet",
+        "FAIL battery",
+        "21 %",
+        "at least 30 %",
+        "FAIL motors cool",
+        "you  area clear",
+        "ok   state fresh",
+    ] {
+        assert!(screen.contains(part), "no {part}:\n{screen}");
+    }
+    assert!(console.said().contains("3 checks of the pre-arm list do not hold"), "{}", console.said());
+    // The operator's own items, in their order.
+    let mut sent = Vec::new();
+    for _ in OperatorCheck::ALL {
+        sent.extend(wishes(&console.press(&["x", "Down"])));
+    }
+    assert_eq!(sent, OperatorCheck::ALL.map(Intent::Confirm));
+    console.press(&["Esc", "5"]);
+    assert!(console.screen(120, 40).contains("3 of 4 not yet (P)"));
+}
+
+#[test]
+fn a_machine_that_can_hurt_somebody_is_armed_by_a_word() {
+    let all_well = vec![item(Check::StateFresh, CheckState::Passed, "2 ms", "at most 10 ms")];
+    let mut console = on_hardware(all_well.clone());
+    assert_eq!(console.press(&["A"]), []);
+    assert!(console.next_step().contains("Type stand to stand the robot up"), "{}", console.next_step());
+    assert_eq!(console.press(&["s", "t", "a", "n"]), []);
+    assert_eq!(wishes(&console.press(&["d"])), [Intent::Arm]);
+    for keys in [&["Enter"][..], &["s", "t", "e"], &["s", "s"], &["A"], &["y"]] {
+        let mut console = on_hardware(all_well.clone());
+        console.press(&["A"]);
+        assert_eq!(wishes(&console.press(keys)), [], "{keys:?}");
+        assert!(console.model.dialog.is_none(), "{keys:?} cancels");
+    }
+    // A check that fails while the word is being typed ends it.
+    let mut console = on_hardware(all_well);
+    console.press(&["A", "s", "t", "a", "n"]);
+    console.record(Record::PreArm(vec![item(Check::Battery, CheckState::Failed, "20 %", "at least 30 %")]));
+    assert_eq!(wishes(&console.press(&["d"])), []);
+}
+
+#[test]
+fn the_frame_says_how_link_battery_and_the_hottest_motor_are_at_every_size() {
+    let mut console = on_hardware(Vec::new());
+    let mut newest = tick(5_000, 0.0, None);
+    newest.state.motor_temperature_c[5] = 63.0;
+    let battery = Battery { charge_percent: 87.0, voltage_v: 24.1, current_a: -2.0, cell_v: [3.4; 10] };
+    newest.state.battery = Some(battery);
+    let link = LinkStatus {
+        state_age_ms: 3,
+        rate_hz: 998,
+        recent_received: 4_900,
+        recent_lost: 100,
+        lost: 123,
+        corrupt: 4,
+        reboots: 1,
+        ..LinkStatus::default()
+    };
+    let counters = Counters { link: Some(link), ..Counters::default() };
+    console.tell(Msg::Snapshot(Box::new(Snapshot { tick: newest, counters })));
+    for (columns, rows) in [(80, 24), (120, 40), (200, 60)] {
+        for view in View::ALL {
+            console.model.view = view;
+            let screen = console.screen(columns, rows);
+            let second = screen.lines().nth(1).unwrap_or_default();
+            for part in ["link 3 ms, 2.0 % lost", "63 C", "87 %"] {
+                assert!(second.contains(part), "no {part} at {columns}x{rows}: {second}");
+            }
+        }
+    }
+    console.model.view = View::Health;
+    let screen = console.screen(120, 40);
+    for part in ["998 Hz, newest 3 ms old", "2.00 % of 5 s, 123 in all", "4 corrupt", "restarts     1 !"] {
+        assert!(screen.contains(part), "no {part}:\n{screen}");
+    }
+    let motor = screen.lines().skip(3).find(|line| line.contains("FL_calf")).expect("the motor").to_owned();
+    assert!(motor.contains("63 C") && motor.contains('!'), "{motor}");
+    // Too small for anything else, the link is still there.
+    assert!(console.screen(40, 10).contains("link 3 ms, 2.0 % lost"));
+}
+
+#[test]
+fn a_simulator_has_no_link_and_says_so() {
+    let mut console = Console::proposed();
+    for view in ["1", "5"] {
+        console.press(&[view]);
+        assert!(console.screen(80, 24).lines().nth(1).is_some_and(|line| line.contains("link none: SIM")));
+    }
+    assert!(console.screen(80, 24).contains("SIM: no link"), "{}", console.screen(80, 24));
+}
+
+#[test]
+fn health_says_what_the_recorder_writes_and_why_it_stopped() {
+    let mut console = Console::proposed();
+    console.press(&["5"]);
+    let mut newest = tick(10_000, 0.0, None);
+    newest.mode = Mode::Disarmed;
+    let counters = Counters { ticks_not_recorded: 12, ..Counters::default() };
+    console.tell(Msg::Snapshot(Box::new(Snapshot { tick: newest, counters })));
+    console.tell(Msg::Recorder(RecorderStatus { bytes: 4_000_000, ticks: 10_000, ..RecorderStatus::default() }));
+    console.record(Record::PreArm(vec![item(Check::Disk, CheckState::Failed, "812 MB", "at least 1000 MB")]));
+    let screen = console.screen(120, 40);
+    for part in ["4.0 MB, 400 kB/s, 10000 ticks", "812 MB !", "12 ticks !"] {
+        assert!(screen.contains(part), "no {part}:\n{screen}");
+    }
+    let error = Some("no space left on device".to_owned());
+    console.tell(Msg::Recorder(RecorderStatus { error, ..RecorderStatus::default() }));
+    assert!(console.screen(120, 40).contains("no space left on device !"));
+}
+
+#[test]
+fn details_that_do_not_fit_are_reached_with_the_paging_keys() {
+    let mut console = finished();
+    let row = TrialRecord {
+        note: "slid on the mat, then the cable was in the way ".repeat(6),
+        hand_value: Some(0.3),
+        ..trial(0, Some(Verdict::Accept), Some(Verdict::Fall))
+    };
+    let row = TrialRecord { gains: vec![("kp".into(), 450.0)], ..row };
+    console.record(Record::Trial(row));
+    console.press(&["2", "Home", "Enter"]);
+    let top = console.screen(80, 24);
+    assert!(top.contains("PgUp PgDn") && top.contains("verdict  "), "{top}");
+    console.press(&["PgDn"]);
+    let bottom = console.screen(80, 24);
+    assert!(bottom != top && bottom.contains("STOP") && !bottom.contains("verdict  "), "{bottom}");
+    console.press(&["PgUp"]);
+    assert_eq!(console.screen(80, 24), top);
+}

@@ -1,0 +1,302 @@
+//! Nothing in the control thread's body allocates or frees: an allocator that ends the process on the spot watches whole trials,
+//! STOP, faults, falls and every mode, with the simulator and with a robot over a link.
+#![allow(
+    unsafe_code,
+    reason = "an allocator can only be written with unsafe; this one hands everything to the system's"
+)]
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+use std::collections::BTreeSet;
+
+use quadfrog::config::{Backend, Config};
+use quadfrog::control::body::Body;
+use quadfrog::control::settings::Settings;
+use quadfrog::realtime::channel::{ControlEnd, ScreenEnd, SessionEnd, channels};
+use quadfrog::realtime::clock::MonotonicClock;
+use quadfrog::realtime::command::{Command, JumpParameters, Permit, Task, TrialSpec};
+use quadfrog::realtime::telemetry::{Event, Mode, Tick};
+use quadfrog::realtime::thread::Instant;
+use quadfrog::robot::description::RobotDescription;
+use quadfrog::robot::{Battery, JointCommand, LinkStatus, Placement, Robot, RobotError, RobotState};
+use quadfrog::sim::Simulator;
+
+thread_local! {
+    static FORBIDDEN: Cell<bool> = const { Cell::new(false) };
+}
+
+struct Forbidding;
+
+/// Ends the process: a panic would allocate its message.
+fn not_now() {
+    if FORBIDDEN.with(Cell::get) {
+        // What is said must not allocate either.
+        let _ = nix::unistd::write(std::io::stderr(), b"the tick allocated or freed memory\n");
+        std::process::abort();
+    }
+}
+
+// SAFETY: every call goes unchanged to the system's allocator; the check touches only a thread-local flag.
+unsafe impl GlobalAlloc for Forbidding {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        not_now();
+        // SAFETY: the caller's promises are passed on.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        not_now();
+        // SAFETY: the caller's promises are passed on.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static FORBIDDING: Forbidding = Forbidding;
+
+fn without_allocation<T>(act: impl FnOnce() -> T) -> T {
+    FORBIDDEN.with(|forbidden| forbidden.set(true));
+    let result = act();
+    FORBIDDEN.with(|forbidden| forbidden.set(false));
+    result
+}
+
+/// The simulator as itself, or as a robot over a link with a battery that nobody can put in place.
+struct Machine {
+    simulator: Simulator,
+    linked: bool,
+    tamper: fn(&mut RobotState),
+    silent: bool,
+    send_fails: bool,
+}
+
+impl Robot for Machine {
+    fn read(&mut self) -> Result<RobotState, RobotError> {
+        if self.silent {
+            return Err(RobotError::Silent { age_ms: 30 });
+        }
+        let mut state = self.simulator.read()?;
+        if self.linked {
+            state.truth = None;
+            state.battery = Some(Battery { charge_percent: 70.0, voltage_v: 24.0, current_a: -1.0, cell_v: [2.4; 10] });
+        }
+        (self.tamper)(&mut state);
+        Ok(state)
+    }
+    fn write(&mut self, command: &JointCommand) -> Result<(), RobotError> {
+        self.simulator.write(command)?;
+        if self.send_fails { Err(RobotError::Send { errno: 111 }) } else { Ok(()) }
+    }
+    fn place(&mut self, placement: &Placement) -> bool {
+        !self.linked && self.simulator.place(placement)
+    }
+    fn link(&self) -> Option<LinkStatus> {
+        self.linked.then(|| LinkStatus { recent_received: 5000, ..LinkStatus::default() })
+    }
+}
+
+struct Bench {
+    config: Config,
+    settings: Settings,
+    body: Body,
+    session: SessionEnd,
+    screen: ScreenEnd,
+    recorder: rtrb::Consumer<Tick>,
+    machine: Machine,
+    clock: MonotonicClock,
+    time_ms: u64,
+    mode_changes: u64,
+    seen: BTreeSet<&'static str>,
+    beats: bool,
+}
+
+impl Bench {
+    fn new(backend: Backend) -> Bench {
+        let config = Config::load(None).unwrap();
+        let description = RobotDescription::embedded("go1").unwrap();
+        let settings = config.settings(&description, Task::Forward, backend).unwrap();
+        let mut simulator = Simulator::new(&description, &config.simulator).unwrap();
+        simulator.place(&Placement { joint_position: settings.lying_position, lying: true, seed: 0 });
+        let (control, session, screen, recorder): (ControlEnd, _, _, _) = channels();
+        let linked = backend == Backend::Hardware;
+        let machine = Machine { simulator, linked, tamper: |_| {}, silent: false, send_fails: false };
+        Bench {
+            config,
+            settings,
+            body: Body::new(&settings, control, 0),
+            session,
+            screen,
+            recorder,
+            machine,
+            clock: MonotonicClock::start(),
+            time_ms: 0,
+            mode_changes: 0,
+            seen: BTreeSet::new(),
+            beats: true,
+        }
+    }
+
+    fn ticks(&mut self, count: u32) {
+        for _ in 0..count {
+            if self.beats {
+                self.screen.heartbeat.beat();
+            }
+            let instant = Instant { planned_ns: self.time_ms * 1_000_000, lateness_ns: 0 };
+            let Bench { body, machine, clock, .. } = self;
+            let mode = without_allocation(|| body.tick(instant, clock, machine).mode);
+            self.time_ms += 1;
+            self.seen.insert(mode.name());
+            while let Ok(event) = self.session.events.pop() {
+                self.mode_changes += u64::from(matches!(event, Event::Mode { .. }));
+            }
+            // Every other tick is taken: the ring runs full on the way, which must cost nothing either.
+            if self.time_ms.is_multiple_of(2) {
+                let _ = self.recorder.pop();
+            }
+        }
+    }
+
+    fn command(&mut self, command: Command) {
+        self.session.commands.push(command).unwrap();
+        self.ticks(1);
+    }
+
+    fn until(&mut self, mode: Mode) {
+        for _ in 0..20_000 {
+            if self.body.mode() == mode {
+                return;
+            }
+            self.ticks(1);
+        }
+        panic!("never {mode:?}; last {:?}", self.body.mode());
+    }
+
+    fn approve(&mut self, fx_n: f64, f0_hz: f64) {
+        let control = self.config.task(Task::Forward);
+        let spec = TrialSpec {
+            trial: 0,
+            task: Task::Forward,
+            jump: JumpParameters { f0_hz, f1_hz: 0.0, fx_n, fy_n: 0.0, fz_n: 220.0 },
+            gains: control.gains(),
+            stance_leg: control.stance_leg(),
+            vmc: true,
+            jumps: 1,
+            seed: 0,
+        };
+        let permit = Permit { mode_changes: self.mode_changes, given_ns: self.time_ms * 1_000_000 };
+        self.command(Command::RunTrial(spec, permit));
+    }
+
+    fn recover(&mut self) {
+        let stops = self.session.stop.count();
+        self.command(Command::Acknowledge { stops });
+        assert_eq!(self.body.mode(), Mode::Disarmed);
+        // A real robot is folded by hand; a simulated one is carried anyway.
+        let lying = Placement { joint_position: self.settings.lying_position, lying: true, seed: 0 };
+        self.machine.simulator.place(&lying);
+        self.ticks(1);
+        if self.body.mode() == Mode::Fault {
+            self.command(Command::Acknowledge { stops });
+        }
+        self.ticks(1500);
+    }
+
+    fn stand(&mut self) {
+        self.command(Command::Arm);
+        assert_eq!(self.body.mode(), Mode::StandUp);
+        self.until(Mode::Ready);
+    }
+}
+
+/// All modes, a good trial, a fall, STOP, every kind of fault, an operator who is gone, refused commands.
+fn everything(backend: Backend) {
+    let mut bench = Bench::new(backend);
+    bench.ticks(1);
+    bench.ticks(5);
+    bench.command(Command::TakeControl);
+    if backend == Backend::Hardware {
+        // Refused: nothing has been still for a second yet.
+        bench.command(Command::Arm);
+        assert_eq!(bench.body.mode(), Mode::Disarmed);
+    }
+    bench.ticks(1500);
+    bench.stand();
+    bench.approve(60.0, 1.3);
+    bench.until(Mode::Review);
+    bench.command(Command::EndReview);
+    bench.command(Command::Arm);
+    bench.command(Command::SitDown);
+    bench.until(Mode::Disarmed);
+    bench.ticks(1500);
+
+    bench.stand();
+    bench.approve(150.0, 0.8);
+    bench.until(Mode::Damped);
+    bench.ticks(2000);
+    bench.recover();
+
+    bench.stand();
+    bench.screen.stop.set();
+    bench.ticks(1000);
+    assert_eq!(bench.body.mode(), Mode::Damped);
+    bench.recover();
+
+    let tampers: [fn(&mut RobotState); 4] = [
+        |state| state.joint_velocity[3] = f64::NAN,
+        |state| state.motor_enabled[3] = false,
+        |state| state.joint_position[3] = 2.0,
+        |state| state.motor_temperature_c[3] = 90.0,
+    ];
+    for tamper in tampers {
+        bench.stand();
+        bench.machine.tamper = tamper;
+        bench.ticks(300);
+        assert_eq!(bench.body.mode(), Mode::Fault);
+        bench.machine.tamper = |_| {};
+        bench.ticks(1500);
+        bench.recover();
+    }
+    bench.stand();
+    bench.machine.silent = true;
+    bench.ticks(300);
+    bench.machine.silent = false;
+    bench.ticks(10);
+    bench.recover();
+    bench.machine.send_fails = true;
+    bench.ticks(10);
+    assert_eq!(bench.body.mode(), Mode::Fault);
+    bench.machine.send_fails = false;
+    bench.ticks(10);
+    bench.recover();
+
+    bench.stand();
+    bench.beats = false;
+    bench.until(Mode::Disarmed);
+    let all: BTreeSet<_> = Mode::ALL.iter().map(|mode| mode.name()).filter(|name| *name != "OFFLINE").collect();
+    assert_eq!(bench.seen, all);
+}
+
+#[test]
+fn the_body_with_the_simulator_never_allocates() {
+    everything(Backend::Simulator);
+}
+
+#[test]
+fn the_body_with_a_linked_robot_never_allocates() {
+    everything(Backend::Hardware);
+}
+
+/// The watchman itself: an allocation where none is allowed ends the process.
+#[test]
+fn an_allocation_in_the_tick_would_be_noticed() {
+    const CHILD: &str = "QUADFROG_ALLOCATES";
+    if std::env::var_os(CHILD).is_some() {
+        without_allocation(|| std::hint::black_box(vec![1.0; 100]));
+        return;
+    }
+    let program = std::env::current_exe().unwrap();
+    let arguments = ["an_allocation_in_the_tick_would_be_noticed", "--exact", "--test-threads=1"];
+    let output = std::process::Command::new(program).args(arguments).env(CHILD, "1").output().unwrap();
+    assert!(!output.status.success(), "{output:?}");
+    assert!(String::from_utf8_lossy(&output.stderr).contains("the tick allocated"), "{output:?}");
+}

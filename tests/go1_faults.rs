@@ -1,0 +1,483 @@
+//! Every row of the table of watchdogs (`research/operators.md` D.4) against an emulated Go1: what is injected into the robot or
+//! its network, and how soon damping is on the wire. A tap between both ends reads the very datagrams. Stepped by hand, so the
+//! reaction is a number of control ticks that no machine's speed can change.
+
+#[path = "support/go1.rs"]
+mod go1;
+
+use std::net::{SocketAddr, UdpSocket};
+
+use go1::{ANY_PORT, description};
+use quadfrog::config::{Backend, Config};
+use quadfrog::control::cycle::{Cycle, Inputs};
+use quadfrog::control::settings::Settings;
+use quadfrog::realtime::clock::SimulatedClock;
+use quadfrog::realtime::command::{Command, JumpParameters, Permit, Task, TrialSpec};
+use quadfrog::realtime::telemetry::{Cause, Event, Fault, Mode, Objection, Tick, TrialEnd};
+use quadfrog::robot::go1::Go1;
+use quadfrog::robot::go1::packet::{CrcForm, LowCmd, MODE_SERVO, POSITION_STOP};
+use quadfrog::robot::{JOINTS, LEGS, LinkStatus, Robot};
+use quadfrog::sim::emulator::Emulator;
+
+/// A cable with an ear.
+struct Tap {
+    to_controller: UdpSocket,
+    to_robot: UdpSocket,
+    controller: Option<SocketAddr>,
+    /// The last command that passed in this millisecond.
+    command: Option<LowCmd>,
+}
+
+impl Tap {
+    fn new(robot: SocketAddr) -> Tap {
+        let socket = || {
+            let socket = UdpSocket::bind(ANY_PORT).unwrap();
+            socket.set_nonblocking(true).unwrap();
+            socket
+        };
+        let (to_controller, to_robot) = (socket(), socket());
+        to_robot.connect(robot).unwrap();
+        Tap { to_controller, to_robot, controller: None, command: None }
+    }
+
+    fn carry_commands(&mut self) {
+        let mut buffer = [0; 2048];
+        self.command = None;
+        while let Ok((length, from)) = self.to_controller.recv_from(&mut buffer) {
+            self.controller = Some(from);
+            self.command = LowCmd::judge(&buffer[..length], CrcForm::Plain).ok().copied();
+            self.to_robot.send(&buffer[..length]).unwrap();
+        }
+    }
+
+    fn carry_states(&mut self) {
+        let mut buffer = [0; 2048];
+        while let Ok(length) = self.to_robot.recv(&mut buffer) {
+            self.to_controller.send_to(&buffer[..length], self.controller.unwrap()).unwrap();
+        }
+    }
+}
+
+struct Bench {
+    config: Config,
+    settings: Settings,
+    cycle: Cycle,
+    go1: Go1,
+    emulator: Emulator,
+    tap: Tap,
+    inputs: Inputs,
+    period_ns: u64,
+    events: Vec<Event>,
+    mode_changes: u64,
+    /// Number of the last tick before the injection.
+    injected_at: u64,
+}
+
+impl Bench {
+    fn new() -> Bench {
+        let mut config = Config::load(None).unwrap();
+        // Fast enough that the clock, not the silence, is what gives the restart away.
+        config.simulator.emulator.reboot_ms = 5;
+        let settings = config.settings(&description(ANY_PORT), Task::Forward, Backend::Hardware).unwrap();
+        let emulator = Emulator::bind(ANY_PORT, &description(ANY_PORT), &config.simulator, 0).unwrap();
+        let tap = Tap::new(emulator.local_address().unwrap());
+        let go1 = Go1::open(&description(tap.to_controller.local_addr().unwrap()), false).unwrap();
+        Bench {
+            config,
+            settings,
+            cycle: Cycle::new(&settings),
+            go1,
+            emulator,
+            tap,
+            inputs: Inputs::default(),
+            period_ns: 1_000_000,
+            events: Vec::new(),
+            mode_changes: 0,
+            injected_at: 0,
+        }
+    }
+
+    /// One millisecond on both ends.
+    fn tick(&mut self, command: Option<Command>) -> Tick {
+        self.inputs.time_ns += self.period_ns;
+        let inputs = Inputs { command, ..self.inputs };
+        let tick = *self.cycle.tick(&inputs, &SimulatedClock, &mut self.go1);
+        for event in self.cycle.events().iter() {
+            self.mode_changes += u64::from(matches!(event, Event::Mode { .. }));
+            self.events.push(event);
+        }
+        self.tap.carry_commands();
+        self.emulator.step();
+        self.tap.carry_states();
+        tick
+    }
+
+    fn until(&mut self, mode: Mode) {
+        for _ in 0..20_000 {
+            if self.cycle.mode() == mode {
+                return;
+            }
+            self.tick(None);
+        }
+        panic!("never {mode:?}; last {:?}: {:?}", self.cycle.mode(), self.events.last());
+    }
+
+    fn approval(&self) -> Command {
+        let control = self.config.task(Task::Forward);
+        let spec = TrialSpec {
+            trial: 3,
+            task: Task::Forward,
+            jump: JumpParameters { f0_hz: 1.3, f1_hz: 0.0, fx_n: 60.0, fy_n: 0.0, fz_n: 270.0 },
+            gains: control.gains(),
+            stance_leg: control.stance_leg(),
+            vmc: control.vmc,
+            jumps: 1,
+            seed: 0,
+        };
+        Command::RunTrial(spec, Permit { mode_changes: self.mode_changes, given_ns: self.inputs.time_ns })
+    }
+
+    /// A robot in `mode`, on the way that an operator takes.
+    fn in_mode(mode: Mode) -> Bench {
+        let mut bench = Bench::new();
+        bench.until(Mode::Observe);
+        bench.tick(Some(Command::TakeControl));
+        // Until the list before arming has seen enough of it: a second of stillness, and of ticks on time.
+        for _ in 0..1500 {
+            bench.tick(None);
+        }
+        assert_eq!(bench.cycle.mode(), Mode::Disarmed);
+        if mode == Mode::Disarmed {
+            return bench;
+        }
+        bench.tick(Some(Command::Arm));
+        assert_eq!(bench.cycle.mode(), Mode::StandUp, "{:?}", bench.cycle.readiness());
+        if mode == Mode::StandUp {
+            for _ in 0..500 {
+                bench.tick(None);
+            }
+            return bench;
+        }
+        bench.until(Mode::Ready);
+        if mode != Mode::Ready {
+            let approval = bench.approval();
+            bench.tick(Some(approval));
+            bench.until(mode);
+        }
+        bench
+    }
+
+    fn airborne() -> Bench {
+        let mut bench = Bench::in_mode(Mode::Jump);
+        for _ in 0..2000 {
+            let flying = bench.emulator.status().truth.is_some_and(|truth| truth.foot_contact == [false; LEGS]);
+            if flying && bench.tick(None).estimate.contact == [false; LEGS] {
+                return bench;
+            }
+            bench.tick(None);
+        }
+        panic!("it never flew");
+    }
+
+    fn link(&self) -> LinkStatus {
+        self.go1.link().unwrap()
+    }
+
+    /// Whether the last datagram on the wire damps every joint as the configuration says.
+    fn wire_damps(&self) -> bool {
+        let kd = self.settings.gate.damping_kd as f32;
+        self.tap.command.is_some_and(|command| {
+            (0..JOINTS).all(|joint| {
+                let motor = command.motor(joint);
+                (motor.mode, motor.kp, motor.kd) == (MODE_SERVO, 0.0, kd)
+                    && (motor.torque, motor.velocity, motor.position) == (0.0, 0.0, POSITION_STOP)
+            })
+        })
+    }
+}
+
+/// What is done.
+#[derive(Clone, Copy)]
+enum Injection {
+    /// To the robot or its network.
+    Robot(&'static str),
+    /// To the control thread.
+    Thread(fn(&mut Bench)),
+}
+
+use Injection::{Robot as ToRobot, Thread};
+
+/// A row that cuts.
+struct Row {
+    name: &'static str,
+    modes: &'static [Mode],
+    injection: Injection,
+    /// Whether the tick that was just done is the first that could know.
+    bad: fn(&Bench, &Tick) -> bool,
+    /// What the operator is told.
+    told: fn(&Cause) -> bool,
+}
+
+const ENERGISED: &[Mode] = &[Mode::StandUp, Mode::Ready, Mode::Countdown, Mode::Jump];
+const STANDING: &[Mode] = &[Mode::StandUp, Mode::Ready, Mode::Countdown];
+const SENT_TO: &[Mode] = &[Mode::Disarmed, Mode::StandUp, Mode::Ready, Mode::Countdown, Mode::Jump];
+
+const CUT: [Row; 15] = [
+    Row {
+        name: "STOP key",
+        modes: SENT_TO,
+        injection: Thread(|bench| bench.inputs.stop = true),
+        bad: |_, _| true,
+        told: |cause| matches!(cause, Cause::Stop),
+    },
+    Row {
+        name: "joint angle beyond its limit",
+        modes: ENERGISED,
+        injection: ToRobot("angle FL_hip 1.3"),
+        bad: |_, tick| tick.state.joint_position[3] > 1.2,
+        told: |cause| matches!(cause, Cause::Fault(Fault::JointPosition { joint: 3, .. })),
+    },
+    Row {
+        name: "joint velocity beyond its limit",
+        modes: ENERGISED,
+        injection: ToRobot("speed RR_thigh 90"),
+        bad: |_, tick| tick.state.joint_velocity[7] > 80.0,
+        told: |cause| matches!(cause, Cause::Fault(Fault::JointVelocity { joint: 7, .. })),
+    },
+    Row {
+        name: "joint torque beyond its limit",
+        modes: ENERGISED,
+        injection: ToRobot("torque RR_calf 50"),
+        bad: |_, tick| tick.state.joint_torque[8] > 45.0,
+        told: |cause| matches!(cause, Cause::Fault(Fault::JointTorque { joint: 8, .. })),
+    },
+    Row {
+        name: "a motor leaves servo mode",
+        modes: ENERGISED,
+        injection: ToRobot("servo-off RL_thigh"),
+        bad: |_, tick| !tick.state.motor_enabled[10],
+        told: |cause| matches!(cause, Cause::Fault(Fault::MotorMode { joint: 10 })),
+    },
+    Row {
+        name: "motor at 80 C",
+        modes: SENT_TO,
+        injection: ToRobot("hot FR_calf 80"),
+        bad: |_, tick| tick.state.motor_temperature_c[2] >= 80.0,
+        told: |cause| matches!(cause, Cause::Fault(Fault::MotorTemperature { joint: 2, .. })),
+    },
+    Row {
+        name: "a joint's angle is no number",
+        modes: SENT_TO,
+        injection: ToRobot("nan FL_calf"),
+        bad: |_, tick| tick.state.joint_position[5].is_nan(),
+        told: |cause| matches!(cause, Cause::Fault(Fault::NotFinite { .. })),
+    },
+    Row {
+        name: "a burst of corrupt datagrams",
+        modes: SENT_TO,
+        injection: ToRobot("corrupt 100"),
+        bad: |bench, _| bench.link().recent_corrupt > bench.settings.watchdog.corrupt,
+        told: |cause| matches!(cause, Cause::Fault(Fault::Corrupt { .. })),
+    },
+    Row {
+        name: "the robot restarts",
+        modes: SENT_TO,
+        injection: ToRobot("reboot"),
+        bad: |bench, _| bench.link().reboots > 0,
+        told: |cause| matches!(cause, Cause::Fault(Fault::Reboot)),
+    },
+    Row {
+        name: "tilt of 0.4 rad while standing",
+        modes: STANDING,
+        injection: ToRobot("tilt 0.4"),
+        bad: |_, tick| tick.estimate.roll_pitch_yaw.x > 0.35,
+        told: |cause| matches!(cause, Cause::Fault(Fault::Tilt { .. })),
+    },
+    Row {
+        name: "tilt of 1.1 rad anywhere",
+        modes: ENERGISED,
+        injection: ToRobot("tilt 1.1"),
+        bad: |_, tick| tick.estimate.roll_pitch_yaw.x > 1.0,
+        told: |cause| matches!(cause, Cause::Fault(Fault::Tilt { .. }) | Cause::Fell(_)),
+    },
+    Row {
+        name: "no state for 20 ms: the robot stands still",
+        modes: SENT_TO,
+        injection: ToRobot("freeze"),
+        bad: |bench, _| bench.cycle.state_age_ms() > bench.settings.watchdog.state_age_ms,
+        told: |cause| matches!(cause, Cause::Fault(Fault::StateAge { age_ms: 21, allowed_ms: 20 })),
+    },
+    Row {
+        name: "no new state for 20 ms: the same one again",
+        modes: SENT_TO,
+        injection: ToRobot("repeat"),
+        bad: |bench, _| bench.cycle.state_age_ms() > bench.settings.watchdog.state_age_ms,
+        told: |cause| matches!(cause, Cause::Fault(Fault::StateAge { age_ms: 21, allowed_ms: 20 })),
+    },
+    Row {
+        name: "a tick more than 10 ms late",
+        modes: SENT_TO,
+        injection: Thread(|bench| bench.inputs.lateness_ns = 10_500_000),
+        bad: |_, _| true,
+        told: |cause| matches!(cause, Cause::Fault(Fault::Late { .. })),
+    },
+    Row {
+        name: "five periods of more than 2 ms",
+        modes: SENT_TO,
+        injection: Thread(|bench| bench.period_ns = 2_500_000),
+        bad: |bench, tick| tick.number >= bench.injected_at + u64::from(bench.settings.watchdog.period_ticks),
+        told: |cause| matches!(cause, Cause::Fault(Fault::Slow { .. })),
+    },
+];
+
+/// Control ticks between the first bad one and the first damping on the wire: 0 where it is the same.
+fn reaction(bench: &mut Bench, row: &Row) -> u32 {
+    bench.injected_at = bench.cycle.last().number;
+    match row.injection {
+        ToRobot(line) => bench.emulator.apply(line.parse().unwrap()),
+        Thread(inject) => inject(bench),
+    }
+    bench.events.clear();
+    let mut since_bad = None;
+    for _ in 0..300 {
+        let tick = bench.tick(None);
+        let bad = (row.bad)(bench, &tick);
+        since_bad = since_bad.map(|ticks| ticks + 1).or(bad.then_some(0));
+        let stopped = bench.events.iter().find_map(|event| match event {
+            Event::Mode { to: Mode::Damped | Mode::Fault, cause, .. } => Some(*cause),
+            _ => None,
+        });
+        if let (Some(cause), true) = (stopped, bench.wire_damps()) {
+            assert!((row.told)(&cause), "{}: told {cause}", row.name);
+            return since_bad.unwrap_or_else(|| panic!("{}: damped before anything was bad: {cause}", row.name));
+        }
+    }
+    panic!("{}: never damped, {:?}", row.name, bench.cycle.mode());
+}
+
+#[test]
+fn every_cut_is_on_the_wire_within_two_ticks() {
+    let mut slowest = 0;
+    for row in &CUT {
+        for &mode in row.modes {
+            let mut bench = Bench::in_mode(mode);
+            let ticks = reaction(&mut bench, row);
+            println!("{:<45} {:<10} {ticks} ticks after the first bad one", row.name, mode.name());
+            assert!(ticks <= 2, "{} in {}: {ticks} ticks", row.name, mode.name());
+            slowest = slowest.max(ticks);
+            // Stopping to send is not stopping: damping goes on and on, whatever the robot does.
+            for _ in 0..300 {
+                bench.tick(None);
+                assert!(bench.wire_damps(), "{} in {}: no damping any more", row.name, mode.name());
+            }
+        }
+    }
+    println!("slowest: {slowest} ticks");
+}
+
+#[test]
+fn a_tilt_in_flight_is_cut_before_it_lands() {
+    let mut bench = Bench::airborne();
+    let row = Row {
+        name: "tilt of 0.9 rad in flight",
+        modes: &[],
+        injection: ToRobot("tilt 0.9"),
+        bad: |_, tick| tick.estimate.roll_pitch_yaw.x > 0.8,
+        told: |cause| matches!(cause, Cause::Fell(_)),
+    };
+    let ticks = reaction(&mut bench, &row);
+    println!("{:<45} in flight  {ticks} ticks after the first bad one", row.name);
+    assert!(ticks <= 2);
+}
+
+/// A gap that does not end is a lost link, and is called one.
+#[test]
+fn a_silence_of_more_than_200_ms_is_a_lost_link() {
+    let mut bench = Bench::in_mode(Mode::Ready);
+    bench.emulator.apply("freeze".parse().unwrap());
+    bench.events.clear();
+    for _ in 0..250 {
+        bench.tick(None);
+    }
+    let faults = bench.events.iter().filter_map(|event| match event {
+        Event::Mode { cause: Cause::Fault(fault), .. } => Some(*fault),
+        _ => None,
+    });
+    let causes: Vec<Fault> = faults.collect();
+    assert!(matches!(causes[..], [Fault::StateAge { .. }, Fault::LinkLost { .. }]), "{causes:?}");
+    assert!(bench.wire_damps());
+}
+
+/// LAND: an operator who is gone lets the robot sit down, also in mid-jump, where it lands first.
+#[test]
+fn an_operator_who_is_gone_lets_it_land_and_sit_down() {
+    for mode in [Mode::StandUp, Mode::Ready, Mode::Countdown, Mode::Jump] {
+        let mut bench = Bench::in_mode(mode);
+        bench.inputs.operator_silent_ms = 1001;
+        bench.tick(None);
+        let expected = if mode == Mode::Jump { Mode::Jump } else { Mode::SitDown };
+        assert_eq!(bench.cycle.mode(), expected);
+        bench.until(Mode::Disarmed);
+        assert!(bench.wire_damps());
+        let stopped =
+            bench.events.iter().any(|event| matches!(event, Event::Mode { to: Mode::Fault | Mode::Damped, .. }));
+        assert!(!stopped, "{:?}", bench.events);
+    }
+}
+
+/// HOLD: the trial that runs is finished, the next one refused.
+#[test]
+fn a_low_battery_and_a_warm_motor_let_the_trial_finish_and_refuse_the_next() {
+    for fault in ["battery 12", "hot RL_hip 72"] {
+        let mut bench = Bench::in_mode(Mode::Jump);
+        bench.emulator.apply(fault.parse().unwrap());
+        bench.until(Mode::Review);
+        assert!(bench.events.iter().any(|event| matches!(event, Event::TrialEnded { end: TrialEnd::Settled, .. })));
+        bench.tick(Some(Command::EndReview));
+        bench.until(Mode::Ready);
+        bench.events.clear();
+        let approval = bench.approval();
+        bench.tick(Some(approval));
+        assert_eq!(bench.cycle.mode(), Mode::Ready, "{fault}");
+        let refused =
+            bench.events.iter().any(|event| matches!(event, Event::Refused { because: Objection::Hold(_), .. }));
+        assert!(refused, "{fault}: {:?}", bench.events);
+    }
+}
+
+/// A robot that was never heard is not spoken to: it is called, and that is all.
+#[test]
+fn a_robot_that_was_never_heard_stays_offline() {
+    let mut bench = Bench::new();
+    bench.emulator.apply("freeze".parse().unwrap());
+    for command in [Some(Command::TakeControl), Some(Command::Arm), None] {
+        bench.tick(command);
+    }
+    for _ in 0..1000 {
+        bench.tick(None);
+        assert!(bench.tap.command.is_none_or(|call| (0..JOINTS).all(|joint| call.motor(joint).mode == 0)));
+    }
+    assert_eq!(bench.cycle.mode(), Mode::Offline);
+}
+
+/// After a stop: looked at, put back, armed again, and it jumps.
+#[test]
+fn after_a_restart_the_robot_is_put_back_and_jumps_again() {
+    let mut bench = Bench::in_mode(Mode::Ready);
+    bench.emulator.apply("reboot".parse().unwrap());
+    bench.until(Mode::Fault);
+    bench.emulator.apply("place".parse().unwrap());
+    for _ in 0..6000 {
+        bench.tick(None);
+    }
+    bench.tick(Some(Command::Acknowledge { stops: 0 }));
+    assert_eq!(bench.cycle.mode(), Mode::Disarmed);
+    for _ in 0..1500 {
+        bench.tick(None);
+    }
+    bench.tick(Some(Command::Arm));
+    bench.until(Mode::Ready);
+    let approval = bench.approval();
+    bench.tick(Some(approval));
+    bench.until(Mode::Review);
+}

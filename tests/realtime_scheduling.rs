@@ -1,0 +1,61 @@
+//! What is asked of the operating system: each favour by itself, what is not granted is a value with a way out, and the thread
+//! runs all the same.
+
+use std::ops::ControlFlow;
+use std::time::Duration;
+
+use quadfrog::config::{Backend, Config};
+use quadfrog::realtime::scheduling::{Favour, Scheduling};
+use quadfrog::realtime::{system, thread};
+
+/// In a thread of its own: a priority stays with the thread that asked for it.
+fn apply(scheduling: Scheduling) -> (Vec<Favour>, Vec<String>) {
+    let granted = std::thread::spawn(move || {
+        let granted = scheduling.apply();
+        let mut ticks = 0;
+        thread::pace(Duration::from_millis(1), |_| {
+            ticks += 1;
+            if ticks == 20 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        })
+        .unwrap();
+        (granted.favours, granted.shortfalls.iter().map(ToString::to_string).collect())
+    });
+    granted.join().unwrap()
+}
+
+#[test]
+fn an_ordinary_thread_asks_for_nothing() {
+    let (favours, shortfalls) = apply(Scheduling { priority: 0, core: Some(0), lock_memory: true });
+    assert!(favours.is_empty() && shortfalls.is_empty(), "{favours:?} {shortfalls:?}");
+}
+
+#[test]
+fn each_favour_is_granted_or_its_refusal_says_what_to_do() {
+    let (favours, shortfalls) = apply(Scheduling { priority: 10, core: Some(0), lock_memory: true });
+    assert_eq!(favours.len() + shortfalls.len(), 4, "{favours:?} {shortfalls:?}");
+    if system::priority_limit() >= 10 {
+        assert!(favours.contains(&Favour::Priority(10)), "{shortfalls:?}");
+    } else {
+        assert!(shortfalls.iter().any(|words| words.contains("setcap cap_sys_nice")), "{shortfalls:?}");
+    }
+    if system::memlock_limit().is_some() {
+        assert!(shortfalls.iter().any(|words| words.contains("memlock unlimited")), "{shortfalls:?}");
+    }
+}
+
+#[test]
+fn a_core_that_is_not_there_is_named_and_the_rest_is_still_asked_for() {
+    let (favours, shortfalls) = apply(Scheduling { priority: 10, core: Some(1000), lock_memory: false });
+    let named = shortfalls.iter().find(|words| words.starts_with("core 1000 not granted"));
+    assert!(named.is_some_and(|words| words.contains("realtime.core")), "{shortfalls:?}");
+    assert_eq!(favours.len() + shortfalls.len(), 3);
+}
+
+/// A simulator never holds a core against the rest of a desktop; a robot's thread asks for all of it.
+#[test]
+fn the_defaults_ask_for_a_robot_alone() {
+    let config = Config::load(None).unwrap();
+    assert_eq!(config.scheduling(Backend::Simulator).priority, 0);
+    let hardware = config.scheduling(Backend::Hardware);
+    assert!(hardware.priority > 50 && hardware.lock_memory && hardware.core.is_none());
+}
