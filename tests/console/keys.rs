@@ -417,3 +417,17 @@ fn settings_out_of_range_are_refused_by_name() {
         assert!(message.contains(key), "{message}");
     }
 }
+
+/// (A danger once: on a terminal too small for the card two blind presses made the robot jump.)
+#[test]
+fn a_terminal_too_small_for_the_card_neither_approves_nor_arms() {
+    let mut console = Console::ready();
+    console.tell(Msg::Resize(60, 15));
+    console.press(&["g"]);
+    console.wait(1000);
+    assert_eq!(wishes(&console.press(&["g"])), []);
+    assert!(console.said().contains("enlarge the terminal to 80x24"), "{}", console.said());
+    assert_eq!(console.press(&["Space"]), [Effect::Stop]);
+    console.mode(Mode::Disarmed);
+    assert_eq!(wishes(&console.press(&["A"])), []);
+}
