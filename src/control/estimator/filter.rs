@@ -2,12 +2,15 @@
 //!
 //! Linear, because the orientation is given: Bledt et al., "MIT Cheetah 3: Design and Control of a Robust, Dynamic
 //! Quadruped Robot", IROS 2018, section on state estimation, with its process model and its leg residuals e_p and e_v.
-//! Three things are ours or from Bloesch et al., "State Estimation for Legged Robots: Consistent Fusion of Leg Kinematics
+//! Five things are ours or from Bloesch et al., "State Estimation for Legged Robots: Consistent Fusion of Leg Kinematics
 //! and IMU", RSS 2012:
 //!
 //! * the accelerometer's bias is a state (Bloesch), learnt while the robot stands and used while it flies;
 //! * a foot has a place only while it stands: its state is made at touchdown and dropped at lift-off (Bloesch);
-//! * a foot is a ball that rolls, so its centre moves while it stands (ours: at push-off by some 2 cm).
+//! * a foot is a ball that rolls, so its centre moves while it stands (ours: at push-off by some 2 cm);
+//! * states may be missing: what happened meanwhile is bridged as a step at an unknown moment, and known accordingly (ours).
+//!   The filter remembers how an error of velocity grew into the position, so a landing puts right both;
+//! * where all standing feet contradict the velocity for long, it is doubted, and with it the way it led (ours).
 //!
 //! There is no residual of the ground's height: a jump may land on a block, and only the height would gain by it.
 
