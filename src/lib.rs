@@ -58,6 +58,12 @@
 //!   continued by another session.
 //! * *A simulated robot is carried back to its mark before each trial*, as a person does it with a real one. A trial is
 //!   then a function of its parameters and seed alone: the console, `optimize` and a replay agree bit for bit.
+//! * *The control thread's body is [`control::body`]*, not the engine's: the engine paces it, a bench and the test with the
+//!   aborting allocator call the very same code.
+//! * *The session may act by itself* (`--approve`, [`session::approval`]), through the same wishes as a person and refused
+//!   for the same reasons; a person's STOP, cancel or fault outranks it.
+//! * *The emulated Go1 is [`sim::emulator`]*: it speaks [`robot::go1::packet`] from the other side, so a study on it passes
+//!   through every line that a study on the robot passes through.
 //! * `config` stands beside `engine`: it turns files into the settings of every part, so it must know them all.
 
 pub mod config;

@@ -40,6 +40,11 @@ pub fn run<R: Robot>(
             life.look()?;
             continue;
         };
+        if life.objection().is_some() {
+            // Another program has queued what no robot may run: it is void, and its cause says why.
+            life.skip()?;
+            continue;
+        }
         let spec = match life.approve(card.trial, card.revision) {
             Err(Refusal::Overtaken(_)) => continue,
             approved => approved?,
@@ -47,7 +52,10 @@ pub fn run<R: Robot>(
         let (end, ticks) = rollout.run(&spec);
         life.ended(spec.trial, &end, ticks);
         let suggested = life.row(spec.trial).and_then(|row| row.suggested).unwrap_or(Verdict::Void);
-        life.judge(suggested, false)?;
+        match life.judge(suggested, false) {
+            Err(Refusal::EndedElsewhere(_)) => continue,
+            judged => judged?,
+        }
         voids = if suggested == Verdict::Void { voids + 1 } else { 0 };
         if let Some(row) = life.row(spec.trial) {
             each(row, ticks);

@@ -43,6 +43,15 @@ fn mode_backend_stop_and_next_step_are_on_every_screen() {
 }
 
 #[test]
+fn a_long_reason_does_not_hide_the_key_that_acknowledges() {
+    let mut console = Console::proposed();
+    console.mode(Mode::Fault);
+    console.model.stopped_because = "fault: ".to_owned() + &"a limit with a long name, ".repeat(5);
+    let screen = console.screen(80, 24);
+    assert!(screen.lines().last().is_some_and(|line| line.contains("then press k")), "{screen}");
+}
+
+#[test]
 fn no_dialog_covers_the_frame_the_answer_or_the_next_step() {
     for opening in ["g", "o", "m", ":", "?", "q", "Enter"] {
         for (columns, rows) in SIZES {

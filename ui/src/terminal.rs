@@ -117,7 +117,9 @@ impl Write for FrameWriter {
 /// Writes frames to the terminal until their sender is gone or the terminal fails.
 fn write_frames(frames: &Receiver<Vec<u8>>, shared: &Shared, mut terminal: File) {
     while let Ok(frame) = frames.recv() {
-        if !shared.broken.load(Ordering::Acquire) {
+        let _pen = PEN.lock().unwrap_or_else(PoisonError::into_inner);
+        // A frame that was drawn while another thread panicked would hide the cursor of a terminal that was given back.
+        if ENTERED.load(Ordering::Acquire) && !shared.broken.load(Ordering::Acquire) {
             match terminal.write_all(&frame) {
                 Ok(()) => {
                     shared.bytes.fetch_add(frame.len() as u64, Ordering::Relaxed);
@@ -183,6 +185,8 @@ impl Backend for OneWay {
 
 /// Set while the terminal is ours; whoever clears it gives the terminal back, once.
 static ENTERED: AtomicBool = AtomicBool::new(false);
+/// Who holds it writes to the terminal: a frame as a whole, or what gives the terminal back.
+static PEN: Mutex<()> = Mutex::new(());
 /// What panicked, for the loop to see; a thread's panic must not leave a dead screen.
 static PANICKED: Mutex<Option<String>> = Mutex::new(None);
 
@@ -354,6 +358,7 @@ fn give_back() {
             let mut bytes = Vec::new();
             // Writing to memory does not fail.
             let _ = queue!(bytes, ResetColor, DisableMouseCapture, DisableBracketedPaste, LeaveAlternateScreen, Show);
+            let _pen = PEN.lock().unwrap_or_else(PoisonError::into_inner);
             let _ = terminal.write_all(&bytes);
         }
         let _ = done.send(());

@@ -58,23 +58,25 @@ impl Life {
     /// When a trial is under way, there are fewer than two points to compare, or the study cannot be written.
     pub fn confirm_best(&mut self, repeats: u32) -> Result<Vec<u32>, Refusal> {
         self.must_be_idle()?;
-        self.tell_pending()?;
         self.study.refresh()?;
         if repeats == 0 {
             if confirming_of(&self.study).is_none() {
                 return not_now("nothing is being confirmed");
             }
+            self.tell_pending()?;
             self.study.annotate_study(&[(CONFIRM.to_owned(), Value::Null)])?;
             self.propose()?;
             return Ok(Vec::new());
         }
         let direction = self.study.options().direction;
-        let best = contenders(self.study.trials(), direction, self.plan.contenders as usize);
+        // As it will be when the last verdict is told: a wish that is refused tells nothing.
+        let best = contenders(self.outlook()?.trials(), direction, self.plan.contenders as usize);
         let best: Vec<Point> = best.into_iter().filter(|point| point.stood > 0).collect();
         if best.len() < 2 {
             return not_now("there are not two points yet that the robot stood through: nothing to compare");
         }
         let trials: Vec<u32> = best.iter().map(|point| point.trials[0]).collect();
+        self.tell_pending()?;
         let from = self.study.trials().len() as u32;
         let confirming = Confirming { trials: trials.clone(), repeats, from };
         self.study.annotate_study(&[(CONFIRM.to_owned(), json!(confirming)), (CONFIRMED.to_owned(), Value::Null)])?;

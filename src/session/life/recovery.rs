@@ -112,10 +112,9 @@ impl Life {
             return if room || queued { Ok(self.propose()?) } else { Ok(()) };
         };
         let next = self.study.waiting().next().map(|trial| trial.number);
-        let on_the_table = card.draft.enqueued.then_some(card.number());
-        // A re-run of our own waits in the outlook alone; it has the number that a foreign point may have taken.
-        let ours = card.draft.enqueued && next.is_none();
-        if next != on_the_table && !ours && !card.is_changed() {
+        // A re-run of our own waits in the outlook alone: its number there means nothing in the study.
+        let on_the_table = (card.draft.enqueued && !card.in_outlook_alone).then_some(card.number());
+        if next != on_the_table && !card.is_changed() {
             self.log("another program has changed the queue: here is what comes next".to_owned());
             self.propose()?;
         }

@@ -11,6 +11,7 @@ use quadfrog::config::Config;
 use quadfrog::engine::{Opened, open_stored, stored_studies, study_files};
 use quadfrog::optimize::exchange::{self, TableTrial};
 use quadfrog::optimize::repeats;
+use quadfrog::optimize::sampler::Direction;
 use quadfrog::optimize::study::Storage;
 use quadfrog::optimize::trial::{Trial, TrialState};
 use quadfrog::recording::record::TrialRecord;
@@ -209,7 +210,16 @@ fn list(folder: &Path) -> Result<(), Failure> {
 
 /// The best trial that the robot stood through.
 fn best_of(opened: &Opened) -> Option<&Trial> {
-    opened.study.best().filter(|trial| !trial.is_fall())
+    // As everywhere: a repeated point is worth the mean of its repeats.
+    let points = repeats::points(opened.study.trials());
+    let stood = |point: &&repeats::Point| point.stood > 0;
+    let better = |a: &repeats::Point, b: &repeats::Point| match opened.study.options().direction {
+        Direction::Maximize => a.mean() > b.mean(),
+        Direction::Minimize => a.mean() < b.mean(),
+    };
+    let best = points.iter().filter(stood).reduce(|best, point| if better(point, best) { point } else { best })?;
+    let standing = |trial: &&Trial| best.trials.contains(&trial.number) && !trial.is_fall();
+    opened.study.trials().iter().find(standing)
 }
 
 fn show(which: &Which) -> Result<(), Failure> {

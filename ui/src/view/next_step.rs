@@ -65,7 +65,8 @@ fn live(model: &Model) -> NextStep {
         Mode::Damped | Mode::Fault => {
             let because = if model.stopped_because.is_empty() { "stopped" } else { &model.stopped_because };
             step(
-                format!("{because}. Look at the robot, then press {}.", key(Action::Acknowledge)),
+                // The key first: a long reason is what may be cut.
+                format!("Look at the robot, then press {}: {because}", key(Action::Acknowledge)),
                 model,
                 &[(Action::Undo, "undo"), quit],
             )
