@@ -12,7 +12,10 @@ mod gains;
 mod proposing;
 mod recovery;
 mod searching;
+mod watch;
 mod wishes;
+
+pub use wishes::BUDGET;
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -33,6 +36,7 @@ use super::objective;
 use card::Card;
 use confirming::Confirmed;
 use searching::Searched;
+use watch::Watch;
 
 /// Why a wish cannot be carried out, in words for the operator.
 #[derive(Debug, thiserror::Error)]
@@ -80,7 +84,7 @@ pub struct Plan {
     pub confidence: f64,
     /// Who this is among the workers on the study: 0 has the study's folder, and with it what a crash left behind.
     pub worker: u32,
-    /// After how long a running trial of another worker counts as dead.
+    /// After how long without news a running trial of another worker counts as dead.
     pub abandoned: Duration,
 }
 
@@ -98,6 +102,7 @@ struct Pending {
 pub struct Life {
     plan: Plan,
     study: Study,
+    watch: Watch,
     rows: BTreeMap<u32, TrialRecord>,
     stage: Stage,
     /// The trial that runs or is under review.
@@ -128,6 +133,7 @@ impl Life {
     /// When the study cannot be read or written.
     pub fn open(plan: Plan, study: Study) -> Result<Life, StudyError> {
         let mut life = Life {
+            watch: Watch::new(plan.abandoned),
             plan,
             study,
             rows: BTreeMap::new(),

@@ -45,7 +45,7 @@ impl Life {
         }
         self.show_points(&outlook);
         let confirms = outlook.waiting().next().is_some_and(|trial| attributes::source_of(trial) == Source::Confirm);
-        if !confirms && recovery::occupied(outlook.trials(), self.plan.abandoned) >= self.plan.budget {
+        if !confirms && recovery::occupied(outlook.trials(), &self.watch) >= self.plan.budget {
             self.show_search(&outlook);
             self.card = None;
             let last = self.rows.keys().next_back().copied().unwrap_or(0);
@@ -122,7 +122,11 @@ impl Life {
             // Queued in the outlook alone so far: now in the study, where another program may have taken its number.
             if queued.is_none() {
                 let given: Vec<_> = draft.parameters.iter().map(|p| (p.name.clone(), p.value)).collect();
-                queued = Some(self.study.enqueue(&given, &origin.attributes())?);
+                queued = self.queue_repeat(&given, &origin.attributes())?;
+                if queued.is_none() {
+                    self.propose()?;
+                    return Err(Refusal::Overtaken(draft.number));
+                }
             }
             if let Some(number) = queued {
                 draft = self.study.redirected(&draft, number)?;
@@ -132,9 +136,9 @@ impl Life {
         let began = Began { seed, worker: self.plan.worker, recording: &self.plan.recording, fixed: &held };
         let attributes = attributes::began(&proposal, &began);
         let beyond_budget = proposal.source == Source::Confirm || origin.source == Source::Confirm;
-        let abandoned = self.plan.abandoned;
+        let watch = &self.watch;
         let budget = self.plan.budget;
-        let room = |trials: &[Trial]| beyond_budget || recovery::occupied(trials, abandoned) < budget;
+        let room = |trials: &[Trial]| beyond_budget || recovery::occupied(trials, watch) < budget;
         let number = match self.study.begin_if(&draft, &overrides, &attributes, room) {
             Ok(number) => number,
             Err(StudyError::StaleDraft { .. } | StudyError::Full) => {
@@ -188,7 +192,11 @@ impl Life {
         let mut queued = None;
         if pending.rerun {
             let (parameters, origin) = self.rerun_of(pending.suggestion.trial)?;
-            queued = Some(self.study.enqueue(&parameters, &origin.attributes())?);
+            // Another program may have seen the debt first; the trial that it has queued is then the re-run.
+            let comes = |other: &Trial| Origin::of(&other.user_attributes).parent == Some(pending.suggestion.trial);
+            let attributes = origin.attributes();
+            queued = self.study.enqueue_unless(&parameters, &attributes, |trials| trials.iter().any(comes))?;
+            queued = queued.or_else(|| self.study.trials().iter().find(|trial| comes(trial)).map(|trial| trial.number));
         }
         // Only now: what could not be written is still to be told.
         self.pending = None;

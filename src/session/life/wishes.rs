@@ -1,9 +1,14 @@
 //! What an operator may change of the card, of the search and of the queue. Each wish is checked; a refusal says what
 //! would do. Nothing runs before it is approved.
 
+use serde_json::json;
+
 use super::attributes::Origin;
 use super::{Life, Refusal, not_now};
 use crate::recording::record::{ParameterInfo, Stage};
+
+/// Study attribute: how many trials are to count. Workers that join and sessions that continue know it from here.
+pub const BUDGET: &str = "budget";
 
 impl Life {
     /// Sets one parameter of the proposal.
@@ -158,12 +163,14 @@ impl Life {
         Ok(())
     }
 
-    /// Raises the budget.
+    /// Raises the budget, for those too who continue the study or join it later.
     ///
     /// # Errors
-    /// When the study cannot be read.
+    /// When the study cannot be read or written.
     pub fn extend(&mut self, trials: u32) -> Result<(), Refusal> {
-        self.plan.budget = self.plan.budget.saturating_add(trials);
+        let budget = self.plan.budget.saturating_add(trials);
+        self.study.annotate_study(&[(BUDGET.to_owned(), json!(budget))])?;
+        self.plan.budget = budget;
         if self.stage == Stage::Finished {
             self.propose()?;
         } else {
