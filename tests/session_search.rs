@@ -5,13 +5,14 @@
 mod support;
 
 use std::collections::BTreeMap;
+use std::time::Duration;
 
 use quadfrog::optimize::insight::IMPORTANCE_TRIALS;
 use quadfrog::optimize::study::Storage;
 use quadfrog::realtime::telemetry::{FallCause, TrialEnd};
 use quadfrog::recording::record::{Fixed, Insight, PointRecord, Record, Search, Source, Stage, Verdict};
-use quadfrog::session::life::Life;
-use support::{accept, far, life, open, run, study, ticks};
+use quadfrog::session::life::{Life, Refusal};
+use support::{accept, far, joined, life, open, plan, run, study, ticks};
 
 /// The newest of what the screen is told.
 #[derive(Default)]
@@ -406,4 +407,36 @@ fn a_verdict_against_the_suggestion_says_so_until_it_is_undone() {
     assert_eq!(cause, "by the operator; looked like accept: landed and settled");
     life.undo().unwrap();
     assert_eq!(life.row(spec.trial).unwrap().cause, "landed and settled");
+}
+
+/// (A defect once: each worker counted only the repeats that were complete, and all queued the last one.)
+#[test]
+fn workers_together_run_no_more_repeats_than_were_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = || Storage::File(folder.path().join("study.log"));
+    let mut first = Life::open(plan(6), study(file())).unwrap();
+    several(&mut first, 6);
+    first.confirm_best(1).unwrap();
+    let mut second = joined(folder.path(), 6, Duration::from_secs(3600));
+    let seen = second.proposal().unwrap();
+    assert_eq!(seen.source, Source::Confirm);
+    run(&mut first, TrialEnd::Stopped);
+    let refused = second.approve(seen.trial, seen.revision);
+    assert!(matches!(refused, Err(Refusal::Overtaken(_))), "{refused:?}");
+    assert!(second.proposal().is_none() && second.others_run(), "the only repeat runs already");
+    // It comes to nothing: whoever is faster takes it up.
+    first.judge(Verdict::Void, false).unwrap();
+    first.close().unwrap();
+    second.look().unwrap();
+    assert_eq!(second.proposal().unwrap().source, Source::Confirm);
+    accept(&mut second);
+    let late = first.proposal().unwrap();
+    assert!(matches!(first.approve(late.trial, late.revision), Err(Refusal::Overtaken(_))));
+    second.close().unwrap();
+    first.look().unwrap();
+    assert_eq!((first.stage(), second.stage()), (Stage::Finished, Stage::Finished));
+    let study = study(file());
+    let repeats = study.trials().iter().filter(|trial| trial.user_attributes["source"] == "confirm");
+    let completed: Vec<bool> = repeats.map(|trial| trial.value.is_some()).collect();
+    assert_eq!(completed, [false, true]);
 }
