@@ -320,7 +320,7 @@ fn a_clock_that_runs_over_is_no_restart() {
     let mut bench = Bench::new();
     let clocks: [fn(&mut RobotState); 3] =
         [|s| s.robot_time_ms = u32::MAX - 1, |s| s.robot_time_ms = u32::MAX, |s| s.robot_time_ms = 0];
-    // From 1.5 s to the clock's end is backwards, and is acknowledged.
+    // From 1.5 s to just before the end of the clock counts as backwards: acknowledged, and on from there.
     for (n, clock) in clocks.into_iter().enumerate() {
         bench.robot.tamper = clock;
         bench.ticks(1);

@@ -34,8 +34,8 @@ pub struct Seen<'a> {
 }
 
 impl PreArm {
-    /// Once per tick: the pace, and whether the robot lies still. An old state says nothing of it: the tick counts neither way
-    /// as long as the state is fresh enough for arming, and what was seen before a longer silence or a restart is forgotten.
+    /// Once per tick: the pace, and whether the robot lies still. An old state says nothing of it: the tick counts neither way,
+    /// and what was seen before a silence that cuts, or before a restart, is forgotten.
     pub fn observe(
         &mut self,
         lateness_ns: u64,
@@ -47,7 +47,7 @@ impl PreArm {
         let allowed = &settings.pre_arm;
         self.late.tick(u32::from(lateness_ns as f64 * 1e-6 > allowed.late_ms));
         let still = state.imu.gyro_body.norm() <= allowed.gyro_rad_s;
-        if restarted || !still || state_age_ms > allowed.state_age_ms {
+        if restarted || !still || state_age_ms > settings.watchdog.state_age_ms {
             self.still = 0;
         } else if state_age_ms == 0 {
             self.still = self.still.saturating_add(1);
