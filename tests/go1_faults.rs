@@ -549,3 +549,24 @@ fn after_a_restart_the_robot_is_put_back_and_jumps_again() {
     bench.tick(Some(approval));
     bench.until(Mode::Review);
 }
+
+/// Where a robot was thought to be before a person carried it back means nothing. (A bug once: only a simulated robot, which is
+/// put in place by the program, began anew.)
+#[test]
+fn a_robot_that_is_armed_begins_at_the_origin() {
+    let mut bench = Bench::in_mode(Mode::Review);
+    let jumped = bench.tick(None).estimate.position_world;
+    assert!(jumped.xy().norm() > 0.1, "{jumped}");
+    bench.tick(Some(Command::SitDown));
+    bench.until(Mode::Disarmed);
+    bench.emulator.apply("place".parse().unwrap());
+    for _ in 0..1500 {
+        bench.tick(None);
+    }
+    let armed = bench.tick(Some(Command::Arm));
+    assert_eq!(armed.mode, Mode::StandUp, "{:?}", bench.cycle.readiness());
+    bench.until(Mode::Ready);
+    let place = bench.tick(None).estimate.position_world;
+    let truth = bench.emulator.status().truth.unwrap().position_world;
+    assert!((place - truth).norm() < 0.03, "thought at {place}, is at {truth}");
+}

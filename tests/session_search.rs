@@ -330,3 +330,80 @@ fn a_rerun_runs_its_own_parameters_though_another_program_queues_a_point_at_the_
     assert_eq!(life.row(again.trial).unwrap().parent, Some(spec.trial));
     assert_eq!(value(&life, "Fx"), 77.0);
 }
+
+/// (A defect once: seen now and then, as a session looks, the point took the re-run's parameters and was lost.)
+#[test]
+fn a_point_queued_beside_a_rerun_runs_and_so_does_the_rerun() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut life = open(folder.path());
+    let spec = run(&mut life, TrialEnd::Fell(FallCause::BodyContact));
+    life.judge(Verdict::Void, true).unwrap();
+    let mut other = study(Storage::File(folder.path().join("study.log")));
+    other.enqueue(&[("Fx".into(), 77.0)], &[]).unwrap();
+    life.look().unwrap();
+    let both = [accept(&mut life), accept(&mut life)];
+    let of = |fx: f64| both.iter().find(|spec| spec.jump.fx_n == fx);
+    assert!(of(77.0).is_some(), "the queued point is lost: {both:?}");
+    let again = of(spec.jump.fx_n).expect("the re-run is lost");
+    assert_eq!((again.jump, life.row(again.trial).unwrap().parent), (spec.jump, Some(spec.trial)));
+    assert_eq!(life.proposal().unwrap().source, Source::Sampler, "nothing comes twice");
+}
+
+/// (A danger once: it ran, with whatever it said.)
+#[test]
+fn a_point_of_another_program_beyond_the_limits_cannot_run() {
+    for (parameters, gains, word) in [
+        (vec![("Fx", 900.0)], None, "Fx = 900"),
+        (vec![("f0", 0.0)], None, "f0 = 0"),
+        (vec![("Fx", 50.0)], Some(9999.0), "kp = 9999"),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let mut life = open(folder.path());
+        let mut other = study(Storage::File(folder.path().join("study.log")));
+        let point: Vec<_> = parameters.iter().map(|(name, value)| ((*name).to_owned(), *value)).collect();
+        let attributes: Vec<_> =
+            gains.map(|kp| ("gains".to_owned(), serde_json::json!({ "kp": kp }))).into_iter().collect();
+        other.enqueue(&point, &attributes).unwrap();
+        life.look().unwrap();
+        let card = life.proposal().unwrap();
+        let refusal = life.approve(card.trial, card.revision).unwrap_err().to_string();
+        assert!(refusal.contains(word), "{refusal}");
+        life.skip().unwrap();
+        let row = life.row(card.trial).unwrap();
+        assert!(row.verdict == Some(Verdict::Void) && row.cause.contains(word), "{row:?}");
+        let next = accept(&mut life);
+        assert!(next.jump.fx_n <= 200.0 && next.jump.f0_hz > 0.0 && next.gains.kp == 400.0);
+    }
+}
+
+#[test]
+fn gains_that_a_queued_point_brings_are_seen_on_its_card() {
+    let mut life = life(5);
+    life.enqueue(&[("Fx".into(), 60.0), ("kp".into(), 500.0)]).unwrap();
+    let card = life.proposal().unwrap();
+    assert_eq!((card.gains[0].value, card.gains[0].proposed, card.source), (500.0, 400.0, Source::Queued));
+    assert_eq!(accept(&mut life).gains.kp, 500.0);
+    let refusal = life.enqueue(&[("Fx".into(), 60.0), ("kp".into(), 5000.0)]).unwrap_err().to_string();
+    assert!(refusal.contains("kp = 5000"), "{refusal}");
+}
+
+/// (A defect once: the refused wish had told the verdict, and it could not be undone any more.)
+#[test]
+fn a_confirmation_that_is_refused_tells_nothing() {
+    let mut life = life(5);
+    accept(&mut life);
+    assert!(life.confirm_best(10).is_err(), "one point is nothing to compare");
+    life.undo().unwrap();
+    assert_eq!(life.stage(), Stage::Review);
+}
+
+#[test]
+fn a_verdict_against_the_suggestion_says_so_until_it_is_undone() {
+    let mut life = life(5);
+    let spec = run(&mut life, TrialEnd::Settled);
+    life.judge(Verdict::Fall, false).unwrap();
+    let cause = &life.row(spec.trial).unwrap().cause;
+    assert_eq!(cause, "by the operator; looked like accept: landed and settled");
+    life.undo().unwrap();
+    assert_eq!(life.row(spec.trial).unwrap().cause, "landed and settled");
+}

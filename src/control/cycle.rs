@@ -346,9 +346,14 @@ impl Cycle {
                 self.place(robot, spec);
                 self.jump = Some(Jump::begin(spec, &self.settings));
             }
-            Command::Arm if self.needs_placing() => {
-                let lying = Placement { joint_position: self.settings.lying_position, lying: true, seed: 0 };
-                self.put(robot, &lying);
+            Command::Arm => {
+                // A person may have carried the robot here: what was estimated on the way means nothing.
+                self.estimator.reset();
+                self.estimate();
+                if self.needs_placing() {
+                    let lying = Placement { joint_position: self.settings.lying_position, lying: true, seed: 0 };
+                    self.put(robot, &lying);
+                }
             }
             _ => {}
         }

@@ -336,13 +336,11 @@ impl Supervisor {
                 })
             }
             Intent::Judge(verdict) => {
-                self.life.judge(*verdict, false).map_err(words)?;
-                self.end_review()?;
+                self.judge(*verdict, false)?;
                 Ok("u takes it back until the next jump is approved".to_owned())
             }
             Intent::Rerun { trial: None } => {
-                self.life.judge(Verdict::Void, true).map_err(words)?;
-                self.end_review()?;
+                self.judge(Verdict::Void, true)?;
                 Ok("void, and its parameters are on the table again".to_owned())
             }
             Intent::Rerun { trial: Some(trial) } => {
@@ -379,6 +377,15 @@ impl Supervisor {
         }
         self.command(command)?;
         Ok(answer.to_owned())
+    }
+
+    /// Judges the trial under review. Where another program has ended it, the review is over as well.
+    fn judge(&mut self, verdict: Verdict, rerun: bool) -> Result<(), String> {
+        let judged = self.life.judge(verdict, rerun);
+        if matches!(judged, Ok(()) | Err(Refusal::EndedElsewhere(_))) {
+            self.end_review()?;
+        }
+        judged.map_err(|refusal| refusal.to_string())
     }
 
     /// The verdict is given: a standing robot is ready again, a fallen one is disarmed and must be armed anew.
