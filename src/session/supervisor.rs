@@ -163,6 +163,11 @@ impl Supervisor {
         while let Ok(event) = self.control.events.pop() {
             self.event(event, time_ns);
         }
+        let reboots = self.control.counters.read().link.map_or(0, |link| link.reboots);
+        if self.pre_arm.robot_restarted(reboots) {
+            let message = "the robot restarted: low-level mode and a clear area are to be confirmed again".to_owned();
+            self.log(Level::Warning, message, time_ns);
+        }
         while let Ok(handed) = self.handed.try_recv() {
             match handed {
                 Handed::Trial(ticks) => self.measured.push_back(ticks),
