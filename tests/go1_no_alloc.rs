@@ -16,7 +16,7 @@ use go1::{ANY_PORT, description, pair};
 use quadfrog::config::{Backend, Config};
 use quadfrog::control::cycle::{Cycle, Inputs};
 use quadfrog::realtime::clock::SimulatedClock;
-use quadfrog::realtime::command::{Command, Task};
+use quadfrog::realtime::command::{Command, Permit, Task};
 use quadfrog::robot::go1::Go1;
 use quadfrog::robot::{JointCommand, Robot};
 use quadfrog::sim::emulator::Fault;
@@ -74,7 +74,8 @@ fn a_tick_over_the_link_does_not_allocate() {
         }
         let command = match ms {
             20 => Some(Command::TakeControl),
-            100 => Some(Command::Arm),
+            // Two changes: heard, and taken control of.
+            100 => Some(Command::Arm(Permit { mode_changes: 2, given_ns: ms * 1_000_000 })),
             _ => None,
         };
         let inputs = Inputs { command, time_ns: ms * 1_000_000, ..Inputs::default() };

@@ -77,7 +77,8 @@ impl Session {
         let settings: Settings = options.config.settings(&options.robot, options.task, backend).unwrap();
         let mut simulator = Simulator::new(&options.robot, &options.config.simulator).unwrap();
         simulator.place(&Placement { joint_position: settings.lying_position, lying: true, seed: 0 });
-        let (control, session_end, _screen, _ticks) = channels();
+        let (control, session_end, screen_end, _ticks) = channels();
+        screen_end.heartbeat.beat();
         let (to_recorder, recorder) = channel();
         let (to_screen, screen) = channel();
         let (_, handed) = channel();
