@@ -391,10 +391,17 @@ impl Engine {
         let flag = closing.clone();
         let scheduling = options.config.scheduling(options.backend);
         let (told, granted) = channel();
+        let damps = options.backend == Backend::Hardware;
         let control = thread
             .spawn(move || {
-                let start =
-                    control_thread::Start { settings: &settings, scheduling, told, clock: &clock, closing: &flag };
+                let start = control_thread::Start {
+                    settings: &settings,
+                    scheduling,
+                    told,
+                    clock: &clock,
+                    closing: &flag,
+                    damps,
+                };
                 control_thread::run(start, control_end, &mut *robot);
             })
             .map_err(system("control"))?;
@@ -435,6 +442,8 @@ const SESSION_PERIOD: Duration = Duration::from_millis(5);
 const LONGEST_GOODBYE: Duration = Duration::from_secs(10);
 /// For how long damping is sent to a real robot before nothing is: it sinks softly in that time.
 const DAMPING_AT_THE_END: Duration = Duration::from_millis(500);
+/// How long it is waited for the answer to the last STOP: a living control thread gives it in a millisecond.
+const LONGEST_STOP: Duration = Duration::from_secs(2);
 
 /// The session thread: intents as they come, events every few milliseconds, until the screen lets go of its handle.
 /// Gives back the session's ends of the channels: a control thread whose session is gone takes that for a breakdown.
@@ -456,16 +465,16 @@ fn run_session(
         }
     }
     let begun = clock.now_ns();
-    while sits_down && supervisor.say_goodbye() && clock.now_ns() - begun < LONGEST_GOODBYE.as_nanos() as u64 {
+    let within = |begun: u64, limit: Duration| clock.now_ns() - begun < limit.as_nanos() as u64;
+    while supervisor.say_goodbye(sits_down) && within(begun, LONGEST_GOODBYE) {
         std::thread::sleep(SESSION_PERIOD);
         supervisor.attend(clock.now_ns());
     }
     if sits_down {
-        if supervisor.mode().energised() {
-            supervisor.stop();
-        }
+        supervisor.stop();
         let begun = clock.now_ns();
-        while clock.now_ns() - begun < DAMPING_AT_THE_END.as_nanos() as u64 {
+        // Until it is heard that nothing is energised. A control thread that does not say so any more damps by itself.
+        while within(begun, DAMPING_AT_THE_END) || supervisor.mode().energised() && within(begun, LONGEST_STOP) {
             std::thread::sleep(SESSION_PERIOD);
             supervisor.attend(clock.now_ns());
         }

@@ -80,6 +80,10 @@ impl Bench {
         Command::RunTrial(self.spec(), self.approval())
     }
 
+    fn arm(&self) -> Command {
+        Command::Arm(self.approval())
+    }
+
     /// Brings the machine into `mode` on the way that an operator takes.
     fn reach(&mut self, mode: Mode) {
         if mode == Mode::Offline {
@@ -89,7 +93,7 @@ impl Bench {
         let way: [(Mode, Option<Command>); 9] = [
             (Mode::Observe, None),
             (Mode::Disarmed, Some(Command::TakeControl)),
-            (Mode::StandUp, Some(Command::Arm)),
+            (Mode::StandUp, Some(Command::Arm(Permit::default()))),
             (Mode::Ready, None),
             (Mode::Countdown, Some(Command::RunTrial(self.spec(), Permit::default()))),
             (Mode::Jump, None),
@@ -101,6 +105,7 @@ impl Bench {
             match command {
                 // Given at this moment: an approval dies with every change of mode.
                 Some(Command::RunTrial(..)) => drop(self.command(self.approved())),
+                Some(Command::Arm(_)) => drop(self.command(self.arm())),
                 Some(command) => drop(self.command(command)),
                 None if self.cycle.mode() != step => drop(self.until(step)),
                 None => {}
@@ -171,13 +176,13 @@ fn a_stopped_robot_stays_damped_until_it_is_acknowledged_and_armed_anew() {
     let mut bench = Bench::new();
     bench.reach(Mode::Ready);
     bench.tick(Inputs { stop: true, ..Inputs::default() });
-    for command in [Command::Arm, bench.approved(), Command::EndReview, Command::Cancel] {
+    for command in [bench.arm(), bench.approved(), Command::EndReview, Command::Cancel] {
         let tick = bench.command(command);
         assert_eq!(tick.mode, Mode::Damped, "{command:?}");
     }
     assert_eq!(bench.command(Command::Acknowledge { stops: 0 }).mode, Mode::Disarmed);
     assert_eq!(bench.command(bench.approved()).mode, Mode::Disarmed);
-    assert_eq!(bench.command(Command::Arm).mode, Mode::StandUp);
+    assert_eq!(bench.command(bench.arm()).mode, Mode::StandUp);
 }
 
 /// The screen is silent during a jump: the jump is landed, then the robot sits down, and the trial is not a good one.
@@ -316,7 +321,7 @@ fn any_command(spec: TrialSpec) -> impl Strategy<Value = Option<Command>> {
     prop_oneof![
         6 => Just(None),
         1 => Just(Some(Command::TakeControl)),
-        2 => Just(Some(Command::Arm)),
+        2 => Just(Some(Command::Arm(Permit::default()))),
         1 => Just(Some(Command::SitDown)),
         2 => Just(Some(Command::RunTrial(spec, Permit::default()))),
         1 => Just(Some(Command::Cancel)),
@@ -364,12 +369,13 @@ proptest! {
             for n in 0..ticks {
                 let command = command.filter(|_| n == 0);
                 let before = bench.cycle.mode();
-                // Half of the approvals are given now, the others are of a time when the robot was in another mode.
+                // Half of the key presses are given now, the others are of a time when the robot was in another mode.
                 let command = match command {
                     Some(Command::RunTrial(..)) if ticks % 2 == 0 => Some(bench.approved()),
+                    Some(Command::Arm(_)) if ticks % 2 == 0 => Some(bench.arm()),
                     command => command,
                 };
-                armed |= command == Some(Command::Arm) && before == Mode::Disarmed;
+                armed |= command == Some(bench.arm()) && before == Mode::Disarmed;
                 approved |= command == Some(bench.approved()) && before == Mode::Ready;
                 let tick = bench.tick(Inputs { command, stop: stop && n == 0, ..Inputs::default() });
                 if tick.mode.energised() {

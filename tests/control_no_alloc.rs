@@ -171,6 +171,11 @@ impl Bench {
         panic!("never {mode:?}; last {:?}", self.body.mode());
     }
 
+    fn arm(&mut self) {
+        let permit = Permit { mode_changes: self.mode_changes, given_ns: self.time_ms * 1_000_000 };
+        self.command(Command::Arm(permit));
+    }
+
     fn approve(&mut self, fx_n: f64, f0_hz: f64) {
         let control = self.config.task(Task::Forward);
         let spec = TrialSpec {
@@ -202,7 +207,7 @@ impl Bench {
     }
 
     fn stand(&mut self) {
-        self.command(Command::Arm);
+        self.arm();
         assert_eq!(self.body.mode(), Mode::StandUp);
         self.until(Mode::Ready);
     }
@@ -216,7 +221,7 @@ fn everything(backend: Backend) {
     bench.command(Command::TakeControl);
     if backend == Backend::Hardware {
         // Refused: nothing has been still for a second yet.
-        bench.command(Command::Arm);
+        bench.arm();
         assert_eq!(bench.body.mode(), Mode::Disarmed);
     }
     bench.ticks(1500);
@@ -224,7 +229,7 @@ fn everything(backend: Backend) {
     bench.approve(60.0, 1.3);
     bench.until(Mode::Review);
     bench.command(Command::EndReview);
-    bench.command(Command::Arm);
+    bench.arm();
     bench.command(Command::SitDown);
     bench.until(Mode::Disarmed);
     bench.ticks(1500);
@@ -272,6 +277,7 @@ fn everything(backend: Backend) {
     bench.stand();
     bench.beats = false;
     bench.until(Mode::Disarmed);
+    bench.command(Command::Leave);
     let all: BTreeSet<_> = Mode::ALL.iter().map(|mode| mode.name()).filter(|name| *name != "OFFLINE").collect();
     assert_eq!(bench.seen, all);
 }

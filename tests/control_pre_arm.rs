@@ -5,7 +5,7 @@ use quadfrog::config::{Backend, Config};
 use quadfrog::control::cycle::{Cycle, Inputs};
 use quadfrog::control::settings::Settings;
 use quadfrog::realtime::clock::SimulatedClock;
-use quadfrog::realtime::command::{Command, Task};
+use quadfrog::realtime::command::{Command, Permit, Task};
 use quadfrog::realtime::pre_arm::Check;
 use quadfrog::realtime::telemetry::{Event, Mode, Objection};
 use quadfrog::robot::description::RobotDescription;
@@ -41,6 +41,7 @@ struct Bench {
     settings: Settings,
     time_ns: u64,
     lateness_ns: u64,
+    mode_changes: u64,
 }
 
 impl Bench {
@@ -57,7 +58,8 @@ impl Bench {
             ..RobotState::default()
         };
         let robot = Told { state: Ok(state), link: LinkStatus { recent_received: 5000, ..LinkStatus::default() } };
-        let mut bench = Bench { cycle: Cycle::new(&settings), robot, settings, time_ns: 0, lateness_ns: 0 };
+        let mut bench =
+            Bench { cycle: Cycle::new(&settings), robot, settings, time_ns: 0, lateness_ns: 0, mode_changes: 0 };
         bench.tick(None);
         bench.tick(Some(Command::TakeControl));
         bench.ticks(6000);
@@ -68,6 +70,8 @@ impl Bench {
         self.time_ns += 1_000_000;
         let inputs = Inputs { time_ns: self.time_ns, lateness_ns: self.lateness_ns, command, ..Inputs::default() };
         self.cycle.tick(&inputs, &SimulatedClock, &mut self.robot);
+        let changes = self.cycle.events().iter().filter(|event| matches!(event, Event::Mode { .. }));
+        self.mode_changes += changes.count() as u64;
     }
 
     fn ticks(&mut self, count: u32) {
@@ -82,7 +86,7 @@ impl Bench {
 
     /// Asks to stand up: the checks that were named, none if it stands up.
     fn arm(&mut self) -> Vec<Check> {
-        self.tick(Some(Command::Arm));
+        self.tick(Some(Command::Arm(Permit { mode_changes: self.mode_changes, given_ns: self.time_ns })));
         let refused = self.cycle.events().iter().find_map(|event| match event {
             Event::Refused { because: Objection::Checks(checks), .. } => Some(checks),
             _ => None,

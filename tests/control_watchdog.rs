@@ -94,7 +94,7 @@ impl Bench {
         if mode == Mode::Disarmed {
             return bench;
         }
-        bench.tick(Some(Command::Arm));
+        bench.tick(Some(bench.arm()));
         assert_eq!(bench.cycle.mode(), Mode::StandUp);
         for step in [Mode::StandUp, Mode::Ready, Mode::Countdown, Mode::Jump, Mode::Settle, Mode::Review, Mode::SitDown]
         {
@@ -172,6 +172,10 @@ impl Bench {
 
     fn approved(&self) -> Command {
         Command::RunTrial(self.spec(), self.approval())
+    }
+
+    fn arm(&self) -> Command {
+        Command::Arm(self.approval())
     }
 
     /// From here on only `count` ticks matter: the tick of them in which damping was sent for the first time, from 1.
@@ -592,12 +596,82 @@ fn an_approval_is_single_use_expires_and_dies_with_a_change_of_mode() {
     bench.tick(Some(Command::SitDown));
     bench.until(Mode::Disarmed);
     bench.ticks(1500);
-    bench.tick(Some(Command::Arm));
+    bench.tick(Some(bench.arm()));
     bench.until(Mode::Ready);
     bench.tick(Some(approval));
     assert_eq!((bench.cycle.mode(), bench.refusal()), (Mode::Ready, Some(Objection::Stale)), "another standing");
     bench.tick(Some(bench.approved()));
     assert_eq!(bench.cycle.mode(), Mode::Countdown);
+}
+
+/// (A defect once: arming did not expire, as an approval does, and nobody had to be there.)
+#[test]
+fn arming_expires_dies_with_a_change_of_mode_and_needs_somebody_who_watches() {
+    let mut bench = Bench::in_mode(Mode::Disarmed);
+    let arm = bench.arm();
+    bench.ticks(30_001);
+    bench.tick(Some(arm));
+    assert!(matches!(bench.refusal(), Some(Objection::Expired { .. })), "{:?}", bench.refusal());
+
+    let arm = bench.arm();
+    bench.tick(Some(bench.arm()));
+    bench.until(Mode::Ready);
+    bench.tick(Some(Command::SitDown));
+    bench.until(Mode::Disarmed);
+    bench.ticks(1500);
+    bench.tick(Some(arm));
+    assert_eq!(bench.refusal(), Some(Objection::Stale), "of another time");
+
+    for silent_ms in [1001, u32::MAX] {
+        bench.inputs.operator_silent_ms = silent_ms;
+        bench.tick(Some(bench.arm()));
+        assert_eq!(bench.refusal(), Some(Objection::OperatorSilent { silent_ms, allowed_ms: 1000 }));
+        assert_eq!(bench.cycle.mode(), Mode::Disarmed);
+    }
+    bench.inputs.operator_silent_ms = 0;
+    bench.tick(Some(bench.arm()));
+    assert_eq!(bench.cycle.mode(), Mode::StandUp);
+}
+
+/// A screen that was never heard does not even begin to send.
+#[test]
+fn control_is_not_taken_while_nobody_watches() {
+    let mut bench = Bench::new();
+    bench.tick(Some(Command::Release));
+    assert_eq!(bench.cycle.mode(), Mode::Observe);
+    bench.inputs.operator_silent_ms = u32::MAX;
+    bench.robot.sent.clear();
+    bench.tick(Some(Command::TakeControl));
+    assert!(matches!(bench.refusal(), Some(Objection::OperatorSilent { .. })), "{:?}", bench.refusal());
+    assert_eq!((bench.cycle.mode(), bench.robot.sent.len()), (Mode::Observe, 0));
+}
+
+/// (A defect once: a session that ended in mid-jump did not land the robot, and it went on jumping.) Whatever the mode, the
+/// robot ends on its belly, disarmed, and nothing stands it up again.
+#[test]
+fn a_session_that_ends_lands_sits_down_and_energises_nothing_any_more() {
+    for mode in [Mode::StandUp, Mode::Ready, Mode::Countdown, Mode::Jump, Mode::Settle, Mode::Review, Mode::SitDown] {
+        let mut bench = Bench::in_mode(mode);
+        bench.tick(Some(Command::Leave));
+        bench.until(Mode::Disarmed);
+        bench.ticks(1500);
+        let (arm, approved) = (bench.arm(), bench.approved());
+        bench.tick(Some(arm));
+        assert_eq!((bench.cycle.mode(), bench.refusal()), (Mode::Disarmed, Some(Objection::Leaving)), "{mode:?}");
+        bench.tick(Some(approved));
+        assert_eq!(bench.cycle.mode(), Mode::Disarmed, "{mode:?}");
+        let ends = bench.events.iter().filter_map(|event| match event {
+            Event::TrialEnded { end, .. } => Some(*end),
+            _ => None,
+        });
+        let expected: &[TrialEnd] = match mode {
+            Mode::Countdown | Mode::Jump => &[TrialEnd::Fault(Fault::OperatorLeft)],
+            // It had landed: the trial is measured to its end.
+            Mode::Settle | Mode::Review | Mode::SitDown => &[TrialEnd::Settled],
+            _ => &[],
+        };
+        assert_eq!(ends.collect::<Vec<_>>(), expected, "{mode:?}");
+    }
 }
 
 /// After a fall: damping, the verdict or an acknowledgement, the checks again, and only then standing up, from where the
@@ -610,13 +684,13 @@ fn after_a_fall_the_robot_stands_up_from_its_measured_pose_once_it_is_upright_ag
     assert_eq!(bench.cycle.mode(), Mode::Damped);
     bench.robot.tamper = |_| {};
     bench.ticks(4000);
-    bench.tick(Some(Command::Arm));
+    bench.tick(Some(bench.arm()));
     assert_eq!(bench.cycle.mode(), Mode::Damped, "not without a look at it");
     bench.tick(Some(Command::Acknowledge { stops: 0 }));
     assert_eq!(bench.cycle.mode(), Mode::Disarmed);
     bench.robot.tamper = |state| tilt(state, Vector3::x_axis(), 0.6);
     bench.ticks(1500);
-    bench.tick(Some(Command::Arm));
+    bench.tick(Some(bench.arm()));
     assert!(matches!(bench.refusal(), Some(Objection::Checks(_))), "it lies on its side");
     // The operator turns it over, folded again.
     bench.robot.tamper = |_| {};
@@ -629,7 +703,7 @@ fn after_a_fall_the_robot_stands_up_from_its_measured_pose_once_it_is_upright_ag
     }
     bench.ticks(1500);
     let before = bench.cycle.last().state.joint_position;
-    let tick = bench.tick(Some(Command::Arm));
+    let tick = bench.tick(Some(bench.arm()));
     assert_eq!(tick.mode, Mode::StandUp);
     for (joint, motor) in tick.command.motor.iter().enumerate() {
         // What is asked for ends at the limit, also where a folded leg rests beyond it.
@@ -698,7 +772,7 @@ fn any_step() -> impl Strategy<Value = Step> {
     prop_oneof![
         3 => Just(Step::Nothing),
         2 => Just(Step::Plain(Command::TakeControl)),
-        4 => Just(Step::Plain(Command::Arm)),
+        4 => Just(Step::Plain(Command::Arm(Permit::default()))),
         1 => Just(Step::Plain(Command::SitDown)),
         1 => Just(Step::Plain(Command::Cancel)),
         1 => Just(Step::Plain(Command::EndReview)),
@@ -728,6 +802,7 @@ proptest! {
         for (step, ticks) in steps {
             bench.inputs.stop = false;
             let command = match step {
+                Step::Plain(Command::Arm(_)) => Some(bench.arm()),
                 Step::Plain(command) => Some(command),
                 Step::FreshApproval => {
                     let approval = bench.approved();
@@ -753,7 +828,7 @@ proptest! {
                 let sent_before = bench.robot.sent.len();
                 let tick = bench.tick(command.filter(|_| n == 0));
                 if tick.mode == Mode::StandUp && before != Mode::StandUp {
-                    prop_assert!(n == 0 && command == Some(Command::Arm), "it stands up by itself");
+                    prop_assert!(n == 0 && matches!(command, Some(Command::Arm(_))), "it stands up by itself");
                     prop_assert_eq!(before, Mode::Disarmed);
                     prop_assert!(bench.cycle.readiness().findings.failing().is_empty());
                     let state = &tick.state;

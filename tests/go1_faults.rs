@@ -138,6 +138,10 @@ impl Bench {
         panic!("never {mode:?}; last {:?}: {:?}", self.cycle.mode(), self.events.last());
     }
 
+    fn arm(&self) -> Command {
+        Command::Arm(Permit { mode_changes: self.mode_changes, given_ns: self.inputs.time_ns })
+    }
+
     fn approval(&self) -> Command {
         let control = self.config.task(Task::Forward);
         let spec = TrialSpec {
@@ -170,7 +174,7 @@ impl Bench {
         if mode == Mode::Disarmed {
             return bench;
         }
-        bench.tick(Some(Command::Arm));
+        bench.tick(Some(bench.arm()));
         assert_eq!(bench.cycle.mode(), Mode::StandUp, "{:?}", bench.cycle.readiness());
         if mode == Mode::StandUp {
             for _ in 0..500 {
@@ -518,7 +522,7 @@ fn a_low_battery_and_a_warm_motor_let_the_trial_finish_and_refuse_the_next() {
 fn a_robot_that_was_never_heard_stays_offline() {
     let mut bench = Bench::new();
     bench.emulator.apply("freeze".parse().unwrap());
-    for command in [Some(Command::TakeControl), Some(Command::Arm), None] {
+    for command in [Some(Command::TakeControl), Some(bench.arm()), None] {
         bench.tick(command);
     }
     for _ in 0..1000 {
@@ -543,7 +547,7 @@ fn after_a_restart_the_robot_is_put_back_and_jumps_again() {
     for _ in 0..1500 {
         bench.tick(None);
     }
-    bench.tick(Some(Command::Arm));
+    bench.tick(Some(bench.arm()));
     bench.until(Mode::Ready);
     let approval = bench.approval();
     bench.tick(Some(approval));
@@ -563,7 +567,8 @@ fn a_robot_that_is_armed_begins_at_the_origin() {
     for _ in 0..1500 {
         bench.tick(None);
     }
-    let armed = bench.tick(Some(Command::Arm));
+    let arm = bench.arm();
+    let armed = bench.tick(Some(arm));
     assert_eq!(armed.mode, Mode::StandUp, "{:?}", bench.cycle.readiness());
     bench.until(Mode::Ready);
     let place = bench.tick(None).estimate.position_world;

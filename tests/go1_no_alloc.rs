@@ -121,7 +121,7 @@ fn a_tick_over_the_link_does_not_allocate() {
     };
     ticks(100, Some(Mode::Observe), None);
     ticks(1500, None, Some(|_, _| Command::TakeControl));
-    ticks(3000, Some(Mode::Ready), Some(|_, _| Command::Arm));
+    ticks(3000, Some(Mode::Ready), Some(|permit, _| Command::Arm(permit)));
     ticks(
         12_000,
         Some(Mode::Review),

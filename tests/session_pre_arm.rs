@@ -17,6 +17,7 @@ use quadfrog::recording::record::{CommandRecord, PreArmCheck, Record, Stamped};
 use quadfrog::recording::recorder::RecorderWatch;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::robot::{Battery, JointCommand, LinkStatus, Placement, Robot, RobotError, RobotState};
+use quadfrog::session::approval::Approval;
 use quadfrog::session::intent::{Intent, OperatorCheck, Wish};
 use quadfrog::session::pre_arm::PreArmList;
 use quadfrog::session::supervisor::{Outlets, Parts, Supervisor};
@@ -62,6 +63,8 @@ impl Robot for Go1Like {
 struct Session {
     supervisor: Supervisor,
     operator: ScreenEnd,
+    /// Whether a screen is alive.
+    watched: bool,
     _ticks: rtrb::Consumer<Tick>,
     body: Body,
     robot: Go1Like,
@@ -81,6 +84,10 @@ impl Session {
     }
 
     fn begin(backend: Backend, folder: Option<std::path::PathBuf>, observe: bool) -> Session {
+        Session { watched: true, ..Session::begin_unwatched(backend, folder, observe) }
+    }
+
+    fn begin_unwatched(backend: Backend, folder: Option<std::path::PathBuf>, observe: bool) -> Session {
         let config = Config::load(None).unwrap();
         let robot = RobotDescription::embedded("go1").unwrap();
         let options = Options { trials: Some(5), observe, ..Options::new(config, robot, backend, Task::Forward) };
@@ -103,6 +110,7 @@ impl Session {
         Session {
             supervisor: Supervisor::new(parts, 0),
             operator,
+            watched: false,
             _ticks: ticks,
             body: Body::new(&settings, control, 0),
             robot: Go1Like { simulator, charge_percent: 90.0, writes: 0, reboots: 0, silent_ms: 0, tamper: |_| {} },
@@ -116,7 +124,9 @@ impl Session {
     fn ticks(&mut self, count: u32) {
         for _ in 0..count {
             self.time_ms += 1;
-            self.operator.heartbeat.beat();
+            if self.watched {
+                self.operator.heartbeat.beat();
+            }
             let instant = Instant { planned_ns: self.time_ms * 1_000_000, lateness_ns: 0 };
             self.body.tick(instant, &SimulatedClock, &mut self.robot);
             self.supervisor.attend(self.time_ms * 1_000_000);
@@ -346,4 +356,57 @@ fn an_observer_may_stop_and_then_lets_go_of_the_robot() {
     let writes = session.robot.writes;
     session.ticks(100);
     assert_eq!(session.robot.writes, writes, "nothing is sent any more");
+}
+
+/// (A defect once: the goodbye judged by the mode that was heard, and an arming on its way left the robot standing.)
+#[test]
+fn an_arming_on_its_way_when_the_session_ends_energises_nothing() {
+    let mut session = Session::new(Backend::Simulator, None);
+    let time_ns = session.time_ms * 1_000_000;
+    session.supervisor.carry_out(&Wish { intent: Intent::Arm, stops: 0, time_ns }, time_ns);
+    assert_eq!(session.supervisor.mode(), Mode::Disarmed, "of the arming nothing is heard yet");
+    session.supervisor.say_goodbye(true);
+    session.supervisor.stop();
+    for _ in 0..3000 {
+        session.ticks(1);
+        assert!(!session.body.mode().energised(), "{:?}", session.body.mode());
+    }
+}
+
+/// The last STOP is none to a robot that this session never spoke to.
+#[test]
+fn the_end_of_a_session_that_only_observes_sends_nothing() {
+    let mut session = Session::begin(Backend::Hardware, None, true);
+    session.ticks(20);
+    assert!(!session.supervisor.say_goodbye(true));
+    session.supervisor.stop();
+    session.ticks(100);
+    assert_eq!((session.body.mode(), session.robot.writes), (Mode::Observe, 0));
+}
+
+/// (A defect once: `auto` went on judging and arming while the program said goodbye.)
+#[test]
+fn nothing_is_done_by_itself_any_more_once_the_session_ends() {
+    let mut session = Session::begin(Backend::Simulator, None, false);
+    session.supervisor = session.supervisor.approving(Approval::Auto, true);
+    session.ticks(10);
+    session.supervisor.take_control();
+    session.supervisor.say_goodbye(true);
+    session.ticks(3000);
+    assert_eq!(session.body.mode(), Mode::Disarmed);
+}
+
+/// (A defect once: a robot was taken control of before any screen was heard.)
+#[test]
+fn control_is_taken_only_once_a_screen_was_heard() {
+    let mut session = Session::begin_unwatched(Backend::Simulator, None, false);
+    session.ticks(10);
+    session.supervisor.take_control();
+    session.ticks(10);
+    assert_eq!(session.body.mode(), Mode::Observe);
+    session.watched = true;
+    session.ticks(1);
+    session.supervisor.take_control();
+    session.ticks(10);
+    assert_eq!(session.body.mode(), Mode::Disarmed);
 }

@@ -87,7 +87,7 @@ impl Body {
     }
 }
 
-/// How long the screen has been silent. A screen that was never heard is as silent as one that is gone.
+/// How long the screen has been silent. A screen that was never heard has been silent for ever.
 #[derive(Default)]
 struct Beats {
     count: u64,
@@ -99,6 +99,9 @@ impl Beats {
         if count != self.count {
             self.count = count;
             self.heard_ns = now_ns;
+        }
+        if count == 0 {
+            return u32::MAX;
         }
         u32::try_from(now_ns.saturating_sub(self.heard_ns) / 1_000_000).unwrap_or(u32::MAX)
     }

@@ -93,8 +93,10 @@ pub struct Cycle {
     state_age_ms: u32,
     /// The system's error number, if the robot could not be reached last time.
     send_error: Option<i32>,
-    /// The screen fell silent during a jump: sit down as soon as it has landed.
-    operator_lost: bool,
+    /// Nobody watches a jump any more, and why: sit down as soon as it has landed.
+    landing: Option<Fault>,
+    /// The session is over: down, and nothing energises again.
+    left: bool,
     tick: Tick,
     events: Events,
 }
@@ -122,7 +124,8 @@ impl Cycle {
             feet: [Foot { position_leg: Vector3::zeros(), jacobian_leg: Matrix3::zeros() }; LEGS],
             state_age_ms: 0,
             send_error: None,
-            operator_lost: false,
+            landing: None,
+            left: false,
             tick: Tick::default(),
             events: Events { list: [None; Events::MOST], count: 0 },
         }
@@ -178,7 +181,7 @@ impl Cycle {
         self.pre_arm.observe(inputs.lateness_ns, &self.tick.state, self.state_age_ms, restarted, &self.settings);
         self.check_pre_arm(robot);
         if let Some(command) = inputs.command {
-            self.obey(&command, inputs.time_ns, robot);
+            self.obey(&command, inputs, robot);
         }
         if inputs.stop {
             self.request(Request::Stop, Cause::Stop);
@@ -265,7 +268,8 @@ impl Cycle {
                 return;
             }
             Some(trip) => self.land(trip.fault),
-            None if self.mode == Mode::Ready => self.operator_lost = false,
+            None if self.left => self.land(Fault::OperatorLeft),
+            None if self.mode == Mode::Ready => self.landing = None,
             None => {}
         }
         // Who tips over while a jump is being judged has fallen: damped as soon as by the table's row of a standing robot, but
@@ -300,7 +304,7 @@ impl Cycle {
                 self.request(Request::SitDown, Cause::Fault(fault));
             }
             Mode::Jump => {
-                self.operator_lost = true;
+                self.landing.get_or_insert(fault);
                 if let Some(jump) = &mut self.jump {
                     jump.land();
                 }
@@ -324,11 +328,11 @@ impl Cycle {
     }
 
     /// One command of the session: carried out, or refused and said so.
-    fn obey<R: Robot + ?Sized>(&mut self, command: &Command, time_ns: u64, robot: &mut R) {
+    fn obey<R: Robot + ?Sized>(&mut self, command: &Command, inputs: &Inputs, robot: &mut R) {
         let request = match command {
             Command::TakeControl => Request::TakeControl,
             Command::Release => Request::Release,
-            Command::Arm => Request::Arm,
+            Command::Arm(_) => Request::Arm,
             Command::SitDown => Request::SitDown,
             Command::RunTrial(..) => Request::Approve,
             Command::Cancel => Request::Cancel,
@@ -336,8 +340,13 @@ impl Cycle {
             Command::EndReview if matches!(self.cause, Cause::Fell(_)) => Request::Acknowledge,
             Command::EndReview => Request::EndReview,
             Command::Acknowledge { .. } => Request::Acknowledge,
+            // No request: from the next tick on `watch` lands whatever is energised.
+            Command::Leave => {
+                self.left = true;
+                return;
+            }
         };
-        if let Err(because) = self.may(command, request, time_ns) {
+        if let Err(because) = self.may(command, request, inputs) {
             self.events.push(Event::Refused { command: *command, mode: self.mode, because });
             return;
         }
@@ -346,7 +355,7 @@ impl Cycle {
                 self.place(robot, spec);
                 self.jump = Some(Jump::begin(spec, &self.settings));
             }
-            Command::Arm => {
+            Command::Arm(_) => {
                 // A person may have carried the robot here: what was estimated on the way means nothing.
                 self.estimator.reset();
                 self.estimate();
@@ -361,28 +370,53 @@ impl Cycle {
     }
 
     /// What speaks against a command, if anything does.
-    fn may(&self, command: &Command, request: Request, time_ns: u64) -> Result<(), Objection> {
+    fn may(&self, command: &Command, request: Request, inputs: &Inputs) -> Result<(), Objection> {
         if mode::next(self.mode, request).is_none() {
             return Err(Objection::Mode);
         }
         match *command {
-            Command::Arm => match self.findings.failing() {
-                failing if failing.is_empty() => Ok(()),
-                failing => Err(Objection::Checks(failing)),
-            },
-            Command::Acknowledge { .. } => self.standing.map_or(Ok(()), |fault| Err(Objection::Standing(fault))),
-            Command::RunTrial(_, Permit { mode_changes, given_ns }) => {
-                let age_s = time_ns.saturating_sub(given_ns) as f64 * 1e-9;
-                let allowed_s = self.settings.approval.expires_s;
-                if mode_changes != self.mode_changes {
-                    Err(Objection::Stale)
-                } else if age_s > allowed_s {
-                    Err(Objection::Expired { age_s, allowed_s })
-                } else {
-                    watchdog::hold(&self.tick.state, &self.settings).map_or(Ok(()), |hold| Err(Objection::Hold(hold)))
+            Command::TakeControl => self.watched(inputs),
+            Command::Arm(permit) => {
+                self.watched(inputs)?;
+                self.fresh(permit, inputs)?;
+                match self.findings.failing() {
+                    failing if failing.is_empty() => Ok(()),
+                    failing => Err(Objection::Checks(failing)),
                 }
             }
+            Command::Acknowledge { .. } => self.standing.map_or(Ok(()), |fault| Err(Objection::Standing(fault))),
+            Command::RunTrial(_, permit) => {
+                self.fresh(permit, inputs)?;
+                watchdog::hold(&self.tick.state, &self.settings).map_or(Ok(()), |hold| Err(Objection::Hold(hold)))
+            }
             _ => Ok(()),
+        }
+    }
+
+    /// Somebody watches: without that nothing is sent to a robot that was only observed, and none stands up.
+    fn watched(&self, inputs: &Inputs) -> Result<(), Objection> {
+        let (silent_ms, allowed_ms) = (inputs.operator_silent_ms, self.settings.watchdog.operator_silent_ms);
+        if self.left {
+            Err(Objection::Leaving)
+        } else if silent_ms > allowed_ms {
+            Err(Objection::OperatorSilent { silent_ms, allowed_ms })
+        } else {
+            Ok(())
+        }
+    }
+
+    /// The key press is of this moment and of this mode.
+    fn fresh(&self, Permit { mode_changes, given_ns }: Permit, inputs: &Inputs) -> Result<(), Objection> {
+        let age_s = inputs.time_ns.saturating_sub(given_ns) as f64 * 1e-9;
+        let allowed_s = self.settings.approval.expires_s;
+        if self.left {
+            Err(Objection::Leaving)
+        } else if mode_changes != self.mode_changes {
+            Err(Objection::Stale)
+        } else if age_s > allowed_s {
+            Err(Objection::Expired { age_s, allowed_s })
+        } else {
+            Ok(())
         }
     }
 
@@ -419,7 +453,7 @@ impl Cycle {
         if let Some(jump) = &mut self.jump {
             let progress = match jump.observe(&self.tick.state, &self.tick.estimate, &self.settings) {
                 // Nobody watches: it need not become quiet, only stand.
-                Progress::Settle if self.operator_lost && jump.landed_s() >= self.settings.watchdog.land_s => {
+                Progress::Settle if self.landing.is_some() && jump.landed_s() >= self.settings.watchdog.land_s => {
                     Progress::Over(TrialEnd::NotQuiet)
                 }
                 progress => progress,
@@ -435,11 +469,7 @@ impl Cycle {
                     if self.mode == Mode::Jump {
                         self.request(Request::Landed, Cause::Course);
                     }
-                    self.finish_trial(if self.operator_lost {
-                        TrialEnd::Fault(Fault::OperatorLost { silent_ms: self.settings.watchdog.operator_silent_ms })
-                    } else {
-                        end
-                    });
+                    self.finish_trial(self.landing.map_or(end, TrialEnd::Fault));
                     self.request(Request::Settled, Cause::Course);
                 }
                 _ => {}

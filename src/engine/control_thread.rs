@@ -1,6 +1,8 @@
-//! The control thread: the system's favours, then one body a millisecond until it is told to end.
+//! The control thread: the system's favours, then one body a millisecond until it is told to end, and damping as its last
+//! word, however it ends.
 
 use std::ops::ControlFlow;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::Sender;
 use std::time::Duration;
@@ -10,8 +12,9 @@ use crate::control::settings::{PERIOD_S, Settings};
 use crate::realtime::channel::ControlEnd;
 use crate::realtime::clock::Clock;
 use crate::realtime::scheduling::{Favour, Scheduling, Shortfall};
-use crate::realtime::thread::pace;
-use crate::robot::Robot;
+use crate::realtime::telemetry::Mode;
+use crate::realtime::thread::{Instant, pace};
+use crate::robot::{JointCommand, Robot};
 
 /// What the thread is started with.
 pub struct Start<'a, C> {
@@ -25,20 +28,140 @@ pub struct Start<'a, C> {
     pub clock: &'a C,
     /// Set when the thread is to end.
     pub closing: &'a AtomicBool,
+    /// Whether the machine keeps the last command when nothing more is sent: a real one does, a simulated one stands still.
+    pub damps: bool,
 }
 
+/// How often damping is sent, at least, after the last tick: for half a second, in which the robot sinks softly.
+const LAST_DAMPINGS: u32 = 500;
+
 /// Runs until `closing` is set.
+///
+/// # Panics
+/// When a tick does, or the clock cannot be read: once the robot has been damped, and `closing` is set.
 pub fn run<C: Clock>(start: Start<C>, end: ControlEnd, robot: &mut dyn Robot) {
     let granted = start.scheduling.apply();
     let _ = start.told.send((granted.favours.clone(), granted.shortfalls.clone()));
-    drop(start.told);
+    let period = Duration::from_secs_f64(PERIOD_S);
+    // The damping at the end is slept, not paced: the clock may be what failed.
+    if let Err(panic) = drive(&start, end, robot, |tick| pace(period, tick), || std::thread::sleep(period)) {
+        resume_unwind(panic);
+    }
+}
+
+/// Ticks as `paced` calls them, then the damping with `wait` after each; what panicked is given back.
+fn drive<C: Clock>(
+    start: &Start<C>,
+    end: ControlEnd,
+    robot: &mut dyn Robot,
+    paced: impl FnOnce(&mut dyn FnMut(Instant) -> ControlFlow<()>) -> Result<(), nix::Error>,
+    mut wait: impl FnMut(),
+) -> std::thread::Result<()> {
+    let closing = || start.closing.load(Ordering::Acquire);
     let mut body = Body::new(start.settings, end, start.clock.now_ns());
-    let paced = pace(Duration::from_secs_f64(PERIOD_S), |instant| {
-        body.tick(instant, start.clock, robot);
-        if start.closing.load(Ordering::Acquire) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-    });
-    if let Err(error) = paced {
-        // Without a clock there is no control: the panic hook tells the operator, the robot's own time-out damps.
-        panic!("the control thread cannot read the monotonic clock: {error}");
+    // Afterwards the body is only asked for its mode, which a panic does not leave half changed.
+    let ended = catch_unwind(AssertUnwindSafe(|| {
+        let tick = &mut |instant| {
+            body.tick(instant, start.clock, robot);
+            if closing() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        };
+        if let Err(error) = paced(tick) {
+            panic!("the control thread cannot read the monotonic clock: {error}");
+        }
+    }));
+    if start.damps && !matches!(body.mode(), Mode::Offline | Mode::Observe) {
+        let damping = JointCommand::damping(start.settings.gate.damping_kd);
+        let mut sent = 0;
+        while sent < LAST_DAMPINGS || !closing() {
+            // What is lost goes with the next: there is nobody left to tell.
+            let _ = robot.write(&damping);
+            sent = sent.saturating_add(1);
+            wait();
+        }
+    }
+    ended
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::{Backend, Config};
+    use crate::realtime::channel::channels;
+    use crate::realtime::clock::SimulatedClock;
+    use crate::realtime::command::{Command, Task};
+    use crate::robot::description::RobotDescription;
+    use crate::robot::{Placement, RobotError, RobotState};
+
+    /// Answers until `reads` is used up, then panics; keeps what it is sent.
+    struct Brittle {
+        reads: u32,
+        sent: Vec<JointCommand>,
+    }
+
+    impl Robot for Brittle {
+        fn read(&mut self) -> Result<RobotState, RobotError> {
+            self.reads = self.reads.checked_sub(1).expect("an injected defect");
+            Ok(RobotState::default())
+        }
+        fn write(&mut self, command: &JointCommand) -> Result<(), RobotError> {
+            self.sent.push(*command);
+            Ok(())
+        }
+        fn place(&mut self, _: &Placement) -> bool {
+            false
+        }
+    }
+
+    /// What a robot is sent, and how often was waited, if reading from it panics after `reads` ticks and the thread is told
+    /// to end after `told_after` waits.
+    fn damped(controlled: bool, damps: bool, reads: u32, told_after: u32) -> (Vec<JointCommand>, u32) {
+        let description = RobotDescription::embedded("go1").unwrap();
+        let settings = Config::load(None).unwrap().settings(&description, Task::Forward, Backend::Hardware).unwrap();
+        let (control, mut session, screen, _ticks) = channels();
+        screen.heartbeat.beat();
+        if controlled {
+            session.commands.push(Command::TakeControl).unwrap();
+        }
+        let mut robot = Brittle { reads, sent: Vec::new() };
+        let closing = AtomicBool::new(told_after == 0);
+        let start = Start {
+            settings: &settings,
+            scheduling: Scheduling::default(),
+            told: std::sync::mpsc::channel().0,
+            clock: &SimulatedClock,
+            closing: &closing,
+            damps,
+        };
+        let mut ms = 0;
+        let unpaced = |tick: &mut dyn FnMut(Instant) -> ControlFlow<()>| {
+            while tick(Instant { planned_ns: ms * 1_000_000, lateness_ns: 0 }).is_continue() {
+                ms += 1;
+            }
+            Ok(())
+        };
+        let mut waited = 0;
+        let ended = drive(&start, control, &mut robot, unpaced, || {
+            waited += 1;
+            closing.fetch_or(waited >= told_after, Ordering::AcqRel);
+        });
+        assert_eq!(ended.is_err(), told_after > 0, "a panic is not swallowed");
+        let is_damping = |command: &&JointCommand| **command == JointCommand::damping(settings.gate.damping_kd);
+        let last = robot.sent.iter().rev().take_while(is_damping).copied().collect();
+        (last, waited)
+    }
+
+    /// (A defect once: a panic in a tick ended the thread, and the motors kept the last torques.)
+    #[test]
+    fn a_panic_in_a_tick_is_followed_by_damping_for_half_a_second_and_until_the_end() {
+        let (sent, waited) = damped(true, true, 20, 1);
+        assert_eq!(waited, 500);
+        assert!(sent.len() >= 500, "{}", sent.len());
+        assert_eq!(damped(true, true, 20, 800).1, 800, "it goes on until it is told to end");
+    }
+
+    #[test]
+    fn the_last_word_to_a_robot_that_is_controlled_is_damping_and_to_another_there_is_none() {
+        assert_eq!(damped(true, true, u32::MAX, 0).1, 500, "an end in order, too");
+        assert_eq!(damped(false, true, 20, 1), (Vec::new(), 0), "a robot that is only observed");
     }
 }

@@ -96,6 +96,8 @@ pub struct SessionEnd {
     pub commands: rtrb::Producer<Command>,
     /// STOP, to see whether one came after a wish.
     pub stop: StopLatch,
+    /// The screen's sign of life, to see whether there is a screen at all.
+    pub heartbeat: Heartbeat,
     /// The newest counters.
     pub counters: triple_buffer::Output<Counters>,
     /// What the control thread has against the next arming and the next trial.
@@ -140,6 +142,7 @@ pub fn channels() -> (ControlEnd, SessionEnd, ScreenEnd, rtrb::Consumer<Tick>) {
     let session = SessionEnd {
         commands: command_in,
         stop: stop.clone(),
+        heartbeat: heartbeat.clone(),
         counters: counters_out,
         readiness: readiness_out,
         events: event_out,

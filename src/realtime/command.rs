@@ -116,7 +116,7 @@ pub struct TrialSpec {
     pub seed: u64,
 }
 
-/// What makes an approval good for one trial, once, now: it dies with any change of mode, and of age.
+/// What makes a key press that energises good once, now: it dies with any change of mode, and of age.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Permit {
     /// How often the mode had changed, as far as the session had heard when it was given.
@@ -133,7 +133,7 @@ pub enum Command {
     /// Nothing is sent any more: back to observing.
     Release,
     /// Energise: checks, then stand up.
-    Arm,
+    Arm(Permit),
     /// Sit down and disarm.
     SitDown,
     /// Run this trial: countdown, jump, settle.
@@ -142,6 +142,8 @@ pub enum Command {
     Cancel,
     /// The verdict is given: the review is over.
     EndReview,
+    /// Nobody is there any more: land, sit down, and never energise again. It holds until the thread ends.
+    Leave,
     /// A damped or faulted robot has been looked at: back to disarmed.
     Acknowledge {
         /// How often STOP had been pressed by then; a later STOP outlives this.

@@ -371,6 +371,8 @@ pub enum Fault {
         /// Silence, ms.
         silent_ms: u32,
     },
+    /// The operator ended the session, or its terminal is gone, before the robot had landed.
+    OperatorLeft,
     /// The command could not be sent.
     Send {
         /// The system's error number.
@@ -426,7 +428,10 @@ impl std::fmt::Display for Fault {
                 write!(f, "{ticks} control periods in a row of {measured_ms:.1} ms, allowed {allowed_ms:.1}")
             }
             Fault::PoseTimeout { error_rad } => write!(f, "the pose was not reached: {error_rad:.2} rad missing"),
-            Fault::OperatorLost { silent_ms } => write!(f, "the operator's screen was silent for {silent_ms} ms"),
+            Fault::OperatorLost { silent_ms } => {
+                write!(f, "operator lost: the operator's screen was silent for {silent_ms} ms")
+            }
+            Fault::OperatorLeft => write!(f, "operator lost: the session ended before the robot had landed"),
             Fault::Send { errno } => write!(f, "the command could not be sent (error {errno})"),
             Fault::EventsLost => write!(f, "the session does not take events"),
         }
@@ -533,17 +538,28 @@ pub enum Objection {
     /// A trial must not begin.
     #[error("{0}")]
     Hold(Hold),
-    /// The mode changed between the approval and the command.
-    #[error("the robot's mode changed after the approval; look again, and approve again")]
+    /// The mode changed between the key press and the command.
+    #[error("the robot's mode changed after the key press; look again, and press again")]
     Stale,
-    /// The approval is too old.
-    #[error("the approval is {age_s:.0} s old, allowed {allowed_s:.0}; look again, and approve again")]
+    /// The key press is too old.
+    #[error("the key press is {age_s:.0} s old, allowed {allowed_s:.0}; look again, and press again")]
     Expired {
         /// Its age, s.
         age_s: f64,
         /// Allowed, s.
         allowed_s: f64,
     },
+    /// Nobody is known to watch: nothing begins to move.
+    #[error("{}", if *.silent_ms == u32::MAX { "the operator's screen was never heard; wait until it is".to_owned() } else { format!("the operator's screen has been silent for {silent_ms} ms, allowed {allowed_ms}; look at its connection") })]
+    OperatorSilent {
+        /// Silence, ms; `u32::MAX` for a screen that was never heard.
+        silent_ms: u32,
+        /// Allowed, ms.
+        allowed_ms: u32,
+    },
+    /// The session is ending.
+    #[error("the session is ending")]
+    Leaving,
 }
 
 /// What lets the running trial finish but forbids the next one.

@@ -84,6 +84,8 @@ pub struct Supervisor {
     mode_changes: u64,
     /// An observer's robot was stopped and acknowledged: it is being let go of.
     letting_go: bool,
+    /// The control thread knows that the session is over.
+    leaving: bool,
     /// What forbade the next trial when that was said last.
     held: Option<String>,
     caution_ns: Option<u64>,
@@ -97,6 +99,8 @@ pub struct Supervisor {
     recorder_gone: bool,
     observe: bool,
     asked_for_control: bool,
+    /// Signs of life of the screen when control was refused last: it is asked for again after the next.
+    beats: u64,
     counters_ns: u64,
     pre_arm: PreArmList,
     /// The list as it was shown last, and when.
@@ -121,6 +125,7 @@ impl Supervisor {
             cause: Cause::Course,
             mode_changes: 0,
             letting_go: false,
+            leaving: false,
             held: None,
             caution_ns: None,
             ended: None,
@@ -130,6 +135,7 @@ impl Supervisor {
             recorder_gone: false,
             observe,
             asked_for_control: false,
+            beats: 0,
             counters_ns: 0,
             pre_arm,
             shown_list: Vec::new(),
@@ -223,34 +229,41 @@ impl Supervisor {
         self.publish(time_ns);
     }
 
-    /// The session ends: what was judged is told.
+    /// The session ends: what was judged is told, and what nobody can judge any more is void if the rules call it so.
     pub fn close(&mut self, time_ns: u64) {
-        if let Err(error) = self.life.close() {
+        if let Err(error) = self.life.leave().and_then(|()| self.life.close()) {
             self.log(Level::Error, format!("the study could not be written: {error}"), time_ns);
         }
         self.publish(time_ns);
     }
 
-    /// A robot that answers is taken control of, unless this session only looks.
+    /// A robot that answers is taken control of once there is a screen, unless this session only looks.
     pub fn take_control(&mut self) {
-        if !self.observe && !self.asked_for_control {
+        if !self.observe && !self.asked_for_control && self.control.heartbeat.count() > self.beats {
             self.asked_for_control = self.command(Command::TakeControl).is_ok();
         }
     }
 
-    /// STOP, by the session itself: the end has come and the robot is still energised.
+    /// STOP, by the session itself, as its last word: what was heard of the mode may be old, and a command that energises
+    /// still on its way. A robot that was never taken control of is not spoken to now either.
     pub fn stop(&self) {
-        self.control.stop.set();
+        if !self.observe && !matches!(self.mode, Mode::Offline | Mode::Observe) {
+            self.control.stop.set();
+        }
     }
 
-    /// Nobody is there any more: a robot that stands sits down, one that jumps as soon as it has landed. False once
-    /// nothing is energised.
-    pub fn say_goodbye(&mut self) -> bool {
-        if mode::next(self.mode, Request::SitDown).is_some() {
+    /// Nobody is there any more: a robot that stands sits down, one that jumps as soon as it has landed, and nothing is
+    /// begun any more. False once no trial is under way and, if `sits_down`, nothing is energised.
+    pub fn say_goodbye(&mut self, sits_down: bool) -> bool {
+        if !self.leaving {
+            self.unattended = Unattended::default();
             // A full ring is emptied a thousand times a second: the next call will get through.
-            let _ = self.command(Command::SitDown);
+            self.leaving = self.command(Command::Leave).is_ok();
         }
-        self.mode.energised()
+        let trial = matches!(self.mode, Mode::Countdown | Mode::Jump | Mode::Settle);
+        // Also a trial of which nothing but its approval was heard, or whose ticks are still on their way here.
+        let running = self.life.stage() == Stage::Running && !self.control.events.is_abandoned();
+        trial || running || sits_down && self.mode.energised()
     }
 
     fn command(&mut self, command: Command) -> Result<(), String> {
@@ -264,7 +277,10 @@ impl Supervisor {
                 let findings = self.control.readiness.read().findings;
                 match objections(&self.pre_arm.look(&findings, &self.recorder.get())) {
                     Some(objections) => Err(objections),
-                    None => self.ask(Request::Arm, Command::Arm, "the robot stands up"),
+                    None => {
+                        let permit = Permit { mode_changes: self.mode_changes, given_ns: wish.time_ns };
+                        self.ask(Request::Arm, Command::Arm(permit), "the robot stands up")
+                    }
                 }
             }
             Intent::Arm => Err(format!("not while the robot is {}", self.mode.name())),
@@ -414,9 +430,17 @@ impl Supervisor {
                 let command_name = describe_command(&command);
                 let message = format!("the control thread refused {command_name} while {}: {because}", mode.name());
                 self.log(Level::Warning, message, time_ns);
-                if let Command::RunTrial(spec, _) = command {
-                    self.ended = Some((spec.trial, TrialEnd::Cancelled));
-                    self.measured.push_back(TrialTicks { trial: spec.trial, ticks: Vec::new() });
+                match command {
+                    Command::RunTrial(spec, _) => {
+                        self.ended = Some((spec.trial, TrialEnd::Cancelled));
+                        self.measured.push_back(TrialTicks { trial: spec.trial, ticks: Vec::new() });
+                    }
+                    Command::Arm(_) => self.unattended.arming_refused(time_ns),
+                    Command::TakeControl => {
+                        self.asked_for_control = false;
+                        self.beats = self.control.heartbeat.count();
+                    }
+                    _ => {}
                 }
             }
         }
@@ -554,7 +578,8 @@ fn describe_command(command: &Command) -> String {
     match command {
         Command::TakeControl => "to be controlled".to_owned(),
         Command::Release => "to be let go of".to_owned(),
-        Command::Arm => "to stand up".to_owned(),
+        Command::Arm(_) => "to stand up".to_owned(),
+        Command::Leave => "to be left".to_owned(),
         Command::SitDown => "to sit down".to_owned(),
         Command::RunTrial(spec, _) => format!("trial {}", spec.trial),
         Command::Cancel => "to cancel".to_owned(),

@@ -3,7 +3,7 @@
 mod support;
 
 use quadfrog::realtime::telemetry::Mode;
-use quadfrog::recording::record::{Record, Stage, StageInfo, Verdict};
+use quadfrog::recording::record::{Record, SessionInfo, Stage, StageInfo, Verdict};
 use quadfrog::session::intent::Intent;
 use quadfrog_console::action::{ACTIONS, Action};
 use quadfrog_console::dialog::Dialog;
@@ -251,7 +251,7 @@ fn a_stopped_robot_is_acknowledged_with_k_or_enter() {
 fn an_observer_and_a_replay_send_nothing() {
     let all = ["A", "g", "o", "O", "n", "a", "f", "v", "r", "u", "m", "=", "D", "k", "C", "Enter"];
     let mut observer = Console::new();
-    observer.record(Record::Session(quadfrog::recording::record::SessionInfo { observe: true, ..session() }));
+    observer.record(Record::Session(SessionInfo { observe: true, ..session() }));
     observer.record(Record::Proposal(proposal(0, 0)));
     observer.stage(Stage::Proposed, 0);
     let mut replay = Console::proposed();
@@ -343,6 +343,19 @@ fn suspending_is_refused_while_the_robot_is_armed() {
     let mut console = Console::ready();
     assert_eq!(console.tell(Msg::Suspend), []);
     assert!(console.said().contains("the robot is armed; D sits it down"), "{}", console.said());
+}
+
+/// (A defect once: a suspended program does not damp the robot that it has just stopped.)
+#[test]
+fn suspending_is_refused_while_anything_is_sent_to_a_real_robot() {
+    for mode in Mode::ALL {
+        let mut console = Console::proposed();
+        console.record(Record::Session(SessionInfo { backend: "go1".into(), ..session() }));
+        console.mode(mode);
+        let suspends = console.tell(Msg::Suspend) == [Effect::Suspend];
+        assert_eq!(suspends, matches!(mode, Mode::Offline | Mode::Observe), "{mode:?}: {}", console.said());
+        assert!(suspends || console.said().contains("sends the robot nothing, not even damping"), "{}", console.said());
+    }
 }
 
 #[test]

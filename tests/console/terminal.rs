@@ -244,6 +244,59 @@ fn a_hang_up_closes_the_session_without_a_word() {
     assert_eq!(player(folder.path()).damage(), None);
 }
 
+/// (A defect once: the robot went on jumping with nobody there, and the trial counted as cut off by a crash.)
+#[test]
+fn losing_the_operator_in_mid_jump_lands_the_robot_and_voids_the_trial() {
+    // A series that takes seven seconds: whoever is lost is lost in the middle of it.
+    let config = folder();
+    std::fs::write(config.path().join("control.toml"), "[tasks.forward]\njumps = 5\nf1_hz = 0.5\n").expect("written");
+    let first = "[first.forward]\nf0 = 1.3\nFx = 20.0\nFz = 270.0\n";
+    std::fs::write(config.path().join("optimize.toml"), first).expect("written");
+    let config = config.path().to_str().expect("a path");
+    for way in [None, Some(Signal::SIGTERM), Some(Signal::SIGHUP)] {
+        let folder = folder();
+        let mut session = Session::start(folder.path(), SIZE, &["--config", config]);
+        session.wait_for(&["Press A to arm"]);
+        session.send("A");
+        session.wait_for(&["READY", "Press g twice to jump"]);
+        session.approve();
+        session.wait_for(&["JUMP"]);
+        match way {
+            Some(signal) => session.signal(signal),
+            None => session.hang_up(),
+        }
+        session.wait();
+
+        let player = player(folder.path());
+        assert_eq!(player.damage(), None, "{way:?}");
+        let changes = player.events().iter().filter_map(|event| match &event.record {
+            Record::Transition(change) => Some(change.to),
+            _ => None,
+        });
+        let landed = [Mode::Jump, Mode::Settle, Mode::Review];
+        let after: Vec<Mode> = changes.skip_while(|mode| *mode != Mode::Jump).take(landed.len()).collect();
+        assert_eq!(after, landed, "{way:?}");
+
+        // The verdict and its cause are on disk though nobody was there to give one.
+        let study = study(folder.path());
+        let trials = stored(&study.join("study.log"));
+        let states: Vec<_> = trials.iter().map(|trial| trial.state).collect();
+        assert_eq!(states, [TrialState::Fail, TrialState::Waiting], "{way:?}");
+        assert_eq!(trials[0].user_attributes["verdict"], "void", "{way:?}");
+        let cause = trials[0].user_attributes["cause"].as_str().expect("a cause");
+        assert!(cause.starts_with("operator lost"), "{way:?}: {cause}");
+
+        // Another program takes it up where it was.
+        let mut command = CommandBuilder::new(env!("CARGO_BIN_EXE_quadfrog"));
+        command.arg("--resume");
+        command.arg(&study);
+        let mut session = Session::run(folder.path(), SIZE, command);
+        session.wait_for(&["Trial #1, re-run of #0"]);
+        session.send("q");
+        assert!(session.wait().success(), "{way:?}");
+    }
+}
+
 #[test]
 fn a_hang_up_that_no_signal_tells_of_is_noticed() {
     let folder = folder();

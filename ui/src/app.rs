@@ -123,6 +123,7 @@ impl Console {
         update(&mut model, Msg::Resize(columns, rows));
         let mut screen = Screen::enter().wrap_err("the terminal cannot be used")?;
         screen.mouse(model.mouse).wrap_err("the terminal cannot be used")?;
+        terminal::stop_on_panic(feed.stop_latch());
         let now = Instant::now();
         Ok(Console {
             feed,
@@ -298,7 +299,9 @@ impl Console {
     /// Ends the session while the operator can still see and stop: sitting down takes seconds.
     fn close(mut self, inputs: &mut UnboundedReceiver<Input>) -> color_eyre::Result<Ended> {
         let ended = self.ended.unwrap_or(Ended::Quit);
-        let (heartbeat, stop) = (self.feed.heartbeat(), self.feed.stop_latch());
+        // An operator who quits still watches; whose terminal is gone, or whose program is ended from elsewhere, does not.
+        let heartbeat = self.feed.heartbeat().filter(|_| ended == Ended::Quit);
+        let stop = self.feed.stop_latch();
         if self.model.robot_needs_us() {
             say(&mut self.model, Level::Info, "the robot sits down, then the program ends".to_owned());
         }

@@ -20,6 +20,7 @@ use crossterm::terminal::{
     Clear, ClearType, EnterAlternateScreen, LeaveAlternateScreen, disable_raw_mode, enable_raw_mode, size,
 };
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
+use quadfrog::realtime::channel::StopLatch;
 use ratatui::backend::{self, Backend, CrosstermBackend, WindowSize};
 use ratatui::buffer::Cell;
 use ratatui::layout::{Position, Size};
@@ -187,6 +188,17 @@ impl Backend for OneWay {
 static ENTERED: AtomicBool = AtomicBool::new(false);
 /// Who holds it writes to the terminal: a frame as a whole, or what gives the terminal back.
 static PEN: Mutex<()> = Mutex::new(());
+/// Set by the first panic: the robot is stopped before anything else is done.
+static STOP: Mutex<Option<StopLatch>> = Mutex::new(None);
+
+/// The engine's thread that speaks to the robot.
+const CONTROL: &str = "control";
+
+/// From now on a panic in any thread sets this latch first; none where there is nothing to stop.
+pub fn stop_on_panic(stop: Option<StopLatch>) {
+    *STOP.lock().unwrap_or_else(PoisonError::into_inner) = stop;
+}
+
 /// What panicked, for the loop to see; a thread's panic must not leave a dead screen.
 static PANICKED: Mutex<Option<String>> = Mutex::new(None);
 
@@ -377,9 +389,24 @@ fn install_panic_hook() {
     }
     let report = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |info| {
-        give_back();
+        // Before anything that takes time: what unwinds next sits a robot down that nobody controls.
+        if let Some(stop) = &*STOP.lock().unwrap_or_else(PoisonError::into_inner) {
+            stop.set();
+        }
         let thread = std::thread::current();
         let name = thread.name().unwrap_or("unnamed").to_owned();
+        if name == CONTROL {
+            // It must damp the robot now and cannot wait for a terminal; the report without its colours is for another.
+            let report = info.to_string();
+            let tell = move || {
+                give_back();
+                eprintln!("{report}");
+                PANICKED.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(name);
+            };
+            let _ = std::thread::Builder::new().name("report".into()).spawn(tell);
+            return;
+        }
+        give_back();
         PANICKED.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(name);
         report(info);
     }));

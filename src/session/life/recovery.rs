@@ -10,7 +10,7 @@ use super::watch::Watch;
 use super::{Life, Refusal};
 use crate::optimize::study::{Outcome, StudyError, Told};
 use crate::optimize::trial::{Trial, TrialState};
-use crate::recording::record::{Record, Source};
+use crate::recording::record::{Record, Source, Stage, Verdict};
 
 impl Life {
     /// What a crash of this session's forerunner left behind.
@@ -20,6 +20,29 @@ impl Life {
         let running: Vec<Trial> = self.study.running().filter(left).cloned().collect();
         for trial in running {
             self.close_trial(&trial, "interrupted: the program ended before the verdict")?;
+        }
+        self.queue_owed()
+    }
+
+    /// The session ends: a trial that ended without being one (its operator is gone, it was stopped) is void with its cause
+    /// and comes again, as after a crash. Any other keeps waiting for a verdict until the study is opened again.
+    ///
+    /// # Errors
+    /// When the study cannot be read or written.
+    pub fn leave(&mut self) -> Result<(), StudyError> {
+        let number = self.current;
+        let Some(row) = self.rows.get_mut(&number) else { return Ok(()) };
+        if self.stage != Stage::Review || row.suggested != Some(Verdict::Void) {
+            return Ok(());
+        }
+        row.verdict = Some(Verdict::Void);
+        let cause = row.cause.clone();
+        self.show_row(number);
+        let trial = self.study.running().find(|trial| trial.number == number).cloned();
+        self.stage = Stage::Finished;
+        match trial {
+            Some(trial) => self.close_trial(&trial, &cause)?,
+            None => return Ok(()),
         }
         self.queue_owed()
     }

@@ -34,6 +34,12 @@ impl Unattended {
             self.held = true;
         }
     }
+
+    /// The control thread does not stand the robot up now; later it may.
+    pub fn arming_refused(&mut self, time_ns: u64) {
+        self.arming = false;
+        self.again_ns = time_ns + AGAIN_NS;
+    }
 }
 
 impl Supervisor {
@@ -85,8 +91,7 @@ impl Supervisor {
                 self.log(Level::Info, format!("{}: {wish}: {answer}", approval.name()), time_ns);
             }
             Err(reason) if wish.intent == Intent::Arm => {
-                self.unattended.arming = false;
-                self.unattended.again_ns = time_ns + AGAIN_NS;
+                self.unattended.arming_refused(time_ns);
                 if self.unattended.refused != reason {
                     self.log(Level::Info, format!("{} cannot arm yet: {reason}", approval.name()), time_ns);
                     self.unattended.refused = reason;

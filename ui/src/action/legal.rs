@@ -220,8 +220,12 @@ pub(super) fn in_replay(model: &Model) -> Legality {
     if model.replay.is_some() { Ok(()) } else { refuse("only in a replay") }
 }
 
+/// A stopped process sends nothing: not even the damping that a real robot lies in.
 pub(super) fn may_suspend(model: &Model) -> Legality {
-    if model.robot_needs_us() {
+    let spoken_to = !matches!(model.mode(), Mode::Offline | Mode::Observe);
+    if model.replay.is_none() && model.is_hardware() && spoken_to {
+        refuse("a suspended program sends the robot nothing, not even damping; quit it instead")
+    } else if model.robot_needs_us() {
         refuse(format!(
             "the robot is armed; {} sits it down, then the program can be suspended",
             model.keymap.key(Action::SitDown)

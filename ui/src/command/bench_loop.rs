@@ -16,9 +16,9 @@ use quadfrog::control::body::Body;
 use quadfrog::control::settings::Settings;
 use quadfrog::realtime::channel::{ScreenEnd, SessionEnd, channels};
 use quadfrog::realtime::clock::{Clock, MonotonicClock};
-use quadfrog::realtime::command::{Command, Task};
+use quadfrog::realtime::command::{Command, Permit, Task};
 use quadfrog::realtime::scheduling::{Granted, Scheduling};
-use quadfrog::realtime::telemetry::{Mode, Tick};
+use quadfrog::realtime::telemetry::{Event, Mode, Tick};
 use quadfrog::realtime::thread::{Instant, pace};
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::robot::go1::Go1;
@@ -253,6 +253,7 @@ struct Others {
     session: SessionEnd,
     screen: ScreenEnd,
     ticks: rtrb::Consumer<Tick>,
+    mode_changes: u64,
 }
 
 impl Others {
@@ -261,7 +262,9 @@ impl Others {
         self.screen.heartbeat.beat();
         while self.ticks.pop().is_ok() {}
         while self.screen.shown.pop().is_ok() {}
-        while self.session.events.pop().is_ok() {}
+        while let Ok(event) = self.session.events.pop() {
+            self.mode_changes += u64::from(matches!(event, Event::Mode { .. }));
+        }
     }
 
     fn ask(&mut self, command: Command) {
@@ -280,7 +283,8 @@ fn stand_and_measure<R: Robot>(
     measured.granted = Some(scheduling.apply());
     let clock = MonotonicClock::start();
     let (end, session, screen, ring) = channels();
-    let mut others = Others { session, screen, ticks: ring };
+    let mut others = Others { session, screen, ticks: ring, mode_changes: 0 };
+    others.attend();
     let mut body = Body::new(settings, end, clock.now_ns());
     let (mut rising, mut left, mut failed) = (0_u64, ticks, None);
     pace(PERIOD, |instant| {
@@ -293,7 +297,10 @@ fn stand_and_measure<R: Robot>(
                 Mode::Ready => rising = u64::MAX,
                 Mode::Observe => others.ask(Command::TakeControl),
                 // What is refused, because the robot has not been still for long enough, is asked again.
-                Mode::Disarmed if rising.is_multiple_of(100) => others.ask(Command::Arm),
+                Mode::Disarmed if rising.is_multiple_of(100) => {
+                    let given_ns = clock.now_ns();
+                    others.ask(Command::Arm(Permit { mode_changes: others.mode_changes, given_ns }));
+                }
                 _ => {}
             }
             if rising > LONGEST_RISE_S * 1000 && rising < u64::MAX {
