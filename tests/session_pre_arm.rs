@@ -2,6 +2,7 @@
 
 use std::sync::mpsc::{Receiver, channel};
 
+use proptest::prelude::*;
 use quadfrog::config::{Backend, Config};
 use quadfrog::control::body::Body;
 use quadfrog::control::settings::Settings;
@@ -13,7 +14,7 @@ use quadfrog::realtime::command::Task;
 use quadfrog::realtime::pre_arm::{Check, CheckState};
 use quadfrog::realtime::telemetry::{Mode, Tick};
 use quadfrog::realtime::thread::Instant;
-use quadfrog::recording::record::{CommandRecord, PreArmCheck, Record, Stamped};
+use quadfrog::recording::record::{CommandRecord, PreArmCheck, Record, Stamped, Verdict};
 use quadfrog::recording::recorder::RecorderWatch;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::robot::{Battery, JointCommand, LinkStatus, Placement, Robot, RobotError, RobotState};
@@ -409,4 +410,108 @@ fn control_is_taken_only_once_a_screen_was_heard() {
     session.supervisor.take_control();
     session.ticks(10);
     assert_eq!(session.body.mode(), Mode::Disarmed);
+}
+
+/// One thing that happens.
+#[derive(Debug, Clone, Copy)]
+enum Step {
+    Wish(fn() -> Intent),
+    Stop,
+    Tamper(fn(&mut RobotState)),
+    PowerCycle,
+    Mend,
+}
+
+fn any_step() -> impl Strategy<Value = Step> {
+    let wishes: [fn() -> Intent; 8] = [
+        || Intent::Arm,
+        || Intent::Acknowledge,
+        || Intent::Confirm(OperatorCheck::LowLevel),
+        || Intent::Confirm(OperatorCheck::Configuration),
+        || Intent::Confirm(OperatorCheck::AreaClear),
+        || Intent::SitDown,
+        || Intent::Cancel,
+        || Intent::Judge(Verdict::Void),
+    ];
+    let tampers: [fn(&mut RobotState); 4] = [
+        |state| state.motor_enabled[7] = false,
+        |state| state.motor_temperature_c[3] = 90.0,
+        |state| state.imu.gyro_body.z = 0.5,
+        |state| state.joint_velocity[4] = f64::NAN,
+    ];
+    prop_oneof![
+        3 => Just(Step::Wish(wishes[0])),
+        3 => Just(Step::Wish(wishes[1])),
+        6 => (2..wishes.len()).prop_map(move |i| Step::Wish(wishes[i])),
+        2 => Just(Step::Stop),
+        2 => (0..tampers.len()).prop_map(move |i| Step::Tamper(tampers[i])),
+        2 => Just(Step::PowerCycle),
+        4 => Just(Step::Mend),
+    ]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 24, failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// Whatever is wished and whatever happens, through the session and the control thread's body: the robot stands up only after
+    /// an accepted wish to arm, given while the operator's words of this life of the robot stood and its motors followed; and it
+    /// never jumps, as nobody approves. What stood is kept account of here, apart from the list.
+    #[test]
+    fn no_session_energises_without_arm_and_the_words_of_this_life(
+        steps in proptest::collection::vec((any_step(), 1..1500_u32), 1..25),
+        begins_cleared: bool,
+    ) {
+        let folder = tempfile::tempdir().unwrap();
+        let mut session = if begins_cleared {
+            Session::cleared(&folder)
+        } else {
+            Session::new(Backend::Hardware, Some(folder.path().to_owned()))
+        };
+        // The operator's words on the robot as it now runs; whether its motors follow.
+        let (mut low_level, mut area, mut follow) = (begins_cleared, begins_cleared, true);
+        for (step, ticks) in steps {
+            let before = session.body.mode();
+            match step {
+                Step::Wish(intent) => {
+                    let intent = intent();
+                    let answer = session.wish(intent.clone());
+                    low_level |= answer.accepted && intent == Intent::Confirm(OperatorCheck::LowLevel);
+                    area |= answer.accepted && intent == Intent::Confirm(OperatorCheck::AreaClear);
+                    if !before.energised() && session.body.mode().energised() {
+                        prop_assert!(answer.accepted && intent == Intent::Arm, "{intent:?} energises");
+                        prop_assert!(before == Mode::Disarmed && low_level && area && follow, "armed without a word");
+                    }
+                }
+                Step::Stop => session.operator.stop.set(),
+                Step::Tamper(tamper) => {
+                    session.robot.tamper = tamper;
+                    let mut state = RobotState { motor_enabled: [true; 12], ..RobotState::default() };
+                    tamper(&mut state);
+                    follow = state.motor_enabled == [true; 12];
+                }
+                Step::PowerCycle => {
+                    session.robot.silent_ms = 1;
+                    session.ticks(300);
+                    session.robot.silent_ms = 0;
+                    session.robot.reboots += 1;
+                    session.robot.tamper = |state| state.robot_time_ms = 0;
+                    session.ticks(1);
+                    session.robot.tamper = |_| {};
+                    (low_level, area, follow) = (false, false, true);
+                }
+                Step::Mend => {
+                    session.robot.tamper = |_| {};
+                    follow = true;
+                }
+            }
+            for _ in 0..ticks {
+                let before = session.body.mode();
+                session.ticks(1);
+                let mode = session.body.mode();
+                prop_assert!(before.energised() || !mode.energised(), "{mode:?} by itself");
+                prop_assert!(!matches!(mode, Mode::Countdown | Mode::Jump | Mode::Settle), "{mode:?} without approval");
+            }
+            area &= session.body.mode().energised() || !before.energised();
+        }
+    }
 }
