@@ -239,7 +239,7 @@ fn a_stopped_robot_is_acknowledged_with_k_or_enter() {
 fn an_observer_and_a_replay_send_nothing() {
     let all = ["A", "g", "o", "O", "n", "a", "f", "v", "r", "u", "m", "=", "D", "k", "C", "Enter"];
     let mut observer = Console::new();
-    observer.record(Record::Session(quadfrog::recording::record::SessionInfo { observe: true, ..session() }));
+    observer.record(Record::Session(SessionInfo { observe: true, ..session() }));
     observer.record(Record::Proposal(proposal(0, 0)));
     observer.stage(Stage::Proposed, 0);
     let mut replay = Console::proposed();
