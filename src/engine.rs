@@ -3,7 +3,7 @@
 mod control_thread;
 mod stored;
 
-pub use stored::{Opened, StoredStudy, open_stored, stored_studies, stored_study, study_files};
+pub use stored::{Opened, StoredStudy, newest_config, open_stored, stored_studies, stored_study, study_files};
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -33,7 +33,7 @@ use crate::robot::go1::link::LinkError;
 use crate::robot::{Placement, Robot};
 use crate::session::approval::Approval;
 use crate::session::intent::{Intent, Wish};
-use crate::session::life::{Life, Plan};
+use crate::session::life::{BUDGET, Life, Plan};
 use crate::session::pre_arm::PreArmList;
 use crate::session::supervisor::{Outlets, Parts, Supervisor};
 use crate::sim::{SimError, Simulator};
@@ -230,9 +230,6 @@ fn enqueue_first(study: &mut Study, point: &[(String, f64)]) -> Result<(), Study
     study.enqueue_unless(point, &[("source".to_owned(), json!("queued"))], |trials| !trials.is_empty()).map(drop)
 }
 
-/// Study attribute: how many trials are to count. Workers that join know it from here.
-const BUDGET: &str = "budget";
-
 /// The name of a study in its journal.
 pub fn study_name(task: Task, seed: u32) -> String {
     format!("{}-seed{seed}", task.name())
@@ -303,26 +300,26 @@ pub struct Prepared {
     _lock: Option<std::fs::File>,
 }
 
-/// Keeps the configuration as it runs in `config/`, or in `config-2/`, ... where an earlier session ran with another.
+/// Keeps the configuration as it runs in `config/`, or in `config-2/`, ... where the session before ran with another: the
+/// one of highest number is always the one that ran last.
 fn keep_config(options: &Options, folder: &Path) -> Result<(), EngineError> {
     let system = |what: String| move |source| EngineError::System { what, source };
-    let names = std::iter::once("config".to_owned()).chain((2..).map(|n| format!("config-{n}")));
-    for config in names.map(|name| folder.join(name)) {
-        let same = |(name, text): &(String, String)| {
-            std::fs::read_to_string(config.join(name)).is_ok_and(|kept| kept == *text)
-        };
-        if config.is_dir() {
+    let config = match newest_config(folder) {
+        None => folder.join("config"),
+        Some((number, newest)) => {
+            let same = |(name, text): &(String, String)| {
+                std::fs::read_to_string(newest.join(name)).is_ok_and(|kept| kept == *text)
+            };
             if options.config.as_run.iter().all(same) {
                 return Ok(());
             }
-            continue;
+            folder.join(format!("config-{}", number + 1))
         }
-        std::fs::create_dir(&config).map_err(system(format!("{}: cannot be made", config.display())))?;
-        for (name, text) in &options.config.as_run {
-            let path = config.join(name);
-            std::fs::write(&path, text).map_err(system(format!("{}: cannot be written", path.display())))?;
-        }
-        return Ok(());
+    };
+    std::fs::create_dir(&config).map_err(system(format!("{}: cannot be made", config.display())))?;
+    for (name, text) in &options.config.as_run {
+        let path = config.join(name);
+        std::fs::write(&path, text).map_err(system(format!("{}: cannot be written", path.display())))?;
     }
     Ok(())
 }

@@ -105,7 +105,7 @@ fn a_sound_robot_is_armed() {
 #[test]
 fn each_item_forbids_arming_by_itself() {
     type Breaks = fn(&mut Bench);
-    let table: [(Check, Breaks); 13] = [
+    let table: [(Check, Breaks); 14] = [
         (Check::StateFresh, |b| b.robot.state = Err(RobotError::Silent { age_ms: 12 })),
         (Check::Loss, |b| b.robot.link.recent_lost = 60),
         (Check::Checksums, |b| b.robot.link.recent_corrupt = 1),
@@ -117,6 +117,7 @@ fn each_item_forbids_arming_by_itself() {
         (Check::Battery, |b| b.state().battery.as_mut().unwrap().charge_percent = 29.0),
         (Check::Battery, |b| b.state().battery = None),
         (Check::MotorsCool, |b| b.state().motor_temperature_c[11] = 61.0),
+        (Check::MotorsFollow, |b| b.state().motor_enabled[7] = false),
         (Check::GyroStill, |b| b.state().imu.gyro_body.y = 0.2),
         (Check::OnTime, |b| {
             b.lateness_ns = 600_000;
@@ -157,6 +158,63 @@ fn stillness_must_last_and_lateness_is_forgotten() {
     bench.ticks(200);
     assert_eq!(bench.arm(), [Check::OnTime]);
     bench.ticks(5000);
+    assert_eq!(bench.arm(), []);
+}
+
+/// A motor that left servo mode is named, and nothing is energised. (A defect once: the other eleven were, until the next tick cut.)
+#[test]
+fn a_motor_out_of_servo_mode_is_named_before_anything_is_energised() {
+    let mut bench = Bench::new();
+    bench.state().motor_enabled[7] = false;
+    bench.state().motor_enabled[9] = false;
+    bench.ticks(1);
+    let findings = bench.cycle.readiness().findings;
+    let finding = findings.get(Check::MotorsFollow).unwrap();
+    assert_eq!((finding.measured, finding.joint), (2.0, Some(7)));
+    assert_eq!(bench.arm(), [Check::MotorsFollow]);
+}
+
+/// An old state is not a still robot. (A defect once: the same state, read a thousand times, passed for a second of stillness.)
+#[test]
+fn silence_is_not_stillness() {
+    let silent = |bench: &mut Bench, ticks: u32| {
+        let state = bench.robot.state;
+        for age_ms in 1..=ticks {
+            bench.robot.state = Err(RobotError::Silent { age_ms });
+            bench.tick(None);
+        }
+        bench.robot.state = state;
+    };
+    let moved = || {
+        let mut bench = Bench::new();
+        bench.state().imu.gyro_body.z = 1.0;
+        bench.ticks(2);
+        bench.state().imu.gyro_body.z = 0.0;
+        bench
+    };
+    // Every tenth state is new: after a second, a tenth of one has been seen.
+    let mut bench = moved();
+    for _ in 0..110 {
+        bench.ticks(1);
+        silent(&mut bench, 9);
+    }
+    bench.ticks(1);
+    assert_eq!(bench.arm(), [Check::GyroStill]);
+    bench.ticks(1000);
+    assert_eq!(bench.arm(), []);
+    // What was seen before a longer silence is forgotten, and so is what was seen before a restart.
+    let mut bench = moved();
+    bench.ticks(1500);
+    silent(&mut bench, 25);
+    bench.ticks(10);
+    bench.tick(Some(Command::Acknowledge { stops: 0 }));
+    assert_eq!(bench.arm(), [Check::GyroStill]);
+    let mut bench = Bench::new();
+    bench.state().robot_time_ms = 0;
+    bench.ticks(2);
+    bench.tick(Some(Command::Acknowledge { stops: 0 }));
+    assert_eq!(bench.arm(), [Check::GyroStill]);
+    bench.ticks(1000);
     assert_eq!(bench.arm(), []);
 }
 

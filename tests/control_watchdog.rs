@@ -283,6 +283,95 @@ fn a_gap_is_cut_at_its_limit_and_becomes_a_lost_link() {
     assert!(lost, "{:?}", bench.events);
 }
 
+/// A later fault that makes the operator's word worthless is told behind whatever came first, once; others are not.
+#[test]
+fn what_voids_the_word_is_told_behind_another_fault() {
+    let mut bench = Bench::in_mode(Mode::Ready);
+    bench.events.clear();
+    let faults: [fn(&mut Bench); 5] = [
+        |b| b.robot.tamper = |s| s.joint_position[2] = -0.7,
+        |b| b.robot.tamper = |s| s.motor_temperature_c[0] = 85.0,
+        |b| b.robot.tamper = |s| s.motor_enabled[5] = false,
+        |b| b.robot.silent_ms = 1,
+        |b| b.robot.tamper = |s| (s.robot_time_ms, s.joint_velocity[1]) = (3, f64::NAN),
+    ];
+    for inject in faults {
+        inject(&mut bench);
+        bench.ticks(300);
+        bench.robot.tamper = |_| {};
+        bench.robot.silent_ms = 0;
+    }
+    let told: Vec<Fault> = bench
+        .events
+        .iter()
+        .filter_map(|event| match event {
+            Event::Mode { to: Mode::Fault, cause: Cause::Fault(fault), .. } => Some(*fault),
+            _ => None,
+        })
+        .collect();
+    assert!(
+        matches!(
+            told[..],
+            [Fault::JointPosition { .. }, Fault::MotorMode { joint: 5 }, Fault::LinkLost { .. }, Fault::Reboot]
+        ),
+        "{told:?}"
+    );
+}
+
+/// The robot's clock of 32 bits begins anew after 49 days: no restart, as the link counts none.
+#[test]
+fn a_clock_that_runs_over_is_no_restart() {
+    let mut bench = Bench::new();
+    let clocks: [fn(&mut RobotState); 3] =
+        [|s| s.robot_time_ms = u32::MAX - 1, |s| s.robot_time_ms = u32::MAX, |s| s.robot_time_ms = 0];
+    // From 1.5 s to just before the end of the clock counts as backwards: acknowledged, and on from there.
+    for (n, clock) in clocks.into_iter().enumerate() {
+        bench.robot.tamper = clock;
+        bench.ticks(1);
+        if n == 0 {
+            bench.tick(Some(Command::Acknowledge { stops: 0 }));
+        }
+        assert_eq!(bench.cycle.mode(), Mode::Disarmed, "{:?}", bench.events.last());
+    }
+    bench.events.clear();
+    bench.robot.tamper = |s| s.robot_time_ms = u32::MAX - 1;
+    bench.ticks(1);
+    assert!(matches!(bench.fault(), Some(Fault::Reboot)), "{:?}", bench.fault());
+}
+
+/// Who tips over while the jump is judged is damped as soon as one that stands ready, and fell: no fault stands in the way of the
+/// verdict. (A defect once: only 1.0 rad cut.)
+#[test]
+fn a_robot_that_tips_over_in_review_is_damped_at_the_limit_of_standing() {
+    let tips: [fn(&mut RobotState); 2] =
+        [|state| tilt(state, Vector3::x_axis(), 0.36), |state| tilt(state, Vector3::y_axis(), -0.36)];
+    for tips_over in tips {
+        let mut bench = Bench::in_mode(Mode::Review);
+        bench.robot.tamper = |state| tilt(state, Vector3::x_axis(), 0.34);
+        bench.ticks(50);
+        assert_eq!(bench.cycle.mode(), Mode::Review);
+        bench.robot.tamper = tips_over;
+        assert_eq!(bench.ticks_until_damping(20), Some(1));
+        let fell = |event: &Event| {
+            matches!(
+                event,
+                Event::Mode {
+                    from: Mode::Review,
+                    to: Mode::Damped,
+                    cause: Cause::Fell(
+                        FallCause::Roll { allowed_rad: 0.35, .. } | FallCause::Pitch { allowed_rad: 0.35, .. }
+                    ),
+                    ..
+                }
+            )
+        };
+        assert!(bench.events.iter().any(fell), "{:?}", bench.events);
+        bench.robot.tamper = |_| {};
+        bench.tick(Some(Command::EndReview));
+        assert_eq!(bench.cycle.mode(), Mode::Disarmed, "the verdict is its acknowledgement; arming is another matter");
+    }
+}
+
 /// Five control periods in a row of more than twice the period; four are forgiven.
 #[test]
 fn slow_periods_are_counted_and_cut() {
@@ -475,12 +564,14 @@ fn an_operator_lost_between_jumps_ends_the_series() {
 /// A robot that stands and waits sits down after its time, on hardware.
 #[test]
 fn an_idle_robot_sits_down() {
-    let mut bench = Bench::in_mode(Mode::Ready);
-    bench.ticks((bench.settings.idle_s * 1000.0) as u32 - 10);
-    assert_eq!(bench.cycle.mode(), Mode::Ready);
-    bench.ticks(20);
-    assert_eq!(bench.cycle.mode(), Mode::SitDown);
-    assert!(bench.events.iter().any(|event| matches!(event, Event::Mode { cause: Cause::Idle { .. }, .. })));
+    for mode in [Mode::Ready, Mode::Review] {
+        let mut bench = Bench::in_mode(mode);
+        bench.ticks((bench.settings.idle_s * 1000.0) as u32 - 10);
+        assert_eq!(bench.cycle.mode(), mode);
+        bench.ticks(20);
+        assert_eq!(bench.cycle.mode(), Mode::SitDown);
+        assert!(bench.events.iter().any(|event| matches!(event, Event::Mode { cause: Cause::Idle { .. }, .. })));
+    }
 }
 
 /// An approval is for once, now, and this mode: used up, outlived or overtaken it starts nothing.

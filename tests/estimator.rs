@@ -191,6 +191,35 @@ fn a_wrong_velocity_is_given_up() {
     assert!((estimate.velocity_world.x - 0.5).abs() < 0.1, "{}", estimate.velocity_world);
 }
 
+/// By 3 m/s, that is, from an accelerometer that was mad for ten milliseconds. (A bug once: what was forgotten was how sure the
+/// velocity is, not the velocity; no standing foot was ever believed again, and a robot that stood flew off by 23 m.)
+#[test]
+fn a_velocity_that_no_foot_could_have_is_given_up_and_the_way_taken_back() {
+    let mut feed = Feed::standing();
+    let start = feed.run(1_000).position_world;
+    feed.state.imu.accel_body.x = 300.0;
+    assert!(feed.run(10).velocity_world.x > 2.0);
+    feed.state.imu.accel_body.x = 0.0;
+    let estimate = feed.run(250);
+    assert!(estimate.velocity_world.norm() < 0.02, "{}", estimate.velocity_world);
+    assert!((estimate.position_world - start).norm() < 0.05, "{}", estimate.position_world);
+}
+
+/// An impact is the last that was seen of a gap: it did not last as long as that. (A bug once: it was taken for the whole gap,
+/// with the certainty of a sample.)
+#[test]
+fn a_knock_at_the_end_of_a_gap_is_not_the_whole_gap() {
+    let mut feed = Feed::standing();
+    let start = feed.run(1_000).position_world;
+    feed.state.imu.accel_body.x = 200.0;
+    feed.state.robot_time_ms += 14;
+    feed.run(1);
+    feed.state.imu.accel_body.x = 0.0;
+    let estimate = feed.run(20);
+    assert!(estimate.velocity_world.norm() < 0.05, "{}", estimate.velocity_world);
+    assert!((estimate.position_world - start).norm() < 0.01, "{}", estimate.position_world);
+}
+
 #[test]
 fn one_number_that_is_none_spoils_nothing() {
     let spoil: [fn(&mut RobotState); 6] = [

@@ -15,7 +15,7 @@ use quadfrog::realtime::clock::SimulatedClock;
 use quadfrog::realtime::command::{Command, JumpParameters, Permit, Task, TrialSpec};
 use quadfrog::realtime::telemetry::{Cause, Event, Fault, Mode, Objection, Tick, TrialEnd};
 use quadfrog::robot::go1::Go1;
-use quadfrog::robot::go1::packet::{CrcForm, LowCmd, MODE_SERVO, POSITION_STOP};
+use quadfrog::robot::go1::packet::{CrcForm, LowCmd, LowState, MODE_SERVO, POSITION_STOP};
 use quadfrog::robot::{JOINTS, LEGS, LinkStatus, Robot};
 use quadfrog::sim::emulator::Emulator;
 
@@ -26,6 +26,8 @@ struct Tap {
     controller: Option<SocketAddr>,
     /// The last command that passed in this millisecond.
     command: Option<LowCmd>,
+    /// Every state reports an orientation of four zeros, which is no rotation.
+    no_rotation: bool,
 }
 
 impl Tap {
@@ -37,7 +39,7 @@ impl Tap {
         };
         let (to_controller, to_robot) = (socket(), socket());
         to_robot.connect(robot).unwrap();
-        Tap { to_controller, to_robot, controller: None, command: None }
+        Tap { to_controller, to_robot, controller: None, command: None, no_rotation: false }
     }
 
     fn carry_commands(&mut self) {
@@ -53,7 +55,15 @@ impl Tap {
     fn carry_states(&mut self) {
         let mut buffer = [0; 2048];
         while let Ok(length) = self.to_robot.recv(&mut buffer) {
-            self.to_controller.send_to(&buffer[..length], self.controller.unwrap()).unwrap();
+            let controller = self.controller.unwrap();
+            if self.no_rotation {
+                let mut state = *LowState::judge(&buffer[..length]).unwrap();
+                state.imu.quaternion = Default::default();
+                state.seal();
+                self.to_controller.send_to(state.bytes(), controller).unwrap();
+            } else {
+                self.to_controller.send_to(&buffer[..length], controller).unwrap();
+            }
         }
     }
 }
@@ -75,9 +85,15 @@ struct Bench {
 
 impl Bench {
     fn new() -> Bench {
-        let mut config = Config::load(None).unwrap();
         // Fast enough that the clock, not the silence, is what gives the restart away.
-        config.simulator.emulator.reboot_ms = 5;
+        Bench::restarting_in(Some(5))
+    }
+
+    /// A robot that needs so long for a restart, ms; as long as the configuration says if none is given.
+    fn restarting_in(reboot_ms: Option<u32>) -> Bench {
+        let mut config = Config::load(None).unwrap();
+        let emulated = &mut config.simulator.emulator;
+        emulated.reboot_ms = reboot_ms.unwrap_or(emulated.reboot_ms);
         let settings = config.settings(&description(ANY_PORT), Task::Forward, Backend::Hardware).unwrap();
         let emulator = Emulator::bind(ANY_PORT, &description(ANY_PORT), &config.simulator, 0).unwrap();
         let tap = Tap::new(emulator.local_address().unwrap());
@@ -143,7 +159,11 @@ impl Bench {
 
     /// A robot in `mode`, on the way that an operator takes.
     fn in_mode(mode: Mode) -> Bench {
-        let mut bench = Bench::new();
+        Bench::new().brought_to(mode)
+    }
+
+    fn brought_to(self, mode: Mode) -> Bench {
+        let mut bench = self;
         bench.until(Mode::Observe);
         bench.tick(Some(Command::TakeControl));
         // Until the list before arming has seen enough of it: a second of stillness, and of ticks on time.
@@ -163,7 +183,10 @@ impl Bench {
             return bench;
         }
         bench.until(Mode::Ready);
-        if mode != Mode::Ready {
+        if mode == Mode::SitDown {
+            bench.tick(Some(Command::SitDown));
+            assert_eq!(bench.cycle.mode(), mode);
+        } else if mode != Mode::Ready {
             let approval = bench.approval();
             bench.tick(Some(approval));
             bench.until(mode);
@@ -222,11 +245,22 @@ struct Row {
     told: fn(&Cause) -> bool,
 }
 
-const ENERGISED: &[Mode] = &[Mode::StandUp, Mode::Ready, Mode::Countdown, Mode::Jump];
-const STANDING: &[Mode] = &[Mode::StandUp, Mode::Ready, Mode::Countdown];
-const SENT_TO: &[Mode] = &[Mode::Disarmed, Mode::StandUp, Mode::Ready, Mode::Countdown, Mode::Jump];
+const ENERGISED: &[Mode] =
+    &[Mode::StandUp, Mode::Ready, Mode::Countdown, Mode::Jump, Mode::Settle, Mode::Review, Mode::SitDown];
+/// Not SETTLE, in which a landing swings, nor SITDOWN, in which a robot may lean.
+const STANDING: &[Mode] = &[Mode::StandUp, Mode::Ready, Mode::Countdown, Mode::Review];
+const SENT_TO: &[Mode] = &[
+    Mode::Disarmed,
+    Mode::StandUp,
+    Mode::Ready,
+    Mode::Countdown,
+    Mode::Jump,
+    Mode::Settle,
+    Mode::Review,
+    Mode::SitDown,
+];
 
-const CUT: [Row; 15] = [
+const CUT: [Row; 16] = [
     Row {
         name: "STOP key",
         modes: SENT_TO,
@@ -277,6 +311,13 @@ const CUT: [Row; 15] = [
         told: |cause| matches!(cause, Cause::Fault(Fault::NotFinite { .. })),
     },
     Row {
+        name: "the orientation is no rotation",
+        modes: SENT_TO,
+        injection: Thread(|bench| bench.tap.no_rotation = true),
+        bad: |_, tick| tick.state.imu.orientation_world.w.is_nan(),
+        told: |cause| matches!(cause, Cause::Fault(Fault::NotFinite { .. })),
+    },
+    Row {
         name: "a burst of corrupt datagrams",
         modes: SENT_TO,
         injection: ToRobot("corrupt 100"),
@@ -295,7 +336,8 @@ const CUT: [Row; 15] = [
         modes: STANDING,
         injection: ToRobot("tilt 0.4"),
         bad: |_, tick| tick.estimate.roll_pitch_yaw.x > 0.35,
-        told: |cause| matches!(cause, Cause::Fault(Fault::Tilt { .. })),
+        // In REVIEW it is a fall.
+        told: |cause| matches!(cause, Cause::Fault(Fault::Tilt { .. }) | Cause::Fell(_)),
     },
     Row {
         name: "tilt of 1.1 rad anywhere",
@@ -412,6 +454,32 @@ fn a_silence_of_more_than_200_ms_is_a_lost_link() {
     assert!(bench.wire_damps());
 }
 
+/// The robot is switched off and on again while another fault stands, and needs as long for it as a real one: the operator is
+/// told of the lost link and of the restart. (A defect once: the first fault was the last that was told.)
+#[test]
+fn a_power_cycle_behind_another_fault_is_told() {
+    let mut bench = Bench::restarting_in(None).brought_to(Mode::Ready);
+    assert!(bench.config.simulator.emulator.reboot_ms > bench.settings.watchdog.link_lost_ms);
+    bench.emulator.apply("angle FL_hip 1.3".parse().unwrap());
+    bench.until(Mode::Fault);
+    bench.emulator.apply("clear".parse().unwrap());
+    for _ in 0..100 {
+        bench.tick(None);
+    }
+    bench.emulator.apply("reboot".parse().unwrap());
+    for _ in 0..3000 {
+        bench.tick(None);
+    }
+    let faults = bench.events.iter().filter_map(|event| match event {
+        Event::Mode { to: Mode::Fault, cause: Cause::Fault(fault), .. } => Some(*fault),
+        _ => None,
+    });
+    let told: Vec<Fault> = faults.collect();
+    assert!(matches!(told[..], [Fault::JointPosition { .. }, Fault::LinkLost { .. }, Fault::Reboot]), "{told:?}");
+    assert_eq!(bench.link().reboots, 1);
+    assert!(bench.wire_damps());
+}
+
 /// LAND: an operator who is gone lets the robot sit down, also in mid-jump, where it lands first.
 #[test]
 fn an_operator_who_is_gone_lets_it_land_and_sit_down() {
@@ -484,4 +552,25 @@ fn after_a_restart_the_robot_is_put_back_and_jumps_again() {
     let approval = bench.approval();
     bench.tick(Some(approval));
     bench.until(Mode::Review);
+}
+
+/// Where a robot was thought to be before a person carried it back means nothing. (A bug once: only a simulated robot, which is
+/// put in place by the program, began anew.)
+#[test]
+fn a_robot_that_is_armed_begins_at_the_origin() {
+    let mut bench = Bench::in_mode(Mode::Review);
+    let jumped = bench.tick(None).estimate.position_world;
+    assert!(jumped.xy().norm() > 0.1, "{jumped}");
+    bench.tick(Some(Command::SitDown));
+    bench.until(Mode::Disarmed);
+    bench.emulator.apply("place".parse().unwrap());
+    for _ in 0..1500 {
+        bench.tick(None);
+    }
+    let armed = bench.tick(Some(bench.arm()));
+    assert_eq!(armed.mode, Mode::StandUp, "{:?}", bench.cycle.readiness());
+    bench.until(Mode::Ready);
+    let place = bench.tick(None).estimate.position_world;
+    let truth = bench.emulator.status().truth.unwrap().position_world;
+    assert!((place - truth).norm() < 0.03, "thought at {place}, is at {truth}");
 }

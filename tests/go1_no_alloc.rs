@@ -1,5 +1,5 @@
-//! Nothing allocates when the Go1's link reads and writes, whatever comes: a counting allocator watches thousands of ticks over
-//! good, bad, silent and dead networks.
+//! Nothing allocates when the Go1's link reads and writes, whatever comes: an allocator that ends the process on the spot watches
+//! a jump and thousands of ticks over good, bad, silent and dead networks.
 #![allow(
     unsafe_code,
     reason = "an allocator can only be written with unsafe; this one hands everything to the system's"
@@ -10,83 +10,143 @@ mod go1;
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
+use std::collections::BTreeSet;
 use std::net::UdpSocket;
 
 use go1::{ANY_PORT, description, pair};
 use quadfrog::config::{Backend, Config};
-use quadfrog::control::cycle::{Cycle, Inputs};
+use quadfrog::control::body::Body;
+use quadfrog::realtime::channel::channels;
 use quadfrog::realtime::clock::SimulatedClock;
-use quadfrog::realtime::command::{Command, Permit, Task};
+use quadfrog::realtime::command::{Command, JumpParameters, Permit, Task, TrialSpec};
+use quadfrog::realtime::telemetry::{Event, Mode};
+use quadfrog::realtime::thread::Instant;
 use quadfrog::robot::go1::Go1;
 use quadfrog::robot::{JointCommand, Robot};
 use quadfrog::sim::emulator::Fault;
 
 thread_local! {
-    static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };
+    static FORBIDDEN: Cell<bool> = const { Cell::new(false) };
 }
 
-struct Counting;
+struct Forbidding;
 
-// SAFETY: every call goes unchanged to the system's allocator; counting touches only a thread-local number.
-unsafe impl GlobalAlloc for Counting {
+/// Ends the process: a panic would allocate its message.
+fn not_now() {
+    if FORBIDDEN.with(Cell::get) {
+        // What is said must not allocate either.
+        let _ = nix::unistd::write(std::io::stderr(), b"the link allocated or freed memory\n");
+        std::process::abort();
+    }
+}
+
+// SAFETY: every call goes unchanged to the system's allocator; the check touches only a thread-local flag.
+unsafe impl GlobalAlloc for Forbidding {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ALLOCATIONS.with(|count| count.set(count.get() + 1));
+        not_now();
         // SAFETY: the caller's promises are passed on.
         unsafe { System.alloc(layout) }
     }
 
     unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        not_now();
         // SAFETY: the caller's promises are passed on.
         unsafe { System.dealloc(pointer, layout) }
     }
 }
 
 #[global_allocator]
-static COUNTING: Counting = Counting;
+static FORBIDDING: Forbidding = Forbidding;
 
-/// How often `work` allocates.
-fn allocations(work: impl FnOnce()) -> u64 {
-    let before = ALLOCATIONS.with(Cell::get);
-    work();
-    ALLOCATIONS.with(Cell::get) - before
+fn without_allocation<T>(act: impl FnOnce() -> T) -> T {
+    FORBIDDEN.with(|forbidden| forbidden.set(true));
+    let result = act();
+    FORBIDDEN.with(|forbidden| forbidden.set(false));
+    result
 }
 
+/// The watchman itself: an allocation where none is allowed ends the process.
 #[test]
-fn the_counter_counts() {
-    assert!(allocations(|| drop(std::hint::black_box(vec![1.0; 100]))) > 0);
+fn an_allocation_would_be_noticed() {
+    const CHILD: &str = "QUADFROG_ALLOCATES";
+    if std::env::var_os(CHILD).is_some() {
+        without_allocation(|| std::hint::black_box(vec![1.0; 100]));
+        return;
+    }
+    let program = std::env::current_exe().unwrap();
+    let arguments = ["an_allocation_would_be_noticed", "--exact", "--test-threads=1"];
+    let output = std::process::Command::new(program).args(arguments).env(CHILD, "1").output().unwrap();
+    assert!(!output.status.success(), "{output:?}");
+    assert!(String::from_utf8_lossy(&output.stderr).contains("the link allocated"), "{output:?}");
 }
 
-/// Standing up over a network that loses, doubles, spoils and delays, then a restart: every branch of the link.
+/// The control thread's body over the link: standing up, a jump and its review on a good network; then one that loses, doubles,
+/// spoils and delays, and a restart: every branch of the link.
 #[test]
 fn a_tick_over_the_link_does_not_allocate() {
     let config = Config::load(None).unwrap();
     let (mut emulator, mut go1) = pair(&config.simulator, 1);
     let settings = config.settings(&description(ANY_PORT), Task::Forward, Backend::Hardware).unwrap();
-    let mut cycle = Cycle::new(&settings);
-    let mut total = 0;
-    for ms in 0..6000 {
-        if ms == 1000 {
-            for fault in ["loss 5", "duplicate 5", "corrupt 5", "jitter 3"] {
-                emulator.apply(fault.parse().unwrap());
-            }
-        } else if ms == 4000 {
-            emulator.apply(Fault::Reboot);
+    let (control, mut session, screen, mut recorder) = channels();
+    let mut body = Body::new(&settings, control, 0);
+    let (mut ms, mut mode_changes, mut seen) = (0, 0, BTreeSet::new());
+    let mut ticks = |count: u32, until: Option<Mode>, command: Option<fn(Permit, &Config) -> Command>| {
+        if let Some(command) = command {
+            let permit = Permit { mode_changes, given_ns: ms * 1_000_000 };
+            session.commands.push(command(permit, &config)).unwrap();
         }
-        let command = match ms {
-            20 => Some(Command::TakeControl),
-            // Two changes: heard, and taken control of.
-            100 => Some(Command::Arm(Permit { mode_changes: 2, given_ns: ms * 1_000_000 })),
-            _ => None,
-        };
-        let inputs = Inputs { command, time_ns: ms * 1_000_000, ..Inputs::default() };
-        total += allocations(|| {
-            let _ = cycle.tick(&inputs, &SimulatedClock, &mut go1);
-        });
-        emulator.step();
+        for _ in 0..count {
+            screen.heartbeat.beat();
+            let instant = Instant { planned_ns: ms * 1_000_000, lateness_ns: 0 };
+            let mode = without_allocation(|| body.tick(instant, &SimulatedClock, &mut go1).mode);
+            ms += 1;
+            seen.insert(mode.name());
+            while let Ok(event) = session.events.pop() {
+                mode_changes += u64::from(matches!(event, Event::Mode { .. }));
+            }
+            let _ = recorder.pop();
+            emulator.step();
+            if until == Some(mode) {
+                return;
+            }
+            if ms == 20_000 {
+                for fault in ["loss 5", "duplicate 5", "corrupt 5", "jitter 3"] {
+                    emulator.apply(fault.parse().unwrap());
+                }
+            } else if ms == 23_000 {
+                emulator.apply(Fault::Reboot);
+            }
+        }
+        assert_eq!(until, None, "never reached after {count} ticks");
+    };
+    ticks(100, Some(Mode::Observe), None);
+    ticks(1500, None, Some(|_, _| Command::TakeControl));
+    ticks(3000, Some(Mode::Ready), Some(|permit, _| Command::Arm(permit)));
+    ticks(
+        12_000,
+        Some(Mode::Review),
+        Some(|permit, config| {
+            let control = config.task(Task::Forward);
+            let spec = TrialSpec {
+                trial: 0,
+                task: Task::Forward,
+                jump: JumpParameters { f0_hz: 1.3, f1_hz: 0.0, fx_n: 60.0, fy_n: 0.0, fz_n: 270.0 },
+                gains: control.gains(),
+                stance_leg: control.stance_leg(),
+                vmc: control.vmc,
+                jumps: 1,
+                seed: 0,
+            };
+            Command::RunTrial(spec, permit)
+        }),
+    );
+    ticks(26_000, None, None);
+    for mode in [Mode::StandUp, Mode::Ready, Mode::Countdown, Mode::Jump, Mode::Settle, Mode::Review, Mode::Fault] {
+        assert!(seen.contains(mode.name()), "{mode:?} is not among {seen:?}");
     }
     let link = go1.link().unwrap();
     assert!(link.corrupt > 50 && link.duplicate > 50 && link.lost > 50 && link.late > 50, "{link:?}");
-    assert_eq!(total, 0);
+    assert_eq!(link.reboots, 1);
 }
 
 #[test]
@@ -98,18 +158,17 @@ fn a_dead_port_and_a_flood_do_not_make_it_allocate() {
     for _ in 0..60 {
         socket.send(&[0; 900]).unwrap();
     }
-    let flood = allocations(|| {
+    without_allocation(|| {
         for _ in 0..10 {
             let _ = go1.read();
         }
     });
     assert_eq!(go1.link().unwrap().foreign, 60);
     drop(socket);
-    let dead = allocations(|| {
+    without_allocation(|| {
         for _ in 0..1000 {
             let _ = go1.write(&JointCommand::damping(3.0));
             let _ = go1.read();
         }
     });
-    assert_eq!((flood, dead), (0, 0));
 }

@@ -4,6 +4,7 @@
 #[path = "support/go1.rs"]
 mod go1;
 
+use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -19,7 +20,7 @@ use quadfrog::realtime::thread::pace;
 use quadfrog::recording::record::{Proposal, Record, Stage, StageInfo, TrialRecord, Verdict};
 
 use quadfrog::robot::description::RobotDescription;
-use quadfrog::robot::{LinkStatus, Robot};
+use quadfrog::robot::{LinkStatus, Robot, Truth};
 use quadfrog::session::automatic;
 use quadfrog::session::intent::{Intent, OperatorCheck};
 use quadfrog::session::rollout::Rollout;
@@ -89,6 +90,8 @@ impl Drop for LivingRobot {
 struct Outcome {
     best: f64,
     rows: Vec<TrialRecord>,
+    /// How far the robot really jumped in each trial, m.
+    in_truth: BTreeMap<u32, f64>,
     link: LinkStatus,
     stops: u32,
 }
@@ -99,7 +102,10 @@ struct Operator {
     robot: EmulatorHandle,
     stage: Option<StageInfo>,
     card: Option<Proposal>,
-    rows: std::collections::BTreeMap<u32, TrialRecord>,
+    rows: BTreeMap<u32, TrialRecord>,
+    /// Where the robot really stood when the trial was approved.
+    stood: Option<Truth>,
+    in_truth: BTreeMap<u32, f64>,
     /// The mode in which something was wished last: once a mode is enough.
     wished_in: Option<(Mode, Option<Stage>, u32)>,
     stops: u32,
@@ -135,6 +141,10 @@ impl Operator {
         match (mode, stage) {
             (_, Some(Stage::Review)) if mode != Mode::Settle && mode != Mode::Jump => {
                 let row = self.rows.get(&trial)?;
+                if let (Some(from), Some(to)) = (self.stood.take(), self.robot.status().truth) {
+                    let moved = from.orientation_world.inverse() * (to.position_world - from.position_world);
+                    self.in_truth.insert(trial, moved.x);
+                }
                 Some(match row.suggested? {
                     // Something else than the parameters was the cause: the same again.
                     Verdict::Void => Intent::Rerun { trial: None },
@@ -160,6 +170,7 @@ impl Operator {
             }
             (Mode::Ready, Some(Stage::Proposed)) => {
                 let card = self.card.as_ref()?;
+                self.stood = self.robot.status().truth;
                 Some(Intent::Approve { trial: card.trial, revision: card.revision })
             }
             _ => None,
@@ -200,7 +211,9 @@ fn over_the_network(seed: u32, trials: u32, late_ms: f64) -> Outcome {
         robot: robot.handle.clone(),
         stage: None,
         card: None,
-        rows: Default::default(),
+        rows: BTreeMap::default(),
+        stood: None,
+        in_truth: BTreeMap::default(),
         wished_in: None,
         stops: 0,
         stop_tested: false,
@@ -211,7 +224,7 @@ fn over_the_network(seed: u32, trials: u32, late_ms: f64) -> Outcome {
     let best = accepted.filter_map(|row| row.value).fold(0.0, f64::max);
     let rows = operator.rows.into_values().collect();
     operator.engine.shutdown();
-    Outcome { best, rows, link, stops: operator.stops }
+    Outcome { best, rows, in_truth: operator.in_truth, link, stops: operator.stops }
 }
 
 /// A study without threads: what it finds in simulated time.
@@ -244,9 +257,19 @@ fn median(values: &[f64]) -> f64 {
 fn tell(seed: u32, outcome: &Outcome) {
     for row in &outcome.rows {
         let value = row.value.map_or_else(|| "     ".to_owned(), |value| format!("{value:.3}"));
-        println!("seed {seed} trial {:>2} {value} {:?}: {}; {:?}", row.trial, row.verdict, row.cause, row.measured);
+        let truth = outcome.in_truth.get(&row.trial).copied().unwrap_or(f64::NAN);
+        println!(
+            "seed {seed} trial {:>2} {value} {:?}: {}; in truth {truth:.3} m, {:?}",
+            row.trial, row.verdict, row.cause, row.measured
+        );
     }
     println!("seed {seed}: best {:.3} m, {} stops, {:?}", outcome.best, outcome.stops, outcome.link);
+}
+
+/// By how much the accepted jumps were measured too long or too short, m.
+fn measured_wrong_by(outcome: &Outcome) -> Vec<f64> {
+    let accepted = outcome.rows.iter().filter(|row| row.verdict == Some(Verdict::Accept));
+    accepted.filter_map(|row| Some((row.value? - outcome.in_truth.get(&row.trial)?).abs())).collect()
 }
 
 /// Twenty trials on each of five robots over loopback, millisecond by millisecond; their best jumps beside the simulator's.
@@ -308,6 +331,10 @@ fn a_study_in_real_time_ends_as_one_in_the_simulator() {
     for (seed, outcome) in &outcomes {
         tell(*seed, outcome);
     }
+    let errors: Vec<f64> = outcomes.iter().flat_map(|(_, outcome)| measured_wrong_by(outcome)).collect();
+    let most = errors.iter().copied().fold(0.0, f64::max);
+    println!("{} jumps measured: wrong by {:.4} m in the median, {most:.4} m at most", errors.len(), median(&errors));
+    assert!(median(&errors) <= 0.03, "the measure is not what the robot did: {errors:.3?}");
     let network: Vec<f64> = outcomes.iter().map(|(_, outcome)| outcome.best).collect();
     let simulator: Vec<f64> = (0..5).map(|seed| in_the_simulator(seed).0).collect();
     compare(&network, &simulator);

@@ -3,12 +3,17 @@
 #[path = "support/life.rs"]
 mod support;
 
+use std::time::Duration;
+
 use quadfrog::optimize::study::Storage;
-use quadfrog::optimize::trial::TrialState;
+use quadfrog::optimize::trial::{Trial, TrialState};
 use quadfrog::realtime::telemetry::{FallCause, TrialEnd};
 use quadfrog::recording::record::{Record, Source, Stage, Verdict};
-use quadfrog::session::life::Life;
-use support::{accept, far, life, open, parameters, run, study, ticks};
+use quadfrog::session::life::{BUDGET, Life};
+use support::{accept, far, joined, life, open, parameters, run, study, ticks};
+
+/// How long no test lasts.
+const PATIENT: Duration = Duration::from_secs(3600);
 
 #[test]
 fn an_accepted_trial_counts_with_its_measured_value() {
@@ -292,4 +297,74 @@ fn the_records_tell_what_the_study_holds() {
         assert_eq!(trial.value, row.value, "trial {}", trial.number);
         assert_eq!(trial.parameters, row.parameters, "trial {}", trial.number);
     }
+}
+
+/// (A defect once: the age of a trial was the difference of two hosts' clocks, and one that ran ahead voided every trial of
+/// the others.)
+#[test]
+fn a_worker_whose_clock_is_behind_keeps_its_trial() {
+    let folder = tempfile::tempdir().unwrap();
+    let journal = folder.path().join("study.log");
+    let mut theirs = joined(folder.path(), 1000, PATIENT);
+    let card = theirs.proposal().unwrap();
+    let spec = theirs.approve(card.trial, card.revision).unwrap();
+    // Its clock is a century behind ours; no line becomes longer by that.
+    let text = std::fs::read_to_string(&journal).unwrap();
+    let behind = text.replace("\"datetime_start\": \"20", "\"datetime_start\": \"19");
+    let behind = behind.replace("\"datetime_start\":\"20", "\"datetime_start\":\"19");
+    assert_ne!(behind, text);
+    std::fs::write(&journal, behind).unwrap();
+    let mut ours = joined(folder.path(), 1000, PATIENT);
+    ours.look().unwrap();
+    assert!(ours.others_run(), "it is alive");
+    theirs.ended(spec.trial, &TrialEnd::Settled, &ticks(spec.trial, far(&spec)));
+    theirs.judge(Verdict::Accept, false).unwrap();
+    theirs.close().unwrap();
+    ours.look().unwrap();
+    assert_eq!(ours.row(spec.trial).unwrap().verdict, Some(Verdict::Accept));
+    assert!(!ours.others_run());
+}
+
+#[test]
+fn a_trial_that_was_seen_running_for_too_long_is_void_and_comes_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut theirs = joined(folder.path(), 1000, PATIENT);
+    let card = theirs.proposal().unwrap();
+    let spec = theirs.approve(card.trial, card.revision).unwrap();
+    drop(theirs);
+    let mut ours = joined(folder.path(), 1000, Duration::from_millis(1));
+    std::thread::sleep(Duration::from_millis(20));
+    ours.look().unwrap();
+    assert_eq!(ours.row(spec.trial).unwrap().verdict, Some(Verdict::Void));
+    let card = ours.proposal().unwrap();
+    assert_eq!((card.source, card.parent), (Source::Rerun, Some(spec.trial)));
+}
+
+/// (A defect once: the verdict's teller did not look whether another worker had paid the debt already.)
+#[test]
+fn a_rerun_that_another_worker_has_queued_comes_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut slow = joined(folder.path(), 1000, PATIENT);
+    let first = run(&mut slow, TrialEnd::Stopped);
+    slow.judge(Verdict::Void, true).unwrap();
+    // Judged and not told yet: another worker takes its owner for dead, tells it and queues it again.
+    let mut other = joined(folder.path(), 1000, Duration::from_millis(1));
+    std::thread::sleep(Duration::from_millis(20));
+    other.look().unwrap();
+    let again = run(&mut slow, TrialEnd::Settled);
+    assert_eq!((again.jump, slow.row(again.trial).unwrap().parent), (first.jump, Some(first.trial)));
+    let study = study(Storage::File(folder.path().join("study.log")));
+    let parent =
+        |trial: &&Trial| trial.user_attributes.get("parent").and_then(|p| p.as_u64()) == Some(u64::from(first.trial));
+    assert_eq!(study.trials().iter().filter(parent).count(), 1);
+}
+
+#[test]
+fn a_raised_budget_is_kept_with_the_study() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut life = open(folder.path());
+    life.extend(5).unwrap();
+    drop(life);
+    let study = study(Storage::File(folder.path().join("study.log")));
+    assert_eq!(study.attributes()[BUDGET].as_u64(), Some(1005));
 }

@@ -5,13 +5,14 @@
 mod support;
 
 use std::collections::BTreeMap;
+use std::time::Duration;
 
 use quadfrog::optimize::insight::IMPORTANCE_TRIALS;
 use quadfrog::optimize::study::Storage;
 use quadfrog::realtime::telemetry::{FallCause, TrialEnd};
 use quadfrog::recording::record::{Fixed, Insight, PointRecord, Record, Search, Source, Stage, Verdict};
-use quadfrog::session::life::Life;
-use support::{accept, far, life, open, run, study, ticks};
+use quadfrog::session::life::{Life, Refusal};
+use support::{accept, far, joined, life, open, plan, run, study, ticks};
 
 /// The newest of what the screen is told.
 #[derive(Default)]
@@ -329,4 +330,113 @@ fn a_rerun_runs_its_own_parameters_though_another_program_queues_a_point_at_the_
     assert_eq!(again.jump, spec.jump);
     assert_eq!(life.row(again.trial).unwrap().parent, Some(spec.trial));
     assert_eq!(value(&life, "Fx"), 77.0);
+}
+
+/// (A defect once: seen now and then, as a session looks, the point took the re-run's parameters and was lost.)
+#[test]
+fn a_point_queued_beside_a_rerun_runs_and_so_does_the_rerun() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut life = open(folder.path());
+    let spec = run(&mut life, TrialEnd::Fell(FallCause::BodyContact));
+    life.judge(Verdict::Void, true).unwrap();
+    let mut other = study(Storage::File(folder.path().join("study.log")));
+    other.enqueue(&[("Fx".into(), 77.0)], &[]).unwrap();
+    life.look().unwrap();
+    let both = [accept(&mut life), accept(&mut life)];
+    let of = |fx: f64| both.iter().find(|spec| spec.jump.fx_n == fx);
+    assert!(of(77.0).is_some(), "the queued point is lost: {both:?}");
+    let again = of(spec.jump.fx_n).expect("the re-run is lost");
+    assert_eq!((again.jump, life.row(again.trial).unwrap().parent), (spec.jump, Some(spec.trial)));
+    assert_eq!(life.proposal().unwrap().source, Source::Sampler, "nothing comes twice");
+}
+
+/// (A danger once: it ran, with whatever it said.)
+#[test]
+fn a_point_of_another_program_beyond_the_limits_cannot_run() {
+    for (parameters, gains, word) in [
+        (vec![("Fx", 900.0)], None, "Fx = 900"),
+        (vec![("f0", 0.0)], None, "f0 = 0"),
+        (vec![("Fx", 50.0)], Some(9999.0), "kp = 9999"),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let mut life = open(folder.path());
+        let mut other = study(Storage::File(folder.path().join("study.log")));
+        let point: Vec<_> = parameters.iter().map(|(name, value)| ((*name).to_owned(), *value)).collect();
+        let attributes: Vec<_> =
+            gains.map(|kp| ("gains".to_owned(), serde_json::json!({ "kp": kp }))).into_iter().collect();
+        other.enqueue(&point, &attributes).unwrap();
+        life.look().unwrap();
+        let card = life.proposal().unwrap();
+        let refusal = life.approve(card.trial, card.revision).unwrap_err().to_string();
+        assert!(refusal.contains(word), "{refusal}");
+        life.skip().unwrap();
+        let row = life.row(card.trial).unwrap();
+        assert!(row.verdict == Some(Verdict::Void) && row.cause.contains(word), "{row:?}");
+        let next = accept(&mut life);
+        assert!(next.jump.fx_n <= 200.0 && next.jump.f0_hz > 0.0 && next.gains.kp == 400.0);
+    }
+}
+
+#[test]
+fn gains_that_a_queued_point_brings_are_seen_on_its_card() {
+    let mut life = life(5);
+    life.enqueue(&[("Fx".into(), 60.0), ("kp".into(), 500.0)]).unwrap();
+    let card = life.proposal().unwrap();
+    assert_eq!((card.gains[0].value, card.gains[0].proposed, card.source), (500.0, 400.0, Source::Queued));
+    assert_eq!(accept(&mut life).gains.kp, 500.0);
+    let refusal = life.enqueue(&[("Fx".into(), 60.0), ("kp".into(), 5000.0)]).unwrap_err().to_string();
+    assert!(refusal.contains("kp = 5000"), "{refusal}");
+}
+
+/// (A defect once: the refused wish had told the verdict, and it could not be undone any more.)
+#[test]
+fn a_confirmation_that_is_refused_tells_nothing() {
+    let mut life = life(5);
+    accept(&mut life);
+    assert!(life.confirm_best(10).is_err(), "one point is nothing to compare");
+    life.undo().unwrap();
+    assert_eq!(life.stage(), Stage::Review);
+}
+
+#[test]
+fn a_verdict_against_the_suggestion_says_so_until_it_is_undone() {
+    let mut life = life(5);
+    let spec = run(&mut life, TrialEnd::Settled);
+    life.judge(Verdict::Fall, false).unwrap();
+    let cause = &life.row(spec.trial).unwrap().cause;
+    assert_eq!(cause, "by the operator; looked like accept: landed and settled");
+    life.undo().unwrap();
+    assert_eq!(life.row(spec.trial).unwrap().cause, "landed and settled");
+}
+
+/// (A defect once: each worker counted only the repeats that were complete, and all queued the last one.)
+#[test]
+fn workers_together_run_no_more_repeats_than_were_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = || Storage::File(folder.path().join("study.log"));
+    let mut first = Life::open(plan(6), study(file())).unwrap();
+    several(&mut first, 6);
+    first.confirm_best(1).unwrap();
+    let mut second = joined(folder.path(), 6, Duration::from_secs(3600));
+    let seen = second.proposal().unwrap();
+    assert_eq!(seen.source, Source::Confirm);
+    run(&mut first, TrialEnd::Stopped);
+    let refused = second.approve(seen.trial, seen.revision);
+    assert!(matches!(refused, Err(Refusal::Overtaken(_))), "{refused:?}");
+    assert!(second.proposal().is_none() && second.others_run(), "the only repeat runs already");
+    // It comes to nothing: whoever is faster takes it up.
+    first.judge(Verdict::Void, false).unwrap();
+    first.close().unwrap();
+    second.look().unwrap();
+    assert_eq!(second.proposal().unwrap().source, Source::Confirm);
+    accept(&mut second);
+    let late = first.proposal().unwrap();
+    assert!(matches!(first.approve(late.trial, late.revision), Err(Refusal::Overtaken(_))));
+    second.close().unwrap();
+    first.look().unwrap();
+    assert_eq!((first.stage(), second.stage()), (Stage::Finished, Stage::Finished));
+    let study = study(file());
+    let repeats = study.trials().iter().filter(|trial| trial.user_attributes["source"] == "confirm");
+    let completed: Vec<bool> = repeats.map(|trial| trial.value.is_some()).collect();
+    assert_eq!(completed, [false, true]);
 }

@@ -177,7 +177,8 @@ impl Cycle {
         let read_ns = clock.now_ns();
         self.estimate();
         self.watch(inputs, previous_robot_time_ms, robot);
-        self.pre_arm.observe(inputs.lateness_ns, &self.tick.state, &self.settings);
+        let restarted = watchdog::restarted(self.tick.state.robot_time_ms, previous_robot_time_ms);
+        self.pre_arm.observe(inputs.lateness_ns, &self.tick.state, self.state_age_ms, restarted, &self.settings);
         self.check_pre_arm(robot);
         if let Some(command) = inputs.command {
             self.obey(&command, inputs, robot);
@@ -271,23 +272,27 @@ impl Cycle {
             None if self.mode == Mode::Ready => self.landing = None,
             None => {}
         }
+        // Who tips over while a jump is being judged has fallen: damped as soon as by the table's row of a standing robot, but
+        // not by a fault, so that the verdict goes on as after any other fall.
         if self.mode != Mode::Review {
             self.fall = FallWatch::default();
-        } else if let Some(cause) = self.fall.observe(&self.tick.state, &self.tick.estimate, &self.settings) {
+        } else if let Some(cause) = self.fall.observe_standing(&self.tick.state, &self.tick.estimate, &self.settings) {
             self.request(Request::Fell, Cause::Fell(cause));
         }
         let allowed_s = self.settings.idle_s;
-        if self.mode == Mode::Ready && allowed_s > 0.0 && self.mode_ticks > ticks(allowed_s) {
+        if matches!(self.mode, Mode::Ready | Mode::Review) && allowed_s > 0.0 && self.mode_ticks > ticks(allowed_s) {
             self.request(Request::SitDown, Cause::Idle { allowed_s });
         }
     }
 
-    /// Damping now. The first cause keeps its name, but a gap that turns out to be a lost link is called one.
+    /// Damping now. The first cause keeps its name, unless a fault of another kind follows that makes the operator's word
+    /// worthless: that one is told whenever it comes.
     fn cut(&mut self, fault: Fault) {
-        let gap = matches!(self.cause, Cause::Fault(Fault::StateAge { .. }));
+        let kind = std::mem::discriminant::<Fault>;
+        let told = matches!(self.cause, Cause::Fault(before) if kind(&before) == kind(&fault));
         if self.mode != Mode::Fault {
             self.request(Request::Fault, Cause::Fault(fault));
-        } else if gap && matches!(fault, Fault::LinkLost { .. }) {
+        } else if !told && fault.voids_the_word() {
             self.change(Mode::Fault, Cause::Fault(fault));
         }
     }
@@ -350,9 +355,14 @@ impl Cycle {
                 self.place(robot, spec);
                 self.jump = Some(Jump::begin(spec, &self.settings));
             }
-            Command::Arm(_) if self.needs_placing() => {
-                let lying = Placement { joint_position: self.settings.lying_position, lying: true, seed: 0 };
-                self.put(robot, &lying);
+            Command::Arm(_) => {
+                // A person may have carried the robot here: what was estimated on the way means nothing.
+                self.estimator.reset();
+                self.estimate();
+                if self.needs_placing() {
+                    let lying = Placement { joint_position: self.settings.lying_position, lying: true, seed: 0 };
+                    self.put(robot, &lying);
+                }
             }
             _ => {}
         }

@@ -185,12 +185,34 @@ pub struct FallWatch {
 impl FallWatch {
     /// Whether the robot has fallen by now, and by which sign. Called once per tick.
     pub fn observe(&mut self, state: &RobotState, estimate: &Estimate, settings: &Settings) -> Option<FallCause> {
+        self.look(state, estimate, settings, f64::INFINITY)
+    }
+
+    /// The same of a robot that has landed and only stands: tilted beyond what a standing robot may be, it is falling. Called
+    /// once per tick.
+    pub fn observe_standing(
+        &mut self,
+        state: &RobotState,
+        estimate: &Estimate,
+        settings: &Settings,
+    ) -> Option<FallCause> {
+        self.look(state, estimate, settings, settings.watchdog.stance_tilt_rad)
+    }
+
+    fn look(
+        &mut self,
+        state: &RobotState,
+        estimate: &Estimate,
+        settings: &Settings,
+        most_rad: f64,
+    ) -> Option<FallCause> {
         let touches = state.truth.is_some_and(|truth| truth.body_contact);
         self.touching = if touches { self.touching + 1 } else { 0 };
         let [roll, pitch, _] = estimate.roll_pitch_yaw.into();
         // In the air nothing can be put right any more: what is tilted there lands on its side.
         let airborne = estimate.contact.iter().all(|&down| !down);
-        let allowed = |limit: f64| if airborne { limit.min(settings.flight_tilt_rad) } else { limit };
+        let in_flight_rad = if airborne { settings.flight_tilt_rad } else { f64::INFINITY };
+        let allowed = |limit: f64| limit.min(in_flight_rad).min(most_rad);
         let (allowed_roll, allowed_pitch) = (allowed(settings.fall.roll_rad), allowed(settings.fall.pitch_rad));
         if roll.abs() > allowed_roll {
             return Some(FallCause::Roll { measured_rad: roll, allowed_rad: allowed_roll });

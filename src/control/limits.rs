@@ -2,7 +2,7 @@
 
 use super::settings::{PERIOD_S, Settings};
 use crate::realtime::telemetry::Fault;
-use crate::robot::{JOINTS, JointCommand, Joints, RobotState};
+use crate::robot::{JOINTS, JointCommand, Joints, MotorCommand, RobotState};
 
 /// What left the gate.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -30,7 +30,10 @@ impl Gate {
     /// Lets `wanted` through as far as the limits allow.
     ///
     /// The torque that counts is the one that the motor's own law will produce at the measured angle and velocity; the
-    /// feed-forward part is changed so that this stays inside the joint's limit and its rate.
+    /// feed-forward part is changed so that this stays inside the joint's limit and its rate. Where that would take a
+    /// feed-forward torque beyond the joint's limit itself, against a law that asks for more than twice of it (an encoder that
+    /// jumps), the law is left out: the torque alone is sent, which is the same if the measured numbers are right and harmless
+    /// if they are not.
     pub fn pass(&mut self, wanted: &JointCommand, state: &RobotState, settings: &Settings) -> Passed {
         let damping = JointCommand::damping(settings.gate.damping_kd);
         if *wanted == damping {
@@ -65,6 +68,9 @@ impl Gate {
                 torque = torque.clamp(last[joint] - step, last[joint] + step);
             }
             motor.torque = torque - feedback;
+            if motor.torque.abs() > settings.max_torque[joint] {
+                *motor = MotorCommand { torque, ..MotorCommand::default() };
+            }
             torques[joint] = torque;
             // Rounding of the subtraction is not a limit.
             let moved = (motor.torque - before.torque).abs() > 1e-9;

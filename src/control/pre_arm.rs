@@ -16,7 +16,7 @@ const PACE_KNOWN_TICKS: u32 = 1000;
 pub struct PreArm {
     /// Ticks that began later than they may.
     late: Recent,
-    /// Ticks for which the gyroscope has been still.
+    /// New states in which the gyroscope has been still, since it last moved, fell silent or restarted.
     still: u32,
 }
 
@@ -34,17 +34,29 @@ pub struct Seen<'a> {
 }
 
 impl PreArm {
-    /// Once per tick: the pace, and whether the robot lies still.
-    pub fn observe(&mut self, lateness_ns: u64, state: &RobotState, settings: &Settings) {
+    /// Once per tick: the pace, and whether the robot lies still. An old state says nothing of it: the tick counts neither way,
+    /// and what was seen before a silence that cuts, or before a restart, is forgotten.
+    pub fn observe(
+        &mut self,
+        lateness_ns: u64,
+        state: &RobotState,
+        state_age_ms: u32,
+        restarted: bool,
+        settings: &Settings,
+    ) {
         let allowed = &settings.pre_arm;
         self.late.tick(u32::from(lateness_ns as f64 * 1e-6 > allowed.late_ms));
         let still = state.imu.gyro_body.norm() <= allowed.gyro_rad_s;
-        self.still = if still { self.still.saturating_add(1) } else { 0 };
+        if restarted || !still || state_age_ms > settings.watchdog.state_age_ms {
+            self.still = 0;
+        } else if state_age_ms == 0 {
+            self.still = self.still.saturating_add(1);
+        }
     }
 
     /// How each check stands now.
     pub fn findings(&self, seen: &Seen, settings: &Settings) -> Findings {
-        let mut findings = Findings(std::array::from_fn(|i| self.find(Check::ALL[i], seen, settings)));
+        let mut findings = Findings(Check::CONTROL.map(|check| self.find(check, seen, settings)));
         if !settings.hardware {
             for finding in findings.0.iter_mut().filter(|finding| !finding.check.needed_in_simulation()) {
                 finding.state = CheckState::NotNeeded;
@@ -127,6 +139,12 @@ impl PreArm {
                 } else {
                     finding
                 }
+            }
+            Check::MotorsFollow => {
+                // Servo mode is commanded while disarmed, too: who does not report it will not follow.
+                let idle = state.motor_enabled.iter().filter(|enabled| !**enabled).count();
+                let first = state.motor_enabled.iter().position(|enabled| !enabled);
+                Finding { joint: first.map(|joint| joint as u8), ..at_most(idle as f64, 0.0) }
             }
             // Not this thread's: what is not looked at has not passed.
             Check::Recorder

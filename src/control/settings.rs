@@ -215,6 +215,8 @@ pub struct EstimatorSettings {
     pub accel_bias_m_s2: f64,
     /// How fast the bias wanders, m/s^2 per square root of a second.
     pub accel_bias_walk: f64,
+    /// Standard deviation of the mean acceleration of a gap in the states, beside what its two ends tell, m/s^2.
+    pub unseen_accel_m_s2: f64,
     /// Standard deviation of a foot's place by encoders and orientation, m.
     pub foot_position_m: f64,
     /// Standard deviation of a foot's velocity by encoders and gyro, m/s.
@@ -227,7 +229,7 @@ pub struct EstimatorSettings {
     pub gate_sigma: f64,
     /// Standard deviation of the velocity where nothing is known of it, m/s.
     pub start_velocity_m_s: f64,
-    /// All feet down may slip for this long; then the velocity is forgotten, s.
+    /// All feet down may slip for this long; then the velocity is doubted, s.
     pub longest_slip_s: f64,
     /// No foot down for longer than this is no flight: the robot hangs, s.
     pub longest_flight_s: f64,
@@ -235,7 +237,7 @@ pub struct EstimatorSettings {
 
 impl EstimatorSettings {
     /// Every number with its key.
-    pub fn numbers(&self) -> [(&'static str, f64); 15] {
+    pub fn numbers(&self) -> [(&'static str, f64); 16] {
         [
             ("contact_on_n", self.contact_on_n),
             ("contact_off_n", self.contact_off_n),
@@ -244,6 +246,7 @@ impl EstimatorSettings {
             ("accel_error_share", self.accel_error_share),
             ("accel_bias_m_s2", self.accel_bias_m_s2),
             ("accel_bias_walk", self.accel_bias_walk),
+            ("unseen_accel_m_s2", self.unseen_accel_m_s2),
             ("foot_position_m", self.foot_position_m),
             ("foot_velocity_m_s", self.foot_velocity_m_s),
             ("foot_velocity_share", self.foot_velocity_share),

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{BUDGET, EngineError};
+use super::EngineError;
 use crate::config::Config;
 use crate::optimize::journal::{Durability, StudyRecord};
 use crate::optimize::sampler::{Direction, SamplerConfig};
@@ -10,6 +10,7 @@ use crate::optimize::space::{Range, Space};
 use crate::optimize::study::{Storage, Study, StudyError, StudyOptions};
 use crate::realtime::command::Task;
 use crate::recording::record::ParameterInfo;
+use crate::session::life::BUDGET;
 
 /// A study of this program that is on disk, or on a server.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -148,6 +149,20 @@ fn seen(record: &StudyRecord) -> Vec<ParameterInfo> {
         }
     }
     parameters
+}
+
+/// The configuration that ran last in a study's folder, with its number: 1 for `config/`, N for `config-N/`; none where
+/// none was kept.
+pub fn newest_config(folder: &Path) -> Option<(u32, PathBuf)> {
+    let numbered = |path: PathBuf| {
+        let number = match path.file_name()?.to_str()? {
+            "config" => 1,
+            name => name.strip_prefix("config-")?.parse().ok()?,
+        };
+        path.is_dir().then_some((number, path))
+    };
+    let entries = std::fs::read_dir(folder).ok()?;
+    entries.filter_map(|entry| numbered(entry.ok()?.path())).max_by_key(|(number, _)| *number)
 }
 
 /// The study files below `folder`, in the order of their names: `folder` itself if it is one, and the folders in it.

@@ -38,14 +38,28 @@ pub enum Check {
     AreaClear,
     /// The STOP key was pressed and acknowledged once in this session.
     StopTested,
+    /// Every motor reports servo mode: all of them will do what they are told, or none is told.
+    MotorsFollow,
 }
 
-/// How many checks the control thread makes: the first of `Check::ALL`.
-pub const CONTROL_CHECKS: usize = 10;
-
 impl Check {
-    /// All checks, in the order of the list; the control thread's first.
-    pub const ALL: [Check; 16] = [
+    /// The checks that the control thread makes, in the order of the list.
+    pub const CONTROL: [Check; 11] = [
+        Check::StateFresh,
+        Check::Loss,
+        Check::Checksums,
+        Check::Upright,
+        Check::JointsInside,
+        Check::LyingDown,
+        Check::Battery,
+        Check::MotorsCool,
+        Check::MotorsFollow,
+        Check::GyroStill,
+        Check::OnTime,
+    ];
+
+    /// All checks, in the order of their numbers in a recording.
+    pub const ALL: [Check; 17] = [
         Check::StateFresh,
         Check::Loss,
         Check::Checksums,
@@ -62,6 +76,7 @@ impl Check {
         Check::Configuration,
         Check::AreaClear,
         Check::StopTested,
+        Check::MotorsFollow,
     ];
 
     /// The words that the operator sees and that files hold.
@@ -83,6 +98,7 @@ impl Check {
             Check::Configuration => "configuration",
             Check::AreaClear => "area clear, remote in hand",
             Check::StopTested => "STOP tested",
+            Check::MotorsFollow => "motors follow",
         }
     }
 
@@ -170,7 +186,7 @@ impl CheckSet {
         self.0 == 0
     }
 
-    /// The checks in the order of the list.
+    /// The checks in the order of their numbers.
     pub fn iter(self) -> impl Iterator<Item = Check> {
         Check::ALL.into_iter().filter(move |check| self.contains(*check))
     }
@@ -185,15 +201,15 @@ impl std::fmt::Display for CheckSet {
     }
 }
 
-/// What the control thread found last, in the order of [`Check::ALL`].
+/// What the control thread found last, in the order of [`Check::CONTROL`].
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Findings(pub [Finding; CONTROL_CHECKS]);
+pub struct Findings(pub [Finding; Check::CONTROL.len()]);
 
 impl Default for Findings {
     /// Nothing is known yet, so nothing has passed.
     fn default() -> Findings {
-        Findings(std::array::from_fn(|i| Finding {
-            check: Check::ALL[i],
+        Findings(Check::CONTROL.map(|check| Finding {
+            check,
             state: CheckState::Failed,
             measured: f64::NAN,
             allowed: f64::NAN,

@@ -382,6 +382,14 @@ pub enum Fault {
     EventsLost,
 }
 
+impl Fault {
+    /// Whether the robot may have restarted, or somebody been at it: what the operator gave their word on before is then worth
+    /// nothing, the low-level mode first of all. Such a fault is told also where another was told already.
+    pub fn voids_the_word(&self) -> bool {
+        matches!(self, Fault::Reboot | Fault::LinkLost { .. } | Fault::MotorMode { .. })
+    }
+}
+
 impl std::fmt::Display for Fault {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let joint = |index: u8| joint_name(index as usize);
@@ -478,7 +486,7 @@ impl std::fmt::Display for Cause {
             Cause::Connected => write!(f, "the robot answers"),
             Cause::Fell(cause) => write!(f, "fell: {cause}"),
             Cause::Fault(fault) => write!(f, "fault: {fault}"),
-            Cause::Idle { allowed_s } => write!(f, "idle: nothing was approved for {allowed_s:.0} s"),
+            Cause::Idle { allowed_s } => write!(f, "idle: nobody approved or judged anything for {allowed_s:.0} s"),
         }
     }
 }

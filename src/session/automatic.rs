@@ -26,6 +26,18 @@ pub fn run<R: Robot>(
     rollout: &mut Rollout<R>,
     mut each: impl FnMut(&TrialRecord, &[Tick]),
 ) -> Result<(), Refusal> {
+    run_watched(life, rollout, |_, row, ticks| each(row, ticks))
+}
+
+/// [`run`] in which `each` is also given the study as it stands then, other workers' trials among it.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_watched<R: Robot>(
+    life: &mut Life,
+    rollout: &mut Rollout<R>,
+    mut each: impl FnMut(&Life, &TrialRecord, &[Tick]),
+) -> Result<(), Refusal> {
     let mut voids = 0;
     loop {
         // Nobody looks at them.
@@ -33,13 +45,23 @@ pub fn run<R: Robot>(
         let Some(card) = life.proposal().filter(|_| life.stage() == Stage::Proposed) else {
             // What is judged must be told before it is waited for others, or they wait for us.
             life.close()?;
-            if !life.others_run() {
+            if life.others_run() {
+                std::thread::sleep(LOOK_PERIOD);
+                life.look()?;
+                continue;
+            }
+            // What was waited for may have been given up only now: then it comes again, and somebody must run it.
+            life.look()?;
+            if life.proposal().is_none() {
                 return Ok(());
             }
-            std::thread::sleep(LOOK_PERIOD);
-            life.look()?;
             continue;
         };
+        if life.objection().is_some() {
+            // Another program has queued what no robot may run: it is void, and its cause says why.
+            life.skip()?;
+            continue;
+        }
         let spec = match life.approve(card.trial, card.revision) {
             Err(Refusal::Overtaken(_)) => continue,
             approved => approved?,
@@ -47,10 +69,13 @@ pub fn run<R: Robot>(
         let (end, ticks) = rollout.run(&spec);
         life.ended(spec.trial, &end, ticks);
         let suggested = life.row(spec.trial).and_then(|row| row.suggested).unwrap_or(Verdict::Void);
-        life.judge(suggested, false)?;
+        match life.judge(suggested, false) {
+            Err(Refusal::EndedElsewhere(_)) => continue,
+            judged => judged?,
+        }
         voids = if suggested == Verdict::Void { voids + 1 } else { 0 };
         if let Some(row) = life.row(spec.trial) {
-            each(row, ticks);
+            each(life, row, ticks);
             if voids >= VOIDS_IN_A_ROW {
                 let cause = row.cause.clone();
                 life.close()?;

@@ -12,13 +12,17 @@ mod gains;
 mod proposing;
 mod recovery;
 mod searching;
+mod watch;
 mod wishes;
+
+pub use wishes::BUDGET;
 
 use std::collections::BTreeMap;
 use std::time::Duration;
 
 use crate::control::settings::TaskControl;
 use crate::optimize::exchange::TableTrial;
+use crate::optimize::repeats::{Point, points};
 use crate::optimize::study::{Outcome, Study, StudyError};
 use crate::optimize::trial::TrialState;
 use crate::realtime::command::{Task, TrialSpec};
@@ -32,6 +36,7 @@ use super::objective;
 use card::Card;
 use confirming::Confirmed;
 use searching::Searched;
+use watch::Watch;
 
 /// Why a wish cannot be carried out, in words for the operator.
 #[derive(Debug, thiserror::Error)]
@@ -42,6 +47,9 @@ pub enum Refusal {
     /// Another worker was faster; the next proposal is on the table.
     #[error("another worker was faster: the proposal for trial {0} does not hold any more; look at the new one")]
     Overtaken(u32),
+    /// The trial under review was ended by another program; the next proposal is on the table.
+    #[error("trial {0} was ended by somebody else meanwhile: what they say stands")]
+    EndedElsewhere(u32),
     /// The study could not be read or written.
     #[error(transparent)]
     Study(#[from] StudyError),
@@ -76,14 +84,15 @@ pub struct Plan {
     pub confidence: f64,
     /// Who this is among the workers on the study: 0 has the study's folder, and with it what a crash left behind.
     pub worker: u32,
-    /// After how long a running trial of another worker counts as dead.
+    /// After how long without news a running trial of another worker counts as dead.
     pub abandoned: Duration,
 }
 
 /// A verdict that can still be undone.
 #[derive(Debug, Clone, PartialEq)]
 struct Pending {
-    trial: u32,
+    /// The row as it was before the verdict.
+    suggestion: TrialRecord,
     outcome: Outcome,
     /// Queue the same parameters again.
     rerun: bool,
@@ -93,6 +102,7 @@ struct Pending {
 pub struct Life {
     plan: Plan,
     study: Study,
+    watch: Watch,
     rows: BTreeMap<u32, TrialRecord>,
     stage: Stage,
     /// The trial that runs or is under review.
@@ -123,6 +133,7 @@ impl Life {
     /// When the study cannot be read or written.
     pub fn open(plan: Plan, study: Study) -> Result<Life, StudyError> {
         let mut life = Life {
+            watch: Watch::new(plan.abandoned),
             plan,
             study,
             rows: BTreeMap::new(),
@@ -161,13 +172,18 @@ impl Life {
         self.rows.get(&trial)
     }
 
-    /// The accepted trial with the largest value, the earliest of equals.
+    /// The accepted trial whose point is worth most, the earliest of equals: a repeated point is worth the mean of its
+    /// repeats ([`crate::optimize::repeats`]).
     pub fn best(&self) -> Option<&TrialRecord> {
+        let points = points(self.study.trials());
+        let worth = |row: &TrialRecord| {
+            points.iter().find(|point| point.trials.contains(&row.trial)).map(Point::mean).or(row.value)
+        };
         let judged = self.rows.values().filter(|row| row.verdict == Some(Verdict::Accept));
-        judged.fold(None, |best: Option<&TrialRecord>, row| match best {
-            Some(best) if row.value <= best.value => Some(best),
-            _ => Some(row),
-        })
+        let worths = judged.map(|row| (worth(row), row));
+        worths
+            .fold(None, |best: Option<(_, &TrialRecord)>, row| best.filter(|best| row.0 <= best.0).or(Some(row)))
+            .map(|(_, row)| row)
     }
 
     /// The card on the table.
@@ -186,7 +202,7 @@ impl Life {
     /// Approves the card as it was seen: it becomes a running trial, on disk before this returns.
     ///
     /// # Errors
-    /// When another card is on the table by now, or the study cannot be written.
+    /// When another card is on the table by now, its values are outside the limits, or the study cannot be written.
     pub fn approve(&mut self, trial: u32, revision: u32) -> Result<TrialSpec, Refusal> {
         let Some(card) = &self.card else { return not_now("there is no proposal to approve") };
         if card.number() != trial || card.revision != revision {
@@ -194,6 +210,9 @@ impl Life {
                 "you approved trial {trial} as it was before; look at the card again (trial {}) and approve that",
                 card.number()
             ));
+        }
+        if let Some(objection) = self.objection() {
+            return not_now(format!("{objection}; change it, or refuse the proposal"));
         }
         let number = self.begin()?;
         self.enter(Stage::Running, number);
@@ -208,10 +227,14 @@ impl Life {
         if self.card.is_none() {
             return not_now("there is no proposal to skip");
         }
+        let cause = match self.objection() {
+            Some(objection) => format!("not run: {objection}"),
+            None => "skipped before the jump".to_owned(),
+        };
         let number = self.begin()?;
         if let Some(row) = self.rows.get_mut(&number) {
             row.verdict = Some(Verdict::Void);
-            row.cause = "skipped before the jump".to_owned();
+            row.cause = cause;
         }
         self.write_judgement(number, false)?;
         self.study.tell(number, Outcome::Fail)?;
@@ -258,20 +281,28 @@ impl Life {
                 return not_now("nothing was measured in this trial; enter a value measured by hand, or mark it void");
             }
         };
+        let suggestion = row.clone();
         row.verdict = Some(verdict);
         row.value = value;
+        if let Some(suggested) = row.suggested.filter(|suggested| *suggested != verdict) {
+            row.cause = format!("by the operator; looked like {}: {}", suggested.name(), row.cause);
+        }
         match self.write_judgement(trial, rerun) {
             // It took so long that another worker has closed it and queued it again, or somebody has ended it by hand.
             Err(StudyError::State { .. }) => {
-                self.log(format!("trial {trial} was ended by somebody else meanwhile: what they say stands"));
                 self.rows.remove(&trial);
                 self.stage = Stage::Finished;
-                return Ok(self.propose()?);
+                self.propose()?;
+                return Err(Refusal::EndedElsewhere(trial));
             }
-            written => written?,
+            Err(error) => {
+                self.rows.insert(trial, suggestion);
+                return Err(error.into());
+            }
+            Ok(()) => {}
         }
         self.show_row(trial);
-        self.pending = Some(Pending { trial, outcome, rerun });
+        self.pending = Some(Pending { suggestion, outcome, rerun });
         self.propose()?;
         Ok(())
     }
@@ -284,15 +315,19 @@ impl Life {
         if !matches!(self.stage, Stage::Proposed | Stage::Finished) || self.pending.is_none() {
             return not_now("there is no verdict to undo; the last one was told when the next trial began");
         }
-        let Some(pending) = self.pending.take() else { return Ok(()) };
-        if let Some(row) = self.rows.get_mut(&pending.trial) {
-            row.verdict = None;
-            row.value = row.suggested.and_then(|suggested| value_of(row, suggested, &self.plan));
+        let Some(pending) = &self.pending else { return Ok(()) };
+        let mut row = pending.suggestion.clone();
+        let trial = row.trial;
+        if let Some(judged) = self.rows.get(&trial) {
+            row.note.clone_from(&judged.note);
         }
-        self.write_judgement(pending.trial, false)?;
+        // Only what is written is taken back: a verdict that still stands on the disk must still be told.
+        self.study.annotate(trial, &attributes::judged(&row, false))?;
+        self.pending = None;
+        self.rows.insert(trial, row);
         self.card = None;
-        self.show_row(pending.trial);
-        self.enter(Stage::Review, pending.trial);
+        self.show_row(trial);
+        self.enter(Stage::Review, trial);
         Ok(())
     }
 

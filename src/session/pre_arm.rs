@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use crate::control::settings::{PreArm, Settings};
 use crate::realtime::pre_arm::{Check, CheckSet, CheckState, Finding, Findings};
-use crate::realtime::telemetry::{Cause, Fault, Mode};
+use crate::realtime::telemetry::{Cause, Mode};
 use crate::recording::disk;
 use crate::recording::record::PreArmCheck;
 use crate::recording::recorder::RecorderStatus;
@@ -33,6 +33,8 @@ pub struct PreArmList {
     folder: Option<PathBuf>,
     /// What the operator has given their word on.
     words: CheckSet,
+    /// How often the robot has restarted, as far as the list has heard.
+    reboots: u64,
     stop: StopTest,
 }
 
@@ -47,6 +49,7 @@ impl PreArmList {
             configuration,
             folder,
             words: CheckSet::EMPTY,
+            reboots: 0,
             stop: StopTest::Open,
         }
     }
@@ -62,10 +65,10 @@ impl PreArmList {
             // Somebody will now go to the robot.
             self.words.remove(Check::AreaClear);
         }
-        if let Cause::Fault(Fault::Reboot | Fault::MotorMode { .. } | Fault::LinkLost { .. }) = cause {
-            // A robot that restarted is not in low-level mode any more.
-            self.words.remove(Check::LowLevel);
-            self.words.remove(Check::AreaClear);
+        if let Cause::Fault(fault) = cause
+            && fault.voids_the_word()
+        {
+            self.take_back();
         }
         self.stop = match (self.stop, from, to, cause) {
             (StopTest::Open, Mode::Offline | Mode::Observe | Mode::Disarmed, Mode::Damped, Cause::Stop) => {
@@ -75,6 +78,23 @@ impl PreArmList {
             (StopTest::Pressed, ..) => StopTest::Open,
             (state, ..) => state,
         };
+    }
+
+    /// The link has counted `reboots` restarts of the robot. True if there was one since the last call: in whatever mode it
+    /// happened, also where it changed none, the operator's word is taken back.
+    pub fn robot_restarted(&mut self, reboots: u64) -> bool {
+        let restarted = reboots > self.reboots;
+        self.reboots = reboots;
+        if restarted {
+            self.take_back();
+        }
+        restarted
+    }
+
+    /// A robot that restarted is not in low-level mode any more, and somebody may be at it.
+    fn take_back(&mut self) {
+        self.words.remove(Check::LowLevel);
+        self.words.remove(Check::AreaClear);
     }
 
     /// How every item stands now.
@@ -119,6 +139,14 @@ impl PreArmList {
             }
             Check::Battery => (format!("{measured:.0} %"), format!("at least {:.0} %", limits.battery_percent)),
             Check::MotorsCool => (format!("{joint} {measured:.0} C"), format!("at most {:.0} C", limits.motor_c)),
+            Check::MotorsFollow => {
+                let found = if measured > 0.0 {
+                    format!("{measured:.0} out of servo mode, {joint} first")
+                } else {
+                    "all in servo mode".to_owned()
+                };
+                (found, "every motor in servo mode".to_owned())
+            }
             Check::GyroStill => (
                 format!("{measured:.2} rad/s"),
                 format!("at most {:.2} rad/s for {} s", limits.gyro_rad_s, limits.still_s),

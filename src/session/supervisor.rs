@@ -169,6 +169,11 @@ impl Supervisor {
         while let Ok(event) = self.control.events.pop() {
             self.event(event, time_ns);
         }
+        let reboots = self.control.counters.read().link.map_or(0, |link| link.reboots);
+        if self.pre_arm.robot_restarted(reboots) {
+            let message = "the robot restarted: low-level mode and a clear area are to be confirmed again".to_owned();
+            self.log(Level::Warning, message, time_ns);
+        }
         while let Ok(handed) = self.handed.try_recv() {
             match handed {
                 Handed::Trial(ticks) => self.measured.push_back(ticks),
@@ -347,13 +352,11 @@ impl Supervisor {
                 })
             }
             Intent::Judge(verdict) => {
-                self.life.judge(*verdict, false).map_err(words)?;
-                self.end_review()?;
+                self.judge(*verdict, false)?;
                 Ok("u takes it back until the next jump is approved".to_owned())
             }
             Intent::Rerun { trial: None } => {
-                self.life.judge(Verdict::Void, true).map_err(words)?;
-                self.end_review()?;
+                self.judge(Verdict::Void, true)?;
                 Ok("void, and its parameters are on the table again".to_owned())
             }
             Intent::Rerun { trial: Some(trial) } => {
@@ -390,6 +393,15 @@ impl Supervisor {
         }
         self.command(command)?;
         Ok(answer.to_owned())
+    }
+
+    /// Judges the trial under review. Where another program has ended it, the review is over as well.
+    fn judge(&mut self, verdict: Verdict, rerun: bool) -> Result<(), String> {
+        let judged = self.life.judge(verdict, rerun);
+        if matches!(judged, Ok(()) | Err(Refusal::EndedElsewhere(_))) {
+            self.end_review()?;
+        }
+        judged.map_err(|refusal| refusal.to_string())
     }
 
     /// The verdict is given: a standing robot is ready again, a fallen one is disarmed and must be armed anew.

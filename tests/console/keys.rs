@@ -34,11 +34,23 @@ fn a_jump_needs_two_presses_at_two_moments() {
     assert!(console.screen(80, 24).contains("Jump?"));
     // 100 ms later: too soon, and it starts the pause again.
     assert_eq!(console.press(&["g"]), []);
-    console.wait(150);
-    assert_eq!(console.press(&["g"]), [], "250 ms after the press before");
-    console.wait(200);
+    console.wait(650);
+    assert_eq!(console.press(&["g"]), [], "750 ms after the press before");
+    console.wait(750);
     assert_eq!(wishes(&console.press(&["g"])), approval(0, 0));
     assert!(console.model.dialog.is_none());
+}
+
+/// (A danger once: a key that is held down repeats itself for the first time after up to 660 ms.)
+#[test]
+fn a_key_that_is_held_down_never_approves() {
+    let mut console = Console::ready();
+    console.press(&["g"]);
+    console.wait(560);
+    for _ in 0..200 {
+        assert_eq!(console.press(&["g"]), []);
+        console.wait(0);
+    }
 }
 
 #[test]
@@ -61,7 +73,7 @@ fn an_approval_is_of_the_card_that_was_seen() {
     console.record(Record::Proposal(proposal(0, 1)));
     assert!(console.model.dialog.is_none(), "the card has changed under the question");
     assert_eq!(console.press(&["g"]), [], "this is the first press for the new card");
-    console.wait(400);
+    console.wait(900);
     assert_eq!(wishes(&console.press(&["g"])), approval(0, 1));
 }
 
@@ -280,7 +292,7 @@ fn energising_keys_do_nothing_in_the_wrong_mode() {
         let mut console = Console::proposed();
         console.mode(mode);
         console.press(&["g"]);
-        console.wait(400);
+        console.wait(900);
         let sent = wishes(&console.press(&["g"]));
         let approved = sent.iter().any(|intent| matches!(intent, Intent::Approve { .. }));
         assert_eq!(approved, mode == Mode::Ready, "g g in {mode:?}");
@@ -417,4 +429,18 @@ fn settings_out_of_range_are_refused_by_name() {
         let message = with(key, value).expect_err(key);
         assert!(message.contains(key), "{message}");
     }
+}
+
+/// (A danger once: on a terminal too small for the card two blind presses made the robot jump.)
+#[test]
+fn a_terminal_too_small_for_the_card_neither_approves_nor_arms() {
+    let mut console = Console::ready();
+    console.tell(Msg::Resize(60, 15));
+    console.press(&["g"]);
+    console.wait(1000);
+    assert_eq!(wishes(&console.press(&["g"])), []);
+    assert!(console.said().contains("enlarge the terminal to 80x24"), "{}", console.said());
+    assert_eq!(console.press(&["Space"]), [Effect::Stop]);
+    console.mode(Mode::Disarmed);
+    assert_eq!(wishes(&console.press(&["A"])), []);
 }

@@ -175,7 +175,7 @@ fn play(session: &mut Session, rows: &[Row]) {
         }
         if row.action == Action::Approve {
             // The second moment of an approval.
-            std::thread::sleep(Duration::from_millis(500));
+            std::thread::sleep(Duration::from_millis(1000));
         }
         let (keys, text) = row.after;
         for key in keys.split_inclusive(|_: char| !keys.contains('\x1b')) {

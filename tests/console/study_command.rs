@@ -236,3 +236,74 @@ fn python_reads_our_table_and_we_read_its_journal_and_its_table() {
     assert!(said.starts_with("5 trials"), "{said}");
     assert!(text(folder.path(), &["study", "enqueue", "python.log", "Fx=60"]).contains("trial 5"));
 }
+
+/// (A defect once: every row came in again, and each point looked as if it had been repeated.)
+#[test]
+fn a_table_that_comes_twice_is_no_repeat() {
+    let (folder, study) = study("forward");
+    text(folder.path(), &["study", "export", &study, "--output", "own.csv"]);
+    let said = text(folder.path(), &["study", "import", &study, "own.csv"]);
+    assert!(said.starts_with("0 trials") && said.contains("6 were there already"), "{said}");
+    // By hand and without times; twice the same in one table is a repeat.
+    let rows = "params_f0,params_Fx,params_Fz,value\n1.0,100,250,0.5\n1.0,100,250,0.5\n";
+    fs::write(folder.path().join("hand.csv"), rows).unwrap();
+    assert!(text(folder.path(), &["study", "import", &study, "hand.csv"]).starts_with("2 trials"));
+    let said = text(folder.path(), &["study", "import", &study, "hand.csv"]);
+    assert!(said.starts_with("0 trials") && said.contains("2 were there already"), "{said}");
+}
+
+/// (A defect once: it went on with the budget of the configuration, and wrote that one down.)
+#[test]
+fn a_study_that_is_continued_keeps_its_budget() {
+    let (folder, study) = study("forward");
+    let rest = text(folder.path(), &["optimize", "--resume", &study, "--json", "--record", "none"]);
+    assert_eq!(rest, "", "its six trials are all that it is to have");
+    assert!(text(folder.path(), &["study", "show", &study]).contains("budget: 6"));
+}
+
+/// (A defect once: it went back to the configuration that it had begun with.)
+#[test]
+fn a_study_that_is_continued_goes_on_with_the_configuration_that_ran_last() {
+    let (folder, study) = study("forward");
+    fs::create_dir(folder.path().join("mine")).unwrap();
+    fs::write(folder.path().join("mine/optimize.toml"), "[bounds]\nFz = [200.0, 210.0]\n").unwrap();
+    let resume = |more: &[&str]| {
+        let words = ["optimize", "--resume", &study, "--json", "--record", "none"];
+        let output = quadfrog(folder.path(), &[&words, more].concat());
+        assert!(output.status.success());
+        (String::from_utf8(output.stdout).unwrap(), String::from_utf8(output.stderr).unwrap())
+    };
+    resume(&["--trials", "7", "--config", "mine"]);
+    let (trials, said) = resume(&["--trials", "9"]);
+    assert!(said.contains("config-2"), "{said}");
+    assert_eq!(trials.lines().count(), 2);
+    for line in trials.lines() {
+        let trial: Value = serde_json::from_str(line).unwrap();
+        assert!((200.0..=210.0).contains(&trial["params"]["Fz"].as_f64().unwrap()), "{line}");
+    }
+    assert!(text(folder.path(), &["study", "show", &study]).contains("Fz from 200 to 210"));
+    // Back to the first one on purpose: from then on that is the last.
+    resume(&["--trials", "10", "--config", &format!("{study}/config")]);
+    let (_, said) = resume(&[]);
+    assert!(said.contains("config-3") && !Path::new(&study).join("config-4").exists(), "{said}");
+}
+
+/// (Defects once: a mistyped place became a new study, and a worker's folder had the name of another seed.)
+#[test]
+fn a_mistyped_place_to_join_is_refused_and_a_worker_is_named_after_its_study() {
+    let folder = tempfile::tempdir().unwrap();
+    for more in [&[][..], &["--task", "forward"], &["--seed", "5"]] {
+        let message = refused(folder.path(), &[&["optimize", "--join", "recordigs/study"], more].concat());
+        assert!(message.contains("no such journal") && message.contains("--task and --seed"), "{message}");
+    }
+    assert!(!folder.path().join("recordigs").exists());
+    let new = ["optimize", "--join", "shared.log", "--task", "twist-cw", "--seed", "5", "--trials", "1"];
+    let made_new = quadfrog(folder.path(), &new);
+    let said = String::from_utf8_lossy(&made_new.stderr);
+    assert!(made_new.status.success() && said.contains("a new study of twist-cw seed 5 is made in"), "{said}");
+    let rest = text(folder.path(), &["optimize", "--join", "shared.log", "--json"]);
+    assert_eq!(rest, "", "its budget of 1 is met");
+    let names: Vec<String> = made(folder.path()).iter().map(|path| path.display().to_string()).collect();
+    assert_eq!(names.len(), 2);
+    assert!(names.iter().all(|name| name.contains("twist-cw-seed5-joined-")), "{names:?}");
+}

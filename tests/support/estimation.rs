@@ -164,10 +164,35 @@ impl JumpError {
 /// Makes `count` jumps of the five tasks in turn, with parameters drawn evenly within the shipped bounds. Returns those that
 /// landed, and how the others ended.
 pub fn jumps(world: World, source: ObjectiveSource, count: u32, seed: u64) -> (Vec<JumpError>, Vec<TrialEnd>) {
-    let config = Config::load(None).unwrap();
     let robot = RobotDescription::embedded("go1").unwrap();
-    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let trials = jumps_on(source, count, seed, |_| {
+        let simulator = Simulator::new(&robot, &world.config()).unwrap();
+        let machine: Box<dyn Robot> = match world {
+            World::Imperfect => Box::new(Imperfect::new(simulator)),
+            World::Ideal | World::HardwareLike => Box::new(simulator),
+        };
+        machine
+    });
     let (mut landed, mut fallen) = (Vec::new(), Vec::new());
+    for (error, end) in trials {
+        match objective::suggest(&end).0 {
+            Verdict::Accept => landed.push(error),
+            _ => fallen.push(end),
+        }
+    }
+    (landed, fallen)
+}
+
+/// The same jumps on the machine that `machine` makes for each trial: every one of them, with how it ended.
+pub fn jumps_on<R: Robot>(
+    source: ObjectiveSource,
+    count: u32,
+    seed: u64,
+    mut machine: impl FnMut(u64) -> R,
+) -> Vec<(JumpError, TrialEnd)> {
+    let config = Config::load(None).unwrap();
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let mut trials = Vec::new();
     for trial in 0..count {
         let task = Task::ALL[trial as usize % Task::ALL.len()];
         let mut draw = |name: &str| {
@@ -190,21 +215,14 @@ pub fn jumps(world: World, source: ObjectiveSource, count: u32, seed: u64) -> (V
             seed: seed.wrapping_add(u64::from(trial)),
         };
         let settings = settings_of(task, source);
-        let simulator = Simulator::new(&robot, &world.config()).unwrap();
-        let machine: Box<dyn Robot> = match world {
-            World::Imperfect => Box::new(Imperfect::new(simulator)),
-            World::Ideal | World::HardwareLike => Box::new(simulator),
-        };
-        let mut rollout = Rollout::new(machine, &settings);
+        let mut rollout = Rollout::new(machine(spec.seed), &settings);
         let (end, ticks) = rollout.run(&spec);
-        if objective::suggest(&end).0 != Verdict::Accept {
-            fallen.push(end);
-            continue;
-        }
+        // A trial that is refused or falls before its impulse measures nothing.
+        let Some(estimate) = objective::measure(ticks) else { continue };
         let truth = objective::measure(&in_truth(ticks, &settings)).unwrap();
-        landed.push(JumpError { task, truth, estimate: objective::measure(ticks).unwrap() });
+        trials.push((JumpError { task, truth, estimate }, end));
     }
-    (landed, fallen)
+    trials
 }
 
 /// The same ticks with the simulator's own knowledge as the estimate.

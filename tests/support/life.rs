@@ -113,3 +113,10 @@ pub fn parameters(life: &Life) -> Vec<f64> {
 pub fn open(folder: &Path) -> Life {
     Life::open(plan(1000), study(Storage::File(folder.join("study.log")))).unwrap()
 }
+
+/// One more worker on the study in `folder`, to whom a trial is dead that it has seen run for `abandoned`.
+pub fn joined(folder: &Path, budget: u32, abandoned: Duration) -> Life {
+    let mut study = study(Storage::File(folder.join("study.log")));
+    let worker = study.join().unwrap();
+    Life::open(Plan { worker, abandoned, ..plan(budget) }, study).unwrap()
+}

@@ -335,7 +335,8 @@ impl Model {
         self.proposal_on_table()?.parameters.iter().find(|p| p.name == *name).map(|p| p.value)
     }
 
-    /// The accepted trial with the highest value; the earlier one of equals.
+    /// The accepted trial whose point is worth most, the earlier one of equals: a repeated point is worth the mean of its
+    /// repeats.
     pub fn best(&self) -> Option<&TrialRecord> {
         self.best_so_far().last()
     }
@@ -343,13 +344,20 @@ impl Model {
     /// The accepted trials that were better than all before them, in order.
     pub fn best_so_far(&self) -> impl Iterator<Item = &TrialRecord> + '_ {
         let mut best = f64::NEG_INFINITY;
-        self.trials.values().filter(move |trial| match accepted_value(trial) {
+        self.trials.values().filter(move |trial| match self.worth(trial) {
             Some(value) if value > best => {
                 best = value;
                 true
             }
             _ => false,
         })
+    }
+
+    /// What the point of an accepted trial is worth.
+    fn worth(&self, trial: &TrialRecord) -> Option<f64> {
+        let value = accepted_value(trial)?;
+        let point = self.points.iter().find(|point| point.trials.contains(&trial.trial));
+        Some(point.map_or(value, |point| point.mean))
     }
 
     /// How many trials count for the budget: as the session says, or else those with a verdict other than void.

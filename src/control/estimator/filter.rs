@@ -2,12 +2,15 @@
 //!
 //! Linear, because the orientation is given: Bledt et al., "MIT Cheetah 3: Design and Control of a Robust, Dynamic
 //! Quadruped Robot", IROS 2018, section on state estimation, with its process model and its leg residuals e_p and e_v.
-//! Three things are ours or from Bloesch et al., "State Estimation for Legged Robots: Consistent Fusion of Leg Kinematics
+//! Five things are ours or from Bloesch et al., "State Estimation for Legged Robots: Consistent Fusion of Leg Kinematics
 //! and IMU", RSS 2012:
 //!
 //! * the accelerometer's bias is a state (Bloesch), learnt while the robot stands and used while it flies;
 //! * a foot has a place only while it stands: its state is made at touchdown and dropped at lift-off (Bloesch);
-//! * a foot is a ball that rolls, so its centre moves while it stands (ours: at push-off by some 2 cm).
+//! * a foot is a ball that rolls, so its centre moves while it stands (ours: at push-off by some 2 cm);
+//! * states may be missing: what happened meanwhile is bridged as a step at an unknown moment, and known accordingly (ours).
+//!   The filter remembers how an error of velocity grew into the position, so a landing puts right both;
+//! * where all standing feet contradict the velocity for long, it is doubted, and with it the way it led (ours).
 //!
 //! There is no residual of the ground's height: a jump may land on a block, and only the height would gain by it.
 
@@ -52,6 +55,17 @@ pub struct Filter {
     anchored: PerLeg<bool>,
     /// For how long feet were down and none was believed, s.
     disbelieved_s: f64,
+    /// What was measured last; none at the start.
+    last: Option<Sample>,
+}
+
+/// What one state says of the motion since the one before.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Sample {
+    /// Of the inertial unit, m/s^2.
+    acceleration_world: Vector3<f64>,
+    /// How fast each foot's centre rolls over the ground, m/s.
+    rolling_world: PerLeg<Vector3<f64>>,
 }
 
 impl Filter {
@@ -62,6 +76,7 @@ impl Filter {
             covariance: Covariance::zeros(),
             anchored: [false; LEGS],
             disbelieved_s: 0.0,
+            last: None,
         };
         filter.state.fixed_rows_mut::<3>(POSITION).copy_from(position_world);
         filter.forget_velocity(settings);
@@ -89,7 +104,10 @@ impl Filter {
         Vector3::from_fn(|i, _| self.covariance[(VELOCITY + i, VELOCITY + i)].max(0.0).sqrt())
     }
 
-    /// Moves on by `dt_s` with the specific force `accel_body` (m/s^2) that was measured at its end.
+    /// Moves on by `dt_s` with the specific force `accel_body` (m/s^2) that was measured at its end: the mean of the last period.
+    ///
+    /// Where states are missing before it, the acceleration passed from the last one known to this one at a moment that nobody
+    /// saw: in the middle at best guess, and anywhere as far as the velocity's uncertainty goes.
     pub fn predict(
         &mut self,
         accel_body: &Vector3<f64>,
@@ -98,15 +116,24 @@ impl Filter {
         dt_s: f64,
         settings: &EstimatorSettings,
     ) {
-        // a = R (f - b) + g;  p += v dt + a dt^2 / 2;  v += a dt;  p_i += (rolling) dt.
+        // a = R (f - b) + g.
         let gravity = Vector3::new(0.0, 0.0, -GRAVITY);
-        let acceleration = world_from_body * (accel_body - self.vector(BIAS)) + gravity;
+        let acceleration_world = world_from_body * (accel_body - self.vector(BIAS)) + gravity;
+        let now = Sample { acceleration_world, rolling_world: feet.map(|motion| motion.rolling_world) };
+        let before = self.last.replace(now).unwrap_or(now);
+        // a' = a - (a - a_0) / 2 * (unseen / dt): over a gap the mean of both ends, but for the period that was measured.
+        let unseen_s = (dt_s - PERIOD_S).max(0.0);
+        let unseen_share = if unseen_s > 0.0 { unseen_s / dt_s } else { 0.0 };
+        let change = now.acceleration_world - before.acceleration_world;
+        let acceleration = acceleration_world - change * (0.5 * unseen_share);
+        // p += v dt + a' dt^2 / 2;  v += a' dt;  p_i += (rolling) dt.
         let moved = self.vector(VELOCITY) * dt_s + acceleration * (0.5 * dt_s * dt_s);
         self.add(POSITION, &moved);
         self.add(VELOCITY, &(acceleration * dt_s));
-        for (leg, motion) in feet.iter().enumerate() {
+        for leg in 0..LEGS {
             if self.anchored[leg] {
-                self.add(foot(leg), &(motion.rolling_world * dt_s));
+                let (rolling, rolled) = (now.rolling_world[leg], before.rolling_world[leg]);
+                self.add(foot(leg), &((rolling - (rolling - rolled) * (0.5 * unseen_share)) * dt_s));
             }
         }
 
@@ -130,6 +157,9 @@ impl Filter {
         // White noise of one sample a period, and what a sample misses of a jerk.
         let sample = settings.accel_noise_m_s2 + settings.accel_error_share * acceleration.norm();
         self.add_variance(VELOCITY, sample * sample * PERIOD_S * dt_s);
+        if unseen_s > 0.0 {
+            self.add_unseen(&change, unseen_s, settings);
+        }
         self.add_variance(BIAS, settings.accel_bias_walk.powi(2) * dt_s);
         for leg in 0..LEGS {
             if self.anchored[leg] {
@@ -138,28 +168,56 @@ impl Filter {
         }
     }
 
+    /// What `unseen_s` seconds without a state leave open, if the acceleration has changed by `change` (m/s^2) meanwhile.
+    fn add_unseen(&mut self, change: &Vector3<f64>, unseen_s: f64, settings: &EstimatorSettings) {
+        // A step at an evenly distributed moment of the gap: its mean has the variance change^2 / 12. And what came and went.
+        let variance = change.map(|change| change * change / 12.0 + settings.unseen_accel_m_s2.powi(2));
+        // A wrong mean acceleration e leaves e t in the velocity and e t^2 / 2 in the position.
+        self.add_common(variance, 0.5 * unseen_s * unseen_s, unseen_s);
+    }
+
+    /// Adds an unknown number of this variance per axis that counts `to_position` times in the position and `to_velocity` times
+    /// in the velocity.
+    fn add_common(&mut self, variance: Vector3<f64>, to_position: f64, to_velocity: f64) {
+        for i in 0..3 {
+            let (p, v) = (POSITION + i, VELOCITY + i);
+            self.covariance[(p, p)] += variance[i] * to_position * to_position;
+            self.covariance[(v, v)] += variance[i] * to_velocity * to_velocity;
+            self.covariance[(p, v)] += variance[i] * to_position * to_velocity;
+            self.covariance[(v, p)] += variance[i] * to_position * to_velocity;
+        }
+    }
+
     /// Learns from the feet that are down. A foot that moves otherwise than a standing foot would slips: it says nothing, and
     /// finds a new place when it stops.
     pub fn correct(&mut self, feet: &PerLeg<FootMotion>, down: &PerLeg<bool>, dt_s: f64, settings: &EstimatorSettings) {
-        let (mut any_down, mut any_believed) = (false, false);
+        let (mut any_believed, mut disagreed, mut disagreement) = (false, 0, Vector3::zeros());
         for (leg, motion) in feet.iter().enumerate() {
             if !down[leg] {
                 self.release(leg);
                 continue;
             }
-            any_down = true;
-            let stands = self.correct_velocity(motion, settings);
+            let residual = self.velocity_residual(motion);
+            let stands = self.correct_velocity(motion, &residual, settings);
             let stayed = stands && self.anchored[leg] && self.correct_position(leg, motion, settings);
-            any_believed |= stands;
+            if stands {
+                any_believed = true;
+            } else {
+                disagreed += 1;
+                disagreement += residual;
+            }
             if !stayed {
                 self.anchor(leg, motion, settings);
             }
         }
-        self.disbelieved_s = if any_down && !any_believed { self.disbelieved_s + dt_s } else { 0.0 };
+        if disagreed == 0 || any_believed {
+            self.disbelieved_s = 0.0;
+            return;
+        }
+        self.disbelieved_s += dt_s;
         if self.disbelieved_s > settings.longest_slip_s {
             // All feet slip for longer than feet can: it is the velocity that is wrong.
-            self.forget_velocity(settings);
-            self.disbelieved_s = 0.0;
+            self.doubt_velocity((disagreement / f64::from(disagreed)).norm(), settings);
         }
     }
 
@@ -167,17 +225,21 @@ impl Filter {
     pub fn rest(&mut self, settings: &EstimatorSettings) {
         self.state.fixed_rows_mut::<3>(VELOCITY).fill(0.0);
         self.forget_velocity(settings);
+        self.last = None;
     }
 
-    /// e_v: a standing foot's centre moves as rolling says, so v = rolling - (velocity relative to the unit). False where
-    /// that cannot be.
-    fn correct_velocity(&mut self, motion: &FootMotion, settings: &EstimatorSettings) -> bool {
+    /// How much faster a foot would have to move if it stood: e_v = (rolling) - (velocity relative to the unit) - v, m/s.
+    fn velocity_residual(&self, motion: &FootMotion) -> Vector3<f64> {
+        motion.rolling_world - motion.velocity_world - self.vector(VELOCITY)
+    }
+
+    /// A standing foot's centre moves as rolling says: learns from e_v = `residual`. False where that cannot be.
+    fn correct_velocity(&mut self, motion: &FootMotion, residual: &Vector3<f64>, settings: &EstimatorSettings) -> bool {
         // Joint velocities err in proportion to the lever, and more the faster the leg is.
         let noise = settings.foot_velocity_m_s + settings.foot_velocity_share * motion.velocity_world.norm();
-        let residual = motion.rolling_world - motion.velocity_world - self.vector(VELOCITY);
         let with_state = self.covariance.fixed_columns::<3>(VELOCITY).into_owned();
         let variance = with_state.fixed_rows::<3>(VELOCITY).into_owned();
-        self.learn(&with_state, variance, noise, &residual, settings.gate_sigma)
+        self.learn(&with_state, variance, noise, residual, settings.gate_sigma)
     }
 
     /// e_p: the foot is where it was put down. False where that cannot be.
@@ -235,6 +297,16 @@ impl Filter {
             self.set_variance(foot(leg), 0.0);
             self.anchored[leg] = false;
         }
+    }
+
+    /// The velocity was wrong by about `error` (m/s) for as long as no foot was believed, and the position ran off with it.
+    fn doubt_velocity(&mut self, error: f64, settings: &EstimatorSettings) {
+        // An error e for t seconds is e in the velocity and e t in the position; the feet, which are placed by the position,
+        // find their places when the legs have said how large it was.
+        let deviation = error.max(settings.start_velocity_m_s);
+        self.add_common(Vector3::repeat(deviation * deviation), self.disbelieved_s, 1.0);
+        (0..LEGS).for_each(|leg| self.release(leg));
+        self.disbelieved_s = 0.0;
     }
 
     fn forget_velocity(&mut self, settings: &EstimatorSettings) {

@@ -1,19 +1,23 @@
 //! Trials that were run elsewhere join the study.
 
+use jiff::Timestamp;
+
 use super::{Study, StudyError};
 use crate::optimize::exchange::TableTrial;
 use crate::optimize::journal::{Effect, JournalError, Operation, Template};
-use crate::optimize::trial::{Distribution, TrialState};
+use crate::optimize::trial::{Distribution, Trial, TrialState};
 
 impl Study {
     /// Adds finished trials as they are, all or none, with the present bounds: the samplers learn from them as from any
-    /// other. Returns their numbers.
+    /// other. A row that the study has already, with the same parameters, value and times, is left out, or the same table
+    /// given twice would look like repeats; a row without times is there already if a trial has its parameters and value.
+    /// Two equal rows need two such trials. Returns the numbers of those that were added.
     ///
     /// # Errors
     /// [`StudyError::State`] for a trial that is not finished, [`StudyError::UnknownParameter`], [`StudyError::Value`] or
     /// [`StudyError::Outside`] for a parameter that cannot be; nothing is added then.
     pub fn import(&mut self, trials: &[TableTrial]) -> Result<Vec<u32>, StudyError> {
-        let mut operations = Vec::new();
+        let mut creations = Vec::new();
         for (row, trial) in (1..).zip(trials) {
             if !trial.state.is_finished() {
                 let action = "it cannot be added as a result: queue it, or leave it out";
@@ -27,16 +31,30 @@ impl Study {
             let template = Template {
                 state: trial.state,
                 values: trial.value.filter(|_| trial.state != TrialState::Fail).map(|value| vec![value]),
-                completed: trial.completed.or(trial.started).or_else(|| Some(jiff::Timestamp::now())),
+                completed: trial.completed.or(trial.started).or_else(|| Some(Timestamp::now())),
                 parameters: trial.parameters.iter().filter_map(parameter).collect(),
                 user_attributes: trial.attributes.clone(),
                 system_attributes: serde_json::Map::new(),
                 intermediate: Vec::new(),
             };
             let started = trial.started.or(template.completed);
-            operations.push(Operation::CreateTrial { study: self.id, started, template: Some(Box::new(template)) });
+            let create = Operation::CreateTrial { study: self.id, started, template: Some(Box::new(template)) };
+            creations.push((trial, create));
         }
-        let effects = self.journal.commit(|_| Ok::<_, JournalError>(operations.clone()))?;
+        let study = self.id;
+        let effects = self.journal.commit(|replay| {
+            let mut there: Vec<&Trial> = replay.studies().get(study).map_or(Vec::new(), |s| s.trials.iter().collect());
+            let mut is_new = |row: &TableTrial| match there.iter().position(|trial| is_same(row, trial)) {
+                // It stands for one row.
+                Some(place) => {
+                    there.swap_remove(place);
+                    false
+                }
+                None => true,
+            };
+            let new = creations.iter().filter(|(row, _)| is_new(row)).map(|(_, create)| create.clone());
+            Ok::<_, JournalError>(new.collect())
+        })?;
         let created = effects.iter().filter_map(|effect| match effect {
             Effect::Created(id) => self.journal.replay().trial(*id).map(|trial| trial.number),
             _ => None,
@@ -56,4 +74,20 @@ impl Study {
         });
         outside.map_or(Ok(()), Err)
     }
+}
+
+/// Whether a row of a table is this trial. Times are compared as the journal keeps them, to the microsecond.
+fn is_same(row: &TableTrial, trial: &Trial) -> bool {
+    let value = row.value.filter(|_| row.state != TrialState::Fail);
+    let point = row.parameters.len() == trial.parameters.len()
+        && row.parameters.iter().all(|(name, value)| trial.parameter(name) == Some(*value));
+    let microseconds = |at: Option<Timestamp>| at.map(Timestamp::as_microsecond);
+    let times = match (row.started.or(row.completed), row.completed.or(row.started)) {
+        (None, None) => true,
+        (started, completed) => {
+            microseconds(started) == microseconds(trial.started)
+                && microseconds(completed) == microseconds(trial.completed)
+        }
+    };
+    row.state == trial.state && value == trial.value && point && times
 }

@@ -26,7 +26,6 @@ use crate::optimize::trial::{Distribution, FIXED_PARAMS, Trial, TrialState, anno
 use jiff::Timestamp;
 use serde_json::Value;
 use std::collections::BTreeMap;
-use std::time::Duration;
 
 /// Trial system attribute: seed of the streams and how far they had been read when the trial began.
 pub const DRAWS: &str = "quadfrog:draws";
@@ -66,7 +65,7 @@ pub enum Outcome {
 pub enum Told {
     /// It was recorded.
     Recorded,
-    /// Somebody else, for example at the dashboard, had finished the trial already; theirs stands.
+    /// Somebody else, for example at the dashboard, had finished the trial already, or was about to; theirs stands.
     AlreadyFinished,
 }
 
@@ -288,13 +287,6 @@ impl Study {
     /// Trials that have begun and not ended: of other workers, or left by a session that was killed.
     pub fn running(&self) -> impl Iterator<Item = &Trial> {
         self.trials().iter().filter(|t| t.state == TrialState::Running)
-    }
-
-    /// For how long a trial has been running, by this machine's clock; none if nobody has said when it began. A clock that
-    /// was set back makes it 0.
-    pub fn age(trial: &Trial) -> Option<Duration> {
-        let elapsed = Timestamp::now().duration_since(trial.started?);
-        Some(Duration::try_from(elapsed).unwrap_or_default())
     }
 
     /// Trials that wait to be run, in the order in which they will be.

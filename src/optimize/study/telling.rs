@@ -30,6 +30,22 @@ impl Study {
     /// # Errors
     /// [`StudyError::Value`] if the value is not a number; [`StudyError::State`] if the trial has not begun.
     pub fn tell(&mut self, trial: u32, outcome: Outcome) -> Result<Told, StudyError> {
+        self.tell_if(trial, outcome, &[], |_| true)
+    }
+
+    /// [`Study::tell`] together with last user attributes, if `holds` says, of the trial at the very moment, that what the
+    /// outcome was concluded from still holds: nobody sees the one without the other. Where it does not hold any more
+    /// nothing is recorded and [`Told::AlreadyFinished`] says so.
+    ///
+    /// # Errors
+    /// As [`Study::tell`].
+    pub fn tell_if(
+        &mut self,
+        trial: u32,
+        outcome: Outcome,
+        attributes: &[(String, Value)],
+        holds: impl Fn(&Trial) -> bool,
+    ) -> Result<Told, StudyError> {
         let id = self.trial(trial)?.id;
         let (state, values) = match outcome {
             Outcome::Complete(value) if value.is_nan() => {
@@ -44,9 +60,14 @@ impl Study {
             Some(t) if t.state == TrialState::Waiting && outcome != Outcome::Fail => {
                 Err(StudyError::State { trial, state: t.state, action: "it cannot have a value yet: begin it first" })
             }
-            _ => Ok(vec![Operation::SetState { trial: id, state, values: values.clone(), at: Some(Timestamp::now()) }]),
+            Some(t) if !holds(t) => Ok(Vec::new()),
+            _ => {
+                let end = Operation::SetState { trial: id, state, values: values.clone(), at: Some(Timestamp::now()) };
+                // A finished trial takes no attributes any more: they come first.
+                Ok(user_attributes(id, attributes).chain([end]).collect())
+            }
         })?;
-        Ok(if effects == [Effect::Accepted] { Told::Recorded } else { Told::AlreadyFinished })
+        Ok(if effects.last() == Some(&Effect::Accepted) { Told::Recorded } else { Told::AlreadyFinished })
     }
 
     /// Queues a trial with the given parameters; those that are not given will be suggested when it is its turn. Returns

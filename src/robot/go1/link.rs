@@ -16,6 +16,10 @@ use crate::robot::LinkStatus;
 /// Datagrams judged in one call at most, so that a flood cannot hold the tick; what is left waits for the next call. A robot sends
 /// one.
 const MOST_PER_CALL: usize = 32;
+/// Commands that the system may refuse in a row: one or two are a full queue that the next millisecond empties. More is a way that
+/// is closed (an address that nobody answers for fills the queue and keeps it full), and five milliseconds without a command are
+/// as many as the watchdog forgives of a slow thread, well before the motors' own time-out.
+const REFUSALS_FORGIVEN: u32 = 5;
 /// Room for a datagram; a longer one than the robot's is cut, and judged on its beginning.
 const BUFFER: usize = 2048;
 
@@ -72,6 +76,8 @@ pub struct Link {
     /// Of the last 64 ms before the newest state: bit k is set if the state of k ms before came.
     seen: u64,
     status: LinkStatus,
+    /// Commands in a row that the system refused.
+    refused: u32,
     window: Window,
     buffer: [u8; BUFFER],
 }
@@ -96,6 +102,7 @@ impl Link {
             newest: None,
             seen: 0,
             status: LinkStatus::default(),
+            refused: 0,
             window: Window::default(),
             buffer: [0; BUFFER],
         })
@@ -211,7 +218,8 @@ impl Link {
     ///
     /// # Errors
     /// The system's error number, where it cannot be sent. That nobody listened to an earlier datagram, or that the system has no
-    /// room for this one, is no error but counted: the robot's silence says the first, the next millisecond mends the second.
+    /// room for this one, is no error but counted: the robot's silence says the first, the next millisecond mends the second. A
+    /// sixth refusal in a row, and each after it, is an error: nothing has reached the network for so long.
     pub fn send(&mut self, command: &LowCmd) -> Result<(), i32> {
         // A port where nobody listens is reported at the next call in place of sending: the second try sends.
         let refused = |sent: &std::io::Result<usize>| {
@@ -221,18 +229,43 @@ impl Link {
         if refused(&sent) {
             sent = self.socket.send(command.bytes());
         }
-        match sent {
-            Ok(_) => {
-                self.status.sent += 1;
-                Ok(())
+        self.account(sent)
+    }
+
+    /// Counts what became of a command.
+    fn account(&mut self, sent: std::io::Result<usize>) -> Result<(), i32> {
+        let Err(error) = sent else {
+            self.status.sent += 1;
+            self.refused = 0;
+            return Ok(());
+        };
+        self.status.send_errors += 1;
+        self.refused = self.refused.saturating_add(1);
+        let passes = matches!(error.kind(), ErrorKind::ConnectionRefused | ErrorKind::WouldBlock);
+        if passes && self.refused <= REFUSALS_FORGIVEN { Ok(()) } else { Err(error.raw_os_error().unwrap_or(0)) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// No socket of this machine can be made to refuse every send: what the system says is given by hand.
+    #[test]
+    fn a_link_that_refuses_every_send_says_so_after_a_few() {
+        let address = (Ipv4Addr::LOCALHOST, 9).into();
+        let options = LinkOptions { address, local_port: 0, state_period_ms: 1, restart_ms: 100 };
+        let mut link = Link::open(&options).unwrap();
+        let full = nix::errno::Errno::EAGAIN as i32;
+        let refused = || Err(std::io::Error::from_raw_os_error(full));
+        for _ in 0..2 {
+            for _ in 0..REFUSALS_FORGIVEN {
+                assert_eq!(link.account(refused()), Ok(()), "a full queue for a few milliseconds is forgiven");
             }
-            Err(error) => {
-                self.status.send_errors += 1;
-                match error.kind() {
-                    ErrorKind::ConnectionRefused | ErrorKind::WouldBlock => Ok(()),
-                    _ => Err(error.raw_os_error().unwrap_or(0)),
-                }
-            }
+            assert_eq!(link.account(refused()), Err(full));
+            assert_eq!(link.account(refused()), Err(full), "as long as it lasts");
+            assert_eq!(link.account(Ok(614)), Ok(()), "and over with the first that goes out");
         }
+        assert_eq!((link.status.sent, link.status.send_errors), (2, 14), "each is counted");
     }
 }

@@ -68,8 +68,12 @@ pub struct Go1 {
     calls: bool,
     /// Milliseconds since the last call.
     since_call_ms: u32,
-    /// Milliseconds since servo mode was first commanded.
+    /// Milliseconds since servo mode was first commanded in this life of the robot.
     servo_ms: Option<u32>,
+    /// Restarts of the robot that `servo_ms` knows of.
+    reboots: u64,
+    /// The last command to damp every joint, as it was sent.
+    damping: Option<LowCmd>,
 }
 
 impl Go1 {
@@ -87,7 +91,15 @@ impl Go1 {
             state_period_ms: network.state_period_ms,
             restart_ms: network.restart_ms,
         })?;
-        Ok(Go1 { link, network, calls: !listen_only, since_call_ms: network.hello_ms, servo_ms: None })
+        Ok(Go1 {
+            link,
+            network,
+            calls: !listen_only,
+            since_call_ms: network.hello_ms,
+            servo_ms: None,
+            reboots: 0,
+            damping: None,
+        })
     }
 
     /// The address of this end.
@@ -121,6 +133,12 @@ impl Robot for Go1 {
             return Err(RobotError::Silent { age_ms });
         };
         let mut state = convert::robot_state(state, self.network.foot_force_n);
+        let reboots = self.link.status().reboots;
+        if reboots != self.reboots {
+            // Its motors have not been told anything yet.
+            self.reboots = reboots;
+            self.servo_ms = None;
+        }
         // A motor has left servo mode only if it was told to be in it, and had the time to.
         if self.servo_ms.is_none_or(|ms| ms <= self.network.servo_grace_ms) {
             state.motor_enabled = [true; JOINTS];
@@ -128,11 +146,17 @@ impl Robot for Go1 {
         Ok(state)
     }
 
-    /// A command that no datagram can say is not sent: the motors brake for this millisecond, and the error is `EINVAL`.
+    /// A command that no datagram can say is not sent, and the error is `EINVAL`: for this millisecond the joints are damped as
+    /// they last were by command, which is how every robot is treated before it is armed. One that was never damped so was
+    /// never commanded anything: it is sent nothing.
     fn write(&mut self, command: &JointCommand) -> Result<(), RobotError> {
         let said = convert::low_cmd(command, self.network.crc);
-        let datagram = said.as_ref().copied().unwrap_or_else(|_| LowCmd::damping(self.network.crc));
-        self.link.send(&datagram).map_err(|errno| RobotError::Send { errno })?;
+        if *command == JointCommand::damping(command.motor[0].kd) {
+            self.damping = said.as_ref().ok().copied().or(self.damping);
+        }
+        if let Some(datagram) = said.as_ref().ok().or(self.damping.as_ref()) {
+            self.link.send(datagram).map_err(|errno| RobotError::Send { errno })?;
+        }
         said.map_err(|_| RobotError::Send { errno: nix::errno::Errno::EINVAL as i32 })?;
         self.servo_ms.get_or_insert(0);
         Ok(())

@@ -237,7 +237,14 @@ pub fn row_of(trial: &Trial, note: String, order: &[ParameterInfo]) -> TrialReco
         hand_value: number_of(HAND_VALUE),
         suggested: named(kept.get(SUGGESTED), Verdict::ALL, Verdict::name),
         cause: kept.get(CAUSE).and_then(Value::as_str).unwrap_or_default().to_owned(),
-        verdict: named(kept.get(VERDICT), Verdict::ALL, Verdict::name).or(default_verdict),
+        // A verdict of ours that fits how the trial ended; otherwise another program ended it, and theirs stands.
+        verdict: named(kept.get(VERDICT), Verdict::ALL, Verdict::name)
+            .filter(|verdict| match trial.state {
+                TrialState::Complete => *verdict != Verdict::Void,
+                TrialState::Fail | TrialState::Pruned => *verdict == Verdict::Void,
+                TrialState::Running | TrialState::Waiting => true,
+            })
+            .or(default_verdict),
         note,
         risk: kept.get(RISK).and_then(|risk| serde_json::from_value::<Risk>(risk.clone()).ok()),
         gains: gains_of(trial),

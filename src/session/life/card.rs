@@ -19,7 +19,11 @@ pub struct Card {
     /// The study as it will be when the trial begins: what is not told yet is told in it.
     outlook: Study,
     changed: BTreeMap<String, f64>,
-    /// The gains that the trial runs with if nobody changes them, in table order.
+    /// The draft was queued in the outlook alone: in the study its number may be another's by now.
+    pub in_outlook_alone: bool,
+    /// The configured gains, in table order.
+    configured: Vec<(String, f64)>,
+    /// The gains that the trial runs with if nobody changes them: the configured ones, or those that it brings.
     gains: Vec<(String, f64)>,
     changed_gains: BTreeMap<String, f64>,
     /// Parameters that the operator has fixed for some trials, as far as they are in the draft.
@@ -28,16 +32,19 @@ pub struct Card {
 
 impl Card {
     /// A card of the next draft of `outlook`, in which the parameters `fixed` are not searched unless the draft was queued
-    /// with values of its own. `gains` are those of the configuration; `revision` must be one that no earlier card had.
-    pub fn new(outlook: Study, fixed: &[(String, f64)], gains: &Gains, revision: u32) -> Card {
+    /// with values of its own. `in_study` says that what waits in it waits in the study too. `gains` are those of the
+    /// configuration; `revision` must be one that no earlier card had.
+    pub fn new(outlook: Study, in_study: bool, fixed: &[(String, f64)], gains: &Gains, revision: u32) -> Card {
         let queued = outlook.waiting().next().map(Trial::fixed).unwrap_or_default();
         let fixed: Vec<_> = fixed.iter().filter(|(name, _)| queued.iter().all(|(n, _)| n != name)).cloned().collect();
         let draft = outlook.draft_with(&fixed);
         let mut card = Card {
+            in_outlook_alone: draft.enqueued && !in_study,
             draft,
             revision,
             outlook,
             changed: BTreeMap::new(),
+            configured: listed(gains),
             gains: listed(gains),
             changed_gains: BTreeMap::new(),
             held: fixed,
@@ -135,13 +142,19 @@ impl Card {
             parent: origin.parent,
             risk: self.risk(&parameters),
             parameters,
-            gains: self.gains.iter().map(|(name, value)| self.gain(name, *value)).collect(),
+            gains: self
+                .gains
+                .iter()
+                .zip(&self.configured)
+                .map(|(brought, usual)| self.gain(brought, usual.1))
+                .collect(),
         }
     }
 
-    fn gain(&self, name: &str, proposed: f64) -> ProposedParameter {
-        let value = self.changed_gains.get(name).copied().unwrap_or(proposed);
-        ProposedParameter { name: name.to_owned(), value, proposed }
+    /// One gain; what differs from the configuration is to be seen, also where nobody has changed it here.
+    fn gain(&self, (name, brought): &(String, f64), configured: f64) -> ProposedParameter {
+        let value = self.changed_gains.get(name).copied().unwrap_or(*brought);
+        ProposedParameter { name: name.clone(), value, proposed: configured }
     }
 
     /// How near earlier falls are; none before the first trial that counts.

@@ -58,23 +58,25 @@ impl Life {
     /// When a trial is under way, there are fewer than two points to compare, or the study cannot be written.
     pub fn confirm_best(&mut self, repeats: u32) -> Result<Vec<u32>, Refusal> {
         self.must_be_idle()?;
-        self.tell_pending()?;
         self.study.refresh()?;
         if repeats == 0 {
             if confirming_of(&self.study).is_none() {
                 return not_now("nothing is being confirmed");
             }
+            self.tell_pending()?;
             self.study.annotate_study(&[(CONFIRM.to_owned(), Value::Null)])?;
             self.propose()?;
             return Ok(Vec::new());
         }
         let direction = self.study.options().direction;
-        let best = contenders(self.study.trials(), direction, self.plan.contenders as usize);
+        // As it will be when the last verdict is told: a wish that is refused tells nothing.
+        let best = contenders(self.outlook()?.trials(), direction, self.plan.contenders as usize);
         let best: Vec<Point> = best.into_iter().filter(|point| point.stood > 0).collect();
         if best.len() < 2 {
             return not_now("there are not two points yet that the robot stood through: nothing to compare");
         }
         let trials: Vec<u32> = best.iter().map(|point| point.trials[0]).collect();
+        self.tell_pending()?;
         let from = self.study.trials().len() as u32;
         let confirming = Confirming { trials: trials.clone(), repeats, from };
         self.study.annotate_study(&[(CONFIRM.to_owned(), json!(confirming)), (CONFIRMED.to_owned(), Value::Null)])?;
@@ -109,6 +111,10 @@ impl Life {
                     Err(_) => Next::Nothing,
                 }
             }
+            // Others run the last ones: what they come to is waited for.
+            Confirmation::Repeat(_) if used(&confirming, outlook.trials(), |state| !state.is_finished()) > 0 => {
+                Next::Nothing
+            }
             Confirmation::Repeat(_) => {
                 let standing = standing(&compared, direction);
                 let words = format!(
@@ -122,10 +128,21 @@ impl Life {
         }
     }
 
-    /// How many repeats are left to confirm the best; none while nothing is being confirmed.
+    /// Queues a repeat, unless other workers have begun or queued the last ones meanwhile. Returns its number.
+    pub(super) fn queue_repeat(
+        &mut self,
+        parameters: &[(String, f64)],
+        attributes: &[(String, Value)],
+    ) -> Result<Option<u32>, StudyError> {
+        let Some(confirming) = confirming_of(&self.study) else { return Ok(None) };
+        self.study.enqueue_unless(parameters, attributes, |trials| left(&confirming, trials) == 0)
+    }
+
+    /// How many repeats are still to be completed to confirm the best; none while nothing is being confirmed.
     pub(super) fn repeats_left(&self, outlook: &Study) -> Option<u32> {
         let confirming = confirming_of(outlook).filter(|_| self.confirmed.is_none())?;
-        Some(left(&confirming, outlook.trials()))
+        let completed = used(&confirming, outlook.trials(), |state| state == TrialState::Complete);
+        Some(confirming.repeats.saturating_sub(completed))
     }
 
     /// Writes what came of a confirmation, once nothing can be undone in it any more.
@@ -191,14 +208,18 @@ fn compared(confirming: &Confirming, study: &Study) -> Vec<Point> {
         .collect()
 }
 
-/// How many repeats are left; void ones use up none.
+/// How many repeats may still be queued; those that run or wait are taken already, void ones use up none.
 fn left(confirming: &Confirming, trials: &[Trial]) -> u32 {
+    let taken = used(confirming, trials, |state| !matches!(state, TrialState::Fail | TrialState::Pruned));
+    confirming.repeats.saturating_sub(taken)
+}
+
+/// How many repeats are in one of the states `of`.
+fn used(confirming: &Confirming, trials: &[Trial], of: impl Fn(TrialState) -> bool) -> u32 {
     let repeat = |trial: &&Trial| {
-        trial.number >= confirming.from
-            && trial.state == TrialState::Complete
-            && attributes::source_of(trial) == Source::Confirm
+        trial.number >= confirming.from && of(trial.state) && attributes::source_of(trial) == Source::Confirm
     };
-    confirming.repeats.saturating_sub(trials.iter().filter(repeat).count() as u32)
+    trials.iter().filter(repeat).count() as u32
 }
 
 fn leads(point: &Point, confidence: f64) -> String {

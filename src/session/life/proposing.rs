@@ -4,13 +4,16 @@ use super::attributes::{self, Began, Origin};
 use super::card::Card;
 use super::confirming::Next;
 use super::searching::Searched;
+use super::wishes::must_be_within;
 use super::{Life, Refusal, gains, not_now, recovery};
 use crate::optimize::insight;
 use crate::optimize::sampler::SamplerKind;
 use crate::optimize::study::{Study, StudyError, Told};
 use crate::optimize::trial::Trial;
 use crate::realtime::command::{JumpParameters, TrialSpec};
-use crate::recording::record::{Insight, ParameterInsight, Record, Source, Stage, TrialRecord};
+use crate::recording::record::{
+    Insight, ParameterInfo, ParameterInsight, ProposedParameter, Record, Source, Stage, TrialRecord,
+};
 
 /// Values at which the densities are shown: a chart of the terminal is hardly wider.
 const INSIGHT_POINTS: usize = 41;
@@ -42,7 +45,7 @@ impl Life {
         }
         self.show_points(&outlook);
         let confirms = outlook.waiting().next().is_some_and(|trial| attributes::source_of(trial) == Source::Confirm);
-        if !confirms && recovery::occupied(outlook.trials(), self.plan.abandoned) >= self.plan.budget {
+        if !confirms && recovery::occupied(outlook.trials(), &self.watch) >= self.plan.budget {
             self.show_search(&outlook);
             self.card = None;
             let last = self.rows.keys().next_back().copied().unwrap_or(0);
@@ -53,13 +56,29 @@ impl Life {
         let fixed: Vec<_> =
             self.searched.fixed(outlook.trials()).into_iter().map(|(n, fixed)| (n, fixed.value)).collect();
         self.show_search(&outlook);
-        let card = Card::new(outlook, &fixed, &self.plan.control.gains(), self.revisions);
+        let in_study = self.study.waiting().next().is_some();
+        let card = Card::new(outlook, in_study, &fixed, &self.plan.control.gains(), self.revisions);
         self.show_insight(&card);
         let number = card.number();
         self.card = Some(card);
         self.show_card();
         self.enter(Stage::Proposed, number);
+        if let Some(objection) = self.objection() {
+            self.log(format!("trial {number} cannot run as it was queued: {objection}"));
+        }
         Ok(())
+    }
+
+    /// Why the card cannot run, whoever chose its values: other programs queue what they like, and bounds may have become
+    /// narrower since. None if it can.
+    pub fn objection(&self) -> Option<String> {
+        let proposal = self.proposal()?;
+        let beyond = |list: &[ProposedParameter], ranges: &[ParameterInfo], what| {
+            list.iter().find_map(|p| must_be_within(ranges, what, &p.name, p.value).err())
+        };
+        beyond(&proposal.parameters, &self.plan.widest, "parameter")
+            .or_else(|| beyond(&proposal.gains, &self.plan.gains, "gain"))
+            .map(|refusal| refusal.to_string())
     }
 
     /// Proposes anew because the search has changed; what the operator had set on the card stays, where it still may.
@@ -79,12 +98,12 @@ impl Life {
     }
 
     /// The study as it will be when the next trial begins: what can still be undone is told in it.
-    fn outlook(&self) -> Result<Study, StudyError> {
+    pub(super) fn outlook(&self) -> Result<Study, StudyError> {
         let mut fork = self.study.fork();
         if let Some(pending) = &self.pending {
-            fork.tell(pending.trial, pending.outcome)?;
+            fork.tell(pending.suggestion.trial, pending.outcome)?;
             if pending.rerun {
-                let (parameters, origin) = self.rerun_of(pending.trial)?;
+                let (parameters, origin) = self.rerun_of(pending.suggestion.trial)?;
                 fork.enqueue(&parameters, &origin.attributes())?;
             }
         }
@@ -97,13 +116,17 @@ impl Life {
         let proposal = card.proposal();
         let origin = card.origin();
         let (overrides, held, mut draft) = (card.overrides(), card.held(), card.draft.clone());
-        let known = self.study.trials().len() as u32;
+        let in_outlook_alone = card.in_outlook_alone;
         let mut queued = self.tell_pending()?;
-        if draft.enqueued && draft.number >= known {
+        if in_outlook_alone {
             // Queued in the outlook alone so far: now in the study, where another program may have taken its number.
             if queued.is_none() {
                 let given: Vec<_> = draft.parameters.iter().map(|p| (p.name.clone(), p.value)).collect();
-                queued = Some(self.study.enqueue(&given, &origin.attributes())?);
+                queued = self.queue_repeat(&given, &origin.attributes())?;
+                if queued.is_none() {
+                    self.propose()?;
+                    return Err(Refusal::Overtaken(draft.number));
+                }
             }
             if let Some(number) = queued {
                 draft = self.study.redirected(&draft, number)?;
@@ -113,9 +136,9 @@ impl Life {
         let began = Began { seed, worker: self.plan.worker, recording: &self.plan.recording, fixed: &held };
         let attributes = attributes::began(&proposal, &began);
         let beyond_budget = proposal.source == Source::Confirm || origin.source == Source::Confirm;
-        let abandoned = self.plan.abandoned;
+        let watch = &self.watch;
         let budget = self.plan.budget;
-        let room = |trials: &[Trial]| beyond_budget || recovery::occupied(trials, abandoned) < budget;
+        let room = |trials: &[Trial]| beyond_budget || recovery::occupied(trials, watch) < budget;
         let number = match self.study.begin_if(&draft, &overrides, &attributes, room) {
             Ok(number) => number,
             Err(StudyError::StaleDraft { .. } | StudyError::Full) => {
@@ -158,14 +181,22 @@ impl Life {
             self.write_confirmed()?;
             return Ok(None);
         };
-        if self.study.tell(pending.trial, pending.outcome)? == Told::AlreadyFinished {
-            // Theirs stands: it is read again with the next proposal.
-            self.rows.remove(&pending.trial);
+        if self.study.tell(pending.suggestion.trial, pending.outcome)? == Told::AlreadyFinished {
+            // It is read again with the next proposal.
+            self.log(format!(
+                "trial {} was ended by somebody else meanwhile: what they say stands",
+                pending.suggestion.trial
+            ));
+            self.rows.remove(&pending.suggestion.trial);
         }
         let mut queued = None;
         if pending.rerun {
-            let (parameters, origin) = self.rerun_of(pending.trial)?;
-            queued = Some(self.study.enqueue(&parameters, &origin.attributes())?);
+            let (parameters, origin) = self.rerun_of(pending.suggestion.trial)?;
+            // Another program may have seen the debt first; the trial that it has queued is then the re-run.
+            let comes = |other: &Trial| Origin::of(&other.user_attributes).parent == Some(pending.suggestion.trial);
+            let attributes = origin.attributes();
+            queued = self.study.enqueue_unless(&parameters, &attributes, |trials| trials.iter().any(comes))?;
+            queued = queued.or_else(|| self.study.trials().iter().find(|trial| comes(trial)).map(|trial| trial.number));
         }
         // Only now: what could not be written is still to be told.
         self.pending = None;
@@ -183,8 +214,7 @@ impl Life {
     pub(super) fn queue(&mut self, parameters: &[(String, f64)], origin: &Origin) -> Result<(), Refusal> {
         self.must_be_idle()?;
         self.study.enqueue(parameters, &origin.attributes())?;
-        self.propose()?;
-        Ok(())
+        Ok(self.propose()?)
     }
 
     /// Whether no trial runs or is under review.

@@ -1,14 +1,14 @@
 //! What a program that ended in mid-trial has left behind: judged trials count, others are void and come again.
 //!
 //! Whose trial is whose: the session that has the study's folder (worker 0) closes at its start the trials that worker 0
-//! began, for it is the only one. Trials of joined workers are closed by whoever sees them, once they have run for longer
-//! than any simulated trial takes (`[workers] abandoned_s`). Trials of other programs are left to those.
-
-use std::time::Duration;
+//! began, for it is the only one. Trials of joined workers are closed by whoever has seen them run for longer than any
+//! simulated trial takes (`[workers] abandoned_s`). Trials of other programs are left to those.
 
 use super::attributes::{self, Origin};
+use super::confirming::Next;
+use super::watch::Watch;
 use super::{Life, Refusal};
-use crate::optimize::study::{Outcome, Study, StudyError, Told};
+use crate::optimize::study::{Outcome, StudyError, Told};
 use crate::optimize::trial::{Trial, TrialState};
 use crate::recording::record::{Record, Source, Stage, Verdict};
 
@@ -49,8 +49,9 @@ impl Life {
 
     /// Closes what joined workers have left behind that are dead by now.
     pub(super) fn close_abandoned(&mut self) -> Result<(), StudyError> {
+        self.watch.observe(self.study.trials());
         let theirs = |trial: &&Trial| attributes::worker_of(trial).is_some_and(|worker| worker > 0);
-        let dead = |trial: &&Trial| theirs(trial) && !self.is_mine(trial) && !self.is_alive(trial);
+        let dead = |trial: &&Trial| theirs(trial) && !self.is_mine(trial) && !self.watch.is_alive(trial);
         let dead: Vec<Trial> = self.study.running().filter(dead).cloned().collect();
         if dead.is_empty() {
             return Ok(());
@@ -66,36 +67,22 @@ impl Life {
         attributes::worker_of(trial) == Some(self.plan.worker) && trial.worker == self.study.worker()
     }
 
-    /// Whether a running trial may still be run by somebody.
-    fn is_alive(&self, trial: &Trial) -> bool {
-        is_alive(trial, self.plan.abandoned)
-    }
-
     /// Whether other workers run trials: until they end it is not known whether the study is finished. Trials that
     /// nobody has ended in time are not waited for.
     pub fn others_run(&self) -> bool {
-        self.study.running().any(|trial| !self.is_mine(trial) && self.is_alive(trial))
+        self.study.running().any(|trial| !self.is_mine(trial) && self.watch.is_alive(trial))
     }
 
     fn close_trial(&mut self, trial: &Trial, cause: &str) -> Result<(), StudyError> {
-        match attributes::judgement_of(trial) {
-            Some(outcome) => {
-                if self.study.tell(trial.number, outcome)? == Told::Recorded {
-                    self.log(format!("trial {} was judged before the interruption: it counts", trial.number));
-                }
-            }
-            None => {
-                // Queued again below, or by the next session if this one is killed before it gets there.
-                let marked = self.study.annotate(trial.number, &attributes::interrupted(cause));
-                match marked {
-                    // Somebody else was faster.
-                    Err(StudyError::State { .. }) => return Ok(()),
-                    other => other?,
-                }
-                if self.study.tell(trial.number, Outcome::Fail)? == Told::Recorded {
-                    self.log(format!("trial {} was interrupted: it is void and queued again", trial.number));
-                }
-            }
+        let (outcome, last, words) = match attributes::judgement_of(trial) {
+            Some(outcome) => (outcome, Vec::new(), "judged before the interruption: it counts"),
+            // Queued again by the caller, or by the next session if this one is killed before it gets there.
+            None => (Outcome::Fail, attributes::interrupted(cause), "interrupted: it is void and queued again"),
+        };
+        // Judged at this very moment it is not dead after all.
+        let unchanged = |now: &Trial| now.user_attributes == trial.user_attributes;
+        if self.study.tell_if(trial.number, outcome, &last, unchanged)? == Told::Recorded {
+            self.log(format!("trial {} was {words}", trial.number));
         }
         Ok(())
     }
@@ -130,15 +117,16 @@ impl Life {
         self.close_abandoned()?;
         self.take_rows();
         let Some(card) = &self.card else {
-            let room = occupied(self.study.trials(), self.plan.abandoned) < self.plan.budget;
+            let room = occupied(self.study.trials(), &self.watch) < self.plan.budget;
             let queued = self.study.waiting().any(|trial| attributes::source_of(trial) == Source::Confirm);
-            return if room || queued { Ok(self.propose()?) } else { Ok(()) };
+            // A repeat that another worker had taken has come to nothing, or was the last.
+            let confirms = self.pending.is_none() && !matches!(self.next_repeat(&self.study), Next::Nothing);
+            return if room || queued || confirms { Ok(self.propose()?) } else { Ok(()) };
         };
         let next = self.study.waiting().next().map(|trial| trial.number);
-        let on_the_table = card.draft.enqueued.then_some(card.number());
-        // A re-run of our own waits in the outlook alone; it has the number that a foreign point may have taken.
-        let ours = card.draft.enqueued && next.is_none();
-        if next != on_the_table && !ours && !card.is_changed() {
+        // A re-run of our own waits in the outlook alone: its number there means nothing in the study.
+        let on_the_table = (card.draft.enqueued && !card.in_outlook_alone).then_some(card.number());
+        if next != on_the_table && !card.is_changed() {
             self.log("another program has changed the queue: here is what comes next".to_owned());
             self.propose()?;
         }
@@ -162,17 +150,13 @@ impl Life {
 }
 
 /// How many of `trials` take a place of the budget: those that count, and those that run and may still count.
-pub(super) fn occupied(trials: &[Trial], abandoned: Duration) -> u32 {
+pub(super) fn occupied(trials: &[Trial], watch: &Watch) -> u32 {
     let takes = |trial: &&Trial| match trial.state {
         TrialState::Complete => true,
         // A person may take any time to judge; the session that has the folder closes its own.
-        TrialState::Running => attributes::worker_of(trial) == Some(0) || is_alive(trial, abandoned),
+        TrialState::Running => attributes::worker_of(trial) == Some(0) || watch.is_alive(trial),
         _ => false,
     };
     let budgeted = |trial: &&Trial| attributes::source_of(trial) != Source::Confirm;
     trials.iter().filter(takes).filter(budgeted).count() as u32
-}
-
-fn is_alive(trial: &Trial, abandoned: Duration) -> bool {
-    Study::age(trial).is_none_or(|age| age < abandoned)
 }

@@ -1,9 +1,14 @@
 //! What an operator may change of the card, of the search and of the queue. Each wish is checked; a refusal says what
 //! would do. Nothing runs before it is approved.
 
+use serde_json::json;
+
 use super::attributes::Origin;
 use super::{Life, Refusal, not_now};
 use crate::recording::record::{ParameterInfo, Stage};
+
+/// Study attribute: how many trials are to count. Workers that join and sessions that continue know it from here.
+pub const BUDGET: &str = "budget";
 
 impl Life {
     /// Sets one parameter of the proposal.
@@ -63,7 +68,8 @@ impl Life {
         if !free {
             return not_now(format!("with {name} fixed nothing would be left to search; queue the point instead"));
         }
-        let from = self.pending.as_ref().map_or(self.study.trials().len() as u32, |pending| pending.trial + 1);
+        let from =
+            self.pending.as_ref().map_or(self.study.trials().len() as u32, |pending| pending.suggestion.trial + 1);
         self.searched.fix(name, value, trials, from);
         self.keep_search()
     }
@@ -128,16 +134,21 @@ impl Life {
         self.queue(&parameters, &origin)
     }
 
-    /// Queues a point; parameters that it lacks are proposed when it is its turn.
+    /// Queues a point, gains of its own among the parameters; what it lacks is proposed when it is its turn.
     ///
     /// # Errors
     /// When a value is outside its bounds, a trial is under way, or the study cannot be written.
-    pub fn enqueue(&mut self, parameters: &[(String, f64)]) -> Result<(), Refusal> {
+    pub fn enqueue(&mut self, point: &[(String, f64)]) -> Result<(), Refusal> {
         let bounds = self.searched.parameters(&self.plan);
-        for (name, value) in parameters {
+        let is_gain = |(name, _): &(String, f64)| self.plan.gains.iter().any(|gain| gain.name == *name);
+        let (gains, parameters): (Vec<_>, Vec<_>) = point.iter().cloned().partition(is_gain);
+        for (name, value) in &parameters {
             must_be_within(&bounds, "parameter", name, *value)?;
         }
-        self.queue(parameters, &Origin::queued())
+        for (name, value) in &gains {
+            must_be_within(&self.plan.gains, "gain", name, *value)?;
+        }
+        self.queue(&parameters, &Origin { gains, ..Origin::queued() })
     }
 
     /// A note on a trial, also on one that was told long ago.
@@ -152,12 +163,14 @@ impl Life {
         Ok(())
     }
 
-    /// Raises the budget.
+    /// Raises the budget, for those too who continue the study or join it later.
     ///
     /// # Errors
-    /// When the study cannot be read.
+    /// When the study cannot be read or written.
     pub fn extend(&mut self, trials: u32) -> Result<(), Refusal> {
-        self.plan.budget = self.plan.budget.saturating_add(trials);
+        let budget = self.plan.budget.saturating_add(trials);
+        self.study.annotate_study(&[(BUDGET.to_owned(), json!(budget))])?;
+        self.plan.budget = budget;
         if self.stage == Stage::Finished {
             self.propose()?;
         } else {
@@ -178,7 +191,7 @@ fn known<'a>(all: &'a [ParameterInfo], what: &str, name: &str) -> Result<&'a Par
     }
 }
 
-fn must_be_within(all: &[ParameterInfo], what: &str, name: &str, value: f64) -> Result<(), Refusal> {
+pub(super) fn must_be_within(all: &[ParameterInfo], what: &str, name: &str, value: f64) -> Result<(), Refusal> {
     let ParameterInfo { unit, low, high, .. } = known(all, what, name)?;
     if value >= *low && value <= *high {
         Ok(())

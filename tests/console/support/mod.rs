@@ -32,7 +32,9 @@ impl Console {
     }
 
     pub fn with(settings: Settings, theme: Theme) -> Console {
-        Console { model: Model::new(settings, theme, None) }
+        let mut model = Model::new(settings, theme, None);
+        model.size = (80, 24);
+        Console { model }
     }
 
     /// A session of the forward task on the simulator, robot disarmed, trial 0 proposed.

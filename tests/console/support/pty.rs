@@ -155,11 +155,11 @@ impl Session {
         writer.flush().expect("typed");
     }
 
-    /// Approves the jump: two presses, half a second apart.
+    /// Approves the jump: two presses, a second apart.
     pub fn approve(&mut self) {
         self.send("g");
         self.wait_for(&["Jump?"]);
-        std::thread::sleep(Duration::from_millis(500));
+        std::thread::sleep(Duration::from_millis(1000));
         self.send("g");
     }
 

@@ -5,6 +5,7 @@ use quadfrog::recording::record::{Stage, Verdict};
 
 use super::{Action, Legality};
 use crate::model::{Model, View};
+use crate::view::{MIN_COLUMNS, MIN_ROWS};
 
 pub(super) fn always(_: &Model) -> Legality {
     Ok(())
@@ -46,6 +47,7 @@ fn busy(mode: Mode) -> Option<&'static str> {
 
 pub(super) fn may_arm(model: &Model) -> Legality {
     may_wish(model)?;
+    must_be_seen(model)?;
     match model.mode() {
         mode if busy(mode).is_some() => refuse(busy(mode).unwrap_or_default()),
         Mode::Disarmed if stage_is(model, Stage::Review) => refuse("the last trial waits for its verdict"),
@@ -81,8 +83,18 @@ pub fn may_acknowledge(model: &Model) -> Legality {
     }
 }
 
+/// What energises needs a screen that shows what it does.
+fn must_be_seen(model: &Model) -> Legality {
+    let (columns, rows) = model.size;
+    if columns >= MIN_COLUMNS && rows >= MIN_ROWS {
+        return Ok(());
+    }
+    refuse(format!("enlarge the terminal to {MIN_COLUMNS}x{MIN_ROWS}: what will run must be seen"))
+}
+
 pub(super) fn may_approve(model: &Model) -> Legality {
     may_change_proposal(model)?;
+    must_be_seen(model)?;
     match model.mode() {
         Mode::Ready => Ok(()),
         Mode::Disarmed => refuse(format!("the robot is not standing: press {} first", model.keymap.key(Action::Arm))),

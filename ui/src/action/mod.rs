@@ -191,7 +191,7 @@ pub const ACTIONS: [ActionInfo; 68] = {
         row(A::SitDown, "sit-down", &["D"], G::Robot, "sit down and disarm", may_sit_down),
         row(A::Acknowledge, "acknowledge", &["k"], G::Robot, "acknowledge a stop or a fault: back to DISARMED", may_acknowledge),
 
-        row(A::Approve, "approve", &["g"], G::Proposal, "approve the jump; again after 0.3 s: countdown and jump", may_approve),
+        row(A::Approve, "approve", &["g"], G::Proposal, "approve the jump; again after 0.8 s: countdown and jump", may_approve),
         row(A::Override, "override", &["o"], G::Proposal, "change parameters and gains of the proposal", may_change_proposal),
         row(A::ClearOverrides, "clear-overrides", &["O"], G::Proposal, "back to what was proposed", may_clear_overrides),
         row(A::Fix, "fix", &["X"], G::Proposal, "Override: fix the parameter for the next trials, or search it again", may_fix),

@@ -30,35 +30,43 @@ pub fn journal(place: &str) -> Storage {
     Storage::File(if path.is_dir() { path.join(STUDY_FILE) } else { path.to_owned() })
 }
 
-/// The study of `storage` that is to be joined; one that does not exist yet is made as `task` and `seed` say, or the
-/// defaults where they are left out. `folder` is this worker's own.
+/// The study of `storage` that is to be joined. One that does not exist yet is made where both `task` and `seed` are
+/// given; without them the place is taken for mistyped.
 pub fn joined(
     storage: &Storage,
     task: Option<Task>,
     seed: Option<u32>,
     robot: &RobotDescription,
-    (usual_task, usual_seed): (Task, u32),
-    folder: PathBuf,
-) -> Result<Chosen, Failure> {
-    let all = stored_studies(storage)?;
+) -> Result<StoredStudy, Failure> {
+    let there = match storage {
+        // To look into a journal file makes its folder.
+        Storage::File(file) => file.is_file(),
+        _ => true,
+    };
+    let all = if there { stored_studies(storage)? } else { Vec::new() };
     let fits =
         |study: &&StoredStudy| task.is_none_or(|task| task == study.task) && seed.is_none_or(|seed| seed == study.seed);
     let fitting: Vec<&StoredStudy> = all.iter().filter(fits).collect();
     match fitting.as_slice() {
-        [] if !all.is_empty() && task.is_none() | seed.is_none() => {
-            let there: Vec<String> = all.iter().map(|s| format!("{} seed {}", s.task.name(), s.seed)).collect();
-            let message = format!(
-                "--join {storage}: there is no such study in it, only {}; to make another give --task and --seed",
-                there.join(", ")
-            );
-            Err(Failure::Input(message))
+        [] => {
+            if let (Some(task), Some(seed)) = (task, seed) {
+                eprintln!("quadfrog: a new study of {} seed {seed} is made in {storage}", task.name());
+                return Ok(StoredStudy { task, seed, robot: robot.name.clone(), budget: None });
+            }
+            let known: Vec<String> = all.iter().map(|s| format!("{} seed {}", s.task.name(), s.seed)).collect();
+            let found = match (there, known.as_slice()) {
+                (false, _) => "there is no such journal".to_owned(),
+                (true, []) => "there is no study of this program in it".to_owned(),
+                (true, known) => format!("there is no such study in it, only {}", known.join(", ")),
+            };
+            let what = if all.is_empty() { "a new study" } else { "another" };
+            Err(Failure::Input(format!("--join {storage}: {found}; to make {what} give --task and --seed")))
         }
-        [] => Ok(Chosen { task: task.unwrap_or(usual_task), seed: seed.unwrap_or(usual_seed), folder, budget: None }),
         [study] if study.robot != robot.name => Err(Failure::Input(format!(
             "--model {}: {storage} holds a study of the {}; give --model {}",
             robot.name, study.robot, study.robot
         ))),
-        [study] => Ok(Chosen { task: study.task, seed: study.seed, folder, budget: study.budget }),
+        [study] => Ok((*study).clone()),
         several => {
             let there: Vec<String> = several.iter().map(|s| format!("{} seed {}", s.task.name(), s.seed)).collect();
             let message = format!("--join {storage}: say with --task and --seed which: {}", there.join(", "));

@@ -136,7 +136,7 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
     let cut_short = left_behind(&folder);
     let handle = Engine::start(Options {
         seed: chosen.seed,
-        trials: arguments.study.trials,
+        trials: arguments.study.trials.or(chosen.budget),
         // Who only looks leaves nothing behind.
         folder: (!arguments.observe).then_some(chosen.folder),
         observe: arguments.observe,

@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use quadfrog::config::{Config, ConfigError};
-use quadfrog::engine::EngineError;
+use quadfrog::engine::{EngineError, newest_config};
 use quadfrog::optimize::journal::JournalError;
 use quadfrog::optimize::sampler::SamplerKind;
 use quadfrog::optimize::study::StudyError;
@@ -171,9 +171,15 @@ pub struct StudyArguments {
 }
 
 impl StudyArguments {
-    /// The configuration asked for; a study that is continued goes on with its own.
+    /// The configuration asked for; a study that is continued goes on with the one that it ran with last.
     fn load_config(&self, resume: Option<&Path>) -> Result<Config, Failure> {
-        let own = resume.map(|folder| folder.join("config")).filter(|config| config.is_dir());
+        let own = match &self.config {
+            None => resume.and_then(newest_config).map(|(_, config)| config),
+            Some(_) => None,
+        };
+        if let Some(own) = &own {
+            eprintln!("quadfrog: the configuration is the one that the study ran with last, {}", own.display());
+        }
         let mut config = Config::load(self.config.as_deref().or(own.as_deref()))?;
         if let Some(sampler) = self.sampler {
             config.choose_sampler(sampler.into());

@@ -9,7 +9,7 @@ use std::sync::{Mutex, PoisonError};
 use clap::{Args, ValueEnum};
 use color_eyre::eyre::eyre;
 use quadfrog::config::{Backend, Config};
-use quadfrog::engine::{self, EngineError, Options};
+use quadfrog::engine::{self, EngineError, Options, StoredStudy};
 use quadfrog::optimize::journal::Durability;
 use quadfrog::optimize::study::Storage;
 use quadfrog::realtime::command::Task;
@@ -99,7 +99,7 @@ pub fn run(arguments: &OptimizeArguments) -> Result<(), Failure> {
     let config = arguments.study.load_config(beside)?;
     let robot = arguments.study.load_robot()?;
     let studies = match &joined {
-        Some(storage) => workers(arguments, storage, &config, &robot)?,
+        Some(storage) => workers(arguments, storage, &robot)?,
         None => choose(arguments, &config, &robot)?,
     };
     let printer = Printer::new(arguments, &config, &studies);
@@ -139,12 +139,7 @@ pub fn run(arguments: &OptimizeArguments) -> Result<(), Failure> {
 }
 
 /// As many workers on the study of `storage` as `--jobs` says, each with a folder of its own.
-fn workers(
-    arguments: &OptimizeArguments,
-    storage: &Storage,
-    config: &Config,
-    robot: &RobotDescription,
-) -> Result<Vec<Chosen>, Failure> {
+fn workers(arguments: &OptimizeArguments, storage: &Storage, robot: &RobotDescription) -> Result<Vec<Chosen>, Failure> {
     let several = || Failure::input("--join: a worker takes part in one study; give one --task and one --seed");
     let task = match arguments.task.as_slice() {
         [] => None,
@@ -156,13 +151,12 @@ fn workers(
         Some([seed]) => Some(*seed),
         Some(_) => return Err(several()),
     };
-    let usual = (Task::Forward, config.optimize.sampler.seed);
-    let folder = |worker: u16| {
-        let name = arguments.study.new_folder(task.unwrap_or(usual.0), seed.unwrap_or(usual.1));
-        // Many may begin in the same second.
-        PathBuf::from(format!("{}-joined-{}-{worker}", name.display(), std::process::id()))
-    };
-    (0..arguments.jobs.unwrap_or(1)).map(|worker| joined(storage, task, seed, robot, usual, folder(worker))).collect()
+    let StoredStudy { task, seed, budget, .. } = joined(storage, task, seed, robot)?;
+    let name = arguments.study.new_folder(task, seed);
+    // Many may begin in the same second.
+    let folder = |worker| PathBuf::from(format!("{}-joined-{}-{worker}", name.display(), std::process::id()));
+    let worker = |worker: u16| Chosen { task, seed, folder: folder(worker), budget };
+    Ok((0..arguments.jobs.unwrap_or(1)).map(worker).collect())
 }
 
 /// The studies that the arguments ask for: every task with every seed.
@@ -197,7 +191,7 @@ fn run_one(
 ) -> Result<(), Failure> {
     let options = Options {
         seed: study.seed,
-        trials: arguments.study.trials.or(study.budget.filter(|_| join.is_some())),
+        trials: arguments.study.trials.or(study.budget),
         folder: Some(study.folder.clone()),
         approve: Approval::Auto,
         join: join.cloned(),
@@ -223,8 +217,8 @@ fn run_one(
     let mut failed = None;
     let kept = arguments.record;
     let mut best: Option<(TrialRecord, Vec<Tick>)> = None;
-    let ran = automatic::run(&mut life, &mut rollout, |row, ticks| {
-        printer.trial(study, row);
+    let ran = automatic::run_watched(&mut life, &mut rollout, |life, row, ticks| {
+        printer.trial(study, row, life.counted());
         let accepted = row.verdict == Some(Verdict::Accept);
         let better = |best: &(TrialRecord, Vec<Tick>)| row.value > best.0.value;
         match kept {

@@ -8,9 +8,10 @@ use std::path::{Path, PathBuf};
 use clap::{Args, Subcommand, ValueEnum};
 use color_eyre::eyre::{WrapErr, eyre};
 use quadfrog::config::Config;
-use quadfrog::engine::{Opened, open_stored, stored_studies, study_files};
+use quadfrog::engine::{Opened, newest_config, open_stored, stored_studies, study_files};
 use quadfrog::optimize::exchange::{self, TableTrial};
 use quadfrog::optimize::repeats;
+use quadfrog::optimize::sampler::Direction;
 use quadfrog::optimize::study::Storage;
 use quadfrog::optimize::trial::{Trial, TrialState};
 use quadfrog::recording::record::TrialRecord;
@@ -127,13 +128,13 @@ pub fn run(command: &StudyCommand) -> Result<(), Failure> {
 }
 
 impl Which {
-    /// The configuration that the study ran with, where its folder has kept it.
+    /// The configuration that the study ran with last, where its folder has kept it.
     fn config(&self) -> Result<Config, Failure> {
         let own = match journal(&self.study) {
-            Storage::File(file) => file.parent().map(|folder| folder.join("config")).filter(|config| config.is_dir()),
+            Storage::File(file) => file.parent().and_then(newest_config),
             _ => None,
         };
-        Ok(Config::load(own.as_deref())?)
+        Ok(Config::load(own.as_ref().map(|(_, config)| config.as_path()))?)
     }
 
     fn open(&self) -> Result<Opened, Failure> {
@@ -209,7 +210,16 @@ fn list(folder: &Path) -> Result<(), Failure> {
 
 /// The best trial that the robot stood through.
 fn best_of(opened: &Opened) -> Option<&Trial> {
-    opened.study.best().filter(|trial| !trial.is_fall())
+    // As everywhere: a repeated point is worth the mean of its repeats.
+    let points = repeats::points(opened.study.trials());
+    let stood = |point: &&repeats::Point| point.stood > 0;
+    let better = |a: &repeats::Point, b: &repeats::Point| match opened.study.options().direction {
+        Direction::Maximize => a.mean() > b.mean(),
+        Direction::Minimize => a.mean() < b.mean(),
+    };
+    let best = points.iter().filter(stood).reduce(|best, point| if better(point, best) { point } else { best })?;
+    let standing = |trial: &&Trial| best.trials.contains(&trial.number) && !trial.is_fall();
+    opened.study.trials().iter().find(standing)
 }
 
 fn show(which: &Which) -> Result<(), Failure> {
@@ -289,13 +299,18 @@ fn import(which: &Which, table: &Path, format: Option<Format>, queue: bool) -> R
     let (finished, unfinished): (Vec<TableTrial>, Vec<TableTrial>) =
         trials.into_iter().partition(|trial| trial.state.is_finished());
     if !queue {
-        let numbers = life::import(&mut study, finished).map_err(|error| wrong(&error))?;
+        let given = finished.len();
+        let added = life::import(&mut study, finished).map_err(|error| wrong(&error))?.len();
+        let known = match given - added {
+            0 => String::new(),
+            known => format!("; {known} were there already, with the same parameters, value and times"),
+        };
         let left = if unfinished.is_empty() {
             String::new()
         } else {
             format!("; {} that had not finished are left out, --queue queues them", unfinished.len())
         };
-        return say(&format!("{} trials are in the study now{left}\n", numbers.len()));
+        return say(&format!("{added} trials are in the study now{known}{left}\n"));
     }
     let points: Vec<TableTrial> = finished.into_iter().chain(unfinished).collect();
     // All or none: looked at before the first is queued.

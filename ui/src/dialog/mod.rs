@@ -18,8 +18,9 @@ use crate::update::{Effect, perform, wish};
 pub use choice::Choice;
 pub use override_form::{OverrideForm, OverrideRow};
 
-/// Two presses nearer than this are one: the second moment of an approval comes later.
-pub const APPROVAL_PAUSE: Duration = Duration::from_millis(300);
+/// Two presses nearer than this are one: the second moment of an approval comes later. Longer than a held key waits before
+/// it repeats itself (660 ms on X11, at most 500 ms elsewhere as delivered), for a repetition cannot be told from a press.
+pub const APPROVAL_PAUSE: Duration = Duration::from_millis(800);
 
 /// Lines that a page of a trial's details moves by; there are never more than two pages of them.
 const DETAILS_PAGE: usize = 10;

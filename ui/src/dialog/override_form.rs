@@ -37,6 +37,8 @@ pub struct OverrideRow {
     pub low: f64,
     /// Upper bound.
     pub high: f64,
+    /// The value of the sampler or the queue; of a gain that of the configuration.
+    pub proposed: f64,
     /// The value of the proposal when the form was opened.
     pub before: f64,
     /// The value now.
@@ -63,6 +65,7 @@ impl OverrideForm {
             unit: info.unit,
             low: info.low,
             high: info.high,
+            proposed: p.proposed,
             before: p.value,
             value: p.value,
             gain,
@@ -136,11 +139,11 @@ pub(super) fn key(model: &mut Model, key: Key, mut form: OverrideForm) -> Vec<Ef
                 return intents.into_iter().flat_map(|intent| wish(model, intent)).collect();
             }
         }
-        // The point as it stands in the form waits its turn; the card stays as it is.
+        // The point as it stands in the form, with what is not as configured of the gains, comes next.
         _ if model.keymap.action(key) == Some(Action::QueuePoint) => {
             if form.take_typed() {
-                let parameters = form.rows.iter().filter(|row| !row.gain);
-                let point = parameters.map(|row| (row.name.clone(), row.value)).collect();
+                let said = form.rows.iter().filter(|row| !row.gain || row.value != row.proposed);
+                let point = said.map(|row| (row.name.clone(), row.value)).collect();
                 return wish(model, Intent::Enqueue(point));
             }
         }

@@ -175,7 +175,8 @@ fn bounds(model: &mut Model) -> Vec<Effect> {
 
 fn queue_point(model: &mut Model) -> Vec<Effect> {
     let Some(proposal) = model.proposal_on_table() else { return Vec::new() };
-    let point = proposal.parameters.iter().map(|p| (p.name.clone(), p.value)).collect();
+    let gains = proposal.gains.iter().filter(|gain| gain.value != gain.proposed);
+    let point = proposal.parameters.iter().chain(gains).map(|p| (p.name.clone(), p.value)).collect();
     wish(model, Intent::Enqueue(point))
 }
 

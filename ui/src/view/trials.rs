@@ -196,7 +196,7 @@ fn render_empty(frame: &mut Frame, area: Rect, model: &Model) {
     ]);
     let lines = vec![
         step("before", &[(Action::Arm, "arm: it stands up"), (Action::Override, "override"), (Action::Skip, "skip")]),
-        step("jump  ", &[(Action::Approve, "approve; again after 0.3 s: the robot jumps")]),
+        step("jump  ", &[(Action::Approve, "approve; again after 0.8 s: the robot jumps")]),
         step(
             "after ",
             &[

@@ -20,6 +20,8 @@ pub struct Printer {
     json: bool,
     several: bool,
     bar: Option<ProgressBar>,
+    /// Whether the bar is that of one study, whoever runs its trials.
+    one: bool,
     units: HashMap<String, String>,
     output: Mutex<()>,
     /// Task, best value and falls of each finished study.
@@ -28,9 +30,12 @@ pub struct Printer {
 
 impl Printer {
     pub fn new(arguments: &OptimizeArguments, config: &Config, studies: &[Chosen]) -> Printer {
-        let budget = arguments.study.trials.unwrap_or(config.optimize.trials);
+        let budget =
+            |study: &Chosen| u64::from(arguments.study.trials.or(study.budget).unwrap_or(config.optimize.trials));
+        // All workers that join work off the budget of the same study.
+        let one = arguments.join.is_some() || studies.len() == 1;
         let bar = std::io::stderr().is_terminal().then(|| {
-            let bar = ProgressBar::new(u64::from(budget) * studies.len() as u64);
+            let bar = ProgressBar::new(studies.iter().take(if one { 1 } else { studies.len() }).map(budget).sum());
             let style = ProgressStyle::with_template("{bar:30} {pos}/{len} trials  {msg}");
             bar.with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
         });
@@ -39,13 +44,15 @@ impl Printer {
             json: arguments.json,
             several: studies.len() > 1,
             bar,
+            one,
             units,
             output: Mutex::new(()),
             results: Mutex::default(),
         }
     }
 
-    pub fn trial(&self, study: &Chosen, row: &TrialRecord) {
+    /// A trial has been judged; `counted` are those of its study that count by now, other workers' among them.
+    pub fn trial(&self, study: &Chosen, row: &TrialRecord, counted: u32) {
         let _alone = self.output.lock();
         if self.json {
             let line = JsonLine {
@@ -63,7 +70,11 @@ impl Printer {
         let line = table::line(row, study.task.unit(), &self.units);
         match &self.bar {
             Some(bar) => {
-                bar.inc(1);
+                match self.one {
+                    // Of several workers here one may know more than the other.
+                    true => bar.set_position(bar.position().max(u64::from(counted))),
+                    false => bar.inc(1),
+                }
                 bar.set_message(line);
             }
             None if self.json => {}
