@@ -70,6 +70,8 @@ struct Session {
     _recorder: Receiver<Stamped>,
     records: Vec<Record>,
     time_ms: u64,
+    /// Whether there is a screen that beats.
+    watched: bool,
 }
 
 impl Session {
@@ -82,12 +84,6 @@ impl Session {
     }
 
     fn begin(backend: Backend, folder: Option<std::path::PathBuf>, observe: bool) -> Session {
-        let session = Session::begin_unwatched(backend, folder, observe);
-        session.control.heartbeat.beat();
-        session
-    }
-
-    fn begin_unwatched(backend: Backend, folder: Option<std::path::PathBuf>, observe: bool) -> Session {
         let config = Config::load(None).unwrap();
         let robot = RobotDescription::embedded("go1").unwrap();
         let options = Options { trials: Some(5), observe, ..Options::new(config, robot, backend, Task::Forward) };
@@ -117,13 +113,16 @@ impl Session {
             _recorder: recorder,
             records: Vec::new(),
             time_ms: 0,
+            watched: true,
         }
     }
 
     fn ticks(&mut self, count: u32) {
         for _ in 0..count {
             self.time_ms += 1;
-            self.operator.heartbeat.beat();
+            if self.watched {
+                self.operator.heartbeat.beat();
+            }
             let instant = Instant { planned_ns: self.time_ms * 1_000_000, lateness_ns: 0 };
             self.body.tick(instant, &SimulatedClock, &mut self.robot);
             self.supervisor.attend(self.time_ms * 1_000_000);
@@ -366,7 +365,7 @@ fn an_arming_on_its_way_when_the_session_ends_energises_nothing() {
     session.supervisor.stop();
     for _ in 0..3000 {
         session.ticks(1);
-        assert!(!session.cycle.mode().energised(), "{:?}", session.cycle.mode());
+        assert!(!session.body.mode().energised(), "{:?}", session.body.mode());
     }
 }
 
@@ -378,7 +377,7 @@ fn the_end_of_a_session_that_only_observes_sends_nothing() {
     assert!(!session.supervisor.say_goodbye(true));
     session.supervisor.stop();
     session.ticks(100);
-    assert_eq!((session.cycle.mode(), session.robot.writes), (Mode::Observe, 0));
+    assert_eq!((session.body.mode(), session.robot.writes), (Mode::Observe, 0));
 }
 
 /// (A defect once: `auto` went on judging and arming while the program said goodbye.)
@@ -390,19 +389,21 @@ fn nothing_is_done_by_itself_any_more_once_the_session_ends() {
     session.supervisor.take_control();
     session.supervisor.say_goodbye(true);
     session.ticks(3000);
-    assert_eq!(session.cycle.mode(), Mode::Disarmed);
+    assert_eq!(session.body.mode(), Mode::Disarmed);
 }
 
 /// (A defect once: a robot was taken control of before any screen was heard.)
 #[test]
 fn control_is_taken_only_once_a_screen_was_heard() {
-    let mut session = Session::begin_unwatched(Backend::Simulator, None, false);
+    let mut session = Session::begin(Backend::Simulator, None, false);
+    session.watched = false;
     session.ticks(10);
     session.supervisor.take_control();
     session.ticks(10);
-    assert_eq!(session.cycle.mode(), Mode::Observe);
-    session.control.heartbeat.beat();
+    assert_eq!(session.body.mode(), Mode::Observe);
+    session.watched = true;
+    session.ticks(1);
     session.supervisor.take_control();
     session.ticks(10);
-    assert_eq!(session.cycle.mode(), Mode::Disarmed);
+    assert_eq!(session.body.mode(), Mode::Disarmed);
 }
