@@ -64,8 +64,6 @@ impl Robot for Go1Like {
 struct Session {
     supervisor: Supervisor,
     operator: ScreenEnd,
-    /// Whether a screen is alive.
-    watched: bool,
     _ticks: rtrb::Consumer<Tick>,
     body: Body,
     robot: Go1Like,
@@ -73,6 +71,8 @@ struct Session {
     _recorder: Receiver<Stamped>,
     records: Vec<Record>,
     time_ms: u64,
+    /// Whether there is a screen that beats.
+    watched: bool,
 }
 
 impl Session {
@@ -85,10 +85,6 @@ impl Session {
     }
 
     fn begin(backend: Backend, folder: Option<std::path::PathBuf>, observe: bool) -> Session {
-        Session { watched: true, ..Session::begin_unwatched(backend, folder, observe) }
-    }
-
-    fn begin_unwatched(backend: Backend, folder: Option<std::path::PathBuf>, observe: bool) -> Session {
         let config = Config::load(None).unwrap();
         let robot = RobotDescription::embedded("go1").unwrap();
         let options = Options { trials: Some(5), observe, ..Options::new(config, robot, backend, Task::Forward) };
@@ -111,7 +107,6 @@ impl Session {
         Session {
             supervisor: Supervisor::new(parts, 0),
             operator,
-            watched: false,
             _ticks: ticks,
             body: Body::new(&settings, control, 0),
             robot: Go1Like { simulator, charge_percent: 90.0, writes: 0, reboots: 0, silent_ms: 0, tamper: |_| {} },
@@ -119,6 +114,7 @@ impl Session {
             _recorder: recorder,
             records: Vec::new(),
             time_ms: 0,
+            watched: true,
         }
     }
 
@@ -400,7 +396,8 @@ fn nothing_is_done_by_itself_any_more_once_the_session_ends() {
 /// (A defect once: a robot was taken control of before any screen was heard.)
 #[test]
 fn control_is_taken_only_once_a_screen_was_heard() {
-    let mut session = Session::begin_unwatched(Backend::Simulator, None, false);
+    let mut session = Session::begin(Backend::Simulator, None, false);
+    session.watched = false;
     session.ticks(10);
     session.supervisor.take_control();
     session.ticks(10);
