@@ -179,6 +179,8 @@ fn resizing_at_any_moment_is_safe() {
     let mut session = Session::start(folder.path(), SIZE, &[]);
     session.wait_for(&["Press A to arm"]);
     session.send("A");
+    // Not before: on a terminal that is too small nothing is armed.
+    session.wait_for(&["STAND UP"]);
     for step in 0..60_u16 {
         session.resize(20 + (step * 37) % 200, 5 + (step * 13) % 60);
         session.send(["1", "2", "3", "4", "5", "6", "?", "\x1b"][usize::from(step) % 8]);
