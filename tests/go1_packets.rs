@@ -129,7 +129,7 @@ proptest! {
         let near = |a: &[f64], b: &[f64], step: f64| a.iter().zip(b).all(|(a, b)| (a - b).abs() <= step);
         prop_assert!(near(&heard.joint_position, &told.joint_position, 1e-6));
         prop_assert!(near(&heard.joint_velocity, &told.joint_velocity, 1e-5));
-        prop_assert!(near(&heard.joint_torque, &told.joint_torque, 0.5 / 256.0 + 1e-6));
+        prop_assert!(near(&heard.joint_torque, &told.joint_torque, 0.5 / 256.0 + 1e-5));
         prop_assert!(heard.imu.orientation_world.angle_to(&told.imu.orientation_world) < 1e-6);
         prop_assert!((heard.imu.gyro_body - told.imu.gyro_body).norm() < 1e-6);
         prop_assert_eq!((heard.robot_time_ms, heard.motor_enabled), (told.robot_time_ms, told.motor_enabled));
