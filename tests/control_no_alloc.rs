@@ -5,10 +5,12 @@
     reason = "an allocator can only be written with unsafe; this one hands everything to the system's"
 )]
 
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
+#[path = "support/no_alloc.rs"]
+mod no_alloc;
+
 use std::collections::BTreeSet;
 
+use no_alloc::without_allocation;
 use quadfrog::config::{Backend, Config};
 use quadfrog::control::body::Body;
 use quadfrog::control::settings::Settings;
@@ -20,46 +22,6 @@ use quadfrog::realtime::thread::Instant;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::robot::{Battery, JointCommand, LinkStatus, Placement, Robot, RobotError, RobotState};
 use quadfrog::sim::Simulator;
-
-thread_local! {
-    static FORBIDDEN: Cell<bool> = const { Cell::new(false) };
-}
-
-struct Forbidding;
-
-/// Ends the process: a panic would allocate its message.
-fn not_now() {
-    if FORBIDDEN.with(Cell::get) {
-        // What is said must not allocate either.
-        let _ = nix::unistd::write(std::io::stderr(), b"the tick allocated or freed memory\n");
-        std::process::abort();
-    }
-}
-
-// SAFETY: every call goes unchanged to the system's allocator; the check touches only a thread-local flag.
-unsafe impl GlobalAlloc for Forbidding {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        not_now();
-        // SAFETY: the caller's promises are passed on.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        not_now();
-        // SAFETY: the caller's promises are passed on.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
-
-#[global_allocator]
-static FORBIDDING: Forbidding = Forbidding;
-
-fn without_allocation<T>(act: impl FnOnce() -> T) -> T {
-    FORBIDDEN.with(|forbidden| forbidden.set(true));
-    let result = act();
-    FORBIDDEN.with(|forbidden| forbidden.set(false));
-    result
-}
 
 /// The simulator as itself, or as a robot over a link with a battery that nobody can put in place.
 struct Machine {
@@ -290,19 +252,4 @@ fn the_body_with_the_simulator_never_allocates() {
 #[test]
 fn the_body_with_a_linked_robot_never_allocates() {
     everything(Backend::Hardware);
-}
-
-/// The watchman itself: an allocation where none is allowed ends the process.
-#[test]
-fn an_allocation_in_the_tick_would_be_noticed() {
-    const CHILD: &str = "QUADFROG_ALLOCATES";
-    if std::env::var_os(CHILD).is_some() {
-        without_allocation(|| std::hint::black_box(vec![1.0; 100]));
-        return;
-    }
-    let program = std::env::current_exe().unwrap();
-    let arguments = ["an_allocation_in_the_tick_would_be_noticed", "--exact", "--test-threads=1"];
-    let output = std::process::Command::new(program).args(arguments).env(CHILD, "1").output().unwrap();
-    assert!(!output.status.success(), "{output:?}");
-    assert!(String::from_utf8_lossy(&output.stderr).contains("the tick allocated"), "{output:?}");
 }

@@ -7,13 +7,14 @@
 
 #[path = "support/go1.rs"]
 mod go1;
+#[path = "support/no_alloc.rs"]
+mod no_alloc;
 
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
 use std::collections::BTreeSet;
 use std::net::UdpSocket;
 
 use go1::{ANY_PORT, description, pair};
+use no_alloc::without_allocation;
 use quadfrog::config::{Backend, Config};
 use quadfrog::control::body::Body;
 use quadfrog::realtime::channel::channels;
@@ -24,61 +25,6 @@ use quadfrog::realtime::thread::Instant;
 use quadfrog::robot::go1::Go1;
 use quadfrog::robot::{JointCommand, Robot};
 use quadfrog::sim::emulator::Fault;
-
-thread_local! {
-    static FORBIDDEN: Cell<bool> = const { Cell::new(false) };
-}
-
-struct Forbidding;
-
-/// Ends the process: a panic would allocate its message.
-fn not_now() {
-    if FORBIDDEN.with(Cell::get) {
-        // What is said must not allocate either.
-        let _ = nix::unistd::write(std::io::stderr(), b"the link allocated or freed memory\n");
-        std::process::abort();
-    }
-}
-
-// SAFETY: every call goes unchanged to the system's allocator; the check touches only a thread-local flag.
-unsafe impl GlobalAlloc for Forbidding {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        not_now();
-        // SAFETY: the caller's promises are passed on.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        not_now();
-        // SAFETY: the caller's promises are passed on.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
-
-#[global_allocator]
-static FORBIDDING: Forbidding = Forbidding;
-
-fn without_allocation<T>(act: impl FnOnce() -> T) -> T {
-    FORBIDDEN.with(|forbidden| forbidden.set(true));
-    let result = act();
-    FORBIDDEN.with(|forbidden| forbidden.set(false));
-    result
-}
-
-/// The watchman itself: an allocation where none is allowed ends the process.
-#[test]
-fn an_allocation_would_be_noticed() {
-    const CHILD: &str = "QUADFROG_ALLOCATES";
-    if std::env::var_os(CHILD).is_some() {
-        without_allocation(|| std::hint::black_box(vec![1.0; 100]));
-        return;
-    }
-    let program = std::env::current_exe().unwrap();
-    let arguments = ["an_allocation_would_be_noticed", "--exact", "--test-threads=1"];
-    let output = std::process::Command::new(program).args(arguments).env(CHILD, "1").output().unwrap();
-    assert!(!output.status.success(), "{output:?}");
-    assert!(String::from_utf8_lossy(&output.stderr).contains("the link allocated"), "{output:?}");
-}
 
 /// The control thread's body over the link: standing up, a jump and its review on a good network; then one that loses, doubles,
 /// spoils and delays, and a restart: every branch of the link.
