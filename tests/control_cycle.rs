@@ -57,17 +57,8 @@ impl Bench {
     }
 
     fn spec(&self) -> TrialSpec {
-        let control = self.config.task(Task::Forward);
-        TrialSpec {
-            trial: 7,
-            task: Task::Forward,
-            jump: JumpParameters { f0_hz: 1.3, f1_hz: 0.0, fx_n: 100.0, fy_n: 0.0, fz_n: 270.0 },
-            gains: control.gains(),
-            stance_leg: control.stance_leg(),
-            vmc: control.vmc,
-            jumps: 1,
-            seed: 0,
-        }
+        let jump = JumpParameters { f0_hz: 1.3, f1_hz: 0.0, fx_n: 100.0, fy_n: 0.0, fz_n: 270.0 };
+        TrialSpec { trial: 7, ..self.config.task(Task::Forward).trial(Task::Forward, jump) }
     }
 
     /// An approval given now, by somebody who has heard of every change of mode.

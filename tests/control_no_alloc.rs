@@ -16,7 +16,7 @@ use quadfrog::control::body::Body;
 use quadfrog::control::settings::Settings;
 use quadfrog::realtime::channel::{ControlEnd, ScreenEnd, SessionEnd, channels};
 use quadfrog::realtime::clock::MonotonicClock;
-use quadfrog::realtime::command::{Command, JumpParameters, Permit, Task, TrialSpec};
+use quadfrog::realtime::command::{Command, JumpParameters, Permit, Task};
 use quadfrog::realtime::telemetry::{Event, Mode, Tick};
 use quadfrog::realtime::thread::Instant;
 use quadfrog::robot::description::RobotDescription;
@@ -139,17 +139,8 @@ impl Bench {
     }
 
     fn approve(&mut self, fx_n: f64, f0_hz: f64) {
-        let control = self.config.task(Task::Forward);
-        let spec = TrialSpec {
-            trial: 0,
-            task: Task::Forward,
-            jump: JumpParameters { f0_hz, f1_hz: 0.0, fx_n, fy_n: 0.0, fz_n: 220.0 },
-            gains: control.gains(),
-            stance_leg: control.stance_leg(),
-            vmc: true,
-            jumps: 1,
-            seed: 0,
-        };
+        let jump = JumpParameters { f0_hz, f1_hz: 0.0, fx_n, fy_n: 0.0, fz_n: 220.0 };
+        let spec = self.config.task(Task::Forward).trial(Task::Forward, jump);
         let permit = Permit { mode_changes: self.mode_changes, given_ns: self.time_ms * 1_000_000 };
         self.command(Command::RunTrial(spec, permit));
     }

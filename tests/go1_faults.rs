@@ -143,17 +143,8 @@ impl Bench {
     }
 
     fn approval(&self) -> Command {
-        let control = self.config.task(Task::Forward);
-        let spec = TrialSpec {
-            trial: 3,
-            task: Task::Forward,
-            jump: JumpParameters { f0_hz: 1.3, f1_hz: 0.0, fx_n: 60.0, fy_n: 0.0, fz_n: 270.0 },
-            gains: control.gains(),
-            stance_leg: control.stance_leg(),
-            vmc: control.vmc,
-            jumps: 1,
-            seed: 0,
-        };
+        let jump = JumpParameters { f0_hz: 1.3, f1_hz: 0.0, fx_n: 60.0, fy_n: 0.0, fz_n: 270.0 };
+        let spec = TrialSpec { trial: 3, ..self.config.task(Task::Forward).trial(Task::Forward, jump) };
         Command::RunTrial(spec, Permit { mode_changes: self.mode_changes, given_ns: self.inputs.time_ns })
     }
 

@@ -19,7 +19,7 @@ use quadfrog::config::{Backend, Config};
 use quadfrog::control::body::Body;
 use quadfrog::realtime::channel::channels;
 use quadfrog::realtime::clock::SimulatedClock;
-use quadfrog::realtime::command::{Command, JumpParameters, Permit, Task, TrialSpec};
+use quadfrog::realtime::command::{Command, JumpParameters, Permit, Task};
 use quadfrog::realtime::telemetry::{Event, Mode};
 use quadfrog::realtime::thread::Instant;
 use quadfrog::robot::go1::Go1;
@@ -72,18 +72,8 @@ fn a_tick_over_the_link_does_not_allocate() {
         12_000,
         Some(Mode::Review),
         Some(|permit, config| {
-            let control = config.task(Task::Forward);
-            let spec = TrialSpec {
-                trial: 0,
-                task: Task::Forward,
-                jump: JumpParameters { f0_hz: 1.3, f1_hz: 0.0, fx_n: 60.0, fy_n: 0.0, fz_n: 270.0 },
-                gains: control.gains(),
-                stance_leg: control.stance_leg(),
-                vmc: control.vmc,
-                jumps: 1,
-                seed: 0,
-            };
-            Command::RunTrial(spec, permit)
+            let jump = JumpParameters { f0_hz: 1.3, f1_hz: 0.0, fx_n: 60.0, fy_n: 0.0, fz_n: 270.0 };
+            Command::RunTrial(config.task(Task::Forward).trial(Task::Forward, jump), permit)
         }),
     );
     ticks(26_000, None, None);

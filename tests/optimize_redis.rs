@@ -1,48 +1,21 @@
 //! A study on a real Redis server, shared by workers: ours as processes of this very test, and Python's. Skipped with a
 //! message where `redis-server` is not installed.
 
+#[path = "support/redis.rs"]
+mod redis;
+
 use quadfrog::optimize::journal::Durability;
 use quadfrog::optimize::sampler::{Direction, SamplerConfig};
 use quadfrog::optimize::space::{Range, Space};
 use quadfrog::optimize::study::{Outcome, Storage, Study, StudyOptions};
 use quadfrog::optimize::trial::TrialState;
+use redis::{Ended, server};
 use serde_json::{Value, json};
 use std::net::TcpListener;
-use std::process::{Child, Command, Stdio};
-use std::time::Duration;
+use std::process::{Command, Stdio};
 
 /// Set for the processes that this test starts as workers: `URL SEED TRIALS`.
 const WORKER: &str = "QUADFROG_TEST_REDIS_WORKER";
-
-/// A process ended with the test.
-struct Ended(Child);
-
-impl Drop for Ended {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
-
-/// A server of the test's own, and its address; `None` where there is none to start.
-fn server() -> Option<(Ended, String)> {
-    let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
-    let arguments = ["--port", &port.to_string(), "--bind", "127.0.0.1", "--save", "", "--appendonly", "no"];
-    let child = Command::new("redis-server").args(arguments).stdout(Stdio::null()).spawn();
-    let Ok(child) = child else {
-        println!("skipped: redis-server is not installed");
-        return None;
-    };
-    let server = Ended(child);
-    let url = format!("redis://127.0.0.1:{port}/0");
-    for _ in 0..600 {
-        if Study::open(Storage::Redis(url.clone()), options(0)).is_ok() {
-            return Some((server, url));
-        }
-        std::thread::sleep(Duration::from_millis(50));
-    }
-    panic!("redis-server did not answer within half a minute");
-}
 
 fn options(seed: u32) -> StudyOptions {
     let ranges = [("f0", 0.75, 1.75), ("Fx", 0.0, 150.0), ("Fz", 150.0, 350.0)];

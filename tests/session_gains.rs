@@ -22,16 +22,8 @@ fn the_robot_stands_in_every_corner_of_the_gains() {
     for corner in 0..1 << ranges.len() {
         let pick = |i: usize| if corner >> i & 1 == 0 { ranges[i].low } else { ranges[i].high };
         let gains = Gains { kp: pick(0), kd: pick(1), kd_joint: pick(2), k_att: pick(3) };
-        let spec = TrialSpec {
-            trial: corner,
-            task: Task::Forward,
-            jump: JumpParameters { f0_hz: 1.3, f1_hz: 0.0, fx_n: 60.0, fy_n: 0.0, fz_n: 230.0 },
-            gains,
-            stance_leg: task.stance_leg(),
-            vmc: task.vmc,
-            jumps: 1,
-            seed: 0,
-        };
+        let jump = JumpParameters { f0_hz: 1.3, f1_hz: 0.0, fx_n: 60.0, fy_n: 0.0, fz_n: 230.0 };
+        let spec = TrialSpec { trial: corner, gains, ..task.trial(Task::Forward, jump) };
         let (end, ticks) = rollout.run(&spec);
         let start = ticks.iter().find(|tick| tick.trial_time_s >= 0.0);
         let height = start.unwrap_or_else(|| panic!("{gains:?}: {end:?} before the jump")).estimate.position_world.z;

@@ -4,7 +4,7 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use crate::realtime::command::Gains;
+use crate::realtime::command::{Gains, JumpParameters, Task, TrialSpec};
 use crate::robot::kinematics::LegGeometry;
 use crate::robot::{Joints, PerLeg};
 
@@ -290,6 +290,20 @@ impl TaskControl {
     /// The nominal foot of a left leg, leg frame, m.
     pub fn stance_leg(&self) -> Vector3<f64> {
         self.stance_m.into()
+    }
+
+    /// A trial of `task` with this force profile, as configured: number 0 and seed 0.
+    pub fn trial(&self, task: Task, jump: JumpParameters) -> TrialSpec {
+        TrialSpec {
+            trial: 0,
+            task,
+            jump,
+            gains: self.gains(),
+            stance_leg: self.stance_leg(),
+            vmc: self.vmc,
+            jumps: self.jumps,
+            seed: 0,
+        }
     }
 }
 

@@ -1,17 +1,19 @@
 //! Several programs on one study: workers of this program as processes, one of them killed, and Python's, on a journal file
 //! and on a real Redis server (skipped with a message where `redis-server` or Optuna is missing).
 
+#[path = "../support/redis.rs"]
+mod redis;
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::io::{BufRead, BufReader};
-use std::net::TcpListener;
 use std::path::Path;
-use std::process::{Child, Command, Stdio};
-use std::time::{Duration, Instant};
+use std::process::{Command, Stdio};
 
 use quadfrog::optimize::journal::Durability;
 use quadfrog::optimize::study::Storage;
 use quadfrog::optimize::trial::{Trial, TrialState};
+use redis::{Ended, server};
 use serde_json::Value;
 
 /// Trials of all workers together.
@@ -19,34 +21,6 @@ const BUDGET: usize = 400;
 
 /// Trials of a study that Python takes part in.
 const SHARED: usize = 120;
-
-/// A process that ends with the test.
-struct Ended(Child);
-
-impl Drop for Ended {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
-
-/// A server of the test's own, and its address; none where there is none to start.
-fn server() -> Option<(Ended, String)> {
-    let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
-    let arguments = ["--port", &port.to_string(), "--bind", "127.0.0.1", "--save", "", "--appendonly", "no"];
-    let Ok(child) = Command::new("redis-server").args(arguments).stdout(Stdio::null()).spawn() else {
-        println!("skipped: redis-server is not installed");
-        return None;
-    };
-    let server = Ended(child);
-    let url = format!("redis://127.0.0.1:{port}/0");
-    let end = Instant::now() + Duration::from_secs(30);
-    while Storage::Redis(url.clone()).journal(Durability::Buffered).is_err() {
-        assert!(Instant::now() < end, "redis-server did not answer within half a minute");
-        std::thread::sleep(Duration::from_millis(50));
-    }
-    Some((server, url))
-}
 
 /// A worker on `journal`; its trials come as JSON lines.
 fn worker(folder: &Path, journal: &str, budget: usize) -> Ended {

@@ -203,17 +203,8 @@ pub fn jumps_on<R: Robot>(
         };
         let jump =
             JumpParameters { f0_hz: draw("f0"), f1_hz: 0.0, fx_n: draw("Fx"), fy_n: draw("Fy"), fz_n: draw("Fz") };
-        let control = config.task(task);
-        let spec = TrialSpec {
-            trial,
-            task,
-            jump,
-            gains: control.gains(),
-            stance_leg: control.stance_leg(),
-            vmc: control.vmc,
-            jumps: 1,
-            seed: seed.wrapping_add(u64::from(trial)),
-        };
+        let seed = seed.wrapping_add(u64::from(trial));
+        let spec = TrialSpec { trial, seed, ..config.task(task).trial(task, jump) };
         let settings = settings_of(task, source);
         let mut rollout = Rollout::new(machine(spec.seed), &settings);
         let (end, ticks) = rollout.run(&spec);

@@ -268,21 +268,18 @@ impl Life {
         let value = |name: &str| row.parameters.iter().find(|(n, _)| n == name).map_or(0.0, |(_, value)| *value);
         let has_f1 = self.plan.parameters.iter().any(|parameter| parameter.name == "f1");
         let seed = self.study.trials().iter().find(|trial| trial.number == number).and_then(attributes::seed_of);
+        let jump = JumpParameters {
+            f0_hz: value("f0"),
+            f1_hz: if has_f1 { value("f1") } else { control.f1_hz },
+            fx_n: value("Fx"),
+            fy_n: value("Fy"),
+            fz_n: value("Fz"),
+        };
         TrialSpec {
             trial: number,
-            task: self.plan.task,
-            jump: JumpParameters {
-                f0_hz: value("f0"),
-                f1_hz: if has_f1 { value("f1") } else { control.f1_hz },
-                fx_n: value("Fx"),
-                fy_n: value("Fy"),
-                fz_n: value("Fz"),
-            },
             gains: gains::of_list(&row.gains, &control.gains()),
-            stance_leg: control.stance_leg(),
-            vmc: control.vmc,
-            jumps: control.jumps,
             seed: seed.unwrap_or_else(|| trial_seed(self.plan.seed, self.plan.worker, number)),
+            ..control.trial(self.plan.task, jump)
         }
     }
 }

@@ -1,0 +1,36 @@
+//! A Redis server of a test's own.
+
+use std::net::TcpListener;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use quadfrog::optimize::journal::Durability;
+use quadfrog::optimize::study::Storage;
+
+/// A process that ends with the test.
+pub struct Ended(pub Child);
+
+impl Drop for Ended {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// A server of the test's own, and its address; none where there is none to start.
+pub fn server() -> Option<(Ended, String)> {
+    let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
+    let arguments = ["--port", &port.to_string(), "--bind", "127.0.0.1", "--save", "", "--appendonly", "no"];
+    let Ok(child) = Command::new("redis-server").args(arguments).stdout(Stdio::null()).spawn() else {
+        println!("skipped: redis-server is not installed");
+        return None;
+    };
+    let server = Ended(child);
+    let url = format!("redis://127.0.0.1:{port}/0");
+    let end = Instant::now() + Duration::from_secs(30);
+    while Storage::Redis(url.clone()).journal(Durability::Buffered).is_err() {
+        assert!(Instant::now() < end, "redis-server did not answer within half a minute");
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    Some((server, url))
+}
