@@ -66,7 +66,7 @@ impl LivingRobot {
         let ending = Arc::new(AtomicBool::new(false));
         let flag = ending.clone();
         let thread = std::thread::spawn(move || {
-            pace(Duration::from_millis(1), |_| {
+            pace(Duration::from_millis(1), Duration::ZERO, |_| {
                 emulator.step();
                 if flag.load(Ordering::Acquire) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
             })

@@ -13,7 +13,7 @@ fn apply(scheduling: Scheduling) -> (Vec<Favour>, Vec<String>) {
     let granted = std::thread::spawn(move || {
         let granted = scheduling.apply();
         let mut ticks = 0;
-        thread::pace(Duration::from_millis(1), |_| {
+        thread::pace(Duration::from_millis(1), Duration::ZERO, |_| {
             ticks += 1;
             if ticks == 20 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         })

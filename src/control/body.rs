@@ -81,9 +81,27 @@ impl Body {
         cycle.last()
     }
 
+    /// Fetches the memory to which the next tick will be written, while nobody waits for it: the rings are long, so their next
+    /// place was last touched seconds ago. To be called between ticks; one that it is not called for is right all the same.
+    pub fn prepare(&mut self) {
+        fetch_next(&mut self.end.ticks);
+        if (self.cycle.last().number + 1).is_multiple_of(SHOWN_EVERY) {
+            fetch_next(&mut self.end.shown);
+        }
+    }
+
     /// The mode in which the last tick ended.
     pub fn mode(&self) -> Mode {
         self.cycle.mode()
+    }
+}
+
+/// Writes to the next free place of a ring without filling it.
+fn fetch_next(ring: &mut rtrb::Producer<Tick>) {
+    if let Ok(mut place) = ring.write_chunk_uninit(1)
+        && let Some(tick) = place.as_mut_slices().0.first_mut()
+    {
+        tick.write(Tick::default());
     }
 }
 

@@ -15,7 +15,7 @@ use crate::realtime::command::{Command, Permit, TrialSpec};
 use crate::realtime::pre_arm::Findings;
 use crate::realtime::telemetry::{Cause, Caution, Event, Fault, Mode, Objection, Phase, Readiness, Tick, TrialEnd};
 use crate::robot::kinematics::Foot;
-use crate::robot::{JointCommand, Joints, LEGS, Leg, PerLeg, Placement, Robot, RobotError};
+use crate::robot::{JointCommand, Joints, LEGS, Leg, PerLeg, Placement, Robot, RobotError, robot_time_passed};
 use nalgebra::{Matrix3, Vector3};
 
 /// For how many ticks a caution is told, so that a session that looks ten times a second misses none.
@@ -177,7 +177,7 @@ impl Cycle {
         let read_ns = clock.now_ns();
         self.estimate();
         self.watch(inputs, previous_robot_time_ms, robot);
-        let restarted = watchdog::restarted(self.tick.state.robot_time_ms, previous_robot_time_ms);
+        let restarted = robot_time_passed(self.tick.state.robot_time_ms, previous_robot_time_ms) < 0;
         self.pre_arm.observe(inputs.lateness_ns, &self.tick.state, self.state_age_ms, restarted, &self.settings);
         self.check_pre_arm(robot);
         if let Some(command) = inputs.command {

@@ -6,7 +6,7 @@
 use super::limits;
 use super::settings::{PERIOD_S, Settings};
 use crate::realtime::telemetry::{Caution, Estimate, Fault, Hold, Mode};
-use crate::robot::{JOINTS, LinkStatus, RobotState};
+use crate::robot::{JOINTS, LinkStatus, RobotState, robot_time_passed};
 
 /// What one tick knows.
 #[derive(Debug, Clone, Copy)]
@@ -170,13 +170,8 @@ fn not_finite(_: &Watchdog, seen: &Seen, _: &Settings) -> Option<Fault> {
 }
 
 fn reboot(_: &Watchdog, seen: &Seen, _: &Settings) -> Option<Fault> {
-    restarted(seen.state.robot_time_ms, seen.previous_robot_time_ms).then_some(Fault::Reboot)
-}
-
-/// Whether the robot's clock went backwards, ms. It runs for 49 days before it begins anew: the difference is right across
-/// that, as it is in the link.
-pub fn restarted(robot_time_ms: u32, previous_robot_time_ms: u32) -> bool {
-    (robot_time_ms.wrapping_sub(previous_robot_time_ms) as i32) < 0
+    let passed_ms = robot_time_passed(seen.state.robot_time_ms, seen.previous_robot_time_ms);
+    (passed_ms < 0).then_some(Fault::Reboot)
 }
 
 fn corrupt(_: &Watchdog, seen: &Seen, settings: &Settings) -> Option<Fault> {

@@ -43,8 +43,10 @@ pub fn run<C: Clock>(start: Start<C>, end: ControlEnd, robot: &mut dyn Robot) {
     let granted = start.scheduling.apply();
     let _ = start.told.send((granted.favours.clone(), granted.shortfalls.clone()));
     let period = Duration::from_secs_f64(PERIOD_S);
+    // Away from the kernel's own work at whole milliseconds.
+    let phase = period / 2;
     // The damping at the end is slept, not paced: the clock may be what failed.
-    if let Err(panic) = drive(&start, end, robot, |tick| pace(period, tick), || std::thread::sleep(period)) {
+    if let Err(panic) = drive(&start, end, robot, |tick| pace(period, phase, tick), || std::thread::sleep(period)) {
         resume_unwind(panic);
     }
 }
@@ -63,6 +65,7 @@ fn drive<C: Clock>(
     let ended = catch_unwind(AssertUnwindSafe(|| {
         let tick = &mut |instant| {
             body.tick(instant, start.clock, robot);
+            body.prepare();
             if closing() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
         if let Err(error) = paced(tick) {

@@ -19,13 +19,21 @@ pub struct Instant {
 /// of calling its body without a pause until it has caught up.
 const FORGIVEN_PERIODS: u64 = 20;
 
-/// Calls `body` once per period until it breaks.
+/// Calls `body` once per period until it breaks, each time `phase` after a whole period of the system's monotonic clock.
+///
+/// The kernel does its own periodic work at whole milliseconds of that clock (the scheduler's tick: Linux,
+/// `kernel/time/tick-common.c`, `tick_setup_device`). A loop that happened to begin there would meet it in every fourth
+/// period, in the middle of a tick; one that stays away from it never does.
 ///
 /// # Errors
 /// When the system's monotonic clock cannot be read or waited on.
-pub fn pace(period: Duration, mut body: impl FnMut(Instant) -> ControlFlow<()>) -> Result<(), nix::Error> {
+pub fn pace(
+    period: Duration,
+    phase: Duration,
+    mut body: impl FnMut(Instant) -> ControlFlow<()>,
+) -> Result<(), nix::Error> {
     let period_ns = period.as_nanos() as u64;
-    let mut start_ns = monotonic_ns()?;
+    let mut start_ns = monotonic_ns()?.next_multiple_of(period_ns) + phase.as_nanos() as u64;
     let mut count = 0u64;
     let mut skipped_ns = 0;
     loop {
@@ -46,8 +54,9 @@ pub fn pace(period: Duration, mut body: impl FnMut(Instant) -> ControlFlow<()>) 
         }
         count += 1;
         if lateness_ns > FORGIVEN_PERIODS * period_ns {
-            start_ns += lateness_ns;
-            skipped_ns += lateness_ns;
+            let whole_ns = lateness_ns - lateness_ns % period_ns;
+            start_ns += whole_ns;
+            skipped_ns += whole_ns;
         }
     }
 }

@@ -151,6 +151,12 @@ pub struct RobotState {
     pub truth: Option<Truth>,
 }
 
+/// By how much the robot's clock went on from `before_ms` to `now_ms`, ms; negative if it restarted. The clock runs for 49 days
+/// before it begins anew: the difference is right across that, too.
+pub fn robot_time_passed(now_ms: u32, before_ms: u32) -> i32 {
+    now_ms.wrapping_sub(before_ms) as i32
+}
+
 impl Default for RobotState {
     fn default() -> Self {
         RobotState {

@@ -14,9 +14,10 @@
 //!
 //! There is no residual of the ground's height: a jump may land on a block, and only the height would gain by it.
 
-use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+use nalgebra::{Matrix3, SVector, Vector3};
 
-use crate::control::estimator::GRAVITY;
+use super::GRAVITY;
+use super::covariance;
 use crate::control::settings::{EstimatorSettings, PERIOD_S};
 use crate::robot::{LEGS, PerLeg};
 
@@ -27,9 +28,8 @@ const VELOCITY: usize = 3;
 const BIAS: usize = 6;
 
 type State = SVector<f64, STATES>;
-type Covariance = SMatrix<f64, STATES, STATES>;
-/// Three columns of it: covariance of the whole state with three measured numbers.
-type Columns = SMatrix<f64, STATES, 3>;
+type Covariance = covariance::Covariance<STATES>;
+type Columns = covariance::Columns<STATES>;
 
 const fn foot(leg: usize) -> usize {
     9 + 3 * leg
@@ -101,7 +101,7 @@ impl Filter {
 
     /// Standard deviations of the velocity that the filter believes of itself, m/s.
     pub fn velocity_deviation(&self) -> Vector3<f64> {
-        Vector3::from_fn(|i, _| self.covariance[(VELOCITY + i, VELOCITY + i)].max(0.0).sqrt())
+        Vector3::from_fn(|i, _| self.covariance.variance(VELOCITY + i).max(0.0).sqrt())
     }
 
     /// Moves on by `dt_s` with the specific force `accel_body` (m/s^2) that was measured at its end: the mean of the last period.
@@ -137,33 +137,20 @@ impl Filter {
             }
         }
 
-        // P <- F P F^T + Q, where F is the identity but for dp/dv = dt and dv/db = -R dt: rows first, then columns. The
-        // second-order terms in dt, 1e-6 of the first, are left out.
-        let p = &mut self.covariance;
-        let turned = world_from_body * -dt_s;
-        let velocity_rows = p.fixed_rows::<3>(VELOCITY).into_owned();
-        let bias_rows = p.fixed_rows::<3>(BIAS).into_owned();
-        let mut rows = p.fixed_rows_mut::<3>(POSITION);
-        rows += velocity_rows * dt_s;
-        let mut rows = p.fixed_rows_mut::<3>(VELOCITY);
-        rows += turned * bias_rows;
-        let velocity_columns = p.fixed_columns::<3>(VELOCITY).into_owned();
-        let bias_columns = p.fixed_columns::<3>(BIAS).into_owned();
-        let mut columns = p.fixed_columns_mut::<3>(POSITION);
-        columns += velocity_columns * dt_s;
-        let mut columns = p.fixed_columns_mut::<3>(VELOCITY);
-        columns += bias_columns * turned.transpose();
+        // P <- F P F^T + Q, where F is the identity but for dp/dv = dt and dv/db = -R dt. The second-order terms in dt, 1e-6 of the
+        // first, are left out.
+        self.covariance.carry([POSITION, VELOCITY, BIAS], dt_s, &(world_from_body * -dt_s));
 
         // White noise of one sample a period, and what a sample misses of a jerk.
         let sample = settings.accel_noise_m_s2 + settings.accel_error_share * acceleration.norm();
-        self.add_variance(VELOCITY, sample * sample * PERIOD_S * dt_s);
+        self.covariance.add_variance(VELOCITY, sample * sample * PERIOD_S * dt_s);
         if unseen_s > 0.0 {
             self.add_unseen(&change, unseen_s, settings);
         }
-        self.add_variance(BIAS, settings.accel_bias_walk.powi(2) * dt_s);
+        self.covariance.add_variance(BIAS, settings.accel_bias_walk.powi(2) * dt_s);
         for leg in 0..LEGS {
             if self.anchored[leg] {
-                self.add_variance(foot(leg), settings.foot_creep.powi(2) * dt_s);
+                self.covariance.add_variance(foot(leg), settings.foot_creep.powi(2) * dt_s);
             }
         }
     }
@@ -181,36 +168,32 @@ impl Filter {
     fn add_common(&mut self, variance: Vector3<f64>, to_position: f64, to_velocity: f64) {
         for i in 0..3 {
             let (p, v) = (POSITION + i, VELOCITY + i);
-            self.covariance[(p, p)] += variance[i] * to_position * to_position;
-            self.covariance[(v, v)] += variance[i] * to_velocity * to_velocity;
-            self.covariance[(p, v)] += variance[i] * to_position * to_velocity;
-            self.covariance[(v, p)] += variance[i] * to_position * to_velocity;
+            self.covariance.add(p, p, variance[i] * to_position * to_position);
+            self.covariance.add(v, v, variance[i] * to_velocity * to_velocity);
+            self.covariance.add(v, p, variance[i] * to_position * to_velocity);
         }
     }
 
     /// Learns from the feet that are down. A foot that moves otherwise than a standing foot would slips: it says nothing, and
     /// finds a new place when it stops.
     pub fn correct(&mut self, feet: &PerLeg<FootMotion>, down: &PerLeg<bool>, dt_s: f64, settings: &EstimatorSettings) {
-        let (mut any_believed, mut disagreed, mut disagreement) = (false, 0, Vector3::zeros());
+        let stands = self.correct_velocity(feet, down, settings);
+        let (mut disagreed, mut disagreement) = (0, Vector3::zeros());
         for (leg, motion) in feet.iter().enumerate() {
             if !down[leg] {
                 self.release(leg);
                 continue;
             }
-            let residual = self.velocity_residual(motion);
-            let stands = self.correct_velocity(motion, &residual, settings);
-            let stayed = stands && self.anchored[leg] && self.correct_position(leg, motion, settings);
-            if stands {
-                any_believed = true;
-            } else {
+            if !stands[leg] {
                 disagreed += 1;
-                disagreement += residual;
+                disagreement += self.velocity_residual(motion);
             }
+            let stayed = stands[leg] && self.anchored[leg] && self.correct_position(leg, motion, settings);
             if !stayed {
                 self.anchor(leg, motion, settings);
             }
         }
-        if disagreed == 0 || any_believed {
+        if disagreed == 0 || stands.contains(&true) {
             self.disbelieved_s = 0.0;
             return;
         }
@@ -233,61 +216,71 @@ impl Filter {
         motion.rolling_world - motion.velocity_world - self.vector(VELOCITY)
     }
 
-    /// A standing foot's centre moves as rolling says: learns from e_v = `residual`. False where that cannot be.
-    fn correct_velocity(&mut self, motion: &FootMotion, residual: &Vector3<f64>, settings: &EstimatorSettings) -> bool {
-        // Joint velocities err in proportion to the lever, and more the faster the leg is.
-        let noise = settings.foot_velocity_m_s + settings.foot_velocity_share * motion.velocity_world.norm();
-        let with_state = self.covariance.fixed_columns::<3>(VELOCITY).into_owned();
+    /// A standing foot's centre moves as rolling says: learns from e_v of the feet that are down. Which of them are believed: all
+    /// are held against what was known before.
+    ///
+    /// They measure the same three numbers with independent errors, so all of them together are one measurement: their mean,
+    /// weighted by 1 / noise^2.
+    fn correct_velocity(
+        &mut self,
+        feet: &PerLeg<FootMotion>,
+        down: &PerLeg<bool>,
+        settings: &EstimatorSettings,
+    ) -> PerLeg<bool> {
+        let with_state = self.covariance.columns(VELOCITY);
         let variance = with_state.fixed_rows::<3>(VELOCITY).into_owned();
-        self.learn(&with_state, variance, noise, residual, settings.gate_sigma)
+        let (mut weight, mut weighted) = (0.0, Vector3::zeros());
+        let stands = std::array::from_fn(|leg| {
+            let (motion, residual) = (&feet[leg], self.velocity_residual(&feet[leg]));
+            // Joint velocities err in proportion to the lever, and more the faster the leg is.
+            let noise = settings.foot_velocity_m_s + settings.foot_velocity_share * motion.velocity_world.norm();
+            let believed = down[leg]
+                && Innovation::new(variance, noise, &residual).is_some_and(|new| new.within(settings.gate_sigma));
+            if believed {
+                weight += 1.0 / (noise * noise);
+                weighted += residual / (noise * noise);
+            }
+            believed
+        });
+        if weight > 0.0
+            && let Some(new) = Innovation::new(variance, weight.sqrt().recip(), &(weighted / weight))
+        {
+            self.learn(&with_state, &new);
+        }
+        stands
     }
 
     /// e_p: the foot is where it was put down. False where that cannot be.
     fn correct_position(&mut self, leg: usize, motion: &FootMotion, settings: &EstimatorSettings) -> bool {
         let residual = motion.offset_world - (self.vector(foot(leg)) - self.vector(POSITION));
-        let with_state: Columns =
-            self.covariance.fixed_columns::<3>(foot(leg)) - self.covariance.fixed_columns::<3>(POSITION);
+        let with_state = self.covariance.columns(foot(leg)) - self.covariance.columns(POSITION);
         let variance = with_state.fixed_rows::<3>(foot(leg)) - with_state.fixed_rows::<3>(POSITION);
-        self.learn(&with_state, variance, settings.foot_position_m, &residual, settings.gate_sigma)
+        let new = Innovation::new(variance, settings.foot_position_m, &residual);
+        let believed = new.filter(|new| new.within(settings.gate_sigma));
+        if let Some(new) = &believed {
+            self.learn(&with_state, new);
+        }
+        believed.is_some()
     }
 
-    /// Three measured numbers with independent errors of `noise`: `with_state` is P H^T, `variance` H P H^T. Nothing is
-    /// learnt, and false returned, where the residual is more than `gate` standard deviations long.
-    fn learn(
-        &mut self,
-        with_state: &Columns,
-        variance: Matrix3<f64>,
-        noise: f64,
-        residual: &Vector3<f64>,
-        gate: f64,
-    ) -> bool {
-        let Some(root) = (variance + Matrix3::from_diagonal_element(noise * noise)).cholesky() else { return false };
-        let lower = root.l_dirty();
-        let Some(whitened) = lower.solve_lower_triangular(residual) else { return false };
-        // Also false for a residual that is no number.
-        let believable = whitened.norm() <= gate;
-        if !believable {
-            return false;
-        }
-        // With S = L L^T and U = P H^T L^-T: x += U L^-1 e, P -= U U^T. This form keeps P symmetric to the bit.
-        let Some(inverse) = lower.solve_lower_triangular(&Matrix3::identity()) else { return false };
+    /// Learns from a measurement; `with_state` is P H^T.
+    fn learn(&mut self, with_state: &Columns, new: &Innovation) {
+        // With U = P H^T L^-T: x += U L^-1 e, P -= U U^T.
+        let Some(inverse) = new.root.solve_lower_triangular(&Matrix3::identity()) else { return };
         let scaled = with_state * inverse.transpose();
-        self.state += scaled * whitened;
-        for column in scaled.column_iter() {
-            self.covariance.ger(-1.0, &column, &column, 1.0);
-        }
-        true
+        self.state += scaled * new.whitened;
+        self.covariance.subtract_square(&scaled);
     }
 
     /// The foot is where it is now: p_i = p + offset, with the kinematics' error.
     fn anchor(&mut self, leg: usize, motion: &FootMotion, settings: &EstimatorSettings) {
         let place = self.vector(POSITION) + motion.offset_world;
         self.state.fixed_rows_mut::<3>(foot(leg)).copy_from(&place);
-        let rows = self.covariance.fixed_rows::<3>(POSITION).into_owned();
-        self.covariance.fixed_rows_mut::<3>(foot(leg)).copy_from(&rows);
-        let columns = self.covariance.fixed_columns::<3>(POSITION).into_owned();
-        self.covariance.fixed_columns_mut::<3>(foot(leg)).copy_from(&columns);
-        self.add_variance(foot(leg), settings.foot_position_m.powi(2));
+        let mut with_state = self.covariance.columns(POSITION);
+        let of_position = with_state.fixed_rows::<3>(POSITION).into_owned();
+        with_state.fixed_rows_mut::<3>(foot(leg)).copy_from(&of_position);
+        self.covariance.set_columns(foot(leg), &with_state);
+        self.covariance.add_variance(foot(leg), settings.foot_position_m.powi(2));
         self.anchored[leg] = true;
     }
 
@@ -322,16 +315,31 @@ impl Filter {
         rows += change;
     }
 
-    fn add_variance(&mut self, at: usize, variance: f64) {
-        for i in at..at + 3 {
-            self.covariance[(i, i)] += variance;
-        }
-    }
-
     /// Three states that are known this well, and independently of everything else.
     fn set_variance(&mut self, at: usize, variance: f64) {
-        self.covariance.fixed_rows_mut::<3>(at).fill(0.0);
-        self.covariance.fixed_columns_mut::<3>(at).fill(0.0);
-        self.add_variance(at, variance);
+        self.covariance.set_columns(at, &Columns::zeros());
+        self.covariance.add_variance(at, variance);
+    }
+}
+
+/// What three measured numbers say beyond what was known.
+struct Innovation {
+    /// L, where L L^T = S = H P H^T + R; what stands above its diagonal means nothing.
+    root: Matrix3<f64>,
+    /// L^-1 e: the residual in standard deviations.
+    whitened: Vector3<f64>,
+}
+
+impl Innovation {
+    /// Of the residual e with independent errors of `noise`, where `variance` is H P H^T. None for numbers that are none.
+    fn new(variance: Matrix3<f64>, noise: f64, residual: &Vector3<f64>) -> Option<Innovation> {
+        let cholesky = (variance + Matrix3::from_diagonal_element(noise * noise)).cholesky()?;
+        let root = *cholesky.l_dirty();
+        Some(Innovation { whitened: root.solve_lower_triangular(residual)?, root })
+    }
+
+    /// Whether it can be: also false for a residual that is no number.
+    fn within(&self, gate_sigma: f64) -> bool {
+        self.whitened.norm() <= gate_sigma
     }
 }

@@ -7,6 +7,7 @@
 //! Yaw is what the inertial unit reports. Nothing on the robot can correct it, so its drift is the estimate's.
 
 mod contact;
+mod covariance;
 mod filter;
 
 use nalgebra::Vector3;
@@ -17,7 +18,7 @@ pub use filter::{Filter, FootMotion};
 use super::settings::{ObjectiveSource, Settings};
 use crate::realtime::telemetry::Estimate;
 use crate::robot::kinematics::Foot;
-use crate::robot::{PerLeg, RobotState, Truth, leg_of};
+use crate::robot::{PerLeg, RobotState, Truth, leg_of, robot_time_passed};
 
 /// Acceleration of free fall, m/s^2.
 pub const GRAVITY: f64 = 9.81;
@@ -101,11 +102,11 @@ impl Estimator {
         let motions = foot_motions(state, feet, settings);
         let chosen = &settings.estimator;
 
+        let passed_ms = |odometry: &Odometry| robot_time_passed(state.robot_time_ms, odometry.robot_time_ms);
         // A clock that goes back is another robot's, or a restarted one's: begin anew.
-        let known = self.odometry.filter(|odometry| odometry.robot_time_ms <= state.robot_time_ms);
-        let odometry = match known {
-            Some(mut odometry) => {
-                let dt_s = f64::from(state.robot_time_ms - odometry.robot_time_ms) * 1e-3;
+        let filter = match self.odometry.as_mut().filter(|odometry| passed_ms(odometry) >= 0) {
+            Some(odometry) => {
+                let dt_s = f64::from(passed_ms(odometry)) * 1e-3;
                 if dt_s == 0.0 {
                     return;
                 }
@@ -120,7 +121,7 @@ impl Estimator {
                     filter.predict(&state.imu.accel_body, &world_from_body, &motions, dt_s, chosen);
                     filter.correct(&motions, &estimate.contact, dt_s, chosen);
                 }
-                odometry
+                &*filter
             }
             None => {
                 self.contact = ContactGate::default();
@@ -130,14 +131,14 @@ impl Estimator {
                 let start = Vector3::new(unit_world.x, unit_world.y, settings.foot_radius - lowest);
                 let mut filter = Filter::new(&start, chosen);
                 filter.correct(&motions, &estimate.contact, 0.0, chosen);
-                Odometry { filter, robot_time_ms: state.robot_time_ms, airborne_s: 0.0 }
+                let begun = Odometry { filter, robot_time_ms: state.robot_time_ms, airborne_s: 0.0 };
+                &self.odometry.insert(begun).filter
             }
         };
-        self.odometry = Some(odometry);
         // From the unit to the trunk's origin: p - R r, v - R (omega x r).
         let lever = state.imu.gyro_body.cross(&settings.imu_origin_body);
-        estimate.position_world = odometry.filter.position_world() - unit_world;
-        estimate.velocity_world = odometry.filter.velocity_world() - world_from_body * lever;
+        estimate.position_world = filter.position_world() - unit_world;
+        estimate.velocity_world = filter.velocity_world() - world_from_body * lever;
     }
 }
 

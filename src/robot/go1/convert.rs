@@ -24,7 +24,7 @@ const QUATERNION_TOLERANCE: f32 = 0.1;
 /// # Errors
 /// When a number is not finite or does not fit the datagram.
 pub fn low_cmd(command: &JointCommand, form: CrcForm) -> Result<LowCmd, CommandError> {
-    let mut datagram = LowCmd::damping(form);
+    let mut datagram = LowCmd::unsealed();
     for (motor, command) in command.motor.iter().enumerate() {
         datagram.set(motor, &target(motor, command)?)?;
     }

@@ -11,7 +11,7 @@ use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, UdpSocket};
 
 use super::packet::{LOW_LEVEL, LowCmd, LowState, Rejection};
 use super::window::Window;
-use crate::robot::LinkStatus;
+use crate::robot::{LinkStatus, robot_time_passed};
 
 /// Datagrams judged in one call at most, so that a flood cannot hold the tick; what is left waits for the next call. A robot sends
 /// one.
@@ -184,8 +184,7 @@ impl Link {
             self.seen = 1;
             return true;
         };
-        // The robot's clock runs for 49 days before it begins anew: the difference is right across that, too.
-        let newer_by = tick.wrapping_sub(newest.tick.get()) as i32;
+        let newer_by = robot_time_passed(tick, newest.tick.get());
         let older_by = newer_by.unsigned_abs();
         if newer_by > 0 {
             let gap = (older_by / self.options.state_period_ms).saturating_sub(1);

@@ -1,7 +1,7 @@
-//! `quadfrog bench loop`: how late the control thread wakes and what a tick costs, and beside it `cyclictest` at the same
-//! priority and pace.
+//! `quadfrog bench loop`: how late the control thread wakes and what a tick costs. Beside the first stands `cyclictest` at the
+//! same priority and pace, beside the second the system calls of a tick without anything of ours: the machine's own share.
 
-use std::net::{Ipv4Addr, SocketAddr};
+use std::net::{Ipv4Addr, SocketAddr, UdpSocket};
 use std::ops::ControlFlow;
 use std::process::Command as Program;
 use std::sync::Arc;
@@ -22,6 +22,7 @@ use quadfrog::realtime::telemetry::{Event, Mode, Tick};
 use quadfrog::realtime::thread::{Instant, pace};
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::robot::go1::Go1;
+use quadfrog::robot::go1::packet::{COMMAND_LENGTH, STATE_LENGTH};
 use quadfrog::robot::{Placement, Robot};
 use quadfrog::sim::Simulator;
 use quadfrog::sim::emulator::Emulator;
@@ -30,6 +31,8 @@ use super::Failure;
 
 /// The control period.
 const PERIOD: Duration = Duration::from_millis(1);
+/// As the engine's thread.
+const PHASE: Duration = Duration::from_micros(500);
 /// What is asked of the wake-up: its 99.9th percentile is at most this many times cyclictest's.
 const RATIO_ASKED: f64 = 1.2;
 /// What is asked of a tick over the link: its 99.9th percentile, us.
@@ -79,6 +82,10 @@ struct Measured {
     read: Times,
     decide: Times,
     write: Times,
+    /// What is left of the tick: the rings, and two readings of the clock.
+    publish: Times,
+    /// After the tick: fetching the places of the next one.
+    prepare: Times,
     /// Ticks that were not in READY: the robot did not stand all the time.
     elsewhere: u64,
     granted: Option<Granted>,
@@ -87,7 +94,8 @@ struct Measured {
 impl Measured {
     fn new() -> Measured {
         let lateness = times();
-        let [wake_up, wake_up_floor, tick, read, decide, write] = std::array::from_fn(|_| lateness.clone());
+        let [wake_up, wake_up_floor, tick, read, decide, write, publish, prepare] =
+            std::array::from_fn(|_| lateness.clone());
         Measured {
             lateness,
             wake_up,
@@ -97,6 +105,8 @@ impl Measured {
             read,
             decide,
             write,
+            publish,
+            prepare,
             elsewhere: 0,
             granted: None,
         }
@@ -111,6 +121,8 @@ impl Measured {
             (&mut self.read, &other.read),
             (&mut self.decide, &other.decide),
             (&mut self.write, &other.write),
+            (&mut self.publish, &other.publish),
+            (&mut self.prepare, &other.prepare),
         ] {
             mine.add(theirs).wrap_err("two histograms could not be added")?;
         }
@@ -128,10 +140,12 @@ impl Measured {
         self.ended_ns = instant.planned_ns + instant.lateness_ns + cost_ns;
         self.tick.saturating_record(cost_ns.max(1));
         let stages = &tick.stages;
+        let [read, decide, write] = [stages.read_ns, stages.decide_ns, stages.write_ns].map(u64::from);
+        let publish = cost_ns.saturating_sub(read + decide + write);
         for (times, ns) in
-            [(&mut self.read, stages.read_ns), (&mut self.decide, stages.decide_ns), (&mut self.write, stages.write_ns)]
+            [(&mut self.read, read), (&mut self.decide, decide), (&mut self.write, write), (&mut self.publish, publish)]
         {
-            times.saturating_record(u64::from(ns).max(1));
+            times.saturating_record(ns.max(1));
         }
         self.elsewhere += u64::from(tick.mode != Mode::Ready);
     }
@@ -148,22 +162,25 @@ pub fn run(arguments: &LoopArguments) -> Result<(), Failure> {
     let scheduling = Scheduling { priority: arguments.priority, core: None, lock_memory: true };
     let turns = if arguments.cyclictest { arguments.turns } else { 1 };
     let ticks = (arguments.seconds * 1000.0 / f64::from(turns)).ceil() as u64;
-    let (mut ours, mut theirs) = (Measured::new(), times());
+    let (mut ours, mut theirs, mut alone) = (Measured::new(), times(), times());
     for turn in 0..turns {
         // Who begins changes from turn to turn: what else the machine does meets both alike.
         if arguments.cyclictest && turn % 2 == 1 {
             cyclictest(arguments.priority, ticks, &mut theirs)?;
         }
         ours.add(measure(scheduling, arguments.with_link, ticks)?)?;
+        if arguments.with_link {
+            alone.add(exchange(scheduling, ticks)?).wrap_err("two histograms could not be added")?;
+        }
         if arguments.cyclictest && turn % 2 == 0 {
             cyclictest(arguments.priority, ticks, &mut theirs)?;
         }
     }
-    report(arguments, &ours, &theirs);
+    report(arguments, &ours, &theirs, &alone);
     Ok(())
 }
 
-fn report(arguments: &LoopArguments, ours: &Measured, theirs: &Times) {
+fn report(arguments: &LoopArguments, ours: &Measured, theirs: &Times, alone: &Times) {
     if let Some(granted) = &ours.granted {
         let favours: Vec<_> = granted.favours.iter().map(ToString::to_string).collect();
         println!("granted: {}", if favours.is_empty() { "nothing".to_owned() } else { favours.join(", ") });
@@ -186,6 +203,11 @@ fn report(arguments: &LoopArguments, ours: &Measured, theirs: &Times) {
     line("  read", &ours.read);
     line("  estimate, watch, decide", &ours.decide);
     line(if arguments.with_link { "  send" } else { "  write (its physics)" }, &ours.write);
+    line("  publish", &ours.publish);
+    line("after it: fetch places", &ours.prepare);
+    if arguments.with_link {
+        line("its system calls alone", alone);
+    }
     println!();
     let (ticks, slept) = (ours.lateness.len(), ours.wake_up.len());
     println!("{ticks} ticks, {} of them made up for a stall, {} not in READY", ticks - slept, ours.elsewhere);
@@ -196,7 +218,10 @@ fn report(arguments: &LoopArguments, ours: &Measured, theirs: &Times) {
     }
     if arguments.with_link {
         let cost = us(ours.tick.value_at_quantile(0.999));
-        println!("p99.9 of a tick with the Go1's link: {cost:.1} us (asked: at most {TICK_ASKED_US})");
+        let machine = us(alone.value_at_quantile(0.999));
+        println!(
+            "p99.9 of a tick with the Go1's link: {cost:.1} us (asked: at most {TICK_ASKED_US}); of its system calls alone: {machine:.1}"
+        );
     }
 }
 
@@ -229,7 +254,7 @@ fn measure(scheduling: Scheduling, with_link: bool, ticks: u64) -> Result<Measur
     let emulated = std::thread::spawn(move || {
         // A robot is on time by itself; an emulated one must not wait for the thread that is measured.
         let _granted = Scheduling { priority: scheduling.priority.saturating_sub(1), ..scheduling }.apply();
-        pace(PERIOD, |_| {
+        pace(PERIOD, Duration::ZERO, |_| {
             emulator.step();
             if flag.load(Ordering::Acquire) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         })
@@ -241,11 +266,44 @@ fn measure(scheduling: Scheduling, with_link: bool, ticks: u64) -> Result<Measur
 }
 
 /// A thread of its own: its priority ends with it.
-fn in_a_thread(
-    act: impl FnOnce() -> Result<Measured, color_eyre::Report> + Send + 'static,
-) -> Result<Measured, Failure> {
+fn in_a_thread<T: Send + 'static>(
+    act: impl FnOnce() -> Result<T, color_eyre::Report> + Send + 'static,
+) -> Result<T, Failure> {
     let joined = std::thread::Builder::new().name("control".into()).spawn(act).wrap_err("no thread to be had")?.join();
     Ok(joined.map_err(|_| eyre!("the control thread broke down"))??)
+}
+
+/// What the system calls of a tick take by themselves, at the same pace and priority: a datagram of a state's length is taken
+/// from the loopback, the queue is found empty, and one of a command's length is sent. What comes was sent a period ago.
+fn exchange(scheduling: Scheduling, ticks: u64) -> Result<Times, Failure> {
+    let open = || -> std::io::Result<(UdpSocket, UdpSocket)> {
+        let sockets = (UdpSocket::bind((Ipv4Addr::LOCALHOST, 0))?, UdpSocket::bind((Ipv4Addr::LOCALHOST, 0))?);
+        sockets.0.connect(sockets.1.local_addr()?)?;
+        sockets.1.connect(sockets.0.local_addr()?)?;
+        sockets.0.set_nonblocking(true)?;
+        sockets.1.set_nonblocking(true)?;
+        Ok(sockets)
+    };
+    let (ours, robots) = open().wrap_err("no sockets on the loopback")?;
+    in_a_thread(move || {
+        let _granted = scheduling.apply();
+        let clock = MonotonicClock::start();
+        let (mut taken, mut left) = (times(), ticks);
+        let (mut buffer, state, command) = ([0; 2048], [0; STATE_LENGTH], [0; COMMAND_LENGTH]);
+        pace(PERIOD, PHASE, |_| {
+            let began_ns = clock.now_ns();
+            // What fails takes its time all the same.
+            while ours.recv(&mut buffer).is_ok() {}
+            let _ = ours.send(&command);
+            taken.saturating_record((clock.now_ns() - began_ns).max(1));
+            while robots.recv(&mut buffer).is_ok() {}
+            let _ = robots.send(&state);
+            left -= 1;
+            if left == 0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        })
+        .wrap_err("the monotonic clock cannot be waited on")?;
+        Ok(taken)
+    })
 }
 
 /// The other ends of the channels, kept so that nothing counts as broken down.
@@ -287,7 +345,7 @@ fn stand_and_measure<R: Robot>(
     others.attend();
     let mut body = Body::new(settings, end, clock.now_ns());
     let (mut rising, mut left, mut failed) = (0_u64, ticks, None);
-    pace(PERIOD, |instant| {
+    pace(PERIOD, PHASE, |instant| {
         let began_ns = clock.now_ns();
         let tick = body.tick(instant, &clock, robot);
         let cost_ns = clock.now_ns() - began_ns;
@@ -310,6 +368,11 @@ fn stand_and_measure<R: Robot>(
         } else {
             measured.take(instant, cost_ns, tick);
             left -= 1;
+        }
+        let ticked_ns = clock.now_ns();
+        body.prepare();
+        if left < ticks {
+            measured.prepare.saturating_record((clock.now_ns() - ticked_ns).max(1));
         }
         others.attend();
         if left == 0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }

@@ -146,7 +146,7 @@ fn wake_up(scheduling: Scheduling) -> Line {
     let measured = std::thread::spawn(move || {
         let _granted = scheduling.apply();
         let mut lateness = Vec::with_capacity(WAKE_UPS);
-        let paced = thread::pace(Duration::from_millis(1), |instant| {
+        let paced = thread::pace(Duration::from_millis(1), Duration::from_micros(500), |instant| {
             lateness.push(instant.lateness_ns);
             if lateness.len() == WAKE_UPS { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         });

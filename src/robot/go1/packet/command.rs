@@ -96,12 +96,18 @@ pub struct LowCmd {
 impl LowCmd {
     /// A command that moves nothing: every motor brakes.
     pub fn damping(form: CrcForm) -> LowCmd {
+        let mut command = LowCmd::unsealed();
+        command.seal(form);
+        command
+    }
+
+    /// The same before its checksum is computed: to be changed first.
+    pub fn unsealed() -> LowCmd {
         let mut command = LowCmd::new_zeroed();
         command.header = Header::low_level();
         for motor in 0..MOTORS {
             command.put(motor, &MotorTarget::DAMPING, [0; 3]);
         }
-        command.seal(form);
         command
     }
 

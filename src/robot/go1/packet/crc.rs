@@ -1,39 +1,24 @@
 //! The checksum of both datagrams: a 32-bit register, start FFFFFFFF, polynomial 04C11DB7, not reflected, no final xor, over
 //! little-endian words taken from their highest bit down (`specs/go1-wire.md`, section 3).
 
-const POLYNOMIAL: u32 = 0x04C1_1DB7;
-
-/// `TABLES[k][b]`: the register that holds byte `b` on top and zeros below, shifted by k + 1 bytes. With one table for each byte
-/// of a word, a word takes four look-ups that do not wait for each other ("slicing by 4", Kounavis and Berry, 2005).
-const TABLES: [[u32; 256]; 4] = tables();
-
-const fn tables() -> [[u32; 256]; 4] {
-    let mut tables = [[0; 256]; 4];
-    let mut byte = 0;
-    while byte < 256 {
-        let mut register = (byte as u32) << 24;
-        let mut k = 0;
-        while k < 4 {
-            let mut bit = 0;
-            while bit < 8 {
-                register = if register >> 31 == 1 { (register << 1) ^ POLYNOMIAL } else { register << 1 };
-                bit += 1;
-            }
-            tables[k][byte] = register;
-            k += 1;
-        }
-        byte += 1;
-    }
-    tables
-}
+/// Words that are turned round at a time: more than a datagram has.
+const BLOCK: usize = 256;
 
 /// The checksum of the whole words in `data`; what is left over is not covered.
+///
+/// It is the common CRC-32 seen in a mirror: that one has the same polynomial and start, takes every byte from its lowest bit up,
+/// shifts the other way, and inverts the register at the end. So the words go in mirrored and the register comes out so.
 pub fn crc(data: &[u8]) -> u32 {
     let (words, _) = data.as_chunks::<4>();
-    words.iter().fold(u32::MAX, |register, word| {
-        let [b0, b1, b2, b3] = (register ^ u32::from_le_bytes(*word)).to_le_bytes().map(usize::from);
-        TABLES[3][b3] ^ TABLES[2][b2] ^ TABLES[1][b1] ^ TABLES[0][b0]
-    })
+    let mut common = crc32fast::Hasher::new();
+    for block in words.chunks(BLOCK) {
+        let mut mirrored = [[0; 4]; BLOCK];
+        for (mirrored, word) in mirrored.iter_mut().zip(block) {
+            *mirrored = u32::from_le_bytes(*word).reverse_bits().to_le_bytes();
+        }
+        common.update(mirrored[..block.len()].as_flattened());
+    }
+    (!common.finalize()).reverse_bits()
 }
 
 /// How the checksum stands in a datagram.

@@ -1,0 +1,176 @@
+//! The filter's covariance: symmetric, so that half of it is worked on.
+
+use nalgebra::{Matrix3, SMatrix};
+
+/// Three columns: covariance of the whole state with three numbers.
+pub type Columns<const N: usize> = SMatrix<f64, N, 3>;
+
+/// A symmetric N x N matrix, N a multiple of three. Of its blocks of 3 x 3, those on the diagonal and below are kept; what stands
+/// above is never looked at. Every index that names a block is that of its first row or column.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Covariance<const N: usize> {
+    columns: [[f64; N]; N],
+}
+
+impl<const N: usize> Covariance<N> {
+    /// All zero: everything is known exactly.
+    pub fn zeros() -> Self {
+        Covariance { columns: [[0.0; N]; N] }
+    }
+
+    /// The element on the diagonal: the variance of state `i`.
+    pub fn variance(&self, i: usize) -> f64 {
+        self.columns[i][i]
+    }
+
+    /// Adds to the variance of the three states from `at` on.
+    pub fn add_variance(&mut self, at: usize, variance: f64) {
+        for i in at..at + 3 {
+            self.columns[i][i] += variance;
+        }
+    }
+
+    /// Adds to the covariance of the two states. The block of `row` stands below that of `column`, or they are the same state.
+    pub fn add(&mut self, row: usize, column: usize, covariance: f64) {
+        self.columns[column][row] += covariance;
+    }
+
+    /// The columns of the three states from `at` on, whole.
+    pub fn columns(&self, at: usize) -> Columns<N> {
+        let mut whole = Columns::zeros();
+        for (k, column) in whole.data.0.iter_mut().enumerate() {
+            for (element, row) in column[..at].iter_mut().zip(&self.columns) {
+                *element = row[at + k];
+            }
+            column[at..].copy_from_slice(&self.columns[at + k][at..]);
+        }
+        whole
+    }
+
+    /// Sets these columns, and by symmetry these rows.
+    pub fn set_columns(&mut self, at: usize, columns: &Columns<N>) {
+        for k in 0..3 {
+            for i in 0..at {
+                self.columns[i][at + k] = columns[(i, k)];
+            }
+            for i in at..N {
+                self.columns[at + k][i] = columns[(i, k)];
+            }
+        }
+    }
+
+    /// P - U U^T. Both halves of a block on the diagonal come out the same to the bit.
+    pub fn subtract_square(&mut self, u: &Columns<N>) {
+        let [u0, u1, u2] = &u.data.0;
+        // Three columns at a time: each number of U that is loaded serves all of them.
+        for (block, [a, b, c]) in self.columns.as_chunks_mut::<3>().0.iter_mut().enumerate() {
+            let at = 3 * block;
+            let [va, vb, vc] = [at, at + 1, at + 2].map(|j| [u0[j], u1[j], u2[j]]);
+            for i in at..N {
+                let product = |v: [f64; 3]| u0[i] * v[0] + u1[i] * v[1] + u2[i] * v[2];
+                a[i] -= product(va);
+                b[i] -= product(vb);
+                c[i] -= product(vc);
+            }
+        }
+    }
+
+    /// P <- F P F^T, where F is the identity but for two blocks: the three states from `position` on grow by `dt_s` times those
+    /// from `velocity` on, and these by `turned` times those from `bias` on. The three stand in this order.
+    pub fn carry(&mut self, [position, velocity, bias]: [usize; 3], dt_s: f64, turned: &Matrix3<f64>) {
+        // The two sets of columns of P F^T that differ from P's, then the two sets of rows of F of these: all else follows by
+        // symmetry.
+        let (of_velocity, of_bias) = (self.columns(velocity), self.columns(bias));
+        let mut to_position = self.columns(position) + of_velocity * dt_s;
+        let mut to_velocity = of_velocity + of_bias * turned.transpose();
+        for columns in [&mut to_position, &mut to_velocity] {
+            let (v, b) = (block(columns, velocity), block(columns, bias));
+            let mut rows = columns.fixed_rows_mut::<3>(position);
+            rows += v * dt_s;
+            let mut rows = columns.fixed_rows_mut::<3>(velocity);
+            rows += turned * b;
+        }
+        // Rounding must not make the diagonal's blocks lopsided.
+        for (columns, at) in [(&mut to_position, position), (&mut to_velocity, velocity)] {
+            let mut square = block(columns, at);
+            square.fill_upper_triangle_with_lower_triangle();
+            columns.fixed_rows_mut::<3>(at).copy_from(&square);
+        }
+        self.set_columns(velocity, &to_velocity);
+        self.set_columns(position, &to_position);
+    }
+}
+
+/// The rows of three states.
+fn block<const N: usize>(columns: &Columns<N>, at: usize) -> Matrix3<f64> {
+    columns.fixed_rows::<3>(at).into_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::SVector;
+
+    const N: usize = 9;
+    type Full = SMatrix<f64, N, N>;
+
+    /// Some numbers, the same every time.
+    fn number(i: usize) -> f64 {
+        (i as f64 * 1.7).sin()
+    }
+
+    /// A covariance and the same as a whole matrix.
+    fn sample() -> (Covariance<N>, Full) {
+        let root = Full::from_fn(|i, j| number(N * i + j));
+        let full = root * root.transpose();
+        let mut covariance = Covariance::zeros();
+        for at in [0, 3, 6] {
+            covariance.set_columns(at, &full.fixed_columns::<3>(at).into_owned());
+        }
+        (covariance, full)
+    }
+
+    fn whole(covariance: &Covariance<N>) -> Full {
+        let mut full = Full::zeros();
+        for at in [0, 3, 6] {
+            full.fixed_columns_mut::<3>(at).copy_from(&covariance.columns(at));
+        }
+        full
+    }
+
+    #[track_caller]
+    fn assert_same(covariance: &Covariance<N>, expected: &Full) {
+        let found = whole(covariance);
+        assert!((found - expected).amax() < 1e-13, "{found} is not {expected}");
+        assert_eq!(found, found.transpose(), "symmetric to the bit");
+    }
+
+    #[test]
+    fn it_is_the_whole_matrix() {
+        let (mut covariance, mut full) = sample();
+        assert_same(&covariance, &full);
+        assert_eq!(SVector::<f64, N>::from_fn(|i, _| covariance.variance(i)), full.diagonal());
+
+        covariance.add_variance(3, 0.25);
+        covariance.add(4, 0, 0.5);
+        full += Full::from_diagonal(&SVector::from_fn(|i, _| if (3..6).contains(&i) { 0.25 } else { 0.0 }));
+        full[(4, 0)] += 0.5;
+        full[(0, 4)] += 0.5;
+        assert_same(&covariance, &full);
+
+        let u = Columns::<N>::from_fn(|i, k| number(100 + 3 * i + k));
+        covariance.subtract_square(&u);
+        assert_same(&covariance, &(full - u * u.transpose()));
+    }
+
+    #[test]
+    fn carrying_it_on_is_the_product_of_the_whole_matrices() {
+        let (mut covariance, full) = sample();
+        let turned = Matrix3::from_fn(|i, j| number(200 + 3 * i + j));
+        let mut f = Full::identity();
+        f.fixed_view_mut::<3, 3>(0, 3).copy_from(&Matrix3::from_diagonal_element(0.1));
+        f.fixed_view_mut::<3, 3>(3, 6).copy_from(&turned);
+        covariance.carry([0, 3, 6], 0.1, &turned);
+        assert_same(&covariance, &(f * full * f.transpose()));
+    }
+}
