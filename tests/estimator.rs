@@ -283,6 +283,22 @@ fn a_clock_that_goes_back_begins_anew() {
     assert_eq!(estimate.velocity_world, Vector3::zeros());
 }
 
+/// (A defect once: the clocks were compared as numbers, and after 49 days the estimate began anew in mid-jump.)
+#[test]
+fn the_estimate_goes_on_across_the_end_of_the_robots_clock() {
+    let mut feed = Feed::standing();
+    feed.state.robot_time_ms = u32::MAX - 100;
+    feed.update();
+    feed.state.foot_force = [0.0; LEGS];
+    feed.state.imu.accel_body.x = 3.0;
+    let before = feed.run(100);
+    assert_eq!(feed.state.robot_time_ms, u32::MAX);
+    feed.state.robot_time_ms = 4;
+    let after = feed.update();
+    let gained = after.velocity_world.x - before.velocity_world.x;
+    assert!((gained - 0.015).abs() < 1e-3, "{gained} m/s in 5 ms of 3 m/s^2");
+}
+
 /// On its stand, before the first stand-up: for half an hour if need be.
 #[test]
 fn a_robot_that_hangs_does_not_fly_away() {

@@ -4,6 +4,7 @@
 use std::ops::ControlFlow;
 use std::time::Duration;
 
+use nix::time::{ClockId, clock_gettime};
 use quadfrog::config::{Backend, Config};
 use quadfrog::realtime::scheduling::{Favour, Scheduling};
 use quadfrog::realtime::{system, thread};
@@ -21,6 +22,32 @@ fn apply(scheduling: Scheduling) -> (Vec<Favour>, Vec<String>) {
         (granted.favours, granted.shortfalls.iter().map(ToString::to_string).collect())
     });
     granted.join().unwrap()
+}
+
+/// Calls come a phase after whole periods of the system's clock, also after a stall that was not made up for.
+#[test]
+fn the_pace_keeps_its_phase() {
+    let (period, phase) = (Duration::from_millis(10), Duration::from_millis(3));
+    let now_ns = || Duration::from(clock_gettime(ClockId::CLOCK_MONOTONIC).unwrap()).as_nanos() as u64;
+    let mut planned = Vec::new();
+    thread::pace(period, phase, |instant| {
+        planned.push((now_ns() - instant.lateness_ns, instant.planned_ns));
+        if planned.len() == 10 {
+            std::thread::sleep(Duration::from_millis(333));
+        }
+        if planned.len() == 20 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    })
+    .unwrap();
+    // What passes between two readings of a clock, at best; of ten calls one is not interrupted there.
+    let past_phase = |calls: &[(u64, u64)]| {
+        calls.iter().map(|(ns, _)| (ns - phase.as_nanos() as u64) % period.as_nanos() as u64).min().unwrap()
+    };
+    for calls in [&planned[..10], &planned[11..]] {
+        assert!(past_phase(calls) < 2_000_000, "{} ns past the phase", past_phase(calls));
+    }
+    assert!(planned.iter().all(|(_, planned_ns)| planned_ns.is_multiple_of(10_000_000)), "{planned:?}");
+    let (before, after) = (planned[9].1, planned[11].1);
+    assert!(after - before >= 300_000_000, "the stall is not made up for: {planned:?}");
 }
 
 #[test]

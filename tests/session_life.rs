@@ -5,11 +5,12 @@ mod support;
 
 use std::time::Duration;
 
+use quadfrog::optimize::exchange::TableTrial;
 use quadfrog::optimize::study::Storage;
 use quadfrog::optimize::trial::{Trial, TrialState};
 use quadfrog::realtime::telemetry::{FallCause, TrialEnd};
 use quadfrog::recording::record::{Record, Source, Stage, Verdict};
-use quadfrog::session::life::{BUDGET, Life};
+use quadfrog::session::life::{BUDGET, Life, import};
 use support::{accept, far, joined, life, open, parameters, run, study, ticks};
 
 /// How long no test lasts.
@@ -357,6 +358,29 @@ fn a_rerun_that_another_worker_has_queued_comes_once() {
     let parent =
         |trial: &&Trial| trial.user_attributes.get("parent").and_then(|p| p.as_u64()) == Some(u64::from(first.trial));
     assert_eq!(study.trials().iter().filter(parent).count(), 1);
+}
+
+/// (A defect once: a session that accepts by itself looked at the newest trial instead.)
+#[test]
+fn a_trial_under_review_need_not_be_the_newest() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut life = open(folder.path());
+    life.enqueue(&[("f0".into(), 1.2), ("Fx".into(), 90.0), ("Fz".into(), 250.0)]).unwrap();
+    let done = TableTrial {
+        state: TrialState::Complete,
+        value: Some(0.3),
+        parameters: vec![("f0".into(), 1.0), ("Fx".into(), 50.0), ("Fz".into(), 200.0)],
+        attributes: serde_json::Map::new(),
+        started: None,
+        completed: None,
+    };
+    let newer = import(&mut study(Storage::File(folder.path().join("study.log"))), vec![done]).unwrap();
+    life.look().unwrap();
+    assert!(life.under_review().is_none());
+    let spec = run(&mut life, TrialEnd::Settled);
+    assert!(newer[0] > spec.trial && life.row(newer[0]).is_some());
+    let row = life.under_review().unwrap();
+    assert_eq!((row.trial, row.suggested), (spec.trial, Some(Verdict::Accept)));
 }
 
 #[test]

@@ -172,6 +172,11 @@ impl Life {
         self.rows.get(&trial)
     }
 
+    /// The row of the trial under review. It need not be the newest: another program may have added trials meanwhile.
+    pub fn under_review(&self) -> Option<&TrialRecord> {
+        if self.stage == Stage::Review { self.row(self.current) } else { None }
+    }
+
     /// The accepted trial whose point is worth most, the earliest of equals: a repeated point is worth the mean of its
     /// repeats ([`crate::optimize::repeats`]).
     pub fn best(&self) -> Option<&TrialRecord> {

@@ -69,7 +69,7 @@ impl Supervisor {
         let stops = self.control.stop.count();
         let step = match self.life.stage() {
             Stage::Review => {
-                let suggested = self.life.rows().last().and_then(|row| row.suggested).unwrap_or(Verdict::Void);
+                let suggested = self.life.under_review().and_then(|row| row.suggested).unwrap_or(Verdict::Void);
                 // What was cancelled or stopped in mid-jump waits for a person, whatever the rule.
                 let judged = if auto { suggested != Verdict::Void } else { suggested == Verdict::Accept };
                 judged.then_some(Intent::Judge(suggested))
