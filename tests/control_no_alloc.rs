@@ -105,7 +105,11 @@ impl Bench {
             }
             let instant = Instant { planned_ns: self.time_ms * 1_000_000, lateness_ns: 0 };
             let Bench { body, machine, clock, .. } = self;
-            let mode = without_allocation(|| body.tick(instant, clock, machine).mode);
+            let mode = without_allocation(|| {
+                let mode = body.tick(instant, clock, machine).mode;
+                body.prepare();
+                mode
+            });
             self.time_ms += 1;
             self.seen.insert(mode.name());
             while let Ok(event) = self.session.events.pop() {

@@ -44,7 +44,11 @@ fn a_tick_over_the_link_does_not_allocate() {
         for _ in 0..count {
             screen.heartbeat.beat();
             let instant = Instant { planned_ns: ms * 1_000_000, lateness_ns: 0 };
-            let mode = without_allocation(|| body.tick(instant, &SimulatedClock, &mut go1).mode);
+            let mode = without_allocation(|| {
+                let mode = body.tick(instant, &SimulatedClock, &mut go1).mode;
+                body.prepare();
+                mode
+            });
             ms += 1;
             seen.insert(mode.name());
             while let Ok(event) = session.events.pop() {

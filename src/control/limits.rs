@@ -98,7 +98,8 @@ pub fn finite(state: &RobotState) -> Result<(), Fault> {
     all(&state.joint_velocity, "a joint velocity")?;
     all(state.imu.orientation_world.coords.as_slice(), "the orientation")?;
     all(state.imu.gyro_body.as_slice(), "the angular velocity")?;
-    all(state.imu.accel_body.as_slice(), "the acceleration")
+    all(state.imu.accel_body.as_slice(), "the acceleration")?;
+    all(&state.foot_force, "a foot's force")
 }
 
 /// Number of ticks in `seconds`.

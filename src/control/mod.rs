@@ -12,7 +12,6 @@ pub mod limits;
 pub mod mode;
 pub mod pre_arm;
 pub mod ramp;
-pub mod recent;
 pub mod settings;
 pub mod vmc;
 pub mod watchdog;

@@ -2,10 +2,10 @@
 //! `Cycle` refuses to arm while one of them fails, whatever the session says. List: `research/operators.md` D.4.
 
 use super::limits::ticks;
-use super::recent::Recent;
 use super::settings::Settings;
 use crate::realtime::pre_arm::{Check, CheckState, Finding, Findings};
 use crate::realtime::telemetry::Estimate;
+use crate::robot::recent::Recent;
 use crate::robot::{JOINTS, LinkStatus, RobotState};
 
 /// Fewer ticks than this say nothing about the pace.
@@ -45,7 +45,8 @@ impl PreArm {
         settings: &Settings,
     ) {
         let allowed = &settings.pre_arm;
-        self.late.tick(u32::from(lateness_ns as f64 * 1e-6 > allowed.late_ms));
+        self.late.advance();
+        self.late.add(u32::from(lateness_ns as f64 * 1e-6 > allowed.late_ms));
         let still = state.imu.gyro_body.norm() <= allowed.gyro_rad_s;
         if restarted || !still || state_age_ms > settings.watchdog.state_age_ms {
             self.still = 0;
@@ -133,8 +134,8 @@ impl PreArm {
             }
             Check::OnTime => {
                 let finding =
-                    at_most(f64::from(self.late.sum()) / f64::from(self.late.span().max(1)), allowed.late_share);
-                if self.late.span() < PACE_KNOWN_TICKS {
+                    at_most(f64::from(self.late.sum()) / f64::from(self.late.span_ms().max(1)), allowed.late_share);
+                if self.late.span_ms() < PACE_KNOWN_TICKS {
                     Finding { state: CheckState::Failed, measured: f64::NAN, ..finding }
                 } else {
                     finding

@@ -8,6 +8,7 @@
 pub mod description;
 pub mod go1;
 pub mod kinematics;
+pub mod recent;
 
 use nalgebra::{UnitQuaternion, Vector3};
 

@@ -15,6 +15,7 @@ use nalgebra::Vector3;
 pub use contact::ContactGate;
 pub use filter::{Filter, FootMotion};
 
+use super::limits;
 use super::settings::{ObjectiveSource, Settings};
 use crate::realtime::telemetry::Estimate;
 use crate::robot::kinematics::Foot;
@@ -62,7 +63,7 @@ impl Estimator {
                 self.estimate.contact = truth.foot_force_world.map(|force| force.z >= settings.contact_force_n);
                 self.believe(truth);
             }
-            _ if is_finite(state) => self.sense(state, feet, settings),
+            _ if limits::finite(state).is_ok() => self.sense(state, feet, settings),
             _ => return &self.estimate,
         }
         let estimate = &mut self.estimate;
@@ -161,12 +162,4 @@ fn foot_motions(state: &RobotState, feet: &PerLeg<Foot>, settings: &Settings) ->
             rolling_world: calf_rate_world.cross(&Vector3::new(0.0, 0.0, settings.foot_radius)),
         }
     })
-}
-
-/// Whether every number that the filter takes is one.
-fn is_finite(state: &RobotState) -> bool {
-    let imu = &state.imu;
-    let legs = state.joint_position.iter().chain(&state.joint_velocity).chain(&state.foot_force);
-    let unit = imu.orientation_world.coords.iter().chain(imu.gyro_body.iter()).chain(imu.accel_body.iter());
-    legs.chain(unit).all(|number| number.is_finite())
 }

@@ -10,7 +10,7 @@ use std::io::ErrorKind;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, UdpSocket};
 
 use super::packet::{LOW_LEVEL, LowCmd, LowState, Rejection};
-use super::window::Window;
+use crate::robot::recent::Recent;
 use crate::robot::{LinkStatus, robot_time_passed};
 
 /// Datagrams judged in one call at most, so that a flood cannot hold the tick; what is left waits for the next call. A robot sends
@@ -78,8 +78,16 @@ pub struct Link {
     status: LinkStatus,
     /// Commands in a row that the system refused.
     refused: u32,
-    window: Window,
+    recent: LastSeconds,
     buffer: [u8; BUFFER],
+}
+
+/// What came in the last five seconds, and what did not.
+#[derive(Debug, Default)]
+struct LastSeconds {
+    received: Recent,
+    lost: Recent,
+    corrupt: Recent,
 }
 
 impl Link {
@@ -103,7 +111,7 @@ impl Link {
             seen: 0,
             status: LinkStatus::default(),
             refused: 0,
-            window: Window::default(),
+            recent: LastSeconds::default(),
             buffer: [0; BUFFER],
         })
     }
@@ -128,7 +136,10 @@ impl Link {
 
     /// Judges what has come since the last call, a millisecond ago. The newest valid state if it is a new one, otherwise none.
     pub fn receive(&mut self) -> Option<&LowState> {
-        self.window.advance();
+        let LastSeconds { received, lost, corrupt } = &mut self.recent;
+        for count in [received, lost, corrupt] {
+            count.advance();
+        }
         self.status.state_age_ms = self.status.state_age_ms.saturating_add(1);
         let mut is_new = false;
         for _ in 0..MOST_PER_CALL {
@@ -139,11 +150,10 @@ impl Link {
                 Err(_) => {}
             }
         }
-        let total = self.window.total();
-        self.status.recent_received = total.received;
-        self.status.recent_lost = total.lost;
-        self.status.recent_corrupt = total.corrupt;
-        self.status.rate_hz = self.window.received_in_the_last_second();
+        self.status.recent_received = self.recent.received.sum();
+        self.status.recent_lost = self.recent.lost.sum();
+        self.status.recent_corrupt = self.recent.corrupt.sum();
+        self.status.rate_hz = self.recent.received.in_a_second();
         if is_new { self.newest.as_ref() } else { None }
     }
 
@@ -156,7 +166,7 @@ impl Link {
                     Rejection::Length { .. } => self.status.wrong_length += 1,
                     Rejection::Crc { .. } => {
                         self.status.corrupt += 1;
-                        self.window.now().corrupt += 1;
+                        self.recent.corrupt.add(1);
                     }
                     Rejection::Head { .. } | Rejection::BatteryOff => self.status.foreign += 1,
                 }
@@ -174,7 +184,7 @@ impl Link {
         self.newest = Some(state);
         self.status.received += 1;
         self.status.state_age_ms = 0;
-        self.window.now().received += 1;
+        self.recent.received.add(1);
         true
     }
 
@@ -189,7 +199,7 @@ impl Link {
         if newer_by > 0 {
             let gap = (older_by / self.options.state_period_ms).saturating_sub(1);
             self.status.lost += u64::from(gap);
-            self.window.now().lost += gap;
+            self.recent.lost.add(gap);
             self.seen = self.seen.checked_shl(older_by).unwrap_or(0) | 1;
             true
         } else if older_by > self.options.restart_ms {
@@ -206,7 +216,7 @@ impl Link {
                     // It was counted as lost when the gap was seen.
                     self.seen |= bit;
                     self.status.lost = self.status.lost.saturating_sub(1);
-                    self.window.now().lost = self.window.now().lost.saturating_sub(1);
+                    self.recent.lost.take_back();
                 }
             }
             false

@@ -6,7 +6,6 @@
 pub mod convert;
 pub mod link;
 pub mod packet;
-mod window;
 
 use std::net::SocketAddr;
 
