@@ -21,6 +21,8 @@ struct Bench {
     robot: Simulator,
     time_ms: u64,
     events: Vec<Event>,
+    /// Ticks that carried a trial.
+    trial_ticks: u64,
 }
 
 impl Bench {
@@ -30,7 +32,7 @@ impl Bench {
         let settings = config.settings(&description, Task::Forward, Backend::Simulator).unwrap();
         let mut robot = Simulator::new(&description, &config.simulator).unwrap();
         robot.place(&Placement { joint_position: settings.lying_position, lying: true, seed: 0 });
-        Bench { config, settings, cycle: Cycle::new(&settings), robot, time_ms: 0, events: Vec::new() }
+        Bench { config, settings, cycle: Cycle::new(&settings), robot, time_ms: 0, events: Vec::new(), trial_ticks: 0 }
     }
 
     fn tick(&mut self, inputs: Inputs) -> Tick {
@@ -38,6 +40,7 @@ impl Bench {
         let inputs = Inputs { time_ns: self.time_ms * 1_000_000, ..inputs };
         let tick = *self.cycle.tick(&inputs, &SimulatedClock, &mut self.robot);
         self.events.extend(self.cycle.events().iter());
+        self.trial_ticks += u64::from(tick.trial.is_some());
         tick
     }
 
@@ -123,10 +126,10 @@ fn an_operator_arms_jumps_and_sits_down() {
     let mut bench = Bench::new();
     bench.reach(Mode::Review);
     let ended = bench.events.iter().find_map(|event| match event {
-        Event::TrialEnded { trial, end } => Some((*trial, *end)),
+        Event::TrialEnded { trial, ticks, end } => Some((*trial, *ticks, *end)),
         _ => None,
     });
-    assert_eq!(ended, Some((7, TrialEnd::Settled)));
+    assert_eq!(ended, Some((7, bench.trial_ticks, TrialEnd::Settled)));
     bench.command(Command::EndReview);
     assert_eq!(bench.cycle.mode(), Mode::Ready);
     bench.command(Command::SitDown);

@@ -85,7 +85,7 @@ impl Bench {
         Bench {
             config,
             settings,
-            body: Body::new(&settings, control, 0),
+            body: Body::new(&settings, control),
             session,
             screen,
             recorder,

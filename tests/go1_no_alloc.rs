@@ -34,7 +34,7 @@ fn a_tick_over_the_link_does_not_allocate() {
     let (mut emulator, mut go1) = pair(&config.simulator, 1);
     let settings = config.settings(&description(ANY_PORT), Task::Forward, Backend::Hardware).unwrap();
     let (control, mut session, screen, mut recorder) = channels();
-    let mut body = Body::new(&settings, control, 0);
+    let mut body = Body::new(&settings, control);
     let (mut ms, mut mode_changes, mut seen) = (0, 0, BTreeSet::new());
     let mut ticks = |count: u32, until: Option<Mode>, command: Option<fn(Permit, &Config) -> Command>| {
         if let Some(command) = command {

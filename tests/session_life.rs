@@ -113,7 +113,7 @@ fn a_trial_in_which_nothing_was_measured_cannot_be_accepted_without_a_hand_measu
     let mut life = life(5);
     let card = life.proposal().unwrap();
     let spec = life.approve(card.trial, card.revision).unwrap();
-    life.ended(spec.trial, &TrialEnd::Settled, &[]);
+    life.ended(spec.trial, &TrialEnd::Settled, &[], 0);
     let error = life.judge(Verdict::Accept, false).unwrap_err().to_string();
     assert!(error.contains("nothing was measured"), "{error}");
     life.set_hand_value(Some(0.42)).unwrap();
@@ -259,15 +259,14 @@ fn an_approval_from_before_an_undo_is_refused() {
     assert!(life.approve(seen.trial, seen.revision).is_err());
 }
 
-/// A trial of which ticks were lost is not measured, and says so.
+/// A trial of which ticks were lost is not measured, and says so. (A defect once: only a gap between two ticks was seen, not a
+/// trial without its end.)
 #[test]
 fn a_trial_with_lost_ticks_is_suggested_void() {
     let mut life = life(5);
     let card = life.proposal().unwrap();
     let spec = life.approve(card.trial, card.revision).unwrap();
-    let mut lossy = ticks(spec.trial, 0.6);
-    lossy[1].number = 40;
-    life.ended(spec.trial, &TrialEnd::Settled, &lossy);
+    life.ended(spec.trial, &TrialEnd::Settled, &ticks(spec.trial, 0.6), 41);
     let row = life.row(spec.trial).unwrap();
     assert_eq!((row.suggested, row.measured), (Some(Verdict::Void), None));
     assert!(row.cause.contains("39 ticks"), "{}", row.cause);
@@ -318,7 +317,7 @@ fn a_worker_whose_clock_is_behind_keeps_its_trial() {
     let mut ours = joined(folder.path(), 1000, PATIENT);
     ours.look().unwrap();
     assert!(ours.others_run(), "it is alive");
-    theirs.ended(spec.trial, &TrialEnd::Settled, &ticks(spec.trial, far(&spec)));
+    theirs.ended(spec.trial, &TrialEnd::Settled, &ticks(spec.trial, far(&spec)), 2);
     theirs.judge(Verdict::Accept, false).unwrap();
     theirs.close().unwrap();
     ours.look().unwrap();

@@ -108,7 +108,7 @@ impl Session {
             supervisor: Supervisor::new(parts, 0),
             operator,
             _ticks: ticks,
-            body: Body::new(&settings, control, 0),
+            body: Body::new(&settings, control),
             robot: Go1Like { simulator, charge_percent: 90.0, writes: 0, reboots: 0, silent_ms: 0, tamper: |_| {} },
             screen,
             _recorder: recorder,
@@ -229,6 +229,24 @@ fn the_area_is_asked_about_before_each_arming() {
     assert_eq!(session.state(Check::StopTested), CheckState::Passed);
     let answer = session.wish(Intent::Arm);
     assert!(!answer.accepted && answer.answer.contains("area clear"), "{answer:?}");
+}
+
+/// (A defect once: a word given in the morning armed the robot in the evening.)
+#[test]
+fn the_word_on_the_area_is_forgotten_after_a_minute() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut session = Session::cleared(&folder);
+    session.ticks(50_000);
+    assert_eq!(session.state(Check::AreaClear), CheckState::Passed);
+    session.ticks(11_000);
+    assert_eq!(session.state(Check::AreaClear), CheckState::Waiting);
+    let answer = session.wish(Intent::Arm);
+    assert!(!answer.accepted && answer.answer.contains("area clear"), "{answer:?}");
+    assert!(session.wish(Intent::Confirm(OperatorCheck::AreaClear)).accepted);
+    assert!(session.wish(Intent::Arm).accepted);
+    // It holds until the robot lies again, however long the session stands.
+    session.ticks(3000);
+    assert_eq!(session.body.mode(), Mode::Ready);
 }
 
 impl Session {

@@ -183,7 +183,7 @@ fn jump(life: &mut Life, noise: f64) {
     let card = life.proposal().expect("a proposal");
     let spec = life.approve(card.trial, card.revision).unwrap();
     let u = (spec.seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5;
-    life.ended(spec.trial, &TrialEnd::Settled, &ticks(spec.trial, far(&spec) + noise * u));
+    life.ended(spec.trial, &TrialEnd::Settled, &ticks(spec.trial, far(&spec) + noise * u), 2);
     life.judge(Verdict::Accept, false).unwrap();
 }
 

@@ -48,6 +48,7 @@ impl Config {
             ("pre_arm.gyro_rad_s", pre_arm.gyro_rad_s),
             ("pre_arm.still_s", pre_arm.still_s),
             ("pre_arm.late_ms", pre_arm.late_ms),
+            ("pre_arm.area_clear_s", pre_arm.area_clear_s),
             ("approval.expires_s", approval.expires_s),
             ("watchdog.stance_tilt_rad", watchdog.stance_tilt_rad),
             ("watchdog.tilt_rad", watchdog.tilt_rad),

@@ -20,26 +20,26 @@ pub struct Body {
     counters: Counters,
     beats: Beats,
     events_lost: bool,
-    /// Time of the clock at which the pace began, ns.
-    start_ns: u64,
+    /// Time of the clock at which the pace began, ns; known from the first tick on.
+    start_ns: Option<u64>,
 }
 
 impl Body {
-    /// A body whose instants count from `start_ns`.
-    pub fn new(settings: &Settings, end: ControlEnd, start_ns: u64) -> Body {
+    /// A body that has not ticked yet.
+    pub fn new(settings: &Settings, end: ControlEnd) -> Body {
         Body {
             cycle: Cycle::new(settings),
             end,
             counters: Counters::default(),
             beats: Beats::default(),
             events_lost: false,
-            start_ns,
+            start_ns: None,
         }
     }
 
     /// One tick.
     pub fn tick<C: Clock, R: Robot + ?Sized>(&mut self, instant: Instant, clock: &C, robot: &mut R) -> &Tick {
-        let Body { cycle, end, counters, .. } = self;
+        let Body { cycle, end, counters, start_ns, .. } = self;
         // A session that broke down takes no more events, though there is room for some.
         self.events_lost |= end.events.is_abandoned();
         let command = end.commands.pop().ok();
@@ -48,7 +48,9 @@ impl Body {
         {
             end.stop.acknowledge(stops);
         }
-        let time_ns = self.start_ns + instant.planned_ns;
+        // The instants count from the pace's start, the clock from its own.
+        let passed_ns = instant.planned_ns + instant.lateness_ns;
+        let time_ns = *start_ns.get_or_insert_with(|| clock.now_ns().saturating_sub(passed_ns)) + instant.planned_ns;
         let inputs = Inputs {
             time_ns,
             lateness_ns: instant.lateness_ns,

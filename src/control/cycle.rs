@@ -85,6 +85,8 @@ pub struct Cycle {
     gate: Gate,
     ramp: Option<PoseRamp>,
     jump: Option<Jump>,
+    /// Ticks that have carried the running trial so far.
+    trial_ticks: u64,
     /// Between a trial and its verdict.
     fall: FallWatch,
     /// The trial that ended in this tick: the tick is still its own.
@@ -119,6 +121,7 @@ impl Cycle {
             gate: Gate::default(),
             ramp: None,
             jump: None,
+            trial_ticks: 0,
             fall: FallWatch::default(),
             ended: None,
             feet: [Foot { position_leg: Vector3::zeros(), jacobian_leg: Matrix3::zeros() }; LEGS],
@@ -170,6 +173,7 @@ impl Cycle {
         let started_ns = clock.now_ns();
         self.events.count = 0;
         self.events.list = [None; Events::MOST];
+        self.tick.time_ns = inputs.time_ns;
         let previous_robot_time_ms = self.tick.state.robot_time_ms;
         self.mode_ticks = self.mode_ticks.saturating_add(1);
 
@@ -206,7 +210,7 @@ impl Cycle {
             self.check_pre_arm(robot);
         }
 
-        self.publish(inputs, sent, passed.limited);
+        self.publish(sent, passed.limited);
         let stages = &mut self.tick.stages;
         stages.lateness_ns = clamp_ns(inputs.lateness_ns);
         stages.read_ns = clamp_ns(read_ns.saturating_sub(started_ns));
@@ -354,6 +358,7 @@ impl Cycle {
             Command::RunTrial(spec, _) => {
                 self.place(robot, spec);
                 self.jump = Some(Jump::begin(spec, &self.settings));
+                self.trial_ticks = 0;
             }
             Command::Arm(_) => {
                 // A person may have carried the robot here: what was estimated on the way means nothing.
@@ -551,7 +556,8 @@ impl Cycle {
     /// The trial is over, if one runs.
     fn finish_trial(&mut self, end: TrialEnd) {
         if let Some(jump) = self.jump.take() {
-            self.events.push(Event::TrialEnded { trial: jump.spec().trial, end });
+            let ticks = self.trial_ticks + 1;
+            self.events.push(Event::TrialEnded { trial: jump.spec().trial, ticks, end });
             self.ended = Some(jump);
         }
     }
@@ -573,15 +579,15 @@ impl Cycle {
     }
 
     /// Fills the tick that everybody else sees.
-    fn publish(&mut self, inputs: &Inputs, sent: JointCommand, limited: u16) {
+    fn publish(&mut self, sent: JointCommand, limited: u16) {
         let tick = &mut self.tick;
         tick.number += 1;
-        tick.time_ns = inputs.time_ns;
         tick.mode = self.mode;
         tick.command = sent;
         tick.limited = limited;
         match self.jump.or(self.ended.take()) {
             Some(jump) => {
+                self.trial_ticks += 1;
                 tick.phase = jump.phase();
                 tick.trial = Some(jump.spec().trial);
                 tick.trial_time_s = jump.time_s();

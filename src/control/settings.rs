@@ -110,6 +110,8 @@ pub struct PreArm {
     pub late_ms: f64,
     /// Largest share of late ticks in the last 5 s.
     pub late_share: f64,
+    /// How long the operator's word that the area is clear holds before the robot is armed, s.
+    pub area_clear_s: f64,
     /// Least free space where the recording goes, MB.
     pub disk_free_mb: u32,
 }
@@ -129,7 +131,7 @@ pub struct ApprovalLimits {
 pub struct Watchdog {
     /// Largest tilt while standing, rad: CUT.
     pub stance_tilt_rad: f64,
-    /// Largest tilt while energised, rad: CUT.
+    /// Largest tilt while sitting down, rad: CUT; and what the flight limits of `[fall]` may not exceed.
     pub tilt_rad: f64,
     /// Age of the robot's state that is worth a word, ms.
     pub state_age_warn_ms: u32,
@@ -167,9 +169,9 @@ pub struct Watchdog {
     pub simulator_late_ms: f64,
     /// Latest start of a tick on hardware, ms: CUT; zero only counts late ticks.
     pub hardware_late_ms: f64,
-    /// Longest wait in READY on the simulator, s; zero waits for ever.
+    /// Longest wait in READY or REVIEW on the simulator, s; zero waits for ever.
     pub simulator_idle_s: f64,
-    /// Longest wait in READY on hardware, s: sit down; zero waits for ever.
+    /// Longest wait in READY or REVIEW on hardware, s: sit down; zero waits for ever.
     pub hardware_idle_s: f64,
 }
 
@@ -362,6 +364,6 @@ pub struct Settings {
     pub watchdog: Watchdog,
     /// Latest start of a tick, ms; zero only counts late ticks.
     pub late_ms: f64,
-    /// Longest wait in READY, s; zero waits for ever.
+    /// Longest wait in READY or REVIEW, s; zero waits for ever.
     pub idle_s: f64,
 }

@@ -13,7 +13,7 @@ use crate::realtime::channel::ControlEnd;
 use crate::realtime::clock::Clock;
 use crate::realtime::scheduling::{Favour, Scheduling, Shortfall};
 use crate::realtime::telemetry::Mode;
-use crate::realtime::thread::{Instant, pace};
+use crate::realtime::thread::{CONTROL_PHASE, Instant, pace};
 use crate::robot::{JointCommand, Robot};
 
 /// What the thread is started with.
@@ -43,10 +43,10 @@ pub fn run<C: Clock>(start: Start<C>, end: ControlEnd, robot: &mut dyn Robot) {
     let granted = start.scheduling.apply();
     let _ = start.told.send((granted.favours.clone(), granted.shortfalls.clone()));
     let period = Duration::from_secs_f64(PERIOD_S);
-    // Away from the kernel's own work at whole milliseconds.
-    let phase = period / 2;
     // The damping at the end is slept, not paced: the clock may be what failed.
-    if let Err(panic) = drive(&start, end, robot, |tick| pace(period, phase, tick), || std::thread::sleep(period)) {
+    if let Err(panic) =
+        drive(&start, end, robot, |tick| pace(period, CONTROL_PHASE, tick), || std::thread::sleep(period))
+    {
         resume_unwind(panic);
     }
 }
@@ -60,7 +60,7 @@ fn drive<C: Clock>(
     mut wait: impl FnMut(),
 ) -> std::thread::Result<()> {
     let closing = || start.closing.load(Ordering::Acquire);
-    let mut body = Body::new(start.settings, end, start.clock.now_ns());
+    let mut body = Body::new(start.settings, end);
     // Afterwards the body is only asked for its mode, which a panic does not leave half changed.
     let ended = catch_unwind(AssertUnwindSafe(|| {
         let tick = &mut |instant| {

@@ -509,6 +509,8 @@ pub enum Event {
     TrialEnded {
         /// Its number.
         trial: u32,
+        /// Ticks that carry it, this one the last: who has fewer does not know the whole trial.
+        ticks: u64,
         /// How it ended.
         end: TrialEnd,
     },

@@ -19,11 +19,14 @@ pub struct Instant {
 /// of calling its body without a pause until it has caught up.
 const FORGIVEN_PERIODS: u64 = 20;
 
-/// Calls `body` once per period until it breaks, each time `phase` after a whole period of the system's monotonic clock.
+/// The phase of a control thread that ticks every millisecond.
 ///
-/// The kernel does its own periodic work at whole milliseconds of that clock (the scheduler's tick: Linux,
-/// `kernel/time/tick-common.c`, `tick_setup_device`). A loop that happened to begin there would meet it in every fourth
-/// period, in the middle of a tick; one that stays away from it never does.
+/// A kernel whose tick is a whole number of milliseconds (CONFIG_HZ 100, 250 or 1000) does its own periodic work at whole
+/// milliseconds of the monotonic clock (Linux, `kernel/time/tick-common.c`, `tick_setup_device`). A loop that happened to begin
+/// there would meet it time and again in the middle of its work; this one stays away from it.
+pub const CONTROL_PHASE: Duration = Duration::from_micros(500);
+
+/// Calls `body` once per period until it breaks, each time `phase` after a whole period of the system's monotonic clock.
 ///
 /// # Errors
 /// When the system's monotonic clock cannot be read or waited on.

@@ -46,10 +46,11 @@ impl Recent {
         self.sum += times;
     }
 
-    /// One of them was a mistake, if it is not too old to be known.
+    /// The newest of them was a mistake, in whichever block it stands.
     pub fn take_back(&mut self) {
-        if self.blocks[self.newest] > 0 {
-            self.blocks[self.newest] -= 1;
+        let back = (0..BLOCKS).map(|back| (self.newest + BLOCKS - back) % BLOCKS);
+        if let Some(block) = { back }.find(|block| self.blocks[*block] > 0) {
+            self.blocks[block] -= 1;
             self.sum -= 1;
         }
     }
@@ -100,8 +101,14 @@ mod tests {
         assert_eq!((recent.in_a_second(), recent.sum()), (2000, 2200));
         recent.take_back();
         assert_eq!(recent.sum(), 2199);
+        // A mistake of the block before, noticed in this one.
+        let mut recent = Recent::default();
+        pass(&mut recent, 100, 1);
+        pass(&mut recent, 1, 0);
+        recent.take_back();
+        assert_eq!(recent.sum(), 99);
         pass(&mut recent, 10_000, 3);
-        assert_eq!((recent.in_a_second(), recent.sum()), (3000, 15_000));
+        assert_eq!((recent.in_a_second(), recent.sum()), (3000, 3 * recent.span_ms()));
     }
 
     #[test]

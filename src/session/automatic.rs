@@ -67,7 +67,7 @@ pub fn run_watched<R: Robot>(
             approved => approved?,
         };
         let (end, ticks) = rollout.run(&spec);
-        life.ended(spec.trial, &end, ticks);
+        life.ended(spec.trial, &end, ticks, ticks.len() as u64);
         let suggested = life.row(spec.trial).and_then(|row| row.suggested).unwrap_or(Verdict::Void);
         match life.judge(suggested, false) {
             Err(Refusal::EndedElsewhere(_)) => continue,

@@ -248,13 +248,14 @@ impl Life {
         Ok(())
     }
 
-    /// The running trial is over: it is measured and waits for its verdict.
-    pub fn ended(&mut self, trial: u32, end: &TrialEnd, ticks: &[Tick]) {
+    /// The running trial is over: it is measured and waits for its verdict. `whole` is how many ticks it has: where some of them
+    /// were lost on the way, nothing is measured.
+    pub fn ended(&mut self, trial: u32, end: &TrialEnd, ticks: &[Tick], whole: u64) {
         if self.stage != Stage::Running || self.current != trial {
             return;
         }
         let (mut suggested, mut cause) = objective::suggest(end);
-        let missing = objective::missing(ticks);
+        let missing = whole.saturating_sub(ticks.len() as u64);
         if missing > 0 {
             (suggested, cause) = (Verdict::Void, format!("{missing} ticks of it were not recorded: not measured"));
         }

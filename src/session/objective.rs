@@ -38,14 +38,6 @@ pub fn measure(ticks: &[Tick]) -> Option<Measured> {
     })
 }
 
-/// How many ticks of a trial are missing between its first and its last: what is not whole is not measured.
-pub fn missing(ticks: &[Tick]) -> u64 {
-    match ticks {
-        [first, .., last] => last.number.saturating_sub(first.number).saturating_sub(ticks.len() as u64 - 1),
-        _ => 0,
-    }
-}
-
 /// The objective J, maximised: m for forward and lateral, rad for twist (paper, section II-D); mean per jump.
 pub fn value(task: Task, measured: &Measured, jumps: u32) -> f64 {
     let whole = match task {

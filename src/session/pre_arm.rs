@@ -33,6 +33,8 @@ pub struct PreArmList {
     folder: Option<PathBuf>,
     /// What the operator has given their word on.
     words: CheckSet,
+    /// When they gave it last on the area, ns.
+    area_ns: u64,
     /// How often the robot has restarted, as far as the list has heard.
     reboots: u64,
     stop: StopTest,
@@ -49,14 +51,31 @@ impl PreArmList {
             configuration,
             folder,
             words: CheckSet::EMPTY,
+            area_ns: 0,
             reboots: 0,
             stop: StopTest::Open,
         }
     }
 
     /// The operator gives their word.
-    pub fn confirm(&mut self, check: OperatorCheck) {
+    pub fn confirm(&mut self, check: OperatorCheck, time_ns: u64) {
         self.words.insert(check.check());
+        if check == OperatorCheck::AreaClear {
+            self.area_ns = time_ns;
+        }
+    }
+
+    /// The robot is not armed yet at `time_ns`: a word that has grown old is taken back. Why, if one was.
+    pub fn forget(&mut self, time_ns: u64) -> Option<String> {
+        let age_s = time_ns.saturating_sub(self.area_ns) as f64 * 1e-9;
+        let allowed_s = self.limits.area_clear_s;
+        if age_s <= allowed_s || !self.words.contains(Check::AreaClear) {
+            return None;
+        }
+        self.words.remove(Check::AreaClear);
+        Some(format!(
+            "the area was said to be clear more than {allowed_s:.0} s ago: look again, and give your word anew"
+        ))
     }
 
     /// The mode changed: a word that the change makes worthless is taken back, and a STOP may have been a test.

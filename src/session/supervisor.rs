@@ -71,6 +71,17 @@ pub struct Parts {
     pub info: SessionInfo,
 }
 
+/// A trial that is over.
+#[derive(Debug, Clone, Copy)]
+struct Ended {
+    trial: u32,
+    end: TrialEnd,
+    /// How many ticks it has.
+    ticks: u64,
+    /// When it was heard of, ns: its ticks are not waited for for ever.
+    time_ns: u64,
+}
+
 /// The session.
 pub struct Supervisor {
     life: Life,
@@ -89,10 +100,8 @@ pub struct Supervisor {
     /// What forbade the next trial when that was said last.
     held: Option<String>,
     caution_ns: Option<u64>,
-    /// How the running trial ended, until its ticks have arrived too.
-    ended: Option<(u32, TrialEnd)>,
-    /// When it ended, ns: its ticks are not waited for for ever.
-    ended_ns: u64,
+    /// The trial that ended, until its ticks have arrived too.
+    ended: Option<Ended>,
     measured: VecDeque<TrialTicks>,
     recorder_complaint: Option<String>,
     /// The recorder's thread takes no records any more.
@@ -129,7 +138,6 @@ impl Supervisor {
             held: None,
             caution_ns: None,
             ended: None,
-            ended_ns: 0,
             measured: VecDeque::new(),
             recorder_complaint: None,
             recorder_gone: false,
@@ -173,6 +181,12 @@ impl Supervisor {
         if self.pre_arm.robot_restarted(reboots) {
             let message = "the robot restarted: low-level mode and a clear area are to be confirmed again".to_owned();
             self.log(Level::Warning, message, time_ns);
+        }
+        if !self.mode.energised()
+            && let Some(message) = self.pre_arm.forget(time_ns)
+        {
+            self.log(Level::Info, message, time_ns);
+            self.shown_list_ns = 0;
         }
         while let Ok(handed) = self.handed.try_recv() {
             match handed {
@@ -288,7 +302,7 @@ impl Supervisor {
                 Err(format!("{} is asked before the robot is armed", check.check().name()))
             }
             Intent::Confirm(check) => {
-                self.pre_arm.confirm(*check);
+                self.pre_arm.confirm(*check, wish.time_ns);
                 self.shown_list_ns = 0;
                 Ok("confirmed".to_owned())
             }
@@ -314,7 +328,7 @@ impl Supervisor {
                 let spec = self.life.approve(*trial, *revision).map_err(words)?;
                 let permit = Permit { mode_changes: self.mode_changes, given_ns: wish.time_ns };
                 if let Err(reason) = self.command(Command::RunTrial(spec, permit)) {
-                    self.life.ended(spec.trial, &TrialEnd::Cancelled, &[]);
+                    self.life.ended(spec.trial, &TrialEnd::Cancelled, &[], 0);
                     return Err(reason);
                 }
                 Ok(format!("trial {} runs", spec.trial))
@@ -422,9 +436,8 @@ impl Supervisor {
                 self.unattended.mode_changed(to, cause);
                 self.say(Record::Transition(Transition { from, to, cause: cause.to_string() }), time_ns);
             }
-            Event::TrialEnded { trial, end } => {
-                self.ended = Some((trial, end));
-                self.ended_ns = time_ns;
+            Event::TrialEnded { trial, ticks, end } => {
+                self.ended = Some(Ended { trial, end, ticks, time_ns });
             }
             Event::Refused { command, mode, because } => {
                 let command_name = describe_command(&command);
@@ -432,7 +445,7 @@ impl Supervisor {
                 self.log(Level::Warning, message, time_ns);
                 match command {
                     Command::RunTrial(spec, _) => {
-                        self.ended = Some((spec.trial, TrialEnd::Cancelled));
+                        self.ended = Some(Ended { trial: spec.trial, end: TrialEnd::Cancelled, ticks: 0, time_ns });
                         self.measured.push_back(TrialTicks { trial: spec.trial, ticks: Vec::new() });
                     }
                     Command::Arm(_) => self.unattended.arming_refused(time_ns),
@@ -448,10 +461,10 @@ impl Supervisor {
 
     /// Once a trial has ended and its ticks are here, it is measured.
     fn measure(&mut self, time_ns: u64) {
-        let Some((trial, end)) = self.ended else { return };
+        let Some(Ended { trial, end, ticks: whole, time_ns: ended_ns }) = self.ended else { return };
         let ticks = match self.measured.iter().position(|ticks| ticks.trial == trial) {
             Some(place) => self.measured.remove(place).map(|found| found.ticks).unwrap_or_default(),
-            None if time_ns < self.ended_ns + LONGEST_WAIT_FOR_TICKS_NS => return,
+            None if time_ns < ended_ns + LONGEST_WAIT_FOR_TICKS_NS => return,
             None => {
                 self.log(Level::Error, format!("the ticks of trial {trial} never came from the recorder"), time_ns);
                 Vec::new()
@@ -459,7 +472,7 @@ impl Supervisor {
         };
         self.measured.clear();
         self.ended = None;
-        self.life.ended(trial, &end, &ticks);
+        self.life.ended(trial, &end, &ticks, whole);
         if self.life.stage() == Stage::Review && matches!(self.mode, Mode::Damped | Mode::Fault) {
             let message = format!("trial {trial} ended in {}: {}", self.mode.name(), self.cause);
             self.log(Level::Warning, message, time_ns);

@@ -324,9 +324,17 @@ fn the_doctor_says_how_the_machine_stands_item_by_item() {
     let output = run(folder.path(), &["doctor"]);
     let said = String::from_utf8_lossy(&output.stdout);
     assert!(output.status.success(), "{said}");
-    for item in
-        ["kernel", "real-time priority", "locked memory", "cores", "timer", "wake-up lateness", "characters", "disk"]
-    {
+    for item in [
+        "kernel",
+        "real-time priority",
+        "locked memory",
+        "cores",
+        "timer",
+        "control thread",
+        "wake-up lateness",
+        "connection",
+        "disk",
+    ] {
         let line = said.lines().find(|line| line.get(6..).is_some_and(|rest| rest.starts_with(item)));
         let line = line.unwrap_or_else(|| panic!("no line on {item}: {said}"));
         assert!(line.starts_with("ok ") || line.starts_with("warn "), "{line}");

@@ -94,7 +94,7 @@ pub fn ticks(trial: u32, dx_m: f64) -> Vec<Tick> {
 pub fn run(life: &mut Life, end: TrialEnd) -> TrialSpec {
     let card = life.proposal().expect("a proposal");
     let spec = life.approve(card.trial, card.revision).unwrap();
-    life.ended(spec.trial, &end, &ticks(spec.trial, far(&spec)));
+    life.ended(spec.trial, &end, &ticks(spec.trial, far(&spec)), 2);
     assert_eq!(life.stage(), Stage::Review);
     spec
 }

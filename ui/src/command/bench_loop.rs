@@ -18,8 +18,9 @@ use quadfrog::realtime::channel::{ScreenEnd, SessionEnd, channels};
 use quadfrog::realtime::clock::{Clock, MonotonicClock};
 use quadfrog::realtime::command::{Command, Permit, Task};
 use quadfrog::realtime::scheduling::{Granted, Scheduling};
+use quadfrog::realtime::system::isolated_cores;
 use quadfrog::realtime::telemetry::{Event, Mode, Tick};
-use quadfrog::realtime::thread::{Instant, pace};
+use quadfrog::realtime::thread::{CONTROL_PHASE, Instant, pace};
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::robot::go1::Go1;
 use quadfrog::robot::go1::packet::{COMMAND_LENGTH, STATE_LENGTH};
@@ -31,8 +32,6 @@ use super::Failure;
 
 /// The control period.
 const PERIOD: Duration = Duration::from_millis(1);
-/// As the engine's thread.
-const PHASE: Duration = Duration::from_micros(500);
 /// What is asked of the wake-up: its 99.9th percentile is at most this many times cyclictest's.
 const RATIO_ASKED: f64 = 1.2;
 /// What is asked of a tick over the link: its 99.9th percentile, us.
@@ -159,21 +158,23 @@ pub fn run(arguments: &LoopArguments) -> Result<(), Failure> {
     if cfg!(debug_assertions) {
         println!("This is a debug build: for figures that count, run it with cargo run --release.");
     }
-    let scheduling = Scheduling { priority: arguments.priority, core: None, lock_memory: true };
+    // All that is compared runs on the same core, where one is isolated.
+    let core = isolated_cores().first().copied();
+    let scheduling = Scheduling { priority: arguments.priority, core, lock_memory: true };
     let turns = if arguments.cyclictest { arguments.turns } else { 1 };
     let ticks = (arguments.seconds * 1000.0 / f64::from(turns)).ceil() as u64;
     let (mut ours, mut theirs, mut alone) = (Measured::new(), times(), times());
     for turn in 0..turns {
         // Who begins changes from turn to turn: what else the machine does meets both alike.
         if arguments.cyclictest && turn % 2 == 1 {
-            cyclictest(arguments.priority, ticks, &mut theirs)?;
+            cyclictest(scheduling, ticks, &mut theirs)?;
         }
         ours.add(measure(scheduling, arguments.with_link, ticks)?)?;
         if arguments.with_link {
             alone.add(exchange(scheduling, ticks)?).wrap_err("two histograms could not be added")?;
         }
         if arguments.cyclictest && turn % 2 == 0 {
-            cyclictest(arguments.priority, ticks, &mut theirs)?;
+            cyclictest(scheduling, ticks, &mut theirs)?;
         }
     }
     report(arguments, &ours, &theirs, &alone);
@@ -253,7 +254,8 @@ fn measure(scheduling: Scheduling, with_link: bool, ticks: u64) -> Result<Measur
     let flag = ended.clone();
     let emulated = std::thread::spawn(move || {
         // A robot is on time by itself; an emulated one must not wait for the thread that is measured.
-        let _granted = Scheduling { priority: scheduling.priority.saturating_sub(1), ..scheduling }.apply();
+        let core = scheduling.core.map(|core| usize::from(core == 0));
+        let _granted = Scheduling { priority: scheduling.priority.saturating_sub(1), core, ..scheduling }.apply();
         pace(PERIOD, Duration::ZERO, |_| {
             emulator.step();
             if flag.load(Ordering::Acquire) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
@@ -290,7 +292,7 @@ fn exchange(scheduling: Scheduling, ticks: u64) -> Result<Times, Failure> {
         let clock = MonotonicClock::start();
         let (mut taken, mut left) = (times(), ticks);
         let (mut buffer, state, command) = ([0; 2048], [0; STATE_LENGTH], [0; COMMAND_LENGTH]);
-        pace(PERIOD, PHASE, |_| {
+        pace(PERIOD, CONTROL_PHASE, |_| {
             let began_ns = clock.now_ns();
             // What fails takes its time all the same.
             while ours.recv(&mut buffer).is_ok() {}
@@ -343,9 +345,9 @@ fn stand_and_measure<R: Robot>(
     let (end, session, screen, ring) = channels();
     let mut others = Others { session, screen, ticks: ring, mode_changes: 0 };
     others.attend();
-    let mut body = Body::new(settings, end, clock.now_ns());
+    let mut body = Body::new(settings, end);
     let (mut rising, mut left, mut failed) = (0_u64, ticks, None);
-    pace(PERIOD, PHASE, |instant| {
+    pace(PERIOD, CONTROL_PHASE, |instant| {
         let began_ns = clock.now_ns();
         let tick = body.tick(instant, &clock, robot);
         let cost_ns = clock.now_ns() - began_ns;
@@ -385,12 +387,15 @@ fn stand_and_measure<R: Robot>(
 }
 
 /// One run of the real cyclictest, into `times`; it counts in whole microseconds.
-fn cyclictest(priority: u8, loops: u64, times: &mut Times) -> Result<(), Failure> {
+fn cyclictest(scheduling: Scheduling, loops: u64, times: &mut Times) -> Result<(), Failure> {
     let mut program = Program::new("cyclictest");
     program.args(["--quiet", "--mlockall", "--threads=1", "--interval=1000", "--histogram=100000"]);
     program.arg(format!("--loops={loops}"));
-    if priority > 0 {
-        program.arg(format!("--priority={priority}")).arg("--policy=fifo");
+    if scheduling.priority > 0 {
+        program.arg(format!("--priority={}", scheduling.priority)).arg("--policy=fifo");
+    }
+    if let Some(core) = scheduling.core {
+        program.arg(format!("--affinity={core}"));
     }
     let output = program
         .output()

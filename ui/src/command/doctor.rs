@@ -66,8 +66,8 @@ pub fn run(arguments: &DoctorArguments) -> Result<(), Failure> {
     let config = Config::load(arguments.config.as_deref())?;
     let scheduling = config.scheduling(Backend::Hardware);
     let mut lines = vec![kernel(), priority(scheduling), memory(), cores(), governor(), timer()];
-    lines.push(wake_up(scheduling));
-    lines.extend([characters(), colours(), size()]);
+    lines.extend(wake_up(scheduling));
+    lines.extend([characters(), colours(), size(), connection()]);
     lines.push(room(&arguments.output, config.safety.pre_arm.disk_free_mb));
     for line in &lines {
         println!("{line}");
@@ -116,8 +116,8 @@ fn cores() -> Line {
         [] => format!("{count}, none isolated"),
         cores => format!("{count}, isolated: {cores:?}"),
     };
-    let remedy = "two cores at least; one kept free for the control thread (boot parameter isolcpus=N) makes it later less often";
-    Line::new("cores", found, count >= 2, remedy)
+    let remedy = "keep one of two or more free for the control thread (boot parameter isolcpus=N, or realtime.core): it is late less often";
+    Line::new("cores", found, count >= 2 && !isolated.is_empty(), remedy)
 }
 
 fn governor() -> Line {
@@ -141,25 +141,32 @@ fn timer() -> Line {
     }
 }
 
-/// A second of wake-ups in a thread that is scheduled as the control thread on hardware would be.
-fn wake_up(scheduling: Scheduling) -> Line {
+/// What a thread is granted that is scheduled as the control thread on hardware would be, and a second of its wake-ups.
+fn wake_up(scheduling: Scheduling) -> Vec<Line> {
     let measured = std::thread::spawn(move || {
-        let _granted = scheduling.apply();
+        let granted = scheduling.apply();
         let mut lateness = Vec::with_capacity(WAKE_UPS);
-        let paced = thread::pace(Duration::from_millis(1), Duration::from_micros(500), |instant| {
+        let paced = thread::pace(Duration::from_millis(1), thread::CONTROL_PHASE, |instant| {
             lateness.push(instant.lateness_ns);
             if lateness.len() == WAKE_UPS { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         });
         lateness.sort_unstable();
-        paced.map(|()| lateness)
+        paced.map(|()| (granted, lateness))
     });
-    match measured.join() {
-        Ok(Ok(lateness)) => {
+    let line = match measured.join() {
+        Ok(Ok((granted, lateness))) => {
+            let favours: Vec<_> = granted.favours.iter().map(ToString::to_string).collect();
+            let mut lines = vec![Line::new("control thread", favours.join(", "), true, "")];
+            lines.extend(granted.shortfalls.iter().map(|shortfall| {
+                let found = format!("not {}: {}", shortfall.favour, shortfall.reason);
+                Line::new("control thread", found, false, shortfall.remedy)
+            }));
             let at = |rank: usize| lateness[rank.min(lateness.len() - 1)] as f64 * 1e-3;
             let (p50, p99, most) = (at(WAKE_UPS / 2), at(WAKE_UPS * 99 / 100), at(WAKE_UPS - 1));
             let found = format!("p50 {p50:.0} us, p99 {p99:.0} us, worst {most:.0} us of {WAKE_UPS}");
             let remedy = "a robot is not armed while p99 is above 500 us: see the lines above; end other programs";
-            Line::new("wake-up lateness", found, p99 < 500.0, remedy)
+            lines.push(Line::new("wake-up lateness", found, p99 < 500.0, remedy));
+            return lines;
         }
         Ok(Err(error)) => Line {
             item: "wake-up lateness",
@@ -171,7 +178,27 @@ fn wake_up(scheduling: Scheduling) -> Line {
             found: "the measuring thread broke down".to_owned(),
             verdict: Verdict::Broken("please report it".to_owned()),
         },
-    }
+    };
+    vec![line]
+}
+
+/// Whether the console would notice that its operator is gone.
+fn connection() -> Line {
+    let set = |name: &str| std::env::var_os(name).is_some();
+    let (found, remedy) = if set("TMUX") || set("STY") {
+        (
+            "tmux or screen",
+            "it lives on when your connection ends, and the robot with it: for a robot start quadfrog outside",
+        )
+    } else if set("SSH_CONNECTION") {
+        (
+            "SSH",
+            "a dead line is noticed only if sshd looks for it: ClientAliveInterval 1, ClientAliveCountMax 2 in sshd_config",
+        )
+    } else {
+        ("a terminal of this machine", "")
+    };
+    Line::new("connection", found, remedy.is_empty(), remedy)
 }
 
 /// The first that is set decides (POSIX, Base Definitions, 8.2).

@@ -27,7 +27,7 @@ use quadfrog::robot::description::RobotDescription;
 ///
 /// Without a subcommand the console opens on the simulator: press the keys that it names.
 #[derive(Debug, Parser)]
-#[command(name = "quadfrog", version, max_term_width = 100)]
+#[command(name = "quadfrog", version, max_term_width = 100, args_conflicts_with_subcommands = true)]
 pub struct Arguments {
     #[command(subcommand)]
     command: Option<Subcommands>,

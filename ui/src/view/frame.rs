@@ -13,7 +13,7 @@ use ratatui::layout::{Alignment, Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
 
-use super::{MIN_COLUMNS, MIN_ROWS, clock, clock_ms, cut, health, number, span};
+use super::{MIN_COLUMNS, MIN_ROWS, clock, clock_ms, cut, number, span};
 use crate::action::Action;
 use crate::model::{Model, View};
 use crate::theme::Role;
@@ -148,7 +148,7 @@ fn condition(model: &Model, width: u16) -> Vec<Span<'static>> {
         (None, "sim") => part("link ", Role::Quiet, "none: SIM".to_owned()),
         (None, _) => part("link ", bad(counters.state_age_ms > 5), format!("{} ms", counters.state_age_ms)),
         (Some(link), _) => {
-            let loss = health::loss_percent(&link);
+            let loss = 100.0 * link.loss_share();
             let role = bad(link.state_age_ms > 5 || loss >= 1.0 || link.rate_hz == 0);
             part("link ", role, format!("{} ms, {loss:.1} % lost", link.state_age_ms));
         }
@@ -245,7 +245,7 @@ pub fn render_small(frame: &mut Frame, area: Rect, model: &Model) {
     let theme = &model.theme;
     let keys = model.keymap.all_keys(Action::Stop);
     let link = match (model.snapshot.counters.link, model.is_hardware()) {
-        (Some(link), _) => format!("link {} ms, {:.1} % lost", link.state_age_ms, health::loss_percent(&link)),
+        (Some(link), _) => format!("link {} ms, {:.1} % lost", link.state_age_ms, 100.0 * link.loss_share()),
         (None, true) => format!("link {} ms", model.snapshot.counters.state_age_ms),
         (None, false) => "link none: SIM".to_owned(),
     };

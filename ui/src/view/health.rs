@@ -206,14 +206,8 @@ fn disk_row(model: &Model) -> Row {
     }
 }
 
-/// Share of the states of the last five seconds that never came, %.
-pub fn loss_percent(link: &LinkStatus) -> f64 {
-    let all = link.recent_received + link.recent_lost;
-    100.0 * f64::from(link.recent_lost) / f64::from(all.max(1))
-}
-
 fn link_rows(link: &LinkStatus) -> Vec<Row> {
-    let loss = loss_percent(link);
+    let loss = 100.0 * link.loss_share();
     vec![
         row("states", format!("{} Hz, newest {} ms old", link.rate_hz, link.state_age_ms), link.state_age_ms > 5),
         row("lost", format!("{loss:.2} % of 5 s, {} in all", link.lost), loss >= 1.0),
