@@ -202,6 +202,9 @@ fn bad_input_is_refused_with_file_key_value_and_nothing_is_made() {
 
     let message = refused(folder.path(), &["optimize", "--config", "elsewhere"]);
     assert!(message.contains("elsewhere"), "{message}");
+    // (A defect once: what stood before the subcommand was the console's, and was left out without a word.)
+    let message = refused(folder.path(), &["--config", "mine", "optimize"]);
+    assert!(message.contains("--config") && message.contains("optimize"), "{message}");
     let message = refused(folder.path(), &["optimize", "--model", "spot"]);
     assert!(message.contains("spot") && message.contains("go1"), "{message}");
     let message = refused(folder.path(), &["optimize", "--task", "backward"]);
