@@ -5,10 +5,12 @@
 mod support;
 
 use std::collections::BTreeMap;
+use std::path::Path;
 use std::time::Duration;
 
 use quadfrog::optimize::insight::IMPORTANCE_TRIALS;
 use quadfrog::optimize::study::Storage;
+use quadfrog::realtime::command::TrialSpec;
 use quadfrog::realtime::telemetry::{FallCause, TrialEnd};
 use quadfrog::recording::record::{Fixed, Insight, PointRecord, Record, Search, Source, Stage, Verdict};
 use quadfrog::session::life::{Life, Refusal};
@@ -317,15 +319,21 @@ fn a_point_queued_by_another_program_comes_next() {
     assert_eq!(value(&life, "Fx"), 78.0);
 }
 
+/// A study in which this trial is to be run again, and another program has queued a point with Fx = 77 at the same moment.
+fn rerun_beside_a_queued_point(folder: &Path) -> (Life, TrialSpec) {
+    let mut life = open(folder);
+    let spec = run(&mut life, TrialEnd::Fell(FallCause::BodyContact));
+    life.judge(Verdict::Void, true).unwrap();
+    let mut other = study(Storage::File(folder.join("study.log")));
+    other.enqueue(&[("Fx".into(), 77.0)], &[]).unwrap();
+    (life, spec)
+}
+
 /// (A danger once: a re-run waits in a fork of the study, and another program may take the number that it has there.)
 #[test]
 fn a_rerun_runs_its_own_parameters_though_another_program_queues_a_point_at_the_same_moment() {
     let folder = tempfile::tempdir().unwrap();
-    let mut life = open(folder.path());
-    let spec = run(&mut life, TrialEnd::Fell(FallCause::BodyContact));
-    life.judge(Verdict::Void, true).unwrap();
-    let mut other = study(Storage::File(folder.path().join("study.log")));
-    other.enqueue(&[("Fx".into(), 77.0)], &[]).unwrap();
+    let (mut life, spec) = rerun_beside_a_queued_point(folder.path());
     let again = accept(&mut life);
     assert_eq!(again.jump, spec.jump);
     assert_eq!(life.row(again.trial).unwrap().parent, Some(spec.trial));
@@ -336,11 +344,7 @@ fn a_rerun_runs_its_own_parameters_though_another_program_queues_a_point_at_the_
 #[test]
 fn a_point_queued_beside_a_rerun_runs_and_so_does_the_rerun() {
     let folder = tempfile::tempdir().unwrap();
-    let mut life = open(folder.path());
-    let spec = run(&mut life, TrialEnd::Fell(FallCause::BodyContact));
-    life.judge(Verdict::Void, true).unwrap();
-    let mut other = study(Storage::File(folder.path().join("study.log")));
-    other.enqueue(&[("Fx".into(), 77.0)], &[]).unwrap();
+    let (mut life, spec) = rerun_beside_a_queued_point(folder.path());
     life.look().unwrap();
     let both = [accept(&mut life), accept(&mut life)];
     let of = |fx: f64| both.iter().find(|spec| spec.jump.fx_n == fx);

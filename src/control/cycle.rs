@@ -180,8 +180,8 @@ impl Cycle {
         self.read(robot);
         let read_ns = clock.now_ns();
         self.estimate();
-        self.watch(inputs, previous_robot_time_ms, robot);
         let restarted = robot_time_passed(self.tick.state.robot_time_ms, previous_robot_time_ms) < 0;
+        self.watch(inputs, restarted, robot);
         self.pre_arm.observe(inputs.lateness_ns, &self.tick.state, self.state_age_ms, restarted, &self.settings);
         self.check_pre_arm(robot);
         if let Some(command) = inputs.command {
@@ -244,14 +244,14 @@ impl Cycle {
     }
 
     /// The table of watchdogs; a robot that fell; one that stood waiting for too long.
-    fn watch<R: Robot + ?Sized>(&mut self, inputs: &Inputs, previous_robot_time_ms: u32, robot: &R) {
+    fn watch<R: Robot + ?Sized>(&mut self, inputs: &Inputs, restarted: bool, robot: &R) {
         self.watchdog.begin(inputs.time_ns, inputs.lateness_ns, &self.settings);
         let seen = watchdog::Seen {
             mode: self.mode,
             state: &self.tick.state,
             estimate: &self.tick.estimate,
             state_age_ms: self.state_age_ms,
-            previous_robot_time_ms,
+            restarted,
             link: robot.link(),
             lateness_ns: inputs.lateness_ns,
             send_error: self.send_error.take(),

@@ -6,7 +6,7 @@
 use super::limits;
 use super::settings::{PERIOD_S, Settings};
 use crate::realtime::telemetry::{Caution, Estimate, Fault, Hold, Mode};
-use crate::robot::{JOINTS, LinkStatus, RobotState, robot_time_passed};
+use crate::robot::{JOINTS, LinkStatus, RobotState};
 
 /// What one tick knows.
 #[derive(Debug, Clone, Copy)]
@@ -19,8 +19,8 @@ pub struct Seen<'a> {
     pub estimate: &'a Estimate,
     /// Age of that state, ms; zero while the robot answers.
     pub state_age_ms: u32,
-    /// The robot's clock in the state before, ms.
-    pub previous_robot_time_ms: u32,
+    /// The robot's clock went backwards since the tick before.
+    pub restarted: bool,
     /// The link; none for a machine without one.
     pub link: Option<LinkStatus>,
     /// How late the tick started, ns.
@@ -170,8 +170,7 @@ fn not_finite(_: &Watchdog, seen: &Seen, _: &Settings) -> Option<Fault> {
 }
 
 fn reboot(_: &Watchdog, seen: &Seen, _: &Settings) -> Option<Fault> {
-    let passed_ms = robot_time_passed(seen.state.robot_time_ms, seen.previous_robot_time_ms);
-    (passed_ms < 0).then_some(Fault::Reboot)
+    seen.restarted.then_some(Fault::Reboot)
 }
 
 fn corrupt(_: &Watchdog, seen: &Seen, settings: &Settings) -> Option<Fault> {

@@ -48,8 +48,8 @@ impl Recent {
 
     /// The newest of them was a mistake, in whichever block it stands.
     pub fn take_back(&mut self) {
-        let back = (0..BLOCKS).map(|back| (self.newest + BLOCKS - back) % BLOCKS);
-        if let Some(block) = { back }.find(|block| self.blocks[*block] > 0) {
+        let newest = (0..BLOCKS).map(|back| self.before(back)).find(|block| self.blocks[*block] > 0);
+        if let Some(block) = newest {
             self.blocks[block] -= 1;
             self.sum -= 1;
         }
@@ -62,7 +62,12 @@ impl Recent {
 
     /// How often it happened in the last second, whole blocks only: the newest is not among them.
     pub fn in_a_second(&self) -> u32 {
-        (1..=SECOND).map(|back| self.blocks[(self.newest + BLOCKS - back) % BLOCKS]).sum()
+        (1..=SECOND).map(|back| self.blocks[self.before(back)]).sum()
+    }
+
+    /// The place of the block that is `back` blocks older than the newest.
+    fn before(&self, back: usize) -> usize {
+        (self.newest + BLOCKS - back) % BLOCKS
     }
 
     /// Milliseconds that are remembered.

@@ -181,22 +181,16 @@ impl Life {
             self.write_confirmed()?;
             return Ok(None);
         };
-        if self.study.tell(pending.suggestion.trial, pending.outcome)? == Told::AlreadyFinished {
+        let trial = pending.suggestion.trial;
+        if self.study.tell(trial, pending.outcome)? == Told::AlreadyFinished {
             // It is read again with the next proposal.
-            self.log(format!(
-                "trial {} was ended by somebody else meanwhile: what they say stands",
-                pending.suggestion.trial
-            ));
-            self.rows.remove(&pending.suggestion.trial);
+            self.log(format!("trial {trial} was ended by somebody else meanwhile: what they say stands"));
+            self.rows.remove(&trial);
         }
         let mut queued = None;
         if pending.rerun {
-            let (parameters, origin) = self.rerun_of(pending.suggestion.trial)?;
-            // Another program may have seen the debt first; the trial that it has queued is then the re-run.
-            let comes = |other: &Trial| Origin::of(&other.user_attributes).parent == Some(pending.suggestion.trial);
-            let attributes = origin.attributes();
-            queued = self.study.enqueue_unless(&parameters, &attributes, |trials| trials.iter().any(comes))?;
-            queued = queued.or_else(|| self.study.trials().iter().find(|trial| comes(trial)).map(|trial| trial.number));
+            let (parameters, origin) = self.rerun_of(trial)?;
+            queued = self.queue_again(trial, &parameters, &origin)?;
         }
         // Only now: what could not be written is still to be told.
         self.pending = None;
@@ -204,7 +198,7 @@ impl Life {
         Ok(queued)
     }
 
-    fn rerun_of(&self, trial: u32) -> Result<(Vec<(String, f64)>, Origin), StudyError> {
+    pub(super) fn rerun_of(&self, trial: u32) -> Result<(Vec<(String, f64)>, Origin), StudyError> {
         let trial = self.study.trial(trial)?;
         let row = attributes::row_of(trial, String::new(), &self.plan.parameters);
         Ok((trial.parameters.clone(), Origin::rerun_of(&row)))

@@ -95,13 +95,24 @@ impl Life {
                 // The same seed as before: the study goes on as if nothing had happened.
                 Origin::interrupted(&trial)
             } else {
-                let row = attributes::row_of(&trial, String::new(), &self.plan.parameters);
-                Origin::rerun_of(&row)
+                self.rerun_of(trial.number)?.1
             };
-            let comes = |other: &Trial| Origin::of(&other.user_attributes).parent == Some(trial.number);
-            self.study.enqueue_unless(&trial.parameters, &origin.attributes(), |trials| trials.iter().any(comes))?;
+            self.queue_again(trial.number, &trial.parameters, &origin)?;
         }
         Ok(())
+    }
+
+    /// Queues what trial `parent` is owed, once: another program may have seen the debt first, and the trial that it has queued
+    /// is then the one. Its number.
+    pub(super) fn queue_again(
+        &mut self,
+        parent: u32,
+        parameters: &[(String, f64)],
+        origin: &Origin,
+    ) -> Result<Option<u32>, StudyError> {
+        let comes = |other: &Trial| Origin::of(&other.user_attributes).parent == Some(parent);
+        let queued = self.study.enqueue_unless(parameters, &origin.attributes(), |trials| trials.iter().any(comes))?;
+        Ok(queued.or_else(|| self.study.trials().iter().find(|trial| comes(trial)).map(|trial| trial.number)))
     }
 
     /// Takes in what other programs have done: their trials join the table, and a point that they have queued comes next

@@ -153,7 +153,10 @@ fn wake_up(scheduling: Scheduling) -> Vec<Line> {
         lateness.sort_unstable();
         paced.map(|()| (granted, lateness))
     });
-    let line = match measured.join() {
+    let broken = |found: String, remedy: &str| {
+        vec![Line { item: "wake-up lateness", found, verdict: Verdict::Broken(remedy.to_owned()) }]
+    };
+    match measured.join() {
         Ok(Ok((granted, lateness))) => {
             let favours: Vec<_> = granted.favours.iter().map(ToString::to_string).collect();
             let mut lines = vec![Line::new("control thread", favours.join(", "), true, "")];
@@ -166,20 +169,11 @@ fn wake_up(scheduling: Scheduling) -> Vec<Line> {
             let found = format!("p50 {p50:.0} us, p99 {p99:.0} us, worst {most:.0} us of {WAKE_UPS}");
             let remedy = "a robot is not armed while p99 is above 500 us: see the lines above; end other programs";
             lines.push(Line::new("wake-up lateness", found, p99 < 500.0, remedy));
-            return lines;
+            lines
         }
-        Ok(Err(error)) => Line {
-            item: "wake-up lateness",
-            found: error.to_string(),
-            verdict: Verdict::Broken("the monotonic clock cannot be waited on".to_owned()),
-        },
-        Err(_) => Line {
-            item: "wake-up lateness",
-            found: "the measuring thread broke down".to_owned(),
-            verdict: Verdict::Broken("please report it".to_owned()),
-        },
-    };
-    vec![line]
+        Ok(Err(error)) => broken(error.to_string(), "the monotonic clock cannot be waited on"),
+        Err(_) => broken("the measuring thread broke down".to_owned(), "please report it"),
+    }
 }
 
 /// Whether the console would notice that its operator is gone.

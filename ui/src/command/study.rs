@@ -11,7 +11,6 @@ use quadfrog::config::Config;
 use quadfrog::engine::{Opened, newest_config, open_stored, stored_studies, study_files};
 use quadfrog::optimize::exchange::{self, TableTrial};
 use quadfrog::optimize::repeats;
-use quadfrog::optimize::sampler::Direction;
 use quadfrog::optimize::study::Storage;
 use quadfrog::optimize::trial::{Trial, TrialState};
 use quadfrog::recording::record::TrialRecord;
@@ -211,13 +210,8 @@ fn list(folder: &Path) -> Result<(), Failure> {
 /// The best trial that the robot stood through.
 fn best_of(opened: &Opened) -> Option<&Trial> {
     // As everywhere: a repeated point is worth the mean of its repeats.
-    let points = repeats::points(opened.study.trials());
-    let stood = |point: &&repeats::Point| point.stood > 0;
-    let better = |a: &repeats::Point, b: &repeats::Point| match opened.study.options().direction {
-        Direction::Maximize => a.mean() > b.mean(),
-        Direction::Minimize => a.mean() < b.mean(),
-    };
-    let best = points.iter().filter(stood).reduce(|best, point| if better(point, best) { point } else { best })?;
+    let best_first = repeats::contenders(opened.study.trials(), opened.study.options().direction, usize::MAX);
+    let best = best_first.iter().find(|point| point.stood > 0)?;
     let standing = |trial: &&Trial| best.trials.contains(&trial.number) && !trial.is_fall();
     opened.study.trials().iter().find(standing)
 }
