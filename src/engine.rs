@@ -391,7 +391,7 @@ impl Engine {
         let flag = closing.clone();
         let scheduling = options.config.scheduling(options.backend);
         let (told, granted) = channel();
-        let damps = options.backend == Backend::Hardware;
+        let real = options.backend == Backend::Hardware;
         let control = thread
             .spawn(move || {
                 let start = control_thread::Start {
@@ -400,7 +400,7 @@ impl Engine {
                     told,
                     clock: &clock,
                     closing: &flag,
-                    damps,
+                    real,
                 };
                 control_thread::run(start, control_end, &mut *robot);
             })

@@ -106,6 +106,7 @@ impl Bench {
             let instant = Instant { planned_ns: self.time_ms * 1_000_000, lateness_ns: 0 };
             let Bench { body, machine, clock, .. } = self;
             let mode = without_allocation(|| {
+                body.rehearse(clock, machine);
                 let mode = body.tick(instant, clock, machine).mode;
                 body.prepare();
                 mode

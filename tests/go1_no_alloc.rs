@@ -45,6 +45,7 @@ fn a_tick_over_the_link_does_not_allocate() {
             screen.heartbeat.beat();
             let instant = Instant { planned_ns: ms * 1_000_000, lateness_ns: 0 };
             let mode = without_allocation(|| {
+                body.rehearse(&SimulatedClock, &mut go1);
                 let mode = body.tick(instant, &SimulatedClock, &mut go1).mode;
                 body.prepare();
                 mode

@@ -24,11 +24,14 @@ fn apply(scheduling: Scheduling) -> (Vec<Favour>, Vec<String>) {
     granted.join().unwrap()
 }
 
+fn now_ns() -> u64 {
+    Duration::from(clock_gettime(ClockId::CLOCK_MONOTONIC).unwrap()).as_nanos() as u64
+}
+
 /// Calls come a phase after whole periods of the system's clock, also after a stall that was not made up for.
 #[test]
 fn the_pace_keeps_its_phase() {
     let (period, phase) = (Duration::from_millis(10), Duration::from_millis(3));
-    let now_ns = || Duration::from(clock_gettime(ClockId::CLOCK_MONOTONIC).unwrap()).as_nanos() as u64;
     let mut planned = Vec::new();
     thread::pace(period, phase, |instant| {
         planned.push((now_ns() - instant.lateness_ns, instant.planned_ns));
@@ -48,6 +51,37 @@ fn the_pace_keeps_its_phase() {
     assert!(planned.iter().all(|(_, planned_ns)| planned_ns.is_multiple_of(10_000_000)), "{planned:?}");
     let (before, after) = (planned[9].1, planned[11].1);
     assert!(after - before >= 300_000_000, "the stall is not made up for: {planned:?}");
+}
+
+/// A rehearsal comes before its tick and in time, and not at all where the time for it has passed.
+#[test]
+fn a_rehearsal_comes_before_its_tick_or_not_at_all() {
+    #[derive(Default)]
+    struct Course {
+        /// The tick that comes next.
+        next: u64,
+        rehearsed: Vec<u64>,
+    }
+    impl thread::Paced for Course {
+        fn rehearse(&mut self) {
+            self.rehearsed.push(self.next);
+        }
+        fn tick(&mut self, _: thread::Instant) -> ControlFlow<()> {
+            if self.next == 10 {
+                // The next two are overdue when this one ends.
+                std::thread::sleep(Duration::from_millis(25));
+            }
+            self.next += 1;
+            if self.next == 20 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        }
+    }
+    let mut course = Course::default();
+    let (period, lead) = (Duration::from_millis(10), Duration::from_millis(6));
+    thread::pace_rehearsed(period, Duration::ZERO, lead, &mut course).unwrap();
+    let Course { next, rehearsed } = course;
+    assert!(next == 20 && !rehearsed.is_empty(), "{rehearsed:?}");
+    assert!(rehearsed.is_sorted_by(|a, b| a < b), "twice before one tick: {rehearsed:?}");
+    assert!(!rehearsed.contains(&11) && !rehearsed.contains(&12), "{rehearsed:?}");
 }
 
 #[test]

@@ -8,7 +8,7 @@ use crate::realtime::clock::Clock;
 use crate::realtime::command::Command;
 use crate::realtime::telemetry::{Counters, Event, Mode, Snapshot, Tick};
 use crate::realtime::thread::Instant;
-use crate::robot::Robot;
+use crate::robot::{JointCommand, LinkStatus, Placement, Robot, RobotError, RobotState};
 
 /// The session is told the counters, and what speaks against arming, ten times a second and with every event.
 const COUNTERS_EVERY: u64 = 100;
@@ -92,9 +92,45 @@ impl Body {
         }
     }
 
+    /// Does the next tick shortly before it comes, on a copy and with a robot that only repeats its last state: code and data
+    /// are then in the processor's caches, from which a millisecond of other work has driven them, and the tick itself takes
+    /// half as long where it takes longest. Nothing comes of it.
+    pub fn rehearse<C: Clock>(&mut self, clock: &C, robot: &mut dyn Robot) {
+        robot.rehearse();
+        let last = self.cycle.last();
+        let inputs = Inputs { time_ns: last.time_ns, ..Inputs::default() };
+        let mut state = last.state;
+        state.robot_time_ms = state.robot_time_ms.wrapping_add(1);
+        let mut repeated = Repeated { state, link: robot.link() };
+        // By the same kind of reference as the robot: a generic function for another type would be other code.
+        std::hint::black_box(self.cycle.clone().tick(&inputs, clock, &mut repeated as &mut dyn Robot));
+        self.prepare();
+    }
+
     /// The mode in which the last tick ended.
     pub fn mode(&self) -> Mode {
         self.cycle.mode()
+    }
+}
+
+/// A robot that is in the state in which it was last seen, whatever it is told.
+struct Repeated {
+    state: RobotState,
+    link: Option<LinkStatus>,
+}
+
+impl Robot for Repeated {
+    fn read(&mut self) -> Result<RobotState, RobotError> {
+        Ok(self.state)
+    }
+    fn write(&mut self, _: &JointCommand) -> Result<(), RobotError> {
+        Ok(())
+    }
+    fn place(&mut self, _: &Placement) -> bool {
+        false
+    }
+    fn link(&self) -> Option<LinkStatus> {
+        self.link
     }
 }
 

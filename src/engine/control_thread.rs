@@ -13,7 +13,7 @@ use crate::realtime::channel::ControlEnd;
 use crate::realtime::clock::Clock;
 use crate::realtime::scheduling::{Favour, Scheduling, Shortfall};
 use crate::realtime::telemetry::Mode;
-use crate::realtime::thread::{CONTROL_PHASE, Instant, pace};
+use crate::realtime::thread::{CONTROL_PHASE, Instant, Paced, REHEARSAL_LEAD, pace_rehearsed};
 use crate::robot::{JointCommand, Robot};
 
 /// What the thread is started with.
@@ -28,8 +28,9 @@ pub struct Start<'a, C> {
     pub clock: &'a C,
     /// Set when the thread is to end.
     pub closing: &'a AtomicBool,
-    /// Whether the machine keeps the last command when nothing more is sent: a real one does, a simulated one stands still.
-    pub damps: bool,
+    /// Whether the machine is a real one. It keeps the last command when nothing more is sent, where a simulated one stands
+    /// still; and its ticks are worth a rehearsal.
+    pub real: bool,
 }
 
 /// How often damping is sent, at least, after the last tick: for half a second, in which the robot sinks softly.
@@ -43,11 +44,31 @@ pub fn run<C: Clock>(start: Start<C>, end: ControlEnd, robot: &mut dyn Robot) {
     let granted = start.scheduling.apply();
     let _ = start.told.send((granted.favours.clone(), granted.shortfalls.clone()));
     let period = Duration::from_secs_f64(PERIOD_S);
+    let lead = if start.real { REHEARSAL_LEAD } else { Duration::ZERO };
+    let paced = |ticking: &mut dyn Paced| pace_rehearsed(period, CONTROL_PHASE, lead, ticking);
     // The damping at the end is slept, not paced: the clock may be what failed.
-    if let Err(panic) =
-        drive(&start, end, robot, |tick| pace(period, CONTROL_PHASE, tick), || std::thread::sleep(period))
-    {
+    if let Err(panic) = drive(&start, end, robot, paced, || std::thread::sleep(period)) {
         resume_unwind(panic);
+    }
+}
+
+/// A body and its robot, until the thread is told to end.
+struct Ticking<'a, C> {
+    body: Body,
+    robot: &'a mut dyn Robot,
+    clock: &'a C,
+    closing: &'a AtomicBool,
+}
+
+impl<C: Clock> Paced for Ticking<'_, C> {
+    fn rehearse(&mut self) {
+        self.body.rehearse(self.clock, self.robot);
+    }
+
+    fn tick(&mut self, instant: Instant) -> ControlFlow<()> {
+        self.body.tick(instant, self.clock, self.robot);
+        self.body.prepare();
+        if self.closing.load(Ordering::Acquire) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 }
 
@@ -56,28 +77,23 @@ fn drive<C: Clock>(
     start: &Start<C>,
     end: ControlEnd,
     robot: &mut dyn Robot,
-    paced: impl FnOnce(&mut dyn FnMut(Instant) -> ControlFlow<()>) -> Result<(), nix::Error>,
+    paced: impl FnOnce(&mut dyn Paced) -> Result<(), nix::Error>,
     mut wait: impl FnMut(),
 ) -> std::thread::Result<()> {
-    let closing = || start.closing.load(Ordering::Acquire);
-    let mut body = Body::new(start.settings, end);
+    let body = Body::new(start.settings, end);
+    let mut ticking = Ticking { body, robot, clock: start.clock, closing: start.closing };
     // Afterwards the body is only asked for its mode, which a panic does not leave half changed.
     let ended = catch_unwind(AssertUnwindSafe(|| {
-        let tick = &mut |instant| {
-            body.tick(instant, start.clock, robot);
-            body.prepare();
-            if closing() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-        };
-        if let Err(error) = paced(tick) {
+        if let Err(error) = paced(&mut ticking) {
             panic!("the control thread cannot read the monotonic clock: {error}");
         }
     }));
-    if start.damps && !matches!(body.mode(), Mode::Offline | Mode::Observe) {
+    if start.real && !matches!(ticking.body.mode(), Mode::Offline | Mode::Observe) {
         let damping = JointCommand::damping(start.settings.gate.damping_kd);
         let mut sent = 0;
-        while sent < LAST_DAMPINGS || !closing() {
+        while sent < LAST_DAMPINGS || !start.closing.load(Ordering::Acquire) {
             // What is lost goes with the next: there is nobody left to tell.
-            let _ = robot.write(&damping);
+            let _ = ticking.robot.write(&damping);
             sent = sent.saturating_add(1);
             wait();
         }
@@ -117,7 +133,7 @@ mod tests {
 
     /// What a robot is sent, and how often was waited, if reading from it panics after `reads` ticks and the thread is told
     /// to end after `told_after` waits.
-    fn damped(controlled: bool, damps: bool, reads: u32, told_after: u32) -> (Vec<JointCommand>, u32) {
+    fn damped(controlled: bool, real: bool, reads: u32, told_after: u32) -> (Vec<JointCommand>, u32) {
         let description = RobotDescription::embedded("go1").unwrap();
         let settings = Config::load(None).unwrap().settings(&description, Task::Forward, Backend::Hardware).unwrap();
         let (control, mut session, screen, _ticks) = channels();
@@ -133,11 +149,12 @@ mod tests {
             told: std::sync::mpsc::channel().0,
             clock: &SimulatedClock,
             closing: &closing,
-            damps,
+            real,
         };
         let mut ms = 0;
-        let unpaced = |tick: &mut dyn FnMut(Instant) -> ControlFlow<()>| {
-            while tick(Instant { planned_ns: ms * 1_000_000, lateness_ns: 0 }).is_continue() {
+        let unpaced = |ticking: &mut dyn Paced| {
+            while ticking.tick(Instant { planned_ns: ms * 1_000_000, lateness_ns: 0 }).is_continue() {
+                ticking.rehearse();
                 ms += 1;
             }
             Ok(())

@@ -1,4 +1,4 @@
-//! Pacing: a body called at absolute instants, one per period, and how late each call was.
+//! Pacing: a body called at absolute instants, one per period, and how late each call was; before each, if it wishes, a rehearsal.
 
 use std::ops::ControlFlow;
 use std::time::Duration;
@@ -26,6 +26,26 @@ const FORGIVEN_PERIODS: u64 = 20;
 /// there would meet it time and again in the middle of its work; this one stays away from it.
 pub const CONTROL_PHASE: Duration = Duration::from_micros(500);
 
+/// How long before a tick of the control thread its rehearsal begins. It has to be over by then (it takes 10 to 30 us, and the
+/// thread wakes for it some tens of us late), and what it fetched has to be there still: `quadfrog bench loop --with-link`.
+pub const REHEARSAL_LEAD: Duration = Duration::from_micros(100);
+
+/// What is called in time.
+pub trait Paced {
+    /// Called somewhat before a tick, to do beforehand what makes the tick shorter. Without effect on anything else, for it is
+    /// not called where the time for it has passed.
+    fn rehearse(&mut self) {}
+
+    /// Called once per period, until it breaks.
+    fn tick(&mut self, instant: Instant) -> ControlFlow<()>;
+}
+
+impl<F: FnMut(Instant) -> ControlFlow<()>> Paced for F {
+    fn tick(&mut self, instant: Instant) -> ControlFlow<()> {
+        self(instant)
+    }
+}
+
 /// Calls `body` once per period until it breaks, each time `phase` after a whole period of the system's monotonic clock.
 ///
 /// # Errors
@@ -35,24 +55,36 @@ pub fn pace(
     phase: Duration,
     mut body: impl FnMut(Instant) -> ControlFlow<()>,
 ) -> Result<(), nix::Error> {
-    let period_ns = period.as_nanos() as u64;
-    let mut start_ns = monotonic_ns()?.next_multiple_of(period_ns) + phase.as_nanos() as u64;
+    pace_rehearsed(period, phase, Duration::ZERO, &mut body)
+}
+
+/// As [`pace`], with a rehearsal that begins `lead` before each tick. The thread sleeps once more between the two.
+///
+/// # Errors
+/// When the system's monotonic clock cannot be read or waited on.
+pub fn pace_rehearsed(
+    period: Duration,
+    phase: Duration,
+    lead: Duration,
+    body: &mut (impl Paced + ?Sized),
+) -> Result<(), nix::Error> {
+    let [period_ns, phase_ns, lead_ns] = [period, phase, lead].map(|time| time.as_nanos() as u64);
+    let mut start_ns = monotonic_ns()?.next_multiple_of(period_ns) + phase_ns;
     let mut count = 0u64;
     let mut skipped_ns = 0;
     loop {
         let planned_ns = start_ns + count * period_ns;
-        let wake = TimeSpec::new((planned_ns / 1_000_000_000) as i64, (planned_ns % 1_000_000_000) as i64);
-        loop {
-            match clock_nanosleep(ClockId::CLOCK_MONOTONIC, ClockNanosleepFlags::TIMER_ABSTIME, &wake) {
-                Ok(_) => break,
-                // A signal woke the thread early: sleep on.
-                Err(nix::Error::EINTR) => {}
-                Err(error) => return Err(error),
+        if lead_ns > 0 {
+            sleep_until(planned_ns - lead_ns)?;
+            // Who woke late for it must not be late for the tick as well.
+            if monotonic_ns()? + lead_ns / 3 <= planned_ns {
+                body.rehearse();
             }
         }
+        sleep_until(planned_ns)?;
         let lateness_ns = monotonic_ns()?.saturating_sub(planned_ns);
         let instant = Instant { planned_ns: count * period_ns + skipped_ns, lateness_ns };
-        if body(instant).is_break() {
+        if body.tick(instant).is_break() {
             return Ok(());
         }
         count += 1;
@@ -60,6 +92,19 @@ pub fn pace(
             let whole_ns = lateness_ns - lateness_ns % period_ns;
             start_ns += whole_ns;
             skipped_ns += whole_ns;
+        }
+    }
+}
+
+/// Returns at once where the time has passed.
+fn sleep_until(time_ns: u64) -> Result<(), nix::Error> {
+    let wake = TimeSpec::new((time_ns / 1_000_000_000) as i64, (time_ns % 1_000_000_000) as i64);
+    loop {
+        match clock_nanosleep(ClockId::CLOCK_MONOTONIC, ClockNanosleepFlags::TIMER_ABSTIME, &wake) {
+            Ok(_) => return Ok(()),
+            // A signal woke the thread early: sleep on.
+            Err(nix::Error::EINTR) => {}
+            Err(error) => return Err(error),
         }
     }
 }

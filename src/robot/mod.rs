@@ -310,6 +310,10 @@ pub trait Robot: Send {
     fn link(&self) -> Option<LinkStatus> {
         None
     }
+
+    /// Goes the way of `read` and `write` once without reading or writing anything, shortly before both are called: what the
+    /// processor needs for them is then at hand. Nobody can notice that it was, or was not, called.
+    fn rehearse(&mut self) {}
 }
 
 impl<R: Robot + ?Sized> Robot for Box<R> {
@@ -324,5 +328,8 @@ impl<R: Robot + ?Sized> Robot for Box<R> {
     }
     fn link(&self) -> Option<LinkStatus> {
         (**self).link()
+    }
+    fn rehearse(&mut self) {
+        (**self).rehearse();
     }
 }

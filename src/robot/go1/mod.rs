@@ -169,4 +169,12 @@ impl Robot for Go1 {
     fn link(&self) -> Option<LinkStatus> {
         Some(*self.link.status())
     }
+
+    fn rehearse(&mut self) {
+        // No torque always fits a datagram.
+        let Ok(command) = convert::low_cmd(&JointCommand::default(), self.network.crc) else { return };
+        if let Some(state) = self.link.rehearse(&command) {
+            std::hint::black_box(convert::robot_state(state, self.network.foot_force_n));
+        }
+    }
 }

@@ -20,7 +20,7 @@ use quadfrog::realtime::command::{Command, Permit, Task};
 use quadfrog::realtime::scheduling::{Granted, Scheduling};
 use quadfrog::realtime::system::isolated_cores;
 use quadfrog::realtime::telemetry::{Event, Mode, Tick};
-use quadfrog::realtime::thread::{CONTROL_PHASE, Instant, pace};
+use quadfrog::realtime::thread::{CONTROL_PHASE, Instant, Paced, REHEARSAL_LEAD, pace, pace_rehearsed};
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::robot::go1::Go1;
 use quadfrog::robot::go1::packet::{COMMAND_LENGTH, STATE_LENGTH};
@@ -50,6 +50,9 @@ pub struct LoopArguments {
     /// Over the Go1's link to an emulated robot in this program, instead of with the simulator
     #[arg(long)]
     with_link: bool,
+    /// Without the rehearsal before each tick over the link, to see what it is worth
+    #[arg(long, requires = "with_link")]
+    unrehearsed: bool,
     /// Also run cyclictest (package rt-tests) in turns with it, and compare
     #[arg(long)]
     cyclictest: bool,
@@ -85,6 +88,8 @@ struct Measured {
     publish: Times,
     /// After the tick: fetching the places of the next one.
     prepare: Times,
+    /// Before the tick: doing it on a copy.
+    rehearsal: Times,
     /// Ticks that were not in READY: the robot did not stand all the time.
     elsewhere: u64,
     granted: Option<Granted>,
@@ -93,7 +98,7 @@ struct Measured {
 impl Measured {
     fn new() -> Measured {
         let lateness = times();
-        let [wake_up, wake_up_floor, tick, read, decide, write, publish, prepare] =
+        let [wake_up, wake_up_floor, tick, read, decide, write, publish, prepare, rehearsal] =
             std::array::from_fn(|_| lateness.clone());
         Measured {
             lateness,
@@ -106,6 +111,7 @@ impl Measured {
             write,
             publish,
             prepare,
+            rehearsal,
             elsewhere: 0,
             granted: None,
         }
@@ -122,6 +128,7 @@ impl Measured {
             (&mut self.write, &other.write),
             (&mut self.publish, &other.publish),
             (&mut self.prepare, &other.prepare),
+            (&mut self.rehearsal, &other.rehearsal),
         ] {
             mine.add(theirs).wrap_err("two histograms could not be added")?;
         }
@@ -169,7 +176,7 @@ pub fn run(arguments: &LoopArguments) -> Result<(), Failure> {
         if arguments.cyclictest && turn % 2 == 1 {
             cyclictest(scheduling, ticks, &mut theirs)?;
         }
-        ours.add(measure(scheduling, arguments.with_link, ticks)?)?;
+        ours.add(measure(scheduling, arguments, ticks)?)?;
         if arguments.with_link {
             alone.add(exchange(scheduling, ticks)?).wrap_err("two histograms could not be added")?;
         }
@@ -206,6 +213,9 @@ fn report(arguments: &LoopArguments, ours: &Measured, theirs: &Times, alone: &Ti
     line(if arguments.with_link { "  send" } else { "  write (its physics)" }, &ours.write);
     line("  publish", &ours.publish);
     line("after it: fetch places", &ours.prepare);
+    if !ours.rehearsal.is_empty() {
+        line("before it: rehearsal", &ours.rehearsal);
+    }
     if arguments.with_link {
         line("its system calls alone", alone);
     }
@@ -231,17 +241,17 @@ fn us(ns: u64) -> f64 {
 }
 
 /// A control thread as the engine's, whose robot stands; `ticks` of them measured.
-fn measure(scheduling: Scheduling, with_link: bool, ticks: u64) -> Result<Measured, Failure> {
+fn measure(scheduling: Scheduling, arguments: &LoopArguments, ticks: u64) -> Result<Measured, Failure> {
     let config = Config::load(None)?;
     let mut description = RobotDescription::embedded("go1").map_err(Failure::input)?;
-    let backend = if with_link { Backend::Hardware } else { Backend::Simulator };
+    let backend = if arguments.with_link { Backend::Hardware } else { Backend::Simulator };
     let mut settings = config.settings(&description, Task::Forward, backend)?;
     // A late tick is what is measured here, and standing is all that the robot does.
     (settings.late_ms, settings.idle_s) = (0.0, 0.0);
-    if !with_link {
+    if !arguments.with_link {
         let mut robot = Simulator::new(&description, &config.simulator).map_err(Failure::input)?;
         robot.place(&Placement { joint_position: settings.lying_position, lying: true, seed: 0 });
-        return in_a_thread(move || stand_and_measure(scheduling, &settings, ticks, &mut robot));
+        return in_a_thread(move || stand_and_measure(scheduling, &settings, ticks, Duration::ZERO, &mut robot));
     }
     let anywhere = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
     let mut emulator = Emulator::bind(anywhere, &description, &config.simulator, 0).map_err(Failure::input)?;
@@ -261,7 +271,8 @@ fn measure(scheduling: Scheduling, with_link: bool, ticks: u64) -> Result<Measur
             if flag.load(Ordering::Acquire) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         })
     });
-    let measured = in_a_thread(move || stand_and_measure(scheduling, &settings, ticks, &mut robot));
+    let lead = if arguments.unrehearsed { Duration::ZERO } else { REHEARSAL_LEAD };
+    let measured = in_a_thread(move || stand_and_measure(scheduling, &settings, ticks, lead, &mut robot));
     ended.store(true, Ordering::Release);
     let _ = emulated.join();
     measured
@@ -333,11 +344,73 @@ impl Others {
     }
 }
 
-fn stand_and_measure<R: Robot>(
+/// A robot that stands up, then the ticks in which it stands, measured.
+struct Standing<'a> {
+    body: Body,
+    robot: &'a mut dyn Robot,
+    clock: MonotonicClock,
+    others: Others,
+    /// Ticks since it began to rise; none once it stands.
+    rising: Option<u64>,
+    left: u64,
+    measured: Measured,
+}
+
+impl Standing<'_> {
+    /// What a session would ask of a robot that is still in `mode` after `ticks`.
+    fn rise(&mut self, ticks: u64, mode: Mode) {
+        match mode {
+            Mode::Observe => self.others.ask(Command::TakeControl),
+            // What is refused, because the robot has not been still for long enough, is asked again.
+            Mode::Disarmed if ticks.is_multiple_of(100) => {
+                let (mode_changes, given_ns) = (self.others.mode_changes, self.clock.now_ns());
+                self.others.ask(Command::Arm(Permit { mode_changes, given_ns }));
+            }
+            _ => {}
+        }
+    }
+}
+
+impl Paced for Standing<'_> {
+    fn rehearse(&mut self) {
+        let began_ns = self.clock.now_ns();
+        self.body.rehearse(&self.clock, self.robot);
+        if self.rising.is_none() {
+            self.measured.rehearsal.saturating_record((self.clock.now_ns() - began_ns).max(1));
+        }
+    }
+
+    fn tick(&mut self, instant: Instant) -> ControlFlow<()> {
+        let began_ns = self.clock.now_ns();
+        let tick = self.body.tick(instant, &self.clock, self.robot);
+        let ticked_ns = self.clock.now_ns();
+        let mode = tick.mode;
+        if self.rising.is_none() {
+            self.measured.take(instant, ticked_ns - began_ns, tick);
+            self.left -= 1;
+        }
+        let ticked_ns = self.clock.now_ns();
+        self.body.prepare();
+        if self.rising.is_none() {
+            self.measured.prepare.saturating_record((self.clock.now_ns() - ticked_ns).max(1));
+        }
+        if let Some(ticks) = self.rising {
+            self.rise(ticks, mode);
+            self.rising = (mode != Mode::Ready).then_some(ticks + 1);
+        }
+        self.others.attend();
+        let late = self.rising.is_some_and(|ticks| ticks > LONGEST_RISE_S * 1000);
+        if self.left == 0 || late { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    }
+}
+
+/// As the engine's control thread goes, with a rehearsal `lead` before each tick.
+fn stand_and_measure(
     scheduling: Scheduling,
     settings: &Settings,
     ticks: u64,
-    robot: &mut R,
+    lead: Duration,
+    robot: &mut dyn Robot,
 ) -> Result<Measured, color_eyre::Report> {
     let mut measured = Measured::new();
     measured.granted = Some(scheduling.apply());
@@ -345,44 +418,15 @@ fn stand_and_measure<R: Robot>(
     let (end, session, screen, ring) = channels();
     let mut others = Others { session, screen, ticks: ring, mode_changes: 0 };
     others.attend();
-    let mut body = Body::new(settings, end);
-    let (mut rising, mut left, mut failed) = (0_u64, ticks, None);
-    pace(PERIOD, CONTROL_PHASE, |instant| {
-        let began_ns = clock.now_ns();
-        let tick = body.tick(instant, &clock, robot);
-        let cost_ns = clock.now_ns() - began_ns;
-        if rising < u64::MAX {
-            rising += 1;
-            match tick.mode {
-                Mode::Ready => rising = u64::MAX,
-                Mode::Observe => others.ask(Command::TakeControl),
-                // What is refused, because the robot has not been still for long enough, is asked again.
-                Mode::Disarmed if rising.is_multiple_of(100) => {
-                    let given_ns = clock.now_ns();
-                    others.ask(Command::Arm(Permit { mode_changes: others.mode_changes, given_ns }));
-                }
-                _ => {}
-            }
-            if rising > LONGEST_RISE_S * 1000 && rising < u64::MAX {
-                failed = Some(tick.mode);
-                return ControlFlow::Break(());
-            }
-        } else {
-            measured.take(instant, cost_ns, tick);
-            left -= 1;
+    let body = Body::new(settings, end);
+    let mut standing = Standing { body, robot, clock, others, rising: Some(0), left: ticks, measured };
+    pace_rehearsed(PERIOD, CONTROL_PHASE, lead, &mut standing).wrap_err("the monotonic clock cannot be waited on")?;
+    match standing.rising {
+        Some(_) => {
+            let mode = standing.body.mode().name();
+            Err(eyre!("the robot did not stand within {LONGEST_RISE_S} s: it is {mode}"))
         }
-        let ticked_ns = clock.now_ns();
-        body.prepare();
-        if left < ticks {
-            measured.prepare.saturating_record((clock.now_ns() - ticked_ns).max(1));
-        }
-        others.attend();
-        if left == 0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-    })
-    .wrap_err("the monotonic clock cannot be waited on")?;
-    match failed {
-        Some(mode) => Err(eyre!("the robot did not stand within {LONGEST_RISE_S} s: it is {}", mode.name())),
-        None => Ok(measured),
+        None => Ok(standing.measured),
     }
 }
 
