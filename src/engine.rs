@@ -1,10 +1,13 @@
 //! Wires the threads; computes nothing. `Engine::start` takes a checked configuration and gives a screen its [`Handle`].
 
 mod control_thread;
+mod guard;
 mod stored;
 
+pub use guard::{GUARD, GuardError, stand as stand_guard};
 pub use stored::{Opened, StoredStudy, newest_config, open_stored, stored_studies, stored_study, study_files};
 
+use guard::Guard;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -60,6 +63,9 @@ pub struct Options {
     pub approve: Approval,
     /// A journal in which to take part as one more worker, instead of the study of the folder.
     pub join: Option<Storage>,
+    /// The program that stands guard over a real robot when it is run with [`GUARD`]: it damps the robot should this process be
+    /// killed. None does without.
+    pub guard: Option<PathBuf>,
 }
 
 impl Options {
@@ -76,6 +82,7 @@ impl Options {
             observe: false,
             approve: Approval::Each,
             join: None,
+            guard: None,
         }
     }
 
@@ -357,9 +364,17 @@ impl Engine {
             return Err(EngineError::Unattended);
         }
         let settings = options.config.settings(&options.robot, options.task, options.backend)?;
-        let mut robot: Box<dyn Robot> = match options.backend {
-            Backend::Simulator => Box::new(Simulator::new(&options.robot, &options.config.simulator)?),
-            Backend::Hardware => Box::new(Go1::open(&options.robot, options.observe)?),
+        let system = |what: &'static str| {
+            move |source| EngineError::System { what: format!("the {what} could not be started"), source }
+        };
+        let (mut robot, guard): (Box<dyn Robot>, _) = match options.backend {
+            Backend::Simulator => (Box::new(Simulator::new(&options.robot, &options.config.simulator)?), None),
+            Backend::Hardware => {
+                let go1 = Go1::open(&options.robot, options.observe)?;
+                let post = |program: &PathBuf| Guard::post(program, &go1, settings.gate.damping_kd);
+                let guard = options.guard.as_ref().map(post).transpose().map_err(system("guard"))?;
+                (Box::new(go1), guard)
+            }
         };
         // A simulated robot begins as a real one does: lying folded on its belly.
         robot.place(&Placement { joint_position: settings.lying_position, lying: true, seed: u64::from(options.seed) });
@@ -384,9 +399,6 @@ impl Engine {
         let status = recorder.watch();
         let closing = Arc::new(AtomicBool::new(false));
 
-        let system = |what: &'static str| {
-            move |source| EngineError::System { what: format!("the {what} thread could not be started"), source }
-        };
         let thread = std::thread::Builder::new().name("control".into());
         let flag = closing.clone();
         let scheduling = options.config.scheduling(options.backend);
@@ -404,7 +416,7 @@ impl Engine {
                 };
                 control_thread::run(start, control_end, &mut *robot);
             })
-            .map_err(system("control"))?;
+            .map_err(system("control thread"))?;
 
         let (intents_in, intents) = channel();
         let folder = recording.as_ref().and(options.folder.clone());
@@ -418,8 +430,8 @@ impl Engine {
         let sits_down = options.backend == Backend::Hardware;
         let session = std::thread::Builder::new()
             .name("session".into())
-            .spawn(move || run_session(supervisor, &intents, &clock, sits_down))
-            .map_err(system("session"))?;
+            .spawn(move || run_session(supervisor, guard, &intents, &clock, sits_down))
+            .map_err(system("session thread"))?;
 
         Ok(Handle {
             screen: screen_end,
@@ -446,15 +458,22 @@ const DAMPING_AT_THE_END: Duration = Duration::from_millis(500);
 const LONGEST_STOP: Duration = Duration::from_secs(2);
 
 /// The session thread: intents as they come, events every few milliseconds, until the screen lets go of its handle.
-/// Gives back the session's ends of the channels: a control thread whose session is gone takes that for a breakdown.
+/// Gives back the session's ends of the channels: a control thread whose session is gone takes that for a breakdown. The
+/// guard, too: the control thread commands the robot until its own end.
 fn run_session(
     mut supervisor: Supervisor,
+    mut guard: Option<Guard>,
     intents: &Receiver<Wish>,
     clock: &MonotonicClock,
     sits_down: bool,
-) -> Supervisor {
+) -> (Supervisor, Option<Guard>) {
     loop {
         supervisor.attend(clock.now_ns());
+        if let Some(guard) = &mut guard
+            && !guard.tell(supervisor.mode().commanded())
+        {
+            supervisor.tell_guard_gone(clock.now_ns());
+        }
         if supervisor.mode() == Mode::Observe {
             supervisor.take_control();
         }
@@ -480,7 +499,7 @@ fn run_session(
         }
     }
     supervisor.close(clock.now_ns());
-    supervisor
+    (supervisor, guard)
 }
 
 /// What a screen holds of a running engine: it draws from it and asks through it, and decides nothing. Dropping it ends
@@ -494,7 +513,7 @@ pub struct Handle {
     records: Receiver<Stamped>,
     closing: Arc<AtomicBool>,
     control: Option<JoinHandle<()>>,
-    session: Option<JoinHandle<Supervisor>>,
+    session: Option<JoinHandle<(Supervisor, Option<Guard>)>>,
     recorder: Option<crate::recording::recorder::RecorderHandle>,
 }
 
@@ -568,7 +587,13 @@ impl Handle {
         if let Some(control) = self.control.take() {
             let _ = control.join();
         }
-        drop(session);
+        if let Some(Ok((supervisor, guard))) = session {
+            // The last that feeds the recorder.
+            drop(supervisor);
+            if let Some(guard) = guard {
+                guard.dismiss();
+            }
+        }
         if let Some(recorder) = self.recorder.take() {
             let _ = recorder.join();
         }

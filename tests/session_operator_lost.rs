@@ -31,6 +31,7 @@ fn start(folder: &Path) -> Handle {
         approve: Approval::Each,
         join: None,
         observe: false,
+        guard: None,
     })
     .unwrap_or_else(|error| panic!("{error}"))
 }
@@ -179,6 +180,7 @@ fn the_last_ticks_go_with_a_fault_outside_a_trial() {
         approve: Approval::Each,
         join: None,
         observe: false,
+        guard: None,
     })
     .unwrap_or_else(|error| panic!("{error}"));
     let mut screen = Screen::new(handle);

@@ -198,7 +198,7 @@ impl Cycle {
             sent = JointCommand::damping(self.settings.gate.damping_kd);
         }
         let decided_ns = clock.now_ns();
-        if !matches!(self.mode, Mode::Offline | Mode::Observe)
+        if self.mode.commanded()
             && let Err(RobotError::Send { errno }) = robot.write(&sent)
         {
             // The watchdog of the next tick says so: this one has no command left to change.

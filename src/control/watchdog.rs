@@ -62,17 +62,17 @@ struct Row {
 
 /// The table. The first row that trips counts, so what makes the numbers below it worthless stands above them.
 const TABLE: [Row; 16] = [
-    Row { level: Level::Cut, watched: connected, trips: events_lost },
-    Row { level: Level::Cut, watched: connected, trips: link_lost },
-    Row { level: Level::Cut, watched: connected, trips: state_age },
+    Row { level: Level::Cut, watched: Mode::commanded, trips: events_lost },
+    Row { level: Level::Cut, watched: Mode::commanded, trips: link_lost },
+    Row { level: Level::Cut, watched: Mode::commanded, trips: state_age },
     // Seen in one tick alone, and what a robot reports while it starts need not be numbers.
-    Row { level: Level::Cut, watched: connected, trips: reboot },
-    Row { level: Level::Cut, watched: connected, trips: not_finite },
-    Row { level: Level::Cut, watched: connected, trips: corrupt },
-    Row { level: Level::Cut, watched: connected, trips: send_error },
-    Row { level: Level::Cut, watched: connected, trips: late },
-    Row { level: Level::Cut, watched: connected, trips: slow },
-    Row { level: Level::Cut, watched: connected, trips: motor_hot },
+    Row { level: Level::Cut, watched: Mode::commanded, trips: reboot },
+    Row { level: Level::Cut, watched: Mode::commanded, trips: not_finite },
+    Row { level: Level::Cut, watched: Mode::commanded, trips: corrupt },
+    Row { level: Level::Cut, watched: Mode::commanded, trips: send_error },
+    Row { level: Level::Cut, watched: Mode::commanded, trips: late },
+    Row { level: Level::Cut, watched: Mode::commanded, trips: slow },
+    Row { level: Level::Cut, watched: Mode::commanded, trips: motor_hot },
     Row { level: Level::Cut, watched: energised_or_faulted, trips: motor_mode },
     Row { level: Level::Cut, watched: Mode::energised, trips: joint_position },
     Row { level: Level::Cut, watched: Mode::energised, trips: joint_velocity },
@@ -80,11 +80,6 @@ const TABLE: [Row; 16] = [
     Row { level: Level::Cut, watched: outside_a_trial, trips: tilt },
     Row { level: Level::Land, watched: Mode::energised, trips: operator_silent },
 ];
-
-/// The robot is spoken to.
-const fn connected(mode: Mode) -> bool {
-    !matches!(mode, Mode::Offline | Mode::Observe)
-}
 
 /// A motor that leaves servo mode after another fault is told, too: power may have been cut. Disarmed, it is an item of the
 /// pre-arm list.
@@ -142,7 +137,7 @@ pub fn hold(state: &RobotState, settings: &Settings) -> Option<Hold> {
 /// What is only worth a word: none if nothing is.
 pub fn caution(seen: &Seen, settings: &Settings) -> Option<Caution> {
     let limits = &settings.watchdog;
-    if connected(seen.mode) && seen.state_age_ms > limits.state_age_warn_ms {
+    if seen.mode.commanded() && seen.state_age_ms > limits.state_age_warn_ms {
         Some(Caution::StateAge { age_ms: seen.state_age_ms, allowed_ms: limits.state_age_warn_ms })
     } else if seen.mode.energised() && seen.operator_silent_ms > limits.operator_warn_ms {
         Some(Caution::OperatorQuiet { silent_ms: seen.operator_silent_ms, allowed_ms: limits.operator_warn_ms })

@@ -12,7 +12,6 @@ use crate::control::settings::{PERIOD_S, Settings};
 use crate::realtime::channel::ControlEnd;
 use crate::realtime::clock::Clock;
 use crate::realtime::scheduling::{Favour, Scheduling, Shortfall};
-use crate::realtime::telemetry::Mode;
 use crate::realtime::thread::{CONTROL_PHASE, Instant, Paced, REHEARSAL_LEAD, pace_rehearsed};
 use crate::robot::{JointCommand, Robot};
 
@@ -88,7 +87,7 @@ fn drive<C: Clock>(
             panic!("the control thread cannot read the monotonic clock: {error}");
         }
     }));
-    if start.real && !matches!(ticking.body.mode(), Mode::Offline | Mode::Observe) {
+    if start.real && ticking.body.mode().commanded() {
         let damping = JointCommand::damping(start.settings.gate.damping_kd);
         let mut sent = 0;
         while sent < LAST_DAMPINGS || !start.closing.load(Ordering::Acquire) {

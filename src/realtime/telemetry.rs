@@ -75,6 +75,11 @@ impl Mode {
         Mode::ALL.into_iter().find(|mode| mode.name() == name)
     }
 
+    /// Whether the robot is sent commands in this mode, be it damping alone.
+    pub const fn commanded(self) -> bool {
+        !matches!(self, Mode::Offline | Mode::Observe)
+    }
+
     /// Whether motors do more than damp in this mode.
     pub const fn energised(self) -> bool {
         matches!(

@@ -167,6 +167,13 @@ impl Supervisor {
         }
     }
 
+    /// Nobody damps the robot any more if this process is killed.
+    pub fn tell_guard_gone(&mut self, time_ns: u64) {
+        let message = "the guard process has ended: if quadfrog is killed now, nothing damps the robot; \
+                       sit down, quit and start again";
+        self.log(Level::Error, message.to_owned(), time_ns);
+    }
+
     /// The mode as far as the session has heard.
     pub fn mode(&self) -> Mode {
         self.mode
@@ -261,7 +268,7 @@ impl Supervisor {
     /// STOP, by the session itself, as its last word: what was heard of the mode may be old, and a command that energises
     /// still on its way. A robot that was never taken control of is not spoken to now either.
     pub fn stop(&self) {
-        if !self.observe && !matches!(self.mode, Mode::Offline | Mode::Observe) {
+        if !self.observe && self.mode.commanded() {
             self.control.stop.set();
         }
     }

@@ -127,6 +127,14 @@ impl Link {
         self.socket.local_addr()
     }
 
+    /// The same socket once more.
+    ///
+    /// # Errors
+    /// When the system has no descriptor left.
+    pub fn socket(&self) -> std::io::Result<UdpSocket> {
+        self.socket.try_clone()
+    }
+
     /// How the link is doing.
     pub fn status(&self) -> &LinkStatus {
         &self.status

@@ -7,12 +7,12 @@ pub mod convert;
 pub mod link;
 pub mod packet;
 
-use std::net::SocketAddr;
+use std::net::{SocketAddr, UdpSocket};
 
 use super::description::RobotDescription;
 use super::{JOINTS, JointCommand, LinkStatus, Placement, Robot, RobotError, RobotState};
 use link::{Link, LinkError, LinkOptions};
-use packet::{CrcForm, LowCmd};
+use packet::{CommandError, CrcForm, LowCmd};
 
 /// The section `[network]` of `robot.toml`; every key is explained there.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Deserialize, serde::Serialize)]
@@ -107,6 +107,22 @@ impl Go1 {
     /// When the system does not say.
     pub fn local_address(&self) -> std::io::Result<SocketAddr> {
         self.link.local_address()
+    }
+
+    /// The socket to the robot once more, for who takes the last word over.
+    ///
+    /// # Errors
+    /// When the system has no descriptor left.
+    pub fn socket(&self) -> std::io::Result<UdpSocket> {
+        self.link.socket()
+    }
+
+    /// The datagram in which every joint is damped with `kd`, N m s/rad.
+    ///
+    /// # Errors
+    /// When no datagram can say so.
+    pub fn damping(&self, kd: f64) -> Result<LowCmd, CommandError> {
+        convert::low_cmd(&JointCommand::damping(kd), self.network.crc)
     }
 
     /// Calls a robot that has never answered.

@@ -222,7 +222,7 @@ pub(super) fn in_replay(model: &Model) -> Legality {
 
 /// A stopped process sends nothing: not even the damping that a real robot lies in.
 pub(super) fn may_suspend(model: &Model) -> Legality {
-    let spoken_to = !matches!(model.mode(), Mode::Offline | Mode::Observe);
+    let spoken_to = model.mode().commanded();
     if model.replay.is_none() && model.is_hardware() && spoken_to {
         refuse("a suspended program sends the robot nothing, not even damping; quit it instead")
     } else if model.robot_needs_us() {

@@ -141,6 +141,8 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
         folder: (!arguments.observe).then_some(chosen.folder),
         observe: arguments.observe,
         approve: arguments.approve.into(),
+        // This program, also where its file was replaced since it was started.
+        guard: Some(PathBuf::from("/proc/self/exe")),
         ..Options::new(config, robot, backend, chosen.task)
     })?;
     let recording = handle.recording().map(Path::to_owned);

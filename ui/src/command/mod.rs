@@ -6,6 +6,7 @@ mod chosen;
 mod console;
 mod doctor;
 mod emulate;
+mod guard;
 mod optimize;
 mod recover;
 mod replay;
@@ -49,6 +50,9 @@ enum Subcommands {
     Bench(bench::BenchArguments),
     /// Say what this machine can do for a robot and a console, and what to do about the rest
     Doctor(doctor::DoctorArguments),
+    /// Damp the robot when the process that started this one is no more
+    #[command(name = quadfrog::engine::GUARD, hide = true)]
+    Guard,
     /// Look at studies, take them elsewhere, bring trials in, queue a point
     Study(study::StudyCommand),
 }
@@ -219,6 +223,7 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
         Some(Subcommands::Emulate(emulate)) => emulate::run(&emulate),
         Some(Subcommands::Bench(bench)) => bench::run(&bench),
         Some(Subcommands::Doctor(doctor)) => doctor::run(&doctor),
+        Some(Subcommands::Guard) => guard::run(),
         Some(Subcommands::Study(study)) => study::run(&study),
     }
 }
