@@ -60,9 +60,9 @@
 //!   then a function of its parameters and seed alone: the console, `optimize` and a replay agree bit for bit.
 //! * *The control thread's body is [`control::body`]*, not the engine's: the engine paces it, a bench and the test with the
 //!   aborting allocator call the very same code.
-//! * *A tick on hardware is rehearsed* ([`control::body::Body::rehearse`]): shortly before it comes it is done on a copy, for
-//!   after a millisecond of other work code and data have left the processor's caches, and fetching them was half of the
-//!   longest ticks.
+//! * *A tick on hardware is rehearsed* on a copy shortly before it comes ([`control::body::Body::rehearse`]), because fetching
+//!   code and data into the processor's caches was a good part of the longest ticks.
+//! * *There is a second process where there is a robot* (`engine/guard.rs`): a program that is killed cannot damp it any more.
 //! * *The session may act by itself* (`--approve`, [`session::approval`]), through the same wishes as a person and refused
 //!   for the same reasons; a person's STOP, cancel or fault outranks it.
 //! * *The emulated Go1 is [`sim::emulator`]*: it speaks [`robot::go1::packet`] from the other side, so a study on it passes

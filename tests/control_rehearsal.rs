@@ -12,16 +12,15 @@ use quadfrog::realtime::command::{Command, JumpParameters, Permit, Task};
 use quadfrog::realtime::telemetry::{Event, Mode, Tick};
 use quadfrog::realtime::thread::Instant;
 use quadfrog::robot::{LinkStatus, Robot};
-use quadfrog::sim::emulator::EmulatorStatus;
+use quadfrog::sim::emulator::{EmulatorStatus, Fault};
 
-/// Over the link to an emulated robot on a bad network: taken over, armed, one jump and its review, and a while after a STOP.
+/// Over the link to an emulated robot on a bad network: taken over, armed, one jump and its review, a STOP, a restart.
 fn session(rehearsals: bool) -> (Vec<Tick>, Vec<Event>, LinkStatus, EmulatorStatus) {
     let config = Config::load(None).unwrap();
     let (mut emulator, mut robot) = pair(&config.simulator, 1);
     let settings = config.settings(&description(ANY_PORT), Task::Forward, Backend::Hardware).unwrap();
     let (control, mut session, screen, mut recorder) = channels();
     let mut body = Body::new(&settings, control);
-    emulator.apply("jitter 2".parse().unwrap());
     let jump = JumpParameters { f0_hz: 1.3, f1_hz: 0.0, fx_n: 60.0, fy_n: 0.0, fz_n: 270.0 };
     let spec = config.task(Task::Forward).trial(Task::Forward, jump);
     let (mut ticks, mut events, mut asked_in) = (Vec::new(), Vec::new(), None);
@@ -41,8 +40,15 @@ fn session(rehearsals: bool) -> (Vec<Tick>, Vec<Event>, LinkStatus, EmulatorStat
             asked_in = Some(body.mode());
             session.commands.push(command).unwrap();
         }
-        if ms == 18_000 {
-            session.stop.set();
+        match ms {
+            1000 => emulator.apply("jitter 2".parse().unwrap()),
+            // Nobody arms a robot with such a network, but it may come to it.
+            5000 => emulator.apply("loss 2".parse().unwrap()),
+            5001 => emulator.apply("duplicate 2".parse().unwrap()),
+            16_000 => session.stop.set(),
+            16_500 => emulator.apply("corrupt 5".parse().unwrap()),
+            17_000 => emulator.apply(Fault::Reboot),
+            _ => {}
         }
         if rehearsals {
             body.rehearse(&SimulatedClock, &mut robot);
@@ -70,5 +76,5 @@ fn a_rehearsal_changes_nothing() {
     assert_eq!(events, events_without);
     assert_eq!(link, link_without);
     assert_eq!(emulator, emulator_without);
-    assert!(link.sent > 15_000 && link.received > 15_000, "{link:?}");
+    assert!(link.sent > 15_000 && link.received > 12_000 && link.lost > 100 && link.reboots == 1, "{link:?}");
 }

@@ -63,8 +63,8 @@ impl Events {
     }
 }
 
-/// The control cycle of one robot.
-#[derive(Debug, Clone)]
+/// The control cycle of one robot. `Copy`, so that a copy shares nothing with it.
+#[derive(Debug, Clone, Copy)]
 pub struct Cycle {
     settings: Settings,
     mode: Mode,

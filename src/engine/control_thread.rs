@@ -27,8 +27,8 @@ pub struct Start<'a, C> {
     pub clock: &'a C,
     /// Set when the thread is to end.
     pub closing: &'a AtomicBool,
-    /// Whether the machine is a real one. It keeps the last command when nothing more is sent, where a simulated one stands
-    /// still; and its ticks are worth a rehearsal.
+    /// Whether the machine lives in its own time, over a link. It keeps the last command when nothing more is sent, where a
+    /// simulated one stands still; and its ticks are rehearsed.
     pub real: bool,
 }
 
@@ -43,12 +43,16 @@ pub fn run<C: Clock>(start: Start<C>, end: ControlEnd, robot: &mut dyn Robot) {
     let granted = start.scheduling.apply();
     let _ = start.told.send((granted.favours.clone(), granted.shortfalls.clone()));
     let period = Duration::from_secs_f64(PERIOD_S);
-    let lead = if start.real { REHEARSAL_LEAD } else { Duration::ZERO };
-    let paced = |ticking: &mut dyn Paced| pace_rehearsed(period, CONTROL_PHASE, lead, ticking);
+    let paced = |ticking: &mut dyn Paced| pace_rehearsed(period, CONTROL_PHASE, lead(start.real), ticking);
     // The damping at the end is slept, not paced: the clock may be what failed.
     if let Err(panic) = drive(&start, end, robot, paced, || std::thread::sleep(period)) {
         resume_unwind(panic);
     }
+}
+
+/// A simulated robot's ticks are not worth a rehearsal: nobody's motors wait for them.
+const fn lead(real: bool) -> Duration {
+    if real { REHEARSAL_LEAD } else { Duration::ZERO }
 }
 
 /// A body and its robot, until the thread is told to end.
@@ -110,9 +114,10 @@ mod tests {
     use crate::robot::description::RobotDescription;
     use crate::robot::{Placement, RobotError, RobotState};
 
-    /// Answers until `reads` is used up, then panics; keeps what it is sent.
+    /// Answers until `reads` or `rehearsals` is used up, then panics; keeps what it is sent.
     struct Brittle {
         reads: u32,
+        rehearsals: u32,
         sent: Vec<JointCommand>,
     }
 
@@ -128,11 +133,14 @@ mod tests {
         fn place(&mut self, _: &Placement) -> bool {
             false
         }
+        fn rehearse(&mut self) {
+            self.rehearsals = self.rehearsals.checked_sub(1).expect("an injected defect");
+        }
     }
 
-    /// What a robot is sent, and how often was waited, if reading from it panics after `reads` ticks and the thread is told
-    /// to end after `told_after` waits.
-    fn damped(controlled: bool, real: bool, reads: u32, told_after: u32) -> (Vec<JointCommand>, u32) {
+    /// What a robot is sent, and how often was waited, if `reads` ticks or `rehearsals` go well with it and the thread is told to
+    /// end after `told_after` waits.
+    fn damped(controlled: bool, [reads, rehearsals]: [u32; 2], told_after: u32) -> (Vec<JointCommand>, u32) {
         let description = RobotDescription::embedded("go1").unwrap();
         let settings = Config::load(None).unwrap().settings(&description, Task::Forward, Backend::Hardware).unwrap();
         let (control, mut session, screen, _ticks) = channels();
@@ -140,7 +148,7 @@ mod tests {
         if controlled {
             session.commands.push(Command::TakeControl).unwrap();
         }
-        let mut robot = Brittle { reads, sent: Vec::new() };
+        let mut robot = Brittle { reads, rehearsals, sent: Vec::new() };
         let closing = AtomicBool::new(told_after == 0);
         let start = Start {
             settings: &settings,
@@ -148,7 +156,7 @@ mod tests {
             told: std::sync::mpsc::channel().0,
             clock: &SimulatedClock,
             closing: &closing,
-            real,
+            real: true,
         };
         let mut ms = 0;
         let unpaced = |ticking: &mut dyn Paced| {
@@ -171,16 +179,23 @@ mod tests {
 
     /// (A defect once: a panic in a tick ended the thread, and the motors kept the last torques.)
     #[test]
-    fn a_panic_in_a_tick_is_followed_by_damping_for_half_a_second_and_until_the_end() {
-        let (sent, waited) = damped(true, true, 20, 1);
-        assert_eq!(waited, 500);
-        assert!(sent.len() >= 500, "{}", sent.len());
-        assert_eq!(damped(true, true, 20, 800).1, 800, "it goes on until it is told to end");
+    fn a_panic_in_a_tick_or_its_rehearsal_is_followed_by_damping_for_half_a_second_and_until_the_end() {
+        for until in [[20, u32::MAX], [u32::MAX, 20]] {
+            let (sent, waited) = damped(true, until, 1);
+            assert_eq!(waited, 500);
+            assert!(sent.len() >= 500, "{}", sent.len());
+            assert_eq!(damped(true, until, 800).1, 800, "it goes on until it is told to end");
+        }
+    }
+
+    #[test]
+    fn a_robot_is_rehearsed_for_and_a_simulator_is_not() {
+        assert_eq!((lead(true), lead(false)), (REHEARSAL_LEAD, Duration::ZERO));
     }
 
     #[test]
     fn the_last_word_to_a_robot_that_is_controlled_is_damping_and_to_another_there_is_none() {
-        assert_eq!(damped(true, true, u32::MAX, 0).1, 500, "an end in order, too");
-        assert_eq!(damped(false, true, 20, 1), (Vec::new(), 0), "a robot that is only observed");
+        assert_eq!(damped(true, [u32::MAX; 2], 0).1, 500, "an end in order, too");
+        assert_eq!(damped(false, [20, u32::MAX], 1), (Vec::new(), 0), "a robot that is only observed");
     }
 }

@@ -26,14 +26,19 @@ const FORGIVEN_PERIODS: u64 = 20;
 /// there would meet it time and again in the middle of its work; this one stays away from it.
 pub const CONTROL_PHASE: Duration = Duration::from_micros(500);
 
-/// How long before a tick of the control thread its rehearsal begins. It has to be over by then (it takes 10 to 30 us, and the
-/// thread wakes for it some tens of us late), and what it fetched has to be there still: `quadfrog bench loop --with-link`.
+/// How long before a tick of the control thread its rehearsal begins: early enough to be over by then, late enough that what it
+/// fetched is there still.
 pub const REHEARSAL_LEAD: Duration = Duration::from_micros(100);
+/// What must be left of the lead once the thread is awake. A rehearsal takes 8 us, in one of a thousand ticks 25 to 40 (on the
+/// loopback: `quadfrog bench loop --with-link`).
+const REHEARSAL_NEEDS: Duration = Duration::from_micros(40);
+/// For so many ticks there is none after one that was not over in time: on a machine that is too slow for it, it does harm.
+const RESTING_TICKS: u32 = 1000;
 
 /// What is called in time.
 pub trait Paced {
-    /// Called somewhat before a tick, to do beforehand what makes the tick shorter. Without effect on anything else, for it is
-    /// not called where the time for it has passed.
+    /// Called somewhat before a tick, to do beforehand what makes the tick shorter. Nothing may depend on it: it is left out
+    /// where time is short.
     fn rehearse(&mut self) {}
 
     /// Called once per period, until it breaks.
@@ -58,7 +63,8 @@ pub fn pace(
     pace_rehearsed(period, phase, Duration::ZERO, &mut body)
 }
 
-/// As [`pace`], with a rehearsal that begins `lead` before each tick. The thread sleeps once more between the two.
+/// As [`pace`], with a rehearsal that begins `lead` before each tick, unless there is no time for it. The thread sleeps once
+/// more between the two.
 ///
 /// # Errors
 /// When the system's monotonic clock cannot be read or waited on.
@@ -68,17 +74,23 @@ pub fn pace_rehearsed(
     lead: Duration,
     body: &mut (impl Paced + ?Sized),
 ) -> Result<(), nix::Error> {
-    let [period_ns, phase_ns, lead_ns] = [period, phase, lead].map(|time| time.as_nanos() as u64);
+    let [period_ns, phase_ns, lead_ns, needs_ns] =
+        [period, phase, lead, REHEARSAL_NEEDS].map(|time| time.as_nanos() as u64);
     let mut start_ns = monotonic_ns()?.next_multiple_of(period_ns) + phase_ns;
     let mut count = 0u64;
     let mut skipped_ns = 0;
+    let mut resting_ticks = 0;
     loop {
         let planned_ns = start_ns + count * period_ns;
-        if lead_ns > 0 {
+        if resting_ticks > 0 {
+            resting_ticks -= 1;
+        } else if lead_ns > 0 && monotonic_ns()? + lead_ns < planned_ns {
             sleep_until(planned_ns - lead_ns)?;
-            // Who woke late for it must not be late for the tick as well.
-            if monotonic_ns()? + lead_ns / 3 <= planned_ns {
+            if monotonic_ns()? + needs_ns <= planned_ns {
                 body.rehearse();
+                if monotonic_ns()? > planned_ns {
+                    resting_ticks = RESTING_TICKS;
+                }
             }
         }
         sleep_until(planned_ns)?;
@@ -96,7 +108,6 @@ pub fn pace_rehearsed(
     }
 }
 
-/// Returns at once where the time has passed.
 fn sleep_until(time_ns: u64) -> Result<(), nix::Error> {
     let wake = TimeSpec::new((time_ns / 1_000_000_000) as i64, (time_ns % 1_000_000_000) as i64);
     loop {

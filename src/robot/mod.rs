@@ -311,8 +311,8 @@ pub trait Robot: Send {
         None
     }
 
-    /// Goes the way of `read` and `write` once without reading or writing anything, shortly before both are called: what the
-    /// processor needs for them is then at hand. Nobody can notice that it was, or was not, called.
+    /// Goes the way of `read` and `write` once, shortly before both are called and bound by the same rules: what the processor
+    /// needs for them is then at hand. The robot hears nothing of it, and neither call answers otherwise for it.
     fn rehearse(&mut self) {}
 }
 

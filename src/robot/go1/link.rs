@@ -253,11 +253,17 @@ impl Link {
     }
 
     /// Sends `command` to nobody but this link itself, takes it back, and judges the newest state once more: the way of a
-    /// datagram, in the system and here, without anything coming of it. The state is given back, if there is one.
-    pub fn rehearse(&mut self, command: &LowCmd) -> Option<&LowState> {
+    /// datagram, in the system and here. The state is given back, if there is one.
+    pub fn rehearse(&mut self, mut command: LowCmd) -> Option<&LowState> {
+        // No robot would obey it, wherever it went.
+        command.header.head = [0; 2];
         if let Some(mirror) = &self.mirror {
             let _ = mirror.send(command.bytes());
-            while mirror.recv(&mut self.buffer).is_ok() {}
+            for _ in 0..MOST_PER_CALL {
+                if mirror.recv(&mut self.buffer).is_err() {
+                    break;
+                }
+            }
         }
         LowState::judge(self.newest.as_ref()?.bytes()).ok()
     }
@@ -287,6 +293,21 @@ fn mirror() -> std::io::Result<UdpSocket> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::robot::go1::packet::CrcForm;
+
+    /// (What a rehearsal does not change is compared in `tests/control_rehearsal.rs`.)
+    #[test]
+    fn a_rehearsal_sends_a_datagram_to_itself_that_nobody_obeys() {
+        let address = (Ipv4Addr::LOCALHOST, 9).into();
+        let mut link =
+            Link::open(&LinkOptions { address, local_port: 0, state_period_ms: 1, restart_ms: 100 }).unwrap();
+        let command = LowCmd::damping(CrcForm::Plain);
+        assert_eq!(link.rehearse(command), None, "there is no state yet");
+        let came = &link.buffer[..command.bytes().len()];
+        assert_eq!(came[2..], command.bytes()[2..]);
+        assert!(LowCmd::judge(came, CrcForm::Plain).is_err());
+        assert_eq!(link.status, LinkStatus::default());
+    }
 
     /// No socket of this machine can be made to refuse every send: what the system says is given by hand.
     #[test]

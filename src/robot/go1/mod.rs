@@ -187,9 +187,9 @@ impl Robot for Go1 {
     }
 
     fn rehearse(&mut self) {
-        // No torque always fits a datagram.
-        let Ok(command) = convert::low_cmd(&JointCommand::default(), self.network.crc) else { return };
-        if let Some(state) = self.link.rehearse(&command) {
+        // Any damping that a datagram can say.
+        let Ok(command) = self.damping(1.0) else { return };
+        if let Some(state) = self.link.rehearse(command) {
             std::hint::black_box(convert::robot_state(state, self.network.foot_force_n));
         }
     }

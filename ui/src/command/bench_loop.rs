@@ -50,7 +50,7 @@ pub struct LoopArguments {
     /// Over the Go1's link to an emulated robot in this program, instead of with the simulator
     #[arg(long)]
     with_link: bool,
-    /// Without the rehearsal before each tick over the link, to see what it is worth
+    /// Without the rehearsal before each tick over the link (and so it is with --cyclictest)
     #[arg(long, requires = "with_link")]
     unrehearsed: bool,
     /// Also run cyclictest (package rt-tests) in turns with it, and compare
@@ -59,6 +59,13 @@ pub struct LoopArguments {
     /// In how many turns
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=100))]
     turns: u32,
+}
+
+impl LoopArguments {
+    /// How long before a tick its rehearsal begins. cyclictest wakes once per period, and is compared with a thread that does.
+    fn lead(&self) -> Duration {
+        if self.with_link && !self.unrehearsed && !self.cyclictest { REHEARSAL_LEAD } else { Duration::ZERO }
+    }
 }
 
 /// Times in ns, from 1 to a second, to three digits; what is longer counts as a second.
@@ -178,7 +185,7 @@ pub fn run(arguments: &LoopArguments) -> Result<(), Failure> {
         }
         ours.add(measure(scheduling, arguments, ticks)?)?;
         if arguments.with_link {
-            alone.add(exchange(scheduling, ticks)?).wrap_err("two histograms could not be added")?;
+            alone.add(exchange(scheduling, arguments.lead(), ticks)?).wrap_err("two histograms could not be added")?;
         }
         if arguments.cyclictest && turn % 2 == 0 {
             cyclictest(scheduling, ticks, &mut theirs)?;
@@ -213,7 +220,7 @@ fn report(arguments: &LoopArguments, ours: &Measured, theirs: &Times, alone: &Ti
     line(if arguments.with_link { "  send" } else { "  write (its physics)" }, &ours.write);
     line("  publish", &ours.publish);
     line("after it: fetch places", &ours.prepare);
-    if !ours.rehearsal.is_empty() {
+    if !arguments.lead().is_zero() {
         line("before it: rehearsal", &ours.rehearsal);
     }
     if arguments.with_link {
@@ -221,7 +228,11 @@ fn report(arguments: &LoopArguments, ours: &Measured, theirs: &Times, alone: &Ti
     }
     println!();
     let (ticks, slept) = (ours.lateness.len(), ours.wake_up.len());
-    println!("{ticks} ticks, {} of them made up for a stall, {} not in READY", ticks - slept, ours.elsewhere);
+    print!("{ticks} ticks, {} of them made up for a stall, {} not in READY", ticks - slept, ours.elsewhere);
+    if !arguments.lead().is_zero() {
+        print!(", {} rehearsed", ours.rehearsal.len());
+    }
+    println!();
     if arguments.cyclictest {
         let (own, other) = (ours.wake_up_floor.value_at_quantile(0.999), theirs.value_at_quantile(0.999));
         let ratio = own.max(1000) as f64 / other.max(1000) as f64;
@@ -251,7 +262,8 @@ fn measure(scheduling: Scheduling, arguments: &LoopArguments, ticks: u64) -> Res
     if !arguments.with_link {
         let mut robot = Simulator::new(&description, &config.simulator).map_err(Failure::input)?;
         robot.place(&Placement { joint_position: settings.lying_position, lying: true, seed: 0 });
-        return in_a_thread(move || stand_and_measure(scheduling, &settings, ticks, Duration::ZERO, &mut robot));
+        let lead = arguments.lead();
+        return in_a_thread(move || stand_and_measure(scheduling, &settings, ticks, lead, &mut robot));
     }
     let anywhere = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
     let mut emulator = Emulator::bind(anywhere, &description, &config.simulator, 0).map_err(Failure::input)?;
@@ -271,7 +283,7 @@ fn measure(scheduling: Scheduling, arguments: &LoopArguments, ticks: u64) -> Res
             if flag.load(Ordering::Acquire) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         })
     });
-    let lead = if arguments.unrehearsed { Duration::ZERO } else { REHEARSAL_LEAD };
+    let lead = arguments.lead();
     let measured = in_a_thread(move || stand_and_measure(scheduling, &settings, ticks, lead, &mut robot));
     ended.store(true, Ordering::Release);
     let _ = emulated.join();
@@ -286,36 +298,76 @@ fn in_a_thread<T: Send + 'static>(
     Ok(joined.map_err(|_| eyre!("the control thread broke down"))??)
 }
 
-/// What the system calls of a tick take by themselves, at the same pace and priority: a datagram of a state's length is taken
-/// from the loopback, the queue is found empty, and one of a command's length is sent. What comes was sent a period ago.
-fn exchange(scheduling: Scheduling, ticks: u64) -> Result<Times, Failure> {
-    let open = || -> std::io::Result<(UdpSocket, UdpSocket)> {
-        let sockets = (UdpSocket::bind((Ipv4Addr::LOCALHOST, 0))?, UdpSocket::bind((Ipv4Addr::LOCALHOST, 0))?);
-        sockets.0.connect(sockets.1.local_addr()?)?;
-        sockets.1.connect(sockets.0.local_addr()?)?;
-        sockets.0.set_nonblocking(true)?;
-        sockets.1.set_nonblocking(true)?;
-        Ok(sockets)
-    };
-    let (ours, robots) = open().wrap_err("no sockets on the loopback")?;
+/// The two ends of a connection on the loopback.
+struct Ends {
+    ours: UdpSocket,
+    robots: UdpSocket,
+}
+
+impl Ends {
+    fn open() -> std::io::Result<Ends> {
+        let ends = Ends {
+            ours: UdpSocket::bind((Ipv4Addr::LOCALHOST, 0))?,
+            robots: UdpSocket::bind((Ipv4Addr::LOCALHOST, 0))?,
+        };
+        ends.ours.connect(ends.robots.local_addr()?)?;
+        ends.robots.connect(ends.ours.local_addr()?)?;
+        ends.ours.set_nonblocking(true)?;
+        ends.robots.set_nonblocking(true)?;
+        Ok(ends)
+    }
+
+    /// What a tick asks of the system: a state is taken, the queue is found empty, a command is sent. What fails takes its time
+    /// all the same.
+    fn tick(&self) {
+        let mut buffer = [0; 2048];
+        while self.ours.recv(&mut buffer).is_ok() {}
+        let _ = self.ours.send(&[0; COMMAND_LENGTH]);
+    }
+
+    /// The robot's part: the state that the next tick takes.
+    fn answer(&self) {
+        let mut buffer = [0; 2048];
+        while self.robots.recv(&mut buffer).is_ok() {}
+        let _ = self.robots.send(&[0; STATE_LENGTH]);
+    }
+}
+
+/// The system calls of a tick without anything of ours, rehearsed as a tick is.
+struct Exchange {
+    ends: Ends,
+    rehearsed: Ends,
+    clock: MonotonicClock,
+    taken: Times,
+    left: u64,
+}
+
+impl Paced for Exchange {
+    fn rehearse(&mut self) {
+        self.rehearsed.answer();
+        self.rehearsed.tick();
+    }
+
+    fn tick(&mut self, _: Instant) -> ControlFlow<()> {
+        let began_ns = self.clock.now_ns();
+        self.ends.tick();
+        self.taken.saturating_record((self.clock.now_ns() - began_ns).max(1));
+        self.ends.answer();
+        self.left -= 1;
+        if self.left == 0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    }
+}
+
+/// What the system calls of a tick take by themselves, at the same pace and priority.
+fn exchange(scheduling: Scheduling, lead: Duration, ticks: u64) -> Result<Times, Failure> {
+    let open = || Ends::open().wrap_err("no sockets on the loopback");
+    let (ends, rehearsed, clock) = (open()?, open()?, MonotonicClock::start());
+    let mut exchange = Exchange { ends, rehearsed, clock, taken: times(), left: ticks };
     in_a_thread(move || {
         let _granted = scheduling.apply();
-        let clock = MonotonicClock::start();
-        let (mut taken, mut left) = (times(), ticks);
-        let (mut buffer, state, command) = ([0; 2048], [0; STATE_LENGTH], [0; COMMAND_LENGTH]);
-        pace(PERIOD, CONTROL_PHASE, |_| {
-            let began_ns = clock.now_ns();
-            // What fails takes its time all the same.
-            while ours.recv(&mut buffer).is_ok() {}
-            let _ = ours.send(&command);
-            taken.saturating_record((clock.now_ns() - began_ns).max(1));
-            while robots.recv(&mut buffer).is_ok() {}
-            let _ = robots.send(&state);
-            left -= 1;
-            if left == 0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-        })
-        .wrap_err("the monotonic clock cannot be waited on")?;
-        Ok(taken)
+        pace_rehearsed(PERIOD, CONTROL_PHASE, lead, &mut exchange)
+            .wrap_err("the monotonic clock cannot be waited on")?;
+        Ok(exchange.taken)
     })
 }
 
@@ -383,16 +435,16 @@ impl Paced for Standing<'_> {
     fn tick(&mut self, instant: Instant) -> ControlFlow<()> {
         let began_ns = self.clock.now_ns();
         let tick = self.body.tick(instant, &self.clock, self.robot);
-        let ticked_ns = self.clock.now_ns();
+        let cost_ns = self.clock.now_ns() - began_ns;
         let mode = tick.mode;
         if self.rising.is_none() {
-            self.measured.take(instant, ticked_ns - began_ns, tick);
+            self.measured.take(instant, cost_ns, tick);
             self.left -= 1;
         }
-        let ticked_ns = self.clock.now_ns();
+        let began_ns = self.clock.now_ns();
         self.body.prepare();
         if self.rising.is_none() {
-            self.measured.prepare.saturating_record((self.clock.now_ns() - ticked_ns).max(1));
+            self.measured.prepare.saturating_record((self.clock.now_ns() - began_ns).max(1));
         }
         if let Some(ticks) = self.rising {
             self.rise(ticks, mode);
