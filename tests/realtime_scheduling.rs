@@ -70,9 +70,9 @@ fn a_rehearsal_comes_before_its_tick_or_not_at_all() {
     impl thread::Paced for Course {
         fn rehearse(&mut self) {
             self.rehearsed.push((self.next, now_ns()));
-            if self.next == 15 {
-                // Over after the tick is due: there is no other for a while.
-                std::thread::sleep(LEAD * 2);
+            if self.next >= 20 {
+                // Over after the tick is due: the third in a row is the last for a while.
+                std::thread::sleep(LEAD + LEAD / 2);
             }
         }
         fn tick(&mut self, instant: thread::Instant) -> ControlFlow<()> {
@@ -86,7 +86,7 @@ fn a_rehearsal_comes_before_its_tick_or_not_at_all() {
                 std::thread::sleep(Duration::from_millis(25));
             }
             self.next += 1;
-            if self.next == 30 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            if self.next == 40 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         }
     }
     let mut course = Course::default();
@@ -95,10 +95,9 @@ fn a_rehearsal_comes_before_its_tick_or_not_at_all() {
     let rehearsed: Vec<u64> = rehearsed.iter().map(|(number, _)| *number).collect();
     assert!(rehearsed.is_sorted_by(|a, b| a < b), "twice before one tick: {rehearsed:?}");
     assert!(!rehearsed.contains(&11) && !rehearsed.contains(&12), "{rehearsed:?}");
-    // A machine that is always busy may leave no time for the fifteenth, and one by accident for none before.
-    let late = rehearsed.iter().position(|number| *number == 15).map_or(0, |place| rehearsed.len() - 1 - place);
-    assert_eq!(late, 0, "{rehearsed:?}");
-    let least = leads.iter().min().expect("none of thirty was rehearsed");
+    let overrun = rehearsed.iter().filter(|number| **number >= 20).count();
+    assert!(overrun <= 3, "{rehearsed:?}");
+    let least = leads.iter().min().expect("none of forty was rehearsed");
     assert!(*least < LEAD.as_nanos() as u64 + 2_000_000, "all begin too early: {leads:?}");
 }
 

@@ -32,7 +32,10 @@ pub const REHEARSAL_LEAD: Duration = Duration::from_micros(100);
 /// What must be left of the lead once the thread is awake. A rehearsal takes 8 us, in one of a thousand ticks 25 to 40 (on the
 /// loopback: `quadfrog bench loop --with-link`).
 const REHEARSAL_NEEDS: Duration = Duration::from_micros(40);
-/// For so many ticks there is none after one that was not over in time: on a machine that is too slow for it, it does harm.
+/// After so many in a row that were not over in time the machine is too slow for it, and a rehearsal does harm; one or two are a
+/// stall that would have come anyway.
+const OVERRUNS: u32 = 3;
+/// For how many ticks there is none then.
 const RESTING_TICKS: u32 = 1000;
 
 /// What is called in time.
@@ -79,7 +82,7 @@ pub fn pace_rehearsed(
     let mut start_ns = monotonic_ns()?.next_multiple_of(period_ns) + phase_ns;
     let mut count = 0u64;
     let mut skipped_ns = 0;
-    let mut resting_ticks = 0;
+    let (mut overruns, mut resting_ticks) = (0, 0);
     loop {
         let planned_ns = start_ns + count * period_ns;
         if resting_ticks > 0 {
@@ -88,8 +91,9 @@ pub fn pace_rehearsed(
             sleep_until(planned_ns - lead_ns)?;
             if monotonic_ns()? + needs_ns <= planned_ns {
                 body.rehearse();
-                if monotonic_ns()? > planned_ns {
-                    resting_ticks = RESTING_TICKS;
+                overruns = if monotonic_ns()? > planned_ns { overruns + 1 } else { 0 };
+                if overruns == OVERRUNS {
+                    (overruns, resting_ticks) = (0, RESTING_TICKS);
                 }
             }
         }
