@@ -22,6 +22,7 @@ use crate::action::Action;
 use crate::export::{self, ExportError};
 use crate::feed::Feed;
 use crate::keymap::{Key, Keymap};
+use crate::line::Line;
 use crate::model::Model;
 use crate::settings::{ChartMode, ColourChoice, GlyphChoice, Settings};
 use crate::terminal::{self, Screen};
@@ -103,6 +104,9 @@ pub fn run(feed: Feed, options: ConsoleOptions) -> color_eyre::Result<Ended> {
 
 struct Console {
     feed: Feed,
+    line: Line,
+    /// Whether the line was alive when it was looked at last.
+    reached: bool,
     model: Model,
     screen: Screen,
     started: Instant,
@@ -124,9 +128,15 @@ impl Console {
         let mut screen = Screen::enter().wrap_err("the terminal cannot be used")?;
         screen.mouse(model.mouse).wrap_err("the terminal cannot be used")?;
         terminal::stop_on_panic(feed.stop_latch());
+        let line = match &feed {
+            Feed::Live(_) => Line::watch(|name| std::env::var(name).ok()).wrap_err("line watcher")?,
+            Feed::Replay(_) => Line::here(),
+        };
         let now = Instant::now();
         Ok(Console {
             feed,
+            line,
+            reached: true,
             model,
             screen,
             started: now,
@@ -149,7 +159,7 @@ impl Console {
         let mut pulse = interval(PULSE.min(self.frame_period));
         pulse.set_missed_tick_behavior(MissedTickBehavior::Skip);
         while self.ended.is_none() {
-            self.feed.beat();
+            self.beat();
             tokio::select! {
                 biased;
                 Some(input) = inputs.recv() => self.take_input(input, &mut inputs),
@@ -172,6 +182,19 @@ impl Console {
             self.draw_if_due()?;
         }
         self.close(&mut inputs)
+    }
+
+    /// The sign of life, of a screen that somebody may see.
+    fn beat(&mut self) {
+        let reached = self.line.alive();
+        if reached {
+            self.feed.beat();
+        }
+        if reached != self.reached {
+            self.reached = reached;
+            let words = if reached { "the SSH line answers again" } else { "the SSH line does not answer any more" };
+            say(&mut self.model, Level::Warning, words.to_owned());
+        }
     }
 
     /// One input and all that wait behind it.
@@ -307,10 +330,12 @@ impl Console {
         }
         self.redraw = true;
         self.draw_if_due()?;
-        let feed = self.feed;
+        let (feed, line) = (self.feed, self.line);
         let closing = std::thread::Builder::new().name("close".into()).spawn(move || feed.shutdown())?;
         while !closing.is_finished() {
-            if let Some(heartbeat) = &heartbeat {
+            if let Some(heartbeat) = &heartbeat
+                && line.alive()
+            {
                 heartbeat.beat();
             }
             while let Ok(input) = inputs.try_recv() {

@@ -18,6 +18,7 @@ pub mod export;
 pub mod feed;
 pub mod history;
 pub mod keymap;
+pub mod line;
 pub mod model;
 pub mod series;
 pub mod settings;

@@ -187,7 +187,8 @@ fn connection() -> Line {
     } else if set("SSH_CONNECTION") {
         (
             "SSH",
-            "a dead line is noticed only if sshd looks for it: ClientAliveInterval 1, ClientAliveCountMax 2 in sshd_config",
+            "a dead line lands the robot after two seconds or more, but only the line from this machine to the next is seen: \
+             ClientAliveInterval 1, ClientAliveCountMax 2 in sshd_config sees all of it",
         )
     } else {
         ("a terminal of this machine", "")
