@@ -24,19 +24,19 @@ fn a_living_connection_is_found_and_nothing_is_repeated() {
     }
 }
 
-/// Lines that a kernel wrote (Linux 6.18) while the other side of 10.7.0.2:22 was cut off.
+/// The middle line is one that a kernel wrote (Linux 6.18) two seconds after the other side of 10.7.0.2:2222 was cut off.
 #[test]
 fn repetitions_are_read_from_the_right_column_of_the_right_line() {
     let table = "  sl  local_address rem_address   st tx_queue rx_queue tr tm->when retrnsmt   uid  timeout inode
-   0: 0200070A:0016 00000000:0000 0A 00000000:00000000 00:00000000 00000000     0        0 71190 1 0000000000000000 100 0 0 10 0
-   1: 0200070A:0016 0100070A:B0D4 01 00000BAC:00000000 01:0000008E 0000000A     0        0 71316 4 0000000000000000 320 4 31 1 7
-   2: 0200070A:0016 0100070A:B0D6 01 00000000:00000000 02:000AF4C8 00000000     0        0 71317 2 0000000000000000 20 4 29 10 -1
+   1: 0200070A:08AE 00000000:0000 0A 00000000:00000000 00:00000000 00000000     0        0 685353 1 0000000001cd59ae 100 0 0 10 0
+   2: 0200070A:08AE 0100070A:9064 01 00007840:00000000 01:00000066 00000003     0        0 685421 3 00000000cd48d142 163 4 31 1 -1
+   3: 0200070A:08AE 0100070A:9066 01 00000000:00000000 02:000AF8FB 00000000     0        0 685422 3 00000000cd48d142 20 4 30 113 -1
 ";
     let repetitions = |words: &str| Connection::of_ssh(words).unwrap().repetitions(table);
-    assert_eq!(repetitions("10.7.0.1 45268 10.7.0.2 22"), Some(10));
-    assert_eq!(repetitions("10.7.0.1 45270 10.7.0.2 22"), Some(0));
-    assert_eq!(repetitions("10.7.0.1 45272 10.7.0.2 22"), None);
-    assert_eq!(repetitions("10.7.0.2 22 10.7.0.1 45268"), None, "the other way round is another connection");
+    assert_eq!(repetitions("10.7.0.1 36964 10.7.0.2 2222"), Some(3));
+    assert_eq!(repetitions("10.7.0.1 36966 10.7.0.2 2222"), Some(0));
+    assert_eq!(repetitions("10.7.0.1 36968 10.7.0.2 2222"), None);
+    assert_eq!(repetitions("10.7.0.2 2222 10.7.0.1 36964"), None, "the other way round is another connection");
 }
 
 #[test]
