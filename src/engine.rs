@@ -4,7 +4,7 @@ mod control_thread;
 mod guard;
 mod stored;
 
-pub use guard::{GUARD, GuardError, stand as stand_guard};
+pub use guard::{GUARD, GuardError, Watch, stand as stand_guard};
 pub use stored::{Opened, StoredStudy, newest_config, open_stored, stored_studies, stored_study, study_files};
 
 use guard::Guard;
@@ -371,7 +371,7 @@ impl Engine {
             Backend::Simulator => (Box::new(Simulator::new(&options.robot, &options.config.simulator)?), None),
             Backend::Hardware => {
                 let go1 = Go1::open(&options.robot, options.observe)?;
-                let post = |program: &PathBuf| Guard::post(program, &go1, settings.gate.damping_kd);
+                let post = |program: &PathBuf| Guard::post(program, &go1, &settings);
                 let guard = options.guard.as_ref().map(post).transpose().map_err(system("guard"))?;
                 (Box::new(go1), guard)
             }
@@ -384,6 +384,7 @@ impl Engine {
             recording.as_ref().and_then(|path| path.file_name()).map(|name| name.to_string_lossy().into_owned());
         let life = open_life(&options, Durability::Synced, recording_name.as_deref().unwrap_or_default())?;
         let info = session_info(&options, &recording.as_ref().map(|p| p.display().to_string()).unwrap_or_default());
+        let (guard, lifeline) = guard.unzip();
         let clock = MonotonicClock::start();
         let writer = match &recording {
             Some(path) => Some(Writer::create(path, &info, utc_ns(), &attachments(&options.config))?),
@@ -413,6 +414,7 @@ impl Engine {
                     clock: &clock,
                     closing: &flag,
                     real,
+                    lifeline,
                 };
                 control_thread::run(start, control_end, &mut *robot);
             })
@@ -469,10 +471,8 @@ fn run_session(
 ) -> (Supervisor, Option<Guard>) {
     loop {
         supervisor.attend(clock.now_ns());
-        if let Some(guard) = &mut guard
-            && !guard.tell(supervisor.mode().commanded())
-        {
-            supervisor.tell_guard_gone(clock.now_ns());
+        if guard.as_mut().is_some_and(Guard::lost) {
+            supervisor.tell_guard_lost(clock.now_ns());
         }
         if supervisor.mode() == Mode::Observe {
             supervisor.take_control();

@@ -231,6 +231,18 @@ fn the_area_is_asked_about_before_each_arming() {
     assert!(!answer.accepted && answer.answer.contains("area clear"), "{answer:?}");
 }
 
+/// Nothing new is begun with a robot that nobody would damp if this program were killed.
+#[test]
+fn without_its_guard_a_robot_is_not_armed() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut session = Session::cleared(&folder);
+    session.supervisor.tell_guard_lost(session.time_ms * 1_000_000);
+    let answer = session.wish(Intent::Arm);
+    assert!(!answer.accepted && answer.answer.starts_with("the guard process has ended"), "{answer:?}");
+    assert!(session.wish(Intent::Confirm(OperatorCheck::AreaClear)).accepted, "what energises nothing goes on");
+    assert_eq!(session.body.mode(), Mode::Disarmed);
+}
+
 /// (A defect once: a word given in the morning armed the robot in the evening.)
 #[test]
 fn the_word_on_the_area_is_forgotten_after_a_minute() {

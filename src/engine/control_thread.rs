@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::Sender;
 use std::time::Duration;
 
+use super::guard::Lifeline;
 use crate::control::body::Body;
 use crate::control::settings::{PERIOD_S, Settings};
 use crate::realtime::channel::ControlEnd;
@@ -30,6 +31,8 @@ pub struct Start<'a, C> {
     /// Whether the machine lives in its own time, over a link. It keeps the last command when nothing more is sent, where a
     /// simulated one stands still; and its ticks are rehearsed.
     pub real: bool,
+    /// The guard's sign of life; none where nobody stands guard.
+    pub lifeline: Option<Lifeline>,
 }
 
 /// How often damping is sent, at least, after the last tick: for half a second, in which the robot sinks softly.
@@ -39,13 +42,14 @@ const LAST_DAMPINGS: u32 = 500;
 ///
 /// # Panics
 /// When a tick does, or the clock cannot be read: once the robot has been damped, and `closing` is set.
-pub fn run<C: Clock>(start: Start<C>, end: ControlEnd, robot: &mut dyn Robot) {
+pub fn run<C: Clock>(mut start: Start<C>, end: ControlEnd, robot: &mut dyn Robot) {
     let granted = start.scheduling.apply();
     let _ = start.told.send((granted.favours.clone(), granted.shortfalls.clone()));
     let period = Duration::from_secs_f64(PERIOD_S);
-    let paced = |ticking: &mut dyn Paced| pace_rehearsed(period, CONTROL_PHASE, lead(start.real), ticking);
+    let lead = lead(start.real);
+    let paced = |ticking: &mut dyn Paced| pace_rehearsed(period, CONTROL_PHASE, lead, ticking);
     // The damping at the end is slept, not paced: the clock may be what failed.
-    if let Err(panic) = drive(&start, end, robot, paced, || std::thread::sleep(period)) {
+    if let Err(panic) = drive(&mut start, end, robot, paced, || std::thread::sleep(period)) {
         resume_unwind(panic);
     }
 }
@@ -61,6 +65,15 @@ struct Ticking<'a, C> {
     robot: &'a mut dyn Robot,
     clock: &'a C,
     closing: &'a AtomicBool,
+    lifeline: Option<Lifeline>,
+}
+
+impl<C> Ticking<'_, C> {
+    fn sign_of_life(&mut self) {
+        if let Some(lifeline) = &mut self.lifeline {
+            lifeline.tick(self.body.mode().commanded());
+        }
+    }
 }
 
 impl<C: Clock> Paced for Ticking<'_, C> {
@@ -71,20 +84,22 @@ impl<C: Clock> Paced for Ticking<'_, C> {
     fn tick(&mut self, instant: Instant) -> ControlFlow<()> {
         self.body.tick(instant, self.clock, self.robot);
         self.body.prepare();
+        self.sign_of_life();
         if self.closing.load(Ordering::Acquire) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 }
 
 /// Ticks as `paced` calls them, then the damping with `wait` after each; what panicked is given back.
 fn drive<C: Clock>(
-    start: &Start<C>,
+    start: &mut Start<C>,
     end: ControlEnd,
     robot: &mut dyn Robot,
     paced: impl FnOnce(&mut dyn Paced) -> Result<(), nix::Error>,
     mut wait: impl FnMut(),
 ) -> std::thread::Result<()> {
     let body = Body::new(start.settings, end);
-    let mut ticking = Ticking { body, robot, clock: start.clock, closing: start.closing };
+    let lifeline = start.lifeline.take();
+    let mut ticking = Ticking { body, robot, clock: start.clock, closing: start.closing, lifeline };
     // Afterwards the body is only asked for its mode, which a panic does not leave half changed.
     let ended = catch_unwind(AssertUnwindSafe(|| {
         if let Err(error) = paced(&mut ticking) {
@@ -97,9 +112,13 @@ fn drive<C: Clock>(
         while sent < LAST_DAMPINGS || !start.closing.load(Ordering::Acquire) {
             // What is lost goes with the next: there is nobody left to tell.
             let _ = ticking.robot.write(&damping);
+            ticking.sign_of_life();
             sent = sent.saturating_add(1);
             wait();
         }
+    }
+    if let Some(lifeline) = ticking.lifeline {
+        lifeline.leave();
     }
     ended
 }
@@ -150,13 +169,14 @@ mod tests {
         }
         let mut robot = Brittle { reads, rehearsals, sent: Vec::new() };
         let closing = AtomicBool::new(told_after == 0);
-        let start = Start {
+        let mut start = Start {
             settings: &settings,
             scheduling: Scheduling::default(),
             told: std::sync::mpsc::channel().0,
             clock: &SimulatedClock,
             closing: &closing,
             real: true,
+            lifeline: None,
         };
         let mut ms = 0;
         let unpaced = |ticking: &mut dyn Paced| {
@@ -167,7 +187,7 @@ mod tests {
             Ok(())
         };
         let mut waited = 0;
-        let ended = drive(&start, control, &mut robot, unpaced, || {
+        let ended = drive(&mut start, control, &mut robot, unpaced, || {
             waited += 1;
             closing.fetch_or(waited >= told_after, Ordering::AcqRel);
         });

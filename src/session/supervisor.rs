@@ -25,6 +25,8 @@ const COUNTERS_PERIOD_NS: u64 = 100_000_000;
 
 /// Said of a recorder that broke down without a word.
 const RECORDER_GONE: &str = "the recorder's thread has ended";
+const GUARD_LOST: &str =
+    "the guard process has ended: nothing damps the robot if quadfrog is killed; sit down, quit and start again";
 
 /// Cautions are said no more often than this, ns.
 const CAUTION_PERIOD_NS: u64 = 10_000_000_000;
@@ -106,6 +108,7 @@ pub struct Supervisor {
     recorder_complaint: Option<String>,
     /// The recorder's thread takes no records any more.
     recorder_gone: bool,
+    guard_lost: bool,
     observe: bool,
     asked_for_control: bool,
     /// Signs of life of the screen when control was refused last: it is asked for again after the next.
@@ -141,6 +144,7 @@ impl Supervisor {
             measured: VecDeque::new(),
             recorder_complaint: None,
             recorder_gone: false,
+            guard_lost: false,
             observe,
             asked_for_control: false,
             beats: 0,
@@ -167,11 +171,10 @@ impl Supervisor {
         }
     }
 
-    /// Nobody damps the robot any more if this process is killed.
-    pub fn tell_guard_gone(&mut self, time_ns: u64) {
-        let message = "the guard process has ended: if quadfrog is killed now, nothing damps the robot; \
-                       sit down, quit and start again";
-        self.log(Level::Error, message.to_owned(), time_ns);
+    /// The guard process has ended: nobody damps the robot any more if this one does. Nothing new is begun with the robot.
+    pub fn tell_guard_lost(&mut self, time_ns: u64) {
+        self.guard_lost = true;
+        self.log(Level::Error, GUARD_LOST.to_owned(), time_ns);
     }
 
     /// The mode as far as the session has heard.
@@ -238,6 +241,8 @@ impl Supervisor {
             Err("this session only observes".to_owned())
         } else if energises && self.control.stop.count() != *stops {
             Err("STOP was pressed after it".to_owned())
+        } else if energises && self.guard_lost {
+            Err(GUARD_LOST.to_owned())
         } else {
             self.noticed(intent);
             self.obey(wish)

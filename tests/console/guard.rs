@@ -12,9 +12,10 @@ use std::process::{Command, Output, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
-use nix::sys::signal::Signal;
+use nix::sys::signal::{Signal, kill};
+use nix::unistd::Pid;
 use pty::Session;
 use quadfrog::config::Config;
 use quadfrog::robot::go1::convert::{low_cmd, low_state};
@@ -98,32 +99,81 @@ fn damping() -> Vec<u8> {
     low_cmd(&JointCommand::damping(kd), CrcForm::Plain).unwrap().bytes().to_vec()
 }
 
-/// A console that has taken control of `robot`, and is in its pre-arm list.
-fn controlling(folder: &Path, robot: &Robot) -> Session {
+fn console(folder: &Path, robot: &Robot, more: &[&str]) -> Session {
     let (address, model) = (robot.address.to_string(), model(folder));
     let arguments = ["--robot", "go1", "--address", &address, "--model", model.to_str().unwrap()];
-    let session = Session::start(folder, (100, 30), &arguments);
-    let damping = damping();
-    session.wait_until("the robot is commanded", || {
-        let received = robot.received.lock().unwrap();
-        received.len() > 500 && received[received.len() - 100..].iter().all(|datagram| *datagram == damping)
-    });
+    Session::start(folder, (120, 36), &[&arguments, more].concat())
+}
+
+/// A console that has taken control of `robot`, and is in its pre-arm list.
+fn controlling(folder: &Path, robot: &Robot) -> Session {
+    let session = console(folder, robot, &[]);
+    damped(&session, robot);
     session
 }
 
+/// Waits until nothing but damping has come for a while.
+fn damped(session: &Session, robot: &Robot) {
+    let damping = damping();
+    session.wait_until("the robot is damped", || {
+        let received = robot.received.lock().unwrap();
+        received.len() > 500 && received[received.len() - 100..].iter().all(|datagram| *datagram == damping)
+    });
+}
+
+/// The guard of `console`: its only child.
+fn guard_of(console: Pid) -> Pid {
+    let tasks = std::fs::read_dir(format!("/proc/{console}/task")).unwrap();
+    let children = tasks.map(|task| std::fs::read_to_string(task.unwrap().path().join("children")).unwrap_or_default());
+    let children: String = children.collect();
+    Pid::from_raw(children.trim().parse().unwrap_or_else(|_| panic!("children of {console}: {children:?}")))
+}
+
+/// Kills the console; what comes from then on must be the guard's.
+fn kill_console(session: &mut Session, robot: &Robot) -> Vec<Vec<u8>> {
+    session.signal(Signal::SIGKILL);
+    session.wait();
+    robot.rest(robot.count())
+}
+
+/// Three seconds of damping; a socket's queue on a busy machine may lose some.
+fn assert_damped(rest: &[Vec<u8>]) {
+    assert!(rest.len() > 1000, "{} datagrams after the end", rest.len());
+    let damping = damping();
+    assert!(rest.iter().all(|datagram| *datagram == damping));
+}
+
+/// Nor does the guard end with what ends a console in order, or a terminal.
 #[test]
 fn a_robot_whose_console_is_killed_is_damped() {
     let folder = tempfile::tempdir().unwrap();
     let robot = Robot::start();
     let mut session = controlling(folder.path(), &robot);
-    session.signal(Signal::SIGKILL);
-    session.wait();
-    let killed = robot.count();
-    let rest = robot.rest(killed);
-    // Three seconds; a socket's queue on a busy machine may lose some.
-    assert!(rest.len() > 1000, "{} datagrams after the end", rest.len());
-    let damping = damping();
-    assert!(rest.iter().all(|datagram| *datagram == damping));
+    let guard = guard_of(session.pid());
+    for signal in [Signal::SIGHUP, Signal::SIGINT, Signal::SIGTERM] {
+        kill(guard, signal).unwrap();
+    }
+    assert_damped(&kill_console(&mut session, &robot));
+}
+
+/// The program stands still, as under a debugger: the guard damps until it goes on, and is then done without.
+#[test]
+fn a_robot_whose_console_is_stopped_is_damped_until_it_goes_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let robot = Robot::start();
+    let mut session = controlling(folder.path(), &robot);
+    session.signal(Signal::SIGSTOP);
+    let stopped = robot.count();
+    session.wait_until("the guard damps", || robot.count() > stopped + 2000);
+    session.signal(Signal::SIGCONT);
+    session.wait_for(&["FAULT", "late"]);
+    // The guard is silent again: of what comes in a second, one sender's share.
+    let (before, began) = (robot.count(), Instant::now());
+    std::thread::sleep(Duration::from_secs(1));
+    let rate = (robot.count() - before) as f64 / began.elapsed().as_secs_f64();
+    assert!(rate < 1500.0, "{rate} datagrams a second");
+    session.signal(Signal::SIGTERM);
+    assert!(session.wait().success());
 }
 
 #[test]
@@ -133,10 +183,43 @@ fn a_robot_whose_console_ends_in_order_hears_nothing_afterwards() {
     let mut session = controlling(folder.path(), &robot);
     session.signal(Signal::SIGTERM);
     assert!(session.wait().success());
-    let ended = robot.count();
     // What was sent before may still wait in the socket.
-    let rest = robot.rest(ended);
+    let rest = robot.rest(robot.count());
     assert!(rest.len() < 100, "{} datagrams after the end", rest.len());
+}
+
+#[test]
+fn a_robot_that_is_only_observed_hears_nothing_of_the_guard_unless_it_was_stopped() {
+    for stopped in [false, true] {
+        let folder = tempfile::tempdir().unwrap();
+        let robot = Robot::start();
+        // The robot sends to where commands come from; the first comes with the STOP.
+        let mut session = console(folder.path(), &robot, &["--observe"]);
+        session.wait_for(&["OFFLINE"]);
+        if stopped {
+            session.send("\x1b[24~");
+            damped(&session, &robot);
+        }
+        let rest = kill_console(&mut session, &robot);
+        if stopped {
+            assert_damped(&rest);
+        } else {
+            assert!(rest.is_empty(), "{} datagrams", rest.len());
+        }
+    }
+}
+
+/// (That nothing is armed then: `session_pre_arm`.)
+#[test]
+fn a_lost_guard_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let robot = Robot::start();
+    let mut session = controlling(folder.path(), &robot);
+    kill(guard_of(session.pid()), Signal::SIGKILL).unwrap();
+    session.send("6");
+    session.wait_for(&["the guard process has ended"]);
+    session.signal(Signal::SIGTERM);
+    assert!(session.wait().success());
 }
 
 /// The guard by itself: what it is given, and where it may send.
@@ -161,9 +244,10 @@ fn a_guard_sends_nothing_to_a_robot_that_was_left_alone_and_nothing_that_is_no_c
     let mut spoilt = damping();
     spoilt[30] ^= 1;
     for (given, after, status) in [
-        (damping(), "", 0),
-        (damping(), "+-", 0),
-        (spoilt, "+", 2),
+        (damping(), "\x46\0", 0),
+        (damping(), "\x46\0+-", 0),
+        (damping(), "\x46", 2),
+        (spoilt, "\x46\0+", 2),
         (damping()[..600].to_vec(), "", 2),
         (b"quadfrog\n".to_vec(), "", 2),
     ] {
@@ -173,4 +257,8 @@ fn a_guard_sends_nothing_to_a_robot_that_was_left_alone_and_nothing_that_is_no_c
         assert_eq!(said.contains("is no command"), status == 2, "{said}");
     }
     assert_eq!(robot.rest(0), Vec::<Vec<u8>>::new());
+    let output = guard(&[&damping()[..], b"\x46\0-+"].concat(), socket);
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success() && said.contains("the robot was damped, 3000 times"), "{said}");
+    assert_damped(&robot.rest(0));
 }

@@ -28,7 +28,7 @@ const BUFFER: usize = 2048;
 pub enum LinkError {
     /// The local port is not to be had.
     #[error(
-        "local UDP port {port}: {source}; end the program that drives the robot already, or set network.local_port in robot.toml"
+        "local UDP port {port}: {source}; end the program that drives the robot already (the guard of a console that was killed ends within three seconds)"
     )]
     Bind {
         /// The port.
