@@ -7,7 +7,6 @@ mod stored;
 pub use guard::{GUARD, GuardError, Watch, stand as stand_guard};
 pub use stored::{Opened, StoredStudy, newest_config, open_stored, stored_studies, stored_study, study_files};
 
-use guard::Guard;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -17,6 +16,7 @@ use std::time::Duration;
 
 use serde_json::json;
 
+use self::guard::Guard;
 use crate::config::{Backend, Config, ConfigError};
 use crate::optimize::journal::Durability;
 use crate::optimize::sampler::Direction;
@@ -63,8 +63,8 @@ pub struct Options {
     pub approve: Approval,
     /// A journal in which to take part as one more worker, instead of the study of the folder.
     pub join: Option<Storage>,
-    /// The program that stands guard over a real robot when it is run with [`GUARD`]: it damps the robot should this process be
-    /// killed. None does without.
+    /// The program that stands guard over a real robot when it is run with [`GUARD`]: it damps the robot when this process falls
+    /// silent. None does without.
     pub guard: Option<PathBuf>,
 }
 

@@ -28,7 +28,7 @@ const BUFFER: usize = 2048;
 pub enum LinkError {
     /// The local port is not to be had.
     #[error(
-        "local UDP port {port}: {source}; end the program that drives the robot already (the guard of a console that was killed ends within three seconds)"
+        "local UDP port {port}: {source}; end the program that has it, the guard of a killed console ends by itself within three seconds; if it does not drive the robot, set another network.local_port in robot.toml"
     )]
     Bind {
         /// The port.
