@@ -23,8 +23,9 @@ const FORGIVEN_PERIODS: u64 = 20;
 ///
 /// A kernel whose tick is a whole number of milliseconds (CONFIG_HZ 100, 250 or 1000) does its own periodic work at whole
 /// milliseconds of the monotonic clock (Linux, `kernel/time/tick-common.c`, `tick_setup_device`). A loop that happened to begin
-/// there would meet it time and again in the middle of its work; this one stays away from it.
-pub const CONTROL_PHASE: Duration = Duration::from_micros(500);
+/// there would meet it time and again in the middle of its work. This one begins late enough after it for what the tick sets off
+/// to be done, and early enough to be done itself before the next.
+pub const CONTROL_PHASE: Duration = Duration::from_micros(750);
 
 /// How long before a tick of the control thread its rehearsal begins: early enough to be over by then, late enough that what it
 /// fetched is there still.
