@@ -2,7 +2,7 @@
 
 use std::net::{SocketAddr, TcpListener, TcpStream};
 
-use quadfrog_console::line::{Connection, Line};
+use quadfrog_console::line::{Connection, Line, Place};
 
 fn words(there: SocketAddr, here: SocketAddr) -> String {
     format!("{} {} {} {}", there.ip(), there.port(), here.ip(), here.port())
@@ -48,8 +48,15 @@ fn what_is_no_connection_is_none() {
     assert_eq!(scoped, Connection::of_ssh("fe80::1 45268 fe80::2 22"));
     assert!(scoped.is_some());
     let ssh = "10.7.0.1 45268 10.7.0.2 22";
-    for set in [&[][..], &[("SSH_CONNECTION", "nonsense")], &[("SSH_CONNECTION", ssh), ("TMUX", "x")]] {
-        let line = Line::watch(|name| set.iter().find(|(n, _)| *n == name).map(|(_, value)| (*value).to_owned()));
-        assert!(line.unwrap().alive());
+    for (set, place) in [
+        (&[][..], Place::Here),
+        (&[("SSH_CONNECTION", "nonsense")], Place::Ssh(None)),
+        (&[("SSH_CONNECTION", ssh)], Place::Ssh(Connection::of_ssh(ssh))),
+        (&[("SSH_CONNECTION", ssh), ("TMUX", "x")], Place::Multiplexer),
+        (&[("STY", "x")], Place::Multiplexer),
+    ] {
+        let found = Place::of(|name| set.iter().find(|(n, _)| *n == name).map(|(_, value)| (*value).to_owned()));
+        assert_eq!(found, place, "{set:?}");
+        assert!(Line::watch(found).unwrap().alive());
     }
 }

@@ -22,7 +22,7 @@ use crate::action::Action;
 use crate::export::{self, ExportError};
 use crate::feed::Feed;
 use crate::keymap::{Key, Keymap};
-use crate::line::Line;
+use crate::line::{Line, Place};
 use crate::model::Model;
 use crate::settings::{ChartMode, ColourChoice, GlyphChoice, Settings};
 use crate::terminal::{self, Screen};
@@ -129,7 +129,7 @@ impl Console {
         screen.mouse(model.mouse).wrap_err("the terminal cannot be used")?;
         terminal::stop_on_panic(feed.stop_latch());
         let line = match &feed {
-            Feed::Live(_) => Line::watch(|name| std::env::var(name).ok()).wrap_err("line watcher")?,
+            Feed::Live(_) => Line::watch(Place::of(|name| std::env::var(name).ok())).wrap_err("line watcher")?,
             Feed::Replay(_) => Line::here(),
         };
         let now = Instant::now();

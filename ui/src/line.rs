@@ -75,6 +75,27 @@ fn end(text: &str) -> Option<SocketAddr> {
     Some(SocketAddr::new(address, u16::from_str_radix(port, 16).ok()?))
 }
 
+/// What is at the other end of the terminal, as the environment tells.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Place {
+    /// This machine.
+    Here,
+    /// tmux or screen: the environment tells where they were started from, not where they are looked at.
+    Multiplexer,
+    /// Another machine, by SSH; the connection, if it can be read.
+    Ssh(Option<Connection>),
+}
+
+impl Place {
+    /// That of the environment.
+    pub fn of(variable: impl Fn(&str) -> Option<String>) -> Place {
+        if ["TMUX", "STY"].iter().any(|name| variable(name).is_some()) {
+            return Place::Multiplexer;
+        }
+        variable("SSH_CONNECTION").map_or(Place::Here, |words| Place::Ssh(Connection::of_ssh(&words)))
+    }
+}
+
 /// The line under this terminal, looked at by a thread of its own; its end ends the thread.
 #[derive(Debug)]
 pub struct Line {
@@ -87,16 +108,13 @@ impl Line {
         Line { dead: Arc::default() }
     }
 
-    /// The line that the environment tells of. Inside tmux or screen that is where they were started from, not where they are
-    /// looked at: nothing is known of it there.
+    /// The line to `place`, as far as it is known.
     ///
     /// # Errors
     /// When there is no thread to be had.
-    pub fn watch(variable: impl Fn(&str) -> Option<String>) -> std::io::Result<Line> {
+    pub fn watch(place: Place) -> std::io::Result<Line> {
         let line = Line::here();
-        let inside = ["TMUX", "STY"].iter().any(|name| variable(name).is_some());
-        let connection = variable("SSH_CONNECTION").as_deref().and_then(Connection::of_ssh);
-        if let Some(connection) = connection.filter(|_| !inside) {
+        if let Place::Ssh(Some(connection)) = place {
             let dead = Arc::downgrade(&line.dead);
             let look = move || {
                 while let Some(dead) = dead.upgrade() {

@@ -12,6 +12,7 @@ use quadfrog::config::{Backend, Config};
 use quadfrog::realtime::scheduling::{ALLOW_LOCKING, ALLOW_PRIORITY, Scheduling};
 use quadfrog::realtime::{system, thread};
 use quadfrog::recording::disk;
+use quadfrog_console::line::Place;
 
 use super::Failure;
 
@@ -178,20 +179,21 @@ fn wake_up(scheduling: Scheduling) -> Vec<Line> {
 
 /// Whether the console would notice that its operator is gone.
 fn connection() -> Line {
-    let set = |name: &str| std::env::var_os(name).is_some();
-    let (found, remedy) = if set("TMUX") || set("STY") {
-        (
+    let (found, remedy) = match Place::of(|name| std::env::var(name).ok()) {
+        Place::Multiplexer => (
             "tmux or screen",
             "it lives on when your connection ends, and the robot with it: for a robot start quadfrog outside",
-        )
-    } else if set("SSH_CONNECTION") {
-        (
+        ),
+        Place::Ssh(Some(_)) => (
             "SSH",
             "a dead line lands the robot after two seconds or more, but only the line from this machine to the next is seen: \
              ClientAliveInterval 1, ClientAliveCountMax 2 in sshd_config sees all of it",
-        )
-    } else {
-        ("a terminal of this machine", "")
+        ),
+        Place::Ssh(None) => (
+            "SSH, but SSH_CONNECTION cannot be read",
+            "a dead line is noticed only if sshd looks for it: ClientAliveInterval 1, ClientAliveCountMax 2 in sshd_config",
+        ),
+        Place::Here => ("a terminal of this machine", ""),
     };
     Line::new("connection", found, remedy.is_empty(), remedy)
 }

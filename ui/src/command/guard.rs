@@ -32,6 +32,7 @@ pub fn run() -> Result<(), Failure> {
     // Whatever makes the console die of hunger must not keep its guard from the processor or on a disk; what is not granted has
     // been said by the console.
     let _granted = Scheduling { priority: 1, core: None, lock_memory: true }.apply();
+    // Without the library's buffer: what it had read ahead could not be waited for.
     let watch = stand_guard(File::from(pipe.as_fd().try_clone_to_owned().wrap_err("no standard input")?), &socket);
     // The port is free again, however long the terminal takes for the last words.
     drop(socket);
