@@ -153,6 +153,7 @@ fn a_stop_that_the_gate_would_cut_is_refused() {
 fn values_that_no_kind_can_hold_are_refused_with_their_line_key_and_value() {
     let error = refused("optimize.toml", "# mine\n\ntrials = -3\n");
     assert!(error.contains(":3") && error.contains("`trials` = -3"), "{error}");
+    assert!(error.contains("a whole number from 0 to 4294967295"), "no user knows our types: {error}");
     let error = refused("control.toml", "\n[tasks.forward]\nstance_m = [0.0, 0.14]\n");
     assert!(error.contains(":3") && error.contains("tasks.forward.stance_m") && error.contains("0.14"), "{error}");
     let error = refused("optimize.toml", "[sampler]\nkind = \"cma\"\n");

@@ -564,8 +564,22 @@ fn parse<T: DeserializeOwned>(
         // An entry of a list stands where its list does.
         let key = key.split('[').next().unwrap_or(&key);
         let value = lookup(&table, key).map(toml::Value::to_string).unwrap_or_default();
-        place.refuse(key, value, error.inner().message())
+        place.refuse(key, value, in_plain_words(error.inner().message()))
     })
+}
+
+/// What a decoder says, without the names of our types.
+fn in_plain_words(message: &str) -> String {
+    let whole = |most: u64| format!("a whole number from 0 to {most}");
+    let Some((found, kind)) = message.rsplit_once("expected ") else { return message.to_owned() };
+    let kind = match kind {
+        "u8" => whole(u8::MAX.into()),
+        "u16" => whole(u16::MAX.into()),
+        "u32" => whole(u32::MAX.into()),
+        "u64" | "usize" => whole(u64::MAX),
+        kind => kind.to_owned(),
+    };
+    format!("{found}expected {kind}")
 }
 
 /// The value of a key with its tables.
