@@ -13,7 +13,7 @@ use super::safety::SafetyFile;
 use crate::control::estimator::GRAVITY;
 use crate::control::leg::stance_of;
 use crate::control::settings::{EstimatorSettings, ObjectiveSource, Ramp, Settings, Settle, Stand, TaskControl};
-use crate::optimize::sampler::{SamplerConfig, SamplerKind};
+use crate::optimize::ask::{SamplerConfig, SamplerKind};
 use crate::realtime::command::Task;
 use crate::realtime::scheduling::Scheduling;
 use crate::recording::record::ParameterInfo;
