@@ -6,7 +6,7 @@ use quadfrog::engine::Handle;
 use quadfrog::realtime::channel::{Heartbeat, StopLatch};
 use quadfrog::recording::player::Player;
 use quadfrog::recording::record::Stamped;
-use quadfrog::session::intent::Intent;
+use quadfrog::session::operator_request::OperatorRequest;
 
 use crate::update::{Msg, ReplayCommand};
 use replay::Replay;
@@ -64,7 +64,7 @@ impl Feed {
     }
 
     /// Asks the session; a recording is not asked.
-    pub fn wish(&self, intent: Intent) {
+    pub fn wish(&self, intent: OperatorRequest) {
         if let Feed::Live(handle) = self {
             handle.wish(intent);
         }
