@@ -7,7 +7,7 @@ use quadfrog::optimize::parzen::observation_weights;
 use quadfrog::optimize::sampler::propose;
 use quadfrog::optimize::space::{Range, Space};
 use quadfrog::optimize::tpe::good_count;
-use quadfrog::optimize::trial::{Distribution, Trial, TrialState};
+use quadfrog::optimize::trial::{Distribution, Trial, TrialState, announcement};
 use quadfrog::optimize::truncnorm::{log_cdf, log_mass, quantile};
 use serde_json::Value;
 use std::collections::HashMap;
@@ -162,7 +162,7 @@ fn run(scenario: &Scenario<'_>, run: &Value, name: &str, tally: &mut Tally) -> [
             });
             trial.set(parameter, *value, Distribution::Float(range));
         }
-        trial.announce(&candidate.joint);
+        trial.system_attributes.extend(announcement(&candidate.joint));
         if zombie.is_none() {
             (trial.state, trial.value) = scenario.evaluate(&trial);
             let state = match trial.state {

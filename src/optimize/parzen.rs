@@ -14,8 +14,6 @@ const FULL_WEIGHT: usize = 25;
 /// The kernels of one coordinate, one entry per kernel in each list.
 #[derive(Debug, Clone)]
 struct Axis {
-    low: f64,
-    high: f64,
     centre: Vec<f64>,
     bandwidth: Vec<f64>,
     /// (low - centre) / bandwidth
@@ -93,12 +91,11 @@ impl Axis {
         let (a, b) = (standardize(low), standardize(high));
         let log_mass = a.iter().zip(&b).map(|(&a, &b)| log_mass(a, b)).collect();
         let log_bandwidth = bandwidth.iter().map(|s| log(*s)).collect();
-        Axis { low, high, centre, bandwidth, a, b, log_mass, log_bandwidth }
+        Axis { centre, bandwidth, a, b, log_mass, log_bandwidth }
     }
 
     /// Adds -z^2/2 - ln(2 pi)/2 - ln(Phi(b) - Phi(a)) - ln sigma, z = (x - mu)/sigma, to each kernel's term.
     fn add_log_kernels(&self, x: f64, terms: &mut [f64]) {
-        debug_assert!(self.low <= self.high);
         for (k, term) in terms.iter_mut().enumerate() {
             let z = (x - self.centre[k]) / self.bandwidth[k];
             let log_kernel = -(z * z) / 2.0 - HALF_LN_TWO_PI - self.log_mass[k] - self.log_bandwidth[k];

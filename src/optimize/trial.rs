@@ -5,11 +5,12 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 
 /// State of a trial; the discriminants are the journal's, the names those of Optuna's tables.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, strum::FromRepr, strum::EnumString, strum::IntoStaticStr)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, strum::FromRepr, strum::EnumString, strum::IntoStaticStr)]
 #[strum(serialize_all = "UPPERCASE")]
 #[repr(u8)]
 pub enum TrialState {
     /// Begun, no value yet.
+    #[default]
     Running = 0,
     /// Finished with a value.
     Complete = 1,
@@ -58,7 +59,7 @@ impl Distribution {
 }
 
 /// One evaluation of the objective.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Trial {
     /// Number within its study, from 0.
     pub number: u32,
@@ -89,20 +90,7 @@ pub struct Trial {
 impl Trial {
     /// A trial without parameters, value, attributes and times.
     pub fn new(number: u32, state: TrialState) -> Self {
-        Trial {
-            number,
-            id: u64::from(number),
-            state,
-            parameters: Vec::new(),
-            distributions: Vec::new(),
-            value: None,
-            intermediate: BTreeMap::new(),
-            user_attributes: BTreeMap::new(),
-            system_attributes: BTreeMap::new(),
-            started: None,
-            completed: None,
-            worker: String::new(),
-        }
+        Trial { number, id: u64::from(number), state, ..Trial::default() }
     }
 
     /// Sets or replaces a parameter.
@@ -144,11 +132,6 @@ impl Trial {
         let text: String =
             (0..).map_while(|i| self.system_attributes.get(&format!("{RELATIVE_PARAMS}:{i}"))?.as_str()).collect();
         serde_json::from_str(&text).as_ref().map(numbers_of).unwrap_or_default()
-    }
-
-    /// Announces a joint sample, as Optuna stores it.
-    pub fn announce(&mut self, joint: &[(String, f64)]) {
-        self.system_attributes.extend(announcement(joint));
     }
 
     /// Sum of the positive constraint values: above 0 the trial is infeasible for Optuna.

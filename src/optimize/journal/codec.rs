@@ -1,6 +1,6 @@
 //! One line of the journal: an operation and the identity of its writer, to and from JSON text.
 
-use super::json::{LineFields, json, number, numbers, parse_json, text, time};
+use super::json::{LineFields, number, numbers, parse_json, text, time};
 use super::operation::{Operation, TrialTemplate};
 use crate::optimize::space::Range;
 use crate::optimize::trial::{Distribution, TrialState, number_of};
@@ -16,7 +16,7 @@ impl Operation {
 
     fn fields(&self) -> (u8, String) {
         let attribute = |of: &str, id: &dyn std::fmt::Display, kind: &str, key: &str, value: &Value| {
-            format!(",\"{of}\":{id},\"{kind}\":{{{}:{}}}", text(key), json(value))
+            format!(",\"{of}\":{id},\"{kind}\":{{{}:{value}}}", text(key))
         };
         match self {
             Operation::CreateStudy { name, directions } => {
@@ -152,7 +152,7 @@ impl TrialTemplate {
             self.parameters.iter().map(|(n, _, d)| format!("{}:{}", text(n), text(&distribution_text(d)))).collect();
         let parameters = self.parameters.iter().map(|(n, v, _)| format!("{}:{}", text(n), number(*v))).collect();
         let attributes =
-            |map: &Map<String, Value>| object(map.iter().map(|(k, v)| format!("{}:{}", text(k), json(v))).collect());
+            |map: &Map<String, Value>| object(map.iter().map(|(k, v)| format!("{}:{}", text(k), v)).collect());
         let intermediate = self.intermediate.iter().map(|(s, v)| format!("\"{s}\":{}", number(*v))).collect();
         let _ = write!(
             out,

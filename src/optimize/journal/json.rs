@@ -91,10 +91,6 @@ pub fn numbers(values: Option<&[f64]>) -> String {
     }
 }
 
-pub fn json(value: &Value) -> String {
-    value.to_string()
-}
-
 pub fn time(at: Option<Timestamp>) -> String {
     at.map_or_else(|| "null".to_owned(), |at| format!("\"{}\"", at.strftime("%Y-%m-%dT%H:%M:%S.%6f+00:00")))
 }

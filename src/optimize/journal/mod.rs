@@ -37,7 +37,7 @@ pub struct Journal {
 impl Journal {
     /// A journal in memory only.
     pub fn in_memory() -> Self {
-        Journal { backend: JournalBackend::Memory, worker: worker_id(), state: JournalState::default() }
+        Journal::new(JournalBackend::Memory)
     }
 
     /// The journal of a file, created by the first commit if it does not exist.
@@ -45,10 +45,7 @@ impl Journal {
     /// # Errors
     /// [`JournalError`] if the file cannot be read.
     pub fn open(file: JournalFile) -> Result<Self, JournalError> {
-        let mut journal =
-            Journal { backend: JournalBackend::File(file), worker: worker_id(), state: JournalState::default() };
-        journal.refresh()?;
-        Ok(journal)
+        Self::read(JournalBackend::File(file))
     }
 
     /// The journal on a Redis server.
@@ -56,13 +53,16 @@ impl Journal {
     /// # Errors
     /// [`JournalError`] if the server cannot be reached or its journal cannot be read.
     pub fn connect(redis: JournalRedis) -> Result<Self, JournalError> {
-        let mut journal = Journal {
-            backend: JournalBackend::Redis(Box::new(redis)),
-            worker: worker_id(),
-            state: JournalState::default(),
-        };
-        journal.refresh()?;
-        Ok(journal)
+        Self::read(JournalBackend::Redis(Box::new(redis)))
+    }
+
+    fn new(backend: JournalBackend) -> Self {
+        Journal { backend, worker: uuid::Uuid::new_v4().to_string(), state: JournalState::default() }
+    }
+
+    fn read(backend: JournalBackend) -> Result<Self, JournalError> {
+        let mut journal = Journal::new(backend);
+        journal.refresh().map(|()| journal)
     }
 
     /// Copies the state to a journal in memory.
@@ -151,8 +151,4 @@ fn collect(state: &mut JournalState, line: &str, own: &str, applied: &mut Vec<Ap
         applied.push(result);
     }
     Ok(())
-}
-
-fn worker_id() -> String {
-    uuid::Uuid::new_v4().to_string()
 }

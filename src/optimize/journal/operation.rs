@@ -100,7 +100,7 @@ pub enum Operation {
 }
 
 /// The contents of an enqueued or imported trial.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct TrialTemplate {
     /// State.
     pub state: TrialState,
@@ -122,14 +122,6 @@ impl TrialTemplate {
     /// A waiting trial with the given parameters.
     pub fn waiting(fixed: Map<String, Value>, user_attributes: Map<String, Value>) -> Self {
         let system_attributes = Map::from_iter([(FIXED_PARAMS.to_owned(), Value::Object(fixed))]);
-        TrialTemplate {
-            state: TrialState::Waiting,
-            values: None,
-            completed: None,
-            parameters: Vec::new(),
-            user_attributes,
-            system_attributes,
-            intermediate: Vec::new(),
-        }
+        TrialTemplate { state: TrialState::Waiting, user_attributes, system_attributes, ..TrialTemplate::default() }
     }
 }

@@ -6,7 +6,7 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 
 /// A study of the journal.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct StudyRecord {
     /// Name.
     pub name: String,
@@ -69,15 +69,7 @@ impl JournalState {
             Operation::CreateStudy { name, directions } => {
                 let free = self.find(&name).is_none();
                 if free {
-                    let (user_attributes, system_attributes) = Default::default();
-                    self.studies.push(StudyRecord {
-                        name,
-                        directions,
-                        deleted: false,
-                        user_attributes,
-                        system_attributes,
-                        trials: Vec::new(),
-                    });
+                    self.studies.push(StudyRecord { name, directions, ..StudyRecord::default() });
                 }
                 free
             }

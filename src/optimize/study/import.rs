@@ -33,8 +33,7 @@ impl Study {
                 completed: trial.completed.or(trial.started).or_else(|| Some(Timestamp::now())),
                 parameters: trial.parameters.iter().filter_map(parameter).collect(),
                 user_attributes: trial.attributes.clone(),
-                system_attributes: serde_json::Map::new(),
-                intermediate: Vec::new(),
+                ..TrialTemplate::default()
             };
             let started = trial.started.or(template.completed);
             let create = Operation::CreateTrial { study: self.id, started, template: Some(Box::new(template)) };
