@@ -15,7 +15,7 @@ use crate::control::leg::stance_of;
 use crate::control::settings::{
     ControlSettings, EstimatorSettings, ObjectiveSource, RampSettings, SettleSettings, StandSettings, TaskControl,
 };
-use crate::optimize::sampler::{SamplerConfig, SamplerKind};
+use crate::optimize::ask::{SamplerConfig, SamplerKind};
 use crate::realtime::scheduling::Scheduling;
 use crate::robot::Leg;
 use crate::robot::description::RobotDescription;

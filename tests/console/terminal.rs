@@ -65,7 +65,7 @@ fn entered(player: &Player, mode: Mode) -> f64 {
 fn stored(file: &Path) -> Vec<Trial> {
     let journal = JournalFile::new(file, Durability::Synced, LOCK_GRACE).expect("a journal");
     let journal = Journal::open(journal).expect("a journal that can be read");
-    journal.replay().studies()[0].trials.clone()
+    journal.state().studies()[0].trials.clone()
 }
 
 #[test]

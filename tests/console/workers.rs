@@ -52,7 +52,7 @@ fn printed(worker: Ended) -> Vec<u32> {
 }
 
 fn trials(storage: &Storage) -> Vec<Trial> {
-    storage.journal(Durability::Buffered).unwrap().replay().studies()[0].trials.clone()
+    storage.journal(Durability::Buffered).unwrap().state().studies()[0].trials.clone()
 }
 
 /// Nothing is lost, nothing is there twice, and the budget is met to the trial.
