@@ -13,7 +13,7 @@ fn sphere(u: &[f64]) -> f64 {
     -u.iter().zip(centre).map(|(u, c)| (u - c) * (u - c)).sum::<f64>()
 }
 
-/// ridge: a curved ridge along u4 = 0.3 + u1/2
+/// ridge: a curved crest along u4 = 0.3 + u1/2
 fn ridge(u: &[f64]) -> f64 {
     let (u1, u2, u3, u4) = (u[0], u[1], u[2], u[3]);
     let (a, b) = (u3 - 0.3, u4 - 0.3 - 0.5 * u1);
@@ -35,14 +35,14 @@ fn hartmann(u: &[f64]) -> f64 {
     ((0..4).map(bump).sum::<f64>() - 1.1) / 0.839
 }
 
-/// edge: the value grows with the push until the robot falls; the best points lie along the edge.
+/// Values that rise with the push and drop to 0, a fall, beyond an edge; the best lies along the edge.
 fn edge(u: &[f64]) -> f64 {
     let push = 1.2 * u[0] + u[1] - 0.3 * u[3];
     let detour = (u[2] - 0.5) * (u[2] - 0.5) + 0.5 * (u[3] - 0.6) * (u[3] - 0.6);
     if push > 1.1 { 0.0 } else { 0.2 + 0.5 * push - 0.4 * detour }
 }
 
-/// pocket: the robot lands only within a region of the space; the value grows towards one side of it.
+/// Values that are 0, a fall, outside a ball, and rise towards one side of the ball.
 fn pocket(u: &[f64]) -> f64 {
     let centre = [0.55, 0.4, 0.5, 0.6];
     let distance: f64 = u.iter().zip(centre).map(|(u, c)| (u - c) * (u - c)).sum();
@@ -51,7 +51,7 @@ fn pocket(u: &[f64]) -> f64 {
 
 type Function = fn(&[f64]) -> f64;
 
-/// Returns the best value after 20 and after 50 trials, and the number of falls among the first 20.
+/// Best value after 20 and after 50 trials, and falls among the first 20.
 fn run(sampler: SamplerConfig, function: Function, falls: bool) -> [f64; 3] {
     let ranges = [("f0", 0.75, 1.75), ("Fx", 0.0, 150.0), ("Fy", 0.0, 150.0), ("Fz", 150.0, 350.0)];
     let options = StudyOptions {
@@ -74,7 +74,7 @@ fn run(sampler: SamplerConfig, function: Function, falls: bool) -> [f64; 3] {
         if fell {
             study.annotate(number, &[(VERDICT.into(), FALL.into())]).expect("running");
         }
-        study.tell(number, Outcome::Complete(value)).expect("finished");
+        study.tell(number, Outcome::Complete(value)).expect("reported");
         best[1] = value.max(best[1]);
         if trial < 20 {
             best[0] = best[1];

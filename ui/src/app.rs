@@ -10,7 +10,7 @@ use crossterm::clipboard::CopyToClipboard;
 use crossterm::event::{Event, KeyEventKind, MouseButton, MouseEvent, MouseEventKind};
 use nix::sys::signal::{Signal, raise};
 use quadfrog::realtime::channel::StopLatch;
-use quadfrog::recording::record::Level;
+use quadfrog::recording::record::LogLevel;
 use quadfrog::robot::description::RobotDescription;
 use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
@@ -194,7 +194,7 @@ impl Console {
             self.connected = connected;
             let text =
                 if connected { "the SSH connection responds again" } else { "the SSH connection does not respond" };
-            say(&mut self.model, Level::Warning, text.to_owned());
+            say(&mut self.model, LogLevel::Warning, text.to_owned());
         }
     }
 
@@ -278,8 +278,8 @@ impl Console {
 
     fn say_written(&mut self, written: Result<PathBuf, ExportError>, text: impl FnOnce(&Path) -> String) {
         match written {
-            Ok(path) => say(&mut self.model, Level::Info, text(&path)),
-            Err(error) => say(&mut self.model, Level::Error, format!("not written: {error}")),
+            Ok(path) => say(&mut self.model, LogLevel::Info, text(&path)),
+            Err(error) => say(&mut self.model, LogLevel::Error, format!("not written: {error}")),
         }
     }
 
@@ -327,7 +327,7 @@ impl Console {
         let heartbeat = self.feed.heartbeat().filter(|_| ended == ConsoleExit::Quit);
         let stop = self.feed.stop_latch();
         if self.model.robot_needs_us() {
-            say(&mut self.model, Level::Info, "the robot sits down, then the program ends".to_owned());
+            say(&mut self.model, LogLevel::Info, "the robot sits down, then the program ends".to_owned());
         }
         self.redraw = true;
         self.draw_if_due()?;

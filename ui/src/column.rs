@@ -2,7 +2,7 @@
 
 use std::cmp::Ordering;
 
-use quadfrog::recording::record::{TrialRecord, Verdict};
+use quadfrog::trial::{TrialRecord, Verdict};
 
 use crate::model::Model;
 

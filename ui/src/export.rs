@@ -4,7 +4,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use quadfrog::config::{Config, ConfigError};
-use quadfrog::realtime::command::Task;
+use quadfrog::trial::Task;
 
 use crate::model::Model;
 use crate::view::trial_text;

@@ -5,7 +5,7 @@ pub mod replay;
 use quadfrog::engine::Handle;
 use quadfrog::realtime::channel::{Heartbeat, StopLatch};
 use quadfrog::recording::player::Player;
-use quadfrog::session::intent::Intent;
+use quadfrog::session::operator_request::OperatorRequest;
 
 use crate::update::{Msg, ReplayCommand};
 use replay::ReplayFeed;
@@ -63,9 +63,9 @@ impl Feed {
     }
 
     /// Sends a request to the session.
-    pub fn wish(&self, intent: Intent) {
+    pub fn wish(&self, request: OperatorRequest) {
         if let Feed::Live(handle) = self {
-            handle.wish(intent);
+            handle.wish(request);
         }
     }
 

@@ -3,13 +3,14 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 
-use quadfrog::realtime::telemetry::{Mode, Snapshot};
-use quadfrog::recording::record::{
-    Insight, Level, ParameterInfo, PointRecord, PreArmCheck, Proposal, Search, SearchedParameter, SessionInfo, Source,
-    Stage, StageInfo, TrialRecord, Verdict,
-};
+use quadfrog::recording::record::{ArmingCheckRecord, LogLevel, SessionInfo, StageRecord};
 use quadfrog::recording::recorder::RecorderStatus;
 use quadfrog::robot::description::RobotDescription;
+use quadfrog::telemetry::{Mode, Snapshot};
+use quadfrog::trial::{
+    ExperimentStage, ParameterInfo, PointRecord, Proposal, ProposalInsight, ProposalSource, SearchStatus,
+    SearchedParameter, TrialRecord, Verdict,
+};
 
 use crate::column::{Column, SortBy};
 use crate::comparison::Comparison;
@@ -56,7 +57,7 @@ impl View {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Message {
     /// How grave.
-    pub level: Level,
+    pub level: LogLevel,
     /// What is said.
     pub text: String,
 }
@@ -67,7 +68,7 @@ pub struct LogLine {
     /// Time since the engine started, ns.
     pub time_ns: u64,
     /// How grave.
-    pub level: Level,
+    pub level: LogLevel,
     /// Which part speaks.
     pub source: String,
     /// The line.
@@ -155,7 +156,7 @@ pub struct LogView {
     /// Lines above the newest; 0 follows.
     pub back: usize,
     /// The lowest level shown.
-    pub level: Option<Level>,
+    pub level: Option<LogLevel>,
     /// Only lines that hold this text.
     pub search: String,
 }
@@ -180,15 +181,15 @@ pub struct Model {
     /// When the newest tick arrived, on the console's clock.
     pub snapshot_at: Duration,
     /// Where the session is in a trial's life.
-    pub stage: Option<StageInfo>,
+    pub stage: Option<StageRecord>,
     /// The proposal on the table.
     pub proposal: Option<Proposal>,
     /// The pre-arm list as it was shown last; empty before the robot was disarmed for the first time.
-    pub pre_arm: Vec<PreArmCheck>,
+    pub pre_arm: Vec<ArmingCheckRecord>,
     /// What is searched at present; none before the session has said so.
-    pub search: Option<Search>,
+    pub search: Option<SearchStatus>,
     /// Why the newest proposal of the sampler was made.
-    pub insight: Option<Insight>,
+    pub insight: Option<ProposalInsight>,
     /// Points that were run more than once.
     pub points: Vec<PointRecord>,
     /// How the recorder is doing; none in a replay.
@@ -289,24 +290,24 @@ impl Model {
     }
 
     /// The stage, where it is known.
-    pub fn stage_is(&self, stage: Stage) -> bool {
+    pub fn stage_is(&self, stage: ExperimentStage) -> bool {
         self.stage.is_some_and(|info| info.stage == stage)
     }
 
     /// The trial that waits for its verdict.
     pub fn under_review(&self) -> Option<&TrialRecord> {
-        let info = self.stage.filter(|info| info.stage == Stage::Review)?;
+        let info = self.stage.filter(|info| info.stage == ExperimentStage::Review)?;
         self.trials.get(&info.trial)
     }
 
     /// The proposal that waits for approval; an older one, still drawn while its trial runs, does not count.
     pub fn proposal_on_table(&self) -> Option<&Proposal> {
-        let info = self.stage.filter(|info| info.stage == Stage::Proposed)?;
+        let info = self.stage.filter(|info| info.stage == ExperimentStage::Proposed)?;
         self.proposal.as_ref().filter(|proposal| proposal.trial == info.trial)
     }
 
     /// The items of the pre-arm list that forbid arming.
-    pub fn pre_arm_failing(&self) -> impl Iterator<Item = &PreArmCheck> + '_ {
+    pub fn pre_arm_failing(&self) -> impl Iterator<Item = &ArmingCheckRecord> + '_ {
         self.pre_arm.iter().filter(|item| !item.state.allows())
     }
 
@@ -418,7 +419,7 @@ impl Model {
 
     /// Whether a source was chosen by a person; shown as a mark in tables.
     pub fn by_hand(trial: &TrialRecord) -> bool {
-        trial.source != Source::Sampler
+        trial.source != ProposalSource::Sampler
     }
 }
 

@@ -1,7 +1,7 @@
 //! When each action can be done, and in words why not.
 
-use quadfrog::realtime::telemetry::Mode;
-use quadfrog::recording::record::{Stage, Verdict};
+use quadfrog::telemetry::Mode;
+use quadfrog::trial::{ExperimentStage, Verdict};
 
 use super::{Action, Legality};
 use crate::model::{Model, View};
@@ -26,7 +26,7 @@ pub fn may_wish(model: &Model) -> Legality {
     Ok(())
 }
 
-fn stage_is(model: &Model, stage: Stage) -> bool {
+fn stage_is(model: &Model, stage: ExperimentStage) -> bool {
     model.stage.is_some_and(|info| info.stage == stage)
 }
 
@@ -50,7 +50,7 @@ pub(super) fn may_arm(model: &Model) -> Legality {
     must_be_seen(model)?;
     match model.mode() {
         mode if busy(mode).is_some() => refuse(busy(mode).unwrap_or_default()),
-        Mode::Disarmed if stage_is(model, Stage::Review) => refuse("the last trial waits for its verdict"),
+        Mode::Disarmed if stage_is(model, ExperimentStage::Review) => refuse("the last trial waits for its verdict"),
         Mode::Disarmed if model.pre_arm.is_empty() => refuse("the pre-arm list is still being made"),
         Mode::Disarmed => match model.pre_arm_failing().count() {
             0 => Ok(()),
@@ -105,10 +105,10 @@ pub(super) fn may_approve(model: &Model) -> Legality {
 pub(super) fn may_change_proposal(model: &Model) -> Legality {
     may_wish(model)?;
     match model.stage.map(|info| info.stage) {
-        Some(Stage::Proposed) if model.proposal_on_table().is_some() => Ok(()),
-        Some(Stage::Review) => refuse("the last trial waits for its verdict"),
-        Some(Stage::Running) => refuse("a trial is running"),
-        Some(Stage::Finished) => {
+        Some(ExperimentStage::Proposed) if model.proposal_on_table().is_some() => Ok(()),
+        Some(ExperimentStage::Review) => refuse("the last trial waits for its verdict"),
+        Some(ExperimentStage::Running) => refuse("a trial is running"),
+        Some(ExperimentStage::Finished) => {
             refuse(format!("the study is finished: {} gives it more trials", model.keymap.key(Action::Continue)))
         }
         _ => refuse("there is no proposal yet"),
@@ -119,9 +119,9 @@ pub(super) fn may_change_proposal(model: &Model) -> Legality {
 pub(super) fn may_search(model: &Model) -> Legality {
     may_wish(model)?;
     match model.stage.map(|info| info.stage) {
-        Some(Stage::Proposed | Stage::Finished) => Ok(()),
-        Some(Stage::Review) => refuse("the last trial waits for its verdict"),
-        Some(Stage::Running) => refuse("a trial is running"),
+        Some(ExperimentStage::Proposed | ExperimentStage::Finished) => Ok(()),
+        Some(ExperimentStage::Review) => refuse("the last trial waits for its verdict"),
+        Some(ExperimentStage::Running) => refuse("a trial is running"),
         None => refuse("the session has not begun"),
     }
 }
@@ -175,17 +175,17 @@ pub(super) fn may_clear_overrides(model: &Model) -> Legality {
 
 pub(super) fn may_continue(model: &Model) -> Legality {
     may_wish(model)?;
-    if stage_is(model, Stage::Finished) { Ok(()) } else { refuse("the study is not finished") }
+    if stage_is(model, ExperimentStage::Finished) { Ok(()) } else { refuse("the study is not finished") }
 }
 
 pub(super) fn may_judge(model: &Model) -> Legality {
     may_wish(model)?;
-    if stage_is(model, Stage::Review) { Ok(()) } else { refuse("no trial waits for a verdict") }
+    if stage_is(model, ExperimentStage::Review) { Ok(()) } else { refuse("no trial waits for a verdict") }
 }
 
 pub(super) fn may_rerun(model: &Model) -> Legality {
     may_wish(model)?;
-    if stage_is(model, Stage::Review) {
+    if stage_is(model, ExperimentStage::Review) {
         return Ok(());
     }
     match model.selected_trial() {

@@ -7,8 +7,8 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use quadfrog::config::Config;
 use quadfrog::engine::newest_config;
 use quadfrog::optimize::sampler::SamplerKind;
-use quadfrog::realtime::command::Task;
 use quadfrog::robot::description::RobotDescription;
+use quadfrog::trial::Task;
 
 use super::failure::Failure;
 

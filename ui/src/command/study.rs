@@ -14,9 +14,9 @@ use quadfrog::optimize::exchange::{self, TableTrial};
 use quadfrog::optimize::repeats;
 use quadfrog::optimize::study::Storage;
 use quadfrog::optimize::trial::{Trial, TrialState};
-use quadfrog::recording::record::TrialRecord;
 use quadfrog::report::table;
-use quadfrog::session::life::{self, rows_of};
+use quadfrog::session::experiment::{self, rows_of};
+use quadfrog::trial::TrialRecord;
 
 use super::arguments::one_of;
 use super::failure::Failure;
@@ -296,7 +296,7 @@ fn import(selector: &StudySelector, table: &Path, format: Option<TableFormat>, q
         trials.into_iter().partition(|trial| trial.state.is_finished());
     if !queue {
         let given = finished.len();
-        let added = life::import(&mut study, finished).map_err(|error| refuse(&error))?.len();
+        let added = experiment::import(&mut study, finished).map_err(|error| refuse(&error))?.len();
         let known = match given - added {
             0 => String::new(),
             known => format!("; {known} were there already (same parameters, value and times)"),

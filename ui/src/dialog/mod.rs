@@ -6,8 +6,8 @@ mod override_form;
 use std::time::Duration;
 
 use crossterm::event::KeyCode;
-use quadfrog::recording::record::Level;
-use quadfrog::session::intent::{Intent, OperatorCheck};
+use quadfrog::recording::record::LogLevel;
+use quadfrog::session::operator_request::{OperatorCheck, OperatorRequest};
 use tui_input::{Input, InputRequest};
 
 use crate::action::{ACTIONS, Action, ActionInfo};
@@ -196,7 +196,7 @@ pub fn key(model: &mut Model, key: Key) -> Vec<Effect> {
 }
 
 fn cancelled(model: &mut Model, text: &str) -> Vec<Effect> {
-    model.message = Some(Message { level: Level::Info, text: format!("cancelled: {text}") });
+    model.message = Some(Message { level: LogLevel::Info, text: format!("cancelled: {text}") });
     Vec::new()
 }
 
@@ -215,9 +215,9 @@ fn arm_key(model: &mut Model, key: Key, typed: usize) -> Vec<Effect> {
         return Vec::new();
     }
     match Action::Arm.legal(model) {
-        Ok(()) => wish(model, Intent::Arm),
+        Ok(()) => wish(model, OperatorRequest::Arm),
         Err(reason) => {
-            model.message = Some(Message { level: Level::Warning, text: format!("not armed: {reason}") });
+            model.message = Some(Message { level: LogLevel::Warning, text: format!("not armed: {reason}") });
             Vec::new()
         }
     }
@@ -235,7 +235,7 @@ fn pre_arm_key(model: &mut Model, key: Key, mut selected: usize) -> Vec<Effect> 
             selected = (selected + 1).min(last);
             Vec::new()
         }
-        KeyCode::Char('x') => wish(model, Intent::Confirm(OperatorCheck::ALL[selected.min(last)])),
+        KeyCode::Char('x') => wish(model, OperatorRequest::Confirm(OperatorCheck::ALL[selected.min(last)])),
         // Arming from the list that says whether it is possible.
         _ if model.keymap.action(key) == Some(Action::Arm) && Action::Arm.legal(model).is_ok() => {
             return perform(model, Action::Arm);
@@ -257,9 +257,9 @@ fn approve_key(model: &mut Model, key: Key, (trial, revision, pressed_at): (u32,
         return Vec::new();
     }
     match Action::Approve.legal(model) {
-        Ok(()) => wish(model, Intent::Approve { trial, revision }),
+        Ok(()) => wish(model, OperatorRequest::Approve { trial, revision }),
         Err(reason) => {
-            model.message = Some(Message { level: Level::Warning, text: format!("not approved: {reason}") });
+            model.message = Some(Message { level: LogLevel::Warning, text: format!("not approved: {reason}") });
             Vec::new()
         }
     }
@@ -290,19 +290,19 @@ fn field_key(model: &mut Model, key: Key, purpose: Purpose, mut input: Input) ->
 /// What a field's text does; the reason when it can do nothing.
 fn submit(model: &mut Model, purpose: Purpose, text: &str) -> Result<Vec<Effect>, String> {
     match purpose {
-        Purpose::Note(trial) => Ok(wish(model, Intent::Note { trial, text: text.to_owned() })),
-        Purpose::HandValue(_) if text.is_empty() => Ok(wish(model, Intent::HandValue(None))),
+        Purpose::Note(trial) => Ok(wish(model, OperatorRequest::Note { trial, text: text.to_owned() })),
+        Purpose::HandValue(_) if text.is_empty() => Ok(wish(model, OperatorRequest::HandValue(None))),
         Purpose::HandValue(_) => match text.replace(',', ".").parse::<f64>() {
-            Ok(value) if value.is_finite() => Ok(wish(model, Intent::HandValue(Some(value)))),
+            Ok(value) if value.is_finite() => Ok(wish(model, OperatorRequest::HandValue(Some(value)))),
             _ => Err(format!("`{text}` is not a number")),
         },
         Purpose::Continue => match text.parse::<u32>() {
-            Ok(more @ 1..=1000) => Ok(wish(model, Intent::Continue(more))),
+            Ok(more @ 1..=1000) => Ok(wish(model, OperatorRequest::Continue(more))),
             _ => Err(format!("`{text}` is not a number of trials from 1 to 1000")),
         },
         Purpose::Fix { parameter, value } => match (text.parse::<u32>(), model.session.parameters.get(parameter)) {
             (Ok(trials @ 1..=1000), Some(info)) => {
-                let intent = Intent::Fix { parameter: info.name.clone(), value, trials };
+                let intent = OperatorRequest::Fix { parameter: info.name.clone(), value, trials };
                 Ok(wish(model, intent))
             }
             _ => Err(format!("`{text}` is not a number of trials from 1 to 1000")),
@@ -312,7 +312,7 @@ fn submit(model: &mut Model, purpose: Purpose, text: &str) -> Result<Vec<Effect>
             Ok(wish(model, intent))
         }
         Purpose::ConfirmBest => match text.parse::<u32>() {
-            Ok(repeats @ 1..=1000) => Ok(wish(model, Intent::ConfirmBest { repeats })),
+            Ok(repeats @ 1..=1000) => Ok(wish(model, OperatorRequest::ConfirmBest { repeats })),
             _ => Err(format!("`{text}` is not a number of repeats from 1 to 1000")),
         },
         Purpose::TrialNumber => {
@@ -332,7 +332,7 @@ fn submit(model: &mut Model, purpose: Purpose, text: &str) -> Result<Vec<Effect>
 }
 
 /// Bounds typed as `low..high`, checked as far as the screen can know; the session checks all of it again.
-fn bounds_of(model: &Model, parameter: usize, text: &str) -> Result<Intent, String> {
+fn bounds_of(model: &Model, parameter: usize, text: &str) -> Result<OperatorRequest, String> {
     let Some(info) = model.session.parameters.get(parameter) else { return Err("there is no such parameter".into()) };
     let (name, unit) = (&info.name, &info.unit);
     let number = |text: &str| text.trim().parse::<f64>().ok().filter(|value| value.is_finite());
@@ -345,7 +345,7 @@ fn bounds_of(model: &Model, parameter: usize, text: &str) -> Result<Intent, Stri
         Some(p) if low < p.least || high > p.most => {
             Err(format!("{name} may be searched from {} to {} {unit} (safety.toml)", p.least, p.most))
         }
-        _ => Ok(Intent::NarrowBounds { parameter: name.clone(), low, high }),
+        _ => Ok(OperatorRequest::NarrowBounds { parameter: name.clone(), low, high }),
     }
 }
 

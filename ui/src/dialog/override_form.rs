@@ -1,8 +1,8 @@
 //! The form in which an operator changes a proposal.
 
 use crossterm::event::KeyCode;
-use quadfrog::recording::record::{ParameterInfo, Proposal, ProposedParameter};
-use quadfrog::session::intent::Intent;
+use quadfrog::session::operator_request::OperatorRequest;
+use quadfrog::trial::{ParameterInfo, Proposal, ProposedParameter};
 use tui_input::Input;
 
 use super::{Dialog, cancelled, edit};
@@ -49,10 +49,10 @@ pub struct OverrideRow {
 
 impl OverrideRow {
     /// What asks the session for the value.
-    fn intent(&self) -> Intent {
+    fn intent(&self) -> OperatorRequest {
         match self.gain {
-            true => Intent::OverrideGain { gain: self.name.clone(), value: self.value },
-            false => Intent::Override { parameter: self.name.clone(), value: self.value },
+            true => OperatorRequest::OverrideGain { gain: self.name.clone(), value: self.value },
+            false => OperatorRequest::Override { parameter: self.name.clone(), value: self.value },
         }
     }
 }
@@ -132,7 +132,7 @@ pub(super) fn key(model: &mut Model, key: Key, mut form: OverrideForm) -> Vec<Ef
         KeyCode::Enter => {
             if form.take_typed() {
                 let changed = form.rows.iter().filter(|row| row.value != row.before);
-                let intents: Vec<Intent> = changed.map(OverrideRow::intent).collect();
+                let intents: Vec<OperatorRequest> = changed.map(OverrideRow::intent).collect();
                 if intents.is_empty() {
                     return cancelled(model, "nothing was changed");
                 }
@@ -144,7 +144,7 @@ pub(super) fn key(model: &mut Model, key: Key, mut form: OverrideForm) -> Vec<Ef
             if form.take_typed() {
                 let said = form.rows.iter().filter(|row| !row.gain || row.value != row.proposed);
                 let point = said.map(|row| (row.name.clone(), row.value)).collect();
-                return wish(model, Intent::Enqueue(point));
+                return wish(model, OperatorRequest::Enqueue(point));
             }
         }
         KeyCode::Up => form.select(form.selected.saturating_sub(1)),

@@ -9,10 +9,10 @@ mod records;
 
 use std::time::Duration;
 
-use quadfrog::realtime::telemetry::{Mode, Snapshot, Tick};
-use quadfrog::recording::record::{Level, Stamped};
+use quadfrog::recording::record::{LogLevel, Stamped};
 use quadfrog::recording::recorder::RecorderStatus;
-use quadfrog::session::intent::Intent;
+use quadfrog::session::operator_request::OperatorRequest;
+use quadfrog::telemetry::{Mode, Snapshot, Tick};
 
 use crate::action::{Action, may_acknowledge, may_wish};
 use crate::dialog::{self, Dialog};
@@ -65,7 +65,7 @@ pub enum Effect {
     /// Stop the robot now.
     Stop,
     /// Ask the session.
-    Wish(Intent),
+    Wish(OperatorRequest),
     /// Move the replay.
     Replay(ReplayCommand),
     /// Ring the terminal's bell.
@@ -186,7 +186,7 @@ fn press(model: &mut Model, key: Key) -> Vec<Effect> {
     }
     if model.mode() == Mode::Countdown && may_wish(model).is_ok() {
         model.dialog = None;
-        return wish(model, Intent::Cancel);
+        return wish(model, OperatorRequest::Cancel);
     }
     if model.dialog.is_some() {
         return dialog::key(model, key);
@@ -195,7 +195,7 @@ fn press(model: &mut Model, key: Key) -> Vec<Effect> {
         Some(action) => perform(model, action),
         None => {
             let help = model.keymap.key(Action::Help);
-            say(model, Level::Info, format!("{key} does nothing here; {help} shows the keys"));
+            say(model, LogLevel::Info, format!("{key} does nothing here; {help} shows the keys"));
             Vec::new()
         }
     }
@@ -204,13 +204,13 @@ fn press(model: &mut Model, key: Key) -> Vec<Effect> {
 /// Stops the robot. What lies over the view closes, so that the robot is seen; a half-written note stays.
 fn stop(model: &mut Model, word: &str) -> Vec<Effect> {
     if model.replay.is_some() {
-        say(model, Level::Info, "this is a replay: there is no robot to stop".to_owned());
+        say(model, LogLevel::Info, "this is a replay: there is no robot to stop".to_owned());
         return Vec::new();
     }
     if !matches!(model.dialog, Some(Dialog::Field { .. })) {
         model.dialog = None;
     }
-    say(model, Level::Warning, format!("{word}: damping"));
+    say(model, LogLevel::Warning, format!("{word}: damping"));
     vec![Effect::Stop]
 }
 
@@ -226,23 +226,23 @@ fn interrupt(model: &mut Model) -> Vec<Effect> {
     } else {
         "STOP: damping. Ctrl-C again within 2 s quits"
     };
-    say(model, Level::Warning, text.to_owned());
+    say(model, LogLevel::Warning, text.to_owned());
     effects
 }
 
 /// Asks the session, if this console may ask at all: the one gate for replays and observers.
-pub fn wish(model: &mut Model, intent: Intent) -> Vec<Effect> {
-    let allowed = if intent == Intent::Acknowledge { may_acknowledge(model) } else { may_wish(model) };
+pub fn wish(model: &mut Model, intent: OperatorRequest) -> Vec<Effect> {
+    let allowed = if intent == OperatorRequest::Acknowledge { may_acknowledge(model) } else { may_wish(model) };
     match allowed {
         Ok(()) => vec![Effect::Wish(intent)],
         Err(reason) => {
-            say(model, Level::Warning, format!("refused: {reason}"));
+            say(model, LogLevel::Warning, format!("refused: {reason}"));
             Vec::new()
         }
     }
 }
 
 /// Shows a line to the operator.
-pub fn say(model: &mut Model, level: Level, text: String) {
+pub fn say(model: &mut Model, level: LogLevel, text: String) {
     model.message = Some(Message { level, text });
 }

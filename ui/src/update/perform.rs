@@ -1,8 +1,9 @@
 //! What each action does.
 
-use quadfrog::realtime::telemetry::Mode;
-use quadfrog::recording::record::{Level, Stage, Verdict};
-use quadfrog::session::intent::Intent;
+use quadfrog::recording::record::LogLevel;
+use quadfrog::session::operator_request::OperatorRequest;
+use quadfrog::telemetry::Mode;
+use quadfrog::trial::{ExperimentStage, Verdict};
 
 use super::navigate::{filter, freeze, ghost, move_by, move_cursor, next_mode, next_series, next_sort, zoom};
 use super::{Effect, ReplayCommand, interrupt, say, stop, wish};
@@ -13,7 +14,7 @@ use crate::model::{Model, View};
 /// Does an action, or says why not.
 pub fn perform(model: &mut Model, action: Action) -> Vec<Effect> {
     if let Err(reason) = action.legal(model) {
-        say(model, Level::Warning, format!("{}: {reason}", action.info().name));
+        say(model, LogLevel::Warning, format!("{}: {reason}", action.info().name));
         // What stands in the way of arming is shown at once, all of it.
         let shown = action == Action::Arm && model.mode() == Mode::Disarmed && model.pre_arm_failing().count() > 0;
         if shown && may_wish(model).is_ok() {
@@ -26,28 +27,28 @@ pub fn perform(model: &mut Model, action: Action) -> Vec<Effect> {
         Action::Interrupt => interrupt(model),
         // A machine that can hurt somebody is asked about with a word, not with a key that lies under a finger.
         Action::Arm if model.is_hardware() => open(model, Dialog::Arm { typed: 0 }),
-        Action::Arm => wish(model, Intent::Arm),
+        Action::Arm => wish(model, OperatorRequest::Arm),
         Action::PreArm => open(model, Dialog::PreArm { selected: 0 }),
-        Action::SitDown => wish(model, Intent::SitDown),
-        Action::Acknowledge => wish(model, Intent::Acknowledge),
+        Action::SitDown => wish(model, OperatorRequest::SitDown),
+        Action::Acknowledge => wish(model, OperatorRequest::Acknowledge),
         Action::Approve => open_approval(model),
         Action::Override => open_override(model),
-        Action::ClearOverrides => wish(model, Intent::ClearOverrides),
+        Action::ClearOverrides => wish(model, OperatorRequest::ClearOverrides),
         Action::Fix => fix(model),
         Action::Bounds => bounds(model),
         Action::QueuePoint => queue_point(model),
-        Action::Skip => wish(model, Intent::Skip),
+        Action::Skip => wish(model, OperatorRequest::Skip),
         Action::Continue => open(model, Dialog::field(Purpose::Continue, "20")),
         Action::ConfirmBest => match model.search.as_ref().and_then(|search| search.confirming) {
-            Some(_) => wish(model, Intent::ConfirmBest { repeats: 0 }),
+            Some(_) => wish(model, OperatorRequest::ConfirmBest { repeats: 0 }),
             None => open(model, Dialog::field(Purpose::ConfirmBest, "10")),
         },
         Action::ExportBest => vec![Effect::ExportBest],
-        Action::Accept => wish(model, Intent::Judge(Verdict::Accept)),
-        Action::Fall => wish(model, Intent::Judge(Verdict::Fall)),
-        Action::Void => wish(model, Intent::Judge(Verdict::Void)),
+        Action::Accept => wish(model, OperatorRequest::Judge(Verdict::Accept)),
+        Action::Fall => wish(model, OperatorRequest::Judge(Verdict::Fall)),
+        Action::Void => wish(model, OperatorRequest::Judge(Verdict::Void)),
         Action::Rerun => rerun(model),
-        Action::Undo => wish(model, Intent::Undo),
+        Action::Undo => wish(model, OperatorRequest::Undo),
         Action::HandValue => match model.under_review().map(|trial| (trial.trial, trial.hand_value)) {
             Some((trial, value)) => {
                 let text = value.map(|value| value.to_string()).unwrap_or_default();
@@ -103,7 +104,7 @@ pub fn perform(model: &mut Model, action: Action) -> Vec<Effect> {
         }
         Action::Copy => match model.selected_trial().map(|trial| crate::view::trial_text::as_text(trial, model)) {
             Some(text) => {
-                say(model, Level::Info, "the row is on your terminal's clipboard (OSC 52)".to_owned());
+                say(model, LogLevel::Info, "the row is on your terminal's clipboard (OSC 52)".to_owned());
                 vec![Effect::Copy(text)]
             }
             None => Vec::new(),
@@ -125,15 +126,15 @@ pub fn perform(model: &mut Model, action: Action) -> Vec<Effect> {
             } else {
                 "mouse off: your terminal selects and copies text"
             };
-            say(model, Level::Info, text.to_owned());
+            say(model, LogLevel::Info, text.to_owned());
             vec![Effect::Mouse(model.mouse)]
         }
         Action::Redraw => {
-            say(model, Level::Info, "the screen was drawn again".to_owned());
+            say(model, LogLevel::Info, "the screen was drawn again".to_owned());
             vec![Effect::Redraw]
         }
         Action::Suspend => vec![Effect::Suspend],
-        Action::Quit if model.robot_needs_us() || model.stage_is(Stage::Review) && model.replay.is_none() => {
+        Action::Quit if model.robot_needs_us() || model.stage_is(ExperimentStage::Review) && model.replay.is_none() => {
             open(model, Dialog::Quit)
         }
         Action::Quit => vec![Effect::Quit],
@@ -161,7 +162,7 @@ fn open_override(model: &mut Model) -> Vec<Effect> {
 fn fix(model: &mut Model) -> Vec<Effect> {
     let Some(name) = model.override_parameter().map(|info| info.name.clone()) else { return Vec::new() };
     if model.searched(&name).is_some_and(|searched| searched.fixed.is_some()) {
-        return wish(model, Intent::Unfix { parameter: name });
+        return wish(model, OperatorRequest::Unfix { parameter: name });
     }
     let Some(value) = model.override_value() else { return Vec::new() };
     open(model, Dialog::field(Purpose::Fix { parameter: model.override_row, value }, "5"))
@@ -177,13 +178,13 @@ fn queue_point(model: &mut Model) -> Vec<Effect> {
     let Some(proposal) = model.proposal_on_table() else { return Vec::new() };
     let gains = proposal.gains.iter().filter(|gain| gain.value != gain.proposed);
     let point = proposal.parameters.iter().chain(gains).map(|p| (p.name.clone(), p.value)).collect();
-    wish(model, Intent::Enqueue(point))
+    wish(model, OperatorRequest::Enqueue(point))
 }
 
 /// Enter: what lies nearest, as long as nothing moves by it.
 fn open_details(model: &mut Model) -> Vec<Effect> {
     if may_acknowledge(model).is_ok() {
-        return wish(model, Intent::Acknowledge);
+        return wish(model, OperatorRequest::Acknowledge);
     }
     if model.view == View::Override && Action::Override.legal(model).is_ok() {
         return open_override(model);
@@ -195,7 +196,7 @@ fn open_details(model: &mut Model) -> Vec<Effect> {
     match trial.map(|trial| trial.trial) {
         Some(trial) => open(model, Dialog::Details { trial, scroll: 0 }),
         None => {
-            say(model, Level::Info, "there is no trial yet".to_owned());
+            say(model, LogLevel::Info, "there is no trial yet".to_owned());
             Vec::new()
         }
     }
@@ -203,11 +204,11 @@ fn open_details(model: &mut Model) -> Vec<Effect> {
 
 /// Under review: void and queue again. In the table: queue the chosen trial.
 fn rerun(model: &mut Model) -> Vec<Effect> {
-    let trial = match model.stage_is(Stage::Review) {
+    let trial = match model.stage_is(ExperimentStage::Review) {
         true => None,
         false => model.selected_trial().map(|trial| trial.trial),
     };
-    wish(model, Intent::Rerun { trial })
+    wish(model, OperatorRequest::Rerun { trial })
 }
 
 fn show(model: &mut Model, view: View) -> Vec<Effect> {

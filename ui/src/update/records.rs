@@ -1,9 +1,8 @@
 //! What a record of the session changes on the screen: rows, the log, the answer to the operator, the bell.
 
-use quadfrog::realtime::telemetry::Mode;
-use quadfrog::recording::record::{
-    CommandRecord, Level, Record, Source, Stage, StageInfo, Stamped, TrialRecord, Verdict,
-};
+use quadfrog::recording::record::{LogLevel, Record, RequestRecord, StageRecord, Stamped};
+use quadfrog::telemetry::Mode;
+use quadfrog::trial::{ExperimentStage, ProposalSource, TrialRecord, Verdict};
 
 use super::{Effect, say};
 use crate::action::Action;
@@ -26,7 +25,7 @@ pub(super) fn close_stale_dialog(model: &mut Model) {
     };
     if stale {
         model.dialog = None;
-        say(model, Level::Warning, "the question was closed: the situation has changed".to_owned());
+        say(model, LogLevel::Warning, "the question was closed: the situation has changed".to_owned());
     }
 }
 
@@ -40,14 +39,14 @@ pub(super) fn take(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
                 info.task, info.robot, info.backend, info.sampler, info.version, info.seed
             );
             model.session = info;
-            log(model, time_ns, Level::Info, "session", text, false);
+            log(model, time_ns, LogLevel::Info, "session", text, false);
         }
         Record::Transition(change) => {
             let stopped = matches!(change.to, Mode::Damped | Mode::Fault);
             let level = match change.to {
-                Mode::Fault => Level::Error,
-                Mode::Damped => Level::Warning,
-                _ => Level::Info,
+                Mode::Fault => LogLevel::Error,
+                Mode::Damped => LogLevel::Warning,
+                _ => LogLevel::Info,
             };
             if stopped {
                 model.stopped_because = change.cause.clone();
@@ -70,20 +69,20 @@ pub(super) fn take(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
             if entered {
                 note_time(model, info, time_ns);
                 match info.stage {
-                    Stage::Proposed => bells.push(BellCause::Proposal),
-                    Stage::Review => {
+                    ExperimentStage::Proposed => bells.push(BellCause::Proposal),
+                    ExperimentStage::Review => {
                         bells.push(BellCause::Verdict);
                         say_suggestion(model, info.trial);
                     }
-                    Stage::Running => {}
-                    Stage::Finished => {
+                    ExperimentStage::Running => {}
+                    ExperimentStage::Finished => {
                         let best = model.best().and_then(|best| Some((best.trial, best.value?)));
                         let best = best.map_or("no trial was accepted".to_owned(), |(trial, value)| {
                             format!("the best is trial {trial}, J = {value:.3} {}", model.session.unit)
                         });
                         let text = format!("the study is finished: {best}");
-                        say(model, Level::Info, text.clone());
-                        log(model, time_ns, Level::Info, "study", text, true);
+                        say(model, LogLevel::Info, text.clone());
+                        log(model, time_ns, LogLevel::Info, "study", text, true);
                     }
                 }
             }
@@ -92,7 +91,7 @@ pub(super) fn take(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
             let values: Vec<String> =
                 proposal.parameters.iter().map(|p| format!("{} {:.4}", p.name, p.value)).collect();
             let text = format!("trial {} ({}): {}", proposal.trial, proposal.source.name(), values.join(", "));
-            log(model, time_ns, Level::Info, "proposal", text, proposal.revision == 0);
+            log(model, time_ns, LogLevel::Info, "proposal", text, proposal.revision == 0);
             model.proposal = Some(proposal);
         }
         Record::Trial(trial) => {
@@ -106,21 +105,21 @@ pub(super) fn take(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
                 say_suggestion(model, number);
             }
         }
-        Record::Command(command) => answer(model, time_ns, command),
+        Record::Request(command) => answer(model, time_ns, command),
         Record::Counters(counters) => model.snapshot.counters = counters,
         Record::Log(line) => {
-            if line.level > Level::Info {
+            if line.level > LogLevel::Info {
                 say(model, line.level, line.message.clone());
             }
             log(model, time_ns, line.level, &line.source, line.message, false);
         }
-        Record::PreArm(list) => model.pre_arm = list,
+        Record::ArmingChecks(list) => model.pre_arm = list,
         Record::Search(search) => model.search = Some(search),
         Record::Insight(insight) => model.insight = Some(insight),
         Record::Points(points) => model.points = points,
         Record::FaultTicks(ticks) => {
             let text = format!("the last {} ticks before the fault are in the recording", ticks.len());
-            log(model, time_ns, Level::Error, "control", text, false);
+            log(model, time_ns, LogLevel::Error, "control", text, false);
         }
     }
     close_stale_dialog(model);
@@ -129,17 +128,17 @@ pub(super) fn take(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
 }
 
 /// Keeps when a trial began and ended.
-fn note_time(model: &mut Model, info: StageInfo, time_ns: u64) {
+fn note_time(model: &mut Model, info: StageRecord, time_ns: u64) {
     match info.stage {
-        Stage::Running => {
+        ExperimentStage::Running => {
             model.ran.insert(info.trial, RunTime { begun_ns: time_ns, ended_ns: None });
         }
-        Stage::Review => {
+        ExperimentStage::Review => {
             if let Some(ran) = model.ran.get_mut(&info.trial) {
                 ran.ended_ns.get_or_insert(time_ns);
             }
         }
-        Stage::Proposed | Stage::Finished => {}
+        ExperimentStage::Proposed | ExperimentStage::Finished => {}
     }
 }
 
@@ -147,13 +146,13 @@ fn note_time(model: &mut Model, info: StageInfo, time_ns: u64) {
 fn say_suggestion(model: &mut Model, trial: u32) {
     let Some(row) = model.trials.get(&trial).filter(|row| row.verdict.is_none()) else { return };
     let Some(suggested) = row.suggested else { return };
-    let level = if suggested == Verdict::Accept { Level::Info } else { Level::Warning };
+    let level = if suggested == Verdict::Accept { LogLevel::Info } else { LogLevel::Warning };
     let text = format!("trial #{trial} looks like {}: {}", suggested.name(), row.cause);
     say(model, level, text);
 }
 
-fn answer(model: &mut Model, time_ns: u64, command: CommandRecord) {
-    let (level, outcome) = if command.accepted { (Level::Info, "") } else { (Level::Warning, "refused: ") };
+fn answer(model: &mut Model, time_ns: u64, command: RequestRecord) {
+    let (level, outcome) = if command.accepted { (LogLevel::Info, "") } else { (LogLevel::Warning, "refused: ") };
     let text = match command.answer.as_str() {
         "" => command.wish.clone(),
         answer => format!("{}: {outcome}{answer}", command.wish),
@@ -169,8 +168,11 @@ fn log_trial(model: &mut Model, time_ns: u64, trial: &TrialRecord) {
     let text = match (trial.verdict, trial.suggested) {
         (Some(verdict), _) if !known(|t| t.verdict) => {
             let value = trial.value.map(|v| format!(", J = {v:.3} {}", model.session.unit)).unwrap_or_default();
-            let source =
-                if trial.source == Source::Sampler { String::new() } else { format!(" ({})", trial.source.name()) };
+            let source = if trial.source == ProposalSource::Sampler {
+                String::new()
+            } else {
+                format!(" ({})", trial.source.name())
+            };
             format!("trial {}{source}: {}{value}", trial.trial, verdict.name())
         }
         (None, Some(verdict)) if !known(|t| t.suggested) => {
@@ -179,10 +181,10 @@ fn log_trial(model: &mut Model, time_ns: u64, trial: &TrialRecord) {
         }
         _ => return,
     };
-    log(model, time_ns, Level::Info, "trial", text, trial.verdict.is_some());
+    log(model, time_ns, LogLevel::Info, "trial", text, trial.verdict.is_some());
 }
 
-fn log(model: &mut Model, time_ns: u64, level: Level, source: &str, text: String, marker: bool) {
+fn log(model: &mut Model, time_ns: u64, level: LogLevel, source: &str, text: String, marker: bool) {
     if model.log.len() == LOG_LINES {
         model.log.pop_front();
     }

@@ -8,7 +8,7 @@
 //! 0.75    1.243             1.75
 //! ```
 
-use quadfrog::recording::record::ParameterInsight;
+use quadfrog::trial::ParameterInsight;
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 

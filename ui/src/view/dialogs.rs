@@ -9,7 +9,7 @@
 //!          └─────────────────────────────────────────────────┘
 //! ```
 
-use quadfrog::session::intent::OperatorCheck;
+use quadfrog::session::operator_request::OperatorCheck;
 use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::symbols::border;

@@ -6,10 +6,9 @@
 //!   wakes late p50 61 us, p99 94 us ...
 //! ```
 
-use quadfrog::realtime::pre_arm::Check;
-use quadfrog::realtime::telemetry::StageTimes;
 use quadfrog::recording::recorder::RecorderStatus;
 use quadfrog::robot::{JOINTS, LinkStatus, joint_name};
+use quadfrog::telemetry::{ArmingCheck, StageTimes};
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
@@ -199,7 +198,7 @@ fn written(status: &RecorderStatus, time_ns: u64) -> String {
 
 /// The room on the disk, as the pre-arm list found it.
 fn disk_row(model: &Model) -> Row {
-    let disk = model.pre_arm.iter().find(|item| item.check == Check::Disk);
+    let disk = model.pre_arm.iter().find(|item| item.check == ArmingCheck::Disk);
     match disk {
         Some(disk) => row("disk", disk.found.clone(), !disk.state.allows()),
         None => row("disk", "-".to_owned(), false),

@@ -4,8 +4,8 @@
 //!  Press g twice to jump  ·  o override  ·  n skip  ·  D sit down
 //! ```
 
-use quadfrog::realtime::telemetry::Mode;
-use quadfrog::recording::record::{Stage, Verdict};
+use quadfrog::telemetry::Mode;
+use quadfrog::trial::{ExperimentStage, Verdict};
 use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
@@ -58,7 +58,7 @@ fn live(model: &Model) -> NextStep {
         _ => {}
     }
     let stage = model.stage.map(|info| info.stage);
-    if stage == Some(Stage::Review) {
+    if stage == Some(ExperimentStage::Review) {
         return review(model);
     }
     match model.mode() {
@@ -72,7 +72,7 @@ fn live(model: &Model) -> NextStep {
             )
         }
         Mode::Offline | Mode::Observe => step("Waiting for the robot to answer.", model, &[quit]),
-        Mode::Disarmed if stage == Some(Stage::Finished) => step(
+        Mode::Disarmed if stage == Some(ExperimentStage::Finished) => step(
             "The study is finished.",
             model,
             &[
@@ -102,7 +102,7 @@ fn live(model: &Model) -> NextStep {
             model,
             &[(Action::Override, "override"), (Action::Undo, "undo"), (Action::Help, "help"), quit],
         ),
-        Mode::Ready if stage == Some(Stage::Finished) => step(
+        Mode::Ready if stage == Some(ExperimentStage::Finished) => step(
             "The study is finished.",
             model,
             &[

@@ -10,13 +10,13 @@
 //! 0.75       1.75   0         150       150        350
 //! ```
 
-use quadfrog::recording::record::Verdict;
+use quadfrog::trial::Verdict;
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::widgets::Paragraph;
 
-use super::objective::sign;
-use super::{densities, heading, number, objective, points};
+use super::objective::{self, sign};
+use super::{densities, heading, number, points};
 use crate::model::Model;
 use crate::theme::Role;
 

@@ -6,9 +6,9 @@
 //! >word area clear, remote in hand  x gives your word
 //! ```
 
-use quadfrog::realtime::pre_arm::CheckState;
-use quadfrog::recording::record::PreArmCheck;
-use quadfrog::session::intent::OperatorCheck;
+use quadfrog::recording::record::ArmingCheckRecord;
+use quadfrog::session::operator_request::OperatorCheck;
+use quadfrog::telemetry::ArmingCheckState;
 use ratatui::text::{Line, Span};
 
 use super::{cut, span};
@@ -16,12 +16,12 @@ use crate::model::Model;
 use crate::theme::Role;
 
 /// A word and a role for how a check stands.
-fn mark(state: CheckState) -> (&'static str, Role) {
+fn mark(state: ArmingCheckState) -> (&'static str, Role) {
     match state {
-        CheckState::Passed => ("ok", Role::Good),
-        CheckState::Failed => ("FAIL", Role::Bad),
-        CheckState::Waiting => ("you", Role::Warning),
-        CheckState::NotNeeded => ("-", Role::Quiet),
+        ArmingCheckState::Passed => ("ok", Role::Good),
+        ArmingCheckState::Failed => ("FAIL", Role::Bad),
+        ArmingCheckState::Waiting => ("you", Role::Warning),
+        ArmingCheckState::NotNeeded => ("-", Role::Quiet),
     }
 }
 
@@ -29,20 +29,20 @@ fn mark(state: CheckState) -> (&'static str, Role) {
 /// the operator is about to give their word on.
 pub fn lines(model: &Model, width: usize, few: usize, chosen: Option<OperatorCheck>) -> Vec<Line<'static>> {
     let theme = &model.theme;
-    let mut items: Vec<&PreArmCheck> = model.pre_arm.iter().collect();
+    let mut items: Vec<&ArmingCheckRecord> = model.pre_arm.iter().collect();
     if items.len() > few {
         items.sort_by_key(|item| item.state.allows());
         items.truncate(few);
     }
     // Half of a narrow terminal has room for what was found alone.
     let name_width = if width < 60 { 1 } else { 27 };
-    let line = |item: &PreArmCheck| {
+    let line = |item: &ArmingCheckRecord| {
         let (word, role) = mark(item.state);
         let selected = chosen.is_some_and(|check| check.check() == item.check);
         let name = item.check.name();
         let gap = name_width.max(name.chars().count() + 1) - name.chars().count();
         let text = match (item.found.as_str(), item.needed.as_str()) {
-            (found, needed) if item.state == CheckState::NotNeeded || width < 60 || needed.is_empty() => {
+            (found, needed) if item.state == ArmingCheckState::NotNeeded || width < 60 || needed.is_empty() => {
                 if found.is_empty() { needed.to_owned() } else { found.to_owned() }
             }
             (found, needed) => format!("{found:<20} {needed}"),

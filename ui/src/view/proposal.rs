@@ -10,7 +10,7 @@
 //!  nearest is #3 at 0.21                looks like accept
 //! ```
 
-use quadfrog::recording::record::{Proposal, ProposedParameter, Risk, Source, Stage, TrialRecord, Verdict};
+use quadfrog::trial::{ExperimentStage, FallRisk, Proposal, ProposalSource, ProposedParameter, TrialRecord, Verdict};
 use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
@@ -28,7 +28,7 @@ pub fn rows(model: &Model) -> u16 {
     let gains = model.proposal_on_table().map_or(0, changed) as u16;
     // Repeats are shown while the best is being confirmed and when the study is finished.
     let confirming = model.search.as_ref().is_some_and(|search| search.confirming.is_some());
-    let repeats = match confirming || model.stage_is(Stage::Finished) {
+    let repeats = match confirming || model.stage_is(ExperimentStage::Finished) {
         true => model.points.len().min(4) as u16 + u16::from(confirming),
         false => 0,
     };
@@ -48,17 +48,19 @@ fn content(model: &Model, width: usize) -> (String, Vec<Line<'static>>) {
         return (format!("Trial #{}: judge it", trial.trial), review(model, trial));
     }
     match (stage, &model.proposal) {
-        (Some(Stage::Finished), _) => ("Study finished".to_owned(), finished(model, width)),
+        (Some(ExperimentStage::Finished), _) => ("Study finished".to_owned(), finished(model, width)),
         (_, Some(proposal)) => {
-            let running = stage == Some(Stage::Running);
+            let running = stage == Some(ExperimentStage::Running);
             let title = match (running, proposal.source, proposal.parent) {
                 (true, _, _) => format!("Trial #{} runs", proposal.trial),
-                (false, Source::Sampler, _) => format!("Trial #{}, by the sampler", proposal.trial),
-                (false, Source::Operator, _) => format!("Trial #{}, overridden", proposal.trial),
-                (false, Source::Rerun, Some(parent)) => format!("Trial #{}, re-run of #{parent}", proposal.trial),
-                (false, Source::Rerun, None) => format!("Trial #{}, a re-run", proposal.trial),
-                (false, Source::Confirm, _) => format!("Trial #{}, to confirm the best", proposal.trial),
-                (false, Source::Queued, _) => format!("Trial #{}, from the queue", proposal.trial),
+                (false, ProposalSource::Sampler, _) => format!("Trial #{}, by the sampler", proposal.trial),
+                (false, ProposalSource::Operator, _) => format!("Trial #{}, overridden", proposal.trial),
+                (false, ProposalSource::Rerun, Some(parent)) => {
+                    format!("Trial #{}, re-run of #{parent}", proposal.trial)
+                }
+                (false, ProposalSource::Rerun, None) => format!("Trial #{}, a re-run", proposal.trial),
+                (false, ProposalSource::Confirm, _) => format!("Trial #{}, to confirm the best", proposal.trial),
+                (false, ProposalSource::Queued, _) => format!("Trial #{}, from the queue", proposal.trial),
             };
             let mut lines: Vec<Line> = proposal.parameters.iter().map(|p| parameter(model, p, width)).collect();
             let changed = proposal.gains.iter().filter(|gain| gain.value != gain.proposed);
@@ -103,7 +105,7 @@ pub fn place(theme: &crate::theme::Theme, value: f64, low: f64, high: f64, width
     format!("[{}o{}]", theme.line().repeat(at), theme.line().repeat(inner - 1 - at))
 }
 
-fn risk(model: &Model, risk: Option<Risk>) -> Line<'static> {
+fn risk(model: &Model, risk: Option<FallRisk>) -> Line<'static> {
     let theme = &model.theme;
     let Some(risk) = risk.filter(|risk| risk.neighbours > 0) else {
         return Line::from(span(theme, Role::Quiet, " no judged trial near it yet"));

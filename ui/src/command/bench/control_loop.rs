@@ -10,20 +10,20 @@ use std::time::Duration;
 use clap::Args;
 use color_eyre::eyre::{WrapErr, eyre};
 use quadfrog::config::{Backend, Config};
-use quadfrog::control::body::Body;
-use quadfrog::control::settings::Settings;
+use quadfrog::control::control_loop::ControlLoop;
+use quadfrog::control::settings::ControlSettings;
 use quadfrog::realtime::channel::{ScreenEnd, SessionEnd, channels};
 use quadfrog::realtime::clock::{Clock, MonotonicClock};
-use quadfrog::realtime::command::{Command, Permit, Task};
-use quadfrog::realtime::scheduling::{Granted, Scheduling};
+use quadfrog::realtime::scheduling::{GrantedSettings, Scheduling};
 use quadfrog::realtime::system::isolated_cores;
-use quadfrog::realtime::telemetry::{Event, Mode, Tick};
 use quadfrog::realtime::thread::{CONTROL_PHASE, Instant, Paced, REHEARSAL_LEAD, pace, pace_rehearsed};
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::robot::go1::Go1;
 use quadfrog::robot::{Placement, Robot};
 use quadfrog::sim::Simulator;
 use quadfrog::sim::emulator::Emulator;
+use quadfrog::telemetry::{Command, Event, Mode, Permit, Tick};
+use quadfrog::trial::Task;
 
 use super::machine::{self, Durations, PERIOD, durations};
 use crate::command::failure::Failure;
@@ -88,7 +88,7 @@ struct LoopMeasurement {
     warm_up: Durations,
     /// Number of ticks in a mode other than READY.
     not_ready: u64,
-    granted: Option<Granted>,
+    granted: Option<GrantedSettings>,
 }
 
 impl LoopMeasurement {
@@ -297,7 +297,7 @@ impl ChannelEnds {
 
 /// A control loop whose robot stands up and is then measured while it stands.
 struct StandingLoop<'a> {
-    body: Body,
+    control: ControlLoop,
     robot: &'a mut dyn Robot,
     clock: MonotonicClock,
     channels: ChannelEnds,
@@ -325,7 +325,7 @@ impl StandingLoop<'_> {
 impl Paced for StandingLoop<'_> {
     fn rehearse(&mut self) {
         let start_ns = self.clock.now_ns();
-        self.body.rehearse(&self.clock, self.robot);
+        self.control.rehearse(&self.clock, self.robot);
         if self.standing_up.is_none() {
             self.measurement.warm_up.saturating_record((self.clock.now_ns() - start_ns).max(1));
         }
@@ -333,7 +333,7 @@ impl Paced for StandingLoop<'_> {
 
     fn tick(&mut self, instant: Instant) -> ControlFlow<()> {
         let start_ns = self.clock.now_ns();
-        let tick = self.body.tick(instant, &self.clock, self.robot);
+        let tick = self.control.tick(instant, &self.clock, self.robot);
         let duration_ns = self.clock.now_ns() - start_ns;
         let mode = tick.mode;
         if self.standing_up.is_none() {
@@ -341,7 +341,7 @@ impl Paced for StandingLoop<'_> {
             self.remaining -= 1;
         }
         let start_ns = self.clock.now_ns();
-        self.body.prepare();
+        self.control.prepare();
         if self.standing_up.is_none() {
             self.measurement.prepare.saturating_record((self.clock.now_ns() - start_ns).max(1));
         }
@@ -357,7 +357,7 @@ impl Paced for StandingLoop<'_> {
 
 fn stand_and_measure(
     scheduling: Scheduling,
-    settings: &Settings,
+    settings: &ControlSettings,
     ticks: u64,
     lead: Duration,
     robot: &mut dyn Robot,
@@ -368,12 +368,12 @@ fn stand_and_measure(
     let (end, session, screen, ring) = channels();
     let mut channels = ChannelEnds { session, screen, ticks: ring, mode_changes: 0 };
     channels.drain();
-    let body = Body::new(settings, end);
+    let control = ControlLoop::new(settings, end);
     let mut standing =
-        StandingLoop { body, robot, clock, channels, standing_up: Some(0), remaining: ticks, measurement };
+        StandingLoop { control, robot, clock, channels, standing_up: Some(0), remaining: ticks, measurement };
     pace_rehearsed(PERIOD, CONTROL_PHASE, lead, &mut standing).wrap_err("waiting on the monotonic clock")?;
     if standing.standing_up.is_some() {
-        let mode = standing.body.mode().name();
+        let mode = standing.control.mode().name();
         return Err(eyre!(
             "the robot did not reach READY within {} s; its mode is {mode}",
             STAND_UP_LIMIT_TICKS / 1000
