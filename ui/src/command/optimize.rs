@@ -6,8 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-use clap::Args;
-use clap::builder::TypedValueParser;
+use clap::{Args, ValueEnum};
 use color_eyre::eyre::eyre;
 use quadfrog::config::{Backend, Config};
 use quadfrog::engine::{self, EngineError, Options, StoredStudy};
@@ -24,24 +23,19 @@ use quadfrog::trial::{Approval, Task, TrialRecord, Verdict};
 
 use printer::Printer;
 
-use super::arguments::{self, StudyArguments, one_of};
+use super::arguments::{self, StudyArguments};
 use super::failure::Failure;
 use super::selection::{SelectedStudy, parse_storage, study_to_continue, study_to_join};
 
 /// The trials whose ticks are recorded.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum RecordChoice {
+    /// Nothing
     None,
+    /// The best trial
     Best,
+    /// Every trial
     All,
-}
-
-fn record_choice() -> impl TypedValueParser<Value = RecordChoice> {
-    one_of([
-        (RecordChoice::None, "none", "Nothing"),
-        (RecordChoice::Best, "best", "The best trial"),
-        (RecordChoice::All, "all", "Every trial"),
-    ])
 }
 
 #[derive(Debug, Args)]
@@ -65,7 +59,7 @@ pub struct OptimizeArguments {
     #[arg(long)]
     json: bool,
     /// Trials to record
-    #[arg(long, value_name = "WHAT", default_value = "best", value_parser = record_choice())]
+    #[arg(long, value_name = "WHAT", default_value = "best")]
     record: RecordChoice,
     /// Studies that run at the same time [default: the number of cores]; with --join: workers [default: 1]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]

@@ -5,8 +5,7 @@ use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-use clap::builder::TypedValueParser;
-use clap::{Args, Subcommand};
+use clap::{Args, Subcommand, ValueEnum};
 use color_eyre::eyre::{WrapErr, eyre};
 use quadfrog::config::Config;
 use quadfrog::engine::{Opened, StoredStudy, newest_config, open_stored, stored_studies, study_files, study_name};
@@ -18,7 +17,6 @@ use quadfrog::report::table;
 use quadfrog::session::experiment::{self, rows_of};
 use quadfrog::trial::TrialRecord;
 
-use super::arguments::one_of;
 use super::failure::Failure;
 use super::selection::parse_storage;
 
@@ -46,7 +44,7 @@ enum StudySubcommand {
         #[command(flatten)]
         study: StudySelector,
         /// Format of the table [default: by the file's name, else csv]
-        #[arg(long, value_name = "FORM", value_parser = table_format())]
+        #[arg(long, value_name = "FORM")]
         format: Option<TableFormat>,
         /// Output file [default: standard output]
         #[arg(long, short, value_name = "FILE")]
@@ -60,7 +58,7 @@ enum StudySubcommand {
         #[arg(value_name = "FILE")]
         table: PathBuf,
         /// Format of the table [default: by the file's name, else csv]
-        #[arg(long, value_name = "FORM", value_parser = table_format())]
+        #[arg(long, value_name = "FORM")]
         format: Option<TableFormat>,
         /// Queue the points to be run instead; their results are ignored
         #[arg(long)]
@@ -94,14 +92,10 @@ struct StudySelector {
     name: Option<String>,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum TableFormat {
     Csv,
     Json,
-}
-
-fn table_format() -> impl TypedValueParser<Value = TableFormat> {
-    one_of([(TableFormat::Csv, "csv", "CSV"), (TableFormat::Json, "json", "JSON")])
 }
 
 impl TableFormat {

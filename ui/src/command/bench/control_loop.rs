@@ -65,7 +65,7 @@ impl LoopArguments {
     }
 }
 
-/// The measurements of one turn, or of several together.
+/// The measurements of all turns.
 struct LoopMeasurement {
     /// Start of every tick after its planned time.
     lateness: Durations,
@@ -74,7 +74,7 @@ struct LoopMeasurement {
     wake_up: Durations,
     /// `wake_up` in whole microseconds, the resolution of cyclictest.
     wake_up_floor: Durations,
-    /// End of the last tick, ns since the start of the loop.
+    /// End of the last tick, ns since the start of the turn.
     end_ns: u64,
     tick: Durations,
     read: Durations,
@@ -102,30 +102,6 @@ impl LoopMeasurement {
             lateness, wake_up, wake_up_floor, end_ns, tick, read, decide, write, publish, prepare, warm_up, not_ready, granted,
         };
         measurement
-    }
-
-    fn histograms(&mut self) -> [&mut Durations; 10] {
-        [
-            &mut self.lateness,
-            &mut self.wake_up,
-            &mut self.wake_up_floor,
-            &mut self.tick,
-            &mut self.read,
-            &mut self.decide,
-            &mut self.write,
-            &mut self.publish,
-            &mut self.prepare,
-            &mut self.warm_up,
-        ]
-    }
-
-    fn add(&mut self, mut other: LoopMeasurement) -> Result<(), Failure> {
-        for (sum, part) in self.histograms().into_iter().zip(other.histograms()) {
-            sum.add(&*part).wrap_err("adding two histograms")?;
-        }
-        self.not_ready += other.not_ready;
-        self.granted = other.granted.or(self.granted.take());
-        Ok(())
     }
 
     fn record(&mut self, instant: Instant, duration_ns: u64, tick: &Tick) {
@@ -164,10 +140,9 @@ pub fn run(arguments: &LoopArguments) -> Result<(), Failure> {
         if arguments.cyclictest && turn % 2 == 1 {
             machine::cyclictest(scheduling, ticks, &mut cyclictest)?;
         }
-        ours.add(measure(scheduling, arguments, ticks)?)?;
+        ours = measure(scheduling, arguments, ticks, ours)?;
         if arguments.with_link {
-            let calls = machine::system_calls(scheduling, arguments.lead(), ticks)?;
-            system_calls.add(calls).wrap_err("adding two histograms")?;
+            system_calls = machine::system_calls(scheduling, arguments.lead(), ticks, system_calls)?;
         }
         if arguments.cyclictest && turn % 2 == 0 {
             machine::cyclictest(scheduling, ticks, &mut cyclictest)?;
@@ -233,8 +208,13 @@ fn us(ns: u64) -> f64 {
     ns as f64 * 1e-3
 }
 
-/// Runs a control thread as the engine does, until its robot stands, and then measures `ticks` ticks.
-fn measure(scheduling: Scheduling, arguments: &LoopArguments, ticks: u64) -> Result<LoopMeasurement, Failure> {
+/// Runs a control thread as the engine does, until its robot stands, and then adds `ticks` ticks to the measurement.
+fn measure(
+    scheduling: Scheduling,
+    arguments: &LoopArguments,
+    ticks: u64,
+    measurement: LoopMeasurement,
+) -> Result<LoopMeasurement, Failure> {
     let config = Config::load(None)?;
     let mut description = RobotDescription::embedded("go1").map_err(Failure::input)?;
     let backend = if arguments.with_link { Backend::Hardware } else { Backend::Simulator };
@@ -245,7 +225,9 @@ fn measure(scheduling: Scheduling, arguments: &LoopArguments, ticks: u64) -> Res
     if !arguments.with_link {
         let mut robot = Simulator::new(&description, &config.simulator).map_err(Failure::input)?;
         robot.place(&Placement { joint_position: settings.lying_position, lying: true, seed: 0 });
-        return machine::in_a_thread(move || stand_and_measure(scheduling, &settings, ticks, lead, &mut robot));
+        return machine::in_a_thread(move || {
+            stand_and_measure(scheduling, &settings, ticks, lead, measurement, &mut robot)
+        });
     }
     let any_port = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
     let mut emulator = Emulator::bind(any_port, &description, &config.simulator, 0).map_err(Failure::input)?;
@@ -265,7 +247,8 @@ fn measure(scheduling: Scheduling, arguments: &LoopArguments, ticks: u64) -> Res
             if flag.load(Ordering::Acquire) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         })
     });
-    let measured = machine::in_a_thread(move || stand_and_measure(scheduling, &settings, ticks, lead, &mut robot));
+    let measured =
+        machine::in_a_thread(move || stand_and_measure(scheduling, &settings, ticks, lead, measurement, &mut robot));
     ending.store(true, Ordering::Release);
     let _ = emulated.join();
     measured
@@ -360,10 +343,10 @@ fn stand_and_measure(
     settings: &ControlSettings,
     ticks: u64,
     lead: Duration,
+    mut measurement: LoopMeasurement,
     robot: &mut dyn Robot,
 ) -> Result<LoopMeasurement, color_eyre::Report> {
-    let granted = Some(scheduling.apply());
-    let measurement = LoopMeasurement { granted, ..LoopMeasurement::new() };
+    (measurement.end_ns, measurement.granted) = (0, Some(scheduling.apply()));
     let clock = MonotonicClock::start();
     let (end, session, screen, ring) = channels();
     let mut channels = ChannelEnds { session, screen, ticks: ring, mode_changes: 0 };

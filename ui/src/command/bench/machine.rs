@@ -103,11 +103,16 @@ impl Paced for SystemCallLoop {
     }
 }
 
-/// Measures the system calls of a tick at the period and priority of the control thread.
-pub fn system_calls(scheduling: Scheduling, lead: Duration, ticks: u64) -> Result<Durations, Failure> {
+/// Adds `ticks` measurements of the system calls of a tick, at the period and priority of the control thread.
+pub fn system_calls(
+    scheduling: Scheduling,
+    lead: Duration,
+    ticks: u64,
+    durations: Durations,
+) -> Result<Durations, Failure> {
     let open = || LoopbackPair::open().wrap_err("sockets on the loopback");
     let (pair, warm_up, clock) = (open()?, open()?, MonotonicClock::start());
-    let mut calls = SystemCallLoop { pair, warm_up, clock, durations: durations(), remaining: ticks };
+    let mut calls = SystemCallLoop { pair, warm_up, clock, durations, remaining: ticks };
     in_a_thread(move || {
         let _granted = scheduling.apply();
         pace_rehearsed(PERIOD, CONTROL_PHASE, lead, &mut calls).wrap_err("waiting on the monotonic clock")?;
