@@ -16,7 +16,7 @@ use quadfrog::control::control_loop::ControlLoop;
 use quadfrog::control::settings::ControlSettings;
 use quadfrog::realtime::channel::{ControlEnd, ScreenEnd, SessionEnd, channels};
 use quadfrog::realtime::clock::MonotonicClock;
-use quadfrog::realtime::thread::Instant;
+use quadfrog::realtime::thread::TickStart;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::robot::{Battery, JointCommand, LinkStatus, Placement, Robot, RobotError, RobotState};
 use quadfrog::sim::Simulator;
@@ -103,7 +103,7 @@ impl Bench {
             if self.beats {
                 self.screen.heartbeat.beat();
             }
-            let instant = Instant { planned_ns: self.time_ms * 1_000_000, lateness_ns: 0 };
+            let instant = TickStart { planned_ns: self.time_ms * 1_000_000, lateness_ns: 0 };
             let Bench { body, machine, clock, .. } = self;
             let mode = without_allocation(|| {
                 body.rehearse(clock, machine);

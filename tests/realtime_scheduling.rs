@@ -19,7 +19,7 @@ fn apply(scheduling: Scheduling) -> (Vec<RealtimeSetting>, Vec<String>) {
             if ticks == 20 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         })
         .unwrap();
-        (granted.favours, granted.shortfalls.iter().map(ToString::to_string).collect())
+        (granted.granted, granted.denied.iter().map(ToString::to_string).collect())
     });
     granted.join().unwrap()
 }
@@ -67,7 +67,7 @@ fn a_rehearsal_comes_before_its_tick_or_not_at_all() {
         /// How long before its tick was due each rehearsal began, ns, or somewhat more: the clock is read late.
         leads: Vec<u64>,
     }
-    impl thread::Paced for Course {
+    impl thread::PeriodicTask for Course {
         fn rehearse(&mut self) {
             self.rehearsed.push((self.next, now_ns()));
             if self.next >= 20 {
@@ -75,7 +75,7 @@ fn a_rehearsal_comes_before_its_tick_or_not_at_all() {
                 std::thread::sleep(LEAD + LEAD / 2);
             }
         }
-        fn tick(&mut self, instant: thread::Instant) -> ControlFlow<()> {
+        fn tick(&mut self, instant: thread::TickStart) -> ControlFlow<()> {
             if let Some((next, began_ns)) = self.rehearsed.last()
                 && *next == self.next
             {

@@ -18,7 +18,7 @@ use quadfrog::realtime::channel::{ScreenEnd, SessionEnd, channels};
 use quadfrog::realtime::clock::{Clock, MonotonicClock};
 use quadfrog::realtime::scheduling::{GrantedSettings, Scheduling};
 use quadfrog::realtime::system::isolated_cores;
-use quadfrog::realtime::thread::{CONTROL_PHASE, Instant, Paced, REHEARSAL_LEAD, pace, pace_rehearsed};
+use quadfrog::realtime::thread::{CONTROL_PHASE, PeriodicTask, REHEARSAL_LEAD, TickStart, pace, pace_rehearsed};
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::robot::go1::Go1;
 use quadfrog::robot::go1::packet::{COMMAND_LENGTH, STATE_LENGTH};
@@ -144,7 +144,7 @@ impl Measured {
         Ok(())
     }
 
-    fn take(&mut self, instant: Instant, cost_ns: u64, tick: &Tick) {
+    fn take(&mut self, instant: TickStart, cost_ns: u64, tick: &Tick) {
         self.lateness.saturating_record(instant.lateness_ns.max(1));
         if instant.planned_ns >= self.ended_ns {
             self.wake_up.saturating_record(instant.lateness_ns.max(1));
@@ -197,9 +197,9 @@ pub fn run(arguments: &LoopArguments) -> Result<(), Failure> {
 
 fn report(arguments: &LoopArguments, ours: &Measured, theirs: &Times, alone: &Times) {
     if let Some(granted) = &ours.granted {
-        let favours: Vec<_> = granted.favours.iter().map(ToString::to_string).collect();
+        let favours: Vec<_> = granted.granted.iter().map(ToString::to_string).collect();
         println!("granted: {}", if favours.is_empty() { "nothing".to_owned() } else { favours.join(", ") });
-        for shortfall in &granted.shortfalls {
+        for shortfall in &granted.denied {
             println!("{shortfall}");
         }
     }
@@ -342,13 +342,13 @@ struct Exchange {
     left: u64,
 }
 
-impl Paced for Exchange {
+impl PeriodicTask for Exchange {
     fn rehearse(&mut self) {
         self.rehearsed.answer();
         self.rehearsed.tick();
     }
 
-    fn tick(&mut self, _: Instant) -> ControlFlow<()> {
+    fn tick(&mut self, _: TickStart) -> ControlFlow<()> {
         let began_ns = self.clock.now_ns();
         self.ends.tick();
         self.taken.saturating_record((self.clock.now_ns() - began_ns).max(1));
@@ -423,7 +423,7 @@ impl Standing<'_> {
     }
 }
 
-impl Paced for Standing<'_> {
+impl PeriodicTask for Standing<'_> {
     fn rehearse(&mut self) {
         let began_ns = self.clock.now_ns();
         self.body.rehearse(&self.clock, self.robot);
@@ -432,7 +432,7 @@ impl Paced for Standing<'_> {
         }
     }
 
-    fn tick(&mut self, instant: Instant) -> ControlFlow<()> {
+    fn tick(&mut self, instant: TickStart) -> ControlFlow<()> {
         let began_ns = self.clock.now_ns();
         let tick = self.body.tick(instant, &self.clock, self.robot);
         let cost_ns = self.clock.now_ns() - began_ns;

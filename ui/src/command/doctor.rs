@@ -159,10 +159,10 @@ fn wake_up(scheduling: Scheduling) -> Vec<Line> {
     };
     match measured.join() {
         Ok(Ok((granted, lateness))) => {
-            let favours: Vec<_> = granted.favours.iter().map(ToString::to_string).collect();
+            let favours: Vec<_> = granted.granted.iter().map(ToString::to_string).collect();
             let mut lines = vec![Line::new("control thread", favours.join(", "), true, "")];
-            lines.extend(granted.shortfalls.iter().map(|shortfall| {
-                let found = format!("not {}: {}", shortfall.favour, shortfall.reason);
+            lines.extend(granted.denied.iter().map(|shortfall| {
+                let found = format!("not {}: {}", shortfall.setting, shortfall.reason);
                 Line::new("control thread", found, false, shortfall.remedy)
             }));
             let at = |rank: usize| lateness[rank.min(lateness.len() - 1)] as f64 * 1e-3;
