@@ -1,0 +1,15 @@
+//! The newest state of the robot is recent.
+
+use super::{ArmingInputs, ControlCheck, Reading, Sentence};
+use crate::control::settings::{ArmingLimits, ControlSettings};
+use crate::telemetry::{ArmingCheck, ArmingFinding};
+
+pub(super) const CHECK: ControlCheck = ControlCheck { check: ArmingCheck::StateFresh, measure, sentence };
+
+fn measure(inputs: &ArmingInputs, settings: &ControlSettings) -> Reading {
+    Reading::at_most(f64::from(inputs.state_age_ms), f64::from(settings.pre_arm.state_age_ms))
+}
+
+fn sentence(finding: &ArmingFinding, limits: &ArmingLimits) -> Sentence {
+    Sentence { found: format!("{:.0} ms old", finding.measured), needed: format!("at most {} ms", limits.state_age_ms) }
+}
