@@ -1,4 +1,4 @@
-//! The control cycle on the simulator, tick by tick: STOP, faults, limits, an operator who is gone.
+//! The control cycle on the simulator, tick by tick: STOP, faults, limits, a lost operator.
 
 use proptest::prelude::*;
 use quadfrog::config::{Backend, Config};
@@ -11,7 +11,7 @@ use quadfrog::robot::go1::convert::low_cmd;
 use quadfrog::robot::go1::packet::CrcForm;
 use quadfrog::robot::{JOINTS, JointCommand, MotorCommand, Placement, Robot, RobotError, RobotState};
 use quadfrog::sim::Simulator;
-use quadfrog::telemetry::{Command, Event, Mode, Permit, Tick, TrialEnd, TrialSpec};
+use quadfrog::telemetry::{Command, CommandRefusal, Event, Mode, Permit, Tick, TrialEnd, TrialSpec};
 use quadfrog::trial::{JumpParameters, Task};
 
 struct Bench {
@@ -48,7 +48,7 @@ impl Bench {
         self.tick(Inputs { command: Some(command), ..Inputs::default() })
     }
 
-    /// Ticks without a word until `mode`.
+    /// Ticks without a command until `mode`.
     fn until(&mut self, mode: Mode) -> Tick {
         for _ in 0..20_000 {
             let tick = self.tick(Inputs::default());
@@ -137,10 +137,10 @@ fn an_operator_arms_jumps_and_sits_down() {
     assert!(is_damping(&tick.command, &bench.settings));
 }
 
-/// STOP from every mode: damping is what this very tick sends.
+/// STOP from every mode sends damping in the same tick.
 #[test]
 fn stop_from_every_mode_damps_in_the_same_tick() {
-    for mode in Mode::ALL {
+    for &mode in Mode::ALL {
         let mut bench = Bench::new();
         bench.reach(mode);
         let tick = bench.tick(Inputs { stop: true, ..Inputs::default() });
@@ -163,6 +163,29 @@ fn a_stop_and_an_approval_in_one_tick_stop() {
     let tick = bench.tick(Inputs { stop: true, command, ..Inputs::default() });
     assert_eq!(tick.mode, Mode::Damped);
     assert!(is_damping(&tick.command, &bench.settings));
+}
+
+/// A command in the tick of a STOP is refused: one change of mode, and a simulated robot is not placed.
+#[test]
+fn a_command_in_the_tick_of_a_stop_is_refused() {
+    let mut bench = Bench::new();
+    bench.reach(Mode::Disarmed);
+    let mode_changes = bench.events.iter().filter(|event| matches!(event, Event::Mode { .. })).count() as u64;
+    bench.events.clear();
+    let command = Command::Arm(Permit { mode_changes, given_ns: bench.time_ms * 1_000_000 });
+    let tick = bench.tick(Inputs { stop: true, command: Some(command), ..Inputs::default() });
+    assert_eq!(tick.mode, Mode::Damped);
+    assert!(
+        matches!(
+            bench.events[..],
+            [
+                Event::Mode { from: Mode::Disarmed, to: Mode::Damped, .. },
+                Event::Refused { command: Command::Arm(_), because: CommandRefusal::Stopped, .. },
+            ]
+        ),
+        "{:?}",
+        bench.events
+    );
 }
 
 #[test]
