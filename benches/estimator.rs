@@ -1,4 +1,4 @@
-//! How good the estimate is over 100 jumps, and what one update costs. `cargo bench --bench estimator`.
+//! Accuracy of the estimate over 100 jumps, and time of one update. `cargo bench --bench estimator`.
 //!
 //! The figures of accuracy are printed once, before the timing; they are the same on every machine.
 
@@ -81,7 +81,7 @@ fn cost(criterion: &mut Criterion) {
             let feet = feet(&settings.geometry, &state.joint_position);
             b.iter(|| {
                 state.robot_time_ms = state.robot_time_ms.wrapping_add(1);
-                // No flight lasts for longer; what hangs is not filtered.
+                // Longer than any flight, the robot hangs and is not filtered.
                 if state.robot_time_ms.is_multiple_of(1000) {
                     estimator.reset();
                 }

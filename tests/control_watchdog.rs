@@ -21,7 +21,7 @@ use quadfrog::telemetry::{
 };
 use quadfrog::trial::{JumpParameters, Task};
 
-/// The simulator, seen as a Go1 over a link, whose reports can be tampered with and whose commands are kept.
+/// The simulator as a Go1 over a link, with changed reports and recorded commands.
 struct Tampered {
     simulator: Simulator,
     tamper: fn(&mut RobotState),
@@ -171,7 +171,7 @@ impl Bench {
         Command::Arm(self.approval())
     }
 
-    /// From here on only `count` ticks matter: the tick of them in which damping was sent for the first time, from 1.
+    /// Runs `count` ticks; returns the first of them, from 1, that sent damping.
     fn ticks_until_damping(&mut self, count: u32) -> Option<u32> {
         self.robot.sent.clear();
         self.events.clear();
@@ -264,7 +264,7 @@ fn tilt(state: &mut RobotState, axis: nalgebra::Unit<Vector3<f64>>, angle: f64) 
     }
 }
 
-/// A state that does not come: nothing at 20 ms, damping in the tick of 21, a lost link by name from 200 ms on.
+/// Missing states: nothing at 20 ms, damping at 21 ms, a lost link by name beyond 200 ms.
 #[test]
 fn a_gap_is_cut_at_its_limit_and_becomes_a_lost_link() {
     let mut bench = Bench::in_mode(Mode::Ready);
@@ -322,7 +322,7 @@ fn a_fault_that_voids_confirmations_is_reported_behind_another_fault() {
     );
 }
 
-/// The robot's clock of 32 bits begins anew after 49 days: no restart, as the link counts none.
+/// The robot's clock of 32 bits overflows after 49 days: no restart.
 #[test]
 fn a_clock_that_runs_over_is_no_restart() {
     let mut bench = Bench::new();
@@ -343,7 +343,8 @@ fn a_clock_that_runs_over_is_no_restart() {
     assert!(matches!(bench.fault(), Some(Fault::Reboot)), "{:?}", bench.fault());
 }
 
-/// A robot that tips over in REVIEW is damped at the limit of READY; it counts as fallen, without a fault. (A defect once: only 1.0 rad cut.)
+/// A robot that tips over in REVIEW is damped at the limit of READY; it counts as fallen, without a fault. Regression: only
+/// 1.0 rad cut.
 #[test]
 fn a_robot_that_tips_over_in_review_is_damped_at_the_limit_of_standing() {
     let tips: [fn(&mut RobotState); 2] =
@@ -375,7 +376,7 @@ fn a_robot_that_tips_over_in_review_is_damped_at_the_limit_of_standing() {
     }
 }
 
-/// Five control periods in a row of more than twice the period; four are forgiven.
+/// Five periods in a row of more than twice the nominal one trip, four do not.
 #[test]
 fn slow_periods_are_counted_and_cut() {
     let slow = |ticks: u64| {
@@ -396,7 +397,7 @@ fn slow_periods_are_counted_and_cut() {
     assert!(fault.contains("5 control periods in a row too long: 2.5 ms exceeds 2.0 ms"), "{fault}");
 }
 
-/// In simulation a late tick is counted and shown but trips nothing, unless asked.
+/// In simulation a late tick is only counted, unless configured.
 #[test]
 fn lateness_trips_nothing_in_simulation_unless_asked() {
     for (late_ms, expected) in [(0.0, Mode::Ready), (10.0, Mode::Fault)] {
@@ -410,7 +411,7 @@ fn lateness_trips_nothing_in_simulation_unless_asked() {
     }
 }
 
-/// A flight that tilts too far is cut before it lands, and counts as a fall: its parameters are to blame.
+/// A flight that tilts too far is damped before it lands, and counts as a fall of its parameters.
 #[test]
 fn a_flight_that_tilts_is_cut_as_a_fall() {
     let mut bench = Bench::airborne();
@@ -429,7 +430,7 @@ fn a_flight_that_tilts_is_cut_as_a_fall() {
     }
 }
 
-/// Who sits down may lean, but not fall over.
+/// A robot that sits down may lean, but not fall over.
 #[test]
 fn sitting_down_is_cut_at_the_outer_tilt() {
     let mut bench = Bench::in_mode(Mode::SitDown);
@@ -441,7 +442,7 @@ fn sitting_down_is_cut_at_the_outer_tilt() {
     assert!(matches!(bench.fault(), Some(Fault::Tilt { allowed_rad: 1.0, .. })));
 }
 
-/// An operator bends the legs of a disarmed robot by hand: that is no fault. What concerns the link is one in every mode.
+/// Bending the legs of a disarmed robot by hand is no fault; faults of the link are, in every commanded mode.
 #[test]
 fn a_disarmed_robot_may_be_handled() {
     let mut bench = Bench::in_mode(Mode::Disarmed);
@@ -473,7 +474,7 @@ fn a_standing_fault_cannot_be_acknowledged() {
     assert_eq!(bench.cycle.mode(), Mode::Disarmed);
 }
 
-/// Battery and warm motors: the trial that runs is finished, the next is refused, and the refusal says why.
+/// Battery and warm motors: the running trial finishes, the next is refused with the reason.
 #[test]
 fn what_holds_lets_the_trial_finish_and_refuses_the_next() {
     type Tamper = fn(&mut RobotState);
@@ -507,7 +508,7 @@ fn what_holds_lets_the_trial_finish_and_refuses_the_next() {
     }
 }
 
-/// The operator is gone in mid-flight: landed with the nominal controller, and down soon after touchdown, quiet or not.
+/// Operator lost in flight: the nominal controller lands, and the robot sits down soon after touchdown, quiet or not.
 #[test]
 fn an_operator_lost_in_flight_is_landed_and_sat_down() {
     let mut bench = Bench::airborne();
@@ -546,7 +547,7 @@ fn a_trial_that_had_landed_counts_though_the_operator_is_lost() {
     assert!(settled, "{:?}", bench.events);
 }
 
-/// Several jumps in a row end with the one under way.
+/// Several jumps in a row end with the running one.
 #[test]
 fn an_operator_lost_between_jumps_ends_the_series() {
     let mut bench = Bench::in_mode(Mode::Ready);
@@ -583,7 +584,7 @@ fn an_idle_robot_sits_down() {
     }
 }
 
-/// An approval is for once, now, and this mode: used up, outlived or overtaken it starts nothing.
+/// An approval holds once, for a limited time and in one mode.
 #[test]
 fn an_approval_is_single_use_expires_and_dies_with_a_change_of_mode() {
     let mut bench = Bench::in_mode(Mode::Ready);
@@ -613,7 +614,7 @@ fn an_approval_is_single_use_expires_and_dies_with_a_change_of_mode() {
     assert_eq!(bench.cycle.mode(), Mode::Countdown);
 }
 
-/// (A defect once: arming did not expire, as an approval does, and nobody had to be there.)
+/// Regression: arming did not expire, and needed no heartbeat of the operator's screen.
 #[test]
 fn arming_expires_dies_with_a_change_of_mode_and_needs_somebody_who_watches() {
     let mut bench = Bench::in_mode(Mode::Disarmed);
@@ -642,7 +643,7 @@ fn arming_expires_dies_with_a_change_of_mode_and_needs_somebody_who_watches() {
     assert_eq!(bench.cycle.mode(), Mode::StandUp);
 }
 
-/// A screen that was never heard does not even begin to send.
+/// Without a first heartbeat of the screen, control cannot be taken.
 #[test]
 fn control_is_not_taken_while_nobody_watches() {
     let mut bench = Bench::new();
@@ -655,8 +656,8 @@ fn control_is_not_taken_while_nobody_watches() {
     assert_eq!((bench.cycle.mode(), bench.robot.sent.len()), (Mode::Observe, 0));
 }
 
-/// (A defect once: a session that ended in mid-jump did not land the robot, and it went on jumping.) Whatever the mode, the
-/// robot ends on its belly, disarmed, and nothing stands it up again.
+/// After the end of the session, from every mode, the robot ends lying and disarmed, and nothing arms it again. Regression: a
+/// session that ended during a jump did not land the robot.
 #[test]
 fn a_session_that_ends_lands_sits_down_and_energises_nothing_any_more() {
     for mode in [Mode::StandUp, Mode::Ready, Mode::Countdown, Mode::Jump, Mode::Settle, Mode::Review, Mode::SitDown] {
@@ -675,7 +676,7 @@ fn a_session_that_ends_lands_sits_down_and_energises_nothing_any_more() {
         });
         let expected: &[TrialEnd] = match mode {
             Mode::Countdown | Mode::Jump => &[TrialEnd::Fault(Fault::OperatorLeft)],
-            // It had landed: the trial is measured to its end.
+            // After the landing the trial is measured to its end.
             Mode::Settle | Mode::Review | Mode::SitDown => &[TrialEnd::Settled],
             _ => &[],
         };
@@ -683,8 +684,7 @@ fn a_session_that_ends_lands_sits_down_and_energises_nothing_any_more() {
     }
 }
 
-/// After a fall: damping, the verdict or an acknowledgement, the checks again, and only then standing up, from where the
-/// joints are.
+/// After a fall: damping, verdict or acknowledgement, the arming checks, and standing up from the measured joint angles.
 #[test]
 fn after_a_fall_the_robot_stands_up_from_its_measured_pose_once_it_is_upright_again() {
     let mut bench = Bench::airborne();
@@ -707,7 +707,7 @@ fn after_a_fall_the_robot_stands_up_from_its_measured_pose_once_it_is_upright_ag
     bench.robot.simulator.place(&Placement { joint_position: lying_position, lying: true, seed: 1 });
     bench.tick(None);
     if bench.cycle.mode() == Mode::Fault {
-        // A robot that is put somewhere has a new clock: as after a restart.
+        // Placing resets the robot's clock, as a restart does.
         bench.tick(Some(Command::Acknowledge { stops: 0 }));
     }
     bench.ticks(1500);
@@ -715,14 +715,14 @@ fn after_a_fall_the_robot_stands_up_from_its_measured_pose_once_it_is_upright_ag
     let tick = bench.tick(Some(bench.arm()));
     assert_eq!(tick.mode, Mode::StandUp);
     for (joint, motor) in tick.command.motor.iter().enumerate() {
-        // What is asked for ends at the limit, also where a folded leg rests beyond it.
+        // Targets end at the limit, also for a folded leg that rests beyond it.
         let measured = before[joint].clamp(bench.settings.min_position[joint], bench.settings.max_position[joint]);
         assert!((motor.position - measured).abs() < 0.01, "joint {joint} begins at its measured angle");
     }
     bench.until(Mode::Ready);
 }
 
-/// Sound robots that learn to jump trip no limit; prints how near they come.
+/// Studies on sound robots trip no limit; prints the margins.
 #[test]
 fn whole_studies_on_the_simulator_trip_no_limit() {
     let robot = RobotDescription::embedded("go1").unwrap();
@@ -799,9 +799,9 @@ fn any_step() -> impl Strategy<Value = Step> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 32, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Whatever comes in whatever order on hardware's terms: a motor does more than damp only after an arm command in a tick in
-    /// which every check held, a jump begins only after an approval that was given since the last change of mode and used
-    /// by nobody, and what is sent is finite.
+    /// For any sequence of commands with hardware settings: a motor does more than damp only after an arm command in a tick in which
+    /// every check passed, a jump begins only after an unused approval given since the last change of mode, and every command is
+    /// finite.
     #[test]
     fn no_sequence_energises_without_arm_fresh_checks_and_approval(
         steps in proptest::collection::vec((any_step(), 1..2500_u32), 1..20)
