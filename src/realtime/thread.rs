@@ -26,7 +26,7 @@ const FORGIVEN_PERIODS: u64 = 20;
 /// that work to be done, and early enough for the control tick to end before the next.
 pub const CONTROL_PHASE: Duration = Duration::from_micros(750);
 
-/// How long before a tick of the control thread its rehearsal begins: early enough to be over by then, late enough that what it
+/// Time from the start of the control thread's rehearsal to its tick: early enough to be over by then, late enough that what it
 /// fetched is there still.
 pub const REHEARSAL_LEAD: Duration = Duration::from_micros(100);
 /// What must be left of the lead once the thread is awake. A rehearsal takes 8 us, in one of a thousand ticks 25 to 40 (on the

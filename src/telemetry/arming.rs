@@ -5,6 +5,7 @@ use strum::{IntoStaticStr, VariantArray};
 
 /// An arming check: a condition that must hold before the robot is energised. The order is the number in recordings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, IntoStaticStr, VariantArray)]
+#[strum(serialize_all = "lowercase")]
 pub enum ArmingCheck {
     /// The robot's newest state is recent.
     #[strum(serialize = "state fresh")]
@@ -13,10 +14,8 @@ pub enum ArmingCheck {
     #[strum(serialize = "packet loss")]
     Loss,
     /// No state arrives with a wrong checksum.
-    #[strum(serialize = "checksums")]
     Checksums,
     /// The trunk is level.
-    #[strum(serialize = "upright")]
     Upright,
     /// Every joint is inside its limits.
     #[strum(serialize = "joints inside limits")]
@@ -25,7 +24,6 @@ pub enum ArmingCheck {
     #[strum(serialize = "lying down")]
     LyingDown,
     /// The charge suffices for a series of jumps.
-    #[strum(serialize = "battery")]
     Battery,
     /// No motor is hot.
     #[strum(serialize = "motors cool")]
@@ -37,7 +35,6 @@ pub enum ArmingCheck {
     #[strum(serialize = "loop on time")]
     OnTime,
     /// Every tick is recorded.
-    #[strum(serialize = "recorder")]
     Recorder,
     /// The disk has space for the recording.
     #[strum(serialize = "disk space")]
@@ -46,7 +43,6 @@ pub enum ArmingCheck {
     #[strum(serialize = "low-level mode, damped")]
     LowLevel,
     /// Confirmed by the operator: the configuration is the intended one.
-    #[strum(serialize = "configuration")]
     Configuration,
     /// Confirmed by the operator: no person is near the robot, and the remote is in hand.
     #[strum(serialize = "area clear, remote in hand")]
@@ -91,16 +87,14 @@ impl ArmingCheck {
 
 /// State of an arming check. The order is the number in recordings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, IntoStaticStr, VariantArray)]
+#[strum(serialize_all = "lowercase")]
 pub enum ArmingCheckState {
     /// The condition holds.
-    #[strum(serialize = "passed")]
     Passed,
     /// The condition does not hold.
-    #[strum(serialize = "failed")]
     #[default]
     Failed,
     /// Waits for the operator's confirmation, or for the test of STOP.
-    #[strum(serialize = "waiting")]
     Waiting,
     /// The simulator does not need it.
     #[strum(serialize = "not needed")]

@@ -8,42 +8,33 @@ use super::{FallCause, Fault};
 #[derive(
     Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize, IntoStaticStr, VariantArray,
 )]
+#[strum(serialize_all = "UPPERCASE")]
 pub enum Mode {
     /// No state from the robot; nothing is sent.
-    #[strum(serialize = "OFFLINE")]
     Offline,
     /// States arrive; nothing is sent.
-    #[strum(serialize = "OBSERVE")]
     Observe,
     /// Damping is sent; the robot lies or is held.
-    #[strum(serialize = "DISARMED")]
     Disarmed,
     /// Timed ramp from the measured pose to the stance.
     #[strum(serialize = "STAND UP")]
     StandUp,
     /// Standing in impedance control, waiting for an approved trial.
-    #[strum(serialize = "READY")]
     Ready,
     /// A trial is approved: standing still before the impulse.
-    #[strum(serialize = "COUNTDOWN")]
     Countdown,
     /// Impulse, flight and landing.
-    #[strum(serialize = "JUMP")]
     Jump,
     /// Feet down, waiting until the robot is quiet.
-    #[strum(serialize = "SETTLE")]
     Settle,
     /// The trial is measured; the operator gives the verdict.
-    #[strum(serialize = "REVIEW")]
     Review,
     /// Timed ramp down to lying.
     #[strum(serialize = "SIT DOWN")]
     SitDown,
     /// Stopped: damping, until acknowledged.
-    #[strum(serialize = "DAMPED")]
     Damped,
     /// Stopped by a fault: damping, until acknowledged.
-    #[strum(serialize = "FAULT")]
     Fault,
 }
 
@@ -72,18 +63,15 @@ impl Mode {
 
 /// Phase of a jump. The order is the number in recordings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, IntoStaticStr, VariantArray)]
+#[strum(serialize_all = "lowercase")]
 pub enum Phase {
     /// Feet on the ground, no force profile.
-    #[strum(serialize = "stance")]
     Stance,
     /// The oscillator is between pi and 2 pi: the force profile acts.
-    #[strum(serialize = "impulse")]
     Impulse,
     /// No foot on the ground.
-    #[strum(serialize = "flight")]
     Flight,
     /// After the first touchdown of a flight, or after an impulse that did not leave the ground.
-    #[strum(serialize = "landing")]
     Landing,
 }
 

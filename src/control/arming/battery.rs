@@ -1,8 +1,6 @@
 //! The charge suffices for a series of jumps; a battery that is not reported fails.
 
-use super::{ArmingInputs, ControlCheck, Reading, Sentence};
-use crate::control::settings::{ArmingLimits, ControlSettings};
-use crate::telemetry::{ArmingCheck, ArmingFinding};
+use super::*;
 
 pub(super) const CHECK: ControlCheck = ControlCheck { check: ArmingCheck::Battery, measure, sentence };
 

@@ -1,8 +1,6 @@
 //! Few states arrive with a wrong checksum; none on a machine without a link.
 
-use super::{ArmingInputs, ControlCheck, Reading, Sentence};
-use crate::control::settings::{ArmingLimits, ControlSettings};
-use crate::telemetry::{ArmingCheck, ArmingFinding};
+use super::*;
 
 pub(super) const CHECK: ControlCheck = ControlCheck { check: ArmingCheck::Checksums, measure, sentence };
 

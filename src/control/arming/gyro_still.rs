@@ -1,9 +1,7 @@
 //! The robot lies still, so that the gyroscope's bias can be trusted.
 
-use super::{ArmingInputs, ControlCheck, Reading, Sentence};
+use super::*;
 use crate::control::limits::ticks;
-use crate::control::settings::{ArmingLimits, ControlSettings};
-use crate::telemetry::{ArmingCheck, ArmingFinding};
 
 pub(super) const CHECK: ControlCheck = ControlCheck { check: ArmingCheck::GyroStill, measure, sentence };
 

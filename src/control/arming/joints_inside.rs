@@ -1,8 +1,6 @@
 //! Every joint is inside its limits, with a margin.
 
-use super::{ArmingInputs, ControlCheck, Reading, Sentence, joint_of};
-use crate::control::settings::{ArmingLimits, ControlSettings};
-use crate::telemetry::{ArmingCheck, ArmingFinding};
+use super::*;
 
 pub(super) const CHECK: ControlCheck = ControlCheck { check: ArmingCheck::JointsInside, measure, sentence };
 

@@ -1,8 +1,6 @@
 //! The joints are near the folded pose, where the stand-up ramp begins.
 
-use super::{ArmingInputs, ControlCheck, Reading, Sentence, joint_of};
-use crate::control::settings::{ArmingLimits, ControlSettings};
-use crate::telemetry::{ArmingCheck, ArmingFinding};
+use super::*;
 
 pub(super) const CHECK: ControlCheck = ControlCheck { check: ArmingCheck::LyingDown, measure, sentence };
 

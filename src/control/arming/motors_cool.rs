@@ -1,8 +1,6 @@
 //! No motor is hot.
 
-use super::{ArmingInputs, ControlCheck, Reading, Sentence, joint_of};
-use crate::control::settings::{ArmingLimits, ControlSettings};
-use crate::telemetry::{ArmingCheck, ArmingFinding};
+use super::*;
 
 pub(super) const CHECK: ControlCheck = ControlCheck { check: ArmingCheck::MotorsCool, measure, sentence };
 

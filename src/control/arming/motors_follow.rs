@@ -1,9 +1,7 @@
 //! Every motor reports servo mode. Servo mode is commanded while disarmed too, so a motor that does not report it
 //! will not follow.
 
-use super::{ArmingInputs, ControlCheck, Reading, Sentence, joint_of};
-use crate::control::settings::{ArmingLimits, ControlSettings};
-use crate::telemetry::{ArmingCheck, ArmingFinding};
+use super::*;
 
 pub(super) const CHECK: ControlCheck = ControlCheck { check: ArmingCheck::MotorsFollow, measure, sentence };
 

@@ -1,8 +1,6 @@
 //! The newest state of the robot is recent.
 
-use super::{ArmingInputs, ControlCheck, Reading, Sentence};
-use crate::control::settings::{ArmingLimits, ControlSettings};
-use crate::telemetry::{ArmingCheck, ArmingFinding};
+use super::*;
 
 pub(super) const CHECK: ControlCheck = ControlCheck { check: ArmingCheck::StateFresh, measure, sentence };
 

@@ -1,8 +1,6 @@
 //! Roll and pitch of the trunk are small.
 
-use super::{ArmingInputs, ControlCheck, Reading, Sentence};
-use crate::control::settings::{ArmingLimits, ControlSettings};
-use crate::telemetry::{ArmingCheck, ArmingFinding};
+use super::*;
 
 pub(super) const CHECK: ControlCheck = ControlCheck { check: ArmingCheck::Upright, measure, sentence };
 
