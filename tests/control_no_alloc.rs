@@ -1,5 +1,5 @@
-//! Nothing in the control thread's body allocates or frees: an allocator that ends the process on the spot watches whole trials,
-//! STOP, faults, falls and every mode, with the simulator and with a robot over a link.
+//! The control loop allocates and frees nothing: whole trials, STOP, faults, falls and every mode under an allocator that aborts,
+//! with the simulator and with a robot over a link.
 #![allow(
     unsafe_code,
     reason = "an allocator can only be written with unsafe; this one hands everything to the system's"
@@ -16,14 +16,14 @@ use quadfrog::control::control_loop::ControlLoop;
 use quadfrog::control::settings::ControlSettings;
 use quadfrog::realtime::channel::{ControlEnd, ScreenEnd, SessionEnd, channels};
 use quadfrog::realtime::clock::MonotonicClock;
-use quadfrog::realtime::thread::Instant;
+use quadfrog::realtime::thread::TickStart;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::robot::{Battery, JointCommand, LinkStatus, Placement, Robot, RobotError, RobotState};
 use quadfrog::sim::Simulator;
 use quadfrog::telemetry::{Command, Event, Mode, Permit, Tick};
 use quadfrog::trial::{JumpParameters, Task};
 
-/// The simulator as itself, or as a robot over a link with a battery that nobody can put in place.
+/// The simulator as itself, or as a robot over a link with a battery, which cannot be placed.
 struct Machine {
     simulator: Simulator,
     linked: bool,
@@ -103,7 +103,7 @@ impl Bench {
             if self.beats {
                 self.screen.heartbeat.beat();
             }
-            let instant = Instant { planned_ns: self.time_ms * 1_000_000, lateness_ns: 0 };
+            let instant = TickStart { planned_ns: self.time_ms * 1_000_000, lateness_ns: 0 };
             let Bench { body, machine, clock, .. } = self;
             let mode = without_allocation(|| {
                 body.rehearse(clock, machine);
@@ -116,7 +116,7 @@ impl Bench {
             while let Ok(event) = self.session.events.pop() {
                 self.mode_changes += u64::from(matches!(event, Event::Mode { .. }));
             }
-            // Every other tick is taken: the ring runs full on the way, which must cost nothing either.
+            // Every other tick is taken, so that the ring runs full: that must not allocate either.
             if self.time_ms.is_multiple_of(2) {
                 let _ = self.recorder.pop();
             }
@@ -154,7 +154,7 @@ impl Bench {
         let stops = self.session.stop.count();
         self.command(Command::Acknowledge { stops });
         assert_eq!(self.body.mode(), Mode::Disarmed);
-        // A real robot is folded by hand; a simulated one is carried anyway.
+        // A real robot is folded by hand; a simulated one is placed.
         let lying = Placement { joint_position: self.settings.lying_position, lying: true, seed: 0 };
         self.machine.simulator.place(&lying);
         self.ticks(1);
@@ -171,14 +171,14 @@ impl Bench {
     }
 }
 
-/// All modes, a good trial, a fall, STOP, every kind of fault, an operator who is gone, refused commands.
+/// All modes, a good trial, a fall, STOP, every kind of fault, a lost operator, refused commands.
 fn everything(backend: Backend) {
     let mut bench = Bench::new(backend);
     bench.ticks(1);
     bench.ticks(5);
     bench.command(Command::TakeControl);
     if backend == Backend::Hardware {
-        // Refused: nothing has been still for a second yet.
+        // Refused: the gyroscope has not been still for a second yet.
         bench.arm();
         assert_eq!(bench.body.mode(), Mode::Disarmed);
     }

@@ -8,7 +8,7 @@ use quadfrog::config::{Backend, Config};
 use quadfrog::control::control_loop::ControlLoop;
 use quadfrog::realtime::channel::channels;
 use quadfrog::realtime::clock::SimulatedClock;
-use quadfrog::realtime::thread::Instant;
+use quadfrog::realtime::thread::TickStart;
 use quadfrog::robot::{LinkStatus, Robot};
 use quadfrog::sim::emulator::{EmulatorStatus, Fault};
 use quadfrog::telemetry::{Command, Event, Mode, Permit, Tick};
@@ -53,7 +53,7 @@ fn session(rehearsals: bool) -> (Vec<Tick>, Vec<Event>, LinkStatus, EmulatorStat
         if rehearsals {
             body.rehearse(&SimulatedClock, &mut robot);
         }
-        let instant = Instant { planned_ns: ms * 1_000_000, lateness_ns: 0 };
+        let instant = TickStart { planned_ns: ms * 1_000_000, lateness_ns: 0 };
         ticks.push(*body.tick(instant, &SimulatedClock, &mut robot));
         body.prepare();
         let _ = recorder.pop();

@@ -1,5 +1,4 @@
-//! The estimate of the base on a machine that does not keep time and a network that loses states: over whole jumps, held
-//! against what the emulated robot really did.
+//! The estimate of the base with late ticks and lost states, over whole jumps, compared with the emulated robot's true motion.
 
 #[path = "support/estimation.rs"]
 mod estimation;
@@ -14,7 +13,7 @@ use quadfrog::sim::SimConfig;
 use quadfrog::sim::emulator::Fault;
 use quadfrog::telemetry::TrialEnd;
 
-/// A robot whose belly feels nothing, as a real one, and whose network becomes bad when it stands.
+/// A robot without a body contact sensor, as a real one, whose network becomes bad once it stands.
 struct Numb {
     robot: Lockstep,
     faults: Vec<Fault>,
@@ -44,7 +43,7 @@ impl Robot for Numb {
     }
 }
 
-/// Whole jumps with what is wrong with time and network.
+/// Whole jumps with faults of time and network.
 fn jumps(config: &SimConfig, late: Option<Late>, faults: &[Fault], count: u32) -> Vec<(JumpError, TrialEnd)> {
     jumps_on(ObjectiveSource::Estimate, count, 1, |seed| {
         let mut robot = Lockstep::new(config, seed);
@@ -54,7 +53,7 @@ fn jumps(config: &SimConfig, late: Option<Late>, faults: &[Fault], count: u32) -
     })
 }
 
-/// Thirty jumps each: who jumped settles, and the displacement is as well known as it is asked to be of a machine in time.
+/// Thirty jumps each: every jump settles, with the accuracy required of a machine without late ticks.
 fn known(name: &str, world: World, late: Option<Late>, faults: &[Fault]) {
     let jumps = jumps(&world.config(), late, faults, 30);
     let settled: Vec<_> = jumps.iter().filter(|(_, end)| *end == TrialEnd::Settled).map(|(error, _)| error).collect();
@@ -71,7 +70,7 @@ fn known(name: &str, world: World, late: Option<Late>, faults: &[Fault]) {
     assert!(unquiet.is_empty(), "{name}: came to rest, and nobody knew: {unquiet:?}");
 }
 
-/// (A bug once: one of 36 such jumps was measured as 0.3 m too long, and one robot that stood was thought 23 m away.)
+/// Regression: one of 36 such jumps was measured 0.3 m too long, and one standing robot was estimated 23 m away.
 #[test]
 fn a_gap_now_and_then_does_not_spoil_the_measure() {
     known("one gap in 200 ms, ideal", World::Ideal, Some(Late::new(200, 15, 0)), &[]);

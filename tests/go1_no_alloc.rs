@@ -19,7 +19,7 @@ use quadfrog::config::{Backend, Config};
 use quadfrog::control::control_loop::ControlLoop;
 use quadfrog::realtime::channel::channels;
 use quadfrog::realtime::clock::SimulatedClock;
-use quadfrog::realtime::thread::Instant;
+use quadfrog::realtime::thread::TickStart;
 use quadfrog::robot::go1::Go1;
 use quadfrog::robot::{JointCommand, Robot};
 use quadfrog::sim::emulator::Fault;
@@ -43,7 +43,7 @@ fn a_tick_over_the_link_does_not_allocate() {
         }
         for _ in 0..count {
             screen.heartbeat.beat();
-            let instant = Instant { planned_ns: ms * 1_000_000, lateness_ns: 0 };
+            let instant = TickStart { planned_ns: ms * 1_000_000, lateness_ns: 0 };
             let mode = without_allocation(|| {
                 body.rehearse(&SimulatedClock, &mut go1);
                 let mode = body.tick(instant, &SimulatedClock, &mut go1).mode;

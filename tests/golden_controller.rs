@@ -1,4 +1,4 @@
-//! The leg controller against torques computed independently of this project (`specs/method.md`).
+//! The leg controller against torques computed independently of this project (`docs/method.md`).
 
 mod support;
 

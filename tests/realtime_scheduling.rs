@@ -1,5 +1,4 @@
-//! What is asked of the operating system: each favour by itself, what is not granted is a value with a way out, and the thread
-//! runs all the same.
+//! Real-time settings: each is requested by itself, a denied one is a value with its remedy, and the thread runs without it.
 
 use std::ops::ControlFlow;
 use std::time::Duration;
@@ -9,7 +8,7 @@ use quadfrog::config::{Backend, Config};
 use quadfrog::realtime::scheduling::{RealtimeSetting, Scheduling};
 use quadfrog::realtime::{system, thread};
 
-/// In a thread of its own: a priority stays with the thread that asked for it.
+/// Applies the settings in a thread of its own, because they stay with the thread.
 fn apply(scheduling: Scheduling) -> (Vec<RealtimeSetting>, Vec<String>) {
     let granted = std::thread::spawn(move || {
         let granted = scheduling.apply();
@@ -19,7 +18,7 @@ fn apply(scheduling: Scheduling) -> (Vec<RealtimeSetting>, Vec<String>) {
             if ticks == 20 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         })
         .unwrap();
-        (granted.favours, granted.shortfalls.iter().map(ToString::to_string).collect())
+        (granted.granted, granted.denied.iter().map(ToString::to_string).collect())
     });
     granted.join().unwrap()
 }
@@ -28,7 +27,7 @@ fn now_ns() -> u64 {
     Duration::from(clock_gettime(ClockId::CLOCK_MONOTONIC).unwrap()).as_nanos() as u64
 }
 
-/// Calls come a phase after whole periods of the system's clock, also after a stall that was not made up for.
+/// Ticks start at the offset after whole periods of the system's clock, also after a stall with skipped periods.
 #[test]
 fn the_pace_keeps_its_phase() {
     let (period, phase) = (Duration::from_millis(10), Duration::from_millis(3));
@@ -41,7 +40,7 @@ fn the_pace_keeps_its_phase() {
         if planned.len() == 20 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     })
     .unwrap();
-    // What passes between two readings of a clock, at best; of ten calls one is not interrupted there.
+    // Least time between two readings of a clock: of ten pairs at least one is not interrupted.
     let past_phase = |calls: &[(u64, u64)]| {
         calls.iter().map(|(ns, _)| (ns - phase.as_nanos() as u64) % period.as_nanos() as u64).min().unwrap()
     };
@@ -67,7 +66,7 @@ fn a_rehearsal_comes_before_its_tick_or_not_at_all() {
         /// How long before its tick was due each rehearsal began, ns, or somewhat more: the clock is read late.
         leads: Vec<u64>,
     }
-    impl thread::Paced for Course {
+    impl thread::PeriodicTask for Course {
         fn rehearse(&mut self) {
             self.rehearsed.push((self.next, now_ns()));
             if self.next >= 20 {
@@ -75,7 +74,7 @@ fn a_rehearsal_comes_before_its_tick_or_not_at_all() {
                 std::thread::sleep(LEAD + LEAD / 2);
             }
         }
-        fn tick(&mut self, instant: thread::Instant) -> ControlFlow<()> {
+        fn tick(&mut self, instant: thread::TickStart) -> ControlFlow<()> {
             if let Some((next, began_ns)) = self.rehearsed.last()
                 && *next == self.next
             {
@@ -103,33 +102,33 @@ fn a_rehearsal_comes_before_its_tick_or_not_at_all() {
 
 #[test]
 fn an_ordinary_thread_asks_for_nothing() {
-    let (favours, shortfalls) = apply(Scheduling { priority: 0, core: Some(0), lock_memory: true });
-    assert!(favours.is_empty() && shortfalls.is_empty(), "{favours:?} {shortfalls:?}");
+    let (granted, denied) = apply(Scheduling { priority: 0, core: Some(0), lock_memory: true });
+    assert!(granted.is_empty() && denied.is_empty(), "{granted:?} {denied:?}");
 }
 
 #[test]
 fn each_favour_is_granted_or_its_refusal_says_what_to_do() {
-    let (favours, shortfalls) = apply(Scheduling { priority: 10, core: Some(0), lock_memory: true });
-    assert_eq!(favours.len() + shortfalls.len(), 4, "{favours:?} {shortfalls:?}");
+    let (granted, denied) = apply(Scheduling { priority: 10, core: Some(0), lock_memory: true });
+    assert_eq!(granted.len() + denied.len(), 4, "{granted:?} {denied:?}");
     if system::priority_limit() >= 10 {
-        assert!(favours.contains(&RealtimeSetting::Priority(10)), "{shortfalls:?}");
+        assert!(granted.contains(&RealtimeSetting::Priority(10)), "{denied:?}");
     } else {
-        assert!(shortfalls.iter().any(|words| words.contains("setcap cap_sys_nice")), "{shortfalls:?}");
+        assert!(denied.iter().any(|words| words.contains("setcap cap_sys_nice")), "{denied:?}");
     }
     if system::memlock_limit().is_some() {
-        assert!(shortfalls.iter().any(|words| words.contains("memlock unlimited")), "{shortfalls:?}");
+        assert!(denied.iter().any(|words| words.contains("memlock unlimited")), "{denied:?}");
     }
 }
 
 #[test]
 fn a_core_that_is_not_there_is_named_and_the_rest_is_still_asked_for() {
-    let (favours, shortfalls) = apply(Scheduling { priority: 10, core: Some(1000), lock_memory: false });
-    let named = shortfalls.iter().find(|words| words.starts_with("core 1000 not granted"));
-    assert!(named.is_some_and(|words| words.contains("realtime.core")), "{shortfalls:?}");
-    assert_eq!(favours.len() + shortfalls.len(), 3);
+    let (granted, denied) = apply(Scheduling { priority: 10, core: Some(1000), lock_memory: false });
+    let named = denied.iter().find(|words| words.starts_with("core 1000 not granted"));
+    assert!(named.is_some_and(|words| words.contains("realtime.core")), "{denied:?}");
+    assert_eq!(granted.len() + denied.len(), 3);
 }
 
-/// A simulator never holds a core against the rest of a desktop; a robot's thread asks for all of it.
+/// A simulator requests no real-time setting; a robot's thread requests all.
 #[test]
 fn the_defaults_ask_for_a_robot_alone() {
     let config = Config::load(None).unwrap();

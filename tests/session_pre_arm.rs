@@ -10,7 +10,7 @@ use quadfrog::engine::{Options, fingerprint, open_life, session_info};
 use quadfrog::optimize::journal::Durability;
 use quadfrog::realtime::channel::{ScreenEnd, channels};
 use quadfrog::realtime::clock::SimulatedClock;
-use quadfrog::realtime::thread::Instant;
+use quadfrog::realtime::thread::TickStart;
 use quadfrog::recording::record::{ArmingCheckRecord, Record, RequestRecord, Stamped};
 use quadfrog::recording::recorder::RecorderWatch;
 use quadfrog::robot::description::RobotDescription;
@@ -122,7 +122,7 @@ impl Session {
             if self.watched {
                 self.operator.heartbeat.beat();
             }
-            let instant = Instant { planned_ns: self.time_ms * 1_000_000, lateness_ns: 0 };
+            let instant = TickStart { planned_ns: self.time_ms * 1_000_000, lateness_ns: 0 };
             self.body.tick(instant, &SimulatedClock, &mut self.robot);
             self.supervisor.attend(self.time_ms * 1_000_000);
             self.records.extend(self.screen.try_iter().map(|stamped| stamped.record));

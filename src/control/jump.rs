@@ -1,4 +1,4 @@
-//! One trial: stand still, impulse, flight, landing, settle. ControlSettings are latched when it begins.
+//! One trial: countdown, impulse, flight, landing, settle. Its settings are latched when it begins.
 
 use super::force_profile::Oscillator;
 use super::leg::LegTarget;
@@ -8,7 +8,7 @@ use crate::robot::{LEGS, PerLeg, RobotState};
 use crate::telemetry::{Estimate, FallCause, Phase, TrialEnd, TrialSpec};
 use nalgebra::Vector3;
 
-/// How far a trial has come.
+/// Progress of a trial.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Progress {
     /// Standing still before the impulse.
@@ -32,7 +32,7 @@ pub struct Jump {
     countdown: u32,
     /// Ticks without any foot on the ground since the last one.
     airborne: u32,
-    /// Whether it has flown and touched down again since the last impulse.
+    /// Whether the robot has flown and touched down since the last impulse.
     flown: bool,
     /// Ticks since the touchdown after the last impulse.
     landed: u32,
@@ -41,13 +41,13 @@ pub struct Jump {
     fall: FallWatch,
 }
 
-/// A foot may lift for a moment in stance; only a longer absence of all four is a flight.
+/// Shortest time without any foot on the ground that counts as a flight, s.
 const SHORTEST_FLIGHT_S: f64 = 0.02;
-/// After an impulse that does not leave the ground within this time, the jump counts as landed.
+/// An impulse without take-off within this time counts as landed, s.
 const LATEST_TAKEOFF_S: f64 = 0.1;
 
 impl Jump {
-    /// Begins a trial: everything that it runs with is fixed from here on.
+    /// Begins a trial with latched settings.
     pub fn begin(spec: &TrialSpec, settings: &ControlSettings) -> Jump {
         Jump {
             spec: *spec,
@@ -67,7 +67,7 @@ impl Jump {
         }
     }
 
-    /// What the trial runs with.
+    /// Settings of the trial.
     pub fn spec(&self) -> &TrialSpec {
         &self.spec
     }
@@ -84,7 +84,7 @@ impl Jump {
         waited + self.oscillator.impulse_s()
     }
 
-    /// No further impulse after the one under way, or the one that has just been: the robot is to land.
+    /// Drops all impulses that have not begun, so that the robot lands.
     pub fn land(&mut self) {
         let period_s = self.oscillator.period_s();
         let begun =
@@ -92,7 +92,7 @@ impl Jump {
         self.spec.jumps = self.spec.jumps.min(begun as u32);
     }
 
-    /// How long it has been on the ground since the last flight, s; zero before it has landed.
+    /// Time on the ground since the last flight, s; zero before the landing.
     pub fn landed_s(&self) -> f64 {
         f64::from(self.landed) * PERIOD_S
     }
@@ -103,12 +103,12 @@ impl Jump {
         if time_s < self.impulses_end_s() { self.oscillator.theta_rad(time_s) } else { 0.0 }
     }
 
-    /// Where in the jump the robot is.
+    /// Phase of the jump.
     pub fn phase(&self) -> Phase {
         self.phase
     }
 
-    /// What the legs are to do now.
+    /// Target of the legs in this tick.
     pub fn target(&self) -> LegTarget {
         let theta_rad = self.theta_rad();
         LegTarget {
@@ -120,7 +120,7 @@ impl Jump {
         }
     }
 
-    /// Takes note of the newest state and says how far the trial has come. Called once per tick, before `target`.
+    /// Advances phase and progress with the newest state. To be called once per tick, before `target`.
     pub fn observe(&mut self, state: &RobotState, estimate: &Estimate, settings: &ControlSettings) -> Progress {
         if let Some(cause) = self.fall.observe(state, estimate, settings) {
             return Progress::Over(TrialEnd::Fell(cause));
@@ -168,42 +168,41 @@ impl Jump {
         }
     }
 
-    /// One tick has passed.
+    /// Counts one tick.
     pub fn advance(&mut self) {
         self.elapsed += 1;
     }
 }
 
-/// Watches for a fall (`specs/method.md`, "fall").
+/// Fall detection (`docs/method.md`, "Fall").
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct FallWatch {
-    /// Ticks for which a part other than the feet has been on the ground.
+    /// Ticks in a row in which a part other than the feet touches the ground.
     touching: u32,
 }
 
 impl FallWatch {
-    /// Whether the robot has fallen by now, and by which sign. Called once per tick.
+    /// Returns the cause of a fall. To be called once per tick.
     pub fn observe(
         &mut self,
         state: &RobotState,
         estimate: &Estimate,
         settings: &ControlSettings,
     ) -> Option<FallCause> {
-        self.look(state, estimate, settings, f64::INFINITY)
+        self.detect(state, estimate, settings, f64::INFINITY)
     }
 
-    /// The same of a robot that has landed and only stands: tilted beyond what a standing robot may be, it is falling. Called
-    /// once per tick.
+    /// As `observe`, for a robot that stands after the landing: its tilt limit is that of standing.
     pub fn observe_standing(
         &mut self,
         state: &RobotState,
         estimate: &Estimate,
         settings: &ControlSettings,
     ) -> Option<FallCause> {
-        self.look(state, estimate, settings, settings.watchdog.stance_tilt_rad)
+        self.detect(state, estimate, settings, settings.watchdog.stance_tilt_rad)
     }
 
-    fn look(
+    fn detect(
         &mut self,
         state: &RobotState,
         estimate: &Estimate,
@@ -213,7 +212,7 @@ impl FallWatch {
         let touches = state.truth.is_some_and(|truth| truth.body_contact);
         self.touching = if touches { self.touching + 1 } else { 0 };
         let [roll, pitch, _] = estimate.roll_pitch_yaw.into();
-        // In the air nothing can be put right any more: what is tilted there lands on its side.
+        // Tilt in the air cannot be corrected before the landing.
         let airborne = estimate.contact.iter().all(|&down| !down);
         let in_flight_rad = if airborne { settings.flight_tilt_rad } else { f64::INFINITY };
         let allowed = |limit: f64| limit.min(in_flight_rad).min(most_rad);

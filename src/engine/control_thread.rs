@@ -13,7 +13,7 @@ use crate::control::settings::{ControlSettings, PERIOD_S};
 use crate::realtime::channel::ControlEnd;
 use crate::realtime::clock::Clock;
 use crate::realtime::scheduling::{DeniedSetting, RealtimeSetting, Scheduling};
-use crate::realtime::thread::{CONTROL_PHASE, Instant, Paced, REHEARSAL_LEAD, pace_rehearsed};
+use crate::realtime::thread::{CONTROL_PHASE, PeriodicTask, REHEARSAL_LEAD, TickStart, pace_rehearsed};
 use crate::robot::{JointCommand, Robot};
 
 /// What the thread is started with.
@@ -44,10 +44,10 @@ const LAST_DAMPINGS: u32 = 500;
 /// When a tick does, or the clock cannot be read: once the robot has been damped, and `closing` is set.
 pub fn run<C: Clock>(mut start: Start<C>, end: ControlEnd, robot: &mut dyn Robot) {
     let granted = start.scheduling.apply();
-    let _ = start.told.send((granted.favours.clone(), granted.shortfalls.clone()));
+    let _ = start.told.send((granted.granted.clone(), granted.denied.clone()));
     let period = Duration::from_secs_f64(PERIOD_S);
     let lead = lead(start.real);
-    let paced = |ticking: &mut dyn Paced| pace_rehearsed(period, CONTROL_PHASE, lead, ticking);
+    let paced = |ticking: &mut dyn PeriodicTask| pace_rehearsed(period, CONTROL_PHASE, lead, ticking);
     // The damping at the end is slept, not paced: the clock may be what failed.
     if let Err(panic) = drive(&mut start, end, robot, paced, || std::thread::sleep(period)) {
         resume_unwind(panic);
@@ -76,12 +76,12 @@ impl<C> Ticking<'_, C> {
     }
 }
 
-impl<C: Clock> Paced for Ticking<'_, C> {
+impl<C: Clock> PeriodicTask for Ticking<'_, C> {
     fn rehearse(&mut self) {
         self.body.rehearse(self.clock, self.robot);
     }
 
-    fn tick(&mut self, instant: Instant) -> ControlFlow<()> {
+    fn tick(&mut self, instant: TickStart) -> ControlFlow<()> {
         self.body.tick(instant, self.clock, self.robot);
         self.body.prepare();
         self.sign_of_life();
@@ -94,7 +94,7 @@ fn drive<C: Clock>(
     start: &mut Start<C>,
     end: ControlEnd,
     robot: &mut dyn Robot,
-    paced: impl FnOnce(&mut dyn Paced) -> Result<(), nix::Error>,
+    paced: impl FnOnce(&mut dyn PeriodicTask) -> Result<(), nix::Error>,
     mut wait: impl FnMut(),
 ) -> std::thread::Result<()> {
     let body = ControlLoop::new(start.settings, end);
@@ -180,8 +180,8 @@ mod tests {
             lifeline: None,
         };
         let mut ms = 0;
-        let unpaced = |ticking: &mut dyn Paced| {
-            while ticking.tick(Instant { planned_ns: ms * 1_000_000, lateness_ns: 0 }).is_continue() {
+        let unpaced = |ticking: &mut dyn PeriodicTask| {
+            while ticking.tick(TickStart { planned_ns: ms * 1_000_000, lateness_ns: 0 }).is_continue() {
                 ticking.rehearse();
                 ms += 1;
             }

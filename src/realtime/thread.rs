@@ -1,4 +1,4 @@
-//! Pacing: a body called at absolute instants, one per period, and how late each call was; before each, if it wishes, a rehearsal.
+//! Calls a periodic task at absolute times of the monotonic clock, and measures its lateness; before each tick, on request, a rehearsal.
 
 use std::ops::ControlFlow;
 use std::time::Duration;
@@ -6,28 +6,27 @@ use std::time::Duration;
 use nix::sys::time::TimeSpec;
 use nix::time::{ClockId, ClockNanosleepFlags, clock_gettime, clock_nanosleep};
 
-/// The instant of one call.
+/// Start of one tick.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Instant {
+pub struct TickStart {
     /// Planned start since the loop began, ns.
     pub planned_ns: u64,
-    /// How much later it really started, ns.
+    /// Delay of the real start, ns.
     pub lateness_ns: u64,
 }
 
-/// A loop that is this many periods behind (the process was suspended, the machine slept) starts counting anew instead
-/// of calling its body without a pause until it has caught up.
+/// A loop that is more periods behind than this (the process was suspended, the machine slept) skips them instead of catching up
+/// without a pause.
 const FORGIVEN_PERIODS: u64 = 20;
 
-/// The phase of a control thread that ticks every millisecond.
+/// Offset of the control thread's ticks within the kernel's millisecond.
 ///
-/// A kernel whose tick is a whole number of milliseconds (CONFIG_HZ 100, 250 or 1000) does its own periodic work at whole
-/// milliseconds of the monotonic clock (Linux, `kernel/time/tick-common.c`, `tick_setup_device`). A loop that happened to begin
-/// there would meet it time and again in the middle of its work. This one begins late enough after it for what the tick sets off
-/// to be done, and early enough to be done itself before the next.
+/// A kernel whose tick is a whole number of milliseconds (CONFIG_HZ 100, 250 or 1000) does its periodic work at whole
+/// milliseconds of the monotonic clock (Linux, `kernel/time/tick-common.c`, `tick_setup_device`). This offset is late enough for
+/// that work to be done, and early enough for the control tick to end before the next.
 pub const CONTROL_PHASE: Duration = Duration::from_micros(750);
 
-/// How long before a tick of the control thread its rehearsal begins: early enough to be over by then, late enough that what it
+/// Time from the start of the control thread's rehearsal to its tick: early enough to be over by then, late enough that what it
 /// fetched is there still.
 pub const REHEARSAL_LEAD: Duration = Duration::from_micros(100);
 /// What must be left of the lead once the thread is awake. A rehearsal takes 8 us, in one of a thousand ticks 25 to 40 (on the
@@ -39,30 +38,30 @@ const OVERRUNS: u32 = 3;
 /// For how many ticks there is none then.
 const RESTING_TICKS: u32 = 1000;
 
-/// What is called in time.
-pub trait Paced {
+/// A task that is called once per period.
+pub trait PeriodicTask {
     /// Called somewhat before a tick, to do beforehand what makes the tick shorter. Nothing may depend on it: it is left out
     /// where time is short.
     fn rehearse(&mut self) {}
 
     /// Called once per period, until it breaks.
-    fn tick(&mut self, instant: Instant) -> ControlFlow<()>;
+    fn tick(&mut self, instant: TickStart) -> ControlFlow<()>;
 }
 
-impl<F: FnMut(Instant) -> ControlFlow<()>> Paced for F {
-    fn tick(&mut self, instant: Instant) -> ControlFlow<()> {
+impl<F: FnMut(TickStart) -> ControlFlow<()>> PeriodicTask for F {
+    fn tick(&mut self, instant: TickStart) -> ControlFlow<()> {
         self(instant)
     }
 }
 
-/// Calls `body` once per period until it breaks, each time `phase` after a whole period of the system's monotonic clock.
+/// Calls `body` once per period, `phase` after a whole period of the system's monotonic clock, until it breaks.
 ///
 /// # Errors
 /// When the system's monotonic clock cannot be read or waited on.
 pub fn pace(
     period: Duration,
     phase: Duration,
-    mut body: impl FnMut(Instant) -> ControlFlow<()>,
+    mut body: impl FnMut(TickStart) -> ControlFlow<()>,
 ) -> Result<(), nix::Error> {
     pace_rehearsed(period, phase, Duration::ZERO, &mut body)
 }
@@ -76,7 +75,7 @@ pub fn pace_rehearsed(
     period: Duration,
     phase: Duration,
     lead: Duration,
-    body: &mut (impl Paced + ?Sized),
+    body: &mut (impl PeriodicTask + ?Sized),
 ) -> Result<(), nix::Error> {
     let [period_ns, phase_ns, lead_ns, needs_ns] =
         [period, phase, lead, REHEARSAL_NEEDS].map(|time| time.as_nanos() as u64);
@@ -100,7 +99,7 @@ pub fn pace_rehearsed(
         }
         sleep_until(planned_ns)?;
         let lateness_ns = monotonic_ns()?.saturating_sub(planned_ns);
-        let instant = Instant { planned_ns: count * period_ns + skipped_ns, lateness_ns };
+        let instant = TickStart { planned_ns: count * period_ns + skipped_ns, lateness_ns };
         if body.tick(instant).is_break() {
             return Ok(());
         }
@@ -118,7 +117,7 @@ fn sleep_until(time_ns: u64) -> Result<(), nix::Error> {
     loop {
         match clock_nanosleep(ClockId::CLOCK_MONOTONIC, ClockNanosleepFlags::TIMER_ABSTIME, &wake) {
             Ok(_) => return Ok(()),
-            // A signal woke the thread early: sleep on.
+            // Woken early by a signal.
             Err(nix::Error::EINTR) => {}
             Err(error) => return Err(error),
         }

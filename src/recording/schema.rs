@@ -154,8 +154,8 @@ pub fn decode(topic: Topic, data: &[u8]) -> Result<Option<Record>, DecodeError> 
         Topic::PreArm => {
             let item = |item: frog::pre_arm::Item| {
                 Ok(ArmingCheckRecord {
-                    check: one_of(&ArmingCheck::ALL, "check", item.check)?,
-                    state: one_of(&ArmingCheckState::ALL, "state of a check", item.state)?,
+                    check: one_of(ArmingCheck::ALL, "check", item.check)?,
+                    state: one_of(ArmingCheckState::ALL, "state of a check", item.state)?,
                     found: item.found,
                     needed: item.needed,
                 })
@@ -387,11 +387,11 @@ mod tests {
 
     #[test]
     fn enums_are_numbered_as_in_the_schema() {
-        for (number, mode) in (0..).zip(Mode::ALL) {
+        for (number, mode) in (0..).zip(Mode::ALL.iter().copied()) {
             assert_eq!(mode as i32, number);
             assert_named(mode.name(), frog::control_tick::Mode::try_from(number).ok().map(|m| m.as_str_name()));
         }
-        for (number, phase) in (0..).zip(Phase::ALL) {
+        for (number, phase) in (0..).zip(Phase::ALL.iter().copied()) {
             assert_eq!(phase as i32, number);
             assert_named(phase.name(), frog::control_tick::Phase::try_from(number).ok().map(|p| p.as_str_name()));
         }
@@ -408,11 +408,11 @@ mod tests {
             assert_named(verdict.name(), frog::trial::Verdict::try_from(number).ok().map(|v| v.as_str_name()));
         }
         // Their names are sentences; their numbers and count are what matters.
-        for (number, check) in (0..).zip(ArmingCheck::ALL) {
+        for (number, check) in (0..).zip(ArmingCheck::ALL.iter().copied()) {
             assert_eq!(check as i32, number);
             assert!(frog::pre_arm::Check::try_from(number).is_ok(), "{check:?}");
         }
-        for (number, state) in (0..).zip(ArmingCheckState::ALL) {
+        for (number, state) in (0..).zip(ArmingCheckState::ALL.iter().copied()) {
             assert_eq!(state as i32, number);
             assert_named(state.name(), frog::pre_arm::State::try_from(number).ok().map(|s| s.as_str_name()));
         }

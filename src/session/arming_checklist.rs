@@ -2,14 +2,12 @@
 
 use std::path::PathBuf;
 
+use crate::control::arming::{self, Sentence};
 use crate::control::settings::{ArmingLimits, ControlSettings};
 use crate::recording::disk;
 use crate::recording::record::ArmingCheckRecord;
 use crate::recording::recorder::RecorderStatus;
-use crate::robot::joint_name;
-use crate::telemetry::{
-    ArmingCheck, ArmingCheckSet, ArmingCheckState, ArmingFinding, ArmingFindings, Mode, TransitionCause,
-};
+use crate::telemetry::{ArmingCheck, ArmingCheckSet, ArmingCheckState, ArmingFindings, Mode, TransitionCause};
 
 use super::operator_request::OperatorCheck;
 
@@ -86,7 +84,7 @@ impl ArmingChecklist {
             self.words.remove(ArmingCheck::AreaClear);
         }
         if let TransitionCause::Fault(fault) = cause
-            && fault.voids_the_word()
+            && fault.voids_confirmations()
         {
             self.take_back();
         }
@@ -119,7 +117,10 @@ impl ArmingChecklist {
 
     /// How every item stands now.
     pub fn look(&self, findings: &ArmingFindings, recorder: &RecorderStatus) -> Vec<ArmingCheckRecord> {
-        let found = findings.0.iter().map(|finding| self.words_of(finding));
+        let found = findings.0.iter().map(|finding| {
+            let Sentence { found, needed } = arming::sentence(finding, &self.limits);
+            self.item(finding.check, finding.state, found, needed)
+        });
         let own = [
             self.recorder(recorder),
             self.disk(),
@@ -137,50 +138,6 @@ impl ArmingChecklist {
         let needed = u64::from(self.trial_mb);
         (free < needed)
             .then(|| format!("{free} MB free where the recording goes, at least {needed} for a trial; make room"))
-    }
-
-    fn words_of(&self, finding: &ArmingFinding) -> ArmingCheckRecord {
-        let ArmingFinding { check, state, measured, .. } = *finding;
-        let limits = &self.limits;
-        let joint = finding.joint.map(|joint| joint_name(joint as usize)).unwrap_or_default();
-        let (found, needed) = match check {
-            ArmingCheck::StateFresh => (format!("{measured:.0} ms old"), format!("at most {} ms", limits.state_age_ms)),
-            ArmingCheck::Loss => {
-                (format!("{:.1} % lost", measured * 100.0), format!("at most {} % in 5 s", limits.loss_share * 100.0))
-            }
-            ArmingCheck::Checksums => (format!("{measured:.0} corrupt"), format!("at most {} in 5 s", limits.corrupt)),
-            ArmingCheck::Upright => {
-                (format!("tilted {measured:.2} rad"), format!("at most {:.2} rad", limits.tilt_rad))
-            }
-            ArmingCheck::JointsInside => {
-                let found = if measured > 0.0 { format!("{joint} {measured:.2} rad beyond") } else { "all".to_owned() };
-                (found, format!("at most {:.2} rad beyond", limits.joint_margin_rad))
-            }
-            ArmingCheck::LyingDown => {
-                (format!("{joint} {measured:.2} rad away"), format!("at most {:.2} rad", limits.lying_tolerance_rad))
-            }
-            ArmingCheck::Battery => (format!("{measured:.0} %"), format!("at least {:.0} %", limits.battery_percent)),
-            ArmingCheck::MotorsCool => (format!("{joint} {measured:.0} C"), format!("at most {:.0} C", limits.motor_c)),
-            ArmingCheck::MotorsFollow => {
-                let found = if measured > 0.0 {
-                    format!("{measured:.0} out of servo mode, {joint} first")
-                } else {
-                    "all in servo mode".to_owned()
-                };
-                (found, "every motor in servo mode".to_owned())
-            }
-            ArmingCheck::GyroStill => (
-                format!("{measured:.2} rad/s"),
-                format!("at most {:.2} rad/s for {} s", limits.gyro_rad_s, limits.still_s),
-            ),
-            ArmingCheck::OnTime => (
-                format!("{:.1} % of ticks late", measured * 100.0),
-                format!("at most {} % later than {} ms", limits.late_share * 100.0, limits.late_ms),
-            ),
-            _ => (String::new(), String::new()),
-        };
-        let found = if measured.is_finite() { found } else { "not known yet".to_owned() };
-        self.item(check, state, found, needed)
     }
 
     fn recorder(&self, status: &RecorderStatus) -> ArmingCheckRecord {

@@ -493,7 +493,7 @@ impl Supervisor {
 
     /// What forbids the next trial, in words; none if nothing does.
     fn hold(&mut self) -> Option<String> {
-        let hold = self.control.readiness.read().hold.map(|hold| hold.to_string());
+        let hold = self.control.readiness.read().inhibit.map(|hold| hold.to_string());
         hold.or_else(|| self.pre_arm.disk_low())
     }
 
@@ -507,7 +507,7 @@ impl Supervisor {
         }
         self.held = hold;
         let due = self.caution_ns.is_none_or(|said_ns| time_ns >= said_ns + CAUTION_PERIOD_NS);
-        if let Some(caution) = self.control.readiness.read().caution.filter(|_| due) {
+        if let Some(caution) = self.control.readiness.read().warning.filter(|_| due) {
             self.caution_ns = Some(time_ns);
             self.log(LogLevel::Warning, caution.to_string(), time_ns);
         }

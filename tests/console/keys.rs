@@ -92,7 +92,7 @@ fn an_approval_ends_with_readiness() {
 #[test]
 fn stop_works_on_every_screen_and_over_every_dialog() {
     for stop in ["Space", "F12"] {
-        for mode in Mode::ALL {
+        for &mode in Mode::ALL {
             for view in ["1", "2", "3", "4", "5", "6"] {
                 let mut console = Console::proposed();
                 console.press(&[view]);
@@ -264,7 +264,7 @@ fn an_observer_and_a_replay_send_nothing() {
         duration_ns: 1,
     }));
     for (name, console) in [("observer", &mut observer), ("replay", &mut replay)] {
-        for mode in Mode::ALL {
+        for &mode in Mode::ALL {
             console.mode(mode);
             for stage in ExperimentStage::ALL {
                 console.stage(stage, 0);
@@ -288,7 +288,7 @@ fn an_observer_and_a_replay_send_nothing() {
 
 #[test]
 fn energising_keys_do_nothing_in_the_wrong_mode() {
-    for mode in Mode::ALL {
+    for &mode in Mode::ALL {
         let mut console = Console::proposed();
         console.mode(mode);
         let armed = wishes(&console.press(&["A"]));
@@ -352,7 +352,7 @@ fn suspending_is_refused_while_the_robot_is_armed() {
 /// (A defect once: a suspended program does not damp the robot that it has just stopped.)
 #[test]
 fn suspending_is_refused_while_anything_is_sent_to_a_real_robot() {
-    for mode in Mode::ALL {
+    for &mode in Mode::ALL {
         let mut console = Console::proposed();
         console.record(Record::Session(SessionInfo { backend: "go1".into(), ..session() }));
         console.mode(mode);

@@ -406,7 +406,7 @@ fn the_mouse_is_off_until_it_is_asked_for_and_never_commands() {
     console.tell(Msg::Mouse(Mouse::WheelUp));
     assert_eq!(console.model.trials_view.selected, Some(0));
     // Wherever it is clicked, in whatever mode: nothing leaves for the robot.
-    for mode in Mode::ALL {
+    for &mode in Mode::ALL {
         console.mode(mode);
         for key in ["1", "2", "4"] {
             console.press(&[key]);

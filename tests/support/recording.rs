@@ -83,8 +83,8 @@ impl Draw {
         Tick {
             number: self.word(),
             time_ns: self.word() >> 2,
-            mode: self.one_of(&Mode::ALL),
-            phase: self.one_of(&Phase::ALL),
+            mode: self.one_of(Mode::ALL),
+            phase: self.one_of(Phase::ALL),
             trial: self.option(|d| d.word() as u32),
             trial_time_s: self.number(),
             theta_rad: self.number(),
@@ -202,8 +202,8 @@ impl Draw {
                 approve: self.string(),
             }),
             1 => Record::Transition(Transition {
-                from: self.one_of(&Mode::ALL),
-                to: self.one_of(&Mode::ALL),
+                from: self.one_of(Mode::ALL),
+                to: self.one_of(Mode::ALL),
                 cause: self.string(),
             }),
             2 => Record::Stage(StageRecord {
@@ -265,10 +265,10 @@ impl Draw {
                 message: self.string(),
             }),
             8 => Record::ArmingChecks(self.several(|d| ArmingCheckRecord {
-                check: d.one_of(&ArmingCheck::ALL),
+                check: d.one_of(ArmingCheck::ALL),
                 found: d.string(),
                 needed: d.string(),
-                state: d.one_of(&ArmingCheckState::ALL),
+                state: d.one_of(ArmingCheckState::ALL),
             })),
             9 => Record::FaultTicks(vec![self.tick(), self.tick()]),
             10 => Record::Search(SearchStatus {

@@ -157,10 +157,10 @@ fn wake_up(scheduling: Scheduling) -> Vec<DoctorItem> {
     const LATENCY: &str = "wake-up latency";
     match measured.join() {
         Ok(Ok((granted, lateness))) => {
-            let settings: Vec<_> = granted.favours.iter().map(ToString::to_string).collect();
+            let settings: Vec<_> = granted.granted.iter().map(ToString::to_string).collect();
             let mut items = vec![DoctorItem::new("control thread", settings.join(", "), true, "")];
-            items.extend(granted.shortfalls.iter().map(|denied| {
-                let found = format!("not {}: {}", denied.favour, denied.reason);
+            items.extend(granted.denied.iter().map(|denied| {
+                let found = format!("not {}: {}", denied.setting, denied.reason);
                 DoctorItem::new("control thread", found, false, denied.remedy)
             }));
             let at = |rank: usize| lateness[rank.min(lateness.len() - 1)] as f64 * 1e-3;

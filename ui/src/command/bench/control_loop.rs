@@ -16,7 +16,7 @@ use quadfrog::realtime::channel::{ScreenEnd, SessionEnd, channels};
 use quadfrog::realtime::clock::{Clock, MonotonicClock};
 use quadfrog::realtime::scheduling::{GrantedSettings, Scheduling};
 use quadfrog::realtime::system::isolated_cores;
-use quadfrog::realtime::thread::{CONTROL_PHASE, Instant, Paced, REHEARSAL_LEAD, pace, pace_rehearsed};
+use quadfrog::realtime::thread::{CONTROL_PHASE, TickStart, PeriodicTask, REHEARSAL_LEAD, pace, pace_rehearsed};
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::robot::go1::Go1;
 use quadfrog::robot::{Placement, Robot};
@@ -104,7 +104,7 @@ impl LoopMeasurement {
         measurement
     }
 
-    fn record(&mut self, instant: Instant, duration_ns: u64, tick: &Tick) {
+    fn record(&mut self, instant: TickStart, duration_ns: u64, tick: &Tick) {
         self.lateness.saturating_record(instant.lateness_ns.max(1));
         if instant.planned_ns >= self.end_ns {
             self.wake_up.saturating_record(instant.lateness_ns.max(1));
@@ -154,9 +154,9 @@ pub fn run(arguments: &LoopArguments) -> Result<(), Failure> {
 
 fn report(arguments: &LoopArguments, ours: &LoopMeasurement, cyclictest: &Durations, system_calls: &Durations) {
     if let Some(granted) = &ours.granted {
-        let settings: Vec<_> = granted.favours.iter().map(ToString::to_string).collect();
+        let settings: Vec<_> = granted.granted.iter().map(ToString::to_string).collect();
         println!("granted: {}", if settings.is_empty() { "nothing".to_owned() } else { settings.join(", ") });
-        for denied in &granted.shortfalls {
+        for denied in &granted.denied {
             println!("{denied}");
         }
     }
@@ -305,7 +305,7 @@ impl StandingLoop<'_> {
     }
 }
 
-impl Paced for StandingLoop<'_> {
+impl PeriodicTask for StandingLoop<'_> {
     fn rehearse(&mut self) {
         let start_ns = self.clock.now_ns();
         self.control.rehearse(&self.clock, self.robot);
@@ -314,7 +314,7 @@ impl Paced for StandingLoop<'_> {
         }
     }
 
-    fn tick(&mut self, instant: Instant) -> ControlFlow<()> {
+    fn tick(&mut self, instant: TickStart) -> ControlFlow<()> {
         let start_ns = self.clock.now_ns();
         let tick = self.control.tick(instant, &self.clock, self.robot);
         let duration_ns = self.clock.now_ns() - start_ns;

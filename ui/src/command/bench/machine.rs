@@ -10,7 +10,7 @@ use color_eyre::eyre::{WrapErr, eyre};
 use hdrhistogram::Histogram;
 use quadfrog::realtime::clock::{Clock, MonotonicClock};
 use quadfrog::realtime::scheduling::Scheduling;
-use quadfrog::realtime::thread::{CONTROL_PHASE, Instant, Paced, pace_rehearsed};
+use quadfrog::realtime::thread::{CONTROL_PHASE, TickStart, PeriodicTask, pace_rehearsed};
 use quadfrog::robot::go1::packet::{COMMAND_LENGTH, STATE_LENGTH};
 
 use crate::command::failure::Failure;
@@ -87,13 +87,13 @@ struct SystemCallLoop {
     remaining: u64,
 }
 
-impl Paced for SystemCallLoop {
+impl PeriodicTask for SystemCallLoop {
     fn rehearse(&mut self) {
         self.warm_up.answer();
         self.warm_up.tick();
     }
 
-    fn tick(&mut self, _: Instant) -> ControlFlow<()> {
+    fn tick(&mut self, _: TickStart) -> ControlFlow<()> {
         let start_ns = self.clock.now_ns();
         self.pair.tick();
         self.durations.saturating_record((self.clock.now_ns() - start_ns).max(1));
