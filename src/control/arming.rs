@@ -3,7 +3,7 @@
 
 use super::limits::ticks;
 use super::settings::ControlSettings;
-use crate::robot::recent::Recent;
+use crate::robot::recent_count::RecentCount;
 use crate::robot::{JOINTS, LinkStatus, RobotState};
 use crate::telemetry::{ArmingCheck, ArmingCheckState, ArmingFinding, ArmingFindings, Estimate};
 
@@ -14,7 +14,7 @@ const PACE_KNOWN_TICKS: u32 = 1000;
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ArmingChecks {
     /// Ticks that began later than they may.
-    late: Recent,
+    late: RecentCount,
     /// New states in which the gyroscope has been still, since it last moved, fell silent or restarted.
     still: u32,
 }

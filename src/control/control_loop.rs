@@ -1,12 +1,19 @@
-//! The control thread's body: inputs from the channels, one tick, and what it gave to the channels. Called once a millisecond
-//! by the engine's thread, and by a test or a bench as they like; nothing here allocates, locks or waits.
+//! Body of the control thread: takes inputs from the channels, runs one tick, and puts its results into the channels.
+//! Called once per millisecond by the engine's thread, and by tests and benches; nothing here allocates, locks or
+//! waits.
+//!
+//! **Cache warm-up.** The other work of a millisecond evicts the tick's code and data from the processor's caches, and
+//! a tick with cold caches takes longer. Therefore [`ControlLoop::warm_up`], 0.1 ms before each tick of a real robot,
+//! runs a tick on a copy of the cycle with the last state and discards the result; [`Robot::warm_up`] does the same for
+//! the system calls of the link. It changes no result (`tests/control_warm_up.rs`). The longest of a thousand ticks
+//! take a third less time with it (loopback: `quadfrog bench loop --with-link`, compared with `--unrehearsed`).
 
 use super::cycle::{Cycle, Inputs};
-use super::settings::{ControlSettings, PERIOD_S};
+use super::settings::ControlSettings;
 use crate::realtime::channel::{ControlEnd, SHOWN_EVERY};
 use crate::realtime::clock::Clock;
 use crate::realtime::thread::Instant;
-use crate::robot::{JointCommand, LinkStatus, Placement, Robot, RobotError, RobotState};
+use crate::robot::{CONTROL_PERIOD_S, JointCommand, LinkStatus, Placement, Robot, RobotError, RobotState};
 use crate::telemetry::{Command, Counters, Event, Mode, Snapshot, Tick};
 
 /// The session is told the counters, and what speaks against arming, ten times a second and with every event.
@@ -60,7 +67,7 @@ impl ControlLoop {
         };
         let tick = *cycle.tick(&inputs, clock, robot);
 
-        counters.late_ticks += u64::from(instant.lateness_ns as f64 > PERIOD_S * 1e9 / 2.0);
+        counters.late_ticks += u64::from(instant.lateness_ns as f64 > CONTROL_PERIOD_S * 1e9 / 2.0);
         counters.worst_lateness_ns = counters.worst_lateness_ns.max(instant.lateness_ns);
         counters.state_age_ms = cycle.state_age_ms();
         counters.link = robot.link();
@@ -82,8 +89,9 @@ impl ControlLoop {
         cycle.last()
     }
 
-    /// Fetches the memory to which the next tick will be written, while nobody waits for it: the rings are long, so their next
-    /// place was last touched seconds ago. To be called between ticks; one that it is not called for is right all the same.
+    /// Fetches the memory to which the next tick will be written, while nobody waits for it: the rings are long, so
+    /// their next place was last touched seconds ago. To be called between ticks; one that it is not called for is
+    /// right all the same.
     pub fn prepare(&mut self) {
         fetch_next(&mut self.end.ticks);
         if (self.cycle.last().number + 1).is_multiple_of(SHOWN_EVERY) {
@@ -91,18 +99,16 @@ impl ControlLoop {
         }
     }
 
-    /// Does the cycle's usual course shortly before the next tick, on a copy and with a robot that is still as it was seen last:
-    /// code and data are then in the processor's caches, from which a millisecond of other work drives them. Nothing comes of
-    /// it. Of a thousand ticks the longest take a third less time with it (on the loopback: `quadfrog bench loop --with-link`,
-    /// and `--unrehearsed`). Should it panic, the tick would have, and is treated so.
-    pub fn rehearse<C: Clock>(&mut self, clock: &C, robot: &mut dyn Robot) {
-        robot.rehearse();
+    /// Warms the caches: runs one tick on a copy of the cycle and discards the result. A panic is treated as one of the
+    /// tick.
+    pub fn warm_up<C: Clock>(&mut self, clock: &C, robot: &mut dyn Robot) {
+        robot.warm_up();
         let last = self.cycle.last();
         let inputs = Inputs { time_ns: last.time_ns, ..Inputs::default() };
         let mut state = last.state;
         state.robot_time_ms = state.robot_time_ms.wrapping_add(1);
-        let mut repeated = Repeated { state, link: robot.link() };
-        // By the same kind of reference as the robot: a generic function for another type would be other code.
+        let mut repeated = LastState { state, link: robot.link() };
+        // `&mut dyn Robot` as in the tick: a generic function for another type would be other code.
         let mut copy = self.cycle;
         std::hint::black_box(copy.tick(&inputs, clock, &mut repeated as &mut dyn Robot));
         self.prepare();
@@ -114,13 +120,13 @@ impl ControlLoop {
     }
 }
 
-/// A robot that is in the state in which it was last seen, whatever it is told.
-struct Repeated {
+/// A robot that repeats the last state and ignores commands.
+struct LastState {
     state: RobotState,
     link: Option<LinkStatus>,
 }
 
-impl Robot for Repeated {
+impl Robot for LastState {
     fn read(&mut self) -> Result<RobotState, RobotError> {
         Ok(self.state)
     }

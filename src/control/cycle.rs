@@ -11,7 +11,7 @@ use super::ramp::{PoseRamp, RampProgress};
 use super::settings::ControlSettings;
 use crate::control::estimator::Estimator;
 use crate::realtime::clock::Clock;
-use crate::robot::kinematics::Foot;
+use crate::robot::kinematics::FootPosition;
 use crate::robot::{JointCommand, Joints, LEGS, Leg, PerLeg, Placement, Robot, RobotError, robot_time_passed};
 use crate::telemetry::{
     ArmingFindings, Command, CommandRefusal, Event, FailsafeWarning, Fault, Mode, Permit, Phase, Readiness, Tick,
@@ -92,7 +92,7 @@ pub struct Cycle {
     fall: FallWatch,
     /// The trial that ended in this tick: the tick is still its own.
     ended: Option<Jump>,
-    feet: PerLeg<Foot>,
+    feet: PerLeg<FootPosition>,
     state_age_ms: u32,
     /// The system's error number, if the robot could not be reached last time.
     send_error: Option<i32>,
@@ -125,7 +125,7 @@ impl Cycle {
             trial_ticks: 0,
             fall: FallWatch::default(),
             ended: None,
-            feet: [Foot { position_leg: Vector3::zeros(), jacobian_leg: Matrix3::zeros() }; LEGS],
+            feet: [FootPosition { position_leg: Vector3::zeros(), jacobian_leg: Matrix3::zeros() }; LEGS],
             state_age_ms: 0,
             send_error: None,
             landing: None,

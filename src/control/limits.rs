@@ -1,7 +1,7 @@
 //! The last gate: finite, clamp, rate. One function, after every controller, always.
 
-use super::settings::{ControlSettings, PERIOD_S};
-use crate::robot::{JOINTS, JointCommand, Joints, MotorCommand, RobotState};
+use super::settings::ControlSettings;
+use crate::robot::{CONTROL_PERIOD_S, JOINTS, JointCommand, Joints, MotorCommand, RobotState};
 use crate::telemetry::Fault;
 
 /// What left the gate.
@@ -104,5 +104,5 @@ pub fn finite(state: &RobotState) -> Result<(), Fault> {
 
 /// Number of ticks in `seconds`.
 pub fn ticks(seconds: f64) -> u32 {
-    (seconds / PERIOD_S).round() as u32
+    (seconds / CONTROL_PERIOD_S).round() as u32
 }

@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use clap::{Args, Subcommand};
 use color_eyre::eyre::{WrapErr, eyre};
-use quadfrog::sim::bench::{Scene, Speed};
+use quadfrog::sim::bench::{BenchScene, SimulatorBench};
 
 use super::Failure;
 
@@ -48,14 +48,14 @@ pub fn run(arguments: &BenchArguments) -> Result<(), Failure> {
         println!("This is a debug build: for figures that count, run it with cargo run --release.");
     }
     println!();
-    let figures = Speed::new().measure(arguments.seconds * 5.0);
+    let figures = SimulatorBench::new().measure(arguments.seconds * 5.0);
     println!("accelerations from torques                {:8.2} us", figures.dynamics_s * 1e6);
-    for (scene, seconds) in Scene::ALL.iter().zip(figures.step_s) {
+    for (scene, seconds) in BenchScene::ALL.iter().zip(figures.step_s) {
         println!("1 ms step, {:<31}{:8.2} us  {:8.0} steps/s", scene.name(), seconds * 1e6, 1.0 / seconds);
     }
     if let Some(script) = &arguments.mujoco {
         let theirs = mujoco(script, arguments.seconds)?;
-        // Scene::ALL[1] is standing on four feet, as the script's robot does.
+        // BenchScene::ALL[1] is standing on four feet, as the script's robot does.
         let ours = 1.0 / figures.step_s[1];
         println!(
             "MuJoCo, 1 ms step, standing on four feet  {:8.2} us  {theirs:8.0} steps/s; ours: {:.1} times as many",

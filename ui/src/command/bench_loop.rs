@@ -1,5 +1,6 @@
-//! `quadfrog bench loop`: how late the control thread wakes and what a tick costs. Beside the first stands `cyclictest` at the
-//! same priority and pace, beside the second the system calls of a tick without anything of ours: the machine's own share.
+//! `quadfrog bench loop`: how late the control thread wakes and what a tick costs. Beside the first stands `cyclictest`
+//! at the same priority and pace, beside the second the system calls of a tick without anything of ours: the machine's
+//! own share.
 
 use std::net::{Ipv4Addr, SocketAddr, UdpSocket};
 use std::ops::ControlFlow;
@@ -18,10 +19,10 @@ use quadfrog::realtime::channel::{ScreenEnd, SessionEnd, channels};
 use quadfrog::realtime::clock::{Clock, MonotonicClock};
 use quadfrog::realtime::scheduling::{GrantedSettings, Scheduling};
 use quadfrog::realtime::system::isolated_cores;
-use quadfrog::realtime::thread::{CONTROL_PHASE, Instant, Paced, REHEARSAL_LEAD, pace, pace_rehearsed};
-use quadfrog::robot::description::RobotDescription;
-use quadfrog::robot::go1::Go1;
+use quadfrog::realtime::thread::{CONTROL_PHASE, Instant, Paced, WARM_UP_LEAD, pace, pace_with_warm_up};
+use quadfrog::robot::description::RobotFiles;
 use quadfrog::robot::go1::packet::{COMMAND_LENGTH, STATE_LENGTH};
+use quadfrog::robot::go1::{Go1, Network};
 use quadfrog::robot::{Placement, Robot};
 use quadfrog::sim::Simulator;
 use quadfrog::sim::emulator::Emulator;
@@ -50,9 +51,9 @@ pub struct LoopArguments {
     /// Over the Go1's link to an emulated robot in this program, instead of with the simulator
     #[arg(long)]
     with_link: bool,
-    /// Without the rehearsal before each tick over the link (and so it is with --cyclictest)
-    #[arg(long, requires = "with_link")]
-    unrehearsed: bool,
+    /// Without the cache warm-up before each tick over the link (always so with --cyclictest)
+    #[arg(long = "unrehearsed", requires = "with_link")]
+    without_warm_up: bool,
     /// Also run cyclictest (package rt-tests) in turns with it, and compare
     #[arg(long)]
     cyclictest: bool,
@@ -62,9 +63,10 @@ pub struct LoopArguments {
 }
 
 impl LoopArguments {
-    /// How long before a tick its rehearsal begins. cyclictest wakes once per period, and is compared with a thread that does.
+    /// Time between cache warm-up and tick; zero for none. cyclictest wakes once per period and is compared with a
+    /// thread that does the same.
     fn lead(&self) -> Duration {
-        if self.with_link && !self.unrehearsed && !self.cyclictest { REHEARSAL_LEAD } else { Duration::ZERO }
+        if self.with_link && !self.without_warm_up && !self.cyclictest { WARM_UP_LEAD } else { Duration::ZERO }
     }
 }
 
@@ -80,8 +82,8 @@ fn times() -> Times {
 struct Measured {
     /// Of all ticks.
     lateness: Times,
-    /// Of the ticks before which the thread slept. A tick that makes up for a stall follows the one before at once: it is
-    /// late, but nothing woke late; cyclictest leaves such periods out.
+    /// Of the ticks before which the thread slept. A tick that makes up for a stall follows the one before at once: it
+    /// is late, but nothing woke late; cyclictest leaves such periods out.
     wake_up: Times,
     /// The same in whole microseconds, as cyclictest counts.
     wake_up_floor: Times,
@@ -95,8 +97,8 @@ struct Measured {
     publish: Times,
     /// After the tick: fetching the places of the next one.
     prepare: Times,
-    /// Before the tick: doing it on a copy.
-    rehearsal: Times,
+    /// Cache warm-up before the tick.
+    warm_up: Times,
     /// Ticks that were not in READY: the robot did not stand all the time.
     elsewhere: u64,
     granted: Option<GrantedSettings>,
@@ -105,7 +107,7 @@ struct Measured {
 impl Measured {
     fn new() -> Measured {
         let lateness = times();
-        let [wake_up, wake_up_floor, tick, read, decide, write, publish, prepare, rehearsal] =
+        let [wake_up, wake_up_floor, tick, read, decide, write, publish, prepare, warm_up] =
             std::array::from_fn(|_| lateness.clone());
         Measured {
             lateness,
@@ -118,7 +120,7 @@ impl Measured {
             write,
             publish,
             prepare,
-            rehearsal,
+            warm_up,
             elsewhere: 0,
             granted: None,
         }
@@ -135,7 +137,7 @@ impl Measured {
             (&mut self.write, &other.write),
             (&mut self.publish, &other.publish),
             (&mut self.prepare, &other.prepare),
-            (&mut self.rehearsal, &other.rehearsal),
+            (&mut self.warm_up, &other.warm_up),
         ] {
             mine.add(theirs).wrap_err("two histograms could not be added")?;
         }
@@ -221,7 +223,7 @@ fn report(arguments: &LoopArguments, ours: &Measured, theirs: &Times, alone: &Ti
     line("  publish", &ours.publish);
     line("after it: fetch places", &ours.prepare);
     if !arguments.lead().is_zero() {
-        line("before it: rehearsal", &ours.rehearsal);
+        line("before it: warm-up", &ours.warm_up);
     }
     if arguments.with_link {
         line("its system calls alone", alone);
@@ -230,7 +232,7 @@ fn report(arguments: &LoopArguments, ours: &Measured, theirs: &Times, alone: &Ti
     let (ticks, slept) = (ours.lateness.len(), ours.wake_up.len());
     print!("{ticks} ticks, {} of them made up for a stall, {} not in READY", ticks - slept, ours.elsewhere);
     if !arguments.lead().is_zero() {
-        print!(", {} rehearsed", ours.rehearsal.len());
+        print!(", {} with cache warm-up", ours.warm_up.len());
     }
     println!();
     if arguments.cyclictest {
@@ -254,7 +256,8 @@ fn us(ns: u64) -> f64 {
 /// A control thread as the engine's, whose robot stands; `ticks` of them measured.
 fn measure(scheduling: Scheduling, arguments: &LoopArguments, ticks: u64) -> Result<Measured, Failure> {
     let config = Config::load(None)?;
-    let mut description = RobotDescription::embedded("go1").map_err(Failure::input)?;
+    let files = RobotFiles::embedded("go1").map_err(Failure::input)?;
+    let description = files.description().map_err(Failure::input)?;
     let backend = if arguments.with_link { Backend::Hardware } else { Backend::Simulator };
     let mut settings = config.settings(&description, Task::Forward, backend)?;
     // A late tick is what is measured here, and standing is all that the robot does.
@@ -266,12 +269,11 @@ fn measure(scheduling: Scheduling, arguments: &LoopArguments, ticks: u64) -> Res
         return in_a_thread(move || stand_and_measure(scheduling, &settings, ticks, lead, &mut robot));
     }
     let anywhere = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
-    let mut emulator = Emulator::bind(anywhere, &description, &config.simulator, 0).map_err(Failure::input)?;
-    if let Some(network) = &mut description.network {
-        network.address = emulator.local_address().wrap_err("the emulator has no address")?;
-        network.local_port = 0;
-    }
-    let mut robot = Go1::open(&description, false).map_err(Failure::input)?;
+    let network = Network::read(&files).map_err(Failure::input)?.expect("the embedded go1 has a network");
+    let mut emulator =
+        Emulator::bind(anywhere, &description, &network, &config.simulator, 0).map_err(Failure::input)?;
+    let address = emulator.local_address().wrap_err("the emulator has no address")?;
+    let mut robot = Go1::open(&Network { address, local_port: 0, ..network }, false).map_err(Failure::input)?;
     let ended = Arc::new(AtomicBool::new(false));
     let flag = ended.clone();
     let emulated = std::thread::spawn(move || {
@@ -317,8 +319,8 @@ impl Ends {
         Ok(ends)
     }
 
-    /// What a tick asks of the system: a state is taken, the queue is found empty, a command is sent. What fails takes its time
-    /// all the same.
+    /// What a tick asks of the system: a state is taken, the queue is found empty, a command is sent. What fails takes
+    /// its time all the same.
     fn tick(&self) {
         let mut buffer = [0; 2048];
         while self.ours.recv(&mut buffer).is_ok() {}
@@ -333,19 +335,19 @@ impl Ends {
     }
 }
 
-/// The system calls of a tick without anything of ours, rehearsed as a tick is.
+/// The system calls of a tick alone, with the same warm-up.
 struct Exchange {
     ends: Ends,
-    rehearsed: Ends,
+    warm_up_ends: Ends,
     clock: MonotonicClock,
     taken: Times,
     left: u64,
 }
 
 impl Paced for Exchange {
-    fn rehearse(&mut self) {
-        self.rehearsed.answer();
-        self.rehearsed.tick();
+    fn warm_up(&mut self) {
+        self.warm_up_ends.answer();
+        self.warm_up_ends.tick();
     }
 
     fn tick(&mut self, _: Instant) -> ControlFlow<()> {
@@ -361,11 +363,11 @@ impl Paced for Exchange {
 /// What the system calls of a tick take by themselves, at the same pace and priority.
 fn exchange(scheduling: Scheduling, lead: Duration, ticks: u64) -> Result<Times, Failure> {
     let open = || Ends::open().wrap_err("no sockets on the loopback");
-    let (ends, rehearsed, clock) = (open()?, open()?, MonotonicClock::start());
-    let mut exchange = Exchange { ends, rehearsed, clock, taken: times(), left: ticks };
+    let (ends, warm_up_ends, clock) = (open()?, open()?, MonotonicClock::start());
+    let mut exchange = Exchange { ends, warm_up_ends, clock, taken: times(), left: ticks };
     in_a_thread(move || {
         let _granted = scheduling.apply();
-        pace_rehearsed(PERIOD, CONTROL_PHASE, lead, &mut exchange)
+        pace_with_warm_up(PERIOD, CONTROL_PHASE, lead, &mut exchange)
             .wrap_err("the monotonic clock cannot be waited on")?;
         Ok(exchange.taken)
     })
@@ -424,11 +426,11 @@ impl Standing<'_> {
 }
 
 impl Paced for Standing<'_> {
-    fn rehearse(&mut self) {
+    fn warm_up(&mut self) {
         let began_ns = self.clock.now_ns();
-        self.body.rehearse(&self.clock, self.robot);
+        self.body.warm_up(&self.clock, self.robot);
         if self.rising.is_none() {
-            self.measured.rehearsal.saturating_record((self.clock.now_ns() - began_ns).max(1));
+            self.measured.warm_up.saturating_record((self.clock.now_ns() - began_ns).max(1));
         }
     }
 
@@ -456,7 +458,7 @@ impl Paced for Standing<'_> {
     }
 }
 
-/// As the engine's control thread goes, with a rehearsal `lead` before each tick.
+/// Runs the body as the engine's control thread does, with a cache warm-up `lead` before each tick.
 fn stand_and_measure(
     scheduling: Scheduling,
     settings: &ControlSettings,
@@ -472,7 +474,8 @@ fn stand_and_measure(
     others.attend();
     let body = ControlLoop::new(settings, end);
     let mut standing = Standing { body, robot, clock, others, rising: Some(0), left: ticks, measured };
-    pace_rehearsed(PERIOD, CONTROL_PHASE, lead, &mut standing).wrap_err("the monotonic clock cannot be waited on")?;
+    pace_with_warm_up(PERIOD, CONTROL_PHASE, lead, &mut standing)
+        .wrap_err("the monotonic clock cannot be waited on")?;
     match standing.rising {
         Some(_) => {
             let mode = standing.body.mode().name();

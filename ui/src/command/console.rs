@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 use quadfrog::config::Backend;
 use quadfrog::engine::{Engine, Options};
+use quadfrog::robot::go1::Network;
 use quadfrog::trial::{Approval, Task};
 use quadfrog_console::app::{self, ConsoleOptions, Ended};
 use quadfrog_console::feed::Feed;
@@ -107,18 +108,20 @@ pub struct ConsoleArguments {
 
 pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
     let config = arguments.study.load_config(arguments.resume.as_deref())?;
-    let mut robot = arguments.study.load_robot()?;
+    let robot = arguments.study.load_robot()?;
     let backend = match arguments.robot {
         Machine::Sim => Backend::Simulator,
         Machine::Go1 => Backend::Hardware,
     };
-    match (&arguments.address, &mut robot.network) {
-        (Some(text), _) if backend == Backend::Simulator => {
-            return Err(Failure::input(format!("--address {text}: the simulator has none; add --robot go1")));
-        }
-        (Some(text), Some(network)) => network.address = address(text)?,
-        // A robot without a network is refused by the engine, with or without an address.
-        _ => {}
+    let mut network = None;
+    if backend == Backend::Hardware {
+        network = Network::read(&arguments.study.robot_files()?).map_err(Failure::input)?;
+    } else if let Some(text) = &arguments.address {
+        return Err(Failure::input(format!("--address {text}: the simulator has none; add --robot go1")));
+    }
+    // The engine refuses a robot without a network.
+    if let (Some(text), Some(network)) = (&arguments.address, &mut network) {
+        network.address = address(text)?;
     }
     let console = options(&arguments.screen, &config)?.with_robot(robot.clone());
     terminal::check().map_err(Failure::input)?;
@@ -142,6 +145,7 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
         approve: arguments.approve.into(),
         // This program, also where its file was replaced since it was started.
         guard: Some(PathBuf::from("/proc/self/exe")),
+        network,
         ..Options::new(config, robot, backend, chosen.task)
     })?;
     let recording = handle.recording().map(Path::to_owned);

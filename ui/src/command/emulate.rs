@@ -3,7 +3,7 @@
 use std::io::BufRead;
 use std::net::SocketAddr;
 use std::ops::ControlFlow;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
@@ -12,10 +12,12 @@ use clap::Args;
 use color_eyre::eyre::WrapErr;
 use nix::sys::signal::{SigSet, Signal};
 use quadfrog::config::Config;
+use quadfrog::engine::EngineError;
 use quadfrog::realtime::thread::pace;
-use quadfrog::robot::description::RobotDescription;
-use quadfrog::sim::CONTROL_PERIOD_S;
-use quadfrog::sim::emulator::{self, Emulator, EmulatorHandle, EmulatorStatus, Fault};
+use quadfrog::robot::CONTROL_PERIOD_S;
+use quadfrog::robot::description::RobotFiles;
+use quadfrog::robot::go1::Network;
+use quadfrog::sim::emulator::{self, Emulator, EmulatorFault, EmulatorHandle, EmulatorStatus};
 
 use super::Failure;
 
@@ -38,20 +40,17 @@ pub struct EmulateArguments {
     config: Option<PathBuf>,
     /// A fault from the start, for example "loss 5"; may be given several times
     #[arg(long = "fault", value_name = "FAULT")]
-    faults: Vec<Fault>,
+    faults: Vec<EmulatorFault>,
 }
 
 pub fn run(arguments: &EmulateArguments) -> Result<(), Failure> {
     let config = Config::load(arguments.config.as_deref())?;
-    let folder = Path::new(&arguments.model);
-    let description = if folder.is_dir() {
-        RobotDescription::from_folder(folder)
-    } else {
-        RobotDescription::embedded(&arguments.model)
-    };
-    let description = description.map_err(Failure::input)?;
-    let mut emulator =
-        Emulator::bind(arguments.bind, &description, &config.simulator, arguments.seed).map_err(Failure::input)?;
+    let files = RobotFiles::open(&arguments.model).map_err(Failure::input)?;
+    let description = files.description().map_err(Failure::input)?;
+    let no_network = || EngineError::NoNetwork { robot: description.name.clone() };
+    let network = Network::read(&files).map_err(Failure::input)?.ok_or_else(no_network)?;
+    let mut emulator = Emulator::bind(arguments.bind, &description, &network, &config.simulator, arguments.seed)
+        .map_err(Failure::input)?;
     for &fault in &arguments.faults {
         emulator.apply(fault);
     }

@@ -21,7 +21,7 @@ use quadfrog::optimize::journal::JournalError;
 use quadfrog::optimize::sampler::SamplerKind;
 use quadfrog::optimize::study::StudyError;
 use quadfrog::recording::RecordingError;
-use quadfrog::robot::description::RobotDescription;
+use quadfrog::robot::description::{RobotDescription, RobotFiles};
 use quadfrog::trial::Task;
 
 /// Optimize the jumps of a quadruped, on the robot or on the built-in simulator.
@@ -191,14 +191,12 @@ impl StudyArguments {
         Ok(config)
     }
 
+    fn robot_files(&self) -> Result<RobotFiles, Failure> {
+        RobotFiles::open(&self.model).map_err(Failure::input)
+    }
+
     fn load_robot(&self) -> Result<RobotDescription, Failure> {
-        let folder = Path::new(&self.model);
-        let robot = if folder.is_dir() {
-            RobotDescription::from_folder(folder)
-        } else {
-            RobotDescription::embedded(&self.model)
-        };
-        robot.map_err(Failure::input)
+        self.robot_files()?.description().map_err(Failure::input)
     }
 
     /// A new study's folder: `<output>/<date>T<time>-<task>-seed<seed>`, with a number behind it where that exists.
