@@ -273,11 +273,11 @@ fn measured_wrong_by(outcome: &Outcome) -> Vec<f64> {
 }
 
 /// Twenty trials on each of five robots over loopback, stepped by the millisecond, compared with the simulator.
-fn step_by_step(watched: bool) -> (Vec<f64>, Vec<f64>) {
+fn step_by_step(with_truth: bool) -> (Vec<f64>, Vec<f64>) {
     let mut bests = (Vec::new(), Vec::new());
     for seed in 0..5 {
-        let robot = |config: &SimConfig| Lockstep { watched, ..Lockstep::new(config, seed.into()) };
-        let backend = if watched { Backend::Simulator } else { Backend::Hardware };
+        let robot = |config: &SimConfig| Lockstep { with_truth, ..Lockstep::new(config, seed.into()) };
+        let backend = if with_truth { Backend::Simulator } else { Backend::Hardware };
         let (over, rows) = in_simulated_time(backend, seed, robot);
         let (alone, alone_rows) = in_the_simulator(seed);
         let row = |row: &TrialRecord| format!("{:.3} {}", row.value.unwrap_or(f64::NAN), row.cause);
