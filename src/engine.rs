@@ -29,8 +29,8 @@ use crate::recording::record::{Record, SessionInfo, Stamped};
 use crate::recording::recorder::{Recorder, RecorderStatus};
 use crate::recording::writer::Writer;
 use crate::robot::description::RobotDescription;
-use crate::robot::go1::Go1;
 use crate::robot::go1::link::LinkError;
+use crate::robot::go1::{Go1, Network};
 use crate::robot::{Placement, Robot};
 use crate::session::arming_checklist::ArmingChecklist;
 use crate::session::experiment::{BUDGET, Experiment, ExperimentPlan};
@@ -46,6 +46,8 @@ pub struct Options {
     pub config: Config,
     /// The machine.
     pub robot: RobotDescription,
+    /// Link settings of the robot; needed on hardware.
+    pub network: Option<Network>,
     /// What stands behind the controller.
     pub backend: Backend,
     /// The task.
@@ -73,6 +75,7 @@ impl Options {
         Options {
             config,
             robot,
+            network: None,
             backend,
             task,
             seed: 0,
@@ -102,6 +105,12 @@ pub enum EngineError {
     /// The link to the robot.
     #[error(transparent)]
     Link(#[from] LinkError),
+    /// The robot's description has no network.
+    #[error("{robot}: its robot.toml has no section [network]; only a robot with one can be driven or emulated")]
+    NoNetwork {
+        /// The robot's name.
+        robot: String,
+    },
     /// The search space.
     #[error(transparent)]
     Space(#[from] SpaceError),
@@ -369,7 +378,8 @@ impl Engine {
         let (mut robot, guard): (Box<dyn Robot>, _) = match options.backend {
             Backend::Simulator => (Box::new(Simulator::new(&options.robot, &options.config.simulator)?), None),
             Backend::Hardware => {
-                let go1 = Go1::open(&options.robot, options.observe)?;
+                let no_network = || EngineError::NoNetwork { robot: options.robot.name.clone() };
+                let go1 = Go1::open(&options.network.ok_or_else(no_network)?, options.observe)?;
                 let post = |program: &PathBuf| Guard::post(program, &go1, &settings);
                 let guard = options.guard.as_ref().map(post).transpose().map_err(system("guard"))?;
                 (Box::new(go1), guard)

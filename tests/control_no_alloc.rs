@@ -7,6 +7,8 @@
 
 #[path = "support/no_alloc.rs"]
 mod no_alloc;
+#[path = "support/robots.rs"]
+mod robots;
 
 use std::collections::BTreeSet;
 
@@ -18,44 +20,10 @@ use quadfrog::realtime::channel::{ControlEnd, ScreenEnd, SessionEnd, channels};
 use quadfrog::realtime::clock::MonotonicClock;
 use quadfrog::realtime::thread::TickStart;
 use quadfrog::robot::description::RobotDescription;
-use quadfrog::robot::{Battery, JointCommand, LinkStatus, Placement, Robot, RobotError, RobotState};
-use quadfrog::sim::Simulator;
+use quadfrog::robot::{Placement, Robot, RobotState};
 use quadfrog::telemetry::{Command, Event, Mode, Permit, Tick};
 use quadfrog::trial::{JumpParameters, Task};
-
-/// The simulator as itself, or as a robot over a link with a battery, which cannot be placed.
-struct Machine {
-    simulator: Simulator,
-    linked: bool,
-    tamper: fn(&mut RobotState),
-    silent: bool,
-    send_fails: bool,
-}
-
-impl Robot for Machine {
-    fn read(&mut self) -> Result<RobotState, RobotError> {
-        if self.silent {
-            return Err(RobotError::Silent { age_ms: 30 });
-        }
-        let mut state = self.simulator.read()?;
-        if self.linked {
-            state.truth = None;
-            state.battery = Some(Battery { charge_percent: 70.0, voltage_v: 24.0, current_a: -1.0, cell_v: [2.4; 10] });
-        }
-        (self.tamper)(&mut state);
-        Ok(state)
-    }
-    fn write(&mut self, command: &JointCommand) -> Result<(), RobotError> {
-        self.simulator.write(command)?;
-        if self.send_fails { Err(RobotError::Send { errno: 111 }) } else { Ok(()) }
-    }
-    fn place(&mut self, placement: &Placement) -> bool {
-        !self.linked && self.simulator.place(placement)
-    }
-    fn link(&self) -> Option<LinkStatus> {
-        self.linked.then(|| LinkStatus { recent_received: 5000, ..LinkStatus::default() })
-    }
-}
+use robots::LinkedRobot;
 
 struct Bench {
     config: Config,
@@ -64,7 +32,7 @@ struct Bench {
     session: SessionEnd,
     screen: ScreenEnd,
     recorder: rtrb::Consumer<Tick>,
-    machine: Machine,
+    machine: LinkedRobot,
     clock: MonotonicClock,
     time_ms: u64,
     mode_changes: u64,
@@ -77,11 +45,9 @@ impl Bench {
         let config = Config::load(None).unwrap();
         let description = RobotDescription::embedded("go1").unwrap();
         let settings = config.settings(&description, Task::Forward, backend).unwrap();
-        let mut simulator = Simulator::new(&description, &config.simulator).unwrap();
-        simulator.place(&Placement { joint_position: settings.lying_position, lying: true, seed: 0 });
         let (control, session, screen, recorder): (ControlEnd, _, _, _) = channels();
-        let linked = backend == Backend::Hardware;
-        let machine = Machine { simulator, linked, tamper: |_| {}, silent: false, send_fails: false };
+        let lying = LinkedRobot::lying(&description, &config.simulator);
+        let machine = LinkedRobot { linked: backend == Backend::Hardware, ..lying };
         Bench {
             config,
             settings,
@@ -106,7 +72,7 @@ impl Bench {
             let instant = TickStart { planned_ns: self.time_ms * 1_000_000, lateness_ns: 0 };
             let Bench { body, machine, clock, .. } = self;
             let mode = without_allocation(|| {
-                body.rehearse(clock, machine);
+                body.warm_up(clock, machine);
                 let mode = body.tick(instant, clock, machine).mode;
                 body.prepare();
                 mode
@@ -220,15 +186,15 @@ fn everything(backend: Backend) {
         bench.recover();
     }
     bench.stand();
-    bench.machine.silent = true;
+    bench.machine.silent_ms = 30;
     bench.ticks(300);
-    bench.machine.silent = false;
+    bench.machine.silent_ms = 0;
     bench.ticks(10);
     bench.recover();
-    bench.machine.send_fails = true;
+    bench.machine.send_errno = Some(111);
     bench.ticks(10);
     assert_eq!(bench.body.mode(), Mode::Fault);
-    bench.machine.send_fails = false;
+    bench.machine.send_errno = None;
     bench.ticks(10);
     bench.recover();
 

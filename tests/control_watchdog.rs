@@ -1,5 +1,8 @@
 //! The failsafe table, row by row: modes, time to damping, text of the fault. A sound robot that jumps trips none.
 
+#[path = "support/robots.rs"]
+mod robots;
+
 use std::collections::BTreeSet;
 
 use nalgebra::{UnitQuaternion, Vector3};
@@ -11,7 +14,7 @@ use quadfrog::engine::{Options, open_life};
 use quadfrog::optimize::journal::Durability;
 use quadfrog::realtime::clock::SimulatedClock;
 use quadfrog::robot::description::RobotDescription;
-use quadfrog::robot::{Battery, JOINTS, JointCommand, LEGS, LinkStatus, Placement, Robot, RobotError, RobotState};
+use quadfrog::robot::{JOINTS, JointCommand, LEGS, Placement, Robot, RobotState};
 use quadfrog::session::automatic;
 use quadfrog::session::rollout::Rollout;
 use quadfrog::sim::Simulator;
@@ -20,47 +23,12 @@ use quadfrog::telemetry::{
     TrialSpec,
 };
 use quadfrog::trial::{JumpParameters, Task};
-
-/// The simulator as a Go1 over a link, with changed reports and recorded commands.
-struct Tampered {
-    simulator: Simulator,
-    tamper: fn(&mut RobotState),
-    silent_ms: u32,
-    send_errno: Option<i32>,
-    link: LinkStatus,
-    /// Commands since the tampering began.
-    sent: Vec<JointCommand>,
-}
-
-impl Robot for Tampered {
-    fn read(&mut self) -> Result<RobotState, RobotError> {
-        if self.silent_ms > 0 {
-            self.silent_ms += 1;
-            return Err(RobotError::Silent { age_ms: self.silent_ms });
-        }
-        let mut state = self.simulator.read()?;
-        state.motor_temperature_c = [35.0; JOINTS];
-        state.battery = Some(Battery { charge_percent: 80.0, voltage_v: 24.0, current_a: -2.0, cell_v: [0.0; 10] });
-        (self.tamper)(&mut state);
-        Ok(state)
-    }
-    fn write(&mut self, command: &JointCommand) -> Result<(), RobotError> {
-        self.sent.push(*command);
-        self.simulator.write(command)?;
-        self.send_errno.map_or(Ok(()), |errno| Err(RobotError::Send { errno }))
-    }
-    fn place(&mut self, _: &Placement) -> bool {
-        false
-    }
-    fn link(&self) -> Option<LinkStatus> {
-        Some(self.link)
-    }
-}
+use robots::LinkedRobot;
 
 struct Bench {
     settings: ControlSettings,
     cycle: Cycle,
-    robot: Tampered,
+    robot: LinkedRobot,
     inputs: Inputs,
     events: Vec<Event>,
     config: Config,
@@ -72,16 +40,8 @@ impl Bench {
         let config = Config::load(None).unwrap();
         let description = RobotDescription::embedded("go1").unwrap();
         let settings = config.settings(&description, Task::Forward, Backend::Hardware).unwrap();
-        let mut simulator = Simulator::new(&description, &config.simulator).unwrap();
-        simulator.place(&Placement { joint_position: settings.lying_position, lying: true, seed: 0 });
-        let robot = Tampered {
-            simulator,
-            tamper: |_| {},
-            silent_ms: 0,
-            send_errno: None,
-            link: LinkStatus { recent_received: 5000, ..LinkStatus::default() },
-            sent: Vec::new(),
-        };
+        let lying = LinkedRobot::lying(&description, &config.simulator);
+        let robot = LinkedRobot { with_truth: true, keeps_commands: true, ..lying };
         let cycle = Cycle::new(&settings);
         let mut bench = Bench { settings, cycle, robot, inputs: Inputs::default(), events: Vec::new(), config };
         bench.tick(None);

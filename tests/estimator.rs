@@ -7,14 +7,14 @@ use estimation::{JumpError, World, jumps, percentile, settings, settings_of};
 use nalgebra::Vector3;
 use quadfrog::config::{Backend, Config};
 use quadfrog::control::cycle::{Cycle, Inputs};
-use quadfrog::control::estimator::{ContactGate, Estimator, GRAVITY};
+use quadfrog::control::estimator::{ContactGate, Estimator};
 use quadfrog::control::leg::{feet, stance_of};
 use quadfrog::control::settings::{ControlSettings, ObjectiveSource};
 use quadfrog::engine::{Options, open_life};
 use quadfrog::optimize::journal::Durability;
 use quadfrog::realtime::clock::SimulatedClock;
 use quadfrog::robot::description::RobotDescription;
-use quadfrog::robot::{Joints, LEGS, Leg, Placement, Robot, RobotState};
+use quadfrog::robot::{GRAVITY, Joints, LEGS, Leg, Placement, Robot, RobotState};
 use quadfrog::session::rollout::Rollout;
 use quadfrog::session::{automatic, objective};
 use quadfrog::sim::Simulator;
@@ -323,8 +323,10 @@ fn contact_does_not_flicker_in_the_noise_of_a_sensor() {
     for force_n in [0.0, 32.0] {
         let mut gate = ContactGate::default();
         for ms in 0..10_000 {
-            simulator
-                .set_state(&quadfrog::sim::State { position_world: Vector3::new(0.0, 0.0, 9.0), ..*simulator.state() });
+            simulator.set_state(&quadfrog::sim::SimState {
+                position_world: Vector3::new(0.0, 0.0, 9.0),
+                ..*simulator.state()
+            });
             let noisy = simulator.read().unwrap().foot_force.map(|noise| force_n + noise);
             let down = gate.update(&noisy, 1e-3, &settings.estimator);
             if ms > 100 {

@@ -1,5 +1,5 @@
-//! Whole jumps against MuJoCo (`golden/jumps.json`), by the protocol of the reference: only feet and trunk collide, friction
-//! 1.0, ideal motors, 1.0 s of settling, one impulse, 1.5 s until the outcome is read.
+//! Whole jumps against MuJoCo (`golden/jumps.json`), by the protocol of the reference: only feet and trunk collide,
+//! friction 1.0, ideal motors, 1.0 s of settling, one impulse, 1.5 s until the outcome is read.
 
 mod support;
 
@@ -46,7 +46,7 @@ struct Outcome {
     yaw_change_rad: f64,
 }
 
-/// Runs one case as the reference does.
+/// Runs one case by the protocol of the reference.
 fn jump(robot: &RobotDescription, config: &SimConfig, file: &File, case: &Case) -> Outcome {
     let mut simulator = Simulator::new(robot, config).unwrap();
     let stance_leg = Vector3::new(file.stance_m.x, file.stance_m.y, file.stance_m.z);
@@ -101,7 +101,7 @@ fn jump(robot: &RobotDescription, config: &SimConfig, file: &File, case: &Case) 
     outcome
 }
 
-/// The value below which `share` of the differences are, interpolated.
+/// Returns the interpolated quantile `share` of the differences.
 fn percentile(differences: &mut [f64], share: f64) -> f64 {
     differences.sort_by(f64::total_cmp);
     let place = (differences.len() - 1) as f64 * share;
@@ -109,7 +109,7 @@ fn percentile(differences: &mut [f64], share: f64) -> f64 {
     below + (above - below) * place.fract()
 }
 
-/// How far the jumps of a file differ from the reference's.
+/// Differences of the jumps of a file from the reference's.
 #[derive(Debug)]
 struct Differences {
     /// Median and 95th percentile of the apex rise, percent.
@@ -184,9 +184,9 @@ fn compare(robot: &RobotDescription, config: &SimConfig, file: &File) -> Differe
     }
 }
 
-/// As shipped, with MuJoCo's convex contact law, everything agrees. With Coulomb's law feet that slide at the end of a push stay on
-/// the ground where MuJoCo's hop along, so the last foot leaves some 14 ms later and twists turn otherwise by several percent;
-/// height, place and fate of the jumps agree all the same.
+/// With MuJoCo's convex contact law, as shipped, all quantities agree. With Coulomb's law feet that slide at the end of
+/// a push stay on the ground, where MuJoCo's hop: the last foot leaves about 14 ms later and twists differ by several
+/// percent; apex, landing position and falls agree.
 #[test]
 fn golden_jumps() {
     let file: File = support::golden("jumps.json");

@@ -52,30 +52,30 @@ fn the_pace_keeps_its_phase() {
     assert!(after - before >= 300_000_000, "the stall is not made up for: {planned:?}");
 }
 
-/// A rehearsal comes before its tick and in time, and not at all where the time for it has passed.
+/// A cache warm-up starts before its tick and in time, or not at all if there is no time for it.
 #[test]
-fn a_rehearsal_comes_before_its_tick_or_not_at_all() {
+fn a_warm_up_precedes_its_tick_or_is_left_out() {
     const LEAD: Duration = Duration::from_millis(6);
 
     #[derive(Default)]
     struct Course {
         /// The tick that comes next.
         next: u64,
-        /// Which were rehearsed, and when.
-        rehearsed: Vec<(u64, u64)>,
-        /// How long before its tick was due each rehearsal began, ns, or somewhat more: the clock is read late.
+        /// Ticks with a warm-up, and its time.
+        warmed: Vec<(u64, u64)>,
+        /// How long before its tick was due each warm-up began, ns, or somewhat more: the clock is read late.
         leads: Vec<u64>,
     }
     impl thread::PeriodicTask for Course {
-        fn rehearse(&mut self) {
-            self.rehearsed.push((self.next, now_ns()));
+        fn warm_up(&mut self) {
+            self.warmed.push((self.next, now_ns()));
             if self.next >= 20 {
                 // Over after the tick is due: the third in a row is the last for a while.
                 std::thread::sleep(LEAD + LEAD / 2);
             }
         }
         fn tick(&mut self, instant: thread::TickStart) -> ControlFlow<()> {
-            if let Some((next, began_ns)) = self.rehearsed.last()
+            if let Some((next, began_ns)) = self.warmed.last()
                 && *next == self.next
             {
                 self.leads.push(now_ns() - instant.lateness_ns - began_ns);
@@ -89,14 +89,14 @@ fn a_rehearsal_comes_before_its_tick_or_not_at_all() {
         }
     }
     let mut course = Course::default();
-    thread::pace_rehearsed(Duration::from_millis(10), Duration::ZERO, LEAD, &mut course).unwrap();
-    let Course { rehearsed, leads, .. } = course;
-    let rehearsed: Vec<u64> = rehearsed.iter().map(|(number, _)| *number).collect();
-    assert!(rehearsed.is_sorted_by(|a, b| a < b), "twice before one tick: {rehearsed:?}");
-    assert!(!rehearsed.contains(&11) && !rehearsed.contains(&12), "{rehearsed:?}");
-    let overrun = rehearsed.iter().filter(|number| **number >= 20).count();
-    assert!(overrun <= 3, "{rehearsed:?}");
-    let least = leads.iter().min().expect("none of forty was rehearsed");
+    thread::pace_with_warm_up(Duration::from_millis(10), Duration::ZERO, LEAD, &mut course).unwrap();
+    let Course { warmed, leads, .. } = course;
+    let warmed: Vec<u64> = warmed.iter().map(|(number, _)| *number).collect();
+    assert!(warmed.is_sorted_by(|a, b| a < b), "twice before one tick: {warmed:?}");
+    assert!(!warmed.contains(&11) && !warmed.contains(&12), "{warmed:?}");
+    let overrun = warmed.iter().filter(|number| **number >= 20).count();
+    assert!(overrun <= 3, "{warmed:?}");
+    let least = leads.iter().min().expect("none of forty had a warm-up");
     assert!(*least < LEAD.as_nanos() as u64 + 2_000_000, "all begin too early: {leads:?}");
 }
 

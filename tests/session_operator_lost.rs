@@ -22,6 +22,7 @@ fn start(folder: &Path) -> Handle {
     Engine::start(Options {
         config: Config::load(None).unwrap(),
         robot: RobotDescription::embedded("go1").unwrap(),
+        network: None,
         backend: Backend::Simulator,
         task: Task::Forward,
         seed: 3,
@@ -172,6 +173,7 @@ fn the_last_ticks_go_with_a_fault_outside_a_trial() {
     let handle = Engine::start(Options {
         config: Config::load(Some(config.path())).unwrap(),
         robot: RobotDescription::embedded("go1").unwrap(),
+        network: None,
         backend: Backend::Simulator,
         task: Task::Forward,
         seed: 3,

@@ -1,5 +1,8 @@
 //! The pre-arm list as the session gives it to an operator: all failing items at once, the operator's word, the test of STOP.
 
+#[path = "support/robots.rs"]
+mod robots;
+
 use std::sync::mpsc::{Receiver, channel};
 
 use proptest::prelude::*;
@@ -13,50 +16,14 @@ use quadfrog::realtime::clock::SimulatedClock;
 use quadfrog::realtime::thread::TickStart;
 use quadfrog::recording::record::{ArmingCheckRecord, Record, RequestRecord, Stamped};
 use quadfrog::recording::recorder::RecorderWatch;
+use quadfrog::robot::RobotState;
 use quadfrog::robot::description::RobotDescription;
-use quadfrog::robot::{Battery, JointCommand, LinkStatus, Placement, Robot, RobotError, RobotState};
 use quadfrog::session::arming_checklist::ArmingChecklist;
 use quadfrog::session::operator_request::{OperatorCheck, OperatorRequest, StampedRequest};
 use quadfrog::session::supervisor::{RecordSinks, Supervisor, SupervisorParts};
-use quadfrog::sim::Simulator;
 use quadfrog::telemetry::{ArmingCheck, ArmingCheckState, Mode, Tick};
 use quadfrog::trial::{Approval, Task, Verdict};
-
-/// The simulator, seen as a robot over a link that reports its battery and cannot be put in place.
-struct Go1Like {
-    simulator: Simulator,
-    charge_percent: f64,
-    /// Commands that were sent.
-    writes: u32,
-    reboots: u64,
-    silent_ms: u32,
-    tamper: fn(&mut RobotState),
-}
-
-impl Robot for Go1Like {
-    fn read(&mut self) -> Result<RobotState, RobotError> {
-        if self.silent_ms > 0 {
-            self.silent_ms += 1;
-            return Err(RobotError::Silent { age_ms: self.silent_ms });
-        }
-        let mut state = self.simulator.read()?;
-        state.truth = None;
-        state.battery =
-            Some(Battery { charge_percent: self.charge_percent, voltage_v: 24.0, current_a: -1.0, cell_v: [0.0; 10] });
-        (self.tamper)(&mut state);
-        Ok(state)
-    }
-    fn write(&mut self, command: &JointCommand) -> Result<(), RobotError> {
-        self.writes += 1;
-        self.simulator.write(command)
-    }
-    fn place(&mut self, _: &Placement) -> bool {
-        false
-    }
-    fn link(&self) -> Option<LinkStatus> {
-        Some(LinkStatus { recent_received: 5000, reboots: self.reboots, ..LinkStatus::default() })
-    }
-}
+use robots::LinkedRobot;
 
 /// A session and the control thread's body that share channels, on one thread and in simulated time.
 struct Session {
@@ -64,7 +31,7 @@ struct Session {
     operator: ScreenEnd,
     _ticks: rtrb::Consumer<Tick>,
     body: ControlLoop,
-    robot: Go1Like,
+    robot: LinkedRobot,
     screen: Receiver<Stamped>,
     _recorder: Receiver<Stamped>,
     records: Vec<Record>,
@@ -87,8 +54,7 @@ impl Session {
         let robot = RobotDescription::embedded("go1").unwrap();
         let options = Options { trials: Some(5), observe, ..Options::new(config, robot, backend, Task::Forward) };
         let settings: ControlSettings = options.config.settings(&options.robot, options.task, backend).unwrap();
-        let mut simulator = Simulator::new(&options.robot, &options.config.simulator).unwrap();
-        simulator.place(&Placement { joint_position: settings.lying_position, lying: true, seed: 0 });
+        let robot = LinkedRobot::lying(&options.robot, &options.config.simulator);
         let (control, session_end, operator, ticks) = channels();
         let (to_recorder, recorder) = channel();
         let (to_screen, screen) = channel();
@@ -107,7 +73,7 @@ impl Session {
             operator,
             _ticks: ticks,
             body: ControlLoop::new(&settings, control),
-            robot: Go1Like { simulator, charge_percent: 90.0, writes: 0, reboots: 0, silent_ms: 0, tamper: |_| {} },
+            robot: LinkedRobot { charge_percent: 90.0, ..robot },
             screen,
             _recorder: recorder,
             records: Vec::new(),
@@ -334,7 +300,7 @@ fn a_restart_that_changes_no_mode_takes_the_word_back() {
     session.ticks(10);
     assert_eq!(session.body.mode(), Mode::Fault);
     session.robot.tamper = |_| {};
-    session.robot.reboots = 1;
+    session.robot.link.reboots = 1;
     session.ticks(200);
     assert_eq!(session.faults_told().len(), 1, "{:?}", session.faults_told());
     let logged = session.records.iter().any(|r| matches!(r, Record::Log(log) if log.message.contains("restarted")));
@@ -524,7 +490,7 @@ proptest! {
                     session.robot.silent_ms = 1;
                     session.ticks(300);
                     session.robot.silent_ms = 0;
-                    session.robot.reboots += 1;
+                    session.robot.link.reboots += 1;
                     session.robot.tamper = |state| state.robot_time_ms = 0;
                     session.ticks(1);
                     session.robot.tamper = |_| {};

@@ -10,15 +10,14 @@ use toml::Table;
 use super::ConfigError;
 use super::merge::merge;
 use super::safety::SafetyFile;
-use crate::control::estimator::GRAVITY;
 use crate::control::leg::stance_of;
 use crate::control::settings::{
     ControlSettings, EstimatorSettings, ObjectiveSource, RampSettings, SettleSettings, StandSettings, TaskControl,
 };
 use crate::optimize::ask::{SamplerConfig, SamplerKind};
 use crate::realtime::scheduling::Scheduling;
-use crate::robot::Leg;
 use crate::robot::description::RobotDescription;
+use crate::robot::{GRAVITY, Leg};
 use crate::sim::{SimConfig, SimError};
 use crate::trial::{ParameterInfo, Task};
 

@@ -1,12 +1,18 @@
 //! The control loop: inputs from the channels, one tick of the cycle, results to the channels. Nothing here allocates, locks or
 //! waits.
+//!
+//! **Cache warm-up.** The other work of a millisecond evicts the tick's code and data from the processor's caches, and a tick with
+//! cold caches takes longer. Therefore [`ControlLoop::warm_up`], 0.1 ms before each tick of a real robot, runs a tick on a copy of
+//! the cycle with the last state and discards the result; [`Robot::warm_up`] does the same for the system calls of the link. It
+//! changes no result (`tests/control_warm_up.rs`). The longest of a thousand ticks take a third less time with it (loopback:
+//! `quadfrog bench loop --with-link`, compared with `--unrehearsed`).
 
 use super::cycle::{Cycle, Inputs};
-use super::settings::{ControlSettings, PERIOD_S};
+use super::settings::ControlSettings;
 use crate::realtime::channel::{ControlEnd, SHOWN_EVERY};
 use crate::realtime::clock::Clock;
 use crate::realtime::thread::TickStart;
-use crate::robot::{JointCommand, LinkStatus, Placement, Robot, RobotError, RobotState};
+use crate::robot::{CONTROL_PERIOD_S, JointCommand, LinkStatus, Placement, Robot, RobotError, RobotState};
 use crate::telemetry::{Command, Counters, Event, Mode, Snapshot, Tick};
 
 /// Ticks between two updates of counters and readiness for the session; every event causes one too.
@@ -60,7 +66,7 @@ impl ControlLoop {
         };
         let tick = *cycle.tick(&inputs, clock, robot);
 
-        counters.late_ticks += u64::from(start.lateness_ns as f64 > PERIOD_S * 1e9 / 2.0);
+        counters.late_ticks += u64::from(start.lateness_ns as f64 > CONTROL_PERIOD_S * 1e9 / 2.0);
         counters.worst_lateness_ns = counters.worst_lateness_ns.max(start.lateness_ns);
         counters.state_age_ms = cycle.state_age_ms();
         counters.link = robot.link();
@@ -91,18 +97,16 @@ impl ControlLoop {
         }
     }
 
-    /// Does the cycle's usual course shortly before the next tick, on a copy and with a robot that is still as it was seen last:
-    /// code and data are then in the processor's caches, from which a millisecond of other work drives them. Nothing comes of
-    /// it. Of a thousand ticks the longest take a third less time with it (on the loopback: `quadfrog bench loop --with-link`,
-    /// and `--unrehearsed`). Should it panic, the tick would have, and is treated so.
-    pub fn rehearse<C: Clock>(&mut self, clock: &C, robot: &mut dyn Robot) {
-        robot.rehearse();
+    /// Warms the caches: runs one tick on a copy of the cycle and discards the result. A panic is treated as one of the
+    /// tick.
+    pub fn warm_up<C: Clock>(&mut self, clock: &C, robot: &mut dyn Robot) {
+        robot.warm_up();
         let last = self.cycle.last();
         let inputs = Inputs { time_ns: last.time_ns, ..Inputs::default() };
         let mut state = last.state;
         state.robot_time_ms = state.robot_time_ms.wrapping_add(1);
-        let mut repeated = Repeated { state, link: robot.link() };
-        // By the same kind of reference as the robot: a generic function for another type would be other code.
+        let mut repeated = LastState { state, link: robot.link() };
+        // `&mut dyn Robot` as in the tick: a generic function for another type would be other code.
         let mut copy = self.cycle;
         std::hint::black_box(copy.tick(&inputs, clock, &mut repeated as &mut dyn Robot));
         self.prepare();
@@ -115,12 +119,12 @@ impl ControlLoop {
 }
 
 /// A robot that repeats one state and ignores commands.
-struct Repeated {
+struct LastState {
     state: RobotState,
     link: Option<LinkStatus>,
 }
 
-impl Robot for Repeated {
+impl Robot for LastState {
     fn read(&mut self) -> Result<RobotState, RobotError> {
         Ok(self.state)
     }

@@ -4,8 +4,8 @@
 //! A fall during a trial is an outcome of the trial, detected by `jump::FallWatch`; it damps as well.
 
 use super::limits;
-use super::settings::{ControlSettings, PERIOD_S};
-use crate::robot::{JOINTS, LinkStatus, RobotState};
+use super::settings::ControlSettings;
+use crate::robot::{CONTROL_PERIOD_S, JOINTS, LinkStatus, RobotState};
 use crate::telemetry::{Estimate, FailsafeWarning, Fault, Mode, TrialInhibit};
 
 /// Data of one tick for the failsafes.
@@ -116,7 +116,7 @@ impl Failsafe {
         let began_ns = time_ns + lateness_ns;
         self.period_ms = self.began_ns.map_or(0.0, |before| began_ns.saturating_sub(before) as f64 * 1e-6);
         self.began_ns = Some(began_ns);
-        let slow = self.period_ms > settings.watchdog.period_factor * PERIOD_S * 1e3;
+        let slow = self.period_ms > settings.watchdog.period_factor * CONTROL_PERIOD_S * 1e3;
         self.slow = if slow { self.slow + 1 } else { 0 };
     }
 
@@ -204,7 +204,7 @@ fn slow(failsafe: &Failsafe, _: &FailsafeInputs, settings: &ControlSettings) -> 
     slow.then_some(Fault::Slow {
         ticks: failsafe.slow,
         measured_ms: failsafe.period_ms,
-        allowed_ms: limits.period_factor * PERIOD_S * 1e3,
+        allowed_ms: limits.period_factor * CONTROL_PERIOD_S * 1e3,
     })
 }
 

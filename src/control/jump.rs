@@ -3,8 +3,8 @@
 use super::force_profile::Oscillator;
 use super::leg::LegTarget;
 use super::limits::ticks;
-use super::settings::{ControlSettings, PERIOD_S};
-use crate::robot::{LEGS, PerLeg, RobotState};
+use super::settings::ControlSettings;
+use crate::robot::{CONTROL_PERIOD_S, LEGS, PerLeg, RobotState};
 use crate::telemetry::{Estimate, FallCause, Phase, TrialEnd, TrialSpec};
 use nalgebra::Vector3;
 
@@ -74,7 +74,7 @@ impl Jump {
 
     /// Time since the oscillator entered pi, s; negative during the countdown.
     pub fn time_s(&self) -> f64 {
-        (f64::from(self.elapsed) - f64::from(self.countdown)) * PERIOD_S
+        (f64::from(self.elapsed) - f64::from(self.countdown)) * CONTROL_PERIOD_S
     }
 
     /// Time at which the last impulse ends, s.
@@ -94,7 +94,7 @@ impl Jump {
 
     /// Time on the ground since the last flight, s; zero before the landing.
     pub fn landed_s(&self) -> f64 {
-        f64::from(self.landed) * PERIOD_S
+        f64::from(self.landed) * CONTROL_PERIOD_S
     }
 
     /// Phase of the oscillator, rad; zero once the last impulse is over.

@@ -3,7 +3,7 @@
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::{force_profile, impedance, vmc};
-use crate::robot::kinematics::{Foot, LegGeometry};
+use crate::robot::kinematics::{FootPosition, LegGeometry};
 use crate::robot::{Joints, Leg, PerLeg, leg_of};
 use crate::trial::Gains;
 
@@ -28,14 +28,14 @@ pub fn stance_of(stance_leg: &Vector3<f64>, leg: Leg) -> Vector3<f64> {
 }
 
 /// Foot positions and Jacobians of all legs at the joint angles, rad.
-pub fn feet(geometry: &LegGeometry, joint_position: &Joints) -> PerLeg<Foot> {
+pub fn feet(geometry: &LegGeometry, joint_position: &Joints) -> PerLeg<FootPosition> {
     Leg::ALL.map(|leg| geometry.foot(&leg_of(joint_position, leg as usize), leg.side()))
 }
 
 /// Joint torques before the actuators' limits, N m: tau_i = tau_f,i + tau_imp,i + tau_VMC,i.
 pub fn torques(
     target: &LegTarget,
-    feet: &PerLeg<Foot>,
+    feet: &PerLeg<FootPosition>,
     joint_velocity: &Joints,
     orientation_world: &UnitQuaternion<f64>,
     contact: &PerLeg<bool>,

@@ -1,7 +1,7 @@
 //! The last gate before the motors, after every controller: finite, clamp, rate.
 
-use super::settings::{ControlSettings, PERIOD_S};
-use crate::robot::{JOINTS, JointCommand, Joints, MotorCommand, RobotState};
+use super::settings::ControlSettings;
+use crate::robot::{CONTROL_PERIOD_S, JOINTS, JointCommand, Joints, MotorCommand, RobotState};
 use crate::telemetry::Fault;
 
 /// Result of the gate.
@@ -108,5 +108,5 @@ pub fn finite(state: &RobotState) -> Result<(), Fault> {
 
 /// Number of ticks in `seconds`.
 pub fn ticks(seconds: f64) -> u32 {
-    (seconds / PERIOD_S).round() as u32
+    (seconds / CONTROL_PERIOD_S).round() as u32
 }

@@ -9,9 +9,6 @@ use crate::robot::{Joints, PerLeg};
 use crate::telemetry::TrialSpec;
 use crate::trial::{Gains, JumpParameters, Task};
 
-/// Control period, s: the paper's 1 kHz.
-pub const PERIOD_S: f64 = 0.001;
-
 /// Stance between trials.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StandSettings {

@@ -1,5 +1,5 @@
-//! The control thread: the system's favours, then one body a millisecond until it is told to end, and damping as its last
-//! word, however it ends.
+//! The control thread: the system's favours, then one body a millisecond until it is told to end, and damping as its
+//! last word, however it ends.
 
 use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
@@ -9,12 +9,12 @@ use std::time::Duration;
 
 use super::guard::Lifeline;
 use crate::control::control_loop::ControlLoop;
-use crate::control::settings::{ControlSettings, PERIOD_S};
+use crate::control::settings::ControlSettings;
 use crate::realtime::channel::ControlEnd;
 use crate::realtime::clock::Clock;
 use crate::realtime::scheduling::{DeniedSetting, RealtimeSetting, Scheduling};
-use crate::realtime::thread::{CONTROL_PHASE, PeriodicTask, REHEARSAL_LEAD, TickStart, pace_rehearsed};
-use crate::robot::{JointCommand, Robot};
+use crate::realtime::thread::{CONTROL_PHASE, PeriodicTask, TickStart, WARM_UP_LEAD, pace_with_warm_up};
+use crate::robot::{CONTROL_PERIOD_S, JointCommand, Robot};
 
 /// What the thread is started with.
 pub struct Start<'a, C> {
@@ -28,8 +28,8 @@ pub struct Start<'a, C> {
     pub clock: &'a C,
     /// Set when the thread is to end.
     pub closing: &'a AtomicBool,
-    /// Whether the machine lives in its own time, over a link. It keeps the last command when nothing more is sent, where a
-    /// simulated one stands still; and its ticks are rehearsed.
+    /// Whether the robot is real (behind a link). It keeps the last command when nothing more is sent, while simulated
+    /// time stops; and a cache warm-up precedes its ticks.
     pub real: bool,
     /// The guard's sign of life; none where nobody stands guard.
     pub lifeline: Option<Lifeline>,
@@ -45,18 +45,18 @@ const LAST_DAMPINGS: u32 = 500;
 pub fn run<C: Clock>(mut start: Start<C>, end: ControlEnd, robot: &mut dyn Robot) {
     let granted = start.scheduling.apply();
     let _ = start.told.send((granted.granted.clone(), granted.denied.clone()));
-    let period = Duration::from_secs_f64(PERIOD_S);
+    let period = Duration::from_secs_f64(CONTROL_PERIOD_S);
     let lead = lead(start.real);
-    let paced = |ticking: &mut dyn PeriodicTask| pace_rehearsed(period, CONTROL_PHASE, lead, ticking);
+    let paced = |ticking: &mut dyn PeriodicTask| pace_with_warm_up(period, CONTROL_PHASE, lead, ticking);
     // The damping at the end is slept, not paced: the clock may be what failed.
     if let Err(panic) = drive(&mut start, end, robot, paced, || std::thread::sleep(period)) {
         resume_unwind(panic);
     }
 }
 
-/// A simulated robot's ticks are not worth a rehearsal: nobody's motors wait for them.
+/// Time between cache warm-up and tick; zero, for none, with a simulated robot, whose tick may be late.
 const fn lead(real: bool) -> Duration {
-    if real { REHEARSAL_LEAD } else { Duration::ZERO }
+    if real { WARM_UP_LEAD } else { Duration::ZERO }
 }
 
 /// A body and its robot, until the thread is told to end.
@@ -77,8 +77,8 @@ impl<C> Ticking<'_, C> {
 }
 
 impl<C: Clock> PeriodicTask for Ticking<'_, C> {
-    fn rehearse(&mut self) {
-        self.body.rehearse(self.clock, self.robot);
+    fn warm_up(&mut self) {
+        self.body.warm_up(self.clock, self.robot);
     }
 
     fn tick(&mut self, instant: TickStart) -> ControlFlow<()> {
@@ -134,10 +134,10 @@ mod tests {
     use crate::telemetry::Command;
     use crate::trial::Task;
 
-    /// Answers until `reads` or `rehearsals` is used up, then panics; keeps what it is sent.
+    /// Answers until `reads` or `warm_ups` is used up, then panics; keeps what it is sent.
     struct Brittle {
         reads: u32,
-        rehearsals: u32,
+        warm_ups: u32,
         sent: Vec<JointCommand>,
     }
 
@@ -153,14 +153,14 @@ mod tests {
         fn place(&mut self, _: &Placement) -> bool {
             false
         }
-        fn rehearse(&mut self) {
-            self.rehearsals = self.rehearsals.checked_sub(1).expect("an injected defect");
+        fn warm_up(&mut self) {
+            self.warm_ups = self.warm_ups.checked_sub(1).expect("an injected defect");
         }
     }
 
-    /// What a robot is sent, and how often was waited, if `reads` ticks or `rehearsals` go well with it and the thread is told to
-    /// end after `told_after` waits.
-    fn damped(controlled: bool, [reads, rehearsals]: [u32; 2], told_after: u32) -> (Vec<JointCommand>, u32) {
+    /// What a robot is sent, and how often was waited, if `reads` ticks or `warm_ups` go well with it and the thread is
+    /// told to end after `told_after` waits.
+    fn damped(controlled: bool, [reads, warm_ups]: [u32; 2], told_after: u32) -> (Vec<JointCommand>, u32) {
         let description = RobotDescription::embedded("go1").unwrap();
         let settings = Config::load(None).unwrap().settings(&description, Task::Forward, Backend::Hardware).unwrap();
         let (control, mut session, screen, _ticks) = channels();
@@ -168,7 +168,7 @@ mod tests {
         if controlled {
             session.commands.push(Command::TakeControl).unwrap();
         }
-        let mut robot = Brittle { reads, rehearsals, sent: Vec::new() };
+        let mut robot = Brittle { reads, warm_ups, sent: Vec::new() };
         let closing = AtomicBool::new(told_after == 0);
         let mut start = Start {
             settings: &settings,
@@ -182,7 +182,7 @@ mod tests {
         let mut ms = 0;
         let unpaced = |ticking: &mut dyn PeriodicTask| {
             while ticking.tick(TickStart { planned_ns: ms * 1_000_000, lateness_ns: 0 }).is_continue() {
-                ticking.rehearse();
+                ticking.warm_up();
                 ms += 1;
             }
             Ok(())
@@ -200,7 +200,7 @@ mod tests {
 
     /// (A defect once: a panic in a tick ended the thread, and the motors kept the last torques.)
     #[test]
-    fn a_panic_in_a_tick_or_its_rehearsal_is_followed_by_damping_for_half_a_second_and_until_the_end() {
+    fn a_panic_in_a_tick_or_its_warm_up_is_followed_by_damping_for_half_a_second_and_until_the_end() {
         for until in [[20, u32::MAX], [u32::MAX, 20]] {
             let (sent, waited) = damped(true, until, 1);
             assert_eq!(waited, 500);
@@ -210,8 +210,8 @@ mod tests {
     }
 
     #[test]
-    fn a_robot_is_rehearsed_for_and_a_simulator_is_not() {
-        assert_eq!((lead(true), lead(false)), (REHEARSAL_LEAD, Duration::ZERO));
+    fn only_a_real_robot_has_a_cache_warm_up() {
+        assert_eq!((lead(true), lead(false)), (WARM_UP_LEAD, Duration::ZERO));
     }
 
     #[test]

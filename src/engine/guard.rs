@@ -159,8 +159,8 @@ pub fn stand(mut pipe: impl Read + AsFd, socket: &UdpSocket) -> Result<Watch, Gu
     pipe.read_exact(&mut damping).map_err(|error| refused(&error))?;
     pipe.read_exact(&mut silence_ms).map_err(|error| refused(&error))?;
     // Nothing leaves this machine that the packets' own rules refuse.
-    LowCmd::judge(&damping, CrcForm::Plain)
-        .or_else(|_| LowCmd::judge(&damping, CrcForm::Sealed))
+    LowCmd::parse(&damping, CrcForm::Plain)
+        .or_else(|_| LowCmd::parse(&damping, CrcForm::Sealed))
         .map_err(|rejection| refused(&rejection))?;
     let silence = PollTimeout::from(u16::from_le_bytes(silence_ms));
     let (mut timeout, mut signs) = (PollTimeout::NONE, [0; 64]);

@@ -2,7 +2,7 @@
 
 use nalgebra::{Rotation3, Vector3};
 
-use crate::control::settings::PERIOD_S;
+use crate::robot::CONTROL_PERIOD_S;
 use crate::telemetry::{Tick, TrialEnd};
 use crate::trial::{MeasuredJump, Task, Verdict};
 
@@ -33,7 +33,7 @@ pub fn measure(ticks: &[Tick]) -> Option<MeasuredJump> {
         dy_m: displacement.y,
         dyaw_rad: end.roll_pitch_yaw.z - yaw_init,
         apex_m,
-        air_s: longest as f64 * PERIOD_S,
+        air_s: longest as f64 * CONTROL_PERIOD_S,
     })
 }
 

@@ -3,9 +3,9 @@
 
 use crate::control::cycle::{Cycle, Inputs};
 use crate::control::limits::ticks;
-use crate::control::settings::{ControlSettings, PERIOD_S};
+use crate::control::settings::ControlSettings;
 use crate::realtime::clock::SimulatedClock;
-use crate::robot::{Placement, Robot};
+use crate::robot::{CONTROL_PERIOD_S, Placement, Robot};
 use crate::telemetry::{Command, Event, Fault, Permit, Tick, TrialEnd, TrialSpec};
 
 /// A robot in simulated time.
@@ -32,7 +32,7 @@ impl<R: Robot> Rollout<R> {
         let profile_s = f64::from(spec.jumps) * (0.5 / spec.jump.f0_hz + 0.5 / spec.jump.f1_hz.max(0.05));
         let most = ticks(self.settings.countdown_s + profile_s + self.settings.settle.cap_s + 1.0);
         for number in 0..most {
-            inputs.time_ns = u64::from(number) * (PERIOD_S * 1e9) as u64;
+            inputs.time_ns = u64::from(number) * (CONTROL_PERIOD_S * 1e9) as u64;
             self.ticks.push(*cycle.tick(&inputs, &SimulatedClock, &mut self.robot));
             inputs.command = None;
             let ended = cycle.events().iter().find_map(|event| match event {

@@ -14,7 +14,7 @@ mod state_fresh;
 mod upright;
 
 use super::settings::{ArmingLimits, ControlSettings};
-use crate::robot::recent::Recent;
+use crate::robot::recent_count::RecentCount;
 use crate::robot::{JOINTS, LinkStatus, RobotState, joint_name};
 use crate::telemetry::{ArmingCheck, ArmingCheckState, ArmingFinding, ArmingFindings, Estimate};
 
@@ -60,7 +60,7 @@ pub struct ArmingInputs<'a> {
 /// Late ticks of the last 5 s, and for how long the robot has been still.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ArmingHistory {
-    late: Recent,
+    late: RecentCount,
     /// New states in a row with a still gyroscope.
     still: u32,
 }

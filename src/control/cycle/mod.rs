@@ -14,7 +14,7 @@ use super::ramp::{PoseRamp, RampProgress};
 use super::settings::ControlSettings;
 use crate::control::estimator::Estimator;
 use crate::realtime::clock::Clock;
-use crate::robot::kinematics::Foot;
+use crate::robot::kinematics::FootPosition;
 use crate::robot::{JointCommand, Joints, LEGS, Leg, PerLeg, Robot, RobotError, robot_time_passed};
 use crate::telemetry::{
     ArmingFindings, Command, Event, FailsafeWarning, Fault, Mode, Phase, Readiness, StageTimes, Tick, TransitionCause,
@@ -92,7 +92,7 @@ pub struct Cycle {
     fall: FallWatch,
     /// The trial that ended in this tick; the tick still belongs to it.
     ended: Option<Jump>,
-    feet: PerLeg<Foot>,
+    feet: PerLeg<FootPosition>,
     state_age_ms: u32,
     /// `errno` of the last failed send; taken by the failsafes of the next tick.
     send_error: Option<i32>,
@@ -125,7 +125,7 @@ impl Cycle {
             trial_ticks: 0,
             fall: FallWatch::default(),
             ended: None,
-            feet: [Foot { position_leg: Vector3::zeros(), jacobian_leg: Matrix3::zeros() }; LEGS],
+            feet: [FootPosition { position_leg: Vector3::zeros(), jacobian_leg: Matrix3::zeros() }; LEGS],
             state_age_ms: 0,
             send_error: None,
             landing: None,

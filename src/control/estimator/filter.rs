@@ -16,10 +16,9 @@
 
 use nalgebra::{Matrix3, SVector, Vector3};
 
-use super::GRAVITY;
 use super::covariance;
-use crate::control::settings::{EstimatorSettings, PERIOD_S};
-use crate::robot::{LEGS, PerLeg};
+use crate::control::settings::EstimatorSettings;
+use crate::robot::{CONTROL_PERIOD_S, GRAVITY, LEGS, PerLeg};
 
 /// Position, velocity, bias of the accelerometer, four feet.
 const STATES: usize = 9 + 3 * LEGS;
@@ -117,7 +116,7 @@ impl Filter {
         let now = MotionSample { acceleration_world, rolling_world: feet.map(|motion| motion.rolling_world) };
         let before = self.last.replace(now).unwrap_or(now);
         // a' = a - (a - a_0) / 2 * (unseen / dt): over a gap the mean of both ends, but for the period that was measured.
-        let unseen_s = (dt_s - PERIOD_S).max(0.0);
+        let unseen_s = (dt_s - CONTROL_PERIOD_S).max(0.0);
         let unseen_share = if unseen_s > 0.0 { unseen_s / dt_s } else { 0.0 };
         let change = now.acceleration_world - before.acceleration_world;
         let acceleration = acceleration_world - change * (0.5 * unseen_share);
@@ -138,7 +137,7 @@ impl Filter {
 
         // White noise of one sample a period, and the sample's error under jerk.
         let sample = settings.accel_noise_m_s2 + settings.accel_error_share * acceleration.norm();
-        self.covariance.add_variance(VELOCITY, sample * sample * PERIOD_S * dt_s);
+        self.covariance.add_variance(VELOCITY, sample * sample * CONTROL_PERIOD_S * dt_s);
         if unseen_s > 0.0 {
             self.add_unseen(&change, unseen_s, settings);
         }

@@ -17,12 +17,9 @@ pub use filter::{Filter, FootMotion};
 
 use super::limits;
 use super::settings::{ControlSettings, ObjectiveSource};
-use crate::robot::kinematics::Foot;
+use crate::robot::kinematics::FootPosition;
 use crate::robot::{PerLeg, RobotState, Truth, leg_of, robot_time_passed};
 use crate::telemetry::Estimate;
-
-/// Acceleration of free fall, m/s^2.
-pub const GRAVITY: f64 = 9.81;
 
 /// Estimator with its state from tick to tick.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -56,7 +53,7 @@ impl Estimator {
 
     /// Updates the estimate with a state and the feet at its joint angles. A repeated state, or one with a number that is not finite
     /// (a failsafe stops the robot), changes nothing.
-    pub fn update(&mut self, state: &RobotState, feet: &PerLeg<Foot>, settings: &ControlSettings) -> &Estimate {
+    pub fn update(&mut self, state: &RobotState, feet: &PerLeg<FootPosition>, settings: &ControlSettings) -> &Estimate {
         let previous_yaw = self.estimate.roll_pitch_yaw.z;
         match &state.truth {
             Some(truth) if settings.objective == ObjectiveSource::Truth => {
@@ -94,7 +91,7 @@ impl Estimator {
         estimate.angular_velocity_body = truth.angular_velocity_body;
     }
 
-    fn fuse_sensors(&mut self, state: &RobotState, feet: &PerLeg<Foot>, settings: &ControlSettings) {
+    fn fuse_sensors(&mut self, state: &RobotState, feet: &PerLeg<FootPosition>, settings: &ControlSettings) {
         let estimate = &mut self.estimate;
         estimate.orientation_world = state.imu.orientation_world;
         estimate.angular_velocity_body = state.imu.gyro_body;
@@ -144,7 +141,7 @@ impl Estimator {
 }
 
 /// Motion of each foot relative to the inertial unit, and of a rolling foot over the ground.
-fn foot_motions(state: &RobotState, feet: &PerLeg<Foot>, settings: &ControlSettings) -> PerLeg<FootMotion> {
+fn foot_motions(state: &RobotState, feet: &PerLeg<FootPosition>, settings: &ControlSettings) -> PerLeg<FootMotion> {
     let rotation = state.imu.orientation_world;
     let gyro_body = state.imu.gyro_body;
     std::array::from_fn(|leg| {

@@ -7,7 +7,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use quadfrog::config::Config;
 use quadfrog::engine::newest_config;
 use quadfrog::optimize::ask::SamplerKind;
-use quadfrog::robot::description::RobotDescription;
+use quadfrog::robot::description::{RobotDescription, RobotFiles};
 use quadfrog::trial::Task;
 
 use super::failure::Failure;
@@ -47,10 +47,10 @@ fn sampler() -> impl TypedValueParser<Value = SamplerKind> {
 }
 
 /// Returns the robot model of a name, or of a folder with a URDF and a robot.toml.
-pub fn load_model(model: &str) -> Result<RobotDescription, Failure> {
-    let folder = Path::new(model);
-    let robot = if folder.is_dir() { RobotDescription::from_folder(folder) } else { RobotDescription::embedded(model) };
-    robot.map_err(Failure::input)
+pub fn load_model(model: &str) -> Result<(RobotFiles, RobotDescription), Failure> {
+    let files = RobotFiles::open(model).map_err(Failure::input)?;
+    let description = files.description().map_err(Failure::input)?;
+    Ok((files, description))
 }
 
 /// Arguments of the console and of `optimize`.

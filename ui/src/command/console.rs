@@ -7,6 +7,7 @@ use clap::Args;
 use clap::builder::TypedValueParser;
 use quadfrog::config::{Backend, Config};
 use quadfrog::engine::{Engine, Options};
+use quadfrog::robot::go1::Network;
 use quadfrog::trial::{Approval, Task};
 use quadfrog_console::app::{self, ConsoleExit, ConsoleOptions};
 use quadfrog_console::feed::Feed;
@@ -92,15 +93,17 @@ pub struct ConsoleArguments {
 
 pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
     let config = arguments.study.load_config(arguments.resume.as_deref())?;
-    let mut robot = arguments::load_model(&arguments.study.model)?;
+    let (files, robot) = arguments::load_model(&arguments.study.model)?;
     let backend = arguments.robot;
-    match (&arguments.address, &mut robot.network) {
-        (Some(text), _) if backend == Backend::Simulator => {
-            return Err(Failure::input(format!("--address {text}: the simulator has none; add --robot go1")));
-        }
-        (Some(text), Some(network)) => network.address = address(text)?,
-        // The engine refuses a robot without a network.
-        _ => {}
+    let mut network = None;
+    if backend == Backend::Hardware {
+        network = Network::read(&files).map_err(Failure::input)?;
+    } else if let Some(text) = &arguments.address {
+        return Err(Failure::input(format!("--address {text}: the simulator has none; add --robot go1")));
+    }
+    // The engine refuses a robot without a network.
+    if let (Some(text), Some(network)) = (&arguments.address, &mut network) {
+        network.address = address(text)?;
     }
     let console = options(&arguments.screen, &config)?.with_robot(robot.clone());
     terminal::check().map_err(Failure::input)?;
@@ -123,6 +126,7 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
         approve: arguments.approve,
         // The running program, even if its file was replaced since the start.
         guard: Some(PathBuf::from("/proc/self/exe")),
+        network,
         ..Options::new(config, robot, backend, selected.task)
     })?;
     let recording = handle.recording().map(Path::to_owned);

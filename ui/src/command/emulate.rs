@@ -12,9 +12,11 @@ use clap::Args;
 use color_eyre::eyre::{WrapErr, eyre};
 use nix::sys::signal::{SigSet, Signal};
 use quadfrog::config::Config;
+use quadfrog::engine::EngineError;
 use quadfrog::realtime::thread::pace;
-use quadfrog::sim::CONTROL_PERIOD_S;
-use quadfrog::sim::emulator::{self, Emulator, EmulatorHandle, EmulatorStatus, Fault};
+use quadfrog::robot::CONTROL_PERIOD_S;
+use quadfrog::robot::go1::Network;
+use quadfrog::sim::emulator::{self, Emulator, EmulatorFault, EmulatorHandle, EmulatorStatus};
 
 use super::arguments::load_model;
 use super::failure::Failure;
@@ -38,14 +40,16 @@ pub struct EmulateArguments {
     config: Option<PathBuf>,
     /// Fault from the start, for example "loss 5"; may be repeated
     #[arg(long = "fault", value_name = "FAULT")]
-    faults: Vec<Fault>,
+    faults: Vec<EmulatorFault>,
 }
 
 pub fn run(arguments: &EmulateArguments) -> Result<(), Failure> {
     let config = Config::load(arguments.config.as_deref())?;
-    let description = load_model(&arguments.model)?;
-    let mut emulator =
-        Emulator::bind(arguments.bind, &description, &config.simulator, arguments.seed).map_err(Failure::input)?;
+    let (files, description) = load_model(&arguments.model)?;
+    let no_network = || EngineError::NoNetwork { robot: description.name.clone() };
+    let network = Network::read(&files).map_err(Failure::input)?.ok_or_else(no_network)?;
+    let mut emulator = Emulator::bind(arguments.bind, &description, &network, &config.simulator, arguments.seed)
+        .map_err(Failure::input)?;
     for &fault in &arguments.faults {
         emulator.apply(fault);
     }

@@ -107,7 +107,7 @@ pub fn run(arguments: &OptimizeArguments) -> Result<(), Failure> {
         _ => arguments.resume.as_deref(),
     };
     let config = arguments.study.load_config(existing)?;
-    let robot = arguments::load_model(&arguments.study.model)?;
+    let (_, robot) = arguments::load_model(&arguments.study.model)?;
     let studies = match &joined {
         Some(storage) => workers(arguments, storage, &robot)?,
         None => select(arguments, &config, &robot)?,

@@ -16,9 +16,9 @@ use quadfrog::realtime::channel::{ScreenEnd, SessionEnd, channels};
 use quadfrog::realtime::clock::{Clock, MonotonicClock};
 use quadfrog::realtime::scheduling::{GrantedSettings, Scheduling};
 use quadfrog::realtime::system::isolated_cores;
-use quadfrog::realtime::thread::{CONTROL_PHASE, TickStart, PeriodicTask, REHEARSAL_LEAD, pace, pace_rehearsed};
-use quadfrog::robot::description::RobotDescription;
-use quadfrog::robot::go1::Go1;
+use quadfrog::realtime::thread::{CONTROL_PHASE, PeriodicTask, TickStart, WARM_UP_LEAD, pace, pace_with_warm_up};
+use quadfrog::robot::description::RobotFiles;
+use quadfrog::robot::go1::{Go1, Network};
 use quadfrog::robot::{Placement, Robot};
 use quadfrog::sim::Simulator;
 use quadfrog::sim::emulator::Emulator;
@@ -61,7 +61,7 @@ impl LoopArguments {
     /// Returns the time from the start of a warm-up to its tick; zero for no warm-up. cyclictest wakes once per period,
     /// so the thread compared with it does too.
     fn lead(&self) -> Duration {
-        if self.with_link && !self.unrehearsed && !self.cyclictest { REHEARSAL_LEAD } else { Duration::ZERO }
+        if self.with_link && !self.unrehearsed && !self.cyclictest { WARM_UP_LEAD } else { Duration::ZERO }
     }
 }
 
@@ -216,7 +216,8 @@ fn measure(
     measurement: LoopMeasurement,
 ) -> Result<LoopMeasurement, Failure> {
     let config = Config::load(None)?;
-    let mut description = RobotDescription::embedded("go1").map_err(Failure::input)?;
+    let files = RobotFiles::embedded("go1").map_err(Failure::input)?;
+    let description = files.description().map_err(Failure::input)?;
     let backend = if arguments.with_link { Backend::Hardware } else { Backend::Simulator };
     let mut settings = config.settings(&description, Task::Forward, backend)?;
     // Neither a late tick nor a long stand may end the measurement.
@@ -230,12 +231,11 @@ fn measure(
         });
     }
     let any_port = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
-    let mut emulator = Emulator::bind(any_port, &description, &config.simulator, 0).map_err(Failure::input)?;
-    if let Some(network) = &mut description.network {
-        network.address = emulator.local_address().wrap_err("the address of the emulator")?;
-        network.local_port = 0;
-    }
-    let mut robot = Go1::open(&description, false).map_err(Failure::input)?;
+    let network = Network::read(&files).map_err(Failure::input)?.expect("the embedded go1 has a network");
+    let mut emulator =
+        Emulator::bind(any_port, &description, &network, &config.simulator, 0).map_err(Failure::input)?;
+    let address = emulator.local_address().wrap_err("the address of the emulator")?;
+    let mut robot = Go1::open(&Network { address, local_port: 0, ..network }, false).map_err(Failure::input)?;
     let ending = Arc::new(AtomicBool::new(false));
     let flag = ending.clone();
     let emulated = std::thread::spawn(move || {
@@ -306,9 +306,9 @@ impl StandingLoop<'_> {
 }
 
 impl PeriodicTask for StandingLoop<'_> {
-    fn rehearse(&mut self) {
+    fn warm_up(&mut self) {
         let start_ns = self.clock.now_ns();
-        self.control.rehearse(&self.clock, self.robot);
+        self.control.warm_up(&self.clock, self.robot);
         if self.standing_up.is_none() {
             self.measurement.warm_up.saturating_record((self.clock.now_ns() - start_ns).max(1));
         }
@@ -354,7 +354,7 @@ fn stand_and_measure(
     let control = ControlLoop::new(settings, end);
     let mut standing =
         StandingLoop { control, robot, clock, channels, standing_up: Some(0), remaining: ticks, measurement };
-    pace_rehearsed(PERIOD, CONTROL_PHASE, lead, &mut standing).wrap_err("waiting on the monotonic clock")?;
+    pace_with_warm_up(PERIOD, CONTROL_PHASE, lead, &mut standing).wrap_err("waiting on the monotonic clock")?;
     if standing.standing_up.is_some() {
         let mode = standing.control.mode().name();
         return Err(eyre!(

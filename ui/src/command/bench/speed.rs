@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use clap::Args;
 use color_eyre::eyre::{WrapErr, eyre};
-use quadfrog::sim::bench::{Scene, Speed};
+use quadfrog::sim::bench::{BenchScene, SimulatorBench};
 
 use super::machine;
 use crate::command::failure::Failure;
@@ -34,9 +34,9 @@ pub fn run(arguments: &SpeedArguments) -> Result<(), Failure> {
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     machine::print_header(&format!(", {cores} cores"));
     println!();
-    let figures = Speed::new().measure(arguments.seconds * 5.0);
+    let figures = SimulatorBench::new().measure(arguments.seconds * 5.0);
     println!("accelerations from torques                {:8.2} us", figures.dynamics_s * 1e6);
-    for (scene, seconds) in Scene::ALL.iter().zip(figures.step_s) {
+    for (scene, seconds) in BenchScene::ALL.iter().zip(figures.step_s) {
         println!("1 ms step, {:<31}{:8.2} us  {:8.0} steps/s", scene.name(), seconds * 1e6, 1.0 / seconds);
     }
     if let Some(script) = &arguments.mujoco {

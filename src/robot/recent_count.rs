@@ -1,33 +1,33 @@
-//! Counts over the last five seconds, in blocks of a tenth: no allocation, and what is asked every millisecond is at hand.
+//! Event counts over the last five seconds, in blocks of 0.1 s. No allocation; the sum is always up to date.
 
 /// Milliseconds in a block.
 const BLOCK_MS: u32 = 100;
-/// Blocks that are remembered.
+/// Number of blocks.
 const BLOCKS: usize = 50;
-/// Blocks that make a second.
+/// Blocks per second.
 const SECOND: usize = 10;
 
-/// How often something happened in the last five seconds.
+/// Number of events in the last five seconds.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Recent {
+pub struct RecentCount {
     blocks: [u32; BLOCKS],
-    /// Of all blocks.
+    /// Sum of all blocks.
     sum: u32,
     newest: usize,
     /// Milliseconds in the newest block.
     ms: u32,
-    /// Blocks that are full, the newest not among them.
+    /// Complete blocks, without the newest.
     full: u32,
 }
 
-impl Default for Recent {
-    fn default() -> Recent {
-        Recent { blocks: [0; BLOCKS], sum: 0, newest: 0, ms: 0, full: 0 }
+impl Default for RecentCount {
+    fn default() -> RecentCount {
+        RecentCount { blocks: [0; BLOCKS], sum: 0, newest: 0, ms: 0, full: 0 }
     }
 }
 
-impl Recent {
-    /// A millisecond begins.
+impl RecentCount {
+    /// Starts the next millisecond.
     pub fn advance(&mut self) {
         if self.ms == BLOCK_MS {
             self.newest = (self.newest + 1) % BLOCKS;
@@ -38,15 +38,15 @@ impl Recent {
         self.ms += 1;
     }
 
-    /// It happened `times` in this millisecond.
+    /// Adds `times` events in this millisecond.
     pub fn add(&mut self, times: u32) {
-        // What does not fit is not counted, so that the sum stays that of the blocks.
+        // Saturates, so that the sum stays equal to that of the blocks.
         let times = times.min(u32::MAX - self.sum);
         self.blocks[self.newest] += times;
         self.sum += times;
     }
 
-    /// The newest of them was a mistake, in whichever block it stands.
+    /// Removes one event, from the newest block that has one.
     pub fn take_back(&mut self) {
         let newest = (0..BLOCKS).map(|back| self.before(back)).find(|block| self.blocks[*block] > 0);
         if let Some(block) = newest {
@@ -55,22 +55,22 @@ impl Recent {
         }
     }
 
-    /// How often it happened.
+    /// Number of events.
     pub fn sum(&self) -> u32 {
         self.sum
     }
 
-    /// How often it happened in the last second, whole blocks only: the newest is not among them.
+    /// Number of events in the last second, from complete blocks alone.
     pub fn in_a_second(&self) -> u32 {
         (1..=SECOND).map(|back| self.blocks[self.before(back)]).sum()
     }
 
-    /// The place of the block that is `back` blocks older than the newest.
+    /// Index of the block that is `back` blocks older than the newest.
     fn before(&self, back: usize) -> usize {
         (self.newest + BLOCKS - back) % BLOCKS
     }
 
-    /// Milliseconds that are remembered.
+    /// Length of the window, ms; shorter than five seconds at first.
     pub fn span_ms(&self) -> u32 {
         self.full * BLOCK_MS + self.ms
     }
@@ -80,7 +80,7 @@ impl Recent {
 mod tests {
     use super::*;
 
-    fn pass(recent: &mut Recent, ms: u32, times: u32) {
+    fn pass(recent: &mut RecentCount, ms: u32, times: u32) {
         for _ in 0..ms {
             recent.advance();
             recent.add(times);
@@ -88,26 +88,26 @@ mod tests {
     }
 
     #[test]
-    fn five_seconds_are_remembered_and_no_more() {
-        let mut recent = Recent::default();
+    fn the_window_is_five_seconds() {
+        let mut recent = RecentCount::default();
         pass(&mut recent, 7, 1);
         assert_eq!((recent.sum(), recent.span_ms()), (7, 7));
         pass(&mut recent, 4893, 0);
         assert_eq!((recent.sum(), recent.span_ms()), (7, 4900));
         pass(&mut recent, 200, 0);
-        assert_eq!(recent.sum(), 0, "what is older than five seconds is forgotten");
+        assert_eq!(recent.sum(), 0, "events older than five seconds do not count");
         assert!(recent.span_ms() <= 5000);
     }
 
     #[test]
     fn the_last_second_is_ten_whole_blocks() {
-        let mut recent = Recent::default();
+        let mut recent = RecentCount::default();
         pass(&mut recent, 1100, 2);
         assert_eq!((recent.in_a_second(), recent.sum()), (2000, 2200));
         recent.take_back();
         assert_eq!(recent.sum(), 2199);
-        // A mistake of the block before, noticed in this one.
-        let mut recent = Recent::default();
+        // An event of the previous block is taken back in this one.
+        let mut recent = RecentCount::default();
         pass(&mut recent, 100, 1);
         pass(&mut recent, 1, 0);
         recent.take_back();
@@ -117,8 +117,8 @@ mod tests {
     }
 
     #[test]
-    fn a_count_beyond_all_bounds_stays_a_sum() {
-        let mut recent = Recent::default();
+    fn a_sum_saturates() {
+        let mut recent = RecentCount::default();
         recent.advance();
         recent.add(u32::MAX);
         recent.add(5);

@@ -1,24 +1,24 @@
-//! A rehearsed tick is the tick that it would have been: nobody at either end can tell whether there was a rehearsal.
+//! A cache warm-up changes no tick, event or datagram.
 
 #[path = "support/go1.rs"]
 mod go1;
 
-use go1::{ANY_PORT, description, pair};
+use go1::{description, pair};
 use quadfrog::config::{Backend, Config};
 use quadfrog::control::control_loop::ControlLoop;
 use quadfrog::realtime::channel::channels;
 use quadfrog::realtime::clock::SimulatedClock;
 use quadfrog::realtime::thread::TickStart;
 use quadfrog::robot::{LinkStatus, Robot};
-use quadfrog::sim::emulator::{EmulatorStatus, Fault};
+use quadfrog::sim::emulator::{EmulatorFault, EmulatorStatus};
 use quadfrog::telemetry::{Command, Event, Mode, Permit, Tick};
 use quadfrog::trial::{JumpParameters, Task};
 
 /// Over the link to an emulated robot on a bad network: taken over, armed, one jump and its review, a STOP, a restart.
-fn session(rehearsals: bool) -> (Vec<Tick>, Vec<Event>, LinkStatus, EmulatorStatus) {
+fn session(warm_up: bool) -> (Vec<Tick>, Vec<Event>, LinkStatus, EmulatorStatus) {
     let config = Config::load(None).unwrap();
     let (mut emulator, mut robot) = pair(&config.simulator, 1);
-    let settings = config.settings(&description(ANY_PORT), Task::Forward, Backend::Hardware).unwrap();
+    let settings = config.settings(&description(), Task::Forward, Backend::Hardware).unwrap();
     let (control, mut session, screen, mut recorder) = channels();
     let mut body = ControlLoop::new(&settings, control);
     let jump = JumpParameters { f0_hz: 1.3, f1_hz: 0.0, fx_n: 60.0, fy_n: 0.0, fz_n: 270.0 };
@@ -42,16 +42,16 @@ fn session(rehearsals: bool) -> (Vec<Tick>, Vec<Event>, LinkStatus, EmulatorStat
         }
         match ms {
             1000 => emulator.apply("jitter 2".parse().unwrap()),
-            // Nobody arms a robot with such a network, but it may come to it.
+            // Arming would be refused with such a network; it can degrade later.
             5000 => emulator.apply("loss 2".parse().unwrap()),
             5001 => emulator.apply("duplicate 2".parse().unwrap()),
             16_000 => session.stop.set(),
             16_500 => emulator.apply("corrupt 5".parse().unwrap()),
-            17_000 => emulator.apply(Fault::Reboot),
+            17_000 => emulator.apply(EmulatorFault::Reboot),
             _ => {}
         }
-        if rehearsals {
-            body.rehearse(&SimulatedClock, &mut robot);
+        if warm_up {
+            body.warm_up(&SimulatedClock, &mut robot);
         }
         let instant = TickStart { planned_ns: ms * 1_000_000, lateness_ns: 0 };
         ticks.push(*body.tick(instant, &SimulatedClock, &mut robot));
@@ -65,7 +65,7 @@ fn session(rehearsals: bool) -> (Vec<Tick>, Vec<Event>, LinkStatus, EmulatorStat
 }
 
 #[test]
-fn a_rehearsal_changes_nothing() {
+fn a_warm_up_changes_nothing() {
     let (ticks, events, link, emulator) = session(true);
     let (ticks_without, events_without, link_without, emulator_without) = session(false);
     for mode in [Mode::Observe, Mode::StandUp, Mode::Ready, Mode::Jump, Mode::Settle, Mode::Review, Mode::Damped] {
