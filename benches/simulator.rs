@@ -1,5 +1,5 @@
-//! Speed of the simulator: dynamics alone, steps standing on four contacts, cost by number of contacts.
-//! `cargo bench --bench simulator`; MuJoCo's side of the comparison is its own `mj_step` on the same model and machine.
+//! Duration of the dynamics alone and of a step by number of contacts: `cargo bench --bench simulator`. The counterpart in
+//! MuJoCo is `mj_step` on the same model and machine.
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use quadfrog::sim::bench::{Scene, Speed};

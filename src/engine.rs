@@ -18,8 +18,8 @@ use serde_json::json;
 
 use self::guard::Guard;
 use crate::config::{Backend, Config, ConfigError};
+use crate::optimize::ask::Direction;
 use crate::optimize::journal::Durability;
-use crate::optimize::sampler::Direction;
 use crate::optimize::space::{Range, Space, SpaceError};
 use crate::optimize::study::{Storage, Study, StudyError, StudyOptions};
 use crate::realtime::channel::{Heartbeat, ScreenEnd, StopLatch, channels};

@@ -52,7 +52,7 @@
 //! # Where this differs from the first plan of the house
 //!
 //! * *The next proposal is drafted, not asked for.* A verdict stays open to undo until the next trial begins, yet the
-//!   operator should see the next proposal at once. So a proposal is a [`optimize::study::Draft`] without effect, made on
+//!   operator should see the next proposal at once. So a proposal is a [`optimize::study::TrialDraft`] without effect, made on
 //!   a fork of the study in which the verdict is told already; verdict and proposal become final together, on approval.
 //! * *A study has a folder* (`study.log`, `config/`, one `session.mcap` per run of the program), because a study can be
 //!   continued by another session.

@@ -12,7 +12,7 @@ use super::merge::{FileOrigin, merge};
 use super::ranges;
 use crate::control::estimator::GRAVITY;
 use crate::control::settings::{ControlSettings, ObjectiveSource, StandSettings, TaskControl};
-use crate::optimize::sampler::SamplerKind;
+use crate::optimize::ask::SamplerKind;
 use crate::realtime::scheduling::Scheduling;
 use crate::robot::Leg;
 use crate::robot::description::RobotDescription;

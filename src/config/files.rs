@@ -8,7 +8,7 @@ use crate::control::settings::{
     ApprovalLimits, ArmingLimits, EstimatorSettings, FailsafeLimits, FallLimits, GateLimits, RampSettings,
     SettleSettings, TaskControl,
 };
-use crate::optimize::sampler::SamplerConfig;
+use crate::optimize::ask::SamplerConfig;
 
 /// `control.toml`.
 #[derive(Debug, Clone, PartialEq, Deserialize)]

@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use super::EngineError;
 use crate::config::Config;
+use crate::optimize::ask::{Direction, SamplerConfig};
 use crate::optimize::journal::{Durability, StudyRecord};
-use crate::optimize::sampler::{Direction, SamplerConfig};
 use crate::optimize::space::{Range, Space};
 use crate::optimize::study::{Storage, Study, StudyError, StudyOptions};
 use crate::session::experiment::BUDGET;
@@ -30,7 +30,7 @@ pub struct StoredStudy {
 /// When it cannot be read.
 pub fn stored_studies(storage: &Storage) -> Result<Vec<StoredStudy>, EngineError> {
     let journal = storage.journal(Durability::Synced).map_err(StudyError::from)?;
-    let living = journal.replay().studies().iter().filter(|study| !study.deleted);
+    let living = journal.state().studies().iter().filter(|study| !study.deleted);
     Ok(living.filter_map(stored).collect())
 }
 
@@ -85,7 +85,7 @@ pub fn open_stored(storage: &Storage, name: Option<&str>, config: &Config) -> Re
         return Err(EngineError::NoJournal { file: file.clone() });
     }
     let journal = storage.journal(Durability::Synced).map_err(StudyError::from)?;
-    let living: Vec<&StudyRecord> = journal.replay().studies().iter().filter(|study| !study.deleted).collect();
+    let living: Vec<&StudyRecord> = journal.state().studies().iter().filter(|study| !study.deleted).collect();
     let names = || living.iter().map(|study| study.name.as_str()).collect::<Vec<_>>().join(", ");
     let journal_name = || storage.to_string();
     let record = match (name, living.as_slice()) {

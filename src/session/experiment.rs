@@ -22,7 +22,7 @@ use std::time::Duration;
 
 use crate::control::settings::TaskControl;
 use crate::optimize::exchange::TableTrial;
-use crate::optimize::repeats::{Point, points};
+use crate::optimize::repeats::{RepeatedPoint, points};
 use crate::optimize::study::{Outcome, Study, StudyError};
 use crate::optimize::trial::TrialState;
 use crate::recording::record::{LogLevel, LogRecord, Record, StageRecord};
@@ -181,7 +181,7 @@ impl Experiment {
     pub fn best(&self) -> Option<&TrialRecord> {
         let points = points(self.study.trials());
         let worth = |row: &TrialRecord| {
-            points.iter().find(|point| point.trials.contains(&row.trial)).map(Point::mean).or(row.value)
+            points.iter().find(|point| point.trials.contains(&row.trial)).map(RepeatedPoint::mean).or(row.value)
         };
         let judged = self.rows.values().filter(|row| row.verdict == Some(Verdict::Accept));
         let worths = judged.map(|row| (worth(row), row));

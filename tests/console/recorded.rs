@@ -1,6 +1,6 @@
-//! Every view of a recorded session, as text, at three sizes. The recording is of the real program on the simulator:
-//! `cargo test -p quadfrog-console --test recorded -- --ignored` makes it anew, and
-//! `INSTA_UPDATE=always cargo test -p quadfrog-console --test recorded` accepts what the screens show then.
+//! All views of a recorded session of the simulator, as text, at three sizes.
+//! `cargo test -p quadfrog-console --test recorded -- --ignored` renews the recording, then
+//! `INSTA_UPDATE=always cargo test -p quadfrog-console --test recorded` the expected screens.
 
 #[path = "support/pty.rs"]
 mod pty;
@@ -32,7 +32,7 @@ fn console(colours: Colours, glyphs: Glyphs) -> Console {
     let robot = quadfrog::robot::description::RobotDescription::embedded(&player.session().robot).expect("its robot");
     console.model.robot = Some(robot);
     let mut feed = Feed::replay(player);
-    // Longer than the recording, at the speed of time.
+    // One hour, longer than the recording.
     for msg in feed.take(3_600_000_000_000) {
         console.tell(msg);
     }
@@ -85,7 +85,7 @@ fn a_replay_shows_every_trial_and_can_be_left() {
 }
 
 #[test]
-#[ignore = "makes the recording that the other tests read"]
+#[ignore = "renews the recording that the other tests read"]
 fn record_the_session() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut command = CommandBuilder::new(env!("CARGO_BIN_EXE_quadfrog"));
@@ -119,7 +119,7 @@ fn record_the_session() {
     let study = recordings.map(|entry| entry.expect("an entry").path()).next().expect("a study");
     let mut player = Player::open(study.join("session.mcap")).expect("a recording");
     let info = player.session().clone();
-    // What the screen needs: the ticks of the last charts as the screen takes them, and every record.
+    // Keeps every fifth tick of the last 5 s, for the charts, and every record.
     let charts_from_ns = player.duration_ns().saturating_sub(5_000_000_000);
     let _ = std::fs::remove_file(recording());
     let mut writer = Writer::create(recording(), &info, player.start_utc_ns(), &[]).expect("the shorter recording");

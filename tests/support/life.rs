@@ -5,8 +5,8 @@ use std::path::Path;
 use std::time::Duration;
 
 use quadfrog::control::settings::TaskControl;
+use quadfrog::optimize::ask::{Direction, SamplerConfig};
 use quadfrog::optimize::journal::Durability;
-use quadfrog::optimize::sampler::{Direction, SamplerConfig};
 use quadfrog::optimize::space::{Range, Space};
 use quadfrog::optimize::study::{Storage, Study, StudyOptions};
 use quadfrog::session::experiment::{Experiment, ExperimentPlan};

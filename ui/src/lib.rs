@@ -1,10 +1,10 @@
-//! The terminal operator console: it draws from the engine's public interface and asks through it; it decides nothing.
+//! The terminal console of the operator: draws the state of the engine and sends requests to it; decides nothing.
 //!
-//! One loop (`app`) takes keys and the feed, folds both into the [`model::Model`] with the one function that may change
-//! it ([`update::update`]), and draws the model with free functions ([`view::render`]).
+//! One loop (`app`) folds keys and feed into the [`model::Model`] with [`update::update`], the only function that changes
+//! it, and draws it with free functions ([`view::render`]).
 //!
 //! ```text
-//! keys, signals ──┐                      ┌── effects: wishes, STOP, bell, quit ──> app ──> engine
+//! keys, signals ──┐                      ┌── effects: requests, STOP, bell, quit ──> app ──> engine
 //!                 ├─> Msg ─> update(model)
 //! engine, replay ─┘                      └── model ──> view::render ──> terminal
 //! ```
@@ -13,12 +13,12 @@ pub mod action;
 pub mod app;
 pub mod column;
 pub mod comparison;
+pub mod connection;
 pub mod dialog;
 pub mod export;
 pub mod feed;
 pub mod history;
 pub mod keymap;
-pub mod line;
 pub mod model;
 pub mod series;
 pub mod settings;

@@ -5,14 +5,14 @@ use std::collections::BTreeMap;
 use super::attributes::Origin;
 use super::gains::listed;
 use crate::optimize::insight;
-use crate::optimize::study::{Draft, Study};
+use crate::optimize::study::{Study, TrialDraft};
 use crate::optimize::trial::Trial;
 use crate::trial::{FallRisk, Gains, Proposal, ProposalSource, ProposedParameter};
 
 /// A card.
 pub struct Card {
     /// What the study proposes.
-    pub draft: Draft,
+    pub draft: TrialDraft,
     /// Changes with every change of the card.
     pub revision: u32,
     /// The study as it will be when the trial begins: what is not told yet is told in it.
@@ -159,7 +159,7 @@ impl Card {
     /// How near earlier falls are; none before the first trial that counts.
     fn risk(&self, point: &[ProposedParameter]) -> Option<FallRisk> {
         let point: Vec<_> = point.iter().map(|p| (p.name.clone(), p.value)).collect();
-        let risk = insight::Risk::of(&point, self.outlook.trials(), &self.outlook.options().space);
+        let risk = insight::FallProximity::of(&point, self.outlook.trials(), &self.outlook.options().space);
         (risk.neighbours > 0).then(|| FallRisk {
             nearest_fall: risk.falls.first().map(|(_, distance)| *distance),
             nearest_fall_trial: risk.falls.first().map(|(trial, _)| *trial),

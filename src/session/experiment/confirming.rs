@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use super::{attributes, not_now};
-use crate::optimize::repeats::{Confirmation, LEAST_REPEATS, Point, confirm, contenders, points, standing};
+use crate::optimize::repeats::{Confirmation, LEAST_REPEATS, RepeatedPoint, confirm, contenders, points, rank};
 use crate::optimize::study::{Study, StudyError};
 use crate::optimize::trial::{Trial, TrialState};
 use crate::recording::record::Record;
@@ -72,7 +72,7 @@ impl Experiment {
         let direction = self.study.options().direction;
         // As it will be when the last verdict is told: a wish that is refused tells nothing.
         let best = contenders(self.outlook()?.trials(), direction, self.plan.contenders as usize);
-        let best: Vec<Point> = best.into_iter().filter(|point| point.stood > 0).collect();
+        let best: Vec<RepeatedPoint> = best.into_iter().filter(|point| point.stood > 0).collect();
         if best.len() < 2 {
             return not_now("there are not two points yet that the robot stood through: nothing to compare");
         }
@@ -117,14 +117,14 @@ impl Experiment {
                 Next::Nothing
             }
             Confirmation::Repeat(_) => {
-                let standing = standing(&compared, direction);
+                let ranking = rank(&compared, direction);
                 let words = format!(
                     "the {} repeats are used up: {}, short of {:.0} %",
                     confirming.repeats,
-                    leads(&compared[standing.leader], standing.confidence),
+                    leads(&compared[ranking.leader], ranking.confidence),
                     100.0 * self.plan.confidence
                 );
-                over(standing.leader, standing.confidence, words)
+                over(ranking.leader, ranking.confidence, words)
             }
         }
     }
@@ -170,12 +170,12 @@ impl Experiment {
                 let compared = compared(confirming, outlook);
                 // Before everyone has been repeated the spread says nothing.
                 let told = compared.len() > 1 && compared.iter().all(|point| point.repeats() >= LEAST_REPEATS);
-                told.then(|| standing(&compared, outlook.options().direction))
-                    .map(|standing| (compared[standing.leader].trials[0], standing.confidence))
+                told.then(|| rank(&compared, outlook.options().direction))
+                    .map(|ranking| (compared[ranking.leader].trials[0], ranking.confidence))
             }
             (None, None) => None,
         };
-        let record = |point: Point| {
+        let record = |point: RepeatedPoint| {
             let contender = trials.iter().any(|first| point.trials.contains(first));
             (point.repeats() > 1 || contender).then(|| PointRecord {
                 stood: point.stood as u32,
@@ -200,7 +200,7 @@ fn confirming_of(study: &Study) -> Option<Confirming> {
 }
 
 /// The points that are compared, as they stand now; one whose trials do not count any more is left out.
-fn compared(confirming: &Confirming, study: &Study) -> Vec<Point> {
+fn compared(confirming: &Confirming, study: &Study) -> Vec<RepeatedPoint> {
     let points = points(study.trials());
     confirming
         .trials
@@ -223,7 +223,7 @@ fn used(confirming: &Confirming, trials: &[Trial], of: impl Fn(TrialState) -> bo
     trials.iter().filter(repeat).count() as u32
 }
 
-fn leads(point: &Point, confidence: f64) -> String {
+fn leads(point: &RepeatedPoint, confidence: f64) -> String {
     let spread = point.deviation().map(|deviation| format!(" +- {deviation:.3}")).unwrap_or_default();
     format!(
         "the point of trial {} leads with {:.1} % confidence: mean {:.3}{spread}, stood {} of {}",

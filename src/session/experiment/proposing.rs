@@ -6,9 +6,9 @@ use super::confirming::Next;
 use super::searching::Searched;
 use super::wishes::must_be_within;
 use super::{gains, not_now, recovery};
+use crate::optimize::ask::SamplerKind;
 use crate::optimize::insight;
-use crate::optimize::sampler::SamplerKind;
-use crate::optimize::study::{Study, StudyError, Told};
+use crate::optimize::study::{Study, StudyError, TellOutcome};
 use crate::optimize::trial::Trial;
 use crate::recording::record::Record;
 use crate::session::experiment::{Experiment, RequestRefusal};
@@ -186,7 +186,7 @@ impl Experiment {
             return Ok(None);
         };
         let trial = pending.suggestion.trial;
-        if self.study.tell(trial, pending.outcome)? == Told::AlreadyFinished {
+        if self.study.tell(trial, pending.outcome)? == TellOutcome::AlreadyFinished {
             // It is read again with the next proposal.
             self.log(format!("trial {trial} was ended by somebody else meanwhile: what they say stands"));
             self.rows.remove(&trial);

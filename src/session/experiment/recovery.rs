@@ -7,7 +7,7 @@
 use super::attributes::{self, Origin};
 use super::confirming::Next;
 use super::watch::Watch;
-use crate::optimize::study::{Outcome, StudyError, Told};
+use crate::optimize::study::{Outcome, StudyError, TellOutcome};
 use crate::optimize::trial::{Trial, TrialState};
 use crate::recording::record::Record;
 use crate::session::experiment::{Experiment, RequestRefusal};
@@ -82,7 +82,7 @@ impl Experiment {
         };
         // Judged at this very moment it is not dead after all.
         let unchanged = |now: &Trial| now.user_attributes == trial.user_attributes;
-        if self.study.tell_if(trial.number, outcome, &last, unchanged)? == Told::Recorded {
+        if self.study.tell_if(trial.number, outcome, &last, unchanged)? == TellOutcome::Recorded {
             self.log(format!("trial {} was {words}", trial.number));
         }
         Ok(())

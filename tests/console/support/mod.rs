@@ -1,4 +1,4 @@
-//! A console without a terminal: keys and records in, effects and the screen as text out.
+//! A console without a terminal: input of keys and records, output of effects and of the screen as text.
 
 #![allow(dead_code, reason = "each test program uses a part")]
 
@@ -27,7 +27,7 @@ pub struct Console {
 }
 
 impl Console {
-    /// Braille, 16 colours, nothing known yet.
+    /// Braille, 16 colours, no session.
     pub fn new() -> Console {
         Console::with(Settings::built_in(), Theme { colours: Colours::Named, glyphs: Glyphs::Braille })
     }
@@ -54,14 +54,14 @@ impl Console {
         console
     }
 
-    /// As [`Console::proposed`], the robot standing.
+    /// [`Console::proposed`] with the robot in READY.
     pub fn ready() -> Console {
         let mut console = Console::proposed();
         console.mode(Mode::Ready);
         console
     }
 
-    /// Trial 0 ran and waits for its verdict, the robot in `mode`.
+    /// Trial 0 under review, the robot in `mode`.
     pub fn review(mode: Mode, suggested: Verdict) -> Console {
         let mut console = Console::ready();
         console.stage(ExperimentStage::Running, 0);
@@ -80,7 +80,7 @@ impl Console {
         self.tell(Msg::Clock(now));
     }
 
-    /// Presses keys by their names, a tenth of a second apart.
+    /// Presses keys by name, 0.1 s apart.
     pub fn press(&mut self, keys: &[&str]) -> Vec<Effect> {
         keys.iter()
             .flat_map(|name| {
@@ -110,7 +110,7 @@ impl Console {
         self.tell(Msg::Snapshot(Box::new(Snapshot { tick, ..self.model.snapshot })));
     }
 
-    /// The screen as text, a line per row, without trailing spaces.
+    /// The screen as text without trailing spaces.
     pub fn screen(&self, columns: u16, rows: u16) -> String {
         let mut terminal = Terminal::new(TestBackend::new(columns, rows)).expect("a screen in memory");
         terminal.draw(|frame| view::render(frame, &self.model)).expect("drawn");
@@ -124,8 +124,7 @@ impl Console {
         text
     }
 
-    /// The colours of the screen: a letter for each style that occurs, in the place of each cell that has it, and what
-    /// the letters mean. Cells in the terminal's own style are blank.
+    /// The styles of the screen: a letter per cell, blank for the terminal's default style, and a legend of the letters.
     pub fn colours(&self, columns: u16, rows: u16) -> String {
         let mut terminal = Terminal::new(TestBackend::new(columns, rows)).expect("a screen in memory");
         terminal.draw(|frame| view::render(frame, &self.model)).expect("drawn");
@@ -140,7 +139,7 @@ impl Console {
             let letters: String = (0..columns)
                 .map(|x| {
                     let cell = &buffer[(x, y)];
-                    // A colour that no ink shows is none.
+                    // The foreground of a blank cell is invisible.
                     let plain = cell.bg == Color::Reset && cell.modifier.is_empty();
                     if plain && (cell.fg == Color::Reset || cell.symbol() == " ") {
                         return ' ';
@@ -162,12 +161,12 @@ impl Console {
         text
     }
 
-    /// What is said in answer to the operator.
+    /// The message to the operator.
     pub fn said(&self) -> &str {
         self.model.message.as_ref().map_or("", |message| message.text.as_str())
     }
 
-    /// The last line of the screen.
+    /// The text of the last line of the screen.
     pub fn next_step(&self) -> String {
         view::next_step::next_step(&self.model).lead
     }

@@ -1,41 +1,30 @@
-//! `quadfrog bench`: the simulator's speed on this machine, beside MuJoCo's where that is at hand.
+//! Speed of the simulator and of whole studies on this machine, compared with MuJoCo on request.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Instant;
 
-use clap::{Args, Subcommand};
+use clap::Args;
 use color_eyre::eyre::{WrapErr, eyre};
 use quadfrog::sim::bench::{Scene, Speed};
 
-use super::Failure;
-
-#[derive(Debug, Subcommand)]
-enum Which {
-    /// How late the control thread wakes and what a tick costs
-    Loop(super::bench_loop::LoopArguments),
-}
+use super::machine;
+use crate::command::failure::Failure;
 
 #[derive(Debug, Args)]
-#[command(args_conflicts_with_subcommands = true)]
-pub struct BenchArguments {
-    #[command(subcommand)]
-    which: Option<Which>,
-    /// How long each figure is measured, s
+pub struct SpeedArguments {
+    /// Duration of each measurement, s
     #[arg(long, value_name = "S", default_value_t = 3.0)]
     seconds: f64,
-    /// A script whose `bench SECONDS` prints MuJoCo's {"mj_steps_per_s_standing": ...} on the same model, run with python3
+    /// Python script whose `bench SECONDS` prints MuJoCo's {"mj_steps_per_s_standing": ...} on the same model
     #[arg(long, value_name = "FILE")]
     mujoco: Option<PathBuf>,
-    /// Also the long run: 5 seeds of 3 tasks of 100 trials
+    /// Also run 5 seeds of 3 tasks of 100 trials
     #[arg(long)]
     long: bool,
 }
 
-pub fn run(arguments: &BenchArguments) -> Result<(), Failure> {
-    if let Some(Which::Loop(arguments)) = &arguments.which {
-        return super::bench_loop::run(arguments);
-    }
+pub fn run(arguments: &SpeedArguments) -> Result<(), Failure> {
     if !(arguments.seconds > 0.0 && arguments.seconds <= 600.0) {
         return Err(Failure::input(format!("--seconds {}: give more than 0 and at most 600", arguments.seconds)));
     }
@@ -43,10 +32,7 @@ pub fn run(arguments: &BenchArguments) -> Result<(), Failure> {
         return Err(Failure::input(format!("--mujoco {}: there is no such file", script.display())));
     }
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
-    println!("{}, {cores} cores, quadfrog {}", machine(), env!("CARGO_PKG_VERSION"));
-    if cfg!(debug_assertions) {
-        println!("This is a debug build: for figures that count, run it with cargo run --release.");
-    }
+    machine::print_header(&format!(", {cores} cores"));
     println!();
     let figures = Speed::new().measure(arguments.seconds * 5.0);
     println!("accelerations from torques                {:8.2} us", figures.dynamics_s * 1e6);
@@ -55,17 +41,16 @@ pub fn run(arguments: &BenchArguments) -> Result<(), Failure> {
     }
     if let Some(script) = &arguments.mujoco {
         let theirs = mujoco(script, arguments.seconds)?;
-        // Scene::ALL[1] is standing on four feet, as the script's robot does.
+        // The robot of the script stands on four feet, as in Scene::ALL[1].
         let ours = 1.0 / figures.step_s[1];
         println!(
-            "MuJoCo, 1 ms step, standing on four feet  {:8.2} us  {theirs:8.0} steps/s; ours: {:.1} times as many",
+            "MuJoCo, 1 ms step, standing on four feet  {:8.2} us  {theirs:8.0} steps/s; quadfrog / MuJoCo: {:.1}",
             1e6 / theirs,
             ours / theirs
         );
     }
     println!();
-    let seconds = studies(&["--trials", "20"])?;
-    println!("optimize, 20 trials, start to finish      {seconds:8.2} s");
+    println!("optimize, 20 trials, start to finish      {:8.2} s", studies(&["--trials", "20"])?);
     if arguments.long {
         let several = ["--task", "forward,lateral-left,twist-ccw", "--seed", "0-4", "--trials", "100"];
         println!("optimize, 5 seeds of 3 tasks of 100 trials{:8.2} s", studies(&several)?);
@@ -73,9 +58,9 @@ pub fn run(arguments: &BenchArguments) -> Result<(), Failure> {
     Ok(())
 }
 
-/// How long `quadfrog optimize` takes with these arguments, s: the program as it is, in a folder of its own.
+/// Returns the duration of `quadfrog optimize` with these arguments in a temporary folder, s.
 fn studies(arguments: &[&str]) -> Result<f64, Failure> {
-    let program = std::env::current_exe().wrap_err("the program cannot find itself")?;
+    let program = std::env::current_exe().wrap_err("the path of this program")?;
     let folder = std::env::temp_dir().join(format!("quadfrog-bench-{}", std::process::id()));
     let start = Instant::now();
     let status = Command::new(program)
@@ -89,29 +74,19 @@ fn studies(arguments: &[&str]) -> Result<f64, Failure> {
         .status()
         .wrap_err("optimize could not be started")?;
     let seconds = start.elapsed().as_secs_f64();
-    // What is left behind in the system's folder for passing things does no harm.
+    // A leftover in the temporary directory is harmless.
     let _ = std::fs::remove_dir_all(&folder);
     if status.success() { Ok(seconds) } else { Err(eyre!("optimize ended with {status}").into()) }
 }
 
-/// MuJoCo's steps per second, from the script.
+/// Returns MuJoCo's steps per second, measured by the script.
 fn mujoco(script: &Path, seconds: f64) -> Result<f64, Failure> {
     let output = Command::new("python3").arg(script).arg("bench").arg(seconds.to_string()).output();
     let output = output.wrap_err("python3 could not be started")?;
-    let said = String::from_utf8_lossy(&output.stdout);
-    let value: Option<serde_json::Value> = said.lines().rev().find_map(|line| serde_json::from_str(line).ok());
+    let text = String::from_utf8_lossy(&output.stdout);
+    let value: Option<serde_json::Value> = text.lines().rev().find_map(|line| serde_json::from_str(line).ok());
     value.and_then(|value| value["mj_steps_per_s_standing"].as_f64()).ok_or_else(|| {
-        Failure::Other(eyre!(
-            "{}: no figure came out: {}",
-            script.display(),
-            String::from_utf8_lossy(&output.stderr).trim()
-        ))
+        let errors = String::from_utf8_lossy(&output.stderr);
+        Failure::Other(eyre!("{}: printed no mj_steps_per_s_standing: {}", script.display(), errors.trim()))
     })
-}
-
-/// The processor's name, as the system gives it.
-pub fn machine() -> String {
-    let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
-    let model = text.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':'));
-    model.map_or_else(|| std::env::consts::ARCH.to_owned(), |(_, name)| name.trim().to_owned())
 }

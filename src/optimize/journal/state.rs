@@ -1,83 +1,75 @@
-//! The state of a journal: what all its lines so far amount to, by Optuna's rules of acceptance.
+//! The state of a journal: the result of all its lines by Optuna's rules of acceptance (`docs/journal.md`).
 
-use super::operation::{Operation, Template};
+use super::operation::{Operation, TrialTemplate};
 use crate::optimize::trial::{Distribution, Trial, TrialState};
 use serde_json::Value;
 use std::collections::BTreeMap;
 
 /// A study of the journal.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct StudyRecord {
     /// Name.
     pub name: String,
     /// Per objective: 0 not set, 1 minimize, 2 maximize.
     pub directions: Vec<u64>,
-    /// Whether it has been deleted; its number is not used again.
+    /// Whether it has been deleted; its id is not used again.
     pub deleted: bool,
-    /// Attributes of the user.
+    /// User attributes.
     pub user_attributes: BTreeMap<String, Value>,
-    /// Attributes of the machinery: metric names, notes.
+    /// System attributes: metric names, notes.
     pub system_attributes: BTreeMap<String, Value>,
-    /// Its trials by number.
+    /// Trials in the order of their numbers.
     pub trials: Vec<Trial>,
 }
 
 /// All studies of a journal.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Replay {
+pub struct JournalState {
     studies: Vec<StudyRecord>,
     /// Trial id -> study and number.
     trials: Vec<(usize, usize)>,
 }
 
-/// What became of an operation.
+/// Result of applying an operation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Effect {
+pub enum Applied {
     /// It took effect.
     Accepted,
-    /// It took effect and made the trial of this id.
+    /// It created the trial with this id.
     Created(u64),
-    /// It is in the journal without effect: its study or trial does not exist, or is finished, or was taken.
+    /// No effect: its study or trial does not exist, is finished, or was begun by another worker.
     Ignored,
 }
 
-impl Replay {
-    /// All studies by id, deleted ones among them.
+impl JournalState {
+    /// All studies in the order of their ids, deleted ones included.
     pub fn studies(&self) -> &[StudyRecord] {
         &self.studies
     }
 
-    /// The id of the living study of that name.
+    /// The id of the study of that name, unless deleted.
     pub fn find(&self, name: &str) -> Option<usize> {
         self.studies.iter().position(|s| !s.deleted && s.name == name)
     }
 
-    /// The id that the next created trial will get.
+    /// The id of the next trial to be created.
     pub fn next_trial_id(&self) -> u64 {
         self.trials.len() as u64
     }
 
-    /// The trial of an id, whatever its study.
+    /// The trial with an id, in any study.
     pub fn trial(&self, id: u64) -> Option<&Trial> {
         let (study, number) = *self.trials.get(usize::try_from(id).ok()?)?;
         self.studies[study].trials.get(number)
     }
 
     /// Applies one operation.
-    pub fn apply(&mut self, operation: Operation, worker: &str) -> Effect {
+    pub fn apply(&mut self, operation: Operation, worker: &str) -> Applied {
         let accepted = match operation {
             Operation::CreateStudy { name, directions } => {
                 let free = self.find(&name).is_none();
                 if free {
-                    let (user_attributes, system_attributes) = Default::default();
-                    self.studies.push(StudyRecord {
-                        name,
-                        directions,
-                        deleted: false,
-                        user_attributes,
-                        system_attributes,
-                        trials: Vec::new(),
-                    });
+                    self.studies.push(StudyRecord { name, directions, ..StudyRecord::default() });
                 }
                 free
             }
@@ -90,7 +82,7 @@ impl Replay {
             }
             Operation::CreateTrial { study, started, template } => {
                 let id = self.trials.len() as u64;
-                let Some(record) = self.study(study) else { return Effect::Ignored };
+                let Some(record) = self.study(study) else { return Applied::Ignored };
                 let number = record.trials.len();
                 let mut trial = Trial::new(number as u32, TrialState::Running);
                 (trial.id, trial.started, trial.worker) = (id, started, worker.to_owned());
@@ -99,14 +91,14 @@ impl Replay {
                 }
                 record.trials.push(trial);
                 self.trials.push((study, number));
-                return Effect::Created(id);
+                return Applied::Created(id);
             }
             Operation::SetParameter { trial, name, value, distribution } => {
                 let fits = self.parameter_fits(trial, &name, &distribution);
                 self.unfinished(trial).filter(|_| fits).map(|t| t.set(&name, value, distribution)).is_some()
             }
             Operation::SetState { trial, state, values, at } => match self.unfinished(trial) {
-                // Of several workers that claim a waiting trial the first line wins.
+                // If several workers claim a waiting trial, the first line takes effect.
                 Some(t) if !(state == TrialState::Running && t.state == TrialState::Running) => {
                     t.state = state;
                     if let Some(values) = values {
@@ -132,20 +124,20 @@ impl Replay {
             }
             Operation::Nothing => false,
         };
-        if accepted { Effect::Accepted } else { Effect::Ignored }
+        if accepted { Applied::Accepted } else { Applied::Ignored }
     }
 
     fn study(&mut self, id: usize) -> Option<&mut StudyRecord> {
         self.studies.get_mut(id).filter(|s| !s.deleted)
     }
 
-    /// A trial that may still change.
+    /// The trial with an id, unless finished.
     fn unfinished(&mut self, id: u64) -> Option<&mut Trial> {
         let (study, number) = *self.trials.get(usize::try_from(id).ok()?)?;
         self.study(study)?.trials.get_mut(number).filter(|t| !t.state.is_finished())
     }
 
-    /// Whether the first trial that has the parameter has it with the same kind of distribution. Bounds may differ.
+    /// Whether the distribution is of the same kind as in the first trial with this parameter. Bounds may differ.
     fn parameter_fits(&self, trial: u64, name: &str, distribution: &Distribution) -> bool {
         let Some((study, _)) = usize::try_from(trial).ok().and_then(|id| self.trials.get(id)) else { return false };
         let earlier = self.studies[*study].trials.iter().find_map(|t| t.distribution(name));
@@ -159,7 +151,7 @@ impl Replay {
     }
 }
 
-fn fill(trial: &mut Trial, template: Template) {
+fn fill(trial: &mut Trial, template: TrialTemplate) {
     trial.state = template.state;
     trial.value = template.values.and_then(|v| v.first().copied());
     trial.completed = template.completed;
