@@ -41,7 +41,7 @@ const ENGINE: [(&str, &[&str]); 12] = [
 
 /// Layers of the console, lowest first: a module uses modules of lower layers only.
 const CONSOLE: [&[&str]; 9] = [
-    &["action", "column", "series", "line"],
+    &["action", "column", "series", "connection"],
     &["keymap", "theme"],
     &["settings", "message"],
     &["model"],
@@ -99,7 +99,7 @@ fn short(path: &Path) -> String {
     path.strip_prefix(root()).unwrap().to_string_lossy().replace('\\', "/")
 }
 
-/// Fails with every violation and the remedy.
+/// Fails with every violation and the remedy, if there is a violation.
 fn assert_none(violations: &[String], remedy: &str) {
     assert!(violations.is_empty(), "{} violations:\n  {}\n{remedy}", violations.len(), violations.join("\n  "));
 }

@@ -94,11 +94,9 @@ impl Config {
                 Some(path) => {
                     let text = std::fs::read_to_string(&path)
                         .map_err(|source| ConfigError::Read { path: path.clone(), source })?;
-                    let file = path.display().to_string();
-                    let merged = merge(&file, &text, &default.table, &optional)?;
-                    (merged.table, FileOrigin { file, lines: merged.lines })
+                    merge(&path.display().to_string(), &text, &default.0, &optional)?
                 }
-                None => (default.table, FileOrigin { file: embedded, lines: default.lines }),
+                None => default,
             };
             as_run.push((name.to_owned(), table.to_string()));
             ranges::check(name, &table, &origin)?;

@@ -7,20 +7,12 @@ use toml::{Table, Value};
 
 use super::ConfigError;
 
-/// A default file with the keys of a given file laid over it.
-pub struct MergedFile {
-    /// Values in force.
-    pub table: Table,
-    /// Line of every key that the file gave, by the key with its tables, joined by dots.
-    pub lines: HashMap<String, usize>,
-}
-
 /// Origin of the values of a file, for messages.
 #[derive(Debug, Clone)]
 pub struct FileOrigin {
     /// Path of the file.
     pub file: String,
-    /// Line of every key that the file gave.
+    /// Line of every key that the file gave, by the key with its tables, joined by dots.
     pub lines: HashMap<String, usize>,
 }
 
@@ -35,21 +27,22 @@ impl FileOrigin {
     }
 }
 
-/// Lays the text of `file` over `default`. Keys of `optional`, which the default leaves out, are allowed too.
+/// Lays the text of `file` over `default`; returns the values in force and their origin. Keys of `optional`, which the default leaves out, are allowed too.
 ///
 /// # Errors
 /// When the text is not TOML, or a key is unknown or of another kind than the default's.
-pub fn merge(file: &str, text: &str, default: &Table, optional: &Table) -> Result<MergedFile, ConfigError> {
+pub fn merge(file: &str, text: &str, default: &Table, optional: &Table) -> Result<(Table, FileOrigin), ConfigError> {
     let line_of = |offset: usize| text[..offset.min(text.len())].matches('\n').count() + 1;
     let parsed = DeTable::parse(text).map_err(|error| ConfigError::Syntax {
         file: file.to_owned(),
         line: line_of(error.span().map_or(0, |span| span.start)),
         message: error.message().to_owned(),
     })?;
-    let mut merged = MergedFile { table: default.clone(), lines: HashMap::new() };
+    let mut table = default.clone();
+    let mut lines = HashMap::new();
     let overlay = Overlay { file, line_of: &line_of };
-    overlay.lay(parsed.get_ref(), &mut merged.table, optional, "", &mut merged.lines)?;
-    Ok(merged)
+    overlay.lay(parsed.get_ref(), &mut table, optional, "", &mut lines)?;
+    Ok((table, FileOrigin { file: file.to_owned(), lines }))
 }
 
 struct Overlay<'a> {
@@ -118,7 +111,7 @@ impl Overlay<'_> {
 fn plain(value: &DeValue<'_>) -> Value {
     match value {
         DeValue::String(text) => Value::String(text.to_string()),
-        // The parser has seen that these are numbers; radix and digit separators were resolved by it.
+        // The parser has checked the digits and resolved radix and separators.
         DeValue::Integer(number) => i64::from_str_radix(number.as_str(), number.radix())
             .map_or_else(|_| Value::String(number.to_string()), Value::Integer),
         DeValue::Float(number) => {

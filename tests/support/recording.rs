@@ -479,7 +479,7 @@ pub fn write(path: &Path, everything: &[Played]) {
     assert_eq!(writer.finish().unwrap(), path);
 }
 
-/// What the player gives, without the session's own first record.
+/// Plays a file and returns everything but the session's first record.
 pub fn play(path: &Path) -> Vec<Played> {
     let mut player = Player::open(path).unwrap_or_else(|error| panic!("{error}"));
     let first = player.next();
