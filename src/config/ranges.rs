@@ -72,7 +72,7 @@ fn range(file: &str, key: &str) -> Option<&'static NumberRange> {
         pattern.split('.').count() == key.split('.').count()
             && pattern.split('.').zip(key.split('.')).all(|(pattern, name)| pattern == "*" || pattern == name)
     };
-    RANGES.iter().find(|(known, keys, _)| *known == file && keys.iter().any(|key| fits(key))).map(|(.., range)| range)
+    RANGES.iter().find(|(known, keys, _)| *known == file && keys.iter().any(&fits)).map(|(.., range)| range)
 }
 
 /// Returns the numbers outside of lists, by their key with its tables.
