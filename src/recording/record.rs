@@ -1,67 +1,65 @@
-//! What is worth keeping of a session besides its ticks. The screen and the recording receive the same records, so a
-//! replay shows what live showed.
-
-use serde::{Deserialize, Serialize};
+//! Records of a session besides its ticks. The screen and the recording receive the same records, so a replay shows the
+//! same screen as the live session.
 
 use crate::telemetry::{ArmingCheck, ArmingCheckState, Counters, Mode, Tick};
 use crate::trial::{ExperimentStage, ParameterInfo, PointRecord, Proposal, ProposalInsight, SearchStatus, TrialRecord};
 
-/// A record and when it happened.
+/// A record with its time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stamped {
     /// Time since the engine started, ns; the same clock as the ticks'.
     pub time_ns: u64,
-    /// What happened.
+    /// The record.
     pub record: Record,
 }
 
-/// One thing that happened, or that is now known.
+/// An event or a new state of the session.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Record {
-    /// What this session is. The first record of each recording.
+    /// Facts of the session. The first record of each recording.
     Session(SessionInfo),
-    /// The mode changed.
+    /// Change of mode.
     Transition(Transition),
-    /// The session moved to another stage of a trial's life.
+    /// Change of the experiment's stage.
     Stage(StageRecord),
-    /// A proposal is on the table, or changed by an override.
+    /// New proposal, or one changed by an override.
     Proposal(Proposal),
-    /// A row of the trial table is new or changed; the newest record of a number counts.
+    /// New or changed row of the trial table; the newest record of a number counts.
     Trial(TrialRecord),
-    /// An operator's wish and what became of it.
+    /// Operator's request and its result.
     Request(RequestRecord),
     /// Counters, ten times a second.
     Counters(Counters),
-    /// A line for the log.
+    /// Line of the log.
     Log(LogRecord),
-    /// The last ticks before a fault, oldest first.
+    /// Last ticks up to a fault, oldest first.
     FaultTicks(Vec<Tick>),
-    /// The whole pre-arm list. The screen sees it twice a second while the robot is disarmed, the recording when an item
-    /// changes its state.
+    /// All arming checks. Sent to the screen twice a second while the robot is disarmed, recorded when a check changes its
+    /// state.
     ArmingChecks(Vec<ArmingCheckRecord>),
-    /// What is searched, and how far the study is.
+    /// Searched parameters and progress of the study.
     Search(SearchStatus),
-    /// Why the proposal was made: told with each that the sampler makes.
+    /// Reasons of the sampler for its proposal; follows each of them.
     Insight(ProposalInsight),
-    /// What repeated points amount to; all of them, each time that one of them changes.
+    /// Statistics of all repeated points, whenever one of them changes.
     Points(Vec<PointRecord>),
 }
 
-/// An item of the pre-arm list and how it stands.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+/// An arming check and its result.
+#[derive(Debug, Clone, PartialEq)]
 pub struct ArmingCheckRecord {
-    /// The item.
+    /// The check.
     pub check: ArmingCheck,
-    /// What was found, in words with a unit.
+    /// Measured value as text, with unit.
     pub found: String,
-    /// What is needed, in words with a unit.
+    /// Needed value as text, with unit.
     pub needed: String,
-    /// How it stands.
+    /// Result.
     pub state: ArmingCheckState,
 }
 
 /// What a session is: written first into a recording, shown in the frame.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct SessionInfo {
     /// Version of this program.
     pub version: String,
@@ -96,55 +94,55 @@ pub struct SessionInfo {
 }
 
 /// A change of mode.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Transition {
     /// From this mode.
     pub from: Mode,
     /// To this one.
     pub to: Mode,
-    /// Why, in words.
+    /// Cause as text.
     pub cause: String,
 }
 
-/// The stage and what it is about.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+/// The experiment's stage and its trial.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct StageRecord {
     /// The stage.
     pub stage: ExperimentStage,
-    /// The trial that it is about; the last one when finished.
+    /// Trial of the stage; the last one when finished.
     pub trial: u32,
     /// Whether the last verdict can still be undone.
     pub can_undo: bool,
 }
 
-/// An operator's wish and what became of it.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+/// An operator's request and its result.
+#[derive(Debug, Clone, PartialEq)]
 pub struct RequestRecord {
-    /// The wish in words, for example `override Fx = 120`.
+    /// The request as text, for example `override Fx = 120`.
     pub wish: String,
     /// Whether it was carried out.
     pub accepted: bool,
-    /// Why not, or what followed.
+    /// Reason of the refusal, or result.
     pub answer: String,
 }
 
-/// How grave a line of the log is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+/// Severity of a line of the log.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum LogLevel {
-    /// For the curious.
+    /// Normal operation.
     Info,
-    /// Something to look at.
+    /// Needs the operator's attention.
     Warning,
-    /// Something failed.
+    /// Failure.
     Error,
 }
 
 /// A line of the log.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct LogRecord {
-    /// How grave.
+    /// Severity.
     pub level: LogLevel,
-    /// Which part speaks.
+    /// Part of the program that logged it.
     pub source: String,
     /// The line.
     pub message: String,

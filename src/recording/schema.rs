@@ -1,38 +1,19 @@
-//! Records as protobuf messages and back.
+//! Records as protobuf messages, and back.
 
 use foxglove::messages::{Log, log};
 use prost::Message;
 
+use super::decode::{DecodeError, number, one_of};
 use super::record::{
     ArmingCheckRecord, LogLevel, LogRecord, Record, RequestRecord, SessionInfo, StageRecord, Transition,
 };
 use super::topic::Topic;
-use super::{frog, optimizing, tick};
+use super::{frog, optimizing, tick, trials};
 use crate::robot::LinkStatus;
-use crate::telemetry::{ArmingCheck, ArmingCheckState, Counters};
-use crate::trial::{
-    ExperimentStage, FallRisk, MeasuredJump, ParameterInfo, Proposal, ProposalSource, ProposedParameter, TrialRecord,
-    Verdict,
-};
+use crate::telemetry::{ArmingCheck, ArmingCheckState, Counters, Mode};
+use crate::trial::{ExperimentStage, ParameterInfo};
 
-/// A message that is not what the schema says.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum DecodeError {
-    /// Not protobuf, or not of this message.
-    #[error("not a message of its schema: {0}")]
-    Protobuf(#[from] prost::DecodeError),
-    /// A part that must be there is not.
-    #[error("{0} is missing")]
-    Missing(&'static str),
-    /// A number without a meaning.
-    #[error("{1} is no {0} that this version knows")]
-    Unknown(&'static str, i32),
-    /// An array of another length than the machine has.
-    #[error("{1} {0}: another number than this version expects")]
-    Length(&'static str, usize),
-}
-
-/// The topic of a record; its message goes into `buffer`. `start_utc_ns` is the log time of engine time 0.
+/// Encodes a record into `buffer` and returns its topic. `start_utc_ns` is the log time of engine time 0, ns.
 pub fn encode(record: &Record, start_utc_ns: u64, log_time: u64, buffer: &mut Vec<u8>) -> Topic {
     buffer.clear();
     let (topic, encoded) = match record {
@@ -49,8 +30,8 @@ pub fn encode(record: &Record, start_utc_ns: u64, log_time: u64, buffer: &mut Ve
             let message = frog::StageInfo { stage: *stage as i32, trial: *trial, can_undo: *can_undo };
             (Topic::Stage, message.encode(buffer))
         }
-        Record::Proposal(value) => (Topic::Proposal, proposal(value).encode(buffer)),
-        Record::Trial(value) => (Topic::Trial, trial(value).encode(buffer)),
+        Record::Proposal(value) => (Topic::Proposal, trials::proposal(value).encode(buffer)),
+        Record::Trial(value) => (Topic::Trial, trials::trial(value).encode(buffer)),
         Record::Request(RequestRecord { wish, accepted, answer }) => {
             let message = frog::OperatorCommand { wish: wish.clone(), accepted: *accepted, answer: answer.clone() };
             (Topic::Command, message.encode(buffer))
@@ -99,19 +80,19 @@ pub fn encode(record: &Record, start_utc_ns: u64, log_time: u64, buffer: &mut Ve
         Record::Insight(value) => (Topic::Insight, optimizing::insight(value).encode(buffer)),
         Record::Points(value) => (Topic::Points, optimizing::points(value).encode(buffer)),
     };
-    encoded.expect("a Vec grows as far as it must");
+    encoded.expect("a Vec grows as needed");
     topic
 }
 
-/// The record of a message; none on a topic that holds no records.
+/// Decodes the record of a message; none on a topic that holds no records.
 pub fn decode(topic: Topic, data: &[u8]) -> Result<Option<Record>, DecodeError> {
     Ok(Some(match topic {
         Topic::Session => Record::Session(from_session(frog::Session::decode(data)?)),
         Topic::Transition => {
             let message = frog::Transition::decode(data)?;
             Record::Transition(Transition {
-                from: tick::mode(message.from)?,
-                to: tick::mode(message.to)?,
+                from: one_of(&Mode::ALL, "mode", message.from)?,
+                to: one_of(&Mode::ALL, "mode", message.to)?,
                 cause: message.cause,
             })
         }
@@ -119,8 +100,8 @@ pub fn decode(topic: Topic, data: &[u8]) -> Result<Option<Record>, DecodeError> 
             let frog::StageInfo { stage, trial, can_undo } = frog::StageInfo::decode(data)?;
             Record::Stage(StageRecord { stage: one_of(&ExperimentStage::ALL, "stage", stage)?, trial, can_undo })
         }
-        Topic::Proposal => Record::Proposal(from_proposal(frog::Proposal::decode(data)?)?),
-        Topic::Trial => Record::Trial(from_trial(frog::Trial::decode(data)?)?),
+        Topic::Proposal => Record::Proposal(trials::from_proposal(frog::Proposal::decode(data)?)?),
+        Topic::Trial => Record::Trial(trials::from_trial(frog::Trial::decode(data)?)?),
         Topic::Command => {
             let frog::OperatorCommand { wish, accepted, answer } = frog::OperatorCommand::decode(data)?;
             Record::Request(RequestRecord { wish, accepted, answer })
@@ -203,8 +184,8 @@ fn from_session(message: frog::Session) -> SessionInfo {
     let bounds = |bounds: frog::Bounds| ParameterInfo {
         name: bounds.name,
         unit: bounds.unit,
-        low: tick::number(bounds.low),
-        high: tick::number(bounds.high),
+        low: number(bounds.low),
+        high: number(bounds.high),
     };
     SessionInfo {
         version: message.version,
@@ -223,116 +204,6 @@ fn from_session(message: frog::Session) -> SessionInfo {
         gains: message.gains.into_iter().map(bounds).collect(),
         approve: message.approve,
     }
-}
-
-fn proposal(value: &Proposal) -> frog::Proposal {
-    let parameter = |parameter: &ProposedParameter| frog::proposal::Parameter {
-        name: parameter.name.clone(),
-        value: Some(parameter.value),
-        proposed: Some(parameter.proposed),
-    };
-    frog::Proposal {
-        trial: value.trial,
-        revision: value.revision,
-        source: value.source as i32,
-        parent: value.parent,
-        parameters: value.parameters.iter().map(parameter).collect(),
-        risk: value.risk.as_ref().map(risk),
-        gains: value.gains.iter().map(parameter).collect(),
-    }
-}
-
-fn from_proposal(message: frog::Proposal) -> Result<Proposal, DecodeError> {
-    let parameter = |parameter: frog::proposal::Parameter| ProposedParameter {
-        name: parameter.name,
-        value: tick::number(parameter.value),
-        proposed: tick::number(parameter.proposed),
-    };
-    Ok(Proposal {
-        trial: message.trial,
-        revision: message.revision,
-        source: one_of(&ProposalSource::ALL, "source", message.source)?,
-        parent: message.parent,
-        parameters: message.parameters.into_iter().map(parameter).collect(),
-        risk: message.risk.map(from_risk),
-        gains: message.gains.into_iter().map(parameter).collect(),
-    })
-}
-
-fn trial(value: &TrialRecord) -> frog::Trial {
-    let parameter = |(name, value): &(String, f64)| frog::trial::Parameter { name: name.clone(), value: Some(*value) };
-    let measured = |measured: &MeasuredJump| frog::trial::Measured {
-        dx: Some(measured.dx_m),
-        dy: Some(measured.dy_m),
-        dyaw: Some(measured.dyaw_rad),
-        apex: Some(measured.apex_m),
-        air: Some(measured.air_s),
-    };
-    frog::Trial {
-        trial: value.trial,
-        source: value.source as i32,
-        parent: value.parent,
-        parameters: value.parameters.iter().map(parameter).collect(),
-        measured: value.measured.as_ref().map(measured),
-        value: value.value,
-        hand_value: value.hand_value,
-        suggested: value.suggested.map(|verdict| verdict as i32),
-        cause: value.cause.clone(),
-        verdict: value.verdict.map(|verdict| verdict as i32),
-        note: value.note.clone(),
-        risk: value.risk.as_ref().map(risk),
-        gains: value.gains.iter().map(parameter).collect(),
-    }
-}
-
-fn from_trial(message: frog::Trial) -> Result<TrialRecord, DecodeError> {
-    let verdict = |verdict: Option<i32>| verdict.map(|verdict| one_of(&Verdict::ALL, "verdict", verdict)).transpose();
-    let measured = |measured: frog::trial::Measured| MeasuredJump {
-        dx_m: tick::number(measured.dx),
-        dy_m: tick::number(measured.dy),
-        dyaw_rad: tick::number(measured.dyaw),
-        apex_m: tick::number(measured.apex),
-        air_s: tick::number(measured.air),
-    };
-    let parameter = |parameter: frog::trial::Parameter| (parameter.name, tick::number(parameter.value));
-    Ok(TrialRecord {
-        trial: message.trial,
-        source: one_of(&ProposalSource::ALL, "source", message.source)?,
-        parent: message.parent,
-        parameters: message.parameters.into_iter().map(parameter).collect(),
-        measured: message.measured.map(measured),
-        value: message.value,
-        hand_value: message.hand_value,
-        suggested: verdict(message.suggested)?,
-        cause: message.cause,
-        verdict: verdict(message.verdict)?,
-        note: message.note,
-        risk: message.risk.map(from_risk),
-        gains: message.gains.into_iter().map(parameter).collect(),
-    })
-}
-
-fn risk(risk: &FallRisk) -> frog::Risk {
-    frog::Risk {
-        nearest_fall: risk.nearest_fall,
-        nearest_fall_trial: risk.nearest_fall_trial,
-        falls: risk.falls,
-        neighbours: risk.neighbours,
-    }
-}
-
-fn from_risk(message: frog::Risk) -> FallRisk {
-    FallRisk {
-        nearest_fall: message.nearest_fall,
-        nearest_fall_trial: message.nearest_fall_trial,
-        falls: message.falls,
-        neighbours: message.neighbours,
-    }
-}
-
-/// The value of that number: enums are numbered in the order of their `ALL`, here and in `proto/frog.proto`.
-fn one_of<T: Copy>(all: &[T], what: &'static str, number: i32) -> Result<T, DecodeError> {
-    all.get(number as usize).copied().ok_or(DecodeError::Unknown(what, number))
 }
 
 fn link(link: &LinkStatus) -> frog::Link {
@@ -378,7 +249,8 @@ fn from_link(link: &frog::Link) -> LinkStatus {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::telemetry::{Mode, Phase};
+    use crate::telemetry::Phase;
+    use crate::trial::{ProposalSource, Verdict};
 
     /// `STAND UP` in the program is `STAND_UP` in the schema, `re-run` is `RE_RUN`.
     fn assert_named(name: &str, in_schema: Option<&str>) {

@@ -1,4 +1,4 @@
-//! Arbitrary ticks and records for the tests of recordings, and a session that looks like a real one.
+//! Arbitrary ticks and records for the tests of recordings, and a realistic session.
 #![allow(dead_code, reason = "each test uses its own part")]
 
 use std::path::Path;
@@ -313,7 +313,7 @@ fn draw(words: usize) -> impl Strategy<Value = Draw> {
         .prop_map(|(words, text)| Draw { words: words.into_iter(), text })
 }
 
-/// Any tick at all: every bit pattern in every number.
+/// Any tick, with any bit pattern in every number.
 pub fn any_tick() -> impl Strategy<Value = Tick> {
     draw(400).prop_map(|mut draw| draw.tick())
 }
@@ -323,7 +323,7 @@ pub fn any_record() -> impl Strategy<Value = Record> {
     (0..13_usize, draw(800)).prop_map(|(kind, mut draw)| draw.record(kind))
 }
 
-/// A session as a study in the simulator begins it.
+/// Returns the session of a study in the simulator.
 pub fn session() -> SessionInfo {
     let parameter =
         |name: &str, unit: &str, low, high| ParameterInfo { name: name.into(), unit: unit.into(), low, high };
@@ -350,7 +350,7 @@ pub fn session() -> SessionInfo {
     }
 }
 
-/// Tick `number` of a robot that moves smoothly, with a little noise in every number, as a simulator gives it.
+/// Returns tick `number` of a robot that moves smoothly, with noise in every number, like a simulator's.
 pub fn moving_tick(number: u64) -> Tick {
     let time = number as f64 * 1e-3;
     let mut state = number.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
@@ -409,8 +409,7 @@ pub fn moving_tick(number: u64) -> Tick {
     }
 }
 
-/// What a jump study records: trials of a second from 1 s on, every 2 s, with the events that belong to them; `events`
-/// are in the order of time.
+/// Returns the ticks and records of a study: trials of 1 s from 1 s on, every 2 s; the records are in the order of time.
 pub fn study(seconds: u64) -> (Vec<Tick>, Vec<Stamped>) {
     let mut ticks: Vec<_> = (0..seconds * 1000).map(moving_tick).collect();
     let mut records = Vec::new();
@@ -480,7 +479,7 @@ pub fn write(path: &Path, everything: &[Played]) {
     assert_eq!(writer.finish().unwrap(), path);
 }
 
-/// What the player gives, without the session's own first record.
+/// Plays a file and returns everything but the session's first record.
 pub fn play(path: &Path) -> Vec<Played> {
     let mut player = Player::open(path).unwrap_or_else(|error| panic!("{error}"));
     let first = player.next();
