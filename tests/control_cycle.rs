@@ -170,9 +170,8 @@ fn a_stop_and_an_approval_in_one_tick_stop() {
 fn a_command_in_the_tick_of_a_stop_is_refused() {
     let mut bench = Bench::new();
     bench.reach(Mode::Disarmed);
-    let mode_changes = bench.events.iter().filter(|event| matches!(event, Event::Mode { .. })).count() as u64;
+    let command = bench.arm();
     bench.events.clear();
-    let command = Command::Arm(Permit { mode_changes, given_ns: bench.time_ms * 1_000_000 });
     let tick = bench.tick(Inputs { stop: true, command: Some(command), ..Inputs::default() });
     assert_eq!(tick.mode, Mode::Damped);
     assert!(

@@ -127,7 +127,7 @@ fn a_lost_operator_costs_the_trial_but_nothing_else() {
     let row = screen.row(trial).unwrap().clone();
     // A silence of a second may end after the landing of a short jump; then the trial counts as it is.
     if row.suggested == Some(Verdict::Void) {
-        assert!(row.cause.contains("screen was silent"), "{}", row.cause);
+        assert!(row.cause.contains("no heartbeat of the operator's screen"), "{}", row.cause);
     } else {
         assert!(row.measured.is_some(), "{row:?}");
     }
@@ -199,7 +199,7 @@ fn the_last_ticks_go_with_a_fault_outside_a_trial() {
     let numbers: Vec<u64> = kept.iter().map(|tick| tick.number).collect();
     assert!(numbers.windows(2).all(|pair| pair[1] == pair[0] + 1), "without a gap");
     let named = player.events().iter().any(|event| {
-        matches!(&event.record, Record::Transition(change) if change.to == Mode::Fault && change.cause.contains("late, allowed"))
+        matches!(&event.record, Record::Transition(change) if change.to == Mode::Fault && change.cause.contains("control thread late"))
     });
     assert!(named);
 }

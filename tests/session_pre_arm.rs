@@ -283,7 +283,7 @@ fn a_restart_during_another_fault_is_told_and_takes_the_word_back() {
     session.robot.tamper = |_| {};
     session.ticks(100);
     let told = session.faults_told();
-    let words = ["FL_hip at 2.000 rad", "the link to the robot is lost", "it restarted"];
+    let words = ["FL_hip at 2.000 rad", "link to the robot lost", "the robot restarted"];
     assert_eq!(told.len(), words.len(), "each once: {told:?}");
     for (told, words) in told.iter().zip(words) {
         assert!(told.contains(words), "{told} instead of {words}");

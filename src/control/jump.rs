@@ -8,9 +8,9 @@ use crate::robot::{CONTROL_PERIOD_S, LEGS, PerLeg, RobotState};
 use crate::telemetry::{Estimate, FallCause, Phase, TrialEnd, TrialSpec};
 use nalgebra::Vector3;
 
-/// Progress of a trial.
+/// TrialProgress of a trial.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Progress {
+pub enum TrialProgress {
     /// Standing still before the impulse.
     Countdown,
     /// Impulse or flight.
@@ -121,13 +121,13 @@ impl Jump {
     }
 
     /// Advances phase and progress with the newest state. To be called once per tick, before `target`.
-    pub fn observe(&mut self, state: &RobotState, estimate: &Estimate, settings: &ControlSettings) -> Progress {
+    pub fn observe(&mut self, state: &RobotState, estimate: &Estimate, settings: &ControlSettings) -> TrialProgress {
         if let Some(cause) = self.fall.observe(state, estimate, settings) {
-            return Progress::Over(TrialEnd::Fell(cause));
+            return TrialProgress::Over(TrialEnd::Fell(cause));
         }
         let time_s = self.time_s();
         if time_s < 0.0 {
-            return Progress::Countdown;
+            return TrialProgress::Countdown;
         }
         let feet_down = estimate.contact.iter().filter(|&&down| down).count();
         if feet_down == 0 {
@@ -148,11 +148,11 @@ impl Jump {
         };
         let since_impulse_s = time_s - self.impulses_end_s();
         if since_impulse_s < 0.0 {
-            return Progress::Jump;
+            return TrialProgress::Jump;
         }
         let stayed = self.airborne == 0 && since_impulse_s > LATEST_TAKEOFF_S;
         if !self.flown && !stayed && since_impulse_s < settings.settle.cap_s {
-            return Progress::Jump;
+            return TrialProgress::Jump;
         }
         self.landed += 1;
         let quiet = feet_down == LEGS
@@ -160,11 +160,11 @@ impl Jump {
             && estimate.angular_velocity_body.norm() < settings.settle.rate_rad_s;
         self.quiet = if quiet { self.quiet + 1 } else { 0 };
         if self.quiet >= ticks(settings.settle.quiet_s) {
-            Progress::Over(TrialEnd::Settled)
+            TrialProgress::Over(TrialEnd::Settled)
         } else if since_impulse_s >= settings.settle.cap_s {
-            Progress::Over(TrialEnd::NotQuiet)
+            TrialProgress::Over(TrialEnd::NotQuiet)
         } else {
-            Progress::Settle
+            TrialProgress::Settle
         }
     }
 

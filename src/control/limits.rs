@@ -6,7 +6,7 @@ use crate::telemetry::Fault;
 
 /// Result of the gate.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Passed {
+pub struct GateOutput {
     /// Command to send.
     pub command: JointCommand,
     /// Bit `i` set: the command of joint `i` was changed.
@@ -36,13 +36,13 @@ impl CommandGate {
     ///    of the feed-forward torque.
     /// 5. If that feed-forward torque exceeds the joint's limit (an encoder that jumps), the limited torque is sent alone, without
     ///    the law: equal if the measured numbers are right, harmless if they are not.
-    pub fn pass(&mut self, wanted: &JointCommand, state: &RobotState, settings: &ControlSettings) -> Passed {
+    pub fn pass(&mut self, wanted: &JointCommand, state: &RobotState, settings: &ControlSettings) -> GateOutput {
         let damping = JointCommand::damping(settings.gate.damping_kd);
         if *wanted == damping {
             self.reset();
-            return Passed { command: damping, limited: 0, fault: None };
+            return GateOutput { command: damping, limited: 0, fault: None };
         }
-        let mut passed = Passed { command: *wanted, limited: 0, fault: None };
+        let mut passed = GateOutput { command: *wanted, limited: 0, fault: None };
         let mut torques = Joints::default();
         for joint in 0..JOINTS {
             let motor = &mut passed.command.motor[joint];
@@ -50,7 +50,7 @@ impl CommandGate {
             if !finite.iter().all(|value| value.is_finite()) {
                 self.reset();
                 let fault = Some(Fault::NotFinite { what: "a motor command" });
-                return Passed { command: damping, limited: u16::MAX >> (16 - JOINTS), fault };
+                return GateOutput { command: damping, limited: u16::MAX >> (16 - JOINTS), fault };
             }
             let before = *motor;
             motor.position = motor.position.clamp(settings.min_position[joint], settings.max_position[joint]);
@@ -61,7 +61,7 @@ impl CommandGate {
             if !feedback.is_finite() {
                 self.reset();
                 let fault = Some(Fault::NotFinite { what: "a joint's angle or velocity" });
-                return Passed { command: damping, limited: u16::MAX >> (16 - JOINTS), fault };
+                return GateOutput { command: damping, limited: u16::MAX >> (16 - JOINTS), fault };
             }
             let mut torque = (motor.torque + feedback).clamp(-settings.max_torque[joint], settings.max_torque[joint]);
             if let Some(last) = self.last_torque {

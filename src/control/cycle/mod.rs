@@ -6,7 +6,7 @@ mod failsafes;
 
 use super::arming::{self, ArmingHistory};
 use super::failsafe::{self, Failsafe};
-use super::jump::{FallWatch, Jump, Progress};
+use super::jump::{FallWatch, Jump, TrialProgress};
 use super::leg::{self, LegTarget};
 use super::limits::CommandGate;
 use super::mode::{self, Trigger};
@@ -280,18 +280,20 @@ impl Cycle {
         if let Some(jump) = &mut self.jump {
             let progress = match jump.observe(&self.tick.state, &self.tick.estimate, &self.settings) {
                 // Landing on a fault: standing suffices, it need not become quiet.
-                Progress::Settle if self.landing.is_some() && jump.landed_s() >= self.settings.watchdog.land_s => {
-                    Progress::Over(TrialEnd::NotQuiet)
+                TrialProgress::Settle if self.landing.is_some() && jump.landed_s() >= self.settings.watchdog.land_s => {
+                    TrialProgress::Over(TrialEnd::NotQuiet)
                 }
                 progress => progress,
             };
             match (self.mode, progress) {
-                (Mode::Countdown, Progress::Jump | Progress::Settle) => {
+                (Mode::Countdown, TrialProgress::Jump | TrialProgress::Settle) => {
                     self.request(Trigger::CountdownOver, TransitionCause::Course);
                 }
-                (Mode::Jump, Progress::Settle) => self.request(Trigger::Landed, TransitionCause::Course),
-                (_, Progress::Over(TrialEnd::Fell(cause))) => self.request(Trigger::Fell, TransitionCause::Fell(cause)),
-                (_, Progress::Over(end)) => {
+                (Mode::Jump, TrialProgress::Settle) => self.request(Trigger::Landed, TransitionCause::Course),
+                (_, TrialProgress::Over(TrialEnd::Fell(cause))) => {
+                    self.request(Trigger::Fell, TransitionCause::Fell(cause))
+                }
+                (_, TrialProgress::Over(end)) => {
                     // A jump may end without SETTLE.
                     if self.mode == Mode::Jump {
                         self.request(Trigger::Landed, TransitionCause::Course);

@@ -36,7 +36,7 @@ const fn foot(leg: usize) -> usize {
 
 /// Motion of one foot from joint angles and orientation, relative to the inertial unit, world axes.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FootMotion {
+pub struct FootOdometry {
     /// From the inertial unit to the foot's centre, m.
     pub offset_world: Vector3<f64>,
     /// Velocity of the foot's centre relative to the inertial unit, m/s.
@@ -106,7 +106,7 @@ impl Filter {
         &mut self,
         accel_body: &Vector3<f64>,
         world_from_body: &Matrix3<f64>,
-        feet: &PerLeg<FootMotion>,
+        feet: &PerLeg<FootOdometry>,
         dt_s: f64,
         settings: &EstimatorSettings,
     ) {
@@ -169,7 +169,13 @@ impl Filter {
 
     /// Corrects the state with the feet that are down. A foot that does not move as a standing foot slips: it is rejected, and gets a
     /// new position when it stops.
-    pub fn correct(&mut self, feet: &PerLeg<FootMotion>, down: &PerLeg<bool>, dt_s: f64, settings: &EstimatorSettings) {
+    pub fn correct(
+        &mut self,
+        feet: &PerLeg<FootOdometry>,
+        down: &PerLeg<bool>,
+        dt_s: f64,
+        settings: &EstimatorSettings,
+    ) {
         let stands = self.correct_velocity(feet, down, settings);
         let (mut disagreed, mut disagreement) = (0, Vector3::zeros());
         for (leg, motion) in feet.iter().enumerate() {
@@ -205,7 +211,7 @@ impl Filter {
     }
 
     /// Velocity residual of a standing foot: e_v = (rolling) - (velocity relative to the unit) - v, m/s.
-    fn velocity_residual(&self, motion: &FootMotion) -> Vector3<f64> {
+    fn velocity_residual(&self, motion: &FootOdometry) -> Vector3<f64> {
         motion.rolling_world - motion.velocity_world - self.vector(VELOCITY)
     }
 
@@ -215,7 +221,7 @@ impl Filter {
     /// 1 / noise^2.
     fn correct_velocity(
         &mut self,
-        feet: &PerLeg<FootMotion>,
+        feet: &PerLeg<FootOdometry>,
         down: &PerLeg<bool>,
         settings: &EstimatorSettings,
     ) -> PerLeg<bool> {
@@ -243,7 +249,7 @@ impl Filter {
     }
 
     /// Corrects with e_p: the foot is at its touchdown position. Returns false for a rejected residual.
-    fn correct_position(&mut self, leg: usize, motion: &FootMotion, settings: &EstimatorSettings) -> bool {
+    fn correct_position(&mut self, leg: usize, motion: &FootOdometry, settings: &EstimatorSettings) -> bool {
         let residual = motion.offset_world - (self.vector(foot(leg)) - self.vector(POSITION));
         let with_state = self.covariance.columns(foot(leg)) - self.covariance.columns(POSITION);
         let variance = with_state.fixed_rows::<3>(foot(leg)) - with_state.fixed_rows::<3>(POSITION);
@@ -265,7 +271,7 @@ impl Filter {
     }
 
     /// Sets the foot's position: p_i = p + offset, with the error of the kinematics.
-    fn anchor(&mut self, leg: usize, motion: &FootMotion, settings: &EstimatorSettings) {
+    fn anchor(&mut self, leg: usize, motion: &FootOdometry, settings: &EstimatorSettings) {
         let place = self.vector(POSITION) + motion.offset_world;
         self.state.fixed_rows_mut::<3>(foot(leg)).copy_from(&place);
         let mut with_state = self.covariance.columns(POSITION);

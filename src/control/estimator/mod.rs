@@ -13,7 +13,7 @@ mod filter;
 use nalgebra::Vector3;
 
 pub use contact::ContactGate;
-pub use filter::{Filter, FootMotion};
+pub use filter::{Filter, FootOdometry};
 
 use super::limits;
 use super::settings::{ControlSettings, ObjectiveSource};
@@ -141,7 +141,7 @@ impl Estimator {
 }
 
 /// Motion of each foot relative to the inertial unit, and of a rolling foot over the ground.
-fn foot_motions(state: &RobotState, feet: &PerLeg<FootPosition>, settings: &ControlSettings) -> PerLeg<FootMotion> {
+fn foot_motions(state: &RobotState, feet: &PerLeg<FootPosition>, settings: &ControlSettings) -> PerLeg<FootOdometry> {
     let rotation = state.imu.orientation_world;
     let gyro_body = state.imu.gyro_body;
     std::array::from_fn(|leg| {
@@ -152,7 +152,7 @@ fn foot_motions(state: &RobotState, feet: &PerLeg<FootPosition>, settings: &Cont
         let (s1, c1) = q.x.sin_cos();
         let swing = dq.y + dq.z;
         let calf_rate_world = rotation * (gyro_body + Vector3::new(dq.x, c1 * swing, s1 * swing));
-        FootMotion {
+        FootOdometry {
             offset_world: rotation * offset_body,
             velocity_world: rotation * velocity_body,
             // A ball on level ground: omega x r, r from the point of contact up to the centre.
