@@ -1,17 +1,16 @@
-//! Where the screen's news comes from: a running engine or a recording. Both give the same messages.
+//! Source of the screen's messages: a running engine or a recording. Both send the same messages.
 
 pub mod replay;
 
 use quadfrog::engine::Handle;
 use quadfrog::realtime::channel::{Heartbeat, StopLatch};
 use quadfrog::recording::player::Player;
-use quadfrog::recording::record::Stamped;
 use quadfrog::session::intent::Intent;
 
-use crate::update::{Msg, ReplayCommand};
-use replay::Replay;
+use crate::message::{Msg, ReplayCommand};
+use replay::ReplayFeed;
 
-/// Messages taken at once; more wait for the next time, so that keys are never kept waiting.
+/// Messages taken at once; the rest waits for the next call, so that keys are handled in between.
 const BATCH: usize = 4096;
 
 /// A running engine or a recording.
@@ -19,7 +18,7 @@ pub enum Feed {
     /// A running engine.
     Live(Box<Handle>),
     /// A recording; nothing can be sent to it.
-    Replay(Box<Replay>),
+    Replay(Box<ReplayFeed>),
 }
 
 impl Feed {
@@ -30,10 +29,10 @@ impl Feed {
 
     /// The feed of a recording; it plays from the start.
     pub fn replay(player: Player) -> Feed {
-        Feed::Replay(Box::new(Replay::new(player)))
+        Feed::Replay(Box::new(ReplayFeed::new(player)))
     }
 
-    /// The screen is alive.
+    /// Sends a heartbeat.
     pub fn beat(&self) {
         if let Feed::Live(handle) = self {
             handle.beat();
@@ -55,7 +54,7 @@ impl Feed {
         }
     }
 
-    /// The sign of life itself, for the time when the session is being ended; none in a replay.
+    /// The heartbeat's sender, for the time when the session is being ended; none in a replay.
     pub fn heartbeat(&self) -> Option<Heartbeat> {
         match self {
             Feed::Live(handle) => Some(handle.heartbeat()),
@@ -63,21 +62,21 @@ impl Feed {
         }
     }
 
-    /// Asks the session; a recording is not asked.
-    pub fn wish(&self, intent: Intent) {
+    /// Sends a request to the session; none in a replay.
+    pub fn request(&self, intent: Intent) {
         if let Feed::Live(handle) = self {
             handle.wish(intent);
         }
     }
 
-    /// Moves the replay; a live session does not move.
+    /// Controls the replay; nothing in a live session.
     pub fn command(&mut self, command: ReplayCommand) {
         if let Feed::Replay(replay) = self {
             replay.command(command);
         }
     }
 
-    /// What is new since the last call, `elapsed_ns` later, oldest first.
+    /// Returns the messages since the last call, `elapsed_ns` ago, oldest first.
     pub fn take(&mut self, elapsed_ns: u64) -> Vec<Msg> {
         let mut news = Vec::new();
         match self {
@@ -95,11 +94,10 @@ impl Feed {
         news
     }
 
-    /// Ends the session and returns its last records: the robot sits down, the files are closed.
-    pub fn shutdown(self) -> Vec<Stamped> {
-        match self {
-            Feed::Live(handle) => handle.shutdown(),
-            Feed::Replay(_) => Vec::new(),
+    /// Ends the session: the robot sits down, the files are closed.
+    pub fn shutdown(self) {
+        if let Feed::Live(handle) = self {
+            handle.shutdown();
         }
     }
 }

@@ -10,8 +10,9 @@ use quadfrog::realtime::command::Task;
 use quadfrog::session::approval::Approval;
 use quadfrog_console::app::{self, ConsoleOptions, Ended};
 use quadfrog_console::feed::Feed;
-use quadfrog_console::settings::{ColourChoice, Settings};
+use quadfrog_console::settings::ConsoleSettings;
 use quadfrog_console::terminal;
+use quadfrog_console::theme::ColourChoice;
 
 use super::chosen::{Chosen, continued};
 use super::{Failure, StudyArguments, TaskName};
@@ -182,7 +183,7 @@ fn left_behind(folder: &Path) -> Vec<PathBuf> {
 
 /// The console's options from the arguments and `console.toml`.
 pub fn options(screen: &ScreenArguments, config: &quadfrog::config::Config) -> Result<ConsoleOptions, Failure> {
-    let settings = Settings::from_table(&config.console)
+    let settings = ConsoleSettings::from_table(&config.console)
         .map_err(|error| config.refuse("console.toml", &error.key, &error.value, &error.reason))?;
     let colours = match screen.color {
         Colour::Auto => None,

@@ -6,8 +6,7 @@ use quadfrog::realtime::telemetry::{Counters, Snapshot};
 use quadfrog::recording::player::{Played, Player};
 use quadfrog::recording::record::{Record, Stamped};
 
-use crate::model::ReplayStatus;
-use crate::update::{Msg, ReplayCommand};
+use crate::message::{Msg, ReplayCommand, ReplayStatus};
 
 /// One tick in so many reaches the charts: 200 a second, as live.
 const SHOWN_EVERY: u64 = quadfrog::realtime::channel::SHOWN_EVERY;
@@ -19,24 +18,24 @@ const PAST_NS: u64 = 8_000_000_000;
 const SPEEDS: [f64; 9] = [0.0625, 0.125, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0];
 
 /// A recording being played.
-pub struct Replay {
+pub struct ReplayFeed {
     player: Player,
     file: String,
     playing: bool,
     /// Index of the speed.
     speed: usize,
     time_ns: u64,
-    /// Read, but later than the present.
+    /// Read, later than the present.
     next: VecDeque<Played>,
     snapshot: Snapshot,
-    /// Messages that a jump has brought, not yet taken.
+    /// Messages of a jump, not yet taken.
     jumped: Vec<Msg>,
 }
 
-impl Replay {
-    /// From the start, playing.
-    pub fn new(player: Player) -> Replay {
-        let mut replay = Replay {
+impl ReplayFeed {
+    /// A replay that plays from the start.
+    pub fn new(player: Player) -> ReplayFeed {
+        let mut replay = ReplayFeed {
             file: player.session().recording.clone(),
             player,
             playing: true,
@@ -50,7 +49,7 @@ impl Replay {
         replay
     }
 
-    /// Moves as the operator wants.
+    /// Carries out a command.
     pub fn command(&mut self, command: ReplayCommand) {
         match command {
             ReplayCommand::PlayPause => {
@@ -78,7 +77,7 @@ impl Replay {
                 self.jump(next.unwrap_or(self.player.duration_ns()));
             }
             ReplayCommand::PreviousMarker => {
-                // While it plays, the marker just passed is not the one that is meant.
+                // While it plays, the marker just passed is skipped.
                 let before = self.time_ns.saturating_sub(if self.playing { 1_000_000_000 } else { 0 });
                 let markers = self.player.markers().iter().rev();
                 let previous = markers.map(|marker| marker.time_ns).find(|time| *time < before);
@@ -87,7 +86,7 @@ impl Replay {
         }
     }
 
-    /// What `elapsed_ns` of the operator's time brings.
+    /// Appends the messages of `elapsed_ns` of the operator's time.
     pub fn take(&mut self, elapsed_ns: u64, news: &mut Vec<Msg>) {
         news.append(&mut self.jumped);
         if self.playing {
@@ -139,7 +138,7 @@ impl Replay {
         }
     }
 
-    /// Goes to a time: the state of the session then, and the seconds before it for the charts.
+    /// Jumps to a time: the state of the session then, and the seconds before it for the charts.
     fn jump(&mut self, time_ns: u64) {
         let time_ns = time_ns.min(self.player.duration_ns());
         let from_ns = time_ns.saturating_sub(PAST_NS);
@@ -153,7 +152,7 @@ impl Replay {
         self.jumped = news;
     }
 
-    /// All events before a time: what the model holds of the session is their fold.
+    /// All events before a time: the model's session is their fold.
     fn log_until(&self, time_ns: u64) -> impl Iterator<Item = Stamped> + '_ {
         self.player.events().iter().take_while(move |event| event.time_ns < time_ns).cloned()
     }
