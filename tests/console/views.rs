@@ -11,6 +11,7 @@ use quadfrog_console::feed::Feed;
 use quadfrog_console::message::{Effect, Mouse, Msg};
 use quadfrog_console::model::View;
 use quadfrog_console::model::dialog::Dialog;
+use quadfrog_console::model::session::SessionModel;
 use quadfrog_console::settings::{BellCause, ConsoleSettings, DEFAULT};
 use quadfrog_console::text;
 use quadfrog_console::theme::{Colours, Glyphs, Theme};
@@ -362,6 +363,13 @@ fn a_row_is_copied_and_the_table_is_written_as_shown() {
     assert!(lines.iter().all(|line| columns(line) == columns(lines[0])), "{csv}");
     let markdown = text::as_markdown(&console.model);
     assert!(markdown.starts_with("| trial | f0 |") && markdown.lines().nth(1).is_some_and(|l| l.contains(" --- |")));
+}
+
+#[test]
+fn a_rewound_replay_starts_from_an_empty_session() {
+    let mut console = Console::review(Mode::Damped, Verdict::Fall);
+    console.tell(Msg::Rewound);
+    assert_eq!(format!("{:?}", console.model.session), format!("{:?}", SessionModel::default()));
 }
 
 #[test]

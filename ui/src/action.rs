@@ -150,7 +150,7 @@ pub static ACTIONS: [ActionInfo; 68] = {
 
         row(A::Approve, "approve", &["g"], G::Proposal, "approve the jump; again after 0.8 s: countdown and jump"),
         row(A::Override, "override", &["o"], G::Proposal, "change parameters and gains of the proposal"),
-        row(A::ClearOverrides, "clear-overrides", &["O"], G::Proposal, "back to what was proposed"),
+        row(A::ClearOverrides, "clear-overrides", &["O"], G::Proposal, "back to the proposed values"),
         row(A::Fix, "fix", &["X"], G::Proposal, "Override: fix the parameter for the next trials, or search it again"),
         row(A::Bounds, "bounds", &["B"], G::Proposal, "Override: search the parameter within other bounds"),
         row(A::QueuePoint, "queue-point", &["Q"], G::Proposal, "queue this point; it comes before the sampler's"),
@@ -172,7 +172,7 @@ pub static ACTIONS: [ActionInfo; 68] = {
         row(A::OptimizerView, "view-optimizer", &["3"], G::Views, "Optimizer: history, scatter, landings"),
         row(A::OverrideView, "view-override", &["4"], G::Views, "Override: the proposal and its bounds"),
         row(A::HealthView, "view-health", &["5"], G::Views, "Health: loop, link, motors, battery"),
-        row(A::LogView, "view-log", &["6"], G::Views, "Log: what happened"),
+        row(A::LogView, "view-log", &["6"], G::Views, "Log: events and requests"),
         row(A::NextView, "next-view", &["Tab"], G::Views, "next view"),
         row(A::PreviousView, "previous-view", &["Shift-Tab"], G::Views, "previous view"),
         row(A::Up, "up", &["Up"], G::Views, "move up"),

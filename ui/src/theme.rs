@@ -80,7 +80,7 @@ pub enum Role {
     Bad,
     /// STOP and the modes DAMPED and FAULT.
     Alarm,
-    /// The chosen row or tab.
+    /// The selected row or tab.
     Selected,
     /// The robot is hardware.
     Hardware,

@@ -8,7 +8,7 @@ use quadfrog::recording::record::{Record, Stamped};
 
 use crate::message::{Msg, ReplayCommand, ReplayStatus};
 
-/// One tick in so many reaches the charts: 200 a second, as live.
+/// Ticks per sample of the charts: 200 samples a second, as live.
 const SHOWN_EVERY: u64 = quadfrog::realtime::channel::SHOWN_EVERY;
 /// Ticks are 1 ms apart; a step moves by one tick of the charts.
 const STEP_NS: u64 = SHOWN_EVERY * 1_000_000;

@@ -20,7 +20,7 @@ pub struct Comparison {
 }
 
 impl Comparison {
-    /// The traces of two trials; none where one of them was not seen.
+    /// The traces of two trials; none where one of them has no recorded signals.
     pub fn new(history: &SignalHistory, a: u32, b: u32) -> Option<Comparison> {
         let (trace_a, trace_b) = (history.trace(a)?, history.trace(b)?.to_vec());
         let start_ns = impulse_start_ns(trace_a.last()?);

@@ -22,7 +22,7 @@ use crate::model::Model;
 use crate::model::dialog::Dialog;
 use crate::model::session::SessionModel;
 use answer::{interrupt, request, stop};
-use dialog::Outcome;
+use dialog::KeyOutcome;
 use perform::perform;
 
 pub use answer::say;
@@ -76,8 +76,8 @@ fn press(model: &mut Model, key: Key) -> Vec<Effect> {
     }
     if let Some(dialog) = model.dialog.take() {
         return match dialog::key(model, dialog, key) {
-            Outcome::Effects(effects) => effects,
-            Outcome::Perform(action) => perform(model, action),
+            KeyOutcome::Effects(effects) => effects,
+            KeyOutcome::Perform(action) => perform(model, action),
         };
     }
     match action {

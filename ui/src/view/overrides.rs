@@ -119,7 +119,7 @@ fn actions(model: &Model, width: usize) -> Vec<Line<'static>> {
     };
     let offered = [
         (Action::Override, "change values and gains: typed, or in steps of 1 % and 10 %".to_owned()),
-        (Action::ClearOverrides, "back to what was proposed".to_owned()),
+        (Action::ClearOverrides, "back to the proposed values".to_owned()),
         (Action::Fix, fix),
         (Action::Bounds, format!("search {name} within other bounds")),
         (Action::QueuePoint, "queue this point; it comes before the sampler's".to_owned()),

@@ -42,7 +42,7 @@ pub fn lines(
     // Half of a narrow terminal has room for the found value alone.
     let name_width = if width < 60 { 1 } else { 27 };
     let line = |item: &PreArmCheck| {
-        let (word, role) = label(item.state);
+        let (state, role) = label(item.state);
         let selected = selected.is_some_and(|check| check.check() == item.check);
         let name = item.check.name();
         let gap = name_width.max(name.chars().count() + 1) - name.chars().count();
@@ -55,7 +55,7 @@ pub fn lines(
         let text = cut(&text, width.saturating_sub(6 + name.chars().count() + gap));
         Line::from(vec![
             Span::raw(if selected { ">" } else { " " }),
-            span(theme, role, format!("{word:<5}")),
+            span(theme, role, format!("{state:<5}")),
             span(theme, if selected { Role::Selected } else { Role::Text }, name),
             Span::raw(" ".repeat(gap)),
             span(theme, Role::Quiet, text),

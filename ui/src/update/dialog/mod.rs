@@ -11,8 +11,8 @@ use crate::message::Effect;
 use crate::model::Model;
 use crate::model::dialog::Dialog;
 
-/// Outcome of a key in a dialog.
-pub(super) enum Outcome {
+/// KeyOutcome of a key in a dialog.
+pub(super) enum KeyOutcome {
     /// Effects of the dialog itself.
     Effects(Vec<Effect>),
     /// An action to perform, as if its key had been pressed without the dialog.
@@ -20,7 +20,7 @@ pub(super) enum Outcome {
 }
 
 /// One key while `dialog`, which was taken out of the model, is open. STOP and Ctrl-C were handled before.
-pub(super) fn key(model: &mut Model, dialog: Dialog, key: Key) -> Outcome {
+pub(super) fn key(model: &mut Model, dialog: Dialog, key: Key) -> KeyOutcome {
     let action = match &dialog {
         Dialog::PreArm { .. } => confirm::action_over_checks(model, key),
         Dialog::Palette { input, selected } => lists::chosen_action(model, key, input.value(), *selected),
@@ -28,9 +28,9 @@ pub(super) fn key(model: &mut Model, dialog: Dialog, key: Key) -> Outcome {
         _ => None,
     };
     if let Some(action) = action {
-        return Outcome::Perform(action);
+        return KeyOutcome::Perform(action);
     }
-    Outcome::Effects(match dialog {
+    KeyOutcome::Effects(match dialog {
         Dialog::Approve { trial, revision, pressed_at } => {
             confirm::approve_key(model, key, (trial, revision, pressed_at))
         }
