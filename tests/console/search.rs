@@ -129,7 +129,7 @@ fn bounds_are_checked_and_each_refusal_is_explained() {
     let mut console = overriding();
     console.record(Record::Search(search((50.0, 120.0), None)));
     let screen = console.screen(80, 24);
-    assert!(line_with(&screen, "Fx  ").contains("initial bounds 0.000..150.0"), "{screen}");
+    assert!(line_with(&screen, "Fx  ").contains("initial 0.000..150.0"), "{screen}");
 }
 
 #[test]
@@ -192,14 +192,14 @@ fn densities_say_why_a_point_was_proposed_without_colours_too() {
         console.record(Record::Insight(insight()));
         console.press(&["3"]);
         let screen = console.screen(columns, rows);
-        let why = line_with(&screen, "TPE f0");
+        let why = line_with(&screen, "TPE ");
         assert_eq!(why.contains("(#12)"), columns > 80, "{why}");
         assert!(why.contains("importance 62 %"), "{why}");
-        assert!(line_with(&screen, "TPE Fx").contains("TPE Fz"));
+        assert!(why.contains("Fx") && why.contains("Fz"), "{why}");
         // Peak and proposal of l are at a quarter of the panel, g's peak at three quarters.
-        let width = why.find("TPE Fx").map(|_| usize::from(columns) / 3).expect("three panels");
+        let width = why.find("Fx").map(|_| usize::from(columns) / 3).expect("three panels");
         let letter = |letter: &str| {
-            let at = screen.lines().skip_while(|line| !line.contains("TPE f0")).skip(1);
+            let at = screen.lines().skip_while(|line| !line.contains("TPE ")).skip(1);
             at.filter_map(|line| line.chars().take(width).position(|c| c.to_string() == letter)).next()
         };
         let g = letter("g").expect("g");

@@ -99,7 +99,7 @@ fn search_state(model: &Model, info: &ParameterInfo) -> Option<Span<'static>> {
         }
         None if (searched.low, searched.high) != (info.low, info.high) => {
             let (low, high) = (number(info.low), number(info.high));
-            Some(span(theme, Role::Warning, format!(" initial bounds {low}..{high}")))
+            Some(span(theme, Role::Warning, format!(" initial {low}..{high}")))
         }
         None => None,
     }
@@ -117,13 +117,14 @@ fn actions(model: &Model, width: usize) -> Vec<Line<'static>> {
         (false, Some(value)) => format!("fix {name} at {} {unit} for the next trials", number(value)),
         (false, None) => format!("fix {name} for the next trials"),
     };
+    let help = |action: Action| action.info().help.to_owned();
     let offered = [
         (Action::Override, "change values and gains: typed, or in steps of 1 % and 10 %".to_owned()),
-        (Action::ClearOverrides, "back to the proposed values".to_owned()),
+        (Action::ClearOverrides, help(Action::ClearOverrides)),
         (Action::Fix, fix),
         (Action::Bounds, format!("search {name} within other bounds")),
-        (Action::QueuePoint, "queue this point; it comes before the sampler's".to_owned()),
-        (Action::Skip, "refuse the proposal and ask for another".to_owned()),
+        (Action::QueuePoint, help(Action::QueuePoint)),
+        (Action::Skip, help(Action::Skip)),
     ];
     let line = |(action, text): (Action, String)| {
         let key = model.keymap.key(action);
