@@ -1,4 +1,4 @@
-//! Compiles `proto/frog.proto`: the messages as Rust types, and their description for the reader of a recording.
+//! Compiles `proto/frog.proto` to Rust types and to the descriptor that a recording carries.
 
 use std::path::PathBuf;
 
@@ -9,7 +9,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let out = PathBuf::from(std::env::var("OUT_DIR")?);
     let mut descriptors = protox::compile(["frog.proto"], ["proto"])?;
     prost_build::Config::new().compile_fds(descriptors.clone())?;
-    // Every channel of a recording carries the description: without comments it is a third as long.
+    // Every channel of a recording carries the descriptor: without comments it has a third of the length.
     for file in &mut descriptors.file {
         file.source_code_info = None;
     }

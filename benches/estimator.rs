@@ -10,10 +10,10 @@ use estimation::{JumpError, World, jumps, percentile, settings};
 use quadfrog::control::estimator::Estimator;
 use quadfrog::control::leg::feet;
 use quadfrog::control::settings::ObjectiveSource;
-use quadfrog::realtime::command::Task;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::robot::{JointCommand, Placement, Robot};
 use quadfrog::sim::Simulator;
+use quadfrog::trial::Task;
 use std::hint::black_box;
 
 const JUMPS: u32 = 100;

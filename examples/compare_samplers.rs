@@ -36,14 +36,14 @@ fn hartmann(u: &[f64]) -> f64 {
     ((0..4).map(bump).sum::<f64>() - 1.1) / 0.839
 }
 
-/// A jump that goes farther the harder the push, until it falls: an edge across the space, along which the best lies.
+/// Values that rise with the push and drop to 0, a fall, beyond an edge; the best lies along the edge.
 fn edge(u: &[f64]) -> f64 {
     let push = 1.2 * u[0] + u[1] - 0.3 * u[3];
     let detour = (u[2] - 0.5) * (u[2] - 0.5) + 0.5 * (u[3] - 0.6) * (u[3] - 0.6);
     if push > 1.1 { 0.0 } else { 0.2 + 0.5 * push - 0.4 * detour }
 }
 
-/// A jump that is stood only within a pocket of the space, and grows towards one side of it.
+/// Values that are 0, a fall, outside a ball, and rise towards one side of the ball.
 fn pocket(u: &[f64]) -> f64 {
     let centre = [0.55, 0.4, 0.5, 0.6];
     let distance: f64 = u.iter().zip(centre).map(|(u, c)| (u - c) * (u - c)).sum();
@@ -75,7 +75,7 @@ fn run(sampler: SamplerConfig, function: Function, falls: bool) -> [f64; 3] {
         if fell {
             study.annotate(number, &[(VERDICT.into(), FALL.into())]).expect("running");
         }
-        study.tell(number, Outcome::Complete(value)).expect("told");
+        study.tell(number, Outcome::Complete(value)).expect("reported");
         best[1] = value.max(best[1]);
         if trial < 20 {
             best[0] = best[1];

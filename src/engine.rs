@@ -24,8 +24,6 @@ use crate::optimize::space::{Range, Space, SpaceError};
 use crate::optimize::study::{Storage, Study, StudyError, StudyOptions};
 use crate::realtime::channel::{Heartbeat, ScreenEnd, StopLatch, channels};
 use crate::realtime::clock::{Clock, MonotonicClock};
-use crate::realtime::command::Task;
-use crate::realtime::telemetry::{Mode, Snapshot, Tick};
 use crate::recording::RecordingError;
 use crate::recording::record::{Record, SessionInfo, Stamped};
 use crate::recording::recorder::{Recorder, RecorderStatus};
@@ -34,12 +32,13 @@ use crate::robot::description::RobotDescription;
 use crate::robot::go1::Go1;
 use crate::robot::go1::link::LinkError;
 use crate::robot::{Placement, Robot};
-use crate::session::approval::Approval;
-use crate::session::intent::{Intent, Wish};
-use crate::session::life::{BUDGET, Life, Plan};
-use crate::session::pre_arm::PreArmList;
-use crate::session::supervisor::{Outlets, Parts, Supervisor};
+use crate::session::arming_checklist::ArmingChecklist;
+use crate::session::experiment::{BUDGET, Experiment, ExperimentPlan};
+use crate::session::operator_request::{OperatorRequest, StampedRequest};
+use crate::session::supervisor::{RecordSinks, Supervisor, SupervisorParts};
 use crate::sim::{SimError, Simulator};
+use crate::telemetry::{Mode, Snapshot, Tick};
+use crate::trial::{Approval, Task};
 
 /// What an engine is started with.
 pub struct Options {
@@ -175,7 +174,7 @@ pub enum EngineError {
 ///
 /// # Errors
 /// When the study cannot be read, or is of another task.
-pub fn open_life(options: &Options, durability: Durability, recording: &str) -> Result<Life, EngineError> {
+pub fn open_life(options: &Options, durability: Durability, recording: &str) -> Result<Experiment, EngineError> {
     let parameters = options.config.parameters(options.task);
     let space = Space::new(parameters.iter().map(|p| (p.name.clone(), Range::linear(p.low, p.high))))?;
     let mut sampler = options.config.optimize.sampler.clone();
@@ -212,7 +211,7 @@ pub fn open_life(options: &Options, durability: Durability, recording: &str) -> 
     if worker == 0 && study.attributes().get(BUDGET) != Some(&json!(budget)) {
         study.annotate_study(&[(BUDGET.to_owned(), json!(budget))])?;
     }
-    let plan = Plan {
+    let plan = ExperimentPlan {
         task: options.task,
         control: *options.config.task(options.task),
         parameters,
@@ -226,7 +225,7 @@ pub fn open_life(options: &Options, durability: Durability, recording: &str) -> 
         worker,
         abandoned: Duration::from_secs_f64(options.config.optimize.workers.abandoned_s),
     };
-    Ok(Life::open(plan, study)?)
+    Ok(Experiment::open(plan, study)?)
 }
 
 /// The point that the configuration asks to begin with.
@@ -396,7 +395,7 @@ impl Engine {
         let (to_screen, screen_records) = channel();
         let (handed_in, handed) = channel();
         let recorder = Recorder::spawn(tick_end, recorder_records, writer, handed_in);
-        let outlets = Outlets { recorder: to_recorder, screen: to_screen };
+        let outlets = RecordSinks { recorder: to_recorder, screen: to_screen };
         let status = recorder.watch();
         let closing = Arc::new(AtomicBool::new(false));
 
@@ -422,8 +421,8 @@ impl Engine {
 
         let (intents_in, intents) = channel();
         let folder = recording.as_ref().and(options.folder.clone());
-        let pre_arm = PreArmList::new(&settings, fingerprint(&options.config), folder);
-        let parts = Parts { life, control: session_end, handed, outlets, recorder: status, pre_arm, info };
+        let pre_arm = ArmingChecklist::new(&settings, fingerprint(&options.config), folder);
+        let parts = SupervisorParts { life, control: session_end, handed, outlets, recorder: status, pre_arm, info };
         let simulated = options.backend == Backend::Simulator;
         let mut supervisor = Supervisor::new(parts, clock.now_ns()).approving(options.approve, simulated);
         if let Ok((favours, shortfalls)) = granted.recv() {
@@ -465,7 +464,7 @@ const LONGEST_STOP: Duration = Duration::from_secs(2);
 fn run_session(
     mut supervisor: Supervisor,
     mut guard: Option<Guard>,
-    intents: &Receiver<Wish>,
+    intents: &Receiver<StampedRequest>,
     clock: &MonotonicClock,
     sits_down: bool,
 ) -> (Supervisor, Option<Guard>) {
@@ -508,7 +507,7 @@ pub struct Handle {
     screen: ScreenEnd,
     recording: Option<PathBuf>,
     _prepared: Prepared,
-    intents: Option<Sender<Wish>>,
+    intents: Option<Sender<StampedRequest>>,
     clock: MonotonicClock,
     records: Receiver<Stamped>,
     closing: Arc<AtomicBool>,
@@ -549,10 +548,10 @@ impl Handle {
     }
 
     /// Wishes something. The answer comes as a `CommandRecord`.
-    pub fn wish(&self, intent: Intent) {
+    pub fn wish(&self, intent: OperatorRequest) {
         if let Some(intents) = &self.intents {
             // A session that has ended answers nothing; the screen sees that its records end.
-            let wish = Wish { intent, stops: self.screen.stop.count(), time_ns: self.clock.now_ns() };
+            let wish = StampedRequest { intent, stops: self.screen.stop.count(), time_ns: self.clock.now_ns() };
             let _ = intents.send(wish);
         }
     }

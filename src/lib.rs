@@ -58,12 +58,12 @@
 //!   continued by another session.
 //! * *A simulated robot is carried back to its mark before each trial*, as a person does it with a real one. A trial is
 //!   then a function of its parameters and seed alone: the console, `optimize` and a replay agree bit for bit.
-//! * *The control thread's body is [`control::body`]*, not the engine's: the engine paces it, a bench and the test with the
+//! * *The control thread's body is [`control::control_loop`]*, not the engine's: the engine paces it, a bench and the test with the
 //!   aborting allocator call the very same code.
-//! * *A tick on hardware is rehearsed* on a copy shortly before it comes ([`control::body::Body::rehearse`]), because fetching
+//! * *A tick on hardware is rehearsed* on a copy shortly before it comes ([`control::control_loop::ControlLoop::rehearse`]), because fetching
 //!   code and data into the processor's caches was a good part of the longest ticks.
 //! * *There is a second process where there is a robot* (`engine/guard.rs`): a program that is killed cannot damp it any more.
-//! * *The session may act by itself* (`--approve`, [`session::approval`]), through the same wishes as a person and refused
+//! * *The session may act by itself* (`--approve`, [`trial`]), through the same wishes as a person and refused
 //!   for the same reasons; a person's STOP, cancel or fault outranks it.
 //! * *The emulated Go1 is [`sim::emulator`]*: it speaks [`robot::go1::packet`] from the other side, so a study on it passes
 //!   through every line that a study on the robot passes through.
@@ -79,3 +79,5 @@ pub mod report;
 pub mod robot;
 pub mod session;
 pub mod sim;
+pub mod telemetry;
+pub mod trial;

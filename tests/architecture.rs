@@ -5,17 +5,34 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// A module and what of ours it may name.
-const MAY_USE: [(&str, &[&str]); 10] = [
+const MAY_USE: [(&str, &[&str]); 12] = [
     ("robot", &[]),
     ("optimize", &[]),
-    ("realtime", &["robot"]),
+    ("trial", &["robot"]),
+    ("telemetry", &["robot", "trial"]),
+    ("realtime", &["telemetry", "robot"]),
     ("sim", &["robot"]),
-    ("control", &["robot", "realtime"]),
-    ("recording", &["realtime", "robot"]),
-    ("report", &["recording", "optimize"]),
-    ("session", &["optimize", "recording", "control", "sim", "realtime", "robot"]),
-    ("config", &["optimize", "recording", "control", "sim", "realtime", "robot"]),
-    ("engine", &["config", "session", "report", "optimize", "recording", "control", "sim", "realtime", "robot"]),
+    ("control", &["robot", "trial", "telemetry", "realtime"]),
+    ("recording", &["telemetry", "trial", "robot"]),
+    ("report", &["recording", "optimize", "trial"]),
+    ("session", &["optimize", "recording", "control", "sim", "realtime", "telemetry", "trial", "robot"]),
+    ("config", &["optimize", "recording", "control", "sim", "realtime", "telemetry", "trial", "robot"]),
+    (
+        "engine",
+        &[
+            "config",
+            "session",
+            "report",
+            "optimize",
+            "recording",
+            "control",
+            "sim",
+            "realtime",
+            "telemetry",
+            "trial",
+            "robot",
+        ],
+    ),
 ];
 
 fn sources(folder: &Path) -> Vec<PathBuf> {

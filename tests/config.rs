@@ -4,8 +4,8 @@ use std::fs;
 use std::path::PathBuf;
 
 use quadfrog::config::{Backend, Config};
-use quadfrog::realtime::command::Task;
 use quadfrog::robot::description::RobotDescription;
+use quadfrog::trial::Task;
 
 /// A folder with one file, and the message that loading it gives.
 fn refused(name: &str, text: &str) -> String {

@@ -3,20 +3,20 @@
 use proptest::prelude::*;
 use quadfrog::config::{Backend, Config};
 use quadfrog::control::cycle::{Cycle, Inputs};
-use quadfrog::control::limits::Gate;
-use quadfrog::control::settings::Settings;
+use quadfrog::control::limits::CommandGate;
+use quadfrog::control::settings::ControlSettings;
 use quadfrog::realtime::clock::SimulatedClock;
-use quadfrog::realtime::command::{Command, JumpParameters, Permit, Task, TrialSpec};
-use quadfrog::realtime::telemetry::{Event, Mode, Tick, TrialEnd};
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::robot::go1::convert::low_cmd;
 use quadfrog::robot::go1::packet::CrcForm;
 use quadfrog::robot::{JOINTS, JointCommand, MotorCommand, Placement, Robot, RobotError, RobotState};
 use quadfrog::sim::Simulator;
+use quadfrog::telemetry::{Command, Event, Mode, Permit, Tick, TrialEnd, TrialSpec};
+use quadfrog::trial::{JumpParameters, Task};
 
 struct Bench {
     config: Config,
-    settings: Settings,
+    settings: ControlSettings,
     cycle: Cycle,
     robot: Simulator,
     time_ms: u64,
@@ -117,7 +117,7 @@ impl Bench {
     }
 }
 
-fn is_damping(command: &JointCommand, settings: &Settings) -> bool {
+fn is_damping(command: &JointCommand, settings: &ControlSettings) -> bool {
     command.motor.iter().all(|motor| motor.kp == 0.0 && motor.velocity == 0.0 && motor.kd == settings.gate.damping_kd)
 }
 
@@ -334,7 +334,7 @@ proptest! {
         torque in -500.0..500.0_f64, before in -20.0..20.0_f64
     ) {
         let Bench { settings, .. } = Bench::new();
-        let mut gate = Gate::default();
+        let mut gate = CommandGate::default();
         let state = RobotState { joint_velocity: [speed; JOINTS], ..RobotState::default() };
         gate.pass(&JointCommand::torques(&[before; JOINTS]), &RobotState::default(), &settings);
         let wanted = JointCommand { motor: [MotorCommand { position, velocity: 0.0, kp, kd, torque }; JOINTS] };

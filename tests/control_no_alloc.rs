@@ -12,16 +12,16 @@ use std::collections::BTreeSet;
 
 use no_alloc::without_allocation;
 use quadfrog::config::{Backend, Config};
-use quadfrog::control::body::Body;
-use quadfrog::control::settings::Settings;
+use quadfrog::control::control_loop::ControlLoop;
+use quadfrog::control::settings::ControlSettings;
 use quadfrog::realtime::channel::{ControlEnd, ScreenEnd, SessionEnd, channels};
 use quadfrog::realtime::clock::MonotonicClock;
-use quadfrog::realtime::command::{Command, JumpParameters, Permit, Task};
-use quadfrog::realtime::telemetry::{Event, Mode, Tick};
 use quadfrog::realtime::thread::Instant;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::robot::{Battery, JointCommand, LinkStatus, Placement, Robot, RobotError, RobotState};
 use quadfrog::sim::Simulator;
+use quadfrog::telemetry::{Command, Event, Mode, Permit, Tick};
+use quadfrog::trial::{JumpParameters, Task};
 
 /// The simulator as itself, or as a robot over a link with a battery that nobody can put in place.
 struct Machine {
@@ -59,8 +59,8 @@ impl Robot for Machine {
 
 struct Bench {
     config: Config,
-    settings: Settings,
-    body: Body,
+    settings: ControlSettings,
+    body: ControlLoop,
     session: SessionEnd,
     screen: ScreenEnd,
     recorder: rtrb::Consumer<Tick>,
@@ -85,7 +85,7 @@ impl Bench {
         Bench {
             config,
             settings,
-            body: Body::new(&settings, control),
+            body: ControlLoop::new(&settings, control),
             session,
             screen,
             recorder,

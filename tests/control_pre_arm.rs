@@ -3,13 +3,12 @@
 use nalgebra::{UnitQuaternion, Vector3};
 use quadfrog::config::{Backend, Config};
 use quadfrog::control::cycle::{Cycle, Inputs};
-use quadfrog::control::settings::Settings;
+use quadfrog::control::settings::ControlSettings;
 use quadfrog::realtime::clock::SimulatedClock;
-use quadfrog::realtime::command::{Command, Permit, Task};
-use quadfrog::realtime::pre_arm::Check;
-use quadfrog::realtime::telemetry::{Event, Mode, Objection};
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::robot::{Battery, JointCommand, LinkStatus, Placement, Robot, RobotError, RobotState};
+use quadfrog::telemetry::{ArmingCheck, Command, CommandRefusal, Event, Mode, Permit};
+use quadfrog::trial::Task;
 
 /// A robot that reports what it is told to.
 struct Told {
@@ -38,7 +37,7 @@ impl Robot for Told {
 struct Bench {
     cycle: Cycle,
     robot: Told,
-    settings: Settings,
+    settings: ControlSettings,
     time_ns: u64,
     lateness_ns: u64,
     mode_changes: u64,
@@ -85,10 +84,10 @@ impl Bench {
     }
 
     /// Asks to stand up: the checks that were named, none if it stands up.
-    fn arm(&mut self) -> Vec<Check> {
+    fn arm(&mut self) -> Vec<ArmingCheck> {
         self.tick(Some(Command::Arm(Permit { mode_changes: self.mode_changes, given_ns: self.time_ns })));
         let refused = self.cycle.events().iter().find_map(|event| match event {
-            Event::Refused { because: Objection::Checks(checks), .. } => Some(checks),
+            Event::Refused { because: CommandRefusal::Checks(checks), .. } => Some(checks),
             _ => None,
         });
         assert_eq!(refused.is_none(), self.cycle.mode() == Mode::StandUp);
@@ -105,27 +104,27 @@ fn a_sound_robot_is_armed() {
 #[test]
 fn each_item_forbids_arming_by_itself() {
     type Breaks = fn(&mut Bench);
-    let table: [(Check, Breaks); 14] = [
-        (Check::StateFresh, |b| b.robot.state = Err(RobotError::Silent { age_ms: 12 })),
-        (Check::Loss, |b| b.robot.link.recent_lost = 60),
-        (Check::Checksums, |b| b.robot.link.recent_corrupt = 1),
-        (Check::Upright, |b| {
+    let table: [(ArmingCheck, Breaks); 14] = [
+        (ArmingCheck::StateFresh, |b| b.robot.state = Err(RobotError::Silent { age_ms: 12 })),
+        (ArmingCheck::Loss, |b| b.robot.link.recent_lost = 60),
+        (ArmingCheck::Checksums, |b| b.robot.link.recent_corrupt = 1),
+        (ArmingCheck::Upright, |b| {
             b.state().imu.orientation_world = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), 0.25);
         }),
-        (Check::JointsInside, |b| b.state().joint_position[2] = -2.83),
-        (Check::LyingDown, |b| b.state().joint_position[4] = 0.6),
-        (Check::Battery, |b| b.state().battery.as_mut().unwrap().charge_percent = 29.0),
-        (Check::Battery, |b| b.state().battery = None),
-        (Check::MotorsCool, |b| b.state().motor_temperature_c[11] = 61.0),
-        (Check::MotorsFollow, |b| b.state().motor_enabled[7] = false),
-        (Check::GyroStill, |b| b.state().imu.gyro_body.y = 0.2),
-        (Check::OnTime, |b| {
+        (ArmingCheck::JointsInside, |b| b.state().joint_position[2] = -2.83),
+        (ArmingCheck::LyingDown, |b| b.state().joint_position[4] = 0.6),
+        (ArmingCheck::Battery, |b| b.state().battery.as_mut().unwrap().charge_percent = 29.0),
+        (ArmingCheck::Battery, |b| b.state().battery = None),
+        (ArmingCheck::MotorsCool, |b| b.state().motor_temperature_c[11] = 61.0),
+        (ArmingCheck::MotorsFollow, |b| b.state().motor_enabled[7] = false),
+        (ArmingCheck::GyroStill, |b| b.state().imu.gyro_body.y = 0.2),
+        (ArmingCheck::OnTime, |b| {
             b.lateness_ns = 600_000;
             b.ticks(60);
             b.lateness_ns = 0;
         }),
-        (Check::MotorsCool, |b| b.state().motor_temperature_c[3] = f64::NAN),
-        (Check::Battery, |b| b.state().battery.as_mut().unwrap().charge_percent = f64::NAN),
+        (ArmingCheck::MotorsCool, |b| b.state().motor_temperature_c[3] = f64::NAN),
+        (ArmingCheck::Battery, |b| b.state().battery.as_mut().unwrap().charge_percent = f64::NAN),
     ];
     for (check, breaks) in table {
         let mut bench = Bench::new();
@@ -141,7 +140,7 @@ fn all_that_fails_is_named_at_once() {
     bench.robot.link.recent_corrupt = 3;
     bench.state().battery = None;
     bench.state().imu.gyro_body.z = 1.0;
-    assert_eq!(bench.arm(), [Check::Checksums, Check::Battery, Check::GyroStill]);
+    assert_eq!(bench.arm(), [ArmingCheck::Checksums, ArmingCheck::Battery, ArmingCheck::GyroStill]);
 }
 
 /// One still moment is not enough, and five seconds later the late ticks are forgotten.
@@ -154,9 +153,9 @@ fn stillness_must_last_and_lateness_is_forgotten() {
     bench.state().imu.gyro_body.z = 0.0;
     bench.lateness_ns = 0;
     bench.ticks(900);
-    assert_eq!(bench.arm(), [Check::GyroStill, Check::OnTime]);
+    assert_eq!(bench.arm(), [ArmingCheck::GyroStill, ArmingCheck::OnTime]);
     bench.ticks(200);
-    assert_eq!(bench.arm(), [Check::OnTime]);
+    assert_eq!(bench.arm(), [ArmingCheck::OnTime]);
     bench.ticks(5000);
     assert_eq!(bench.arm(), []);
 }
@@ -169,9 +168,9 @@ fn a_motor_out_of_servo_mode_is_named_before_anything_is_energised() {
     bench.state().motor_enabled[9] = false;
     bench.ticks(1);
     let findings = bench.cycle.readiness().findings;
-    let finding = findings.get(Check::MotorsFollow).unwrap();
+    let finding = findings.get(ArmingCheck::MotorsFollow).unwrap();
     assert_eq!((finding.measured, finding.joint), (2.0, Some(7)));
-    assert_eq!(bench.arm(), [Check::MotorsFollow]);
+    assert_eq!(bench.arm(), [ArmingCheck::MotorsFollow]);
 }
 
 /// An old state is not a still robot. (A defect once: the same state, read a thousand times, passed for a second of stillness.)
@@ -199,7 +198,7 @@ fn silence_is_not_stillness() {
         silent(&mut bench, 9);
     }
     bench.ticks(1);
-    assert_eq!(bench.arm(), [Check::GyroStill]);
+    assert_eq!(bench.arm(), [ArmingCheck::GyroStill]);
     bench.ticks(1000);
     assert_eq!(bench.arm(), []);
     // What was seen before a longer silence is forgotten, and so is what was seen before a restart.
@@ -208,12 +207,12 @@ fn silence_is_not_stillness() {
     silent(&mut bench, 25);
     bench.ticks(10);
     bench.tick(Some(Command::Acknowledge { stops: 0 }));
-    assert_eq!(bench.arm(), [Check::GyroStill]);
+    assert_eq!(bench.arm(), [ArmingCheck::GyroStill]);
     let mut bench = Bench::new();
     bench.state().robot_time_ms = 0;
     bench.ticks(2);
     bench.tick(Some(Command::Acknowledge { stops: 0 }));
-    assert_eq!(bench.arm(), [Check::GyroStill]);
+    assert_eq!(bench.arm(), [ArmingCheck::GyroStill]);
     bench.ticks(1000);
     assert_eq!(bench.arm(), []);
 }

@@ -5,14 +5,14 @@ mod go1;
 
 use go1::{ANY_PORT, description, pair};
 use quadfrog::config::{Backend, Config};
-use quadfrog::control::body::Body;
+use quadfrog::control::control_loop::ControlLoop;
 use quadfrog::realtime::channel::channels;
 use quadfrog::realtime::clock::SimulatedClock;
-use quadfrog::realtime::command::{Command, JumpParameters, Permit, Task};
-use quadfrog::realtime::telemetry::{Event, Mode, Tick};
 use quadfrog::realtime::thread::Instant;
 use quadfrog::robot::{LinkStatus, Robot};
 use quadfrog::sim::emulator::{EmulatorStatus, Fault};
+use quadfrog::telemetry::{Command, Event, Mode, Permit, Tick};
+use quadfrog::trial::{JumpParameters, Task};
 
 /// Over the link to an emulated robot on a bad network: taken over, armed, one jump and its review, a STOP, a restart.
 fn session(rehearsals: bool) -> (Vec<Tick>, Vec<Event>, LinkStatus, EmulatorStatus) {
@@ -20,7 +20,7 @@ fn session(rehearsals: bool) -> (Vec<Tick>, Vec<Event>, LinkStatus, EmulatorStat
     let (mut emulator, mut robot) = pair(&config.simulator, 1);
     let settings = config.settings(&description(ANY_PORT), Task::Forward, Backend::Hardware).unwrap();
     let (control, mut session, screen, mut recorder) = channels();
-    let mut body = Body::new(&settings, control);
+    let mut body = ControlLoop::new(&settings, control);
     let jump = JumpParameters { f0_hz: 1.3, f1_hz: 0.0, fx_n: 60.0, fy_n: 0.0, fz_n: 270.0 };
     let spec = config.task(Task::Forward).trial(Task::Forward, jump);
     let (mut ticks, mut events, mut asked_in) = (Vec::new(), Vec::new(), None);

@@ -7,17 +7,20 @@ use nalgebra::{UnitQuaternion, Vector3};
 use proptest::prelude::*;
 use quadfrog::config::{Backend, Config};
 use quadfrog::control::cycle::{Cycle, Inputs};
-use quadfrog::control::settings::Settings;
+use quadfrog::control::settings::ControlSettings;
 use quadfrog::engine::{Options, open_life};
 use quadfrog::optimize::journal::Durability;
 use quadfrog::realtime::clock::SimulatedClock;
-use quadfrog::realtime::command::{Command, JumpParameters, Permit, Task, TrialSpec};
-use quadfrog::realtime::telemetry::{Cause, Event, FallCause, Fault, Hold, Mode, Objection, Tick, TrialEnd};
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::robot::{Battery, JOINTS, JointCommand, LEGS, LinkStatus, Placement, Robot, RobotError, RobotState};
 use quadfrog::session::automatic;
 use quadfrog::session::rollout::Rollout;
 use quadfrog::sim::Simulator;
+use quadfrog::telemetry::{
+    Command, CommandRefusal, Event, FallCause, Fault, Mode, Permit, Tick, TransitionCause, TrialEnd, TrialInhibit,
+    TrialSpec,
+};
+use quadfrog::trial::{JumpParameters, Task};
 
 /// The simulator, seen as a Go1 over a link, whose reports can be tampered with and whose commands are kept.
 struct Tampered {
@@ -56,7 +59,7 @@ impl Robot for Tampered {
 }
 
 struct Bench {
-    settings: Settings,
+    settings: ControlSettings,
     cycle: Cycle,
     robot: Tampered,
     inputs: Inputs,
@@ -188,12 +191,12 @@ impl Bench {
 
     fn fault(&self) -> Option<Fault> {
         self.events.iter().find_map(|event| match event {
-            Event::Mode { to: Mode::Fault, cause: Cause::Fault(fault), .. } => Some(*fault),
+            Event::Mode { to: Mode::Fault, cause: TransitionCause::Fault(fault), .. } => Some(*fault),
             _ => None,
         })
     }
 
-    fn refusal(&self) -> Option<Objection> {
+    fn refusal(&self) -> Option<CommandRefusal> {
         self.cycle.events().iter().find_map(|event| match event {
             Event::Refused { because, .. } => Some(because),
             _ => None,
@@ -266,7 +269,7 @@ fn a_gap_is_cut_at_its_limit_and_becomes_a_lost_link() {
             Event::Mode {
                 from: Mode::Fault,
                 to: Mode::Fault,
-                cause: Cause::Fault(Fault::LinkLost { age_ms: 201, .. }),
+                cause: TransitionCause::Fault(Fault::LinkLost { age_ms: 201, .. }),
                 ..
             }
         )
@@ -296,7 +299,7 @@ fn what_voids_the_word_is_told_behind_another_fault() {
         .events
         .iter()
         .filter_map(|event| match event {
-            Event::Mode { to: Mode::Fault, cause: Cause::Fault(fault), .. } => Some(*fault),
+            Event::Mode { to: Mode::Fault, cause: TransitionCause::Fault(fault), .. } => Some(*fault),
             _ => None,
         })
         .collect();
@@ -349,7 +352,7 @@ fn a_robot_that_tips_over_in_review_is_damped_at_the_limit_of_standing() {
                 Event::Mode {
                     from: Mode::Review,
                     to: Mode::Damped,
-                    cause: Cause::Fell(
+                    cause: TransitionCause::Fell(
                         FallCause::Roll { allowed_rad: 0.35, .. } | FallCause::Pitch { allowed_rad: 0.35, .. }
                     ),
                     ..
@@ -389,7 +392,7 @@ fn slow_periods_are_counted_and_cut() {
 fn lateness_trips_nothing_in_simulation_unless_asked() {
     for (late_ms, expected) in [(0.0, Mode::Ready), (10.0, Mode::Fault)] {
         let mut bench = Bench::in_mode(Mode::Ready);
-        let settings = Settings { late_ms, hardware: false, ..bench.settings };
+        let settings = ControlSettings { late_ms, hardware: false, ..bench.settings };
         bench.cycle = Cycle::ready(&settings);
         bench.tick(None);
         bench.inputs.lateness_ns = 500_000_000;
@@ -453,7 +456,7 @@ fn a_standing_fault_cannot_be_acknowledged() {
     bench.robot.tamper = |state| state.motor_temperature_c[0] = 85.0;
     bench.ticks(5);
     bench.tick(Some(Command::Acknowledge { stops: 0 }));
-    assert!(matches!(bench.refusal(), Some(Objection::Standing(Fault::MotorTemperature { joint: 0, .. }))));
+    assert!(matches!(bench.refusal(), Some(CommandRefusal::Standing(Fault::MotorTemperature { joint: 0, .. }))));
     assert_eq!(bench.cycle.mode(), Mode::Fault);
     bench.robot.tamper = |_| {};
     bench.ticks(1);
@@ -465,15 +468,15 @@ fn a_standing_fault_cannot_be_acknowledged() {
 #[test]
 fn what_holds_lets_the_trial_finish_and_refuses_the_next() {
     type Tamper = fn(&mut RobotState);
-    type IsIt = fn(Hold) -> bool;
+    type IsIt = fn(TrialInhibit) -> bool;
     let holds: [(Tamper, IsIt); 2] = [
         (
             |state| state.battery.as_mut().unwrap().charge_percent = 14.0,
-            |hold| matches!(hold, Hold::BatteryLow { measured_percent, .. } if measured_percent == 14.0),
+            |hold| matches!(hold, TrialInhibit::BatteryLow { measured_percent, .. } if measured_percent == 14.0),
         ),
         (
             |state| state.motor_temperature_c[6] = 72.0,
-            |hold| matches!(hold, Hold::MotorWarm { joint: 6, measured_c, .. } if measured_c == 72.0),
+            |hold| matches!(hold, TrialInhibit::MotorWarm { joint: 6, measured_c, .. } if measured_c == 72.0),
         ),
     ];
     for (tamper, is_it) in holds {
@@ -485,7 +488,11 @@ fn what_holds_lets_the_trial_finish_and_refuses_the_next() {
         bench.tick(Some(Command::EndReview));
         assert_eq!(bench.cycle.mode(), Mode::Ready);
         bench.tick(Some(bench.approved()));
-        assert!(matches!(bench.refusal(), Some(Objection::Hold(hold)) if is_it(hold)), "{:?}", bench.refusal());
+        assert!(
+            matches!(bench.refusal(), Some(CommandRefusal::Inhibited(hold)) if is_it(hold)),
+            "{:?}",
+            bench.refusal()
+        );
         assert_eq!(bench.cycle.mode(), Mode::Ready);
         assert!(bench.cycle.readiness().hold.is_some_and(is_it));
     }
@@ -561,7 +568,9 @@ fn an_idle_robot_sits_down() {
         assert_eq!(bench.cycle.mode(), mode);
         bench.ticks(20);
         assert_eq!(bench.cycle.mode(), Mode::SitDown);
-        assert!(bench.events.iter().any(|event| matches!(event, Event::Mode { cause: Cause::Idle { .. }, .. })));
+        assert!(
+            bench.events.iter().any(|event| matches!(event, Event::Mode { cause: TransitionCause::Idle { .. }, .. }))
+        );
     }
 }
 
@@ -574,12 +583,12 @@ fn an_approval_is_single_use_expires_and_dies_with_a_change_of_mode() {
     bench.tick(Some(Command::Cancel));
     assert_eq!(bench.cycle.mode(), Mode::Ready, "any key cancels the countdown");
     bench.tick(Some(approval));
-    assert_eq!((bench.cycle.mode(), bench.refusal()), (Mode::Ready, Some(Objection::Stale)), "used up");
+    assert_eq!((bench.cycle.mode(), bench.refusal()), (Mode::Ready, Some(CommandRefusal::Stale)), "used up");
 
     let approval = bench.approved();
     bench.ticks(30_001);
     bench.tick(Some(approval));
-    assert!(matches!(bench.refusal(), Some(Objection::Expired { .. })), "{:?}", bench.refusal());
+    assert!(matches!(bench.refusal(), Some(CommandRefusal::Expired { .. })), "{:?}", bench.refusal());
     assert_eq!(bench.cycle.mode(), Mode::Ready);
 
     let mut bench = Bench::in_mode(Mode::Ready);
@@ -590,7 +599,7 @@ fn an_approval_is_single_use_expires_and_dies_with_a_change_of_mode() {
     bench.tick(Some(bench.arm()));
     bench.until(Mode::Ready);
     bench.tick(Some(approval));
-    assert_eq!((bench.cycle.mode(), bench.refusal()), (Mode::Ready, Some(Objection::Stale)), "another standing");
+    assert_eq!((bench.cycle.mode(), bench.refusal()), (Mode::Ready, Some(CommandRefusal::Stale)), "another standing");
     bench.tick(Some(bench.approved()));
     assert_eq!(bench.cycle.mode(), Mode::Countdown);
 }
@@ -602,7 +611,7 @@ fn arming_expires_dies_with_a_change_of_mode_and_needs_somebody_who_watches() {
     let arm = bench.arm();
     bench.ticks(30_001);
     bench.tick(Some(arm));
-    assert!(matches!(bench.refusal(), Some(Objection::Expired { .. })), "{:?}", bench.refusal());
+    assert!(matches!(bench.refusal(), Some(CommandRefusal::Expired { .. })), "{:?}", bench.refusal());
 
     let arm = bench.arm();
     bench.tick(Some(bench.arm()));
@@ -611,12 +620,12 @@ fn arming_expires_dies_with_a_change_of_mode_and_needs_somebody_who_watches() {
     bench.until(Mode::Disarmed);
     bench.ticks(1500);
     bench.tick(Some(arm));
-    assert_eq!(bench.refusal(), Some(Objection::Stale), "of another time");
+    assert_eq!(bench.refusal(), Some(CommandRefusal::Stale), "of another time");
 
     for silent_ms in [1001, u32::MAX] {
         bench.inputs.operator_silent_ms = silent_ms;
         bench.tick(Some(bench.arm()));
-        assert_eq!(bench.refusal(), Some(Objection::OperatorSilent { silent_ms, allowed_ms: 1000 }));
+        assert_eq!(bench.refusal(), Some(CommandRefusal::OperatorSilent { silent_ms, allowed_ms: 1000 }));
         assert_eq!(bench.cycle.mode(), Mode::Disarmed);
     }
     bench.inputs.operator_silent_ms = 0;
@@ -633,7 +642,7 @@ fn control_is_not_taken_while_nobody_watches() {
     bench.inputs.operator_silent_ms = u32::MAX;
     bench.robot.sent.clear();
     bench.tick(Some(Command::TakeControl));
-    assert!(matches!(bench.refusal(), Some(Objection::OperatorSilent { .. })), "{:?}", bench.refusal());
+    assert!(matches!(bench.refusal(), Some(CommandRefusal::OperatorSilent { .. })), "{:?}", bench.refusal());
     assert_eq!((bench.cycle.mode(), bench.robot.sent.len()), (Mode::Observe, 0));
 }
 
@@ -648,7 +657,7 @@ fn a_session_that_ends_lands_sits_down_and_energises_nothing_any_more() {
         bench.ticks(1500);
         let (arm, approved) = (bench.arm(), bench.approved());
         bench.tick(Some(arm));
-        assert_eq!((bench.cycle.mode(), bench.refusal()), (Mode::Disarmed, Some(Objection::Leaving)), "{mode:?}");
+        assert_eq!((bench.cycle.mode(), bench.refusal()), (Mode::Disarmed, Some(CommandRefusal::Leaving)), "{mode:?}");
         bench.tick(Some(approved));
         assert_eq!(bench.cycle.mode(), Mode::Disarmed, "{mode:?}");
         let ends = bench.events.iter().filter_map(|event| match event {
@@ -682,7 +691,7 @@ fn after_a_fall_the_robot_stands_up_from_its_measured_pose_once_it_is_upright_ag
     bench.robot.tamper = |state| tilt(state, Vector3::x_axis(), 0.6);
     bench.ticks(1500);
     bench.tick(Some(bench.arm()));
-    assert!(matches!(bench.refusal(), Some(Objection::Checks(_))), "it lies on its side");
+    assert!(matches!(bench.refusal(), Some(CommandRefusal::Checks(_))), "it lies on its side");
     // The operator turns it over, folded again.
     bench.robot.tamper = |_| {};
     let lying_position = bench.settings.lying_position;

@@ -9,21 +9,20 @@ use quadfrog::config::{Backend, Config};
 use quadfrog::control::cycle::{Cycle, Inputs};
 use quadfrog::control::estimator::{ContactGate, Estimator, GRAVITY};
 use quadfrog::control::leg::{feet, stance_of};
-use quadfrog::control::settings::{ObjectiveSource, Settings};
+use quadfrog::control::settings::{ControlSettings, ObjectiveSource};
 use quadfrog::engine::{Options, open_life};
 use quadfrog::optimize::journal::Durability;
 use quadfrog::realtime::clock::SimulatedClock;
-use quadfrog::realtime::command::Task;
-use quadfrog::realtime::telemetry::Estimate;
-use quadfrog::recording::record::{TrialRecord, Verdict};
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::robot::{Joints, LEGS, Leg, Placement, Robot, RobotState};
 use quadfrog::session::rollout::Rollout;
 use quadfrog::session::{automatic, objective};
 use quadfrog::sim::Simulator;
+use quadfrog::telemetry::Estimate;
+use quadfrog::trial::{Task, TrialRecord, Verdict};
 
 /// Joint angles of a stance, feet at the task's nominal places.
-fn stance(settings: &Settings) -> Joints {
+fn stance(settings: &ControlSettings) -> Joints {
     let mut joints = Joints::default();
     for leg in Leg::ALL {
         let q = settings.geometry.inverse(&stance_of(&settings.stand.stance_leg, leg), leg.side()).unwrap();
@@ -34,7 +33,7 @@ fn stance(settings: &Settings) -> Joints {
 
 /// An estimator fed by hand: perfect sensors of a robot that stands still, to be changed at will.
 struct Feed {
-    settings: Settings,
+    settings: ControlSettings,
     estimator: Estimator,
     state: RobotState,
 }

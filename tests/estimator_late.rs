@@ -9,10 +9,10 @@ mod go1;
 use estimation::{JumpError, World, jumps_on, percentile};
 use go1::{Late, Lockstep};
 use quadfrog::control::settings::ObjectiveSource;
-use quadfrog::realtime::telemetry::TrialEnd;
 use quadfrog::robot::{JointCommand, LinkStatus, Placement, Robot, RobotError, RobotState};
 use quadfrog::sim::SimConfig;
 use quadfrog::sim::emulator::Fault;
+use quadfrog::telemetry::TrialEnd;
 
 /// A robot whose belly feels nothing, as a real one, and whose network becomes bad when it stands.
 struct Numb {

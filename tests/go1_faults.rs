@@ -10,14 +10,16 @@ use std::net::{SocketAddr, UdpSocket};
 use go1::{ANY_PORT, description};
 use quadfrog::config::{Backend, Config};
 use quadfrog::control::cycle::{Cycle, Inputs};
-use quadfrog::control::settings::Settings;
+use quadfrog::control::settings::ControlSettings;
 use quadfrog::realtime::clock::SimulatedClock;
-use quadfrog::realtime::command::{Command, JumpParameters, Permit, Task, TrialSpec};
-use quadfrog::realtime::telemetry::{Cause, Event, Fault, Mode, Objection, Tick, TrialEnd};
 use quadfrog::robot::go1::Go1;
 use quadfrog::robot::go1::packet::{CrcForm, LowCmd, LowState, MODE_SERVO, POSITION_STOP};
 use quadfrog::robot::{JOINTS, LEGS, LinkStatus, Robot};
 use quadfrog::sim::emulator::Emulator;
+use quadfrog::telemetry::{
+    Command, CommandRefusal, Event, Fault, Mode, Permit, Tick, TransitionCause, TrialEnd, TrialSpec,
+};
+use quadfrog::trial::{JumpParameters, Task};
 
 /// A cable with an ear.
 struct Tap {
@@ -70,7 +72,7 @@ impl Tap {
 
 struct Bench {
     config: Config,
-    settings: Settings,
+    settings: ControlSettings,
     cycle: Cycle,
     go1: Go1,
     emulator: Emulator,
@@ -233,7 +235,7 @@ struct Row {
     /// Whether the tick that was just done is the first that could know.
     bad: fn(&Bench, &Tick) -> bool,
     /// What the operator is told.
-    told: fn(&Cause) -> bool,
+    told: fn(&TransitionCause) -> bool,
 }
 
 const ENERGISED: &[Mode] =
@@ -257,70 +259,70 @@ const CUT: [Row; 16] = [
         modes: SENT_TO,
         injection: Thread(|bench| bench.inputs.stop = true),
         bad: |_, _| true,
-        told: |cause| matches!(cause, Cause::Stop),
+        told: |cause| matches!(cause, TransitionCause::Stop),
     },
     Row {
         name: "joint angle beyond its limit",
         modes: ENERGISED,
         injection: ToRobot("angle FL_hip 1.3"),
         bad: |_, tick| tick.state.joint_position[3] > 1.2,
-        told: |cause| matches!(cause, Cause::Fault(Fault::JointPosition { joint: 3, .. })),
+        told: |cause| matches!(cause, TransitionCause::Fault(Fault::JointPosition { joint: 3, .. })),
     },
     Row {
         name: "joint velocity beyond its limit",
         modes: ENERGISED,
         injection: ToRobot("speed RR_thigh 90"),
         bad: |_, tick| tick.state.joint_velocity[7] > 80.0,
-        told: |cause| matches!(cause, Cause::Fault(Fault::JointVelocity { joint: 7, .. })),
+        told: |cause| matches!(cause, TransitionCause::Fault(Fault::JointVelocity { joint: 7, .. })),
     },
     Row {
         name: "joint torque beyond its limit",
         modes: ENERGISED,
         injection: ToRobot("torque RR_calf 50"),
         bad: |_, tick| tick.state.joint_torque[8] > 45.0,
-        told: |cause| matches!(cause, Cause::Fault(Fault::JointTorque { joint: 8, .. })),
+        told: |cause| matches!(cause, TransitionCause::Fault(Fault::JointTorque { joint: 8, .. })),
     },
     Row {
         name: "a motor leaves servo mode",
         modes: ENERGISED,
         injection: ToRobot("servo-off RL_thigh"),
         bad: |_, tick| !tick.state.motor_enabled[10],
-        told: |cause| matches!(cause, Cause::Fault(Fault::MotorMode { joint: 10 })),
+        told: |cause| matches!(cause, TransitionCause::Fault(Fault::MotorMode { joint: 10 })),
     },
     Row {
         name: "motor at 80 C",
         modes: SENT_TO,
         injection: ToRobot("hot FR_calf 80"),
         bad: |_, tick| tick.state.motor_temperature_c[2] >= 80.0,
-        told: |cause| matches!(cause, Cause::Fault(Fault::MotorTemperature { joint: 2, .. })),
+        told: |cause| matches!(cause, TransitionCause::Fault(Fault::MotorTemperature { joint: 2, .. })),
     },
     Row {
         name: "a joint's angle is no number",
         modes: SENT_TO,
         injection: ToRobot("nan FL_calf"),
         bad: |_, tick| tick.state.joint_position[5].is_nan(),
-        told: |cause| matches!(cause, Cause::Fault(Fault::NotFinite { .. })),
+        told: |cause| matches!(cause, TransitionCause::Fault(Fault::NotFinite { .. })),
     },
     Row {
         name: "the orientation is no rotation",
         modes: SENT_TO,
         injection: Thread(|bench| bench.tap.no_rotation = true),
         bad: |_, tick| tick.state.imu.orientation_world.w.is_nan(),
-        told: |cause| matches!(cause, Cause::Fault(Fault::NotFinite { .. })),
+        told: |cause| matches!(cause, TransitionCause::Fault(Fault::NotFinite { .. })),
     },
     Row {
         name: "a burst of corrupt datagrams",
         modes: SENT_TO,
         injection: ToRobot("corrupt 100"),
         bad: |bench, _| bench.link().recent_corrupt > bench.settings.watchdog.corrupt,
-        told: |cause| matches!(cause, Cause::Fault(Fault::Corrupt { .. })),
+        told: |cause| matches!(cause, TransitionCause::Fault(Fault::Corrupt { .. })),
     },
     Row {
         name: "the robot restarts",
         modes: SENT_TO,
         injection: ToRobot("reboot"),
         bad: |bench, _| bench.link().reboots > 0,
-        told: |cause| matches!(cause, Cause::Fault(Fault::Reboot)),
+        told: |cause| matches!(cause, TransitionCause::Fault(Fault::Reboot)),
     },
     Row {
         name: "tilt of 0.4 rad while standing",
@@ -328,42 +330,42 @@ const CUT: [Row; 16] = [
         injection: ToRobot("tilt 0.4"),
         bad: |_, tick| tick.estimate.roll_pitch_yaw.x > 0.35,
         // In REVIEW it is a fall.
-        told: |cause| matches!(cause, Cause::Fault(Fault::Tilt { .. }) | Cause::Fell(_)),
+        told: |cause| matches!(cause, TransitionCause::Fault(Fault::Tilt { .. }) | TransitionCause::Fell(_)),
     },
     Row {
         name: "tilt of 1.1 rad anywhere",
         modes: ENERGISED,
         injection: ToRobot("tilt 1.1"),
         bad: |_, tick| tick.estimate.roll_pitch_yaw.x > 1.0,
-        told: |cause| matches!(cause, Cause::Fault(Fault::Tilt { .. }) | Cause::Fell(_)),
+        told: |cause| matches!(cause, TransitionCause::Fault(Fault::Tilt { .. }) | TransitionCause::Fell(_)),
     },
     Row {
         name: "no state for 20 ms: the robot stands still",
         modes: SENT_TO,
         injection: ToRobot("freeze"),
         bad: |bench, _| bench.cycle.state_age_ms() > bench.settings.watchdog.state_age_ms,
-        told: |cause| matches!(cause, Cause::Fault(Fault::StateAge { age_ms: 21, allowed_ms: 20 })),
+        told: |cause| matches!(cause, TransitionCause::Fault(Fault::StateAge { age_ms: 21, allowed_ms: 20 })),
     },
     Row {
         name: "no new state for 20 ms: the same one again",
         modes: SENT_TO,
         injection: ToRobot("repeat"),
         bad: |bench, _| bench.cycle.state_age_ms() > bench.settings.watchdog.state_age_ms,
-        told: |cause| matches!(cause, Cause::Fault(Fault::StateAge { age_ms: 21, allowed_ms: 20 })),
+        told: |cause| matches!(cause, TransitionCause::Fault(Fault::StateAge { age_ms: 21, allowed_ms: 20 })),
     },
     Row {
         name: "a tick more than 10 ms late",
         modes: SENT_TO,
         injection: Thread(|bench| bench.inputs.lateness_ns = 10_500_000),
         bad: |_, _| true,
-        told: |cause| matches!(cause, Cause::Fault(Fault::Late { .. })),
+        told: |cause| matches!(cause, TransitionCause::Fault(Fault::Late { .. })),
     },
     Row {
         name: "five periods of more than 2 ms",
         modes: SENT_TO,
         injection: Thread(|bench| bench.period_ns = 2_500_000),
         bad: |bench, tick| tick.number >= bench.injected_at + u64::from(bench.settings.watchdog.period_ticks),
-        told: |cause| matches!(cause, Cause::Fault(Fault::Slow { .. })),
+        told: |cause| matches!(cause, TransitionCause::Fault(Fault::Slow { .. })),
     },
 ];
 
@@ -420,7 +422,7 @@ fn a_tilt_in_flight_is_cut_before_it_lands() {
         modes: &[],
         injection: ToRobot("tilt 0.9"),
         bad: |_, tick| tick.estimate.roll_pitch_yaw.x > 0.8,
-        told: |cause| matches!(cause, Cause::Fell(_)),
+        told: |cause| matches!(cause, TransitionCause::Fell(_)),
     };
     let ticks = reaction(&mut bench, &row);
     println!("{:<45} in flight  {ticks} ticks after the first bad one", row.name);
@@ -437,7 +439,7 @@ fn a_silence_of_more_than_200_ms_is_a_lost_link() {
         bench.tick(None);
     }
     let faults = bench.events.iter().filter_map(|event| match event {
-        Event::Mode { cause: Cause::Fault(fault), .. } => Some(*fault),
+        Event::Mode { cause: TransitionCause::Fault(fault), .. } => Some(*fault),
         _ => None,
     });
     let causes: Vec<Fault> = faults.collect();
@@ -462,7 +464,7 @@ fn a_power_cycle_behind_another_fault_is_told() {
         bench.tick(None);
     }
     let faults = bench.events.iter().filter_map(|event| match event {
-        Event::Mode { to: Mode::Fault, cause: Cause::Fault(fault), .. } => Some(*fault),
+        Event::Mode { to: Mode::Fault, cause: TransitionCause::Fault(fault), .. } => Some(*fault),
         _ => None,
     });
     let told: Vec<Fault> = faults.collect();
@@ -502,8 +504,10 @@ fn a_low_battery_and_a_warm_motor_let_the_trial_finish_and_refuse_the_next() {
         let approval = bench.approval();
         bench.tick(Some(approval));
         assert_eq!(bench.cycle.mode(), Mode::Ready, "{fault}");
-        let refused =
-            bench.events.iter().any(|event| matches!(event, Event::Refused { because: Objection::Hold(_), .. }));
+        let refused = bench
+            .events
+            .iter()
+            .any(|event| matches!(event, Event::Refused { because: CommandRefusal::Inhibited(_), .. }));
         assert!(refused, "{fault}: {:?}", bench.events);
     }
 }

@@ -16,15 +16,15 @@ use std::net::UdpSocket;
 use go1::{ANY_PORT, description, pair};
 use no_alloc::without_allocation;
 use quadfrog::config::{Backend, Config};
-use quadfrog::control::body::Body;
+use quadfrog::control::control_loop::ControlLoop;
 use quadfrog::realtime::channel::channels;
 use quadfrog::realtime::clock::SimulatedClock;
-use quadfrog::realtime::command::{Command, JumpParameters, Permit, Task};
-use quadfrog::realtime::telemetry::{Event, Mode};
 use quadfrog::realtime::thread::Instant;
 use quadfrog::robot::go1::Go1;
 use quadfrog::robot::{JointCommand, Robot};
 use quadfrog::sim::emulator::Fault;
+use quadfrog::telemetry::{Command, Event, Mode, Permit};
+use quadfrog::trial::{JumpParameters, Task};
 
 /// The control thread's body over the link: standing up, a jump and its review on a good network; then one that loses, doubles,
 /// spoils and delays, and a restart: every branch of the link.
@@ -34,7 +34,7 @@ fn a_tick_over_the_link_does_not_allocate() {
     let (mut emulator, mut go1) = pair(&config.simulator, 1);
     let settings = config.settings(&description(ANY_PORT), Task::Forward, Backend::Hardware).unwrap();
     let (control, mut session, screen, mut recorder) = channels();
-    let mut body = Body::new(&settings, control);
+    let mut body = ControlLoop::new(&settings, control);
     let (mut ms, mut mode_changes, mut seen) = (0, 0, BTreeSet::new());
     let mut ticks = |count: u32, until: Option<Mode>, command: Option<fn(Permit, &Config) -> Command>| {
         if let Some(command) = command {

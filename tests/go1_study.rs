@@ -14,15 +14,15 @@ use go1::{ANY_PORT, Lockstep, description};
 use quadfrog::config::{Backend, Config};
 use quadfrog::engine::{Engine, Handle, Options, open_life};
 use quadfrog::optimize::journal::Durability;
-use quadfrog::realtime::command::Task;
-use quadfrog::realtime::telemetry::Mode;
 use quadfrog::realtime::thread::pace;
-use quadfrog::recording::record::{Proposal, Record, Stage, StageInfo, TrialRecord, Verdict};
+use quadfrog::recording::record::{Record, StageRecord};
+use quadfrog::telemetry::Mode;
+use quadfrog::trial::{ExperimentStage, Proposal, Task, TrialRecord, Verdict};
 
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::robot::{LinkStatus, Robot, Truth};
 use quadfrog::session::automatic;
-use quadfrog::session::intent::{Intent, OperatorCheck};
+use quadfrog::session::operator_request::{OperatorCheck, OperatorRequest};
 use quadfrog::session::rollout::Rollout;
 use quadfrog::sim::emulator::{Emulator, EmulatorHandle, Fault};
 use quadfrog::sim::{SimConfig, Simulator};
@@ -100,14 +100,14 @@ struct Outcome {
 struct Operator {
     engine: Handle,
     robot: EmulatorHandle,
-    stage: Option<StageInfo>,
+    stage: Option<StageRecord>,
     card: Option<Proposal>,
     rows: BTreeMap<u32, TrialRecord>,
     /// Where the robot really stood when the trial was approved.
     stood: Option<Truth>,
     in_truth: BTreeMap<u32, f64>,
     /// The mode in which something was wished last: once a mode is enough.
-    wished_in: Option<(Mode, Option<Stage>, u32)>,
+    wished_in: Option<(Mode, Option<ExperimentStage>, u32)>,
     stops: u32,
     stop_tested: bool,
     lies_since: Option<Instant>,
@@ -126,7 +126,7 @@ impl Operator {
                     self.stops += 1;
                     println!("{} -> {}: {}", change.from.name(), change.to.name(), change.cause);
                 }
-                Record::Command(command) if !command.accepted => println!("{}: {}", command.wish, command.answer),
+                Record::Request(command) if !command.accepted => println!("{}: {}", command.wish, command.answer),
                 Record::Log(line) => println!("{}", line.message),
                 _ => {}
             }
@@ -136,10 +136,10 @@ impl Operator {
     }
 
     /// What a person would wish now; none to wait.
-    fn act(&mut self, mode: Mode) -> Option<Intent> {
+    fn act(&mut self, mode: Mode) -> Option<OperatorRequest> {
         let (stage, trial) = (self.stage.map(|stage| stage.stage), self.stage.map_or(0, |stage| stage.trial));
         match (mode, stage) {
-            (_, Some(Stage::Review)) if mode != Mode::Settle && mode != Mode::Jump => {
+            (_, Some(ExperimentStage::Review)) if mode != Mode::Settle && mode != Mode::Jump => {
                 let row = self.rows.get(&trial)?;
                 if let (Some(from), Some(to)) = (self.stood.take(), self.robot.status().truth) {
                     let moved = from.orientation_world.inverse() * (to.position_world - from.position_world);
@@ -147,12 +147,14 @@ impl Operator {
                 }
                 Some(match row.suggested? {
                     // Something else than the parameters was the cause: the same again.
-                    Verdict::Void => Intent::Rerun { trial: None },
-                    verdict => Intent::Judge(verdict),
+                    Verdict::Void => OperatorRequest::Rerun { trial: None },
+                    verdict => OperatorRequest::Judge(verdict),
                 })
             }
-            (Mode::Damped | Mode::Fault, Some(Stage::Proposed | Stage::Finished)) => Some(Intent::Acknowledge),
-            (Mode::Disarmed, Some(Stage::Proposed)) => {
+            (Mode::Damped | Mode::Fault, Some(ExperimentStage::Proposed | ExperimentStage::Finished)) => {
+                Some(OperatorRequest::Acknowledge)
+            }
+            (Mode::Disarmed, Some(ExperimentStage::Proposed)) => {
                 if !self.stop_tested {
                     self.stop_tested = true;
                     self.engine.stop();
@@ -162,16 +164,16 @@ impl Operator {
                     self.robot.apply(Fault::Place);
                     self.lies_since = Some(Instant::now());
                     for word in OperatorCheck::ALL {
-                        self.engine.wish(Intent::Confirm(word));
+                        self.engine.wish(OperatorRequest::Confirm(word));
                     }
                 }
                 let still = self.lies_since.is_some_and(|since| since.elapsed() > STILL);
-                still.then_some(Intent::Arm)
+                still.then_some(OperatorRequest::Arm)
             }
-            (Mode::Ready, Some(Stage::Proposed)) => {
+            (Mode::Ready, Some(ExperimentStage::Proposed)) => {
                 let card = self.card.as_ref()?;
                 self.stood = self.robot.status().truth;
-                Some(Intent::Approve { trial: card.trial, revision: card.revision })
+                Some(OperatorRequest::Approve { trial: card.trial, revision: card.revision })
             }
             _ => None,
         }
@@ -182,7 +184,7 @@ impl Operator {
         let mut wished_at = begun;
         loop {
             let (mode, link) = self.look();
-            if self.stage.is_some_and(|stage| stage.stage == Stage::Finished) {
+            if self.stage.is_some_and(|stage| stage.stage == ExperimentStage::Finished) {
                 return link;
             }
             assert!(begun.elapsed() < PATIENCE, "still {} at {:?} after {PATIENCE:?}", mode.name(), self.stage);

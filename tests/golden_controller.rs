@@ -4,9 +4,9 @@ mod support;
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use quadfrog::control::leg::{self, LegTarget};
-use quadfrog::realtime::command::{Gains, JumpParameters, Task};
 use quadfrog::robot::Joints;
 use quadfrog::robot::kinematics::LegGeometry;
+use quadfrog::trial::{Gains, JumpParameters, Task};
 use serde::Deserialize;
 
 #[derive(Deserialize)]

@@ -5,10 +5,10 @@ mod support;
 
 use nalgebra::{UnitQuaternion, Vector3};
 use quadfrog::control::leg::{LegTarget, feet, stance_of, torques};
-use quadfrog::realtime::command::{Gains, JumpParameters, Task};
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::robot::{JointCommand, Joints, Leg, PerLeg, Placement, Robot};
 use quadfrog::sim::{BodyKind, ContactLaw, SimConfig, Simulator};
+use quadfrog::trial::{Gains, JumpParameters, Task};
 use serde::Deserialize;
 
 #[derive(Deserialize)]

@@ -6,11 +6,11 @@ use std::time::Duration;
 
 use nix::time::{ClockId, clock_gettime};
 use quadfrog::config::{Backend, Config};
-use quadfrog::realtime::scheduling::{Favour, Scheduling};
+use quadfrog::realtime::scheduling::{RealtimeSetting, Scheduling};
 use quadfrog::realtime::{system, thread};
 
 /// In a thread of its own: a priority stays with the thread that asked for it.
-fn apply(scheduling: Scheduling) -> (Vec<Favour>, Vec<String>) {
+fn apply(scheduling: Scheduling) -> (Vec<RealtimeSetting>, Vec<String>) {
     let granted = std::thread::spawn(move || {
         let granted = scheduling.apply();
         let mut ticks = 0;
@@ -112,7 +112,7 @@ fn each_favour_is_granted_or_its_refusal_says_what_to_do() {
     let (favours, shortfalls) = apply(Scheduling { priority: 10, core: Some(0), lock_memory: true });
     assert_eq!(favours.len() + shortfalls.len(), 4, "{favours:?} {shortfalls:?}");
     if system::priority_limit() >= 10 {
-        assert!(favours.contains(&Favour::Priority(10)), "{shortfalls:?}");
+        assert!(favours.contains(&RealtimeSetting::Priority(10)), "{shortfalls:?}");
     } else {
         assert!(shortfalls.iter().any(|words| words.contains("setcap cap_sys_nice")), "{shortfalls:?}");
     }

@@ -5,11 +5,11 @@ mod support;
 
 use std::process::Command;
 
-use quadfrog::realtime::telemetry::{Mode, Tick};
-use quadfrog::recording::record::{Level, LogRecord, Record, Stamped};
+use quadfrog::recording::record::{LogLevel, LogRecord, Record, Stamped};
 use quadfrog::recording::writer::Writer;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::robot::{JOINTS, Leg, joint_name};
+use quadfrog::telemetry::{Mode, Tick};
 use serde_json::{Value, json};
 use support::*;
 
@@ -39,7 +39,7 @@ fn python_reads_every_topic() {
     let (mut ticks, mut records) = study(4);
     ticks[3990..].iter_mut().for_each(|tick| tick.mode = Mode::Fault);
     let stamped = |ms: u64, record| Stamped { time_ns: ms * MS, record };
-    let log = LogRecord { level: Level::Warning, source: "link".into(), message: "späte Antwort \u{1f438}".into() };
+    let log = LogRecord { level: LogLevel::Warning, source: "link".into(), message: "späte Antwort \u{1f438}".into() };
     records.push(stamped(3995, Record::Log(log)));
     records.push(stamped(3996, Record::FaultTicks(ticks[3900..3990].to_vec())));
     let attachment: [(&str, &str, &[u8]); 1] = [("config.toml", "application/toml", b"kp = 400.0\n")];

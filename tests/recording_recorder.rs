@@ -7,11 +7,11 @@ use std::io::{self, Write};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, mpsc};
 
-use quadfrog::realtime::telemetry::{Mode, Tick};
 use quadfrog::recording::player::Player;
 use quadfrog::recording::record::Stamped;
 use quadfrog::recording::recorder::{FAULT_TICKS, Handed, Recorder, RecorderHandle, TrialTicks};
 use quadfrog::recording::writer::{Sink, Writer};
+use quadfrog::telemetry::{Mode, Tick};
 use support::*;
 
 /// A recorder that is given everything, live, and then its end.

@@ -4,11 +4,12 @@
 mod support;
 
 use proptest::prelude::*;
-use quadfrog::realtime::telemetry::{Mode, Tick};
 use quadfrog::recording::RecordingError;
 use quadfrog::recording::player::{Marker, MarkerKind, Played, Player};
-use quadfrog::recording::record::{LogRecord, Record, Stage, Stamped};
+use quadfrog::recording::record::{LogRecord, Record, Stamped};
 use quadfrog::recording::writer::Writer;
+use quadfrog::telemetry::{Mode, Tick};
+use quadfrog::trial::ExperimentStage;
 use support::*;
 
 fn config() -> ProptestConfig {
@@ -49,7 +50,7 @@ proptest! {
             writer.tick(tick).unwrap();
             if index % 25 == 0 && let Some(late) = late.get(index / 25) {
                 let text = format!("line {index}");
-                let log = LogRecord { level: quadfrog::recording::record::Level::Info, source: "test".into(), message: text };
+                let log = LogRecord { level: quadfrog::recording::record::LogLevel::Info, source: "test".into(), message: text };
                 // Each at an instant of its own: records of the very same nanosecond have no order.
                 let time_ns = tick.time_ns.saturating_sub(*late as u64 * MS) + 500 + index as u64;
                 records.push(Stamped { time_ns, record: Record::Log(log) });
@@ -151,7 +152,7 @@ fn the_state_at_a_moment_is_what_was_known_then() {
         assert_eq!(found, expected, "at {ms} ms");
     }
     let running = player.state_at(1500 * MS);
-    assert!(running.iter().any(|s| matches!(&s.record, Record::Stage(info) if info.stage == Stage::Running)));
+    assert!(running.iter().any(|s| matches!(&s.record, Record::Stage(info) if info.stage == ExperimentStage::Running)));
 }
 
 #[test]

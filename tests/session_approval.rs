@@ -4,12 +4,11 @@ use std::time::{Duration, Instant};
 
 use quadfrog::config::{Backend, Config};
 use quadfrog::engine::{Engine, EngineError, Handle, Options};
-use quadfrog::realtime::command::Task;
-use quadfrog::realtime::telemetry::Mode;
-use quadfrog::recording::record::{Record, Stage, Stamped, Verdict};
+use quadfrog::recording::record::{Record, Stamped};
 use quadfrog::robot::description::RobotDescription;
-use quadfrog::session::approval::Approval;
-use quadfrog::session::intent::Intent;
+use quadfrog::session::operator_request::OperatorRequest;
+use quadfrog::telemetry::Mode;
+use quadfrog::trial::{Approval, ExperimentStage, Task, Verdict};
 
 fn options(approve: Approval, backend: Backend) -> Options {
     let config = Config::load(None).unwrap();
@@ -65,7 +64,7 @@ fn mode(records: &[Record]) -> Option<Mode> {
     records.iter().rev().find_map(|r| if let Record::Transition(t) = r { Some(t.to) } else { None })
 }
 
-fn stage(records: &[Record]) -> Option<Stage> {
+fn stage(records: &[Record]) -> Option<ExperimentStage> {
     records.iter().rev().find_map(|r| if let Record::Stage(s) = r { Some(s.stage) } else { None })
 }
 
@@ -79,7 +78,7 @@ fn judged(records: &[Record], verdict: Verdict) -> usize {
 fn auto_runs_a_whole_study_without_a_question_and_stop_still_holds_it() {
     let mut screen = Screen::new(Approval::Auto);
     screen.until("a first verdict", |r| judged(r, Verdict::Accept) + judged(r, Verdict::Fall) >= 1);
-    screen.until("the second jump", |r| mode(r) == Some(Mode::Jump) || stage(r) == Some(Stage::Running));
+    screen.until("the second jump", |r| mode(r) == Some(Mode::Jump) || stage(r) == Some(ExperimentStage::Running));
     screen.handle.stop();
     screen.until("damping", |r| mode(r) == Some(Mode::Damped));
     let before = screen.records.len();
@@ -87,17 +86,17 @@ fn auto_runs_a_whole_study_without_a_question_and_stop_still_holds_it() {
     assert_eq!(mode(&screen.records), Some(Mode::Damped), "nobody acknowledges a STOP but a person");
     assert!(!screen.records[before..].iter().any(|r| matches!(r, Record::Transition(t) if t.to.energised())));
     // A person judges the stopped jump, acknowledges and arms: then it goes on by itself.
-    screen.until("the review", |r| stage(r) == Some(Stage::Review));
-    screen.handle.wish(Intent::Acknowledge);
-    screen.handle.wish(Intent::Judge(Verdict::Void));
+    screen.until("the review", |r| stage(r) == Some(ExperimentStage::Review));
+    screen.handle.wish(OperatorRequest::Acknowledge);
+    screen.handle.wish(OperatorRequest::Judge(Verdict::Void));
     screen.until("disarmed", |r| mode(r) == Some(Mode::Disarmed));
     screen.pass(Duration::from_secs(1));
     assert_eq!(mode(&screen.records), Some(Mode::Disarmed), "it is armed by a person after a stop");
-    screen.handle.wish(Intent::Arm);
-    screen.until("the end of the study", |r| stage(r) == Some(Stage::Finished));
+    screen.handle.wish(OperatorRequest::Arm);
+    screen.until("the end of the study", |r| stage(r) == Some(ExperimentStage::Finished));
     assert_eq!(judged(&screen.records, Verdict::Accept) + judged(&screen.records, Verdict::Fall), 3);
     let asked =
-        screen.records.iter().filter(|r| matches!(r, Record::Command(c) if c.wish.starts_with("approve"))).count();
+        screen.records.iter().filter(|r| matches!(r, Record::Request(c) if c.wish.starts_with("approve"))).count();
     assert_eq!(asked, 0);
 }
 
@@ -107,7 +106,7 @@ fn falls_only_waits_for_a_person_to_arm_and_then_accepts_what_landed() {
     screen.until("disarmed", |r| mode(r) == Some(Mode::Disarmed));
     screen.pass(Duration::from_secs(1));
     assert_eq!(mode(&screen.records), Some(Mode::Disarmed));
-    screen.handle.wish(Intent::Arm);
+    screen.handle.wish(OperatorRequest::Arm);
     // The first jump of seed 0 lands; a fall would wait for a verdict.
     screen.until("an accepted jump or a fall that waits", |r| {
         judged(r, Verdict::Accept) >= 1
@@ -115,10 +114,10 @@ fn falls_only_waits_for_a_person_to_arm_and_then_accepts_what_landed() {
     });
     if judged(&screen.records, Verdict::Accept) == 0 {
         screen.pass(Duration::from_secs(1));
-        assert_eq!(stage(&screen.records), Some(Stage::Review), "a fall is judged by a person");
+        assert_eq!(stage(&screen.records), Some(ExperimentStage::Review), "a fall is judged by a person");
     } else {
         screen.until("the next jump, approved by itself", |r| {
-            r.iter().filter(|r| matches!(r, Record::Stage(s) if s.stage == Stage::Running)).count() >= 2
+            r.iter().filter(|r| matches!(r, Record::Stage(s) if s.stage == ExperimentStage::Running)).count() >= 2
         });
     }
 }

@@ -2,11 +2,12 @@
 
 use quadfrog::config::{Backend, Config};
 use quadfrog::control::settings::TaskControl;
-use quadfrog::realtime::command::{Gains, JumpParameters, Task, TrialSpec};
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::session::objective;
 use quadfrog::session::rollout::Rollout;
 use quadfrog::sim::Simulator;
+use quadfrog::telemetry::TrialSpec;
+use quadfrog::trial::{Gains, JumpParameters, Task};
 
 /// Whatever an operator may set, the robot stands until the impulse begins: no trial of allowed gains is lost before it
 /// has jumped.

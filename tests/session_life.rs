@@ -8,9 +8,11 @@ use std::time::Duration;
 use quadfrog::optimize::exchange::TableTrial;
 use quadfrog::optimize::study::Storage;
 use quadfrog::optimize::trial::{Trial, TrialState};
-use quadfrog::realtime::telemetry::{FallCause, TrialEnd};
-use quadfrog::recording::record::{Record, Source, Stage, Verdict};
-use quadfrog::session::life::{BUDGET, Life, import};
+use quadfrog::recording::record::Record;
+use quadfrog::session::experiment::import;
+use quadfrog::session::experiment::{BUDGET, Experiment};
+use quadfrog::telemetry::{FallCause, TrialEnd};
+use quadfrog::trial::{ExperimentStage, ProposalSource, Verdict};
 use support::{accept, far, joined, life, open, parameters, run, study, ticks};
 
 /// How long no test lasts.
@@ -47,7 +49,7 @@ fn a_void_trial_does_not_count_and_a_rerun_repeats_its_parameters() {
     life.judge(Verdict::Void, true).unwrap();
     assert_eq!(life.counted(), 0);
     let card = life.proposal().unwrap();
-    assert_eq!((card.source, card.parent), (Source::Rerun, Some(first.trial)));
+    assert_eq!((card.source, card.parent), (ProposalSource::Rerun, Some(first.trial)));
     assert_eq!(parameters(&life), before);
     let second = accept(&mut life);
     assert_eq!(second.jump, first.jump);
@@ -72,12 +74,12 @@ fn an_override_runs_as_the_operators_and_keeps_what_was_proposed() {
     let proposed = life.proposal().unwrap();
     life.set_parameter("Fx", 120.0).unwrap();
     let card = life.proposal().unwrap();
-    assert_eq!(card.source, Source::Operator);
+    assert_eq!(card.source, ProposalSource::Operator);
     assert_eq!(card.parameters[1].value, 120.0);
     assert_eq!(card.parameters[1].proposed, proposed.parameters[1].proposed);
     let spec = accept(&mut life);
     assert_eq!(spec.jump.fx_n, 120.0);
-    assert_eq!(life.row(spec.trial).unwrap().source, Source::Operator);
+    assert_eq!(life.row(spec.trial).unwrap().source, ProposalSource::Operator);
 }
 
 #[test]
@@ -87,7 +89,7 @@ fn an_approval_of_an_earlier_card_is_refused() {
     life.set_parameter("Fx", 120.0).unwrap();
     let error = life.approve(seen.trial, seen.revision).unwrap_err().to_string();
     assert!(error.contains("look at the card again"), "{error}");
-    assert_eq!(life.stage(), Stage::Proposed);
+    assert_eq!(life.stage(), ExperimentStage::Proposed);
 }
 
 #[test]
@@ -96,7 +98,7 @@ fn a_verdict_can_be_undone_until_the_next_trial_begins() {
     let spec = accept(&mut life);
     let after_accept = parameters(&life);
     life.undo().unwrap();
-    assert_eq!(life.stage(), Stage::Review);
+    assert_eq!(life.stage(), ExperimentStage::Review);
     assert_eq!(life.row(spec.trial).unwrap().verdict, None);
     life.judge(Verdict::Accept, false).unwrap();
     assert_eq!(parameters(&life), after_accept);
@@ -147,10 +149,10 @@ fn the_budget_ends_the_study_and_can_be_raised() {
     let mut life = life(2);
     accept(&mut life);
     accept(&mut life);
-    assert_eq!(life.stage(), Stage::Finished);
+    assert_eq!(life.stage(), ExperimentStage::Finished);
     assert!(life.proposal().is_none());
     life.extend(1).unwrap();
-    assert_eq!(life.stage(), Stage::Proposed);
+    assert_eq!(life.stage(), ExperimentStage::Proposed);
 }
 
 #[test]
@@ -167,7 +169,7 @@ fn falls_nearby_are_shown_as_a_risk() {
 }
 
 /// The same study with an operator's odd moments: override, fall, re-run, void, skip, undo.
-fn eventful(life: &mut Life, step: u32) {
+fn eventful(life: &mut Experiment, step: u32) {
     match step % 7 {
         1 => {
             life.set_parameter("Fx", 60.0 + f64::from(step)).unwrap();
@@ -205,7 +207,8 @@ fn a_study_interrupted_after_every_verdict_equals_the_unbroken_one() {
             unbroken.proposal().unwrap().parameters,
             "after step {step}"
         );
-        let verdicts = |life: &Life| life.rows().map(|row| (row.trial, row.verdict, row.value)).collect::<Vec<_>>();
+        let verdicts =
+            |life: &Experiment| life.rows().map(|row| (row.trial, row.verdict, row.value)).collect::<Vec<_>>();
         assert_eq!(verdicts(&resumed), verdicts(&unbroken), "after step {step}");
     }
 }
@@ -224,7 +227,7 @@ fn a_trial_interrupted_in_mid_jump_is_void_and_comes_again() {
     assert_eq!(row.verdict, Some(Verdict::Void));
     assert!(row.cause.contains("interrupted"), "{}", row.cause);
     let card = life.proposal().unwrap();
-    assert_eq!((card.source, card.parent), (Source::Rerun, Some(spec.trial)));
+    assert_eq!((card.source, card.parent), (ProposalSource::Rerun, Some(spec.trial)));
     let again = life.approve(card.trial, card.revision).unwrap();
     assert_eq!((again.jump, again.seed), (spec.jump, spec.seed));
     assert!(again.trial > spec.trial);
@@ -241,7 +244,7 @@ fn a_rerun_survives_every_moment_of_a_kill_and_comes_once() {
     for _ in 0..3 {
         let life = open(folder.path());
         let card = life.proposal().unwrap();
-        assert_eq!((card.source, card.parent), (Source::Rerun, Some(spec.trial)));
+        assert_eq!((card.source, card.parent), (ProposalSource::Rerun, Some(spec.trial)));
         let waiting = study(Storage::File(folder.path().join("study.log"))).waiting().count();
         assert_eq!(waiting, 1);
     }
@@ -337,7 +340,7 @@ fn a_trial_that_was_seen_running_for_too_long_is_void_and_comes_again() {
     ours.look().unwrap();
     assert_eq!(ours.row(spec.trial).unwrap().verdict, Some(Verdict::Void));
     let card = ours.proposal().unwrap();
-    assert_eq!((card.source, card.parent), (Source::Rerun, Some(spec.trial)));
+    assert_eq!((card.source, card.parent), (ProposalSource::Rerun, Some(spec.trial)));
 }
 
 /// (A defect once: the verdict's teller did not look whether another worker had paid the debt already.)

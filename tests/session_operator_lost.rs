@@ -8,13 +8,12 @@ use std::time::{Duration, Instant};
 
 use quadfrog::config::{Backend, Config};
 use quadfrog::engine::{Engine, Handle, Options};
-use quadfrog::realtime::command::Task;
-use quadfrog::realtime::telemetry::Mode;
 use quadfrog::recording::player::Player;
-use quadfrog::recording::record::{Proposal, Record, Stage, TrialRecord, Verdict};
+use quadfrog::recording::record::Record;
 use quadfrog::robot::description::RobotDescription;
-use quadfrog::session::approval::Approval;
-use quadfrog::session::intent::Intent;
+use quadfrog::session::operator_request::OperatorRequest;
+use quadfrog::telemetry::Mode;
+use quadfrog::trial::{Approval, ExperimentStage, Proposal, Task, TrialRecord, Verdict};
 
 /// Whatever is waited for comes in a few seconds; a machine under load may take longer.
 const PATIENCE: Duration = Duration::from_secs(60);
@@ -100,10 +99,10 @@ impl Screen {
     /// Stands, approves what is on the table, and flies.
     fn jump(&mut self) -> Proposal {
         self.until_mode(Mode::Disarmed);
-        self.handle.wish(Intent::Arm);
+        self.handle.wish(OperatorRequest::Arm);
         self.until_mode(Mode::Ready);
         let proposal = self.proposal();
-        self.handle.wish(Intent::Approve { trial: proposal.trial, revision: proposal.revision });
+        self.handle.wish(OperatorRequest::Approve { trial: proposal.trial, revision: proposal.revision });
         self.until_mode(Mode::Jump);
         proposal
     }
@@ -155,7 +154,8 @@ fn a_lost_operator_costs_the_trial_but_nothing_else() {
     assert_eq!(values(&proposal), values(&before));
     assert_eq!(proposal.parent, Some(trial));
     again.until("the old trial", |screen| screen.row(trial).is_some_and(|row| row.verdict == Some(Verdict::Void)));
-    let stages = again.records.iter().any(|r| matches!(r, Record::Stage(info) if info.stage == Stage::Proposed));
+    let stages =
+        again.records.iter().any(|r| matches!(r, Record::Stage(info) if info.stage == ExperimentStage::Proposed));
     assert!(stages, "the study goes on");
 }
 

@@ -4,25 +4,23 @@ use std::sync::mpsc::{Receiver, channel};
 
 use proptest::prelude::*;
 use quadfrog::config::{Backend, Config};
-use quadfrog::control::body::Body;
-use quadfrog::control::settings::Settings;
+use quadfrog::control::control_loop::ControlLoop;
+use quadfrog::control::settings::ControlSettings;
 use quadfrog::engine::{Options, fingerprint, open_life, session_info};
 use quadfrog::optimize::journal::Durability;
 use quadfrog::realtime::channel::{ScreenEnd, channels};
 use quadfrog::realtime::clock::SimulatedClock;
-use quadfrog::realtime::command::Task;
-use quadfrog::realtime::pre_arm::{Check, CheckState};
-use quadfrog::realtime::telemetry::{Mode, Tick};
 use quadfrog::realtime::thread::Instant;
-use quadfrog::recording::record::{CommandRecord, PreArmCheck, Record, Stamped, Verdict};
+use quadfrog::recording::record::{ArmingCheckRecord, Record, RequestRecord, Stamped};
 use quadfrog::recording::recorder::RecorderWatch;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::robot::{Battery, JointCommand, LinkStatus, Placement, Robot, RobotError, RobotState};
-use quadfrog::session::approval::Approval;
-use quadfrog::session::intent::{Intent, OperatorCheck, Wish};
-use quadfrog::session::pre_arm::PreArmList;
-use quadfrog::session::supervisor::{Outlets, Parts, Supervisor};
+use quadfrog::session::arming_checklist::ArmingChecklist;
+use quadfrog::session::operator_request::{OperatorCheck, OperatorRequest, StampedRequest};
+use quadfrog::session::supervisor::{RecordSinks, Supervisor, SupervisorParts};
 use quadfrog::sim::Simulator;
+use quadfrog::telemetry::{ArmingCheck, ArmingCheckState, Mode, Tick};
+use quadfrog::trial::{Approval, Task, Verdict};
 
 /// The simulator, seen as a robot over a link that reports its battery and cannot be put in place.
 struct Go1Like {
@@ -65,7 +63,7 @@ struct Session {
     supervisor: Supervisor,
     operator: ScreenEnd,
     _ticks: rtrb::Consumer<Tick>,
-    body: Body,
+    body: ControlLoop,
     robot: Go1Like,
     screen: Receiver<Stamped>,
     _recorder: Receiver<Stamped>,
@@ -88,27 +86,27 @@ impl Session {
         let config = Config::load(None).unwrap();
         let robot = RobotDescription::embedded("go1").unwrap();
         let options = Options { trials: Some(5), observe, ..Options::new(config, robot, backend, Task::Forward) };
-        let settings: Settings = options.config.settings(&options.robot, options.task, backend).unwrap();
+        let settings: ControlSettings = options.config.settings(&options.robot, options.task, backend).unwrap();
         let mut simulator = Simulator::new(&options.robot, &options.config.simulator).unwrap();
         simulator.place(&Placement { joint_position: settings.lying_position, lying: true, seed: 0 });
         let (control, session_end, operator, ticks) = channels();
         let (to_recorder, recorder) = channel();
         let (to_screen, screen) = channel();
         let (_, handed) = channel();
-        let parts = Parts {
+        let parts = SupervisorParts {
             life: open_life(&options, Durability::Buffered, "").unwrap(),
             control: session_end,
             handed,
-            outlets: Outlets { recorder: to_recorder, screen: to_screen },
+            outlets: RecordSinks { recorder: to_recorder, screen: to_screen },
             recorder: RecorderWatch::default(),
-            pre_arm: PreArmList::new(&settings, fingerprint(&options.config), folder),
+            pre_arm: ArmingChecklist::new(&settings, fingerprint(&options.config), folder),
             info: session_info(&options, ""),
         };
         Session {
             supervisor: Supervisor::new(parts, 0),
             operator,
             _ticks: ticks,
-            body: Body::new(&settings, control),
+            body: ControlLoop::new(&settings, control),
             robot: Go1Like { simulator, charge_percent: 90.0, writes: 0, reboots: 0, silent_ms: 0, tamper: |_| {} },
             screen,
             _recorder: recorder,
@@ -132,27 +130,27 @@ impl Session {
     }
 
     /// Wishes and gives back the answer.
-    fn wish(&mut self, intent: Intent) -> CommandRecord {
+    fn wish(&mut self, intent: OperatorRequest) -> RequestRecord {
         let time_ns = self.time_ms * 1_000_000;
-        self.supervisor.carry_out(&Wish { intent, stops: self.operator.stop.count(), time_ns }, time_ns);
+        self.supervisor.carry_out(&StampedRequest { intent, stops: self.operator.stop.count(), time_ns }, time_ns);
         let mut records = self.screen.try_iter().map(|stamped| stamped.record);
         let answer = records.find_map(|record| match record {
-            Record::Command(command) => Some(command),
+            Record::Request(command) => Some(command),
             _ => None,
         });
         self.ticks(5);
         answer.expect("every wish is answered")
     }
 
-    fn list(&self) -> Vec<PreArmCheck> {
+    fn list(&self) -> Vec<ArmingCheckRecord> {
         let list = self.records.iter().rev().find_map(|record| match record {
-            Record::PreArm(list) => Some(list.clone()),
+            Record::ArmingChecks(list) => Some(list.clone()),
             _ => None,
         });
         list.expect("the list is shown while the robot is disarmed")
     }
 
-    fn state(&self, check: Check) -> CheckState {
+    fn state(&self, check: ArmingCheck) -> ArmingCheckState {
         self.list().iter().find(|item| item.check == check).expect("every check is on the list").state
     }
 
@@ -160,7 +158,7 @@ impl Session {
         self.operator.stop.set();
         self.ticks(5);
         assert_eq!(self.body.mode(), Mode::Damped);
-        assert!(self.wish(Intent::Acknowledge).accepted);
+        assert!(self.wish(OperatorRequest::Acknowledge).accepted);
         self.ticks(1500);
         assert_eq!(self.body.mode(), Mode::Disarmed);
     }
@@ -169,10 +167,10 @@ impl Session {
 #[test]
 fn a_simulated_robot_is_armed_without_ceremony() {
     let mut session = Session::new(Backend::Simulator, None);
-    assert_eq!(session.list().len(), Check::ALL.len());
-    let needed: Vec<_> = session.list().into_iter().filter(|item| item.state != CheckState::NotNeeded).collect();
-    assert_eq!(needed.iter().map(|item| item.check).collect::<Vec<_>>(), [Check::StateFresh]);
-    let answer = session.wish(Intent::Arm);
+    assert_eq!(session.list().len(), ArmingCheck::ALL.len());
+    let needed: Vec<_> = session.list().into_iter().filter(|item| item.state != ArmingCheckState::NotNeeded).collect();
+    assert_eq!(needed.iter().map(|item| item.check).collect::<Vec<_>>(), [ArmingCheck::StateFresh]);
+    let answer = session.wish(OperatorRequest::Arm);
     assert!(answer.accepted, "{answer:?}");
     assert_eq!(session.body.mode(), Mode::StandUp);
 }
@@ -184,7 +182,7 @@ fn a_real_robot_is_not_armed_before_every_item_holds_and_the_refusal_names_all()
     let mut session = Session::new(Backend::Hardware, Some(folder.path().to_owned()));
     session.robot.charge_percent = 20.0;
     session.ticks(110);
-    let answer = session.wish(Intent::Arm);
+    let answer = session.wish(OperatorRequest::Arm);
     assert!(!answer.accepted);
     for words in [
         "battery: 20 %, needed: at least 30 %",
@@ -197,14 +195,14 @@ fn a_real_robot_is_not_armed_before_every_item_holds_and_the_refusal_names_all()
     }
     session.robot.charge_percent = 90.0;
     for check in OperatorCheck::ALL {
-        assert!(session.wish(Intent::Confirm(check)).accepted);
+        assert!(session.wish(OperatorRequest::Confirm(check)).accepted);
     }
     session.ticks(600);
-    let answer = session.wish(Intent::Arm);
+    let answer = session.wish(OperatorRequest::Arm);
     assert!(!answer.accepted && answer.answer.starts_with("STOP tested") && !answer.answer.contains(';'), "{answer:?}");
     session.test_stop();
-    assert_eq!(session.state(Check::StopTested), CheckState::Passed);
-    let answer = session.wish(Intent::Arm);
+    assert_eq!(session.state(ArmingCheck::StopTested), ArmingCheckState::Passed);
+    let answer = session.wish(OperatorRequest::Arm);
     assert!(answer.accepted, "{answer:?}");
     assert_eq!(session.body.mode(), Mode::StandUp);
 }
@@ -216,18 +214,18 @@ fn the_area_is_asked_about_before_each_arming() {
     let mut session = Session::new(Backend::Hardware, Some(folder.path().to_owned()));
     session.test_stop();
     for check in OperatorCheck::ALL {
-        session.wish(Intent::Confirm(check));
+        session.wish(OperatorRequest::Confirm(check));
     }
-    assert!(session.wish(Intent::Arm).accepted);
-    assert!(!session.wish(Intent::Confirm(OperatorCheck::AreaClear)).accepted, "not while it is armed");
+    assert!(session.wish(OperatorRequest::Arm).accepted);
+    assert!(!session.wish(OperatorRequest::Confirm(OperatorCheck::AreaClear)).accepted, "not while it is armed");
     session.operator.stop.set();
     session.ticks(3000);
-    session.wish(Intent::Acknowledge);
+    session.wish(OperatorRequest::Acknowledge);
     session.ticks(1500);
-    assert_eq!(session.state(Check::AreaClear), CheckState::Waiting);
-    assert_eq!(session.state(Check::LowLevel), CheckState::Passed);
-    assert_eq!(session.state(Check::StopTested), CheckState::Passed);
-    let answer = session.wish(Intent::Arm);
+    assert_eq!(session.state(ArmingCheck::AreaClear), ArmingCheckState::Waiting);
+    assert_eq!(session.state(ArmingCheck::LowLevel), ArmingCheckState::Passed);
+    assert_eq!(session.state(ArmingCheck::StopTested), ArmingCheckState::Passed);
+    let answer = session.wish(OperatorRequest::Arm);
     assert!(!answer.accepted && answer.answer.contains("area clear"), "{answer:?}");
 }
 
@@ -237,9 +235,12 @@ fn without_its_guard_a_robot_is_not_armed() {
     let folder = tempfile::tempdir().unwrap();
     let mut session = Session::cleared(&folder);
     session.supervisor.tell_guard_lost(session.time_ms * 1_000_000);
-    let answer = session.wish(Intent::Arm);
+    let answer = session.wish(OperatorRequest::Arm);
     assert!(!answer.accepted && answer.answer.starts_with("the guard process has ended"), "{answer:?}");
-    assert!(session.wish(Intent::Confirm(OperatorCheck::AreaClear)).accepted, "what energises nothing goes on");
+    assert!(
+        session.wish(OperatorRequest::Confirm(OperatorCheck::AreaClear)).accepted,
+        "what energises nothing goes on"
+    );
     assert_eq!(session.body.mode(), Mode::Disarmed);
 }
 
@@ -249,13 +250,13 @@ fn the_word_on_the_area_is_forgotten_after_a_minute() {
     let folder = tempfile::tempdir().unwrap();
     let mut session = Session::cleared(&folder);
     session.ticks(50_000);
-    assert_eq!(session.state(Check::AreaClear), CheckState::Passed);
+    assert_eq!(session.state(ArmingCheck::AreaClear), ArmingCheckState::Passed);
     session.ticks(11_000);
-    assert_eq!(session.state(Check::AreaClear), CheckState::Waiting);
-    let answer = session.wish(Intent::Arm);
+    assert_eq!(session.state(ArmingCheck::AreaClear), ArmingCheckState::Waiting);
+    let answer = session.wish(OperatorRequest::Arm);
     assert!(!answer.accepted && answer.answer.contains("area clear"), "{answer:?}");
-    assert!(session.wish(Intent::Confirm(OperatorCheck::AreaClear)).accepted);
-    assert!(session.wish(Intent::Arm).accepted);
+    assert!(session.wish(OperatorRequest::Confirm(OperatorCheck::AreaClear)).accepted);
+    assert!(session.wish(OperatorRequest::Arm).accepted);
     // It holds until the robot lies again, however long the session stands.
     session.ticks(3000);
     assert_eq!(session.body.mode(), Mode::Ready);
@@ -267,7 +268,7 @@ impl Session {
         let mut session = Session::new(Backend::Hardware, Some(folder.path().to_owned()));
         session.test_stop();
         for check in OperatorCheck::ALL {
-            assert!(session.wish(Intent::Confirm(check)).accepted);
+            assert!(session.wish(OperatorRequest::Confirm(check)).accepted);
         }
         session
     }
@@ -281,13 +282,13 @@ impl Session {
     }
 
     fn must_confirm_low_level_again(&mut self) {
-        assert!(self.wish(Intent::Acknowledge).accepted);
+        assert!(self.wish(OperatorRequest::Acknowledge).accepted);
         self.ticks(1500);
         assert_eq!(self.body.mode(), Mode::Disarmed);
-        let answer = self.wish(Intent::Arm);
+        let answer = self.wish(OperatorRequest::Arm);
         assert!(!answer.accepted && answer.answer.contains("low-level mode, damped: not confirmed"), "{answer:?}");
         assert!(answer.answer.contains("area clear, remote in hand: not confirmed"), "{answer:?}");
-        assert_eq!(self.state(Check::LowLevel), CheckState::Waiting);
+        assert_eq!(self.state(ArmingCheck::LowLevel), ArmingCheckState::Waiting);
     }
 }
 
@@ -297,13 +298,16 @@ impl Session {
 fn a_restart_during_another_fault_is_told_and_takes_the_word_back() {
     let folder = tempfile::tempdir().unwrap();
     let mut session = Session::cleared(&folder);
-    assert!(session.wish(Intent::Arm).accepted);
+    assert!(session.wish(OperatorRequest::Arm).accepted);
     session.robot.tamper = |state| state.joint_position[3] = 2.0;
     session.ticks(10);
     session.robot.tamper = |_| {};
     session.ticks(10);
     for check in [OperatorCheck::LowLevel, OperatorCheck::AreaClear] {
-        assert!(session.wish(Intent::Confirm(check)).accepted, "given too early: the robot is switched off only now");
+        assert!(
+            session.wish(OperatorRequest::Confirm(check)).accepted,
+            "given too early: the robot is switched off only now"
+        );
     }
     session.robot.silent_ms = 1;
     session.ticks(2000);
@@ -343,26 +347,26 @@ fn a_restart_that_changes_no_mode_takes_the_word_back() {
 fn the_list_is_shown_twice_a_second_and_on_change() {
     let folder = tempfile::tempdir().unwrap();
     let mut session = Session::new(Backend::Hardware, Some(folder.path().to_owned()));
-    let lists = |session: &Session| session.records.iter().filter(|r| matches!(r, Record::PreArm(_))).count();
+    let lists = |session: &Session| session.records.iter().filter(|r| matches!(r, Record::ArmingChecks(_))).count();
     let before = lists(&session);
     session.ticks(2000);
     assert!((3..=5).contains(&(lists(&session) - before)), "{} lists in 2 s", lists(&session) - before);
-    assert_eq!(session.state(Check::Battery), CheckState::Passed);
+    assert_eq!(session.state(ArmingCheck::Battery), ArmingCheckState::Passed);
     let before = lists(&session);
     session.robot.charge_percent = 29.0;
     session.ticks(110);
     assert!(lists(&session) > before);
-    let battery = session.list().into_iter().find(|item| item.check == Check::Battery).unwrap();
-    assert_eq!((battery.found.as_str(), battery.state), ("29 %", CheckState::Failed));
+    let battery = session.list().into_iter().find(|item| item.check == ArmingCheck::Battery).unwrap();
+    assert_eq!((battery.found.as_str(), battery.state), ("29 %", ArmingCheckState::Failed));
 }
 
 #[test]
 fn a_full_disk_and_a_missing_recording_are_named() {
     let session = Session::new(Backend::Hardware, None);
-    assert_eq!(session.state(Check::Recorder), CheckState::Failed);
+    assert_eq!(session.state(ArmingCheck::Recorder), ArmingCheckState::Failed);
     let gone = std::path::PathBuf::from("/no/such/folder");
     let session = Session::new(Backend::Simulator, Some(gone));
-    assert_eq!(session.state(Check::Disk), CheckState::Failed);
+    assert_eq!(session.state(ArmingCheck::Disk), ArmingCheckState::Failed);
 }
 
 /// STOP is everybody's: who only looks may press it, damping is sent then, and an acknowledgement gives the robot back to whose
@@ -375,9 +379,9 @@ fn an_observer_may_stop_and_then_lets_go_of_the_robot() {
     session.operator.stop.set();
     session.ticks(50);
     assert_eq!((session.body.mode(), session.robot.writes), (Mode::Damped, 50));
-    let answer = session.wish(Intent::Arm);
+    let answer = session.wish(OperatorRequest::Arm);
     assert!(!answer.accepted && answer.answer.contains("only observes"), "{answer:?}");
-    assert!(session.wish(Intent::Acknowledge).accepted);
+    assert!(session.wish(OperatorRequest::Acknowledge).accepted);
     session.ticks(10);
     assert_eq!(session.body.mode(), Mode::Observe);
     let writes = session.robot.writes;
@@ -390,7 +394,7 @@ fn an_observer_may_stop_and_then_lets_go_of_the_robot() {
 fn an_arming_on_its_way_when_the_session_ends_energises_nothing() {
     let mut session = Session::new(Backend::Simulator, None);
     let time_ns = session.time_ms * 1_000_000;
-    session.supervisor.carry_out(&Wish { intent: Intent::Arm, stops: 0, time_ns }, time_ns);
+    session.supervisor.carry_out(&StampedRequest { intent: OperatorRequest::Arm, stops: 0, time_ns }, time_ns);
     assert_eq!(session.supervisor.mode(), Mode::Disarmed, "of the arming nothing is heard yet");
     session.supervisor.say_goodbye(true);
     session.supervisor.stop();
@@ -442,7 +446,7 @@ fn control_is_taken_only_once_a_screen_was_heard() {
 /// One thing that happens.
 #[derive(Debug, Clone, Copy)]
 enum Step {
-    Wish(fn() -> Intent),
+    Request(fn() -> OperatorRequest),
     Stop,
     Tamper(fn(&mut RobotState)),
     PowerCycle,
@@ -450,15 +454,15 @@ enum Step {
 }
 
 fn any_step() -> impl Strategy<Value = Step> {
-    let wishes: [fn() -> Intent; 8] = [
-        || Intent::Arm,
-        || Intent::Acknowledge,
-        || Intent::Confirm(OperatorCheck::LowLevel),
-        || Intent::Confirm(OperatorCheck::Configuration),
-        || Intent::Confirm(OperatorCheck::AreaClear),
-        || Intent::SitDown,
-        || Intent::Cancel,
-        || Intent::Judge(Verdict::Void),
+    let wishes: [fn() -> OperatorRequest; 8] = [
+        || OperatorRequest::Arm,
+        || OperatorRequest::Acknowledge,
+        || OperatorRequest::Confirm(OperatorCheck::LowLevel),
+        || OperatorRequest::Confirm(OperatorCheck::Configuration),
+        || OperatorRequest::Confirm(OperatorCheck::AreaClear),
+        || OperatorRequest::SitDown,
+        || OperatorRequest::Cancel,
+        || OperatorRequest::Judge(Verdict::Void),
     ];
     let tampers: [fn(&mut RobotState); 4] = [
         |state| state.motor_enabled[7] = false,
@@ -467,9 +471,9 @@ fn any_step() -> impl Strategy<Value = Step> {
         |state| state.joint_velocity[4] = f64::NAN,
     ];
     prop_oneof![
-        3 => Just(Step::Wish(wishes[0])),
-        3 => Just(Step::Wish(wishes[1])),
-        6 => (2..wishes.len()).prop_map(move |i| Step::Wish(wishes[i])),
+        3 => Just(Step::Request(wishes[0])),
+        3 => Just(Step::Request(wishes[1])),
+        6 => (2..wishes.len()).prop_map(move |i| Step::Request(wishes[i])),
         2 => Just(Step::Stop),
         2 => (0..tampers.len()).prop_map(move |i| Step::Tamper(tampers[i])),
         2 => Just(Step::PowerCycle),
@@ -499,13 +503,13 @@ proptest! {
         for (step, ticks) in steps {
             let before = session.body.mode();
             match step {
-                Step::Wish(intent) => {
+                Step::Request(intent) => {
                     let intent = intent();
                     let answer = session.wish(intent.clone());
-                    low_level |= answer.accepted && intent == Intent::Confirm(OperatorCheck::LowLevel);
-                    area |= answer.accepted && intent == Intent::Confirm(OperatorCheck::AreaClear);
+                    low_level |= answer.accepted && intent == OperatorRequest::Confirm(OperatorCheck::LowLevel);
+                    area |= answer.accepted && intent == OperatorRequest::Confirm(OperatorCheck::AreaClear);
                     if !before.energised() && session.body.mode().energised() {
-                        prop_assert!(answer.accepted && intent == Intent::Arm, "{intent:?} energises");
+                        prop_assert!(answer.accepted && intent == OperatorRequest::Arm, "{intent:?} energises");
                         prop_assert!(before == Mode::Disarmed && low_level && area && follow, "armed without a word");
                     }
                 }

@@ -10,22 +10,24 @@ use std::time::Duration;
 
 use quadfrog::optimize::insight::IMPORTANCE_TRIALS;
 use quadfrog::optimize::study::Storage;
-use quadfrog::realtime::command::TrialSpec;
-use quadfrog::realtime::telemetry::{FallCause, TrialEnd};
-use quadfrog::recording::record::{Fixed, Insight, PointRecord, Record, Search, Source, Stage, Verdict};
-use quadfrog::session::life::{Life, Refusal};
+use quadfrog::recording::record::Record;
+use quadfrog::session::experiment::{Experiment, RequestRefusal};
+use quadfrog::telemetry::{FallCause, TrialEnd, TrialSpec};
+use quadfrog::trial::{
+    ExperimentStage, FixedParameter, PointRecord, ProposalInsight, ProposalSource, SearchStatus, Verdict,
+};
 use support::{accept, far, joined, life, open, plan, run, study, ticks};
 
 /// The newest of what the screen is told.
 #[derive(Default)]
 struct Told {
-    search: Option<Search>,
-    insight: Option<Insight>,
+    search: Option<SearchStatus>,
+    insight: Option<ProposalInsight>,
     points: Vec<PointRecord>,
     log: Vec<String>,
 }
 
-fn told(life: &mut Life, told: &mut Told) {
+fn told(life: &mut Experiment, told: &mut Told) {
     for record in life.take_records() {
         match record {
             Record::Search(search) => told.search = Some(search),
@@ -37,19 +39,19 @@ fn told(life: &mut Life, told: &mut Told) {
     }
 }
 
-fn search(life: &mut Life) -> Search {
+fn search(life: &mut Experiment) -> SearchStatus {
     let mut news = Told::default();
     told(life, &mut news);
     news.search.expect("the search has changed")
 }
 
-fn several(life: &mut Life, trials: usize) {
+fn several(life: &mut Experiment, trials: usize) {
     for _ in 0..trials {
         accept(life);
     }
 }
 
-fn value(life: &Life, name: &str) -> f64 {
+fn value(life: &Experiment, name: &str) -> f64 {
     life.proposal().unwrap().parameters.iter().find(|p| p.name == name).unwrap().value
 }
 
@@ -65,7 +67,7 @@ fn a_gain_is_checked_runs_in_one_trial_alone_and_stays_with_it() {
 
     life.set_gain("kp", 500.0).unwrap();
     let card = life.proposal().unwrap();
-    assert_eq!(card.source, Source::Operator);
+    assert_eq!(card.source, ProposalSource::Operator);
     let kp = &card.gains[0];
     assert_eq!((kp.name.as_str(), kp.value, kp.proposed), ("kp", 500.0, 400.0));
     let spec = accept(&mut life);
@@ -91,7 +93,7 @@ fn changes_of_a_card_are_taken_back_together() {
     life.set_parameter("Fx", 100.0).unwrap();
     life.clear_overrides().unwrap();
     let card = life.proposal().unwrap();
-    assert_eq!((card.source, card.gains[0].value), (Source::Sampler, 400.0));
+    assert_eq!((card.source, card.gains[0].value), (ProposalSource::Sampler, 400.0));
 }
 
 #[test]
@@ -100,13 +102,13 @@ fn a_fixed_parameter_has_its_value_for_so_many_trials_and_the_others_are_still_p
     let mut life = open(folder.path());
     several(&mut life, 4);
     life.fix("Fx", 60.0, 3).unwrap();
-    assert_eq!(search(&mut life).parameters[1].fixed, Some(Fixed { value: 60.0, trials: 3 }));
+    assert_eq!(search(&mut life).parameters[1].fixed, Some(FixedParameter { value: 60.0, trials: 3 }));
     let mut others = Vec::new();
     for left in [3, 2, 2, 1] {
         // Interrupted in between, it goes on.
         let mut life = open(folder.path());
-        assert_eq!(search(&mut life).parameters[1].fixed, Some(Fixed { value: 60.0, trials: left }));
-        assert_eq!(life.proposal().unwrap().source, Source::Sampler);
+        assert_eq!(search(&mut life).parameters[1].fixed, Some(FixedParameter { value: 60.0, trials: left }));
+        assert_eq!(life.proposal().unwrap().source, ProposalSource::Sampler);
         let spec = run(&mut life, TrialEnd::Settled);
         assert_eq!(spec.jump.fx_n, 60.0);
         others.push(spec.jump.fz_n);
@@ -181,7 +183,7 @@ fn bounds_are_changed_within_what_safety_allows_and_kept() {
 }
 
 /// A jump whose length is what its parameters say, plus noise of its seed.
-fn jump(life: &mut Life, noise: f64) {
+fn jump(life: &mut Experiment, noise: f64) {
     let card = life.proposal().expect("a proposal");
     let spec = life.approve(card.trial, card.revision).unwrap();
     let u = (spec.seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5;
@@ -207,7 +209,7 @@ fn the_best_of_a_finished_study_is_confirmed_beyond_its_budget() {
         }
         assert_eq!(news.search.as_ref().unwrap().confirming, Some(60 - repeats));
         let card = life.proposal().unwrap();
-        assert_eq!(card.source, Source::Confirm);
+        assert_eq!(card.source, ProposalSource::Confirm);
         assert!(trials.contains(&card.parent.unwrap()));
         jump(&mut life, 0.02);
         repeats += 1;
@@ -225,27 +227,27 @@ fn the_best_of_a_finished_study_is_confirmed_beyond_its_budget() {
     assert_eq!(news.points.iter().filter(|point| point.contender).count(), 3);
     let words = news.log.iter().find(|line| line.starts_with("confirmed")).expect("it is said");
     assert!(words.contains("% confidence") && words.contains("stood"), "{words}");
-    assert_eq!(life.proposal().unwrap().source, Source::Sampler, "the search goes on");
+    assert_eq!(life.proposal().unwrap().source, ProposalSource::Sampler, "the search goes on");
 }
 
 #[test]
 fn repeats_end_with_their_budget_or_when_they_are_called_off() {
     let mut life = life(6);
     (0..6).for_each(|_| jump(&mut life, 0.02));
-    assert_eq!(life.stage(), Stage::Finished);
+    assert_eq!(life.stage(), ExperimentStage::Finished);
     life.confirm_best(4).unwrap();
     let mut news = Told::default();
     for _ in 0..4 {
-        assert_eq!(life.stage(), Stage::Proposed);
+        assert_eq!(life.stage(), ExperimentStage::Proposed);
         jump(&mut life, 50.0);
     }
     told(&mut life, &mut news);
-    assert_eq!(life.stage(), Stage::Finished);
+    assert_eq!(life.stage(), ExperimentStage::Finished);
     assert!(news.log.iter().any(|line| line.contains("used up") && line.contains("short of 95 %")), "{:?}", news.log);
     life.confirm_best(4).unwrap();
-    assert_eq!(life.stage(), Stage::Proposed);
+    assert_eq!(life.stage(), ExperimentStage::Proposed);
     assert!(life.confirm_best(0).unwrap().is_empty());
-    assert_eq!(life.stage(), Stage::Finished);
+    assert_eq!(life.stage(), ExperimentStage::Finished);
     assert!(life.confirm_best(0).unwrap_err().to_string().contains("nothing is being confirmed"));
 }
 
@@ -256,16 +258,16 @@ fn the_verdict_that_ended_a_confirmation_can_be_undone() {
     several(&mut life, 6);
     life.confirm_best(40).unwrap();
     let mut news = Told::default();
-    while life.stage() == Stage::Proposed {
+    while life.stage() == ExperimentStage::Proposed {
         accept(&mut life);
     }
     told(&mut life, &mut news);
     assert!(news.log.iter().any(|line| line.starts_with("confirmed")));
     life.undo().unwrap();
     life.judge(Verdict::Void, false).unwrap();
-    assert_eq!(life.stage(), Stage::Proposed, "one repeat is missing again");
+    assert_eq!(life.stage(), ExperimentStage::Proposed, "one repeat is missing again");
     accept(&mut life);
-    assert_eq!(life.stage(), Stage::Finished);
+    assert_eq!(life.stage(), ExperimentStage::Finished);
 }
 
 #[test]
@@ -307,7 +309,7 @@ fn a_point_queued_by_another_program_comes_next() {
     let mut other = study(Storage::File(folder.path().join("study.log")));
     other.enqueue(&[("Fx".into(), 77.0)], &[]).unwrap();
     life.look().unwrap();
-    assert_eq!((life.proposal().unwrap().source, value(&life, "Fx")), (Source::Queued, 77.0));
+    assert_eq!((life.proposal().unwrap().source, value(&life, "Fx")), (ProposalSource::Queued, 77.0));
     // Not over the operator's head.
     let mut other = study(Storage::File(folder.path().join("study.log")));
     accept(&mut life);
@@ -320,7 +322,7 @@ fn a_point_queued_by_another_program_comes_next() {
 }
 
 /// A study in which this trial is to be run again, and another program has queued a point with Fx = 77 at the same moment.
-fn rerun_beside_a_queued_point(folder: &Path) -> (Life, TrialSpec) {
+fn rerun_beside_a_queued_point(folder: &Path) -> (Experiment, TrialSpec) {
     let mut life = open(folder);
     let spec = run(&mut life, TrialEnd::Fell(FallCause::BodyContact));
     life.judge(Verdict::Void, true).unwrap();
@@ -351,7 +353,7 @@ fn a_point_queued_beside_a_rerun_runs_and_so_does_the_rerun() {
     assert!(of(77.0).is_some(), "the queued point is lost: {both:?}");
     let again = of(spec.jump.fx_n).expect("the re-run is lost");
     assert_eq!((again.jump, life.row(again.trial).unwrap().parent), (spec.jump, Some(spec.trial)));
-    assert_eq!(life.proposal().unwrap().source, Source::Sampler, "nothing comes twice");
+    assert_eq!(life.proposal().unwrap().source, ProposalSource::Sampler, "nothing comes twice");
 }
 
 /// (A danger once: it ran, with whatever it said.)
@@ -386,7 +388,7 @@ fn gains_that_a_queued_point_brings_are_seen_on_its_card() {
     let mut life = life(5);
     life.enqueue(&[("Fx".into(), 60.0), ("kp".into(), 500.0)]).unwrap();
     let card = life.proposal().unwrap();
-    assert_eq!((card.gains[0].value, card.gains[0].proposed, card.source), (500.0, 400.0, Source::Queued));
+    assert_eq!((card.gains[0].value, card.gains[0].proposed, card.source), (500.0, 400.0, ProposalSource::Queued));
     assert_eq!(accept(&mut life).gains.kp, 500.0);
     let refusal = life.enqueue(&[("Fx".into(), 60.0), ("kp".into(), 5000.0)]).unwrap_err().to_string();
     assert!(refusal.contains("kp = 5000"), "{refusal}");
@@ -399,7 +401,7 @@ fn a_confirmation_that_is_refused_tells_nothing() {
     accept(&mut life);
     assert!(life.confirm_best(10).is_err(), "one point is nothing to compare");
     life.undo().unwrap();
-    assert_eq!(life.stage(), Stage::Review);
+    assert_eq!(life.stage(), ExperimentStage::Review);
 }
 
 #[test]
@@ -418,27 +420,27 @@ fn a_verdict_against_the_suggestion_says_so_until_it_is_undone() {
 fn workers_together_run_no_more_repeats_than_were_asked_for() {
     let folder = tempfile::tempdir().unwrap();
     let file = || Storage::File(folder.path().join("study.log"));
-    let mut first = Life::open(plan(6), study(file())).unwrap();
+    let mut first = Experiment::open(plan(6), study(file())).unwrap();
     several(&mut first, 6);
     first.confirm_best(1).unwrap();
     let mut second = joined(folder.path(), 6, Duration::from_secs(3600));
     let seen = second.proposal().unwrap();
-    assert_eq!(seen.source, Source::Confirm);
+    assert_eq!(seen.source, ProposalSource::Confirm);
     run(&mut first, TrialEnd::Stopped);
     let refused = second.approve(seen.trial, seen.revision);
-    assert!(matches!(refused, Err(Refusal::Overtaken(_))), "{refused:?}");
+    assert!(matches!(refused, Err(RequestRefusal::Overtaken(_))), "{refused:?}");
     assert!(second.proposal().is_none() && second.others_run(), "the only repeat runs already");
     // It comes to nothing: whoever is faster takes it up.
     first.judge(Verdict::Void, false).unwrap();
     first.close().unwrap();
     second.look().unwrap();
-    assert_eq!(second.proposal().unwrap().source, Source::Confirm);
+    assert_eq!(second.proposal().unwrap().source, ProposalSource::Confirm);
     accept(&mut second);
     let late = first.proposal().unwrap();
-    assert!(matches!(first.approve(late.trial, late.revision), Err(Refusal::Overtaken(_))));
+    assert!(matches!(first.approve(late.trial, late.revision), Err(RequestRefusal::Overtaken(_))));
     second.close().unwrap();
     first.look().unwrap();
-    assert_eq!((first.stage(), second.stage()), (Stage::Finished, Stage::Finished));
+    assert_eq!((first.stage(), second.stage()), (ExperimentStage::Finished, ExperimentStage::Finished));
     let study = study(file());
     let repeats = study.trials().iter().filter(|trial| trial.user_attributes["source"] == "confirm");
     let completed: Vec<bool> = repeats.map(|trial| trial.value.is_some()).collect();

@@ -3,12 +3,11 @@
 use quadfrog::config::{Backend, Config};
 use quadfrog::engine::{Options, open_life};
 use quadfrog::optimize::journal::Durability;
-use quadfrog::realtime::command::Task;
-use quadfrog::recording::record::TrialRecord;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::session::automatic;
 use quadfrog::session::rollout::Rollout;
 use quadfrog::sim::Simulator;
+use quadfrog::trial::{Task, TrialRecord};
 
 const TRIALS: u32 = 20;
 

@@ -12,14 +12,15 @@ use super::merge::merge;
 use super::safety::SafetyFile;
 use crate::control::estimator::GRAVITY;
 use crate::control::leg::stance_of;
-use crate::control::settings::{EstimatorSettings, ObjectiveSource, Ramp, Settings, Settle, Stand, TaskControl};
+use crate::control::settings::{
+    ControlSettings, EstimatorSettings, ObjectiveSource, RampSettings, SettleSettings, StandSettings, TaskControl,
+};
 use crate::optimize::sampler::{SamplerConfig, SamplerKind};
-use crate::realtime::command::Task;
 use crate::realtime::scheduling::Scheduling;
-use crate::recording::record::ParameterInfo;
 use crate::robot::Leg;
 use crate::robot::description::RobotDescription;
 use crate::sim::{SimConfig, SimError};
+use crate::trial::{ParameterInfo, Task};
 
 /// The files of a configuration folder and their defaults.
 const FILES: [(&str, &str); 5] = [
@@ -61,13 +62,13 @@ pub enum Backend {
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct ControlFile {
     /// Standing up.
-    pub stand_up: Ramp,
+    pub stand_up: RampSettings,
     /// Sitting down.
-    pub sit_down: Ramp,
+    pub sit_down: RampSettings,
     /// From approval to the impulse.
     pub countdown: Countdown,
     /// When a trial is over.
-    pub settle: Settle,
+    pub settle: SettleSettings,
     /// When a foot is on the ground.
     pub contact: Contact,
     /// How the base's state is estimated.
@@ -310,13 +311,18 @@ impl Config {
     ///
     /// # Errors
     /// When the stance of `task` is out of the robot's reach, or the objective cannot be measured on `backend`.
-    pub fn settings(&self, robot: &RobotDescription, task: Task, backend: Backend) -> Result<Settings, ConfigError> {
+    pub fn settings(
+        &self,
+        robot: &RobotDescription,
+        task: Task,
+        backend: Backend,
+    ) -> Result<ControlSettings, ConfigError> {
         let chosen = self.task(task);
         self.check_stance(robot, task)?;
         let hardware = backend == Backend::Hardware;
         let SafetyFile { watchdog, fall, .. } = &self.safety;
         let (min_position, max_position) = robot.allowed_positions();
-        Ok(Settings {
+        Ok(ControlSettings {
             geometry: robot.leg_geometry,
             hip_origin_body: Leg::ALL.map(|leg| robot.legs[leg as usize].joint_origin[0]),
             imu_origin_body: robot.imu_origin,
@@ -328,7 +334,7 @@ impl Config {
             // A folded leg rests on its mechanical stop; what is asked of the motors ends at the limit.
             lying_position: std::array::from_fn(|i| robot.lying_position[i].clamp(min_position[i], max_position[i])),
             weight_n: robot.total_mass() * GRAVITY,
-            stand: Stand { gains: chosen.gains(), stance_leg: chosen.stance_leg(), vmc: chosen.vmc },
+            stand: StandSettings { gains: chosen.gains(), stance_leg: chosen.stance_leg(), vmc: chosen.vmc },
             stand_up: self.control.stand_up,
             sit_down: self.control.sit_down,
             countdown_s: if hardware { self.control.countdown.hardware_s } else { self.control.countdown.simulator_s },

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use toml::{Table, Value};
 
 use super::{Config, ConfigError};
-use crate::realtime::command::Task;
+use crate::trial::Task;
 
 impl Config {
     /// Writes the files of this configuration into `folder`, which may exist but hold none of them, so that a new study of

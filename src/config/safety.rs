@@ -5,21 +5,21 @@ use std::collections::BTreeMap;
 use serde::Deserialize;
 
 use super::{Config, ConfigError};
-use crate::control::settings::{ApprovalLimits, Fall, Gate, PreArm, Watchdog};
+use crate::control::settings::{ApprovalLimits, ArmingLimits, FailsafeLimits, FallLimits, GateLimits};
 
 /// `safety.toml`.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct SafetyFile {
     /// When the robot counts as fallen.
-    pub fall: Fall,
+    pub fall: FallLimits,
     /// The last gate.
-    pub gate: Gate,
+    pub gate: GateLimits,
     /// What must hold before the robot is energised.
-    pub pre_arm: PreArm,
+    pub pre_arm: ArmingLimits,
     /// How long an approval holds.
     pub approval: ApprovalLimits,
     /// What trips the watchdog.
-    pub watchdog: Watchdog,
+    pub watchdog: FailsafeLimits,
     /// The widest bounds of each parameter.
     pub parameters: BTreeMap<String, [f64; 2]>,
     /// The range of each gain of the controller.

@@ -1,21 +1,22 @@
 //! One control tick: read, estimate, watch, decide, limit, write, publish. An ordinary call: the real-time thread makes
 //! it a thousand times a second, a rollout as fast as the machine goes.
 
+use super::arming::{self, ArmingChecks};
+use super::failsafe::{self, Failsafe, FailsafeAction};
 use super::jump::{FallWatch, Jump, Progress};
 use super::leg::{self, LegTarget};
-use super::limits::{Gate, ticks};
-use super::mode::{self, Request};
-use super::pre_arm::{self, PreArm};
+use super::limits::{CommandGate, ticks};
+use super::mode::{self, Trigger};
 use super::ramp::{PoseRamp, RampProgress};
-use super::settings::Settings;
-use super::watchdog::{self, Level, Watchdog};
+use super::settings::ControlSettings;
 use crate::control::estimator::Estimator;
 use crate::realtime::clock::Clock;
-use crate::realtime::command::{Command, Permit, TrialSpec};
-use crate::realtime::pre_arm::Findings;
-use crate::realtime::telemetry::{Cause, Caution, Event, Fault, Mode, Objection, Phase, Readiness, Tick, TrialEnd};
 use crate::robot::kinematics::Foot;
 use crate::robot::{JointCommand, Joints, LEGS, Leg, PerLeg, Placement, Robot, RobotError, robot_time_passed};
+use crate::telemetry::{
+    ArmingFindings, Command, CommandRefusal, Event, FailsafeWarning, Fault, Mode, Permit, Phase, Readiness, Tick,
+    TransitionCause, TrialEnd, TrialSpec,
+};
 use nalgebra::{Matrix3, Vector3};
 
 /// For how many ticks a caution is told, so that a session that looks ten times a second misses none.
@@ -66,23 +67,23 @@ impl Events {
 /// The control cycle of one robot. `Copy`, so that a copy shares nothing with it.
 #[derive(Debug, Clone, Copy)]
 pub struct Cycle {
-    settings: Settings,
+    settings: ControlSettings,
     mode: Mode,
     /// Why the mode is what it is.
-    cause: Cause,
+    cause: TransitionCause,
     /// How often it changed.
     mode_changes: u64,
     /// Ticks since it changed.
     mode_ticks: u32,
     estimator: Estimator,
-    watchdog: Watchdog,
+    watchdog: Failsafe,
     /// What trips in this tick.
     standing: Option<Fault>,
     /// The newest caution and for how many ticks it is still told.
-    caution: Option<(Caution, u32)>,
-    pre_arm: PreArm,
-    findings: Findings,
-    gate: Gate,
+    caution: Option<(FailsafeWarning, u32)>,
+    pre_arm: ArmingChecks,
+    findings: ArmingFindings,
+    gate: CommandGate,
     ramp: Option<PoseRamp>,
     jump: Option<Jump>,
     /// Ticks that have carried the running trial so far.
@@ -105,20 +106,20 @@ pub struct Cycle {
 
 impl Cycle {
     /// A cycle that has not heard of its robot yet.
-    pub fn new(settings: &Settings) -> Cycle {
+    pub fn new(settings: &ControlSettings) -> Cycle {
         Cycle {
             settings: *settings,
             mode: Mode::Offline,
-            cause: Cause::Course,
+            cause: TransitionCause::Course,
             mode_changes: 0,
             mode_ticks: 0,
             estimator: Estimator::default(),
-            watchdog: Watchdog::default(),
+            watchdog: Failsafe::default(),
             standing: None,
             caution: None,
-            pre_arm: PreArm::default(),
-            findings: Findings::default(),
-            gate: Gate::default(),
+            pre_arm: ArmingChecks::default(),
+            findings: ArmingFindings::default(),
+            gate: CommandGate::default(),
             ramp: None,
             jump: None,
             trial_ticks: 0,
@@ -135,7 +136,7 @@ impl Cycle {
     }
 
     /// A cycle whose robot stands ready for a trial: for rollouts, in which nobody arms.
-    pub fn ready(settings: &Settings) -> Cycle {
+    pub fn ready(settings: &ControlSettings) -> Cycle {
         Cycle { mode: Mode::Ready, ..Cycle::new(settings) }
     }
 
@@ -153,7 +154,7 @@ impl Cycle {
     pub fn readiness(&self) -> Readiness {
         Readiness {
             findings: self.findings,
-            hold: watchdog::hold(&self.tick.state, &self.settings),
+            hold: failsafe::hold(&self.tick.state, &self.settings),
             caution: self.caution.map(|(caution, _)| caution),
         }
     }
@@ -188,13 +189,13 @@ impl Cycle {
             self.obey(&command, inputs, robot);
         }
         if inputs.stop {
-            self.request(Request::Stop, Cause::Stop);
+            self.request(Trigger::Stop, TransitionCause::Stop);
         }
         let wanted = self.decide();
         let passed = self.gate.pass(&wanted, &self.tick.state, &self.settings);
         let mut sent = passed.command;
         if let Some(fault) = passed.fault {
-            self.request(Request::Fault, Cause::Fault(fault));
+            self.request(Trigger::Fault, TransitionCause::Fault(fault));
             sent = JointCommand::damping(self.settings.gate.damping_kd);
         }
         let decided_ns = clock.now_ns();
@@ -229,7 +230,7 @@ impl Cycle {
                 self.tick.state = state;
                 self.state_age_ms = 0;
                 if self.mode == Mode::Offline {
-                    self.request(Request::Heard, Cause::Connected);
+                    self.request(Trigger::Heard, TransitionCause::Connected);
                 }
             }
             Err(RobotError::Silent { age_ms }) => self.state_age_ms = age_ms,
@@ -246,7 +247,7 @@ impl Cycle {
     /// The table of watchdogs; a robot that fell; one that stood waiting for too long.
     fn watch<R: Robot + ?Sized>(&mut self, inputs: &Inputs, restarted: bool, robot: &R) {
         self.watchdog.begin(inputs.time_ns, inputs.lateness_ns, &self.settings);
-        let seen = watchdog::Seen {
+        let seen = failsafe::FailsafeInputs {
             mode: self.mode,
             state: &self.tick.state,
             estimate: &self.tick.estimate,
@@ -259,14 +260,14 @@ impl Cycle {
             events_lost: inputs.events_lost,
         };
         let trip = self.watchdog.check(&seen, &self.settings);
-        self.caution = match (watchdog::caution(&seen, &self.settings), self.caution) {
+        self.caution = match (failsafe::caution(&seen, &self.settings), self.caution) {
             (Some(caution), _) => Some((caution, CAUTION_TICKS)),
             (None, Some((caution, left))) if left > 1 => Some((caution, left - 1)),
             _ => None,
         };
         self.standing = None;
         match trip {
-            Some(trip) if trip.level == Level::Cut => {
+            Some(trip) if trip.level == FailsafeAction::Cut => {
                 self.standing = Some(trip.fault);
                 self.cut(trip.fault);
                 return;
@@ -281,11 +282,11 @@ impl Cycle {
         if self.mode != Mode::Review {
             self.fall = FallWatch::default();
         } else if let Some(cause) = self.fall.observe_standing(&self.tick.state, &self.tick.estimate, &self.settings) {
-            self.request(Request::Fell, Cause::Fell(cause));
+            self.request(Trigger::Fell, TransitionCause::Fell(cause));
         }
         let allowed_s = self.settings.idle_s;
         if matches!(self.mode, Mode::Ready | Mode::Review) && allowed_s > 0.0 && self.mode_ticks > ticks(allowed_s) {
-            self.request(Request::SitDown, Cause::Idle { allowed_s });
+            self.request(Trigger::SitDown, TransitionCause::Idle { allowed_s });
         }
     }
 
@@ -293,11 +294,11 @@ impl Cycle {
     /// worthless: that one is told whenever it comes.
     fn cut(&mut self, fault: Fault) {
         let kind = std::mem::discriminant::<Fault>;
-        let told = matches!(self.cause, Cause::Fault(before) if kind(&before) == kind(&fault));
+        let told = matches!(self.cause, TransitionCause::Fault(before) if kind(&before) == kind(&fault));
         if self.mode != Mode::Fault {
-            self.request(Request::Fault, Cause::Fault(fault));
+            self.request(Trigger::Fault, TransitionCause::Fault(fault));
         } else if !told && fault.voids_the_word() {
-            self.change(Mode::Fault, Cause::Fault(fault));
+            self.change(Mode::Fault, TransitionCause::Fault(fault));
         }
     }
 
@@ -305,7 +306,7 @@ impl Cycle {
     fn land(&mut self, fault: Fault) {
         match self.mode {
             Mode::StandUp | Mode::Ready | Mode::Countdown | Mode::Review => {
-                self.request(Request::SitDown, Cause::Fault(fault));
+                self.request(Trigger::SitDown, TransitionCause::Fault(fault));
             }
             Mode::Jump => {
                 self.landing.get_or_insert(fault);
@@ -321,7 +322,7 @@ impl Cycle {
     /// How the pre-arm list stands: looked at while it matters, from the newest state.
     fn check_pre_arm<R: Robot + ?Sized>(&mut self, robot: &R) {
         if self.mode == Mode::Disarmed {
-            let seen = pre_arm::Seen {
+            let seen = arming::ArmingInputs {
                 state: &self.tick.state,
                 estimate: &self.tick.estimate,
                 state_age_ms: self.state_age_ms,
@@ -334,16 +335,16 @@ impl Cycle {
     /// One command of the session: carried out, or refused and said so.
     fn obey<R: Robot + ?Sized>(&mut self, command: &Command, inputs: &Inputs, robot: &mut R) {
         let request = match command {
-            Command::TakeControl => Request::TakeControl,
-            Command::Release => Request::Release,
-            Command::Arm(_) => Request::Arm,
-            Command::SitDown => Request::SitDown,
-            Command::RunTrial(..) => Request::Approve,
-            Command::Cancel => Request::Cancel,
+            Command::TakeControl => Trigger::TakeControl,
+            Command::Release => Trigger::Release,
+            Command::Arm(_) => Trigger::Arm,
+            Command::SitDown => Trigger::SitDown,
+            Command::RunTrial(..) => Trigger::Approve,
+            Command::Cancel => Trigger::Cancel,
             // A robot that fell was judged: looked at, that is. It still has to be armed anew.
-            Command::EndReview if matches!(self.cause, Cause::Fell(_)) => Request::Acknowledge,
-            Command::EndReview => Request::EndReview,
-            Command::Acknowledge { .. } => Request::Acknowledge,
+            Command::EndReview if matches!(self.cause, TransitionCause::Fell(_)) => Trigger::Acknowledge,
+            Command::EndReview => Trigger::EndReview,
+            Command::Acknowledge { .. } => Trigger::Acknowledge,
             // No request: from the next tick on `watch` lands whatever is energised.
             Command::Leave => {
                 self.left = true;
@@ -371,13 +372,13 @@ impl Cycle {
             }
             _ => {}
         }
-        self.request(request, Cause::Command);
+        self.request(request, TransitionCause::Command);
     }
 
     /// What speaks against a command, if anything does.
-    fn may(&self, command: &Command, request: Request, inputs: &Inputs) -> Result<(), Objection> {
+    fn may(&self, command: &Command, request: Trigger, inputs: &Inputs) -> Result<(), CommandRefusal> {
         if mode::next(self.mode, request).is_none() {
-            return Err(Objection::Mode);
+            return Err(CommandRefusal::Mode);
         }
         match *command {
             Command::TakeControl => self.watched(inputs),
@@ -386,40 +387,41 @@ impl Cycle {
                 self.fresh(permit, inputs)?;
                 match self.findings.failing() {
                     failing if failing.is_empty() => Ok(()),
-                    failing => Err(Objection::Checks(failing)),
+                    failing => Err(CommandRefusal::Checks(failing)),
                 }
             }
-            Command::Acknowledge { .. } => self.standing.map_or(Ok(()), |fault| Err(Objection::Standing(fault))),
+            Command::Acknowledge { .. } => self.standing.map_or(Ok(()), |fault| Err(CommandRefusal::Standing(fault))),
             Command::RunTrial(_, permit) => {
                 self.fresh(permit, inputs)?;
-                watchdog::hold(&self.tick.state, &self.settings).map_or(Ok(()), |hold| Err(Objection::Hold(hold)))
+                failsafe::hold(&self.tick.state, &self.settings)
+                    .map_or(Ok(()), |hold| Err(CommandRefusal::Inhibited(hold)))
             }
             _ => Ok(()),
         }
     }
 
     /// Somebody watches: without that nothing is sent to a robot that was only observed, and none stands up.
-    fn watched(&self, inputs: &Inputs) -> Result<(), Objection> {
+    fn watched(&self, inputs: &Inputs) -> Result<(), CommandRefusal> {
         let (silent_ms, allowed_ms) = (inputs.operator_silent_ms, self.settings.watchdog.operator_silent_ms);
         if self.left {
-            Err(Objection::Leaving)
+            Err(CommandRefusal::Leaving)
         } else if silent_ms > allowed_ms {
-            Err(Objection::OperatorSilent { silent_ms, allowed_ms })
+            Err(CommandRefusal::OperatorSilent { silent_ms, allowed_ms })
         } else {
             Ok(())
         }
     }
 
     /// The key press is of this moment and of this mode.
-    fn fresh(&self, Permit { mode_changes, given_ns }: Permit, inputs: &Inputs) -> Result<(), Objection> {
+    fn fresh(&self, Permit { mode_changes, given_ns }: Permit, inputs: &Inputs) -> Result<(), CommandRefusal> {
         let age_s = inputs.time_ns.saturating_sub(given_ns) as f64 * 1e-9;
         let allowed_s = self.settings.approval.expires_s;
         if self.left {
-            Err(Objection::Leaving)
+            Err(CommandRefusal::Leaving)
         } else if mode_changes != self.mode_changes {
-            Err(Objection::Stale)
+            Err(CommandRefusal::Stale)
         } else if age_s > allowed_s {
-            Err(Objection::Expired { age_s, allowed_s })
+            Err(CommandRefusal::Expired { age_s, allowed_s })
         } else {
             Ok(())
         }
@@ -465,17 +467,17 @@ impl Cycle {
             };
             match (self.mode, progress) {
                 (Mode::Countdown, Progress::Jump | Progress::Settle) => {
-                    self.request(Request::CountdownOver, Cause::Course);
+                    self.request(Trigger::CountdownOver, TransitionCause::Course);
                 }
-                (Mode::Jump, Progress::Settle) => self.request(Request::Landed, Cause::Course),
-                (_, Progress::Over(TrialEnd::Fell(cause))) => self.request(Request::Fell, Cause::Fell(cause)),
+                (Mode::Jump, Progress::Settle) => self.request(Trigger::Landed, TransitionCause::Course),
+                (_, Progress::Over(TrialEnd::Fell(cause))) => self.request(Trigger::Fell, TransitionCause::Fell(cause)),
                 (_, Progress::Over(end)) => {
                     // A jump may be over without a moment of settling.
                     if self.mode == Mode::Jump {
-                        self.request(Request::Landed, Cause::Course);
+                        self.request(Trigger::Landed, TransitionCause::Course);
                     }
                     self.finish_trial(self.landing.map_or(end, TrialEnd::Fault));
-                    self.request(Request::Settled, Cause::Course);
+                    self.request(Trigger::Settled, TransitionCause::Course);
                 }
                 _ => {}
             }
@@ -483,13 +485,13 @@ impl Cycle {
         if let Some(ramp) = &mut self.ramp {
             match ramp.progress(&self.tick.state.joint_position) {
                 RampProgress::Moving => {}
-                RampProgress::Reached => self.request(Request::PoseReached, Cause::Course),
+                RampProgress::Reached => self.request(Trigger::PoseReached, TransitionCause::Course),
                 RampProgress::Late { .. } if self.mode == Mode::SitDown => {
                     // Lying down is where the floor stops it: damping is safe from here.
-                    self.request(Request::PoseReached, Cause::Course);
+                    self.request(Trigger::PoseReached, TransitionCause::Course);
                 }
                 RampProgress::Late { error_rad } => {
-                    self.request(Request::Fault, Cause::Fault(Fault::PoseTimeout { error_rad }));
+                    self.request(Trigger::Fault, TransitionCause::Fault(Fault::PoseTimeout { error_rad }));
                 }
             }
         }
@@ -523,13 +525,13 @@ impl Cycle {
     }
 
     /// The only place where the mode changes.
-    fn request(&mut self, request: Request, cause: Cause) {
+    fn request(&mut self, request: Trigger, cause: TransitionCause) {
         if let Some(to) = mode::next(self.mode, request).filter(|to| *to != self.mode) {
             self.change(to, cause);
         }
     }
 
-    fn change(&mut self, to: Mode, cause: Cause) {
+    fn change(&mut self, to: Mode, cause: TransitionCause) {
         let from = self.mode;
         self.mode = to;
         self.cause = cause;
@@ -545,10 +547,13 @@ impl Cycle {
         };
         if !matches!(to, Mode::Countdown | Mode::Jump | Mode::Settle) {
             self.finish_trial(match cause {
-                Cause::Stop => TrialEnd::Stopped,
-                Cause::Fell(cause) => TrialEnd::Fell(cause),
-                Cause::Fault(fault) => TrialEnd::Fault(fault),
-                Cause::Command | Cause::Course | Cause::Connected | Cause::Idle { .. } => TrialEnd::Cancelled,
+                TransitionCause::Stop => TrialEnd::Stopped,
+                TransitionCause::Fell(cause) => TrialEnd::Fell(cause),
+                TransitionCause::Fault(fault) => TrialEnd::Fault(fault),
+                TransitionCause::Command
+                | TransitionCause::Course
+                | TransitionCause::Connected
+                | TransitionCause::Idle { .. } => TrialEnd::Cancelled,
             });
         }
     }

@@ -2,8 +2,8 @@
 
 use nalgebra::Vector3;
 
-use crate::realtime::command::Gains;
 use crate::robot::kinematics::Foot;
+use crate::trial::Gains;
 
 /// The force that the virtual spring and damper at the foot ask for, leg frame, N: Kp (p_d - p) - Kd v.
 pub fn force_leg(

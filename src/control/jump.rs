@@ -1,12 +1,11 @@
-//! One trial: stand still, impulse, flight, landing, settle. Settings are latched when it begins.
+//! One trial: stand still, impulse, flight, landing, settle. ControlSettings are latched when it begins.
 
 use super::force_profile::Oscillator;
 use super::leg::LegTarget;
 use super::limits::ticks;
-use super::settings::{PERIOD_S, Settings};
-use crate::realtime::command::TrialSpec;
-use crate::realtime::telemetry::{Estimate, FallCause, Phase, TrialEnd};
+use super::settings::{ControlSettings, PERIOD_S};
 use crate::robot::{LEGS, PerLeg, RobotState};
+use crate::telemetry::{Estimate, FallCause, Phase, TrialEnd, TrialSpec};
 use nalgebra::Vector3;
 
 /// How far a trial has come.
@@ -49,7 +48,7 @@ const LATEST_TAKEOFF_S: f64 = 0.1;
 
 impl Jump {
     /// Begins a trial: everything that it runs with is fixed from here on.
-    pub fn begin(spec: &TrialSpec, settings: &Settings) -> Jump {
+    pub fn begin(spec: &TrialSpec, settings: &ControlSettings) -> Jump {
         Jump {
             spec: *spec,
             oscillator: Oscillator {
@@ -122,7 +121,7 @@ impl Jump {
     }
 
     /// Takes note of the newest state and says how far the trial has come. Called once per tick, before `target`.
-    pub fn observe(&mut self, state: &RobotState, estimate: &Estimate, settings: &Settings) -> Progress {
+    pub fn observe(&mut self, state: &RobotState, estimate: &Estimate, settings: &ControlSettings) -> Progress {
         if let Some(cause) = self.fall.observe(state, estimate, settings) {
             return Progress::Over(TrialEnd::Fell(cause));
         }
@@ -184,7 +183,12 @@ pub struct FallWatch {
 
 impl FallWatch {
     /// Whether the robot has fallen by now, and by which sign. Called once per tick.
-    pub fn observe(&mut self, state: &RobotState, estimate: &Estimate, settings: &Settings) -> Option<FallCause> {
+    pub fn observe(
+        &mut self,
+        state: &RobotState,
+        estimate: &Estimate,
+        settings: &ControlSettings,
+    ) -> Option<FallCause> {
         self.look(state, estimate, settings, f64::INFINITY)
     }
 
@@ -194,7 +198,7 @@ impl FallWatch {
         &mut self,
         state: &RobotState,
         estimate: &Estimate,
-        settings: &Settings,
+        settings: &ControlSettings,
     ) -> Option<FallCause> {
         self.look(state, estimate, settings, settings.watchdog.stance_tilt_rad)
     }
@@ -203,7 +207,7 @@ impl FallWatch {
         &mut self,
         state: &RobotState,
         estimate: &Estimate,
-        settings: &Settings,
+        settings: &ControlSettings,
         most_rad: f64,
     ) -> Option<FallCause> {
         let touches = state.truth.is_some_and(|truth| truth.body_contact);

@@ -4,9 +4,9 @@
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::{force_profile, impedance, vmc};
-use crate::realtime::command::Gains;
 use crate::robot::kinematics::{Foot, LegGeometry};
 use crate::robot::{Joints, Leg, PerLeg, leg_of};
+use crate::trial::Gains;
 
 /// What the legs are to do in this tick.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,8 +1,8 @@
 //! The last gate: finite, clamp, rate. One function, after every controller, always.
 
-use super::settings::{PERIOD_S, Settings};
-use crate::realtime::telemetry::Fault;
+use super::settings::{ControlSettings, PERIOD_S};
 use crate::robot::{JOINTS, JointCommand, Joints, MotorCommand, RobotState};
+use crate::telemetry::Fault;
 
 /// What left the gate.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -17,11 +17,11 @@ pub struct Passed {
 
 /// The gate; remembers the last torques for the rate limit.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Gate {
+pub struct CommandGate {
     last_torque: Option<Joints>,
 }
 
-impl Gate {
+impl CommandGate {
     /// The next command is not compared with the last one: the robot was put somewhere else or was damped.
     pub fn reset(&mut self) {
         self.last_torque = None;
@@ -34,7 +34,7 @@ impl Gate {
     /// feed-forward torque beyond the joint's limit itself, against a law that asks for more than twice of it (an encoder that
     /// jumps), the law is left out: the torque alone is sent, which is the same if the measured numbers are right and harmless
     /// if they are not.
-    pub fn pass(&mut self, wanted: &JointCommand, state: &RobotState, settings: &Settings) -> Passed {
+    pub fn pass(&mut self, wanted: &JointCommand, state: &RobotState, settings: &ControlSettings) -> Passed {
         let damping = JointCommand::damping(settings.gate.damping_kd);
         if *wanted == damping {
             // The safe command needs no measured number, and passes even when there is none.

@@ -1,17 +1,17 @@
 //! The 1 kHz cycle: read, estimate, watch, decide, limit, write, publish. Pure functions and one `tick()`; no thread,
 //! no file, no lock, no allocation.
 
-pub mod body;
+pub mod arming;
+pub mod control_loop;
 pub mod cycle;
 pub mod estimator;
+pub mod failsafe;
 pub mod force_profile;
 pub mod impedance;
 pub mod jump;
 pub mod leg;
 pub mod limits;
 pub mod mode;
-pub mod pre_arm;
 pub mod ramp;
 pub mod settings;
 pub mod vmc;
-pub mod watchdog;

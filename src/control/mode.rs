@@ -1,10 +1,10 @@
 //! The legal changes of mode: one function, tested as a table. Table and reasons: `research/operators.md` D.3.
 
-use crate::realtime::telemetry::Mode;
+use crate::telemetry::Mode;
 
 /// What may change the mode.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Request {
+pub enum Trigger {
     /// The robot answers.
     Heard,
     /// The operator takes control.
@@ -39,25 +39,25 @@ pub enum Request {
     Acknowledge,
 }
 
-impl Request {
+impl Trigger {
     /// All requests.
-    pub const ALL: [Request; 16] = [
-        Request::Heard,
-        Request::TakeControl,
-        Request::Release,
-        Request::Arm,
-        Request::PoseReached,
-        Request::SitDown,
-        Request::Approve,
-        Request::Cancel,
-        Request::CountdownOver,
-        Request::Landed,
-        Request::Settled,
-        Request::EndReview,
-        Request::Fell,
-        Request::Stop,
-        Request::Fault,
-        Request::Acknowledge,
+    pub const ALL: [Trigger; 16] = [
+        Trigger::Heard,
+        Trigger::TakeControl,
+        Trigger::Release,
+        Trigger::Arm,
+        Trigger::PoseReached,
+        Trigger::SitDown,
+        Trigger::Approve,
+        Trigger::Cancel,
+        Trigger::CountdownOver,
+        Trigger::Landed,
+        Trigger::Settled,
+        Trigger::EndReview,
+        Trigger::Fell,
+        Trigger::Stop,
+        Trigger::Fault,
+        Trigger::Acknowledge,
     ];
 }
 
@@ -68,28 +68,28 @@ impl Request {
 /// 3. A robot that fell while energised is damped.
 /// 4. Damped and faulted modes are left by acknowledgement alone, and to Disarmed alone.
 /// 5. The only ways to more energy are Arm and Approve, and both begin with a key press.
-pub fn next(mode: Mode, request: Request) -> Option<Mode> {
+pub fn next(mode: Mode, request: Trigger) -> Option<Mode> {
     use Mode::*;
     match (mode, request) {
-        (Fault, Request::Stop) => Some(Fault),
-        (_, Request::Stop) => Some(Damped),
-        (Offline | Observe, Request::Fault) => None,
-        (_, Request::Fault) => Some(Fault),
-        (mode, Request::Fell) if mode.energised() => Some(Damped),
-        (Offline, Request::Heard) => Some(Observe),
-        (Observe, Request::TakeControl) => Some(Disarmed),
-        (Disarmed, Request::Release) => Some(Observe),
-        (Disarmed, Request::Arm) => Some(StandUp),
-        (StandUp, Request::PoseReached) => Some(Ready),
-        (Ready, Request::Approve) => Some(Countdown),
-        (Countdown, Request::Cancel) => Some(Ready),
-        (Countdown, Request::CountdownOver) => Some(Jump),
-        (Jump, Request::Landed) => Some(Settle),
-        (Settle, Request::Settled) => Some(Review),
-        (Review, Request::EndReview) => Some(Ready),
-        (StandUp | Ready | Countdown | Review, Request::SitDown) => Some(SitDown),
-        (SitDown, Request::PoseReached) => Some(Disarmed),
-        (Damped | Fault, Request::Acknowledge) => Some(Disarmed),
+        (Fault, Trigger::Stop) => Some(Fault),
+        (_, Trigger::Stop) => Some(Damped),
+        (Offline | Observe, Trigger::Fault) => None,
+        (_, Trigger::Fault) => Some(Fault),
+        (mode, Trigger::Fell) if mode.energised() => Some(Damped),
+        (Offline, Trigger::Heard) => Some(Observe),
+        (Observe, Trigger::TakeControl) => Some(Disarmed),
+        (Disarmed, Trigger::Release) => Some(Observe),
+        (Disarmed, Trigger::Arm) => Some(StandUp),
+        (StandUp, Trigger::PoseReached) => Some(Ready),
+        (Ready, Trigger::Approve) => Some(Countdown),
+        (Countdown, Trigger::Cancel) => Some(Ready),
+        (Countdown, Trigger::CountdownOver) => Some(Jump),
+        (Jump, Trigger::Landed) => Some(Settle),
+        (Settle, Trigger::Settled) => Some(Review),
+        (Review, Trigger::EndReview) => Some(Ready),
+        (StandUp | Ready | Countdown | Review, Trigger::SitDown) => Some(SitDown),
+        (SitDown, Trigger::PoseReached) => Some(Disarmed),
+        (Damped | Fault, Trigger::Acknowledge) => Some(Disarmed),
         _ => None,
     }
 }
@@ -102,8 +102,8 @@ mod tests {
     #[test]
     fn every_pair_of_mode_and_request_is_in_the_table() {
         use Mode::*;
-        use Request as R;
-        let table: [(Mode, &[(Request, Mode)]); 12] = [
+        use Trigger as R;
+        let table: [(Mode, &[(Trigger, Mode)]); 12] = [
             (Offline, &[(R::Heard, Observe), (R::Stop, Damped)]),
             (Observe, &[(R::TakeControl, Disarmed), (R::Stop, Damped)]),
             (Disarmed, &[(R::Release, Observe), (R::Arm, StandUp), (R::Stop, Damped), (R::Fault, Fault)]),
@@ -155,7 +155,7 @@ mod tests {
             (Fault, &[(R::Acknowledge, Disarmed), (R::Stop, Fault), (R::Fault, Fault)]),
         ];
         for (mode, legal) in table {
-            for request in Request::ALL {
+            for request in Trigger::ALL {
                 let expected = legal.iter().find(|(r, _)| *r == request).map(|(_, to)| *to);
                 assert_eq!(next(mode, request), expected, "{mode:?} {request:?}");
             }

@@ -1,7 +1,7 @@
 //! Standing up and sitting down: joint targets that move smoothly from the measured pose to another.
 
 use super::limits::ticks;
-use super::settings::Ramp;
+use super::settings::RampSettings;
 use crate::robot::{JOINTS, JointCommand, Joints, MotorCommand, RobotState};
 
 /// How far a ramp has come.
@@ -23,13 +23,13 @@ pub enum RampProgress {
 pub struct PoseRamp {
     from: Joints,
     to: Joints,
-    settings: Ramp,
+    settings: RampSettings,
     elapsed: u32,
 }
 
 impl PoseRamp {
     /// Starts at the measured angles, never at where the robot was thought to be.
-    pub fn begin(state: &RobotState, to: &Joints, settings: &Ramp) -> PoseRamp {
+    pub fn begin(state: &RobotState, to: &Joints, settings: &RampSettings) -> PoseRamp {
         PoseRamp { from: state.joint_position, to: *to, settings: *settings, elapsed: 0 }
     }
 

@@ -4,16 +4,17 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use crate::realtime::command::{Gains, JumpParameters, Task, TrialSpec};
 use crate::robot::kinematics::LegGeometry;
 use crate::robot::{Joints, PerLeg};
+use crate::telemetry::TrialSpec;
+use crate::trial::{Gains, JumpParameters, Task};
 
 /// Control period, s: the paper's 1 kHz.
 pub const PERIOD_S: f64 = 0.001;
 
 /// How the robot stands while nothing else is asked: gains, nominal feet, Virtual Model Control.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Stand {
+pub struct StandSettings {
     /// Gains of the leg controller.
     pub gains: Gains,
     /// Nominal foot position of a left leg, leg frame, m.
@@ -25,7 +26,7 @@ pub struct Stand {
 /// Standing up and sitting down: a ramp of joint targets from the measured pose.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Ramp {
+pub struct RampSettings {
     /// Duration, s.
     pub duration_s: f64,
     /// Joint stiffness, N m/rad.
@@ -41,7 +42,7 @@ pub struct Ramp {
 /// When a trial is over.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Settle {
+pub struct SettleSettings {
     /// How long all feet must be down and the body quiet, s.
     pub quiet_s: f64,
     /// Longest wait after the impulse, s.
@@ -55,7 +56,7 @@ pub struct Settle {
 /// When the robot counts as fallen.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Fall {
+pub struct FallLimits {
     /// Largest absolute roll, rad.
     pub roll_rad: f64,
     /// Largest absolute pitch, rad.
@@ -71,7 +72,7 @@ pub struct Fall {
 /// The last gate before the motors.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Gate {
+pub struct GateLimits {
     /// Largest change of a joint's torque from one tick to the next, N m.
     pub torque_step_nm: f64,
     /// Largest joint stiffness that may be sent, N m/rad.
@@ -85,7 +86,7 @@ pub struct Gate {
 /// What must hold before the robot is energised.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct PreArm {
+pub struct ArmingLimits {
     /// Oldest state, ms.
     pub state_age_ms: u32,
     /// Largest share of states lost in the last 5 s.
@@ -128,7 +129,7 @@ pub struct ApprovalLimits {
 /// landing and sits down, HOLD finishes the trial and refuses approvals.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Watchdog {
+pub struct FailsafeLimits {
     /// Largest tilt while standing, rad: CUT.
     pub stance_tilt_rad: f64,
     /// Largest tilt while sitting down, rad: CUT; and what the flight limits of `[fall]` may not exceed.
@@ -311,7 +312,7 @@ impl TaskControl {
 
 /// Everything that the control cycle is made with.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Settings {
+pub struct ControlSettings {
     /// Leg lengths.
     pub geometry: LegGeometry,
     /// Hip joints in the body frame, m.
@@ -333,17 +334,17 @@ pub struct Settings {
     /// Weight, N.
     pub weight_n: f64,
     /// How it stands between trials.
-    pub stand: Stand,
+    pub stand: StandSettings,
     /// Standing up.
-    pub stand_up: Ramp,
+    pub stand_up: RampSettings,
     /// Sitting down.
-    pub sit_down: Ramp,
+    pub sit_down: RampSettings,
     /// From approval to the impulse, standing still, s.
     pub countdown_s: f64,
     /// When a trial is over.
-    pub settle: Settle,
+    pub settle: SettleSettings,
     /// When the robot counts as fallen.
-    pub fall: Fall,
+    pub fall: FallLimits,
     /// Largest absolute roll or pitch with no foot down, rad.
     pub flight_tilt_rad: f64,
     /// Least force on a foot that counts as contact where the truth is known, N.
@@ -353,15 +354,15 @@ pub struct Settings {
     /// How it is estimated from the sensors.
     pub estimator: EstimatorSettings,
     /// The last gate.
-    pub gate: Gate,
+    pub gate: GateLimits,
     /// A machine that can hurt somebody: the whole pre-arm list holds.
     pub hardware: bool,
     /// Before the robot is energised.
-    pub pre_arm: PreArm,
+    pub pre_arm: ArmingLimits,
     /// How long an approval holds.
     pub approval: ApprovalLimits,
     /// The watchdog.
-    pub watchdog: Watchdog,
+    pub watchdog: FailsafeLimits,
     /// Latest start of a tick, ms; zero only counts late ticks.
     pub late_ms: f64,
     /// Longest wait in READY or REVIEW, s; zero waits for ever.

@@ -8,22 +8,22 @@ use std::sync::mpsc::Sender;
 use std::time::Duration;
 
 use super::guard::Lifeline;
-use crate::control::body::Body;
-use crate::control::settings::{PERIOD_S, Settings};
+use crate::control::control_loop::ControlLoop;
+use crate::control::settings::{ControlSettings, PERIOD_S};
 use crate::realtime::channel::ControlEnd;
 use crate::realtime::clock::Clock;
-use crate::realtime::scheduling::{Favour, Scheduling, Shortfall};
+use crate::realtime::scheduling::{DeniedSetting, RealtimeSetting, Scheduling};
 use crate::realtime::thread::{CONTROL_PHASE, Instant, Paced, REHEARSAL_LEAD, pace_rehearsed};
 use crate::robot::{JointCommand, Robot};
 
 /// What the thread is started with.
 pub struct Start<'a, C> {
     /// What the cycle is made with.
-    pub settings: &'a Settings,
+    pub settings: &'a ControlSettings,
     /// What is asked of the system.
     pub scheduling: Scheduling,
     /// Told once what the system granted, before the first tick.
-    pub told: Sender<(Vec<Favour>, Vec<Shortfall>)>,
+    pub told: Sender<(Vec<RealtimeSetting>, Vec<DeniedSetting>)>,
     /// The clock of the engine.
     pub clock: &'a C,
     /// Set when the thread is to end.
@@ -61,7 +61,7 @@ const fn lead(real: bool) -> Duration {
 
 /// A body and its robot, until the thread is told to end.
 struct Ticking<'a, C> {
-    body: Body,
+    body: ControlLoop,
     robot: &'a mut dyn Robot,
     clock: &'a C,
     closing: &'a AtomicBool,
@@ -97,7 +97,7 @@ fn drive<C: Clock>(
     paced: impl FnOnce(&mut dyn Paced) -> Result<(), nix::Error>,
     mut wait: impl FnMut(),
 ) -> std::thread::Result<()> {
-    let body = Body::new(start.settings, end);
+    let body = ControlLoop::new(start.settings, end);
     let lifeline = start.lifeline.take();
     let mut ticking = Ticking { body, robot, clock: start.clock, closing: start.closing, lifeline };
     // Afterwards the body is only asked for its mode, which a panic does not leave half changed.
@@ -129,9 +129,10 @@ mod tests {
     use crate::config::{Backend, Config};
     use crate::realtime::channel::channels;
     use crate::realtime::clock::SimulatedClock;
-    use crate::realtime::command::{Command, Task};
     use crate::robot::description::RobotDescription;
     use crate::robot::{Placement, RobotError, RobotState};
+    use crate::telemetry::Command;
+    use crate::trial::Task;
 
     /// Answers until `reads` or `rehearsals` is used up, then panics; keeps what it is sent.
     struct Brittle {

@@ -22,7 +22,7 @@ use std::time::Duration;
 use nix::fcntl::{FcntlArg, OFlag, fcntl};
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 
-use crate::control::settings::Settings;
+use crate::control::settings::ControlSettings;
 use crate::robot::go1::Go1;
 use crate::robot::go1::packet::{COMMAND_LENGTH, CrcForm, LowCmd};
 
@@ -61,7 +61,7 @@ impl Guard {
     ///
     /// # Errors
     /// When the process cannot be started, or no datagram can say the damping of `settings`.
-    pub fn post(program: &Path, robot: &Go1, settings: &Settings) -> std::io::Result<(Guard, Lifeline)> {
+    pub fn post(program: &Path, robot: &Go1, settings: &ControlSettings) -> std::io::Result<(Guard, Lifeline)> {
         let (socket, damping) = (robot.socket()?, robot.damping(settings.gate.damping_kd));
         let damping = damping.map_err(std::io::Error::other)?;
         let allowed_ms =

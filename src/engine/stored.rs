@@ -8,9 +8,8 @@ use crate::optimize::journal::{Durability, StudyRecord};
 use crate::optimize::sampler::{Direction, SamplerConfig};
 use crate::optimize::space::{Range, Space};
 use crate::optimize::study::{Storage, Study, StudyError, StudyOptions};
-use crate::realtime::command::Task;
-use crate::recording::record::ParameterInfo;
-use crate::session::life::BUDGET;
+use crate::session::experiment::BUDGET;
+use crate::trial::{ParameterInfo, Task};
 
 /// A study of this program that is on disk, or on a server.
 #[derive(Debug, Clone, PartialEq, Eq)]

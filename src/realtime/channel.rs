@@ -4,8 +4,7 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use super::command::Command;
-use super::telemetry::{Counters, Event, Readiness, Snapshot, Tick};
+use crate::telemetry::{Command, Counters, Event, Readiness, Snapshot, Tick};
 
 /// Commands that may wait.
 pub const COMMANDS: usize = 64;

@@ -2,9 +2,6 @@
 
 pub mod channel;
 pub mod clock;
-pub mod command;
-pub mod pre_arm;
 pub mod scheduling;
 pub mod system;
-pub mod telemetry;
 pub mod thread;

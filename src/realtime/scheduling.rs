@@ -24,7 +24,7 @@ pub struct Scheduling {
 
 /// One of the things asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Favour {
+pub enum RealtimeSetting {
     /// SCHED_FIFO at this priority.
     Priority(u8),
     /// The program's memory is locked.
@@ -35,13 +35,13 @@ pub enum Favour {
     Awake,
 }
 
-impl std::fmt::Display for Favour {
+impl std::fmt::Display for RealtimeSetting {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Favour::Priority(priority) => write!(f, "SCHED_FIFO priority {priority}"),
-            Favour::LockedMemory => write!(f, "locked memory"),
-            Favour::Core(core) => write!(f, "core {core}"),
-            Favour::Awake => write!(f, "processor kept awake"),
+            RealtimeSetting::Priority(priority) => write!(f, "SCHED_FIFO priority {priority}"),
+            RealtimeSetting::LockedMemory => write!(f, "locked memory"),
+            RealtimeSetting::Core(core) => write!(f, "core {core}"),
+            RealtimeSetting::Awake => write!(f, "processor kept awake"),
         }
     }
 }
@@ -49,9 +49,9 @@ impl std::fmt::Display for Favour {
 /// What was not granted, why, and the way to get it.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{favour} not granted: {reason}; {remedy}")]
-pub struct Shortfall {
+pub struct DeniedSetting {
     /// What was asked.
-    pub favour: Favour,
+    pub favour: RealtimeSetting,
     /// What the system says.
     pub reason: String,
     /// What to do.
@@ -67,36 +67,36 @@ const ALLOW_AWAKE: &str = "run as root, or give this user the right to write /de
 
 /// What was granted; the processor is kept awake for as long as this lives.
 #[derive(Debug)]
-pub struct Granted {
+pub struct GrantedSettings {
     /// What was granted.
-    pub favours: Vec<Favour>,
+    pub favours: Vec<RealtimeSetting>,
     /// What was not.
-    pub shortfalls: Vec<Shortfall>,
+    pub shortfalls: Vec<DeniedSetting>,
     _awake: Option<File>,
 }
 
 impl Scheduling {
     /// Asks for the calling thread. To be called before the loop: it allocates and waits.
-    pub fn apply(&self) -> Granted {
-        let mut granted = Granted { favours: Vec::new(), shortfalls: Vec::new(), _awake: None };
+    pub fn apply(&self) -> GrantedSettings {
+        let mut granted = GrantedSettings { favours: Vec::new(), shortfalls: Vec::new(), _awake: None };
         if self.priority == 0 {
             return granted;
         }
-        let mut note = |favour: Favour, asked: Result<(), String>, remedy: &'static str| match asked {
+        let mut note = |favour: RealtimeSetting, asked: Result<(), String>, remedy: &'static str| match asked {
             Ok(()) => granted.favours.push(favour),
-            Err(reason) => granted.shortfalls.push(Shortfall { favour, reason, remedy }),
+            Err(reason) => granted.shortfalls.push(DeniedSetting { favour, reason, remedy }),
         };
         if self.lock_memory {
-            note(Favour::LockedMemory, lock_memory(), ALLOW_LOCKING);
+            note(RealtimeSetting::LockedMemory, lock_memory(), ALLOW_LOCKING);
         }
         prefault_stack();
         if let Some(core) = self.core.or_else(|| system::isolated_cores().first().copied()) {
-            note(Favour::Core(core), pin(core), ALLOW_CORE);
+            note(RealtimeSetting::Core(core), pin(core), ALLOW_CORE);
         }
         let awake = stay_awake();
-        note(Favour::Awake, awake.as_ref().map(|_| ()).map_err(ToString::to_string), ALLOW_AWAKE);
+        note(RealtimeSetting::Awake, awake.as_ref().map(|_| ()).map_err(ToString::to_string), ALLOW_AWAKE);
         // Last: what came before may take its time.
-        note(Favour::Priority(self.priority), set_priority(self.priority), ALLOW_PRIORITY);
+        note(RealtimeSetting::Priority(self.priority), set_priority(self.priority), ALLOW_PRIORITY);
         granted._awake = awake.ok();
         granted
     }

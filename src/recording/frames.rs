@@ -4,9 +4,9 @@ use foxglove::messages::{FrameTransform, FrameTransforms, Pose, PoseInFrame, Qua
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::tick::timestamp;
-use crate::realtime::telemetry::Tick;
 use crate::robot::description::RobotDescription;
 use crate::robot::{JOINT_NAMES, Leg};
+use crate::telemetry::Tick;
 
 /// Where the trunk is: what the simulator knows, or else what the controller believes.
 fn base(tick: &Tick) -> (Vector3<f64>, UnitQuaternion<f64>) {

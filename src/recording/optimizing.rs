@@ -1,10 +1,10 @@
 //! What the optimizer has to say as protobuf messages and back: search, insight, points.
 
 use super::frog;
-use super::record::{Fixed, Insight, ParameterInsight, PointRecord, Search, SearchedParameter};
 use super::tick::number;
+use crate::trial::{FixedParameter, ParameterInsight, PointRecord, ProposalInsight, SearchStatus, SearchedParameter};
 
-pub fn search(value: &Search) -> frog::Search {
+pub fn search(value: &SearchStatus) -> frog::Search {
     let parameter = |parameter: &SearchedParameter| frog::search::Parameter {
         name: parameter.name.clone(),
         low: Some(parameter.low),
@@ -21,16 +21,16 @@ pub fn search(value: &Search) -> frog::Search {
     }
 }
 
-pub fn from_search(message: frog::Search) -> Search {
+pub fn from_search(message: frog::Search) -> SearchStatus {
     let parameter = |parameter: frog::search::Parameter| SearchedParameter {
         name: parameter.name,
         low: number(parameter.low),
         high: number(parameter.high),
         least: number(parameter.least),
         most: number(parameter.most),
-        fixed: parameter.fixed.map(|fixed| Fixed { value: number(fixed.value), trials: fixed.trials }),
+        fixed: parameter.fixed.map(|fixed| FixedParameter { value: number(fixed.value), trials: fixed.trials }),
     };
-    Search {
+    SearchStatus {
         budget: message.budget,
         counted: message.counted,
         parameters: message.parameters.into_iter().map(parameter).collect(),
@@ -38,7 +38,7 @@ pub fn from_search(message: frog::Search) -> Search {
     }
 }
 
-pub fn insight(value: &Insight) -> frog::Insight {
+pub fn insight(value: &ProposalInsight) -> frog::Insight {
     let parameter = |parameter: &ParameterInsight| frog::insight::Parameter {
         name: parameter.name.clone(),
         proposed: Some(parameter.proposed),
@@ -50,7 +50,7 @@ pub fn insight(value: &Insight) -> frog::Insight {
     frog::Insight { trial: value.trial, parameters: value.parameters.iter().map(parameter).collect() }
 }
 
-pub fn from_insight(message: frog::Insight) -> Insight {
+pub fn from_insight(message: frog::Insight) -> ProposalInsight {
     let parameter = |parameter: frog::insight::Parameter| ParameterInsight {
         name: parameter.name,
         proposed: number(parameter.proposed),
@@ -59,7 +59,7 @@ pub fn from_insight(message: frog::Insight) -> Insight {
         good: parameter.good,
         bad: parameter.bad,
     };
-    Insight { trial: message.trial, parameters: message.parameters.into_iter().map(parameter).collect() }
+    ProposalInsight { trial: message.trial, parameters: message.parameters.into_iter().map(parameter).collect() }
 }
 
 pub fn points(value: &[PointRecord]) -> frog::Points {

@@ -16,7 +16,7 @@ use super::record::{Record, SessionInfo, Stamped};
 use super::schema::{self, DecodeError};
 use super::topic::Topic;
 use super::{frog, tick};
-use crate::realtime::telemetry::Tick;
+use crate::telemetry::Tick;
 
 /// One thing played.
 #[allow(clippy::large_enum_variant, reason = "nearly all are ticks; a box for each would cost more than it saves")]

@@ -11,7 +11,7 @@ use rtrb::Consumer;
 use super::error::RecordingError;
 use super::record::{Record, Stamped};
 use super::writer::Writer;
-use crate::realtime::telemetry::{Mode, Tick};
+use crate::telemetry::{Mode, Tick};
 
 /// How long the thread sleeps when there is nothing to write; the ring holds several seconds.
 const IDLE: Duration = Duration::from_millis(2);

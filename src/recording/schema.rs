@@ -3,17 +3,17 @@
 use foxglove::messages::{Log, log};
 use prost::Message;
 
-use super::frog;
-use super::optimizing;
 use super::record::{
-    CommandRecord, Level, LogRecord, Measured, ParameterInfo, PreArmCheck, Proposal, ProposedParameter, Record, Risk,
-    SessionInfo, Source, Stage, StageInfo, Transition, TrialRecord, Verdict,
+    ArmingCheckRecord, LogLevel, LogRecord, Record, RequestRecord, SessionInfo, StageRecord, Transition,
 };
-use super::tick;
 use super::topic::Topic;
-use crate::realtime::pre_arm::{Check, CheckState};
-use crate::realtime::telemetry::Counters;
+use super::{frog, optimizing, tick};
 use crate::robot::LinkStatus;
+use crate::telemetry::{ArmingCheck, ArmingCheckState, Counters};
+use crate::trial::{
+    ExperimentStage, FallRisk, MeasuredJump, ParameterInfo, Proposal, ProposalSource, ProposedParameter, TrialRecord,
+    Verdict,
+};
 
 /// A message that is not what the schema says.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -45,13 +45,13 @@ pub fn encode(record: &Record, start_utc_ns: u64, log_time: u64, buffer: &mut Ve
             };
             (Topic::Transition, message.encode(buffer))
         }
-        Record::Stage(StageInfo { stage, trial, can_undo }) => {
+        Record::Stage(StageRecord { stage, trial, can_undo }) => {
             let message = frog::StageInfo { stage: *stage as i32, trial: *trial, can_undo: *can_undo };
             (Topic::Stage, message.encode(buffer))
         }
         Record::Proposal(value) => (Topic::Proposal, proposal(value).encode(buffer)),
         Record::Trial(value) => (Topic::Trial, trial(value).encode(buffer)),
-        Record::Command(CommandRecord { wish, accepted, answer }) => {
+        Record::Request(RequestRecord { wish, accepted, answer }) => {
             let message = frog::OperatorCommand { wish: wish.clone(), accepted: *accepted, answer: answer.clone() };
             (Topic::Command, message.encode(buffer))
         }
@@ -69,9 +69,9 @@ pub fn encode(record: &Record, start_utc_ns: u64, log_time: u64, buffer: &mut Ve
         }
         Record::Log(LogRecord { level, source, message }) => {
             let level = match level {
-                Level::Info => log::Level::Info,
-                Level::Warning => log::Level::Warning,
-                Level::Error => log::Level::Error,
+                LogLevel::Info => log::Level::Info,
+                LogLevel::Warning => log::Level::Warning,
+                LogLevel::Error => log::Level::Error,
             };
             let message = Log {
                 timestamp: Some(tick::timestamp(log_time)),
@@ -86,8 +86,8 @@ pub fn encode(record: &Record, start_utc_ns: u64, log_time: u64, buffer: &mut Ve
             let message = frog::FaultTicks { ticks: ticks.iter().map(tick::whole).collect() };
             (Topic::Fault, message.encode(buffer))
         }
-        Record::PreArm(list) => {
-            let item = |item: &PreArmCheck| frog::pre_arm::Item {
+        Record::ArmingChecks(list) => {
+            let item = |item: &ArmingCheckRecord| frog::pre_arm::Item {
                 check: item.check as i32,
                 state: item.state as i32,
                 found: item.found.clone(),
@@ -117,13 +117,13 @@ pub fn decode(topic: Topic, data: &[u8]) -> Result<Option<Record>, DecodeError> 
         }
         Topic::Stage => {
             let frog::StageInfo { stage, trial, can_undo } = frog::StageInfo::decode(data)?;
-            Record::Stage(StageInfo { stage: one_of(&Stage::ALL, "stage", stage)?, trial, can_undo })
+            Record::Stage(StageRecord { stage: one_of(&ExperimentStage::ALL, "stage", stage)?, trial, can_undo })
         }
         Topic::Proposal => Record::Proposal(from_proposal(frog::Proposal::decode(data)?)?),
         Topic::Trial => Record::Trial(from_trial(frog::Trial::decode(data)?)?),
         Topic::Command => {
             let frog::OperatorCommand { wish, accepted, answer } = frog::OperatorCommand::decode(data)?;
-            Record::Command(CommandRecord { wish, accepted, answer })
+            Record::Request(RequestRecord { wish, accepted, answer })
         }
         Topic::Counters => {
             let message = frog::Counters::decode(data)?;
@@ -141,9 +141,9 @@ pub fn decode(topic: Topic, data: &[u8]) -> Result<Option<Record>, DecodeError> 
             let message = Log::decode(data)?;
             let level = match message.level() {
                 log::Level::Unknown => return Err(DecodeError::Unknown("log level", message.level)),
-                log::Level::Debug | log::Level::Info => Level::Info,
-                log::Level::Warning => Level::Warning,
-                log::Level::Error | log::Level::Fatal => Level::Error,
+                log::Level::Debug | log::Level::Info => LogLevel::Info,
+                log::Level::Warning => LogLevel::Warning,
+                log::Level::Error | log::Level::Fatal => LogLevel::Error,
             };
             Record::Log(LogRecord { level, source: message.name, message: message.message })
         }
@@ -153,15 +153,15 @@ pub fn decode(topic: Topic, data: &[u8]) -> Result<Option<Record>, DecodeError> 
         }
         Topic::PreArm => {
             let item = |item: frog::pre_arm::Item| {
-                Ok(PreArmCheck {
-                    check: one_of(&Check::ALL, "check", item.check)?,
-                    state: one_of(&CheckState::ALL, "state of a check", item.state)?,
+                Ok(ArmingCheckRecord {
+                    check: one_of(&ArmingCheck::ALL, "check", item.check)?,
+                    state: one_of(&ArmingCheckState::ALL, "state of a check", item.state)?,
                     found: item.found,
                     needed: item.needed,
                 })
             };
             let items = frog::PreArm::decode(data)?.items;
-            Record::PreArm(items.into_iter().map(item).collect::<Result<_, DecodeError>>()?)
+            Record::ArmingChecks(items.into_iter().map(item).collect::<Result<_, DecodeError>>()?)
         }
         Topic::Search => Record::Search(optimizing::from_search(frog::Search::decode(data)?)),
         Topic::Insight => Record::Insight(optimizing::from_insight(frog::Insight::decode(data)?)),
@@ -251,7 +251,7 @@ fn from_proposal(message: frog::Proposal) -> Result<Proposal, DecodeError> {
     Ok(Proposal {
         trial: message.trial,
         revision: message.revision,
-        source: one_of(&Source::ALL, "source", message.source)?,
+        source: one_of(&ProposalSource::ALL, "source", message.source)?,
         parent: message.parent,
         parameters: message.parameters.into_iter().map(parameter).collect(),
         risk: message.risk.map(from_risk),
@@ -261,7 +261,7 @@ fn from_proposal(message: frog::Proposal) -> Result<Proposal, DecodeError> {
 
 fn trial(value: &TrialRecord) -> frog::Trial {
     let parameter = |(name, value): &(String, f64)| frog::trial::Parameter { name: name.clone(), value: Some(*value) };
-    let measured = |measured: &Measured| frog::trial::Measured {
+    let measured = |measured: &MeasuredJump| frog::trial::Measured {
         dx: Some(measured.dx_m),
         dy: Some(measured.dy_m),
         dyaw: Some(measured.dyaw_rad),
@@ -287,7 +287,7 @@ fn trial(value: &TrialRecord) -> frog::Trial {
 
 fn from_trial(message: frog::Trial) -> Result<TrialRecord, DecodeError> {
     let verdict = |verdict: Option<i32>| verdict.map(|verdict| one_of(&Verdict::ALL, "verdict", verdict)).transpose();
-    let measured = |measured: frog::trial::Measured| Measured {
+    let measured = |measured: frog::trial::Measured| MeasuredJump {
         dx_m: tick::number(measured.dx),
         dy_m: tick::number(measured.dy),
         dyaw_rad: tick::number(measured.dyaw),
@@ -297,7 +297,7 @@ fn from_trial(message: frog::Trial) -> Result<TrialRecord, DecodeError> {
     let parameter = |parameter: frog::trial::Parameter| (parameter.name, tick::number(parameter.value));
     Ok(TrialRecord {
         trial: message.trial,
-        source: one_of(&Source::ALL, "source", message.source)?,
+        source: one_of(&ProposalSource::ALL, "source", message.source)?,
         parent: message.parent,
         parameters: message.parameters.into_iter().map(parameter).collect(),
         measured: message.measured.map(measured),
@@ -312,7 +312,7 @@ fn from_trial(message: frog::Trial) -> Result<TrialRecord, DecodeError> {
     })
 }
 
-fn risk(risk: &Risk) -> frog::Risk {
+fn risk(risk: &FallRisk) -> frog::Risk {
     frog::Risk {
         nearest_fall: risk.nearest_fall,
         nearest_fall_trial: risk.nearest_fall_trial,
@@ -321,8 +321,8 @@ fn risk(risk: &Risk) -> frog::Risk {
     }
 }
 
-fn from_risk(message: frog::Risk) -> Risk {
-    Risk {
+fn from_risk(message: frog::Risk) -> FallRisk {
+    FallRisk {
         nearest_fall: message.nearest_fall,
         nearest_fall_trial: message.nearest_fall_trial,
         falls: message.falls,
@@ -378,7 +378,7 @@ fn from_link(link: &frog::Link) -> LinkStatus {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::realtime::telemetry::{Mode, Phase};
+    use crate::telemetry::{Mode, Phase};
 
     /// `STAND UP` in the program is `STAND_UP` in the schema, `re-run` is `RE_RUN`.
     fn assert_named(name: &str, in_schema: Option<&str>) {
@@ -395,11 +395,11 @@ mod tests {
             assert_eq!(phase as i32, number);
             assert_named(phase.name(), frog::control_tick::Phase::try_from(number).ok().map(|p| p.as_str_name()));
         }
-        for (number, stage) in (0..).zip(Stage::ALL) {
+        for (number, stage) in (0..).zip(ExperimentStage::ALL) {
             assert_eq!(stage as i32, number);
             assert_named(stage.name(), frog::stage_info::Stage::try_from(number).ok().map(|s| s.as_str_name()));
         }
-        for (number, source) in (0..).zip(Source::ALL) {
+        for (number, source) in (0..).zip(ProposalSource::ALL) {
             assert_eq!(source as i32, number);
             assert_named(source.name(), frog::proposal::Source::try_from(number).ok().map(|s| s.as_str_name()));
         }
@@ -408,11 +408,11 @@ mod tests {
             assert_named(verdict.name(), frog::trial::Verdict::try_from(number).ok().map(|v| v.as_str_name()));
         }
         // Their names are sentences; their numbers and count are what matters.
-        for (number, check) in (0..).zip(Check::ALL) {
+        for (number, check) in (0..).zip(ArmingCheck::ALL) {
             assert_eq!(check as i32, number);
             assert!(frog::pre_arm::Check::try_from(number).is_ok(), "{check:?}");
         }
-        for (number, state) in (0..).zip(CheckState::ALL) {
+        for (number, state) in (0..).zip(ArmingCheckState::ALL) {
             assert_eq!(state as i32, number);
             assert_named(state.name(), frog::pre_arm::State::try_from(number).ok().map(|s| s.as_str_name()));
         }

@@ -5,10 +5,10 @@ use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use super::frog;
 use super::schema::DecodeError;
-use crate::realtime::telemetry::{Estimate, Mode, Phase, StageTimes, Tick};
 use crate::robot::{
     Battery, Imu, JOINTS, JointCommand, Joints, LEGS, MotorCommand, PerLeg, RobotState, Truth, joint_name,
 };
+use crate::telemetry::{Estimate, Mode, Phase, StageTimes, Tick};
 
 /// Log time (UTC, ns) as protobuf's seconds and nanoseconds; past the year 2106 the stamp stands still.
 pub fn timestamp(log_time: u64) -> Timestamp {

@@ -13,8 +13,8 @@ use super::output::{Output, with_suffix};
 use super::record::{Record, SessionInfo, Stamped};
 use super::topic::Topic;
 use super::{frames, frog, tick};
-use crate::realtime::telemetry::{Mode, Tick};
 use crate::robot::description::RobotDescription;
+use crate::telemetry::{Mode, Tick};
 
 /// `/robot/pose` and `/tf` are written every 10 ms: they are for the eye, and follow from the ticks.
 const FRAMES_PERIOD_NS: u64 = 10_000_000;

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::fmt::Write;
 
-use crate::recording::record::{ParameterInfo, TrialRecord, Verdict};
+use crate::trial::{ParameterInfo, TrialRecord, Verdict};
 
 /// One trial in a line: number, parameters with their units, value, verdict and why.
 pub fn line(row: &TrialRecord, unit: &str, units: &HashMap<String, String>) -> String {

@@ -6,11 +6,11 @@
 
 use std::time::Duration;
 
-use super::life::{Life, Refusal};
+use super::experiment::{Experiment, RequestRefusal};
 use super::rollout::Rollout;
-use crate::realtime::telemetry::Tick;
-use crate::recording::record::{Stage, TrialRecord, Verdict};
 use crate::robot::Robot;
+use crate::telemetry::Tick;
+use crate::trial::{ExperimentStage, TrialRecord, Verdict};
 
 /// After this many void trials in a row nothing will come of the study: something is wrong that no parameter mends.
 const VOIDS_IN_A_ROW: u32 = 10;
@@ -22,10 +22,10 @@ const LOOK_PERIOD: Duration = Duration::from_millis(50);
 /// # Errors
 /// When the study cannot be read or written, or one trial after the other is void.
 pub fn run<R: Robot>(
-    life: &mut Life,
+    life: &mut Experiment,
     rollout: &mut Rollout<R>,
     mut each: impl FnMut(&TrialRecord, &[Tick]),
-) -> Result<(), Refusal> {
+) -> Result<(), RequestRefusal> {
     run_watched(life, rollout, |_, row, ticks| each(row, ticks))
 }
 
@@ -34,15 +34,15 @@ pub fn run<R: Robot>(
 /// # Errors
 /// As [`run`].
 pub fn run_watched<R: Robot>(
-    life: &mut Life,
+    life: &mut Experiment,
     rollout: &mut Rollout<R>,
-    mut each: impl FnMut(&Life, &TrialRecord, &[Tick]),
-) -> Result<(), Refusal> {
+    mut each: impl FnMut(&Experiment, &TrialRecord, &[Tick]),
+) -> Result<(), RequestRefusal> {
     let mut voids = 0;
     loop {
         // Nobody looks at them.
         life.take_records();
-        let Some(card) = life.proposal().filter(|_| life.stage() == Stage::Proposed) else {
+        let Some(card) = life.proposal().filter(|_| life.stage() == ExperimentStage::Proposed) else {
             // What is judged must be told before it is waited for others, or they wait for us.
             life.close()?;
             if life.others_run() {
@@ -63,14 +63,14 @@ pub fn run_watched<R: Robot>(
             continue;
         }
         let spec = match life.approve(card.trial, card.revision) {
-            Err(Refusal::Overtaken(_)) => continue,
+            Err(RequestRefusal::Overtaken(_)) => continue,
             approved => approved?,
         };
         let (end, ticks) = rollout.run(&spec);
         life.ended(spec.trial, &end, ticks, ticks.len() as u64);
         let suggested = life.row(spec.trial).and_then(|row| row.suggested).unwrap_or(Verdict::Void);
         match life.judge(suggested, false) {
-            Err(Refusal::EndedElsewhere(_)) => continue,
+            Err(RequestRefusal::EndedElsewhere(_)) => continue,
             judged => judged?,
         }
         voids = if suggested == Verdict::Void { voids + 1 } else { 0 };
@@ -79,7 +79,9 @@ pub fn run_watched<R: Robot>(
             if voids >= VOIDS_IN_A_ROW {
                 let cause = row.cause.clone();
                 life.close()?;
-                return Err(Refusal::NotNow(format!("{voids} trials in a row were void, the last because: {cause}")));
+                return Err(RequestRefusal::NotNow(format!(
+                    "{voids} trials in a row were void, the last because: {cause}"
+                )));
             }
         }
     }

@@ -1,10 +1,9 @@
 //! The life of a trial: proposed, approved, run, measured, judged.
 
-pub mod approval;
+pub mod arming_checklist;
 pub mod automatic;
-pub mod intent;
-pub mod life;
+pub mod experiment;
 pub mod objective;
-pub mod pre_arm;
+pub mod operator_request;
 pub mod rollout;
 pub mod supervisor;

@@ -3,15 +3,14 @@
 use nalgebra::{Rotation3, Vector3};
 
 use crate::control::settings::PERIOD_S;
-use crate::realtime::command::Task;
-use crate::realtime::telemetry::{Tick, TrialEnd};
-use crate::recording::record::{Measured, Verdict};
+use crate::telemetry::{Tick, TrialEnd};
+use crate::trial::{MeasuredJump, Task, Verdict};
 
 /// Measures a trial from its ticks; none if they end before the impulse begins.
 ///
 /// x, y and yaw are read when the oscillator enters pi (t = 0) and at the last tick; displacements are in the world
 /// frame turned so that the trial starts at yaw 0 (`specs/method.md`, "Timing of a trial").
-pub fn measure(ticks: &[Tick]) -> Option<Measured> {
+pub fn measure(ticks: &[Tick]) -> Option<MeasuredJump> {
     let first = ticks.iter().position(|tick| tick.trial_time_s >= 0.0 && tick.trial.is_some())?;
     let (start, end) = (&ticks[first].estimate, &ticks.last()?.estimate);
     let yaw_init = start.roll_pitch_yaw.z;
@@ -29,7 +28,7 @@ pub fn measure(ticks: &[Tick]) -> Option<Measured> {
             longest = longest.max(tick.number - since + 1);
         }
     }
-    Some(Measured {
+    Some(MeasuredJump {
         dx_m: displacement.x,
         dy_m: displacement.y,
         dyaw_rad: end.roll_pitch_yaw.z - yaw_init,
@@ -39,7 +38,7 @@ pub fn measure(ticks: &[Tick]) -> Option<Measured> {
 }
 
 /// The objective J, maximised: m for forward and lateral, rad for twist (paper, section II-D); mean per jump.
-pub fn value(task: Task, measured: &Measured, jumps: u32) -> f64 {
+pub fn value(task: Task, measured: &MeasuredJump, jumps: u32) -> f64 {
     let whole = match task {
         Task::Forward => measured.dx_m,
         Task::LateralLeft => measured.dy_m,

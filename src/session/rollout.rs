@@ -3,22 +3,21 @@
 
 use crate::control::cycle::{Cycle, Inputs};
 use crate::control::limits::ticks;
-use crate::control::settings::{PERIOD_S, Settings};
+use crate::control::settings::{ControlSettings, PERIOD_S};
 use crate::realtime::clock::SimulatedClock;
-use crate::realtime::command::{Command, Permit, TrialSpec};
-use crate::realtime::telemetry::{Event, Fault, Tick, TrialEnd};
 use crate::robot::{Placement, Robot};
+use crate::telemetry::{Command, Event, Fault, Permit, Tick, TrialEnd, TrialSpec};
 
 /// A robot in simulated time.
 pub struct Rollout<R: Robot> {
     robot: R,
-    settings: Settings,
+    settings: ControlSettings,
     ticks: Vec<Tick>,
 }
 
 impl<R: Robot> Rollout<R> {
     /// A rollout of that robot, which must be one that can be put in place.
-    pub fn new(robot: R, settings: &Settings) -> Rollout<R> {
+    pub fn new(robot: R, settings: &ControlSettings) -> Rollout<R> {
         Rollout { robot, settings: *settings, ticks: Vec::new() }
     }
 

@@ -6,18 +6,18 @@ mod unattended;
 use std::collections::VecDeque;
 use std::sync::mpsc::{Receiver, Sender};
 
-use super::intent::{Intent, Wish};
-use super::life::{Life, Refusal};
-use super::pre_arm::{PreArmList, objections};
-use crate::control::mode::{self, Request};
+use super::arming_checklist::{ArmingChecklist, objections};
+use super::experiment::{Experiment, RequestRefusal};
+use super::operator_request::{OperatorRequest, StampedRequest};
+use crate::control::mode::{self, Trigger};
 use crate::realtime::channel::SessionEnd;
-use crate::realtime::command::{Command, Permit};
-use crate::realtime::scheduling::{Favour, Shortfall};
-use crate::realtime::telemetry::{Cause, Event, Mode, TrialEnd};
+use crate::realtime::scheduling::{DeniedSetting, RealtimeSetting};
 use crate::recording::record::{
-    CommandRecord, Level, LogRecord, PreArmCheck, Record, SessionInfo, Stage, Stamped, Transition, Verdict,
+    ArmingCheckRecord, LogLevel, LogRecord, Record, RequestRecord, SessionInfo, Stamped, Transition,
 };
 use crate::recording::recorder::{Handed, RecorderWatch, TrialTicks};
+use crate::telemetry::{Command, Event, Mode, Permit, TransitionCause, TrialEnd};
+use crate::trial::{ExperimentStage, Verdict};
 use unattended::Unattended;
 
 /// How often the counters are told to the screen and the recording, ns.
@@ -40,14 +40,14 @@ const LOOK_PERIOD_NS: u64 = 500_000_000;
 const LONGEST_WAIT_FOR_TICKS_NS: u64 = 10_000_000_000;
 
 /// Where the records go: the recorder and the screen receive the same.
-pub struct Outlets {
+pub struct RecordSinks {
     /// To the recorder.
     pub recorder: Sender<Stamped>,
     /// To the screen.
     pub screen: Sender<Stamped>,
 }
 
-impl Outlets {
+impl RecordSinks {
     /// Whether the recorder took it. A screen that is gone takes nothing any more: the session ends with it, not because of it.
     fn put(&self, stamped: Stamped) -> bool {
         let _ = self.screen.send(stamped.clone());
@@ -56,19 +56,19 @@ impl Outlets {
 }
 
 /// What a session is made of.
-pub struct Parts {
+pub struct SupervisorParts {
     /// The study's life.
-    pub life: Life,
+    pub life: Experiment,
     /// To the control thread.
     pub control: SessionEnd,
     /// The ticks of each trial and of each fault, from the recorder.
     pub handed: Receiver<Handed>,
     /// Where the records go.
-    pub outlets: Outlets,
+    pub outlets: RecordSinks,
     /// How the recorder is doing.
     pub recorder: RecorderWatch,
     /// What must hold before the robot is energised.
-    pub pre_arm: PreArmList,
+    pub pre_arm: ArmingChecklist,
     /// What this session is: its first record.
     pub info: SessionInfo,
 }
@@ -86,13 +86,13 @@ struct Ended {
 
 /// The session.
 pub struct Supervisor {
-    life: Life,
+    life: Experiment,
     control: SessionEnd,
     handed: Receiver<Handed>,
-    outlets: Outlets,
+    outlets: RecordSinks,
     recorder: RecorderWatch,
     mode: Mode,
-    cause: Cause,
+    cause: TransitionCause,
     /// How often the mode changed, as far as the session has heard.
     mode_changes: u64,
     /// An observer's robot was stopped and acknowledged: it is being let go of.
@@ -114,9 +114,9 @@ pub struct Supervisor {
     /// Signs of life of the screen when control was refused last: it is asked for again after the next.
     beats: u64,
     counters_ns: u64,
-    pre_arm: PreArmList,
+    pre_arm: ArmingChecklist,
     /// The list as it was shown last, and when.
-    shown_list: Vec<PreArmCheck>,
+    shown_list: Vec<ArmingCheckRecord>,
     shown_list_ns: u64,
     looked_ns: u64,
     unattended: Unattended,
@@ -124,8 +124,8 @@ pub struct Supervisor {
 
 impl Supervisor {
     /// A session over a study.
-    pub fn new(parts: Parts, time_ns: u64) -> Supervisor {
-        let Parts { life, control, handed, outlets, recorder, pre_arm, info } = parts;
+    pub fn new(parts: SupervisorParts, time_ns: u64) -> Supervisor {
+        let SupervisorParts { life, control, handed, outlets, recorder, pre_arm, info } = parts;
         let observe = info.observe;
         let mut supervisor = Supervisor {
             life,
@@ -134,7 +134,7 @@ impl Supervisor {
             outlets,
             recorder,
             mode: Mode::Offline,
-            cause: Cause::Course,
+            cause: TransitionCause::Course,
             mode_changes: 0,
             letting_go: false,
             leaving: false,
@@ -161,20 +161,20 @@ impl Supervisor {
     }
 
     /// What the control thread got of what it asked of the system, and what it did not.
-    pub fn tell_scheduling(&mut self, favours: &[Favour], shortfalls: &[Shortfall], time_ns: u64) {
+    pub fn tell_scheduling(&mut self, favours: &[RealtimeSetting], shortfalls: &[DeniedSetting], time_ns: u64) {
         if !favours.is_empty() {
             let granted: Vec<_> = favours.iter().map(ToString::to_string).collect();
-            self.log(Level::Info, format!("control thread: {}", granted.join(", ")), time_ns);
+            self.log(LogLevel::Info, format!("control thread: {}", granted.join(", ")), time_ns);
         }
         for shortfall in shortfalls {
-            self.log(Level::Warning, format!("control thread: {shortfall}"), time_ns);
+            self.log(LogLevel::Warning, format!("control thread: {shortfall}"), time_ns);
         }
     }
 
     /// The guard process has ended: nobody damps the robot any more if this one does. Nothing new is begun with the robot.
     pub fn tell_guard_lost(&mut self, time_ns: u64) {
         self.guard_lost = true;
-        self.log(Level::Error, GUARD_LOST.to_owned(), time_ns);
+        self.log(LogLevel::Error, GUARD_LOST.to_owned(), time_ns);
     }
 
     /// The mode as far as the session has heard.
@@ -190,12 +190,12 @@ impl Supervisor {
         let reboots = self.control.counters.read().link.map_or(0, |link| link.reboots);
         if self.pre_arm.robot_restarted(reboots) {
             let message = "the robot restarted: low-level mode and a clear area are to be confirmed again".to_owned();
-            self.log(Level::Warning, message, time_ns);
+            self.log(LogLevel::Warning, message, time_ns);
         }
         if !self.mode.energised()
             && let Some(message) = self.pre_arm.forget(time_ns)
         {
-            self.log(Level::Info, message, time_ns);
+            self.log(LogLevel::Info, message, time_ns);
             self.shown_list_ns = 0;
         }
         while let Ok(handed) = self.handed.try_recv() {
@@ -209,7 +209,7 @@ impl Supervisor {
         let complaint = self.recorder.get().error.or_else(|| self.recorder_gone.then(|| RECORDER_GONE.to_owned()));
         if complaint != self.recorder_complaint {
             if let Some(complaint) = &complaint {
-                self.log(Level::Error, format!("the recording failed: {complaint}"), time_ns);
+                self.log(LogLevel::Error, format!("the recording failed: {complaint}"), time_ns);
             }
             self.recorder_complaint = complaint;
         }
@@ -223,7 +223,7 @@ impl Supervisor {
         if time_ns >= self.looked_ns + LOOK_PERIOD_NS {
             self.looked_ns = time_ns;
             if let Err(error) = self.life.look() {
-                self.log(Level::Error, format!("the study could not be read: {error}"), time_ns);
+                self.log(LogLevel::Error, format!("the study could not be read: {error}"), time_ns);
             }
         }
         self.publish(time_ns);
@@ -231,13 +231,13 @@ impl Supervisor {
     }
 
     /// Carries out one wish, or says why not.
-    pub fn carry_out(&mut self, wish: &Wish, time_ns: u64) {
-        let Wish { intent, stops, .. } = wish;
+    pub fn carry_out(&mut self, wish: &StampedRequest, time_ns: u64) {
+        let StampedRequest { intent, stops, .. } = wish;
         // The screen may have seen a change of mode that is still on its way here.
         self.attend(time_ns);
-        let energises = matches!(intent, Intent::Arm | Intent::Approve { .. });
+        let energises = matches!(intent, OperatorRequest::Arm | OperatorRequest::Approve { .. });
         // Who only looks may stop the robot, as everybody may, and then let go of it again.
-        let answer = if self.observe && *intent != Intent::Acknowledge {
+        let answer = if self.observe && *intent != OperatorRequest::Acknowledge {
             Err("this session only observes".to_owned())
         } else if energises && self.control.stop.count() != *stops {
             Err("STOP was pressed after it".to_owned())
@@ -251,14 +251,14 @@ impl Supervisor {
             Ok(answer) => (true, answer),
             Err(reason) => (false, reason),
         };
-        self.say(Record::Command(CommandRecord { wish: describe(intent), accepted, answer }), time_ns);
+        self.say(Record::Request(RequestRecord { wish: describe(intent), accepted, answer }), time_ns);
         self.publish(time_ns);
     }
 
     /// The session ends: what was judged is told, and what nobody can judge any more is void if the rules call it so.
     pub fn close(&mut self, time_ns: u64) {
         if let Err(error) = self.life.leave().and_then(|()| self.life.close()) {
-            self.log(Level::Error, format!("the study could not be written: {error}"), time_ns);
+            self.log(LogLevel::Error, format!("the study could not be written: {error}"), time_ns);
         }
         self.publish(time_ns);
     }
@@ -288,7 +288,7 @@ impl Supervisor {
         }
         let trial = matches!(self.mode, Mode::Countdown | Mode::Jump | Mode::Settle);
         // Also a trial of which nothing but its approval was heard, or whose ticks are still on their way here.
-        let running = self.life.stage() == Stage::Running && !self.control.events.is_abandoned();
+        let running = self.life.stage() == ExperimentStage::Running && !self.control.events.is_abandoned();
         trial || running || sits_down && self.mode.energised()
     }
 
@@ -296,36 +296,36 @@ impl Supervisor {
         self.control.commands.push(command).map_err(|_| "the control thread does not take commands".to_owned())
     }
 
-    fn obey(&mut self, wish: &Wish) -> Result<String, String> {
-        let words = |refusal: Refusal| refusal.to_string();
+    fn obey(&mut self, wish: &StampedRequest) -> Result<String, String> {
+        let words = |refusal: RequestRefusal| refusal.to_string();
         match &wish.intent {
-            Intent::Arm if mode::next(self.mode, Request::Arm).is_some() => {
+            OperatorRequest::Arm if mode::next(self.mode, Trigger::Arm).is_some() => {
                 let findings = self.control.readiness.read().findings;
                 match objections(&self.pre_arm.look(&findings, &self.recorder.get())) {
                     Some(objections) => Err(objections),
                     None => {
                         let permit = Permit { mode_changes: self.mode_changes, given_ns: wish.time_ns };
-                        self.ask(Request::Arm, Command::Arm(permit), "the robot stands up")
+                        self.ask(Trigger::Arm, Command::Arm(permit), "the robot stands up")
                     }
                 }
             }
-            Intent::Arm => Err(format!("not while the robot is {}", self.mode.name())),
-            Intent::Confirm(check) if self.mode.energised() => {
+            OperatorRequest::Arm => Err(format!("not while the robot is {}", self.mode.name())),
+            OperatorRequest::Confirm(check) if self.mode.energised() => {
                 Err(format!("{} is asked before the robot is armed", check.check().name()))
             }
-            Intent::Confirm(check) => {
+            OperatorRequest::Confirm(check) => {
                 self.pre_arm.confirm(*check, wish.time_ns);
                 self.shown_list_ns = 0;
                 Ok("confirmed".to_owned())
             }
-            Intent::SitDown => self.ask(Request::SitDown, Command::SitDown, "the robot sits down"),
-            Intent::Acknowledge => self.ask(
-                Request::Acknowledge,
+            OperatorRequest::SitDown => self.ask(Trigger::SitDown, Command::SitDown, "the robot sits down"),
+            OperatorRequest::Acknowledge => self.ask(
+                Trigger::Acknowledge,
                 Command::Acknowledge { stops: wish.stops },
                 "acknowledged; arm when ready",
             ),
-            Intent::Cancel => self.ask(Request::Cancel, Command::Cancel, "the countdown is cancelled"),
-            Intent::Approve { trial, revision } => {
+            OperatorRequest::Cancel => self.ask(Trigger::Cancel, Command::Cancel, "the countdown is cancelled"),
+            OperatorRequest::Approve { trial, revision } => {
                 if self.mode != Mode::Ready {
                     return Err(format!("the robot is {}, not READY{}", self.mode.name(), way_to_ready(self.mode)));
                 }
@@ -345,31 +345,31 @@ impl Supervisor {
                 }
                 Ok(format!("trial {} runs", spec.trial))
             }
-            Intent::Skip => self.life.skip().map_err(words).map(|()| "skipped; here is another".to_owned()),
-            Intent::Override { parameter, value } => {
+            OperatorRequest::Skip => self.life.skip().map_err(words).map(|()| "skipped; here is another".to_owned()),
+            OperatorRequest::Override { parameter, value } => {
                 self.life.set_parameter(parameter, *value).map_err(words)?;
                 Ok(format!("{parameter} will be {value}"))
             }
-            Intent::ClearOverrides => {
+            OperatorRequest::ClearOverrides => {
                 self.life.clear_overrides().map_err(words).map(|()| "as it was proposed".to_owned())
             }
-            Intent::OverrideGain { gain, value } => {
+            OperatorRequest::OverrideGain { gain, value } => {
                 self.life.set_gain(gain, *value).map_err(words)?;
                 Ok(format!("{gain} will be {value} in this trial"))
             }
-            Intent::Fix { parameter, value, trials } => {
+            OperatorRequest::Fix { parameter, value, trials } => {
                 self.life.fix(parameter, *value, *trials).map_err(words)?;
                 Ok(format!("{parameter} is {value} for the next {trials} trials that count"))
             }
-            Intent::Unfix { parameter } => {
+            OperatorRequest::Unfix { parameter } => {
                 self.life.unfix(parameter).map_err(words)?;
                 Ok(format!("{parameter} is searched again"))
             }
-            Intent::NarrowBounds { parameter, low, high } => {
+            OperatorRequest::NarrowBounds { parameter, low, high } => {
                 self.life.narrow_bounds(parameter, *low, *high).map_err(words)?;
                 Ok(format!("{parameter} is searched from {low} to {high}"))
             }
-            Intent::ConfirmBest { repeats } => {
+            OperatorRequest::ConfirmBest { repeats } => {
                 let trials = self.life.confirm_best(*repeats).map_err(words)?;
                 let trials: Vec<String> = trials.iter().map(u32::to_string).collect();
                 Ok(match trials.len() {
@@ -377,35 +377,35 @@ impl Supervisor {
                     _ => format!("the points of trials {} are repeated, at most {repeats} times", trials.join(", ")),
                 })
             }
-            Intent::Judge(verdict) => {
+            OperatorRequest::Judge(verdict) => {
                 self.judge(*verdict, false)?;
                 Ok("u takes it back until the next jump is approved".to_owned())
             }
-            Intent::Rerun { trial: None } => {
+            OperatorRequest::Rerun { trial: None } => {
                 self.judge(Verdict::Void, true)?;
                 Ok("void, and its parameters are on the table again".to_owned())
             }
-            Intent::Rerun { trial: Some(trial) } => {
+            OperatorRequest::Rerun { trial: Some(trial) } => {
                 self.life.repeat(*trial).map_err(words)?;
                 Ok(format!("the parameters of trial {trial} are queued"))
             }
-            Intent::Undo => self.life.undo().map_err(words).map(|()| "the verdict is taken back".to_owned()),
-            Intent::HandValue(value) => {
+            OperatorRequest::Undo => self.life.undo().map_err(words).map(|()| "the verdict is taken back".to_owned()),
+            OperatorRequest::HandValue(value) => {
                 self.life.set_hand_value(*value).map_err(words)?;
                 Ok(match value {
                     Some(value) => format!("{value} counts instead of the measured value"),
                     None => "the measured value counts".to_owned(),
                 })
             }
-            Intent::Note { trial, text } => {
+            OperatorRequest::Note { trial, text } => {
                 self.life.note(*trial, text).map_err(words)?;
                 Ok("noted".to_owned())
             }
-            Intent::Enqueue(parameters) => {
+            OperatorRequest::Enqueue(parameters) => {
                 self.life.enqueue(parameters).map_err(words)?;
                 Ok("queued".to_owned())
             }
-            Intent::Continue(trials) => {
+            OperatorRequest::Continue(trials) => {
                 self.life.extend(*trials).map_err(words)?;
                 Ok(format!("the study now has {} trials", self.life.budget()))
             }
@@ -413,7 +413,7 @@ impl Supervisor {
     }
 
     /// Sends `command` if the mode allows `request`.
-    fn ask(&mut self, request: Request, command: Command, answer: &str) -> Result<String, String> {
+    fn ask(&mut self, request: Trigger, command: Command, answer: &str) -> Result<String, String> {
         if mode::next(self.mode, request).is_none() {
             return Err(format!("not while the robot is {}", self.mode.name()));
         }
@@ -424,7 +424,7 @@ impl Supervisor {
     /// Judges the trial under review. Where another program has ended it, the review is over as well.
     fn judge(&mut self, verdict: Verdict, rerun: bool) -> Result<(), String> {
         let judged = self.life.judge(verdict, rerun);
-        if matches!(judged, Ok(()) | Err(Refusal::EndedElsewhere(_))) {
+        if matches!(judged, Ok(()) | Err(RequestRefusal::EndedElsewhere(_))) {
             self.end_review()?;
         }
         judged.map_err(|refusal| refusal.to_string())
@@ -432,7 +432,7 @@ impl Supervisor {
 
     /// The verdict is given: a standing robot is ready again, a fallen one is disarmed and must be armed anew.
     fn end_review(&mut self) -> Result<(), String> {
-        let fallen = self.mode == Mode::Damped && matches!(self.cause, Cause::Fell(_));
+        let fallen = self.mode == Mode::Damped && matches!(self.cause, TransitionCause::Fell(_));
         if self.mode == Mode::Review || fallen { self.command(Command::EndReview) } else { Ok(()) }
     }
 
@@ -454,7 +454,7 @@ impl Supervisor {
             Event::Refused { command, mode, because } => {
                 let command_name = describe_command(&command);
                 let message = format!("the control thread refused {command_name} while {}: {because}", mode.name());
-                self.log(Level::Warning, message, time_ns);
+                self.log(LogLevel::Warning, message, time_ns);
                 match command {
                     Command::RunTrial(spec, _) => {
                         self.ended = Some(Ended { trial: spec.trial, end: TrialEnd::Cancelled, ticks: 0, time_ns });
@@ -478,16 +478,16 @@ impl Supervisor {
             Some(place) => self.measured.remove(place).map(|found| found.ticks).unwrap_or_default(),
             None if time_ns < ended_ns + LONGEST_WAIT_FOR_TICKS_NS => return,
             None => {
-                self.log(Level::Error, format!("the ticks of trial {trial} never came from the recorder"), time_ns);
+                self.log(LogLevel::Error, format!("the ticks of trial {trial} never came from the recorder"), time_ns);
                 Vec::new()
             }
         };
         self.measured.clear();
         self.ended = None;
         self.life.ended(trial, &end, &ticks, whole);
-        if self.life.stage() == Stage::Review && matches!(self.mode, Mode::Damped | Mode::Fault) {
+        if self.life.stage() == ExperimentStage::Review && matches!(self.mode, Mode::Damped | Mode::Fault) {
             let message = format!("trial {trial} ended in {}: {}", self.mode.name(), self.cause);
-            self.log(Level::Warning, message, time_ns);
+            self.log(LogLevel::Warning, message, time_ns);
         }
     }
 
@@ -503,13 +503,13 @@ impl Supervisor {
         if let Some(reason) = &hold
             && self.held.is_none()
         {
-            self.log(Level::Warning, format!("no further trial can be approved: {reason}"), time_ns);
+            self.log(LogLevel::Warning, format!("no further trial can be approved: {reason}"), time_ns);
         }
         self.held = hold;
         let due = self.caution_ns.is_none_or(|said_ns| time_ns >= said_ns + CAUTION_PERIOD_NS);
         if let Some(caution) = self.control.readiness.read().caution.filter(|_| due) {
             self.caution_ns = Some(time_ns);
-            self.log(Level::Warning, caution.to_string(), time_ns);
+            self.log(LogLevel::Warning, caution.to_string(), time_ns);
         }
     }
 
@@ -527,8 +527,8 @@ impl Supervisor {
         }
         let findings = self.control.readiness.read().findings;
         let list = self.pre_arm.look(&findings, &self.recorder.get());
-        let states = |list: &[PreArmCheck]| list.iter().map(|item| item.state).collect::<Vec<_>>();
-        let stamped = Stamped { time_ns, record: Record::PreArm(list.clone()) };
+        let states = |list: &[ArmingCheckRecord]| list.iter().map(|item| item.state).collect::<Vec<_>>();
+        let stamped = Stamped { time_ns, record: Record::ArmingChecks(list.clone()) };
         if states(&list) != states(&self.shown_list) {
             self.recorder_gone |= !self.outlets.put(stamped);
         } else if time_ns >= self.shown_list_ns + PRE_ARM_PERIOD_NS {
@@ -551,7 +551,7 @@ impl Supervisor {
         self.recorder_gone |= !self.outlets.put(Stamped { time_ns, record });
     }
 
-    fn log(&mut self, level: Level, message: String, time_ns: u64) {
+    fn log(&mut self, level: LogLevel, message: String, time_ns: u64) {
         self.say(Record::Log(LogRecord { level, source: "session".to_owned(), message }), time_ns);
     }
 }
@@ -567,35 +567,35 @@ fn way_to_ready(mode: Mode) -> &'static str {
     }
 }
 
-fn describe(intent: &Intent) -> String {
+fn describe(intent: &OperatorRequest) -> String {
     match intent {
-        Intent::Arm => "arm".to_owned(),
-        Intent::Confirm(check) => format!("confirm {}", check.check().name()),
-        Intent::SitDown => "sit down".to_owned(),
-        Intent::Acknowledge => "acknowledge".to_owned(),
-        Intent::Approve { trial, .. } => format!("approve trial {trial}"),
-        Intent::Cancel => "cancel the countdown".to_owned(),
-        Intent::Skip => "skip the proposal".to_owned(),
-        Intent::Override { parameter, value } => format!("override {parameter} = {value}"),
-        Intent::OverrideGain { gain, value } => format!("set the gain {gain} = {value}"),
-        Intent::ClearOverrides => "clear the overrides".to_owned(),
-        Intent::Fix { parameter, value, trials } => format!("fix {parameter} = {value} for {trials} trials"),
-        Intent::Unfix { parameter } => format!("search {parameter} again"),
-        Intent::NarrowBounds { parameter, low, high } => format!("search {parameter} from {low} to {high}"),
-        Intent::ConfirmBest { repeats: 0 } => "end the repeats".to_owned(),
-        Intent::ConfirmBest { repeats } => format!("confirm the best with {repeats} repeats"),
-        Intent::Judge(verdict) => verdict.name().to_owned(),
-        Intent::Rerun { trial: None } => "re-run".to_owned(),
-        Intent::Rerun { trial: Some(trial) } => format!("re-run trial {trial}"),
-        Intent::Undo => "undo the verdict".to_owned(),
-        Intent::HandValue(Some(value)) => format!("value measured by hand {value}"),
-        Intent::HandValue(None) => "no value measured by hand".to_owned(),
-        Intent::Note { trial, text } => format!("note on trial {trial}: {text}"),
-        Intent::Enqueue(point) => {
+        OperatorRequest::Arm => "arm".to_owned(),
+        OperatorRequest::Confirm(check) => format!("confirm {}", check.check().name()),
+        OperatorRequest::SitDown => "sit down".to_owned(),
+        OperatorRequest::Acknowledge => "acknowledge".to_owned(),
+        OperatorRequest::Approve { trial, .. } => format!("approve trial {trial}"),
+        OperatorRequest::Cancel => "cancel the countdown".to_owned(),
+        OperatorRequest::Skip => "skip the proposal".to_owned(),
+        OperatorRequest::Override { parameter, value } => format!("override {parameter} = {value}"),
+        OperatorRequest::OverrideGain { gain, value } => format!("set the gain {gain} = {value}"),
+        OperatorRequest::ClearOverrides => "clear the overrides".to_owned(),
+        OperatorRequest::Fix { parameter, value, trials } => format!("fix {parameter} = {value} for {trials} trials"),
+        OperatorRequest::Unfix { parameter } => format!("search {parameter} again"),
+        OperatorRequest::NarrowBounds { parameter, low, high } => format!("search {parameter} from {low} to {high}"),
+        OperatorRequest::ConfirmBest { repeats: 0 } => "end the repeats".to_owned(),
+        OperatorRequest::ConfirmBest { repeats } => format!("confirm the best with {repeats} repeats"),
+        OperatorRequest::Judge(verdict) => verdict.name().to_owned(),
+        OperatorRequest::Rerun { trial: None } => "re-run".to_owned(),
+        OperatorRequest::Rerun { trial: Some(trial) } => format!("re-run trial {trial}"),
+        OperatorRequest::Undo => "undo the verdict".to_owned(),
+        OperatorRequest::HandValue(Some(value)) => format!("value measured by hand {value}"),
+        OperatorRequest::HandValue(None) => "no value measured by hand".to_owned(),
+        OperatorRequest::Note { trial, text } => format!("note on trial {trial}: {text}"),
+        OperatorRequest::Enqueue(point) => {
             let words: Vec<_> = point.iter().map(|(name, value)| format!("{name} = {value}")).collect();
             format!("queue {}", words.join(", "))
         }
-        Intent::Continue(trials) => format!("continue for {trials} trials"),
+        OperatorRequest::Continue(trials) => format!("continue for {trials} trials"),
     }
 }
 

@@ -2,9 +2,10 @@
 
 mod support;
 
-use quadfrog::realtime::telemetry::Mode;
-use quadfrog::recording::record::{Record, SessionInfo, Stage, StageInfo, Verdict};
-use quadfrog::session::intent::Intent;
+use quadfrog::recording::record::{Record, SessionInfo, StageRecord};
+use quadfrog::session::operator_request::OperatorRequest;
+use quadfrog::telemetry::Mode;
+use quadfrog::trial::{ExperimentStage, Verdict};
 use quadfrog_console::action::{ACTIONS, Action};
 use quadfrog_console::keymap::{Key, Keymap};
 use quadfrog_console::message::{Effect, Msg};
@@ -14,7 +15,7 @@ use quadfrog_console::settings::{ConsoleSettings, DEFAULT};
 use strum::VariantArray;
 use support::{Console, proposal, session, trial};
 
-fn wishes(effects: &[Effect]) -> Vec<Intent> {
+fn wishes(effects: &[Effect]) -> Vec<OperatorRequest> {
     effects
         .iter()
         .filter_map(|effect| match effect {
@@ -24,8 +25,8 @@ fn wishes(effects: &[Effect]) -> Vec<Intent> {
         .collect()
 }
 
-fn approval(trial: u32, revision: u32) -> Vec<Intent> {
-    vec![Intent::Approve { trial, revision }]
+fn approval(trial: u32, revision: u32) -> Vec<OperatorRequest> {
+    vec![OperatorRequest::Approve { trial, revision }]
 }
 
 #[test]
@@ -119,12 +120,12 @@ fn a_text_field_takes_space_only_while_the_robot_is_not_armed() {
         (effects, console)
     };
     let (effects, _) = note(Mode::Disarmed, &["o", "k", "Space", "y", "Enter"]);
-    assert_eq!(wishes(&effects), [Intent::Note { trial: 0, text: "ok y".into() }]);
+    assert_eq!(wishes(&effects), [OperatorRequest::Note { trial: 0, text: "ok y".into() }]);
     let (effects, console) = note(Mode::Review, &["o", "k", "Space"]);
     assert_eq!(effects, [Effect::Stop]);
     assert!(matches!(console.model.dialog, Some(Dialog::Field { .. })), "the half-written note stays");
     let (effects, _) = note(Mode::Review, &["o", "k", "_", "y", "Enter"]);
-    assert_eq!(wishes(&effects), [Intent::Note { trial: 0, text: "ok y".into() }]);
+    assert_eq!(wishes(&effects), [OperatorRequest::Note { trial: 0, text: "ok y".into() }]);
     let (effects, _) = note(Mode::Disarmed, &["F12"]);
     assert_eq!(effects, [Effect::Stop], "F12 is STOP in a field too");
 }
@@ -134,7 +135,7 @@ fn any_key_cancels_a_countdown_and_stop_stops_it() {
     for key in ["x", "g", "Enter", "Esc", "1", "q"] {
         let mut console = Console::ready();
         console.mode(Mode::Countdown);
-        assert_eq!(wishes(&console.press(&[key])), [Intent::Cancel], "{key}");
+        assert_eq!(wishes(&console.press(&[key])), [OperatorRequest::Cancel], "{key}");
     }
     let mut console = Console::ready();
     console.mode(Mode::Countdown);
@@ -166,10 +167,10 @@ fn quitting_asks_while_the_robot_is_armed_or_a_trial_waits() {
 #[test]
 fn verdicts_are_legal_in_review_alone() {
     let verdicts = [
-        ("a", Intent::Judge(Verdict::Accept)),
-        ("f", Intent::Judge(Verdict::Fall)),
-        ("v", Intent::Judge(Verdict::Void)),
-        ("r", Intent::Rerun { trial: None }),
+        ("a", OperatorRequest::Judge(Verdict::Accept)),
+        ("f", OperatorRequest::Judge(Verdict::Fall)),
+        ("v", OperatorRequest::Judge(Verdict::Void)),
+        ("r", OperatorRequest::Rerun { trial: None }),
     ];
     for (key, intent) in verdicts {
         for mode in [Mode::Review, Mode::Damped, Mode::Disarmed] {
@@ -187,8 +188,8 @@ fn verdicts_are_legal_in_review_alone() {
 fn undo_is_offered_while_the_session_says_so() {
     let mut console = Console::ready();
     assert_eq!(console.press(&["u"]), []);
-    console.record(Record::Stage(StageInfo { stage: Stage::Proposed, trial: 0, can_undo: true }));
-    assert_eq!(wishes(&console.press(&["u"])), [Intent::Undo]);
+    console.record(Record::Stage(StageRecord { stage: ExperimentStage::Proposed, trial: 0, can_undo: true }));
+    assert_eq!(wishes(&console.press(&["u"])), [OperatorRequest::Undo]);
 }
 
 #[test]
@@ -196,7 +197,7 @@ fn an_override_is_checked_and_leaves_on_enter() {
     let mut console = Console::ready();
     assert_eq!(console.press(&["o", "Down", "1", "2", "0", ".", "5"]), [], "nothing is sent while it is typed");
     let sent = wishes(&console.press(&["Enter"]));
-    assert_eq!(sent, [Intent::Override { parameter: "Fx".into(), value: 120.5 }]);
+    assert_eq!(sent, [OperatorRequest::Override { parameter: "Fx".into(), value: 120.5 }]);
 
     let mut console = Console::ready();
     assert_eq!(console.press(&["o", "Down", "1", "8", "0", "Enter"]), []);
@@ -206,14 +207,14 @@ fn an_override_is_checked_and_leaves_on_enter() {
     // 1 % and 10 % of the range of Fx, 150 N, from 75 N.
     let mut console = Console::ready();
     let sent = wishes(&console.press(&["o", "Down", "Right", "PgUp", "Left", "Right", "Enter"]));
-    let [Intent::Override { parameter, value }] = sent.as_slice() else { panic!("{sent:?}") };
+    let [OperatorRequest::Override { parameter, value }] = sent.as_slice() else { panic!("{sent:?}") };
     assert_eq!(parameter, "Fx");
     assert!((value - 91.5).abs() < 1e-9, "{value}");
 
     // Steps end at the bound.
     let mut console = Console::ready();
     let keys: Vec<&str> = ["o", "Down"].into_iter().chain(["PgUp"; 12]).chain(["Enter"]).collect();
-    assert_eq!(wishes(&console.press(&keys)), [Intent::Override { parameter: "Fx".into(), value: 150.0 }]);
+    assert_eq!(wishes(&console.press(&keys)), [OperatorRequest::Override { parameter: "Fx".into(), value: 150.0 }]);
 }
 
 #[test]
@@ -241,7 +242,7 @@ fn a_stopped_robot_is_acknowledged_with_k_or_enter() {
         for mode in [Mode::Damped, Mode::Fault] {
             let mut console = Console::proposed();
             console.mode(mode);
-            assert_eq!(wishes(&console.press(&[key])), [Intent::Acknowledge]);
+            assert_eq!(wishes(&console.press(&[key])), [OperatorRequest::Acknowledge]);
         }
     }
     let mut console = Console::proposed();
@@ -254,7 +255,7 @@ fn an_observer_and_a_replay_send_nothing() {
     let mut observer = Console::new();
     observer.record(Record::Session(SessionInfo { observe: true, ..session() }));
     observer.record(Record::Proposal(proposal(0, 0)));
-    observer.stage(Stage::Proposed, 0);
+    observer.stage(ExperimentStage::Proposed, 0);
     let mut replay = Console::proposed();
     replay.tell(Msg::Replay(quadfrog_console::message::ReplayStatus {
         file: "session.mcap".into(),
@@ -266,14 +267,17 @@ fn an_observer_and_a_replay_send_nothing() {
     for (name, console) in [("observer", &mut observer), ("replay", &mut replay)] {
         for mode in Mode::ALL {
             console.mode(mode);
-            for stage in Stage::ALL {
+            for stage in ExperimentStage::ALL {
                 console.stage(stage, 0);
                 for key in all {
                     let sent = wishes(&console.press(&[key]));
                     // Whoever stopped the robot may say that it was looked at; the session then lets go of it.
                     let stopped = name == "observer" && matches!(mode, Mode::Damped | Mode::Fault);
-                    let expected =
-                        if stopped && ["k", "Enter"].contains(&key) { vec![Intent::Acknowledge] } else { vec![] };
+                    let expected = if stopped && ["k", "Enter"].contains(&key) {
+                        vec![OperatorRequest::Acknowledge]
+                    } else {
+                        vec![]
+                    };
                     assert_eq!(sent, expected, "{name}, {key} in {mode:?}, {stage:?}");
                 }
             }
@@ -289,13 +293,13 @@ fn energising_keys_do_nothing_in_the_wrong_mode() {
         let mut console = Console::proposed();
         console.mode(mode);
         let armed = wishes(&console.press(&["A"]));
-        assert_eq!(armed.contains(&Intent::Arm), mode == Mode::Disarmed, "A in {mode:?}");
+        assert_eq!(armed.contains(&OperatorRequest::Arm), mode == Mode::Disarmed, "A in {mode:?}");
         let mut console = Console::proposed();
         console.mode(mode);
         console.press(&["g"]);
         console.wait(900);
         let sent = wishes(&console.press(&["g"]));
-        let approved = sent.iter().any(|intent| matches!(intent, Intent::Approve { .. }));
+        let approved = sent.iter().any(|intent| matches!(intent, OperatorRequest::Approve { .. }));
         assert_eq!(approved, mode == Mode::Ready, "g g in {mode:?}");
     }
 }
@@ -310,7 +314,7 @@ fn the_palette_says_why_not_and_never_moves_the_robot_with_enter() {
     assert_eq!(console.press(&[":", "a", "r", "m", "Enter"]), [], "arming is asked again");
     assert_eq!(console.press(&["Enter"]), []);
     console.press(&[":", "a", "r", "m", "Enter"]);
-    assert_eq!(wishes(&console.press(&["y"])), [Intent::Arm]);
+    assert_eq!(wishes(&console.press(&["y"])), [OperatorRequest::Arm]);
 }
 
 #[test]
@@ -322,7 +326,7 @@ fn pasted_text_is_never_read_as_keys() {
     console.press(&["m"]);
     console.tell(Msg::Paste("slid on the mat\n".into()));
     let sent = wishes(&console.press(&["Enter"]));
-    assert_eq!(sent, [Intent::Note { trial: 0, text: "slid on the mat".into() }]);
+    assert_eq!(sent, [OperatorRequest::Note { trial: 0, text: "slid on the mat".into() }]);
 }
 
 #[test]
@@ -362,10 +366,10 @@ fn suspending_is_refused_while_anything_is_sent_to_a_real_robot() {
 #[test]
 fn the_bell_rings_when_the_operator_is_needed() {
     let mut console = Console::ready();
-    console.stage(Stage::Running, 0);
+    console.stage(ExperimentStage::Running, 0);
     console.record(Record::Trial(trial(0, None, None)));
-    assert_eq!(console.stage(Stage::Review, 0), [Effect::Bell]);
-    assert_eq!(console.stage(Stage::Review, 0), [], "once");
+    assert_eq!(console.stage(ExperimentStage::Review, 0), [Effect::Bell]);
+    assert_eq!(console.stage(ExperimentStage::Review, 0), [], "once");
 }
 
 #[test]

@@ -48,7 +48,7 @@ const fn row(action: Action, key: &'static str, seen: Seen, after: (&'static str
 const LIVE: &[Row] = &[
     row(Action::Override, "o", Shows("Override trial #0"), ("\x1b[B120\r", "was 106.2")),
     row(Action::ClearOverrides, "O", Hides("was 106.2"), ("", "")),
-    row(Action::PreArm, "P", Shows("Arming checks: all passed"), ("\x1b", "Press A to arm")),
+    row(Action::ArmingChecks, "P", Shows("Arming checks: all passed"), ("\x1b", "Press A to arm")),
     row(Action::Skip, "n", Hides("106.2 N"), ("", "Press A to arm")),
     row(Action::Suspend, "Ctrl-Z", Suspends, ("", "Press A to arm")),
     row(Action::Arm, "A", Shows("STAND UP"), ("", "READY")),

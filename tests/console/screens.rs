@@ -2,8 +2,9 @@
 
 mod support;
 
-use quadfrog::realtime::telemetry::{Mode, Phase};
-use quadfrog::recording::record::{Record, Stage, Verdict};
+use quadfrog::recording::record::Record;
+use quadfrog::telemetry::{Mode, Phase};
+use quadfrog::trial::{ExperimentStage, Verdict};
 use quadfrog_console::message::Msg;
 use quadfrog_console::settings::ConsoleSettings;
 use quadfrog_console::theme::{Colours, Glyphs, Theme};
@@ -111,7 +112,7 @@ fn ascii_is_ascii_on_every_screen() {
             for number in 0..3 {
                 console.record(Record::Trial(trial(number, Some(Verdict::ALL[number as usize]), None)));
             }
-            console.stage(Stage::Proposed, 3);
+            console.stage(ExperimentStage::Proposed, 3);
             for time_ms in (0..9000).step_by(5) {
                 console.tell(Msg::Tick(Box::new(tick(time_ms, (time_ms as f64 / 300.0).sin(), None))));
             }

@@ -4,16 +4,15 @@
 mod support;
 
 use quadfrog::config::Config;
-use quadfrog::realtime::command::Task;
-use quadfrog::realtime::pre_arm::{Check, CheckState};
-use quadfrog::realtime::telemetry::{Counters, Mode, Snapshot};
-use quadfrog::recording::record::{
-    Fixed, Insight, ParameterInsight, PointRecord, PreArmCheck, Record, Search, SearchedParameter, SessionInfo, Stage,
-    TrialRecord, Verdict,
-};
+use quadfrog::recording::record::{ArmingCheckRecord, Record, SessionInfo};
 use quadfrog::recording::recorder::RecorderStatus;
 use quadfrog::robot::{Battery, LinkStatus};
-use quadfrog::session::intent::{Intent, OperatorCheck};
+use quadfrog::session::operator_request::{OperatorCheck, OperatorRequest};
+use quadfrog::telemetry::{ArmingCheck, ArmingCheckState, Counters, Mode, Snapshot};
+use quadfrog::trial::{
+    ExperimentStage, FixedParameter, ParameterInsight, PointRecord, ProposalInsight, SearchStatus, SearchedParameter,
+    Task, TrialRecord, Verdict,
+};
 use quadfrog_console::export;
 use quadfrog_console::message::{Effect, Msg};
 use quadfrog_console::model::View;
@@ -21,7 +20,7 @@ use quadfrog_console::model::dialog::Dialog;
 use strum::VariantArray;
 use support::{Console, session, tick, trial};
 
-fn wishes(effects: &[Effect]) -> Vec<Intent> {
+fn wishes(effects: &[Effect]) -> Vec<OperatorRequest> {
     let wish = |effect: &Effect| match effect {
         Effect::Request(intent) => Some(intent.clone()),
         _ => None,
@@ -34,7 +33,7 @@ fn line_with(screen: &str, text: &str) -> String {
 }
 
 /// What is searched: Fx as given, the others as the session began.
-fn search(fx: (f64, f64), fixed: Option<Fixed>) -> Search {
+fn search(fx: (f64, f64), fixed: Option<FixedParameter>) -> SearchStatus {
     let parameter = |name: &str, (low, high), (least, most), fixed| SearchedParameter {
         name: name.into(),
         low,
@@ -43,7 +42,7 @@ fn search(fx: (f64, f64), fixed: Option<Fixed>) -> Search {
         most,
         fixed,
     };
-    Search {
+    SearchStatus {
         budget: 20,
         counted: 0,
         parameters: vec![
@@ -72,7 +71,7 @@ fn gains_are_set_within_their_own_safe_ranges() {
     }
     // From f0 down to kp, past the three parameters.
     let sent = console.press(&["Up", "o", "Down", "Down", "Down", "5", "0", "0", "Enter"]);
-    assert_eq!(wishes(&sent), [Intent::OverrideGain { gain: "kp".into(), value: 500.0 }]);
+    assert_eq!(wishes(&sent), [OperatorRequest::OverrideGain { gain: "kp".into(), value: 500.0 }]);
     console.press(&["o", "Down", "2", "0", "0", "0", "Enter"]);
     let screen = console.screen(80, 24);
     assert!(screen.contains("is outside"), "{screen}");
@@ -86,12 +85,12 @@ fn a_parameter_is_fixed_for_some_trials_and_searched_again() {
     assert_eq!(console.press(&["X"]), []);
     assert!(console.screen(80, 24).contains("Fix Fx at 75.00 N for how many trials?"), "{}", console.screen(80, 24));
     let sent = wishes(&console.press(&["Backspace", "3", "Enter"]));
-    assert_eq!(sent, [Intent::Fix { parameter: "Fx".into(), value: 75.0, trials: 3 }]);
-    console.record(Record::Search(search((0.0, 150.0), Some(Fixed { value: 75.0, trials: 3 }))));
+    assert_eq!(sent, [OperatorRequest::Fix { parameter: "Fx".into(), value: 75.0, trials: 3 }]);
+    console.record(Record::Search(search((0.0, 150.0), Some(FixedParameter { value: 75.0, trials: 3 }))));
     let screen = console.screen(80, 24);
     assert!(line_with(&screen, "Fx  ").contains("fixed at 75.00, 3 more"), "{screen}");
     assert!(line_with(&screen, "  X  ").contains("search Fx again"), "{screen}");
-    assert_eq!(wishes(&console.press(&["X"])), [Intent::Unfix { parameter: "Fx".into() }]);
+    assert_eq!(wishes(&console.press(&["X"])), [OperatorRequest::Unfix { parameter: "Fx".into() }]);
     for wrong in ["0", "-1", "many"] {
         let mut console = overriding();
         console.press(&["X", "Backspace"]);
@@ -115,7 +114,7 @@ fn bounds_are_checked_and_each_refusal_is_explained() {
         (sent, console.screen(80, 24))
     };
     let (sent, _) = typed("50..120.5");
-    assert_eq!(sent, [Intent::NarrowBounds { parameter: "Fx".into(), low: 50.0, high: 120.5 }]);
+    assert_eq!(sent, [OperatorRequest::NarrowBounds { parameter: "Fx".into(), low: 50.0, high: 120.5 }]);
     for (text, reason) in [
         ("120..50", "120 is not below 50"),
         ("50", "is no range; write it as 50..120"),
@@ -142,7 +141,7 @@ fn an_override_outside_narrowed_bounds_is_refused_with_the_present_ones() {
 
 #[test]
 fn the_point_on_the_card_or_in_the_form_can_be_queued() {
-    let point = |fx: f64| Intent::Enqueue(vec![("f0".into(), 1.25), ("Fx".into(), fx), ("Fz".into(), 250.0)]);
+    let point = |fx: f64| OperatorRequest::Enqueue(vec![("f0".into(), 1.25), ("Fx".into(), fx), ("Fz".into(), 250.0)]);
     let mut console = overriding();
     assert_eq!(wishes(&console.press(&["Q"])), [point(75.0)]);
     let sent = wishes(&console.press(&["o", "1", "0", "0", "Q"]));
@@ -152,7 +151,7 @@ fn the_point_on_the_card_or_in_the_form_can_be_queued() {
 
 #[test]
 fn the_search_cannot_be_changed_while_a_trial_is_under_way() {
-    for stage in [Stage::Running, Stage::Review] {
+    for stage in [ExperimentStage::Running, ExperimentStage::Review] {
         let mut console = overriding();
         console.stage(stage, 0);
         for key in ["X", "B", "Q", "K"] {
@@ -169,10 +168,10 @@ fn the_search_cannot_be_changed_while_a_trial_is_under_way() {
     assert_eq!(console.said(), "bounds: only in the view Override");
 }
 
-fn insight() -> Insight {
+fn insight() -> ProposalInsight {
     let at: Vec<f64> = (0..=40).map(|i| 0.75 + f64::from(i) / 40.0).collect();
     let bump = |middle: f64| at.iter().map(|x| (-((x - middle) / 0.1).powi(2)).exp()).collect::<Vec<f64>>();
-    Insight {
+    ProposalInsight {
         trial: 12,
         parameters: vec![ParameterInsight {
             name: "f0".into(),
@@ -232,7 +231,7 @@ fn finished() -> Console {
         };
         console.record(Record::Trial(row));
     }
-    console.stage(Stage::Finished, 3);
+    console.stage(ExperimentStage::Finished, 3);
     console
 }
 
@@ -245,12 +244,12 @@ fn a_finished_study_says_so_and_what_comes_next() {
         assert!(screen.contains(part), "no {part}:\n{screen}");
     }
     console.press(&["C"]);
-    assert_eq!(wishes(&console.press(&["Enter"])), [Intent::Continue(20)]);
+    assert_eq!(wishes(&console.press(&["Enter"])), [OperatorRequest::Continue(20)]);
     console.press(&["K"]);
     assert!(console.screen(80, 24).contains("How many repeats at most"));
-    assert_eq!(wishes(&console.press(&["Enter"])), [Intent::ConfirmBest { repeats: 10 }]);
-    console.record(Record::Search(Search { confirming: Some(7), ..search((0.0, 150.0), None) }));
-    assert_eq!(wishes(&console.press(&["K"])), [Intent::ConfirmBest { repeats: 0 }], "the same key ends it");
+    assert_eq!(wishes(&console.press(&["Enter"])), [OperatorRequest::ConfirmBest { repeats: 10 }]);
+    console.record(Record::Search(SearchStatus { confirming: Some(7), ..search((0.0, 150.0), None) }));
+    assert_eq!(wishes(&console.press(&["K"])), [OperatorRequest::ConfirmBest { repeats: 0 }], "the same key ends it");
     assert_eq!(console.press(&["E"]), [Effect::ExportBest]);
 }
 
@@ -324,27 +323,28 @@ fn the_best_of_a_continued_study_is_exported_with_its_newest_configuration() {
 }
 
 /// A Go1 that lies disarmed with this pre-arm list.
-fn on_hardware(list: Vec<PreArmCheck>) -> Console {
+fn on_hardware(list: Vec<ArmingCheckRecord>) -> Console {
     let mut console = Console::proposed();
     console.record(Record::Session(SessionInfo { backend: "go1".into(), ..session() }));
-    console.record(Record::PreArm(list));
+    console.record(Record::ArmingChecks(list));
     console
 }
 
-fn item(check: Check, state: CheckState, found: &str, needed: &str) -> PreArmCheck {
-    PreArmCheck { check, state, found: found.into(), needed: needed.into() }
+fn item(check: ArmingCheck, state: ArmingCheckState, found: &str, needed: &str) -> ArmingCheckRecord {
+    ArmingCheckRecord { check, state, found: found.into(), needed: needed.into() }
 }
 
 #[test]
 fn arming_shows_every_check_that_fails_and_takes_the_operators_word() {
     let mut console = on_hardware(vec![
-        item(Check::StateFresh, CheckState::Passed, "2 ms", "at most 10 ms"),
-        item(Check::Battery, CheckState::Failed, "21 %", "at least 30 %"),
-        item(Check::MotorsCool, CheckState::Failed, "FR_calf 64 C", "below 60 C"),
-        item(Check::AreaClear, CheckState::Waiting, "", "your word"),
+        item(ArmingCheck::StateFresh, ArmingCheckState::Passed, "2 ms", "at most 10 ms"),
+        item(ArmingCheck::Battery, ArmingCheckState::Failed, "21 %", "at least 30 %"),
+        item(ArmingCheck::MotorsCool, ArmingCheckState::Failed, "FR_calf 64 C", "below 60 C"),
+        item(ArmingCheck::AreaClear, ArmingCheckState::Waiting, "", "your word"),
     ]);
     assert_eq!(console.next_step(), "Not ready to arm: 3 checks have not passed. P shows them.");
-    let mut resumed = on_hardware(vec![item(Check::StateFresh, CheckState::Passed, "2 ms", "at most 10 ms")]);
+    let mut resumed =
+        on_hardware(vec![item(ArmingCheck::StateFresh, ArmingCheckState::Passed, "2 ms", "at most 10 ms")]);
     resumed.tell(Msg::Resumed);
     assert_eq!(resumed.next_step(), "Checking the robot.");
     assert_eq!(resumed.press(&["A"]), [], "what was checked before the program was stopped is old");
@@ -367,19 +367,19 @@ fn arming_shows_every_check_that_fails_and_takes_the_operators_word() {
     for _ in OperatorCheck::ALL {
         sent.extend(wishes(&console.press(&["x", "Down"])));
     }
-    assert_eq!(sent, OperatorCheck::ALL.map(Intent::Confirm));
+    assert_eq!(sent, OperatorCheck::ALL.map(OperatorRequest::Confirm));
     console.press(&["Esc", "5"]);
     assert!(console.screen(120, 40).contains("3 of 4 not yet (P)"));
 }
 
 #[test]
 fn a_machine_that_can_hurt_somebody_is_armed_by_a_word() {
-    let all_well = vec![item(Check::StateFresh, CheckState::Passed, "2 ms", "at most 10 ms")];
+    let all_well = vec![item(ArmingCheck::StateFresh, ArmingCheckState::Passed, "2 ms", "at most 10 ms")];
     let mut console = on_hardware(all_well.clone());
     assert_eq!(console.press(&["A"]), []);
     assert!(console.next_step().contains("Type stand to stand the robot up"), "{}", console.next_step());
     assert_eq!(console.press(&["s", "t", "a", "n"]), []);
-    assert_eq!(wishes(&console.press(&["d"])), [Intent::Arm]);
+    assert_eq!(wishes(&console.press(&["d"])), [OperatorRequest::Arm]);
     for keys in [&["Enter"][..], &["s", "t", "e"], &["s", "s"], &["A"], &["y"]] {
         let mut console = on_hardware(all_well.clone());
         console.press(&["A"]);
@@ -389,7 +389,12 @@ fn a_machine_that_can_hurt_somebody_is_armed_by_a_word() {
     // A check that fails while the word is being typed ends it.
     let mut console = on_hardware(all_well);
     console.press(&["A", "s", "t", "a", "n"]);
-    console.record(Record::PreArm(vec![item(Check::Battery, CheckState::Failed, "20 %", "at least 30 %")]));
+    console.record(Record::ArmingChecks(vec![item(
+        ArmingCheck::Battery,
+        ArmingCheckState::Failed,
+        "20 %",
+        "at least 30 %",
+    )]));
     assert_eq!(wishes(&console.press(&["d"])), []);
 }
 
@@ -452,7 +457,12 @@ fn health_says_what_the_recorder_writes_and_why_it_stopped() {
     let counters = Counters { ticks_not_recorded: 12, ..Counters::default() };
     console.tell(Msg::Snapshot(Box::new(Snapshot { tick: newest, counters })));
     console.tell(Msg::Recorder(RecorderStatus { bytes: 4_000_000, ticks: 10_000, ..RecorderStatus::default() }));
-    console.record(Record::PreArm(vec![item(Check::Disk, CheckState::Failed, "812 MB", "at least 1000 MB")]));
+    console.record(Record::ArmingChecks(vec![item(
+        ArmingCheck::Disk,
+        ArmingCheckState::Failed,
+        "812 MB",
+        "at least 1000 MB",
+    )]));
     let screen = console.screen(120, 40);
     for part in ["4.0 MB, 400 kB/s, 10000 ticks", "812 MB !", "12 ticks !"] {
         assert!(screen.contains(part), "no {part}:\n{screen}");

@@ -11,9 +11,10 @@ use portable_pty::CommandBuilder;
 use pty::Session;
 use quadfrog::optimize::journal::{Durability, Journal, JournalFile, LOCK_GRACE};
 use quadfrog::optimize::trial::{Trial, TrialState};
-use quadfrog::realtime::telemetry::Mode;
 use quadfrog::recording::player::Player;
-use quadfrog::recording::record::{Record, Source, TrialRecord, Verdict};
+use quadfrog::recording::record::Record;
+use quadfrog::telemetry::Mode;
+use quadfrog::trial::{ProposalSource, TrialRecord, Verdict};
 use quadfrog_console::app::{self, ConsoleOptions};
 use quadfrog_console::feed::Feed;
 use quadfrog_console::settings::ConsoleSettings;
@@ -102,7 +103,10 @@ fn a_session_by_keys_is_what_the_recording_and_the_study_say() {
     assert_eq!(player.damage(), None);
     let rows = rows(&player);
     let fx = |row: &TrialRecord| row.parameters.iter().find(|(name, _)| name == "Fx").map(|(_, value)| *value);
-    assert_eq!((rows[0].verdict, rows[0].value, rows[0].source), (Some(Verdict::Fall), Some(0.0), Source::Operator));
+    assert_eq!(
+        (rows[0].verdict, rows[0].value, rows[0].source),
+        (Some(Verdict::Fall), Some(0.0), ProposalSource::Operator)
+    );
     assert_eq!(fx(&rows[0]), Some(120.0));
     assert_eq!((rows[1].verdict, rows[1].value), (Some(Verdict::Void), None));
     let proposals: Vec<_> = player
@@ -114,7 +118,7 @@ fn a_session_by_keys_is_what_the_recording_and_the_study_say() {
         })
         .collect();
     let last = proposals.last().expect("a proposal");
-    assert_eq!((last.trial, last.source, last.parent), (2, Source::Rerun, Some(1)));
+    assert_eq!((last.trial, last.source, last.parent), (2, ProposalSource::Rerun, Some(1)));
     let again: Vec<f64> = last.parameters.iter().map(|p| p.value).collect();
     let before: Vec<f64> = rows[1].parameters.iter().map(|(_, value)| *value).collect();
     assert_eq!(again, before, "the same parameters again");

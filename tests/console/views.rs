@@ -4,9 +4,10 @@ mod support;
 
 use std::path::Path;
 
-use quadfrog::realtime::telemetry::{Mode, Phase};
 use quadfrog::recording::player::Player;
-use quadfrog::recording::record::{Record, Stage, TrialRecord, Verdict};
+use quadfrog::recording::record::Record;
+use quadfrog::telemetry::{Mode, Phase};
+use quadfrog::trial::{ExperimentStage, TrialRecord, Verdict};
 use quadfrog_console::feed::Feed;
 use quadfrog_console::message::{Effect, Mouse, Msg};
 use quadfrog_console::model::View;
@@ -165,7 +166,7 @@ fn joints_contact_and_wireframe_are_there_at_every_size() {
         newest.limited = 0b10;
         newest.estimate.contact = [true, false, true, false];
         let counters = console.model.snapshot.counters;
-        let snapshot = quadfrog::realtime::telemetry::Snapshot { tick: newest, counters };
+        let snapshot = quadfrog::telemetry::Snapshot { tick: newest, counters };
         console.tell(Msg::Snapshot(Box::new(snapshot)));
         console.press(&["t", "t"]);
         let screen = console.screen(columns, rows);
@@ -317,7 +318,7 @@ fn details_tell_everything_that_is_known_of_a_trial() {
     console.tell(Msg::Record(quadfrog::recording::record::Stamped {
         time_ns: 61_000_000_000,
         record: Record::Stage(quadfrog::recording::record::StageInfo {
-            stage: Stage::Running,
+            stage: ExperimentStage::Running,
             trial: 1,
             can_undo: false,
         }),
@@ -325,7 +326,7 @@ fn details_tell_everything_that_is_known_of_a_trial() {
     console.tell(Msg::Record(quadfrog::recording::record::Stamped {
         time_ns: 64_500_000_000,
         record: Record::Stage(quadfrog::recording::record::StageInfo {
-            stage: Stage::Review,
+            stage: ExperimentStage::Review,
             trial: 1,
             can_undo: false,
         }),
@@ -455,10 +456,10 @@ fn each_cause_rings_the_bell_only_where_the_settings_name_it() {
         if console.record(Record::Trial(trial(0, None, Some(Verdict::Fall)))).contains(&Effect::Bell) {
             rung.push(BellCause::Fall);
         }
-        if console.stage(Stage::Review, 0).contains(&Effect::Bell) {
+        if console.stage(ExperimentStage::Review, 0).contains(&Effect::Bell) {
             rung.push(BellCause::Verdict);
         }
-        if console.stage(Stage::Proposed, 1).contains(&Effect::Bell) {
+        if console.stage(ExperimentStage::Proposed, 1).contains(&Effect::Bell) {
             rung.push(BellCause::Proposal);
         }
         assert_eq!(rung, [named]);

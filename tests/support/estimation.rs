@@ -6,15 +6,14 @@ use nalgebra::Vector2;
 use quadfrog::config::{Backend, Config};
 use quadfrog::control::estimator::Estimator;
 use quadfrog::control::leg::feet;
-use quadfrog::control::settings::{ObjectiveSource, Settings};
-use quadfrog::realtime::command::{JumpParameters, Task, TrialSpec};
-use quadfrog::realtime::telemetry::{Tick, TrialEnd};
-use quadfrog::recording::record::{Measured, Verdict};
+use quadfrog::control::settings::{ControlSettings, ObjectiveSource};
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::robot::{JOINTS, JointCommand, Joints, LEGS, PerLeg, Placement, Robot, RobotError, RobotState};
 use quadfrog::session::objective;
 use quadfrog::session::rollout::Rollout;
 use quadfrog::sim::{ActuatorKind, SimConfig, Simulator};
+use quadfrog::telemetry::{Tick, TrialEnd, TrialSpec};
+use quadfrog::trial::{JumpParameters, MeasuredJump, Task, Verdict};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
@@ -43,16 +42,16 @@ impl World {
 }
 
 /// The shipped settings with the controller on the estimate.
-pub fn settings(task: Task) -> Settings {
+pub fn settings(task: Task) -> ControlSettings {
     settings_of(task, ObjectiveSource::Estimate)
 }
 
 /// The shipped settings with the controller on `source`.
-pub fn settings_of(task: Task, source: ObjectiveSource) -> Settings {
+pub fn settings_of(task: Task, source: ObjectiveSource) -> ControlSettings {
     let config = Config::load(None).unwrap();
     let robot = RobotDescription::embedded("go1").unwrap();
     let settings = config.settings(&robot, task, Backend::Simulator).unwrap();
-    Settings { objective: source, ..settings }
+    ControlSettings { objective: source, ..settings }
 }
 
 /// A simulator whose machine was badly calibrated: joint zeros off by 0.01 rad (5 mm at the foot), an accelerometer with 1 %
@@ -139,8 +138,8 @@ fn even(random: &mut ChaCha8Rng) -> f64 {
 #[derive(Debug, Clone, Copy)]
 pub struct JumpError {
     pub task: Task,
-    pub truth: Measured,
-    pub estimate: Measured,
+    pub truth: MeasuredJump,
+    pub estimate: MeasuredJump,
 }
 
 impl JumpError {
@@ -217,8 +216,8 @@ pub fn jumps_on<R: Robot>(
 }
 
 /// The same ticks with the simulator's own knowledge as the estimate.
-pub fn in_truth(ticks: &[Tick], settings: &Settings) -> Vec<Tick> {
-    let settings = Settings { objective: ObjectiveSource::Truth, ..*settings };
+pub fn in_truth(ticks: &[Tick], settings: &ControlSettings) -> Vec<Tick> {
+    let settings = ControlSettings { objective: ObjectiveSource::Truth, ..*settings };
     let mut estimator = Estimator::default();
     let believed = ticks.iter().map(|tick| {
         let feet = feet(&settings.geometry, &tick.state.joint_position);

@@ -9,10 +9,9 @@ use quadfrog::optimize::journal::Durability;
 use quadfrog::optimize::sampler::{Direction, SamplerConfig};
 use quadfrog::optimize::space::{Range, Space};
 use quadfrog::optimize::study::{Storage, Study, StudyOptions};
-use quadfrog::realtime::command::{Task, TrialSpec};
-use quadfrog::realtime::telemetry::{Tick, TrialEnd};
-use quadfrog::recording::record::{ParameterInfo, Stage, Verdict};
-use quadfrog::session::life::{Life, Plan};
+use quadfrog::session::experiment::{Experiment, ExperimentPlan};
+use quadfrog::telemetry::{Tick, TrialEnd, TrialSpec};
+use quadfrog::trial::{ExperimentStage, ParameterInfo, Task, Verdict};
 
 pub const BOUNDS: [(&str, f64, f64); 3] = [("f0", 0.75, 1.75), ("Fx", 0.0, 150.0), ("Fz", 150.0, 350.0)];
 
@@ -33,8 +32,8 @@ pub fn study(storage: Storage) -> Study {
     .unwrap()
 }
 
-pub fn plan(budget: u32) -> Plan {
-    Plan {
+pub fn plan(budget: u32) -> ExperimentPlan {
+    ExperimentPlan {
         task: Task::Forward,
         control: TaskControl {
             kp: 400.0,
@@ -69,8 +68,8 @@ pub fn bounds(of: impl Fn(f64, f64) -> (f64, f64)) -> Vec<ParameterInfo> {
     BOUNDS.map(info).to_vec()
 }
 
-pub fn life(budget: u32) -> Life {
-    Life::open(plan(budget), study(Storage::Memory)).unwrap()
+pub fn life(budget: u32) -> Experiment {
+    Experiment::open(plan(budget), study(Storage::Memory)).unwrap()
 }
 
 /// A jump that goes as far as the parameters say: smooth, and different everywhere.
@@ -91,32 +90,32 @@ pub fn ticks(trial: u32, dx_m: f64) -> Vec<Tick> {
 }
 
 /// Approves what is on the table, lets it end as `end` and brings it to review.
-pub fn run(life: &mut Life, end: TrialEnd) -> TrialSpec {
+pub fn run(life: &mut Experiment, end: TrialEnd) -> TrialSpec {
     let card = life.proposal().expect("a proposal");
     let spec = life.approve(card.trial, card.revision).unwrap();
     life.ended(spec.trial, &end, &ticks(spec.trial, far(&spec)), 2);
-    assert_eq!(life.stage(), Stage::Review);
+    assert_eq!(life.stage(), ExperimentStage::Review);
     spec
 }
 
-pub fn accept(life: &mut Life) -> TrialSpec {
+pub fn accept(life: &mut Experiment) -> TrialSpec {
     let spec = run(life, TrialEnd::Settled);
     life.judge(Verdict::Accept, false).unwrap();
     spec
 }
 
-pub fn parameters(life: &Life) -> Vec<f64> {
+pub fn parameters(life: &Experiment) -> Vec<f64> {
     life.proposal().unwrap().parameters.iter().map(|p| p.value).collect()
 }
 
 /// The study in `folder`, taken up as a session does it.
-pub fn open(folder: &Path) -> Life {
-    Life::open(plan(1000), study(Storage::File(folder.join("study.log")))).unwrap()
+pub fn open(folder: &Path) -> Experiment {
+    Experiment::open(plan(1000), study(Storage::File(folder.join("study.log")))).unwrap()
 }
 
 /// One more worker on the study in `folder`, to whom a trial is dead that it has seen run for `abandoned`.
-pub fn joined(folder: &Path, budget: u32, abandoned: Duration) -> Life {
+pub fn joined(folder: &Path, budget: u32, abandoned: Duration) -> Experiment {
     let mut study = study(Storage::File(folder.join("study.log")));
     let worker = study.join().unwrap();
-    Life::open(Plan { worker, abandoned, ..plan(budget) }, study).unwrap()
+    Experiment::open(ExperimentPlan { worker, abandoned, ..plan(budget) }, study).unwrap()
 }

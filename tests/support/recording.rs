@@ -5,12 +5,12 @@ use std::path::Path;
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use proptest::prelude::*;
-use quadfrog::realtime::pre_arm::{Check, CheckState};
-use quadfrog::realtime::telemetry::{Counters, Estimate, Mode, Phase, StageTimes, Tick};
 use quadfrog::recording::player::{Played, Player};
 use quadfrog::recording::record::*;
 use quadfrog::recording::writer::Writer;
 use quadfrog::robot::{Battery, Imu, JointCommand, LinkStatus, MotorCommand, RobotState, Truth};
+use quadfrog::telemetry::{ArmingCheck, ArmingCheckState, Counters, Estimate, Mode, Phase, StageTimes, Tick};
+use quadfrog::trial::*;
 
 /// Log time of engine time 0 in these tests: 2026-11-21 00:00 UTC.
 pub const START_UTC_NS: u64 = 1_795_219_200_000_000_000;
@@ -162,8 +162,8 @@ impl Draw {
         }
     }
 
-    fn risk(&mut self) -> Option<Risk> {
-        self.option(|d| Risk {
+    fn risk(&mut self) -> Option<FallRisk> {
+        self.option(|d| FallRisk {
             nearest_fall: d.option(Draw::number),
             nearest_fall_trial: d.option(|d| d.word() as u32),
             falls: d.word() as u32,
@@ -206,15 +206,15 @@ impl Draw {
                 to: self.one_of(&Mode::ALL),
                 cause: self.string(),
             }),
-            2 => Record::Stage(StageInfo {
-                stage: self.one_of(&Stage::ALL),
+            2 => Record::Stage(StageRecord {
+                stage: self.one_of(&ExperimentStage::ALL),
                 trial: self.word() as u32,
                 can_undo: self.yes(),
             }),
             3 => Record::Proposal(Proposal {
                 trial: self.word() as u32,
                 revision: self.word() as u32,
-                source: self.one_of(&Source::ALL),
+                source: self.one_of(&ProposalSource::ALL),
                 parent: self.option(|d| d.word() as u32),
                 parameters: self.several(|d| ProposedParameter {
                     name: d.string(),
@@ -230,10 +230,10 @@ impl Draw {
             }),
             4 => Record::Trial(TrialRecord {
                 trial: self.word() as u32,
-                source: self.one_of(&Source::ALL),
+                source: self.one_of(&ProposalSource::ALL),
                 parent: self.option(|d| d.word() as u32),
                 parameters: self.several(|d| (d.string(), d.number())),
-                measured: self.option(|d| Measured {
+                measured: self.option(|d| MeasuredJump {
                     dx_m: d.number(),
                     dy_m: d.number(),
                     dyaw_rad: d.number(),
@@ -249,7 +249,7 @@ impl Draw {
                 risk: self.risk(),
                 gains: self.several(|d| (d.string(), d.number())),
             }),
-            5 => Record::Command(CommandRecord { wish: self.string(), accepted: self.yes(), answer: self.string() }),
+            5 => Record::Request(RequestRecord { wish: self.string(), accepted: self.yes(), answer: self.string() }),
             6 => Record::Counters(Counters {
                 late_ticks: self.word(),
                 worst_lateness_ns: self.word(),
@@ -260,18 +260,18 @@ impl Draw {
                 link: self.option(Draw::link),
             }),
             7 => Record::Log(LogRecord {
-                level: self.one_of(&[Level::Info, Level::Warning, Level::Error]),
+                level: self.one_of(&[LogLevel::Info, LogLevel::Warning, LogLevel::Error]),
                 source: self.string(),
                 message: self.string(),
             }),
-            8 => Record::PreArm(self.several(|d| PreArmCheck {
-                check: d.one_of(&Check::ALL),
+            8 => Record::ArmingChecks(self.several(|d| ArmingCheckRecord {
+                check: d.one_of(&ArmingCheck::ALL),
                 found: d.string(),
                 needed: d.string(),
-                state: d.one_of(&CheckState::ALL),
+                state: d.one_of(&ArmingCheckState::ALL),
             })),
             9 => Record::FaultTicks(vec![self.tick(), self.tick()]),
-            10 => Record::Search(Search {
+            10 => Record::Search(SearchStatus {
                 budget: self.word() as u32,
                 counted: self.word() as u32,
                 parameters: self.several(|d| SearchedParameter {
@@ -280,11 +280,11 @@ impl Draw {
                     high: d.number(),
                     least: d.number(),
                     most: d.number(),
-                    fixed: d.option(|d| Fixed { value: d.number(), trials: d.word() as u32 }),
+                    fixed: d.option(|d| FixedParameter { value: d.number(), trials: d.word() as u32 }),
                 }),
                 confirming: self.option(|d| d.word() as u32),
             }),
-            11 => Record::Insight(Insight {
+            11 => Record::Insight(ProposalInsight {
                 trial: self.word() as u32,
                 parameters: self.several(|d| ParameterInsight {
                     name: d.string(),
@@ -419,11 +419,11 @@ pub fn study(seconds: u64) -> (Vec<Tick>, Vec<Stamped>) {
             (tick.trial, tick.mode) = (Some(trial), Mode::Jump);
         }
         let mut add = |ms: u64, record| records.push(Stamped { time_ns: ms * MS, record });
-        let stage = |stage| Record::Stage(StageInfo { stage, trial, can_undo: trial > 0 });
+        let stage = |stage| Record::Stage(StageRecord { stage, trial, can_undo: trial > 0 });
         let row = |verdict: Option<Verdict>| {
             Record::Trial(TrialRecord {
                 trial,
-                source: Source::Sampler,
+                source: ProposalSource::Sampler,
                 parent: None,
                 parameters: vec![("f0".into(), 1.25), ("Fx".into(), 100.0 + f64::from(trial)), ("Fz".into(), 250.0)],
                 measured: None,
@@ -437,20 +437,20 @@ pub fn study(seconds: u64) -> (Vec<Tick>, Vec<Stamped>) {
                 gains: Vec::new(),
             })
         };
-        add(start - 500, stage(Stage::Proposed));
+        add(start - 500, stage(ExperimentStage::Proposed));
         add(
             start - 500,
             Record::Proposal(Proposal {
                 trial,
                 revision: 0,
-                source: Source::Sampler,
+                source: ProposalSource::Sampler,
                 parent: None,
                 parameters: vec![ProposedParameter { name: "Fx".into(), value: 100.0, proposed: 100.0 }],
                 risk: None,
                 gains: Vec::new(),
             }),
         );
-        add(start, stage(Stage::Running));
+        add(start, stage(ExperimentStage::Running));
         add(start, row(None));
         add(start + 100, Record::Counters(Counters { late_ticks: u64::from(trial), ..Counters::default() }));
         if start + 999 < seconds * 1000 {

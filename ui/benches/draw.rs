@@ -10,9 +10,10 @@ mod support;
 use std::time::{Duration, Instant};
 
 use nix::time::{ClockId, clock_gettime};
-use quadfrog::realtime::telemetry::{Phase, Snapshot};
-use quadfrog::recording::record::{Insight, ParameterInsight, Record, Verdict};
+use quadfrog::recording::record::Record;
 use quadfrog::robot::description::RobotDescription;
+use quadfrog::telemetry::{Phase, Snapshot};
+use quadfrog::trial::{ParameterInsight, ProposalInsight, Verdict};
 use quadfrog_console::message::Msg;
 use quadfrog_console::model::View;
 use quadfrog_console::series::Series;
@@ -30,7 +31,7 @@ fn processor_time() -> Duration {
 }
 
 /// One of the ticks of a session that jumps every four seconds.
-fn sample(time_ms: u64) -> quadfrog::realtime::telemetry::Tick {
+fn sample(time_ms: u64) -> quadfrog::telemetry::Tick {
     let in_jump_ms = time_ms % 4_000;
     let phase = match in_jump_ms {
         0..300 => Some(Phase::Impulse),
@@ -61,7 +62,7 @@ fn main() {
         console.tell(Msg::Tick(Box::new(sample(time_ms))));
     }
     console.press(&["c"]);
-    console.record(Record::Insight(Insight { trial: 0, parameters: ["f0", "Fx", "Fz"].map(insight).to_vec() }));
+    console.record(Record::Insight(ProposalInsight { trial: 0, parameters: ["f0", "Fx", "Fz"].map(insight).to_vec() }));
     let mut terminal = Terminal::new(TestBackend::new(200, 60)).expect("a screen in memory");
     let mut time_ms = 60_000;
     for view in View::VARIANTS.iter().copied() {

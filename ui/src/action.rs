@@ -9,7 +9,7 @@ pub enum Action {
     Stop,
     Interrupt,
     Arm,
-    PreArm,
+    ArmingChecks,
     SitDown,
     Acknowledge,
     Approve,
@@ -144,7 +144,7 @@ pub static ACTIONS: [ActionInfo; 68] = {
         fixed(row(A::Stop, "stop", &["Space", "F12"], G::Robot, "STOP: damp all motors at once, from any screen")),
         fixed(row(A::Interrupt, "interrupt", &["Ctrl-C"], G::Robot, "STOP; again within 2 s: quit")),
         row(A::Arm, "arm", &["A"], G::Robot, "arm: the robot stands up"),
-        row(A::PreArm, "pre-arm", &["P"], G::Robot, "arming checks, and your confirmation where one is needed"),
+        row(A::ArmingChecks, "pre-arm", &["P"], G::Robot, "arming checks, and your confirmation where one is needed"),
         row(A::SitDown, "sit-down", &["D"], G::Robot, "sit down and disarm"),
         row(A::Acknowledge, "acknowledge", &["k"], G::Robot, "acknowledge a stop or a fault: back to DISARMED"),
 

@@ -12,7 +12,7 @@ use crossterm::clipboard::CopyToClipboard;
 use crossterm::event::{Event, KeyEventKind, MouseButton, MouseEvent, MouseEventKind};
 use nix::sys::signal::{Signal, raise};
 use quadfrog::realtime::channel::StopLatch;
-use quadfrog::recording::record::Level;
+use quadfrog::recording::record::LogLevel;
 use quadfrog::robot::description::RobotDescription;
 use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
@@ -199,7 +199,7 @@ impl Console {
         if reached != self.reached {
             self.reached = reached;
             let words = if reached { "the SSH line answers again" } else { "the SSH line does not answer any more" };
-            say(&mut self.model, Level::Warning, words.to_owned());
+            say(&mut self.model, LogLevel::Warning, words.to_owned());
         }
     }
 
@@ -286,8 +286,8 @@ impl Console {
 
     fn say_written(&mut self, written: Result<PathBuf, ExportError>, words: impl FnOnce(&Path) -> String) {
         match written {
-            Ok(path) => say(&mut self.model, Level::Info, words(&path)),
-            Err(error) => say(&mut self.model, Level::Error, format!("not written: {error}")),
+            Ok(path) => say(&mut self.model, LogLevel::Info, words(&path)),
+            Err(error) => say(&mut self.model, LogLevel::Error, format!("not written: {error}")),
         }
     }
 
@@ -335,7 +335,7 @@ impl Console {
         let heartbeat = self.feed.heartbeat().filter(|_| ended == Ended::Quit);
         let stop = self.feed.stop_latch();
         if self.model.robot_needs_us() {
-            say(&mut self.model, Level::Info, "the robot sits down, then the program ends".to_owned());
+            say(&mut self.model, LogLevel::Info, "the robot sits down, then the program ends".to_owned());
         }
         self.redraw = true;
         self.draw_if_due()?;

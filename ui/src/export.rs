@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use quadfrog::config::{Config, ConfigError};
 use quadfrog::engine::newest_config;
-use quadfrog::realtime::command::Task;
+use quadfrog::trial::Task;
 
 use crate::model::Model;
 use crate::text;

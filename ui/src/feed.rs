@@ -5,7 +5,7 @@ pub mod replay;
 use quadfrog::engine::Handle;
 use quadfrog::realtime::channel::{Heartbeat, StopLatch};
 use quadfrog::recording::player::Player;
-use quadfrog::session::intent::Intent;
+use quadfrog::session::operator_request::OperatorRequest;
 
 use crate::message::{Msg, ReplayCommand};
 use replay::ReplayFeed;
@@ -63,7 +63,7 @@ impl Feed {
     }
 
     /// Sends a request to the session; none in a replay.
-    pub fn request(&self, intent: Intent) {
+    pub fn request(&self, intent: OperatorRequest) {
         if let Feed::Live(handle) = self {
             handle.wish(intent);
         }

@@ -1,8 +1,8 @@
 //! The conditions of each action, with the reason where it is not possible. The session checks every request again.
 
-use quadfrog::control::mode::{self, Request};
-use quadfrog::realtime::telemetry::Mode;
-use quadfrog::recording::record::{Stage, Verdict};
+use quadfrog::control::mode::{self, Trigger};
+use quadfrog::telemetry::Mode;
+use quadfrog::trial::{ExperimentStage, Verdict};
 
 use crate::action::{ACTIONS, Action, ActionInfo};
 use crate::layout::{MIN_COLUMNS, MIN_ROWS};
@@ -68,7 +68,7 @@ pub fn may_acknowledge(model: &Model) -> Legality {
     if !model.session.info.observe {
         may_request(model)?;
     }
-    require(mode::next(model.mode(), Request::Acknowledge).is_some(), "nothing waits to be acknowledged")
+    require(mode::next(model.mode(), Trigger::Acknowledge).is_some(), "nothing waits to be acknowledged")
 }
 
 fn require(condition: bool, reason: &str) -> Legality {
@@ -97,22 +97,23 @@ fn busy(mode: Mode) -> Option<&'static str> {
 fn may_arm(model: &Model) -> Legality {
     may_request(model)?;
     must_be_visible(model)?;
-    if mode::next(model.mode(), Request::Arm).is_none() {
+    if mode::next(model.mode(), Trigger::Arm).is_none() {
         return refuse(busy(model.mode()).unwrap_or("the robot is armed already"));
     }
-    require(!model.session.stage_is(Stage::Review), "the last trial waits for its verdict")?;
-    require(!model.session.pre_arm.is_empty(), "the arming checks are not finished")?;
-    match model.session.pre_arm_failing() {
+    require(!model.session.stage_is(ExperimentStage::Review), "the last trial waits for its verdict")?;
+    require(!model.session.arming_checks.is_empty(), "the arming checks are not finished")?;
+    match model.session.failing_checks() {
         0 => Ok(()),
-        count => {
-            refuse(format!("{count} arming checks have not passed: {} shows them", model.keymap.key(Action::PreArm)))
-        }
+        count => refuse(format!(
+            "{count} arming checks have not passed: {} shows them",
+            model.keymap.key(Action::ArmingChecks)
+        )),
     }
 }
 
 fn may_sit_down(model: &Model) -> Legality {
     may_request(model)?;
-    match (mode::next(model.mode(), Request::SitDown), model.mode()) {
+    match (mode::next(model.mode(), Trigger::SitDown), model.mode()) {
         (Some(_), _) => Ok(()),
         (None, Mode::Disarmed) => refuse("the robot is disarmed already"),
         (None, mode) => refuse(busy(mode).unwrap_or("not now")),
@@ -131,7 +132,7 @@ fn must_be_visible(model: &Model) -> Legality {
 fn may_approve(model: &Model) -> Legality {
     may_change_proposal(model)?;
     must_be_visible(model)?;
-    match (mode::next(model.mode(), Request::Approve), model.mode()) {
+    match (mode::next(model.mode(), Trigger::Approve), model.mode()) {
         (Some(_), _) => Ok(()),
         (None, Mode::Disarmed) => {
             refuse(format!("the robot is not standing: press {} first", model.keymap.key(Action::Arm)))
@@ -143,10 +144,10 @@ fn may_approve(model: &Model) -> Legality {
 fn may_change_proposal(model: &Model) -> Legality {
     may_request(model)?;
     match model.session.stage.map(|info| info.stage) {
-        Some(Stage::Proposed) if model.session.open_proposal().is_some() => Ok(()),
-        Some(Stage::Review) => refuse("the last trial waits for its verdict"),
-        Some(Stage::Running) => refuse("a trial is running"),
-        Some(Stage::Finished) => {
+        Some(ExperimentStage::Proposed) if model.session.open_proposal().is_some() => Ok(()),
+        Some(ExperimentStage::Review) => refuse("the last trial waits for its verdict"),
+        Some(ExperimentStage::Running) => refuse("a trial is running"),
+        Some(ExperimentStage::Finished) => {
             refuse(format!("the study is finished: {} gives it more trials", model.keymap.key(Action::Continue)))
         }
         _ => refuse("there is no proposal yet"),
@@ -157,9 +158,9 @@ fn may_change_proposal(model: &Model) -> Legality {
 fn may_search(model: &Model) -> Legality {
     may_request(model)?;
     match model.session.stage.map(|info| info.stage) {
-        Some(Stage::Proposed | Stage::Finished) => Ok(()),
-        Some(Stage::Review) => refuse("the last trial waits for its verdict"),
-        Some(Stage::Running) => refuse("a trial is running"),
+        Some(ExperimentStage::Proposed | ExperimentStage::Finished) => Ok(()),
+        Some(ExperimentStage::Review) => refuse("the last trial waits for its verdict"),
+        Some(ExperimentStage::Running) => refuse("a trial is running"),
         None => refuse("the session has not begun"),
     }
 }
@@ -199,17 +200,17 @@ fn may_clear_overrides(model: &Model) -> Legality {
 
 fn may_continue(model: &Model) -> Legality {
     may_request(model)?;
-    require(model.session.stage_is(Stage::Finished), "the study is not finished")
+    require(model.session.stage_is(ExperimentStage::Finished), "the study is not finished")
 }
 
 fn may_judge(model: &Model) -> Legality {
     may_request(model)?;
-    require(model.session.stage_is(Stage::Review), "no trial waits for a verdict")
+    require(model.session.stage_is(ExperimentStage::Review), "no trial waits for a verdict")
 }
 
 fn may_rerun(model: &Model) -> Legality {
     may_request(model)?;
-    if model.session.stage_is(Stage::Review) {
+    if model.session.stage_is(ExperimentStage::Review) {
         return Ok(());
     }
     match model.selected_trial() {

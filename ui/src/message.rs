@@ -2,10 +2,10 @@
 
 use std::time::Duration;
 
-use quadfrog::realtime::telemetry::{Snapshot, Tick};
 use quadfrog::recording::record::Stamped;
 use quadfrog::recording::recorder::RecorderStatus;
-use quadfrog::session::intent::Intent;
+use quadfrog::session::operator_request::OperatorRequest;
+use quadfrog::telemetry::{Snapshot, Tick};
 
 use crate::keymap::Key;
 
@@ -63,7 +63,7 @@ pub enum Effect {
     /// Stop the robot now.
     Stop,
     /// Send a request to the session.
-    Request(Intent),
+    Request(OperatorRequest),
     /// Control the replay.
     Replay(ReplayCommand),
     /// Ring the terminal's bell.

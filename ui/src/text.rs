@@ -1,6 +1,6 @@
 //! Rows of the trial table as text: clipboard, CSV, Markdown.
 
-use quadfrog::recording::record::{TrialRecord, Verdict};
+use quadfrog::trial::{TrialRecord, Verdict};
 
 use crate::model::Model;
 

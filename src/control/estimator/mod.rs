@@ -16,10 +16,10 @@ pub use contact::ContactGate;
 pub use filter::{Filter, FootMotion};
 
 use super::limits;
-use super::settings::{ObjectiveSource, Settings};
-use crate::realtime::telemetry::Estimate;
+use super::settings::{ControlSettings, ObjectiveSource};
 use crate::robot::kinematics::Foot;
 use crate::robot::{PerLeg, RobotState, Truth, leg_of, robot_time_passed};
+use crate::telemetry::Estimate;
 
 /// Acceleration of free fall, m/s^2.
 pub const GRAVITY: f64 = 9.81;
@@ -56,7 +56,7 @@ impl Estimator {
 
     /// The estimate after one more state; `feet` belong to its joint angles. A state that was seen already changes nothing,
     /// nor does one with a number that is not finite (the watchdog stops the robot).
-    pub fn update(&mut self, state: &RobotState, feet: &PerLeg<Foot>, settings: &Settings) -> &Estimate {
+    pub fn update(&mut self, state: &RobotState, feet: &PerLeg<Foot>, settings: &ControlSettings) -> &Estimate {
         let previous_yaw = self.estimate.roll_pitch_yaw.z;
         match &state.truth {
             Some(truth) if settings.objective == ObjectiveSource::Truth => {
@@ -94,7 +94,7 @@ impl Estimator {
         estimate.angular_velocity_body = truth.angular_velocity_body;
     }
 
-    fn sense(&mut self, state: &RobotState, feet: &PerLeg<Foot>, settings: &Settings) {
+    fn sense(&mut self, state: &RobotState, feet: &PerLeg<Foot>, settings: &ControlSettings) {
         let estimate = &mut self.estimate;
         estimate.orientation_world = state.imu.orientation_world;
         estimate.angular_velocity_body = state.imu.gyro_body;
@@ -144,7 +144,7 @@ impl Estimator {
 }
 
 /// How each foot moves relative to the inertial unit, and over the ground if it rolls there.
-fn foot_motions(state: &RobotState, feet: &PerLeg<Foot>, settings: &Settings) -> PerLeg<FootMotion> {
+fn foot_motions(state: &RobotState, feet: &PerLeg<Foot>, settings: &ControlSettings) -> PerLeg<FootMotion> {
     let rotation = state.imu.orientation_world;
     let gyro_body = state.imu.gyro_body;
     std::array::from_fn(|leg| {

@@ -3,10 +3,10 @@
 //! A person's hand outranks it: after STOP, a fault, a cancelled countdown, an undone verdict or a wish to sit down it holds
 //! still until a person arms or approves again. It never acknowledges a stop.
 
-use super::{Intent, Supervisor, Wish};
-use crate::realtime::telemetry::{Cause, Mode};
-use crate::recording::record::{Level, Stage, Verdict};
-use crate::session::approval::Approval;
+use super::{OperatorRequest, StampedRequest, Supervisor};
+use crate::recording::record::LogLevel;
+use crate::telemetry::{Mode, TransitionCause};
+use crate::trial::{Approval, ExperimentStage, Verdict};
 
 /// Whether and how the session acts by itself.
 #[derive(Debug, Default)]
@@ -28,9 +28,9 @@ const AGAIN_NS: u64 = 500_000_000;
 
 impl Unattended {
     /// STOP, a fault, and a robot that sits down although nobody asked it to (its operator is silent) end the course.
-    pub fn mode_changed(&mut self, to: Mode, cause: Cause) {
+    pub fn mode_changed(&mut self, to: Mode, cause: TransitionCause) {
         self.arming &= to == Mode::Disarmed;
-        if matches!(cause, Cause::Stop | Cause::Fault(_)) || to == Mode::SitDown {
+        if matches!(cause, TransitionCause::Stop | TransitionCause::Fault(_)) || to == Mode::SitDown {
             self.held = true;
         }
     }
@@ -50,11 +50,14 @@ impl Supervisor {
     }
 
     /// A person has wished something.
-    pub(super) fn noticed(&mut self, intent: &Intent) {
+    pub(super) fn noticed(&mut self, intent: &OperatorRequest) {
         match intent {
-            Intent::Cancel | Intent::SitDown | Intent::Undo | Intent::Acknowledge => self.unattended.held = true,
+            OperatorRequest::Cancel
+            | OperatorRequest::SitDown
+            | OperatorRequest::Undo
+            | OperatorRequest::Acknowledge => self.unattended.held = true,
             // Towards more energy only: a verdict given after a stop does not set the robot going.
-            Intent::Arm | Intent::Approve { .. } => self.unattended.held = false,
+            OperatorRequest::Arm | OperatorRequest::Approve { .. } => self.unattended.held = false,
             _ => {}
         }
     }
@@ -68,39 +71,39 @@ impl Supervisor {
         let auto = approval == Approval::Auto && simulated;
         let stops = self.control.stop.count();
         let step = match self.life.stage() {
-            Stage::Review => {
+            ExperimentStage::Review => {
                 let suggested = self.life.under_review().and_then(|row| row.suggested).unwrap_or(Verdict::Void);
                 // What was cancelled or stopped in mid-jump waits for a person, whatever the rule.
                 let judged = if auto { suggested != Verdict::Void } else { suggested == Verdict::Accept };
-                judged.then_some(Intent::Judge(suggested))
+                judged.then_some(OperatorRequest::Judge(suggested))
             }
-            Stage::Proposed if self.mode == Mode::Ready && simulated => {
-                self.life.proposal().map(|card| Intent::Approve { trial: card.trial, revision: card.revision })
+            ExperimentStage::Proposed if self.mode == Mode::Ready && simulated => {
+                self.life.proposal().map(|card| OperatorRequest::Approve { trial: card.trial, revision: card.revision })
             }
-            Stage::Proposed if self.mode == Mode::Disarmed && auto && !arming && time_ns >= again_ns => {
-                Some(Intent::Arm)
+            ExperimentStage::Proposed if self.mode == Mode::Disarmed && auto && !arming && time_ns >= again_ns => {
+                Some(OperatorRequest::Arm)
             }
             _ => None,
         };
         let Some(intent) = step else { return };
-        self.unattended.arming = intent == Intent::Arm;
-        let wish = Wish { intent, stops, time_ns };
+        self.unattended.arming = intent == OperatorRequest::Arm;
+        let wish = StampedRequest { intent, stops, time_ns };
         match self.obey(&wish) {
             Ok(answer) => {
                 let wish = super::describe(&wish.intent);
-                self.log(Level::Info, format!("{}: {wish}: {answer}", approval.name()), time_ns);
+                self.log(LogLevel::Info, format!("{}: {wish}: {answer}", approval.name()), time_ns);
             }
-            Err(reason) if wish.intent == Intent::Arm => {
+            Err(reason) if wish.intent == OperatorRequest::Arm => {
                 self.unattended.arming_refused(time_ns);
                 if self.unattended.refused != reason {
-                    self.log(Level::Info, format!("{} cannot arm yet: {reason}", approval.name()), time_ns);
+                    self.log(LogLevel::Info, format!("{} cannot arm yet: {reason}", approval.name()), time_ns);
                     self.unattended.refused = reason;
                 }
             }
             Err(reason) => {
                 // Said once: a person must look.
                 self.unattended.held = true;
-                self.log(Level::Warning, format!("{} waits for a person: {reason}", approval.name()), time_ns);
+                self.log(LogLevel::Warning, format!("{} waits for a person: {reason}", approval.name()), time_ns);
             }
         }
         self.publish(time_ns);

@@ -4,11 +4,12 @@
 
 use std::time::Duration;
 
-use quadfrog::realtime::pre_arm::{Check, CheckState};
-use quadfrog::realtime::telemetry::{Mode, Phase, Snapshot, Tick};
 use quadfrog::recording::record::{
-    CommandRecord, Measured, ParameterInfo, PreArmCheck, Proposal, ProposedParameter, Record, SessionInfo, Source,
-    Stage, StageInfo, Stamped, Transition, TrialRecord, Verdict,
+    ArmingCheckRecord, Record, RequestRecord, SessionInfo, StageRecord, Stamped, Transition,
+};
+use quadfrog::telemetry::{ArmingCheck, ArmingCheckState, Mode, Phase, Snapshot, Tick};
+use quadfrog::trial::{
+    ExperimentStage, MeasuredJump, ParameterInfo, Proposal, ProposalSource, ProposedParameter, TrialRecord, Verdict,
 };
 use quadfrog_console::keymap::Key;
 use quadfrog_console::message::{Effect, Msg};
@@ -43,13 +44,13 @@ impl Console {
         let mut console = Console::new();
         console.record(Record::Session(session()));
         console.record(Record::Proposal(proposal(0, 0)));
-        console.stage(Stage::Proposed, 0);
+        console.stage(ExperimentStage::Proposed, 0);
         console.mode(Mode::Disarmed);
-        console.record(Record::PreArm(vec![PreArmCheck {
-            check: Check::StateFresh,
+        console.record(Record::ArmingChecks(vec![ArmingCheckRecord {
+            check: ArmingCheck::StateFresh,
             found: "0 ms old".into(),
             needed: "at most 10 ms".into(),
-            state: CheckState::Passed,
+            state: ArmingCheckState::Passed,
         }]));
         console
     }
@@ -64,9 +65,9 @@ impl Console {
     /// Trial 0 ran and waits for its verdict, the robot in `mode`.
     pub fn review(mode: Mode, suggested: Verdict) -> Console {
         let mut console = Console::ready();
-        console.stage(Stage::Running, 0);
+        console.stage(ExperimentStage::Running, 0);
         console.record(Record::Trial(trial(0, None, Some(suggested))));
-        console.stage(Stage::Review, 0);
+        console.stage(ExperimentStage::Review, 0);
         console.mode(mode);
         console
     }
@@ -95,12 +96,12 @@ impl Console {
         self.tell(Msg::Record(Stamped { time_ns: self.model.snapshot.tick.time_ns, record }))
     }
 
-    pub fn stage(&mut self, stage: Stage, trial: u32) -> Vec<Effect> {
-        self.record(Record::Stage(StageInfo { stage, trial, can_undo: false }))
+    pub fn stage(&mut self, stage: ExperimentStage, trial: u32) -> Vec<Effect> {
+        self.record(Record::Stage(StageRecord { stage, trial, can_undo: false }))
     }
 
     pub fn answer(&mut self, wish: &str, accepted: bool, answer: &str) {
-        self.record(Record::Command(CommandRecord { wish: wish.into(), accepted, answer: answer.into() }));
+        self.record(Record::Request(RequestRecord { wish: wish.into(), accepted, answer: answer.into() }));
     }
 
     pub fn mode(&mut self, mode: Mode) {
@@ -209,7 +210,7 @@ pub fn proposal(trial: u32, revision: u32) -> Proposal {
     Proposal {
         trial,
         revision,
-        source: Source::Sampler,
+        source: ProposalSource::Sampler,
         parent: None,
         parameters: vec![parameter("f0", 1.25), parameter("Fx", 75.0), parameter("Fz", 250.0)],
         risk: None,
@@ -230,10 +231,10 @@ pub fn trial(number: u32, verdict: Option<Verdict>, suggested: Option<Verdict>) 
     };
     TrialRecord {
         trial: number,
-        source: Source::Sampler,
+        source: ProposalSource::Sampler,
         parent: None,
         parameters: vec![("f0".into(), 1.25), ("Fx".into(), 75.0), ("Fz".into(), 250.0)],
-        measured: Some(Measured { dx_m: 0.42, dy_m: -0.01, dyaw_rad: 0.02, apex_m: 0.3, air_s: 0.25 }),
+        measured: Some(MeasuredJump { dx_m: 0.42, dy_m: -0.01, dyaw_rad: 0.02, apex_m: 0.3, air_s: 0.25 }),
         value,
         hand_value: None,
         suggested,

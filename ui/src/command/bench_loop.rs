@@ -12,14 +12,12 @@ use clap::Args;
 use color_eyre::eyre::{WrapErr, eyre};
 use hdrhistogram::Histogram;
 use quadfrog::config::{Backend, Config};
-use quadfrog::control::body::Body;
-use quadfrog::control::settings::Settings;
+use quadfrog::control::control_loop::ControlLoop;
+use quadfrog::control::settings::ControlSettings;
 use quadfrog::realtime::channel::{ScreenEnd, SessionEnd, channels};
 use quadfrog::realtime::clock::{Clock, MonotonicClock};
-use quadfrog::realtime::command::{Command, Permit, Task};
-use quadfrog::realtime::scheduling::{Granted, Scheduling};
+use quadfrog::realtime::scheduling::{GrantedSettings, Scheduling};
 use quadfrog::realtime::system::isolated_cores;
-use quadfrog::realtime::telemetry::{Event, Mode, Tick};
 use quadfrog::realtime::thread::{CONTROL_PHASE, Instant, Paced, REHEARSAL_LEAD, pace, pace_rehearsed};
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::robot::go1::Go1;
@@ -27,6 +25,8 @@ use quadfrog::robot::go1::packet::{COMMAND_LENGTH, STATE_LENGTH};
 use quadfrog::robot::{Placement, Robot};
 use quadfrog::sim::Simulator;
 use quadfrog::sim::emulator::Emulator;
+use quadfrog::telemetry::{Command, Event, Mode, Permit, Tick};
+use quadfrog::trial::Task;
 
 use super::Failure;
 
@@ -99,7 +99,7 @@ struct Measured {
     rehearsal: Times,
     /// Ticks that were not in READY: the robot did not stand all the time.
     elsewhere: u64,
-    granted: Option<Granted>,
+    granted: Option<GrantedSettings>,
 }
 
 impl Measured {
@@ -398,7 +398,7 @@ impl Others {
 
 /// A robot that stands up, then the ticks in which it stands, measured.
 struct Standing<'a> {
-    body: Body,
+    body: ControlLoop,
     robot: &'a mut dyn Robot,
     clock: MonotonicClock,
     others: Others,
@@ -459,7 +459,7 @@ impl Paced for Standing<'_> {
 /// As the engine's control thread goes, with a rehearsal `lead` before each tick.
 fn stand_and_measure(
     scheduling: Scheduling,
-    settings: &Settings,
+    settings: &ControlSettings,
     ticks: u64,
     lead: Duration,
     robot: &mut dyn Robot,
@@ -470,7 +470,7 @@ fn stand_and_measure(
     let (end, session, screen, ring) = channels();
     let mut others = Others { session, screen, ticks: ring, mode_changes: 0 };
     others.attend();
-    let body = Body::new(settings, end);
+    let body = ControlLoop::new(settings, end);
     let mut standing = Standing { body, robot, clock, others, rising: Some(0), left: ticks, measured };
     pace_rehearsed(PERIOD, CONTROL_PHASE, lead, &mut standing).wrap_err("the monotonic clock cannot be waited on")?;
     match standing.rising {

@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use quadfrog::engine::{STUDY_FILE, StoredStudy, stored_studies, stored_study};
 use quadfrog::optimize::study::Storage;
-use quadfrog::realtime::command::Task;
 use quadfrog::robot::description::RobotDescription;
+use quadfrog::trial::Task;
 
 use super::Failure;
 

@@ -20,9 +20,9 @@ use quadfrog::engine::{EngineError, newest_config};
 use quadfrog::optimize::journal::JournalError;
 use quadfrog::optimize::sampler::SamplerKind;
 use quadfrog::optimize::study::StudyError;
-use quadfrog::realtime::command::Task;
 use quadfrog::recording::RecordingError;
 use quadfrog::robot::description::RobotDescription;
+use quadfrog::trial::Task;
 
 /// Optimize the jumps of a quadruped, on the robot or on the built-in simulator.
 ///

@@ -12,15 +12,14 @@ use quadfrog::config::{Backend, Config};
 use quadfrog::engine::{self, EngineError, Options, StoredStudy};
 use quadfrog::optimize::journal::Durability;
 use quadfrog::optimize::study::Storage;
-use quadfrog::realtime::command::Task;
-use quadfrog::realtime::telemetry::Tick;
-use quadfrog::recording::record::{Record, Stamped, TrialRecord, Verdict};
+use quadfrog::recording::record::{Record, Stamped};
 use quadfrog::recording::writer::Writer;
 use quadfrog::robot::description::RobotDescription;
-use quadfrog::session::approval::Approval;
 use quadfrog::session::automatic;
 use quadfrog::session::rollout::Rollout;
 use quadfrog::sim::Simulator;
+use quadfrog::telemetry::Tick;
+use quadfrog::trial::{Approval, Task, TrialRecord, Verdict};
 
 use printer::Printer;
 

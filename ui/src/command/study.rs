@@ -13,9 +13,10 @@ use quadfrog::optimize::exchange::{self, TableTrial};
 use quadfrog::optimize::repeats;
 use quadfrog::optimize::study::Storage;
 use quadfrog::optimize::trial::{Trial, TrialState};
-use quadfrog::recording::record::TrialRecord;
 use quadfrog::report::table;
-use quadfrog::session::life::{self, rows_of};
+use quadfrog::session::experiment;
+use quadfrog::session::experiment::rows_of;
+use quadfrog::trial::TrialRecord;
 
 use super::Failure;
 use super::chosen::journal;
@@ -294,7 +295,7 @@ fn import(which: &Which, table: &Path, format: Option<Format>, queue: bool) -> R
         trials.into_iter().partition(|trial| trial.state.is_finished());
     if !queue {
         let given = finished.len();
-        let added = life::import(&mut study, finished).map_err(|error| wrong(&error))?.len();
+        let added = experiment::import(&mut study, finished).map_err(|error| wrong(&error))?.len();
         let known = match given - added {
             0 => String::new(),
             known => format!("; {known} were there already, with the same parameters, value and times"),

@@ -2,9 +2,9 @@
 
 use std::collections::VecDeque;
 
-use quadfrog::realtime::telemetry::{Counters, Snapshot};
 use quadfrog::recording::player::{Played, Player};
 use quadfrog::recording::record::{Record, Stamped};
+use quadfrog::telemetry::{Counters, Snapshot};
 
 use crate::message::{Msg, ReplayCommand, ReplayStatus};
 

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use quadfrog::recording::record::{ParameterInfo, Proposal, ProposedParameter};
+use quadfrog::trial::{ParameterInfo, Proposal, ProposedParameter};
 use tui_input::Input;
 
 use super::session::SessionModel;
@@ -29,7 +29,7 @@ pub enum Dialog {
         typed: usize,
     },
     /// The arming checks.
-    PreArm {
+    ArmingChecks {
         /// The selected one of the operator's own items.
         selected: usize,
     },

@@ -2,8 +2,8 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
-use quadfrog::realtime::telemetry::{Mode, Phase, Tick};
 use quadfrog::robot::{LEGS, PerLeg};
+use quadfrog::telemetry::{Mode, Phase, Tick};
 
 /// Samples that are kept: a minute at 200 a second.
 const CAPACITY: usize = 12_000;

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use quadfrog::recording::record::Level;
+use quadfrog::recording::record::LogLevel;
 
 /// Lines that the log keeps.
 const CAPACITY: usize = 10_000;
@@ -13,7 +13,7 @@ pub struct LogLine {
     /// Time since the engine started, ns.
     pub time_ns: u64,
     /// Severity.
-    pub level: Level,
+    pub level: LogLevel,
     /// Part of the program.
     pub source: String,
     /// The line.
@@ -44,7 +44,7 @@ pub struct LogView {
     /// Lines above the newest; 0 follows.
     pub back: usize,
     /// The lowest level shown.
-    pub level: Option<Level>,
+    pub level: Option<LogLevel>,
     /// Text that a shown line contains.
     pub search: String,
 }

@@ -10,10 +10,11 @@ pub mod trials;
 
 use std::time::Duration;
 
-use quadfrog::realtime::telemetry::{Mode, Snapshot};
-use quadfrog::recording::record::{Level, ParameterInfo, TrialRecord};
+use quadfrog::recording::record::LogLevel;
 use quadfrog::recording::recorder::RecorderStatus;
 use quadfrog::robot::description::RobotDescription;
+use quadfrog::telemetry::{Mode, Snapshot};
+use quadfrog::trial::{ParameterInfo, TrialRecord};
 use strum::{IntoStaticStr, VariantArray};
 
 use crate::column::Column;
@@ -52,7 +53,7 @@ impl View {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Notice {
     /// Severity.
-    pub level: Level,
+    pub level: LogLevel,
     /// The text.
     pub text: String,
 }

@@ -1,11 +1,11 @@
 //! The session as its records have reported it.
 
-use quadfrog::realtime::command::Task;
-use quadfrog::recording::record::{
-    Insight, ParameterInfo, PreArmCheck, Proposal, Search, SearchedParameter, SessionInfo, Stage, StageInfo,
-    TrialRecord, Verdict,
-};
+use quadfrog::recording::record::{ArmingCheckRecord, SessionInfo, StageRecord};
 use quadfrog::session::objective;
+use quadfrog::trial::{
+    ExperimentStage, ParameterInfo, Proposal, ProposalInsight, SearchStatus, SearchedParameter, Task, TrialRecord,
+    Verdict,
+};
 
 use super::log::SessionLog;
 use super::trials::Trials;
@@ -15,16 +15,16 @@ use super::trials::Trials;
 pub struct SessionModel {
     /// Task, robot, sampler, parameters, files.
     pub info: SessionInfo,
-    /// Stage of the present trial; none before the session has begun.
-    pub stage: Option<StageInfo>,
+    /// ExperimentStage of the present trial; none before the session has begun.
+    pub stage: Option<StageRecord>,
     /// The newest proposal; its trial may run already.
     pub proposal: Option<Proposal>,
     /// The newest arming checks; empty before the robot was disarmed for the first time.
-    pub pre_arm: Vec<PreArmCheck>,
+    pub arming_checks: Vec<ArmingCheckRecord>,
     /// Present bounds, fixed parameters and budget.
-    pub search: Option<Search>,
+    pub search: Option<SearchStatus>,
     /// Densities and importances behind the sampler's newest proposal.
-    pub insight: Option<Insight>,
+    pub insight: Option<ProposalInsight>,
     /// The study.
     pub trials: Trials,
     /// The log.
@@ -35,25 +35,25 @@ pub struct SessionModel {
 
 impl SessionModel {
     /// Whether the session is in this stage.
-    pub fn stage_is(&self, stage: Stage) -> bool {
+    pub fn stage_is(&self, stage: ExperimentStage) -> bool {
         self.stage.is_some_and(|info| info.stage == stage)
     }
 
     /// The trial that waits for its verdict.
     pub fn under_review(&self) -> Option<&TrialRecord> {
-        let info = self.stage.filter(|info| info.stage == Stage::Review)?;
+        let info = self.stage.filter(|info| info.stage == ExperimentStage::Review)?;
         self.trials.records.get(&info.trial)
     }
 
     /// The proposal that waits for approval.
     pub fn open_proposal(&self) -> Option<&Proposal> {
-        let info = self.stage.filter(|info| info.stage == Stage::Proposed)?;
+        let info = self.stage.filter(|info| info.stage == ExperimentStage::Proposed)?;
         self.proposal.as_ref().filter(|proposal| proposal.trial == info.trial)
     }
 
     /// The number of arming checks that forbid arming.
-    pub fn pre_arm_failing(&self) -> usize {
-        self.pre_arm.iter().filter(|item| !item.state.allows()).count()
+    pub fn failing_checks(&self) -> usize {
+        self.arming_checks.iter().filter(|item| !item.state.allows()).count()
     }
 
     /// Whether the session drives hardware.

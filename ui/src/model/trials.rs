@@ -3,7 +3,7 @@
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
 
-use quadfrog::recording::record::{ParameterInfo, PointRecord, TrialRecord, Verdict};
+use quadfrog::trial::{ParameterInfo, PointRecord, TrialRecord, Verdict};
 
 use crate::column::Column;
 

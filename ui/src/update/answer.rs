@@ -2,8 +2,8 @@
 
 use std::time::Duration;
 
-use quadfrog::recording::record::Level;
-use quadfrog::session::intent::Intent;
+use quadfrog::recording::record::LogLevel;
+use quadfrog::session::operator_request::OperatorRequest;
 
 use crate::legal::{may_acknowledge, may_request};
 use crate::message::Effect;
@@ -14,23 +14,23 @@ use crate::model::{Model, Notice};
 const INTERRUPT_WINDOW: Duration = Duration::from_secs(2);
 
 /// Shows a line to the operator.
-pub fn say(model: &mut Model, level: Level, text: impl Into<String>) {
+pub fn say(model: &mut Model, level: LogLevel, text: impl Into<String>) {
     model.message = Some(Notice { level, text: text.into() });
 }
 
 /// Reports that a dialog ended without effect.
 pub(super) fn cancelled(model: &mut Model, text: &str) -> Vec<Effect> {
-    say(model, Level::Info, format!("cancelled: {text}"));
+    say(model, LogLevel::Info, format!("cancelled: {text}"));
     Vec::new()
 }
 
 /// Sends a request to the session, except in a replay or from an observer.
-pub(super) fn request(model: &mut Model, intent: Intent) -> Vec<Effect> {
-    let allowed = if intent == Intent::Acknowledge { may_acknowledge(model) } else { may_request(model) };
+pub(super) fn request(model: &mut Model, intent: OperatorRequest) -> Vec<Effect> {
+    let allowed = if intent == OperatorRequest::Acknowledge { may_acknowledge(model) } else { may_request(model) };
     match allowed {
         Ok(()) => vec![Effect::Request(intent)],
         Err(reason) => {
-            say(model, Level::Warning, format!("refused: {reason}"));
+            say(model, LogLevel::Warning, format!("refused: {reason}"));
             Vec::new()
         }
     }
@@ -39,13 +39,13 @@ pub(super) fn request(model: &mut Model, intent: Intent) -> Vec<Effect> {
 /// Stops the robot. The dialog closes, so that the robot is visible; a half-written text stays.
 pub(super) fn stop(model: &mut Model) -> Vec<Effect> {
     if model.replay.is_some() {
-        say(model, Level::Info, "this is a replay: there is no robot to stop");
+        say(model, LogLevel::Info, "this is a replay: there is no robot to stop");
         return Vec::new();
     }
     if !matches!(model.dialog, Some(Dialog::Field { .. })) {
         model.dialog = None;
     }
-    say(model, Level::Warning, "STOP: damping");
+    say(model, LogLevel::Warning, "STOP: damping");
     vec![Effect::Stop]
 }
 
@@ -58,6 +58,6 @@ pub(super) fn interrupt(model: &mut Model) -> Vec<Effect> {
     }
     let effects = stop(model);
     let stopped = if effects.is_empty() { "" } else { "STOP: damping. " };
-    say(model, Level::Warning, format!("{stopped}Ctrl-C again within 2 s quits"));
+    say(model, LogLevel::Warning, format!("{stopped}Ctrl-C again within 2 s quits"));
     effects
 }

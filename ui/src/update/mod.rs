@@ -10,9 +10,9 @@ mod navigate;
 mod perform;
 mod records;
 
-use quadfrog::realtime::telemetry::Mode;
-use quadfrog::recording::record::Level;
-use quadfrog::session::intent::Intent;
+use quadfrog::recording::record::LogLevel;
+use quadfrog::session::operator_request::OperatorRequest;
+use quadfrog::telemetry::Mode;
 
 use crate::action::Action;
 use crate::keymap::Key;
@@ -54,7 +54,7 @@ pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
             model.history.clear();
             model.log_view.back = 0;
         }
-        Msg::Resumed => model.session.pre_arm.clear(),
+        Msg::Resumed => model.session.arming_checks.clear(),
     }
     Vec::new()
 }
@@ -72,7 +72,7 @@ fn press(model: &mut Model, key: Key) -> Vec<Effect> {
     }
     if model.mode() == Mode::Countdown && may_request(model).is_ok() {
         model.dialog = None;
-        return request(model, Intent::Cancel);
+        return request(model, OperatorRequest::Cancel);
     }
     if let Some(dialog) = model.dialog.take() {
         return match dialog::key(model, dialog, key) {
@@ -84,7 +84,7 @@ fn press(model: &mut Model, key: Key) -> Vec<Effect> {
         Some(action) => perform(model, action),
         None => {
             let help = model.keymap.key(Action::Help);
-            say(model, Level::Info, format!("{key} does nothing here; {help} shows the keys"));
+            say(model, LogLevel::Info, format!("{key} does nothing here; {help} shows the keys"));
             Vec::new()
         }
     }

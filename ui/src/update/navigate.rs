@@ -1,6 +1,7 @@
 //! Movement within the views: rows, pages, the charts' cursor, freezing, zooming, ghosts, sorting and filtering.
 
-use quadfrog::recording::record::{Level, Verdict};
+use quadfrog::recording::record::LogLevel;
+use quadfrog::trial::Verdict;
 
 use strum::VariantArray;
 
@@ -99,7 +100,7 @@ pub(super) fn ghost(model: &mut Model) -> Vec<Effect> {
         }
         _ => no_ghost(model),
     };
-    say(model, Level::Info, text);
+    say(model, LogLevel::Info, text);
     Vec::new()
 }
 
@@ -182,8 +183,8 @@ pub(super) fn filter(model: &mut Model) -> Vec<Effect> {
         View::Log => {
             model.log_view.back = 0;
             model.log_view.level = match model.log_view.level {
-                None => Some(Level::Warning),
-                Some(Level::Warning) => Some(Level::Error),
+                None => Some(LogLevel::Warning),
+                Some(LogLevel::Warning) => Some(LogLevel::Error),
                 Some(_) => None,
             };
         }

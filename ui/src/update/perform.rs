@@ -1,8 +1,9 @@
 //! The effect of each action.
 
-use quadfrog::realtime::telemetry::Mode;
-use quadfrog::recording::record::{Level, Stage, Verdict};
-use quadfrog::session::intent::Intent;
+use quadfrog::recording::record::LogLevel;
+use quadfrog::session::operator_request::OperatorRequest;
+use quadfrog::telemetry::Mode;
+use quadfrog::trial::{ExperimentStage, Verdict};
 
 use strum::VariantArray;
 
@@ -17,11 +18,11 @@ use crate::model::{Model, View};
 /// Performs an action, or reports why it is not possible.
 pub(super) fn perform(model: &mut Model, action: Action) -> Vec<Effect> {
     if let Err(reason) = legal(action, model) {
-        say(model, Level::Warning, format!("{}: {reason}", action.info().name));
+        say(model, LogLevel::Warning, format!("{}: {reason}", action.info().name));
         // All failed arming checks are shown at once.
-        let shown = action == Action::Arm && model.mode() == Mode::Disarmed && model.session.pre_arm_failing() > 0;
+        let shown = action == Action::Arm && model.mode() == Mode::Disarmed && model.session.failing_checks() > 0;
         if shown && may_request(model).is_ok() {
-            return open(model, Dialog::PreArm { selected: 0 });
+            return open(model, Dialog::ArmingChecks { selected: 0 });
         }
         return Vec::new();
     }
@@ -30,28 +31,28 @@ pub(super) fn perform(model: &mut Model, action: Action) -> Vec<Effect> {
         Action::Interrupt => interrupt(model),
         // Arming hardware needs a typed confirmation, not a single key.
         Action::Arm if model.session.is_hardware() => open(model, Dialog::Arm { typed: 0 }),
-        Action::Arm => request(model, Intent::Arm),
-        Action::PreArm => open(model, Dialog::PreArm { selected: 0 }),
-        Action::SitDown => request(model, Intent::SitDown),
-        Action::Acknowledge => request(model, Intent::Acknowledge),
+        Action::Arm => request(model, OperatorRequest::Arm),
+        Action::ArmingChecks => open(model, Dialog::ArmingChecks { selected: 0 }),
+        Action::SitDown => request(model, OperatorRequest::SitDown),
+        Action::Acknowledge => request(model, OperatorRequest::Acknowledge),
         Action::Approve => open_approval(model),
         Action::Override => open_override(model),
-        Action::ClearOverrides => request(model, Intent::ClearOverrides),
+        Action::ClearOverrides => request(model, OperatorRequest::ClearOverrides),
         Action::Fix => fix(model),
         Action::Bounds => bounds(model),
         Action::QueuePoint => queue_point(model),
-        Action::Skip => request(model, Intent::Skip),
+        Action::Skip => request(model, OperatorRequest::Skip),
         Action::Continue => open(model, Dialog::field(Purpose::Continue, "20")),
         Action::ConfirmBest => match model.session.confirming() {
-            Some(_) => request(model, Intent::ConfirmBest { repeats: 0 }),
+            Some(_) => request(model, OperatorRequest::ConfirmBest { repeats: 0 }),
             None => open(model, Dialog::field(Purpose::ConfirmBest, "10")),
         },
         Action::ExportBest => vec![Effect::ExportBest],
-        Action::Accept => request(model, Intent::Judge(Verdict::Accept)),
-        Action::Fall => request(model, Intent::Judge(Verdict::Fall)),
-        Action::Void => request(model, Intent::Judge(Verdict::Void)),
+        Action::Accept => request(model, OperatorRequest::Judge(Verdict::Accept)),
+        Action::Fall => request(model, OperatorRequest::Judge(Verdict::Fall)),
+        Action::Void => request(model, OperatorRequest::Judge(Verdict::Void)),
         Action::Rerun => rerun(model),
-        Action::Undo => request(model, Intent::Undo),
+        Action::Undo => request(model, OperatorRequest::Undo),
         Action::HandValue => match model.session.under_review().map(|trial| (trial.trial, trial.hand_value)) {
             Some((trial, value)) => {
                 let text = value.map(|value| value.to_string()).unwrap_or_default();
@@ -107,7 +108,7 @@ pub(super) fn perform(model: &mut Model, action: Action) -> Vec<Effect> {
         }
         Action::Copy => match model.selected_trial().map(|trial| trial.trial) {
             Some(trial) => {
-                say(model, Level::Info, "the row is on your terminal's clipboard (OSC 52)");
+                say(model, LogLevel::Info, "the row is on your terminal's clipboard (OSC 52)");
                 vec![Effect::CopyTrial(trial)]
             }
             None => Vec::new(),
@@ -129,15 +130,17 @@ pub(super) fn perform(model: &mut Model, action: Action) -> Vec<Effect> {
             } else {
                 "mouse off: your terminal selects and copies text"
             };
-            say(model, Level::Info, text);
+            say(model, LogLevel::Info, text);
             vec![Effect::Mouse(model.mouse)]
         }
         Action::Redraw => {
-            say(model, Level::Info, "the screen was drawn again");
+            say(model, LogLevel::Info, "the screen was drawn again");
             vec![Effect::Redraw]
         }
         Action::Suspend => vec![Effect::Suspend],
-        Action::Quit if model.robot_needs_us() || model.session.stage_is(Stage::Review) && model.replay.is_none() => {
+        Action::Quit
+            if model.robot_needs_us() || model.session.stage_is(ExperimentStage::Review) && model.replay.is_none() =>
+        {
             open(model, Dialog::Quit)
         }
         Action::Quit => vec![Effect::Quit],
@@ -165,7 +168,7 @@ fn open_override(model: &mut Model) -> Vec<Effect> {
 fn fix(model: &mut Model) -> Vec<Effect> {
     let Some(name) = model.override_parameter().map(|info| info.name.clone()) else { return Vec::new() };
     if model.session.searched(&name).is_some_and(|searched| searched.fixed.is_some()) {
-        return request(model, Intent::Unfix { parameter: name });
+        return request(model, OperatorRequest::Unfix { parameter: name });
     }
     let Some(value) = model.override_value() else { return Vec::new() };
     open(model, Dialog::field(Purpose::Fix { parameter: model.override_row, value }, "5"))
@@ -183,13 +186,13 @@ fn queue_point(model: &mut Model) -> Vec<Effect> {
     let Some(proposal) = model.session.open_proposal() else { return Vec::new() };
     let gains = proposal.gains.iter().filter(|gain| gain.value != gain.proposed);
     let point = proposal.parameters.iter().chain(gains).map(|p| (p.name.clone(), p.value)).collect();
-    request(model, Intent::Enqueue(point))
+    request(model, OperatorRequest::Enqueue(point))
 }
 
 /// Enter: acknowledges, overrides or opens the details; it never starts motion.
 fn open_details(model: &mut Model) -> Vec<Effect> {
     if may_acknowledge(model).is_ok() {
-        return request(model, Intent::Acknowledge);
+        return request(model, OperatorRequest::Acknowledge);
     }
     if model.view == View::Override && legal(Action::Override, model).is_ok() {
         return open_override(model);
@@ -197,7 +200,7 @@ fn open_details(model: &mut Model) -> Vec<Effect> {
     match model.trial_in_view().map(|trial| trial.trial) {
         Some(trial) => open(model, Dialog::Details { trial, scroll: 0 }),
         None => {
-            say(model, Level::Info, "there is no trial yet");
+            say(model, LogLevel::Info, "there is no trial yet");
             Vec::new()
         }
     }
@@ -205,11 +208,11 @@ fn open_details(model: &mut Model) -> Vec<Effect> {
 
 /// Under review: voids the trial and queues it again. In the table: queues the selected trial.
 fn rerun(model: &mut Model) -> Vec<Effect> {
-    let trial = match model.session.stage_is(Stage::Review) {
+    let trial = match model.session.stage_is(ExperimentStage::Review) {
         true => None,
         false => model.selected_trial().map(|trial| trial.trial),
     };
-    request(model, Intent::Rerun { trial })
+    request(model, OperatorRequest::Rerun { trial })
 }
 
 fn show(model: &mut Model, view: View) -> Vec<Effect> {

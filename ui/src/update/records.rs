@@ -1,9 +1,8 @@
 //! The fold of the session's records: rows, the log, the answer to the operator, the bell.
 
-use quadfrog::realtime::telemetry::Mode;
-use quadfrog::recording::record::{
-    CommandRecord, Level, Record, Source, Stage, StageInfo, Stamped, TrialRecord, Verdict,
-};
+use quadfrog::recording::record::{LogLevel, Record, RequestRecord, StageRecord, Stamped};
+use quadfrog::telemetry::Mode;
+use quadfrog::trial::{ExperimentStage, ProposalSource, TrialRecord, Verdict};
 
 use super::answer::say;
 use crate::action::Action;
@@ -31,7 +30,7 @@ pub(super) fn close_stale_dialog(model: &mut Model) {
     };
     if stale {
         model.dialog = None;
-        say(model, Level::Warning, "the question was closed: the situation has changed");
+        say(model, LogLevel::Warning, "the question was closed: the situation has changed");
     }
 }
 
@@ -45,14 +44,14 @@ pub(super) fn take(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
                 info.task, info.robot, info.backend, info.sampler, info.version, info.seed
             );
             model.session.info = info;
-            log(model, time_ns, Level::Info, "session", text, false);
+            log(model, time_ns, LogLevel::Info, "session", text, false);
         }
         Record::Transition(change) => {
             let stopped = matches!(change.to, Mode::Damped | Mode::Fault);
             let level = match change.to {
-                Mode::Fault => Level::Error,
-                Mode::Damped => Level::Warning,
-                _ => Level::Info,
+                Mode::Fault => LogLevel::Error,
+                Mode::Damped => LogLevel::Warning,
+                _ => LogLevel::Info,
             };
             if stopped {
                 model.session.stopped_because = change.cause.clone();
@@ -76,20 +75,20 @@ pub(super) fn take(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
             if entered {
                 note_time(model, info, time_ns);
                 match info.stage {
-                    Stage::Proposed => bells.push(BellCause::Proposal),
-                    Stage::Review => {
+                    ExperimentStage::Proposed => bells.push(BellCause::Proposal),
+                    ExperimentStage::Review => {
                         bells.push(BellCause::Verdict);
                         say_suggestion(model, info.trial);
                     }
-                    Stage::Running => {}
-                    Stage::Finished => {
+                    ExperimentStage::Running => {}
+                    ExperimentStage::Finished => {
                         let best = model.session.trials.best().and_then(|best| Some((best.trial, best.value?)));
                         let best = best.map_or("no trial was accepted".to_owned(), |(trial, value)| {
                             format!("the best is trial {trial}, J = {value:.3} {}", model.session.info.unit)
                         });
                         let text = format!("the study is finished: {best}");
-                        say(model, Level::Info, text.clone());
-                        log(model, time_ns, Level::Info, "study", text, true);
+                        say(model, LogLevel::Info, text.clone());
+                        log(model, time_ns, LogLevel::Info, "study", text, true);
                     }
                 }
             }
@@ -98,7 +97,7 @@ pub(super) fn take(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
             let values: Vec<String> =
                 proposal.parameters.iter().map(|p| format!("{} {:.4}", p.name, p.value)).collect();
             let text = format!("trial {} ({}): {}", proposal.trial, proposal.source.name(), values.join(", "));
-            log(model, time_ns, Level::Info, "proposal", text, proposal.revision == 0);
+            log(model, time_ns, LogLevel::Info, "proposal", text, proposal.revision == 0);
             model.session.proposal = Some(proposal);
         }
         Record::Trial(trial) => {
@@ -112,21 +111,21 @@ pub(super) fn take(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
                 say_suggestion(model, number);
             }
         }
-        Record::Command(command) => answer(model, time_ns, command),
+        Record::Request(command) => answer(model, time_ns, command),
         Record::Counters(counters) => model.snapshot.counters = counters,
         Record::Log(line) => {
-            if line.level > Level::Info {
+            if line.level > LogLevel::Info {
                 say(model, line.level, line.message.clone());
             }
             log(model, time_ns, line.level, &line.source, line.message, false);
         }
-        Record::PreArm(list) => model.session.pre_arm = list,
+        Record::ArmingChecks(list) => model.session.arming_checks = list,
         Record::Search(search) => model.session.search = Some(search),
         Record::Insight(insight) => model.session.insight = Some(insight),
         Record::Points(points) => model.session.trials.points = points,
         Record::FaultTicks(ticks) => {
             let text = format!("the last {} ticks before the fault are in the recording", ticks.len());
-            log(model, time_ns, Level::Error, "control", text, false);
+            log(model, time_ns, LogLevel::Error, "control", text, false);
         }
     }
     close_stale_dialog(model);
@@ -135,17 +134,17 @@ pub(super) fn take(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
 }
 
 /// Keeps the run time of a trial.
-fn note_time(model: &mut Model, info: StageInfo, time_ns: u64) {
+fn note_time(model: &mut Model, info: StageRecord, time_ns: u64) {
     match info.stage {
-        Stage::Running => {
+        ExperimentStage::Running => {
             model.session.trials.ran.insert(info.trial, RunTime { begun_ns: time_ns, ended_ns: None });
         }
-        Stage::Review => {
+        ExperimentStage::Review => {
             if let Some(ran) = model.session.trials.ran.get_mut(&info.trial) {
                 ran.ended_ns.get_or_insert(time_ns);
             }
         }
-        Stage::Proposed | Stage::Finished => {}
+        ExperimentStage::Proposed | ExperimentStage::Finished => {}
     }
 }
 
@@ -153,13 +152,13 @@ fn note_time(model: &mut Model, info: StageInfo, time_ns: u64) {
 fn say_suggestion(model: &mut Model, trial: u32) {
     let Some(row) = model.session.trials.records.get(&trial).filter(|row| row.verdict.is_none()) else { return };
     let Some(suggested) = row.suggested else { return };
-    let level = if suggested == Verdict::Accept { Level::Info } else { Level::Warning };
+    let level = if suggested == Verdict::Accept { LogLevel::Info } else { LogLevel::Warning };
     let text = format!("trial #{trial}, suggested verdict: {} ({})", suggested.name(), row.cause);
     say(model, level, text);
 }
 
-fn answer(model: &mut Model, time_ns: u64, command: CommandRecord) {
-    let (level, outcome) = if command.accepted { (Level::Info, "") } else { (Level::Warning, "refused: ") };
+fn answer(model: &mut Model, time_ns: u64, command: RequestRecord) {
+    let (level, outcome) = if command.accepted { (LogLevel::Info, "") } else { (LogLevel::Warning, "refused: ") };
     let text = match command.answer.as_str() {
         "" => command.wish.clone(),
         answer => format!("{}: {outcome}{answer}", command.wish),
@@ -175,8 +174,11 @@ fn log_trial(model: &mut Model, time_ns: u64, trial: &TrialRecord) {
     let text = match (trial.verdict, trial.suggested) {
         (Some(verdict), _) if !known(|t| t.verdict) => {
             let value = trial.value.map(|v| format!(", J = {v:.3} {}", model.session.info.unit)).unwrap_or_default();
-            let source =
-                if trial.source == Source::Sampler { String::new() } else { format!(" ({})", trial.source.name()) };
+            let source = if trial.source == ProposalSource::Sampler {
+                String::new()
+            } else {
+                format!(" ({})", trial.source.name())
+            };
             format!("trial {}{source}: {}{value}", trial.trial, verdict.name())
         }
         (None, Some(verdict)) if !known(|t| t.suggested) => {
@@ -185,10 +187,10 @@ fn log_trial(model: &mut Model, time_ns: u64, trial: &TrialRecord) {
         }
         _ => return,
     };
-    log(model, time_ns, Level::Info, "trial", text, trial.verdict.is_some());
+    log(model, time_ns, LogLevel::Info, "trial", text, trial.verdict.is_some());
 }
 
-fn log(model: &mut Model, time_ns: u64, level: Level, source: &str, text: String, marker: bool) {
+fn log(model: &mut Model, time_ns: u64, level: LogLevel, source: &str, text: String, marker: bool) {
     model.session.log.push(LogLine { time_ns, level, source: source.to_owned(), text, marker });
     // A reader who has scrolled back stays on the same lines.
     if model.log_view.back > 0 {

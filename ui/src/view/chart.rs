@@ -6,7 +6,7 @@
 //! ⣀⣀⣀⠤⠔⠊⠁⠀⠀⠀⠈⠒⠤⢄⣀⣀⣀⣀│⠀⠀⠤⠤⠔⠒
 //! ```
 
-use quadfrog::realtime::telemetry::Phase;
+use quadfrog::telemetry::Phase;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 

@@ -8,7 +8,7 @@
 //! 0.75    1.243             1.75
 //! ```
 
-use quadfrog::recording::record::{Insight, ParameterInsight};
+use quadfrog::trial::{ParameterInsight, ProposalInsight};
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 
@@ -17,7 +17,7 @@ use super::draw::{cut, heading, number};
 use crate::theme::{Role, Theme};
 
 /// Draws the panel of one parameter.
-pub fn render(frame: &mut Frame, area: Rect, insight: Option<&Insight>, name: &str, theme: &Theme) {
+pub fn render(frame: &mut Frame, area: Rect, insight: Option<&ProposalInsight>, name: &str, theme: &Theme) {
     let title = match insight {
         Some(insight) if area.width >= 58 => format!("TPE density of {name} (#{}): l good, g rest", insight.trial),
         Some(insight) if area.width >= 36 => format!("TPE {name} (#{})", insight.trial),

@@ -6,7 +6,7 @@
 //! f0             1.24300 Hz  (0.75 to 1.75)
 //! ```
 
-use quadfrog::recording::record::TrialRecord;
+use quadfrog::trial::TrialRecord;
 
 use super::draw::clock;
 use super::points;

@@ -9,7 +9,7 @@
 //!          └─────────────────────────────────────────────────┘
 //! ```
 
-use quadfrog::session::intent::OperatorCheck;
+use quadfrog::session::operator_request::OperatorCheck;
 use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::symbols::border;
@@ -19,7 +19,7 @@ use tui_input::Input;
 
 use super::details::details;
 use super::draw::{cut, number, scale, span};
-use super::{help, pre_arm};
+use super::{arming, help};
 use crate::action::Action;
 use crate::legal::palette;
 use crate::model::Model;
@@ -35,11 +35,11 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
             popup(frame, area, model, "Jump?", 60, approve(model, *trial, waited));
         }
         Dialog::Arm { typed } => popup(frame, area, model, "Arm?", 60, arm(model, *typed)),
-        Dialog::PreArm { selected } => {
+        Dialog::ArmingChecks { selected } => {
             let chosen = OperatorCheck::ALL.get(*selected).copied();
             let lines =
-                pre_arm::lines(&model.session, &model.theme, 74, usize::from(area.height.saturating_sub(2)), chosen);
-            popup(frame, area, model, &format!("Arming checks: {}", pre_arm::summary(&model.session)), 78, lines);
+                arming::lines(&model.session, &model.theme, 74, usize::from(area.height.saturating_sub(2)), chosen);
+            popup(frame, area, model, &format!("Arming checks: {}", arming::summary(&model.session)), 78, lines);
         }
         Dialog::Quit => popup(frame, area, model, "Quit?", 58, quit(model)),
         Dialog::Override(form) => {

@@ -1,6 +1,6 @@
 //! Parts that several panels draw, and the formats of numbers and times.
 
-use quadfrog::recording::record::Verdict;
+use quadfrog::trial::Verdict;
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};

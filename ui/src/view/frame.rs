@@ -5,9 +5,9 @@
 //!  STOP Space F12    loop 0 late, worst 0.1 ms    link 0 ms    motor 31 C    battery 87 %
 //! ```
 
-use quadfrog::realtime::telemetry::Mode;
-use quadfrog::recording::record::Level;
+use quadfrog::recording::record::LogLevel;
 use quadfrog::robot::joint_name;
+use quadfrog::telemetry::Mode;
 use ratatui::Frame;
 use ratatui::layout::{Alignment, Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
@@ -208,9 +208,9 @@ pub fn render_tabs(frame: &mut Frame, area: Rect, model: &Model) {
 pub fn render_message(frame: &mut Frame, area: Rect, model: &Model) {
     let Some(message) = &model.message else { return };
     let role = match message.level {
-        Level::Info => Role::Text,
-        Level::Warning => Role::Warning,
-        Level::Error => Role::Bad,
+        LogLevel::Info => Role::Text,
+        LogLevel::Warning => Role::Warning,
+        LogLevel::Error => Role::Bad,
     };
     let text = cut(&message.text, usize::from(area.width).saturating_sub(1));
     frame.render_widget(Line::from(vec![Span::raw(" "), span(&model.theme, role, text)]), area);

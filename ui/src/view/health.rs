@@ -6,17 +6,16 @@
 //! wake-up      p50 61 us, p99 94 us ...
 //! ```
 
-use quadfrog::realtime::pre_arm::Check;
-use quadfrog::realtime::telemetry::StageTimes;
 use quadfrog::recording::recorder::RecorderStatus;
 use quadfrog::robot::{JOINTS, LinkStatus, joint_name};
+use quadfrog::telemetry::{ArmingCheck, StageTimes};
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
 
+use super::arming;
 use super::draw::{heading, span};
-use super::pre_arm;
 use crate::action::Action;
 use crate::model::Model;
 use crate::model::history::ChartSample;
@@ -44,9 +43,9 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     panel(frame, robot, model, "Link and battery", robot_rows(model));
     let [motors, checks] = Layout::vertical([Constraint::Length(JOINTS as u16 + 1), Constraint::Fill(1)]).areas(right);
     panel_named(frame, motors, model, ("Motors", MOTOR_NAME_WIDTH), motor_rows(model));
-    let aside = format!("{} ({})", pre_arm::summary(&model.session), model.keymap.key(Action::PreArm));
+    let aside = format!("{} ({})", arming::summary(&model.session), model.keymap.key(Action::ArmingChecks));
     let body = heading(frame, checks, &model.theme, "Arming checks", &aside);
-    let lines = pre_arm::lines(&model.session, &model.theme, usize::from(body.width), usize::from(body.height), None);
+    let lines = arming::lines(&model.session, &model.theme, usize::from(body.width), usize::from(body.height), None);
     frame.render_widget(Paragraph::new(lines), body);
 }
 
@@ -204,7 +203,7 @@ fn written(status: &RecorderStatus, time_ns: u64) -> String {
 
 /// Free space on the disk, from the arming checks.
 fn disk_row(model: &Model) -> HealthRow {
-    let disk = model.session.pre_arm.iter().find(|item| item.check == Check::Disk);
+    let disk = model.session.arming_checks.iter().find(|item| item.check == ArmingCheck::Disk);
     match disk {
         Some(disk) => row("disk", disk.found.clone(), !disk.state.allows()),
         None => row("disk", "-".to_owned(), false),

@@ -7,7 +7,7 @@
 //! 00:16.110 W operator  override Fx = 180: refused: outside 0 to 150 N
 //! ```
 
-use quadfrog::recording::record::Level;
+use quadfrog::recording::record::LogLevel;
 use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
@@ -34,9 +34,9 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
 fn summary(model: &Model, shown: usize) -> String {
     let view = &model.log_view;
     let level = match view.level {
-        None | Some(Level::Info) => "all levels",
-        Some(Level::Warning) => "warnings and errors",
-        Some(Level::Error) => "errors",
+        None | Some(LogLevel::Info) => "all levels",
+        Some(LogLevel::Warning) => "warnings and errors",
+        Some(LogLevel::Error) => "errors",
     };
     let search = if view.search.is_empty() { "search".to_owned() } else { format!("with \"{}\"", view.search) };
     let back = if view.back > 0 { format!("; {} back", view.back) } else { String::new() };
@@ -48,17 +48,17 @@ fn line_of(theme: &Theme, line: &LogLine, width: usize) -> Line<'static> {
     let ms = line.time_ns / 1_000_000;
     let time = format!("{:>3}:{:02}.{:03} ", ms / 60_000, ms / 1000 % 60, ms % 1000);
     let (mark, role) = match line.level {
-        Level::Error => ("E", Role::Bad),
-        Level::Warning => ("W", Role::Warning),
-        Level::Info if line.marker => (">", Role::Heading),
-        Level::Info => (" ", Role::Text),
+        LogLevel::Error => ("E", Role::Bad),
+        LogLevel::Warning => ("W", Role::Warning),
+        LogLevel::Info if line.marker => (">", Role::Heading),
+        LogLevel::Info => (" ", Role::Text),
     };
     Line::from(vec![
         span(theme, Role::Quiet, time),
         span(theme, role, format!("{mark} ")),
         span(theme, Role::Quiet, format!("{:<9} ", cut(&line.source, 9))),
         match line.level {
-            Level::Info => Span::raw(cut(&line.text, width.saturating_sub(23))),
+            LogLevel::Info => Span::raw(cut(&line.text, width.saturating_sub(23))),
             _ => span(theme, role, cut(&line.text, width.saturating_sub(23))),
         },
     ])

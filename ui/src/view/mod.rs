@@ -11,6 +11,7 @@
 //!  Press g twice to jump  ·  o override  ·  n skip  ·  D sit down             <- the next possible step
 //! ```
 
+mod arming;
 pub mod chart;
 mod densities;
 mod details;
@@ -27,7 +28,6 @@ mod objective;
 mod optimizer;
 mod overrides;
 mod points;
-mod pre_arm;
 mod proposal;
 mod signal;
 mod trials;

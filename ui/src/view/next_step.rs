@@ -4,8 +4,8 @@
 //!  Press g twice to jump  ·  o override  ·  n skip  ·  D sit down
 //! ```
 
-use quadfrog::realtime::telemetry::Mode;
-use quadfrog::recording::record::{Stage, Verdict};
+use quadfrog::telemetry::Mode;
+use quadfrog::trial::{ExperimentStage, Verdict};
 use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
@@ -59,7 +59,7 @@ fn live(model: &Model) -> NextStep {
         _ => {}
     }
     let stage = model.session.stage.map(|info| info.stage);
-    if stage == Some(Stage::Review) {
+    if stage == Some(ExperimentStage::Review) {
         return review(model);
     }
     match model.mode() {
@@ -74,7 +74,7 @@ fn live(model: &Model) -> NextStep {
             step(lead, model, &[(Action::Undo, "undo"), quit])
         }
         Mode::Offline | Mode::Observe => step("Waiting for the robot to answer.", model, &[quit]),
-        Mode::Disarmed if stage == Some(Stage::Finished) => step(
+        Mode::Disarmed if stage == Some(ExperimentStage::Finished) => step(
             "The study is finished.",
             model,
             &[
@@ -85,16 +85,16 @@ fn live(model: &Model) -> NextStep {
                 quit,
             ],
         ),
-        Mode::Disarmed if model.session.pre_arm.is_empty() => step(
+        Mode::Disarmed if model.session.arming_checks.is_empty() => step(
             "Checking the robot.",
             model,
             &[(Action::Override, "override"), (Action::Undo, "undo"), (Action::Help, "help"), quit],
         ),
-        Mode::Disarmed if model.session.pre_arm_failing() > 0 => step(
+        Mode::Disarmed if model.session.failing_checks() > 0 => step(
             format!(
                 "Not ready to arm: {} checks have not passed. {} shows them.",
-                model.session.pre_arm_failing(),
-                key(Action::PreArm)
+                model.session.failing_checks(),
+                key(Action::ArmingChecks)
             ),
             model,
             &[(Action::Override, "override"), (Action::Undo, "undo"), (Action::Help, "help"), quit],
@@ -104,7 +104,7 @@ fn live(model: &Model) -> NextStep {
             model,
             &[(Action::Override, "override"), (Action::Undo, "undo"), (Action::Help, "help"), quit],
         ),
-        Mode::Ready if stage == Some(Stage::Finished) => step(
+        Mode::Ready if stage == Some(ExperimentStage::Finished) => step(
             "The study is finished.",
             model,
             &[
@@ -181,7 +181,7 @@ fn in_dialog(model: &Model, dialog: &Dialog) -> NextStep {
             let left = word.get(*typed..).unwrap_or_default();
             plain(format!("Type {left} to stand the robot up. Any other key cancels."))
         }
-        Dialog::PreArm { .. } => {
+        Dialog::ArmingChecks { .. } => {
             let arm = if legal(Action::Arm, model).is_ok() {
                 format!(" {} arms.", model.keymap.key(Action::Arm))
             } else {

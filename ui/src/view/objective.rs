@@ -8,7 +8,7 @@
 //! 0    ─x──────x──x───
 //! ```
 
-use quadfrog::recording::record::{TrialRecord, Verdict};
+use quadfrog::trial::{TrialRecord, Verdict};
 use ratatui::Frame;
 use ratatui::layout::Rect;
 

@@ -10,7 +10,7 @@
 //! 0.75       1.75   0         150       150        350
 //! ```
 
-use quadfrog::recording::record::Verdict;
+use quadfrog::trial::Verdict;
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::widgets::Paragraph;

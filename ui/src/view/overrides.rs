@@ -11,7 +11,7 @@
 //!   X  fix Fx at 120.0 N for the next trials
 //! ```
 
-use quadfrog::recording::record::{ParameterInfo, ProposedParameter};
+use quadfrog::trial::{ParameterInfo, ProposedParameter};
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};

@@ -5,7 +5,7 @@
 //! #11   2/3  0.520 m +-0.301
 //! ```
 
-use quadfrog::recording::record::PointRecord;
+use quadfrog::trial::PointRecord;
 use ratatui::text::{Line, Span};
 
 use super::draw::{number, span};

@@ -10,7 +10,7 @@
 //!  fall #3, normalised distance 0.21    suggested verdict: accept
 //! ```
 
-use quadfrog::recording::record::{Proposal, ProposedParameter, Risk, Source, Stage, TrialRecord, Verdict};
+use quadfrog::trial::{ExperimentStage, FallRisk, Proposal, ProposalSource, ProposedParameter, TrialRecord, Verdict};
 use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
@@ -30,7 +30,7 @@ pub fn rows(session: &SessionModel) -> u16 {
     let gains = session.open_proposal().map_or(0, changed) as u16;
     // Repeats are shown while the best is being confirmed and when the study is finished.
     let confirming = session.confirming().is_some();
-    let repeats = match confirming || session.stage_is(Stage::Finished) {
+    let repeats = match confirming || session.stage_is(ExperimentStage::Finished) {
         true => session.trials.points.len().min(4) as u16 + u16::from(confirming),
         false => 0,
     };
@@ -51,17 +51,19 @@ fn content(model: &Model, width: usize) -> (String, Vec<Line<'static>>) {
         return (format!("Trial #{}: judge it", trial.trial), review(session, theme, trial));
     }
     match (stage, &session.proposal) {
-        (Some(Stage::Finished), _) => ("Study finished".to_owned(), finished(model, width)),
+        (Some(ExperimentStage::Finished), _) => ("Study finished".to_owned(), finished(model, width)),
         (_, Some(proposal)) => {
-            let running = stage == Some(Stage::Running);
+            let running = stage == Some(ExperimentStage::Running);
             let title = match (running, proposal.source, proposal.parent) {
                 (true, _, _) => format!("Trial #{} runs", proposal.trial),
-                (false, Source::Sampler, _) => format!("Trial #{}, by the sampler", proposal.trial),
-                (false, Source::Operator, _) => format!("Trial #{}, overridden", proposal.trial),
-                (false, Source::Rerun, Some(parent)) => format!("Trial #{}, re-run of #{parent}", proposal.trial),
-                (false, Source::Rerun, None) => format!("Trial #{}, a re-run", proposal.trial),
-                (false, Source::Confirm, _) => format!("Trial #{}, to confirm the best", proposal.trial),
-                (false, Source::Queued, _) => format!("Trial #{}, from the queue", proposal.trial),
+                (false, ProposalSource::Sampler, _) => format!("Trial #{}, by the sampler", proposal.trial),
+                (false, ProposalSource::Operator, _) => format!("Trial #{}, overridden", proposal.trial),
+                (false, ProposalSource::Rerun, Some(parent)) => {
+                    format!("Trial #{}, re-run of #{parent}", proposal.trial)
+                }
+                (false, ProposalSource::Rerun, None) => format!("Trial #{}, a re-run", proposal.trial),
+                (false, ProposalSource::Confirm, _) => format!("Trial #{}, to confirm the best", proposal.trial),
+                (false, ProposalSource::Queued, _) => format!("Trial #{}, from the queue", proposal.trial),
             };
             let mut lines: Vec<Line> =
                 proposal.parameters.iter().map(|p| parameter(session, theme, p, width)).collect();
@@ -98,7 +100,7 @@ fn parameter(session: &SessionModel, theme: &Theme, p: &ProposedParameter, width
     Line::from(spans)
 }
 
-fn risk(theme: &Theme, risk: Option<Risk>) -> Line<'static> {
+fn risk(theme: &Theme, risk: Option<FallRisk>) -> Line<'static> {
     let Some(risk) = risk.filter(|risk| risk.neighbours > 0) else {
         return Line::from(span(theme, Role::Quiet, " no judged trial near it yet"));
     };

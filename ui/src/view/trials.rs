@@ -7,7 +7,7 @@
 //!    7  1.243   118.2   243.9   0.642 o accept * sampler   | slid on the mat
 //! ```
 
-use quadfrog::recording::record::{TrialRecord, Verdict};
+use quadfrog::trial::{TrialRecord, Verdict};
 use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::style::Style;

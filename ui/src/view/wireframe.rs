@@ -8,10 +8,10 @@
 //! ```
 
 use nalgebra::{UnitQuaternion, Vector3};
-use quadfrog::realtime::telemetry::Tick;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::robot::kinematics::LegGeometry;
 use quadfrog::robot::{LEGS, Leg, leg_of};
+use quadfrog::telemetry::Tick;
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 

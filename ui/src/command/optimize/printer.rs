@@ -7,9 +7,8 @@ use std::sync::{Mutex, PoisonError};
 use indicatif::{ProgressBar, ProgressStyle};
 use quadfrog::config::Config;
 use quadfrog::engine::Options;
-use quadfrog::realtime::command::Task;
-use quadfrog::recording::record::{Measured, TrialRecord, Verdict};
 use quadfrog::report::table;
+use quadfrog::trial::{MeasuredJump, Task, TrialRecord, Verdict};
 use serde::{Serialize, Serializer};
 
 use super::OptimizeArguments;
@@ -157,7 +156,7 @@ struct JsonLine<'a> {
     params: &'a [(String, f64)],
     value: Option<f64>,
     verdict: Option<Verdict>,
-    measured: Option<Measured>,
+    measured: Option<MeasuredJump>,
 }
 
 fn in_table_order<S: Serializer>(parameters: &&[(String, f64)], serializer: S) -> Result<S::Ok, S::Error> {

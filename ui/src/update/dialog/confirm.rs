@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use crossterm::event::KeyCode;
-use quadfrog::recording::record::Level;
-use quadfrog::session::intent::{Intent, OperatorCheck};
+use quadfrog::recording::record::LogLevel;
+use quadfrog::session::operator_request::{OperatorCheck, OperatorRequest};
 
 use crate::action::Action;
 use crate::keymap::Key;
@@ -28,7 +28,7 @@ pub(super) fn approve_key(
         model.dialog = Some(Dialog::Approve { trial, revision, pressed_at: model.clock });
         return Vec::new();
     }
-    request_if_legal(model, Action::Approve, Intent::Approve { trial, revision }, "not approved")
+    request_if_legal(model, Action::Approve, OperatorRequest::Approve { trial, revision }, "not approved")
 }
 
 pub(super) fn arm_key(model: &mut Model, key: Key, typed: usize) -> Vec<Effect> {
@@ -40,14 +40,14 @@ pub(super) fn arm_key(model: &mut Model, key: Key, typed: usize) -> Vec<Effect> 
         model.dialog = Some(Dialog::Arm { typed: typed + 1 });
         return Vec::new();
     }
-    request_if_legal(model, Action::Arm, Intent::Arm, "not armed")
+    request_if_legal(model, Action::Arm, OperatorRequest::Arm, "not armed")
 }
 
-fn request_if_legal(model: &mut Model, action: Action, intent: Intent, refused: &str) -> Vec<Effect> {
+fn request_if_legal(model: &mut Model, action: Action, intent: OperatorRequest, refused: &str) -> Vec<Effect> {
     match legal(action, model) {
         Ok(()) => request(model, intent),
         Err(reason) => {
-            say(model, Level::Warning, format!("{refused}: {reason}"));
+            say(model, LogLevel::Warning, format!("{refused}: {reason}"));
             Vec::new()
         }
     }
@@ -67,16 +67,18 @@ pub(super) fn action_over_checks(model: &Model, key: Key) -> Option<Action> {
     arms.then_some(Action::Arm)
 }
 
-pub(super) fn pre_arm_key(model: &mut Model, key: Key, mut selected: usize) -> Vec<Effect> {
+pub(super) fn arming_checks_key(model: &mut Model, key: Key, mut selected: usize) -> Vec<Effect> {
     let last = OperatorCheck::ALL.len() - 1;
     let mut effects = Vec::new();
     match key.code() {
         KeyCode::Esc | KeyCode::Enter => return effects,
         KeyCode::Up => selected = selected.saturating_sub(1),
         KeyCode::Down => selected = (selected + 1).min(last),
-        KeyCode::Char('x') => effects = request(model, Intent::Confirm(OperatorCheck::ALL[selected.min(last)])),
+        KeyCode::Char('x') => {
+            effects = request(model, OperatorRequest::Confirm(OperatorCheck::ALL[selected.min(last)]))
+        }
         _ => {}
     }
-    model.dialog = Some(Dialog::PreArm { selected });
+    model.dialog = Some(Dialog::ArmingChecks { selected });
     effects
 }

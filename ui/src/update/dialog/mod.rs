@@ -22,7 +22,7 @@ pub(super) enum KeyOutcome {
 /// One key while `dialog`, which was taken out of the model, is open. STOP and Ctrl-C were handled before.
 pub(super) fn key(model: &mut Model, dialog: Dialog, key: Key) -> KeyOutcome {
     let action = match &dialog {
-        Dialog::PreArm { .. } => confirm::action_over_checks(model, key),
+        Dialog::ArmingChecks { .. } => confirm::action_over_checks(model, key),
         Dialog::Palette { input, selected } => lists::chosen_action(model, key, input.value(), *selected),
         Dialog::Details { .. } => lists::action_over_details(model, key),
         _ => None,
@@ -35,7 +35,7 @@ pub(super) fn key(model: &mut Model, dialog: Dialog, key: Key) -> KeyOutcome {
             confirm::approve_key(model, key, (trial, revision, pressed_at))
         }
         Dialog::Arm { typed } => confirm::arm_key(model, key, typed),
-        Dialog::PreArm { selected } => confirm::pre_arm_key(model, key, selected),
+        Dialog::ArmingChecks { selected } => confirm::arming_checks_key(model, key, selected),
         Dialog::Quit => confirm::quit_key(model, key),
         Dialog::Override(form) => override_form::key(model, key, form),
         Dialog::Field { purpose, input, .. } => text_field::key(model, key, purpose, input),

@@ -1,7 +1,7 @@
 //! Keys of the form that changes a proposal.
 
 use crossterm::event::KeyCode;
-use quadfrog::session::intent::Intent;
+use quadfrog::session::operator_request::OperatorRequest;
 
 use super::text_field::edit;
 use crate::action::Action;
@@ -12,10 +12,10 @@ use crate::model::dialog::{Dialog, OverrideForm, OverrideRow};
 use crate::update::answer::{cancelled, request};
 
 /// The request that sends a row's value to the session.
-fn intent(row: &OverrideRow) -> Intent {
+fn intent(row: &OverrideRow) -> OperatorRequest {
     match row.gain {
-        true => Intent::OverrideGain { gain: row.name.clone(), value: row.value },
-        false => Intent::Override { parameter: row.name.clone(), value: row.value },
+        true => OperatorRequest::OverrideGain { gain: row.name.clone(), value: row.value },
+        false => OperatorRequest::Override { parameter: row.name.clone(), value: row.value },
     }
 }
 
@@ -65,7 +65,7 @@ pub(super) fn key(model: &mut Model, key: Key, mut form: OverrideForm) -> Vec<Ef
         KeyCode::Enter => {
             if form.take_typed() {
                 let changed = form.rows.iter().filter(|row| row.value != row.before);
-                let intents: Vec<Intent> = changed.map(intent).collect();
+                let intents: Vec<OperatorRequest> = changed.map(intent).collect();
                 if intents.is_empty() {
                     return cancelled(model, "nothing was changed");
                 }
@@ -77,7 +77,7 @@ pub(super) fn key(model: &mut Model, key: Key, mut form: OverrideForm) -> Vec<Ef
             if form.take_typed() {
                 let set = form.rows.iter().filter(|row| !row.gain || row.value != row.proposed);
                 let point = set.map(|row| (row.name.clone(), row.value)).collect();
-                return request(model, Intent::Enqueue(point));
+                return request(model, OperatorRequest::Enqueue(point));
             }
         }
         KeyCode::Up => form.select(form.selected.saturating_sub(1)),

@@ -1,7 +1,7 @@
 //! Keys of the one-line text fields, and the effect of their text.
 
 use crossterm::event::KeyCode;
-use quadfrog::session::intent::Intent;
+use quadfrog::session::operator_request::OperatorRequest;
 use tui_input::{Input, InputRequest};
 
 use crate::keymap::Key;
@@ -36,20 +36,20 @@ pub(super) fn key(model: &mut Model, key: Key, purpose: Purpose, mut input: Inpu
 /// The reason when the text is refused.
 fn submit(model: &mut Model, purpose: Purpose, text: &str) -> Result<Vec<Effect>, String> {
     let intent = match purpose {
-        Purpose::Note(trial) => Intent::Note { trial, text: text.to_owned() },
-        Purpose::HandValue(_) if text.is_empty() => Intent::HandValue(None),
+        Purpose::Note(trial) => OperatorRequest::Note { trial, text: text.to_owned() },
+        Purpose::HandValue(_) if text.is_empty() => OperatorRequest::HandValue(None),
         Purpose::HandValue(_) => match text.replace(',', ".").parse::<f64>() {
-            Ok(value) if value.is_finite() => Intent::HandValue(Some(value)),
+            Ok(value) if value.is_finite() => OperatorRequest::HandValue(Some(value)),
             _ => return Err(format!("`{text}` is not a number")),
         },
-        Purpose::Continue => Intent::Continue(count(text, "trials")?),
+        Purpose::Continue => OperatorRequest::Continue(count(text, "trials")?),
         Purpose::Fix { parameter, value } => {
             let trials = count(text, "trials")?;
             let info = model.session.info.parameters.get(parameter).ok_or("there is no such parameter")?;
-            Intent::Fix { parameter: info.name.clone(), value, trials }
+            OperatorRequest::Fix { parameter: info.name.clone(), value, trials }
         }
         Purpose::Bounds { parameter } => bounds(model, parameter, text)?,
-        Purpose::ConfirmBest => Intent::ConfirmBest { repeats: count(text, "repeats")? },
+        Purpose::ConfirmBest => OperatorRequest::ConfirmBest { repeats: count(text, "repeats")? },
         Purpose::TrialNumber => {
             let number = text.parse::<u32>().map_err(|_| format!("`{text}` is not the number of a trial"))?;
             if !model.session.trials.records.contains_key(&number) {
@@ -73,7 +73,7 @@ fn count(text: &str, things: &str) -> Result<u32, String> {
 }
 
 /// Bounds typed as `low..high`, checked as far as the screen can know; the session checks all of it again.
-fn bounds(model: &Model, parameter: usize, text: &str) -> Result<Intent, String> {
+fn bounds(model: &Model, parameter: usize, text: &str) -> Result<OperatorRequest, String> {
     let info = model.session.info.parameters.get(parameter).ok_or("there is no such parameter")?;
     let (name, unit) = (&info.name, &info.unit);
     let number = |text: &str| text.trim().parse::<f64>().ok().filter(|value| value.is_finite());
@@ -86,7 +86,7 @@ fn bounds(model: &Model, parameter: usize, text: &str) -> Result<Intent, String>
         Some(p) if low < p.least || high > p.most => {
             Err(format!("{name} may be searched from {} to {} {unit} (safety.toml)", p.least, p.most))
         }
-        _ => Ok(Intent::NarrowBounds { parameter: name.clone(), low, high }),
+        _ => Ok(OperatorRequest::NarrowBounds { parameter: name.clone(), low, high }),
     }
 }
 

@@ -6,11 +6,12 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use super::{Plan, attributes};
+use super::attributes;
 use crate::optimize::space::{Range, Space};
 use crate::optimize::study::{Study, StudyError};
 use crate::optimize::trial::{Trial, TrialState};
-use crate::recording::record::{Fixed, ParameterInfo, Search, SearchedParameter};
+use crate::session::experiment::ExperimentPlan;
+use crate::trial::{FixedParameter, ParameterInfo, SearchStatus, SearchedParameter};
 
 /// Study attribute: changed bounds, `{"Fx": [40, 110]}`.
 const BOUNDS: &str = "bounds";
@@ -36,7 +37,7 @@ struct Hold {
 
 impl Searched {
     /// As kept with the study; what the plan does not allow (any more) is left out.
-    pub fn of(study: &Study, plan: &Plan) -> Searched {
+    pub fn of(study: &Study, plan: &ExperimentPlan) -> Searched {
         let kept = |key: &str| study.attributes().get(key).cloned().unwrap_or(Value::Null);
         let mut searched = Searched {
             bounds: serde_json::from_value(kept(BOUNDS)).unwrap_or_default(),
@@ -58,7 +59,7 @@ impl Searched {
     }
 
     /// The parameters with their present bounds, in table order.
-    pub fn parameters(&self, plan: &Plan) -> Vec<ParameterInfo> {
+    pub fn parameters(&self, plan: &ExperimentPlan) -> Vec<ParameterInfo> {
         let present = |parameter: &ParameterInfo| match self.bounds.get(&parameter.name) {
             Some([low, high]) => ParameterInfo { low: *low, high: *high, ..parameter.clone() },
             None => parameter.clone(),
@@ -67,7 +68,7 @@ impl Searched {
     }
 
     /// Makes the study search within the present bounds.
-    pub fn apply(&self, plan: &Plan, study: &mut Study) -> Result<(), StudyError> {
+    pub fn apply(&self, plan: &ExperimentPlan, study: &mut Study) -> Result<(), StudyError> {
         let present = self.parameters(plan);
         let mut space = Vec::new();
         for parameter in study.options().space.parameters() {
@@ -82,7 +83,7 @@ impl Searched {
 
     /// The parameters that are fixed for the next trial, with their values and for how many trials more. Void trials do
     /// not use up any.
-    pub fn fixed(&self, trials: &[Trial]) -> BTreeMap<String, Fixed> {
+    pub fn fixed(&self, trials: &[Trial]) -> BTreeMap<String, FixedParameter> {
         let left = |(name, hold): (&String, &Hold)| {
             let ran = |trial: &&Trial| {
                 trial.number >= hold.from
@@ -90,13 +91,13 @@ impl Searched {
                     && attributes::was_fixed(trial, name, hold.value)
             };
             let ran = trials.iter().filter(ran).count() as u32;
-            (ran < hold.trials).then(|| (name.clone(), Fixed { value: hold.value, trials: hold.trials - ran }))
+            (ran < hold.trials).then(|| (name.clone(), FixedParameter { value: hold.value, trials: hold.trials - ran }))
         };
         self.fixed.iter().filter_map(left).collect()
     }
 
     /// Sets the bounds of a parameter; those of the configuration are no change.
-    pub fn set_bounds(&mut self, name: &str, low: f64, high: f64, plan: &Plan) {
+    pub fn set_bounds(&mut self, name: &str, low: f64, high: f64, plan: &ExperimentPlan) {
         let configured = plan.parameters.iter().any(|p| p.name == name && p.low == low && p.high == high);
         if configured {
             self.bounds.remove(name);
@@ -116,7 +117,13 @@ impl Searched {
     }
 
     /// For the screen.
-    pub fn record(&self, plan: &Plan, counted: u32, trials: &[Trial], confirming: Option<u32>) -> Search {
+    pub fn record(
+        &self,
+        plan: &ExperimentPlan,
+        counted: u32,
+        trials: &[Trial],
+        confirming: Option<u32>,
+    ) -> SearchStatus {
         let fixed = self.fixed(trials);
         let searched = |parameter: ParameterInfo| {
             let widest = plan.widest.iter().find(|widest| widest.name == parameter.name).unwrap_or(&parameter);
@@ -130,6 +137,6 @@ impl Searched {
             }
         };
         let parameters = self.parameters(plan).into_iter().map(searched).collect();
-        Search { budget: plan.budget, counted, parameters, confirming }
+        SearchStatus { budget: plan.budget, counted, parameters, confirming }
     }
 }

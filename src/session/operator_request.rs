@@ -1,8 +1,8 @@
 //! What an operator may wish of the session. Every intent is answered by a `CommandRecord`: carried out, or refused and
 //! why. STOP is not among them: it has its own latch (`engine::Handle::stop`).
 
-use crate::realtime::pre_arm::Check;
-use crate::recording::record::Verdict;
+use crate::telemetry::ArmingCheck;
+use crate::trial::Verdict;
 
 /// What only an operator can know: an item of the pre-arm list that takes their word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -21,20 +21,20 @@ impl OperatorCheck {
         [OperatorCheck::LowLevel, OperatorCheck::Configuration, OperatorCheck::AreaClear];
 
     /// The item of the list.
-    pub const fn check(self) -> Check {
+    pub const fn check(self) -> ArmingCheck {
         match self {
-            OperatorCheck::LowLevel => Check::LowLevel,
-            OperatorCheck::Configuration => Check::Configuration,
-            OperatorCheck::AreaClear => Check::AreaClear,
+            OperatorCheck::LowLevel => ArmingCheck::LowLevel,
+            OperatorCheck::Configuration => ArmingCheck::Configuration,
+            OperatorCheck::AreaClear => ArmingCheck::AreaClear,
         }
     }
 }
 
 /// An intent with what makes it good: what energises is not carried out if STOP came after it, or too late.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Wish {
+pub struct StampedRequest {
     /// What is wished.
-    pub intent: Intent,
+    pub intent: OperatorRequest,
     /// How often STOP had been pressed when it was wished.
     pub stops: u64,
     /// When it was wished, ns since the engine started.
@@ -43,7 +43,7 @@ pub struct Wish {
 
 /// What may be wished.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Intent {
+pub enum OperatorRequest {
     /// Energise the robot: it stands up.
     Arm,
     /// The operator's word on an item of the pre-arm list.

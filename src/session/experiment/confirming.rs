@@ -4,12 +4,13 @@
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use super::attributes;
-use super::{Life, Refusal, not_now};
+use super::{attributes, not_now};
 use crate::optimize::repeats::{Confirmation, LEAST_REPEATS, Point, confirm, contenders, points, standing};
 use crate::optimize::study::{Study, StudyError};
 use crate::optimize::trial::{Trial, TrialState};
-use crate::recording::record::{PointRecord, Record, Source};
+use crate::recording::record::Record;
+use crate::session::experiment::{Experiment, RequestRefusal};
+use crate::trial::{PointRecord, ProposalSource};
 
 /// Study attribute: what is being confirmed; null when it is over.
 const CONFIRM: &str = "confirm";
@@ -50,13 +51,13 @@ pub(super) enum Next {
     Over(Confirmed, String),
 }
 
-impl Life {
+impl Experiment {
     /// Repeats the best points up to `repeats` times in all; 0 ends a confirmation that goes on. The last verdict is told
     /// by this and cannot be undone any more.
     ///
     /// # Errors
     /// When a trial is under way, there are fewer than two points to compare, or the study cannot be written.
-    pub fn confirm_best(&mut self, repeats: u32) -> Result<Vec<u32>, Refusal> {
+    pub fn confirm_best(&mut self, repeats: u32) -> Result<Vec<u32>, RequestRefusal> {
         self.must_be_idle()?;
         self.study.refresh()?;
         if repeats == 0 {
@@ -217,7 +218,7 @@ fn left(confirming: &Confirming, trials: &[Trial]) -> u32 {
 /// How many repeats are in one of the states `of`.
 fn used(confirming: &Confirming, trials: &[Trial], of: impl Fn(TrialState) -> bool) -> u32 {
     let repeat = |trial: &&Trial| {
-        trial.number >= confirming.from && of(trial.state) && attributes::source_of(trial) == Source::Confirm
+        trial.number >= confirming.from && of(trial.state) && attributes::source_of(trial) == ProposalSource::Confirm
     };
     trials.iter().filter(repeat).count() as u32
 }

@@ -25,11 +25,10 @@ use crate::optimize::exchange::TableTrial;
 use crate::optimize::repeats::{Point, points};
 use crate::optimize::study::{Outcome, Study, StudyError};
 use crate::optimize::trial::TrialState;
-use crate::realtime::command::{Task, TrialSpec};
-use crate::realtime::telemetry::{Tick, TrialEnd};
-use crate::recording::record::{
-    Level, LogRecord, ParameterInfo, PointRecord, Proposal, Record, Search, Source, Stage, StageInfo, TrialRecord,
-    Verdict,
+use crate::recording::record::{LogLevel, LogRecord, Record, StageRecord};
+use crate::telemetry::{Tick, TrialEnd, TrialSpec};
+use crate::trial::{
+    ExperimentStage, ParameterInfo, PointRecord, Proposal, ProposalSource, SearchStatus, Task, TrialRecord, Verdict,
 };
 
 use super::objective;
@@ -40,7 +39,7 @@ use watch::Watch;
 
 /// Why a wish cannot be carried out, in words for the operator.
 #[derive(Debug, thiserror::Error)]
-pub enum Refusal {
+pub enum RequestRefusal {
     /// It does not fit the present stage or the bounds.
     #[error("{0}")]
     NotNow(String),
@@ -55,13 +54,13 @@ pub enum Refusal {
     Study(#[from] StudyError),
 }
 
-fn not_now<T>(why: impl Into<String>) -> Result<T, Refusal> {
-    Err(Refusal::NotNow(why.into()))
+fn not_now<T>(why: impl Into<String>) -> Result<T, RequestRefusal> {
+    Err(RequestRefusal::NotNow(why.into()))
 }
 
 /// What the trials of one study have in common.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Plan {
+pub struct ExperimentPlan {
     /// The task.
     pub task: Task,
     /// What the controller runs with.
@@ -99,12 +98,12 @@ struct Pending {
 }
 
 /// Trials of one study and where the present one stands.
-pub struct Life {
-    plan: Plan,
+pub struct Experiment {
+    plan: ExperimentPlan,
     study: Study,
     watch: Watch,
     rows: BTreeMap<u32, TrialRecord>,
-    stage: Stage,
+    stage: ExperimentStage,
     /// The trial that runs or is under review.
     current: u32,
     card: Option<Card>,
@@ -121,23 +120,23 @@ pub struct Life {
 /// What the screen knows already.
 #[derive(Default)]
 struct Said {
-    search: Option<Search>,
+    search: Option<SearchStatus>,
     points: Vec<PointRecord>,
 }
 
-impl Life {
+impl Experiment {
     /// Takes up a study, new or not. What a crash left running is told if it was judged; otherwise it is void and its
     /// parameters are queued again.
     ///
     /// # Errors
     /// When the study cannot be read or written.
-    pub fn open(plan: Plan, study: Study) -> Result<Life, StudyError> {
-        let mut life = Life {
+    pub fn open(plan: ExperimentPlan, study: Study) -> Result<Experiment, StudyError> {
+        let mut life = Experiment {
             watch: Watch::new(plan.abandoned),
             plan,
             study,
             rows: BTreeMap::new(),
-            stage: Stage::Finished,
+            stage: ExperimentStage::Finished,
             current: 0,
             card: None,
             revisions: 0,
@@ -158,7 +157,7 @@ impl Life {
     }
 
     /// Where the present trial stands.
-    pub fn stage(&self) -> Stage {
+    pub fn stage(&self) -> ExperimentStage {
         self.stage
     }
 
@@ -174,7 +173,7 @@ impl Life {
 
     /// The row of the trial under review. It need not be the newest: another program may have added trials meanwhile.
     pub fn under_review(&self) -> Option<&TrialRecord> {
-        if self.stage == Stage::Review { self.row(self.current) } else { None }
+        if self.stage == ExperimentStage::Review { self.row(self.current) } else { None }
     }
 
     /// The accepted trial whose point is worth most, the earliest of equals: a repeated point is worth the mean of its
@@ -199,7 +198,7 @@ impl Life {
     /// How many trials count so far; repeats that confirm the best are beyond the budget.
     pub fn counted(&self) -> u32 {
         let counts = |row: &&TrialRecord| {
-            matches!(row.verdict, Some(Verdict::Accept | Verdict::Fall)) && row.source != Source::Confirm
+            matches!(row.verdict, Some(Verdict::Accept | Verdict::Fall)) && row.source != ProposalSource::Confirm
         };
         self.rows.values().filter(counts).count() as u32
     }
@@ -208,7 +207,7 @@ impl Life {
     ///
     /// # Errors
     /// When another card is on the table by now, its values are outside the limits, or the study cannot be written.
-    pub fn approve(&mut self, trial: u32, revision: u32) -> Result<TrialSpec, Refusal> {
+    pub fn approve(&mut self, trial: u32, revision: u32) -> Result<TrialSpec, RequestRefusal> {
         let Some(card) = &self.card else { return not_now("there is no proposal to approve") };
         if card.number() != trial || card.revision != revision {
             return not_now(format!(
@@ -220,7 +219,7 @@ impl Life {
             return not_now(format!("{objection}; change it, or refuse the proposal"));
         }
         let number = self.begin()?;
-        self.enter(Stage::Running, number);
+        self.enter(ExperimentStage::Running, number);
         Ok(self.spec(number))
     }
 
@@ -228,7 +227,7 @@ impl Life {
     ///
     /// # Errors
     /// When there is no proposal, or the study cannot be written.
-    pub fn skip(&mut self) -> Result<(), Refusal> {
+    pub fn skip(&mut self) -> Result<(), RequestRefusal> {
         if self.card.is_none() {
             return not_now("there is no proposal to skip");
         }
@@ -251,7 +250,7 @@ impl Life {
     /// The running trial is over: it is measured and waits for its verdict. `whole` is how many ticks it has: where some of them
     /// were lost on the way, nothing is measured.
     pub fn ended(&mut self, trial: u32, end: &TrialEnd, ticks: &[Tick], whole: u64) {
-        if self.stage != Stage::Running || self.current != trial {
+        if self.stage != ExperimentStage::Running || self.current != trial {
             return;
         }
         let (mut suggested, mut cause) = objective::suggest(end);
@@ -266,15 +265,15 @@ impl Life {
             row.value = value_of(row, suggested, &self.plan);
         }
         self.show_row(trial);
-        self.enter(Stage::Review, trial);
+        self.enter(ExperimentStage::Review, trial);
     }
 
     /// Judges the trial under review; with `rerun` its parameters are queued again.
     ///
     /// # Errors
     /// When nothing is under review, or an accepted trial has no value, or the study cannot be written.
-    pub fn judge(&mut self, verdict: Verdict, rerun: bool) -> Result<(), Refusal> {
-        if self.stage != Stage::Review {
+    pub fn judge(&mut self, verdict: Verdict, rerun: bool) -> Result<(), RequestRefusal> {
+        if self.stage != ExperimentStage::Review {
             return not_now("no trial is under review");
         }
         let trial = self.current;
@@ -297,9 +296,9 @@ impl Life {
             // It took so long that another worker has closed it and queued it again, or somebody has ended it by hand.
             Err(StudyError::State { .. }) => {
                 self.rows.remove(&trial);
-                self.stage = Stage::Finished;
+                self.stage = ExperimentStage::Finished;
                 self.propose()?;
-                return Err(Refusal::EndedElsewhere(trial));
+                return Err(RequestRefusal::EndedElsewhere(trial));
             }
             Err(error) => {
                 self.rows.insert(trial, suggestion);
@@ -317,8 +316,8 @@ impl Life {
     ///
     /// # Errors
     /// When it was told already, or the study cannot be written.
-    pub fn undo(&mut self) -> Result<(), Refusal> {
-        if !matches!(self.stage, Stage::Proposed | Stage::Finished) || self.pending.is_none() {
+    pub fn undo(&mut self) -> Result<(), RequestRefusal> {
+        if !matches!(self.stage, ExperimentStage::Proposed | ExperimentStage::Finished) || self.pending.is_none() {
             return not_now("there is no verdict to undo; the last one was told when the next trial began");
         }
         let Some(pending) = &self.pending else { return Ok(()) };
@@ -333,7 +332,7 @@ impl Life {
         self.rows.insert(trial, row);
         self.card = None;
         self.show_row(trial);
-        self.enter(Stage::Review, trial);
+        self.enter(ExperimentStage::Review, trial);
         Ok(())
     }
 
@@ -341,8 +340,8 @@ impl Life {
     ///
     /// # Errors
     /// When nothing is under review or the value is not finite.
-    pub fn set_hand_value(&mut self, value: Option<f64>) -> Result<(), Refusal> {
-        if self.stage != Stage::Review {
+    pub fn set_hand_value(&mut self, value: Option<f64>) -> Result<(), RequestRefusal> {
+        if self.stage != ExperimentStage::Review {
             return not_now("no trial is under review");
         }
         if value.is_some_and(|value| !value.is_finite()) {
@@ -377,10 +376,10 @@ impl Life {
         }
     }
 
-    fn enter(&mut self, stage: Stage, trial: u32) {
+    fn enter(&mut self, stage: ExperimentStage, trial: u32) {
         self.stage = stage;
         self.current = trial;
-        self.outbox.push(Record::Stage(StageInfo { stage, trial, can_undo: self.pending.is_some() }));
+        self.outbox.push(Record::Stage(StageRecord { stage, trial, can_undo: self.pending.is_some() }));
     }
 
     fn show_card(&mut self) {
@@ -396,7 +395,7 @@ impl Life {
     }
 
     fn log(&mut self, message: String) {
-        self.outbox.push(Record::Log(LogRecord { level: Level::Info, source: "study".to_owned(), message }));
+        self.outbox.push(Record::Log(LogRecord { level: LogLevel::Info, source: "study".to_owned(), message }));
     }
 }
 
@@ -420,7 +419,7 @@ pub fn import(study: &mut Study, trials: Vec<TableTrial>) -> Result<Vec<u32>, St
 
 /// What a verdict makes of a row: 0 for a fall (paper, section II-D), nothing for a void, else the value measured by hand
 /// or by the robot.
-fn value_of(row: &TrialRecord, verdict: Verdict, plan: &Plan) -> Option<f64> {
+fn value_of(row: &TrialRecord, verdict: Verdict, plan: &ExperimentPlan) -> Option<f64> {
     match verdict {
         Verdict::Fall => Some(0.0),
         Verdict::Void => None,

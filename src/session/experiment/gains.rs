@@ -1,6 +1,6 @@
 //! The controller's gains by name, as screens and files have them.
 
-use crate::realtime::command::Gains;
+use crate::trial::Gains;
 
 /// The gains by name, in table order.
 pub fn listed(gains: &Gains) -> Vec<(String, f64)> {

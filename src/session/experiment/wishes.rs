@@ -4,18 +4,19 @@
 use serde_json::json;
 
 use super::attributes::Origin;
-use super::{Life, Refusal, not_now};
-use crate::recording::record::{ParameterInfo, Stage};
+use super::not_now;
+use crate::session::experiment::{Experiment, RequestRefusal};
+use crate::trial::{ExperimentStage, ParameterInfo};
 
 /// Study attribute: how many trials are to count. Workers that join and sessions that continue know it from here.
 pub const BUDGET: &str = "budget";
 
-impl Life {
+impl Experiment {
     /// Sets one parameter of the proposal.
     ///
     /// # Errors
     /// When there is no proposal, no such parameter, or the value is outside its bounds.
-    pub fn set_parameter(&mut self, name: &str, value: f64) -> Result<(), Refusal> {
+    pub fn set_parameter(&mut self, name: &str, value: f64) -> Result<(), RequestRefusal> {
         let bounds = self.searched.parameters(&self.plan);
         let Some(card) = &mut self.card else { return not_now("there is no proposal to change") };
         must_be_within(&bounds, "parameter", name, value)?;
@@ -29,7 +30,7 @@ impl Life {
     ///
     /// # Errors
     /// When there is no proposal, no such gain, or the value is outside its safe range.
-    pub fn set_gain(&mut self, name: &str, value: f64) -> Result<(), Refusal> {
+    pub fn set_gain(&mut self, name: &str, value: f64) -> Result<(), RequestRefusal> {
         let Some(card) = &mut self.card else { return not_now("there is no proposal to change") };
         must_be_within(&self.plan.gains, "gain", name, value)?;
         self.revisions += 1;
@@ -42,7 +43,7 @@ impl Life {
     ///
     /// # Errors
     /// When there is no proposal.
-    pub fn clear_overrides(&mut self) -> Result<(), Refusal> {
+    pub fn clear_overrides(&mut self) -> Result<(), RequestRefusal> {
         let Some(card) = &mut self.card else { return not_now("there is no proposal to change") };
         self.revisions += 1;
         card.clear(self.revisions);
@@ -56,7 +57,7 @@ impl Life {
     /// # Errors
     /// When a trial is under way, there is no such parameter, the value is outside its bounds, nothing would be left to
     /// search, or the study cannot be written.
-    pub fn fix(&mut self, name: &str, value: f64, trials: u32) -> Result<(), Refusal> {
+    pub fn fix(&mut self, name: &str, value: f64, trials: u32) -> Result<(), RequestRefusal> {
         self.must_be_idle()?;
         let bounds = self.searched.parameters(&self.plan);
         must_be_within(&bounds, "parameter", name, value)?;
@@ -78,7 +79,7 @@ impl Life {
     ///
     /// # Errors
     /// When a trial is under way, the parameter is not fixed, or the study cannot be written.
-    pub fn unfix(&mut self, name: &str) -> Result<(), Refusal> {
+    pub fn unfix(&mut self, name: &str) -> Result<(), RequestRefusal> {
         self.must_be_idle()?;
         if !self.searched.unfix(name) {
             return not_now(format!("{name} is not fixed"));
@@ -92,7 +93,7 @@ impl Life {
     /// # Errors
     /// When a trial is under way, there is no such parameter, the bounds are no range or wider than `safety.toml` allows,
     /// the parameter is fixed outside them, or the study cannot be written.
-    pub fn narrow_bounds(&mut self, name: &str, low: f64, high: f64) -> Result<(), Refusal> {
+    pub fn narrow_bounds(&mut self, name: &str, low: f64, high: f64) -> Result<(), RequestRefusal> {
         self.must_be_idle()?;
         let widest = known(&self.plan.widest, "parameter", name)?;
         if low >= high || low.is_nan() || high.is_nan() {
@@ -119,7 +120,7 @@ impl Life {
     }
 
     /// Writes bounds and fixed parameters, and proposes what is next with them.
-    fn keep_search(&mut self) -> Result<(), Refusal> {
+    fn keep_search(&mut self) -> Result<(), RequestRefusal> {
         self.study.annotate_study(&self.searched.attributes())?;
         Ok(self.repropose()?)
     }
@@ -128,7 +129,7 @@ impl Life {
     ///
     /// # Errors
     /// When there is no such trial, a trial is under way, or the study cannot be written.
-    pub fn repeat(&mut self, trial: u32) -> Result<(), Refusal> {
+    pub fn repeat(&mut self, trial: u32) -> Result<(), RequestRefusal> {
         let Some(row) = self.rows.get(&trial) else { return not_now(format!("there is no trial {trial}")) };
         let (parameters, origin) = (row.parameters.clone(), Origin::rerun_of(row));
         self.queue(&parameters, &origin)
@@ -138,7 +139,7 @@ impl Life {
     ///
     /// # Errors
     /// When a value is outside its bounds, a trial is under way, or the study cannot be written.
-    pub fn enqueue(&mut self, point: &[(String, f64)]) -> Result<(), Refusal> {
+    pub fn enqueue(&mut self, point: &[(String, f64)]) -> Result<(), RequestRefusal> {
         let bounds = self.searched.parameters(&self.plan);
         let is_gain = |(name, _): &(String, f64)| self.plan.gains.iter().any(|gain| gain.name == *name);
         let (gains, parameters): (Vec<_>, Vec<_>) = point.iter().cloned().partition(is_gain);
@@ -155,7 +156,7 @@ impl Life {
     ///
     /// # Errors
     /// When there is no such trial or the study cannot be written.
-    pub fn note(&mut self, trial: u32, text: &str) -> Result<(), Refusal> {
+    pub fn note(&mut self, trial: u32, text: &str) -> Result<(), RequestRefusal> {
         let Some(row) = self.rows.get_mut(&trial) else { return not_now(format!("there is no trial {trial}")) };
         row.note = text.to_owned();
         self.study.note(trial, text)?;
@@ -167,11 +168,11 @@ impl Life {
     ///
     /// # Errors
     /// When the study cannot be read or written.
-    pub fn extend(&mut self, trials: u32) -> Result<(), Refusal> {
+    pub fn extend(&mut self, trials: u32) -> Result<(), RequestRefusal> {
         let budget = self.plan.budget.saturating_add(trials);
         self.study.annotate_study(&[(BUDGET.to_owned(), json!(budget))])?;
         self.plan.budget = budget;
-        if self.stage == Stage::Finished {
+        if self.stage == ExperimentStage::Finished {
             self.propose()?;
         } else {
             let fork = self.study.fork();
@@ -181,7 +182,7 @@ impl Life {
     }
 }
 
-fn known<'a>(all: &'a [ParameterInfo], what: &str, name: &str) -> Result<&'a ParameterInfo, Refusal> {
+fn known<'a>(all: &'a [ParameterInfo], what: &str, name: &str) -> Result<&'a ParameterInfo, RequestRefusal> {
     match all.iter().find(|parameter| parameter.name == name) {
         Some(parameter) => Ok(parameter),
         None => {
@@ -191,7 +192,7 @@ fn known<'a>(all: &'a [ParameterInfo], what: &str, name: &str) -> Result<&'a Par
     }
 }
 
-pub(super) fn must_be_within(all: &[ParameterInfo], what: &str, name: &str, value: f64) -> Result<(), Refusal> {
+pub(super) fn must_be_within(all: &[ParameterInfo], what: &str, name: &str, value: f64) -> Result<(), RequestRefusal> {
     let ParameterInfo { unit, low, high, .. } = known(all, what, name)?;
     if value >= *low && value <= *high {
         Ok(())

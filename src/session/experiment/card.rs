@@ -7,8 +7,7 @@ use super::gains::listed;
 use crate::optimize::insight;
 use crate::optimize::study::{Draft, Study};
 use crate::optimize::trial::Trial;
-use crate::realtime::command::Gains;
-use crate::recording::record::{Proposal, ProposedParameter, Risk, Source};
+use crate::trial::{FallRisk, Gains, Proposal, ProposalSource, ProposedParameter};
 
 /// A card.
 pub struct Card {
@@ -138,7 +137,7 @@ impl Card {
         Proposal {
             trial: self.number(),
             revision: self.revision,
-            source: if self.is_changed() { Source::Operator } else { origin.source },
+            source: if self.is_changed() { ProposalSource::Operator } else { origin.source },
             parent: origin.parent,
             risk: self.risk(&parameters),
             parameters,
@@ -158,10 +157,10 @@ impl Card {
     }
 
     /// How near earlier falls are; none before the first trial that counts.
-    fn risk(&self, point: &[ProposedParameter]) -> Option<Risk> {
+    fn risk(&self, point: &[ProposedParameter]) -> Option<FallRisk> {
         let point: Vec<_> = point.iter().map(|p| (p.name.clone(), p.value)).collect();
         let risk = insight::Risk::of(&point, self.outlook.trials(), &self.outlook.options().space);
-        (risk.neighbours > 0).then(|| Risk {
+        (risk.neighbours > 0).then(|| FallRisk {
             nearest_fall: risk.falls.first().map(|(_, distance)| *distance),
             nearest_fall_trial: risk.falls.first().map(|(trial, _)| *trial),
             falls: risk.fell_near as u32,

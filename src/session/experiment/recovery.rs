@@ -7,12 +7,13 @@
 use super::attributes::{self, Origin};
 use super::confirming::Next;
 use super::watch::Watch;
-use super::{Life, Refusal};
 use crate::optimize::study::{Outcome, StudyError, Told};
 use crate::optimize::trial::{Trial, TrialState};
-use crate::recording::record::{Record, Source, Stage, Verdict};
+use crate::recording::record::Record;
+use crate::session::experiment::{Experiment, RequestRefusal};
+use crate::trial::{ExperimentStage, ProposalSource, Verdict};
 
-impl Life {
+impl Experiment {
     /// What a crash of this session's forerunner left behind.
     pub(super) fn close_interrupted(&mut self) -> Result<(), StudyError> {
         let me = self.plan.worker;
@@ -32,14 +33,14 @@ impl Life {
     pub fn leave(&mut self) -> Result<(), StudyError> {
         let number = self.current;
         let Some(row) = self.rows.get_mut(&number) else { return Ok(()) };
-        if self.stage != Stage::Review || row.suggested != Some(Verdict::Void) {
+        if self.stage != ExperimentStage::Review || row.suggested != Some(Verdict::Void) {
             return Ok(());
         }
         row.verdict = Some(Verdict::Void);
         let cause = row.cause.clone();
         self.show_row(number);
         let trial = self.study.running().find(|trial| trial.number == number).cloned();
-        self.stage = Stage::Finished;
+        self.stage = ExperimentStage::Finished;
         match trial {
             Some(trial) => self.close_trial(&trial, &cause)?,
             None => return Ok(()),
@@ -120,7 +121,7 @@ impl Life {
     ///
     /// # Errors
     /// When the study cannot be read or written.
-    pub fn look(&mut self) -> Result<(), Refusal> {
+    pub fn look(&mut self) -> Result<(), RequestRefusal> {
         if !self.is_idle() {
             return Ok(());
         }
@@ -129,7 +130,7 @@ impl Life {
         self.take_rows();
         let Some(card) = &self.card else {
             let room = occupied(self.study.trials(), &self.watch) < self.plan.budget;
-            let queued = self.study.waiting().any(|trial| attributes::source_of(trial) == Source::Confirm);
+            let queued = self.study.waiting().any(|trial| attributes::source_of(trial) == ProposalSource::Confirm);
             // A repeat that another worker had taken has come to nothing, or was the last.
             let confirms = self.pending.is_none() && !matches!(self.next_repeat(&self.study), Next::Nothing);
             return if room || queued || confirms { Ok(self.propose()?) } else { Ok(()) };
@@ -168,6 +169,6 @@ pub(super) fn occupied(trials: &[Trial], watch: &Watch) -> u32 {
         TrialState::Running => attributes::worker_of(trial) == Some(0) || watch.is_alive(trial),
         _ => false,
     };
-    let budgeted = |trial: &&Trial| attributes::source_of(trial) != Source::Confirm;
+    let budgeted = |trial: &&Trial| attributes::source_of(trial) != ProposalSource::Confirm;
     trials.iter().filter(takes).filter(budgeted).count() as u32
 }

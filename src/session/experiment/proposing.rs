@@ -5,20 +5,23 @@ use super::card::Card;
 use super::confirming::Next;
 use super::searching::Searched;
 use super::wishes::must_be_within;
-use super::{Life, Refusal, gains, not_now, recovery};
+use super::{gains, not_now, recovery};
 use crate::optimize::insight;
 use crate::optimize::sampler::SamplerKind;
 use crate::optimize::study::{Study, StudyError, Told};
 use crate::optimize::trial::Trial;
-use crate::realtime::command::{JumpParameters, TrialSpec};
-use crate::recording::record::{
-    Insight, ParameterInfo, ParameterInsight, ProposedParameter, Record, Source, Stage, TrialRecord,
+use crate::recording::record::Record;
+use crate::session::experiment::{Experiment, RequestRefusal};
+use crate::telemetry::TrialSpec;
+use crate::trial::{
+    ExperimentStage, JumpParameters, ParameterInfo, ParameterInsight, ProposalInsight, ProposalSource,
+    ProposedParameter, TrialRecord,
 };
 
 /// Values at which the densities are shown: a chart of the terminal is hardly wider.
 const INSIGHT_POINTS: usize = 41;
 
-impl Life {
+impl Experiment {
     /// Puts the next card on the table, or finishes.
     pub(super) fn propose(&mut self) -> Result<(), StudyError> {
         self.study.refresh()?;
@@ -44,12 +47,13 @@ impl Life {
             self.write_confirmed()?;
         }
         self.show_points(&outlook);
-        let confirms = outlook.waiting().next().is_some_and(|trial| attributes::source_of(trial) == Source::Confirm);
+        let confirms =
+            outlook.waiting().next().is_some_and(|trial| attributes::source_of(trial) == ProposalSource::Confirm);
         if !confirms && recovery::occupied(outlook.trials(), &self.watch) >= self.plan.budget {
             self.show_search(&outlook);
             self.card = None;
             let last = self.rows.keys().next_back().copied().unwrap_or(0);
-            self.enter(Stage::Finished, last);
+            self.enter(ExperimentStage::Finished, last);
             return Ok(());
         }
         self.revisions += 1;
@@ -62,7 +66,7 @@ impl Life {
         let number = card.number();
         self.card = Some(card);
         self.show_card();
-        self.enter(Stage::Proposed, number);
+        self.enter(ExperimentStage::Proposed, number);
         if let Some(objection) = self.objection() {
             self.log(format!("trial {number} cannot run as it was queued: {objection}"));
         }
@@ -111,7 +115,7 @@ impl Life {
     }
 
     /// The card becomes a running trial of the study.
-    pub(super) fn begin(&mut self) -> Result<u32, Refusal> {
+    pub(super) fn begin(&mut self) -> Result<u32, RequestRefusal> {
         let Some(card) = &self.card else { unreachable!("callers have looked at the card") };
         let proposal = card.proposal();
         let origin = card.origin();
@@ -125,7 +129,7 @@ impl Life {
                 queued = self.queue_repeat(&given, &origin.attributes())?;
                 if queued.is_none() {
                     self.propose()?;
-                    return Err(Refusal::Overtaken(draft.number));
+                    return Err(RequestRefusal::Overtaken(draft.number));
                 }
             }
             if let Some(number) = queued {
@@ -135,7 +139,7 @@ impl Life {
         let seed = origin.seed.unwrap_or_else(|| trial_seed(self.plan.seed, self.plan.worker, draft.number));
         let began = Began { seed, worker: self.plan.worker, recording: &self.plan.recording, fixed: &held };
         let attributes = attributes::began(&proposal, &began);
-        let beyond_budget = proposal.source == Source::Confirm || origin.source == Source::Confirm;
+        let beyond_budget = proposal.source == ProposalSource::Confirm || origin.source == ProposalSource::Confirm;
         let watch = &self.watch;
         let budget = self.plan.budget;
         let room = |trials: &[Trial]| beyond_budget || recovery::occupied(trials, watch) < budget;
@@ -143,7 +147,7 @@ impl Life {
             Ok(number) => number,
             Err(StudyError::StaleDraft { .. } | StudyError::Full) => {
                 self.propose()?;
-                return Err(Refusal::Overtaken(draft.number));
+                return Err(RequestRefusal::Overtaken(draft.number));
             }
             Err(error) => return Err(error.into()),
         };
@@ -205,7 +209,7 @@ impl Life {
     }
 
     /// Queues a point, and proposes what is next then.
-    pub(super) fn queue(&mut self, parameters: &[(String, f64)], origin: &Origin) -> Result<(), Refusal> {
+    pub(super) fn queue(&mut self, parameters: &[(String, f64)], origin: &Origin) -> Result<(), RequestRefusal> {
         self.must_be_idle()?;
         self.study.enqueue(parameters, &origin.attributes())?;
         Ok(self.propose()?)
@@ -213,10 +217,10 @@ impl Life {
 
     /// Whether no trial runs or is under review.
     pub(super) fn is_idle(&self) -> bool {
-        matches!(self.stage, Stage::Proposed | Stage::Finished)
+        matches!(self.stage, ExperimentStage::Proposed | ExperimentStage::Finished)
     }
 
-    pub(super) fn must_be_idle(&self) -> Result<(), Refusal> {
+    pub(super) fn must_be_idle(&self) -> Result<(), RequestRefusal> {
         if self.is_idle() { Ok(()) } else { not_now("finish the present trial first") }
     }
 
@@ -252,7 +256,7 @@ impl Life {
             }
         };
         let parameters = card.draft.parameters.iter().map(|p| (p.name.clone(), p.value)).map(parameter).collect();
-        self.outbox.push(Record::Insight(Insight { trial: card.number(), parameters }));
+        self.outbox.push(Record::Insight(ProposalInsight { trial: card.number(), parameters }));
     }
 
     /// What the control thread is given for the trial `number`.

@@ -1,11 +1,11 @@
-//! The pre-arm list: what must hold before a robot is energised. Names and findings; who looks is `control::pre_arm` for
-//! what a tick can know and `session::pre_arm` for the rest.
+//! The pre-arm list: what must hold before a robot is energised. Names and findings; who looks is `control::arming` for
+//! what a tick can know and `session::arming_checklist` for the rest.
 
 use serde::{Deserialize, Serialize};
 
 /// One item of the list.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-pub enum Check {
+pub enum ArmingCheck {
     /// The robot's newest state is new.
     StateFresh,
     /// Few states are lost on the way.
@@ -42,75 +42,75 @@ pub enum Check {
     MotorsFollow,
 }
 
-impl Check {
+impl ArmingCheck {
     /// The checks that the control thread makes, in the order of the list.
-    pub const CONTROL: [Check; 11] = [
-        Check::StateFresh,
-        Check::Loss,
-        Check::Checksums,
-        Check::Upright,
-        Check::JointsInside,
-        Check::LyingDown,
-        Check::Battery,
-        Check::MotorsCool,
-        Check::MotorsFollow,
-        Check::GyroStill,
-        Check::OnTime,
+    pub const CONTROL: [ArmingCheck; 11] = [
+        ArmingCheck::StateFresh,
+        ArmingCheck::Loss,
+        ArmingCheck::Checksums,
+        ArmingCheck::Upright,
+        ArmingCheck::JointsInside,
+        ArmingCheck::LyingDown,
+        ArmingCheck::Battery,
+        ArmingCheck::MotorsCool,
+        ArmingCheck::MotorsFollow,
+        ArmingCheck::GyroStill,
+        ArmingCheck::OnTime,
     ];
 
     /// All checks, in the order of their numbers in a recording.
-    pub const ALL: [Check; 17] = [
-        Check::StateFresh,
-        Check::Loss,
-        Check::Checksums,
-        Check::Upright,
-        Check::JointsInside,
-        Check::LyingDown,
-        Check::Battery,
-        Check::MotorsCool,
-        Check::GyroStill,
-        Check::OnTime,
-        Check::Recorder,
-        Check::Disk,
-        Check::LowLevel,
-        Check::Configuration,
-        Check::AreaClear,
-        Check::StopTested,
-        Check::MotorsFollow,
+    pub const ALL: [ArmingCheck; 17] = [
+        ArmingCheck::StateFresh,
+        ArmingCheck::Loss,
+        ArmingCheck::Checksums,
+        ArmingCheck::Upright,
+        ArmingCheck::JointsInside,
+        ArmingCheck::LyingDown,
+        ArmingCheck::Battery,
+        ArmingCheck::MotorsCool,
+        ArmingCheck::GyroStill,
+        ArmingCheck::OnTime,
+        ArmingCheck::Recorder,
+        ArmingCheck::Disk,
+        ArmingCheck::LowLevel,
+        ArmingCheck::Configuration,
+        ArmingCheck::AreaClear,
+        ArmingCheck::StopTested,
+        ArmingCheck::MotorsFollow,
     ];
 
     /// The words that the operator sees and that files hold.
     pub const fn name(self) -> &'static str {
         match self {
-            Check::StateFresh => "state fresh",
-            Check::Loss => "packet loss",
-            Check::Checksums => "checksums",
-            Check::Upright => "upright",
-            Check::JointsInside => "joints inside limits",
-            Check::LyingDown => "lying down",
-            Check::Battery => "battery",
-            Check::MotorsCool => "motors cool",
-            Check::GyroStill => "gyro still",
-            Check::OnTime => "loop on time",
-            Check::Recorder => "recorder",
-            Check::Disk => "disk space",
-            Check::LowLevel => "low-level mode, damped",
-            Check::Configuration => "configuration",
-            Check::AreaClear => "area clear, remote in hand",
-            Check::StopTested => "STOP tested",
-            Check::MotorsFollow => "motors follow",
+            ArmingCheck::StateFresh => "state fresh",
+            ArmingCheck::Loss => "packet loss",
+            ArmingCheck::Checksums => "checksums",
+            ArmingCheck::Upright => "upright",
+            ArmingCheck::JointsInside => "joints inside limits",
+            ArmingCheck::LyingDown => "lying down",
+            ArmingCheck::Battery => "battery",
+            ArmingCheck::MotorsCool => "motors cool",
+            ArmingCheck::GyroStill => "gyro still",
+            ArmingCheck::OnTime => "loop on time",
+            ArmingCheck::Recorder => "recorder",
+            ArmingCheck::Disk => "disk space",
+            ArmingCheck::LowLevel => "low-level mode, damped",
+            ArmingCheck::Configuration => "configuration",
+            ArmingCheck::AreaClear => "area clear, remote in hand",
+            ArmingCheck::StopTested => "STOP tested",
+            ArmingCheck::MotorsFollow => "motors follow",
         }
     }
 
     /// Whether a simulated robot needs it too: it hurts nobody, and is carried to its mark in whatever pose it lies.
     pub const fn needed_in_simulation(self) -> bool {
-        matches!(self, Check::StateFresh | Check::Recorder | Check::Disk)
+        matches!(self, ArmingCheck::StateFresh | ArmingCheck::Recorder | ArmingCheck::Disk)
     }
 }
 
 /// How a check stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
-pub enum CheckState {
+pub enum ArmingCheckState {
     /// It holds.
     Passed,
     /// It does not hold.
@@ -122,34 +122,34 @@ pub enum CheckState {
     NotNeeded,
 }
 
-impl CheckState {
+impl ArmingCheckState {
     /// All states.
-    pub const ALL: [CheckState; 4] =
-        [CheckState::Passed, CheckState::Failed, CheckState::Waiting, CheckState::NotNeeded];
+    pub const ALL: [ArmingCheckState; 4] =
+        [ArmingCheckState::Passed, ArmingCheckState::Failed, ArmingCheckState::Waiting, ArmingCheckState::NotNeeded];
 
     /// The words that the operator sees and that files hold.
     pub const fn name(self) -> &'static str {
         match self {
-            CheckState::Passed => "passed",
-            CheckState::Failed => "failed",
-            CheckState::Waiting => "waiting",
-            CheckState::NotNeeded => "not needed",
+            ArmingCheckState::Passed => "passed",
+            ArmingCheckState::Failed => "failed",
+            ArmingCheckState::Waiting => "waiting",
+            ArmingCheckState::NotNeeded => "not needed",
         }
     }
 
     /// Whether the robot may be armed as far as this check goes.
     pub const fn allows(self) -> bool {
-        matches!(self, CheckState::Passed | CheckState::NotNeeded)
+        matches!(self, ArmingCheckState::Passed | ArmingCheckState::NotNeeded)
     }
 }
 
 /// What one check of the control thread found; in the check's own unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Finding {
+pub struct ArmingFinding {
     /// The check.
-    pub check: Check,
+    pub check: ArmingCheck,
     /// How it stands.
-    pub state: CheckState,
+    pub state: ArmingCheckState,
     /// What was measured; not finite where nothing is known.
     pub measured: f64,
     /// What is allowed at most, or for the battery at least.
@@ -160,24 +160,24 @@ pub struct Finding {
 
 /// A set of checks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct CheckSet(u32);
+pub struct ArmingCheckSet(u32);
 
-impl CheckSet {
+impl ArmingCheckSet {
     /// Without any check.
-    pub const EMPTY: CheckSet = CheckSet(0);
+    pub const EMPTY: ArmingCheckSet = ArmingCheckSet(0);
 
     /// Adds `check`.
-    pub fn insert(&mut self, check: Check) {
+    pub fn insert(&mut self, check: ArmingCheck) {
         self.0 |= 1 << check as u32;
     }
 
     /// Takes `check` out.
-    pub fn remove(&mut self, check: Check) {
+    pub fn remove(&mut self, check: ArmingCheck) {
         self.0 &= !(1 << check as u32);
     }
 
     /// Whether `check` is in it.
-    pub fn contains(self, check: Check) -> bool {
+    pub fn contains(self, check: ArmingCheck) -> bool {
         self.0 & (1 << check as u32) != 0
     }
 
@@ -187,12 +187,12 @@ impl CheckSet {
     }
 
     /// The checks in the order of their numbers.
-    pub fn iter(self) -> impl Iterator<Item = Check> {
-        Check::ALL.into_iter().filter(move |check| self.contains(*check))
+    pub fn iter(self) -> impl Iterator<Item = ArmingCheck> {
+        ArmingCheck::ALL.into_iter().filter(move |check| self.contains(*check))
     }
 }
 
-impl std::fmt::Display for CheckSet {
+impl std::fmt::Display for ArmingCheckSet {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         for (place, check) in self.iter().enumerate() {
             write!(f, "{}{}", if place == 0 { "" } else { ", " }, check.name())?;
@@ -201,16 +201,16 @@ impl std::fmt::Display for CheckSet {
     }
 }
 
-/// What the control thread found last, in the order of [`Check::CONTROL`].
+/// What the control thread found last, in the order of [`ArmingCheck::CONTROL`].
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Findings(pub [Finding; Check::CONTROL.len()]);
+pub struct ArmingFindings(pub [ArmingFinding; ArmingCheck::CONTROL.len()]);
 
-impl Default for Findings {
+impl Default for ArmingFindings {
     /// Nothing is known yet, so nothing has passed.
-    fn default() -> Findings {
-        Findings(Check::CONTROL.map(|check| Finding {
+    fn default() -> ArmingFindings {
+        ArmingFindings(ArmingCheck::CONTROL.map(|check| ArmingFinding {
             check,
-            state: CheckState::Failed,
+            state: ArmingCheckState::Failed,
             measured: f64::NAN,
             allowed: f64::NAN,
             joint: None,
@@ -218,10 +218,10 @@ impl Default for Findings {
     }
 }
 
-impl Findings {
+impl ArmingFindings {
     /// The checks that forbid arming.
-    pub fn failing(&self) -> CheckSet {
-        let mut failing = CheckSet::EMPTY;
+    pub fn failing(&self) -> ArmingCheckSet {
+        let mut failing = ArmingCheckSet::EMPTY;
         for finding in self.0.iter().filter(|finding| !finding.state.allows()) {
             failing.insert(finding.check);
         }
@@ -229,7 +229,7 @@ impl Findings {
     }
 
     /// What was found of `check`; none if it is not the control thread's.
-    pub fn get(&self, check: Check) -> Option<&Finding> {
+    pub fn get(&self, check: ArmingCheck) -> Option<&ArmingFinding> {
         self.0.iter().find(|finding| finding.check == check)
     }
 }

@@ -4,13 +4,13 @@
 //! A fall in the course of a trial is not here: it is an outcome of the trial (`jump::FallWatch`), and damps as well.
 
 use super::limits;
-use super::settings::{PERIOD_S, Settings};
-use crate::realtime::telemetry::{Caution, Estimate, Fault, Hold, Mode};
+use super::settings::{ControlSettings, PERIOD_S};
 use crate::robot::{JOINTS, LinkStatus, RobotState};
+use crate::telemetry::{Estimate, FailsafeWarning, Fault, Mode, TrialInhibit};
 
 /// What one tick knows.
 #[derive(Debug, Clone, Copy)]
-pub struct Seen<'a> {
+pub struct FailsafeInputs<'a> {
     /// Mode at the start of the tick.
     pub mode: Mode,
     /// The newest state.
@@ -35,7 +35,7 @@ pub struct Seen<'a> {
 
 /// What happens when a row trips.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Level {
+pub enum FailsafeAction {
     /// Damping in the same tick, latched as a fault.
     Cut,
     /// The landing is finished, then the robot sits down and is disarmed.
@@ -46,39 +46,39 @@ pub enum Level {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Trip {
     /// What happens.
-    pub level: Level,
+    pub level: FailsafeAction,
     /// What was measured and what is allowed.
     pub fault: Fault,
 }
 
 /// One row of the table.
-struct Row {
-    level: Level,
+struct FailsafeRow {
+    level: FailsafeAction,
     /// The modes in which it is watched.
     watched: fn(Mode) -> bool,
     /// The fault, if it is one now.
-    trips: fn(&Watchdog, &Seen, &Settings) -> Option<Fault>,
+    trips: fn(&Failsafe, &FailsafeInputs, &ControlSettings) -> Option<Fault>,
 }
 
 /// The table. The first row that trips counts, so what makes the numbers below it worthless stands above them.
-const TABLE: [Row; 16] = [
-    Row { level: Level::Cut, watched: Mode::commanded, trips: events_lost },
-    Row { level: Level::Cut, watched: Mode::commanded, trips: link_lost },
-    Row { level: Level::Cut, watched: Mode::commanded, trips: state_age },
-    // Seen in one tick alone, and what a robot reports while it starts need not be numbers.
-    Row { level: Level::Cut, watched: Mode::commanded, trips: reboot },
-    Row { level: Level::Cut, watched: Mode::commanded, trips: not_finite },
-    Row { level: Level::Cut, watched: Mode::commanded, trips: corrupt },
-    Row { level: Level::Cut, watched: Mode::commanded, trips: send_error },
-    Row { level: Level::Cut, watched: Mode::commanded, trips: late },
-    Row { level: Level::Cut, watched: Mode::commanded, trips: slow },
-    Row { level: Level::Cut, watched: Mode::commanded, trips: motor_hot },
-    Row { level: Level::Cut, watched: energised_or_faulted, trips: motor_mode },
-    Row { level: Level::Cut, watched: Mode::energised, trips: joint_position },
-    Row { level: Level::Cut, watched: Mode::energised, trips: joint_velocity },
-    Row { level: Level::Cut, watched: Mode::energised, trips: joint_torque },
-    Row { level: Level::Cut, watched: outside_a_trial, trips: tilt },
-    Row { level: Level::Land, watched: Mode::energised, trips: operator_silent },
+const TABLE: [FailsafeRow; 16] = [
+    FailsafeRow { level: FailsafeAction::Cut, watched: Mode::commanded, trips: events_lost },
+    FailsafeRow { level: FailsafeAction::Cut, watched: Mode::commanded, trips: link_lost },
+    FailsafeRow { level: FailsafeAction::Cut, watched: Mode::commanded, trips: state_age },
+    // FailsafeInputs in one tick alone, and what a robot reports while it starts need not be numbers.
+    FailsafeRow { level: FailsafeAction::Cut, watched: Mode::commanded, trips: reboot },
+    FailsafeRow { level: FailsafeAction::Cut, watched: Mode::commanded, trips: not_finite },
+    FailsafeRow { level: FailsafeAction::Cut, watched: Mode::commanded, trips: corrupt },
+    FailsafeRow { level: FailsafeAction::Cut, watched: Mode::commanded, trips: send_error },
+    FailsafeRow { level: FailsafeAction::Cut, watched: Mode::commanded, trips: late },
+    FailsafeRow { level: FailsafeAction::Cut, watched: Mode::commanded, trips: slow },
+    FailsafeRow { level: FailsafeAction::Cut, watched: Mode::commanded, trips: motor_hot },
+    FailsafeRow { level: FailsafeAction::Cut, watched: energised_or_faulted, trips: motor_mode },
+    FailsafeRow { level: FailsafeAction::Cut, watched: Mode::energised, trips: joint_position },
+    FailsafeRow { level: FailsafeAction::Cut, watched: Mode::energised, trips: joint_velocity },
+    FailsafeRow { level: FailsafeAction::Cut, watched: Mode::energised, trips: joint_torque },
+    FailsafeRow { level: FailsafeAction::Cut, watched: outside_a_trial, trips: tilt },
+    FailsafeRow { level: FailsafeAction::Land, watched: Mode::energised, trips: operator_silent },
 ];
 
 /// A motor that leaves servo mode after another fault is told, too: power may have been cut. Disarmed, it is an item of the
@@ -95,7 +95,7 @@ const fn outside_a_trial(mode: Mode) -> bool {
 
 /// The watchdog: the table and what it must remember from tick to tick.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Watchdog {
+pub struct Failsafe {
     /// When the tick before began, ns.
     began_ns: Option<u64>,
     /// Time since then, ms.
@@ -104,9 +104,9 @@ pub struct Watchdog {
     slow: u32,
 }
 
-impl Watchdog {
+impl Failsafe {
     /// Once per tick, first: the pace.
-    pub fn begin(&mut self, time_ns: u64, lateness_ns: u64, settings: &Settings) {
+    pub fn begin(&mut self, time_ns: u64, lateness_ns: u64, settings: &ControlSettings) {
         let began_ns = time_ns + lateness_ns;
         self.period_ms = self.began_ns.map_or(0.0, |before| began_ns.saturating_sub(before) as f64 * 1e-6);
         self.began_ns = Some(began_ns);
@@ -115,7 +115,7 @@ impl Watchdog {
     }
 
     /// The first row that trips; none if all is well.
-    pub fn check(&self, seen: &Seen, settings: &Settings) -> Option<Trip> {
+    pub fn check(&self, seen: &FailsafeInputs, settings: &ControlSettings) -> Option<Trip> {
         TABLE.iter().filter(|row| (row.watched)(seen.mode)).find_map(|row| {
             let fault = (row.trips)(self, seen, settings)?;
             Some(Trip { level: row.level, fault })
@@ -124,65 +124,69 @@ impl Watchdog {
 }
 
 /// What lets a trial finish but forbids the next: none if nothing does.
-pub fn hold(state: &RobotState, settings: &Settings) -> Option<Hold> {
+pub fn hold(state: &RobotState, settings: &ControlSettings) -> Option<TrialInhibit> {
     let limits = &settings.watchdog;
     let low = state.battery.map(|battery| battery.charge_percent).filter(|charge| *charge < limits.battery_percent);
     if let Some(measured_percent) = low {
-        return Some(Hold::BatteryLow { measured_percent, allowed_percent: limits.battery_percent });
+        return Some(TrialInhibit::BatteryLow { measured_percent, allowed_percent: limits.battery_percent });
     }
     let (joint, measured_c) = hottest(state);
-    (measured_c >= limits.motor_warm_c).then_some(Hold::MotorWarm { joint, measured_c, allowed_c: limits.motor_warm_c })
+    (measured_c >= limits.motor_warm_c).then_some(TrialInhibit::MotorWarm {
+        joint,
+        measured_c,
+        allowed_c: limits.motor_warm_c,
+    })
 }
 
 /// What is only worth a word: none if nothing is.
-pub fn caution(seen: &Seen, settings: &Settings) -> Option<Caution> {
+pub fn caution(seen: &FailsafeInputs, settings: &ControlSettings) -> Option<FailsafeWarning> {
     let limits = &settings.watchdog;
     if seen.mode.commanded() && seen.state_age_ms > limits.state_age_warn_ms {
-        Some(Caution::StateAge { age_ms: seen.state_age_ms, allowed_ms: limits.state_age_warn_ms })
+        Some(FailsafeWarning::StateAge { age_ms: seen.state_age_ms, allowed_ms: limits.state_age_warn_ms })
     } else if seen.mode.energised() && seen.operator_silent_ms > limits.operator_warn_ms {
-        Some(Caution::OperatorQuiet { silent_ms: seen.operator_silent_ms, allowed_ms: limits.operator_warn_ms })
+        Some(FailsafeWarning::OperatorQuiet { silent_ms: seen.operator_silent_ms, allowed_ms: limits.operator_warn_ms })
     } else {
         None
     }
 }
 
-fn events_lost(_: &Watchdog, seen: &Seen, _: &Settings) -> Option<Fault> {
+fn events_lost(_: &Failsafe, seen: &FailsafeInputs, _: &ControlSettings) -> Option<Fault> {
     seen.events_lost.then_some(Fault::EventsLost)
 }
 
-fn link_lost(_: &Watchdog, seen: &Seen, settings: &Settings) -> Option<Fault> {
+fn link_lost(_: &Failsafe, seen: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {
     let (age_ms, allowed_ms) = (seen.state_age_ms, settings.watchdog.link_lost_ms);
     (age_ms > allowed_ms).then_some(Fault::LinkLost { age_ms, allowed_ms })
 }
 
-fn state_age(_: &Watchdog, seen: &Seen, settings: &Settings) -> Option<Fault> {
+fn state_age(_: &Failsafe, seen: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {
     let (age_ms, allowed_ms) = (seen.state_age_ms, settings.watchdog.state_age_ms);
     (age_ms > allowed_ms).then_some(Fault::StateAge { age_ms, allowed_ms })
 }
 
-fn not_finite(_: &Watchdog, seen: &Seen, _: &Settings) -> Option<Fault> {
+fn not_finite(_: &Failsafe, seen: &FailsafeInputs, _: &ControlSettings) -> Option<Fault> {
     limits::finite(seen.state).err()
 }
 
-fn reboot(_: &Watchdog, seen: &Seen, _: &Settings) -> Option<Fault> {
+fn reboot(_: &Failsafe, seen: &FailsafeInputs, _: &ControlSettings) -> Option<Fault> {
     seen.restarted.then_some(Fault::Reboot)
 }
 
-fn corrupt(_: &Watchdog, seen: &Seen, settings: &Settings) -> Option<Fault> {
+fn corrupt(_: &Failsafe, seen: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {
     let (count, allowed) = (seen.link?.recent_corrupt, settings.watchdog.corrupt);
     (count > allowed).then_some(Fault::Corrupt { count, allowed })
 }
 
-fn send_error(_: &Watchdog, seen: &Seen, _: &Settings) -> Option<Fault> {
+fn send_error(_: &Failsafe, seen: &FailsafeInputs, _: &ControlSettings) -> Option<Fault> {
     seen.send_error.map(|errno| Fault::Send { errno })
 }
 
-fn late(_: &Watchdog, seen: &Seen, settings: &Settings) -> Option<Fault> {
+fn late(_: &Failsafe, seen: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {
     let (measured_ms, allowed_ms) = (seen.lateness_ns as f64 * 1e-6, settings.late_ms);
     (allowed_ms > 0.0 && measured_ms > allowed_ms).then_some(Fault::Late { measured_ms, allowed_ms })
 }
 
-fn slow(watchdog: &Watchdog, _: &Seen, settings: &Settings) -> Option<Fault> {
+fn slow(watchdog: &Failsafe, _: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {
     let limits = &settings.watchdog;
     let slow = settings.late_ms > 0.0 && watchdog.slow >= limits.period_ticks;
     slow.then_some(Fault::Slow {
@@ -192,17 +196,17 @@ fn slow(watchdog: &Watchdog, _: &Seen, settings: &Settings) -> Option<Fault> {
     })
 }
 
-fn motor_hot(_: &Watchdog, seen: &Seen, settings: &Settings) -> Option<Fault> {
+fn motor_hot(_: &Failsafe, seen: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {
     let ((joint, measured_c), allowed_c) = (hottest(seen.state), settings.watchdog.motor_c);
     (measured_c >= allowed_c).then_some(Fault::MotorTemperature { joint, measured_c, allowed_c })
 }
 
-fn motor_mode(_: &Watchdog, seen: &Seen, _: &Settings) -> Option<Fault> {
+fn motor_mode(_: &Failsafe, seen: &FailsafeInputs, _: &ControlSettings) -> Option<Fault> {
     let joint = seen.state.motor_enabled.iter().position(|enabled| !enabled)?;
     Some(Fault::MotorMode { joint: joint as u8 })
 }
 
-fn joint_position(_: &Watchdog, seen: &Seen, settings: &Settings) -> Option<Fault> {
+fn joint_position(_: &Failsafe, seen: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {
     let margin = settings.watchdog.joint_margin_rad;
     (0..JOINTS).find_map(|joint| {
         let measured_rad = seen.state.joint_position[joint];
@@ -213,7 +217,7 @@ fn joint_position(_: &Watchdog, seen: &Seen, settings: &Settings) -> Option<Faul
     })
 }
 
-fn joint_velocity(_: &Watchdog, seen: &Seen, settings: &Settings) -> Option<Fault> {
+fn joint_velocity(_: &Failsafe, seen: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {
     (0..JOINTS).find_map(|joint| {
         let measured_rad_s = seen.state.joint_velocity[joint];
         let allowed_rad_s = settings.max_velocity[joint] * settings.watchdog.velocity_factor;
@@ -222,7 +226,7 @@ fn joint_velocity(_: &Watchdog, seen: &Seen, settings: &Settings) -> Option<Faul
     })
 }
 
-fn joint_torque(_: &Watchdog, seen: &Seen, settings: &Settings) -> Option<Fault> {
+fn joint_torque(_: &Failsafe, seen: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {
     (0..JOINTS).find_map(|joint| {
         let measured_nm = seen.state.joint_torque[joint];
         let allowed_nm = settings.max_torque[joint] * settings.watchdog.torque_factor;
@@ -231,7 +235,7 @@ fn joint_torque(_: &Watchdog, seen: &Seen, settings: &Settings) -> Option<Fault>
     })
 }
 
-fn tilt(_: &Watchdog, seen: &Seen, settings: &Settings) -> Option<Fault> {
+fn tilt(_: &Failsafe, seen: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {
     let [roll, pitch, _] = seen.estimate.roll_pitch_yaw.into();
     let measured_rad = roll.abs().max(pitch.abs());
     // Who sits down may lean; who stands must not.
@@ -240,7 +244,7 @@ fn tilt(_: &Watchdog, seen: &Seen, settings: &Settings) -> Option<Fault> {
     (measured_rad > allowed_rad).then_some(Fault::Tilt { measured_rad, allowed_rad })
 }
 
-fn operator_silent(_: &Watchdog, seen: &Seen, settings: &Settings) -> Option<Fault> {
+fn operator_silent(_: &Failsafe, seen: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {
     let silent_ms = seen.operator_silent_ms;
     (silent_ms > settings.watchdog.operator_silent_ms).then_some(Fault::OperatorLost { silent_ms })
 }

@@ -2,19 +2,18 @@
 //! by the engine's thread, and by a test or a bench as they like; nothing here allocates, locks or waits.
 
 use super::cycle::{Cycle, Inputs};
-use super::settings::{PERIOD_S, Settings};
+use super::settings::{ControlSettings, PERIOD_S};
 use crate::realtime::channel::{ControlEnd, SHOWN_EVERY};
 use crate::realtime::clock::Clock;
-use crate::realtime::command::Command;
-use crate::realtime::telemetry::{Counters, Event, Mode, Snapshot, Tick};
 use crate::realtime::thread::Instant;
 use crate::robot::{JointCommand, LinkStatus, Placement, Robot, RobotError, RobotState};
+use crate::telemetry::{Command, Counters, Event, Mode, Snapshot, Tick};
 
 /// The session is told the counters, and what speaks against arming, ten times a second and with every event.
 const COUNTERS_EVERY: u64 = 100;
 
 /// A control cycle at its ends of the channels.
-pub struct Body {
+pub struct ControlLoop {
     cycle: Cycle,
     end: ControlEnd,
     counters: Counters,
@@ -24,10 +23,10 @@ pub struct Body {
     start_ns: Option<u64>,
 }
 
-impl Body {
+impl ControlLoop {
     /// A body that has not ticked yet.
-    pub fn new(settings: &Settings, end: ControlEnd) -> Body {
-        Body {
+    pub fn new(settings: &ControlSettings, end: ControlEnd) -> ControlLoop {
+        ControlLoop {
             cycle: Cycle::new(settings),
             end,
             counters: Counters::default(),
@@ -39,7 +38,7 @@ impl Body {
 
     /// One tick.
     pub fn tick<C: Clock, R: Robot + ?Sized>(&mut self, instant: Instant, clock: &C, robot: &mut R) -> &Tick {
-        let Body { cycle, end, counters, start_ns, .. } = self;
+        let ControlLoop { cycle, end, counters, start_ns, .. } = self;
         // A session that broke down takes no more events, though there is room for some.
         self.events_lost |= end.events.is_abandoned();
         let command = end.commands.pop().ok();

@@ -2,15 +2,16 @@
 
 use std::path::PathBuf;
 
-use crate::control::settings::{PreArm, Settings};
-use crate::realtime::pre_arm::{Check, CheckSet, CheckState, Finding, Findings};
-use crate::realtime::telemetry::{Cause, Mode};
+use crate::control::settings::{ArmingLimits, ControlSettings};
 use crate::recording::disk;
-use crate::recording::record::PreArmCheck;
+use crate::recording::record::ArmingCheckRecord;
 use crate::recording::recorder::RecorderStatus;
 use crate::robot::joint_name;
+use crate::telemetry::{
+    ArmingCheck, ArmingCheckSet, ArmingCheckState, ArmingFinding, ArmingFindings, Mode, TransitionCause,
+};
 
-use super::intent::OperatorCheck;
+use super::operator_request::OperatorCheck;
 
 /// How far the test of the STOP key has come.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -22,8 +23,8 @@ enum StopTest {
 
 /// What the list is made with and what it remembers of this session.
 #[derive(Debug, Clone)]
-pub struct PreArmList {
-    limits: PreArm,
+pub struct ArmingChecklist {
+    limits: ArmingLimits,
     /// Free space that a trial needs, MB.
     trial_mb: u32,
     hardware: bool,
@@ -32,7 +33,7 @@ pub struct PreArmList {
     /// Where the recording goes; none where nothing is kept.
     folder: Option<PathBuf>,
     /// What the operator has given their word on.
-    words: CheckSet,
+    words: ArmingCheckSet,
     /// When they gave it last on the area, ns.
     area_ns: u64,
     /// How often the robot has restarted, as far as the list has heard.
@@ -40,17 +41,17 @@ pub struct PreArmList {
     stop: StopTest,
 }
 
-impl PreArmList {
+impl ArmingChecklist {
     /// A list of which nothing is confirmed. `configuration` is shown beside the operator's word on it; `folder` is where
     /// the recording goes, none where nothing is kept.
-    pub fn new(settings: &Settings, configuration: String, folder: Option<PathBuf>) -> PreArmList {
-        PreArmList {
+    pub fn new(settings: &ControlSettings, configuration: String, folder: Option<PathBuf>) -> ArmingChecklist {
+        ArmingChecklist {
             limits: settings.pre_arm,
             trial_mb: settings.watchdog.disk_free_mb,
             hardware: settings.hardware,
             configuration,
             folder,
-            words: CheckSet::EMPTY,
+            words: ArmingCheckSet::EMPTY,
             area_ns: 0,
             reboots: 0,
             stop: StopTest::Open,
@@ -69,28 +70,28 @@ impl PreArmList {
     pub fn forget(&mut self, time_ns: u64) -> Option<String> {
         let age_s = time_ns.saturating_sub(self.area_ns) as f64 * 1e-9;
         let allowed_s = self.limits.area_clear_s;
-        if age_s <= allowed_s || !self.words.contains(Check::AreaClear) {
+        if age_s <= allowed_s || !self.words.contains(ArmingCheck::AreaClear) {
             return None;
         }
-        self.words.remove(Check::AreaClear);
+        self.words.remove(ArmingCheck::AreaClear);
         Some(format!(
             "the area was said to be clear more than {allowed_s:.0} s ago: look again, and give your word anew"
         ))
     }
 
     /// The mode changed: a word that the change makes worthless is taken back, and a STOP may have been a test.
-    pub fn mode_changed(&mut self, from: Mode, to: Mode, cause: &Cause) {
+    pub fn mode_changed(&mut self, from: Mode, to: Mode, cause: &TransitionCause) {
         if from.energised() && !to.energised() {
             // Somebody will now go to the robot.
-            self.words.remove(Check::AreaClear);
+            self.words.remove(ArmingCheck::AreaClear);
         }
-        if let Cause::Fault(fault) = cause
+        if let TransitionCause::Fault(fault) = cause
             && fault.voids_the_word()
         {
             self.take_back();
         }
         self.stop = match (self.stop, from, to, cause) {
-            (StopTest::Open, Mode::Offline | Mode::Observe | Mode::Disarmed, Mode::Damped, Cause::Stop) => {
+            (StopTest::Open, Mode::Offline | Mode::Observe | Mode::Disarmed, Mode::Damped, TransitionCause::Stop) => {
                 StopTest::Pressed
             }
             (StopTest::Pressed, Mode::Damped, Mode::Disarmed, _) => StopTest::Passed,
@@ -112,12 +113,12 @@ impl PreArmList {
 
     /// A robot that restarted is not in low-level mode any more, and somebody may be at it.
     fn take_back(&mut self) {
-        self.words.remove(Check::LowLevel);
-        self.words.remove(Check::AreaClear);
+        self.words.remove(ArmingCheck::LowLevel);
+        self.words.remove(ArmingCheck::AreaClear);
     }
 
     /// How every item stands now.
-    pub fn look(&self, findings: &Findings, recorder: &RecorderStatus) -> Vec<PreArmCheck> {
+    pub fn look(&self, findings: &ArmingFindings, recorder: &RecorderStatus) -> Vec<ArmingCheckRecord> {
         let found = findings.0.iter().map(|finding| self.words_of(finding));
         let own = [
             self.recorder(recorder),
@@ -138,27 +139,29 @@ impl PreArmList {
             .then(|| format!("{free} MB free where the recording goes, at least {needed} for a trial; make room"))
     }
 
-    fn words_of(&self, finding: &Finding) -> PreArmCheck {
-        let Finding { check, state, measured, .. } = *finding;
+    fn words_of(&self, finding: &ArmingFinding) -> ArmingCheckRecord {
+        let ArmingFinding { check, state, measured, .. } = *finding;
         let limits = &self.limits;
         let joint = finding.joint.map(|joint| joint_name(joint as usize)).unwrap_or_default();
         let (found, needed) = match check {
-            Check::StateFresh => (format!("{measured:.0} ms old"), format!("at most {} ms", limits.state_age_ms)),
-            Check::Loss => {
+            ArmingCheck::StateFresh => (format!("{measured:.0} ms old"), format!("at most {} ms", limits.state_age_ms)),
+            ArmingCheck::Loss => {
                 (format!("{:.1} % lost", measured * 100.0), format!("at most {} % in 5 s", limits.loss_share * 100.0))
             }
-            Check::Checksums => (format!("{measured:.0} corrupt"), format!("at most {} in 5 s", limits.corrupt)),
-            Check::Upright => (format!("tilted {measured:.2} rad"), format!("at most {:.2} rad", limits.tilt_rad)),
-            Check::JointsInside => {
+            ArmingCheck::Checksums => (format!("{measured:.0} corrupt"), format!("at most {} in 5 s", limits.corrupt)),
+            ArmingCheck::Upright => {
+                (format!("tilted {measured:.2} rad"), format!("at most {:.2} rad", limits.tilt_rad))
+            }
+            ArmingCheck::JointsInside => {
                 let found = if measured > 0.0 { format!("{joint} {measured:.2} rad beyond") } else { "all".to_owned() };
                 (found, format!("at most {:.2} rad beyond", limits.joint_margin_rad))
             }
-            Check::LyingDown => {
+            ArmingCheck::LyingDown => {
                 (format!("{joint} {measured:.2} rad away"), format!("at most {:.2} rad", limits.lying_tolerance_rad))
             }
-            Check::Battery => (format!("{measured:.0} %"), format!("at least {:.0} %", limits.battery_percent)),
-            Check::MotorsCool => (format!("{joint} {measured:.0} C"), format!("at most {:.0} C", limits.motor_c)),
-            Check::MotorsFollow => {
+            ArmingCheck::Battery => (format!("{measured:.0} %"), format!("at least {:.0} %", limits.battery_percent)),
+            ArmingCheck::MotorsCool => (format!("{joint} {measured:.0} C"), format!("at most {:.0} C", limits.motor_c)),
+            ArmingCheck::MotorsFollow => {
                 let found = if measured > 0.0 {
                     format!("{measured:.0} out of servo mode, {joint} first")
                 } else {
@@ -166,11 +169,11 @@ impl PreArmList {
                 };
                 (found, "every motor in servo mode".to_owned())
             }
-            Check::GyroStill => (
+            ArmingCheck::GyroStill => (
                 format!("{measured:.2} rad/s"),
                 format!("at most {:.2} rad/s for {} s", limits.gyro_rad_s, limits.still_s),
             ),
-            Check::OnTime => (
+            ArmingCheck::OnTime => (
                 format!("{:.1} % of ticks late", measured * 100.0),
                 format!("at most {} % later than {} ms", limits.late_share * 100.0, limits.late_ms),
             ),
@@ -180,59 +183,66 @@ impl PreArmList {
         self.item(check, state, found, needed)
     }
 
-    fn recorder(&self, status: &RecorderStatus) -> PreArmCheck {
+    fn recorder(&self, status: &RecorderStatus) -> ArmingCheckRecord {
         let (state, found) = match (&status.error, &self.folder) {
-            (Some(error), _) => (CheckState::Failed, error.clone()),
-            (None, Some(_)) if status.finished => (CheckState::Failed, "has ended".to_owned()),
-            (None, Some(_)) => (CheckState::Passed, "recording".to_owned()),
+            (Some(error), _) => (ArmingCheckState::Failed, error.clone()),
+            (None, Some(_)) if status.finished => (ArmingCheckState::Failed, "has ended".to_owned()),
+            (None, Some(_)) => (ArmingCheckState::Passed, "recording".to_owned()),
             // Who asks for no recording of a simulation gets none; a real robot's jumps are always kept.
-            (None, None) if self.hardware => (CheckState::Failed, "nothing is kept".to_owned()),
-            (None, None) => (CheckState::NotNeeded, "nothing is to be kept".to_owned()),
+            (None, None) if self.hardware => (ArmingCheckState::Failed, "nothing is kept".to_owned()),
+            (None, None) => (ArmingCheckState::NotNeeded, "nothing is to be kept".to_owned()),
         };
-        self.item(Check::Recorder, state, found, "every tick is recorded".to_owned())
+        self.item(ArmingCheck::Recorder, state, found, "every tick is recorded".to_owned())
     }
 
-    fn disk(&self) -> PreArmCheck {
+    fn disk(&self) -> ArmingCheckRecord {
         let needed = format!("at least {} MB", self.limits.disk_free_mb);
         let (state, found) = match &self.folder {
-            None => (CheckState::NotNeeded, "nothing is to be kept".to_owned()),
+            None => (ArmingCheckState::NotNeeded, "nothing is to be kept".to_owned()),
             Some(folder) => match disk::free_mb(folder) {
-                Ok(free) if free >= u64::from(self.limits.disk_free_mb) => (CheckState::Passed, format!("{free} MB")),
-                Ok(free) => (CheckState::Failed, format!("{free} MB")),
-                Err(error) => (CheckState::Failed, error.to_string()),
+                Ok(free) if free >= u64::from(self.limits.disk_free_mb) => {
+                    (ArmingCheckState::Passed, format!("{free} MB"))
+                }
+                Ok(free) => (ArmingCheckState::Failed, format!("{free} MB")),
+                Err(error) => (ArmingCheckState::Failed, error.to_string()),
             },
         };
-        self.item(Check::Disk, state, found, needed)
+        self.item(ArmingCheck::Disk, state, found, needed)
     }
 
-    fn word(&self, check: OperatorCheck, about: String, needed: &str) -> PreArmCheck {
+    fn word(&self, check: OperatorCheck, about: String, needed: &str) -> ArmingCheckRecord {
         let check = check.check();
         let given = self.words.contains(check);
-        let state = if given { CheckState::Passed } else { CheckState::Waiting };
+        let state = if given { ArmingCheckState::Passed } else { ArmingCheckState::Waiting };
         let found = format!("{about}{}", if given { "confirmed" } else { "not confirmed" });
         self.item(check, state, found, needed.to_owned())
     }
 
-    fn stop_tested(&self) -> PreArmCheck {
+    fn stop_tested(&self) -> ArmingCheckRecord {
         let (state, found) = match self.stop {
-            StopTest::Open => (CheckState::Waiting, "not in this session"),
-            StopTest::Pressed => (CheckState::Waiting, "pressed, not acknowledged"),
-            StopTest::Passed => (CheckState::Passed, "pressed and acknowledged"),
+            StopTest::Open => (ArmingCheckState::Waiting, "not in this session"),
+            StopTest::Pressed => (ArmingCheckState::Waiting, "pressed, not acknowledged"),
+            StopTest::Passed => (ArmingCheckState::Passed, "pressed and acknowledged"),
         };
-        self.item(Check::StopTested, state, found.to_owned(), "press STOP, then acknowledge".to_owned())
+        self.item(ArmingCheck::StopTested, state, found.to_owned(), "press STOP, then acknowledge".to_owned())
     }
 
-    fn item(&self, check: Check, state: CheckState, found: String, needed: String) -> PreArmCheck {
+    fn item(&self, check: ArmingCheck, state: ArmingCheckState, found: String, needed: String) -> ArmingCheckRecord {
         if self.hardware || check.needed_in_simulation() {
-            PreArmCheck { check, found, needed, state }
+            ArmingCheckRecord { check, found, needed, state }
         } else {
-            PreArmCheck { check, found, needed: "not needed in simulation".to_owned(), state: CheckState::NotNeeded }
+            ArmingCheckRecord {
+                check,
+                found,
+                needed: "not needed in simulation".to_owned(),
+                state: ArmingCheckState::NotNeeded,
+            }
         }
     }
 }
 
 /// What stands in the way of arming, all of it, in words; none if nothing does.
-pub fn objections(list: &[PreArmCheck]) -> Option<String> {
+pub fn objections(list: &[ArmingCheckRecord]) -> Option<String> {
     let open: Vec<String> = list
         .iter()
         .filter(|item| !item.state.allows())

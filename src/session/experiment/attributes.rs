@@ -7,7 +7,7 @@ use serde_json::{Map, Value, json};
 
 use crate::optimize::study::{DRAWS, Outcome};
 use crate::optimize::trial::{GAINS, Trial, TrialState};
-use crate::recording::record::{Measured, ParameterInfo, Proposal, Risk, Source, TrialRecord, Verdict};
+use crate::trial::{FallRisk, MeasuredJump, ParameterInfo, Proposal, ProposalSource, TrialRecord, Verdict};
 
 const SOURCE: &str = "source";
 const PARENT: &str = "parent";
@@ -31,7 +31,7 @@ type Attributes = Vec<(String, Value)>;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Origin {
     /// Who chose it.
-    pub source: Source,
+    pub source: ProposalSource,
     /// The trial that it repeats.
     pub parent: Option<u32>,
     /// The seed that it is to run with; none for one of its own.
@@ -43,36 +43,38 @@ pub struct Origin {
 impl Origin {
     /// The sampler's own.
     pub fn sampler() -> Origin {
-        Origin { source: Source::Sampler, parent: None, seed: None, gains: Vec::new() }
+        Origin { source: ProposalSource::Sampler, parent: None, seed: None, gains: Vec::new() }
     }
 
     /// A point that somebody queued.
     pub fn queued() -> Origin {
-        Origin { source: Source::Queued, ..Origin::sampler() }
+        Origin { source: ProposalSource::Queued, ..Origin::sampler() }
     }
 
     /// A repetition with the same gains and with noise of its own. What confirmed the best still does.
     pub fn rerun_of(row: &TrialRecord) -> Origin {
-        let source = if row.source == Source::Confirm { Source::Confirm } else { Source::Rerun };
+        let source =
+            if row.source == ProposalSource::Confirm { ProposalSource::Confirm } else { ProposalSource::Rerun };
         Origin { source, parent: Some(row.trial), seed: None, gains: row.gains.clone() }
     }
 
     /// A repeat of a point that may be the best, with the gains of its first trial.
     pub fn confirming(first: &Trial) -> Origin {
-        Origin { source: Source::Confirm, parent: Some(first.number), seed: None, gains: gains_of(first) }
+        Origin { source: ProposalSource::Confirm, parent: Some(first.number), seed: None, gains: gains_of(first) }
     }
 
     /// The same trial once more, after a crash, as if nothing had happened.
     pub fn interrupted(trial: &Trial) -> Origin {
-        let confirms = source_of(trial) == Source::Confirm;
-        let source = if confirms { Source::Confirm } else { Source::Rerun };
+        let confirms = source_of(trial) == ProposalSource::Confirm;
+        let source = if confirms { ProposalSource::Confirm } else { ProposalSource::Rerun };
         Origin { source, parent: Some(trial.number), seed: seed_of(trial), gains: gains_of(trial) }
     }
 
     /// As kept with the queued trial; without attributes it was queued by another program.
     pub fn of(attributes: &BTreeMap<String, Value>) -> Origin {
         Origin {
-            source: named(attributes.get(SOURCE), Source::ALL, Source::name).unwrap_or(Source::Queued),
+            source: named(attributes.get(SOURCE), ProposalSource::ALL, ProposalSource::name)
+                .unwrap_or(ProposalSource::Queued),
             parent: number(attributes.get(PARENT)),
             seed: attributes.get(SEED).and_then(seed_from),
             gains: numbers(attributes.get(GAINS)),
@@ -145,7 +147,7 @@ pub fn judged(row: &TrialRecord, rerun: bool) -> Attributes {
         (HAND_VALUE.to_owned(), json!(row.hand_value)),
         (RERUN.to_owned(), json!(rerun)),
     ];
-    if let Some(Measured { dx_m, dy_m, dyaw_rad, apex_m, air_s }) = row.measured {
+    if let Some(MeasuredJump { dx_m, dy_m, dyaw_rad, apex_m, air_s }) = row.measured {
         // Numeric columns of their own, so that the dashboard can sort by them.
         let terms = [("dx_m", dx_m), ("dy_m", dy_m), ("dyaw_rad", dyaw_rad), ("apex_m", apex_m), ("air_s", air_s)];
         kept.extend(terms.map(|(name, value)| (name.to_owned(), json!(value))));
@@ -182,8 +184,9 @@ pub fn was_interrupted(trial: &Trial) -> bool {
 }
 
 /// Who chose a trial's parameters.
-pub fn source_of(trial: &Trial) -> Source {
-    named(trial.user_attributes.get(SOURCE), Source::ALL, Source::name).unwrap_or(Source::Queued)
+pub fn source_of(trial: &Trial) -> ProposalSource {
+    named(trial.user_attributes.get(SOURCE), ProposalSource::ALL, ProposalSource::name)
+        .unwrap_or(ProposalSource::Queued)
 }
 
 /// The gains that a trial ran with; empty where nobody has kept them.
@@ -214,7 +217,7 @@ pub fn row_of(trial: &Trial, note: String, order: &[ParameterInfo]) -> TrialReco
     let number_of = |name: &str| kept.get(name).and_then(Value::as_f64);
     let origin = Origin::of(kept);
     let measured = (|| {
-        Some(Measured {
+        Some(MeasuredJump {
             dx_m: number_of("dx_m")?,
             dy_m: number_of("dy_m")?,
             dyaw_rad: number_of("dyaw_rad")?,
@@ -246,7 +249,7 @@ pub fn row_of(trial: &Trial, note: String, order: &[ParameterInfo]) -> TrialReco
             })
             .or(default_verdict),
         note,
-        risk: kept.get(RISK).and_then(|risk| serde_json::from_value::<Risk>(risk.clone()).ok()),
+        risk: kept.get(RISK).and_then(|risk| serde_json::from_value::<FallRisk>(risk.clone()).ok()),
         gains: gains_of(trial),
     }
 }

@@ -6,9 +6,9 @@
 //! >you  area clear, remote in hand  x confirms the item
 //! ```
 
-use quadfrog::realtime::pre_arm::CheckState;
-use quadfrog::recording::record::PreArmCheck;
-use quadfrog::session::intent::OperatorCheck;
+use quadfrog::recording::record::ArmingCheckRecord;
+use quadfrog::session::operator_request::OperatorCheck;
+use quadfrog::telemetry::ArmingCheckState;
 use ratatui::text::{Line, Span};
 
 use super::draw::{cut, span};
@@ -16,12 +16,12 @@ use crate::model::session::SessionModel;
 use crate::theme::{Role, Theme};
 
 /// Text and role of a check's state.
-fn label(state: CheckState) -> (&'static str, Role) {
+fn label(state: ArmingCheckState) -> (&'static str, Role) {
     match state {
-        CheckState::Passed => ("ok", Role::Good),
-        CheckState::Failed => ("FAIL", Role::Bad),
-        CheckState::Waiting => ("you", Role::Warning),
-        CheckState::NotNeeded => ("-", Role::Quiet),
+        ArmingCheckState::Passed => ("ok", Role::Good),
+        ArmingCheckState::Failed => ("FAIL", Role::Bad),
+        ArmingCheckState::Waiting => ("you", Role::Warning),
+        ArmingCheckState::NotNeeded => ("-", Role::Quiet),
     }
 }
 
@@ -34,20 +34,20 @@ pub fn lines(
     few: usize,
     selected: Option<OperatorCheck>,
 ) -> Vec<Line<'static>> {
-    let mut items: Vec<&PreArmCheck> = session.pre_arm.iter().collect();
+    let mut items: Vec<&ArmingCheckRecord> = session.arming_checks.iter().collect();
     if items.len() > few {
         items.sort_by_key(|item| item.state.allows());
         items.truncate(few);
     }
     // Half of a narrow terminal has room for the found value alone.
     let name_width = if width < 60 { 1 } else { 27 };
-    let line = |item: &PreArmCheck| {
+    let line = |item: &ArmingCheckRecord| {
         let (state, role) = label(item.state);
         let selected = selected.is_some_and(|check| check.check() == item.check);
         let name = item.check.name();
         let gap = name_width.max(name.chars().count() + 1) - name.chars().count();
         let text = match (item.found.as_str(), item.needed.as_str()) {
-            (found, needed) if item.state == CheckState::NotNeeded || width < 60 || needed.is_empty() => {
+            (found, needed) if item.state == ArmingCheckState::NotNeeded || width < 60 || needed.is_empty() => {
                 if found.is_empty() { needed.to_owned() } else { found.to_owned() }
             }
             (found, needed) => format!("{found:<20} {needed}"),
@@ -70,9 +70,9 @@ pub fn lines(
 
 /// The number of items that forbid arming, in words.
 pub fn summary(session: &SessionModel) -> String {
-    match (session.pre_arm.is_empty(), session.pre_arm_failing()) {
+    match (session.arming_checks.is_empty(), session.failing_checks()) {
         (true, _) => String::new(),
         (false, 0) => "all passed".to_owned(),
-        (false, count) => format!("{count} of {} not yet", session.pre_arm.len()),
+        (false, count) => format!("{count} of {} not yet", session.arming_checks.len()),
     }
 }

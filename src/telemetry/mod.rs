@@ -1,0 +1,15 @@
+//! Everything that crosses the real-time boundary. All types are `Copy`: nothing is freed inside a tick.
+
+mod arming;
+mod command;
+mod event;
+mod fault;
+mod mode;
+mod tick;
+
+pub use arming::{ArmingCheck, ArmingCheckSet, ArmingCheckState, ArmingFinding, ArmingFindings};
+pub use command::{Command, Permit, TrialSpec};
+pub use event::{CommandRefusal, Event, Readiness, TrialEnd};
+pub use fault::{FailsafeWarning, FallCause, Fault, TrialInhibit};
+pub use mode::{Mode, Phase, TransitionCause};
+pub use tick::{Counters, Estimate, Snapshot, StageTimes, Tick};
