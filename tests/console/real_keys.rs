@@ -11,7 +11,7 @@ use nix::sys::signal::Signal;
 use portable_pty::CommandBuilder;
 use pty::Session;
 use quadfrog_console::action::{ACTIONS, Action};
-use quadfrog_console::settings::Settings;
+use quadfrog_console::settings::ConsoleSettings;
 
 /// The effect of a key on the terminal.
 enum Seen {
@@ -46,12 +46,12 @@ const fn row(action: Action, key: &'static str, seen: Seen, after: (&'static str
 const LIVE: &[Row] = &[
     row(Action::Override, "o", Shows("Override trial #0"), ("\x1b[B120\r", "was 106.2")),
     row(Action::ClearOverrides, "O", Hides("was 106.2"), ("", "")),
-    row(Action::PreArm, "P", Shows("Pre-arm list: all passed"), ("\x1b", "Press A to arm")),
+    row(Action::ArmingChecks, "P", Shows("Arming checks: all passed"), ("\x1b", "Press A to arm")),
     row(Action::Skip, "n", Hides("106.2 N"), ("", "Press A to arm")),
     row(Action::Suspend, "Ctrl-Z", Suspends, ("", "Press A to arm")),
     row(Action::Arm, "A", Shows("STAND UP"), ("", "READY")),
     row(Action::SitDown, "D", Shows("SIT DOWN"), ("", "DISARMED")),
-    row(Action::Stop, "F12", Shows("DAMPED"), ("", "then press k")),
+    row(Action::Stop, "F12", Shows("DAMPED"), ("", "k acknowledges")),
     row(Action::Acknowledge, "k", Hides("DAMPED"), ("A", "READY")),
     row(Action::Stop, "Space", Shows("DAMPED"), ("kA", "READY")),
     row(Action::Approve, "g", Shows("Jump?"), ("", "")),
@@ -65,10 +65,10 @@ const LIVE: &[Row] = &[
     row(Action::Accept, "a", Shows("Study finished"), ("", "")),
     row(Action::ExportBest, "E", Shows("exported; start with quadfrog --config "), ("", "")),
     row(Action::Continue, "C", Shows("How many more trials?"), ("\r", "Trial #2")),
-    row(Action::ConfirmBest, "K", Shows("two accepted trials are needed"), ("4", "What can be done")),
+    row(Action::ConfirmBest, "K", Shows("two accepted trials are needed"), ("4", "Actions ─")),
     row(Action::Fix, "X", Shows("Fix Fx at"), ("3\r", "fixed at")),
     row(Action::Fix, "X", Hides("fixed at"), ("", "")),
-    row(Action::Bounds, "B", Shows("Search Fx from .. to"), ("\x1520..120\r", "began 0.000..150.0")),
+    row(Action::Bounds, "B", Shows("Search Fx from .. to"), ("\x1520..120\r", "initial 0.000..150.0")),
     row(Action::QueuePoint, "Q", Shows("queue f0 ="), ("1", "8 s sweep")),
     row(Action::Interrupt, "Ctrl-C", Shows("Ctrl-C again within 2 s quits"), ("", "DAMPED")),
     row(Action::Quit, "q", Shows("The study and its recording are in"), ("", "")),
@@ -99,7 +99,7 @@ const REPLAY: &[Row] = &[
     row(Action::PageUp, "PgUp", Changes, ("", "")),
     row(Action::PageDown, "PgDn", Changes, ("", "")),
     row(Action::Ghost, "c", Shows("is laid under the charts"), ("", "")),
-    row(Action::Open, "Enter", Shows("objective told"), ("\x1b", "by number")),
+    row(Action::Open, "Enter", Shows("reported to the optimizer"), ("\x1b", "by number")),
     row(Action::Sort, "s", Shows("by value"), ("", "")),
     row(Action::Reverse, "S", Shows("by value reversed"), ("", "")),
     row(Action::Filter, "F", Shows("only accept"), ("FFF", "all (F)")),
@@ -188,7 +188,7 @@ fn play(session: &mut Session, rows: &[Row]) {
 
 #[test]
 fn every_key_of_the_keymap_has_a_row() {
-    let keymap = Settings::built_in().keymap;
+    let keymap = ConsoleSettings::built_in().keymap;
     let wanted: BTreeSet<(&str, String)> =
         ACTIONS.iter().flat_map(|info| keymap.keys(info.action).map(|key| (info.name, key.to_string()))).collect();
     let rows: BTreeSet<(&str, String)> =

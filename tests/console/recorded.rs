@@ -14,7 +14,7 @@ use quadfrog::recording::player::{Played, Player};
 use quadfrog::recording::record::Record;
 use quadfrog::recording::writer::Writer;
 use quadfrog_console::feed::Feed;
-use quadfrog_console::settings::Settings;
+use quadfrog_console::settings::ConsoleSettings;
 use quadfrog_console::theme::{Colours, Glyphs, Theme};
 use support::Console;
 
@@ -27,7 +27,7 @@ fn recording() -> PathBuf {
 
 /// A console at the end of the recorded session: two trials judged, the third under review.
 fn console(colours: Colours, glyphs: Glyphs) -> Console {
-    let mut console = Console::with(Settings::built_in(), Theme { colours, glyphs });
+    let mut console = Console::with(ConsoleSettings::built_in(), Theme { colours, glyphs });
     let player = Player::open(recording()).expect("the recorded session");
     let robot = quadfrog::robot::description::RobotDescription::embedded(&player.session().robot).expect("its robot");
     console.model.robot = Some(robot);
@@ -79,7 +79,7 @@ fn views_of_a_recorded_session_in_colour() {
 #[test]
 fn a_replay_shows_every_trial_and_can_be_left() {
     let console = console(Colours::Named, Glyphs::Braille);
-    assert_eq!(console.model.trials.len(), 3);
+    assert_eq!(console.model.session.trials.records.len(), 3);
     let screen = console.screen(80, 24);
     assert!(screen.contains("REPLAY") && screen.contains("Trial #2: judge it"), "{screen}");
 }

@@ -17,7 +17,7 @@ use quadfrog::telemetry::Mode;
 use quadfrog::trial::{ProposalSource, TrialRecord, Verdict};
 use quadfrog_console::app::{self, ConsoleOptions};
 use quadfrog_console::feed::Feed;
-use quadfrog_console::settings::Settings;
+use quadfrog_console::settings::ConsoleSettings;
 
 const SIZE: (u16, u16) = (100, 30);
 
@@ -149,7 +149,7 @@ fn stop_key_stops_at_once_and_k_acknowledges() {
     session.send("A");
     session.wait_for(&["Press g twice"]);
     session.send(" ");
-    session.wait_for(&["DAMPED", "then press k"]);
+    session.wait_for(&["DAMPED", "k acknowledges"]);
     session.send("k");
     session.wait_for(&["DISARMED", "Press A to arm"]);
     session.send("q");
@@ -335,7 +335,7 @@ fn a_panic_in_any_thread_restores_the_terminal_and_names_the_thread() {
 fn a_console_one_of_whose_threads_panics() {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/console/session.mcap");
     let player = Player::open(file).expect("the recorded session");
-    let options = ConsoleOptions::new(Settings::built_in(), None, false, false);
+    let options = ConsoleOptions::new(ConsoleSettings::built_in(), None, false, false);
     let defect = || {
         std::thread::sleep(Duration::from_secs(1));
         panic!("an injected defect");

@@ -13,11 +13,12 @@ use quadfrog::recording::record::Record;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::telemetry::{Phase, Snapshot};
 use quadfrog::trial::{ParameterInsight, ProposalInsight, Verdict};
+use quadfrog_console::message::Msg;
 use quadfrog_console::model::View;
-use quadfrog_console::series::SIGNALS;
-use quadfrog_console::update::Msg;
+use quadfrog_console::series::Series;
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
+use strum::VariantArray;
 use support::{Console, tick, trial};
 
 /// Number of frames per view.
@@ -52,7 +53,7 @@ fn insight(name: &str) -> ParameterInsight {
 fn main() {
     let mut console = Console::ready();
     console.model.robot = Some(RobotDescription::embedded("go1").expect("the built-in robot"));
-    console.model.live.series = SIGNALS.map(|signal| signal.series).to_vec();
+    console.model.live.series = Series::VARIANTS.to_vec();
     for number in 0..100 {
         console.record(Record::Trial(trial(number, Some(Verdict::ALL[number as usize % 3]), None)));
     }
@@ -63,7 +64,7 @@ fn main() {
     console.record(Record::Insight(ProposalInsight { trial: 0, parameters: ["f0", "Fx", "Fz"].map(insight).to_vec() }));
     let mut terminal = Terminal::new(TestBackend::new(200, 60)).expect("a screen in memory");
     let mut time_ms = 60_000;
-    for view in View::ALL {
+    for view in View::VARIANTS.iter().copied() {
         console.model.view = view;
         let (mut wall, mut processor) = (Vec::new(), Vec::new());
         for _ in 0..FRAMES {

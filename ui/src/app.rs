@@ -21,12 +21,13 @@ use crate::connection::{ConnectionMonitor, TerminalLocation};
 use crate::export::{self, ExportError};
 use crate::feed::Feed;
 use crate::keymap::{Key, Keymap};
+use crate::message::{Effect, Mouse, Msg};
 use crate::model::Model;
-use crate::settings::{ChartMode, ColourChoice, GlyphChoice, Settings};
+use crate::settings::{ChartMode, ConsoleSettings};
 use crate::terminal::{self, Screen};
-use crate::theme::Theme;
-use crate::update::{Effect, Mouse, Msg, say, update};
-use crate::view;
+use crate::theme::{ColourChoice, GlyphChoice, Theme};
+use crate::update::{say, update};
+use crate::{text, view};
 
 /// Maximum period of the loop and of the operator heartbeat.
 const PULSE: Duration = Duration::from_millis(50);
@@ -37,14 +38,19 @@ const LOW_BANDWIDTH_FRAMES: u32 = 2;
 #[derive(Debug, Clone)]
 pub struct ConsoleOptions {
     /// `console.toml`.
-    pub settings: Settings,
+    pub settings: ConsoleSettings,
     /// The robot model, for limits; none if unknown.
     pub robot: Option<RobotDescription>,
 }
 
 impl ConsoleOptions {
     /// Overrides the settings by those of the command line.
-    pub fn new(settings: Settings, colours: Option<ColourChoice>, ascii: bool, low_bandwidth: bool) -> ConsoleOptions {
+    pub fn new(
+        settings: ConsoleSettings,
+        colours: Option<ColourChoice>,
+        ascii: bool,
+        low_bandwidth: bool,
+    ) -> ConsoleOptions {
         let mut settings = settings;
         settings.low_bandwidth = low_bandwidth;
         if low_bandwidth {
@@ -235,15 +241,10 @@ impl Console {
     fn carry_out(&mut self, effect: Effect) {
         match effect {
             Effect::Stop => self.feed.stop(),
-            Effect::Wish(intent) => self.feed.wish(intent),
+            Effect::Request(intent) => self.feed.request(intent),
             Effect::Replay(command) => self.feed.command(command),
             Effect::Bell => self.send(b"\x07"),
-            Effect::Copy(text) => {
-                let mut bytes = Vec::new();
-                // Writing to memory cannot fail.
-                let _ = crossterm::queue!(bytes, CopyToClipboard::to_clipboard_from(text));
-                self.send(&bytes);
-            }
+            Effect::CopyTrial(trial) => self.copy_trial(trial),
             Effect::Mouse(on) => {
                 // A failure is reported with the next frame.
                 let _ = self.screen.mouse(on);
@@ -264,6 +265,14 @@ impl Console {
         if self.screen.ready() {
             let _ = self.screen.send(bytes);
         }
+    }
+
+    fn copy_trial(&mut self, trial: u32) {
+        let Some(trial) = self.model.session.trials.records.get(&trial) else { return };
+        let mut bytes = Vec::new();
+        // Writing to memory does not fail.
+        let _ = crossterm::queue!(bytes, CopyToClipboard::to_clipboard_from(text::as_text(trial, &self.model)));
+        self.send(&bytes);
     }
 
     fn export(&mut self) {

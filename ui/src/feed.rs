@@ -7,7 +7,7 @@ use quadfrog::realtime::channel::{Heartbeat, StopLatch};
 use quadfrog::recording::player::Player;
 use quadfrog::session::operator_request::OperatorRequest;
 
-use crate::update::{Msg, ReplayCommand};
+use crate::message::{Msg, ReplayCommand};
 use replay::ReplayFeed;
 
 /// Maximum number of records, and of ticks, per call of [`Feed::take`]: bounds the delay of the next key.
@@ -63,7 +63,7 @@ impl Feed {
     }
 
     /// Sends a request to the session.
-    pub fn wish(&self, request: OperatorRequest) {
+    pub fn request(&self, request: OperatorRequest) {
         if let Feed::Live(handle) = self {
             handle.wish(request);
         }

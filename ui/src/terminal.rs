@@ -26,7 +26,7 @@ use ratatui::buffer::Cell;
 use ratatui::layout::{Position, Size};
 use ratatui::{Terminal, TerminalOptions, Viewport};
 
-use crate::view::{MIN_COLUMNS, MIN_ROWS};
+use crate::layout::{MIN_COLUMNS, MIN_ROWS};
 
 /// Time limit of the restoration of a terminal that does not read.
 const LEAVE_TIMEOUT: Duration = Duration::from_millis(500);

@@ -12,10 +12,11 @@ use quadfrog::trial::{
     ExperimentStage, MeasuredJump, ParameterInfo, Proposal, ProposalSource, ProposedParameter, TrialRecord, Verdict,
 };
 use quadfrog_console::keymap::Key;
+use quadfrog_console::message::{Effect, Msg};
 use quadfrog_console::model::Model;
-use quadfrog_console::settings::Settings;
+use quadfrog_console::settings::ConsoleSettings;
 use quadfrog_console::theme::{Colours, Glyphs, Theme};
-use quadfrog_console::update::{Effect, Msg, update};
+use quadfrog_console::update::update;
 use quadfrog_console::view;
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
@@ -29,10 +30,10 @@ pub struct Console {
 impl Console {
     /// Braille, 16 colours, no session.
     pub fn new() -> Console {
-        Console::with(Settings::built_in(), Theme { colours: Colours::Named, glyphs: Glyphs::Braille })
+        Console::with(ConsoleSettings::built_in(), Theme { colours: Colours::Named, glyphs: Glyphs::Braille })
     }
 
-    pub fn with(settings: Settings, theme: Theme) -> Console {
+    pub fn with(settings: ConsoleSettings, theme: Theme) -> Console {
         let mut model = Model::new(settings, theme, None);
         model.size = (80, 24);
         Console { model }

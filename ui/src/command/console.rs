@@ -11,8 +11,9 @@ use quadfrog::robot::go1::Network;
 use quadfrog::trial::{Approval, Task};
 use quadfrog_console::app::{self, ConsoleExit, ConsoleOptions};
 use quadfrog_console::feed::Feed;
-use quadfrog_console::settings::{ColourChoice, Settings};
+use quadfrog_console::settings::ConsoleSettings;
 use quadfrog_console::terminal;
+use quadfrog_console::theme::ColourChoice;
 
 use super::arguments::{self, StudyArguments, one_of};
 use super::failure::Failure;
@@ -163,7 +164,7 @@ fn incomplete_recordings(folder: &Path) -> Vec<PathBuf> {
 
 /// Returns the console's options from the arguments and `console.toml`.
 pub fn options(screen: &ScreenArguments, config: &Config) -> Result<ConsoleOptions, Failure> {
-    let settings = Settings::from_table(&config.console)
+    let settings = ConsoleSettings::from_table(&config.console)
         .map_err(|error| config.refuse("console.toml", &error.key, &error.value, &error.reason))?;
     let colours = (screen.color != ColourChoice::Auto).then_some(screen.color);
     Ok(ConsoleOptions::new(settings, colours, screen.ascii, screen.low_bandwidth))

@@ -6,8 +6,7 @@ use quadfrog::recording::player::{Played, Player};
 use quadfrog::recording::record::{Record, Stamped};
 use quadfrog::telemetry::{Counters, Snapshot};
 
-use crate::model::ReplayStatus;
-use crate::update::{Msg, ReplayCommand};
+use crate::message::{Msg, ReplayCommand, ReplayStatus};
 
 /// Ticks per tick of the charts: 200 per second, as live.
 const SHOWN_EVERY: u64 = quadfrog::realtime::channel::SHOWN_EVERY;

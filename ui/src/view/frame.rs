@@ -1,4 +1,4 @@
-//! The permanent frame: two lines at the top, the tabs, the answer line, and what remains of them on a small terminal.
+//! The permanent frame: two lines at the top, the tabs, the message line; a reduced form on a small terminal.
 //!
 //! ```text
 //!  READY      SIM  forward   trial #8   7 of 20 judged   best 0.642 m (#3)       REC 03:12
@@ -13,15 +13,16 @@ use ratatui::layout::{Alignment, Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
 
-use super::{MIN_COLUMNS, MIN_ROWS, clock, clock_ms, cut, number, span};
+use super::draw::{clock, clock_ms, cut, number, span};
 use crate::action::Action;
-use crate::model::{Model, View};
+use crate::layout::{MIN_COLUMNS, MIN_ROWS, tabs};
+use crate::model::Model;
 use crate::theme::Role;
 
-/// Age of the newest tick at which the numbers on the screen are called old, ms.
+/// Age of the newest tick from which the numbers count as old, ms.
 const STALE_MS: u128 = 500;
 
-/// The two lines that nothing covers.
+/// The two lines that no dialog covers.
 pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let [first, second] = rows(area);
     let recording = Line::from(recording(model));
@@ -36,7 +37,7 @@ fn rows(area: Rect) -> [Rect; 2] {
     [Rect { height: 1, ..area }, Rect { y: area.y + 1, height: area.height.saturating_sub(1).min(1), ..area }]
 }
 
-/// The mode as a word on its colour.
+/// The mode.
 pub fn mode_span(model: &Model) -> Span<'static> {
     let mode = model.mode();
     let role = match mode {
@@ -48,10 +49,10 @@ pub fn mode_span(model: &Model) -> Span<'static> {
     span(&model.theme, role, format!(" {:<9} ", mode.name()))
 }
 
-/// What is being driven: never a guess, and never by colour alone.
+/// The driven machine, in words and colour.
 fn backend(model: &Model) -> Span<'static> {
     let theme = &model.theme;
-    match model.session.backend.as_str() {
+    match model.session.info.backend.as_str() {
         _ if model.replay.is_some() => span(theme, Role::Heading, "REPLAY"),
         "" => span(theme, Role::Quiet, "starting"),
         "sim" => span(theme, Role::Heading, "SIM"),
@@ -59,11 +60,11 @@ fn backend(model: &Model) -> Span<'static> {
     }
 }
 
-/// What runs where, as far as `room` characters take it: a number is shown whole or not at all.
+/// Mode, machine, task, trial and best, within `room` characters: a number is shown whole or not at all.
 fn identity(model: &Model, width: u16, room: usize) -> Line<'static> {
     let theme = &model.theme;
     let mut spans = vec![mode_span(model), Span::raw(" "), backend(model), Span::raw("  ")];
-    let session = &model.session;
+    let session = &model.session.info;
     if session.observe {
         spans.push(span(theme, Role::Warning, "OBSERVING  "));
     }
@@ -78,15 +79,15 @@ fn identity(model: &Model, width: u16, room: usize) -> Line<'static> {
         ));
     }
     spans.push(Span::raw(session.task.clone()));
-    if let Some(info) = model.stage {
-        let (finished, budget) = (model.counted(), model.budget());
+    if let Some(info) = model.session.stage {
+        let (finished, budget) = (model.session.counted(), model.session.budget());
         let text = match narrow {
             true => format!("  trial #{}  {finished}/{budget}", info.trial),
             false => format!("   trial #{}   {finished} of {budget} judged", info.trial),
         };
         spans.push(Span::raw(text));
     }
-    if let Some((best, value)) = model.best().and_then(|best| Some((best, best.value?))) {
+    if let Some((best, value)) = model.session.trials.best().and_then(|best| Some((best, best.value?))) {
         let before = spans.len();
         spans.push(Span::raw(if narrow { "  best " } else { "   best " }));
         spans.push(span(theme, Role::Good, format!("{} {}", number(value), session.unit)));
@@ -103,7 +104,7 @@ fn identity(model: &Model, width: u16, room: usize) -> Line<'static> {
 fn recording(model: &Model) -> Vec<Span<'static>> {
     let theme = &model.theme;
     if let Some(replay) = &model.replay {
-        // Steps are milliseconds; while it plays they would only flicker.
+        // Milliseconds are readable only while it does not play.
         let at = if replay.playing { clock(replay.time_ns) } else { clock_ms(replay.time_ns) };
         let speed = if replay.playing || replay.speed != 1.0 { format!(" x{}", replay.speed) } else { String::new() };
         let paused = if replay.playing { "" } else { " paused" };
@@ -112,7 +113,7 @@ fn recording(model: &Model) -> Vec<Span<'static>> {
     }
     let counters = &model.snapshot.counters;
     let elapsed = clock(model.snapshot.tick.time_ns);
-    match (model.session.recording.is_empty(), counters.ticks_not_recorded) {
+    match (model.session.info.recording.is_empty(), counters.ticks_not_recorded) {
         (true, _) => vec![span(theme, Role::Quiet, format!("not recording {elapsed} "))],
         (false, 0) => vec![span(theme, Role::Good, "REC "), Span::raw(format!("{elapsed} "))],
         (false, lost) => {
@@ -142,8 +143,8 @@ fn condition(model: &Model, width: u16) -> Vec<Span<'static>> {
         true => format!("{} late", counters.late_ticks),
         false => format!("{} late, worst {:.1} ms", counters.late_ticks, counters.worst_lateness_ns as f64 / 1e6),
     };
-    part("loop ", look(late_share > 0.001), late);
-    match (counters.link, model.session.backend.as_str()) {
+    part("loop ", warning(late_share > 0.001), late);
+    match (counters.link, model.session.info.backend.as_str()) {
         (_, "") => {}
         (None, "sim") => part("link ", Role::Quiet, "none: SIM".to_owned()),
         (None, _) => part("link ", bad(counters.state_age_ms > 5), format!("{} ms", counters.state_age_ms)),
@@ -170,43 +171,18 @@ fn condition(model: &Model, width: u16) -> Vec<Span<'static>> {
     spans
 }
 
-fn look(worth_it: bool) -> Role {
-    if worth_it { Role::Warning } else { Role::Text }
+fn warning(condition: bool) -> Role {
+    if condition { Role::Warning } else { Role::Text }
 }
 
-fn bad(it_is: bool) -> Role {
-    if it_is { Role::Bad } else { Role::Text }
+fn bad(condition: bool) -> Role {
+    if condition { Role::Bad } else { Role::Text }
 }
 
-/// The tabs with their actions.
-fn tabs(model: &Model) -> impl Iterator<Item = (View, Action, String)> + '_ {
-    let actions = [
-        Action::LiveView,
-        Action::TrialsView,
-        Action::OptimizerView,
-        Action::OverrideView,
-        Action::HealthView,
-        Action::LogView,
-    ];
-    View::ALL
-        .into_iter()
-        .zip(actions)
-        .map(|(view, action)| (view, action, format!(" {} {} ", model.keymap.key(action), view.name())))
-}
-
-/// The action of the tab in a column of the terminal.
-pub fn tab_at(model: &Model, column: u16) -> Option<Action> {
-    let mut end = 0;
-    tabs(model).find_map(|(_, action, text)| {
-        end += text.chars().count();
-        (usize::from(column) < end).then_some(action)
-    })
-}
-
-/// The tabs, and at the right where help is; while the charts are frozen, that they are, in every view.
+/// The tabs, and at the right the keys of the help, or that the charts are frozen.
 pub fn render_tabs(frame: &mut Frame, area: Rect, model: &Model) {
     let theme = &model.theme;
-    let spans: Vec<Span> = tabs(model)
+    let spans: Vec<Span> = tabs(&model.keymap)
         .map(|(view, _, text)| span(theme, if view == model.view { Role::Selected } else { Role::Quiet }, text))
         .collect();
     frame.render_widget(Line::from(spans), area);
@@ -240,11 +216,11 @@ pub fn render_message(frame: &mut Frame, area: Rect, model: &Model) {
     frame.render_widget(Line::from(vec![Span::raw(" "), span(&model.theme, role, text)]), area);
 }
 
-/// What remains on a terminal that is too small: the mode, STOP, the link and the size that is needed.
+/// The reduced form on a terminal that is too small: mode, STOP, link, needed size.
 pub fn render_small(frame: &mut Frame, area: Rect, model: &Model) {
     let theme = &model.theme;
     let keys = model.keymap.all_keys(Action::Stop);
-    let link = match (model.snapshot.counters.link, model.is_hardware()) {
+    let link = match (model.snapshot.counters.link, model.session.is_hardware()) {
         (Some(link), _) => format!("link {} ms, {:.1} % lost", link.state_age_ms, 100.0 * link.loss_share()),
         (None, true) => format!("link {} ms", model.snapshot.counters.state_age_ms),
         (None, false) => "link none: SIM".to_owned(),

@@ -1,4 +1,4 @@
-//! What the charts draw: the last minute of telemetry, and a short trace of each trial for comparing.
+//! Samples of the charts: the last minute of telemetry, and a short trace of each trial.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -12,16 +12,16 @@ const TRACES: usize = 256;
 /// Samples of one trace: ten seconds at 200 a second.
 const TRACE_CAPACITY: usize = 2_000;
 
-/// What the charts need of one tick; single precision is finer than any screen.
+/// The part of one tick that the charts draw; single precision is finer than any screen.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sample {
+pub struct ChartSample {
     /// Time since the engine started, ns.
     pub time_ns: u64,
     /// Mode at the end of the tick.
     pub mode: Mode,
     /// Phase of the jump.
     pub phase: Phase,
-    /// Trial that runs.
+    /// The running trial.
     pub trial: Option<u32>,
     /// Time since the impulse began, s.
     pub trial_time_s: f32,
@@ -45,14 +45,14 @@ pub struct Sample {
     pub contact: PerLeg<bool>,
 }
 
-impl From<&Tick> for Sample {
-    fn from(tick: &Tick) -> Sample {
+impl From<&Tick> for ChartSample {
+    fn from(tick: &Tick) -> ChartSample {
         let rpy = tick.estimate.roll_pitch_yaw;
         let mut foot_z = [0.0; LEGS];
         for (z, foot) in foot_z.iter_mut().zip(&tick.estimate.foot_position_leg) {
             *z = foot.z as f32;
         }
-        Sample {
+        ChartSample {
             time_ns: tick.time_ns,
             mode: tick.mode,
             phase: tick.phase,
@@ -72,22 +72,22 @@ impl From<&Tick> for Sample {
 }
 
 /// The sample whose time within its trial is nearest.
-pub fn at_trial_time(trace: &[Sample], trial_time_s: f32) -> Option<&Sample> {
-    let distance = |sample: &&Sample| (sample.trial_time_s - trial_time_s).abs();
+pub fn at_trial_time(trace: &[ChartSample], trial_time_s: f32) -> Option<&ChartSample> {
+    let distance = |sample: &&ChartSample| (sample.trial_time_s - trial_time_s).abs();
     trace.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)))
 }
 
 /// The newest samples, oldest first, and the trials' traces.
 #[derive(Debug, Clone, Default)]
-pub struct History {
-    samples: VecDeque<Sample>,
-    traces: BTreeMap<u32, Vec<Sample>>,
+pub struct SignalHistory {
+    samples: VecDeque<ChartSample>,
+    traces: BTreeMap<u32, Vec<ChartSample>>,
 }
 
-impl History {
-    /// Takes one tick. A tick older than the newest one (a replay was rewound) starts the samples anew.
+impl SignalHistory {
+    /// Appends one tick. A tick older than the newest one (a replay was rewound) clears the samples first.
     pub fn push(&mut self, tick: &Tick) {
-        let sample = Sample::from(tick);
+        let sample = ChartSample::from(tick);
         if self.samples.back().is_some_and(|newest| newest.time_ns >= sample.time_ns) {
             self.samples.clear();
         }
@@ -114,22 +114,22 @@ impl History {
     }
 
     /// The samples of one trace.
-    pub fn of_trace(trace: &[Sample]) -> History {
-        History { samples: trace.iter().copied().collect(), traces: BTreeMap::new() }
+    pub fn of_trace(trace: &[ChartSample]) -> SignalHistory {
+        SignalHistory { samples: trace.iter().copied().collect(), traces: BTreeMap::new() }
     }
 
-    /// Forgets the samples, not the traces: time has jumped.
+    /// Clears the samples, not the traces: time has jumped.
     pub fn clear(&mut self) {
         self.samples.clear();
     }
 
     /// All samples, oldest first.
-    pub fn samples(&self) -> impl DoubleEndedIterator<Item = &Sample> + '_ {
+    pub fn samples(&self) -> impl DoubleEndedIterator<Item = &ChartSample> + '_ {
         self.samples.iter()
     }
 
     /// The samples of the last `window_ns`, oldest first.
-    pub fn window(&self, window_ns: u64) -> impl Iterator<Item = &Sample> + '_ {
+    pub fn window(&self, window_ns: u64) -> impl Iterator<Item = &ChartSample> + '_ {
         let from = self.newest_ns().saturating_sub(window_ns);
         let start = self.samples.partition_point(|sample| sample.time_ns <= from && from > 0);
         self.samples.range(start..)
@@ -141,7 +141,7 @@ impl History {
     }
 
     /// The sample nearest to a time.
-    pub fn at(&self, time_ns: u64) -> Option<&Sample> {
+    pub fn at(&self, time_ns: u64) -> Option<&ChartSample> {
         let after = self.samples.partition_point(|sample| sample.time_ns < time_ns);
         let before = after.checked_sub(1).and_then(|index| self.samples.get(index));
         let after = self.samples.get(after);
@@ -149,7 +149,7 @@ impl History {
     }
 
     /// The trace of a trial, countdown to end.
-    pub fn trace(&self, trial: u32) -> Option<&[Sample]> {
+    pub fn trace(&self, trial: u32) -> Option<&[ChartSample]> {
         self.traces.get(&trial).map(Vec::as_slice)
     }
 
