@@ -1,9 +1,6 @@
 //! Vocabulary of a trial: task, parameters with units, proposal, status, verdict, measured values.
 
-use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
-
-use crate::robot::{LEGS, Leg, PerLeg};
 
 /// What the robot is asked to learn; decides the signs of the force amplitudes and the objective.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -62,24 +59,6 @@ pub struct JumpParameters {
     pub fy_n: f64,
     /// Amplitude along z, N per foot, positive.
     pub fz_n: f64,
-}
-
-impl JumpParameters {
-    /// The amplitude `[Fx Fy Fz]` of each foot with the signs of `task` (`specs/method.md`, "Amplitude signs"),
-    /// as the force that the foot exerts divided by sin(theta), leg frame, N.
-    pub fn amplitudes_leg(&self, task: Task) -> PerLeg<Vector3<f64>> {
-        let mut amplitudes = [Vector3::zeros(); LEGS];
-        for (amplitude, leg) in amplitudes.iter_mut().zip(Leg::ALL) {
-            *amplitude = match task {
-                Task::Forward => Vector3::new(self.fx_n, 0.0, self.fz_n),
-                Task::LateralLeft => Vector3::new(0.0, self.fy_n, self.fz_n),
-                Task::LateralRight => Vector3::new(0.0, -self.fy_n, self.fz_n),
-                Task::TwistCcw => Vector3::new(0.0, leg.end() * self.fy_n, self.fz_n),
-                Task::TwistCw => Vector3::new(0.0, -leg.end() * self.fy_n, self.fz_n),
-            };
-        }
-        amplitudes
-    }
 }
 
 /// Gains of the leg controller (paper, equation 4 and the Virtual Model Control).

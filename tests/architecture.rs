@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 const MAY_USE: [(&str, &[&str]); 12] = [
     ("robot", &[]),
     ("optimize", &[]),
-    ("trial", &["robot"]),
+    ("trial", &[]),
     ("telemetry", &["robot", "trial"]),
     ("realtime", &["telemetry", "robot"]),
     ("sim", &["robot"]),
