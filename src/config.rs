@@ -6,7 +6,7 @@ mod export;
 mod merge;
 mod safety;
 
-pub use checked::{Backend, Config, ConfirmFile, ControlFile, OptimizeFile, WorkersFile};
+pub use checked::{Config, ConfirmFile, ControlFile, OptimizeFile, WorkersFile};
 pub use safety::SafetyFile;
 
 use std::path::PathBuf;

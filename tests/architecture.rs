@@ -13,7 +13,7 @@ const MAY_USE: [(&str, &[&str]); 12] = [
     ("realtime", &["telemetry", "robot"]),
     ("sim", &["robot"]),
     ("control", &["robot", "trial", "telemetry", "realtime"]),
-    ("recording", &["telemetry", "trial", "robot"]),
+    ("recording", &["telemetry", "trial", "robot", "optimize"]),
     ("report", &["recording", "optimize", "trial"]),
     ("session", &["optimize", "recording", "control", "sim", "realtime", "telemetry", "trial", "robot"]),
     ("config", &["optimize", "recording", "control", "sim", "realtime", "telemetry", "trial", "robot"]),

@@ -1,7 +1,7 @@
 //! The control cycle on the simulator, tick by tick: STOP, faults, limits, an operator who is gone.
 
 use proptest::prelude::*;
-use quadfrog::config::{Backend, Config};
+use quadfrog::config::Config;
 use quadfrog::control::cycle::{Cycle, Inputs};
 use quadfrog::control::limits::CommandGate;
 use quadfrog::control::settings::ControlSettings;
@@ -12,7 +12,7 @@ use quadfrog::robot::go1::packet::CrcForm;
 use quadfrog::robot::{JOINTS, JointCommand, MotorCommand, Placement, Robot, RobotError, RobotState};
 use quadfrog::sim::Simulator;
 use quadfrog::telemetry::{Command, Event, Mode, Permit, Tick, TrialEnd, TrialSpec};
-use quadfrog::trial::{JumpParameters, Task};
+use quadfrog::trial::{Backend, JumpParameters, Task};
 
 struct Bench {
     config: Config,

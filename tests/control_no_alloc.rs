@@ -11,7 +11,7 @@ mod no_alloc;
 use std::collections::BTreeSet;
 
 use no_alloc::without_allocation;
-use quadfrog::config::{Backend, Config};
+use quadfrog::config::Config;
 use quadfrog::control::control_loop::ControlLoop;
 use quadfrog::control::settings::ControlSettings;
 use quadfrog::realtime::channel::{ControlEnd, ScreenEnd, SessionEnd, channels};
@@ -21,7 +21,7 @@ use quadfrog::robot::description::RobotDescription;
 use quadfrog::robot::{Battery, JointCommand, LinkStatus, Placement, Robot, RobotError, RobotState};
 use quadfrog::sim::Simulator;
 use quadfrog::telemetry::{Command, Event, Mode, Permit, Tick};
-use quadfrog::trial::{JumpParameters, Task};
+use quadfrog::trial::{Backend, JumpParameters, Task};
 
 /// The simulator as itself, or as a robot over a link with a battery that nobody can put in place.
 struct Machine {

@@ -1,14 +1,14 @@
 //! The control thread's own checks before arming: it refuses whatever the session says, and each item fails by itself.
 
 use nalgebra::{UnitQuaternion, Vector3};
-use quadfrog::config::{Backend, Config};
+use quadfrog::config::Config;
 use quadfrog::control::cycle::{Cycle, Inputs};
 use quadfrog::control::settings::ControlSettings;
 use quadfrog::realtime::clock::SimulatedClock;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::robot::{Battery, JointCommand, LinkStatus, Placement, Robot, RobotError, RobotState};
 use quadfrog::telemetry::{ArmingCheck, Command, CommandRefusal, Event, Mode, Permit};
-use quadfrog::trial::Task;
+use quadfrog::trial::{Backend, Task};
 
 /// A robot that reports what it is told to.
 struct Told {

@@ -11,13 +11,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use go1::{ANY_PORT, Lockstep, description};
-use quadfrog::config::{Backend, Config};
-use quadfrog::engine::{Engine, Handle, Options, open_life};
+use quadfrog::config::Config;
+use quadfrog::engine::{self, Handle, Options, open_experiment};
 use quadfrog::optimize::journal::Durability;
 use quadfrog::realtime::thread::pace;
 use quadfrog::recording::record::{Record, StageRecord};
 use quadfrog::telemetry::Mode;
-use quadfrog::trial::{ExperimentStage, Proposal, Task, TrialRecord, Verdict};
+use quadfrog::trial::{Backend, ExperimentStage, Proposal, Task, TrialRecord, Verdict};
 
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::robot::{LinkStatus, Robot, Truth};
@@ -115,7 +115,7 @@ struct Operator {
 
 impl Operator {
     fn look(&mut self) -> (Mode, LinkStatus) {
-        self.engine.beat();
+        self.engine.send_heartbeat();
         while self.engine.next_tick().is_some() {}
         while let Some(stamped) = self.engine.next_record() {
             match stamped.record {
@@ -164,7 +164,7 @@ impl Operator {
                     self.robot.apply(Fault::Place);
                     self.lies_since = Some(Instant::now());
                     for word in OperatorCheck::ALL {
-                        self.engine.wish(OperatorRequest::Confirm(word));
+                        self.engine.request(OperatorRequest::Confirm(word));
                     }
                 }
                 let still = self.lies_since.is_some_and(|since| since.elapsed() > STILL);
@@ -192,7 +192,7 @@ impl Operator {
             // Once is enough, unless nothing comes of it.
             let wishes = self.wished_in != Some(here) || wished_at.elapsed() > Duration::from_secs(3);
             if wishes && let Some(intent) = self.act(mode) {
-                self.engine.wish(intent);
+                self.engine.request(intent);
                 wished_at = Instant::now();
                 self.wished_in = Some(here);
             }
@@ -209,7 +209,7 @@ fn over_the_network(seed: u32, trials: u32, late_ms: f64) -> Outcome {
     let mut options = options(config, robot.description.clone(), Backend::Hardware, seed, trials);
     options.folder = Some(folder.path().join("study"));
     let mut operator = Operator {
-        engine: Engine::start(options).unwrap(),
+        engine: engine::start(options).unwrap(),
         robot: robot.handle.clone(),
         stage: None,
         card: None,
@@ -238,7 +238,7 @@ fn in_simulated_time<R: Robot>(
     let description = RobotDescription::embedded("go1").unwrap();
     let options = options(config(0.0), description, backend, seed, TRIALS);
     let settings = options.config.settings(&options.robot, TASK, backend).unwrap();
-    let mut life = open_life(&options, Durability::Buffered, "").unwrap();
+    let mut life = open_experiment(&options, Durability::Buffered, "").unwrap();
     let mut rollout = Rollout::new(robot(&options.config.simulator), &settings);
     automatic::run(&mut life, &mut rollout, |_, _| {}).unwrap();
     (life.best().and_then(|row| row.value).unwrap_or(0.0), life.rows().cloned().collect())

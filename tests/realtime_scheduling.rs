@@ -5,9 +5,10 @@ use std::ops::ControlFlow;
 use std::time::Duration;
 
 use nix::time::{ClockId, clock_gettime};
-use quadfrog::config::{Backend, Config};
+use quadfrog::config::Config;
 use quadfrog::realtime::scheduling::{RealtimeSetting, Scheduling};
 use quadfrog::realtime::{system, thread};
+use quadfrog::trial::Backend;
 
 /// In a thread of its own: a priority stays with the thread that asked for it.
 fn apply(scheduling: Scheduling) -> (Vec<RealtimeSetting>, Vec<String>) {

@@ -1,6 +1,6 @@
 //! The life of a trial through its public interface: what an operator may do, what the study is told, what a crash costs.
 
-#[path = "support/life.rs"]
+#[path = "support/experiment.rs"]
 mod support;
 
 use std::time::Duration;
@@ -9,8 +9,8 @@ use quadfrog::optimize::exchange::TableTrial;
 use quadfrog::optimize::study::Storage;
 use quadfrog::optimize::trial::{Trial, TrialState};
 use quadfrog::recording::record::Record;
+use quadfrog::session::experiment::Experiment;
 use quadfrog::session::experiment::import;
-use quadfrog::session::experiment::{BUDGET, Experiment};
 use quadfrog::telemetry::{FallCause, TrialEnd};
 use quadfrog::trial::{ExperimentStage, ProposalSource, Verdict};
 use support::{accept, far, joined, life, open, parameters, run, study, ticks};
@@ -298,7 +298,7 @@ fn the_records_tell_what_the_study_holds() {
         let state = if row.verdict == Some(Verdict::Void) { TrialState::Fail } else { TrialState::Complete };
         assert_eq!(trial.state, state, "trial {}", trial.number);
         assert_eq!(trial.value, row.value, "trial {}", trial.number);
-        assert_eq!(trial.parameters, row.parameters, "trial {}", trial.number);
+        assert_eq!(trial.parameters, *row.parameters, "trial {}", trial.number);
     }
 }
 
@@ -318,12 +318,12 @@ fn a_worker_whose_clock_is_behind_keeps_its_trial() {
     assert_ne!(behind, text);
     std::fs::write(&journal, behind).unwrap();
     let mut ours = joined(folder.path(), 1000, PATIENT);
-    ours.look().unwrap();
+    ours.refresh().unwrap();
     assert!(ours.others_run(), "it is alive");
     theirs.ended(spec.trial, &TrialEnd::Settled, &ticks(spec.trial, far(&spec)), 2);
     theirs.judge(Verdict::Accept, false).unwrap();
     theirs.close().unwrap();
-    ours.look().unwrap();
+    ours.refresh().unwrap();
     assert_eq!(ours.row(spec.trial).unwrap().verdict, Some(Verdict::Accept));
     assert!(!ours.others_run());
 }
@@ -337,7 +337,7 @@ fn a_trial_that_was_seen_running_for_too_long_is_void_and_comes_again() {
     drop(theirs);
     let mut ours = joined(folder.path(), 1000, Duration::from_millis(1));
     std::thread::sleep(Duration::from_millis(20));
-    ours.look().unwrap();
+    ours.refresh().unwrap();
     assert_eq!(ours.row(spec.trial).unwrap().verdict, Some(Verdict::Void));
     let card = ours.proposal().unwrap();
     assert_eq!((card.source, card.parent), (ProposalSource::Rerun, Some(spec.trial)));
@@ -353,7 +353,7 @@ fn a_rerun_that_another_worker_has_queued_comes_once() {
     // Judged and not told yet: another worker takes its owner for dead, tells it and queues it again.
     let mut other = joined(folder.path(), 1000, Duration::from_millis(1));
     std::thread::sleep(Duration::from_millis(20));
-    other.look().unwrap();
+    other.refresh().unwrap();
     let again = run(&mut slow, TrialEnd::Settled);
     assert_eq!((again.jump, slow.row(again.trial).unwrap().parent), (first.jump, Some(first.trial)));
     let study = study(Storage::File(folder.path().join("study.log")));
@@ -377,7 +377,7 @@ fn a_trial_under_review_need_not_be_the_newest() {
         completed: None,
     };
     let newer = import(&mut study(Storage::File(folder.path().join("study.log"))), vec![done]).unwrap();
-    life.look().unwrap();
+    life.refresh().unwrap();
     assert!(life.under_review().is_none());
     let spec = run(&mut life, TrialEnd::Settled);
     assert!(newer[0] > spec.trial && life.row(newer[0]).is_some());
@@ -392,5 +392,5 @@ fn a_raised_budget_is_kept_with_the_study() {
     life.extend(5).unwrap();
     drop(life);
     let study = study(Storage::File(folder.path().join("study.log")));
-    assert_eq!(study.attributes()[BUDGET].as_u64(), Some(1005));
+    assert_eq!(study.attributes()["budget"].as_u64(), Some(1005));
 }

@@ -1,7 +1,7 @@
 //! What an operator may change of the search through the public interface of a life: gains, fixed parameters, bounds, the
 //! confirmation of the best, and what other programs do meanwhile.
 
-#[path = "support/life.rs"]
+#[path = "support/experiment.rs"]
 mod support;
 
 use std::collections::BTreeMap;
@@ -308,14 +308,14 @@ fn a_point_queued_by_another_program_comes_next() {
     accept(&mut life);
     let mut other = study(Storage::File(folder.path().join("study.log")));
     other.enqueue(&[("Fx".into(), 77.0)], &[]).unwrap();
-    life.look().unwrap();
+    life.refresh().unwrap();
     assert_eq!((life.proposal().unwrap().source, value(&life, "Fx")), (ProposalSource::Queued, 77.0));
     // Not over the operator's head.
     let mut other = study(Storage::File(folder.path().join("study.log")));
     accept(&mut life);
     life.set_parameter("Fz", 200.0).unwrap();
     other.enqueue(&[("Fx".into(), 78.0)], &[]).unwrap();
-    life.look().unwrap();
+    life.refresh().unwrap();
     assert_eq!(value(&life, "Fz"), 200.0);
     assert_eq!(accept(&mut life).jump.fz_n, 200.0);
     assert_eq!(value(&life, "Fx"), 78.0);
@@ -347,7 +347,7 @@ fn a_rerun_runs_its_own_parameters_though_another_program_queues_a_point_at_the_
 fn a_point_queued_beside_a_rerun_runs_and_so_does_the_rerun() {
     let folder = tempfile::tempdir().unwrap();
     let (mut life, spec) = rerun_beside_a_queued_point(folder.path());
-    life.look().unwrap();
+    life.refresh().unwrap();
     let both = [accept(&mut life), accept(&mut life)];
     let of = |fx: f64| both.iter().find(|spec| spec.jump.fx_n == fx);
     assert!(of(77.0).is_some(), "the queued point is lost: {both:?}");
@@ -371,7 +371,7 @@ fn a_point_of_another_program_beyond_the_limits_cannot_run() {
         let attributes: Vec<_> =
             gains.map(|kp| ("gains".to_owned(), serde_json::json!({ "kp": kp }))).into_iter().collect();
         other.enqueue(&point, &attributes).unwrap();
-        life.look().unwrap();
+        life.refresh().unwrap();
         let card = life.proposal().unwrap();
         let refusal = life.approve(card.trial, card.revision).unwrap_err().to_string();
         assert!(refusal.contains(word), "{refusal}");
@@ -433,13 +433,13 @@ fn workers_together_run_no_more_repeats_than_were_asked_for() {
     // It comes to nothing: whoever is faster takes it up.
     first.judge(Verdict::Void, false).unwrap();
     first.close().unwrap();
-    second.look().unwrap();
+    second.refresh().unwrap();
     assert_eq!(second.proposal().unwrap().source, ProposalSource::Confirm);
     accept(&mut second);
     let late = first.proposal().unwrap();
     assert!(matches!(first.approve(late.trial, late.revision), Err(RequestRefusal::Overtaken(_))));
     second.close().unwrap();
-    first.look().unwrap();
+    first.refresh().unwrap();
     assert_eq!((first.stage(), second.stage()), (ExperimentStage::Finished, ExperimentStage::Finished));
     let study = study(file());
     let repeats = study.trials().iter().filter(|trial| trial.user_attributes["source"] == "confirm");

@@ -17,10 +17,11 @@ use crate::control::settings::{
 };
 use crate::optimize::sampler::{SamplerConfig, SamplerKind};
 use crate::realtime::scheduling::Scheduling;
+use crate::recording::record::HealthLimits;
 use crate::robot::Leg;
 use crate::robot::description::RobotDescription;
 use crate::sim::{SimConfig, SimError};
-use crate::trial::{ParameterInfo, Task};
+use crate::trial::{Backend, GAIN_UNITS, ParameterInfo, ParameterValues, Task, parameter_unit};
 
 /// The files of a configuration folder and their defaults.
 const FILES: [(&str, &str); 5] = [
@@ -30,9 +31,6 @@ const FILES: [(&str, &str); 5] = [
     ("simulator.toml", include_str!("../../config/simulator.toml")),
     ("console.toml", include_str!("../../config/console.toml")),
 ];
-
-/// The gains of the controller, in table order, with their units.
-const GAINS: [(&str, &str); 4] = [("kp", "N/m"), ("kd", "N s/m"), ("kd_joint", "N m s/rad"), ("k_att", "N/m")];
 
 /// Keys that may be given though the defaults leave them out, each with an example of its kind.
 const OPTIONAL: [(&str, &str); 1] = [(
@@ -48,15 +46,6 @@ twist-ccw = { f0 = 1.0, f1 = 1.0, Fx = 1.0, Fy = 1.0, Fz = 1.0 }
 twist-cw = { f0 = 1.0, f1 = 1.0, Fx = 1.0, Fy = 1.0, Fz = 1.0 }
 ",
 )];
-
-/// Which machine stands behind the controller.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Backend {
-    /// The built-in simulator.
-    Simulator,
-    /// A robot over its network.
-    Hardware,
-}
 
 /// `control.toml`.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -252,15 +241,14 @@ impl Config {
             .iter()
             .map(|name| {
                 let [low, high] = self.optimize.bounds[name];
-                let unit = if name.starts_with('f') { "Hz" } else { "N" };
-                ParameterInfo { name: name.clone(), unit: unit.to_owned(), low, high }
+                ParameterInfo { name: name.clone(), unit: parameter_unit(name).to_owned(), low, high }
             })
             .collect()
     }
 
     /// The point that a new study of `task` begins with; empty where none is given.
-    pub fn first(&self, task: Task) -> Vec<(String, f64)> {
-        let Some(point) = self.optimize.first.get(task.name()) else { return Vec::new() };
+    pub fn first(&self, task: Task) -> ParameterValues {
+        let Some(point) = self.optimize.first.get(task.name()) else { return ParameterValues::default() };
         let names = &self.optimize.parameters[task.name()];
         names.iter().filter_map(|name| Some((name.clone(), *point.get(name)?))).collect()
     }
@@ -276,13 +264,27 @@ impl Config {
 
     /// The controller's gains with the ranges in which they may be set, in table order.
     pub fn gains(&self) -> Vec<ParameterInfo> {
-        GAINS
+        GAIN_UNITS
             .iter()
             .map(|(name, unit)| {
                 let [low, high] = self.safety.gains[*name];
                 ParameterInfo { name: (*name).to_owned(), unit: (*unit).to_owned(), low, high }
             })
             .collect()
+    }
+
+    /// Returns the limits by which a screen colours its values.
+    pub fn health_limits(&self) -> HealthLimits {
+        let (safety, default) = (&self.safety, HealthLimits::default());
+        HealthLimits {
+            state_age_ms: safety.watchdog.state_age_warn_ms,
+            loss_share: safety.pre_arm.loss_share,
+            motor_c: safety.pre_arm.motor_c,
+            battery_percent: safety.pre_arm.battery_percent,
+            // 0: late ticks trip nothing.
+            late_ms: Some(safety.watchdog.hardware_late_ms).filter(|ms| *ms > 0.0).unwrap_or(default.late_ms),
+            late_share: default.late_share,
+        }
     }
 
     /// What the objective is measured from: as chosen, or else the truth on the simulator and the estimate on hardware.
@@ -479,7 +481,7 @@ impl Config {
             if !(low.is_finite() && high.is_finite() && low <= high) {
                 return Err(self.refuse(FILE, &key, value, "must be [lower, upper] with lower <= upper"));
             }
-            if name.starts_with('f') && *low <= 0.0 {
+            if parameter_unit(name) == "Hz" && *low <= 0.0 {
                 return Err(self.refuse(FILE, &key, value, "a frequency must be above 0 Hz"));
             }
             if *low < least || *high > most {

@@ -42,6 +42,25 @@ pub enum SamplerKind {
     Sobol,
 }
 
+impl SamplerKind {
+    const ALL: [SamplerKind; 4] = [SamplerKind::Tpe, SamplerKind::Gp, SamplerKind::Random, SamplerKind::Sobol];
+
+    /// Returns the name in files and recordings.
+    pub const fn name(self) -> &'static str {
+        match self {
+            SamplerKind::Tpe => "tpe",
+            SamplerKind::Gp => "gp",
+            SamplerKind::Random => "random",
+            SamplerKind::Sobol => "sobol",
+        }
+    }
+
+    /// Returns the sampler of that name.
+    pub fn from_name(name: &str) -> Option<SamplerKind> {
+        SamplerKind::ALL.into_iter().find(|kind| kind.name() == name)
+    }
+}
+
 /// The settings of `[sampler]` in `config/optimize.toml`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]

@@ -47,11 +47,11 @@ pub fn run_watched<R: Robot>(
             life.close()?;
             if life.others_run() {
                 std::thread::sleep(LOOK_PERIOD);
-                life.look()?;
+                life.refresh()?;
                 continue;
             }
             // What was waited for may have been given up only now: then it comes again, and somebody must run it.
-            life.look()?;
+            life.refresh()?;
             if life.proposal().is_none() {
                 return Ok(());
             }

@@ -4,7 +4,6 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use quadfrog::config::{Config, ConfigError};
-use quadfrog::trial::Task;
 
 use crate::model::Model;
 use crate::view::trial_text;
@@ -57,7 +56,7 @@ pub fn table(model: &Model) -> Result<PathBuf, ExportError> {
 /// When no trial was accepted, the study's configuration cannot be read, or a file is there already or cannot be written.
 pub fn best(model: &Model) -> Result<PathBuf, ExportError> {
     let best = model.best().ok_or(ExportError::NoBest)?;
-    let task = Task::from_name(&model.session.task).ok_or(ExportError::NoBest)?;
+    let task = model.session.task.ok_or(ExportError::NoBest)?;
     let study = folder(model);
     let as_run = Some(study.join("config")).filter(|config| config.is_dir());
     let config = Config::load(as_run.as_deref())?;

@@ -36,7 +36,7 @@ impl Feed {
     /// The screen is alive.
     pub fn beat(&self) {
         if let Feed::Live(handle) = self {
-            handle.beat();
+            handle.send_heartbeat();
         }
     }
 
@@ -66,7 +66,7 @@ impl Feed {
     /// Asks the session; a recording is not asked.
     pub fn wish(&self, intent: OperatorRequest) {
         if let Feed::Live(handle) = self {
-            handle.wish(intent);
+            handle.request(intent);
         }
     }
 

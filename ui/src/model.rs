@@ -313,7 +313,7 @@ impl Model {
 
     /// Whether a machine is driven that can hurt somebody.
     pub fn is_hardware(&self) -> bool {
-        !matches!(self.session.backend.as_str(), "" | "sim")
+        self.session.is_hardware()
     }
 
     /// The parameter of that name with its present bounds.

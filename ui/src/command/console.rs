@@ -4,9 +4,9 @@ use std::net::{SocketAddr, ToSocketAddrs};
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use quadfrog::config::Backend;
-use quadfrog::engine::{Engine, Options};
-use quadfrog::trial::{Approval, Task};
+
+use quadfrog::engine::{self, Options};
+use quadfrog::trial::{Approval, Backend, Task};
 use quadfrog_console::app::{self, ConsoleOptions, Ended};
 use quadfrog_console::feed::Feed;
 use quadfrog_console::settings::{ColourChoice, Settings};
@@ -133,7 +133,7 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
     };
     let folder = chosen.folder.clone();
     let cut_short = left_behind(&folder);
-    let handle = Engine::start(Options {
+    let handle = engine::start(Options {
         seed: chosen.seed,
         trials: arguments.study.trials.or(chosen.budget),
         // Who only looks leaves nothing behind.

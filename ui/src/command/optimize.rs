@@ -8,7 +8,7 @@ use std::sync::{Mutex, PoisonError};
 
 use clap::{Args, ValueEnum};
 use color_eyre::eyre::eyre;
-use quadfrog::config::{Backend, Config};
+use quadfrog::config::Config;
 use quadfrog::engine::{self, EngineError, Options, StoredStudy};
 use quadfrog::optimize::journal::Durability;
 use quadfrog::optimize::study::Storage;
@@ -19,7 +19,7 @@ use quadfrog::session::automatic;
 use quadfrog::session::rollout::Rollout;
 use quadfrog::sim::Simulator;
 use quadfrog::telemetry::Tick;
-use quadfrog::trial::{Approval, Task, TrialRecord, Verdict};
+use quadfrog::trial::{Approval, Backend, Task, TrialRecord, Verdict};
 
 use printer::Printer;
 
@@ -208,7 +208,7 @@ fn run_one(
         None => None,
     };
     // The trial is on its way to the disk when it is judged, and on it before the next one is proposed.
-    let mut life = engine::open_life(&options, Durability::Synced, name.as_deref().unwrap_or_default())?;
+    let mut life = engine::open_experiment(&options, Durability::Synced, name.as_deref().unwrap_or_default())?;
     let mut recorder = match &recording {
         Some(path) => Some(StudyRecorder::create(path, &options)?),
         None => None,
@@ -261,8 +261,7 @@ struct StudyRecorder {
 impl StudyRecorder {
     fn create(path: &Path, options: &Options) -> Result<StudyRecorder, EngineError> {
         let info = engine::session_info(options, &path.display().to_string());
-        let mut writer = Writer::create(path, &info, engine::utc_ns(), &engine::attachments(&options.config))?;
-        writer.record(&Stamped { time_ns: 0, record: Record::Session(info) })?;
+        let writer = Writer::create(path, &info, engine::utc_ns(), &engine::attachments(&options.config))?;
         Ok(StudyRecorder { writer, time_ns: 0 })
     }
 

@@ -6,6 +6,7 @@
 //!   wakes late p50 61 us, p99 94 us ...
 //! ```
 
+use quadfrog::recording::record::HealthLimits;
 use quadfrog::recording::recorder::RecorderStatus;
 use quadfrog::robot::{JOINTS, LinkStatus, joint_name};
 use quadfrog::telemetry::{ArmingCheck, StageTimes};
@@ -85,6 +86,7 @@ fn percentile(sorted: &[u32], share: f64) -> f64 {
 }
 
 fn timing_rows(model: &Model) -> Vec<Row> {
+    let limits = &model.session.limits;
     let tick = &model.snapshot.tick;
     let counters = &model.snapshot.counters;
     let share = counters.late_ticks as f64 / tick.number.max(1) as f64;
@@ -101,8 +103,8 @@ fn timing_rows(model: &Model) -> Vec<Row> {
     let worst_ms = counters.worst_lateness_ns as f64 / 1e6;
     vec![
         row("ticks", tick.number.to_string(), false),
-        row("late ticks", format!("{} ({:.3} %)", counters.late_ticks, share * 100.0), share > 0.001),
-        row("worst", format!("{worst_ms:.2} ms late"), worst_ms > 10.0),
+        row("late ticks", format!("{} ({:.3} %)", counters.late_ticks, share * 100.0), share > limits.late_share),
+        row("worst", format!("{worst_ms:.2} ms late"), worst_ms > limits.late_ms),
         row("wakes late", micro(&late), percentile(&late, 0.99) > 5e5),
         row("tick takes", micro(&busy), percentile(&busy, 0.99) > 5e5),
         row("stages, us", stages(&tick.stages), false),
@@ -162,13 +164,18 @@ fn recorder_rows(model: &Model) -> Vec<Row> {
 }
 
 fn robot_rows(model: &Model) -> Vec<Row> {
+    let limits = &model.session.limits;
     let tick = &model.snapshot.tick;
     let counters = &model.snapshot.counters;
     let mut rows = Vec::new();
     match counters.link {
-        Some(link) => rows.extend(link_rows(&link)),
+        Some(link) => rows.extend(link_rows(&link, limits)),
         None if model.is_hardware() => {
-            rows.push(row("state age", format!("{} ms", counters.state_age_ms), counters.state_age_ms > 5));
+            rows.push(row(
+                "state age",
+                format!("{} ms", counters.state_age_ms),
+                counters.state_age_ms > limits.state_age_ms,
+            ));
         }
         None => rows.push(row("link", "SIM: no link".to_owned(), false)),
     }
@@ -205,11 +212,15 @@ fn disk_row(model: &Model) -> Row {
     }
 }
 
-fn link_rows(link: &LinkStatus) -> Vec<Row> {
+fn link_rows(link: &LinkStatus, limits: &HealthLimits) -> Vec<Row> {
     let loss = 100.0 * link.loss_share();
     vec![
-        row("states", format!("{} Hz, newest {} ms old", link.rate_hz, link.state_age_ms), link.state_age_ms > 5),
-        row("lost", format!("{loss:.2} % of 5 s, {} in all", link.lost), loss >= 1.0),
+        row(
+            "states",
+            format!("{} Hz, newest {} ms old", link.rate_hz, link.state_age_ms),
+            link.state_age_ms > limits.state_age_ms,
+        ),
+        row("lost", format!("{loss:.2} % of 5 s, {} in all", link.lost), loss >= 100.0 * limits.loss_share),
         row("odd ones", format!("{} late, {} twice, {} foreign", link.late, link.duplicate, link.foreign), false),
         row(
             "broken",

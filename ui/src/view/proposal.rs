@@ -10,7 +10,9 @@
 //!  nearest is #3 at 0.21                looks like accept
 //! ```
 
-use quadfrog::trial::{ExperimentStage, FallRisk, Proposal, ProposalSource, ProposedParameter, TrialRecord, Verdict};
+use quadfrog::trial::{
+    ExperimentStage, FallRisk, Proposal, ProposalSource, ProposedParameter, Task, TrialRecord, Verdict,
+};
 use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
@@ -160,13 +162,14 @@ fn review(model: &Model, trial: &TrialRecord) -> Vec<Line<'static>> {
 /// The trial's measured objective, whatever its verdict will be.
 pub fn objective(model: &Model, trial: &TrialRecord) -> Option<f64> {
     let measured = trial.measured?;
-    trial.value.or(match model.session.task.as_str() {
-        "forward" => Some(measured.dx_m),
-        "lateral-left" => Some(measured.dy_m),
-        "lateral-right" => Some(-measured.dy_m),
-        "twist-ccw" => Some(measured.dyaw_rad),
-        "twist-cw" => Some(-measured.dyaw_rad),
-        _ => None,
+    trial.value.or_else(|| {
+        Some(match model.session.task? {
+            Task::Forward => measured.dx_m,
+            Task::LateralLeft => measured.dy_m,
+            Task::LateralRight => -measured.dy_m,
+            Task::TwistCcw => measured.dyaw_rad,
+            Task::TwistCw => -measured.dyaw_rad,
+        })
     })
 }
 
