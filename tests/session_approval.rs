@@ -1,4 +1,4 @@
-//! Who approves: the engine with its threads, on the simulator in real time.
+//! Rules of approval: the engine with its threads, on the simulator in real time.
 
 use std::time::{Duration, Instant};
 
@@ -16,7 +16,7 @@ fn options(approve: Approval, backend: Backend) -> Options {
     Options { trials: Some(3), approve, ..Options::new(config, robot, backend, Task::Forward) }
 }
 
-/// A screen that is alive and presses nothing of itself.
+/// A screen that sends heartbeats and presses no key by itself.
 struct Screen {
     handle: Handle,
     records: Vec<Record>,
@@ -36,7 +36,7 @@ impl Screen {
         }
     }
 
-    /// Lives on for a while.
+    /// Runs for a while.
     fn pass(&mut self, time: Duration) {
         let end = Instant::now() + time;
         while Instant::now() < end {

@@ -485,7 +485,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 24, failure_persistence: None, ..ProptestConfig::default() })]
 
     /// Whatever is wished and whatever happens, through the session and the control thread's body: the robot stands up only after
-    /// an accepted wish to arm, given while the operator's words of this life of the robot stood and its motors followed; and it
+    /// an accepted wish to arm, given while the operator's words of this experiment of the robot stood and its motors followed; and it
     /// never jumps, as nobody approves. What stood is kept account of here, apart from the list.
     #[test]
     fn no_session_energises_without_arm_and_the_words_of_this_life(

@@ -59,7 +59,7 @@ const fn lead(real: bool) -> Duration {
     if real { REHEARSAL_LEAD } else { Duration::ZERO }
 }
 
-/// A body and its robot, until the thread is told to end.
+/// The control loop and its robot, until the engine closes.
 struct Ticking<'a, C> {
     body: ControlLoop,
     robot: &'a mut dyn Robot,
@@ -110,7 +110,7 @@ fn drive<C: Clock>(
         let damping = JointCommand::damping(start.settings.gate.damping_kd);
         let mut sent = 0;
         while sent < LAST_DAMPINGS || !start.closing.load(Ordering::Acquire) {
-            // What is lost goes with the next: there is nobody left to tell.
+            // A lost datagram is followed by the next.
             let _ = ticking.robot.write(&damping);
             ticking.sign_of_life();
             sent = sent.saturating_add(1);
@@ -206,7 +206,7 @@ mod tests {
             let (sent, waited) = damped(true, until, 1);
             assert_eq!(waited, 500);
             assert!(sent.len() >= 500, "{}", sent.len());
-            assert_eq!(damped(true, until, 800).1, 800, "it goes on until it is told to end");
+            assert_eq!(damped(true, until, 800).1, 800, "it continues until the engine closes");
         }
     }
 

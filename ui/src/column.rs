@@ -167,7 +167,7 @@ impl Model {
 
     fn nth_parameter(&self, trial: &TrialRecord, index: usize) -> Option<f64> {
         let name = &self.session.parameters.get(index)?.name;
-        trial.parameters.iter().find(|(known, _)| known == name).map(|(_, value)| *value)
+        trial.parameters.get(name)
     }
 
     /// Whether the row has what the table is sorted by.
