@@ -8,7 +8,7 @@ mod merge;
 mod ranges;
 mod rules;
 
-pub use checked::{Backend, Config};
+pub use checked::Config;
 pub use files::{ConfirmFile, ControlFile, OptimizeFile, SafetyFile, WorkersFile};
 
 use std::path::PathBuf;

@@ -3,9 +3,9 @@
 use std::fs;
 use std::path::PathBuf;
 
-use quadfrog::config::{Backend, Config};
+use quadfrog::config::Config;
 use quadfrog::robot::description::RobotDescription;
-use quadfrog::trial::Task;
+use quadfrog::trial::{Backend, Task};
 
 /// Loads a folder with one file and returns the error's message.
 fn refused(name: &str, text: &str) -> String {

@@ -1,7 +1,7 @@
 //! The control cycle on the simulator, tick by tick: STOP, faults, limits, a lost operator.
 
 use proptest::prelude::*;
-use quadfrog::config::{Backend, Config};
+use quadfrog::config::Config;
 use quadfrog::control::cycle::{Cycle, Inputs};
 use quadfrog::control::limits::CommandGate;
 use quadfrog::control::settings::ControlSettings;

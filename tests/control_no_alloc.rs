@@ -13,7 +13,7 @@ mod robots;
 use std::collections::BTreeSet;
 
 use no_alloc::without_allocation;
-use quadfrog::config::{Backend, Config};
+use quadfrog::config::Config;
 use quadfrog::control::control_loop::ControlLoop;
 use quadfrog::control::settings::ControlSettings;
 use quadfrog::realtime::channel::{ControlEnd, ScreenEnd, SessionEnd, channels};

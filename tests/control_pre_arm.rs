@@ -1,22 +1,22 @@
 //! The arming checks of the control thread: each fails by itself and refuses arming, whatever the session says.
 
 use nalgebra::{UnitQuaternion, Vector3};
-use quadfrog::config::{Backend, Config};
+use quadfrog::config::Config;
 use quadfrog::control::cycle::{Cycle, Inputs};
 use quadfrog::control::settings::ControlSettings;
 use quadfrog::realtime::clock::SimulatedClock;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::robot::{Battery, JointCommand, LinkStatus, Placement, Robot, RobotError, RobotState};
 use quadfrog::telemetry::{ArmingCheck, Command, CommandRefusal, Event, Mode, Permit};
-use quadfrog::trial::Task;
+use quadfrog::trial::{Backend, Task};
 
 /// A robot that reports a given state.
-struct Told {
+struct TellOutcome {
     state: Result<RobotState, RobotError>,
     link: LinkStatus,
 }
 
-impl Robot for Told {
+impl Robot for TellOutcome {
     fn read(&mut self) -> Result<RobotState, RobotError> {
         if let Ok(state) = &mut self.state {
             state.robot_time_ms += 1;
@@ -36,7 +36,7 @@ impl Robot for Told {
 
 struct Bench {
     cycle: Cycle,
-    robot: Told,
+    robot: TellOutcome,
     settings: ControlSettings,
     time_ns: u64,
     lateness_ns: u64,
@@ -56,7 +56,8 @@ impl Bench {
             battery: Some(Battery { charge_percent: 80.0, voltage_v: 24.0, current_a: 0.0, cell_v: [0.0; 10] }),
             ..RobotState::default()
         };
-        let robot = Told { state: Ok(state), link: LinkStatus { recent_received: 5000, ..LinkStatus::default() } };
+        let robot =
+            TellOutcome { state: Ok(state), link: LinkStatus { recent_received: 5000, ..LinkStatus::default() } };
         let mut bench =
             Bench { cycle: Cycle::new(&settings), robot, settings, time_ns: 0, lateness_ns: 0, mode_changes: 0 };
         bench.tick(None);

@@ -4,7 +4,7 @@
 mod go1;
 
 use go1::{description, pair};
-use quadfrog::config::{Backend, Config};
+use quadfrog::config::Config;
 use quadfrog::control::control_loop::ControlLoop;
 use quadfrog::realtime::channel::channels;
 use quadfrog::realtime::clock::SimulatedClock;
@@ -12,7 +12,7 @@ use quadfrog::realtime::thread::TickStart;
 use quadfrog::robot::{LinkStatus, Robot};
 use quadfrog::sim::emulator::{EmulatorFault, EmulatorStatus};
 use quadfrog::telemetry::{Command, Event, Mode, Permit, Tick};
-use quadfrog::trial::{JumpParameters, Task};
+use quadfrog::trial::{Backend, JumpParameters, Task};
 
 /// Over the link to an emulated robot on a bad network: taken over, armed, one jump and its review, a STOP, a restart.
 fn session(warm_up: bool) -> (Vec<Tick>, Vec<Event>, LinkStatus, EmulatorStatus) {

@@ -7,10 +7,10 @@ use std::collections::BTreeSet;
 
 use nalgebra::{UnitQuaternion, Vector3};
 use proptest::prelude::*;
-use quadfrog::config::{Backend, Config};
+use quadfrog::config::Config;
 use quadfrog::control::cycle::{Cycle, Inputs};
 use quadfrog::control::settings::ControlSettings;
-use quadfrog::engine::{Options, open_life};
+use quadfrog::engine::{Options, open_experiment};
 use quadfrog::optimize::journal::Durability;
 use quadfrog::realtime::clock::SimulatedClock;
 use quadfrog::robot::description::RobotDescription;
@@ -22,7 +22,7 @@ use quadfrog::telemetry::{
     Command, CommandRefusal, Event, FallCause, Fault, Mode, Permit, Tick, TransitionCause, TrialEnd, TrialInhibit,
     TrialSpec,
 };
-use quadfrog::trial::{JumpParameters, Task};
+use quadfrog::trial::{Backend, JumpParameters, Task};
 use robots::LinkedRobot;
 
 struct Bench {
@@ -695,7 +695,7 @@ fn whole_studies_on_the_simulator_trip_no_limit() {
         };
         let settings = options.config.settings(&robot, task, Backend::Simulator).unwrap();
         let simulator = Simulator::new(&robot, &options.config.simulator).unwrap();
-        let mut life = open_life(&options, Durability::Buffered, "").unwrap();
+        let mut life = open_experiment(&options, Durability::Buffered, "").unwrap();
         automatic::run(&mut life, &mut Rollout::new(simulator, &settings), |row, ticks| {
             let faulty = ticks.iter().find(|tick| tick.mode == Mode::Fault);
             assert!(faulty.is_none(), "{}, trial {}: {}", task.name(), row.trial, row.cause);

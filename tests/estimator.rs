@@ -5,12 +5,12 @@ mod estimation;
 
 use estimation::{JumpError, World, jumps, percentile, settings, settings_of};
 use nalgebra::Vector3;
-use quadfrog::config::{Backend, Config};
+use quadfrog::config::Config;
 use quadfrog::control::cycle::{Cycle, Inputs};
 use quadfrog::control::estimator::{ContactGate, Estimator};
 use quadfrog::control::leg::{feet, stance_of};
 use quadfrog::control::settings::{ControlSettings, ObjectiveSource};
-use quadfrog::engine::{Options, open_life};
+use quadfrog::engine::{Options, open_experiment};
 use quadfrog::optimize::journal::Durability;
 use quadfrog::realtime::clock::SimulatedClock;
 use quadfrog::robot::description::RobotDescription;
@@ -19,7 +19,7 @@ use quadfrog::session::rollout::Rollout;
 use quadfrog::session::{automatic, objective};
 use quadfrog::sim::Simulator;
 use quadfrog::telemetry::Estimate;
-use quadfrog::trial::{Task, TrialRecord, Verdict};
+use quadfrog::trial::{Backend, Task, TrialRecord, Verdict};
 
 /// Joint angles of a stance, feet at the task's nominal positions.
 fn stance(settings: &ControlSettings) -> Joints {
@@ -425,7 +425,7 @@ fn study(source: &str, seed: u32) -> (TrialRecord, f64) {
     let options = Options { seed, trials: Some(20), ..Options::new(config, robot, backend, task) };
     let settings = options.config.settings(&options.robot, task, backend).unwrap();
     let simulator = Simulator::new(&options.robot, &options.config.simulator).unwrap();
-    let mut life = open_life(&options, Durability::Buffered, "").unwrap();
+    let mut life = open_experiment(&options, Durability::Buffered, "").unwrap();
     let mut in_truth = Vec::new();
     automatic::run(&mut life, &mut Rollout::new(simulator, &settings), |row, ticks| {
         let truth = objective::measure(&estimation::in_truth(ticks, &settings)).unwrap();

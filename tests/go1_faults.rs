@@ -8,7 +8,7 @@ mod go1;
 use std::net::{SocketAddr, UdpSocket};
 
 use go1::{ANY_PORT, description, emulator, network};
-use quadfrog::config::{Backend, Config};
+use quadfrog::config::Config;
 use quadfrog::control::cycle::{Cycle, Inputs};
 use quadfrog::control::settings::ControlSettings;
 use quadfrog::realtime::clock::SimulatedClock;
@@ -19,7 +19,7 @@ use quadfrog::sim::emulator::Emulator;
 use quadfrog::telemetry::{
     Command, CommandRefusal, Event, Fault, Mode, Permit, Tick, TransitionCause, TrialEnd, TrialSpec,
 };
-use quadfrog::trial::{JumpParameters, Task};
+use quadfrog::trial::{Backend, JumpParameters, Task};
 
 /// UDP proxy between controller and emulator that keeps the last command.
 struct Tap {

@@ -15,7 +15,7 @@ use std::net::UdpSocket;
 
 use go1::{ANY_PORT, description, network, pair};
 use no_alloc::without_allocation;
-use quadfrog::config::{Backend, Config};
+use quadfrog::config::Config;
 use quadfrog::control::control_loop::ControlLoop;
 use quadfrog::realtime::channel::channels;
 use quadfrog::realtime::clock::SimulatedClock;
@@ -24,7 +24,7 @@ use quadfrog::robot::go1::Go1;
 use quadfrog::robot::{JointCommand, Robot};
 use quadfrog::sim::emulator::EmulatorFault;
 use quadfrog::telemetry::{Command, Event, Mode, Permit};
-use quadfrog::trial::{JumpParameters, Task};
+use quadfrog::trial::{Backend, JumpParameters, Task};
 
 /// The control thread's body over the link: standing up, a jump and its review on a good network; then a network that
 /// loses, duplicates, corrupts and delays, and a restart: every branch of the link.

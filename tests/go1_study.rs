@@ -11,8 +11,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use go1::{Lockstep, description, emulator, network};
-use quadfrog::config::{Backend, Config};
-use quadfrog::engine::{Engine, Handle, Options, open_life};
+use quadfrog::config::Config;
+use quadfrog::engine::{self, Handle, Options, open_experiment};
 use quadfrog::optimize::journal::Durability;
 use quadfrog::realtime::thread::pace;
 use quadfrog::recording::record::{Record, StageRecord};
@@ -24,7 +24,7 @@ use quadfrog::session::rollout::Rollout;
 use quadfrog::sim::emulator::{EmulatorFault, EmulatorHandle};
 use quadfrog::sim::{SimConfig, Simulator};
 use quadfrog::telemetry::Mode;
-use quadfrog::trial::{ExperimentStage, Proposal, Task, TrialRecord, Verdict};
+use quadfrog::trial::{Backend, ExperimentStage, Proposal, Task, TrialRecord, Verdict};
 
 const TASK: Task = Task::Forward;
 const TRIALS: u32 = 20;
@@ -114,7 +114,7 @@ struct Operator {
 
 impl Operator {
     fn look(&mut self) -> (Mode, LinkStatus) {
-        self.engine.beat();
+        self.engine.send_heartbeat();
         while self.engine.next_tick().is_some() {}
         while let Some(stamped) = self.engine.next_record() {
             match stamped.record {
@@ -163,7 +163,7 @@ impl Operator {
                     self.robot.apply(EmulatorFault::Place);
                     self.lies_since = Some(Instant::now());
                     for word in OperatorCheck::ALL {
-                        self.engine.wish(OperatorRequest::Confirm(word));
+                        self.engine.request(OperatorRequest::Confirm(word));
                     }
                 }
                 let still = self.lies_since.is_some_and(|since| since.elapsed() > STILL);
@@ -191,7 +191,7 @@ impl Operator {
             // Once is enough, unless nothing comes of it.
             let wishes = self.wished_in != Some(here) || wished_at.elapsed() > Duration::from_secs(3);
             if wishes && let Some(intent) = self.act(mode) {
-                self.engine.wish(intent);
+                self.engine.request(intent);
                 wished_at = Instant::now();
                 self.wished_in = Some(here);
             }
@@ -208,7 +208,7 @@ fn over_the_network(seed: u32, trials: u32, late_ms: f64) -> Outcome {
     let mut options = options(config, Some(robot.network), Backend::Hardware, seed, trials);
     options.folder = Some(folder.path().join("study"));
     let mut operator = Operator {
-        engine: Engine::start(options).unwrap(),
+        engine: engine::start(options).unwrap(),
         robot: robot.handle.clone(),
         stage: None,
         card: None,
@@ -236,7 +236,7 @@ fn in_simulated_time<R: Robot>(
 ) -> (f64, Vec<TrialRecord>) {
     let options = options(config(0.0), None, backend, seed, TRIALS);
     let settings = options.config.settings(&options.robot, TASK, backend).unwrap();
-    let mut life = open_life(&options, Durability::Buffered, "").unwrap();
+    let mut life = open_experiment(&options, Durability::Buffered, "").unwrap();
     let mut rollout = Rollout::new(robot(&options.config.simulator), &settings);
     automatic::run(&mut life, &mut rollout, |_, _| {}).unwrap();
     (life.best().and_then(|row| row.value).unwrap_or(0.0), life.rows().cloned().collect())

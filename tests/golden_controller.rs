@@ -3,6 +3,7 @@
 mod support;
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use quadfrog::control::force_profile::amplitudes_leg;
 use quadfrog::control::leg::{self, LegTarget};
 use quadfrog::robot::Joints;
 use quadfrog::robot::kinematics::LegGeometry;
@@ -56,7 +57,7 @@ fn golden_controller() {
             gains: Gains { kp: 400.0, kd: 8.0, kd_joint: 0.8, k_att: 200.0 },
             stance_leg: Vector3::new(0.0, 0.14, -0.25),
             vmc: case.vmc,
-            amplitudes_leg: jump.amplitudes_leg(task),
+            amplitudes_leg: amplitudes_leg(&jump, task),
             theta_rad: case.theta_rad,
         };
         let [w, x, y, z] = case.base_quat_wxyz;

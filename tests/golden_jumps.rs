@@ -4,6 +4,7 @@
 mod support;
 
 use nalgebra::{UnitQuaternion, Vector3};
+use quadfrog::control::force_profile::amplitudes_leg;
 use quadfrog::control::leg::{LegTarget, feet, stance_of, torques};
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::robot::{JointCommand, Joints, Leg, PerLeg, Placement, Robot};
@@ -80,7 +81,7 @@ fn jump(robot: &RobotDescription, config: &SimConfig, file: &File, case: &Case) 
             gains: file.gains,
             stance_leg,
             vmc: true,
-            amplitudes_leg: if active { profile.amplitudes_leg(task) } else { PerLeg::default() },
+            amplitudes_leg: if active { amplitudes_leg(&profile, task) } else { PerLeg::default() },
             theta_rad: std::f64::consts::PI + std::f64::consts::TAU * case.f0_hz * (t - start),
         };
         let feet = feet(&robot.leg_geometry, &state.joint_position);

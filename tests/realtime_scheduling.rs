@@ -4,9 +4,10 @@ use std::ops::ControlFlow;
 use std::time::Duration;
 
 use nix::time::{ClockId, clock_gettime};
-use quadfrog::config::{Backend, Config};
+use quadfrog::config::Config;
 use quadfrog::realtime::scheduling::{RealtimeSetting, Scheduling};
 use quadfrog::realtime::{system, thread};
+use quadfrog::trial::Backend;
 
 /// Applies the settings in a thread of its own, because they stay with the thread.
 fn apply(scheduling: Scheduling) -> (Vec<RealtimeSetting>, Vec<String>) {

@@ -9,7 +9,7 @@ use std::sync::{Arc, mpsc};
 
 use quadfrog::recording::player::Player;
 use quadfrog::recording::record::Stamped;
-use quadfrog::recording::recorder::{FAULT_TICKS, Handed, Recorder, RecorderHandle, TrialTicks};
+use quadfrog::recording::recorder::{CollectedTicks, FAULT_TICKS, Recorder, RecorderHandle, TrialTicks};
 use quadfrog::recording::writer::{Sink, Writer};
 use quadfrog::telemetry::{Mode, Tick};
 use support::*;
@@ -33,8 +33,8 @@ fn record(writer: Option<Writer>, ticks: &[Tick], records: &[Stamped]) -> (Recor
     drop((ring, sender));
     // The channel ends when the thread does.
     let trials = trials.into_iter().filter_map(|handed| match handed {
-        Handed::Trial(trial) => Some(trial),
-        Handed::Fault(_) => None,
+        CollectedTicks::Trial(trial) => Some(trial),
+        CollectedTicks::Fault(_) => None,
     });
     (handle, trials.collect())
 }
@@ -193,8 +193,8 @@ fn the_last_200_ticks_are_delivered_with_each_fault() {
     let kept: Vec<Vec<u64>> = handed
         .into_iter()
         .map(|handed| match handed {
-            Handed::Fault(ticks) => ticks.iter().map(|tick| tick.number).collect(),
-            Handed::Trial(trial) => panic!("there was no trial, and here is {}", trial.trial),
+            CollectedTicks::Fault(ticks) => ticks.iter().map(|tick| tick.number).collect(),
+            CollectedTicks::Trial(trial) => panic!("there was no trial, and here is {}", trial.trial),
         })
         .collect();
     handle.join();

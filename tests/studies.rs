@@ -1,13 +1,13 @@
 //! Whole studies on the built-in simulator: the best values of the method, and identical bits for the same seed.
 
-use quadfrog::config::{Backend, Config};
-use quadfrog::engine::{Options, open_life};
+use quadfrog::config::Config;
+use quadfrog::engine::{Options, open_experiment};
 use quadfrog::optimize::journal::Durability;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::session::automatic;
 use quadfrog::session::rollout::Rollout;
 use quadfrog::sim::Simulator;
-use quadfrog::trial::{Task, TrialRecord};
+use quadfrog::trial::{Backend, Task, TrialRecord};
 
 const TRIALS: u32 = 20;
 
@@ -19,7 +19,7 @@ fn study(task: Task, seed: u32) -> (Vec<TrialRecord>, f64) {
     let settings = options.config.settings(&options.robot, task, Backend::Simulator).unwrap();
     let simulator = Simulator::new(&options.robot, &options.config.simulator).unwrap();
     let mut rollout = Rollout::new(simulator, &settings);
-    let mut life = open_life(&options, Durability::Buffered, "").unwrap();
+    let mut life = open_experiment(&options, Durability::Buffered, "").unwrap();
     automatic::run(&mut life, &mut rollout, |_, _| {}).unwrap();
     let best = life.best().and_then(|row| row.value).unwrap_or(0.0);
     (life.rows().cloned().collect(), best)

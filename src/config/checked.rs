@@ -13,11 +13,12 @@ use super::ranges;
 use crate::control::settings::{ControlSettings, ObjectiveSource, StandSettings, TaskControl};
 use crate::optimize::ask::SamplerKind;
 use crate::realtime::scheduling::Scheduling;
+use crate::recording::record::HealthLimits;
 use crate::robot::GRAVITY;
 use crate::robot::Leg;
 use crate::robot::description::RobotDescription;
 use crate::sim::SimConfig;
-use crate::trial::{ParameterInfo, Task};
+use crate::trial::{Backend, GAIN_UNITS, ParameterInfo, ParameterValues, Task, parameter_unit};
 
 /// The files of a configuration folder and their defaults.
 const FILES: [(&str, &str); 5] = [
@@ -27,9 +28,6 @@ const FILES: [(&str, &str); 5] = [
     ("simulator.toml", include_str!("../../config/simulator.toml")),
     ("console.toml", include_str!("../../config/console.toml")),
 ];
-
-/// The gains of the controller, in table order, with their units.
-const GAINS: [(&str, &str); 4] = [("kp", "N/m"), ("kd", "N s/m"), ("kd_joint", "N m s/rad"), ("k_att", "N/m")];
 
 /// Optional keys, which the defaults leave out, each with an example of its kind.
 const OPTIONAL: [(&str, &str); 1] = [(
@@ -45,15 +43,6 @@ twist-ccw = { f0 = 1.0, f1 = 1.0, Fx = 1.0, Fy = 1.0, Fz = 1.0 }
 twist-cw = { f0 = 1.0, f1 = 1.0, Fx = 1.0, Fy = 1.0, Fz = 1.0 }
 ",
 )];
-
-/// Machine that the controller drives.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Backend {
-    /// The built-in simulator.
-    Simulator,
-    /// A robot over its network.
-    Hardware,
-}
 
 /// All files, checked.
 #[derive(Debug, Clone)]
@@ -143,15 +132,14 @@ impl Config {
             .iter()
             .map(|name| {
                 let [low, high] = self.optimize.bounds[name];
-                let unit = if name.starts_with('f') { "Hz" } else { "N" };
-                ParameterInfo { name: name.clone(), unit: unit.to_owned(), low, high }
+                ParameterInfo { name: name.clone(), unit: parameter_unit(name).to_owned(), low, high }
             })
             .collect()
     }
 
     /// Returns the first point of a new study of `task`; empty if none is given.
-    pub fn first(&self, task: Task) -> Vec<(String, f64)> {
-        let Some(point) = self.optimize.first.get(task.name()) else { return Vec::new() };
+    pub fn first(&self, task: Task) -> ParameterValues {
+        let Some(point) = self.optimize.first.get(task.name()) else { return ParameterValues::default() };
         let names = &self.optimize.parameters[task.name()];
         names.iter().filter_map(|name| Some((name.clone(), *point.get(name)?))).collect()
     }
@@ -167,13 +155,27 @@ impl Config {
 
     /// Returns the controller's gains with their allowed ranges, in table order.
     pub fn gains(&self) -> Vec<ParameterInfo> {
-        GAINS
+        GAIN_UNITS
             .iter()
             .map(|(name, unit)| {
                 let [low, high] = self.safety.gains[*name];
                 ParameterInfo { name: (*name).to_owned(), unit: (*unit).to_owned(), low, high }
             })
             .collect()
+    }
+
+    /// Returns the limits by which a screen colours its values.
+    pub fn health_limits(&self) -> HealthLimits {
+        let (safety, default) = (&self.safety, HealthLimits::default());
+        HealthLimits {
+            state_age_ms: safety.watchdog.state_age_warn_ms,
+            loss_share: safety.pre_arm.loss_share,
+            motor_c: safety.pre_arm.motor_c,
+            battery_percent: safety.pre_arm.battery_percent,
+            // 0: late ticks trip nothing.
+            late_ms: Some(safety.watchdog.hardware_late_ms).filter(|ms| *ms > 0.0).unwrap_or(default.late_ms),
+            late_share: default.late_share,
+        }
     }
 
     /// Returns the source of the objective: as chosen, else the truth on the simulator and the estimate on hardware.

@@ -1,13 +1,13 @@
 //! Rules between the keys of a configuration, and between a configuration and a robot.
 
 use super::ConfigError;
-use super::checked::{Backend, Config};
+use super::checked::Config;
 use super::files::SafetyFile;
 use crate::control::leg::stance_of;
 use crate::robot::Leg;
 use crate::robot::description::RobotDescription;
 use crate::sim::SimError;
-use crate::trial::Task;
+use crate::trial::{Backend, Task, parameter_unit};
 
 const CONTROL: &str = "control.toml";
 const SAFETY: &str = "safety.toml";
@@ -100,7 +100,7 @@ impl Config {
             if !(low.is_finite() && high.is_finite() && low <= high) {
                 return Err(self.refuse(OPTIMIZE, &key, value, "must be [lower, upper] with lower <= upper"));
             }
-            if name.starts_with('f') && *low <= 0.0 {
+            if parameter_unit(name) == "Hz" && *low <= 0.0 {
                 return Err(self.refuse(OPTIMIZE, &key, value, "a frequency must be above 0 Hz"));
             }
             if *low < least || *high > most {

@@ -4,7 +4,10 @@ use std::f64::consts::{PI, TAU};
 
 use nalgebra::Vector3;
 
-/// The oscillator as a closed function of the time since theta = pi: no integration, no drift.
+use crate::robot::{LEGS, Leg, PerLeg};
+use crate::trial::{JumpParameters, Task};
+
+/// The oscillator as a function of the time since it entered theta = pi, so that no error of integration adds up.
 ///
 /// theta_dot = 2 pi f0 while pi <= theta < 2 pi (impulse), 2 pi f1 while 0 <= theta < pi (off phase).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -43,4 +46,20 @@ impl Oscillator {
 /// F = `[Fx Fy Fz]` sin(theta) if sin(theta) < 0, else 0.
 pub fn force_leg(amplitude_leg: &Vector3<f64>, theta_rad: f64) -> Vector3<f64> {
     amplitude_leg * theta_rad.sin().min(0.0)
+}
+
+/// Returns the amplitude `[Fx Fy Fz]` of each foot with the signs of `task` (`docs/method.md`, "Amplitude signs"): the
+/// force that the foot exerts divided by sin(theta), leg frame, N.
+pub fn amplitudes_leg(jump: &JumpParameters, task: Task) -> PerLeg<Vector3<f64>> {
+    let mut amplitudes = [Vector3::zeros(); LEGS];
+    for (amplitude, leg) in amplitudes.iter_mut().zip(Leg::ALL) {
+        *amplitude = match task {
+            Task::Forward => Vector3::new(jump.fx_n, 0.0, jump.fz_n),
+            Task::LateralLeft => Vector3::new(0.0, jump.fy_n, jump.fz_n),
+            Task::LateralRight => Vector3::new(0.0, -jump.fy_n, jump.fz_n),
+            Task::TwistCcw => Vector3::new(0.0, leg.end() * jump.fy_n, jump.fz_n),
+            Task::TwistCw => Vector3::new(0.0, -leg.end() * jump.fy_n, jump.fz_n),
+        };
+    }
+    amplitudes
 }

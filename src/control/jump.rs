@@ -1,6 +1,6 @@
 //! One trial: countdown, impulse, flight, landing, settle. Its settings are latched when it begins.
 
-use super::force_profile::Oscillator;
+use super::force_profile::{Oscillator, amplitudes_leg};
 use super::leg::LegTarget;
 use super::limits::ticks;
 use super::settings::ControlSettings;
@@ -55,7 +55,7 @@ impl Jump {
                 f0_hz: spec.jump.f0_hz,
                 f1_hz: if spec.jumps > 1 { spec.jump.f1_hz } else { 0.0 },
             },
-            amplitudes_leg: spec.jump.amplitudes_leg(spec.task),
+            amplitudes_leg: amplitudes_leg(&spec.jump, spec.task),
             elapsed: 0,
             countdown: ticks(settings.countdown_s),
             airborne: 0,

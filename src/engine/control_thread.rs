@@ -1,5 +1,5 @@
-//! The control thread: the system's favours, then one body a millisecond until it is told to end, and damping as its
-//! last word, however it ends.
+//! The control thread: applies the real-time settings, then runs the control loop at 1 kHz. On exit, also after a panic, it
+//! keeps sending damping commands.
 
 use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
@@ -16,26 +16,26 @@ use crate::realtime::scheduling::{DeniedSetting, RealtimeSetting, Scheduling};
 use crate::realtime::thread::{CONTROL_PHASE, PeriodicTask, TickStart, WARM_UP_LEAD, pace_with_warm_up};
 use crate::robot::{CONTROL_PERIOD_S, JointCommand, Robot};
 
-/// What the thread is started with.
+/// Parts of the control thread.
 pub struct Start<'a, C> {
-    /// What the cycle is made with.
+    /// Settings of the control cycle.
     pub settings: &'a ControlSettings,
-    /// What is asked of the system.
+    /// Real-time settings that are requested of the system.
     pub scheduling: Scheduling,
-    /// Told once what the system granted, before the first tick.
-    pub told: Sender<(Vec<RealtimeSetting>, Vec<DeniedSetting>)>,
+    /// Receives the granted and denied real-time settings once, before the first tick.
+    pub report: Sender<(Vec<RealtimeSetting>, Vec<DeniedSetting>)>,
     /// The clock of the engine.
     pub clock: &'a C,
     /// Set when the thread is to end.
     pub closing: &'a AtomicBool,
-    /// Whether the robot is real (behind a link). It keeps the last command when nothing more is sent, while simulated
-    /// time stops; and a cache warm-up precedes its ticks.
+    /// Whether the robot is real. A real robot keeps the last command when nothing more is sent, a simulated one stands still;
+    /// and the caches are warmed before each tick of a real one.
     pub real: bool,
-    /// The guard's sign of life; none where nobody stands guard.
+    /// Heartbeat to the guard; none without a guard.
     pub lifeline: Option<Lifeline>,
 }
 
-/// How often damping is sent, at least, after the last tick: for half a second, in which the robot sinks softly.
+/// Least number of damping commands after the last tick: half a second, in which the robot sinks softly.
 const LAST_DAMPINGS: u32 = 500;
 
 /// Runs until `closing` is set.
@@ -44,7 +44,7 @@ const LAST_DAMPINGS: u32 = 500;
 /// When a tick does, or the clock cannot be read: once the robot has been damped, and `closing` is set.
 pub fn run<C: Clock>(mut start: Start<C>, end: ControlEnd, robot: &mut dyn Robot) {
     let granted = start.scheduling.apply();
-    let _ = start.told.send((granted.granted.clone(), granted.denied.clone()));
+    let _ = start.report.send((granted.granted.clone(), granted.denied.clone()));
     let period = Duration::from_secs_f64(CONTROL_PERIOD_S);
     let lead = lead(start.real);
     let paced = |ticking: &mut dyn PeriodicTask| pace_with_warm_up(period, CONTROL_PHASE, lead, ticking);
@@ -54,12 +54,12 @@ pub fn run<C: Clock>(mut start: Start<C>, end: ControlEnd, robot: &mut dyn Robot
     }
 }
 
-/// Time between cache warm-up and tick; zero, for none, with a simulated robot, whose tick may be late.
+/// Returns the time before a tick at which the caches are warmed; zero for a simulated robot, which needs no punctual tick.
 const fn lead(real: bool) -> Duration {
     if real { WARM_UP_LEAD } else { Duration::ZERO }
 }
 
-/// A body and its robot, until the thread is told to end.
+/// The control loop and its robot, until the engine closes.
 struct Ticking<'a, C> {
     body: ControlLoop,
     robot: &'a mut dyn Robot,
@@ -110,7 +110,7 @@ fn drive<C: Clock>(
         let damping = JointCommand::damping(start.settings.gate.damping_kd);
         let mut sent = 0;
         while sent < LAST_DAMPINGS || !start.closing.load(Ordering::Acquire) {
-            // What is lost goes with the next: there is nobody left to tell.
+            // A lost datagram is followed by the next.
             let _ = ticking.robot.write(&damping);
             ticking.sign_of_life();
             sent = sent.saturating_add(1);
@@ -126,12 +126,13 @@ fn drive<C: Clock>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::{Backend, Config};
+    use crate::config::Config;
     use crate::realtime::channel::channels;
     use crate::realtime::clock::SimulatedClock;
     use crate::robot::description::RobotDescription;
     use crate::robot::{Placement, RobotError, RobotState};
     use crate::telemetry::Command;
+    use crate::trial::Backend;
     use crate::trial::Task;
 
     /// Answers until `reads` or `warm_ups` is used up, then panics; keeps what it is sent.
@@ -173,7 +174,7 @@ mod tests {
         let mut start = Start {
             settings: &settings,
             scheduling: Scheduling::default(),
-            told: std::sync::mpsc::channel().0,
+            report: std::sync::mpsc::channel().0,
             clock: &SimulatedClock,
             closing: &closing,
             real: true,
@@ -205,7 +206,7 @@ mod tests {
             let (sent, waited) = damped(true, until, 1);
             assert_eq!(waited, 500);
             assert!(sent.len() >= 500, "{}", sent.len());
-            assert_eq!(damped(true, until, 800).1, 800, "it goes on until it is told to end");
+            assert_eq!(damped(true, until, 800).1, 800, "it continues until the engine closes");
         }
     }
 

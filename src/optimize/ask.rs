@@ -26,8 +26,11 @@ impl Direction {
 }
 
 /// The algorithm that proposes candidates.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, strum::VariantArray, strum::IntoStaticStr,
+)]
 #[serde(rename_all = "lowercase")]
+#[strum(serialize_all = "lowercase")]
 pub enum SamplerKind {
     /// Tree-structured Parzen estimator, as Optuna 5.0.
     #[default]
@@ -38,6 +41,21 @@ pub enum SamplerKind {
     Random,
     /// Points of the Sobol sequence: evenly spread, independent of results.
     Sobol,
+}
+
+impl SamplerKind {
+    /// All samplers.
+    pub const ALL: &[SamplerKind] = <SamplerKind as strum::VariantArray>::VARIANTS;
+
+    /// Returns the name in files, recordings and on the command line.
+    pub fn name(self) -> &'static str {
+        self.into()
+    }
+
+    /// Returns the sampler of that name.
+    pub fn from_name(name: &str) -> Option<SamplerKind> {
+        SamplerKind::ALL.iter().copied().find(|kind| kind.name() == name)
+    }
 }
 
 /// The settings of `[sampler]` in `config/optimize.toml`.

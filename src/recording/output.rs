@@ -68,10 +68,10 @@ impl Output {
         let fields = [
             ("tool", "quadfrog".to_string()),
             ("version", session.version.clone()),
-            ("backend", session.backend.clone()),
+            ("backend", session.backend_name().to_string()),
             ("robot", session.robot.clone()),
-            ("task", session.task.clone()),
-            ("sampler", session.sampler.clone()),
+            ("task", session.task_name().to_string()),
+            ("sampler", session.sampler_name().to_string()),
             ("seed", session.seed.to_string()),
             ("budget", session.budget.to_string()),
             ("started", session.started.clone()),

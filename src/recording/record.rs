@@ -1,8 +1,12 @@
 //! Records of a session besides its ticks. The screen and the recording receive the same records, so a replay shows the
 //! same screen as the live session.
 
+use crate::optimize::ask::SamplerKind;
 use crate::telemetry::{ArmingCheck, ArmingCheckState, Counters, Mode, Tick};
-use crate::trial::{ExperimentStage, ParameterInfo, PointRecord, Proposal, ProposalInsight, SearchStatus, TrialRecord};
+use crate::trial::{
+    Approval, Backend, ExperimentStage, ParameterInfo, PointRecord, Proposal, ProposalInsight, SearchStatus, Task,
+    TrialRecord,
+};
 
 /// A record with its time.
 #[derive(Debug, Clone, PartialEq)]
@@ -63,16 +67,16 @@ pub struct ArmingCheckRecord {
 pub struct SessionInfo {
     /// Version of this program.
     pub version: String,
-    /// `sim` or `go1`.
-    pub backend: String,
+    /// The robot behind the controller; none before a session begins, and for a name that this version does not know.
+    pub backend: Option<Backend>,
     /// Name of the robot model.
     pub robot: String,
-    /// Task name.
-    pub task: String,
+    /// Task; none as for `backend`.
+    pub task: Option<Task>,
     /// Unit of the objective.
     pub unit: String,
-    /// Sampler name.
-    pub sampler: String,
+    /// Sampler; none as for `backend`.
+    pub sampler: Option<SamplerKind>,
     /// Seed of the study.
     pub seed: u64,
     /// How many trials the study is to have.
@@ -89,8 +93,68 @@ pub struct SessionInfo {
     pub observe: bool,
     /// The controller's gains with the ranges in which an operator may set them, in table order.
     pub gains: Vec<ParameterInfo>,
-    /// Who approves and judges: `each`, `falls-only` or `auto`.
-    pub approve: String,
+    /// The jumps that a person approves and judges.
+    pub approve: Approval,
+    /// Limits by which a screen colours its values.
+    pub limits: HealthLimits,
+}
+
+impl SessionInfo {
+    /// Returns whether the session drives the simulator.
+    pub fn is_simulated(&self) -> bool {
+        self.backend == Some(Backend::Simulator)
+    }
+
+    /// Returns whether the session drives a robot.
+    pub fn is_hardware(&self) -> bool {
+        self.backend == Some(Backend::Hardware)
+    }
+
+    /// Returns the backend's name in recordings; empty where it is not known.
+    pub fn backend_name(&self) -> &'static str {
+        self.backend.map_or("", Backend::name)
+    }
+
+    /// Returns the task's name; empty where it is not known.
+    pub fn task_name(&self) -> &'static str {
+        self.task.map_or("", Task::name)
+    }
+
+    /// Returns the sampler's name; empty where it is not known.
+    pub fn sampler_name(&self) -> &'static str {
+        self.sampler.map_or("", SamplerKind::name)
+    }
+}
+
+/// Limits by which a screen colours the health of link, motors, battery and control loop. The default holds for recordings
+/// without them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HealthLimits {
+    /// Largest age of the robot's state, ms (`safety.toml`, `[watchdog] state_age_warn_ms`).
+    pub state_age_ms: u32,
+    /// Share of lost states that is no longer good (`[pre_arm] loss_share`).
+    pub loss_share: f64,
+    /// Motor temperature that is no longer good, degrees Celsius (`[pre_arm] motor_c`).
+    pub motor_c: f64,
+    /// Least charge of the battery, % (`[pre_arm] battery_percent`).
+    pub battery_percent: f64,
+    /// Largest share of late ticks.
+    pub late_share: f64,
+    /// Largest delay of a tick, ms (`[watchdog] hardware_late_ms`).
+    pub late_ms: f64,
+}
+
+impl Default for HealthLimits {
+    fn default() -> HealthLimits {
+        HealthLimits {
+            state_age_ms: 5,
+            loss_share: 0.01,
+            motor_c: 60.0,
+            battery_percent: 30.0,
+            late_share: 0.001,
+            late_ms: 10.0,
+        }
+    }
 }
 
 /// A change of mode.

@@ -30,9 +30,9 @@ pub struct TrialTicks {
 /// Number of ticks delivered with a fault, including the first tick in FAULT.
 pub const FAULT_TICKS: usize = 200;
 
-/// Delivery of the recorder to the session.
+/// Ticks that the recorder sends to the session.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Handed {
+pub enum CollectedTicks {
     /// A trial's ticks, once it is over.
     Trial(TrialTicks),
     /// The last ticks up to the first in FAULT, oldest first.
@@ -68,7 +68,7 @@ pub struct Recorder {
     ticks: Consumer<Tick>,
     records: Receiver<Stamped>,
     writer: Option<Writer>,
-    handed: Sender<Handed>,
+    handed: Sender<CollectedTicks>,
     trial: Option<TrialTicks>,
     /// The last ticks.
     last: VecDeque<Tick>,
@@ -95,7 +95,7 @@ impl Recorder {
         ticks: Consumer<Tick>,
         records: Receiver<Stamped>,
         writer: Option<Writer>,
-        handed: Sender<Handed>,
+        handed: Sender<CollectedTicks>,
     ) -> RecorderHandle {
         let status = Arc::new(Mutex::new(RecorderStatus::default()));
         let mut recorder = Recorder {
@@ -217,13 +217,13 @@ impl Recorder {
         let before = self.last.back().map(|last| last.mode);
         self.last.push_back(*tick);
         if tick.mode == Mode::Fault && before != Some(Mode::Fault) {
-            let _ = self.handed.send(Handed::Fault(self.last.iter().copied().collect())); // an error as in `deliver_trial`
+            let _ = self.handed.send(CollectedTicks::Fault(self.last.iter().copied().collect())); // as with a trial's
         }
     }
 
     fn deliver_trial(&mut self) {
         if let Some(trial) = self.trial.take() {
-            let _ = self.handed.send(Handed::Trial(trial)); // fails when the session has ended; the ticks are in the file
+            let _ = self.handed.send(CollectedTicks::Trial(trial)); // nobody measures any more: nothing is lost, the file has them
         }
     }
 }

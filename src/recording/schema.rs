@@ -5,10 +5,11 @@ use prost::Message;
 
 use super::decode::{DecodeError, number, one_of};
 use super::record::{
-    ArmingCheckRecord, LogLevel, LogRecord, Record, RequestRecord, SessionInfo, StageRecord, Transition,
+    ArmingCheckRecord, HealthLimits, LogLevel, LogRecord, Record, RequestRecord, SessionInfo, StageRecord, Transition,
 };
 use super::topic::Topic;
 use super::{frog, optimizing, tick, trials};
+use crate::optimize::ask::SamplerKind;
 use crate::robot::LinkStatus;
 use crate::telemetry::{ArmingCheck, ArmingCheckState, Counters, Mode};
 use crate::trial::{ExperimentStage, ParameterInfo};
@@ -162,11 +163,11 @@ fn session(info: &SessionInfo, start_utc_ns: u64) -> frog::Session {
     };
     frog::Session {
         version: info.version.clone(),
-        backend: info.backend.clone(),
+        backend: info.backend_name().to_owned(),
         robot: info.robot.clone(),
-        task: info.task.clone(),
+        task: info.task_name().to_owned(),
         unit: info.unit.clone(),
-        sampler: info.sampler.clone(),
+        sampler: info.sampler_name().to_owned(),
         seed: info.seed,
         budget: info.budget,
         parameters: info.parameters.iter().map(bounds).collect(),
@@ -176,7 +177,8 @@ fn session(info: &SessionInfo, start_utc_ns: u64) -> frog::Session {
         observe: info.observe,
         start_utc_ns,
         gains: info.gains.iter().map(bounds).collect(),
-        approve: info.approve.clone(),
+        approve: info.approve.name().to_owned(),
+        limits: Some(health_limits(&info.limits)),
     }
 }
 
@@ -189,11 +191,11 @@ fn from_session(message: frog::Session) -> SessionInfo {
     };
     SessionInfo {
         version: message.version,
-        backend: message.backend,
+        backend: message.backend.parse().ok(),
         robot: message.robot,
-        task: message.task,
+        task: message.task.parse().ok(),
         unit: message.unit,
-        sampler: message.sampler,
+        sampler: SamplerKind::from_name(&message.sampler),
         seed: message.seed,
         budget: message.budget,
         parameters: message.parameters.into_iter().map(bounds).collect(),
@@ -202,7 +204,30 @@ fn from_session(message: frog::Session) -> SessionInfo {
         started: message.started,
         observe: message.observe,
         gains: message.gains.into_iter().map(bounds).collect(),
-        approve: message.approve,
+        approve: message.approve.parse().unwrap_or_default(),
+        limits: message.limits.map_or_else(HealthLimits::default, |limits| from_health_limits(&limits)),
+    }
+}
+
+fn health_limits(limits: &HealthLimits) -> frog::HealthLimits {
+    frog::HealthLimits {
+        state_age_ms: limits.state_age_ms,
+        loss_share: limits.loss_share,
+        motor_c: limits.motor_c,
+        battery_percent: limits.battery_percent,
+        late_share: limits.late_share,
+        late_ms: limits.late_ms,
+    }
+}
+
+fn from_health_limits(message: &frog::HealthLimits) -> HealthLimits {
+    HealthLimits {
+        state_age_ms: message.state_age_ms,
+        loss_share: message.loss_share,
+        motor_c: message.motor_c,
+        battery_percent: message.battery_percent,
+        late_share: message.late_share,
+        late_ms: message.late_ms,
     }
 }
 

@@ -38,8 +38,8 @@ pub fn table(rows: &[TrialRecord], parameters: &[ParameterInfo], unit: &str) -> 
         let asterisk = if row.verdict == Some(Verdict::Accept) && row.value == Some(best) { "*" } else { "" };
         let mut cells = vec![format!("{asterisk}{}", row.trial)];
         for parameter in parameters {
-            let value = row.parameters.iter().find(|(name, _)| *name == parameter.name);
-            cells.push(value.map_or_else(String::new, |(_, v)| format!("{v:.*}", digits(&parameter.unit))));
+            let value = row.parameters.get(&parameter.name);
+            cells.push(value.map_or_else(String::new, |v| format!("{v:.*}", digits(&parameter.unit))));
         }
         cells.push(row.value.map_or_else(|| "-".into(), |value| format!("{value:.3}")));
         cells.push(row.measured.map_or_else(|| "-".into(), |measured| format!("{:.3}", measured.apex_m)));

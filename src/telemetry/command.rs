@@ -59,3 +59,19 @@ pub enum Command {
         stops: u64,
     },
 }
+
+impl std::fmt::Display for Command {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Command::TakeControl => f.write_str("to take control"),
+            Command::Release => f.write_str("to release the robot"),
+            Command::Arm(_) => f.write_str("to stand up"),
+            Command::Leave => f.write_str("to end the session"),
+            Command::SitDown => f.write_str("to sit down"),
+            Command::RunTrial(spec, _) => write!(f, "trial {}", spec.trial),
+            Command::Cancel => f.write_str("to cancel"),
+            Command::EndReview => f.write_str("to end the review"),
+            Command::Acknowledge { .. } => f.write_str("the acknowledgement"),
+        }
+    }
+}

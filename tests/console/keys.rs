@@ -5,7 +5,7 @@ mod support;
 use quadfrog::recording::record::{Record, SessionInfo, StageRecord};
 use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::telemetry::Mode;
-use quadfrog::trial::{ExperimentStage, Verdict};
+use quadfrog::trial::{Backend, ExperimentStage, Verdict};
 use quadfrog_console::action::{ACTIONS, Action};
 use quadfrog_console::keymap::{Key, Keymap};
 use quadfrog_console::message::{Effect, Msg};
@@ -355,7 +355,7 @@ fn suspending_is_refused_while_the_robot_is_armed() {
 fn suspending_is_refused_while_anything_is_sent_to_a_real_robot() {
     for &mode in Mode::ALL {
         let mut console = Console::proposed();
-        console.record(Record::Session(SessionInfo { backend: "go1".into(), ..session() }));
+        console.record(Record::Session(SessionInfo { backend: Some(Backend::Hardware), ..session() }));
         console.mode(mode);
         let suspends = console.tell(Msg::Suspend) == [Effect::Suspend];
         assert_eq!(suspends, matches!(mode, Mode::Offline | Mode::Observe), "{mode:?}: {}", console.said());

@@ -10,8 +10,8 @@ use quadfrog::robot::{Battery, LinkStatus};
 use quadfrog::session::operator_request::{OperatorCheck, OperatorRequest};
 use quadfrog::telemetry::{ArmingCheck, ArmingCheckState, Counters, Mode, Snapshot};
 use quadfrog::trial::{
-    ExperimentStage, FixedParameter, ParameterInsight, PointRecord, ProposalInsight, SearchStatus, SearchedParameter,
-    Task, TrialRecord, Verdict,
+    Backend, ExperimentStage, FixedParameter, ParameterInsight, PointRecord, ProposalInsight, SearchStatus,
+    SearchedParameter, Task, TrialRecord, Verdict,
 };
 use quadfrog_console::export;
 use quadfrog_console::message::{Effect, Msg};
@@ -226,7 +226,7 @@ fn finished() -> Console {
     for (number, value) in [(0, 0.3), (1, 0.2), (2, 0.61), (3, 0.4)] {
         let row = TrialRecord {
             value: Some(value),
-            gains: vec![("kp".into(), 450.0), ("kd".into(), 8.0)],
+            gains: vec![("kp".into(), 450.0), ("kd".into(), 8.0)].into(),
             ..trial(number, Some(Verdict::Accept), None)
         };
         console.record(Record::Trial(row));
@@ -257,7 +257,7 @@ fn a_finished_study_says_so_and_what_comes_next() {
 fn repeats_are_shown_as_k_of_n_with_their_spread() {
     let mut console = finished();
     let point = |trials: Vec<u32>, stood, mean, deviation, confidence| PointRecord {
-        parameters: vec![("f0".into(), 1.25)],
+        parameters: vec![("f0".into(), 1.25)].into(),
         trials,
         stood,
         mean,
@@ -291,8 +291,8 @@ fn the_best_is_written_as_a_configuration_that_the_program_takes() {
     let best = export::best(&console.model).expect("written");
     assert_eq!(best, folder.path().join("best-trial-2"));
     let config = Config::load(Some(&best)).expect("a configuration");
-    let first: Vec<(String, f64)> = vec![("f0".into(), 1.25), ("Fx".into(), 75.0), ("Fz".into(), 250.0)];
-    assert_eq!(config.first(Task::Forward), first, "the point that a study begins with");
+    let first = vec![("f0".into(), 1.25), ("Fx".into(), 75.0), ("Fz".into(), 250.0)];
+    assert_eq!(*config.first(Task::Forward), first, "the point that a study begins with");
     let gains = config.task(Task::Forward);
     assert_eq!((gains.kp, gains.kd), (450.0, 8.0));
     assert!(export::best(&console.model).expect_err("once").to_string().contains("best-trial-2"), "nothing is lost");
@@ -325,7 +325,7 @@ fn the_best_of_a_continued_study_is_exported_with_its_newest_configuration() {
 /// A Go1 that lies disarmed with this pre-arm list.
 fn on_hardware(list: Vec<ArmingCheckRecord>) -> Console {
     let mut console = Console::proposed();
-    console.record(Record::Session(SessionInfo { backend: "go1".into(), ..session() }));
+    console.record(Record::Session(SessionInfo { backend: Some(Backend::Hardware), ..session() }));
     console.record(Record::ArmingChecks(list));
     console
 }
@@ -480,7 +480,7 @@ fn details_that_do_not_fit_are_reached_with_the_paging_keys() {
         hand_value: Some(0.3),
         ..trial(0, Some(Verdict::Accept), Some(Verdict::Fall))
     };
-    let row = TrialRecord { gains: vec![("kp".into(), 450.0)], ..row };
+    let row = TrialRecord { gains: vec![("kp".into(), 450.0)].into(), ..row };
     console.record(Record::Trial(row));
     console.press(&["2", "Home", "Enter"]);
     let top = console.screen(80, 24);

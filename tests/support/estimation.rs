@@ -3,7 +3,7 @@
 #![allow(dead_code, reason = "test and bench each use their own part")]
 
 use nalgebra::Vector2;
-use quadfrog::config::{Backend, Config};
+use quadfrog::config::Config;
 use quadfrog::control::estimator::Estimator;
 use quadfrog::control::leg::feet;
 use quadfrog::control::settings::{ControlSettings, ObjectiveSource};
@@ -13,7 +13,7 @@ use quadfrog::session::objective;
 use quadfrog::session::rollout::Rollout;
 use quadfrog::sim::{ActuatorKind, SimConfig, Simulator};
 use quadfrog::telemetry::{Tick, TrialEnd, TrialSpec};
-use quadfrog::trial::{JumpParameters, MeasuredJump, Task, Verdict};
+use quadfrog::trial::{Backend, JumpParameters, MeasuredJump, Task, Verdict};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use proptest::prelude::*;
+use quadfrog::optimize::ask::SamplerKind;
 use quadfrog::recording::player::{Played, Player};
 use quadfrog::recording::record::*;
 use quadfrog::recording::writer::Writer;
@@ -176,11 +177,13 @@ impl Draw {
         match kind {
             0 => Record::Session(SessionInfo {
                 version: self.string(),
-                backend: self.string(),
+                backend: self.option(|d| d.one_of(&[Backend::Simulator, Backend::Hardware])),
                 robot: self.string(),
-                task: self.string(),
+                task: self.option(|d| d.one_of(&Task::ALL)),
                 unit: self.string(),
-                sampler: self.string(),
+                sampler: self.option(|d| {
+                    d.one_of(&[SamplerKind::Tpe, SamplerKind::Gp, SamplerKind::Random, SamplerKind::Sobol])
+                }),
                 seed: self.word(),
                 budget: self.word() as u32,
                 parameters: self.several(|d| ParameterInfo {
@@ -199,7 +202,15 @@ impl Draw {
                     low: d.number(),
                     high: d.number(),
                 }),
-                approve: self.string(),
+                approve: self.one_of(&Approval::ALL),
+                limits: HealthLimits {
+                    state_age_ms: self.word() as u32,
+                    loss_share: self.number(),
+                    motor_c: self.number(),
+                    battery_percent: self.number(),
+                    late_share: self.number(),
+                    late_ms: self.number(),
+                },
             }),
             1 => Record::Transition(Transition {
                 from: self.one_of(Mode::ALL),
@@ -232,7 +243,7 @@ impl Draw {
                 trial: self.word() as u32,
                 source: self.one_of(&ProposalSource::ALL),
                 parent: self.option(|d| d.word() as u32),
-                parameters: self.several(|d| (d.string(), d.number())),
+                parameters: self.several(|d| (d.string(), d.number())).into(),
                 measured: self.option(|d| MeasuredJump {
                     dx_m: d.number(),
                     dy_m: d.number(),
@@ -247,7 +258,7 @@ impl Draw {
                 verdict: self.option(|d| d.one_of(&Verdict::ALL)),
                 note: self.string(),
                 risk: self.risk(),
-                gains: self.several(|d| (d.string(), d.number())),
+                gains: self.several(|d| (d.string(), d.number())).into(),
             }),
             5 => Record::Request(RequestRecord { wish: self.string(), accepted: self.yes(), answer: self.string() }),
             6 => Record::Counters(Counters {
@@ -296,7 +307,7 @@ impl Draw {
                 }),
             }),
             _ => Record::Points(self.several(|d| PointRecord {
-                parameters: d.several(|d| (d.string(), d.number())),
+                parameters: d.several(|d| (d.string(), d.number())).into(),
                 trials: d.several(|d| d.word() as u32),
                 stood: d.word() as u32,
                 mean: d.number(),
@@ -329,11 +340,11 @@ pub fn session() -> SessionInfo {
         |name: &str, unit: &str, low, high| ParameterInfo { name: name.into(), unit: unit.into(), low, high };
     SessionInfo {
         version: "0.1.0".into(),
-        backend: "sim".into(),
+        backend: Some(Backend::Simulator),
         robot: "go1".into(),
-        task: "forward".into(),
+        task: Some(Task::Forward),
         unit: "m".into(),
-        sampler: "tpe".into(),
+        sampler: Some(SamplerKind::Tpe),
         seed: 7,
         budget: 20,
         parameters: vec![
@@ -346,7 +357,8 @@ pub fn session() -> SessionInfo {
         started: "2026-11-21T00:00:00Z".into(),
         observe: false,
         gains: vec![parameter("kp", "N/m", 100.0, 1000.0)],
-        approve: "each".into(),
+        approve: Approval::Each,
+        limits: HealthLimits::default(),
     }
 }
 
@@ -424,7 +436,8 @@ pub fn study(seconds: u64) -> (Vec<Tick>, Vec<Stamped>) {
                 trial,
                 source: ProposalSource::Sampler,
                 parent: None,
-                parameters: vec![("f0".into(), 1.25), ("Fx".into(), 100.0 + f64::from(trial)), ("Fz".into(), 250.0)],
+                parameters: vec![("f0".into(), 1.25), ("Fx".into(), 100.0 + f64::from(trial)), ("Fz".into(), 250.0)]
+                    .into(),
                 measured: None,
                 value: verdict.map(|_| 0.1 * f64::from(trial)),
                 hand_value: None,
@@ -433,7 +446,7 @@ pub fn study(seconds: u64) -> (Vec<Tick>, Vec<Stamped>) {
                 verdict,
                 note: String::new(),
                 risk: None,
-                gains: Vec::new(),
+                gains: ParameterValues::default(),
             })
         };
         add(start - 500, stage(ExperimentStage::Proposed));

@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 
 use quadfrog::config::{Config, ConfigError};
 use quadfrog::engine::newest_config;
-use quadfrog::trial::Task;
 
 use crate::model::Model;
 use crate::text;
@@ -57,7 +56,7 @@ pub fn table(model: &Model) -> Result<PathBuf, ExportError> {
 /// When no trial was accepted, the study's configuration cannot be read, or a file is there already or cannot be written.
 pub fn best(model: &Model) -> Result<PathBuf, ExportError> {
     let best = model.session.trials.best().ok_or(ExportError::NoBest)?;
-    let task = Task::from_name(&model.session.info.task).ok_or(ExportError::NoBest)?;
+    let task = model.session.info.task.ok_or(ExportError::NoBest)?;
     let study = folder(model);
     let as_run = newest_config(&study).map(|(_, config)| config);
     let config = Config::load(as_run.as_deref())?;

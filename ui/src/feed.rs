@@ -35,7 +35,7 @@ impl Feed {
     /// Sends the operator heartbeat.
     pub fn beat(&self) {
         if let Feed::Live(handle) = self {
-            handle.beat();
+            handle.send_heartbeat();
         }
     }
 
@@ -65,7 +65,7 @@ impl Feed {
     /// Sends a request to the session.
     pub fn request(&self, request: OperatorRequest) {
         if let Feed::Live(handle) = self {
-            handle.wish(request);
+            handle.request(request);
         }
     }
 

@@ -4,12 +4,14 @@
 
 use std::time::Duration;
 
+use quadfrog::optimize::ask::SamplerKind;
 use quadfrog::recording::record::{
-    ArmingCheckRecord, Record, RequestRecord, SessionInfo, StageRecord, Stamped, Transition,
+    ArmingCheckRecord, HealthLimits, Record, RequestRecord, SessionInfo, StageRecord, Stamped, Transition,
 };
 use quadfrog::telemetry::{ArmingCheck, ArmingCheckState, Mode, Phase, Snapshot, Tick};
 use quadfrog::trial::{
-    ExperimentStage, MeasuredJump, ParameterInfo, Proposal, ProposalSource, ProposedParameter, TrialRecord, Verdict,
+    Approval, Backend, ExperimentStage, MeasuredJump, ParameterInfo, Proposal, ProposalSource, ProposedParameter, Task,
+    TrialRecord, Verdict,
 };
 use quadfrog_console::keymap::Key;
 use quadfrog_console::message::{Effect, Msg};
@@ -178,11 +180,11 @@ pub fn session() -> SessionInfo {
         |name: &str, unit: &str, low, high| ParameterInfo { name: name.into(), unit: unit.into(), low, high };
     SessionInfo {
         version: "0.1.0".into(),
-        backend: "sim".into(),
+        backend: Some(Backend::Simulator),
         robot: "go1".into(),
-        task: "forward".into(),
+        task: Some(Task::Forward),
         unit: "m".into(),
-        sampler: "tpe".into(),
+        sampler: Some(SamplerKind::Tpe),
         seed: 0,
         budget: 20,
         parameters: vec![
@@ -200,7 +202,8 @@ pub fn session() -> SessionInfo {
             parameter("kd_joint", "N m s/rad", 0.0, 3.0),
             parameter("k_att", "N/m", 0.0, 600.0),
         ],
-        approve: "each".into(),
+        approve: Approval::Each,
+        limits: HealthLimits::default(),
     }
 }
 
@@ -232,7 +235,7 @@ pub fn trial(number: u32, verdict: Option<Verdict>, suggested: Option<Verdict>) 
         trial: number,
         source: ProposalSource::Sampler,
         parent: None,
-        parameters: vec![("f0".into(), 1.25), ("Fx".into(), 75.0), ("Fz".into(), 250.0)],
+        parameters: vec![("f0".into(), 1.25), ("Fx".into(), 75.0), ("Fz".into(), 250.0)].into(),
         measured: Some(MeasuredJump { dx_m: 0.42, dy_m: -0.01, dyaw_rad: 0.02, apex_m: 0.3, air_s: 0.25 }),
         value,
         hand_value: None,
@@ -242,7 +245,7 @@ pub fn trial(number: u32, verdict: Option<Verdict>, suggested: Option<Verdict>) 
         verdict,
         note: String::new(),
         risk: None,
-        gains: Vec::new(),
+        gains: Vec::new().into(),
     }
 }
 

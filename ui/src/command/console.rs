@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use clap::builder::TypedValueParser;
-use quadfrog::config::{Backend, Config};
-use quadfrog::engine::{Engine, Options};
+use quadfrog::config::Config;
+use quadfrog::engine::{self, Options};
 use quadfrog::robot::go1::Network;
-use quadfrog::trial::{Approval, Task};
+use quadfrog::trial::{Approval, Backend, Task};
 use quadfrog_console::app::{self, ConsoleExit, ConsoleOptions};
 use quadfrog_console::feed::Feed;
 use quadfrog_console::settings::ConsoleSettings;
@@ -118,7 +118,7 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
     };
     let folder = selected.folder.clone();
     let incomplete = incomplete_recordings(&folder);
-    let handle = Engine::start(Options {
+    let handle = engine::start(Options {
         seed: selected.seed,
         trials: arguments.study.trials.or(selected.budget),
         // An observer writes no files.

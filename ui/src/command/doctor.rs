@@ -7,10 +7,11 @@ use std::time::Duration;
 
 use clap::Args;
 use color_eyre::eyre::eyre;
-use quadfrog::config::{Backend, Config};
+use quadfrog::config::Config;
 use quadfrog::realtime::scheduling::{ALLOW_LOCKING, ALLOW_PRIORITY, Scheduling};
 use quadfrog::realtime::{system, thread};
 use quadfrog::recording::disk;
+use quadfrog::trial::Backend;
 use quadfrog_console::connection::TerminalLocation;
 
 use super::failure::Failure;

@@ -8,7 +8,7 @@ use std::sync::{Mutex, PoisonError};
 
 use clap::{Args, ValueEnum};
 use color_eyre::eyre::eyre;
-use quadfrog::config::{Backend, Config};
+use quadfrog::config::Config;
 use quadfrog::engine::{self, EngineError, Options, StoredStudy};
 use quadfrog::optimize::journal::Durability;
 use quadfrog::optimize::study::Storage;
@@ -19,7 +19,7 @@ use quadfrog::session::automatic;
 use quadfrog::session::rollout::Rollout;
 use quadfrog::sim::Simulator;
 use quadfrog::telemetry::Tick;
-use quadfrog::trial::{Approval, Task, TrialRecord, Verdict};
+use quadfrog::trial::{Approval, Backend, Task, TrialRecord, Verdict};
 
 use printer::Printer;
 
@@ -215,15 +215,15 @@ fn run_one(
         None => None,
     };
     // Synced: a judged trial is on disk before the next one is proposed.
-    let mut life = engine::open_life(&options, Durability::Synced, name.as_deref().unwrap_or_default())?;
+    let mut experiment = engine::open_experiment(&options, Durability::Synced, name.as_deref().unwrap_or_default())?;
     let mut recorder = match &recording {
         Some(path) => Some(StudyRecorder::create(path, &options)?),
         None => None,
     };
     let mut failed = None;
     let mut best: Option<(TrialRecord, Vec<Tick>)> = None;
-    let ran = automatic::run_watched(&mut life, &mut rollout, |life, row, ticks| {
-        printer.trial(study, row, life.counted());
+    let ran = automatic::run_watched(&mut experiment, &mut rollout, |experiment, row, ticks| {
+        printer.trial(study, row, experiment.counted());
         let accepted = row.verdict == Some(Verdict::Accept);
         let better = |best: &(TrialRecord, Vec<Tick>)| row.value > best.0.value;
         match arguments.record {
@@ -244,7 +244,7 @@ fn run_one(
         if let Some((row, ticks)) = &best {
             recorder.trial(row, ticks).map_err(EngineError::from)?;
         }
-        for row in life.rows() {
+        for row in experiment.rows() {
             recorder.row(row).map_err(EngineError::from)?;
         }
         recorder.finish().map_err(EngineError::from)?;
@@ -256,7 +256,7 @@ fn run_one(
         let place = join.map_or_else(|| study.folder.display().to_string(), ToString::to_string);
         return Err(Failure::Other(eyre!("{place}: {refusal}")));
     }
-    printer.finished(study, &life.rows().cloned().collect::<Vec<_>>(), life.best(), &options);
+    printer.finished(study, &experiment.rows().cloned().collect::<Vec<_>>(), experiment.best(), &options);
     Ok(())
 }
 
@@ -269,8 +269,7 @@ struct StudyRecorder {
 impl StudyRecorder {
     fn create(path: &Path, options: &Options) -> Result<StudyRecorder, EngineError> {
         let info = engine::session_info(options, &path.display().to_string());
-        let mut writer = Writer::create(path, &info, engine::utc_ns(), &engine::attachments(&options.config))?;
-        writer.record(&Stamped { time_ns: 0, record: Record::Session(info) })?;
+        let writer = Writer::create(path, &info, engine::utc_ns(), &engine::attachments(&options.config))?;
         Ok(StudyRecorder { writer, time_ns: 0 })
     }
 

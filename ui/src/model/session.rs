@@ -3,8 +3,7 @@
 use quadfrog::recording::record::{ArmingCheckRecord, SessionInfo, StageRecord};
 use quadfrog::session::objective;
 use quadfrog::trial::{
-    ExperimentStage, ParameterInfo, Proposal, ProposalInsight, SearchStatus, SearchedParameter, Task, TrialRecord,
-    Verdict,
+    ExperimentStage, ParameterInfo, Proposal, ProposalInsight, SearchStatus, SearchedParameter, TrialRecord, Verdict,
 };
 
 use super::log::SessionLog;
@@ -58,7 +57,7 @@ impl SessionModel {
 
     /// Whether the session drives hardware.
     pub fn is_hardware(&self) -> bool {
-        !matches!(self.info.backend.as_str(), "" | "sim")
+        self.info.is_hardware()
     }
 
     /// The letters that arm the robot, typed in order: on hardware several, against a single accidental press.
@@ -105,6 +104,6 @@ impl SessionModel {
 
     /// The measured objective of a trial, before any verdict.
     pub fn measured_objective(&self, trial: &TrialRecord) -> Option<f64> {
-        Some(objective::value(Task::from_name(&self.info.task)?, &trial.measured?, 1))
+        Some(objective::value(self.info.task?, &trial.measured?, 1))
     }
 }

@@ -41,7 +41,12 @@ pub(super) fn take(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
         Record::Session(info) => {
             let text = format!(
                 "{} on {} ({}), {} {}, seed {}",
-                info.task, info.robot, info.backend, info.sampler, info.version, info.seed
+                info.task_name(),
+                info.robot,
+                info.backend_name(),
+                info.sampler_name(),
+                info.version,
+                info.seed
             );
             model.session.info = info;
             log(model, time_ns, LogLevel::Info, "session", text, false);

@@ -8,6 +8,7 @@
 use quadfrog::recording::record::LogLevel;
 use quadfrog::robot::joint_name;
 use quadfrog::telemetry::Mode;
+use quadfrog::trial::{Approval, Backend};
 use ratatui::Frame;
 use ratatui::layout::{Alignment, Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
@@ -52,11 +53,11 @@ pub fn mode_span(model: &Model) -> Span<'static> {
 /// The driven machine, in words and colour.
 fn backend(model: &Model) -> Span<'static> {
     let theme = &model.theme;
-    match model.session.info.backend.as_str() {
+    match model.session.info.backend {
         _ if model.replay.is_some() => span(theme, Role::Heading, "REPLAY"),
-        "" => span(theme, Role::Quiet, "starting"),
-        "sim" => span(theme, Role::Heading, "SIM"),
-        hardware => span(theme, Role::Hardware, format!(" {} ", hardware.to_uppercase())),
+        None => span(theme, Role::Quiet, "starting"),
+        Some(Backend::Simulator) => span(theme, Role::Heading, "SIM"),
+        Some(hardware) => span(theme, Role::Hardware, format!(" {} ", hardware.name().to_uppercase())),
     }
 }
 
@@ -70,15 +71,15 @@ fn identity(model: &Model, width: u16, room: usize) -> Line<'static> {
     }
     // A narrow terminal has room for the best value only if the words are left out.
     let narrow = width < 100;
-    if !matches!(session.approve.as_str(), "" | "each") && model.replay.is_none() {
-        let approve = session.approve.to_uppercase();
+    if session.approve != Approval::Each && model.replay.is_none() {
+        let approve = session.approve.name().to_uppercase();
         spans.push(span(
             theme,
             Role::Warning,
             if narrow { format!("{approve}  ") } else { format!("APPROVE {approve}  ") },
         ));
     }
-    spans.push(Span::raw(session.task.clone()));
+    spans.push(Span::raw(session.task_name()));
     if let Some(info) = model.session.stage {
         let (finished, budget) = (model.session.counted(), model.session.budget());
         let text = match narrow {
@@ -138,19 +139,23 @@ fn condition(model: &Model, width: u16) -> Vec<Span<'static>> {
     };
     let snapshot = &model.snapshot;
     let counters = &snapshot.counters;
+    let limits = &model.session.info.limits;
     let late_share = counters.late_ticks as f64 / snapshot.tick.number.max(1) as f64;
     let late = match narrow {
         true => format!("{} late", counters.late_ticks),
         false => format!("{} late, worst {:.1} ms", counters.late_ticks, counters.worst_lateness_ns as f64 / 1e6),
     };
-    part("loop ", warning(late_share > 0.001), late);
-    match (counters.link, model.session.info.backend.as_str()) {
-        (_, "") => {}
-        (None, "sim") => part("link ", Role::Quiet, "none: SIM".to_owned()),
-        (None, _) => part("link ", bad(counters.state_age_ms > 5), format!("{} ms", counters.state_age_ms)),
+    part("loop ", warning(late_share > limits.late_share), late);
+    match (counters.link, model.session.info.backend) {
+        (_, None) => {}
+        (None, Some(Backend::Simulator)) => part("link ", Role::Quiet, "none: SIM".to_owned()),
+        (None, _) => {
+            part("link ", bad(counters.state_age_ms > limits.state_age_ms), format!("{} ms", counters.state_age_ms))
+        }
         (Some(link), _) => {
             let loss = 100.0 * link.loss_share();
-            let role = bad(link.state_age_ms > 5 || loss >= 1.0 || link.rate_hz == 0);
+            let lossy = loss >= 100.0 * limits.loss_share;
+            let role = bad(link.state_age_ms > limits.state_age_ms || lossy || link.rate_hz == 0);
             part("link ", role, format!("{} ms, {loss:.1} % lost", link.state_age_ms));
         }
     }
@@ -158,11 +163,19 @@ fn condition(model: &Model, width: u16) -> Vec<Span<'static>> {
     let hottest = temperatures.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1));
     if let Some((joint, hottest)) = hottest.filter(|(_, hottest)| *hottest > 0.0) {
         let joint = if narrow { String::new() } else { format!(" {}", joint_name(joint)) };
-        part(if narrow { "motor " } else { "hottest " }, bad(hottest >= 60.0), format!("{hottest:.0} C{joint}"));
+        part(
+            if narrow { "motor " } else { "hottest " },
+            bad(f64::from(hottest) >= limits.motor_c),
+            format!("{hottest:.0} C{joint}"),
+        );
     }
     if let Some(battery) = snapshot.tick.state.battery {
         let charge = battery.charge_percent;
-        part(if narrow { "bat " } else { "battery " }, bad(charge < 30.0), format!("{charge:.0} %"));
+        part(
+            if narrow { "bat " } else { "battery " },
+            bad(f64::from(charge) < limits.battery_percent),
+            format!("{charge:.0} %"),
+        );
     }
     let age_ms = model.clock.saturating_sub(model.snapshot_at).as_millis();
     if age_ms > STALE_MS && model.replay.is_none() {

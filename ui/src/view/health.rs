@@ -6,6 +6,7 @@
 //! wake-up      p50 61 us, p99 94 us ...
 //! ```
 
+use quadfrog::recording::record::HealthLimits;
 use quadfrog::recording::recorder::RecorderStatus;
 use quadfrog::robot::{JOINTS, LinkStatus, joint_name};
 use quadfrog::telemetry::{ArmingCheck, StageTimes};
@@ -88,6 +89,7 @@ fn percentile(sorted: &[u32], share: f64) -> f64 {
 fn timing_rows(model: &Model) -> Vec<HealthRow> {
     let tick = &model.snapshot.tick;
     let counters = &model.snapshot.counters;
+    let limits = &model.session.info.limits;
     let share = counters.late_ticks as f64 / tick.number.max(1) as f64;
     let sorted = |value: fn(&ChartSample) -> u32| {
         let mut values: Vec<u32> = model.history.samples().map(value).collect();
@@ -102,8 +104,8 @@ fn timing_rows(model: &Model) -> Vec<HealthRow> {
     let worst_ms = counters.worst_lateness_ns as f64 / 1e6;
     vec![
         row("ticks", tick.number.to_string(), false),
-        row("late ticks", format!("{} ({:.3} %)", counters.late_ticks, share * 100.0), share > 0.001),
-        row("worst", format!("{worst_ms:.2} ms late"), worst_ms > 10.0),
+        row("late ticks", format!("{} ({:.3} %)", counters.late_ticks, share * 100.0), share > limits.late_share),
+        row("worst", format!("{worst_ms:.2} ms late"), worst_ms > limits.late_ms),
         row("wake-up", micro(&late), percentile(&late, 0.99) > 5e5),
         row("tick takes", micro(&busy), percentile(&busy, 0.99) > 5e5),
         row("stages, us", stages(&tick.stages), false),
@@ -169,11 +171,16 @@ fn recorder_rows(model: &Model) -> Vec<HealthRow> {
 fn robot_rows(model: &Model) -> Vec<HealthRow> {
     let tick = &model.snapshot.tick;
     let counters = &model.snapshot.counters;
+    let limits = &model.session.info.limits;
     let mut rows = Vec::new();
     match counters.link {
-        Some(link) => rows.extend(link_rows(&link)),
+        Some(link) => rows.extend(link_rows(&link, limits)),
         None if model.session.is_hardware() => {
-            rows.push(row("state age", format!("{} ms", counters.state_age_ms), counters.state_age_ms > 5));
+            rows.push(row(
+                "state age",
+                format!("{} ms", counters.state_age_ms),
+                counters.state_age_ms > limits.state_age_ms,
+            ));
         }
         None => rows.push(row("link", "SIM: no link".to_owned(), false)),
     }
@@ -183,7 +190,8 @@ fn robot_rows(model: &Model) -> Vec<HealthRow> {
             let cells: Vec<f64> = battery.cell_v.into_iter().filter(|v| *v > 0.0).collect();
             let low = cells.iter().copied().fold(f64::INFINITY, f64::min);
             let high = cells.iter().copied().fold(0.0, f64::max);
-            rows.push(row("battery", format!("{:.0} %", battery.charge_percent), battery.charge_percent < 30.0));
+            let low_charge = f64::from(battery.charge_percent) < limits.battery_percent;
+            rows.push(row("battery", format!("{:.0} %", battery.charge_percent), low_charge));
             rows.push(row("", format!("{:.1} V, {:.1} A", battery.voltage_v, battery.current_a), false));
             if !cells.is_empty() {
                 rows.push(row("cells", format!("{low:.3} to {high:.3} V",), high - low > 0.1));
@@ -210,11 +218,15 @@ fn disk_row(model: &Model) -> HealthRow {
     }
 }
 
-fn link_rows(link: &LinkStatus) -> Vec<HealthRow> {
+fn link_rows(link: &LinkStatus, limits: &HealthLimits) -> Vec<HealthRow> {
     let loss = 100.0 * link.loss_share();
     vec![
-        row("states", format!("{} Hz, newest {} ms old", link.rate_hz, link.state_age_ms), link.state_age_ms > 5),
-        row("lost", format!("{loss:.2} % of 5 s, {} in all", link.lost), loss >= 1.0),
+        row(
+            "states",
+            format!("{} Hz, newest {} ms old", link.rate_hz, link.state_age_ms),
+            link.state_age_ms > limits.state_age_ms,
+        ),
+        row("lost", format!("{loss:.2} % of 5 s, {} in all", link.lost), loss >= 100.0 * limits.loss_share),
         row(
             "unusual",
             format!("{} out of order, {} duplicate, {} unknown source", link.late, link.duplicate, link.foreign),
@@ -239,7 +251,7 @@ fn motor_rows(model: &Model) -> Vec<HealthRow> {
         let limited = if tick.limited & (1 << joint) != 0 { " limited" } else { "" };
         let (q, torque) = (tick.state.joint_position[joint], tick.state.joint_torque[joint]);
         let text = format!("{temperature:3.0} C {state:<3}{q:+6.2} rad{torque:+6.1} N m{limited}");
-        rows.push((joint_name(joint), text, temperature >= 60.0));
+        rows.push((joint_name(joint), text, f64::from(temperature) >= model.session.info.limits.motor_c));
     }
     rows
 }

@@ -84,11 +84,11 @@ fn render_scatter(frame: &mut Frame, area: Rect, session: &SessionModel, theme: 
         session.trials.records.values().filter(|trial| trial.verdict != Some(Verdict::Void)).collect();
     trials.sort_by_key(|trial| best == Some(trial.trial));
     for trial in trials {
-        let Some((_, value)) = trial.parameters.iter().find(|(name, _)| *name == info.name) else { continue };
+        let Some(value) = trial.parameters.get(&info.name) else { continue };
         let Some(objective) = trial.value else { continue };
         let (mark, role) = sign(trial.verdict);
         let mark = if best == Some(trial.trial) { "*" } else { mark };
-        buffer.set_string(column(*value), row(objective), mark, theme.style(role));
+        buffer.set_string(column(value), row(objective), mark, theme.style(role));
     }
     let (low, high) = (number(info.low), number(info.high));
     buffer.set_string(scale.x, scale.y, &low, theme.style(Role::Quiet));

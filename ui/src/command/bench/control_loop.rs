@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use clap::Args;
 use color_eyre::eyre::{WrapErr, eyre};
-use quadfrog::config::{Backend, Config};
+use quadfrog::config::Config;
 use quadfrog::control::control_loop::ControlLoop;
 use quadfrog::control::settings::ControlSettings;
 use quadfrog::realtime::channel::{ScreenEnd, SessionEnd, channels};
@@ -23,7 +23,7 @@ use quadfrog::robot::{Placement, Robot};
 use quadfrog::sim::Simulator;
 use quadfrog::sim::emulator::Emulator;
 use quadfrog::telemetry::{Command, Event, Mode, Permit, Tick};
-use quadfrog::trial::Task;
+use quadfrog::trial::{Backend, Task};
 
 use super::machine::{self, Durations, PERIOD, durations};
 use crate::command::failure::Failure;

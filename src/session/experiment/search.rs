@@ -1,64 +1,53 @@
-//! Bounds and fixed parameters as the operator has set them in mid-study. They are attributes of the study itself, so that
-//! every session and every worker searches the same.
+//! Bounds and fixed parameters that the operator sets during a study. They are attributes of the study, so that every
+//! session and every worker searches the same space.
 
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
-use serde_json::{Value, json};
 
-use super::attributes;
+use super::attributes::{self, Attributes, StudyAttributes, TrialAttributes};
 use crate::optimize::space::{Range, Space};
 use crate::optimize::study::{Study, StudyError};
 use crate::optimize::trial::{Trial, TrialState};
 use crate::session::experiment::ExperimentPlan;
 use crate::trial::{FixedParameter, ParameterInfo, SearchStatus, SearchedParameter};
 
-/// Study attribute: changed bounds, `{"Fx": [40, 110]}`.
-const BOUNDS: &str = "bounds";
-/// Study attribute: fixed parameters, `{"Fx": {"value": 60, "trials": 5, "from": 12}}`.
-const FIXED: &str = "fixed";
-
-/// What differs from the configuration.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Searched {
+/// Differences of the search space from the configuration.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct SearchSettings {
     bounds: BTreeMap<String, [f64; 2]>,
-    fixed: BTreeMap<String, Hold>,
+    fixed: BTreeMap<String, FixedFrom>,
 }
 
-/// A parameter that is not searched for some trials.
+/// A parameter that is fixed for some trials.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-struct Hold {
+pub struct FixedFrom {
     value: f64,
-    /// For how many trials.
+    /// Number of trials.
     trials: u32,
-    /// Number of the first trial that it applied to.
+    /// Number of the first trial.
     from: u32,
 }
 
-impl Searched {
-    /// As kept with the study; what the plan does not allow (any more) is left out.
-    pub fn of(study: &Study, plan: &ExperimentPlan) -> Searched {
-        let kept = |key: &str| study.attributes().get(key).cloned().unwrap_or(Value::Null);
-        let mut searched = Searched {
-            bounds: serde_json::from_value(kept(BOUNDS)).unwrap_or_default(),
-            fixed: serde_json::from_value(kept(FIXED)).unwrap_or_default(),
-        };
+impl SearchSettings {
+    /// Reads the settings of the study; those outside the plan's widest bounds are left out.
+    pub fn of(study: &Study, plan: &ExperimentPlan) -> SearchSettings {
+        let StudyAttributes { bounds, fixed, .. } = StudyAttributes::of(study.attributes());
+        let (mut bounds, mut fixed) = (bounds.unwrap_or_default(), fixed.unwrap_or_default());
         let widest = |name: &String| plan.widest.iter().find(|parameter| parameter.name == *name);
-        searched.bounds.retain(|name, [low, high]| {
+        bounds.retain(|name, [low, high]| {
             widest(name).is_some_and(|widest| low < high && *low >= widest.low && *high <= widest.high)
         });
-        searched.fixed.retain(|name, hold| {
-            widest(name).is_some_and(|widest| hold.value >= widest.low && hold.value <= widest.high)
-        });
-        searched
+        fixed.retain(|name, fixed| widest(name).is_some_and(|widest| widest.contains(fixed.value)));
+        SearchSettings { bounds, fixed }
     }
 
-    /// To be kept with the study.
-    pub fn attributes(&self) -> Vec<(String, Value)> {
-        vec![(BOUNDS.to_owned(), json!(self.bounds)), (FIXED.to_owned(), json!(self.fixed))]
+    /// Returns the attributes of the study.
+    pub fn attributes(&self) -> Attributes {
+        attributes::write(self)
     }
 
-    /// The parameters with their present bounds, in table order.
+    /// Returns the parameters with their present bounds, in table order.
     pub fn parameters(&self, plan: &ExperimentPlan) -> Vec<ParameterInfo> {
         let present = |parameter: &ParameterInfo| match self.bounds.get(&parameter.name) {
             Some([low, high]) => ParameterInfo { low: *low, high: *high, ..parameter.clone() },
@@ -77,26 +66,28 @@ impl Searched {
         }
         match Space::new(space) {
             Ok(space) => study.search(space),
-            Err(_) => unreachable!("bounds were checked when they were taken up"),
+            // The configured bounds hold: both the configuration and `of` refuse bounds that are no range.
+            Err(_) => Ok(()),
         }
     }
 
-    /// The parameters that are fixed for the next trial, with their values and for how many trials more. Void trials do
-    /// not use up any.
+    /// Returns the parameters that are fixed for the next trial, with the number of trials left. A void trial uses up
+    /// none.
     pub fn fixed(&self, trials: &[Trial]) -> BTreeMap<String, FixedParameter> {
-        let left = |(name, hold): (&String, &Hold)| {
+        let left = |(name, fixed): (&String, &FixedFrom)| {
             let ran = |trial: &&Trial| {
-                trial.number >= hold.from
+                trial.number >= fixed.from
                     && !matches!(trial.state, TrialState::Fail | TrialState::Waiting)
-                    && attributes::was_fixed(trial, name, hold.value)
+                    && TrialAttributes::of(trial).fixed.get(name) == Some(fixed.value)
             };
             let ran = trials.iter().filter(ran).count() as u32;
-            (ran < hold.trials).then(|| (name.clone(), FixedParameter { value: hold.value, trials: hold.trials - ran }))
+            let left = FixedParameter { value: fixed.value, trials: fixed.trials.saturating_sub(ran) };
+            (left.trials > 0).then(|| (name.clone(), left))
         };
         self.fixed.iter().filter_map(left).collect()
     }
 
-    /// Sets the bounds of a parameter; those of the configuration are no change.
+    /// Sets the bounds of a parameter; the configured bounds are no difference.
     pub fn set_bounds(&mut self, name: &str, low: f64, high: f64, plan: &ExperimentPlan) {
         let configured = plan.parameters.iter().any(|p| p.name == name && p.low == low && p.high == high);
         if configured {
@@ -108,16 +99,16 @@ impl Searched {
 
     /// Fixes a parameter for `trials` trials from number `from` on.
     pub fn fix(&mut self, name: &str, value: f64, trials: u32, from: u32) {
-        self.fixed.insert(name.to_owned(), Hold { value, trials, from });
+        self.fixed.insert(name.to_owned(), FixedFrom { value, trials, from });
     }
 
-    /// Lets a parameter be searched again; whether it was fixed.
+    /// Lets a parameter be searched again. Returns whether it was fixed.
     pub fn unfix(&mut self, name: &str) -> bool {
         self.fixed.remove(name).is_some()
     }
 
-    /// For the screen.
-    pub fn record(
+    /// Returns the record for the screen and the recording.
+    pub fn status(
         &self,
         plan: &ExperimentPlan,
         counted: u32,

@@ -1,4 +1,4 @@
-//! A study without a robot: jumps that go as far as their parameters say.
+//! A study without a robot: the length of a jump is a function of its parameters.
 #![allow(dead_code, reason = "each test uses its own part")]
 
 use std::path::Path;
@@ -68,11 +68,11 @@ pub fn bounds(of: impl Fn(f64, f64) -> (f64, f64)) -> Vec<ParameterInfo> {
     BOUNDS.map(info).to_vec()
 }
 
-pub fn life(budget: u32) -> Experiment {
+pub fn experiment(budget: u32) -> Experiment {
     Experiment::open(plan(budget), study(Storage::Memory)).unwrap()
 }
 
-/// A jump that goes as far as the parameters say: smooth, and different everywhere.
+/// Length of a jump, m: a smooth function of the parameters.
 pub fn far(spec: &TrialSpec) -> f64 {
     let (f, x, z) = (spec.jump.f0_hz - 1.2, spec.jump.fx_n / 150.0 - 0.7, spec.jump.fz_n / 350.0 - 0.6);
     0.7 - f * f - x * x - z * z
@@ -89,31 +89,31 @@ pub fn ticks(trial: u32, dx_m: f64) -> Vec<Tick> {
         .to_vec()
 }
 
-/// Approves what is on the table, lets it end as `end` and brings it to review.
-pub fn run(life: &mut Experiment, end: TrialEnd) -> TrialSpec {
-    let card = life.proposal().expect("a proposal");
-    let spec = life.approve(card.trial, card.revision).unwrap();
-    life.ended(spec.trial, &end, &ticks(spec.trial, far(&spec)), 2);
-    assert_eq!(life.stage(), ExperimentStage::Review);
+/// Approves the proposal and ends its trial with `end`, up to the review.
+pub fn run(experiment: &mut Experiment, end: TrialEnd) -> TrialSpec {
+    let card = experiment.proposal().expect("a proposal");
+    let spec = experiment.approve(card.trial, card.revision).unwrap();
+    experiment.ended(spec.trial, &end, &ticks(spec.trial, far(&spec)), 2);
+    assert_eq!(experiment.stage(), ExperimentStage::Review);
     spec
 }
 
-pub fn accept(life: &mut Experiment) -> TrialSpec {
-    let spec = run(life, TrialEnd::Settled);
-    life.judge(Verdict::Accept, false).unwrap();
+pub fn accept(experiment: &mut Experiment) -> TrialSpec {
+    let spec = run(experiment, TrialEnd::Settled);
+    experiment.judge(Verdict::Accept, false).unwrap();
     spec
 }
 
-pub fn parameters(life: &Experiment) -> Vec<f64> {
-    life.proposal().unwrap().parameters.iter().map(|p| p.value).collect()
+pub fn parameters(experiment: &Experiment) -> Vec<f64> {
+    experiment.proposal().unwrap().parameters.iter().map(|p| p.value).collect()
 }
 
-/// The study in `folder`, taken up as a session does it.
+/// Opens the study in `folder` as a session does.
 pub fn open(folder: &Path) -> Experiment {
     Experiment::open(plan(1000), study(Storage::File(folder.join("study.log")))).unwrap()
 }
 
-/// One more worker on the study in `folder`, to whom a trial is dead that it has seen run for `abandoned`.
+/// Joins the study in `folder` as one more worker; see [`ExperimentPlan::abandoned`].
 pub fn joined(folder: &Path, budget: u32, abandoned: Duration) -> Experiment {
     let mut study = study(Storage::File(folder.join("study.log")));
     let worker = study.join().unwrap();
