@@ -317,7 +317,7 @@ fn details_tell_everything_that_is_known_of_a_trial() {
     let again = TrialRecord { parent: Some(0), hand_value: Some(0.37), ..trial(1, Some(Verdict::Accept), None) };
     console.tell(Msg::Record(quadfrog::recording::record::Stamped {
         time_ns: 61_000_000_000,
-        record: Record::Stage(quadfrog::recording::record::StageInfo {
+        record: Record::Stage(quadfrog::recording::record::StageRecord {
             stage: ExperimentStage::Running,
             trial: 1,
             can_undo: false,
@@ -325,7 +325,7 @@ fn details_tell_everything_that_is_known_of_a_trial() {
     }));
     console.tell(Msg::Record(quadfrog::recording::record::Stamped {
         time_ns: 64_500_000_000,
-        record: Record::Stage(quadfrog::recording::record::StageInfo {
+        record: Record::Stage(quadfrog::recording::record::StageRecord {
             stage: ExperimentStage::Review,
             trial: 1,
             can_undo: false,
