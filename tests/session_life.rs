@@ -88,7 +88,7 @@ fn an_approval_of_an_earlier_card_is_refused() {
     let seen = experiment.proposal().unwrap();
     experiment.set_parameter("Fx", 120.0).unwrap();
     let error = experiment.approve(seen.trial, seen.revision).unwrap_err().to_string();
-    assert!(error.contains("look at the card again"), "{error}");
+    assert!(error.contains("has changed since it was shown"), "{error}");
     assert_eq!(experiment.stage(), ExperimentStage::Proposed);
 }
 

@@ -248,7 +248,7 @@ fn repeats_end_with_their_budget_or_when_they_are_called_off() {
     assert_eq!(experiment.stage(), ExperimentStage::Proposed);
     assert!(experiment.confirm_best(0).unwrap().is_empty());
     assert_eq!(experiment.stage(), ExperimentStage::Finished);
-    assert!(experiment.confirm_best(0).unwrap_err().to_string().contains("nothing is being confirmed"));
+    assert!(experiment.confirm_best(0).unwrap_err().to_string().contains("no confirmation of the best is running"));
 }
 
 /// The last repeat can be judged otherwise: what was concluded from it is then concluded anew.

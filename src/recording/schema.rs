@@ -212,22 +212,22 @@ fn from_session(message: frog::Session) -> SessionInfo {
 fn health_limits(limits: &HealthLimits) -> frog::HealthLimits {
     frog::HealthLimits {
         state_age_ms: limits.state_age_ms,
-        loss_share: limits.loss_share,
-        motor_c: limits.motor_c,
-        battery_percent: limits.battery_percent,
-        late_share: limits.late_share,
-        late_ms: limits.late_ms,
+        loss_share: Some(limits.loss_share),
+        motor_c: Some(limits.motor_c),
+        battery_percent: Some(limits.battery_percent),
+        late_share: Some(limits.late_share),
+        late_ms: Some(limits.late_ms),
     }
 }
 
 fn from_health_limits(message: &frog::HealthLimits) -> HealthLimits {
     HealthLimits {
         state_age_ms: message.state_age_ms,
-        loss_share: message.loss_share,
-        motor_c: message.motor_c,
-        battery_percent: message.battery_percent,
-        late_share: message.late_share,
-        late_ms: message.late_ms,
+        loss_share: tick::number(message.loss_share),
+        motor_c: tick::number(message.motor_c),
+        battery_percent: tick::number(message.battery_percent),
+        late_share: tick::number(message.late_share),
+        late_ms: tick::number(message.late_ms),
     }
 }
 
