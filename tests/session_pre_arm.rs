@@ -23,42 +23,7 @@ use quadfrog::session::operator_request::{OperatorCheck, OperatorRequest, Stampe
 use quadfrog::session::supervisor::{RecordSinks, Supervisor, SupervisorParts};
 use quadfrog::telemetry::{ArmingCheck, ArmingCheckState, Mode, Tick};
 use quadfrog::trial::{Approval, Backend, Task, Verdict};
-
-/// The simulator, seen as a robot over a link that reports its battery and cannot be put in place.
-struct Go1Like {
-    simulator: Simulator,
-    charge_percent: f64,
-    /// Commands that were sent.
-    writes: u32,
-    reboots: u64,
-    silent_ms: u32,
-    tamper: fn(&mut RobotState),
-}
-
-impl Robot for Go1Like {
-    fn read(&mut self) -> Result<RobotState, RobotError> {
-        if self.silent_ms > 0 {
-            self.silent_ms += 1;
-            return Err(RobotError::Silent { age_ms: self.silent_ms });
-        }
-        let mut state = self.simulator.read()?;
-        state.truth = None;
-        state.battery =
-            Some(Battery { charge_percent: self.charge_percent, voltage_v: 24.0, current_a: -1.0, cell_v: [0.0; 10] });
-        (self.tamper)(&mut state);
-        Ok(state)
-    }
-    fn write(&mut self, command: &JointCommand) -> Result<(), RobotError> {
-        self.writes += 1;
-        self.simulator.write(command)
-    }
-    fn place(&mut self, _: &Placement) -> bool {
-        false
-    }
-    fn link(&self) -> Option<LinkStatus> {
-        Some(LinkStatus { recent_received: 5000, reboots: self.reboots, ..LinkStatus::default() })
-    }
-}
+use robots::LinkedRobot;
 
 /// A session and the control thread's body that share channels, on one thread and in simulated time.
 struct Session {

@@ -223,11 +223,11 @@ fn health_limits(limits: &HealthLimits) -> frog::HealthLimits {
 fn from_health_limits(message: &frog::HealthLimits) -> HealthLimits {
     HealthLimits {
         state_age_ms: message.state_age_ms,
-        loss_share: tick::number(message.loss_share),
-        motor_c: tick::number(message.motor_c),
-        battery_percent: tick::number(message.battery_percent),
-        late_share: tick::number(message.late_share),
-        late_ms: tick::number(message.late_ms),
+        loss_share: number(message.loss_share),
+        motor_c: number(message.motor_c),
+        battery_percent: number(message.battery_percent),
+        late_share: number(message.late_share),
+        late_ms: number(message.late_ms),
     }
 }
 
