@@ -12,7 +12,7 @@ use quadfrog::robot::go1::packet::CrcForm;
 use quadfrog::robot::{JOINTS, JointCommand, MotorCommand, Placement, Robot, RobotError, RobotState};
 use quadfrog::sim::Simulator;
 use quadfrog::telemetry::{Command, CommandRefusal, Event, Mode, Permit, Tick, TrialEnd, TrialSpec};
-use quadfrog::trial::{JumpParameters, Task};
+use quadfrog::trial::{Backend, JumpParameters, Task};
 
 struct Bench {
     config: Config,

@@ -22,7 +22,7 @@ use quadfrog::realtime::thread::TickStart;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::robot::{Placement, Robot, RobotState};
 use quadfrog::telemetry::{Command, Event, Mode, Permit, Tick};
-use quadfrog::trial::{JumpParameters, Task};
+use quadfrog::trial::{Backend, JumpParameters, Task};
 use robots::LinkedRobot;
 
 struct Bench {
