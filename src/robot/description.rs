@@ -30,36 +30,16 @@ pub struct RigidBody {
     pub collision: Vec<CollisionShape>,
 }
 
-/// A collision shape in the frame of its link.
+/// A collision shape in the frame of its link, lengths in m; `rotation` takes the axes of the shape to link axes.
 #[derive(Debug, Clone, PartialEq)]
+#[expect(missing_docs, reason = "the doc of the type describes the fields")]
 pub enum CollisionShape {
     /// A sphere.
-    Sphere {
-        /// Centre, m.
-        center: Vector3<f64>,
-        /// Radius, m.
-        radius: f64,
-    },
+    Sphere { center: Vector3<f64>, radius: f64 },
     /// A box.
-    Box {
-        /// Centre, m.
-        center: Vector3<f64>,
-        /// Rotation of the box's axes into link axes.
-        rotation: Matrix3<f64>,
-        /// Half of each edge, m.
-        half_extents: Vector3<f64>,
-    },
+    Box { center: Vector3<f64>, rotation: Matrix3<f64>, half_extents: Vector3<f64> },
     /// A cylinder along its own z axis.
-    Cylinder {
-        /// Centre, m.
-        center: Vector3<f64>,
-        /// Rotation of the cylinder's axes into link axes.
-        rotation: Matrix3<f64>,
-        /// Radius, m.
-        radius: f64,
-        /// Half of its length, m.
-        half_length: f64,
-    },
+    Cylinder { center: Vector3<f64>, rotation: Matrix3<f64>, radius: f64, half_length: f64 },
 }
 
 /// One leg: three bodies and their joints.

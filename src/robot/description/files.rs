@@ -18,43 +18,20 @@ const EMBEDDED: &[(&str, &str, &str)] = &[
 
 /// Error in a robot's description.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[expect(missing_docs, reason = "the message describes a variant and its fields")]
 pub enum DescriptionError {
     /// No embedded robot has that name.
     #[error("no robot named \"{name}\" is built in (built in: {known}); give the folder of its robot.toml instead")]
-    Unknown {
-        /// The requested name.
-        name: String,
-        /// The names of the embedded robots.
-        known: String,
-    },
+    Unknown { name: String, known: String },
     /// A file cannot be read.
     #[error("{}: cannot be read: {reason}", file.display())]
-    Read {
-        /// The file.
-        file: PathBuf,
-        /// The system's reason.
-        reason: String,
-    },
+    Read { file: PathBuf, reason: String },
     /// Syntax error in TOML or XML, or a missing or unknown key.
     #[error("{}: {reason}", file.display())]
-    Syntax {
-        /// The file.
-        file: PathBuf,
-        /// Reason of the parser, with line and column.
-        reason: String,
-    },
+    Syntax { file: PathBuf, reason: String },
     /// A value or the structure is impossible for a quadruped.
     #[error("{}: {element}: {problem}; {remedy}", file.display())]
-    Invalid {
-        /// The file.
-        file: PathBuf,
-        /// The link, joint or key.
-        element: String,
-        /// The problem, with the value.
-        problem: String,
-        /// Required values.
-        remedy: &'static str,
-    },
+    Invalid { file: PathBuf, element: String, problem: String, remedy: &'static str },
 }
 
 /// `robot.toml`.

@@ -4,8 +4,9 @@ use std::str::FromStr;
 
 use crate::robot::{JOINTS, joint_name};
 
-/// A fault from now on, or an action of a person on the robot.
+/// A fault from now on, or an action of a person on the robot. A joint is an index, 0..12.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[expect(missing_docs, reason = "the doc of the variant describes its fields")]
 pub enum EmulatorFault {
     /// Share of datagrams lost, each way, percent.
     Loss(f64),
@@ -24,50 +25,21 @@ pub enum EmulatorFault {
     /// The robot reboots; its clock restarts.
     Reboot,
     /// A motor reports this temperature, degrees Celsius.
-    Hot {
-        /// Joint, 0..12.
-        joint: usize,
-        /// Temperature, degrees Celsius.
-        celsius: f64,
-    },
+    Hot { joint: usize, celsius: f64 },
     /// The battery reports this charge, percent.
     Battery(f64),
     /// A motor leaves servo mode: it brakes and reports the mode.
-    ServoOff {
-        /// Joint, 0..12.
-        joint: usize,
-    },
+    ServoOff { joint: usize },
     /// A joint is stuck at its current angle, up to its motor's torque.
-    Stuck {
-        /// Joint, 0..12.
-        joint: usize,
-    },
+    Stuck { joint: usize },
     /// An encoder reports this angle, rad.
-    Angle {
-        /// Joint, 0..12.
-        joint: usize,
-        /// Angle, rad.
-        radians: f64,
-    },
+    Angle { joint: usize, radians: f64 },
     /// An encoder reports this velocity, rad/s.
-    Speed {
-        /// Joint, 0..12.
-        joint: usize,
-        /// Velocity, rad/s.
-        radians_per_s: f64,
-    },
+    Speed { joint: usize, radians_per_s: f64 },
     /// A motor reports this torque, N m.
-    Torque {
-        /// Joint, 0..12.
-        joint: usize,
-        /// Torque, N m.
-        newton_metres: f64,
-    },
+    Torque { joint: usize, newton_metres: f64 },
     /// An encoder reports NaN as its angle.
-    NotANumber {
-        /// Joint, 0..12.
-        joint: usize,
-    },
+    NotANumber { joint: usize },
     /// Error of the reported roll, rad.
     Tilt(f64),
     /// A person lays the robot down at its start position, on its belly.
@@ -145,39 +117,16 @@ const FAULTS: [(&str, FaultOperands, &str); 19] = [
 
 /// Error of parsing a fault.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[expect(missing_docs, reason = "the message describes a variant and its fields")]
 pub enum EmulatorFaultError {
-    /// Unknown name.
     #[error("\"{word}\" is not a known fault; known faults: {known}")]
-    Unknown {
-        /// The given name.
-        word: String,
-        /// All names.
-        known: String,
-    },
-    /// Wrong number of operands.
+    Unknown { word: String, known: String },
     #[error("write it as: {usage}")]
-    Usage {
-        /// The name with its operands.
-        usage: String,
-    },
-    /// Unknown joint.
+    Usage { usage: String },
     #[error("\"{name}\" is not a joint; write it as FR_hip, FL_thigh, RL_calf and so on")]
-    Joint {
-        /// The name.
-        name: String,
-    },
-    /// Not a number within the bounds.
+    Joint { name: String },
     #[error("\"{value}\" is out of range: give {lowest} to {highest} ({unit})")]
-    Number {
-        /// The given text.
-        value: String,
-        /// The unit.
-        unit: &'static str,
-        /// Lowest value.
-        lowest: f64,
-        /// Highest value.
-        highest: f64,
-    },
+    Number { value: String, unit: &'static str, lowest: f64, highest: f64 },
 }
 
 impl FromStr for EmulatorFault {
