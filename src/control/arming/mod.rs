@@ -23,8 +23,10 @@ struct ControlCheck {
     check: ArmingCheck,
     /// Measures and compares; runs in the tick.
     measure: fn(&ArmingInputs, &ControlSettings) -> Reading,
-    /// Words for the operator; allocates, so it runs outside of the tick.
-    sentence: fn(&ArmingFinding, &ArmingLimits) -> Sentence,
+    /// Measured value in words; as `needed` it allocates, so it runs outside of the tick.
+    found: fn(&ArmingFinding) -> String,
+    /// Limit in words.
+    needed: fn(&ArmingLimits) -> String,
 }
 
 /// The table, in the order of [`ArmingCheck::CONTROL`].
@@ -141,14 +143,11 @@ pub fn findings(inputs: &ArmingInputs, settings: &ControlSettings) -> ArmingFind
 /// Describes `finding` for the operator. Allocates: not for the tick.
 pub fn sentence(finding: &ArmingFinding, limits: &ArmingLimits) -> Sentence {
     let row = CHECKS.iter().find(|row| row.check == finding.check);
-    let mut sentence = row.map_or_else(
-        || Sentence { found: String::new(), needed: String::new() },
-        |row| (row.sentence)(finding, limits),
-    );
-    if !finding.measured.is_finite() {
-        sentence.found = "not known yet".to_owned();
+    let known = row.filter(|_| finding.measured.is_finite());
+    Sentence {
+        found: known.map_or_else(|| "not known yet".to_owned(), |row| (row.found)(finding)),
+        needed: row.map(|row| (row.needed)(limits)).unwrap_or_default(),
     }
-    sentence
 }
 
 /// Name of the joint of `finding`; empty for a finding about the whole robot.
