@@ -8,9 +8,11 @@
 mod files;
 mod urdf;
 
+use std::path::PathBuf;
+
 use nalgebra::{Matrix3, Vector3};
 
-pub use files::{DescriptionError, RobotFiles};
+pub use files::RobotFiles;
 
 use super::kinematics::LegGeometry;
 use super::{JOINTS, Joints, PerLeg};
@@ -111,4 +113,22 @@ impl RobotDescription {
         }
         (lowest, highest)
     }
+}
+
+/// Error in a robot's description.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[expect(missing_docs, reason = "the message describes a variant and its fields")]
+pub enum DescriptionError {
+    /// No embedded robot has that name.
+    #[error("no robot named \"{name}\" is built in (built in: {known}); give the folder of its robot.toml instead")]
+    Unknown { name: String, known: String },
+    /// A file cannot be read.
+    #[error("{}: cannot be read: {reason}", file.display())]
+    Read { file: PathBuf, reason: String },
+    /// Syntax error in TOML or XML, or a missing or unknown key.
+    #[error("{}: {reason}", file.display())]
+    Syntax { file: PathBuf, reason: String },
+    /// A value or the structure is impossible for a quadruped.
+    #[error("{}: {element}: {problem}; {remedy}", file.display())]
+    Invalid { file: PathBuf, element: String, problem: String, remedy: &'static str },
 }

@@ -2,7 +2,7 @@
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-use crate::robot::Joints;
+use crate::robot::{Joints, PerLeg};
 
 /// Position and velocity of every part.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -41,4 +41,17 @@ pub struct Acceleration {
     pub angular_body: Vector3<f64>,
     /// Joint accelerations, rad/s^2.
     pub joint: Joints,
+}
+
+/// Contact with the ground during one control period.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct PeriodContacts {
+    /// Whether each foot had a contact force in the last step.
+    pub foot: PerLeg<bool>,
+    /// Impulse on each foot over the period, world, N s.
+    pub foot_impulse_world: PerLeg<Vector3<f64>>,
+    /// Normal component of `foot_impulse_world`, out of the ground, N s.
+    pub foot_normal_impulse: PerLeg<f64>,
+    /// Whether any other part had a contact force.
+    pub body: bool,
 }

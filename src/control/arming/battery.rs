@@ -1,6 +1,6 @@
 //! The charge suffices for a series of jumps; a battery that is not reported fails.
 
-use super::*;
+use super::check::*;
 
 pub(super) const CHECK: ControlCheck = ControlCheck {
     check: ArmingCheck::Battery,

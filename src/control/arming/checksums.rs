@@ -1,6 +1,6 @@
 //! Few states arrive with a wrong checksum; none on a machine without a link.
 
-use super::*;
+use super::check::*;
 
 pub(super) const CHECK: ControlCheck = ControlCheck {
     check: ArmingCheck::Checksums,

@@ -1,6 +1,6 @@
 //! The robot lies still, so that the gyroscope's bias can be trusted.
 
-use super::*;
+use super::check::*;
 use crate::control::limits::ticks;
 
 pub(super) const CHECK: ControlCheck = ControlCheck {

@@ -1,6 +1,6 @@
 //! Every joint is inside its limits, with a margin.
 
-use super::*;
+use super::check::*;
 
 pub(super) const CHECK: ControlCheck = ControlCheck {
     check: ArmingCheck::JointsInside,

@@ -1,6 +1,6 @@
 //! Few states are lost on the way; none on a machine without a link.
 
-use super::*;
+use super::check::*;
 
 pub(super) const CHECK: ControlCheck = ControlCheck {
     check: ArmingCheck::Loss,

@@ -1,6 +1,6 @@
 //! The joints are near the folded pose, where the stand-up ramp begins.
 
-use super::*;
+use super::check::*;
 
 pub(super) const CHECK: ControlCheck = ControlCheck {
     check: ArmingCheck::LyingDown,

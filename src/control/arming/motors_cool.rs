@@ -1,6 +1,6 @@
 //! No motor is hot.
 
-use super::*;
+use super::check::*;
 
 pub(super) const CHECK: ControlCheck = ControlCheck {
     check: ArmingCheck::MotorsCool,

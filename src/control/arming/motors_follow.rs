@@ -1,7 +1,7 @@
 //! Every motor reports servo mode. Servo mode is commanded while disarmed too, so a motor that does not report it
 //! will not follow.
 
-use super::*;
+use super::check::*;
 
 pub(super) const CHECK: ControlCheck = ControlCheck {
     check: ArmingCheck::MotorsFollow,

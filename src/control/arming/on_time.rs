@@ -1,6 +1,6 @@
 //! Ticks begin on time.
 
-use super::*;
+use super::check::*;
 
 /// A shorter time gives no share of late ticks.
 const LEAST_SPAN_MS: u32 = 1000;

@@ -1,6 +1,6 @@
 //! The newest state of the robot is recent.
 
-use super::*;
+use super::check::*;
 
 pub(super) const CHECK: ControlCheck = ControlCheck {
     check: ArmingCheck::StateFresh,

@@ -1,6 +1,6 @@
 //! Roll and pitch of the trunk are small.
 
-use super::*;
+use super::check::*;
 
 pub(super) const CHECK: ControlCheck = ControlCheck {
     check: ArmingCheck::Upright,

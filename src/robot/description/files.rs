@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 use serde::Deserialize;
 use serde::de::{DeserializeOwned, IgnoredAny};
 
-use super::{RobotDescription, urdf};
+use super::{DescriptionError, RobotDescription, urdf};
 use crate::robot::{JOINTS, Joints, Leg};
 
 /// Embedded robots: name, `robot.toml`, URDF.
@@ -15,24 +15,6 @@ const EMBEDDED: &[(&str, &str, &str)] = &[
     ("go1", include_str!("../../../robots/go1/robot.toml"), include_str!("../../../robots/go1/go1.urdf")),
     ("a1", include_str!("../../../robots/a1/robot.toml"), include_str!("../../../robots/a1/a1.urdf")),
 ];
-
-/// Error in a robot's description.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[expect(missing_docs, reason = "the message describes a variant and its fields")]
-pub enum DescriptionError {
-    /// No embedded robot has that name.
-    #[error("no robot named \"{name}\" is built in (built in: {known}); give the folder of its robot.toml instead")]
-    Unknown { name: String, known: String },
-    /// A file cannot be read.
-    #[error("{}: cannot be read: {reason}", file.display())]
-    Read { file: PathBuf, reason: String },
-    /// Syntax error in TOML or XML, or a missing or unknown key.
-    #[error("{}: {reason}", file.display())]
-    Syntax { file: PathBuf, reason: String },
-    /// A value or the structure is impossible for a quadruped.
-    #[error("{}: {element}: {problem}; {remedy}", file.display())]
-    Invalid { file: PathBuf, element: String, problem: String, remedy: &'static str },
-}
 
 /// `robot.toml`.
 #[derive(Debug, Deserialize)]
