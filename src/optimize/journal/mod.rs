@@ -12,10 +12,10 @@ mod operation;
 mod redis;
 mod state;
 
-pub use self::redis::JournalRedis;
+pub(super) use self::redis::JournalRedis;
 pub use error::JournalError;
 pub use file::{Durability, JournalFile, LOCK_GRACE};
-pub use operation::{Operation, TrialTemplate};
+pub use operation::{AttributeKind, Operation};
 pub use state::{Applied, JournalState, StudyRecord};
 
 /// Place of storage of the lines.
@@ -35,8 +35,7 @@ pub struct Journal {
 }
 
 impl Journal {
-    /// A journal in memory only.
-    pub fn in_memory() -> Self {
+    pub(super) fn in_memory() -> Self {
         Journal::new(JournalBackend::Memory)
     }
 
@@ -48,11 +47,7 @@ impl Journal {
         Self::read(JournalBackend::File(file))
     }
 
-    /// The journal on a Redis server.
-    ///
-    /// # Errors
-    /// [`JournalError`] if the server cannot be reached or its journal cannot be read.
-    pub fn connect(redis: JournalRedis) -> Result<Self, JournalError> {
+    pub(super) fn connect(redis: JournalRedis) -> Result<Self, JournalError> {
         Self::read(JournalBackend::Redis(Box::new(redis)))
     }
 

@@ -2,7 +2,7 @@
 
 use super::{Study, StudyError, StudyOptions, user_attributes};
 use crate::optimize::ask::{Ask, Draws};
-use crate::optimize::journal::Operation;
+use crate::optimize::journal::{AttributeKind, Operation};
 use crate::optimize::sampler::propose;
 use crate::optimize::space::{Parameter, Range};
 use crate::optimize::trial::{Distribution, FIXED_PARAMS, Trial, TrialState, announcement, value_of};
@@ -173,20 +173,12 @@ impl Study {
                 system.push((FIXED_PARAMS.to_owned(), Value::Object(object)));
             }
             system.push((DRAWS.to_owned(), json!(StreamPosition { seed, draws })));
-            operations.extend(system.into_iter().map(|(key, value)| Operation::TrialSystemAttribute {
-                trial: id,
-                key,
-                value,
-            }));
+            let set = |(key, value): (String, Value)| Operation::trial_attribute(id, AttributeKind::System, &key, value);
+            operations.extend(system.into_iter().map(set));
             operations.extend(draft.parameters.iter().map(|s| {
                 let value = value_of(overrides, &s.name).unwrap_or(s.value);
-                let range = Range { low: s.low, high: s.high, log: s.log };
-                Operation::SetParameter {
-                    trial: id,
-                    name: s.name.clone(),
-                    value,
-                    distribution: Distribution::Float(range),
-                }
+                let distribution = Distribution::Float(Range { low: s.low, high: s.high, log: s.log });
+                Operation::SetParameter { trial: id, name: s.name.clone(), value, distribution }
             }));
             operations.extend(user_attributes(id, attributes));
             Ok(operations)

@@ -20,7 +20,7 @@ pub use storage::Storage;
 pub use workers::worker_seed;
 
 use crate::optimize::ask::{Direction, SamplerConfig, Streams};
-use crate::optimize::journal::{Durability, Journal, JournalError, Operation, StudyRecord};
+use crate::optimize::journal::{Applied, AttributeKind, Durability, Journal, JournalError, Operation, StudyRecord};
 use crate::optimize::repeats;
 use crate::optimize::space::Space;
 use crate::optimize::trial::{Trial, TrialState};
@@ -174,6 +174,14 @@ impl Study {
         self.journal.worker()
     }
 
+    /// Numbers of the trials that a commit has created.
+    fn created(&self, applied: &[Applied]) -> impl Iterator<Item = u32> {
+        applied.iter().filter_map(|result| match result {
+            Applied::Created(id) => self.journal.state().trial(*id).map(|trial| trial.number),
+            _ => None,
+        })
+    }
+
     fn record(&self) -> &StudyRecord {
         &self.journal.state().studies()[self.id]
     }
@@ -182,21 +190,19 @@ impl Study {
 /// The operations that create a study.
 fn creation(study: usize, options: &StudyOptions) -> Vec<Operation> {
     let create = Operation::CreateStudy { name: options.name.clone(), directions: vec![options.direction as u64] };
-    let metric = Operation::StudySystemAttribute {
-        study,
-        key: METRIC_NAMES.to_owned(),
-        value: Value::from(vec![options.metric.clone()]),
-    };
-    let attribute = |(key, value): &(String, Value)| {
-        let (key, value) = (key.clone(), value.clone());
-        Operation::StudyUserAttribute { study, key, value }
-    };
-    [create, metric].into_iter().chain(options.attributes.iter().map(attribute)).collect()
+    let metric = vec![options.metric.clone()];
+    let metric = Operation::study_attribute(study, AttributeKind::System, METRIC_NAMES, metric);
+    [create, metric].into_iter().chain(study_attributes(study, &options.attributes)).collect()
+}
+
+fn study_attributes(study: usize, attributes: &[(String, Value)]) -> impl Iterator<Item = Operation> {
+    let set =
+        move |(key, value): &(String, Value)| Operation::study_attribute(study, AttributeKind::User, key, value.clone());
+    attributes.iter().map(set)
 }
 
 fn user_attributes(trial: u64, attributes: &[(String, Value)]) -> impl Iterator<Item = Operation> {
-    attributes.iter().map(move |(key, value)| {
-        let (key, value) = (key.clone(), value.clone());
-        Operation::TrialUserAttribute { trial, key, value }
-    })
+    let set =
+        move |(key, value): &(String, Value)| Operation::trial_attribute(trial, AttributeKind::User, key, value.clone());
+    attributes.iter().map(set)
 }

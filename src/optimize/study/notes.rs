@@ -2,7 +2,7 @@
 //! end of a trial.
 
 use super::{Study, StudyError};
-use crate::optimize::journal::{JournalError, Operation};
+use crate::optimize::journal::{AttributeKind, JournalError, Operation};
 use serde_json::Value;
 
 /// Characters per piece of a note of the dashboard.
@@ -26,9 +26,9 @@ impl Study {
             while attributes.contains_key(&key(pieces.len())) {
                 pieces.push(String::new()); // left over from a longer note
             }
-            let set = |key, value| Operation::StudySystemAttribute { study, key, value };
-            let pieces = pieces.into_iter().enumerate().map(|(i, piece)| set(key(i), Value::from(piece)));
-            Ok::<_, JournalError>(std::iter::once(set(version.clone(), Value::from(next))).chain(pieces).collect())
+            let set = |key: &str, value| Operation::study_attribute(study, AttributeKind::System, key, value);
+            let pieces = pieces.into_iter().enumerate().map(|(i, piece)| set(&key(i), Value::from(piece)));
+            Ok::<_, JournalError>(std::iter::once(set(&version, Value::from(next))).chain(pieces).collect())
         })?;
         Ok(())
     }
