@@ -19,10 +19,10 @@ fn study(task: Task, seed: u32) -> (Vec<TrialRecord>, f64) {
     let settings = options.config.settings(&options.robot, task, Backend::Simulator).unwrap();
     let simulator = Simulator::new(&options.robot, &options.config.simulator).unwrap();
     let mut rollout = Rollout::new(simulator, &settings);
-    let mut life = open_experiment(&options, Durability::Buffered, "").unwrap();
-    automatic::run(&mut life, &mut rollout, |_, _| {}).unwrap();
-    let best = life.best().and_then(|row| row.value).unwrap_or(0.0);
-    (life.rows().cloned().collect(), best)
+    let mut experiment = open_experiment(&options, Durability::Buffered, "").unwrap();
+    automatic::run(&mut experiment, &mut rollout, |_, _| {}).unwrap();
+    let best = experiment.best().and_then(|row| row.value).unwrap_or(0.0);
+    (experiment.rows().cloned().collect(), best)
 }
 
 /// Best values of seeds 0 to 4; prints them with those of MuJoCo with the same controller.

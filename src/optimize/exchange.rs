@@ -102,9 +102,6 @@ pub fn to_json(trials: &[Trial], note: impl Fn(u32) -> String) -> String {
 }
 
 /// Reads a CSV table.
-///
-/// # Errors
-/// [`ExchangeError`] for text that is not CSV, a missing column and an invalid cell.
 pub fn from_csv(text: &str) -> Result<Vec<TableTrial>, ExchangeError> {
     let format = |error: csv::Error| ExchangeError::Format { format: "CSV", message: error.to_string() };
     let mut reader = csv::Reader::from_reader(text.as_bytes());
@@ -131,10 +128,7 @@ pub fn from_csv(text: &str) -> Result<Vec<TableTrial>, ExchangeError> {
     Ok(trials)
 }
 
-/// Reads a JSON array.
-///
-/// # Errors
-/// [`ExchangeError`] for text that is not a JSON array, a missing member and an invalid one.
+/// Reads a JSON array of objects.
 pub fn from_json(text: &str) -> Result<Vec<TableTrial>, ExchangeError> {
     let format = |message: String| ExchangeError::Format { format: "JSON", message };
     let value: Value = serde_json::from_str(text).map_err(|error| format(error.to_string()))?;

@@ -94,11 +94,7 @@ pub enum SpaceError {
 }
 
 impl Space {
-    /// Checks the parameters.
-    ///
-    /// # Errors
-    /// [`SpaceError`] without any parameter, for a name given twice, and for bounds that are not finite, reversed, or not
-    /// positive though logarithmic.
+    /// Checks the parameters: at least one, no name twice, bounds finite, ascending, and positive if logarithmic.
     pub fn new(parameters: impl IntoIterator<Item = (String, Range)>) -> Result<Self, SpaceError> {
         let mut space: Vec<Parameter> = Vec::new();
         for (name, range) in parameters {

@@ -54,10 +54,7 @@ impl Operation {
         }
     }
 
-    /// Parses a line into the identity of the writer and the operation.
-    ///
-    /// # Errors
-    /// The fault of the line, as a text that can follow "line 12: ".
+    /// Parses a line into the identity of the writer and the operation. The error can follow "line 12: ".
     pub fn parse(line: &str) -> Result<(String, Operation), String> {
         let value = parse_json(line)?;
         let fields = LineFields(value.as_object().ok_or("not a JSON object")?);

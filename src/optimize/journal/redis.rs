@@ -35,9 +35,6 @@ pub struct JournalRedis {
 
 impl JournalRedis {
     /// The journal of the server at `url` (`redis://host:port/db`) under the key prefix `prefix`; does not connect.
-    ///
-    /// # Errors
-    /// If the address is invalid.
     pub fn new(url: &str, prefix: &str) -> Result<Self, JournalError> {
         let refuse = |source| JournalError::Redis { action: "parse the address of", address: url.to_owned(), source };
         let info = url.into_connection_info().map_err(refuse)?;

@@ -31,12 +31,8 @@ pub struct SuggestedParameter {
     pub value: f64,
     /// Whether the value was given, not suggested by the sampler.
     pub fixed: bool,
-    /// Lower bound.
-    pub low: f64,
-    /// Upper bound.
-    pub high: f64,
-    /// Whether the search is logarithmic.
-    pub log: bool,
+    /// Bounds and scale of the search.
+    pub range: Range,
 }
 
 /// A proposal without effect on the study.
@@ -85,9 +81,7 @@ impl Study {
             name: p.name.clone(),
             value,
             fixed: value_of(&given, &p.name).is_some(),
-            low: p.range.low,
-            high: p.range.high,
-            log: p.range.log,
+            range: p.range,
         };
         TrialDraft {
             number: waiting.map_or(trials.len() as u32, |t| t.number),
@@ -113,8 +107,7 @@ impl Study {
     ///
     /// # Errors
     /// [`StudyError::StaleDraft`] if another trial has begun from the same streams, or another worker has begun the enqueued
-    /// trial; [`StudyError::UnknownParameter`] or [`StudyError::Value`] for an invalid override; journal errors. The study
-    /// is unchanged then.
+    /// trial; [`StudyError::UnknownParameter`] or [`StudyError::Value`] for an override. The study is unchanged then.
     pub fn begin(
         &mut self,
         draft: &TrialDraft,
@@ -125,10 +118,7 @@ impl Study {
     }
 
     /// [`Study::begin`] if `room`, called with all trials while the journal is locked, returns true: workers on a shared
-    /// journal keep a common budget exactly.
-    ///
-    /// # Errors
-    /// As [`Study::begin`]; [`StudyError::Full`] if `room` returns false.
+    /// journal keep a common budget exactly. [`StudyError::Full`] if it returns false.
     pub fn begin_if(
         &mut self,
         draft: &TrialDraft,
@@ -141,9 +131,9 @@ impl Study {
         if draft.before != self.streams.draws() || draft.seed != self.options.sampler.seed {
             return Err(stale());
         }
-        let given: Vec<(String, f64)> =
-            merged(draft.parameters.iter().filter(|s| s.fixed).map(|s| (s.name.clone(), s.value)).collect(), overrides);
-        let nothing_drawn = draft.parameters.iter().all(|s| value_of(&given, &s.name).is_some() || s.low == s.high);
+        let fixed = draft.parameters.iter().filter(|s| s.fixed).map(|s| (s.name.clone(), s.value));
+        let given = merged(fixed.collect(), overrides);
+        let nothing_drawn = draft.parameters.iter().all(|s| value_of(&given, &s.name).is_some() || s.range.is_point());
         let draws = if nothing_drawn { draft.before } else { draft.after };
         let (study, seed) = (self.id, draft.seed);
         let mut id = 0;
@@ -173,11 +163,12 @@ impl Study {
                 system.push((FIXED_PARAMS.to_owned(), Value::Object(object)));
             }
             system.push((DRAWS.to_owned(), json!(StreamPosition { seed, draws })));
-            let set = |(key, value): (String, Value)| Operation::trial_attribute(id, AttributeKind::System, &key, value);
+            let set =
+                |(key, value): (String, Value)| Operation::trial_attribute(id, AttributeKind::System, &key, value);
             operations.extend(system.into_iter().map(set));
             operations.extend(draft.parameters.iter().map(|s| {
                 let value = value_of(overrides, &s.name).unwrap_or(s.value);
-                let distribution = Distribution::Float(Range { low: s.low, high: s.high, log: s.log });
+                let distribution = Distribution::Float(s.range);
                 Operation::SetParameter { trial: id, name: s.name.clone(), value, distribution }
             }));
             operations.extend(user_attributes(id, attributes));

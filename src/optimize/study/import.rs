@@ -55,9 +55,6 @@ impl Study {
     }
 
     /// Checks that the parameters of a point exist and lie within the present bounds.
-    ///
-    /// # Errors
-    /// [`StudyError::UnknownParameter`], [`StudyError::Value`] or [`StudyError::Outside`].
     pub fn check_point(&self, point: &[(String, f64)]) -> Result<(), StudyError> {
         self.check_parameters(point)?;
         let outside = point.iter().find_map(|(name, value)| {

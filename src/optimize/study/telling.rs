@@ -8,10 +8,8 @@ use crate::optimize::journal::{Applied, JournalError, Operation};
 use crate::optimize::trial::{FIXED_PARAMS, Trial, TrialState};
 
 impl Study {
-    /// Sets user attributes of a running or waiting trial: verdict, cause, measured terms.
-    ///
-    /// # Errors
-    /// [`StudyError::State`] if the trial is finished and thus immutable; use [`Study::note`].
+    /// Sets user attributes of a running or waiting trial: verdict, cause, measured terms. A finished trial is immutable
+    /// ([`StudyError::State`]), see [`Study::note`].
     pub fn annotate(&mut self, trial: u32, attributes: &[(String, Value)]) -> Result<(), StudyError> {
         let id = self.trial(trial)?.id;
         self.journal.commit(|journal| match journal.trial(id) {
@@ -34,10 +32,8 @@ impl Study {
     }
 
     /// Sets user attributes and finishes a trial in one commit, if `holds(trial)` is true while the journal is locked.
-    /// Otherwise nothing is recorded and the answer is [`TellOutcome::AlreadyFinished`].
-    ///
-    /// # Errors
-    /// As [`Study::tell`].
+    /// Otherwise nothing is recorded and the answer is [`TellOutcome::AlreadyFinished`]. Errors are those of
+    /// [`Study::tell`].
     pub fn tell_if(
         &mut self,
         trial: u32,
@@ -70,9 +66,7 @@ impl Study {
         Ok(if recorded { TellOutcome::Recorded } else { TellOutcome::AlreadyFinished })
     }
 
-    /// Enqueues a trial with the given parameters; the others are suggested when it begins. Returns its number.
-    ///
-    /// # Errors
+    /// Enqueues a trial with the given parameters; the others are suggested when it begins. Returns its number, or
     /// [`StudyError::UnknownParameter`] or [`StudyError::Value`] for an invalid parameter.
     pub fn enqueue(&mut self, parameters: &[(String, f64)], attributes: &[(String, Value)]) -> Result<u32, StudyError> {
         let queued = self.enqueue_unless(parameters, attributes, |_| false)?;
@@ -81,9 +75,6 @@ impl Study {
 
     /// [`Study::enqueue`] unless `done`, called with all trials while the journal is locked, returns true: of several workers
     /// only one enqueues. Returns `None` if `done` was true.
-    ///
-    /// # Errors
-    /// As [`Study::enqueue`].
     pub fn enqueue_unless(
         &mut self,
         parameters: &[(String, f64)],
@@ -108,9 +99,6 @@ impl Study {
     }
 
     /// Sets user attributes of the study.
-    ///
-    /// # Errors
-    /// Journal errors.
     pub fn annotate_study(&mut self, attributes: &[(String, Value)]) -> Result<(), StudyError> {
         let study = self.id;
         self.journal.commit(|_| Ok::<_, JournalError>(study_attributes(study, attributes).collect()))?;

@@ -10,9 +10,6 @@ const WORKERS: &str = "quadfrog:workers";
 impl Study {
     /// Joins as a worker with the next free number, from 1 (0 is the session that created the study), and continues with
     /// the random streams of that worker's seed, [`worker_seed`].
-    ///
-    /// # Errors
-    /// If the journal cannot be read or written.
     pub fn join(&mut self) -> Result<u32, StudyError> {
         let study = self.id;
         let mut worker = 0;

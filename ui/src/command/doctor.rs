@@ -14,6 +14,7 @@ use quadfrog::recording::disk;
 use quadfrog::trial::Backend;
 use quadfrog_console::connection::TerminalLocation;
 
+use super::arguments;
 use super::failure::Failure;
 
 /// Number of wake-ups measured, at 1 kHz.
@@ -107,16 +108,13 @@ fn priority(scheduling: Scheduling) -> DoctorItem {
 }
 
 fn memory() -> DoctorItem {
-    match system::memlock_limit() {
-        None => DoctorItem::new("locked memory", "unlimited", true, ""),
-        Some(bytes) => {
-            DoctorItem::new("locked memory", format!("{} MB at most", bytes / 1_000_000), false, ALLOW_LOCKING)
-        }
-    }
+    let limit = system::memlock_limit();
+    let found = limit.map_or("unlimited".to_owned(), |bytes| format!("{} MB at most", bytes / 1_000_000));
+    DoctorItem::new("locked memory", found, limit.is_none(), ALLOW_LOCKING)
 }
 
 fn cores() -> DoctorItem {
-    let count = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+    let count = arguments::cores();
     let isolated = system::isolated_cores();
     let found = match isolated.as_slice() {
         [] => format!("{count}, none isolated"),
@@ -242,10 +240,9 @@ fn disk_space(folder: &Path, needed_mb: u32) -> DoctorItem {
             let remedy = format!("a robot is not armed with less than {needed_mb} MB; free space, or choose --output");
             DoctorItem::new("disk", found, free >= u64::from(needed_mb), &remedy)
         }
-        Err(error) => DoctorItem::broken(
-            "disk",
-            format!("{}: {error}", existing.display()),
-            "nothing can be recorded there; choose another --output",
-        ),
+        Err(error) => {
+            let found = format!("{}: {error}", existing.display());
+            DoctorItem::broken("disk", found, "nothing can be recorded there; choose another --output")
+        }
     }
 }
