@@ -10,12 +10,10 @@ use quadfrog::optimize::space::Space;
 use quadfrog::optimize::trial::{Distribution, Trial, TrialState};
 use serde_json::{Map, Value, json};
 use std::path::PathBuf;
-use support::golden_folder;
+use support::{golden_folder, golden_tpe_file};
 
 fn golden(name: &str) -> PathBuf {
-    let root = golden_folder();
-    let mut candidates = [root.join("tpe").join(name), root.join(name)].into_iter();
-    candidates.find(|p| p.exists()).unwrap_or_else(|| panic!("no {name} in {}", root.display()))
+    golden_tpe_file(name).unwrap_or_else(|| panic!("no {name} in {}", golden_folder().display()))
 }
 
 /// A trial in the shape of the expected file.

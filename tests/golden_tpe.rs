@@ -13,14 +13,13 @@ use quadfrog::optimize::trial::{Distribution, Trial, TrialState, announcement};
 use quadfrog::optimize::truncnorm::{log_cdf, log_mass, quantile};
 use serde_json::Value;
 use std::collections::HashMap;
-use support::golden_folder;
+use support::golden_tpe_file;
 
 /// Largest difference allowed, as a share of the parameter's range.
 const TOLERANCE: f64 = 1e-10;
 
 fn golden(name: &str) -> Option<Value> {
-    let root = golden_folder();
-    let path = [root.join("tpe").join(name), root.join(name)].into_iter().find(|p| p.exists())?;
+    let path = golden_tpe_file(name)?;
     let text = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
     Some(serde_json::from_str(&text).unwrap_or_else(|e| panic!("{}: {e}", path.display())))
 }

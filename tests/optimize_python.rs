@@ -12,7 +12,7 @@ use quadfrog::optimize::journal::{Durability, Journal, JournalError, JournalFile
 use quadfrog::optimize::sampler::propose;
 use quadfrog::optimize::space::{Range, Space};
 use quadfrog::optimize::study::{Outcome, Storage, Study};
-use quadfrog::optimize::trial::{Distribution, Trial, TrialState};
+use quadfrog::optimize::trial::{Distribution, Trial, TrialState, value_of};
 use redis::Ended;
 use serde_json::{Value, json};
 use std::io::{Read, Write};
@@ -56,6 +56,11 @@ fn journal() -> (TempDir, PathBuf, String) {
     (folder, path, text)
 }
 
+/// [`journal`] if Python has Optuna.
+fn shared_journal() -> Option<(TempDir, PathBuf, String)> {
+    python_has("optuna", "5.").then(journal)
+}
+
 fn ask<'a>(config: &'a SamplerConfig, trials: &'a [Trial], space: &'a Space, fixed: &'a [(String, f64)]) -> Ask<'a> {
     Ask { config, trials, space, fixed, direction: Direction::Maximize }
 }
@@ -67,11 +72,7 @@ fn open(path: &Path, seed: u32) -> Study {
 
 /// The script's objective.
 fn objective(parameters: &[(String, f64)]) -> f64 {
-    let u = |name: &str| {
-        let value = parameters.iter().find(|(n, _)| n == name).map_or(1.0, |(_, v)| *v);
-        let range = forward().range(name).unwrap();
-        (value - range.low) / (range.high - range.low)
-    };
+    let u = |name: &str| forward().range(name).unwrap().scale(value_of(parameters, name).unwrap_or(1.0));
     1.0 - (u("f0") - 0.35).powi(2) - (u("Fx") - 0.6).powi(2) - (u("Fz") - 0.55).powi(2)
 }
 
@@ -91,10 +92,7 @@ fn run_several(study: &mut Study, count: usize) -> Vec<u32> {
 
 #[test]
 fn python_reads_what_we_wrote() {
-    if !python_has("optuna", "5.") {
-        return;
-    }
-    let (_folder, path, journal) = journal();
+    let Some((_folder, path, journal)) = shared_journal() else { return };
     let mut study = open(&path, 3);
     for number in 0..14 {
         let overrides = [("Fx".to_owned(), 80.0)];
@@ -126,10 +124,7 @@ fn python_reads_what_we_wrote() {
 
 #[test]
 fn we_run_what_python_enqueued_and_both_continue_each_other() {
-    if !python_has("optuna", "5.") {
-        return;
-    }
-    let (_folder, path, journal) = journal();
+    let Some((_folder, path, journal)) = shared_journal() else { return };
     let mut study = open(&path, 3);
     run_several(&mut study, 6);
 
@@ -190,11 +185,7 @@ fn bounds_changed_in_mid_study_are_treated_as_optuna_does() {
                 trial.set(&p.name, value, Distribution::Float(p.range));
                 compared += 1;
             }
-            let mut point = trial.parameters.clone();
-            if trial.parameter("f0").is_none() {
-                point.push(("f0".into(), 1.0));
-            }
-            trial.value = Some(objective(&point));
+            trial.value = Some(objective(&trial.parameters));
             trials.push(trial);
         }
     }
@@ -203,10 +194,7 @@ fn bounds_changed_in_mid_study_are_treated_as_optuna_does() {
 
 #[test]
 fn three_writers_at_once_lose_nothing() {
-    if !python_has("optuna", "5.") {
-        return;
-    }
-    let (_folder, path, journal) = journal();
+    let Some((_folder, path, journal)) = shared_journal() else { return };
     drop(open(&path, 0));
     let theirs = python(&["continue", &journal, "100", "9"]).stdout(Stdio::piped()).spawn().unwrap();
     let ours: Vec<_> = (1..3)
@@ -229,10 +217,7 @@ fn three_writers_at_once_lose_nothing() {
 /// PED-ANOVA's divergences equal those of Optuna's evaluator, also after a change of the bounds.
 #[test]
 fn importances_are_optunas() {
-    if !python_has("optuna", "5.") {
-        return;
-    }
-    let (_folder, path, journal) = journal();
+    let Some((_folder, path, journal)) = shared_journal() else { return };
     let mut study = open(&path, 3);
     for trials in [12, 30, 80, 110] {
         while study.trials().len() < trials {
@@ -301,10 +286,9 @@ fn until<T>(what: &str, mut ask: impl FnMut() -> Option<T>) -> T {
 
 #[test]
 fn the_dashboard_shows_our_study_while_we_write() {
-    if !python_has("optuna", "5.") || !python_has("optuna_dashboard", "0.") {
+    let Some((_folder, path, journal)) = shared_journal().filter(|_| python_has("optuna_dashboard", "0.")) else {
         return;
-    }
-    let (_folder, path, journal) = journal();
+    };
     let mut study = open(&path, 1);
     run_several(&mut study, 4);
     study.note(2, "slipped a little").unwrap();
@@ -313,13 +297,9 @@ fn the_dashboard_shows_our_study_while_we_write() {
                   from optuna.storages import JournalStorage\n\
                   from optuna.storages.journal import JournalFileBackend\n\
                   optuna_dashboard.run_server(JournalStorage(JournalFileBackend(sys.argv[1])), port=int(sys.argv[2]))";
-    let child = Command::new("python3")
-        .args(["-c", server, &journal, &port.to_string()])
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .spawn()
-        .unwrap();
-    let _dashboard = Ended(child);
+    let mut dashboard = Command::new("python3");
+    dashboard.args(["-c", server, &journal, &port.to_string()]).stdout(Stdio::null()).stderr(Stdio::null());
+    let _dashboard = Ended(dashboard.spawn().unwrap());
     let studies = until("the dashboard's answer", || get(port, "/api/studies"));
     let shown = &studies["study_summaries"][0];
     assert_eq!(shown["study_name"], "forward", "{studies}");

@@ -6,7 +6,7 @@ mod support;
 use quadfrog::optimize::ask::{Direction, SamplerConfig};
 use quadfrog::optimize::space::{Range, Space};
 use quadfrog::optimize::study::{Outcome, Storage, Study, StudyError, StudyOptions, TellOutcome};
-use quadfrog::optimize::trial::{Trial, TrialState};
+use quadfrog::optimize::trial::{Trial, TrialState, value_of};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use support::{begin, forward_log, in_memory};
@@ -36,7 +36,7 @@ fn with_a_trial() -> (TempDir, PathBuf, Study) {
 }
 
 fn objective(parameters: &[(String, f64)]) -> f64 {
-    let x = |name: &str| parameters.iter().find(|(n, _)| n == name).unwrap().1;
+    let x = |name: &str| value_of(parameters, name).unwrap();
     let (a, b, c) = (x("f0") - 1.1, x("Fx") / 150.0 - 0.6, x("Fz") / 350.0 - 0.7);
     1.0 / (1.0 + 4.0 * a * a + 3.0 * b * b + 5.0 * c * c)
 }

@@ -63,10 +63,7 @@ fn the_mirrored_tasks_learn_too() {
 fn the_same_seed_gives_the_same_table_bit_for_bit() {
     let (first, _) = study(Task::Forward, 3);
     let (second, _) = std::thread::spawn(|| study(Task::Forward, 3)).join().unwrap();
-    assert_eq!(first.len(), second.len());
-    for (a, b) in first.iter().zip(&second) {
-        assert_eq!(a, b);
-        let bits = |row: &TrialRecord| row.value.map(f64::to_bits);
-        assert_eq!(bits(a), bits(b), "trial {}", a.trial);
-    }
+    assert_eq!(first, second);
+    let bits = |rows: &[TrialRecord]| rows.iter().map(|row| row.value.map(f64::to_bits)).collect::<Vec<_>>();
+    assert_eq!(bits(&first), bits(&second));
 }

@@ -51,11 +51,6 @@ impl JournalFile {
         Ok(JournalFile { path, lock: lock.into(), durability, grace, offset: 0, lines: 0 })
     }
 
-    /// Absolute path of the journal.
-    pub fn path(&self) -> &Path {
-        &self.path
-    }
-
     /// Passes every line completed since the last call to `accept`, which returns the fault of an invalid line. A last line
     /// that is incomplete or invalid is returned and read again by the next call.
     ///

@@ -55,13 +55,11 @@ impl JournalRedis {
             let batch: Vec<Option<String>> = self.ask("read", |c| redis::cmd("MGET").arg(&keys).query(c))?;
             for line in batch {
                 let Some(line) = line else { return Ok(()) };
-                match accept(line.trim_end()) {
-                    Ok(()) => self.lines += 1,
-                    Err(fault) => {
-                        let path = format!("{}, key {}:log:{}", self.address, self.prefix, self.lines).into();
-                        return Err(JournalError::Line { path, line: self.lines as usize + 1, fault });
-                    }
-                }
+                accept(line.trim_end()).map_err(|fault| {
+                    let path = format!("{}, key {}:log:{}", self.address, self.prefix, self.lines).into();
+                    JournalError::Line { path, line: self.lines as usize + 1, fault }
+                })?;
+                self.lines += 1;
             }
         }
         Ok(())

@@ -141,22 +141,15 @@ impl Study {
             if !journal.studies().get(study).is_some_and(|record| room(&record.trials)) {
                 return Err(StudyError::Full);
             }
-            let now = Timestamp::now();
-            let mut operations = Vec::new();
-            match draft.waiting {
-                Some(waiting) => {
-                    id = waiting;
-                    if journal.trial(id).is_none_or(|t| t.state != TrialState::Waiting) {
-                        return Err(stale());
-                    }
-                    let state = TrialState::Running;
-                    operations.push(Operation::SetState { trial: id, state, values: None, at: Some(now) });
+            id = draft.waiting.unwrap_or(journal.next_trial_id());
+            let (waiting, now) = (journal.trial(id).map(|t| t.state), Some(Timestamp::now()));
+            let mut operations = match (draft.waiting, waiting) {
+                (None, _) => vec![Operation::CreateTrial { study, started: now, template: None }],
+                (_, Some(TrialState::Waiting)) => {
+                    vec![Operation::SetState { trial: id, state: TrialState::Running, values: None, at: now }]
                 }
-                None => {
-                    id = journal.next_trial_id();
-                    operations.push(Operation::CreateTrial { study, started: Some(now), template: None });
-                }
-            }
+                _ => return Err(stale()),
+            };
             let mut system = announcement(&draft.joint);
             if !given.is_empty() {
                 let object = given.iter().map(|(n, v)| (n.clone(), Value::from(*v))).collect();

@@ -132,11 +132,9 @@ fn governor() -> DoctorItem {
 }
 
 fn timer() -> DoctorItem {
+    let remedy = "the kernel has no high-resolution timers (CONFIG_HIGH_RES_TIMERS): 1 kHz cannot be kept";
     match system::timer_resolution_ns() {
-        Ok(ns) => {
-            let remedy = "the kernel has no high-resolution timers (CONFIG_HIGH_RES_TIMERS): 1 kHz cannot be kept";
-            DoctorItem::new("timer", format!("{ns} ns"), ns <= 1000, remedy)
-        }
+        Ok(ns) => DoctorItem::new("timer", format!("{ns} ns"), ns <= 1000, remedy),
         Err(error) => DoctorItem::broken("timer", error.to_string(), "the monotonic clock cannot be read"),
     }
 }
@@ -221,13 +219,11 @@ fn colours() -> DoctorItem {
 }
 
 fn size() -> DoctorItem {
-    match crossterm::terminal::size() {
-        Ok((columns, rows)) => {
-            let remedy = "below 80x24 only the mode, STOP and the link are shown; make the window larger";
-            DoctorItem::new("terminal size", format!("{columns}x{rows}"), columns >= 80 && rows >= 24, remedy)
-        }
-        Err(_) => DoctorItem::new("terminal size", "not a terminal", false, "run the console itself in a terminal"),
-    }
+    let Ok((columns, rows)) = crossterm::terminal::size() else {
+        return DoctorItem::new("terminal size", "not a terminal", false, "run the console itself in a terminal");
+    };
+    let remedy = "below 80x24 only the mode, STOP and the link are shown; make the window larger";
+    DoctorItem::new("terminal size", format!("{columns}x{rows}"), columns >= 80 && rows >= 24, remedy)
 }
 
 /// Checks the free space in the folder, or in its nearest ancestor that exists.

@@ -70,11 +70,8 @@ pub struct OptimizeArguments {
 impl OptimizeArguments {
     /// Returns the only seed, if one is given; more than one is refused with `message`.
     fn only_seed(&self, message: &str) -> Result<Option<u32>, Failure> {
-        match self.seed.as_ref().map(|seeds| seeds.0.as_slice()) {
-            None => Ok(None),
-            Some([seed]) => Ok(Some(*seed)),
-            Some(_) => Err(Failure::input(message)),
-        }
+        let seeds = self.seed.as_ref().map_or(&[][..], |seeds| &seeds.0);
+        if seeds.len() > 1 { Err(Failure::input(message)) } else { Ok(seeds.first().copied()) }
     }
 }
 
