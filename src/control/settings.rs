@@ -235,30 +235,6 @@ pub struct EstimatorSettings {
     pub longest_flight_s: f64,
 }
 
-impl EstimatorSettings {
-    /// Every number with its key.
-    pub fn numbers(&self) -> [(&'static str, f64); 16] {
-        [
-            ("contact_on_n", self.contact_on_n),
-            ("contact_off_n", self.contact_off_n),
-            ("contact_time_s", self.contact_time_s),
-            ("accel_noise_m_s2", self.accel_noise_m_s2),
-            ("accel_error_share", self.accel_error_share),
-            ("accel_bias_m_s2", self.accel_bias_m_s2),
-            ("accel_bias_walk", self.accel_bias_walk),
-            ("unseen_accel_m_s2", self.unseen_accel_m_s2),
-            ("foot_position_m", self.foot_position_m),
-            ("foot_velocity_m_s", self.foot_velocity_m_s),
-            ("foot_velocity_share", self.foot_velocity_share),
-            ("foot_creep", self.foot_creep),
-            ("gate_sigma", self.gate_sigma),
-            ("start_velocity_m_s", self.start_velocity_m_s),
-            ("longest_slip_s", self.longest_slip_s),
-            ("longest_flight_s", self.longest_flight_s),
-        ]
-    }
-}
-
 /// Trial settings of one task: section `[tasks.<task>]` of `config/control.toml`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -11,10 +11,10 @@ use mcap::records::{MessageHeader, Record as McapRecord};
 use prost::Message;
 
 use super::container::{Chunk, Container};
-use super::decode::DecodeError;
 use super::error::RecordingError;
 use super::record::{Record, SessionInfo, Stamped};
 use super::topic::Topic;
+use super::wire::DecodeError;
 use super::{frog, schema, tick};
 use crate::telemetry::Tick;
 
@@ -338,5 +338,5 @@ fn join(
         joints.filter(|(other, _)| same(other)).ok_or(DecodeError::Missing("/robot/joint_states of a tick"))?;
     let (_, command) =
         command.filter(|(other, _)| same(other)).ok_or(DecodeError::Missing("/robot/joint_cmd of a tick"))?;
-    tick::join(&frog::ControlTick::decode(control)?, &joints, &command)
+    tick::join(frog::ControlTick::decode(control)?, &joints, command)
 }

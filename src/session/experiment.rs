@@ -5,84 +5,35 @@
 //! then it can be undone. The next proposal is drafted on a fork of the study in which the verdict is already reported,
 //! and is therefore what the study itself will propose.
 
-pub mod attributes;
+pub(crate) mod attributes;
 mod changes;
 mod confirmation;
 mod liveness;
+mod plan;
 mod proposal_card;
 mod proposing;
 mod queue;
 mod search;
 
+pub use self::plan::{ExperimentPlan, RequestRefusal};
+
 use std::collections::BTreeMap;
-use std::time::Duration;
 
 use self::attributes::JudgedAttributes;
 use self::confirmation::{BestConfirmation, NextRepeat};
+use self::plan::not_now;
 use self::proposal_card::ProposalCard;
 use self::queue::TrialQueue;
 use self::search::SearchSettings;
 use super::objective;
-use crate::control::settings::TaskControl;
+use crate::optimize::ask::Direction;
 use crate::optimize::exchange::TableTrial;
-use crate::optimize::repeats::{RepeatedPoint, points};
+use crate::optimize::repeats::{RepeatedPoint, improvements, points};
 use crate::optimize::study::{Outcome, Study, StudyError};
 use crate::optimize::trial::TrialState;
 use crate::recording::record::{LogLevel, LogRecord, Record, StageRecord};
 use crate::telemetry::{Tick, TrialEnd, TrialSpec};
-use crate::trial::{
-    ExperimentStage, ParameterInfo, Proposal, ProposalSource, SearchStatus, Task, TrialRecord, Verdict,
-};
-
-/// Refusal of a request, as a message for the operator.
-#[derive(Debug, thiserror::Error)]
-pub enum RequestRefusal {
-    /// The request does not fit the present stage or the bounds.
-    #[error("{0}")]
-    NotNow(String),
-    /// Another worker began the proposed trial; there is a new proposal.
-    #[error("another worker was faster: the proposal for trial {0} does not hold any more; approve the new one")]
-    Overtaken(u32),
-    /// Another program ended the trial under review; there is a new proposal.
-    #[error("trial {0} was ended by another program: that result stands")]
-    EndedElsewhere(u32),
-    /// The study could not be read or written.
-    #[error(transparent)]
-    Study(#[from] StudyError),
-}
-
-fn not_now<T>(reason: impl Into<String>) -> Result<T, RequestRefusal> {
-    Err(RequestRefusal::NotNow(reason.into()))
-}
-
-/// Settings that all trials of one study share.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ExperimentPlan {
-    /// The task.
-    pub task: Task,
-    /// Settings of the controller.
-    pub control: TaskControl,
-    /// Parameters with their bounds, in table order.
-    pub parameters: Vec<ParameterInfo>,
-    /// Seed of the study.
-    pub seed: u64,
-    /// Trials that are to count.
-    pub budget: u32,
-    /// File name of the recording; empty without one.
-    pub recording: String,
-    /// The same parameters with the widest bounds that they may be given.
-    pub widest: Vec<ParameterInfo>,
-    /// The controller's gains with the ranges in which they may be set.
-    pub gains: Vec<ParameterInfo>,
-    /// Number of best points that are repeated to confirm the best.
-    pub contenders: u32,
-    /// Confidence at which one of them is the best.
-    pub confidence: f64,
-    /// Number of this worker on the study: 0 has the study's folder, and closes the trials that a crash left running.
-    pub worker: u32,
-    /// Time without news after which a running trial of another worker counts as abandoned.
-    pub abandoned: Duration,
-}
+use crate::trial::{ExperimentStage, ParameterInfo, Proposal, ProposalSource, SearchStatus, TrialRecord, Verdict};
 
 /// A verdict that can still be undone.
 #[derive(Debug, Clone, PartialEq)]
@@ -186,14 +137,9 @@ impl Experiment {
     /// is the mean of its repeats ([`crate::optimize::repeats`]).
     pub fn best(&self) -> Option<&TrialRecord> {
         let points = points(self.study.trials());
-        let value = |row: &TrialRecord| {
-            points.iter().find(|point| point.trials.contains(&row.trial)).map(RepeatedPoint::mean).or(row.value)
-        };
+        let mean = |number| points.iter().find(|point| point.trials.contains(&number)).map(RepeatedPoint::mean);
         let accepted = self.rows.values().filter(|row| row.verdict == Some(Verdict::Accept));
-        accepted
-            .map(|row| (value(row), row))
-            .fold(None, |best: Option<(_, &TrialRecord)>, row| best.filter(|best| row.0 <= best.0).or(Some(row)))
-            .map(|(_, row)| row)
+        improvements(accepted.filter_map(|row| Some((row, row.trial, row.value?))), mean, Direction::Maximize).last()
     }
 
     /// Returns the proposal that waits for approval.

@@ -260,7 +260,7 @@ impl Draw {
                 risk: self.risk(),
                 gains: self.several(|d| (d.string(), d.number())).into(),
             }),
-            5 => Record::Request(RequestRecord { wish: self.string(), accepted: self.yes(), answer: self.string() }),
+            5 => Record::Request(RequestRecord { request: self.string(), accepted: self.yes(), answer: self.string() }),
             6 => Record::Counters(Counters {
                 late_ticks: self.word(),
                 worst_lateness_ns: self.word(),

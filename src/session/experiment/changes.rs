@@ -2,8 +2,9 @@
 //! Nothing runs before it is approved.
 
 use super::attributes::{self, BudgetAttribute, Origin};
+use super::plan::{RequestRefusal, not_now};
 use super::proposal_card::ProposalCard;
-use super::{Experiment, ExperimentState, RequestRefusal, confirmation, not_now};
+use super::{Experiment, ExperimentState, confirmation};
 use crate::trial::{ParameterInfo, ProposalSource};
 
 impl Experiment {

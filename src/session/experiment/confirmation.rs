@@ -1,38 +1,14 @@
 //! Confirmation of the best: the best points are repeated until one leads with enough confidence, or the repeats are used
 //! up. The rule is that of [`crate::optimize::repeats`]; the repeats are proposals like any other, beyond the budget.
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use serde_json::Value;
 
-use super::attributes::{self, StudyAttributes};
+use super::attributes::{self, Conclusion, RunningConfirmation, StudyAttributes};
 use crate::optimize::repeats::{Confirmation, LEAST_REPEATS, RepeatedPoint, confirm, contenders, points, rank};
 use crate::optimize::study::{Study, StudyError};
 use crate::optimize::trial::{Trial, TrialState};
 use crate::trial::PointRecord;
-
-/// A confirmation that runs.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct RunningConfirmation {
-    /// First trials of the compared points.
-    trials: Vec<u32>,
-    /// Most repeats.
-    repeats: u32,
-    /// Number of the first trial that may be one of them.
-    from: u32,
-}
-
-/// Conclusion of a confirmation.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Conclusion {
-    /// First trials of the compared points.
-    trials: Vec<u32>,
-    /// First trial of the leading point.
-    leader: u32,
-    /// Confidence that the leading point is the best.
-    confidence: f64,
-    /// Whether the confidence is enough.
-    sure: bool,
-}
 
 /// Next step of a confirmation.
 pub enum NextRepeat {
