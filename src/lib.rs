@@ -22,52 +22,35 @@
 //!
 //! ```text
 //!  screen (the program's main thread)                     recorder
-//!    │  intents            records │ ▲ ticks, snapshot       ▲ every tick
+//!    │  requests           records │ ▲ ticks, snapshot       ▲ every tick
 //!    ▼                             ▼ │                       │
 //!  session ── commands ──────────► control, 1 kHz ───────────┘
 //!          ◄─ events ─────────────
 //! ```
 //!
-//! What crosses to and from `control` is `Copy` and goes through wait-free channels ([`realtime::channel`]); nothing in a
-//! tick allocates, locks, logs or touches a file. STOP is a latch of its own that the tick reads before it acts. Simulated
-//! time is the same [`control::cycle::Cycle::tick`] called without a thread ([`session::rollout`]).
+//! Everything that crosses to and from `control` is `Copy` ([`telemetry`]) and goes through wait-free channels
+//! ([`realtime::channel`]). Nothing in a tick allocates, locks, logs or touches a file. STOP is a latch of its own that the tick
+//! reads before it acts. Simulated time is the same [`control::cycle::Cycle::tick`] called without a thread
+//! ([`session::rollout`]).
 //!
-//! # Who may use whom
+//! # Modules
 //!
 //! ```text
-//! ui         -> the engine's public interface          draws and asks; decides nothing
-//! engine     -> everything below                       wires
+//! ui         -> the engine's public interface          draws and sends requests; decides nothing
+//! engine     -> everything below                       starts the threads and connects them
 //! config     -> everything below                       files to checked values
-//! report     -> recording, optimize                    draws what happened
-//! session    -> optimize, recording, control, sim, realtime, robot    decides which trial, and whether it counts
-//! recording  -> realtime, robot                        writes and reads what was known
-//! control    -> robot, realtime                        decides this millisecond's torques
-//! sim        -> robot                                  answers as the machine would
-//! realtime   -> robot                                  carries
-//! optimize, robot -> nothing of ours                   numbers | the machine
+//! report     -> recording, optimize, trial             figures and tables
+//! session    -> optimize, recording, control, sim, realtime, telemetry, trial, robot    proposes, runs and judges trials
+//! recording  -> telemetry, trial, optimize, robot      writes and reads sessions
+//! control    -> telemetry, realtime, trial, robot      computes the torques of a tick
+//! sim        -> robot                                  simulates the robot
+//! realtime   -> telemetry, robot                       threads, scheduling, clock, channels
+//! telemetry  -> robot, trial                           data across the real-time boundary
+//! optimize, robot, trial -> nothing of ours            samplers and studies | the machine | vocabulary of a trial
 //! ```
 //!
-//! `tests/architecture.rs` checks the arrows.
-//!
-//! # Where this differs from the first plan of the house
-//!
-//! * *The next proposal is drafted, not asked for.* A verdict stays open to undo until the next trial begins, yet the
-//!   operator should see the next proposal at once. So a proposal is a [`optimize::study::TrialDraft`] without effect, made on
-//!   a fork of the study in which the verdict is told already; verdict and proposal become final together, on approval.
-//! * *A study has a folder* (`study.log`, `config/`, one `session.mcap` per run of the program), because a study can be
-//!   continued by another session.
-//! * *A simulated robot is carried back to its mark before each trial*, as a person does it with a real one. A trial is
-//!   then a function of its parameters and seed alone: the console, `optimize` and a replay agree bit for bit.
-//! * *The control thread's body is [`control::control_loop`]*, not the engine's: the engine paces it, a bench and the test with the
-//!   aborting allocator call the very same code.
-//! * *A cache warm-up precedes each tick on hardware* ([`control::control_loop`]): cold caches were a good part of the longest
-//!   ticks.
-//! * *There is a second process where there is a robot* (`engine/guard.rs`): a program that is killed cannot damp it any more.
-//! * *The session may act by itself* (`--approve`, [`trial`]), through the same wishes as a person and refused
-//!   for the same reasons; a person's STOP, cancel or fault outranks it.
-//! * *The emulated Go1 is [`sim::emulator`]*: it speaks [`robot::go1::packet`] from the other side, so a study on it passes
-//!   through every line that a study on the robot passes through.
-//! * `config` stands beside `engine`: it turns files into the settings of every part, so it must know them all.
+//! `tests/architecture.rs` checks these rules. `docs/architecture.md` explains the structure and how to add a task, a robot, a
+//! sampler, a view or a failsafe.
 
 pub mod config;
 pub mod control;

@@ -88,10 +88,10 @@ impl Config {
                 None => default,
             };
             as_run.push((name.to_owned(), table.to_string()));
-            ranges::check(name, &table, &origin)?;
             origins.insert(name, origin);
             tables.insert(name, table);
         }
+        let numbers = tables.clone();
         let mut take = |name: &'static str| (name, tables.remove(name).unwrap_or_default());
         let config = Config {
             control: parse(&origins, take("control.toml"))?,
@@ -102,6 +102,10 @@ impl Config {
             as_run,
             origins,
         };
+        // After the types, whose error names the kind of number that a key holds.
+        for (name, table) in &numbers {
+            ranges::check(name, table, &config.origins[name])?;
+        }
         config.check()?;
         Ok(config)
     }

@@ -254,7 +254,7 @@ fn a_guard_sends_nothing_to_a_robot_without_commands_and_no_invalid_command() {
         let output = guard(&[&given, after.as_bytes()].concat(), socket.try_clone().unwrap());
         let printed = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(status), "{after:?}: {printed}");
-        assert_eq!(printed.contains("is no command"), status == 2, "{printed}");
+        assert_eq!(printed.contains("is not a valid command"), status == 2, "{printed}");
     }
     assert_eq!(robot.rest(0), Vec::<Vec<u8>>::new());
     let output = guard(&[&damping()[..], b"\x46\0-+"].concat(), socket);
