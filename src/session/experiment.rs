@@ -77,9 +77,6 @@ pub struct Experiment {
 impl Experiment {
     /// Opens a study, new or not. A trial that a crash left running counts if it was judged; otherwise it is void and its
     /// parameters are queued again.
-    ///
-    /// # Errors
-    /// When the study cannot be read or written.
     pub fn open(plan: ExperimentPlan, study: Study) -> Result<Experiment, StudyError> {
         let mut experiment = Experiment {
             queue: TrialQueue::new(plan.worker, plan.abandoned),
@@ -170,9 +167,7 @@ impl Experiment {
     }
 
     /// Approves the proposal as it was seen: it becomes a running trial, on disk before this returns.
-    ///
-    /// # Errors
-    /// When there is another proposal by now, its values are outside the limits, or the study cannot be written.
+    /// Refused when there is another proposal by now or its values are outside the limits.
     pub fn approve(&mut self, trial: u32, revision: u32) -> Result<TrialSpec, RequestRefusal> {
         let ExperimentState::Proposed(card) = &self.state else { return not_now("there is no proposal to approve") };
         if !card.is(trial, revision) {
@@ -191,9 +186,7 @@ impl Experiment {
     }
 
     /// Refuses the proposal: it becomes a void trial, which the sampler does not see.
-    ///
-    /// # Errors
-    /// When there is no proposal, or the study cannot be written.
+    /// Refused when there is no proposal.
     pub fn skip(&mut self) -> Result<(), RequestRefusal> {
         let ExperimentState::Proposed(card) = &self.state else { return not_now("there is no proposal to skip") };
         let cause = match self.objection() {
@@ -235,9 +228,7 @@ impl Experiment {
     }
 
     /// Judges the trial under review; with `rerun` its parameters are queued again.
-    ///
-    /// # Errors
-    /// When no trial is under review, an accepted trial has no value, or the study cannot be written.
+    /// Refused when no trial is under review or an accepted trial has no value.
     pub fn judge(&mut self, verdict: Verdict, rerun: bool) -> Result<(), RequestRefusal> {
         let trial = self.reviewed()?;
         let Some(row) = self.rows.get_mut(&trial) else { return not_now(NOT_UNDER_REVIEW) };
@@ -276,9 +267,7 @@ impl Experiment {
     }
 
     /// Takes the last verdict back.
-    ///
-    /// # Errors
-    /// When it was reported already, or the study cannot be written.
+    /// Refused when it was reported already.
     pub fn undo(&mut self) -> Result<(), RequestRefusal> {
         let Some(pending) = self.pending.as_ref().filter(|_| self.is_idle()) else {
             return not_now("there is no verdict to undo; the last one became final when the next trial began");
@@ -298,9 +287,7 @@ impl Experiment {
     }
 
     /// Uses a value measured by hand for the trial under review; none returns to the measured one.
-    ///
-    /// # Errors
-    /// When no trial is under review or the value is not finite.
+    /// Refused when no trial is under review or the value is not finite.
     pub fn set_hand_value(&mut self, value: Option<f64>) -> Result<(), RequestRefusal> {
         let trial = self.reviewed()?;
         if value.is_some_and(|value| !value.is_finite()) {
@@ -316,9 +303,6 @@ impl Experiment {
 
     /// Takes in the changes of other programs: their trials join the table, and a point that they have queued is proposed
     /// next if the operator has not changed the proposal. To be called regularly.
-    ///
-    /// # Errors
-    /// When the study cannot be read or written.
     pub fn refresh(&mut self) -> Result<(), RequestRefusal> {
         if !self.is_idle() {
             return Ok(());
@@ -352,9 +336,6 @@ impl Experiment {
     /// Ends the session during a review: a trial that is to be void by the rules (stopped, or its operator is gone) is void
     /// with its cause, and its parameters are queued again as after a crash. Any other waits for its verdict until the
     /// study is opened again.
-    ///
-    /// # Errors
-    /// When the study cannot be read or written.
     pub fn leave(&mut self) -> Result<(), StudyError> {
         let ExperimentState::Review(trial) = self.state else { return Ok(()) };
         let Some(row) = self.rows.get_mut(&trial).filter(|row| row.suggested == Some(Verdict::Void)) else {
@@ -370,9 +351,6 @@ impl Experiment {
     }
 
     /// Reports the pending verdict: the session ends.
-    ///
-    /// # Errors
-    /// When the study cannot be written.
     pub fn close(&mut self) -> Result<(), StudyError> {
         self.report_pending().map(drop)
     }
@@ -444,9 +422,6 @@ pub fn rows_of(study: &Study, order: &[ParameterInfo]) -> Vec<TrialRecord> {
 }
 
 /// Adds finished trials of another study. Re-runs that are still to be queued there are not queued here.
-///
-/// # Errors
-/// As [`Study::import`].
 pub fn import(study: &mut Study, trials: Vec<TableTrial>) -> Result<Vec<u32>, StudyError> {
     let trials: Vec<TableTrial> = trials
         .into_iter()

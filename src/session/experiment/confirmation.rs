@@ -34,7 +34,6 @@ pub struct BestConfirmation {
 }
 
 impl BestConfirmation {
-    /// No conclusion yet.
     pub fn new(contenders: u32, confidence: f64) -> BestConfirmation {
         BestConfirmation { contenders, confidence, concluded: None, published: Vec::new() }
     }
@@ -72,7 +71,6 @@ impl BestConfirmation {
         self.concluded = None;
     }
 
-    /// Keeps a conclusion until it can be written.
     pub fn conclude(&mut self, conclusion: Conclusion) {
         self.concluded = Some(conclusion);
     }
@@ -88,7 +86,6 @@ impl BestConfirmation {
         study.annotate_study(&attributes::write(&Concluded { confirmed, confirm: None }))
     }
 
-    /// Returns the next step of the confirmation in the study `outlook`.
     pub fn next(&self, outlook: &Study) -> NextRepeat {
         let Some(running) = running(outlook) else { return NextRepeat::None };
         let direction = outlook.options().direction;
@@ -181,7 +178,6 @@ impl BestConfirmation {
     }
 }
 
-/// Returns the confirmation that runs.
 pub fn running(study: &Study) -> Option<RunningConfirmation> {
     StudyAttributes::of(study.attributes()).confirm
 }

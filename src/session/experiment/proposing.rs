@@ -144,15 +144,10 @@ impl Experiment {
             source: proposal.source,
             parent: proposal.parent,
             parameters: proposal.parameters.iter().map(|p| (p.name.clone(), p.value)).collect(),
-            measured: None,
-            value: None,
-            hand_value: None,
-            suggested: None,
-            cause: String::new(),
-            verdict: None,
             note: gains_note(&gains, &self.plan.control.gains()),
             risk: proposal.risk,
             gains,
+            ..TrialRecord::default()
         };
         if !row.note.is_empty() {
             // The sampler learns from this trial like from any other; the note shows that the controller differed.

@@ -59,7 +59,6 @@ impl TrialQueue {
         Ok(log)
     }
 
-    /// Returns whether other workers run trials. An abandoned trial does not count.
     pub fn others_run(&self, study: &Study) -> bool {
         study.running().any(|trial| !self.is_own(study, trial) && self.liveness.is_alive(trial))
     }

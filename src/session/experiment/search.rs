@@ -32,7 +32,6 @@ impl SearchSettings {
         SearchSettings { bounds, fixed }
     }
 
-    /// Returns the attributes of the study.
     pub fn attributes(&self) -> Attributes {
         attributes::write(self)
     }
@@ -97,7 +96,6 @@ impl SearchSettings {
         self.fixed.remove(name).is_some()
     }
 
-    /// Returns the record for the screen and the recording.
     pub fn status(
         &self,
         plan: &ExperimentPlan,
