@@ -20,13 +20,16 @@
 //!
 //! # Threads
 //!
-//! ```text
-//!  screen (the program's main thread)                     recorder
-//!    │  requests           records │ ▲ ticks, snapshot       ▲ every tick
-//!    ▼                             ▼ │                       │
-//!  session ── commands ──────────► control, 1 kHz ───────────┘
-//!          ◄─ events ─────────────
-//! ```
+//! | from | to | data |
+//! |---|---|---|
+//! | screen (the program's main thread) | session | requests |
+//! | screen | control | STOP, heartbeat |
+//! | session | control, 1 kHz | commands |
+//! | control | session | events, readiness |
+//! | control | recorder | every tick |
+//! | control | screen | every fifth tick, snapshot |
+//! | session | screen, recorder | records |
+//! | recorder | session | ticks of a trial |
 //!
 //! Everything that crosses to and from `control` is `Copy` ([`telemetry`]) and goes through wait-free channels
 //! ([`realtime::channel`]). Nothing in a tick allocates, locks, logs or touches a file. STOP is a latch of its own that the tick
