@@ -177,9 +177,7 @@ impl Gains {
 }
 
 /// The jumps that a person approves and judges. STOP, the loss of the operator and every limit work the same in all.
-#[derive(
-    Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, EnumString, IntoStaticStr, VariantArray,
-)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, EnumString, IntoStaticStr, VariantArray)]
 #[strum(serialize_all = "kebab-case")]
 pub enum Approval {
     /// A person approves and judges each jump.
@@ -203,7 +201,7 @@ impl Approval {
 }
 
 /// One optimized parameter, or one gain.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct ParameterInfo {
     /// Name, for example `Fx`.
     pub name: String,
@@ -227,10 +225,11 @@ impl ParameterInfo {
 /// ```text
 /// proposed -> running -> review -> proposed | finished
 /// ```
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, EnumString, IntoStaticStr, VariantArray)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, EnumString, IntoStaticStr, VariantArray)]
 #[strum(serialize_all = "lowercase")]
 pub enum ExperimentStage {
     /// A proposal waits for approval.
+    #[default]
     Proposed,
     /// The trial was approved and runs.
     Running,
@@ -252,15 +251,19 @@ impl ExperimentStage {
 }
 
 /// Origin of a trial's parameters.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, EnumString, IntoStaticStr, VariantArray)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, EnumString, IntoStaticStr, VariantArray,
+)]
 #[serde(rename_all = "kebab-case")]
 #[strum(serialize_all = "lowercase")]
 pub enum ProposalSource {
     /// The sampler alone.
+    #[default]
     Sampler,
     /// The operator changed at least one.
     Operator,
     /// A re-run of an earlier trial.
+    #[serde(rename = "re-run")]
     #[strum(serialize = "re-run")]
     Rerun,
     /// A point queued beforehand, by the operator or by another program.
@@ -280,7 +283,7 @@ impl ProposalSource {
 }
 
 /// A proposed trial: the values that run if it is approved.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Proposal {
     /// The number that the trial will have.
     pub trial: u32,
@@ -299,7 +302,7 @@ pub struct Proposal {
 }
 
 /// One value of a proposal.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct ProposedParameter {
     /// Name.
     pub name: String,
@@ -310,7 +313,7 @@ pub struct ProposedParameter {
 }
 
 /// Distance of a proposal to earlier falls, in parameters scaled to their bounds. Shown only: it changes no proposal.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct FallRisk {
     /// Euclidean distance to the nearest fall; none without a fall.
     pub nearest_fall: Option<f64>,
@@ -346,7 +349,7 @@ impl Verdict {
 }
 
 /// Measured values of a jump, in the world frame turned so that the trial starts at yaw 0.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct MeasuredJump {
     /// Forward displacement x_final - x_init, m.
     pub dx_m: f64,
@@ -361,7 +364,7 @@ pub struct MeasuredJump {
 }
 
 /// A row of the trial table.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct TrialRecord {
     /// Number in the study.
     pub trial: u32,
@@ -392,7 +395,7 @@ pub struct TrialRecord {
 }
 
 /// The present search space and the progress of the study.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct SearchStatus {
     /// Trials that are to count.
     pub budget: u32,
@@ -405,7 +408,7 @@ pub struct SearchStatus {
 }
 
 /// One parameter as it is searched at present.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct SearchedParameter {
     /// Name.
     pub name: String,
@@ -422,7 +425,7 @@ pub struct SearchedParameter {
 }
 
 /// A parameter that is fixed for some trials.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct FixedParameter {
     /// Its value, in the parameter's unit.
     pub value: f64,
@@ -431,7 +434,7 @@ pub struct FixedParameter {
 }
 
 /// Reasons of a proposal.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct ProposalInsight {
     /// The proposed trial.
     pub trial: u32,
@@ -440,7 +443,7 @@ pub struct ProposalInsight {
 }
 
 /// Reasons of one parameter's proposed value, and its importance.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct ParameterInsight {
     /// Name.
     pub name: String,
@@ -458,7 +461,7 @@ pub struct ParameterInsight {
 }
 
 /// A point that was run more than once or is being confirmed; repeats are aggregated as in `optimize::repeats`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct PointRecord {
     /// Parameters by name, in table order.
     pub parameters: ParameterValues,

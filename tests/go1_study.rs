@@ -125,7 +125,7 @@ impl Operator {
                     self.stops += 1;
                     println!("{} -> {}: {}", change.from.name(), change.to.name(), change.cause);
                 }
-                Record::Request(command) if !command.accepted => println!("{}: {}", command.wish, command.answer),
+                Record::Request(command) if !command.accepted => println!("{}: {}", command.request, command.answer),
                 Record::Log(line) => println!("{}", line.message),
                 _ => {}
             }

@@ -35,12 +35,7 @@ fn whole() -> &'static Whole {
         let everything = in_order(&ticks, &records);
         let attachment: [(&str, &str, &[u8]); 1] = [("config.toml", "application/toml", b"kp = 400.0\n")];
         let mut writer = Writer::create(&path, &session(), START_UTC_NS, &attachment).unwrap();
-        for played in &everything {
-            match played {
-                Played::Tick(tick) => writer.tick(tick).unwrap(),
-                Played::Record(stamped) => writer.record(stamped).unwrap(),
-            }
-        }
+        write_all(&mut writer, &everything);
         writer.flush().unwrap();
         let part = fs::read(folder.path().join("whole.mcap.part")).unwrap();
         writer.finish().unwrap();

@@ -46,12 +46,7 @@ fn python_reads_every_topic() {
     let mut writer = Writer::create(&path, &session(), START_UTC_NS, &attachment).unwrap();
     writer.show_links_of(RobotDescription::embedded("go1").unwrap());
     let everything = in_order(&ticks, &records);
-    for played in &everything {
-        match played {
-            quadfrog::recording::player::Played::Tick(tick) => writer.tick(tick).unwrap(),
-            quadfrog::recording::player::Played::Record(stamped) => writer.record(stamped).unwrap(),
-        }
-    }
+    write_all(&mut writer, &everything);
     writer.finish().unwrap();
     assert_same(&play(&path), &everything);
     let Some(found) = python_reads(&path) else { return };

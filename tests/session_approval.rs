@@ -96,7 +96,7 @@ fn auto_runs_a_whole_study_without_a_question_and_stop_still_holds_it() {
     screen.until("the end of the study", |r| stage(r) == Some(ExperimentStage::Finished));
     assert_eq!(judged(&screen.records, Verdict::Accept) + judged(&screen.records, Verdict::Fall), 3);
     let asked =
-        screen.records.iter().filter(|r| matches!(r, Record::Request(c) if c.wish.starts_with("approve"))).count();
+        screen.records.iter().filter(|r| matches!(r, Record::Request(c) if c.request.starts_with("approve"))).count();
     assert_eq!(asked, 0);
 }
 

@@ -6,14 +6,12 @@ mod support;
 use std::time::Duration;
 
 use quadfrog::optimize::exchange::TableTrial;
-use quadfrog::optimize::study::Storage;
 use quadfrog::optimize::trial::{Trial, TrialState};
 use quadfrog::recording::record::Record;
-use quadfrog::session::experiment::Experiment;
-use quadfrog::session::experiment::import;
+use quadfrog::session::experiment::{Experiment, import};
 use quadfrog::telemetry::{FallCause, TrialEnd};
 use quadfrog::trial::{ExperimentStage, ProposalSource, Verdict};
-use support::{accept, experiment, far, joined, open, parameters, run, study, ticks};
+use support::{accept, approve, experiment, far, joined, open, parameters, run, study_in, ticks};
 
 /// Longer than any test.
 const PATIENT: Duration = Duration::from_secs(3600);
@@ -113,8 +111,7 @@ fn a_verdict_can_be_undone_until_the_next_trial_begins() {
 #[test]
 fn a_trial_in_which_nothing_was_measured_cannot_be_accepted_without_a_hand_measured_value() {
     let mut experiment = experiment(5);
-    let card = experiment.proposal().unwrap();
-    let spec = experiment.approve(card.trial, card.revision).unwrap();
+    let spec = approve(&mut experiment);
     experiment.ended(spec.trial, &TrialEnd::Settled, &[], 0);
     let error = experiment.judge(Verdict::Accept, false).unwrap_err().to_string();
     assert!(error.contains("nothing was measured"), "{error}");
@@ -220,8 +217,7 @@ fn a_trial_interrupted_in_mid_jump_is_void_and_comes_again() {
     let folder = tempfile::tempdir().unwrap();
     let mut experiment = open(folder.path());
     accept(&mut experiment);
-    let card = experiment.proposal().unwrap();
-    let spec = experiment.approve(card.trial, card.revision).unwrap();
+    let spec = approve(&mut experiment);
     drop(experiment);
     let mut experiment = open(folder.path());
     let row = experiment.row(spec.trial).unwrap();
@@ -246,7 +242,7 @@ fn a_rerun_survives_every_moment_of_a_kill_and_comes_once() {
         let experiment = open(folder.path());
         let card = experiment.proposal().unwrap();
         assert_eq!((card.source, card.parent), (ProposalSource::Rerun, Some(spec.trial)));
-        let waiting = study(Storage::File(folder.path().join("study.log"))).waiting().count();
+        let waiting = study_in(folder.path()).waiting().count();
         assert_eq!(waiting, 1);
     }
 }
@@ -268,8 +264,7 @@ fn an_approval_from_before_an_undo_is_refused() {
 #[test]
 fn a_trial_with_lost_ticks_is_suggested_void() {
     let mut experiment = experiment(5);
-    let card = experiment.proposal().unwrap();
-    let spec = experiment.approve(card.trial, card.revision).unwrap();
+    let spec = approve(&mut experiment);
     experiment.ended(spec.trial, &TrialEnd::Settled, &ticks(spec.trial, 0.6), 41);
     let row = experiment.row(spec.trial).unwrap();
     assert_eq!((row.suggested, row.measured), (Some(Verdict::Void), None));
@@ -291,7 +286,7 @@ fn the_records_tell_what_the_study_holds() {
             shown.insert(row.trial, row);
         }
     }
-    let study = study(Storage::File(folder.path().join("study.log")));
+    let study = study_in(folder.path());
     let finished: Vec<_> = study.trials().iter().filter(|t| t.state.is_finished()).collect();
     assert_eq!(finished.len(), shown.len());
     for trial in finished {
@@ -310,8 +305,7 @@ fn a_worker_whose_clock_is_behind_keeps_its_trial() {
     let folder = tempfile::tempdir().unwrap();
     let journal = folder.path().join("study.log");
     let mut theirs = joined(folder.path(), 1000, PATIENT);
-    let card = theirs.proposal().unwrap();
-    let spec = theirs.approve(card.trial, card.revision).unwrap();
+    let spec = approve(&mut theirs);
     // Its clock is a century behind ours; no line becomes longer by that.
     let text = std::fs::read_to_string(&journal).unwrap();
     let behind = text.replace("\"datetime_start\": \"20", "\"datetime_start\": \"19");
@@ -333,8 +327,7 @@ fn a_worker_whose_clock_is_behind_keeps_its_trial() {
 fn a_trial_that_was_seen_running_for_too_long_is_void_and_comes_again() {
     let folder = tempfile::tempdir().unwrap();
     let mut theirs = joined(folder.path(), 1000, PATIENT);
-    let card = theirs.proposal().unwrap();
-    let spec = theirs.approve(card.trial, card.revision).unwrap();
+    let spec = approve(&mut theirs);
     drop(theirs);
     let mut ours = joined(folder.path(), 1000, Duration::from_millis(1));
     std::thread::sleep(Duration::from_millis(20));
@@ -357,7 +350,7 @@ fn a_rerun_that_another_worker_has_queued_comes_once() {
     other.refresh().unwrap();
     let again = run(&mut slow, TrialEnd::Settled);
     assert_eq!((again.jump, slow.row(again.trial).unwrap().parent), (first.jump, Some(first.trial)));
-    let study = study(Storage::File(folder.path().join("study.log")));
+    let study = study_in(folder.path());
     let parent =
         |trial: &&Trial| trial.user_attributes.get("parent").and_then(|p| p.as_u64()) == Some(u64::from(first.trial));
     assert_eq!(study.trials().iter().filter(parent).count(), 1);
@@ -377,7 +370,7 @@ fn a_trial_under_review_need_not_be_the_newest() {
         started: None,
         completed: None,
     };
-    let newer = import(&mut study(Storage::File(folder.path().join("study.log"))), vec![done]).unwrap();
+    let newer = import(&mut study_in(folder.path()), vec![done]).unwrap();
     experiment.refresh().unwrap();
     assert!(experiment.under_review().is_none());
     let spec = run(&mut experiment, TrialEnd::Settled);
@@ -392,6 +385,6 @@ fn a_raised_budget_is_kept_with_the_study() {
     let mut experiment = open(folder.path());
     experiment.extend(5).unwrap();
     drop(experiment);
-    let study = study(Storage::File(folder.path().join("study.log")));
+    let study = study_in(folder.path());
     assert_eq!(study.attributes()["budget"].as_u64(), Some(1005));
 }

@@ -13,27 +13,17 @@ use quadfrog::recording::record::Record;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::telemetry::Mode;
-use quadfrog::trial::{Approval, Backend, ExperimentStage, Proposal, Task, TrialRecord, Verdict};
+use quadfrog::trial::{Backend, ExperimentStage, Proposal, Task, TrialRecord, Verdict};
 
 /// Whatever is waited for comes in a few seconds; a machine under load may take longer.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-fn start(folder: &Path) -> Handle {
-    engine::start(Options {
-        config: Config::load(None).unwrap(),
-        robot: RobotDescription::embedded("go1").unwrap(),
-        network: None,
-        backend: Backend::Simulator,
-        task: Task::Forward,
-        seed: 3,
-        trials: Some(5),
-        folder: Some(folder.to_owned()),
-        approve: Approval::Each,
-        join: None,
-        observe: false,
-        guard: None,
-    })
-    .unwrap_or_else(|error| panic!("{error}"))
+fn start(folder: &Path, config: Option<&Path>) -> Handle {
+    let config = Config::load(config).unwrap();
+    let robot = RobotDescription::embedded("go1").unwrap();
+    let options = Options::new(config, robot, Backend::Simulator, Task::Forward);
+    engine::start(Options { seed: 3, trials: Some(5), folder: Some(folder.to_owned()), ..options })
+        .unwrap_or_else(|error| panic!("{error}"))
 }
 
 /// A screen: it beats in a thread of its own until it is lost, and keeps what it is told.
@@ -118,7 +108,7 @@ impl Drop for Screen {
 #[test]
 fn a_lost_operator_costs_the_trial_but_nothing_else() {
     let folder = tempfile::tempdir().unwrap();
-    let mut screen = Screen::new(start(folder.path()));
+    let mut screen = Screen::new(start(folder.path(), None));
     let before = screen.jump();
     screen.lost();
     screen.until_mode(Mode::Disarmed);
@@ -149,7 +139,7 @@ fn a_lost_operator_costs_the_trial_but_nothing_else() {
     assert_eq!(player.damage(), None);
 
     // Nobody judged it: it is void, and its parameters come again.
-    let mut again = Screen::new(start(folder.path()));
+    let mut again = Screen::new(start(folder.path(), None));
     let proposal = again.proposal();
     let values = |proposal: &Proposal| proposal.parameters.iter().map(|p| p.value).collect::<Vec<_>>();
     assert_eq!(values(&proposal), values(&before));
@@ -170,22 +160,7 @@ fn the_last_ticks_go_with_a_fault_outside_a_trial() {
     let refused = Config::load(Some(config.path()));
     assert!(refused.is_err(), "a limit below any temperature is refused");
     std::fs::write(config.path().join("safety.toml"), "[watchdog]\nsimulator_late_ms = 0.000001\n").unwrap();
-    let handle = engine::start(Options {
-        config: Config::load(Some(config.path())).unwrap(),
-        robot: RobotDescription::embedded("go1").unwrap(),
-        network: None,
-        backend: Backend::Simulator,
-        task: Task::Forward,
-        seed: 3,
-        trials: Some(5),
-        folder: Some(folder.path().to_owned()),
-        approve: Approval::Each,
-        join: None,
-        observe: false,
-        guard: None,
-    })
-    .unwrap_or_else(|error| panic!("{error}"));
-    let mut screen = Screen::new(handle);
+    let mut screen = Screen::new(start(folder.path(), Some(config.path())));
     screen.until_mode(Mode::Fault);
     screen.until("the fault's ticks", |screen| screen.records.iter().any(|r| matches!(r, Record::FaultTicks(_))));
     drop(screen);

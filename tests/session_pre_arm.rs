@@ -34,6 +34,7 @@ struct Session {
     robot: LinkedRobot,
     screen: Receiver<Stamped>,
     _recorder: Receiver<Stamped>,
+    _folder: Option<tempfile::TempDir>,
     records: Vec<Record>,
     time_ms: u64,
     /// Whether there is a screen that beats.
@@ -47,6 +48,13 @@ impl Session {
         session.supervisor.take_control();
         session.ticks(1500);
         session
+    }
+
+    /// On hardware's terms, with a folder for the recording.
+    fn hardware() -> Session {
+        let folder = tempfile::tempdir().unwrap();
+        let session = Session::new(Backend::Hardware, Some(folder.path().to_owned()));
+        Session { _folder: Some(folder), ..session }
     }
 
     fn begin(backend: Backend, folder: Option<std::path::PathBuf>, observe: bool) -> Session {
@@ -76,6 +84,7 @@ impl Session {
             robot: LinkedRobot { charge_percent: 90.0, ..robot },
             screen,
             _recorder: recorder,
+            _folder: None,
             records: Vec::new(),
             time_ms: 0,
             watched: true,
@@ -144,8 +153,7 @@ fn a_simulated_robot_is_armed_without_ceremony() {
 /// All failing items at once: the refusal names each with what was found and what is needed.
 #[test]
 fn a_real_robot_is_not_armed_before_every_item_holds_and_the_refusal_names_all() {
-    let folder = tempfile::tempdir().unwrap();
-    let mut session = Session::new(Backend::Hardware, Some(folder.path().to_owned()));
+    let mut session = Session::hardware();
     session.robot.charge_percent = 20.0;
     session.ticks(110);
     let answer = session.request(OperatorRequest::Arm);
@@ -176,8 +184,7 @@ fn a_real_robot_is_not_armed_before_every_item_holds_and_the_refusal_names_all()
 /// The word that the area is clear holds for one arming: afterwards somebody has been at the robot.
 #[test]
 fn the_area_is_asked_about_before_each_arming() {
-    let folder = tempfile::tempdir().unwrap();
-    let mut session = Session::new(Backend::Hardware, Some(folder.path().to_owned()));
+    let mut session = Session::hardware();
     session.test_stop();
     for check in OperatorCheck::ALL {
         session.request(OperatorRequest::Confirm(check));
@@ -198,8 +205,7 @@ fn the_area_is_asked_about_before_each_arming() {
 /// Nothing new is begun with a robot that nobody would damp if this program were killed.
 #[test]
 fn without_its_guard_a_robot_is_not_armed() {
-    let folder = tempfile::tempdir().unwrap();
-    let mut session = Session::cleared(&folder);
+    let mut session = Session::cleared();
     session.supervisor.report_guard_lost(session.time_ms * 1_000_000);
     let answer = session.request(OperatorRequest::Arm);
     assert!(!answer.accepted && answer.answer.starts_with("the guard process has ended"), "{answer:?}");
@@ -213,8 +219,7 @@ fn without_its_guard_a_robot_is_not_armed() {
 /// (A defect once: a word given in the morning armed the robot in the evening.)
 #[test]
 fn the_word_on_the_area_is_forgotten_after_a_minute() {
-    let folder = tempfile::tempdir().unwrap();
-    let mut session = Session::cleared(&folder);
+    let mut session = Session::cleared();
     session.ticks(50_000);
     assert_eq!(session.state(ArmingCheck::AreaClear), ArmingCheckState::Passed);
     session.ticks(11_000);
@@ -230,8 +235,8 @@ fn the_word_on_the_area_is_forgotten_after_a_minute() {
 
 impl Session {
     /// On hardware's terms, disarmed, and every item holds.
-    fn cleared(folder: &tempfile::TempDir) -> Session {
-        let mut session = Session::new(Backend::Hardware, Some(folder.path().to_owned()));
+    fn cleared() -> Session {
+        let mut session = Session::hardware();
         session.test_stop();
         for check in OperatorCheck::ALL {
             assert!(session.request(OperatorRequest::Confirm(check)).accepted);
@@ -262,8 +267,7 @@ impl Session {
 /// once: the first fault hid them, and a robot whose own controller ran again was armed.)
 #[test]
 fn a_restart_during_another_fault_is_told_and_takes_the_word_back() {
-    let folder = tempfile::tempdir().unwrap();
-    let mut session = Session::cleared(&folder);
+    let mut session = Session::cleared();
     assert!(session.request(OperatorRequest::Arm).accepted);
     session.robot.tamper = |state| state.joint_position[3] = 2.0;
     session.ticks(10);
@@ -294,8 +298,7 @@ fn a_restart_during_another_fault_is_told_and_takes_the_word_back() {
 /// The link's count of restarts alone takes the word back, whatever the mode and whether or not it changed.
 #[test]
 fn a_restart_that_changes_no_mode_takes_the_word_back() {
-    let folder = tempfile::tempdir().unwrap();
-    let mut session = Session::cleared(&folder);
+    let mut session = Session::cleared();
     session.robot.tamper = |state| state.motor_temperature_c[3] = 90.0;
     session.ticks(10);
     assert_eq!(session.body.mode(), Mode::Fault);
@@ -311,8 +314,7 @@ fn a_restart_that_changes_no_mode_takes_the_word_back() {
 /// Every item with its value, twice a second while the robot is disarmed, and at once when one changes.
 #[test]
 fn the_list_is_shown_twice_a_second_and_on_change() {
-    let folder = tempfile::tempdir().unwrap();
-    let mut session = Session::new(Backend::Hardware, Some(folder.path().to_owned()));
+    let mut session = Session::hardware();
     let lists = |session: &Session| session.records.iter().filter(|r| matches!(r, Record::ArmingChecks(_))).count();
     let before = lists(&session);
     session.ticks(2000);
@@ -458,12 +460,7 @@ proptest! {
         steps in proptest::collection::vec((any_step(), 1..1500_u32), 1..25),
         begins_cleared: bool,
     ) {
-        let folder = tempfile::tempdir().unwrap();
-        let mut session = if begins_cleared {
-            Session::cleared(&folder)
-        } else {
-            Session::new(Backend::Hardware, Some(folder.path().to_owned()))
-        };
+        let mut session = if begins_cleared { Session::cleared() } else { Session::hardware() };
         // The operator's words on the robot as it now runs; whether its motors follow.
         let (mut low_level, mut area, mut follow) = (begins_cleared, begins_cleared, true);
         for (step, ticks) in steps {

@@ -1,5 +1,4 @@
-//! What an operator may change of the search through the public interface of a experiment: gains, fixed parameters, bounds, the
-//! confirmation of the best, and what other programs do meanwhile.
+//! The operator's changes of the search: gains, fixed parameters, bounds, confirmation of the best, and other programs.
 
 #[path = "support/experiment.rs"]
 mod support;
@@ -9,25 +8,24 @@ use std::path::Path;
 use std::time::Duration;
 
 use quadfrog::optimize::insight::IMPORTANCE_TRIALS;
-use quadfrog::optimize::study::Storage;
 use quadfrog::recording::record::Record;
 use quadfrog::session::experiment::{Experiment, RequestRefusal};
 use quadfrog::telemetry::{FallCause, TrialEnd, TrialSpec};
 use quadfrog::trial::{
     ExperimentStage, FixedParameter, PointRecord, ProposalInsight, ProposalSource, SearchStatus, Verdict,
 };
-use support::{accept, experiment, far, joined, open, plan, run, study, ticks};
+use support::{accept, approve, experiment, far, joined, open, plan, run, study_in, ticks};
 
-/// The newest of what the screen is told.
+/// The newest records.
 #[derive(Default)]
-struct TellOutcome {
+struct News {
     search: Option<SearchStatus>,
     insight: Option<ProposalInsight>,
     points: Vec<PointRecord>,
     log: Vec<String>,
 }
 
-fn told(experiment: &mut Experiment, told: &mut TellOutcome) {
+fn told(experiment: &mut Experiment, told: &mut News) {
     for record in experiment.take_records() {
         match record {
             Record::Search(search) => told.search = Some(search),
@@ -40,7 +38,7 @@ fn told(experiment: &mut Experiment, told: &mut TellOutcome) {
 }
 
 fn search(experiment: &mut Experiment) -> SearchStatus {
-    let mut news = TellOutcome::default();
+    let mut news = News::default();
     told(experiment, &mut news);
     news.search.expect("the search has changed")
 }
@@ -184,8 +182,7 @@ fn bounds_are_changed_within_what_safety_allows_and_kept() {
 
 /// A jump whose length is what its parameters say, plus noise of its seed.
 fn jump(experiment: &mut Experiment, noise: f64) {
-    let card = experiment.proposal().expect("a proposal");
-    let spec = experiment.approve(card.trial, card.revision).unwrap();
+    let spec = approve(experiment);
     let u = (spec.seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5;
     experiment.ended(spec.trial, &TrialEnd::Settled, &ticks(spec.trial, far(&spec) + noise * u), 2);
     experiment.judge(Verdict::Accept, false).unwrap();
@@ -200,7 +197,7 @@ fn the_best_of_a_finished_study_is_confirmed_beyond_its_budget() {
     let counted = experiment.counted();
     let trials = experiment.confirm_best(60).unwrap();
     assert_eq!(trials.len(), 3);
-    let mut news = TellOutcome::default();
+    let mut news = News::default();
     let mut repeats = 0;
     loop {
         told(&mut experiment, &mut news);
@@ -236,7 +233,7 @@ fn repeats_end_with_their_budget_or_when_they_are_called_off() {
     (0..6).for_each(|_| jump(&mut experiment, 0.02));
     assert_eq!(experiment.stage(), ExperimentStage::Finished);
     experiment.confirm_best(4).unwrap();
-    let mut news = TellOutcome::default();
+    let mut news = News::default();
     for _ in 0..4 {
         assert_eq!(experiment.stage(), ExperimentStage::Proposed);
         jump(&mut experiment, 50.0);
@@ -257,7 +254,7 @@ fn the_verdict_that_ended_a_confirmation_can_be_undone() {
     let mut experiment = experiment(6);
     several(&mut experiment, 6);
     experiment.confirm_best(40).unwrap();
-    let mut news = TellOutcome::default();
+    let mut news = News::default();
     while experiment.stage() == ExperimentStage::Proposed {
         accept(&mut experiment);
     }
@@ -273,7 +270,7 @@ fn the_verdict_that_ended_a_confirmation_can_be_undone() {
 #[test]
 fn a_proposal_comes_with_its_densities_and_what_matters() {
     let mut experiment = experiment(40);
-    let mut news = TellOutcome::default();
+    let mut news = News::default();
     for _ in 0..IMPORTANCE_TRIALS - 1 {
         accept(&mut experiment);
     }
@@ -306,12 +303,12 @@ fn a_point_queued_by_another_program_comes_next() {
     let folder = tempfile::tempdir().unwrap();
     let mut experiment = open(folder.path());
     accept(&mut experiment);
-    let mut other = study(Storage::File(folder.path().join("study.log")));
+    let mut other = study_in(folder.path());
     other.enqueue(&[("Fx".into(), 77.0)], &[]).unwrap();
     experiment.refresh().unwrap();
     assert_eq!((experiment.proposal().unwrap().source, value(&experiment, "Fx")), (ProposalSource::Queued, 77.0));
     // Not over the operator's head.
-    let mut other = study(Storage::File(folder.path().join("study.log")));
+    let mut other = study_in(folder.path());
     accept(&mut experiment);
     experiment.set_parameter("Fz", 200.0).unwrap();
     other.enqueue(&[("Fx".into(), 78.0)], &[]).unwrap();
@@ -326,7 +323,7 @@ fn rerun_beside_a_queued_point(folder: &Path) -> (Experiment, TrialSpec) {
     let mut experiment = open(folder);
     let spec = run(&mut experiment, TrialEnd::Fell(FallCause::BodyContact));
     experiment.judge(Verdict::Void, true).unwrap();
-    let mut other = study(Storage::File(folder.join("study.log")));
+    let mut other = study_in(folder);
     other.enqueue(&[("Fx".into(), 77.0)], &[]).unwrap();
     (experiment, spec)
 }
@@ -366,7 +363,7 @@ fn a_point_of_another_program_beyond_the_limits_cannot_run() {
     ] {
         let folder = tempfile::tempdir().unwrap();
         let mut experiment = open(folder.path());
-        let mut other = study(Storage::File(folder.path().join("study.log")));
+        let mut other = study_in(folder.path());
         let point: Vec<_> = parameters.iter().map(|(name, value)| ((*name).to_owned(), *value)).collect();
         let attributes: Vec<_> =
             gains.map(|kp| ("gains".to_owned(), serde_json::json!({ "kp": kp }))).into_iter().collect();
@@ -419,8 +416,7 @@ fn a_verdict_against_the_suggestion_says_so_until_it_is_undone() {
 #[test]
 fn workers_together_run_no_more_repeats_than_were_asked_for() {
     let folder = tempfile::tempdir().unwrap();
-    let file = || Storage::File(folder.path().join("study.log"));
-    let mut first = Experiment::open(plan(6), study(file())).unwrap();
+    let mut first = Experiment::open(plan(6), study_in(folder.path())).unwrap();
     several(&mut first, 6);
     first.confirm_best(1).unwrap();
     let mut second = joined(folder.path(), 6, Duration::from_secs(3600));
@@ -441,7 +437,7 @@ fn workers_together_run_no_more_repeats_than_were_asked_for() {
     second.close().unwrap();
     first.refresh().unwrap();
     assert_eq!((first.stage(), second.stage()), (ExperimentStage::Finished, ExperimentStage::Finished));
-    let study = study(file());
+    let study = study_in(folder.path());
     let repeats = study.trials().iter().filter(|trial| trial.user_attributes["source"] == "confirm");
     let completed: Vec<bool> = repeats.map(|trial| trial.value.is_some()).collect();
     assert_eq!(completed, [false, true]);

@@ -64,9 +64,6 @@ pub struct Config {
 
 impl Config {
     /// Loads the defaults, with the files of `folder` laid over them.
-    ///
-    /// # Errors
-    /// When a file cannot be read, or a key or value is invalid; the message names file, line, key and value.
     pub fn load(folder: Option<&Path>) -> Result<Config, ConfigError> {
         if let Some(folder) = folder {
             refuse_unknown_files(folder)?;
@@ -91,20 +88,18 @@ impl Config {
             origins.insert(name, origin);
             tables.insert(name, table);
         }
-        let numbers = tables.clone();
-        let mut take = |name: &'static str| (name, tables.remove(name).unwrap_or_default());
         let config = Config {
-            control: parse(&origins, take("control.toml"))?,
-            safety: parse(&origins, take("safety.toml"))?,
-            optimize: parse(&origins, take("optimize.toml"))?,
-            simulator: parse(&origins, take("simulator.toml"))?,
-            console: take("console.toml").1,
+            control: parse("control.toml", &tables, &origins)?,
+            safety: parse("safety.toml", &tables, &origins)?,
+            optimize: parse("optimize.toml", &tables, &origins)?,
+            simulator: parse("simulator.toml", &tables, &origins)?,
+            console: tables["console.toml"].clone(),
             as_run,
             origins,
         };
         // After the types, whose error names the kind of number that a key holds.
-        for (name, table) in &numbers {
-            ranges::check(name, table, &config.origins[name])?;
+        for (name, _) in FILES {
+            ranges::check(name, &tables[name], &config.origins[name])?;
         }
         config.check()?;
         Ok(config)
@@ -277,15 +272,16 @@ fn template(text: &str) -> Table {
 }
 
 fn parse<T: DeserializeOwned>(
+    name: &'static str,
+    tables: &HashMap<&'static str, Table>,
     origins: &HashMap<&'static str, FileOrigin>,
-    (name, table): (&'static str, Table),
 ) -> Result<T, ConfigError> {
-    let origin = &origins[name];
+    let (table, origin) = (&tables[name], &origins[name]);
     serde_path_to_error::deserialize(toml::Value::Table(table.clone())).map_err(|error| {
         let key = error.path().to_string();
         // An entry of a list has the line of its list.
         let key = key.split('[').next().unwrap_or(&key);
-        let value = lookup(&table, key).map(toml::Value::to_string).unwrap_or_default();
+        let value = lookup(table, key).map(toml::Value::to_string).unwrap_or_default();
         origin.refuse(key, value, without_type_names(error.inner().message()))
     })
 }

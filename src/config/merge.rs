@@ -28,9 +28,6 @@ impl FileOrigin {
 }
 
 /// Lays the text of `file` over `default`; returns the values in force and their origin. Keys of `optional`, which the default leaves out, are allowed too.
-///
-/// # Errors
-/// When the text is not TOML, or a key is unknown or of another kind than the default's.
 pub fn merge(file: &str, text: &str, default: &Table, optional: &Table) -> Result<(Table, FileOrigin), ConfigError> {
     let line_of = |offset: usize| text[..offset.min(text.len())].matches('\n').count() + 1;
     let parsed = DeTable::parse(text).map_err(|error| ConfigError::Syntax {

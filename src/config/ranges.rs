@@ -1,18 +1,12 @@
-//! Allowed range of every single number in the files. Rules between keys are in `rules.rs`.
+//! Allowed range of every single number in the files; that of `simulator.toml` is in `crate::sim::ranges`, because a
+//! simulator checks it, too. Rules between keys are in `rules.rs`.
 
-use toml::{Table, Value};
+use toml::Table;
 
 use super::ConfigError;
 use super::merge::FileOrigin;
+use crate::sim::ranges::{NOT_NEGATIVE, NumberRange, POSITIVE, Row, first_outside};
 
-/// Allowed numbers, all finite, and their description for the message.
-struct NumberRange {
-    allows: fn(f64) -> bool,
-    text: &'static str,
-}
-
-const POSITIVE: NumberRange = NumberRange { allows: |v| v > 0.0, text: "must be a number above 0" };
-const NOT_NEGATIVE: NumberRange = NumberRange { allows: |v| v >= 0.0, text: "must be 0 or more" };
 const LATENESS: NumberRange =
     NumberRange { allows: |v| v >= 0.0, text: "must be a number of milliseconds, or 0 to only count" };
 const IDLE_TIME: NumberRange =
@@ -29,70 +23,53 @@ const TRIALS: NumberRange = NumberRange { allows: |v| v >= 1.0, text: "a study n
 const CONTENDERS: NumberRange = NumberRange { allows: |v| (2.0..=10.0).contains(&v), text: "must be 2 to 10 points" };
 const CONFIDENCE: NumberRange = NumberRange { allows: |v| v > 0.5 && v < 1.0, text: "must be above 0.5 and below 1" };
 
-/// File, keys and their range. `*` stands for any name; the first row that fits applies.
-const RANGES: [(&str, &[&str], NumberRange); 15] = [
-    ("control.toml", &["countdown.simulator_s"], COUNTDOWN),
-    ("control.toml", &["tasks.*.jumps"], JUMPS),
-    ("control.toml", &["tasks.*.f1_hz"], NOT_NEGATIVE),
-    ("control.toml", &["realtime.hardware_priority", "realtime.simulator_priority"], PRIORITY),
-    ("control.toml", &["realtime.core"], CORE),
-    ("control.toml", &["stand_up.*", "sit_down.*", "countdown.*", "settle.*", "contact.*", "estimator.*"], POSITIVE),
+const CONTROL: &[Row] = &[
+    (&["countdown.simulator_s"], COUNTDOWN),
+    (&["tasks.*.jumps"], JUMPS),
+    (&["tasks.*.f1_hz"], NOT_NEGATIVE),
+    (&["realtime.hardware_priority", "realtime.simulator_priority"], PRIORITY),
+    (&["realtime.core"], CORE),
+    (&["stand_up.*", "sit_down.*", "countdown.*", "settle.*", "contact.*", "estimator.*"], POSITIVE),
+];
+const SAFETY: &[Row] = &[
     (
-        "safety.toml",
         &["*.corrupt", "*.disk_free_mb", "*.joint_margin_rad", "*.battery_percent", "*.loss_share", "*.late_share"],
         NOT_NEGATIVE,
     ),
-    ("safety.toml", &["watchdog.simulator_late_ms", "watchdog.hardware_late_ms"], LATENESS),
-    ("safety.toml", &["watchdog.simulator_idle_s", "watchdog.hardware_idle_s"], IDLE_TIME),
-    ("safety.toml", &["watchdog.velocity_factor", "watchdog.torque_factor", "watchdog.period_factor"], FACTOR),
-    ("safety.toml", &["*.*"], POSITIVE),
-    ("optimize.toml", &["workers.abandoned_s"], POSITIVE),
-    ("optimize.toml", &["trials"], TRIALS),
-    ("optimize.toml", &["confirm.contenders"], CONTENDERS),
-    ("optimize.toml", &["confirm.confidence"], CONFIDENCE),
+    (&["watchdog.simulator_late_ms", "watchdog.hardware_late_ms"], LATENESS),
+    (&["watchdog.simulator_idle_s", "watchdog.hardware_idle_s"], IDLE_TIME),
+    (&["watchdog.velocity_factor", "watchdog.torque_factor", "watchdog.period_factor"], FACTOR),
+    (&["*.*"], POSITIVE),
+];
+const OPTIMIZE: &[Row] = &[
+    (&["workers.abandoned_s"], POSITIVE),
+    (&["trials"], TRIALS),
+    (&["confirm.contenders"], CONTENDERS),
+    (&["confirm.confidence"], CONFIDENCE),
 ];
 
-/// Checks every number of `file` against [`RANGES`].
-///
-/// # Errors
-/// [`ConfigError::Value`] of the first number out of its range.
+/// Returns the ranges of a file's numbers; the first row that fits applies.
+fn rows(file: &str) -> &'static [Row] {
+    match file {
+        "control.toml" => CONTROL,
+        "safety.toml" => SAFETY,
+        "optimize.toml" => OPTIMIZE,
+        _ => &[],
+    }
+}
+
+/// Checks every number of `file`.
 pub fn check(file: &str, table: &Table, origin: &FileOrigin) -> Result<(), ConfigError> {
-    for (key, value) in numbers(table, "") {
-        if let Some(range) = range(file, &key)
-            && !(value.is_finite() && (range.allows)(value))
-        {
-            return Err(origin.refuse(&key, value, range.text));
-        }
+    match first_outside(rows(file), table) {
+        Some((key, value, text)) => Err(origin.refuse(&key, value, text)),
+        None => Ok(()),
     }
-    Ok(())
-}
-
-fn range(file: &str, key: &str) -> Option<&'static NumberRange> {
-    let fits = |pattern: &&str| {
-        pattern.split('.').count() == key.split('.').count()
-            && pattern.split('.').zip(key.split('.')).all(|(pattern, name)| pattern == "*" || pattern == name)
-    };
-    RANGES.iter().find(|(known, keys, _)| *known == file && keys.iter().any(&fits)).map(|(.., range)| range)
-}
-
-/// Returns the numbers outside of lists, by their key with its tables.
-fn numbers(table: &Table, tables: &str) -> Vec<(String, f64)> {
-    let mut found = Vec::new();
-    for (name, value) in table {
-        let key = format!("{tables}{name}");
-        match value {
-            Value::Integer(value) => found.push((key, *value as f64)),
-            Value::Float(value) => found.push((key, *value)),
-            Value::Table(inner) => found.extend(numbers(inner, &format!("{key}."))),
-            _ => {}
-        }
-    }
-    found
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sim::ranges::{numbers, range};
 
     /// Gains have their ranges in `safety.toml`; the sampler's numbers are whole and may all be given.
     #[test]
@@ -105,7 +82,8 @@ mod tests {
         for (file, text) in files {
             for (key, _) in numbers(&text.parse().unwrap(), "") {
                 let elsewhere = ["kp", "kd", "kd_joint", "k_att"].iter().any(|gain| key.ends_with(&format!(".{gain}")));
-                assert!(elsewhere || key.starts_with("sampler.") || range(file, &key).is_some(), "{file}: `{key}`");
+                let known = range(rows(file), &key).is_some();
+                assert!(elsewhere || key.starts_with("sampler.") || known, "{file}: `{key}`");
             }
         }
     }

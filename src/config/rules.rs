@@ -18,7 +18,7 @@ impl Config {
         self.check_safety()?;
         self.check_optimize()?;
         self.simulator.check().map_err(|error| match error {
-            SimError::Value { key, value, remedy } => self.refuse("simulator.toml", key, value, remedy),
+            SimError::Value { key, value, remedy } => self.refuse("simulator.toml", &key, value, remedy),
             SimError::Syntax { reason } => {
                 ConfigError::Syntax { file: "simulator.toml".to_owned(), line: 1, message: reason }
             }

@@ -80,9 +80,6 @@ pub fn newest_config(folder: &Path) -> Option<(u32, PathBuf)> {
 }
 
 /// Returns the study files of `folder` and of the folders in it, in the order of their names.
-///
-/// # Errors
-/// When the folder cannot be read.
 pub fn study_files(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
     let own = folder.join(STUDY_FILE);
     let mut files: Vec<PathBuf> = std::fs::read_dir(folder)?

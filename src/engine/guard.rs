@@ -59,9 +59,6 @@ pub struct Lifeline {
 
 impl Guard {
     /// Starts `program guard` over `robot`.
-    ///
-    /// # Errors
-    /// When the process cannot be started, or no datagram can hold the damping of `settings`.
     pub fn post(program: &Path, robot: &Go1, settings: &ControlSettings) -> std::io::Result<(Guard, Lifeline)> {
         let (socket, damping) = (robot.socket()?, robot.damping(settings.gate.damping_kd));
         let damping = damping.map_err(std::io::Error::other)?;
@@ -153,9 +150,6 @@ pub enum Watch {
 }
 
 /// Runs the guard until `pipe` ends.
-///
-/// # Errors
-/// When the datagram is not a valid command.
 pub fn stand(mut pipe: impl Read + AsFd, socket: &UdpSocket) -> Result<Watch, GuardError> {
     let refused = |reason: &dyn ToString| GuardError { reason: reason.to_string() };
     let (mut damping, mut silence_ms) = ([0; COMMAND_LENGTH], [0; 2]);

@@ -67,87 +67,41 @@ impl Options {
 }
 
 /// Error of an engine's start.
+#[expect(missing_docs, reason = "the messages name variants and fields")]
 #[derive(Debug, thiserror::Error)]
 pub enum EngineError {
-    /// A value of the configuration.
     #[error(transparent)]
     Config(#[from] ConfigError),
-    /// The simulator's configuration.
     #[error(transparent)]
     Simulator(#[from] SimError),
-    /// The link to the robot.
     #[error(transparent)]
     Link(#[from] LinkError),
-    /// The robot's description has no network.
     #[error("{robot}: its robot.toml has no section [network]; only a robot with one can be driven or emulated")]
-    NoNetwork {
-        /// The robot's name.
-        robot: String,
-    },
-    /// The search space.
+    NoNetwork { robot: String },
     #[error(transparent)]
     Space(#[from] SpaceError),
-    /// The study.
     #[error(transparent)]
     Study(#[from] StudyError),
-    /// The recording.
     #[error(transparent)]
     Recording(#[from] RecordingError),
-    /// Automatic approval on a robot.
     #[error(
         "--approve auto: only on the simulator; a jump of the robot is approved by a person: give each or falls-only"
     )]
     Unattended,
-    /// A journal that does not exist.
     #[error("{}: there is no such journal; give a study's folder, its study.log, a journal file or redis://HOST:PORT/DB", file.display())]
-    NoJournal {
-        /// The file.
-        file: PathBuf,
-    },
-    /// A journal with several studies.
+    NoJournal { file: PathBuf },
     #[error("{journal}: several studies are in it; choose one with --name: {names}")]
-    WhichStudy {
-        /// The journal.
-        journal: String,
-        /// Their names.
-        names: String,
-    },
-    /// A study that does not exist.
+    WhichStudy { journal: String, names: String },
     #[error("{journal}: there is no such study in it{}", if names.is_empty() { String::new() } else { format!("; its studies: {names}") })]
-    NoSuchStudy {
-        /// The journal.
-        journal: String,
-        /// The names that there are.
-        names: String,
-    },
-    /// A study that this program cannot use.
+    NoSuchStudy { journal: String, names: String },
     #[error(
         "{journal}: study {name} has no real-valued parameter yet, or several objectives; this program supports neither"
     )]
-    Unusable {
-        /// The journal.
-        journal: String,
-        /// The study's name.
-        name: String,
-    },
-    /// A journal without a study of this program.
+    Unusable { journal: String, name: String },
     #[error("{}: holds no study that this program made", file.display())]
-    NoStudy {
-        /// The file.
-        file: PathBuf,
-    },
-    /// Another session has the study.
+    NoStudy { file: PathBuf },
     #[error("{}: another session is running in this folder; end it first, or view the study with optuna-dashboard", folder.display())]
-    InUse {
-        /// The folder.
-        folder: PathBuf,
-    },
-    /// The folder of the study, or a thread.
+    InUse { folder: PathBuf },
     #[error("{what}: {source}")]
-    System {
-        /// The attempted action.
-        what: String,
-        /// The system's error.
-        source: std::io::Error,
-    },
+    System { what: String, source: std::io::Error },
 }

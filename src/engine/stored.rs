@@ -25,9 +25,6 @@ pub struct StoredStudy {
 }
 
 /// Returns the studies of this program in `storage`; none if the file does not exist.
-///
-/// # Errors
-/// When it cannot be read.
 pub fn stored_studies(storage: &Storage) -> Result<Vec<StoredStudy>, EngineError> {
     let journal = storage.journal(Durability::Synced).map_err(StudyError::from)?;
     let living = journal.state().studies().iter().filter(|study| !study.deleted);
@@ -35,9 +32,6 @@ pub fn stored_studies(storage: &Storage) -> Result<Vec<StoredStudy>, EngineError
 }
 
 /// Returns the study in `file`.
-///
-/// # Errors
-/// When the file cannot be read or holds no study of this program.
 pub fn stored_study(file: &Path) -> Result<StoredStudy, EngineError> {
     let studies = stored_studies(&Storage::File(file.to_owned()))?;
     studies.into_iter().next().ok_or_else(|| EngineError::NoStudy { file: file.to_owned() })

@@ -5,11 +5,9 @@
 //! fields. While it grows it is named `*.mcap.part`; only a finished one is named `*.mcap`.
 
 mod container;
-mod decode;
 pub mod disk;
 mod error;
 mod frames;
-mod optimizing;
 mod output;
 pub mod player;
 pub mod record;
@@ -19,6 +17,7 @@ mod schema;
 mod tick;
 mod topic;
 mod trials;
+mod wire;
 pub mod writer;
 
 pub use error::RecordingError;

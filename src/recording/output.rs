@@ -22,9 +22,6 @@ const CHUNK_BYTES: usize = 256 * 1024;
 /// Destination of a recording's bytes: a file, or a failing one in a test.
 pub trait Sink: Write + Send {
     /// Waits until everything written is on the disk.
-    ///
-    /// # Errors
-    /// When the disk fails.
     fn sync(&mut self) -> io::Result<()>;
 }
 
@@ -43,7 +40,6 @@ pub struct Output {
 }
 
 impl Output {
-    /// Writes the header of the file.
     pub fn new(sink: Box<dyn Sink>) -> Result<Output, McapError> {
         let disk = SharedSink(Arc::new(Mutex::new(CountedSink { sink: BufWriter::new(sink), bytes: 0 })));
         let mcap = WriteOptions::new()
@@ -141,7 +137,6 @@ impl Output {
         Ok(disk.sink.get_mut().sync()?)
     }
 
-    /// Returns the bytes passed to the disk so far.
     pub fn bytes(&self) -> u64 {
         self.disk.lock().bytes
     }

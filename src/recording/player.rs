@@ -11,10 +11,10 @@ use mcap::records::{MessageHeader, Record as McapRecord};
 use prost::Message;
 
 use super::container::{Chunk, Container};
-use super::decode::DecodeError;
 use super::error::RecordingError;
 use super::record::{Record, SessionInfo, Stamped};
 use super::topic::Topic;
+use super::wire::DecodeError;
 use super::{frog, schema, tick};
 use crate::telemetry::Tick;
 
@@ -156,9 +156,6 @@ impl Player {
     }
 
     /// Returns the bytes of an attached file, for example `config.toml`; none if no file has that name.
-    ///
-    /// # Errors
-    /// When it cannot be read.
     pub fn attachment(&mut self, name: &str) -> Result<Option<Vec<u8>>, RecordingError> {
         for span in self.container.attachments.clone() {
             let attachment = self
@@ -272,18 +269,14 @@ impl Player {
                 continue;
             }
             let played = match topic {
-                Topic::JointStates => JointStates::decode(&*data)
-                    .map(|message| {
-                        joints = Some((header, message));
-                        None
-                    })
-                    .map_err(DecodeError::from),
-                Topic::JointCommand => frog::JointCommand::decode(&*data)
-                    .map(|message| {
-                        command = Some((header, message));
-                        None
-                    })
-                    .map_err(DecodeError::from),
+                Topic::JointStates => JointStates::decode(&*data).map_err(DecodeError::from).map(|message| {
+                    joints = Some((header, message));
+                    None
+                }),
+                Topic::JointCommand => frog::JointCommand::decode(&*data).map_err(DecodeError::from).map(|message| {
+                    command = Some((header, message));
+                    None
+                }),
                 Topic::Tick => join(&header, &data, joints.take(), command.take()).map(|tick| Some(Played::Tick(tick))),
                 _ => schema::decode(topic, &data)
                     .map(|record| record.map(|record| Played::Record(Stamped { time_ns, record }))),
@@ -338,5 +331,5 @@ fn join(
         joints.filter(|(other, _)| same(other)).ok_or(DecodeError::Missing("/robot/joint_states of a tick"))?;
     let (_, command) =
         command.filter(|(other, _)| same(other)).ok_or(DecodeError::Missing("/robot/joint_cmd of a tick"))?;
-    tick::join(&frog::ControlTick::decode(control)?, &joints, &command)
+    tick::join(frog::ControlTick::decode(control)?, &joints, command)
 }

@@ -62,7 +62,7 @@ pub struct ArmingCheckRecord {
     pub state: ArmingCheckState,
 }
 
-/// What a session is: written first into a recording, shown in the frame.
+/// Facts of a session: written first into a recording, shown in the frame.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct SessionInfo {
     /// Version of this program.
@@ -79,7 +79,7 @@ pub struct SessionInfo {
     pub sampler: Option<SamplerKind>,
     /// Seed of the study.
     pub seed: u64,
-    /// How many trials the study is to have.
+    /// Trials that are to count.
     pub budget: u32,
     /// The parameters with their bounds, in table order.
     pub parameters: Vec<ParameterInfo>,
@@ -89,7 +89,7 @@ pub struct SessionInfo {
     pub recording: String,
     /// Start, UTC, ISO 8601.
     pub started: String,
-    /// Whether this session may only look.
+    /// Whether the session only observes.
     pub observe: bool,
     /// The controller's gains with the ranges in which an operator may set them, in table order.
     pub gains: Vec<ParameterInfo>,
@@ -169,7 +169,7 @@ pub struct Transition {
 }
 
 /// The experiment's stage and its trial.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct StageRecord {
     /// The stage.
     pub stage: ExperimentStage,
@@ -180,10 +180,10 @@ pub struct StageRecord {
 }
 
 /// An operator's request and its result.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct RequestRecord {
     /// The request as text, for example `override Fx = 120`.
-    pub wish: String,
+    pub request: String,
     /// Whether it was carried out.
     pub accepted: bool,
     /// Reason of the refusal, or result.

@@ -3,51 +3,32 @@
 use foxglove::messages::{Log, log};
 use prost::Message;
 
-use super::decode::{DecodeError, number, one_of};
 use super::record::{
     ArmingCheckRecord, HealthLimits, LogLevel, LogRecord, Record, RequestRecord, SessionInfo, StageRecord, Transition,
 };
 use super::topic::Topic;
-use super::{frog, optimizing, tick, trials};
+use super::wire::{DecodeError, Way, decoded, encoded, one_of};
+use super::{frog, tick, trials};
 use crate::robot::LinkStatus;
-use crate::telemetry::{ArmingCheck, ArmingCheckState, Counters, Mode};
-use crate::trial::{ExperimentStage, ParameterInfo};
+use crate::telemetry::Counters;
+use crate::trial::ParameterInfo;
 
 /// Encodes a record into `buffer` and returns its topic. `start_utc_ns` is the log time of engine time 0, ns.
 pub fn encode(record: &Record, start_utc_ns: u64, log_time: u64, buffer: &mut Vec<u8>) -> Topic {
     buffer.clear();
-    let (topic, encoded) = match record {
-        Record::Session(info) => (Topic::Session, session(info, start_utc_ns).encode(buffer)),
-        Record::Transition(transition) => {
-            let message = frog::Transition {
-                from: transition.from as i32,
-                to: transition.to as i32,
-                cause: transition.cause.clone(),
-            };
+    let (topic, written) = match record {
+        Record::Session(info) => {
+            (Topic::Session, frog::Session { start_utc_ns, ..encoded(session, info) }.encode(buffer))
+        }
+        Record::Transition(Transition { from, to, cause }) => {
+            let message = frog::Transition { from: *from as i32, to: *to as i32, cause: cause.clone() };
             (Topic::Transition, message.encode(buffer))
         }
-        Record::Stage(StageRecord { stage, trial, can_undo }) => {
-            let message = frog::StageInfo { stage: *stage as i32, trial: *trial, can_undo: *can_undo };
-            (Topic::Stage, message.encode(buffer))
-        }
-        Record::Proposal(value) => (Topic::Proposal, trials::proposal(value).encode(buffer)),
-        Record::Trial(value) => (Topic::Trial, trials::trial(value).encode(buffer)),
-        Record::Request(RequestRecord { wish, accepted, answer }) => {
-            let message = frog::OperatorCommand { wish: wish.clone(), accepted: *accepted, answer: answer.clone() };
-            (Topic::Command, message.encode(buffer))
-        }
-        Record::Counters(counters) => {
-            let message = frog::Counters {
-                late_ticks: counters.late_ticks,
-                worst_lateness_ns: counters.worst_lateness_ns,
-                ticks_not_recorded: counters.ticks_not_recorded,
-                ticks_not_shown: counters.ticks_not_shown,
-                commands_refused: counters.commands_refused,
-                state_age_ms: counters.state_age_ms,
-                link: counters.link.as_ref().map(link),
-            };
-            (Topic::Counters, message.encode(buffer))
-        }
+        Record::Stage(value) => (Topic::Stage, encoded(stage, value).encode(buffer)),
+        Record::Proposal(value) => (Topic::Proposal, encoded(trials::proposal, value).encode(buffer)),
+        Record::Trial(value) => (Topic::Trial, encoded(trials::trial, value).encode(buffer)),
+        Record::Request(value) => (Topic::Command, encoded(request, value).encode(buffer)),
+        Record::Counters(value) => (Topic::Counters, encoded(counters, value).encode(buffer)),
         Record::Log(LogRecord { level, source, message }) => {
             let level = match level {
                 LogLevel::Info => log::Level::Info,
@@ -76,48 +57,27 @@ pub fn encode(record: &Record, start_utc_ns: u64, log_time: u64, buffer: &mut Ve
             };
             (Topic::PreArm, frog::PreArm { items: list.iter().map(item).collect() }.encode(buffer))
         }
-        Record::Search(value) => (Topic::Search, optimizing::search(value).encode(buffer)),
-        Record::Insight(value) => (Topic::Insight, optimizing::insight(value).encode(buffer)),
-        Record::Points(value) => (Topic::Points, optimizing::points(value).encode(buffer)),
+        Record::Search(value) => (Topic::Search, encoded(trials::search, value).encode(buffer)),
+        Record::Insight(value) => (Topic::Insight, encoded(trials::insight, value).encode(buffer)),
+        Record::Points(value) => (Topic::Points, encoded(trials::points, value).encode(buffer)),
     };
-    encoded.expect("a Vec grows as needed");
+    written.expect("a Vec grows as needed");
     topic
 }
 
 /// Decodes the record of a message; none on a topic that holds no records.
 pub fn decode(topic: Topic, data: &[u8]) -> Result<Option<Record>, DecodeError> {
     Ok(Some(match topic {
-        Topic::Session => Record::Session(from_session(frog::Session::decode(data)?)),
+        Topic::Session => Record::Session(decoded(session, frog::Session::decode(data)?)?),
         Topic::Transition => {
-            let message = frog::Transition::decode(data)?;
-            Record::Transition(Transition {
-                from: one_of(&Mode::ALL, "mode", message.from)?,
-                to: one_of(&Mode::ALL, "mode", message.to)?,
-                cause: message.cause,
-            })
+            let frog::Transition { from, to, cause } = frog::Transition::decode(data)?;
+            Record::Transition(Transition { from: one_of("mode", from)?, to: one_of("mode", to)?, cause })
         }
-        Topic::Stage => {
-            let frog::StageInfo { stage, trial, can_undo } = frog::StageInfo::decode(data)?;
-            Record::Stage(StageRecord { stage: one_of(&ExperimentStage::ALL, "stage", stage)?, trial, can_undo })
-        }
-        Topic::Proposal => Record::Proposal(trials::from_proposal(frog::Proposal::decode(data)?)?),
-        Topic::Trial => Record::Trial(trials::from_trial(frog::Trial::decode(data)?)?),
-        Topic::Command => {
-            let frog::OperatorCommand { wish, accepted, answer } = frog::OperatorCommand::decode(data)?;
-            Record::Request(RequestRecord { wish, accepted, answer })
-        }
-        Topic::Counters => {
-            let message = frog::Counters::decode(data)?;
-            Record::Counters(Counters {
-                late_ticks: message.late_ticks,
-                worst_lateness_ns: message.worst_lateness_ns,
-                ticks_not_recorded: message.ticks_not_recorded,
-                ticks_not_shown: message.ticks_not_shown,
-                commands_refused: message.commands_refused,
-                state_age_ms: message.state_age_ms,
-                link: message.link.as_ref().map(from_link),
-            })
-        }
+        Topic::Stage => Record::Stage(decoded(stage, frog::StageInfo::decode(data)?)?),
+        Topic::Proposal => Record::Proposal(decoded(trials::proposal, frog::Proposal::decode(data)?)?),
+        Topic::Trial => Record::Trial(decoded(trials::trial, frog::Trial::decode(data)?)?),
+        Topic::Command => Record::Request(decoded(request, frog::OperatorCommand::decode(data)?)?),
+        Topic::Counters => Record::Counters(decoded(counters, frog::Counters::decode(data)?)?),
         Topic::Log => {
             let message = Log::decode(data)?;
             let level = match message.level() {
@@ -130,151 +90,123 @@ pub fn decode(topic: Topic, data: &[u8]) -> Result<Option<Record>, DecodeError> 
         }
         Topic::Fault => {
             let message = frog::FaultTicks::decode(data)?;
-            Record::FaultTicks(message.ticks.iter().map(tick::from_whole).collect::<Result<_, _>>()?)
+            Record::FaultTicks(message.ticks.into_iter().map(tick::from_whole).collect::<Result<_, _>>()?)
         }
         Topic::PreArm => {
             let item = |item: frog::pre_arm::Item| {
-                Ok(ArmingCheckRecord {
-                    check: one_of(ArmingCheck::ALL, "check", item.check)?,
-                    state: one_of(ArmingCheckState::ALL, "state of a check", item.state)?,
-                    found: item.found,
-                    needed: item.needed,
-                })
+                let (check, state) = (one_of("check", item.check)?, one_of("state of a check", item.state)?);
+                Ok(ArmingCheckRecord { check, state, found: item.found, needed: item.needed })
             };
             let items = frog::PreArm::decode(data)?.items;
             Record::ArmingChecks(items.into_iter().map(item).collect::<Result<_, DecodeError>>()?)
         }
-        Topic::Search => Record::Search(optimizing::from_search(frog::Search::decode(data)?)),
-        Topic::Insight => Record::Insight(optimizing::from_insight(frog::Insight::decode(data)?)),
-        Topic::Points => Record::Points(optimizing::from_points(frog::Points::decode(data)?)),
+        Topic::Search => Record::Search(decoded(trials::search, frog::Search::decode(data)?)?),
+        Topic::Insight => Record::Insight(decoded(trials::insight, frog::Insight::decode(data)?)?),
+        Topic::Points => Record::Points(decoded(trials::points, frog::Points::decode(data)?)?),
         Topic::JointStates | Topic::JointCommand | Topic::Tick | Topic::Pose | Topic::Tf | Topic::Marker => {
             return Ok(None);
         }
     }))
 }
 
-fn session(info: &SessionInfo, start_utc_ns: u64) -> frog::Session {
-    let bounds = |parameter: &ParameterInfo| frog::Bounds {
-        name: parameter.name.clone(),
-        unit: parameter.unit.clone(),
-        low: Some(parameter.low),
-        high: Some(parameter.high),
-    };
-    frog::Session {
-        version: info.version.clone(),
-        backend: info.backend_name().to_owned(),
-        robot: info.robot.clone(),
-        task: info.task_name().to_owned(),
-        unit: info.unit.clone(),
-        sampler: info.sampler_name().to_owned(),
-        seed: info.seed,
-        budget: info.budget,
-        parameters: info.parameters.iter().map(bounds).collect(),
-        study: info.study.clone(),
-        recording: info.recording.clone(),
-        started: info.started.clone(),
-        observe: info.observe,
-        start_utc_ns,
-        gains: info.gains.iter().map(bounds).collect(),
-        approve: info.approve.name().to_owned(),
-        limits: Some(health_limits(&info.limits)),
-    }
+fn stage(way: Way, ours: &mut StageRecord, m: &mut frog::StageInfo) -> Result<(), DecodeError> {
+    way.variant(&mut ours.stage, &mut m.stage, "stage")?;
+    way.copy(&mut ours.trial, &mut m.trial);
+    way.copy(&mut ours.can_undo, &mut m.can_undo);
+    Ok(())
 }
 
-fn from_session(message: frog::Session) -> SessionInfo {
-    let bounds = |bounds: frog::Bounds| ParameterInfo {
-        name: bounds.name,
-        unit: bounds.unit,
-        low: number(bounds.low),
-        high: number(bounds.high),
-    };
-    SessionInfo {
-        version: message.version,
-        backend: message.backend.parse().ok(),
-        robot: message.robot,
-        task: message.task.parse().ok(),
-        unit: message.unit,
-        sampler: message.sampler.parse().ok(),
-        seed: message.seed,
-        budget: message.budget,
-        parameters: message.parameters.into_iter().map(bounds).collect(),
-        study: message.study,
-        recording: message.recording,
-        started: message.started,
-        observe: message.observe,
-        gains: message.gains.into_iter().map(bounds).collect(),
-        approve: message.approve.parse().unwrap_or_default(),
-        limits: message.limits.map_or_else(HealthLimits::default, |limits| from_health_limits(&limits)),
-    }
+fn request(way: Way, ours: &mut RequestRecord, m: &mut frog::OperatorCommand) -> Result<(), DecodeError> {
+    way.copy(&mut ours.request, &mut m.wish);
+    way.copy(&mut ours.accepted, &mut m.accepted);
+    way.copy(&mut ours.answer, &mut m.answer);
+    Ok(())
 }
 
-fn health_limits(limits: &HealthLimits) -> frog::HealthLimits {
-    frog::HealthLimits {
-        state_age_ms: limits.state_age_ms,
-        loss_share: Some(limits.loss_share),
-        motor_c: Some(limits.motor_c),
-        battery_percent: Some(limits.battery_percent),
-        late_share: Some(limits.late_share),
-        late_ms: Some(limits.late_ms),
+/// All but the time of the start, which is the writer's.
+fn session(way: Way, ours: &mut SessionInfo, m: &mut frog::Session) -> Result<(), DecodeError> {
+    way.copy(&mut ours.version, &mut m.version);
+    way.copy(&mut ours.robot, &mut m.robot);
+    way.copy(&mut ours.unit, &mut m.unit);
+    way.copy(&mut ours.seed, &mut m.seed);
+    way.copy(&mut ours.budget, &mut m.budget);
+    way.list(&mut ours.parameters, &mut m.parameters, bounds)?;
+    way.copy(&mut ours.study, &mut m.study);
+    way.copy(&mut ours.recording, &mut m.recording);
+    way.copy(&mut ours.started, &mut m.started);
+    way.copy(&mut ours.observe, &mut m.observe);
+    way.list(&mut ours.gains, &mut m.gains, bounds)?;
+    match way {
+        Way::Encode => {
+            m.backend = ours.backend_name().to_owned();
+            m.task = ours.task_name().to_owned();
+            m.sampler = ours.sampler_name().to_owned();
+            m.approve = ours.approve.name().to_owned();
+            m.limits = Some(encoded(health_limits, &ours.limits));
+        }
+        Way::Decode => {
+            ours.backend = m.backend.parse().ok();
+            ours.task = m.task.parse().ok();
+            ours.sampler = m.sampler.parse().ok();
+            ours.approve = m.approve.parse().unwrap_or_default();
+            ours.limits = m.limits.take().map(|m| decoded(health_limits, m)).transpose()?.unwrap_or_default();
+        }
     }
+    Ok(())
 }
 
-fn from_health_limits(message: &frog::HealthLimits) -> HealthLimits {
-    HealthLimits {
-        state_age_ms: message.state_age_ms,
-        loss_share: number(message.loss_share),
-        motor_c: number(message.motor_c),
-        battery_percent: number(message.battery_percent),
-        late_share: number(message.late_share),
-        late_ms: number(message.late_ms),
-    }
+fn bounds(way: Way, ours: &mut ParameterInfo, m: &mut frog::Bounds) -> Result<(), DecodeError> {
+    way.copy(&mut ours.name, &mut m.name);
+    way.copy(&mut ours.unit, &mut m.unit);
+    way.number(&mut ours.low, &mut m.low);
+    way.number(&mut ours.high, &mut m.high);
+    Ok(())
 }
 
-fn link(link: &LinkStatus) -> frog::Link {
-    frog::Link {
-        received: link.received,
-        lost: link.lost,
-        late: link.late,
-        duplicate: link.duplicate,
-        corrupt: link.corrupt,
-        wrong_length: link.wrong_length,
-        foreign: link.foreign,
-        reboots: link.reboots,
-        sent: link.sent,
-        send_errors: link.send_errors,
-        state_age_ms: link.state_age_ms,
-        rate_hz: link.rate_hz,
-        recent_received: link.recent_received,
-        recent_lost: link.recent_lost,
-        recent_corrupt: link.recent_corrupt,
-    }
+fn health_limits(way: Way, ours: &mut HealthLimits, m: &mut frog::HealthLimits) -> Result<(), DecodeError> {
+    way.copy(&mut ours.state_age_ms, &mut m.state_age_ms);
+    way.number(&mut ours.loss_share, &mut m.loss_share);
+    way.number(&mut ours.motor_c, &mut m.motor_c);
+    way.number(&mut ours.battery_percent, &mut m.battery_percent);
+    way.number(&mut ours.late_share, &mut m.late_share);
+    way.number(&mut ours.late_ms, &mut m.late_ms);
+    Ok(())
 }
 
-fn from_link(link: &frog::Link) -> LinkStatus {
-    LinkStatus {
-        received: link.received,
-        lost: link.lost,
-        late: link.late,
-        duplicate: link.duplicate,
-        corrupt: link.corrupt,
-        wrong_length: link.wrong_length,
-        foreign: link.foreign,
-        reboots: link.reboots,
-        sent: link.sent,
-        send_errors: link.send_errors,
-        state_age_ms: link.state_age_ms,
-        rate_hz: link.rate_hz,
-        recent_received: link.recent_received,
-        recent_lost: link.recent_lost,
-        recent_corrupt: link.recent_corrupt,
-    }
+fn counters(way: Way, ours: &mut Counters, m: &mut frog::Counters) -> Result<(), DecodeError> {
+    way.copy(&mut ours.late_ticks, &mut m.late_ticks);
+    way.copy(&mut ours.worst_lateness_ns, &mut m.worst_lateness_ns);
+    way.copy(&mut ours.ticks_not_recorded, &mut m.ticks_not_recorded);
+    way.copy(&mut ours.ticks_not_shown, &mut m.ticks_not_shown);
+    way.copy(&mut ours.commands_refused, &mut m.commands_refused);
+    way.copy(&mut ours.state_age_ms, &mut m.state_age_ms);
+    way.option(&mut ours.link, &mut m.link, link)
+}
+
+fn link(way: Way, ours: &mut LinkStatus, m: &mut frog::Link) -> Result<(), DecodeError> {
+    way.copy(&mut ours.received, &mut m.received);
+    way.copy(&mut ours.lost, &mut m.lost);
+    way.copy(&mut ours.late, &mut m.late);
+    way.copy(&mut ours.duplicate, &mut m.duplicate);
+    way.copy(&mut ours.corrupt, &mut m.corrupt);
+    way.copy(&mut ours.wrong_length, &mut m.wrong_length);
+    way.copy(&mut ours.foreign, &mut m.foreign);
+    way.copy(&mut ours.reboots, &mut m.reboots);
+    way.copy(&mut ours.sent, &mut m.sent);
+    way.copy(&mut ours.send_errors, &mut m.send_errors);
+    way.copy(&mut ours.state_age_ms, &mut m.state_age_ms);
+    way.copy(&mut ours.rate_hz, &mut m.rate_hz);
+    way.copy(&mut ours.recent_received, &mut m.recent_received);
+    way.copy(&mut ours.recent_lost, &mut m.recent_lost);
+    way.copy(&mut ours.recent_corrupt, &mut m.recent_corrupt);
+    Ok(())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::telemetry::Phase;
-    use crate::trial::{ProposalSource, Verdict};
+    use crate::telemetry::{ArmingCheck, ArmingCheckState, Mode, Phase};
+    use crate::trial::{ExperimentStage, ProposalSource, Verdict};
 
     /// `STAND UP` in the program is `STAND_UP` in the schema, `re-run` is `RE_RUN`.
     fn assert_named(name: &str, in_schema: Option<&str>) {

@@ -1,14 +1,14 @@
 //! A tick as the messages of its three topics, and back, bit for bit.
 
 use foxglove::messages::{JointState, JointStates, Timestamp};
-use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use nalgebra::{UnitQuaternion, Vector3};
 
-use super::decode::{DecodeError, number, one_of};
 use super::frog;
-use crate::robot::{
-    Battery, Imu, JOINTS, JointCommand, Joints, LEGS, MotorCommand, PerLeg, RobotState, Truth, joint_name,
-};
-use crate::telemetry::{Estimate, Mode, Phase, StageTimes, Tick};
+use super::wire::{DecodeError, Way, encoded};
+use crate::robot::{Battery, JOINTS, Joints, LEGS, MotorCommand, PerLeg, RobotState, Truth, joint_name};
+use crate::telemetry::Tick;
+
+const JOINT_VALUES: &str = "joint values";
 
 /// Converts log time (UTC, ns) to protobuf's seconds and nanoseconds; saturates in the year 2106.
 pub fn timestamp(log_time: u64) -> Timestamp {
@@ -34,149 +34,122 @@ pub fn joint_states(state: &RobotState, log_time: u64, message: &mut JointStates
 
 /// Returns the joint command as sent, with the torque before the limits.
 pub fn joint_command(tick: &Tick) -> frog::JointCommand {
-    let each = |value: fn(&MotorCommand) -> f64| tick.command.motor.iter().map(value).collect();
-    frog::JointCommand {
-        position: each(|motor| motor.position),
-        velocity: each(|motor| motor.velocity),
-        kp: each(|motor| motor.kp),
-        kd: each(|motor| motor.kd),
-        torque: each(|motor| motor.torque),
-        torque_demanded: tick.torque_demanded.to_vec(),
-        limited: tick.limited.into(),
-    }
+    encoded(joint_command_fields, tick)
 }
 
 /// Returns everything else of a tick.
 pub fn control_tick(tick: &Tick) -> frog::ControlTick {
-    let Tick { state, estimate, stages, .. } = tick;
-    let orientation = estimate.orientation_world.coords;
-    let imu = state.imu.orientation_world.coords;
-    let [fr, fl, rr, rl] = estimate.foot_position_leg;
-    frog::ControlTick {
-        number: tick.number,
-        time_ns: tick.time_ns,
-        mode: tick.mode as i32,
-        phase: tick.phase as i32,
-        trial: tick.trial,
-        trial_time: Some(tick.trial_time_s),
-        theta: Some(tick.theta_rad),
-        roll: Some(estimate.roll_pitch_yaw.x),
-        pitch: Some(estimate.roll_pitch_yaw.y),
-        yaw: Some(estimate.roll_pitch_yaw.z),
-        position_x: Some(estimate.position_world.x),
-        position_y: Some(estimate.position_world.y),
-        position_z: Some(estimate.position_world.z),
-        velocity_x: Some(estimate.velocity_world.x),
-        velocity_y: Some(estimate.velocity_world.y),
-        velocity_z: Some(estimate.velocity_world.z),
-        orientation_x: Some(orientation.x),
-        orientation_y: Some(orientation.y),
-        orientation_z: Some(orientation.z),
-        orientation_w: Some(orientation.w),
-        angular_velocity_x: Some(estimate.angular_velocity_body.x),
-        angular_velocity_y: Some(estimate.angular_velocity_body.y),
-        angular_velocity_z: Some(estimate.angular_velocity_body.z),
-        contact_fr: estimate.contact[0],
-        contact_fl: estimate.contact[1],
-        contact_rr: estimate.contact[2],
-        contact_rl: estimate.contact[3],
-        foot_x_fr: Some(fr.x),
-        foot_y_fr: Some(fr.y),
-        foot_z_fr: Some(fr.z),
-        foot_x_fl: Some(fl.x),
-        foot_y_fl: Some(fl.y),
-        foot_z_fl: Some(fl.z),
-        foot_x_rr: Some(rr.x),
-        foot_y_rr: Some(rr.y),
-        foot_z_rr: Some(rr.z),
-        foot_x_rl: Some(rl.x),
-        foot_y_rl: Some(rl.y),
-        foot_z_rl: Some(rl.z),
-        robot_time_ms: state.robot_time_ms,
-        imu_x: Some(imu.x),
-        imu_y: Some(imu.y),
-        imu_z: Some(imu.z),
-        imu_w: Some(imu.w),
-        gyro_x: Some(state.imu.gyro_body.x),
-        gyro_y: Some(state.imu.gyro_body.y),
-        gyro_z: Some(state.imu.gyro_body.z),
-        acc_x: Some(state.imu.accel_body.x),
-        acc_y: Some(state.imu.accel_body.y),
-        acc_z: Some(state.imu.accel_body.z),
-        force_fr: Some(state.foot_force[0]),
-        force_fl: Some(state.foot_force[1]),
-        force_rr: Some(state.foot_force[2]),
-        force_rl: Some(state.foot_force[3]),
-        motor_temperature: state.motor_temperature_c.to_vec(),
-        motor_enabled: (0..JOINTS).map(|motor| u32::from(state.motor_enabled[motor]) << motor).sum(),
-        battery: state.battery.as_ref().map(battery),
-        truth: state.truth.as_ref().map(truth),
-        lateness_ns: stages.lateness_ns,
-        read_ns: stages.read_ns,
-        decide_ns: stages.decide_ns,
-        write_ns: stages.write_ns,
-    }
+    encoded(control_tick_fields, tick)
 }
 
-fn battery(battery: &Battery) -> frog::Battery {
-    frog::Battery {
-        charge: Some(battery.charge_percent),
-        voltage: Some(battery.voltage_v),
-        current: Some(battery.current_a),
-        cell: battery.cell_v.to_vec(),
+fn joint_command_fields(way: Way, tick: &mut Tick, m: &mut frog::JointCommand) -> Result<(), DecodeError> {
+    let fields: [(fn(&mut MotorCommand) -> &mut f64, &mut Vec<f64>); 5] = [
+        (|motor| &mut motor.position, &mut m.position),
+        (|motor| &mut motor.velocity, &mut m.velocity),
+        (|motor| &mut motor.kp, &mut m.kp),
+        (|motor| &mut motor.kd, &mut m.kd),
+        (|motor| &mut motor.torque, &mut m.torque),
+    ];
+    for (field, theirs) in fields {
+        let mut ours: Joints = tick.command.motor.map(|mut motor| *field(&mut motor));
+        way.array(&mut ours, theirs, JOINT_VALUES)?;
+        for (motor, value) in tick.command.motor.iter_mut().zip(ours) {
+            *field(motor) = value;
+        }
     }
+    way.array(&mut tick.torque_demanded, &mut m.torque_demanded, JOINT_VALUES)?;
+    match way {
+        Way::Encode => m.limited = tick.limited.into(),
+        Way::Decode => {
+            let unknown = |_| DecodeError::Unknown("limited", m.limited as i32);
+            tick.limited = u16::try_from(m.limited).map_err(unknown)?;
+        }
+    }
+    Ok(())
 }
 
-fn truth(truth: &Truth) -> frog::Truth {
-    let orientation = truth.orientation_world.coords;
-    let [fr, fl, rr, rl] = truth.foot_force_world;
-    frog::Truth {
-        position_x: Some(truth.position_world.x),
-        position_y: Some(truth.position_world.y),
-        position_z: Some(truth.position_world.z),
-        velocity_x: Some(truth.velocity_world.x),
-        velocity_y: Some(truth.velocity_world.y),
-        velocity_z: Some(truth.velocity_world.z),
-        orientation_x: Some(orientation.x),
-        orientation_y: Some(orientation.y),
-        orientation_z: Some(orientation.z),
-        orientation_w: Some(orientation.w),
-        angular_velocity_x: Some(truth.angular_velocity_body.x),
-        angular_velocity_y: Some(truth.angular_velocity_body.y),
-        angular_velocity_z: Some(truth.angular_velocity_body.z),
-        contact_fr: truth.foot_contact[0],
-        contact_fl: truth.foot_contact[1],
-        contact_rr: truth.foot_contact[2],
-        contact_rl: truth.foot_contact[3],
-        force_x_fr: Some(fr.x),
-        force_y_fr: Some(fr.y),
-        force_z_fr: Some(fr.z),
-        force_x_fl: Some(fl.x),
-        force_y_fl: Some(fl.y),
-        force_z_fl: Some(fl.z),
-        force_x_rr: Some(rr.x),
-        force_y_rr: Some(rr.y),
-        force_z_rr: Some(rr.z),
-        force_x_rl: Some(rl.x),
-        force_y_rl: Some(rl.y),
-        force_z_rl: Some(rl.z),
-        body_contact: truth.body_contact,
-    }
+fn control_tick_fields(way: Way, tick: &mut Tick, m: &mut frog::ControlTick) -> Result<(), DecodeError> {
+    way.copy(&mut tick.number, &mut m.number);
+    way.copy(&mut tick.time_ns, &mut m.time_ns);
+    way.variant(&mut tick.mode, &mut m.mode, "mode")?;
+    way.variant(&mut tick.phase, &mut m.phase, "phase")?;
+    way.copy(&mut tick.trial, &mut m.trial);
+    way.number(&mut tick.trial_time_s, &mut m.trial_time);
+    way.number(&mut tick.theta_rad, &mut m.theta);
+
+    let estimate = &mut tick.estimate;
+    vector(way, &mut estimate.roll_pitch_yaw, [&mut m.roll, &mut m.pitch, &mut m.yaw]);
+    vector(way, &mut estimate.position_world, [&mut m.position_x, &mut m.position_y, &mut m.position_z]);
+    vector(way, &mut estimate.velocity_world, [&mut m.velocity_x, &mut m.velocity_y, &mut m.velocity_z]);
+    let orientation = [&mut m.orientation_x, &mut m.orientation_y, &mut m.orientation_z, &mut m.orientation_w];
+    rotation(way, &mut estimate.orientation_world, orientation);
+    let angular_velocity = [&mut m.angular_velocity_x, &mut m.angular_velocity_y, &mut m.angular_velocity_z];
+    vector(way, &mut estimate.angular_velocity_body, angular_velocity);
+    let contact = [&mut m.contact_fr, &mut m.contact_fl, &mut m.contact_rr, &mut m.contact_rl];
+    contacts(way, &mut estimate.contact, contact);
+    let [fr, fl, rr, rl] = &mut estimate.foot_position_leg;
+    vector(way, fr, [&mut m.foot_x_fr, &mut m.foot_y_fr, &mut m.foot_z_fr]);
+    vector(way, fl, [&mut m.foot_x_fl, &mut m.foot_y_fl, &mut m.foot_z_fl]);
+    vector(way, rr, [&mut m.foot_x_rr, &mut m.foot_y_rr, &mut m.foot_z_rr]);
+    vector(way, rl, [&mut m.foot_x_rl, &mut m.foot_y_rl, &mut m.foot_z_rl]);
+
+    let state = &mut tick.state;
+    way.copy(&mut state.robot_time_ms, &mut m.robot_time_ms);
+    rotation(way, &mut state.imu.orientation_world, [&mut m.imu_x, &mut m.imu_y, &mut m.imu_z, &mut m.imu_w]);
+    vector(way, &mut state.imu.gyro_body, [&mut m.gyro_x, &mut m.gyro_y, &mut m.gyro_z]);
+    vector(way, &mut state.imu.accel_body, [&mut m.acc_x, &mut m.acc_y, &mut m.acc_z]);
+    let force = [&mut m.force_fr, &mut m.force_fl, &mut m.force_rr, &mut m.force_rl];
+    way.numbers(state.foot_force.each_mut(), force);
+    way.array(&mut state.motor_temperature_c, &mut m.motor_temperature, JOINT_VALUES)?;
+    let mut enabled = (0..JOINTS).map(|motor| u32::from(state.motor_enabled[motor]) << motor).sum();
+    way.copy(&mut enabled, &mut m.motor_enabled);
+    state.motor_enabled = std::array::from_fn(|motor| enabled & (1 << motor) != 0);
+    way.option(&mut state.battery, &mut m.battery, battery)?;
+    way.option(&mut state.truth, &mut m.truth, truth)?;
+
+    way.copy(&mut tick.stages.lateness_ns, &mut m.lateness_ns);
+    way.copy(&mut tick.stages.read_ns, &mut m.read_ns);
+    way.copy(&mut tick.stages.decide_ns, &mut m.decide_ns);
+    way.copy(&mut tick.stages.write_ns, &mut m.write_ns);
+    Ok(())
+}
+
+fn battery(way: Way, ours: &mut Battery, m: &mut frog::Battery) -> Result<(), DecodeError> {
+    way.number(&mut ours.charge_percent, &mut m.charge);
+    way.number(&mut ours.voltage_v, &mut m.voltage);
+    way.number(&mut ours.current_a, &mut m.current);
+    way.array(&mut ours.cell_v, &mut m.cell, "cells")
+}
+
+fn truth(way: Way, ours: &mut Truth, m: &mut frog::Truth) -> Result<(), DecodeError> {
+    vector(way, &mut ours.position_world, [&mut m.position_x, &mut m.position_y, &mut m.position_z]);
+    vector(way, &mut ours.velocity_world, [&mut m.velocity_x, &mut m.velocity_y, &mut m.velocity_z]);
+    let orientation = [&mut m.orientation_x, &mut m.orientation_y, &mut m.orientation_z, &mut m.orientation_w];
+    rotation(way, &mut ours.orientation_world, orientation);
+    let angular_velocity = [&mut m.angular_velocity_x, &mut m.angular_velocity_y, &mut m.angular_velocity_z];
+    vector(way, &mut ours.angular_velocity_body, angular_velocity);
+    let contact = [&mut m.contact_fr, &mut m.contact_fl, &mut m.contact_rr, &mut m.contact_rl];
+    contacts(way, &mut ours.foot_contact, contact);
+    let [fr, fl, rr, rl] = &mut ours.foot_force_world;
+    vector(way, fr, [&mut m.force_x_fr, &mut m.force_y_fr, &mut m.force_z_fr]);
+    vector(way, fl, [&mut m.force_x_fl, &mut m.force_y_fl, &mut m.force_z_fl]);
+    vector(way, rr, [&mut m.force_x_rr, &mut m.force_y_rr, &mut m.force_z_rr]);
+    vector(way, rl, [&mut m.force_x_rl, &mut m.force_y_rl, &mut m.force_z_rl]);
+    way.copy(&mut ours.body_contact, &mut m.body_contact);
+    Ok(())
 }
 
 /// A tick from its three messages.
 pub fn join(
-    control: &frog::ControlTick,
+    mut control: frog::ControlTick,
     joints: &JointStates,
-    command: &frog::JointCommand,
+    mut command: frog::JointCommand,
 ) -> Result<Tick, DecodeError> {
     let each = |value: fn(&JointState) -> Option<f64>| {
         joints.joints.iter().map(|joint| value(joint).unwrap_or_default()).collect::<Vec<_>>()
     };
-    let position = each(|joint| joint.position);
-    let velocity = each(|joint| joint.velocity);
-    let torque = each(|joint| joint.effort);
-    tick(control, command, [&position, &velocity, &torque])
+    let measured = [each(|joint| joint.position), each(|joint| joint.velocity), each(|joint| joint.effort)];
+    joined(&mut control, &mut command, measured)
 }
 
 /// A whole tick of a fault, in one message.
@@ -191,118 +164,37 @@ pub fn whole(tick: &Tick) -> frog::fault_ticks::Whole {
 }
 
 /// The inverse of [`whole`].
-pub fn from_whole(message: &frog::fault_ticks::Whole) -> Result<Tick, DecodeError> {
-    let control = message.tick.as_ref().ok_or(DecodeError::Missing("a fault's tick"))?;
-    let command = message.command.as_ref().ok_or(DecodeError::Missing("a fault's joint command"))?;
-    tick(control, command, [&message.position, &message.velocity, &message.torque])
+pub fn from_whole(message: frog::fault_ticks::Whole) -> Result<Tick, DecodeError> {
+    let mut control = message.tick.ok_or(DecodeError::Missing("a fault's tick"))?;
+    let mut command = message.command.ok_or(DecodeError::Missing("a fault's joint command"))?;
+    joined(&mut control, &mut command, [message.position, message.velocity, message.torque])
 }
 
-fn tick(
-    control: &frog::ControlTick,
-    command: &frog::JointCommand,
-    [position, velocity, torque]: [&[f64]; 3],
+fn joined(
+    control: &mut frog::ControlTick,
+    command: &mut frog::JointCommand,
+    [mut position, mut velocity, mut torque]: [Vec<f64>; 3],
 ) -> Result<Tick, DecodeError> {
-    let c = control;
-    Ok(Tick {
-        number: c.number,
-        time_ns: c.time_ns,
-        mode: one_of(&Mode::ALL, "mode", c.mode)?,
-        phase: one_of(&Phase::ALL, "phase", c.phase)?,
-        trial: c.trial,
-        trial_time_s: number(c.trial_time),
-        theta_rad: number(c.theta),
-        state: RobotState {
-            robot_time_ms: c.robot_time_ms,
-            joint_position: twelve(position)?,
-            joint_velocity: twelve(velocity)?,
-            joint_torque: twelve(torque)?,
-            imu: Imu {
-                orientation_world: rotation(c.imu_x, c.imu_y, c.imu_z, c.imu_w),
-                gyro_body: vector(c.gyro_x, c.gyro_y, c.gyro_z),
-                accel_body: vector(c.acc_x, c.acc_y, c.acc_z),
-            },
-            foot_force: [c.force_fr, c.force_fl, c.force_rr, c.force_rl].map(number),
-            motor_temperature_c: twelve(&c.motor_temperature)?,
-            motor_enabled: std::array::from_fn(|motor| c.motor_enabled & (1 << motor) != 0),
-            battery: c.battery.as_ref().map(from_battery).transpose()?,
-            truth: c.truth.as_ref().map(from_truth),
-        },
-        estimate: Estimate {
-            position_world: vector(c.position_x, c.position_y, c.position_z),
-            velocity_world: vector(c.velocity_x, c.velocity_y, c.velocity_z),
-            orientation_world: rotation(c.orientation_x, c.orientation_y, c.orientation_z, c.orientation_w),
-            angular_velocity_body: vector(c.angular_velocity_x, c.angular_velocity_y, c.angular_velocity_z),
-            roll_pitch_yaw: vector(c.roll, c.pitch, c.yaw),
-            contact: [c.contact_fr, c.contact_fl, c.contact_rr, c.contact_rl],
-            foot_position_leg: [
-                vector(c.foot_x_fr, c.foot_y_fr, c.foot_z_fr),
-                vector(c.foot_x_fl, c.foot_y_fl, c.foot_z_fl),
-                vector(c.foot_x_rr, c.foot_y_rr, c.foot_z_rr),
-                vector(c.foot_x_rl, c.foot_y_rl, c.foot_z_rl),
-            ],
-        },
-        torque_demanded: twelve(&command.torque_demanded)?,
-        command: from_joint_command(command)?,
-        limited: u16::try_from(command.limited).map_err(|_| DecodeError::Unknown("limited", command.limited as i32))?,
-        stages: StageTimes {
-            lateness_ns: c.lateness_ns,
-            read_ns: c.read_ns,
-            decide_ns: c.decide_ns,
-            write_ns: c.write_ns,
-        },
-    })
+    let mut tick = Tick::default();
+    control_tick_fields(Way::Decode, &mut tick, control)?;
+    joint_command_fields(Way::Decode, &mut tick, command)?;
+    Way::Decode.array(&mut tick.state.joint_position, &mut position, JOINT_VALUES)?;
+    Way::Decode.array(&mut tick.state.joint_velocity, &mut velocity, JOINT_VALUES)?;
+    Way::Decode.array(&mut tick.state.joint_torque, &mut torque, JOINT_VALUES)?;
+    Ok(tick)
 }
 
-fn from_joint_command(message: &frog::JointCommand) -> Result<JointCommand, DecodeError> {
-    let [position, velocity] = [twelve(&message.position)?, twelve(&message.velocity)?];
-    let [kp, kd, torque] = [twelve(&message.kp)?, twelve(&message.kd)?, twelve(&message.torque)?];
-    let motor = |i: usize| MotorCommand {
-        position: position[i],
-        velocity: velocity[i],
-        kp: kp[i],
-        kd: kd[i],
-        torque: torque[i],
-    };
-    Ok(JointCommand { motor: std::array::from_fn(motor) })
-}
-
-fn from_battery(battery: &frog::Battery) -> Result<Battery, DecodeError> {
-    Ok(Battery {
-        charge_percent: number(battery.charge),
-        voltage_v: number(battery.voltage),
-        current_a: number(battery.current),
-        cell_v: battery.cell.as_slice().try_into().map_err(|_| DecodeError::Length("cells", battery.cell.len()))?,
-    })
-}
-
-fn from_truth(t: &frog::Truth) -> Truth {
-    let foot_force_world: PerLeg<Vector3<f64>> = [
-        vector(t.force_x_fr, t.force_y_fr, t.force_z_fr),
-        vector(t.force_x_fl, t.force_y_fl, t.force_z_fl),
-        vector(t.force_x_rr, t.force_y_rr, t.force_z_rr),
-        vector(t.force_x_rl, t.force_y_rl, t.force_z_rl),
-    ];
-    let foot_contact: [bool; LEGS] = [t.contact_fr, t.contact_fl, t.contact_rr, t.contact_rl];
-    Truth {
-        position_world: vector(t.position_x, t.position_y, t.position_z),
-        velocity_world: vector(t.velocity_x, t.velocity_y, t.velocity_z),
-        orientation_world: rotation(t.orientation_x, t.orientation_y, t.orientation_z, t.orientation_w),
-        angular_velocity_body: vector(t.angular_velocity_x, t.angular_velocity_y, t.angular_velocity_z),
-        foot_contact,
-        foot_force_world,
-        body_contact: t.body_contact,
+fn contacts(way: Way, ours: &mut PerLeg<bool>, theirs: [&mut bool; LEGS]) {
+    for (ours, theirs) in ours.iter_mut().zip(theirs) {
+        way.copy(ours, theirs);
     }
 }
 
-fn vector(x: Option<f64>, y: Option<f64>, z: Option<f64>) -> Vector3<f64> {
-    Vector3::new(number(x), number(y), number(z))
+fn vector(way: Way, ours: &mut Vector3<f64>, theirs: [&mut Option<f64>; 3]) {
+    way.numbers(ours.data.0[0].each_mut(), theirs);
 }
 
-/// Not normalized: that would change the last bits.
-fn rotation(x: Option<f64>, y: Option<f64>, z: Option<f64>, w: Option<f64>) -> UnitQuaternion<f64> {
-    UnitQuaternion::new_unchecked(Quaternion::new(number(w), number(x), number(y), number(z)))
-}
-
-fn twelve(values: &[f64]) -> Result<Joints, DecodeError> {
-    values.try_into().map_err(|_| DecodeError::Length("joint values", values.len()))
+/// x, y, z, w. Not normalized: that would change the last bits.
+fn rotation(way: Way, ours: &mut UnitQuaternion<f64>, theirs: [&mut Option<f64>; 4]) {
+    way.numbers(ours.as_mut_unchecked().coords.data.0[0].each_mut(), theirs);
 }

@@ -1,110 +1,114 @@
-//! Proposals and trials as protobuf messages, and back.
+//! Fields of proposals, trials and the state of the optimizer, for both directions.
 
-use super::decode::{DecodeError, number, one_of};
 use super::frog;
-use crate::trial::{FallRisk, MeasuredJump, Proposal, ProposalSource, ProposedParameter, TrialRecord, Verdict};
+use super::wire::{DecodeError, Way};
+use crate::trial::{
+    FallRisk, FixedParameter, MeasuredJump, ParameterInsight, PointRecord, Proposal, ProposalInsight,
+    ProposedParameter, SearchStatus, SearchedParameter, TrialRecord,
+};
 
-pub fn proposal(value: &Proposal) -> frog::Proposal {
-    let parameter = |parameter: &ProposedParameter| frog::proposal::Parameter {
-        name: parameter.name.clone(),
-        value: Some(parameter.value),
-        proposed: Some(parameter.proposed),
-    };
-    frog::Proposal {
-        trial: value.trial,
-        revision: value.revision,
-        source: value.source as i32,
-        parent: value.parent,
-        parameters: value.parameters.iter().map(parameter).collect(),
-        risk: value.risk.as_ref().map(risk),
-        gains: value.gains.iter().map(parameter).collect(),
-    }
+type Done = Result<(), DecodeError>;
+
+pub fn proposal(way: Way, ours: &mut Proposal, m: &mut frog::Proposal) -> Done {
+    way.copy(&mut ours.trial, &mut m.trial);
+    way.copy(&mut ours.revision, &mut m.revision);
+    way.variant(&mut ours.source, &mut m.source, "source")?;
+    way.copy(&mut ours.parent, &mut m.parent);
+    way.list(&mut ours.parameters, &mut m.parameters, proposed)?;
+    way.option(&mut ours.risk, &mut m.risk, risk)?;
+    way.list(&mut ours.gains, &mut m.gains, proposed)
 }
 
-pub fn from_proposal(message: frog::Proposal) -> Result<Proposal, DecodeError> {
-    let parameter = |parameter: frog::proposal::Parameter| ProposedParameter {
-        name: parameter.name,
-        value: number(parameter.value),
-        proposed: number(parameter.proposed),
-    };
-    Ok(Proposal {
-        trial: message.trial,
-        revision: message.revision,
-        source: one_of(&ProposalSource::ALL, "source", message.source)?,
-        parent: message.parent,
-        parameters: message.parameters.into_iter().map(parameter).collect(),
-        risk: message.risk.map(from_risk),
-        gains: message.gains.into_iter().map(parameter).collect(),
-    })
+fn proposed(way: Way, ours: &mut ProposedParameter, m: &mut frog::proposal::Parameter) -> Done {
+    way.copy(&mut ours.name, &mut m.name);
+    way.number(&mut ours.value, &mut m.value);
+    way.number(&mut ours.proposed, &mut m.proposed);
+    Ok(())
 }
 
-pub fn trial(value: &TrialRecord) -> frog::Trial {
-    let parameter = |(name, value): &(String, f64)| frog::trial::Parameter { name: name.clone(), value: Some(*value) };
-    let measured = |measured: &MeasuredJump| frog::trial::Measured {
-        dx: Some(measured.dx_m),
-        dy: Some(measured.dy_m),
-        dyaw: Some(measured.dyaw_rad),
-        apex: Some(measured.apex_m),
-        air: Some(measured.air_s),
-    };
-    frog::Trial {
-        trial: value.trial,
-        source: value.source as i32,
-        parent: value.parent,
-        parameters: value.parameters.iter().map(parameter).collect(),
-        measured: value.measured.as_ref().map(measured),
-        value: value.value,
-        hand_value: value.hand_value,
-        suggested: value.suggested.map(|verdict| verdict as i32),
-        cause: value.cause.clone(),
-        verdict: value.verdict.map(|verdict| verdict as i32),
-        note: value.note.clone(),
-        risk: value.risk.as_ref().map(risk),
-        gains: value.gains.iter().map(parameter).collect(),
-    }
+pub fn trial(way: Way, ours: &mut TrialRecord, m: &mut frog::Trial) -> Done {
+    way.copy(&mut ours.trial, &mut m.trial);
+    way.variant(&mut ours.source, &mut m.source, "source")?;
+    way.copy(&mut ours.parent, &mut m.parent);
+    way.values(&mut ours.parameters, &mut m.parameters);
+    way.option(&mut ours.measured, &mut m.measured, measured)?;
+    way.copy(&mut ours.value, &mut m.value);
+    way.copy(&mut ours.hand_value, &mut m.hand_value);
+    way.maybe_variant(&mut ours.suggested, &mut m.suggested, "verdict")?;
+    way.copy(&mut ours.cause, &mut m.cause);
+    way.maybe_variant(&mut ours.verdict, &mut m.verdict, "verdict")?;
+    way.copy(&mut ours.note, &mut m.note);
+    way.option(&mut ours.risk, &mut m.risk, risk)?;
+    way.values(&mut ours.gains, &mut m.gains);
+    Ok(())
 }
 
-pub fn from_trial(message: frog::Trial) -> Result<TrialRecord, DecodeError> {
-    let verdict = |verdict: Option<i32>| verdict.map(|verdict| one_of(&Verdict::ALL, "verdict", verdict)).transpose();
-    let measured = |measured: frog::trial::Measured| MeasuredJump {
-        dx_m: number(measured.dx),
-        dy_m: number(measured.dy),
-        dyaw_rad: number(measured.dyaw),
-        apex_m: number(measured.apex),
-        air_s: number(measured.air),
-    };
-    let parameter = |parameter: frog::trial::Parameter| (parameter.name, number(parameter.value));
-    Ok(TrialRecord {
-        trial: message.trial,
-        source: one_of(&ProposalSource::ALL, "source", message.source)?,
-        parent: message.parent,
-        parameters: message.parameters.into_iter().map(parameter).collect(),
-        measured: message.measured.map(measured),
-        value: message.value,
-        hand_value: message.hand_value,
-        suggested: verdict(message.suggested)?,
-        cause: message.cause,
-        verdict: verdict(message.verdict)?,
-        note: message.note,
-        risk: message.risk.map(from_risk),
-        gains: message.gains.into_iter().map(parameter).collect(),
-    })
+fn measured(way: Way, ours: &mut MeasuredJump, m: &mut frog::trial::Measured) -> Done {
+    way.number(&mut ours.dx_m, &mut m.dx);
+    way.number(&mut ours.dy_m, &mut m.dy);
+    way.number(&mut ours.dyaw_rad, &mut m.dyaw);
+    way.number(&mut ours.apex_m, &mut m.apex);
+    way.number(&mut ours.air_s, &mut m.air);
+    Ok(())
 }
 
-fn risk(risk: &FallRisk) -> frog::Risk {
-    frog::Risk {
-        nearest_fall: risk.nearest_fall,
-        nearest_fall_trial: risk.nearest_fall_trial,
-        falls: risk.falls,
-        neighbours: risk.neighbours,
-    }
+fn risk(way: Way, ours: &mut FallRisk, m: &mut frog::Risk) -> Done {
+    way.copy(&mut ours.nearest_fall, &mut m.nearest_fall);
+    way.copy(&mut ours.nearest_fall_trial, &mut m.nearest_fall_trial);
+    way.copy(&mut ours.falls, &mut m.falls);
+    way.copy(&mut ours.neighbours, &mut m.neighbours);
+    Ok(())
 }
 
-fn from_risk(message: frog::Risk) -> FallRisk {
-    FallRisk {
-        nearest_fall: message.nearest_fall,
-        nearest_fall_trial: message.nearest_fall_trial,
-        falls: message.falls,
-        neighbours: message.neighbours,
-    }
+pub fn search(way: Way, ours: &mut SearchStatus, m: &mut frog::Search) -> Done {
+    way.copy(&mut ours.budget, &mut m.budget);
+    way.copy(&mut ours.counted, &mut m.counted);
+    way.list(&mut ours.parameters, &mut m.parameters, searched)?;
+    way.copy(&mut ours.confirming, &mut m.confirming);
+    Ok(())
+}
+
+fn searched(way: Way, ours: &mut SearchedParameter, m: &mut frog::search::Parameter) -> Done {
+    way.copy(&mut ours.name, &mut m.name);
+    way.number(&mut ours.low, &mut m.low);
+    way.number(&mut ours.high, &mut m.high);
+    way.number(&mut ours.least, &mut m.least);
+    way.number(&mut ours.most, &mut m.most);
+    way.option(&mut ours.fixed, &mut m.fixed, fixed)
+}
+
+fn fixed(way: Way, ours: &mut FixedParameter, m: &mut frog::search::Fixed) -> Done {
+    way.number(&mut ours.value, &mut m.value);
+    way.copy(&mut ours.trials, &mut m.trials);
+    Ok(())
+}
+
+pub fn insight(way: Way, ours: &mut ProposalInsight, m: &mut frog::Insight) -> Done {
+    way.copy(&mut ours.trial, &mut m.trial);
+    way.list(&mut ours.parameters, &mut m.parameters, reasons)
+}
+
+fn reasons(way: Way, ours: &mut ParameterInsight, m: &mut frog::insight::Parameter) -> Done {
+    way.copy(&mut ours.name, &mut m.name);
+    way.number(&mut ours.proposed, &mut m.proposed);
+    way.copy(&mut ours.importance, &mut m.importance);
+    way.copy(&mut ours.at, &mut m.at);
+    way.copy(&mut ours.good, &mut m.good);
+    way.copy(&mut ours.bad, &mut m.bad);
+    Ok(())
+}
+
+pub fn points(way: Way, ours: &mut Vec<PointRecord>, m: &mut frog::Points) -> Done {
+    way.list(ours, &mut m.points, point)
+}
+
+fn point(way: Way, ours: &mut PointRecord, m: &mut frog::points::Point) -> Done {
+    way.values(&mut ours.parameters, &mut m.parameters);
+    way.copy(&mut ours.trials, &mut m.trials);
+    way.copy(&mut ours.stood, &mut m.stood);
+    way.number(&mut ours.mean, &mut m.mean);
+    way.copy(&mut ours.deviation, &mut m.deviation);
+    way.copy(&mut ours.contender, &mut m.contender);
+    way.copy(&mut ours.confidence, &mut m.confidence);
+    Ok(())
 }

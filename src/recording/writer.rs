@@ -72,9 +72,6 @@ impl Writer {
     }
 
     /// Like [`create`](Writer::create), into any sink. `path` is for messages only; nothing is renamed.
-    ///
-    /// # Errors
-    /// When the sink fails.
     pub fn into_sink(
         sink: Box<dyn Sink>,
         path: impl AsRef<Path>,
@@ -119,9 +116,6 @@ impl Writer {
     }
 
     /// Writes one tick.
-    ///
-    /// # Errors
-    /// When the disk fails; the recording ends there.
     pub fn tick(&mut self, tick: &Tick) -> Result<(), RecordingError> {
         self.write_tick(tick).map_err(|error| error_at(&self.part, error))
     }
@@ -162,9 +156,6 @@ impl Writer {
     }
 
     /// Writes one record.
-    ///
-    /// # Errors
-    /// When the disk fails; the recording ends there.
     pub fn record(&mut self, stamped: &Stamped) -> Result<(), RecordingError> {
         let log_time = self.start_utc_ns.saturating_add(stamped.time_ns);
         self.records = self.records.wrapping_add(1);
@@ -175,17 +166,11 @@ impl Writer {
     }
 
     /// Passes everything to the operating system: it then survives a crash of the program.
-    ///
-    /// # Errors
-    /// When the disk fails.
     pub fn flush(&mut self) -> Result<(), RecordingError> {
         self.out.close_chunk().map_err(|error| error_at(&self.part, error))
     }
 
     /// Waits until everything is on the disk: it then survives a power cut. Takes milliseconds.
-    ///
-    /// # Errors
-    /// When the disk fails.
     pub fn sync(&mut self) -> Result<(), RecordingError> {
         self.flush()?;
         self.out.sync().map_err(|error| error_at(&self.part, error))

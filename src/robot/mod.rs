@@ -94,7 +94,7 @@ pub struct Imu {
 }
 
 /// True state, known in simulation alone. Used for the objective in simulation and to evaluate the estimator.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Truth {
     /// Position of the trunk's origin in the world, m.
     pub position_world: Vector3<f64>,
@@ -113,7 +113,7 @@ pub struct Truth {
 }
 
 /// Battery as reported by its management system.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Battery {
     /// State of charge, percent.
     pub charge_percent: f64,

@@ -30,9 +30,6 @@ pub fn run<R: Robot>(
 }
 
 /// [`run`] in which `each` also receives the experiment, which includes the trials of other workers.
-///
-/// # Errors
-/// As [`run`].
 pub fn run_watched<R: Robot>(
     experiment: &mut Experiment,
     rollout: &mut Rollout<R>,

@@ -5,84 +5,35 @@
 //! then it can be undone. The next proposal is drafted on a fork of the study in which the verdict is already reported,
 //! and is therefore what the study itself will propose.
 
-pub mod attributes;
+pub(crate) mod attributes;
 mod changes;
 mod confirmation;
 mod liveness;
+mod plan;
 mod proposal_card;
 mod proposing;
 mod queue;
 mod search;
 
+pub use self::plan::{ExperimentPlan, RequestRefusal};
+
 use std::collections::BTreeMap;
-use std::time::Duration;
 
 use self::attributes::JudgedAttributes;
 use self::confirmation::{BestConfirmation, NextRepeat};
+use self::plan::not_now;
 use self::proposal_card::ProposalCard;
 use self::queue::TrialQueue;
 use self::search::SearchSettings;
 use super::objective;
-use crate::control::settings::TaskControl;
+use crate::optimize::ask::Direction;
 use crate::optimize::exchange::TableTrial;
-use crate::optimize::repeats::{RepeatedPoint, points};
+use crate::optimize::repeats::{RepeatedPoint, improvements, points};
 use crate::optimize::study::{Outcome, Study, StudyError};
 use crate::optimize::trial::TrialState;
 use crate::recording::record::{LogLevel, LogRecord, Record, StageRecord};
 use crate::telemetry::{Tick, TrialEnd, TrialSpec};
-use crate::trial::{
-    ExperimentStage, ParameterInfo, Proposal, ProposalSource, SearchStatus, Task, TrialRecord, Verdict,
-};
-
-/// Refusal of a request, as a message for the operator.
-#[derive(Debug, thiserror::Error)]
-pub enum RequestRefusal {
-    /// The request does not fit the present stage or the bounds.
-    #[error("{0}")]
-    NotNow(String),
-    /// Another worker began the proposed trial; there is a new proposal.
-    #[error("another worker was faster: the proposal for trial {0} does not hold any more; approve the new one")]
-    Overtaken(u32),
-    /// Another program ended the trial under review; there is a new proposal.
-    #[error("trial {0} was ended by another program: that result stands")]
-    EndedElsewhere(u32),
-    /// The study could not be read or written.
-    #[error(transparent)]
-    Study(#[from] StudyError),
-}
-
-fn not_now<T>(reason: impl Into<String>) -> Result<T, RequestRefusal> {
-    Err(RequestRefusal::NotNow(reason.into()))
-}
-
-/// Settings that all trials of one study share.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ExperimentPlan {
-    /// The task.
-    pub task: Task,
-    /// Settings of the controller.
-    pub control: TaskControl,
-    /// Parameters with their bounds, in table order.
-    pub parameters: Vec<ParameterInfo>,
-    /// Seed of the study.
-    pub seed: u64,
-    /// Trials that are to count.
-    pub budget: u32,
-    /// File name of the recording; empty without one.
-    pub recording: String,
-    /// The same parameters with the widest bounds that they may be given.
-    pub widest: Vec<ParameterInfo>,
-    /// The controller's gains with the ranges in which they may be set.
-    pub gains: Vec<ParameterInfo>,
-    /// Number of best points that are repeated to confirm the best.
-    pub contenders: u32,
-    /// Confidence at which one of them is the best.
-    pub confidence: f64,
-    /// Number of this worker on the study: 0 has the study's folder, and closes the trials that a crash left running.
-    pub worker: u32,
-    /// Time without news after which a running trial of another worker counts as abandoned.
-    pub abandoned: Duration,
-}
+use crate::trial::{ExperimentStage, ParameterInfo, Proposal, ProposalSource, SearchStatus, TrialRecord, Verdict};
 
 /// A verdict that can still be undone.
 #[derive(Debug, Clone, PartialEq)]
@@ -126,9 +77,6 @@ pub struct Experiment {
 impl Experiment {
     /// Opens a study, new or not. A trial that a crash left running counts if it was judged; otherwise it is void and its
     /// parameters are queued again.
-    ///
-    /// # Errors
-    /// When the study cannot be read or written.
     pub fn open(plan: ExperimentPlan, study: Study) -> Result<Experiment, StudyError> {
         let mut experiment = Experiment {
             queue: TrialQueue::new(plan.worker, plan.abandoned),
@@ -186,14 +134,9 @@ impl Experiment {
     /// is the mean of its repeats ([`crate::optimize::repeats`]).
     pub fn best(&self) -> Option<&TrialRecord> {
         let points = points(self.study.trials());
-        let value = |row: &TrialRecord| {
-            points.iter().find(|point| point.trials.contains(&row.trial)).map(RepeatedPoint::mean).or(row.value)
-        };
+        let mean = |number| points.iter().find(|point| point.trials.contains(&number)).map(RepeatedPoint::mean);
         let accepted = self.rows.values().filter(|row| row.verdict == Some(Verdict::Accept));
-        accepted
-            .map(|row| (value(row), row))
-            .fold(None, |best: Option<(_, &TrialRecord)>, row| best.filter(|best| row.0 <= best.0).or(Some(row)))
-            .map(|(_, row)| row)
+        improvements(accepted.filter_map(|row| Some((row, row.trial, row.value?))), mean, Direction::Maximize).last()
     }
 
     /// Returns the proposal that waits for approval.
@@ -224,9 +167,7 @@ impl Experiment {
     }
 
     /// Approves the proposal as it was seen: it becomes a running trial, on disk before this returns.
-    ///
-    /// # Errors
-    /// When there is another proposal by now, its values are outside the limits, or the study cannot be written.
+    /// Refused when there is another proposal by now or its values are outside the limits.
     pub fn approve(&mut self, trial: u32, revision: u32) -> Result<TrialSpec, RequestRefusal> {
         let ExperimentState::Proposed(card) = &self.state else { return not_now("there is no proposal to approve") };
         if !card.is(trial, revision) {
@@ -245,9 +186,7 @@ impl Experiment {
     }
 
     /// Refuses the proposal: it becomes a void trial, which the sampler does not see.
-    ///
-    /// # Errors
-    /// When there is no proposal, or the study cannot be written.
+    /// Refused when there is no proposal.
     pub fn skip(&mut self) -> Result<(), RequestRefusal> {
         let ExperimentState::Proposed(card) = &self.state else { return not_now("there is no proposal to skip") };
         let cause = match self.objection() {
@@ -289,9 +228,7 @@ impl Experiment {
     }
 
     /// Judges the trial under review; with `rerun` its parameters are queued again.
-    ///
-    /// # Errors
-    /// When no trial is under review, an accepted trial has no value, or the study cannot be written.
+    /// Refused when no trial is under review or an accepted trial has no value.
     pub fn judge(&mut self, verdict: Verdict, rerun: bool) -> Result<(), RequestRefusal> {
         let trial = self.reviewed()?;
         let Some(row) = self.rows.get_mut(&trial) else { return not_now(NOT_UNDER_REVIEW) };
@@ -330,9 +267,7 @@ impl Experiment {
     }
 
     /// Takes the last verdict back.
-    ///
-    /// # Errors
-    /// When it was reported already, or the study cannot be written.
+    /// Refused when it was reported already.
     pub fn undo(&mut self) -> Result<(), RequestRefusal> {
         let Some(pending) = self.pending.as_ref().filter(|_| self.is_idle()) else {
             return not_now("there is no verdict to undo; the last one became final when the next trial began");
@@ -352,9 +287,7 @@ impl Experiment {
     }
 
     /// Uses a value measured by hand for the trial under review; none returns to the measured one.
-    ///
-    /// # Errors
-    /// When no trial is under review or the value is not finite.
+    /// Refused when no trial is under review or the value is not finite.
     pub fn set_hand_value(&mut self, value: Option<f64>) -> Result<(), RequestRefusal> {
         let trial = self.reviewed()?;
         if value.is_some_and(|value| !value.is_finite()) {
@@ -370,9 +303,6 @@ impl Experiment {
 
     /// Takes in the changes of other programs: their trials join the table, and a point that they have queued is proposed
     /// next if the operator has not changed the proposal. To be called regularly.
-    ///
-    /// # Errors
-    /// When the study cannot be read or written.
     pub fn refresh(&mut self) -> Result<(), RequestRefusal> {
         if !self.is_idle() {
             return Ok(());
@@ -406,9 +336,6 @@ impl Experiment {
     /// Ends the session during a review: a trial that is to be void by the rules (stopped, or its operator is gone) is void
     /// with its cause, and its parameters are queued again as after a crash. Any other waits for its verdict until the
     /// study is opened again.
-    ///
-    /// # Errors
-    /// When the study cannot be read or written.
     pub fn leave(&mut self) -> Result<(), StudyError> {
         let ExperimentState::Review(trial) = self.state else { return Ok(()) };
         let Some(row) = self.rows.get_mut(&trial).filter(|row| row.suggested == Some(Verdict::Void)) else {
@@ -424,9 +351,6 @@ impl Experiment {
     }
 
     /// Reports the pending verdict: the session ends.
-    ///
-    /// # Errors
-    /// When the study cannot be written.
     pub fn close(&mut self) -> Result<(), StudyError> {
         self.report_pending().map(drop)
     }
@@ -498,9 +422,6 @@ pub fn rows_of(study: &Study, order: &[ParameterInfo]) -> Vec<TrialRecord> {
 }
 
 /// Adds finished trials of another study. Re-runs that are still to be queued there are not queued here.
-///
-/// # Errors
-/// As [`Study::import`].
 pub fn import(study: &mut Study, trials: Vec<TableTrial>) -> Result<Vec<u32>, StudyError> {
     let trials: Vec<TableTrial> = trials
         .into_iter()

@@ -45,6 +45,7 @@ pub struct StampedRequest {
 }
 
 /// A request of the operator. `Display` names it for the log.
+#[expect(missing_docs, reason = "the variants describe their fields")]
 #[derive(Debug, Clone, PartialEq)]
 pub enum OperatorRequest {
     /// Energise the robot: it stands up.
@@ -56,78 +57,36 @@ pub enum OperatorRequest {
     /// The operator has checked the damped or faulted robot.
     Acknowledge,
     /// Run the proposal as it was seen.
-    Approve {
-        /// Number of the proposed trial.
-        trial: u32,
-        /// Revision of the proposal.
-        revision: u32,
-    },
+    Approve { trial: u32, revision: u32 },
     /// Cancel the countdown.
     Cancel,
     /// Refuse the proposal; the sampler proposes another.
     Skip,
-    /// Set one parameter of the proposal.
-    Override {
-        /// Parameter name.
-        parameter: String,
-        /// New value, in the parameter's unit.
-        value: f64,
-    },
-    /// Set one of the controller's gains for the proposed trial.
-    OverrideGain {
-        /// `kp`, `kd`, `kd_joint` or `k_att`.
-        gain: String,
-        /// New value, in the gain's unit.
-        value: f64,
-    },
+    /// Set one parameter of the proposal, in its unit.
+    Override { parameter: String, value: f64 },
+    /// Set one of the controller's gains (`kp`, `kd`, `kd_joint` or `k_att`) for the proposed trial, in its unit.
+    OverrideGain { gain: String, value: f64 },
     /// Take all overrides back, also those of gains.
     ClearOverrides,
     /// Fix a parameter for the next trials; the others are still proposed.
-    Fix {
-        /// Parameter name.
-        parameter: String,
-        /// Its value, in the parameter's unit.
-        value: f64,
-        /// For how many trials.
-        trials: u32,
-    },
+    Fix { parameter: String, value: f64, trials: u32 },
     /// Let a fixed parameter be searched again.
-    Unfix {
-        /// Parameter name.
-        parameter: String,
-    },
+    Unfix { parameter: String },
     /// Search a parameter within these bounds from now on; the configured ones undo it.
-    NarrowBounds {
-        /// Parameter name.
-        parameter: String,
-        /// Lower bound, in the parameter's unit.
-        low: f64,
-        /// Upper bound.
-        high: f64,
-    },
+    NarrowBounds { parameter: String, low: f64, high: f64 },
     /// Repeat the best points until one leads with enough confidence, at most so often in all; 0 ends that.
-    ConfirmBest {
-        /// Most repeats.
-        repeats: u32,
-    },
+    ConfirmBest { repeats: u32 },
     /// Judge the trial under review.
     Judge(Verdict),
-    /// Void the trial under review (or repeat an earlier one) and queue its parameters again.
-    Rerun {
-        /// The trial to repeat; none for the one under review.
-        trial: Option<u32>,
-    },
+    /// Void the trial under review, or repeat an earlier one, and queue the parameters again; no number for the one under
+    /// review.
+    Rerun { trial: Option<u32> },
     /// Take the last verdict back.
     Undo,
     /// Use a value measured by hand for the trial under review; none removes it.
     HandValue(Option<f64>),
     /// A note on a trial.
-    Note {
-        /// The trial.
-        trial: u32,
-        /// The text.
-        text: String,
-    },
+    Note { trial: u32, text: String },
     /// Queue a point, in table order of the parameters.
     Enqueue(Vec<(String, f64)>),
     /// Raise the budget by this many trials.

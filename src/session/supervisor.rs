@@ -2,6 +2,8 @@
 //! records to the screen and the recording. Every request is answered: carried out, or refused with the reason.
 
 mod answering;
+mod automatic;
+mod standing;
 mod unattended;
 
 use std::collections::VecDeque;
@@ -27,11 +29,6 @@ const RECORDER_GONE: &str = "the recorder's thread has ended";
 const GUARD_LOST: &str =
     "the guard process has ended: nothing damps the robot if quadfrog is killed; sit down, quit and start again";
 
-/// Least time between two logged cautions, ns.
-const CAUTION_PERIOD_NS: u64 = 10_000_000_000;
-
-/// Period of the arming checklist's records for the screen, ns.
-const CHECKLIST_PERIOD_NS: u64 = 500_000_000;
 /// Period of reading the changes of other programs to the study, ns.
 const REFRESH_PERIOD_NS: u64 = 500_000_000;
 
@@ -253,7 +250,7 @@ impl Supervisor {
             Ok(answer) => (true, answer),
             Err(reason) => (false, reason),
         };
-        self.publish(Record::Request(RequestRecord { wish: request.to_string(), accepted, answer }), time_ns);
+        self.publish(Record::Request(RequestRecord { request: request.to_string(), accepted, answer }), time_ns);
         self.publish_experiment(time_ns);
     }
 
@@ -350,56 +347,6 @@ impl Supervisor {
             let message = format!("trial {trial} ended in {}: {}", self.mode.name(), self.cause);
             self.log(LogLevel::Warning, message, time_ns);
         }
-    }
-
-    /// Returns the reason that forbids the next trial; none if nothing does.
-    fn inhibit(&mut self) -> Option<String> {
-        let hold = self.control.readiness.read().inhibit.map(|hold| hold.to_string());
-        hold.or_else(|| self.checklist.disk_low())
-    }
-
-    /// Logs once the reason that forbids the next trial, and the values on which a failsafe will soon act.
-    fn warn(&mut self, time_ns: u64) {
-        let inhibit = self.inhibit();
-        if let Some(reason) = &inhibit
-            && self.inhibited.is_none()
-        {
-            self.log(LogLevel::Warning, format!("no further trial can be approved: {reason}"), time_ns);
-        }
-        self.inhibited = inhibit;
-        let due = self.caution_ns.is_none_or(|logged_ns| time_ns >= logged_ns + CAUTION_PERIOD_NS);
-        if let Some(caution) = self.control.readiness.read().warning.filter(|_| due) {
-            self.caution_ns = Some(time_ns);
-            self.log(LogLevel::Warning, caution.to_string(), time_ns);
-        }
-    }
-
-    /// Returns to OBSERVE after an observer has acknowledged its STOP.
-    fn release(&mut self) {
-        if self.observe && self.mode == Mode::Disarmed && !self.releasing {
-            self.releasing = self.command(Command::Release).is_ok();
-        }
-    }
-
-    /// Publishes the arming checklist while the robot is disarmed: to the screen twice a second, to the recorder, too, when a
-    /// check changes its state.
-    fn publish_checklist(&mut self, time_ns: u64) {
-        if self.mode != Mode::Disarmed || self.observe {
-            return;
-        }
-        let findings = self.control.readiness.read().findings;
-        let list = self.checklist.items(&findings, &self.recorder.get());
-        let states = |list: &[ArmingCheckRecord]| list.iter().map(|item| item.state).collect::<Vec<_>>();
-        let stamped = Stamped { time_ns, record: Record::ArmingChecks(list.clone()) };
-        if states(&list) != states(&self.published_checklist) {
-            self.recorder_gone |= !self.sinks.send(stamped);
-        } else if time_ns >= self.checklist_ns + CHECKLIST_PERIOD_NS {
-            let _ = self.sinks.screen.send(stamped);
-        } else {
-            return;
-        }
-        self.checklist_ns = time_ns;
-        self.published_checklist = list;
     }
 
     /// Publishes the experiment's records.

@@ -16,6 +16,7 @@ mod joint_stop;
 mod model;
 mod motion;
 mod quantities;
+pub(crate) mod ranges;
 mod sensors;
 mod spatial;
 mod state;

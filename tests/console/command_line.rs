@@ -6,6 +6,8 @@ use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
+use quadfrog::recording::player::Player;
+use quadfrog::recording::record::Record;
 use serde_json::Value;
 
 fn quadfrog(folder: &Path) -> Command {
@@ -60,6 +62,17 @@ fn optimize_prints_one_json_object_per_trial_in_the_promised_form() {
     let [study] = studies(folder.path()).try_into().expect("one study");
     assert!(study.join("study.log").is_file() && study.join("session.mcap").is_file());
     assert!(study.join("config/control.toml").is_file());
+}
+
+/// (A defect once: the writer's own session record was followed by a second one.)
+#[test]
+fn the_recording_of_optimize_holds_one_session_record() {
+    let folder = tempfile::tempdir().unwrap();
+    assert_eq!(run(folder.path(), &["optimize", "--trials", "1"]).status.code(), Some(0));
+    let [study] = studies(folder.path()).try_into().expect("one study");
+    let player = Player::open(study.join("session.mcap")).unwrap();
+    let sessions = player.events().iter().filter(|event| matches!(event.record, Record::Session(_)));
+    assert_eq!(sessions.count(), 1);
 }
 
 #[test]

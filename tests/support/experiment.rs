@@ -89,10 +89,15 @@ pub fn ticks(trial: u32, dx_m: f64) -> Vec<Tick> {
         .to_vec()
 }
 
+/// Approves the proposal.
+pub fn approve(experiment: &mut Experiment) -> TrialSpec {
+    let card = experiment.proposal().expect("a proposal");
+    experiment.approve(card.trial, card.revision).unwrap()
+}
+
 /// Approves the proposal and ends its trial with `end`, up to the review.
 pub fn run(experiment: &mut Experiment, end: TrialEnd) -> TrialSpec {
-    let card = experiment.proposal().expect("a proposal");
-    let spec = experiment.approve(card.trial, card.revision).unwrap();
+    let spec = approve(experiment);
     experiment.ended(spec.trial, &end, &ticks(spec.trial, far(&spec)), 2);
     assert_eq!(experiment.stage(), ExperimentStage::Review);
     spec
@@ -108,14 +113,19 @@ pub fn parameters(experiment: &Experiment) -> Vec<f64> {
     experiment.proposal().unwrap().parameters.iter().map(|p| p.value).collect()
 }
 
+/// Returns the study in `folder`, as another program reads it.
+pub fn study_in(folder: &Path) -> Study {
+    study(Storage::File(folder.join("study.log")))
+}
+
 /// Opens the study in `folder` as a session does.
 pub fn open(folder: &Path) -> Experiment {
-    Experiment::open(plan(1000), study(Storage::File(folder.join("study.log")))).unwrap()
+    Experiment::open(plan(1000), study_in(folder)).unwrap()
 }
 
 /// Joins the study in `folder` as one more worker; see [`ExperimentPlan::abandoned`].
 pub fn joined(folder: &Path, budget: u32, abandoned: Duration) -> Experiment {
-    let mut study = study(Storage::File(folder.join("study.log")));
+    let mut study = study_in(folder);
     let worker = study.join().unwrap();
     Experiment::open(ExperimentPlan { worker, abandoned, ..plan(budget) }, study).unwrap()
 }

@@ -172,6 +172,14 @@ impl Draw {
         })
     }
 
+    fn bounds(&mut self) -> ParameterInfo {
+        ParameterInfo { name: self.string(), unit: self.string(), low: self.number(), high: self.number() }
+    }
+
+    fn proposed(&mut self) -> ProposedParameter {
+        ProposedParameter { name: self.string(), value: self.number(), proposed: self.number() }
+    }
+
     /// A record of the kind `kind`.
     fn record(&mut self, kind: usize) -> Record {
         match kind {
@@ -186,22 +194,12 @@ impl Draw {
                 }),
                 seed: self.word(),
                 budget: self.word() as u32,
-                parameters: self.several(|d| ParameterInfo {
-                    name: d.string(),
-                    unit: d.string(),
-                    low: d.number(),
-                    high: d.number(),
-                }),
+                parameters: self.several(Draw::bounds),
                 study: self.string(),
                 recording: self.string(),
                 started: self.string(),
                 observe: self.yes(),
-                gains: self.several(|d| ParameterInfo {
-                    name: d.string(),
-                    unit: d.string(),
-                    low: d.number(),
-                    high: d.number(),
-                }),
+                gains: self.several(Draw::bounds),
                 approve: self.one_of(&Approval::ALL),
                 limits: HealthLimits {
                     state_age_ms: self.word() as u32,
@@ -227,17 +225,9 @@ impl Draw {
                 revision: self.word() as u32,
                 source: self.one_of(&ProposalSource::ALL),
                 parent: self.option(|d| d.word() as u32),
-                parameters: self.several(|d| ProposedParameter {
-                    name: d.string(),
-                    value: d.number(),
-                    proposed: d.number(),
-                }),
+                parameters: self.several(Draw::proposed),
                 risk: self.risk(),
-                gains: self.several(|d| ProposedParameter {
-                    name: d.string(),
-                    value: d.number(),
-                    proposed: d.number(),
-                }),
+                gains: self.several(Draw::proposed),
             }),
             4 => Record::Trial(TrialRecord {
                 trial: self.word() as u32,
@@ -260,7 +250,7 @@ impl Draw {
                 risk: self.risk(),
                 gains: self.several(|d| (d.string(), d.number())).into(),
             }),
-            5 => Record::Request(RequestRecord { wish: self.string(), accepted: self.yes(), answer: self.string() }),
+            5 => Record::Request(RequestRecord { request: self.string(), accepted: self.yes(), answer: self.string() }),
             6 => Record::Counters(Counters {
                 late_ticks: self.word(),
                 worst_lateness_ns: self.word(),
@@ -434,34 +424,16 @@ pub fn study(seconds: u64) -> (Vec<Tick>, Vec<Stamped>) {
         let row = |verdict: Option<Verdict>| {
             Record::Trial(TrialRecord {
                 trial,
-                source: ProposalSource::Sampler,
-                parent: None,
                 parameters: vec![("f0".into(), 1.25), ("Fx".into(), 100.0 + f64::from(trial)), ("Fz".into(), 250.0)]
                     .into(),
-                measured: None,
                 value: verdict.map(|_| 0.1 * f64::from(trial)),
-                hand_value: None,
-                suggested: None,
-                cause: String::new(),
                 verdict,
-                note: String::new(),
-                risk: None,
-                gains: ParameterValues::default(),
+                ..TrialRecord::default()
             })
         };
         add(start - 500, stage(ExperimentStage::Proposed));
-        add(
-            start - 500,
-            Record::Proposal(Proposal {
-                trial,
-                revision: 0,
-                source: ProposalSource::Sampler,
-                parent: None,
-                parameters: vec![ProposedParameter { name: "Fx".into(), value: 100.0, proposed: 100.0 }],
-                risk: None,
-                gains: Vec::new(),
-            }),
-        );
+        let parameters = vec![ProposedParameter { name: "Fx".into(), value: 100.0, proposed: 100.0 }];
+        add(start - 500, Record::Proposal(Proposal { trial, parameters, ..Proposal::default() }));
         add(start, stage(ExperimentStage::Running));
         add(start, row(None));
         add(start + 100, Record::Counters(Counters { late_ticks: u64::from(trial), ..Counters::default() }));
@@ -483,13 +455,18 @@ pub fn in_order(ticks: &[Tick], records: &[Stamped]) -> Vec<Played> {
 /// Writes everything to `path` in the given order, and finishes the file.
 pub fn write(path: &Path, everything: &[Played]) {
     let mut writer = Writer::create(path, &session(), START_UTC_NS, &[]).unwrap();
+    write_all(&mut writer, everything);
+    assert_eq!(writer.finish().unwrap(), path);
+}
+
+/// Writes everything in the given order.
+pub fn write_all(writer: &mut Writer, everything: &[Played]) {
     for played in everything {
         match played {
             Played::Tick(tick) => writer.tick(tick).unwrap(),
             Played::Record(stamped) => writer.record(stamped).unwrap(),
         }
     }
-    assert_eq!(writer.finish().unwrap(), path);
 }
 
 /// Plays a file and returns everything but the session's first record.

@@ -8,8 +8,6 @@ use serde::de::{DeserializeOwned, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::{Map, Value};
 
-use super::confirmation::{Conclusion, RunningConfirmation};
-use super::search::FixedFrom;
 use crate::optimize::ask::SamplerConfig;
 use crate::optimize::study::{DRAWS, Outcome};
 use crate::optimize::trial::{Trial, TrialState};
@@ -23,15 +21,10 @@ pub type Attributes = Vec<(String, Value)>;
 /// Attributes of a study that was made by this program.
 #[derive(Debug, Serialize)]
 pub struct NewStudyAttributes<'a> {
-    /// The task.
     pub task: Task,
-    /// Name of the robot model.
     pub robot: &'a str,
-    /// Seed of the study.
     pub seed: u32,
-    /// Settings of the sampler.
     pub sampler: &'a SamplerConfig,
-    /// Version of this program.
     pub version: &'static str,
     /// Trials that are to count.
     pub budget: u32,
@@ -48,34 +41,56 @@ pub struct BudgetAttribute {
 #[derive(Debug, Clone, PartialEq, Default, Deserialize)]
 #[serde(default)]
 pub struct StudyAttributes {
-    /// The task.
-    #[serde(deserialize_with = "lenient")]
     pub task: Option<Task>,
-    /// Name of the robot model.
-    #[serde(deserialize_with = "lenient")]
     pub robot: Option<String>,
-    /// Seed of the study.
-    #[serde(deserialize_with = "lenient")]
     pub seed: Option<u32>,
     /// Trials that are to count.
-    #[serde(deserialize_with = "lenient")]
     pub budget: Option<u32>,
     /// Bounds that the operator has changed, `{"Fx": [40, 110]}`.
-    #[serde(deserialize_with = "lenient")]
     pub bounds: Option<BTreeMap<String, [f64; 2]>>,
     /// Fixed parameters, `{"Fx": {"value": 60, "trials": 5, "from": 12}}`.
-    #[serde(deserialize_with = "lenient")]
     pub fixed: Option<BTreeMap<String, FixedFrom>>,
     /// The confirmation that runs; null when it is over.
-    #[serde(deserialize_with = "lenient")]
     pub confirm: Option<RunningConfirmation>,
     /// Conclusion of the last confirmation.
-    #[serde(deserialize_with = "lenient")]
     pub confirmed: Option<Conclusion>,
 }
 
+/// A parameter that is fixed for some trials.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct FixedFrom {
+    pub value: f64,
+    /// Number of trials.
+    pub trials: u32,
+    /// Number of the first trial.
+    pub from: u32,
+}
+
+/// A confirmation that runs.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RunningConfirmation {
+    /// First trials of the compared points.
+    pub trials: Vec<u32>,
+    /// Most repeats.
+    pub repeats: u32,
+    /// Number of the first trial that may be one of them.
+    pub from: u32,
+}
+
+/// Conclusion of a confirmation.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Conclusion {
+    /// First trials of the compared points.
+    pub trials: Vec<u32>,
+    /// First trial of the leading point.
+    pub leader: u32,
+    /// Confidence that the leading point is the best.
+    pub confidence: f64,
+    /// Whether the confidence is enough.
+    pub sure: bool,
+}
+
 impl StudyAttributes {
-    /// Reads the attributes of a study.
     pub fn of(attributes: &BTreeMap<String, Value>) -> StudyAttributes {
         read(attributes)
     }
@@ -85,15 +100,13 @@ impl StudyAttributes {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Origin {
-    /// Origin of the parameters.
-    #[serde(serialize_with = "name_of", deserialize_with = "source_or_queued")]
     pub source: ProposalSource,
     /// The trial that it repeats.
-    #[serde(skip_serializing_if = "Option::is_none", deserialize_with = "lenient")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub parent: Option<u32>,
     /// The seed of its noise and terrain; none for a new one. Text: JSON numbers of other programs do not hold 64 bits.
-    #[serde(skip_serializing_if = "Option::is_none", serialize_with = "as_text", deserialize_with = "from_text")]
-    pub seed: Option<u64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub seed: Option<String>,
     /// Its gains; empty for those of the configuration.
     #[serde(skip_serializing_if = "is_empty", serialize_with = "as_object", deserialize_with = "numbers")]
     pub gains: ParameterValues,
@@ -136,12 +149,14 @@ impl Origin {
         read(attributes)
     }
 
-    /// Reads the origin of a trial.
     pub fn of_trial(trial: &Trial) -> Origin {
         read(&trial.user_attributes)
     }
 
-    /// Returns the attributes of the queued trial.
+    pub fn seed(&self) -> Option<u64> {
+        self.seed.as_ref()?.parse().ok()
+    }
+
     pub fn attributes(&self) -> Attributes {
         write(self)
     }
@@ -174,7 +189,7 @@ impl BeganAttributes {
     ) -> BeganAttributes {
         let gains = proposal.gains.iter().map(|gain| (gain.name.clone(), gain.value)).collect();
         BeganAttributes {
-            origin: Origin { source: proposal.source, parent: proposal.parent, seed: Some(seed), gains },
+            origin: Origin { source: proposal.source, parent: proposal.parent, seed: Some(seed.to_string()), gains },
             version: env!("CARGO_PKG_VERSION"),
             worker,
             recording: recording.to_owned(),
@@ -217,17 +232,10 @@ impl JudgedAttributes<'_> {
 /// Attributes of a trial whose program ended before the verdict.
 #[derive(Debug, Serialize)]
 pub struct InterruptedAttributes<'a> {
-    verdict: Verdict,
-    cause: &'a str,
-    rerun: bool,
-    interrupted: bool,
-}
-
-impl InterruptedAttributes<'_> {
-    /// Returns the attributes of a void trial whose parameters are queued again.
-    pub fn new(cause: &str) -> InterruptedAttributes<'_> {
-        InterruptedAttributes { verdict: Verdict::Void, cause, rerun: true, interrupted: true }
-    }
+    pub verdict: Verdict,
+    pub cause: &'a str,
+    pub rerun: bool,
+    pub interrupted: bool,
 }
 
 /// Attributes of a trial besides its [`Origin`].
@@ -235,39 +243,26 @@ impl InterruptedAttributes<'_> {
 #[serde(default)]
 pub struct TrialAttributes {
     /// The worker that runs it: 0 is the session that has the study's folder.
-    #[serde(deserialize_with = "lenient")]
     pub worker: Option<u32>,
     /// Distance to earlier falls at its approval.
-    #[serde(deserialize_with = "lenient")]
     pub risk: Option<FallRisk>,
     /// Parameters that the operator had fixed for some trials.
     #[serde(deserialize_with = "numbers")]
     pub fixed: ParameterValues,
-    /// The verdict.
-    #[serde(deserialize_with = "lenient")]
     pub verdict: Option<Verdict>,
     /// The verdict that the rules suggest.
-    #[serde(deserialize_with = "lenient")]
     pub suggested: Option<Verdict>,
     /// Reason of the suggestion, or of another verdict.
-    #[serde(deserialize_with = "lenient")]
     pub cause: Option<String>,
-    /// The objective.
-    #[serde(deserialize_with = "lenient")]
     pub value: Option<f64>,
-    /// A value measured by hand.
-    #[serde(deserialize_with = "lenient")]
     pub hand_value: Option<f64>,
     /// The parameters are to be queued again.
-    #[serde(deserialize_with = "lenient")]
     pub rerun: Option<bool>,
     /// The program ended before the verdict.
-    #[serde(deserialize_with = "lenient")]
     pub interrupted: Option<bool>,
 }
 
 impl TrialAttributes {
-    /// Reads the attributes of a trial.
     pub fn of(trial: &Trial) -> TrialAttributes {
         read(&trial.user_attributes)
     }
@@ -319,7 +314,7 @@ pub fn row_of(trial: &Trial, note: String, order: &[ParameterInfo]) -> TrialReco
         source,
         parent,
         parameters: order.iter().filter_map(|p| Some((p.name.clone(), trial.parameter(&p.name)?))).collect(),
-        measured: read::<Measured>(&trial.user_attributes).0,
+        measured: parse(&trial.user_attributes, |_| true),
         value: trial.value,
         hand_value: kept.hand_value,
         suggested: kept.suggested,
@@ -332,19 +327,16 @@ pub fn row_of(trial: &Trial, note: String, order: &[ParameterInfo]) -> TrialReco
     }
 }
 
-/// Measured terms; none unless all are there.
-#[derive(Default)]
-struct Measured(Option<MeasuredJump>);
-
-impl<'de> Deserialize<'de> for Measured {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Measured, D::Error> {
-        lenient(deserializer).map(Measured)
-    }
+/// Reads attributes; those of another type are left out.
+fn read<T: DeserializeOwned + Default>(attributes: &BTreeMap<String, Value>) -> T {
+    let fits = |name: &str| parse::<T>(attributes, |other| other == name).is_some();
+    parse(attributes, |_| true).or_else(|| parse(attributes, fits)).unwrap_or_default()
 }
 
-fn read<T: DeserializeOwned + Default>(attributes: &BTreeMap<String, Value>) -> T {
-    let pairs = attributes.iter().map(|(name, value)| (name.as_str(), value));
-    T::deserialize(MapDeserializer::<_, serde_json::Error>::new(pairs)).unwrap_or_default()
+/// Reads the attributes whose names are `kept`; none if one is missing or of another type.
+fn parse<T: DeserializeOwned>(attributes: &BTreeMap<String, Value>, kept: impl Fn(&str) -> bool) -> Option<T> {
+    let pairs = attributes.iter().map(|(name, value)| (name.as_str(), value)).filter(|(name, _)| kept(name));
+    T::deserialize(MapDeserializer::<_, serde_json::Error>::new(pairs)).ok()
 }
 
 /// Returns the fields of `attributes` in their order; a [`Value`] would sort them.
@@ -375,29 +367,6 @@ impl<'de> Deserialize<'de> for Ordered {
         }
         deserializer.deserialize_map(InOrder)
     }
-}
-
-/// Reads a value of another type as none.
-fn lenient<'de, D: Deserializer<'de>, T: DeserializeOwned>(deserializer: D) -> Result<Option<T>, D::Error> {
-    Ok(serde_json::from_value(Value::deserialize(deserializer)?).ok())
-}
-
-fn name_of<S: Serializer>(source: &ProposalSource, serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.serialize_str(source.name())
-}
-
-fn source_or_queued<'de, D: Deserializer<'de>>(deserializer: D) -> Result<ProposalSource, D::Error> {
-    let name: Option<String> = lenient(deserializer)?;
-    Ok(name.and_then(|name| name.parse().ok()).unwrap_or(ProposalSource::Queued))
-}
-
-fn as_text<S: Serializer>(seed: &Option<u64>, serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.collect_str(&seed.unwrap_or_default())
-}
-
-fn from_text<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<u64>, D::Error> {
-    let text: Option<String> = lenient(deserializer)?;
-    Ok(text.and_then(|text| text.parse().ok()))
 }
 
 fn is_empty(values: &ParameterValues) -> bool {

@@ -2,15 +2,14 @@
 //! Nothing runs before it is approved.
 
 use super::attributes::{self, BudgetAttribute, Origin};
+use super::plan::{RequestRefusal, not_now};
 use super::proposal_card::ProposalCard;
-use super::{Experiment, ExperimentState, RequestRefusal, confirmation, not_now};
+use super::{Experiment, ExperimentState, confirmation};
 use crate::trial::{ParameterInfo, ProposalSource};
 
 impl Experiment {
     /// Sets one parameter of the proposal.
-    ///
-    /// # Errors
-    /// When there is no proposal, no such parameter, or the value is outside its bounds.
+    /// Refused when there is no proposal, no such parameter, or the value is outside its bounds.
     pub fn set_parameter(&mut self, name: &str, value: f64) -> Result<(), RequestRefusal> {
         self.change_card()?;
         must_be_within(&self.search.parameters(&self.plan), "parameter", name, value)?;
@@ -21,9 +20,7 @@ impl Experiment {
     }
 
     /// Sets one of the controller's gains for the proposed trial.
-    ///
-    /// # Errors
-    /// When there is no proposal, no such gain, or the value is outside its safe range.
+    /// Refused when there is no proposal, no such gain, or the value is outside its safe range.
     pub fn set_gain(&mut self, name: &str, value: f64) -> Result<(), RequestRefusal> {
         self.change_card()?;
         must_be_within(&self.plan.gains, "gain", name, value)?;
@@ -34,9 +31,6 @@ impl Experiment {
     }
 
     /// Takes all changes of the proposal back, also those of gains.
-    ///
-    /// # Errors
-    /// When there is no proposal.
     pub fn clear_overrides(&mut self) -> Result<(), RequestRefusal> {
         let revision = self.next_revision();
         self.change_card()?.clear(revision);
@@ -53,10 +47,8 @@ impl Experiment {
 
     /// Fixes a parameter for the next `trials` trials that count; the other parameters are proposed for that value. A point
     /// that was queued with a value of its own keeps it. Replaces an earlier fix of the same parameter.
-    ///
-    /// # Errors
-    /// When a trial is under way, there is no such parameter, the value is outside its bounds, nothing would be left to
-    /// search, or the study cannot be written.
+    /// Refused when a trial is under way, there is no such parameter, the value is outside its bounds, nothing would be
+    /// left to search.
     pub fn fix(&mut self, name: &str, value: f64, trials: u32) -> Result<(), RequestRefusal> {
         self.must_be_idle()?;
         let bounds = self.search.parameters(&self.plan);
@@ -76,9 +68,7 @@ impl Experiment {
     }
 
     /// Lets a fixed parameter be searched again.
-    ///
-    /// # Errors
-    /// When a trial is under way, the parameter is not fixed, or the study cannot be written.
+    /// Refused when a trial is under way or the parameter is not fixed.
     pub fn unfix(&mut self, name: &str) -> Result<(), RequestRefusal> {
         self.must_be_idle()?;
         if !self.search.unfix(name) {
@@ -89,10 +79,8 @@ impl Experiment {
 
     /// Searches a parameter between `low` and `high` from now on. As in Optuna, it is then sampled by itself until no
     /// finished trial has other bounds; trials outside stay in the history. The configured bounds undo it.
-    ///
-    /// # Errors
-    /// When a trial is under way, there is no such parameter, the bounds are no range or wider than `safety.toml` allows,
-    /// the parameter is fixed outside them, or the study cannot be written.
+    /// Refused when a trial is under way, there is no such parameter, the bounds are no range or wider than
+    /// `safety.toml` allows, or the parameter is fixed outside them.
     pub fn narrow_bounds(&mut self, name: &str, low: f64, high: f64) -> Result<(), RequestRefusal> {
         self.must_be_idle()?;
         let widest = named(&self.plan.widest, "parameter", name)?;
@@ -126,9 +114,7 @@ impl Experiment {
     }
 
     /// Queues the parameters of an earlier trial again, with its gains.
-    ///
-    /// # Errors
-    /// When there is no such trial, a trial is under way, or the study cannot be written.
+    /// Refused when there is no such trial or a trial is under way.
     pub fn repeat(&mut self, trial: u32) -> Result<(), RequestRefusal> {
         let Some(row) = self.rows.get(&trial) else { return not_now(format!("there is no trial {trial}")) };
         let parameters = row.parameters.clone();
@@ -137,9 +123,7 @@ impl Experiment {
     }
 
     /// Queues a point, which may hold gains, too; the parameters that it lacks are proposed when it is its turn.
-    ///
-    /// # Errors
-    /// When a value is outside its bounds, a trial is under way, or the study cannot be written.
+    /// Refused when a value is outside its bounds or a trial is under way.
     pub fn enqueue(&mut self, point: &[(String, f64)]) -> Result<(), RequestRefusal> {
         let bounds = self.search.parameters(&self.plan);
         let is_gain = |(name, _): &(String, f64)| self.plan.gains.iter().any(|gain| gain.name == *name);
@@ -161,9 +145,7 @@ impl Experiment {
 
     /// Repeats the best points up to `repeats` times in all; 0 ends the confirmation. Makes the last verdict final. Returns
     /// the first trials of the compared points.
-    ///
-    /// # Errors
-    /// When a trial is under way, there are fewer than two points to compare, or the study cannot be written.
+    /// Refused when a trial is under way or there are fewer than two points to compare.
     pub fn confirm_best(&mut self, repeats: u32) -> Result<Vec<u32>, RequestRefusal> {
         self.must_be_idle()?;
         self.study.refresh()?;
@@ -188,9 +170,7 @@ impl Experiment {
     }
 
     /// Sets the note of a trial.
-    ///
-    /// # Errors
-    /// When there is no such trial or the study cannot be written.
+    /// Refused when there is no such trial.
     pub fn note(&mut self, trial: u32, text: &str) -> Result<(), RequestRefusal> {
         let Some(row) = self.rows.get_mut(&trial) else { return not_now(format!("there is no trial {trial}")) };
         row.note = text.to_owned();
@@ -200,9 +180,6 @@ impl Experiment {
     }
 
     /// Raises the budget, also for sessions that continue the study or join it later.
-    ///
-    /// # Errors
-    /// When the study cannot be read or written.
     pub fn extend(&mut self, trials: u32) -> Result<(), RequestRefusal> {
         let budget = self.plan.budget.saturating_add(trials);
         self.study.annotate_study(&attributes::write(&BudgetAttribute { budget }))?;

@@ -1,38 +1,14 @@
 //! Confirmation of the best: the best points are repeated until one leads with enough confidence, or the repeats are used
 //! up. The rule is that of [`crate::optimize::repeats`]; the repeats are proposals like any other, beyond the budget.
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use serde_json::Value;
 
-use super::attributes::{self, StudyAttributes};
+use super::attributes::{self, Conclusion, RunningConfirmation, StudyAttributes};
 use crate::optimize::repeats::{Confirmation, LEAST_REPEATS, RepeatedPoint, confirm, contenders, points, rank};
 use crate::optimize::study::{Study, StudyError};
 use crate::optimize::trial::{Trial, TrialState};
 use crate::trial::PointRecord;
-
-/// A confirmation that runs.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct RunningConfirmation {
-    /// First trials of the compared points.
-    trials: Vec<u32>,
-    /// Most repeats.
-    repeats: u32,
-    /// Number of the first trial that may be one of them.
-    from: u32,
-}
-
-/// Conclusion of a confirmation.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Conclusion {
-    /// First trials of the compared points.
-    trials: Vec<u32>,
-    /// First trial of the leading point.
-    leader: u32,
-    /// Confidence that the leading point is the best.
-    confidence: f64,
-    /// Whether the confidence is enough.
-    sure: bool,
-}
 
 /// Next step of a confirmation.
 pub enum NextRepeat {
@@ -58,7 +34,6 @@ pub struct BestConfirmation {
 }
 
 impl BestConfirmation {
-    /// No conclusion yet.
     pub fn new(contenders: u32, confidence: f64) -> BestConfirmation {
         BestConfirmation { contenders, confidence, concluded: None, published: Vec::new() }
     }
@@ -96,7 +71,6 @@ impl BestConfirmation {
         self.concluded = None;
     }
 
-    /// Keeps a conclusion until it can be written.
     pub fn conclude(&mut self, conclusion: Conclusion) {
         self.concluded = Some(conclusion);
     }
@@ -112,7 +86,6 @@ impl BestConfirmation {
         study.annotate_study(&attributes::write(&Concluded { confirmed, confirm: None }))
     }
 
-    /// Returns the next step of the confirmation in the study `outlook`.
     pub fn next(&self, outlook: &Study) -> NextRepeat {
         let Some(running) = running(outlook) else { return NextRepeat::None };
         let direction = outlook.options().direction;
@@ -205,7 +178,6 @@ impl BestConfirmation {
     }
 }
 
-/// Returns the confirmation that runs.
 pub fn running(study: &Study) -> Option<RunningConfirmation> {
     StudyAttributes::of(study.attributes()).confirm
 }

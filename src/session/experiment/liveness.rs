@@ -16,7 +16,6 @@ pub struct Liveness {
 }
 
 impl Liveness {
-    /// Starts without any trial.
     pub fn new(abandoned: Duration) -> Liveness {
         Liveness { abandoned, last_news: BTreeMap::new() }
     }

@@ -41,13 +41,9 @@ pub struct Changes {
 
 /// The values of a card at its approval.
 pub struct ApprovedCard {
-    /// The proposal as it was seen.
     pub proposal: Proposal,
-    /// Origin of the draft.
     pub origin: Origin,
-    /// The draft.
     pub draft: TrialDraft,
-    /// The changed parameters.
     pub overrides: Vec<(String, f64)>,
     /// The fixed parameters, without those that were changed for this trial.
     pub fixed: ParameterValues,
@@ -77,7 +73,6 @@ impl ProposalCard {
         card
     }
 
-    /// Returns the number that the trial will have.
     pub fn number(&self) -> u32 {
         self.draft.number
     }
@@ -121,13 +116,11 @@ impl ProposalCard {
         (self.changes != Changes::default()).then_some(&self.changes)
     }
 
-    /// Takes all changes back.
     pub fn clear(&mut self, revision: u32) {
         self.changes = Changes::default();
         self.revision = revision;
     }
 
-    /// Returns the values for the trial.
     pub fn approved(&self) -> ApprovedCard {
         let changed = &self.changes.parameters;
         ApprovedCard {
@@ -183,7 +176,6 @@ impl ProposalCard {
         })
     }
 
-    /// Returns the reasons of the draft.
     pub fn insight(&self) -> ProposalInsight {
         let (trials, options) = (self.outlook.trials(), self.outlook.options());
         let densities = match options.sampler.kind {

@@ -3,9 +3,10 @@
 use super::attributes::{self, BeganAttributes, Origin};
 use super::changes::must_be_within;
 use super::confirmation::{self, NextRepeat};
+use super::plan::{RequestRefusal, not_now};
 use super::proposal_card::{ApprovedCard, ProposalCard};
 use super::search::SearchSettings;
-use super::{Experiment, ExperimentState, RequestRefusal, not_now, queue};
+use super::{Experiment, ExperimentState, queue};
 use crate::optimize::study::{Study, StudyError, TellOutcome};
 use crate::optimize::trial::Trial;
 use crate::recording::record::Record;
@@ -124,7 +125,7 @@ impl Experiment {
             draft = self.study.redirected(&draft, number)?;
         }
         let worker = self.plan.worker;
-        let seed = origin.seed.unwrap_or_else(|| trial_seed(self.plan.seed, worker, draft.number));
+        let seed = origin.seed().unwrap_or_else(|| trial_seed(self.plan.seed, worker, draft.number));
         let began = BeganAttributes::new(&proposal, seed, worker, &self.plan.recording, fixed);
         let beyond_budget = [proposal.source, origin.source].contains(&ProposalSource::Confirm);
         let (queue, budget) = (&self.queue, self.plan.budget);
@@ -143,15 +144,10 @@ impl Experiment {
             source: proposal.source,
             parent: proposal.parent,
             parameters: proposal.parameters.iter().map(|p| (p.name.clone(), p.value)).collect(),
-            measured: None,
-            value: None,
-            hand_value: None,
-            suggested: None,
-            cause: String::new(),
-            verdict: None,
             note: gains_note(&gains, &self.plan.control.gains()),
             risk: proposal.risk,
             gains,
+            ..TrialRecord::default()
         };
         if !row.note.is_empty() {
             // The sampler learns from this trial like from any other; the note shows that the controller differed.
@@ -208,7 +204,7 @@ impl Experiment {
     pub fn spec(&self, number: u32) -> TrialSpec {
         let row = &self.rows[&number];
         let control = &self.plan.control;
-        let seed = self.study.trial(number).ok().and_then(|trial| Origin::of_trial(trial).seed);
+        let seed = self.study.trial(number).ok().and_then(|trial| Origin::of_trial(trial).seed());
         TrialSpec {
             trial: number,
             gains: control.gains().with(&row.gains),

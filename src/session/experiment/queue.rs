@@ -11,7 +11,7 @@ use super::attributes::{self, Attributes, InterruptedAttributes, Origin, TrialAt
 use super::liveness::Liveness;
 use crate::optimize::study::{Outcome, Study, StudyError, TellOutcome};
 use crate::optimize::trial::{Trial, TrialState};
-use crate::trial::ParameterValues;
+use crate::trial::{ParameterValues, Verdict};
 
 /// The part of an experiment that closes unfinished trials and queues repetitions.
 #[derive(Debug)]
@@ -59,7 +59,6 @@ impl TrialQueue {
         Ok(log)
     }
 
-    /// Returns whether other workers run trials. An abandoned trial does not count.
     pub fn others_run(&self, study: &Study) -> bool {
         study.running().any(|trial| !self.is_own(study, trial) && self.liveness.is_alive(trial))
     }
@@ -88,7 +87,12 @@ fn close_all(study: &mut Study, trials: &[Trial], cause: &str) -> Result<Vec<Str
             Some(outcome) => (outcome, Attributes::new(), "judged before the interruption: it counts"),
             // Queued again by the caller, or by the next session if this program is killed before.
             None => {
-                let last = attributes::write(&InterruptedAttributes::new(cause));
+                let last = attributes::write(&InterruptedAttributes {
+                    verdict: Verdict::Void,
+                    cause,
+                    rerun: true,
+                    interrupted: true,
+                });
                 (Outcome::Fail, last, "interrupted: it is void and queued again")
             }
         };

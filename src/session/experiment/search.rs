@@ -3,13 +3,13 @@
 
 use std::collections::BTreeMap;
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
-use super::attributes::{self, Attributes, StudyAttributes, TrialAttributes};
+use super::attributes::{self, Attributes, FixedFrom, StudyAttributes, TrialAttributes};
+use super::plan::ExperimentPlan;
 use crate::optimize::space::{Range, Space};
 use crate::optimize::study::{Study, StudyError};
 use crate::optimize::trial::{Trial, TrialState};
-use crate::session::experiment::ExperimentPlan;
 use crate::trial::{FixedParameter, ParameterInfo, SearchStatus, SearchedParameter};
 
 /// Differences of the search space from the configuration.
@@ -17,16 +17,6 @@ use crate::trial::{FixedParameter, ParameterInfo, SearchStatus, SearchedParamete
 pub struct SearchSettings {
     bounds: BTreeMap<String, [f64; 2]>,
     fixed: BTreeMap<String, FixedFrom>,
-}
-
-/// A parameter that is fixed for some trials.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct FixedFrom {
-    value: f64,
-    /// Number of trials.
-    trials: u32,
-    /// Number of the first trial.
-    from: u32,
 }
 
 impl SearchSettings {
@@ -42,7 +32,6 @@ impl SearchSettings {
         SearchSettings { bounds, fixed }
     }
 
-    /// Returns the attributes of the study.
     pub fn attributes(&self) -> Attributes {
         attributes::write(self)
     }
@@ -107,7 +96,6 @@ impl SearchSettings {
         self.fixed.remove(name).is_some()
     }
 
-    /// Returns the record for the screen and the recording.
     pub fn status(
         &self,
         plan: &ExperimentPlan,

@@ -103,7 +103,7 @@ impl Console {
     }
 
     pub fn answer(&mut self, wish: &str, accepted: bool, answer: &str) {
-        self.record(Record::Request(RequestRecord { wish: wish.into(), accepted, answer: answer.into() }));
+        self.record(Record::Request(RequestRecord { request: wish.into(), accepted, answer: answer.into() }));
     }
 
     pub fn mode(&mut self, mode: Mode) {

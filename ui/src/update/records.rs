@@ -165,8 +165,8 @@ fn say_suggestion(model: &mut Model, trial: u32) {
 fn answer(model: &mut Model, time_ns: u64, command: RequestRecord) {
     let (level, outcome) = if command.accepted { (LogLevel::Info, "") } else { (LogLevel::Warning, "refused: ") };
     let text = match command.answer.as_str() {
-        "" => command.wish.clone(),
-        answer => format!("{}: {outcome}{answer}", command.wish),
+        "" => command.request.clone(),
+        answer => format!("{}: {outcome}{answer}", command.request),
     };
     say(model, level, text.clone());
     log(model, time_ns, level, "operator", text, false);

@@ -1,0 +1,57 @@
+//! Settings of an experiment, and refusals of its requests.
+
+use std::time::Duration;
+
+use crate::control::settings::TaskControl;
+use crate::optimize::study::StudyError;
+use crate::trial::{ParameterInfo, Task};
+
+/// Refusal of a request, as a message for the operator.
+#[derive(Debug, thiserror::Error)]
+pub enum RequestRefusal {
+    /// The request does not fit the present stage or the bounds.
+    #[error("{0}")]
+    NotNow(String),
+    /// Another worker began the proposed trial; there is a new proposal.
+    #[error("another worker was faster: the proposal for trial {0} does not hold any more; approve the new one")]
+    Overtaken(u32),
+    /// Another program ended the trial under review; there is a new proposal.
+    #[error("trial {0} was ended by another program: that result stands")]
+    EndedElsewhere(u32),
+    /// The study could not be read or written.
+    #[error(transparent)]
+    Study(#[from] StudyError),
+}
+
+pub fn not_now<T>(reason: impl Into<String>) -> Result<T, RequestRefusal> {
+    Err(RequestRefusal::NotNow(reason.into()))
+}
+
+/// Settings that all trials of one study share.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ExperimentPlan {
+    /// The task.
+    pub task: Task,
+    /// Settings of the controller.
+    pub control: TaskControl,
+    /// Parameters with their bounds, in table order.
+    pub parameters: Vec<ParameterInfo>,
+    /// Seed of the study.
+    pub seed: u64,
+    /// Trials that are to count.
+    pub budget: u32,
+    /// File name of the recording; empty without one.
+    pub recording: String,
+    /// The same parameters with the widest bounds that they may be given.
+    pub widest: Vec<ParameterInfo>,
+    /// The controller's gains with the ranges in which they may be set.
+    pub gains: Vec<ParameterInfo>,
+    /// Number of best points that are repeated to confirm the best.
+    pub contenders: u32,
+    /// Confidence at which one of them is the best.
+    pub confidence: f64,
+    /// Number of this worker on the study: 0 has the study's folder, and closes the trials that a crash left running.
+    pub worker: u32,
+    /// Time without news after which a running trial of another worker counts as abandoned.
+    pub abandoned: Duration,
+}

@@ -1,0 +1,62 @@
+//! Steps of the automatic rule.
+
+use super::Supervisor;
+use super::unattended::Unattended;
+use crate::recording::record::LogLevel;
+use crate::session::operator_request::{OperatorRequest, StampedRequest};
+use crate::telemetry::Mode;
+use crate::trial::{Approval, ExperimentStage, Verdict};
+
+impl Supervisor {
+    /// Returns the session with the given rule of approval.
+    pub fn approving(mut self, approval: Approval, simulated: bool) -> Supervisor {
+        self.unattended = Unattended { approval, simulated, ..Unattended::default() };
+        self
+    }
+
+    /// Takes the next step, if the rule allows one.
+    pub fn act_unattended(&mut self, time_ns: u64) {
+        let Unattended { approval, simulated, paused, arming, retry_ns, .. } = self.unattended;
+        if approval == Approval::Each || paused || self.observe || self.ended.is_some() {
+            return;
+        }
+        let auto = approval == Approval::Auto && simulated;
+        let stops = self.control.stop.count();
+        let step = match self.experiment.stage() {
+            ExperimentStage::Review => {
+                let suggested = self.experiment.under_review().and_then(|row| row.suggested).unwrap_or(Verdict::Void);
+                // A trial that was cancelled or stopped waits for a person under every rule.
+                let judged = if auto { suggested != Verdict::Void } else { suggested == Verdict::Accept };
+                judged.then_some(OperatorRequest::Judge(suggested))
+            }
+            ExperimentStage::Proposed if self.mode == Mode::Ready && simulated => self
+                .experiment
+                .proposal()
+                .map(|proposal| OperatorRequest::Approve { trial: proposal.trial, revision: proposal.revision }),
+            ExperimentStage::Proposed if self.mode == Mode::Disarmed && auto && !arming && time_ns >= retry_ns => {
+                Some(OperatorRequest::Arm)
+            }
+            _ => None,
+        };
+        let Some(request) = step else { return };
+        self.unattended.arming = request == OperatorRequest::Arm;
+        let stamped = StampedRequest { request, stops, time_ns };
+        match self.answer(&stamped) {
+            Ok(answer) => {
+                self.log(LogLevel::Info, format!("{}: {}: {answer}", approval.name(), stamped.request), time_ns);
+            }
+            Err(reason) if stamped.request == OperatorRequest::Arm => {
+                self.unattended.arming_refused(time_ns);
+                if self.unattended.refused != reason {
+                    self.log(LogLevel::Info, format!("{} cannot arm yet: {reason}", approval.name()), time_ns);
+                    self.unattended.refused = reason;
+                }
+            }
+            Err(reason) => {
+                self.unattended.paused = true;
+                self.log(LogLevel::Warning, format!("{} waits for a person: {reason}", approval.name()), time_ns);
+            }
+        }
+        self.publish_experiment(time_ns);
+    }
+}
