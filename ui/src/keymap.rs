@@ -135,12 +135,10 @@ impl FromStr for Key {
 /// A refused key of `console.toml`.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("[keys] {action} = {key}: {reason}")]
+#[expect(missing_docs, reason = "the names say the rest")]
 pub struct KeymapError {
-    /// The action, as written.
     pub action: String,
-    /// Its key or keys, as written.
     pub key: String,
-    /// Reason and remedy.
     pub reason: String,
 }
 

@@ -22,13 +22,13 @@
 
 pub mod action;
 pub mod app;
-pub mod column;
+mod column;
 pub mod connection;
 pub mod export;
 pub mod feed;
 pub mod keymap;
-pub mod layout;
-pub mod legal;
+mod layout;
+mod legal;
 pub mod message;
 pub mod model;
 pub mod series;

@@ -41,7 +41,7 @@ fn export_cells(model: &Model) -> (Vec<String>, Vec<Vec<String>>) {
     let row = |trial: &&TrialRecord| {
         let mut cells = vec![trial.trial.to_string()];
         for info in &model.session.info.parameters {
-            cells.push(optional(trial.parameters.iter().find(|(name, _)| *name == info.name).map(|(_, value)| *value)));
+            cells.push(optional(trial.parameters.get(&info.name)));
         }
         cells.extend([
             optional(trial.value),

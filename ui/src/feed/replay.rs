@@ -17,7 +17,6 @@ const PAST_NS: u64 = 8_000_000_000;
 /// Speeds relative to the recording.
 const SPEEDS: [f64; 9] = [0.0625, 0.125, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0];
 
-/// A recording during playback.
 pub struct ReplayFeed {
     player: Player,
     file: String,
@@ -33,7 +32,6 @@ pub struct ReplayFeed {
 }
 
 impl ReplayFeed {
-    /// Starts playback at the beginning.
     pub fn new(player: Player) -> ReplayFeed {
         let mut replay = ReplayFeed {
             file: player.session().recording.clone(),
@@ -49,7 +47,6 @@ impl ReplayFeed {
         replay
     }
 
-    /// Executes a command of the operator.
     pub fn command(&mut self, command: ReplayCommand) {
         match command {
             ReplayCommand::PlayPause => {

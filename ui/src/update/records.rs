@@ -61,9 +61,7 @@ pub(super) fn take(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
             if stopped {
                 model.session.stopped_because = change.cause.clone();
                 // The STOP key was answered already.
-                let answered = change.cause == "STOP"
-                    && model.message.as_ref().is_some_and(|message| message.text.starts_with("STOP"));
-                if !answered {
+                if !(change.is_stop() && model.message.as_ref().is_some_and(|message| message.stop)) {
                     say(model, level, format!("{}: {}", change.to.name(), change.cause));
                 }
             }
@@ -138,7 +136,6 @@ pub(super) fn take(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
     if rings { vec![Effect::Bell] } else { Vec::new() }
 }
 
-/// Keeps the run time of a trial.
 fn note_time(model: &mut Model, info: StageRecord, time_ns: u64) {
     match info.stage {
         ExperimentStage::Running => {

@@ -1,10 +1,4 @@
 //! A chart of one signal over time, in sweep or scroll mode.
-//!
-//! ```text
-//! roll +0.021 rad             ±0.50
-//! ⠀⠀⠀⠀⠀⠀⢀⠔⠑⠤⡀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀
-//! ⣀⣀⣀⠤⠔⠊⠁⠀⠀⠀⠈⠒⠤⢄⣀⣀⣀⣀│⠀⠀⠤⠤⠔⠒
-//! ```
 
 use quadfrog::telemetry::Phase;
 use ratatui::buffer::Buffer;
@@ -21,7 +15,6 @@ use crate::theme::{Glyphs, Role, Theme};
 /// The time axis, the same for all charts of a view.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TimeAxis {
-    /// Sweep or scroll.
     pub mode: ChartMode,
     /// Time shown, ns.
     pub window_ns: u64,
@@ -49,14 +42,11 @@ impl TimeAxis {
     }
 }
 
-/// A trial laid under the charts.
 #[derive(Clone, Copy)]
 pub struct Ghost<'a> {
-    /// Its samples.
     pub trace: &'a [ChartSample],
     /// Where its impulse begins on the charts' axis, ns.
     pub start_ns: u64,
-    /// Style of its line.
     pub role: Role,
     /// Whether its value stands beside the other in the heading.
     pub named: bool,
@@ -64,11 +54,8 @@ pub struct Ghost<'a> {
 
 /// A chart with its heading line. Under two rows nothing is drawn.
 pub struct Chart<'a> {
-    /// The signal.
     pub signal: Signal,
-    /// The time axis.
     pub axis: TimeAxis,
-    /// The samples.
     pub history: &'a SignalHistory,
     /// The phase of each column, from [`phases`].
     pub phases: &'a [Option<Phase>],
@@ -78,12 +65,10 @@ pub struct Chart<'a> {
     pub cursor_ns: Option<u64>,
     /// Whether the sweep's cursor is drawn as a line.
     pub cursor_line: bool,
-    /// Colours and characters.
     pub theme: Theme,
 }
 
 impl Chart<'_> {
-    /// Draws it.
     pub fn draw(&self, buffer: &mut Buffer, area: Rect) {
         if area.height < 2 || area.width < 8 {
             return;

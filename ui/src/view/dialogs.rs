@@ -26,7 +26,6 @@ use crate::model::Model;
 use crate::model::dialog::{APPROVAL_PAUSE, Choice, Dialog, OverrideForm, Purpose};
 use crate::theme::{Glyphs, Role, Theme};
 
-/// Draws the open dialog.
 pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let Some(dialog) = &model.dialog else { return };
     match dialog {
@@ -56,7 +55,7 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
             );
         }
         Dialog::Palette { input, selected } => render_palette(frame, area, model, input, *selected),
-        Dialog::Choose { what, selected } => render_choice(frame, area, model, *what, *selected),
+        Dialog::Choose { subject, selected } => render_choice(frame, area, model, *subject, *selected),
         Dialog::Help { scroll } => render_help(frame, area, model, *scroll),
         Dialog::Details { trial, scroll } => render_details(frame, area, model, *trial, *scroll),
     }
@@ -132,12 +131,12 @@ fn answers(theme: &Theme, key: &str, text: &str) -> Line<'static> {
 
 fn arm(model: &Model, typed: usize) -> Vec<Line<'static>> {
     let theme = &model.theme;
-    let word = model.session.arming_word();
+    let letters = model.session.arming_confirmation();
     let mut lines = vec![Line::from("The robot will stand up. Is the area clear?"), Line::default()];
-    if word.len() == 1 {
-        lines.push(answers(&model.theme, word, "stand up"));
+    if letters.len() == 1 {
+        lines.push(answers(&model.theme, letters, "stand up"));
     } else {
-        let (done, left) = word.split_at(typed.min(word.len()));
+        let (done, left) = letters.split_at(typed.min(letters.len()));
         lines.push(Line::from(vec![
             span(theme, Role::Selected, " Cancel "),
             span(theme, Role::Quiet, " Enter, or any other key     type "),
@@ -195,9 +194,9 @@ fn overrides(model: &Model, form: &OverrideForm) -> Vec<Line<'static>> {
             lines.push(Line::from(span(theme, Role::Quiet, "  gains of the controller, for this trial alone")));
         }
         let selected = index == form.selected;
-        let mark = if selected { ">" } else { " " };
+        let symbol = if selected { ">" } else { " " };
         let mut spans =
-            vec![span(theme, if selected { Role::Key } else { Role::Text }, format!("{mark} {:<8}", row.name))];
+            vec![span(theme, if selected { Role::Key } else { Role::Text }, format!("{symbol} {:<8}", row.name))];
         match &form.typing {
             Some(input) if selected => {
                 // As wide as the number that it replaces, so that the line does not shift.
@@ -227,7 +226,6 @@ fn overrides(model: &Model, form: &OverrideForm) -> Vec<Line<'static>> {
     lines
 }
 
-/// A line of text with its cursor.
 fn edited(theme: &Theme, input: &Input) -> Vec<Span<'static>> {
     let text: Vec<char> = input.value().chars().collect();
     let at = input.cursor().min(text.len());
@@ -313,13 +311,13 @@ fn render_palette(frame: &mut Frame, area: Rect, model: &Model, input: &Input, s
     }
 }
 
-fn render_choice(frame: &mut Frame, area: Rect, model: &Model, what: Choice, selected: usize) {
+fn render_choice(frame: &mut Frame, area: Rect, model: &Model, subject: Choice, selected: usize) {
     let theme = &model.theme;
-    let title = match what {
+    let title = match subject {
         Choice::Series => "Series of the charts",
         Choice::Columns => "Columns of the trial table",
     };
-    let rows = model.choices(what);
+    let rows = model.choices(subject);
     let inner = open_box(frame, area, theme, title, 66, rows.len() as u16 + 2);
     // A terminal that is too low shows the lines around the chosen one.
     let first = (selected + 1).saturating_sub(usize::from(inner.height));
@@ -328,8 +326,8 @@ fn render_choice(frame: &mut Frame, area: Rect, model: &Model, what: Choice, sel
             break;
         }
         let area = Rect { y: inner.y + line as u16, height: 1, ..inner };
-        let mark = if *on { "[x]" } else { "[ ]" };
-        let text = cut(&format!("{mark} {name:<11} {help}"), usize::from(inner.width));
+        let symbol = if *on { "[x]" } else { "[ ]" };
+        let text = cut(&format!("{symbol} {name:<11} {help}"), usize::from(inner.width));
         let role = match (index == selected, on) {
             (true, _) => Role::Selected,
             (false, true) => Role::Text,

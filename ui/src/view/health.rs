@@ -1,10 +1,4 @@
 //! View 5, Health: loop timing, recorder, link, motors, battery, arming checks.
-//!
-//! ```text
-//! Loop ──────────────────────────   Motors ────────────────────────────
-//! late ticks   0 (0.000 %)          FR_hip       31 C  -0.33 rad  +4.4 N m
-//! wake-up      p50 61 us, p99 94 us ...
-//! ```
 
 use quadfrog::recording::record::HealthLimits;
 use quadfrog::recording::recorder::RecorderStatus;
@@ -22,7 +16,6 @@ use crate::model::Model;
 use crate::model::history::ChartSample;
 use crate::theme::Role;
 
-/// Draws the view.
 pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let [left, right] = Layout::horizontal([Constraint::Fill(1); 2]).spacing(2).areas(area);
     // The histogram needs rows that 80x24 does not have.
@@ -50,9 +43,7 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     frame.render_widget(Paragraph::new(lines), body);
 }
 
-/// Width of the names at the left of a panel.
 const NAME_WIDTH: usize = 13;
-/// Width of the joints' names.
 const MOTOR_NAME_WIDTH: usize = 9;
 
 /// A line of a panel: name, value, and whether it is beyond its limit.
@@ -62,7 +53,6 @@ fn panel(frame: &mut Frame, area: Rect, model: &Model, title: &str, rows: Vec<He
     panel_named(frame, area, model, (title, NAME_WIDTH), rows);
 }
 
-/// A panel with its title and the width of its names.
 fn panel_named(frame: &mut Frame, area: Rect, model: &Model, (title, name_width): (&str, usize), rows: Vec<HealthRow>) {
     let theme = &model.theme;
     let body = heading(frame, area, theme, title, "");
@@ -112,7 +102,6 @@ fn timing_rows(model: &Model) -> Vec<HealthRow> {
     ]
 }
 
-/// The durations of a tick's stages.
 fn stages(stages: &StageTimes) -> String {
     let micro = |ns: u32| f64::from(ns) / 1e3;
     format!(
@@ -123,7 +112,6 @@ fn stages(stages: &StageTimes) -> String {
     )
 }
 
-/// Histogram of the wake-up latency of the last minute.
 fn lateness_rows(model: &Model, width: usize) -> Vec<HealthRow> {
     let mut counts = [0_u32; CLASSES_US.len() + 1];
     for sample in model.history.samples() {
@@ -175,7 +163,7 @@ fn robot_rows(model: &Model) -> Vec<HealthRow> {
     let mut rows = Vec::new();
     match counters.link {
         Some(link) => rows.extend(link_rows(&link, limits)),
-        None if model.session.is_hardware() => {
+        None if model.session.info.is_hardware() => {
             rows.push(row(
                 "state age",
                 format!("{} ms", counters.state_age_ms),
@@ -202,7 +190,6 @@ fn robot_rows(model: &Model) -> Vec<HealthRow> {
     rows
 }
 
-/// Size of the recording and its mean rate.
 fn written(status: &RecorderStatus, time_ns: u64) -> String {
     let megabytes = status.bytes as f64 / 1e6;
     let rate = status.bytes as f64 / 1e3 / (time_ns as f64 / 1e9).max(1.0);

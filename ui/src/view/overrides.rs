@@ -1,15 +1,4 @@
 //! View 4, Override: the proposal with its bounds, the controller's gains, and the actions on the selected one.
-//!
-//! ```text
-//! Trial #8, by: sampler ─────────────────────────────────────────────────
-//!   f0    1.243 Hz     0.750 [-----o-----] 1.750
-//! > Fx    120.0 N      0.000 [--------o--] 150.0    proposed was 118.2
-//! Gains of the controller, for this trial ───────────────────────────────
-//!   kp    400.0 N/m    100.0 [---o-------] 1000
-//! Actions ───────────────────────────────────────────────────────────────
-//!   o  change values and gains
-//!   X  fix Fx at 120.0 N for the next trials
-//! ```
 
 use quadfrog::trial::{ParameterInfo, ProposedParameter};
 use ratatui::Frame;
@@ -23,7 +12,6 @@ use crate::legal::legal;
 use crate::model::Model;
 use crate::theme::Role;
 
-/// Draws the view.
 pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let theme = &model.theme;
     let proposal = model.session.open_proposal();
@@ -65,7 +53,6 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     frame.render_widget(Paragraph::new(actions(model, usize::from(body.width))), body);
 }
 
-/// One value with its place in its range.
 fn row(model: &Model, index: usize, info: &ParameterInfo, p: Option<&ProposedParameter>) -> Vec<Span<'static>> {
     let theme = &model.theme;
     let selected = index == model.override_row;

@@ -1,14 +1,5 @@
 //! The trial panel: the proposal before the jump, the parameters while it runs, the measured values after it, and the
 //! best parameters when the study is finished.
-//!
-//! ```text
-//! Trial #8, by the sampler ──────      Trial #8: judge it ────────────
-//!  f0    1.243 Hz   [----o-----]        J     0.642 m
-//!  Fx    118.2 N    [-------o--]        dx   +0.642 m   dy   -0.012 m
-//!  Fz    243.9 N    [---o------]        yaw  +0.031 rad
-//!  1 of the 5 nearest fell; nearest     rise +0.412 m   air   0.330 s
-//!  fall #3, normalised distance 0.21    suggested verdict: accept
-//! ```
 
 use quadfrog::trial::{ExperimentStage, FallRisk, Proposal, ProposalSource, ProposedParameter, TrialRecord, Verdict};
 use ratatui::Frame;
@@ -23,7 +14,6 @@ use crate::model::Model;
 use crate::model::session::SessionModel;
 use crate::theme::{Role, Theme};
 
-/// The rows that the panel needs.
 pub fn rows(session: &SessionModel) -> u16 {
     let parameters = session.info.parameters.len().clamp(3, 6) as u16;
     let changed = |proposal: &Proposal| proposal.gains.iter().filter(|gain| gain.value != gain.proposed).count();
@@ -37,7 +27,6 @@ pub fn rows(session: &SessionModel) -> u16 {
     parameters + 4 + gains + repeats
 }
 
-/// Draws the panel.
 pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let (title, lines) = content(model, usize::from(area.width));
     let body = heading(frame, area, &model.theme, &title, "");
@@ -80,7 +69,6 @@ fn content(model: &Model, width: usize) -> (String, Vec<Line<'static>>) {
     }
 }
 
-/// One parameter with its place between the bounds.
 fn parameter(session: &SessionModel, theme: &Theme, p: &ProposedParameter, width: usize) -> Line<'static> {
     let info = session.parameter(&p.name).or_else(|| session.gain(&p.name).cloned());
     let unit = info.as_ref().map_or("", |info| info.unit.as_str());
