@@ -209,13 +209,3 @@ pub static ACTIONS: [ActionInfo; 68] = {
         row(A::Quit, "quit", &["q"], G::Program, "quit; needs confirmation while the robot is armed"),
     ]
 };
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_table_has_the_order_of_the_actions() {
-        assert!(ACTIONS.iter().map(|info| info.action).eq(Action::VARIANTS.iter().copied()));
-    }
-}

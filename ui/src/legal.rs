@@ -2,7 +2,7 @@
 
 use quadfrog::control::mode::{self, Trigger};
 use quadfrog::telemetry::Mode;
-use quadfrog::trial::{ExperimentStage, Verdict};
+use quadfrog::trial::{ExperimentStage, Proposal, Verdict};
 
 use crate::action::{ACTIONS, Action, ActionInfo};
 use crate::layout::{MIN_COLUMNS, MIN_ROWS};
@@ -197,11 +197,9 @@ fn may_fix(model: &Model) -> Legality {
 
 fn may_clear_overrides(model: &Model) -> Legality {
     may_change_proposal(model)?;
-    let overridden = model
-        .session
-        .open_proposal()
-        .is_some_and(|proposal| proposal.parameters.iter().chain(&proposal.gains).any(|p| p.value != p.proposed));
-    require(overridden, "nothing was overridden")
+    let changed =
+        |proposal: &Proposal| proposal.parameters.iter().chain(&proposal.gains).any(|p| p.value != p.proposed);
+    require(model.session.open_proposal().is_some_and(changed), "nothing was overridden")
 }
 
 fn may_rerun(model: &Model) -> Legality {

@@ -94,7 +94,6 @@ pub enum ReplayCommand {
 #[derive(Debug, Clone, PartialEq)]
 #[expect(missing_docs, reason = "the names say the rest")]
 pub struct ReplayStatus {
-    pub file: String,
     pub playing: bool,
     /// Recorded seconds per second.
     pub speed: f64,

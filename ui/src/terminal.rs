@@ -54,12 +54,11 @@ pub enum TerminalError {
 /// # Errors
 /// When there is no terminal, or it is too small. A terminal that shrinks later shows a reduced screen.
 pub fn check() -> Result<(), TerminalError> {
-    for (name, is_terminal) in
-        [("standard input", io::stdin().is_terminal()), ("standard output", io::stdout().is_terminal())]
-    {
-        if !is_terminal {
-            return Err(TerminalError::NoTerminal(name));
-        }
+    if !io::stdin().is_terminal() {
+        return Err(TerminalError::NoTerminal("standard input"));
+    }
+    if !io::stdout().is_terminal() {
+        return Err(TerminalError::NoTerminal("standard output"));
     }
     match size() {
         Ok((0, _) | (_, 0)) | Err(_) => Err(TerminalError::NoSize),

@@ -19,7 +19,6 @@ const SPEEDS: [f64; 9] = [0.0625, 0.125, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0];
 
 pub struct ReplayFeed {
     player: Player,
-    file: String,
     playing: bool,
     /// Index in [`SPEEDS`].
     speed: usize,
@@ -34,7 +33,6 @@ pub struct ReplayFeed {
 impl ReplayFeed {
     pub fn new(player: Player) -> ReplayFeed {
         let mut replay = ReplayFeed {
-            file: player.session().recording.clone(),
             player,
             playing: true,
             speed: SPEEDS.iter().position(|speed| *speed == 1.0).unwrap_or(0),
@@ -94,7 +92,6 @@ impl ReplayFeed {
         }
         messages.push(Msg::Snapshot(Box::new(self.snapshot)));
         messages.push(Msg::Replay(ReplayStatus {
-            file: self.file.clone(),
             playing: self.playing,
             speed: SPEEDS[self.speed],
             time_ns: self.time_ns,

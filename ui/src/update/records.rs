@@ -176,10 +176,9 @@ fn log_trial(model: &mut Model, time_ns: u64, trial: &TrialRecord) {
     let text = match (trial.verdict, trial.suggested) {
         (Some(verdict), _) if !known(|t| t.verdict) => {
             let value = trial.value.map(|v| format!(", J = {v:.3} {}", model.session.info.unit)).unwrap_or_default();
-            let source = if trial.source == ProposalSource::Sampler {
-                String::new()
-            } else {
-                format!(" ({})", trial.source.name())
+            let source = match trial.source {
+                ProposalSource::Sampler => String::new(),
+                other => format!(" ({})", other.name()),
             };
             format!("trial {}{source}: {}{value}", trial.trial, verdict.name())
         }

@@ -195,14 +195,8 @@ impl Chart<'_> {
 
     /// Colours the columns of a jump's phases; [`draw_phases`] shows the same in letters.
     fn shade(&self, buffer: &mut Buffer, plot: Rect) {
-        for (column, phase) in self.phases.iter().enumerate().take(usize::from(plot.width)) {
-            let role = match phase {
-                Some(Phase::Impulse) => Role::ShadeImpulse,
-                Some(Phase::Flight) => Role::ShadeFlight,
-                Some(Phase::Landing) => Role::ShadeLanding,
-                Some(Phase::Stance) | None => continue,
-            };
-            buffer.set_style(Rect { x: plot.x + column as u16, width: 1, ..plot }, self.theme.style(role));
+        for (column, (role, _)) in jump_columns(self.phases, plot.width) {
+            buffer.set_style(Rect { x: plot.x + column, width: 1, ..plot }, self.theme.style(role));
         }
     }
 
@@ -236,15 +230,19 @@ pub fn phases(axis: &TimeAxis, history: &SignalHistory, width: u16) -> Vec<Optio
     phases
 }
 
+/// The columns of a jump's phases, each with its role and its letter.
+fn jump_columns(phases: &[Option<Phase>], width: u16) -> impl Iterator<Item = (u16, (Role, &'static str))> {
+    (0..width).zip(phases).filter_map(|(column, phase)| match phase {
+        Some(Phase::Impulse) => Some((column, (Role::ShadeImpulse, "i"))),
+        Some(Phase::Flight) => Some((column, (Role::ShadeFlight, "f"))),
+        Some(Phase::Landing) => Some((column, (Role::ShadeLanding, "l"))),
+        Some(Phase::Stance) | None => None,
+    })
+}
+
 /// A line of letters under charts: `i` impulse, `f` flight, `l` landing.
 pub fn draw_phases(buffer: &mut Buffer, area: Rect, phases: &[Option<Phase>], theme: &Theme) {
-    for (column, phase) in phases.iter().enumerate().take(usize::from(area.width)) {
-        let letter = match phase {
-            Some(Phase::Impulse) => "i",
-            Some(Phase::Flight) => "f",
-            Some(Phase::Landing) => "l",
-            Some(Phase::Stance) | None => continue,
-        };
-        buffer.set_string(area.x + column as u16, area.y, letter, theme.style(Role::Quiet));
+    for (column, (_, letter)) in jump_columns(phases, area.width) {
+        buffer.set_string(area.x + column, area.y, letter, theme.style(Role::Quiet));
     }
 }

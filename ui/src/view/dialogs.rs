@@ -45,14 +45,8 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
             popup(frame, area, model, &format!("Override trial #{}", form.trial), 78, overrides(model, form))
         }
         Dialog::Field { purpose, input, problem } => {
-            popup(
-                frame,
-                area,
-                model,
-                &field_title(model, *purpose),
-                64,
-                field(model, *purpose, input, problem.as_deref()),
-            );
+            let lines = field(model, *purpose, input, problem.as_deref());
+            popup(frame, area, model, &field_title(model, *purpose), 64, lines);
         }
         Dialog::Palette { input, selected } => render_palette(frame, area, model, input, *selected),
         Dialog::Choose { subject, selected } => render_choice(frame, area, model, *subject, *selected),
@@ -101,11 +95,8 @@ fn open_box(frame: &mut Frame, area: Rect, theme: &Theme, title: &str, width: u1
     let set = if theme.glyphs == Glyphs::Ascii { ASCII } else { border::PLAIN };
     let (width, height) = (width.min(area.width), height.min(area.height));
     let at = Rect { x: area.x + (area.width - width) / 2, y: area.y + (area.height - height) / 2, width, height };
-    let block = Block::bordered().border_set(set).border_style(theme.style(Role::Heading)).title(span(
-        theme,
-        Role::Heading,
-        format!(" {title} "),
-    ));
+    let title = span(theme, Role::Heading, format!(" {title} "));
+    let block = Block::bordered().border_set(set).border_style(theme.style(Role::Heading)).title(title);
     let inner = block.inner(at);
     frame.render_widget(Clear, at);
     frame.render_widget(block, at);
@@ -214,15 +205,10 @@ fn overrides(model: &Model, form: &OverrideForm) -> Vec<Line<'static>> {
         }
         lines.push(Line::from(spans));
     }
-    lines.push(Line::default());
-    match &form.problem {
-        Some(problem) => lines.push(Line::from(span(theme, Role::Bad, problem.clone()))),
-        None => lines.push(Line::from(span(
-            theme,
-            Role::Quiet,
-            "This does not move the robot: it is approved like any other proposal.",
-        ))),
-    }
+    let note = "This does not move the robot: it is approved like any other proposal.";
+    let below =
+        form.problem.as_ref().map_or(span(theme, Role::Quiet, note), |text| span(theme, Role::Bad, text.as_str()));
+    lines.extend([Line::default(), Line::from(below)]);
     lines
 }
 
@@ -262,29 +248,23 @@ fn field(model: &Model, purpose: Purpose, input: &Input, problem: Option<&str>) 
     if matches!(purpose, Purpose::HandValue(_)) {
         spans.push(span(theme, Role::Quiet, format!(" {}", model.session.info.unit)));
     }
-    let below = match (problem, purpose) {
-        (Some(problem), _) => span(theme, Role::Bad, problem.to_owned()),
-        (None, Purpose::HandValue(_)) => {
-            span(theme, Role::Quiet, "replaces the measured value; empty: back to the measured one")
-        }
-        (None, Purpose::Bounds { parameter }) => {
+    let hint = match purpose {
+        Purpose::HandValue(_) => "replaces the measured value; empty: back to the measured one".to_owned(),
+        Purpose::Bounds { parameter } => {
             let info = model.session.info.parameters.get(parameter);
             let searched = info.and_then(|info| model.session.searched(&info.name));
             let allowed = searched.map_or(String::new(), |p| format!("; safety.toml allows {} to {}", p.least, p.most));
-            span(theme, Role::Quiet, format!("write it as 50..120{allowed}; past trials stay"))
+            format!("write it as 50..120{allowed}; past trials stay")
         }
-        (None, Purpose::Fix { .. }) => span(theme, Role::Quiet, "the others are still proposed by the sampler"),
-        (None, Purpose::ConfirmBest) => span(
-            theme,
-            Role::Quiet,
-            "the best points run again until one leads; each repeat is approved like any other",
-        ),
-        (None, Purpose::LogSearch) => span(theme, Role::Quiet, "empty: all lines"),
-        (None, Purpose::Note(_)) if model.robot_needs_us() => {
-            span(theme, Role::Quiet, "the robot is armed: Space is STOP, _ writes a space")
+        Purpose::Fix { .. } => "the others are still proposed by the sampler".to_owned(),
+        Purpose::ConfirmBest => {
+            "the best points run again until one leads; each repeat is approved like any other".to_owned()
         }
-        _ => span(theme, Role::Quiet, ""),
+        Purpose::LogSearch => "empty: all lines".to_owned(),
+        Purpose::Note(_) if model.robot_needs_us() => "the robot is armed: Space is STOP, _ writes a space".to_owned(),
+        Purpose::Note(_) | Purpose::Continue | Purpose::TrialNumber => String::new(),
     };
+    let below = problem.map_or_else(|| span(theme, Role::Quiet, hint), |problem| span(theme, Role::Bad, problem));
     vec![Line::from(spans), Line::default(), Line::from(below)]
 }
 
@@ -321,10 +301,9 @@ fn render_choice(frame: &mut Frame, area: Rect, model: &Model, subject: Choice, 
     let inner = open_box(frame, area, theme, title, 66, rows.len() as u16 + 2);
     // A terminal that is too low shows the lines around the chosen one.
     let first = (selected + 1).saturating_sub(usize::from(inner.height));
-    for (line, (index, (name, help, on))) in rows.iter().enumerate().skip(first).enumerate() {
-        if line >= usize::from(inner.height) {
-            break;
-        }
+    for (line, (index, (name, help, on))) in
+        rows.iter().enumerate().skip(first).take(usize::from(inner.height)).enumerate()
+    {
         let area = Rect { y: inner.y + line as u16, height: 1, ..inner };
         let symbol = if *on { "[x]" } else { "[ ]" };
         let text = cut(&format!("{symbol} {name:<11} {help}"), usize::from(inner.width));

@@ -65,11 +65,8 @@ fn identity(model: &Model, width: u16, room: usize) -> Line<'static> {
     let narrow = width < 100;
     if session.approve != Approval::Each && model.replay.is_none() {
         let approve = session.approve.name().to_uppercase();
-        spans.push(span(
-            theme,
-            Role::Warning,
-            if narrow { format!("{approve}  ") } else { format!("APPROVE {approve}  ") },
-        ));
+        let text = if narrow { format!("{approve}  ") } else { format!("APPROVE {approve}  ") };
+        spans.push(span(theme, Role::Warning, text));
     }
     spans.push(Span::raw(session.task_name()));
     if let Some(info) = model.session.stage {
@@ -155,19 +152,13 @@ fn condition(model: &Model, width: u16) -> Vec<Span<'static>> {
     let hottest = temperatures.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1));
     if let Some((joint, hottest)) = hottest.filter(|(_, hottest)| *hottest > 0.0) {
         let joint = if narrow { String::new() } else { format!(" {}", joint_name(joint)) };
-        part(
-            if narrow { "motor " } else { "hottest " },
-            bad(f64::from(hottest) >= limits.motor_c),
-            format!("{hottest:.0} C{joint}"),
-        );
+        let name = if narrow { "motor " } else { "hottest " };
+        part(name, bad(f64::from(hottest) >= limits.motor_c), format!("{hottest:.0} C{joint}"));
     }
     if let Some(battery) = snapshot.tick.state.battery {
         let charge = battery.charge_percent;
-        part(
-            if narrow { "bat " } else { "battery " },
-            bad(f64::from(charge) < limits.battery_percent),
-            format!("{charge:.0} %"),
-        );
+        let name = if narrow { "bat " } else { "battery " };
+        part(name, bad(f64::from(charge) < limits.battery_percent), format!("{charge:.0} %"));
     }
     let age_ms = model.clock.saturating_sub(model.snapshot_at).as_millis();
     if age_ms > STALE_MS && model.replay.is_none() {

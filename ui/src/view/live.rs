@@ -30,12 +30,10 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let joints_only = model.live.panel == Panel::Joints;
     let room = side.height - card_rows;
     // Without room for both, the panel of the joints shows the robot and the others the objective.
-    let picture_rows = if room >= 18 {
-        12
-    } else if joints_only {
-        room
-    } else {
-        0
+    let picture_rows = match joints_only {
+        _ if room >= 18 => 12,
+        true => room,
+        false => 0,
     };
     let [card, objective_area, picture] =
         Layout::vertical([Constraint::Length(card_rows), Constraint::Fill(1), Constraint::Length(picture_rows)])

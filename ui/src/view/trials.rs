@@ -161,29 +161,15 @@ fn render_empty(frame: &mut Frame, area: Rect, model: &Model) {
         }
         Line::from(spans)
     };
-    let stop = Line::from(vec![
-        span(theme, Role::Quiet, "   always "),
-        span(theme, Role::Key, model.keymap.all_keys(Action::Stop)),
-        span(theme, Role::Quiet, " STOP: damp all motors at once   "),
-        span(theme, Role::Key, model.keymap.key(Action::Quit)),
-        span(theme, Role::Quiet, " quit   "),
-        span(theme, Role::Key, model.keymap.key(Action::Help)),
-        span(theme, Role::Quiet, " all keys"),
-    ]);
+    let judge = [(Action::Accept, "accept"), (Action::Fall, "fall"), (Action::Void, "void"), (Action::Rerun, "re-run")];
     let lines = vec![
         step("before", &[(Action::Arm, "arm: it stands up"), (Action::Override, "override"), (Action::Skip, "skip")]),
         step("jump  ", &[(Action::Approve, "approve; again after 0.8 s: the robot jumps")]),
+        step("after ", &[&judge[..], &[(Action::Undo, "undo")]].concat()),
         step(
-            "after ",
-            &[
-                (Action::Accept, "accept"),
-                (Action::Fall, "fall"),
-                (Action::Void, "void"),
-                (Action::Rerun, "re-run"),
-                (Action::Undo, "undo"),
-            ],
+            "always",
+            &[(Action::Stop, "STOP: damp all motors at once"), (Action::Quit, "quit"), (Action::Help, "all keys")],
         ),
-        stop,
     ];
     frame.render_widget(Paragraph::new(lines), area);
 }
