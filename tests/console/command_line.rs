@@ -212,7 +212,7 @@ fn several_studies_are_summarized_and_the_sampler_can_be_chosen() {
         ["optimize", "--seed", "0-1", "--trials", "2", "--record", "none", "--sampler", "sobol", "--output", "mine"];
     let text = program.text(&arguments);
     assert!(text.trim_end().lines().last().unwrap().starts_with("forward: 2 studies, mean best"), "{text}");
-    let kept = fs::read_to_string(program.study("mine").join("config/optimize.toml")).unwrap();
+    let kept = fs::read_to_string(program.studies("mine")[0].join("config/optimize.toml")).unwrap();
     assert!(kept.contains("kind = \"sobol\""), "{kept}");
 }
 

@@ -249,7 +249,6 @@ fn an_observer_and_a_replay_send_nothing() {
     observer.stage(ExperimentStage::Proposed, 0);
     let mut replay = Console::proposed();
     replay.tell(Msg::Replay(quadfrog_console::message::ReplayStatus {
-        file: "session.mcap".into(),
         playing: true,
         speed: 1.0,
         time_ns: 0,
@@ -363,7 +362,9 @@ fn the_bell_rings_when_the_operator_is_needed() {
 #[test]
 fn every_action_has_a_name_a_key_and_a_line_of_help() {
     let keymap = ConsoleSettings::built_in().keymap;
+    assert_eq!(ACTIONS.len(), Action::VARIANTS.len());
     for (index, info) in ACTIONS.iter().enumerate() {
+        assert_eq!(Action::VARIANTS[index], info.action, "the table has the order of the actions");
         assert!(!info.help.is_empty() && !info.keys.is_empty(), "{}", info.name);
         assert!(ACTIONS[..index].iter().all(|other| other.name != info.name && other.action != info.action));
         let keys: Vec<String> = keymap.keys(info.action).map(|key| key.to_string()).collect();

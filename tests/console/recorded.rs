@@ -71,14 +71,6 @@ fn views_of_a_recorded_session_in_colour() {
 }
 
 #[test]
-fn a_replay_shows_every_trial_and_can_be_left() {
-    let console = console(Colours::Named, Glyphs::Braille);
-    assert_eq!(console.model.session.trials.records.len(), 3);
-    let screen = console.screen(80, 24);
-    assert!(screen.contains("REPLAY") && screen.contains("Trial #2: judge it"), "{screen}");
-}
-
-#[test]
 #[ignore = "renews the recording that the other tests read"]
 fn record_the_session() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -5,8 +5,8 @@ mod support;
 use std::path::Path;
 
 use quadfrog::recording::player::Player;
-use quadfrog::recording::record::Record;
-use quadfrog::telemetry::{Mode, Phase};
+use quadfrog::recording::record::{Record, Transition};
+use quadfrog::telemetry::{Mode, Phase, Snapshot};
 use quadfrog::trial::{ExperimentStage, TrialRecord, Verdict};
 use quadfrog_console::feed::Feed;
 use quadfrog_console::message::{Effect, Mouse, Msg};
@@ -138,9 +138,7 @@ fn joints_contact_and_wireframe_are_there_at_every_size() {
         newest.state.joint_torque[1] = -20.0;
         newest.limited = 0b10;
         newest.estimate.contact = [true, false, true, false];
-        let counters = console.model.snapshot.counters;
-        let snapshot = quadfrog::telemetry::Snapshot { tick: newest, counters };
-        console.tell(Msg::Snapshot(Box::new(snapshot)));
+        console.tell(Msg::Snapshot(Box::new(Snapshot { tick: newest, ..console.model.snapshot })));
         console.press(&["t", "t"]);
         let screen = console.screen(columns, rows);
         assert!(screen.contains("FR● FL○ RR● RL○"), "{screen}");
@@ -413,24 +411,15 @@ fn each_cause_rings_the_bell_only_where_the_settings_name_it() {
     for named in all {
         let mut console = Console::ready();
         console.model.bell = vec![named];
-        let mut rung = Vec::new();
-        let fault = Record::Transition(quadfrog::recording::record::Transition {
-            from: Mode::Ready,
-            to: Mode::Fault,
-            cause: "test".into(),
-        });
-        if console.record(fault).contains(&Effect::Bell) {
-            rung.push(BellCause::Fault);
-        }
-        if console.record(Record::Trial(trial(0, None, Some(Verdict::Fall)))).contains(&Effect::Bell) {
-            rung.push(BellCause::Fall);
-        }
-        if console.stage(ExperimentStage::Review, 0).contains(&Effect::Bell) {
-            rung.push(BellCause::Verdict);
-        }
-        if console.stage(ExperimentStage::Proposed, 1).contains(&Effect::Bell) {
-            rung.push(BellCause::Proposal);
-        }
+        let fault = Transition { from: Mode::Ready, to: Mode::Fault, cause: "test".into() };
+        let effects = [
+            (BellCause::Fault, console.record(Record::Transition(fault))),
+            (BellCause::Fall, console.record(Record::Trial(trial(0, None, Some(Verdict::Fall))))),
+            (BellCause::Verdict, console.stage(ExperimentStage::Review, 0)),
+            (BellCause::Proposal, console.stage(ExperimentStage::Proposed, 1)),
+        ];
+        let rung: Vec<_> =
+            effects.iter().filter(|(_, effects)| effects.contains(&Effect::Bell)).map(|(cause, _)| *cause).collect();
         assert_eq!(rung, [named]);
     }
 }
@@ -530,15 +519,11 @@ fn markers_take_a_replay_from_trial_to_trial_and_to_the_end() {
     played.press("[");
     let marker = played.time_ms();
     assert!(times.contains(&marker) && marker < times[times.len() - 1]);
-    for _ in 0..20 {
-        played.press("[");
-    }
+    (0..20).for_each(|_| played.press("["));
     assert_eq!(played.time_ms(), 0);
     assert_eq!(played.console.model.session.trials.records.len(), 0, "what was not yet, is not shown");
     // From the end, playing starts over.
-    for _ in 0..20 {
-        played.press("]");
-    }
+    (0..20).for_each(|_| played.press("]"));
     played.press("p");
     played.wait(500);
     assert_eq!(played.time_ms(), 500);
