@@ -9,7 +9,6 @@ use super::record::{
 };
 use super::topic::Topic;
 use super::{frog, optimizing, tick, trials};
-use crate::optimize::ask::SamplerKind;
 use crate::robot::LinkStatus;
 use crate::telemetry::{ArmingCheck, ArmingCheckState, Counters, Mode};
 use crate::trial::{ExperimentStage, ParameterInfo};
@@ -195,7 +194,7 @@ fn from_session(message: frog::Session) -> SessionInfo {
         robot: message.robot,
         task: message.task.parse().ok(),
         unit: message.unit,
-        sampler: SamplerKind::from_name(&message.sampler),
+        sampler: message.sampler.parse().ok(),
         seed: message.seed,
         budget: message.budget,
         parameters: message.parameters.into_iter().map(bounds).collect(),
