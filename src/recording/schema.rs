@@ -9,6 +9,7 @@ use super::record::{
 };
 use super::topic::Topic;
 use super::{frog, optimizing, tick, trials};
+use crate::optimize::ask::SamplerKind;
 use crate::robot::LinkStatus;
 use crate::telemetry::{ArmingCheck, ArmingCheckState, Counters, Mode};
 use crate::trial::{ExperimentStage, ParameterInfo};
@@ -194,7 +195,7 @@ fn from_session(message: frog::Session) -> SessionInfo {
         robot: message.robot,
         task: message.task.parse().ok(),
         unit: message.unit,
-        sampler: message.sampler.parse().ok(),
+        sampler: SamplerKind::from_name(&message.sampler),
         seed: message.seed,
         budget: message.budget,
         parameters: message.parameters.into_iter().map(bounds).collect(),
