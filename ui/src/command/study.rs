@@ -159,14 +159,8 @@ fn list(folder: &Path) -> Result<(), Failure> {
     let mut rows = vec![["study", "task", "seed", "trials", "counted", "falls", "best"].map(str::to_owned).to_vec()];
     for file in &files {
         // A study that cannot be read is reported, and the others are listed.
-        let studies = match stored_studies(&Storage::File(file.clone())) {
-            Ok(studies) => studies,
-            Err(error) => {
-                eprintln!("quadfrog: {error}");
-                continue;
-            }
-        };
-        for stored in studies {
+        let studies = stored_studies(&Storage::File(file.clone()));
+        for stored in studies.inspect_err(|error| eprintln!("quadfrog: {error}")).unwrap_or_default() {
             match list_row(file, &stored) {
                 Err(failure @ Failure::Input(_)) => failure.print(),
                 row => rows.push(row?),
