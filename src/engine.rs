@@ -67,7 +67,7 @@ pub fn start(options: Options) -> Result<Handle, EngineError> {
         recording.as_ref().and_then(|path| path.file_name()).map(|name| name.to_string_lossy().into_owned());
     let experiment = open_experiment(&options, Durability::Synced, recording_name.as_deref().unwrap_or_default())?;
     let info = session_info(&options, &recording.as_ref().map(|p| p.display().to_string()).unwrap_or_default());
-    let (guard, lifeline) = guard.unzip();
+    let (guard, guard_heartbeat) = guard.unzip();
     let clock = MonotonicClock::start();
     let writer = match &recording {
         Some(path) => Some(Writer::create(path, &info, utc_ns(), &attachments(&options.config))?),
@@ -97,7 +97,7 @@ pub fn start(options: Options) -> Result<Handle, EngineError> {
                 clock: &clock,
                 closing: &flag,
                 real,
-                lifeline,
+                guard_heartbeat,
             };
             control_thread::run(start, control_end, &mut *robot);
         })

@@ -57,11 +57,11 @@ fn a_sound_robot_is_armed() {
 fn each_check_refuses_arming_by_itself() {
     type Breaks = fn(&mut ArmingBench);
     let table: [(ArmingCheck, Breaks); 14] = [
-        (ArmingCheck::StateFresh, |b| b.robot.state = Err(RobotError::Silent { age_ms: 12 })),
+        (ArmingCheck::StateFresh, |b| b.robot.state = Err(RobotError::NoNewState { age_ms: 12 })),
         (ArmingCheck::Loss, |b| b.robot.link.recent_lost = 60),
         (ArmingCheck::Checksums, |b| b.robot.link.recent_corrupt = 1),
         (ArmingCheck::Upright, |b| {
-            b.state().imu.orientation_world = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), 0.25);
+            b.state().imu.world_from_body = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), 0.25);
         }),
         (ArmingCheck::JointsInside, |b| b.state().joint_position[2] = -2.83),
         (ArmingCheck::LyingDown, |b| b.state().joint_position[4] = 0.6),
@@ -131,7 +131,7 @@ fn silence_is_not_stillness() {
     let silent = |bench: &mut ArmingBench, ticks: u32| {
         let state = bench.robot.state;
         for age_ms in 1..=ticks {
-            bench.robot.state = Err(RobotError::Silent { age_ms });
+            bench.robot.state = Err(RobotError::NoNewState { age_ms });
             bench.tick(None);
         }
         bench.robot.state = state;

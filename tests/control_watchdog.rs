@@ -98,9 +98,9 @@ fn every_cut_row_damps_within_two_ticks_and_names_its_fault() {
 
 fn tilt(state: &mut RobotState, axis: nalgebra::Unit<Vector3<f64>>, angle: f64) {
     let tilted = UnitQuaternion::from_axis_angle(&axis, angle);
-    state.imu.orientation_world = tilted;
+    state.imu.world_from_body = tilted;
     if let Some(truth) = &mut state.truth {
-        truth.orientation_world = tilted;
+        truth.world_from_body = tilted;
     }
 }
 
@@ -277,7 +277,7 @@ fn a_standing_fault_cannot_be_acknowledged() {
     bench.robot.tamper = |state| state.motor_temperature_c[0] = 85.0;
     bench.ticks(5);
     assert_eq!(bench.acknowledge(), Mode::Fault);
-    assert!(matches!(bench.refusal(), Some(CommandRefusal::Standing(Fault::MotorTemperature { joint: 0, .. }))));
+    assert!(matches!(bench.refusal(), Some(CommandRefusal::FaultPersists(Fault::MotorTemperature { joint: 0, .. }))));
     bench.robot.tamper = |_| {};
     bench.ticks(1);
     assert_eq!(bench.acknowledge(), Mode::Disarmed);

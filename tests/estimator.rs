@@ -219,7 +219,7 @@ fn one_number_that_is_none_spoils_nothing() {
     let spoil: [fn(&mut RobotState); 6] = [
         |state| state.imu.accel_body.x = f64::NAN,
         |state| state.imu.gyro_body.z = f64::INFINITY,
-        |state| state.imu.orientation_world.as_mut_unchecked().coords.w = f64::NAN,
+        |state| state.imu.world_from_body.as_mut_unchecked().coords.w = f64::NAN,
         |state| state.joint_position[4] = f64::NAN,
         |state| state.joint_velocity[11] = f64::NEG_INFINITY,
         |state| state.foot_force[2] = f64::NAN,
@@ -343,7 +343,7 @@ fn yaw_counts_full_turns_on_sensors_as_on_truth() {
     feed.state.foot_force = [0.0; LEGS];
     for ms in 1..=700 {
         let yaw = f64::from(ms) * 0.01;
-        feed.state.imu.orientation_world = nalgebra::UnitQuaternion::from_euler_angles(0.0, 0.0, yaw);
+        feed.state.imu.world_from_body = nalgebra::UnitQuaternion::from_euler_angles(0.0, 0.0, yaw);
         let estimate = feed.run(1);
         assert!((estimate.roll_pitch_yaw.z - yaw).abs() < 1e-9, "{} at {yaw}", estimate.roll_pitch_yaw.z);
     }
@@ -362,8 +362,8 @@ fn the_truth_is_passed_through_where_it_is_asked_for() {
         let truth = tick.state.truth.unwrap();
         assert_eq!(tick.estimate.position_world, truth.position_world);
         assert_eq!(tick.estimate.velocity_world, truth.velocity_world);
-        assert_eq!(tick.estimate.orientation_world, truth.orientation_world);
-        assert_ne!(tick.estimate.orientation_world, tick.state.imu.orientation_world);
+        assert_eq!(tick.estimate.world_from_body, truth.world_from_body);
+        assert_ne!(tick.estimate.world_from_body, tick.state.imu.world_from_body);
     }
 }
 

@@ -188,7 +188,7 @@ const CUT: [Row; 16] = [
     ("servo-off RL_thigh", ENERGISED, |_, t| !t.state.motor_enabled[10], &["motor RL_thigh left servo mode"]),
     ("hot FR_calf 80", SENT_TO, |_, t| t.state.motor_temperature_c[2] >= 80.0, &["motor FR_calf at 80 degrees"]),
     ("nan FL_calf", SENT_TO, |_, t| t.state.joint_position[5].is_nan(), &["a joint angle is not a finite"]),
-    ("no rotation", SENT_TO, |_, t| t.state.imu.orientation_world.w.is_nan(), &["the orientation is not a finite"]),
+    ("no rotation", SENT_TO, |_, t| t.state.imu.world_from_body.w.is_nan(), &["the orientation is not a finite"]),
     ("corrupt 100", SENT_TO, corrupted, &["states with a wrong checksum"]),
     ("reboot", SENT_TO, |bench, _| bench.link_status().reboots > 0, &["the robot restarted"]),
     ("tilt 0.4", STANDING, |_, t| t.estimate.roll_pitch_yaw.x > 0.35, TILTED),

@@ -7,7 +7,7 @@ mod go1;
 use std::net::UdpSocket;
 
 use go1::{ANY_PORT, description, network, pair};
-use quadfrog::robot::go1::packet::{CrcForm, HIGH_LEVEL, LowCmd, LowState, MODE_DAMPING, MODE_SERVO};
+use quadfrog::robot::go1::packet::{CrcForm, HIGH_LEVEL, LowCmd, LowState, MODE_BRAKE, MODE_SERVO};
 use quadfrog::robot::go1::{Go1, Network};
 use quadfrog::robot::{JOINTS, JointCommand, LinkStatus, Robot, RobotError};
 use quadfrog::sim::SimConfig;
@@ -109,7 +109,7 @@ fn a_restart_is_noticed_once() {
     run(&mut emulator, &mut go1, 1000);
     emulator.apply(EmulatorFault::Reboot);
     run(&mut emulator, &mut go1, 1000);
-    assert!(matches!(go1.read(), Err(RobotError::Silent { age_ms: 999.. })));
+    assert!(matches!(go1.read(), Err(RobotError::NoNewState { age_ms: 999.. })));
     run(&mut emulator, &mut go1, 3000);
     let link = status(&go1);
     assert_eq!((link.reboots, link.lost), (1, 0), "{link:?}");
@@ -123,7 +123,7 @@ fn a_clock_that_stands_still_is_silence() {
     run(&mut emulator, &mut go1, 100);
     emulator.apply(EmulatorFault::Repeat);
     run(&mut emulator, &mut go1, 50);
-    assert!(matches!(go1.read(), Err(RobotError::Silent { age_ms: 49..=51 })));
+    assert!(matches!(go1.read(), Err(RobotError::NoNewState { age_ms: 49..=51 })));
     assert!(status(&go1).duplicate >= 48);
 }
 
@@ -136,7 +136,7 @@ fn nobody_at_the_robots_port_is_silence_until_somebody_is() {
     drop(port);
     let mut go1 = Go1::open(&network(address), false).unwrap();
     for age in 1..=500 {
-        assert_eq!(go1.read(), Err(RobotError::Silent { age_ms: age }));
+        assert_eq!(go1.read(), Err(RobotError::NoNewState { age_ms: age }));
     }
     assert_eq!(status(&go1).sent, 5, "called ten times a second");
     for _ in 0..100 {
@@ -264,7 +264,7 @@ fn a_motor_leaves_servo_mode_only_after_it_was_in_it() {
     let mut next = |robot: &mut Robots| {
         tick += 1;
         let mut state = state(tick);
-        state.motor[4].mode = MODE_DAMPING;
+        state.motor[4].mode = MODE_BRAKE;
         state.seal();
         robot.send(state.bytes());
         robot.go1.read().unwrap().motor_enabled
@@ -310,7 +310,7 @@ fn a_restart_gives_the_motors_their_time_to_servo_mode_again() {
     let mut enabled = |robot: &mut Robots, restart: bool| {
         tick = if restart { 0 } else { tick + 1 };
         let mut state = state(tick);
-        state.motor[4].mode = MODE_DAMPING;
+        state.motor[4].mode = MODE_BRAKE;
         state.seal();
         robot.send(state.bytes());
         let enabled = robot.go1.read().unwrap().motor_enabled[4];

@@ -4,7 +4,7 @@
 use proptest::prelude::*;
 use quadfrog::robot::go1::convert::{low_cmd, low_state, motor_command, robot_state};
 use quadfrog::robot::go1::packet::{
-    COMMAND_LENGTH, CommandError, CrcForm, LowCmd, LowState, MODE_DAMPING, MODE_SERVO, POSITION_STOP, Rejection,
+    COMMAND_LENGTH, CommandError, CrcForm, LowCmd, LowState, MODE_BRAKE, MODE_SERVO, POSITION_STOP, Rejection,
     VELOCITY_STOP, crc,
 };
 use quadfrog::robot::{Battery, JOINTS, JointCommand, MotorCommand, RobotState};
@@ -45,7 +45,7 @@ proptest! {
             }
         }
         for motor in JOINTS..20 {
-            prop_assert_eq!(read.motor(motor).mode, MODE_DAMPING);
+            prop_assert_eq!(read.motor(motor).mode, MODE_BRAKE);
         }
     }
 
@@ -72,7 +72,7 @@ proptest! {
         if let Ok(datagram) = low_cmd(&JointCommand { motor }, form) {
             prop_assert_eq!(datagram.bytes()[562], 0);
         }
-        prop_assert_eq!(LowCmd::damping(form).bytes()[562], 0);
+        prop_assert_eq!(LowCmd::braking(form).bytes()[562], 0);
     }
 
     #[test]
@@ -92,7 +92,7 @@ proptest! {
 
     #[test]
     fn one_wrong_bit_anywhere_under_the_checksum_is_seen(bit in 16..608 * 8usize, form in form()) {
-        let mut bytes = LowCmd::damping(form).bytes().to_vec();
+        let mut bytes = LowCmd::braking(form).bytes().to_vec();
         bytes[bit / 8] ^= 1 << (bit % 8);
         prop_assert!(matches!(LowCmd::parse(&bytes, form), Err(Rejection::Crc { .. })), "bit {}", bit);
     }
@@ -123,7 +123,7 @@ proptest! {
             ..RobotState::default()
         };
         told.battery.as_mut().unwrap().cell_v[..6].fill(3.84);
-        told.imu.orientation_world = nalgebra::UnitQuaternion::from_scaled_axis(nalgebra::Vector3::from(axis));
+        told.imu.world_from_body = nalgebra::UnitQuaternion::from_scaled_axis(nalgebra::Vector3::from(axis));
         told.imu.gyro_body = axis.into();
         let mut datagram = low_state(&told, 1.0);
         datagram.seal();
@@ -132,7 +132,7 @@ proptest! {
         prop_assert!(near(&heard.joint_position, &told.joint_position, 1e-6));
         prop_assert!(near(&heard.joint_velocity, &told.joint_velocity, 1e-5));
         prop_assert!(near(&heard.joint_torque, &told.joint_torque, 0.5 / 256.0 + 1e-5));
-        prop_assert!(heard.imu.orientation_world.angle_to(&told.imu.orientation_world) < 1e-6);
+        prop_assert!(heard.imu.world_from_body.angle_to(&told.imu.world_from_body) < 1e-6);
         prop_assert!((heard.imu.gyro_body - told.imu.gyro_body).norm() < 1e-6);
         prop_assert_eq!((heard.robot_time_ms, heard.motor_enabled), (told.robot_time_ms, told.motor_enabled));
         prop_assert_eq!((heard.foot_force, heard.motor_temperature_c), (told.foot_force, told.motor_temperature_c));
@@ -145,7 +145,7 @@ proptest! {
 /// The default command of `docs/go1-wire.md`, section 3, in both forms.
 #[test]
 fn a_command_that_asks_for_the_battery_to_be_switched_off_is_none() {
-    let mut bytes = LowCmd::damping(CrcForm::Plain).bytes().to_vec();
+    let mut bytes = LowCmd::braking(CrcForm::Plain).bytes().to_vec();
     assert_eq!(bytes.len(), COMMAND_LENGTH);
     bytes[562] = 0xA5;
     let sum = crc(&bytes[..608]);

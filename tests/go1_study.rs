@@ -141,7 +141,7 @@ impl Operator {
             (_, Some(ExperimentStage::Review)) if mode != Mode::Settle && mode != Mode::Jump => {
                 let row = self.rows.get(&trial)?;
                 if let (Some(from), Some(to)) = (self.stood.take(), self.robot.status().truth) {
-                    let moved = from.orientation_world.inverse() * (to.position_world - from.position_world);
+                    let moved = from.world_from_body.inverse() * (to.position_world - from.position_world);
                     self.in_truth.insert(trial, moved.x);
                 }
                 Some(match row.suggested? {

@@ -25,7 +25,7 @@ fn state_of(case: &Value) -> SimState {
     let [w, x, y, z] = array(&case["base_quat_wxyz"]);
     SimState {
         position_world: array::<3>(&case["base_position"]).into(),
-        orientation_world: UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z)),
+        world_from_body: UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z)),
         joint_position: array(&case["joint_q"]),
         velocity_body: array::<3>(&case["base_linvel_body"]).into(),
         angular_velocity_body: array::<3>(&case["base_angvel_body"]).into(),
@@ -102,7 +102,7 @@ fn golden_flight() {
         }
         let (found, expected) = (*simulator.state(), state_of(&case["final"]));
         metres.see((found.position_world - expected.position_world).norm(), || format!("case {number}"));
-        let turned = found.orientation_world.angle_to(&expected.orientation_world);
+        let turned = found.world_from_body.angle_to(&expected.world_from_body);
         radians.see(turned, || format!("case {number}, orientation"));
         for (i, (a, b)) in found.joint_position.iter().zip(&expected.joint_position).enumerate() {
             radians.see(a - b, || format!("case {number}, joint {i}"));

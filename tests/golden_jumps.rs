@@ -65,7 +65,7 @@ fn jump(robot: &RobotDescription, config: &SimConfig, file: &File, case: &Case) 
         let t = f64::from(tick) * 0.001;
         let state = simulator.read().unwrap();
         let truth = state.truth.unwrap();
-        let (roll, pitch, heading) = truth.orientation_world.euler_angles();
+        let (roll, pitch, heading) = truth.world_from_body.euler_angles();
         let turn = heading - last_yaw + std::f64::consts::PI;
         yaw += turn.rem_euclid(std::f64::consts::TAU) - std::f64::consts::PI;
         last_yaw = heading;
@@ -81,7 +81,7 @@ fn jump(robot: &RobotDescription, config: &SimConfig, file: &File, case: &Case) 
             theta_rad: std::f64::consts::PI + std::f64::consts::TAU * case.f0_hz * (t - start),
         };
         let feet = feet(&robot.leg_geometry, &state.joint_position);
-        let orientation: UnitQuaternion<f64> = truth.orientation_world;
+        let orientation: UnitQuaternion<f64> = truth.world_from_body;
         let torque = torques(&target, &feet, &state.joint_velocity, &orientation, &truth.foot_contact);
         if let Some((origin, _)) = initial {
             outcome.apex_rise_m = outcome.apex_rise_m.max(truth.position_world.z - origin.z);

@@ -54,7 +54,7 @@ struct CommandCase {
 
 /// A command whose motor records have those reserved words, which no function of [`LowCmd`] sets.
 fn with_reserve(motors: &[[u32; 9]], form: CrcForm) -> LowCmd {
-    let mut datagram = LowCmd::damping(form).bytes().to_vec();
+    let mut datagram = LowCmd::braking(form).bytes().to_vec();
     for (motor, words) in motors.iter().enumerate() {
         for (word, value) in words[6..].iter().enumerate() {
             datagram[37 + 27 * motor + 4 * word..][..4].copy_from_slice(&value.to_le_bytes());

@@ -110,7 +110,7 @@ fn a_drop_from_half_a_metre_sinks_in_less_than_half_a_millimetre() {
         let mut simulator = Simulator::new(&robot, &SimConfig::default()).unwrap();
         simulator.place(&Placement { joint_position, lying: false, seed: 0 });
         let mut state = *simulator.state();
-        state.orientation_world = UnitQuaternion::from_euler_angles(tilt, -tilt, 0.0);
+        state.world_from_body = UnitQuaternion::from_euler_angles(tilt, -tilt, 0.0);
         simulator.set_state(&state);
         state.position_world.z += 0.5 - simulator.smallest_gap();
         simulator.set_state(&state);
@@ -135,9 +135,9 @@ fn no_energy_is_gained_in_a_thousand_drops() {
     for drop in 0..1000 {
         let limits = &robot.limits;
         let mut vector = |size: f64| Vector3::from_fn(|_, _| uniform(&mut random, -size, size));
-        let orientation_world = UnitQuaternion::from_scaled_axis(vector(2.0));
+        let world_from_body = UnitQuaternion::from_scaled_axis(vector(2.0));
         let (velocity_body, angular_velocity_body) = (vector(1.0), vector(2.0));
-        let mut state = SimState { orientation_world, velocity_body, angular_velocity_body, ..SimState::default() };
+        let mut state = SimState { world_from_body, velocity_body, angular_velocity_body, ..SimState::default() };
         for i in 0..12 {
             state.joint_position[i] = uniform(&mut random, limits.min_position[i], limits.max_position[i]);
             state.joint_velocity[i] = uniform(&mut random, -3.0, 3.0);
@@ -182,7 +182,7 @@ fn slide(law: ContactLaw, tolerance: f64) {
         let joint_position = robot.lying_position;
         simulator.place(&Placement { joint_position, lying: true, seed: 0 });
         let mut state = *simulator.state();
-        state.orientation_world = UnitQuaternion::from_euler_angles(0.0, -angle, 0.0);
+        state.world_from_body = UnitQuaternion::from_euler_angles(0.0, -angle, 0.0);
         state.position_world.z += 1.0;
         simulator.set_state(&state);
         state.position_world.z -= simulator.smallest_gap() / angle.cos();
@@ -237,7 +237,7 @@ fn a_fallen_robot_lies_on_its_body_and_says_so() {
     let mut simulator = Simulator::new(&robot, &SimConfig::default()).unwrap();
     simulator.place(&Placement { joint_position: robot.lying_position, lying: true, seed: 0 });
     let mut state = *simulator.state();
-    state.orientation_world = UnitQuaternion::from_euler_angles(2.5, 0.3, 0.0);
+    state.world_from_body = UnitQuaternion::from_euler_angles(2.5, 0.3, 0.0);
     state.position_world.z = 0.6;
     simulator.set_state(&state);
     for _ in 0..4000 {

@@ -15,7 +15,7 @@ fn tumbling(flight_substeps: u32) -> Simulator {
     let mut simulator = Simulator::new(&robot, &config).unwrap();
     simulator.set_state(&SimState {
         position_world: Vector3::new(0.3, -0.2, 5.0),
-        orientation_world: UnitQuaternion::from_euler_angles(0.4, -0.3, 1.0),
+        world_from_body: UnitQuaternion::from_euler_angles(0.4, -0.3, 1.0),
         joint_position: std::array::from_fn(|i| [0.1, 0.8, -1.6][i % 3]),
         velocity_body: Vector3::new(1.0, -0.5, 0.8),
         angular_velocity_body: Vector3::new(3.0, -4.0, 5.0),

@@ -88,7 +88,7 @@ fn a_robot_stands_on_blocks() {
         let truth = state.truth.unwrap();
         assert!(truth.velocity_world.norm() < 0.05, "seed {seed}: moves at {}", truth.velocity_world.norm());
         let standing = truth.foot_contact.iter().filter(|&&contact| contact).count();
-        let (roll, pitch, _) = truth.orientation_world.euler_angles();
+        let (roll, pitch, _) = truth.world_from_body.euler_angles();
         assert!(roll.abs() < 0.4 && pitch.abs() < 0.4, "seed {seed}: tilted by {roll} and {pitch} rad");
         on_feet += usize::from(standing >= 3);
         assert!(simulator.smallest_gap() > -1e-3, "seed {seed}: {} m deep", -simulator.smallest_gap());

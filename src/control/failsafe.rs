@@ -1,7 +1,7 @@
 //! The failsafe table: cause, modes in which it is watched, action. Reasons: `docs/safety.md`; every limit is a key of
 //! `config/safety.toml`, `[watchdog]`.
 //!
-//! A fall during a trial is an outcome of the trial, detected by `jump::FallWatch`; it damps as well.
+//! A fall during a trial is an outcome of the trial, detected by `running_trial::FallWatch`; it damps as well.
 
 use super::limits;
 use super::settings::ControlSettings;
@@ -37,7 +37,7 @@ pub struct FailsafeInputs<'a> {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FailsafeAction {
     /// Damping in the same tick, latched as FAULT. Cleared by an acknowledgement once no row with this action trips.
-    Cut,
+    Damp,
     /// No further impulse; after the landing the robot sits down and is disarmed. Cleared when the cause is gone, and by arming.
     Land,
 }
@@ -63,7 +63,7 @@ const fn cut(
     cause: fn(&Failsafe, &FailsafeInputs, &ControlSettings) -> Option<Fault>,
     modes: fn(Mode) -> bool,
 ) -> FailsafeRow {
-    FailsafeRow { cause, modes, action: FailsafeAction::Cut }
+    FailsafeRow { cause, modes, action: FailsafeAction::Damp }
 }
 
 /// The table, by precedence: the first row that trips counts. A cause that makes measured numbers invalid stands above the rows
@@ -93,7 +93,7 @@ const fn energised_or_faulted(mode: Mode) -> bool {
     mode.energised() || matches!(mode, Mode::Fault)
 }
 
-/// Energised, without a trial and its review, where tilt is a fall: `jump::FallWatch` compares it with this row's limit in REVIEW,
+/// Energised, without a trial and its review, where tilt is a fall: `running_trial::FallWatch` compares it with this row's limit in REVIEW,
 /// and with the limit of a fall in SETTLE, where a landing may swing.
 const fn outside_a_trial(mode: Mode) -> bool {
     matches!(mode, Mode::StandUp | Mode::Ready | Mode::Countdown | Mode::SitDown)

@@ -32,11 +32,11 @@ pub fn torques(
     target: &LegTarget,
     feet: &PerLeg<FootPosition>,
     joint_velocity: &Joints,
-    orientation_world: &UnitQuaternion<f64>,
+    world_from_body: &UnitQuaternion<f64>,
     contact: &PerLeg<bool>,
 ) -> Joints {
     let k_att = if target.vmc { target.gains.k_att } else { 0.0 };
-    let vmc_z = vmc::forces_leg_z(k_att, orientation_world, contact);
+    let vmc_z = vmc::forces_leg_z(k_att, world_from_body, contact);
     let mut torques = Joints::default();
     for leg in Leg::ALL {
         let i = leg as usize;

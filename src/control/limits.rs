@@ -103,7 +103,7 @@ pub fn finite(state: &RobotState) -> Result<(), Fault> {
     };
     all(&state.joint_position, "a joint angle")?;
     all(&state.joint_velocity, "a joint velocity")?;
-    all(state.imu.orientation_world.coords.as_slice(), "the orientation")?;
+    all(state.imu.world_from_body.coords.as_slice(), "the orientation")?;
     all(state.imu.gyro_body.as_slice(), "the angular velocity")?;
     all(state.imu.accel_body.as_slice(), "the acceleration")?;
     all(&state.foot_force, "a foot's force")

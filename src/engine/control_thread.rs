@@ -7,13 +7,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::Sender;
 use std::time::Duration;
 
-use super::guard::Lifeline;
+use super::guard::GuardHeartbeat;
 use crate::control::control_loop::ControlLoop;
 use crate::control::settings::ControlSettings;
 use crate::realtime::channel::ControlEnd;
 use crate::realtime::clock::Clock;
 use crate::realtime::scheduling::{DeniedSetting, RealtimeSetting, Scheduling};
-use crate::realtime::thread::{CONTROL_PHASE, PeriodicTask, TickStart, WARM_UP_LEAD, pace_with_warm_up};
+use crate::realtime::thread::{CONTROL_TICK_OFFSET, PeriodicTask, TickStart, WARM_UP_LEAD, pace_with_warm_up};
 use crate::robot::{CONTROL_PERIOD_S, JointCommand, Robot};
 
 /// Parts of the control thread.
@@ -32,7 +32,7 @@ pub struct Start<'a, C> {
     /// and the caches are warmed before each tick of a real one.
     pub real: bool,
     /// Heartbeat to the guard; none without a guard.
-    pub lifeline: Option<Lifeline>,
+    pub guard_heartbeat: Option<GuardHeartbeat>,
 }
 
 /// Least number of damping commands after the last tick: half a second, in which the robot sinks softly.
@@ -47,7 +47,7 @@ pub fn run<C: Clock>(mut start: Start<C>, end: ControlEnd, robot: &mut dyn Robot
     let _ = start.report.send((granted.granted.clone(), granted.denied.clone()));
     let period = Duration::from_secs_f64(CONTROL_PERIOD_S);
     let lead = lead(start.real);
-    let paced = |ticking: &mut dyn PeriodicTask| pace_with_warm_up(period, CONTROL_PHASE, lead, ticking);
+    let paced = |ticking: &mut dyn PeriodicTask| pace_with_warm_up(period, CONTROL_TICK_OFFSET, lead, ticking);
     // The damping at the end is slept, not paced: the clock may be what failed.
     if let Err(panic) = drive(&mut start, end, robot, paced, || std::thread::sleep(period)) {
         resume_unwind(panic);
@@ -65,13 +65,13 @@ struct Ticking<'a, C> {
     robot: &'a mut dyn Robot,
     clock: &'a C,
     closing: &'a AtomicBool,
-    lifeline: Option<Lifeline>,
+    guard_heartbeat: Option<GuardHeartbeat>,
 }
 
 impl<C> Ticking<'_, C> {
-    fn sign_of_life(&mut self) {
-        if let Some(lifeline) = &mut self.lifeline {
-            lifeline.tick(self.body.mode().commanded());
+    fn send_guard_heartbeat(&mut self) {
+        if let Some(guard_heartbeat) = &mut self.guard_heartbeat {
+            guard_heartbeat.tick(self.body.mode().commanded());
         }
     }
 }
@@ -84,7 +84,7 @@ impl<C: Clock> PeriodicTask for Ticking<'_, C> {
     fn tick(&mut self, instant: TickStart) -> ControlFlow<()> {
         self.body.tick(instant, self.clock, self.robot);
         self.body.prepare();
-        self.sign_of_life();
+        self.send_guard_heartbeat();
         if self.closing.load(Ordering::Acquire) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 }
@@ -98,8 +98,8 @@ fn drive<C: Clock>(
     mut wait: impl FnMut(),
 ) -> std::thread::Result<()> {
     let body = ControlLoop::new(start.settings, end);
-    let lifeline = start.lifeline.take();
-    let mut ticking = Ticking { body, robot, clock: start.clock, closing: start.closing, lifeline };
+    let guard_heartbeat = start.guard_heartbeat.take();
+    let mut ticking = Ticking { body, robot, clock: start.clock, closing: start.closing, guard_heartbeat };
     // Afterwards the body is only asked for its mode, which a panic does not leave half changed.
     let ended = catch_unwind(AssertUnwindSafe(|| {
         if let Err(error) = paced(&mut ticking) {
@@ -112,13 +112,13 @@ fn drive<C: Clock>(
         while sent < LAST_DAMPINGS || !start.closing.load(Ordering::Acquire) {
             // A lost datagram is followed by the next.
             let _ = ticking.robot.write(&damping);
-            ticking.sign_of_life();
+            ticking.send_guard_heartbeat();
             sent = sent.saturating_add(1);
             wait();
         }
     }
-    if let Some(lifeline) = ticking.lifeline {
-        lifeline.leave();
+    if let Some(guard_heartbeat) = ticking.guard_heartbeat {
+        guard_heartbeat.leave();
     }
     ended
 }
@@ -178,7 +178,7 @@ mod tests {
             clock: &SimulatedClock,
             closing: &closing,
             real: true,
-            lifeline: None,
+            guard_heartbeat: None,
         };
         let mut ms = 0;
         let unpaced = |ticking: &mut dyn PeriodicTask| {

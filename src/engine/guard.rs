@@ -47,10 +47,10 @@ pub struct Guard {
     gone: bool,
 }
 
-/// The control thread's end of the pipe. Dropped without [`Lifeline::leave`], as in a panic, it makes the guard damp the
+/// The control thread's end of the pipe. Dropped without [`GuardHeartbeat::leave`], as in a panic, it makes the guard damp the
 /// robot.
 #[derive(Debug)]
-pub struct Lifeline {
+pub struct GuardHeartbeat {
     pipe: File,
     broken: Arc<AtomicBool>,
     commanded: bool,
@@ -59,7 +59,7 @@ pub struct Lifeline {
 
 impl Guard {
     /// Starts `program guard` over `robot`.
-    pub fn post(program: &Path, robot: &Go1, settings: &ControlSettings) -> std::io::Result<(Guard, Lifeline)> {
+    pub fn post(program: &Path, robot: &Go1, settings: &ControlSettings) -> std::io::Result<(Guard, GuardHeartbeat)> {
         let (socket, damping) = (robot.socket()?, robot.damping(settings.gate.damping_kd));
         let damping = damping.map_err(std::io::Error::other)?;
         let allowed_ms =
@@ -80,7 +80,7 @@ impl Guard {
         fcntl(&pipe, FcntlArg::F_SETFL(OFlag::O_NONBLOCK))?;
         let broken = Arc::<AtomicBool>::default();
         let guard = Guard { process, broken: broken.clone(), gone: false };
-        Ok((guard, Lifeline { pipe, broken, commanded: false, ticks: 0 }))
+        Ok((guard, GuardHeartbeat { pipe, broken, commanded: false, ticks: 0 }))
     }
 
     /// Returns true once, when the guard has exited or its pipe is broken. A guard with a broken pipe is killed so that it does
@@ -106,7 +106,7 @@ impl Guard {
     }
 }
 
-impl Lifeline {
+impl GuardHeartbeat {
     /// Counts a tick, or a datagram that is sent without one, and sends a heartbeat when it is due. Neither blocks nor
     /// allocates.
     pub fn tick(&mut self, commanded: bool) {

@@ -26,7 +26,7 @@ const FORGIVEN_PERIODS: u64 = 20;
 /// whole milliseconds of the monotonic clock (Linux, `kernel/time/tick-common.c`, `tick_setup_device`). A loop that
 /// happened to begin there would meet it time and again in the middle of its work. This one begins late enough after it
 /// for what the tick sets off to be done, and early enough to be done itself before the next.
-pub const CONTROL_PHASE: Duration = Duration::from_micros(750);
+pub const CONTROL_TICK_OFFSET: Duration = Duration::from_micros(750);
 
 /// Time between the start of the cache warm-up and the tick of the control thread: long enough for the warm-up to end,
 /// short enough for the caches to stay warm. See [`crate::control::control_loop`].

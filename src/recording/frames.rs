@@ -11,8 +11,8 @@ use crate::telemetry::Tick;
 /// Returns the trunk's pose in the world: the simulator's truth, else the estimate.
 fn base(tick: &Tick) -> (Vector3<f64>, UnitQuaternion<f64>) {
     match &tick.state.truth {
-        Some(truth) => (truth.position_world, truth.orientation_world),
-        None => (tick.estimate.position_world, tick.estimate.orientation_world),
+        Some(truth) => (truth.position_world, truth.world_from_body),
+        None => (tick.estimate.position_world, tick.estimate.world_from_body),
     }
 }
 

@@ -82,7 +82,7 @@ fn control_tick_fields(way: Way, tick: &mut Tick, m: &mut frog::ControlTick) -> 
     vector(way, &mut estimate.position_world, [&mut m.position_x, &mut m.position_y, &mut m.position_z]);
     vector(way, &mut estimate.velocity_world, [&mut m.velocity_x, &mut m.velocity_y, &mut m.velocity_z]);
     let orientation = [&mut m.orientation_x, &mut m.orientation_y, &mut m.orientation_z, &mut m.orientation_w];
-    rotation(way, &mut estimate.orientation_world, orientation);
+    rotation(way, &mut estimate.world_from_body, orientation);
     let angular_velocity = [&mut m.angular_velocity_x, &mut m.angular_velocity_y, &mut m.angular_velocity_z];
     vector(way, &mut estimate.angular_velocity_body, angular_velocity);
     let contact = [&mut m.contact_fr, &mut m.contact_fl, &mut m.contact_rr, &mut m.contact_rl];
@@ -95,7 +95,7 @@ fn control_tick_fields(way: Way, tick: &mut Tick, m: &mut frog::ControlTick) -> 
 
     let state = &mut tick.state;
     way.copy(&mut state.robot_time_ms, &mut m.robot_time_ms);
-    rotation(way, &mut state.imu.orientation_world, [&mut m.imu_x, &mut m.imu_y, &mut m.imu_z, &mut m.imu_w]);
+    rotation(way, &mut state.imu.world_from_body, [&mut m.imu_x, &mut m.imu_y, &mut m.imu_z, &mut m.imu_w]);
     vector(way, &mut state.imu.gyro_body, [&mut m.gyro_x, &mut m.gyro_y, &mut m.gyro_z]);
     vector(way, &mut state.imu.accel_body, [&mut m.acc_x, &mut m.acc_y, &mut m.acc_z]);
     let force = [&mut m.force_fr, &mut m.force_fl, &mut m.force_rr, &mut m.force_rl];
@@ -125,7 +125,7 @@ fn truth(way: Way, ours: &mut Truth, m: &mut frog::Truth) -> Result<(), DecodeEr
     vector(way, &mut ours.position_world, [&mut m.position_x, &mut m.position_y, &mut m.position_z]);
     vector(way, &mut ours.velocity_world, [&mut m.velocity_x, &mut m.velocity_y, &mut m.velocity_z]);
     let orientation = [&mut m.orientation_x, &mut m.orientation_y, &mut m.orientation_z, &mut m.orientation_w];
-    rotation(way, &mut ours.orientation_world, orientation);
+    rotation(way, &mut ours.world_from_body, orientation);
     let angular_velocity = [&mut m.angular_velocity_x, &mut m.angular_velocity_y, &mut m.angular_velocity_z];
     vector(way, &mut ours.angular_velocity_body, angular_velocity);
     let contact = [&mut m.contact_fr, &mut m.contact_fl, &mut m.contact_rr, &mut m.contact_rl];

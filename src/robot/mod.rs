@@ -86,7 +86,7 @@ pub fn leg_of(joints: &Joints, leg: usize) -> Vector3<f64> {
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Imu {
     /// Rotation from body axes to world axes.
-    pub orientation_world: UnitQuaternion<f64>,
+    pub world_from_body: UnitQuaternion<f64>,
     /// Angular velocity in body axes, rad/s.
     pub gyro_body: Vector3<f64>,
     /// Specific force (acceleration less gravity) in body axes, m/s^2; (0, 0, +9.81) at rest.
@@ -101,7 +101,7 @@ pub struct Truth {
     /// Velocity of the trunk's origin in the world, m/s.
     pub velocity_world: Vector3<f64>,
     /// Rotation from body axes to world axes.
-    pub orientation_world: UnitQuaternion<f64>,
+    pub world_from_body: UnitQuaternion<f64>,
     /// Angular velocity in body axes, rad/s.
     pub angular_velocity_body: Vector3<f64>,
     /// Whether each foot is in contact.
@@ -221,7 +221,7 @@ pub struct Placement {
 #[expect(missing_docs, reason = "the message describes a variant, the name of a field holds its unit")]
 pub enum RobotError {
     #[error("no state from the robot for {age_ms} ms")]
-    Silent { age_ms: u32 },
+    NoNewState { age_ms: u32 },
     #[error("the command could not be sent to the robot (error {errno})")]
     Send { errno: i32 },
 }

@@ -131,7 +131,7 @@ impl Supervisor {
             sinks,
             recorder,
             mode: Mode::Offline,
-            cause: TransitionCause::Course,
+            cause: TransitionCause::StepFinished,
             mode_changes: 0,
             releasing: false,
             leaving: false,

@@ -171,7 +171,7 @@ impl Collider {
 
     /// Smallest distance of a probe to the ground, m.
     pub fn smallest_gap(&self, legs: &PerLeg<LegDynamics>, state: &SimState, terrain: &Terrain) -> f64 {
-        let world_from_body = state.orientation_world.to_rotation_matrix().into_inner();
+        let world_from_body = state.world_from_body.to_rotation_matrix().into_inner();
         let mut smallest = f64::INFINITY;
         self.near(legs, state, terrain, &world_from_body, f64::INFINITY, |_, _, sphere| {
             for contact in terrain.contacts(&sphere.center_world, sphere.radius, f64::INFINITY).into_iter().flatten() {

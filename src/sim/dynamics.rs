@@ -264,7 +264,7 @@ impl Dynamics {
     /// rotor inertia, and the terms that the time step treats implicitly.
     pub fn new(model: &RobotModel, state: &SimState, added: &Joints) -> Dynamics {
         let velocity = SpatialMotion { linear: state.velocity_body, angular: state.angular_velocity_body };
-        let gravity_body = state.orientation_world.inverse_transform_vector(&Vector3::new(0.0, 0.0, -GRAVITY));
+        let gravity_body = state.world_from_body.inverse_transform_vector(&Vector3::new(0.0, 0.0, -GRAVITY));
         let (legs, leg_inertia, leg_force) = LegLanes::new(
             &model.legs,
             joint_lanes(&state.joint_position),

@@ -28,8 +28,8 @@ pub(super) fn semi_implicit_euler(state: &mut SimState, velocity: &GeneralizedVe
     let (linear, angular) = split(&velocity.trunk);
     // p' = p + h R v,  R' = R exp(h w),  v' = exp(h w)^T v
     let turn = UnitQuaternion::from_scaled_axis(angular * h);
-    state.position_world += state.orientation_world * (linear * h);
-    state.orientation_world = UnitQuaternion::new_normalize(state.orientation_world.quaternion() * turn.quaternion());
+    state.position_world += state.world_from_body * (linear * h);
+    state.world_from_body = UnitQuaternion::new_normalize(state.world_from_body.quaternion() * turn.quaternion());
     state.velocity_body = turn.inverse_transform_vector(&linear);
     state.angular_velocity_body = angular;
     for i in 0..JOINTS {
@@ -41,18 +41,18 @@ pub(super) fn semi_implicit_euler(state: &mut SimState, velocity: &GeneralizedVe
 /// Time derivative of a [`SimState`].
 struct StateDerivative {
     position_world: Vector3<f64>,
-    orientation_world: Quaternion<f64>,
+    world_from_body: Quaternion<f64>,
     joint_position: Joints,
     acceleration: Acceleration,
 }
 
 impl StateDerivative {
     fn new(state: &SimState, acceleration: Acceleration) -> StateDerivative {
-        let rotation = state.orientation_world.quaternion();
+        let rotation = state.world_from_body.quaternion();
         StateDerivative {
             // dp/dt = R v,  dr/dt = r (0, w) / 2
-            position_world: state.orientation_world * state.velocity_body,
-            orientation_world: rotation * Quaternion::from_imag(state.angular_velocity_body) * 0.5,
+            position_world: state.world_from_body * state.velocity_body,
+            world_from_body: rotation * Quaternion::from_imag(state.angular_velocity_body) * 0.5,
             joint_position: state.joint_velocity,
             acceleration,
         }
@@ -63,8 +63,8 @@ impl StateDerivative {
         let a = &self.acceleration;
         SimState {
             position_world: state.position_world + self.position_world * h,
-            orientation_world: UnitQuaternion::new_normalize(
-                state.orientation_world.quaternion() + self.orientation_world * h,
+            world_from_body: UnitQuaternion::new_normalize(
+                state.world_from_body.quaternion() + self.world_from_body * h,
             ),
             joint_position: std::array::from_fn(|i| state.joint_position[i] + h * self.joint_position[i]),
             velocity_body: state.velocity_body + a.linear_body * h,
@@ -93,10 +93,10 @@ pub(super) fn runge_kutta_4(
         std::array::from_fn(|i| (f(&k1)[i] + 2.0 * (f(&k2)[i] + f(&k3)[i]) + f(&k4)[i]) / 6.0)
     };
     let vectors = |f: fn(&StateDerivative) -> Vector3<f64>| (f(&k1) + (f(&k2) + f(&k3)) * 2.0 + f(&k4)) / 6.0;
-    let turning = k1.orientation_world + (k2.orientation_world + k3.orientation_world) * 2.0 + k4.orientation_world;
+    let turning = k1.world_from_body + (k2.world_from_body + k3.world_from_body) * 2.0 + k4.world_from_body;
     let mean = StateDerivative {
         position_world: vectors(|k| k.position_world),
-        orientation_world: turning / 6.0,
+        world_from_body: turning / 6.0,
         joint_position: joints(|k| &k.joint_position),
         acceleration: Acceleration {
             linear_body: vectors(|k| k.acceleration.linear_body),

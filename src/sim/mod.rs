@@ -116,7 +116,7 @@ impl Simulator {
     pub fn set_state(&mut self, state: &SimState) {
         self.state = *state;
         self.contacts = PeriodContacts::default();
-        self.specific_force_body = state.orientation_world.inverse_transform_vector(&Vector3::new(0.0, 0.0, GRAVITY));
+        self.specific_force_body = state.world_from_body.inverse_transform_vector(&Vector3::new(0.0, 0.0, GRAVITY));
         self.solver.reset();
         self.actuator.reset();
         self.report();
@@ -141,7 +141,7 @@ impl Simulator {
     /// Velocity of the inertial unit, world, m/s.
     fn imu_velocity_world(&self) -> Vector3<f64> {
         let v = self.state.velocity_body + self.state.angular_velocity_body.cross(&self.imu_origin);
-        self.state.orientation_world * v
+        self.state.world_from_body * v
     }
 
     /// Measures the current state with the sensors.
@@ -153,7 +153,7 @@ impl Simulator {
             joint_velocity: state.joint_velocity,
             joint_torque: *self.actuator.torque(),
             imu: Imu {
-                orientation_world: state.orientation_world,
+                world_from_body: state.world_from_body,
                 gyro_body: state.angular_velocity_body,
                 accel_body: self.specific_force_body,
             },
@@ -169,8 +169,8 @@ impl Simulator {
         let state = &self.state;
         Truth {
             position_world: state.position_world,
-            velocity_world: state.orientation_world * state.velocity_body,
-            orientation_world: state.orientation_world,
+            velocity_world: state.world_from_body * state.velocity_body,
+            world_from_body: state.world_from_body,
             angular_velocity_body: state.angular_velocity_body,
             foot_contact: self.contacts.foot,
             foot_force_world: self.contacts.foot_impulse_world.map(|impulse| impulse / CONTROL_PERIOD_S),
@@ -189,7 +189,7 @@ impl Robot for Simulator {
         self.control_period(command);
         let acceleration = (self.imu_velocity_world() - before) / CONTROL_PERIOD_S;
         let specific_force = acceleration + Vector3::new(0.0, 0.0, GRAVITY);
-        self.specific_force_body = self.state.orientation_world.inverse_transform_vector(&specific_force);
+        self.specific_force_body = self.state.world_from_body.inverse_transform_vector(&specific_force);
         self.report();
         Ok(())
     }

@@ -106,7 +106,7 @@ impl RobotModel {
         let (linear, angular) = split(&momentum);
         let mass = dynamics.composite.mass;
         let com_body = dynamics.composite.first / mass;
-        let to_world = &state.orientation_world;
+        let to_world = &state.world_from_body;
         Momentum {
             com_world: state.position_world + to_world * com_body,
             com_velocity_world: to_world * (linear / mass),
@@ -132,7 +132,7 @@ impl RobotModel {
     pub fn feet(&self, state: &SimState) -> PerLeg<FootKinematics> {
         let dynamics = self.dynamics(state);
         let legs = dynamics.legs();
-        let to_world = state.orientation_world.to_rotation_matrix().into_inner();
+        let to_world = state.world_from_body.to_rotation_matrix().into_inner();
         std::array::from_fn::<_, LEGS, _>(|l| {
             let leg = &legs[l];
             let foot_body = leg.in_body(2, &self.foot_origin[l]);

@@ -76,7 +76,7 @@ impl Sensors {
         // Ornstein-Uhlenbeck: e' = e (1 - dt/T) + sigma sqrt(2 dt/T) n keeps the standard deviation sigma.
         let share = 1.0 / ORIENTATION_DRIFT_MS;
         self.tilt = self.tilt * (1.0 - share) + self.normal(config.orientation_noise_rad * (2.0 * share).sqrt());
-        state.imu.orientation_world *= UnitQuaternion::from_scaled_axis(self.tilt);
+        state.imu.world_from_body *= UnitQuaternion::from_scaled_axis(self.tilt);
         for q in &mut state.joint_position {
             *q = rounded(*q, config.encoder_step_rad);
         }

@@ -10,7 +10,7 @@ pub struct SimState {
     /// Position of the trunk's origin, world, m.
     pub position_world: Vector3<f64>,
     /// Rotation from body axes to world axes.
-    pub orientation_world: UnitQuaternion<f64>,
+    pub world_from_body: UnitQuaternion<f64>,
     /// Joint angles, rad.
     pub joint_position: Joints,
     /// Velocity of the trunk's origin in body axes, m/s.
@@ -26,7 +26,7 @@ impl SimState {
     pub fn is_finite(&self) -> bool {
         let vectors = [self.position_world, self.velocity_body, self.angular_velocity_body];
         vectors.iter().flat_map(|v| v.iter()).all(|x| x.is_finite())
-            && self.orientation_world.coords.iter().all(|x| x.is_finite())
+            && self.world_from_body.coords.iter().all(|x| x.is_finite())
             && self.joint_position.iter().chain(&self.joint_velocity).all(|x| x.is_finite())
     }
 }

@@ -78,7 +78,7 @@ impl Simulator {
     }
 
     fn world_from_body(&self) -> Matrix3<f64> {
-        self.state.orientation_world.to_rotation_matrix().into_inner()
+        self.state.world_from_body.to_rotation_matrix().into_inner()
     }
 
     fn find_contacts(

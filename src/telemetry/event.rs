@@ -44,7 +44,7 @@ pub enum CommandRefusal {
     #[error("these arming checks fail: {0}")]
     Checks(ArmingCheckSet),
     #[error("the cause persists: {0}")]
-    Standing(Fault),
+    FaultPersists(Fault),
     #[error("{0}")]
     Inhibited(TrialInhibit),
     #[error("the robot's mode changed after the key press; check the mode and press again")]

@@ -12,4 +12,4 @@ pub use command::{Command, Permit, TrialSpec};
 pub use event::{CommandRefusal, Event, Readiness, TrialEnd};
 pub use fault::{FailsafeWarning, FallCause, Fault, TrialInhibit};
 pub use mode::{Mode, Phase, TransitionCause};
-pub use tick::{Counters, Estimate, Snapshot, StageTimes, Tick};
+pub use tick::{Counters, Estimate, Snapshot, Tick, TickDurations};

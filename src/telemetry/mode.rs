@@ -95,7 +95,7 @@ pub enum TransitionCause {
     /// A command of the session.
     Command,
     /// A ramp or a phase of the trial is over.
-    Course,
+    StepFinished,
     /// The first state arrived.
     Connected,
     /// The robot fell.
@@ -111,7 +111,7 @@ impl std::fmt::Display for TransitionCause {
         match self {
             TransitionCause::Stop => write!(f, "STOP"),
             TransitionCause::Command => write!(f, "operator"),
-            TransitionCause::Course => write!(f, "done"),
+            TransitionCause::StepFinished => write!(f, "done"),
             TransitionCause::Connected => write!(f, "the robot answers"),
             TransitionCause::Fell(cause) => write!(f, "fell: {cause}"),
             TransitionCause::Fault(fault) => write!(f, "{fault}"),

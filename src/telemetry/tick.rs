@@ -13,7 +13,7 @@ pub struct Estimate {
     /// Velocity of the trunk's origin, world, m/s.
     pub velocity_world: Vector3<f64>,
     /// Rotation that takes body axes to world axes.
-    pub orientation_world: UnitQuaternion<f64>,
+    pub world_from_body: UnitQuaternion<f64>,
     /// Angular velocity, body axes, rad/s.
     pub angular_velocity_body: Vector3<f64>,
     /// Roll, pitch and yaw (z-y-x Euler angles), rad; yaw is unwrapped: full turns count.
@@ -26,7 +26,7 @@ pub struct Estimate {
 
 /// Durations of the stages of a tick, ns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct StageTimes {
+pub struct TickDurations {
     /// From the planned start of the tick to its real start.
     pub lateness_ns: u32,
     /// Reading the robot.
@@ -65,7 +65,7 @@ pub struct Tick {
     /// Bit `i` set: the last gate changed the command of joint `i`.
     pub limited: u16,
     /// Time per stage.
-    pub stages: StageTimes,
+    pub stages: TickDurations,
 }
 
 /// Counters since the engine started.

@@ -10,7 +10,7 @@ use quadfrog::recording::player::{Played, Player};
 use quadfrog::recording::record::*;
 use quadfrog::recording::writer::Writer;
 use quadfrog::robot::{Battery, Imu, JointCommand, LinkStatus, MotorCommand, RobotState, Truth};
-use quadfrog::telemetry::{ArmingCheck, ArmingCheckState, Counters, Estimate, Mode, Phase, StageTimes, Tick};
+use quadfrog::telemetry::{ArmingCheck, ArmingCheckState, Counters, Estimate, Mode, Phase, Tick, TickDurations};
 use quadfrog::trial::*;
 
 /// Log time of engine time 0 in these tests: 2026-11-21 00:00 UTC.
@@ -94,7 +94,7 @@ impl Draw {
                 joint_position: self.numbers(),
                 joint_velocity: self.numbers(),
                 joint_torque: self.numbers(),
-                imu: Imu { orientation_world: self.rotation(), gyro_body: self.vector(), accel_body: self.vector() },
+                imu: Imu { world_from_body: self.rotation(), gyro_body: self.vector(), accel_body: self.vector() },
                 foot_force: self.numbers(),
                 motor_temperature_c: self.numbers(),
                 motor_enabled: std::array::from_fn(|_| self.yes()),
@@ -107,7 +107,7 @@ impl Draw {
                 truth: self.option(|d| Truth {
                     position_world: d.vector(),
                     velocity_world: d.vector(),
-                    orientation_world: d.rotation(),
+                    world_from_body: d.rotation(),
                     angular_velocity_body: d.vector(),
                     foot_contact: std::array::from_fn(|_| d.yes()),
                     foot_force_world: std::array::from_fn(|_| d.vector()),
@@ -117,7 +117,7 @@ impl Draw {
             estimate: Estimate {
                 position_world: self.vector(),
                 velocity_world: self.vector(),
-                orientation_world: self.rotation(),
+                world_from_body: self.rotation(),
                 angular_velocity_body: self.vector(),
                 roll_pitch_yaw: self.vector(),
                 contact: std::array::from_fn(|_| self.yes()),
@@ -134,7 +134,7 @@ impl Draw {
                 }),
             },
             limited: self.word() as u16,
-            stages: StageTimes {
+            stages: TickDurations {
                 lateness_ns: self.word() as u32,
                 read_ns: self.word() as u32,
                 decide_ns: self.word() as u32,
@@ -368,7 +368,7 @@ pub fn moving_tick(number: u64) -> Tick {
     let truth = Truth {
         position_world: vector(0.2),
         velocity_world: vector(0.3),
-        orientation_world: orientation,
+        world_from_body: orientation,
         angular_velocity_body: vector(0.4),
         foot_contact: [true, false, true, false],
         foot_force_world: std::array::from_fn(|leg| vector(leg as f64) * 30.0),
@@ -377,13 +377,13 @@ pub fn moving_tick(number: u64) -> Tick {
     let estimate = Estimate {
         position_world: vector(0.5),
         velocity_world: vector(0.6),
-        orientation_world: orientation,
+        world_from_body: orientation,
         angular_velocity_body: vector(0.7),
         roll_pitch_yaw: vector(0.8),
         contact: truth.foot_contact,
         foot_position_leg: std::array::from_fn(|leg| vector(leg as f64)),
     };
-    let imu = Imu { orientation_world: orientation, gyro_body: vector(0.9), accel_body: vector(1.0) };
+    let imu = Imu { world_from_body: orientation, gyro_body: vector(0.9), accel_body: vector(1.0) };
     let mut joints = |phase: f64| std::array::from_fn(|joint| wave(phase + joint as f64));
     let torque: [f64; 12] = joints(0.0);
     Tick {
@@ -406,7 +406,7 @@ pub fn moving_tick(number: u64) -> Tick {
         estimate,
         torque_demanded: torque,
         command: JointCommand::torques(&torque),
-        stages: StageTimes { lateness_ns: 900, read_ns: 1_200, decide_ns: 2_500, write_ns: 20_000 },
+        stages: TickDurations { lateness_ns: 900, read_ns: 1_200, decide_ns: 2_500, write_ns: 20_000 },
         ..Tick::default()
     }
 }

@@ -52,7 +52,7 @@ impl Robot for LinkedRobot {
     fn read(&mut self) -> Result<RobotState, RobotError> {
         if self.silent_ms > 0 {
             self.silent_ms += 1;
-            return Err(RobotError::Silent { age_ms: self.silent_ms });
+            return Err(RobotError::NoNewState { age_ms: self.silent_ms });
         }
         let mut state = self.simulator.read()?;
         if self.linked {

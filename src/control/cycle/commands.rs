@@ -2,8 +2,8 @@
 
 use super::{Cycle, Inputs};
 use crate::control::failsafe;
-use crate::control::jump::Jump;
 use crate::control::mode::{self, Trigger};
+use crate::control::running_trial::RunningTrial;
 use crate::robot::{Placement, Robot};
 use crate::telemetry::{Command, CommandRefusal, Event, Permit, TransitionCause, TrialSpec};
 
@@ -34,7 +34,7 @@ impl Cycle {
         match command {
             Command::RunTrial(spec, _) => {
                 self.place_for_trial(robot, spec);
-                self.jump = Some(Jump::begin(spec, &self.settings));
+                self.jump = Some(RunningTrial::begin(spec, &self.settings));
                 self.trial_ticks = 0;
             }
             Command::Arm(_) => {
@@ -48,7 +48,7 @@ impl Cycle {
             }
             _ => {}
         }
-        self.request(trigger, TransitionCause::Command);
+        self.trigger(trigger, TransitionCause::Command);
     }
 
     /// The reason to refuse a command; none if it is carried out.
@@ -75,7 +75,7 @@ impl Cycle {
                     (!failing.is_empty()).then_some(CommandRefusal::Checks(failing))
                 })
             }
-            Command::Acknowledge { .. } => self.tripped.map(CommandRefusal::Standing),
+            Command::Acknowledge { .. } => self.tripped.map(CommandRefusal::FaultPersists),
             Command::RunTrial(_, permit) => self
                 .permit_expired(permit, inputs)
                 .or_else(|| failsafe::trial_inhibit(&self.tick.state, &self.settings).map(CommandRefusal::Inhibited)),

@@ -2,9 +2,9 @@
 
 use super::{Cycle, Inputs};
 use crate::control::failsafe::{self, FailsafeAction, FailsafeInputs};
-use crate::control::jump::FallWatch;
 use crate::control::limits::ticks;
 use crate::control::mode::Trigger;
+use crate::control::running_trial::FallWatch;
 use crate::robot::Robot;
 use crate::telemetry::{Fault, Mode, Tick, TransitionCause};
 
@@ -40,9 +40,9 @@ impl Cycle {
         };
         self.tripped = None;
         match trip {
-            Some(trip) if trip.action == FailsafeAction::Cut => {
+            Some(trip) if trip.action == FailsafeAction::Damp => {
                 self.tripped = Some(trip.fault);
-                self.cut(trip.fault);
+                self.damp_and_latch(trip.fault);
                 return;
             }
             Some(trip) => self.land(trip.fault),
@@ -55,21 +55,21 @@ impl Cycle {
         if self.mode != Mode::Review {
             self.fall = FallWatch::default();
         } else if let Some(cause) = self.fall.observe(state, estimate, &self.settings, stance_tilt_rad) {
-            self.request(Trigger::Fell, TransitionCause::Fell(cause));
+            self.trigger(Trigger::Fell, TransitionCause::Fell(cause));
         }
         let allowed_s = self.settings.idle_s;
         if matches!(self.mode, Mode::Ready | Mode::Review) && allowed_s > 0.0 && self.mode_ticks > ticks(allowed_s) {
-            self.request(Trigger::SitDown, TransitionCause::Idle { allowed_s });
+            self.trigger(Trigger::SitDown, TransitionCause::Idle { allowed_s });
         }
     }
 
     /// Damps and latches the fault. A latched fault keeps its name, unless a fault of another kind voids confirmations: that one
     /// is reported too.
-    fn cut(&mut self, fault: Fault) {
+    fn damp_and_latch(&mut self, fault: Fault) {
         let kind = std::mem::discriminant::<Fault>;
         let reported = matches!(self.cause, TransitionCause::Fault(latched) if kind(&latched) == kind(&fault));
         if self.mode != Mode::Fault {
-            self.request(Trigger::Fault, TransitionCause::Fault(fault));
+            self.trigger(Trigger::Fault, TransitionCause::Fault(fault));
         } else if !reported && fault.voids_confirmations() {
             self.change(Mode::Fault, TransitionCause::Fault(fault));
         }
@@ -79,7 +79,7 @@ impl Cycle {
     fn land(&mut self, fault: Fault) {
         match self.mode {
             Mode::StandUp | Mode::Ready | Mode::Countdown | Mode::Review => {
-                self.request(Trigger::SitDown, TransitionCause::Fault(fault));
+                self.trigger(Trigger::SitDown, TransitionCause::Fault(fault));
             }
             Mode::Jump => {
                 self.landing.get_or_insert(fault);

@@ -6,18 +6,18 @@ mod failsafes;
 
 use super::arming::{self, ArmingHistory};
 use super::failsafe::{self, Failsafe};
-use super::jump::{FallWatch, Jump, TrialProgress};
 use super::leg::{self, LegTarget};
 use super::limits::CommandGate;
 use super::mode::{self, Trigger};
 use super::ramp::{PoseRamp, RampProgress};
+use super::running_trial::{FallWatch, RunningTrial, TrialProgress};
 use super::settings::ControlSettings;
 use crate::control::estimator::Estimator;
 use crate::realtime::clock::Clock;
 use crate::robot::kinematics::FootPosition;
 use crate::robot::{JointCommand, Joints, LEGS, PerLeg, Robot, RobotError, robot_time_passed};
 use crate::telemetry::{
-    ArmingFindings, Command, Event, FailsafeWarning, Fault, Mode, Readiness, StageTimes, Tick, TransitionCause,
+    ArmingFindings, Command, Event, FailsafeWarning, Fault, Mode, Readiness, Tick, TickDurations, TransitionCause,
     TrialEnd,
 };
 use nalgebra::Vector3;
@@ -84,13 +84,13 @@ pub struct Cycle {
     findings: ArmingFindings,
     gate: CommandGate,
     ramp: Option<PoseRamp>,
-    jump: Option<Jump>,
+    jump: Option<RunningTrial>,
     /// Ticks of the running trial so far.
     trial_ticks: u64,
     /// Fall detection in REVIEW.
     fall: FallWatch,
     /// The trial that ended in this tick; the tick still belongs to it.
-    ended: Option<Jump>,
+    ended: Option<RunningTrial>,
     feet: PerLeg<FootPosition>,
     state_age_ms: u32,
     /// `errno` of the last failed send; taken by the failsafes of the next tick.
@@ -109,7 +109,7 @@ impl Cycle {
         Cycle {
             settings: *settings,
             mode: Mode::Offline,
-            cause: TransitionCause::Course,
+            cause: TransitionCause::StepFinished,
             mode_changes: 0,
             mode_ticks: 0,
             estimator: Estimator::default(),
@@ -177,7 +177,7 @@ impl Cycle {
         self.read(robot);
         let read_ns = clock.now_ns();
         if inputs.stop {
-            self.request(Trigger::Stop, TransitionCause::Stop);
+            self.trigger(Trigger::Stop, TransitionCause::Stop);
         }
         self.estimate();
         let restarted = robot_time_passed(self.tick.state.robot_time_ms, previous_robot_time_ms) < 0;
@@ -197,7 +197,7 @@ impl Cycle {
             self.run_arming_checks(robot);
         }
 
-        self.publish(sent, limited);
+        self.complete_tick(sent, limited);
         self.stamp(inputs.lateness_ns, [started_ns, read_ns, decided_ns, written_ns]);
         if let Some(jump) = &mut self.jump {
             jump.advance();
@@ -218,10 +218,10 @@ impl Cycle {
                 self.tick.state = state;
                 self.state_age_ms = 0;
                 if self.mode == Mode::Offline {
-                    self.request(Trigger::Connected, TransitionCause::Connected);
+                    self.trigger(Trigger::Connected, TransitionCause::Connected);
                 }
             }
-            Err(RobotError::Silent { age_ms }) => self.state_age_ms = age_ms,
+            Err(RobotError::NoNewState { age_ms }) => self.state_age_ms = age_ms,
             Err(RobotError::Send { errno }) => self.send_error = Some(errno),
         }
     }
@@ -252,7 +252,7 @@ impl Cycle {
         match passed.fault {
             None => (passed.command, passed.limited),
             Some(fault) => {
-                self.request(Trigger::Fault, TransitionCause::Fault(fault));
+                self.trigger(Trigger::Fault, TransitionCause::Fault(fault));
                 (JointCommand::damping(self.settings.gate.damping_kd), passed.limited)
             }
         }
@@ -286,19 +286,19 @@ impl Cycle {
             };
             match (self.mode, progress) {
                 (Mode::Countdown, TrialProgress::Jump | TrialProgress::Settle) => {
-                    self.request(Trigger::CountdownOver, TransitionCause::Course);
+                    self.trigger(Trigger::CountdownOver, TransitionCause::StepFinished);
                 }
-                (Mode::Jump, TrialProgress::Settle) => self.request(Trigger::Landed, TransitionCause::Course),
+                (Mode::Jump, TrialProgress::Settle) => self.trigger(Trigger::Landed, TransitionCause::StepFinished),
                 (_, TrialProgress::Over(TrialEnd::Fell(cause))) => {
-                    self.request(Trigger::Fell, TransitionCause::Fell(cause))
+                    self.trigger(Trigger::Fell, TransitionCause::Fell(cause))
                 }
                 (_, TrialProgress::Over(end)) => {
                     // A jump may end without SETTLE.
                     if self.mode == Mode::Jump {
-                        self.request(Trigger::Landed, TransitionCause::Course);
+                        self.trigger(Trigger::Landed, TransitionCause::StepFinished);
                     }
                     self.finish_trial(self.landing.map_or(end, TrialEnd::Fault));
-                    self.request(Trigger::Settled, TransitionCause::Course);
+                    self.trigger(Trigger::Settled, TransitionCause::StepFinished);
                 }
                 _ => {}
             }
@@ -310,13 +310,13 @@ impl Cycle {
         if let Some(ramp) = &self.ramp {
             match ramp.progress(&self.tick.state.joint_position) {
                 RampProgress::Moving => {}
-                RampProgress::Reached => self.request(Trigger::PoseReached, TransitionCause::Course),
+                RampProgress::Reached => self.trigger(Trigger::PoseReached, TransitionCause::StepFinished),
                 RampProgress::Late { .. } if self.mode == Mode::SitDown => {
                     // The floor may stop the robot short of the lying pose; damping is safe there.
-                    self.request(Trigger::PoseReached, TransitionCause::Course);
+                    self.trigger(Trigger::PoseReached, TransitionCause::StepFinished);
                 }
                 RampProgress::Late { error_rad } => {
-                    self.request(Trigger::Fault, TransitionCause::Fault(Fault::PoseTimeout { error_rad }));
+                    self.trigger(Trigger::Fault, TransitionCause::Fault(Fault::PoseTimeout { error_rad }));
                 }
             }
         }
@@ -347,13 +347,13 @@ impl Cycle {
     fn legs(&mut self, target: &LegTarget) -> JointCommand {
         let (state, estimate) = (&self.tick.state, &self.tick.estimate);
         let torques =
-            leg::torques(target, &self.feet, &state.joint_velocity, &estimate.orientation_world, &estimate.contact);
+            leg::torques(target, &self.feet, &state.joint_velocity, &estimate.world_from_body, &estimate.contact);
         self.tick.torque_demanded = torques;
         JointCommand::torques(&torques)
     }
 
     /// Changes the mode if `mode::next` allows it.
-    fn request(&mut self, trigger: Trigger, cause: TransitionCause) {
+    fn trigger(&mut self, trigger: Trigger, cause: TransitionCause) {
         if let Some(to) = mode::next(self.mode, trigger).filter(|to| *to != self.mode) {
             self.change(to, cause);
         }
@@ -380,7 +380,7 @@ impl Cycle {
                 TransitionCause::Fell(cause) => TrialEnd::Fell(cause),
                 TransitionCause::Fault(fault) => TrialEnd::Fault(fault),
                 TransitionCause::Command
-                | TransitionCause::Course
+                | TransitionCause::StepFinished
                 | TransitionCause::Connected
                 | TransitionCause::Idle { .. } => TrialEnd::Cancelled,
             });
@@ -406,7 +406,7 @@ impl Cycle {
     }
 
     /// Completes the tick for recorder, screen and session.
-    fn publish(&mut self, sent: JointCommand, limited: u16) {
+    fn complete_tick(&mut self, sent: JointCommand, limited: u16) {
         let tick = &mut self.tick;
         tick.number += 1;
         tick.mode = self.mode;
@@ -425,7 +425,7 @@ impl Cycle {
     }
 
     fn stamp(&mut self, lateness_ns: u64, [started, read, decided, written]: [u64; 4]) {
-        self.tick.stages = StageTimes {
+        self.tick.stages = TickDurations {
             lateness_ns: span_ns(0, lateness_ns),
             read_ns: span_ns(started, read),
             decide_ns: span_ns(read, decided),

@@ -65,7 +65,7 @@ impl Estimator {
         }
         let estimate = &mut self.estimate;
         estimate.foot_position_leg = feet.map(|foot| foot.position_leg);
-        let (roll, pitch, yaw) = estimate.orientation_world.euler_angles();
+        let (roll, pitch, yaw) = estimate.world_from_body.euler_angles();
         // Unwrap: the yaw nearest to the previous one, so that a turn of more than pi counts in full.
         let turn = yaw - previous_yaw;
         let unwrapped = if self.started {
@@ -87,15 +87,15 @@ impl Estimator {
         let estimate = &mut self.estimate;
         estimate.position_world = truth.position_world;
         estimate.velocity_world = truth.velocity_world;
-        estimate.orientation_world = truth.orientation_world;
+        estimate.world_from_body = truth.world_from_body;
         estimate.angular_velocity_body = truth.angular_velocity_body;
     }
 
     fn fuse_sensors(&mut self, state: &RobotState, feet: &PerLeg<FootPosition>, settings: &ControlSettings) {
         let estimate = &mut self.estimate;
-        estimate.orientation_world = state.imu.orientation_world;
+        estimate.world_from_body = state.imu.world_from_body;
         estimate.angular_velocity_body = state.imu.gyro_body;
-        let world_from_body = state.imu.orientation_world.to_rotation_matrix().into_inner();
+        let world_from_body = state.imu.world_from_body.to_rotation_matrix().into_inner();
         let unit_world = world_from_body * settings.imu_origin_body;
         let motions = foot_motions(state, feet, settings);
         let weights = &settings.estimator;
@@ -142,7 +142,7 @@ impl Estimator {
 
 /// Motion of each foot relative to the inertial unit, and of a rolling foot over the ground.
 fn foot_motions(state: &RobotState, feet: &PerLeg<FootPosition>, settings: &ControlSettings) -> PerLeg<FootOdometry> {
-    let rotation = state.imu.orientation_world;
+    let rotation = state.imu.world_from_body;
     let gyro_body = state.imu.gyro_body;
     std::array::from_fn(|leg| {
         let (q, dq) = (leg_of(&state.joint_position, leg), leg_of(&state.joint_velocity, leg));

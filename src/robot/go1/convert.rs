@@ -9,7 +9,7 @@ use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use zerocopy::little_endian::F32;
 
 use super::packet::{
-    CommandError, CrcForm, LowCmd, LowState, MODE_DAMPING, MODE_SERVO, MotorRecord, MotorTarget, POSITION_STOP,
+    CommandError, CrcForm, LowCmd, LowState, MODE_BRAKE, MODE_SERVO, MotorRecord, MotorTarget, POSITION_STOP,
     VELOCITY_STOP,
 };
 use crate::robot::{Battery, Imu, JOINTS, JointCommand, MotorCommand, RobotState};
@@ -75,7 +75,7 @@ pub fn robot_state(state: &LowState, foot_force_n: f64) -> RobotState {
     let imu = &state.imu;
     let [w, x, y, z] = imu.quaternion.map(F32::get);
     let norm = (w * w + x * x + y * y + z * z).sqrt();
-    let orientation_world = if (norm - 1.0).abs() < QUATERNION_TOLERANCE {
+    let world_from_body = if (norm - 1.0).abs() < QUATERNION_TOLERANCE {
         UnitQuaternion::new_normalize(Quaternion::new(w.into(), x.into(), y.into(), z.into()))
     } else {
         UnitQuaternion::new_unchecked(Quaternion::new(f64::NAN, f64::NAN, f64::NAN, f64::NAN))
@@ -86,7 +86,7 @@ pub fn robot_state(state: &LowState, foot_force_n: f64) -> RobotState {
         joint_position: joints(|motor| motor.position.get().into()),
         joint_velocity: joints(|motor| motor.velocity.get().into()),
         joint_torque: joints(|motor| motor.torque().into()),
-        imu: Imu { orientation_world, gyro_body: vector(&imu.gyroscope), accel_body: vector(&imu.accelerometer) },
+        imu: Imu { world_from_body, gyro_body: vector(&imu.gyroscope), accel_body: vector(&imu.accelerometer) },
         foot_force: state.foot_force.map(|force| f64::from(force.get()) * foot_force_n),
         motor_temperature_c: joints(|motor| motor.temperature.into()),
         motor_enabled: std::array::from_fn(|i| state.motor[i].mode == MODE_SERVO),
@@ -104,7 +104,7 @@ pub fn robot_state(state: &LowState, foot_force_n: f64) -> RobotState {
 pub fn low_state(state: &RobotState, foot_force_n: f64) -> LowState {
     let mut datagram = LowState::zero();
     datagram.tick = state.robot_time_ms.into();
-    let orientation = &state.imu.orientation_world;
+    let orientation = &state.imu.world_from_body;
     let [x, y, z, w]: [f64; 4] = orientation.coords.into();
     datagram.imu.quaternion = [w, x, y, z].map(float);
     datagram.imu.gyroscope = floats(&state.imu.gyro_body);
@@ -113,7 +113,7 @@ pub fn low_state(state: &RobotState, foot_force_n: f64) -> LowState {
     datagram.imu.roll_pitch_yaw = [roll, pitch, yaw].map(float);
     for i in 0..JOINTS {
         let motor = &mut datagram.motor[i];
-        motor.mode = if state.motor_enabled[i] { MODE_SERVO } else { MODE_DAMPING };
+        motor.mode = if state.motor_enabled[i] { MODE_SERVO } else { MODE_BRAKE };
         motor.position = float(state.joint_position[i]);
         motor.velocity = float(state.joint_velocity[i]);
         motor.position_raw = motor.position;

@@ -288,7 +288,7 @@ mod tests {
         let address = (Ipv4Addr::LOCALHOST, 9).into();
         let mut link =
             Link::open(&LinkOptions { address, local_port: 0, state_period_ms: 1, restart_ms: 100 }).unwrap();
-        let command = LowCmd::damping(CrcForm::Plain);
+        let command = LowCmd::braking(CrcForm::Plain);
         assert_eq!(link.warm_up(command), None, "there is no state yet");
         let received = &link.buffer[..command.bytes().len()];
         assert_eq!(received[2..], command.bytes()[2..]);

@@ -137,7 +137,7 @@ impl Go1 {
         if self.sends_hello && !self.link.has_received() && self.since_hello_ms >= self.network.hello_ms {
             self.since_hello_ms = 0;
             // An error is counted in the link's statistics.
-            let _ = self.link.send(&LowCmd::damping(self.network.crc));
+            let _ = self.link.send(&LowCmd::braking(self.network.crc));
         }
     }
 }
@@ -151,7 +151,7 @@ impl Robot for Go1 {
         let Some(state) = self.link.receive() else {
             let age_ms = self.link.status().state_age_ms;
             self.hello();
-            return Err(RobotError::Silent { age_ms });
+            return Err(RobotError::NoNewState { age_ms });
         };
         let mut state = convert::robot_state(state, self.network.foot_force_n);
         let reboots = self.link.status().reboots;

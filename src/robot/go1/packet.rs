@@ -13,7 +13,7 @@ mod state;
 use zerocopy::little_endian::{U16, U32};
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout, Unaligned};
 
-pub use command::{COMMAND_LENGTH, LowCmd, MODE_DAMPING, MODE_SERVO, MotorTarget, POSITION_STOP, VELOCITY_STOP};
+pub use command::{COMMAND_LENGTH, LowCmd, MODE_BRAKE, MODE_SERVO, MotorTarget, POSITION_STOP, VELOCITY_STOP};
 pub use crc::{CrcForm, crc};
 pub use state::{BatteryRecord, ImuRecord, LowState, MotorRecord, STATE_LENGTH};
 

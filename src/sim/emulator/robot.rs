@@ -139,7 +139,7 @@ impl EmulatedRobot {
         replace(&mut state.joint_position, &self.defects.angle);
         replace(&mut state.joint_velocity, &self.defects.speed);
         replace(&mut state.joint_torque, &self.defects.torque);
-        state.imu.orientation_world *= UnitQuaternion::from_axis_angle(&Vector3::x_axis(), self.defects.tilt_rad);
+        state.imu.world_from_body *= UnitQuaternion::from_axis_angle(&Vector3::x_axis(), self.defects.tilt_rad);
         let mut datagram = convert::low_state(&state, self.foot_force_n);
         datagram.seal();
         let mut bytes = datagram.bytes().to_vec();

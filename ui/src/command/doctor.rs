@@ -144,7 +144,7 @@ fn wake_up(scheduling: Scheduling) -> Vec<DoctorItem> {
     let measured = std::thread::spawn(move || {
         let granted = scheduling.apply();
         let mut lateness = Vec::with_capacity(WAKE_UPS);
-        let paced = thread::pace(Duration::from_millis(1), thread::CONTROL_PHASE, |instant| {
+        let paced = thread::pace(Duration::from_millis(1), thread::CONTROL_TICK_OFFSET, |instant| {
             lateness.push(instant.lateness_ns);
             if lateness.len() == WAKE_UPS { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         });

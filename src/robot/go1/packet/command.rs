@@ -13,7 +13,7 @@ const COVERED: usize = 608;
 /// Motor mode: the motor follows its target.
 pub const MODE_SERVO: u8 = 0x0A;
 /// Motor mode: the motor brakes by itself, with unknown strength.
-pub const MODE_DAMPING: u8 = 0x00;
+pub const MODE_BRAKE: u8 = 0x00;
 /// The position that means "no position target".
 pub const POSITION_STOP: f32 = 2.146e9;
 /// The velocity that means "no velocity target".
@@ -36,7 +36,7 @@ enum BatteryOff {
 /// Target of one motor in the datagram's resolution: `tau + kp (q_des - q) + kd (dq_des - dq)` inside the motor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MotorTarget {
-    /// [`MODE_SERVO`] or [`MODE_DAMPING`].
+    /// [`MODE_SERVO`] or [`MODE_BRAKE`].
     pub mode: u8,
     /// Desired angle, rad, or [`POSITION_STOP`].
     pub position: f32,
@@ -53,8 +53,8 @@ pub struct MotorTarget {
 
 impl MotorTarget {
     /// Braking without target and gain.
-    pub const DAMPING: MotorTarget = MotorTarget {
-        mode: MODE_DAMPING,
+    pub const BRAKING: MotorTarget = MotorTarget {
+        mode: MODE_BRAKE,
         position: POSITION_STOP,
         velocity: VELOCITY_STOP,
         torque: 0.0,
@@ -95,18 +95,18 @@ pub struct LowCmd {
 
 impl LowCmd {
     /// Returns a command in which every motor brakes.
-    pub fn damping(form: CrcForm) -> LowCmd {
+    pub fn braking(form: CrcForm) -> LowCmd {
         let mut command = LowCmd::unsealed();
         command.seal(form);
         command
     }
 
-    /// Returns the command of [`LowCmd::damping`] without a checksum.
+    /// Returns the command of [`LowCmd::braking`] without a checksum.
     pub fn unsealed() -> LowCmd {
         let mut command = LowCmd::new_zeroed();
         command.header = Header::low_level();
         for motor in 0..MOTORS {
-            command.put(motor, &MotorTarget::DAMPING, [U32::ZERO; 3]);
+            command.put(motor, &MotorTarget::BRAKING, [U32::ZERO; 3]);
         }
         command
     }

@@ -16,7 +16,7 @@ use quadfrog::realtime::channel::{ScreenEnd, SessionEnd, channels};
 use quadfrog::realtime::clock::{Clock, MonotonicClock};
 use quadfrog::realtime::scheduling::{GrantedSettings, Scheduling};
 use quadfrog::realtime::system::isolated_cores;
-use quadfrog::realtime::thread::{CONTROL_PHASE, PeriodicTask, TickStart, WARM_UP_LEAD, pace, pace_with_warm_up};
+use quadfrog::realtime::thread::{CONTROL_TICK_OFFSET, PeriodicTask, TickStart, WARM_UP_LEAD, pace, pace_with_warm_up};
 use quadfrog::robot::description::RobotFiles;
 use quadfrog::robot::go1::{Go1, Network};
 use quadfrog::robot::{Placement, Robot};
@@ -342,7 +342,7 @@ fn stand_and_measure(
     let control = ControlLoop::new(settings, end);
     let mut standing =
         StandingLoop { control, robot, clock, channels, standing_up: Some(0), remaining: ticks, measurement };
-    pace_with_warm_up(PERIOD, CONTROL_PHASE, lead, &mut standing).wrap_err("waiting on the monotonic clock")?;
+    pace_with_warm_up(PERIOD, CONTROL_TICK_OFFSET, lead, &mut standing).wrap_err("waiting on the monotonic clock")?;
     if standing.standing_up.is_some() {
         let mode = standing.control.mode().name();
         let limit_s = STAND_UP_LIMIT_TICKS / 1000;

@@ -10,7 +10,7 @@ use color_eyre::eyre::{WrapErr, eyre};
 use hdrhistogram::Histogram;
 use quadfrog::realtime::clock::{Clock, MonotonicClock};
 use quadfrog::realtime::scheduling::Scheduling;
-use quadfrog::realtime::thread::{CONTROL_PHASE, PeriodicTask, TickStart, pace_with_warm_up};
+use quadfrog::realtime::thread::{CONTROL_TICK_OFFSET, PeriodicTask, TickStart, pace_with_warm_up};
 use quadfrog::robot::go1::packet::{COMMAND_LENGTH, STATE_LENGTH};
 
 use crate::command::failure::Failure;
@@ -115,7 +115,7 @@ pub fn system_calls(
     let mut calls = SystemCallLoop { pair, warm_up, clock, durations, remaining: ticks };
     in_a_thread(move || {
         let _granted = scheduling.apply();
-        pace_with_warm_up(PERIOD, CONTROL_PHASE, lead, &mut calls).wrap_err("waiting on the monotonic clock")?;
+        pace_with_warm_up(PERIOD, CONTROL_TICK_OFFSET, lead, &mut calls).wrap_err("waiting on the monotonic clock")?;
         Ok(calls.durations)
     })
 }

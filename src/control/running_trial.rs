@@ -8,7 +8,7 @@ use crate::robot::{CONTROL_PERIOD_S, LEGS, PerLeg, RobotState};
 use crate::telemetry::{Estimate, FallCause, Phase, TrialEnd, TrialSpec};
 use nalgebra::Vector3;
 
-/// TrialProgress of a trial.
+/// Progress of a trial.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum TrialProgress {
     /// Standing still before the impulse.
@@ -23,7 +23,7 @@ pub enum TrialProgress {
 
 /// A running trial.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Jump {
+pub struct RunningTrial {
     spec: TrialSpec,
     oscillator: Oscillator,
     amplitudes_leg: PerLeg<Vector3<f64>>,
@@ -46,10 +46,10 @@ const SHORTEST_FLIGHT_S: f64 = 0.02;
 /// An impulse without take-off within this time counts as landed, s.
 const LATEST_TAKEOFF_S: f64 = 0.1;
 
-impl Jump {
+impl RunningTrial {
     /// Begins a trial with latched settings.
-    pub fn begin(spec: &TrialSpec, settings: &ControlSettings) -> Jump {
-        Jump {
+    pub fn begin(spec: &TrialSpec, settings: &ControlSettings) -> RunningTrial {
+        RunningTrial {
             spec: *spec,
             oscillator: Oscillator {
                 f0_hz: spec.jump.f0_hz,
