@@ -452,11 +452,11 @@ fn any_step() -> impl Strategy<Value = Step> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 24, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Whatever is wished and whatever happens, through the session and the control thread's body: the robot stands up only after
-    /// an accepted wish to arm, given while the operator's words of this experiment of the robot stood and its motors followed; and it
-    /// never jumps, as nobody approves. What stood is kept account of here, apart from the list.
+    /// For any sequence of requests and faults, through the session and the control loop: the robot stands up only after an
+    /// accepted request to arm, made while the operator's confirmations since the robot's last boot were valid and its motors
+    /// followed; and it never jumps without an approval. The test keeps its own account of the confirmations.
     #[test]
-    fn no_session_energises_without_arm_and_the_words_of_this_life(
+    fn no_session_energises_without_arm_and_confirmations_since_the_boot(
         steps in proptest::collection::vec((any_step(), 1..1500_u32), 1..25),
         begins_cleared: bool,
     ) {

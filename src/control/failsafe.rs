@@ -250,7 +250,7 @@ fn joint_torque(_: &Failsafe, inputs: &FailsafeInputs, settings: &ControlSetting
 fn tilt(_: &Failsafe, inputs: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {
     let [roll, pitch, _] = inputs.estimate.roll_pitch_yaw.into();
     let measured_rad = roll.abs().max(pitch.abs());
-    // A robot that sits down may lean.
+    // The tilt limit is larger while the robot sits down.
     let limits = &settings.watchdog;
     let allowed_rad = if inputs.mode == Mode::SitDown { limits.tilt_rad } else { limits.stance_tilt_rad };
     (measured_rad > allowed_rad).then_some(Fault::Tilt { measured_rad, allowed_rad })

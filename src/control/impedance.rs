@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use crate::robot::kinematics::FootPosition;
 use crate::trial::Gains;
 
-/// The force that the virtual spring and damper at the foot ask for, leg frame, N: Kp (p_d - p) - Kd v.
+/// Force of the virtual spring and damper at the foot, leg frame, N: Kp (p_d - p) - Kd v.
 pub fn force_leg(
     gains: &Gains,
     desired_leg: &Vector3<f64>,

@@ -35,7 +35,7 @@ pub struct Start<'a, C> {
     pub guard_heartbeat: Option<GuardHeartbeat>,
 }
 
-/// Least number of damping commands after the last tick: half a second, in which the robot sinks softly.
+/// Least number of damping commands after the last tick: half a second, in which the damped robot lowers to the floor.
 const LAST_DAMPINGS: u32 = 500;
 
 /// Runs until `closing` is set.
@@ -48,13 +48,13 @@ pub fn run<C: Clock>(mut start: Start<C>, end: ControlEnd, robot: &mut dyn Robot
     let period = Duration::from_secs_f64(CONTROL_PERIOD_S);
     let lead = lead(start.real);
     let paced = |ticking: &mut dyn PeriodicTask| pace_with_warm_up(period, CONTROL_TICK_OFFSET, lead, ticking);
-    // The damping at the end is slept, not paced: the clock may be what failed.
+    // Damping at the end is timed with sleep: the monotonic clock may have failed.
     if let Err(panic) = drive(&mut start, end, robot, paced, || std::thread::sleep(period)) {
         resume_unwind(panic);
     }
 }
 
-/// Returns the time before a tick at which the caches are warmed; zero for a simulated robot, which needs no punctual tick.
+/// Returns the time before a tick at which the caches are warmed; zero for a simulated robot, whose tick has no deadline.
 const fn lead(real: bool) -> Duration {
     if real { WARM_UP_LEAD } else { Duration::ZERO }
 }

@@ -1,4 +1,5 @@
-//! The wait-free channels over the real-time boundary. Each endpoint exists once: code without it cannot send.
+//! The wait-free channels over the real-time boundary. Each end of a ring or
+//! buffer exists once: code without it cannot send. The STOP latch and the heartbeat can be cloned.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};

@@ -23,9 +23,9 @@ const FORGIVEN_PERIODS: u64 = 20;
 /// Offset of the control thread's ticks within the kernel's millisecond.
 ///
 /// A kernel whose tick is a whole number of milliseconds (CONFIG_HZ 100, 250 or 1000) does its own periodic work at
-/// whole milliseconds of the monotonic clock (Linux, `kernel/time/tick-common.c`, `tick_setup_device`). A loop that
-/// happened to begin there would meet it time and again in the middle of its work. This one begins late enough after it
-/// for what the tick sets off to be done, and early enough to be done itself before the next.
+/// whole milliseconds of the monotonic clock (Linux, `kernel/time/tick-common.c`, `tick_setup_device`). A control tick
+/// at a whole millisecond would compete with it. At 750 us the kernel's work has ended, and the control tick ends before
+/// the next kernel tick.
 pub const CONTROL_TICK_OFFSET: Duration = Duration::from_micros(750);
 
 /// Time between the start of the cache warm-up and the tick of the control thread: long enough for the warm-up to end,
@@ -40,7 +40,7 @@ const OVERRUNS: u32 = 3;
 /// Length of that pause, ticks.
 const RESTING_TICKS: u32 = 1000;
 
-/// What is called in time.
+/// A task that is called once per period.
 pub trait PeriodicTask {
     /// Cache warm-up, called shortly before a tick. It is left out if there is no time, so nothing may depend on it.
     fn warm_up(&mut self) {}

@@ -142,7 +142,7 @@ pub struct RobotState {
     pub foot_force: PerLeg<f64>,
     /// Motor temperatures, degrees Celsius.
     pub motor_temperature_c: Joints,
-    /// Whether each motor reports servo mode, in which it follows commands.
+    /// Whether each motor follows commands: it reports servo mode, or commands have not been sent for long enough to change it.
     pub motor_enabled: [bool; JOINTS],
     /// Battery; none if the robot has none.
     pub battery: Option<Battery>,
@@ -272,7 +272,7 @@ impl LinkStatus {
 /// A robot: hardware or simulator. The control thread calls `read` and `write` once per tick; neither allocates, locks
 /// or blocks.
 pub trait Robot: Send {
-    /// Returns the newest state.
+    /// Returns the state that arrived since the last call, or [`RobotError::NoNewState`] with the age of the newest one.
     fn read(&mut self) -> Result<RobotState, RobotError>;
 
     /// Sends one command. A simulator advances by one control period.

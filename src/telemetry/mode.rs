@@ -5,11 +5,11 @@ use strum::{IntoStaticStr, VariantArray};
 
 use super::{FallCause, Fault};
 
-/// Mode of the machine; `control::mode::next` is the only function that changes it. The order is the number in recordings.
+/// Mode of the machine; `control::mode::next` decides its changes. The order is the number in recordings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, IntoStaticStr, VariantArray)]
 #[strum(serialize_all = "UPPERCASE")]
 pub enum Mode {
-    /// No state from the robot; nothing is sent.
+    /// No state from the robot; no joint command is sent.
     #[default]
     Offline,
     /// States arrive; nothing is sent.
@@ -72,7 +72,7 @@ pub enum Phase {
     Impulse,
     /// No foot on the ground.
     Flight,
-    /// After the first touchdown of a flight, or after an impulse that did not leave the ground.
+    /// After the first touchdown of a flight.
     Landing,
 }
 

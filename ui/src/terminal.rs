@@ -203,7 +203,7 @@ impl Screen {
         let (frames, received) = channel();
         let for_writer = state.clone();
         let writer = std::thread::Builder::new()
-            .name("screen".into())
+            .name("frame-writer".into())
             .spawn(move || write_frames(&received, &for_writer, terminal))?;
         install_panic_hook();
         let writer_end = FrameWriter { frame: Vec::new(), frames, state: state.clone() };

@@ -53,7 +53,7 @@ impl Cycle {
 
     /// The reason to refuse a command; none if it is carried out.
     ///
-    /// 1. While STOP is set, every command is refused. An acknowledgement of the last STOP clears the latch before the tick.
+    /// 1. While STOP is set, every command but `Leave` is refused. An acknowledgement of the last STOP clears the latch before the tick.
     /// 2. `mode::next` must allow the trigger in the present mode.
     /// 3. Taking control and arming need an operator's screen with a heartbeat, and a session that has not ended.
     /// 4. Arming and approval need a fresh permit.

@@ -278,7 +278,7 @@ impl Cycle {
     fn follow_jump(&mut self) {
         if let Some(jump) = &mut self.jump {
             let progress = match jump.observe(&self.tick.state, &self.tick.estimate, &self.settings) {
-                // Landing on a fault: standing suffices, it need not become quiet.
+                // After a fault the landing ends when the robot stands; rest is not required.
                 TrialProgress::Settle if self.landing.is_some() && jump.landed_s() >= self.settings.watchdog.land_s => {
                     TrialProgress::Over(TrialEnd::NotQuiet)
                 }

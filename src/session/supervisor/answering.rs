@@ -91,7 +91,7 @@ impl Supervisor {
             }
             OperatorRequest::Judge(verdict) => {
                 self.judge(*verdict, false)?;
-                Ok("u takes it back until the next jump is approved".to_owned())
+                Ok("u takes it back until the next trial is approved or skipped".to_owned())
             }
             OperatorRequest::Rerun { trial: None } => {
                 self.judge(Verdict::Void, true)?;
