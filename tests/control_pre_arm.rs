@@ -1,110 +1,61 @@
 //! The arming checks of the control thread: each fails by itself and refuses arming, whatever the session says.
 
+#[path = "support/bench.rs"]
+mod bench;
+#[path = "support/robots.rs"]
+mod robots;
+
+use bench::{Bench, shipped};
 use nalgebra::{UnitQuaternion, Vector3};
-use quadfrog::config::Config;
-use quadfrog::control::cycle::{Cycle, Inputs};
-use quadfrog::control::settings::ControlSettings;
-use quadfrog::realtime::clock::SimulatedClock;
-use quadfrog::robot::description::RobotDescription;
-use quadfrog::robot::{Battery, JointCommand, LinkStatus, Placement, Robot, RobotError, RobotState};
-use quadfrog::telemetry::{ArmingCheck, Command, CommandRefusal, Event, Mode, Permit};
-use quadfrog::trial::{Backend, Task};
+use quadfrog::robot::{Battery, LinkStatus, RobotError, RobotState};
+use quadfrog::telemetry::{ArmingCheck, Command, CommandRefusal, Mode};
+use quadfrog::trial::Backend;
+use robots::ScriptedRobot;
 
-/// A robot that reports a given state.
-struct TellOutcome {
-    state: Result<RobotState, RobotError>,
-    link: LinkStatus,
+type ArmingBench = Bench<ScriptedRobot>;
+
+/// A disarmed robot that lies still and passes every check.
+fn lying_still() -> ArmingBench {
+    let (config, _, settings) = shipped(Backend::Hardware);
+    let state = RobotState {
+        joint_position: settings.lying_position,
+        motor_enabled: [true; 12],
+        motor_temperature_c: [30.0; 12],
+        battery: Some(Battery { charge_percent: 80.0, voltage_v: 24.0, current_a: 0.0, cell_v: [0.0; 10] }),
+        ..RobotState::default()
+    };
+    let link = LinkStatus { recent_received: 5000, ..LinkStatus::default() };
+    let mut bench = Bench::new(config, settings, ScriptedRobot { state: Ok(state), link }).reach(Mode::Disarmed);
+    bench.ticks(4500);
+    bench
 }
 
-impl Robot for TellOutcome {
-    fn read(&mut self) -> Result<RobotState, RobotError> {
-        if let Ok(state) = &mut self.state {
-            state.robot_time_ms += 1;
-        }
-        self.state
-    }
-    fn write(&mut self, _: &JointCommand) -> Result<(), RobotError> {
-        Ok(())
-    }
-    fn place(&mut self, _: &Placement) -> bool {
-        false
-    }
-    fn link(&self) -> Option<LinkStatus> {
-        Some(self.link)
-    }
-}
-
-struct Bench {
-    cycle: Cycle,
-    robot: TellOutcome,
-    settings: ControlSettings,
-    time_ns: u64,
-    lateness_ns: u64,
-    mode_changes: u64,
-}
-
-impl Bench {
-    /// A disarmed robot that lies still and passes every check.
-    fn new() -> Bench {
-        let description = RobotDescription::embedded("go1").unwrap();
-        let config = Config::load(None).unwrap();
-        let settings = config.settings(&description, Task::Forward, Backend::Hardware).unwrap();
-        let state = RobotState {
-            joint_position: settings.lying_position,
-            motor_enabled: [true; 12],
-            motor_temperature_c: [30.0; 12],
-            battery: Some(Battery { charge_percent: 80.0, voltage_v: 24.0, current_a: 0.0, cell_v: [0.0; 10] }),
-            ..RobotState::default()
-        };
-        let robot =
-            TellOutcome { state: Ok(state), link: LinkStatus { recent_received: 5000, ..LinkStatus::default() } };
-        let mut bench =
-            Bench { cycle: Cycle::new(&settings), robot, settings, time_ns: 0, lateness_ns: 0, mode_changes: 0 };
-        bench.tick(None);
-        bench.tick(Some(Command::TakeControl));
-        bench.ticks(6000);
-        bench
-    }
-
-    fn tick(&mut self, command: Option<Command>) {
-        self.time_ns += 1_000_000;
-        let inputs = Inputs { time_ns: self.time_ns, lateness_ns: self.lateness_ns, command, ..Inputs::default() };
-        self.cycle.tick(&inputs, &SimulatedClock, &mut self.robot);
-        let changes = self.cycle.events().iter().filter(|event| matches!(event, Event::Mode { .. }));
-        self.mode_changes += changes.count() as u64;
-    }
-
-    fn ticks(&mut self, count: u32) {
-        for _ in 0..count {
-            self.tick(None);
-        }
-    }
-
+impl ArmingBench {
     fn state(&mut self) -> &mut RobotState {
         self.robot.state.as_mut().unwrap()
     }
 
     /// Arms; returns the failing checks of a refusal.
-    fn arm(&mut self) -> Vec<ArmingCheck> {
-        self.tick(Some(Command::Arm(Permit { mode_changes: self.mode_changes, given_ns: self.time_ns })));
-        let refused = self.cycle.events().iter().find_map(|event| match event {
-            Event::Refused { because: CommandRefusal::Checks(checks), .. } => Some(checks),
-            _ => None,
-        });
-        assert_eq!(refused.is_none(), self.cycle.mode() == Mode::StandUp);
-        refused.map(|checks| checks.iter().collect()).unwrap_or_default()
+    fn failing(&mut self) -> Vec<ArmingCheck> {
+        self.command(self.arm());
+        let checks = match self.refusal() {
+            Some(CommandRefusal::Checks(checks)) => checks.iter().collect(),
+            other => other.map(|other| panic!("{other}")).unwrap_or_default(),
+        };
+        assert_eq!(checks == [], self.cycle.mode() == Mode::StandUp);
+        checks
     }
 }
 
 #[test]
 fn a_sound_robot_is_armed() {
-    assert_eq!(Bench::new().arm(), []);
+    assert_eq!(lying_still().failing(), []);
 }
 
 /// Each check fails alone and is named alone.
 #[test]
 fn each_check_refuses_arming_by_itself() {
-    type Breaks = fn(&mut Bench);
+    type Breaks = fn(&mut ArmingBench);
     let table: [(ArmingCheck, Breaks); 14] = [
         (ArmingCheck::StateFresh, |b| b.robot.state = Err(RobotError::Silent { age_ms: 12 })),
         (ArmingCheck::Loss, |b| b.robot.link.recent_lost = 60),
@@ -120,64 +71,64 @@ fn each_check_refuses_arming_by_itself() {
         (ArmingCheck::MotorsFollow, |b| b.state().motor_enabled[7] = false),
         (ArmingCheck::GyroStill, |b| b.state().imu.gyro_body.y = 0.2),
         (ArmingCheck::OnTime, |b| {
-            b.lateness_ns = 600_000;
+            b.inputs.lateness_ns = 600_000;
             b.ticks(60);
-            b.lateness_ns = 0;
+            b.inputs.lateness_ns = 0;
         }),
         (ArmingCheck::MotorsCool, |b| b.state().motor_temperature_c[3] = f64::NAN),
         (ArmingCheck::Battery, |b| b.state().battery.as_mut().unwrap().charge_percent = f64::NAN),
     ];
     for (check, breaks) in table {
-        let mut bench = Bench::new();
+        let mut bench = lying_still();
         breaks(&mut bench);
-        assert_eq!(bench.arm(), [check]);
+        assert_eq!(bench.failing(), [check]);
         assert_eq!(bench.cycle.mode(), Mode::Disarmed);
     }
 }
 
 #[test]
 fn all_that_fails_is_named_at_once() {
-    let mut bench = Bench::new();
+    let mut bench = lying_still();
     bench.robot.link.recent_corrupt = 3;
     bench.state().battery = None;
     bench.state().imu.gyro_body.z = 1.0;
-    assert_eq!(bench.arm(), [ArmingCheck::Checksums, ArmingCheck::Battery, ArmingCheck::GyroStill]);
+    assert_eq!(bench.failing(), [ArmingCheck::Checksums, ArmingCheck::Battery, ArmingCheck::GyroStill]);
 }
 
 /// Stillness must last; late ticks leave the window after five seconds.
 #[test]
 fn stillness_must_last_and_lateness_is_forgotten() {
-    let mut bench = Bench::new();
+    let mut bench = lying_still();
     bench.state().imu.gyro_body.z = 1.0;
-    bench.lateness_ns = 2_000_000;
+    bench.inputs.lateness_ns = 2_000_000;
     bench.ticks(100);
     bench.state().imu.gyro_body.z = 0.0;
-    bench.lateness_ns = 0;
+    bench.inputs.lateness_ns = 0;
     bench.ticks(900);
-    assert_eq!(bench.arm(), [ArmingCheck::GyroStill, ArmingCheck::OnTime]);
+    assert_eq!(bench.failing(), [ArmingCheck::GyroStill, ArmingCheck::OnTime]);
     bench.ticks(200);
-    assert_eq!(bench.arm(), [ArmingCheck::OnTime]);
+    assert_eq!(bench.failing(), [ArmingCheck::OnTime]);
     bench.ticks(5000);
-    assert_eq!(bench.arm(), []);
+    assert_eq!(bench.failing(), []);
 }
 
 /// A motor that left servo mode is named, and nothing is energised. Regression: the other eleven were energised for one tick.
 #[test]
 fn a_motor_out_of_servo_mode_is_named_before_anything_is_energised() {
-    let mut bench = Bench::new();
+    let mut bench = lying_still();
     bench.state().motor_enabled[7] = false;
     bench.state().motor_enabled[9] = false;
     bench.ticks(1);
     let findings = bench.cycle.readiness().findings;
     let finding = findings.get(ArmingCheck::MotorsFollow).unwrap();
     assert_eq!((finding.measured, finding.joint), (2.0, Some(7)));
-    assert_eq!(bench.arm(), [ArmingCheck::MotorsFollow]);
+    assert_eq!(bench.failing(), [ArmingCheck::MotorsFollow]);
 }
 
 /// An old state does not count as stillness. Regression: one state that was read a thousand times counted as a second.
 #[test]
 fn silence_is_not_stillness() {
-    let silent = |bench: &mut Bench, ticks: u32| {
+    let silent = |bench: &mut ArmingBench, ticks: u32| {
         let state = bench.robot.state;
         for age_ms in 1..=ticks {
             bench.robot.state = Err(RobotError::Silent { age_ms });
@@ -186,7 +137,7 @@ fn silence_is_not_stillness() {
         bench.robot.state = state;
     };
     let moved = || {
-        let mut bench = Bench::new();
+        let mut bench = lying_still();
         bench.state().imu.gyro_body.z = 1.0;
         bench.ticks(2);
         bench.state().imu.gyro_body.z = 0.0;
@@ -199,29 +150,29 @@ fn silence_is_not_stillness() {
         silent(&mut bench, 9);
     }
     bench.ticks(1);
-    assert_eq!(bench.arm(), [ArmingCheck::GyroStill]);
+    assert_eq!(bench.failing(), [ArmingCheck::GyroStill]);
     bench.ticks(1000);
-    assert_eq!(bench.arm(), []);
+    assert_eq!(bench.failing(), []);
     // A longer silence and a restart reset the count.
     let mut bench = moved();
     bench.ticks(1500);
     silent(&mut bench, 25);
     bench.ticks(10);
-    bench.tick(Some(Command::Acknowledge { stops: 0 }));
-    assert_eq!(bench.arm(), [ArmingCheck::GyroStill]);
-    let mut bench = Bench::new();
+    bench.command(Command::Acknowledge { stops: 0 });
+    assert_eq!(bench.failing(), [ArmingCheck::GyroStill]);
+    let mut bench = lying_still();
     bench.state().robot_time_ms = 0;
     bench.ticks(2);
-    bench.tick(Some(Command::Acknowledge { stops: 0 }));
-    assert_eq!(bench.arm(), [ArmingCheck::GyroStill]);
+    bench.command(Command::Acknowledge { stops: 0 });
+    assert_eq!(bench.failing(), [ArmingCheck::GyroStill]);
     bench.ticks(1000);
-    assert_eq!(bench.arm(), []);
+    assert_eq!(bench.failing(), []);
 }
 
 /// Joint limits: intersection of URDF and official SDK.
 #[test]
 fn joint_limits_are_the_intersection_of_the_urdf_and_the_official_sdk() {
-    let Bench { settings, .. } = Bench::new();
+    let Bench { settings, .. } = lying_still();
     for leg in 0..4 {
         let limits = |joint: usize| (settings.min_position[3 * leg + joint], settings.max_position[3 * leg + joint]);
         assert_eq!(limits(0), (-0.863, 0.863), "hip: the URDF's");

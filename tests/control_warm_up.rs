@@ -1,10 +1,12 @@
 //! A cache warm-up changes no tick, event or datagram.
 
+#[path = "support/bench.rs"]
+mod bench;
 #[path = "support/go1.rs"]
 mod go1;
 
-use go1::{description, pair};
-use quadfrog::config::Config;
+use bench::{shipped, spec};
+use go1::pair;
 use quadfrog::control::control_loop::ControlLoop;
 use quadfrog::realtime::channel::channels;
 use quadfrog::realtime::clock::SimulatedClock;
@@ -12,17 +14,14 @@ use quadfrog::realtime::thread::TickStart;
 use quadfrog::robot::{LinkStatus, Robot};
 use quadfrog::sim::emulator::{EmulatorFault, EmulatorStatus};
 use quadfrog::telemetry::{Command, Event, Mode, Permit, Tick};
-use quadfrog::trial::{Backend, JumpParameters, Task};
+use quadfrog::trial::Backend;
 
 /// Over the link to an emulated robot on a bad network: taken over, armed, one jump and its review, a STOP, a restart.
 fn session(warm_up: bool) -> (Vec<Tick>, Vec<Event>, LinkStatus, EmulatorStatus) {
-    let config = Config::load(None).unwrap();
+    let (config, _, settings) = shipped(Backend::Hardware);
     let (mut emulator, mut robot) = pair(&config.simulator, 1);
-    let settings = config.settings(&description(), Task::Forward, Backend::Hardware).unwrap();
     let (control, mut session, screen, mut recorder) = channels();
     let mut body = ControlLoop::new(&settings, control);
-    let jump = JumpParameters { f0_hz: 1.3, f1_hz: 0.0, fx_n: 60.0, fy_n: 0.0, fz_n: 270.0 };
-    let spec = config.task(Task::Forward).trial(Task::Forward, jump);
     let (mut ticks, mut events, mut asked_in) = (Vec::new(), Vec::new(), None);
     for ms in 0..20_000 {
         screen.heartbeat.beat();
@@ -33,7 +32,7 @@ fn session(warm_up: bool) -> (Vec<Tick>, Vec<Event>, LinkStatus, EmulatorStatus)
         let command = match body.mode() {
             Mode::Observe if ms == 100 => Some(Command::TakeControl),
             Mode::Disarmed if ms == 2000 => Some(Command::Arm(permit)),
-            Mode::Ready if asked_in != Some(Mode::Ready) => Some(Command::RunTrial(spec, permit)),
+            Mode::Ready if asked_in != Some(Mode::Ready) => Some(Command::RunTrial(spec(&config), permit)),
             _ => None,
         };
         if let Some(command) = command {

@@ -8,13 +8,13 @@ use nalgebra::Vector3;
 use quadfrog::config::Config;
 use quadfrog::control::cycle::{Cycle, Inputs};
 use quadfrog::control::estimator::{ContactGate, Estimator};
-use quadfrog::control::leg::{feet, stance_of};
+use quadfrog::control::leg::feet;
 use quadfrog::control::settings::{ControlSettings, ObjectiveSource};
 use quadfrog::engine::{Options, open_experiment};
 use quadfrog::optimize::journal::Durability;
 use quadfrog::realtime::clock::SimulatedClock;
 use quadfrog::robot::description::RobotDescription;
-use quadfrog::robot::{GRAVITY, Joints, LEGS, Leg, Placement, Robot, RobotState};
+use quadfrog::robot::{GRAVITY, Joints, LEGS, Placement, Robot, RobotState};
 use quadfrog::session::rollout::Rollout;
 use quadfrog::session::{automatic, objective};
 use quadfrog::sim::Simulator;
@@ -23,12 +23,7 @@ use quadfrog::trial::{Backend, Task, TrialRecord, Verdict};
 
 /// Joint angles of a stance, feet at the task's nominal positions.
 fn stance(settings: &ControlSettings) -> Joints {
-    let mut joints = Joints::default();
-    for leg in Leg::ALL {
-        let q = settings.geometry.inverse(&stance_of(&settings.stand.stance_leg, leg), leg.side()).unwrap();
-        joints[3 * leg as usize..][..3].copy_from_slice(q.as_slice());
-    }
-    joints
+    settings.geometry.stance(&settings.stand.stance_leg, &Joints::default())
 }
 
 /// An estimator with the perfect sensors of a standing robot, which a test changes.

@@ -5,87 +5,56 @@
     reason = "an allocator can only be written with unsafe; this one hands everything to the system's"
 )]
 
+#[path = "support/bench.rs"]
+mod bench;
 #[path = "support/go1.rs"]
 mod go1;
 #[path = "support/no_alloc.rs"]
 mod no_alloc;
 
-use std::collections::BTreeSet;
 use std::net::UdpSocket;
 
-use go1::{ANY_PORT, description, network, pair};
+use bench::{LoopBench, shipped, spec};
+use go1::{ANY_PORT, network, pair};
 use no_alloc::without_allocation;
-use quadfrog::config::Config;
-use quadfrog::control::control_loop::ControlLoop;
-use quadfrog::realtime::channel::channels;
-use quadfrog::realtime::clock::SimulatedClock;
-use quadfrog::realtime::thread::TickStart;
 use quadfrog::robot::go1::Go1;
 use quadfrog::robot::{JointCommand, Robot};
-use quadfrog::sim::emulator::EmulatorFault;
-use quadfrog::telemetry::{Command, Event, Mode, Permit};
-use quadfrog::trial::{Backend, JumpParameters, Task};
+use quadfrog::sim::emulator::{Emulator, EmulatorFault};
+use quadfrog::telemetry::{Command, Mode};
+use quadfrog::trial::Backend;
+
+fn run(bench: &mut LoopBench<Go1>, emulator: &mut Emulator, count: u32) {
+    for _ in 0..count {
+        bench.tick();
+        emulator.step();
+    }
+}
 
 /// The control thread's body over the link: standing up, a jump and its review on a good network; then a network that
 /// loses, duplicates, corrupts and delays, and a restart: every branch of the link.
 #[test]
 fn a_tick_over_the_link_does_not_allocate() {
-    let config = Config::load(None).unwrap();
-    let (mut emulator, mut go1) = pair(&config.simulator, 1);
-    let settings = config.settings(&description(), Task::Forward, Backend::Hardware).unwrap();
-    let (control, mut session, screen, mut recorder) = channels();
-    let mut body = ControlLoop::new(&settings, control);
-    let (mut ms, mut mode_changes, mut seen) = (0, 0, BTreeSet::new());
-    let mut ticks = |count: u32, until: Option<Mode>, command: Option<fn(Permit, &Config) -> Command>| {
-        if let Some(command) = command {
-            let permit = Permit { mode_changes, given_ns: ms * 1_000_000 };
-            session.commands.push(command(permit, &config)).unwrap();
-        }
-        for _ in 0..count {
-            screen.heartbeat.beat();
-            let instant = TickStart { planned_ns: ms * 1_000_000, lateness_ns: 0 };
-            let mode = without_allocation(|| {
-                body.warm_up(&SimulatedClock, &mut go1);
-                let mode = body.tick(instant, &SimulatedClock, &mut go1).mode;
-                body.prepare();
-                mode
-            });
-            ms += 1;
-            seen.insert(mode.name());
-            while let Ok(event) = session.events.pop() {
-                mode_changes += u64::from(matches!(event, Event::Mode { .. }));
-            }
-            let _ = recorder.pop();
-            emulator.step();
-            if until == Some(mode) {
-                return;
-            }
-            if ms == 20_000 {
-                for fault in ["loss 5", "duplicate 5", "corrupt 5", "jitter 3"] {
-                    emulator.apply(fault.parse().unwrap());
-                }
-            } else if ms == 23_000 {
-                emulator.apply(EmulatorFault::Reboot);
-            }
-        }
-        assert_eq!(until, None, "never reached after {count} ticks");
-    };
-    ticks(100, Some(Mode::Observe), None);
-    ticks(1500, None, Some(|_, _| Command::TakeControl));
-    ticks(3000, Some(Mode::Ready), Some(|permit, _| Command::Arm(permit)));
-    ticks(
-        12_000,
-        Some(Mode::Review),
-        Some(|permit, config| {
-            let jump = JumpParameters { f0_hz: 1.3, f1_hz: 0.0, fx_n: 60.0, fy_n: 0.0, fz_n: 270.0 };
-            Command::RunTrial(config.task(Task::Forward).trial(Task::Forward, jump), permit)
-        }),
-    );
-    ticks(26_000, None, None);
-    for mode in [Mode::StandUp, Mode::Ready, Mode::Countdown, Mode::Jump, Mode::Settle, Mode::Review, Mode::Fault] {
-        assert!(seen.contains(mode.name()), "{mode:?} is not among {seen:?}");
+    let (config, _, settings) = shipped(Backend::Hardware);
+    let (mut emulator, go1) = pair(&config.simulator, 1);
+    let mut bench = LoopBench::new(config, &settings, go1, |tick| without_allocation(tick));
+    run(&mut bench, &mut emulator, 100);
+    bench.command(Command::TakeControl);
+    run(&mut bench, &mut emulator, 1500);
+    bench.command(Command::Arm(bench.permit()));
+    run(&mut bench, &mut emulator, 4000);
+    bench.command(Command::RunTrial(spec(&bench.config), bench.permit()));
+    run(&mut bench, &mut emulator, 12_000);
+    assert!(bench.seen.contains(Mode::Review.name()), "{:?}", bench.seen);
+    for fault in ["loss 5", "duplicate 5", "corrupt 5", "jitter 3"] {
+        emulator.apply(fault.parse().unwrap());
     }
-    let link = go1.link().unwrap();
+    run(&mut bench, &mut emulator, 3000);
+    emulator.apply(EmulatorFault::Reboot);
+    run(&mut bench, &mut emulator, 23_000);
+    for mode in [Mode::StandUp, Mode::Ready, Mode::Countdown, Mode::Jump, Mode::Settle, Mode::Review, Mode::Fault] {
+        assert!(bench.seen.contains(mode.name()), "{mode:?} is not among {:?}", bench.seen);
+    }
+    let link = bench.robot.link().unwrap();
     assert!(link.corrupt > 50 && link.duplicate > 50 && link.lost > 50 && link.late > 50, "{link:?}");
     assert_eq!(link.reboots, 1);
 }

@@ -5,9 +5,9 @@ mod support;
 
 use nalgebra::{UnitQuaternion, Vector3};
 use quadfrog::control::force_profile::amplitudes_leg;
-use quadfrog::control::leg::{LegTarget, feet, stance_of, torques};
+use quadfrog::control::leg::{LegTarget, feet, torques};
 use quadfrog::robot::description::RobotDescription;
-use quadfrog::robot::{JointCommand, Joints, Leg, PerLeg, Placement, Robot};
+use quadfrog::robot::{JointCommand, PerLeg, Placement, Robot};
 use quadfrog::sim::{BodyKind, ContactLaw, SimConfig, Simulator};
 use quadfrog::trial::{Gains, JumpParameters, Task};
 use serde::Deserialize;
@@ -51,11 +51,7 @@ struct Outcome {
 fn jump(robot: &RobotDescription, config: &SimConfig, file: &File, case: &Case) -> Outcome {
     let mut simulator = Simulator::new(robot, config).unwrap();
     let stance_leg = Vector3::new(file.stance_m.x, file.stance_m.y, file.stance_m.z);
-    let mut joint_position = Joints::default();
-    for leg in Leg::ALL {
-        let q = robot.leg_geometry.inverse(&stance_of(&stance_leg, leg), leg.side()).unwrap();
-        joint_position[3 * leg as usize..][..3].copy_from_slice(q.as_slice());
-    }
+    let joint_position = robot.leg_geometry.stance(&stance_leg, &robot.lying_position);
     assert!(simulator.place(&Placement { joint_position, lying: false, seed: 0 }));
 
     let task: Task = case.task.parse().unwrap();

@@ -5,7 +5,7 @@ mod support;
 
 use nalgebra::{UnitQuaternion, Vector3};
 use quadfrog::robot::description::RobotDescription;
-use quadfrog::robot::{GRAVITY, JointCommand, Joints, Leg, MotorCommand, Placement, Robot};
+use quadfrog::robot::{GRAVITY, JointCommand, Joints, Placement, Robot};
 use quadfrog::sim::{ContactLaw, SimConfig, SimState, Simulator, TerrainKind};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
@@ -23,22 +23,7 @@ fn with_friction(friction: f64) -> SimConfig {
 
 /// Feet under the hips, `y` out and `depth` down, m.
 fn stance(robot: &RobotDescription, y: f64, depth: f64) -> Joints {
-    let mut joints = Joints::default();
-    for leg in Leg::ALL {
-        let foot = Vector3::new(0.0, leg.side() * y, -depth);
-        let q = robot.leg_geometry.inverse(&foot, leg.side()).unwrap();
-        joints[3 * leg as usize..][..3].copy_from_slice(q.as_slice());
-    }
-    joints
-}
-
-/// Command that holds these angles.
-fn hold(position: &Joints, kp: f64, kd: f64) -> JointCommand {
-    let mut command = JointCommand::default();
-    for (motor, &position) in command.motor.iter_mut().zip(position) {
-        *motor = MotorCommand { position, kp, kd, ..MotorCommand::default() };
-    }
-    command
+    robot.leg_geometry.stance(&Vector3::new(0.0, y, -depth), &Joints::default())
 }
 
 fn standing(config: &SimConfig) -> (Simulator, JointCommand) {
@@ -46,7 +31,7 @@ fn standing(config: &SimConfig) -> (Simulator, JointCommand) {
     let joint_position = stance(&robot, 0.1, 0.26);
     let mut simulator = Simulator::new(&robot, config).unwrap();
     simulator.place(&Placement { joint_position, lying: false, seed: 1 });
-    (simulator, hold(&joint_position, 100.0, 3.0))
+    (simulator, JointCommand::hold(&joint_position, 100.0, 3.0))
 }
 
 fn uniform(random: &mut ChaCha8Rng, low: f64, high: f64) -> f64 {
@@ -129,7 +114,7 @@ fn a_drop_from_half_a_metre_sinks_in_less_than_half_a_millimetre() {
         simulator.set_state(&state);
         state.position_world.z += 0.5 - simulator.smallest_gap();
         simulator.set_state(&state);
-        let command = hold(&joint_position, 60.0, 2.0);
+        let command = JointCommand::hold(&joint_position, 60.0, 2.0);
         for tick in 0..1500 {
             simulator.write(&command).unwrap();
             deepest.see(simulator.smallest_gap().min(0.0), || format!("drop {case}, {tick} ms"));
@@ -202,7 +187,7 @@ fn slide(law: ContactLaw, tolerance: f64) {
         simulator.set_state(&state);
         state.position_world.z -= simulator.smallest_gap() / angle.cos();
         simulator.set_state(&state);
-        let command = hold(&joint_position, 100.0, 3.0);
+        let command = JointCommand::hold(&joint_position, 100.0, 3.0);
         for _ in 0..300 {
             simulator.write(&command).unwrap();
         }

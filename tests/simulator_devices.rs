@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 use quadfrog::robot::description::RobotDescription;
-use quadfrog::robot::{GRAVITY, JointCommand, MotorCommand, Placement, Robot, RobotState};
+use quadfrog::robot::{GRAVITY, JointCommand, Placement, Robot, RobotState};
 use quadfrog::sim::{ActuatorKind, SimConfig, SimError, SimState, Simulator};
 
 fn go1() -> RobotDescription {
@@ -181,10 +181,7 @@ fn delay_is_that_many_ticks_and_spares_the_truth() {
 #[test]
 fn a_motor_holds_its_position() {
     let mut simulator = floating(&SimConfig::default());
-    let mut command = JointCommand::default();
-    for motor in &mut command.motor {
-        *motor = MotorCommand { position: 0.0, kp: 40.0, kd: 1.0, ..MotorCommand::default() };
-    }
+    let mut command = JointCommand::hold(&[0.0; 12], 40.0, 1.0);
     command.motor[1].position = 1.5;
     command.motor[2].position = -1.0;
     for _ in 0..1500 {

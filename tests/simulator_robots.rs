@@ -1,6 +1,6 @@
 //! Robot descriptions: the embedded ones, those from a folder, and invalid ones.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use nalgebra::Vector3;
 use quadfrog::robot::description::{DescriptionError, RobotDescription};
@@ -10,29 +10,18 @@ use quadfrog::sim::{SimConfig, Simulator};
 const GO1: &str = include_str!("../robots/go1/go1.urdf");
 const GO1_TOML: &str = include_str!("../robots/go1/robot.toml");
 
-/// A temporary folder with a robot's two files.
-struct Folder(PathBuf);
-
-impl Folder {
-    fn new(name: &str, urdf: &str, toml: &str) -> Folder {
-        let path = std::env::temp_dir().join(format!("quadfrog-{name}-{}", std::process::id()));
-        std::fs::create_dir_all(&path).unwrap();
-        std::fs::write(path.join("go1.urdf"), urdf).unwrap();
-        std::fs::write(path.join("robot.toml"), toml).unwrap();
-        Folder(path)
-    }
+/// The message about a robot with these two files.
+fn refused(urdf: &str, toml: &str) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("go1.urdf"), urdf).unwrap();
+    std::fs::write(folder.path().join("robot.toml"), toml).unwrap();
+    RobotDescription::from_folder(folder.path()).unwrap_err().to_string()
 }
 
-impl Drop for Folder {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_dir_all(&self.0);
-    }
-}
-
-fn refusal(name: &str, from: &str, to: &str) -> String {
+/// The message about a Go1 with one change in its URDF.
+fn refusal(from: &str, to: &str) -> String {
     assert!(GO1.contains(from), "{from}");
-    let folder = Folder::new(name, &GO1.replacen(from, to, 1), GO1_TOML);
-    RobotDescription::from_folder(&folder.0).unwrap_err().to_string()
+    refused(&GO1.replacen(from, to, 1), GO1_TOML)
 }
 
 #[test]
@@ -75,17 +64,9 @@ fn every_robot_lies_stands_and_jumps() {
         let truth = simulator.read().unwrap().truth.unwrap();
         assert!(truth.body_contact && truth.velocity_world.norm() < 0.02, "{name} does not lie still");
 
-        let mut joint_position = [0.0; 12];
-        for leg in Leg::ALL {
-            let foot = Vector3::new(0.0, leg.side() * 0.14, -0.25);
-            let q = robot.leg_geometry.inverse(&foot, leg.side()).unwrap();
-            joint_position[3 * leg as usize..][..3].copy_from_slice(q.as_slice());
-        }
+        let joint_position = robot.leg_geometry.stance(&Vector3::new(0.0, 0.14, -0.25), &robot.lying_position);
         simulator.place(&Placement { joint_position, lying: false, seed: 0 });
-        let mut command = JointCommand::default();
-        for (motor, position) in command.motor.iter_mut().zip(joint_position) {
-            *motor = MotorCommand { position, kp: 100.0, kd: 3.0, ..MotorCommand::default() };
-        }
+        let command = JointCommand::hold(&joint_position, 100.0, 3.0);
         for _ in 0..2000 {
             simulator.write(&command).unwrap();
         }
@@ -117,33 +98,27 @@ fn every_robot_lies_stands_and_jumps() {
 
 #[test]
 fn impossible_robots_are_refused_by_name() {
-    let message = refusal("mass", "<mass value=\"5.561079999999999\"/>", "<mass value=\"0\"/>");
+    let message = refusal("<mass value=\"5.561079999999999\"/>", "<mass value=\"0\"/>");
     assert!(message.contains("go1.urdf") && message.contains("trunk") && message.contains("mass 0 kg"), "{message}");
     let message =
-        refusal("foot", "<geometry><sphere radius=\"0.02\"/></geometry>", "<geometry><box size=\"1 1 1\"/></geometry>");
+        refusal("<geometry><sphere radius=\"0.02\"/></geometry>", "<geometry><box size=\"1 1 1\"/></geometry>");
     assert!(message.contains("FR_calf") && message.contains("no foot"), "{message}");
-    let message = refusal("axis", "<axis xyz=\"0 1 0\"/>", "<axis xyz=\"0 0 1\"/>");
+    let message = refusal("<axis xyz=\"0 1 0\"/>", "<axis xyz=\"0 0 1\"/>");
     assert!(message.contains("FR_thigh_joint") && message.contains("axis (0, 0, 1)"), "{message}");
-    let message = refusal("limits", "lower=\"-0.863\"", "lower=\"0.9\"");
+    let message = refusal("lower=\"-0.863\"", "lower=\"0.9\"");
     assert!(message.contains("FR_hip_joint") && message.contains("0.9"), "{message}");
-    let message = refusal(
-        "legs",
-        "<joint name=\"FR_hip_joint\" type=\"revolute\">",
-        "<joint name=\"FR_hip_joint\" type=\"fixed\">",
-    );
-    assert!(message.contains("FR_thigh_joint") && message.contains("where a hip is"), "{message}");
     let message =
-        refusal("lengths", "<origin xyz=\"0 0 -0.213\" rpy=\"0 0 0\"/>", "<origin xyz=\"0 0 -0.2\" rpy=\"0 0 0\"/>");
+        refusal("<joint name=\"FR_hip_joint\" type=\"revolute\">", "<joint name=\"FR_hip_joint\" type=\"fixed\">");
+    assert!(message.contains("FR_thigh_joint") && message.contains("where a hip is"), "{message}");
+    let message = refusal("<origin xyz=\"0 0 -0.213\" rpy=\"0 0 0\"/>", "<origin xyz=\"0 0 -0.2\" rpy=\"0 0 0\"/>");
     assert!(message.contains("calf joint") && message.contains("alike"), "{message}");
-    let message = refusal("xml", "</robot>", "");
+    let message = refusal("</robot>", "");
     assert!(message.contains("go1.urdf"), "{message}");
 
     let error = RobotDescription::embedded("spot").unwrap_err();
     assert!(matches!(error, DescriptionError::Unknown { .. }) && error.to_string().contains("go1"));
     let missing = RobotDescription::from_folder(Path::new("/nowhere")).unwrap_err();
     assert!(matches!(missing, DescriptionError::Read { .. }));
-    let folder = Folder::new("toml", GO1, &GO1_TOML.replace("gear_ratio", "gear_ration"));
-    assert!(RobotDescription::from_folder(&folder.0).unwrap_err().to_string().contains("gear_ration"));
-    let folder = Folder::new("pose", GO1, &GO1_TOML.replace("-2.75", "-3.0"));
-    assert!(RobotDescription::from_folder(&folder.0).unwrap_err().to_string().contains("-3 rad"));
+    assert!(refused(GO1, &GO1_TOML.replace("gear_ratio", "gear_ration")).contains("gear_ration"));
+    assert!(refused(GO1, &GO1_TOML.replace("-2.75", "-3.0")).contains("-3 rad"));
 }

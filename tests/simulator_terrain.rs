@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 use quadfrog::robot::description::RobotDescription;
-use quadfrog::robot::{JointCommand, Joints, Leg, MotorCommand, Placement, Robot};
+use quadfrog::robot::{JointCommand, Leg, Placement, Robot};
 use quadfrog::sim::{SimConfig, Simulator, TerrainKind};
 
 fn config(kind: TerrainKind) -> SimConfig {
@@ -11,26 +11,12 @@ fn config(kind: TerrainKind) -> SimConfig {
     config
 }
 
-fn stance(robot: &RobotDescription) -> Joints {
-    let mut joints = Joints::default();
-    for leg in Leg::ALL {
-        let foot = Vector3::new(0.0, leg.side() * 0.12, -0.26);
-        let q = robot.leg_geometry.inverse(&foot, leg.side()).unwrap();
-        joints[3 * leg as usize..][..3].copy_from_slice(q.as_slice());
-    }
-    joints
-}
-
 fn stand(config: &SimConfig, seed: u64) -> (Simulator, JointCommand) {
     let robot = RobotDescription::embedded("go1").unwrap();
-    let joint_position = stance(&robot);
+    let joint_position = robot.leg_geometry.stance(&Vector3::new(0.0, 0.12, -0.26), &robot.lying_position);
     let mut simulator = Simulator::new(&robot, config).unwrap();
     simulator.place(&Placement { joint_position, lying: false, seed });
-    let mut command = JointCommand::default();
-    for (motor, position) in command.motor.iter_mut().zip(joint_position) {
-        *motor = MotorCommand { position, kp: 100.0, kd: 3.0, ..MotorCommand::default() };
-    }
-    (simulator, command)
+    (simulator, JointCommand::hold(&joint_position, 100.0, 3.0))
 }
 
 #[test]

@@ -3,7 +3,6 @@
 use super::ConfigError;
 use super::checked::Config;
 use super::files::SafetyFile;
-use crate::control::leg::stance_of;
 use crate::robot::Leg;
 use crate::robot::description::RobotDescription;
 use crate::sim::SimError;
@@ -150,7 +149,7 @@ impl Config {
         let value = format!("{:?}", chosen.stance_m);
         let (min_position, max_position) = robot.allowed_positions();
         for leg in Leg::ALL {
-            let foot = stance_of(&chosen.stance_leg(), leg);
+            let foot = leg.mirrored(&chosen.stance_leg());
             let q = robot
                 .leg_geometry
                 .inverse(&foot, leg.side())

@@ -110,19 +110,18 @@ impl Jump {
 
     /// Target of the legs in this tick.
     pub fn target(&self) -> LegTarget {
-        let theta_rad = self.theta_rad();
         LegTarget {
             gains: self.spec.gains,
             stance_leg: self.spec.stance_leg,
             vmc: self.spec.vmc,
             amplitudes_leg: self.amplitudes_leg,
-            theta_rad,
+            theta_rad: self.theta_rad(),
         }
     }
 
     /// Advances phase and progress with the newest state. To be called once per tick, before `target`.
     pub fn observe(&mut self, state: &RobotState, estimate: &Estimate, settings: &ControlSettings) -> TrialProgress {
-        if let Some(cause) = self.fall.observe(state, estimate, settings) {
+        if let Some(cause) = self.fall.observe(state, estimate, settings, f64::INFINITY) {
             return TrialProgress::Over(TrialEnd::Fell(cause));
         }
         let time_s = self.time_s();
@@ -182,27 +181,8 @@ pub struct FallWatch {
 }
 
 impl FallWatch {
-    /// Returns the cause of a fall. To be called once per tick.
+    /// Returns the cause of a fall; `most_rad` is a limit of the tilt beside those of a trial. To be called once per tick.
     pub fn observe(
-        &mut self,
-        state: &RobotState,
-        estimate: &Estimate,
-        settings: &ControlSettings,
-    ) -> Option<FallCause> {
-        self.detect(state, estimate, settings, f64::INFINITY)
-    }
-
-    /// As `observe`, for a robot that stands after the landing: its tilt limit is that of standing.
-    pub fn observe_standing(
-        &mut self,
-        state: &RobotState,
-        estimate: &Estimate,
-        settings: &ControlSettings,
-    ) -> Option<FallCause> {
-        self.detect(state, estimate, settings, settings.watchdog.stance_tilt_rad)
-    }
-
-    fn detect(
         &mut self,
         state: &RobotState,
         estimate: &Estimate,

@@ -22,11 +22,6 @@ pub struct LegTarget {
     pub theta_rad: f64,
 }
 
-/// Nominal foot position of `leg`, leg frame, m: y mirrored for a right leg.
-pub fn stance_of(stance_leg: &Vector3<f64>, leg: Leg) -> Vector3<f64> {
-    Vector3::new(stance_leg.x, leg.side() * stance_leg.y, stance_leg.z)
-}
-
 /// Foot positions and Jacobians of all legs at the joint angles, rad.
 pub fn feet(geometry: &LegGeometry, joint_position: &Joints) -> PerLeg<FootPosition> {
     Leg::ALL.map(|leg| geometry.foot(&leg_of(joint_position, leg as usize), leg.side()))
@@ -46,7 +41,7 @@ pub fn torques(
     for leg in Leg::ALL {
         let i = leg as usize;
         let dq = leg_of(joint_velocity, i);
-        let desired = stance_of(&target.stance_leg, leg);
+        let desired = leg.mirrored(&target.stance_leg);
         let mut force = impedance::force_leg(&target.gains, &desired, &feet[i], &dq);
         force += force_profile::force_leg(&target.amplitudes_leg[i], target.theta_rad);
         force.z += vmc_z[i];

@@ -44,13 +44,17 @@ impl CommandGate {
         }
         let mut passed = GateOutput { command: *wanted, limited: 0, fault: None };
         let mut torques = Joints::default();
+        let refused = |what| GateOutput {
+            command: damping,
+            limited: u16::MAX >> (16 - JOINTS),
+            fault: Some(Fault::NotFinite { what }),
+        };
         for joint in 0..JOINTS {
             let motor = &mut passed.command.motor[joint];
             let finite = [motor.position, motor.velocity, motor.kp, motor.kd, motor.torque];
             if !finite.iter().all(|value| value.is_finite()) {
                 self.reset();
-                let fault = Some(Fault::NotFinite { what: "a motor command" });
-                return GateOutput { command: damping, limited: u16::MAX >> (16 - JOINTS), fault };
+                return refused("a motor command");
             }
             let before = *motor;
             motor.position = motor.position.clamp(settings.min_position[joint], settings.max_position[joint]);
@@ -60,8 +64,7 @@ impl CommandGate {
             let feedback = motor.torque_at(state.joint_position[joint], state.joint_velocity[joint]) - motor.torque;
             if !feedback.is_finite() {
                 self.reset();
-                let fault = Some(Fault::NotFinite { what: "a joint's angle or velocity" });
-                return GateOutput { command: damping, limited: u16::MAX >> (16 - JOINTS), fault };
+                return refused("a joint's angle or velocity");
             }
             let mut torque = (motor.torque + feedback).clamp(-settings.max_torque[joint], settings.max_torque[joint]);
             if let Some(last) = self.last_torque {

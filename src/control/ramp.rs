@@ -2,20 +2,18 @@
 
 use super::limits::ticks;
 use super::settings::RampSettings;
-use crate::robot::{JOINTS, JointCommand, Joints, MotorCommand, RobotState};
+use crate::robot::{JointCommand, Joints, RobotState};
 
 /// Progress of a ramp.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[expect(missing_docs, reason = "the doc of the variant describes its field")]
 pub enum RampProgress {
     /// Under way.
     Moving,
     /// The joints are within the tolerance.
     Reached,
-    /// The joints are not within the tolerance after the time-out.
-    Late {
-        /// Largest joint error, rad.
-        error_rad: f64,
-    },
+    /// The joints are not within the tolerance after the time-out; the error is the largest of a joint.
+    Late { error_rad: f64 },
 }
 
 /// A ramp under way.
@@ -55,16 +53,7 @@ impl PoseRamp {
         // Smoothstep 3 s^2 - 2 s^3: starts and ends at rest.
         let smooth = part * part * (3.0 - 2.0 * part);
         self.elapsed += 1;
-        let mut command = JointCommand::default();
-        for joint in 0..JOINTS {
-            command.motor[joint] = MotorCommand {
-                position: self.from[joint] + smooth * (self.to[joint] - self.from[joint]),
-                velocity: 0.0,
-                kp: self.settings.kp,
-                kd: self.settings.kd,
-                torque: 0.0,
-            };
-        }
-        command
+        let position = std::array::from_fn(|joint| self.from[joint] + smooth * (self.to[joint] - self.from[joint]));
+        JointCommand::hold(&position, self.settings.kp, self.settings.kd)
     }
 }

@@ -5,9 +5,10 @@ use super::space::{Parameter, Space};
 use super::trial::{Trial, value_of};
 use serde::{Deserialize, Serialize};
 use std::cmp::Ordering;
+use strum::{EnumString, IntoStaticStr, VariantArray};
 
 /// Whether the objective is minimized or maximized; the discriminants are the journal's.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, strum::IntoStaticStr)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, IntoStaticStr)]
 #[serde(rename_all = "lowercase")]
 #[strum(serialize_all = "lowercase")]
 pub enum Direction {
@@ -27,7 +28,7 @@ impl Direction {
 
 /// The algorithm that proposes candidates.
 #[derive(
-    Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, strum::VariantArray, strum::IntoStaticStr,
+    Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, EnumString, IntoStaticStr, VariantArray,
 )]
 #[serde(rename_all = "lowercase")]
 #[strum(serialize_all = "lowercase")]
@@ -45,16 +46,11 @@ pub enum SamplerKind {
 
 impl SamplerKind {
     /// All samplers.
-    pub const ALL: &[SamplerKind] = <SamplerKind as strum::VariantArray>::VARIANTS;
+    pub const ALL: &[SamplerKind] = <SamplerKind as VariantArray>::VARIANTS;
 
     /// Returns the name in files, recordings and on the command line.
     pub fn name(self) -> &'static str {
         self.into()
-    }
-
-    /// Returns the sampler of that name.
-    pub fn from_name(name: &str) -> Option<SamplerKind> {
-        SamplerKind::ALL.iter().copied().find(|kind| kind.name() == name)
     }
 }
 

@@ -2,7 +2,7 @@
 //! same screen as the live session.
 
 use crate::optimize::ask::SamplerKind;
-use crate::telemetry::{ArmingCheck, ArmingCheckState, Counters, Mode, Tick};
+use crate::telemetry::{ArmingCheck, ArmingCheckState, Counters, Mode, Tick, TransitionCause};
 use crate::trial::{
     Approval, Backend, ExperimentStage, ParameterInfo, PointRecord, Proposal, ProposalInsight, SearchStatus, Task,
     TrialRecord,
@@ -161,6 +161,13 @@ pub struct Transition {
     pub to: Mode,
     /// Cause as text.
     pub cause: String,
+}
+
+impl Transition {
+    /// Whether the operator's STOP caused it.
+    pub fn is_stop(&self) -> bool {
+        self.cause == TransitionCause::Stop.to_string()
+    }
 }
 
 /// The experiment's stage and its trial.

@@ -9,7 +9,6 @@ use super::record::{
 use super::topic::Topic;
 use super::wire::{DecodeError, Way, decoded, encoded, one_of};
 use super::{frog, tick, trials};
-use crate::optimize::ask::SamplerKind;
 use crate::robot::LinkStatus;
 use crate::telemetry::Counters;
 use crate::trial::ParameterInfo;
@@ -148,7 +147,7 @@ fn session(way: Way, ours: &mut SessionInfo, m: &mut frog::Session) -> Result<()
         Way::Decode => {
             ours.backend = m.backend.parse().ok();
             ours.task = m.task.parse().ok();
-            ours.sampler = SamplerKind::from_name(&m.sampler);
+            ours.sampler = m.sampler.parse().ok();
             ours.approve = m.approve.parse().unwrap_or_default();
             ours.limits = m.limits.take().map(|m| decoded(health_limits, m)).transpose()?.unwrap_or_default();
         }

@@ -8,9 +8,11 @@
 mod files;
 mod urdf;
 
+use std::path::PathBuf;
+
 use nalgebra::{Matrix3, Vector3};
 
-pub use files::{DescriptionError, RobotFiles};
+pub use files::RobotFiles;
 
 use super::kinematics::LegGeometry;
 use super::{JOINTS, Joints, PerLeg};
@@ -30,36 +32,16 @@ pub struct RigidBody {
     pub collision: Vec<CollisionShape>,
 }
 
-/// A collision shape in the frame of its link.
+/// A collision shape in the frame of its link, lengths in m; `rotation` takes the axes of the shape to link axes.
 #[derive(Debug, Clone, PartialEq)]
+#[expect(missing_docs, reason = "the doc of the type describes the fields")]
 pub enum CollisionShape {
     /// A sphere.
-    Sphere {
-        /// Centre, m.
-        center: Vector3<f64>,
-        /// Radius, m.
-        radius: f64,
-    },
+    Sphere { center: Vector3<f64>, radius: f64 },
     /// A box.
-    Box {
-        /// Centre, m.
-        center: Vector3<f64>,
-        /// Rotation of the box's axes into link axes.
-        rotation: Matrix3<f64>,
-        /// Half of each edge, m.
-        half_extents: Vector3<f64>,
-    },
+    Box { center: Vector3<f64>, rotation: Matrix3<f64>, half_extents: Vector3<f64> },
     /// A cylinder along its own z axis.
-    Cylinder {
-        /// Centre, m.
-        center: Vector3<f64>,
-        /// Rotation of the cylinder's axes into link axes.
-        rotation: Matrix3<f64>,
-        /// Radius, m.
-        radius: f64,
-        /// Half of its length, m.
-        half_length: f64,
-    },
+    Cylinder { center: Vector3<f64>, rotation: Matrix3<f64>, radius: f64, half_length: f64 },
 }
 
 /// One leg: three bodies and their joints.
@@ -131,4 +113,22 @@ impl RobotDescription {
         }
         (lowest, highest)
     }
+}
+
+/// Error in a robot's description.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[expect(missing_docs, reason = "the message describes a variant and its fields")]
+pub enum DescriptionError {
+    /// No embedded robot has that name.
+    #[error("no robot named \"{name}\" is built in (built in: {known}); give the folder of its robot.toml instead")]
+    Unknown { name: String, known: String },
+    /// A file cannot be read.
+    #[error("{}: cannot be read: {reason}", file.display())]
+    Read { file: PathBuf, reason: String },
+    /// Syntax error in TOML or XML, or a missing or unknown key.
+    #[error("{}: {reason}", file.display())]
+    Syntax { file: PathBuf, reason: String },
+    /// A value or the structure is impossible for a quadruped.
+    #[error("{}: {element}: {problem}; {remedy}", file.display())]
+    Invalid { file: PathBuf, element: String, problem: String, remedy: &'static str },
 }

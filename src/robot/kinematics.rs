@@ -6,6 +6,8 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use super::{Joints, Leg};
+
 /// Lengths of a leg, m.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LegGeometry {
@@ -18,7 +20,7 @@ pub struct LegGeometry {
 }
 
 /// Position of the centre of a foot and its derivative with respect to the joint angles, leg frame.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct FootPosition {
     /// Position in the leg frame, m.
     pub position_leg: Vector3<f64>,
@@ -59,13 +61,6 @@ impl LegGeometry {
         }
     }
 
-    /// Returns the positions of thigh joint, calf joint and foot in the leg frame, m; arguments as of
-    /// [`LegGeometry::foot`].
-    pub fn points(&self, q: &Vector3<f64>, side: f64) -> [Vector3<f64>; 3] {
-        let end = |thigh, calf| LegGeometry { thigh, calf, ..*self }.foot(q, side).position_leg;
-        [end(0.0, 0.0), end(self.thigh, 0.0), end(self.thigh, self.calf)]
-    }
-
     /// Returns the joint angles for the foot at `position_leg` (m), with the knee backwards (calf angle negative) and
     /// the foot below the hip axis.
     ///
@@ -98,5 +93,17 @@ impl LegGeometry {
         // (-x, a) = (l2 sin q2 + l3 sin(q2+q3), l2 cos q2 + l3 cos(q2+q3)).
         let thigh = (-x).atan2(a) - (l3 * calf.sin()).atan2(l2 + l3 * calf.cos());
         Ok(Vector3::new(hip, thigh, calf))
+    }
+
+    /// Returns the joint angles for all feet at `foot_leg` (m) in their leg frames, y mirrored for right legs. A leg
+    /// that cannot reach the point keeps its angles of `otherwise`.
+    pub fn stance(&self, foot_leg: &Vector3<f64>, otherwise: &Joints) -> Joints {
+        let mut joints = *otherwise;
+        for leg in Leg::ALL {
+            if let Ok(q) = self.inverse(&leg.mirrored(foot_leg), leg.side()) {
+                joints[3 * leg as usize..][..3].copy_from_slice(q.as_slice());
+            }
+        }
+        joints
     }
 }

@@ -55,6 +55,11 @@ impl Leg {
         }
     }
 
+    /// Returns a point of a left leg's frame as that of this leg: y is mirrored for a right leg.
+    pub fn mirrored(self, point_leg: &Vector3<f64>) -> Vector3<f64> {
+        Vector3::new(point_leg.x, self.side() * point_leg.y, point_leg.z)
+    }
+
     /// +1 for a front leg, -1 for a rear one.
     pub const fn end(self) -> f64 {
         match self {
@@ -78,7 +83,7 @@ pub fn leg_of(joints: &Joints, leg: usize) -> Vector3<f64> {
 }
 
 /// Measurement of the inertial unit.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Imu {
     /// Rotation from body axes to world axes.
     pub orientation_world: UnitQuaternion<f64>,
@@ -86,12 +91,6 @@ pub struct Imu {
     pub gyro_body: Vector3<f64>,
     /// Specific force (acceleration less gravity) in body axes, m/s^2; (0, 0, +9.81) at rest.
     pub accel_body: Vector3<f64>,
-}
-
-impl Default for Imu {
-    fn default() -> Self {
-        Imu { orientation_world: UnitQuaternion::identity(), gyro_body: Vector3::zeros(), accel_body: Vector3::zeros() }
-    }
 }
 
 /// True state, known in simulation alone. Used for the objective in simulation and to evaluate the estimator.
@@ -127,7 +126,7 @@ pub struct Battery {
 }
 
 /// One state message.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct RobotState {
     /// Clock of the robot, ms since its boot; it decreases when the robot has rebooted.
     pub robot_time_ms: u32,
@@ -155,23 +154,6 @@ pub struct RobotState {
 /// clock wraps around after 49 days.
 pub fn robot_time_passed(now_ms: u32, before_ms: u32) -> i32 {
     now_ms.wrapping_sub(before_ms) as i32
-}
-
-impl Default for RobotState {
-    fn default() -> Self {
-        RobotState {
-            robot_time_ms: 0,
-            joint_position: [0.0; JOINTS],
-            joint_velocity: [0.0; JOINTS],
-            joint_torque: [0.0; JOINTS],
-            imu: Imu::default(),
-            foot_force: [0.0; LEGS],
-            motor_temperature_c: [0.0; JOINTS],
-            motor_enabled: [false; JOINTS],
-            battery: None,
-            truth: None,
-        }
-    }
 }
 
 /// Command to one motor: `torque + kp (position - q) + kd (velocity - dq)`, computed inside the motor.
@@ -214,11 +196,12 @@ impl JointCommand {
 
     /// Commands torques alone, N m.
     pub fn torques(torque: &Joints) -> Self {
-        let mut command = JointCommand::default();
-        for (motor, &torque) in command.motor.iter_mut().zip(torque) {
-            motor.torque = torque;
-        }
-        command
+        JointCommand { motor: torque.map(|torque| MotorCommand { torque, ..MotorCommand::default() }) }
+    }
+
+    /// Holds the joint angles `position` (rad) at rest with stiffness `kp` (N m/rad) and damping `kd` (N m s/rad).
+    pub fn hold(position: &Joints, kp: f64, kd: f64) -> Self {
+        JointCommand { motor: position.map(|position| MotorCommand { position, kp, kd, ..MotorCommand::default() }) }
     }
 }
 
@@ -235,19 +218,12 @@ pub struct Placement {
 
 /// No state is available, or the command could not be sent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[expect(missing_docs, reason = "the message describes a variant, the name of a field holds its unit")]
 pub enum RobotError {
-    /// No valid state since the given time.
     #[error("no state from the robot for {age_ms} ms")]
-    Silent {
-        /// Age of the newest valid state, ms.
-        age_ms: u32,
-    },
-    /// The operating system did not send the command.
+    Silent { age_ms: u32 },
     #[error("the command could not be sent to the robot (error {errno})")]
-    Send {
-        /// Error number of the operating system.
-        errno: i32,
-    },
+    Send { errno: i32 },
 }
 
 /// Statistics of the link to a robot. Counts are since the program's start.

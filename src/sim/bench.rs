@@ -8,8 +8,7 @@ use std::time::Instant;
 
 use super::{RobotModel, SimConfig, SimState, Simulator};
 use crate::robot::description::RobotDescription;
-use crate::robot::kinematics::LegGeometry;
-use crate::robot::{JointCommand, Joints, Leg, MotorCommand, Placement, Robot};
+use crate::robot::{JointCommand, Joints, Leg, Placement, Robot};
 use nalgebra::Vector3;
 
 /// A scene with a known number of contacts.
@@ -109,7 +108,10 @@ impl SimulatorBench {
         let mut simulator = Simulator::new(&self.robot, &self.config).expect("the shipped configuration is valid");
         let folded = self.robot.lying_position;
         let joint_position = match scene {
-            BenchScene::Flight | BenchScene::Standing => standing(&self.robot.leg_geometry),
+            // Feet 0.14 m beside and 0.25 m below the hips.
+            BenchScene::Flight | BenchScene::Standing => {
+                self.robot.leg_geometry.stance(&Vector3::new(0.0, 0.14, -0.25), &folded)
+            }
             BenchScene::Lying => folded,
             // Hips inwards until their cylinders touch, feet folded behind.
             BenchScene::Sprawling => std::array::from_fn(|i| match i % 3 {
@@ -119,10 +121,7 @@ impl SimulatorBench {
             }),
         };
         simulator.place(&Placement { joint_position, lying: scene != BenchScene::Standing, seed: 0 });
-        let mut command = JointCommand::default();
-        for (motor, position) in command.motor.iter_mut().zip(joint_position) {
-            *motor = MotorCommand { position, kp: 60.0, kd: 2.0, ..MotorCommand::default() };
-        }
+        let mut command = JointCommand::hold(&joint_position, 60.0, 2.0);
         let mut start = None;
         if scene == BenchScene::Flight {
             let mut state = *simulator.state();
@@ -178,17 +177,6 @@ impl SceneRun {
     pub fn contacts(&self) -> usize {
         self.simulator.contact_count()
     }
-}
-
-/// Returns the joint angles of a stance with the feet 0.14 m beside and 0.25 m below the hips.
-fn standing(geometry: &LegGeometry) -> Joints {
-    let mut joints = Joints::default();
-    for leg in Leg::ALL {
-        let foot = Vector3::new(0.0, leg.side() * 0.14, -0.25);
-        let q = geometry.inverse(&foot, leg.side()).expect("the stance is within reach");
-        joints[3 * leg as usize..][..3].copy_from_slice(q.as_slice());
-    }
-    joints
 }
 
 /// Returns the mean time of one call of `f` over about `seconds`.

@@ -24,14 +24,10 @@ const SPEED_MARGIN: f64 = 2.0;
 /// Geometry that can touch the ground.
 #[derive(Debug, Clone, Copy)]
 enum ProbeShape {
-    Sphere {
-        radius: f64,
-    },
+    /// Its radius is zero for a corner.
+    Sphere { radius: f64 },
     /// A circle about `axis` (link axes).
-    Rim {
-        radius: f64,
-        axis: Vector3<f64>,
-    },
+    Rim { radius: f64, axis: Vector3<f64> },
 }
 
 /// A sphere or rim of a link that can touch the ground.
@@ -145,12 +141,7 @@ impl Collider {
     fn add_bound(&mut self, first: usize) {
         let probes = &self.probes[first..];
         let center = probes.iter().map(|p| p.center).sum::<Vector3<f64>>() / probes.len() as f64;
-        let reach = |p: &Probe| {
-            let radius = match p.shape {
-                ProbeShape::Sphere { radius } | ProbeShape::Rim { radius, .. } => radius,
-            };
-            (p.center - center).norm() + radius
-        };
+        let reach = |p: &Probe| (p.center - center).norm() + p.shape.radius();
         let radius = probes.iter().map(reach).fold(0.0, f64::max);
         let Probe { leg, link, .. } = probes[0];
         self.bounds.push(BoundingSphere { leg, link, center, radius, first, count: probes.len() });

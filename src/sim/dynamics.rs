@@ -20,7 +20,7 @@ use nalgebra::{Matrix3, Vector3};
 use simba::simd::{SimdComplexField, SimdValue};
 
 use super::model::{Lanes, LegsModel, RobotModel};
-use super::spatial::{AxisRotation, SpatialForce, SpatialInertia, SpatialMotion, SymmetricMatrix};
+use super::spatial::{AxisRotation, SpatialForce, SpatialInertia, SpatialMotion};
 use super::state::{Acceleration, SimState};
 use crate::robot::{GRAVITY, JOINTS, Joints, LEGS, PerLeg};
 
@@ -278,18 +278,10 @@ impl Dynamics {
         let up = SpatialMotion { linear: -gravity_body, angular: Vector3::zeros() };
         let own = model.trunk.times(&up).plus(&velocity.cross_force(&model.trunk.times(&velocity)));
         let bias = own.plus(&SpatialForce { linear: sums(&leg_force.linear), angular: sums(&leg_force.angular) });
-        let s = &leg_inertia.second;
         let composite = model.trunk.plus(&SpatialInertia {
             mass: sum(leg_inertia.mass),
             first: sums(&leg_inertia.first),
-            second: SymmetricMatrix {
-                xx: sum(s.xx),
-                xy: sum(s.xy),
-                xz: sum(s.xz),
-                yy: sum(s.yy),
-                yz: sum(s.yz),
-                zz: sum(s.zz),
-            },
+            second: leg_inertia.second.map(sum),
         });
 
         // I_A = I_0 - sum F G; only the lower triangle is used.
@@ -427,7 +419,7 @@ fn sums(v: &Vector3<Lanes>) -> Vector3<f64> {
 }
 
 /// Returns a spatial inertia as the columns of a 6x6 matrix, linear part first: [[m 1, -hx], [hx, I]].
-fn columns(inertia: &SpatialInertia<f64>) -> [Six; 6] {
+pub(super) fn columns(inertia: &SpatialInertia<f64>) -> [Six; 6] {
     let (m, h, i) = (inertia.mass, &inertia.first, &inertia.second);
     [
         [m, 0.0, 0.0, 0.0, h.z, -h.y],

@@ -29,7 +29,7 @@ pub(super) fn semi_implicit_euler(state: &mut SimState, velocity: &GeneralizedVe
     // p' = p + h R v,  R' = R exp(h w),  v' = exp(h w)^T v
     let turn = UnitQuaternion::from_scaled_axis(angular * h);
     state.position_world += state.orientation_world * (linear * h);
-    state.orientation_world = normalized(state.orientation_world.quaternion() * turn.quaternion());
+    state.orientation_world = UnitQuaternion::new_normalize(state.orientation_world.quaternion() * turn.quaternion());
     state.velocity_body = turn.inverse_transform_vector(&linear);
     state.angular_velocity_body = angular;
     for i in 0..JOINTS {
@@ -63,7 +63,9 @@ impl StateDerivative {
         let a = &self.acceleration;
         SimState {
             position_world: state.position_world + self.position_world * h,
-            orientation_world: normalized(state.orientation_world.quaternion() + self.orientation_world * h),
+            orientation_world: UnitQuaternion::new_normalize(
+                state.orientation_world.quaternion() + self.orientation_world * h,
+            ),
             joint_position: std::array::from_fn(|i| state.joint_position[i] + h * self.joint_position[i]),
             velocity_body: state.velocity_body + a.linear_body * h,
             angular_velocity_body: state.angular_velocity_body + a.angular_body * h,
@@ -103,9 +105,4 @@ pub(super) fn runge_kutta_4(
         },
     };
     mean.advance(state, h)
-}
-
-/// Returns the unit quaternion nearest to `q`.
-fn normalized(q: Quaternion<f64>) -> UnitQuaternion<f64> {
-    UnitQuaternion::new_normalize(q)
 }

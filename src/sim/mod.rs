@@ -44,7 +44,7 @@ use collision::Collider;
 use contact::ContactSolver;
 use dynamics::Dynamics;
 use sensors::Sensors;
-use step::PeriodContacts;
+use state::PeriodContacts;
 use terrain::Terrain;
 
 /// A simulated robot.

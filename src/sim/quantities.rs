@@ -4,9 +4,9 @@
 //! Velocity vectors of 18 are ordered: linear velocity of the trunk's origin (body axes), angular velocity (body axes),
 //! joints.
 
-use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+use nalgebra::{SMatrix, SVector, Vector3};
 
-use super::dynamics::{Dynamics, Six, add_scaled};
+use super::dynamics::{Dynamics, Six, add_scaled, columns};
 use super::model::RobotModel;
 use super::spatial::SpatialMotion;
 use super::state::{Acceleration, SimState};
@@ -67,16 +67,9 @@ impl RobotModel {
     /// M(q): kg, kg m, kg m^2.
     pub fn mass_matrix(&self, state: &SimState) -> SMatrix<f64, DOF, DOF> {
         let dynamics = self.dynamics(state);
-        let composite = &dynamics.composite;
         let mut matrix = SMatrix::<f64, DOF, DOF>::zeros();
-        // I_0 = [[m 1, -hx], [hx, I]]
-        matrix.fixed_view_mut::<3, 3>(0, 0).fill_diagonal(composite.mass);
-        let hx = composite.first.cross_matrix();
-        matrix.fixed_view_mut::<3, 3>(3, 0).copy_from(&hx);
-        matrix.fixed_view_mut::<3, 3>(0, 3).copy_from(&-hx);
-        let i = &composite.second;
-        let inertia = Matrix3::new(i.xx, i.xy, i.xz, i.xy, i.yy, i.yz, i.xz, i.yz, i.zz);
-        matrix.fixed_view_mut::<3, 3>(3, 3).copy_from(&inertia);
+        let composite = SMatrix::<f64, 6, 6>::from(columns(&dynamics.composite));
+        matrix.fixed_view_mut::<6, 6>(0, 0).copy_from(&composite);
         for l in 0..LEGS {
             let j = 6 + 3 * l;
             let coupling = SMatrix::<f64, 6, 3>::from(dynamics.coupling(l));

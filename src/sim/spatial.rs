@@ -60,6 +60,15 @@ pub(super) struct SymmetricMatrix<T> {
     pub zz: T,
 }
 
+impl<T: Copy> SymmetricMatrix<T> {
+    /// Applies `f` to each element.
+    #[inline]
+    pub fn map<U>(&self, f: impl Fn(T) -> U) -> SymmetricMatrix<U> {
+        let SymmetricMatrix { xx, xy, xz, yy, yz, zz } = *self;
+        SymmetricMatrix { xx: f(xx), xy: f(xy), xz: f(xz), yy: f(yy), yz: f(yz), zz: f(zz) }
+    }
+}
+
 impl<T: Real> SymmetricMatrix<T> {
     #[inline]
     fn plus(&self, o: &SymmetricMatrix<T>) -> SymmetricMatrix<T> {
@@ -211,7 +220,7 @@ pub(super) struct SpatialMotion<T> {
 /// A spatial force (force, and moment about a frame's origin) or momentum.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct SpatialForce<T> {
-    /// SpatialForce.
+    /// Force or linear momentum.
     pub linear: Vector3<T>,
     /// Moment about the origin.
     pub angular: Vector3<T>,

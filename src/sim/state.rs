@@ -2,10 +2,10 @@
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-use crate::robot::{JOINTS, Joints};
+use crate::robot::{Joints, PerLeg};
 
 /// Position and velocity of every part.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SimState {
     /// Position of the trunk's origin, world, m.
     pub position_world: Vector3<f64>,
@@ -19,19 +19,6 @@ pub struct SimState {
     pub angular_velocity_body: Vector3<f64>,
     /// Joint velocities, rad/s.
     pub joint_velocity: Joints,
-}
-
-impl Default for SimState {
-    fn default() -> Self {
-        SimState {
-            position_world: Vector3::zeros(),
-            orientation_world: UnitQuaternion::identity(),
-            joint_position: [0.0; JOINTS],
-            velocity_body: Vector3::zeros(),
-            angular_velocity_body: Vector3::zeros(),
-            joint_velocity: [0.0; JOINTS],
-        }
-    }
 }
 
 impl SimState {
@@ -54,4 +41,17 @@ pub struct Acceleration {
     pub angular_body: Vector3<f64>,
     /// Joint accelerations, rad/s^2.
     pub joint: Joints,
+}
+
+/// Contact with the ground during one control period.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct PeriodContacts {
+    /// Whether each foot had a contact force in the last step.
+    pub foot: PerLeg<bool>,
+    /// Impulse on each foot over the period, world, N s.
+    pub foot_impulse_world: PerLeg<Vector3<f64>>,
+    /// Normal component of `foot_impulse_world`, out of the ground, N s.
+    pub foot_normal_impulse: PerLeg<f64>,
+    /// Whether any other part had a contact force.
+    pub body: bool,
 }

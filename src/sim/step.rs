@@ -1,6 +1,6 @@
 //! One control period: motor torques, free motion, contacts, impulses, positions.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Matrix3;
 
 use super::Simulator;
 use super::collision::Collider;
@@ -8,20 +8,8 @@ use super::dynamics::{Dynamics, add_scaled};
 use super::integrate::{free_velocity, runge_kutta_4, semi_implicit_euler};
 use super::joint_stop::add_joint_constraints;
 use super::motion::{GeneralizedVelocity, StepContext};
-use crate::robot::{CONTROL_PERIOD_S, JOINTS, JointCommand, PerLeg};
-
-/// Contact with the ground during one control period.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct PeriodContacts {
-    /// Whether each foot had a contact force in the last step.
-    pub foot: PerLeg<bool>,
-    /// Impulse on each foot over the period, world, N s.
-    pub foot_impulse_world: PerLeg<Vector3<f64>>,
-    /// Normal component of `foot_impulse_world`, out of the ground, N s.
-    pub foot_normal_impulse: PerLeg<f64>,
-    /// Whether any other part had a contact force.
-    pub body: bool,
-}
+use super::state::PeriodContacts;
+use crate::robot::{CONTROL_PERIOD_S, JOINTS, JointCommand};
 
 impl Simulator {
     /// Advances by one control period under `command`.

@@ -6,51 +6,35 @@ use strum::{IntoStaticStr, VariantArray};
 /// An arming check: a condition that must hold before the robot is energised. The order is the number in recordings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, IntoStaticStr, VariantArray)]
 #[strum(serialize_all = "lowercase")]
+#[expect(missing_docs, reason = "`control::arming` and `session::arming_checklist` describe each check")]
 pub enum ArmingCheck {
-    /// The robot's newest state is recent.
     #[strum(serialize = "state fresh")]
     StateFresh,
-    /// Few states are lost on the way.
     #[strum(serialize = "packet loss")]
     Loss,
-    /// No state arrives with a wrong checksum.
     Checksums,
-    /// The trunk is level.
     Upright,
-    /// Every joint is inside its limits.
     #[strum(serialize = "joints inside limits")]
     JointsInside,
-    /// The joints are near the folded pose, where the stand-up ramp begins.
     #[strum(serialize = "lying down")]
     LyingDown,
-    /// The charge suffices for a series of jumps.
     Battery,
-    /// No motor is hot.
     #[strum(serialize = "motors cool")]
     MotorsCool,
-    /// The robot lies still: the gyroscope's bias can be trusted.
     #[strum(serialize = "gyro still")]
     GyroStill,
-    /// Ticks begin on time.
     #[strum(serialize = "loop on time")]
     OnTime,
-    /// Every tick is recorded.
     Recorder,
-    /// The disk has space for the recording.
     #[strum(serialize = "disk space")]
     Disk,
-    /// Confirmed by the operator: the robot is in low-level mode and was damped with the remote before.
     #[strum(serialize = "low-level mode, damped")]
     LowLevel,
-    /// Confirmed by the operator: the configuration is the intended one.
     Configuration,
-    /// Confirmed by the operator: no person is near the robot, and the remote is in hand.
     #[strum(serialize = "area clear, remote in hand")]
     AreaClear,
-    /// The STOP key was pressed and acknowledged once in this session.
     #[strum(serialize = "STOP tested")]
     StopTested,
-    /// Every motor reports servo mode, so that all of them follow commands.
     #[strum(serialize = "motors follow")]
     MotorsFollow,
 }
@@ -181,13 +165,8 @@ pub struct ArmingFindings(pub [ArmingFinding; ArmingCheck::CONTROL.len()]);
 impl Default for ArmingFindings {
     /// Nothing measured yet: every check fails.
     fn default() -> ArmingFindings {
-        ArmingFindings(ArmingCheck::CONTROL.map(|check| ArmingFinding {
-            check,
-            state: ArmingCheckState::Failed,
-            measured: f64::NAN,
-            allowed: f64::NAN,
-            joint: None,
-        }))
+        let (state, measured, allowed) = (ArmingCheckState::Failed, f64::NAN, f64::NAN);
+        ArmingFindings(ArmingCheck::CONTROL.map(|check| ArmingFinding { check, state, measured, allowed, joint: None }))
     }
 }
 

@@ -36,6 +36,7 @@ pub struct Permit {
 
 /// A command of the session to the control thread. STOP has a latch of its own.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[expect(missing_docs, reason = "the doc of the variant describes its field")]
 pub enum Command {
     /// Take control of an observed robot: damping is sent from now on.
     TakeControl,
@@ -53,11 +54,8 @@ pub enum Command {
     EndReview,
     /// The session ends: land, sit down, and never energise again.
     Leave,
-    /// Acknowledge DAMPED or FAULT: back to DISARMED.
-    Acknowledge {
-        /// Count of STOPs that are acknowledged; a later STOP stays set.
-        stops: u64,
-    },
+    /// Acknowledge DAMPED or FAULT and the first `stops` STOPs: back to DISARMED. A later STOP stays set.
+    Acknowledge { stops: u64 },
 }
 
 impl std::fmt::Display for Command {

@@ -1,16 +1,16 @@
 //! Mode of the machine, phase of a jump and cause of a change of mode.
 
+use serde::{Deserialize, Serialize};
 use strum::{IntoStaticStr, VariantArray};
 
 use super::{FallCause, Fault};
 
 /// Mode of the machine; `control::mode::next` is the only function that changes it. The order is the number in recordings.
-#[derive(
-    Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize, IntoStaticStr, VariantArray,
-)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, IntoStaticStr, VariantArray)]
 #[strum(serialize_all = "UPPERCASE")]
 pub enum Mode {
     /// No state from the robot; nothing is sent.
+    #[default]
     Offline,
     /// States arrive; nothing is sent.
     Observe,
@@ -62,10 +62,11 @@ impl Mode {
 }
 
 /// Phase of a jump. The order is the number in recordings.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, IntoStaticStr, VariantArray)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, IntoStaticStr, VariantArray)]
 #[strum(serialize_all = "lowercase")]
 pub enum Phase {
     /// Feet on the ground, no force profile.
+    #[default]
     Stance,
     /// The oscillator is between pi and 2 pi: the force profile acts.
     Impulse,
@@ -87,6 +88,7 @@ impl Phase {
 
 /// Cause of a change of mode.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[expect(missing_docs, reason = "the name of the field holds its unit")]
 pub enum TransitionCause {
     /// The operator's STOP.
     Stop,
@@ -101,10 +103,7 @@ pub enum TransitionCause {
     /// A failsafe or the last gate.
     Fault(Fault),
     /// The robot waited for too long in READY or REVIEW.
-    Idle {
-        /// Allowed, s.
-        allowed_s: f64,
-    },
+    Idle { allowed_s: f64 },
 }
 
 impl std::fmt::Display for TransitionCause {
@@ -116,9 +115,7 @@ impl std::fmt::Display for TransitionCause {
             TransitionCause::Connected => write!(f, "the robot answers"),
             TransitionCause::Fell(cause) => write!(f, "fell: {cause}"),
             TransitionCause::Fault(fault) => write!(f, "{fault}"),
-            TransitionCause::Idle { allowed_s } => {
-                write!(f, "idle: no approval or verdict for {allowed_s:.0} s")
-            }
+            TransitionCause::Idle { allowed_s } => write!(f, "idle: no approval or verdict for {allowed_s:.0} s"),
         }
     }
 }

@@ -3,10 +3,10 @@
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::{Mode, Phase};
-use crate::robot::{JointCommand, Joints, LEGS, LinkStatus, PerLeg, RobotState};
+use crate::robot::{JointCommand, Joints, LinkStatus, PerLeg, RobotState};
 
 /// Estimate of the base and the feet.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Estimate {
     /// Position of the trunk's origin, world, m.
     pub position_world: Vector3<f64>,
@@ -24,20 +24,6 @@ pub struct Estimate {
     pub foot_position_leg: PerLeg<Vector3<f64>>,
 }
 
-impl Default for Estimate {
-    fn default() -> Self {
-        Estimate {
-            position_world: Vector3::zeros(),
-            velocity_world: Vector3::zeros(),
-            orientation_world: UnitQuaternion::identity(),
-            angular_velocity_body: Vector3::zeros(),
-            roll_pitch_yaw: Vector3::zeros(),
-            contact: [false; LEGS],
-            foot_position_leg: [Vector3::zeros(); LEGS],
-        }
-    }
-}
-
 /// Durations of the stages of a tick, ns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct StageTimes {
@@ -52,7 +38,7 @@ pub struct StageTimes {
 }
 
 /// Record of one control tick.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Tick {
     /// Count of ticks since the engine started.
     pub number: u64,
@@ -80,26 +66,6 @@ pub struct Tick {
     pub limited: u16,
     /// Time per stage.
     pub stages: StageTimes,
-}
-
-impl Default for Tick {
-    fn default() -> Self {
-        Tick {
-            number: 0,
-            time_ns: 0,
-            mode: Mode::Offline,
-            phase: Phase::Stance,
-            trial: None,
-            trial_time_s: 0.0,
-            theta_rad: 0.0,
-            state: RobotState::default(),
-            estimate: Estimate::default(),
-            torque_demanded: Joints::default(),
-            command: JointCommand::default(),
-            limited: 0,
-            stages: StageTimes::default(),
-        }
-    }
 }
 
 /// Counters since the engine started.

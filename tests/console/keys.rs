@@ -1,4 +1,4 @@
-//! Keys in, wishes out: what the operator's keys can and cannot do, on every screen.
+//! Keys in, requests out, on every screen.
 
 mod support;
 
@@ -13,17 +13,7 @@ use quadfrog_console::model::View;
 use quadfrog_console::model::dialog::Dialog;
 use quadfrog_console::settings::{ConsoleSettings, DEFAULT};
 use strum::VariantArray;
-use support::{Console, proposal, session, trial};
-
-fn wishes(effects: &[Effect]) -> Vec<OperatorRequest> {
-    effects
-        .iter()
-        .filter_map(|effect| match effect {
-            Effect::Request(intent) => Some(intent.clone()),
-            _ => None,
-        })
-        .collect()
-}
+use support::{Console, VIEWS, proposal, requests, session, trial};
 
 fn approval(trial: u32, revision: u32) -> Vec<OperatorRequest> {
     vec![OperatorRequest::Approve { trial, revision }]
@@ -39,11 +29,11 @@ fn a_jump_needs_two_presses_at_two_moments() {
     console.wait(650);
     assert_eq!(console.press(&["g"]), [], "750 ms after the press before");
     console.wait(750);
-    assert_eq!(wishes(&console.press(&["g"])), approval(0, 0));
+    assert_eq!(console.requests(&["g"]), approval(0, 0));
     assert!(console.model.dialog.is_none());
 }
 
-/// (A danger once: a key that is held down repeats itself for the first time after up to 660 ms.)
+/// A key that is held down repeats itself for the first time after up to 660 ms.
 #[test]
 fn a_key_that_is_held_down_never_approves() {
     let mut console = Console::ready();
@@ -76,7 +66,7 @@ fn an_approval_is_of_the_card_that_was_seen() {
     assert!(console.model.dialog.is_none(), "the card has changed under the question");
     assert_eq!(console.press(&["g"]), [], "this is the first press for the new card");
     console.wait(900);
-    assert_eq!(wishes(&console.press(&["g"])), approval(0, 1));
+    assert_eq!(console.requests(&["g"]), approval(0, 1));
 }
 
 #[test]
@@ -86,7 +76,7 @@ fn an_approval_ends_with_readiness() {
         console.press(&["g"]);
         console.mode(mode);
         console.wait(1000);
-        assert_eq!(wishes(&console.press(&["g"])), [], "{mode:?}");
+        assert_eq!(console.requests(&["g"]), [], "{mode:?}");
     }
 }
 
@@ -94,7 +84,7 @@ fn an_approval_ends_with_readiness() {
 fn stop_works_on_every_screen_and_over_every_dialog() {
     for stop in ["Space", "F12"] {
         for &mode in Mode::ALL {
-            for view in ["1", "2", "3", "4", "5", "6"] {
+            for view in VIEWS {
                 let mut console = Console::proposed();
                 console.press(&[view]);
                 console.mode(mode);
@@ -119,13 +109,14 @@ fn a_text_field_takes_space_only_while_the_robot_is_not_armed() {
         let effects = console.press(keys);
         (effects, console)
     };
+    let noted = [OperatorRequest::Note { trial: 0, text: "ok y".into() }];
     let (effects, _) = note(Mode::Disarmed, &["o", "k", "Space", "y", "Enter"]);
-    assert_eq!(wishes(&effects), [OperatorRequest::Note { trial: 0, text: "ok y".into() }]);
+    assert_eq!(requests(&effects), noted);
     let (effects, console) = note(Mode::Review, &["o", "k", "Space"]);
     assert_eq!(effects, [Effect::Stop]);
     assert!(matches!(console.model.dialog, Some(Dialog::Field { .. })), "the half-written note stays");
     let (effects, _) = note(Mode::Review, &["o", "k", "_", "y", "Enter"]);
-    assert_eq!(wishes(&effects), [OperatorRequest::Note { trial: 0, text: "ok y".into() }]);
+    assert_eq!(requests(&effects), noted);
     let (effects, _) = note(Mode::Disarmed, &["F12"]);
     assert_eq!(effects, [Effect::Stop], "F12 is STOP in a field too");
 }
@@ -135,7 +126,7 @@ fn any_key_cancels_a_countdown_and_stop_stops_it() {
     for key in ["x", "g", "Enter", "Esc", "1", "q"] {
         let mut console = Console::ready();
         console.mode(Mode::Countdown);
-        assert_eq!(wishes(&console.press(&[key])), [OperatorRequest::Cancel], "{key}");
+        assert_eq!(console.requests(&[key]), [OperatorRequest::Cancel], "{key}");
     }
     let mut console = Console::ready();
     console.mode(Mode::Countdown);
@@ -175,7 +166,7 @@ fn verdicts_are_legal_in_review_alone() {
     for (key, intent) in verdicts {
         for mode in [Mode::Review, Mode::Damped, Mode::Disarmed] {
             let mut console = Console::review(mode, Verdict::Accept);
-            let sent = wishes(&console.press(&[key]));
+            let sent = console.requests(&[key]);
             assert_eq!(sent.as_slice(), std::slice::from_ref(&intent), "{key} in {mode:?}");
         }
         let mut console = Console::ready();
@@ -189,14 +180,14 @@ fn undo_is_offered_while_the_session_says_so() {
     let mut console = Console::ready();
     assert_eq!(console.press(&["u"]), []);
     console.record(Record::Stage(StageRecord { stage: ExperimentStage::Proposed, trial: 0, can_undo: true }));
-    assert_eq!(wishes(&console.press(&["u"])), [OperatorRequest::Undo]);
+    assert_eq!(console.requests(&["u"]), [OperatorRequest::Undo]);
 }
 
 #[test]
 fn an_override_is_checked_and_leaves_on_enter() {
     let mut console = Console::ready();
     assert_eq!(console.press(&["o", "Down", "1", "2", "0", ".", "5"]), [], "nothing is sent while it is typed");
-    let sent = wishes(&console.press(&["Enter"]));
+    let sent = console.requests(&["Enter"]);
     assert_eq!(sent, [OperatorRequest::Override { parameter: "Fx".into(), value: 120.5 }]);
 
     let mut console = Console::ready();
@@ -206,7 +197,7 @@ fn an_override_is_checked_and_leaves_on_enter() {
 
     // 1 % and 10 % of the range of Fx, 150 N, from 75 N.
     let mut console = Console::ready();
-    let sent = wishes(&console.press(&["o", "Down", "Right", "PgUp", "Left", "Right", "Enter"]));
+    let sent = console.requests(&["o", "Down", "Right", "PgUp", "Left", "Right", "Enter"]);
     let [OperatorRequest::Override { parameter, value }] = sent.as_slice() else { panic!("{sent:?}") };
     assert_eq!(parameter, "Fx");
     assert!((value - 91.5).abs() < 1e-9, "{value}");
@@ -214,20 +205,20 @@ fn an_override_is_checked_and_leaves_on_enter() {
     // Steps end at the bound.
     let mut console = Console::ready();
     let keys: Vec<&str> = ["o", "Down"].into_iter().chain(["PgUp"; 12]).chain(["Enter"]).collect();
-    assert_eq!(wishes(&console.press(&keys)), [OperatorRequest::Override { parameter: "Fx".into(), value: 150.0 }]);
+    assert_eq!(console.requests(&keys), [OperatorRequest::Override { parameter: "Fx".into(), value: 150.0 }]);
 }
 
 #[test]
 fn letters_are_not_typed_into_an_override() {
     let mut console = Console::ready();
     console.press(&["o", "9", "k", "q", "0"]);
-    let sent = wishes(&console.press(&["Enter"]));
+    let sent = console.requests(&["Enter"]);
     assert_eq!(sent, [], "90 Hz is outside of the bounds");
     assert!(console.screen(80, 24).contains("f0 = 90 Hz is outside"), "{}", console.screen(80, 24));
 }
 
 #[test]
-fn a_refusal_is_said_with_its_reason_and_logged() {
+fn a_refusal_is_reported_with_its_reason_and_logged() {
     let mut console = Console::ready();
     console.answer("override Fx = 120", false, "the trial runs already");
     let text = "override Fx = 120: refused: the trial runs already";
@@ -242,7 +233,7 @@ fn a_stopped_robot_is_acknowledged_with_k_or_enter() {
         for mode in [Mode::Damped, Mode::Fault] {
             let mut console = Console::proposed();
             console.mode(mode);
-            assert_eq!(wishes(&console.press(&[key])), [OperatorRequest::Acknowledge]);
+            assert_eq!(console.requests(&[key]), [OperatorRequest::Acknowledge]);
         }
     }
     let mut console = Console::proposed();
@@ -258,7 +249,6 @@ fn an_observer_and_a_replay_send_nothing() {
     observer.stage(ExperimentStage::Proposed, 0);
     let mut replay = Console::proposed();
     replay.tell(Msg::Replay(quadfrog_console::message::ReplayStatus {
-        file: "session.mcap".into(),
         playing: true,
         speed: 1.0,
         time_ns: 0,
@@ -270,21 +260,18 @@ fn an_observer_and_a_replay_send_nothing() {
             for stage in ExperimentStage::ALL {
                 console.stage(stage, 0);
                 for key in all {
-                    let sent = wishes(&console.press(&[key]));
-                    // Whoever stopped the robot may say that it was looked at; the session then lets go of it.
+                    let sent = console.requests(&[key]);
+                    // An observer's STOP stops the robot, so an observer may acknowledge it.
                     let stopped = name == "observer" && matches!(mode, Mode::Damped | Mode::Fault);
-                    let expected = if stopped && ["k", "Enter"].contains(&key) {
-                        vec![OperatorRequest::Acknowledge]
-                    } else {
-                        vec![]
-                    };
+                    let acknowledges = usize::from(stopped && ["k", "Enter"].contains(&key));
+                    let expected = &[OperatorRequest::Acknowledge][..acknowledges];
                     assert_eq!(sent, expected, "{name}, {key} in {mode:?}, {stage:?}");
                 }
             }
         }
     }
     assert_eq!(replay.press(&["Space"]), [], "there is no robot to stop");
-    assert_eq!(observer.press(&["Space"]), [Effect::Stop], "STOP is everybody's");
+    assert_eq!(observer.press(&["Space"]), [Effect::Stop], "an observer may stop the robot");
 }
 
 #[test]
@@ -292,20 +279,20 @@ fn energising_keys_do_nothing_in_the_wrong_mode() {
     for &mode in Mode::ALL {
         let mut console = Console::proposed();
         console.mode(mode);
-        let armed = wishes(&console.press(&["A"]));
+        let armed = console.requests(&["A"]);
         assert_eq!(armed.contains(&OperatorRequest::Arm), mode == Mode::Disarmed, "A in {mode:?}");
         let mut console = Console::proposed();
         console.mode(mode);
         console.press(&["g"]);
         console.wait(900);
-        let sent = wishes(&console.press(&["g"]));
+        let sent = console.requests(&["g"]);
         let approved = sent.iter().any(|intent| matches!(intent, OperatorRequest::Approve { .. }));
         assert_eq!(approved, mode == Mode::Ready, "g g in {mode:?}");
     }
 }
 
 #[test]
-fn the_palette_says_why_not_and_never_moves_the_robot_with_enter() {
+fn the_palette_gives_reasons_and_never_moves_the_robot_with_enter() {
     let mut console = Console::proposed();
     console.press(&[":", "a", "p", "p", "r", "o", "v", "e"]);
     let screen = console.screen(80, 24);
@@ -314,7 +301,7 @@ fn the_palette_says_why_not_and_never_moves_the_robot_with_enter() {
     assert_eq!(console.press(&[":", "a", "r", "m", "Enter"]), [], "arming is asked again");
     assert_eq!(console.press(&["Enter"]), []);
     console.press(&[":", "a", "r", "m", "Enter"]);
-    assert_eq!(wishes(&console.press(&["y"])), [OperatorRequest::Arm]);
+    assert_eq!(console.requests(&["y"]), [OperatorRequest::Arm]);
 }
 
 #[test]
@@ -325,16 +312,16 @@ fn pasted_text_is_never_read_as_keys() {
     let mut console = Console::review(Mode::Review, Verdict::Accept);
     console.press(&["m"]);
     console.tell(Msg::Paste("slid on the mat\n".into()));
-    let sent = wishes(&console.press(&["Enter"]));
+    let sent = console.requests(&["Enter"]);
     assert_eq!(sent, [OperatorRequest::Note { trial: 0, text: "slid on the mat".into() }]);
 }
 
 #[test]
 fn numbers_and_tab_change_the_view() {
     let mut console = Console::proposed();
-    for (key, view) in ["1", "2", "3", "4", "5", "6"].into_iter().zip(View::VARIANTS.iter().copied()) {
+    for (key, view) in VIEWS.into_iter().zip(View::VARIANTS) {
         console.press(&[key]);
-        assert_eq!(console.model.view, view);
+        assert_eq!(console.model.view, *view);
     }
     console.press(&["Tab"]);
     assert_eq!(console.model.view, View::Live);
@@ -350,7 +337,7 @@ fn suspending_is_refused_while_the_robot_is_armed() {
     assert!(console.said().contains("the robot is armed; D sits it down"), "{}", console.said());
 }
 
-/// (A defect once: a suspended program does not damp the robot that it has just stopped.)
+/// A suspended program does not damp the robot that it has just stopped.
 #[test]
 fn suspending_is_refused_while_anything_is_sent_to_a_real_robot() {
     for &mode in Mode::ALL {
@@ -375,7 +362,9 @@ fn the_bell_rings_when_the_operator_is_needed() {
 #[test]
 fn every_action_has_a_name_a_key_and_a_line_of_help() {
     let keymap = ConsoleSettings::built_in().keymap;
+    assert_eq!(ACTIONS.len(), Action::VARIANTS.len());
     for (index, info) in ACTIONS.iter().enumerate() {
+        assert_eq!(Action::VARIANTS[index], info.action, "the table has the order of the actions");
         assert!(!info.help.is_empty() && !info.keys.is_empty(), "{}", info.name);
         assert!(ACTIONS[..index].iter().all(|other| other.name != info.name && other.action != info.action));
         let keys: Vec<String> = keymap.keys(info.action).map(|key| key.to_string()).collect();
@@ -436,16 +425,16 @@ fn settings_out_of_range_are_refused_by_name() {
     }
 }
 
-/// (A danger once: on a terminal too small for the card two blind presses made the robot jump.)
+/// Two presses without sight of the proposal would make the robot jump.
 #[test]
 fn a_terminal_too_small_for_the_card_neither_approves_nor_arms() {
     let mut console = Console::ready();
     console.tell(Msg::Resize(60, 15));
     console.press(&["g"]);
     console.wait(1000);
-    assert_eq!(wishes(&console.press(&["g"])), []);
+    assert_eq!(console.requests(&["g"]), []);
     assert!(console.said().contains("enlarge the terminal to 80x24"), "{}", console.said());
     assert_eq!(console.press(&["Space"]), [Effect::Stop]);
     console.mode(Mode::Disarmed);
-    assert_eq!(wishes(&console.press(&["A"])), []);
+    assert_eq!(console.requests(&["A"]), []);
 }

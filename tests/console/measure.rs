@@ -23,9 +23,7 @@ fn processor_time(pid: i32) -> f64 {
 
 /// Prints data rate and processor load of one minute of a session with two jumps.
 fn minute(name: &str, size: (u16, u16), arguments: &[&str]) {
-    let folder = tempfile::tempdir().expect("a folder");
-    let mut session = Session::start(folder.path(), size, arguments);
-    session.wait_for(&["Press A to arm"]);
+    let (_folder, mut session) = Session::opened(size, arguments);
     session.send("A");
     session.wait_for(&["Press g twice"]);
     let (begun, bytes, used) = (Instant::now(), session.bytes(), processor_time(session.pid().as_raw()));
@@ -62,9 +60,7 @@ fn bytes_on_the_wire_and_processor() {
 #[test]
 #[ignore = "a measurement"]
 fn key_to_screen() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let mut session = Session::start(folder.path(), (80, 24), &[]);
-    session.wait_for(&["Press A to arm"]);
+    let (_folder, mut session) = Session::opened((80, 24), &[]);
     let mut times = Vec::new();
     for round in 0..200 {
         let (key, shown) = if round % 2 == 0 { ("?", "Keys (1") } else { ("\x1b", "Press A to arm") };

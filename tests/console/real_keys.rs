@@ -199,9 +199,7 @@ fn every_key_of_the_keymap_has_a_row() {
 
 #[test]
 fn every_key_of_a_live_session_is_seen() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let mut session = Session::start(folder.path(), (120, 40), &["--trials", "1", "--seed", "3"]);
-    session.wait_for(&["Press A to arm"]);
+    let (_folder, mut session) = Session::opened((120, 40), &["--trials", "1", "--seed", "3"]);
     play(&mut session, LIVE);
     assert!(session.wait().success());
     assert!(session.restored() && session.cooked());

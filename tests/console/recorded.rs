@@ -41,47 +41,33 @@ fn console(colours: Colours, glyphs: Glyphs) -> Console {
 
 const SIZES: [(u16, u16); 3] = [(80, 24), (120, 40), (200, 60)];
 
-#[test]
-fn views_of_a_recorded_session() {
+fn compare(colours: Colours, glyphs: Glyphs, kind: &str, draw: impl Fn(&Console, u16, u16) -> String) {
     for (columns, rows) in SIZES {
-        let mut console = console(Colours::Named, Glyphs::Braille);
+        let mut console = console(colours, glyphs);
         for (key, name) in VIEWS {
             console.press(&[key]);
-            insta::assert_snapshot!(format!("{name}-{columns}x{rows}"), console.screen(columns, rows));
+            insta::assert_snapshot!(format!("{name}-{columns}x{rows}{kind}"), draw(&console, columns, rows));
         }
     }
+}
+
+#[test]
+fn views_of_a_recorded_session() {
+    compare(Colours::Named, Glyphs::Braille, "", Console::screen);
 }
 
 #[test]
 fn views_of_a_recorded_session_in_ascii() {
-    for (columns, rows) in SIZES {
-        let mut console = console(Colours::None, Glyphs::Ascii);
-        for (key, name) in VIEWS {
-            console.press(&[key]);
-            let screen = console.screen(columns, rows);
-            assert!(screen.is_ascii(), "{name} at {columns}x{rows}:\n{screen}");
-            insta::assert_snapshot!(format!("{name}-{columns}x{rows}-ascii"), screen);
-        }
-    }
+    compare(Colours::None, Glyphs::Ascii, "-ascii", |console, columns, rows| {
+        let screen = console.screen(columns, rows);
+        assert!(screen.is_ascii(), "{columns}x{rows}:\n{screen}");
+        screen
+    });
 }
 
 #[test]
 fn views_of_a_recorded_session_in_colour() {
-    for (columns, rows) in SIZES {
-        let mut console = console(Colours::True, Glyphs::Braille);
-        for (key, name) in VIEWS {
-            console.press(&[key]);
-            insta::assert_snapshot!(format!("{name}-{columns}x{rows}-colour"), console.colours(columns, rows));
-        }
-    }
-}
-
-#[test]
-fn a_replay_shows_every_trial_and_can_be_left() {
-    let console = console(Colours::Named, Glyphs::Braille);
-    assert_eq!(console.model.session.trials.records.len(), 3);
-    let screen = console.screen(80, 24);
-    assert!(screen.contains("REPLAY") && screen.contains("Trial #2: judge it"), "{screen}");
+    compare(Colours::True, Glyphs::Braille, "-colour", Console::colours);
 }
 
 #[test]

@@ -1,5 +1,4 @@
-//! What the operator sees and changes of the search and of the machine's fitness: view Override, why a point was proposed,
-//! repeats, a finished study, the pre-arm list, the link.
+//! Search and readiness on the screen: view Override, densities, repeats, a finished study, the arming checks, the link.
 
 mod support;
 
@@ -8,7 +7,7 @@ use quadfrog::recording::record::{ArmingCheckRecord, Record, SessionInfo};
 use quadfrog::recording::recorder::RecorderStatus;
 use quadfrog::robot::{Battery, LinkStatus};
 use quadfrog::session::operator_request::{OperatorCheck, OperatorRequest};
-use quadfrog::telemetry::{ArmingCheck, ArmingCheckState, Counters, Mode, Snapshot};
+use quadfrog::telemetry::{ArmingCheck, ArmingCheckState, Counters, Mode, Snapshot, Tick};
 use quadfrog::trial::{
     Backend, ExperimentStage, FixedParameter, ParameterInsight, PointRecord, ProposalInsight, SearchStatus,
     SearchedParameter, Task, TrialRecord, Verdict,
@@ -18,21 +17,9 @@ use quadfrog_console::message::{Effect, Msg};
 use quadfrog_console::model::View;
 use quadfrog_console::model::dialog::Dialog;
 use strum::VariantArray;
-use support::{Console, session, tick, trial};
+use support::{Console, assert_shows, line_with, requests, session, tick, trial};
 
-fn wishes(effects: &[Effect]) -> Vec<OperatorRequest> {
-    let wish = |effect: &Effect| match effect {
-        Effect::Request(intent) => Some(intent.clone()),
-        _ => None,
-    };
-    effects.iter().filter_map(wish).collect()
-}
-
-fn line_with(screen: &str, text: &str) -> String {
-    screen.lines().find(|line| line.contains(text)).unwrap_or_else(|| panic!("no {text} in\n{screen}")).to_owned()
-}
-
-/// What is searched: Fx as given, the others as the session began.
+/// The search space: Fx as given, the others as the session began.
 fn search(fx: (f64, f64), fixed: Option<FixedParameter>) -> SearchStatus {
     let parameter = |name: &str, (low, high), (least, most), fixed| SearchedParameter {
         name: name.into(),
@@ -66,12 +53,10 @@ fn overriding() -> Console {
 fn gains_are_set_within_their_own_safe_ranges() {
     let mut console = overriding();
     let screen = console.screen(80, 24);
-    for part in ["Gains of the controller", "kp        400.0 N/m", "k_att     200.0 N/m", "600.0"] {
-        assert!(screen.contains(part), "no {part}:\n{screen}");
-    }
+    assert_shows(&screen, &["Gains of the controller", "kp        400.0 N/m", "k_att     200.0 N/m", "600.0"]);
     // From f0 down to kp, past the three parameters.
     let sent = console.press(&["Up", "o", "Down", "Down", "Down", "5", "0", "0", "Enter"]);
-    assert_eq!(wishes(&sent), [OperatorRequest::OverrideGain { gain: "kp".into(), value: 500.0 }]);
+    assert_eq!(requests(&sent), [OperatorRequest::OverrideGain { gain: "kp".into(), value: 500.0 }]);
     console.press(&["o", "Down", "2", "0", "0", "0", "Enter"]);
     let screen = console.screen(80, 24);
     assert!(screen.contains("is outside"), "{screen}");
@@ -84,19 +69,17 @@ fn a_parameter_is_fixed_for_some_trials_and_searched_again() {
     assert!(line_with(&console.screen(80, 24), "  X  ").contains("fix Fx at 75.00 N for the next trials"));
     assert_eq!(console.press(&["X"]), []);
     assert!(console.screen(80, 24).contains("Fix Fx at 75.00 N for how many trials?"), "{}", console.screen(80, 24));
-    let sent = wishes(&console.press(&["Backspace", "3", "Enter"]));
+    let sent = console.requests(&["Backspace", "3", "Enter"]);
     assert_eq!(sent, [OperatorRequest::Fix { parameter: "Fx".into(), value: 75.0, trials: 3 }]);
     console.record(Record::Search(search((0.0, 150.0), Some(FixedParameter { value: 75.0, trials: 3 }))));
     let screen = console.screen(80, 24);
     assert!(line_with(&screen, "Fx  ").contains("fixed at 75.00, 3 more"), "{screen}");
     assert!(line_with(&screen, "  X  ").contains("search Fx again"), "{screen}");
-    assert_eq!(wishes(&console.press(&["X"])), [OperatorRequest::Unfix { parameter: "Fx".into() }]);
+    assert_eq!(console.requests(&["X"]), [OperatorRequest::Unfix { parameter: "Fx".into() }]);
     for wrong in ["0", "-1", "many"] {
         let mut console = overriding();
         console.press(&["X", "Backspace"]);
-        for c in wrong.chars() {
-            console.press(&[&c.to_string()]);
-        }
+        console.enter(wrong);
         assert_eq!(console.press(&["Enter"]), [], "{wrong}");
         assert!(console.screen(80, 24).contains("is not a number of trials"), "{wrong}");
     }
@@ -107,10 +90,8 @@ fn bounds_are_checked_and_each_refusal_is_explained() {
     let typed = |text: &str| {
         let mut console = overriding();
         console.press(&["B", "Ctrl-U"]);
-        for c in text.chars() {
-            console.press(&[&c.to_string()]);
-        }
-        let sent = wishes(&console.press(&["Enter"]));
+        console.enter(text);
+        let sent = console.requests(&["Enter"]);
         (sent, console.screen(80, 24))
     };
     let (sent, _) = typed("50..120.5");
@@ -143,8 +124,8 @@ fn an_override_outside_narrowed_bounds_is_refused_with_the_present_ones() {
 fn the_point_on_the_card_or_in_the_form_can_be_queued() {
     let point = |fx: f64| OperatorRequest::Enqueue(vec![("f0".into(), 1.25), ("Fx".into(), fx), ("Fz".into(), 250.0)]);
     let mut console = overriding();
-    assert_eq!(wishes(&console.press(&["Q"])), [point(75.0)]);
-    let sent = wishes(&console.press(&["o", "1", "0", "0", "Q"]));
+    assert_eq!(console.requests(&["Q"]), [point(75.0)]);
+    let sent = console.requests(&["o", "1", "0", "0", "Q"]);
     assert_eq!(sent, [point(100.0)], "as typed; the card stays as it is");
     assert!(console.model.dialog.is_none());
 }
@@ -240,16 +221,17 @@ fn a_finished_study_says_so_and_what_comes_next() {
     let mut console = finished();
     assert_eq!(console.said(), "the study is finished: the best is trial 2, J = 0.610 m");
     let screen = console.screen(80, 24);
-    for part in ["Study finished", "best 0.610 m (#2)", "C more", "K confirm", "E export", "The study is finished."] {
-        assert!(screen.contains(part), "no {part}:\n{screen}");
-    }
+    assert_shows(
+        &screen,
+        &["Study finished", "best 0.610 m (#2)", "C more", "K confirm", "E export", "The study is finished."],
+    );
     console.press(&["C"]);
-    assert_eq!(wishes(&console.press(&["Enter"])), [OperatorRequest::Continue(20)]);
+    assert_eq!(console.requests(&["Enter"]), [OperatorRequest::Continue(20)]);
     console.press(&["K"]);
     assert!(console.screen(80, 24).contains("How many repeats at most"));
-    assert_eq!(wishes(&console.press(&["Enter"])), [OperatorRequest::ConfirmBest { repeats: 10 }]);
+    assert_eq!(console.requests(&["Enter"]), [OperatorRequest::ConfirmBest { repeats: 10 }]);
     console.record(Record::Search(SearchStatus { confirming: Some(7), ..search((0.0, 150.0), None) }));
-    assert_eq!(wishes(&console.press(&["K"])), [OperatorRequest::ConfirmBest { repeats: 0 }], "the same key ends it");
+    assert_eq!(console.requests(&["K"]), [OperatorRequest::ConfirmBest { repeats: 0 }], "the same key ends it");
     assert_eq!(console.press(&["E"]), [Effect::ExportBest]);
 }
 
@@ -322,7 +304,7 @@ fn the_best_of_a_continued_study_is_exported_with_its_newest_configuration() {
     assert!(exported.contains("chart_window_s = 4.0"), "{exported}");
 }
 
-/// A Go1 that lies disarmed with this pre-arm list.
+/// A Go1 that lies disarmed with these arming checks.
 fn on_hardware(list: Vec<ArmingCheckRecord>) -> Console {
     let mut console = Console::proposed();
     console.record(Record::Session(SessionInfo { backend: Some(Backend::Hardware), ..session() }));
@@ -334,38 +316,42 @@ fn item(check: ArmingCheck, state: ArmingCheckState, found: &str, needed: &str) 
     ArmingCheckRecord { check, state, found: found.into(), needed: needed.into() }
 }
 
+fn fresh() -> ArmingCheckRecord {
+    item(ArmingCheck::StateFresh, ArmingCheckState::Passed, "2 ms", "at most 10 ms")
+}
+
 #[test]
-fn arming_shows_every_check_that_fails_and_takes_the_operators_word() {
+fn arming_shows_every_check_that_fails_and_takes_the_operators_confirmation() {
     let mut console = on_hardware(vec![
-        item(ArmingCheck::StateFresh, ArmingCheckState::Passed, "2 ms", "at most 10 ms"),
+        fresh(),
         item(ArmingCheck::Battery, ArmingCheckState::Failed, "21 %", "at least 30 %"),
         item(ArmingCheck::MotorsCool, ArmingCheckState::Failed, "FR_calf 64 C", "below 60 C"),
-        item(ArmingCheck::AreaClear, ArmingCheckState::Waiting, "", "your word"),
+        item(ArmingCheck::AreaClear, ArmingCheckState::Waiting, "", "your confirmation"),
     ]);
     assert_eq!(console.next_step(), "Not ready to arm: 3 checks have not passed. P shows them.");
-    let mut resumed =
-        on_hardware(vec![item(ArmingCheck::StateFresh, ArmingCheckState::Passed, "2 ms", "at most 10 ms")]);
+    let mut resumed = on_hardware(vec![fresh()]);
     resumed.tell(Msg::Resumed);
     assert_eq!(resumed.next_step(), "Checking the robot.");
     assert_eq!(resumed.press(&["A"]), [], "what was checked before the program was stopped is old");
     assert_eq!(console.press(&["A"]), [], "nothing is armed");
     let screen = console.screen(80, 24);
-    for part in [
-        "3 of 4 not yet",
-        "FAIL battery",
-        "21 %",
-        "at least 30 %",
-        "FAIL motors cool",
-        "you  area clear",
-        "ok   state fresh",
-    ] {
-        assert!(screen.contains(part), "no {part}:\n{screen}");
-    }
+    assert_shows(
+        &screen,
+        &[
+            "3 of 4 not yet",
+            "FAIL battery",
+            "21 %",
+            "at least 30 %",
+            "FAIL motors cool",
+            "you  area clear",
+            "ok   state fresh",
+        ],
+    );
     assert!(console.said().contains("3 arming checks have not passed"), "{}", console.said());
     // The operator's own items, in their order.
     let mut sent = Vec::new();
     for _ in OperatorCheck::ALL {
-        sent.extend(wishes(&console.press(&["x", "Down"])));
+        sent.extend(console.requests(&["x", "Down"]));
     }
     assert_eq!(sent, OperatorCheck::ALL.map(OperatorRequest::Confirm));
     console.press(&["Esc", "5"]);
@@ -373,29 +359,24 @@ fn arming_shows_every_check_that_fails_and_takes_the_operators_word() {
 }
 
 #[test]
-fn a_machine_that_can_hurt_somebody_is_armed_by_a_word() {
-    let all_well = vec![item(ArmingCheck::StateFresh, ArmingCheckState::Passed, "2 ms", "at most 10 ms")];
-    let mut console = on_hardware(all_well.clone());
+fn hardware_is_armed_by_a_typed_confirmation() {
+    let mut console = on_hardware(vec![fresh()]);
     assert_eq!(console.press(&["A"]), []);
     assert!(console.next_step().contains("Type stand to stand the robot up"), "{}", console.next_step());
     assert_eq!(console.press(&["s", "t", "a", "n"]), []);
-    assert_eq!(wishes(&console.press(&["d"])), [OperatorRequest::Arm]);
+    assert_eq!(console.requests(&["d"]), [OperatorRequest::Arm]);
     for keys in [&["Enter"][..], &["s", "t", "e"], &["s", "s"], &["A"], &["y"]] {
-        let mut console = on_hardware(all_well.clone());
+        let mut console = on_hardware(vec![fresh()]);
         console.press(&["A"]);
-        assert_eq!(wishes(&console.press(keys)), [], "{keys:?}");
+        assert_eq!(console.requests(keys), [], "{keys:?}");
         assert!(console.model.dialog.is_none(), "{keys:?} cancels");
     }
-    // A check that fails while the word is being typed ends it.
-    let mut console = on_hardware(all_well);
+    // A check that fails meanwhile ends it.
+    let mut console = on_hardware(vec![fresh()]);
     console.press(&["A", "s", "t", "a", "n"]);
-    console.record(Record::ArmingChecks(vec![item(
-        ArmingCheck::Battery,
-        ArmingCheckState::Failed,
-        "20 %",
-        "at least 30 %",
-    )]));
-    assert_eq!(wishes(&console.press(&["d"])), []);
+    let failed = item(ArmingCheck::Battery, ArmingCheckState::Failed, "20 %", "at least 30 %");
+    console.record(Record::ArmingChecks(vec![failed]));
+    assert_eq!(console.requests(&["d"]), []);
 }
 
 #[test]
@@ -429,9 +410,7 @@ fn the_frame_says_how_link_battery_and_the_hottest_motor_are_at_every_size() {
     }
     console.model.view = View::Health;
     let screen = console.screen(120, 40);
-    for part in ["998 Hz, newest 3 ms old", "2.00 % of 5 s, 123 in all", "4 corrupt", "restarts     1 !"] {
-        assert!(screen.contains(part), "no {part}:\n{screen}");
-    }
+    assert_shows(&screen, &["998 Hz, newest 3 ms old", "2.00 % of 5 s, 123 in all", "4 corrupt", "restarts     1 !"]);
     let motor = screen.lines().skip(3).find(|line| line.contains("FL_calf")).expect("the motor").to_owned();
     assert!(motor.contains("63 C") && motor.contains('!'), "{motor}");
     // Too small for anything else, the link is still there.
@@ -452,21 +431,14 @@ fn a_simulator_has_no_link_and_says_so() {
 fn health_says_what_the_recorder_writes_and_why_it_stopped() {
     let mut console = Console::proposed();
     console.press(&["5"]);
-    let mut newest = tick(10_000, 0.0, None);
-    newest.mode = Mode::Disarmed;
+    let newest = Tick { mode: Mode::Disarmed, ..tick(10_000, 0.0, None) };
     let counters = Counters { ticks_not_recorded: 12, ..Counters::default() };
     console.tell(Msg::Snapshot(Box::new(Snapshot { tick: newest, counters })));
     console.tell(Msg::Recorder(RecorderStatus { bytes: 4_000_000, ticks: 10_000, ..RecorderStatus::default() }));
-    console.record(Record::ArmingChecks(vec![item(
-        ArmingCheck::Disk,
-        ArmingCheckState::Failed,
-        "812 MB",
-        "at least 1000 MB",
-    )]));
+    let disk = item(ArmingCheck::Disk, ArmingCheckState::Failed, "812 MB", "at least 1000 MB");
+    console.record(Record::ArmingChecks(vec![disk]));
     let screen = console.screen(120, 40);
-    for part in ["4.0 MB, 400 kB/s, 10000 ticks", "812 MB !", "12 ticks !"] {
-        assert!(screen.contains(part), "no {part}:\n{screen}");
-    }
+    assert_shows(&screen, &["4.0 MB, 400 kB/s, 10000 ticks", "812 MB !", "12 ticks !"]);
     let error = Some("no space left on device".to_owned());
     console.tell(Msg::Recorder(RecorderStatus { error, ..RecorderStatus::default() }));
     assert!(console.screen(120, 40).contains("no space left on device !"));
@@ -478,9 +450,9 @@ fn details_that_do_not_fit_are_reached_with_the_paging_keys() {
     let row = TrialRecord {
         note: "slid on the mat, then the cable was in the way ".repeat(6),
         hand_value: Some(0.3),
+        gains: vec![("kp".into(), 450.0)].into(),
         ..trial(0, Some(Verdict::Accept), Some(Verdict::Fall))
     };
-    let row = TrialRecord { gains: vec![("kp".into(), 450.0)].into(), ..row };
     console.record(Record::Trial(row));
     console.press(&["2", "Home", "Enter"]);
     let top = console.screen(80, 24);

@@ -1,91 +1,65 @@
 //! `quadfrog study` on stored studies.
 
-use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
+#[path = "support/program.rs"]
+mod program;
 
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+use program::{Program, assert_shows, hold};
 use serde_json::Value;
 
-fn quadfrog(folder: &Path, arguments: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_quadfrog"));
-    command.args(arguments).current_dir(folder).stdin(Stdio::null()).env("NO_COLOR", "1").output().unwrap()
-}
-
-fn text(folder: &Path, arguments: &[&str]) -> String {
-    let output = quadfrog(folder, arguments);
-    assert_eq!(output.status.code(), Some(0), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8(output.stdout).unwrap()
-}
-
-fn refused(folder: &Path, arguments: &[&str]) -> String {
-    let output = quadfrog(folder, arguments);
-    let message = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
-    message
-}
-
-/// A folder with a finished study of six trials, and the study's folder.
-fn study(task: &str) -> (tempfile::TempDir, String) {
-    let folder = tempfile::tempdir().unwrap();
-    text(folder.path(), &["optimize", "--task", task, "--trials", "6", "--record", "none"]);
-    let study = made(folder.path()).pop().unwrap();
-    (folder, study.to_str().unwrap().to_owned())
-}
-
-fn made(folder: &Path) -> Vec<PathBuf> {
-    let mut all: Vec<PathBuf> =
-        fs::read_dir(folder.join("recordings")).unwrap().map(|entry| entry.unwrap().path()).collect();
-    all.sort();
-    all
+/// A finished study of six trials, and its folder.
+fn study(task: &str) -> (Program, String) {
+    let program = Program::new();
+    program.text(&["optimize", "--task", task, "--trials", "6", "--record", "none"]);
+    let study = program.study("recordings");
+    (program, study.to_str().unwrap().to_owned())
 }
 
 #[test]
 fn studies_are_listed_and_shown() {
-    let (folder, study) = study("forward");
-    let list = text(folder.path(), &["study", "list"]);
+    let (program, study) = study("forward");
+    let list = program.text(&["study", "list"]);
     let mut lines = list.lines();
     assert!(lines.next().unwrap().starts_with("study"), "{list}");
     let line = lines.next().unwrap();
     assert!(line.contains("forward") && line.contains(" m"), "{list}");
     let name = Path::new(&study).file_name().unwrap().to_str().unwrap();
     assert!(line.contains(name), "{list}");
-    let show = text(folder.path(), &["study", "show", &study]);
+    let show = program.text(&["study", "show", &study]);
     assert!(
         show.contains("forward-seed0") && show.contains("robot: go1") && show.contains("Fz from 150 to 350 N"),
         "{show}"
     );
     assert!(show.contains("f0 (Hz)") && show.contains("Best: trial"), "{show}");
-    let best = text(folder.path(), &["study", "best", &format!("{study}/study.log")]);
+    let best = program.text(&["study", "best", &format!("{study}/study.log")]);
     assert!(show.ends_with(&best), "{best}");
-    assert!(text(folder.path(), &["study", "list", "."]).contains("no study"));
-    assert!(refused(folder.path(), &["study", "list", "elsewhere"]).contains("elsewhere"));
-    assert!(refused(folder.path(), &["study", "show", "elsewhere"]).contains("no such journal"));
-    assert!(!folder.path().join("elsewhere").exists());
-    assert!(refused(folder.path(), &["study", "show", &study, "--name", "other"]).contains("forward-seed0"));
+    assert!(program.text(&["study", "list", "."]).contains("no study"));
+    assert!(program.refused(&["study", "list", "elsewhere"]).contains("elsewhere"));
+    assert!(program.refused(&["study", "show", "elsewhere"]).contains("no such journal"));
+    assert!(!program.path("elsewhere").exists());
+    assert!(program.refused(&["study", "show", &study, "--name", "other"]).contains("forward-seed0"));
 }
 
 #[test]
 fn an_exported_study_is_imported_unchanged_in_both_formats() {
-    let (folder, first) = study("forward");
+    let (program, first) = study("forward");
     for form in ["csv", "json"] {
         let file = format!("table.{form}");
-        text(folder.path(), &["study", "export", &first, "--output", &file]);
-        let printed = text(folder.path(), &["study", "export", &first, "--format", form]);
-        assert_eq!(printed, fs::read_to_string(folder.path().join(&file)).unwrap());
+        program.text(&["study", "export", &first, "--output", &file]);
+        let printed = program.text(&["study", "export", &first, "--format", form]);
+        assert_eq!(printed, fs::read_to_string(program.path(&file)).unwrap());
         // Into a study of one trial.
         let output = format!("other-{form}");
-        text(folder.path(), &["optimize", "--trials", "1", "--seed", "7", "--record", "none", "--output", &output]);
-        let other = fs::read_dir(folder.path().join(&output)).unwrap().next().unwrap().unwrap().path();
+        program.text(&["optimize", "--trials", "1", "--seed", "7", "--record", "none", "--output", &output]);
+        let other = program.study(&output);
         let other = other.to_str().unwrap();
-        let printed = text(folder.path(), &["study", "import", other, &file]);
+        let printed = program.text(&["study", "import", other, &file]);
         assert!(printed.starts_with("6 trials"), "{printed}");
         let trials = |study: &str| -> Vec<Value> {
-            let Value::Array(all) =
-                serde_json::from_str(&text(folder.path(), &["study", "export", study, "--format", "json"])).unwrap()
-            else {
-                panic!("no array")
-            };
-            all
+            serde_json::from_str(&program.text(&["study", "export", study, "--format", "json"])).unwrap()
         };
         let (theirs, ours) = (trials(other), trials(&first));
         assert_eq!(theirs.len(), 7);
@@ -101,21 +75,19 @@ fn an_exported_study_is_imported_unchanged_in_both_formats() {
             }
         }
         // Imported trials count: the budget of seven is met.
-        let rest =
-            quadfrog(folder.path(), &["optimize", "--resume", other, "--trials", "7", "--json", "--record", "none"]);
+        let rest = program.run(&["optimize", "--resume", other, "--trials", "7", "--json", "--record", "none"]);
         assert!(rest.status.success() && rest.stdout.is_empty());
     }
 }
 
 #[test]
 fn an_invalid_table_is_refused_as_a_whole_with_row_and_column() {
-    let (folder, study) = study("forward");
-    let import = |name: &str, table: &str, words: &[&str]| {
-        fs::write(folder.path().join(name), table).unwrap();
-        let message = refused(folder.path(), &["study", "import", &study, name]);
-        for word in words.iter().chain([&name]) {
-            assert!(message.contains(word), "{message}");
-        }
+    let (program, study) = study("forward");
+    let import = |name: &str, table: &str, parts: &[&str]| {
+        program.write(name, table);
+        let message = program.refused(&["study", "import", &study, name]);
+        assert_shows(&message, parts);
+        assert_shows(&message, &[name]);
     };
     let head = "params_f0,params_Fx,params_Fz,value,state\n";
     import(
@@ -135,72 +107,58 @@ fn an_invalid_table_is_refused_as_a_whole_with_row_and_column() {
     import("object.json", "{}", &["JSON", "array"]);
     import("value.json", "[{\"params\":{\"f0\":1},\"state\":\"COMPLETE\"}]", &["trial 1", "value"]);
     import("none.csv", "", &["params_<name>"]);
-    let left = text(folder.path(), &["study", "export", &study, "--format", "csv"]);
+    let left = program.text(&["study", "export", &study, "--format", "csv"]);
     assert_eq!(left.lines().count(), 7, "nothing was added: {left}");
 }
 
 #[test]
 fn a_queued_point_runs_next_and_points_of_a_table_can_be_queued() {
-    let (folder, study) = study("forward");
-    for (setting, words) in
+    let (program, study) = study("forward");
+    for (setting, part) in
         [("Fx=151", "0 to 150"), ("Fw=1", "f0, Fx, Fz"), ("Fx=NaN", "finite"), ("Fx", "Fx=120"), ("Fx=much", "much")]
     {
-        let message = refused(folder.path(), &["study", "enqueue", &study, setting]);
-        assert!(message.contains(words), "{message}");
+        assert_shows(&program.refused(&["study", "enqueue", &study, setting]), &[part]);
     }
-    assert!(refused(folder.path(), &["study", "enqueue", &study, "Fx=1", "Fx=2"]).contains("twice"));
+    assert!(program.refused(&["study", "enqueue", &study, "Fx=1", "Fx=2"]).contains("twice"));
     // The lock of a running session does not prevent it.
-    let held = fs::File::open(Path::new(&study).join("session.lock")).unwrap();
-    held.lock().unwrap();
-    assert!(text(folder.path(), &["study", "enqueue", &study, "Fx=77", "Fz=222.5"]).contains("trial 6"));
+    let held = hold(Path::new(&study));
+    assert!(program.text(&["study", "enqueue", &study, "Fx=77", "Fz=222.5"]).contains("trial 6"));
     drop(held);
-    fs::write(folder.path().join("points.csv"), "params_f0,params_Fx,params_Fz\n1.25,66,211\n").unwrap();
-    assert!(text(folder.path(), &["study", "import", &study, "points.csv", "--queue"]).contains("1 points"));
-    assert!(text(folder.path(), &["study", "show", &study]).contains("2 queued"));
-    let output = text(folder.path(), &["optimize", "--resume", &study, "--trials", "8", "--json", "--record", "none"]);
-    let trials: Vec<Value> = output.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    program.write("points.csv", "params_f0,params_Fx,params_Fz\n1.25,66,211\n");
+    assert!(program.text(&["study", "import", &study, "points.csv", "--queue"]).contains("1 points"));
+    assert!(program.text(&["study", "show", &study]).contains("2 queued"));
+    let trials = program.trials(&["optimize", "--resume", &study, "--trials", "8", "--json", "--record", "none"]);
     assert_eq!((&trials[0]["params"]["Fx"], &trials[0]["params"]["Fz"]), (&77.0.into(), &222.5.into()));
     assert_eq!((&trials[1]["params"]["f0"], &trials[1]["params"]["Fx"]), (&1.25.into(), &66.0.into()));
 }
 
 #[test]
 fn the_best_begins_the_next_study() {
-    let (folder, study) = study("twist-cw");
-    let printed = text(folder.path(), &["study", "best", &study, "--config", "found"]);
+    let (program, study) = study("twist-cw");
+    let printed = program.text(&["study", "best", &study, "--config", "found"]);
     assert!(printed.contains("--config found"), "{printed}");
-    let output = text(
-        folder.path(),
-        &[
-            "optimize", "--task", "twist-cw", "--config", "found", "--trials", "2", "--seed", "5", "--json",
-            "--record", "none",
-        ],
-    );
-    let first: Value = serde_json::from_str(output.lines().next().unwrap()).unwrap();
-    let trials: Value =
-        serde_json::from_str(&text(folder.path(), &["study", "export", &study, "--format", "json"])).unwrap();
-    let best = trials.as_array().unwrap().iter().max_by(|a, b| {
-        let value = |t: &Value| t["value"].as_f64().unwrap_or(f64::NEG_INFINITY);
-        value(a).total_cmp(&value(b))
-    });
+    let next = ["optimize", "--task", "twist-cw", "--config", "found", "--trials", "2", "--seed", "5"];
+    let first = program.trials(&[&next[..], &["--json", "--record", "none"]].concat()).remove(0);
+    let trials: Vec<Value> =
+        serde_json::from_str(&program.text(&["study", "export", &study, "--format", "json"])).unwrap();
+    let value = |trial: &Value| trial["value"].as_f64().unwrap_or(f64::NEG_INFINITY);
+    let best = trials.iter().max_by(|a, b| value(a).total_cmp(&value(b)));
     assert_eq!(first["params"], best.unwrap()["params"]);
     // No folder is overwritten, and values written by hand are checked.
-    assert!(refused(folder.path(), &["study", "best", &study, "--config", "found"]).contains("new folder"));
-    fs::create_dir(folder.path().join("mine")).unwrap();
-    let write = |text: &str| fs::write(folder.path().join("mine/optimize.toml"), text).unwrap();
+    assert!(program.refused(&["study", "best", &study, "--config", "found"]).contains("new folder"));
+    let write = |text: &str| program.write("mine/optimize.toml", text);
     write("[first.forward]\nFx = 151.0\n");
-    let message = refused(folder.path(), &["optimize", "--config", "mine"]);
+    let message = program.refused(&["optimize", "--config", "mine"]);
     assert!(message.contains("mine/optimize.toml:2") && message.contains("[0, 150]"), "{message}");
     write("[first.backward]\nFx = 1.0\n");
-    assert!(refused(folder.path(), &["optimize", "--config", "mine"]).contains("first.backward"));
+    assert!(program.refused(&["optimize", "--config", "mine"]).contains("first.backward"));
 }
 
 #[test]
 fn a_closed_output_pipe_is_no_error() {
-    let (folder, study) = study("forward");
+    let (program, study) = study("forward");
     for arguments in [&["study", "export", &study][..], &["study", "show", &study], &["study", "list"]] {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_quadfrog"));
-        command.args(arguments).current_dir(folder.path()).stdin(Stdio::null());
-        let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        let mut child = program.command(arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
         drop(child.stdout.take());
         let output = child.wait_with_output().unwrap();
         let errors = String::from_utf8_lossy(&output.stderr);
@@ -215,7 +173,7 @@ fn python_reads_our_table_and_we_read_its_journal_and_its_table() {
         println!("skipped: python3 has no optuna with pandas");
         return;
     }
-    let (folder, ours) = study("forward");
+    let (program, ours) = study("forward");
     let script = "import sys, optuna, pandas\n\
         from optuna.storages import JournalStorage\n\
         from optuna.storages.journal import JournalFileBackend\n\
@@ -224,50 +182,49 @@ fn python_reads_our_table_and_we_read_its_journal_and_its_table() {
         study.trials_dataframe().to_csv('python.csv', index=False)\n\
         table = pandas.read_csv('ours.csv')\n\
         assert len(table) == 6 and table['params_Fx'].between(0, 150).all() and (table['state'] == 'COMPLETE').any()\n";
-    text(folder.path(), &["study", "export", &ours, "--output", "ours.csv"]);
-    let python = Command::new("python3").args(["-c", script]).current_dir(folder.path()).output().unwrap();
+    program.text(&["study", "export", &ours, "--output", "ours.csv"]);
+    let python = Command::new("python3").args(["-c", script]).current_dir(program.path("")).output().unwrap();
     assert!(python.status.success(), "{}", String::from_utf8_lossy(&python.stderr));
-    let show = text(folder.path(), &["study", "show", "python.log"]);
+    let show = program.text(&["study", "show", "python.log"]);
     assert!(show.contains("theirs") && show.contains("Fx from 0 to 150"), "{show}");
-    assert_eq!(text(folder.path(), &["study", "export", "python.log"]).lines().count(), 6);
-    let printed = text(folder.path(), &["study", "import", &ours, "python.csv"]);
+    assert_eq!(program.text(&["study", "export", "python.log"]).lines().count(), 6);
+    let printed = program.text(&["study", "import", &ours, "python.csv"]);
     assert!(printed.starts_with("5 trials"), "{printed}");
-    assert!(text(folder.path(), &["study", "enqueue", "python.log", "Fx=60"]).contains("trial 5"));
+    assert!(program.text(&["study", "enqueue", "python.log", "Fx=60"]).contains("trial 5"));
 }
 
 /// Regression: every row was imported again, and each point appeared to be repeated.
 #[test]
 fn a_table_that_is_imported_twice_is_no_repeat() {
-    let (folder, study) = study("forward");
-    text(folder.path(), &["study", "export", &study, "--output", "own.csv"]);
-    let printed = text(folder.path(), &["study", "import", &study, "own.csv"]);
+    let (program, study) = study("forward");
+    program.text(&["study", "export", &study, "--output", "own.csv"]);
+    let printed = program.text(&["study", "import", &study, "own.csv"]);
     assert!(printed.starts_with("0 trials") && printed.contains("6 were there already"), "{printed}");
     // Written by hand, without times: equal rows of one table are repeats.
     let rows = "params_f0,params_Fx,params_Fz,value\n1.0,100,250,0.5\n1.0,100,250,0.5\n";
-    fs::write(folder.path().join("hand.csv"), rows).unwrap();
-    assert!(text(folder.path(), &["study", "import", &study, "hand.csv"]).starts_with("2 trials"));
-    let printed = text(folder.path(), &["study", "import", &study, "hand.csv"]);
+    program.write("hand.csv", rows);
+    assert!(program.text(&["study", "import", &study, "hand.csv"]).starts_with("2 trials"));
+    let printed = program.text(&["study", "import", &study, "hand.csv"]);
     assert!(printed.starts_with("0 trials") && printed.contains("2 were there already"), "{printed}");
 }
 
 /// Regression: the budget of the configuration replaced the stored one.
 #[test]
 fn a_continued_study_keeps_its_budget() {
-    let (folder, study) = study("forward");
-    let rest = text(folder.path(), &["optimize", "--resume", &study, "--json", "--record", "none"]);
+    let (program, study) = study("forward");
+    let rest = program.text(&["optimize", "--resume", &study, "--json", "--record", "none"]);
     assert_eq!(rest, "", "its budget of six is met");
-    assert!(text(folder.path(), &["study", "show", &study]).contains("budget: 6"));
+    assert!(program.text(&["study", "show", &study]).contains("budget: 6"));
 }
 
 /// Regression: it ran with its first configuration.
 #[test]
 fn a_continued_study_keeps_its_last_configuration() {
-    let (folder, study) = study("forward");
-    fs::create_dir(folder.path().join("mine")).unwrap();
-    fs::write(folder.path().join("mine/optimize.toml"), "[bounds]\nFz = [200.0, 210.0]\n").unwrap();
+    let (program, study) = study("forward");
+    program.write("mine/optimize.toml", "[bounds]\nFz = [200.0, 210.0]\n");
     let resume = |more: &[&str]| {
         let base = ["optimize", "--resume", &study, "--json", "--record", "none"];
-        let output = quadfrog(folder.path(), &[&base, more].concat());
+        let output = program.run(&[&base, more].concat());
         assert!(output.status.success());
         (String::from_utf8(output.stdout).unwrap(), String::from_utf8(output.stderr).unwrap())
     };
@@ -279,7 +236,7 @@ fn a_continued_study_keeps_its_last_configuration() {
         let trial: Value = serde_json::from_str(line).unwrap();
         assert!((200.0..=210.0).contains(&trial["params"]["Fz"].as_f64().unwrap()), "{line}");
     }
-    assert!(text(folder.path(), &["study", "show", &study]).contains("Fz from 200 to 210"));
+    assert!(program.text(&["study", "show", &study]).contains("Fz from 200 to 210"));
     // The first configuration, given explicitly, becomes the last one.
     resume(&["--trials", "10", "--config", &format!("{study}/config")]);
     let (_, printed) = resume(&[]);
@@ -289,19 +246,19 @@ fn a_continued_study_keeps_its_last_configuration() {
 /// Regressions: a mistyped place became a new study, and a worker's folder had the name of another seed.
 #[test]
 fn a_mistyped_place_to_join_is_refused_and_a_worker_is_named_after_its_study() {
-    let folder = tempfile::tempdir().unwrap();
+    let program = Program::new();
     for more in [&[][..], &["--task", "forward"], &["--seed", "5"]] {
-        let message = refused(folder.path(), &[&["optimize", "--join", "recordigs/study"], more].concat());
+        let message = program.refused(&[&["optimize", "--join", "recordigs/study"], more].concat());
         assert!(message.contains("no such journal") && message.contains("--task and --seed"), "{message}");
     }
-    assert!(!folder.path().join("recordigs").exists());
+    assert!(!program.path("recordigs").exists());
     let new = ["optimize", "--join", "shared.log", "--task", "twist-cw", "--seed", "5", "--trials", "1"];
-    let made_new = quadfrog(folder.path(), &new);
+    let made_new = program.run(&new);
     let printed = String::from_utf8_lossy(&made_new.stderr);
     assert!(made_new.status.success() && printed.contains("a new study of twist-cw seed 5 is made in"), "{printed}");
-    let rest = text(folder.path(), &["optimize", "--join", "shared.log", "--json"]);
+    let rest = program.text(&["optimize", "--join", "shared.log", "--json"]);
     assert_eq!(rest, "", "its budget of 1 is met");
-    let names: Vec<String> = made(folder.path()).iter().map(|path| path.display().to_string()).collect();
+    let names: Vec<String> = program.studies("recordings").iter().map(|path| path.display().to_string()).collect();
     assert_eq!(names.len(), 2);
     assert!(names.iter().all(|name| name.contains("twist-cw-seed5-joined-")), "{names:?}");
 }

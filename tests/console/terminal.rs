@@ -102,22 +102,18 @@ fn a_session_by_keys_agrees_with_the_recording_and_the_study() {
     let player = player(folder.path());
     assert_eq!(player.damage(), None);
     let rows = rows(&player);
-    let fx = |row: &TrialRecord| row.parameters.iter().find(|(name, _)| name == "Fx").map(|(_, value)| *value);
+    let fx = |row: &TrialRecord| row.parameters.get("Fx");
     assert_eq!(
         (rows[0].verdict, rows[0].value, rows[0].source),
         (Some(Verdict::Fall), Some(0.0), ProposalSource::Operator)
     );
     assert_eq!(fx(&rows[0]), Some(120.0));
     assert_eq!((rows[1].verdict, rows[1].value), (Some(Verdict::Void), None));
-    let proposals: Vec<_> = player
-        .events()
-        .iter()
-        .filter_map(|event| match &event.record {
-            Record::Proposal(proposal) => Some(proposal),
-            _ => None,
-        })
-        .collect();
-    let last = proposals.last().expect("a proposal");
+    let last = player.events().iter().rev().find_map(|event| match &event.record {
+        Record::Proposal(proposal) => Some(proposal),
+        _ => None,
+    });
+    let last = last.expect("a proposal");
     assert_eq!((last.trial, last.source, last.parent), (2, ProposalSource::Rerun, Some(1)));
     let again: Vec<f64> = last.parameters.iter().map(|p| p.value).collect();
     let before: Vec<f64> = rows[1].parameters.iter().map(|(_, value)| *value).collect();
@@ -143,9 +139,7 @@ fn a_session_by_keys_agrees_with_the_recording_and_the_study() {
 
 #[test]
 fn stop_key_stops_at_once_and_k_acknowledges() {
-    let folder = folder();
-    let mut session = Session::start(folder.path(), SIZE, &[]);
-    session.wait_for(&["Press A to arm"]);
+    let (_folder, mut session) = Session::opened(SIZE, &[]);
     session.send("A");
     session.wait_for(&["Press g twice"]);
     session.send(" ");
@@ -158,9 +152,7 @@ fn stop_key_stops_at_once_and_k_acknowledges() {
 
 #[test]
 fn a_terminal_that_does_not_read_delays_no_stop() {
-    let folder = folder();
-    let mut session = Session::start(folder.path(), (200, 60), &[]);
-    session.wait_for(&["Press A to arm"]);
+    let (folder, mut session) = Session::opened((200, 60), &[]);
     session.read(false);
     session.send("A");
     // The frames fill the terminal's buffer.
@@ -179,9 +171,7 @@ fn a_terminal_that_does_not_read_delays_no_stop() {
 
 #[test]
 fn resizing_at_any_moment_is_safe() {
-    let folder = folder();
-    let mut session = Session::start(folder.path(), SIZE, &[]);
-    session.wait_for(&["Press A to arm"]);
+    let (_folder, mut session) = Session::opened(SIZE, &[]);
     session.send("A");
     // Arming is refused on a terminal that is too small.
     session.wait_for(&["STAND UP"]);
@@ -202,9 +192,7 @@ fn resizing_at_any_moment_is_safe() {
 #[test]
 fn signals_end_the_program_with_the_terminal_restored() {
     for signal in [Signal::SIGTERM, Signal::SIGINT] {
-        let folder = folder();
-        let mut session = Session::start(folder.path(), SIZE, &[]);
-        session.wait_for(&["Press A to arm"]);
+        let (folder, mut session) = Session::opened(SIZE, &[]);
         // The mouse capture must end too.
         session.send("M");
         session.wait_for(&["mouse on"]);
@@ -221,9 +209,7 @@ fn signals_end_the_program_with_the_terminal_restored() {
 
 #[test]
 fn suspending_gives_the_terminal_back_and_continuing_takes_it() {
-    let folder = folder();
-    let mut session = Session::start(folder.path(), SIZE, &[]);
-    session.wait_for(&["Press A to arm"]);
+    let (_folder, mut session) = Session::opened(SIZE, &[]);
     session.send("\x1a");
     session.wait_until("the terminal is given back", || session.restored() && session.cooked());
     session.signal(Signal::SIGCONT);
@@ -241,9 +227,7 @@ fn suspending_gives_the_terminal_back_and_continuing_takes_it() {
 
 #[test]
 fn a_hang_up_closes_the_session_without_output() {
-    let folder = folder();
-    let mut session = Session::start(folder.path(), SIZE, &[]);
-    session.wait_for(&["Press A to arm"]);
+    let (folder, mut session) = Session::opened(SIZE, &[]);
     session.hang_up();
     session.wait();
     assert!(!session.sent(b"\x1b[?1049l"), "no output after a hang-up");
@@ -260,9 +244,7 @@ fn losing_the_operator_in_mid_jump_lands_the_robot_and_voids_the_trial() {
     std::fs::write(config.path().join("optimize.toml"), first).expect("written");
     let config = config.path().to_str().expect("a path");
     for way in [None, Some(Signal::SIGTERM), Some(Signal::SIGHUP)] {
-        let folder = folder();
-        let mut session = Session::start(folder.path(), SIZE, &["--config", config]);
-        session.wait_for(&["Press A to arm"]);
+        let (folder, mut session) = Session::opened(SIZE, &["--config", config]);
         session.send("A");
         session.wait_for(&["READY", "Press g twice to jump"]);
         session.approve();

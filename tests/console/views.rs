@@ -1,12 +1,12 @@
-//! What the keys of the views do: charts, trial table, mouse, replay. Keys in, screen out.
+//! Keys of the views in, screen out: charts, trial table, mouse, replay.
 
 mod support;
 
 use std::path::Path;
 
 use quadfrog::recording::player::Player;
-use quadfrog::recording::record::Record;
-use quadfrog::telemetry::{Mode, Phase};
+use quadfrog::recording::record::{Record, Transition};
+use quadfrog::telemetry::{Mode, Phase, Snapshot};
 use quadfrog::trial::{ExperimentStage, TrialRecord, Verdict};
 use quadfrog_console::feed::Feed;
 use quadfrog_console::message::{Effect, Mouse, Msg};
@@ -17,9 +17,9 @@ use quadfrog_console::settings::{BellCause, ConsoleSettings, DEFAULT};
 use quadfrog_console::text;
 use quadfrog_console::theme::{Colours, Glyphs, Theme};
 use strum::VariantArray;
-use support::{Console, tick, trial};
+use support::{Console, assert_shows, line_with, tick, trial};
 
-/// A console that has seen the jumps of some trials, each a second after the one before; roll says which one it was.
+/// A console after the jumps of some trials, each a second after the one before; roll depends on the trial.
 fn jumped(trials: &[u32]) -> Console {
     let mut console = Console::ready();
     for (index, number) in trials.iter().enumerate() {
@@ -33,15 +33,11 @@ fn jumped(trials: &[u32]) -> Console {
             };
             let jump = Some((*number, time_ms as f64 / 1e3 - 0.2, phase));
             let roll = 0.01 * f64::from(*number) + 0.1 * (time_ms as f64 / 200.0).sin();
-            console.tell(Msg::Tick(Box::new(tick(from_ms + time_ms, roll, jump))));
+            console.tick(tick(from_ms + time_ms, roll, jump));
         }
         console.record(Record::Trial(trial(*number, Some(Verdict::Accept), None)));
     }
     console
-}
-
-fn first_screen_line_with(screen: &str, text: &str) -> String {
-    screen.lines().find(|line| line.contains(text)).unwrap_or_else(|| panic!("no {text} in\n{screen}")).to_owned()
 }
 
 #[test]
@@ -49,9 +45,7 @@ fn frozen_charts_stand_still_and_every_view_says_for_how_long() {
     let mut console = jumped(&[0]);
     console.press(&["z"]);
     let before = console.screen(80, 24);
-    for time_ms in (5_000..9_000).step_by(5) {
-        console.tell(Msg::Tick(Box::new(tick(time_ms, 0.2, None))));
-    }
+    console.ticks(5_000..9_000, |_| 0.2);
     console.wait(12_300);
     let after = console.screen(80, 24);
     assert!(after.contains("VIEW FROZEN -12.3 s"), "{after}");
@@ -69,9 +63,7 @@ fn frozen_charts_stand_still_and_every_view_says_for_how_long() {
 #[test]
 fn the_cursor_reads_the_values_of_its_time() {
     let mut console = Console::ready();
-    for time_ms in (0..8_000).step_by(5) {
-        console.tell(Msg::Tick(Box::new(tick(time_ms, time_ms as f64 * 1e-5, None))));
-    }
+    console.ticks(0..8_000, |time_ms| time_ms as f64 * 1e-5);
     assert!(console.screen(80, 24).contains("roll +0.080 rad"));
     // Each step is a hundredth of the window of 8 s.
     console.press(&["Left", "Left", "Left", "Left", "Left"]);
@@ -100,19 +92,14 @@ fn sweep_and_scroll_draw_the_same_samples_at_different_places() {
     console.press(&["w"]);
     let scroll = console.screen(120, 40);
     assert!(sweep.contains("8 s sweep") && scroll.contains("8 s scroll"));
-    let newest = |screen: &str| first_screen_line_with(screen, "fll").find("fll");
+    let newest = |screen: &str| line_with(screen, "fll").find("fll");
     assert!(newest(&sweep) < newest(&scroll), "a jump just seen is at the right edge when scrolling:\n{scroll}");
 }
 
 #[test]
 fn the_keys_of_the_series_change_what_is_drawn() {
     let mut console = jumped(&[0]);
-    let shows = |console: &Console, texts: &[&str]| {
-        let screen = console.screen(80, 24);
-        for text in texts {
-            assert!(screen.contains(text), "no {text}:\n{screen}");
-        }
-    };
+    let shows = |console: &Console, texts: &[&str]| assert_shows(&console.screen(80, 24), texts);
     shows(&console, &["roll ", "pitch ", "FL foot", "RR foot"]);
     console.press(&["t"]);
     shows(&console, &["height ", "oscillator ", "FL force", "RR force"]);
@@ -127,29 +114,15 @@ fn the_keys_of_the_series_change_what_is_drawn() {
     let screen = console.screen(80, 24);
     assert!(!screen.contains("roll ") && screen.contains("height "), "{screen}");
     // The last one cannot be switched off.
-    console.press(&["T"]);
-    for _ in 0..12 {
-        console.press(&["x", "Down"]);
-    }
-    console.press(&["Home"]);
-    for _ in 0..12 {
-        console.press(&["x", "Down"]);
-    }
-    console.press(&["Enter"]);
+    let all_off = ["x", "Down"].repeat(12);
+    console.press(&[&["T"], &all_off[..], &["Home"], &all_off, &["Enter"]].concat());
     assert!(!console.model.live.series.is_empty());
 }
 
 #[test]
 fn charts_without_room_are_counted() {
     let mut console = Console::ready();
-    console.press(&["T"]);
-    for _ in 0..6 {
-        console.press(&["Down"]);
-    }
-    for _ in 0..6 {
-        console.press(&["x", "Down"]);
-    }
-    console.press(&["Esc"]);
+    console.press(&[&["T"], &["Down"; 6][..], &["x", "Down"].repeat(6), &["Esc"]].concat());
     assert_eq!(console.model.live.series.len(), 12);
     assert!(console.screen(80, 24).contains("4 more have no room"), "{}", console.screen(80, 24));
     assert!(!console.screen(120, 60).contains("no room"));
@@ -165,13 +138,11 @@ fn joints_contact_and_wireframe_are_there_at_every_size() {
         newest.state.joint_torque[1] = -20.0;
         newest.limited = 0b10;
         newest.estimate.contact = [true, false, true, false];
-        let counters = console.model.snapshot.counters;
-        let snapshot = quadfrog::telemetry::Snapshot { tick: newest, counters };
-        console.tell(Msg::Snapshot(Box::new(snapshot)));
+        console.tell(Msg::Snapshot(Box::new(Snapshot { tick: newest, ..console.model.snapshot })));
         console.press(&["t", "t"]);
         let screen = console.screen(columns, rows);
         assert!(screen.contains("FR● FL○ RR● RL○"), "{screen}");
-        let thigh = first_screen_line_with(&screen, "FR thigh");
+        let thigh = line_with(&screen, "FR thigh");
         assert!(thigh.contains("-20.0!") && thigh.contains('█'), "{thigh}");
         for joint in ["FR hip", "FL calf", "RR thigh", "RL calf"] {
             assert!(screen.contains(joint), "no {joint}:\n{screen}");
@@ -196,15 +167,14 @@ fn any_two_trials_are_compared_in_live() {
     let mut console = jumped(&[0, 1, 2]);
     console.press(&["2", "Home", "c", "End", "c"]);
     assert_eq!(console.said(), "A is trial 0, B is trial 2: 1 shows both in Live");
-    assert!(first_screen_line_with(&console.screen(80, 24), "   0~").contains("accept"));
+    assert!(line_with(&console.screen(80, 24), "   0~").contains("accept"));
     console.press(&["1"]);
     let screen = console.screen(120, 40);
     assert!(screen.contains("A #0 coloured, B #2 green, at +0.00 s"), "{screen}");
     // At the start of the impulse, 0.2 s in: 0.1 sin 1 = 0.084; B is 0.02 above A.
-    assert!(first_screen_line_with(&screen, "roll").contains("A +0.084 B +0.104 rad"), "{screen}");
+    assert!(line_with(&screen, "roll").contains("A +0.084 B +0.104 rad"), "{screen}");
     // 1 s of both is the window; a step is a hundredth of it.
-    let steps: Vec<&str> = ["Right"; 20].to_vec();
-    console.press(&steps);
+    console.press(&["Right"; 20]);
     let screen = console.screen(120, 40);
     assert!(screen.contains("at +0.20 s"), "{screen}");
     console.press(&["c"]);
@@ -225,9 +195,7 @@ fn a_trial_without_a_trace_cannot_be_a_ghost() {
 /// Twelve trials: accept, fall, void in turn.
 fn twelve() -> Console {
     let mut console = Console::ready();
-    for number in 0..12 {
-        console.record(Record::Trial(trial(number, Some(Verdict::ALL[number as usize % 3]), None)));
-    }
+    console.judged(12);
     console.press(&["2"]);
     console
 }
@@ -257,7 +225,7 @@ fn the_sorting_key_goes_through_all_shown_columns() {
     let mut seen = Vec::new();
     for _ in 0..8 {
         console.press(&["s"]);
-        let line = first_screen_line_with(&console.screen(200, 60), "; by ");
+        let line = line_with(&console.screen(200, 60), "; by ");
         let by = line.split("; by ").nth(1).and_then(|rest| rest.split(" (").next()).expect("a column").to_owned();
         seen.push(by);
     }
@@ -273,7 +241,7 @@ fn columns_are_chosen_in_a_dialog_and_in_the_settings() {
     console.press(&["x", "Down", "x", "Enter"]);
     let screen = console.screen(80, 24);
     assert!(!screen.contains("Fx N") && screen.contains("dx m"), "{screen}");
-    assert!(first_screen_line_with(&screen, "   0 ").contains("+0.420"), "{screen}");
+    assert!(line_with(&screen, "   0 ").contains("+0.420"), "{screen}");
 
     let mut table: toml::Table = DEFAULT.parse().expect("the defaults");
     table.insert("trial_columns".into(), vec!["apex", "value"].into());
@@ -297,12 +265,17 @@ fn columns_are_chosen_in_a_dialog_and_in_the_settings() {
 #[test]
 fn the_filter_the_best_and_a_number_find_rows() {
     let mut console = twelve();
+    assert_eq!(numbers(&console), (0..12).collect::<Vec<_>>());
     console.press(&["F"]);
     assert_eq!(numbers(&console), [0, 3, 6, 9]);
-    console.press(&["F", "F"]);
+    console.press(&["s"]);
+    assert_eq!(numbers(&console), [9, 6, 3, 0], "sorted and filtered");
+    console.press(&["F"]);
+    assert_eq!(numbers(&console), [1, 4, 7, 10]);
+    console.press(&["F"]);
     assert_eq!(numbers(&console), [2, 5, 8, 11]);
     console.press(&["F", "b"]);
-    assert_eq!(numbers(&console), [0, 3, 6, 9], "each was the best so far");
+    assert_eq!(numbers(&console), [9, 6, 3, 0], "each was the best so far");
     console.press(&["b", "/", "7", "Enter"]);
     assert_eq!(console.model.trial_table.selected, Some(7));
     console.press(&["/", "9", "9", "Enter"]);
@@ -310,40 +283,34 @@ fn the_filter_the_best_and_a_number_find_rows() {
 }
 
 #[test]
-fn details_tell_everything_that_is_known_of_a_trial() {
+fn details_show_all_values_of_a_trial() {
     let mut console = Console::ready();
     let first = TrialRecord { note: "slid on the mat".into(), ..trial(0, Some(Verdict::Void), Some(Verdict::Fall)) };
     console.record(Record::Trial(first));
     let again = TrialRecord { parent: Some(0), hand_value: Some(0.37), ..trial(1, Some(Verdict::Accept), None) };
-    console.tell(Msg::Record(quadfrog::recording::record::Stamped {
-        time_ns: 61_000_000_000,
-        record: Record::Stage(quadfrog::recording::record::StageRecord {
-            stage: ExperimentStage::Running,
-            trial: 1,
-            can_undo: false,
-        }),
-    }));
-    console.tell(Msg::Record(quadfrog::recording::record::Stamped {
-        time_ns: 64_500_000_000,
-        record: Record::Stage(quadfrog::recording::record::StageRecord {
-            stage: ExperimentStage::Review,
-            trial: 1,
-            can_undo: false,
-        }),
-    }));
+    for (time_ns, stage) in [(61_000_000_000, ExperimentStage::Running), (64_500_000_000, ExperimentStage::Review)] {
+        console.model.snapshot.tick.time_ns = time_ns;
+        console.stage(stage, 1);
+    }
     console.record(Record::Trial(again));
     console.press(&["2", "Home", "Enter"]);
     let screen = console.screen(80, 24);
-    for part in ["Trial #0", "void", "suggested", "fall: roll 1.20 rad", "75.00000 N", "(0 to 150)", "slid on the mat"]
-    {
-        assert!(screen.contains(part), "no {part}:\n{screen}");
-    }
+    assert_shows(
+        &screen,
+        &[
+            "Trial #0",
+            "void",
+            "suggested",
+            "fall: roll 1.200 rad exceeds 1.000 rad",
+            "75.00000 N",
+            "(0 to 150)",
+            "slid on the mat",
+        ],
+    );
     console.press(&["Down"]);
     let screen = console.screen(80, 24);
-    for part in ["Trial #1", "of trial 0", "by hand", "0.3700 m", "at 01:01 of the session, took 3.5 s"] {
-        assert!(screen.contains(part), "no {part}:\n{screen}");
-    }
-    assert!(first_screen_line_with(&screen, "attempt").contains('2'), "{screen}");
+    assert_shows(&screen, &["Trial #1", "of trial 0", "by hand", "0.3700 m", "at 01:01 of the session, took 3.5 s"]);
+    assert!(line_with(&screen, "attempt").contains('2'), "{screen}");
 }
 
 #[test]
@@ -444,24 +411,15 @@ fn each_cause_rings_the_bell_only_where_the_settings_name_it() {
     for named in all {
         let mut console = Console::ready();
         console.model.bell = vec![named];
-        let mut rung = Vec::new();
-        let fault = Record::Transition(quadfrog::recording::record::Transition {
-            from: Mode::Ready,
-            to: Mode::Fault,
-            cause: "test".into(),
-        });
-        if console.record(fault).contains(&Effect::Bell) {
-            rung.push(BellCause::Fault);
-        }
-        if console.record(Record::Trial(trial(0, None, Some(Verdict::Fall)))).contains(&Effect::Bell) {
-            rung.push(BellCause::Fall);
-        }
-        if console.stage(ExperimentStage::Review, 0).contains(&Effect::Bell) {
-            rung.push(BellCause::Verdict);
-        }
-        if console.stage(ExperimentStage::Proposed, 1).contains(&Effect::Bell) {
-            rung.push(BellCause::Proposal);
-        }
+        let fault = Transition { from: Mode::Ready, to: Mode::Fault, cause: "test".into() };
+        let effects = [
+            (BellCause::Fault, console.record(Record::Transition(fault))),
+            (BellCause::Fall, console.record(Record::Trial(trial(0, None, Some(Verdict::Fall))))),
+            (BellCause::Verdict, console.stage(ExperimentStage::Review, 0)),
+            (BellCause::Proposal, console.stage(ExperimentStage::Proposed, 1)),
+        ];
+        let rung: Vec<_> =
+            effects.iter().filter(|(_, effects)| effects.contains(&Effect::Bell)).map(|(cause, _)| *cause).collect();
         assert_eq!(rung, [named]);
     }
 }
@@ -470,17 +428,18 @@ fn each_cause_rings_the_bell_only_where_the_settings_name_it() {
 fn the_first_screen_names_every_key_that_a_newcomer_needs() {
     let console = Console::proposed();
     let screen = console.screen(80, 24);
-    for part in [
-        "STOP  Space F12",
-        "Press A to arm",
-        "o override",
-        "g approve; again after 0.8 s: the robot jumps",
-        "a accept   f fall   v void   r re-run",
-        "q quit",
-        "? all keys",
-    ] {
-        assert!(screen.contains(part), "no {part}:\n{screen}");
-    }
+    assert_shows(
+        &screen,
+        &[
+            "STOP  Space F12",
+            "Press A to arm",
+            "o override",
+            "g approve; again after 0.8 s: the robot jumps",
+            "a accept   f fall   v void   r re-run",
+            "q quit",
+            "? all keys",
+        ],
+    );
 }
 
 /// The recorded session, played as the program plays it.
@@ -560,15 +519,11 @@ fn markers_take_a_replay_from_trial_to_trial_and_to_the_end() {
     played.press("[");
     let marker = played.time_ms();
     assert!(times.contains(&marker) && marker < times[times.len() - 1]);
-    for _ in 0..20 {
-        played.press("[");
-    }
+    (0..20).for_each(|_| played.press("["));
     assert_eq!(played.time_ms(), 0);
     assert_eq!(played.console.model.session.trials.records.len(), 0, "what was not yet, is not shown");
     // From the end, playing starts over.
-    for _ in 0..20 {
-        played.press("]");
-    }
+    (0..20).for_each(|_| played.press("]"));
     played.press("p");
     played.wait(500);
     assert_eq!(played.time_ms(), 500);

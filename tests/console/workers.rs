@@ -1,15 +1,16 @@
 //! Several worker processes on one study, one of them killed, and a worker of Optuna, on a journal file and on a Redis
 //! server (skipped with a message if `redis-server` or Optuna is missing).
 
+#[path = "support/program.rs"]
+mod program;
 #[path = "../support/redis.rs"]
 mod redis;
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs;
-use std::io::{BufRead, BufReader};
-use std::path::Path;
+use std::io::{self, BufRead, BufReader};
 use std::process::{Command, Stdio};
 
+use program::{Program, assert_shows, hold};
 use quadfrog::optimize::journal::Durability;
 use quadfrog::optimize::study::Storage;
 use quadfrog::optimize::trial::{Trial, TrialState};
@@ -23,29 +24,24 @@ const BUDGET: usize = 400;
 const SHARED: usize = 120;
 
 /// Starts a worker on `journal` that prints JSON lines.
-fn worker(folder: &Path, journal: &str, budget: usize) -> Ended {
+fn worker(program: &Program, journal: &str, budget: usize) -> Ended {
     let trials = budget.to_string();
-    let mut command = Command::new(env!("CARGO_BIN_EXE_quadfrog"));
-    command.args(["optimize", "--join", journal, "--task", "forward", "--seed", "3", "--trials", &trials]);
-    command.args(["--json", "--record", "none", "--config", "mine"]).current_dir(folder);
-    Ended(command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap())
+    let join = ["optimize", "--join", journal, "--task", "forward", "--seed", "3", "--trials", &trials];
+    let mut command = program.command(&[&join[..], &["--json", "--record", "none", "--config", "mine"]].concat());
+    Ended(command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap())
 }
 
 /// A folder with a configuration in which a dead worker's trial is abandoned after 10 s.
-fn folder() -> tempfile::TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    fs::create_dir(folder.path().join("mine")).unwrap();
-    fs::write(folder.path().join("mine/optimize.toml"), "[workers]\nabandoned_s = 10.0\n").unwrap();
-    folder
+fn abandoning() -> Program {
+    let program = Program::new();
+    program.write("mine/optimize.toml", "[workers]\nabandoned_s = 10.0\n");
+    program
 }
 
 /// The numbers of the trials that a worker printed until its end.
-fn printed(worker: Ended) -> Vec<u32> {
-    let mut worker = worker;
-    let mut output = String::new();
-    std::io::Read::read_to_string(&mut worker.0.stdout.take().unwrap(), &mut output).unwrap();
-    let mut errors = String::new();
-    std::io::Read::read_to_string(&mut worker.0.stderr.take().unwrap(), &mut errors).unwrap();
+fn printed(mut worker: Ended) -> Vec<u32> {
+    let output = io::read_to_string(worker.0.stdout.take().unwrap()).unwrap();
+    let errors = io::read_to_string(worker.0.stderr.take().unwrap()).unwrap();
     assert!(worker.0.wait().unwrap().success(), "{errors}");
     let number = |line: &str| serde_json::from_str::<Value>(line).unwrap()["trial"].as_u64().unwrap() as u32;
     output.lines().map(number).collect()
@@ -81,27 +77,23 @@ fn by_worker(trials: &[Trial]) -> BTreeMap<u32, Vec<u32>> {
 }
 
 fn four_workers(journal: &str, storage: &Storage) {
-    let folder = folder();
-    let mut victim = worker(folder.path(), journal, BUDGET);
+    let program = abandoning();
+    let mut victim = worker(&program, journal, BUDGET);
     let mut lines = BufReader::new(victim.0.stdout.take().unwrap()).lines();
-    // The first worker makes the study.
-    let mut seen: Vec<u32> = Vec::new();
     let number = |line: String| serde_json::from_str::<Value>(&line).unwrap()["trial"].as_u64().unwrap() as u32;
-    seen.push(number(lines.next().expect("a first trial").unwrap()));
-    let others: Vec<Ended> = (0..3).map(|_| worker(folder.path(), journal, BUDGET)).collect();
+    // The first worker makes the study.
+    let mut seen = vec![number(lines.next().expect("a first trial").unwrap())];
+    let others: Vec<Ended> = (0..3).map(|_| worker(&program, journal, BUDGET)).collect();
     seen.extend(lines.by_ref().take(30).map(|line| number(line.unwrap())));
     // The trials it printed before the kill are judged.
     victim.0.kill().unwrap();
     victim.0.wait().unwrap();
     seen.extend(lines.map_while(Result::ok).filter(|line| line.ends_with('}')).map(number));
-    let mut all = seen;
-    for other in others {
-        all.extend(printed(other));
-    }
+    seen.extend(others.into_iter().flat_map(printed));
     let trials = trials(storage);
     let workers = by_worker(&trials);
     assert_eq!(workers.len(), 4, "{:?}", workers.keys());
-    check(&trials, &workers, &all);
+    check(&trials, &workers, &seen);
     let seeds: BTreeSet<u64> =
         trials.iter().map(|t| t.system_attributes["quadfrog:draws"]["seed"].as_u64().unwrap()).collect();
     assert_eq!(seeds.len(), 4, "each worker has its own random streams");
@@ -127,10 +119,10 @@ fn a_python_worker_joins_the_study() {
         println!("skipped: python3 has no optuna");
         return;
     }
-    let folder = folder();
-    let file = folder.path().join("shared.log");
+    let program = abandoning();
+    let file = program.path("shared.log");
     let journal = file.to_str().unwrap();
-    let mut ours = worker(folder.path(), journal, SHARED);
+    let mut ours = worker(&program, journal, SHARED);
     let mut lines = BufReader::new(ours.0.stdout.take().unwrap()).lines();
     for _ in 0..20 {
         lines.next().expect("a trial").unwrap();
@@ -167,38 +159,25 @@ fn a_python_worker_joins_the_study() {
 /// It takes budget, robot, task and configuration from the folder; contradicting arguments are refused.
 #[test]
 fn a_worker_joins_the_study_of_a_folder() {
-    let folder = tempfile::tempdir().unwrap();
-    let run = |arguments: &[&str]| {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_quadfrog"));
-        command.args(arguments).current_dir(folder.path()).stdin(Stdio::null()).output().unwrap()
-    };
-    let config = folder.path().join("mine");
-    fs::create_dir(&config).unwrap();
-    fs::write(config.join("optimize.toml"), "[bounds]\nFz = [200.0, 300.0]\n").unwrap();
-    let made =
-        run(&["optimize", "--trials", "4", "--seed", "2", "--record", "none", "--output", "first", "--config", "mine"]);
-    assert!(made.status.success());
-    let study = fs::read_dir(folder.path().join("first")).unwrap().next().unwrap().unwrap().path();
-    let study = study.to_str().unwrap();
+    let program = Program::new();
+    program.write("mine/optimize.toml", "[bounds]\nFz = [200.0, 300.0]\n");
+    let first = ["optimize", "--trials", "4", "--seed", "2", "--record", "none", "--output", "first"];
+    program.text(&[&first[..], &["--config", "mine"]].concat());
+    let study = program.study("first");
     // The lock of a running session does not prevent joining.
-    let held = fs::File::open(Path::new(study).join("session.lock")).unwrap();
-    held.lock().unwrap();
-    let joined = run(&["optimize", "--join", study, "--json", "--record", "none"]);
-    assert!(joined.status.success() && joined.stdout.is_empty(), "the budget of 4 is met already");
-    let joined = run(&["optimize", "--join", study, "--trials", "9", "--json", "--record", "all"]);
-    let text = String::from_utf8_lossy(&joined.stdout);
-    assert_eq!(text.lines().count(), 5, "{text}");
-    for line in text.lines() {
-        let trial: Value = serde_json::from_str(line).unwrap();
-        assert!((200.0..=300.0).contains(&trial["params"]["Fz"].as_f64().unwrap()), "{line}");
+    let _held = hold(&study);
+    let study = study.to_str().unwrap();
+    let joined = program.text(&["optimize", "--join", study, "--json", "--record", "none"]);
+    assert_eq!(joined, "", "the budget of 4 is met already");
+    let trials = program.trials(&["optimize", "--join", study, "--trials", "9", "--json", "--record", "all"]);
+    assert_eq!(trials.len(), 5, "{trials:?}");
+    for trial in trials {
+        assert!((200.0..=300.0).contains(&trial["params"]["Fz"].as_f64().unwrap()), "{trial}");
     }
-    let own = fs::read_dir(folder.path().join("recordings")).unwrap().map(|e| e.unwrap().path());
-    assert!(own.into_iter().any(|own| own.join("session.mcap").is_file() && !own.join("study.log").exists()));
-    let refused = run(&["optimize", "--join", study, "--model", "a1"]);
-    assert_eq!(refused.status.code(), Some(2));
-    let refused = run(&["optimize", "--join", study, "--task", "twist-cw"]);
-    let message = String::from_utf8_lossy(&refused.stderr);
-    assert!(refused.status.code() == Some(2) && message.contains("forward seed 2"), "{message}");
-    let refused = run(&["optimize", "--join", "redis://127.0.0.1:1/0"]);
+    let mut own = program.studies("recordings").into_iter();
+    assert!(own.any(|own| own.join("session.mcap").is_file() && !own.join("study.log").exists()));
+    program.refused(&["optimize", "--join", study, "--model", "a1"]);
+    assert_shows(&program.refused(&["optimize", "--join", study, "--task", "twist-cw"]), &["forward seed 2"]);
+    let refused = program.run(&["optimize", "--join", "redis://127.0.0.1:1/0"]);
     assert_eq!(refused.status.code(), Some(1), "a server that does not answer is not unusable input");
 }

@@ -79,3 +79,27 @@ impl Robot for LinkedRobot {
         self.linked.then_some(self.link)
     }
 }
+
+/// A robot that reports a given state, with the next time, and ignores commands.
+pub struct ScriptedRobot {
+    pub state: Result<RobotState, RobotError>,
+    pub link: LinkStatus,
+}
+
+impl Robot for ScriptedRobot {
+    fn read(&mut self) -> Result<RobotState, RobotError> {
+        if let Ok(state) = &mut self.state {
+            state.robot_time_ms += 1;
+        }
+        self.state
+    }
+    fn write(&mut self, _: &JointCommand) -> Result<(), RobotError> {
+        Ok(())
+    }
+    fn place(&mut self, _: &Placement) -> bool {
+        false
+    }
+    fn link(&self) -> Option<LinkStatus> {
+        Some(self.link)
+    }
+}

@@ -9,6 +9,7 @@ use color_eyre::eyre::{WrapErr, eyre};
 use crossterm::clipboard::CopyToClipboard;
 use crossterm::event::{Event, KeyEventKind, MouseButton, MouseEvent, MouseEventKind};
 use nix::sys::signal::{Signal, raise};
+use quadfrog::engine::Handle;
 use quadfrog::realtime::channel::StopLatch;
 use quadfrog::recording::record::LogLevel;
 use quadfrog::robot::description::RobotDescription;
@@ -18,7 +19,7 @@ use tokio::time::{MissedTickBehavior, interval};
 
 use crate::action::Action;
 use crate::connection::{ConnectionMonitor, TerminalLocation};
-use crate::export::{self, ExportError};
+
 use crate::feed::Feed;
 use crate::keymap::{Key, Keymap};
 use crate::message::{Effect, Mouse, Msg};
@@ -27,7 +28,7 @@ use crate::settings::{ChartMode, ConsoleSettings};
 use crate::terminal::{self, Screen};
 use crate::theme::{ColourChoice, GlyphChoice, Theme};
 use crate::update::{say, update};
-use crate::{text, view};
+use crate::{export, text, view};
 
 /// Maximum period of the loop and of the operator heartbeat.
 const PULSE: Duration = Duration::from_millis(50);
@@ -78,23 +79,16 @@ impl ConsoleOptions {
 
 /// The reason for which the console ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[expect(missing_docs, reason = "the names say the rest")]
 pub enum ConsoleExit {
-    /// The operator quit.
     Quit,
-    /// SIGTERM.
     Terminated,
     /// The terminal hung up; nothing can be printed.
     HungUp,
 }
 
-/// Input from the terminal.
-enum TerminalInput {
-    Key(Key),
-    Paste(String),
-    Mouse(Mouse),
-    Resize(u16, u16),
-    HungUp,
-}
+/// Input from the terminal; none when it hung up.
+type TerminalInput = Option<Msg>;
 
 /// Opens the console on the feed and runs it until the operator or the system ends it; then ends the session of a live feed.
 ///
@@ -130,7 +124,7 @@ impl Console {
         update(&mut model, Msg::Resize(columns, rows));
         let mut screen = Screen::enter().wrap_err("the terminal cannot be used")?;
         screen.mouse(model.mouse).wrap_err("the terminal cannot be used")?;
-        terminal::stop_on_panic(feed.stop_latch());
+        terminal::stop_on_panic(feed.handle().map(Handle::stop_latch));
         let connection = match &feed {
             Feed::Live(_) => {
                 let location = TerminalLocation::of(|name| std::env::var(name).ok());
@@ -156,8 +150,8 @@ impl Console {
 
     async fn run(mut self) -> color_eyre::Result<ConsoleExit> {
         let (input, mut inputs) = unbounded_channel();
-        read_input(input.clone(), self.model.keymap.clone(), self.feed.stop_latch())?;
-        terminal::watch_for_hang_up(move || drop(input.send(TerminalInput::HungUp))).wrap_err("hang-up watcher")?;
+        read_input(input.clone(), self.model.keymap.clone(), self.feed.handle().map(Handle::stop_latch))?;
+        terminal::watch_for_hang_up(move || drop(input.send(None))).wrap_err("hang-up watcher")?;
         let mut interrupted = signal(SignalKind::interrupt())?;
         let mut terminated = signal(SignalKind::terminate())?;
         let mut hung_up = signal(SignalKind::hangup())?;
@@ -173,13 +167,13 @@ impl Console {
                 _ = terminated.recv() => self.end(ConsoleExit::Terminated),
                 _ = interrupted.recv() => {
                     let key = self.model.keymap.keys(Action::Interrupt).next();
-                    self.tell(key.map(Msg::Key));
+                    self.take(key.map(Msg::Key));
                 }
-                _ = suspended.recv() => self.tell([Msg::Suspend]),
+                _ = suspended.recv() => self.take([Msg::Suspend]),
                 _ = pulse.tick() => {}
             }
             if let Some(thread) = terminal::panicked() {
-                self.feed.stop();
+                self.carry_out(Effect::Stop);
                 self.screen.hang_up();
                 self.feed.shutdown();
                 return Err(eyre!("the thread `{thread}` panicked; the robot was stopped and the session was ended"));
@@ -193,8 +187,8 @@ impl Console {
     /// Sends the operator heartbeat while the connection is alive, and reports its loss and its return.
     fn beat(&mut self) {
         let connected = self.connection.alive();
-        if connected {
-            self.feed.beat();
+        if connected && let Some(handle) = self.feed.handle() {
+            handle.send_heartbeat();
         }
         if connected != self.connected {
             self.connected = connected;
@@ -209,11 +203,8 @@ impl Console {
         let mut next = Some(input);
         while let Some(input) = next {
             match input {
-                TerminalInput::Key(key) => self.tell([Msg::Key(key)]),
-                TerminalInput::Paste(text) => self.tell([Msg::Paste(text)]),
-                TerminalInput::Mouse(event) => self.tell([Msg::Mouse(event)]),
-                TerminalInput::Resize(columns, rows) => self.tell([Msg::Resize(columns, rows)]),
-                TerminalInput::HungUp => self.hang_up(),
+                Some(message) => self.take([message]),
+                None => self.hang_up(),
             }
             self.redraw = true;
             next = inputs.try_recv().ok();
@@ -225,11 +216,11 @@ impl Console {
         let elapsed = now.duration_since(self.last_feed);
         self.last_feed = now;
         let news = self.feed.take(u64::try_from(elapsed.as_nanos()).unwrap_or(0));
-        self.tell(news);
+        self.take(news);
     }
 
     /// Updates the model and performs the effects.
-    fn tell(&mut self, messages: impl IntoIterator<Item = Msg>) {
+    fn take(&mut self, messages: impl IntoIterator<Item = Msg>) {
         update(&mut self.model, Msg::Clock(self.started.elapsed()));
         for message in messages {
             for effect in update(&mut self.model, message) {
@@ -240,21 +231,24 @@ impl Console {
 
     fn carry_out(&mut self, effect: Effect) {
         match effect {
-            Effect::Stop => self.feed.stop(),
-            Effect::Request(intent) => self.feed.request(intent),
+            Effect::Stop => self.feed.handle().into_iter().for_each(Handle::stop),
+            Effect::Request(request) => {
+                self.feed.handle().into_iter().for_each(|handle| handle.request(request.clone()))
+            }
             Effect::Replay(command) => self.feed.command(command),
             Effect::Bell => self.send(b"\x07"),
             Effect::CopyTrial(trial) => self.copy_trial(trial),
-            Effect::Mouse(on) => {
-                // A failure is reported with the next frame.
-                let _ = self.screen.mouse(on);
+            // A failure is reported with the next frame.
+            Effect::Mouse(on) => drop(self.screen.mouse(on)),
+            Effect::Export => {
+                let written = export::table(&self.model);
+                self.say_written(written, |path| format!("written: {} and trials.md beside it", path.display()));
             }
-            Effect::Export => self.export(),
-            Effect::ExportBest => self.export_best(),
-            Effect::Redraw => {
-                // A failure is reported with the next frame.
-                let _ = self.screen.clear();
+            Effect::ExportBest => {
+                let written = export::best(&self.model);
+                self.say_written(written, |path| format!("exported; start with quadfrog --config {}", path.display()));
             }
+            Effect::Redraw => drop(self.screen.clear()),
             Effect::Suspend => self.suspend(),
             Effect::Quit => self.end(ConsoleExit::Quit),
         }
@@ -275,17 +269,7 @@ impl Console {
         self.send(&bytes);
     }
 
-    fn export(&mut self) {
-        let written = export::table(&self.model);
-        self.say_written(written, |path| format!("written: {} and trials.md beside it", path.display()));
-    }
-
-    fn export_best(&mut self) {
-        let written = export::best(&self.model);
-        self.say_written(written, |path| format!("exported; start with quadfrog --config {}", path.display()));
-    }
-
-    fn say_written(&mut self, written: Result<PathBuf, ExportError>, text: impl FnOnce(&Path) -> String) {
+    fn say_written(&mut self, written: color_eyre::Result<PathBuf>, text: impl FnOnce(&Path) -> String) {
         match written {
             Ok(path) => say(&mut self.model, LogLevel::Info, text(&path)),
             Err(error) => say(&mut self.model, LogLevel::Error, format!("not written: {error}")),
@@ -333,8 +317,8 @@ impl Console {
     fn close(mut self, inputs: &mut UnboundedReceiver<TerminalInput>) -> color_eyre::Result<ConsoleExit> {
         let ended = self.ended.unwrap_or(ConsoleExit::Quit);
         // The operator is present after a quit key, but not after a hang-up or SIGTERM.
-        let heartbeat = self.feed.heartbeat().filter(|_| ended == ConsoleExit::Quit);
-        let stop = self.feed.stop_latch();
+        let heartbeat = self.feed.handle().map(Handle::heartbeat).filter(|_| ended == ConsoleExit::Quit);
+        let stop = self.feed.handle().map(Handle::stop_latch);
         if self.model.robot_needs_us() {
             say(&mut self.model, LogLevel::Info, "the robot sits down, then the program ends".to_owned());
         }
@@ -349,7 +333,7 @@ impl Console {
                 heartbeat.beat();
             }
             while let Ok(input) = inputs.try_recv() {
-                if let (TerminalInput::Key(key), Some(stop)) = (input, &stop)
+                if let (Some(Msg::Key(key)), Some(stop)) = (input, &stop)
                     && matches!(self.model.keymap.action(key), Some(Action::Stop | Action::Interrupt))
                 {
                     stop.set();
@@ -378,18 +362,18 @@ fn read_input(inputs: UnboundedSender<TerminalInput>, keymap: Keymap, stop: Opti
                     {
                         stop.set();
                     }
-                    TerminalInput::Key(key)
+                    Some(Msg::Key(key))
                 }
-                Ok(Event::Paste(text)) => TerminalInput::Paste(text),
+                Ok(Event::Paste(text)) => Some(Msg::Paste(text)),
                 Ok(Event::Mouse(event)) => match mouse(event) {
-                    Some(event) => TerminalInput::Mouse(event),
+                    Some(event) => Some(Msg::Mouse(event)),
                     None => continue,
                 },
-                Ok(Event::Resize(columns, rows)) => TerminalInput::Resize(columns, rows),
+                Ok(Event::Resize(columns, rows)) => Some(Msg::Resize(columns, rows)),
                 Ok(_) => continue,
-                Err(_) => TerminalInput::HungUp,
+                Err(_) => None,
             };
-            let gone = matches!(input, TerminalInput::HungUp);
+            let gone = input.is_none();
             if inputs.send(input).is_err() || gone {
                 return;
             }

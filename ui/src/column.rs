@@ -6,40 +6,27 @@ use strum::{EnumString, IntoStaticStr, VariantArray};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, VariantArray, EnumString, IntoStaticStr)]
 #[strum(serialize_all = "lowercase")]
 pub enum Column {
-    /// One column for each parameter.
     Parameters,
-    /// Forward displacement, m.
     Dx,
-    /// Displacement to the left, m.
     Dy,
-    /// Turn, rad.
     Yaw,
-    /// Rise of the trunk, m; `console.toml` may also call it `apex`.
+    /// `console.toml` may also call it `apex`.
     #[strum(to_string = "rise", serialize = "apex")]
     Rise,
-    /// Longest time in the air, s.
     Air,
-    /// Objective that the sampler receives.
     Value,
-    /// The verdict, or the suggested one.
     Verdict,
-    /// Source of the parameters.
     Source,
-    /// Falls among the nearest trials when it was approved.
     Risk,
-    /// Start, on the session's clock.
     Time,
-    /// Cause and note.
     Cause,
 }
 
 impl Column {
-    /// Its name in `console.toml` and in the dialog.
     pub fn name(self) -> &'static str {
         self.into()
     }
 
-    /// Its content, for the dialog.
     pub const fn help(self) -> &'static str {
         match self {
             Column::Parameters => "one column for each parameter",

@@ -15,9 +15,7 @@ use std::time::Duration;
 /// Consecutive retransmissions of a dead connection. The first is sent after 0.2 s or more, the third after seven times
 /// that: 1.4 s on a local network, 2 to 3 s on a long path.
 const DEAD_RETRANSMISSIONS: u32 = 3;
-/// Period of the check.
 const CHECK_PERIOD: Duration = Duration::from_millis(250);
-/// The kernel's tables of TCP connections.
 const TABLES: [&str; 2] = ["/proc/net/tcp", "/proc/net/tcp6"];
 
 /// A TCP connection by its two ends.

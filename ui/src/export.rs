@@ -1,35 +1,16 @@
 //! Files written beside the study on request: the trial table, and the best parameters as a configuration.
 
-use std::io;
 use std::path::{Path, PathBuf};
 
-use quadfrog::config::{Config, ConfigError};
+use color_eyre::eyre::{OptionExt, eyre};
+use quadfrog::config::Config;
 use quadfrog::engine::newest_config;
 
 use crate::model::Model;
 use crate::text;
 
-/// A file that could not be written.
-#[derive(Debug, thiserror::Error)]
-pub enum ExportError {
-    /// An operating system error.
-    #[error("{path}: {source}")]
-    System {
-        /// The file or folder.
-        path: PathBuf,
-        /// The error.
-        source: io::Error,
-    },
-    /// The configuration cannot be read or written.
-    #[error(transparent)]
-    Config(#[from] ConfigError),
-    /// There is nothing to write.
-    #[error("no trial was accepted yet")]
-    NoBest,
-}
-
-fn write(path: &Path, text: &str) -> Result<(), ExportError> {
-    std::fs::write(path, text).map_err(|source| ExportError::System { path: path.to_owned(), source })
+fn write(path: &Path, text: &str) -> color_eyre::Result<()> {
+    std::fs::write(path, text).map_err(|error| eyre!("{}: {error}", path.display()))
 }
 
 /// The folder of the study, or the working directory where that folder does not exist (a replay from elsewhere).
@@ -42,7 +23,7 @@ fn folder(model: &Model) -> PathBuf {
 ///
 /// # Errors
 /// When one of them cannot be written.
-pub fn table(model: &Model) -> Result<PathBuf, ExportError> {
+pub fn table(model: &Model) -> color_eyre::Result<PathBuf> {
     let csv = folder(model).join("trials.csv");
     write(&csv, &text::as_csv(model))?;
     write(&csv.with_extension("md"), &text::as_markdown(model))?;
@@ -54,9 +35,9 @@ pub fn table(model: &Model) -> Result<PathBuf, ExportError> {
 ///
 /// # Errors
 /// When no trial was accepted, the study's configuration cannot be read, or a file is there already or cannot be written.
-pub fn best(model: &Model) -> Result<PathBuf, ExportError> {
-    let best = model.session.trials.best().ok_or(ExportError::NoBest)?;
-    let task = model.session.info.task.ok_or(ExportError::NoBest)?;
+pub fn best(model: &Model) -> color_eyre::Result<PathBuf> {
+    let (best, task) =
+        model.session.trials.best().zip(model.session.info.task).ok_or_eyre("no trial was accepted yet")?;
     let study = folder(model);
     let as_run = newest_config(&study).map(|(_, config)| config);
     let config = Config::load(as_run.as_deref())?;

@@ -1,11 +1,9 @@
 //! The source of the screen's messages: a running engine or a recording. Both give the same messages.
 
-pub mod replay;
+mod replay;
 
 use quadfrog::engine::Handle;
-use quadfrog::realtime::channel::{Heartbeat, StopLatch};
 use quadfrog::recording::player::Player;
-use quadfrog::session::operator_request::OperatorRequest;
 
 use crate::message::{Msg, ReplayCommand};
 use replay::ReplayFeed;
@@ -14,10 +12,9 @@ use replay::ReplayFeed;
 const BATCH: usize = 4096;
 
 /// A running engine or a recording.
+#[expect(missing_docs, reason = "the names say the rest")]
 pub enum Feed {
-    /// A running engine.
     Live(Box<Handle>),
-    /// A recording, which ignores requests.
     Replay(Box<ReplayFeed>),
 }
 
@@ -32,40 +29,11 @@ impl Feed {
         Feed::Replay(Box::new(ReplayFeed::new(player)))
     }
 
-    /// Sends the operator heartbeat.
-    pub fn beat(&self) {
-        if let Feed::Live(handle) = self {
-            handle.send_heartbeat();
-        }
-    }
-
-    /// Stops the robot.
-    pub fn stop(&self) {
-        if let Feed::Live(handle) = self {
-            handle.stop();
-        }
-    }
-
-    /// Returns the stop latch, for threads that stop the robot without the loop; none in a replay.
-    pub fn stop_latch(&self) -> Option<StopLatch> {
+    /// Returns the running engine; none in a replay, which nothing commands.
+    pub fn handle(&self) -> Option<&Handle> {
         match self {
-            Feed::Live(handle) => Some(handle.stop_latch()),
+            Feed::Live(handle) => Some(handle),
             Feed::Replay(_) => None,
-        }
-    }
-
-    /// Returns the operator heartbeat, for use while the session ends; none in a replay.
-    pub fn heartbeat(&self) -> Option<Heartbeat> {
-        match self {
-            Feed::Live(handle) => Some(handle.heartbeat()),
-            Feed::Replay(_) => None,
-        }
-    }
-
-    /// Sends a request to the session.
-    pub fn request(&self, request: OperatorRequest) {
-        if let Feed::Live(handle) = self {
-            handle.request(request);
         }
     }
 

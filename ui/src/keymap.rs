@@ -135,12 +135,10 @@ impl FromStr for Key {
 /// A refused key of `console.toml`.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("[keys] {action} = {key}: {reason}")]
+#[expect(missing_docs, reason = "the names say the rest")]
 pub struct KeymapError {
-    /// The action, as written.
     pub action: String,
-    /// Its key or keys, as written.
     pub key: String,
-    /// Reason and remedy.
     pub reason: String,
 }
 
@@ -184,11 +182,8 @@ impl Keymap {
             };
             for key in keys {
                 if let Some((_, other)) = bindings.iter().find(|(bound, _)| *bound == key) {
-                    let reason = format!(
-                        "the key is bound to `{}` and to `{}`; give one of them another key",
-                        other.info().name,
-                        info.name
-                    );
+                    let (one, other) = (other.info().name, info.name);
+                    let reason = format!("the key is bound to `{one}` and to `{other}`; give one of them another key");
                     return Err(refused(info.name, &key.to_string(), reason));
                 }
                 bindings.push((key, info.action));

@@ -7,23 +7,17 @@ use crate::action::Action;
 use crate::keymap::Keymap;
 use crate::model::View;
 
-/// Columns that the console needs.
 pub const MIN_COLUMNS: u16 = 80;
-/// Rows that the console needs.
 pub const MIN_ROWS: u16 = 24;
 
 /// The parts of the screen, from the top.
 #[derive(Debug, Clone, Copy)]
 pub struct Areas {
-    /// The frame: mode, STOP, counters.
     pub frame: Rect,
-    /// The tabs.
     pub tabs: Rect,
-    /// The open view.
     pub body: Rect,
     /// The newest answer to the operator.
     pub message: Rect,
-    /// The next possible step.
     pub next_step: Rect,
 }
 
@@ -54,7 +48,6 @@ pub fn first_row(rows: usize, selected: Option<usize>, space: usize) -> usize {
     at.saturating_sub(space / 2).min(rows.saturating_sub(space))
 }
 
-/// The tabs with their actions and texts, from the left.
 pub fn tabs(keymap: &Keymap) -> impl Iterator<Item = (View, Action, String)> + '_ {
     View::VARIANTS.iter().map(move |view| {
         let action = match view {

@@ -2,7 +2,7 @@
 
 use quadfrog::control::mode::{self, Trigger};
 use quadfrog::telemetry::Mode;
-use quadfrog::trial::{ExperimentStage, Verdict};
+use quadfrog::trial::{ExperimentStage, Proposal, Verdict};
 
 use crate::action::{ACTIONS, Action, ActionInfo};
 use crate::layout::{MIN_COLUMNS, MIN_ROWS};
@@ -11,7 +11,6 @@ use crate::model::{Model, View};
 /// Whether an action is possible now; the reason if it is not.
 pub type Legality = Result<(), String>;
 
-/// Whether `action` is possible now.
 pub fn legal(action: Action, model: &Model) -> Legality {
     use Action as A;
     match action {
@@ -23,14 +22,34 @@ pub fn legal(action: Action, model: &Model) -> Legality {
         A::ClearOverrides => may_clear_overrides(model),
         A::Fix => may_fix(model),
         A::Bounds => may_bound(model),
-        A::Continue => may_continue(model),
-        A::ConfirmBest => may_confirm(model),
-        A::ExportBest => may_export_best(model),
-        A::Accept | A::Fall | A::Void | A::HandValue => may_judge(model),
+        A::Continue => {
+            may_request(model)?;
+            require(model.session.stage_is(ExperimentStage::Finished), "the study is not finished")
+        }
+        A::ConfirmBest => {
+            may_search(model)?;
+            let accepted = model.session.trials.count(Verdict::Accept);
+            require(accepted >= 2, "two accepted trials are needed to compare")
+        }
+        A::ExportBest => {
+            may_request(model)?;
+            require(model.session.trials.best().is_some(), "no trial was accepted yet")?;
+            require(!model.session.info.study.is_empty(), "this session keeps no study")
+        }
+        A::Accept | A::Fall | A::Void | A::HandValue => {
+            may_request(model)?;
+            require(model.session.stage_is(ExperimentStage::Review), "no trial waits for a verdict")
+        }
         A::Rerun => may_rerun(model),
-        A::Undo => may_undo(model),
-        A::Note => may_note(model),
-        A::Ghost => may_ghost(model),
+        A::Undo => {
+            may_request(model)?;
+            require(model.session.stage.is_some_and(|info| info.can_undo), "no verdict can be taken back")
+        }
+        A::Note => {
+            may_request(model)?;
+            require(model.trial_in_view().is_some(), "there is no trial yet")
+        }
+        A::Ghost => require(model.history.traces().next().is_some(), "no jump has been recorded yet"),
         A::Sort | A::Reverse | A::Columns | A::BestOnly | A::Copy | A::Export => {
             require(model.view == View::Trials, "only in the view Trials")
         }
@@ -143,26 +162,25 @@ fn may_approve(model: &Model) -> Legality {
 
 fn may_change_proposal(model: &Model) -> Legality {
     may_request(model)?;
-    match model.session.stage.map(|info| info.stage) {
-        Some(ExperimentStage::Proposed) if model.session.open_proposal().is_some() => Ok(()),
-        Some(ExperimentStage::Review) => refuse("the last trial waits for its verdict"),
-        Some(ExperimentStage::Running) => refuse("a trial is running"),
-        Some(ExperimentStage::Finished) => {
-            refuse(format!("the study is finished: {} gives it more trials", model.keymap.key(Action::Continue)))
-        }
-        _ => refuse("there is no proposal yet"),
+    not_under_way(model)?;
+    if model.session.stage_is(ExperimentStage::Finished) {
+        let key = model.keymap.key(Action::Continue);
+        return refuse(format!("the study is finished: {key} gives it more trials"));
     }
+    require(model.session.open_proposal().is_some(), "there is no proposal yet")
+}
+
+/// No trial runs or waits for its verdict.
+fn not_under_way(model: &Model) -> Legality {
+    require(!model.session.stage_is(ExperimentStage::Review), "the last trial waits for its verdict")?;
+    require(!model.session.stage_is(ExperimentStage::Running), "a trial is running")
 }
 
 /// Whether the search may be changed: not during a trial.
 fn may_search(model: &Model) -> Legality {
     may_request(model)?;
-    match model.session.stage.map(|info| info.stage) {
-        Some(ExperimentStage::Proposed | ExperimentStage::Finished) => Ok(()),
-        Some(ExperimentStage::Review) => refuse("the last trial waits for its verdict"),
-        Some(ExperimentStage::Running) => refuse("a trial is running"),
-        None => refuse("the session has not begun"),
-    }
+    not_under_way(model)?;
+    require(model.session.stage.is_some(), "the session has not begun")
 }
 
 fn may_bound(model: &Model) -> Legality {
@@ -177,35 +195,11 @@ fn may_fix(model: &Model) -> Legality {
     require(fixed.is_some() || model.override_value().is_some(), "there is no proposal whose value could be kept")
 }
 
-fn may_confirm(model: &Model) -> Legality {
-    may_search(model)?;
-    let accepted = model.session.trials.count(Verdict::Accept);
-    require(accepted >= 2, "two accepted trials are needed to compare")
-}
-
-fn may_export_best(model: &Model) -> Legality {
-    may_request(model)?;
-    require(model.session.trials.best().is_some(), "no trial was accepted yet")?;
-    require(!model.session.info.study.is_empty(), "this session keeps no study")
-}
-
 fn may_clear_overrides(model: &Model) -> Legality {
     may_change_proposal(model)?;
-    let overridden = model
-        .session
-        .open_proposal()
-        .is_some_and(|proposal| proposal.parameters.iter().chain(&proposal.gains).any(|p| p.value != p.proposed));
-    require(overridden, "nothing was overridden")
-}
-
-fn may_continue(model: &Model) -> Legality {
-    may_request(model)?;
-    require(model.session.stage_is(ExperimentStage::Finished), "the study is not finished")
-}
-
-fn may_judge(model: &Model) -> Legality {
-    may_request(model)?;
-    require(model.session.stage_is(ExperimentStage::Review), "no trial waits for a verdict")
+    let changed =
+        |proposal: &Proposal| proposal.parameters.iter().chain(&proposal.gains).any(|p| p.value != p.proposed);
+    require(model.session.open_proposal().is_some_and(changed), "nothing was overridden")
 }
 
 fn may_rerun(model: &Model) -> Legality {
@@ -219,23 +213,9 @@ fn may_rerun(model: &Model) -> Legality {
     }
 }
 
-fn may_undo(model: &Model) -> Legality {
-    may_request(model)?;
-    require(model.session.stage.is_some_and(|info| info.can_undo), "no verdict can be taken back")
-}
-
-fn may_note(model: &Model) -> Legality {
-    may_request(model)?;
-    require(model.trial_in_view().is_some(), "there is no trial yet")
-}
-
-fn may_ghost(model: &Model) -> Legality {
-    require(model.history.traces().next().is_some(), "no jump has been recorded yet")
-}
-
 /// A stopped process sends nothing, not even the damping commands that a real robot needs.
 fn may_suspend(model: &Model) -> Legality {
-    if model.replay.is_none() && model.session.is_hardware() && model.mode().commanded() {
+    if model.replay.is_none() && model.session.info.is_hardware() && model.mode().commanded() {
         refuse("a suspended program sends the robot nothing, not even damping; quit it instead")
     } else if model.robot_needs_us() {
         let sit_down = model.keymap.key(Action::SitDown);

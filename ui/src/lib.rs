@@ -9,26 +9,17 @@
 //! engine, replay ─┘                      └── model ──> view::render ──> terminal
 //! ```
 //!
-//! Modules, each using only those before it, and no file in an import cycle:
-//!
-//! ```text
-//! action  column  series  theme    names, keys and help of actions; columns; series; colours and characters
-//! keymap  settings  message        keys; console.toml; messages and effects
-//! model                            data of the screen and questions to it
-//! layout  legal  text              places on the screen; conditions of actions; trial rows as text
-//! update | view | feed | export    changes the model; draws it; messages' source; files on request
-//! connection  terminal  app        the SSH connection; the terminal; the loop
-//! ```
+//! The modules and their layers: `docs/architecture.md`.
 
 pub mod action;
 pub mod app;
-pub mod column;
+mod column;
 pub mod connection;
 pub mod export;
 pub mod feed;
 pub mod keymap;
-pub mod layout;
-pub mod legal;
+mod layout;
+mod legal;
 pub mod message;
 pub mod model;
 pub mod series;

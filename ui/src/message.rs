@@ -11,13 +11,13 @@ use crate::keymap::Key;
 
 /// An input of the console: keys, mouse, signals, the feed, the clock.
 #[expect(clippy::large_enum_variant, reason = "records are few; the many ticks are boxed")]
+#[expect(missing_docs, reason = "the names say the rest")]
 #[derive(Debug, Clone)]
 pub enum Msg {
     /// Time since the console started.
     Clock(Duration),
     /// Columns and rows of the terminal.
     Resize(u16, u16),
-    /// A key press.
     Key(Key),
     /// Pasted text; never read as keys.
     Paste(String),
@@ -25,13 +25,10 @@ pub enum Msg {
     Mouse(Mouse),
     /// The newest tick and counters, for numbers and the mode.
     Snapshot(Box<Snapshot>),
-    /// State of the recorder.
     Recorder(RecorderStatus),
     /// One of the ticks for the charts.
     Tick(Box<Tick>),
-    /// A record of the session.
     Record(Stamped),
-    /// State of the replay.
     Replay(ReplayStatus),
     /// The replay jumped to another time; the records up to that time follow from the start.
     Rewound,
@@ -43,12 +40,10 @@ pub enum Msg {
 
 /// Mouse input; columns and rows count from 0 at the upper left.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[expect(missing_docs, reason = "the names say the rest")]
 pub enum Mouse {
-    /// The left button was pressed.
     Click {
-        /// Column.
         column: u16,
-        /// Row.
         row: u16,
     },
     /// The wheel was turned away from the operator.
@@ -59,14 +54,11 @@ pub enum Mouse {
 
 /// An effect outside of the model, carried out by the program's loop.
 #[derive(Debug, Clone, PartialEq)]
+#[expect(missing_docs, reason = "the names say the rest")]
 pub enum Effect {
-    /// Stop the robot now.
     Stop,
-    /// Send a request to the session.
     Request(OperatorRequest),
-    /// Control the replay.
     Replay(ReplayCommand),
-    /// Ring the terminal's bell.
     Bell,
     /// Put the row of this trial on the clipboard of the operator's terminal.
     CopyTrial(u32),
@@ -74,7 +66,6 @@ pub enum Effect {
     Export,
     /// Write the best parameters as a configuration beside the study.
     ExportBest,
-    /// Redraw the whole screen.
     Redraw,
     /// Switch mouse reports of the terminal on or off.
     Mouse(bool),
@@ -86,29 +77,23 @@ pub enum Effect {
 
 /// A command to the replay.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[expect(missing_docs, reason = "the names say the rest")]
 pub enum ReplayCommand {
-    /// Play or pause.
     PlayPause,
     /// One chart tick forward; pauses.
     StepForward,
     /// One chart tick back; pauses.
     StepBack,
-    /// Half the speed.
     Slower,
-    /// Twice the speed.
     Faster,
-    /// To the marker before.
     PreviousMarker,
-    /// To the marker after.
     NextMarker,
 }
 
 /// State of the replay.
 #[derive(Debug, Clone, PartialEq)]
+#[expect(missing_docs, reason = "the names say the rest")]
 pub struct ReplayStatus {
-    /// Name of the file.
-    pub file: String,
-    /// Whether it plays.
     pub playing: bool,
     /// Recorded seconds per second.
     pub speed: f64,

@@ -19,12 +19,11 @@ pub const DEFAULT: &str = include_str!("../../config/console.toml");
 
 /// The console's settings, checked.
 #[derive(Debug, Clone, PartialEq)]
+#[expect(missing_docs, reason = "the names say the rest")]
 pub struct ConsoleSettings {
     /// Highest frame rate, 1/s.
     pub frames_per_second: u32,
-    /// Colours.
     pub colours: ColourChoice,
-    /// Characters of the charts.
     pub glyphs: GlyphChoice,
     /// Whether charts sweep or scroll.
     pub chart_mode: ChartMode,
@@ -36,11 +35,9 @@ pub struct ConsoleSettings {
     pub trial_columns: Vec<Column>,
     /// Whether clicks and the wheel reach the console.
     pub mouse: bool,
-    /// Causes that ring the terminal's bell.
     pub bell: Vec<BellCause>,
     /// Whether to save bandwidth; from the command line, not from the file.
     pub low_bandwidth: bool,
-    /// The keys.
     pub keymap: Keymap,
 }
 
@@ -71,12 +68,10 @@ pub enum BellCause {
 /// A setting that is refused.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("console.toml: {key} = {value}: {reason}")]
+#[expect(missing_docs, reason = "the names say the rest")]
 pub struct SettingsError {
-    /// The key, with its table.
     pub key: String,
-    /// The value as written.
     pub value: String,
-    /// Reason and remedy.
     pub reason: String,
 }
 

@@ -35,28 +35,18 @@ const HANG_UP_PERIOD_MS: u16 = 200;
 
 /// The reason for which the console cannot open.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages say the rest")]
 pub enum TerminalError {
-    /// Standard input or output is not a terminal.
     #[error(
         "the console needs a terminal, but {0} is not one; over SSH use `ssh -t`, for a study without a screen use `quadfrog optimize`"
     )]
-    NoTerminal(
-        /// The stream.
-        &'static str,
-    ),
-    /// The size is unknown.
+    NoTerminal(&'static str),
     #[error("the size of the terminal is unknown; set it with `stty rows {MIN_ROWS} columns {MIN_COLUMNS}`")]
     NoSize,
-    /// The terminal is too small.
     #[error(
         "the terminal has {columns}x{rows} characters, the console needs at least {MIN_COLUMNS}x{MIN_ROWS}; enlarge it"
     )]
-    TooSmall {
-        /// Columns.
-        columns: u16,
-        /// Rows.
-        rows: u16,
-    },
+    TooSmall { columns: u16, rows: u16 },
 }
 
 /// Checks whether the console can open on this terminal.
@@ -64,12 +54,11 @@ pub enum TerminalError {
 /// # Errors
 /// When there is no terminal, or it is too small. A terminal that shrinks later shows a reduced screen.
 pub fn check() -> Result<(), TerminalError> {
-    for (name, is_terminal) in
-        [("standard input", io::stdin().is_terminal()), ("standard output", io::stdout().is_terminal())]
-    {
-        if !is_terminal {
-            return Err(TerminalError::NoTerminal(name));
-        }
+    if !io::stdin().is_terminal() {
+        return Err(TerminalError::NoTerminal("standard input"));
+    }
+    if !io::stdout().is_terminal() {
+        return Err(TerminalError::NoTerminal("standard output"));
     }
     match size() {
         Ok((0, _) | (_, 0)) | Err(_) => Err(TerminalError::NoSize),
@@ -90,7 +79,7 @@ struct WriterState {
 }
 
 /// Collects the bytes of a frame and sends the complete frame to the writing thread.
-pub struct FrameWriter {
+struct FrameWriter {
     frame: Vec<u8>,
     frames: Sender<Vec<u8>>,
     state: Arc<WriterState>,
@@ -191,12 +180,12 @@ static PANICKED: Mutex<Option<String>> = Mutex::new(None);
 const CONTROL: &str = "control";
 
 /// Makes a panic in any thread set this latch first; none if there is no robot to stop.
-pub fn stop_on_panic(stop: Option<StopLatch>) {
+pub(crate) fn stop_on_panic(stop: Option<StopLatch>) {
     *STOP.lock().unwrap_or_else(PoisonError::into_inner) = stop;
 }
 
 /// The terminal in use by the console; restored on drop.
-pub struct Screen {
+pub(crate) struct Screen {
     terminal: Option<Terminal<WriteOnlyBackend>>,
     state: Arc<WriterState>,
     writer: Option<JoinHandle<()>>,
@@ -207,9 +196,6 @@ pub struct Screen {
 impl Screen {
     /// Enters raw mode and the alternate screen, and hides the cursor. From now on a panic in any thread restores the
     /// terminal before it is reported.
-    ///
-    /// # Errors
-    /// When the terminal cannot be configured.
     pub fn enter() -> io::Result<Screen> {
         let terminal = own_file()?;
         let state = Arc::new(WriterState::default());
@@ -229,9 +215,6 @@ impl Screen {
     }
 
     /// Configures the terminal, also after a suspension.
-    ///
-    /// # Errors
-    /// When the terminal cannot be configured.
     pub fn take(&mut self) -> io::Result<()> {
         enable_raw_mode()?;
         ENTERED.store(true, Ordering::Release);
@@ -260,9 +243,6 @@ impl Screen {
     }
 
     /// Draws a frame.
-    ///
-    /// # Errors
-    /// When the terminal's size is unknown or the writing thread has ended.
     pub fn draw(&mut self, render: impl FnOnce(&mut ratatui::Frame)) -> io::Result<()> {
         match &mut self.terminal {
             Some(terminal) => terminal.draw(render).map(|_| ()),
@@ -271,17 +251,11 @@ impl Screen {
     }
 
     /// Clears the screen, so that the next frame draws all cells.
-    ///
-    /// # Errors
-    /// When the writing thread has ended.
     pub fn clear(&mut self) -> io::Result<()> {
         self.terminal.as_mut().map_or(Ok(()), Terminal::clear)
     }
 
     /// Starts or ends the capture of mouse events.
-    ///
-    /// # Errors
-    /// When the writing thread has ended.
     pub fn mouse(&mut self, on: bool) -> io::Result<()> {
         let Some(terminal) = &mut self.terminal else { return Ok(()) };
         let writer = &mut terminal.backend_mut().0;
@@ -295,9 +269,6 @@ impl Screen {
     }
 
     /// Sends bytes outside a frame: a bell, the clipboard.
-    ///
-    /// # Errors
-    /// When the writing thread has ended.
     pub fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
         let Some(terminal) = &mut self.terminal else { return Ok(()) };
         let writer = &mut terminal.backend_mut().0;
@@ -399,16 +370,13 @@ fn install_panic_hook() {
 }
 
 /// Returns the name of the first thread that panicked, if any.
-pub fn panicked() -> Option<String> {
+pub(crate) fn panicked() -> Option<String> {
     PANICKED.lock().unwrap_or_else(PoisonError::into_inner).clone()
 }
 
 /// Watches for a hang-up of the terminal in a thread and calls `notify` once. The event loop cannot detect it: without
 /// SIGHUP, reading events from a terminal that hung up never returns.
-///
-/// # Errors
-/// When the thread cannot be started.
-pub fn watch_for_hang_up(notify: impl FnOnce() + Send + 'static) -> io::Result<()> {
+pub(crate) fn watch_for_hang_up(notify: impl FnOnce() + Send + 'static) -> io::Result<()> {
     let terminal = io::stdin().as_fd().try_clone_to_owned()?;
     let watch = move || {
         loop {

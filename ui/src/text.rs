@@ -2,7 +2,9 @@
 
 use quadfrog::trial::{TrialRecord, Verdict};
 
+use crate::column::Column;
 use crate::model::Model;
+use crate::model::trials::measured;
 
 /// Cause and note on one line.
 pub fn remark(trial: &TrialRecord) -> String {
@@ -40,9 +42,7 @@ fn export_cells(model: &Model) -> (Vec<String>, Vec<Vec<String>>) {
     let optional = |value: Option<f64>| value.map(|value| value.to_string()).unwrap_or_default();
     let row = |trial: &&TrialRecord| {
         let mut cells = vec![trial.trial.to_string()];
-        for info in &model.session.info.parameters {
-            cells.push(optional(trial.parameters.iter().find(|(name, _)| *name == info.name).map(|(_, value)| *value)));
-        }
+        cells.extend(model.session.info.parameters.iter().map(|info| optional(trial.parameters.get(&info.name))));
         cells.extend([
             optional(trial.value),
             optional(trial.hand_value),
@@ -53,15 +53,9 @@ fn export_cells(model: &Model) -> (Vec<String>, Vec<Vec<String>>) {
             trial.parent.map(|parent| parent.to_string()).unwrap_or_default(),
             model.session.trials.attempt(trial).to_string(),
         ]);
-        let m = trial.measured;
-        cells.extend([
-            optional(m.map(|m| m.dx_m)),
-            optional(m.map(|m| m.dy_m)),
-            optional(m.map(|m| m.dyaw_rad)),
-            optional(m.map(|m| m.apex_m)),
-            optional(m.map(|m| m.air_s)),
-            trial.note.clone(),
-        ]);
+        let quantities = [Column::Dx, Column::Dy, Column::Yaw, Column::Rise, Column::Air];
+        cells.extend(quantities.map(|column| optional(measured(trial, column))));
+        cells.push(trial.note.clone());
         cells
     };
     (names, model.trial_rows().iter().map(row).collect())

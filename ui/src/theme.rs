@@ -1,5 +1,7 @@
 //! Meaning of colours and characters. A style never carries a meaning alone: text or a symbol says the same.
 
+#![expect(missing_docs, reason = "the names of colours and characters say the rest")]
+
 use ratatui::style::{Color, Modifier, Style};
 use serde::Deserialize;
 
@@ -9,16 +11,12 @@ pub enum ColourChoice {
     /// As the environment says in `NO_COLOR`, `COLORTERM` and `TERM`.
     #[serde(rename = "auto")]
     Auto,
-    /// 24 bit.
     #[serde(rename = "true")]
     True,
-    /// The 256 indexed colours.
     #[serde(rename = "256")]
     Indexed,
-    /// The 16 named colours.
     #[serde(rename = "16")]
     Named,
-    /// None; bold and reverse remain.
     #[serde(rename = "none")]
     None,
 }
@@ -31,20 +29,15 @@ pub enum GlyphChoice {
     Auto,
     /// Braille: 2 x 4 dots in a character.
     Braille,
-    /// One dot in a character, and line characters.
     Dots,
-    /// Nothing beyond ASCII.
     Ascii,
 }
 
 /// Colours of the terminal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Colours {
-    /// 24 bit.
     True,
-    /// 256 indexed ones.
     Indexed,
-    /// 16 named ones.
     Named,
     /// None: bold, dim and reverse remain.
     None,
@@ -53,11 +46,8 @@ pub enum Colours {
 /// Characters that the terminal can draw.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Glyphs {
-    /// Braille patterns and line characters.
     Braille,
-    /// One dot in a character, and line characters.
     Dots,
-    /// Nothing beyond ASCII.
     Ascii,
 }
 
@@ -68,9 +58,7 @@ pub enum Role {
     Text,
     /// Labels, units and lines.
     Quiet,
-    /// A heading.
     Heading,
-    /// A key to press.
     Key,
     /// In order.
     Good,
@@ -101,9 +89,7 @@ pub enum Role {
 /// Colours and characters of this terminal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Theme {
-    /// Colours.
     pub colours: Colours,
-    /// Characters.
     pub glyphs: Glyphs,
 }
 
@@ -163,13 +149,12 @@ impl Theme {
         Theme { colours, glyphs }
     }
 
-    /// The style of a role.
     pub fn style(&self, role: Role) -> Style {
         let plain = Style::new();
         match role {
             Role::Text => plain,
-            Role::Quiet if self.colours == Colours::Named => plain.add_modifier(Modifier::DIM),
-            Role::Quiet => self.fg(GREY),
+            Role::Quiet | Role::Ghost if self.colours == Colours::Named => plain.add_modifier(Modifier::DIM),
+            Role::Quiet | Role::Ghost => self.fg(GREY),
             Role::Heading => self.fg(CYAN).add_modifier(Modifier::BOLD),
             Role::Key => plain.add_modifier(Modifier::BOLD),
             Role::Good => self.fg(GREEN),
@@ -180,69 +165,63 @@ impl Theme {
             Role::Hardware => self.reverse(AMBER),
             Role::SeriesA => self.fg(CYAN),
             Role::SeriesB => self.fg(VIOLET),
-            Role::Ghost if self.colours == Colours::Named => plain.add_modifier(Modifier::DIM),
-            Role::Ghost => self.fg(GREY),
             Role::ShadeImpulse => self.bg(NIGHT_IMPULSE),
             Role::ShadeFlight => self.bg(NIGHT_FLIGHT),
             Role::ShadeLanding => self.bg(NIGHT_LANDING),
         }
     }
 
-    /// The horizontal line of headings.
-    pub fn line(&self) -> &'static str {
-        if self.glyphs == Glyphs::Ascii { "-" } else { "─" }
+    /// `unicode` as far as the terminal can draw it, else `ascii`.
+    fn pick(&self, ascii: &'static str, unicode: &'static str) -> &'static str {
+        if self.glyphs == Glyphs::Ascii { ascii } else { unicode }
     }
 
-    /// A vertical line.
+    /// The horizontal line of headings.
+    pub fn line(&self) -> &'static str {
+        self.pick("-", "─")
+    }
+
     pub fn bar(&self) -> &'static str {
-        if self.glyphs == Glyphs::Ascii { "|" } else { "│" }
+        self.pick("|", "│")
     }
 
     /// Separator of two items on one line.
     pub fn dot(&self) -> &'static str {
-        if self.glyphs == Glyphs::Ascii { "-" } else { "·" }
+        self.pick("-", "·")
     }
 
-    /// Arrow from one item to the next.
     pub fn arrow(&self) -> &'static str {
-        if self.glyphs == Glyphs::Ascii { "->" } else { "→" }
+        self.pick("->", "→")
     }
 
-    /// Plus or minus.
     pub fn plus_minus(&self) -> &'static str {
-        if self.glyphs == Glyphs::Ascii { "+-" } else { "±" }
+        self.pick("+-", "±")
     }
 
-    /// A lamp: on, off.
     pub fn lamp(&self, on: bool) -> &'static str {
-        match (on, self.glyphs == Glyphs::Ascii) {
-            (true, false) => "●",
-            (false, false) => "○",
-            (true, true) => "#",
-            (false, true) => ".",
-        }
+        if on { self.pick("#", "●") } else { self.pick(".", "○") }
     }
 
     /// The filled and the empty part of a bar.
     pub fn fill(&self) -> (&'static str, &'static str) {
-        if self.glyphs == Glyphs::Ascii { ("#", ".") } else { ("█", "░") }
+        (self.pick("#", "█"), self.pick(".", "░"))
     }
 
-    fn colour(&self, shade: Shade) -> Color {
+    fn colour(&self, shade: Shade) -> Option<Color> {
         match self.colours {
-            Colours::True => Color::Rgb(shade.rgb.0, shade.rgb.1, shade.rgb.2),
-            Colours::Indexed => Color::Indexed(shade.index),
-            Colours::Named => shade.named,
-            Colours::None => Color::Reset,
+            Colours::True => Some(Color::from(shade.rgb)),
+            Colours::Indexed => Some(Color::Indexed(shade.index)),
+            Colours::Named => Some(shade.named),
+            Colours::None => None,
         }
     }
 
     fn fg(&self, shade: Shade) -> Style {
-        if self.colours == Colours::None { Style::new() } else { Style::new().fg(self.colour(shade)) }
+        self.colour(shade).map_or_else(Style::new, |colour| Style::new().fg(colour))
     }
 
     fn bg(&self, shade: Shade) -> Style {
-        if self.colours == Colours::None { Style::new() } else { Style::new().bg(self.colour(shade)) }
+        self.colour(shade).map_or_else(Style::new, |colour| Style::new().bg(colour))
     }
 
     /// Dark text on the colour; reversed where there are no colours.

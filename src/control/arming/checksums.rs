@@ -1,14 +1,13 @@
 //! Few states arrive with a wrong checksum; none on a machine without a link.
 
-use super::*;
+use super::check::*;
 
-pub(super) const CHECK: ControlCheck = ControlCheck { check: ArmingCheck::Checksums, measure, sentence };
-
-fn measure(inputs: &ArmingInputs, settings: &ControlSettings) -> Reading {
-    let corrupt = inputs.link.map_or(0.0, |link| f64::from(link.recent_corrupt));
-    Reading::at_most(corrupt, f64::from(settings.pre_arm.corrupt))
-}
-
-fn sentence(finding: &ArmingFinding, limits: &ArmingLimits) -> Sentence {
-    Sentence { found: format!("{:.0} corrupt", finding.measured), needed: format!("at most {} in 5 s", limits.corrupt) }
-}
+pub(super) const CHECK: ControlCheck = ControlCheck {
+    check: ArmingCheck::Checksums,
+    measure: |inputs, settings| {
+        let corrupt = inputs.link.map_or(0, |link| link.recent_corrupt);
+        Reading::at_most(corrupt.into(), settings.pre_arm.corrupt.into())
+    },
+    found: |finding| format!("{:.0} corrupt", finding.measured),
+    needed: |limits| format!("at most {} in 5 s", limits.corrupt),
+};

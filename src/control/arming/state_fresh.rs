@@ -1,13 +1,10 @@
 //! The newest state of the robot is recent.
 
-use super::*;
+use super::check::*;
 
-pub(super) const CHECK: ControlCheck = ControlCheck { check: ArmingCheck::StateFresh, measure, sentence };
-
-fn measure(inputs: &ArmingInputs, settings: &ControlSettings) -> Reading {
-    Reading::at_most(f64::from(inputs.state_age_ms), f64::from(settings.pre_arm.state_age_ms))
-}
-
-fn sentence(finding: &ArmingFinding, limits: &ArmingLimits) -> Sentence {
-    Sentence { found: format!("{:.0} ms old", finding.measured), needed: format!("at most {} ms", limits.state_age_ms) }
-}
+pub(super) const CHECK: ControlCheck = ControlCheck {
+    check: ArmingCheck::StateFresh,
+    measure: |inputs, settings| Reading::at_most(inputs.state_age_ms.into(), settings.pre_arm.state_age_ms.into()),
+    found: |finding| format!("{:.0} ms old", finding.measured),
+    needed: |limits| format!("at most {} ms", limits.state_age_ms),
+};

@@ -3,9 +3,8 @@
 use super::{Cycle, Inputs};
 use crate::control::failsafe;
 use crate::control::jump::Jump;
-use crate::control::leg;
 use crate::control::mode::{self, Trigger};
-use crate::robot::{Leg, Placement, Robot};
+use crate::robot::{Placement, Robot};
 use crate::telemetry::{Command, CommandRefusal, Event, Permit, TransitionCause, TrialSpec};
 
 impl Cycle {
@@ -119,14 +118,8 @@ impl Cycle {
 
     /// Places a simulated robot at the origin, feet at the trial's stance.
     fn place_for_trial<R: Robot + ?Sized>(&mut self, robot: &mut R, spec: &TrialSpec) {
-        let mut joint_position = self.tick.state.joint_position;
-        for leg in Leg::ALL {
-            let foot = leg::stance_of(&spec.stance_leg, leg);
-            // The session has checked that the stance can be reached; a leg that cannot keeps its angles.
-            if let Ok(q) = self.settings.geometry.inverse(&foot, leg.side()) {
-                joint_position[3 * leg as usize..3 * leg as usize + 3].copy_from_slice(q.as_slice());
-            }
-        }
+        // The session has checked that the stance can be reached.
+        let joint_position = self.settings.geometry.stance(&spec.stance_leg, &self.tick.state.joint_position);
         self.place(robot, &Placement { joint_position, lying: false, seed: spec.seed });
     }
 

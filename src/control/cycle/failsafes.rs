@@ -6,7 +6,7 @@ use crate::control::jump::FallWatch;
 use crate::control::limits::ticks;
 use crate::control::mode::Trigger;
 use crate::robot::Robot;
-use crate::telemetry::{Fault, Mode, TransitionCause};
+use crate::telemetry::{Fault, Mode, Tick, TransitionCause};
 
 /// Ticks for which a warning stays set; the session polls at 10 Hz.
 const WARNING_TICKS: u32 = 1000;
@@ -50,9 +50,11 @@ impl Cycle {
             None if self.mode == Mode::Ready => self.landing = None,
             None => {}
         }
+        let Tick { state, estimate, .. } = &self.tick;
+        let stance_tilt_rad = self.settings.watchdog.stance_tilt_rad;
         if self.mode != Mode::Review {
             self.fall = FallWatch::default();
-        } else if let Some(cause) = self.fall.observe_standing(&self.tick.state, &self.tick.estimate, &self.settings) {
+        } else if let Some(cause) = self.fall.observe(state, estimate, &self.settings, stance_tilt_rad) {
             self.request(Trigger::Fell, TransitionCause::Fell(cause));
         }
         let allowed_s = self.settings.idle_s;

@@ -15,12 +15,12 @@ use super::settings::ControlSettings;
 use crate::control::estimator::Estimator;
 use crate::realtime::clock::Clock;
 use crate::robot::kinematics::FootPosition;
-use crate::robot::{JointCommand, Joints, LEGS, Leg, PerLeg, Robot, RobotError, robot_time_passed};
+use crate::robot::{JointCommand, Joints, LEGS, PerLeg, Robot, RobotError, robot_time_passed};
 use crate::telemetry::{
-    ArmingFindings, Command, Event, FailsafeWarning, Fault, Mode, Phase, Readiness, StageTimes, Tick, TransitionCause,
+    ArmingFindings, Command, Event, FailsafeWarning, Fault, Mode, Readiness, StageTimes, Tick, TransitionCause,
     TrialEnd,
 };
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 
 /// Inputs of one tick.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -40,7 +40,7 @@ pub struct Inputs {
 }
 
 /// Events of one tick.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Events {
     list: [Option<Event>; Events::MOST],
     count: usize,
@@ -49,7 +49,6 @@ pub struct Events {
 impl Events {
     /// One tick causes at most a refusal, changes of mode and the end of a trial: fewer than this.
     const MOST: usize = 8;
-    const NONE: Events = Events { list: [None; Events::MOST], count: 0 };
 
     fn push(&mut self, event: Event) {
         debug_assert!(self.count < Self::MOST, "a tick caused more than {} events", Self::MOST);
@@ -125,13 +124,13 @@ impl Cycle {
             trial_ticks: 0,
             fall: FallWatch::default(),
             ended: None,
-            feet: [FootPosition { position_leg: Vector3::zeros(), jacobian_leg: Matrix3::zeros() }; LEGS],
+            feet: PerLeg::default(),
             state_age_ms: 0,
             send_error: None,
             landing: None,
             session_left: false,
             tick: Tick::default(),
-            events: Events::NONE,
+            events: Events::default(),
         }
     }
 
@@ -207,7 +206,7 @@ impl Cycle {
     }
 
     fn begin(&mut self, inputs: &Inputs) {
-        self.events = Events::NONE;
+        self.events = Events::default();
         self.tick.time_ns = inputs.time_ns;
         self.mode_ticks = self.mode_ticks.saturating_add(1);
     }
@@ -402,15 +401,8 @@ impl Cycle {
     fn standing_pose(&self) -> Joints {
         let stand = &self.settings.stand;
         let sag = self.settings.weight_n / (LEGS as f64 * stand.gains.kp);
-        let mut pose = self.settings.lying_position;
-        for leg in Leg::ALL {
-            let i = 3 * leg as usize;
-            let foot = leg::stance_of(&stand.stance_leg, leg) + Vector3::new(0.0, 0.0, sag);
-            if let Ok(q) = self.settings.geometry.inverse(&foot, leg.side()) {
-                pose[i..i + 3].copy_from_slice(q.as_slice());
-            }
-        }
-        pose
+        let foot_leg = stand.stance_leg + Vector3::new(0.0, 0.0, sag);
+        self.settings.geometry.stance(&foot_leg, &self.settings.lying_position)
     }
 
     /// Completes the tick for recorder, screen and session.
@@ -428,12 +420,7 @@ impl Cycle {
                 tick.trial_time_s = jump.time_s();
                 tick.theta_rad = jump.theta_rad();
             }
-            None => {
-                tick.phase = Phase::Stance;
-                tick.trial = None;
-                tick.trial_time_s = 0.0;
-                tick.theta_rad = 0.0;
-            }
+            None => (tick.phase, tick.trial, tick.trial_time_s, tick.theta_rad) = Default::default(),
         }
     }
 

@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 use serde::Deserialize;
 use serde::de::{DeserializeOwned, IgnoredAny};
 
-use super::{RobotDescription, urdf};
+use super::{DescriptionError, RobotDescription, urdf};
 use crate::robot::{JOINTS, Joints, Leg};
 
 /// Embedded robots: name, `robot.toml`, URDF.
@@ -15,47 +15,6 @@ const EMBEDDED: &[(&str, &str, &str)] = &[
     ("go1", include_str!("../../../robots/go1/robot.toml"), include_str!("../../../robots/go1/go1.urdf")),
     ("a1", include_str!("../../../robots/a1/robot.toml"), include_str!("../../../robots/a1/a1.urdf")),
 ];
-
-/// Error in a robot's description.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum DescriptionError {
-    /// No embedded robot has that name.
-    #[error("no robot named \"{name}\" is built in (built in: {known}); give the folder of its robot.toml instead")]
-    Unknown {
-        /// The requested name.
-        name: String,
-        /// The names of the embedded robots.
-        known: String,
-    },
-    /// A file cannot be read.
-    #[error("{}: cannot be read: {reason}", file.display())]
-    Read {
-        /// The file.
-        file: PathBuf,
-        /// The system's reason.
-        reason: String,
-    },
-    /// Syntax error in TOML or XML, or a missing or unknown key.
-    #[error("{}: {reason}", file.display())]
-    Syntax {
-        /// The file.
-        file: PathBuf,
-        /// Reason of the parser, with line and column.
-        reason: String,
-    },
-    /// A value or the structure is impossible for a quadruped.
-    #[error("{}: {element}: {problem}; {remedy}", file.display())]
-    Invalid {
-        /// The file.
-        file: PathBuf,
-        /// The link, joint or key.
-        element: String,
-        /// The problem, with the value.
-        problem: String,
-        /// Required values.
-        remedy: &'static str,
-    },
-}
 
 /// `robot.toml`.
 #[derive(Debug, Deserialize)]

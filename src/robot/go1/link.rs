@@ -26,27 +26,16 @@ const BUFFER: usize = 2048;
 
 /// Error of opening a link.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the message describes a variant and its fields")]
 pub enum LinkError {
-    /// The local port is not available.
     #[error(
         "local UDP port {port}: {source}; end the program that uses it (the guard of a killed console ends within three seconds); if that program does not drive the robot, set another network.local_port in robot.toml"
     )]
-    Bind {
-        /// The port.
-        port: u16,
-        /// Error of the operating system.
-        source: std::io::Error,
-    },
-    /// No route to the robot's address.
+    Bind { port: u16, source: std::io::Error },
     #[error(
         "no route to the robot at {address}: {source}; check the cable, and that this machine has an address in the robot's network"
     )]
-    Connect {
-        /// The robot's address.
-        address: SocketAddr,
-        /// Error of the operating system.
-        source: std::io::Error,
-    },
+    Connect { address: SocketAddr, source: std::io::Error },
 }
 
 /// Settings of a link.

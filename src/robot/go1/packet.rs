@@ -60,61 +60,30 @@ impl Header {
 
 /// Reason for which a datagram is rejected.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[expect(missing_docs, reason = "the message describes a variant and its fields")]
 pub enum Rejection {
     /// A state that is too short, or a command of another length.
     #[error("a datagram of {length} bytes, expected {expected}")]
-    Length {
-        /// Received bytes.
-        length: usize,
-        /// Expected bytes (of a state: at least).
-        expected: usize,
-    },
+    Length { length: usize, expected: usize },
     /// Does not begin with [`HEAD`].
     #[error("a datagram that begins with {:02X} {:02X}, not FE EF", head[0], head[1])]
-    Head {
-        /// The first two bytes.
-        head: [u8; 2],
-    },
+    Head { head: [u8; 2] },
     /// Wrong checksum for the form of the datagram.
     #[error("checksum {found:08X}, computed {computed:08X}")]
-    Crc {
-        /// Checksum in the datagram.
-        found: u32,
-        /// Computed checksum.
-        computed: u32,
-    },
+    Crc { found: u32, computed: u32 },
     /// A command that requests to switch the battery off, which drops the robot.
     #[error("a command that requests to switch the battery off (byte 562 is not zero)")]
     BatteryOff,
 }
 
-/// A number that a command cannot represent.
+/// A number that a command cannot represent, in motor record `motor`, 0..20; `highest` is the first that is too large.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[expect(missing_docs, reason = "the message describes a variant and its fields")]
 pub enum CommandError {
     /// Not a finite number.
     #[error("{quantity} of motor {motor} is {value}, not a finite number")]
-    NotFinite {
-        /// The quantity.
-        quantity: &'static str,
-        /// Motor record, 0..20.
-        motor: usize,
-        /// The value.
-        value: f32,
-    },
+    NotFinite { quantity: &'static str, motor: usize, value: f32 },
     /// Outside of the range of the fixed point.
     #[error("{quantity} of motor {motor} is {value} {unit}; a datagram can hold {lowest} up to less than {highest}")]
-    OutOfRange {
-        /// The quantity.
-        quantity: &'static str,
-        /// Motor record, 0..20.
-        motor: usize,
-        /// The value.
-        value: f32,
-        /// The unit.
-        unit: &'static str,
-        /// Lowest value.
-        lowest: f32,
-        /// First value that is too large.
-        highest: f32,
-    },
+    OutOfRange { quantity: &'static str, motor: usize, value: f32, unit: &'static str, lowest: f32, highest: f32 },
 }

@@ -4,8 +4,9 @@ use std::str::FromStr;
 
 use crate::robot::{JOINTS, joint_name};
 
-/// A fault from now on, or an action of a person on the robot.
+/// A fault from now on, or an action of a person on the robot. A joint is an index, 0..12.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[expect(missing_docs, reason = "the doc of the variant describes its fields")]
 pub enum EmulatorFault {
     /// Share of datagrams lost, each way, percent.
     Loss(f64),
@@ -24,50 +25,21 @@ pub enum EmulatorFault {
     /// The robot reboots; its clock restarts.
     Reboot,
     /// A motor reports this temperature, degrees Celsius.
-    Hot {
-        /// Joint, 0..12.
-        joint: usize,
-        /// Temperature, degrees Celsius.
-        celsius: f64,
-    },
+    Hot { joint: usize, celsius: f64 },
     /// The battery reports this charge, percent.
     Battery(f64),
     /// A motor leaves servo mode: it brakes and reports the mode.
-    ServoOff {
-        /// Joint, 0..12.
-        joint: usize,
-    },
+    ServoOff { joint: usize },
     /// A joint is stuck at its current angle, up to its motor's torque.
-    Stuck {
-        /// Joint, 0..12.
-        joint: usize,
-    },
+    Stuck { joint: usize },
     /// An encoder reports this angle, rad.
-    Angle {
-        /// Joint, 0..12.
-        joint: usize,
-        /// Angle, rad.
-        radians: f64,
-    },
+    Angle { joint: usize, radians: f64 },
     /// An encoder reports this velocity, rad/s.
-    Speed {
-        /// Joint, 0..12.
-        joint: usize,
-        /// Velocity, rad/s.
-        radians_per_s: f64,
-    },
+    Speed { joint: usize, radians_per_s: f64 },
     /// A motor reports this torque, N m.
-    Torque {
-        /// Joint, 0..12.
-        joint: usize,
-        /// Torque, N m.
-        newton_metres: f64,
-    },
+    Torque { joint: usize, newton_metres: f64 },
     /// An encoder reports NaN as its angle.
-    NotANumber {
-        /// Joint, 0..12.
-        joint: usize,
-    },
+    NotANumber { joint: usize },
     /// Error of the reported roll, rad.
     Tilt(f64),
     /// A person lays the robot down at its start position, on its belly.
@@ -79,105 +51,69 @@ pub enum EmulatorFault {
 /// Operands of a fault.
 #[derive(Clone, Copy)]
 enum FaultOperands {
-    None(EmulatorFault),
+    Plain(EmulatorFault),
     /// A number with its unit, lowest and highest value.
     Number(fn(f64) -> EmulatorFault, &'static str, f64, f64),
     Joint(fn(usize) -> EmulatorFault),
     JointNumber(fn(usize, f64) -> EmulatorFault, &'static str, f64, f64),
 }
 
-use FaultOperands::{Joint, JointNumber, Number};
+use FaultOperands::{Joint, JointNumber, Number, Plain};
 
 /// Name, operands and description of every fault, for the parser and `help`.
-const FAULTS: [(&str, FaultOperands, &str); 19] = [
-    (
-        "loss",
-        Number(EmulatorFault::Loss, "PERCENT", 0.0, 100.0),
-        "the network loses this share of the datagrams, each way",
-    ),
-    ("delay", Number(EmulatorFault::Delay, "MS", 0.0, 1000.0), "every datagram is delayed by this time, each way"),
-    ("jitter", Number(EmulatorFault::Jitter, "MS", 0.0, 1000.0), "largest random addition to the delay"),
-    ("duplicate", Number(EmulatorFault::Duplicate, "PERCENT", 0.0, 100.0), "this share of the datagrams is duplicated"),
-    (
-        "corrupt",
-        Number(EmulatorFault::Corrupt, "PERCENT", 0.0, 100.0),
-        "one bit is flipped in this share of the datagrams",
-    ),
-    (
-        "freeze",
-        FaultOperands::None(EmulatorFault::Freeze),
-        "the robot's computer stops: no states, no commands executed",
-    ),
-    ("repeat", FaultOperands::None(EmulatorFault::Repeat), "the same state is sent repeatedly"),
-    ("reboot", FaultOperands::None(EmulatorFault::Reboot), "the robot reboots; its clock restarts"),
-    (
-        "hot",
-        JointNumber(|joint, celsius| EmulatorFault::Hot { joint, celsius }, "CELSIUS", -40.0, 127.0),
-        "a motor reports this temperature",
-    ),
-    ("battery", Number(EmulatorFault::Battery, "PERCENT", 0.0, 100.0), "the battery reports this charge"),
-    ("servo-off", Joint(|joint| EmulatorFault::ServoOff { joint }), "a motor leaves servo mode"),
-    ("stuck", Joint(|joint| EmulatorFault::Stuck { joint }), "a joint is stuck at its current angle"),
-    (
-        "angle",
-        JointNumber(|joint, radians| EmulatorFault::Angle { joint, radians }, "RAD", -10.0, 10.0),
-        "an encoder reports this angle",
-    ),
-    (
-        "speed",
-        JointNumber(|joint, radians_per_s| EmulatorFault::Speed { joint, radians_per_s }, "RAD/S", -1000.0, 1000.0),
-        "an encoder reports this velocity",
-    ),
-    (
-        "torque",
-        JointNumber(|joint, newton_metres| EmulatorFault::Torque { joint, newton_metres }, "NM", -120.0, 120.0),
-        "a motor reports this torque",
-    ),
-    ("nan", Joint(|joint| EmulatorFault::NotANumber { joint }), "an encoder reports NaN as its angle"),
-    ("tilt", Number(EmulatorFault::Tilt, "RAD", -3.2, 3.2), "error of the reported roll"),
-    (
-        "place",
-        FaultOperands::None(EmulatorFault::Place),
-        "a person lays the robot down at its start position, on its belly",
-    ),
-    ("clear", FaultOperands::None(EmulatorFault::Clear), "all faults end"),
-];
+const FAULTS: [(&str, FaultOperands, &str); 19] = {
+    use EmulatorFault::*;
+    [
+        ("loss", Number(Loss, "PERCENT", 0.0, 100.0), "the network loses this share of the datagrams, each way"),
+        ("delay", Number(Delay, "MS", 0.0, 1000.0), "every datagram is delayed by this time, each way"),
+        ("jitter", Number(Jitter, "MS", 0.0, 1000.0), "largest random addition to the delay"),
+        ("duplicate", Number(Duplicate, "PERCENT", 0.0, 100.0), "this share of the datagrams is duplicated"),
+        ("corrupt", Number(Corrupt, "PERCENT", 0.0, 100.0), "one bit is flipped in this share of the datagrams"),
+        ("freeze", Plain(Freeze), "the robot's computer stops: no states, no commands executed"),
+        ("repeat", Plain(Repeat), "the same state is sent repeatedly"),
+        ("reboot", Plain(Reboot), "the robot reboots; its clock restarts"),
+        (
+            "hot",
+            JointNumber(|joint, celsius| Hot { joint, celsius }, "CELSIUS", -40.0, 127.0),
+            "a motor reports this temperature",
+        ),
+        ("battery", Number(Battery, "PERCENT", 0.0, 100.0), "the battery reports this charge"),
+        ("servo-off", Joint(|joint| ServoOff { joint }), "a motor leaves servo mode"),
+        ("stuck", Joint(|joint| Stuck { joint }), "a joint is stuck at its current angle"),
+        (
+            "angle",
+            JointNumber(|joint, radians| Angle { joint, radians }, "RAD", -10.0, 10.0),
+            "an encoder reports this angle",
+        ),
+        (
+            "speed",
+            JointNumber(|joint, radians_per_s| Speed { joint, radians_per_s }, "RAD/S", -1000.0, 1000.0),
+            "an encoder reports this velocity",
+        ),
+        (
+            "torque",
+            JointNumber(|joint, newton_metres| Torque { joint, newton_metres }, "NM", -120.0, 120.0),
+            "a motor reports this torque",
+        ),
+        ("nan", Joint(|joint| NotANumber { joint }), "an encoder reports NaN as its angle"),
+        ("tilt", Number(Tilt, "RAD", -3.2, 3.2), "error of the reported roll"),
+        ("place", Plain(Place), "a person lays the robot down at its start position, on its belly"),
+        ("clear", Plain(Clear), "all faults end"),
+    ]
+};
 
 /// Error of parsing a fault.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[expect(missing_docs, reason = "the message describes a variant and its fields")]
 pub enum EmulatorFaultError {
-    /// Unknown name.
     #[error("\"{word}\" is not a known fault; known faults: {known}")]
-    Unknown {
-        /// The given name.
-        word: String,
-        /// All names.
-        known: String,
-    },
-    /// Wrong number of operands.
+    Unknown { word: String, known: String },
     #[error("write it as: {usage}")]
-    Usage {
-        /// The name with its operands.
-        usage: String,
-    },
-    /// Unknown joint.
+    Usage { usage: String },
     #[error("\"{name}\" is not a joint; write it as FR_hip, FL_thigh, RL_calf and so on")]
-    Joint {
-        /// The name.
-        name: String,
-    },
-    /// Not a number within the bounds.
+    Joint { name: String },
     #[error("\"{value}\" is out of range: give {lowest} to {highest} ({unit})")]
-    Number {
-        /// The given text.
-        value: String,
-        /// The unit.
-        unit: &'static str,
-        /// Lowest value.
-        lowest: f64,
-        /// Highest value.
-        highest: f64,
-    },
+    Number { value: String, unit: &'static str, lowest: f64, highest: f64 },
 }
 
 impl FromStr for EmulatorFault {
@@ -192,7 +128,7 @@ impl FromStr for EmulatorFault {
         };
         let given: Vec<&str> = words.collect();
         match (*operands, given.as_slice()) {
-            (FaultOperands::None(fault), []) => Ok(fault),
+            (Plain(fault), []) => Ok(fault),
             (Number(fault, unit, lowest, highest), [value]) => Ok(fault(number(value, unit, lowest, highest)?)),
             (Joint(fault), [name]) => Ok(fault(joint(name)?)),
             (JointNumber(fault, unit, lowest, highest), [name, value]) => {
@@ -217,7 +153,7 @@ fn joint(name: &str) -> Result<usize, EmulatorFaultError> {
 
 fn usage(word: &str, operands: FaultOperands) -> String {
     match operands {
-        FaultOperands::None(_) => word.to_owned(),
+        Plain(_) => word.to_owned(),
         Number(_, unit, ..) => format!("{word} {unit}"),
         Joint(_) => format!("{word} JOINT"),
         JointNumber(_, unit, ..) => format!("{word} JOINT {unit}"),
@@ -242,7 +178,7 @@ mod tests {
             let value = |unit: &str| line.replace(unit, "3");
             let parsed = match operands {
                 Number(_, unit, ..) | JointNumber(_, unit, ..) => value(unit).parse::<EmulatorFault>(),
-                FaultOperands::None(_) | Joint(_) => line.parse(),
+                Plain(_) | Joint(_) => line.parse(),
             };
             assert!(parsed.is_ok(), "{line}: {parsed:?}");
             assert!(help().contains(&usage(word, *operands)));

@@ -30,15 +30,11 @@ const BUFFER: usize = 2048;
 
 /// Error of starting an emulator.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the message describes a variant and its fields")]
 pub enum EmulatorError {
     /// The address is not available.
     #[error("{address}: {source}; give an address of this machine and a free port, for example 127.0.0.1:8007")]
-    Bind {
-        /// The address.
-        address: SocketAddr,
-        /// Error of the operating system.
-        source: std::io::Error,
-    },
+    Bind { address: SocketAddr, source: std::io::Error },
     /// The simulator's configuration.
     #[error(transparent)]
     Simulator(#[from] SimError),

@@ -2,15 +2,17 @@
 
 #![allow(dead_code, reason = "each test program uses a part")]
 
+use std::ops::Range;
 use std::time::Duration;
 
 use quadfrog::optimize::ask::SamplerKind;
 use quadfrog::recording::record::{
-    ArmingCheckRecord, HealthLimits, Record, RequestRecord, SessionInfo, StageRecord, Stamped, Transition,
+    ArmingCheckRecord, Record, RequestRecord, SessionInfo, StageRecord, Stamped, Transition,
 };
+use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::telemetry::{ArmingCheck, ArmingCheckState, Mode, Phase, Snapshot, Tick};
 use quadfrog::trial::{
-    Approval, Backend, ExperimentStage, MeasuredJump, ParameterInfo, Proposal, ProposalSource, ProposedParameter, Task,
+    Backend, ExperimentStage, MeasuredJump, ParameterInfo, Proposal, ProposalSource, ProposedParameter, Task,
     TrialRecord, Verdict,
 };
 use quadfrog_console::keymap::Key;
@@ -22,7 +24,11 @@ use quadfrog_console::update::update;
 use quadfrog_console::view;
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
+use ratatui::buffer::Buffer;
 use ratatui::style::Color;
+
+/// The keys of the views.
+pub const VIEWS: [&str; 6] = ["1", "2", "3", "4", "5", "6"];
 
 /// A console under test.
 pub struct Console {
@@ -102,8 +108,8 @@ impl Console {
         self.record(Record::Stage(StageRecord { stage, trial, can_undo: false }))
     }
 
-    pub fn answer(&mut self, wish: &str, accepted: bool, answer: &str) {
-        self.record(Record::Request(RequestRecord { request: wish.into(), accepted, answer: answer.into() }));
+    pub fn answer(&mut self, request: &str, accepted: bool, answer: &str) {
+        self.record(Record::Request(RequestRecord { request: request.into(), accepted, answer: answer.into() }));
     }
 
     pub fn mode(&mut self, mode: Mode) {
@@ -113,11 +119,44 @@ impl Console {
         self.tell(Msg::Snapshot(Box::new(Snapshot { tick, ..self.model.snapshot })));
     }
 
-    /// The screen as text without trailing spaces.
-    pub fn screen(&self, columns: u16, rows: u16) -> String {
+    /// Presses keys; the requests to the session.
+    pub fn requests(&mut self, keys: &[&str]) -> Vec<OperatorRequest> {
+        requests(&self.press(keys))
+    }
+
+    /// Types a text, character by character.
+    pub fn enter(&mut self, text: &str) {
+        text.chars().for_each(|c| drop(self.press(&[&c.to_string()])));
+    }
+
+    /// A tick every 5 ms, outside of a trial, with the roll of each time in ms.
+    pub fn ticks(&mut self, times_ms: Range<u64>, roll: impl Fn(u64) -> f64) {
+        for time_ms in times_ms.step_by(5) {
+            self.tick(tick(time_ms, roll(time_ms), None));
+        }
+    }
+
+    /// A tick for the charts.
+    pub fn tick(&mut self, tick: Tick) {
+        self.tell(Msg::Tick(Box::new(tick)));
+    }
+
+    /// Trials that are judged accept, fall, void in turn.
+    pub fn judged(&mut self, count: u32) {
+        for number in 0..count {
+            self.record(Record::Trial(trial(number, Some(Verdict::ALL[number as usize % 3]), None)));
+        }
+    }
+
+    pub fn draw(&self, columns: u16, rows: u16) -> Buffer {
         let mut terminal = Terminal::new(TestBackend::new(columns, rows)).expect("a screen in memory");
         terminal.draw(|frame| view::render(frame, &self.model)).expect("drawn");
-        let buffer = terminal.backend().buffer();
+        terminal.backend().buffer().clone()
+    }
+
+    /// The screen as text without trailing spaces.
+    pub fn screen(&self, columns: u16, rows: u16) -> String {
+        let buffer = self.draw(columns, rows);
         let mut text = String::new();
         for y in 0..rows {
             let line: String = (0..columns).map(|x| buffer[(x, y)].symbol()).collect();
@@ -129,9 +168,7 @@ impl Console {
 
     /// The styles of the screen: a letter per cell, blank for the terminal's default style, and a legend of the letters.
     pub fn colours(&self, columns: u16, rows: u16) -> String {
-        let mut terminal = Terminal::new(TestBackend::new(columns, rows)).expect("a screen in memory");
-        terminal.draw(|frame| view::render(frame, &self.model)).expect("drawn");
-        let buffer = terminal.backend().buffer();
+        let buffer = self.draw(columns, rows);
         let colour = |colour: Color| match colour {
             Color::Rgb(r, g, b) => format!("{r},{g},{b}"),
             other => format!("{other:?}").to_lowercase(),
@@ -175,6 +212,25 @@ impl Console {
     }
 }
 
+pub fn requests(effects: &[Effect]) -> Vec<OperatorRequest> {
+    let request = |effect: &Effect| match effect {
+        Effect::Request(request) => Some(request.clone()),
+        _ => None,
+    };
+    effects.iter().filter_map(request).collect()
+}
+
+pub fn line_with(screen: &str, text: &str) -> String {
+    screen.lines().find(|line| line.contains(text)).unwrap_or_else(|| panic!("no {text} in\n{screen}")).to_owned()
+}
+
+#[track_caller]
+pub fn assert_shows(screen: &str, parts: &[&str]) {
+    for part in parts {
+        assert!(screen.contains(part), "no {part}:\n{screen}");
+    }
+}
+
 pub fn session() -> SessionInfo {
     let parameter =
         |name: &str, unit: &str, low, high| ParameterInfo { name: name.into(), unit: unit.into(), low, high };
@@ -185,7 +241,6 @@ pub fn session() -> SessionInfo {
         task: Some(Task::Forward),
         unit: "m".into(),
         sampler: Some(SamplerKind::Tpe),
-        seed: 0,
         budget: 20,
         parameters: vec![
             parameter("f0", "Hz", 0.75, 1.75),
@@ -195,15 +250,13 @@ pub fn session() -> SessionInfo {
         study: "recordings/forward/study.log".into(),
         recording: "recordings/forward/session.mcap".into(),
         started: "2026-11-21T03:00:00Z".into(),
-        observe: false,
         gains: vec![
             parameter("kp", "N/m", 100.0, 1000.0),
             parameter("kd", "N s/m", 0.0, 30.0),
             parameter("kd_joint", "N m s/rad", 0.0, 3.0),
             parameter("k_att", "N/m", 0.0, 600.0),
         ],
-        approve: Approval::Each,
-        limits: HealthLimits::default(),
+        ..SessionInfo::default()
     }
 }
 
@@ -240,7 +293,7 @@ pub fn trial(number: u32, verdict: Option<Verdict>, suggested: Option<Verdict>) 
         value,
         hand_value: None,
         suggested,
-        cause: if suggested == Some(Verdict::Fall) { "roll 1.20 rad, allowed 1.00" } else { "landed and settled" }
+        cause: if suggested == Some(Verdict::Fall) { "roll 1.200 rad exceeds 1.000 rad" } else { "landed and settled" }
             .into(),
         verdict,
         note: String::new(),

@@ -4,7 +4,7 @@
 
 use std::io::{Read, Write};
 use std::num::NonZeroU16;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::{Duration, Instant};
@@ -30,7 +30,6 @@ pub struct Session {
     output: Arc<Mutex<Output>>,
     reading: Arc<AtomicBool>,
     closed: Arc<AtomicBool>,
-    pub folder: PathBuf,
 }
 
 fn nonzero(value: u16) -> NonZeroU16 {
@@ -45,6 +44,14 @@ impl Session {
         command.arg(folder);
         command.args(arguments);
         Session::run(folder, (columns, rows), command)
+    }
+
+    /// Starts the console in a new folder and waits until the robot can be armed.
+    pub fn opened(size: (u16, u16), arguments: &[&str]) -> (tempfile::TempDir, Session) {
+        let folder = tempfile::tempdir().expect("a folder");
+        let session = Session::start(folder.path(), size, arguments);
+        session.wait_for(&["Press A to arm"]);
+        (folder, session)
     }
 
     /// Starts any command.
@@ -83,7 +90,7 @@ impl Session {
             }
         });
         let writer = Some(pair.master.take_writer().expect("a writer"));
-        Session { master: Some(pair.master), writer, child, output, reading, closed, folder: folder.to_owned() }
+        Session { master: Some(pair.master), writer, child, output, reading, closed }
     }
 
     fn output(&self) -> MutexGuard<'_, Output> {
@@ -128,15 +135,10 @@ impl Session {
 
     /// Waits until the screen shows all of the texts.
     pub fn wait_for(&self, texts: &[&str]) {
-        let begun = Instant::now();
-        loop {
+        self.wait_until(&format!("the screen shows {texts:?}"), || {
             let screen = self.screen();
-            if texts.iter().all(|text| screen.contains(text)) {
-                return;
-            }
-            assert!(begun.elapsed() < PATIENCE, "the screen never showed {texts:?}:\n{screen}");
-            std::thread::sleep(Duration::from_millis(10));
-        }
+            texts.iter().all(|text| screen.contains(text))
+        });
     }
 
     /// Waits until `condition` holds.

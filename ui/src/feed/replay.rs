@@ -17,10 +17,8 @@ const PAST_NS: u64 = 8_000_000_000;
 /// Speeds relative to the recording.
 const SPEEDS: [f64; 9] = [0.0625, 0.125, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0];
 
-/// A recording during playback.
 pub struct ReplayFeed {
     player: Player,
-    file: String,
     playing: bool,
     /// Index in [`SPEEDS`].
     speed: usize,
@@ -33,10 +31,8 @@ pub struct ReplayFeed {
 }
 
 impl ReplayFeed {
-    /// Starts playback at the beginning.
     pub fn new(player: Player) -> ReplayFeed {
         let mut replay = ReplayFeed {
-            file: player.session().recording.clone(),
             player,
             playing: true,
             speed: SPEEDS.iter().position(|speed| *speed == 1.0).unwrap_or(0),
@@ -49,7 +45,6 @@ impl ReplayFeed {
         replay
     }
 
-    /// Executes a command of the operator.
     pub fn command(&mut self, command: ReplayCommand) {
         match command {
             ReplayCommand::PlayPause => {
@@ -97,7 +92,6 @@ impl ReplayFeed {
         }
         messages.push(Msg::Snapshot(Box::new(self.snapshot)));
         messages.push(Msg::Replay(ReplayStatus {
-            file: self.file.clone(),
             playing: self.playing,
             speed: SPEEDS[self.speed],
             time_ns: self.time_ns,

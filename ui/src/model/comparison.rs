@@ -2,16 +2,12 @@
 
 use super::history::{ChartSample, SignalHistory};
 
-/// Two trials on one axis, aligned where their impulses begin.
+/// Trials A and B on one axis, aligned where their impulses begin.
 #[derive(Debug, Clone)]
 pub struct Comparison {
-    /// Trial A.
     pub a: u32,
-    /// Trial B.
     pub b: u32,
-    /// A's trace.
     pub history_a: SignalHistory,
-    /// B's trace.
     pub trace_b: Vec<ChartSample>,
     /// Start of A's impulse, ns, on A's clock.
     pub start_ns: u64,

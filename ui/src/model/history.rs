@@ -2,8 +2,8 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
-use quadfrog::robot::{LEGS, PerLeg};
-use quadfrog::telemetry::{Mode, Phase, Tick};
+use quadfrog::robot::PerLeg;
+use quadfrog::telemetry::{Phase, Tick};
 
 /// Samples that are kept: a minute at 200 a second.
 const CAPACITY: usize = 12_000;
@@ -17,8 +17,6 @@ const TRACE_CAPACITY: usize = 2_000;
 pub struct ChartSample {
     /// Time since the engine started, ns.
     pub time_ns: u64,
-    /// Mode at the end of the tick.
-    pub mode: Mode,
     /// Phase of the jump.
     pub phase: Phase,
     /// The running trial.
@@ -48,13 +46,8 @@ pub struct ChartSample {
 impl From<&Tick> for ChartSample {
     fn from(tick: &Tick) -> ChartSample {
         let rpy = tick.estimate.roll_pitch_yaw;
-        let mut foot_z = [0.0; LEGS];
-        for (z, foot) in foot_z.iter_mut().zip(&tick.estimate.foot_position_leg) {
-            *z = foot.z as f32;
-        }
         ChartSample {
             time_ns: tick.time_ns,
-            mode: tick.mode,
             phase: tick.phase,
             trial: tick.trial,
             trial_time_s: tick.trial_time_s as f32,
@@ -64,7 +57,7 @@ impl From<&Tick> for ChartSample {
             lateness_ns: tick.stages.lateness_ns,
             busy_ns: tick.stages.read_ns.saturating_add(tick.stages.decide_ns).saturating_add(tick.stages.write_ns),
             theta: tick.theta_rad as f32,
-            foot_z,
+            foot_z: tick.estimate.foot_position_leg.map(|foot| foot.z as f32),
             foot_force: tick.state.foot_force.map(|force| force as f32),
             contact: tick.estimate.contact,
         }

@@ -10,14 +10,12 @@ use crate::settings::ChartMode;
 /// State of the live view.
 #[derive(Debug, Clone)]
 pub struct LiveView {
-    /// Sweep or scroll.
     pub mode: ChartMode,
     /// Time that a chart shows, s.
     pub window_s: f64,
     /// Whether the sweep's cursor is drawn as a line; without it the gap ahead of the newest value shows the same with
     /// less to send.
     pub cursor_line: bool,
-    /// Charts, or the joints in their place.
     pub panel: Panel,
     /// Drawn series, in the order of the charts.
     pub series: Vec<Series>,
@@ -31,10 +29,8 @@ pub struct LiveView {
     pub comparison: Option<Comparison>,
 }
 
-/// Content of the large area of the live view.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Panel {
-    /// Signals over time.
     Charts,
     /// Torque and speed of the joints, and the robot as a wireframe.
     Joints,

@@ -12,11 +12,9 @@ const CAPACITY: usize = 10_000;
 pub struct LogLine {
     /// Time since the engine started, ns.
     pub time_ns: u64,
-    /// Severity.
     pub level: LogLevel,
     /// Part of the program.
     pub source: String,
-    /// The line.
     pub text: String,
     /// Whether a trial was proposed or judged, or a fault latched.
     pub marker: bool,

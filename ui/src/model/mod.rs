@@ -1,12 +1,12 @@
 //! The content of the screen: plain data and questions to it. [`crate::update`] alone changes it.
 
-pub mod comparison;
+pub(crate) mod comparison;
 pub mod dialog;
-pub mod history;
-pub mod live;
-pub mod log;
+pub(crate) mod history;
+pub(crate) mod live;
+pub(crate) mod log;
 pub mod session;
-pub mod trials;
+pub(crate) mod trials;
 
 use std::time::Duration;
 
@@ -32,7 +32,7 @@ use trials::TrialTable;
 
 /// One of the tabs, in their order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, VariantArray, IntoStaticStr)]
-#[expect(missing_docs, reason = "the words of the tabs")]
+#[expect(missing_docs, reason = "the labels of the tabs")]
 pub enum View {
     Live,
     Trials,
@@ -43,7 +43,7 @@ pub enum View {
 }
 
 impl View {
-    /// The word on its tab.
+    /// The label of its tab.
     pub fn name(self) -> &'static str {
         self.into()
     }
@@ -51,27 +51,25 @@ impl View {
 
 /// The message line: the newest answer to the operator.
 #[derive(Debug, Clone, PartialEq)]
+#[expect(missing_docs, reason = "the names say the rest")]
 pub struct Notice {
-    /// Severity.
     pub level: LogLevel,
-    /// The text.
     pub text: String,
+    /// Whether it answers the STOP key.
+    pub stop: bool,
 }
 
 /// The content of the screen.
 #[derive(Debug, Clone)]
+#[expect(missing_docs, reason = "the names say the rest")]
 pub struct Model {
-    /// Colours and characters.
     pub theme: Theme,
-    /// The active keys.
     pub keymap: Keymap,
-    /// Causes that ring the bell.
     pub bell: Vec<BellCause>,
     /// The robot's limits and geometry; none where they are not known.
     pub robot: Option<RobotDescription>,
     /// Time since the console started.
     pub clock: Duration,
-    /// The session, from its records.
     pub session: SessionModel,
     /// The newest tick and counters.
     pub snapshot: Snapshot,
@@ -79,21 +77,14 @@ pub struct Model {
     pub snapshot_at: Duration,
     /// State of the recorder; none in a replay.
     pub recorder: Option<RecorderStatus>,
-    /// Samples of the charts.
     pub history: SignalHistory,
-    /// The newest answer to the operator.
     pub message: Option<Notice>,
-    /// The open tab.
     pub view: View,
-    /// The dialog over it.
     pub dialog: Option<Dialog>,
-    /// Live view.
     pub live: LiveView,
-    /// Trial table.
     pub trial_table: TrialTable,
     /// Selected row of view Override.
     pub override_row: usize,
-    /// Log view.
     pub log_view: LogView,
     /// State of the replay; none in a live session.
     pub replay: Option<ReplayStatus>,

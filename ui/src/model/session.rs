@@ -11,10 +11,10 @@ use super::trials::Trials;
 
 /// The fold of the session's records. A replay that jumps resets it whole.
 #[derive(Debug, Clone, Default)]
+#[expect(missing_docs, reason = "the names say the rest")]
 pub struct SessionModel {
-    /// Task, robot, sampler, parameters, files.
     pub info: SessionInfo,
-    /// ExperimentStage of the present trial; none before the session has begun.
+    /// Stage of the present trial; none before the session has begun.
     pub stage: Option<StageRecord>,
     /// The newest proposal; its trial may run already.
     pub proposal: Option<Proposal>,
@@ -24,9 +24,7 @@ pub struct SessionModel {
     pub search: Option<SearchStatus>,
     /// Densities and importances behind the sampler's newest proposal.
     pub insight: Option<ProposalInsight>,
-    /// The study.
     pub trials: Trials,
-    /// The log.
     pub log: SessionLog,
     /// Cause of the newest DAMPED or FAULT.
     pub stopped_because: String,
@@ -38,16 +36,19 @@ impl SessionModel {
         self.stage.is_some_and(|info| info.stage == stage)
     }
 
+    fn trial_in(&self, stage: ExperimentStage) -> Option<u32> {
+        self.stage.filter(|info| info.stage == stage).map(|info| info.trial)
+    }
+
     /// The trial that waits for its verdict.
     pub fn under_review(&self) -> Option<&TrialRecord> {
-        let info = self.stage.filter(|info| info.stage == ExperimentStage::Review)?;
-        self.trials.records.get(&info.trial)
+        self.trials.records.get(&self.trial_in(ExperimentStage::Review)?)
     }
 
     /// The proposal that waits for approval.
     pub fn open_proposal(&self) -> Option<&Proposal> {
-        let info = self.stage.filter(|info| info.stage == ExperimentStage::Proposed)?;
-        self.proposal.as_ref().filter(|proposal| proposal.trial == info.trial)
+        let trial = self.trial_in(ExperimentStage::Proposed)?;
+        self.proposal.as_ref().filter(|proposal| proposal.trial == trial)
     }
 
     /// The number of arming checks that forbid arming.
@@ -55,14 +56,9 @@ impl SessionModel {
         self.arming_checks.iter().filter(|item| !item.state.allows()).count()
     }
 
-    /// Whether the session drives hardware.
-    pub fn is_hardware(&self) -> bool {
-        self.info.is_hardware()
-    }
-
     /// The letters that arm the robot, typed in order: on hardware several, against a single accidental press.
-    pub fn arming_word(&self) -> &'static str {
-        if self.is_hardware() { "stand" } else { "y" }
+    pub fn arming_confirmation(&self) -> &'static str {
+        if self.info.is_hardware() { "stand" } else { "y" }
     }
 
     /// The parameter of that name with its present bounds.

@@ -3,6 +3,8 @@
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
 
+use quadfrog::optimize::ask::Direction;
+use quadfrog::optimize::repeats::improvements;
 use quadfrog::trial::{ParameterInfo, PointRecord, TrialRecord, Verdict};
 
 use crate::column::Column;
@@ -28,7 +30,6 @@ pub struct RunTime {
 }
 
 impl Trials {
-    /// The newest trial.
     pub fn newest(&self) -> Option<&TrialRecord> {
         self.records.values().next_back()
     }
@@ -45,21 +46,9 @@ impl Trials {
 
     /// The accepted trials that were better than all before them, in order.
     pub fn best_so_far(&self) -> impl Iterator<Item = &TrialRecord> + '_ {
-        let mut best = f64::NEG_INFINITY;
-        self.records.values().filter(move |trial| match self.mean_value(trial) {
-            Some(value) if value > best => {
-                best = value;
-                true
-            }
-            _ => false,
-        })
-    }
-
-    /// The value of an accepted trial: the mean over the repeats of its point.
-    fn mean_value(&self, trial: &TrialRecord) -> Option<f64> {
-        let value = accepted_value(trial)?;
-        let point = self.points.iter().find(|point| point.trials.contains(&trial.trial));
-        Some(point.map_or(value, |point| point.mean))
+        let accepted = self.records.values().filter_map(|trial| Some((trial, trial.trial, accepted_value(trial)?)));
+        let mean = |trial| self.points.iter().find(|point| point.trials.contains(&trial)).map(|point| point.mean);
+        improvements(accepted, mean, Direction::Maximize)
     }
 
     /// Attempts at the parameters of a trial up to it: 1, or one more than the trial that it repeats.
@@ -71,7 +60,6 @@ impl Trials {
     }
 }
 
-/// The value of an accepted trial.
 pub fn accepted_value(trial: &TrialRecord) -> Option<f64> {
     trial.value.filter(|_| trial.verdict == Some(Verdict::Accept))
 }
@@ -92,8 +80,8 @@ pub fn measured(trial: &TrialRecord, column: Column) -> Option<f64> {
 /// Order of the trial table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum SortBy {
-    /// Number, oldest first.
     #[default]
+    /// Number, oldest first.
     Number,
     /// A parameter, by its index in the session's list.
     Parameter(usize),
@@ -106,11 +94,9 @@ pub enum SortBy {
 pub struct TrialTable {
     /// The selected trial; none follows the newest.
     pub selected: Option<u32>,
-    /// Order of the rows.
     pub sort: SortBy,
     /// Whether the order is reversed; rows without a value stay last.
     pub reversed: bool,
-    /// Only this verdict.
     pub filter: Option<Verdict>,
     /// Only trials that were the best when they ran.
     pub best_only: bool,
@@ -134,42 +120,40 @@ impl TrialTable {
         } else {
             trials.records.values().filter(|trial| self.filter.is_none() || trial.verdict == self.filter).collect()
         };
-        let nth = |trial: &TrialRecord, index| nth_parameter(trial, parameters, index);
+        let sort_value = |trial: &TrialRecord| {
+            let value = match self.sort {
+                SortBy::Number => None,
+                SortBy::Parameter(index) => trial.parameters.get(&parameters.get(index)?.name),
+                SortBy::Column(Column::Value) => trial.value,
+                SortBy::Column(Column::Risk) => risk_share(trial),
+                // The newest last.
+                SortBy::Column(Column::Time) => trials.ran.get(&trial.trial).map(|ran| -(ran.begun_ns as f64)),
+                SortBy::Column(column) => measured(trial, column),
+            };
+            value.filter(|value| !value.is_nan())
+        };
         rows.sort_by(|a, b| match self.sort {
             SortBy::Number => a.trial.cmp(&b.trial),
-            SortBy::Parameter(index) => descending(nth(a, index), nth(b, index)),
             SortBy::Column(Column::Verdict) => verdict_rank(a.verdict).cmp(&verdict_rank(b.verdict)),
             SortBy::Column(Column::Source | Column::Parameters) => a.source.name().cmp(b.source.name()),
             SortBy::Column(Column::Cause) => a.cause.cmp(&b.cause),
-            SortBy::Column(Column::Value) => descending(a.value, b.value),
-            SortBy::Column(Column::Risk) => descending(risk_share(a), risk_share(b)),
-            SortBy::Column(Column::Time) => {
-                let begun = |trial: &TrialRecord| trials.ran.get(&trial.trial).map(|ran| -(ran.begun_ns as f64));
-                descending(begun(a), begun(b))
-            }
-            SortBy::Column(column) => descending(measured(a, column), measured(b, column)),
+            _ => descending(sort_value(a), sort_value(b)),
         });
         if self.reversed {
-            let sortable = |trial: &TrialRecord| match self.sort {
-                SortBy::Parameter(index) => nth(trial, index).is_some(),
-                SortBy::Column(Column::Value) => trial.value.is_some_and(|value| !value.is_nan()),
-                SortBy::Column(Column::Verdict) => trial.verdict.is_some(),
-                SortBy::Column(Column::Risk) => risk_share(trial).is_some(),
-                SortBy::Column(Column::Time) => trials.ran.contains_key(&trial.trial),
-                SortBy::Number | SortBy::Column(Column::Source | Column::Parameters | Column::Cause) => true,
-                SortBy::Column(column) => measured(trial, column).is_some(),
-            };
             // Rows without a value to sort by stay last.
-            let sorted = rows.iter().take_while(|row| sortable(row)).count();
+            let sorted = match self.sort {
+                SortBy::Column(Column::Verdict) => rows.iter().take_while(|row| row.verdict.is_some()).count(),
+                SortBy::Number | SortBy::Column(Column::Source | Column::Parameters | Column::Cause) => rows.len(),
+                _ => rows.iter().take_while(|row| sort_value(row).is_some()).count(),
+            };
             rows[..sorted].reverse();
         }
         rows
     }
 }
 
-/// Larger numbers first; NaN and none last.
+/// Larger numbers first, none last.
 fn descending(a: Option<f64>, b: Option<f64>) -> Ordering {
-    let (a, b) = (a.filter(|a| !a.is_nan()), b.filter(|b| !b.is_nan()));
     match (a, b) {
         (Some(a), Some(b)) => b.total_cmp(&a),
         (a, b) => b.is_some().cmp(&a.is_some()),
@@ -179,11 +163,6 @@ fn descending(a: Option<f64>, b: Option<f64>) -> Ordering {
 /// The order of verdicts: accept, fall, void, none yet.
 fn verdict_rank(verdict: Option<Verdict>) -> usize {
     verdict.and_then(|verdict| Verdict::ALL.iter().position(|v| *v == verdict)).unwrap_or(Verdict::ALL.len())
-}
-
-fn nth_parameter(trial: &TrialRecord, parameters: &[ParameterInfo], index: usize) -> Option<f64> {
-    let name = &parameters.get(index)?.name;
-    trial.parameters.iter().find(|(known, _)| known == name).map(|(_, value)| *value)
 }
 
 /// Share of falls among the nearest trials before it ran.

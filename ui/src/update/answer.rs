@@ -15,7 +15,12 @@ const INTERRUPT_WINDOW: Duration = Duration::from_secs(2);
 
 /// Shows a line to the operator.
 pub fn say(model: &mut Model, level: LogLevel, text: impl Into<String>) {
-    model.message = Some(Notice { level, text: text.into() });
+    model.message = Some(Notice { level, text: text.into(), stop: false });
+}
+
+/// Answers the STOP key.
+fn say_stop(model: &mut Model, text: &str) {
+    model.message = Some(Notice { level: LogLevel::Warning, text: text.to_owned(), stop: true });
 }
 
 /// Reports that a dialog ended without effect.
@@ -45,7 +50,7 @@ pub(super) fn stop(model: &mut Model) -> Vec<Effect> {
     if !matches!(model.dialog, Some(Dialog::Field { .. })) {
         model.dialog = None;
     }
-    say(model, LogLevel::Warning, "STOP: damping");
+    say_stop(model, "STOP: damping");
     vec![Effect::Stop]
 }
 
@@ -57,7 +62,9 @@ pub(super) fn interrupt(model: &mut Model) -> Vec<Effect> {
         return vec![Effect::Quit];
     }
     let effects = stop(model);
-    let stopped = if effects.is_empty() { "" } else { "STOP: damping. " };
-    say(model, LogLevel::Warning, format!("{stopped}Ctrl-C again within 2 s quits"));
+    match effects.is_empty() {
+        true => say(model, LogLevel::Warning, "Ctrl-C again within 2 s quits"),
+        false => say_stop(model, "STOP: damping. Ctrl-C again within 2 s quits"),
+    }
     effects
 }

@@ -11,7 +11,6 @@ use crate::model::{Model, View};
 /// Rows that one notch of the wheel moves by.
 const NOTCH: isize = 3;
 
-/// Handles mouse input.
 pub(super) fn take(model: &mut Model, event: Mouse) -> Vec<Effect> {
     if !model.mouse || model.dialog.is_some() {
         return Vec::new();
@@ -24,12 +23,10 @@ pub(super) fn take(model: &mut Model, event: Mouse) -> Vec<Effect> {
             if row == areas.tabs.y {
                 return tab_at(&model.keymap, column).map_or_else(Vec::new, |action| perform(model, action));
             }
-            if let Some(trial) = trial_at(model, &areas, row) {
-                model.trial_table.selected = Some(trial);
-            }
-            Vec::new()
+            model.trial_table.selected = trial_at(model, &areas, row).or(model.trial_table.selected);
         }
     }
+    Vec::new()
 }
 
 /// The trial that the view Trials shows in a row of the terminal.

@@ -2,13 +2,11 @@
 
 use quadfrog::recording::record::LogLevel;
 use quadfrog::trial::Verdict;
-
 use strum::VariantArray;
 
 use super::answer::say;
 use crate::action::Action;
 use crate::column::Column;
-use crate::message::Effect;
 use crate::model::comparison::Comparison;
 use crate::model::live::Panel;
 use crate::model::trials::SortBy;
@@ -17,11 +15,11 @@ use crate::series::Series;
 use crate::settings::ChartMode;
 
 /// Moves through the rows of the open view; `isize::MIN` and `MAX` go to the ends.
-pub(super) fn move_by(model: &mut Model, step: isize) -> Vec<Effect> {
+pub(super) fn move_by(model: &mut Model, step: isize) {
     match model.view {
         View::Trials | View::Live => {
             let rows: Vec<u32> = model.trial_rows().iter().map(|trial| trial.trial).collect();
-            let Some(last) = rows.len().checked_sub(1) else { return Vec::new() };
+            let Some(last) = rows.len().checked_sub(1) else { return };
             let at = model.trial_table.selected.and_then(|n| rows.iter().position(|row| *row == n)).unwrap_or(last);
             let to = at.saturating_add_signed(step).min(last);
             // The newest row is followed.
@@ -43,19 +41,18 @@ pub(super) fn move_by(model: &mut Model, step: isize) -> Vec<Effect> {
         }
         View::Optimizer | View::Health => {}
     }
-    Vec::new()
 }
 
 /// Moves the charts' cursor; the first move freezes them.
-pub(super) fn move_cursor(model: &mut Model, step: i64) -> Vec<Effect> {
+pub(super) fn move_cursor(model: &mut Model, step: i64) {
     if model.view != View::Live {
-        return Vec::new();
+        return;
     }
     if let Some(comparison) = &mut model.live.comparison {
         let (first, last) = comparison.span_ns();
         let step_ns = (last - first) as i64 / 100 * step;
         comparison.cursor_ns = comparison.cursor_ns.saturating_add_signed(step_ns).clamp(first, last);
-        return Vec::new();
+        return;
     }
     if model.live.frozen.is_none() {
         freeze(model);
@@ -65,10 +62,9 @@ pub(super) fn move_cursor(model: &mut Model, step: i64) -> Vec<Effect> {
     let newest = model.charted().newest_ns();
     let oldest = newest.saturating_sub((model.live.window_s * 1e9) as u64);
     model.live.cursor_ns = model.live.cursor_ns.saturating_add_signed(step_ns).clamp(oldest, newest);
-    Vec::new()
 }
 
-pub(super) fn freeze(model: &mut Model) -> Vec<Effect> {
+pub(super) fn freeze(model: &mut Model) {
     model.live.frozen = match model.live.frozen.take() {
         Some(_) => None,
         None => {
@@ -76,32 +72,25 @@ pub(super) fn freeze(model: &mut Model) -> Vec<Effect> {
             Some((model.history.clone(), model.clock))
         }
     };
-    Vec::new()
 }
 
-pub(super) fn zoom(model: &mut Model, factor: f64) -> Vec<Effect> {
+pub(super) fn zoom(model: &mut Model, factor: f64) {
     model.live.window_s = (model.live.window_s * factor).clamp(1.0, 60.0);
-    Vec::new()
 }
 
 /// Lays a trial under the charts of a jump: the selected one in Trials, else the best. In Trials a second one compares the
 /// two; the same again, or the key in Live, ends it.
-pub(super) fn ghost(model: &mut Model) -> Vec<Effect> {
+pub(super) fn ghost(model: &mut Model) {
     let text = match (model.view, model.live.ghost, model.live.comparison.is_some()) {
         (View::Trials, Some(a), false) => second_ghost(model, a),
         (View::Trials, _, _) => {
             model.live.comparison = None;
-            let chosen = model.selected_trial().map(|trial| trial.trial);
-            first_ghost(model, chosen)
+            first_ghost(model, model.selected_trial().map(|trial| trial.trial))
         }
-        (_, None, false) => {
-            let best = model.session.trials.best().map(|trial| trial.trial);
-            first_ghost(model, best)
-        }
+        (_, None, false) => first_ghost(model, model.session.trials.best().map(|trial| trial.trial)),
         _ => no_ghost(model),
     };
     say(model, LogLevel::Info, text);
-    Vec::new()
 }
 
 fn no_ghost(model: &mut Model) -> String {
@@ -112,14 +101,12 @@ fn no_ghost(model: &mut Model) -> String {
 
 fn first_ghost(model: &mut Model, trial: Option<u32>) -> String {
     model.live.ghost = trial.filter(|trial| model.history.trace(*trial).is_some());
-    match model.live.ghost {
-        Some(trial) => {
-            format!("trial {trial} is laid under the charts of a jump; a second one in Trials compares the two")
+    match (model.live.ghost, trial) {
+        (Some(a), _) => {
+            format!("trial {a} is laid under the charts of a jump; a second one in Trials compares the two")
         }
-        None => match trial {
-            Some(trial) => no_signals(trial),
-            None => "no trial was accepted yet".to_owned(),
-        },
+        (None, Some(trial)) => no_signals(trial),
+        (None, None) => "no trial was accepted yet".to_owned(),
     }
 }
 
@@ -140,27 +127,24 @@ fn second_ghost(model: &mut Model, a: u32) -> String {
 }
 
 /// The next set of series: attitude and feet, forces, joints.
-pub(super) fn next_series(model: &mut Model) -> Vec<Effect> {
+pub(super) fn next_series(model: &mut Model) {
     let live = &mut model.live;
     (live.panel, live.series) = match (live.panel, live.series == Series::ATTITUDE) {
         (Panel::Charts, true) => (Panel::Charts, Series::FORCES.to_vec()),
         (Panel::Charts, false) if live.series == Series::FORCES => (Panel::Joints, live.series.clone()),
         _ => (Panel::Charts, Series::ATTITUDE.to_vec()),
     };
-    Vec::new()
 }
 
-/// Sweep or scroll.
-pub(super) fn next_mode(model: &mut Model) -> Vec<Effect> {
+pub(super) fn next_mode(model: &mut Model) {
     model.live.mode = match model.live.mode {
         ChartMode::Sweep => ChartMode::Scroll,
         ChartMode::Scroll => ChartMode::Sweep,
     };
-    Vec::new()
 }
 
 /// Sorts by the next shown column: number, value and verdict first, then the others from left to right.
-pub(super) fn next_sort(model: &mut Model) -> Vec<Effect> {
+pub(super) fn next_sort(model: &mut Model) {
     let view = &model.trial_table;
     let mut orders = vec![SortBy::Number];
     let shown = |column: &Column| view.columns.contains(column);
@@ -175,27 +159,18 @@ pub(super) fn next_sort(model: &mut Model) -> Vec<Effect> {
     let at = orders.iter().position(|order| *order == view.sort).unwrap_or(0);
     model.trial_table.sort = orders[(at + 1) % orders.len()];
     model.trial_table.reversed = false;
-    Vec::new()
 }
 
-pub(super) fn filter(model: &mut Model) -> Vec<Effect> {
-    match model.view {
-        View::Log => {
-            model.log_view.back = 0;
-            model.log_view.level = match model.log_view.level {
-                None => Some(LogLevel::Warning),
-                Some(LogLevel::Warning) => Some(LogLevel::Error),
-                Some(_) => None,
-            };
-        }
-        _ => {
-            model.trial_table.filter = match model.trial_table.filter {
-                None => Some(Verdict::Accept),
-                Some(Verdict::Accept) => Some(Verdict::Fall),
-                Some(Verdict::Fall) => Some(Verdict::Void),
-                Some(Verdict::Void) => None,
-            };
-        }
+pub(super) fn filter(model: &mut Model) {
+    if model.view == View::Log {
+        model.log_view.back = 0;
+        model.log_view.level = match model.log_view.level {
+            None => Some(LogLevel::Warning),
+            Some(LogLevel::Warning) => Some(LogLevel::Error),
+            Some(_) => None,
+        };
+    } else {
+        let next = model.trial_table.filter.map_or(0, |verdict| verdict as usize + 1);
+        model.trial_table.filter = Verdict::ALL.get(next).copied();
     }
-    Vec::new()
 }

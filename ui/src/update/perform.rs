@@ -3,8 +3,7 @@
 use quadfrog::recording::record::LogLevel;
 use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::telemetry::Mode;
-use quadfrog::trial::{ExperimentStage, Verdict};
-
+use quadfrog::trial::{ExperimentStage, Proposal, Verdict};
 use strum::VariantArray;
 
 use super::answer::{interrupt, request, say, stop};
@@ -22,57 +21,61 @@ pub(super) fn perform(model: &mut Model, action: Action) -> Vec<Effect> {
         // All failed arming checks are shown at once.
         let shown = action == Action::Arm && model.mode() == Mode::Disarmed && model.session.failing_checks() > 0;
         if shown && may_request(model).is_ok() {
-            return open(model, Dialog::ArmingChecks { selected: 0 });
+            open(model, Dialog::ArmingChecks { selected: 0 });
         }
         return Vec::new();
     }
     match action {
-        Action::Stop => stop(model),
-        Action::Interrupt => interrupt(model),
+        Action::Stop => return stop(model),
+        Action::Interrupt => return interrupt(model),
         // Arming hardware needs a typed confirmation, not a single key.
-        Action::Arm if model.session.is_hardware() => open(model, Dialog::Arm { typed: 0 }),
-        Action::Arm => request(model, OperatorRequest::Arm),
+        Action::Arm if model.session.info.is_hardware() => open(model, Dialog::Arm { typed: 0 }),
+        Action::Arm => return request(model, OperatorRequest::Arm),
         Action::ArmingChecks => open(model, Dialog::ArmingChecks { selected: 0 }),
-        Action::SitDown => request(model, OperatorRequest::SitDown),
-        Action::Acknowledge => request(model, OperatorRequest::Acknowledge),
-        Action::Approve => open_approval(model),
-        Action::Override => open_override(model),
-        Action::ClearOverrides => request(model, OperatorRequest::ClearOverrides),
-        Action::Fix => fix(model),
-        Action::Bounds => bounds(model),
-        Action::QueuePoint => queue_point(model),
-        Action::Skip => request(model, OperatorRequest::Skip),
-        Action::Continue => open(model, Dialog::field(Purpose::Continue, "20")),
-        Action::ConfirmBest => match model.session.confirming() {
-            Some(_) => request(model, OperatorRequest::ConfirmBest { repeats: 0 }),
-            None => open(model, Dialog::field(Purpose::ConfirmBest, "10")),
-        },
-        Action::ExportBest => vec![Effect::ExportBest],
-        Action::Accept => request(model, OperatorRequest::Judge(Verdict::Accept)),
-        Action::Fall => request(model, OperatorRequest::Judge(Verdict::Fall)),
-        Action::Void => request(model, OperatorRequest::Judge(Verdict::Void)),
-        Action::Rerun => rerun(model),
-        Action::Undo => request(model, OperatorRequest::Undo),
-        Action::HandValue => match model.session.under_review().map(|trial| (trial.trial, trial.hand_value)) {
-            Some((trial, value)) => {
-                let text = value.map(|value| value.to_string()).unwrap_or_default();
-                open(model, Dialog::field(Purpose::HandValue(trial), &text))
+        Action::SitDown => return request(model, OperatorRequest::SitDown),
+        Action::Acknowledge => return request(model, OperatorRequest::Acknowledge),
+        Action::Approve => {
+            if let Some(&Proposal { trial, revision, .. }) = model.session.open_proposal() {
+                open(model, Dialog::Approve { trial, revision, pressed_at: model.clock });
             }
-            None => Vec::new(),
-        },
-        Action::Note => match model.trial_in_view().map(|trial| (trial.trial, trial.note.clone())) {
-            Some((trial, note)) => open(model, Dialog::field(Purpose::Note(trial), &note)),
-            None => Vec::new(),
-        },
-        Action::Open => open_details(model),
-        Action::LiveView => show(model, View::Live),
-        Action::TrialsView => show(model, View::Trials),
-        Action::OptimizerView => show(model, View::Optimizer),
-        Action::OverrideView => show(model, View::Override),
-        Action::HealthView => show(model, View::Health),
-        Action::LogView => show(model, View::Log),
-        Action::NextView => show(model, neighbour_view(model.view, 1)),
-        Action::PreviousView => show(model, neighbour_view(model.view, View::VARIANTS.len() - 1)),
+        }
+        Action::Override => open_override(model),
+        Action::ClearOverrides => return request(model, OperatorRequest::ClearOverrides),
+        Action::Fix => return fix(model),
+        Action::Bounds => bounds(model),
+        Action::QueuePoint => return queue_point(model),
+        Action::Skip => return request(model, OperatorRequest::Skip),
+        Action::Continue => open(model, Dialog::field(Purpose::Continue, "20")),
+        Action::ConfirmBest if model.session.confirming().is_some() => {
+            return request(model, OperatorRequest::ConfirmBest { repeats: 0 });
+        }
+        Action::ConfirmBest => open(model, Dialog::field(Purpose::ConfirmBest, "10")),
+        Action::ExportBest => return vec![Effect::ExportBest],
+        Action::Accept => return request(model, OperatorRequest::Judge(Verdict::Accept)),
+        Action::Fall => return request(model, OperatorRequest::Judge(Verdict::Fall)),
+        Action::Void => return request(model, OperatorRequest::Judge(Verdict::Void)),
+        Action::Rerun => return rerun(model),
+        Action::Undo => return request(model, OperatorRequest::Undo),
+        Action::HandValue => {
+            if let Some(trial) = model.session.under_review() {
+                let text = trial.hand_value.map(|value| value.to_string()).unwrap_or_default();
+                open(model, Dialog::field(Purpose::HandValue(trial.trial), &text));
+            }
+        }
+        Action::Note => {
+            if let Some(trial) = model.trial_in_view() {
+                open(model, Dialog::field(Purpose::Note(trial.trial), &trial.note));
+            }
+        }
+        Action::Open => return open_details(model),
+        Action::LiveView => model.view = View::Live,
+        Action::TrialsView => model.view = View::Trials,
+        Action::OptimizerView => model.view = View::Optimizer,
+        Action::OverrideView => model.view = View::Override,
+        Action::HealthView => model.view = View::Health,
+        Action::LogView => model.view = View::Log,
+        Action::NextView => model.view = neighbour_view(model.view, 1),
+        Action::PreviousView => model.view = neighbour_view(model.view, View::VARIANTS.len() - 1),
         Action::Up => move_by(model, -1),
         Action::Down => move_by(model, 1),
         Action::PageUp => move_by(model, -(model.page.max(2) as isize - 1)),
@@ -86,82 +89,65 @@ pub(super) fn perform(model: &mut Model, action: Action) -> Vec<Effect> {
         Action::ZoomOut => zoom(model, 2.0),
         Action::ChartMode => next_mode(model),
         Action::Series => next_series(model),
-        Action::ChooseSeries => open(model, Dialog::Choose { what: Choice::Series, selected: 0 }),
+        Action::ChooseSeries => open(model, Dialog::Choose { subject: Choice::Series, selected: 0 }),
         Action::Ghost => ghost(model),
         Action::Sort => next_sort(model),
-        Action::Reverse => {
-            model.trial_table.reversed = !model.trial_table.reversed;
-            Vec::new()
-        }
+        Action::Reverse => model.trial_table.reversed = !model.trial_table.reversed,
         Action::Filter => filter(model),
-        Action::Columns => open(model, Dialog::Choose { what: Choice::Columns, selected: 0 }),
-        Action::BestOnly => {
-            model.trial_table.best_only = !model.trial_table.best_only;
-            Vec::new()
+        Action::Columns => open(model, Dialog::Choose { subject: Choice::Columns, selected: 0 }),
+        Action::BestOnly => model.trial_table.best_only = !model.trial_table.best_only,
+        Action::Search if model.view == View::Log => {
+            open(model, Dialog::field(Purpose::LogSearch, &model.log_view.search));
         }
-        Action::Search => {
-            let (purpose, text) = match model.view {
-                View::Log => (Purpose::LogSearch, model.log_view.search.clone()),
-                _ => (Purpose::TrialNumber, String::new()),
-            };
-            open(model, Dialog::field(purpose, &text))
-        }
-        Action::Copy => match model.selected_trial().map(|trial| trial.trial) {
-            Some(trial) => {
+        Action::Search => open(model, Dialog::field(Purpose::TrialNumber, "")),
+        Action::Copy => {
+            if let Some(trial) = model.selected_trial().map(|trial| trial.trial) {
                 say(model, LogLevel::Info, "the row is on your terminal's clipboard (OSC 52)");
-                vec![Effect::CopyTrial(trial)]
+                return vec![Effect::CopyTrial(trial)];
             }
-            None => Vec::new(),
-        },
-        Action::Export => vec![Effect::Export],
-        Action::PlayPause => vec![Effect::Replay(ReplayCommand::PlayPause)],
-        Action::StepForward => vec![Effect::Replay(ReplayCommand::StepForward)],
-        Action::StepBack => vec![Effect::Replay(ReplayCommand::StepBack)],
-        Action::Slower => vec![Effect::Replay(ReplayCommand::Slower)],
-        Action::Faster => vec![Effect::Replay(ReplayCommand::Faster)],
-        Action::PreviousMarker => vec![Effect::Replay(ReplayCommand::PreviousMarker)],
-        Action::NextMarker => vec![Effect::Replay(ReplayCommand::NextMarker)],
+        }
+        Action::Export => return vec![Effect::Export],
+        Action::PlayPause => return vec![Effect::Replay(ReplayCommand::PlayPause)],
+        Action::StepForward => return vec![Effect::Replay(ReplayCommand::StepForward)],
+        Action::StepBack => return vec![Effect::Replay(ReplayCommand::StepBack)],
+        Action::Slower => return vec![Effect::Replay(ReplayCommand::Slower)],
+        Action::Faster => return vec![Effect::Replay(ReplayCommand::Faster)],
+        Action::PreviousMarker => return vec![Effect::Replay(ReplayCommand::PreviousMarker)],
+        Action::NextMarker => return vec![Effect::Replay(ReplayCommand::NextMarker)],
         Action::Palette => open(model, Dialog::Palette { input: Default::default(), selected: 0 }),
         Action::Help => open(model, Dialog::Help { scroll: 0 }),
         Action::Mouse => {
             model.mouse = !model.mouse;
-            let text = if model.mouse {
-                "mouse on: tabs, rows, wheel; Shift while dragging selects text in most terminals"
-            } else {
-                "mouse off: your terminal selects and copies text"
+            let text = match model.mouse {
+                true => "mouse on: tabs, rows, wheel; Shift while dragging selects text in most terminals",
+                false => "mouse off: your terminal selects and copies text",
             };
             say(model, LogLevel::Info, text);
-            vec![Effect::Mouse(model.mouse)]
+            return vec![Effect::Mouse(model.mouse)];
         }
         Action::Redraw => {
             say(model, LogLevel::Info, "the screen was drawn again");
-            vec![Effect::Redraw]
+            return vec![Effect::Redraw];
         }
-        Action::Suspend => vec![Effect::Suspend],
+        Action::Suspend => return vec![Effect::Suspend],
         Action::Quit
             if model.robot_needs_us() || model.session.stage_is(ExperimentStage::Review) && model.replay.is_none() =>
         {
-            open(model, Dialog::Quit)
+            open(model, Dialog::Quit);
         }
-        Action::Quit => vec![Effect::Quit],
+        Action::Quit => return vec![Effect::Quit],
     }
-}
-
-fn open(model: &mut Model, dialog: Dialog) -> Vec<Effect> {
-    model.dialog = Some(dialog);
     Vec::new()
 }
 
-fn open_approval(model: &mut Model) -> Vec<Effect> {
-    let Some(proposal) = model.session.open_proposal() else { return Vec::new() };
-    let (trial, revision) = (proposal.trial, proposal.revision);
-    open(model, Dialog::Approve { trial, revision, pressed_at: model.clock })
+fn open(model: &mut Model, dialog: Dialog) {
+    model.dialog = Some(dialog);
 }
 
-fn open_override(model: &mut Model) -> Vec<Effect> {
-    let Some(proposal) = model.session.open_proposal() else { return Vec::new() };
-    let form = OverrideForm::new(proposal, &model.session, model.override_row);
-    open(model, Dialog::Override(form))
+fn open_override(model: &mut Model) {
+    if let Some(proposal) = model.session.open_proposal() {
+        model.dialog = Some(Dialog::Override(OverrideForm::new(proposal, &model.session, model.override_row)));
+    }
 }
 
 /// Asks for how many trials the selected parameter keeps its proposed value; a fixed one is searched again.
@@ -171,15 +157,15 @@ fn fix(model: &mut Model) -> Vec<Effect> {
         return request(model, OperatorRequest::Unfix { parameter: name });
     }
     let Some(value) = model.override_value() else { return Vec::new() };
-    open(model, Dialog::field(Purpose::Fix { parameter: model.override_row, value }, "5"))
+    open(model, Dialog::field(Purpose::Fix { parameter: model.override_row, value }, "5"));
+    Vec::new()
 }
 
-fn bounds(model: &mut Model) -> Vec<Effect> {
-    let Some(info) = model.override_parameter().and_then(|info| model.session.parameter(&info.name)) else {
-        return Vec::new();
-    };
-    let text = format!("{}..{}", info.low, info.high);
-    open(model, Dialog::field(Purpose::Bounds { parameter: model.override_row }, &text))
+fn bounds(model: &mut Model) {
+    if let Some(info) = model.override_parameter().and_then(|info| model.session.parameter(&info.name)) {
+        let text = format!("{}..{}", info.low, info.high);
+        open(model, Dialog::field(Purpose::Bounds { parameter: model.override_row }, &text));
+    }
 }
 
 fn queue_point(model: &mut Model) -> Vec<Effect> {
@@ -195,15 +181,13 @@ fn open_details(model: &mut Model) -> Vec<Effect> {
         return request(model, OperatorRequest::Acknowledge);
     }
     if model.view == View::Override && legal(Action::Override, model).is_ok() {
-        return open_override(model);
+        open_override(model);
+    } else if let Some(trial) = model.trial_in_view().map(|trial| trial.trial) {
+        open(model, Dialog::Details { trial, scroll: 0 });
+    } else {
+        say(model, LogLevel::Info, "there is no trial yet");
     }
-    match model.trial_in_view().map(|trial| trial.trial) {
-        Some(trial) => open(model, Dialog::Details { trial, scroll: 0 }),
-        None => {
-            say(model, LogLevel::Info, "there is no trial yet");
-            Vec::new()
-        }
-    }
+    Vec::new()
 }
 
 /// Under review: voids the trial and queues it again. In the table: queues the selected trial.
@@ -213,11 +197,6 @@ fn rerun(model: &mut Model) -> Vec<Effect> {
         false => model.selected_trial().map(|trial| trial.trial),
     };
     request(model, OperatorRequest::Rerun { trial })
-}
-
-fn show(model: &mut Model, view: View) -> Vec<Effect> {
-    model.view = view;
-    Vec::new()
 }
 
 fn neighbour_view(view: View, step: usize) -> View {

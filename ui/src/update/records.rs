@@ -61,9 +61,7 @@ pub(super) fn take(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
             if stopped {
                 model.session.stopped_because = change.cause.clone();
                 // The STOP key was answered already.
-                let answered = change.cause == "STOP"
-                    && model.message.as_ref().is_some_and(|message| message.text.starts_with("STOP"));
-                if !answered {
+                if !(change.is_stop() && model.message.as_ref().is_some_and(|message| message.stop)) {
                     say(model, level, format!("{}: {}", change.to.name(), change.cause));
                 }
             }
@@ -138,7 +136,6 @@ pub(super) fn take(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
     if rings { vec![Effect::Bell] } else { Vec::new() }
 }
 
-/// Keeps the run time of a trial.
 fn note_time(model: &mut Model, info: StageRecord, time_ns: u64) {
     match info.stage {
         ExperimentStage::Running => {
@@ -179,10 +176,9 @@ fn log_trial(model: &mut Model, time_ns: u64, trial: &TrialRecord) {
     let text = match (trial.verdict, trial.suggested) {
         (Some(verdict), _) if !known(|t| t.verdict) => {
             let value = trial.value.map(|v| format!(", J = {v:.3} {}", model.session.info.unit)).unwrap_or_default();
-            let source = if trial.source == ProposalSource::Sampler {
-                String::new()
-            } else {
-                format!(" ({})", trial.source.name())
+            let source = match trial.source {
+                ProposalSource::Sampler => String::new(),
+                other => format!(" ({})", other.name()),
             };
             format!("trial {}{source}: {}{value}", trial.trial, verdict.name())
         }

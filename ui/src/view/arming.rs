@@ -1,10 +1,4 @@
 //! The arming checks: each with the found value and the limit, all failing ones at once.
-//!
-//! ```text
-//! ok    upright                     0.02 rad              at most 0.2 rad
-//! FAIL  battery                     21 %                  at least 30 %
-//! >you  area clear, remote in hand  x confirms the item
-//! ```
 
 use quadfrog::recording::record::ArmingCheckRecord;
 use quadfrog::session::operator_request::OperatorCheck;
@@ -15,7 +9,6 @@ use super::draw::{cut, span};
 use crate::model::session::SessionModel;
 use crate::theme::{Role, Theme};
 
-/// Text and role of a check's state.
 fn label(state: ArmingCheckState) -> (&'static str, Role) {
     match state {
         ArmingCheckState::Passed => ("ok", Role::Good),

@@ -1,10 +1,4 @@
 //! A chart of one signal over time, in sweep or scroll mode.
-//!
-//! ```text
-//! roll +0.021 rad             ±0.50
-//! ⠀⠀⠀⠀⠀⠀⢀⠔⠑⠤⡀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀
-//! ⣀⣀⣀⠤⠔⠊⠁⠀⠀⠀⠈⠒⠤⢄⣀⣀⣀⣀│⠀⠀⠤⠤⠔⠒
-//! ```
 
 use quadfrog::telemetry::Phase;
 use ratatui::buffer::Buffer;
@@ -21,7 +15,6 @@ use crate::theme::{Glyphs, Role, Theme};
 /// The time axis, the same for all charts of a view.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TimeAxis {
-    /// Sweep or scroll.
     pub mode: ChartMode,
     /// Time shown, ns.
     pub window_ns: u64,
@@ -49,14 +42,11 @@ impl TimeAxis {
     }
 }
 
-/// A trial laid under the charts.
 #[derive(Clone, Copy)]
 pub struct Ghost<'a> {
-    /// Its samples.
     pub trace: &'a [ChartSample],
     /// Where its impulse begins on the charts' axis, ns.
     pub start_ns: u64,
-    /// Style of its line.
     pub role: Role,
     /// Whether its value stands beside the other in the heading.
     pub named: bool,
@@ -64,11 +54,8 @@ pub struct Ghost<'a> {
 
 /// A chart with its heading line. Under two rows nothing is drawn.
 pub struct Chart<'a> {
-    /// The signal.
     pub signal: Signal,
-    /// The time axis.
     pub axis: TimeAxis,
-    /// The samples.
     pub history: &'a SignalHistory,
     /// The phase of each column, from [`phases`].
     pub phases: &'a [Option<Phase>],
@@ -78,12 +65,10 @@ pub struct Chart<'a> {
     pub cursor_ns: Option<u64>,
     /// Whether the sweep's cursor is drawn as a line.
     pub cursor_line: bool,
-    /// Colours and characters.
     pub theme: Theme,
 }
 
 impl Chart<'_> {
-    /// Draws it.
     pub fn draw(&self, buffer: &mut Buffer, area: Rect) {
         if area.height < 2 || area.width < 8 {
             return;
@@ -210,14 +195,8 @@ impl Chart<'_> {
 
     /// Colours the columns of a jump's phases; [`draw_phases`] shows the same in letters.
     fn shade(&self, buffer: &mut Buffer, plot: Rect) {
-        for (column, phase) in self.phases.iter().enumerate().take(usize::from(plot.width)) {
-            let role = match phase {
-                Some(Phase::Impulse) => Role::ShadeImpulse,
-                Some(Phase::Flight) => Role::ShadeFlight,
-                Some(Phase::Landing) => Role::ShadeLanding,
-                Some(Phase::Stance) | None => continue,
-            };
-            buffer.set_style(Rect { x: plot.x + column as u16, width: 1, ..plot }, self.theme.style(role));
+        for (column, (role, _)) in jump_columns(self.phases, plot.width) {
+            buffer.set_style(Rect { x: plot.x + column, width: 1, ..plot }, self.theme.style(role));
         }
     }
 
@@ -251,15 +230,19 @@ pub fn phases(axis: &TimeAxis, history: &SignalHistory, width: u16) -> Vec<Optio
     phases
 }
 
+/// The columns of a jump's phases, each with its role and its letter.
+fn jump_columns(phases: &[Option<Phase>], width: u16) -> impl Iterator<Item = (u16, (Role, &'static str))> {
+    (0..width).zip(phases).filter_map(|(column, phase)| match phase {
+        Some(Phase::Impulse) => Some((column, (Role::ShadeImpulse, "i"))),
+        Some(Phase::Flight) => Some((column, (Role::ShadeFlight, "f"))),
+        Some(Phase::Landing) => Some((column, (Role::ShadeLanding, "l"))),
+        Some(Phase::Stance) | None => None,
+    })
+}
+
 /// A line of letters under charts: `i` impulse, `f` flight, `l` landing.
 pub fn draw_phases(buffer: &mut Buffer, area: Rect, phases: &[Option<Phase>], theme: &Theme) {
-    for (column, phase) in phases.iter().enumerate().take(usize::from(area.width)) {
-        let letter = match phase {
-            Some(Phase::Impulse) => "i",
-            Some(Phase::Flight) => "f",
-            Some(Phase::Landing) => "l",
-            Some(Phase::Stance) | None => continue,
-        };
-        buffer.set_string(area.x + column as u16, area.y, letter, theme.style(Role::Quiet));
+    for (column, (_, letter)) in jump_columns(phases, area.width) {
+        buffer.set_string(area.x + column, area.y, letter, theme.style(Role::Quiet));
     }
 }

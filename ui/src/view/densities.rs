@@ -1,12 +1,5 @@
 //! TPE's two densities along a parameter, l(x) of the good trials and g(x) of the others, with the proposed value: TPE
 //! proposes where l is high and g is low.
-//!
-//! ```text
-//! TPE density of f0 ─────── importance 62 %
-//!      l⡠⠒⢄│             g
-//!    ⡠⠊   ⠈│⢄      ⡠⠒⠒⠤⡀
-//! 0.75    1.243             1.75
-//! ```
 
 use quadfrog::trial::{ParameterInsight, ProposalInsight};
 use ratatui::Frame;
@@ -16,7 +9,6 @@ use super::dots::DotGrid;
 use super::draw::{cut, heading, number};
 use crate::theme::{Role, Theme};
 
-/// Draws the panel of one parameter.
 pub fn render(frame: &mut Frame, area: Rect, insight: Option<&ProposalInsight>, name: &str, theme: &Theme) {
     let title = match insight {
         Some(insight) if area.width >= 58 => format!("TPE density of {name} (#{}): l good, g rest", insight.trial),
@@ -79,7 +71,6 @@ pub fn render(frame: &mut Frame, area: Rect, insight: Option<&ProposalInsight>, 
     }
 }
 
-/// The column of the proposal.
 fn column_of(insight: &ParameterInsight, (low, high): (f64, f64), width: u16) -> u16 {
     let share = ((insight.proposed - low) / (high - low)).clamp(0.0, 1.0);
     (share * f64::from(width - 1)).round() as u16

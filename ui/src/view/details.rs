@@ -1,10 +1,4 @@
 //! All details of one trial, for their dialog.
-//!
-//! ```text
-//! verdict        accept
-//! value          0.6420 m, reported to the optimizer
-//! f0             1.24300 Hz  (0.75 to 1.75)
-//! ```
 
 use quadfrog::trial::TrialRecord;
 
@@ -13,7 +7,6 @@ use super::points;
 use crate::model::session::SessionModel;
 use crate::theme::Theme;
 
-/// All details of one trial: names and values.
 pub fn details(session: &SessionModel, theme: &Theme, trial: &TrialRecord) -> Vec<(String, String)> {
     let unit = &session.info.unit;
     let mut rows: Vec<(String, String)> = Vec::new();

@@ -26,7 +26,6 @@ use crate::model::Model;
 use crate::model::dialog::{APPROVAL_PAUSE, Choice, Dialog, OverrideForm, Purpose};
 use crate::theme::{Glyphs, Role, Theme};
 
-/// Draws the open dialog.
 pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let Some(dialog) = &model.dialog else { return };
     match dialog {
@@ -46,17 +45,11 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
             popup(frame, area, model, &format!("Override trial #{}", form.trial), 78, overrides(model, form))
         }
         Dialog::Field { purpose, input, problem } => {
-            popup(
-                frame,
-                area,
-                model,
-                &field_title(model, *purpose),
-                64,
-                field(model, *purpose, input, problem.as_deref()),
-            );
+            let lines = field(model, *purpose, input, problem.as_deref());
+            popup(frame, area, model, &field_title(model, *purpose), 64, lines);
         }
         Dialog::Palette { input, selected } => render_palette(frame, area, model, input, *selected),
-        Dialog::Choose { what, selected } => render_choice(frame, area, model, *what, *selected),
+        Dialog::Choose { subject, selected } => render_choice(frame, area, model, *subject, *selected),
         Dialog::Help { scroll } => render_help(frame, area, model, *scroll),
         Dialog::Details { trial, scroll } => render_details(frame, area, model, *trial, *scroll),
     }
@@ -102,11 +95,8 @@ fn open_box(frame: &mut Frame, area: Rect, theme: &Theme, title: &str, width: u1
     let set = if theme.glyphs == Glyphs::Ascii { ASCII } else { border::PLAIN };
     let (width, height) = (width.min(area.width), height.min(area.height));
     let at = Rect { x: area.x + (area.width - width) / 2, y: area.y + (area.height - height) / 2, width, height };
-    let block = Block::bordered().border_set(set).border_style(theme.style(Role::Heading)).title(span(
-        theme,
-        Role::Heading,
-        format!(" {title} "),
-    ));
+    let title = span(theme, Role::Heading, format!(" {title} "));
+    let block = Block::bordered().border_set(set).border_style(theme.style(Role::Heading)).title(title);
     let inner = block.inner(at);
     frame.render_widget(Clear, at);
     frame.render_widget(block, at);
@@ -132,12 +122,12 @@ fn answers(theme: &Theme, key: &str, text: &str) -> Line<'static> {
 
 fn arm(model: &Model, typed: usize) -> Vec<Line<'static>> {
     let theme = &model.theme;
-    let word = model.session.arming_word();
+    let letters = model.session.arming_confirmation();
     let mut lines = vec![Line::from("The robot will stand up. Is the area clear?"), Line::default()];
-    if word.len() == 1 {
-        lines.push(answers(&model.theme, word, "stand up"));
+    if letters.len() == 1 {
+        lines.push(answers(&model.theme, letters, "stand up"));
     } else {
-        let (done, left) = word.split_at(typed.min(word.len()));
+        let (done, left) = letters.split_at(typed.min(letters.len()));
         lines.push(Line::from(vec![
             span(theme, Role::Selected, " Cancel "),
             span(theme, Role::Quiet, " Enter, or any other key     type "),
@@ -195,9 +185,9 @@ fn overrides(model: &Model, form: &OverrideForm) -> Vec<Line<'static>> {
             lines.push(Line::from(span(theme, Role::Quiet, "  gains of the controller, for this trial alone")));
         }
         let selected = index == form.selected;
-        let mark = if selected { ">" } else { " " };
+        let symbol = if selected { ">" } else { " " };
         let mut spans =
-            vec![span(theme, if selected { Role::Key } else { Role::Text }, format!("{mark} {:<8}", row.name))];
+            vec![span(theme, if selected { Role::Key } else { Role::Text }, format!("{symbol} {:<8}", row.name))];
         match &form.typing {
             Some(input) if selected => {
                 // As wide as the number that it replaces, so that the line does not shift.
@@ -215,19 +205,13 @@ fn overrides(model: &Model, form: &OverrideForm) -> Vec<Line<'static>> {
         }
         lines.push(Line::from(spans));
     }
-    lines.push(Line::default());
-    match &form.problem {
-        Some(problem) => lines.push(Line::from(span(theme, Role::Bad, problem.clone()))),
-        None => lines.push(Line::from(span(
-            theme,
-            Role::Quiet,
-            "This does not move the robot: it is approved like any other proposal.",
-        ))),
-    }
+    let note = "This does not move the robot: it is approved like any other proposal.";
+    let below =
+        form.problem.as_ref().map_or(span(theme, Role::Quiet, note), |text| span(theme, Role::Bad, text.as_str()));
+    lines.extend([Line::default(), Line::from(below)]);
     lines
 }
 
-/// A line of text with its cursor.
 fn edited(theme: &Theme, input: &Input) -> Vec<Span<'static>> {
     let text: Vec<char> = input.value().chars().collect();
     let at = input.cursor().min(text.len());
@@ -264,29 +248,23 @@ fn field(model: &Model, purpose: Purpose, input: &Input, problem: Option<&str>) 
     if matches!(purpose, Purpose::HandValue(_)) {
         spans.push(span(theme, Role::Quiet, format!(" {}", model.session.info.unit)));
     }
-    let below = match (problem, purpose) {
-        (Some(problem), _) => span(theme, Role::Bad, problem.to_owned()),
-        (None, Purpose::HandValue(_)) => {
-            span(theme, Role::Quiet, "replaces the measured value; empty: back to the measured one")
-        }
-        (None, Purpose::Bounds { parameter }) => {
+    let hint = match purpose {
+        Purpose::HandValue(_) => "replaces the measured value; empty: back to the measured one".to_owned(),
+        Purpose::Bounds { parameter } => {
             let info = model.session.info.parameters.get(parameter);
             let searched = info.and_then(|info| model.session.searched(&info.name));
             let allowed = searched.map_or(String::new(), |p| format!("; safety.toml allows {} to {}", p.least, p.most));
-            span(theme, Role::Quiet, format!("write it as 50..120{allowed}; past trials stay"))
+            format!("write it as 50..120{allowed}; past trials stay")
         }
-        (None, Purpose::Fix { .. }) => span(theme, Role::Quiet, "the others are still proposed by the sampler"),
-        (None, Purpose::ConfirmBest) => span(
-            theme,
-            Role::Quiet,
-            "the best points run again until one leads; each repeat is approved like any other",
-        ),
-        (None, Purpose::LogSearch) => span(theme, Role::Quiet, "empty: all lines"),
-        (None, Purpose::Note(_)) if model.robot_needs_us() => {
-            span(theme, Role::Quiet, "the robot is armed: Space is STOP, _ writes a space")
+        Purpose::Fix { .. } => "the others are still proposed by the sampler".to_owned(),
+        Purpose::ConfirmBest => {
+            "the best points run again until one leads; each repeat is approved like any other".to_owned()
         }
-        _ => span(theme, Role::Quiet, ""),
+        Purpose::LogSearch => "empty: all lines".to_owned(),
+        Purpose::Note(_) if model.robot_needs_us() => "the robot is armed: Space is STOP, _ writes a space".to_owned(),
+        Purpose::Note(_) | Purpose::Continue | Purpose::TrialNumber => String::new(),
     };
+    let below = problem.map_or_else(|| span(theme, Role::Quiet, hint), |problem| span(theme, Role::Bad, problem));
     vec![Line::from(spans), Line::default(), Line::from(below)]
 }
 
@@ -313,23 +291,22 @@ fn render_palette(frame: &mut Frame, area: Rect, model: &Model, input: &Input, s
     }
 }
 
-fn render_choice(frame: &mut Frame, area: Rect, model: &Model, what: Choice, selected: usize) {
+fn render_choice(frame: &mut Frame, area: Rect, model: &Model, subject: Choice, selected: usize) {
     let theme = &model.theme;
-    let title = match what {
+    let title = match subject {
         Choice::Series => "Series of the charts",
         Choice::Columns => "Columns of the trial table",
     };
-    let rows = model.choices(what);
+    let rows = model.choices(subject);
     let inner = open_box(frame, area, theme, title, 66, rows.len() as u16 + 2);
     // A terminal that is too low shows the lines around the chosen one.
     let first = (selected + 1).saturating_sub(usize::from(inner.height));
-    for (line, (index, (name, help, on))) in rows.iter().enumerate().skip(first).enumerate() {
-        if line >= usize::from(inner.height) {
-            break;
-        }
+    for (line, (index, (name, help, on))) in
+        rows.iter().enumerate().skip(first).take(usize::from(inner.height)).enumerate()
+    {
         let area = Rect { y: inner.y + line as u16, height: 1, ..inner };
-        let mark = if *on { "[x]" } else { "[ ]" };
-        let text = cut(&format!("{mark} {name:<11} {help}"), usize::from(inner.width));
+        let symbol = if *on { "[x]" } else { "[ ]" };
+        let text = cut(&format!("{symbol} {name:<11} {help}"), usize::from(inner.width));
         let role = match (index == selected, on) {
             (true, _) => Role::Selected,
             (false, true) => Role::Text,

@@ -36,7 +36,6 @@ fn character(glyphs: Glyphs, dots: &[[bool; 4]; 2]) -> char {
     }
 }
 
-/// A grid of dots over an area.
 pub struct DotGrid {
     glyphs: Glyphs,
     /// Dots across and down.
@@ -45,7 +44,6 @@ pub struct DotGrid {
 }
 
 impl DotGrid {
-    /// An empty grid.
     pub fn new(area: Rect, glyphs: Glyphs) -> DotGrid {
         let (across, down) = resolution(glyphs);
         let size = (usize::from(area.width) * across, usize::from(area.height) * down);

@@ -7,7 +7,6 @@ use ratatui::text::{Line, Span};
 
 use crate::theme::{Role, Theme};
 
-/// Text in a role's style.
 pub fn span(theme: &Theme, role: Role, text: impl Into<String>) -> Span<'static> {
     Span::styled(text.into(), theme.style(role))
 }
@@ -45,7 +44,6 @@ pub fn clock(time_ns: u64) -> String {
     if h > 0 { format!("{h}:{m:02}:{s:02}") } else { format!("{m:02}:{s:02}") }
 }
 
-/// As [`clock`], with milliseconds.
 pub fn clock_ms(time_ns: u64) -> String {
     format!("{}.{:03}", clock(time_ns), time_ns / 1_000_000 % 1000)
 }

@@ -1,9 +1,4 @@
 //! The permanent frame: two lines at the top, the tabs, the message line; a reduced form on a small terminal.
-//!
-//! ```text
-//!  READY      SIM  forward   trial #8   7 of 20 judged   best 0.642 m (#3)       REC 03:12
-//!  STOP Space F12    loop 0 late, worst 0.1 ms    link 0 ms    motor 31 C    battery 87 %
-//! ```
 
 use quadfrog::recording::record::LogLevel;
 use quadfrog::robot::joint_name;
@@ -23,7 +18,6 @@ use crate::theme::Role;
 /// Age of the newest tick from which the numbers count as old, ms.
 const STALE_MS: u128 = 500;
 
-/// The two lines that no dialog covers.
 pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let [first, second] = rows(area);
     let recording = Line::from(recording(model));
@@ -38,7 +32,6 @@ fn rows(area: Rect) -> [Rect; 2] {
     [Rect { height: 1, ..area }, Rect { y: area.y + 1, height: area.height.saturating_sub(1).min(1), ..area }]
 }
 
-/// The mode.
 pub fn mode_span(model: &Model) -> Span<'static> {
     let mode = model.mode();
     let role = match mode {
@@ -50,7 +43,6 @@ pub fn mode_span(model: &Model) -> Span<'static> {
     span(&model.theme, role, format!(" {:<9} ", mode.name()))
 }
 
-/// The driven machine, in words and colour.
 fn backend(model: &Model) -> Span<'static> {
     let theme = &model.theme;
     match model.session.info.backend {
@@ -73,11 +65,8 @@ fn identity(model: &Model, width: u16, room: usize) -> Line<'static> {
     let narrow = width < 100;
     if session.approve != Approval::Each && model.replay.is_none() {
         let approve = session.approve.name().to_uppercase();
-        spans.push(span(
-            theme,
-            Role::Warning,
-            if narrow { format!("{approve}  ") } else { format!("APPROVE {approve}  ") },
-        ));
+        let text = if narrow { format!("{approve}  ") } else { format!("APPROVE {approve}  ") };
+        spans.push(span(theme, Role::Warning, text));
     }
     spans.push(Span::raw(session.task_name()));
     if let Some(info) = model.session.stage {
@@ -163,19 +152,13 @@ fn condition(model: &Model, width: u16) -> Vec<Span<'static>> {
     let hottest = temperatures.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1));
     if let Some((joint, hottest)) = hottest.filter(|(_, hottest)| *hottest > 0.0) {
         let joint = if narrow { String::new() } else { format!(" {}", joint_name(joint)) };
-        part(
-            if narrow { "motor " } else { "hottest " },
-            bad(f64::from(hottest) >= limits.motor_c),
-            format!("{hottest:.0} C{joint}"),
-        );
+        let name = if narrow { "motor " } else { "hottest " };
+        part(name, bad(f64::from(hottest) >= limits.motor_c), format!("{hottest:.0} C{joint}"));
     }
     if let Some(battery) = snapshot.tick.state.battery {
         let charge = battery.charge_percent;
-        part(
-            if narrow { "bat " } else { "battery " },
-            bad(f64::from(charge) < limits.battery_percent),
-            format!("{charge:.0} %"),
-        );
+        let name = if narrow { "bat " } else { "battery " };
+        part(name, bad(f64::from(charge) < limits.battery_percent), format!("{charge:.0} %"));
     }
     let age_ms = model.clock.saturating_sub(model.snapshot_at).as_millis();
     if age_ms > STALE_MS && model.replay.is_none() {
@@ -217,7 +200,6 @@ pub fn render_tabs(frame: &mut Frame, area: Rect, model: &Model) {
     frame.render_widget(Line::from(aside).alignment(Alignment::Right), area);
 }
 
-/// The newest answer to the operator.
 pub fn render_message(frame: &mut Frame, area: Rect, model: &Model) {
     let Some(message) = &model.message else { return };
     let role = match message.level {
@@ -233,7 +215,7 @@ pub fn render_message(frame: &mut Frame, area: Rect, model: &Model) {
 pub fn render_small(frame: &mut Frame, area: Rect, model: &Model) {
     let theme = &model.theme;
     let keys = model.keymap.all_keys(Action::Stop);
-    let link = match (model.snapshot.counters.link, model.session.is_hardware()) {
+    let link = match (model.snapshot.counters.link, model.session.info.is_hardware()) {
         (Some(link), _) => format!("link {} ms, {:.1} % lost", link.state_age_ms, 100.0 * link.loss_share()),
         (None, true) => format!("link {} ms", model.snapshot.counters.state_age_ms),
         (None, false) => "link none: SIM".to_owned(),

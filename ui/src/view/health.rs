@@ -1,15 +1,9 @@
 //! View 5, Health: loop timing, recorder, link, motors, battery, arming checks.
-//!
-//! ```text
-//! Loop ──────────────────────────   Motors ────────────────────────────
-//! late ticks   0 (0.000 %)          FR_hip       31 C  -0.33 rad  +4.4 N m
-//! wake-up      p50 61 us, p99 94 us ...
-//! ```
 
 use quadfrog::recording::record::HealthLimits;
 use quadfrog::recording::recorder::RecorderStatus;
 use quadfrog::robot::{JOINTS, LinkStatus, joint_name};
-use quadfrog::telemetry::{ArmingCheck, StageTimes};
+use quadfrog::telemetry::ArmingCheck;
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
@@ -22,7 +16,6 @@ use crate::model::Model;
 use crate::model::history::ChartSample;
 use crate::theme::Role;
 
-/// Draws the view.
 pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let [left, right] = Layout::horizontal([Constraint::Fill(1); 2]).spacing(2).areas(area);
     // The histogram needs rows that 80x24 does not have.
@@ -35,35 +28,28 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
         Constraint::Fill(1),
     ])
     .areas(left);
-    panel(frame, timing, model, "Loop", timing_rows);
+    panel(frame, timing, model, ("Loop", NAME_WIDTH), timing_rows);
     if lateness_rows_shown > 0 {
         let rows = lateness_rows(model, usize::from(lateness.width));
-        panel(frame, lateness, model, "Wake-up latency, last minute", rows);
+        panel(frame, lateness, model, ("Wake-up latency, last minute", NAME_WIDTH), rows);
     }
-    panel(frame, recording, model, "Recorder and screen", recorder_rows(model));
-    panel(frame, robot, model, "Link and battery", robot_rows(model));
+    panel(frame, recording, model, ("Recorder and screen", NAME_WIDTH), recorder_rows(model));
+    panel(frame, robot, model, ("Link and battery", NAME_WIDTH), robot_rows(model));
     let [motors, checks] = Layout::vertical([Constraint::Length(JOINTS as u16 + 1), Constraint::Fill(1)]).areas(right);
-    panel_named(frame, motors, model, ("Motors", MOTOR_NAME_WIDTH), motor_rows(model));
+    panel(frame, motors, model, ("Motors", MOTOR_NAME_WIDTH), motor_rows(model));
     let aside = format!("{} ({})", arming::summary(&model.session), model.keymap.key(Action::ArmingChecks));
     let body = heading(frame, checks, &model.theme, "Arming checks", &aside);
     let lines = arming::lines(&model.session, &model.theme, usize::from(body.width), usize::from(body.height), None);
     frame.render_widget(Paragraph::new(lines), body);
 }
 
-/// Width of the names at the left of a panel.
 const NAME_WIDTH: usize = 13;
-/// Width of the joints' names.
 const MOTOR_NAME_WIDTH: usize = 9;
 
 /// A line of a panel: name, value, and whether it is beyond its limit.
 type HealthRow = (String, String, bool);
 
-fn panel(frame: &mut Frame, area: Rect, model: &Model, title: &str, rows: Vec<HealthRow>) {
-    panel_named(frame, area, model, (title, NAME_WIDTH), rows);
-}
-
-/// A panel with its title and the width of its names.
-fn panel_named(frame: &mut Frame, area: Rect, model: &Model, (title, name_width): (&str, usize), rows: Vec<HealthRow>) {
+fn panel(frame: &mut Frame, area: Rect, model: &Model, (title, name_width): (&str, usize), rows: Vec<HealthRow>) {
     let theme = &model.theme;
     let body = heading(frame, area, theme, title, "");
     let line = |(name, value, beyond): HealthRow| {
@@ -102,28 +88,18 @@ fn timing_rows(model: &Model) -> Vec<HealthRow> {
         format!("p50 {p50:.0} us, p99 {p99:.0} us")
     };
     let worst_ms = counters.worst_lateness_ns as f64 / 1e6;
+    let stages = &tick.stages;
+    let [read, decide, write] = [stages.read_ns, stages.decide_ns, stages.write_ns].map(|ns| f64::from(ns) / 1e3);
     vec![
         row("ticks", tick.number.to_string(), false),
         row("late ticks", format!("{} ({:.3} %)", counters.late_ticks, share * 100.0), share > limits.late_share),
         row("worst", format!("{worst_ms:.2} ms late"), worst_ms > limits.late_ms),
         row("wake-up", micro(&late), percentile(&late, 0.99) > 5e5),
         row("tick takes", micro(&busy), percentile(&busy, 0.99) > 5e5),
-        row("stages, us", stages(&tick.stages), false),
+        row("stages, us", format!("read {read:.0}, decide {decide:.0}, write {write:.0}"), false),
     ]
 }
 
-/// The durations of a tick's stages.
-fn stages(stages: &StageTimes) -> String {
-    let micro = |ns: u32| f64::from(ns) / 1e3;
-    format!(
-        "read {:.0}, decide {:.0}, write {:.0}",
-        micro(stages.read_ns),
-        micro(stages.decide_ns),
-        micro(stages.write_ns)
-    )
-}
-
-/// Histogram of the wake-up latency of the last minute.
 fn lateness_rows(model: &Model, width: usize) -> Vec<HealthRow> {
     let mut counts = [0_u32; CLASSES_US.len() + 1];
     for sample in model.history.samples() {
@@ -142,6 +118,8 @@ fn lateness_rows(model: &Model, width: usize) -> Vec<HealthRow> {
 }
 
 fn recorder_rows(model: &Model) -> Vec<HealthRow> {
+    let recording = &model.session.info.recording;
+    let disk = model.session.arming_checks.iter().find(|item| item.check == ArmingCheck::Disk);
     let counters = &model.snapshot.counters;
     let name = |path: &str| match path.rsplit_once('/') {
         // The end of the path identifies the study and the recording; more has no room.
@@ -150,18 +128,14 @@ fn recorder_rows(model: &Model) -> Vec<HealthRow> {
         None => path.to_owned(),
     };
     vec![
-        row(
-            "recording",
-            name(&model.session.info.recording),
-            model.session.info.recording.is_empty() && model.replay.is_none(),
-        ),
+        row("recording", name(recording), recording.is_empty() && model.replay.is_none()),
         row("study", name(&model.session.info.study), false),
         match &model.recorder {
             Some(RecorderStatus { error: Some(error), .. }) => row("writing", error.clone(), true),
             Some(status) => row("written", written(status, model.snapshot.tick.time_ns), false),
             None => row("written", "-".to_owned(), false),
         },
-        disk_row(model),
+        disk.map_or(row("disk", "-".to_owned(), false), |d| row("disk", d.found.clone(), !d.state.allows())),
         row("not recorded", format!("{} ticks", counters.ticks_not_recorded), counters.ticks_not_recorded > 0),
         row("not shown", format!("{} ticks", counters.ticks_not_shown), false),
         row("refused", format!("{} commands", counters.commands_refused), false),
@@ -175,12 +149,9 @@ fn robot_rows(model: &Model) -> Vec<HealthRow> {
     let mut rows = Vec::new();
     match counters.link {
         Some(link) => rows.extend(link_rows(&link, limits)),
-        None if model.session.is_hardware() => {
-            rows.push(row(
-                "state age",
-                format!("{} ms", counters.state_age_ms),
-                counters.state_age_ms > limits.state_age_ms,
-            ));
+        None if model.session.info.is_hardware() => {
+            let age_ms = counters.state_age_ms;
+            rows.push(row("state age", format!("{age_ms} ms"), age_ms > limits.state_age_ms));
         }
         None => rows.push(row("link", "SIM: no link".to_owned(), false)),
     }
@@ -202,41 +173,22 @@ fn robot_rows(model: &Model) -> Vec<HealthRow> {
     rows
 }
 
-/// Size of the recording and its mean rate.
 fn written(status: &RecorderStatus, time_ns: u64) -> String {
     let megabytes = status.bytes as f64 / 1e6;
     let rate = status.bytes as f64 / 1e3 / (time_ns as f64 / 1e9).max(1.0);
     format!("{megabytes:.1} MB, {rate:.0} kB/s, {} ticks", status.ticks)
 }
 
-/// Free space on the disk, from the arming checks.
-fn disk_row(model: &Model) -> HealthRow {
-    let disk = model.session.arming_checks.iter().find(|item| item.check == ArmingCheck::Disk);
-    match disk {
-        Some(disk) => row("disk", disk.found.clone(), !disk.state.allows()),
-        None => row("disk", "-".to_owned(), false),
-    }
-}
-
 fn link_rows(link: &LinkStatus, limits: &HealthLimits) -> Vec<HealthRow> {
     let loss = 100.0 * link.loss_share();
+    let states = format!("{} Hz, newest {} ms old", link.rate_hz, link.state_age_ms);
+    let unusual = format!("{} out of order, {} duplicate, {} unknown source", link.late, link.duplicate, link.foreign);
+    let broken = format!("{} corrupt ({} in 5 s), {} short", link.corrupt, link.recent_corrupt, link.wrong_length);
     vec![
-        row(
-            "states",
-            format!("{} Hz, newest {} ms old", link.rate_hz, link.state_age_ms),
-            link.state_age_ms > limits.state_age_ms,
-        ),
+        row("states", states, link.state_age_ms > limits.state_age_ms),
         row("lost", format!("{loss:.2} % of 5 s, {} in all", link.lost), loss >= 100.0 * limits.loss_share),
-        row(
-            "unusual",
-            format!("{} out of order, {} duplicate, {} unknown source", link.late, link.duplicate, link.foreign),
-            false,
-        ),
-        row(
-            "broken",
-            format!("{} corrupt ({} in 5 s), {} short", link.corrupt, link.recent_corrupt, link.wrong_length),
-            link.recent_corrupt > 0,
-        ),
+        row("unusual", unusual, false),
+        row("broken", broken, link.recent_corrupt > 0),
         row("sent", format!("{}, failed {}", link.sent, link.send_errors), link.send_errors > 0),
         row("restarts", link.reboots.to_string(), link.reboots > 0),
     ]

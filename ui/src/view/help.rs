@@ -1,12 +1,4 @@
 //! The help overlay, made of the active keymap.
-//!
-//! ```text
-//! ┌ Keys ─────────────────────────────────────────────────────┐
-//! │ Robot                                                     │
-//! │   Space F12   STOP: damp all motors at once, any screen   │
-//! │   A           arm: the robot stands up                    │
-//! └───────────────────────────────────────────────────────────┘
-//! ```
 
 use ratatui::text::Line;
 use strum::VariantArray;
@@ -17,7 +9,6 @@ use crate::legal::legal;
 use crate::model::Model;
 use crate::theme::Role;
 
-/// The lines of the help.
 pub fn lines(model: &Model) -> Vec<Line<'static>> {
     let theme = &model.theme;
     let mut lines = Vec::new();

@@ -1,16 +1,4 @@
 //! View 1, Live: charts of the robot's state, the present proposal and the last trials.
-//!
-//! ```text
-//! roll +0.021 rad    ±0.50   pitch -0.013 rad   ±0.50   Trial 8, by the sampler ────
-//! ⣀⣀⣀⠤⠔⠊⠁⠀⠀⠀⠈⠒⠤⢄⣀          ⣀⣀⣀⣀⣀⣀⣀⣀⣀⣀⣀⣀⣀           f0    1.243 Hz  ├────●─────┤
-//! FR foot z -0.196 m         FL foot z -0.196 m          Fx    118.2 N   ├───────●──┤
-//! ⠤⠤⠤⠤⠤⠤⠤⠤⠤⠤⠤⠤⠤⠤⠤          ⠤⠤⠤⠤⠤⠤⠤⠤⠤⠤⠤⠤⠤           Fz    243.9 N   ├───●──────┤
-//! RR foot z -0.196 m         RL foot z -0.197 m         J over trials ──── best 0.642 m
-//! ⠤⠤⠤⠤⠤⠤⠤⠤⠤⠤⠤⠤⠤⠤⠤          ⠤⠤⠤⠤⠤⠤⠤⠤⠤⠤⠤⠤⠤           o  o x o O
-//!     iifffl                     iifffl
-//!    #  f0 Hz   Fx N    Fz N    J m     verdict  source    cause
-//!    7  1.243   118.2   243.9   0.642   accept   sampler
-//! ```
 
 use quadfrog::robot::{JOINTS, joint_name};
 use ratatui::Frame;
@@ -28,12 +16,10 @@ use crate::model::live::Panel;
 use crate::settings::ChartMode;
 use crate::theme::Role;
 
-/// Width of the right-hand side.
 const SIDE: u16 = 32;
 /// Rows of a chart with its heading, at least.
 const CHART_ROWS: u16 = 3;
 
-/// Draws the view.
 pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let table_rows = (area.height / 4).clamp(5, 14);
     let [upper, table] = Layout::vertical([Constraint::Fill(1), Constraint::Length(table_rows)]).areas(area);
@@ -44,12 +30,10 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let joints_only = model.live.panel == Panel::Joints;
     let room = side.height - card_rows;
     // Without room for both, the panel of the joints shows the robot and the others the objective.
-    let picture_rows = if room >= 18 {
-        12
-    } else if joints_only {
-        room
-    } else {
-        0
+    let picture_rows = match joints_only {
+        _ if room >= 18 => 12,
+        true => room,
+        false => 0,
     };
     let [card, objective_area, picture] =
         Layout::vertical([Constraint::Length(card_rows), Constraint::Fill(1), Constraint::Length(picture_rows)])
@@ -71,7 +55,6 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     trials::render_table(frame, table, model, false);
 }
 
-/// Data of all charts of the view.
 struct ChartSource<'a> {
     history: &'a SignalHistory,
     axis: TimeAxis,

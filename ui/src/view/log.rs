@@ -1,11 +1,4 @@
 //! View 6, Log: events, every request and its outcome, and markers at trials and faults.
-//!
-//! ```text
-//! Log ─────────────────────────────────── 214 lines; F all levels; / search
-//! 00:12.420   operator  approve trial 7: done
-//! 00:15.902 > trial     trial 7: accept, J = 0.642 m
-//! 00:16.110 W operator  override Fx = 180: refused: outside 0 to 150 N
-//! ```
 
 use quadfrog::recording::record::LogLevel;
 use ratatui::Frame;
@@ -18,7 +11,6 @@ use crate::model::Model;
 use crate::model::log::LogLine;
 use crate::theme::{Role, Theme};
 
-/// Draws the view.
 pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let lines: Vec<&LogLine> = model.log_view.lines(&model.session.log).collect();
     let body = heading(frame, area, &model.theme, "Log", &summary(model, lines.len()));
@@ -47,7 +39,7 @@ fn summary(model: &Model, shown: usize) -> String {
 fn line_of(theme: &Theme, line: &LogLine, width: usize) -> Line<'static> {
     let ms = line.time_ns / 1_000_000;
     let time = format!("{:>3}:{:02}.{:03} ", ms / 60_000, ms / 1000 % 60, ms % 1000);
-    let (mark, role) = match line.level {
+    let (symbol, role) = match line.level {
         LogLevel::Error => ("E", Role::Bad),
         LogLevel::Warning => ("W", Role::Warning),
         LogLevel::Info if line.marker => (">", Role::Heading),
@@ -55,7 +47,7 @@ fn line_of(theme: &Theme, line: &LogLine, width: usize) -> Line<'static> {
     };
     Line::from(vec![
         span(theme, Role::Quiet, time),
-        span(theme, role, format!("{mark} ")),
+        span(theme, role, format!("{symbol} ")),
         span(theme, Role::Quiet, format!("{:<9} ", cut(&line.source, 9))),
         match line.level {
             LogLevel::Info => Span::raw(cut(&line.text, width.saturating_sub(23))),

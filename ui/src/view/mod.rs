@@ -12,7 +12,7 @@
 //! ```
 
 mod arming;
-pub mod chart;
+mod chart;
 mod densities;
 mod details;
 mod dialogs;

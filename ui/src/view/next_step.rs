@@ -1,8 +1,4 @@
 //! The last line: the operator's next possible step.
-//!
-//! ```text
-//!  Press g twice to jump  ·  o override  ·  n skip  ·  D sit down
-//! ```
 
 use quadfrog::telemetry::Mode;
 use quadfrog::trial::{ExperimentStage, Verdict};
@@ -49,106 +45,63 @@ fn step(lead: impl Into<String>, model: &Model, others: &[(Action, &'static str)
 
 fn live(model: &Model) -> NextStep {
     let key = |action| model.keymap.key(action);
-    let quit = (Action::Quit, "quit");
+    let session = &model.session;
+    let (stage, finished) = (session.stage.map(|info| info.stage), session.stage_is(ExperimentStage::Finished));
+    let (sit_down, undo, quit) = ((Action::SitDown, "sit down"), (Action::Undo, "undo"), (Action::Quit, "quit"));
+    let change = (Action::Override, "override");
     match model.mode() {
-        Mode::Countdown => return step("Countdown to the jump: any key cancels it.", model, &[]),
-        Mode::StandUp => return step("Standing up.", model, &[(Action::SitDown, "sit down")]),
-        Mode::Jump => return step("Jumping.", model, &[]),
-        Mode::Settle => return step("Landed; waiting until the robot is quiet.", model, &[]),
-        Mode::SitDown => return step("Sitting down.", model, &[]),
-        _ => {}
-    }
-    let stage = model.session.stage.map(|info| info.stage);
-    if stage == Some(ExperimentStage::Review) {
-        return review(model);
-    }
-    match model.mode() {
-        Mode::Damped | Mode::Fault => {
-            let stopped = if model.mode() == Mode::Fault { "FAULT" } else { "STOPPED" };
-            let because = match model.session.stopped_because.as_str() {
-                "" => String::new(),
-                because => format!(": {because}"),
-            };
+        Mode::Countdown => step("Countdown to the jump: any key cancels it.", model, &[]),
+        Mode::StandUp => step("Standing up.", model, &[sit_down]),
+        Mode::Jump => step("Jumping.", model, &[]),
+        Mode::Settle => step("Landed; waiting until the robot is quiet.", model, &[]),
+        Mode::SitDown => step("Sitting down.", model, &[]),
+        _ if stage == Some(ExperimentStage::Review) => review(model),
+        mode @ (Mode::Damped | Mode::Fault) => {
+            let stopped = if mode == Mode::Fault { "FAULT" } else { "STOPPED" };
+            let cause = &session.stopped_because;
+            let because = if cause.is_empty() { String::new() } else { format!(": {cause}") };
             // The key first: a long reason may be cut.
             let lead = format!("{stopped}; check the robot, then {} acknowledges{because}", key(Action::Acknowledge));
-            step(lead, model, &[(Action::Undo, "undo"), quit])
+            step(lead, model, &[undo, quit])
         }
         Mode::Offline | Mode::Observe => step("Waiting for the robot to answer.", model, &[quit]),
-        Mode::Disarmed if stage == Some(ExperimentStage::Finished) => step(
-            "The study is finished.",
-            model,
-            &[
-                (Action::Continue, "more trials"),
-                (Action::ConfirmBest, "confirm best"),
-                (Action::ExportBest, "export"),
-                (Action::Undo, "undo"),
-                quit,
-            ],
-        ),
-        Mode::Disarmed if model.session.arming_checks.is_empty() => step(
-            "Checking the robot.",
-            model,
-            &[(Action::Override, "override"), (Action::Undo, "undo"), (Action::Help, "help"), quit],
-        ),
-        Mode::Disarmed if model.session.failing_checks() > 0 => step(
-            format!(
-                "Not ready to arm: {} checks have not passed. {} shows them.",
-                model.session.failing_checks(),
-                key(Action::ArmingChecks)
-            ),
-            model,
-            &[(Action::Override, "override"), (Action::Undo, "undo"), (Action::Help, "help"), quit],
-        ),
-        Mode::Disarmed => step(
-            format!("Press {} to arm: the robot stands up.", key(Action::Arm)),
-            model,
-            &[(Action::Override, "override"), (Action::Undo, "undo"), (Action::Help, "help"), quit],
-        ),
-        Mode::Ready if stage == Some(ExperimentStage::Finished) => step(
-            "The study is finished.",
-            model,
-            &[
-                (Action::Continue, "more trials"),
-                (Action::ConfirmBest, "confirm best"),
-                (Action::ExportBest, "export"),
-                (Action::SitDown, "sit down"),
-                (Action::Undo, "undo"),
-            ],
-        ),
-        Mode::Ready if model.session.open_proposal().is_some() => step(
-            format!("Press {} twice to jump.", key(Action::Approve)),
-            model,
-            &[
-                (Action::Override, "override"),
-                (Action::Skip, "skip"),
-                (Action::Undo, "undo"),
-                (Action::SitDown, "sit down"),
-            ],
-        ),
-        _ => step("The sampler is choosing the next trial.", model, &[(Action::SitDown, "sit down")]),
+        mode @ (Mode::Disarmed | Mode::Ready) if finished => {
+            let more = [(Action::Continue, "more trials"), (Action::ConfirmBest, "confirm best")];
+            let rest = if mode == Mode::Disarmed { [undo, quit] } else { [sit_down, undo] };
+            step("The study is finished.", model, &[&more[..], &[(Action::ExportBest, "export")], &rest].concat())
+        }
+        Mode::Disarmed => {
+            let lead = match session.failing_checks() {
+                _ if session.arming_checks.is_empty() => "Checking the robot.".to_owned(),
+                0 => format!("Press {} to arm: the robot stands up.", key(Action::Arm)),
+                failing => {
+                    let shows = key(Action::ArmingChecks);
+                    format!("Not ready to arm: {failing} checks have not passed. {shows} shows them.")
+                }
+            };
+            step(lead, model, &[change, undo, (Action::Help, "help"), quit])
+        }
+        Mode::Ready if session.open_proposal().is_some() => {
+            let lead = format!("Press {} twice to jump.", key(Action::Approve));
+            step(lead, model, &[change, (Action::Skip, "skip"), undo, sit_down])
+        }
+        _ => step("The sampler is choosing the next trial.", model, &[sit_down]),
     }
 }
 
 fn review(model: &Model) -> NextStep {
-    let key = |action| model.keymap.key(action);
-    let lead = match model.session.under_review().and_then(|trial| trial.suggested) {
-        Some(Verdict::Accept) => format!("Judge it: {} accept (suggested)", key(Action::Accept)),
-        Some(Verdict::Fall) => format!("Judge it: {} fall (suggested)", key(Action::Fall)),
-        Some(Verdict::Void) => format!("Judge it: {} void (suggested)", key(Action::Void)),
+    let suggested = model.session.under_review().and_then(|trial| trial.suggested);
+    let verdicts = [(Action::Accept, Verdict::Accept), (Action::Fall, Verdict::Fall), (Action::Void, Verdict::Void)];
+    let (first, others): (Vec<_>, Vec<_>) = verdicts.into_iter().partition(|(_, verdict)| Some(*verdict) == suggested);
+    let lead = match first.first() {
+        Some((action, verdict)) => {
+            format!("Judge it: {} {} (suggested)", model.keymap.key(*action), verdict.name())
+        }
         None => "Judge it".to_owned(),
     };
-    let suggested = model.session.under_review().and_then(|trial| trial.suggested);
-    let mut verdicts = vec![(Action::Accept, "accept"), (Action::Fall, "fall"), (Action::Void, "void")];
-    verdicts.retain(|(action, _)| {
-        !matches!(
-            (action, suggested),
-            (Action::Accept, Some(Verdict::Accept))
-                | (Action::Fall, Some(Verdict::Fall))
-                | (Action::Void, Some(Verdict::Void))
-        )
-    });
-    verdicts.extend([(Action::Rerun, "re-run"), (Action::HandValue, "value by hand"), (Action::Note, "note")]);
-    step(lead, model, &verdicts)
+    let mut others: Vec<_> = others.into_iter().map(|(action, verdict)| (action, verdict.name())).collect();
+    others.extend([(Action::Rerun, "re-run"), (Action::HandValue, "value by hand"), (Action::Note, "note")]);
+    step(lead, model, &others)
 }
 
 fn replay(model: &Model) -> NextStep {
@@ -170,46 +123,38 @@ fn replay(model: &Model) -> NextStep {
 }
 
 fn in_dialog(model: &Model, dialog: &Dialog) -> NextStep {
-    let plain = |lead: String| NextStep { lead, others: Vec::new() };
-    match dialog {
-        Dialog::Approve { trial, .. } => plain(format!(
-            "Press {} again to jump (trial #{trial}). Any other key cancels.",
-            model.keymap.key(Action::Approve)
-        )),
+    let key = |action| model.keymap.key(action);
+    let lead = match dialog {
+        Dialog::Approve { trial, .. } => {
+            format!("Press {} again to jump (trial #{trial}). Any other key cancels.", key(Action::Approve))
+        }
         Dialog::Arm { typed } => {
-            let word = model.session.arming_word();
-            let left = word.get(*typed..).unwrap_or_default();
-            plain(format!("Type {left} to stand the robot up. Any other key cancels."))
+            let left = model.session.arming_confirmation().get(*typed..).unwrap_or_default();
+            format!("Type {left} to stand the robot up. Any other key cancels.")
         }
         Dialog::ArmingChecks { .. } => {
-            let arm = if legal(Action::Arm, model).is_ok() {
-                format!(" {} arms.", model.keymap.key(Action::Arm))
-            } else {
-                String::new()
-            };
-            plain(format!("Up Down choose an item, x confirms it, Enter closes.{arm}"))
+            let arms = legal(Action::Arm, model).map_or(String::new(), |()| format!(" {} arms.", key(Action::Arm)));
+            format!("Up Down choose an item, x confirms it, Enter closes.{arms}")
         }
-        Dialog::Quit => plain("Press y to quit. Any other key cancels.".to_owned()),
-        Dialog::Override(form) if form.typing.is_some() => {
-            plain("Enter takes the value and applies. Esc drops it.".to_owned())
+        Dialog::Override(form) if form.typing.is_none() => {
+            let queue = key(Action::QueuePoint);
+            format!("Type, or Left Right 1 %, PgUp PgDn 10 %. Enter applies, {queue} queues, Esc cancels.")
         }
-        Dialog::Override(_) => {
-            let queue = model.keymap.key(Action::QueuePoint);
-            plain(format!("Type, or Left Right 1 %, PgUp PgDn 10 %. Enter applies, {queue} queues, Esc cancels."))
-        }
+        Dialog::Override(_) => "Enter takes the value and applies. Esc drops it.".to_owned(),
+        Dialog::Quit => "Press y to quit. Any other key cancels.".to_owned(),
         Dialog::Field { purpose: Purpose::Note(_), .. } if model.robot_needs_us() => {
-            plain("Enter saves the note, Esc cancels. Armed: Space is STOP, _ writes a space.".to_owned())
+            "Enter saves the note, Esc cancels. Armed: Space is STOP, _ writes a space.".to_owned()
         }
-        Dialog::Field { .. } => plain("Enter confirms, Esc cancels.".to_owned()),
-        Dialog::Palette { .. } => plain("Type to filter, Up Down choose, Enter does it, Esc closes.".to_owned()),
-        Dialog::Choose { .. } => plain("Up Down choose, x switches it on or off, Enter closes.".to_owned()),
-        Dialog::Help { .. } => plain("Up Down scroll, any other key closes.".to_owned()),
-        Dialog::Details { .. } => plain("Up Down other trials, Esc closes.".to_owned()),
-    }
+        Dialog::Field { .. } => "Enter confirms, Esc cancels.".to_owned(),
+        Dialog::Palette { .. } => "Type to filter, Up Down choose, Enter does it, Esc closes.".to_owned(),
+        Dialog::Choose { .. } => "Up Down choose, x switches it on or off, Enter closes.".to_owned(),
+        Dialog::Help { .. } => "Up Down scroll, any other key closes.".to_owned(),
+        Dialog::Details { .. } => "Up Down other trials, Esc closes.".to_owned(),
+    };
+    NextStep { lead, others: Vec::new() }
 }
 
-/// Draws the line.
-pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
+pub(super) fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let theme = &model.theme;
     let next = next_step(model);
     let mut left = usize::from(area.width).saturating_sub(next.lead.chars().count() + 1);

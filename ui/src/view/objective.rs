@@ -1,12 +1,4 @@
 //! The objective over the trials, with the best so far.
-//!
-//! ```text
-//! J over trials ───────────── best 0.642 m
-//! 0.642            *────────
-//!             o────
-//!          o           o
-//! 0    ─x──────x──x───
-//! ```
 
 use quadfrog::trial::{TrialRecord, Verdict};
 use ratatui::Frame;
@@ -17,10 +9,8 @@ use crate::model::session::SessionModel;
 use crate::model::trials::accepted_value;
 use crate::theme::{Role, Theme};
 
-/// Width of the numbers at the left.
 const SCALE: u16 = 6;
 
-/// Draws the panel.
 pub fn render(frame: &mut Frame, area: Rect, session: &SessionModel, theme: &Theme) {
     let best = session.trials.best();
     let aside = match best.and_then(|trial| Some((trial.trial, trial.value?))) {
@@ -60,12 +50,12 @@ pub fn render(frame: &mut Frame, area: Rect, session: &SessionModel, theme: &The
         buffer.set_string(from, row(value), line, theme.style(Role::Quiet));
     }
     for trial in session.trials.records.values() {
-        let (mark, role) = sign(trial.verdict);
+        let (symbol, role) = sign(trial.verdict);
         let y = match trial.verdict {
             Some(Verdict::Void) => bottom,
             _ => row(trial.value.or(trial.hand_value).unwrap_or(0.0)),
         };
-        buffer.set_string(column(trial.trial), y, mark, theme.style(role));
+        buffer.set_string(column(trial.trial), y, symbol, theme.style(role));
     }
     if let Some((trial, value)) = best.and_then(|best| Some((best, accepted_value(best)?))) {
         buffer.set_string(column(trial.trial), row(value), "*", theme.style(Role::Good));

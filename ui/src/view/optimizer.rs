@@ -1,14 +1,4 @@
 //! View 3, Optimizer: objective over trials and parameters, TPE's densities, landing places.
-//!
-//! ```text
-//! J over trials ──────── best 0.642 m   Landings, from above ─── x forward, y left
-//!         *───                                  o
-//!    o──                                      o * x
-//! f0 ─────────────  Fx ────────────────  Fz ───────────────
-//!    o  *             o   *                o *
-//! x      x          x   x               x      x
-//! 0.75       1.75   0         150       150        350
-//! ```
 
 use quadfrog::trial::Verdict;
 use ratatui::Frame;
@@ -20,7 +10,6 @@ use super::{densities, objective, points};
 use crate::model::session::SessionModel;
 use crate::theme::{Role, Theme};
 
-/// Draws the view.
 pub fn render(frame: &mut Frame, area: Rect, session: &SessionModel, theme: &Theme) {
     let repeated = points::lines(session, theme, usize::from(area.width));
     // Repeats have rows of their own where there are any to spare.
@@ -86,9 +75,9 @@ fn render_scatter(frame: &mut Frame, area: Rect, session: &SessionModel, theme: 
     for trial in trials {
         let Some(value) = trial.parameters.get(&info.name) else { continue };
         let Some(objective) = trial.value else { continue };
-        let (mark, role) = sign(trial.verdict);
-        let mark = if best == Some(trial.trial) { "*" } else { mark };
-        buffer.set_string(column(value), row(objective), mark, theme.style(role));
+        let (symbol, role) = sign(trial.verdict);
+        let symbol = if best == Some(trial.trial) { "*" } else { symbol };
+        buffer.set_string(column(value), row(objective), symbol, theme.style(role));
     }
     let (low, high) = (number(info.low), number(info.high));
     buffer.set_string(scale.x, scale.y, &low, theme.style(Role::Quiet));
@@ -131,10 +120,10 @@ fn render_landings(frame: &mut Frame, area: Rect, session: &SessionModel, theme:
     let mut landings: Vec<_> = landed().collect();
     landings.sort_by_key(|(trial, _)| best == Some(trial.trial));
     for (trial, m) in landings {
-        let (mark, role) = sign(trial.verdict);
-        let mark = if best == Some(trial.trial) { "*" } else { mark };
+        let (symbol, role) = sign(trial.verdict);
+        let symbol = if best == Some(trial.trial) { "*" } else { symbol };
         let (x, y) = place(m.dx_m, m.dy_m);
-        buffer.set_string(x, y, mark, theme.style(role));
+        buffer.set_string(x, y, symbol, theme.style(role));
     }
     let text = if landed().next().is_none() { "none yet".to_owned() } else { format!("scale {} m", number(reach)) };
     buffer.set_string(body.x, body.y, text, theme.style(Role::Quiet));

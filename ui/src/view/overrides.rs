@@ -1,15 +1,4 @@
 //! View 4, Override: the proposal with its bounds, the controller's gains, and the actions on the selected one.
-//!
-//! ```text
-//! Trial #8, by: sampler ─────────────────────────────────────────────────
-//!   f0    1.243 Hz     0.750 [-----o-----] 1.750
-//! > Fx    120.0 N      0.000 [--------o--] 150.0    proposed was 118.2
-//! Gains of the controller, for this trial ───────────────────────────────
-//!   kp    400.0 N/m    100.0 [---o-------] 1000
-//! Actions ───────────────────────────────────────────────────────────────
-//!   o  change values and gains
-//!   X  fix Fx at 120.0 N for the next trials
-//! ```
 
 use quadfrog::trial::{ParameterInfo, ProposedParameter};
 use ratatui::Frame;
@@ -23,27 +12,24 @@ use crate::legal::legal;
 use crate::model::Model;
 use crate::theme::Role;
 
-/// Draws the view.
 pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let theme = &model.theme;
     let proposal = model.session.open_proposal();
-    let values = |values: Option<&[ProposedParameter]>, name: &str| {
-        values.and_then(|values| values.iter().find(|p| p.name == *name)).cloned()
-    };
-    let mut rows: Vec<Line> = Vec::new();
+    let value = |values: &[ProposedParameter], name: &str| values.iter().find(|p| p.name == *name).cloned();
     let parameters = &model.session.info.parameters;
-    for (index, info) in parameters.iter().enumerate() {
-        let value = values(proposal.map(|p| p.parameters.as_slice()), &info.name);
+    let line = |(index, info): (usize, &ParameterInfo)| {
+        let value = proposal.and_then(|p| value(&p.parameters, &info.name));
         let present = model.session.parameter(&info.name).unwrap_or_else(|| info.clone());
         let mut spans = row(model, index, &present, value.as_ref());
         spans.extend(search_state(model, info));
-        rows.push(Line::from(spans));
-    }
-    let mut gains: Vec<Line> = Vec::new();
-    for (index, info) in model.session.info.gains.iter().enumerate() {
-        let value = values(proposal.map(|p| p.gains.as_slice()), &info.name);
-        gains.push(Line::from(row(model, parameters.len() + index, info, value.as_ref())));
-    }
+        Line::from(spans)
+    };
+    let rows: Vec<Line> = parameters.iter().enumerate().map(line).collect();
+    let gain = |(index, info): (usize, &ParameterInfo)| {
+        let value = proposal.and_then(|p| value(&p.gains, &info.name));
+        Line::from(row(model, parameters.len() + index, info, value.as_ref()))
+    };
+    let gains: Vec<Line> = model.session.info.gains.iter().enumerate().map(gain).collect();
     let title = match proposal {
         Some(proposal) => format!("Trial #{}, by: {}", proposal.trial, proposal.source.name()),
         None => "Parameters".to_owned(),
@@ -65,7 +51,6 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     frame.render_widget(Paragraph::new(actions(model, usize::from(body.width))), body);
 }
 
-/// One value with its place in its range.
 fn row(model: &Model, index: usize, info: &ParameterInfo, p: Option<&ProposedParameter>) -> Vec<Span<'static>> {
     let theme = &model.theme;
     let selected = index == model.override_row;

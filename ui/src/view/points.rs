@@ -1,9 +1,4 @@
 //! Points that ran more than once: landed repeats of all, mean, standard deviation, and the confidence of the leading one.
-//!
-//! ```text
-//! #3    3/3  0.641 m +-0.012  leads, 96 %
-//! #11   2/3  0.520 m +-0.301
-//! ```
 
 use quadfrog::trial::PointRecord;
 use ratatui::text::{Line, Span};

@@ -1,14 +1,5 @@
 //! The trial panel: the proposal before the jump, the parameters while it runs, the measured values after it, and the
 //! best parameters when the study is finished.
-//!
-//! ```text
-//! Trial #8, by the sampler ──────      Trial #8: judge it ────────────
-//!  f0    1.243 Hz   [----o-----]        J     0.642 m
-//!  Fx    118.2 N    [-------o--]        dx   +0.642 m   dy   -0.012 m
-//!  Fz    243.9 N    [---o------]        yaw  +0.031 rad
-//!  1 of the 5 nearest fell; nearest     rise +0.412 m   air   0.330 s
-//!  fall #3, normalised distance 0.21    suggested verdict: accept
-//! ```
 
 use quadfrog::trial::{ExperimentStage, FallRisk, Proposal, ProposalSource, ProposedParameter, TrialRecord, Verdict};
 use ratatui::Frame;
@@ -23,7 +14,6 @@ use crate::model::Model;
 use crate::model::session::SessionModel;
 use crate::theme::{Role, Theme};
 
-/// The rows that the panel needs.
 pub fn rows(session: &SessionModel) -> u16 {
     let parameters = session.info.parameters.len().clamp(3, 6) as u16;
     let changed = |proposal: &Proposal| proposal.gains.iter().filter(|gain| gain.value != gain.proposed).count();
@@ -37,7 +27,6 @@ pub fn rows(session: &SessionModel) -> u16 {
     parameters + 4 + gains + repeats
 }
 
-/// Draws the panel.
 pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let (title, lines) = content(model, usize::from(area.width));
     let body = heading(frame, area, &model.theme, &title, "");
@@ -53,18 +42,16 @@ fn content(model: &Model, width: usize) -> (String, Vec<Line<'static>>) {
     match (stage, &session.proposal) {
         (Some(ExperimentStage::Finished), _) => ("Study finished".to_owned(), finished(model, width)),
         (_, Some(proposal)) => {
-            let running = stage == Some(ExperimentStage::Running);
-            let title = match (running, proposal.source, proposal.parent) {
-                (true, _, _) => format!("Trial #{} runs", proposal.trial),
-                (false, ProposalSource::Sampler, _) => format!("Trial #{}, by the sampler", proposal.trial),
-                (false, ProposalSource::Operator, _) => format!("Trial #{}, overridden", proposal.trial),
-                (false, ProposalSource::Rerun, Some(parent)) => {
-                    format!("Trial #{}, re-run of #{parent}", proposal.trial)
-                }
-                (false, ProposalSource::Rerun, None) => format!("Trial #{}, a re-run", proposal.trial),
-                (false, ProposalSource::Confirm, _) => format!("Trial #{}, to confirm the best", proposal.trial),
-                (false, ProposalSource::Queued, _) => format!("Trial #{}, from the queue", proposal.trial),
+            let cause = match (proposal.source, proposal.parent) {
+                _ if stage == Some(ExperimentStage::Running) => " runs".to_owned(),
+                (ProposalSource::Sampler, _) => ", by the sampler".to_owned(),
+                (ProposalSource::Operator, _) => ", overridden".to_owned(),
+                (ProposalSource::Rerun, Some(parent)) => format!(", re-run of #{parent}"),
+                (ProposalSource::Rerun, None) => ", a re-run".to_owned(),
+                (ProposalSource::Confirm, _) => ", to confirm the best".to_owned(),
+                (ProposalSource::Queued, _) => ", from the queue".to_owned(),
             };
+            let title = format!("Trial #{}{cause}", proposal.trial);
             let mut lines: Vec<Line> =
                 proposal.parameters.iter().map(|p| parameter(session, theme, p, width)).collect();
             let changed = proposal.gains.iter().filter(|gain| gain.value != gain.proposed);
@@ -80,7 +67,6 @@ fn content(model: &Model, width: usize) -> (String, Vec<Line<'static>>) {
     }
 }
 
-/// One parameter with its place between the bounds.
 fn parameter(session: &SessionModel, theme: &Theme, p: &ProposedParameter, width: usize) -> Line<'static> {
     let info = session.parameter(&p.name).or_else(|| session.gain(&p.name).cloned());
     let unit = info.as_ref().map_or("", |info| info.unit.as_str());
@@ -128,18 +114,9 @@ fn review(session: &SessionModel, theme: &Theme, trial: &TrialRecord) -> Vec<Lin
         None => lines.push(Line::from(label(" nothing was measured"))),
     }
     if let Some(m) = trial.measured {
-        lines.push(Line::from(vec![
-            label(" dx   "),
-            Span::raw(format!("{:+.3} m", m.dx_m)),
-            label("  dy  "),
-            Span::raw(format!("{:+.3} m", m.dy_m)),
-        ]));
-        lines.push(Line::from(vec![
-            label(" rise "),
-            Span::raw(format!("{:+.3} m", m.apex_m)),
-            label("  air "),
-            Span::raw(format!(" {:.3} s", m.air_s)),
-        ]));
+        let pair = |a, x, b, y| Line::from(vec![label(a), Span::raw(x), label(b), Span::raw(y)]);
+        lines.push(pair(" dx   ", format!("{:+.3} m", m.dx_m), "  dy  ", format!("{:+.3} m", m.dy_m)));
+        lines.push(pair(" rise ", format!("{:+.3} m", m.apex_m), "  air ", format!(" {:.3} s", m.air_s)));
         lines.push(Line::from(vec![label(" yaw  "), Span::raw(format!("{:+.3} rad", m.dyaw_rad))]));
     }
     if let Some(verdict) = trial.suggested {
@@ -165,17 +142,12 @@ fn finished(model: &Model, width: usize) -> Vec<Line<'static>> {
         let p = ProposedParameter { name: name.clone(), value: *value, proposed: *value };
         lines.push(parameter(session, theme, &p, width));
     }
-    let offer = |action: Action, text: &'static str| {
-        vec![
-            Span::raw(" "),
-            span(theme, Role::Key, model.keymap.key(action)),
-            span(theme, Role::Quiet, format!(" {text} ")),
-        ]
+    let offers = [(Action::Continue, "more"), (Action::ConfirmBest, "confirm"), (Action::ExportBest, "export")];
+    let offer = |(action, text)| {
+        let (key, text) = (model.keymap.key(action), format!(" {text} "));
+        [Span::raw(" "), span(theme, Role::Key, key), span(theme, Role::Quiet, text)]
     };
-    let mut last = offer(Action::Continue, "more");
-    last.extend(offer(Action::ConfirmBest, "confirm"));
-    last.extend(offer(Action::ExportBest, "export"));
-    lines.push(Line::from(last));
+    lines.push(Line::from_iter(offers.into_iter().flat_map(offer)));
     lines.extend(points::lines(session, theme, width));
     lines
 }

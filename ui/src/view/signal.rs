@@ -9,13 +9,11 @@ use crate::theme::Role;
 /// Drawing of a series.
 #[derive(Clone, Copy)]
 pub struct Signal {
-    /// The series.
     pub series: Series,
     /// Its value in a sample.
     pub value: fn(&ChartSample) -> f32,
     /// Ranges, narrowest first; the first one that holds the window's values is drawn.
     pub ranges: &'static [(f32, f32)],
-    /// Its colour.
     pub role: Role,
     /// The foot whose contact lamp stands beside the name.
     pub foot: Option<Leg>,
@@ -27,7 +25,6 @@ const FORCE: &[(f32, f32)] = &[(0.0, 100.0), (0.0, 400.0), (0.0, 1000.0)];
 const HEIGHT: &[(f32, f32)] = &[(0.0, 0.5), (0.0, 1.0), (0.0, 2.0)];
 const TURN: &[(f32, f32)] = &[(0.0, 6.3)];
 
-/// The drawing of `series`.
 pub fn signal(series: Series) -> Signal {
     let base = |value, ranges, role| Signal { series, value, ranges, role, foot: None };
     let foot = |leg: Leg, value| Signal { foot: Some(leg), ..base(value, FOOT, role_of(leg)) };
@@ -48,7 +45,6 @@ pub fn signal(series: Series) -> Signal {
     }
 }
 
-/// The colour of front and rear legs.
 const fn role_of(leg: Leg) -> Role {
     match leg {
         Leg::FR | Leg::FL => Role::SeriesA,

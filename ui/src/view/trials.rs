@@ -1,11 +1,4 @@
 //! View 2, Trials: the whole table. Its newest rows are the lower part of Live.
-//!
-//! ```text
-//! Trials ──────────────── 12 accept, 5 fall, 1 void; by number; all; F filter s sort
-//!    #  f0 Hz   Fx N    Fz N    J m     verdict  source    cause and note
-//!    6  1.102    91.2   301.4   0.000 x fall     sampler   roll 1.21 rad, allowed 1.00
-//!    7  1.243   118.2   243.9   0.642 o accept * sampler   | slid on the mat
-//! ```
 
 use quadfrog::trial::{TrialRecord, Verdict};
 use ratatui::Frame;
@@ -23,7 +16,6 @@ use crate::model::trials::{SortBy, measured};
 use crate::text::remark;
 use crate::theme::Role;
 
-/// Draws the view.
 pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let body = heading(frame, area, &model.theme, "Trials", &summary(model));
     render_table(frame, body, model, true);
@@ -56,14 +48,12 @@ fn summary(model: &Model) -> String {
     )
 }
 
-/// One column as drawn.
 struct ShownColumn {
     title: String,
     width: usize,
     cell: CellContent,
 }
 
-/// Content of a cell.
 enum CellContent {
     Parameter(String),
     Of(Column),
@@ -148,7 +138,6 @@ pub fn render_table(frame: &mut Frame, area: Rect, model: &Model, full: bool) {
     }
 }
 
-/// Text as wide as its column.
 fn padded(text: &str, width: usize) -> String {
     let text = cut(text, width);
     // The last column takes the rest of the line and needs no filling.
@@ -164,48 +153,33 @@ fn render_empty(frame: &mut Frame, area: Rect, model: &Model) {
     if model.replay.is_some() || model.session.info.observe {
         return frame.render_widget(Line::from(span(theme, Role::Quiet, "     no trial yet")), area);
     }
-    let step = |number: &str, words: &[(Action, &'static str)]| {
+    let step = |number: &str, keys: &[(Action, &'static str)]| {
         let mut spans = vec![span(theme, Role::Quiet, format!("   {number} "))];
-        for (action, text) in words {
+        for (action, text) in keys {
             spans.push(span(theme, Role::Key, model.keymap.all_keys(*action)));
             spans.push(span(theme, Role::Quiet, format!(" {text}   ")));
         }
         Line::from(spans)
     };
-    let stop = Line::from(vec![
-        span(theme, Role::Quiet, "   always "),
-        span(theme, Role::Key, model.keymap.all_keys(Action::Stop)),
-        span(theme, Role::Quiet, " STOP: damp all motors at once   "),
-        span(theme, Role::Key, model.keymap.key(Action::Quit)),
-        span(theme, Role::Quiet, " quit   "),
-        span(theme, Role::Key, model.keymap.key(Action::Help)),
-        span(theme, Role::Quiet, " all keys"),
-    ]);
+    let judge = [(Action::Accept, "accept"), (Action::Fall, "fall"), (Action::Void, "void"), (Action::Rerun, "re-run")];
     let lines = vec![
         step("before", &[(Action::Arm, "arm: it stands up"), (Action::Override, "override"), (Action::Skip, "skip")]),
         step("jump  ", &[(Action::Approve, "approve; again after 0.8 s: the robot jumps")]),
+        step("after ", &[&judge[..], &[(Action::Undo, "undo")]].concat()),
         step(
-            "after ",
-            &[
-                (Action::Accept, "accept"),
-                (Action::Fall, "fall"),
-                (Action::Void, "void"),
-                (Action::Rerun, "re-run"),
-                (Action::Undo, "undo"),
-            ],
+            "always",
+            &[(Action::Stop, "STOP: damp all motors at once"), (Action::Quit, "quit"), (Action::Help, "all keys")],
         ),
-        stop,
     ];
     frame.render_widget(Paragraph::new(lines), area);
 }
 
-/// Text and role of a cell.
 fn cell(model: &Model, trial: &TrialRecord, column: &ShownColumn, best: bool) -> (String, Role) {
     let (symbol, role) = sign(trial.verdict);
     let column = match &column.cell {
         CellContent::Parameter(name) => {
-            let value = trial.parameters.iter().find(|(known, _)| known == name);
-            return (format!("{:>7}", value.map_or("-".to_owned(), |(_, value)| number(*value))), Role::Text);
+            let value = trial.parameters.get(name);
+            return (format!("{:>7}", value.map_or("-".to_owned(), number)), Role::Text);
         }
         CellContent::Of(column) => *column,
     };

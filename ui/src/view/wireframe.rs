@@ -1,11 +1,4 @@
 //! The robot as a wireframe, from the side and from above.
-//!
-//! ```text
-//! Robot ─────────────── FR# FL# RR# RL#
-//!      ⡤⠤⠤⠤⠤⠤⠤⠤⡄          ⡏⠉⠉⠉⠉⢹
-//!     ⢰⠁      ⢰⠁          ⡇    ⢸
-//!      ⠣⡀      ⠣⡀         ⣇⣀⣀⣀⣀⣸
-//! ```
 
 use nalgebra::{UnitQuaternion, Vector3};
 use quadfrog::robot::description::RobotDescription;
@@ -31,7 +24,6 @@ fn leg_points(robot: &RobotDescription, leg: Leg, q: &Vector3<f64>) -> [Vector3<
     [hip, end(0.0, 0.0), end(geometry.thigh, 0.0), end(geometry.thigh, geometry.calf)]
 }
 
-/// Draws the panel.
 pub fn render(frame: &mut Frame, area: Rect, robot: Option<&RobotDescription>, tick: &Tick, theme: &Theme) {
     let lamps = Leg::ALL.map(|leg| format!("{}{}", leg.name(), theme.lamp(tick.estimate.contact[leg as usize])));
     let body = heading(frame, area, theme, "Robot", &lamps.join(" "));

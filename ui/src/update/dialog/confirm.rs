@@ -32,11 +32,11 @@ pub(super) fn approve_key(
 }
 
 pub(super) fn arm_key(model: &mut Model, key: Key, typed: usize) -> Vec<Effect> {
-    let word = model.session.arming_word();
-    if key.typed() != word.chars().nth(typed) {
+    let letters = model.session.arming_confirmation();
+    if key.typed() != letters.chars().nth(typed) {
         return cancelled(model, "not armed");
     }
-    if typed + 1 < word.len() {
+    if typed + 1 < letters.len() {
         model.dialog = Some(Dialog::Arm { typed: typed + 1 });
         return Vec::new();
     }

@@ -62,15 +62,15 @@ pub(super) fn help_key(model: &mut Model, key: Key, scroll: usize) -> Vec<Effect
 }
 
 /// Switches in a list, which stays open; the change shows at once.
-pub(super) fn choice_key(model: &mut Model, key: Key, what: Choice, mut selected: usize) -> Vec<Effect> {
-    let last = model.choices(what).len().saturating_sub(1);
+pub(super) fn choice_key(model: &mut Model, key: Key, subject: Choice, mut selected: usize) -> Vec<Effect> {
+    let last = model.choices(subject).len().saturating_sub(1);
     match key.code() {
         KeyCode::Esc | KeyCode::Enter => return Vec::new(),
         KeyCode::Up => selected = selected.saturating_sub(1),
         KeyCode::Down => selected = (selected + 1).min(last),
         KeyCode::Home => selected = 0,
         KeyCode::End => selected = last,
-        KeyCode::Left | KeyCode::Right | KeyCode::Char('x') => match what {
+        KeyCode::Left | KeyCode::Right | KeyCode::Char('x') => match subject {
             Choice::Series => {
                 model.live.panel = Panel::Charts;
                 toggle(&mut model.live.series, selected);
@@ -79,7 +79,7 @@ pub(super) fn choice_key(model: &mut Model, key: Key, what: Choice, mut selected
         },
         _ => {}
     }
-    model.dialog = Some(Dialog::Choose { what, selected });
+    model.dialog = Some(Dialog::Choose { subject, selected });
     Vec::new()
 }
 
@@ -101,22 +101,19 @@ pub(super) fn action_over_details(model: &Model, key: Key) -> Option<Action> {
 }
 
 pub(super) fn details_key(model: &mut Model, key: Key, trial: u32, scroll: usize) -> Vec<Effect> {
-    let neighbour = match key.code() {
-        KeyCode::PageUp | KeyCode::PageDown => {
-            // The drawing stops at the last line.
-            let scroll = match key.code() {
-                KeyCode::PageUp => scroll.saturating_sub(DETAILS_PAGE),
-                _ => scroll + DETAILS_PAGE,
-            };
-            model.dialog = Some(Dialog::Details { trial, scroll: scroll.min(DETAILS_PAGE * 2) });
-            return Vec::new();
-        }
-        KeyCode::Up => model.session.trials.records.range(..trial).next_back(),
-        KeyCode::Down => model.session.trials.records.range(trial + 1..).next(),
+    let records = &model.session.trials.records;
+    let (neighbour, scroll) = match key.code() {
+        KeyCode::PageUp => (None, scroll.saturating_sub(DETAILS_PAGE)),
+        // The drawing stops at the last line.
+        KeyCode::PageDown => (None, (scroll + DETAILS_PAGE).min(DETAILS_PAGE * 2)),
+        KeyCode::Up => (records.range(..trial).next_back(), 0),
+        KeyCode::Down => (records.range(trial + 1..).next(), 0),
         _ => return Vec::new(),
     };
     let trial = neighbour.map_or(trial, |(number, _)| *number);
-    model.trial_table.selected = Some(trial);
-    model.dialog = Some(Dialog::Details { trial, scroll: 0 });
+    if matches!(key.code(), KeyCode::Up | KeyCode::Down) {
+        model.trial_table.selected = Some(trial);
+    }
+    model.dialog = Some(Dialog::Details { trial, scroll });
     Vec::new()
 }

@@ -11,7 +11,7 @@ use crate::message::Effect;
 use crate::model::Model;
 use crate::model::dialog::Dialog;
 
-/// KeyOutcome of a key in a dialog.
+/// Outcome of a key in a dialog.
 pub(super) enum KeyOutcome {
     /// Effects of the dialog itself.
     Effects(Vec<Effect>),
@@ -41,7 +41,7 @@ pub(super) fn key(model: &mut Model, dialog: Dialog, key: Key) -> KeyOutcome {
         Dialog::Field { purpose, input, .. } => text_field::key(model, key, purpose, input),
         Dialog::Palette { input, selected } => lists::palette_key(model, key, input, selected),
         Dialog::Help { scroll } => lists::help_key(model, key, scroll),
-        Dialog::Choose { what, selected } => lists::choice_key(model, key, what, selected),
+        Dialog::Choose { subject, selected } => lists::choice_key(model, key, subject, selected),
         Dialog::Details { trial, scroll } => lists::details_key(model, key, trial, scroll),
     })
 }

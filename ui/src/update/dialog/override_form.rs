@@ -11,7 +11,6 @@ use crate::model::Model;
 use crate::model::dialog::{Dialog, OverrideForm, OverrideRow};
 use crate::update::answer::{cancelled, request};
 
-/// The request that sends a row's value to the session.
 fn intent(row: &OverrideRow) -> OperatorRequest {
     match row.gain {
         true => OperatorRequest::OverrideGain { gain: row.name.clone(), value: row.value },
@@ -54,7 +53,6 @@ impl OverrideForm {
     }
 }
 
-/// One key while the form is open.
 pub(super) fn key(model: &mut Model, key: Key, mut form: OverrideForm) -> Vec<Effect> {
     match key.code() {
         KeyCode::Esc if form.typing.is_some() => {

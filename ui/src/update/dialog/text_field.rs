@@ -90,7 +90,6 @@ fn bounds(model: &Model, parameter: usize, text: &str) -> Result<OperatorRequest
     }
 }
 
-/// Edits a line of text.
 pub(super) fn edit(input: &mut Input, key: Key) {
     let request = match (key.typed(), key.code()) {
         (Some(c), _) => InputRequest::InsertChar(c),

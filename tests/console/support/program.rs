@@ -1,0 +1,90 @@
+//! Complete runs of the program in a temporary folder.
+
+#![allow(dead_code, reason = "each test program uses a part")]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+
+use serde_json::Value;
+
+/// The folder in which the program runs.
+pub struct Program(tempfile::TempDir);
+
+impl Program {
+    pub fn new() -> Program {
+        Program(tempfile::tempdir().unwrap())
+    }
+
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    /// Writes a file below the folder.
+    pub fn write(&self, name: &str, text: &str) {
+        fs::create_dir_all(self.path(name).parent().unwrap()).unwrap();
+        fs::write(self.path(name), text).unwrap();
+    }
+
+    pub fn command(&self, arguments: &[&str]) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_quadfrog"));
+        command.args(arguments).current_dir(&self.0).stdin(Stdio::null()).env("NO_COLOR", "1");
+        command
+    }
+
+    pub fn run(&self, arguments: &[&str]) -> Output {
+        self.command(arguments).output().unwrap()
+    }
+
+    /// The output of a run that must succeed.
+    #[track_caller]
+    pub fn text(&self, arguments: &[&str]) -> String {
+        let output = self.run(arguments);
+        assert_eq!(output.status.code(), Some(0), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+        String::from_utf8(output.stdout).unwrap()
+    }
+
+    /// The JSON lines of a run that must succeed.
+    #[track_caller]
+    pub fn trials(&self, arguments: &[&str]) -> Vec<Value> {
+        self.text(arguments).lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+    }
+
+    /// The message of a run that must end with status 2.
+    #[track_caller]
+    pub fn refused(&self, arguments: &[&str]) -> String {
+        let output = self.run(arguments);
+        let message = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
+        message
+    }
+
+    /// The study folders below a folder, by name.
+    pub fn studies(&self, below: &str) -> Vec<PathBuf> {
+        let entries = fs::read_dir(self.path(below)).into_iter().flatten();
+        let mut studies: Vec<PathBuf> = entries.map(|entry| entry.unwrap().path()).collect();
+        studies.sort();
+        studies
+    }
+
+    /// The only study below a folder.
+    #[track_caller]
+    pub fn study(&self, below: &str) -> PathBuf {
+        let [study] = self.studies(below).try_into().expect("one study");
+        study
+    }
+}
+
+/// Holds the lock of a study, as a running session does.
+pub fn hold(study: &Path) -> fs::File {
+    let held = fs::File::open(study.join("session.lock")).unwrap();
+    held.lock().unwrap();
+    held
+}
+
+#[track_caller]
+pub fn assert_shows(text: &str, parts: &[&str]) {
+    for part in parts {
+        assert!(text.contains(part), "no {part}:\n{text}");
+    }
+}
