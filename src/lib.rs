@@ -41,7 +41,7 @@
 //! ```text
 //! ui         -> the engine's public interface          draws and sends requests; decides nothing
 //! engine     -> everything below                       starts the threads and connects them
-//! config     -> everything below                       files to checked values
+//! config     -> everything below but report, session   files to checked values
 //! report     -> recording, optimize, trial             figures and tables
 //! session    -> optimize, recording, control, sim, realtime, telemetry, trial, robot    proposes, runs and judges trials
 //! recording  -> telemetry, trial, optimize, robot      writes and reads sessions

@@ -22,19 +22,15 @@ impl Backend {
 }
 
 /// The kind of jump that is optimized; decides the signs of the force amplitudes and the objective.
+#[expect(missing_docs, reason = "the names say the direction; that of a twist is seen from above")]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, EnumString, IntoStaticStr, VariantArray)]
 #[serde(rename_all = "kebab-case")]
 #[strum(serialize_all = "kebab-case")]
 pub enum Task {
-    /// Jump forward.
     Forward,
-    /// Jump to the left.
     LateralLeft,
-    /// Jump to the right.
     LateralRight,
-    /// Turn counterclockwise, seen from above.
     TwistCcw,
-    /// Turn clockwise, seen from above.
     TwistCw,
 }
 
@@ -47,11 +43,6 @@ impl Task {
         self.into()
     }
 
-    /// Returns the task of that name.
-    pub fn from_name(name: &str) -> Option<Task> {
-        name.parse().ok()
-    }
-
     /// Returns the unit of the objective: m, or rad for a twist.
     pub const fn unit(self) -> &'static str {
         match self {
@@ -61,15 +52,16 @@ impl Task {
     }
 }
 
-/// The parameters that a study may optimize, with their units.
-pub const PARAMETER_UNITS: [(&str, &str); 5] = [("f0", "Hz"), ("f1", "Hz"), ("Fx", "N"), ("Fy", "N"), ("Fz", "N")];
-
 /// The gains of the controller, in table order, with their units.
 pub const GAIN_UNITS: [(&str, &str); 4] = [("kp", "N/m"), ("kd", "N s/m"), ("kd_joint", "N m s/rad"), ("k_att", "N/m")];
 
 /// Returns the unit of an optimized parameter; empty for an unknown name.
 pub fn parameter_unit(name: &str) -> &'static str {
-    PARAMETER_UNITS.iter().find(|(known, _)| *known == name).map_or("", |(_, unit)| unit)
+    match name {
+        "f0" | "f1" => "Hz",
+        "Fx" | "Fy" | "Fz" => "N",
+        _ => "",
+    }
 }
 
 /// Values by name, in table order: the parameters of a point, or the gains of a trial.

@@ -134,6 +134,7 @@ fn is_name(word: &str) -> bool {
 }
 
 /// A module's file: its imports, the names of its items, and the other paths in its code.
+#[derive(Default)]
 struct Module {
     file: PathBuf,
     /// Name in this module and the path that it stands for; `*` for everything in a module.
@@ -150,14 +151,7 @@ struct Module {
 impl Module {
     fn read(file: &Path) -> Module {
         let words = words(file);
-        let mut module = Module {
-            file: file.to_owned(),
-            imports: Vec::new(),
-            used: Vec::new(),
-            items: BTreeSet::new(),
-            paths: Vec::new(),
-            types: Vec::new(),
-        };
+        let mut module = Module { file: file.to_owned(), ..Module::default() };
         let mut at = 0;
         while at < words.len() {
             let word = words[at].as_str();
@@ -452,16 +446,8 @@ fn every_cited_path_exists() {
     for folder in ["docs", "recordings", "robots"] {
         prose.extend(files(&root().join(folder), "md").into_iter().map(|file| (file, "")));
     }
-    prose.extend(["README.md", "Cargo.toml", "ui/Cargo.toml", "build.rs"].map(|name| {
-        (
-            root().join(name),
-            match name.rsplit_once('.') {
-                Some((_, "md")) => "",
-                Some((_, "rs")) => "//",
-                _ => "#",
-            },
-        )
-    }));
+    let others = [("README.md", ""), ("Cargo.toml", "#"), ("ui/Cargo.toml", "#"), ("build.rs", "//")];
+    prose.extend(others.map(|(name, comment)| (root().join(name), comment)));
     let (mut violations, mut checked) = (Vec::new(), 0);
     for (file, comment) in prose {
         for (line, text) in (1..).zip(fs::read_to_string(&file).unwrap().lines()) {

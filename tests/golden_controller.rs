@@ -51,7 +51,7 @@ fn golden_controller() {
     let geometry = LegGeometry { abduction: 0.08, thigh: 0.213, calf: 0.213 };
     let (mut torque, mut feet_difference) = (support::Largest::default(), support::Largest::default());
     for (number, case) in file.cases.iter().enumerate() {
-        let task = Task::from_name(&case.task).unwrap_or_else(|| panic!("unknown task {}", case.task));
+        let task: Task = case.task.parse().unwrap_or_else(|_| panic!("unknown task {}", case.task));
         let jump = JumpParameters { f0_hz: 1.0, f1_hz: 0.0, fx_n: case.Fx_n, fy_n: case.Fy_n, fz_n: case.Fz_n };
         let target = LegTarget {
             gains: Gains { kp: 400.0, kd: 8.0, kd_joint: 0.8, k_att: 200.0 },

@@ -54,7 +54,7 @@ fn jump(robot: &RobotDescription, config: &SimConfig, file: &File, case: &Case) 
     let joint_position = robot.leg_geometry.stance(&stance_leg, &robot.lying_position);
     assert!(simulator.place(&Placement { joint_position, lying: false, seed: 0 }));
 
-    let task = Task::from_name(&case.task).unwrap();
+    let task: Task = case.task.parse().unwrap();
     let profile = JumpParameters { f0_hz: case.f0_hz, f1_hz: 0.0, fx_n: case.Fx_n, fy_n: case.Fy_n, fz_n: case.Fz_n };
     let (start, impulse) = (1.0, 0.5 / case.f0_hz);
     let ticks = ((start + impulse + 1.5) * 1000.0_f64).round_ties_even() as u32;

@@ -15,7 +15,7 @@ use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::telemetry::Mode;
 use quadfrog::trial::{Backend, ExperimentStage, Proposal, Task, TrialRecord, Verdict};
 
-/// Whatever is waited for comes in a few seconds; a machine under load may take longer.
+/// Longest wait; ends only a test that fails.
 const PATIENCE: Duration = Duration::from_secs(60);
 
 fn start(folder: &Path, config: Option<&Path>) -> Handle {

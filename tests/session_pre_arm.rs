@@ -1,4 +1,4 @@
-//! The pre-arm list as the session gives it to an operator: all failing items at once, the operator's word, the test of STOP.
+//! The arming checklist of a session: all failing checks at once, the operator's confirmations, the test of STOP.
 
 #[path = "support/robots.rs"]
 mod robots;
@@ -37,7 +37,7 @@ struct Session {
     _folder: Option<tempfile::TempDir>,
     records: Vec<Record>,
     time_ms: u64,
-    /// Whether there is a screen that beats.
+    /// Whether a screen sends heartbeats.
     watched: bool,
 }
 
@@ -104,7 +104,6 @@ impl Session {
         }
     }
 
-    /// Wishes and gives back the answer.
     fn request(&mut self, request: OperatorRequest) -> RequestRecord {
         let time_ns = self.time_ms * 1_000_000;
         self.supervisor.carry_out(&StampedRequest { request, stops: self.operator.stop.count(), time_ns }, time_ns);
@@ -114,7 +113,7 @@ impl Session {
             _ => None,
         });
         self.ticks(5);
-        answer.expect("every wish is answered")
+        answer.expect("every request is answered")
     }
 
     fn list(&self) -> Vec<ArmingCheckRecord> {
@@ -150,7 +149,6 @@ fn a_simulated_robot_is_armed_without_ceremony() {
     assert_eq!(session.body.mode(), Mode::StandUp);
 }
 
-/// All failing items at once: the refusal names each with what was found and what is needed.
 #[test]
 fn a_real_robot_is_not_armed_before_every_item_holds_and_the_refusal_names_all() {
     let mut session = Session::hardware();

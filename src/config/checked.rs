@@ -45,15 +45,12 @@ twist-cw = { f0 = 1.0, f1 = 1.0, Fx = 1.0, Fy = 1.0, Fz = 1.0 }
 )];
 
 /// All files, checked.
+#[expect(missing_docs, reason = "a field has the name of its file")]
 #[derive(Debug, Clone)]
 pub struct Config {
-    /// `control.toml`.
     pub control: ControlFile,
-    /// `safety.toml`.
     pub safety: SafetyFile,
-    /// `optimize.toml`.
     pub optimize: OptimizeFile,
-    /// `simulator.toml`.
     pub simulator: SimConfig,
     /// `console.toml`, read by the console.
     pub console: Table,

@@ -18,13 +18,11 @@ use crate::robot::{CONTROL_PERIOD_S, JointCommand, Robot};
 
 /// Parts of the control thread.
 pub struct Start<'a, C> {
-    /// Settings of the control cycle.
     pub settings: &'a ControlSettings,
     /// Real-time settings that are requested of the system.
     pub scheduling: Scheduling,
     /// Receives the granted and denied real-time settings once, before the first tick.
     pub report: Sender<(Vec<RealtimeSetting>, Vec<DeniedSetting>)>,
-    /// The clock of the engine.
     pub clock: &'a C,
     /// Set when the thread is to end.
     pub closing: &'a AtomicBool,

@@ -13,26 +13,20 @@ use crate::sim::SimError;
 use crate::trial::{Approval, Backend, Task};
 
 /// Settings of an engine's start.
+#[expect(missing_docs, reason = "the types say the rest")]
 pub struct Options {
-    /// The configuration.
     pub config: Config,
-    /// The robot.
     pub robot: RobotDescription,
     /// Link settings of the robot; needed on hardware.
     pub network: Option<Network>,
-    /// The robot behind the controller.
     pub backend: Backend,
-    /// The task.
     pub task: Task,
-    /// Seed of the study.
     pub seed: u32,
     /// Trials that are to count; none for the number of the configuration.
     pub trials: Option<u32>,
     /// The folder of the study, created if it does not exist: study.log, session.mcap, config/. None keeps nothing.
     pub folder: Option<PathBuf>,
-    /// Whether the session only observes.
     pub observe: bool,
-    /// The jumps that a person approves and judges.
     pub approve: Approval,
     /// The journal of a study that this engine joins as one more worker, instead of the study of the folder.
     pub join: Option<Storage>,

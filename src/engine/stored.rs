@@ -12,13 +12,11 @@ use crate::session::experiment::attributes::StudyAttributes;
 use crate::trial::{ParameterInfo, Task};
 
 /// Description of a stored study of this program.
+#[expect(missing_docs, reason = "the types say the rest")]
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct StoredStudy {
-    /// Its task.
     pub task: Task,
-    /// Its seed.
     pub seed: u32,
-    /// The robot model.
     pub robot: String,
     /// Trials that are to count; none where an older version made it.
     pub budget: Option<u32>,

@@ -33,7 +33,6 @@ pub struct RecordSpan {
 /// Position and content of a chunk.
 #[derive(Debug, Clone)]
 pub struct Chunk {
-    /// The chunk's record.
     pub span: RecordSpan,
     /// Log time of its earliest message, ns UTC.
     pub start: u64,
@@ -49,9 +48,7 @@ pub struct Container {
     path: PathBuf,
     /// Complete chunks, in the order of the file.
     pub chunks: Vec<Chunk>,
-    /// Attachments in the order of the file.
     pub attachments: Vec<RecordSpan>,
-    /// Metadata in the order of the file.
     pub metadata: Vec<RecordSpan>,
     /// Description of the missing end of the file; none for a finished file.
     pub cut: Option<String>,

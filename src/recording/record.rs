@@ -100,11 +100,6 @@ pub struct SessionInfo {
 }
 
 impl SessionInfo {
-    /// Returns whether the session drives the simulator.
-    pub fn is_simulated(&self) -> bool {
-        self.backend == Some(Backend::Simulator)
-    }
-
     /// Returns whether the session drives a robot.
     pub fn is_hardware(&self) -> bool {
         self.backend == Some(Backend::Hardware)

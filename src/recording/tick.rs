@@ -43,7 +43,8 @@ pub fn control_tick(tick: &Tick) -> frog::ControlTick {
 }
 
 fn joint_command_fields(way: Way, tick: &mut Tick, m: &mut frog::JointCommand) -> Result<(), DecodeError> {
-    let fields: [(fn(&mut MotorCommand) -> &mut f64, &mut Vec<f64>); 5] = [
+    type Field = fn(&mut MotorCommand) -> &mut f64;
+    let fields: [(Field, &mut Vec<f64>); 5] = [
         (|motor| &mut motor.position, &mut m.position),
         (|motor| &mut motor.velocity, &mut m.velocity),
         (|motor| &mut motor.kp, &mut m.kp),

@@ -36,10 +36,9 @@ const REFRESH_PERIOD_NS: u64 = 500_000_000;
 const LONGEST_WAIT_FOR_TICKS_NS: u64 = 10_000_000_000;
 
 /// Receivers of the records: the recorder and the screen get the same.
+#[expect(missing_docs, reason = "the types say the rest")]
 pub struct RecordSinks {
-    /// To the recorder.
     pub recorder: Sender<Stamped>,
-    /// To the screen.
     pub screen: Sender<Stamped>,
 }
 
@@ -53,18 +52,14 @@ impl RecordSinks {
 }
 
 /// Parts of a session.
+#[expect(missing_docs, reason = "the types say the rest")]
 pub struct SupervisorParts {
-    /// The experiment.
     pub experiment: Experiment,
-    /// To the control thread.
     pub control: SessionEnd,
     /// The ticks of each trial and of each fault, from the recorder.
     pub ticks: Receiver<CollectedTicks>,
-    /// Receivers of the records.
     pub sinks: RecordSinks,
-    /// Status of the recorder.
     pub recorder: RecorderWatch,
-    /// The arming checks of the session.
     pub checklist: ArmingChecklist,
     /// The session's record for the screen; the recording begins with it already.
     pub info: SessionInfo,

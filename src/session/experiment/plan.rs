@@ -28,17 +28,14 @@ pub fn not_now<T>(reason: impl Into<String>) -> Result<T, RequestRefusal> {
 }
 
 /// Settings that all trials of one study share.
+#[expect(missing_docs, reason = "the types say the rest")]
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExperimentPlan {
-    /// The task.
     pub task: Task,
-    /// Settings of the controller.
     pub control: TaskControl,
     /// Parameters with their bounds, in table order.
     pub parameters: Vec<ParameterInfo>,
-    /// Seed of the study.
     pub seed: u64,
-    /// Trials that are to count.
     pub budget: u32,
     /// File name of the recording; empty without one.
     pub recording: String,

@@ -11,13 +11,13 @@ const CHECKLIST_PERIOD_NS: u64 = 500_000_000;
 
 impl Supervisor {
     /// Returns the reason that forbids the next trial; none if nothing does.
-    pub fn inhibit(&mut self) -> Option<String> {
+    pub(super) fn inhibit(&mut self) -> Option<String> {
         let hold = self.control.readiness.read().inhibit.map(|hold| hold.to_string());
         hold.or_else(|| self.checklist.disk_low())
     }
 
     /// Logs once the reason that forbids the next trial, and the values on which a failsafe will soon act.
-    pub fn warn(&mut self, time_ns: u64) {
+    pub(super) fn warn(&mut self, time_ns: u64) {
         let inhibit = self.inhibit();
         if let Some(reason) = &inhibit
             && self.inhibited.is_none()
@@ -33,7 +33,7 @@ impl Supervisor {
     }
 
     /// Returns to OBSERVE after an observer has acknowledged its STOP.
-    pub fn release(&mut self) {
+    pub(super) fn release(&mut self) {
         if self.observe && self.mode == Mode::Disarmed && !self.releasing {
             self.releasing = self.command(Command::Release).is_ok();
         }
@@ -41,7 +41,7 @@ impl Supervisor {
 
     /// Publishes the arming checklist while the robot is disarmed: to the screen twice a second, to the recorder, too, when a
     /// check changes its state.
-    pub fn publish_checklist(&mut self, time_ns: u64) {
+    pub(super) fn publish_checklist(&mut self, time_ns: u64) {
         if self.mode != Mode::Disarmed || self.observe {
             return;
         }
