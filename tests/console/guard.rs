@@ -21,6 +21,7 @@ use quadfrog::config::Config;
 use quadfrog::robot::go1::convert::{low_cmd, low_state};
 use quadfrog::robot::go1::packet::CrcForm;
 use quadfrog::robot::{JointCommand, RobotState};
+use tempfile::TempDir;
 
 /// Time without a datagram after which the sender counts as ended.
 const SILENCE: Duration = Duration::from_millis(500);
@@ -105,11 +106,12 @@ fn console(folder: &Path, robot: &RecordingRobot, more: &[&str]) -> Session {
     Session::start(folder, (120, 36), &[&arguments, more].concat())
 }
 
-/// A console in control of `robot`, before arming.
-fn controlling(folder: &Path, robot: &RecordingRobot) -> Session {
-    let session = console(folder, robot, &[]);
-    damped(&session, robot);
-    session
+/// A robot and the console in control of it, before arming.
+fn controlling() -> (TempDir, RecordingRobot, Session) {
+    let (folder, robot) = (tempfile::tempdir().unwrap(), RecordingRobot::start());
+    let session = console(folder.path(), &robot, &[]);
+    damped(&session, &robot);
+    (folder, robot, session)
 }
 
 /// Waits until the last 100 commands are damping.
@@ -146,9 +148,7 @@ fn assert_damped(rest: &[Vec<u8>]) {
 /// The guard ignores the signals that end a console or a terminal.
 #[test]
 fn a_robot_whose_console_is_killed_is_damped() {
-    let folder = tempfile::tempdir().unwrap();
-    let robot = RecordingRobot::start();
-    let mut session = controlling(folder.path(), &robot);
+    let (_folder, robot, mut session) = controlling();
     let guard = guard_of(session.pid());
     for signal in [Signal::SIGHUP, Signal::SIGINT, Signal::SIGTERM] {
         kill(guard, signal).unwrap();
@@ -159,9 +159,7 @@ fn a_robot_whose_console_is_killed_is_damped() {
 /// A stopped process, as under a debugger.
 #[test]
 fn a_robot_whose_console_is_stopped_is_damped_until_it_continues() {
-    let folder = tempfile::tempdir().unwrap();
-    let robot = RecordingRobot::start();
-    let mut session = controlling(folder.path(), &robot);
+    let (_folder, robot, mut session) = controlling();
     session.signal(Signal::SIGSTOP);
     let stopped = robot.count();
     session.wait_until("the guard damps", || robot.count() > stopped + 2000);
@@ -178,9 +176,7 @@ fn a_robot_whose_console_is_stopped_is_damped_until_it_continues() {
 
 #[test]
 fn a_robot_whose_console_ends_normally_receives_nothing_afterwards() {
-    let folder = tempfile::tempdir().unwrap();
-    let robot = RecordingRobot::start();
-    let mut session = controlling(folder.path(), &robot);
+    let (_folder, robot, mut session) = controlling();
     session.signal(Signal::SIGTERM);
     assert!(session.wait().success());
     // Earlier commands may still be in the socket's queue.
@@ -212,9 +208,7 @@ fn an_observed_robot_receives_nothing_from_the_guard_unless_it_was_stopped() {
 /// `session_pre_arm` checks that arming is then refused.
 #[test]
 fn a_lost_guard_is_reported() {
-    let folder = tempfile::tempdir().unwrap();
-    let robot = RecordingRobot::start();
-    let mut session = controlling(folder.path(), &robot);
+    let (_folder, _robot, mut session) = controlling();
     kill(guard_of(session.pid()), Signal::SIGKILL).unwrap();
     session.send("6");
     session.wait_for(&["the guard process has ended"]);

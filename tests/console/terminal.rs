@@ -102,12 +102,9 @@ fn a_session_by_keys_agrees_with_the_recording_and_the_study() {
     let player = player(folder.path());
     assert_eq!(player.damage(), None);
     let rows = rows(&player);
-    let fx = |row: &TrialRecord| row.parameters.get("Fx");
-    assert_eq!(
-        (rows[0].verdict, rows[0].value, rows[0].source),
-        (Some(Verdict::Fall), Some(0.0), ProposalSource::Operator)
-    );
-    assert_eq!(fx(&rows[0]), Some(120.0));
+    let first = &rows[0];
+    assert_eq!((first.verdict, first.value, first.source), (Some(Verdict::Fall), Some(0.0), ProposalSource::Operator));
+    assert_eq!(first.parameters.get("Fx"), Some(120.0));
     assert_eq!((rows[1].verdict, rows[1].value), (Some(Verdict::Void), None));
     let last = player.events().iter().rev().find_map(|event| match &event.record {
         Record::Proposal(proposal) => Some(proposal),

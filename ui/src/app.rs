@@ -47,16 +47,16 @@ pub struct ConsoleOptions {
 impl ConsoleOptions {
     /// Overrides the settings by those of the command line.
     pub fn new(
-        settings: ConsoleSettings,
+        mut settings: ConsoleSettings,
         colours: Option<ColourChoice>,
         ascii: bool,
         low_bandwidth: bool,
     ) -> ConsoleOptions {
-        let mut settings = settings;
         settings.low_bandwidth = low_bandwidth;
         if low_bandwidth {
-            settings.colours =
-                if settings.colours == ColourChoice::None { ColourChoice::None } else { ColourChoice::Named };
+            if settings.colours != ColourChoice::None {
+                settings.colours = ColourChoice::Named;
+            }
             settings.frames_per_second = settings.frames_per_second.min(LOW_BANDWIDTH_FRAMES);
             settings.chart_mode = ChartMode::Sweep;
         }
@@ -192,9 +192,8 @@ impl Console {
         }
         if connected != self.connected {
             self.connected = connected;
-            let text =
-                if connected { "the SSH connection responds again" } else { "the SSH connection does not respond" };
-            say(&mut self.model, LogLevel::Warning, text.to_owned());
+            let text = if connected { "responds again" } else { "does not respond" };
+            say(&mut self.model, LogLevel::Warning, format!("the SSH connection {text}"));
         }
     }
 
@@ -238,8 +237,9 @@ impl Console {
             Effect::Replay(command) => self.feed.command(command),
             Effect::Bell => self.send(b"\x07"),
             Effect::CopyTrial(trial) => self.copy_trial(trial),
-            // A failure is reported with the next frame.
+            // A failure of these two is reported with the next frame.
             Effect::Mouse(on) => drop(self.screen.mouse(on)),
+            Effect::Redraw => drop(self.screen.clear()),
             Effect::Export => {
                 let written = export::table(&self.model);
                 self.say_written(written, |path| format!("written: {} and trials.md beside it", path.display()));
@@ -248,7 +248,6 @@ impl Console {
                 let written = export::best(&self.model);
                 self.say_written(written, |path| format!("exported; start with quadfrog --config {}", path.display()));
             }
-            Effect::Redraw => drop(self.screen.clear()),
             Effect::Suspend => self.suspend(),
             Effect::Quit => self.end(ConsoleExit::Quit),
         }

@@ -23,13 +23,8 @@ pub fn as_text(trial: &TrialRecord, model: &Model) -> String {
     }
     let value = trial.value.map_or("-".to_owned(), |value| value.to_string());
     let verdict = trial.verdict.map_or("-", Verdict::name);
-    text.push_str(&format!(
-        "\tJ={value} {}\t{verdict}\t{}\t{}",
-        model.session.info.unit,
-        trial.source.name(),
-        remark(trial)
-    ));
-    text
+    let (unit, source, remark) = (&model.session.info.unit, trial.source.name(), remark(trial));
+    text + &format!("\tJ={value} {unit}\t{verdict}\t{source}\t{remark}")
 }
 
 /// The names of the exported columns and the rows of the table as shown.

@@ -152,8 +152,7 @@ impl Model {
         self.session.info.parameters.get(self.override_row)
     }
 
-    /// The proposed value of that parameter.
-    pub fn override_value(&self) -> Option<f64> {
+    pub(crate) fn override_value(&self) -> Option<f64> {
         let name = &self.override_parameter()?.name;
         self.session.open_proposal()?.parameters.iter().find(|p| p.name == *name).map(|p| p.value)
     }

@@ -31,8 +31,7 @@ pub struct SessionModel {
 }
 
 impl SessionModel {
-    /// Whether the session is in this stage.
-    pub fn stage_is(&self, stage: ExperimentStage) -> bool {
+    pub(crate) fn stage_is(&self, stage: ExperimentStage) -> bool {
         self.stage.is_some_and(|info| info.stage == stage)
     }
 
@@ -93,8 +92,7 @@ impl SessionModel {
         }
     }
 
-    /// The number of trials of the study.
-    pub fn budget(&self) -> u32 {
+    pub(crate) fn budget(&self) -> u32 {
         self.search.as_ref().map_or(self.info.budget, |search| search.budget)
     }
 

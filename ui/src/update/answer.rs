@@ -29,15 +29,18 @@ pub(super) fn cancelled(model: &mut Model, text: &str) -> Vec<Effect> {
     Vec::new()
 }
 
+/// Reports why something was not done.
+pub(super) fn refused(model: &mut Model, subject: &str, reason: &str) -> Vec<Effect> {
+    say(model, LogLevel::Warning, format!("{subject}: {reason}"));
+    Vec::new()
+}
+
 /// Sends a request to the session, except in a replay or from an observer.
 pub(super) fn request(model: &mut Model, intent: OperatorRequest) -> Vec<Effect> {
     let allowed = if intent == OperatorRequest::Acknowledge { may_acknowledge(model) } else { may_request(model) };
     match allowed {
         Ok(()) => vec![Effect::Request(intent)],
-        Err(reason) => {
-            say(model, LogLevel::Warning, format!("refused: {reason}"));
-            Vec::new()
-        }
+        Err(reason) => refused(model, "refused", &reason),
     }
 }
 

@@ -39,15 +39,9 @@ pub(super) fn take(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
     let mut bells = Vec::new();
     match stamped.record {
         Record::Session(info) => {
-            let text = format!(
-                "{} on {} ({}), {} {}, seed {}",
-                info.task_name(),
-                info.robot,
-                info.backend_name(),
-                info.sampler_name(),
-                info.version,
-                info.seed
-            );
+            let (task, robot, backend) = (info.task_name(), &info.robot, info.backend_name());
+            let (sampler, version, seed) = (info.sampler_name(), &info.version, info.seed);
+            let text = format!("{task} on {robot} ({backend}), {sampler} {version}, seed {seed}");
             model.session.info = info;
             log(model, time_ns, LogLevel::Info, "session", text, false);
         }

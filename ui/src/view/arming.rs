@@ -33,17 +33,18 @@ pub fn lines(
         items.truncate(few);
     }
     // Half of a narrow terminal has room for the found value alone.
-    let name_width = if width < 60 { 1 } else { 27 };
+    let wide = width >= 60;
+    let name_width = if wide { 27 } else { 1 };
     let line = |item: &ArmingCheckRecord| {
         let (state, role) = label(item.state);
         let selected = selected.is_some_and(|check| check.check() == item.check);
         let name = item.check.name();
         let gap = name_width.max(name.chars().count() + 1) - name.chars().count();
         let text = match (item.found.as_str(), item.needed.as_str()) {
-            (found, needed) if item.state == ArmingCheckState::NotNeeded || width < 60 || needed.is_empty() => {
-                if found.is_empty() { needed.to_owned() } else { found.to_owned() }
+            (found, needed) if wide && item.state != ArmingCheckState::NotNeeded && !needed.is_empty() => {
+                format!("{found:<20} {needed}")
             }
-            (found, needed) => format!("{found:<20} {needed}"),
+            ("", text) | (text, _) => text.to_owned(),
         };
         let text = cut(&text, width.saturating_sub(6 + name.chars().count() + gap));
         Line::from(vec![

@@ -1,12 +1,12 @@
 //! TPE's two densities along a parameter, l(x) of the good trials and g(x) of the others, with the proposed value: TPE
 //! proposes where l is high and g is low.
 
-use quadfrog::trial::{ParameterInsight, ProposalInsight};
+use quadfrog::trial::ProposalInsight;
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 
 use super::dots::DotGrid;
-use super::draw::{cut, heading, number};
+use super::draw::{cell_at, cut, heading, number};
 use crate::theme::{Role, Theme};
 
 pub fn render(frame: &mut Frame, area: Rect, insight: Option<&ProposalInsight>, name: &str, theme: &Theme) {
@@ -46,16 +46,15 @@ pub fn render(frame: &mut Frame, area: Rect, insight: Option<&ProposalInsight>, 
         }
         dots.draw(buffer, plot, theme.style(role));
     }
-    let column = column_of(insight, (low, high), plot.width);
+    let column = cell_at((insight.proposed - low) / (high - low), plot.width);
     for y in plot.y..plot.bottom() {
         buffer.set_string(plot.x + column, y, theme.bar(), theme.style(Role::Key));
     }
     // A letter at each curve's peak distinguishes the curves without colours.
     for (density, role, label) in curves {
         let Some((x, y)) = insight.at.iter().zip(density).max_by(|a, b| a.1.total_cmp(b.1)) else { continue };
-        let column = ((x - low) / (high - low) * f64::from(plot.width - 1)).round() as u16;
-        let column = column.min(plot.width.saturating_sub(label.len() as u16));
-        let row = ((1.0 - y / top.max(f64::MIN_POSITIVE)) * f64::from(plot.height - 1)).round() as u16;
+        let column = cell_at((x - low) / (high - low), plot.width).min(plot.width.saturating_sub(label.len() as u16));
+        let row = cell_at(1.0 - y / top.max(f64::MIN_POSITIVE), plot.height);
         buffer.set_string(plot.x + column, plot.y + row, label, theme.style(role));
     }
     let (left, right) = (number(low), number(high));
@@ -69,9 +68,4 @@ pub fn render(frame: &mut Frame, area: Rect, insight: Option<&ProposalInsight>, 
         let x = x.clamp(scale.x + left.len() as u16 + 1, at.saturating_sub(now.len() as u16 + 1));
         buffer.set_string(x, scale.y, now, theme.style(Role::Key));
     }
-}
-
-fn column_of(insight: &ParameterInsight, (low, high): (f64, f64), width: u16) -> u16 {
-    let share = ((insight.proposed - low) / (high - low)).clamp(0.0, 1.0);
-    (share * f64::from(width - 1)).round() as u16
 }

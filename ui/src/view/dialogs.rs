@@ -10,6 +10,7 @@
 //! ```
 
 use quadfrog::session::operator_request::OperatorCheck;
+use quadfrog::trial::ProposedParameter;
 use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::symbols::border;
@@ -144,14 +145,11 @@ fn approve(model: &Model, trial: u32, waited: bool) -> Vec<Line<'static>> {
     let key = model.keymap.key(Action::Approve);
     let mut lines = Vec::new();
     if let Some(proposal) = &model.session.proposal {
-        let values: Vec<String> = proposal
-            .parameters
-            .iter()
-            .map(|p| {
-                let unit = model.session.parameter(&p.name).map_or(String::new(), |info| info.unit);
-                format!("{} {} {unit}", p.name, number(p.value))
-            })
-            .collect();
+        let value = |p: &ProposedParameter| {
+            let unit = model.session.parameter(&p.name).map_or(String::new(), |info| info.unit);
+            format!("{} {} {unit}", p.name, number(p.value))
+        };
+        let values: Vec<String> = proposal.parameters.iter().map(value).collect();
         lines.push(Line::from(format!("Trial #{trial}: {}", values.join(", "))));
     }
     lines.push(Line::from("Is the area clear of people and objects?"));

@@ -58,6 +58,11 @@ pub fn cut(text: &str, width: usize) -> String {
     short
 }
 
+/// The cell of a share, 0 to 1, of a row or column of `cells`.
+pub fn cell_at(share: f64, cells: u16) -> u16 {
+    (share.clamp(0.0, 1.0) * f64::from(cells - 1)).round() as u16
+}
+
 /// The sign of a verdict: on charts and in tables, with or without colours.
 pub fn sign(verdict: Option<Verdict>) -> (&'static str, Role) {
     match verdict {

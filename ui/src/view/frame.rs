@@ -19,17 +19,13 @@ use crate::theme::Role;
 const STALE_MS: u128 = 500;
 
 pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
-    let [first, second] = rows(area);
+    let [first, second] = Layout::vertical([Constraint::Length(1); 2]).areas(area);
     let recording = Line::from(recording(model));
     let width = recording.width() as u16;
     let [left, right] = Layout::horizontal([Constraint::Fill(1), Constraint::Length(width)]).spacing(1).areas(first);
     frame.render_widget(identity(model, area.width, usize::from(left.width)), left);
     frame.render_widget(recording, right);
     frame.render_widget(Line::from(condition(model, area.width)), second);
-}
-
-fn rows(area: Rect) -> [Rect; 2] {
-    [Rect { height: 1, ..area }, Rect { y: area.y + 1, height: area.height.saturating_sub(1).min(1), ..area }]
 }
 
 pub fn mode_span(model: &Model) -> Span<'static> {
@@ -71,11 +67,10 @@ fn identity(model: &Model, width: u16, room: usize) -> Line<'static> {
     spans.push(Span::raw(session.task_name()));
     if let Some(info) = model.session.stage {
         let (finished, budget) = (model.session.counted(), model.session.budget());
-        let text = match narrow {
+        spans.push(Span::raw(match narrow {
             true => format!("  trial #{}  {finished}/{budget}", info.trial),
             false => format!("   trial #{}   {finished} of {budget} judged", info.trial),
-        };
-        spans.push(Span::raw(text));
+        }));
     }
     if let Some((best, value)) = model.session.trials.best().and_then(|best| Some((best, best.value?))) {
         let before = spans.len();
@@ -153,12 +148,12 @@ fn condition(model: &Model, width: u16) -> Vec<Span<'static>> {
     if let Some((joint, hottest)) = hottest.filter(|(_, hottest)| *hottest > 0.0) {
         let joint = if narrow { String::new() } else { format!(" {}", joint_name(joint)) };
         let name = if narrow { "motor " } else { "hottest " };
-        part(name, bad(f64::from(hottest) >= limits.motor_c), format!("{hottest:.0} C{joint}"));
+        part(name, bad(hottest >= limits.motor_c), format!("{hottest:.0} C{joint}"));
     }
     if let Some(battery) = snapshot.tick.state.battery {
         let charge = battery.charge_percent;
         let name = if narrow { "bat " } else { "battery " };
-        part(name, bad(f64::from(charge) < limits.battery_percent), format!("{charge:.0} %"));
+        part(name, bad(charge < limits.battery_percent), format!("{charge:.0} %"));
     }
     let age_ms = model.clock.saturating_sub(model.snapshot_at).as_millis();
     if age_ms > STALE_MS && model.replay.is_none() {

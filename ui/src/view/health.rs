@@ -161,7 +161,7 @@ fn robot_rows(model: &Model) -> Vec<HealthRow> {
             let cells: Vec<f64> = battery.cell_v.into_iter().filter(|v| *v > 0.0).collect();
             let low = cells.iter().copied().fold(f64::INFINITY, f64::min);
             let high = cells.iter().copied().fold(0.0, f64::max);
-            let low_charge = f64::from(battery.charge_percent) < limits.battery_percent;
+            let low_charge = battery.charge_percent < limits.battery_percent;
             rows.push(row("battery", format!("{:.0} %", battery.charge_percent), low_charge));
             rows.push(row("", format!("{:.1} V, {:.1} A", battery.voltage_v, battery.current_a), false));
             if !cells.is_empty() {
@@ -203,7 +203,7 @@ fn motor_rows(model: &Model) -> Vec<HealthRow> {
         let limited = if tick.limited & (1 << joint) != 0 { " limited" } else { "" };
         let (q, torque) = (tick.state.joint_position[joint], tick.state.joint_torque[joint]);
         let text = format!("{temperature:3.0} C {state:<3}{q:+6.2} rad{torque:+6.1} N m{limited}");
-        rows.push((joint_name(joint), text, f64::from(temperature) >= model.session.info.limits.motor_c));
+        rows.push((joint_name(joint), text, temperature >= model.session.info.limits.motor_c));
     }
     rows
 }

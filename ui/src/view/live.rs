@@ -63,15 +63,11 @@ struct ChartSource<'a> {
 }
 
 impl<'a> ChartSource<'a> {
+    /// Two trials, or the present, or the frozen history.
     fn of(model: &'a Model) -> ChartSource<'a> {
-        match &model.live.comparison {
-            Some(comparison) => ChartSource::compared(comparison),
-            None => ChartSource::running(model),
+        if let Some(comparison) = &model.live.comparison {
+            return ChartSource::compared(comparison);
         }
-    }
-
-    /// The present, or the frozen history.
-    fn running(model: &'a Model) -> ChartSource<'a> {
         let history = model.charted();
         let axis = TimeAxis {
             mode: model.live.mode,

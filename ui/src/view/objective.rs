@@ -4,7 +4,7 @@ use quadfrog::trial::{TrialRecord, Verdict};
 use ratatui::Frame;
 use ratatui::layout::Rect;
 
-use super::draw::{heading, number, sign};
+use super::draw::{cell_at, heading, number, sign};
 use crate::model::session::SessionModel;
 use crate::model::trials::accepted_value;
 use crate::theme::{Role, Theme};
@@ -36,10 +36,7 @@ pub fn render(frame: &mut Frame, area: Rect, session: &SessionModel, theme: &The
         let at = if slots <= width { trial as usize * (width / slots) } else { trial as usize * width / slots };
         plot.x + SCALE + at.min(width - 1) as u16
     };
-    let row = |value: f64| {
-        let share = ((high - value) / (high - low)).clamp(0.0, 1.0);
-        plot.y + (share * f64::from(plot.height - 1)).round() as u16
-    };
+    let row = |value: f64| plot.y + cell_at((high - value) / (high - low), plot.height);
     // Best so far: a level line from each new best to the next.
     let bests: Vec<&TrialRecord> = session.trials.best_so_far().collect();
     for (index, trial) in bests.iter().enumerate() {

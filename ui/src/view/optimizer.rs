@@ -5,7 +5,7 @@ use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::widgets::Paragraph;
 
-use super::draw::{heading, number, sign};
+use super::draw::{cell_at, heading, number, sign};
 use super::{densities, objective, points};
 use crate::model::session::SessionModel;
 use crate::theme::{Role, Theme};
@@ -52,14 +52,8 @@ fn render_scatter(frame: &mut Frame, area: Rect, session: &SessionModel, theme: 
     }
     let high = session.trials.records.values().filter_map(|trial| trial.value).fold(1e-3, f64::max);
     let low = session.trials.records.values().filter_map(|trial| trial.value).fold(0.0, f64::min);
-    let column = |value: f64| {
-        let share = ((value - info.low) / (info.high - info.low)).clamp(0.0, 1.0);
-        plot.x + (share * f64::from(plot.width - 1)).round() as u16
-    };
-    let row = |value: f64| {
-        let share = ((high - value) / (high - low)).clamp(0.0, 1.0);
-        plot.y + (share * f64::from(plot.height - 1)).round() as u16
-    };
+    let column = |value: f64| plot.x + cell_at((value - info.low) / (info.high - info.low), plot.width);
+    let row = |value: f64| plot.y + cell_at((high - value) / (high - low), plot.height);
     let buffer = frame.buffer_mut();
     let proposed = session.open_proposal().and_then(|p| p.parameters.iter().find(|p| p.name == info.name));
     if let Some(proposed) = proposed {

@@ -37,12 +37,6 @@ pub fn repeats_of(session: &SessionModel, theme: &Theme, trial: u32) -> Option<S
     let point = session.trials.points.iter().find(|point| point.trials.contains(&trial) && point.trials.len() > 1)?;
     let spread = point.deviation.map_or(String::new(), |sd| format!(" {} {:.4}", theme.plus_minus(), sd));
     let trials: Vec<String> = point.trials.iter().map(|trial| format!("#{trial}")).collect();
-    Some(format!(
-        "{}/{} landed, {:.4}{spread} {} ({})",
-        point.stood,
-        point.trials.len(),
-        point.mean,
-        session.info.unit,
-        trials.join(" ")
-    ))
+    let (stood, of, unit) = (point.stood, point.trials.len(), &session.info.unit);
+    Some(format!("{stood}/{of} landed, {:.4}{spread} {unit} ({})", point.mean, trials.join(" ")))
 }

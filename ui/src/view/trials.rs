@@ -39,13 +39,8 @@ fn summary(model: &Model) -> String {
         SortBy::Column(column) => column.name(),
     };
     let turned = if view.reversed { " reversed" } else { "" };
-    let key = |action| model.keymap.key(action);
-    format!(
-        "{counts}; by {sort}{turned} ({}), {shown} ({}), columns ({})",
-        key(Action::Sort),
-        key(Action::Filter),
-        key(Action::Columns)
-    )
+    let [by, only, columns] = [Action::Sort, Action::Filter, Action::Columns].map(|action| model.keymap.key(action));
+    format!("{counts}; by {sort}{turned} ({by}), {shown} ({only}), columns ({columns})")
 }
 
 struct ShownColumn {

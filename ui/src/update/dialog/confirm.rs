@@ -3,7 +3,6 @@
 use std::time::Duration;
 
 use crossterm::event::KeyCode;
-use quadfrog::recording::record::LogLevel;
 use quadfrog::session::operator_request::{OperatorCheck, OperatorRequest};
 
 use crate::action::Action;
@@ -12,7 +11,7 @@ use crate::legal::legal;
 use crate::message::Effect;
 use crate::model::Model;
 use crate::model::dialog::{APPROVAL_PAUSE, Dialog};
-use crate::update::answer::{cancelled, request, say};
+use crate::update::answer::{cancelled, refused, request};
 
 /// The second press of an approval. Only the approving key approves, and only after a pause: a bounced or held key starts
 /// the pause again. Every other key, Enter included, cancels.
@@ -43,13 +42,10 @@ pub(super) fn arm_key(model: &mut Model, key: Key, typed: usize) -> Vec<Effect> 
     request_if_legal(model, Action::Arm, OperatorRequest::Arm, "not armed")
 }
 
-fn request_if_legal(model: &mut Model, action: Action, intent: OperatorRequest, refused: &str) -> Vec<Effect> {
+fn request_if_legal(model: &mut Model, action: Action, intent: OperatorRequest, text: &str) -> Vec<Effect> {
     match legal(action, model) {
         Ok(()) => request(model, intent),
-        Err(reason) => {
-            say(model, LogLevel::Warning, format!("{refused}: {reason}"));
-            Vec::new()
-        }
+        Err(reason) => refused(model, text, &reason),
     }
 }
 

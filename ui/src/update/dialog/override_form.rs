@@ -11,7 +11,7 @@ use crate::model::Model;
 use crate::model::dialog::{Dialog, OverrideForm, OverrideRow};
 use crate::update::answer::{cancelled, request};
 
-fn intent(row: &OverrideRow) -> OperatorRequest {
+fn override_request(row: &OverrideRow) -> OperatorRequest {
     match row.gain {
         true => OperatorRequest::OverrideGain { gain: row.name.clone(), value: row.value },
         false => OperatorRequest::Override { parameter: row.name.clone(), value: row.value },
@@ -60,15 +60,14 @@ pub(super) fn key(model: &mut Model, key: Key, mut form: OverrideForm) -> Vec<Ef
             form.problem = None;
         }
         KeyCode::Esc => return cancelled(model, "nothing was changed"),
+        KeyCode::Enter if !form.take_typed() => {}
         KeyCode::Enter => {
-            if form.take_typed() {
-                let changed = form.rows.iter().filter(|row| row.value != row.before);
-                let intents: Vec<OperatorRequest> = changed.map(intent).collect();
-                if intents.is_empty() {
-                    return cancelled(model, "nothing was changed");
-                }
-                return intents.into_iter().flat_map(|intent| request(model, intent)).collect();
+            let changed = form.rows.iter().filter(|row| row.value != row.before);
+            let requests: Vec<OperatorRequest> = changed.map(override_request).collect();
+            if requests.is_empty() {
+                return cancelled(model, "nothing was changed");
             }
+            return requests.into_iter().flat_map(|each| request(model, each)).collect();
         }
         // Queues the form's point with the gains that differ from the configuration.
         _ if model.keymap.action(key) == Some(Action::QueuePoint) => {
