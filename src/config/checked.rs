@@ -22,6 +22,12 @@ use crate::robot::description::RobotDescription;
 use crate::sim::{SimConfig, SimError};
 use crate::trial::{ParameterInfo, Task};
 
+/// Largest damping of Virtual Model Control, N s/m: a corner that moves at 1 m/s then meets half of the stiffness' force at a
+/// tilt of 1 rad.
+const MAX_ATTITUDE_RATE_GAIN: f64 = 100.0;
+/// Longest time of the foot placement, s: at 1 m/s the foot is then placed 0.3 m ahead, the end of the leg's reach.
+const MAX_FOOT_PLACEMENT_S: f64 = 0.3;
+
 /// The files of a configuration folder and their defaults.
 const FILES: [(&str, &str); 5] = [
     ("control.toml", include_str!("../../config/control.toml")),
@@ -334,7 +340,12 @@ impl Config {
             // A folded leg rests on its mechanical stop; what is asked of the motors ends at the limit.
             lying_position: std::array::from_fn(|i| robot.lying_position[i].clamp(min_position[i], max_position[i])),
             weight_n: robot.total_mass() * GRAVITY,
-            stand: StandSettings { gains: chosen.gains(), stance_leg: chosen.stance_leg(), vmc: chosen.vmc },
+            stand: StandSettings {
+                gains: chosen.gains(),
+                stance_leg: chosen.stance_leg(),
+                vmc: chosen.vmc,
+                attitude_rate_gain: chosen.attitude_rate_gain,
+            },
             stand_up: self.control.stand_up,
             sit_down: self.control.sit_down,
             countdown_s: if hardware { self.control.countdown.hardware_s } else { self.control.countdown.simulator_s },
@@ -417,6 +428,19 @@ impl Config {
                     let reason =
                         format!("must be within the safe range [{least}, {most}] of safety.toml, [gains] {key}");
                     return Err(self.refuse(FILE, &format!("{tables}.{key}"), value, reason));
+                }
+            }
+            for (key, value, most, unit) in [
+                ("attitude_rate_gain", chosen.attitude_rate_gain, MAX_ATTITUDE_RATE_GAIN, "N s/m"),
+                ("foot_placement_s", chosen.foot_placement_s, MAX_FOOT_PLACEMENT_S, "s"),
+            ] {
+                if !(0.0..=most).contains(&value) {
+                    return Err(self.refuse(
+                        FILE,
+                        &format!("{tables}.{key}"),
+                        value,
+                        format!("must be 0 to {most} {unit}"),
+                    ));
                 }
             }
             if chosen.jumps == 0 || chosen.jumps > 100 {

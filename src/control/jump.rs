@@ -1,5 +1,6 @@
 //! One trial: stand still, impulse, flight, landing, settle. ControlSettings are latched when it begins.
 
+use super::foot_placement::{SHORTEST_FLIGHT_S, SwingLegs};
 use super::force_profile::Oscillator;
 use super::leg::LegTarget;
 use super::limits::ticks;
@@ -30,8 +31,7 @@ pub struct Jump {
     /// Ticks since the trial began; the oscillator enters pi at `countdown`.
     elapsed: u32,
     countdown: u32,
-    /// Ticks without any foot on the ground since the last one.
-    airborne: u32,
+    swing: SwingLegs,
     /// Whether it has flown and touched down again since the last impulse.
     flown: bool,
     /// Ticks since the touchdown after the last impulse.
@@ -41,8 +41,6 @@ pub struct Jump {
     fall: FallWatch,
 }
 
-/// A foot may lift for a moment in stance; only a longer absence of all four is a flight.
-const SHORTEST_FLIGHT_S: f64 = 0.02;
 /// After an impulse that does not leave the ground within this time, the jump counts as landed.
 const LATEST_TAKEOFF_S: f64 = 0.1;
 
@@ -58,7 +56,7 @@ impl Jump {
             amplitudes_leg: spec.jump.amplitudes_leg(spec.task),
             elapsed: 0,
             countdown: ticks(settings.countdown_s),
-            airborne: 0,
+            swing: SwingLegs::default(),
             flown: false,
             landed: 0,
             quiet: 0,
@@ -109,12 +107,17 @@ impl Jump {
     }
 
     /// What the legs are to do now.
-    pub fn target(&self) -> LegTarget {
+    pub fn target(&self, estimate: &Estimate) -> LegTarget {
         let theta_rad = self.theta_rad();
         LegTarget {
             gains: self.spec.gains,
             stance_leg: self.spec.stance_leg,
             vmc: self.spec.vmc,
+            attitude_rate_gain: self.spec.attitude_rate_gain,
+            foot_offset_leg: self.swing.offsets_leg(
+                self.spec.foot_placement_s,
+                &estimate.orientation_world.inverse_transform_vector(&estimate.velocity_world),
+            ),
             amplitudes_leg: self.amplitudes_leg,
             theta_rad,
         }
@@ -130,12 +133,8 @@ impl Jump {
             return Progress::Countdown;
         }
         let feet_down = estimate.contact.iter().filter(|&&down| down).count();
-        if feet_down == 0 {
-            self.airborne += 1;
-        } else {
-            self.flown |= self.airborne >= ticks(SHORTEST_FLIGHT_S);
-            self.airborne = 0;
-        }
+        self.flown |= feet_down > 0 && self.swing.airborne_ticks() >= ticks(SHORTEST_FLIGHT_S);
+        self.swing.observe(&estimate.contact);
         let impulse = self.theta_rad() >= std::f64::consts::PI;
         if impulse {
             self.flown = false;
@@ -150,7 +149,7 @@ impl Jump {
         if since_impulse_s < 0.0 {
             return Progress::Jump;
         }
-        let stayed = self.airborne == 0 && since_impulse_s > LATEST_TAKEOFF_S;
+        let stayed = self.swing.airborne_ticks() == 0 && since_impulse_s > LATEST_TAKEOFF_S;
         if !self.flown && !stayed && since_impulse_s < settings.settle.cap_s {
             return Progress::Jump;
         }

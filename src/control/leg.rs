@@ -1,11 +1,13 @@
 //! The full leg controller: force profile, impedance and Virtual Model Control added up (paper, last equation of
 //! section II-C). Pure: numbers in, torques out.
 
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::Vector3;
 
+use super::vmc::VmcGains;
 use super::{force_profile, impedance, vmc};
 use crate::robot::kinematics::{Foot, LegGeometry};
 use crate::robot::{Joints, Leg, PerLeg, leg_of};
+use crate::telemetry::Estimate;
 use crate::trial::Gains;
 
 /// What the legs are to do in this tick.
@@ -17,6 +19,10 @@ pub struct LegTarget {
     pub stance_leg: Vector3<f64>,
     /// Whether Virtual Model Control acts.
     pub vmc: bool,
+    /// Damping of Virtual Model Control, N s/m; acts only where `vmc` does.
+    pub attitude_rate_gain: f64,
+    /// Shift of each leg's nominal foot position, leg frame, m; zero for legs that are not in swing.
+    pub foot_offset_leg: PerLeg<Vector3<f64>>,
     /// Signed force amplitudes per leg, leg frame, N; zero outside an impulse.
     pub amplitudes_leg: PerLeg<Vector3<f64>>,
     /// Phase of the oscillator, rad.
@@ -34,20 +40,19 @@ pub fn feet(geometry: &LegGeometry, joint_position: &Joints) -> PerLeg<Foot> {
 }
 
 /// Joint torques before the actuators' limits, N m: tau_i = tau_f,i + tau_imp,i + tau_VMC,i.
-pub fn torques(
-    target: &LegTarget,
-    feet: &PerLeg<Foot>,
-    joint_velocity: &Joints,
-    orientation_world: &UnitQuaternion<f64>,
-    contact: &PerLeg<bool>,
-) -> Joints {
-    let k_att = if target.vmc { target.gains.k_att } else { 0.0 };
-    let vmc_z = vmc::forces_leg_z(k_att, orientation_world, contact);
+pub fn torques(target: &LegTarget, feet: &PerLeg<Foot>, joint_velocity: &Joints, estimate: &Estimate) -> Joints {
+    let vmc_gains = if target.vmc {
+        VmcGains { attitude: target.gains.k_att, attitude_rate: target.attitude_rate_gain }
+    } else {
+        VmcGains { attitude: 0.0, attitude_rate: 0.0 }
+    };
+    let vmc_z =
+        vmc::forces_leg_z(vmc_gains, &estimate.orientation_world, &estimate.angular_velocity_body, &estimate.contact);
     let mut torques = Joints::default();
     for leg in Leg::ALL {
         let i = leg as usize;
         let dq = leg_of(joint_velocity, i);
-        let desired = stance_of(&target.stance_leg, leg);
+        let desired = stance_of(&target.stance_leg, leg) + target.foot_offset_leg[i];
         let mut force = impedance::force_leg(&target.gains, &desired, &feet[i], &dq);
         force += force_profile::force_leg(&target.amplitudes_leg[i], target.theta_rad);
         force.z += vmc_z[i];
