@@ -9,7 +9,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let out = PathBuf::from(std::env::var("OUT_DIR")?);
     let mut descriptors = protox::compile(["frog.proto"], ["proto"])?;
     prost_build::Config::new().compile_fds(descriptors.clone())?;
-    // Every channel of a recording carries the descriptor: without comments it has a third of the length.
+    // Every schema of a recording contains the descriptor: without comments it has a third of the length.
     for file in &mut descriptors.file {
         file.source_code_info = None;
     }

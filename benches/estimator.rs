@@ -1,6 +1,6 @@
-//! How good the estimate is over 100 jumps, and what one update costs. `cargo bench --bench estimator`.
+//! Accuracy of the estimator over 100 jumps, and duration of an update: `cargo bench --bench estimator`.
 //!
-//! The figures of accuracy are printed once, before the timing; they are the same on every machine.
+//! The accuracy is printed first; it is the same on every machine.
 
 #[path = "../tests/support/estimation.rs"]
 mod estimation;
@@ -20,10 +20,8 @@ const JUMPS: u32 = 100;
 const SEED: u64 = 0;
 
 fn accuracy(_: &mut Criterion) {
-    println!(
-        "Error of the estimate over {JUMPS} jumps with random parameters within the bounds, sensors with their errors"
-    );
-    println!("                             landed | displacement, cm    | yaw, rad      | apex, cm");
+    println!("Error of the estimate over {JUMPS} jumps with random parameters within the bounds and sensor errors");
+    println!("                             landed | displacement, cm    | yaw, rad      | rise, cm");
     println!("                             of     | median  95 %   max  | 95 %    max   | median  95 %");
     let worlds = [
         (World::Ideal, "ideal motors, friction 1.0"),
@@ -40,7 +38,7 @@ fn accuracy(_: &mut Criterion) {
         }
         let (_, fallen_on_truth) = jumps(world, ObjectiveSource::Truth, JUMPS, SEED);
         println!(
-            "  fallen, and left out: {}; with the controller on the truth {}",
+            "  fallen and excluded: {}; with the controller on the truth: {}",
             fallen.len(),
             fallen_on_truth.len()
         );
@@ -81,7 +79,7 @@ fn cost(criterion: &mut Criterion) {
             let feet = feet(&settings.geometry, &state.joint_position);
             b.iter(|| {
                 state.robot_time_ms = state.robot_time_ms.wrapping_add(1);
-                // No flight lasts for longer; what hangs is not filtered.
+                // No flight lasts longer than 1 s.
                 if state.robot_time_ms.is_multiple_of(1000) {
                     estimator.reset();
                 }

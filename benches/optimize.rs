@@ -1,10 +1,10 @@
-//! Time of one ask, and of a whole study on disk.
+//! Time of one ask and of a whole study on disk.
 
 use criterion::{Criterion, criterion_group, criterion_main};
+use quadfrog::optimize::ask::{Direction, SamplerConfig, SamplerKind};
 use quadfrog::optimize::journal::Durability;
-use quadfrog::optimize::sampler::{Direction, SamplerConfig, SamplerKind};
 use quadfrog::optimize::space::{Range, Space};
-use quadfrog::optimize::study::{Outcome, Storage, Study, StudyOptions};
+use quadfrog::optimize::study::{Outcome, Storage, Study, StudyOptions, SuggestedParameter};
 use std::hint::black_box;
 
 fn options(sampler: SamplerConfig, durability: Durability) -> StudyOptions {
@@ -20,7 +20,7 @@ fn options(sampler: SamplerConfig, durability: Durability) -> StudyOptions {
     }
 }
 
-/// A study with `trials` finished trials of a smooth objective, at points of the random sampler so that it is quick.
+/// A study with `trials` finished trials of a smooth objective, at points of the random sampler, which is fast.
 fn history(sampler: SamplerConfig, trials: u32) -> Study {
     let random = SamplerConfig { kind: SamplerKind::Random, ..SamplerConfig::default() };
     let mut points = Study::open(Storage::Memory, options(random, Durability::Buffered)).expect("memory");
@@ -29,7 +29,7 @@ fn history(sampler: SamplerConfig, trials: u32) -> Study {
         let draft = points.draft();
         let number = points.begin(&draft, &[], &[]).expect("begins");
         let point: Vec<_> = points.trial(number).expect("begun").parameters.clone();
-        points.tell(number, Outcome::Complete(0.0)).expect("told");
+        points.tell(number, Outcome::Complete(0.0)).expect("running");
         study.enqueue(&point, &[]).expect("queued");
         run(&mut study);
     }
@@ -39,9 +39,9 @@ fn history(sampler: SamplerConfig, trials: u32) -> Study {
 fn run(study: &mut Study) {
     let draft = study.draft();
     let number = study.begin(&draft, &[], &[]).expect("begins");
-    let u = |s: &quadfrog::optimize::study::Suggestion| (s.value - s.low) / (s.high - s.low) - 0.4;
+    let u = |s: &SuggestedParameter| (s.value - s.low) / (s.high - s.low) - 0.4;
     let value = -draft.parameters.iter().map(|s| u(s) * u(s)).sum::<f64>();
-    study.tell(number, Outcome::Complete(value)).expect("told");
+    study.tell(number, Outcome::Complete(value)).expect("running");
 }
 
 fn ask(c: &mut Criterion) {
@@ -53,7 +53,7 @@ fn ask(c: &mut Criterion) {
             group.bench_function(format!("tpe {mode}, {trials} trials"), |b| b.iter(|| black_box(study.draft())));
         }
     }
-    // The fit grows with the cube of the trials: what it is made for is some tens of them.
+    // The cost of the fit grows with the cube of the number of trials; the sampler is intended for some tens.
     group.sample_size(10);
     for trials in [20, 50, 200] {
         let study = history(SamplerConfig { kind: SamplerKind::Gp, ..SamplerConfig::default() }, trials);

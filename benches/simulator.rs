@@ -1,16 +1,16 @@
-//! Speed of the simulator: dynamics alone, steps standing on four contacts, cost by number of contacts.
-//! `cargo bench --bench simulator`; MuJoCo's side of the comparison is its own `mj_step` on the same model and machine.
+//! Duration of the dynamics alone and of a step by number of contacts: `cargo bench --bench simulator`. The counterpart in
+//! MuJoCo is `mj_step` on the same model and machine.
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use quadfrog::sim::bench::{Scene, Speed};
+use quadfrog::sim::bench::{BenchScene, SimulatorBench};
 
 fn benches(criterion: &mut Criterion) {
-    let speed = Speed::new();
+    let speed = SimulatorBench::new();
     criterion.bench_function("dynamics: accelerations from torques", |b| {
         let mut dynamics = speed.dynamics();
         b.iter(|| dynamics.run());
     });
-    for scene in Scene::ALL {
+    for scene in BenchScene::ALL {
         criterion.bench_function(&format!("1 ms step, {}", scene.name()), |b| {
             let mut stand = speed.scene(scene);
             b.iter(|| stand.step());

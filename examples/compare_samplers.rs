@@ -1,20 +1,20 @@
-//! Prints the table of `src/optimize/README.md`: mean best value after 20 and 50 trials on three functions of four
+//! Prints the table of `src/optimize/README.md`: mean best value after 20 and 50 trials on five functions of four
 //! parameters, per sampler.
 //!
 //! `cargo run --release --example compare_samplers [SEEDS] [SAMPLER...]`
 
-use quadfrog::optimize::sampler::{Direction, SamplerConfig, SamplerKind};
+use quadfrog::optimize::ask::{Direction, SamplerConfig, SamplerKind};
 use quadfrog::optimize::space::{Range, Space};
 use quadfrog::optimize::study::{Outcome, Storage, Study, StudyOptions};
 use quadfrog::optimize::trial::{FALL, VERDICT};
 
-/// sphere: -sum (u - c)^2
+/// -sum (u - c)^2
 fn sphere(u: &[f64]) -> f64 {
     let centre = [0.35, 0.6, 0.4, 0.55];
     -u.iter().zip(centre).map(|(u, c)| (u - c) * (u - c)).sum::<f64>()
 }
 
-/// ridge: a curved crest along u4 = 0.3 + u1/2
+/// A curved crest along u4 = 0.3 + u1/2.
 fn ridge(u: &[f64]) -> f64 {
     let (u1, u2, u3, u4) = (u[0], u[1], u[2], u[3]);
     let (a, b) = (u3 - 0.3, u4 - 0.3 - 0.5 * u1);
@@ -52,7 +52,7 @@ fn pocket(u: &[f64]) -> f64 {
 
 type Function = fn(&[f64]) -> f64;
 
-/// Best value after 20 and after 50 trials, and falls among the first 20.
+/// Best values after 20 and after 50 trials, and falls among the first 20.
 fn run(sampler: SamplerConfig, function: Function, falls: bool) -> [f64; 3] {
     let ranges = [("f0", 0.75, 1.75), ("Fx", 0.0, 150.0), ("Fy", 0.0, 150.0), ("Fz", 150.0, 350.0)];
     let options = StudyOptions {

@@ -1,31 +1,33 @@
 //! TOML files to checked values. The files of `config/` are embedded as the defaults; another folder may replace any of
-//! them, whole or key by key. A key that the defaults do not have is refused, with file, line and the nearest known key.
+//! their keys. A key that the defaults do not have is rejected with file, line and the nearest known key.
 
 mod checked;
 mod export;
+mod files;
 mod merge;
-mod safety;
+mod ranges;
+mod rules;
 
-pub use checked::{Backend, Config, ConfirmFile, ControlFile, OptimizeFile, WorkersFile};
-pub use safety::SafetyFile;
+pub use checked::Config;
+pub use files::{ConfirmFile, ControlFile, OptimizeFile, SafetyFile, WorkersFile};
 
 use std::path::PathBuf;
 
-/// A configuration that cannot be used: which file, which key, which value, and what to do.
+/// Error of a configuration: file, key, value and remedy.
 #[derive(Debug, thiserror::Error)]
 pub enum ConfigError {
-    /// The folder is not there.
+    /// The folder does not exist.
     #[error("{}: no such configuration folder; give a folder that holds control.toml, safety.toml, ... or leave --config away", path.display())]
     NoFolder {
         /// The folder.
         path: PathBuf,
     },
-    /// A file that no one reads: probably a misspelt name.
+    /// A file that is not read: probably a misspelt name.
     #[error("{}: not a configuration file; the files are {known}", path.display())]
     UnknownFile {
         /// The file.
         path: PathBuf,
-        /// The names that are read.
+        /// Names of the files that are read.
         known: String,
     },
     /// The file cannot be read.
@@ -33,15 +35,15 @@ pub enum ConfigError {
     Read {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// Error of the system.
         source: std::io::Error,
     },
-    /// The file cannot be written, or is there already.
+    /// The file cannot be written, or exists already.
     #[error("{}: cannot be written: {source}; give a new folder", path.display())]
     Write {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// Error of the system.
         source: std::io::Error,
     },
     /// Not TOML.
@@ -51,7 +53,7 @@ pub enum ConfigError {
         file: String,
         /// Line, from 1.
         line: usize,
-        /// What the parser says.
+        /// Message of the parser.
         message: String,
     },
     /// A key that does not exist.
@@ -66,7 +68,7 @@ pub enum ConfigError {
         /// The most similar known key.
         nearest: Option<String>,
     },
-    /// A value of another kind than it must be.
+    /// A value of the wrong kind.
     #[error("{file}:{line}: `{key}` must be {expected}, not {found}")]
     Kind {
         /// The file.
@@ -75,21 +77,21 @@ pub enum ConfigError {
         line: usize,
         /// The key with its tables.
         key: String,
-        /// The kind that it must have.
+        /// Kind of the default.
         expected: String,
-        /// What stands there.
+        /// Value in the file.
         found: String,
     },
-    /// A value that cannot be.
+    /// A value that is not allowed.
     #[error("{file}: `{key}` = {value}: {reason}")]
     Value {
-        /// The file, with the line where the file gives one.
+        /// The file, with the line if the file has the key.
         file: String,
         /// The key with its tables.
         key: String,
-        /// What stands there.
+        /// Value in the file.
         value: String,
-        /// Why it cannot be, and what can.
+        /// Reason, with the allowed values.
         reason: String,
     },
 }

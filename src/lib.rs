@@ -52,7 +52,7 @@
 //! # Where this differs from the first plan of the house
 //!
 //! * *The next proposal is drafted, not asked for.* A verdict stays open to undo until the next trial begins, yet the
-//!   operator should see the next proposal at once. So a proposal is a [`optimize::study::Draft`] without effect, made on
+//!   operator should see the next proposal at once. So a proposal is a [`optimize::study::TrialDraft`] without effect, made on
 //!   a fork of the study in which the verdict is told already; verdict and proposal become final together, on approval.
 //! * *A study has a folder* (`study.log`, `config/`, one `session.mcap` per run of the program), because a study can be
 //!   continued by another session.
@@ -60,8 +60,8 @@
 //!   then a function of its parameters and seed alone: the console, `optimize` and a replay agree bit for bit.
 //! * *The control thread's body is [`control::control_loop`]*, not the engine's: the engine paces it, a bench and the test with the
 //!   aborting allocator call the very same code.
-//! * *A tick on hardware is rehearsed* on a copy shortly before it comes ([`control::control_loop::ControlLoop::rehearse`]), because fetching
-//!   code and data into the processor's caches was a good part of the longest ticks.
+//! * *A cache warm-up precedes each tick on hardware* ([`control::control_loop`]): cold caches were a good part of the longest
+//!   ticks.
 //! * *There is a second process where there is a robot* (`engine/guard.rs`): a program that is killed cannot damp it any more.
 //! * *The session may act by itself* (`--approve`, [`trial`]), through the same wishes as a person and refused
 //!   for the same reasons; a person's STOP, cancel or fault outranks it.

@@ -1,12 +1,30 @@
 //! Vocabulary of a trial: task, parameters with units, proposal, status, verdict, measured values.
 
-use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
+use strum::{EnumString, IntoStaticStr, VariantArray};
 
-use crate::robot::{LEGS, Leg, PerLeg};
+/// The robot behind the controller.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, EnumString, IntoStaticStr, VariantArray)]
+pub enum Backend {
+    /// The built-in simulator.
+    #[strum(serialize = "sim")]
+    Simulator,
+    /// A robot over its network.
+    #[strum(serialize = "go1")]
+    Hardware,
+}
 
-/// What the robot is asked to learn; decides the signs of the force amplitudes and the objective.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+impl Backend {
+    /// Returns the name in recordings.
+    pub fn name(self) -> &'static str {
+        self.into()
+    }
+}
+
+/// The kind of jump that is optimized; decides the signs of the force amplitudes and the objective.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, EnumString, IntoStaticStr, VariantArray)]
+#[serde(rename_all = "kebab-case")]
+#[strum(serialize_all = "kebab-case")]
 pub enum Task {
     /// Jump forward.
     Forward,
@@ -16,36 +34,83 @@ pub enum Task {
     LateralRight,
     /// Turn counterclockwise, seen from above.
     TwistCcw,
-    /// Turn clockwise.
+    /// Turn clockwise, seen from above.
     TwistCw,
 }
 
 impl Task {
     /// All tasks.
-    pub const ALL: [Task; 5] = [Task::Forward, Task::LateralLeft, Task::LateralRight, Task::TwistCcw, Task::TwistCw];
+    pub const ALL: [Task; Task::VARIANTS.len()] = *Task::VARIANTS.first_chunk().unwrap();
 
-    /// The name on the command line and in files.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Task::Forward => "forward",
-            Task::LateralLeft => "lateral-left",
-            Task::LateralRight => "lateral-right",
-            Task::TwistCcw => "twist-ccw",
-            Task::TwistCw => "twist-cw",
-        }
+    /// Returns the name on the command line and in files.
+    pub fn name(self) -> &'static str {
+        self.into()
     }
 
-    /// The task of that name.
+    /// Returns the task of that name.
     pub fn from_name(name: &str) -> Option<Task> {
-        Task::ALL.into_iter().find(|task| task.name() == name)
+        name.parse().ok()
     }
 
-    /// The unit of the objective: metres, or radians for a twist.
+    /// Returns the unit of the objective: m, or rad for a twist.
     pub const fn unit(self) -> &'static str {
         match self {
             Task::Forward | Task::LateralLeft | Task::LateralRight => "m",
             Task::TwistCcw | Task::TwistCw => "rad",
         }
+    }
+}
+
+/// The parameters that a study may optimize, with their units.
+pub const PARAMETER_UNITS: [(&str, &str); 5] = [("f0", "Hz"), ("f1", "Hz"), ("Fx", "N"), ("Fy", "N"), ("Fz", "N")];
+
+/// The gains of the controller, in table order, with their units.
+pub const GAIN_UNITS: [(&str, &str); 4] = [("kp", "N/m"), ("kd", "N s/m"), ("kd_joint", "N m s/rad"), ("k_att", "N/m")];
+
+/// Returns the unit of an optimized parameter; empty for an unknown name.
+pub fn parameter_unit(name: &str) -> &'static str {
+    PARAMETER_UNITS.iter().find(|(known, _)| *known == name).map_or("", |(_, unit)| unit)
+}
+
+/// Values by name, in table order: the parameters of a point, or the gains of a trial.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct ParameterValues(Vec<(String, f64)>);
+
+impl ParameterValues {
+    /// Returns the value of that name.
+    pub fn get(&self, name: &str) -> Option<f64> {
+        self.iter().find(|(known, _)| known == name).map(|(_, value)| *value)
+    }
+}
+
+/// The optimizer's plain pairs.
+impl std::ops::Deref for ParameterValues {
+    type Target = [(String, f64)];
+
+    fn deref(&self) -> &Self::Target {
+        &self.0
+    }
+}
+
+impl From<Vec<(String, f64)>> for ParameterValues {
+    fn from(pairs: Vec<(String, f64)>) -> ParameterValues {
+        ParameterValues(pairs)
+    }
+}
+
+impl FromIterator<(String, f64)> for ParameterValues {
+    fn from_iter<I: IntoIterator<Item = (String, f64)>>(pairs: I) -> ParameterValues {
+        ParameterValues(pairs.into_iter().collect())
+    }
+}
+
+impl<'a> IntoIterator for &'a ParameterValues {
+    type Item = &'a (String, f64);
+    type IntoIter = std::slice::Iter<'a, (String, f64)>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.0.iter()
     }
 }
 
@@ -65,25 +130,21 @@ pub struct JumpParameters {
 }
 
 impl JumpParameters {
-    /// The amplitude `[Fx Fy Fz]` of each foot with the signs of `task` (`specs/method.md`, "Amplitude signs"),
-    /// as the force that the foot exerts divided by sin(theta), leg frame, N.
-    pub fn amplitudes_leg(&self, task: Task) -> PerLeg<Vector3<f64>> {
-        let mut amplitudes = [Vector3::zeros(); LEGS];
-        for (amplitude, leg) in amplitudes.iter_mut().zip(Leg::ALL) {
-            *amplitude = match task {
-                Task::Forward => Vector3::new(self.fx_n, 0.0, self.fz_n),
-                Task::LateralLeft => Vector3::new(0.0, self.fy_n, self.fz_n),
-                Task::LateralRight => Vector3::new(0.0, -self.fy_n, self.fz_n),
-                Task::TwistCcw => Vector3::new(0.0, leg.end() * self.fy_n, self.fz_n),
-                Task::TwistCw => Vector3::new(0.0, -leg.end() * self.fy_n, self.fz_n),
-            };
+    /// Returns the jump of a point; `f1_hz` holds where the point has no `f1`, and an amplitude that it lacks is 0.
+    pub fn from_values(values: &ParameterValues, f1_hz: f64) -> JumpParameters {
+        let value = |name: &str| values.get(name).unwrap_or(0.0);
+        JumpParameters {
+            f0_hz: value("f0"),
+            f1_hz: values.get("f1").unwrap_or(f1_hz),
+            fx_n: value("Fx"),
+            fy_n: value("Fy"),
+            fz_n: value("Fz"),
         }
-        amplitudes
     }
 }
 
 /// Gains of the leg controller (paper, equation 4 and the Virtual Model Control).
-#[derive(Debug, Clone, Copy, PartialEq, serde::Deserialize, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Gains {
     /// Cartesian stiffness Kp, N/m, the same along all axes.
@@ -96,34 +157,52 @@ pub struct Gains {
     pub k_att: f64,
 }
 
-/// How much a person is asked. STOP, the loss of the operator and every limit work the same in all.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+impl Gains {
+    /// Returns the gains by name, in table order.
+    pub fn values(&self) -> ParameterValues {
+        let Gains { kp, kd, kd_joint, k_att } = *self;
+        GAIN_UNITS.iter().zip([kp, kd, kd_joint, k_att]).map(|((name, _), value)| ((*name).to_owned(), value)).collect()
+    }
+
+    /// Returns these gains with the values of `values` in place of their own.
+    pub fn with(&self, values: &ParameterValues) -> Gains {
+        let value = |name: &str, own| values.get(name).unwrap_or(own);
+        Gains {
+            kp: value("kp", self.kp),
+            kd: value("kd", self.kd),
+            kd_joint: value("kd_joint", self.kd_joint),
+            k_att: value("k_att", self.k_att),
+        }
+    }
+}
+
+/// The jumps that a person approves and judges. STOP, the loss of the operator and every limit work the same in all.
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, EnumString, IntoStaticStr, VariantArray,
+)]
+#[strum(serialize_all = "kebab-case")]
 pub enum Approval {
     /// A person approves and judges each jump.
     #[default]
     Each,
-    /// What landed and settled is accepted by itself, and on the simulator the next jump is approved by itself; a fall or
-    /// anything odd waits for a person.
+    /// A jump that landed and settled is accepted automatically, and on the simulator the next jump is approved
+    /// automatically; a fall or an interrupted jump waits for a person.
     FallsOnly,
-    /// Nobody is asked: for the simulator alone.
+    /// Everything is approved and judged automatically; on the simulator only.
     Auto,
 }
 
 impl Approval {
     /// All of them.
-    pub const ALL: [Approval; 3] = [Approval::Each, Approval::FallsOnly, Approval::Auto];
+    pub const ALL: [Approval; Approval::VARIANTS.len()] = *Approval::VARIANTS.first_chunk().unwrap();
 
-    /// The word on the command line and in files.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Approval::Each => "each",
-            Approval::FallsOnly => "falls-only",
-            Approval::Auto => "auto",
-        }
+    /// Returns the name on the command line and in files.
+    pub fn name(self) -> &'static str {
+        self.into()
     }
 }
 
-/// One optimized parameter.
+/// One optimized parameter, or one gain.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ParameterInfo {
     /// Name, for example `Fx`.
@@ -136,8 +215,20 @@ pub struct ParameterInfo {
     pub high: f64,
 }
 
-/// Where the session is in a trial's life.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+impl ParameterInfo {
+    /// Returns whether `value` is within the bounds; false for NaN.
+    pub fn contains(&self, value: f64) -> bool {
+        value >= self.low && value <= self.high
+    }
+}
+
+/// Stage of the experiment's current trial.
+///
+/// ```text
+/// proposed -> running -> review -> proposed | finished
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, EnumString, IntoStaticStr, VariantArray)]
+#[strum(serialize_all = "lowercase")]
 pub enum ExperimentStage {
     /// A proposal waits for approval.
     Proposed,
@@ -151,74 +242,59 @@ pub enum ExperimentStage {
 
 impl ExperimentStage {
     /// All stages.
-    pub const ALL: [ExperimentStage; 4] =
-        [ExperimentStage::Proposed, ExperimentStage::Running, ExperimentStage::Review, ExperimentStage::Finished];
+    pub const ALL: [ExperimentStage; ExperimentStage::VARIANTS.len()] =
+        *ExperimentStage::VARIANTS.first_chunk().unwrap();
 
-    /// The word that the operator sees and that files hold.
-    pub const fn name(self) -> &'static str {
-        match self {
-            ExperimentStage::Proposed => "proposed",
-            ExperimentStage::Running => "running",
-            ExperimentStage::Review => "review",
-            ExperimentStage::Finished => "finished",
-        }
+    /// Returns the name on the screen and in files.
+    pub fn name(self) -> &'static str {
+        self.into()
     }
 }
 
-/// Who chose a trial's parameters.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+/// Origin of a trial's parameters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, EnumString, IntoStaticStr, VariantArray)]
 #[serde(rename_all = "kebab-case")]
+#[strum(serialize_all = "lowercase")]
 pub enum ProposalSource {
     /// The sampler alone.
     Sampler,
     /// The operator changed at least one.
     Operator,
     /// A re-run of an earlier trial.
+    #[strum(serialize = "re-run")]
     Rerun,
     /// A point queued beforehand, by the operator or by another program.
     Queued,
-    /// A repeat of one of the best points, to be sure of the best; beyond the budget.
+    /// A repeat of one of the best points, to confirm the best; beyond the budget.
     Confirm,
 }
 
 impl ProposalSource {
     /// All sources.
-    pub const ALL: [ProposalSource; 5] = [
-        ProposalSource::Sampler,
-        ProposalSource::Operator,
-        ProposalSource::Rerun,
-        ProposalSource::Queued,
-        ProposalSource::Confirm,
-    ];
+    pub const ALL: [ProposalSource; ProposalSource::VARIANTS.len()] = *ProposalSource::VARIANTS.first_chunk().unwrap();
 
-    /// The word that the operator sees and that files hold.
-    pub const fn name(self) -> &'static str {
-        match self {
-            ProposalSource::Sampler => "sampler",
-            ProposalSource::Operator => "operator",
-            ProposalSource::Rerun => "re-run",
-            ProposalSource::Queued => "queued",
-            ProposalSource::Confirm => "confirm",
-        }
+    /// Returns the name on the screen and in files.
+    pub fn name(self) -> &'static str {
+        self.into()
     }
 }
 
-/// A proposal: what will run if it is approved.
+/// A proposed trial: the values that run if it is approved.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Proposal {
     /// The number that the trial will have.
     pub trial: u32,
-    /// Changes with every override: an approval names the revision that the operator saw.
+    /// Changed by every override: an approval names the revision that the operator saw.
     pub revision: u32,
-    /// Who chose the parameters.
+    /// Origin of the parameters.
     pub source: ProposalSource,
     /// The trial whose parameters these are, for a re-run.
     pub parent: Option<u32>,
     /// The values, in table order.
     pub parameters: Vec<ProposedParameter>,
-    /// How near earlier falls are; none before the first judged trial.
+    /// Distance to earlier falls; none before the first judged trial.
     pub risk: Option<FallRisk>,
-    /// The controller's gains, in table order; `proposed` is what the trial would run with if nobody had changed them.
+    /// The controller's gains, in table order; `proposed` is the configured value.
     pub gains: Vec<ProposedParameter>,
 }
 
@@ -229,11 +305,11 @@ pub struct ProposedParameter {
     pub name: String,
     /// The value that will run.
     pub value: f64,
-    /// What the sampler (or the queue) proposed; differs from `value` after an override.
+    /// The value from the sampler or the queue; differs from `value` after an override.
     pub proposed: f64,
 }
 
-/// How near a proposal is to earlier falls, in parameters scaled to their bounds. Shown, never silently used.
+/// Distance of a proposal to earlier falls, in parameters scaled to their bounds. Shown only: it changes no proposal.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct FallRisk {
     /// Euclidean distance to the nearest fall; none without a fall.
@@ -242,37 +318,34 @@ pub struct FallRisk {
     pub nearest_fall_trial: Option<u32>,
     /// Falls among the nearest judged trials.
     pub falls: u32,
-    /// How many nearest judged trials were looked at, at most 5.
+    /// Number of nearest judged trials that were compared, at most 5.
     pub neighbours: u32,
 }
 
-/// What an operator (or the automatic rule) decides of a trial.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+/// Decision of the operator, or of the automatic rule, on a trial.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, EnumString, IntoStaticStr, VariantArray)]
 #[serde(rename_all = "lowercase")]
+#[strum(serialize_all = "lowercase")]
 pub enum Verdict {
-    /// It counts with its value.
+    /// The trial counts with its value.
     Accept,
-    /// It fell: told with J = 0.
+    /// The robot fell: reported to the sampler with J = 0.
     Fall,
-    /// Its cause lies outside the parameters: hidden from the sampler, kept on record.
+    /// The cause lies outside the parameters: hidden from the sampler, kept on record.
     Void,
 }
 
 impl Verdict {
     /// All verdicts.
-    pub const ALL: [Verdict; 3] = [Verdict::Accept, Verdict::Fall, Verdict::Void];
+    pub const ALL: [Verdict; Verdict::VARIANTS.len()] = *Verdict::VARIANTS.first_chunk().unwrap();
 
-    /// The word that the operator sees and that files hold.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Verdict::Accept => "accept",
-            Verdict::Fall => "fall",
-            Verdict::Void => "void",
-        }
+    /// Returns the name on the screen and in files.
+    pub fn name(self) -> &'static str {
+        self.into()
     }
 }
 
-/// What was measured of a jump, in the world frame turned so that the trial starts at yaw 0.
+/// Measured values of a jump, in the world frame turned so that the trial starts at yaw 0.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct MeasuredJump {
     /// Forward displacement x_final - x_init, m.
@@ -292,42 +365,42 @@ pub struct MeasuredJump {
 pub struct TrialRecord {
     /// Number in the study.
     pub trial: u32,
-    /// Who chose the parameters.
+    /// Origin of the parameters.
     pub source: ProposalSource,
     /// The trial whose parameters these are, for a re-run.
     pub parent: Option<u32>,
     /// Parameters by name, in table order.
-    pub parameters: Vec<(String, f64)>,
-    /// What was measured; none while it runs, or if it was stopped before.
+    pub parameters: ParameterValues,
+    /// Measured values; none while it runs, or if it was stopped before.
     pub measured: Option<MeasuredJump>,
-    /// The objective that the sampler is told: the measured or the hand-measured value, 0 for a fall, none for a void.
+    /// The objective that is reported to the sampler: the measured or the hand-measured value, 0 for a fall, none for void.
     pub value: Option<f64>,
     /// A value measured by hand, kept beside the measured one.
     pub hand_value: Option<f64>,
     /// The verdict that the rules suggest.
     pub suggested: Option<Verdict>,
-    /// Why they suggest it, in words.
+    /// Reason of the suggestion, or of another verdict.
     pub cause: String,
     /// The verdict; none while it runs or waits.
     pub verdict: Option<Verdict>,
     /// The operator's note.
     pub note: String,
-    /// How near earlier falls were when it was approved.
+    /// Distance to earlier falls at its approval.
     pub risk: Option<FallRisk>,
-    /// The controller's gains that it ran with, by name; empty for a trial of another program.
-    pub gains: Vec<(String, f64)>,
+    /// The controller's gains that it ran with; empty for a trial of another program.
+    pub gains: ParameterValues,
 }
 
-/// What is searched at present, and how far the study is.
+/// The present search space and the progress of the study.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct SearchStatus {
-    /// How many trials are to count.
+    /// Trials that are to count.
     pub budget: u32,
-    /// How many count so far: accepted or fallen, repeats that confirm the best left out.
+    /// Trials that count so far: accepted or fallen, without repeats that confirm the best.
     pub counted: u32,
     /// Every parameter, in table order.
     pub parameters: Vec<SearchedParameter>,
-    /// How many repeats are left to confirm the best; none while nothing is being confirmed.
+    /// Repeats left to confirm the best; none while no confirmation runs.
     pub confirming: Option<u32>,
 }
 
@@ -348,16 +421,16 @@ pub struct SearchedParameter {
     pub fixed: Option<FixedParameter>,
 }
 
-/// A parameter that is not searched for some trials.
+/// A parameter that is fixed for some trials.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct FixedParameter {
     /// Its value, in the parameter's unit.
     pub value: f64,
-    /// For how many trials more, the proposed one among them.
+    /// Trials left, including the proposed one.
     pub trials: u32,
 }
 
-/// Why a point was proposed.
+/// Reasons of a proposal.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ProposalInsight {
     /// The proposed trial.
@@ -366,7 +439,7 @@ pub struct ProposalInsight {
     pub parameters: Vec<ParameterInsight>,
 }
 
-/// Why a parameter has the proposed value, and what it matters.
+/// Reasons of one parameter's proposed value, and its importance.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ParameterInsight {
     /// Name.
@@ -376,7 +449,7 @@ pub struct ParameterInsight {
     /// Share of this parameter in reaching the best tenth of the trials, 0 to 1, all together 1 (PED-ANOVA); none while
     /// there are too few trials to tell.
     pub importance: Option<f64>,
-    /// Where the densities are known, from the lower to the upper bound; empty where TPE does not propose.
+    /// Values at which the densities are given, from the lower to the upper bound; empty where TPE does not propose.
     pub at: Vec<f64>,
     /// TPE's l(x), of the good trials, per unit of the parameter.
     pub good: Vec<f64>,
@@ -384,20 +457,20 @@ pub struct ParameterInsight {
     pub bad: Vec<f64>,
 }
 
-/// A point that was run more than once, or is about to be: its repeats are aggregated as `optimize::repeats` says.
+/// A point that was run more than once or is being confirmed; repeats are aggregated as in `optimize::repeats`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PointRecord {
     /// Parameters by name, in table order.
-    pub parameters: Vec<(String, f64)>,
+    pub parameters: ParameterValues,
     /// Its trials that count, ascending: n is their number.
     pub trials: Vec<u32>,
-    /// k: how many of them did not fall.
+    /// k: number of them that did not fall.
     pub stood: u32,
     /// Mean value, falls included.
     pub mean: f64,
     /// Standard deviation of a single repeat, from two repeats on.
     pub deviation: Option<f64>,
-    /// Whether it is one of those among which the best is being confirmed, or was.
+    /// Whether it is or was one of the points among which the best is confirmed.
     pub contender: bool,
     /// The confidence that it is the best of the contenders; of the leading one alone.
     pub confidence: Option<f64>,

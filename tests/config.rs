@@ -1,13 +1,13 @@
-//! Configuration files: what is wrong is refused with file, line, key, value and what to do.
+//! Configuration files: errors are reported with file, line, key, value and remedy.
 
 use std::fs;
 use std::path::PathBuf;
 
-use quadfrog::config::{Backend, Config};
+use quadfrog::config::Config;
 use quadfrog::robot::description::RobotDescription;
-use quadfrog::trial::Task;
+use quadfrog::trial::{Backend, Task};
 
-/// A folder with one file, and the message that loading it gives.
+/// Loads a folder with one file and returns the error's message.
 fn refused(name: &str, text: &str) -> String {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join(name), text).unwrap();
@@ -148,7 +148,7 @@ fn a_stop_that_the_gate_would_cut_is_refused() {
     assert!(error.contains("gate.damping_kd") && error.contains("kd_max"), "{error}");
 }
 
-/// (A defect once: such values were said to stand in line 1.)
+/// (A defect once: such values were reported in line 1.)
 #[test]
 fn values_that_no_kind_can_hold_are_refused_with_their_line_key_and_value() {
     let error = refused("optimize.toml", "# mine\n\ntrials = -3\n");

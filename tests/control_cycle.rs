@@ -1,7 +1,7 @@
-//! The control cycle on the simulator, tick by tick: STOP, faults, limits, an operator who is gone.
+//! The control cycle on the simulator, tick by tick: STOP, faults, limits, a lost operator.
 
 use proptest::prelude::*;
-use quadfrog::config::{Backend, Config};
+use quadfrog::config::Config;
 use quadfrog::control::cycle::{Cycle, Inputs};
 use quadfrog::control::limits::CommandGate;
 use quadfrog::control::settings::ControlSettings;
@@ -11,8 +11,8 @@ use quadfrog::robot::go1::convert::low_cmd;
 use quadfrog::robot::go1::packet::CrcForm;
 use quadfrog::robot::{JOINTS, JointCommand, MotorCommand, Placement, Robot, RobotError, RobotState};
 use quadfrog::sim::Simulator;
-use quadfrog::telemetry::{Command, Event, Mode, Permit, Tick, TrialEnd, TrialSpec};
-use quadfrog::trial::{JumpParameters, Task};
+use quadfrog::telemetry::{Command, CommandRefusal, Event, Mode, Permit, Tick, TrialEnd, TrialSpec};
+use quadfrog::trial::{Backend, JumpParameters, Task};
 
 struct Bench {
     config: Config,
@@ -21,7 +21,7 @@ struct Bench {
     robot: Simulator,
     time_ms: u64,
     events: Vec<Event>,
-    /// Ticks that carried a trial.
+    /// Ticks of trials.
     trial_ticks: u64,
 }
 
@@ -48,7 +48,7 @@ impl Bench {
         self.tick(Inputs { command: Some(command), ..Inputs::default() })
     }
 
-    /// Ticks without a word until `mode`.
+    /// Ticks without a command until `mode`.
     fn until(&mut self, mode: Mode) -> Tick {
         for _ in 0..20_000 {
             let tick = self.tick(Inputs::default());
@@ -64,7 +64,7 @@ impl Bench {
         TrialSpec { trial: 7, ..self.config.task(Task::Forward).trial(Task::Forward, jump) }
     }
 
-    /// An approval given now, by somebody who has heard of every change of mode.
+    /// An approval given now, with every change of mode counted.
     fn approval(&self) -> Permit {
         let changes = self.events.iter().filter(|event| matches!(event, Event::Mode { .. })).count();
         Permit { mode_changes: changes as u64, given_ns: self.time_ms * 1_000_000 }
@@ -78,7 +78,7 @@ impl Bench {
         Command::Arm(self.approval())
     }
 
-    /// Brings the machine into `mode` on the way that an operator takes.
+    /// Brings the machine into `mode` with an operator's commands.
     fn reach(&mut self, mode: Mode) {
         if mode == Mode::Offline {
             return;
@@ -97,7 +97,7 @@ impl Bench {
         ];
         for (step, command) in way {
             match command {
-                // Given at this moment: an approval dies with every change of mode.
+                // Any change of mode voids an approval.
                 Some(Command::RunTrial(..)) => drop(self.command(self.approved())),
                 Some(Command::Arm(_)) => drop(self.command(self.arm())),
                 Some(command) => drop(self.command(command)),
@@ -137,10 +137,10 @@ fn an_operator_arms_jumps_and_sits_down() {
     assert!(is_damping(&tick.command, &bench.settings));
 }
 
-/// STOP from every mode: damping is what this very tick sends.
+/// STOP from every mode sends damping in the same tick.
 #[test]
 fn stop_from_every_mode_damps_in_the_same_tick() {
-    for mode in Mode::ALL {
+    for &mode in Mode::ALL {
         let mut bench = Bench::new();
         bench.reach(mode);
         let tick = bench.tick(Inputs { stop: true, ..Inputs::default() });
@@ -154,7 +154,7 @@ fn stop_from_every_mode_damps_in_the_same_tick() {
     }
 }
 
-/// STOP wins over a command of the same tick.
+/// STOP takes precedence over a command of the same tick.
 #[test]
 fn a_stop_and_an_approval_in_one_tick_stop() {
     let mut bench = Bench::new();
@@ -163,6 +163,28 @@ fn a_stop_and_an_approval_in_one_tick_stop() {
     let tick = bench.tick(Inputs { stop: true, command, ..Inputs::default() });
     assert_eq!(tick.mode, Mode::Damped);
     assert!(is_damping(&tick.command, &bench.settings));
+}
+
+/// A command in the tick of a STOP is refused: one change of mode, and a simulated robot is not placed.
+#[test]
+fn a_command_in_the_tick_of_a_stop_is_refused() {
+    let mut bench = Bench::new();
+    bench.reach(Mode::Disarmed);
+    let command = bench.arm();
+    bench.events.clear();
+    let tick = bench.tick(Inputs { stop: true, command: Some(command), ..Inputs::default() });
+    assert_eq!(tick.mode, Mode::Damped);
+    assert!(
+        matches!(
+            bench.events[..],
+            [
+                Event::Mode { from: Mode::Disarmed, to: Mode::Damped, .. },
+                Event::Refused { command: Command::Arm(_), because: CommandRefusal::Stopped, .. },
+            ]
+        ),
+        "{:?}",
+        bench.events
+    );
 }
 
 #[test]
@@ -179,7 +201,7 @@ fn a_stopped_robot_stays_damped_until_it_is_acknowledged_and_armed_anew() {
     assert_eq!(bench.command(bench.arm()).mode, Mode::StandUp);
 }
 
-/// The screen is silent during a jump: the jump is landed, then the robot sits down, and the trial is not a good one.
+/// No heartbeat of the screen during a jump: the robot lands and sits down, and the trial ends with a fault.
 #[test]
 fn an_operator_lost_in_mid_jump_is_landed_and_sat_down() {
     let mut bench = Bench::new();
@@ -212,7 +234,7 @@ fn an_operator_lost_in_the_countdown_never_jumps() {
     assert!(bench.events.iter().any(|event| matches!(event, Event::TrialEnded { end: TrialEnd::Fault(_), .. })));
 }
 
-/// A robot whose sensor breaks: the named fault, and damping, in the same tick.
+/// A sensor that fails: named fault and damping in the same tick.
 #[test]
 fn a_number_that_is_none_is_a_fault_and_damps_at_once() {
     struct Broken(Simulator, bool);
@@ -243,7 +265,7 @@ fn a_number_that_is_none_is_a_fault_and_damps_at_once() {
     let tick = *cycle.tick(&Inputs::default(), &SimulatedClock, &mut robot);
     assert_eq!(tick.mode, Mode::Fault);
     assert!(is_damping(&tick.command, &settings));
-    // (A bug once: the gate remembered the number that is none and broke down in the next tick.)
+    // Regression: the gate kept a NaN for the rate limit of the next tick.
     let causes: Vec<String> = cycle
         .events()
         .iter()
@@ -259,7 +281,7 @@ fn a_number_that_is_none_is_a_fault_and_damps_at_once() {
     }
 }
 
-/// A jump that must fall: the robot is damped, and comes to rest on the floor instead of thrashing about.
+/// A jump that must fall: the robot is damped and comes to rest on the floor.
 #[test]
 fn a_fallen_robot_is_damped_and_comes_to_rest() {
     let mut bench = Bench::new();
@@ -282,7 +304,7 @@ fn a_fallen_robot_is_damped_and_comes_to_rest() {
     assert!(motion < 0.1, "the trunk still moves at {motion} m/s");
 }
 
-/// A state that is too old is a fault that says so.
+/// A state that is too old is a fault of that name.
 #[test]
 fn a_silent_robot_is_a_fault() {
     struct Silent(Simulator, u32);
@@ -325,9 +347,9 @@ fn any_command(spec: TrialSpec) -> impl Strategy<Value = Option<Command>> {
 }
 
 proptest! {
-    /// Whatever a controller wants and an encoder reports: the motor is told no more than the joint's torque, the law inside it
-    /// asks for no more at the numbers measured, and a datagram can say it. (A bug once: against an encoder at 60 rad/s the gate
-    /// passed more than 128 N m, the link braked, and the fault was "could not be sent (error 22)".)
+    /// For any wanted command and measured state: feed-forward torque and the torque of the motor's law are within the joint's
+    /// limit, and a datagram can hold the command. Regression: with an encoder at 60 rad/s the gate passed more than 128 N m, the
+    /// link braked, and the fault was "could not be sent (error 22)".
     #[test]
     fn what_leaves_the_gate_can_be_said(
         speed in -100.0..100.0_f64, kd in 0.0..20.0_f64, kp in 0.0..300.0_f64, position in -4.0..4.0_f64,
@@ -351,8 +373,8 @@ proptest! {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 24, ..ProptestConfig::default() })]
 
-    /// Whatever comes in whatever order: motors do more than damp only after an arm command since they last damped, a
-    /// jump only after an approval since the last one, and the torque limits hold in every tick.
+    /// For any sequence of commands: motors do more than damp only after an arm command since the last damping, a jump begins only
+    /// after a new approval, and the torque limits hold in every tick.
     #[test]
     fn no_sequence_energises_without_arm_and_approval(
         steps in proptest::collection::vec((any_command(Bench::new().spec()), 1..900_u32, proptest::bool::weighted(0.05)), 1..24)
@@ -363,7 +385,7 @@ proptest! {
             for n in 0..ticks {
                 let command = command.filter(|_| n == 0);
                 let before = bench.cycle.mode();
-                // Half of the key presses are given now, the others are of a time when the robot was in another mode.
+                // Half of the key presses are current, the others were made in an earlier mode.
                 let command = match command {
                     Some(Command::RunTrial(..)) if ticks % 2 == 0 => Some(bench.approved()),
                     Some(Command::Arm(_)) if ticks % 2 == 0 => Some(bench.arm()),
@@ -395,7 +417,7 @@ proptest! {
     }
 }
 
-/// (A defect once: an acknowledgement that had waited in a queue erased a STOP that was pressed after it.)
+/// Regression: an acknowledgement that had waited in a queue cleared a STOP that was pressed after it.
 #[test]
 fn a_stop_outlives_an_acknowledgement_of_an_earlier_one() {
     let latch = quadfrog::realtime::channel::StopLatch::default();

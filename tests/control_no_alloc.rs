@@ -1,5 +1,5 @@
-//! Nothing in the control thread's body allocates or frees: an allocator that ends the process on the spot watches whole trials,
-//! STOP, faults, falls and every mode, with the simulator and with a robot over a link.
+//! The control loop allocates and frees nothing: whole trials, STOP, faults, falls and every mode under an allocator that aborts,
+//! with the simulator and with a robot over a link.
 #![allow(
     unsafe_code,
     reason = "an allocator can only be written with unsafe; this one hands everything to the system's"
@@ -7,55 +7,23 @@
 
 #[path = "support/no_alloc.rs"]
 mod no_alloc;
+#[path = "support/robots.rs"]
+mod robots;
 
 use std::collections::BTreeSet;
 
 use no_alloc::without_allocation;
-use quadfrog::config::{Backend, Config};
+use quadfrog::config::Config;
 use quadfrog::control::control_loop::ControlLoop;
 use quadfrog::control::settings::ControlSettings;
 use quadfrog::realtime::channel::{ControlEnd, ScreenEnd, SessionEnd, channels};
 use quadfrog::realtime::clock::MonotonicClock;
-use quadfrog::realtime::thread::Instant;
+use quadfrog::realtime::thread::TickStart;
 use quadfrog::robot::description::RobotDescription;
-use quadfrog::robot::{Battery, JointCommand, LinkStatus, Placement, Robot, RobotError, RobotState};
-use quadfrog::sim::Simulator;
+use quadfrog::robot::{Placement, Robot, RobotState};
 use quadfrog::telemetry::{Command, Event, Mode, Permit, Tick};
-use quadfrog::trial::{JumpParameters, Task};
-
-/// The simulator as itself, or as a robot over a link with a battery that nobody can put in place.
-struct Machine {
-    simulator: Simulator,
-    linked: bool,
-    tamper: fn(&mut RobotState),
-    silent: bool,
-    send_fails: bool,
-}
-
-impl Robot for Machine {
-    fn read(&mut self) -> Result<RobotState, RobotError> {
-        if self.silent {
-            return Err(RobotError::Silent { age_ms: 30 });
-        }
-        let mut state = self.simulator.read()?;
-        if self.linked {
-            state.truth = None;
-            state.battery = Some(Battery { charge_percent: 70.0, voltage_v: 24.0, current_a: -1.0, cell_v: [2.4; 10] });
-        }
-        (self.tamper)(&mut state);
-        Ok(state)
-    }
-    fn write(&mut self, command: &JointCommand) -> Result<(), RobotError> {
-        self.simulator.write(command)?;
-        if self.send_fails { Err(RobotError::Send { errno: 111 }) } else { Ok(()) }
-    }
-    fn place(&mut self, placement: &Placement) -> bool {
-        !self.linked && self.simulator.place(placement)
-    }
-    fn link(&self) -> Option<LinkStatus> {
-        self.linked.then(|| LinkStatus { recent_received: 5000, ..LinkStatus::default() })
-    }
-}
+use quadfrog::trial::{Backend, JumpParameters, Task};
+use robots::LinkedRobot;
 
 struct Bench {
     config: Config,
@@ -64,7 +32,7 @@ struct Bench {
     session: SessionEnd,
     screen: ScreenEnd,
     recorder: rtrb::Consumer<Tick>,
-    machine: Machine,
+    machine: LinkedRobot,
     clock: MonotonicClock,
     time_ms: u64,
     mode_changes: u64,
@@ -77,11 +45,9 @@ impl Bench {
         let config = Config::load(None).unwrap();
         let description = RobotDescription::embedded("go1").unwrap();
         let settings = config.settings(&description, Task::Forward, backend).unwrap();
-        let mut simulator = Simulator::new(&description, &config.simulator).unwrap();
-        simulator.place(&Placement { joint_position: settings.lying_position, lying: true, seed: 0 });
         let (control, session, screen, recorder): (ControlEnd, _, _, _) = channels();
-        let linked = backend == Backend::Hardware;
-        let machine = Machine { simulator, linked, tamper: |_| {}, silent: false, send_fails: false };
+        let lying = LinkedRobot::lying(&description, &config.simulator);
+        let machine = LinkedRobot { linked: backend == Backend::Hardware, ..lying };
         Bench {
             config,
             settings,
@@ -103,10 +69,10 @@ impl Bench {
             if self.beats {
                 self.screen.heartbeat.beat();
             }
-            let instant = Instant { planned_ns: self.time_ms * 1_000_000, lateness_ns: 0 };
+            let instant = TickStart { planned_ns: self.time_ms * 1_000_000, lateness_ns: 0 };
             let Bench { body, machine, clock, .. } = self;
             let mode = without_allocation(|| {
-                body.rehearse(clock, machine);
+                body.warm_up(clock, machine);
                 let mode = body.tick(instant, clock, machine).mode;
                 body.prepare();
                 mode
@@ -116,7 +82,7 @@ impl Bench {
             while let Ok(event) = self.session.events.pop() {
                 self.mode_changes += u64::from(matches!(event, Event::Mode { .. }));
             }
-            // Every other tick is taken: the ring runs full on the way, which must cost nothing either.
+            // Every other tick is taken, so that the ring runs full: that must not allocate either.
             if self.time_ms.is_multiple_of(2) {
                 let _ = self.recorder.pop();
             }
@@ -154,7 +120,7 @@ impl Bench {
         let stops = self.session.stop.count();
         self.command(Command::Acknowledge { stops });
         assert_eq!(self.body.mode(), Mode::Disarmed);
-        // A real robot is folded by hand; a simulated one is carried anyway.
+        // A real robot is folded by hand; a simulated one is placed.
         let lying = Placement { joint_position: self.settings.lying_position, lying: true, seed: 0 };
         self.machine.simulator.place(&lying);
         self.ticks(1);
@@ -171,14 +137,14 @@ impl Bench {
     }
 }
 
-/// All modes, a good trial, a fall, STOP, every kind of fault, an operator who is gone, refused commands.
+/// All modes, a good trial, a fall, STOP, every kind of fault, a lost operator, refused commands.
 fn everything(backend: Backend) {
     let mut bench = Bench::new(backend);
     bench.ticks(1);
     bench.ticks(5);
     bench.command(Command::TakeControl);
     if backend == Backend::Hardware {
-        // Refused: nothing has been still for a second yet.
+        // Refused: the gyroscope has not been still for a second yet.
         bench.arm();
         assert_eq!(bench.body.mode(), Mode::Disarmed);
     }
@@ -220,15 +186,15 @@ fn everything(backend: Backend) {
         bench.recover();
     }
     bench.stand();
-    bench.machine.silent = true;
+    bench.machine.silent_ms = 30;
     bench.ticks(300);
-    bench.machine.silent = false;
+    bench.machine.silent_ms = 0;
     bench.ticks(10);
     bench.recover();
-    bench.machine.send_fails = true;
+    bench.machine.send_errno = Some(111);
     bench.ticks(10);
     assert_eq!(bench.body.mode(), Mode::Fault);
-    bench.machine.send_fails = false;
+    bench.machine.send_errno = None;
     bench.ticks(10);
     bench.recover();
 

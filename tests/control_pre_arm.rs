@@ -1,22 +1,22 @@
-//! The control thread's own checks before arming: it refuses whatever the session says, and each item fails by itself.
+//! The arming checks of the control thread: each fails by itself and refuses arming, whatever the session says.
 
 use nalgebra::{UnitQuaternion, Vector3};
-use quadfrog::config::{Backend, Config};
+use quadfrog::config::Config;
 use quadfrog::control::cycle::{Cycle, Inputs};
 use quadfrog::control::settings::ControlSettings;
 use quadfrog::realtime::clock::SimulatedClock;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::robot::{Battery, JointCommand, LinkStatus, Placement, Robot, RobotError, RobotState};
 use quadfrog::telemetry::{ArmingCheck, Command, CommandRefusal, Event, Mode, Permit};
-use quadfrog::trial::Task;
+use quadfrog::trial::{Backend, Task};
 
-/// A robot that reports what it is told to.
-struct Told {
+/// A robot that reports a given state.
+struct TellOutcome {
     state: Result<RobotState, RobotError>,
     link: LinkStatus,
 }
 
-impl Robot for Told {
+impl Robot for TellOutcome {
     fn read(&mut self) -> Result<RobotState, RobotError> {
         if let Ok(state) = &mut self.state {
             state.robot_time_ms += 1;
@@ -36,7 +36,7 @@ impl Robot for Told {
 
 struct Bench {
     cycle: Cycle,
-    robot: Told,
+    robot: TellOutcome,
     settings: ControlSettings,
     time_ns: u64,
     lateness_ns: u64,
@@ -44,7 +44,7 @@ struct Bench {
 }
 
 impl Bench {
-    /// Lies, disarmed, and has been looked at for a while: everything holds.
+    /// A disarmed robot that lies still and passes every check.
     fn new() -> Bench {
         let description = RobotDescription::embedded("go1").unwrap();
         let config = Config::load(None).unwrap();
@@ -56,7 +56,8 @@ impl Bench {
             battery: Some(Battery { charge_percent: 80.0, voltage_v: 24.0, current_a: 0.0, cell_v: [0.0; 10] }),
             ..RobotState::default()
         };
-        let robot = Told { state: Ok(state), link: LinkStatus { recent_received: 5000, ..LinkStatus::default() } };
+        let robot =
+            TellOutcome { state: Ok(state), link: LinkStatus { recent_received: 5000, ..LinkStatus::default() } };
         let mut bench =
             Bench { cycle: Cycle::new(&settings), robot, settings, time_ns: 0, lateness_ns: 0, mode_changes: 0 };
         bench.tick(None);
@@ -83,7 +84,7 @@ impl Bench {
         self.robot.state.as_mut().unwrap()
     }
 
-    /// Asks to stand up: the checks that were named, none if it stands up.
+    /// Arms; returns the failing checks of a refusal.
     fn arm(&mut self) -> Vec<ArmingCheck> {
         self.tick(Some(Command::Arm(Permit { mode_changes: self.mode_changes, given_ns: self.time_ns })));
         let refused = self.cycle.events().iter().find_map(|event| match event {
@@ -100,9 +101,9 @@ fn a_sound_robot_is_armed() {
     assert_eq!(Bench::new().arm(), []);
 }
 
-/// Each item is broken alone, is named alone, and holds again once it is mended.
+/// Each check fails alone and is named alone.
 #[test]
-fn each_item_forbids_arming_by_itself() {
+fn each_check_refuses_arming_by_itself() {
     type Breaks = fn(&mut Bench);
     let table: [(ArmingCheck, Breaks); 14] = [
         (ArmingCheck::StateFresh, |b| b.robot.state = Err(RobotError::Silent { age_ms: 12 })),
@@ -143,7 +144,7 @@ fn all_that_fails_is_named_at_once() {
     assert_eq!(bench.arm(), [ArmingCheck::Checksums, ArmingCheck::Battery, ArmingCheck::GyroStill]);
 }
 
-/// One still moment is not enough, and five seconds later the late ticks are forgotten.
+/// Stillness must last; late ticks leave the window after five seconds.
 #[test]
 fn stillness_must_last_and_lateness_is_forgotten() {
     let mut bench = Bench::new();
@@ -160,7 +161,7 @@ fn stillness_must_last_and_lateness_is_forgotten() {
     assert_eq!(bench.arm(), []);
 }
 
-/// A motor that left servo mode is named, and nothing is energised. (A defect once: the other eleven were, until the next tick cut.)
+/// A motor that left servo mode is named, and nothing is energised. Regression: the other eleven were energised for one tick.
 #[test]
 fn a_motor_out_of_servo_mode_is_named_before_anything_is_energised() {
     let mut bench = Bench::new();
@@ -173,7 +174,7 @@ fn a_motor_out_of_servo_mode_is_named_before_anything_is_energised() {
     assert_eq!(bench.arm(), [ArmingCheck::MotorsFollow]);
 }
 
-/// An old state is not a still robot. (A defect once: the same state, read a thousand times, passed for a second of stillness.)
+/// An old state does not count as stillness. Regression: one state that was read a thousand times counted as a second.
 #[test]
 fn silence_is_not_stillness() {
     let silent = |bench: &mut Bench, ticks: u32| {
@@ -191,7 +192,7 @@ fn silence_is_not_stillness() {
         bench.state().imu.gyro_body.z = 0.0;
         bench
     };
-    // Every tenth state is new: after a second, a tenth of one has been seen.
+    // Every tenth state is new: after a second, 0.1 s of states has arrived.
     let mut bench = moved();
     for _ in 0..110 {
         bench.ticks(1);
@@ -201,7 +202,7 @@ fn silence_is_not_stillness() {
     assert_eq!(bench.arm(), [ArmingCheck::GyroStill]);
     bench.ticks(1000);
     assert_eq!(bench.arm(), []);
-    // What was seen before a longer silence is forgotten, and so is what was seen before a restart.
+    // A longer silence and a restart reset the count.
     let mut bench = moved();
     bench.ticks(1500);
     silent(&mut bench, 25);
@@ -217,7 +218,7 @@ fn silence_is_not_stillness() {
     assert_eq!(bench.arm(), []);
 }
 
-/// What both the URDF and the official SDK allow, joint by joint.
+/// Joint limits: intersection of URDF and official SDK.
 #[test]
 fn joint_limits_are_the_intersection_of_the_urdf_and_the_official_sdk() {
     let Bench { settings, .. } = Bench::new();

@@ -1,27 +1,27 @@
-//! The estimate of the base from sensors alone: how good it is over whole jumps, and what may not spoil it.
+//! The estimate of the base from sensors alone: accuracy over whole jumps, robustness to slip, gaps and bad samples.
 
 #[path = "support/estimation.rs"]
 mod estimation;
 
 use estimation::{JumpError, World, jumps, percentile, settings, settings_of};
 use nalgebra::Vector3;
-use quadfrog::config::{Backend, Config};
+use quadfrog::config::Config;
 use quadfrog::control::cycle::{Cycle, Inputs};
-use quadfrog::control::estimator::{ContactGate, Estimator, GRAVITY};
+use quadfrog::control::estimator::{ContactGate, Estimator};
 use quadfrog::control::leg::{feet, stance_of};
 use quadfrog::control::settings::{ControlSettings, ObjectiveSource};
-use quadfrog::engine::{Options, open_life};
+use quadfrog::engine::{Options, open_experiment};
 use quadfrog::optimize::journal::Durability;
 use quadfrog::realtime::clock::SimulatedClock;
 use quadfrog::robot::description::RobotDescription;
-use quadfrog::robot::{Joints, LEGS, Leg, Placement, Robot, RobotState};
+use quadfrog::robot::{GRAVITY, Joints, LEGS, Leg, Placement, Robot, RobotState};
 use quadfrog::session::rollout::Rollout;
 use quadfrog::session::{automatic, objective};
 use quadfrog::sim::Simulator;
 use quadfrog::telemetry::Estimate;
-use quadfrog::trial::{Task, TrialRecord, Verdict};
+use quadfrog::trial::{Backend, Task, TrialRecord, Verdict};
 
-/// Joint angles of a stance, feet at the task's nominal places.
+/// Joint angles of a stance, feet at the task's nominal positions.
 fn stance(settings: &ControlSettings) -> Joints {
     let mut joints = Joints::default();
     for leg in Leg::ALL {
@@ -31,7 +31,7 @@ fn stance(settings: &ControlSettings) -> Joints {
     joints
 }
 
-/// An estimator fed by hand: perfect sensors of a robot that stands still, to be changed at will.
+/// An estimator with the perfect sensors of a standing robot, which a test changes.
 struct Feed {
     settings: ControlSettings,
     estimator: Estimator,
@@ -49,13 +49,13 @@ impl Feed {
         feed
     }
 
-    /// The estimate of the state as it is.
+    /// Estimate of the present state.
     fn update(&mut self) -> Estimate {
         let feet = feet(&self.settings.geometry, &self.state.joint_position);
         *self.estimator.update(&self.state, &feet, &self.settings)
     }
 
-    /// The estimate after `ms` more states, each a millisecond later.
+    /// Estimate after `ms` more states, one per millisecond.
     fn run(&mut self, ms: u32) -> Estimate {
         let mut estimate = Estimate::default();
         for _ in 0..ms {
@@ -66,8 +66,8 @@ impl Feed {
     }
 }
 
-/// What is asked of 100 jumps (`cargo bench --bench estimator`), on 25: 3 cm in the median, 8 cm at the 95th percentile, yaw
-/// within 0.05 rad; with motors as they are and feet that slip, too.
+/// Accuracy over 25 jumps (`cargo bench --bench estimator` makes 100): median 3 cm, 95th percentile 8 cm, yaw within 0.05 rad; also
+/// with realistic motors and slipping feet.
 #[test]
 fn the_displacement_of_a_jump_is_known_to_three_centimetres() {
     for world in [World::Ideal, World::HardwareLike] {
@@ -82,7 +82,7 @@ fn the_displacement_of_a_jump_is_known_to_three_centimetres() {
         );
         assert!(landed.len() >= 12, "{world:?}: {} of 25 landed: too few to judge by", landed.len());
         assert!(median <= 0.03 && most <= 0.08 && yaw <= 0.05, "{world:?}");
-        // They did jump, and the figure is not that of a robot that stood still.
+        // The robots did jump.
         assert!(landed.iter().any(|jump| jump.truth.dx_m > 0.2) && landed.iter().any(|jump| jump.truth.dyaw_rad > 0.5));
     }
 }
@@ -98,8 +98,8 @@ fn the_same_jumps_give_the_same_bits() {
     assert_eq!(std::thread::spawn(bits).join().unwrap(), first);
 }
 
-/// A minute in READY with biased, noisy sensors. By its gyro's bias alone (3.5 mrad/s, 0.2 m above the feet) the robot would
-/// seem to move 4 cm; the places of its feet hold it, but for what they are allowed to creep.
+/// A minute in READY with biased, noisy sensors. The gyroscope's bias alone (3.5 mrad/s, 0.2 m above the feet) would move the
+/// estimate by 4 cm; the positions of the feet hold it, except for their configured creep.
 #[test]
 fn a_robot_that_stands_for_a_minute_stays_where_it_is() {
     let settings = settings(Task::Forward);
@@ -141,14 +141,14 @@ fn a_flight_is_ballistic() {
     feed.state.foot_force = [0.0; LEGS];
     feed.state.imu.accel_body = Vector3::zeros();
     let estimate = feed.run(400);
-    // The first two milliseconds count as standing, and feet that do not move do not contradict.
+    // The first two milliseconds count as standing; feet that do not move agree.
     assert_eq!(estimate.contact, [false; LEGS]);
     assert!((estimate.velocity_world.z + GRAVITY * 0.4).abs() < 0.15, "{}", estimate.velocity_world);
     assert!((estimate.position_world.z - start.z + GRAVITY * 0.08).abs() < 0.05, "{}", estimate.position_world);
     assert!((estimate.position_world - start).xy().norm() < 1e-3);
 }
 
-/// A foot that slides under a robot that stands: 0.2 m/s for 0.3 s. Were it believed, a quarter of its 6 cm would be the trunk's.
+/// A foot that slides under a standing robot, 0.2 m/s for 0.3 s. If accepted, a quarter of its 6 cm would go to the trunk.
 #[test]
 fn a_slipping_foot_is_gated() {
     let mut feed = Feed::standing();
@@ -165,13 +165,13 @@ fn a_slipping_foot_is_gated() {
         farthest = farthest.max((feed.run(1).position_world - start).norm());
     }
     assert!(farthest < 0.002, "the sliding foot dragged the trunk by {farthest} m");
-    // It stops, and is believed again where it is now.
+    // It stops, and is accepted at its new position.
     feed.state.joint_velocity = [0.0; 12];
     let estimate = feed.run(500);
     assert!((estimate.position_world - start).norm() < 0.002 && estimate.velocity_world.norm() < 0.01);
 }
 
-/// All four feet agree on a velocity that the filter thinks impossible (it was pushed while it heard nothing): it gives in.
+/// All four feet agree on a velocity that the filter rejects (a push in a gap of the states): after a time it is accepted.
 #[test]
 fn a_wrong_velocity_is_given_up() {
     let mut feed = Feed::standing();
@@ -186,12 +186,12 @@ fn a_wrong_velocity_is_given_up() {
         }
         estimate = feed.run(1);
     }
-    // The trunk moves against the feet; rolling takes its part.
+    // The trunk moves against the feet, less their rolling.
     assert!((estimate.velocity_world.x - 0.5).abs() < 0.1, "{}", estimate.velocity_world);
 }
 
-/// By 3 m/s, that is, from an accelerometer that was mad for ten milliseconds. (A bug once: what was forgotten was how sure the
-/// velocity is, not the velocity; no standing foot was ever believed again, and a robot that stood flew off by 23 m.)
+/// A velocity error of 3 m/s from ten milliseconds of a wrong accelerometer. Regression: the variance was reset without the
+/// velocity, no standing foot was accepted again, and the estimate of a standing robot moved 23 m.
 #[test]
 fn a_velocity_that_no_foot_could_have_is_given_up_and_the_way_taken_back() {
     let mut feed = Feed::standing();
@@ -204,8 +204,8 @@ fn a_velocity_that_no_foot_could_have_is_given_up_and_the_way_taken_back() {
     assert!((estimate.position_world - start).norm() < 0.05, "{}", estimate.position_world);
 }
 
-/// An impact is the last that was seen of a gap: it did not last as long as that. (A bug once: it was taken for the whole gap,
-/// with the certainty of a sample.)
+/// An impact at the end of a gap did not last for the whole gap. Regression: it was integrated over the gap with the variance of one
+/// sample.
 #[test]
 fn a_knock_at_the_end_of_a_gap_is_not_the_whole_gap() {
     let mut feed = Feed::standing();
@@ -255,7 +255,7 @@ fn a_reset_forgets_everything() {
     assert_eq!(again.position_world.xy(), Vector3::zeros().xy());
 }
 
-/// The robot reports as often as it does; a tick that finds the old state learns nothing, and a gap is bridged.
+/// A tick without a new state changes nothing, and a gap is bridged.
 #[test]
 fn a_state_counts_once_and_a_gap_is_bridged() {
     let mut feed = Feed::standing();
@@ -266,7 +266,7 @@ fn a_state_counts_once_and_a_gap_is_bridged() {
     feed.state.robot_time_ms += 9;
     let bridged = feed.run(1);
     let gained = bridged.velocity_world.x - first.velocity_world.x;
-    // Less what was taken for bias while the feet still counted as standing.
+    // Less the part estimated as bias while the feet still counted as standing.
     assert!((gained - 0.010).abs() < 1e-4, "{gained} m/s in 10 ms of 1 m/s^2");
 }
 
@@ -282,7 +282,7 @@ fn a_clock_that_goes_back_begins_anew() {
     assert_eq!(estimate.velocity_world, Vector3::zeros());
 }
 
-/// (A defect once: the clocks were compared as numbers, and after 49 days the estimate began anew in mid-jump.)
+/// Regression: clocks were compared as numbers, so that the estimate restarted at the overflow after 49 days.
 #[test]
 fn the_estimate_goes_on_across_the_end_of_the_robots_clock() {
     let mut feed = Feed::standing();
@@ -298,7 +298,7 @@ fn the_estimate_goes_on_across_the_end_of_the_robots_clock() {
     assert!((gained - 0.015).abs() < 1e-3, "{gained} m/s in 5 ms of 3 m/s^2");
 }
 
-/// On its stand, before the first stand-up: for half an hour if need be.
+/// Half an hour on a stand before the first stand-up.
 #[test]
 fn a_robot_that_hangs_does_not_fly_away() {
     let mut feed = Feed::standing();
@@ -307,7 +307,7 @@ fn a_robot_that_hangs_does_not_fly_away() {
     let estimate = feed.run(60_000);
     assert_eq!(estimate.velocity_world, Vector3::zeros());
     assert!(estimate.position_world.norm() < 1.0, "{}", estimate.position_world);
-    // Put down, it is believed to stand at once.
+    // Put down, it stands at once.
     feed.state.foot_force = [32.0; LEGS];
     assert!(feed.run(200).velocity_world.norm() < 0.02);
 }
@@ -323,8 +323,10 @@ fn contact_does_not_flicker_in_the_noise_of_a_sensor() {
     for force_n in [0.0, 32.0] {
         let mut gate = ContactGate::default();
         for ms in 0..10_000 {
-            simulator
-                .set_state(&quadfrog::sim::State { position_world: Vector3::new(0.0, 0.0, 9.0), ..*simulator.state() });
+            simulator.set_state(&quadfrog::sim::SimState {
+                position_world: Vector3::new(0.0, 0.0, 9.0),
+                ..*simulator.state()
+            });
             let noisy = simulator.read().unwrap().foot_force.map(|noise| force_n + noise);
             let down = gate.update(&noisy, 1e-3, &settings.estimator);
             if ms > 100 {
@@ -333,7 +335,7 @@ fn contact_does_not_flicker_in_the_noise_of_a_sensor() {
         }
     }
     assert_eq!(changes, 0, "wrong contacts in 20 s of noise on four feet");
-    // A tap of one millisecond is none; a landing and the end of a push are seen in two.
+    // A tap of one millisecond is no contact; a landing and the end of a push are detected in two.
     let mut gate = ContactGate::default();
     let mut feel = |force_n| gate.update(&[force_n; LEGS], 1e-3, &settings.estimator)[0];
     let forces = [0.0, 180.0, 0.0, 60.0, 100.0, 100.0, 0.0, 100.0, 0.0, 0.0];
@@ -352,7 +354,7 @@ fn yaw_counts_full_turns_on_sensors_as_on_truth() {
     }
 }
 
-/// With `objective = "truth"` it is the simulator's own knowledge, to the bit, whatever the sensors say.
+/// With `objective = "truth"` the estimate equals the simulator's true state to the bit, whatever the sensors report.
 #[test]
 fn the_truth_is_passed_through_where_it_is_asked_for() {
     let settings = settings_of(Task::Forward, ObjectiveSource::Truth);
@@ -412,7 +414,7 @@ fn a_source_or_weight_that_cannot_be_is_refused() {
     assert!(error.contains("estimator.contact_off_n") && error.contains("contact_on_n"), "{error}");
 }
 
-/// A forward study of 20 trials with noisy sensors: its best, by the estimate where it ran on that, and by the truth.
+/// A forward study of 20 trials with noisy sensors: its best by its own objective and by the truth.
 fn study(source: &str, seed: u32) -> (TrialRecord, f64) {
     let config = config(&[
         ("optimize.toml", &format!("objective = \"{source}\"\n")),
@@ -423,7 +425,7 @@ fn study(source: &str, seed: u32) -> (TrialRecord, f64) {
     let options = Options { seed, trials: Some(20), ..Options::new(config, robot, backend, task) };
     let settings = options.config.settings(&options.robot, task, backend).unwrap();
     let simulator = Simulator::new(&options.robot, &options.config.simulator).unwrap();
-    let mut life = open_life(&options, Durability::Buffered, "").unwrap();
+    let mut life = open_experiment(&options, Durability::Buffered, "").unwrap();
     let mut in_truth = Vec::new();
     automatic::run(&mut life, &mut Rollout::new(simulator, &settings), |row, ticks| {
         let truth = objective::measure(&estimation::in_truth(ticks, &settings)).unwrap();

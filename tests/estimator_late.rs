@@ -1,5 +1,5 @@
-//! The estimate of the base on a machine that does not keep time and a network that loses states: over whole jumps, held
-//! against what the emulated robot really did.
+//! The estimate of the base with timing gaps and lost states: over whole jumps, compared with the true state of the
+//! emulated robot.
 
 #[path = "support/estimation.rs"]
 mod estimation;
@@ -11,17 +11,18 @@ use go1::{Late, Lockstep};
 use quadfrog::control::settings::ObjectiveSource;
 use quadfrog::robot::{JointCommand, LinkStatus, Placement, Robot, RobotError, RobotState};
 use quadfrog::sim::SimConfig;
-use quadfrog::sim::emulator::Fault;
+use quadfrog::sim::emulator::EmulatorFault;
 use quadfrog::telemetry::TrialEnd;
 
-/// A robot whose belly feels nothing, as a real one, and whose network becomes bad when it stands.
-struct Numb {
+/// An emulated robot that does not report contact of its belly, like a real one, and whose network gets faults when it
+/// stands.
+struct WithoutBodyContact {
     robot: Lockstep,
-    faults: Vec<Fault>,
-    lived_ms: u32,
+    faults: Vec<EmulatorFault>,
+    elapsed_ms: u32,
 }
 
-impl Robot for Numb {
+impl Robot for WithoutBodyContact {
     fn read(&mut self) -> Result<RobotState, RobotError> {
         let mut state = self.robot.read()?;
         if let Some(truth) = &mut state.truth {
@@ -30,8 +31,8 @@ impl Robot for Numb {
         Ok(state)
     }
     fn write(&mut self, command: &JointCommand) -> Result<(), RobotError> {
-        self.lived_ms += 1;
-        if self.lived_ms == 500 {
+        self.elapsed_ms += 1;
+        if self.elapsed_ms == 500 {
             self.faults.iter().for_each(|fault| self.robot.emulator.apply(*fault));
         }
         self.robot.write(command)
@@ -44,18 +45,19 @@ impl Robot for Numb {
     }
 }
 
-/// Whole jumps with what is wrong with time and network.
-fn jumps(config: &SimConfig, late: Option<Late>, faults: &[Fault], count: u32) -> Vec<(JumpError, TrialEnd)> {
+/// Makes whole jumps with timing gaps and network faults.
+fn jumps(config: &SimConfig, late: Option<Late>, faults: &[EmulatorFault], count: u32) -> Vec<(JumpError, TrialEnd)> {
     jumps_on(ObjectiveSource::Estimate, count, 1, |seed| {
         let mut robot = Lockstep::new(config, seed);
-        robot.watched = true;
+        robot.with_truth = true;
         robot.late = late.as_ref().map(|late| late.seeded(seed));
-        Numb { robot, faults: faults.to_vec(), lived_ms: 0 }
+        WithoutBodyContact { robot, faults: faults.to_vec(), elapsed_ms: 0 }
     })
 }
 
-/// Thirty jumps each: who jumped settles, and the displacement is as well known as it is asked to be of a machine in time.
-fn known(name: &str, world: World, late: Option<Late>, faults: &[Fault]) {
+/// Checks thirty jumps: robots that jumped settle, and the error of the displacement is within the limits that hold
+/// without gaps.
+fn known(name: &str, world: World, late: Option<Late>, faults: &[EmulatorFault]) {
     let jumps = jumps(&world.config(), late, faults, 30);
     let settled: Vec<_> = jumps.iter().filter(|(_, end)| *end == TrialEnd::Settled).map(|(error, _)| error).collect();
     let of = |share| percentile(settled.iter().map(|error| error.displacement_m()), share);
@@ -71,7 +73,7 @@ fn known(name: &str, world: World, late: Option<Late>, faults: &[Fault]) {
     assert!(unquiet.is_empty(), "{name}: came to rest, and nobody knew: {unquiet:?}");
 }
 
-/// (A bug once: one of 36 such jumps was measured as 0.3 m too long, and one robot that stood was thought 23 m away.)
+/// Regression: one of 36 such jumps was measured 0.3 m too long, and one standing robot was estimated 23 m away.
 #[test]
 fn a_gap_now_and_then_does_not_spoil_the_measure() {
     known("one gap in 200 ms, ideal", World::Ideal, Some(Late::new(200, 15, 0)), &[]);
@@ -86,7 +88,7 @@ fn a_machine_that_is_late_fifteen_times_a_second_still_measures() {
 
 #[test]
 fn a_network_that_loses_and_overtakes_still_measures() {
-    let faults = [Fault::Loss(5.0), Fault::Jitter(3.0)];
+    let faults = [EmulatorFault::Loss(5.0), EmulatorFault::Jitter(3.0)];
     known("5 % lost, 3 ms of jitter, ideal", World::Ideal, None, &faults);
     known("5 % lost, 3 ms of jitter, hardware-like", World::HardwareLike, None, &faults);
 }

@@ -1,14 +1,14 @@
-//! Every row of the table of watchdogs (`research/operators.md` D.4) against an emulated Go1: what is injected into the robot or
-//! its network, and how soon damping is on the wire. A tap between both ends reads the very datagrams. Stepped by hand, so the
-//! reaction is a number of control ticks that no machine's speed can change.
+//! Every row of the table of watchdogs (`docs/safety.md`) against an emulated Go1: what is injected into the robot or
+//! its network, and how soon damping is on the wire. A proxy between both ends reads the datagrams. Stepped by hand, so
+//! the reaction is a number of control ticks that does not depend on the machine's speed.
 
 #[path = "support/go1.rs"]
 mod go1;
 
 use std::net::{SocketAddr, UdpSocket};
 
-use go1::{ANY_PORT, description};
-use quadfrog::config::{Backend, Config};
+use go1::{ANY_PORT, description, emulator, network};
+use quadfrog::config::Config;
 use quadfrog::control::cycle::{Cycle, Inputs};
 use quadfrog::control::settings::ControlSettings;
 use quadfrog::realtime::clock::SimulatedClock;
@@ -19,14 +19,14 @@ use quadfrog::sim::emulator::Emulator;
 use quadfrog::telemetry::{
     Command, CommandRefusal, Event, Fault, Mode, Permit, Tick, TransitionCause, TrialEnd, TrialSpec,
 };
-use quadfrog::trial::{JumpParameters, Task};
+use quadfrog::trial::{Backend, JumpParameters, Task};
 
-/// A cable with an ear.
+/// UDP proxy between controller and emulator that keeps the last command.
 struct Tap {
     to_controller: UdpSocket,
     to_robot: UdpSocket,
     controller: Option<SocketAddr>,
-    /// The last command that passed in this millisecond.
+    /// The last command in this millisecond.
     command: Option<LowCmd>,
     /// Every state reports an orientation of four zeros, which is no rotation.
     no_rotation: bool,
@@ -49,7 +49,7 @@ impl Tap {
         self.command = None;
         while let Ok((length, from)) = self.to_controller.recv_from(&mut buffer) {
             self.controller = Some(from);
-            self.command = LowCmd::judge(&buffer[..length], CrcForm::Plain).ok().copied();
+            self.command = LowCmd::parse(&buffer[..length], CrcForm::Plain).ok().copied();
             self.to_robot.send(&buffer[..length]).unwrap();
         }
     }
@@ -59,7 +59,7 @@ impl Tap {
         while let Ok(length) = self.to_robot.recv(&mut buffer) {
             let controller = self.controller.unwrap();
             if self.no_rotation {
-                let mut state = *LowState::judge(&buffer[..length]).unwrap();
+                let mut state = *LowState::parse(&buffer[..length]).unwrap();
                 state.imu.quaternion = Default::default();
                 state.seal();
                 self.to_controller.send_to(state.bytes(), controller).unwrap();
@@ -87,19 +87,19 @@ struct Bench {
 
 impl Bench {
     fn new() -> Bench {
-        // Fast enough that the clock, not the silence, is what gives the restart away.
+        // Short enough that the clock, not a missing state, reveals the restart.
         Bench::restarting_in(Some(5))
     }
 
-    /// A robot that needs so long for a restart, ms; as long as the configuration says if none is given.
+    /// A robot whose restart takes `reboot_ms`, or the configured time if none is given.
     fn restarting_in(reboot_ms: Option<u32>) -> Bench {
         let mut config = Config::load(None).unwrap();
         let emulated = &mut config.simulator.emulator;
         emulated.reboot_ms = reboot_ms.unwrap_or(emulated.reboot_ms);
-        let settings = config.settings(&description(ANY_PORT), Task::Forward, Backend::Hardware).unwrap();
-        let emulator = Emulator::bind(ANY_PORT, &description(ANY_PORT), &config.simulator, 0).unwrap();
+        let settings = config.settings(&description(), Task::Forward, Backend::Hardware).unwrap();
+        let emulator = emulator(&config.simulator, 0);
         let tap = Tap::new(emulator.local_address().unwrap());
-        let go1 = Go1::open(&description(tap.to_controller.local_addr().unwrap()), false).unwrap();
+        let go1 = Go1::open(&network(tap.to_controller.local_addr().unwrap()), false).unwrap();
         Bench {
             config,
             settings,
@@ -115,7 +115,7 @@ impl Bench {
         }
     }
 
-    /// One millisecond on both ends.
+    /// Simulates one millisecond of controller and robot.
     fn tick(&mut self, command: Option<Command>) -> Tick {
         self.inputs.time_ns += self.period_ns;
         let inputs = Inputs { command, ..self.inputs };
@@ -150,7 +150,7 @@ impl Bench {
         Command::RunTrial(spec, Permit { mode_changes: self.mode_changes, given_ns: self.inputs.time_ns })
     }
 
-    /// A robot in `mode`, on the way that an operator takes.
+    /// A robot in `mode`, reached by an operator's commands.
     fn in_mode(mode: Mode) -> Bench {
         Bench::new().brought_to(mode)
     }
@@ -159,7 +159,7 @@ impl Bench {
         let mut bench = self;
         bench.until(Mode::Observe);
         bench.tick(Some(Command::TakeControl));
-        // Until the list before arming has seen enough of it: a second of stillness, and of ticks on time.
+        // The arming checks need a second without motion and with ticks on time.
         for _ in 0..1500 {
             bench.tick(None);
         }
@@ -203,7 +203,7 @@ impl Bench {
         self.go1.link().unwrap()
     }
 
-    /// Whether the last datagram on the wire damps every joint as the configuration says.
+    /// Whether the last datagram on the wire damps every joint with the configured gain.
     fn wire_damps(&self) -> bool {
         let kd = self.settings.gate.damping_kd as f32;
         self.tap.command.is_some_and(|command| {
@@ -216,31 +216,31 @@ impl Bench {
     }
 }
 
-/// What is done.
+/// An injected fault.
 #[derive(Clone, Copy)]
 enum Injection {
-    /// To the robot or its network.
+    /// A fault of the robot or its network, as the emulator parses it.
     Robot(&'static str),
-    /// To the control thread.
+    /// A fault of the control thread.
     Thread(fn(&mut Bench)),
 }
 
 use Injection::{Robot as ToRobot, Thread};
 
-/// A row that cuts.
+/// A row of the table whose action is damping.
 struct Row {
     name: &'static str,
     modes: &'static [Mode],
     injection: Injection,
-    /// Whether the tick that was just done is the first that could know.
+    /// Whether the last tick is the first that could detect the fault.
     bad: fn(&Bench, &Tick) -> bool,
-    /// What the operator is told.
+    /// Part of the reported fault.
     told: fn(&TransitionCause) -> bool,
 }
 
 const ENERGISED: &[Mode] =
     &[Mode::StandUp, Mode::Ready, Mode::Countdown, Mode::Jump, Mode::Settle, Mode::Review, Mode::SitDown];
-/// Not SETTLE, in which a landing swings, nor SITDOWN, in which a robot may lean.
+/// Not SETTLE, in which the trunk swings after a landing, nor SITDOWN, in which a robot may lean.
 const STANDING: &[Mode] = &[Mode::StandUp, Mode::Ready, Mode::Countdown, Mode::Review];
 const SENT_TO: &[Mode] = &[
     Mode::Disarmed,
@@ -369,7 +369,7 @@ const CUT: [Row; 16] = [
     },
 ];
 
-/// Control ticks between the first bad one and the first damping on the wire: 0 where it is the same.
+/// Control ticks between the first bad one and the first damping on the wire; 0 if it is the same tick.
 fn reaction(bench: &mut Bench, row: &Row) -> u32 {
     bench.injected_at = bench.cycle.last().number;
     match row.injection {
@@ -404,7 +404,7 @@ fn every_cut_is_on_the_wire_within_two_ticks() {
             println!("{:<45} {:<10} {ticks} ticks after the first bad one", row.name, mode.name());
             assert!(ticks <= 2, "{} in {}: {ticks} ticks", row.name, mode.name());
             slowest = slowest.max(ticks);
-            // Stopping to send is not stopping: damping goes on and on, whatever the robot does.
+            // Damping continues to be sent, whatever the robot reports.
             for _ in 0..300 {
                 bench.tick(None);
                 assert!(bench.wire_damps(), "{} in {}: no damping any more", row.name, mode.name());
@@ -429,7 +429,7 @@ fn a_tilt_in_flight_is_cut_before_it_lands() {
     assert!(ticks <= 2);
 }
 
-/// A gap that does not end is a lost link, and is called one.
+/// A gap that does not end is reported as a lost link.
 #[test]
 fn a_silence_of_more_than_200_ms_is_a_lost_link() {
     let mut bench = Bench::in_mode(Mode::Ready);
@@ -447,8 +447,8 @@ fn a_silence_of_more_than_200_ms_is_a_lost_link() {
     assert!(bench.wire_damps());
 }
 
-/// The robot is switched off and on again while another fault stands, and needs as long for it as a real one: the operator is
-/// told of the lost link and of the restart. (A defect once: the first fault was the last that was told.)
+/// The robot is switched off and on while another fault is latched, and boots as slowly as a real one: lost link and
+/// restart are reported too. (A defect once: only the first fault was reported.)
 #[test]
 fn a_power_cycle_behind_another_fault_is_told() {
     let mut bench = Bench::restarting_in(None).brought_to(Mode::Ready);
@@ -473,7 +473,7 @@ fn a_power_cycle_behind_another_fault_is_told() {
     assert!(bench.wire_damps());
 }
 
-/// LAND: an operator who is gone lets the robot sit down, also in mid-jump, where it lands first.
+/// LAND: after a lost operator the robot sits down; in flight it lands first.
 #[test]
 fn an_operator_who_is_gone_lets_it_land_and_sit_down() {
     for mode in [Mode::StandUp, Mode::Ready, Mode::Countdown, Mode::Jump] {
@@ -490,7 +490,7 @@ fn an_operator_who_is_gone_lets_it_land_and_sit_down() {
     }
 }
 
-/// HOLD: the trial that runs is finished, the next one refused.
+/// HOLD: the running trial is finished, the next one refused.
 #[test]
 fn a_low_battery_and_a_warm_motor_let_the_trial_finish_and_refuse_the_next() {
     for fault in ["battery 12", "hot RL_hip 72"] {
@@ -512,7 +512,7 @@ fn a_low_battery_and_a_warm_motor_let_the_trial_finish_and_refuse_the_next() {
     }
 }
 
-/// A robot that was never heard is not spoken to: it is called, and that is all.
+/// A robot that has never answered gets hello commands only.
 #[test]
 fn a_robot_that_was_never_heard_stays_offline() {
     let mut bench = Bench::new();
@@ -527,7 +527,7 @@ fn a_robot_that_was_never_heard_stays_offline() {
     assert_eq!(bench.cycle.mode(), Mode::Offline);
 }
 
-/// After a stop: looked at, put back, armed again, and it jumps.
+/// After a stop the robot is placed, armed again, and jumps.
 #[test]
 fn after_a_restart_the_robot_is_put_back_and_jumps_again() {
     let mut bench = Bench::in_mode(Mode::Ready);
@@ -549,8 +549,8 @@ fn after_a_restart_the_robot_is_put_back_and_jumps_again() {
     bench.until(Mode::Review);
 }
 
-/// Where a robot was thought to be before a person carried it back means nothing. (A bug once: only a simulated robot, which is
-/// put in place by the program, began anew.)
+/// The estimated position restarts after a person has carried the robot. (A bug once: it did so for simulated robots
+/// alone, which the program places.)
 #[test]
 fn a_robot_that_is_armed_begins_at_the_origin() {
     let mut bench = Bench::in_mode(Mode::Review);

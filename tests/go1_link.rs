@@ -1,23 +1,23 @@
-//! The link to a Go1: every datagram judged, every loss counted, over a real loopback socket against the emulated robot or a
-//! socket of the test's own. Stepped by hand: nothing here depends on how fast the machine is.
+//! The link to a Go1: every datagram is checked, every loss counted, over a loopback socket with the emulated robot or
+//! a socket of the test. Stepped by hand, so that nothing depends on the machine's speed.
 
 #[path = "support/go1.rs"]
 mod go1;
 
 use std::net::UdpSocket;
 
-use go1::{ANY_PORT, description, pair};
-use quadfrog::robot::go1::Go1;
+use go1::{ANY_PORT, description, network, pair};
 use quadfrog::robot::go1::packet::{CrcForm, HIGH_LEVEL, LowCmd, LowState, MODE_DAMPING, MODE_SERVO};
+use quadfrog::robot::go1::{Go1, Network};
 use quadfrog::robot::{JOINTS, JointCommand, LinkStatus, Robot, RobotError};
 use quadfrog::sim::SimConfig;
-use quadfrog::sim::emulator::{Emulator, Fault};
+use quadfrog::sim::emulator::{Emulator, EmulatorFault};
 
 fn status(go1: &Go1) -> LinkStatus {
     go1.link().unwrap()
 }
 
-/// `ms` milliseconds of damping.
+/// Damps for `ms` milliseconds.
 fn run(emulator: &mut Emulator, go1: &mut Go1, ms: u32) {
     for _ in 0..ms {
         let _ = go1.read();
@@ -26,13 +26,13 @@ fn run(emulator: &mut Emulator, go1: &mut Go1, ms: u32) {
     }
 }
 
-/// Runs until the robot has been heard, then with `fault`, then a while without; the states of all this, and the counts.
+/// Runs until the first state, then with `fault`, then a while without; returns all states and the counts.
 fn with(fault: &str, ms: u32) -> (u64, LinkStatus) {
     let (mut emulator, mut go1) = pair(&SimConfig::default(), 3);
     run(&mut emulator, &mut go1, 10);
     emulator.apply(fault.parse().unwrap());
     run(&mut emulator, &mut go1, ms);
-    emulator.apply(Fault::Clear);
+    emulator.apply(EmulatorFault::Clear);
     run(&mut emulator, &mut go1, 2000);
     let _ = go1.read();
     (emulator.status().states, status(&go1))
@@ -46,7 +46,7 @@ fn a_good_network_loses_nothing() {
     assert_eq!((link.state_age_ms, link.rate_hz, link.loss_share()), (0, 1000, 0.0));
 }
 
-/// Received and lost together are what was sent, to the last one.
+/// Received and lost states together are exactly the sent ones.
 #[test]
 fn every_lost_state_is_counted() {
     let (states, link) = with("loss 5", 20_000);
@@ -59,7 +59,8 @@ fn every_lost_state_is_counted() {
 fn every_corrupt_datagram_is_counted_and_none_is_used() {
     let (states, link) = with("corrupt 2", 20_000);
     assert_eq!(link.received + link.lost, states);
-    // A turned bit in the head makes it foreign; one behind what the checksum covers does no harm and is not seen.
+    // A flipped bit in the head makes a datagram foreign; one in bytes that the checksum does not cover is not
+    // detected.
     assert!((300..500).contains(&link.corrupt), "{} of 20000 at 2 %", link.corrupt);
     assert!(link.lost <= link.corrupt + link.foreign + 20, "{link:?}");
 }
@@ -71,12 +72,12 @@ fn a_duplicate_is_counted_and_not_new() {
     assert!((1800..2200).contains(&link.duplicate), "{}", link.duplicate);
 }
 
-/// What was overtaken is late, not lost; and the newest state never goes back in time.
+/// An overtaken state is late, not lost; and the newest state never goes back in time.
 #[test]
 fn an_overtaken_state_is_late_and_not_lost() {
     let (mut emulator, mut go1) = pair(&SimConfig::default(), 3);
     run(&mut emulator, &mut go1, 10);
-    emulator.apply(Fault::Jitter(5.0));
+    emulator.apply(EmulatorFault::Jitter(5.0));
     let mut newest = 0;
     for _ in 0..10_000 {
         if let Ok(state) = go1.read() {
@@ -86,7 +87,7 @@ fn an_overtaken_state_is_late_and_not_lost() {
         go1.write(&JointCommand::damping(3.0)).unwrap();
         emulator.step();
     }
-    emulator.apply(Fault::Clear);
+    emulator.apply(EmulatorFault::Clear);
     run(&mut emulator, &mut go1, 20);
     let _ = go1.read();
     let link = status(&go1);
@@ -94,7 +95,7 @@ fn an_overtaken_state_is_late_and_not_lost() {
     assert_eq!((link.received + link.late, link.lost), (emulator.status().states, 0), "{link:?}");
 }
 
-/// With a delay the age of the states says nothing, their clock does: the link is as fast as before.
+/// With a delay the rate of the states is unchanged.
 #[test]
 fn a_delayed_link_keeps_its_rate() {
     let (_, link) = with("delay 8", 4000);
@@ -106,7 +107,7 @@ fn a_delayed_link_keeps_its_rate() {
 fn a_restart_is_noticed_once() {
     let (mut emulator, mut go1) = pair(&SimConfig::default(), 3);
     run(&mut emulator, &mut go1, 1000);
-    emulator.apply(Fault::Reboot);
+    emulator.apply(EmulatorFault::Reboot);
     run(&mut emulator, &mut go1, 1000);
     assert!(matches!(go1.read(), Err(RobotError::Silent { age_ms: 999.. })));
     run(&mut emulator, &mut go1, 3000);
@@ -115,25 +116,25 @@ fn a_restart_is_noticed_once() {
     assert!(link.rate_hz > 950, "{link:?}");
 }
 
-/// The same state again and again is not a living robot, whatever its rate.
+/// A repeated state is not a new state, whatever its rate.
 #[test]
 fn a_clock_that_stands_still_is_silence() {
     let (mut emulator, mut go1) = pair(&SimConfig::default(), 3);
     run(&mut emulator, &mut go1, 100);
-    emulator.apply(Fault::Repeat);
+    emulator.apply(EmulatorFault::Repeat);
     run(&mut emulator, &mut go1, 50);
     assert!(matches!(go1.read(), Err(RobotError::Silent { age_ms: 49..=51 })));
     assert!(status(&go1).duplicate >= 48);
 }
 
-/// A dead port answers every second datagram with an error of the system (`specs/go1-wire.md`, section 5): no send is lost by
-/// it and nothing panics; the robot is called until it answers.
+/// A dead port answers every second datagram with an error of the system (`docs/go1-wire.md`, section 5): no send is
+/// lost by it and nothing panics; hello commands are sent until the robot answers.
 #[test]
 fn nobody_at_the_robots_port_is_silence_until_somebody_is() {
     let port = UdpSocket::bind(ANY_PORT).unwrap();
     let address = port.local_addr().unwrap();
     drop(port);
-    let mut go1 = Go1::open(&description(address), false).unwrap();
+    let mut go1 = Go1::open(&network(address), false).unwrap();
     for age in 1..=500 {
         assert_eq!(go1.read(), Err(RobotError::Silent { age_ms: age }));
     }
@@ -143,7 +144,7 @@ fn nobody_at_the_robots_port_is_silence_until_somebody_is() {
         let _ = go1.read();
     }
     assert_eq!((status(&go1).sent, status(&go1).send_errors), (106, 0));
-    let mut emulator = Emulator::bind(address, &description(address), &SimConfig::default(), 0).unwrap();
+    let mut emulator = Emulator::bind(address, &description(), &network(address), &SimConfig::default(), 0).unwrap();
     run(&mut emulator, &mut go1, 10);
     assert!(go1.read().is_ok());
 }
@@ -152,7 +153,7 @@ fn nobody_at_the_robots_port_is_silence_until_somebody_is() {
 fn who_only_listens_never_sends() {
     let robot = UdpSocket::bind(ANY_PORT).unwrap();
     robot.set_nonblocking(true).unwrap();
-    let mut go1 = Go1::open(&description(robot.local_addr().unwrap()), true).unwrap();
+    let mut go1 = Go1::open(&network(robot.local_addr().unwrap()), true).unwrap();
     for _ in 0..1000 {
         let _ = go1.read();
     }
@@ -160,7 +161,7 @@ fn who_only_listens_never_sends() {
     assert_eq!(status(&go1).sent, 0);
 }
 
-/// The robot's side is a socket of the test's own.
+/// A link whose robot is a socket of the test.
 struct Robots {
     socket: UdpSocket,
     go1: Go1,
@@ -169,7 +170,7 @@ struct Robots {
 impl Robots {
     fn new() -> Robots {
         let socket = UdpSocket::bind(ANY_PORT).unwrap();
-        let go1 = Go1::open(&description(socket.local_addr().unwrap()), false).unwrap();
+        let go1 = Go1::open(&network(socket.local_addr().unwrap()), false).unwrap();
         socket.connect(("127.0.0.1", go1.local_address().unwrap().port())).unwrap();
         Robots { socket, go1 }
     }
@@ -187,7 +188,7 @@ fn state(tick: u32) -> LowState {
     state
 }
 
-/// The official endpoint judges the last datagram of a queue alone; here a good one survives whatever comes behind it.
+/// The official endpoint checks the last datagram of a queue alone; here a valid one is kept whatever follows it.
 #[test]
 fn a_good_state_is_not_lost_to_bad_ones_behind_it() {
     let mut robot = Robots::new();
@@ -228,7 +229,7 @@ fn another_sender_is_not_heard() {
     assert_eq!(status(&robot.go1).received, 1);
 }
 
-/// The clock of 32 bits begins anew after 49 days: one state later, not a restart and not 4 billion lost ones.
+/// The 32-bit clock wraps around after 49 days: that is the next state, not a restart and not 4 billion lost states.
 #[test]
 fn the_robots_clock_may_run_over() {
     let mut robot = Robots::new();
@@ -239,7 +240,7 @@ fn the_robots_clock_may_run_over() {
     assert_eq!((status(&robot.go1).lost, status(&robot.go1).reboots), (0, 0));
 }
 
-/// A flood cannot hold the tick: what is left waits for the next millisecond.
+/// A flood cannot delay the tick: the rest is read in the next milliseconds.
 #[test]
 fn a_flood_is_judged_a_part_at_a_time() {
     let mut robot = Robots::new();
@@ -255,7 +256,7 @@ fn a_flood_is_judged_a_part_at_a_time() {
     assert_eq!(newest, 80);
 }
 
-/// A motor that brakes before it was told to follow has not left servo mode; one that still does some time after has.
+/// A motor that brakes before the first command has not left servo mode; one that still brakes some time after it has.
 #[test]
 fn a_motor_leaves_servo_mode_only_after_it_was_in_it() {
     let mut robot = Robots::new();
@@ -276,8 +277,8 @@ fn a_motor_leaves_servo_mode_only_after_it_was_in_it() {
     assert!(!next(&mut robot)[4]);
 }
 
-/// What cannot be said is not sent as something else: the joints are damped in servo mode, as by the last command to damp, and
-/// the caller hears of it. (A defect once: the motors' own braking of unknown strength, mode 0x00, went to all twelve.)
+/// In place of a command that does not fit a datagram, the last damping command is sent, in servo mode, and the caller
+/// gets an error. (A defect once: all motors got mode 0x00, their own braking of unknown strength.)
 #[test]
 fn a_command_that_is_no_number_becomes_the_last_damping_and_an_error() {
     let mut robot = Robots::new();
@@ -294,17 +295,17 @@ fn a_command_that_is_no_number_becomes_the_last_damping_and_an_error() {
     for _ in 0..3 {
         assert!(robot.socket.recv(&mut buffer).is_ok());
     }
-    let sent = LowCmd::judge(&buffer[..614], CrcForm::Plain).unwrap();
+    let sent = LowCmd::parse(&buffer[..614], CrcForm::Plain).unwrap();
     for motor in (0..JOINTS).map(|joint| sent.motor(joint)) {
         assert_eq!((motor.mode, motor.kp, motor.kd, motor.torque), (MODE_SERVO, 0.0, 3.0, 0.0));
     }
 }
 
-/// After a restart the motors are given the same time to report servo mode as after the first command.
+/// After a restart the motors have the same time to report servo mode as after the first command.
 #[test]
 fn a_restart_gives_the_motors_their_time_to_servo_mode_again() {
     let mut robot = Robots::new();
-    let grace_ms = description(ANY_PORT).network.unwrap().servo_grace_ms;
+    let grace_ms = network(ANY_PORT).servo_grace_ms;
     let mut tick = 10_000;
     let mut enabled = |robot: &mut Robots, restart: bool| {
         tick = if restart { 0 } else { tick + 1 };
@@ -317,17 +318,16 @@ fn a_restart_gives_the_motors_their_time_to_servo_mode_again() {
         enabled
     };
     let late = (0..grace_ms + 10).map(|_| enabled(&mut robot, false)).filter(|enabled| !enabled).count();
-    assert!(late > 0, "a motor that does not follow is told");
+    assert!(late > 0, "a motor that does not follow is reported");
     assert!(enabled(&mut robot, true), "not in the very first state after a restart");
     assert!((0..grace_ms / 2).all(|_| enabled(&mut robot, false)));
     assert!((0..grace_ms).any(|_| !enabled(&mut robot, false)));
 }
 
 #[test]
-fn a_taken_local_port_is_said_with_the_way_out() {
+fn a_taken_local_port_is_reported_with_the_remedy() {
     let taken = UdpSocket::bind("0.0.0.0:0").unwrap();
-    let mut description = description(ANY_PORT);
-    description.network.as_mut().unwrap().local_port = taken.local_addr().unwrap().port();
-    let error = Go1::open(&description, false).unwrap_err().to_string();
+    let local_port = taken.local_addr().unwrap().port();
+    let error = Go1::open(&Network { local_port, ..network(ANY_PORT) }, false).unwrap_err().to_string();
     assert!(error.contains("network.local_port"), "{error}");
 }

@@ -1,5 +1,5 @@
-//! Nothing allocates when the Go1's link reads and writes, whatever comes: an allocator that ends the process on the spot watches
-//! a jump and thousands of ticks over good, bad, silent and dead networks.
+//! The Go1's link never allocates in `read` and `write`: an allocator that aborts the process is active during a jump
+//! and thousands of ticks over good, bad, silent and dead networks.
 #![allow(
     unsafe_code,
     reason = "an allocator can only be written with unsafe; this one hands everything to the system's"
@@ -13,26 +13,26 @@ mod no_alloc;
 use std::collections::BTreeSet;
 use std::net::UdpSocket;
 
-use go1::{ANY_PORT, description, pair};
+use go1::{ANY_PORT, description, network, pair};
 use no_alloc::without_allocation;
-use quadfrog::config::{Backend, Config};
+use quadfrog::config::Config;
 use quadfrog::control::control_loop::ControlLoop;
 use quadfrog::realtime::channel::channels;
 use quadfrog::realtime::clock::SimulatedClock;
-use quadfrog::realtime::thread::Instant;
+use quadfrog::realtime::thread::TickStart;
 use quadfrog::robot::go1::Go1;
 use quadfrog::robot::{JointCommand, Robot};
-use quadfrog::sim::emulator::Fault;
+use quadfrog::sim::emulator::EmulatorFault;
 use quadfrog::telemetry::{Command, Event, Mode, Permit};
-use quadfrog::trial::{JumpParameters, Task};
+use quadfrog::trial::{Backend, JumpParameters, Task};
 
-/// The control thread's body over the link: standing up, a jump and its review on a good network; then one that loses, doubles,
-/// spoils and delays, and a restart: every branch of the link.
+/// The control thread's body over the link: standing up, a jump and its review on a good network; then a network that
+/// loses, duplicates, corrupts and delays, and a restart: every branch of the link.
 #[test]
 fn a_tick_over_the_link_does_not_allocate() {
     let config = Config::load(None).unwrap();
     let (mut emulator, mut go1) = pair(&config.simulator, 1);
-    let settings = config.settings(&description(ANY_PORT), Task::Forward, Backend::Hardware).unwrap();
+    let settings = config.settings(&description(), Task::Forward, Backend::Hardware).unwrap();
     let (control, mut session, screen, mut recorder) = channels();
     let mut body = ControlLoop::new(&settings, control);
     let (mut ms, mut mode_changes, mut seen) = (0, 0, BTreeSet::new());
@@ -43,9 +43,9 @@ fn a_tick_over_the_link_does_not_allocate() {
         }
         for _ in 0..count {
             screen.heartbeat.beat();
-            let instant = Instant { planned_ns: ms * 1_000_000, lateness_ns: 0 };
+            let instant = TickStart { planned_ns: ms * 1_000_000, lateness_ns: 0 };
             let mode = without_allocation(|| {
-                body.rehearse(&SimulatedClock, &mut go1);
+                body.warm_up(&SimulatedClock, &mut go1);
                 let mode = body.tick(instant, &SimulatedClock, &mut go1).mode;
                 body.prepare();
                 mode
@@ -65,7 +65,7 @@ fn a_tick_over_the_link_does_not_allocate() {
                     emulator.apply(fault.parse().unwrap());
                 }
             } else if ms == 23_000 {
-                emulator.apply(Fault::Reboot);
+                emulator.apply(EmulatorFault::Reboot);
             }
         }
         assert_eq!(until, None, "never reached after {count} ticks");
@@ -94,7 +94,7 @@ fn a_tick_over_the_link_does_not_allocate() {
 fn a_dead_port_and_a_flood_do_not_make_it_allocate() {
     let socket = UdpSocket::bind(ANY_PORT).unwrap();
     let address = socket.local_addr().unwrap();
-    let mut go1 = Go1::open(&description(address), false).unwrap();
+    let mut go1 = Go1::open(&network(address), false).unwrap();
     socket.connect(("127.0.0.1", go1.local_address().unwrap().port())).unwrap();
     for _ in 0..60 {
         socket.send(&[0; 900]).unwrap();

@@ -1,4 +1,4 @@
-//! Properties of the Go1's datagrams: what can be said comes back within the fixed point's step, what cannot is refused, and
+//! Properties of the Go1's datagrams: numbers in range survive encoding within the resolution, others are refused, and
 //! the battery is never switched off.
 
 use proptest::prelude::*;
@@ -27,10 +27,11 @@ proptest! {
     #[test]
     fn a_command_comes_back_within_the_fixed_points_step(command in command(), form in form()) {
         let datagram = low_cmd(&command, form).unwrap();
-        let read = LowCmd::judge(datagram.bytes(), form).unwrap();
+        let read = LowCmd::parse(datagram.bytes(), form).unwrap();
         for (joint, wanted) in command.motor.iter().enumerate() {
             let got = motor_command(&read.motor(joint)).expect("servo mode");
-            // Truncated towards zero: never more than asked for, and less than one step less, but for the rounding to 32 bits.
+            // Truncated towards zero: not more than the command, and less than one step less, except for the rounding
+            // to 32 bits.
             for (got, wanted, step) in
                 [(got.torque, wanted.torque, 1.0 / 256.0), (got.kp, wanted.kp, 1.0 / 32.0), (got.kd, wanted.kd, 1.0 / 16.0)]
             {
@@ -48,7 +49,7 @@ proptest! {
         }
     }
 
-    /// No target where there is no gain for it: a motor never runs to a position that nobody meant.
+    /// Without a gain there is no target: a motor never runs to a stale position.
     #[test]
     fn without_a_gain_there_is_no_target(command in command()) {
         let datagram = low_cmd(&command, CrcForm::Plain).unwrap();
@@ -60,7 +61,8 @@ proptest! {
         }
     }
 
-    /// Byte 562 with 0xA5 would drop the robot. Arbitrary bits in every number of a command, encoded or refused, leave it zero.
+    /// Byte 562 with 0xA5 would drop the robot. Arbitrary bits in every number of a command, encoded or refused, leave
+    /// it zero.
     #[test]
     fn no_command_switches_the_battery_off(numbers in proptest::array::uniform12(proptest::array::uniform5(any::<u64>())), form in form()) {
         let motor = numbers.map(|bits| {
@@ -92,16 +94,16 @@ proptest! {
     fn one_wrong_bit_anywhere_under_the_checksum_is_seen(bit in 16..608 * 8usize, form in form()) {
         let mut bytes = LowCmd::damping(form).bytes().to_vec();
         bytes[bit / 8] ^= 1 << (bit % 8);
-        prop_assert!(matches!(LowCmd::judge(&bytes, form), Err(Rejection::Crc { .. })), "bit {}", bit);
+        prop_assert!(matches!(LowCmd::parse(&bytes, form), Err(Rejection::Crc { .. })), "bit {}", bit);
     }
 
     #[test]
     fn nothing_that_comes_makes_a_reader_panic(bytes in proptest::collection::vec(any::<u8>(), 0..1500)) {
-        let _ = LowState::judge(&bytes).map(|state| robot_state(state, 1.0));
-        let _ = LowCmd::judge(&bytes, CrcForm::Plain);
+        let _ = LowState::parse(&bytes).map(|state| robot_state(state, 1.0));
+        let _ = LowCmd::parse(&bytes, CrcForm::Plain);
     }
 
-    /// What the emulator says of the robot is what the controller hears.
+    /// The controller decodes the state that the emulator encodes.
     #[test]
     fn a_state_comes_back(
         q in proptest::array::uniform12(-4.0..4.0f64), dq in proptest::array::uniform12(-30.0..30.0f64),
@@ -125,7 +127,7 @@ proptest! {
         told.imu.gyro_body = axis.into();
         let mut datagram = low_state(&told, 1.0);
         datagram.seal();
-        let heard = robot_state(LowState::judge(datagram.bytes()).unwrap(), 1.0);
+        let heard = robot_state(LowState::parse(datagram.bytes()).unwrap(), 1.0);
         let near = |a: &[f64], b: &[f64], step: f64| a.iter().zip(b).all(|(a, b)| (a - b).abs() <= step);
         prop_assert!(near(&heard.joint_position, &told.joint_position, 1e-6));
         prop_assert!(near(&heard.joint_velocity, &told.joint_velocity, 1e-5));
@@ -140,7 +142,7 @@ proptest! {
     }
 }
 
-/// The default command of `specs/go1-wire.md`, section 3, in both forms.
+/// The default command of `docs/go1-wire.md`, section 3, in both forms.
 #[test]
 fn a_command_that_asks_for_the_battery_to_be_switched_off_is_none() {
     let mut bytes = LowCmd::damping(CrcForm::Plain).bytes().to_vec();
@@ -148,10 +150,11 @@ fn a_command_that_asks_for_the_battery_to_be_switched_off_is_none() {
     bytes[562] = 0xA5;
     let sum = crc(&bytes[..608]);
     bytes[610..].copy_from_slice(&sum.to_le_bytes());
-    assert_eq!(LowCmd::judge(&bytes, CrcForm::Plain), Err(Rejection::BatteryOff));
+    assert_eq!(LowCmd::parse(&bytes, CrcForm::Plain), Err(Rejection::BatteryOff));
 }
 
-/// The sources hold the one value of the battery's byte and no way around the type: the driver writes no byte by its place.
+/// The sources contain the only value of the battery's byte and no way around the type: the driver writes no byte by
+/// its offset.
 #[test]
 fn the_driver_writes_no_byte_by_its_place() {
     let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("src/robot/go1");

@@ -1,5 +1,5 @@
-//! Whole studies over the network: the engine drives emulated Go1s over loopback in real time, with an operator who arms,
-//! approves, judges as suggested, and after a stop looks, puts the robot back and arms again.
+//! Whole studies over the network: the engine drives emulated Go1s over loopback in real time, with an operator who
+//! arms, approves, accepts the suggested verdicts, and after a stop places the robot and arms again.
 
 #[path = "support/go1.rs"]
 mod go1;
@@ -10,35 +10,34 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use go1::{ANY_PORT, Lockstep, description};
-use quadfrog::config::{Backend, Config};
-use quadfrog::engine::{Engine, Handle, Options, open_life};
+use go1::{Lockstep, description, emulator, network};
+use quadfrog::config::Config;
+use quadfrog::engine::{self, Handle, Options, open_experiment};
 use quadfrog::optimize::journal::Durability;
 use quadfrog::realtime::thread::pace;
 use quadfrog::recording::record::{Record, StageRecord};
-use quadfrog::telemetry::Mode;
-use quadfrog::trial::{ExperimentStage, Proposal, Task, TrialRecord, Verdict};
-
-use quadfrog::robot::description::RobotDescription;
+use quadfrog::robot::go1::Network;
 use quadfrog::robot::{LinkStatus, Robot, Truth};
 use quadfrog::session::automatic;
 use quadfrog::session::operator_request::{OperatorCheck, OperatorRequest};
 use quadfrog::session::rollout::Rollout;
-use quadfrog::sim::emulator::{Emulator, EmulatorHandle, Fault};
+use quadfrog::sim::emulator::{EmulatorFault, EmulatorHandle};
 use quadfrog::sim::{SimConfig, Simulator};
+use quadfrog::telemetry::Mode;
+use quadfrog::trial::{Backend, ExperimentStage, Proposal, Task, TrialRecord, Verdict};
 
 const TASK: Task = Task::Forward;
 const TRIALS: u32 = 20;
-/// How long a robot must lie still before it may be armed, and a little more.
+/// Time without motion before a robot can be armed, with a margin.
 const STILL: Duration = Duration::from_millis(1300);
-/// Nobody waits longer for a study of a few minutes.
+/// Time limit of a study.
 const PATIENCE: Duration = Duration::from_secs(1200);
 
 fn config(late_ms: f64) -> Config {
     let mut config = Config::load(None).unwrap();
-    // As long as in the simulator: nobody has to step back.
+    // As long as in the simulator: no person is beside the robot.
     config.control.countdown.hardware_s = config.control.countdown.simulator_s;
-    // A machine that does other things too: what is a hiccup here would be a fault at a robot.
+    // The test machine has other load: its delays would be faults at a robot.
     config.safety.watchdog.hardware_late_ms = late_ms;
     config.safety.watchdog.state_age_ms = (2.0 * late_ms).max(20.0) as u32;
     config.safety.watchdog.period_ticks = 1000;
@@ -46,22 +45,22 @@ fn config(late_ms: f64) -> Config {
     config
 }
 
-fn options(config: Config, robot: RobotDescription, backend: Backend, seed: u32, trials: u32) -> Options {
-    Options { seed, trials: Some(trials), ..Options::new(config, robot, backend, TASK) }
+fn options(config: Config, network: Option<Network>, backend: Backend, seed: u32, trials: u32) -> Options {
+    Options { network, seed, trials: Some(trials), ..Options::new(config, description(), backend, TASK) }
 }
 
-/// An emulated robot in real time on a thread of its own, until dropped.
+/// An emulated robot in real time in its own thread.
 struct LivingRobot {
     handle: EmulatorHandle,
-    description: RobotDescription,
+    network: Network,
     ending: Arc<AtomicBool>,
     thread: Option<std::thread::JoinHandle<()>>,
 }
 
 impl LivingRobot {
     fn new(config: &Config, seed: u64) -> LivingRobot {
-        let mut emulator = Emulator::bind(ANY_PORT, &description(ANY_PORT), &config.simulator, seed).unwrap();
-        let description = description(emulator.local_address().unwrap());
+        let mut emulator = emulator(&config.simulator, seed);
+        let network = network(emulator.local_address().unwrap());
         let handle = emulator.handle();
         let ending = Arc::new(AtomicBool::new(false));
         let flag = ending.clone();
@@ -72,7 +71,7 @@ impl LivingRobot {
             })
             .unwrap();
         });
-        LivingRobot { handle, description, ending, thread: Some(thread) }
+        LivingRobot { handle, network, ending, thread: Some(thread) }
     }
 }
 
@@ -85,25 +84,25 @@ impl Drop for LivingRobot {
     }
 }
 
-/// What came of a study.
+/// Result of a study.
 #[derive(Debug)]
 struct Outcome {
     best: f64,
     rows: Vec<TrialRecord>,
-    /// How far the robot really jumped in each trial, m.
+    /// True displacement of each trial, m.
     in_truth: BTreeMap<u32, f64>,
     link: LinkStatus,
     stops: u32,
 }
 
-/// A person at the console who does what the screen says.
+/// An operator who follows the screen.
 struct Operator {
     engine: Handle,
     robot: EmulatorHandle,
     stage: Option<StageRecord>,
     card: Option<Proposal>,
     rows: BTreeMap<u32, TrialRecord>,
-    /// Where the robot really stood when the trial was approved.
+    /// True state at the approval of the trial.
     stood: Option<Truth>,
     in_truth: BTreeMap<u32, f64>,
     /// The mode in which something was wished last: once a mode is enough.
@@ -115,7 +114,7 @@ struct Operator {
 
 impl Operator {
     fn look(&mut self) -> (Mode, LinkStatus) {
-        self.engine.beat();
+        self.engine.send_heartbeat();
         while self.engine.next_tick().is_some() {}
         while let Some(stamped) = self.engine.next_record() {
             match stamped.record {
@@ -146,7 +145,7 @@ impl Operator {
                     self.in_truth.insert(trial, moved.x);
                 }
                 Some(match row.suggested? {
-                    // Something else than the parameters was the cause: the same again.
+                    // The parameters were not the cause: run the trial again.
                     Verdict::Void => OperatorRequest::Rerun { trial: None },
                     verdict => OperatorRequest::Judge(verdict),
                 })
@@ -161,10 +160,10 @@ impl Operator {
                     return None;
                 }
                 if self.lies_since.is_none_or(|since| since.elapsed() > STILL * 2) {
-                    self.robot.apply(Fault::Place);
+                    self.robot.apply(EmulatorFault::Place);
                     self.lies_since = Some(Instant::now());
                     for word in OperatorCheck::ALL {
-                        self.engine.wish(OperatorRequest::Confirm(word));
+                        self.engine.request(OperatorRequest::Confirm(word));
                     }
                 }
                 let still = self.lies_since.is_some_and(|since| since.elapsed() > STILL);
@@ -192,7 +191,7 @@ impl Operator {
             // Once is enough, unless nothing comes of it.
             let wishes = self.wished_in != Some(here) || wished_at.elapsed() > Duration::from_secs(3);
             if wishes && let Some(intent) = self.act(mode) {
-                self.engine.wish(intent);
+                self.engine.request(intent);
                 wished_at = Instant::now();
                 self.wished_in = Some(here);
             }
@@ -201,15 +200,15 @@ impl Operator {
     }
 }
 
-/// A study on a robot of its own.
+/// Runs a study on an emulated robot.
 fn over_the_network(seed: u32, trials: u32, late_ms: f64) -> Outcome {
     let config = config(late_ms);
     let robot = LivingRobot::new(&config, seed.into());
     let folder = tempfile::tempdir().unwrap();
-    let mut options = options(config, robot.description.clone(), Backend::Hardware, seed, trials);
+    let mut options = options(config, Some(robot.network), Backend::Hardware, seed, trials);
     options.folder = Some(folder.path().join("study"));
     let mut operator = Operator {
-        engine: Engine::start(options).unwrap(),
+        engine: engine::start(options).unwrap(),
         robot: robot.handle.clone(),
         stage: None,
         card: None,
@@ -229,16 +228,15 @@ fn over_the_network(seed: u32, trials: u32, late_ms: f64) -> Outcome {
     Outcome { best, rows, in_truth: operator.in_truth, link, stops: operator.stops }
 }
 
-/// A study without threads: what it finds in simulated time.
+/// Runs a study without threads, in simulated time.
 fn in_simulated_time<R: Robot>(
     backend: Backend,
     seed: u32,
     robot: impl FnOnce(&SimConfig) -> R,
 ) -> (f64, Vec<TrialRecord>) {
-    let description = RobotDescription::embedded("go1").unwrap();
-    let options = options(config(0.0), description, backend, seed, TRIALS);
+    let options = options(config(0.0), None, backend, seed, TRIALS);
     let settings = options.config.settings(&options.robot, TASK, backend).unwrap();
-    let mut life = open_life(&options, Durability::Buffered, "").unwrap();
+    let mut life = open_experiment(&options, Durability::Buffered, "").unwrap();
     let mut rollout = Rollout::new(robot(&options.config.simulator), &settings);
     automatic::run(&mut life, &mut rollout, |_, _| {}).unwrap();
     (life.best().and_then(|row| row.value).unwrap_or(0.0), life.rows().cloned().collect())
@@ -246,7 +244,7 @@ fn in_simulated_time<R: Robot>(
 
 /// The same study in the simulator, without a network.
 fn in_the_simulator(seed: u32) -> (f64, Vec<TrialRecord>) {
-    let simulator = |config: &SimConfig| Simulator::new(&RobotDescription::embedded("go1").unwrap(), config).unwrap();
+    let simulator = |config: &SimConfig| Simulator::new(&description(), config).unwrap();
     in_simulated_time(Backend::Simulator, seed, simulator)
 }
 
@@ -268,18 +266,18 @@ fn tell(seed: u32, outcome: &Outcome) {
     println!("seed {seed}: best {:.3} m, {} stops, {:?}", outcome.best, outcome.stops, outcome.link);
 }
 
-/// By how much the accepted jumps were measured too long or too short, m.
+/// Errors of the measured displacements of the accepted jumps, m.
 fn measured_wrong_by(outcome: &Outcome) -> Vec<f64> {
     let accepted = outcome.rows.iter().filter(|row| row.verdict == Some(Verdict::Accept));
     accepted.filter_map(|row| Some((row.value? - outcome.in_truth.get(&row.trial)?).abs())).collect()
 }
 
-/// Twenty trials on each of five robots over loopback, millisecond by millisecond; their best jumps beside the simulator's.
-fn step_by_step(watched: bool) -> (Vec<f64>, Vec<f64>) {
+/// Twenty trials on each of five robots over loopback, stepped by the millisecond, compared with the simulator.
+fn step_by_step(with_truth: bool) -> (Vec<f64>, Vec<f64>) {
     let mut bests = (Vec::new(), Vec::new());
     for seed in 0..5 {
-        let robot = |config: &SimConfig| Lockstep { watched, ..Lockstep::new(config, seed.into()) };
-        let backend = if watched { Backend::Simulator } else { Backend::Hardware };
+        let robot = |config: &SimConfig| Lockstep { with_truth, ..Lockstep::new(config, seed.into()) };
+        let backend = if with_truth { Backend::Simulator } else { Backend::Hardware };
         let (over, rows) = in_simulated_time(backend, seed, robot);
         let (alone, alone_rows) = in_the_simulator(seed);
         let row = |row: &TrialRecord| format!("{:.3} {}", row.value.unwrap_or(f64::NAN), row.cause);
@@ -292,21 +290,21 @@ fn step_by_step(watched: bool) -> (Vec<f64>, Vec<f64>) {
     bests
 }
 
-/// What the link itself changes: with cameras that tell where the robot is, nothing but a millisecond and the fixed point.
+/// Effect of the link alone: with the true state available, only a millisecond of delay and the fixed point.
 #[test]
 fn the_link_takes_nothing_from_a_study() {
     let (network, simulator) = step_by_step(true);
     assert!(compare(&network, &simulator).abs() <= 0.1);
 }
 
-/// The whole of it: the robot's own sensors alone say how far it jumped.
+/// Link and estimator: the robot's sensors alone measure the jump.
 #[test]
 fn a_study_over_the_network_ends_as_one_in_the_simulator() {
     let (network, simulator) = step_by_step(false);
     assert!(compare(&network, &simulator).abs() <= 0.1);
 }
 
-/// How the medians differ, relative to the simulator's.
+/// Returns the difference of the medians, relative to the simulator's.
 fn compare(network: &[f64], simulator: &[f64]) -> f64 {
     let (over, alone) = (median(network), median(simulator));
     println!("best of {TRIALS} trials, seeds 0-4: network {network:.3?} m, simulator {simulator:.3?} m");
@@ -339,7 +337,7 @@ fn a_study_in_real_time_ends_as_one_in_the_simulator() {
     assert!(median(&errors) <= 0.03, "the measure is not what the robot did: {errors:.3?}");
     let network: Vec<f64> = outcomes.iter().map(|(_, outcome)| outcome.best).collect();
     let simulator: Vec<f64> = (0..5).map(|seed| in_the_simulator(seed).0).collect();
-    // Not worse. Better it may be: nobody carries these robots back to a mark, every jump begins as the last one ended, and the
-    // best of twenty differing jumps lies higher than that of twenty equal ones.
+    // Not worse; it may be better: these robots are not placed between trials, so the start states differ, and the
+    // best of twenty different jumps is higher than that of twenty equal ones.
     assert!(compare(&network, &simulator) >= -0.1);
 }

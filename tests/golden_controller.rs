@@ -1,8 +1,9 @@
-//! The leg controller against torques computed independently of this project (`specs/method.md`).
+//! The leg controller against torques computed independently of this project (`docs/method.md`).
 
 mod support;
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use quadfrog::control::force_profile::amplitudes_leg;
 use quadfrog::control::leg::{self, LegTarget};
 use quadfrog::robot::kinematics::LegGeometry;
 use quadfrog::robot::{Joints, PerLeg};
@@ -59,7 +60,7 @@ fn golden_controller() {
             vmc: case.vmc,
             attitude_rate_gain: 0.0,
             foot_offset_leg: PerLeg::default(),
-            amplitudes_leg: jump.amplitudes_leg(task),
+            amplitudes_leg: amplitudes_leg(&jump, task),
             theta_rad: case.theta_rad,
         };
         let [w, x, y, z] = case.base_quat_wxyz;

@@ -1,12 +1,12 @@
 //! Smooth dynamics against Pinocchio (`golden/dynamics.json`) and a fine reference integration (`golden/flight.json`).
-//! The folder is that of the environment variable `QUADFROG_GOLDEN` where it is set.
+//! `QUADFROG_GOLDEN` names another folder of golden data.
 
 mod support;
 
 use nalgebra::{Quaternion, UnitQuaternion};
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::robot::{JointCommand, Leg, Robot};
-use quadfrog::sim::{DOF, Model, SimConfig, Simulator, State};
+use quadfrog::sim::{DOF, RobotModel, SimConfig, SimState, Simulator};
 use serde_json::Value;
 use support::{Largest, golden};
 
@@ -21,9 +21,9 @@ fn array<const N: usize>(value: &Value) -> [f64; N] {
     numbers(value).try_into().expect("the right number of values")
 }
 
-fn state_of(case: &Value) -> State {
+fn state_of(case: &Value) -> SimState {
     let [w, x, y, z] = array(&case["base_quat_wxyz"]);
-    State {
+    SimState {
         position_world: array::<3>(&case["base_position"]).into(),
         orientation_world: UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z)),
         joint_position: array(&case["joint_q"]),
@@ -46,7 +46,7 @@ fn relative(found: &[f64], expected: &Value) -> f64 {
 
 #[test]
 fn golden_dynamics() {
-    let model = Model::new(&RobotDescription::embedded("go1").unwrap());
+    let model = RobotModel::new(&RobotDescription::embedded("go1").unwrap());
     let file = golden::<Value>("dynamics.json");
     let cases = file["cases"].as_array().unwrap();
     assert!(!cases.is_empty());

@@ -1,8 +1,9 @@
-//! A journal written by Optuna 5.0.0, read here, and what Optuna itself says is in it. `QUADFROG_GOLDEN` names another
-//! folder of golden data.
+//! A journal written by Optuna 5.0.0, compared with the contents that Optuna itself reports. `QUADFROG_GOLDEN` selects
+//! another folder of golden data.
 
+use quadfrog::optimize::ask::{Ask, Direction, SamplerConfig, Streams};
 use quadfrog::optimize::journal::{Durability, Journal, JournalFile, LOCK_GRACE, Operation};
-use quadfrog::optimize::sampler::{Direction, SamplerConfig, Streams, propose};
+use quadfrog::optimize::sampler::propose;
 use quadfrog::optimize::space::Space;
 use quadfrog::optimize::trial::{Distribution, Trial, TrialState};
 use serde_json::{Map, Value, json};
@@ -17,17 +18,10 @@ fn golden(name: &str) -> PathBuf {
 
 /// A trial in the shape of the expected file.
 fn as_expected(trial: &Trial) -> Value {
-    let state = match trial.state {
-        TrialState::Running => "RUNNING",
-        TrialState::Complete => "COMPLETE",
-        TrialState::Pruned => "PRUNED",
-        TrialState::Fail => "FAIL",
-        TrialState::Waiting => "WAITING",
-    };
     let map = |members: Vec<(String, Value)>| Value::Object(Map::from_iter(members));
     json!({
         "number": trial.number,
-        "state": state,
+        "state": <&str>::from(trial.state),
         "value": trial.value,
         "params": map(trial.parameters.iter().map(|(n, v)| (n.clone(), Value::from(*v))).collect()),
         "user_attrs": trial.user_attributes,
@@ -43,7 +37,7 @@ fn golden_journal() {
     let log = golden("journal.log");
     let journal = Journal::open(JournalFile::new(&log, Durability::Synced, LOCK_GRACE).unwrap()).unwrap();
     let name = expected["study_name"].as_str().unwrap();
-    let study = &journal.replay().studies()[journal.replay().find(name).expect("the study is in the journal")];
+    let study = &journal.state().studies()[journal.state().find(name).expect("the study is in the journal")];
     let mut compared = 0;
     let mut same = |what: String, ours: Value, theirs: &Value| {
         assert_eq!(&ours, theirs, "{what}");
@@ -65,7 +59,7 @@ fn golden_journal() {
     println!("golden_journal: {compared} cases compared, largest difference {largest:.1e} of the range");
 }
 
-/// The suggestions in the journal, made again from its seed.
+/// Recomputes the suggestions of the journal from its seed.
 fn suggested_again(trials: &[Trial], expected: &Value, direction: Direction, compared: &mut usize) -> f64 {
     let (Some(seed), Some(multivariate)) = (expected["seed"].as_u64(), expected["multivariate"].as_bool()) else {
         return 0.0;
@@ -77,8 +71,11 @@ fn suggested_again(trials: &[Trial], expected: &Value, direction: Direction, com
         let range = |d: &Distribution| d.range().expect("the golden journal has floats only");
         let names = trial.parameters.iter().map(|(n, _)| n.clone());
         let space = Space::new(names.zip(trial.distributions.iter().map(range))).unwrap();
-        let proposal = propose(&config, &mut streams, &trials[..i], &space, &trial.fixed(), direction);
-        for (p, value) in space.parameters().iter().zip(proposal.values) {
+        let candidate = propose(
+            &Ask { config: &config, trials: &trials[..i], space: &space, fixed: &trial.fixed(), direction },
+            &mut streams,
+        );
+        for (p, value) in space.parameters().iter().zip(candidate.values) {
             let theirs = trial.parameter(&p.name).unwrap();
             let difference = (value - theirs).abs() / (p.range.high - p.range.low);
             assert!(difference <= 1e-10, "trial {i} {}: ours {value}, Optuna's {theirs}", p.name);
@@ -97,7 +94,7 @@ fn lines_are_written_as_they_were_read() {
         let ours = operation.to_line(&worker);
         let (again, reread) = Operation::parse(ours.trim_end()).unwrap();
         assert_eq!((again, reread), (worker, operation), "{line}");
-        // and member for member what Python wrote
+        // And equal member by member to the line of Python.
         let (ours, theirs): (Value, Value) =
             (serde_json::from_str(&ours).unwrap(), serde_json::from_str(line).unwrap());
         assert_eq!(ours, theirs);

@@ -6,6 +6,7 @@ mod support;
 
 use nalgebra::Vector3;
 use quadfrog::control::foot_placement::SwingLegs;
+use quadfrog::control::force_profile::amplitudes_leg;
 use quadfrog::control::leg::{LegTarget, feet, stance_of, torques};
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::robot::{JointCommand, Joints, Leg, PerLeg, Placement, Robot};
@@ -66,7 +67,7 @@ struct Outcome {
     yaw_change_rad: f64,
 }
 
-/// Runs one case as the reference does.
+/// Runs one case by the protocol of the reference.
 fn jump(robot: &RobotDescription, config: &SimConfig, file: &File, case: &Case) -> Outcome {
     let mut simulator = Simulator::new(robot, config).unwrap();
     let stance_leg = Vector3::new(file.stance_m.x, file.stance_m.y, file.stance_m.z);
@@ -118,7 +119,7 @@ fn jump(robot: &RobotDescription, config: &SimConfig, file: &File, case: &Case) 
             vmc: true,
             attitude_rate_gain: case.terms.attitude_rate_gain,
             foot_offset_leg: swing.offsets_leg(case.terms.foot_placement_s, &velocity_body),
-            amplitudes_leg: if active { profile.amplitudes_leg(task) } else { PerLeg::default() },
+            amplitudes_leg: if active { amplitudes_leg(&profile, task) } else { PerLeg::default() },
             theta_rad: std::f64::consts::PI + std::f64::consts::TAU * case.f0_hz * since.max(0.0),
         };
         let feet = feet(&robot.leg_geometry, &state.joint_position);
@@ -138,7 +139,7 @@ fn jump(robot: &RobotDescription, config: &SimConfig, file: &File, case: &Case) 
     outcome
 }
 
-/// The value below which `share` of the differences are, interpolated.
+/// Returns the interpolated quantile `share` of the differences.
 fn percentile(differences: &mut [f64], share: f64) -> f64 {
     differences.sort_by(f64::total_cmp);
     let place = (differences.len() - 1) as f64 * share;
@@ -146,7 +147,7 @@ fn percentile(differences: &mut [f64], share: f64) -> f64 {
     below + (above - below) * place.fract()
 }
 
-/// How far the jumps of a file differ from the reference's.
+/// Differences of the jumps of a file from the reference's.
 #[derive(Debug)]
 struct Differences {
     /// Median and 95th percentile of the apex rise, percent.
@@ -229,9 +230,9 @@ fn reference_setup(file: &File) -> (RobotDescription, SimConfig) {
     (RobotDescription::embedded("go1").unwrap(), config)
 }
 
-/// As shipped, with MuJoCo's convex contact law, everything agrees. With Coulomb's law feet that slide at the end of a push stay on
-/// the ground where MuJoCo's hop along, so the last foot leaves some 14 ms later and twists turn otherwise by several percent;
-/// height, place and fate of the jumps agree all the same.
+/// With MuJoCo's convex contact law, as shipped, all quantities agree. With Coulomb's law feet that slide at the end of
+/// a push stay on the ground, where MuJoCo's hop: the last foot leaves about 14 ms later and twists differ by several
+/// percent; apex, landing position and falls agree.
 #[test]
 fn golden_jumps() {
     let file: File = support::golden("jumps.json");

@@ -1,12 +1,13 @@
-//! Every suggestion of Optuna 5.0.0's TPE in `golden/tpe`, closed loop: the objective is computed here, so one wrong
-//! suggestion would lead all later ones astray. `QUADFROG_GOLDEN` names another folder of golden data.
+//! Every suggestion of Optuna 5.0.0's TPE in `tests/golden/tpe`, closed loop: the objective is computed here, so one wrong
+//! suggestion changes all later ones. `QUADFROG_GOLDEN` selects another folder of golden data.
 
+use quadfrog::optimize::ask::{Ask, Direction, SamplerConfig, Streams};
 use quadfrog::optimize::mt19937::Mt19937;
 use quadfrog::optimize::parzen::observation_weights;
-use quadfrog::optimize::sampler::{Direction, SamplerConfig, Streams, propose};
+use quadfrog::optimize::sampler::propose;
 use quadfrog::optimize::space::{Range, Space};
 use quadfrog::optimize::tpe::good_count;
-use quadfrog::optimize::trial::{Distribution, Trial, TrialState};
+use quadfrog::optimize::trial::{Distribution, Trial, TrialState, announcement};
 use quadfrog::optimize::truncnorm::{log_cdf, log_mass, quantile};
 use serde_json::Value;
 use std::collections::HashMap;
@@ -27,7 +28,7 @@ fn floats(value: &Value) -> Vec<f64> {
     value.as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect()
 }
 
-/// What a file of runs has in common.
+/// Settings common to the runs of a file.
 struct Scenario<'a> {
     file: &'a Value,
     direction: Direction,
@@ -50,8 +51,8 @@ impl<'a> Scenario<'a> {
         self.file["param_order"][dim].as_array().unwrap().iter().map(|v| v.as_str().unwrap()).collect()
     }
 
-    /// The parameters of the trial that is run again at `index`: the file's plan counts from the best. They are those of
-    /// our own trial, not of the file, which may differ in the last bit: a re-run is equal to what was run.
+    /// The parameters of the trial that is re-run at `index`; the file's plan has its rank. They are those of this program's
+    /// trial, which can differ from the file in the last bit: a re-run is bit-identical to its original.
     fn rerun(&self, index: usize, trials: &[Trial]) -> Option<Vec<(String, f64)>> {
         let plan = self.file["rerun_plan"].as_array()?;
         let rank = plan.iter().find(|entry| entry[0] == index)?[1].as_u64()? as usize;
@@ -60,7 +61,7 @@ impl<'a> Scenario<'a> {
         Some(complete[rank].parameters.clone())
     }
 
-    /// The objective of the file's `formula`; what it says of numbers that fail or are pruned comes back as a state.
+    /// Evaluates the objective of the file's `formula`, with the state of trials that fail or are pruned.
     fn evaluate(&self, trial: &Trial) -> (TrialState, Option<f64>) {
         let x = |name: &str| trial.parameter(name).unwrap();
         let u = |name: &str| (x(name) - self.range(name).low) / (self.range(name).high - self.range(name).low);
@@ -95,7 +96,7 @@ impl<'a> Scenario<'a> {
                 let e = if lateral { u("Fy") - 0.8 } else { 0.0 };
                 if lateral { v + 0.5 * e * e } else { v }
             }
-            other => panic!("objective {other} is not known to this test"),
+            other => panic!("objective {other} is unknown to this test"),
         };
         (TrialState::Complete, Some(value))
     }
@@ -117,7 +118,7 @@ impl Tally {
     }
 }
 
-/// Replays one run and compares every suggestion; returns the next doubles of both streams.
+/// Repeats one run and compares every suggestion; returns the next doubles of both streams.
 fn run(scenario: &Scenario<'_>, run: &Value, name: &str, tally: &mut Tally) -> [[f64; 2]; 2] {
     let dim = run["dim"].to_string();
     let names = scenario.names(&dim);
@@ -137,7 +138,7 @@ fn run(scenario: &Scenario<'_>, run: &Value, name: &str, tally: &mut Tally) -> [
         .unwrap_or_default();
     let mut trials: Vec<Trial> = Vec::new();
     for (index, theirs) in expected.iter().enumerate() {
-        for (&late, _) in zombies.iter().filter(|(_, (_, told))| *told == Some(index as u64)) {
+        for (&late, _) in zombies.iter().filter(|(_, (_, end))| *end == Some(index as u64)) {
             let trial = &mut trials[late as usize];
             (trial.state, trial.value) = scenario.evaluate(trial);
         }
@@ -149,24 +150,27 @@ fn run(scenario: &Scenario<'_>, run: &Value, name: &str, tally: &mut Tally) -> [
         let zombie = zombies.get(&(index as u64));
         let asked = &names[..zombie.map_or(names.len(), |(suggested, _)| *suggested)];
         let space = Space::new(asked.iter().map(|n| ((*n).to_owned(), scenario.range(n)))).unwrap();
-        let proposal = propose(&config, &mut streams, &trials, &space, &fixed, scenario.direction);
+        let candidate = propose(
+            &Ask { config: &config, trials: &trials, space: &space, fixed: &fixed, direction: scenario.direction },
+            &mut streams,
+        );
         let mut trial = Trial::new(index as u32, TrialState::Running);
-        for (k, (&parameter, value)) in asked.iter().zip(&proposal.values).enumerate() {
+        for (k, (&parameter, value)) in asked.iter().zip(&candidate.values).enumerate() {
             let range = scenario.range(parameter);
             tally.compare(*value, theirs[k].as_f64().unwrap(), range.high - range.low, || {
                 format!("{name} {config:?} dim {dim} trial {index} {parameter}")
             });
             trial.set(parameter, *value, Distribution::Float(range));
         }
-        trial.announce(&proposal.joint);
+        trial.system_attributes.extend(announcement(&candidate.joint));
         if zombie.is_none() {
             (trial.state, trial.value) = scenario.evaluate(&trial);
-            let told = match trial.state {
+            let state = match trial.state {
                 TrialState::Complete => b'C',
                 TrialState::Fail => b'F',
                 _ => b'P',
             };
-            assert_eq!(states[index], told, "{name}: state of trial {index}");
+            assert_eq!(states[index], state, "{name}: state of trial {index}");
         }
         trials.push(trial);
     }

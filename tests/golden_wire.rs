@@ -1,10 +1,11 @@
-//! Datagrams against the official library's, captured on loopback (`golden/wire`): what it sent for which fields, and what it
-//! accepted, decoded to what. `QUADFROG_GOLDEN` names another folder of golden data.
+//! Compares datagrams with those of the official library, captured on loopback (`golden/wire`): commands that it sent,
+//! and states that it accepted or rejected, with their decoded fields. `QUADFROG_GOLDEN` names another folder of golden
+//! data.
 
 mod support;
 
 use quadfrog::robot::go1::packet::{
-    CommandError, CrcForm, Header, LowCmd, LowState, MOTORS, MotorTarget, Rejection, STATE_LENGTH,
+    CommandError, CrcForm, Header, LowCmd, LowState, MOTORS, MotorTarget, Rejection, STATE_LENGTH, crc,
 };
 use serde::Deserialize;
 use serde_json::Value;
@@ -14,7 +15,7 @@ struct File<T> {
     cases: Vec<T>,
 }
 
-/// `wire/<name>` in the golden folder, or `<name>` where the folder itself is that of the datagrams.
+/// Reads `wire/<name>` in the golden folder, or `<name>` if the folder itself holds the datagrams.
 fn cases<T: serde::de::DeserializeOwned>(name: &str) -> Vec<T> {
     let nested = format!("wire/{name}");
     let name = if support::golden_folder().join(&nested).exists() { &nested } else { name };
@@ -51,9 +52,22 @@ struct CommandCase {
     sealed_crc: String,
 }
 
-/// The command of those fields; of the battery's bytes there is no first one.
+/// A command whose motor records have those reserved words, which no function of [`LowCmd`] sets.
+fn with_reserve(motors: &[[u32; 9]], form: CrcForm) -> LowCmd {
+    let mut datagram = LowCmd::damping(form).bytes().to_vec();
+    for (motor, words) in motors.iter().enumerate() {
+        for (word, value) in words[6..].iter().enumerate() {
+            datagram[37 + 27 * motor + 4 * word..][..4].copy_from_slice(&value.to_le_bytes());
+        }
+    }
+    let checksum = form.apply(crc(&datagram[..608]));
+    datagram[610..].copy_from_slice(&checksum.to_le_bytes());
+    *LowCmd::parse(&datagram, form).unwrap()
+}
+
+/// The command of those fields, without the byte that switches the battery off.
 fn command(fields: &CommandFields, form: CrcForm) -> Result<LowCmd, CommandError> {
-    let mut command = LowCmd::damping(form);
+    let mut command = with_reserve(&fields.motor_cmd, form);
     command.header = Header {
         head: fields.head,
         level: fields.level_flag,
@@ -62,7 +76,7 @@ fn command(fields: &CommandFields, form: CrcForm) -> Result<LowCmd, CommandError
         version: fields.version.map(Into::into),
         bandwidth: fields.band_width.into(),
     };
-    for (motor, &[mode, q, dq, tau, kp, kd, r0, r1, r2]) in fields.motor_cmd.iter().enumerate() {
+    for (motor, &[mode, q, dq, tau, kp, kd, ..]) in fields.motor_cmd.iter().enumerate() {
         let target = MotorTarget {
             mode: mode as u8,
             position: f32::from_bits(q),
@@ -72,7 +86,6 @@ fn command(fields: &CommandFields, form: CrcForm) -> Result<LowCmd, CommandError
             kd: f32::from_bits(kd),
         };
         command.set(motor, &target)?;
-        command.set_reserve(motor, [r0, r1, r2]);
     }
     command.battery_reserve = [fields.bms[1], fields.bms[2], fields.bms[3]];
     command.remote = bytes(&fields.wireless_remote).try_into().unwrap();
@@ -91,18 +104,19 @@ fn every_command_in_range_is_the_librarys_byte_for_byte() {
         for (form, wire) in [(CrcForm::Plain, plain), (CrcForm::Sealed, sealed)] {
             let ours = command(&case.fields, form).unwrap_or_else(|error| panic!("{}: {error}", case.name));
             if case.fields.bms[0] != 0 {
-                // The one thing that ours cannot say: all else is the same, and theirs is no command to us.
+                // Our commands cannot switch the battery off: all other bytes are equal, and the library's command is
+                // rejected.
                 assert_eq!(ours.bytes()[562], 0, "{}", case.name);
                 assert_eq!(ours.bytes()[..562], wire[..562], "{}", case.name);
                 assert_eq!(ours.bytes()[563..610], wire[563..610], "{}", case.name);
                 if case.fields.head == [0xFE, 0xEF] {
-                    assert_eq!(LowCmd::judge(&wire, form), Err(Rejection::BatteryOff), "{}", case.name);
+                    assert_eq!(LowCmd::parse(&wire, form), Err(Rejection::BatteryOff), "{}", case.name);
                 }
                 continue;
             }
             assert_eq!(ours.bytes(), wire, "{}, {form:?}", case.name);
             if case.fields.head == [0xFE, 0xEF] {
-                let read = LowCmd::judge(&wire, form).unwrap_or_else(|error| panic!("{}: {error}", case.name));
+                let read = LowCmd::parse(&wire, form).unwrap_or_else(|error| panic!("{}: {error}", case.name));
                 assert_eq!(read.bytes(), wire, "{}, {form:?}", case.name);
             }
             same += 1;
@@ -112,7 +126,7 @@ fn every_command_in_range_is_the_librarys_byte_for_byte() {
     assert!(same > 0);
 }
 
-/// The library lets the words wrap round (200 N m becomes -56); ours says which quantity of which motor does not fit.
+/// The library lets numbers wrap around (200 N m becomes -56); our error names the quantity and the motor.
 #[test]
 fn every_command_out_of_range_is_refused_by_name() {
     let mut refused = 0;
@@ -152,7 +166,7 @@ struct StateCase {
 fn every_state_is_accepted_or_rejected_as_by_the_library() {
     let (mut accepted, mut rejected) = (0, 0);
     for case in cases::<StateCase>("lowstate.json") {
-        // The library's buffer: zeroed once, every datagram of the queue over the one before, judged at the end.
+        // The library's buffer: zeroed once, each datagram of the queue over the previous one, checked at the end.
         let mut buffer = vec![0; STATE_LENGTH];
         let mut last = Vec::new();
         for datagram in case.datagrams.iter().map(|hex| bytes(hex)) {
@@ -160,15 +174,15 @@ fn every_state_is_accepted_or_rejected_as_by_the_library() {
             buffer[..kept].copy_from_slice(&datagram[..kept]);
             last = datagram;
         }
-        let verdict = LowState::judge(&buffer);
+        let verdict = LowState::parse(&buffer);
         let expected = match verdict {
             Ok(_) => 0,
             Err(Rejection::Head { .. }) => -1,
             Err(_) => -3,
         };
         assert_eq!(expected, case.recv, "{}: {verdict:?}", case.name);
-        // Ours judges each datagram by itself. Only of one that is too short can that differ: it is never a state.
-        match LowState::judge(&last) {
+        // Ours checks each datagram by itself. Only for a datagram that is too short can the results differ.
+        match LowState::parse(&last) {
             Err(Rejection::Length { length, .. }) => assert!(length < STATE_LENGTH, "{}", case.name),
             alone => assert_eq!(alone, verdict, "{}", case.name),
         }
@@ -184,7 +198,7 @@ fn every_state_is_accepted_or_rejected_as_by_the_library() {
     assert!(accepted > 0);
 }
 
-/// Every field of a decoded state; floats by their bits.
+/// Compares every field of a decoded state; floats by their bits.
 fn compare(ours: &LowState, theirs: &Value, case: &str) {
     let numbers = |value: &Value| -> Vec<i64> {
         value.as_array().unwrap_or_else(|| panic!("{case}: {value}")).iter().map(|v| v.as_i64().unwrap()).collect()

@@ -1,9 +1,9 @@
-//! What the operator is shown: densities that are densities, risks that count, repeats that convince.
+//! Results for the operator: densities, falls nearby, repeats, the best trial and its confirmation.
 
-use quadfrog::optimize::insight::{Risk, densities};
+use quadfrog::optimize::ask::{Direction, SamplerConfig};
+use quadfrog::optimize::insight::{FallProximity, densities};
 use quadfrog::optimize::mt19937::Mt19937;
-use quadfrog::optimize::repeats::{Confirmation, Point, confirm, contenders, points, student_cdf};
-use quadfrog::optimize::sampler::{Direction, SamplerConfig};
+use quadfrog::optimize::repeats::{Confirmation, RepeatedPoint, best, confirm, contenders, points, student_cdf};
 use quadfrog::optimize::space::{Range, Space};
 use quadfrog::optimize::trial::{Distribution, FALL, Trial, TrialState, VERDICT};
 
@@ -62,24 +62,24 @@ fn the_good_density_is_high_where_the_good_trials_are() {
 }
 
 #[test]
-fn risk_counts_the_falls_among_the_nearest() {
+fn the_falls_among_the_nearest_trials_are_counted() {
     let trials = history(40);
     let at = |u: [f64; 2]| trial(99, u, 0.0, false).parameters;
-    let safe = Risk::of(&at([0.1, 0.1]), &trials, &space());
+    let safe = FallProximity::of(&at([0.1, 0.1]), &trials, &space());
     assert_eq!((safe.fell_near, safe.neighbours), (0, 5));
-    let edge = Risk::of(&at([0.95, 0.95]), &trials, &space());
+    let edge = FallProximity::of(&at([0.95, 0.95]), &trials, &space());
     assert_eq!((edge.fell_near, edge.neighbours), (5, 5));
     assert!(edge.falls[0].1 < safe.falls[0].1);
     assert_eq!(edge.falls.len(), trials.iter().filter(|t| t.is_fall()).count());
     assert!(edge.falls.is_sorted_by(|a, b| a.1 <= b.1));
 
-    // distances by hand, in scaled units: 0.3 along one axis, 0.4 along the logarithmic one
+    // Distances by hand, in scaled units: 0.3 along one axis, 0.4 along the logarithmic one.
     let one = [trial(0, [0.5, 0.9], 0.0, true)];
-    let risk = Risk::of(&at([0.2, 0.5]), &one, &space());
-    assert_eq!(risk.falls[0].0, 0);
-    assert!((risk.falls[0].1 - 0.5).abs() < 1e-12);
-    assert_eq!(risk.attributes()[1].1, "1/1");
-    assert!(Risk::of(&at([0.2, 0.5]), &[], &space()).attributes()[0].1.is_null());
+    let proximity = FallProximity::of(&at([0.2, 0.5]), &one, &space());
+    assert_eq!(proximity.falls[0].0, 0);
+    assert!((proximity.falls[0].1 - 0.5).abs() < 1e-12);
+    assert_eq!(proximity.attributes()[1].1, "1/1");
+    assert!(FallProximity::of(&at([0.2, 0.5]), &[], &space()).attributes()[0].1.is_null());
 }
 
 #[test]
@@ -98,6 +98,22 @@ fn repeats_are_one_point() {
     assert_eq!(all[1].deviation(), None);
     assert_eq!(contenders(&trials, Direction::Maximize, 1)[0].trials, [1]);
     assert_eq!(contenders(&trials, Direction::Minimize, 1)[0].trials, [0, 2, 3]);
+}
+
+#[test]
+fn the_best_trial_is_that_of_the_best_mean_and_did_not_fall() {
+    let number = |trials: &[Trial], direction| best(trials, direction).map(|trial| trial.number);
+    let lucky_once = [
+        trial(0, [0.1, 0.2], 9.0, false),
+        trial(1, [0.3, 0.2], 5.0, false),
+        trial(2, [0.1, 0.2], 0.0, true),
+        trial(3, [0.5, 0.2], 5.0, false),
+    ];
+    assert_eq!(number(&lucky_once, Direction::Maximize), Some(1), "mean 4.5 of 2; of equals the earliest");
+    assert_eq!(number(&lucky_once, Direction::Minimize), Some(0), "a fall is never the best");
+    assert_eq!(number(&lucky_once[2..3], Direction::Maximize), None);
+    let unknown = Trial { value: Some(f64::NAN), ..trial(0, [0.1, 0.1], 0.0, false) };
+    assert_eq!(number(&[unknown, trial(1, [0.3, 0.2], 5.0, false)], Direction::Maximize), Some(1));
 }
 
 #[test]
@@ -124,11 +140,11 @@ fn normal(stream: &mut Mt19937) -> f64 {
     (-2.0 * (1.0 - stream.double()).ln()).sqrt() * (std::f64::consts::TAU * stream.double()).cos()
 }
 
-/// Confirms among three points of the given true means; which led (if one did) and how many repeats it took.
+/// Confirms among three points of given true means; returns the leader, if any, and the number of repeats.
 fn confirmation(truth: [f64; 3], noise: f64, budget: usize, stream: &mut Mt19937) -> (Option<usize>, usize) {
     let mut run = |i: usize| truth[i] + noise * normal(stream);
-    let mut contenders: Vec<Point> = (0..3)
-        .map(|i| Point {
+    let mut contenders: Vec<RepeatedPoint> = (0..3)
+        .map(|i| RepeatedPoint {
             parameters: vec![("x".into(), i as f64)],
             trials: vec![i as u32],
             values: vec![run(i)],

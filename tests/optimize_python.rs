@@ -1,9 +1,10 @@
-//! The same journal in the hands of Python's Optuna 5 and optuna-dashboard. Where Python lacks them the tests say so and
-//! skip; `pip install optuna==5.0.0 optuna-dashboard` installs them.
+//! Interoperability of the journal with Python's Optuna 5 and optuna-dashboard. Tests are skipped with a message if Python
+//! lacks them; `pip install optuna==5.0.0 optuna-dashboard` installs them.
 
+use quadfrog::optimize::ask::{Ask, Direction, SamplerConfig, Streams};
 use quadfrog::optimize::importance::divergences;
 use quadfrog::optimize::journal::{Durability, Journal, JournalError, JournalFile, Operation};
-use quadfrog::optimize::sampler::{Direction, SamplerConfig, Streams, propose};
+use quadfrog::optimize::sampler::propose;
 use quadfrog::optimize::space::{Range, Space};
 use quadfrog::optimize::study::{Outcome, Storage, Study, StudyOptions};
 use quadfrog::optimize::trial::{Distribution, Trial, TrialState};
@@ -16,7 +17,7 @@ use std::time::Duration;
 
 const SCRIPT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/support/optuna_study.py");
 
-/// Whether Python can import `module`; says so where it cannot.
+/// Whether Python can import `module`; prints a message if it cannot.
 fn python_has(module: &str, version: &str) -> bool {
     let check = format!("import {module}; assert {module}.__version__.startswith('{version}')");
     let found = Command::new("python3").args(["-c", &check]).stderr(Stdio::null()).status().is_ok_and(|s| s.success());
@@ -32,7 +33,7 @@ fn python(arguments: &[&str]) -> Command {
     command
 }
 
-/// Runs the script and reads its answer.
+/// Runs the script and parses its output.
 fn optuna(arguments: &[&str]) -> Value {
     let output = python(arguments).output().expect("python3 runs");
     assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
@@ -67,6 +68,10 @@ impl Drop for Folder {
 fn space() -> Space {
     let ranges = [("f0", 0.75, 1.75), ("Fx", 0.0, 150.0), ("Fz", 150.0, 350.0)];
     Space::new(ranges.map(|(n, low, high)| (n.to_owned(), Range::linear(low, high)))).unwrap()
+}
+
+fn ask<'a>(config: &'a SamplerConfig, trials: &'a [Trial], space: &'a Space, fixed: &'a [(String, f64)]) -> Ask<'a> {
+    Ask { config, trials, space, fixed, direction: Direction::Maximize }
 }
 
 fn open(path: &Path, seed: u32) -> Study {
@@ -171,11 +176,11 @@ fn we_run_what_python_enqueued_and_both_continue_each_other() {
         run(&mut study, &[]);
     });
 
-    // and what they suggest next is what we would suggest with their seed, from the very same history
+    // The next suggestion of Python equals ours for the same seed and history.
     let before = study.trials().to_vec();
     let next = optuna(&["continue", &journal, "1", "5"]);
     let config = SamplerConfig { seed: 5, ..SamplerConfig::default() };
-    let ours = propose(&config, &mut Streams::new(5), &before, &space(), &[], Direction::Maximize);
+    let ours = propose(&ask(&config, &before, &space(), &[]), &mut Streams::new(5));
     for (p, value) in space().parameters().iter().zip(ours.values) {
         let theirs = next[0]["params"][&p.name].as_f64().unwrap();
         assert!((value - theirs).abs() <= 1e-10 * (p.range.high - p.range.low), "{}: {value}, not {theirs}", p.name);
@@ -201,9 +206,9 @@ fn bounds_changed_in_mid_study_are_treated_as_optuna_does() {
             });
             let space = Space::new(ranges).unwrap();
             let fixed: &[(String, f64)] = if i == 20 { &[("Fz".to_owned(), 225.0)] } else { &[] };
-            let proposal = propose(&config, &mut streams, &trials, &space, fixed, Direction::Maximize);
+            let candidate = propose(&ask(&config, &trials, &space, fixed), &mut streams);
             let mut trial = Trial::new(i as u32, TrialState::Complete);
-            for (p, value) in space.parameters().iter().zip(proposal.values) {
+            for (p, value) in space.parameters().iter().zip(candidate.values) {
                 let theirs = theirs[&p.name].as_f64().unwrap();
                 let difference = (value - theirs).abs() / (p.range.high - p.range.low);
                 assert!(difference <= 1e-10, "seed {seed} trial {i} {}: {value}, not {theirs}", p.name);
@@ -250,7 +255,7 @@ fn three_writers_at_once_lose_nothing() {
     assert!(!folder.0.join("study.log.lock").exists());
 }
 
-/// PED-ANOVA's divergences equal those of Optuna's evaluator, also after the bounds have changed in mid-study.
+/// PED-ANOVA's divergences equal those of Optuna's evaluator, also after a change of the bounds.
 #[test]
 fn importances_are_optunas() {
     if !python_has("optuna", "5.") {
@@ -279,7 +284,7 @@ fn importances_are_optunas() {
     }
 }
 
-/// A lock as a writer leaves it that was killed while it held it.
+/// Creates the lock that a killed writer leaves.
 fn dead_writers_lock(path: &Path) {
     #[cfg(unix)]
     std::os::unix::fs::symlink(path, path.with_extension("log.lock")).unwrap();
@@ -294,7 +299,7 @@ fn the_lock_of_a_dead_writer_is_broken() {
     let mut journal = Journal::open(file).unwrap();
     let create = Operation::CreateStudy { name: "after".into(), directions: vec![2] };
     journal.commit(|_| Ok::<_, JournalError>(vec![create.clone()])).unwrap();
-    assert_eq!(journal.replay().find("after"), Some(0));
+    assert_eq!(journal.state().find("after"), Some(0));
     assert!(std::fs::symlink_metadata(path.with_extension("log.lock")).is_err(), "the lock is gone");
 }
 
@@ -311,7 +316,7 @@ fn the_lock_of_a_dead_writer_is_broken_after_thirty_seconds() {
     assert!(began.elapsed() >= Duration::from_secs(30), "a lock may be held for 30 s");
 }
 
-/// The dashboard, ended with the test.
+/// The process of the dashboard, killed on drop.
 struct Dashboard(Child);
 
 impl Drop for Dashboard {
@@ -321,7 +326,7 @@ impl Drop for Dashboard {
     }
 }
 
-/// GET of a path of the dashboard; `None` while it does not answer.
+/// GETs a path of the dashboard; `None` until it answers.
 fn get(port: u16, path: &str) -> Option<Value> {
     let mut stream = TcpStream::connect(("127.0.0.1", port)).ok()?;
     write!(stream, "GET {path} HTTP/1.0\r\nHost: localhost\r\n\r\n").ok()?;
@@ -330,7 +335,7 @@ fn get(port: u16, path: &str) -> Option<Value> {
     serde_json::from_str(answer.split_once("\r\n\r\n")?.1).ok()
 }
 
-/// Asks until the answer is as wanted; the time-out only ends a test that fails.
+/// Polls until `ask` returns a value; fails after a minute.
 fn until<T>(what: &str, mut ask: impl FnMut() -> Option<T>) -> T {
     for _ in 0..600 {
         if let Some(answer) = ask() {

@@ -1,11 +1,11 @@
-//! A study on a real Redis server, shared by workers: ours as processes of this very test, and Python's. Skipped with a
-//! message where `redis-server` is not installed.
+//! A study on a Redis server, shared by workers: processes of this test program, and Python. Skipped with a message if
+//! `redis-server` is not installed.
 
 #[path = "support/redis.rs"]
 mod redis;
 
+use quadfrog::optimize::ask::{Direction, SamplerConfig};
 use quadfrog::optimize::journal::Durability;
-use quadfrog::optimize::sampler::{Direction, SamplerConfig};
 use quadfrog::optimize::space::{Range, Space};
 use quadfrog::optimize::study::{Outcome, Storage, Study, StudyOptions};
 use quadfrog::optimize::trial::TrialState;
@@ -42,7 +42,7 @@ fn run(study: &mut Study) -> u32 {
     number
 }
 
-/// Not a test by itself: what a worker process does.
+/// The body of a worker process, not a test by itself.
 #[test]
 fn worker() {
     let Ok(task) = std::env::var(WORKER) else { return };
@@ -73,7 +73,7 @@ fn four_workers_one_of_them_killed_lose_nothing_and_double_nothing() {
         let of = |t: &&quadfrog::optimize::trial::Trial| t.system_attributes["quadfrog:draws"]["seed"] == 4;
         study.trials().iter().filter(of).count()
     };
-    // killed in the middle of its work, whenever that is
+    // Killed at an arbitrary point of its work.
     while victims(&watcher) < 40 {
         watcher.refresh().unwrap();
         assert!(victim.0.try_wait().unwrap().is_none(), "the worker ended by itself");

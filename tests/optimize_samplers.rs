@@ -1,10 +1,10 @@
-//! Properties of the samplers that are not Optuna's: they stay inside, they repeat, they do better than chance.
+//! Properties of the samplers beyond equality with Optuna: bounds, repeatability, better results than random points.
 
-use quadfrog::optimize::gp::falls::Standing;
+use quadfrog::optimize::ask::{Direction, SamplerConfig, SamplerKind};
+use quadfrog::optimize::gp::falls::StandProbability;
 use quadfrog::optimize::gp::process::GaussianProcess;
 use quadfrog::optimize::gp::{ascent, log_improvement};
 use quadfrog::optimize::mt19937::Mt19937;
-use quadfrog::optimize::sampler::{Direction, SamplerConfig, SamplerKind};
 use quadfrog::optimize::sobol::{MAX_DIMENSIONS, Sobol};
 use quadfrog::optimize::space::{Range, Space, SpaceError};
 use quadfrog::optimize::study::{Outcome, Storage, Study, StudyOptions};
@@ -28,7 +28,7 @@ fn study(kind: SamplerKind, seed: u32, direction: Direction) -> Study {
     Study::open(Storage::Memory, options).unwrap()
 }
 
-/// Runs trials of a jump that grows with u1 + u2 until it falls beyond 1.3; returns (best value, falls).
+/// Runs trials of a jump that improves with u1 + u2 up to a fall beyond 1.3; returns (best value, falls).
 fn jumps(study: &mut Study, trials: u32, overrides: &[(String, f64)]) -> (f64, usize) {
     for _ in 0..trials {
         let draft = study.draft();
@@ -124,7 +124,7 @@ fn running_trials_of_others_keep_the_gaussian_process_away() {
         .map(|(a, b)| ((a.value - b.value) / (a.high - a.low)).powi(2))
         .sum::<f64>()
         .sqrt();
-    assert!(apart > 0.01, "two workers at once were sent {apart} apart");
+    assert!(apart > 0.01, "two workers got candidates {apart} apart");
 }
 
 #[test]
@@ -136,7 +136,7 @@ fn sobol_points_fill_every_interval_once() {
         points.iter().for_each(|p| seen[(p[d] * 256.0) as usize] += 1);
         assert!(seen.iter().all(|n| *n == 1), "dimension {d}");
     }
-    // the first two coordinates together are a (0, 2)-net: every elementary box of area 1/256 holds one point
+    // The first two coordinates together are a (0, 2)-net: every elementary box of area 1/256 contains one point.
     for columns in [1, 2, 16, 128] {
         let rows = 256 / columns;
         let mut seen = vec![0; 256];
@@ -146,7 +146,7 @@ fn sobol_points_fill_every_interval_once() {
 }
 
 #[test]
-fn the_process_passes_through_quiet_values_and_knows_where_it_knows() {
+fn the_process_interpolates_noiseless_values_and_is_uncertain_far_from_points() {
     let grid: Vec<Vec<f64>> = (0..25).map(|i| vec![f64::from(i % 5) / 4.0, f64::from(i / 5) / 4.0]).collect();
     let f = |x: &[f64]| (3.0 * x[0]).sin() + x[1] * x[1];
     let values: Vec<f64> = grid.iter().map(|x| f(x)).collect();
@@ -160,7 +160,7 @@ fn the_process_passes_through_quiet_values_and_knows_where_it_knows() {
         assert!((mean - f(&x)).abs() < 0.02, "{mean} +- {deviation}, not {} at {x:?}", f(&x));
     }
     let left = GaussianProcess::fit(grid[..10].to_vec(), &values[..10]).unwrap();
-    assert!(left.predict(&[0.5, 1.0]).1 > 3.0 * left.predict(&[0.5, 0.1]).1, "far from all points it is unsure");
+    assert!(left.predict(&[0.5, 1.0]).1 > 3.0 * left.predict(&[0.5, 0.1]).1, "uncertain far from all points");
 }
 
 #[test]
@@ -187,15 +187,15 @@ fn noise_is_estimated() {
 }
 
 #[test]
-fn the_chance_of_standing_falls_towards_the_falls() {
+fn the_probability_of_standing_decreases_towards_the_falls() {
     let mut stream = Mt19937::new(11);
     let points: Vec<Vec<f64>> = (0..30).map(|_| vec![stream.double(), stream.double()]).collect();
     let stood: Vec<bool> = points.iter().map(|p| p[0] < 0.6).collect();
-    let standing = Standing::fit(&points, &stood).unwrap();
-    let along: Vec<f64> = (0..=4).map(|i| standing.chance(&[f64::from(i) / 4.0, 0.5])).collect();
+    let stand = StandProbability::fit(&points, &stood).unwrap();
+    let along: Vec<f64> = (0..=4).map(|i| stand.probability(&[f64::from(i) / 4.0, 0.5])).collect();
     assert!(along.is_sorted_by(|a, b| a > b), "{along:?}");
     assert!(along[0] > 0.8 && along[4] < 0.3, "{along:?}");
-    assert!(Standing::fit(&points, &[true; 30]).is_none(), "without a fall there is nothing to learn");
+    assert!(StandProbability::fit(&points, &[true; 30]).is_none(), "without a fall there is nothing to learn");
 }
 
 #[test]
@@ -219,7 +219,7 @@ fn the_logarithm_of_the_improvement_is_smooth_and_right() {
 
 #[test]
 fn climbing_ends_on_the_summit_or_at_the_wall() {
-    // Rosenbrock's valley upside down
+    // Rosenbrock's function, negated
     let valley = |x: &[f64]| -((1.0 - x[0]).powi(2) + 100.0 * (x[1] - x[0] * x[0]).powi(2));
     let bounds = [(-2.0, 2.0), (-2.0, 2.0)];
     let (x, _) = ascent::maximize(ascent::with_gradient(valley, &bounds, 1e-6), &[-1.2, 1.0], &bounds, 200);

@@ -1,9 +1,9 @@
-//! The study: proposals without effect, interruptions without loss, other writers.
+//! The study: drafts without effect, interruptions without loss, other writers.
 
+use quadfrog::optimize::ask::{Direction, SamplerConfig};
 use quadfrog::optimize::journal::Durability;
-use quadfrog::optimize::sampler::{Direction, SamplerConfig};
 use quadfrog::optimize::space::{Range, Space};
-use quadfrog::optimize::study::{Outcome, Storage, Study, StudyError, StudyOptions, Told};
+use quadfrog::optimize::study::{Outcome, Storage, Study, StudyError, StudyOptions, TellOutcome};
 use quadfrog::optimize::trial::TrialState;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -25,7 +25,7 @@ fn options(seed: u32, multivariate: bool) -> StudyOptions {
     }
 }
 
-/// A folder of the test's own, removed when it passes.
+/// A temporary folder, removed if the test passes.
 struct Folder(PathBuf);
 
 impl Folder {
@@ -55,7 +55,7 @@ fn objective(parameters: &[(String, f64)]) -> f64 {
     1.0 / (1.0 + 4.0 * a * a + 3.0 * b * b + 5.0 * c * c)
 }
 
-/// One trial from proposal to value; every third is a fall and every seventh fails.
+/// Runs one trial; every third has the value 0, every seventh fails.
 fn one_trial(study: &mut Study, overrides: &[(String, f64)]) {
     let draft = study.draft();
     let trial = study.begin(&draft, overrides, &[("source".into(), json!("sampler"))]).unwrap();
@@ -66,10 +66,10 @@ fn one_trial(study: &mut Study, overrides: &[(String, f64)]) {
         n if n % 3 == 2 => Outcome::Complete(0.0),
         _ => Outcome::Complete(value),
     };
-    assert_eq!(study.tell(trial, outcome).unwrap(), Told::Recorded);
+    assert_eq!(study.tell(trial, outcome).unwrap(), TellOutcome::Recorded);
 }
 
-/// What must be the same bit for bit: number, state, parameters, value, positions of the random streams.
+/// The bit-identical part of a trial: number, state, parameters, value, positions of the random streams.
 type Row = (u32, TrialState, Vec<(String, f64)>, Option<f64>, Value);
 
 fn table(study: &Study) -> Vec<Row> {
@@ -127,27 +127,27 @@ fn a_verdict_given_before_a_crash_is_there_afterwards() {
     let draft = study.draft();
     let trial = study.begin(&draft, &[], &[]).unwrap();
     study.annotate(trial, &[("verdict".into(), json!("fall")), ("value".into(), json!(0.0))]).unwrap();
-    drop(study); // as killed: nothing is told
+    drop(study); // as if killed before the tell
 
     let mut study = open(&path, 0, true);
     let left: Vec<u32> = study.running().map(|t| t.number).collect();
     assert_eq!(left, [trial]);
     assert_eq!(study.trial(trial).unwrap().user_attributes["verdict"], json!("fall"));
-    assert_eq!(study.tell(trial, Outcome::Complete(0.0)).unwrap(), Told::Recorded);
+    assert_eq!(study.tell(trial, Outcome::Complete(0.0)).unwrap(), TellOutcome::Recorded);
     assert_eq!(study.running().count(), 0);
 }
 
 #[test]
-fn the_operators_values_are_recorded_as_fixed() {
+fn overrides_are_recorded_as_fixed() {
     let mut study = Study::open(Storage::Memory, options(0, true)).unwrap();
     let draft = study.draft();
     let trial = study.begin(&draft, &[("Fz".into(), 200.0)], &[]).unwrap();
     let trial = study.trial(trial).unwrap();
     assert_eq!(trial.parameter("Fz"), Some(200.0));
-    assert_eq!(trial.parameter("f0"), Some(draft.parameters[0].value), "what was not overridden is as it was shown");
+    assert_eq!(trial.parameter("f0"), Some(draft.parameters[0].value), "a parameter without override is as drafted");
     assert_eq!(trial.fixed(), [("Fz".to_owned(), 200.0)]);
 
-    // a trial of which everything is given uses no random numbers: the next one draws what this one would have
+    // A trial with all parameters given uses no random numbers.
     let before = study.draft();
     let all: Vec<_> = before.parameters.iter().map(|s| (s.name.clone(), s.low)).collect();
     study.begin(&before, &all, &[]).unwrap();
@@ -165,11 +165,11 @@ fn refusals_say_what_is_wrong() {
     assert!(nan.contains("`f0`") && nan.contains("NaN"), "{nan}");
     let log = error(study.enqueue(&[("Fz".into(), 0.0)], &[]));
     assert!(log.contains("`Fz`") && log.contains("above 0"), "{log}");
-    assert_eq!(study.trials().len(), 0, "nothing of a refused call remains");
+    assert_eq!(study.trials().len(), 0, "a refused call changes nothing");
     let trial = study.begin(&draft, &[], &[]).unwrap();
     assert!(matches!(study.tell(trial, Outcome::Complete(f64::NAN)), Err(StudyError::Value { .. })));
     study.tell(trial, Outcome::Complete(1.0)).unwrap();
-    assert_eq!(study.tell(trial, Outcome::Complete(2.0)).unwrap(), Told::AlreadyFinished);
+    assert_eq!(study.tell(trial, Outcome::Complete(2.0)).unwrap(), TellOutcome::AlreadyFinished);
     assert_eq!(study.trial(trial).unwrap().value, Some(1.0));
     let late = study.annotate(trial, &[("verdict".into(), json!("fall"))]).unwrap_err().to_string();
     assert!(late.contains("note"), "{late}");
@@ -195,7 +195,7 @@ fn enqueued_trials_come_first_in_their_order_and_keep_their_numbers() {
     let partly = study.draft();
     assert_eq!(partly.number, 1);
     assert_eq!(partly.parameters[1].value, 99.0);
-    assert_eq!(partly.parameters[0].value, draft.parameters[0].value, "the first random number is still unused");
+    assert_eq!(partly.parameters[0].value, draft.parameters[0].value, "the first random number is unused");
     study.begin(&partly, &[], &[]).unwrap();
     assert_eq!(study.waiting().count(), 0);
 }
@@ -224,7 +224,7 @@ fn a_torn_last_line_is_cut_off_and_kept_aside() {
         one_trial(&mut resumed, &[]);
         assert_eq!(std::fs::read(folder.file("study.log.torn-0")).unwrap(), torn.as_bytes());
         study.refresh().unwrap();
-        assert_eq!(study.trials().len(), 2, "the other session reads on");
+        assert_eq!(study.trials().len(), 2, "the other session continues reading");
         assert_eq!(table(&open(&path, 0, true)), table(&study));
     }
 }
@@ -254,7 +254,7 @@ fn a_file_that_became_shorter_is_noticed() {
 }
 
 #[test]
-fn what_json_lacks_is_read_and_written_as_python_does() {
+fn infinities_and_nan_are_read_and_written_as_by_python() {
     let folder = Folder::new("infinite");
     let path = folder.file("study.log");
     let mut study = open(&path, 0, true);
@@ -302,7 +302,7 @@ fn a_study_of_another_kind_is_refused() {
     let space = Space::new([("Fz".into(), Range::linear(150.0, 350.0))]).unwrap();
     let scale = refuse(StudyOptions { space, ..options(0, true) });
     assert!(scale.contains("`Fz`") && scale.contains("logarithmic"), "{scale}");
-    // other bounds are no other kind
+    // Bounds may differ.
     let space = Space::new([("Fz".into(), Range::logarithmic(200.0, 300.0))]).unwrap();
     Study::open(Storage::File(path.clone()), StudyOptions { space, ..options(0, true) }).unwrap();
 }

@@ -1,15 +1,15 @@
-//! What is asked of the operating system: each favour by itself, what is not granted is a value with a way out, and the thread
-//! runs all the same.
+//! Real-time settings: each is requested by itself, a denied one is a value with its remedy, and the thread runs without it.
 
 use std::ops::ControlFlow;
 use std::time::Duration;
 
 use nix::time::{ClockId, clock_gettime};
-use quadfrog::config::{Backend, Config};
+use quadfrog::config::Config;
 use quadfrog::realtime::scheduling::{RealtimeSetting, Scheduling};
 use quadfrog::realtime::{system, thread};
+use quadfrog::trial::Backend;
 
-/// In a thread of its own: a priority stays with the thread that asked for it.
+/// Applies the settings in a thread of its own, because they stay with the thread.
 fn apply(scheduling: Scheduling) -> (Vec<RealtimeSetting>, Vec<String>) {
     let granted = std::thread::spawn(move || {
         let granted = scheduling.apply();
@@ -19,7 +19,7 @@ fn apply(scheduling: Scheduling) -> (Vec<RealtimeSetting>, Vec<String>) {
             if ticks == 20 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         })
         .unwrap();
-        (granted.favours, granted.shortfalls.iter().map(ToString::to_string).collect())
+        (granted.granted, granted.denied.iter().map(ToString::to_string).collect())
     });
     granted.join().unwrap()
 }
@@ -28,7 +28,7 @@ fn now_ns() -> u64 {
     Duration::from(clock_gettime(ClockId::CLOCK_MONOTONIC).unwrap()).as_nanos() as u64
 }
 
-/// Calls come a phase after whole periods of the system's clock, also after a stall that was not made up for.
+/// Ticks start at the offset after whole periods of the system's clock, also after a stall with skipped periods.
 #[test]
 fn the_pace_keeps_its_phase() {
     let (period, phase) = (Duration::from_millis(10), Duration::from_millis(3));
@@ -41,7 +41,7 @@ fn the_pace_keeps_its_phase() {
         if planned.len() == 20 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     })
     .unwrap();
-    // What passes between two readings of a clock, at best; of ten calls one is not interrupted there.
+    // Least time between two readings of a clock: of ten pairs at least one is not interrupted.
     let past_phase = |calls: &[(u64, u64)]| {
         calls.iter().map(|(ns, _)| (ns - phase.as_nanos() as u64) % period.as_nanos() as u64).min().unwrap()
     };
@@ -53,30 +53,30 @@ fn the_pace_keeps_its_phase() {
     assert!(after - before >= 300_000_000, "the stall is not made up for: {planned:?}");
 }
 
-/// A rehearsal comes before its tick and in time, and not at all where the time for it has passed.
+/// A cache warm-up starts before its tick and in time, or not at all if there is no time for it.
 #[test]
-fn a_rehearsal_comes_before_its_tick_or_not_at_all() {
+fn a_warm_up_precedes_its_tick_or_is_left_out() {
     const LEAD: Duration = Duration::from_millis(6);
 
     #[derive(Default)]
     struct Course {
         /// The tick that comes next.
         next: u64,
-        /// Which were rehearsed, and when.
-        rehearsed: Vec<(u64, u64)>,
-        /// How long before its tick was due each rehearsal began, ns, or somewhat more: the clock is read late.
+        /// Ticks with a warm-up, and its time.
+        warmed: Vec<(u64, u64)>,
+        /// How long before its tick was due each warm-up began, ns, or somewhat more: the clock is read late.
         leads: Vec<u64>,
     }
-    impl thread::Paced for Course {
-        fn rehearse(&mut self) {
-            self.rehearsed.push((self.next, now_ns()));
+    impl thread::PeriodicTask for Course {
+        fn warm_up(&mut self) {
+            self.warmed.push((self.next, now_ns()));
             if self.next >= 20 {
                 // Over after the tick is due: the third in a row is the last for a while.
                 std::thread::sleep(LEAD + LEAD / 2);
             }
         }
-        fn tick(&mut self, instant: thread::Instant) -> ControlFlow<()> {
-            if let Some((next, began_ns)) = self.rehearsed.last()
+        fn tick(&mut self, instant: thread::TickStart) -> ControlFlow<()> {
+            if let Some((next, began_ns)) = self.warmed.last()
                 && *next == self.next
             {
                 self.leads.push(now_ns() - instant.lateness_ns - began_ns);
@@ -90,46 +90,46 @@ fn a_rehearsal_comes_before_its_tick_or_not_at_all() {
         }
     }
     let mut course = Course::default();
-    thread::pace_rehearsed(Duration::from_millis(10), Duration::ZERO, LEAD, &mut course).unwrap();
-    let Course { rehearsed, leads, .. } = course;
-    let rehearsed: Vec<u64> = rehearsed.iter().map(|(number, _)| *number).collect();
-    assert!(rehearsed.is_sorted_by(|a, b| a < b), "twice before one tick: {rehearsed:?}");
-    assert!(!rehearsed.contains(&11) && !rehearsed.contains(&12), "{rehearsed:?}");
-    let overrun = rehearsed.iter().filter(|number| **number >= 20).count();
-    assert!(overrun <= 3, "{rehearsed:?}");
-    let least = leads.iter().min().expect("none of forty was rehearsed");
+    thread::pace_with_warm_up(Duration::from_millis(10), Duration::ZERO, LEAD, &mut course).unwrap();
+    let Course { warmed, leads, .. } = course;
+    let warmed: Vec<u64> = warmed.iter().map(|(number, _)| *number).collect();
+    assert!(warmed.is_sorted_by(|a, b| a < b), "twice before one tick: {warmed:?}");
+    assert!(!warmed.contains(&11) && !warmed.contains(&12), "{warmed:?}");
+    let overrun = warmed.iter().filter(|number| **number >= 20).count();
+    assert!(overrun <= 3, "{warmed:?}");
+    let least = leads.iter().min().expect("none of forty had a warm-up");
     assert!(*least < LEAD.as_nanos() as u64 + 2_000_000, "all begin too early: {leads:?}");
 }
 
 #[test]
 fn an_ordinary_thread_asks_for_nothing() {
-    let (favours, shortfalls) = apply(Scheduling { priority: 0, core: Some(0), lock_memory: true });
-    assert!(favours.is_empty() && shortfalls.is_empty(), "{favours:?} {shortfalls:?}");
+    let (granted, denied) = apply(Scheduling { priority: 0, core: Some(0), lock_memory: true });
+    assert!(granted.is_empty() && denied.is_empty(), "{granted:?} {denied:?}");
 }
 
 #[test]
 fn each_favour_is_granted_or_its_refusal_says_what_to_do() {
-    let (favours, shortfalls) = apply(Scheduling { priority: 10, core: Some(0), lock_memory: true });
-    assert_eq!(favours.len() + shortfalls.len(), 4, "{favours:?} {shortfalls:?}");
+    let (granted, denied) = apply(Scheduling { priority: 10, core: Some(0), lock_memory: true });
+    assert_eq!(granted.len() + denied.len(), 4, "{granted:?} {denied:?}");
     if system::priority_limit() >= 10 {
-        assert!(favours.contains(&RealtimeSetting::Priority(10)), "{shortfalls:?}");
+        assert!(granted.contains(&RealtimeSetting::Priority(10)), "{denied:?}");
     } else {
-        assert!(shortfalls.iter().any(|words| words.contains("setcap cap_sys_nice")), "{shortfalls:?}");
+        assert!(denied.iter().any(|words| words.contains("setcap cap_sys_nice")), "{denied:?}");
     }
     if system::memlock_limit().is_some() {
-        assert!(shortfalls.iter().any(|words| words.contains("memlock unlimited")), "{shortfalls:?}");
+        assert!(denied.iter().any(|words| words.contains("memlock unlimited")), "{denied:?}");
     }
 }
 
 #[test]
 fn a_core_that_is_not_there_is_named_and_the_rest_is_still_asked_for() {
-    let (favours, shortfalls) = apply(Scheduling { priority: 10, core: Some(1000), lock_memory: false });
-    let named = shortfalls.iter().find(|words| words.starts_with("core 1000 not granted"));
-    assert!(named.is_some_and(|words| words.contains("realtime.core")), "{shortfalls:?}");
-    assert_eq!(favours.len() + shortfalls.len(), 3);
+    let (granted, denied) = apply(Scheduling { priority: 10, core: Some(1000), lock_memory: false });
+    let named = denied.iter().find(|words| words.starts_with("core 1000 not granted"));
+    assert!(named.is_some_and(|words| words.contains("realtime.core")), "{denied:?}");
+    assert_eq!(granted.len() + denied.len(), 3);
 }
 
-/// A simulator never holds a core against the rest of a desktop; a robot's thread asks for all of it.
+/// A simulator requests no real-time setting; a robot's thread requests all.
 #[test]
 fn the_defaults_ask_for_a_robot_alone() {
     let config = Config::load(None).unwrap();

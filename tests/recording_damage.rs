@@ -1,5 +1,4 @@
-//! Recordings that were cut off, damaged, or never were recordings: everything readable is played and recovered, the rest
-//! is said.
+//! Truncated, damaged and foreign files: everything readable is played and recovered, the rest is reported.
 
 #[path = "support/recording.rs"]
 mod support;
@@ -20,7 +19,7 @@ use quadfrog::recording::recover::recover;
 use quadfrog::recording::writer::Writer;
 use support::*;
 
-/// A study of 4 s: its bytes, finished and as it stood before, and what is in it.
+/// A study of 4 s: the bytes of its file before and after finishing, and its content.
 struct Whole {
     finished: Vec<u8>,
     part: Vec<u8>,
@@ -49,7 +48,7 @@ fn whole() -> &'static Whole {
     })
 }
 
-/// How many ticks and records the complete chunks in `bytes` hold, by the MCAP library's own reader.
+/// Counts the ticks and records in the complete chunks of `bytes` with the MCAP library's reader.
 fn in_complete_chunks(bytes: &[u8]) -> usize {
     let options = LinearReaderOptions::default().with_emit_chunks(true).with_skip_end_magic(true);
     let mut reader = LinearReader::new_with_options(options);
@@ -111,7 +110,7 @@ fn cut_at(length: usize, of: &[u8]) {
         (Ok((played, damage)), Some(expected)) => {
             assert_eq!(played.len(), expected, "cut after {length} bytes");
             assert_equal(&played, &whole().everything[..expected]);
-            let damage = damage.expect("a cut file is not without fault");
+            let damage = damage.expect("a truncated file is damaged");
             assert!(damage.starts_with(&path.display().to_string()), "{damage}");
             let recovered = recover(&path).unwrap();
             assert_eq!(recovered.path, folder.path().join("session.mcap"));
@@ -150,13 +149,13 @@ proptest! {
     }
 
     #[test]
-    fn a_file_cut_near_its_beginning_says_so(length in 0..20_000_usize) {
+    fn a_file_cut_near_its_beginning_is_reported(length in 0..20_000_usize) {
         cut_at(length, &whole().part);
     }
 
     #[test]
     fn wrong_bytes_are_never_played(places in prop::collection::vec((0.0..1.0_f64, 1..=255_u8), 1..4)) {
-        // Whatever is damaged, what is played was recorded: checksums guard every chunk.
+        // A checksum guards every chunk: everything played was recorded.
         let mut bytes = whole().finished.clone();
         for (place, flip) in places {
             let at = 8 + (place * (bytes.len() - 8) as f64) as usize;
@@ -176,7 +175,7 @@ proptest! {
 }
 
 #[test]
-fn a_damaged_chunk_is_left_out_and_said() {
+fn a_damaged_chunk_is_left_out_and_reported() {
     let Whole { finished, everything, .. } = whole();
     let mut bytes = finished.clone();
     let middle = bytes.len() / 2;
@@ -197,7 +196,7 @@ fn a_damaged_chunk_is_left_out_and_said() {
 }
 
 #[test]
-fn a_damaged_index_is_not_believed() {
+fn a_damaged_index_is_ignored() {
     // The index is where the finished file is longer; every byte of it is under a checksum.
     let Whole { finished, part, everything } = whole();
     let folder = tempfile::tempdir().unwrap();
@@ -212,7 +211,7 @@ fn a_damaged_index_is_not_believed() {
 }
 
 #[test]
-fn a_damaged_beginning_is_said() {
+fn a_damaged_beginning_is_reported() {
     let mut bytes = whole().part.clone();
     bytes[2000] ^= 0x10; // in the first chunk, after metadata and attachment
     let folder = tempfile::tempdir().unwrap();
@@ -234,7 +233,7 @@ fn a_file_that_was_finished_and_never_renamed_is_whole() {
 
 #[test]
 fn a_file_with_a_hole_of_zeros_at_its_end_is_played_up_to_it() {
-    // What a power cut leaves on some file systems: the length was written, the data was not.
+    // A power cut on some file systems: the length was written, the data was not.
     let part = &whole().part;
     let mut bytes = part[..part.len() / 2].to_vec();
     let expected = in_complete_chunks(&bytes) - 1;
@@ -242,12 +241,12 @@ fn a_file_with_a_hole_of_zeros_at_its_end_is_played_up_to_it() {
     let folder = tempfile::tempdir().unwrap();
     let (played, damage) = play_damaged(&file(folder.path(), "hole.mcap.part", &bytes)).unwrap();
     assert!(damage.is_some());
-    // The chunk that the cut went through is as long as it says, but its checksum is wrong.
+    // The truncated chunk has its full length of zeros, but a wrong checksum.
     assert_equal(&played, &whole().everything[..expected]);
 }
 
 #[test]
-fn what_is_no_recording_is_refused_by_name() {
+fn a_file_that_is_no_recording_is_rejected_with_its_name() {
     let folder = tempfile::tempdir().unwrap();
     let open = |name: &str, bytes: &[u8]| {
         let path = file(folder.path(), name, bytes);

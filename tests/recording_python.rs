@@ -1,4 +1,4 @@
-//! A recording as the independent Python reader sees it: every topic, its count, and values that agree.
+//! A recording read by the independent Python reader: every topic, its count and its values agree.
 
 #[path = "support/recording.rs"]
 mod support;
@@ -13,7 +13,7 @@ use quadfrog::telemetry::{Mode, Tick};
 use serde_json::{Value, json};
 use support::*;
 
-/// Runs the reader; none where Python or its packages lack.
+/// Runs the reader; none without Python or its packages.
 fn python_reads(path: &std::path::Path) -> Option<Value> {
     let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/support/read_mcap.py");
     let output = match Command::new("python3").arg(script).arg(path).output() {
@@ -23,12 +23,12 @@ fn python_reads(path: &std::path::Path) -> Option<Value> {
             return None;
         }
     };
-    let said = String::from_utf8_lossy(&output.stderr);
+    let stderr = String::from_utf8_lossy(&output.stderr);
     if output.status.code() == Some(77) {
-        println!("skipped: pip install mcap mcap-protobuf-support ({})", said.trim());
+        println!("skipped: pip install mcap mcap-protobuf-support ({})", stderr.trim());
         return None;
     }
-    assert!(output.status.success(), "{said}");
+    assert!(output.status.success(), "{stderr}");
     Some(serde_json::from_slice(&output.stdout).unwrap())
 }
 
@@ -118,7 +118,7 @@ fn python_reads_every_topic() {
     println!("Python read {total} messages on {} topics and agrees", found["counts"].as_object().unwrap().len());
 }
 
-/// The frames, chained from the trunk, put each foot where the closed-form kinematics has it.
+/// Asserts that the frames, chained from the trunk, give the feet of the closed-form kinematics.
 fn frames_reach_the_feet(frames: &Value, tick: &Tick) {
     use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
     let frames = frames.as_array().unwrap();

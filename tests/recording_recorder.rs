@@ -1,4 +1,4 @@
-//! The recorder thread: nothing is lost, trials are handed on, a failing disk stops the recording alone.
+//! The recorder thread: nothing is lost, trials are delivered, a failing disk ends only the recording.
 
 #[path = "support/recording.rs"]
 mod support;
@@ -9,12 +9,12 @@ use std::sync::{Arc, mpsc};
 
 use quadfrog::recording::player::Player;
 use quadfrog::recording::record::Stamped;
-use quadfrog::recording::recorder::{FAULT_TICKS, Handed, Recorder, RecorderHandle, TrialTicks};
+use quadfrog::recording::recorder::{CollectedTicks, FAULT_TICKS, Recorder, RecorderHandle, TrialTicks};
 use quadfrog::recording::writer::{Sink, Writer};
 use quadfrog::telemetry::{Mode, Tick};
 use support::*;
 
-/// A recorder that is given everything, live, and then its end.
+/// Runs a recorder on live ticks and records up to its end.
 fn record(writer: Option<Writer>, ticks: &[Tick], records: &[Stamped]) -> (RecorderHandle, Vec<TrialTicks>) {
     let (mut ring, consumer) = rtrb::RingBuffer::new(64);
     let (sender, receiver) = mpsc::channel();
@@ -33,13 +33,13 @@ fn record(writer: Option<Writer>, ticks: &[Tick], records: &[Stamped]) -> (Recor
     drop((ring, sender));
     // The channel ends when the thread does.
     let trials = trials.into_iter().filter_map(|handed| match handed {
-        Handed::Trial(trial) => Some(trial),
-        Handed::Fault(_) => None,
+        CollectedTicks::Trial(trial) => Some(trial),
+        CollectedTicks::Fault(_) => None,
     });
     (handle, trials.collect())
 }
 
-/// The trials as they stand in the ticks.
+/// Returns the trials of the ticks.
 fn trials_of(ticks: &[Tick]) -> Vec<TrialTicks> {
     let runs = ticks.chunk_by(|a, b| a.trial == b.trial);
     runs.filter_map(|run| run[0].trial.map(|trial| TrialTicks { trial, ticks: run.to_vec() })).collect()
@@ -64,7 +64,7 @@ fn a_session_is_recorded_in_whole_and_in_order() {
 }
 
 #[test]
-fn without_a_writer_trials_are_still_handed_on() {
+fn without_a_writer_trials_are_still_delivered() {
     let (ticks, records) = study(4);
     let (handle, trials) = record(None, &ticks, &records);
     let status = handle.join();
@@ -72,7 +72,7 @@ fn without_a_writer_trials_are_still_handed_on() {
     assert_same(&trials, &trials_of(&ticks));
 }
 
-/// A disk that is full after some bytes, and counts how often it was to sync.
+/// A disk that is full after some bytes and counts the syncs.
 struct SmallDisk {
     left: usize,
     syncs: Arc<AtomicUsize>,
@@ -107,7 +107,7 @@ fn on_small_disk(bytes: usize) -> (Writer, Arc<AtomicUsize>) {
 }
 
 #[test]
-fn a_failing_disk_is_announced_and_trials_are_still_handed_on() {
+fn a_failing_disk_is_reported_and_trials_are_still_delivered() {
     let (ticks, records) = study(4);
     for bytes in [100_000, 300_000, 1_000_000] {
         let (writer, _) = on_small_disk(bytes);
@@ -179,7 +179,7 @@ fn a_recording_of_a_session_that_runs_can_be_played() {
 
 /// The last ticks go with a fault, in a trial or outside of one, and again with the next fault.
 #[test]
-fn the_last_200_ticks_are_handed_on_with_each_fault() {
+fn the_last_200_ticks_are_delivered_with_each_fault() {
     let (mut ring, consumer) = rtrb::RingBuffer::new(4096);
     let (sender, receiver) = mpsc::channel();
     let (handed_in, handed) = mpsc::channel();
@@ -193,8 +193,8 @@ fn the_last_200_ticks_are_handed_on_with_each_fault() {
     let kept: Vec<Vec<u64>> = handed
         .into_iter()
         .map(|handed| match handed {
-            Handed::Fault(ticks) => ticks.iter().map(|tick| tick.number).collect(),
-            Handed::Trial(trial) => panic!("there was no trial, and here is {}", trial.trial),
+            CollectedTicks::Fault(ticks) => ticks.iter().map(|tick| tick.number).collect(),
+            CollectedTicks::Trial(trial) => panic!("there was no trial, and here is {}", trial.trial),
         })
         .collect();
     handle.join();

@@ -1,4 +1,4 @@
-//! What is recorded is played back: every field, bit for bit, in the order of time, from any moment.
+//! Every recorded field is played back bit for bit, in the order of time, from any moment.
 
 #[path = "support/recording.rs"]
 mod support;
@@ -9,7 +9,6 @@ use quadfrog::recording::player::{Marker, MarkerKind, Played, Player};
 use quadfrog::recording::record::{LogRecord, Record, Stamped};
 use quadfrog::recording::writer::Writer;
 use quadfrog::telemetry::{Mode, Tick};
-use quadfrog::trial::ExperimentStage;
 use support::*;
 
 fn config() -> ProptestConfig {
@@ -124,35 +123,6 @@ fn the_player_knows_the_session_its_length_and_its_markers() {
     let trial = |trial, ms: u64| Marker { time_ns: ms * MS, kind: MarkerKind::Trial(trial) };
     let fault = Marker { time_ns: 5900 * MS, kind: MarkerKind::Fault };
     assert_eq!(player.markers(), [trial(0, 1000), trial(1, 3000), trial(2, 5000), fault]);
-}
-
-#[test]
-fn the_state_at_a_moment_is_what_was_known_then() {
-    let (path, everything) = shared_study();
-    let player = Player::open(path).unwrap();
-    for ms in [0, 499, 500, 1000, 1999, 2600, 3000, 4999] {
-        // The slow and obvious way: everything until then, the newest of each kind kept.
-        let (mut stage, mut proposal, mut rows) = (None, None, std::collections::BTreeMap::new());
-        for played in everything.iter().take_while(|played| played.time_ns() <= ms * MS) {
-            let Played::Record(stamped) = played else { continue };
-            match &stamped.record {
-                Record::Stage(_) => stage = Some(stamped.clone()),
-                Record::Proposal(_) => proposal = Some(stamped.clone()),
-                Record::Trial(row) => drop(rows.insert(row.trial, stamped.clone())),
-                _ => {}
-            }
-        }
-        let mut expected = vec![Stamped { time_ns: 0, record: Record::Session(session()) }];
-        expected.extend(stage.into_iter().chain(proposal).chain(rows.into_values()));
-        let mut found = player.state_at(ms * MS);
-        assert!(found.is_sorted_by_key(|stamped| stamped.time_ns));
-        for list in [&mut found, &mut expected] {
-            list.sort_by_key(|stamped| format!("{stamped:?}"));
-        }
-        assert_eq!(found, expected, "at {ms} ms");
-    }
-    let running = player.state_at(1500 * MS);
-    assert!(running.iter().any(|s| matches!(&s.record, Record::Stage(info) if info.stage == ExperimentStage::Running)));
 }
 
 #[test]

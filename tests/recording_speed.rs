@@ -1,6 +1,6 @@
-//! How long a tick takes to record and how much room it needs: printed, not judged. Build with `--release` to measure:
-//! `cargo test --release --test recording_speed -- --nocapture`. On Linux the time is this thread's on the processor,
-//! so that other programs on the machine do not count.
+//! Time and space of a recorded tick: printed, not asserted. Build with `--release` to measure:
+//! `cargo test --release --test recording_speed -- --nocapture`. On Linux it is CPU time of this thread, so that other
+//! programs do not count.
 
 #[path = "support/recording.rs"]
 mod support;
@@ -12,7 +12,7 @@ use quadfrog::recording::player::{Played, Player};
 use quadfrog::recording::writer::Writer;
 use support::*;
 
-/// Time used so far, us: of this thread on the processor where the system tells it, else of the clock on the wall.
+/// Returns the time used so far, us: CPU time of this thread if the system reports it, else wall-clock time.
 fn now_us() -> f64 {
     static START: LazyLock<Instant> = LazyLock::new(Instant::now);
     let on_processor = std::fs::read_to_string("/proc/thread-self/schedstat").ok();

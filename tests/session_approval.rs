@@ -1,14 +1,14 @@
-//! Who approves: the engine with its threads, on the simulator in real time.
+//! Rules of approval: the engine with its threads, on the simulator in real time.
 
 use std::time::{Duration, Instant};
 
-use quadfrog::config::{Backend, Config};
-use quadfrog::engine::{Engine, EngineError, Handle, Options};
+use quadfrog::config::Config;
+use quadfrog::engine::{self, EngineError, Handle, Options};
 use quadfrog::recording::record::{Record, Stamped};
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::telemetry::Mode;
-use quadfrog::trial::{Approval, ExperimentStage, Task, Verdict};
+use quadfrog::trial::{Approval, Backend, ExperimentStage, Task, Verdict};
 
 fn options(approve: Approval, backend: Backend) -> Options {
     let config = Config::load(None).unwrap();
@@ -16,7 +16,7 @@ fn options(approve: Approval, backend: Backend) -> Options {
     Options { trials: Some(3), approve, ..Options::new(config, robot, backend, Task::Forward) }
 }
 
-/// A screen that is alive and presses nothing of itself.
+/// A screen that sends heartbeats and presses no key by itself.
 struct Screen {
     handle: Handle,
     records: Vec<Record>,
@@ -24,7 +24,7 @@ struct Screen {
 
 impl Screen {
     fn new(approve: Approval) -> Screen {
-        Screen { handle: Engine::start(options(approve, Backend::Simulator)).unwrap(), records: Vec::new() }
+        Screen { handle: engine::start(options(approve, Backend::Simulator)).unwrap(), records: Vec::new() }
     }
 
     /// Waits until `wanted` of all records so far; the time-out only ends a test that fails.
@@ -36,7 +36,7 @@ impl Screen {
         }
     }
 
-    /// Lives on for a while.
+    /// Runs for a while.
     fn pass(&mut self, time: Duration) {
         let end = Instant::now() + time;
         while Instant::now() < end {
@@ -45,7 +45,7 @@ impl Screen {
     }
 
     fn step(&mut self) {
-        self.handle.beat();
+        self.handle.send_heartbeat();
         while let Some(Stamped { record, .. }) = self.handle.next_record() {
             if !matches!(record, Record::Counters(_)) {
                 self.records.push(record);
@@ -87,12 +87,12 @@ fn auto_runs_a_whole_study_without_a_question_and_stop_still_holds_it() {
     assert!(!screen.records[before..].iter().any(|r| matches!(r, Record::Transition(t) if t.to.energised())));
     // A person judges the stopped jump, acknowledges and arms: then it goes on by itself.
     screen.until("the review", |r| stage(r) == Some(ExperimentStage::Review));
-    screen.handle.wish(OperatorRequest::Acknowledge);
-    screen.handle.wish(OperatorRequest::Judge(Verdict::Void));
+    screen.handle.request(OperatorRequest::Acknowledge);
+    screen.handle.request(OperatorRequest::Judge(Verdict::Void));
     screen.until("disarmed", |r| mode(r) == Some(Mode::Disarmed));
     screen.pass(Duration::from_secs(1));
     assert_eq!(mode(&screen.records), Some(Mode::Disarmed), "it is armed by a person after a stop");
-    screen.handle.wish(OperatorRequest::Arm);
+    screen.handle.request(OperatorRequest::Arm);
     screen.until("the end of the study", |r| stage(r) == Some(ExperimentStage::Finished));
     assert_eq!(judged(&screen.records, Verdict::Accept) + judged(&screen.records, Verdict::Fall), 3);
     let asked =
@@ -106,7 +106,7 @@ fn falls_only_waits_for_a_person_to_arm_and_then_accepts_what_landed() {
     screen.until("disarmed", |r| mode(r) == Some(Mode::Disarmed));
     screen.pass(Duration::from_secs(1));
     assert_eq!(mode(&screen.records), Some(Mode::Disarmed));
-    screen.handle.wish(OperatorRequest::Arm);
+    screen.handle.request(OperatorRequest::Arm);
     // The first jump of seed 0 lands; a fall would wait for a verdict.
     screen.until("an accepted jump or a fall that waits", |r| {
         judged(r, Verdict::Accept) >= 1
@@ -124,9 +124,22 @@ fn falls_only_waits_for_a_person_to_arm_and_then_accepts_what_landed() {
 
 #[test]
 fn auto_is_refused_on_hardware() {
-    match Engine::start(options(Approval::Auto, Backend::Hardware)) {
+    match engine::start(options(Approval::Auto, Backend::Hardware)) {
         Err(error @ EngineError::Unattended) => assert!(error.to_string().contains("only on the simulator"), "{error}"),
         Err(error) => panic!("another refusal: {error}"),
         Ok(_) => panic!("it started"),
     }
+}
+
+#[test]
+fn a_recording_holds_one_session_record() {
+    let folder = tempfile::tempdir().unwrap();
+    let options = Options { folder: Some(folder.path().join("study")), ..options(Approval::Each, Backend::Simulator) };
+    let handle = engine::start(options).unwrap();
+    let path = handle.recording().unwrap().to_owned();
+    handle.shutdown();
+    let bytes = std::fs::read(path).unwrap();
+    let messages = mcap::MessageStream::new(&bytes).unwrap().map(Result::unwrap);
+    let sessions = messages.filter(|message| message.channel.topic == "/session").count();
+    assert_eq!(sessions, 1);
 }

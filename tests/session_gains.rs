@@ -1,13 +1,13 @@
 //! The ranges of `safety.toml`, `[gains]`, on the simulator.
 
-use quadfrog::config::{Backend, Config};
+use quadfrog::config::Config;
 use quadfrog::control::settings::TaskControl;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::session::objective;
 use quadfrog::session::rollout::Rollout;
 use quadfrog::sim::Simulator;
 use quadfrog::telemetry::TrialSpec;
-use quadfrog::trial::{Gains, JumpParameters, Task};
+use quadfrog::trial::{Backend, Gains, JumpParameters, Task};
 
 /// Whatever an operator may set, the robot stands until the impulse begins: no trial of allowed gains is lost before it
 /// has jumped.

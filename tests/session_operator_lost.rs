@@ -6,22 +6,23 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use quadfrog::config::{Backend, Config};
-use quadfrog::engine::{Engine, Handle, Options};
+use quadfrog::config::Config;
+use quadfrog::engine::{self, Handle, Options};
 use quadfrog::recording::player::Player;
 use quadfrog::recording::record::Record;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::telemetry::Mode;
-use quadfrog::trial::{Approval, ExperimentStage, Proposal, Task, TrialRecord, Verdict};
+use quadfrog::trial::{Approval, Backend, ExperimentStage, Proposal, Task, TrialRecord, Verdict};
 
 /// Whatever is waited for comes in a few seconds; a machine under load may take longer.
 const PATIENCE: Duration = Duration::from_secs(60);
 
 fn start(folder: &Path) -> Handle {
-    Engine::start(Options {
+    engine::start(Options {
         config: Config::load(None).unwrap(),
         robot: RobotDescription::embedded("go1").unwrap(),
+        network: None,
         backend: Backend::Simulator,
         task: Task::Forward,
         seed: 3,
@@ -99,10 +100,10 @@ impl Screen {
     /// Stands, approves what is on the table, and flies.
     fn jump(&mut self) -> Proposal {
         self.until_mode(Mode::Disarmed);
-        self.handle.wish(OperatorRequest::Arm);
+        self.handle.request(OperatorRequest::Arm);
         self.until_mode(Mode::Ready);
         let proposal = self.proposal();
-        self.handle.wish(OperatorRequest::Approve { trial: proposal.trial, revision: proposal.revision });
+        self.handle.request(OperatorRequest::Approve { trial: proposal.trial, revision: proposal.revision });
         self.until_mode(Mode::Jump);
         proposal
     }
@@ -126,7 +127,7 @@ fn a_lost_operator_costs_the_trial_but_nothing_else() {
     let row = screen.row(trial).unwrap().clone();
     // A silence of a second may end after the landing of a short jump; then the trial counts as it is.
     if row.suggested == Some(Verdict::Void) {
-        assert!(row.cause.contains("screen was silent"), "{}", row.cause);
+        assert!(row.cause.contains("no heartbeat of the operator's screen"), "{}", row.cause);
     } else {
         assert!(row.measured.is_some(), "{row:?}");
     }
@@ -169,9 +170,10 @@ fn the_last_ticks_go_with_a_fault_outside_a_trial() {
     let refused = Config::load(Some(config.path()));
     assert!(refused.is_err(), "a limit below any temperature is refused");
     std::fs::write(config.path().join("safety.toml"), "[watchdog]\nsimulator_late_ms = 0.000001\n").unwrap();
-    let handle = Engine::start(Options {
+    let handle = engine::start(Options {
         config: Config::load(Some(config.path())).unwrap(),
         robot: RobotDescription::embedded("go1").unwrap(),
+        network: None,
         backend: Backend::Simulator,
         task: Task::Forward,
         seed: 3,
@@ -197,7 +199,7 @@ fn the_last_ticks_go_with_a_fault_outside_a_trial() {
     let numbers: Vec<u64> = kept.iter().map(|tick| tick.number).collect();
     assert!(numbers.windows(2).all(|pair| pair[1] == pair[0] + 1), "without a gap");
     let named = player.events().iter().any(|event| {
-        matches!(&event.record, Record::Transition(change) if change.to == Mode::Fault && change.cause.contains("late, allowed"))
+        matches!(&event.record, Record::Transition(change) if change.to == Mode::Fault && change.cause.contains("control thread late"))
     });
     assert!(named);
 }

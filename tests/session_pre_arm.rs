@@ -1,62 +1,29 @@
 //! The pre-arm list as the session gives it to an operator: all failing items at once, the operator's word, the test of STOP.
 
+#[path = "support/robots.rs"]
+mod robots;
+
 use std::sync::mpsc::{Receiver, channel};
 
 use proptest::prelude::*;
-use quadfrog::config::{Backend, Config};
+use quadfrog::config::Config;
 use quadfrog::control::control_loop::ControlLoop;
 use quadfrog::control::settings::ControlSettings;
-use quadfrog::engine::{Options, fingerprint, open_life, session_info};
+use quadfrog::engine::{Options, fingerprint, open_experiment, session_info};
 use quadfrog::optimize::journal::Durability;
 use quadfrog::realtime::channel::{ScreenEnd, channels};
 use quadfrog::realtime::clock::SimulatedClock;
-use quadfrog::realtime::thread::Instant;
+use quadfrog::realtime::thread::TickStart;
 use quadfrog::recording::record::{ArmingCheckRecord, Record, RequestRecord, Stamped};
 use quadfrog::recording::recorder::RecorderWatch;
+use quadfrog::robot::RobotState;
 use quadfrog::robot::description::RobotDescription;
-use quadfrog::robot::{Battery, JointCommand, LinkStatus, Placement, Robot, RobotError, RobotState};
 use quadfrog::session::arming_checklist::ArmingChecklist;
 use quadfrog::session::operator_request::{OperatorCheck, OperatorRequest, StampedRequest};
 use quadfrog::session::supervisor::{RecordSinks, Supervisor, SupervisorParts};
-use quadfrog::sim::Simulator;
 use quadfrog::telemetry::{ArmingCheck, ArmingCheckState, Mode, Tick};
-use quadfrog::trial::{Approval, Task, Verdict};
-
-/// The simulator, seen as a robot over a link that reports its battery and cannot be put in place.
-struct Go1Like {
-    simulator: Simulator,
-    charge_percent: f64,
-    /// Commands that were sent.
-    writes: u32,
-    reboots: u64,
-    silent_ms: u32,
-    tamper: fn(&mut RobotState),
-}
-
-impl Robot for Go1Like {
-    fn read(&mut self) -> Result<RobotState, RobotError> {
-        if self.silent_ms > 0 {
-            self.silent_ms += 1;
-            return Err(RobotError::Silent { age_ms: self.silent_ms });
-        }
-        let mut state = self.simulator.read()?;
-        state.truth = None;
-        state.battery =
-            Some(Battery { charge_percent: self.charge_percent, voltage_v: 24.0, current_a: -1.0, cell_v: [0.0; 10] });
-        (self.tamper)(&mut state);
-        Ok(state)
-    }
-    fn write(&mut self, command: &JointCommand) -> Result<(), RobotError> {
-        self.writes += 1;
-        self.simulator.write(command)
-    }
-    fn place(&mut self, _: &Placement) -> bool {
-        false
-    }
-    fn link(&self) -> Option<LinkStatus> {
-        Some(LinkStatus { recent_received: 5000, reboots: self.reboots, ..LinkStatus::default() })
-    }
-}
+use quadfrog::trial::{Approval, Backend, Task, Verdict};
+use robots::LinkedRobot;
 
 /// A session and the control thread's body that share channels, on one thread and in simulated time.
 struct Session {
@@ -64,7 +31,7 @@ struct Session {
     operator: ScreenEnd,
     _ticks: rtrb::Consumer<Tick>,
     body: ControlLoop,
-    robot: Go1Like,
+    robot: LinkedRobot,
     screen: Receiver<Stamped>,
     _recorder: Receiver<Stamped>,
     records: Vec<Record>,
@@ -87,19 +54,18 @@ impl Session {
         let robot = RobotDescription::embedded("go1").unwrap();
         let options = Options { trials: Some(5), observe, ..Options::new(config, robot, backend, Task::Forward) };
         let settings: ControlSettings = options.config.settings(&options.robot, options.task, backend).unwrap();
-        let mut simulator = Simulator::new(&options.robot, &options.config.simulator).unwrap();
-        simulator.place(&Placement { joint_position: settings.lying_position, lying: true, seed: 0 });
+        let robot = LinkedRobot::lying(&options.robot, &options.config.simulator);
         let (control, session_end, operator, ticks) = channels();
         let (to_recorder, recorder) = channel();
         let (to_screen, screen) = channel();
-        let (_, handed) = channel();
+        let (_, collected) = channel();
         let parts = SupervisorParts {
-            life: open_life(&options, Durability::Buffered, "").unwrap(),
+            experiment: open_experiment(&options, Durability::Buffered, "").unwrap(),
             control: session_end,
-            handed,
-            outlets: RecordSinks { recorder: to_recorder, screen: to_screen },
+            ticks: collected,
+            sinks: RecordSinks { recorder: to_recorder, screen: to_screen },
             recorder: RecorderWatch::default(),
-            pre_arm: ArmingChecklist::new(&settings, fingerprint(&options.config), folder),
+            checklist: ArmingChecklist::new(&settings, fingerprint(&options.config), folder),
             info: session_info(&options, ""),
         };
         Session {
@@ -107,7 +73,7 @@ impl Session {
             operator,
             _ticks: ticks,
             body: ControlLoop::new(&settings, control),
-            robot: Go1Like { simulator, charge_percent: 90.0, writes: 0, reboots: 0, silent_ms: 0, tamper: |_| {} },
+            robot: LinkedRobot { charge_percent: 90.0, ..robot },
             screen,
             _recorder: recorder,
             records: Vec::new(),
@@ -122,17 +88,17 @@ impl Session {
             if self.watched {
                 self.operator.heartbeat.beat();
             }
-            let instant = Instant { planned_ns: self.time_ms * 1_000_000, lateness_ns: 0 };
+            let instant = TickStart { planned_ns: self.time_ms * 1_000_000, lateness_ns: 0 };
             self.body.tick(instant, &SimulatedClock, &mut self.robot);
-            self.supervisor.attend(self.time_ms * 1_000_000);
+            self.supervisor.poll(self.time_ms * 1_000_000);
             self.records.extend(self.screen.try_iter().map(|stamped| stamped.record));
         }
     }
 
     /// Wishes and gives back the answer.
-    fn wish(&mut self, intent: OperatorRequest) -> RequestRecord {
+    fn request(&mut self, request: OperatorRequest) -> RequestRecord {
         let time_ns = self.time_ms * 1_000_000;
-        self.supervisor.carry_out(&StampedRequest { intent, stops: self.operator.stop.count(), time_ns }, time_ns);
+        self.supervisor.carry_out(&StampedRequest { request, stops: self.operator.stop.count(), time_ns }, time_ns);
         let mut records = self.screen.try_iter().map(|stamped| stamped.record);
         let answer = records.find_map(|record| match record {
             Record::Request(command) => Some(command),
@@ -158,7 +124,7 @@ impl Session {
         self.operator.stop.set();
         self.ticks(5);
         assert_eq!(self.body.mode(), Mode::Damped);
-        assert!(self.wish(OperatorRequest::Acknowledge).accepted);
+        assert!(self.request(OperatorRequest::Acknowledge).accepted);
         self.ticks(1500);
         assert_eq!(self.body.mode(), Mode::Disarmed);
     }
@@ -170,7 +136,7 @@ fn a_simulated_robot_is_armed_without_ceremony() {
     assert_eq!(session.list().len(), ArmingCheck::ALL.len());
     let needed: Vec<_> = session.list().into_iter().filter(|item| item.state != ArmingCheckState::NotNeeded).collect();
     assert_eq!(needed.iter().map(|item| item.check).collect::<Vec<_>>(), [ArmingCheck::StateFresh]);
-    let answer = session.wish(OperatorRequest::Arm);
+    let answer = session.request(OperatorRequest::Arm);
     assert!(answer.accepted, "{answer:?}");
     assert_eq!(session.body.mode(), Mode::StandUp);
 }
@@ -182,7 +148,7 @@ fn a_real_robot_is_not_armed_before_every_item_holds_and_the_refusal_names_all()
     let mut session = Session::new(Backend::Hardware, Some(folder.path().to_owned()));
     session.robot.charge_percent = 20.0;
     session.ticks(110);
-    let answer = session.wish(OperatorRequest::Arm);
+    let answer = session.request(OperatorRequest::Arm);
     assert!(!answer.accepted);
     for words in [
         "battery: 20 %, needed: at least 30 %",
@@ -195,14 +161,14 @@ fn a_real_robot_is_not_armed_before_every_item_holds_and_the_refusal_names_all()
     }
     session.robot.charge_percent = 90.0;
     for check in OperatorCheck::ALL {
-        assert!(session.wish(OperatorRequest::Confirm(check)).accepted);
+        assert!(session.request(OperatorRequest::Confirm(check)).accepted);
     }
     session.ticks(600);
-    let answer = session.wish(OperatorRequest::Arm);
+    let answer = session.request(OperatorRequest::Arm);
     assert!(!answer.accepted && answer.answer.starts_with("STOP tested") && !answer.answer.contains(';'), "{answer:?}");
     session.test_stop();
     assert_eq!(session.state(ArmingCheck::StopTested), ArmingCheckState::Passed);
-    let answer = session.wish(OperatorRequest::Arm);
+    let answer = session.request(OperatorRequest::Arm);
     assert!(answer.accepted, "{answer:?}");
     assert_eq!(session.body.mode(), Mode::StandUp);
 }
@@ -214,18 +180,18 @@ fn the_area_is_asked_about_before_each_arming() {
     let mut session = Session::new(Backend::Hardware, Some(folder.path().to_owned()));
     session.test_stop();
     for check in OperatorCheck::ALL {
-        session.wish(OperatorRequest::Confirm(check));
+        session.request(OperatorRequest::Confirm(check));
     }
-    assert!(session.wish(OperatorRequest::Arm).accepted);
-    assert!(!session.wish(OperatorRequest::Confirm(OperatorCheck::AreaClear)).accepted, "not while it is armed");
+    assert!(session.request(OperatorRequest::Arm).accepted);
+    assert!(!session.request(OperatorRequest::Confirm(OperatorCheck::AreaClear)).accepted, "not while it is armed");
     session.operator.stop.set();
     session.ticks(3000);
-    session.wish(OperatorRequest::Acknowledge);
+    session.request(OperatorRequest::Acknowledge);
     session.ticks(1500);
     assert_eq!(session.state(ArmingCheck::AreaClear), ArmingCheckState::Waiting);
     assert_eq!(session.state(ArmingCheck::LowLevel), ArmingCheckState::Passed);
     assert_eq!(session.state(ArmingCheck::StopTested), ArmingCheckState::Passed);
-    let answer = session.wish(OperatorRequest::Arm);
+    let answer = session.request(OperatorRequest::Arm);
     assert!(!answer.accepted && answer.answer.contains("area clear"), "{answer:?}");
 }
 
@@ -234,11 +200,11 @@ fn the_area_is_asked_about_before_each_arming() {
 fn without_its_guard_a_robot_is_not_armed() {
     let folder = tempfile::tempdir().unwrap();
     let mut session = Session::cleared(&folder);
-    session.supervisor.tell_guard_lost(session.time_ms * 1_000_000);
-    let answer = session.wish(OperatorRequest::Arm);
+    session.supervisor.report_guard_lost(session.time_ms * 1_000_000);
+    let answer = session.request(OperatorRequest::Arm);
     assert!(!answer.accepted && answer.answer.starts_with("the guard process has ended"), "{answer:?}");
     assert!(
-        session.wish(OperatorRequest::Confirm(OperatorCheck::AreaClear)).accepted,
+        session.request(OperatorRequest::Confirm(OperatorCheck::AreaClear)).accepted,
         "what energises nothing goes on"
     );
     assert_eq!(session.body.mode(), Mode::Disarmed);
@@ -253,10 +219,10 @@ fn the_word_on_the_area_is_forgotten_after_a_minute() {
     assert_eq!(session.state(ArmingCheck::AreaClear), ArmingCheckState::Passed);
     session.ticks(11_000);
     assert_eq!(session.state(ArmingCheck::AreaClear), ArmingCheckState::Waiting);
-    let answer = session.wish(OperatorRequest::Arm);
+    let answer = session.request(OperatorRequest::Arm);
     assert!(!answer.accepted && answer.answer.contains("area clear"), "{answer:?}");
-    assert!(session.wish(OperatorRequest::Confirm(OperatorCheck::AreaClear)).accepted);
-    assert!(session.wish(OperatorRequest::Arm).accepted);
+    assert!(session.request(OperatorRequest::Confirm(OperatorCheck::AreaClear)).accepted);
+    assert!(session.request(OperatorRequest::Arm).accepted);
     // It holds until the robot lies again, however long the session stands.
     session.ticks(3000);
     assert_eq!(session.body.mode(), Mode::Ready);
@@ -268,7 +234,7 @@ impl Session {
         let mut session = Session::new(Backend::Hardware, Some(folder.path().to_owned()));
         session.test_stop();
         for check in OperatorCheck::ALL {
-            assert!(session.wish(OperatorRequest::Confirm(check)).accepted);
+            assert!(session.request(OperatorRequest::Confirm(check)).accepted);
         }
         session
     }
@@ -282,10 +248,10 @@ impl Session {
     }
 
     fn must_confirm_low_level_again(&mut self) {
-        assert!(self.wish(OperatorRequest::Acknowledge).accepted);
+        assert!(self.request(OperatorRequest::Acknowledge).accepted);
         self.ticks(1500);
         assert_eq!(self.body.mode(), Mode::Disarmed);
-        let answer = self.wish(OperatorRequest::Arm);
+        let answer = self.request(OperatorRequest::Arm);
         assert!(!answer.accepted && answer.answer.contains("low-level mode, damped: not confirmed"), "{answer:?}");
         assert!(answer.answer.contains("area clear, remote in hand: not confirmed"), "{answer:?}");
         assert_eq!(self.state(ArmingCheck::LowLevel), ArmingCheckState::Waiting);
@@ -298,14 +264,14 @@ impl Session {
 fn a_restart_during_another_fault_is_told_and_takes_the_word_back() {
     let folder = tempfile::tempdir().unwrap();
     let mut session = Session::cleared(&folder);
-    assert!(session.wish(OperatorRequest::Arm).accepted);
+    assert!(session.request(OperatorRequest::Arm).accepted);
     session.robot.tamper = |state| state.joint_position[3] = 2.0;
     session.ticks(10);
     session.robot.tamper = |_| {};
     session.ticks(10);
     for check in [OperatorCheck::LowLevel, OperatorCheck::AreaClear] {
         assert!(
-            session.wish(OperatorRequest::Confirm(check)).accepted,
+            session.request(OperatorRequest::Confirm(check)).accepted,
             "given too early: the robot is switched off only now"
         );
     }
@@ -317,7 +283,7 @@ fn a_restart_during_another_fault_is_told_and_takes_the_word_back() {
     session.robot.tamper = |_| {};
     session.ticks(100);
     let told = session.faults_told();
-    let words = ["FL_hip at 2.000 rad", "the link to the robot is lost", "it restarted"];
+    let words = ["FL_hip at 2.000 rad", "link to the robot lost", "the robot restarted"];
     assert_eq!(told.len(), words.len(), "each once: {told:?}");
     for (told, words) in told.iter().zip(words) {
         assert!(told.contains(words), "{told} instead of {words}");
@@ -334,7 +300,7 @@ fn a_restart_that_changes_no_mode_takes_the_word_back() {
     session.ticks(10);
     assert_eq!(session.body.mode(), Mode::Fault);
     session.robot.tamper = |_| {};
-    session.robot.reboots = 1;
+    session.robot.link.reboots = 1;
     session.ticks(200);
     assert_eq!(session.faults_told().len(), 1, "{:?}", session.faults_told());
     let logged = session.records.iter().any(|r| matches!(r, Record::Log(log) if log.message.contains("restarted")));
@@ -379,9 +345,9 @@ fn an_observer_may_stop_and_then_lets_go_of_the_robot() {
     session.operator.stop.set();
     session.ticks(50);
     assert_eq!((session.body.mode(), session.robot.writes), (Mode::Damped, 50));
-    let answer = session.wish(OperatorRequest::Arm);
+    let answer = session.request(OperatorRequest::Arm);
     assert!(!answer.accepted && answer.answer.contains("only observes"), "{answer:?}");
-    assert!(session.wish(OperatorRequest::Acknowledge).accepted);
+    assert!(session.request(OperatorRequest::Acknowledge).accepted);
     session.ticks(10);
     assert_eq!(session.body.mode(), Mode::Observe);
     let writes = session.robot.writes;
@@ -394,9 +360,9 @@ fn an_observer_may_stop_and_then_lets_go_of_the_robot() {
 fn an_arming_on_its_way_when_the_session_ends_energises_nothing() {
     let mut session = Session::new(Backend::Simulator, None);
     let time_ns = session.time_ms * 1_000_000;
-    session.supervisor.carry_out(&StampedRequest { intent: OperatorRequest::Arm, stops: 0, time_ns }, time_ns);
+    session.supervisor.carry_out(&StampedRequest { request: OperatorRequest::Arm, stops: 0, time_ns }, time_ns);
     assert_eq!(session.supervisor.mode(), Mode::Disarmed, "of the arming nothing is heard yet");
-    session.supervisor.say_goodbye(true);
+    session.supervisor.wind_down(true);
     session.supervisor.stop();
     for _ in 0..3000 {
         session.ticks(1);
@@ -409,7 +375,7 @@ fn an_arming_on_its_way_when_the_session_ends_energises_nothing() {
 fn the_end_of_a_session_that_only_observes_sends_nothing() {
     let mut session = Session::begin(Backend::Hardware, None, true);
     session.ticks(20);
-    assert!(!session.supervisor.say_goodbye(true));
+    assert!(!session.supervisor.wind_down(true));
     session.supervisor.stop();
     session.ticks(100);
     assert_eq!((session.body.mode(), session.robot.writes), (Mode::Observe, 0));
@@ -422,7 +388,7 @@ fn nothing_is_done_by_itself_any_more_once_the_session_ends() {
     session.supervisor = session.supervisor.approving(Approval::Auto, true);
     session.ticks(10);
     session.supervisor.take_control();
-    session.supervisor.say_goodbye(true);
+    session.supervisor.wind_down(true);
     session.ticks(3000);
     assert_eq!(session.body.mode(), Mode::Disarmed);
 }
@@ -485,7 +451,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 24, failure_persistence: None, ..ProptestConfig::default() })]
 
     /// Whatever is wished and whatever happens, through the session and the control thread's body: the robot stands up only after
-    /// an accepted wish to arm, given while the operator's words of this life of the robot stood and its motors followed; and it
+    /// an accepted wish to arm, given while the operator's words of this experiment of the robot stood and its motors followed; and it
     /// never jumps, as nobody approves. What stood is kept account of here, apart from the list.
     #[test]
     fn no_session_energises_without_arm_and_the_words_of_this_life(
@@ -505,7 +471,7 @@ proptest! {
             match step {
                 Step::Request(intent) => {
                     let intent = intent();
-                    let answer = session.wish(intent.clone());
+                    let answer = session.request(intent.clone());
                     low_level |= answer.accepted && intent == OperatorRequest::Confirm(OperatorCheck::LowLevel);
                     area |= answer.accepted && intent == OperatorRequest::Confirm(OperatorCheck::AreaClear);
                     if !before.energised() && session.body.mode().energised() {
@@ -524,7 +490,7 @@ proptest! {
                     session.robot.silent_ms = 1;
                     session.ticks(300);
                     session.robot.silent_ms = 0;
-                    session.robot.reboots += 1;
+                    session.robot.link.reboots += 1;
                     session.robot.tamper = |state| state.robot_time_ms = 0;
                     session.ticks(1);
                     session.robot.tamper = |_| {};

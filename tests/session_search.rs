@@ -1,7 +1,7 @@
-//! What an operator may change of the search through the public interface of a life: gains, fixed parameters, bounds, the
+//! What an operator may change of the search through the public interface of a experiment: gains, fixed parameters, bounds, the
 //! confirmation of the best, and what other programs do meanwhile.
 
-#[path = "support/life.rs"]
+#[path = "support/experiment.rs"]
 mod support;
 
 use std::collections::BTreeMap;
@@ -16,19 +16,19 @@ use quadfrog::telemetry::{FallCause, TrialEnd, TrialSpec};
 use quadfrog::trial::{
     ExperimentStage, FixedParameter, PointRecord, ProposalInsight, ProposalSource, SearchStatus, Verdict,
 };
-use support::{accept, far, joined, life, open, plan, run, study, ticks};
+use support::{accept, experiment, far, joined, open, plan, run, study, ticks};
 
 /// The newest of what the screen is told.
 #[derive(Default)]
-struct Told {
+struct TellOutcome {
     search: Option<SearchStatus>,
     insight: Option<ProposalInsight>,
     points: Vec<PointRecord>,
     log: Vec<String>,
 }
 
-fn told(life: &mut Experiment, told: &mut Told) {
-    for record in life.take_records() {
+fn told(experiment: &mut Experiment, told: &mut TellOutcome) {
+    for record in experiment.take_records() {
         match record {
             Record::Search(search) => told.search = Some(search),
             Record::Insight(insight) => told.insight = Some(insight),
@@ -39,187 +39,187 @@ fn told(life: &mut Experiment, told: &mut Told) {
     }
 }
 
-fn search(life: &mut Experiment) -> SearchStatus {
-    let mut news = Told::default();
-    told(life, &mut news);
+fn search(experiment: &mut Experiment) -> SearchStatus {
+    let mut news = TellOutcome::default();
+    told(experiment, &mut news);
     news.search.expect("the search has changed")
 }
 
-fn several(life: &mut Experiment, trials: usize) {
+fn several(experiment: &mut Experiment, trials: usize) {
     for _ in 0..trials {
-        accept(life);
+        accept(experiment);
     }
 }
 
-fn value(life: &Experiment, name: &str) -> f64 {
-    life.proposal().unwrap().parameters.iter().find(|p| p.name == name).unwrap().value
+fn value(experiment: &Experiment, name: &str) -> f64 {
+    experiment.proposal().unwrap().parameters.iter().find(|p| p.name == name).unwrap().value
 }
 
 #[test]
 fn a_gain_is_checked_runs_in_one_trial_alone_and_stays_with_it() {
     let folder = tempfile::tempdir().unwrap();
-    let mut life = open(folder.path());
-    let error = life.set_gain("kp", 1001.0).unwrap_err().to_string();
+    let mut experiment = open(folder.path());
+    let error = experiment.set_gain("kp", 1001.0).unwrap_err().to_string();
     assert!(error.contains("kp = 1001") && error.contains("100 to 1000"), "{error}");
-    let error = life.set_gain("ki", 1.0).unwrap_err().to_string();
+    let error = experiment.set_gain("ki", 1.0).unwrap_err().to_string();
     assert!(error.contains("kp, kd, kd_joint, k_att"), "{error}");
-    assert!(life.set_gain("kd", f64::NAN).is_err());
+    assert!(experiment.set_gain("kd", f64::NAN).is_err());
 
-    life.set_gain("kp", 500.0).unwrap();
-    let card = life.proposal().unwrap();
+    experiment.set_gain("kp", 500.0).unwrap();
+    let card = experiment.proposal().unwrap();
     assert_eq!(card.source, ProposalSource::Operator);
     let kp = &card.gains[0];
     assert_eq!((kp.name.as_str(), kp.value, kp.proposed), ("kp", 500.0, 400.0));
-    let spec = accept(&mut life);
+    let spec = accept(&mut experiment);
     assert_eq!((spec.gains.kp, spec.gains.kd), (500.0, 8.0));
-    let next = accept(&mut life);
+    let next = accept(&mut experiment);
     assert_eq!(next.gains.kp, 400.0, "the next trial has the configured gains again");
 
     // The table of a later session knows, and a re-run has the same gains.
-    let mut life = open(folder.path());
-    let row = life.row(spec.trial).unwrap();
+    let mut experiment = open(folder.path());
+    let row = experiment.row(spec.trial).unwrap();
     assert_eq!(row.gains.iter().find(|(name, _)| name == "kp").unwrap().1, 500.0);
     assert!(row.note.contains("kp 500 (configured 400)"), "{}", row.note);
-    assert!(life.row(next.trial).unwrap().note.is_empty());
-    life.repeat(spec.trial).unwrap();
-    let again = accept(&mut life);
+    assert!(experiment.row(next.trial).unwrap().note.is_empty());
+    experiment.repeat(spec.trial).unwrap();
+    let again = accept(&mut experiment);
     assert_eq!((again.jump, again.gains), (spec.jump, spec.gains));
 }
 
 #[test]
 fn changes_of_a_card_are_taken_back_together() {
-    let mut life = life(5);
-    life.set_gain("kp", 500.0).unwrap();
-    life.set_parameter("Fx", 100.0).unwrap();
-    life.clear_overrides().unwrap();
-    let card = life.proposal().unwrap();
+    let mut experiment = experiment(5);
+    experiment.set_gain("kp", 500.0).unwrap();
+    experiment.set_parameter("Fx", 100.0).unwrap();
+    experiment.clear_overrides().unwrap();
+    let card = experiment.proposal().unwrap();
     assert_eq!((card.source, card.gains[0].value), (ProposalSource::Sampler, 400.0));
 }
 
 #[test]
 fn a_fixed_parameter_has_its_value_for_so_many_trials_and_the_others_are_still_proposed() {
     let folder = tempfile::tempdir().unwrap();
-    let mut life = open(folder.path());
-    several(&mut life, 4);
-    life.fix("Fx", 60.0, 3).unwrap();
-    assert_eq!(search(&mut life).parameters[1].fixed, Some(FixedParameter { value: 60.0, trials: 3 }));
+    let mut experiment = open(folder.path());
+    several(&mut experiment, 4);
+    experiment.fix("Fx", 60.0, 3).unwrap();
+    assert_eq!(search(&mut experiment).parameters[1].fixed, Some(FixedParameter { value: 60.0, trials: 3 }));
     let mut others = Vec::new();
     for left in [3, 2, 2, 1] {
         // Interrupted in between, it goes on.
-        let mut life = open(folder.path());
-        assert_eq!(search(&mut life).parameters[1].fixed, Some(FixedParameter { value: 60.0, trials: left }));
-        assert_eq!(life.proposal().unwrap().source, ProposalSource::Sampler);
-        let spec = run(&mut life, TrialEnd::Settled);
+        let mut experiment = open(folder.path());
+        assert_eq!(search(&mut experiment).parameters[1].fixed, Some(FixedParameter { value: 60.0, trials: left }));
+        assert_eq!(experiment.proposal().unwrap().source, ProposalSource::Sampler);
+        let spec = run(&mut experiment, TrialEnd::Settled);
         assert_eq!(spec.jump.fx_n, 60.0);
         others.push(spec.jump.fz_n);
         // A void trial uses up none.
         let verdict = if others.len() == 2 { Verdict::Void } else { Verdict::Accept };
-        life.judge(verdict, false).unwrap();
-        life.close().unwrap();
+        experiment.judge(verdict, false).unwrap();
+        experiment.close().unwrap();
     }
     others.dedup();
     assert_eq!(others.len(), 4, "the other parameters are proposed: {others:?}");
-    let mut life = open(folder.path());
-    assert_eq!(search(&mut life).parameters[1].fixed, None);
-    assert_ne!(value(&life, "Fx"), 60.0);
+    let mut experiment = open(folder.path());
+    assert_eq!(search(&mut experiment).parameters[1].fixed, None);
+    assert_ne!(value(&experiment, "Fx"), 60.0);
 }
 
 #[test]
 fn a_fixed_parameter_can_be_freed_and_overridden_and_leaves_queued_points_alone() {
-    let mut life = life(20);
-    life.fix("Fx", 60.0, 5).unwrap();
-    life.set_parameter("Fx", 70.0).unwrap();
-    assert_eq!(accept(&mut life).jump.fx_n, 70.0);
-    life.enqueue(&[("Fx".into(), 80.0)]).unwrap();
-    assert_eq!(accept(&mut life).jump.fx_n, 80.0);
-    assert_eq!(value(&life, "Fx"), 60.0);
-    life.unfix("Fx").unwrap();
-    assert_ne!(value(&life, "Fx"), 60.0);
-    assert!(life.unfix("Fx").unwrap_err().to_string().contains("not fixed"));
-    let error = life.fix("Fx", 200.0, 1).unwrap_err().to_string();
+    let mut experiment = experiment(20);
+    experiment.fix("Fx", 60.0, 5).unwrap();
+    experiment.set_parameter("Fx", 70.0).unwrap();
+    assert_eq!(accept(&mut experiment).jump.fx_n, 70.0);
+    experiment.enqueue(&[("Fx".into(), 80.0)]).unwrap();
+    assert_eq!(accept(&mut experiment).jump.fx_n, 80.0);
+    assert_eq!(value(&experiment, "Fx"), 60.0);
+    experiment.unfix("Fx").unwrap();
+    assert_ne!(value(&experiment, "Fx"), 60.0);
+    assert!(experiment.unfix("Fx").unwrap_err().to_string().contains("not fixed"));
+    let error = experiment.fix("Fx", 200.0, 1).unwrap_err().to_string();
     assert!(error.contains("0 to 150"), "{error}");
-    assert!(life.fix("Fx", 60.0, 0).is_err());
-    life.fix("Fx", 60.0, 2).unwrap();
-    life.fix("f0", 1.0, 2).unwrap();
-    let error = life.fix("Fz", 200.0, 2).unwrap_err().to_string();
+    assert!(experiment.fix("Fx", 60.0, 0).is_err());
+    experiment.fix("Fx", 60.0, 2).unwrap();
+    experiment.fix("f0", 1.0, 2).unwrap();
+    let error = experiment.fix("Fz", 200.0, 2).unwrap_err().to_string();
     assert!(error.contains("nothing would be left"), "{error}");
 }
 
 #[test]
 fn bounds_are_changed_within_what_safety_allows_and_kept() {
     let folder = tempfile::tempdir().unwrap();
-    let mut life = open(folder.path());
-    several(&mut life, 5);
+    let mut experiment = open(folder.path());
+    several(&mut experiment, 5);
     for (low, high, words) in
         [(110.0, 40.0, "no range"), (0.0, 301.0, "safety.toml allows: 0 to 300"), (0.0, f64::NAN, "")]
     {
-        let error = life.narrow_bounds("Fx", low, high).unwrap_err().to_string();
+        let error = experiment.narrow_bounds("Fx", low, high).unwrap_err().to_string();
         assert!(error.contains(words), "{error}");
     }
-    life.set_parameter("Fz", 200.0).unwrap();
-    life.narrow_bounds("Fx", 40.0, 50.0).unwrap();
-    assert_eq!(value(&life, "Fz"), 200.0, "what was set on the card stays");
-    life.clear_overrides().unwrap();
+    experiment.set_parameter("Fz", 200.0).unwrap();
+    experiment.narrow_bounds("Fx", 40.0, 50.0).unwrap();
+    assert_eq!(value(&experiment, "Fz"), 200.0, "what was set on the card stays");
+    experiment.clear_overrides().unwrap();
     for _ in 0..6 {
-        let mut life = open(folder.path());
-        let fx = value(&life, "Fx");
+        let mut experiment = open(folder.path());
+        let fx = value(&experiment, "Fx");
         assert!((40.0..=50.0).contains(&fx), "{fx}");
-        assert!(life.set_parameter("Fx", 60.0).is_err());
-        accept(&mut life);
-        life.close().unwrap();
+        assert!(experiment.set_parameter("Fx", 60.0).is_err());
+        accept(&mut experiment);
+        experiment.close().unwrap();
     }
-    let mut life = open(folder.path());
-    life.fix("Fx", 45.0, 1).unwrap();
-    assert!(life.narrow_bounds("Fx", 46.0, 50.0).unwrap_err().to_string().contains("fixed at 45"));
-    life.unfix("Fx").unwrap();
+    let mut experiment = open(folder.path());
+    experiment.fix("Fx", 45.0, 1).unwrap();
+    assert!(experiment.narrow_bounds("Fx", 46.0, 50.0).unwrap_err().to_string().contains("fixed at 45"));
+    experiment.unfix("Fx").unwrap();
     // Wider than configured, though not than safe; and back.
-    life.narrow_bounds("Fx", 0.0, 300.0).unwrap();
-    life.set_parameter("Fx", 250.0).unwrap();
-    life.narrow_bounds("Fx", 0.0, 150.0).unwrap();
-    let now = search(&mut life);
+    experiment.narrow_bounds("Fx", 0.0, 300.0).unwrap();
+    experiment.set_parameter("Fx", 250.0).unwrap();
+    experiment.narrow_bounds("Fx", 0.0, 150.0).unwrap();
+    let now = search(&mut experiment);
     let fx = &now.parameters[1];
     assert_eq!((fx.low, fx.high, fx.least, fx.most), (0.0, 150.0, 0.0, 300.0));
-    assert!(value(&life, "Fx") <= 150.0, "a value that the bounds exclude does not stay on the card");
+    assert!(value(&experiment, "Fx") <= 150.0, "a value that the bounds exclude does not stay on the card");
 }
 
 /// A jump whose length is what its parameters say, plus noise of its seed.
-fn jump(life: &mut Experiment, noise: f64) {
-    let card = life.proposal().expect("a proposal");
-    let spec = life.approve(card.trial, card.revision).unwrap();
+fn jump(experiment: &mut Experiment, noise: f64) {
+    let card = experiment.proposal().expect("a proposal");
+    let spec = experiment.approve(card.trial, card.revision).unwrap();
     let u = (spec.seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5;
-    life.ended(spec.trial, &TrialEnd::Settled, &ticks(spec.trial, far(&spec) + noise * u), 2);
-    life.judge(Verdict::Accept, false).unwrap();
+    experiment.ended(spec.trial, &TrialEnd::Settled, &ticks(spec.trial, far(&spec) + noise * u), 2);
+    experiment.judge(Verdict::Accept, false).unwrap();
 }
 
 #[test]
 fn the_best_of_a_finished_study_is_confirmed_beyond_its_budget() {
     let folder = tempfile::tempdir().unwrap();
-    let mut life = open(folder.path());
-    assert!(life.confirm_best(5).unwrap_err().to_string().contains("nothing to compare"));
-    (0..12).for_each(|_| jump(&mut life, 0.02));
-    let counted = life.counted();
-    let trials = life.confirm_best(60).unwrap();
+    let mut experiment = open(folder.path());
+    assert!(experiment.confirm_best(5).unwrap_err().to_string().contains("nothing to compare"));
+    (0..12).for_each(|_| jump(&mut experiment, 0.02));
+    let counted = experiment.counted();
+    let trials = experiment.confirm_best(60).unwrap();
     assert_eq!(trials.len(), 3);
-    let mut news = Told::default();
+    let mut news = TellOutcome::default();
     let mut repeats = 0;
     loop {
-        told(&mut life, &mut news);
+        told(&mut experiment, &mut news);
         if news.search.as_ref().unwrap().confirming.is_none() {
             break;
         }
         assert_eq!(news.search.as_ref().unwrap().confirming, Some(60 - repeats));
-        let card = life.proposal().unwrap();
+        let card = experiment.proposal().unwrap();
         assert_eq!(card.source, ProposalSource::Confirm);
         assert!(trials.contains(&card.parent.unwrap()));
-        jump(&mut life, 0.02);
+        jump(&mut experiment, 0.02);
         repeats += 1;
         // Ended and taken up again in between: that costs nothing.
-        told(&mut life, &mut news);
-        life.close().unwrap();
-        life = open(folder.path());
+        told(&mut experiment, &mut news);
+        experiment.close().unwrap();
+        experiment = open(folder.path());
     }
     assert!((6..60).contains(&repeats), "each is run three times at least: {repeats}");
-    assert_eq!(life.counted(), counted, "repeats are beyond the budget");
+    assert_eq!(experiment.counted(), counted, "repeats are beyond the budget");
     let leader: Vec<_> = news.points.iter().filter(|point| point.confidence.is_some()).collect();
     assert_eq!(leader.len(), 1);
     assert!(leader[0].contender && leader[0].confidence.unwrap() >= 0.95 && leader[0].deviation.unwrap() > 0.0);
@@ -227,62 +227,62 @@ fn the_best_of_a_finished_study_is_confirmed_beyond_its_budget() {
     assert_eq!(news.points.iter().filter(|point| point.contender).count(), 3);
     let words = news.log.iter().find(|line| line.starts_with("confirmed")).expect("it is said");
     assert!(words.contains("% confidence") && words.contains("stood"), "{words}");
-    assert_eq!(life.proposal().unwrap().source, ProposalSource::Sampler, "the search goes on");
+    assert_eq!(experiment.proposal().unwrap().source, ProposalSource::Sampler, "the search goes on");
 }
 
 #[test]
 fn repeats_end_with_their_budget_or_when_they_are_called_off() {
-    let mut life = life(6);
-    (0..6).for_each(|_| jump(&mut life, 0.02));
-    assert_eq!(life.stage(), ExperimentStage::Finished);
-    life.confirm_best(4).unwrap();
-    let mut news = Told::default();
+    let mut experiment = experiment(6);
+    (0..6).for_each(|_| jump(&mut experiment, 0.02));
+    assert_eq!(experiment.stage(), ExperimentStage::Finished);
+    experiment.confirm_best(4).unwrap();
+    let mut news = TellOutcome::default();
     for _ in 0..4 {
-        assert_eq!(life.stage(), ExperimentStage::Proposed);
-        jump(&mut life, 50.0);
+        assert_eq!(experiment.stage(), ExperimentStage::Proposed);
+        jump(&mut experiment, 50.0);
     }
-    told(&mut life, &mut news);
-    assert_eq!(life.stage(), ExperimentStage::Finished);
+    told(&mut experiment, &mut news);
+    assert_eq!(experiment.stage(), ExperimentStage::Finished);
     assert!(news.log.iter().any(|line| line.contains("used up") && line.contains("short of 95 %")), "{:?}", news.log);
-    life.confirm_best(4).unwrap();
-    assert_eq!(life.stage(), ExperimentStage::Proposed);
-    assert!(life.confirm_best(0).unwrap().is_empty());
-    assert_eq!(life.stage(), ExperimentStage::Finished);
-    assert!(life.confirm_best(0).unwrap_err().to_string().contains("nothing is being confirmed"));
+    experiment.confirm_best(4).unwrap();
+    assert_eq!(experiment.stage(), ExperimentStage::Proposed);
+    assert!(experiment.confirm_best(0).unwrap().is_empty());
+    assert_eq!(experiment.stage(), ExperimentStage::Finished);
+    assert!(experiment.confirm_best(0).unwrap_err().to_string().contains("no confirmation of the best is running"));
 }
 
 /// The last repeat can be judged otherwise: what was concluded from it is then concluded anew.
 #[test]
 fn the_verdict_that_ended_a_confirmation_can_be_undone() {
-    let mut life = life(6);
-    several(&mut life, 6);
-    life.confirm_best(40).unwrap();
-    let mut news = Told::default();
-    while life.stage() == ExperimentStage::Proposed {
-        accept(&mut life);
+    let mut experiment = experiment(6);
+    several(&mut experiment, 6);
+    experiment.confirm_best(40).unwrap();
+    let mut news = TellOutcome::default();
+    while experiment.stage() == ExperimentStage::Proposed {
+        accept(&mut experiment);
     }
-    told(&mut life, &mut news);
+    told(&mut experiment, &mut news);
     assert!(news.log.iter().any(|line| line.starts_with("confirmed")));
-    life.undo().unwrap();
-    life.judge(Verdict::Void, false).unwrap();
-    assert_eq!(life.stage(), ExperimentStage::Proposed, "one repeat is missing again");
-    accept(&mut life);
-    assert_eq!(life.stage(), ExperimentStage::Finished);
+    experiment.undo().unwrap();
+    experiment.judge(Verdict::Void, false).unwrap();
+    assert_eq!(experiment.stage(), ExperimentStage::Proposed, "one repeat is missing again");
+    accept(&mut experiment);
+    assert_eq!(experiment.stage(), ExperimentStage::Finished);
 }
 
 #[test]
 fn a_proposal_comes_with_its_densities_and_what_matters() {
-    let mut life = life(40);
-    let mut news = Told::default();
+    let mut experiment = experiment(40);
+    let mut news = TellOutcome::default();
     for _ in 0..IMPORTANCE_TRIALS - 1 {
-        accept(&mut life);
+        accept(&mut experiment);
     }
-    told(&mut life, &mut news);
+    told(&mut experiment, &mut news);
     assert!(news.insight.as_ref().unwrap().parameters.iter().all(|p| p.importance.is_none()));
-    several(&mut life, 5);
-    told(&mut life, &mut news);
+    several(&mut experiment, 5);
+    told(&mut experiment, &mut news);
     let insight = news.insight.unwrap();
-    let card = life.proposal().unwrap();
+    let card = experiment.proposal().unwrap();
     assert_eq!(insight.trial, card.trial);
     let shares: f64 = insight.parameters.iter().filter_map(|p| p.importance).sum();
     assert!((shares - 1.0).abs() < 1e-12, "{shares}");
@@ -304,56 +304,56 @@ fn a_proposal_comes_with_its_densities_and_what_matters() {
 #[test]
 fn a_point_queued_by_another_program_comes_next() {
     let folder = tempfile::tempdir().unwrap();
-    let mut life = open(folder.path());
-    accept(&mut life);
+    let mut experiment = open(folder.path());
+    accept(&mut experiment);
     let mut other = study(Storage::File(folder.path().join("study.log")));
     other.enqueue(&[("Fx".into(), 77.0)], &[]).unwrap();
-    life.look().unwrap();
-    assert_eq!((life.proposal().unwrap().source, value(&life, "Fx")), (ProposalSource::Queued, 77.0));
+    experiment.refresh().unwrap();
+    assert_eq!((experiment.proposal().unwrap().source, value(&experiment, "Fx")), (ProposalSource::Queued, 77.0));
     // Not over the operator's head.
     let mut other = study(Storage::File(folder.path().join("study.log")));
-    accept(&mut life);
-    life.set_parameter("Fz", 200.0).unwrap();
+    accept(&mut experiment);
+    experiment.set_parameter("Fz", 200.0).unwrap();
     other.enqueue(&[("Fx".into(), 78.0)], &[]).unwrap();
-    life.look().unwrap();
-    assert_eq!(value(&life, "Fz"), 200.0);
-    assert_eq!(accept(&mut life).jump.fz_n, 200.0);
-    assert_eq!(value(&life, "Fx"), 78.0);
+    experiment.refresh().unwrap();
+    assert_eq!(value(&experiment, "Fz"), 200.0);
+    assert_eq!(accept(&mut experiment).jump.fz_n, 200.0);
+    assert_eq!(value(&experiment, "Fx"), 78.0);
 }
 
 /// A study in which this trial is to be run again, and another program has queued a point with Fx = 77 at the same moment.
 fn rerun_beside_a_queued_point(folder: &Path) -> (Experiment, TrialSpec) {
-    let mut life = open(folder);
-    let spec = run(&mut life, TrialEnd::Fell(FallCause::BodyContact));
-    life.judge(Verdict::Void, true).unwrap();
+    let mut experiment = open(folder);
+    let spec = run(&mut experiment, TrialEnd::Fell(FallCause::BodyContact));
+    experiment.judge(Verdict::Void, true).unwrap();
     let mut other = study(Storage::File(folder.join("study.log")));
     other.enqueue(&[("Fx".into(), 77.0)], &[]).unwrap();
-    (life, spec)
+    (experiment, spec)
 }
 
 /// (A danger once: a re-run waits in a fork of the study, and another program may take the number that it has there.)
 #[test]
 fn a_rerun_runs_its_own_parameters_though_another_program_queues_a_point_at_the_same_moment() {
     let folder = tempfile::tempdir().unwrap();
-    let (mut life, spec) = rerun_beside_a_queued_point(folder.path());
-    let again = accept(&mut life);
+    let (mut experiment, spec) = rerun_beside_a_queued_point(folder.path());
+    let again = accept(&mut experiment);
     assert_eq!(again.jump, spec.jump);
-    assert_eq!(life.row(again.trial).unwrap().parent, Some(spec.trial));
-    assert_eq!(value(&life, "Fx"), 77.0);
+    assert_eq!(experiment.row(again.trial).unwrap().parent, Some(spec.trial));
+    assert_eq!(value(&experiment, "Fx"), 77.0);
 }
 
 /// (A defect once: seen now and then, as a session looks, the point took the re-run's parameters and was lost.)
 #[test]
 fn a_point_queued_beside_a_rerun_runs_and_so_does_the_rerun() {
     let folder = tempfile::tempdir().unwrap();
-    let (mut life, spec) = rerun_beside_a_queued_point(folder.path());
-    life.look().unwrap();
-    let both = [accept(&mut life), accept(&mut life)];
+    let (mut experiment, spec) = rerun_beside_a_queued_point(folder.path());
+    experiment.refresh().unwrap();
+    let both = [accept(&mut experiment), accept(&mut experiment)];
     let of = |fx: f64| both.iter().find(|spec| spec.jump.fx_n == fx);
     assert!(of(77.0).is_some(), "the queued point is lost: {both:?}");
     let again = of(spec.jump.fx_n).expect("the re-run is lost");
-    assert_eq!((again.jump, life.row(again.trial).unwrap().parent), (spec.jump, Some(spec.trial)));
-    assert_eq!(life.proposal().unwrap().source, ProposalSource::Sampler, "nothing comes twice");
+    assert_eq!((again.jump, experiment.row(again.trial).unwrap().parent), (spec.jump, Some(spec.trial)));
+    assert_eq!(experiment.proposal().unwrap().source, ProposalSource::Sampler, "nothing comes twice");
 }
 
 /// (A danger once: it ran, with whatever it said.)
@@ -365,54 +365,54 @@ fn a_point_of_another_program_beyond_the_limits_cannot_run() {
         (vec![("Fx", 50.0)], Some(9999.0), "kp = 9999"),
     ] {
         let folder = tempfile::tempdir().unwrap();
-        let mut life = open(folder.path());
+        let mut experiment = open(folder.path());
         let mut other = study(Storage::File(folder.path().join("study.log")));
         let point: Vec<_> = parameters.iter().map(|(name, value)| ((*name).to_owned(), *value)).collect();
         let attributes: Vec<_> =
             gains.map(|kp| ("gains".to_owned(), serde_json::json!({ "kp": kp }))).into_iter().collect();
         other.enqueue(&point, &attributes).unwrap();
-        life.look().unwrap();
-        let card = life.proposal().unwrap();
-        let refusal = life.approve(card.trial, card.revision).unwrap_err().to_string();
+        experiment.refresh().unwrap();
+        let card = experiment.proposal().unwrap();
+        let refusal = experiment.approve(card.trial, card.revision).unwrap_err().to_string();
         assert!(refusal.contains(word), "{refusal}");
-        life.skip().unwrap();
-        let row = life.row(card.trial).unwrap();
+        experiment.skip().unwrap();
+        let row = experiment.row(card.trial).unwrap();
         assert!(row.verdict == Some(Verdict::Void) && row.cause.contains(word), "{row:?}");
-        let next = accept(&mut life);
+        let next = accept(&mut experiment);
         assert!(next.jump.fx_n <= 200.0 && next.jump.f0_hz > 0.0 && next.gains.kp == 400.0);
     }
 }
 
 #[test]
 fn gains_that_a_queued_point_brings_are_seen_on_its_card() {
-    let mut life = life(5);
-    life.enqueue(&[("Fx".into(), 60.0), ("kp".into(), 500.0)]).unwrap();
-    let card = life.proposal().unwrap();
+    let mut experiment = experiment(5);
+    experiment.enqueue(&[("Fx".into(), 60.0), ("kp".into(), 500.0)]).unwrap();
+    let card = experiment.proposal().unwrap();
     assert_eq!((card.gains[0].value, card.gains[0].proposed, card.source), (500.0, 400.0, ProposalSource::Queued));
-    assert_eq!(accept(&mut life).gains.kp, 500.0);
-    let refusal = life.enqueue(&[("Fx".into(), 60.0), ("kp".into(), 5000.0)]).unwrap_err().to_string();
+    assert_eq!(accept(&mut experiment).gains.kp, 500.0);
+    let refusal = experiment.enqueue(&[("Fx".into(), 60.0), ("kp".into(), 5000.0)]).unwrap_err().to_string();
     assert!(refusal.contains("kp = 5000"), "{refusal}");
 }
 
 /// (A defect once: the refused wish had told the verdict, and it could not be undone any more.)
 #[test]
 fn a_confirmation_that_is_refused_tells_nothing() {
-    let mut life = life(5);
-    accept(&mut life);
-    assert!(life.confirm_best(10).is_err(), "one point is nothing to compare");
-    life.undo().unwrap();
-    assert_eq!(life.stage(), ExperimentStage::Review);
+    let mut experiment = experiment(5);
+    accept(&mut experiment);
+    assert!(experiment.confirm_best(10).is_err(), "one point is nothing to compare");
+    experiment.undo().unwrap();
+    assert_eq!(experiment.stage(), ExperimentStage::Review);
 }
 
 #[test]
 fn a_verdict_against_the_suggestion_says_so_until_it_is_undone() {
-    let mut life = life(5);
-    let spec = run(&mut life, TrialEnd::Settled);
-    life.judge(Verdict::Fall, false).unwrap();
-    let cause = &life.row(spec.trial).unwrap().cause;
+    let mut experiment = experiment(5);
+    let spec = run(&mut experiment, TrialEnd::Settled);
+    experiment.judge(Verdict::Fall, false).unwrap();
+    let cause = &experiment.row(spec.trial).unwrap().cause;
     assert_eq!(cause, "by the operator; looked like accept: landed and settled");
-    life.undo().unwrap();
-    assert_eq!(life.row(spec.trial).unwrap().cause, "landed and settled");
+    experiment.undo().unwrap();
+    assert_eq!(experiment.row(spec.trial).unwrap().cause, "landed and settled");
 }
 
 /// (A defect once: each worker counted only the repeats that were complete, and all queued the last one.)
@@ -433,13 +433,13 @@ fn workers_together_run_no_more_repeats_than_were_asked_for() {
     // It comes to nothing: whoever is faster takes it up.
     first.judge(Verdict::Void, false).unwrap();
     first.close().unwrap();
-    second.look().unwrap();
+    second.refresh().unwrap();
     assert_eq!(second.proposal().unwrap().source, ProposalSource::Confirm);
     accept(&mut second);
     let late = first.proposal().unwrap();
     assert!(matches!(first.approve(late.trial, late.revision), Err(RequestRefusal::Overtaken(_))));
     second.close().unwrap();
-    first.look().unwrap();
+    first.refresh().unwrap();
     assert_eq!((first.stage(), second.stage()), (ExperimentStage::Finished, ExperimentStage::Finished));
     let study = study(file());
     let repeats = study.trials().iter().filter(|trial| trial.user_attributes["source"] == "confirm");

@@ -1,12 +1,12 @@
-//! Properties of contact: forces sum to the weight, feet do not creep, the cone holds, nothing pulls, nothing sinks in, no
-//! energy comes from nowhere, friction holds and slips where it should.
+//! Properties of contact: forces sum to the weight, feet do not creep, forces are in the cone and never pull, nothing
+//! penetrates, energy does not increase, friction sticks and slides as given.
 
 mod support;
 
 use nalgebra::{UnitQuaternion, Vector3};
 use quadfrog::robot::description::RobotDescription;
-use quadfrog::robot::{JointCommand, Joints, Leg, MotorCommand, Placement, Robot};
-use quadfrog::sim::{ContactLaw, GRAVITY, SimConfig, Simulator, State, TerrainKind};
+use quadfrog::robot::{GRAVITY, JointCommand, Joints, Leg, MotorCommand, Placement, Robot};
+use quadfrog::sim::{ContactLaw, SimConfig, SimState, Simulator, TerrainKind};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use support::Largest;
@@ -32,7 +32,7 @@ fn stance(robot: &RobotDescription, y: f64, depth: f64) -> Joints {
     joints
 }
 
-/// Motors that hold these angles.
+/// Command that holds these angles.
 fn hold(position: &Joints, kp: f64, kd: f64) -> JointCommand {
     let mut command = JointCommand::default();
     for (motor, &position) in command.motor.iter_mut().zip(position) {
@@ -91,7 +91,7 @@ fn feet_do_not_creep() {
     assert!(creep.value < 1e-4);
 }
 
-/// Through a wild fall: every force is inside the cone and pushes.
+/// In a fall with many contacts every force is inside the cone and pushes.
 #[test]
 fn forces_stay_inside_the_cone_and_never_pull() {
     let friction = 0.6;
@@ -106,7 +106,7 @@ fn forces_stay_inside_the_cone_and_never_pull() {
             let torque = std::array::from_fn(|_| uniform(&mut random, -20.0, 20.0));
             simulator.write(&JointCommand::torques(&torque)).unwrap();
             for force in simulator.read().unwrap().truth.unwrap().foot_force_world {
-                // A period's force is a sum of forces in one and the same cone, so it is in the cone as well.
+                // The force of a period is a sum of forces in the same cone, so it is in the cone too.
                 assert!(force.z >= 0.0, "pulls with {} N", force.z);
                 assert!(force.xy().norm() <= friction * force.z * (1.0 + 1e-9) + 1e-9, "{force} leaves the cone");
                 pressed += usize::from(force.z > 1.0);
@@ -139,8 +139,8 @@ fn a_drop_from_half_a_metre_sinks_in_less_than_half_a_millimetre() {
     assert!(deepest.value < 5e-4);
 }
 
-/// Limp robots, thrown at random: never more energy than at the start, and hardly ever more than the least so far. (The steps in
-/// contact are of first order: limbs that whirl at their stops exchange a little energy with the step.)
+/// Limp robots with random initial motion: the energy never exceeds the initial one, and hardly ever the least so far.
+/// (Contact steps are of first order: fast limbs at their stops gain or lose a little energy.)
 #[test]
 fn no_energy_is_gained_in_a_thousand_drops() {
     let robot = go1();
@@ -152,7 +152,7 @@ fn no_energy_is_gained_in_a_thousand_drops() {
         let mut vector = |size: f64| Vector3::from_fn(|_, _| uniform(&mut random, -size, size));
         let orientation_world = UnitQuaternion::from_scaled_axis(vector(2.0));
         let (velocity_body, angular_velocity_body) = (vector(1.0), vector(2.0));
-        let mut state = State { orientation_world, velocity_body, angular_velocity_body, ..State::default() };
+        let mut state = SimState { orientation_world, velocity_body, angular_velocity_body, ..SimState::default() };
         for i in 0..12 {
             state.joint_position[i] = uniform(&mut random, limits.min_position[i], limits.max_position[i]);
             state.joint_velocity[i] = uniform(&mut random, -3.0, 3.0);
@@ -176,8 +176,8 @@ fn no_energy_is_gained_in_a_thousand_drops() {
     assert!(gain.value < 0.02);
 }
 
-/// A lying robot on a slope sticks below atan(mu) and slides above, by Coulomb's law exactly at the rate that it gives, by the convex
-/// one, hopping a little, nearly so.
+/// A lying robot on a slope sticks below atan(mu) and slides above: with Coulomb's law at exactly its acceleration,
+/// with the convex law, hopping a little, at nearly the same.
 #[test]
 fn friction_holds_below_its_angle_and_slips_above() {
     for (law, tolerance) in [(ContactLaw::Coulomb, 1e-3), (ContactLaw::Convex, 0.1)] {
@@ -228,7 +228,7 @@ fn slide(law: ContactLaw, tolerance: f64) {
 fn joint_stops_hold() {
     let robot = go1();
     let mut simulator = Simulator::new(&robot, &SimConfig::default()).unwrap();
-    let mut state = State { joint_position: stance(&robot, 0.1, 0.26), ..State::default() };
+    let mut state = SimState { joint_position: stance(&robot, 0.1, 0.26), ..SimState::default() };
     state.position_world.z = 3.0;
     let mut over = Largest::default();
     for sign in [-1.0, 1.0] {

@@ -1,9 +1,9 @@
-//! Motors and sensors: each setting does what `config/simulator.toml` says of it.
+//! Motors and sensors: each setting has the effect given in `config/simulator.toml`.
 
 use nalgebra::Vector3;
 use quadfrog::robot::description::RobotDescription;
-use quadfrog::robot::{JointCommand, MotorCommand, Placement, Robot, RobotState};
-use quadfrog::sim::{ActuatorKind, GRAVITY, SimConfig, SimError, Simulator, State};
+use quadfrog::robot::{GRAVITY, JointCommand, MotorCommand, Placement, Robot, RobotState};
+use quadfrog::sim::{ActuatorKind, SimConfig, SimError, SimState, Simulator};
 
 fn go1() -> RobotDescription {
     RobotDescription::embedded("go1").unwrap()
@@ -13,7 +13,11 @@ fn go1() -> RobotDescription {
 fn floating(config: &SimConfig) -> Simulator {
     let mut simulator = Simulator::new(&go1(), config).unwrap();
     let joint_position = std::array::from_fn(|i| [0.0, 1.2, -1.8][i % 3]);
-    simulator.set_state(&State { position_world: Vector3::new(0.0, 0.0, 50.0), joint_position, ..State::default() });
+    simulator.set_state(&SimState {
+        position_world: Vector3::new(0.0, 0.0, 50.0),
+        joint_position,
+        ..SimState::default()
+    });
     simulator
 }
 
@@ -51,7 +55,7 @@ fn ideal_torques_are_clamped_to_the_limits() {
     assert_eq!(simulator.read().unwrap().joint_torque, [3.0; 12]);
 }
 
-/// Damping far stiffer than a joint's inertia over a step stays stable and takes the motion out.
+/// Damping much stiffer than inertia over step is stable and stops the motion.
 #[test]
 fn stiff_damping_is_stable() {
     for config in [SimConfig::default(), hardware_like()] {
@@ -106,14 +110,14 @@ fn hardware_torque_falls_with_speed() {
     assert_eq!(torque_at(1.1, -100.0), -most, "braking");
 }
 
-/// A joint that nothing but dry friction holds stays; with more torque than that it moves.
+/// Dry friction holds a joint up to its torque; with more torque the joint moves.
 #[test]
 fn dry_friction_holds_small_torques() {
     let mut config = hardware_like();
     config.actuator.hardware_like.viscous_friction_nm_s = 0.0;
     let friction = config.actuator.hardware_like.dry_friction_nm;
     let moved = |torque: f64| {
-        // Falling freely: no weight on the joints.
+        // Free fall: no weight on the joints.
         let mut simulator = floating(&config);
         let start = simulator.state().joint_position[2];
         let mut command = [0.0; 12];
@@ -133,7 +137,7 @@ fn at_rest_the_accelerometer_shows_gravity() {
     assert!((state.imu.accel_body - Vector3::new(0.0, 0.0, GRAVITY)).norm() < 0.05, "{}", state.imu.accel_body);
     let mut simulator = floating(&SimConfig::default());
     simulator.write(&JointCommand::default()).unwrap();
-    // Falling freely it shows next to nothing.
+    // Nearly zero in free fall.
     assert!(simulator.read().unwrap().imu.accel_body.norm() < 0.5);
 }
 
@@ -153,7 +157,7 @@ fn noise_has_the_configured_size() {
     for q in states[5999].joint_position {
         assert!((q / step - (q / step).round()).abs() < 1e-6, "{q} rad is between two encoder steps");
     }
-    // Another trial, other biases; the same trial, the same.
+    // The biases differ between seeds and are equal for the same seed.
     assert_eq!(lying(&config, 3, 10), states[..10]);
     assert_ne!(lying(&config, 4, 10)[9].imu.gyro_body, states[9].imu.gyro_body);
 }

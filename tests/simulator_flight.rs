@@ -1,9 +1,10 @@
-//! Properties of motion without contact: momentum and energy are kept, the error falls with the step at the integrator's order.
+//! Properties of motion without contact: momentum and energy are conserved, the error decreases with the step at the
+//! integrator's order.
 
 use nalgebra::{UnitQuaternion, Vector3};
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::robot::{JointCommand, Robot};
-use quadfrog::sim::{SimConfig, Simulator, State};
+use quadfrog::sim::{SimConfig, SimState, Simulator};
 
 /// A limp robot that tumbles high up, without joint stops.
 fn tumbling(flight_substeps: u32) -> Simulator {
@@ -12,7 +13,7 @@ fn tumbling(flight_substeps: u32) -> Simulator {
     let mut config = SimConfig::default();
     config.step.flight_substeps = flight_substeps;
     let mut simulator = Simulator::new(&robot, &config).unwrap();
-    simulator.set_state(&State {
+    simulator.set_state(&SimState {
         position_world: Vector3::new(0.3, -0.2, 5.0),
         orientation_world: UnitQuaternion::from_euler_angles(0.4, -0.3, 1.0),
         joint_position: std::array::from_fn(|i| [0.1, 0.8, -1.6][i % 3]),
@@ -58,7 +59,7 @@ fn the_error_falls_with_the_fourth_power_of_the_step() {
     assert!((3.7..4.3).contains(&order));
 }
 
-/// The same seed and commands, the same bits; also from a used simulator and from a copy.
+/// The same seed and commands give the same bits, also from a used simulator and from a copy.
 #[test]
 fn a_run_repeats_bit_for_bit() {
     let run = |simulator: &mut Simulator| {

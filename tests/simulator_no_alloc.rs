@@ -1,4 +1,4 @@
-//! Nothing allocates in a step: a counting allocator watches a jump-like run on every terrain and with every device on.
+//! No step allocates: a counting allocator during a jump-like run on every terrain with all sensor and motor errors.
 #![allow(
     unsafe_code,
     reason = "an allocator can only be written with unsafe; this one hands everything to the system's"
@@ -21,12 +21,12 @@ struct Counting;
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         ALLOCATIONS.with(|count| count.set(count.get() + 1));
-        // SAFETY: the caller's promises are passed on.
+        // SAFETY: the caller's guarantees are passed on.
         unsafe { System.alloc(layout) }
     }
 
     unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: the caller's promises are passed on.
+        // SAFETY: the caller's guarantees are passed on.
         unsafe { System.dealloc(pointer, layout) }
     }
 }
@@ -61,7 +61,7 @@ fn a_step_does_not_allocate() {
             let joint_position = robot.lying_position;
             simulator.place(&Placement { joint_position, lying: true, seed: 5 });
             let before = allocations();
-            // Thrashes, jumps, falls: every kind of step, with many contacts.
+            // Random motion, jumps and falls: every kind of step, with many contacts.
             for tick in 0..3000 {
                 let t = f64::from(tick) * 0.001;
                 let command = JointCommand::torques(&std::array::from_fn(|i| 25.0 * (7.0 * t + i as f64).sin()));

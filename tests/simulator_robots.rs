@@ -1,16 +1,16 @@
-//! Robots from files: the two that come with the program, a user's own, and what is refused.
+//! Robot descriptions: the embedded ones, those from a folder, and invalid ones.
 
 use std::path::{Path, PathBuf};
 
 use nalgebra::Vector3;
 use quadfrog::robot::description::{DescriptionError, RobotDescription};
-use quadfrog::robot::{JointCommand, Leg, MotorCommand, Placement, Robot};
-use quadfrog::sim::{GRAVITY, SimConfig, Simulator};
+use quadfrog::robot::{GRAVITY, JointCommand, Leg, MotorCommand, Placement, Robot};
+use quadfrog::sim::{SimConfig, Simulator};
 
 const GO1: &str = include_str!("../robots/go1/go1.urdf");
 const GO1_TOML: &str = include_str!("../robots/go1/robot.toml");
 
-/// A folder of its own with a robot's two files, removed at the end.
+/// A temporary folder with a robot's two files.
 struct Folder(PathBuf);
 
 impl Folder {
@@ -94,7 +94,7 @@ fn every_robot_lies_stands_and_jumps() {
         assert!((force / (simulator.model().mass() * GRAVITY) - 1.0).abs() < 1e-3, "{name} stands on {force} N");
         assert!(!truth.body_contact && truth.foot_contact == [true; 4]);
 
-        // Straight down with the feet: tau = J^T f.
+        // Feet push straight down: tau = J^T f.
         let (start, mut highest) = (truth.position_world.z, 0.0_f64);
         for tick in 0..600 {
             let mut push = command;

@@ -1,4 +1,4 @@
-//! Steps and rough ground: feet find them, blocks are the same for the same seed, loose ones move when kicked.
+//! Steps and blocks: feet touch them, the same seed gives the same blocks, loose blocks move when pushed.
 
 use nalgebra::Vector3;
 use quadfrog::robot::description::RobotDescription;
@@ -51,7 +51,7 @@ fn on_steps_the_front_feet_stand_higher() {
     assert_eq!(simulator.read().unwrap().truth.unwrap().foot_contact, [true; 4]);
 }
 
-/// Pushed against a riser, a foot stops there.
+/// A foot that is pushed against a riser stops.
 #[test]
 fn a_riser_is_a_wall() {
     let mut config = config(TerrainKind::Steps);
@@ -81,7 +81,7 @@ fn blocks_are_those_of_the_seed() {
     assert_eq!(first.len(), expected.count as usize);
     assert_eq!(first, blocks(1));
     assert_ne!(first, blocks(2));
-    // Overlapping ones lie on each other: some are higher than one block, all by whole blocks.
+    // Overlapping blocks are stacked: some tops are higher than one block, all by whole blocks.
     let thickness = expected.thickness_m;
     assert!(first.iter().all(|b| b.top < (f64::from(expected.layers) + 0.5) * thickness));
     assert!(first.iter().any(|b| b.top > 1.5 * thickness));
@@ -90,7 +90,7 @@ fn blocks_are_those_of_the_seed() {
 
 #[test]
 fn a_robot_stands_on_blocks() {
-    // Now and then a calf leans on a block's edge with its foot in the air beside it.
+    // Sometimes a calf touches a block's edge while its foot is in the air.
     let mut on_feet = 0;
     for seed in 0..20 {
         let (mut simulator, command) = stand(&config(TerrainKind::Blocks), seed);
@@ -110,7 +110,7 @@ fn a_robot_stands_on_blocks() {
     assert!(on_feet >= 15, "only {on_feet} of 20 stood on three feet or more");
 }
 
-/// A foot dragged over a loose block takes it along; a fixed block stays.
+/// A foot that is dragged over a loose block moves it; a fixed block does not move.
 #[test]
 fn loose_blocks_move_when_kicked() {
     let moved = |loose: bool| {

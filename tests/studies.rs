@@ -1,17 +1,17 @@
-//! Whole studies on the built-in simulator: they reach what the method reaches, and the same seed gives the same bits.
+//! Whole studies on the built-in simulator: the best values of the method, and identical bits for the same seed.
 
-use quadfrog::config::{Backend, Config};
-use quadfrog::engine::{Options, open_life};
+use quadfrog::config::Config;
+use quadfrog::engine::{Options, open_experiment};
 use quadfrog::optimize::journal::Durability;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::session::automatic;
 use quadfrog::session::rollout::Rollout;
 use quadfrog::sim::Simulator;
-use quadfrog::trial::{Task, TrialRecord};
+use quadfrog::trial::{Backend, Task, TrialRecord};
 
 const TRIALS: u32 = 20;
 
-/// A study of 20 trials without a screen: its rows and its best value.
+/// Runs a study of 20 trials without a screen; returns its rows and its best value.
 fn study(task: Task, seed: u32) -> (Vec<TrialRecord>, f64) {
     let config = Config::load(None).unwrap();
     let robot = RobotDescription::embedded("go1").unwrap();
@@ -19,13 +19,13 @@ fn study(task: Task, seed: u32) -> (Vec<TrialRecord>, f64) {
     let settings = options.config.settings(&options.robot, task, Backend::Simulator).unwrap();
     let simulator = Simulator::new(&options.robot, &options.config.simulator).unwrap();
     let mut rollout = Rollout::new(simulator, &settings);
-    let mut life = open_life(&options, Durability::Buffered, "").unwrap();
+    let mut life = open_experiment(&options, Durability::Buffered, "").unwrap();
     automatic::run(&mut life, &mut rollout, |_, _| {}).unwrap();
     let best = life.best().and_then(|row| row.value).unwrap_or(0.0);
     (life.rows().cloned().collect(), best)
 }
 
-/// Best values of seeds 0 to 4; prints them beside what MuJoCo reaches with the same controller.
+/// Best values of seeds 0 to 4; prints them with those of MuJoCo with the same controller.
 fn bests(task: Task, mujoco: &str) -> Vec<f64> {
     let bests: Vec<f64> = (0..5).map(|seed| study(task, seed).1).collect();
     println!("{}: best of {TRIALS} trials, seeds 0-4: {bests:.3?} {}; MuJoCo {mujoco}", task.name(), task.unit());
@@ -50,7 +50,7 @@ fn twist_reaches_two_radians_in_four_of_five_seeds() {
     assert!(bests.iter().filter(|&&best| best >= 2.0).count() >= 4, "{bests:?}");
 }
 
-/// Right and clockwise are the mirror images: they learn as well.
+/// Right and clockwise are the mirror images of left and counterclockwise.
 #[test]
 fn the_mirrored_tasks_learn_too() {
     let (_, right) = study(Task::LateralRight, 0);

@@ -1,4 +1,4 @@
-//! The configuration with a point that was found, as a folder that `--config` reads.
+//! Export of the configuration with a found point, as a folder for `--config`.
 
 use std::fs::OpenOptions;
 use std::io::Write as _;
@@ -10,12 +10,11 @@ use super::{Config, ConfigError};
 use crate::trial::Task;
 
 impl Config {
-    /// Writes the files of this configuration into `folder`, which may exist but hold none of them, so that a new study of
-    /// `task` begins with `point` (`[first.<task>]` in `optimize.toml`) and its trials run with `gains`, where these are
-    /// given by name. Returns the files.
+    /// Writes the files of this configuration into `folder`: a new study of `task` begins with `point` (`[first.<task>]` in
+    /// `optimize.toml`), and its trials run with `gains`, both by name. Returns the written files.
     ///
     /// # Errors
-    /// [`ConfigError::Write`] where a file exists already or cannot be written: nothing is overwritten.
+    /// [`ConfigError::Write`] when a file exists already or cannot be written: nothing is overwritten.
     pub fn export(
         &self,
         folder: &Path,
@@ -45,7 +44,7 @@ impl Config {
     }
 }
 
-/// The text of a file with numbers set in one of its tables, which is made where it is not there.
+/// Returns the text of a file with numbers set in one of its tables, created if missing.
 fn with(text: &str, tables: &[&str], values: &[(String, f64)]) -> String {
     let Ok(mut whole) = text.parse::<Table>() else { return text.to_owned() };
     let mut table = &mut whole;

@@ -1,4 +1,4 @@
-//! One file over its default: every key must be known to the default and of its kind.
+//! A file laid over its default: every key must be in the default and of the same kind.
 
 use std::collections::HashMap;
 
@@ -7,37 +7,50 @@ use toml::{Table, Value};
 
 use super::ConfigError;
 
-/// The merged table, and the line of every key that the file gave (keys with their tables, joined by dots).
-pub struct Merged {
-    /// Default and file in one.
-    pub table: Table,
-    /// Where the file says what it says.
+/// Origin of the values of a file, for messages.
+#[derive(Debug, Clone)]
+pub struct FileOrigin {
+    /// Path of the file.
+    pub file: String,
+    /// Line of every key that the file gave, by the key with its tables, joined by dots.
     pub lines: HashMap<String, usize>,
 }
 
-/// Lays the text of `file` over `default`. Keys of `optional` may be given too, though the default leaves them out.
+impl FileOrigin {
+    /// Returns the error of a value: file, line, key, value and reason.
+    pub fn refuse(&self, key: &str, value: impl ToString, reason: impl ToString) -> ConfigError {
+        let file = match self.lines.get(key) {
+            Some(line) => format!("{}:{line}", self.file),
+            None => self.file.clone(),
+        };
+        ConfigError::Value { file, key: key.to_owned(), value: value.to_string(), reason: reason.to_string() }
+    }
+}
+
+/// Lays the text of `file` over `default`; returns the values in force and their origin. Keys of `optional`, which the default leaves out, are allowed too.
 ///
 /// # Errors
-/// When it is not TOML, or a key is unknown or of another kind than the default's.
-pub fn merge(file: &str, text: &str, default: &Table, optional: &Table) -> Result<Merged, ConfigError> {
+/// When the text is not TOML, or a key is unknown or of another kind than the default's.
+pub fn merge(file: &str, text: &str, default: &Table, optional: &Table) -> Result<(Table, FileOrigin), ConfigError> {
     let line_of = |offset: usize| text[..offset.min(text.len())].matches('\n').count() + 1;
     let parsed = DeTable::parse(text).map_err(|error| ConfigError::Syntax {
         file: file.to_owned(),
         line: line_of(error.span().map_or(0, |span| span.start)),
         message: error.message().to_owned(),
     })?;
-    let mut merged = Merged { table: default.clone(), lines: HashMap::new() };
-    let place = Place { file, line_of: &line_of };
-    place.lay(parsed.get_ref(), &mut merged.table, optional, "", &mut merged.lines)?;
-    Ok(merged)
+    let mut table = default.clone();
+    let mut lines = HashMap::new();
+    let overlay = Overlay { file, line_of: &line_of };
+    overlay.lay(parsed.get_ref(), &mut table, optional, "", &mut lines)?;
+    Ok((table, FileOrigin { file: file.to_owned(), lines }))
 }
 
-struct Place<'a> {
+struct Overlay<'a> {
     file: &'a str,
     line_of: &'a dyn Fn(usize) -> usize,
 }
 
-impl Place<'_> {
+impl Overlay<'_> {
     fn lay(
         &self,
         over: &DeTable<'_>,
@@ -51,7 +64,7 @@ impl Place<'_> {
             let line = (self.line_of)(name.span().start);
             let example = optional.get(name.get_ref().as_ref());
             if let (false, Some(example)) = (under.contains_key(name.get_ref().as_ref()), example) {
-                // Of a table only the keys that are given; of a value its kind.
+                // A table begins empty; a value begins as the example, for its kind.
                 let nothing = if example.is_table() { Value::Table(Table::new()) } else { example.clone() };
                 under.insert(name.get_ref().to_string(), nothing);
             }
@@ -94,11 +107,11 @@ impl Place<'_> {
     }
 }
 
-/// The value without its places.
+/// Returns the value without the positions in the text.
 fn plain(value: &DeValue<'_>) -> Value {
     match value {
         DeValue::String(text) => Value::String(text.to_string()),
-        // The parser has seen that these are numbers; radix and digit separators were resolved by it.
+        // The parser has checked the digits and resolved radix and separators.
         DeValue::Integer(number) => i64::from_str_radix(number.as_str(), number.radix())
             .map_or_else(|_| Value::String(number.to_string()), Value::Integer),
         DeValue::Float(number) => {
@@ -113,7 +126,7 @@ fn plain(value: &DeValue<'_>) -> Value {
     }
 }
 
-/// Whether a value may stand where the default has another: an integer may stand for a float.
+/// Whether a value may replace the default's: an integer may replace a float.
 fn same_kind(given: &Value, known: &Value) -> bool {
     match (given, known) {
         (Value::Integer(_), Value::Float(_)) => true,

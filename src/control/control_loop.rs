@@ -1,45 +1,51 @@
-//! The control thread's body: inputs from the channels, one tick, and what it gave to the channels. Called once a millisecond
-//! by the engine's thread, and by a test or a bench as they like; nothing here allocates, locks or waits.
+//! The control loop: inputs from the channels, one tick of the cycle, results to the channels. Nothing here allocates, locks or
+//! waits.
+//!
+//! **Cache warm-up.** The other work of a millisecond evicts the tick's code and data from the processor's caches, and a tick with
+//! cold caches takes longer. Therefore [`ControlLoop::warm_up`], 0.1 ms before each tick of a real robot, runs a tick on a copy of
+//! the cycle with the last state and discards the result; [`Robot::warm_up`] does the same for the system calls of the link. It
+//! changes no result (`tests/control_warm_up.rs`). The longest of a thousand ticks take a third less time with it (loopback:
+//! `quadfrog bench loop --with-link`, compared with `--unrehearsed`).
 
 use super::cycle::{Cycle, Inputs};
-use super::settings::{ControlSettings, PERIOD_S};
+use super::settings::ControlSettings;
 use crate::realtime::channel::{ControlEnd, SHOWN_EVERY};
 use crate::realtime::clock::Clock;
-use crate::realtime::thread::Instant;
-use crate::robot::{JointCommand, LinkStatus, Placement, Robot, RobotError, RobotState};
+use crate::realtime::thread::TickStart;
+use crate::robot::{CONTROL_PERIOD_S, JointCommand, LinkStatus, Placement, Robot, RobotError, RobotState};
 use crate::telemetry::{Command, Counters, Event, Mode, Snapshot, Tick};
 
-/// The session is told the counters, and what speaks against arming, ten times a second and with every event.
+/// Ticks between two updates of counters and readiness for the session; every event causes one too.
 const COUNTERS_EVERY: u64 = 100;
 
-/// A control cycle at its ends of the channels.
+/// A control cycle with its channels.
 pub struct ControlLoop {
     cycle: Cycle,
     end: ControlEnd,
     counters: Counters,
-    beats: Beats,
+    heartbeat: HeartbeatWatch,
     events_lost: bool,
-    /// Time of the clock at which the pace began, ns; known from the first tick on.
+    /// Clock time of the loop's start, ns; known from the first tick on.
     start_ns: Option<u64>,
 }
 
 impl ControlLoop {
-    /// A body that has not ticked yet.
+    /// A loop before its first tick.
     pub fn new(settings: &ControlSettings, end: ControlEnd) -> ControlLoop {
         ControlLoop {
             cycle: Cycle::new(settings),
             end,
             counters: Counters::default(),
-            beats: Beats::default(),
+            heartbeat: HeartbeatWatch::default(),
             events_lost: false,
             start_ns: None,
         }
     }
 
-    /// One tick.
-    pub fn tick<C: Clock, R: Robot + ?Sized>(&mut self, instant: Instant, clock: &C, robot: &mut R) -> &Tick {
+    /// Runs one tick.
+    pub fn tick<C: Clock, R: Robot + ?Sized>(&mut self, start: TickStart, clock: &C, robot: &mut R) -> &Tick {
         let ControlLoop { cycle, end, counters, start_ns, .. } = self;
-        // A session that broke down takes no more events, though there is room for some.
+        // A session that broke down takes no events, even into a ring with space.
         self.events_lost |= end.events.is_abandoned();
         let command = end.commands.pop().ok();
         if let Some(Command::Acknowledge { stops }) = command
@@ -47,30 +53,30 @@ impl ControlLoop {
         {
             end.stop.acknowledge(stops);
         }
-        // The instants count from the pace's start, the clock from its own.
-        let passed_ns = instant.planned_ns + instant.lateness_ns;
-        let time_ns = *start_ns.get_or_insert_with(|| clock.now_ns().saturating_sub(passed_ns)) + instant.planned_ns;
+        // `TickStart` counts from the loop's start, the clock from its own.
+        let passed_ns = start.planned_ns + start.lateness_ns;
+        let time_ns = *start_ns.get_or_insert_with(|| clock.now_ns().saturating_sub(passed_ns)) + start.planned_ns;
         let inputs = Inputs {
             time_ns,
-            lateness_ns: instant.lateness_ns,
+            lateness_ns: start.lateness_ns,
             stop: end.stop.is_set(),
-            operator_silent_ms: self.beats.silent_ms(end.heartbeat.count(), time_ns),
+            operator_silent_ms: self.heartbeat.silent_ms(end.heartbeat.count(), time_ns),
             command,
             events_lost: self.events_lost,
         };
         let tick = *cycle.tick(&inputs, clock, robot);
 
-        counters.late_ticks += u64::from(instant.lateness_ns as f64 > PERIOD_S * 1e9 / 2.0);
-        counters.worst_lateness_ns = counters.worst_lateness_ns.max(instant.lateness_ns);
+        counters.late_ticks += u64::from(start.lateness_ns as f64 > CONTROL_PERIOD_S * 1e9 / 2.0);
+        counters.worst_lateness_ns = counters.worst_lateness_ns.max(start.lateness_ns);
         counters.state_age_ms = cycle.state_age_ms();
         counters.link = robot.link();
         counters.ticks_not_recorded += u64::from(end.ticks.push(tick).is_err());
         if tick.number.is_multiple_of(SHOWN_EVERY) {
             counters.ticks_not_shown += u64::from(end.shown.push(tick).is_err());
         }
-        let told = cycle.events().iter().next().is_some();
-        if told || tick.number.is_multiple_of(COUNTERS_EVERY) {
-            // Before the events: who hears that the robot is disarmed also knows what speaks against arming it.
+        let has_events = cycle.events().iter().next().is_some();
+        if has_events || tick.number.is_multiple_of(COUNTERS_EVERY) {
+            // Before the events, so that a session that receives DISARMED reads current findings.
             end.counters.write(*counters);
             end.readiness.write(cycle.readiness());
         }
@@ -82,8 +88,8 @@ impl ControlLoop {
         cycle.last()
     }
 
-    /// Fetches the memory to which the next tick will be written, while nobody waits for it: the rings are long, so their next
-    /// place was last touched seconds ago. To be called between ticks; one that it is not called for is right all the same.
+    /// Prefetches the memory of the next tick in the rings, whose next slot was last used seconds ago. Optional; to be called
+    /// between ticks.
     pub fn prepare(&mut self) {
         fetch_next(&mut self.end.ticks);
         if (self.cycle.last().number + 1).is_multiple_of(SHOWN_EVERY) {
@@ -91,18 +97,16 @@ impl ControlLoop {
         }
     }
 
-    /// Does the cycle's usual course shortly before the next tick, on a copy and with a robot that is still as it was seen last:
-    /// code and data are then in the processor's caches, from which a millisecond of other work drives them. Nothing comes of
-    /// it. Of a thousand ticks the longest take a third less time with it (on the loopback: `quadfrog bench loop --with-link`,
-    /// and `--unrehearsed`). Should it panic, the tick would have, and is treated so.
-    pub fn rehearse<C: Clock>(&mut self, clock: &C, robot: &mut dyn Robot) {
-        robot.rehearse();
+    /// Warms the caches: runs one tick on a copy of the cycle and discards the result. A panic is treated as one of the
+    /// tick.
+    pub fn warm_up<C: Clock>(&mut self, clock: &C, robot: &mut dyn Robot) {
+        robot.warm_up();
         let last = self.cycle.last();
         let inputs = Inputs { time_ns: last.time_ns, ..Inputs::default() };
         let mut state = last.state;
         state.robot_time_ms = state.robot_time_ms.wrapping_add(1);
-        let mut repeated = Repeated { state, link: robot.link() };
-        // By the same kind of reference as the robot: a generic function for another type would be other code.
+        let mut repeated = LastState { state, link: robot.link() };
+        // `&mut dyn Robot` as in the tick: a generic function for another type would be other code.
         let mut copy = self.cycle;
         std::hint::black_box(copy.tick(&inputs, clock, &mut repeated as &mut dyn Robot));
         self.prepare();
@@ -114,13 +118,13 @@ impl ControlLoop {
     }
 }
 
-/// A robot that is in the state in which it was last seen, whatever it is told.
-struct Repeated {
+/// A robot that repeats one state and ignores commands.
+struct LastState {
     state: RobotState,
     link: Option<LinkStatus>,
 }
 
-impl Robot for Repeated {
+impl Robot for LastState {
     fn read(&mut self) -> Result<RobotState, RobotError> {
         Ok(self.state)
     }
@@ -135,7 +139,7 @@ impl Robot for Repeated {
     }
 }
 
-/// Writes to the next free place of a ring without filling it.
+/// Writes to the next free slot of a ring without publishing it.
 fn fetch_next(ring: &mut rtrb::Producer<Tick>) {
     if let Ok(mut place) = ring.write_chunk_uninit(1)
         && let Some(tick) = place.as_mut_slices().0.first_mut()
@@ -144,22 +148,23 @@ fn fetch_next(ring: &mut rtrb::Producer<Tick>) {
     }
 }
 
-/// How long the screen has been silent. A screen that was never heard has been silent for ever.
+/// Time-out of the operator screen's heartbeat.
 #[derive(Default)]
-struct Beats {
+struct HeartbeatWatch {
     count: u64,
-    heard_ns: u64,
+    changed_ns: u64,
 }
 
-impl Beats {
+impl HeartbeatWatch {
+    /// Returns the time since the last heartbeat, ms; `u32::MAX` before the first.
     fn silent_ms(&mut self, count: u64, now_ns: u64) -> u32 {
         if count != self.count {
             self.count = count;
-            self.heard_ns = now_ns;
+            self.changed_ns = now_ns;
         }
         if count == 0 {
             return u32::MAX;
         }
-        u32::try_from(now_ns.saturating_sub(self.heard_ns) / 1_000_000).unwrap_or(u32::MAX)
+        u32::try_from(now_ns.saturating_sub(self.changed_ns) / 1_000_000).unwrap_or(u32::MAX)
     }
 }

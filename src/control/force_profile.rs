@@ -4,6 +4,9 @@ use std::f64::consts::{PI, TAU};
 
 use nalgebra::Vector3;
 
+use crate::robot::{LEGS, Leg, PerLeg};
+use crate::trial::{JumpParameters, Task};
+
 /// The oscillator as a function of the time since it entered theta = pi, so that no error of integration adds up.
 ///
 /// theta_dot = 2 pi f0 while pi <= theta < 2 pi (impulse), 2 pi f1 while 0 <= theta < pi (off phase).
@@ -37,19 +40,26 @@ impl Oscillator {
         let impulse = self.impulse_s();
         if in_period < impulse { PI + TAU * self.f0_hz * in_period } else { TAU * self.f1_hz * (in_period - impulse) }
     }
-
-    /// How many impulses have begun by `time_s`.
-    pub fn impulses_begun(&self, time_s: f64) -> u32 {
-        if time_s < 0.0 {
-            return 0;
-        }
-        let period = self.period_s();
-        if period.is_finite() { (time_s / period).floor() as u32 + 1 } else { 1 }
-    }
 }
 
-/// The force that the profile asks a foot to exert, leg frame, N:
+/// Force of the profile that a foot exerts, leg frame, N:
 /// F = `[Fx Fy Fz]` sin(theta) if sin(theta) < 0, else 0.
 pub fn force_leg(amplitude_leg: &Vector3<f64>, theta_rad: f64) -> Vector3<f64> {
     amplitude_leg * theta_rad.sin().min(0.0)
+}
+
+/// Returns the amplitude `[Fx Fy Fz]` of each foot with the signs of `task` (`docs/method.md`, "Amplitude signs"): the
+/// force that the foot exerts divided by sin(theta), leg frame, N.
+pub fn amplitudes_leg(jump: &JumpParameters, task: Task) -> PerLeg<Vector3<f64>> {
+    let mut amplitudes = [Vector3::zeros(); LEGS];
+    for (amplitude, leg) in amplitudes.iter_mut().zip(Leg::ALL) {
+        *amplitude = match task {
+            Task::Forward => Vector3::new(jump.fx_n, 0.0, jump.fz_n),
+            Task::LateralLeft => Vector3::new(0.0, jump.fy_n, jump.fz_n),
+            Task::LateralRight => Vector3::new(0.0, -jump.fy_n, jump.fz_n),
+            Task::TwistCcw => Vector3::new(0.0, leg.end() * jump.fy_n, jump.fz_n),
+            Task::TwistCw => Vector3::new(0.0, -leg.end() * jump.fy_n, jump.fz_n),
+        };
+    }
+    amplitudes
 }

@@ -2,14 +2,14 @@
 
 use nalgebra::Vector3;
 
-use crate::robot::kinematics::Foot;
+use crate::robot::kinematics::FootPosition;
 use crate::trial::Gains;
 
 /// The force that the virtual spring and damper at the foot ask for, leg frame, N: Kp (p_d - p) - Kd v.
 pub fn force_leg(
     gains: &Gains,
     desired_leg: &Vector3<f64>,
-    foot: &Foot,
+    foot: &FootPosition,
     joint_velocity: &Vector3<f64>,
 ) -> Vector3<f64> {
     // v = J dq
@@ -18,6 +18,11 @@ pub fn force_leg(
 }
 
 /// Joint torques of one leg, N m: tau = J^T F - Kd,joint dq.
-pub fn torque(gains: &Gains, foot: &Foot, force_leg: &Vector3<f64>, joint_velocity: &Vector3<f64>) -> Vector3<f64> {
+pub fn torque(
+    gains: &Gains,
+    foot: &FootPosition,
+    force_leg: &Vector3<f64>,
+    joint_velocity: &Vector3<f64>,
+) -> Vector3<f64> {
     foot.jacobian_leg.tr_mul(force_leg) - joint_velocity * gains.kd_joint
 }

@@ -1,17 +1,17 @@
-//! One trial: stand still, impulse, flight, landing, settle. ControlSettings are latched when it begins.
+//! One trial: countdown, impulse, flight, landing, settle. Its settings are latched when it begins.
 
 use super::foot_placement::{SHORTEST_FLIGHT_S, SwingLegs};
-use super::force_profile::Oscillator;
+use super::force_profile::{Oscillator, amplitudes_leg};
 use super::leg::LegTarget;
 use super::limits::ticks;
-use super::settings::{ControlSettings, PERIOD_S};
-use crate::robot::{LEGS, PerLeg, RobotState};
+use super::settings::ControlSettings;
+use crate::robot::{CONTROL_PERIOD_S, LEGS, PerLeg, RobotState};
 use crate::telemetry::{Estimate, FallCause, Phase, TrialEnd, TrialSpec};
 use nalgebra::Vector3;
 
-/// How far a trial has come.
+/// TrialProgress of a trial.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Progress {
+pub enum TrialProgress {
     /// Standing still before the impulse.
     Countdown,
     /// Impulse or flight.
@@ -32,7 +32,7 @@ pub struct Jump {
     elapsed: u32,
     countdown: u32,
     swing: SwingLegs,
-    /// Whether it has flown and touched down again since the last impulse.
+    /// Whether the robot has flown and touched down since the last impulse.
     flown: bool,
     /// Ticks since the touchdown after the last impulse.
     landed: u32,
@@ -41,11 +41,11 @@ pub struct Jump {
     fall: FallWatch,
 }
 
-/// After an impulse that does not leave the ground within this time, the jump counts as landed.
+/// An impulse without take-off within this time counts as landed, s.
 const LATEST_TAKEOFF_S: f64 = 0.1;
 
 impl Jump {
-    /// Begins a trial: everything that it runs with is fixed from here on.
+    /// Begins a trial with latched settings.
     pub fn begin(spec: &TrialSpec, settings: &ControlSettings) -> Jump {
         Jump {
             spec: *spec,
@@ -53,7 +53,7 @@ impl Jump {
                 f0_hz: spec.jump.f0_hz,
                 f1_hz: if spec.jumps > 1 { spec.jump.f1_hz } else { 0.0 },
             },
-            amplitudes_leg: spec.jump.amplitudes_leg(spec.task),
+            amplitudes_leg: amplitudes_leg(&spec.jump, spec.task),
             elapsed: 0,
             countdown: ticks(settings.countdown_s),
             swing: SwingLegs::default(),
@@ -65,14 +65,14 @@ impl Jump {
         }
     }
 
-    /// What the trial runs with.
+    /// Settings of the trial.
     pub fn spec(&self) -> &TrialSpec {
         &self.spec
     }
 
     /// Time since the oscillator entered pi, s; negative during the countdown.
     pub fn time_s(&self) -> f64 {
-        (f64::from(self.elapsed) - f64::from(self.countdown)) * PERIOD_S
+        (f64::from(self.elapsed) - f64::from(self.countdown)) * CONTROL_PERIOD_S
     }
 
     /// Time at which the last impulse ends, s.
@@ -82,7 +82,7 @@ impl Jump {
         waited + self.oscillator.impulse_s()
     }
 
-    /// No further impulse after the one under way, or the one that has just been: the robot is to land.
+    /// Drops all impulses that have not begun, so that the robot lands.
     pub fn land(&mut self) {
         let period_s = self.oscillator.period_s();
         let begun =
@@ -90,9 +90,9 @@ impl Jump {
         self.spec.jumps = self.spec.jumps.min(begun as u32);
     }
 
-    /// How long it has been on the ground since the last flight, s; zero before it has landed.
+    /// Time on the ground since the last flight, s; zero before the landing.
     pub fn landed_s(&self) -> f64 {
-        f64::from(self.landed) * PERIOD_S
+        f64::from(self.landed) * CONTROL_PERIOD_S
     }
 
     /// Phase of the oscillator, rad; zero once the last impulse is over.
@@ -101,12 +101,12 @@ impl Jump {
         if time_s < self.impulses_end_s() { self.oscillator.theta_rad(time_s) } else { 0.0 }
     }
 
-    /// Where in the jump the robot is.
+    /// Phase of the jump.
     pub fn phase(&self) -> Phase {
         self.phase
     }
 
-    /// What the legs are to do now.
+    /// Target of the legs in this tick.
     pub fn target(&self, estimate: &Estimate) -> LegTarget {
         let theta_rad = self.theta_rad();
         LegTarget {
@@ -123,14 +123,14 @@ impl Jump {
         }
     }
 
-    /// Takes note of the newest state and says how far the trial has come. Called once per tick, before `target`.
-    pub fn observe(&mut self, state: &RobotState, estimate: &Estimate, settings: &ControlSettings) -> Progress {
+    /// Advances phase and progress with the newest state. To be called once per tick, before `target`.
+    pub fn observe(&mut self, state: &RobotState, estimate: &Estimate, settings: &ControlSettings) -> TrialProgress {
         if let Some(cause) = self.fall.observe(state, estimate, settings) {
-            return Progress::Over(TrialEnd::Fell(cause));
+            return TrialProgress::Over(TrialEnd::Fell(cause));
         }
         let time_s = self.time_s();
         if time_s < 0.0 {
-            return Progress::Countdown;
+            return TrialProgress::Countdown;
         }
         let feet_down = estimate.contact.iter().filter(|&&down| down).count();
         self.flown |= feet_down > 0 && self.swing.airborne_ticks() >= ticks(SHORTEST_FLIGHT_S);
@@ -147,11 +147,11 @@ impl Jump {
         };
         let since_impulse_s = time_s - self.impulses_end_s();
         if since_impulse_s < 0.0 {
-            return Progress::Jump;
+            return TrialProgress::Jump;
         }
         let stayed = self.swing.airborne_ticks() == 0 && since_impulse_s > LATEST_TAKEOFF_S;
         if !self.flown && !stayed && since_impulse_s < settings.settle.cap_s {
-            return Progress::Jump;
+            return TrialProgress::Jump;
         }
         self.landed += 1;
         let quiet = feet_down == LEGS
@@ -159,50 +159,49 @@ impl Jump {
             && estimate.angular_velocity_body.norm() < settings.settle.rate_rad_s;
         self.quiet = if quiet { self.quiet + 1 } else { 0 };
         if self.quiet >= ticks(settings.settle.quiet_s) {
-            Progress::Over(TrialEnd::Settled)
+            TrialProgress::Over(TrialEnd::Settled)
         } else if since_impulse_s >= settings.settle.cap_s {
-            Progress::Over(TrialEnd::NotQuiet)
+            TrialProgress::Over(TrialEnd::NotQuiet)
         } else {
-            Progress::Settle
+            TrialProgress::Settle
         }
     }
 
-    /// One tick has passed.
+    /// Counts one tick.
     pub fn advance(&mut self) {
         self.elapsed += 1;
     }
 }
 
-/// Watches for a fall (`specs/method.md`, "fall").
+/// Fall detection (`docs/method.md`, "Fall").
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct FallWatch {
-    /// Ticks for which a part other than the feet has been on the ground.
+    /// Ticks in a row in which a part other than the feet touches the ground.
     touching: u32,
 }
 
 impl FallWatch {
-    /// Whether the robot has fallen by now, and by which sign. Called once per tick.
+    /// Returns the cause of a fall. To be called once per tick.
     pub fn observe(
         &mut self,
         state: &RobotState,
         estimate: &Estimate,
         settings: &ControlSettings,
     ) -> Option<FallCause> {
-        self.look(state, estimate, settings, f64::INFINITY)
+        self.detect(state, estimate, settings, f64::INFINITY)
     }
 
-    /// The same of a robot that has landed and only stands: tilted beyond what a standing robot may be, it is falling. Called
-    /// once per tick.
+    /// As `observe`, for a robot that stands after the landing: its tilt limit is that of standing.
     pub fn observe_standing(
         &mut self,
         state: &RobotState,
         estimate: &Estimate,
         settings: &ControlSettings,
     ) -> Option<FallCause> {
-        self.look(state, estimate, settings, settings.watchdog.stance_tilt_rad)
+        self.detect(state, estimate, settings, settings.watchdog.stance_tilt_rad)
     }
 
-    fn look(
+    fn detect(
         &mut self,
         state: &RobotState,
         estimate: &Estimate,
@@ -212,7 +211,7 @@ impl FallWatch {
         let touches = state.truth.is_some_and(|truth| truth.body_contact);
         self.touching = if touches { self.touching + 1 } else { 0 };
         let [roll, pitch, _] = estimate.roll_pitch_yaw.into();
-        // In the air nothing can be put right any more: what is tilted there lands on its side.
+        // Tilt in the air cannot be corrected before the landing.
         let airborne = estimate.contact.iter().all(|&down| !down);
         let in_flight_rad = if airborne { settings.flight_tilt_rad } else { f64::INFINITY };
         let allowed = |limit: f64| limit.min(in_flight_rad).min(most_rad);

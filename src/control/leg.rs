@@ -1,16 +1,15 @@
-//! The full leg controller: force profile, impedance and Virtual Model Control added up (paper, last equation of
-//! section II-C). Pure: numbers in, torques out.
+//! The leg controller: sum of force profile, impedance and Virtual Model Control (paper, last equation of section II-C).
 
 use nalgebra::Vector3;
 
 use super::vmc::VmcGains;
 use super::{force_profile, impedance, vmc};
-use crate::robot::kinematics::{Foot, LegGeometry};
+use crate::robot::kinematics::{FootPosition, LegGeometry};
 use crate::robot::{Joints, Leg, PerLeg, leg_of};
 use crate::telemetry::Estimate;
 use crate::trial::Gains;
 
-/// What the legs are to do in this tick.
+/// Target of the legs in one tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LegTarget {
     /// Gains.
@@ -29,18 +28,23 @@ pub struct LegTarget {
     pub theta_rad: f64,
 }
 
-/// The nominal foot position of `leg`: that of a left leg with y mirrored on the right, leg frame, m.
+/// Nominal foot position of `leg`, leg frame, m: y mirrored for a right leg.
 pub fn stance_of(stance_leg: &Vector3<f64>, leg: Leg) -> Vector3<f64> {
     Vector3::new(stance_leg.x, leg.side() * stance_leg.y, stance_leg.z)
 }
 
-/// Foot positions and Jacobians of all legs at the joint angles `q`, rad.
-pub fn feet(geometry: &LegGeometry, joint_position: &Joints) -> PerLeg<Foot> {
+/// Foot positions and Jacobians of all legs at the joint angles, rad.
+pub fn feet(geometry: &LegGeometry, joint_position: &Joints) -> PerLeg<FootPosition> {
     Leg::ALL.map(|leg| geometry.foot(&leg_of(joint_position, leg as usize), leg.side()))
 }
 
 /// Joint torques before the actuators' limits, N m: tau_i = tau_f,i + tau_imp,i + tau_VMC,i.
-pub fn torques(target: &LegTarget, feet: &PerLeg<Foot>, joint_velocity: &Joints, estimate: &Estimate) -> Joints {
+pub fn torques(
+    target: &LegTarget,
+    feet: &PerLeg<FootPosition>,
+    joint_velocity: &Joints,
+    estimate: &Estimate,
+) -> Joints {
     let vmc_gains = if target.vmc {
         VmcGains { attitude: target.gains.k_att, attitude_rate: target.attitude_rate_gain }
     } else {

@@ -1,47 +1,48 @@
-//! The last gate: finite, clamp, rate. One function, after every controller, always.
+//! The last gate before the motors, after every controller: finite, clamp, rate.
 
-use super::settings::{ControlSettings, PERIOD_S};
-use crate::robot::{JOINTS, JointCommand, Joints, MotorCommand, RobotState};
+use super::settings::ControlSettings;
+use crate::robot::{CONTROL_PERIOD_S, JOINTS, JointCommand, Joints, MotorCommand, RobotState};
 use crate::telemetry::Fault;
 
-/// What left the gate.
+/// Result of the gate.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Passed {
-    /// The command that may be sent.
+pub struct GateOutput {
+    /// Command to send.
     pub command: JointCommand,
     /// Bit `i` set: the command of joint `i` was changed.
     pub limited: u16,
-    /// Something was not a finite number: `command` is damping.
+    /// A number was not finite; `command` is damping.
     pub fault: Option<Fault>,
 }
 
-/// The gate; remembers the last torques for the rate limit.
+/// The gate, with the last torques for the rate limit.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct CommandGate {
     last_torque: Option<Joints>,
 }
 
 impl CommandGate {
-    /// The next command is not compared with the last one: the robot was put somewhere else or was damped.
+    /// Clears the last torques: the rate limit does not apply to the next command, after a placement or damping.
     pub fn reset(&mut self) {
         self.last_torque = None;
     }
 
-    /// Lets `wanted` through as far as the limits allow.
+    /// Limits `wanted`.
     ///
-    /// The torque that counts is the one that the motor's own law will produce at the measured angle and velocity; the
-    /// feed-forward part is changed so that this stays inside the joint's limit and its rate. Where that would take a
-    /// feed-forward torque beyond the joint's limit itself, against a law that asks for more than twice of it (an encoder that
-    /// jumps), the law is left out: the torque alone is sent, which is the same if the measured numbers are right and harmless
-    /// if they are not.
-    pub fn pass(&mut self, wanted: &JointCommand, state: &RobotState, settings: &ControlSettings) -> Passed {
+    /// 1. Damping passes unchanged: it needs no measured number.
+    /// 2. A number that is not finite gives damping and a fault.
+    /// 3. Position and gains are clamped.
+    /// 4. The torque of the motor's own law at the measured angle and velocity is clamped to the joint's limit and rate, by a change
+    ///    of the feed-forward torque.
+    /// 5. If that feed-forward torque exceeds the joint's limit (an encoder that jumps), the limited torque is sent alone, without
+    ///    the law: equal if the measured numbers are right, harmless if they are not.
+    pub fn pass(&mut self, wanted: &JointCommand, state: &RobotState, settings: &ControlSettings) -> GateOutput {
         let damping = JointCommand::damping(settings.gate.damping_kd);
         if *wanted == damping {
-            // The safe command needs no measured number, and passes even when there is none.
             self.reset();
-            return Passed { command: damping, limited: 0, fault: None };
+            return GateOutput { command: damping, limited: 0, fault: None };
         }
-        let mut passed = Passed { command: *wanted, limited: 0, fault: None };
+        let mut passed = GateOutput { command: *wanted, limited: 0, fault: None };
         let mut torques = Joints::default();
         for joint in 0..JOINTS {
             let motor = &mut passed.command.motor[joint];
@@ -49,7 +50,7 @@ impl CommandGate {
             if !finite.iter().all(|value| value.is_finite()) {
                 self.reset();
                 let fault = Some(Fault::NotFinite { what: "a motor command" });
-                return Passed { command: damping, limited: u16::MAX >> (16 - JOINTS), fault };
+                return GateOutput { command: damping, limited: u16::MAX >> (16 - JOINTS), fault };
             }
             let before = *motor;
             motor.position = motor.position.clamp(settings.min_position[joint], settings.max_position[joint]);
@@ -60,7 +61,7 @@ impl CommandGate {
             if !feedback.is_finite() {
                 self.reset();
                 let fault = Some(Fault::NotFinite { what: "a joint's angle or velocity" });
-                return Passed { command: damping, limited: u16::MAX >> (16 - JOINTS), fault };
+                return GateOutput { command: damping, limited: u16::MAX >> (16 - JOINTS), fault };
             }
             let mut torque = (motor.torque + feedback).clamp(-settings.max_torque[joint], settings.max_torque[joint]);
             if let Some(last) = self.last_torque {
@@ -72,7 +73,7 @@ impl CommandGate {
                 *motor = MotorCommand { torque, ..MotorCommand::default() };
             }
             torques[joint] = torque;
-            // Rounding of the subtraction is not a limit.
+            // Rounding of the subtraction does not count as limited.
             let moved = (motor.torque - before.torque).abs() > 1e-9;
             if moved
                 || motor.kp != before.kp
@@ -89,7 +90,10 @@ impl CommandGate {
     }
 }
 
-/// Whether every measured number is finite.
+/// Checks that every measured number is finite.
+///
+/// # Errors
+/// The first quantity that is not.
 pub fn finite(state: &RobotState) -> Result<(), Fault> {
     let all = |values: &[f64], what| {
         if values.iter().all(|value| value.is_finite()) { Ok(()) } else { Err(Fault::NotFinite { what }) }
@@ -104,5 +108,5 @@ pub fn finite(state: &RobotState) -> Result<(), Fault> {
 
 /// Number of ticks in `seconds`.
 pub fn ticks(seconds: f64) -> u32 {
-    (seconds / PERIOD_S).round() as u32
+    (seconds / CONTROL_PERIOD_S).round() as u32
 }

@@ -1,5 +1,4 @@
-//! The 1 kHz cycle: read, estimate, watch, decide, limit, write, publish. Pure functions and one `tick()`; no thread,
-//! no file, no lock, no allocation.
+//! The 1 kHz control cycle: pure functions and one `tick()`, without thread, file, lock or allocation.
 
 pub mod arming;
 pub mod control_loop;

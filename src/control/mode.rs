@@ -1,21 +1,21 @@
-//! The legal changes of mode: one function, tested as a table. Table and reasons: `research/operators.md` D.3.
+//! The legal changes of mode: one function, tested as a table. Table and reasons: `docs/safety.md`.
 
 use crate::telemetry::Mode;
 
-/// What may change the mode.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// Cause that may change the mode.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, strum::VariantArray)]
 pub enum Trigger {
-    /// The robot answers.
-    Heard,
+    /// The first state arrived.
+    Connected,
     /// The operator takes control.
     TakeControl,
-    /// The robot is let go of: it is only observed.
+    /// The operator releases the robot: it is only observed.
     Release,
-    /// The operator energises.
+    /// The operator arms the robot.
     Arm,
     /// A ramp has reached its pose.
     PoseReached,
-    /// The operator (or a watchdog that lands the robot) asks to sit down.
+    /// The operator, or a failsafe that lands the robot, sits it down.
     SitDown,
     /// An approved trial is to run.
     Approve,
@@ -33,50 +33,28 @@ pub enum Trigger {
     Fell,
     /// The operator's STOP.
     Stop,
-    /// A limit or a watchdog tripped.
+    /// A failsafe or the last gate tripped.
     Fault,
-    /// The operator has looked at the stopped robot.
+    /// The operator acknowledged DAMPED or FAULT.
     Acknowledge,
 }
 
-impl Trigger {
-    /// All requests.
-    pub const ALL: [Trigger; 16] = [
-        Trigger::Heard,
-        Trigger::TakeControl,
-        Trigger::Release,
-        Trigger::Arm,
-        Trigger::PoseReached,
-        Trigger::SitDown,
-        Trigger::Approve,
-        Trigger::Cancel,
-        Trigger::CountdownOver,
-        Trigger::Landed,
-        Trigger::Settled,
-        Trigger::EndReview,
-        Trigger::Fell,
-        Trigger::Stop,
-        Trigger::Fault,
-        Trigger::Acknowledge,
-    ];
-}
-
-/// The mode after `request` in `mode`; none if that is not legal.
+/// Returns the mode after `trigger` in `mode`; none if the change is not legal.
 ///
-/// 1. STOP leads to damping from everywhere; only a fault, which damps already, keeps its own name.
-/// 2. A fault latches from every mode in which something is sent.
+/// 1. STOP leads to DAMPED from every mode but FAULT, which damps already.
+/// 2. A fault latches from every mode in which commands are sent.
 /// 3. A robot that fell while energised is damped.
-/// 4. Damped and faulted modes are left by acknowledgement alone, and to Disarmed alone.
-/// 5. The only ways to more energy are Arm and Approve, and both begin with a key press.
-pub fn next(mode: Mode, request: Trigger) -> Option<Mode> {
+/// 4. DAMPED and FAULT are left by an acknowledgement only, to DISARMED only.
+/// 5. Only `Arm` and `Approve` lead to more energy; both begin with a key press.
+pub fn next(mode: Mode, trigger: Trigger) -> Option<Mode> {
     use Mode::*;
-    match (mode, request) {
+    match (mode, trigger) {
         (Fault, Trigger::Stop) => Some(Fault),
         (_, Trigger::Stop) => Some(Damped),
         (Offline | Observe, Trigger::Fault) => None,
         (_, Trigger::Fault) => Some(Fault),
         (mode, Trigger::Fell) if mode.energised() => Some(Damped),
-        (Offline, Trigger::Heard) => Some(Observe),
+        (Offline, Trigger::Connected) => Some(Observe),
         (Observe, Trigger::TakeControl) => Some(Disarmed),
         (Disarmed, Trigger::Release) => Some(Observe),
         (Disarmed, Trigger::Arm) => Some(StandUp),
@@ -97,14 +75,15 @@ pub fn next(mode: Mode, request: Trigger) -> Option<Mode> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use strum::VariantArray;
 
-    /// The whole machine as a table: each row a mode, each legal request with where it leads.
+    /// Each row: a mode, its legal triggers and their targets.
     #[test]
-    fn every_pair_of_mode_and_request_is_in_the_table() {
+    fn every_pair_of_mode_and_trigger_is_in_the_table() {
         use Mode::*;
         use Trigger as R;
         let table: [(Mode, &[(Trigger, Mode)]); 12] = [
-            (Offline, &[(R::Heard, Observe), (R::Stop, Damped)]),
+            (Offline, &[(R::Connected, Observe), (R::Stop, Damped)]),
             (Observe, &[(R::TakeControl, Disarmed), (R::Stop, Damped)]),
             (Disarmed, &[(R::Release, Observe), (R::Arm, StandUp), (R::Stop, Damped), (R::Fault, Fault)]),
             (
@@ -155,9 +134,9 @@ mod tests {
             (Fault, &[(R::Acknowledge, Disarmed), (R::Stop, Fault), (R::Fault, Fault)]),
         ];
         for (mode, legal) in table {
-            for request in Trigger::ALL {
-                let expected = legal.iter().find(|(r, _)| *r == request).map(|(_, to)| *to);
-                assert_eq!(next(mode, request), expected, "{mode:?} {request:?}");
+            for &trigger in Trigger::VARIANTS {
+                let expected = legal.iter().find(|(r, _)| *r == trigger).map(|(_, to)| *to);
+                assert_eq!(next(mode, trigger), expected, "{mode:?} {trigger:?}");
             }
         }
     }

@@ -1,17 +1,17 @@
-//! Standing up and sitting down: joint targets that move smoothly from the measured pose to another.
+//! Standing up and sitting down: a smooth ramp of joint targets from the measured pose.
 
 use super::limits::ticks;
 use super::settings::RampSettings;
 use crate::robot::{JOINTS, JointCommand, Joints, MotorCommand, RobotState};
 
-/// How far a ramp has come.
+/// Progress of a ramp.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum RampProgress {
     /// Under way.
     Moving,
-    /// The joints are where they should be.
+    /// The joints are within the tolerance.
     Reached,
-    /// The time is up and they are not.
+    /// The joints are not within the tolerance after the time-out.
     Late {
         /// Largest joint error, rad.
         error_rad: f64,
@@ -28,12 +28,12 @@ pub struct PoseRamp {
 }
 
 impl PoseRamp {
-    /// Starts at the measured angles, never at where the robot was thought to be.
+    /// Starts at the measured angles.
     pub fn begin(state: &RobotState, to: &Joints, settings: &RampSettings) -> PoseRamp {
         PoseRamp { from: state.joint_position, to: *to, settings: *settings, elapsed: 0 }
     }
 
-    /// Whether the pose is reached at the measured angles.
+    /// Compares the measured angles with the pose.
     pub fn progress(&self, joint_position: &Joints) -> RampProgress {
         if self.elapsed < ticks(self.settings.duration_s) {
             return RampProgress::Moving;
@@ -48,7 +48,7 @@ impl PoseRamp {
         }
     }
 
-    /// The targets of this tick; the ramp moves on by one.
+    /// Returns the targets of this tick and advances the ramp.
     pub fn command(&mut self) -> JointCommand {
         let duration = f64::from(ticks(self.settings.duration_s).max(1));
         let part = (f64::from(self.elapsed) / duration).min(1.0);

@@ -1,5 +1,5 @@
-//! What is chosen about the control cycle: the sections of `config/control.toml` and `config/safety.toml`, and what the
-//! cycle needs of the machine's description. Every key is explained in those files.
+//! Settings of the control cycle: sections of `config/control.toml` and `config/safety.toml`, which explain every key, and
+//! properties of the machine.
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -9,10 +9,7 @@ use crate::robot::{Joints, PerLeg};
 use crate::telemetry::TrialSpec;
 use crate::trial::{Gains, JumpParameters, Task};
 
-/// Control period, s: the paper's 1 kHz.
-pub const PERIOD_S: f64 = 0.001;
-
-/// How the robot stands while nothing else is asked: gains, nominal feet, Virtual Model Control.
+/// Stance between trials.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StandSettings {
     /// Gains of the leg controller.
@@ -37,15 +34,15 @@ pub struct RampSettings {
     pub kd: f64,
     /// Largest joint error at which the pose counts as reached, rad.
     pub tolerance_rad: f64,
-    /// How long after the ramp the pose may take to be reached, s.
+    /// Time-out after the end of the ramp, s.
     pub timeout_s: f64,
 }
 
-/// When a trial is over.
+/// End of a trial.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SettleSettings {
-    /// How long all feet must be down and the body quiet, s.
+    /// Time for which all feet must be down and the body quiet, s.
     pub quiet_s: f64,
     /// Longest wait after the impulse, s.
     pub cap_s: f64,
@@ -55,7 +52,7 @@ pub struct SettleSettings {
     pub rate_rad_s: f64,
 }
 
-/// When the robot counts as fallen.
+/// Limits of a fall.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FallLimits {
@@ -63,7 +60,7 @@ pub struct FallLimits {
     pub roll_rad: f64,
     /// Largest absolute pitch, rad.
     pub pitch_rad: f64,
-    /// For how long a part other than the feet must be on the ground, s (known in simulation only).
+    /// Time for which a part other than the feet touches the ground, s (known in simulation only).
     pub body_contact_s: f64,
     /// Largest absolute roll or pitch in flight on the simulator, rad.
     pub simulator_flight_rad: f64,
@@ -85,7 +82,7 @@ pub struct GateLimits {
     pub damping_kd: f64,
 }
 
-/// What must hold before the robot is energised.
+/// Limits of the arming checks: section `[pre_arm]` of `config/safety.toml`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ArmingLimits {
@@ -97,7 +94,7 @@ pub struct ArmingLimits {
     pub corrupt: u32,
     /// Largest roll or pitch, rad.
     pub tilt_rad: f64,
-    /// How far a joint may lie beyond its limit, rad.
+    /// Largest distance of a joint beyond its limit, rad.
     pub joint_margin_rad: f64,
     /// Largest distance of a joint from the lying pose, rad.
     pub lying_tolerance_rad: f64,
@@ -105,30 +102,30 @@ pub struct ArmingLimits {
     pub battery_percent: f64,
     /// Hottest motor, degrees Celsius.
     pub motor_c: f64,
-    /// Largest angular velocity, rad/s ...
+    /// Largest angular velocity of a still robot, rad/s.
     pub gyro_rad_s: f64,
-    /// ... for this long, s.
+    /// Time for which the robot must be still, s.
     pub still_s: f64,
     /// Ticks that begin later than this are late, ms.
     pub late_ms: f64,
     /// Largest share of late ticks in the last 5 s.
     pub late_share: f64,
-    /// How long the operator's word that the area is clear holds before the robot is armed, s.
+    /// Time after which the operator's confirmation of a clear area expires, s.
     pub area_clear_s: f64,
     /// Least free space where the recording goes, MB.
     pub disk_free_mb: u32,
 }
 
-/// How long an approval holds.
+/// Expiry of an approval.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ApprovalLimits {
-    /// From the key press to the countdown at most, s.
+    /// Longest time from the key press to the countdown, s.
     pub expires_s: f64,
 }
 
-/// What trips the watchdog: the section `[watchdog]` of `config/safety.toml`. CUT damps in the same tick, LAND finishes the
-/// landing and sits down, HOLD finishes the trial and refuses approvals.
+/// Limits of the failsafes: section `[watchdog]` of `config/safety.toml`. CUT damps in the same tick, LAND finishes the landing and
+/// sits down, HOLD finishes the trial and refuses approvals.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FailsafeLimits {
@@ -136,13 +133,13 @@ pub struct FailsafeLimits {
     pub stance_tilt_rad: f64,
     /// Largest tilt while sitting down, rad: CUT; and what the flight limits of `[fall]` may not exceed.
     pub tilt_rad: f64,
-    /// Age of the robot's state that is worth a word, ms.
+    /// Age of the robot's state that gives a warning, ms.
     pub state_age_warn_ms: u32,
-    /// Oldest state of the robot that may be acted on, ms: CUT.
+    /// Oldest state of the robot, ms: CUT.
     pub state_age_ms: u32,
     /// Age of the state from which the link counts as lost, ms.
     pub link_lost_ms: u32,
-    /// How far a joint may go beyond its limit, rad: CUT.
+    /// Largest distance of a joint beyond its limit, rad: CUT.
     pub joint_margin_rad: f64,
     /// Largest joint velocity, times the motor's no-load speed: CUT.
     pub velocity_factor: f64,
@@ -156,15 +153,15 @@ pub struct FailsafeLimits {
     pub battery_percent: f64,
     /// Most corrupt datagrams in the last 5 s: CUT.
     pub corrupt: u32,
-    /// Longest time between two ticks, periods ...
+    /// Longest time between two ticks, periods.
     pub period_factor: f64,
-    /// ... for this many ticks in a row: CUT, where late ticks trip at all.
+    /// Ticks in a row with a longer period: CUT, unless late ticks are only counted.
     pub period_ticks: u32,
-    /// Silence of the operator's screen that is worth a word, ms.
+    /// Time without a heartbeat of the operator's screen that gives a warning, ms.
     pub operator_warn_ms: u32,
-    /// Longest silence of the operator's screen, ms: LAND.
+    /// Longest time without a heartbeat of the operator's screen, ms: LAND.
     pub operator_silent_ms: u32,
-    /// From touchdown until a robot that is to land sits down, s.
+    /// LAND: longest time from touchdown to sitting down, s.
     pub land_s: f64,
     /// Least free space where the recording goes, MB: HOLD.
     pub disk_free_mb: u32,
@@ -172,23 +169,23 @@ pub struct FailsafeLimits {
     pub simulator_late_ms: f64,
     /// Latest start of a tick on hardware, ms: CUT; zero only counts late ticks.
     pub hardware_late_ms: f64,
-    /// Longest wait in READY or REVIEW on the simulator, s; zero waits for ever.
+    /// Longest wait in READY or REVIEW on the simulator, s; zero disables the limit.
     pub simulator_idle_s: f64,
-    /// Longest wait in READY or REVIEW on hardware, s: sit down; zero waits for ever.
+    /// Longest wait in READY or REVIEW on hardware, s: sit down; zero disables the limit.
     pub hardware_idle_s: f64,
 }
 
-/// Where the base's position, velocity and orientation come from, and with them the objective.
+/// Source of the base's position, velocity and orientation, and of the objective.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ObjectiveSource {
-    /// The simulator's own knowledge.
+    /// The simulator's true state.
     Truth,
     /// The sensors, as on hardware.
     Estimate,
 }
 
 impl ObjectiveSource {
-    /// The word that `config/optimize.toml` has for it.
+    /// Name in `config/optimize.toml`.
     pub const fn name(self) -> &'static str {
         match self {
             ObjectiveSource::Truth => "truth",
@@ -202,7 +199,7 @@ impl ObjectiveSource {
     }
 }
 
-/// How the sensors are weighed against each other: section `[estimator]` of `config/control.toml`.
+/// Weights of the sensors: section `[estimator]` of `config/control.toml`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct EstimatorSettings {
@@ -210,33 +207,33 @@ pub struct EstimatorSettings {
     pub contact_on_n: f64,
     /// Force below which a foot on the ground is in the air, N.
     pub contact_off_n: f64,
-    /// How long the sensor must have said so, s.
+    /// Time for which the sensor must report the change, s.
     pub contact_time_s: f64,
     /// Standard deviation of an accelerometer sample at 1 kHz, m/s^2.
     pub accel_noise_m_s2: f64,
     /// Its error in proportion to the acceleration.
     pub accel_error_share: f64,
-    /// Standard deviation of the accelerometer's bias before anything is known of it, m/s^2.
+    /// Initial standard deviation of the accelerometer's bias, m/s^2.
     pub accel_bias_m_s2: f64,
-    /// How fast the bias wanders, m/s^2 per square root of a second.
+    /// Random walk of the bias, m/s^2 per square root of a second.
     pub accel_bias_walk: f64,
-    /// Standard deviation of the mean acceleration of a gap in the states, beside what its two ends tell, m/s^2.
+    /// Standard deviation of the mean acceleration in a gap of the states, in addition to the interpolation, m/s^2.
     pub unseen_accel_m_s2: f64,
-    /// Standard deviation of a foot's place by encoders and orientation, m.
+    /// Standard deviation of a foot's position from encoders and orientation, m.
     pub foot_position_m: f64,
-    /// Standard deviation of a foot's velocity by encoders and gyro, m/s.
+    /// Standard deviation of a foot's velocity from encoders and gyroscope, m/s.
     pub foot_velocity_m_s: f64,
     /// Its error in proportion to the velocity.
     pub foot_velocity_share: f64,
-    /// How fast a standing foot creeps, m per square root of a second.
+    /// Random walk of a standing foot, m per square root of a second.
     pub foot_creep: f64,
-    /// A foot that disagrees by more standard deviations than this slips.
+    /// Largest residual of a standing foot, standard deviations; beyond it the foot slips.
     pub gate_sigma: f64,
-    /// Standard deviation of the velocity where nothing is known of it, m/s.
+    /// Standard deviation of an unknown velocity, m/s.
     pub start_velocity_m_s: f64,
-    /// All feet down may slip for this long; then the velocity is doubted, s.
+    /// Longest slip of all feet that are down, s; after it the velocity's variance is raised.
     pub longest_slip_s: f64,
-    /// No foot down for longer than this is no flight: the robot hangs, s.
+    /// Longest flight, s; after it the robot counts as hanging.
     pub longest_flight_s: f64,
 }
 
@@ -264,7 +261,7 @@ impl EstimatorSettings {
     }
 }
 
-/// What the trials of one task run with: a section `[tasks.<task>]` of `config/control.toml`.
+/// Trial settings of one task: section `[tasks.<task>]` of `config/control.toml`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TaskControl {
@@ -318,20 +315,20 @@ impl TaskControl {
     }
 }
 
-/// Everything that the control cycle is made with.
+/// Settings of the control cycle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ControlSettings {
     /// Leg lengths.
     pub geometry: LegGeometry,
     /// Hip joints in the body frame, m.
     pub hip_origin_body: PerLeg<Vector3<f64>>,
-    /// Where the inertial unit sits, body frame, m.
+    /// Position of the inertial unit, body frame, m.
     pub imu_origin_body: Vector3<f64>,
     /// Radius of a foot, m.
     pub foot_radius: f64,
-    /// Lowest joint angles, rad: the higher of the URDF's and the maker's own.
+    /// Lowest joint angles, rad: the higher of the URDF's and the manufacturer's.
     pub min_position: Joints,
-    /// Highest joint angles, rad: the lower of the URDF's and the maker's own.
+    /// Highest joint angles, rad: the lower of the URDF's and the manufacturer's.
     pub max_position: Joints,
     /// Largest joint torques, N m.
     pub max_torque: Joints,
@@ -341,7 +338,7 @@ pub struct ControlSettings {
     pub lying_position: Joints,
     /// Weight, N.
     pub weight_n: f64,
-    /// How it stands between trials.
+    /// Stance between trials.
     pub stand: StandSettings,
     /// Standing up.
     pub stand_up: RampSettings,
@@ -349,30 +346,30 @@ pub struct ControlSettings {
     pub sit_down: RampSettings,
     /// From approval to the impulse, standing still, s.
     pub countdown_s: f64,
-    /// When a trial is over.
+    /// End of a trial.
     pub settle: SettleSettings,
-    /// When the robot counts as fallen.
+    /// Limits of a fall.
     pub fall: FallLimits,
     /// Largest absolute roll or pitch with no foot down, rad.
     pub flight_tilt_rad: f64,
-    /// Least force on a foot that counts as contact where the truth is known, N.
+    /// Least force of a contact when the simulator's true state is used, N.
     pub contact_force_n: f64,
-    /// Where the base's state comes from.
+    /// Source of the base's state.
     pub objective: ObjectiveSource,
-    /// How it is estimated from the sensors.
+    /// Weights of the sensors.
     pub estimator: EstimatorSettings,
     /// The last gate.
     pub gate: GateLimits,
-    /// A machine that can hurt somebody: the whole pre-arm list holds.
+    /// Real hardware: all arming checks apply.
     pub hardware: bool,
-    /// Before the robot is energised.
+    /// Limits of the arming checks.
     pub pre_arm: ArmingLimits,
-    /// How long an approval holds.
+    /// Expiry of an approval.
     pub approval: ApprovalLimits,
-    /// The watchdog.
+    /// Limits of the failsafes.
     pub watchdog: FailsafeLimits,
     /// Latest start of a tick, ms; zero only counts late ticks.
     pub late_ms: f64,
-    /// Longest wait in READY or REVIEW, s; zero waits for ever.
+    /// Longest wait in READY or REVIEW, s; zero disables the limit.
     pub idle_s: f64,
 }

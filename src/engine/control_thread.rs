@@ -1,5 +1,5 @@
-//! The control thread: the system's favours, then one body a millisecond until it is told to end, and damping as its last
-//! word, however it ends.
+//! The control thread: applies the real-time settings, then runs the control loop at 1 kHz. On exit, also after a panic, it
+//! keeps sending damping commands.
 
 use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
@@ -9,33 +9,33 @@ use std::time::Duration;
 
 use super::guard::Lifeline;
 use crate::control::control_loop::ControlLoop;
-use crate::control::settings::{ControlSettings, PERIOD_S};
+use crate::control::settings::ControlSettings;
 use crate::realtime::channel::ControlEnd;
 use crate::realtime::clock::Clock;
 use crate::realtime::scheduling::{DeniedSetting, RealtimeSetting, Scheduling};
-use crate::realtime::thread::{CONTROL_PHASE, Instant, Paced, REHEARSAL_LEAD, pace_rehearsed};
-use crate::robot::{JointCommand, Robot};
+use crate::realtime::thread::{CONTROL_PHASE, PeriodicTask, TickStart, WARM_UP_LEAD, pace_with_warm_up};
+use crate::robot::{CONTROL_PERIOD_S, JointCommand, Robot};
 
-/// What the thread is started with.
+/// Parts of the control thread.
 pub struct Start<'a, C> {
-    /// What the cycle is made with.
+    /// Settings of the control cycle.
     pub settings: &'a ControlSettings,
-    /// What is asked of the system.
+    /// Real-time settings that are requested of the system.
     pub scheduling: Scheduling,
-    /// Told once what the system granted, before the first tick.
-    pub told: Sender<(Vec<RealtimeSetting>, Vec<DeniedSetting>)>,
+    /// Receives the granted and denied real-time settings once, before the first tick.
+    pub report: Sender<(Vec<RealtimeSetting>, Vec<DeniedSetting>)>,
     /// The clock of the engine.
     pub clock: &'a C,
     /// Set when the thread is to end.
     pub closing: &'a AtomicBool,
-    /// Whether the machine lives in its own time, over a link. It keeps the last command when nothing more is sent, where a
-    /// simulated one stands still; and its ticks are rehearsed.
+    /// Whether the robot is real. A real robot keeps the last command when nothing more is sent, a simulated one stands still;
+    /// and the caches are warmed before each tick of a real one.
     pub real: bool,
-    /// The guard's sign of life; none where nobody stands guard.
+    /// Heartbeat to the guard; none without a guard.
     pub lifeline: Option<Lifeline>,
 }
 
-/// How often damping is sent, at least, after the last tick: for half a second, in which the robot sinks softly.
+/// Least number of damping commands after the last tick: half a second, in which the robot sinks softly.
 const LAST_DAMPINGS: u32 = 500;
 
 /// Runs until `closing` is set.
@@ -44,22 +44,22 @@ const LAST_DAMPINGS: u32 = 500;
 /// When a tick does, or the clock cannot be read: once the robot has been damped, and `closing` is set.
 pub fn run<C: Clock>(mut start: Start<C>, end: ControlEnd, robot: &mut dyn Robot) {
     let granted = start.scheduling.apply();
-    let _ = start.told.send((granted.favours.clone(), granted.shortfalls.clone()));
-    let period = Duration::from_secs_f64(PERIOD_S);
+    let _ = start.report.send((granted.granted.clone(), granted.denied.clone()));
+    let period = Duration::from_secs_f64(CONTROL_PERIOD_S);
     let lead = lead(start.real);
-    let paced = |ticking: &mut dyn Paced| pace_rehearsed(period, CONTROL_PHASE, lead, ticking);
+    let paced = |ticking: &mut dyn PeriodicTask| pace_with_warm_up(period, CONTROL_PHASE, lead, ticking);
     // The damping at the end is slept, not paced: the clock may be what failed.
     if let Err(panic) = drive(&mut start, end, robot, paced, || std::thread::sleep(period)) {
         resume_unwind(panic);
     }
 }
 
-/// A simulated robot's ticks are not worth a rehearsal: nobody's motors wait for them.
+/// Returns the time before a tick at which the caches are warmed; zero for a simulated robot, which needs no punctual tick.
 const fn lead(real: bool) -> Duration {
-    if real { REHEARSAL_LEAD } else { Duration::ZERO }
+    if real { WARM_UP_LEAD } else { Duration::ZERO }
 }
 
-/// A body and its robot, until the thread is told to end.
+/// The control loop and its robot, until the engine closes.
 struct Ticking<'a, C> {
     body: ControlLoop,
     robot: &'a mut dyn Robot,
@@ -76,12 +76,12 @@ impl<C> Ticking<'_, C> {
     }
 }
 
-impl<C: Clock> Paced for Ticking<'_, C> {
-    fn rehearse(&mut self) {
-        self.body.rehearse(self.clock, self.robot);
+impl<C: Clock> PeriodicTask for Ticking<'_, C> {
+    fn warm_up(&mut self) {
+        self.body.warm_up(self.clock, self.robot);
     }
 
-    fn tick(&mut self, instant: Instant) -> ControlFlow<()> {
+    fn tick(&mut self, instant: TickStart) -> ControlFlow<()> {
         self.body.tick(instant, self.clock, self.robot);
         self.body.prepare();
         self.sign_of_life();
@@ -94,7 +94,7 @@ fn drive<C: Clock>(
     start: &mut Start<C>,
     end: ControlEnd,
     robot: &mut dyn Robot,
-    paced: impl FnOnce(&mut dyn Paced) -> Result<(), nix::Error>,
+    paced: impl FnOnce(&mut dyn PeriodicTask) -> Result<(), nix::Error>,
     mut wait: impl FnMut(),
 ) -> std::thread::Result<()> {
     let body = ControlLoop::new(start.settings, end);
@@ -110,7 +110,7 @@ fn drive<C: Clock>(
         let damping = JointCommand::damping(start.settings.gate.damping_kd);
         let mut sent = 0;
         while sent < LAST_DAMPINGS || !start.closing.load(Ordering::Acquire) {
-            // What is lost goes with the next: there is nobody left to tell.
+            // A lost datagram is followed by the next.
             let _ = ticking.robot.write(&damping);
             ticking.sign_of_life();
             sent = sent.saturating_add(1);
@@ -126,18 +126,19 @@ fn drive<C: Clock>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::{Backend, Config};
+    use crate::config::Config;
     use crate::realtime::channel::channels;
     use crate::realtime::clock::SimulatedClock;
     use crate::robot::description::RobotDescription;
     use crate::robot::{Placement, RobotError, RobotState};
     use crate::telemetry::Command;
+    use crate::trial::Backend;
     use crate::trial::Task;
 
-    /// Answers until `reads` or `rehearsals` is used up, then panics; keeps what it is sent.
+    /// Answers until `reads` or `warm_ups` is used up, then panics; keeps what it is sent.
     struct Brittle {
         reads: u32,
-        rehearsals: u32,
+        warm_ups: u32,
         sent: Vec<JointCommand>,
     }
 
@@ -153,14 +154,14 @@ mod tests {
         fn place(&mut self, _: &Placement) -> bool {
             false
         }
-        fn rehearse(&mut self) {
-            self.rehearsals = self.rehearsals.checked_sub(1).expect("an injected defect");
+        fn warm_up(&mut self) {
+            self.warm_ups = self.warm_ups.checked_sub(1).expect("an injected defect");
         }
     }
 
-    /// What a robot is sent, and how often was waited, if `reads` ticks or `rehearsals` go well with it and the thread is told to
-    /// end after `told_after` waits.
-    fn damped(controlled: bool, [reads, rehearsals]: [u32; 2], told_after: u32) -> (Vec<JointCommand>, u32) {
+    /// What a robot is sent, and how often was waited, if `reads` ticks or `warm_ups` go well with it and the thread is
+    /// told to end after `told_after` waits.
+    fn damped(controlled: bool, [reads, warm_ups]: [u32; 2], told_after: u32) -> (Vec<JointCommand>, u32) {
         let description = RobotDescription::embedded("go1").unwrap();
         let settings = Config::load(None).unwrap().settings(&description, Task::Forward, Backend::Hardware).unwrap();
         let (control, mut session, screen, _ticks) = channels();
@@ -168,21 +169,21 @@ mod tests {
         if controlled {
             session.commands.push(Command::TakeControl).unwrap();
         }
-        let mut robot = Brittle { reads, rehearsals, sent: Vec::new() };
+        let mut robot = Brittle { reads, warm_ups, sent: Vec::new() };
         let closing = AtomicBool::new(told_after == 0);
         let mut start = Start {
             settings: &settings,
             scheduling: Scheduling::default(),
-            told: std::sync::mpsc::channel().0,
+            report: std::sync::mpsc::channel().0,
             clock: &SimulatedClock,
             closing: &closing,
             real: true,
             lifeline: None,
         };
         let mut ms = 0;
-        let unpaced = |ticking: &mut dyn Paced| {
-            while ticking.tick(Instant { planned_ns: ms * 1_000_000, lateness_ns: 0 }).is_continue() {
-                ticking.rehearse();
+        let unpaced = |ticking: &mut dyn PeriodicTask| {
+            while ticking.tick(TickStart { planned_ns: ms * 1_000_000, lateness_ns: 0 }).is_continue() {
+                ticking.warm_up();
                 ms += 1;
             }
             Ok(())
@@ -200,18 +201,18 @@ mod tests {
 
     /// (A defect once: a panic in a tick ended the thread, and the motors kept the last torques.)
     #[test]
-    fn a_panic_in_a_tick_or_its_rehearsal_is_followed_by_damping_for_half_a_second_and_until_the_end() {
+    fn a_panic_in_a_tick_or_its_warm_up_is_followed_by_damping_for_half_a_second_and_until_the_end() {
         for until in [[20, u32::MAX], [u32::MAX, 20]] {
             let (sent, waited) = damped(true, until, 1);
             assert_eq!(waited, 500);
             assert!(sent.len() >= 500, "{}", sent.len());
-            assert_eq!(damped(true, until, 800).1, 800, "it goes on until it is told to end");
+            assert_eq!(damped(true, until, 800).1, 800, "it continues until the engine closes");
         }
     }
 
     #[test]
-    fn a_robot_is_rehearsed_for_and_a_simulator_is_not() {
-        assert_eq!((lead(true), lead(false)), (REHEARSAL_LEAD, Duration::ZERO));
+    fn only_a_real_robot_has_a_cache_warm_up() {
+        assert_eq!((lead(true), lead(false)), (WARM_UP_LEAD, Duration::ZERO));
     }
 
     #[test]

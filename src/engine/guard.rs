@@ -1,11 +1,11 @@
-//! The guard: a second process that shares the robot's socket and damps the robot when this one falls silent.
+//! The guard: a second process that shares the robot's socket and damps the robot when the heartbeat of this process stops.
 //!
-//! However a program ends that can still act, the control thread's last word is damping. One that is killed or stopped has no last
-//! word, and what a robot does that hears no more is not established (`robots/go1/README.md`). The guard knows one datagram, and
-//! the control thread gives it a sign of life every few ticks. It damps while none comes and the robot was commanded; it stops
-//! when one comes again, for then the control thread acts: it finds itself late, and cuts.
+//! A control thread that ends sends damping, also after a panic. A process that is killed or stopped sends nothing, and the
+//! robot's reaction to silence is not established (`robots/go1/README.md`). The guard holds one datagram, and the control
+//! thread sends it a heartbeat every few ticks. Without heartbeats the guard damps a commanded robot. It stops when they
+//! resume, because the control thread then finds itself late and damps the robot.
 //!
-//! On the pipe: the damping datagram, the longest silence in ms (two bytes, little endian), then the signs of life, [`COMMANDED`]
+//! On the pipe: the damping datagram, the longest silence in ms (two bytes, little endian), then the heartbeats, [`COMMANDED`]
 //! or [`LEFT_ALONE`].
 
 use std::fs::File;
@@ -26,32 +26,33 @@ use crate::control::settings::ControlSettings;
 use crate::robot::go1::Go1;
 use crate::robot::go1::packet::{COMMAND_LENGTH, CrcForm, LowCmd};
 
-/// The argument with which the program stands guard.
+/// Argument that runs the program as the guard.
 pub const GUARD: &str = "guard";
 const COMMANDED: u8 = b'+';
 const LEFT_ALONE: u8 = b'-';
-/// A sign of life is given in every so-manieth tick.
-const BEAT_TICKS: u32 = 10;
-/// How long the control thread may be silent beyond what its own watchdog allows, ms: some signs of life.
+/// Ticks between two heartbeats to the guard.
+const HEARTBEAT_TICKS: u32 = 10;
+/// Silence of the control thread that is allowed beyond its own limit for late ticks, ms: several heartbeats.
 const PATIENCE_MS: f64 = 50.0;
-/// The same where its watchdog allows everything, ms.
+/// Allowed silence where late ticks have no limit, ms.
 const LONGEST_PATIENCE_MS: f64 = 1000.0;
-/// For how many milliseconds, and datagrams, the robot is damped once the pipe has ended: several times as long as it sinks.
+/// Damping datagrams, one per millisecond, after the pipe has ended: several times the duration of sinking.
 const DAMPINGS: u32 = 3000;
 
-/// The process, for who watches over it.
+/// The guard process, seen from the engine.
 #[derive(Debug)]
 pub struct Guard {
     process: Child,
-    unheard: Arc<AtomicBool>,
+    broken: Arc<AtomicBool>,
     gone: bool,
 }
 
-/// The control thread's end of the pipe. Dropped without [`Lifeline::leave`], as in a panic, it lets the guard do its work.
+/// The control thread's end of the pipe. Dropped without [`Lifeline::leave`], as in a panic, it makes the guard damp the
+/// robot.
 #[derive(Debug)]
 pub struct Lifeline {
     pipe: File,
-    unheard: Arc<AtomicBool>,
+    broken: Arc<AtomicBool>,
     commanded: bool,
     ticks: u32,
 }
@@ -60,7 +61,7 @@ impl Guard {
     /// Starts `program guard` over `robot`.
     ///
     /// # Errors
-    /// When the process cannot be started, or no datagram can say the damping of `settings`.
+    /// When the process cannot be started, or no datagram can hold the damping of `settings`.
     pub fn post(program: &Path, robot: &Go1, settings: &ControlSettings) -> std::io::Result<(Guard, Lifeline)> {
         let (socket, damping) = (robot.socket()?, robot.damping(settings.gate.damping_kd));
         let damping = damping.map_err(std::io::Error::other)?;
@@ -73,106 +74,108 @@ impl Guard {
             .stdin(theirs)
             .stdout(OwnedFd::from(socket))
             .stderr(Stdio::inherit())
-            // What the terminal does to the console's processes is not meant for it.
+            // Signals of the terminal must not reach the guard.
             .process_group(0)
             .spawn()?;
         let mut pipe = File::from(OwnedFd::from(ours));
         pipe.write_all(damping.bytes())?;
         pipe.write_all(&(allowed_ms as u16).to_le_bytes())?;
         fcntl(&pipe, FcntlArg::F_SETFL(OFlag::O_NONBLOCK))?;
-        let unheard = Arc::<AtomicBool>::default();
-        let guard = Guard { process, unheard: unheard.clone(), gone: false };
-        Ok((guard, Lifeline { pipe, unheard, commanded: false, ticks: 0 }))
+        let broken = Arc::<AtomicBool>::default();
+        let guard = Guard { process, broken: broken.clone(), gone: false };
+        Ok((guard, Lifeline { pipe, broken, commanded: false, ticks: 0 }))
     }
 
-    /// True once, when it is found to have ended, or to listen no more; that one is ended, lest it take a full pipe for silence.
+    /// Returns true once, when the guard has exited or its pipe is broken. A guard with a broken pipe is killed so that it does
+    /// not start damping.
     pub fn lost(&mut self) -> bool {
         if self.gone {
             return false;
         }
-        let unheard = self.unheard.load(Ordering::Acquire);
-        if unheard {
-            // One that has ended already cannot be killed.
+        let broken = self.broken.load(Ordering::Acquire);
+        if broken {
+            // An error means that it has exited already.
             let _ = self.process.kill();
         }
-        self.gone = unheard || self.process.try_wait().is_ok_and(|status| status.is_some());
+        self.gone = broken || self.process.try_wait().is_ok_and(|status| status.is_some());
         self.gone
     }
 
-    /// Ends it, also one that is stopped; to be called after the last command.
+    /// Kills the guard, also a stopped one; to be called after the last command.
     pub fn dismiss(mut self) {
-        // One that has ended by itself was missed before.
+        // An error means that it has exited already.
         let _ = self.process.kill();
         let _ = self.process.wait();
     }
 }
 
 impl Lifeline {
-    /// To be called after every tick, or every datagram that is sent without one: neither blocks nor allocates.
+    /// Counts a tick, or a datagram that is sent without one, and sends a heartbeat when it is due. Neither blocks nor
+    /// allocates.
     pub fn tick(&mut self, commanded: bool) {
         self.ticks += 1;
-        if self.ticks == BEAT_TICKS || commanded != self.commanded {
-            self.tell(commanded);
+        if self.ticks == HEARTBEAT_TICKS || commanded != self.commanded {
+            self.send(commanded);
         }
     }
 
-    /// The robot is left alone from now on.
+    /// Tells the guard that the robot is not commanded any more.
     pub fn leave(mut self) {
-        self.tell(false);
+        self.send(false);
     }
 
-    fn tell(&mut self, commanded: bool) {
+    fn send(&mut self, commanded: bool) {
         (self.ticks, self.commanded) = (0, commanded);
         let byte = if commanded { COMMANDED } else { LEFT_ALONE };
         if self.pipe.write_all(&[byte]).is_err() {
-            self.unheard.store(true, Ordering::Release);
+            self.broken.store(true, Ordering::Release);
         }
     }
 }
 
-/// What the first process sent is not what a guard needs: it was started by hand, perhaps.
+/// Invalid input of a guard, for example of one that was started by hand.
 #[derive(Debug, thiserror::Error)]
-#[error("the guard is a process that quadfrog starts by itself: what it was given to send is no command ({reason})")]
+#[error("quadfrog starts the guard itself; its input is not a valid command ({reason})")]
 pub struct GuardError {
     reason: String,
 }
 
-/// What became of a guard's life.
+/// End of a guard.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Watch {
-    /// The robot was left alone in the end.
+    /// The robot was not commanded at the end.
     Quiet,
     /// The pipe ended while the robot was commanded.
     Damped {
-        /// How often damping was sent since then.
+        /// Damping datagrams since then.
         sent: u32,
     },
 }
 
-/// The guard's whole life, until `pipe` ends.
+/// Runs the guard until `pipe` ends.
 ///
 /// # Errors
-/// When what is to be sent is no command.
+/// When the datagram is not a valid command.
 pub fn stand(mut pipe: impl Read + AsFd, socket: &UdpSocket) -> Result<Watch, GuardError> {
     let refused = |reason: &dyn ToString| GuardError { reason: reason.to_string() };
     let (mut damping, mut silence_ms) = ([0; COMMAND_LENGTH], [0; 2]);
     pipe.read_exact(&mut damping).map_err(|error| refused(&error))?;
     pipe.read_exact(&mut silence_ms).map_err(|error| refused(&error))?;
-    // Nothing leaves this machine that the packets' own rules refuse.
-    LowCmd::judge(&damping, CrcForm::Plain)
-        .or_else(|_| LowCmd::judge(&damping, CrcForm::Sealed))
+    // The guard sends only datagrams that pass the checks of the packets.
+    LowCmd::parse(&damping, CrcForm::Plain)
+        .or_else(|_| LowCmd::parse(&damping, CrcForm::Sealed))
         .map_err(|rejection| refused(&rejection))?;
     let silence = PollTimeout::from(u16::from_le_bytes(silence_ms));
     let (mut timeout, mut signs) = (PollTimeout::NONE, [0; 64]);
     loop {
         match poll(&mut [PollFd::new(pipe.as_fd(), PollFlags::POLLIN)], timeout) {
             Err(nix::Error::EINTR) => continue,
-            // Silence: a datagram now, and one every millisecond until there is a sign of life.
+            // Silence: a datagram now, and one every millisecond until the next heartbeat.
             Ok(0) => {
                 let _ = socket.send(&damping);
                 timeout = PollTimeout::from(1_u16);
             }
-            // A pipe that cannot be looked at is read.
+            // After an error of poll, the read tells the state of the pipe.
             Ok(_) | Err(_) => match pipe.read(&mut signs) {
                 Err(error) if error.kind() == std::io::ErrorKind::Interrupted => {}
                 // A pipe that cannot be read has ended.
@@ -186,7 +189,7 @@ pub fn stand(mut pipe: impl Read + AsFd, socket: &UdpSocket) -> Result<Watch, Gu
     }
     let mut sent = 0;
     for _ in 0..DAMPINGS {
-        // One that is lost is followed by the next.
+        // A lost datagram is followed by the next.
         sent += u32::from(socket.send(&damping).is_ok());
         // Slept, not paced: the clock may be what failed.
         std::thread::sleep(Duration::from_millis(1));

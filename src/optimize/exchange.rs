@@ -1,52 +1,43 @@
-//! Trials as tables: CSV and JSON, out and in. The columns are those of Optuna's `Study.trials_dataframe`, so that either
-//! program reads what the other has written: `number`, `value`, `datetime_start`, `datetime_complete`, `params_<name>`,
-//! `user_attrs_<name>`, `state`; besides them `note`.
+//! Export and import of trials as CSV and JSON tables. The columns are those of Optuna's `Study.trials_dataframe`, for
+//! exchange in both directions: `number`, `value`, `datetime_start`, `datetime_complete`, `params_<name>`,
+//! `user_attrs_<name>`, `state`; in addition `note`.
 
 use std::collections::BTreeSet;
 
 use jiff::Timestamp;
 use serde_json::{Map, Value, json};
 
-use super::trial::{Trial, TrialState};
-
-/// The states as Optuna writes them.
-const STATES: [(TrialState, &str); 5] = [
-    (TrialState::Running, "RUNNING"),
-    (TrialState::Complete, "COMPLETE"),
-    (TrialState::Pruned, "PRUNED"),
-    (TrialState::Fail, "FAIL"),
-    (TrialState::Waiting, "WAITING"),
-];
+use super::trial::{Trial, TrialState, value_of};
 
 const PARAMETER: &str = "params_";
 const ATTRIBUTE: &str = "user_attrs_";
 
-/// A table that cannot be read: where, what is wrong, what would do.
+/// Error in a table of trials.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ExchangeError {
-    /// Not the format that it was said to be.
-    #[error("not {format}: {what}")]
+    /// Text that the parser of the format rejects.
+    #[error("not {format}: {message}")]
     Format {
         /// `CSV` or `JSON`.
         format: &'static str,
-        /// What the parser says.
-        what: String,
+        /// Message of the parser.
+        message: String,
     },
-    /// A column or member is missing that every trial needs.
+    /// A required column or member is missing.
     #[error(
         "there is no {0}; give one parameter per column `params_<name>` (JSON: an object `params`), `value` and `state`"
     )]
     Missing(&'static str),
-    /// A cell that is not what its column says.
+    /// A cell with a value that its column does not allow.
     #[error("trial {row}: {column} = {found}: {expected}")]
     Cell {
-        /// Which trial of the table, from 1.
+        /// Number of the trial within the table, from 1.
         row: usize,
         /// The column.
         column: String,
-        /// What stands there.
+        /// Content.
         found: String,
-        /// What can stand there.
+        /// Rule for the content.
         expected: &'static str,
     },
 }
@@ -54,30 +45,26 @@ pub enum ExchangeError {
 /// A trial of a table.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TableTrial {
-    /// Its state.
+    /// State.
     pub state: TrialState,
-    /// Its value, of a complete one.
+    /// Value of a complete trial.
     pub value: Option<f64>,
     /// Parameters by name.
     pub parameters: Vec<(String, f64)>,
-    /// Attributes of the user.
+    /// User attributes.
     pub attributes: Map<String, Value>,
-    /// When it began.
+    /// Time of the beginning.
     pub started: Option<Timestamp>,
-    /// When it ended.
+    /// Time of the end.
     pub completed: Option<Timestamp>,
 }
 
-fn state_name(state: TrialState) -> &'static str {
-    STATES.iter().find(|(s, _)| *s == state).map_or("FAIL", |(_, name)| name)
-}
-
-/// The parameters that a trial has, or will have if it waits.
+/// The parameters of a trial; of a waiting one those that are given.
 pub fn parameters_of(trial: &Trial) -> Vec<(String, f64)> {
     if trial.state == TrialState::Waiting { trial.fixed() } else { trial.parameters.clone() }
 }
 
-/// The trials as CSV with a header; `note` gives the note of a trial by its number.
+/// The trials as CSV with a header; `note` returns the note of a trial by its number.
 pub fn to_csv(trials: &[Trial], note: impl Fn(u32) -> String) -> String {
     let mut parameters: Vec<String> = Vec::new();
     let mut attributes: BTreeSet<&str> = BTreeSet::new();
@@ -99,7 +86,7 @@ pub fn to_csv(trials: &[Trial], note: impl Fn(u32) -> String) -> String {
     let number = |value: Option<f64>| value.map(|value| format!("{value:?}")).unwrap_or_default();
     let text = |value: Option<&Value>| match value {
         None | Some(Value::Null) => String::new(),
-        // A text that would be read as something else, like the digits of a seed, keeps its quotes.
+        // A text that would be read as another type, such as the digits of a seed, keeps its quotes.
         Some(Value::String(text)) if plain(text).is_string() => text.clone(),
         Some(other) => other.to_string(),
     };
@@ -107,24 +94,24 @@ pub fn to_csv(trials: &[Trial], note: impl Fn(u32) -> String) -> String {
     for trial in trials {
         let given = parameters_of(trial);
         let mut row = vec![trial.number.to_string(), number(trial.value), time(trial.started), time(trial.completed)];
-        row.extend(parameters.iter().map(|name| number(given.iter().find(|(n, _)| n == name).map(|(_, v)| *v))));
+        row.extend(parameters.iter().map(|name| number(value_of(&given, name))));
         row.extend(attributes.iter().map(|name| text(trial.user_attributes.get(*name))));
-        row.extend([note(trial.number), state_name(trial.state).to_owned()]);
+        row.extend([note(trial.number), <&str>::from(trial.state).to_owned()]);
         rows.push(row);
     }
     for row in rows {
-        writer.write_record(row).expect("memory takes rows of equal length");
+        writer.write_record(row).expect("rows of equal length");
     }
-    String::from_utf8(writer.into_inner().expect("memory is written at once")).expect("text was put in")
+    String::from_utf8(writer.into_inner().expect("a write to memory")).expect("UTF-8 cells")
 }
 
-/// The trials as a JSON array of objects; `note` gives the note of a trial by its number.
+/// The trials as a JSON array of objects; `note` returns the note of a trial by its number.
 pub fn to_json(trials: &[Trial], note: impl Fn(u32) -> String) -> String {
     let object = |trial: &Trial| {
         let parameters: Map<String, Value> = parameters_of(trial).into_iter().map(|(n, v)| (n, json!(v))).collect();
         json!({
             "number": trial.number,
-            "state": state_name(trial.state),
+            "state": <&str>::from(trial.state),
             "value": trial.value,
             "datetime_start": trial.started.map(|at| at.to_string()),
             "datetime_complete": trial.completed.map(|at| at.to_string()),
@@ -137,12 +124,12 @@ pub fn to_json(trials: &[Trial], note: impl Fn(u32) -> String) -> String {
     format!("[\n{}\n]\n", lines.join(",\n"))
 }
 
-/// The trials of a CSV table.
+/// Reads a CSV table.
 ///
 /// # Errors
-/// [`ExchangeError`] if it is none, or a cell is not what its column says.
+/// [`ExchangeError`] for text that is not CSV, a missing column and an invalid cell.
 pub fn from_csv(text: &str) -> Result<Vec<TableTrial>, ExchangeError> {
-    let format = |error: csv::Error| ExchangeError::Format { format: "CSV", what: error.to_string() };
+    let format = |error: csv::Error| ExchangeError::Format { format: "CSV", message: error.to_string() };
     let mut reader = csv::Reader::from_reader(text.as_bytes());
     let header = reader.headers().map_err(format)?.clone();
     if !header.iter().any(|column| column.starts_with(PARAMETER)) {
@@ -172,12 +159,12 @@ pub fn from_csv(text: &str) -> Result<Vec<TableTrial>, ExchangeError> {
     Ok(trials)
 }
 
-/// The trials of a JSON array.
+/// Reads a JSON array.
 ///
 /// # Errors
-/// [`ExchangeError`] if it is none, or a member is not what its name says.
+/// [`ExchangeError`] for text that is not a JSON array, a missing member and an invalid one.
 pub fn from_json(text: &str) -> Result<Vec<TableTrial>, ExchangeError> {
-    let format = |what: String| ExchangeError::Format { format: "JSON", what };
+    let format = |message: String| ExchangeError::Format { format: "JSON", message };
     let value: Value = serde_json::from_str(text).map_err(|error| format(error.to_string()))?;
     let Value::Array(list) = value else { return Err(format("an array of trials is expected".to_owned())) };
     let object = |(row, item): (usize, &Value)| match item {
@@ -187,7 +174,7 @@ pub fn from_json(text: &str) -> Result<Vec<TableTrial>, ExchangeError> {
     list.iter().enumerate().map(object).collect()
 }
 
-/// The text of a cell as the value that it shows: Python writes `True`, JSON `true`.
+/// The value of a cell; Python writes `True`, JSON `true`.
 fn plain(cell: &str) -> Value {
     match cell {
         "True" => Value::Bool(true),
@@ -210,7 +197,7 @@ fn trial(row: usize, members: &Map<String, Value>) -> Result<TableTrial, Exchang
         Some(value) => Some(number("value", value)?),
     };
     let state = match members.get("state") {
-        // A table of points and results needs no state.
+        // Optional: follows from the value.
         None => {
             if value.is_some() {
                 TrialState::Complete
@@ -219,8 +206,8 @@ fn trial(row: usize, members: &Map<String, Value>) -> Result<TableTrial, Exchang
             }
         }
         Some(name) => {
-            let known = STATES.iter().find(|(_, known)| name.as_str() == Some(known));
-            known.ok_or_else(|| cell("state", name, "must be COMPLETE, PRUNED, FAIL, RUNNING or WAITING"))?.0
+            let known = name.as_str().and_then(|name| name.parse().ok());
+            known.ok_or_else(|| cell("state", name, "must be COMPLETE, PRUNED, FAIL, RUNNING or WAITING"))?
         }
     };
     if state == TrialState::Complete && value.is_none() {
@@ -251,7 +238,7 @@ fn trial(row: usize, members: &Map<String, Value>) -> Result<TableTrial, Exchang
     })
 }
 
-/// A time with its offset, or without one as Optuna's tables have it: then it is this machine's local time.
+/// A time with its offset, or without one as in Optuna's tables, which have local time.
 fn moment(text: &str) -> Option<Timestamp> {
     if let Ok(at) = text.parse::<Timestamp>() {
         return Some(at);

@@ -1,13 +1,13 @@
-//! How much each parameter matters: PED-ANOVA.
+//! Importance of each parameter: PED-ANOVA.
 //!
 //! Watanabe, Bansal and Hutter, "PED-ANOVA: Efficiently Quantifying Hyperparameter Importance in Arbitrary Subspaces",
 //! IJCAI 2023 (arXiv:2304.10255). The importance of a parameter is the Pearson divergence between two densities along it:
-//! that of the best trials and that of all trials; where the best are spread like all, it does not matter. The settings
-//! are those of Optuna's `PedAnovaImportanceEvaluator`: the best tenth against all, values rounded to a grid of 50,
-//! Scott's bandwidth. Parameters whose bounds have changed are weighed per bounds (Conditional PED-ANOVA,
-//! arXiv:2601.20800, theorem 4.2).
+//! that of the best trials and that of all trials; it is 0 if the best are distributed like all. The settings are those
+//! of Optuna's `PedAnovaImportanceEvaluator`: the best tenth against all, values rounded to a grid of 50, Scott's
+//! bandwidth. Parameters whose bounds have changed are weighted per bounds (Conditional PED-ANOVA, arXiv:2601.20800,
+//! theorem 4.2).
 
-use super::sampler::Direction;
+use super::ask::Direction;
 use super::space::{Range, Space};
 use super::trial::{Trial, TrialState};
 use super::truncnorm::log_mass;
@@ -15,17 +15,17 @@ use libm::exp;
 
 /// Share of the trials that counts as best: gamma'.
 const BEST: f64 = 0.1;
-/// Values per parameter.
+/// Grid cells per parameter.
 const GRID: usize = 50;
-/// Bounds that fewer trials had say nothing about the parameter.
+/// Least number of trials with the same bounds; bounds of fewer trials are ignored.
 const FEWEST: usize = 2;
-/// The grid's cells are one wide; 90 % of a kernel lies within half of one at least.
+/// Least bandwidth, in cells: 90 % of the narrowest kernel lies within half a cell of its centre.
 const NARROWEST: f64 = 0.5 / 1.64;
 /// Keeps the quotient of two densities finite.
 const FLOOR: f64 = 1e-12;
 
 /// The importance of every parameter of the space, in its order: the divergences times the square of the share of best
-/// trials, as Optuna reports them before it makes them sum to 1. Empty with fewer than two finished trials.
+/// trials, as Optuna reports them before normalization. Empty with fewer than two finished trials.
 pub fn divergences(trials: &[Trial], space: &Space, direction: Direction) -> Vec<(String, f64)> {
     let finite = |t: &&Trial| t.state == TrialState::Complete && t.value.is_some_and(f64::is_finite);
     let all: Vec<&Trial> = trials.iter().filter(finite).collect();
@@ -36,7 +36,7 @@ pub fn divergences(trials: &[Trial], space: &Space, direction: Direction) -> Vec
     let mut ranked = all.clone();
     ranked.sort_by(|a, b| direction.best_first(value(a), value(b)));
     let worst = value(ranked[(BEST * all.len() as f64).ceil() as usize - 1]);
-    // Equals of the worst among the best are among the best too.
+    // Trials equal to the worst of the best count as best too.
     let is_best = |t: &&Trial| direction.best_first(value(t), worst).is_le();
     let best_count = all.iter().copied().filter(|t| is_best(t)).count() as f64;
     let gamma = best_count / all.len() as f64;
@@ -64,21 +64,21 @@ pub fn divergences(trials: &[Trial], space: &Space, direction: Direction) -> Vec
     space.parameters().iter().map(|p| (p.name.clone(), importance(&p.name))).collect()
 }
 
-/// How many of the trials lie in each cell of the parameter's grid.
+/// Number of trials in each cell of the parameter's grid.
 fn cells(trials: &[&Trial], name: &str, range: Range) -> [f64; GRID] {
     let mut counts = [0.0; GRID];
     let (low, high) = range.inner_bounds();
     let step = (high - low) / (GRID - 1) as f64;
     for x in trials.iter().filter_map(|t| t.parameter(name)).map(|v| range.inner(v)) {
-        // The nearest cell, the lower one of two; values outside the bounds belong to the last.
+        // The nearest cell, the lower of two; values outside the bounds belong to the outermost cell.
         let cell = ((x - low) / step - 0.5).ceil().clamp(0.0, (GRID - 1) as f64);
         counts[cell as usize] += 1.0;
     }
     counts
 }
 
-/// The density of counted cells: a normal kernel per cell in use, weighed by its count, and a broad prior of weight 1, each
-/// cut to the grid and integrated over its cells.
+/// The density of counted cells: a normal kernel per occupied cell, weighted by its count, and a broad prior of weight 1,
+/// each truncated to the grid and integrated over its cells.
 fn density(counts: &[f64; GRID]) -> [f64; GRID] {
     let used: Vec<(f64, f64)> = (0..GRID).map(|i| (i as f64, counts[i])).filter(|(_, n)| *n > 0.0).collect();
     let total: f64 = used.iter().map(|(_, n)| n).sum();
@@ -102,7 +102,7 @@ fn density(counts: &[f64; GRID]) -> [f64; GRID] {
     density
 }
 
-/// From the first cell that reaches a quarter of the count to the first that exceeds three quarters.
+/// Interquartile range: from the first cell that reaches a quarter of the count to the first above three quarters.
 fn quartile_range(used: &[(f64, f64)], total: f64) -> f64 {
     let reaches = |reached: &dyn Fn(f64) -> bool| {
         let mut sum = 0.0;

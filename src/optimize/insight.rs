@@ -1,30 +1,30 @@
-//! Why a point was proposed and how near the edge it is: for the operator's eyes, never for the sampler's.
+//! The reasons for a proposal and its distance from falls, for the operator; no sampler reads them.
 
+use super::ask::{Direction, SamplerConfig};
 use super::importance;
-use super::sampler::{Direction, SamplerConfig};
 use super::space::{Parameter, Space};
-use super::tpe::{Model, joint_space, split};
-use super::trial::Trial;
+use super::tpe::{TpeModel, joint_space, split};
+use super::trial::{Trial, value_of};
 use serde_json::Value;
 
-/// How many of the nearest trials the share of falls is taken over.
+/// Number of nearest trials over which falls are counted.
 pub const NEIGHBOURS: usize = 5;
 
 /// TPE's two densities along one parameter, both per unit of the parameter.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Density {
-    /// The parameter.
+    /// Name of the parameter.
     pub name: String,
     /// Values of the parameter, ascending from its lower to its upper bound.
     pub at: Vec<f64>,
     /// l(x), of the good trials, at these values.
     pub good: Vec<f64>,
-    /// g(x), of the bad ones.
+    /// g(x), of the bad trials, at these values.
     pub bad: Vec<f64>,
 }
 
-/// The densities along every parameter of the space for the present history, at `points` values each (at least 2): in
-/// multivariate mode the marginals of the joint densities. Parameters whose range is a point are left out.
+/// The densities along every parameter of the space, at `points` values each (at least 2): in multivariate mode the
+/// marginals of the joint densities. Parameters whose range is a single point are left out.
 pub fn densities(
     config: &SamplerConfig,
     trials: &[Trial],
@@ -34,14 +34,14 @@ pub fn densities(
 ) -> Vec<Density> {
     let parts = split(trials, direction);
     let joint = if config.multivariate { joint_space(trials) } else { Vec::new() };
-    let together = Model::fit(&parts, &joint, true);
+    let together = TpeModel::fit(&parts, &joint, true);
     let density = |p: &Parameter| {
         let axis = joint.iter().position(|j| j == p);
         let alone;
         let (model, axis) = match axis {
             Some(axis) => (&together, axis),
             None => {
-                alone = Model::fit(&parts, std::slice::from_ref(p), config.multivariate);
+                alone = TpeModel::fit(&parts, std::slice::from_ref(p), config.multivariate);
                 (&alone, 0)
             }
         };
@@ -56,11 +56,11 @@ pub fn densities(
     space.parameters().iter().filter(|p| !p.range.is_point()).map(density).collect()
 }
 
-/// How many finished trials are needed before a share of importance is told: with fewer the best tenth is one trial.
+/// Finished trials from which on importances are reported: with fewer the best tenth is one trial.
 pub const IMPORTANCE_TRIALS: usize = 11;
 
-/// The share of each parameter in reaching the best tenth of the trials, all together 1, in the order of the space; empty
-/// while there are fewer than [`IMPORTANCE_TRIALS`] finished trials or nothing can be told.
+/// The share of each parameter in reaching the best tenth of the trials, in the order of the space, with sum 1; empty
+/// with fewer than [`IMPORTANCE_TRIALS`] finished trials or if all divergences are 0.
 pub fn importances(trials: &[Trial], space: &Space, direction: Direction) -> Vec<(String, f64)> {
     if trials.iter().filter(|t| t.state.is_observed()).count() < IMPORTANCE_TRIALS {
         return Vec::new();
@@ -70,25 +70,24 @@ pub fn importances(trials: &[Trial], space: &Space, direction: Direction) -> Vec
     if sum > 0.0 { divergences.into_iter().map(|(name, d)| (name, d / sum)).collect() } else { Vec::new() }
 }
 
-/// How near a point is to trials that fell.
+/// Falls near a point.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Risk {
-    /// Falls by distance, the nearest first: number of the trial and distance in scaled units, where every parameter's
-    /// range has length 1.
+pub struct FallProximity {
+    /// Falls, nearest first: number of the trial and distance in scaled units (every parameter's range has length 1).
     pub falls: Vec<(u32, f64)>,
-    /// How many of the nearest trials fell.
+    /// Number of falls among the nearest trials.
     pub fell_near: usize,
-    /// How many nearest trials were looked at: [`NEIGHBOURS`], or as many as there are.
+    /// Number of nearest trials: [`NEIGHBOURS`], or all if there are fewer.
     pub neighbours: usize,
 }
 
-impl Risk {
-    /// Of a point, given by name, among the finished trials that have all parameters of the space.
+impl FallProximity {
+    /// Measures a point, given by name, against the finished trials that have all parameters of the space.
     pub fn of(point: &[(String, f64)], trials: &[Trial], space: &Space) -> Self {
         let scaled = |value: &dyn Fn(&str) -> Option<f64>| -> Option<Vec<f64>> {
             space.parameters().iter().map(|p| value(&p.name).map(|v| p.range.scale(v))).collect()
         };
-        let here = scaled(&|name| point.iter().find(|(n, _)| n == name).map(|(_, v)| *v));
+        let here = scaled(&|name| value_of(point, name));
         let distance = |t: &Trial| {
             let there = scaled(&|name| t.parameter(name))?;
             Some(here.as_ref()?.iter().zip(there).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt())
@@ -97,14 +96,14 @@ impl Risk {
         let mut near: Vec<(f64, &Trial)> = observed.filter_map(|t| Some((distance(t)?, t))).collect();
         near.sort_by(|a, b| a.0.total_cmp(&b.0));
         let nearest = &near[..near.len().min(NEIGHBOURS)];
-        Risk {
+        FallProximity {
             falls: near.iter().filter(|(_, t)| t.is_fall()).map(|(d, t)| (t.number, *d)).collect(),
             fell_near: nearest.iter().filter(|(_, t)| t.is_fall()).count(),
             neighbours: nearest.len(),
         }
     }
 
-    /// As attributes of a trial: `nearest_fall` (distance in scaled units, null without any fall) and `falls_near`
+    /// The attributes of a trial: `nearest_fall` (distance in scaled units, null without a fall) and `falls_near`
     /// (`2/5`).
     pub fn attributes(&self) -> [(String, Value); 2] {
         let nearest = self.falls.first().map_or(Value::Null, |(_, d)| Value::from(*d));

@@ -1,4 +1,4 @@
-//! The Mersenne Twister MT19937 as NumPy's `RandomState` seeds and reads it, with a count of what was drawn.
+//! The Mersenne Twister MT19937 as NumPy's `RandomState` seeds and reads it, with a count of the draws.
 //!
 //! Matsumoto and Nishimura, "Mersenne Twister", ACM TOMACS 8(1), 1998; the seeding is their `init_genrand` of 2002.
 
@@ -8,7 +8,7 @@ const MATRIX_A: u32 = 0x9908_B0DF;
 const UPPER: u32 = 0x8000_0000;
 const LOWER: u32 = 0x7FFF_FFFF;
 
-/// A stream of doubles in [0, 1) that knows how many it has given, so that it can be stopped and continued.
+/// A stream of doubles in [0, 1); the count of draws is the position from which it can be continued.
 #[derive(Clone)]
 pub struct Mt19937 {
     state: [u32; N],
@@ -17,7 +17,7 @@ pub struct Mt19937 {
 }
 
 impl Mt19937 {
-    /// The stream of `seed` from its start.
+    /// The stream of `seed` at its start.
     pub fn new(seed: u32) -> Self {
         // x_i = 1812433253 (x_{i-1} xor (x_{i-1} >> 30)) + i  (mod 2^32)
         let mut state = [seed; N];
@@ -28,12 +28,12 @@ impl Mt19937 {
         Mt19937 { state, next: N, drawn: 0 }
     }
 
-    /// How many doubles have been drawn since the seed.
+    /// Number of doubles drawn since the seed.
     pub fn drawn(&self) -> u64 {
         self.drawn
     }
 
-    /// Draws and forgets doubles until `drawn` of them have been taken in all. Never goes back.
+    /// Discards doubles up to position `drawn`; a stream beyond it does not move.
     pub fn advance_to(&mut self, drawn: u64) {
         while self.drawn < drawn {
             self.double();

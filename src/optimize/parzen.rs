@@ -1,21 +1,19 @@
-//! The Parzen estimator of TPE: a mixture of product normals cut to the search range, one per observation and one broad
-//! prior.
+//! The Parzen estimator of TPE: a mixture of product normals truncated to the search range, one per observation and one
+//! broad prior.
 //!
 //! Bergstra et al., "Algorithms for hyper-parameter optimization", NeurIPS 2011; the weights and bandwidths are those of
-//! Optuna 5. Coordinates here are those of the search (logarithms for logarithmic parameters).
+//! Optuna 5. Coordinates are those of the search (logarithms for logarithmic parameters).
 
 use super::mt19937::Mt19937;
 use super::truncnorm::{HALF_LN_TWO_PI, log_mass, quantile};
 use libm::{exp, log};
 
-/// The newest observations, as many as this, keep full weight.
+/// Number of newest observations with full weight.
 const FULL_WEIGHT: usize = 25;
 
 /// The kernels of one coordinate, one entry per kernel in each list.
 #[derive(Debug, Clone)]
 struct Axis {
-    low: f64,
-    high: f64,
     centre: Vec<f64>,
     bandwidth: Vec<f64>,
     /// (low - centre) / bandwidth
@@ -36,8 +34,8 @@ pub struct Parzen {
 }
 
 impl Parzen {
-    /// The estimator of the observations: `columns[p]` holds coordinate p of every observation, oldest first, and
-    /// `bounds[p]` its search range. Observations outside the range are used as they are.
+    /// Fits the observations: `columns[p]` holds coordinate p of every observation, oldest first, and
+    /// `bounds[p]` its search range. Observations outside the range are used unchanged.
     pub fn new(columns: &[Vec<f64>], bounds: &[(f64, f64)]) -> Self {
         let observations = columns.first().map_or(0, Vec::len);
         let mut weight = observation_weights(observations);
@@ -49,8 +47,8 @@ impl Parzen {
         Parzen { axes, weight, log_weight }
     }
 
-    /// Draws `count` points; `result[p][i]` is coordinate p of point i. Takes `count (1 + coordinates)` doubles: the
-    /// components first, then coordinate by coordinate.
+    /// Draws `count` points; `result[p][i]` is coordinate p of point i. Takes `count (1 + coordinates)` doubles: first
+    /// the components, then coordinate by coordinate.
     pub fn sample(&self, stream: &mut Mt19937, count: usize) -> Vec<Vec<f64>> {
         let kernels: Vec<usize> = (0..count).map(|_| choose(&self.weight, stream)).collect();
         let draw =
@@ -93,12 +91,11 @@ impl Axis {
         let (a, b) = (standardize(low), standardize(high));
         let log_mass = a.iter().zip(&b).map(|(&a, &b)| log_mass(a, b)).collect();
         let log_bandwidth = bandwidth.iter().map(|s| log(*s)).collect();
-        Axis { low, high, centre, bandwidth, a, b, log_mass, log_bandwidth }
+        Axis { centre, bandwidth, a, b, log_mass, log_bandwidth }
     }
 
     /// Adds -z^2/2 - ln(2 pi)/2 - ln(Phi(b) - Phi(a)) - ln sigma, z = (x - mu)/sigma, to each kernel's term.
     fn add_log_kernels(&self, x: f64, terms: &mut [f64]) {
-        debug_assert!(self.low <= self.high);
         for (k, term) in terms.iter_mut().enumerate() {
             let z = (x - self.centre[k]) / self.bandwidth[k];
             let log_kernel = -(z * z) / 2.0 - HALF_LN_TWO_PI - self.log_mass[k] - self.log_bandwidth[k];
@@ -123,7 +120,7 @@ pub fn choose(weight: &[f64], stream: &mut Mt19937) -> usize {
     below.min(weight.len() - 1)
 }
 
-/// Weights of observations, oldest first: the newest 25 count fully, the older ones on a ramp that starts at 1/m.
+/// Weights of `m` observations, oldest first: 1 for the newest 25, a ramp from 1/m for the older ones.
 pub fn observation_weights(m: usize) -> Vec<f64> {
     let old = m.saturating_sub(FULL_WEIGHT);
     let first = 1.0 / m as f64;
@@ -132,9 +129,8 @@ pub fn observation_weights(m: usize) -> Vec<f64> {
     ramp.chain(std::iter::repeat_n(1.0, m - old)).collect()
 }
 
-/// A bandwidth per observation: the distance to the farther of its two neighbours in the sorted list (the range's ends
-/// are neighbours of a single observation only), clipped so that no kernel is a spike ("magic clip").
-/// Equal values stay in the order in which they were observed.
+/// Bandwidth per observation: the distance to the farther of its two neighbours in the sorted list (a single observation
+/// has the bounds as neighbours), clipped from below against spikes ("magic clip"). Equal values keep their order.
 fn bandwidths(observations: &[f64], low: f64, high: f64) -> Vec<f64> {
     let m = observations.len();
     let mut order: Vec<usize> = (0..m).collect();
@@ -155,13 +151,13 @@ fn bandwidths(observations: &[f64], low: f64, high: f64) -> Vec<f64> {
     result
 }
 
-/// ln sum exp(terms), with the largest taken out first; negative infinity if all terms are.
+/// ln sum exp(terms), factored by the largest; negative infinity if all terms are.
 fn log_sum_exp(terms: &[f64]) -> f64 {
     let largest = terms.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     if largest == f64::NEG_INFINITY {
         return largest;
     }
-    // Terms below e^-50 of the largest do not reach the last bit of a sum of thousands: most kernels are that far away.
+    // Terms below e^-50 of the largest do not change the last bit of a sum of thousands; most kernels are that far away.
     let share = |t: &f64| if t - largest < -50.0 { 0.0 } else { exp(t - largest) };
     log(terms.iter().map(share).sum::<f64>()) + largest
 }

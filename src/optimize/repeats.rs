@@ -1,33 +1,32 @@
-//! Several trials of one point: what they amount to together, and which point to repeat to be sure of the best.
+//! Repeats: several trials of one point, the best trial, and the rule that confirms it.
 //!
-//! The rule: complete trials whose parameters (and gains, where they are kept) are equal to the bit are repeats of one
-//! point. Its value is the mean of
-//! all their values, falls included with the value that they were told with; it is shown as k/n, k of n repeats stood,
-//! with the standard deviation of a single repeat. TPE sees every repeat as a trial of its own, as Optuna does; the
-//! Gaussian process weighs them by the noise that it estimates.
+//! Complete trials whose parameters (and gains, if recorded) are equal to the bit are repeats of one point. The value of
+//! a point is the mean over its repeats, falls included with their value; displays show it as k/n (k of n repeats without
+//! a fall) with the standard deviation of a single repeat. TPE treats every repeat as a trial of its own, as Optuna does;
+//! the Gaussian process accounts for them by its estimated noise.
 
-use super::sampler::Direction;
-use super::trial::{GAINS, Trial, TrialState};
+use super::ask::Direction;
+use super::trial::{GAINS, Trial, TrialState, value_of};
 use std::f64::consts::PI;
 
-/// Repeats that a contender must have before anything is concluded from its spread.
+/// Least repeats of a contender before its spread is used.
 pub const LEAST_REPEATS: usize = 3;
 
-/// A point and all that its repeats say.
+/// A point and the results of its repeats.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Point {
+pub struct RepeatedPoint {
     /// The parameters.
     pub parameters: Vec<(String, f64)>,
     /// Numbers of its trials, ascending.
     pub trials: Vec<u32>,
     /// Values of these trials.
     pub values: Vec<f64>,
-    /// k: how many of them did not fall.
+    /// k: number of trials without a fall.
     pub stood: usize,
 }
 
-impl Point {
-    /// n: how often it was run.
+impl RepeatedPoint {
+    /// n: number of trials.
     pub fn repeats(&self) -> usize {
         self.values.len()
     }
@@ -49,12 +48,12 @@ impl Point {
     }
 }
 
-/// All points that have a complete trial, in the order of their first trials.
-pub fn points(trials: &[Trial]) -> Vec<Point> {
-    let mut points: Vec<Point> = Vec::new();
+/// All points with a complete trial, in the order of their first trials.
+pub fn points(trials: &[Trial]) -> Vec<RepeatedPoint> {
+    let mut points: Vec<RepeatedPoint> = Vec::new();
     let complete = trials.iter().filter(|t| t.state == TrialState::Complete);
     for (trial, value) in complete.filter_map(|t| Some((t, t.value?))) {
-        let first = |p: &Point| trials.iter().find(|t| t.number == p.trials[0]);
+        let first = |p: &RepeatedPoint| trials.iter().find(|t| t.number == p.trials[0]);
         let conditions = |t: &Trial| t.user_attributes.get(GAINS).cloned();
         let known = points
             .iter_mut()
@@ -66,7 +65,7 @@ pub fn points(trials: &[Trial]) -> Vec<Point> {
                 point.values.push(value);
                 point.stood += stood;
             }
-            None => points.push(Point {
+            None => points.push(RepeatedPoint {
                 parameters: trial.parameters.clone(),
                 trials: vec![trial.number],
                 values: vec![value],
@@ -78,44 +77,68 @@ pub fn points(trials: &[Trial]) -> Vec<Point> {
 }
 
 fn same(a: &[(String, f64)], b: &[(String, f64)]) -> bool {
-    let has = |(name, value): &(String, f64)| b.iter().any(|(n, v)| n == name && v.to_bits() == value.to_bits());
+    let has = |(name, value): &(String, f64)| value_of(b, name).map(f64::to_bits) == Some(value.to_bits());
     a.len() == b.len() && a.iter().all(has)
 }
 
+/// The trials that were better than all before them, in order; the last is the best, the earliest among equals. `trials`:
+/// candidates in the order of their numbers, each with its number and its own value; `mean`: value of the repeated point
+/// of a trial, which replaces the trial's own.
+pub fn improvements<T>(
+    trials: impl IntoIterator<Item = (T, u32, f64)>,
+    mean: impl Fn(u32) -> Option<f64>,
+    direction: Direction,
+) -> impl Iterator<Item = T> {
+    let mut best = None;
+    trials.into_iter().filter_map(move |(trial, number, value)| {
+        let value = mean(number).unwrap_or(value);
+        let better = !value.is_nan() && best.is_none_or(|best| direction.best_first(value, best).is_lt());
+        better.then(|| best = Some(value)).map(|()| trial)
+    })
+}
+
+/// The best feasible complete trial that did not fall, with repeats averaged; the earliest among equals.
+pub fn best(trials: &[Trial], direction: Direction) -> Option<&Trial> {
+    let points = points(trials);
+    let mean = |number| points.iter().find(|point| point.trials.contains(&number)).map(RepeatedPoint::mean);
+    let candidates = trials.iter().filter(|t| t.state == TrialState::Complete && t.violation() <= 0.0 && !t.is_fall());
+    improvements(candidates.filter_map(|t| Some((t, t.number, t.value?))), mean, direction).last()
+}
+
 /// The best `count` points by mean value, best first; earlier ones first among equals.
-pub fn contenders(trials: &[Trial], direction: Direction, count: usize) -> Vec<Point> {
+pub fn contenders(trials: &[Trial], direction: Direction, count: usize) -> Vec<RepeatedPoint> {
     let mut points = points(trials);
     points.sort_by(|a, b| direction.best_first(a.mean(), b.mean()));
     points.truncate(count);
     points
 }
 
-/// What to do to confirm the best of some points.
+/// Next step in the confirmation of the best of some points.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Confirmation {
-    /// Run the contender of this index once more.
+    /// Repeat the contender of this index.
     Repeat(usize),
-    /// The contender of this index leads, with at least this confidence over all others together.
+    /// The contender of this index leads, with this confidence over all others together.
     Leads(usize, f64),
 }
 
-/// Decides from the repeats so far of contenders that were chosen once ([`contenders`]) and stay the same (the values
-/// that chose them flatter them, so each is repeated before it is believed).
+/// Decides the next step from the repeats so far of contenders that were chosen once ([`contenders`]) and stay the same:
+/// the values by which they were chosen are biased upwards, so each is repeated.
 ///
 /// First every contender gets [`LEAST_REPEATS`]. Then the leader is compared with each of the others by Student's t-test
-/// with the variance pooled over all of them; the confidence in the leader is 1 minus the sum of the chances that another
-/// is better (Bonferroni). Below `confidence` the leader or its closest rival is repeated, whichever has fewer repeats.
-/// Without any spread at all (a simulator without noise) the leader leads for certain.
+/// with the variance pooled over all of them; the confidence in the leader is 1 minus the sum of the probabilities that
+/// another is better (Bonferroni). Below `confidence` the leader or its closest rival is repeated, whichever has fewer
+/// repeats. Without any spread (a simulator without noise) the confidence is 1.
 ///
-/// Looking after each repeat finds a leader too early more often than looking once: over many confirmations of equally
-/// good contenders that matters, for contenders that differ it does not.
-pub fn confirm(contenders: &[Point], direction: Direction, confidence: f64) -> Confirmation {
+/// Testing after each repeat finds a leader too early more often than testing once; this matters over many confirmations
+/// of equally good contenders, not for contenders that differ.
+pub fn confirm(contenders: &[RepeatedPoint], direction: Direction, confidence: f64) -> Confirmation {
     let fewest = (0..contenders.len()).min_by_key(|i| contenders[*i].repeats());
     let Some(fewest) = fewest.filter(|_| contenders.len() > 1) else { return Confirmation::Leads(0, 1.0) };
     if contenders[fewest].repeats() < LEAST_REPEATS {
         return Confirmation::Repeat(fewest);
     }
-    let Standing { leader, confidence: reached, rival } = standing(contenders, direction);
+    let Ranking { leader, confidence: reached, rival } = rank(contenders, direction);
     if reached >= confidence {
         return Confirmation::Leads(leader, reached);
     }
@@ -123,28 +146,28 @@ pub fn confirm(contenders: &[Point], direction: Direction, confidence: f64) -> C
     Confirmation::Repeat(if leader_has_fewer { leader } else { rival })
 }
 
-/// Who is ahead, and how surely.
+/// Leader and rival of some contenders.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Standing {
+pub struct Ranking {
     /// Index of the contender with the best mean.
     pub leader: usize,
-    /// Confidence in it over all others together; 0 while there is no spread to tell it from.
+    /// Confidence in the leader over all others together; 0 while no contender has two repeats.
     pub confidence: f64,
-    /// Index of the contender that may best be better; the leader itself where there is no other.
+    /// Index of the contender most likely to be better; the leader itself without another.
     pub rival: usize,
 }
 
-/// Who is ahead of some contenders (at least one), by the test of [`confirm`].
-pub fn standing(contenders: &[Point], direction: Direction) -> Standing {
+/// Ranks some contenders (at least one) by the test of [`confirm`].
+pub fn rank(contenders: &[RepeatedPoint], direction: Direction) -> Ranking {
     let mut order: Vec<usize> = (0..contenders.len()).collect();
     order.sort_by(|a, b| direction.best_first(contenders[*a].mean(), contenders[*b].mean()));
     let leader = order[0];
     let freedom = contenders.iter().map(|p| p.repeats() - 1).sum::<usize>();
     if freedom == 0 {
-        return Standing { leader, confidence: 0.0, rival: order.get(1).copied().unwrap_or(leader) };
+        return Ranking { leader, confidence: 0.0, rival: order.get(1).copied().unwrap_or(leader) };
     }
     // s^2 = sum_i sum_j (y_ij - mean_i)^2 / sum_i (n_i - 1)
-    let variance = contenders.iter().map(Point::squares).sum::<f64>() / freedom as f64;
+    let variance = contenders.iter().map(RepeatedPoint::squares).sum::<f64>() / freedom as f64;
     let doubt = |rival: usize| {
         let (a, b) = (&contenders[leader], &contenders[rival]);
         // t = (mean_a - mean_b) / (s sqrt(1/n_a + 1/n_b))
@@ -155,7 +178,7 @@ pub fn standing(contenders: &[Point], direction: Direction) -> Standing {
     let doubts: Vec<(usize, f64)> = order[1..].iter().map(|&rival| (rival, doubt(rival))).collect();
     let confidence = (1.0 - doubts.iter().map(|(_, d)| d).sum::<f64>()).max(0.0);
     let rival = doubts.into_iter().max_by(|a, b| a.1.total_cmp(&b.1)).map_or(leader, |(rival, _)| rival);
-    Standing { leader, confidence, rival }
+    Ranking { leader, confidence, rival }
 }
 
 /// Distribution function of Student's t for t >= 0 and a whole number of degrees of freedom

@@ -1,4 +1,4 @@
-//! The Sobol sequence: points that fill the unit cube more evenly than random ones do.
+//! The Sobol sequence: points that fill the unit cube more evenly than random ones.
 //!
 //! Direction numbers of Joe and Kuo, "Constructing Sobol sequences with better two-dimensional projections", SIAM J. Sci.
 //! Comput. 30, 2008 (table new-joe-kuo-6.21201), in the Gray-code order of Antonov and Saleev, with a random digital
@@ -8,7 +8,7 @@ use super::mt19937::Mt19937;
 
 /// Bits of a coordinate.
 const BITS: usize = 32;
-/// Coordinates that the table covers.
+/// Number of coordinates in the table.
 pub const MAX_DIMENSIONS: usize = 10;
 
 /// Primitive polynomial (degree is the number of initial values; inner coefficients as bits) and initial values m_i.
@@ -32,8 +32,8 @@ pub struct Sobol {
 }
 
 impl Sobol {
-    /// The sequence in so many dimensions, shifted by one draw of `stream` per dimension. Beyond
-    /// [`MAX_DIMENSIONS`] the table's coordinates repeat with other shifts: still even one by one, no longer pairwise.
+    /// The sequence shifted by one draw of `stream` per dimension. Beyond [`MAX_DIMENSIONS`] the table's coordinates
+    /// repeat with other shifts: even in each coordinate, not pairwise.
     pub fn new(dimensions: usize, stream: &mut Mt19937) -> Self {
         let directions = (0..dimensions).map(|d| direction_numbers(d % MAX_DIMENSIONS)).collect();
         let shift = (0..dimensions).map(|_| (stream.double() * f64::from(u32::MAX)) as u32).collect();
@@ -55,7 +55,7 @@ impl Sobol {
 fn direction_numbers(dimension: usize) -> [u32; BITS] {
     let mut v = [0; BITS];
     let Some((a, m)) = dimension.checked_sub(1).map(|d| TABLE[d]) else {
-        // the first coordinate is van der Corput's sequence
+        // The first coordinate is van der Corput's sequence.
         (0..BITS).for_each(|i| v[i] = 1 << (BITS - 1 - i));
         return v;
     };

@@ -1,26 +1,26 @@
-//! What is searched: named ranges of real numbers, linear or logarithmic.
+//! The search space: named ranges of real numbers, linear or logarithmic.
 
 use serde::{Deserialize, Serialize};
 
-/// The range of one parameter. Two trials belong to the same search only if their ranges are equal to the bit.
+/// The range of one parameter. Only trials whose ranges are equal to the bit are sampled jointly.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Range {
     /// Lower bound, in the parameter's own unit, included.
     pub low: f64,
     /// Upper bound, in the parameter's own unit, included.
     pub high: f64,
-    /// Whether the parameter is searched in its logarithm.
+    /// Whether the search coordinate is the logarithm.
     #[serde(default)]
     pub log: bool,
 }
 
 impl Range {
-    /// A range searched linearly.
+    /// A linear range.
     pub const fn linear(low: f64, high: f64) -> Self {
         Range { low, high, log: false }
     }
 
-    /// A range searched in the logarithm; both bounds must be positive.
+    /// A logarithmic range; both bounds must be positive.
     pub const fn logarithmic(low: f64, high: f64) -> Self {
         Range { low, high, log: true }
     }
@@ -30,12 +30,12 @@ impl Range {
         self.low <= value && value <= self.high
     }
 
-    /// Whether the range is a single point, of which nothing can be learned.
+    /// Whether the range is a single point.
     pub fn is_point(&self) -> bool {
         self.low == self.high
     }
 
-    /// The coordinate in which the parameter is searched: itself, or its natural logarithm.
+    /// The search coordinate: the value or its natural logarithm.
     pub fn inner(&self, value: f64) -> f64 {
         if self.log { libm::log(value) } else { value }
     }
@@ -56,7 +56,7 @@ impl Range {
         if high > low { (self.inner(value) - low) / (high - low) } else { 0.5 }
     }
 
-    /// The value at position `unit` (0..1), kept inside the range whatever the rounding.
+    /// The value at position `unit` (0..1), clamped to the range against rounding.
     pub fn unscale(&self, unit: f64) -> f64 {
         let (low, high) = self.inner_bounds();
         self.outer(low + (high - low) * unit).clamp(self.low, self.high)
@@ -66,52 +66,54 @@ impl Range {
 /// A named range.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Parameter {
-    /// Name, as in the journal and on screen: `f0`, `Fx`.
+    /// Name, as in the journal and on the screen: `f0`, `Fx`.
     pub name: String,
-    /// Where it may lie.
+    /// Bounds and scale.
     #[serde(flatten)]
     pub range: Range,
 }
 
-/// The parameters of a study in the order in which they are asked for.
+/// The parameters of a study in the order in which they are sampled.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Space(Vec<Parameter>);
 
-/// Why a space cannot be searched.
+/// Reason why a space cannot be searched.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SpaceError {
-    /// Nothing to search.
+    /// No parameter.
     #[error("the space has no parameter: give at least one")]
     Empty,
     /// Two parameters of one name.
     #[error("parameter `{0}` is given twice: names must differ")]
     Duplicate(String),
     /// Bounds that are not a range.
-    #[error("parameter `{name}`: bounds {low}..{high} are no range: both must be finite and low must not exceed high")]
+    #[error(
+        "parameter `{name}`: bounds {low}..{high} are not a range: both must be finite and low must not exceed high"
+    )]
     Bounds {
         /// The parameter.
         name: String,
-        /// Its lower bound as given.
+        /// Lower bound as given.
         low: f64,
-        /// Its upper bound as given.
+        /// Upper bound as given.
         high: f64,
     },
-    /// A logarithm of nothing.
+    /// A logarithmic range that is not positive.
     #[error("parameter `{name}` is logarithmic, so its lower bound must be above 0, not {low}")]
     LogBounds {
         /// The parameter.
         name: String,
-        /// Its lower bound as given.
+        /// Lower bound as given.
         low: f64,
     },
 }
 
 impl Space {
-    /// Checks the parameters and makes a space of them.
+    /// Checks the parameters.
     ///
     /// # Errors
-    /// [`SpaceError`] if there is none, a name is given twice, or bounds are not finite, reversed, or not positive
-    /// though logarithmic.
+    /// [`SpaceError`] without any parameter, for a name given twice, and for bounds that are not finite, reversed, or not
+    /// positive though logarithmic.
     pub fn new(parameters: impl IntoIterator<Item = (String, Range)>) -> Result<Self, SpaceError> {
         let mut space: Vec<Parameter> = Vec::new();
         for (name, range) in parameters {

@@ -1,39 +1,40 @@
 //! The tree-structured Parzen estimator, equal to Optuna 5.0's `TPESampler` for float parameters.
 //!
 //! Bergstra et al., NeurIPS 2011; Watanabe, "Tree-structured Parzen estimator", arXiv:2304.11127. Finished trials are
-//! split into the good and the bad; l(x) and g(x) are the Parzen estimators of the two; of 24 candidates drawn from l
-//! the one with the largest l(x)/g(x) is proposed. Trials still running count as bad (the constant liar), so that
-//! workers do not crowd.
+//! split into good and bad; l(x) and g(x) are the Parzen estimators of the two; of 24 candidates drawn from l the one
+//! with the largest l(x)/g(x) is proposed. Running trials count as bad (constant liar), which keeps parallel workers
+//! apart. `docs/tpe.md` has the rules of Optuna 5.0 in full.
 
+use super::ask::{Ask, Candidate, Direction, Streams};
+use super::model_free::uniform;
 use super::mt19937::Mt19937;
 use super::parzen::Parzen;
-use super::sampler::{Direction, Proposal, SamplerConfig, Streams};
-use super::space::{Parameter, Range, Space};
-use super::trial::{Trial, TrialState};
+use super::space::{Parameter, Range};
+use super::trial::{Trial, TrialState, value_of};
 use std::cmp::Ordering;
 
-/// How many of `n` finished trials are good: min(ceil(0.1 n), 25).
+/// Number of good trials among `n` finished ones: min(ceil(0.1 n), 25).
 pub fn good_count(n: usize) -> usize {
     ((0.1 * n as f64).ceil() as usize).min(25)
 }
 
 /// Trials split into good and bad, each in the order of their numbers.
 #[derive(Debug)]
-pub struct Split<'a> {
+pub struct TpeSplit<'a> {
     /// The best tenth.
     pub good: Vec<&'a Trial>,
-    /// The rest, and those still running.
+    /// The others, running ones included.
     pub bad: Vec<&'a Trial>,
 }
 
-/// Splits the history; trials that failed or wait are in neither part.
-pub fn split(trials: &[Trial], direction: Direction) -> Split<'_> {
+/// Splits the history; failed and waiting trials are in neither part.
+pub fn split(trials: &[Trial], direction: Direction) -> TpeSplit<'_> {
     let observed = trials.iter().filter(|t| t.state.is_observed());
     let places = good_count(observed.clone().count());
     let (feasible, mut infeasible): (Vec<&Trial>, Vec<&Trial>) = observed.partition(|t| t.violation() <= 0.0);
     let (mut complete, mut pruned): (Vec<&Trial>, Vec<&Trial>) =
         feasible.into_iter().partition(|t| t.state == TrialState::Complete);
-    // Stable sorts: equal trials stay in the order of their numbers.
+    // Stable sorts: equal trials keep the order of their numbers.
     complete.sort_by(|a, b| direction.best_first(a.value.unwrap_or(f64::NAN), b.value.unwrap_or(f64::NAN)));
     pruned.sort_by(|a, b| pruned_order(a, b, direction));
     infeasible.sort_by(|a, b| a.violation().total_cmp(&b.violation()));
@@ -43,10 +44,10 @@ pub fn split(trials: &[Trial], direction: Direction) -> Split<'_> {
     bad.extend(trials.iter().filter(|t| t.state == TrialState::Running));
     good.sort_by_key(|t| t.number);
     bad.sort_by_key(|t| t.number);
-    Split { good, bad }
+    TpeSplit { good, bad }
 }
 
-/// Pruned trials: the one that went farthest first, then by its last intermediate value; silent ones last.
+/// Order of pruned trials: by last step, descending, then by the value there; those without intermediate values last.
 fn pruned_order(a: &Trial, b: &Trial, direction: Direction) -> Ordering {
     let key = |t: &Trial| match t.intermediate.last_key_value() {
         None => (1, 0.0),
@@ -57,7 +58,7 @@ fn pruned_order(a: &Trial, b: &Trial, direction: Direction) -> Ordering {
     step_a.cmp(&step_b).then(value_a.partial_cmp(&value_b).unwrap_or(Ordering::Equal))
 }
 
-/// The parameters that every finished trial has with the very same range, sorted by name: those sampled jointly.
+/// Parameters that every finished trial has with the same range, sorted by name: those sampled jointly.
 pub fn joint_space(trials: &[Trial]) -> Vec<Parameter> {
     let mut observed = trials.iter().filter(|t| t.state.is_observed());
     let Some(first) = observed.next() else { return Vec::new() };
@@ -75,31 +76,31 @@ pub fn joint_space(trials: &[Trial]) -> Vec<Parameter> {
     joint
 }
 
-/// The two densities over `parameters` for the present history.
-pub struct Model {
+/// The two densities over some parameters.
+pub struct TpeModel {
     parameters: Vec<Parameter>,
     /// l(x), of the good trials.
     pub good: Parzen,
-    /// g(x), of the bad ones.
+    /// g(x), of the bad trials.
     pub bad: Parzen,
 }
 
-impl Model {
-    /// Fits both densities. `announced`: whether joint samples announced by running trials stand in for parameters that
-    /// they have not set yet.
-    pub fn fit(split: &Split<'_>, parameters: &[Parameter], announced: bool) -> Self {
+impl TpeModel {
+    /// Fits both densities. `announced`: whether the joint samples announced by running trials substitute for
+    /// parameters that are not set yet.
+    pub fn fit(split: &TpeSplit<'_>, parameters: &[Parameter], announced: bool) -> Self {
         let bounds: Vec<(f64, f64)> = parameters.iter().map(|p| p.range.inner_bounds()).collect();
         let fit = |trials: &[&Trial]| Parzen::new(&observations(trials, parameters, announced), &bounds);
-        Model { parameters: parameters.to_vec(), good: fit(&split.good), bad: fit(&split.bad) }
+        TpeModel { parameters: parameters.to_vec(), good: fit(&split.good), bad: fit(&split.bad) }
     }
 
-    /// The best of `candidates` drawn from l, in the parameters' own units and in their order.
+    /// Returns the best of `candidates` points drawn from l, in the parameters' own units and in their order.
     pub fn propose(&self, stream: &mut Mt19937, candidates: usize) -> Vec<f64> {
         let drawn = self.good.sample(stream, candidates);
         let ranges: Vec<Range> = self.parameters.iter().map(|p| p.range).collect();
         let values: Vec<Vec<f64>> =
             drawn.iter().zip(&ranges).map(|(column, r)| column.iter().map(|&x| r.outer(x)).collect()).collect();
-        // Scored at the value that will be proposed: for logarithmic parameters ln of the rounded exp.
+        // Scored at the value that is proposed: for logarithmic parameters ln of the rounded exp.
         let scored: Vec<Vec<f64>> =
             values.iter().zip(&ranges).map(|(column, r)| column.iter().map(|&v| r.inner(v)).collect()).collect();
         let (log_l, log_g) = (self.good.log_density(&scored), self.bad.log_density(&scored));
@@ -113,17 +114,18 @@ impl Model {
     }
 }
 
-/// The search coordinates of the trials that have every parameter, by parameter.
+/// Search coordinates, by parameter, of the trials that have every parameter.
 fn observations(trials: &[&Trial], parameters: &[Parameter], announced: bool) -> Vec<Vec<f64>> {
     let mut columns = vec![Vec::with_capacity(trials.len()); parameters.len()];
     let mut row = Vec::with_capacity(parameters.len());
     for trial in trials {
-        let promised = if announced && trial.state == TrialState::Running { trial.announced() } else { Vec::new() };
+        let sample = if announced && trial.state == TrialState::Running { trial.announced() } else { Vec::new() };
         row.clear();
-        row.extend(parameters.iter().map_while(|p| {
-            let promise = || promised.iter().find(|(n, _)| *n == p.name).map(|(_, v)| *v);
-            trial.parameter(&p.name).or_else(promise).map(|v| p.range.inner(v))
-        }));
+        row.extend(
+            parameters.iter().map_while(|p| {
+                trial.parameter(&p.name).or_else(|| value_of(&sample, &p.name)).map(|v| p.range.inner(v))
+            }),
+        );
         if row.len() == parameters.len() {
             columns.iter_mut().zip(&row).for_each(|(column, x)| column.push(*x));
         }
@@ -131,26 +133,17 @@ fn observations(trials: &[&Trial], parameters: &[Parameter], announced: bool) ->
     columns
 }
 
-/// The next point, parameter by parameter as Optuna asks for them. `trials` must not hold the trial that is being asked
-/// for; `fixed` are its given parameters.
-pub fn propose(
-    config: &SamplerConfig,
-    streams: &mut Streams,
-    trials: &[Trial],
-    space: &Space,
-    fixed: &[(String, f64)],
-    direction: Direction,
-) -> Proposal {
+/// Proposes the next point, parameter by parameter as Optuna asks for them.
+pub fn propose(ask: &Ask<'_>, streams: &mut Streams) -> Candidate {
+    let Ask { config, trials, space, direction, .. } = *ask;
     let startup = trials.iter().filter(|t| t.state.is_observed()).count() < config.startup_trials(space);
-    let mut parts: Option<Split<'_>> = None;
+    let mut parts: Option<TpeSplit<'_>> = None;
     let mut joint: Option<Vec<(String, f64)>> = None;
     let mut values = Vec::with_capacity(space.parameters().len());
     for parameter in space.parameters() {
         let Parameter { name, range } = parameter;
-        let value = if let Some((_, given)) = fixed.iter().find(|(n, _)| n == name) {
-            *given
-        } else if range.is_point() {
-            range.low
+        let value = if let Some(given) = ask.given(parameter) {
+            given
         } else if startup {
             uniform(range, &mut streams.startup)
         } else {
@@ -160,27 +153,15 @@ pub fn propose(
                 if together.is_empty() {
                     return Vec::new();
                 }
-                let point = Model::fit(parts, &together, true).propose(&mut streams.model, config.candidates);
+                let point = TpeModel::fit(parts, &together, true).propose(&mut streams.model, config.candidates);
                 together.into_iter().map(|p| p.name).zip(point).collect()
             });
-            match joint.iter().find(|(n, v)| n == name && range.contains(*v)) {
-                Some((_, v)) => *v,
-                None => {
-                    let alone = Model::fit(parts, std::slice::from_ref(parameter), config.multivariate);
-                    alone.propose(&mut streams.model, config.candidates)[0]
-                }
-            }
+            value_of(joint, name).filter(|v| range.contains(*v)).unwrap_or_else(|| {
+                let alone = TpeModel::fit(parts, std::slice::from_ref(parameter), config.multivariate);
+                alone.propose(&mut streams.model, config.candidates)[0]
+            })
         };
         values.push(value);
     }
-    Proposal { values, joint: joint.unwrap_or_default() }
-}
-
-/// One uniform draw over the search coordinate; never the upper bound itself.
-pub fn uniform(range: &Range, stream: &mut Mt19937) -> f64 {
-    let (a, b) = range.inner_bounds();
-    // x = a + (b - a) u
-    let x = a + (b - a) * stream.double();
-    let x = if range.log { range.outer(x).max(range.low) } else { x };
-    x.min(range.high.next_down())
+    Candidate { values, joint: joint.unwrap_or_default() }
 }

@@ -1,26 +1,29 @@
-//! A trial as the samplers see it and the journal tells it.
+//! A trial, as samplers read it and the journal stores it.
 
 use super::space::Range;
 use serde_json::Value;
 use std::collections::BTreeMap;
 
-/// Where a trial stands; the discriminants are the journal's.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// State of a trial; the discriminants are the journal's, the names those of Optuna's tables.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, strum::FromRepr, strum::EnumString, strum::IntoStaticStr)]
+#[strum(serialize_all = "UPPERCASE")]
+#[repr(u8)]
 pub enum TrialState {
     /// Begun, no value yet.
+    #[default]
     Running = 0,
     /// Finished with a value.
     Complete = 1,
-    /// Stopped early by a pruner (other programs do this; we read it).
+    /// Stopped early by a pruner of another program.
     Pruned = 2,
-    /// Finished without a value; the samplers do not see it.
+    /// Finished without a value; ignored by the samplers.
     Fail = 3,
-    /// Enqueued: parameters are asked for, nobody has begun it.
+    /// Enqueued, not begun.
     Waiting = 4,
 }
 
 impl TrialState {
-    /// Whether nothing about the trial can change any more.
+    /// Whether the trial is immutable.
     pub fn is_finished(self) -> bool {
         matches!(self, TrialState::Complete | TrialState::Pruned | TrialState::Fail)
     }
@@ -31,23 +34,22 @@ impl TrialState {
     }
 }
 
-/// How a parameter of a trial was distributed.
+/// Distribution of a parameter of a trial.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Distribution {
-    /// A float range, ours.
+    /// A float range.
     Float(Range),
-    /// An integer, stepped or categorical one, written by another program: its kind and settings as text. The samplers
-    /// here leave it out of the joint space.
+    /// An integer, stepped or categorical distribution of another program; left out of the joint space.
     Foreign {
-        /// Name of the kind, for example `IntDistribution`.
+        /// Kind, for example `IntDistribution`.
         kind: String,
-        /// The journal's text.
+        /// JSON text in the journal.
         text: String,
     },
 }
 
 impl Distribution {
-    /// The range, if it is a float's.
+    /// The range of a float.
     pub fn range(&self) -> Option<Range> {
         match self {
             Distribution::Float(range) => Some(*range),
@@ -57,54 +59,41 @@ impl Distribution {
 }
 
 /// One evaluation of the objective.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Trial {
     /// Number within its study, from 0.
     pub number: u32,
     /// Number within the journal, over all its studies.
     pub id: u64,
-    /// Where it stands.
+    /// State.
     pub state: TrialState,
     /// Parameters in the order in which they were set.
     pub parameters: Vec<(String, f64)>,
     /// Distributions, parallel to `parameters`.
     pub distributions: Vec<Distribution>,
-    /// The objective, of a complete trial (and of a pruned one that reported).
+    /// Value of the objective, of a complete trial or of a pruned one that reported one.
     pub value: Option<f64>,
-    /// Intermediate values by step, as a pruner wants them.
+    /// Intermediate values by step, for pruners.
     pub intermediate: BTreeMap<i64, f64>,
-    /// Attributes of the user: verdict, cause, measured terms.
+    /// User attributes: verdict, cause, measured terms.
     pub user_attributes: BTreeMap<String, Value>,
-    /// Attributes of the machinery: fixed parameters, draw counters, announced joint samples.
+    /// System attributes: fixed parameters, positions of the random streams, announced joint samples.
     pub system_attributes: BTreeMap<String, Value>,
-    /// When it began, if it did.
+    /// Time of the beginning.
     pub started: Option<jiff::Timestamp>,
-    /// When it was finished, if it was.
+    /// Time of the end.
     pub completed: Option<jiff::Timestamp>,
-    /// Identity of the writer that began it (or enqueued it, while it waits).
+    /// Identity of the writer that began it (enqueued it, while it waits).
     pub worker: String,
 }
 
 impl Trial {
-    /// A trial without anything.
+    /// A trial without parameters, value, attributes and times.
     pub fn new(number: u32, state: TrialState) -> Self {
-        Trial {
-            number,
-            id: u64::from(number),
-            state,
-            parameters: Vec::new(),
-            distributions: Vec::new(),
-            value: None,
-            intermediate: BTreeMap::new(),
-            user_attributes: BTreeMap::new(),
-            system_attributes: BTreeMap::new(),
-            started: None,
-            completed: None,
-            worker: String::new(),
-        }
+        Trial { number, id: u64::from(number), state, ..Trial::default() }
     }
 
-    /// Sets a parameter, or replaces it.
+    /// Sets or replaces a parameter.
     pub fn set(&mut self, name: &str, value: f64, distribution: Distribution) {
         match self.parameters.iter().position(|(n, _)| n == name) {
             Some(i) => {
@@ -120,7 +109,7 @@ impl Trial {
 
     /// The value of parameter `name`.
     pub fn parameter(&self, name: &str) -> Option<f64> {
-        self.parameters.iter().find(|(n, _)| n == name).map(|(_, v)| *v)
+        value_of(&self.parameters, name)
     }
 
     /// The distribution of parameter `name`.
@@ -128,35 +117,24 @@ impl Trial {
         self.parameters.iter().position(|(n, _)| n == name).map(|i| &self.distributions[i])
     }
 
-    /// Parameters that were given, not suggested: of an enqueued trial, or overridden by the operator.
+    /// Given parameters: of an enqueued trial, or overridden by the operator.
     pub fn fixed(&self) -> Vec<(String, f64)> {
-        match self.system_attributes.get(FIXED_PARAMS) {
-            Some(Value::Object(map)) => map.iter().filter_map(|(k, v)| Some((k.clone(), number_of(v)?))).collect(),
-            _ => Vec::new(),
-        }
+        self.system_attributes.get(FIXED_PARAMS).map(numbers_of).unwrap_or_default()
     }
 
-    /// Whether the robot fell: its attribute `verdict` says `fall`.
+    /// Whether the robot fell: attribute `verdict` is `fall`.
     pub fn is_fall(&self) -> bool {
         self.user_attributes.get(VERDICT).and_then(Value::as_str) == Some(FALL)
     }
 
-    /// The joint sample announced for other workers, empty where there is none. Optuna writes it as JSON text in pieces.
+    /// The joint sample announced to other workers, empty without one. Optuna stores it as JSON text in pieces.
     pub fn announced(&self) -> Vec<(String, f64)> {
         let text: String =
             (0..).map_while(|i| self.system_attributes.get(&format!("{RELATIVE_PARAMS}:{i}"))?.as_str()).collect();
-        match serde_json::from_str(&text) {
-            Ok(Value::Object(map)) => map.iter().filter_map(|(k, v)| Some((k.clone(), number_of(v)?))).collect(),
-            _ => Vec::new(),
-        }
+        serde_json::from_str(&text).as_ref().map(numbers_of).unwrap_or_default()
     }
 
-    /// Announces a joint sample, as Optuna writes it.
-    pub fn announce(&mut self, joint: &[(String, f64)]) {
-        self.system_attributes.extend(announcement(joint));
-    }
-
-    /// The sum of the positive constraint values, 0 if there are none: above 0 the trial is infeasible to Optuna.
+    /// Sum of the positive constraint values: above 0 the trial is infeasible for Optuna.
     pub fn violation(&self) -> f64 {
         let positive = |v: &Value| number_of(v).unwrap_or(0.0).max(0.0);
         let named: f64 = self
@@ -173,15 +151,15 @@ impl Trial {
     }
 }
 
-/// Trial user attribute: what the operator, or the machine for him, judged.
+/// Trial user attribute: the verdict of the operator or of the automatic judge.
 pub const VERDICT: &str = "verdict";
-/// The verdict of a trial that ended on the floor. It is told with a value, but what the value says is where not to go.
+/// The verdict of a trial that ended with a fall. Its value shows the sampler a region to avoid.
 pub const FALL: &str = "fall";
-/// Trial user attribute: under which conditions besides its parameters it ran, an object. Trials with others are no repeats.
+/// Trial user attribute: gains of the controller, an object. Trials with different gains are not repeats.
 pub const GAINS: &str = "gains";
 /// Trial system attribute: the fixed parameters, an object.
 pub const FIXED_PARAMS: &str = "fixed_params";
-/// Trial system attribute: the announced joint sample, with `:0`, `:1` ... for its pieces.
+/// Trial system attribute: the announced joint sample; its pieces have the suffixes `:0`, `:1` ...
 pub const RELATIVE_PARAMS: &str = "tpe:relative_params";
 
 /// The attributes that announce a joint sample: an object as JSON text, in pieces of 2045 characters.
@@ -197,7 +175,18 @@ pub fn announcement(joint: &[(String, f64)]) -> Vec<(String, Value)> {
     text.chunks(2045).enumerate().map(piece).collect()
 }
 
-/// A number of a JSON value; the tokens that JSON lacks arrive as text.
+/// The value of parameter `name`.
+pub fn value_of(parameters: &[(String, f64)], name: &str) -> Option<f64> {
+    parameters.iter().find(|(n, _)| n == name).map(|(_, v)| *v)
+}
+
+/// The members of a JSON object that are numbers.
+fn numbers_of(value: &Value) -> Vec<(String, f64)> {
+    let members = value.as_object().into_iter().flatten();
+    members.filter_map(|(name, v)| Some((name.clone(), number_of(v)?))).collect()
+}
+
+/// The number of a JSON value; infinities and NaN, which JSON lacks, are text.
 pub(crate) fn number_of(value: &Value) -> Option<f64> {
     match value {
         Value::Number(n) => n.as_f64(),

@@ -1,8 +1,8 @@
-//! The normal distribution cut to an interval: logarithms of its mass and density, and its quantiles, accurate far
-//! out in the tails where the plain formulas give 0 or cancel.
+//! The normal distribution truncated to an interval: logarithm of its mass and quantiles, accurate in the far tails, where
+//! the plain formulas underflow or cancel.
 //!
-//! Symbols: Phi and phi are the distribution function and density of the standard normal. All arithmetic goes through
-//! the `libm` crate, so that the bits do not depend on the C library of the machine.
+//! Symbols: Phi and phi are the distribution function and density of the standard normal. All functions are
+//! those of the `libm` crate, so that the bits do not depend on the C library of the machine.
 
 use libm::{erf, erfc, exp, expm1, log, log1p, sqrt};
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
@@ -22,7 +22,7 @@ pub fn log_cdf(x: f64) -> f64 {
     }
 }
 
-/// Phi(x), by whichever of erf and erfc does not cancel.
+/// Phi(x), by erf or erfc, whichever does not cancel.
 fn cdf_by_erfc(x: f64) -> f64 {
     let t = x * FRAC_1_SQRT_2;
     if t < -FRAC_1_SQRT_2 {
@@ -55,7 +55,7 @@ pub fn log_mass(a: f64, b: f64) -> f64 {
     if b <= 0.0 {
         log_mass_left(a, b)
     } else if a > 0.0 {
-        // the mass of (a, b) is that of its mirror image (-b, -a), where nothing cancels
+        // The mass of (a, b) is that of its mirror image (-b, -a), which does not cancel.
         log_mass_left(-b, -a)
     } else {
         // ln(1 - Phi(a) - Phi(-b))
@@ -70,7 +70,7 @@ fn log_mass_left(a: f64, b: f64) -> f64 {
     log_b + log1p(-exp(log_a - log_b))
 }
 
-/// The value below which the share `u` (0..1) of the standard normal cut to [a, b] lies.
+/// Quantile `u` (0..1) of the standard normal truncated to [a, b].
 pub fn quantile(u: f64, a: f64, b: f64) -> f64 {
     if u == 0.0 {
         return a;
@@ -93,13 +93,13 @@ fn log_add_exp(x: f64, y: f64) -> f64 {
 
 /// The x with ln Phi(x) = y, by Newton's method on the concave function ln Phi.
 fn inverse_log_cdf(y: f64) -> f64 {
-    // near y = 0 solve for the other tail instead: Phi(-x) = 1 - e^y
+    // Near y = 0 the other tail is solved: Phi(-x) = 1 - e^y.
     let flipped = y > -0.01;
     let z = if flipped { log(-expm1(y)) } else { y };
     let mut x = if z < -5.0 {
         -sqrt(-2.0 * (z + HALF_LN_TWO_PI))
     } else {
-        // the logistic approximation of Phi has standard deviation pi / sqrt(3)
+        // The logistic approximation of Phi has standard deviation pi / sqrt(3).
         -(sqrt(3.0) / PI) * log(expm1(-z))
     };
     for _ in 0..100 {
@@ -107,7 +107,7 @@ fn inverse_log_cdf(y: f64) -> f64 {
         let log_phi = log_cdf(x);
         let step = (log_phi - z) * exp(log_phi + 0.5 * x * x + HALF_LN_TWO_PI);
         x -= step;
-        // convergence is quadratic, so after such a step the error is of the order of rounding
+        // Convergence is quadratic: after such a step the error is of the order of rounding.
         if step.abs() < 1e-8 * x.abs() || x == 0.0 {
             break;
         }

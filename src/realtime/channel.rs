@@ -1,25 +1,25 @@
-//! The wait-free channels over the real-time boundary. Each endpoint is handed out once: whoever was not given one cannot
-//! send.
+//! The wait-free channels over the real-time boundary. Each endpoint exists once: code without it cannot send.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::telemetry::{Command, Counters, Event, Readiness, Snapshot, Tick};
 
-/// Commands that may wait.
+/// Capacity of the ring of commands.
 pub const COMMANDS: usize = 64;
-/// Ticks that may wait for the recorder: four seconds.
+/// Capacity of the recorder's ring, ticks: four seconds.
 pub const TICKS: usize = 4096;
-/// Decimated ticks that may wait for the screen.
+/// Capacity of the screen's ring, decimated ticks.
 pub const SHOWN_TICKS: usize = 1024;
-/// Every n-th tick goes to the screen's charts.
+/// Decimation of the ticks for the screen's charts.
 pub const SHOWN_EVERY: u64 = 5;
-/// Events that may wait for the session.
+/// Capacity of the ring of events.
 pub const EVENTS: usize = 256;
 
-/// STOP: anyone sets it, control reads it first in every tick, and it is cleared by an acknowledgement alone.
+/// The STOP latch. Any thread sets it; the control thread reads it in every tick before it acts on failsafes or commands; an
+/// acknowledgement clears it.
 ///
-/// Stops are counted, and an acknowledgement names the stops that it has seen: a newer STOP outlives it.
+/// STOPs are counted, and an acknowledgement names the count that it answers: a newer STOP stays set.
 #[derive(Debug, Clone, Default)]
 pub struct StopLatch(Arc<Stops>);
 
@@ -30,12 +30,12 @@ struct Stops {
 }
 
 impl StopLatch {
-    /// Stops. Cannot queue, wait or fail.
+    /// Sets STOP. Cannot queue, wait or fail.
     pub fn set(&self) {
         self.0.pressed.fetch_add(1, Ordering::AcqRel);
     }
 
-    /// How often it was pressed.
+    /// Number of STOPs since the start.
     pub fn count(&self) -> u64 {
         self.0.pressed.load(Ordering::Acquire)
     }
@@ -45,23 +45,23 @@ impl StopLatch {
         self.count() > self.0.acknowledged.load(Ordering::Acquire)
     }
 
-    /// The control thread takes note that somebody has looked after the first `stops` of them.
+    /// Acknowledges the first `stops` STOPs.
     pub fn acknowledge(&self, stops: u64) {
         self.0.acknowledged.fetch_max(stops, Ordering::AcqRel);
     }
 }
 
-/// A sign of life of the operator's screen.
+/// Heartbeat counter of the operator's screen.
 #[derive(Debug, Clone, Default)]
 pub struct Heartbeat(Arc<AtomicU64>);
 
 impl Heartbeat {
-    /// The screen is alive.
+    /// Counts one heartbeat.
     pub fn beat(&self) {
         self.0.fetch_add(1, Ordering::Relaxed);
     }
 
-    /// How often it was said to be.
+    /// Number of heartbeats since the start.
     pub fn count(&self) -> u64 {
         self.0.load(Ordering::Relaxed)
     }
@@ -69,11 +69,11 @@ impl Heartbeat {
 
 /// The control thread's ends.
 pub struct ControlEnd {
-    /// What the session asks.
+    /// Commands of the session.
     pub commands: rtrb::Consumer<Command>,
     /// STOP.
     pub stop: StopLatch,
-    /// The screen's sign of life.
+    /// Heartbeat of the screen.
     pub heartbeat: Heartbeat,
     /// Every tick, for the recorder.
     pub ticks: rtrb::Producer<Tick>,
@@ -83,25 +83,25 @@ pub struct ControlEnd {
     pub snapshot: triple_buffer::Input<Snapshot>,
     /// The counters, for the session.
     pub counters: triple_buffer::Input<Counters>,
-    /// What speaks against the next arming and the next trial, for the session.
+    /// Conditions of the next arming and the next trial, for the session.
     pub readiness: triple_buffer::Input<Readiness>,
-    /// What happened.
+    /// Events.
     pub events: rtrb::Producer<Event>,
 }
 
 /// The session's ends.
 pub struct SessionEnd {
-    /// What it asks.
+    /// Commands to the control thread.
     pub commands: rtrb::Producer<Command>,
-    /// STOP, to see whether one came after a wish.
+    /// STOP, to detect one that came after an operator's request.
     pub stop: StopLatch,
-    /// The screen's sign of life, to see whether there is a screen at all.
+    /// Heartbeat of the screen, to detect a missing screen.
     pub heartbeat: Heartbeat,
     /// The newest counters.
     pub counters: triple_buffer::Output<Counters>,
-    /// What the control thread has against the next arming and the next trial.
+    /// Conditions of the next arming and the next trial.
     pub readiness: triple_buffer::Output<Readiness>,
-    /// What happened.
+    /// Events.
     pub events: rtrb::Consumer<Event>,
 }
 
@@ -109,7 +109,7 @@ pub struct SessionEnd {
 pub struct ScreenEnd {
     /// STOP.
     pub stop: StopLatch,
-    /// Its sign of life.
+    /// Heartbeat of this screen.
     pub heartbeat: Heartbeat,
     /// Ticks for charts.
     pub shown: rtrb::Consumer<Tick>,
@@ -117,7 +117,7 @@ pub struct ScreenEnd {
     pub snapshot: triple_buffer::Output<Snapshot>,
 }
 
-/// All channels of one engine; the last is the recorder's end.
+/// Creates all channels of one engine; the last is the recorder's end.
 pub fn channels() -> (ControlEnd, SessionEnd, ScreenEnd, rtrb::Consumer<Tick>) {
     let (command_in, command_out) = rtrb::RingBuffer::new(COMMANDS);
     let (tick_in, tick_out) = rtrb::RingBuffer::new(TICKS);

@@ -1,10 +1,10 @@
-//! Time: the machine's monotonic clock, or one that stands still for simulated time.
+//! Clocks of the control cycle: the monotonic clock, or a constant one for simulated time.
 
 use std::time::Instant;
 
-/// Where the cycle reads the time from, to time its stages.
+/// Clock that measures the stages of a tick.
 pub trait Clock {
-    /// Time since the clock was made, ns.
+    /// Time since the clock was created, ns.
     fn now_ns(&self) -> u64;
 }
 
@@ -27,7 +27,7 @@ impl Clock for MonotonicClock {
     }
 }
 
-/// A clock that does not move: in simulated time nothing takes time, and the same seed gives the same ticks.
+/// A constant clock: the stages of a simulated tick take no time, so the same seed gives the same ticks.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct SimulatedClock;
 

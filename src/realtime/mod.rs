@@ -1,4 +1,4 @@
-//! The real-time boundary: what crosses it (all `Copy`) and how.
+//! The operating system: thread, scheduling, clock, channels, properties of the machine.
 
 pub mod channel;
 pub mod clock;

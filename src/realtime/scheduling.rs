@@ -1,6 +1,5 @@
-//! What a control thread asks of the operating system: a real-time priority, locked memory, a core of its own, no deep
-//! sleep of the processor. Each is tried by itself, and what is not granted is a value that says how to get it: a thread
-//! without them still runs, only later now and then.
+//! Real-time settings of the control thread: priority, locked memory, a core of its own, no deep sleep of the processor. Each is
+//! requested by itself; a denied one is a value with the remedy. A thread without them runs, with later ticks.
 
 use std::fs::File;
 use std::io::Write;
@@ -11,18 +10,18 @@ use nix::unistd::Pid;
 
 use super::system;
 
-/// What is asked.
+/// Requested settings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Scheduling {
-    /// Priority under SCHED_FIFO, 1 to 99; 0 stays an ordinary thread, and asks for nothing else either.
+    /// Priority under SCHED_FIFO, 1 to 99; with 0 the thread stays ordinary and requests no setting at all.
     pub priority: u8,
-    /// The core to stay on; none leaves the choice to the system, unless a core is isolated for such a thread.
+    /// Core to run on; none means the first isolated core, or the system's choice without one.
     pub core: Option<usize>,
-    /// Whether the program's memory is locked: no page of it is ever fetched from a disk.
+    /// Whether the program's memory is locked, so that no page fault reads a disk.
     pub lock_memory: bool,
 }
 
-/// One of the things asked for.
+/// One real-time setting.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RealtimeSetting {
     /// SCHED_FIFO at this priority.
@@ -31,7 +30,7 @@ pub enum RealtimeSetting {
     LockedMemory,
     /// The thread stays on this core.
     Core(usize),
-    /// The processor does not sleep deeply while the thread lives.
+    /// The processor does not sleep deeply while the thread runs.
     Awake,
 }
 
@@ -46,45 +45,45 @@ impl std::fmt::Display for RealtimeSetting {
     }
 }
 
-/// What was not granted, why, and the way to get it.
+/// A denied setting.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{favour} not granted: {reason}; {remedy}")]
+#[error("{setting} not granted: {reason}; {remedy}")]
 pub struct DeniedSetting {
-    /// What was asked.
-    pub favour: RealtimeSetting,
-    /// What the system says.
+    /// The setting.
+    pub setting: RealtimeSetting,
+    /// The system's reason.
     pub reason: String,
-    /// What to do.
+    /// Instruction to the operator.
     pub remedy: &'static str,
 }
 
-/// How to be allowed what a control thread needs.
+/// Remedy for a denied priority.
 pub const ALLOW_PRIORITY: &str = "allow it: `sudo setcap cap_sys_nice,cap_ipc_lock+ep $(command -v quadfrog)`, or `@realtime - rtprio 99` in /etc/security/limits.conf and a new login";
-/// How to be allowed to lock memory.
+/// Remedy for denied memory locking.
 pub const ALLOW_LOCKING: &str = "allow it: `sudo setcap cap_sys_nice,cap_ipc_lock+ep $(command -v quadfrog)`, or `@realtime - memlock unlimited` in /etc/security/limits.conf and a new login";
 const ALLOW_CORE: &str = "set realtime.core in control.toml to a core that this program may use, or to -1";
 const ALLOW_AWAKE: &str = "run as root, or give this user the right to write /dev/cpu_dma_latency (a udev rule)";
 
-/// What was granted; the processor is kept awake for as long as this lives.
+/// Granted and denied settings. Keeps the processor awake until dropped.
 #[derive(Debug)]
 pub struct GrantedSettings {
-    /// What was granted.
-    pub favours: Vec<RealtimeSetting>,
-    /// What was not.
-    pub shortfalls: Vec<DeniedSetting>,
+    /// Granted settings.
+    pub granted: Vec<RealtimeSetting>,
+    /// Denied settings.
+    pub denied: Vec<DeniedSetting>,
     _awake: Option<File>,
 }
 
 impl Scheduling {
-    /// Asks for the calling thread. To be called before the loop: it allocates and waits.
+    /// Requests the settings for the calling thread. Allocates and blocks: to be called before the loop.
     pub fn apply(&self) -> GrantedSettings {
-        let mut granted = GrantedSettings { favours: Vec::new(), shortfalls: Vec::new(), _awake: None };
+        let mut settings = GrantedSettings { granted: Vec::new(), denied: Vec::new(), _awake: None };
         if self.priority == 0 {
-            return granted;
+            return settings;
         }
-        let mut note = |favour: RealtimeSetting, asked: Result<(), String>, remedy: &'static str| match asked {
-            Ok(()) => granted.favours.push(favour),
-            Err(reason) => granted.shortfalls.push(DeniedSetting { favour, reason, remedy }),
+        let mut note = |setting: RealtimeSetting, result: Result<(), String>, remedy: &'static str| match result {
+            Ok(()) => settings.granted.push(setting),
+            Err(reason) => settings.denied.push(DeniedSetting { setting, reason, remedy }),
         };
         if self.lock_memory {
             note(RealtimeSetting::LockedMemory, lock_memory(), ALLOW_LOCKING);
@@ -95,15 +94,14 @@ impl Scheduling {
         }
         let awake = stay_awake();
         note(RealtimeSetting::Awake, awake.as_ref().map(|_| ()).map_err(ToString::to_string), ALLOW_AWAKE);
-        // Last: what came before may take its time.
+        // Last, so that the calls above run at ordinary priority.
         note(RealtimeSetting::Priority(self.priority), set_priority(self.priority), ALLOW_PRIORITY);
-        granted._awake = awake.ok();
-        granted
+        settings._awake = awake.ok();
+        settings
     }
 }
 
-/// All pages, present and future. Only where there is no limit: with one, the first allocation beyond it would fail, in
-/// whatever thread.
+/// Locks all pages, present and future. Refused under a limit, because the first allocation beyond it would fail, in any thread.
 fn lock_memory() -> Result<(), String> {
     if let Some(bytes) = system::memlock_limit() {
         return Err(format!("this user may lock {} MB only", bytes / 1_000_000));
@@ -116,15 +114,14 @@ fn pin(core: usize) -> Result<(), String> {
     set.set(core).and_then(|()| sched_setaffinity(Pid::from_raw(0), &set)).map_err(|error| error.to_string())
 }
 
-/// Asks the power management for a wake-up latency of 0 us (Linux, Documentation/power/pm_qos_interface.rst); holds while
-/// the file is open.
+/// Requests a wake-up latency of 0 us (Linux, Documentation/power/pm_qos_interface.rst) for as long as the file is open.
 fn stay_awake() -> std::io::Result<File> {
     let mut file = File::options().write(true).open("/dev/cpu_dma_latency")?;
     file.write_all(&0_i32.to_ne_bytes())?;
     Ok(file)
 }
 
-/// Touches the part of the stack that a tick may use, so that its pages are there before the first one.
+/// Touches 256 KiB of the stack, so that its pages are mapped before the first tick.
 #[inline(never)]
 fn prefault_stack() {
     let mut stack = [0_u8; 256 * 1024];

@@ -1,10 +1,10 @@
-//! What this machine can do for a control thread: what `quadfrog doctor` explains and `scheduling` asks before it acts.
+//! Real-time properties of the machine, for `quadfrog doctor` and `scheduling`.
 
 use std::fs::read_to_string;
 
 use nix::sys::resource::{RLIM_INFINITY, Resource, getrlimit};
 
-/// Whether the kernel is built for real time (PREEMPT_RT): it says so itself.
+/// Whether the kernel is built for real time (PREEMPT_RT).
 pub fn kernel_is_realtime() -> bool {
     read_to_string("/sys/kernel/realtime").is_ok_and(|text| text.trim() == "1") || kernel_build().contains("PREEMPT_RT")
 }
@@ -14,7 +14,7 @@ pub fn kernel_release() -> String {
     read_to_string("/proc/sys/kernel/osrelease").unwrap_or_default().trim().to_owned()
 }
 
-/// How the kernel was built, for example `#1 SMP PREEMPT_DYNAMIC`.
+/// The kernel's build, for example `#1 SMP PREEMPT_DYNAMIC`.
 pub fn kernel_build() -> String {
     read_to_string("/proc/sys/kernel/version").unwrap_or_default().trim().to_owned()
 }
@@ -27,7 +27,7 @@ pub fn priority_limit() -> u64 {
     getrlimit(Resource::RLIMIT_RTPRIO).map_or(0, |(soft, _)| soft.min(99))
 }
 
-/// How many bytes this process may lock; none without a limit, as with the capability CAP_IPC_LOCK.
+/// Limit of locked memory of this process, bytes; none without a limit, as with the capability CAP_IPC_LOCK.
 pub fn memlock_limit() -> Option<u64> {
     if has_capability(14) {
         return None;
@@ -36,12 +36,12 @@ pub fn memlock_limit() -> Option<u64> {
     (soft != RLIM_INFINITY).then_some(soft)
 }
 
-/// Cores that the kernel keeps ordinary threads away from (boot parameter `isolcpus`).
+/// Cores without ordinary threads (boot parameter `isolcpus`).
 pub fn isolated_cores() -> Vec<usize> {
     cores(&read_to_string("/sys/devices/system/cpu/isolated").unwrap_or_default())
 }
 
-/// The frequency governors in use, each named once; empty where the system does not say (a virtual machine).
+/// The frequency governors in use, each once; empty where the system reports none (a virtual machine).
 pub fn governors() -> Vec<String> {
     let mut found = Vec::new();
     let count = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
@@ -57,10 +57,10 @@ pub fn governors() -> Vec<String> {
     found
 }
 
-/// Resolution of the clock that the control thread sleeps by, ns.
+/// Resolution of the monotonic clock, ns.
 ///
 /// # Errors
-/// When the system does not say.
+/// When the system does not report it.
 pub fn timer_resolution_ns() -> Result<u64, nix::Error> {
     let resolution = nix::time::clock_getres(nix::time::ClockId::CLOCK_MONOTONIC)?;
     Ok(resolution.tv_sec() as u64 * 1_000_000_000 + resolution.tv_nsec() as u64)
@@ -73,7 +73,7 @@ fn has_capability(bit: u32) -> bool {
     effective.and_then(|hex| u64::from_str_radix(hex.trim(), 16).ok()).is_some_and(|set| set & (1 << bit) != 0)
 }
 
-/// A list of cores as the kernel writes it: `0,2-4`.
+/// Parses the kernel's list of cores, for example `0,2-4`.
 fn cores(list: &str) -> Vec<usize> {
     let mut found = Vec::new();
     for part in list.trim().split(',').filter(|part| !part.is_empty()) {

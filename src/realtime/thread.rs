@@ -1,4 +1,5 @@
-//! Pacing: a body called at absolute instants, one per period, and how late each call was; before each, if it wishes, a rehearsal.
+//! Pacing: calls a body at absolute instants, one per period, and measures how late each call was; optionally with a
+//! cache warm-up before each call.
 
 use std::ops::ControlFlow;
 use std::time::Duration;
@@ -6,80 +7,80 @@ use std::time::Duration;
 use nix::sys::time::TimeSpec;
 use nix::time::{ClockId, ClockNanosleepFlags, clock_gettime, clock_nanosleep};
 
-/// The instant of one call.
+/// Start of one tick.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Instant {
+pub struct TickStart {
     /// Planned start since the loop began, ns.
     pub planned_ns: u64,
-    /// How much later it really started, ns.
+    /// Delay of the real start, ns.
     pub lateness_ns: u64,
 }
 
-/// A loop that is this many periods behind (the process was suspended, the machine slept) starts counting anew instead
-/// of calling its body without a pause until it has caught up.
+/// A loop that is more periods behind than this (the process was suspended, the machine slept) skips them instead of catching up
+/// without a pause.
 const FORGIVEN_PERIODS: u64 = 20;
 
-/// The phase of a control thread that ticks every millisecond.
+/// Offset of the control thread's ticks within the kernel's millisecond.
 ///
-/// A kernel whose tick is a whole number of milliseconds (CONFIG_HZ 100, 250 or 1000) does its own periodic work at whole
-/// milliseconds of the monotonic clock (Linux, `kernel/time/tick-common.c`, `tick_setup_device`). A loop that happened to begin
-/// there would meet it time and again in the middle of its work. This one begins late enough after it for what the tick sets off
-/// to be done, and early enough to be done itself before the next.
+/// A kernel whose tick is a whole number of milliseconds (CONFIG_HZ 100, 250 or 1000) does its own periodic work at
+/// whole milliseconds of the monotonic clock (Linux, `kernel/time/tick-common.c`, `tick_setup_device`). A loop that
+/// happened to begin there would meet it time and again in the middle of its work. This one begins late enough after it
+/// for what the tick sets off to be done, and early enough to be done itself before the next.
 pub const CONTROL_PHASE: Duration = Duration::from_micros(750);
 
-/// How long before a tick of the control thread its rehearsal begins: early enough to be over by then, late enough that what it
-/// fetched is there still.
-pub const REHEARSAL_LEAD: Duration = Duration::from_micros(100);
-/// What must be left of the lead once the thread is awake. A rehearsal takes 8 us, in one of a thousand ticks 25 to 40 (on the
-/// loopback: `quadfrog bench loop --with-link`).
-const REHEARSAL_NEEDS: Duration = Duration::from_micros(40);
-/// After so many in a row that were not over in time the machine is too slow for it, and a rehearsal does harm; one or two are a
-/// stall that would have come anyway.
+/// Time between the start of the cache warm-up and the tick of the control thread: long enough for the warm-up to end,
+/// short enough for the caches to stay warm. See [`crate::control::control_loop`].
+pub const WARM_UP_LEAD: Duration = Duration::from_micros(100);
+/// Time before the tick that a warm-up needs; with less there is none. It takes 8 us, in one of a thousand ticks 25 to
+/// 40 us (loopback, `quadfrog bench loop --with-link`).
+const WARM_UP_TIME: Duration = Duration::from_micros(40);
+/// Consecutive warm-ups that end after the tick was due, after which they pause: the machine is too slow for them. One
+/// or two are stalls that the warm-up did not cause.
 const OVERRUNS: u32 = 3;
-/// For how many ticks there is none then.
+/// Length of that pause, ticks.
 const RESTING_TICKS: u32 = 1000;
 
 /// What is called in time.
-pub trait Paced {
-    /// Called somewhat before a tick, to do beforehand what makes the tick shorter. Nothing may depend on it: it is left out
-    /// where time is short.
-    fn rehearse(&mut self) {}
+pub trait PeriodicTask {
+    /// Cache warm-up, called shortly before a tick. It is left out if there is no time, so nothing may depend on it.
+    fn warm_up(&mut self) {}
 
     /// Called once per period, until it breaks.
-    fn tick(&mut self, instant: Instant) -> ControlFlow<()>;
+    fn tick(&mut self, instant: TickStart) -> ControlFlow<()>;
 }
 
-impl<F: FnMut(Instant) -> ControlFlow<()>> Paced for F {
-    fn tick(&mut self, instant: Instant) -> ControlFlow<()> {
+impl<F: FnMut(TickStart) -> ControlFlow<()>> PeriodicTask for F {
+    fn tick(&mut self, instant: TickStart) -> ControlFlow<()> {
         self(instant)
     }
 }
 
-/// Calls `body` once per period until it breaks, each time `phase` after a whole period of the system's monotonic clock.
+/// Calls `body` once per period until it breaks, each time `phase` after a whole period of the system's monotonic
+/// clock.
 ///
 /// # Errors
 /// When the system's monotonic clock cannot be read or waited on.
 pub fn pace(
     period: Duration,
     phase: Duration,
-    mut body: impl FnMut(Instant) -> ControlFlow<()>,
+    mut body: impl FnMut(TickStart) -> ControlFlow<()>,
 ) -> Result<(), nix::Error> {
-    pace_rehearsed(period, phase, Duration::ZERO, &mut body)
+    pace_with_warm_up(period, phase, Duration::ZERO, &mut body)
 }
 
-/// As [`pace`], with a rehearsal that begins `lead` before each tick, unless there is no time for it. The thread sleeps once
-/// more between the two.
+/// As [`pace`], with a cache warm-up that starts `lead` before each tick, unless there is no time for it. The thread
+/// sleeps between the two.
 ///
 /// # Errors
 /// When the system's monotonic clock cannot be read or waited on.
-pub fn pace_rehearsed(
+pub fn pace_with_warm_up(
     period: Duration,
     phase: Duration,
     lead: Duration,
-    body: &mut (impl Paced + ?Sized),
+    body: &mut (impl PeriodicTask + ?Sized),
 ) -> Result<(), nix::Error> {
     let [period_ns, phase_ns, lead_ns, needs_ns] =
-        [period, phase, lead, REHEARSAL_NEEDS].map(|time| time.as_nanos() as u64);
+        [period, phase, lead, WARM_UP_TIME].map(|time| time.as_nanos() as u64);
     let mut start_ns = monotonic_ns()?.next_multiple_of(period_ns) + phase_ns;
     let mut count = 0u64;
     let mut skipped_ns = 0;
@@ -91,7 +92,7 @@ pub fn pace_rehearsed(
         } else if lead_ns > 0 && monotonic_ns()? + lead_ns < planned_ns {
             sleep_until(planned_ns - lead_ns)?;
             if monotonic_ns()? + needs_ns <= planned_ns {
-                body.rehearse();
+                body.warm_up();
                 overruns = if monotonic_ns()? > planned_ns { overruns + 1 } else { 0 };
                 if overruns == OVERRUNS {
                     (overruns, resting_ticks) = (0, RESTING_TICKS);
@@ -100,7 +101,7 @@ pub fn pace_rehearsed(
         }
         sleep_until(planned_ns)?;
         let lateness_ns = monotonic_ns()?.saturating_sub(planned_ns);
-        let instant = Instant { planned_ns: count * period_ns + skipped_ns, lateness_ns };
+        let instant = TickStart { planned_ns: count * period_ns + skipped_ns, lateness_ns };
         if body.tick(instant).is_break() {
             return Ok(());
         }
@@ -118,7 +119,7 @@ fn sleep_until(time_ns: u64) -> Result<(), nix::Error> {
     loop {
         match clock_nanosleep(ClockId::CLOCK_MONOTONIC, ClockNanosleepFlags::TIMER_ABSTIME, &wake) {
             Ok(_) => return Ok(()),
-            // A signal woke the thread early: sleep on.
+            // Woken early by a signal.
             Err(nix::Error::EINTR) => {}
             Err(error) => return Err(error),
         }

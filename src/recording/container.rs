@@ -1,5 +1,5 @@
-//! Reads an MCAP file that may have been cut off anywhere: where its chunks are, and one chunk at a time. Layout of
-//! the records: the MCAP specification, "Records" (<https://mcap.dev/spec>).
+//! Reader of an MCAP file that may be truncated anywhere: positions of its chunks, then one chunk at a time. Layout of the
+//! records: the MCAP specification, "Records" (<https://mcap.dev/spec>).
 
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
@@ -18,48 +18,48 @@ const RECORD_HEAD: u64 = 9;
 const FOOTER_BYTES: u64 = RECORD_HEAD + 8 + 8 + 4;
 /// The record that ends the data: head and a checksum.
 const DATA_END_BYTES: u64 = RECORD_HEAD + 4;
-/// Larger chunks are not ours; a length that says so is damage, and must not be believed when memory is asked for.
+/// Largest accepted chunk, bytes: a larger length is damage, and must not decide how much memory is allocated.
 const LARGEST_CHUNK: usize = 256 * 1024 * 1024;
 
-/// Where a record is in the file.
+/// Position of a record in the file, bytes.
 #[derive(Debug, Clone, Copy)]
-pub struct Span {
-    /// Of the record's head.
+pub struct RecordSpan {
+    /// Offset of the record's head.
     pub offset: u64,
-    /// Of its body.
+    /// Length of its body.
     pub bytes: u64,
 }
 
-/// Where a chunk is and what is in it.
+/// Position and content of a chunk.
 #[derive(Debug, Clone)]
 pub struct Chunk {
     /// The chunk's record.
-    pub span: Span,
+    pub span: RecordSpan,
     /// Log time of its earliest message, ns UTC.
     pub start: u64,
     /// Log time of its latest message, ns UTC.
     pub end: u64,
-    /// The channels of its messages; none where the index after the chunk was cut off.
+    /// Channels of its messages; none if the index after the chunk is missing.
     pub channels: Option<Vec<u16>>,
 }
 
-/// What is where in a file.
+/// An MCAP file with the positions of its records.
 pub struct Container {
     file: File,
     path: PathBuf,
-    /// Chunks that are there as a whole, in the order of the file.
+    /// Complete chunks, in the order of the file.
     pub chunks: Vec<Chunk>,
     /// Attachments in the order of the file.
-    pub attachments: Vec<Span>,
+    pub attachments: Vec<RecordSpan>,
     /// Metadata in the order of the file.
-    pub metadata: Vec<Span>,
-    /// What is missing of the file itself, in words; none for a finished one.
+    pub metadata: Vec<RecordSpan>,
+    /// Description of the missing end of the file; none for a finished file.
     pub cut: Option<String>,
     topics: Vec<Option<Topic>>,
 }
 
 impl Container {
-    /// Finds the chunks, through the file's own index where it was finished, else by going from record to record.
+    /// Opens a file; finds the chunks in its index if there is one, else by scanning from record to record.
     pub fn open(path: &Path) -> Result<Container, RecordingError> {
         Container::with(path, |container, bytes| match container.read_index(bytes) {
             Ok(true) => Ok(()),
@@ -67,7 +67,7 @@ impl Container {
         })
     }
 
-    /// Finds the chunks by going from record to record, whatever the file's index says.
+    /// Opens a file; finds the chunks by scanning from record to record, without the index.
     pub fn open_by_scanning(path: &Path) -> Result<Container, RecordingError> {
         Container::with(path, Container::scan)
     }
@@ -90,7 +90,7 @@ impl Container {
             topics: Vec::new(),
         };
         find(&mut container, bytes).map_err(|error| container.error(error))?;
-        // The channels of our own files stand in their first chunk.
+        // The channels of a recording are in its first chunk.
         if let Some(chunk) = container.chunks.first().cloned()
             && let Err(source) = container.read_chunk(&chunk)
             && container.topics.is_empty()
@@ -100,7 +100,7 @@ impl Container {
         Ok(container)
     }
 
-    /// The file's own index; false where there is none, or not all of it.
+    /// Reads the file's index; false if it is missing or incomplete.
     fn read_index(&mut self, bytes: u64) -> Result<bool, McapError> {
         let magic = mcap::MAGIC.len() as u64;
         if bytes < 2 * magic + FOOTER_BYTES || self.read_at(bytes - magic, magic)? != mcap::MAGIC {
@@ -114,7 +114,7 @@ impl Container {
         if footer.summary_start == 0 || footer.summary_start > footer_at {
             return Ok(false);
         }
-        // From the record before the index to the end of the file: only so is its checksum verified.
+        // From the record before the index to the end of the file: needed to verify the checksum.
         let from = footer.summary_start.saturating_sub(DATA_END_BYTES);
         let summary = self.read_at(from, bytes - from)?;
         let options = LinearReaderOptions::default()
@@ -140,7 +140,7 @@ impl Container {
         Ok(true)
     }
 
-    /// From record to record, as far as they go.
+    /// Scans from record to record up to the first incomplete one.
     fn scan(&mut self, bytes: u64) -> Result<(), McapError> {
         let mut at = mcap::MAGIC.len() as u64;
         while bytes - at >= RECORD_HEAD {
@@ -149,7 +149,7 @@ impl Container {
             if length > bytes - at - RECORD_HEAD {
                 break;
             }
-            let span = Span { offset: at, bytes: length };
+            let span = RecordSpan { offset: at, bytes: length };
             match head[0] {
                 op::CHUNK => {
                     // Start and end are the first two numbers of a chunk.
@@ -171,7 +171,7 @@ impl Container {
                     }
                     return Ok(());
                 }
-                0 => break, // no record: a hole that a crashed file system left
+                0 => break, // no record: zeros left by a crashed file system
                 _ => {}
             }
             at += RECORD_HEAD + length;
@@ -186,10 +186,10 @@ impl Container {
         Ok(())
     }
 
-    /// The records of one chunk. Its checksum is verified before anything in it is believed.
+    /// Returns the records of a chunk after verifying its checksum.
     ///
     /// # Errors
-    /// When it is damaged; of such a chunk nothing can be trusted.
+    /// When the checksum or a record is wrong; nothing of such a chunk is used.
     pub fn read_chunk(&mut self, chunk: &Chunk) -> Result<Vec<Record<'static>>, McapError> {
         let bytes = self.read_at(chunk.span.offset, RECORD_HEAD + chunk.span.bytes)?;
         let options = LinearReaderOptions::default()
@@ -206,8 +206,8 @@ impl Container {
         Ok(records)
     }
 
-    /// An attached file; its checksum is verified.
-    pub fn read_attachment(&mut self, span: Span) -> Result<mcap::Attachment<'static>, McapError> {
+    /// Returns an attached file after verifying its checksum.
+    pub fn read_attachment(&mut self, span: RecordSpan) -> Result<mcap::Attachment<'static>, McapError> {
         let body = self.read_record(span)?;
         // Log time, create time, name, media type, data, checksum: the lengths of the three in the middle must fit.
         let name = 16;
@@ -224,16 +224,16 @@ impl Container {
                 media_type: header.media_type,
                 data: data.into_owned().into(),
             }),
-            _ => unreachable!("the opcode says what is parsed"),
+            _ => unreachable!("parsed by its opcode"),
         }
     }
 
-    /// The body of a record.
-    pub fn read_record(&mut self, span: Span) -> Result<Vec<u8>, McapError> {
+    /// Returns the body of a record.
+    pub fn read_record(&mut self, span: RecordSpan) -> Result<Vec<u8>, McapError> {
         self.read_at(span.offset + RECORD_HEAD, span.bytes)
     }
 
-    /// The topic of a channel; none for one that is not ours.
+    /// Returns the topic of a channel; none for a foreign channel.
     pub fn topic(&self, channel: u16) -> Option<Topic> {
         self.topics.get(usize::from(channel)).copied().flatten()
     }
@@ -247,7 +247,7 @@ impl Container {
     }
 
     fn read_at(&mut self, offset: u64, bytes: u64) -> Result<Vec<u8>, McapError> {
-        // A length is only believed as far as the file goes: memory is asked for after that.
+        // The length is checked against the file before memory is allocated.
         let end = self.file.seek(SeekFrom::End(0))?;
         if offset.checked_add(bytes).is_none_or(|last| last > end) {
             return Err(io::Error::from(io::ErrorKind::UnexpectedEof).into());
@@ -267,7 +267,7 @@ impl Container {
     }
 }
 
-/// The records in `bytes`; those of a chunk in its place.
+/// Returns the records in `bytes`, with the records of a chunk in place of it.
 fn records(bytes: &[u8], options: LinearReaderOptions) -> Result<Vec<Record<'static>>, McapError> {
     let mut reader = LinearReader::new_with_options(options);
     let mut unread = bytes;
@@ -288,12 +288,12 @@ fn records(bytes: &[u8], options: LinearReaderOptions) -> Result<Vec<Record<'sta
     Ok(records)
 }
 
-/// Of a record in the index: offset and length with the head.
-fn span(offset: u64, length: u64) -> Span {
-    Span { offset, bytes: length.saturating_sub(RECORD_HEAD) }
+/// Returns the position of a record from the index, whose length includes the head.
+fn span(offset: u64, length: u64) -> RecordSpan {
+    RecordSpan { offset, bytes: length.saturating_sub(RECORD_HEAD) }
 }
 
-/// The length of a string; the largest where there is none.
+/// Returns the length of a string; the largest number beyond the end of `bytes`.
 fn length(bytes: &[u8], at: u64) -> u32 {
     let bytes = usize::try_from(at).ok().and_then(|at| bytes.get(at..at + 4)).and_then(|bytes| bytes.try_into().ok());
     bytes.map_or(u32::MAX, u32::from_le_bytes)

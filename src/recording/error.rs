@@ -1,4 +1,4 @@
-//! What can go wrong with a recording: what, where, what to do.
+//! Errors of writing, reading and recovering a recording.
 
 use std::io;
 use std::path::PathBuf;
@@ -6,29 +6,29 @@ use std::path::PathBuf;
 /// A recording could not be written, read or recovered.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordingError {
-    /// The system refused.
+    /// Error of the system.
     #[error("{}: could not {doing}: {source}", path.display())]
     Io {
         /// The file.
         path: PathBuf,
-        /// What was tried.
+        /// Attempted action.
         doing: &'static str,
-        /// Why it failed.
+        /// Error of the system.
         source: io::Error,
     },
-    /// Nothing may be overwritten.
+    /// The file exists already; nothing is overwritten.
     #[error("{}: exists already and is not overwritten; move it away or choose another name", path.display())]
     Exists {
-        /// The file in the way.
+        /// The existing file.
         path: PathBuf,
     },
-    /// A name that the writer cannot turn into a `.part`.
+    /// A name that does not end in `.mcap`.
     #[error("{}: a recording's name must end in .mcap", path.display())]
     Name {
         /// The name.
         path: PathBuf,
     },
-    /// Nothing was written into it.
+    /// The file has no bytes.
     #[error("{}: the file is empty; nothing was recorded in it", path.display())]
     Empty {
         /// The file.
@@ -51,12 +51,12 @@ pub enum RecordingError {
         /// The file.
         path: PathBuf,
     },
-    /// The beginning, which says what the rest means, is damaged.
-    #[error("{}: damaged at its beginning ({source}); what follows cannot be understood without it", path.display())]
+    /// The first chunk, which holds the schemas and channels, is damaged.
+    #[error("{}: damaged at its beginning ({source}); the rest cannot be decoded without its schemas and channels", path.display())]
     Head {
         /// The file.
         path: PathBuf,
-        /// How it is damaged.
+        /// Kind of damage.
         source: mcap::McapError,
     },
     /// Cut off before the first message.
@@ -64,15 +64,15 @@ pub enum RecordingError {
     TooShort {
         /// The file.
         path: PathBuf,
-        /// Its length.
+        /// Length of the file.
         bytes: u64,
     },
-    /// The MCAP library refused to write.
+    /// Error of the MCAP library while writing.
     #[error("{}: could not write: {source}", path.display())]
     Mcap {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// Error of the library.
         source: mcap::McapError,
     },
 }

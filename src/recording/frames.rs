@@ -8,7 +8,7 @@ use crate::robot::description::RobotDescription;
 use crate::robot::{JOINT_NAMES, Leg};
 use crate::telemetry::Tick;
 
-/// Where the trunk is: what the simulator knows, or else what the controller believes.
+/// Returns the trunk's pose in the world: the simulator's truth, else the estimate.
 fn base(tick: &Tick) -> (Vector3<f64>, UnitQuaternion<f64>) {
     match &tick.state.truth {
         Some(truth) => (truth.position_world, truth.orientation_world),
@@ -16,7 +16,7 @@ fn base(tick: &Tick) -> (Vector3<f64>, UnitQuaternion<f64>) {
     }
 }
 
-/// The trunk in the world.
+/// Returns the trunk's pose in the world as a message.
 pub fn pose(tick: &Tick, log_time: u64) -> PoseInFrame {
     let (position, orientation) = base(tick);
     PoseInFrame {
@@ -26,7 +26,7 @@ pub fn pose(tick: &Tick, log_time: u64) -> PoseInFrame {
     }
 }
 
-/// Seventeen frames: the trunk and, of each leg, hip, thigh, calf and foot.
+/// Returns seventeen frames: the trunk and, of each leg, hip, thigh, calf and foot.
 pub fn transforms(tick: &Tick, robot: &RobotDescription, log_time: u64) -> FrameTransforms {
     let frame =
         |parent: String, child: String, translation: &Vector3<f64>, rotation: &UnitQuaternion<f64>| FrameTransform {

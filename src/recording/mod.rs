@@ -1,10 +1,11 @@
-//! Sessions on disk: what is kept (`record`), how it is written (`writer`, `recorder`), read back (`player`) and saved
-//! after a crash (`recover`).
+//! Sessions on disk: the records (`record`), writing (`writer`, `recorder`), playing (`player`) and recovery after a crash
+//! (`recover`).
 //!
 //! A recording is an MCAP file of protobuf messages; `recordings/README.md` lists its topics, `proto/frog.proto` its
 //! fields. While it grows it is named `*.mcap.part`; only a finished one is named `*.mcap`.
 
 mod container;
+mod decode;
 pub mod disk;
 mod error;
 mod frames;
@@ -17,12 +18,13 @@ pub mod recover;
 mod schema;
 mod tick;
 mod topic;
+mod trials;
 pub mod writer;
 
 pub use error::RecordingError;
 
 /// The messages of `proto/frog.proto` as Rust types.
-#[allow(missing_docs, clippy::all, reason = "generated; the fields are explained in proto/frog.proto")]
+#[allow(missing_docs, clippy::all, reason = "generated; proto/frog.proto documents the fields")]
 mod frog {
     include!(concat!(env!("OUT_DIR"), "/frog.v1.rs"));
 }

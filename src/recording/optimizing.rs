@@ -1,7 +1,7 @@
-//! What the optimizer has to say as protobuf messages and back: search, insight, points.
+//! State of the optimizer (search, insight, points) as protobuf messages, and back.
 
+use super::decode::number;
 use super::frog;
-use super::tick::number;
 use crate::trial::{FixedParameter, ParameterInsight, PointRecord, ProposalInsight, SearchStatus, SearchedParameter};
 
 pub fn search(value: &SearchStatus) -> frog::Search {

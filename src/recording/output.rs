@@ -16,16 +16,15 @@ use super::record::{Record, SessionInfo};
 use super::schema;
 use super::topic::Topic;
 
-/// A chunk is closed once it holds this much, uncompressed: an eighth of a second of ticks. What a crash can take of
-/// the data that the system already has is the one open chunk.
+/// Uncompressed bytes at which a chunk is closed: an eighth of a second of ticks. A crash loses at most the open chunk.
 const CHUNK_BYTES: usize = 256 * 1024;
 
-/// Where the bytes of a recording go: a file, or in a test something that fails.
+/// Destination of a recording's bytes: a file, or a failing one in a test.
 pub trait Sink: Write + Send {
     /// Waits until everything written is on the disk.
     ///
     /// # Errors
-    /// When the disk refuses.
+    /// When the disk fails.
     fn sync(&mut self) -> io::Result<()>;
 }
 
@@ -37,21 +36,21 @@ impl Sink for File {
 
 /// The container: topics to channels, messages to chunks.
 pub struct Output {
-    pub mcap: mcap::Writer<NoSeek<Disk>>,
-    disk: Disk,
+    pub mcap: mcap::Writer<NoSeek<SharedSink>>,
+    disk: SharedSink,
     buffer: Vec<u8>,
     open_bytes: usize,
 }
 
 impl Output {
-    /// The header; every topic of this project is a channel from the start.
+    /// Writes the header of the file.
     pub fn new(sink: Box<dyn Sink>) -> Result<Output, McapError> {
-        let disk = Disk(Arc::new(Mutex::new(Counted { sink: BufWriter::new(sink), bytes: 0 })));
+        let disk = SharedSink(Arc::new(Mutex::new(CountedSink { sink: BufWriter::new(sink), bytes: 0 })));
         let mcap = WriteOptions::new()
             .profile("")
             .library(concat!("quadfrog ", env!("CARGO_PKG_VERSION")))
             .chunk_size(None) // closed by `close_full_chunk`, between ticks
-            // Whole chunks or nothing: else a crash leaves a chunk of length 2^64 - 1, on which readers give up.
+            // Chunks are written whole: with seeking, a crash leaves a chunk of length 2^64 - 1, which readers reject.
             .disable_seeking(true)
             .compression_level(1)
             .compression_threads(0)
@@ -59,7 +58,7 @@ impl Output {
         Ok(Output { mcap, disk, buffer: Vec::new(), open_bytes: 0 })
     }
 
-    /// What survives a cut best: who and what, and the files that the session ran with.
+    /// Writes metadata, attachments and all channels, at the beginning, where they survive a truncation.
     pub fn head(
         &mut self,
         session: &SessionInfo,
@@ -69,10 +68,10 @@ impl Output {
         let fields = [
             ("tool", "quadfrog".to_string()),
             ("version", session.version.clone()),
-            ("backend", session.backend.clone()),
+            ("backend", session.backend_name().to_string()),
             ("robot", session.robot.clone()),
-            ("task", session.task.clone()),
-            ("sampler", session.sampler.clone()),
+            ("task", session.task_name().to_string()),
+            ("sampler", session.sampler_name().to_string()),
             ("seed", session.seed.to_string()),
             ("budget", session.budget.to_string()),
             ("started", session.started.clone()),
@@ -90,7 +89,7 @@ impl Output {
                 data: Cow::Borrowed(bytes),
             })?;
         }
-        for (index, topic) in Topic::ALL.into_iter().enumerate() {
+        for (index, topic) in Topic::ALL.iter().enumerate() {
             let schema = topic.schema();
             let schema = self.mcap.add_schema(&schema.name, &schema.encoding, &schema.data)?;
             let channel = self.mcap.add_channel(schema, topic.name(), "protobuf", &BTreeMap::new())?;
@@ -107,7 +106,7 @@ impl Output {
         message: &impl Message,
     ) -> Result<(), McapError> {
         self.buffer.clear();
-        message.encode(&mut self.buffer).expect("a Vec grows as far as it must");
+        message.encode(&mut self.buffer).expect("a Vec grows as needed");
         self.put(topic, sequence, log_time)
     }
 
@@ -129,20 +128,20 @@ impl Output {
         self.mcap.write_to_known_channel(&header, &self.buffer)
     }
 
-    /// The index, and all of it on the disk.
+    /// Writes the index and waits until everything is on the disk.
     pub fn finish(&mut self) -> Result<(), McapError> {
         self.mcap.finish()?;
         self.sync()
     }
 
-    /// Waits until everything handed to the disk is on it.
+    /// Waits until everything passed to the disk is on it.
     pub fn sync(&mut self) -> Result<(), McapError> {
         let mut disk = self.disk.lock();
         disk.sink.flush()?;
         Ok(disk.sink.get_mut().sync()?)
     }
 
-    /// Bytes handed to the disk so far.
+    /// Returns the bytes passed to the disk so far.
     pub fn bytes(&self) -> u64 {
         self.disk.lock().bytes
     }
@@ -152,29 +151,29 @@ impl Output {
         if self.open_bytes < CHUNK_BYTES { Ok(()) } else { self.close_chunk() }
     }
 
-    /// Closes the chunk and hands it to the operating system.
+    /// Closes the chunk and passes it to the operating system.
     pub fn close_chunk(&mut self) -> Result<(), McapError> {
         self.open_bytes = 0;
         self.mcap.flush()
     }
 }
 
-/// The sink, shared by the container, which writes, and the writer, which counts and syncs. Never contended.
+/// The sink, shared by the MCAP writer, which writes, and [`Output`], which counts and syncs. Both are on one thread.
 #[derive(Clone)]
-pub struct Disk(Arc<Mutex<Counted>>);
+pub struct SharedSink(Arc<Mutex<CountedSink>>);
 
-struct Counted {
+struct CountedSink {
     sink: BufWriter<Box<dyn Sink>>,
     bytes: u64,
 }
 
-impl Disk {
-    fn lock(&self) -> MutexGuard<'_, Counted> {
+impl SharedSink {
+    fn lock(&self) -> MutexGuard<'_, CountedSink> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-impl Write for Disk {
+impl Write for SharedSink {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         let mut counted = self.lock();
         let written = counted.sink.write(bytes)?;
@@ -187,7 +186,7 @@ impl Write for Disk {
     }
 }
 
-/// A name with something behind it.
+/// Returns the path with `suffix` appended to its name.
 pub fn with_suffix(path: &Path, suffix: &str) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
     name.push(suffix);

@@ -1,9 +1,9 @@
-//! Plays a recording, finished or cut off anywhere: ticks and records in the order of time, from any moment.
+//! Player of a recording, finished or truncated anywhere: ticks and records in the order of time, from any moment.
 //!
-//! Of an hour's recording only the index and the events are in memory (events: everything but ticks and counters);
-//! ticks are decoded chunk by chunk while they are played.
+//! In memory are the index and the events (everything but ticks and counters); ticks are decoded chunk by chunk while they
+//! are played.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 
 use foxglove::messages::JointStates;
@@ -11,15 +11,15 @@ use mcap::records::{MessageHeader, Record as McapRecord};
 use prost::Message;
 
 use super::container::{Chunk, Container};
+use super::decode::DecodeError;
 use super::error::RecordingError;
 use super::record::{Record, SessionInfo, Stamped};
-use super::schema::{self, DecodeError};
 use super::topic::Topic;
-use super::{frog, tick};
+use super::{frog, schema, tick};
 use crate::telemetry::Tick;
 
-/// One thing played.
-#[allow(clippy::large_enum_variant, reason = "nearly all are ticks; a box for each would cost more than it saves")]
+/// A played tick or record.
+#[allow(clippy::large_enum_variant, reason = "nearly all are ticks; a box for each costs more than it saves")]
 #[derive(Debug, Clone, PartialEq)]
 pub enum Played {
     /// A control tick.
@@ -29,7 +29,7 @@ pub enum Played {
 }
 
 impl Played {
-    /// When, ns since the engine started.
+    /// Returns the time since the engine started, ns.
     pub fn time_ns(&self) -> u64 {
         match self {
             Played::Tick(tick) => tick.time_ns,
@@ -38,25 +38,25 @@ impl Played {
     }
 }
 
-/// What begins at a marker.
+/// Kind of a marker.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MarkerKind {
-    /// The trial of that number.
+    /// Begin of the trial of that number.
     Trial(u32),
-    /// A fault.
+    /// Begin of a fault.
     Fault,
 }
 
-/// A moment to jump to.
+/// A moment to seek.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Marker {
-    /// When, ns since the engine started.
+    /// Time since the engine started, ns.
     pub time_ns: u64,
-    /// What begins there.
+    /// Kind.
     pub kind: MarkerKind,
 }
 
-/// A recording being played. It is an iterator: `next` gives ticks and records in the order of time.
+/// Iterator over the ticks and records of a recording, in the order of time.
 pub struct Player {
     container: Container,
     path: PathBuf,
@@ -75,11 +75,11 @@ pub struct Player {
 }
 
 impl Player {
-    /// Opens a recording, also one that was cut off: then it plays everything readable, and
-    /// [`damage`](Player::damage) says what is missing.
+    /// Opens a recording. Of a truncated or damaged one everything readable is played; [`damage`](Player::damage)
+    /// describes the rest.
     ///
     /// # Errors
-    /// When there is nothing to play: no such file, an empty one, not an MCAP file, one of another program.
+    /// When nothing can be played: missing or empty file, no MCAP file, file of another program.
     pub fn open(path: impl AsRef<Path>) -> Result<Player, RecordingError> {
         let path = path.as_ref();
         let mut container = Container::open(path)?;
@@ -105,33 +105,33 @@ impl Player {
         Ok(player)
     }
 
-    /// What the session was.
+    /// Returns the facts of the session.
     pub fn session(&self) -> &SessionInfo {
         &self.session
     }
 
-    /// The time of day at engine time 0, ns since 1970, UTC.
+    /// Returns the UTC time of engine time 0, ns since 1970.
     pub fn start_utc_ns(&self) -> u64 {
         self.start_utc_ns
     }
 
-    /// Time of the last message, ns since the engine started.
+    /// Returns the time of the last message since the engine started, ns.
     pub fn duration_ns(&self) -> u64 {
         self.duration_ns
     }
 
-    /// Where trials and faults begin, in the order of time.
+    /// Returns the begins of trials and faults, in the order of time.
     pub fn markers(&self) -> &[Marker] {
         &self.markers
     }
 
-    /// All records but the counters, in the order of time.
+    /// Returns all records but the counters, in the order of time.
     pub fn events(&self) -> &[Stamped] {
         &self.events
     }
 
-    /// What of the recording is missing, as far as it is known: the end of a file is known from the start, a chunk
-    /// whose checksum is wrong once it was to be played. None for a file without fault.
+    /// Returns a description of the missing parts found so far: a truncated end is found on opening, a chunk with a wrong
+    /// checksum when it is played. None for an intact file.
     pub fn damage(&self) -> Option<String> {
         let chunks = match (self.damaged_chunks.len(), &self.first_trouble) {
             (0, None) => None,
@@ -146,7 +146,7 @@ impl Player {
         (!parts.is_empty()).then(|| format!("{}: {}", self.path.display(), parts.join("; ")))
     }
 
-    /// Continues at `time_ns`, forward or back: the next thing played is the first one not before it.
+    /// Continues at `time_ns`, forward or back, with the first tick or record not before it.
     pub fn seek(&mut self, time_ns: u64) {
         self.queue.clear();
         self.from_ns = time_ns;
@@ -155,29 +155,7 @@ impl Player {
         self.next_chunk = chunks.iter().position(|chunk| chunk.end >= log_time).unwrap_or(chunks.len());
     }
 
-    /// The records that define what a screen shows at `time_ns`: the session, the newest stage, proposal and what
-    /// belongs to them, and the newest row of each trial, in the order of time.
-    pub fn state_at(&self, time_ns: u64) -> Vec<Stamped> {
-        let mut newest = BTreeMap::new();
-        for (index, event) in self.events.iter().enumerate().take_while(|(_, event)| event.time_ns <= time_ns) {
-            let key = match &event.record {
-                Record::Session(_) => (0, 0),
-                Record::Stage(_) => (1, 0),
-                Record::Proposal(_) => (2, 0),
-                Record::Trial(row) => (3, row.trial),
-                Record::Search(_) => (4, 0),
-                Record::Insight(_) => (5, 0),
-                Record::Points(_) => (6, 0),
-                _ => continue,
-            };
-            newest.insert(key, index);
-        }
-        let mut indices: Vec<_> = newest.into_values().collect();
-        indices.sort_unstable();
-        indices.into_iter().map(|index| self.events[index].clone()).collect()
-    }
-
-    /// The bytes of an attached file, for example `config.toml`; none if there is none of that name.
+    /// Returns the bytes of an attached file, for example `config.toml`; none if no file has that name.
     ///
     /// # Errors
     /// When it cannot be read.
@@ -194,7 +172,7 @@ impl Player {
         Ok(None)
     }
 
-    /// The session, the markers and all events: from the chunks that hold any.
+    /// Reads the session, the markers and all events from the chunks that hold any.
     fn read_events(&mut self) -> Result<(), RecordingError> {
         let container = &self.container;
         let known = |channel: &u16| container.topic(*channel);
@@ -242,7 +220,7 @@ impl Player {
         Ok(())
     }
 
-    /// Why there is no session: cut off before it, or a file of another program.
+    /// Returns the error of a file without session: truncated before it, or of another program.
     fn no_session(&self) -> RecordingError {
         let path = self.path.clone();
         let bytes = std::fs::metadata(&path).map(|metadata| metadata.len()).unwrap_or_default();
@@ -253,7 +231,7 @@ impl Player {
         }
     }
 
-    /// The messages of a chunk on our topics; none of a damaged one, which is noted.
+    /// Returns the messages of a chunk on known topics; none of a damaged chunk, which is noted.
     fn messages_of(&mut self, index: usize) -> Vec<(Topic, MessageHeader, Vec<u8>)> {
         let chunk = self.container.chunks[index].clone();
         let records = match self.container.read_chunk(&chunk) {
@@ -281,11 +259,11 @@ impl Player {
         self.first_trouble.get_or_insert_with(|| trouble.to_string());
     }
 
-    /// The next chunk into the queue.
+    /// Reads the next chunk into the queue.
     fn read_chunk(&mut self) {
         let messages = self.messages_of(self.next_chunk);
         self.next_chunk += 1;
-        // The messages of a tick stand together and share sequence and log time: joints, command, the rest.
+        // The messages of a tick are adjacent and share sequence and log time: joints, command, the rest.
         let mut joints: Option<(MessageHeader, JointStates)> = None;
         let mut command: Option<(MessageHeader, frog::JointCommand)> = None;
         for (topic, header, data) in messages {
@@ -323,9 +301,9 @@ impl Player {
 impl Iterator for Player {
     type Item = Played;
 
-    /// The next tick or record in the order of time; none at the end.
+    /// Returns the next tick or record in the order of time; none at the end.
     fn next(&mut self) -> Option<Played> {
-        // Another chunk may still hold something earlier than what is at hand.
+        // An unread chunk may hold something earlier than the queue.
         while let Some(chunk) = self.container.chunks.get(self.next_chunk) {
             let starts = chunk.start.saturating_sub(self.start_utc_ns);
             if self.queue.front().is_some_and(|first| first.time_ns() < starts) {
@@ -348,7 +326,7 @@ fn marker(data: &[u8]) -> Result<MarkerKind, DecodeError> {
     }
 }
 
-/// A tick of its own message and of the two before it.
+/// Joins a tick from its message and the two before it.
 fn join(
     header: &MessageHeader,
     control: &[u8],

@@ -1,80 +1,82 @@
-//! What is worth keeping of a session besides its ticks. The screen and the recording receive the same records, so a
-//! replay shows what live showed.
+//! Records of a session besides its ticks. The screen and the recording receive the same records, so a replay shows the
+//! same screen as the live session.
 
-use serde::{Deserialize, Serialize};
-
+use crate::optimize::ask::SamplerKind;
 use crate::telemetry::{ArmingCheck, ArmingCheckState, Counters, Mode, Tick};
-use crate::trial::{ExperimentStage, ParameterInfo, PointRecord, Proposal, ProposalInsight, SearchStatus, TrialRecord};
+use crate::trial::{
+    Approval, Backend, ExperimentStage, ParameterInfo, PointRecord, Proposal, ProposalInsight, SearchStatus, Task,
+    TrialRecord,
+};
 
-/// A record and when it happened.
+/// A record with its time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stamped {
     /// Time since the engine started, ns; the same clock as the ticks'.
     pub time_ns: u64,
-    /// What happened.
+    /// The record.
     pub record: Record,
 }
 
-/// One thing that happened, or that is now known.
+/// An event or a new state of the session.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Record {
-    /// What this session is. The first record of each recording.
+    /// Facts of the session. The first record of each recording.
     Session(SessionInfo),
-    /// The mode changed.
+    /// Change of mode.
     Transition(Transition),
-    /// The session moved to another stage of a trial's life.
+    /// Change of the experiment's stage.
     Stage(StageRecord),
-    /// A proposal is on the table, or changed by an override.
+    /// New proposal, or one changed by an override.
     Proposal(Proposal),
-    /// A row of the trial table is new or changed; the newest record of a number counts.
+    /// New or changed row of the trial table; the newest record of a number counts.
     Trial(TrialRecord),
-    /// An operator's wish and what became of it.
+    /// Operator's request and its result.
     Request(RequestRecord),
     /// Counters, ten times a second.
     Counters(Counters),
-    /// A line for the log.
+    /// Line of the log.
     Log(LogRecord),
-    /// The last ticks before a fault, oldest first.
+    /// Last ticks up to a fault, oldest first.
     FaultTicks(Vec<Tick>),
-    /// The whole pre-arm list. The screen sees it twice a second while the robot is disarmed, the recording when an item
-    /// changes its state.
+    /// All arming checks. Sent to the screen twice a second while the robot is disarmed, recorded when a check changes its
+    /// state.
     ArmingChecks(Vec<ArmingCheckRecord>),
-    /// What is searched, and how far the study is.
+    /// Searched parameters and progress of the study.
     Search(SearchStatus),
-    /// Why the proposal was made: told with each that the sampler makes.
+    /// Reasons of the sampler for its proposal; follows each of them.
     Insight(ProposalInsight),
-    /// What repeated points amount to; all of them, each time that one of them changes.
+    /// Statistics of all repeated points, whenever one of them changes.
     Points(Vec<PointRecord>),
 }
 
-/// An item of the pre-arm list and how it stands.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+/// An arming check and its result.
+#[derive(Debug, Clone, PartialEq)]
 pub struct ArmingCheckRecord {
-    /// The item.
+    /// The check.
     pub check: ArmingCheck,
-    /// What was found, in words with a unit.
+    /// Measured value as text, with unit.
     pub found: String,
-    /// What is needed, in words with a unit.
+    /// Needed value as text, with unit.
     pub needed: String,
-    /// How it stands.
+    /// Result.
     pub state: ArmingCheckState,
 }
 
 /// What a session is: written first into a recording, shown in the frame.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct SessionInfo {
     /// Version of this program.
     pub version: String,
-    /// `sim` or `go1`.
-    pub backend: String,
+    /// The robot behind the controller; none before a session begins, and for a name that this version does not know.
+    pub backend: Option<Backend>,
     /// Name of the robot model.
     pub robot: String,
-    /// Task name.
-    pub task: String,
+    /// Task; none as for `backend`.
+    pub task: Option<Task>,
     /// Unit of the objective.
     pub unit: String,
-    /// Sampler name.
-    pub sampler: String,
+    /// Sampler; none as for `backend`.
+    pub sampler: Option<SamplerKind>,
     /// Seed of the study.
     pub seed: u64,
     /// How many trials the study is to have.
@@ -91,60 +93,120 @@ pub struct SessionInfo {
     pub observe: bool,
     /// The controller's gains with the ranges in which an operator may set them, in table order.
     pub gains: Vec<ParameterInfo>,
-    /// Who approves and judges: `each`, `falls-only` or `auto`.
-    pub approve: String,
+    /// The jumps that a person approves and judges.
+    pub approve: Approval,
+    /// Limits by which a screen colours its values.
+    pub limits: HealthLimits,
+}
+
+impl SessionInfo {
+    /// Returns whether the session drives the simulator.
+    pub fn is_simulated(&self) -> bool {
+        self.backend == Some(Backend::Simulator)
+    }
+
+    /// Returns whether the session drives a robot.
+    pub fn is_hardware(&self) -> bool {
+        self.backend == Some(Backend::Hardware)
+    }
+
+    /// Returns the backend's name in recordings; empty where it is not known.
+    pub fn backend_name(&self) -> &'static str {
+        self.backend.map_or("", Backend::name)
+    }
+
+    /// Returns the task's name; empty where it is not known.
+    pub fn task_name(&self) -> &'static str {
+        self.task.map_or("", Task::name)
+    }
+
+    /// Returns the sampler's name; empty where it is not known.
+    pub fn sampler_name(&self) -> &'static str {
+        self.sampler.map_or("", SamplerKind::name)
+    }
+}
+
+/// Limits by which a screen colours the health of link, motors, battery and control loop. The default holds for recordings
+/// without them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HealthLimits {
+    /// Largest age of the robot's state, ms (`safety.toml`, `[watchdog] state_age_warn_ms`).
+    pub state_age_ms: u32,
+    /// Share of lost states that is no longer good (`[pre_arm] loss_share`).
+    pub loss_share: f64,
+    /// Motor temperature that is no longer good, degrees Celsius (`[pre_arm] motor_c`).
+    pub motor_c: f64,
+    /// Least charge of the battery, % (`[pre_arm] battery_percent`).
+    pub battery_percent: f64,
+    /// Largest share of late ticks.
+    pub late_share: f64,
+    /// Largest delay of a tick, ms (`[watchdog] hardware_late_ms`).
+    pub late_ms: f64,
+}
+
+impl Default for HealthLimits {
+    fn default() -> HealthLimits {
+        HealthLimits {
+            state_age_ms: 5,
+            loss_share: 0.01,
+            motor_c: 60.0,
+            battery_percent: 30.0,
+            late_share: 0.001,
+            late_ms: 10.0,
+        }
+    }
 }
 
 /// A change of mode.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Transition {
     /// From this mode.
     pub from: Mode,
     /// To this one.
     pub to: Mode,
-    /// Why, in words.
+    /// Cause as text.
     pub cause: String,
 }
 
-/// The stage and what it is about.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+/// The experiment's stage and its trial.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct StageRecord {
     /// The stage.
     pub stage: ExperimentStage,
-    /// The trial that it is about; the last one when finished.
+    /// Trial of the stage; the last one when finished.
     pub trial: u32,
     /// Whether the last verdict can still be undone.
     pub can_undo: bool,
 }
 
-/// An operator's wish and what became of it.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+/// An operator's request and its result.
+#[derive(Debug, Clone, PartialEq)]
 pub struct RequestRecord {
-    /// The wish in words, for example `override Fx = 120`.
+    /// The request as text, for example `override Fx = 120`.
     pub wish: String,
     /// Whether it was carried out.
     pub accepted: bool,
-    /// Why not, or what followed.
+    /// Reason of the refusal, or result.
     pub answer: String,
 }
 
-/// How grave a line of the log is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+/// Severity of a line of the log.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum LogLevel {
-    /// For the curious.
+    /// Normal operation.
     Info,
-    /// Something to look at.
+    /// Needs the operator's attention.
     Warning,
-    /// Something failed.
+    /// Failure.
     Error,
 }
 
 /// A line of the log.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct LogRecord {
-    /// How grave.
+    /// Severity.
     pub level: LogLevel,
-    /// Which part speaks.
+    /// Part of the program that logged it.
     pub source: String,
     /// The line.
     pub message: String,

@@ -1,4 +1,4 @@
-//! The recorder thread: ticks and records into one file, and the ticks of each trial to whoever measures it.
+//! The recorder thread: writes ticks and records into one file, and delivers each trial's ticks to the session.
 
 use std::collections::VecDeque;
 use std::sync::mpsc::{Receiver, Sender, TryRecvError};
@@ -13,12 +13,12 @@ use super::record::{Record, Stamped};
 use super::writer::Writer;
 use crate::telemetry::{Mode, Tick};
 
-/// How long the thread sleeps when there is nothing to write; the ring holds several seconds.
+/// Sleep of the thread when there is nothing to write; the ring holds several seconds.
 const IDLE: Duration = Duration::from_millis(2);
-/// How often everything is handed to the operating system.
+/// Period of flushes to the operating system.
 const FLUSH_PERIOD: Duration = Duration::from_secs(1);
 
-/// The ticks of one trial, oldest first: what the session measures from.
+/// Ticks of one trial, oldest first, from which the session measures the jump.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrialTicks {
     /// The trial's number.
@@ -27,37 +27,37 @@ pub struct TrialTicks {
     pub ticks: Vec<Tick>,
 }
 
-/// Ticks that are handed on with a fault, the first faulty one among them.
+/// Number of ticks delivered with a fault, including the first tick in FAULT.
 pub const FAULT_TICKS: usize = 200;
 
-/// What the recorder hands to the session.
+/// Ticks that the recorder sends to the session.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Handed {
+pub enum CollectedTicks {
     /// A trial's ticks, once it is over.
     Trial(TrialTicks),
     /// The last ticks up to the first in FAULT, oldest first.
     Fault(Vec<Tick>),
 }
 
-/// How the recording is doing.
+/// State of the recording.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct RecorderStatus {
-    /// Bytes handed to the disk; the open chunk is not among them.
+    /// Bytes passed to the disk, without the open chunk.
     pub bytes: u64,
     /// Ticks written.
     pub ticks: u64,
-    /// Why nothing is written any more; the recording ends where it failed, under its name `*.mcap.part`.
+    /// Error that ended the recording, which keeps its name `*.mcap.part`; none without an error.
     pub error: Option<String>,
     /// Whether the file is complete and has its final name.
     pub finished: bool,
 }
 
-/// A view of how the recording is doing, for whoever has to say so.
+/// Shared view of the state of the recording.
 #[derive(Debug, Clone, Default)]
 pub struct RecorderWatch(Arc<Mutex<RecorderStatus>>);
 
 impl RecorderWatch {
-    /// How it is doing now.
+    /// Returns the present state.
     pub fn get(&self) -> RecorderStatus {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
@@ -68,34 +68,34 @@ pub struct Recorder {
     ticks: Consumer<Tick>,
     records: Receiver<Stamped>,
     writer: Option<Writer>,
-    handed: Sender<Handed>,
+    handed: Sender<CollectedTicks>,
     trial: Option<TrialTicks>,
     /// The last ticks.
     last: VecDeque<Tick>,
-    /// Records that came and are not written yet.
+    /// Received records that are not written yet.
     waiting: VecDeque<Stamped>,
     flushed: Instant,
     status: Arc<Mutex<RecorderStatus>>,
 }
 
-/// The other end of a recorder thread. Dropped, the thread goes on until its producers are gone.
+/// Handle of a recorder thread. After it is dropped, the thread runs until its producers are dropped.
 pub struct RecorderHandle {
     status: Arc<Mutex<RecorderStatus>>,
     thread: JoinHandle<()>,
 }
 
 impl Recorder {
-    /// Starts the thread. It ends, and completes the file, once the ring's producer and every sender of records are
-    /// gone and everything from them is written. Without a writer it records nothing and only hands on ticks: those
-    /// of a trial when the ticks stop carrying its number, and the last ones at a fault.
+    /// Starts the thread. It completes the file and exits after the ring's producer and all senders of records are
+    /// dropped and everything from them is written. Without a writer it records nothing and only delivers ticks: those of
+    /// a trial at its end, the last ones at a fault.
     ///
     /// # Panics
-    /// When the system has no thread left.
+    /// When the system cannot start a thread.
     pub fn spawn(
         ticks: Consumer<Tick>,
         records: Receiver<Stamped>,
         writer: Option<Writer>,
-        handed: Sender<Handed>,
+        handed: Sender<CollectedTicks>,
     ) -> RecorderHandle {
         let status = Arc::new(Mutex::new(RecorderStatus::default()));
         let mut recorder = Recorder {
@@ -119,7 +119,7 @@ impl Recorder {
 
     fn run(&mut self) {
         loop {
-            // Asked before the queues are emptied: what was sent before the end is still taken.
+            // Read before the queues are emptied, so that everything sent before the end is written.
             let no_more_ticks = self.ticks.is_abandoned();
             let no_more_records = self.take_records();
             let idle = self.write_new();
@@ -135,7 +135,7 @@ impl Recorder {
                 std::thread::sleep(IDLE);
             }
         }
-        self.hand_on_trial();
+        self.deliver_trial();
         if let Some(writer) = self.writer.take() {
             let (bytes, ticks) = (writer.bytes(), writer.ticks());
             let finished = writer.finish();
@@ -149,7 +149,7 @@ impl Recorder {
         }
     }
 
-    /// Whether all senders are gone.
+    /// Takes the received records; returns whether all senders are dropped.
     fn take_records(&mut self) -> bool {
         loop {
             match self.records.try_recv() {
@@ -160,7 +160,7 @@ impl Recorder {
         }
     }
 
-    /// Writes what has come, in the order of time; whether there was nothing.
+    /// Writes the received ticks and records in the order of time; returns whether there were none.
     fn write_new(&mut self) -> bool {
         let new_ticks = self.ticks.slots();
         let idle = new_ticks == 0 && self.waiting.is_empty();
@@ -186,7 +186,7 @@ impl Recorder {
         }
     }
 
-    /// Lets the writer do something; if it fails it was its last.
+    /// Calls the writer; drops it after an error.
     fn write(&mut self, act: impl FnOnce(&mut Writer) -> Result<(), RecordingError>) {
         let Some(writer) = &mut self.writer else { return };
         if let Err(error) = act(writer) {
@@ -205,7 +205,7 @@ impl Recorder {
 
     fn collect(&mut self, tick: &Tick) {
         if self.trial.as_ref().map(|trial| trial.trial) != tick.trial {
-            self.hand_on_trial();
+            self.deliver_trial();
             self.trial = tick.trial.map(|trial| TrialTicks { trial, ticks: Vec::new() });
         }
         if let Some(trial) = &mut self.trial {
@@ -217,39 +217,39 @@ impl Recorder {
         let before = self.last.back().map(|last| last.mode);
         self.last.push_back(*tick);
         if tick.mode == Mode::Fault && before != Some(Mode::Fault) {
-            let _ = self.handed.send(Handed::Fault(self.last.iter().copied().collect())); // as with a trial's
+            let _ = self.handed.send(CollectedTicks::Fault(self.last.iter().copied().collect())); // as with a trial's
         }
     }
 
-    fn hand_on_trial(&mut self) {
+    fn deliver_trial(&mut self) {
         if let Some(trial) = self.trial.take() {
-            let _ = self.handed.send(Handed::Trial(trial)); // nobody measures any more: nothing is lost, the file has them
+            let _ = self.handed.send(CollectedTicks::Trial(trial)); // nobody measures any more: nothing is lost, the file has them
         }
     }
 }
 
 impl RecorderHandle {
-    /// A view that may be kept elsewhere.
+    /// Returns a shared view of the state.
     pub fn watch(&self) -> RecorderWatch {
         RecorderWatch(Arc::clone(&self.status))
     }
 
-    /// How the recording is doing.
+    /// Returns the state of the recording.
     pub fn status(&self) -> RecorderStatus {
         self.status.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// Whether the thread has ended.
+    /// Whether the thread has exited.
     pub fn is_finished(&self) -> bool {
         self.thread.is_finished()
     }
 
-    /// Waits for the thread to end, which it does when both producers are gone, and says how the recording ended.
+    /// Waits until the thread exits, after both producers are dropped, and returns the final state.
     pub fn join(self) -> RecorderStatus {
         let outcome = self.thread.join();
         let mut status = self.status.lock().unwrap_or_else(PoisonError::into_inner).clone();
         if outcome.is_err() {
-            status.error.get_or_insert_with(|| "the recorder's thread broke down; please report it".into());
+            status.error.get_or_insert_with(|| "the recorder thread panicked; please report it".into());
         }
         status
     }

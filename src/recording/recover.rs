@@ -1,4 +1,4 @@
-//! Makes a proper file of a recording that was not finished.
+//! Recovery of a recording that was not finished or is damaged.
 
 use std::collections::{BTreeMap, HashMap};
 use std::fs::{self, File};
@@ -13,16 +13,16 @@ use super::error::RecordingError;
 use super::output::{Output, with_suffix};
 use super::topic::Topic;
 
-/// What was saved.
+/// Result of a recovery.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recovered {
-    /// The new file. The old one is left as it was.
+    /// The new file. The old one is unchanged.
     pub path: PathBuf,
     /// Ticks in it.
     pub ticks: u64,
     /// Messages in it, the ticks' among them.
     pub messages: u64,
-    /// What could not be saved, in words; none if only the file's own index was missing.
+    /// Description of the lost parts; none if only the file's index was missing.
     pub lost: Option<String>,
 }
 
@@ -30,7 +30,7 @@ pub struct Recovered {
 /// an index: `x.mcap` for `x.mcap.part`, `x.recovered.mcap` for `x.mcap`. Nothing is overwritten and nothing deleted.
 ///
 /// # Errors
-/// When there is nothing to recover, when the new file exists already, or when the disk refuses.
+/// When there is nothing to recover, when the new file exists already, or when the disk fails.
 pub fn recover(path: impl AsRef<Path>) -> Result<Recovered, RecordingError> {
     let path = path.as_ref();
     let mut container = Container::open_by_scanning(path)?;
@@ -51,8 +51,8 @@ pub fn recover(path: impl AsRef<Path>) -> Result<Recovered, RecordingError> {
         move |source: io::Error| RecordingError::Io { path, doing, source }
     };
     let file = File::create(&unfinished).map_err(io("create the file", &unfinished))?;
-    let copy = Output::new(Box::new(file)).and_then(|out| Copy::new(out).all(&mut container));
-    let copied = copy.map_err(|error| match error {
+    let result = Output::new(Box::new(file)).and_then(|out| RecordCopier::new(out).all(&mut container));
+    let copied = result.map_err(|error| match error {
         McapError::Io(source) => RecordingError::Io { path: unfinished.clone(), doing: "write", source },
         source => RecordingError::Mcap { path: path.into(), source },
     })?;
@@ -71,17 +71,17 @@ pub fn recover(path: impl AsRef<Path>) -> Result<Recovered, RecordingError> {
     })
 }
 
-/// Copies records, giving schemas and channels the numbers of the new file.
-struct Copy {
+/// Copies records, with the new file's numbers of schemas and channels.
+struct RecordCopier {
     out: Output,
     schemas: HashMap<u16, u16>,
     channels: HashMap<u16, u16>,
     tick_channel: Option<u16>,
-    done: Copied,
+    done: CopyCounts,
 }
 
 #[derive(Default)]
-struct Copied {
+struct CopyCounts {
     ticks: u64,
     messages: u64,
     damaged_chunks: usize,
@@ -89,14 +89,14 @@ struct Copied {
     damaged_extras: usize,
 }
 
-impl Copy {
-    fn new(out: Output) -> Copy {
+impl RecordCopier {
+    fn new(out: Output) -> RecordCopier {
         let (schemas, channels) = (HashMap::new(), HashMap::new());
-        Copy { out, schemas, channels, tick_channel: None, done: Copied::default() }
+        RecordCopier { out, schemas, channels, tick_channel: None, done: CopyCounts::default() }
     }
 
-    /// Everything, metadata and attachments first.
-    fn all(mut self, container: &mut Container) -> Result<Copied, McapError> {
+    /// Copies everything, metadata and attachments first.
+    fn all(mut self, container: &mut Container) -> Result<CopyCounts, McapError> {
         for span in container.metadata.clone() {
             let body = container.read_record(span)?;
             match mcap::parse_record(op::METADATA, &body) {
@@ -116,7 +116,7 @@ impl Copy {
                     for record in records {
                         self.record(record)?;
                     }
-                    // A chunk of the old file is one of the new: it holds whole ticks.
+                    // The new file has the chunks of the old one: each holds whole ticks.
                     self.out.mcap.flush()?;
                 }
                 Err(_) => self.done.damaged_chunks += 1,

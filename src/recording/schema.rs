@@ -1,38 +1,20 @@
-//! Records as protobuf messages and back.
+//! Records as protobuf messages, and back.
 
 use foxglove::messages::{Log, log};
 use prost::Message;
 
+use super::decode::{DecodeError, number, one_of};
 use super::record::{
-    ArmingCheckRecord, LogLevel, LogRecord, Record, RequestRecord, SessionInfo, StageRecord, Transition,
+    ArmingCheckRecord, HealthLimits, LogLevel, LogRecord, Record, RequestRecord, SessionInfo, StageRecord, Transition,
 };
 use super::topic::Topic;
-use super::{frog, optimizing, tick};
+use super::{frog, optimizing, tick, trials};
+use crate::optimize::ask::SamplerKind;
 use crate::robot::LinkStatus;
-use crate::telemetry::{ArmingCheck, ArmingCheckState, Counters};
-use crate::trial::{
-    ExperimentStage, FallRisk, MeasuredJump, ParameterInfo, Proposal, ProposalSource, ProposedParameter, TrialRecord,
-    Verdict,
-};
+use crate::telemetry::{ArmingCheck, ArmingCheckState, Counters, Mode};
+use crate::trial::{ExperimentStage, ParameterInfo};
 
-/// A message that is not what the schema says.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum DecodeError {
-    /// Not protobuf, or not of this message.
-    #[error("not a message of its schema: {0}")]
-    Protobuf(#[from] prost::DecodeError),
-    /// A part that must be there is not.
-    #[error("{0} is missing")]
-    Missing(&'static str),
-    /// A number without a meaning.
-    #[error("{1} is no {0} that this version knows")]
-    Unknown(&'static str, i32),
-    /// An array of another length than the machine has.
-    #[error("{1} {0}: another number than this version expects")]
-    Length(&'static str, usize),
-}
-
-/// The topic of a record; its message goes into `buffer`. `start_utc_ns` is the log time of engine time 0.
+/// Encodes a record into `buffer` and returns its topic. `start_utc_ns` is the log time of engine time 0, ns.
 pub fn encode(record: &Record, start_utc_ns: u64, log_time: u64, buffer: &mut Vec<u8>) -> Topic {
     buffer.clear();
     let (topic, encoded) = match record {
@@ -49,8 +31,8 @@ pub fn encode(record: &Record, start_utc_ns: u64, log_time: u64, buffer: &mut Ve
             let message = frog::StageInfo { stage: *stage as i32, trial: *trial, can_undo: *can_undo };
             (Topic::Stage, message.encode(buffer))
         }
-        Record::Proposal(value) => (Topic::Proposal, proposal(value).encode(buffer)),
-        Record::Trial(value) => (Topic::Trial, trial(value).encode(buffer)),
+        Record::Proposal(value) => (Topic::Proposal, trials::proposal(value).encode(buffer)),
+        Record::Trial(value) => (Topic::Trial, trials::trial(value).encode(buffer)),
         Record::Request(RequestRecord { wish, accepted, answer }) => {
             let message = frog::OperatorCommand { wish: wish.clone(), accepted: *accepted, answer: answer.clone() };
             (Topic::Command, message.encode(buffer))
@@ -99,19 +81,19 @@ pub fn encode(record: &Record, start_utc_ns: u64, log_time: u64, buffer: &mut Ve
         Record::Insight(value) => (Topic::Insight, optimizing::insight(value).encode(buffer)),
         Record::Points(value) => (Topic::Points, optimizing::points(value).encode(buffer)),
     };
-    encoded.expect("a Vec grows as far as it must");
+    encoded.expect("a Vec grows as needed");
     topic
 }
 
-/// The record of a message; none on a topic that holds no records.
+/// Decodes the record of a message; none on a topic that holds no records.
 pub fn decode(topic: Topic, data: &[u8]) -> Result<Option<Record>, DecodeError> {
     Ok(Some(match topic {
         Topic::Session => Record::Session(from_session(frog::Session::decode(data)?)),
         Topic::Transition => {
             let message = frog::Transition::decode(data)?;
             Record::Transition(Transition {
-                from: tick::mode(message.from)?,
-                to: tick::mode(message.to)?,
+                from: one_of(&Mode::ALL, "mode", message.from)?,
+                to: one_of(&Mode::ALL, "mode", message.to)?,
                 cause: message.cause,
             })
         }
@@ -119,8 +101,8 @@ pub fn decode(topic: Topic, data: &[u8]) -> Result<Option<Record>, DecodeError> 
             let frog::StageInfo { stage, trial, can_undo } = frog::StageInfo::decode(data)?;
             Record::Stage(StageRecord { stage: one_of(&ExperimentStage::ALL, "stage", stage)?, trial, can_undo })
         }
-        Topic::Proposal => Record::Proposal(from_proposal(frog::Proposal::decode(data)?)?),
-        Topic::Trial => Record::Trial(from_trial(frog::Trial::decode(data)?)?),
+        Topic::Proposal => Record::Proposal(trials::from_proposal(frog::Proposal::decode(data)?)?),
+        Topic::Trial => Record::Trial(trials::from_trial(frog::Trial::decode(data)?)?),
         Topic::Command => {
             let frog::OperatorCommand { wish, accepted, answer } = frog::OperatorCommand::decode(data)?;
             Record::Request(RequestRecord { wish, accepted, answer })
@@ -154,8 +136,8 @@ pub fn decode(topic: Topic, data: &[u8]) -> Result<Option<Record>, DecodeError> 
         Topic::PreArm => {
             let item = |item: frog::pre_arm::Item| {
                 Ok(ArmingCheckRecord {
-                    check: one_of(&ArmingCheck::ALL, "check", item.check)?,
-                    state: one_of(&ArmingCheckState::ALL, "state of a check", item.state)?,
+                    check: one_of(ArmingCheck::ALL, "check", item.check)?,
+                    state: one_of(ArmingCheckState::ALL, "state of a check", item.state)?,
                     found: item.found,
                     needed: item.needed,
                 })
@@ -181,11 +163,11 @@ fn session(info: &SessionInfo, start_utc_ns: u64) -> frog::Session {
     };
     frog::Session {
         version: info.version.clone(),
-        backend: info.backend.clone(),
+        backend: info.backend_name().to_owned(),
         robot: info.robot.clone(),
-        task: info.task.clone(),
+        task: info.task_name().to_owned(),
         unit: info.unit.clone(),
-        sampler: info.sampler.clone(),
+        sampler: info.sampler_name().to_owned(),
         seed: info.seed,
         budget: info.budget,
         parameters: info.parameters.iter().map(bounds).collect(),
@@ -195,7 +177,8 @@ fn session(info: &SessionInfo, start_utc_ns: u64) -> frog::Session {
         observe: info.observe,
         start_utc_ns,
         gains: info.gains.iter().map(bounds).collect(),
-        approve: info.approve.clone(),
+        approve: info.approve.name().to_owned(),
+        limits: Some(health_limits(&info.limits)),
     }
 }
 
@@ -203,16 +186,16 @@ fn from_session(message: frog::Session) -> SessionInfo {
     let bounds = |bounds: frog::Bounds| ParameterInfo {
         name: bounds.name,
         unit: bounds.unit,
-        low: tick::number(bounds.low),
-        high: tick::number(bounds.high),
+        low: number(bounds.low),
+        high: number(bounds.high),
     };
     SessionInfo {
         version: message.version,
-        backend: message.backend,
+        backend: message.backend.parse().ok(),
         robot: message.robot,
-        task: message.task,
+        task: message.task.parse().ok(),
         unit: message.unit,
-        sampler: message.sampler,
+        sampler: SamplerKind::from_name(&message.sampler),
         seed: message.seed,
         budget: message.budget,
         parameters: message.parameters.into_iter().map(bounds).collect(),
@@ -221,118 +204,31 @@ fn from_session(message: frog::Session) -> SessionInfo {
         started: message.started,
         observe: message.observe,
         gains: message.gains.into_iter().map(bounds).collect(),
-        approve: message.approve,
+        approve: message.approve.parse().unwrap_or_default(),
+        limits: message.limits.map_or_else(HealthLimits::default, |limits| from_health_limits(&limits)),
     }
 }
 
-fn proposal(value: &Proposal) -> frog::Proposal {
-    let parameter = |parameter: &ProposedParameter| frog::proposal::Parameter {
-        name: parameter.name.clone(),
-        value: Some(parameter.value),
-        proposed: Some(parameter.proposed),
-    };
-    frog::Proposal {
-        trial: value.trial,
-        revision: value.revision,
-        source: value.source as i32,
-        parent: value.parent,
-        parameters: value.parameters.iter().map(parameter).collect(),
-        risk: value.risk.as_ref().map(risk),
-        gains: value.gains.iter().map(parameter).collect(),
+fn health_limits(limits: &HealthLimits) -> frog::HealthLimits {
+    frog::HealthLimits {
+        state_age_ms: limits.state_age_ms,
+        loss_share: Some(limits.loss_share),
+        motor_c: Some(limits.motor_c),
+        battery_percent: Some(limits.battery_percent),
+        late_share: Some(limits.late_share),
+        late_ms: Some(limits.late_ms),
     }
 }
 
-fn from_proposal(message: frog::Proposal) -> Result<Proposal, DecodeError> {
-    let parameter = |parameter: frog::proposal::Parameter| ProposedParameter {
-        name: parameter.name,
-        value: tick::number(parameter.value),
-        proposed: tick::number(parameter.proposed),
-    };
-    Ok(Proposal {
-        trial: message.trial,
-        revision: message.revision,
-        source: one_of(&ProposalSource::ALL, "source", message.source)?,
-        parent: message.parent,
-        parameters: message.parameters.into_iter().map(parameter).collect(),
-        risk: message.risk.map(from_risk),
-        gains: message.gains.into_iter().map(parameter).collect(),
-    })
-}
-
-fn trial(value: &TrialRecord) -> frog::Trial {
-    let parameter = |(name, value): &(String, f64)| frog::trial::Parameter { name: name.clone(), value: Some(*value) };
-    let measured = |measured: &MeasuredJump| frog::trial::Measured {
-        dx: Some(measured.dx_m),
-        dy: Some(measured.dy_m),
-        dyaw: Some(measured.dyaw_rad),
-        apex: Some(measured.apex_m),
-        air: Some(measured.air_s),
-    };
-    frog::Trial {
-        trial: value.trial,
-        source: value.source as i32,
-        parent: value.parent,
-        parameters: value.parameters.iter().map(parameter).collect(),
-        measured: value.measured.as_ref().map(measured),
-        value: value.value,
-        hand_value: value.hand_value,
-        suggested: value.suggested.map(|verdict| verdict as i32),
-        cause: value.cause.clone(),
-        verdict: value.verdict.map(|verdict| verdict as i32),
-        note: value.note.clone(),
-        risk: value.risk.as_ref().map(risk),
-        gains: value.gains.iter().map(parameter).collect(),
+fn from_health_limits(message: &frog::HealthLimits) -> HealthLimits {
+    HealthLimits {
+        state_age_ms: message.state_age_ms,
+        loss_share: number(message.loss_share),
+        motor_c: number(message.motor_c),
+        battery_percent: number(message.battery_percent),
+        late_share: number(message.late_share),
+        late_ms: number(message.late_ms),
     }
-}
-
-fn from_trial(message: frog::Trial) -> Result<TrialRecord, DecodeError> {
-    let verdict = |verdict: Option<i32>| verdict.map(|verdict| one_of(&Verdict::ALL, "verdict", verdict)).transpose();
-    let measured = |measured: frog::trial::Measured| MeasuredJump {
-        dx_m: tick::number(measured.dx),
-        dy_m: tick::number(measured.dy),
-        dyaw_rad: tick::number(measured.dyaw),
-        apex_m: tick::number(measured.apex),
-        air_s: tick::number(measured.air),
-    };
-    let parameter = |parameter: frog::trial::Parameter| (parameter.name, tick::number(parameter.value));
-    Ok(TrialRecord {
-        trial: message.trial,
-        source: one_of(&ProposalSource::ALL, "source", message.source)?,
-        parent: message.parent,
-        parameters: message.parameters.into_iter().map(parameter).collect(),
-        measured: message.measured.map(measured),
-        value: message.value,
-        hand_value: message.hand_value,
-        suggested: verdict(message.suggested)?,
-        cause: message.cause,
-        verdict: verdict(message.verdict)?,
-        note: message.note,
-        risk: message.risk.map(from_risk),
-        gains: message.gains.into_iter().map(parameter).collect(),
-    })
-}
-
-fn risk(risk: &FallRisk) -> frog::Risk {
-    frog::Risk {
-        nearest_fall: risk.nearest_fall,
-        nearest_fall_trial: risk.nearest_fall_trial,
-        falls: risk.falls,
-        neighbours: risk.neighbours,
-    }
-}
-
-fn from_risk(message: frog::Risk) -> FallRisk {
-    FallRisk {
-        nearest_fall: message.nearest_fall,
-        nearest_fall_trial: message.nearest_fall_trial,
-        falls: message.falls,
-        neighbours: message.neighbours,
-    }
-}
-
-/// The value of that number: enums are numbered in the order of their `ALL`, here and in `proto/frog.proto`.
-fn one_of<T: Copy>(all: &[T], what: &'static str, number: i32) -> Result<T, DecodeError> {
-    all.get(number as usize).copied().ok_or(DecodeError::Unknown(what, number))
 }
 
 fn link(link: &LinkStatus) -> frog::Link {
@@ -378,7 +274,8 @@ fn from_link(link: &frog::Link) -> LinkStatus {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::telemetry::{Mode, Phase};
+    use crate::telemetry::Phase;
+    use crate::trial::{ProposalSource, Verdict};
 
     /// `STAND UP` in the program is `STAND_UP` in the schema, `re-run` is `RE_RUN`.
     fn assert_named(name: &str, in_schema: Option<&str>) {
@@ -387,11 +284,11 @@ mod tests {
 
     #[test]
     fn enums_are_numbered_as_in_the_schema() {
-        for (number, mode) in (0..).zip(Mode::ALL) {
+        for (number, mode) in (0..).zip(Mode::ALL.iter().copied()) {
             assert_eq!(mode as i32, number);
             assert_named(mode.name(), frog::control_tick::Mode::try_from(number).ok().map(|m| m.as_str_name()));
         }
-        for (number, phase) in (0..).zip(Phase::ALL) {
+        for (number, phase) in (0..).zip(Phase::ALL.iter().copied()) {
             assert_eq!(phase as i32, number);
             assert_named(phase.name(), frog::control_tick::Phase::try_from(number).ok().map(|p| p.as_str_name()));
         }
@@ -408,11 +305,11 @@ mod tests {
             assert_named(verdict.name(), frog::trial::Verdict::try_from(number).ok().map(|v| v.as_str_name()));
         }
         // Their names are sentences; their numbers and count are what matters.
-        for (number, check) in (0..).zip(ArmingCheck::ALL) {
+        for (number, check) in (0..).zip(ArmingCheck::ALL.iter().copied()) {
             assert_eq!(check as i32, number);
             assert!(frog::pre_arm::Check::try_from(number).is_ok(), "{check:?}");
         }
-        for (number, state) in (0..).zip(ArmingCheckState::ALL) {
+        for (number, state) in (0..).zip(ArmingCheckState::ALL.iter().copied()) {
             assert_eq!(state as i32, number);
             assert_named(state.name(), frog::pre_arm::State::try_from(number).ok().map(|s| s.as_str_name()));
         }

@@ -1,28 +1,28 @@
-//! A tick as the three messages of its topics, and back, bit for bit.
+//! A tick as the messages of its three topics, and back, bit for bit.
 
 use foxglove::messages::{JointState, JointStates, Timestamp};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
+use super::decode::{DecodeError, number, one_of};
 use super::frog;
-use super::schema::DecodeError;
 use crate::robot::{
     Battery, Imu, JOINTS, JointCommand, Joints, LEGS, MotorCommand, PerLeg, RobotState, Truth, joint_name,
 };
 use crate::telemetry::{Estimate, Mode, Phase, StageTimes, Tick};
 
-/// Log time (UTC, ns) as protobuf's seconds and nanoseconds; past the year 2106 the stamp stands still.
+/// Converts log time (UTC, ns) to protobuf's seconds and nanoseconds; saturates in the year 2106.
 pub fn timestamp(log_time: u64) -> Timestamp {
     let (seconds, nanoseconds) = (log_time / 1_000_000_000, log_time % 1_000_000_000);
     Timestamp::new(u32::try_from(seconds).unwrap_or(u32::MAX), nanoseconds as u32)
 }
 
-/// A message for [`joint_states`] to fill, with the joints' names as the URDF has them.
+/// Returns a message for [`joint_states`] to fill, with the URDF's joint names.
 pub fn named_joints() -> JointStates {
     let joint = |index| JointState { name: joint_name(index), ..JointState::default() };
     JointStates { timestamp: None, joints: (0..JOINTS).map(joint).collect() }
 }
 
-/// What the robot reported of its joints, into a message made by [`named_joints`].
+/// Fills a message of [`named_joints`] with the measured joint states.
 pub fn joint_states(state: &RobotState, log_time: u64, message: &mut JointStates) {
     message.timestamp = Some(timestamp(log_time));
     for (index, joint) in message.joints.iter_mut().enumerate() {
@@ -32,7 +32,7 @@ pub fn joint_states(state: &RobotState, log_time: u64, message: &mut JointStates
     }
 }
 
-/// What the joints were told.
+/// Returns the joint command as sent, with the torque before the limits.
 pub fn joint_command(tick: &Tick) -> frog::JointCommand {
     let each = |value: fn(&MotorCommand) -> f64| tick.command.motor.iter().map(value).collect();
     frog::JointCommand {
@@ -46,7 +46,7 @@ pub fn joint_command(tick: &Tick) -> frog::JointCommand {
     }
 }
 
-/// Everything else of a tick.
+/// Returns everything else of a tick.
 pub fn control_tick(tick: &Tick) -> frog::ControlTick {
     let Tick { state, estimate, stages, .. } = tick;
     let orientation = estimate.orientation_world.coords;
@@ -206,8 +206,8 @@ fn tick(
     Ok(Tick {
         number: c.number,
         time_ns: c.time_ns,
-        mode: mode(c.mode)?,
-        phase: *Phase::ALL.get(c.phase as usize).ok_or(DecodeError::Unknown("phase", c.phase))?,
+        mode: one_of(&Mode::ALL, "mode", c.mode)?,
+        phase: one_of(&Phase::ALL, "phase", c.phase)?,
         trial: c.trial,
         trial_time_s: number(c.trial_time),
         theta_rad: number(c.theta),
@@ -253,11 +253,6 @@ fn tick(
     })
 }
 
-/// The mode of that number in `ControlTick.Mode`.
-pub fn mode(value: i32) -> Result<Mode, DecodeError> {
-    Mode::ALL.get(value as usize).copied().ok_or(DecodeError::Unknown("mode", value))
-}
-
 fn from_joint_command(message: &frog::JointCommand) -> Result<JointCommand, DecodeError> {
     let [position, velocity] = [twelve(&message.position)?, twelve(&message.velocity)?];
     let [kp, kd, torque] = [twelve(&message.kp)?, twelve(&message.kd)?, twelve(&message.torque)?];
@@ -299,16 +294,11 @@ fn from_truth(t: &frog::Truth) -> Truth {
     }
 }
 
-/// A number that an older recording lacks reads as zero, as protobuf has it.
-pub fn number(value: Option<f64>) -> f64 {
-    value.unwrap_or_default()
-}
-
 fn vector(x: Option<f64>, y: Option<f64>, z: Option<f64>) -> Vector3<f64> {
     Vector3::new(number(x), number(y), number(z))
 }
 
-/// Not normalized again: that would change the last bits.
+/// Not normalized: that would change the last bits.
 fn rotation(x: Option<f64>, y: Option<f64>, z: Option<f64>, w: Option<f64>) -> UnitQuaternion<f64> {
     UnitQuaternion::new_unchecked(Quaternion::new(number(w), number(x), number(y), number(z)))
 }

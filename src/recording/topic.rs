@@ -2,88 +2,69 @@
 
 use foxglove::messages::{FrameTransforms, JointStates, Log, PoseInFrame};
 use foxglove::{Encode, Schema};
+use strum::{EnumString, IntoStaticStr, VariantArray};
 
-/// The description of `proto/frog.proto`, as every channel carries it.
+/// Descriptor of `proto/frog.proto`, part of every channel's schema.
 const FROG_DESCRIPTORS: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/frog.v1.bin"));
 
-/// A topic; its place in `ALL` plus one is its channel in files written here (readers go by the name).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+/// A topic. Its order is that of the channels in files written here; readers use the name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, EnumString, IntoStaticStr, VariantArray)]
 pub enum Topic {
+    #[strum(serialize = "/robot/joint_states")]
     JointStates,
+    #[strum(serialize = "/robot/joint_cmd")]
     JointCommand,
+    #[strum(serialize = "/robot/tick")]
     Tick,
+    #[strum(serialize = "/robot/pose")]
     Pose,
+    #[strum(serialize = "/tf")]
     Tf,
+    #[strum(serialize = "/robot/counters")]
     Counters,
+    #[strum(serialize = "/session")]
     Session,
+    #[strum(serialize = "/fsm")]
     Transition,
+    #[strum(serialize = "/opt/stage")]
     Stage,
+    #[strum(serialize = "/opt/proposal")]
     Proposal,
+    #[strum(serialize = "/opt/trial")]
     Trial,
+    #[strum(serialize = "/operator/command")]
     Command,
+    #[strum(serialize = "/log")]
     Log,
+    #[strum(serialize = "/fault")]
     Fault,
+    #[strum(serialize = "/marker")]
     Marker,
+    #[strum(serialize = "/safety/pre_arm")]
     PreArm,
+    #[strum(serialize = "/opt/search")]
     Search,
+    #[strum(serialize = "/opt/insight")]
     Insight,
+    #[strum(serialize = "/opt/points")]
     Points,
 }
 
 impl Topic {
-    pub const ALL: [Topic; 19] = [
-        Topic::JointStates,
-        Topic::JointCommand,
-        Topic::Tick,
-        Topic::Pose,
-        Topic::Tf,
-        Topic::Counters,
-        Topic::Session,
-        Topic::Transition,
-        Topic::Stage,
-        Topic::Proposal,
-        Topic::Trial,
-        Topic::Command,
-        Topic::Log,
-        Topic::Fault,
-        Topic::Marker,
-        Topic::PreArm,
-        Topic::Search,
-        Topic::Insight,
-        Topic::Points,
-    ];
+    /// All topics; the place of one, plus 1, is its channel in files written here.
+    pub const ALL: &'static [Topic] = Topic::VARIANTS;
 
-    /// The name in the file.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Topic::JointStates => "/robot/joint_states",
-            Topic::JointCommand => "/robot/joint_cmd",
-            Topic::Tick => "/robot/tick",
-            Topic::Pose => "/robot/pose",
-            Topic::Tf => "/tf",
-            Topic::Counters => "/robot/counters",
-            Topic::Session => "/session",
-            Topic::Transition => "/fsm",
-            Topic::Stage => "/opt/stage",
-            Topic::Proposal => "/opt/proposal",
-            Topic::Trial => "/opt/trial",
-            Topic::Command => "/operator/command",
-            Topic::Log => "/log",
-            Topic::Fault => "/fault",
-            Topic::Marker => "/marker",
-            Topic::PreArm => "/safety/pre_arm",
-            Topic::Search => "/opt/search",
-            Topic::Insight => "/opt/insight",
-            Topic::Points => "/opt/points",
-        }
+    /// Returns the name in the file.
+    pub fn name(self) -> &'static str {
+        self.into()
     }
 
-    /// The topic of that name.
+    /// Returns the topic of that name.
     pub fn from_name(name: &str) -> Option<Topic> {
-        Topic::ALL.into_iter().find(|topic| topic.name() == name)
+        name.parse().ok()
     }
 
-    /// Whether its messages are few: events, of which a player keeps all at hand, unlike ticks and counters.
+    /// Whether its messages are events: few, and kept in memory by a player, unlike ticks and counters.
     pub const fn is_event(self) -> bool {
         !matches!(
             self,
@@ -91,14 +72,14 @@ impl Topic {
         )
     }
 
-    /// What its messages look like.
+    /// Returns the schema of its messages.
     pub fn schema(self) -> Schema {
         let own = |name: &str| Schema::new(format!("frog.v1.{name}"), "protobuf", FROG_DESCRIPTORS);
         match self {
-            Topic::JointStates => JointStates::get_schema().expect("foxglove's messages have schemas"),
-            Topic::Pose => PoseInFrame::get_schema().expect("foxglove's messages have schemas"),
-            Topic::Tf => FrameTransforms::get_schema().expect("foxglove's messages have schemas"),
-            Topic::Log => Log::get_schema().expect("foxglove's messages have schemas"),
+            Topic::JointStates => JointStates::get_schema().expect("a message of foxglove has a schema"),
+            Topic::Pose => PoseInFrame::get_schema().expect("a message of foxglove has a schema"),
+            Topic::Tf => FrameTransforms::get_schema().expect("a message of foxglove has a schema"),
+            Topic::Log => Log::get_schema().expect("a message of foxglove has a schema"),
             Topic::JointCommand => own("JointCommand"),
             Topic::Tick => own("ControlTick"),
             Topic::Counters => own("Counters"),
@@ -124,7 +105,7 @@ mod tests {
 
     #[test]
     fn topics_are_found_by_name_and_by_number() {
-        for topic in Topic::ALL {
+        for &topic in Topic::ALL {
             assert_eq!(Topic::from_name(topic.name()), Some(topic));
             assert_eq!(Topic::ALL[topic as usize], topic);
         }

@@ -1,4 +1,4 @@
-//! Writes a recording: a session as it happens, or a single rollout at once.
+//! Writer of a recording: a live session, or a single rollout at once.
 
 use std::fs::{self, OpenOptions};
 use std::io;
@@ -16,17 +16,17 @@ use super::{frames, frog, tick};
 use crate::robot::description::RobotDescription;
 use crate::telemetry::{Mode, Tick};
 
-/// `/robot/pose` and `/tf` are written every 10 ms: they are for the eye, and follow from the ticks.
+/// Period of `/robot/pose` and `/tf`, for viewers; both follow from the ticks.
 const FRAMES_PERIOD_NS: u64 = 10_000_000;
 
-/// Writes one recording. Dropped without [`finish`](Writer::finish), the file keeps its name `*.mcap.part` and what was
-/// written until then.
+/// Writer of one recording. Dropped without [`finish`](Writer::finish), it leaves the file as `*.mcap.part` with everything
+/// written so far.
 pub struct Writer {
     out: Output,
     joints: JointStates,
     robot: Option<RobotDescription>,
     start_utc_ns: u64,
-    /// Whether a tick had which trial and mode last: a change of them is a marker.
+    /// Trial and mode of the last tick: a change may be a marker.
     last: Option<(Option<u32>, Mode)>,
     last_frames: Option<u64>,
     records: u32,
@@ -36,13 +36,13 @@ pub struct Writer {
 }
 
 impl Writer {
-    /// Begins the recording `path` (`*.mcap`); until it is finished it is named `*.mcap.part`. Missing folders are made.
-    /// Metadata, attachments and the session's first message are on the disk when this returns.
+    /// Begins the recording `path` (`*.mcap`), named `*.mcap.part` until it is finished. Creates missing folders. Metadata,
+    /// attachments and the session's first message are on the disk on return.
     ///
-    /// `start_utc_ns` is the time of day, UTC, at engine time 0, ns since 1970; `attachments` are (name, media type, bytes).
+    /// `start_utc_ns` is the UTC time of engine time 0, ns since 1970; `attachments` are (name, media type, bytes).
     ///
     /// # Errors
-    /// When the name does not end in `.mcap`, when one of the two files exists already, or when the disk refuses.
+    /// When the name does not end in `.mcap`, when one of the two files exists already, or when the disk fails.
     pub fn create(
         path: impl AsRef<Path>,
         session: &SessionInfo,
@@ -71,10 +71,10 @@ impl Writer {
         Writer::begin(Box::new(file), path, part, session, start_utc_ns, attachments)
     }
 
-    /// Like [`create`](Writer::create), into anything else than a file. `path` is for messages alone; nothing is renamed.
+    /// Like [`create`](Writer::create), into any sink. `path` is for messages only; nothing is renamed.
     ///
     /// # Errors
-    /// When the sink refuses.
+    /// When the sink fails.
     pub fn into_sink(
         sink: Box<dyn Sink>,
         path: impl AsRef<Path>,
@@ -113,7 +113,7 @@ impl Writer {
         Ok(writer)
     }
 
-    /// From now on `/tf` is written too: the frames of this robot's links, for viewers in three dimensions.
+    /// Adds `/tf` to the following ticks: the frames of this robot's links, for 3D viewers.
     pub fn show_links_of(&mut self, robot: RobotDescription) {
         self.robot = Some(robot);
     }
@@ -121,15 +121,15 @@ impl Writer {
     /// Writes one tick.
     ///
     /// # Errors
-    /// When the disk refuses; the recording is then at its end.
+    /// When the disk fails; the recording ends there.
     pub fn tick(&mut self, tick: &Tick) -> Result<(), RecordingError> {
         self.write_tick(tick).map_err(|error| error_at(&self.part, error))
     }
 
     fn write_tick(&mut self, tick: &Tick) -> Result<(), McapError> {
         let log_time = self.start_utc_ns.saturating_add(tick.time_ns);
-        let sequence = tick.number as u32; // the player knows the three messages of a tick by it
-        self.mark(tick, log_time)?;
+        let sequence = tick.number as u32; // joins the messages of a tick in the player
+        self.write_marker(tick, log_time)?;
         tick::joint_states(&tick.state, log_time, &mut self.joints);
         self.out.message(Topic::JointStates, sequence, log_time, &self.joints)?;
         self.out.message(Topic::JointCommand, sequence, log_time, &tick::joint_command(tick))?;
@@ -143,12 +143,12 @@ impl Writer {
             }
         }
         self.ticks += 1;
-        // Only here, never between the messages of a tick: a chunk holds whole ticks.
+        // Not between the messages of a tick: a chunk holds whole ticks.
         self.out.close_full_chunk()
     }
 
-    /// A marker where a trial or a fault begins.
-    fn mark(&mut self, tick: &Tick, log_time: u64) -> Result<(), McapError> {
+    /// Writes a marker where a trial or a fault begins.
+    fn write_marker(&mut self, tick: &Tick, log_time: u64) -> Result<(), McapError> {
         let (last_trial, last_mode) = self.last.replace((tick.trial, tick.mode)).unwrap_or((None, Mode::Offline));
         if tick.trial.is_some() && tick.trial != last_trial {
             let marker = frog::Marker { kind: frog::marker::Kind::Trial as i32, trial: tick.trial };
@@ -164,7 +164,7 @@ impl Writer {
     /// Writes one record.
     ///
     /// # Errors
-    /// When the disk refuses; the recording is then at its end.
+    /// When the disk fails; the recording ends there.
     pub fn record(&mut self, stamped: &Stamped) -> Result<(), RecordingError> {
         let log_time = self.start_utc_ns.saturating_add(stamped.time_ns);
         self.records = self.records.wrapping_add(1);
@@ -174,10 +174,10 @@ impl Writer {
             .map_err(|error| error_at(&self.part, error))
     }
 
-    /// Hands everything to the operating system: it then survives the end of this program, however it ends.
+    /// Passes everything to the operating system: it then survives a crash of the program.
     ///
     /// # Errors
-    /// When the disk refuses.
+    /// When the disk fails.
     pub fn flush(&mut self) -> Result<(), RecordingError> {
         self.out.close_chunk().map_err(|error| error_at(&self.part, error))
     }
@@ -185,16 +185,16 @@ impl Writer {
     /// Waits until everything is on the disk: it then survives a power cut. Takes milliseconds.
     ///
     /// # Errors
-    /// When the disk refuses.
+    /// When the disk fails.
     pub fn sync(&mut self) -> Result<(), RecordingError> {
         self.flush()?;
         self.out.sync().map_err(|error| error_at(&self.part, error))
     }
 
-    /// Completes the file with its index, waits until it is on the disk, and gives it its final name, which is returned.
+    /// Completes the file with its index, waits until it is on the disk, renames it and returns its final name.
     ///
     /// # Errors
-    /// When the disk refuses, or when another file took the name meanwhile; the recording then keeps the name `*.part`.
+    /// When the disk fails, or when a file of the final name exists by now; the recording then keeps the name `*.part`.
     pub fn finish(mut self) -> Result<PathBuf, RecordingError> {
         self.out.finish().map_err(|error| error_at(&self.part, error))?;
         if self.part != self.path {
@@ -210,17 +210,17 @@ impl Writer {
         Ok(self.path.clone())
     }
 
-    /// Ticks written so far.
+    /// Returns the ticks written so far.
     pub fn ticks(&self) -> u64 {
         self.ticks
     }
 
-    /// Bytes handed to the disk so far; the open chunk is not among them.
+    /// Returns the bytes passed to the disk so far, without the open chunk.
     pub fn bytes(&self) -> u64 {
         self.out.bytes()
     }
 
-    /// The final name.
+    /// Returns the final name.
     pub fn path(&self) -> &Path {
         &self.path
     }

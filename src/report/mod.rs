@@ -1,3 +1,3 @@
-//! What happened, as tables.
+//! Tables of trials.
 
 pub mod table;

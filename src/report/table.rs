@@ -5,7 +5,7 @@ use std::fmt::Write;
 
 use crate::trial::{ParameterInfo, TrialRecord, Verdict};
 
-/// One trial in a line: number, parameters with their units, value, verdict and why.
+/// One trial as a line: number, parameters with their units, value, verdict with its cause.
 pub fn line(row: &TrialRecord, unit: &str, units: &HashMap<String, String>) -> String {
     let mut text = format!("trial {:>3}", row.trial);
     for (name, value) in &row.parameters {
@@ -16,7 +16,7 @@ pub fn line(row: &TrialRecord, unit: &str, units: &HashMap<String, String>) -> S
     text
 }
 
-/// The value and verdict of a trial in words.
+/// Value and verdict of a trial as text.
 fn outcome(row: &TrialRecord, unit: &str) -> String {
     match (row.verdict, row.value) {
         (Some(Verdict::Accept), Some(value)) => format!("{value:.3} {unit}  accept"),
@@ -26,7 +26,7 @@ fn outcome(row: &TrialRecord, unit: &str) -> String {
     }
 }
 
-/// All trials as an aligned table; the best is marked.
+/// All trials as an aligned table; the best has an asterisk.
 pub fn table(rows: &[TrialRecord], parameters: &[ParameterInfo], unit: &str) -> String {
     let mut header: Vec<String> = vec!["trial".into()];
     header.extend(parameters.iter().map(|p| format!("{} ({})", p.name, p.unit)));
@@ -35,11 +35,11 @@ pub fn table(rows: &[TrialRecord], parameters: &[ParameterInfo], unit: &str) -> 
     let best = rows.iter().filter(accepted).filter_map(|row| row.value).fold(f64::NEG_INFINITY, f64::max);
     let mut lines = vec![header];
     for row in rows {
-        let mark = if row.verdict == Some(Verdict::Accept) && row.value == Some(best) { "*" } else { "" };
-        let mut cells = vec![format!("{mark}{}", row.trial)];
+        let asterisk = if row.verdict == Some(Verdict::Accept) && row.value == Some(best) { "*" } else { "" };
+        let mut cells = vec![format!("{asterisk}{}", row.trial)];
         for parameter in parameters {
-            let value = row.parameters.iter().find(|(name, _)| *name == parameter.name);
-            cells.push(value.map_or_else(String::new, |(_, v)| format!("{v:.*}", digits(&parameter.unit))));
+            let value = row.parameters.get(&parameter.name);
+            cells.push(value.map_or_else(String::new, |v| format!("{v:.*}", digits(&parameter.unit))));
         }
         cells.push(row.value.map_or_else(|| "-".into(), |value| format!("{value:.3}")));
         cells.push(row.measured.map_or_else(|| "-".into(), |measured| format!("{:.3}", measured.apex_m)));
@@ -58,10 +58,10 @@ pub fn table(rows: &[TrialRecord], parameters: &[ParameterInfo], unit: &str) -> 
     let mut text = String::new();
     for line in &lines {
         for (column, cell) in line.iter().enumerate() {
-            // Numbers to the right; the words of the last two columns to the left.
-            let words = column + 2 >= columns;
+            // Numbers right-aligned; the texts of the last two columns left-aligned.
+            let is_text = column + 2 >= columns;
             let pad = " ".repeat(widths[column] - cell.chars().count());
-            let cell = if words { format!("{cell}{pad}") } else { format!("{pad}{cell}") };
+            let cell = if is_text { format!("{cell}{pad}") } else { format!("{pad}{cell}") };
             text.push_str(&cell);
             text.push_str("  ");
         }
@@ -71,7 +71,7 @@ pub fn table(rows: &[TrialRecord], parameters: &[ParameterInfo], unit: &str) -> 
     text
 }
 
-/// Digits after the point that a parameter of that unit deserves.
+/// Decimal places for a parameter of a unit.
 fn digits(unit: &str) -> usize {
     if unit == "Hz" { 3 } else { 1 }
 }

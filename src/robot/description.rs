@@ -1,23 +1,23 @@
-//! What is true of one machine: bodies, joints, limits, poses. Read from a folder `robots/<name>/` that holds a
-//! URDF (bodies, joints, limits, collision shapes) and a `robot.toml` (what a URDF cannot say).
+//! Description of one robot: bodies, joints, limits, poses. Read from a folder `robots/<name>/` with a URDF (bodies,
+//! joints, limits, collision shapes) and a `robot.toml` (all else).
 //!
-//! Any quadruped with three joints a leg will do. Nothing is read from names: the root of the URDF is the trunk, its
-//! four chains of three revolute joints are the legs, told apart by where the hip is (in front or behind, left or right).
+//! Any quadruped with three joints per leg is accepted. Names have no meaning: the root of the URDF is the trunk, its
+//! four chains of three revolute joints are the legs, identified by the position of the hip (front or rear, left or
+//! right).
 
 mod files;
 mod urdf;
 
 use nalgebra::{Matrix3, Vector3};
 
-pub use files::DescriptionError;
+pub use files::{DescriptionError, RobotFiles};
 
-use super::go1::Network;
 use super::kinematics::LegGeometry;
 use super::{JOINTS, Joints, PerLeg};
 
 /// One rigid body. Frames are parallel to the body frame at zero joint angles.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Body {
+pub struct RigidBody {
     /// Link name, for example `FR_thigh`.
     pub name: String,
     /// Mass, kg.
@@ -26,13 +26,13 @@ pub struct Body {
     pub com: Vector3<f64>,
     /// Rotational inertia about the centre of mass in link axes, kg m^2.
     pub inertia_com: Matrix3<f64>,
-    /// Shapes that can touch the ground, in the link's frame; a foot's sphere is not among them.
-    pub collision: Vec<Shape>,
+    /// Shapes that can touch the ground, in the link's frame, without the foot's sphere.
+    pub collision: Vec<CollisionShape>,
 }
 
 /// A collision shape in the frame of its link.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Shape {
+pub enum CollisionShape {
     /// A sphere.
     Sphere {
         /// Centre, m.
@@ -62,11 +62,11 @@ pub enum Shape {
     },
 }
 
-/// One leg: three bodies and the joints that carry them.
+/// One leg: three bodies and their joints.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LegDescription {
     /// Hip, thigh and calf; the foot's mass is part of the calf.
-    pub bodies: [Body; 3],
+    pub bodies: [RigidBody; 3],
     /// Origin of each joint in its parent's frame, m.
     pub joint_origin: [Vector3<f64>; 3],
     /// Centre of the foot in the calf's frame, m.
@@ -84,44 +84,42 @@ pub struct JointLimits {
     pub max_position: Joints,
     /// Largest absolute torques, N m.
     pub max_torque: Joints,
-    /// Largest absolute velocities, rad/s (the no-load speed of the motor).
+    /// Largest absolute velocities (no-load speed of the motor), rad/s.
     pub max_velocity: Joints,
 }
 
-/// Everything that is constant about a machine.
+/// Constants of a robot.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RobotDescription {
     /// Name, for example `go1`.
     pub name: String,
     /// The floating base.
-    pub trunk: Body,
+    pub trunk: RigidBody,
     /// Legs in the order FR, FL, RR, RL.
     pub legs: PerLeg<LegDescription>,
-    /// Lengths for the closed-form leg kinematics, the same for all legs but for the side.
+    /// Lengths for the closed-form leg kinematics, the same for all legs.
     pub leg_geometry: LegGeometry,
     /// Hard limits.
     pub limits: JointLimits,
-    /// Joint angles that the maker's own controller library allows: hip, thigh, calf of every leg, `[lowest, highest]`, rad;
-    /// none where they are not known.
+    /// Joint angles that the maker's controller library allows: hip, thigh, calf, `[lowest, highest]`, rad; none if
+    /// unknown.
     pub maker_limits: Option<[[f64; 2]; 3]>,
-    /// Joint angles of the machine lying folded on the floor, rad: where standing up starts and sitting down ends.
+    /// Joint angles of the robot folded on the floor, rad: start of standing up and end of sitting down.
     pub lying_position: Joints,
-    /// Inertia of each motor's rotor as felt at the joint (gear ratio squared times its own), kg m^2.
+    /// Inertia of each motor's rotor at the joint (gear ratio squared times rotor inertia), kg m^2.
     pub rotor_inertia: Joints,
-    /// Where the inertial unit sits, trunk frame, m; its axes are the trunk's.
+    /// Position of the inertial unit, trunk frame, m; its axes are the trunk's.
     pub imu_origin: Vector3<f64>,
-    /// How the machine is reached; none for one that cannot be driven.
-    pub network: Option<Network>,
 }
 
 impl RobotDescription {
-    /// Mass of the whole machine, kg.
+    /// Total mass, kg.
     pub fn total_mass(&self) -> f64 {
         self.trunk.mass + self.legs.iter().flat_map(|leg| &leg.bodies).map(|body| body.mass).sum::<f64>()
     }
 
-    /// Lowest and highest joint angles that a controller may ask for, rad: what both the URDF and the maker's own library
-    /// allow.
+    /// Lowest and highest joint angles that a controller may command, rad: allowed by the URDF and by the maker's
+    /// library.
     pub fn allowed_positions(&self) -> (Joints, Joints) {
         let (mut lowest, mut highest) = (self.limits.min_position, self.limits.max_position);
         if let Some(maker) = self.maker_limits {

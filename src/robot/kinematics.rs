@@ -1,6 +1,6 @@
 //! Closed-form kinematics of one leg: hip about x, thigh and calf about y. Pure functions.
 //!
-//! Source: `specs/method.md`, "Frames and signs", with side s = +1 left, -1 right:
+//! Source: `docs/method.md`, "Frames and signs", with side s = +1 left, -1 right:
 //! a = l2 cos q2 + l3 cos(q2 + q3);  x = -l2 sin q2 - l3 sin(q2 + q3);
 //! y = s l1 cos q1 + a sin q1;  z = s l1 sin q1 - a cos q1.
 
@@ -17,9 +17,9 @@ pub struct LegGeometry {
     pub calf: f64,
 }
 
-/// The foot's position and its derivative by the joint angles, leg frame.
+/// Position of the centre of a foot and its derivative with respect to the joint angles, leg frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Foot {
+pub struct FootPosition {
     /// Position in the leg frame, m.
     pub position_leg: Vector3<f64>,
     /// Jacobian d position / d q, m/rad; rows x, y, z, columns hip, thigh, calf.
@@ -30,24 +30,25 @@ pub struct Foot {
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error("the foot cannot be at ({:.3}, {:.3}, {:.3}) m in the leg frame: it is {reason}", position_leg.x, position_leg.y, position_leg.z)]
 pub struct Unreachable {
-    /// The point asked for, m.
+    /// The requested point, m.
     pub position_leg: Vector3<f64>,
-    /// Why not.
+    /// The reason.
     pub reason: &'static str,
 }
 
 impl LegGeometry {
-    /// Foot position and Jacobian at the joint angles `q` (hip, thigh, calf; rad) of a leg on `side` (+1 left, -1 right).
-    pub fn foot(&self, q: &Vector3<f64>, side: f64) -> Foot {
+    /// Returns foot position and Jacobian at the joint angles `q` (hip, thigh, calf; rad) of a leg on `side` (+1 left,
+    /// -1 right).
+    pub fn foot(&self, q: &Vector3<f64>, side: f64) -> FootPosition {
         let (s1, c1) = q.x.sin_cos();
         let (s2, c2) = q.y.sin_cos();
         let (s23, c23) = (q.y + q.z).sin_cos();
         let l1 = side * self.abduction;
-        // a: how far the foot is below the thigh joint in the leg's own plane; w: how far behind it.
+        // In the plane of the leg the foot is a below and w behind the thigh joint.
         let a = self.thigh * c2 + self.calf * c23;
         let w = self.thigh * s2 + self.calf * s23;
         let (calf_c, calf_s) = (self.calf * c23, self.calf * s23);
-        Foot {
+        FootPosition {
             position_leg: Vector3::new(-w, l1 * c1 + a * s1, l1 * s1 - a * c1),
             #[rustfmt::skip]
             jacobian_leg: Matrix3::new(
@@ -58,11 +59,18 @@ impl LegGeometry {
         }
     }
 
-    /// Joint angles that put the foot at `position_leg` (m), knee pointing backwards (calf angle negative), the foot
-    /// below the hip axis.
+    /// Returns the positions of thigh joint, calf joint and foot in the leg frame, m; arguments as of
+    /// [`LegGeometry::foot`].
+    pub fn points(&self, q: &Vector3<f64>, side: f64) -> [Vector3<f64>; 3] {
+        let end = |thigh, calf| LegGeometry { thigh, calf, ..*self }.foot(q, side).position_leg;
+        [end(0.0, 0.0), end(self.thigh, 0.0), end(self.thigh, self.calf)]
+    }
+
+    /// Returns the joint angles for the foot at `position_leg` (m), with the knee backwards (calf angle negative) and
+    /// the foot below the hip axis.
     ///
     /// # Errors
-    /// When the point is farther than the stretched leg or nearer than the abduction link and the folded leg allow.
+    /// The point is farther than the stretched leg, or nearer than the abduction link or the folded leg allows.
     pub fn inverse(&self, position_leg: &Vector3<f64>, side: f64) -> Result<Vector3<f64>, Unreachable> {
         let unreachable = |reason| Unreachable { position_leg: *position_leg, reason };
         let [x, y, z] = (*position_leg).into();

@@ -1,5 +1,5 @@
-//! The machine as a controller sees it: what it reports, what it can be told, and the seam behind which a
-//! Go1 or the simulator stands.
+//! The robot as the controller sees it: reported state, commands, and the trait [`Robot`] that the Go1 and the
+//! simulator implement.
 //!
 //! Frames: **world** z up; **body** origin at the trunk's, x forward, y left, z up; **leg** origin at the leg's
 //! hip joint, axes of the body. Legs are always in the order FR, FL, RR, RL; joints hip (abduction, about x),
@@ -8,21 +8,25 @@
 pub mod description;
 pub mod go1;
 pub mod kinematics;
-pub mod recent;
+pub mod recent_count;
 
 use nalgebra::{UnitQuaternion, Vector3};
 
+/// Acceleration of free fall, m/s^2.
+pub const GRAVITY: f64 = 9.81;
+/// Period of the control cycle, s: a command holds for this long.
+pub const CONTROL_PERIOD_S: f64 = 0.001;
 /// Number of legs.
 pub const LEGS: usize = 4;
-/// Number of actuated joints, `3 * leg + joint`.
+/// Number of actuated joints; index `3 * leg + joint`.
 pub const JOINTS: usize = 12;
 /// One number per joint, in motor order (FR, FL, RR, RL x hip, thigh, calf).
 pub type Joints = [f64; JOINTS];
 /// One number per leg, FR, FL, RR, RL.
 pub type PerLeg<T> = [T; LEGS];
 
-/// A leg; the discriminant is its index everywhere.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+/// A leg; the discriminant is its index, the variant's name that of URDF links.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, strum::IntoStaticStr)]
 pub enum Leg {
     /// Front right.
     FR = 0,
@@ -38,17 +42,12 @@ impl Leg {
     /// All legs in index order.
     pub const ALL: PerLeg<Leg> = [Leg::FR, Leg::FL, Leg::RR, Leg::RL];
 
-    /// The two letters of the field, as in URDF link names.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Leg::FR => "FR",
-            Leg::FL => "FL",
-            Leg::RR => "RR",
-            Leg::RL => "RL",
-        }
+    /// Two letters, as in URDF link names.
+    pub fn name(self) -> &'static str {
+        self.into()
     }
 
-    /// +1 for a left leg, -1 for a right one: the sign `s` of the paper's leg geometry.
+    /// +1 for a left leg, -1 for a right one: the sign s in `docs/method.md`.
     pub const fn side(self) -> f64 {
         match self {
             Leg::FL | Leg::RL => 1.0,
@@ -65,23 +64,23 @@ impl Leg {
     }
 }
 
-/// The names of a leg's joints in motor order.
+/// Names of a leg's joints in motor order.
 pub const JOINT_NAMES: [&str; 3] = ["hip", "thigh", "calf"];
 
-/// The name of joint `index` (0..12) as the URDF has it, for example `FR_thigh`.
+/// Returns the name of joint `index` (0..12), for example `FR_thigh`.
 pub fn joint_name(index: usize) -> String {
     format!("{}_{}", Leg::ALL[index / 3].name(), JOINT_NAMES[index % 3])
 }
 
-/// The three joint values of one leg as a vector.
+/// Returns the three joint values of one leg.
 pub fn leg_of(joints: &Joints, leg: usize) -> Vector3<f64> {
     Vector3::new(joints[3 * leg], joints[3 * leg + 1], joints[3 * leg + 2])
 }
 
-/// What the inertial unit reports.
+/// Measurement of the inertial unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Imu {
-    /// Rotation that takes body axes to world axes.
+    /// Rotation from body axes to world axes.
     pub orientation_world: UnitQuaternion<f64>,
     /// Angular velocity in body axes, rad/s.
     pub gyro_body: Vector3<f64>,
@@ -95,22 +94,22 @@ impl Default for Imu {
     }
 }
 
-/// What only a simulator can know. Used for the objective in simulation and to judge the estimator.
+/// True state, known in simulation alone. Used for the objective in simulation and to evaluate the estimator.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Truth {
     /// Position of the trunk's origin in the world, m.
     pub position_world: Vector3<f64>,
     /// Velocity of the trunk's origin in the world, m/s.
     pub velocity_world: Vector3<f64>,
-    /// Rotation that takes body axes to world axes.
+    /// Rotation from body axes to world axes.
     pub orientation_world: UnitQuaternion<f64>,
     /// Angular velocity in body axes, rad/s.
     pub angular_velocity_body: Vector3<f64>,
-    /// Whether each foot touches something.
+    /// Whether each foot is in contact.
     pub foot_contact: PerLeg<bool>,
     /// Force of the ground on each foot, world axes, N.
     pub foot_force_world: PerLeg<Vector3<f64>>,
-    /// Whether any part other than the feet touches something: the robot has fallen.
+    /// Whether any part other than the feet is in contact: the robot has fallen.
     pub body_contact: bool,
 }
 
@@ -123,14 +122,14 @@ pub struct Battery {
     pub voltage_v: f64,
     /// Current, A; negative while discharging.
     pub current_a: f64,
-    /// Cell voltages, V; zero where there is no such cell.
+    /// Cell voltages, V; zero for absent cells.
     pub cell_v: [f64; 10],
 }
 
-/// Everything that the machine reports in one state message.
+/// One state message.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RobotState {
-    /// The robot's own clock, ms since its start; going backwards means that it rebooted.
+    /// Clock of the robot, ms since its boot; it decreases when the robot has rebooted.
     pub robot_time_ms: u32,
     /// Joint angles, rad.
     pub joint_position: Joints,
@@ -140,20 +139,20 @@ pub struct RobotState {
     pub joint_torque: Joints,
     /// Inertial unit.
     pub imu: Imu,
-    /// Normal force at each foot's sensor, N.
+    /// Normal force at each foot sensor, N.
     pub foot_force: PerLeg<f64>,
     /// Motor temperatures, degrees Celsius.
     pub motor_temperature_c: Joints,
-    /// Whether each motor reports that it follows commands (servo mode).
+    /// Whether each motor reports servo mode, in which it follows commands.
     pub motor_enabled: [bool; JOINTS],
-    /// Battery; none for a machine without one.
+    /// Battery; none if the robot has none.
     pub battery: Option<Battery>,
-    /// The simulator's own knowledge; none on hardware.
+    /// True state; none on hardware.
     pub truth: Option<Truth>,
 }
 
-/// By how much the robot's clock went on from `before_ms` to `now_ms`, ms; negative if it restarted. The clock runs for 49 days
-/// before it begins anew: the difference is right across that, too.
+/// Returns the time between two values of the robot's clock, ms; negative if the robot rebooted. Correct also when the
+/// clock wraps around after 49 days.
 pub fn robot_time_passed(now_ms: u32, before_ms: u32) -> i32 {
     now_ms.wrapping_sub(before_ms) as i32
 }
@@ -175,7 +174,7 @@ impl Default for RobotState {
     }
 }
 
-/// What one motor is told: `torque + kp (position - q) + kd (velocity - dq)`, computed inside the motor.
+/// Command to one motor: `torque + kp (position - q) + kd (velocity - dq)`, computed inside the motor.
 ///
 /// A command with all gains and the torque zero leaves the joint free; `kp = 0, torque = 0, kd > 0,
 /// velocity = 0` is damping.
@@ -194,26 +193,26 @@ pub struct MotorCommand {
 }
 
 impl MotorCommand {
-    /// The torque that the motor's own law asks for at joint angle `q` and velocity `dq`, N m.
+    /// Returns the torque of the motor's control law at joint angle `q` and velocity `dq`, N m.
     pub fn torque_at(&self, q: f64, dq: f64) -> f64 {
         self.torque + self.kp * (self.position - q) + self.kd * (self.velocity - dq)
     }
 }
 
-/// One command to the whole machine.
+/// Command to all motors.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct JointCommand {
-    /// One command per motor.
+    /// Command per motor.
     pub motor: [MotorCommand; JOINTS],
 }
 
 impl JointCommand {
-    /// Every joint damped with gain `kd` (N m s/rad): the safe command, energy only ever leaves.
+    /// Damps every joint with gain `kd` (N m s/rad): the safe command, which only dissipates energy.
     pub fn damping(kd: f64) -> Self {
         JointCommand { motor: [MotorCommand { kd, ..MotorCommand::default() }; JOINTS] }
     }
 
-    /// Pure torques, N m.
+    /// Commands torques alone, N m.
     pub fn torques(torque: &Joints) -> Self {
         let mut command = JointCommand::default();
         for (motor, &torque) in command.motor.iter_mut().zip(torque) {
@@ -223,66 +222,66 @@ impl JointCommand {
     }
 }
 
-/// Where a machine is put before a trial. A simulator does it at once; for hardware the operator does it by hand.
+/// Start position of a trial. A simulator takes it at once; on hardware the operator places the robot by hand.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Placement {
-    /// Joint angles to start from, rad.
+    /// Initial joint angles, rad.
     pub joint_position: Joints,
-    /// Lying folded on the floor (before standing up) or standing with the feet touching it.
+    /// True for a robot that lies folded on the floor, false for one that stands.
     pub lying: bool,
-    /// Seed of everything random in this trial: sensor noise, terrain where it is random.
+    /// Seed of all random numbers in this trial: sensor noise, random terrain.
     pub seed: u64,
 }
 
-/// The state that `read` returned is not to be had, or the command could not be sent.
+/// No state is available, or the command could not be sent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum RobotError {
-    /// No valid state yet, or none for the given time.
+    /// No valid state since the given time.
     #[error("no state from the robot for {age_ms} ms")]
     Silent {
         /// Age of the newest valid state, ms.
         age_ms: u32,
     },
-    /// The operating system refused to send.
+    /// The operating system did not send the command.
     #[error("the command could not be sent to the robot (error {errno})")]
     Send {
-        /// The system's error number.
+        /// Error number of the operating system.
         errno: i32,
     },
 }
 
-/// How the link to a robot is doing: what came, what did not, and what was not fit to use. Counts are since the start.
+/// Statistics of the link to a robot. Counts are since the program's start.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct LinkStatus {
-    /// Valid states that were newer than all before.
+    /// Valid states that were newer than all earlier ones.
     pub received: u64,
-    /// States that never came, from gaps in the robot's clock; one that comes late after all is not lost.
+    /// Lost states, from gaps in the robot's clock; a state that arrives late is no longer counted.
     pub lost: u64,
-    /// Valid states that were older than the newest: overtaken on the way.
+    /// Valid states that were older than the newest one (overtaken).
     pub late: u64,
-    /// Valid states with the time of the newest one: sent twice, or by a robot whose clock stands still.
+    /// Valid states with the time of an earlier one: duplicated datagrams, or a robot whose clock stands still.
     pub duplicate: u64,
-    /// Datagrams whose checksum is wrong.
+    /// Datagrams with a wrong checksum.
     pub corrupt: u64,
     /// Datagrams too short for a state.
     pub wrong_length: u64,
     /// Datagrams with another header than a low-level state's.
     pub foreign: u64,
-    /// How often the robot's clock began anew.
+    /// Restarts of the robot's clock.
     pub reboots: u64,
-    /// Commands handed to the network.
+    /// Commands passed to the network.
     pub sent: u64,
-    /// Commands that the operating system refused to send.
+    /// Commands that the operating system did not send.
     pub send_errors: u64,
     /// Age of the newest valid state, ms.
     pub state_age_ms: u32,
-    /// Valid states in the last second: their rate, Hz.
+    /// Rate of valid states in the last second, Hz.
     pub rate_hz: u32,
-    /// Of the last five seconds: valid states.
+    /// Valid states in the last five seconds.
     pub recent_received: u32,
-    /// Of the last five seconds: lost states.
+    /// Lost states in the last five seconds.
     pub recent_lost: u32,
-    /// Of the last five seconds: corrupt datagrams.
+    /// Corrupt datagrams in the last five seconds.
     pub recent_corrupt: u32,
 }
 
@@ -294,26 +293,26 @@ impl LinkStatus {
     }
 }
 
-/// The machine: hardware or simulator. Both calls are made once per tick from the control thread and neither
-/// allocates, locks nor blocks.
+/// A robot: hardware or simulator. The control thread calls `read` and `write` once per tick; neither allocates, locks
+/// or blocks.
 pub trait Robot: Send {
-    /// The newest state.
+    /// Returns the newest state.
     fn read(&mut self) -> Result<RobotState, RobotError>;
 
-    /// Sends one command. For the simulator this advances time by one control period.
+    /// Sends one command. A simulator advances by one control period.
     fn write(&mut self, command: &JointCommand) -> Result<(), RobotError>;
 
-    /// Puts the machine in place for a trial; false where only a person can (hardware).
+    /// Places the robot for a trial; returns false if only a person can (hardware).
     fn place(&mut self, placement: &Placement) -> bool;
 
-    /// How the link is doing; none for a machine without one.
+    /// Returns the statistics of the link; none for a robot without a link.
     fn link(&self) -> Option<LinkStatus> {
         None
     }
 
-    /// Goes the way of `read` and `write` once, shortly before both are called and bound by the same rules: what the processor
-    /// needs for them is then at hand. The robot hears nothing of it, and neither call answers otherwise for it.
-    fn rehearse(&mut self) {}
+    /// Warms the caches for `read` and `write`, under the same real-time rules; see [`crate::control::control_loop`].
+    /// Sends nothing to the robot, and changes no result of later calls.
+    fn warm_up(&mut self) {}
 }
 
 impl<R: Robot + ?Sized> Robot for Box<R> {
@@ -329,7 +328,7 @@ impl<R: Robot + ?Sized> Robot for Box<R> {
     fn link(&self) -> Option<LinkStatus> {
         (**self).link()
     }
-    fn rehearse(&mut self) {
-        (**self).rehearse();
+    fn warm_up(&mut self) {
+        (**self).warm_up();
     }
 }

@@ -1,19 +1,17 @@
-//! The whole pre-arm list in words: what the control thread found, what the session sees, what the operator says.
+//! The arming checklist: findings of the control thread, checks of the session, confirmations of the operator.
 
 use std::path::PathBuf;
 
+use crate::control::arming::{self, Sentence};
 use crate::control::settings::{ArmingLimits, ControlSettings};
 use crate::recording::disk;
 use crate::recording::record::ArmingCheckRecord;
 use crate::recording::recorder::RecorderStatus;
-use crate::robot::joint_name;
-use crate::telemetry::{
-    ArmingCheck, ArmingCheckSet, ArmingCheckState, ArmingFinding, ArmingFindings, Mode, TransitionCause,
-};
+use crate::telemetry::{ArmingCheck, ArmingCheckSet, ArmingCheckState, ArmingFindings, Mode, TransitionCause};
 
 use super::operator_request::OperatorCheck;
 
-/// How far the test of the STOP key has come.
+/// Progress of the test of the STOP key.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum StopTest {
     Open,
@@ -21,7 +19,7 @@ enum StopTest {
     Passed,
 }
 
-/// What the list is made with and what it remembers of this session.
+/// The arming checks of one session.
 #[derive(Debug, Clone)]
 pub struct ArmingChecklist {
     limits: ArmingLimits,
@@ -30,20 +28,20 @@ pub struct ArmingChecklist {
     hardware: bool,
     /// Fingerprint of the configuration.
     configuration: String,
-    /// Where the recording goes; none where nothing is kept.
+    /// Folder of the recording; none where nothing is kept.
     folder: Option<PathBuf>,
-    /// What the operator has given their word on.
-    words: ArmingCheckSet,
-    /// When they gave it last on the area, ns.
+    /// Checks that the operator has confirmed.
+    confirmed: ArmingCheckSet,
+    /// Time of the last confirmation of the clear area, ns.
     area_ns: u64,
-    /// How often the robot has restarted, as far as the list has heard.
+    /// Restarts of the robot that were taken in.
     reboots: u64,
     stop: StopTest,
 }
 
 impl ArmingChecklist {
-    /// A list of which nothing is confirmed. `configuration` is shown beside the operator's word on it; `folder` is where
-    /// the recording goes, none where nothing is kept.
+    /// A list without confirmations. `configuration` is the fingerprint for the operator; `folder` is the folder of the
+    /// recording, none where nothing is kept.
     pub fn new(settings: &ControlSettings, configuration: String, folder: Option<PathBuf>) -> ArmingChecklist {
         ArmingChecklist {
             limits: settings.pre_arm,
@@ -51,44 +49,44 @@ impl ArmingChecklist {
             hardware: settings.hardware,
             configuration,
             folder,
-            words: ArmingCheckSet::EMPTY,
+            confirmed: ArmingCheckSet::EMPTY,
             area_ns: 0,
             reboots: 0,
             stop: StopTest::Open,
         }
     }
 
-    /// The operator gives their word.
+    /// Takes in the operator's confirmation of a check.
     pub fn confirm(&mut self, check: OperatorCheck, time_ns: u64) {
-        self.words.insert(check.check());
+        self.confirmed.insert(check.check());
         if check == OperatorCheck::AreaClear {
             self.area_ns = time_ns;
         }
     }
 
-    /// The robot is not armed yet at `time_ns`: a word that has grown old is taken back. Why, if one was.
-    pub fn forget(&mut self, time_ns: u64) -> Option<String> {
+    /// Withdraws the confirmation of the clear area if it is too old at `time_ns`. Returns the reason if it was withdrawn.
+    pub fn expire(&mut self, time_ns: u64) -> Option<String> {
         let age_s = time_ns.saturating_sub(self.area_ns) as f64 * 1e-9;
         let allowed_s = self.limits.area_clear_s;
-        if age_s <= allowed_s || !self.words.contains(ArmingCheck::AreaClear) {
+        if age_s <= allowed_s || !self.confirmed.contains(ArmingCheck::AreaClear) {
             return None;
         }
-        self.words.remove(ArmingCheck::AreaClear);
+        self.confirmed.remove(ArmingCheck::AreaClear);
         Some(format!(
-            "the area was said to be clear more than {allowed_s:.0} s ago: look again, and give your word anew"
+            "the confirmation that the area is clear is older than {allowed_s:.0} s: check the area and confirm it again"
         ))
     }
 
-    /// The mode changed: a word that the change makes worthless is taken back, and a STOP may have been a test.
+    /// Takes in a change of mode: confirmations that it invalidates are withdrawn, and a STOP may be the test of the key.
     pub fn mode_changed(&mut self, from: Mode, to: Mode, cause: &TransitionCause) {
         if from.energised() && !to.energised() {
-            // Somebody will now go to the robot.
-            self.words.remove(ArmingCheck::AreaClear);
+            // A person may go to the robot now.
+            self.confirmed.remove(ArmingCheck::AreaClear);
         }
         if let TransitionCause::Fault(fault) = cause
-            && fault.voids_the_word()
+            && fault.voids_confirmations()
         {
-            self.take_back();
+            self.withdraw();
         }
         self.stop = match (self.stop, from, to, cause) {
             (StopTest::Open, Mode::Offline | Mode::Observe | Mode::Disarmed, Mode::Damped, TransitionCause::Stop) => {
@@ -100,87 +98,59 @@ impl ArmingChecklist {
         };
     }
 
-    /// The link has counted `reboots` restarts of the robot. True if there was one since the last call: in whatever mode it
-    /// happened, also where it changed none, the operator's word is taken back.
+    /// Takes in the number of restarts of the robot. Returns true if there was one since the last call: the operator's
+    /// confirmations are withdrawn then, in every mode.
     pub fn robot_restarted(&mut self, reboots: u64) -> bool {
         let restarted = reboots > self.reboots;
         self.reboots = reboots;
         if restarted {
-            self.take_back();
+            self.withdraw();
         }
         restarted
     }
 
-    /// A robot that restarted is not in low-level mode any more, and somebody may be at it.
-    fn take_back(&mut self) {
-        self.words.remove(ArmingCheck::LowLevel);
-        self.words.remove(ArmingCheck::AreaClear);
+    /// Withdraws low-level mode, which a restart ends, and the clear area, because a person may be at the robot.
+    fn withdraw(&mut self) {
+        self.confirmed.remove(ArmingCheck::LowLevel);
+        self.confirmed.remove(ArmingCheck::AreaClear);
     }
 
-    /// How every item stands now.
-    pub fn look(&self, findings: &ArmingFindings, recorder: &RecorderStatus) -> Vec<ArmingCheckRecord> {
-        let found = findings.0.iter().map(|finding| self.words_of(finding));
+    /// Returns the present state of every check.
+    pub fn items(&self, findings: &ArmingFindings, recorder: &RecorderStatus) -> Vec<ArmingCheckRecord> {
+        let found = findings.0.iter().map(|finding| {
+            let Sentence { found, needed } = arming::sentence(finding, &self.limits);
+            self.item(finding.check, finding.state, found, needed)
+        });
         let own = [
             self.recorder(recorder),
             self.disk(),
-            self.word(OperatorCheck::LowLevel, String::new(), "remote L2+A, L2+A, L2+B, L1+L2+START; your word"),
-            self.word(OperatorCheck::Configuration, format!("{}, ", self.configuration), "your word on config/"),
-            self.word(OperatorCheck::AreaClear, String::new(), "nobody within 2 m; your word"),
+            self.confirmation(
+                OperatorCheck::LowLevel,
+                String::new(),
+                "remote L2+A, L2+A, L2+B, L1+L2+START; the operator's confirmation",
+            ),
+            self.confirmation(
+                OperatorCheck::Configuration,
+                format!("{}, ", self.configuration),
+                "the operator's confirmation of config/",
+            ),
+            self.confirmation(
+                OperatorCheck::AreaClear,
+                String::new(),
+                "no person within 2 m; the operator's confirmation",
+            ),
             self.stop_tested(),
         ];
         found.chain(own).collect()
     }
 
-    /// Says so if the disk is too full for another trial.
+    /// Returns the reason if the disk is too full for another trial.
     pub fn disk_low(&self) -> Option<String> {
         let free = disk::free_mb(self.folder.as_ref()?).ok()?;
         let needed = u64::from(self.trial_mb);
-        (free < needed)
-            .then(|| format!("{free} MB free where the recording goes, at least {needed} for a trial; make room"))
-    }
-
-    fn words_of(&self, finding: &ArmingFinding) -> ArmingCheckRecord {
-        let ArmingFinding { check, state, measured, .. } = *finding;
-        let limits = &self.limits;
-        let joint = finding.joint.map(|joint| joint_name(joint as usize)).unwrap_or_default();
-        let (found, needed) = match check {
-            ArmingCheck::StateFresh => (format!("{measured:.0} ms old"), format!("at most {} ms", limits.state_age_ms)),
-            ArmingCheck::Loss => {
-                (format!("{:.1} % lost", measured * 100.0), format!("at most {} % in 5 s", limits.loss_share * 100.0))
-            }
-            ArmingCheck::Checksums => (format!("{measured:.0} corrupt"), format!("at most {} in 5 s", limits.corrupt)),
-            ArmingCheck::Upright => {
-                (format!("tilted {measured:.2} rad"), format!("at most {:.2} rad", limits.tilt_rad))
-            }
-            ArmingCheck::JointsInside => {
-                let found = if measured > 0.0 { format!("{joint} {measured:.2} rad beyond") } else { "all".to_owned() };
-                (found, format!("at most {:.2} rad beyond", limits.joint_margin_rad))
-            }
-            ArmingCheck::LyingDown => {
-                (format!("{joint} {measured:.2} rad away"), format!("at most {:.2} rad", limits.lying_tolerance_rad))
-            }
-            ArmingCheck::Battery => (format!("{measured:.0} %"), format!("at least {:.0} %", limits.battery_percent)),
-            ArmingCheck::MotorsCool => (format!("{joint} {measured:.0} C"), format!("at most {:.0} C", limits.motor_c)),
-            ArmingCheck::MotorsFollow => {
-                let found = if measured > 0.0 {
-                    format!("{measured:.0} out of servo mode, {joint} first")
-                } else {
-                    "all in servo mode".to_owned()
-                };
-                (found, "every motor in servo mode".to_owned())
-            }
-            ArmingCheck::GyroStill => (
-                format!("{measured:.2} rad/s"),
-                format!("at most {:.2} rad/s for {} s", limits.gyro_rad_s, limits.still_s),
-            ),
-            ArmingCheck::OnTime => (
-                format!("{:.1} % of ticks late", measured * 100.0),
-                format!("at most {} % later than {} ms", limits.late_share * 100.0, limits.late_ms),
-            ),
-            _ => (String::new(), String::new()),
-        };
-        let found = if measured.is_finite() { found } else { "not known yet".to_owned() };
-        self.item(check, state, found, needed)
+        (free < needed).then(|| {
+            format!("{free} MB free in the recording's folder, a trial needs at least {needed}; free some space")
+        })
     }
 
     fn recorder(&self, status: &RecorderStatus) -> ArmingCheckRecord {
@@ -188,9 +158,9 @@ impl ArmingChecklist {
             (Some(error), _) => (ArmingCheckState::Failed, error.clone()),
             (None, Some(_)) if status.finished => (ArmingCheckState::Failed, "has ended".to_owned()),
             (None, Some(_)) => (ArmingCheckState::Passed, "recording".to_owned()),
-            // Who asks for no recording of a simulation gets none; a real robot's jumps are always kept.
-            (None, None) if self.hardware => (ArmingCheckState::Failed, "nothing is kept".to_owned()),
-            (None, None) => (ArmingCheckState::NotNeeded, "nothing is to be kept".to_owned()),
+            // A simulation may run without a recording, a real robot may not.
+            (None, None) if self.hardware => (ArmingCheckState::Failed, "no recording".to_owned()),
+            (None, None) => (ArmingCheckState::NotNeeded, "no recording requested".to_owned()),
         };
         self.item(ArmingCheck::Recorder, state, found, "every tick is recorded".to_owned())
     }
@@ -198,7 +168,7 @@ impl ArmingChecklist {
     fn disk(&self) -> ArmingCheckRecord {
         let needed = format!("at least {} MB", self.limits.disk_free_mb);
         let (state, found) = match &self.folder {
-            None => (ArmingCheckState::NotNeeded, "nothing is to be kept".to_owned()),
+            None => (ArmingCheckState::NotNeeded, "no recording requested".to_owned()),
             Some(folder) => match disk::free_mb(folder) {
                 Ok(free) if free >= u64::from(self.limits.disk_free_mb) => {
                     (ArmingCheckState::Passed, format!("{free} MB"))
@@ -210,9 +180,9 @@ impl ArmingChecklist {
         self.item(ArmingCheck::Disk, state, found, needed)
     }
 
-    fn word(&self, check: OperatorCheck, about: String, needed: &str) -> ArmingCheckRecord {
+    fn confirmation(&self, check: OperatorCheck, about: String, needed: &str) -> ArmingCheckRecord {
         let check = check.check();
-        let given = self.words.contains(check);
+        let given = self.confirmed.contains(check);
         let state = if given { ArmingCheckState::Passed } else { ArmingCheckState::Waiting };
         let found = format!("{about}{}", if given { "confirmed" } else { "not confirmed" });
         self.item(check, state, found, needed.to_owned())
@@ -241,7 +211,7 @@ impl ArmingChecklist {
     }
 }
 
-/// What stands in the way of arming, all of it, in words; none if nothing does.
+/// Returns all failing checks; none if arming is allowed.
 pub fn objections(list: &[ArmingCheckRecord]) -> Option<String> {
     let open: Vec<String> = list
         .iter()

@@ -1,8 +1,8 @@
-//! A study without a person: every proposal is approved, every suggested verdict is the verdict.
+//! A study without a person: every proposal is approved, and every suggested verdict is the verdict.
 //!
-//! On a shared study this is one worker of several. The budget is that of all together: a trial begins only while those
-//! that count and those that run are fewer, seen under the journal's lock, so it is met to the trial; a worker that finds
-//! no room waits until the others' trials have ended, for one of them may come to nothing.
+//! On a shared study this is one worker of several, with one budget for all. A trial begins only while the trials that count
+//! or run are fewer than the budget, checked under the journal's lock, so the budget is met exactly. A worker without room
+//! waits until the trials of the others have ended, because one of them may be void.
 
 use std::time::Duration;
 
@@ -12,73 +12,73 @@ use crate::robot::Robot;
 use crate::telemetry::Tick;
 use crate::trial::{ExperimentStage, TrialRecord, Verdict};
 
-/// After this many void trials in a row nothing will come of the study: something is wrong that no parameter mends.
+/// Void trials in a row after which the run ends: their cause does not depend on the parameters.
 const VOIDS_IN_A_ROW: u32 = 10;
-/// How often a worker without work looks whether there is some.
-const LOOK_PERIOD: Duration = Duration::from_millis(50);
+/// Time between two reads of the study by a worker that waits.
+const WAIT_PERIOD: Duration = Duration::from_millis(50);
 
-/// Runs trials until the study has its budget; `each` is given every judged trial with its ticks.
+/// Runs trials until the study has its budget; `each` receives every judged trial with its ticks.
 ///
 /// # Errors
-/// When the study cannot be read or written, or one trial after the other is void.
+/// When the study cannot be read or written, or too many trials in a row are void.
 pub fn run<R: Robot>(
-    life: &mut Experiment,
+    experiment: &mut Experiment,
     rollout: &mut Rollout<R>,
     mut each: impl FnMut(&TrialRecord, &[Tick]),
 ) -> Result<(), RequestRefusal> {
-    run_watched(life, rollout, |_, row, ticks| each(row, ticks))
+    run_watched(experiment, rollout, |_, row, ticks| each(row, ticks))
 }
 
-/// [`run`] in which `each` is also given the study as it stands then, other workers' trials among it.
+/// [`run`] in which `each` also receives the experiment, which includes the trials of other workers.
 ///
 /// # Errors
 /// As [`run`].
 pub fn run_watched<R: Robot>(
-    life: &mut Experiment,
+    experiment: &mut Experiment,
     rollout: &mut Rollout<R>,
     mut each: impl FnMut(&Experiment, &TrialRecord, &[Tick]),
 ) -> Result<(), RequestRefusal> {
     let mut voids = 0;
     loop {
-        // Nobody looks at them.
-        life.take_records();
-        let Some(card) = life.proposal().filter(|_| life.stage() == ExperimentStage::Proposed) else {
-            // What is judged must be told before it is waited for others, or they wait for us.
-            life.close()?;
-            if life.others_run() {
-                std::thread::sleep(LOOK_PERIOD);
-                life.look()?;
+        // There is neither a screen nor a recording of them.
+        experiment.take_records();
+        let Some(proposal) = experiment.proposal().filter(|_| experiment.stage() == ExperimentStage::Proposed) else {
+            // The pending verdict must be reported before this worker waits: the others wait for it.
+            experiment.close()?;
+            if experiment.others_run() {
+                std::thread::sleep(WAIT_PERIOD);
+                experiment.refresh()?;
                 continue;
             }
-            // What was waited for may have been given up only now: then it comes again, and somebody must run it.
-            life.look()?;
-            if life.proposal().is_none() {
+            // An abandoned trial of another worker may be queued again only now.
+            experiment.refresh()?;
+            if experiment.proposal().is_none() {
                 return Ok(());
             }
             continue;
         };
-        if life.objection().is_some() {
-            // Another program has queued what no robot may run: it is void, and its cause says why.
-            life.skip()?;
+        if experiment.objection().is_some() {
+            // Another program has queued a point outside the limits: it is void with this cause.
+            experiment.skip()?;
             continue;
         }
-        let spec = match life.approve(card.trial, card.revision) {
+        let spec = match experiment.approve(proposal.trial, proposal.revision) {
             Err(RequestRefusal::Overtaken(_)) => continue,
             approved => approved?,
         };
         let (end, ticks) = rollout.run(&spec);
-        life.ended(spec.trial, &end, ticks, ticks.len() as u64);
-        let suggested = life.row(spec.trial).and_then(|row| row.suggested).unwrap_or(Verdict::Void);
-        match life.judge(suggested, false) {
+        experiment.ended(spec.trial, &end, ticks, ticks.len() as u64);
+        let suggested = experiment.row(spec.trial).and_then(|row| row.suggested).unwrap_or(Verdict::Void);
+        match experiment.judge(suggested, false) {
             Err(RequestRefusal::EndedElsewhere(_)) => continue,
             judged => judged?,
         }
         voids = if suggested == Verdict::Void { voids + 1 } else { 0 };
-        if let Some(row) = life.row(spec.trial) {
-            each(life, row, ticks);
+        if let Some(row) = experiment.row(spec.trial) {
+            each(experiment, row, ticks);
             if voids >= VOIDS_IN_A_ROW {
                 let cause = row.cause.clone();
-                life.close()?;
+                experiment.close()?;
                 return Err(RequestRefusal::NotNow(format!(
                     "{voids} trials in a row were void, the last because: {cause}"
                 )));

@@ -1,201 +1,210 @@
-//! The life of a trial: proposed, approved, run, measured, judged. A state machine around the study; no thread, no clock,
-//! no robot. The supervisor drives it from an operator's intents, `automatic` without a person.
+//! An experiment: the trials of one study, each proposed, approved, run, measured and judged. A state machine around the
+//! study without thread, clock or robot. The supervisor drives it by an operator's requests, `automatic` without a person.
 //!
-//! A verdict is on disk as soon as it is given, but the sampler is told only when the next trial begins: until then it can
-//! be undone. What the operator sees next is drafted on a fork of the study in which the verdict is already told, and is
-//! therefore what the study itself will propose.
+//! A verdict is on disk as soon as it is given, but it is reported to the sampler only when the next trial begins: until
+//! then it can be undone. The next proposal is drafted on a fork of the study in which the verdict is already reported,
+//! and is therefore what the study itself will propose.
 
-mod attributes;
-mod card;
-mod confirming;
-mod gains;
+pub mod attributes;
+mod changes;
+mod confirmation;
+mod liveness;
+mod proposal_card;
 mod proposing;
-mod recovery;
-mod searching;
-mod watch;
-mod wishes;
-
-pub use wishes::BUDGET;
+mod queue;
+mod search;
 
 use std::collections::BTreeMap;
 use std::time::Duration;
 
+use self::attributes::JudgedAttributes;
+use self::confirmation::{BestConfirmation, NextRepeat};
+use self::proposal_card::ProposalCard;
+use self::queue::TrialQueue;
+use self::search::SearchSettings;
+use super::objective;
 use crate::control::settings::TaskControl;
 use crate::optimize::exchange::TableTrial;
-use crate::optimize::repeats::{Point, points};
+use crate::optimize::repeats::{RepeatedPoint, points};
 use crate::optimize::study::{Outcome, Study, StudyError};
 use crate::optimize::trial::TrialState;
 use crate::recording::record::{LogLevel, LogRecord, Record, StageRecord};
 use crate::telemetry::{Tick, TrialEnd, TrialSpec};
 use crate::trial::{
-    ExperimentStage, ParameterInfo, PointRecord, Proposal, ProposalSource, SearchStatus, Task, TrialRecord, Verdict,
+    ExperimentStage, ParameterInfo, Proposal, ProposalSource, SearchStatus, Task, TrialRecord, Verdict,
 };
 
-use super::objective;
-use card::Card;
-use confirming::Confirmed;
-use searching::Searched;
-use watch::Watch;
-
-/// Why a wish cannot be carried out, in words for the operator.
+/// Refusal of a request, as a message for the operator.
 #[derive(Debug, thiserror::Error)]
 pub enum RequestRefusal {
-    /// It does not fit the present stage or the bounds.
+    /// The request does not fit the present stage or the bounds.
     #[error("{0}")]
     NotNow(String),
-    /// Another worker was faster; the next proposal is on the table.
-    #[error("another worker was faster: the proposal for trial {0} does not hold any more; look at the new one")]
+    /// Another worker began the proposed trial; there is a new proposal.
+    #[error("another worker was faster: the proposal for trial {0} does not hold any more; approve the new one")]
     Overtaken(u32),
-    /// The trial under review was ended by another program; the next proposal is on the table.
-    #[error("trial {0} was ended by somebody else meanwhile: what they say stands")]
+    /// Another program ended the trial under review; there is a new proposal.
+    #[error("trial {0} was ended by another program: that result stands")]
     EndedElsewhere(u32),
     /// The study could not be read or written.
     #[error(transparent)]
     Study(#[from] StudyError),
 }
 
-fn not_now<T>(why: impl Into<String>) -> Result<T, RequestRefusal> {
-    Err(RequestRefusal::NotNow(why.into()))
+fn not_now<T>(reason: impl Into<String>) -> Result<T, RequestRefusal> {
+    Err(RequestRefusal::NotNow(reason.into()))
 }
 
-/// What the trials of one study have in common.
+/// Settings that all trials of one study share.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExperimentPlan {
     /// The task.
     pub task: Task,
-    /// What the controller runs with.
+    /// Settings of the controller.
     pub control: TaskControl,
     /// Parameters with their bounds, in table order.
     pub parameters: Vec<ParameterInfo>,
     /// Seed of the study.
     pub seed: u64,
-    /// How many trials are to count.
+    /// Trials that are to count.
     pub budget: u32,
-    /// Name of the recording that the trials go into; empty without one.
+    /// File name of the recording; empty without one.
     pub recording: String,
     /// The same parameters with the widest bounds that they may be given.
     pub widest: Vec<ParameterInfo>,
     /// The controller's gains with the ranges in which they may be set.
     pub gains: Vec<ParameterInfo>,
-    /// How many of the best points are repeated to confirm the best.
+    /// Number of best points that are repeated to confirm the best.
     pub contenders: u32,
     /// Confidence at which one of them is the best.
     pub confidence: f64,
-    /// Who this is among the workers on the study: 0 has the study's folder, and with it what a crash left behind.
+    /// Number of this worker on the study: 0 has the study's folder, and closes the trials that a crash left running.
     pub worker: u32,
-    /// After how long without news a running trial of another worker counts as dead.
+    /// Time without news after which a running trial of another worker counts as abandoned.
     pub abandoned: Duration,
 }
 
 /// A verdict that can still be undone.
 #[derive(Debug, Clone, PartialEq)]
-struct Pending {
-    /// The row as it was before the verdict.
+struct PendingVerdict {
+    /// The row before the verdict.
     suggestion: TrialRecord,
     outcome: Outcome,
     /// Queue the same parameters again.
     rerun: bool,
 }
 
-/// Trials of one study and where the present one stands.
+/// State of the current trial.
+enum ExperimentState {
+    /// A proposal waits for approval.
+    Proposed(Box<ProposalCard>),
+    /// This trial runs.
+    Running(u32),
+    /// This trial waits for its verdict.
+    Review(u32),
+    /// The budget is used up.
+    Finished,
+}
+
+/// The trials of one study and the state of the current one.
 pub struct Experiment {
     plan: ExperimentPlan,
     study: Study,
-    watch: Watch,
+    state: ExperimentState,
+    /// Rows of the trial table, by number.
     rows: BTreeMap<u32, TrialRecord>,
-    stage: ExperimentStage,
-    /// The trial that runs or is under review.
-    current: u32,
-    card: Option<Card>,
-    /// How many cards and changes of cards there were: no approval of an earlier one fits a later one.
+    /// Number of cards and changes of cards: the newest revision.
     revisions: u32,
-    pending: Option<Pending>,
-    searched: Searched,
-    confirmed: Option<Confirmed>,
+    pending: Option<PendingVerdict>,
+    queue: TrialQueue,
+    search: SearchSettings,
+    confirmation: BestConfirmation,
     outbox: Vec<Record>,
-    /// What was said last of search and points: said again only if it has changed.
-    said: Said,
-}
-
-/// What the screen knows already.
-#[derive(Default)]
-struct Said {
-    search: Option<SearchStatus>,
-    points: Vec<PointRecord>,
+    published_search: Option<SearchStatus>,
 }
 
 impl Experiment {
-    /// Takes up a study, new or not. What a crash left running is told if it was judged; otherwise it is void and its
+    /// Opens a study, new or not. A trial that a crash left running counts if it was judged; otherwise it is void and its
     /// parameters are queued again.
     ///
     /// # Errors
     /// When the study cannot be read or written.
     pub fn open(plan: ExperimentPlan, study: Study) -> Result<Experiment, StudyError> {
-        let mut life = Experiment {
-            watch: Watch::new(plan.abandoned),
+        let mut experiment = Experiment {
+            queue: TrialQueue::new(plan.worker, plan.abandoned),
+            confirmation: BestConfirmation::new(plan.contenders, plan.confidence),
             plan,
             study,
+            state: ExperimentState::Finished,
             rows: BTreeMap::new(),
-            stage: ExperimentStage::Finished,
-            current: 0,
-            card: None,
             revisions: 0,
             pending: None,
-            searched: Searched::default(),
-            confirmed: None,
+            search: SearchSettings::default(),
             outbox: Vec::new(),
-            said: Said::default(),
+            published_search: None,
         };
-        life.close_interrupted()?;
-        life.propose()?;
-        Ok(life)
+        let log = experiment.queue.close_interrupted(&mut experiment.study)?;
+        experiment.log_all(log);
+        experiment.propose()?;
+        Ok(experiment)
     }
 
-    /// What happened since the last call, for the screen and the recording.
+    /// Takes the records since the last call, for the screen and the recording.
     pub fn take_records(&mut self) -> Vec<Record> {
         std::mem::take(&mut self.outbox)
     }
 
-    /// Where the present trial stands.
+    /// Returns the stage of the current trial.
     pub fn stage(&self) -> ExperimentStage {
-        self.stage
+        match self.state {
+            ExperimentState::Proposed(_) => ExperimentStage::Proposed,
+            ExperimentState::Running(_) => ExperimentStage::Running,
+            ExperimentState::Review(_) => ExperimentStage::Review,
+            ExperimentState::Finished => ExperimentStage::Finished,
+        }
     }
 
-    /// The rows of the trial table, by number.
+    /// Returns the rows of the trial table, by number.
     pub fn rows(&self) -> impl Iterator<Item = &TrialRecord> {
         self.rows.values()
     }
 
-    /// The row of `trial`.
+    /// Returns the row of `trial`.
     pub fn row(&self, trial: u32) -> Option<&TrialRecord> {
         self.rows.get(&trial)
     }
 
-    /// The row of the trial under review. It need not be the newest: another program may have added trials meanwhile.
+    /// Returns the row of the trial under review. It need not be the newest: another program may have added trials.
     pub fn under_review(&self) -> Option<&TrialRecord> {
-        if self.stage == ExperimentStage::Review { self.row(self.current) } else { None }
+        match self.state {
+            ExperimentState::Review(trial) => self.row(trial),
+            _ => None,
+        }
     }
 
-    /// The accepted trial whose point is worth most, the earliest of equals: a repeated point is worth the mean of its
-    /// repeats ([`crate::optimize::repeats`]).
+    /// Returns the accepted trial whose point has the greatest value, the earliest of equals. The value of a repeated point
+    /// is the mean of its repeats ([`crate::optimize::repeats`]).
     pub fn best(&self) -> Option<&TrialRecord> {
         let points = points(self.study.trials());
-        let worth = |row: &TrialRecord| {
-            points.iter().find(|point| point.trials.contains(&row.trial)).map(Point::mean).or(row.value)
+        let value = |row: &TrialRecord| {
+            points.iter().find(|point| point.trials.contains(&row.trial)).map(RepeatedPoint::mean).or(row.value)
         };
-        let judged = self.rows.values().filter(|row| row.verdict == Some(Verdict::Accept));
-        let worths = judged.map(|row| (worth(row), row));
-        worths
+        let accepted = self.rows.values().filter(|row| row.verdict == Some(Verdict::Accept));
+        accepted
+            .map(|row| (value(row), row))
             .fold(None, |best: Option<(_, &TrialRecord)>, row| best.filter(|best| row.0 <= best.0).or(Some(row)))
             .map(|(_, row)| row)
     }
 
-    /// The card on the table.
+    /// Returns the proposal that waits for approval.
     pub fn proposal(&self) -> Option<Proposal> {
-        self.card.as_ref().map(Card::proposal)
+        match &self.state {
+            ExperimentState::Proposed(card) => Some(card.proposal()),
+            _ => None,
+        }
     }
 
-    /// How many trials count so far; repeats that confirm the best are beyond the budget.
+    /// Returns the number of trials that count so far; repeats that confirm the best are beyond the budget.
     pub fn counted(&self) -> u32 {
         let counts = |row: &&TrialRecord| {
             matches!(row.verdict, Some(Verdict::Accept | Verdict::Fall)) && row.source != ProposalSource::Confirm
@@ -203,58 +212,69 @@ impl Experiment {
         self.rows.values().filter(counts).count() as u32
     }
 
-    /// Approves the card as it was seen: it becomes a running trial, on disk before this returns.
+    /// Returns the number of trials that are to count.
+    pub fn budget(&self) -> u32 {
+        self.plan.budget
+    }
+
+    /// Returns whether other workers run trials: until they end it is open whether the study is finished. An abandoned
+    /// trial does not count.
+    pub fn others_run(&self) -> bool {
+        self.queue.others_run(&self.study)
+    }
+
+    /// Approves the proposal as it was seen: it becomes a running trial, on disk before this returns.
     ///
     /// # Errors
-    /// When another card is on the table by now, its values are outside the limits, or the study cannot be written.
+    /// When there is another proposal by now, its values are outside the limits, or the study cannot be written.
     pub fn approve(&mut self, trial: u32, revision: u32) -> Result<TrialSpec, RequestRefusal> {
-        let Some(card) = &self.card else { return not_now("there is no proposal to approve") };
-        if card.number() != trial || card.revision != revision {
+        let ExperimentState::Proposed(card) = &self.state else { return not_now("there is no proposal to approve") };
+        if !card.is(trial, revision) {
             return not_now(format!(
-                "you approved trial {trial} as it was before; look at the card again (trial {}) and approve that",
+                "the proposal for trial {trial} has changed since it was shown; check the new one (trial {}) and approve it",
                 card.number()
             ));
         }
         if let Some(objection) = self.objection() {
             return not_now(format!("{objection}; change it, or refuse the proposal"));
         }
-        let number = self.begin()?;
-        self.enter(ExperimentStage::Running, number);
+        let card = card.approved();
+        let number = self.begin(card)?;
+        self.enter(ExperimentState::Running(number), number);
         Ok(self.spec(number))
     }
 
-    /// Refuses the proposal: the sampler is told nothing and proposes another.
+    /// Refuses the proposal: it becomes a void trial, which the sampler does not see.
     ///
     /// # Errors
     /// When there is no proposal, or the study cannot be written.
     pub fn skip(&mut self) -> Result<(), RequestRefusal> {
-        if self.card.is_none() {
-            return not_now("there is no proposal to skip");
-        }
+        let ExperimentState::Proposed(card) = &self.state else { return not_now("there is no proposal to skip") };
         let cause = match self.objection() {
             Some(objection) => format!("not run: {objection}"),
             None => "skipped before the jump".to_owned(),
         };
-        let number = self.begin()?;
+        let card = card.approved();
+        let number = self.begin(card)?;
         if let Some(row) = self.rows.get_mut(&number) {
             row.verdict = Some(Verdict::Void);
             row.cause = cause;
         }
         self.write_judgement(number, false)?;
         self.study.tell(number, Outcome::Fail)?;
-        self.show_row(number);
+        self.publish_row(number);
         self.propose()?;
         Ok(())
     }
 
-    /// The running trial is over: it is measured and waits for its verdict. `whole` is how many ticks it has: where some of them
-    /// were lost on the way, nothing is measured.
-    pub fn ended(&mut self, trial: u32, end: &TrialEnd, ticks: &[Tick], whole: u64) {
-        if self.stage != ExperimentStage::Running || self.current != trial {
+    /// Measures the trial that has ended; it waits for its verdict then. `recorded` is its number of ticks: if some are
+    /// missing in `ticks`, nothing is measured.
+    pub fn ended(&mut self, trial: u32, end: &TrialEnd, ticks: &[Tick], recorded: u64) {
+        if !matches!(self.state, ExperimentState::Running(running) if running == trial) {
             return;
         }
         let (mut suggested, mut cause) = objective::suggest(end);
-        let missing = whole.saturating_sub(ticks.len() as u64);
+        let missing = recorded.saturating_sub(ticks.len() as u64);
         if missing > 0 {
             (suggested, cause) = (Verdict::Void, format!("{missing} ticks of it were not recorded: not measured"));
         }
@@ -264,26 +284,23 @@ impl Experiment {
             row.cause = cause;
             row.value = value_of(row, suggested, &self.plan);
         }
-        self.show_row(trial);
-        self.enter(ExperimentStage::Review, trial);
+        self.publish_row(trial);
+        self.enter(ExperimentState::Review(trial), trial);
     }
 
     /// Judges the trial under review; with `rerun` its parameters are queued again.
     ///
     /// # Errors
-    /// When nothing is under review, or an accepted trial has no value, or the study cannot be written.
+    /// When no trial is under review, an accepted trial has no value, or the study cannot be written.
     pub fn judge(&mut self, verdict: Verdict, rerun: bool) -> Result<(), RequestRefusal> {
-        if self.stage != ExperimentStage::Review {
-            return not_now("no trial is under review");
-        }
-        let trial = self.current;
-        let Some(row) = self.rows.get_mut(&trial) else { return not_now("no trial is under review") };
+        let trial = self.reviewed()?;
+        let Some(row) = self.rows.get_mut(&trial) else { return not_now(NOT_UNDER_REVIEW) };
         let value = value_of(row, verdict, &self.plan);
         let outcome = match (verdict, value) {
             (Verdict::Void, _) => Outcome::Fail,
             (_, Some(value)) => Outcome::Complete(value),
             (_, None) => {
-                return not_now("nothing was measured in this trial; enter a value measured by hand, or mark it void");
+                return not_now("nothing was measured in this trial; enter a value measured by hand, or judge it void");
             }
         };
         let suggestion = row.clone();
@@ -293,10 +310,10 @@ impl Experiment {
             row.cause = format!("by the operator; looked like {}: {}", suggested.name(), row.cause);
         }
         match self.write_judgement(trial, rerun) {
-            // It took so long that another worker has closed it and queued it again, or somebody has ended it by hand.
+            // Another worker has closed the trial as abandoned, or another program has ended it.
             Err(StudyError::State { .. }) => {
                 self.rows.remove(&trial);
-                self.stage = ExperimentStage::Finished;
+                self.state = ExperimentState::Finished;
                 self.propose()?;
                 return Err(RequestRefusal::EndedElsewhere(trial));
             }
@@ -306,8 +323,8 @@ impl Experiment {
             }
             Ok(()) => {}
         }
-        self.show_row(trial);
-        self.pending = Some(Pending { suggestion, outcome, rerun });
+        self.publish_row(trial);
+        self.pending = Some(PendingVerdict { suggestion, outcome, rerun });
         self.propose()?;
         Ok(())
     }
@@ -315,97 +332,172 @@ impl Experiment {
     /// Takes the last verdict back.
     ///
     /// # Errors
-    /// When it was told already, or the study cannot be written.
+    /// When it was reported already, or the study cannot be written.
     pub fn undo(&mut self) -> Result<(), RequestRefusal> {
-        if !matches!(self.stage, ExperimentStage::Proposed | ExperimentStage::Finished) || self.pending.is_none() {
-            return not_now("there is no verdict to undo; the last one was told when the next trial began");
-        }
-        let Some(pending) = &self.pending else { return Ok(()) };
+        let Some(pending) = self.pending.as_ref().filter(|_| self.is_idle()) else {
+            return not_now("there is no verdict to undo; the last one became final when the next trial began");
+        };
         let mut row = pending.suggestion.clone();
         let trial = row.trial;
         if let Some(judged) = self.rows.get(&trial) {
             row.note.clone_from(&judged.note);
         }
-        // Only what is written is taken back: a verdict that still stands on the disk must still be told.
-        self.study.annotate(trial, &attributes::judged(&row, false))?;
+        // If this fails, the verdict stands on the disk and must still be reported.
+        self.study.annotate(trial, &attributes::write(&JudgedAttributes::of(&row, false)))?;
         self.pending = None;
         self.rows.insert(trial, row);
-        self.card = None;
-        self.show_row(trial);
-        self.enter(ExperimentStage::Review, trial);
+        self.publish_row(trial);
+        self.enter(ExperimentState::Review(trial), trial);
         Ok(())
     }
 
-    /// Uses a value measured by hand for the trial under review; none goes back to the measured one.
+    /// Uses a value measured by hand for the trial under review; none returns to the measured one.
     ///
     /// # Errors
-    /// When nothing is under review or the value is not finite.
+    /// When no trial is under review or the value is not finite.
     pub fn set_hand_value(&mut self, value: Option<f64>) -> Result<(), RequestRefusal> {
-        if self.stage != ExperimentStage::Review {
-            return not_now("no trial is under review");
-        }
+        let trial = self.reviewed()?;
         if value.is_some_and(|value| !value.is_finite()) {
             return not_now("a measured value must be a finite number");
         }
-        let trial = self.current;
         if let Some(row) = self.rows.get_mut(&trial) {
             row.hand_value = value;
             row.value = row.suggested.and_then(|suggested| value_of(row, suggested, &self.plan));
         }
-        self.show_row(trial);
+        self.publish_row(trial);
         Ok(())
     }
 
-    /// How many trials are to count.
-    pub fn budget(&self) -> u32 {
-        self.plan.budget
+    /// Takes in the changes of other programs: their trials join the table, and a point that they have queued is proposed
+    /// next if the operator has not changed the proposal. To be called regularly.
+    ///
+    /// # Errors
+    /// When the study cannot be read or written.
+    pub fn refresh(&mut self) -> Result<(), RequestRefusal> {
+        if !self.is_idle() {
+            return Ok(());
+        }
+        self.study.refresh()?;
+        let log = self.queue.close_abandoned(&mut self.study)?;
+        self.log_all(log);
+        self.take_rows();
+        match &self.state {
+            ExperimentState::Proposed(card) => {
+                let next = self.study.waiting().next().map(|trial| trial.number);
+                if next != card.waits_as() && card.changes().is_none() {
+                    self.log("another program has changed the queue: a new proposal follows".to_owned());
+                    self.propose()?;
+                }
+            }
+            _ => {
+                let room = self.queue.occupied(self.study.trials()) < self.plan.budget;
+                let queued = self.study.waiting().any(attributes::confirms);
+                // A repeat of another worker may have been void, or may have been the last.
+                let confirms =
+                    self.pending.is_none() && !matches!(self.confirmation.next(&self.study), NextRepeat::None);
+                if room || queued || confirms {
+                    self.propose()?;
+                }
+            }
+        }
+        Ok(())
     }
 
-    /// Tells what is pending: the session ends.
+    /// Ends the session during a review: a trial that is to be void by the rules (stopped, or its operator is gone) is void
+    /// with its cause, and its parameters are queued again as after a crash. Any other waits for its verdict until the
+    /// study is opened again.
+    ///
+    /// # Errors
+    /// When the study cannot be read or written.
+    pub fn leave(&mut self) -> Result<(), StudyError> {
+        let ExperimentState::Review(trial) = self.state else { return Ok(()) };
+        let Some(row) = self.rows.get_mut(&trial).filter(|row| row.suggested == Some(Verdict::Void)) else {
+            return Ok(());
+        };
+        row.verdict = Some(Verdict::Void);
+        let cause = row.cause.clone();
+        self.publish_row(trial);
+        self.state = ExperimentState::Finished;
+        let log = self.queue.close(&mut self.study, trial, &cause)?;
+        self.log_all(log);
+        Ok(())
+    }
+
+    /// Reports the pending verdict: the session ends.
     ///
     /// # Errors
     /// When the study cannot be written.
     pub fn close(&mut self) -> Result<(), StudyError> {
-        self.tell_pending().map(drop)
+        self.report_pending().map(drop)
+    }
+
+    fn is_idle(&self) -> bool {
+        matches!(self.state, ExperimentState::Proposed(_) | ExperimentState::Finished)
+    }
+
+    fn reviewed(&self) -> Result<u32, RequestRefusal> {
+        match self.state {
+            ExperimentState::Review(trial) => Ok(trial),
+            _ => not_now(NOT_UNDER_REVIEW),
+        }
     }
 
     fn write_judgement(&mut self, trial: u32, rerun: bool) -> Result<(), StudyError> {
         match self.rows.get(&trial) {
-            Some(row) => self.study.annotate(trial, &attributes::judged(row, rerun)),
+            Some(row) => self.study.annotate(trial, &attributes::write(&JudgedAttributes::of(row, rerun))),
             None => Ok(()),
         }
     }
 
-    fn enter(&mut self, stage: ExperimentStage, trial: u32) {
-        self.stage = stage;
-        self.current = trial;
-        self.outbox.push(Record::Stage(StageRecord { stage, trial, can_undo: self.pending.is_some() }));
-    }
-
-    fn show_card(&mut self) {
-        if let Some(proposal) = self.proposal() {
-            self.outbox.push(Record::Proposal(proposal));
+    /// Adds the trials that other programs have run or are running to the table.
+    fn take_rows(&mut self) {
+        for trial in self.study.trials() {
+            let news = match self.rows.get(&trial.number) {
+                None => trial.state != TrialState::Waiting,
+                Some(row) => trial.state.is_finished() && row.verdict.is_none(),
+            };
+            if news {
+                let row = attributes::row_of(trial, self.study.note_of(trial.number), &self.plan.parameters);
+                self.outbox.push(Record::Trial(row.clone()));
+                self.rows.insert(trial.number, row);
+            }
         }
     }
 
-    fn show_row(&mut self, trial: u32) {
-        if let Some(row) = self.rows.get(&trial) {
-            self.outbox.push(Record::Trial(row.clone()));
-        }
+    fn enter(&mut self, state: ExperimentState, trial: u32) {
+        self.state = state;
+        let (stage, can_undo) = (self.stage(), self.pending.is_some());
+        self.outbox.push(Record::Stage(StageRecord { stage, trial, can_undo }));
+    }
+
+    fn publish_proposal(&mut self) {
+        self.outbox.extend(self.proposal().map(Record::Proposal));
+    }
+
+    fn publish_row(&mut self, trial: u32) {
+        self.outbox.extend(self.rows.get(&trial).cloned().map(Record::Trial));
     }
 
     fn log(&mut self, message: String) {
         self.outbox.push(Record::Log(LogRecord { level: LogLevel::Info, source: "study".to_owned(), message }));
     }
+
+    fn log_all(&mut self, messages: Vec<String>) {
+        for message in messages {
+            self.log(message);
+        }
+    }
 }
 
-/// The trial table of a study that is only looked at: every trial but those that wait.
+const NOT_UNDER_REVIEW: &str = "no trial is under review";
+
+/// Returns the trial table of a stored study: every trial but those that wait.
 pub fn rows_of(study: &Study, order: &[ParameterInfo]) -> Vec<TrialRecord> {
     let begun = study.trials().iter().filter(|trial| trial.state != TrialState::Waiting);
     begun.map(|trial| attributes::row_of(trial, study.note_of(trial.number), order)).collect()
 }
 
-/// Adds finished trials of another study: what an operator of that study still wanted is not owed here.
+/// Adds finished trials of another study. Re-runs that are still to be queued there are not queued here.
 ///
 /// # Errors
 /// As [`Study::import`].
@@ -417,8 +509,8 @@ pub fn import(study: &mut Study, trials: Vec<TableTrial>) -> Result<Vec<u32>, St
     study.import(&trials)
 }
 
-/// What a verdict makes of a row: 0 for a fall (paper, section II-D), nothing for a void, else the value measured by hand
-/// or by the robot.
+/// Returns the value of a row with a verdict: 0 for a fall (paper, section II-D), none for void, else the value measured by
+/// hand or by the robot.
 fn value_of(row: &TrialRecord, verdict: Verdict, plan: &ExperimentPlan) -> Option<f64> {
     match verdict {
         Verdict::Fall => Some(0.0),

@@ -1,4 +1,4 @@
-//! The life of a trial: proposed, approved, run, measured, judged.
+//! The session: the experiment with its trials, the requests of the operator, the checks before arming.
 
 pub mod arming_checklist;
 pub mod automatic;

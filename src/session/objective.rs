@@ -1,15 +1,15 @@
-//! What a jump is worth: a pure function of the trial's recorded ticks, so that a replay computes the same number.
+//! Measurement and objective of a jump: pure functions of the trial's recorded ticks, so that a replay computes the same.
 
 use nalgebra::{Rotation3, Vector3};
 
-use crate::control::settings::PERIOD_S;
+use crate::robot::CONTROL_PERIOD_S;
 use crate::telemetry::{Tick, TrialEnd};
 use crate::trial::{MeasuredJump, Task, Verdict};
 
-/// Measures a trial from its ticks; none if they end before the impulse begins.
+/// Measures a trial from its ticks; none if they end before the impulse.
 ///
 /// x, y and yaw are read when the oscillator enters pi (t = 0) and at the last tick; displacements are in the world
-/// frame turned so that the trial starts at yaw 0 (`specs/method.md`, "Timing of a trial").
+/// frame turned so that the trial starts at yaw 0 (`docs/method.md`, "Timing of a trial").
 pub fn measure(ticks: &[Tick]) -> Option<MeasuredJump> {
     let first = ticks.iter().position(|tick| tick.trial_time_s >= 0.0 && tick.trial.is_some())?;
     let (start, end) = (&ticks[first].estimate, &ticks.last()?.estimate);
@@ -33,11 +33,11 @@ pub fn measure(ticks: &[Tick]) -> Option<MeasuredJump> {
         dy_m: displacement.y,
         dyaw_rad: end.roll_pitch_yaw.z - yaw_init,
         apex_m,
-        air_s: longest as f64 * PERIOD_S,
+        air_s: longest as f64 * CONTROL_PERIOD_S,
     })
 }
 
-/// The objective J, maximised: m for forward and lateral, rad for twist (paper, section II-D); mean per jump.
+/// Returns the objective J, maximised: m for forward and lateral, rad for twist (paper, section II-D); mean per jump.
 pub fn value(task: Task, measured: &MeasuredJump, jumps: u32) -> f64 {
     let whole = match task {
         Task::Forward => measured.dx_m,
@@ -49,7 +49,7 @@ pub fn value(task: Task, measured: &MeasuredJump, jumps: u32) -> f64 {
     whole / f64::from(jumps.max(1))
 }
 
-/// What the rules suggest, and why in words.
+/// Returns the verdict that the rules suggest, and its reason.
 pub fn suggest(end: &TrialEnd) -> (Verdict, String) {
     match end {
         TrialEnd::Settled => (Verdict::Accept, "landed and settled".into()),

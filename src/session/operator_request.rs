@@ -1,17 +1,19 @@
-//! What an operator may wish of the session. Every intent is answered by a `CommandRecord`: carried out, or refused and
-//! why. STOP is not among them: it has its own latch (`engine::Handle::stop`).
+//! Requests of the operator to the session. Every request is answered by a `RequestRecord`: carried out, or refused with the
+//! reason. STOP is not among them: it has its own latch (`engine::Handle::stop`).
+
+use std::fmt;
 
 use crate::telemetry::ArmingCheck;
 use crate::trial::Verdict;
 
-/// What only an operator can know: an item of the pre-arm list that takes their word.
+/// Arming check that only the operator can confirm.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum OperatorCheck {
     /// The robot is in low-level mode, and was damped with the remote before.
     LowLevel,
-    /// The configuration that is shown is the one that is meant.
+    /// The displayed configuration is the intended one.
     Configuration,
-    /// Nobody is near the robot, and the remote is in hand. Holds for one arming.
+    /// No person is within 2 m of the robot, and the remote is in hand. Holds for one arming.
     AreaClear,
 }
 
@@ -20,7 +22,7 @@ impl OperatorCheck {
     pub const ALL: [OperatorCheck; 3] =
         [OperatorCheck::LowLevel, OperatorCheck::Configuration, OperatorCheck::AreaClear];
 
-    /// The item of the list.
+    /// Returns the arming check.
     pub const fn check(self) -> ArmingCheck {
         match self {
             OperatorCheck::LowLevel => ArmingCheck::LowLevel,
@@ -30,33 +32,34 @@ impl OperatorCheck {
     }
 }
 
-/// An intent with what makes it good: what energises is not carried out if STOP came after it, or too late.
+/// A request with the state at which it was made: a request that energises the robot is not carried out if STOP was pressed
+/// after it, or if it arrives too late.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StampedRequest {
-    /// What is wished.
-    pub intent: OperatorRequest,
-    /// How often STOP had been pressed when it was wished.
+    /// The request.
+    pub request: OperatorRequest,
+    /// Count of the STOP latch when the request was made.
     pub stops: u64,
-    /// When it was wished, ns since the engine started.
+    /// Time of the request, ns since the engine started.
     pub time_ns: u64,
 }
 
-/// What may be wished.
+/// A request of the operator. `Display` names it for the log.
 #[derive(Debug, Clone, PartialEq)]
 pub enum OperatorRequest {
     /// Energise the robot: it stands up.
     Arm,
-    /// The operator's word on an item of the pre-arm list.
+    /// The operator's confirmation of an arming check.
     Confirm(OperatorCheck),
     /// Sit down and disarm.
     SitDown,
-    /// The damped or faulted robot has been looked at.
+    /// The operator has checked the damped or faulted robot.
     Acknowledge,
-    /// Run the proposal as it was seen: `trial` and `revision` are those of the card.
+    /// Run the proposal as it was seen.
     Approve {
         /// Number of the proposed trial.
         trial: u32,
-        /// Revision of the card.
+        /// Revision of the proposal.
         revision: u32,
     },
     /// Cancel the countdown.
@@ -77,7 +80,7 @@ pub enum OperatorRequest {
         /// New value, in the gain's unit.
         value: f64,
     },
-    /// Back to what was proposed, gains too.
+    /// Take all overrides back, also those of gains.
     ClearOverrides,
     /// Fix a parameter for the next trials; the others are still proposed.
     Fix {
@@ -129,4 +132,42 @@ pub enum OperatorRequest {
     Enqueue(Vec<(String, f64)>),
     /// Raise the budget by this many trials.
     Continue(u32),
+}
+
+impl fmt::Display for OperatorRequest {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            OperatorRequest::Arm => f.write_str("arm"),
+            OperatorRequest::Confirm(check) => write!(f, "confirm {}", check.check().name()),
+            OperatorRequest::SitDown => f.write_str("sit down"),
+            OperatorRequest::Acknowledge => f.write_str("acknowledge"),
+            OperatorRequest::Approve { trial, .. } => write!(f, "approve trial {trial}"),
+            OperatorRequest::Cancel => f.write_str("cancel the countdown"),
+            OperatorRequest::Skip => f.write_str("skip the proposal"),
+            OperatorRequest::Override { parameter, value } => write!(f, "override {parameter} = {value}"),
+            OperatorRequest::OverrideGain { gain, value } => write!(f, "set the gain {gain} = {value}"),
+            OperatorRequest::ClearOverrides => f.write_str("clear the overrides"),
+            OperatorRequest::Fix { parameter, value, trials } => {
+                write!(f, "fix {parameter} = {value} for {trials} trials")
+            }
+            OperatorRequest::Unfix { parameter } => write!(f, "search {parameter} again"),
+            OperatorRequest::NarrowBounds { parameter, low, high } => {
+                write!(f, "search {parameter} from {low} to {high}")
+            }
+            OperatorRequest::ConfirmBest { repeats: 0 } => f.write_str("end the repeats"),
+            OperatorRequest::ConfirmBest { repeats } => write!(f, "confirm the best with {repeats} repeats"),
+            OperatorRequest::Judge(verdict) => f.write_str(verdict.name()),
+            OperatorRequest::Rerun { trial: None } => f.write_str("re-run"),
+            OperatorRequest::Rerun { trial: Some(trial) } => write!(f, "re-run trial {trial}"),
+            OperatorRequest::Undo => f.write_str("undo the verdict"),
+            OperatorRequest::HandValue(Some(value)) => write!(f, "value measured by hand {value}"),
+            OperatorRequest::HandValue(None) => f.write_str("no value measured by hand"),
+            OperatorRequest::Note { trial, text } => write!(f, "note on trial {trial}: {text}"),
+            OperatorRequest::Enqueue(point) => {
+                let values: Vec<_> = point.iter().map(|(name, value)| format!("{name} = {value}")).collect();
+                write!(f, "queue {}", values.join(", "))
+            }
+            OperatorRequest::Continue(trials) => write!(f, "continue for {trials} trials"),
+        }
+    }
 }

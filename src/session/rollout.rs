@@ -1,11 +1,11 @@
-//! The same cycle and simulator on simulated time: no thread, as fast as the machine goes, bit-for-bit repeatable for a
+//! The control cycle and the simulator on simulated time: without a thread, as fast as possible, bit-for-bit repeatable for a
 //! seed.
 
 use crate::control::cycle::{Cycle, Inputs};
 use crate::control::limits::ticks;
-use crate::control::settings::{ControlSettings, PERIOD_S};
+use crate::control::settings::ControlSettings;
 use crate::realtime::clock::SimulatedClock;
-use crate::robot::{Placement, Robot};
+use crate::robot::{CONTROL_PERIOD_S, Placement, Robot};
 use crate::telemetry::{Command, Event, Fault, Permit, Tick, TrialEnd, TrialSpec};
 
 /// A robot in simulated time.
@@ -16,23 +16,23 @@ pub struct Rollout<R: Robot> {
 }
 
 impl<R: Robot> Rollout<R> {
-    /// A rollout of that robot, which must be one that can be put in place.
+    /// A rollout of `robot`, which must support [`Robot::place`].
     pub fn new(robot: R, settings: &ControlSettings) -> Rollout<R> {
         Rollout { robot, settings: *settings, ticks: Vec::new() }
     }
 
-    /// Runs one trial from its mark and says how it ended; the ticks are those of the trial, countdown included.
+    /// Runs one trial from the start pose. Returns its end and its ticks, countdown included.
     pub fn run(&mut self, spec: &TrialSpec) -> (TrialEnd, &[Tick]) {
-        // The last trial may have left the robot on its back; a robot that is ready for a trial is not.
+        // The last trial may have left the robot fallen.
         self.robot.place(&Placement { joint_position: self.settings.lying_position, lying: true, seed: spec.seed });
         let mut cycle = Cycle::ready(&self.settings);
         let mut inputs = Inputs { command: Some(Command::RunTrial(*spec, Permit::default())), ..Inputs::default() };
         self.ticks.clear();
-        // A trial ends by itself `cap_s` after its last impulse; anything longer is a fault of ours, and said so.
+        // The cycle ends a trial `cap_s` after its last impulse at the latest; a longer one is an error of this program.
         let profile_s = f64::from(spec.jumps) * (0.5 / spec.jump.f0_hz + 0.5 / spec.jump.f1_hz.max(0.05));
         let most = ticks(self.settings.countdown_s + profile_s + self.settings.settle.cap_s + 1.0);
         for number in 0..most {
-            inputs.time_ns = u64::from(number) * (PERIOD_S * 1e9) as u64;
+            inputs.time_ns = u64::from(number) * (CONTROL_PERIOD_S * 1e9) as u64;
             self.ticks.push(*cycle.tick(&inputs, &SimulatedClock, &mut self.robot));
             inputs.command = None;
             let ended = cycle.events().iter().find_map(|event| match event {

@@ -1,45 +1,44 @@
-//! The session thread's work: an operator's intents in, commands to the control thread, events and measured ticks back,
-//! records to the screen and the recording. Every intent is answered, carried out or refused and why.
+//! The work of the session thread: requests of the operator in, commands to the control thread, its events and ticks back,
+//! records to the screen and the recording. Every request is answered: carried out, or refused with the reason.
 
+mod answering;
 mod unattended;
 
 use std::collections::VecDeque;
 use std::sync::mpsc::{Receiver, Sender};
 
-use super::arming_checklist::{ArmingChecklist, objections};
-use super::experiment::{Experiment, RequestRefusal};
+use super::arming_checklist::ArmingChecklist;
+use super::experiment::Experiment;
 use super::operator_request::{OperatorRequest, StampedRequest};
-use crate::control::mode::{self, Trigger};
 use crate::realtime::channel::SessionEnd;
 use crate::realtime::scheduling::{DeniedSetting, RealtimeSetting};
 use crate::recording::record::{
     ArmingCheckRecord, LogLevel, LogRecord, Record, RequestRecord, SessionInfo, Stamped, Transition,
 };
-use crate::recording::recorder::{Handed, RecorderWatch, TrialTicks};
-use crate::telemetry::{Command, Event, Mode, Permit, TransitionCause, TrialEnd};
-use crate::trial::{ExperimentStage, Verdict};
+use crate::recording::recorder::{CollectedTicks, RecorderWatch, TrialTicks};
+use crate::telemetry::{Command, Event, Mode, TransitionCause, TrialEnd};
+use crate::trial::ExperimentStage;
 use unattended::Unattended;
 
-/// How often the counters are told to the screen and the recording, ns.
+/// Period of the counters' records, ns.
 const COUNTERS_PERIOD_NS: u64 = 100_000_000;
 
-/// Said of a recorder that broke down without a word.
 const RECORDER_GONE: &str = "the recorder's thread has ended";
 const GUARD_LOST: &str =
     "the guard process has ended: nothing damps the robot if quadfrog is killed; sit down, quit and start again";
 
-/// Cautions are said no more often than this, ns.
+/// Least time between two logged cautions, ns.
 const CAUTION_PERIOD_NS: u64 = 10_000_000_000;
 
-/// How often the pre-arm list is shown again though no item changed its state, ns.
-const PRE_ARM_PERIOD_NS: u64 = 500_000_000;
-/// How often the study is looked at for what other programs have written, ns.
-const LOOK_PERIOD_NS: u64 = 500_000_000;
+/// Period of the arming checklist's records for the screen, ns.
+const CHECKLIST_PERIOD_NS: u64 = 500_000_000;
+/// Period of reading the changes of other programs to the study, ns.
+const REFRESH_PERIOD_NS: u64 = 500_000_000;
 
-/// How long the recorder may take to hand over a trial's ticks, ns.
+/// Longest wait for a trial's ticks from the recorder, ns.
 const LONGEST_WAIT_FOR_TICKS_NS: u64 = 10_000_000_000;
 
-/// Where the records go: the recorder and the screen receive the same.
+/// Receivers of the records: the recorder and the screen get the same.
 pub struct RecordSinks {
     /// To the recorder.
     pub recorder: Sender<Stamped>,
@@ -48,392 +47,255 @@ pub struct RecordSinks {
 }
 
 impl RecordSinks {
-    /// Whether the recorder took it. A screen that is gone takes nothing any more: the session ends with it, not because of it.
-    fn put(&self, stamped: Stamped) -> bool {
+    /// Sends a record to both. Returns false if the recorder's thread has ended. A screen that is gone ends the session
+    /// elsewhere.
+    fn send(&self, stamped: Stamped) -> bool {
         let _ = self.screen.send(stamped.clone());
         self.recorder.send(stamped).is_ok()
     }
 }
 
-/// What a session is made of.
+/// Parts of a session.
 pub struct SupervisorParts {
-    /// The study's life.
-    pub life: Experiment,
+    /// The experiment.
+    pub experiment: Experiment,
     /// To the control thread.
     pub control: SessionEnd,
     /// The ticks of each trial and of each fault, from the recorder.
-    pub handed: Receiver<Handed>,
-    /// Where the records go.
-    pub outlets: RecordSinks,
-    /// How the recorder is doing.
+    pub ticks: Receiver<CollectedTicks>,
+    /// Receivers of the records.
+    pub sinks: RecordSinks,
+    /// Status of the recorder.
     pub recorder: RecorderWatch,
-    /// What must hold before the robot is energised.
-    pub pre_arm: ArmingChecklist,
-    /// What this session is: its first record.
+    /// The arming checks of the session.
+    pub checklist: ArmingChecklist,
+    /// The session's record for the screen; the recording begins with it already.
     pub info: SessionInfo,
 }
 
-/// A trial that is over.
+/// A trial that has ended.
 #[derive(Debug, Clone, Copy)]
 struct Ended {
     trial: u32,
     end: TrialEnd,
-    /// How many ticks it has.
+    /// Number of its ticks.
     ticks: u64,
-    /// When it was heard of, ns: its ticks are not waited for for ever.
+    /// Time of its event, ns.
     time_ns: u64,
 }
 
 /// The session.
 pub struct Supervisor {
-    life: Experiment,
+    experiment: Experiment,
     control: SessionEnd,
-    handed: Receiver<Handed>,
-    outlets: RecordSinks,
+    ticks: Receiver<CollectedTicks>,
+    sinks: RecordSinks,
     recorder: RecorderWatch,
     mode: Mode,
     cause: TransitionCause,
-    /// How often the mode changed, as far as the session has heard.
+    /// Number of mode changes that were reported to the session.
     mode_changes: u64,
-    /// An observer's robot was stopped and acknowledged: it is being let go of.
-    letting_go: bool,
-    /// The control thread knows that the session is over.
+    /// An observer's STOP was acknowledged: the release of the robot was commanded.
+    releasing: bool,
+    /// The end of the session was commanded.
     leaving: bool,
-    /// What forbade the next trial when that was said last.
-    held: Option<String>,
+    /// Reason that forbids the next trial, as it was logged last.
+    inhibited: Option<String>,
     caution_ns: Option<u64>,
-    /// The trial that ended, until its ticks have arrived too.
+    /// The trial that has ended, until its ticks have arrived.
     ended: Option<Ended>,
     measured: VecDeque<TrialTicks>,
-    recorder_complaint: Option<String>,
-    /// The recorder's thread takes no records any more.
+    recorder_error: Option<String>,
+    /// The recorder's thread has ended.
     recorder_gone: bool,
     guard_lost: bool,
     observe: bool,
-    asked_for_control: bool,
-    /// Signs of life of the screen when control was refused last: it is asked for again after the next.
-    beats: u64,
+    control_requested: bool,
+    /// Heartbeats of the screen when control was refused last: it is requested again after the next.
+    heartbeats: u64,
     counters_ns: u64,
-    pre_arm: ArmingChecklist,
-    /// The list as it was shown last, and when.
-    shown_list: Vec<ArmingCheckRecord>,
-    shown_list_ns: u64,
-    looked_ns: u64,
+    checklist: ArmingChecklist,
+    /// The checklist as it was published last, and its time.
+    published_checklist: Vec<ArmingCheckRecord>,
+    checklist_ns: u64,
+    refreshed_ns: u64,
     unattended: Unattended,
 }
 
 impl Supervisor {
-    /// A session over a study.
+    /// Starts the session of an experiment.
     pub fn new(parts: SupervisorParts, time_ns: u64) -> Supervisor {
-        let SupervisorParts { life, control, handed, outlets, recorder, pre_arm, info } = parts;
+        let SupervisorParts { experiment, control, ticks, sinks, recorder, checklist, info } = parts;
         let observe = info.observe;
         let mut supervisor = Supervisor {
-            life,
+            experiment,
             control,
-            handed,
-            outlets,
+            ticks,
+            sinks,
             recorder,
             mode: Mode::Offline,
             cause: TransitionCause::Course,
             mode_changes: 0,
-            letting_go: false,
+            releasing: false,
             leaving: false,
-            held: None,
+            inhibited: None,
             caution_ns: None,
             ended: None,
             measured: VecDeque::new(),
-            recorder_complaint: None,
+            recorder_error: None,
             recorder_gone: false,
             guard_lost: false,
             observe,
-            asked_for_control: false,
-            beats: 0,
+            control_requested: false,
+            heartbeats: 0,
             counters_ns: 0,
-            pre_arm,
-            shown_list: Vec::new(),
-            shown_list_ns: 0,
-            looked_ns: 0,
+            checklist,
+            published_checklist: Vec::new(),
+            checklist_ns: 0,
+            refreshed_ns: 0,
             unattended: Unattended::default(),
         };
-        supervisor.say(Record::Session(info), time_ns);
-        supervisor.publish(time_ns);
+        // Not to the recorder: its file begins with this record.
+        let _ = supervisor.sinks.screen.send(Stamped { time_ns, record: Record::Session(info) });
+        supervisor.publish_experiment(time_ns);
         supervisor
     }
 
-    /// What the control thread got of what it asked of the system, and what it did not.
-    pub fn tell_scheduling(&mut self, favours: &[RealtimeSetting], shortfalls: &[DeniedSetting], time_ns: u64) {
-        if !favours.is_empty() {
-            let granted: Vec<_> = favours.iter().map(ToString::to_string).collect();
+    /// Logs the real-time settings that the control thread was granted and denied.
+    pub fn report_scheduling(&mut self, granted: &[RealtimeSetting], denied: &[DeniedSetting], time_ns: u64) {
+        if !granted.is_empty() {
+            let granted: Vec<_> = granted.iter().map(ToString::to_string).collect();
             self.log(LogLevel::Info, format!("control thread: {}", granted.join(", ")), time_ns);
         }
-        for shortfall in shortfalls {
-            self.log(LogLevel::Warning, format!("control thread: {shortfall}"), time_ns);
+        for setting in denied {
+            self.log(LogLevel::Warning, format!("control thread: {setting}"), time_ns);
         }
     }
 
-    /// The guard process has ended: nobody damps the robot any more if this one does. Nothing new is begun with the robot.
-    pub fn tell_guard_lost(&mut self, time_ns: u64) {
+    /// Takes in that the guard process has ended. Nothing that energises the robot is begun any more: without the guard
+    /// nothing damps the robot if this process is killed.
+    pub fn report_guard_lost(&mut self, time_ns: u64) {
         self.guard_lost = true;
         self.log(LogLevel::Error, GUARD_LOST.to_owned(), time_ns);
     }
 
-    /// The mode as far as the session has heard.
+    /// Returns the mode that was reported to the session last.
     pub fn mode(&self) -> Mode {
         self.mode
     }
 
-    /// Takes in what happened since the last call; to be called every few milliseconds.
-    pub fn attend(&mut self, time_ns: u64) {
+    /// Takes in the events and ticks since the last call; to be called every few milliseconds.
+    pub fn poll(&mut self, time_ns: u64) {
         while let Ok(event) = self.control.events.pop() {
             self.event(event, time_ns);
         }
         let reboots = self.control.counters.read().link.map_or(0, |link| link.reboots);
-        if self.pre_arm.robot_restarted(reboots) {
-            let message = "the robot restarted: low-level mode and a clear area are to be confirmed again".to_owned();
+        if self.checklist.robot_restarted(reboots) {
+            let message = "the robot restarted: confirm low-level mode and the clear area again".to_owned();
             self.log(LogLevel::Warning, message, time_ns);
         }
         if !self.mode.energised()
-            && let Some(message) = self.pre_arm.forget(time_ns)
+            && let Some(message) = self.checklist.expire(time_ns)
         {
             self.log(LogLevel::Info, message, time_ns);
-            self.shown_list_ns = 0;
+            self.checklist_ns = 0;
         }
-        while let Ok(handed) = self.handed.try_recv() {
-            match handed {
-                Handed::Trial(ticks) => self.measured.push_back(ticks),
-                Handed::Fault(ticks) => self.say(Record::FaultTicks(ticks), time_ns),
+        while let Ok(collected) = self.ticks.try_recv() {
+            match collected {
+                CollectedTicks::Trial(ticks) => self.measured.push_back(ticks),
+                CollectedTicks::Fault(ticks) => self.publish(Record::FaultTicks(ticks), time_ns),
             }
         }
-        self.let_go();
+        self.release();
         self.measure(time_ns);
-        let complaint = self.recorder.get().error.or_else(|| self.recorder_gone.then(|| RECORDER_GONE.to_owned()));
-        if complaint != self.recorder_complaint {
-            if let Some(complaint) = &complaint {
-                self.log(LogLevel::Error, format!("the recording failed: {complaint}"), time_ns);
+        let error = self.recorder.get().error.or_else(|| self.recorder_gone.then(|| RECORDER_GONE.to_owned()));
+        if error != self.recorder_error {
+            if let Some(error) = &error {
+                self.log(LogLevel::Error, format!("the recording failed: {error}"), time_ns);
             }
-            self.recorder_complaint = complaint;
+            self.recorder_error = error;
         }
         if time_ns >= self.counters_ns + COUNTERS_PERIOD_NS {
             self.counters_ns = time_ns;
             let counters = *self.control.counters.read();
-            self.say(Record::Counters(counters), time_ns);
-            self.show_pre_arm(time_ns);
+            self.publish(Record::Counters(counters), time_ns);
+            self.publish_checklist(time_ns);
             self.warn(time_ns);
         }
-        if time_ns >= self.looked_ns + LOOK_PERIOD_NS {
-            self.looked_ns = time_ns;
-            if let Err(error) = self.life.look() {
+        if time_ns >= self.refreshed_ns + REFRESH_PERIOD_NS {
+            self.refreshed_ns = time_ns;
+            if let Err(error) = self.experiment.refresh() {
                 self.log(LogLevel::Error, format!("the study could not be read: {error}"), time_ns);
             }
         }
-        self.publish(time_ns);
-        self.act_by_itself(time_ns);
+        self.publish_experiment(time_ns);
+        self.act_unattended(time_ns);
     }
 
-    /// Carries out one wish, or says why not.
-    pub fn carry_out(&mut self, wish: &StampedRequest, time_ns: u64) {
-        let StampedRequest { intent, stops, .. } = wish;
-        // The screen may have seen a change of mode that is still on its way here.
-        self.attend(time_ns);
-        let energises = matches!(intent, OperatorRequest::Arm | OperatorRequest::Approve { .. });
-        // Who only looks may stop the robot, as everybody may, and then let go of it again.
-        let answer = if self.observe && *intent != OperatorRequest::Acknowledge {
+    /// Carries out one request and publishes the answer.
+    pub fn carry_out(&mut self, stamped: &StampedRequest, time_ns: u64) {
+        let StampedRequest { request, stops, .. } = stamped;
+        // The screen may have shown a change of mode whose event is still in the ring.
+        self.poll(time_ns);
+        let energises = matches!(request, OperatorRequest::Arm | OperatorRequest::Approve { .. });
+        // An observer may stop the robot and release it again.
+        let answer = if self.observe && *request != OperatorRequest::Acknowledge {
             Err("this session only observes".to_owned())
         } else if energises && self.control.stop.count() != *stops {
             Err("STOP was pressed after it".to_owned())
         } else if energises && self.guard_lost {
             Err(GUARD_LOST.to_owned())
         } else {
-            self.noticed(intent);
-            self.obey(wish)
+            self.unattended.requested(request);
+            self.answer(stamped)
         };
         let (accepted, answer) = match answer {
             Ok(answer) => (true, answer),
             Err(reason) => (false, reason),
         };
-        self.say(Record::Request(RequestRecord { wish: describe(intent), accepted, answer }), time_ns);
-        self.publish(time_ns);
+        self.publish(Record::Request(RequestRecord { wish: request.to_string(), accepted, answer }), time_ns);
+        self.publish_experiment(time_ns);
     }
 
-    /// The session ends: what was judged is told, and what nobody can judge any more is void if the rules call it so.
+    /// Ends the session: the pending verdict is reported, and a trial under review that is void by the rules is void.
     pub fn close(&mut self, time_ns: u64) {
-        if let Err(error) = self.life.leave().and_then(|()| self.life.close()) {
+        if let Err(error) = self.experiment.leave().and_then(|()| self.experiment.close()) {
             self.log(LogLevel::Error, format!("the study could not be written: {error}"), time_ns);
         }
-        self.publish(time_ns);
+        self.publish_experiment(time_ns);
     }
 
-    /// A robot that answers is taken control of once there is a screen, unless this session only looks.
+    /// Takes control of a robot that answers, once there is a screen, unless this session only observes.
     pub fn take_control(&mut self) {
-        if !self.observe && !self.asked_for_control && self.control.heartbeat.count() > self.beats {
-            self.asked_for_control = self.command(Command::TakeControl).is_ok();
+        if !self.observe && !self.control_requested && self.control.heartbeat.count() > self.heartbeats {
+            self.control_requested = self.command(Command::TakeControl).is_ok();
         }
     }
 
-    /// STOP, by the session itself, as its last word: what was heard of the mode may be old, and a command that energises
-    /// still on its way. A robot that was never taken control of is not spoken to now either.
+    /// STOP by the session at its end: the last reported mode may be old, and a command that energises the robot may still be
+    /// in the ring. A robot that was never taken control of receives nothing.
     pub fn stop(&self) {
         if !self.observe && self.mode.commanded() {
             self.control.stop.set();
         }
     }
 
-    /// Nobody is there any more: a robot that stands sits down, one that jumps as soon as it has landed, and nothing is
-    /// begun any more. False once no trial is under way and, if `sits_down`, nothing is energised.
-    pub fn say_goodbye(&mut self, sits_down: bool) -> bool {
+    /// Winds the session down: a standing robot sits down, a jumping one after its landing, and nothing new begins. Returns
+    /// false once no trial is under way and, if `sits_down`, nothing is energised.
+    pub fn wind_down(&mut self, sits_down: bool) -> bool {
         if !self.leaving {
             self.unattended = Unattended::default();
-            // A full ring is emptied a thousand times a second: the next call will get through.
+            // A full ring is emptied at 1 kHz: the next call succeeds.
             self.leaving = self.command(Command::Leave).is_ok();
         }
         let trial = matches!(self.mode, Mode::Countdown | Mode::Jump | Mode::Settle);
-        // Also a trial of which nothing but its approval was heard, or whose ticks are still on their way here.
-        let running = self.life.stage() == ExperimentStage::Running && !self.control.events.is_abandoned();
+        // Also a trial that has not begun yet, or whose ticks have not arrived yet.
+        let running = self.experiment.stage() == ExperimentStage::Running && !self.control.events.is_abandoned();
         trial || running || sits_down && self.mode.energised()
     }
 
     fn command(&mut self, command: Command) -> Result<(), String> {
         self.control.commands.push(command).map_err(|_| "the control thread does not take commands".to_owned())
-    }
-
-    fn obey(&mut self, wish: &StampedRequest) -> Result<String, String> {
-        let words = |refusal: RequestRefusal| refusal.to_string();
-        match &wish.intent {
-            OperatorRequest::Arm if mode::next(self.mode, Trigger::Arm).is_some() => {
-                let findings = self.control.readiness.read().findings;
-                match objections(&self.pre_arm.look(&findings, &self.recorder.get())) {
-                    Some(objections) => Err(objections),
-                    None => {
-                        let permit = Permit { mode_changes: self.mode_changes, given_ns: wish.time_ns };
-                        self.ask(Trigger::Arm, Command::Arm(permit), "the robot stands up")
-                    }
-                }
-            }
-            OperatorRequest::Arm => Err(format!("not while the robot is {}", self.mode.name())),
-            OperatorRequest::Confirm(check) if self.mode.energised() => {
-                Err(format!("{} is asked before the robot is armed", check.check().name()))
-            }
-            OperatorRequest::Confirm(check) => {
-                self.pre_arm.confirm(*check, wish.time_ns);
-                self.shown_list_ns = 0;
-                Ok("confirmed".to_owned())
-            }
-            OperatorRequest::SitDown => self.ask(Trigger::SitDown, Command::SitDown, "the robot sits down"),
-            OperatorRequest::Acknowledge => self.ask(
-                Trigger::Acknowledge,
-                Command::Acknowledge { stops: wish.stops },
-                "acknowledged; arm when ready",
-            ),
-            OperatorRequest::Cancel => self.ask(Trigger::Cancel, Command::Cancel, "the countdown is cancelled"),
-            OperatorRequest::Approve { trial, revision } => {
-                if self.mode != Mode::Ready {
-                    return Err(format!("the robot is {}, not READY{}", self.mode.name(), way_to_ready(self.mode)));
-                }
-                if let Some(complaint) = &self.recorder_complaint {
-                    return Err(format!(
-                        "nothing is recorded ({complaint}); a jump without a recording is not measured"
-                    ));
-                }
-                if let Some(hold) = self.hold() {
-                    return Err(hold);
-                }
-                let spec = self.life.approve(*trial, *revision).map_err(words)?;
-                let permit = Permit { mode_changes: self.mode_changes, given_ns: wish.time_ns };
-                if let Err(reason) = self.command(Command::RunTrial(spec, permit)) {
-                    self.life.ended(spec.trial, &TrialEnd::Cancelled, &[], 0);
-                    return Err(reason);
-                }
-                Ok(format!("trial {} runs", spec.trial))
-            }
-            OperatorRequest::Skip => self.life.skip().map_err(words).map(|()| "skipped; here is another".to_owned()),
-            OperatorRequest::Override { parameter, value } => {
-                self.life.set_parameter(parameter, *value).map_err(words)?;
-                Ok(format!("{parameter} will be {value}"))
-            }
-            OperatorRequest::ClearOverrides => {
-                self.life.clear_overrides().map_err(words).map(|()| "as it was proposed".to_owned())
-            }
-            OperatorRequest::OverrideGain { gain, value } => {
-                self.life.set_gain(gain, *value).map_err(words)?;
-                Ok(format!("{gain} will be {value} in this trial"))
-            }
-            OperatorRequest::Fix { parameter, value, trials } => {
-                self.life.fix(parameter, *value, *trials).map_err(words)?;
-                Ok(format!("{parameter} is {value} for the next {trials} trials that count"))
-            }
-            OperatorRequest::Unfix { parameter } => {
-                self.life.unfix(parameter).map_err(words)?;
-                Ok(format!("{parameter} is searched again"))
-            }
-            OperatorRequest::NarrowBounds { parameter, low, high } => {
-                self.life.narrow_bounds(parameter, *low, *high).map_err(words)?;
-                Ok(format!("{parameter} is searched from {low} to {high}"))
-            }
-            OperatorRequest::ConfirmBest { repeats } => {
-                let trials = self.life.confirm_best(*repeats).map_err(words)?;
-                let trials: Vec<String> = trials.iter().map(u32::to_string).collect();
-                Ok(match trials.len() {
-                    0 => "no more repeats".to_owned(),
-                    _ => format!("the points of trials {} are repeated, at most {repeats} times", trials.join(", ")),
-                })
-            }
-            OperatorRequest::Judge(verdict) => {
-                self.judge(*verdict, false)?;
-                Ok("u takes it back until the next jump is approved".to_owned())
-            }
-            OperatorRequest::Rerun { trial: None } => {
-                self.judge(Verdict::Void, true)?;
-                Ok("void, and its parameters are on the table again".to_owned())
-            }
-            OperatorRequest::Rerun { trial: Some(trial) } => {
-                self.life.repeat(*trial).map_err(words)?;
-                Ok(format!("the parameters of trial {trial} are queued"))
-            }
-            OperatorRequest::Undo => self.life.undo().map_err(words).map(|()| "the verdict is taken back".to_owned()),
-            OperatorRequest::HandValue(value) => {
-                self.life.set_hand_value(*value).map_err(words)?;
-                Ok(match value {
-                    Some(value) => format!("{value} counts instead of the measured value"),
-                    None => "the measured value counts".to_owned(),
-                })
-            }
-            OperatorRequest::Note { trial, text } => {
-                self.life.note(*trial, text).map_err(words)?;
-                Ok("noted".to_owned())
-            }
-            OperatorRequest::Enqueue(parameters) => {
-                self.life.enqueue(parameters).map_err(words)?;
-                Ok("queued".to_owned())
-            }
-            OperatorRequest::Continue(trials) => {
-                self.life.extend(*trials).map_err(words)?;
-                Ok(format!("the study now has {} trials", self.life.budget()))
-            }
-        }
-    }
-
-    /// Sends `command` if the mode allows `request`.
-    fn ask(&mut self, request: Trigger, command: Command, answer: &str) -> Result<String, String> {
-        if mode::next(self.mode, request).is_none() {
-            return Err(format!("not while the robot is {}", self.mode.name()));
-        }
-        self.command(command)?;
-        Ok(answer.to_owned())
-    }
-
-    /// Judges the trial under review. Where another program has ended it, the review is over as well.
-    fn judge(&mut self, verdict: Verdict, rerun: bool) -> Result<(), String> {
-        let judged = self.life.judge(verdict, rerun);
-        if matches!(judged, Ok(()) | Err(RequestRefusal::EndedElsewhere(_))) {
-            self.end_review()?;
-        }
-        judged.map_err(|refusal| refusal.to_string())
-    }
-
-    /// The verdict is given: a standing robot is ready again, a fallen one is disarmed and must be armed anew.
-    fn end_review(&mut self) -> Result<(), String> {
-        let fallen = self.mode == Mode::Damped && matches!(self.cause, TransitionCause::Fell(_));
-        if self.mode == Mode::Review || fallen { self.command(Command::EndReview) } else { Ok(()) }
     }
 
     fn event(&mut self, event: Event, time_ns: u64) {
@@ -442,18 +304,17 @@ impl Supervisor {
                 self.mode = to;
                 self.cause = cause;
                 self.mode_changes += 1;
-                self.letting_go = false;
-                self.pre_arm.mode_changed(from, to, &cause);
-                self.shown_list.clear();
+                self.releasing = false;
+                self.checklist.mode_changed(from, to, &cause);
+                self.published_checklist.clear();
                 self.unattended.mode_changed(to, cause);
-                self.say(Record::Transition(Transition { from, to, cause: cause.to_string() }), time_ns);
+                self.publish(Record::Transition(Transition { from, to, cause: cause.to_string() }), time_ns);
             }
             Event::TrialEnded { trial, ticks, end } => {
                 self.ended = Some(Ended { trial, end, ticks, time_ns });
             }
             Event::Refused { command, mode, because } => {
-                let command_name = describe_command(&command);
-                let message = format!("the control thread refused {command_name} while {}: {because}", mode.name());
+                let message = format!("the control thread refused {command} while {}: {because}", mode.name());
                 self.log(LogLevel::Warning, message, time_ns);
                 match command {
                     Command::RunTrial(spec, _) => {
@@ -462,8 +323,8 @@ impl Supervisor {
                     }
                     Command::Arm(_) => self.unattended.arming_refused(time_ns),
                     Command::TakeControl => {
-                        self.asked_for_control = false;
-                        self.beats = self.control.heartbeat.count();
+                        self.control_requested = false;
+                        self.heartbeats = self.control.heartbeat.count();
                     }
                     _ => {}
                 }
@@ -471,144 +332,88 @@ impl Supervisor {
         }
     }
 
-    /// Once a trial has ended and its ticks are here, it is measured.
+    /// Measures a trial that has ended, once its ticks have arrived.
     fn measure(&mut self, time_ns: u64) {
         let Some(Ended { trial, end, ticks: whole, time_ns: ended_ns }) = self.ended else { return };
         let ticks = match self.measured.iter().position(|ticks| ticks.trial == trial) {
             Some(place) => self.measured.remove(place).map(|found| found.ticks).unwrap_or_default(),
             None if time_ns < ended_ns + LONGEST_WAIT_FOR_TICKS_NS => return,
             None => {
-                self.log(LogLevel::Error, format!("the ticks of trial {trial} never came from the recorder"), time_ns);
+                self.log(LogLevel::Error, format!("the recorder did not send the ticks of trial {trial}"), time_ns);
                 Vec::new()
             }
         };
         self.measured.clear();
         self.ended = None;
-        self.life.ended(trial, &end, &ticks, whole);
-        if self.life.stage() == ExperimentStage::Review && matches!(self.mode, Mode::Damped | Mode::Fault) {
+        self.experiment.ended(trial, &end, &ticks, whole);
+        if self.experiment.stage() == ExperimentStage::Review && matches!(self.mode, Mode::Damped | Mode::Fault) {
             let message = format!("trial {trial} ended in {}: {}", self.mode.name(), self.cause);
             self.log(LogLevel::Warning, message, time_ns);
         }
     }
 
-    /// What forbids the next trial, in words; none if nothing does.
-    fn hold(&mut self) -> Option<String> {
-        let hold = self.control.readiness.read().hold.map(|hold| hold.to_string());
-        hold.or_else(|| self.pre_arm.disk_low())
+    /// Returns the reason that forbids the next trial; none if nothing does.
+    fn inhibit(&mut self) -> Option<String> {
+        let hold = self.control.readiness.read().inhibit.map(|hold| hold.to_string());
+        hold.or_else(|| self.checklist.disk_low())
     }
 
-    /// What stands out, said once: what forbids the next trial, and what a watchdog will soon act on.
+    /// Logs once the reason that forbids the next trial, and the values on which a failsafe will soon act.
     fn warn(&mut self, time_ns: u64) {
-        let hold = self.hold();
-        if let Some(reason) = &hold
-            && self.held.is_none()
+        let inhibit = self.inhibit();
+        if let Some(reason) = &inhibit
+            && self.inhibited.is_none()
         {
             self.log(LogLevel::Warning, format!("no further trial can be approved: {reason}"), time_ns);
         }
-        self.held = hold;
-        let due = self.caution_ns.is_none_or(|said_ns| time_ns >= said_ns + CAUTION_PERIOD_NS);
-        if let Some(caution) = self.control.readiness.read().caution.filter(|_| due) {
+        self.inhibited = inhibit;
+        let due = self.caution_ns.is_none_or(|logged_ns| time_ns >= logged_ns + CAUTION_PERIOD_NS);
+        if let Some(caution) = self.control.readiness.read().warning.filter(|_| due) {
             self.caution_ns = Some(time_ns);
             self.log(LogLevel::Warning, caution.to_string(), time_ns);
         }
     }
 
-    /// An observer's STOP was acknowledged: the robot is whose it was.
-    fn let_go(&mut self) {
-        if self.observe && self.mode == Mode::Disarmed && !self.letting_go {
-            self.letting_go = self.command(Command::Release).is_ok();
+    /// Returns to OBSERVE after an observer has acknowledged its STOP.
+    fn release(&mut self) {
+        if self.observe && self.mode == Mode::Disarmed && !self.releasing {
+            self.releasing = self.command(Command::Release).is_ok();
         }
     }
 
-    /// The pre-arm list, while the robot is disarmed: to the screen twice a second, to both when an item changes its state.
-    fn show_pre_arm(&mut self, time_ns: u64) {
+    /// Publishes the arming checklist while the robot is disarmed: to the screen twice a second, to the recorder, too, when a
+    /// check changes its state.
+    fn publish_checklist(&mut self, time_ns: u64) {
         if self.mode != Mode::Disarmed || self.observe {
             return;
         }
         let findings = self.control.readiness.read().findings;
-        let list = self.pre_arm.look(&findings, &self.recorder.get());
+        let list = self.checklist.items(&findings, &self.recorder.get());
         let states = |list: &[ArmingCheckRecord]| list.iter().map(|item| item.state).collect::<Vec<_>>();
         let stamped = Stamped { time_ns, record: Record::ArmingChecks(list.clone()) };
-        if states(&list) != states(&self.shown_list) {
-            self.recorder_gone |= !self.outlets.put(stamped);
-        } else if time_ns >= self.shown_list_ns + PRE_ARM_PERIOD_NS {
-            let _ = self.outlets.screen.send(stamped);
+        if states(&list) != states(&self.published_checklist) {
+            self.recorder_gone |= !self.sinks.send(stamped);
+        } else if time_ns >= self.checklist_ns + CHECKLIST_PERIOD_NS {
+            let _ = self.sinks.screen.send(stamped);
         } else {
             return;
         }
-        self.shown_list_ns = time_ns;
-        self.shown_list = list;
+        self.checklist_ns = time_ns;
+        self.published_checklist = list;
     }
 
-    /// What the study's life has to say.
-    fn publish(&mut self, time_ns: u64) {
-        for record in self.life.take_records() {
-            self.recorder_gone |= !self.outlets.put(Stamped { time_ns, record });
+    /// Publishes the experiment's records.
+    fn publish_experiment(&mut self, time_ns: u64) {
+        for record in self.experiment.take_records() {
+            self.recorder_gone |= !self.sinks.send(Stamped { time_ns, record });
         }
     }
 
-    fn say(&mut self, record: Record, time_ns: u64) {
-        self.recorder_gone |= !self.outlets.put(Stamped { time_ns, record });
+    fn publish(&mut self, record: Record, time_ns: u64) {
+        self.recorder_gone |= !self.sinks.send(Stamped { time_ns, record });
     }
 
     fn log(&mut self, level: LogLevel, message: String, time_ns: u64) {
-        self.say(Record::Log(LogRecord { level, source: "session".to_owned(), message }), time_ns);
-    }
-}
-
-/// What leads to READY from here, in words.
-fn way_to_ready(mode: Mode) -> &'static str {
-    match mode {
-        Mode::Disarmed => "; arm it first",
-        Mode::Damped | Mode::Fault => "; acknowledge, then arm",
-        Mode::Review => "; judge the last trial first",
-        Mode::Offline => "; there is no robot",
-        _ => "; wait until it is",
-    }
-}
-
-fn describe(intent: &OperatorRequest) -> String {
-    match intent {
-        OperatorRequest::Arm => "arm".to_owned(),
-        OperatorRequest::Confirm(check) => format!("confirm {}", check.check().name()),
-        OperatorRequest::SitDown => "sit down".to_owned(),
-        OperatorRequest::Acknowledge => "acknowledge".to_owned(),
-        OperatorRequest::Approve { trial, .. } => format!("approve trial {trial}"),
-        OperatorRequest::Cancel => "cancel the countdown".to_owned(),
-        OperatorRequest::Skip => "skip the proposal".to_owned(),
-        OperatorRequest::Override { parameter, value } => format!("override {parameter} = {value}"),
-        OperatorRequest::OverrideGain { gain, value } => format!("set the gain {gain} = {value}"),
-        OperatorRequest::ClearOverrides => "clear the overrides".to_owned(),
-        OperatorRequest::Fix { parameter, value, trials } => format!("fix {parameter} = {value} for {trials} trials"),
-        OperatorRequest::Unfix { parameter } => format!("search {parameter} again"),
-        OperatorRequest::NarrowBounds { parameter, low, high } => format!("search {parameter} from {low} to {high}"),
-        OperatorRequest::ConfirmBest { repeats: 0 } => "end the repeats".to_owned(),
-        OperatorRequest::ConfirmBest { repeats } => format!("confirm the best with {repeats} repeats"),
-        OperatorRequest::Judge(verdict) => verdict.name().to_owned(),
-        OperatorRequest::Rerun { trial: None } => "re-run".to_owned(),
-        OperatorRequest::Rerun { trial: Some(trial) } => format!("re-run trial {trial}"),
-        OperatorRequest::Undo => "undo the verdict".to_owned(),
-        OperatorRequest::HandValue(Some(value)) => format!("value measured by hand {value}"),
-        OperatorRequest::HandValue(None) => "no value measured by hand".to_owned(),
-        OperatorRequest::Note { trial, text } => format!("note on trial {trial}: {text}"),
-        OperatorRequest::Enqueue(point) => {
-            let words: Vec<_> = point.iter().map(|(name, value)| format!("{name} = {value}")).collect();
-            format!("queue {}", words.join(", "))
-        }
-        OperatorRequest::Continue(trials) => format!("continue for {trials} trials"),
-    }
-}
-
-fn describe_command(command: &Command) -> String {
-    match command {
-        Command::TakeControl => "to be controlled".to_owned(),
-        Command::Release => "to be let go of".to_owned(),
-        Command::Arm(_) => "to stand up".to_owned(),
-        Command::Leave => "to be left".to_owned(),
-        Command::SitDown => "to sit down".to_owned(),
-        Command::RunTrial(spec, _) => format!("trial {}", spec.trial),
-        Command::Cancel => "to cancel".to_owned(),
-        Command::EndReview => "to end the review".to_owned(),
-        Command::Acknowledge { .. } => "the acknowledgement".to_owned(),
+        self.publish(Record::Log(LogRecord { level, source: "session".to_owned(), message }), time_ns);
     }
 }

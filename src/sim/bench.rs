@@ -1,135 +1,130 @@
-//! The simulator's speed, measured the same way by `benches/simulator.rs` and by the program's own bench.
+//! Speed of the simulator, for `benches/simulator.rs` and `quadfrog bench`.
 //!
-//! A step on four contacts that takes three sweeps does 11,800 floating-point operations in 22,800 instructions (callgrind, x86-64
-//! without extensions: two lanes). At 1.8 us that is 6.6 of the 12 Gflop/s that two such additions or multiplications a
-//! cycle give at 3 GHz: about half of the machine's limit. The rest is moving numbers between lanes and legs.
+//! A step with four contacts and three sweeps takes 11,800 floating-point operations in 22,800 instructions (callgrind,
+//! x86-64 without extensions: two lanes). At 1.8 us that is 6.6 Gflop/s, about half of the 12 Gflop/s that two
+//! additions or multiplications per cycle give at 3 GHz. The rest is data movement between lanes and legs.
 
 use std::time::Instant;
 
-use super::{Model, SimConfig, Simulator, State};
+use super::{RobotModel, SimConfig, SimState, Simulator};
 use crate::robot::description::RobotDescription;
 use crate::robot::kinematics::LegGeometry;
 use crate::robot::{JointCommand, Joints, Leg, MotorCommand, Placement, Robot};
 use nalgebra::Vector3;
 
-/// A situation with a known number of contacts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Scene {
-    /// Free flight: none.
+/// A scene with a known number of contacts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, strum::IntoStaticStr)]
+pub enum BenchScene {
+    /// Free flight: 0 contacts.
+    #[strum(serialize = "0 contacts (flight)")]
     Flight,
-    /// Standing on four feet.
+    /// Standing on four feet: 4 contacts.
+    #[strum(serialize = "4 contacts (standing)")]
     Standing,
-    /// Lying on the belly: four feet and four corners of the trunk.
+    /// Lying on the belly, on four feet and four corners of the trunk: 8 contacts.
+    #[strum(serialize = "8 contacts (lying)")]
     Lying,
-    /// The same with the hips turned down: four hip cylinders more.
+    /// Lying, with four hip cylinders on the ground too: 12 contacts.
+    #[strum(serialize = "12 contacts (lying, hips down)")]
     Sprawling,
 }
 
-impl Scene {
-    /// All of them, by number of contacts.
-    pub const ALL: [Scene; 4] = [Scene::Flight, Scene::Standing, Scene::Lying, Scene::Sprawling];
+impl BenchScene {
+    /// All scenes, by number of contacts.
+    pub const ALL: [BenchScene; 4] =
+        [BenchScene::Flight, BenchScene::Standing, BenchScene::Lying, BenchScene::Sprawling];
 
-    /// What it shows.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Scene::Flight => "0 contacts (flight)",
-            Scene::Standing => "4 contacts (standing)",
-            Scene::Lying => "8 contacts (lying)",
-            Scene::Sprawling => "12 contacts (lying, hips down)",
-        }
+    /// Name in the bench's output.
+    pub fn name(self) -> &'static str {
+        self.into()
     }
 
-    /// How many contacts it has.
+    /// Number of contacts.
     pub const fn contacts(self) -> usize {
-        match self {
-            Scene::Flight => 0,
-            Scene::Standing => 4,
-            Scene::Lying => 8,
-            Scene::Sprawling => 12,
-        }
+        4 * self as usize
     }
 }
 
-/// What was measured.
+/// Measured times.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Figures {
+pub struct SimulatorTimes {
     /// One evaluation of the accelerations from torques, s.
     pub dynamics_s: f64,
-    /// One step of 1 ms in each of [`Scene::ALL`], s.
+    /// One step of 1 ms in each of [`BenchScene::ALL`], s.
     pub step_s: [f64; 4],
 }
 
-/// Sets scenes up for measuring; a Go1, ideal motors, one step per millisecond, only the default shapes.
+/// Bench of the simulator: a Go1 with ideal motors, one step per millisecond, default collision shapes.
 #[derive(Debug)]
-pub struct Speed {
+pub struct SimulatorBench {
     robot: RobotDescription,
     config: SimConfig,
 }
 
-/// Accelerations from torques, ready to be run.
+/// Repeated evaluation of the accelerations.
 #[derive(Debug)]
 pub struct DynamicsRun {
-    model: Model,
-    state: State,
+    model: RobotModel,
+    state: SimState,
     torque: Joints,
 }
 
-/// A scene that has come to rest.
+/// A scene at rest, to be stepped.
 #[derive(Debug)]
 pub struct SceneRun {
     simulator: Simulator,
     command: JointCommand,
-    start: Option<State>,
+    start: Option<SimState>,
     steps: u32,
 }
 
-impl Default for Speed {
+impl Default for SimulatorBench {
     fn default() -> Self {
         Self::new()
     }
 }
 
-impl Speed {
+impl SimulatorBench {
     /// The Go1 on level ground.
-    pub fn new() -> Speed {
+    pub fn new() -> SimulatorBench {
         let mut config = SimConfig::default();
         config.step.contact_substeps = 1;
-        Speed { robot: RobotDescription::embedded("go1").expect("go1 is embedded"), config }
+        SimulatorBench { robot: RobotDescription::embedded("go1").expect("go1 is embedded"), config }
     }
 
-    /// The dynamics alone, in motion.
+    /// Sets up the dynamics alone, of a robot in motion.
     pub fn dynamics(&self) -> DynamicsRun {
-        let state = State {
+        let state = SimState {
             joint_position: std::array::from_fn(|i| [0.1, 0.8, -1.6][i % 3]),
             joint_velocity: std::array::from_fn(|i| 0.3 * i as f64 - 1.5),
             velocity_body: Vector3::new(0.5, -0.2, 1.0),
             angular_velocity_body: Vector3::new(0.3, 1.0, -0.4),
-            ..State::default()
+            ..SimState::default()
         };
-        DynamicsRun { model: Model::new(&self.robot), state, torque: [1.0; 12] }
+        DynamicsRun { model: RobotModel::new(&self.robot), state, torque: [1.0; 12] }
     }
 
-    /// `scene`, half a second after it was set up.
-    pub fn scene(&self, scene: Scene) -> SceneRun {
+    /// Sets up `scene` and simulates half a second.
+    pub fn scene(&self, scene: BenchScene) -> SceneRun {
         let mut simulator = Simulator::new(&self.robot, &self.config).expect("the shipped configuration is valid");
         let folded = self.robot.lying_position;
         let joint_position = match scene {
-            Scene::Flight | Scene::Standing => standing(&self.robot.leg_geometry),
-            Scene::Lying => folded,
-            // Hips turned inwards until their cylinders touch, feet folded up behind.
-            Scene::Sprawling => std::array::from_fn(|i| match i % 3 {
+            BenchScene::Flight | BenchScene::Standing => standing(&self.robot.leg_geometry),
+            BenchScene::Lying => folded,
+            // Hips inwards until their cylinders touch, feet folded behind.
+            BenchScene::Sprawling => std::array::from_fn(|i| match i % 3 {
                 0 => -0.113 * Leg::ALL[i / 3].side(),
                 1 => 2.6,
                 _ => -2.75,
             }),
         };
-        simulator.place(&Placement { joint_position, lying: scene != Scene::Standing, seed: 0 });
+        simulator.place(&Placement { joint_position, lying: scene != BenchScene::Standing, seed: 0 });
         let mut command = JointCommand::default();
         for (motor, position) in command.motor.iter_mut().zip(joint_position) {
             *motor = MotorCommand { position, kp: 60.0, kd: 2.0, ..MotorCommand::default() };
         }
         let mut start = None;
-        if scene == Scene::Flight {
+        if scene == BenchScene::Flight {
             let mut state = *simulator.state();
             state.position_world.z += 5.0;
             simulator.set_state(&state);
@@ -143,13 +138,13 @@ impl Speed {
         run
     }
 
-    /// Measures everything for about `seconds` in all.
-    pub fn measure(&self, seconds: f64) -> Figures {
+    /// Measures dynamics and all scenes for about `seconds` in all.
+    pub fn measure(&self, seconds: f64) -> SimulatorTimes {
         let share = seconds / 5.0;
         let mut dynamics = self.dynamics();
-        Figures {
+        SimulatorTimes {
             dynamics_s: time(share, || dynamics.run()),
-            step_s: Scene::ALL.map(|scene| {
+            step_s: BenchScene::ALL.map(|scene| {
                 let mut run = self.scene(scene);
                 time(share, || run.step())
             }),
@@ -158,7 +153,7 @@ impl Speed {
 }
 
 impl DynamicsRun {
-    /// Accelerations once; the result moves the next state a little, so that nothing can be left out.
+    /// Evaluates the accelerations once; the result changes the next state, so that no call can be optimized away.
     pub fn run(&mut self) {
         let a = self.model.forward_dynamics(&self.state, &self.torque);
         self.state.joint_velocity[0] = a.joint[0].clamp(-1.0, 1.0);
@@ -166,9 +161,9 @@ impl DynamicsRun {
 }
 
 impl SceneRun {
-    /// One millisecond.
+    /// Simulates one millisecond.
     pub fn step(&mut self) {
-        // Falling starts anew before it gets fast.
+        // The fall restarts before it is fast.
         if let Some(start) = self.start
             && self.steps.is_multiple_of(256)
         {
@@ -179,13 +174,13 @@ impl SceneRun {
         let _ = self.simulator.write(&self.command);
     }
 
-    /// How many points touched in the last step.
+    /// Number of contacts in the last step.
     pub fn contacts(&self) -> usize {
         self.simulator.contact_count()
     }
 }
 
-/// The feet under the hips, 0.14 m out and 0.25 m down.
+/// Returns the joint angles of a stance with the feet 0.14 m beside and 0.25 m below the hips.
 fn standing(geometry: &LegGeometry) -> Joints {
     let mut joints = Joints::default();
     for leg in Leg::ALL {
@@ -196,7 +191,7 @@ fn standing(geometry: &LegGeometry) -> Joints {
     joints
 }
 
-/// Mean time of one call of `f` over about `seconds`.
+/// Returns the mean time of one call of `f` over about `seconds`.
 fn time(seconds: f64, mut f: impl FnMut()) -> f64 {
     let start = Instant::now();
     let mut calls = 0u32;

@@ -1,27 +1,29 @@
-//! Which points of the machine are near the ground.
+//! Collision detection: points of the robot that are near the ground.
 //!
-//! Every shape meets the ground at spheres (of radius zero for corners): a foot at one, a box at its corners, a cylinder at
-//! the lowest point of each rim. Against a plane this is exact. Against the edges of steps and blocks the long edges of a
-//! box are seen at points [`EDGE_SPACING`] apart: an edge of a block narrower than that can be missed between them.
+//! Every shape meets the ground at spheres (of radius zero for corners): a foot at one, a box at its corners, a
+//! cylinder at the lowest point of each rim. Against a plane this is exact. Against the edges of steps and blocks the
+//! long edges of a box are sampled [`EDGE_SPACING`] apart: a narrower edge of a block can pass between two samples.
 
 use nalgebra::{Matrix3, Vector3};
 
 use super::config::{BodyKind, SimConfig, TerrainKind};
-use super::contact::{ContactPoint, ContactSolver, TRUNK, Velocity};
-use super::dynamics::{Dynamics, Leg};
+use super::contact::{ContactPoint, ContactSolver};
+use super::dynamics::LegDynamics;
+use super::motion::{GeneralizedVelocity, StepContext, TRUNK};
 use super::quantities::split;
-use super::state::State;
-use super::terrain::{MAX_TOUCHES, Terrain, Touch};
-use crate::robot::description::{Body, RobotDescription, Shape};
-use crate::robot::{self, LEGS, PerLeg};
+use super::state::SimState;
+use super::terrain::{MAX_TERRAIN_CONTACTS, Terrain, TerrainContact};
+use crate::robot::description::{CollisionShape, RigidBody, RobotDescription};
+use crate::robot::{LEGS, Leg, PerLeg};
 
-/// Where boxes are to meet boxes, points along an edge are at most this far apart, m.
+/// Largest distance of two samples along an edge, for contact between boxes, m.
 const EDGE_SPACING: f64 = 0.1;
-/// Contacts are looked for as if points could be faster than they are by this much, m/s: what impulses of the same step may add.
+/// Speed that impulses of the same step may add to a point, m/s.
 const SPEED_MARGIN: f64 = 2.0;
-/// A sphere or rim of the machine that can touch.
+
+/// Geometry that can touch the ground.
 #[derive(Debug, Clone, Copy)]
-enum Outline {
+enum ProbeShape {
     Sphere {
         radius: f64,
     },
@@ -32,6 +34,7 @@ enum Outline {
     },
 }
 
+/// A sphere or rim of a link that can touch the ground.
 #[derive(Debug, Clone, Copy)]
 struct Probe {
     /// Leg, or [`TRUNK`].
@@ -39,61 +42,49 @@ struct Probe {
     link: usize,
     /// Centre in the link's frame, m.
     center: Vector3<f64>,
-    outline: Outline,
+    shape: ProbeShape,
 }
 
-/// A sphere of the machine where it is now.
-struct Place {
+/// The sphere of a probe at the current state.
+struct ProbeSphere {
     center_body: Vector3<f64>,
     center_world: Vector3<f64>,
     radius: f64,
 }
 
-/// A run of probes in one ball.
+/// Bounding sphere of a run of probes on one link, link frame.
 #[derive(Debug, Clone, Copy)]
-struct Ball {
+struct BoundingSphere {
     leg: usize,
     link: usize,
     center: Vector3<f64>,
     radius: f64,
+    /// First probe, and number of probes.
     first: usize,
     count: usize,
 }
 
-/// A step that is about to be made.
-pub(super) struct Moment<'a> {
-    pub dynamics: &'a Dynamics,
-    pub legs: &'a PerLeg<Leg>,
-    pub state: &'a State,
-    pub terrain: &'a Terrain,
-    pub world_from_body: &'a Matrix3<f64>,
-    /// Velocity that it would end with without contact.
-    pub free: &'a Velocity,
-    /// Its length, s.
-    pub h: f64,
-}
-
-/// All that can touch.
+/// All collision geometry of the robot.
 #[derive(Debug, Clone)]
 pub(super) struct Collider {
-    /// The feet come first, one per leg.
+    /// The feet first, one per leg.
     probes: Vec<Probe>,
-    balls: Vec<Ball>,
-    /// No point is farther than this from the trunk's origin or from a joint that moves it, m.
+    bounds: Vec<BoundingSphere>,
+    /// Upper bound of the distance of a point from the trunk's origin or from a joint that moves it, m.
     extent: f64,
 }
 
 impl Collider {
     pub fn new(description: &RobotDescription, config: &SimConfig) -> Collider {
-        let mut collider = Collider { probes: Vec::new(), balls: Vec::new(), extent: 0.0 };
+        let mut collider = Collider { probes: Vec::new(), bounds: Vec::new(), extent: 0.0 };
         let spacing = match config.terrain.kind {
             TerrainKind::Flat | TerrainKind::Slope => f64::INFINITY,
             TerrainKind::Steps | TerrainKind::Blocks => EDGE_SPACING,
         };
         for (leg, part) in description.legs.iter().enumerate() {
-            let outline = Outline::Sphere { radius: part.foot_radius };
-            collider.probes.push(Probe { leg, link: 2, center: part.foot_origin, outline });
-            collider.add_ball(leg);
+            let shape = ProbeShape::Sphere { radius: part.foot_radius };
+            collider.probes.push(Probe { leg, link: 2, center: part.foot_origin, shape });
+            collider.add_bound(leg);
         }
         let touches = |kind| config.contact.bodies.contains(&kind);
         if touches(BodyKind::Trunk) {
@@ -106,150 +97,152 @@ impl Collider {
                 }
             }
         }
-        // Along a leg stretched out, and then across the shape at its end.
-        for ball in &collider.balls {
-            let origins = description.legs.get(ball.leg).map_or(&[][..], |leg| &leg.joint_origin[..=ball.link]);
+        // The length of the stretched leg, plus the shape at its end.
+        for bound in &collider.bounds {
+            let origins = description.legs.get(bound.leg).map_or(&[][..], |leg| &leg.joint_origin[..=bound.link]);
             let leg: f64 = origins.iter().map(|origin| origin.norm()).sum();
-            collider.extent = collider.extent.max(leg + ball.center.norm() + ball.radius);
+            collider.extent = collider.extent.max(leg + bound.center.norm() + bound.radius);
         }
         collider
     }
 
-    /// How many impulses are to be remembered.
-    pub fn memories(&self) -> usize {
-        self.probes.len() * MAX_TOUCHES
+    /// Number of warm-start impulses.
+    pub fn warm_start_slots(&self) -> usize {
+        self.probes.len() * MAX_TERRAIN_CONTACTS
     }
 
-    /// The leg whose foot remembers its impulse at `memory`; none for other parts.
-    pub fn foot_of(memory: usize) -> Option<robot::Leg> {
-        robot::Leg::ALL.get(memory / MAX_TOUCHES).copied()
+    /// Leg whose foot has the warm-start impulse `slot`; none for other parts.
+    pub fn foot_of(slot: usize) -> Option<Leg> {
+        Leg::ALL.get(slot / MAX_TERRAIN_CONTACTS).copied()
     }
 
-    fn add_body(&mut self, body: &Body, leg: usize, link: usize, spacing: f64) {
+    fn add_body(&mut self, body: &RigidBody, leg: usize, link: usize, spacing: f64) {
         for shape in &body.collision {
             let first = self.probes.len();
             match *shape {
-                Shape::Sphere { center, radius } => {
-                    self.probes.push(Probe { leg, link, center, outline: Outline::Sphere { radius } });
+                CollisionShape::Sphere { center, radius } => {
+                    self.probes.push(Probe { leg, link, center, shape: ProbeShape::Sphere { radius } });
                 }
-                Shape::Box { center, rotation, half_extents } => {
+                CollisionShape::Box { center, rotation, half_extents } => {
                     for point in edge_points(&half_extents, spacing) {
-                        let outline = Outline::Sphere { radius: 0.0 };
-                        self.probes.push(Probe { leg, link, center: center + rotation * point, outline });
+                        let shape = ProbeShape::Sphere { radius: 0.0 };
+                        self.probes.push(Probe { leg, link, center: center + rotation * point, shape });
                     }
                 }
-                Shape::Cylinder { center, rotation, radius, half_length } => {
+                CollisionShape::Cylinder { center, rotation, radius, half_length } => {
                     let axis: Vector3<f64> = rotation.column(2).into();
                     for end in [-half_length, half_length] {
-                        let outline = Outline::Rim { radius, axis };
-                        self.probes.push(Probe { leg, link, center: center + axis * end, outline });
+                        let shape = ProbeShape::Rim { radius, axis };
+                        self.probes.push(Probe { leg, link, center: center + axis * end, shape });
                     }
                 }
             }
-            self.add_ball(first);
+            self.add_bound(first);
         }
     }
 
-    /// A ball around the probes from `first` on, which belong to one link.
-    fn add_ball(&mut self, first: usize) {
+    /// Adds the bounding sphere of the probes from `first` on, which belong to one link.
+    fn add_bound(&mut self, first: usize) {
         let probes = &self.probes[first..];
         let center = probes.iter().map(|p| p.center).sum::<Vector3<f64>>() / probes.len() as f64;
         let reach = |p: &Probe| {
-            let radius = match p.outline {
-                Outline::Sphere { radius } | Outline::Rim { radius, .. } => radius,
+            let radius = match p.shape {
+                ProbeShape::Sphere { radius } | ProbeShape::Rim { radius, .. } => radius,
             };
             (p.center - center).norm() + radius
         };
         let radius = probes.iter().map(reach).fold(0.0, f64::max);
         let Probe { leg, link, .. } = probes[0];
-        self.balls.push(Ball { leg, link, center, radius, first, count: probes.len() });
+        self.bounds.push(BoundingSphere { leg, link, center, radius, first, count: probes.len() });
     }
 
-    /// Adds to `solver` every point that may touch in the step.
-    pub fn find(&self, moment: &Moment, solver: &mut ContactSolver) {
-        let reach = moment.h * (self.fastest(moment.free) + SPEED_MARGIN);
-        let now = Velocity::of(moment.state);
-        self.near(moment.legs, moment.state, moment.terrain, moment.world_from_body, reach, |probe, i, place| {
-            for (k, touch) in moment.terrain.touches(&place.center_world, place.radius, reach).into_iter().enumerate() {
-                if let Some(touch) = touch {
-                    add_touch(moment, &now, probe, MAX_TOUCHES * i + k, &place, &touch, solver);
+    /// Adds to `solver` every point that can touch in the step.
+    pub fn find(&self, step: &StepContext, solver: &mut ContactSolver) {
+        let reach = step.h * (self.fastest(step.free_velocity) + SPEED_MARGIN);
+        let velocity = GeneralizedVelocity::of(step.state);
+        self.near(step.legs, step.state, step.terrain, step.world_from_body, reach, |probe, i, sphere| {
+            for (k, contact) in
+                step.terrain.contacts(&sphere.center_world, sphere.radius, reach).into_iter().enumerate()
+            {
+                if let Some(contact) = contact {
+                    add_contact(step, &velocity, probe, MAX_TERRAIN_CONTACTS * i + k, &sphere, &contact, solver);
                 }
             }
         });
     }
 
-    /// A bound on the speed of any point: |v| + r |w| + l (|dq_1| + |dq_2| + |dq_3|), m/s.
-    fn fastest(&self, v: &Velocity) -> f64 {
+    /// Upper bound of the speed of any point: |v| + r |w| + l (|dq_1| + |dq_2| + |dq_3|), m/s.
+    fn fastest(&self, v: &GeneralizedVelocity) -> f64 {
         let (linear, angular) = split(&v.trunk);
         let legs = v.legs.iter().fold(0.0, |most: f64, dq| most.max(dq.abs().sum()));
         linear.norm() + self.extent * (angular.norm() + legs)
     }
 
-    /// The smallest gap of any probe to the ground, m.
-    pub fn smallest_gap(&self, legs: &PerLeg<Leg>, state: &State, terrain: &Terrain) -> f64 {
+    /// Smallest distance of a probe to the ground, m.
+    pub fn smallest_gap(&self, legs: &PerLeg<LegDynamics>, state: &SimState, terrain: &Terrain) -> f64 {
         let world_from_body = state.orientation_world.to_rotation_matrix().into_inner();
         let mut smallest = f64::INFINITY;
-        self.near(legs, state, terrain, &world_from_body, f64::INFINITY, |_, _, place| {
-            for touch in terrain.touches(&place.center_world, place.radius, f64::INFINITY).into_iter().flatten() {
-                smallest = smallest.min(touch.gap);
+        self.near(legs, state, terrain, &world_from_body, f64::INFINITY, |_, _, sphere| {
+            for contact in terrain.contacts(&sphere.center_world, sphere.radius, f64::INFINITY).into_iter().flatten() {
+                smallest = smallest.min(contact.gap);
             }
         });
         smallest
     }
 
-    /// Calls `see` with every probe that is nearer than `reach` to the height of the highest ground.
+    /// Calls `visit` with every probe whose height is less than `reach` above the highest ground.
     #[inline]
     fn near(
         &self,
-        legs: &PerLeg<Leg>,
-        state: &State,
+        legs: &PerLeg<LegDynamics>,
+        state: &SimState,
         terrain: &Terrain,
         world_from_body: &Matrix3<f64>,
         reach: f64,
-        mut see: impl FnMut(&Probe, usize, Place),
+        mut visit: impl FnMut(&Probe, usize, ProbeSphere),
     ) {
         let up_body = world_from_body.tr_mul(&terrain.normal());
         let base = terrain.clearance(&state.position_world);
-        for ball in &self.balls {
-            // Height of a point p of the link: that of its frame's origin and up . p in the link's axes.
-            let (origin_body, up_link) = match ball.leg {
+        for bound in &self.bounds {
+            // Height of a point p of the link: height of its frame's origin + up . p in link axes.
+            let (origin_body, up_link) = match bound.leg {
                 TRUNK => (Vector3::zeros(), up_body),
-                leg => (legs[leg].origin_body[ball.link], legs[leg].in_link(ball.link, &up_body)),
+                leg => (legs[leg].origin_body[bound.link], legs[leg].in_link(bound.link, &up_body)),
             };
             let height = base + up_body.dot(&origin_body);
-            if height + up_link.dot(&ball.center) > ball.radius + reach {
+            if height + up_link.dot(&bound.center) > bound.radius + reach {
                 continue;
             }
-            for (i, probe) in self.probes.iter().enumerate().skip(ball.first).take(ball.count) {
-                if height + up_link.dot(&probe.center) > probe.outline.radius() + reach {
+            for (i, probe) in self.probes.iter().enumerate().skip(bound.first).take(bound.count) {
+                if height + up_link.dot(&probe.center) > probe.shape.radius() + reach {
                     continue;
                 }
-                let (center_link, radius) = probe.outline.lowest(&probe.center, &up_link);
-                let center_body = match ball.leg {
+                let (center_link, radius) = probe.shape.lowest(&probe.center, &up_link);
+                let center_body = match bound.leg {
                     TRUNK => center_link,
-                    leg => legs[leg].in_body(ball.link, &center_link),
+                    leg => legs[leg].in_body(bound.link, &center_link),
                 };
                 let center_world = state.position_world + world_from_body * center_body;
-                see(probe, i, Place { center_body, center_world, radius });
+                visit(probe, i, ProbeSphere { center_body, center_world, radius });
             }
         }
     }
 }
 
-impl Outline {
+impl ProbeShape {
     fn radius(&self) -> f64 {
         match *self {
-            Outline::Sphere { radius } | Outline::Rim { radius, .. } => radius,
+            ProbeShape::Sphere { radius } | ProbeShape::Rim { radius, .. } => radius,
         }
     }
 
-    /// Centre and radius of the sphere that meets the ground, link axes: for a rim its lowest point.
+    /// Centre and radius of the sphere that meets the ground, link axes; of a rim, its lowest point with radius zero.
     #[inline]
     fn lowest(&self, center: &Vector3<f64>, up: &Vector3<f64>) -> (Vector3<f64>, f64) {
         match *self {
-            Outline::Sphere { radius } => (*center, radius),
-            Outline::Rim { radius, axis } => {
-                // From the centre against the ground's normal, in the rim's plane.
+            ProbeShape::Sphere { radius } => (*center, radius),
+            ProbeShape::Rim { radius, axis } => {
+                // The direction against the ground's normal in the plane of the rim.
                 let out = axis * axis.dot(up) - up;
                 let size = out.norm();
                 (if size > 1e-9 { center + out * (radius / size) } else { *center }, 0.0)
@@ -258,56 +251,62 @@ impl Outline {
     }
 }
 
-/// Adds a touch to `solver` if it may close within the step.
+/// Adds a contact to `solver` if its gap can close within the step.
 #[inline]
-fn add_touch(
-    moment: &Moment,
-    now: &Velocity,
+fn add_contact(
+    step: &StepContext,
+    velocity: &GeneralizedVelocity,
     probe: &Probe,
-    memory: usize,
-    place: &Place,
-    touch: &Touch,
+    warm_start_slot: usize,
+    sphere: &ProbeSphere,
+    contact: &TerrainContact,
     solver: &mut ContactSolver,
 ) {
-    let Moment { dynamics, legs, terrain, world_from_body, free, h, .. } = *moment;
-    let normal_body = world_from_body.tr_mul(&touch.normal_world);
-    let position_body = place.center_body - normal_body * (place.radius + touch.gap.min(0.0));
+    let StepContext { legs, terrain, world_from_body, h, .. } = *step;
+    let normal_body = world_from_body.tr_mul(&contact.normal_world);
+    let position_body = sphere.center_body - normal_body * (sphere.radius + contact.gap.min(0.0));
     let leg_jacobian = match probe.leg {
         TRUNK => Matrix3::zeros(),
         leg => legs[leg].point_jacobian(probe.link, &position_body),
     };
-    let ground_velocity_body = match touch.block {
+    let ground_velocity_body = match contact.block {
         Some(block) => world_from_body.tr_mul(&terrain.block_velocity(block)),
         None => Vector3::zeros(),
     };
-    let free_velocity_body = point_velocity(free, probe.leg, &leg_jacobian, &position_body) - ground_velocity_body;
-    if touch.gap + h * (normal_body.dot(&free_velocity_body) - SPEED_MARGIN) > 0.0 {
+    let free_velocity_body =
+        point_velocity(step.free_velocity, probe.leg, &leg_jacobian, &position_body) - ground_velocity_body;
+    if contact.gap + h * (normal_body.dot(&free_velocity_body) - SPEED_MARGIN) > 0.0 {
         return;
     }
     let point = ContactPoint {
         leg: probe.leg,
-        memory,
+        warm_start_slot,
         position_body,
         normal_body,
         leg_jacobian,
-        gap: touch.gap,
-        friction: touch.friction,
-        slip_body: point_velocity(now, probe.leg, &leg_jacobian, &position_body) - ground_velocity_body,
-        free_slip_body: free_velocity_body,
-        block: touch.block,
+        gap: contact.gap,
+        friction: contact.friction,
+        velocity_body: point_velocity(velocity, probe.leg, &leg_jacobian, &position_body) - ground_velocity_body,
+        free_velocity_body,
+        block: contact.block,
     };
-    solver.add_point(dynamics, legs, &point, world_from_body, h);
+    solver.add_point(step, &point);
 }
 
-/// Velocity of a point at `p_body` on `leg`, body axes: v + w x p + J_l dq.
+/// Returns the velocity of a point at `p_body` on `leg`, body axes: v + w x p + J_l dq.
 #[inline]
-fn point_velocity(v: &Velocity, leg: usize, leg_jacobian: &Matrix3<f64>, p_body: &Vector3<f64>) -> Vector3<f64> {
+fn point_velocity(
+    v: &GeneralizedVelocity,
+    leg: usize,
+    leg_jacobian: &Matrix3<f64>,
+    p_body: &Vector3<f64>,
+) -> Vector3<f64> {
     let (linear, angular) = split(&v.trunk);
     let trunk = linear + angular.cross(p_body);
     if leg == TRUNK { trunk } else { trunk + leg_jacobian * v.legs[leg] }
 }
 
-/// The corners of a box, and points along its edges no farther apart than `spacing`.
+/// Returns the corners of a box, and points along its edges no farther apart than `spacing`.
 fn edge_points(half: &Vector3<f64>, spacing: f64) -> Vec<Vector3<f64>> {
     let mut points: Vec<Vector3<f64>> = Vec::new();
     for corner in 0..8 {

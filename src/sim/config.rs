@@ -1,4 +1,4 @@
-//! What is chosen: `config/simulator.toml` as data. Every key is explained there, with its unit and source.
+//! `config/simulator.toml` as data. That file explains every key with its unit and source.
 
 use serde::Deserialize;
 
@@ -10,7 +10,7 @@ pub struct SimConfig {
     pub step: StepConfig,
     /// Contact solver.
     pub solver: SolverConfig,
-    /// What can touch.
+    /// Contacts.
     pub contact: ContactConfig,
     /// The ground.
     pub terrain: TerrainConfig,
@@ -18,7 +18,7 @@ pub struct SimConfig {
     pub actuator: ActuatorConfig,
     /// The sensors.
     pub sensors: SensorConfig,
-    /// What else a robot on a network does: for `quadfrog emulate` alone.
+    /// Properties of the emulated robot, for `quadfrog emulate`.
     pub emulator: EmulatorConfig,
 }
 
@@ -36,11 +36,11 @@ pub struct StepConfig {
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SolverConfig {
-    /// Sweeps end below this change of velocity, m/s.
+    /// Change of velocity below which the sweeps end, m/s.
     pub tolerance_m_s: f64,
-    /// Most sweeps.
+    /// Largest number of sweeps.
     pub max_sweeps: u32,
-    /// Share of a penetration taken back per step.
+    /// Share of a penetration that one step recovers.
     pub penetration_recovery: f64,
 }
 
@@ -48,15 +48,15 @@ pub struct SolverConfig {
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ContactConfig {
-    /// Which law.
+    /// Contact law.
     pub law: ContactLaw,
     /// Time constant with which the convex law stops a slip, s.
     pub slip_time_s: f64,
-    /// What can touch the ground besides the feet.
+    /// Links that can touch the ground besides the feet.
     pub bodies: Vec<BodyKind>,
 }
 
-/// Which impulse in the friction cone a contact gives.
+/// Contact law: selects the impulse in the friction cone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ContactLaw {
@@ -66,7 +66,7 @@ pub enum ContactLaw {
     Convex,
 }
 
-/// A kind of link.
+/// Kind of link.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum BodyKind {
@@ -80,7 +80,7 @@ pub enum BodyKind {
     Calf,
 }
 
-/// Which ground.
+/// Kind of ground.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum TerrainKind {
@@ -90,7 +90,7 @@ pub enum TerrainKind {
     Slope,
     /// Stairs.
     Steps,
-    /// Rough ground of blocks.
+    /// Random blocks.
     Blocks,
 }
 
@@ -98,7 +98,7 @@ pub enum TerrainKind {
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TerrainConfig {
-    /// Which ground.
+    /// Kind of ground.
     pub kind: TerrainKind,
     /// Coulomb coefficient.
     pub friction: f64,
@@ -130,7 +130,7 @@ pub struct StepsConfig {
     pub run_m: f64,
     /// World x of the first riser, m.
     pub start_m: f64,
-    /// How many.
+    /// Number of steps.
     pub count: u32,
 }
 
@@ -138,27 +138,27 @@ pub struct StepsConfig {
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BlocksConfig {
-    /// How many, at most: those for which there is room.
+    /// Largest number of blocks; fewer if there is no room.
     pub count: u32,
-    /// How many may lie on each other.
+    /// Largest number of blocks on top of each other.
     pub layers: u32,
-    /// Height of each, m.
+    /// Height of a block, m.
     pub thickness_m: f64,
     /// Shortest and longest edge, m.
     pub edge_m: [f64; 2],
-    /// Half of the edge of the square with the centres, m.
+    /// Half of the edge of the square that holds the centres, m.
     pub reach_m: f64,
-    /// Coulomb coefficient of their surface.
+    /// Coulomb coefficient of the surface.
     pub friction: f64,
-    /// Whether they slide when kicked.
+    /// Whether the blocks slide when pushed.
     pub loose: bool,
-    /// Mass of each, kg.
+    /// Mass of a block, kg.
     pub mass_kg: f64,
     /// Coulomb coefficient between block and floor.
     pub floor_friction: f64,
 }
 
-/// Which motors.
+/// Motor model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 pub enum ActuatorKind {
     /// Torque as commanded, clamped to the limits.
@@ -173,7 +173,7 @@ pub enum ActuatorKind {
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ActuatorConfig {
-    /// Which motors.
+    /// Motor model.
     pub kind: ActuatorKind,
     /// Used where `kind` is hardware-like.
     pub hardware_like: HardwareLikeConfig,
@@ -183,7 +183,7 @@ pub struct ActuatorConfig {
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct HardwareLikeConfig {
-    /// Full torque up to this share of the no-load speed.
+    /// Share of the no-load speed up to which the motor gives full torque.
     pub full_torque_speed_share: f64,
     /// Time constant of the torque, s.
     pub torque_lag_s: f64,
@@ -191,7 +191,7 @@ pub struct HardwareLikeConfig {
     pub dry_friction_nm: f64,
     /// Viscous friction of a joint, N m s/rad.
     pub viscous_friction_nm_s: f64,
-    /// Whether the rotors' inertia is felt.
+    /// Whether the rotors have inertia.
     pub rotor_inertia: bool,
 }
 
@@ -199,7 +199,7 @@ pub struct HardwareLikeConfig {
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SensorConfig {
-    /// Whether anything below applies.
+    /// Whether the errors below apply.
     pub enabled: bool,
     /// Standard deviation of a gyro sample, rad/s.
     pub gyro_noise_rad_s: f64,
@@ -209,17 +209,17 @@ pub struct SensorConfig {
     pub accel_noise_m_s2: f64,
     /// Standard deviation of the accelerometer's bias, m/s^2.
     pub accel_bias_m_s2: f64,
-    /// Standard deviation of the orientation's slow error, rad.
+    /// Standard deviation of the orientation's drift, rad.
     pub orientation_noise_rad: f64,
-    /// Step of the joint angles, rad.
+    /// Resolution of the joint angles, rad.
     pub encoder_step_rad: f64,
     /// Standard deviation of the joint velocities, rad/s.
     pub joint_velocity_noise_rad_s: f64,
     /// Standard deviation of the foot forces, N.
     pub foot_force_noise_n: f64,
-    /// Step of the foot forces, N.
+    /// Resolution of the foot forces, N.
     pub foot_force_step_n: f64,
-    /// Age of a state when it is read, ms.
+    /// Delay of a state, ms.
     pub delay_ms: u32,
 }
 
@@ -227,27 +227,27 @@ pub struct SensorConfig {
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct EmulatorConfig {
-    /// After this long without a command the motors brake, ms.
+    /// Time without a command after which the motors brake, ms.
     pub command_timeout_ms: u32,
-    /// How strongly a motor brakes that is not in servo mode, N m s/rad.
+    /// Damping of a motor that is not in servo mode, N m s/rad.
     pub braking_kd: f64,
-    /// How long a restart takes, ms.
+    /// Duration of a restart, ms.
     pub reboot_ms: u32,
     /// Length of a state datagram, bytes.
     pub state_length: usize,
     /// Temperature of the motors, degrees Celsius.
     pub motor_temperature_c: f64,
-    /// State of charge of the battery, percent.
+    /// SimState of charge of the battery, percent.
     pub battery_percent: f64,
 }
 
-/// A value that the simulator cannot run with.
+/// Error in the simulator's configuration.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SimError {
-    /// The text is not the configuration's TOML.
+    /// The text is not TOML with the known keys.
     #[error("simulator configuration: {reason}")]
     Syntax {
-        /// The parser's reason, with the place.
+        /// Reason of the parser, with line and column.
         reason: String,
     },
     /// A value is out of its range.
@@ -257,12 +257,12 @@ pub enum SimError {
         key: &'static str,
         /// The value.
         value: f64,
-        /// What it may be.
+        /// Allowed values.
         remedy: &'static str,
     },
 }
 
-/// The file as shipped.
+/// The shipped file.
 const SHIPPED: &str = include_str!("../../config/simulator.toml");
 
 impl Default for SimConfig {
@@ -276,19 +276,19 @@ impl SimConfig {
     /// Reads and checks the text of a `simulator.toml`.
     ///
     /// # Errors
-    /// When a key is unknown or missing, or a value out of range: the error names it.
+    /// A key is unknown or missing, or a value is out of range.
     pub fn from_toml(text: &str) -> Result<SimConfig, SimError> {
         let config: SimConfig = toml::from_str(text).map_err(|e| SimError::Syntax { reason: e.to_string() })?;
         config.check()?;
         Ok(config)
     }
 
-    /// Whether every value is in its range.
+    /// Checks that every value is in its range.
     ///
     /// # Errors
-    /// The first that is not.
+    /// The first value that is not.
     pub fn check(&self) -> Result<(), SimError> {
-        const POSITIVE: &str = "give a number of more than zero";
+        const POSITIVE: &str = "give a number greater than zero";
         const NOT_NEGATIVE: &str = "give zero or more";
         const SHARE: &str = "give a share, 0 to 1";
         let check = |key, value: f64, range: bool, remedy| {
@@ -315,7 +315,7 @@ impl SimConfig {
         check("terrain.slope.heading_rad", terrain.slope.heading_rad, true, "give an angle")?;
         positive("terrain.steps.rise_m", terrain.steps.rise_m)?;
         positive("terrain.steps.run_m", terrain.steps.run_m)?;
-        check("terrain.steps.start_m", terrain.steps.start_m, true, "give a place")?;
+        check("terrain.steps.start_m", terrain.steps.start_m, true, "give a finite number")?;
         count("terrain.steps.count", terrain.steps.count, 100, "give 1 to 100")?;
         let blocks = &terrain.blocks;
         count("terrain.blocks.count", blocks.count, 500, "give 1 to 500")?;

@@ -1,30 +1,30 @@
 //! Equations of motion of a floating trunk with four legs: M(q) a + b(q, v) = [0; tau] (Featherstone 2008, eq. 9.20).
 //!
-//! The machine is a trunk with four chains of three, so M is an arrow:
+//! The robot is a trunk with four chains of three joints, so M is an arrow matrix:
 //!
 //! ```text
-//! M = | I_0   F_1  F_2  F_3  F_4 |    I_0: composite inertia of the whole machine (6x6)
-//!     | F_1^T H_1                |    F_l: momentum of the trunk's frame per unit velocity of leg l's joints (6x3)
+//! M = | I_0   F_1  F_2  F_3  F_4 |    I_0: composite inertia of the whole robot (6x6)
+//!     | F_1^T H_1                |    F_l: momentum in the trunk's frame per unit velocity of leg l's joints (6x3)
 //!     | F_2^T      H_2           |    H_l: the leg's own mass matrix (3x3)
 //!     | ...              ...     |
 //! ```
 //!
-//! Factoring it leg by leg is exactly as cheap as the articulated-body algorithm here, and leaves what contacts
+//! Factoring it leg by leg costs as much as the articulated-body algorithm here, and gives the factors that contacts
 //! need: H_l = C_l C_l^T, G_l = H_l^-1 F_l^T and the Schur complement I_A = I_0 - sum F_l G_l = L L^T, which is the
 //! articulated inertia of the trunk (Featherstone sections 6.5 and 7.1: sparse factorization and articulated inertia).
 //!
-//! Each leg is worked out in the frame of its hip link, in which thigh and calf turn about the same fixed axis y.
+//! Each leg is computed in the frame of its hip link, in which thigh and calf turn about the same fixed axis y.
 //! Six-vectors have the linear part first, in body axes at the trunk's origin.
 
 use nalgebra::{Matrix3, Vector3};
 use simba::simd::{SimdComplexField, SimdValue};
 
-use super::model::{GRAVITY, Lanes, LegsModel, Model};
-use super::spatial::{Force, Inertia, Motion, Symmetric, Turn};
-use super::state::{Acceleration, State};
-use crate::robot::{JOINTS, Joints, LEGS, PerLeg};
+use super::model::{Lanes, LegsModel, RobotModel};
+use super::spatial::{AxisRotation, SpatialForce, SpatialInertia, SpatialMotion, SymmetricMatrix};
+use super::state::{Acceleration, SimState};
+use crate::robot::{GRAVITY, JOINTS, Joints, LEGS, PerLeg};
 
-/// A row over, or a column of, the trunk's six velocities. Plain arrays, which the compiler turns into vector instructions.
+/// A six-vector of the trunk. A plain array, which the compiler vectorizes.
 pub(super) type Six = [f64; 6];
 
 /// a . b
@@ -41,21 +41,21 @@ pub(super) fn add_scaled(y: &mut Six, x: &Six, s: f64) {
     }
 }
 
-/// All legs: where their parts are and how they couple to the trunk. Every number is one per leg.
+/// Kinematics of all legs and their coupling to the trunk; one lane per leg.
 #[derive(Debug, Clone)]
-pub(super) struct Legs {
+pub(super) struct LegLanes {
     /// Rotation of the hip link about x.
-    hip: Turn<Lanes>,
+    hip: AxisRotation<Lanes>,
     /// Rotation of thigh and calf about the hip link's y.
-    thigh: Turn<Lanes>,
-    calf: Turn<Lanes>,
+    thigh: AxisRotation<Lanes>,
+    calf: AxisRotation<Lanes>,
     /// Joint origins in the trunk's frame, m.
     origin_body: [Vector3<Lanes>; 3],
     /// H: mass matrix of the leg's joints, kg m^2: 11, 12, 13, 22, 23, 33.
     mass: [Lanes; 6],
     /// F: a column for each joint.
     coupling: [[Lanes; 6]; 3],
-    /// c: torques that velocity and gravity ask for, N m.
+    /// c: velocity and gravity terms, N m.
     bias: [Lanes; 3],
     /// C^-1: inverse of the lower Cholesky factor of H: 11, 21, 22, 31, 32, 33.
     factor_inverse: [Lanes; 6],
@@ -63,12 +63,12 @@ pub(super) struct Legs {
     gain: [[Lanes; 6]; 3],
 }
 
-/// One leg, for points on it.
+/// Kinematics and factors of one leg.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Leg {
-    hip: Turn<f64>,
-    thigh: Turn<f64>,
-    calf: Turn<f64>,
+pub(super) struct LegDynamics {
+    hip: AxisRotation<f64>,
+    thigh: AxisRotation<f64>,
+    calf: AxisRotation<f64>,
     /// Joint origins in the trunk's frame, m.
     pub origin_body: [Vector3<f64>; 3],
     /// C^-1.
@@ -77,44 +77,44 @@ pub(super) struct Leg {
     pub gain: [Six; 3],
 }
 
-/// The equations at one state.
+/// Equations of motion at one state.
 #[derive(Debug, Clone)]
 pub(super) struct Dynamics {
-    legs: Legs,
+    legs: LegLanes,
     /// I_0 as mass, first and second moment.
-    pub composite: Inertia<f64>,
+    pub composite: SpatialInertia<f64>,
     /// b of the trunk's rows.
     pub bias: Six,
-    /// L: lower Cholesky factor of I_A by columns, with the reciprocals of its diagonal kept apart.
+    /// L: lower Cholesky factor of I_A by columns. The reciprocals of its diagonal are separate.
     factor: [Six; 6],
     factor_diagonal_inverse: Six,
 }
 
-/// Three numbers per joint of a leg as lanes.
+/// Returns the joints of all legs as lanes.
 #[inline]
 fn joint_lanes(x: &Joints) -> [Lanes; 3] {
     [0, 1, 2].map(|i| Lanes::from([x[i], x[3 + i], x[6 + i], x[9 + i]]))
 }
 
-impl Legs {
-    /// Fills everything; returns the legs' composite inertias and bias forces in the trunk's frame.
+impl LegLanes {
+    /// Computes all legs; returns also their composite inertias and bias forces in the trunk's frame.
     #[inline]
     fn new(
         model: &LegsModel,
         q: [Lanes; 3],
         dq: [Lanes; 3],
         added: [Lanes; 3],
-        trunk_velocity: &Motion<Lanes>,
+        trunk_velocity: &SpatialMotion<Lanes>,
         gravity_body: &Vector3<Lanes>,
-    ) -> (Legs, Inertia<Lanes>, Force<Lanes>) {
-        let (hip, thigh, calf) = (Turn::by(q[0]), Turn::by(q[1]), Turn::by(q[1] + q[2]));
+    ) -> (LegLanes, SpatialInertia<Lanes>, SpatialForce<Lanes>) {
+        let (hip, thigh, calf) = (AxisRotation::new(q[0]), AxisRotation::new(q[1]), AxisRotation::new(q[1] + q[2]));
         let origin_hip = model.joint_origin[0];
         let origin_thigh = model.joint_origin[1];
-        let origin_calf = origin_thigh + thigh.y(&model.joint_origin[2]);
+        let origin_calf = origin_thigh + thigh.rotate_y(&model.joint_origin[2]);
 
-        // Inertias about the hip's origin, hip axes, each with all that hangs on it (CRBA, Table 6.2: I^c).
-        let link_calf = model.inertia[2].turned_y(calf).moved(&origin_calf);
-        let link_thigh = model.inertia[1].turned_y(thigh).moved(&origin_thigh);
+        // Composite inertias about the hip's origin, hip axes (CRBA, Table 6.2: I^c).
+        let link_calf = model.inertia[2].rotated_y(calf).moved(&origin_calf);
+        let link_thigh = model.inertia[1].rotated_y(thigh).moved(&origin_thigh);
         let link_hip = model.inertia[0];
         let composite_thigh = link_thigh.plus(&link_calf);
         let composite_hip = link_hip.plus(&composite_thigh);
@@ -128,40 +128,46 @@ impl Legs {
 
         // Newton-Euler with zero accelerations (Table 5.1): v_i = v_p + s_i dq_i,  a_i = a_p + v_i x s_i dq_i,
         // f_i = I_i a_i + v_i x* I_i v_i;  gravity enters as an upward acceleration of the trunk.
-        let v0 = Motion {
-            linear: hip.x_back(&(trunk_velocity.linear + trunk_velocity.angular.cross(&origin_hip))),
-            angular: hip.x_back(&trunk_velocity.angular),
+        let v0 = SpatialMotion {
+            linear: hip.unrotate_x(&(trunk_velocity.linear + trunk_velocity.angular.cross(&origin_hip))),
+            angular: hip.unrotate_x(&trunk_velocity.angular),
         };
-        let (v1, mut a1) = v0.joined_x(dq[0]);
-        let (v2, c2) = v1.joined_y(dq[1], &origin_thigh);
-        let (v3, c3) = v2.joined_y(dq[2], &origin_calf);
-        a1.linear -= hip.x_back(gravity_body);
+        let (v1, mut a1) = v0.across_joint_x(dq[0]);
+        let (v2, c2) = v1.across_joint_y(dq[1], &origin_thigh);
+        let (v3, c3) = v2.across_joint_y(dq[2], &origin_calf);
+        a1.linear -= hip.unrotate_x(gravity_body);
         let a2 = a1.plus(&c2);
         let a3 = a2.plus(&c3);
-        let force = |link: &Inertia<Lanes>, v: &Motion<Lanes>, a| link.times(a).plus(&v.cross_force(&link.times(v)));
+        let force = |link: &SpatialInertia<Lanes>, v: &SpatialMotion<Lanes>, a| {
+            link.times(a).plus(&v.cross_force(&link.times(v)))
+        };
         let p3 = force(&link_calf, &v3, &a3);
         let p2 = force(&link_thigh, &v2, &a2).plus(&p3);
         let p1 = force(&link_hip, &v1, &a1).plus(&p2);
 
-        let column = |f: &Force<Lanes>| {
-            let f = f.out_of(hip, &origin_hip);
+        let column = |f: &SpatialForce<Lanes>| {
+            let f = f.in_parent(hip, &origin_hip);
             [f.linear.x, f.linear.y, f.linear.z, f.angular.x, f.angular.y, f.angular.z]
         };
         let coupling = [column(&f1), column(&f2), column(&f3)];
         let mass = [h11, h12, h13, h22, h23, h33];
         let (factor_inverse, gain) = factor(&mass, &added, &coupling);
-        let legs = Legs {
+        let legs = LegLanes {
             hip,
             thigh,
             calf,
-            origin_body: [origin_hip, origin_hip + hip.x(&origin_thigh), origin_hip + hip.x(&origin_calf)],
+            origin_body: [
+                origin_hip,
+                origin_hip + hip.rotate_x(&origin_thigh),
+                origin_hip + hip.rotate_x(&origin_calf),
+            ],
             mass,
             coupling,
             bias: [p1.angular.x, p2.about_y(&origin_thigh), p3.about_y(&origin_calf)],
             factor_inverse,
             gain,
         };
-        (legs, composite_hip.turned_x(hip).moved(&origin_hip), p1.out_of(hip, &origin_hip))
+        (legs, composite_hip.rotated_x(hip).moved(&origin_hip), p1.in_parent(hip, &origin_hip))
     }
 
     /// H^-1 u = C^-T C^-1 u.
@@ -174,7 +180,7 @@ impl Legs {
         [i11 * y1 + i21 * y2 + i31 * y3, i22 * y2 + i32 * y3, i33 * y3]
     }
 
-    /// What the joints do when the trunk does `trunk`: `free` - G a_0.
+    /// Accelerations of the joints for an acceleration `trunk`: `free` - G a_0.
     #[inline]
     fn follow(&self, free: &[Lanes; 3], trunk: &Six) -> [Lanes; 3] {
         [0, 1, 2].map(|j| {
@@ -216,7 +222,7 @@ fn factor(m: &[Lanes; 6], added: &[Lanes; 3], coupling: &[[Lanes; 6]; 3]) -> ([L
     ([i11, i21, i22, i31, i32, i33], gain)
 }
 
-impl Leg {
+impl LegDynamics {
     /// Velocity of a point at `p_body` on the link `link` (0 hip, 1 thigh, 2 calf) per joint velocity, body axes.
     #[inline]
     pub fn point_jacobian(&self, link: usize, p_body: &Vector3<f64>) -> Matrix3<f64> {
@@ -230,53 +236,53 @@ impl Leg {
         Matrix3::from_columns(&[column1, column2, column3])
     }
 
-    /// A point of link `link` (0 hip, 1 thigh, 2 calf) from its frame to the trunk's.
+    /// Transforms a point of link `link` (0 hip, 1 thigh, 2 calf) to the trunk's frame.
     #[inline]
     pub fn in_body(&self, link: usize, p: &Vector3<f64>) -> Vector3<f64> {
         let turned = match link {
             0 => *p,
-            1 => self.thigh.y(p),
-            _ => self.calf.y(p),
+            1 => self.thigh.rotate_y(p),
+            _ => self.calf.rotate_y(p),
         };
-        self.origin_body[link] + self.hip.x(&turned)
+        self.origin_body[link] + self.hip.rotate_x(&turned)
     }
 
-    /// A vector in the trunk's axes seen in the axes of link `link`.
+    /// Rotates a vector from the trunk's axes to the axes of link `link`.
     #[inline]
     pub fn in_link(&self, link: usize, v_body: &Vector3<f64>) -> Vector3<f64> {
-        let v = self.hip.x_back(v_body);
+        let v = self.hip.unrotate_x(v_body);
         match link {
             0 => v,
-            1 => self.thigh.y_back(&v),
-            _ => self.calf.y_back(&v),
+            1 => self.thigh.unrotate_y(&v),
+            _ => self.calf.unrotate_y(&v),
         }
     }
 }
 
 impl Dynamics {
-    /// The equations of `model` at `state`, with `added` on the diagonal of the joints' mass matrix (kg m^2): rotor inertia
-    /// and whatever the time step treats implicitly.
-    pub fn new(model: &Model, state: &State, added: &Joints) -> Dynamics {
-        let velocity = Motion { linear: state.velocity_body, angular: state.angular_velocity_body };
+    /// Computes the equations of `model` at `state`, with `added` on the diagonal of the joints' mass matrix (kg m^2):
+    /// rotor inertia, and the terms that the time step treats implicitly.
+    pub fn new(model: &RobotModel, state: &SimState, added: &Joints) -> Dynamics {
+        let velocity = SpatialMotion { linear: state.velocity_body, angular: state.angular_velocity_body };
         let gravity_body = state.orientation_world.inverse_transform_vector(&Vector3::new(0.0, 0.0, -GRAVITY));
-        let (legs, leg_inertia, leg_force) = Legs::new(
+        let (legs, leg_inertia, leg_force) = LegLanes::new(
             &model.legs,
             joint_lanes(&state.joint_position),
             joint_lanes(&state.joint_velocity),
             joint_lanes(added),
-            &Motion { linear: velocity.linear.map(Lanes::splat), angular: velocity.angular.map(Lanes::splat) },
+            &SpatialMotion { linear: velocity.linear.map(Lanes::splat), angular: velocity.angular.map(Lanes::splat) },
             &gravity_body.map(Lanes::splat),
         );
 
-        // The trunk's own share, f_0 = I_0 a_0 + v_0 x* I_0 v_0, and the legs'.
-        let up = Motion { linear: -gravity_body, angular: Vector3::zeros() };
+        // f_0 = I_0 a_0 + v_0 x* I_0 v_0 of the trunk alone, plus the forces of the legs.
+        let up = SpatialMotion { linear: -gravity_body, angular: Vector3::zeros() };
         let own = model.trunk.times(&up).plus(&velocity.cross_force(&model.trunk.times(&velocity)));
-        let bias = own.plus(&Force { linear: sums(&leg_force.linear), angular: sums(&leg_force.angular) });
+        let bias = own.plus(&SpatialForce { linear: sums(&leg_force.linear), angular: sums(&leg_force.angular) });
         let s = &leg_inertia.second;
-        let composite = model.trunk.plus(&Inertia {
+        let composite = model.trunk.plus(&SpatialInertia {
             mass: sum(leg_inertia.mass),
             first: sums(&leg_inertia.first),
-            second: Symmetric {
+            second: SymmetricMatrix {
                 xx: sum(s.xx),
                 xy: sum(s.xy),
                 xz: sum(s.xz),
@@ -286,7 +292,7 @@ impl Dynamics {
             },
         });
 
-        // I_A = I_0 - sum F G, only the lower triangle counts.
+        // I_A = I_0 - sum F G; only the lower triangle is used.
         let mut articulated = columns(&composite);
         let ([f1, f2, f3], [g1, g2, g3]) = (&legs.coupling, &legs.gain);
         for j in 0..6 {
@@ -319,7 +325,7 @@ impl Dynamics {
         }
     }
 
-    /// The change of joint velocities that impulses make: C_l^-T y_l - G_l dv_0, with y_l = sum U^T p.
+    /// Change of the joint velocities by impulses: C_l^-T y_l - G_l dv_0, with y_l = sum U^T p.
     pub fn joint_change(&self, sums: &PerLeg<Vector3<f64>>, trunk: &Six) -> PerLeg<Vector3<f64>> {
         let y = [0, 1, 2].map(|i| Lanes::from(sums.map(|sum| sum[i])));
         let [i11, i21, i22, i31, i32, i33] = self.legs.factor_inverse;
@@ -328,41 +334,41 @@ impl Dynamics {
         std::array::from_fn(|l| Vector3::from_fn(|j, _| change[j].extract(l)))
     }
 
-    /// Each leg by itself.
-    pub fn legs(&self) -> PerLeg<Leg> {
-        let turn = Turn { cos: 1.0, sin: 0.0 };
-        let mut out = [Leg {
-            hip: turn,
-            thigh: turn,
-            calf: turn,
+    /// The legs one by one.
+    pub fn legs(&self) -> PerLeg<LegDynamics> {
+        let identity = AxisRotation { cos: 1.0, sin: 0.0 };
+        let mut out = [LegDynamics {
+            hip: identity,
+            thigh: identity,
+            calf: identity,
             origin_body: [Vector3::zeros(); 3],
             factor_inverse: Matrix3::zeros(),
             gain: [[0.0; 6]; 3],
         }; LEGS];
-        // One quantity after the other: a row of lanes is dealt out to the four legs.
-        let mut deal = |x: Lanes, place: fn(&mut Leg, usize, usize) -> &mut f64, i: usize, j: usize| {
+        // Each quantity is distributed from its lanes to the four legs.
+        let mut scatter = |x: Lanes, element: fn(&mut LegDynamics, usize, usize) -> &mut f64, i: usize, j: usize| {
             let x: [f64; LEGS] = x.into();
             for (leg, x) in out.iter_mut().zip(x) {
-                *place(leg, i, j) = x;
+                *element(leg, i, j) = x;
             }
         };
         let legs = &self.legs;
-        deal(legs.hip.cos, |leg, _, _| &mut leg.hip.cos, 0, 0);
-        deal(legs.hip.sin, |leg, _, _| &mut leg.hip.sin, 0, 0);
-        deal(legs.thigh.cos, |leg, _, _| &mut leg.thigh.cos, 0, 0);
-        deal(legs.thigh.sin, |leg, _, _| &mut leg.thigh.sin, 0, 0);
-        deal(legs.calf.cos, |leg, _, _| &mut leg.calf.cos, 0, 0);
-        deal(legs.calf.sin, |leg, _, _| &mut leg.calf.sin, 0, 0);
+        scatter(legs.hip.cos, |leg, _, _| &mut leg.hip.cos, 0, 0);
+        scatter(legs.hip.sin, |leg, _, _| &mut leg.hip.sin, 0, 0);
+        scatter(legs.thigh.cos, |leg, _, _| &mut leg.thigh.cos, 0, 0);
+        scatter(legs.thigh.sin, |leg, _, _| &mut leg.thigh.sin, 0, 0);
+        scatter(legs.calf.cos, |leg, _, _| &mut leg.calf.cos, 0, 0);
+        scatter(legs.calf.sin, |leg, _, _| &mut leg.calf.sin, 0, 0);
         for j in 0..3 {
             for k in 0..3 {
-                deal(legs.origin_body[j][k], |leg, j, k| &mut leg.origin_body[j][k], j, k);
+                scatter(legs.origin_body[j][k], |leg, j, k| &mut leg.origin_body[j][k], j, k);
             }
             for k in 0..6 {
-                deal(legs.gain[j][k], |leg, j, k| &mut leg.gain[j][k], j, k);
+                scatter(legs.gain[j][k], |leg, j, k| &mut leg.gain[j][k], j, k);
             }
         }
         for (n, (i, j)) in [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)].into_iter().enumerate() {
-            deal(legs.factor_inverse[n], |leg, i, j| &mut leg.factor_inverse[(i, j)], i, j);
+            scatter(legs.factor_inverse[n], |leg, i, j| &mut leg.factor_inverse[(i, j)], i, j);
         }
         out
     }
@@ -372,7 +378,7 @@ impl Dynamics {
         self.legs.coupling.map(|column| column.map(|x| x.extract(leg)))
     }
 
-    /// H of one leg, without what was added to its diagonal.
+    /// H of one leg, without the terms added to its diagonal.
     pub fn leg_mass(&self, leg: usize) -> Matrix3<f64> {
         let [h11, h12, h13, h22, h23, h33] = self.legs.mass.map(|x| x.extract(leg));
         Matrix3::new(h11, h12, h13, h12, h22, h23, h13, h23, h33)
@@ -384,7 +390,7 @@ impl Dynamics {
         std::array::from_fn::<f64, JOINTS, _>(|i| bias[i % 3].extract(i / 3))
     }
 
-    /// x becomes L^-1 x.
+    /// Replaces x by L^-1 x.
     #[inline]
     pub fn solve_lower(&self, x: &mut Six) {
         for j in 0..6 {
@@ -395,7 +401,7 @@ impl Dynamics {
         }
     }
 
-    /// x becomes L^-T x.
+    /// Replaces x by L^-T x.
     #[inline]
     pub fn solve_upper(&self, x: &mut Six) {
         for j in (0..6).rev() {
@@ -407,21 +413,21 @@ impl Dynamics {
     }
 }
 
-/// The sum over the legs.
+/// Sum over the legs.
 #[inline]
 fn sum(x: Lanes) -> f64 {
     let [a, b, c, d]: [f64; LEGS] = x.into();
     (a + b) + (c + d)
 }
 
-/// The same for each component.
+/// Sum over the legs of each component.
 #[inline]
 fn sums(v: &Vector3<Lanes>) -> Vector3<f64> {
     Vector3::new(sum(v.x), sum(v.y), sum(v.z))
 }
 
-/// A spatial inertia as the columns of a 6x6 matrix, linear part first: [[m 1, -hx], [hx, I]].
-fn columns(inertia: &Inertia<f64>) -> [Six; 6] {
+/// Returns a spatial inertia as the columns of a 6x6 matrix, linear part first: [[m 1, -hx], [hx, I]].
+fn columns(inertia: &SpatialInertia<f64>) -> [Six; 6] {
     let (m, h, i) = (inertia.mass, &inertia.first, &inertia.second);
     [
         [m, 0.0, 0.0, 0.0, h.z, -h.y],

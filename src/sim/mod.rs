@@ -1,8 +1,8 @@
-//! Rigid-body simulator behind the `Robot` trait: answers as the machine would.
+//! Rigid-body simulator behind the [`Robot`] trait.
 //!
-//! Constant [`Model`], changing [`State`]; one control period is `step.rs` read from the top. [`contact`](self) impulses are found
-//! together by a per-contact Gauss-Seidel method with the exact Coulomb cone. Deterministic: the same seed and the same
-//! commands give the same bits. Nothing allocates after `new` and `place`.
+//! [`RobotModel`] is constant, [`SimState`] changes; `step.rs` is the sequence of one control period. Contact impulses
+//! are solved together by a per-contact Gauss-Seidel method with the exact Coulomb cone. Deterministic: the same seed
+//! and the same commands give the same bits. Nothing allocates after `new` and `place`.
 
 mod actuator;
 pub mod bench;
@@ -12,7 +12,9 @@ mod contact;
 mod dynamics;
 pub mod emulator;
 mod integrate;
+mod joint_stop;
 mod model;
+mod motion;
 mod quantities;
 mod sensors;
 mod spatial;
@@ -27,121 +29,121 @@ pub use config::{
     HardwareLikeConfig, SensorConfig, SimConfig, SimError, SlopeConfig, SolverConfig, StepConfig, StepsConfig,
     TerrainConfig, TerrainKind,
 };
-pub use model::{GRAVITY, Model};
-pub use quantities::{DOF, Energy, FootMotion, Momentum};
-pub use state::{Acceleration, State};
-pub use step::CONTROL_PERIOD_S;
+pub use model::RobotModel;
+pub use quantities::{DOF, Energy, FootKinematics, Momentum};
+pub use state::{Acceleration, SimState};
 pub use terrain::TerrainBox;
 
 use crate::robot::description::{JointLimits, RobotDescription};
-use crate::robot::{Imu, JOINTS, JointCommand, Placement, Robot, RobotError, RobotState, Truth};
+use crate::robot::{
+    CONTROL_PERIOD_S, GRAVITY, Imu, JOINTS, JointCommand, Placement, Robot, RobotError, RobotState, Truth,
+};
 use actuator::Actuator;
 use collision::Collider;
 use contact::ContactSolver;
 use dynamics::Dynamics;
 use sensors::Sensors;
-use step::Touched;
+use step::PeriodContacts;
 use terrain::Terrain;
 
-/// The simulated machine.
+/// A simulated robot.
 #[derive(Debug, Clone)]
 pub struct Simulator {
     config: SimConfig,
-    model: Model,
+    model: RobotModel,
     limits: JointLimits,
     imu_origin: Vector3<f64>,
     collider: Collider,
     terrain: Terrain,
     actuator: Actuator,
     solver: ContactSolver,
-    state: State,
-    touched: Touched,
-    /// Mean acceleration of the inertial unit's place over the last period, less gravity; body axes, m/s^2.
+    state: SimState,
+    contacts: PeriodContacts,
+    /// Mean acceleration of the inertial unit over the last period, less gravity; body axes, m/s^2.
     specific_force_body: Vector3<f64>,
-    /// Control periods since it was placed.
+    /// Control periods since `place`.
     ticks: u32,
     sensors: Sensors,
-    /// What is read until the next control period.
+    /// State that `read` returns until the next control period.
     reported: RobotState,
 }
 
 impl Simulator {
-    /// The machine `description` in the world of `config`, at rest with joint angles zero at the world's origin until it is
-    /// placed.
+    /// Creates the robot `description` in the world of `config`, at rest at the world's origin with joint angles zero.
     ///
     /// # Errors
-    /// When a value of `config` is out of range.
+    /// A value of `config` is out of range.
     pub fn new(description: &RobotDescription, config: &SimConfig) -> Result<Simulator, SimError> {
         config.check()?;
         let motor = &config.actuator;
-        let mut model = Model::new(description);
+        let mut model = RobotModel::new(description);
         if motor.kind == ActuatorKind::HardwareLike && motor.hardware_like.rotor_inertia {
             model = model.with_rotor_inertia(description.rotor_inertia);
         }
         let collider = Collider::new(description, config);
         let mut simulator = Simulator {
-            solver: ContactSolver::new(config.solver, &config.contact, collider.memories()),
+            solver: ContactSolver::new(config.solver, &config.contact, collider.warm_start_slots()),
             terrain: Terrain::new(&config.terrain),
             actuator: Actuator::new(motor, &description.limits),
             model,
             limits: description.limits,
             imu_origin: description.imu_origin,
             collider,
-            state: State::default(),
-            touched: Touched::default(),
+            state: SimState::default(),
+            contacts: PeriodContacts::default(),
             specific_force_body: Vector3::new(0.0, 0.0, GRAVITY),
             ticks: 0,
             sensors: Sensors::new(&config.sensors),
             reported: RobotState::default(),
             config: config.clone(),
         };
-        simulator.set_state(&State::default());
+        simulator.set_state(&SimState::default());
         Ok(simulator)
     }
 
-    /// What is constant about the machine.
-    pub fn model(&self) -> &Model {
+    /// The constant model.
+    pub fn model(&self) -> &RobotModel {
         &self.model
     }
 
-    /// Where it is and how it moves.
-    pub fn state(&self) -> &State {
+    /// Current position and velocity of every part.
+    pub fn state(&self) -> &SimState {
         &self.state
     }
 
-    /// Puts it into any state, for tests and studies of its own; forgets contact forces and motor lag.
-    pub fn set_state(&mut self, state: &State) {
+    /// Sets the state; resets contact impulses and motor lag.
+    pub fn set_state(&mut self, state: &SimState) {
         self.state = *state;
-        self.touched = Touched::default();
+        self.contacts = PeriodContacts::default();
         self.specific_force_body = state.orientation_world.inverse_transform_vector(&Vector3::new(0.0, 0.0, GRAVITY));
         self.solver.reset();
         self.actuator.reset();
         self.report();
     }
 
-    /// Smallest distance between the machine and the ground, m; negative where it is inside.
+    /// Smallest distance between the robot and the ground, m; negative if a part is inside.
     pub fn smallest_gap(&self) -> f64 {
         let dynamics = Dynamics::new(&self.model, &self.state, &[0.0; JOINTS]);
         self.collider.smallest_gap(&dynamics.legs(), &self.state, &self.terrain)
     }
 
-    /// Number of points that touched, or could have, in the last step.
+    /// Number of contact points of the last step.
     pub fn contact_count(&self) -> usize {
         self.solver.contacts().len()
     }
 
-    /// The steps or blocks on the ground, where they are now.
+    /// The steps or blocks on the ground at their current positions.
     pub fn terrain_boxes(&self) -> impl Iterator<Item = TerrainBox> + '_ {
         self.terrain.boxes()
     }
 
-    /// Velocity of the inertial unit's place, world, m/s.
+    /// Velocity of the inertial unit, world, m/s.
     fn imu_velocity_world(&self) -> Vector3<f64> {
         let v = self.state.velocity_body + self.state.angular_velocity_body.cross(&self.imu_origin);
         self.state.orientation_world * v
     }
 
-    /// Has the sensors look.
+    /// Measures the current state with the sensors.
     fn report(&mut self) {
         let state = &self.state;
         let exact = RobotState {
@@ -154,7 +156,7 @@ impl Simulator {
                 gyro_body: state.angular_velocity_body,
                 accel_body: self.specific_force_body,
             },
-            foot_force: self.touched.foot_normal_impulse.map(|impulse| impulse / CONTROL_PERIOD_S),
+            foot_force: self.contacts.foot_normal_impulse.map(|impulse| impulse / CONTROL_PERIOD_S),
             motor_enabled: [true; JOINTS],
             truth: Some(self.truth()),
             ..RobotState::default()
@@ -169,9 +171,9 @@ impl Simulator {
             velocity_world: state.orientation_world * state.velocity_body,
             orientation_world: state.orientation_world,
             angular_velocity_body: state.angular_velocity_body,
-            foot_contact: self.touched.foot,
-            foot_force_world: self.touched.foot_impulse_world.map(|impulse| impulse / CONTROL_PERIOD_S),
-            body_contact: self.touched.body,
+            foot_contact: self.contacts.foot,
+            foot_force_world: self.contacts.foot_impulse_world.map(|impulse| impulse / CONTROL_PERIOD_S),
+            body_contact: self.contacts.body,
         }
     }
 }
@@ -191,12 +193,13 @@ impl Robot for Simulator {
         Ok(())
     }
 
-    /// Standing or lying level at the world's origin, as low as the ground allows; everything random starts anew from the seed.
+    /// Places the robot level at the world's origin, as low as the ground allows, and restarts all random numbers from
+    /// the seed.
     fn place(&mut self, placement: &Placement) -> bool {
         self.terrain.reset(placement.seed);
         self.ticks = 0;
-        let mut state = State { joint_position: placement.joint_position, ..State::default() };
-        // Lowered from above until the first part touches: on level ground in one step, on blocks in a few.
+        let mut state = SimState { joint_position: placement.joint_position, ..SimState::default() };
+        // Lowered until the first part touches: one iteration on level ground, a few on blocks.
         state.position_world.z = 2.0;
         for _ in 0..200 {
             self.set_state(&state);

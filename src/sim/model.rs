@@ -1,46 +1,43 @@
-//! What is constant: the description in the form that the equations use.
+//! The constant model: the robot description in the form that the equations use.
 
 use nalgebra::Vector3;
 
-use super::spatial::{Inertia, Symmetric};
-use crate::robot::description::{Body, RobotDescription};
+use super::spatial::{SpatialInertia, SymmetricMatrix};
+use crate::robot::description::{RigidBody, RobotDescription};
 use crate::robot::{JOINTS, Joints, PerLeg};
 
-/// Acceleration of free fall, m/s^2, straight down.
-pub const GRAVITY: f64 = 9.81;
-
-/// A number for each leg, in lanes.
+/// One number per leg, in SIMD lanes.
 pub(super) type Lanes = simba::simd::WideF64x4;
 
-/// The legs' constants.
+/// Constants of the legs.
 #[derive(Debug, Clone)]
 pub(super) struct LegsModel {
     /// Origin of each joint in its parent's frame, m.
     pub joint_origin: [Vector3<Lanes>; 3],
     /// Inertia of hip, thigh and calf about their joint's origin, link axes.
-    pub inertia: [Inertia<Lanes>; 3],
+    pub inertia: [SpatialInertia<Lanes>; 3],
 }
 
-/// The machine as the equations see it. Built once; nothing here changes.
+/// Masses and geometry of the robot.
 #[derive(Debug, Clone)]
-pub struct Model {
-    pub(super) trunk: Inertia<f64>,
+pub struct RobotModel {
+    pub(super) trunk: SpatialInertia<f64>,
     pub(super) legs: LegsModel,
     /// Centre of each foot in its calf's frame, m.
     pub(super) foot_origin: PerLeg<Vector3<f64>>,
     mass: f64,
-    /// Inertia that the motors' rotors add at each joint, kg m^2; zero for ideal motors.
+    /// Inertia of the rotors at each joint, kg m^2; zero for ideal motors.
     pub(super) rotor_inertia: Joints,
 }
 
-impl Model {
-    /// The rigid bodies of `description`, without rotor inertia.
-    pub fn new(description: &RobotDescription) -> Model {
-        let inertia = |body: &Body| Inertia::new(body.mass, &body.com, &body.inertia_com);
+impl RobotModel {
+    /// Takes the rigid bodies of `description`, without rotor inertia.
+    pub fn new(description: &RobotDescription) -> RobotModel {
+        let inertia = |body: &RigidBody| SpatialInertia::new(body.mass, &body.com, &body.inertia_com);
         let legs = &description.legs;
         let trunk = inertia(&description.trunk);
         let links = legs.iter().flat_map(|leg| &leg.bodies);
-        Model {
+        RobotModel {
             mass: trunk.mass + links.map(|body| body.mass).sum::<f64>(),
             trunk,
             legs: LegsModel {
@@ -52,29 +49,29 @@ impl Model {
         }
     }
 
-    /// The same bodies with rotors of these inertias at the joints, kg m^2.
-    pub fn with_rotor_inertia(mut self, rotor_inertia: Joints) -> Model {
+    /// Sets the inertia of the rotors at the joints, kg m^2.
+    pub fn with_rotor_inertia(mut self, rotor_inertia: Joints) -> RobotModel {
         self.rotor_inertia = rotor_inertia;
         self
     }
 
-    /// Mass of the whole machine, kg.
+    /// Total mass, kg.
     pub fn mass(&self) -> f64 {
         self.mass
     }
 }
 
-/// One vector per leg as a vector of lanes.
+/// Returns one vector per leg as a vector of lanes.
 pub(super) fn vector_lanes(v: &PerLeg<Vector3<f64>>) -> Vector3<Lanes> {
     Vector3::new(Lanes::from(v.map(|v| v.x)), Lanes::from(v.map(|v| v.y)), Lanes::from(v.map(|v| v.z)))
 }
 
-fn inertia_lanes(i: &PerLeg<Inertia<f64>>) -> Inertia<Lanes> {
-    let lanes = |f: fn(&Symmetric<f64>) -> f64| Lanes::from(i.each_ref().map(|i| f(&i.second)));
-    Inertia {
+fn inertia_lanes(i: &PerLeg<SpatialInertia<f64>>) -> SpatialInertia<Lanes> {
+    let lanes = |f: fn(&SymmetricMatrix<f64>) -> f64| Lanes::from(i.each_ref().map(|i| f(&i.second)));
+    SpatialInertia {
         mass: Lanes::from(i.map(|i| i.mass)),
         first: vector_lanes(&i.map(|i| i.first)),
-        second: Symmetric {
+        second: SymmetricMatrix {
             xx: lanes(|s| s.xx),
             xy: lanes(|s| s.xy),
             xz: lanes(|s| s.xz),

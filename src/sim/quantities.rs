@@ -1,20 +1,21 @@
-//! What can be asked of a model at a state: accelerations, mass matrix, momenta, energies, feet. For tests, displays and
-//! the truth of the simulator; the time step uses [`super::dynamics`] directly.
+//! Quantities of a model at a state: accelerations, mass matrix, momentum, energy, feet. For tests and benches; the
+//! time step uses [`super::dynamics`] directly.
 //!
-//! Velocity vectors of 18 are ordered: linear velocity of the trunk's origin (body axes), angular velocity (body axes), joints.
+//! Velocity vectors of 18 are ordered: linear velocity of the trunk's origin (body axes), angular velocity (body axes),
+//! joints.
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 use super::dynamics::{Dynamics, Six, add_scaled};
-use super::model::{GRAVITY, Model};
-use super::spatial::Motion;
-use super::state::{Acceleration, State};
-use crate::robot::{JOINTS, Joints, LEGS, PerLeg, leg_of};
+use super::model::RobotModel;
+use super::spatial::SpatialMotion;
+use super::state::{Acceleration, SimState};
+use crate::robot::{GRAVITY, JOINTS, Joints, LEGS, PerLeg, leg_of};
 
 /// Degrees of freedom: six of the trunk and twelve joints.
 pub const DOF: usize = 6 + JOINTS;
 
-/// Momentum of the whole machine.
+/// Momentum of the whole robot.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Momentum {
     /// Position of the centre of mass, world, m.
@@ -25,45 +26,46 @@ pub struct Momentum {
     pub angular_world: Vector3<f64>,
 }
 
-/// Energy of the whole machine, J.
+/// Energy of the whole robot, J.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Energy {
-    /// Of motion, rotors included.
+    /// Kinetic energy, with that of the rotors.
     pub kinetic: f64,
-    /// Of height; zero with the centre of mass at z = 0.
+    /// Potential energy; zero with the centre of mass at z = 0.
     pub potential: f64,
 }
 
 impl Energy {
-    /// Kinetic and potential energy together, J.
+    /// Sum of kinetic and potential energy, J.
     pub fn total(&self) -> f64 {
         self.kinetic + self.potential
     }
 }
 
-/// The centre of a foot.
+/// Position, velocity and Jacobian of the centre of a foot.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FootMotion {
+pub struct FootKinematics {
     /// Position, world, m.
     pub position_world: Vector3<f64>,
     /// Velocity, world, m/s.
     pub velocity_world: Vector3<f64>,
-    /// Velocity per unit of each of the 18 velocities, world.
+    /// Jacobian with respect to the 18 velocities, world.
     pub jacobian_world: SMatrix<f64, 3, DOF>,
 }
 
-impl Model {
-    fn dynamics(&self, state: &State) -> Dynamics {
+impl RobotModel {
+    fn dynamics(&self, state: &SimState) -> Dynamics {
         Dynamics::new(self, state, &self.rotor_inertia)
     }
 
-    /// Accelerations under the joint torques `torque` (N m) and gravity, without contact, friction or joint stops.
-    pub fn forward_dynamics(&self, state: &State, torque: &Joints) -> Acceleration {
+    /// Returns the accelerations under the joint torques `torque` (N m) and gravity, without contact, friction or joint
+    /// stops.
+    pub fn forward_dynamics(&self, state: &SimState, torque: &Joints) -> Acceleration {
         self.dynamics(state).acceleration(torque)
     }
 
     /// M(q): kg, kg m, kg m^2.
-    pub fn mass_matrix(&self, state: &State) -> SMatrix<f64, DOF, DOF> {
+    pub fn mass_matrix(&self, state: &SimState) -> SMatrix<f64, DOF, DOF> {
         let dynamics = self.dynamics(state);
         let composite = &dynamics.composite;
         let mut matrix = SMatrix::<f64, DOF, DOF>::zeros();
@@ -88,8 +90,8 @@ impl Model {
         matrix
     }
 
-    /// b(q, v): the generalised forces that velocity and gravity ask for; M a + b = [0; tau]. N, N m.
-    pub fn bias(&self, state: &State) -> SVector<f64, DOF> {
+    /// b(q, v): velocity and gravity terms of M a + b = [0; tau]. N, N m.
+    pub fn bias(&self, state: &SimState) -> SVector<f64, DOF> {
         let dynamics = self.dynamics(state);
         let mut bias = SVector::<f64, DOF>::zeros();
         bias.fixed_rows_mut::<6>(0).copy_from_slice(&dynamics.bias);
@@ -98,10 +100,10 @@ impl Model {
     }
 
     /// Centre of mass, its velocity, and the angular momentum about it.
-    pub fn momentum(&self, state: &State) -> Momentum {
+    pub fn momentum(&self, state: &SimState) -> Momentum {
         let dynamics = self.dynamics(state);
         // The first six rows of M v are the momentum about the trunk's origin.
-        let velocity = Motion { linear: state.velocity_body, angular: state.angular_velocity_body };
+        let velocity = SpatialMotion { linear: state.velocity_body, angular: state.angular_velocity_body };
         let trunk = dynamics.composite.times(&velocity);
         let mut momentum = stack(&trunk.linear, &trunk.angular);
         let columns = (0..LEGS).flat_map(|leg| dynamics.coupling(leg));
@@ -121,7 +123,7 @@ impl Model {
     }
 
     /// Kinetic and potential energy.
-    pub fn energy(&self, state: &State) -> Energy {
+    pub fn energy(&self, state: &SimState) -> Energy {
         let mut v = SVector::<f64, DOF>::zeros();
         v.fixed_rows_mut::<3>(0).copy_from(&state.velocity_body);
         v.fixed_rows_mut::<3>(3).copy_from(&state.angular_velocity_body);
@@ -133,8 +135,8 @@ impl Model {
         }
     }
 
-    /// The centres of the feet.
-    pub fn feet(&self, state: &State) -> PerLeg<FootMotion> {
+    /// Motion of the centres of the feet.
+    pub fn feet(&self, state: &SimState) -> PerLeg<FootKinematics> {
         let dynamics = self.dynamics(state);
         let legs = dynamics.legs();
         let to_world = state.orientation_world.to_rotation_matrix().into_inner();
@@ -150,7 +152,7 @@ impl Model {
             let velocity_body = state.velocity_body
                 + state.angular_velocity_body.cross(&foot_body)
                 + joints * leg_of(&state.joint_velocity, l);
-            FootMotion {
+            FootKinematics {
                 position_world: state.position_world + to_world * foot_body,
                 velocity_world: to_world * velocity_body,
                 jacobian_world,
@@ -159,13 +161,13 @@ impl Model {
     }
 }
 
-/// Linear and angular part as one row.
+/// Joins linear and angular part.
 #[inline]
 pub(super) fn stack(linear: &Vector3<f64>, angular: &Vector3<f64>) -> Six {
     [linear.x, linear.y, linear.z, angular.x, angular.y, angular.z]
 }
 
-/// Its linear and its angular part.
+/// Returns linear and angular part.
 #[inline]
 pub(super) fn split(six: &Six) -> (Vector3<f64>, Vector3<f64>) {
     (Vector3::new(six[0], six[1], six[2]), Vector3::new(six[3], six[4], six[5]))

@@ -1,5 +1,5 @@
-//! What the machine reports of its state: noise and bias of the inertial unit, encoder steps, coarse foot forces, delay. Drawn
-//! once per control period from the trial's seed, so reading twice reads the same.
+//! Sensor errors: noise and bias of the inertial unit, encoder steps, resolution of the foot forces, delay. Drawn once
+//! per control period from the trial's seed.
 
 use nalgebra::{UnitQuaternion, Vector3};
 use rand_chacha::ChaCha8Rng;
@@ -11,7 +11,7 @@ use crate::robot::RobotState;
 
 /// Longest delay, ms.
 pub(super) const MAX_DELAY: usize = 20;
-/// Time constant of the orientation's wandering error, ms. Ours: the order of an attitude filter's.
+/// Time constant of the orientation's random drift, ms. Assumption: the order of an attitude filter's time constant.
 const ORIENTATION_DRIFT_MS: f64 = 1000.0;
 
 /// The sensors and their errors.
@@ -23,7 +23,7 @@ pub(super) struct Sensors {
     accel_bias: Vector3<f64>,
     /// Error of the orientation as a rotation vector, body axes, rad.
     tilt: Vector3<f64>,
-    /// The last states measured, by time modulo their number.
+    /// Ring of the last measured states.
     past: [RobotState; MAX_DELAY + 1],
     measured: usize,
 }
@@ -41,9 +41,9 @@ impl Sensors {
         }
     }
 
-    /// Starts a trial: biases are drawn anew, and the past is forgotten.
+    /// Starts a trial: draws the biases and discards past states.
     pub fn reset(&mut self, seed: u64) {
-        // Another stream than the terrain's, which has the same seed.
+        // Not the stream of the terrain, which has the same seed.
         self.random = ChaCha8Rng::seed_from_u64(seed);
         self.random.set_stream(1);
         self.measured = 0;
@@ -53,8 +53,8 @@ impl Sensors {
         self.tilt = self.normal(config.orientation_noise_rad);
     }
 
-    /// What is reported when the machine's state is `exact`; called once per control period. What the simulator alone knows
-    /// (`truth`) stays exact and new.
+    /// Returns the reported state for the true state `exact`; called once per control period. `truth` stays exact and
+    /// is not delayed.
     pub fn measure(&mut self, exact: &RobotState) -> RobotState {
         if !self.config.enabled {
             return *exact;
@@ -101,7 +101,7 @@ impl Sensors {
     }
 }
 
-/// `x` in whole steps; as it is where there are none.
+/// Rounds `x` to whole steps; a step of zero means no rounding.
 fn rounded(x: f64, step: f64) -> f64 {
     if step > 0.0 { (x / step).round() * step } else { x }
 }

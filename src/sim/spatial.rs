@@ -1,57 +1,57 @@
-//! Spatial inertia and forces at one common point (Featherstone, "Rigid Body Dynamics Algorithms", 2008, chapter 2), written out
-//! for symmetric matrices and for joints about x and y.
+//! Spatial inertia, motion and force at one common point (Featherstone, "Rigid Body Dynamics Algorithms", 2008, chapter
+//! 2), specialized to symmetric matrices and to joints about x and y.
 //!
-//! `T` is one number, or one number per leg: the four legs are worked out side by side.
+//! `T` is one number, or one SIMD lane per leg.
 
 use nalgebra::{Matrix3, Vector3};
 use simba::simd::SimdRealField;
 
-/// A number, or several in lanes.
+/// One number, or one per lane.
 pub(super) trait Real: SimdRealField + Copy {}
 impl<T: SimdRealField + Copy> Real for T {}
 
-/// Cosine and sine of an angle: a rotation about one axis.
+/// Rotation about one coordinate axis, as cosine and sine.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Turn<T> {
+pub(super) struct AxisRotation<T> {
     pub cos: T,
     pub sin: T,
 }
 
-impl<T: Real> Turn<T> {
+impl<T: Real> AxisRotation<T> {
     #[inline]
-    pub fn by(angle: T) -> Turn<T> {
+    pub fn new(angle: T) -> AxisRotation<T> {
         let (sin, cos) = angle.simd_sin_cos();
-        Turn { cos, sin }
+        AxisRotation { cos, sin }
     }
 
-    /// Rx v: from a frame turned about x to the one that it was turned from.
+    /// Rx v: from the rotated frame to the original one.
     #[inline]
-    pub fn x(self, v: &Vector3<T>) -> Vector3<T> {
+    pub fn rotate_x(self, v: &Vector3<T>) -> Vector3<T> {
         Vector3::new(v.x, self.cos * v.y - self.sin * v.z, self.sin * v.y + self.cos * v.z)
     }
 
     /// Rx^T v.
     #[inline]
-    pub fn x_back(self, v: &Vector3<T>) -> Vector3<T> {
+    pub fn unrotate_x(self, v: &Vector3<T>) -> Vector3<T> {
         Vector3::new(v.x, self.cos * v.y + self.sin * v.z, self.cos * v.z - self.sin * v.y)
     }
 
     /// Ry v.
     #[inline]
-    pub fn y(self, v: &Vector3<T>) -> Vector3<T> {
+    pub fn rotate_y(self, v: &Vector3<T>) -> Vector3<T> {
         Vector3::new(self.cos * v.x + self.sin * v.z, v.y, self.cos * v.z - self.sin * v.x)
     }
 
     /// Ry^T v.
     #[inline]
-    pub fn y_back(self, v: &Vector3<T>) -> Vector3<T> {
+    pub fn unrotate_y(self, v: &Vector3<T>) -> Vector3<T> {
         Vector3::new(self.cos * v.x - self.sin * v.z, v.y, self.sin * v.x + self.cos * v.z)
     }
 }
 
-/// A symmetric 3x3 matrix.
+/// Symmetric 3x3 matrix.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Symmetric<T> {
+pub(super) struct SymmetricMatrix<T> {
     pub xx: T,
     pub xy: T,
     pub xz: T,
@@ -60,10 +60,10 @@ pub(super) struct Symmetric<T> {
     pub zz: T,
 }
 
-impl<T: Real> Symmetric<T> {
+impl<T: Real> SymmetricMatrix<T> {
     #[inline]
-    fn plus(&self, o: &Symmetric<T>) -> Symmetric<T> {
-        Symmetric {
+    fn plus(&self, o: &SymmetricMatrix<T>) -> SymmetricMatrix<T> {
+        SymmetricMatrix {
             xx: self.xx + o.xx,
             xy: self.xy + o.xy,
             xz: self.xz + o.xz,
@@ -85,43 +85,43 @@ impl<T: Real> Symmetric<T> {
 
 /// A body's spatial inertia about the origin of the frame that it is expressed in (Featherstone eq. 2.63).
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Inertia<T> {
+pub(super) struct SpatialInertia<T> {
     /// m, kg.
     pub mass: T,
     /// First moment h = m c, kg m.
     pub first: Vector3<T>,
     /// Rotational inertia about the origin, kg m^2.
-    pub second: Symmetric<T>,
+    pub second: SymmetricMatrix<T>,
 }
 
-impl Inertia<f64> {
-    /// From mass, centre of mass and inertia about it.
-    pub fn new(mass: f64, com: &Vector3<f64>, inertia_com: &Matrix3<f64>) -> Inertia<f64> {
+impl SpatialInertia<f64> {
+    /// Creates it from mass, centre of mass and inertia about the centre of mass.
+    pub fn new(mass: f64, com: &Vector3<f64>, inertia_com: &Matrix3<f64>) -> SpatialInertia<f64> {
         // I_O = I_C + m (c.c 1 - c c^T)
         let m = inertia_com + (Matrix3::identity() * com.norm_squared() - com * com.transpose()) * mass;
-        let second = Symmetric { xx: m.m11, xy: m.m12, xz: m.m13, yy: m.m22, yz: m.m23, zz: m.m33 };
-        Inertia { mass, first: com * mass, second }
+        let second = SymmetricMatrix { xx: m.m11, xy: m.m12, xz: m.m13, yy: m.m22, yz: m.m23, zz: m.m33 };
+        SpatialInertia { mass, first: com * mass, second }
     }
 }
 
-impl<T: Real> Inertia<T> {
+impl<T: Real> SpatialInertia<T> {
     #[inline]
-    pub fn plus(&self, o: &Inertia<T>) -> Inertia<T> {
-        Inertia { mass: self.mass + o.mass, first: self.first + o.first, second: self.second.plus(&o.second) }
+    pub fn plus(&self, o: &SpatialInertia<T>) -> SpatialInertia<T> {
+        SpatialInertia { mass: self.mass + o.mass, first: self.first + o.first, second: self.second.plus(&o.second) }
     }
 
-    /// The same body about an origin that lies at -r: its frame's origin is at `r` in the new one.
+    /// The inertia about a new origin; `r` is the old origin in the new frame.
     #[inline]
-    pub fn moved(&self, r: &Vector3<T>) -> Inertia<T> {
+    pub fn moved(&self, r: &Vector3<T>) -> SpatialInertia<T> {
         // h' = h + m r;  I' = I + 2 (h.r) 1 - h r^T - r h^T + m (r.r 1 - r r^T) = I + ((h + h').r) 1 - h' r^T - r h^T
         let h = &self.first;
         let new = h + r * self.mass;
         let (x, y, z) = ((h.x + new.x) * r.x, (h.y + new.y) * r.y, (h.z + new.z) * r.z);
         let i = &self.second;
-        Inertia {
+        SpatialInertia {
             mass: self.mass,
             first: new,
-            second: Symmetric {
+            second: SymmetricMatrix {
                 xx: i.xx + y + z,
                 xy: i.xy - new.x * r.y - r.x * h.y,
                 xz: i.xz - new.x * r.z - r.x * h.z,
@@ -134,14 +134,14 @@ impl<T: Real> Inertia<T> {
 
     /// Ry I Ry^T.
     #[inline]
-    pub fn turned_y(&self, t: Turn<T>) -> Inertia<T> {
-        let Symmetric { xx, xy, xz, yy, yz, zz } = self.second;
+    pub fn rotated_y(&self, t: AxisRotation<T>) -> SpatialInertia<T> {
+        let SymmetricMatrix { xx, xy, xz, yy, yz, zz } = self.second;
         let (cc, ss, cs) = (t.cos * t.cos, t.sin * t.sin, t.cos * t.sin);
         let twice = (cs + cs) * xz;
-        Inertia {
+        SpatialInertia {
             mass: self.mass,
-            first: t.y(&self.first),
-            second: Symmetric {
+            first: t.rotate_y(&self.first),
+            second: SymmetricMatrix {
                 xx: cc * xx + twice + ss * zz,
                 xy: t.cos * xy + t.sin * yz,
                 xz: cs * (zz - xx) + (cc - ss) * xz,
@@ -154,14 +154,14 @@ impl<T: Real> Inertia<T> {
 
     /// Rx I Rx^T.
     #[inline]
-    pub fn turned_x(&self, t: Turn<T>) -> Inertia<T> {
-        let Symmetric { xx, xy, xz, yy, yz, zz } = self.second;
+    pub fn rotated_x(&self, t: AxisRotation<T>) -> SpatialInertia<T> {
+        let SymmetricMatrix { xx, xy, xz, yy, yz, zz } = self.second;
         let (cc, ss, cs) = (t.cos * t.cos, t.sin * t.sin, t.cos * t.sin);
         let twice = (cs + cs) * yz;
-        Inertia {
+        SpatialInertia {
             mass: self.mass,
-            first: t.x(&self.first),
-            second: Symmetric {
+            first: t.rotate_x(&self.first),
+            second: SymmetricMatrix {
                 xx,
                 xy: t.cos * xy - t.sin * xz,
                 xz: t.sin * xy + t.cos * xz,
@@ -172,10 +172,10 @@ impl<T: Real> Inertia<T> {
         }
     }
 
-    /// I v (eq. 2.63): the momentum of the velocity `v`, or the force that the acceleration `v` takes.
+    /// I v (eq. 2.63): momentum at the velocity `v`, or force for the acceleration `v`.
     #[inline]
-    pub fn times(&self, v: &Motion<T>) -> Force<T> {
-        Force {
+    pub fn times(&self, v: &SpatialMotion<T>) -> SpatialForce<T> {
+        SpatialForce {
             linear: v.linear * self.mass - self.first.cross(&v.angular),
             angular: self.second.times(&v.angular) + self.first.cross(&v.linear),
         }
@@ -183,16 +183,16 @@ impl<T: Real> Inertia<T> {
 
     /// I s for the joint s = [x; 0] about x through the origin.
     #[inline]
-    pub fn times_x(&self) -> Force<T> {
+    pub fn times_x(&self) -> SpatialForce<T> {
         let (h, i) = (&self.first, &self.second);
-        Force { linear: Vector3::new(T::zero(), -h.z, h.y), angular: Vector3::new(i.xx, i.xy, i.xz) }
+        SpatialForce { linear: Vector3::new(T::zero(), -h.z, h.y), angular: Vector3::new(i.xx, i.xy, i.xz) }
     }
 
     /// I s for the joint s = [y; o x y] about y through `o`.
     #[inline]
-    pub fn times_y(&self, o: &Vector3<T>) -> Force<T> {
+    pub fn times_y(&self, o: &Vector3<T>) -> SpatialForce<T> {
         let (m, h, i) = (self.mass, &self.first, &self.second);
-        Force {
+        SpatialForce {
             linear: Vector3::new(h.z - m * o.z, T::zero(), m * o.x - h.x),
             angular: Vector3::new(i.xy + h.y * o.x, i.yy - h.z * o.z - h.x * o.x, i.yz + h.y * o.z),
         }
@@ -201,36 +201,37 @@ impl<T: Real> Inertia<T> {
 
 /// A spatial velocity or acceleration at a frame's origin.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Motion<T> {
-    /// Of the body's point at the origin.
+pub(super) struct SpatialMotion<T> {
+    /// Linear part: of the body's point at the origin.
     pub linear: Vector3<T>,
-    /// About any point.
+    /// Angular part.
     pub angular: Vector3<T>,
 }
 
-/// A spatial force: a force, and its moment about a frame's origin. Also a momentum.
+/// A spatial force (force, and moment about a frame's origin) or momentum.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Force<T> {
-    /// Force.
+pub(super) struct SpatialForce<T> {
+    /// SpatialForce.
     pub linear: Vector3<T>,
     /// Moment about the origin.
     pub angular: Vector3<T>,
 }
 
-impl<T: Real> Motion<T> {
+impl<T: Real> SpatialMotion<T> {
     /// v + s w for the joint about x through the origin, and v x s w (eq. 2.33) at that velocity.
     #[inline]
-    pub fn joined_x(&self, w: T) -> (Motion<T>, Motion<T>) {
+    pub fn across_joint_x(&self, w: T) -> (SpatialMotion<T>, SpatialMotion<T>) {
         let mut v = *self;
         v.angular.x += w;
         let (l, a, o) = (&v.linear, &v.angular, T::zero());
-        let change = Motion { linear: Vector3::new(o, l.z * w, -l.y * w), angular: Vector3::new(o, a.z * w, -a.y * w) };
+        let change =
+            SpatialMotion { linear: Vector3::new(o, l.z * w, -l.y * w), angular: Vector3::new(o, a.z * w, -a.y * w) };
         (v, change)
     }
 
     /// v + s w for the joint about y through `o`, and v x s w at that velocity.
     #[inline]
-    pub fn joined_y(&self, w: T, o: &Vector3<T>) -> (Motion<T>, Motion<T>) {
+    pub fn across_joint_y(&self, w: T, o: &Vector3<T>) -> (SpatialMotion<T>, SpatialMotion<T>) {
         // s w = [y w; (-o_z, 0, o_x) w]
         let (lx, lz) = (-o.z * w, o.x * w);
         let mut v = *self;
@@ -239,40 +240,40 @@ impl<T: Real> Motion<T> {
         v.linear.z += lz;
         let (l, a) = (&v.linear, &v.angular);
         let linear = Vector3::new(a.y * lz - l.z * w, a.z * lx - a.x * lz, l.x * w - a.y * lx);
-        (v, Motion { linear, angular: Vector3::new(-a.z * w, T::zero(), a.x * w) })
+        (v, SpatialMotion { linear, angular: Vector3::new(-a.z * w, T::zero(), a.x * w) })
     }
 
     #[inline]
-    pub fn plus(&self, o: &Motion<T>) -> Motion<T> {
-        Motion { linear: self.linear + o.linear, angular: self.angular + o.angular }
+    pub fn plus(&self, o: &SpatialMotion<T>) -> SpatialMotion<T> {
+        SpatialMotion { linear: self.linear + o.linear, angular: self.angular + o.angular }
     }
 
     /// v x* f (eq. 2.34).
     #[inline]
-    pub fn cross_force(&self, f: &Force<T>) -> Force<T> {
-        Force {
+    pub fn cross_force(&self, f: &SpatialForce<T>) -> SpatialForce<T> {
+        SpatialForce {
             linear: self.angular.cross(&f.linear),
             angular: self.angular.cross(&f.angular) + self.linear.cross(&f.linear),
         }
     }
 }
 
-impl<T: Real> Force<T> {
+impl<T: Real> SpatialForce<T> {
     #[inline]
-    pub fn plus(&self, o: &Force<T>) -> Force<T> {
-        Force { linear: self.linear + o.linear, angular: self.angular + o.angular }
+    pub fn plus(&self, o: &SpatialForce<T>) -> SpatialForce<T> {
+        SpatialForce { linear: self.linear + o.linear, angular: self.angular + o.angular }
     }
 
-    /// s . f for the joint about y through `o`: the torque there.
+    /// s . f for the joint about y through `o`: the joint's torque.
     #[inline]
     pub fn about_y(&self, o: &Vector3<T>) -> T {
         self.angular.y + o.x * self.linear.z - o.z * self.linear.x
     }
 
-    /// The same force in a frame from which this one is turned by `t` about x and displaced by `r`.
+    /// Transforms the force to the parent frame, in which this one is rotated by `t` about x and displaced by `r`.
     #[inline]
-    pub fn out_of(&self, t: Turn<T>, r: &Vector3<T>) -> Force<T> {
-        let linear = t.x(&self.linear);
-        Force { linear, angular: t.x(&self.angular) + r.cross(&linear) }
+    pub fn in_parent(&self, t: AxisRotation<T>, r: &Vector3<T>) -> SpatialForce<T> {
+        let linear = t.rotate_x(&self.linear);
+        SpatialForce { linear, angular: t.rotate_x(&self.angular) + r.cross(&linear) }
     }
 }

@@ -1,4 +1,4 @@
-//! What changes: where the machine is and how it moves.
+//! The state of the simulated robot.
 
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -6,10 +6,10 @@ use crate::robot::{JOINTS, Joints};
 
 /// Position and velocity of every part.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct State {
+pub struct SimState {
     /// Position of the trunk's origin, world, m.
     pub position_world: Vector3<f64>,
-    /// Rotation that takes body axes to world axes.
+    /// Rotation from body axes to world axes.
     pub orientation_world: UnitQuaternion<f64>,
     /// Joint angles, rad.
     pub joint_position: Joints,
@@ -21,9 +21,9 @@ pub struct State {
     pub joint_velocity: Joints,
 }
 
-impl Default for State {
+impl Default for SimState {
     fn default() -> Self {
-        State {
+        SimState {
             position_world: Vector3::zeros(),
             orientation_world: UnitQuaternion::identity(),
             joint_position: [0.0; JOINTS],
@@ -34,7 +34,7 @@ impl Default for State {
     }
 }
 
-impl State {
+impl SimState {
     /// Whether every number is finite.
     pub fn is_finite(&self) -> bool {
         let vectors = [self.position_world, self.velocity_body, self.angular_velocity_body];
@@ -44,8 +44,8 @@ impl State {
     }
 }
 
-/// Rates of change of the velocities: of the trunk's body-frame components (Featherstone's spatial acceleration) and of the
-/// joints.
+/// Rates of change of the velocities: of the trunk's body-frame components (Featherstone's spatial acceleration) and of
+/// the joints.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Acceleration {
     /// d/dt of `velocity_body`'s components, m/s^2.

@@ -1,38 +1,36 @@
-//! One control period, read from the top: drive, free motion, what can touch, impulses, positions.
+//! One control period: motor torques, free motion, contacts, impulses, positions.
 
 use nalgebra::{Matrix3, Vector3};
 
 use super::Simulator;
-use super::collision::{Collider, Moment};
-use super::contact::{Velocity, add_joints};
+use super::collision::Collider;
 use super::dynamics::{Dynamics, add_scaled};
 use super::integrate::{free_velocity, runge_kutta_4, semi_implicit_euler};
-use crate::robot::{JOINTS, JointCommand, PerLeg};
+use super::joint_stop::add_joint_constraints;
+use super::motion::{GeneralizedVelocity, StepContext};
+use crate::robot::{CONTROL_PERIOD_S, JOINTS, JointCommand, PerLeg};
 
-/// One control period, s: a command holds for this long.
-pub const CONTROL_PERIOD_S: f64 = 1e-3;
-
-/// What the ground did during one control period.
+/// Contact with the ground during one control period.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Touched {
-    /// Whether each foot was pressed in the last step.
+pub(super) struct PeriodContacts {
+    /// Whether each foot had a contact force in the last step.
     pub foot: PerLeg<bool>,
     /// Impulse on each foot over the period, world, N s.
     pub foot_impulse_world: PerLeg<Vector3<f64>>,
-    /// Its part out of the ground, N s.
+    /// Normal component of `foot_impulse_world`, out of the ground, N s.
     pub foot_normal_impulse: PerLeg<f64>,
-    /// Whether any other part was pressed.
+    /// Whether any other part had a contact force.
     pub body: bool,
 }
 
 impl Simulator {
     /// Advances by one control period under `command`.
     pub(super) fn control_period(&mut self, command: &JointCommand) {
-        self.touched = Touched::default();
+        self.contacts = PeriodContacts::default();
         let contact_step = CONTROL_PERIOD_S / f64::from(self.config.step.contact_substeps);
         let flight_step = CONTROL_PERIOD_S / f64::from(self.config.step.flight_substeps);
-        // Free flight as long as nothing can touch within a step; from there on, contact steps to the period's end. Where
-        // something touched in the last step, flight is not even tried.
+        // Flight steps while nothing can touch within a step, contact steps for the rest of the period. No flight step
+        // is tried if there was a constraint in the last step.
         let mut flown = 0;
         while self.solver.is_empty()
             && flown < self.config.step.flight_substeps
@@ -48,8 +46,8 @@ impl Simulator {
         self.ticks += 1;
     }
 
-    /// A step of free flight; false, with nothing changed, where something can touch or the motors do not give a constant
-    /// torque.
+    /// Makes a step of free flight. Returns false, and changes nothing, if something can touch in it or the torque
+    /// depends on the velocity.
     fn flight_step(&mut self, command: &JointCommand, h: f64) -> bool {
         let before = self.actuator.clone();
         let drive = self.actuator.drive(command, &self.state.joint_position, &self.state.joint_velocity, h);
@@ -70,10 +68,10 @@ impl Simulator {
         true
     }
 
-    /// A step with whatever touches.
+    /// Makes a step with contacts, joint stops and friction.
     fn contact_step(&mut self, command: &JointCommand, h: f64) {
         let drive = self.actuator.drive(command, &self.state.joint_position, &self.state.joint_velocity, h);
-        // (M + h D) (v' - v) = h (tau - b): damping taken at the end of the step.
+        // (M + h D) (v' - v) = h (tau - b): damping at the velocity of the end of the step.
         let added = std::array::from_fn(|i| self.model.rotor_inertia[i] + h * drive.damping[i]);
         let dynamics = Dynamics::new(&self.model, &self.state, &added);
         let acceleration = dynamics.acceleration(&drive.torque);
@@ -86,7 +84,7 @@ impl Simulator {
             for (leg, change) in velocity.legs.iter_mut().zip(&change.legs) {
                 *leg += change;
             }
-            self.note_touches(&world_from_body, h);
+            self.sum_contacts(&world_from_body, h);
         }
         semi_implicit_euler(&mut self.state, &velocity, h);
     }
@@ -95,20 +93,25 @@ impl Simulator {
         self.state.orientation_world.to_rotation_matrix().into_inner()
     }
 
-    fn find_contacts(&mut self, dynamics: &Dynamics, free: &Velocity, dry_friction: &[f64; JOINTS], h: f64) {
+    fn find_contacts(
+        &mut self,
+        dynamics: &Dynamics,
+        free_velocity: &GeneralizedVelocity,
+        dry_friction: &[f64; JOINTS],
+        h: f64,
+    ) {
         self.solver.start(h);
         let world_from_body = self.world_from_body();
         let (state, terrain, world_from_body) = (&self.state, &self.terrain, &world_from_body);
         let legs = &dynamics.legs();
-        let moment = Moment { dynamics, legs, state, terrain, world_from_body, free, h };
-        self.collider.find(&moment, &mut self.solver);
-        let limits = (&self.limits.min_position, &self.limits.max_position);
-        add_joints(&mut self.solver, &moment, limits, dry_friction);
+        let step = StepContext { dynamics, legs, state, terrain, world_from_body, free_velocity, h };
+        self.collider.find(&step, &mut self.solver);
+        add_joint_constraints(&mut self.solver, &step, &self.limits, dry_friction);
     }
 
-    /// Sums up what was pressed, and pushes loose blocks.
-    fn note_touches(&mut self, world_from_body: &Matrix3<f64>, h: f64) {
-        self.touched.foot = [false; 4];
+    /// Adds up the contact impulses, and pushes loose blocks.
+    fn sum_contacts(&mut self, world_from_body: &Matrix3<f64>, h: f64) {
+        self.contacts.foot = [false; 4];
         let mut pushed = 0u64;
         for contact in self.solver.contacts() {
             let normal = contact.normal_impulse();
@@ -116,13 +119,13 @@ impl Simulator {
                 continue;
             }
             let impulse_world = world_from_body * contact.impulse_body();
-            match Collider::foot_of(contact.memory) {
+            match Collider::foot_of(contact.warm_start_slot) {
                 Some(leg) => {
-                    self.touched.foot[leg as usize] = true;
-                    self.touched.foot_impulse_world[leg as usize] += impulse_world;
-                    self.touched.foot_normal_impulse[leg as usize] += normal;
+                    self.contacts.foot[leg as usize] = true;
+                    self.contacts.foot_impulse_world[leg as usize] += impulse_world;
+                    self.contacts.foot_normal_impulse[leg as usize] += normal;
                 }
-                None => self.touched.body = true,
+                None => self.contacts.body = true,
             }
             if let Some(block) = contact.block {
                 self.terrain.push_block(block, &-impulse_world, h);

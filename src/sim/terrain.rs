@@ -1,47 +1,47 @@
-//! The ground: a plane with, perhaps, upright boxes on it (stairs, blocks).
+//! The ground: a plane, optionally with upright boxes on it (stairs, blocks).
 
 use nalgebra::{Vector2, Vector3};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
 use super::config::{BlocksConfig, TerrainConfig, TerrainKind};
-use super::model::GRAVITY;
+use crate::robot::GRAVITY;
 
-/// Most places at which one sphere touches at a time: a floor and a wall.
-pub(super) const MAX_TOUCHES: usize = 2;
+/// Most contacts of one sphere at a time: a floor and a wall.
+pub(super) const MAX_TERRAIN_CONTACTS: usize = 2;
 
-/// A place where a sphere touches or is about to.
+/// Contact of a sphere with the ground, or one within reach.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Touch {
+pub(super) struct TerrainContact {
     /// Distance between the surfaces, m; negative inside.
     pub gap: f64,
     /// Out of the ground, world.
     pub normal_world: Vector3<f64>,
     /// Coulomb coefficient.
     pub friction: f64,
-    /// Which loose block.
+    /// Index of the loose block.
     pub block: Option<usize>,
 }
 
-/// A step or block on the ground: an upright box.
+/// A step or block on the ground: an upright box, for displays.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TerrainBox {
-    /// Its centre in the world's horizontal plane, m.
+    /// Centre in the world's horizontal plane, m.
     pub center: [f64; 2],
-    /// Half of its two edges, m.
+    /// Half of the two edges, m.
     pub half_edges: [f64; 2],
     /// Direction of the first edge.
     pub axis: [f64; 2],
-    /// Height of its top, m.
+    /// Height of the top, m.
     pub top: f64,
 }
 
-/// An upright box on the ground.
+/// An upright box on the ground, with its velocity.
 #[derive(Debug, Clone, Copy)]
-struct Block {
+struct TerrainBlock {
     center: Vector2<f64>,
     half: Vector2<f64>,
-    /// Direction of its own x in the world.
+    /// Direction of the box's x in the world.
     axis: Vector2<f64>,
     top: f64,
     velocity: Vector2<f64>,
@@ -53,8 +53,8 @@ pub(super) struct Terrain {
     config: TerrainConfig,
     /// Normal of the plane through the world's origin.
     normal: Vector3<f64>,
-    blocks: Vec<Block>,
-    /// No ground is higher above the plane than this, m.
+    blocks: Vec<TerrainBlock>,
+    /// Largest height of the ground above the plane, m.
     highest: f64,
 }
 
@@ -70,7 +70,7 @@ impl Terrain {
         terrain
     }
 
-    /// Lays everything that is random by `seed`; the same seed, the same ground.
+    /// Builds the ground; random parts depend on `seed` alone.
     pub fn reset(&mut self, seed: u64) {
         self.blocks.clear();
         match self.config.kind {
@@ -83,11 +83,11 @@ impl Terrain {
 
     fn build_steps(&mut self) {
         let steps = &self.config.steps;
-        // Each step reaches to the far end, so that the next one stands on it.
+        // Each step extends to the far end, below all later ones.
         let far = 100.0;
         for i in 0..steps.count {
             let start = steps.start_m + f64::from(i) * steps.run_m;
-            self.blocks.push(Block {
+            self.blocks.push(TerrainBlock {
                 center: Vector2::new(start + far / 2.0, 0.0),
                 half: Vector2::new(far / 2.0, far),
                 axis: Vector2::x(),
@@ -107,8 +107,9 @@ impl Terrain {
             let center = Vector2::new(uniform(-reach_m, reach_m), uniform(-reach_m, reach_m));
             let half = Vector2::new(uniform(edge_m[0], edge_m[1]), uniform(edge_m[0], edge_m[1])) / 2.0;
             let (sin, cos) = uniform(0.0, std::f64::consts::PI).sin_cos();
-            let mut block = Block { center, half, axis: Vector2::new(cos, sin), top: 0.0, velocity: Vector2::zeros() };
-            // It lies on the highest of those below it; where that is too high, it is laid elsewhere.
+            let mut block =
+                TerrainBlock { center, half, axis: Vector2::new(cos, sin), top: 0.0, velocity: Vector2::zeros() };
+            // A block lies on the highest one below it; a block that would be too high is drawn again.
             let under = self.blocks.iter().filter(|other| block.overlaps(other)).fold(0.0_f64, |z, b| z.max(b.top));
             block.top = under + thickness_m;
             if block.top < (f64::from(layers) + 0.5) * thickness_m {
@@ -117,16 +118,21 @@ impl Terrain {
         }
     }
 
-    /// Height of a point above the plane, less that of the highest ground: more than `radius` away, nothing can touch.
+    /// Height of a point above the highest ground, m.
     #[inline]
     pub fn clearance(&self, point_world: &Vector3<f64>) -> f64 {
         self.normal.dot(point_world) - self.highest
     }
 
-    /// Where a sphere is nearer than `reach` to the ground: the plane and the nearest box.
-    pub fn touches(&self, center_world: &Vector3<f64>, radius: f64, reach: f64) -> [Option<Touch>; MAX_TOUCHES] {
+    /// Contacts of a sphere within `reach` of the ground: highest floor and nearest wall.
+    pub fn contacts(
+        &self,
+        center_world: &Vector3<f64>,
+        radius: f64,
+        reach: f64,
+    ) -> [Option<TerrainContact>; MAX_TERRAIN_CONTACTS] {
         let height = self.normal.dot(center_world) - radius;
-        let plane = (height < reach).then_some(Touch {
+        let plane = (height < reach).then_some(TerrainContact {
             gap: height,
             normal_world: self.normal,
             friction: self.config.friction,
@@ -135,21 +141,21 @@ impl Terrain {
         if self.blocks.is_empty() || height > self.highest + reach {
             return [plane, None];
         }
-        // The floor under a box is out of reach; of the boxes, the highest top and the nearest wall count.
-        let (mut floor, mut wall): (Option<Touch>, Option<Touch>) = (plane, None);
+        // The top of a box replaces the floor under it; of all boxes the highest top and the nearest wall count.
+        let (mut floor, mut wall): (Option<TerrainContact>, Option<TerrainContact>) = (plane, None);
         for (i, block) in self.blocks.iter().enumerate() {
             let Some((gap, normal_world)) = block.nearest(center_world, radius, reach) else { continue };
             let blocks = &self.config.blocks;
             let is_block = self.config.kind == TerrainKind::Blocks;
-            let touch = Touch {
+            let contact = TerrainContact {
                 gap,
                 normal_world,
                 friction: if is_block { blocks.friction } else { self.config.friction },
                 block: (is_block && blocks.loose).then_some(i),
             };
-            let place = if normal_world.z > 0.999 { &mut floor } else { &mut wall };
-            if place.is_none_or(|other| gap < other.gap) {
-                *place = Some(touch);
+            let slot = if normal_world.z > 0.999 { &mut floor } else { &mut wall };
+            if slot.is_none_or(|other| gap < other.gap) {
+                *slot = Some(contact);
             }
         }
         [floor, wall]
@@ -176,19 +182,20 @@ impl Terrain {
         })
     }
 
-    /// A foot's impulse on loose block `block` (world, N s) in a step of `h` seconds: what of it friction on the floor does not
-    /// take pushes the block.
+    /// Applies a foot's impulse (world, N s) to loose block `block` in a step of `h` seconds, less the friction on the
+    /// floor.
     pub fn push_block(&mut self, block: usize, impulse_world: &Vector3<f64>, h: f64) {
         let BlocksConfig { mass_kg, floor_friction, .. } = self.config.blocks;
         let block = &mut self.blocks[block];
-        // Coulomb again: the floor takes up to mu (m g h + pressing impulse) of the momentum.
+        // Coulomb: the floor takes at most mu (m g h + normal impulse) of the momentum.
         let momentum = block.velocity * mass_kg + impulse_world.xy();
         let most = floor_friction * (mass_kg * GRAVITY * h - impulse_world.z.min(0.0));
         let size = momentum.norm();
         block.velocity = if size <= most { Vector2::zeros() } else { momentum * ((1.0 - most / size) / mass_kg) };
     }
 
-    /// Moves the loose blocks by `h` seconds; those that nobody pushes slow down by friction on the floor.
+    /// Advances the loose blocks by `h` seconds; blocks for which `pushed` is false are slowed by friction on the
+    /// floor.
     pub fn advance(&mut self, pushed: impl Fn(usize) -> bool, h: f64) {
         if !self.config.blocks.loose || self.config.kind != TerrainKind::Blocks {
             return;
@@ -203,8 +210,8 @@ impl Terrain {
     }
 }
 
-impl Block {
-    /// From the world's horizontal plane to its own axes.
+impl TerrainBlock {
+    /// Rotates a vector from the world's horizontal plane to the box's axes.
     #[inline]
     fn local(&self, v: Vector2<f64>) -> Vector2<f64> {
         Vector2::new(self.axis.dot(&v), self.axis.x * v.y - self.axis.y * v.x)
@@ -215,9 +222,9 @@ impl Block {
         Vector2::new(self.axis.x * v.x - self.axis.y * v.y, self.axis.y * v.x + self.axis.x * v.y)
     }
 
-    /// Whether two blocks' outlines overlap (separating axes).
-    fn overlaps(&self, other: &Block) -> bool {
-        let separated = |a: &Block, b: &Block| {
+    /// Whether the outlines of two blocks overlap (separating axes).
+    fn overlaps(&self, other: &TerrainBlock) -> bool {
+        let separated = |a: &TerrainBlock, b: &TerrainBlock| {
             let center = a.local(b.center - a.center);
             let axis = a.local(b.axis);
             let reach = Vector2::new(
@@ -229,7 +236,7 @@ impl Block {
         !separated(self, other) && !separated(other, self)
     }
 
-    /// Gap and normal between a sphere and this box, where nearer than `reach`.
+    /// Gap and normal between a sphere and this box, if nearer than `reach`.
     fn nearest(&self, center: &Vector3<f64>, radius: f64, reach: f64) -> Option<(f64, Vector3<f64>)> {
         let p = self.local(center.xy() - self.center);
         let outside = Vector2::new(p.x.abs() - self.half.x, p.y.abs() - self.half.y);
@@ -245,7 +252,7 @@ impl Block {
         let out_x = sideways(Vector2::new(1.0_f64.copysign(p.x), 0.0));
         let out_y = sideways(Vector2::new(0.0, 1.0_f64.copysign(p.y)));
         if outside.x <= 0.0 && outside.y <= 0.0 && above <= 0.0 {
-            // The centre is inside: out by the nearest face.
+            // The centre is inside: the normal of the nearest face.
             let nearest = above.max(outside.x).max(outside.y);
             let normal = match nearest {
                 n if n == above => Vector3::z(),
@@ -260,7 +267,7 @@ impl Block {
     }
 }
 
-/// A number in [0, 1) with 53 random bits.
-fn unit_interval(random: &mut ChaCha8Rng) -> f64 {
+/// Returns a uniform number in [0, 1) with 53 random bits.
+pub(super) fn unit_interval(random: &mut ChaCha8Rng) -> f64 {
     (random.next_u64() >> 11) as f64 / (1u64 << 53) as f64
 }

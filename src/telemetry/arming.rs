@@ -1,49 +1,62 @@
-//! The pre-arm list: what must hold before a robot is energised. Names and findings; who looks is `control::arming` for
-//! what a tick can know and `session::arming_checklist` for the rest.
+//! Arming checks: names and findings. `control::arming` makes those of the control thread, `session::arming_checklist` the others.
 
 use serde::{Deserialize, Serialize};
+use strum::{IntoStaticStr, VariantArray};
 
-/// One item of the list.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+/// An arming check: a condition that must hold before the robot is energised. The order is the number in recordings.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, IntoStaticStr, VariantArray)]
+#[strum(serialize_all = "lowercase")]
 pub enum ArmingCheck {
-    /// The robot's newest state is new.
+    /// The robot's newest state is recent.
+    #[strum(serialize = "state fresh")]
     StateFresh,
     /// Few states are lost on the way.
+    #[strum(serialize = "packet loss")]
     Loss,
-    /// No state arrives corrupt.
+    /// No state arrives with a wrong checksum.
     Checksums,
     /// The trunk is level.
     Upright,
     /// Every joint is inside its limits.
+    #[strum(serialize = "joints inside limits")]
     JointsInside,
-    /// The joints are near the pose of lying folded, from which standing up begins.
+    /// The joints are near the folded pose, where the stand-up ramp begins.
+    #[strum(serialize = "lying down")]
     LyingDown,
-    /// There is charge enough for a series of jumps.
+    /// The charge suffices for a series of jumps.
     Battery,
     /// No motor is hot.
+    #[strum(serialize = "motors cool")]
     MotorsCool,
-    /// The robot does not move: its gyroscope's bias can be trusted.
+    /// The robot lies still: the gyroscope's bias can be trusted.
+    #[strum(serialize = "gyro still")]
     GyroStill,
     /// Ticks begin on time.
+    #[strum(serialize = "loop on time")]
     OnTime,
-    /// Everything is recorded.
+    /// Every tick is recorded.
     Recorder,
-    /// There is room for the recording.
+    /// The disk has space for the recording.
+    #[strum(serialize = "disk space")]
     Disk,
-    /// The operator's word: the robot is in low-level mode and was damped with the remote before.
+    /// Confirmed by the operator: the robot is in low-level mode and was damped with the remote before.
+    #[strum(serialize = "low-level mode, damped")]
     LowLevel,
-    /// The operator's word: this is the configuration that is meant.
+    /// Confirmed by the operator: the configuration is the intended one.
     Configuration,
-    /// The operator's word: nobody is near the robot, and the remote is in hand.
+    /// Confirmed by the operator: no person is near the robot, and the remote is in hand.
+    #[strum(serialize = "area clear, remote in hand")]
     AreaClear,
     /// The STOP key was pressed and acknowledged once in this session.
+    #[strum(serialize = "STOP tested")]
     StopTested,
-    /// Every motor reports servo mode: all of them will do what they are told, or none is told.
+    /// Every motor reports servo mode, so that all of them follow commands.
+    #[strum(serialize = "motors follow")]
     MotorsFollow,
 }
 
 impl ArmingCheck {
-    /// The checks that the control thread makes, in the order of the list.
+    /// The checks of the control thread, in the order of the list.
     pub const CONTROL: [ArmingCheck; 11] = [
         ArmingCheck::StateFresh,
         ArmingCheck::Loss,
@@ -58,103 +71,63 @@ impl ArmingCheck {
         ArmingCheck::OnTime,
     ];
 
-    /// All checks, in the order of their numbers in a recording.
-    pub const ALL: [ArmingCheck; 17] = [
-        ArmingCheck::StateFresh,
-        ArmingCheck::Loss,
-        ArmingCheck::Checksums,
-        ArmingCheck::Upright,
-        ArmingCheck::JointsInside,
-        ArmingCheck::LyingDown,
-        ArmingCheck::Battery,
-        ArmingCheck::MotorsCool,
-        ArmingCheck::GyroStill,
-        ArmingCheck::OnTime,
-        ArmingCheck::Recorder,
-        ArmingCheck::Disk,
-        ArmingCheck::LowLevel,
-        ArmingCheck::Configuration,
-        ArmingCheck::AreaClear,
-        ArmingCheck::StopTested,
-        ArmingCheck::MotorsFollow,
-    ];
+    /// All values in order.
+    pub const ALL: &'static [ArmingCheck] = Self::VARIANTS;
 
-    /// The words that the operator sees and that files hold.
-    pub const fn name(self) -> &'static str {
-        match self {
-            ArmingCheck::StateFresh => "state fresh",
-            ArmingCheck::Loss => "packet loss",
-            ArmingCheck::Checksums => "checksums",
-            ArmingCheck::Upright => "upright",
-            ArmingCheck::JointsInside => "joints inside limits",
-            ArmingCheck::LyingDown => "lying down",
-            ArmingCheck::Battery => "battery",
-            ArmingCheck::MotorsCool => "motors cool",
-            ArmingCheck::GyroStill => "gyro still",
-            ArmingCheck::OnTime => "loop on time",
-            ArmingCheck::Recorder => "recorder",
-            ArmingCheck::Disk => "disk space",
-            ArmingCheck::LowLevel => "low-level mode, damped",
-            ArmingCheck::Configuration => "configuration",
-            ArmingCheck::AreaClear => "area clear, remote in hand",
-            ArmingCheck::StopTested => "STOP tested",
-            ArmingCheck::MotorsFollow => "motors follow",
-        }
+    /// Name on the screen and in files.
+    pub fn name(self) -> &'static str {
+        self.into()
     }
 
-    /// Whether a simulated robot needs it too: it hurts nobody, and is carried to its mark in whatever pose it lies.
+    /// Whether the simulator needs the check too: a simulated robot is harmless, and is placed whatever its pose.
     pub const fn needed_in_simulation(self) -> bool {
         matches!(self, ArmingCheck::StateFresh | ArmingCheck::Recorder | ArmingCheck::Disk)
     }
 }
 
-/// How a check stands.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+/// State of an arming check. The order is the number in recordings.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, IntoStaticStr, VariantArray)]
+#[strum(serialize_all = "lowercase")]
 pub enum ArmingCheckState {
-    /// It holds.
+    /// The condition holds.
     Passed,
-    /// It does not hold.
+    /// The condition does not hold.
     #[default]
     Failed,
-    /// It waits for the operator's word, or for the operator to test STOP.
+    /// Waits for the operator's confirmation, or for the test of STOP.
     Waiting,
     /// The simulator does not need it.
+    #[strum(serialize = "not needed")]
     NotNeeded,
 }
 
 impl ArmingCheckState {
-    /// All states.
-    pub const ALL: [ArmingCheckState; 4] =
-        [ArmingCheckState::Passed, ArmingCheckState::Failed, ArmingCheckState::Waiting, ArmingCheckState::NotNeeded];
+    /// All values in order.
+    pub const ALL: &'static [ArmingCheckState] = Self::VARIANTS;
 
-    /// The words that the operator sees and that files hold.
-    pub const fn name(self) -> &'static str {
-        match self {
-            ArmingCheckState::Passed => "passed",
-            ArmingCheckState::Failed => "failed",
-            ArmingCheckState::Waiting => "waiting",
-            ArmingCheckState::NotNeeded => "not needed",
-        }
+    /// Name on the screen and in files.
+    pub fn name(self) -> &'static str {
+        self.into()
     }
 
-    /// Whether the robot may be armed as far as this check goes.
+    /// Whether the check permits arming.
     pub const fn allows(self) -> bool {
         matches!(self, ArmingCheckState::Passed | ArmingCheckState::NotNeeded)
     }
 }
 
-/// What one check of the control thread found; in the check's own unit.
+/// Finding of one check of the control thread, in the check's unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ArmingFinding {
     /// The check.
     pub check: ArmingCheck,
-    /// How it stands.
+    /// Its state.
     pub state: ArmingCheckState,
-    /// What was measured; not finite where nothing is known.
+    /// Measured value; not finite where it is not known.
     pub measured: f64,
-    /// What is allowed at most, or for the battery at least.
+    /// Limit: the largest value, for the battery the smallest.
     pub allowed: f64,
-    /// The joint that it is about, 0..12; none where it is about the whole robot.
+    /// Index of the joint, 0..12; none for a finding about the whole robot.
     pub joint: Option<u8>,
 }
 
@@ -176,19 +149,19 @@ impl ArmingCheckSet {
         self.0 &= !(1 << check as u32);
     }
 
-    /// Whether `check` is in it.
+    /// Whether the set holds `check`.
     pub fn contains(self, check: ArmingCheck) -> bool {
         self.0 & (1 << check as u32) != 0
     }
 
-    /// Whether there is none.
+    /// Whether the set is empty.
     pub fn is_empty(self) -> bool {
         self.0 == 0
     }
 
-    /// The checks in the order of their numbers.
+    /// The checks in the order of their numbers in recordings.
     pub fn iter(self) -> impl Iterator<Item = ArmingCheck> {
-        ArmingCheck::ALL.into_iter().filter(move |check| self.contains(*check))
+        ArmingCheck::ALL.iter().copied().filter(move |check| self.contains(*check))
     }
 }
 
@@ -201,12 +174,12 @@ impl std::fmt::Display for ArmingCheckSet {
     }
 }
 
-/// What the control thread found last, in the order of [`ArmingCheck::CONTROL`].
+/// Latest findings of the control thread, in the order of [`ArmingCheck::CONTROL`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ArmingFindings(pub [ArmingFinding; ArmingCheck::CONTROL.len()]);
 
 impl Default for ArmingFindings {
-    /// Nothing is known yet, so nothing has passed.
+    /// Nothing measured yet: every check fails.
     fn default() -> ArmingFindings {
         ArmingFindings(ArmingCheck::CONTROL.map(|check| ArmingFinding {
             check,
@@ -228,7 +201,7 @@ impl ArmingFindings {
         failing
     }
 
-    /// What was found of `check`; none if it is not the control thread's.
+    /// The finding of `check`; none for a check of the session.
     pub fn get(&self, check: ArmingCheck) -> Option<&ArmingFinding> {
         self.0.iter().find(|finding| finding.check == check)
     }

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use crate::trial::{Gains, JumpParameters, Task};
 
-/// Everything that a trial runs with; latched when the trial starts.
+/// Settings of one trial; latched when the trial starts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TrialSpec {
     /// Number of the trial in its study.
@@ -23,27 +23,27 @@ pub struct TrialSpec {
     pub attitude_rate_gain: f64,
     /// Time of the foot placement, s.
     pub foot_placement_s: f64,
-    /// How many jumps in a row make the trial; 1 for a single jump.
+    /// Jumps in a row; 1 for a single jump.
     pub jumps: u32,
-    /// Seed of everything random in the trial, for a simulator.
+    /// Seed of the simulator's random numbers.
     pub seed: u64,
 }
 
-/// What makes a key press that energises good once, now: it dies with any change of mode, and of age.
+/// Permit of one key press that energises; void after any change of mode, and after a time limit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Permit {
-    /// How often the mode had changed, as far as the session had heard when it was given.
+    /// Changes of mode that the session had received at the key press.
     pub mode_changes: u64,
-    /// When the operator gave it, ns since the engine started.
+    /// Time of the key press, ns since the engine started.
     pub given_ns: u64,
 }
 
-/// What the session asks of the control thread. STOP does not travel here: it has its own latch.
+/// A command of the session to the control thread. STOP has a latch of its own.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Command {
-    /// The operator takes control of a robot that was only observed: damping is sent from now on.
+    /// Take control of an observed robot: damping is sent from now on.
     TakeControl,
-    /// Nothing is sent any more: back to observing.
+    /// Stop sending: back to OBSERVE.
     Release,
     /// Energise: checks, then stand up.
     Arm(Permit),
@@ -53,13 +53,29 @@ pub enum Command {
     RunTrial(TrialSpec, Permit),
     /// Cancel a countdown.
     Cancel,
-    /// The verdict is given: the review is over.
+    /// End the review: the verdict is given.
     EndReview,
-    /// Nobody is there any more: land, sit down, and never energise again. It holds until the thread ends.
+    /// The session ends: land, sit down, and never energise again.
     Leave,
-    /// A damped or faulted robot has been looked at: back to disarmed.
+    /// Acknowledge DAMPED or FAULT: back to DISARMED.
     Acknowledge {
-        /// How often STOP had been pressed by then; a later STOP outlives this.
+        /// Count of STOPs that are acknowledged; a later STOP stays set.
         stops: u64,
     },
+}
+
+impl std::fmt::Display for Command {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Command::TakeControl => f.write_str("to take control"),
+            Command::Release => f.write_str("to release the robot"),
+            Command::Arm(_) => f.write_str("to stand up"),
+            Command::Leave => f.write_str("to end the session"),
+            Command::SitDown => f.write_str("to sit down"),
+            Command::RunTrial(spec, _) => write!(f, "trial {}", spec.trial),
+            Command::Cancel => f.write_str("to cancel"),
+            Command::EndReview => f.write_str("to end the review"),
+            Command::Acknowledge { .. } => f.write_str("the acknowledgement"),
+        }
+    }
 }

@@ -1,15 +1,15 @@
-//! Events from the control thread to the session, and the state of its arming checks.
+//! Events from the control thread to the session, and its readiness for arming and trials.
 
 use super::{
     ArmingCheckSet, ArmingFindings, Command, FailsafeWarning, FallCause, Fault, Mode, TransitionCause, TrialInhibit,
 };
 
-/// How a trial ended.
+/// End of a trial.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum TrialEnd {
     /// Feet down and quiet.
     Settled,
-    /// The cap ran out before it was quiet.
+    /// Not quiet within the longest settling time.
     NotQuiet,
     /// It fell.
     Fell(FallCause),
@@ -21,7 +21,7 @@ pub enum TrialEnd {
     Fault(Fault),
 }
 
-/// What the control thread tells the session.
+/// An event of the control thread.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Event {
     /// The mode changed.
@@ -30,61 +30,64 @@ pub enum Event {
         from: Mode,
         /// To this one.
         to: Mode,
-        /// Why.
+        /// Cause.
         cause: TransitionCause,
-        /// When, ns since the engine started.
+        /// Time, ns since the engine started.
         time_ns: u64,
     },
     /// A trial is over; its ticks can be measured.
     TrialEnded {
         /// Its number.
         trial: u32,
-        /// Ticks that carry it, this one the last: who has fewer does not know the whole trial.
+        /// Number of ticks of the trial, this one the last; a receiver with fewer has lost some.
         ticks: u64,
-        /// How it ended.
+        /// Its end.
         end: TrialEnd,
     },
-    /// A command was not carried out.
+    /// A command was refused.
     Refused {
         /// The command.
         command: Command,
-        /// The mode at that moment.
+        /// The mode at the refusal.
         mode: Mode,
-        /// Why.
+        /// Reason.
         because: CommandRefusal,
     },
 }
 
-/// Why the control thread does not carry out a command.
+/// Reason to refuse a command.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum CommandRefusal {
-    /// The present mode forbids it.
+    /// STOP is set.
+    #[error("STOP is set; acknowledge it first")]
+    Stopped,
+    /// The mode forbids the command.
     #[error("not in this mode")]
     Mode,
-    /// Checks of the pre-arm list fail.
-    #[error("these checks fail: {0}")]
+    /// Arming checks fail.
+    #[error("these arming checks fail: {0}")]
     Checks(ArmingCheckSet),
-    /// What tripped is still so: acknowledging it would change nothing.
-    #[error("it is still so: {0}")]
+    /// The cause of the fault persists: an acknowledgement would change nothing.
+    #[error("the cause persists: {0}")]
     Standing(Fault),
-    /// A trial must not begin.
+    /// The next trial is inhibited.
     #[error("{0}")]
     Inhibited(TrialInhibit),
     /// The mode changed between the key press and the command.
-    #[error("the robot's mode changed after the key press; look again, and press again")]
+    #[error("the robot's mode changed after the key press; check the mode and press again")]
     Stale,
     /// The key press is too old.
-    #[error("the key press is {age_s:.0} s old, allowed {allowed_s:.0}; look again, and press again")]
+    #[error("the key press is {age_s:.0} s old, limit {allowed_s:.0} s; check the robot and press again")]
     Expired {
         /// Its age, s.
         age_s: f64,
         /// Allowed, s.
         allowed_s: f64,
     },
-    /// Nobody is known to watch: nothing begins to move.
-    #[error("{}", if *.silent_ms == u32::MAX { "the operator's screen was never heard; wait until it is".to_owned() } else { format!("the operator's screen has been silent for {silent_ms} ms, allowed {allowed_ms}; look at its connection") })]
+    /// No heartbeat of the operator's screen.
+    #[error("{}", if *.silent_ms == u32::MAX { "no heartbeat of the operator's screen yet; wait for the first".to_owned() } else { format!("no heartbeat of the operator's screen for {silent_ms} ms, limit {allowed_ms} ms; check its connection") })]
     OperatorSilent {
-        /// Silence, ms; `u32::MAX` for a screen that was never heard.
+        /// Time since the last heartbeat, ms; `u32::MAX` before the first.
         silent_ms: u32,
         /// Allowed, ms.
         allowed_ms: u32,
@@ -94,13 +97,13 @@ pub enum CommandRefusal {
     Leaving,
 }
 
-/// What the control thread thinks of the next arming and the next trial.
+/// Conditions of the next arming and the next trial.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Readiness {
-    /// How its checks of the pre-arm list stood when the robot was disarmed last.
+    /// Arming findings of the last tick in DISARMED.
     pub findings: ArmingFindings,
-    /// What forbids the next trial.
-    pub hold: Option<TrialInhibit>,
-    /// The newest caution of the last second.
-    pub caution: Option<FailsafeWarning>,
+    /// Reason to refuse the next trial.
+    pub inhibit: Option<TrialInhibit>,
+    /// The newest warning of the last second.
+    pub warning: Option<FailsafeWarning>,
 }

@@ -1,4 +1,4 @@
-//! Everything that crosses the real-time boundary. All types are `Copy`: nothing is freed inside a tick.
+//! Everything that crosses the real-time boundary. All types are `Copy`: nothing is allocated or freed inside a tick.
 
 mod arming;
 mod command;

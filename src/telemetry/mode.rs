@@ -1,17 +1,23 @@
 //! Mode of the machine, phase of a jump and cause of a change of mode.
 
+use strum::{IntoStaticStr, VariantArray};
+
 use super::{FallCause, Fault};
 
-/// What the machine is doing as a whole. One function, `control::mode::next`, owns the changes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
+/// Mode of the machine; `control::mode::next` is the only function that changes it. The order is the number in recordings.
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize, IntoStaticStr, VariantArray,
+)]
+#[strum(serialize_all = "UPPERCASE")]
 pub enum Mode {
     /// No state from the robot; nothing is sent.
     Offline,
-    /// The robot is heard; nothing is sent.
+    /// States arrive; nothing is sent.
     Observe,
     /// Damping is sent; the robot lies or is held.
     Disarmed,
     /// Timed ramp from the measured pose to the stance.
+    #[strum(serialize = "STAND UP")]
     StandUp,
     /// Standing in impedance control, waiting for an approved trial.
     Ready,
@@ -21,9 +27,10 @@ pub enum Mode {
     Jump,
     /// Feet down, waiting until the robot is quiet.
     Settle,
-    /// The trial is measured; the operator judges.
+    /// The trial is measured; the operator gives the verdict.
     Review,
     /// Timed ramp down to lying.
+    #[strum(serialize = "SIT DOWN")]
     SitDown,
     /// Stopped: damping, until acknowledged.
     Damped,
@@ -32,46 +39,15 @@ pub enum Mode {
 }
 
 impl Mode {
-    /// All modes.
-    pub const ALL: [Mode; 12] = [
-        Mode::Offline,
-        Mode::Observe,
-        Mode::Disarmed,
-        Mode::StandUp,
-        Mode::Ready,
-        Mode::Countdown,
-        Mode::Jump,
-        Mode::Settle,
-        Mode::Review,
-        Mode::SitDown,
-        Mode::Damped,
-        Mode::Fault,
-    ];
+    /// All values in order.
+    pub const ALL: &'static [Mode] = Self::VARIANTS;
 
-    /// The word that the operator sees and that files hold.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Mode::Offline => "OFFLINE",
-            Mode::Observe => "OBSERVE",
-            Mode::Disarmed => "DISARMED",
-            Mode::StandUp => "STAND UP",
-            Mode::Ready => "READY",
-            Mode::Countdown => "COUNTDOWN",
-            Mode::Jump => "JUMP",
-            Mode::Settle => "SETTLE",
-            Mode::Review => "REVIEW",
-            Mode::SitDown => "SIT DOWN",
-            Mode::Damped => "DAMPED",
-            Mode::Fault => "FAULT",
-        }
+    /// Name on the screen and in files.
+    pub fn name(self) -> &'static str {
+        self.into()
     }
 
-    /// The mode of that name.
-    pub fn from_name(name: &str) -> Option<Mode> {
-        Mode::ALL.into_iter().find(|mode| mode.name() == name)
-    }
-
-    /// Whether the robot is sent commands in this mode, be it damping alone.
+    /// Whether the robot is sent commands in this mode, at least damping.
     pub const fn commanded(self) -> bool {
         !matches!(self, Mode::Offline | Mode::Observe)
     }
@@ -85,10 +61,11 @@ impl Mode {
     }
 }
 
-/// Where in a jump the robot is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+/// Phase of a jump. The order is the number in recordings.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, IntoStaticStr, VariantArray)]
+#[strum(serialize_all = "lowercase")]
 pub enum Phase {
-    /// On its feet, no profile.
+    /// Feet on the ground, no force profile.
     Stance,
     /// The oscillator is between pi and 2 pi: the force profile acts.
     Impulse,
@@ -99,41 +76,31 @@ pub enum Phase {
 }
 
 impl Phase {
-    /// All phases.
-    pub const ALL: [Phase; 4] = [Phase::Stance, Phase::Impulse, Phase::Flight, Phase::Landing];
+    /// All values in order.
+    pub const ALL: &'static [Phase] = Self::VARIANTS;
 
-    /// The word that the operator sees and that files hold.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Phase::Stance => "stance",
-            Phase::Impulse => "impulse",
-            Phase::Flight => "flight",
-            Phase::Landing => "landing",
-        }
-    }
-
-    /// The phase of that name.
-    pub fn from_name(name: &str) -> Option<Phase> {
-        Phase::ALL.into_iter().find(|phase| phase.name() == name)
+    /// Name on the screen and in files.
+    pub fn name(self) -> &'static str {
+        self.into()
     }
 }
 
-/// Why the mode changed.
+/// Cause of a change of mode.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum TransitionCause {
     /// The operator's STOP.
     Stop,
     /// A command of the session.
     Command,
-    /// The course of things: a ramp or a phase is over.
+    /// A ramp or a phase of the trial is over.
     Course,
-    /// The robot began to answer.
+    /// The first state arrived.
     Connected,
     /// The robot fell.
     Fell(FallCause),
-    /// A limit or a watchdog.
+    /// A failsafe or the last gate.
     Fault(Fault),
-    /// The robot stood waiting for too long.
+    /// The robot waited for too long in READY or REVIEW.
     Idle {
         /// Allowed, s.
         allowed_s: f64,
@@ -148,9 +115,9 @@ impl std::fmt::Display for TransitionCause {
             TransitionCause::Course => write!(f, "done"),
             TransitionCause::Connected => write!(f, "the robot answers"),
             TransitionCause::Fell(cause) => write!(f, "fell: {cause}"),
-            TransitionCause::Fault(fault) => write!(f, "fault: {fault}"),
+            TransitionCause::Fault(fault) => write!(f, "{fault}"),
             TransitionCause::Idle { allowed_s } => {
-                write!(f, "idle: nobody approved or judged anything for {allowed_s:.0} s")
+                write!(f, "idle: no approval or verdict for {allowed_s:.0} s")
             }
         }
     }

@@ -5,7 +5,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 use super::{Mode, Phase};
 use crate::robot::{JointCommand, Joints, LEGS, LinkStatus, PerLeg, RobotState};
 
-/// What the controller believes about the base and the feet.
+/// Estimate of the base and the feet.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimate {
     /// Position of the trunk's origin, world, m.
@@ -38,20 +38,20 @@ impl Default for Estimate {
     }
 }
 
-/// How long the stages of a tick took, ns.
+/// Durations of the stages of a tick, ns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct StageTimes {
     /// From the planned start of the tick to its real start.
     pub lateness_ns: u32,
     /// Reading the robot.
     pub read_ns: u32,
-    /// Estimating, watching, deciding and limiting.
+    /// Estimate, failsafes, command, decision and limits.
     pub decide_ns: u32,
     /// Writing the command (for the simulator: its physics).
     pub write_ns: u32,
 }
 
-/// Everything that was known and done in one control tick.
+/// Record of one control tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tick {
     /// Count of ticks since the engine started.
@@ -68,11 +68,11 @@ pub struct Tick {
     pub trial_time_s: f64,
     /// Phase of the oscillator, rad.
     pub theta_rad: f64,
-    /// What the robot reported.
+    /// State that the robot reported.
     pub state: RobotState,
-    /// What the controller made of it.
+    /// Estimate from that state.
     pub estimate: Estimate,
-    /// Joint torques that the controller asked for, before the limits, N m.
+    /// Joint torques of the controller before the limits, N m.
     pub torque_demanded: Joints,
     /// The command as sent, after the limits.
     pub command: JointCommand,
@@ -102,18 +102,18 @@ impl Default for Tick {
     }
 }
 
-/// What is counted since the engine started, so that no loss passes silently.
+/// Counters since the engine started.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Counters {
     /// Ticks that started more than half a period late.
     pub late_ticks: u64,
     /// Largest lateness of a tick, ns.
     pub worst_lateness_ns: u64,
-    /// Ticks that the recorder's ring could not take.
+    /// Ticks lost because the recorder's ring was full.
     pub ticks_not_recorded: u64,
-    /// Ticks that the screen's ring could not take.
+    /// Ticks lost because the screen's ring was full.
     pub ticks_not_shown: u64,
-    /// Commands refused because they were not legal.
+    /// Refused commands.
     pub commands_refused: u64,
     /// Age of the robot's newest valid state, ms.
     pub state_age_ms: u32,
@@ -121,11 +121,11 @@ pub struct Counters {
     pub link: Option<LinkStatus>,
 }
 
-/// The newest tick and the counters: what a screen draws from.
+/// The newest tick and the counters, for the screen.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Snapshot {
     /// The newest tick.
     pub tick: Tick,
-    /// What was counted so far.
+    /// Counters up to that tick.
     pub counters: Counters,
 }

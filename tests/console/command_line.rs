@@ -1,4 +1,4 @@
-//! The command line as a user has it: whole runs of the program, its output, its exit status.
+//! The command line: output and exit status of complete runs of the program.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -18,7 +18,7 @@ fn run(folder: &Path, arguments: &[&str]) -> Output {
     quadfrog(folder).args(arguments).output().unwrap()
 }
 
-/// The message of a run that must be refused with status 2.
+/// The message of a run that must end with status 2.
 fn refused(folder: &Path, arguments: &[&str]) -> String {
     let output = run(folder, arguments);
     let message = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -92,10 +92,9 @@ fn the_same_seed_prints_the_same_bytes_on_any_number_of_threads() {
     assert_eq!(one, sorted("2"));
 }
 
-/// Killed in the middle with SIGKILL, then continued: nothing that was judged is lost, and the trials are those of the
-/// unbroken run.
+/// Killed with SIGKILL, then continued: no judged trial is lost, and the trials are those of an uninterrupted run.
 #[test]
-fn a_study_killed_in_the_middle_is_continued_as_if_nothing_had_happened() {
+fn a_killed_study_continues_as_if_it_had_not_been_interrupted() {
     let folder = tempfile::tempdir().unwrap();
     const TRIALS: &str = "16";
     let whole = run(folder.path(), &["optimize", "--trials", TRIALS, "--seed", "5", "--json", "--output", "whole"]);
@@ -104,7 +103,7 @@ fn a_study_killed_in_the_middle_is_continued_as_if_nothing_had_happened() {
 
     let mut printed = Vec::new();
     let mut resumed = None;
-    // Killed after the third and after the twelfth trial: in the random and in the model's part.
+    // Killed after trials 3 and 12: while the sampler draws at random, and while it uses its model.
     for after in [3, 12] {
         let mut command = quadfrog(folder.path());
         command.args(["optimize", "--trials", TRIALS, "--json"]);
@@ -133,7 +132,7 @@ fn a_study_killed_in_the_middle_is_continued_as_if_nothing_had_happened() {
     let rest = run(folder.path(), &["optimize", "--trials", TRIALS, "--json", "--resume", study.to_str().unwrap()]);
     assert_eq!(rest.status.code(), Some(0), "{}", String::from_utf8_lossy(&rest.stderr));
 
-    // What counts, in order: a trial that was killed before its verdict came again under another number.
+    // Counted trials in order: a trial killed before its verdict was repeated under another number.
     let counted = |trials: &[Value]| -> Vec<(Value, Value, Value)> {
         trials.iter().map(|t| (t["params"].clone(), t["value"].clone(), t["verdict"].clone())).collect()
     };
@@ -147,7 +146,7 @@ fn a_study_killed_in_the_middle_is_continued_as_if_nothing_had_happened() {
     }
 }
 
-/// The complete trials of a journal, by number: read as the format says, without this project's reader.
+/// The complete trials of a journal by number, parsed without the project's reader.
 fn journal_trials(path: &Path) -> BTreeMap<u64, Value> {
     let mut trials: BTreeMap<u64, Value> = BTreeMap::new();
     let mut created = 0;
@@ -174,7 +173,7 @@ fn journal_trials(path: &Path) -> BTreeMap<u64, Value> {
 }
 
 #[test]
-fn bad_input_is_refused_with_file_key_value_and_nothing_is_made() {
+fn bad_input_is_refused_with_file_key_and_value_and_no_study_is_made() {
     let folder = tempfile::tempdir().unwrap();
     let config = folder.path().join("mine");
     fs::create_dir(&config).unwrap();
@@ -202,7 +201,7 @@ fn bad_input_is_refused_with_file_key_value_and_nothing_is_made() {
 
     let message = refused(folder.path(), &["optimize", "--config", "elsewhere"]);
     assert!(message.contains("elsewhere"), "{message}");
-    // (A defect once: what stood before the subcommand was the console's, and was left out without a word.)
+    // Regression: options before the subcommand were silently ignored.
     let message = refused(folder.path(), &["--config", "mine", "optimize"]);
     assert!(message.contains("--config") && message.contains("optimize"), "{message}");
     let message = refused(folder.path(), &["optimize", "--model", "spot"]);
@@ -224,7 +223,7 @@ fn a_urdf_without_a_foot_is_refused() {
     let ours = Path::new(env!("CARGO_MANIFEST_DIR")).join("../robots/go1");
     fs::copy(ours.join("robot.toml"), model.join("robot.toml")).unwrap();
     let urdf = fs::read_to_string(ours.join("go1.urdf")).unwrap();
-    // The link and joint of one foot are cut out.
+    // Removes link and joint of one foot.
     let cut = |text: &str, start: &str, end: &str| match text.find(start) {
         Some(from) => {
             let to = text[from..].find(end).unwrap() + from + end.len();
@@ -242,7 +241,7 @@ fn a_urdf_without_a_foot_is_refused() {
 }
 
 #[test]
-fn a_recording_that_is_none_or_is_cut_is_refused_or_played_with_a_word() {
+fn a_file_that_is_no_recording_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("noise.mcap"), b"this is no recording").unwrap();
     let message = refused(folder.path(), &["replay", "noise.mcap"]);
@@ -255,7 +254,7 @@ fn a_recording_that_is_none_or_is_cut_is_refused_or_played_with_a_word() {
 }
 
 #[test]
-fn a_recording_cut_short_is_named_and_can_be_made_whole() {
+fn an_incomplete_recording_is_reported_and_can_be_repaired() {
     let folder = tempfile::tempdir().unwrap();
     let output = run(folder.path(), &["optimize", "--trials", "1", "--record", "all"]);
     assert_eq!(output.status.code(), Some(0));
@@ -266,17 +265,17 @@ fn a_recording_cut_short_is_named_and_can_be_made_whole() {
     let message = refused(folder.path(), &["replay", "cut.mcap"]);
     assert!(message.contains("cut.mcap") && message.contains("quadfrog recover cut.mcap"), "{message}");
     let output = run(folder.path(), &["recover", "cut.mcap"]);
-    let said = String::from_utf8_lossy(&output.stdout);
-    assert_eq!(output.status.code(), Some(0), "{said}");
-    assert!(said.contains("cut.recovered.mcap") && said.contains("ticks"), "{said}");
-    assert!(cut.is_file(), "nothing is lost");
+    let printed = String::from_utf8_lossy(&output.stdout);
+    assert_eq!(output.status.code(), Some(0), "{printed}");
+    assert!(printed.contains("cut.recovered.mcap") && printed.contains("ticks"), "{printed}");
+    assert!(cut.is_file(), "the damaged file is kept");
 }
 
-/// (A defect once: of several studies that failed only the first said why.)
+/// Regression: of several failed studies only the first was reported.
 #[test]
-fn every_study_that_fails_says_why_and_a_disk_that_refuses_is_no_bad_input() {
+fn every_failed_study_is_reported_and_a_disk_error_is_not_unusable_input() {
     let folder = tempfile::tempdir().unwrap();
-    // A file stands where the folders of the studies are to be made.
+    // A file in place of the parent folder.
     fs::write(folder.path().join("taken"), "").unwrap();
     let output = run(folder.path(), &["optimize", "--seed", "0-1", "--trials", "1", "--output", "taken"]);
     let message = String::from_utf8_lossy(&output.stderr);
@@ -285,7 +284,7 @@ fn every_study_that_fails_says_why_and_a_disk_that_refuses_is_no_bad_input() {
 }
 
 #[test]
-fn several_studies_are_summed_up_and_the_sampler_can_be_chosen() {
+fn several_studies_are_summarized_and_the_sampler_can_be_chosen() {
     let folder = tempfile::tempdir().unwrap();
     let arguments =
         ["optimize", "--seed", "0-1", "--trials", "2", "--record", "none", "--sampler", "sobol", "--output", "mine"];
@@ -297,7 +296,7 @@ fn several_studies_are_summed_up_and_the_sampler_can_be_chosen() {
     assert!(kept.contains("kind = \"sobol\""), "{kept}");
 }
 
-/// A study goes on with its own configuration and robot, and belongs to one session at a time.
+/// It also belongs to one session at a time.
 #[test]
 fn a_continued_study_keeps_its_configuration_and_robot() {
     let folder = tempfile::tempdir().unwrap();
@@ -320,13 +319,12 @@ fn a_continued_study_keeps_its_configuration_and_robot() {
     assert!(message.contains("another session"), "{message}");
 }
 
-/// Whatever the machine: each item has a line that says ok or warn, a warning says what to do, and the simulator is usable.
 #[test]
-fn the_doctor_says_how_the_machine_stands_item_by_item() {
+fn the_doctor_reports_each_item_and_a_remedy_for_each_warning() {
     let folder = tempfile::tempdir().unwrap();
     let output = run(folder.path(), &["doctor"]);
-    let said = String::from_utf8_lossy(&output.stdout);
-    assert!(output.status.success(), "{said}");
+    let printed = String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.success(), "{printed}");
     for item in [
         "kernel",
         "real-time priority",
@@ -334,20 +332,20 @@ fn the_doctor_says_how_the_machine_stands_item_by_item() {
         "cores",
         "timer",
         "control thread",
-        "wake-up lateness",
+        "wake-up latency",
         "connection",
         "disk",
     ] {
-        let line = said.lines().find(|line| line.get(6..).is_some_and(|rest| rest.starts_with(item)));
-        let line = line.unwrap_or_else(|| panic!("no line on {item}: {said}"));
+        let line = printed.lines().find(|line| line.get(6..).is_some_and(|rest| rest.starts_with(item)));
+        let line = line.unwrap_or_else(|| panic!("no line on {item}: {printed}"));
         assert!(line.starts_with("ok ") || line.starts_with("warn "), "{line}");
     }
-    let warnings = said.lines().filter(|line| line.starts_with("warn ")).count();
-    assert_eq!(said.lines().filter(|line| line.trim_start().starts_with("-> ")).count(), warnings, "{said}");
+    let warnings = printed.lines().filter(|line| line.starts_with("warn ")).count();
+    assert_eq!(printed.lines().filter(|line| line.trim_start().starts_with("-> ")).count(), warnings, "{printed}");
 }
 
 #[test]
-fn without_a_terminal_the_console_says_what_to_do() {
+fn without_a_terminal_the_console_names_the_alternatives() {
     let folder = tempfile::tempdir().unwrap();
     let message = refused(folder.path(), &[]);
     assert!(message.contains("terminal") && message.contains("optimize"), "{message}");

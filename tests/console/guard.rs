@@ -1,5 +1,5 @@
-//! The process that damps a robot whose console was killed: the real program, and a socket in the robot's place that keeps what
-//! it is sent.
+//! The guard process, which damps a robot whose console died: the program, and a socket that records the commands in place
+//! of the robot.
 
 #[path = "support/pty.rs"]
 mod pty;
@@ -22,19 +22,19 @@ use quadfrog::robot::go1::convert::{low_cmd, low_state};
 use quadfrog::robot::go1::packet::CrcForm;
 use quadfrog::robot::{JointCommand, RobotState};
 
-/// How long no datagram comes from who has stopped sending.
+/// Time without a datagram after which the sender counts as ended.
 const SILENCE: Duration = Duration::from_millis(500);
 
 /// Answers every datagram with the state of a robot that lies still.
-struct Robot {
+struct RecordingRobot {
     address: SocketAddr,
     received: Arc<Mutex<Vec<Vec<u8>>>>,
     ending: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
 
-impl Robot {
-    fn start() -> Robot {
+impl RecordingRobot {
+    fn start() -> RecordingRobot {
         let socket = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
         socket.set_read_timeout(Some(SILENCE)).unwrap();
         let address = socket.local_addr().unwrap();
@@ -48,18 +48,18 @@ impl Robot {
                 state.robot_time_ms += 1;
                 let mut answer = low_state(&state, 1.0);
                 answer.seal();
-                // Whoever was killed is not there to hear it.
+                // Fails if the sender was killed.
                 let _ = socket.send_to(answer.bytes(), from);
             }
         };
-        Robot { address, received, ending, thread: Some(std::thread::spawn(answer)) }
+        RecordingRobot { address, received, ending, thread: Some(std::thread::spawn(answer)) }
     }
 
     fn count(&self) -> usize {
         self.received.lock().unwrap().len()
     }
 
-    /// All that comes from now until nothing comes any more.
+    /// The datagrams from number `from` until the sender ends.
     fn rest(&self, from: usize) -> Vec<Vec<u8>> {
         let mut count = usize::MAX;
         while count != self.count() {
@@ -70,14 +70,14 @@ impl Robot {
     }
 }
 
-impl Drop for Robot {
+impl Drop for RecordingRobot {
     fn drop(&mut self) {
         self.ending.store(true, Ordering::Release);
         let _ = self.thread.take().map(JoinHandle::join);
     }
 }
 
-/// The Go1 with any port at this end, so that tests can run side by side.
+/// The Go1 with any local port, so that tests can run in parallel.
 fn model(folder: &Path) -> PathBuf {
     let model = folder.join("model");
     std::fs::create_dir(&model).unwrap();
@@ -93,27 +93,27 @@ fn model(folder: &Path) -> PathBuf {
     model
 }
 
-/// What every joint is told to damp it.
+/// The damping command.
 fn damping() -> Vec<u8> {
     let kd = Config::load(None).unwrap().safety.gate.damping_kd;
     low_cmd(&JointCommand::damping(kd), CrcForm::Plain).unwrap().bytes().to_vec()
 }
 
-fn console(folder: &Path, robot: &Robot, more: &[&str]) -> Session {
+fn console(folder: &Path, robot: &RecordingRobot, more: &[&str]) -> Session {
     let (address, model) = (robot.address.to_string(), model(folder));
     let arguments = ["--robot", "go1", "--address", &address, "--model", model.to_str().unwrap()];
     Session::start(folder, (120, 36), &[&arguments, more].concat())
 }
 
-/// A console that has taken control of `robot`, and is in its pre-arm list.
-fn controlling(folder: &Path, robot: &Robot) -> Session {
+/// A console in control of `robot`, before arming.
+fn controlling(folder: &Path, robot: &RecordingRobot) -> Session {
     let session = console(folder, robot, &[]);
     damped(&session, robot);
     session
 }
 
-/// Waits until nothing but damping has come for a while.
-fn damped(session: &Session, robot: &Robot) {
+/// Waits until the last 100 commands are damping.
+fn damped(session: &Session, robot: &RecordingRobot) {
     let damping = damping();
     session.wait_until("the robot is damped", || {
         let received = robot.received.lock().unwrap();
@@ -121,7 +121,7 @@ fn damped(session: &Session, robot: &Robot) {
     });
 }
 
-/// The guard of `console`: its only child.
+/// The guard: the only child of `console`.
 fn guard_of(console: Pid) -> Pid {
     let tasks = std::fs::read_dir(format!("/proc/{console}/task")).unwrap();
     let children = tasks.map(|task| std::fs::read_to_string(task.unwrap().path().join("children")).unwrap_or_default());
@@ -129,25 +129,25 @@ fn guard_of(console: Pid) -> Pid {
     Pid::from_raw(children.trim().parse().unwrap_or_else(|_| panic!("children of {console}: {children:?}")))
 }
 
-/// Kills the console; what comes from then on must be the guard's.
-fn kill_console(session: &mut Session, robot: &Robot) -> Vec<Vec<u8>> {
+/// Kills the console and returns the commands of the guard.
+fn kill_console(session: &mut Session, robot: &RecordingRobot) -> Vec<Vec<u8>> {
     session.signal(Signal::SIGKILL);
     session.wait();
     robot.rest(robot.count())
 }
 
-/// Three seconds of damping; a socket's queue on a busy machine may lose some.
+/// Checks for damping over three seconds; a busy machine may lose some datagrams.
 fn assert_damped(rest: &[Vec<u8>]) {
     assert!(rest.len() > 1000, "{} datagrams after the end", rest.len());
     let damping = damping();
     assert!(rest.iter().all(|datagram| *datagram == damping));
 }
 
-/// Nor does the guard end with what ends a console in order, or a terminal.
+/// The guard ignores the signals that end a console or a terminal.
 #[test]
 fn a_robot_whose_console_is_killed_is_damped() {
     let folder = tempfile::tempdir().unwrap();
-    let robot = Robot::start();
+    let robot = RecordingRobot::start();
     let mut session = controlling(folder.path(), &robot);
     let guard = guard_of(session.pid());
     for signal in [Signal::SIGHUP, Signal::SIGINT, Signal::SIGTERM] {
@@ -156,18 +156,18 @@ fn a_robot_whose_console_is_killed_is_damped() {
     assert_damped(&kill_console(&mut session, &robot));
 }
 
-/// The program stands still, as under a debugger: the guard damps until it goes on, and is then done without.
+/// A stopped process, as under a debugger.
 #[test]
-fn a_robot_whose_console_is_stopped_is_damped_until_it_goes_on() {
+fn a_robot_whose_console_is_stopped_is_damped_until_it_continues() {
     let folder = tempfile::tempdir().unwrap();
-    let robot = Robot::start();
+    let robot = RecordingRobot::start();
     let mut session = controlling(folder.path(), &robot);
     session.signal(Signal::SIGSTOP);
     let stopped = robot.count();
     session.wait_until("the guard damps", || robot.count() > stopped + 2000);
     session.signal(Signal::SIGCONT);
     session.wait_for(&["FAULT", "late"]);
-    // The guard is silent again: of what comes in a second, one sender's share.
+    // The guard is silent again: the rate is that of one sender.
     let (before, began) = (robot.count(), Instant::now());
     std::thread::sleep(Duration::from_secs(1));
     let rate = (robot.count() - before) as f64 / began.elapsed().as_secs_f64();
@@ -177,23 +177,23 @@ fn a_robot_whose_console_is_stopped_is_damped_until_it_goes_on() {
 }
 
 #[test]
-fn a_robot_whose_console_ends_in_order_hears_nothing_afterwards() {
+fn a_robot_whose_console_ends_normally_receives_nothing_afterwards() {
     let folder = tempfile::tempdir().unwrap();
-    let robot = Robot::start();
+    let robot = RecordingRobot::start();
     let mut session = controlling(folder.path(), &robot);
     session.signal(Signal::SIGTERM);
     assert!(session.wait().success());
-    // What was sent before may still wait in the socket.
+    // Earlier commands may still be in the socket's queue.
     let rest = robot.rest(robot.count());
     assert!(rest.len() < 100, "{} datagrams after the end", rest.len());
 }
 
 #[test]
-fn a_robot_that_is_only_observed_hears_nothing_of_the_guard_unless_it_was_stopped() {
+fn an_observed_robot_receives_nothing_from_the_guard_unless_it_was_stopped() {
     for stopped in [false, true] {
         let folder = tempfile::tempdir().unwrap();
-        let robot = Robot::start();
-        // The robot sends to where commands come from; the first comes with the STOP.
+        let robot = RecordingRobot::start();
+        // The robot answers commands; the first one is that of STOP.
         let mut session = console(folder.path(), &robot, &["--observe"]);
         session.wait_for(&["OFFLINE"]);
         if stopped {
@@ -209,11 +209,11 @@ fn a_robot_that_is_only_observed_hears_nothing_of_the_guard_unless_it_was_stoppe
     }
 }
 
-/// (That nothing is armed then: `session_pre_arm`.)
+/// `session_pre_arm` checks that arming is then refused.
 #[test]
-fn a_lost_guard_is_told() {
+fn a_lost_guard_is_reported() {
     let folder = tempfile::tempdir().unwrap();
-    let robot = Robot::start();
+    let robot = RecordingRobot::start();
     let mut session = controlling(folder.path(), &robot);
     kill(guard_of(session.pid()), Signal::SIGKILL).unwrap();
     session.send("6");
@@ -222,7 +222,7 @@ fn a_lost_guard_is_told() {
     assert!(session.wait().success());
 }
 
-/// The guard by itself: what it is given, and where it may send.
+/// Runs the guard alone with this input and this socket.
 fn guard(given: &[u8], socket: UdpSocket) -> Output {
     let mut process = Command::new(env!("CARGO_BIN_EXE_quadfrog"))
         .arg("guard")
@@ -231,14 +231,14 @@ fn guard(given: &[u8], socket: UdpSocket) -> Output {
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
-    // One that refuses what it is given does not read to the end.
+    // A guard that refuses its input does not read all of it.
     let _ = process.stdin.take().unwrap().write_all(given);
     process.wait_with_output().unwrap()
 }
 
 #[test]
-fn a_guard_sends_nothing_to_a_robot_that_was_left_alone_and_nothing_that_is_no_command() {
-    let robot = Robot::start();
+fn a_guard_sends_nothing_to_a_robot_without_commands_and_no_invalid_command() {
+    let robot = RecordingRobot::start();
     let socket = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
     socket.connect(robot.address).unwrap();
     let mut spoilt = damping();
@@ -252,13 +252,13 @@ fn a_guard_sends_nothing_to_a_robot_that_was_left_alone_and_nothing_that_is_no_c
         (b"quadfrog\n".to_vec(), "", 2),
     ] {
         let output = guard(&[&given, after.as_bytes()].concat(), socket.try_clone().unwrap());
-        let said = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(output.status.code(), Some(status), "{after:?}: {said}");
-        assert_eq!(said.contains("is no command"), status == 2, "{said}");
+        let printed = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(status), "{after:?}: {printed}");
+        assert_eq!(printed.contains("is no command"), status == 2, "{printed}");
     }
     assert_eq!(robot.rest(0), Vec::<Vec<u8>>::new());
     let output = guard(&[&damping()[..], b"\x46\0-+"].concat(), socket);
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success() && said.contains("the robot was damped, 3000 times"), "{said}");
+    let printed = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success() && printed.contains("the robot was damped, 3000 times"), "{printed}");
     assert_damped(&robot.rest(0));
 }

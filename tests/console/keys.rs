@@ -5,20 +5,21 @@ mod support;
 use quadfrog::recording::record::{Record, SessionInfo, StageRecord};
 use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::telemetry::Mode;
-use quadfrog::trial::{ExperimentStage, Verdict};
+use quadfrog::trial::{Backend, ExperimentStage, Verdict};
 use quadfrog_console::action::{ACTIONS, Action};
-use quadfrog_console::dialog::Dialog;
 use quadfrog_console::keymap::{Key, Keymap};
+use quadfrog_console::message::{Effect, Msg};
 use quadfrog_console::model::View;
-use quadfrog_console::settings::{DEFAULT, Settings};
-use quadfrog_console::update::{Effect, Msg};
+use quadfrog_console::model::dialog::Dialog;
+use quadfrog_console::settings::{ConsoleSettings, DEFAULT};
+use strum::VariantArray;
 use support::{Console, proposal, session, trial};
 
 fn wishes(effects: &[Effect]) -> Vec<OperatorRequest> {
     effects
         .iter()
         .filter_map(|effect| match effect {
-            Effect::Wish(intent) => Some(intent.clone()),
+            Effect::Request(intent) => Some(intent.clone()),
             _ => None,
         })
         .collect()
@@ -92,7 +93,7 @@ fn an_approval_ends_with_readiness() {
 #[test]
 fn stop_works_on_every_screen_and_over_every_dialog() {
     for stop in ["Space", "F12"] {
-        for mode in Mode::ALL {
+        for &mode in Mode::ALL {
             for view in ["1", "2", "3", "4", "5", "6"] {
                 let mut console = Console::proposed();
                 console.press(&[view]);
@@ -256,7 +257,7 @@ fn an_observer_and_a_replay_send_nothing() {
     observer.record(Record::Proposal(proposal(0, 0)));
     observer.stage(ExperimentStage::Proposed, 0);
     let mut replay = Console::proposed();
-    replay.tell(Msg::Replay(quadfrog_console::model::ReplayStatus {
+    replay.tell(Msg::Replay(quadfrog_console::message::ReplayStatus {
         file: "session.mcap".into(),
         playing: true,
         speed: 1.0,
@@ -264,7 +265,7 @@ fn an_observer_and_a_replay_send_nothing() {
         duration_ns: 1,
     }));
     for (name, console) in [("observer", &mut observer), ("replay", &mut replay)] {
-        for mode in Mode::ALL {
+        for &mode in Mode::ALL {
             console.mode(mode);
             for stage in ExperimentStage::ALL {
                 console.stage(stage, 0);
@@ -288,7 +289,7 @@ fn an_observer_and_a_replay_send_nothing() {
 
 #[test]
 fn energising_keys_do_nothing_in_the_wrong_mode() {
-    for mode in Mode::ALL {
+    for &mode in Mode::ALL {
         let mut console = Console::proposed();
         console.mode(mode);
         let armed = wishes(&console.press(&["A"]));
@@ -331,7 +332,7 @@ fn pasted_text_is_never_read_as_keys() {
 #[test]
 fn numbers_and_tab_change_the_view() {
     let mut console = Console::proposed();
-    for (key, view) in ["1", "2", "3", "4", "5", "6"].into_iter().zip(View::ALL) {
+    for (key, view) in ["1", "2", "3", "4", "5", "6"].into_iter().zip(View::VARIANTS.iter().copied()) {
         console.press(&[key]);
         assert_eq!(console.model.view, view);
     }
@@ -352,9 +353,9 @@ fn suspending_is_refused_while_the_robot_is_armed() {
 /// (A defect once: a suspended program does not damp the robot that it has just stopped.)
 #[test]
 fn suspending_is_refused_while_anything_is_sent_to_a_real_robot() {
-    for mode in Mode::ALL {
+    for &mode in Mode::ALL {
         let mut console = Console::proposed();
-        console.record(Record::Session(SessionInfo { backend: "go1".into(), ..session() }));
+        console.record(Record::Session(SessionInfo { backend: Some(Backend::Hardware), ..session() }));
         console.mode(mode);
         let suspends = console.tell(Msg::Suspend) == [Effect::Suspend];
         assert_eq!(suspends, matches!(mode, Mode::Offline | Mode::Observe), "{mode:?}: {}", console.said());
@@ -373,7 +374,7 @@ fn the_bell_rings_when_the_operator_is_needed() {
 
 #[test]
 fn every_action_has_a_name_a_key_and_a_line_of_help() {
-    let keymap = Settings::built_in().keymap;
+    let keymap = ConsoleSettings::built_in().keymap;
     for (index, info) in ACTIONS.iter().enumerate() {
         assert!(!info.help.is_empty() && !info.keys.is_empty(), "{}", info.name);
         assert!(ACTIONS[..index].iter().all(|other| other.name != info.name && other.action != info.action));
@@ -420,7 +421,7 @@ fn settings_out_of_range_are_refused_by_name() {
     let with = |key: &str, value: toml::Value| {
         let mut table: toml::Table = DEFAULT.parse().expect("the defaults");
         table.insert(key.into(), value);
-        Settings::from_table(&table).map(|_| ()).map_err(|error| error.to_string())
+        ConsoleSettings::from_table(&table).map(|_| ()).map_err(|error| error.to_string())
     };
     assert_eq!(with("frames_per_second", 10.into()), Ok(()));
     for (key, value) in [

@@ -1,4 +1,4 @@
-//! Measurements of the console, printed and not judged: timing decides no test. They run when asked for:
+//! Measurements of the console, printed without limits. Run them with
 //! `cargo test --release -p quadfrog-console --test measure -- --ignored --nocapture --test-threads 1`.
 
 #[path = "support/pty.rs"]
@@ -8,20 +8,20 @@ use std::time::{Duration, Instant};
 
 use pty::Session;
 
-/// The given share of sorted durations.
+/// A percentile, as a share, of sorted durations.
 fn percentile(sorted: &[Duration], share: f64) -> Duration {
     sorted[((sorted.len() - 1) as f64 * share).round() as usize]
 }
 
-/// Processor time that a process has used so far, s.
+/// Processor time of a process, s.
 fn processor_time(pid: i32) -> f64 {
     let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).expect("its state");
-    // Fields 14 and 15 (user and system time in 1/100 s) count from behind the name, which may hold spaces.
+    // Fields 14 and 15 (user and system time, 1/100 s), counted after the name, which may contain spaces.
     let fields: Vec<&str> = stat.rsplit(')').next().expect("fields").split_whitespace().collect();
     fields[11..13].iter().map(|ticks| ticks.parse::<f64>().expect("a number") / 100.0).sum()
 }
 
-/// A minute of a session with two jumps; prints what it costs.
+/// Prints data rate and processor load of one minute of a session with two jumps.
 fn minute(name: &str, size: (u16, u16), arguments: &[&str]) {
     let folder = tempfile::tempdir().expect("a folder");
     let mut session = Session::start(folder.path(), size, arguments);

@@ -1,6 +1,4 @@
-//! Every key of the active keymap, pressed in a real terminal on the real program: each does something that is seen.
-//!
-//! The table is checked against the keymap, so a key without a row fails.
+//! The visible effect of every key of the default keymap, on the program in a pseudo-terminal. A key without a row fails.
 
 #[path = "support/pty.rs"]
 mod pty;
@@ -13,30 +11,30 @@ use nix::sys::signal::Signal;
 use portable_pty::CommandBuilder;
 use pty::Session;
 use quadfrog_console::action::{ACTIONS, Action};
-use quadfrog_console::settings::Settings;
+use quadfrog_console::settings::ConsoleSettings;
 
-/// What a key makes of the terminal.
+/// The effect of a key on the terminal.
 enum Seen {
-    /// The text, not on the screen before.
+    /// This text appears.
     Shows(&'static str),
-    /// The text, on the screen before, goes.
+    /// This text disappears.
     Hides(&'static str),
-    /// Anything on a screen that stands still.
+    /// A still screen changes.
     Changes,
     /// These bytes are sent.
     Sends(&'static [u8]),
-    /// The program gives the terminal back and stops until it is continued.
+    /// The program restores the terminal and stops until it is continued.
     Suspends,
 }
 
 use Seen::{Changes, Hides, Sends, Shows, Suspends};
 
-/// An action, the key that is pressed, what is seen of it, and how the story goes on.
+/// An action, its key, the expected effect and the continuation.
 struct Row {
     action: Action,
     key: &'static str,
     seen: Seen,
-    /// Keys typed afterwards, and what is waited for then.
+    /// Keys typed next, and the text to wait for.
     after: (&'static str, &'static str),
 }
 
@@ -48,12 +46,12 @@ const fn row(action: Action, key: &'static str, seen: Seen, after: (&'static str
 const LIVE: &[Row] = &[
     row(Action::Override, "o", Shows("Override trial #0"), ("\x1b[B120\r", "was 106.2")),
     row(Action::ClearOverrides, "O", Hides("was 106.2"), ("", "")),
-    row(Action::PreArm, "P", Shows("Pre-arm list: all passed"), ("\x1b", "Press A to arm")),
+    row(Action::ArmingChecks, "P", Shows("Arming checks: all passed"), ("\x1b", "Press A to arm")),
     row(Action::Skip, "n", Hides("106.2 N"), ("", "Press A to arm")),
     row(Action::Suspend, "Ctrl-Z", Suspends, ("", "Press A to arm")),
     row(Action::Arm, "A", Shows("STAND UP"), ("", "READY")),
     row(Action::SitDown, "D", Shows("SIT DOWN"), ("", "DISARMED")),
-    row(Action::Stop, "F12", Shows("DAMPED"), ("", "then press k")),
+    row(Action::Stop, "F12", Shows("DAMPED"), ("", "k acknowledges")),
     row(Action::Acknowledge, "k", Hides("DAMPED"), ("A", "READY")),
     row(Action::Stop, "Space", Shows("DAMPED"), ("kA", "READY")),
     row(Action::Approve, "g", Shows("Jump?"), ("", "")),
@@ -65,18 +63,18 @@ const LIVE: &[Row] = &[
     row(Action::Rerun, "r", Shows("re-run of #1"), ("u", "judge it")),
     row(Action::Fall, "f", Shows("Study finished"), ("u", "judge it")),
     row(Action::Accept, "a", Shows("Study finished"), ("", "")),
-    row(Action::ExportBest, "E", Shows("for --config: "), ("", "")),
+    row(Action::ExportBest, "E", Shows("exported; start with quadfrog --config "), ("", "")),
     row(Action::Continue, "C", Shows("How many more trials?"), ("\r", "Trial #2")),
-    row(Action::ConfirmBest, "K", Shows("two accepted trials are needed"), ("4", "What can be done")),
+    row(Action::ConfirmBest, "K", Shows("two accepted trials are needed"), ("4", "Actions ─")),
     row(Action::Fix, "X", Shows("Fix Fx at"), ("3\r", "fixed at")),
     row(Action::Fix, "X", Hides("fixed at"), ("", "")),
-    row(Action::Bounds, "B", Shows("Search Fx from .. to"), ("\x1520..120\r", "began 0.000..150.0")),
+    row(Action::Bounds, "B", Shows("Search Fx from .. to"), ("\x1520..120\r", "initial 0.000..150.0")),
     row(Action::QueuePoint, "Q", Shows("queue f0 ="), ("1", "8 s sweep")),
     row(Action::Interrupt, "Ctrl-C", Shows("Ctrl-C again within 2 s quits"), ("", "DAMPED")),
     row(Action::Quit, "q", Shows("The study and its recording are in"), ("", "")),
 ];
 
-/// The recorded session, played and then paused at its end.
+/// The recorded session, paused at its end.
 const REPLAY: &[Row] = &[
     row(Action::PlayPause, "p", Shows("paused"), ("", "")),
     row(Action::NextMarker, "]", Changes, ("", "")),
@@ -101,7 +99,7 @@ const REPLAY: &[Row] = &[
     row(Action::PageUp, "PgUp", Changes, ("", "")),
     row(Action::PageDown, "PgDn", Changes, ("", "")),
     row(Action::Ghost, "c", Shows("is laid under the charts"), ("", "")),
-    row(Action::Open, "Enter", Shows("objective told"), ("\x1b", "by number")),
+    row(Action::Open, "Enter", Shows("reported to the optimizer"), ("\x1b", "by number")),
     row(Action::Sort, "s", Shows("by value"), ("", "")),
     row(Action::Reverse, "S", Shows("by value reversed"), ("", "")),
     row(Action::Filter, "F", Shows("only accept"), ("FFF", "all (F)")),
@@ -123,7 +121,7 @@ const REPLAY: &[Row] = &[
     row(Action::Redraw, "Ctrl-L", Shows("the screen was drawn again"), ("", "")),
 ];
 
-/// What a terminal sends for a key.
+/// The bytes that a terminal sends for a key.
 fn typed(key: &str) -> String {
     let named = match key {
         "Space" => " ",
@@ -168,13 +166,13 @@ fn play(session: &mut Session, rows: &[Row]) {
                 session.wait_until(&format!("{name} sends its bytes"), || session.sent_after(bytes, wanted));
             }
             Suspends => {
-                session.wait_until("the terminal is given back", || session.restored() && session.cooked());
+                session.wait_until("the terminal is restored", || session.restored() && session.cooked());
                 session.signal(Signal::SIGCONT);
                 session.wait_until("the terminal is taken again", || !session.restored());
             }
         }
         if row.action == Action::Approve {
-            // The second moment of an approval.
+            // The second press counts after 1 s at the earliest.
             std::thread::sleep(Duration::from_millis(1000));
         }
         let (keys, text) = row.after;
@@ -190,7 +188,7 @@ fn play(session: &mut Session, rows: &[Row]) {
 
 #[test]
 fn every_key_of_the_keymap_has_a_row() {
-    let keymap = Settings::built_in().keymap;
+    let keymap = ConsoleSettings::built_in().keymap;
     let wanted: BTreeSet<(&str, String)> =
         ACTIONS.iter().flat_map(|info| keymap.keys(info.action).map(|key| (info.name, key.to_string()))).collect();
     let rows: BTreeSet<(&str, String)> =

@@ -1,6 +1,6 @@
-//! Every view of a recorded session, as text, at three sizes. The recording is of the real program on the simulator:
-//! `cargo test -p quadfrog-console --test recorded -- --ignored` makes it anew, and
-//! `INSTA_UPDATE=always cargo test -p quadfrog-console --test recorded` accepts what the screens show then.
+//! All views of a recorded session of the simulator, as text, at three sizes.
+//! `cargo test -p quadfrog-console --test recorded -- --ignored` renews the recording, then
+//! `INSTA_UPDATE=always cargo test -p quadfrog-console --test recorded` the expected screens.
 
 #[path = "support/pty.rs"]
 mod pty;
@@ -14,7 +14,7 @@ use quadfrog::recording::player::{Played, Player};
 use quadfrog::recording::record::Record;
 use quadfrog::recording::writer::Writer;
 use quadfrog_console::feed::Feed;
-use quadfrog_console::settings::Settings;
+use quadfrog_console::settings::ConsoleSettings;
 use quadfrog_console::theme::{Colours, Glyphs, Theme};
 use support::Console;
 
@@ -27,12 +27,12 @@ fn recording() -> PathBuf {
 
 /// A console at the end of the recorded session: two trials judged, the third under review.
 fn console(colours: Colours, glyphs: Glyphs) -> Console {
-    let mut console = Console::with(Settings::built_in(), Theme { colours, glyphs });
+    let mut console = Console::with(ConsoleSettings::built_in(), Theme { colours, glyphs });
     let player = Player::open(recording()).expect("the recorded session");
     let robot = quadfrog::robot::description::RobotDescription::embedded(&player.session().robot).expect("its robot");
     console.model.robot = Some(robot);
     let mut feed = Feed::replay(player);
-    // Longer than the recording, at the speed of time.
+    // One hour, longer than the recording.
     for msg in feed.take(3_600_000_000_000) {
         console.tell(msg);
     }
@@ -79,13 +79,13 @@ fn views_of_a_recorded_session_in_colour() {
 #[test]
 fn a_replay_shows_every_trial_and_can_be_left() {
     let console = console(Colours::Named, Glyphs::Braille);
-    assert_eq!(console.model.trials.len(), 3);
+    assert_eq!(console.model.session.trials.records.len(), 3);
     let screen = console.screen(80, 24);
     assert!(screen.contains("REPLAY") && screen.contains("Trial #2: judge it"), "{screen}");
 }
 
 #[test]
-#[ignore = "makes the recording that the other tests read"]
+#[ignore = "renews the recording that the other tests read"]
 fn record_the_session() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut command = CommandBuilder::new(env!("CARGO_BIN_EXE_quadfrog"));
@@ -119,7 +119,7 @@ fn record_the_session() {
     let study = recordings.map(|entry| entry.expect("an entry").path()).next().expect("a study");
     let mut player = Player::open(study.join("session.mcap")).expect("a recording");
     let info = player.session().clone();
-    // What the screen needs: the ticks of the last charts as the screen takes them, and every record.
+    // Keeps every fifth tick of the last 5 s, for the charts, and every record.
     let charts_from_ns = player.duration_ns().saturating_sub(5_000_000_000);
     let _ = std::fs::remove_file(recording());
     let mut writer = Writer::create(recording(), &info, player.start_utc_ns(), &[]).expect("the shorter recording");

@@ -10,18 +10,19 @@ use quadfrog::robot::{Battery, LinkStatus};
 use quadfrog::session::operator_request::{OperatorCheck, OperatorRequest};
 use quadfrog::telemetry::{ArmingCheck, ArmingCheckState, Counters, Mode, Snapshot};
 use quadfrog::trial::{
-    ExperimentStage, FixedParameter, ParameterInsight, PointRecord, ProposalInsight, SearchStatus, SearchedParameter,
-    Task, TrialRecord, Verdict,
+    Backend, ExperimentStage, FixedParameter, ParameterInsight, PointRecord, ProposalInsight, SearchStatus,
+    SearchedParameter, Task, TrialRecord, Verdict,
 };
-use quadfrog_console::dialog::Dialog;
 use quadfrog_console::export;
+use quadfrog_console::message::{Effect, Msg};
 use quadfrog_console::model::View;
-use quadfrog_console::update::{Effect, Msg};
+use quadfrog_console::model::dialog::Dialog;
+use strum::VariantArray;
 use support::{Console, session, tick, trial};
 
 fn wishes(effects: &[Effect]) -> Vec<OperatorRequest> {
     let wish = |effect: &Effect| match effect {
-        Effect::Wish(intent) => Some(intent.clone()),
+        Effect::Request(intent) => Some(intent.clone()),
         _ => None,
     };
     effects.iter().filter_map(wish).collect()
@@ -127,7 +128,7 @@ fn bounds_are_checked_and_each_refusal_is_explained() {
     let mut console = overriding();
     console.record(Record::Search(search((50.0, 120.0), None)));
     let screen = console.screen(80, 24);
-    assert!(line_with(&screen, "Fx  ").contains("began 0.000..150.0"), "{screen}");
+    assert!(line_with(&screen, "Fx  ").contains("initial 0.000..150.0"), "{screen}");
 }
 
 #[test]
@@ -190,14 +191,14 @@ fn densities_say_why_a_point_was_proposed_without_colours_too() {
         console.record(Record::Insight(insight()));
         console.press(&["3"]);
         let screen = console.screen(columns, rows);
-        let why = line_with(&screen, "Why f0");
+        let why = line_with(&screen, "TPE ");
         assert_eq!(why.contains("(#12)"), columns > 80, "{why}");
-        assert!(why.contains("matters 62 %"), "{why}");
-        assert!(line_with(&screen, "Why Fx").contains("Why Fz"));
+        assert!(why.contains("importance 62 %"), "{why}");
+        assert!(why.contains("Fx") && why.contains("Fz"), "{why}");
         // Peak and proposal of l are at a quarter of the panel, g's peak at three quarters.
-        let width = why.find("Why Fx").map(|_| usize::from(columns) / 3).expect("three panels");
+        let width = why.find("Fx").map(|_| usize::from(columns) / 3).expect("three panels");
         let letter = |letter: &str| {
-            let at = screen.lines().skip_while(|line| !line.contains("Why f0")).skip(1);
+            let at = screen.lines().skip_while(|line| !line.contains("TPE ")).skip(1);
             at.filter_map(|line| line.chars().take(width).position(|c| c.to_string() == letter)).next()
         };
         let g = letter("g").expect("g");
@@ -215,7 +216,7 @@ fn before_the_first_trials_both_densities_are_the_prior() {
     console.record(Record::Insight(insight));
     console.press(&["3"]);
     let screen = console.screen(120, 40);
-    assert!(screen.contains("l = g") && !screen.contains("matters"), "{screen}");
+    assert!(screen.contains("l = g") && !screen.contains("importance"), "{screen}");
 }
 
 /// A finished study of four trials; trial 2 is the best.
@@ -225,7 +226,7 @@ fn finished() -> Console {
     for (number, value) in [(0, 0.3), (1, 0.2), (2, 0.61), (3, 0.4)] {
         let row = TrialRecord {
             value: Some(value),
-            gains: vec![("kp".into(), 450.0), ("kd".into(), 8.0)],
+            gains: vec![("kp".into(), 450.0), ("kd".into(), 8.0)].into(),
             ..trial(number, Some(Verdict::Accept), None)
         };
         console.record(Record::Trial(row));
@@ -256,7 +257,7 @@ fn a_finished_study_says_so_and_what_comes_next() {
 fn repeats_are_shown_as_k_of_n_with_their_spread() {
     let mut console = finished();
     let point = |trials: Vec<u32>, stood, mean, deviation, confidence| PointRecord {
-        parameters: vec![("f0".into(), 1.25)],
+        parameters: vec![("f0".into(), 1.25)].into(),
         trials,
         stood,
         mean,
@@ -278,7 +279,7 @@ fn repeats_are_shown_as_k_of_n_with_their_spread() {
     assert!(screen.contains("2/2  0.600 m ±0.012  leads, 96 %"), "{screen}");
     console.press(&["2", "/", "2", "Enter", "Enter"]);
     let screen = console.screen(80, 24);
-    assert!(line_with(&screen, "repeats").contains("2/2 stood, 0.6000 ± 0.0120 m (#2 #4)"), "{screen}");
+    assert!(line_with(&screen, "repeats").contains("2/2 landed, 0.6000 ± 0.0120 m (#2 #4)"), "{screen}");
 }
 
 #[test]
@@ -290,8 +291,8 @@ fn the_best_is_written_as_a_configuration_that_the_program_takes() {
     let best = export::best(&console.model).expect("written");
     assert_eq!(best, folder.path().join("best-trial-2"));
     let config = Config::load(Some(&best)).expect("a configuration");
-    let first: Vec<(String, f64)> = vec![("f0".into(), 1.25), ("Fx".into(), 75.0), ("Fz".into(), 250.0)];
-    assert_eq!(config.first(Task::Forward), first, "the point that a study begins with");
+    let first = vec![("f0".into(), 1.25), ("Fx".into(), 75.0), ("Fz".into(), 250.0)];
+    assert_eq!(*config.first(Task::Forward), first, "the point that a study begins with");
     let gains = config.task(Task::Forward);
     assert_eq!((gains.kp, gains.kd), (450.0, 8.0));
     assert!(export::best(&console.model).expect_err("once").to_string().contains("best-trial-2"), "nothing is lost");
@@ -303,10 +304,28 @@ fn the_best_is_written_as_a_configuration_that_the_program_takes() {
     assert!(error.contains("/proc/best-trial-2"), "{error}");
 }
 
+#[test]
+fn the_best_of_a_continued_study_is_exported_with_its_newest_configuration() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let study = folder.path().join("study.log");
+    let mut console = finished();
+    console.record(Record::Session(SessionInfo { study: study.display().to_string(), ..session() }));
+    // Two exported configurations serve as those of the study; the newer one has another time window.
+    for name in ["config", "config-2"] {
+        std::fs::rename(export::best(&console.model).expect("written"), folder.path().join(name)).expect("renamed");
+    }
+    let newest = folder.path().join("config-2/console.toml");
+    let text = std::fs::read_to_string(&newest).expect("the console's settings");
+    std::fs::write(&newest, text.replace("chart_window_s = 8.0", "chart_window_s = 4.0")).expect("written");
+    let best = export::best(&console.model).expect("written");
+    let exported = std::fs::read_to_string(best.join("console.toml")).expect("the console's settings");
+    assert!(exported.contains("chart_window_s = 4.0"), "{exported}");
+}
+
 /// A Go1 that lies disarmed with this pre-arm list.
 fn on_hardware(list: Vec<ArmingCheckRecord>) -> Console {
     let mut console = Console::proposed();
-    console.record(Record::Session(SessionInfo { backend: "go1".into(), ..session() }));
+    console.record(Record::Session(SessionInfo { backend: Some(Backend::Hardware), ..session() }));
     console.record(Record::ArmingChecks(list));
     console
 }
@@ -323,7 +342,7 @@ fn arming_shows_every_check_that_fails_and_takes_the_operators_word() {
         item(ArmingCheck::MotorsCool, ArmingCheckState::Failed, "FR_calf 64 C", "below 60 C"),
         item(ArmingCheck::AreaClear, ArmingCheckState::Waiting, "", "your word"),
     ]);
-    assert_eq!(console.next_step(), "Not ready to arm: 3 checks. P shows them.");
+    assert_eq!(console.next_step(), "Not ready to arm: 3 checks have not passed. P shows them.");
     let mut resumed =
         on_hardware(vec![item(ArmingCheck::StateFresh, ArmingCheckState::Passed, "2 ms", "at most 10 ms")]);
     resumed.tell(Msg::Resumed);
@@ -342,7 +361,7 @@ fn arming_shows_every_check_that_fails_and_takes_the_operators_word() {
     ] {
         assert!(screen.contains(part), "no {part}:\n{screen}");
     }
-    assert!(console.said().contains("3 checks of the pre-arm list do not hold"), "{}", console.said());
+    assert!(console.said().contains("3 arming checks have not passed"), "{}", console.said());
     // The operator's own items, in their order.
     let mut sent = Vec::new();
     for _ in OperatorCheck::ALL {
@@ -399,7 +418,7 @@ fn the_frame_says_how_link_battery_and_the_hottest_motor_are_at_every_size() {
     let counters = Counters { link: Some(link), ..Counters::default() };
     console.tell(Msg::Snapshot(Box::new(Snapshot { tick: newest, counters })));
     for (columns, rows) in [(80, 24), (120, 40), (200, 60)] {
-        for view in View::ALL {
+        for view in View::VARIANTS.iter().copied() {
             console.model.view = view;
             let screen = console.screen(columns, rows);
             let second = screen.lines().nth(1).unwrap_or_default();
@@ -461,7 +480,7 @@ fn details_that_do_not_fit_are_reached_with_the_paging_keys() {
         hand_value: Some(0.3),
         ..trial(0, Some(Verdict::Accept), Some(Verdict::Fall))
     };
-    let row = TrialRecord { gains: vec![("kp".into(), 450.0)], ..row };
+    let row = TrialRecord { gains: vec![("kp".into(), 450.0)].into(), ..row };
     console.record(Record::Trial(row));
     console.press(&["2", "Home", "Enter"]);
     let top = console.screen(80, 24);

@@ -1,4 +1,4 @@
-//! `quadfrog study`: the same files from outside, as a person or a script has them.
+//! `quadfrog study` on stored studies.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -65,7 +65,7 @@ fn studies_are_listed_and_shown() {
 }
 
 #[test]
-fn a_study_goes_out_and_comes_back_the_same_in_both_forms() {
+fn an_exported_study_is_imported_unchanged_in_both_formats() {
     let (folder, first) = study("forward");
     for form in ["csv", "json"] {
         let file = format!("table.{form}");
@@ -77,8 +77,8 @@ fn a_study_goes_out_and_comes_back_the_same_in_both_forms() {
         text(folder.path(), &["optimize", "--trials", "1", "--seed", "7", "--record", "none", "--output", &output]);
         let other = fs::read_dir(folder.path().join(&output)).unwrap().next().unwrap().unwrap().path();
         let other = other.to_str().unwrap();
-        let said = text(folder.path(), &["study", "import", other, &file]);
-        assert!(said.starts_with("6 trials"), "{said}");
+        let printed = text(folder.path(), &["study", "import", other, &file]);
+        assert!(printed.starts_with("6 trials"), "{printed}");
         let trials = |study: &str| -> Vec<Value> {
             let Value::Array(all) =
                 serde_json::from_str(&text(folder.path(), &["study", "export", study, "--format", "json"])).unwrap()
@@ -93,14 +93,14 @@ fn a_study_goes_out_and_comes_back_the_same_in_both_forms() {
             for key in ["state", "value", "params", "datetime_start", "datetime_complete"] {
                 assert_eq!(theirs[key], ours[key], "{key}");
             }
-            // A table has no null, and what was owed or numbered in the one study is not in the other.
+            // A table has no null; trial numbers and pending re-runs do not apply to another study.
             for (name, value) in ours["user_attrs"].as_object().unwrap() {
                 let left_out = value.is_null() || ["worker", "rerun"].contains(&name.as_str());
                 let same = theirs["user_attrs"].get(name).filter(|value| !value.is_null()) == Some(value);
                 assert!(same != left_out, "{name}: {value}");
             }
         }
-        // What came in counts: the study has its seven trials and runs no more.
+        // Imported trials count: the budget of seven is met.
         let rest =
             quadfrog(folder.path(), &["optimize", "--resume", other, "--trials", "7", "--json", "--record", "none"]);
         assert!(rest.status.success() && rest.stdout.is_empty());
@@ -108,7 +108,7 @@ fn a_study_goes_out_and_comes_back_the_same_in_both_forms() {
 }
 
 #[test]
-fn a_table_that_cannot_be_is_refused_whole_with_its_row_and_column() {
+fn an_invalid_table_is_refused_as_a_whole_with_row_and_column() {
     let (folder, study) = study("forward");
     let import = |name: &str, table: &str, words: &[&str]| {
         fs::write(folder.path().join(name), table).unwrap();
@@ -149,7 +149,7 @@ fn a_queued_point_runs_next_and_points_of_a_table_can_be_queued() {
         assert!(message.contains(words), "{message}");
     }
     assert!(refused(folder.path(), &["study", "enqueue", &study, "Fx=1", "Fx=2"]).contains("twice"));
-    // A session that runs in the folder does not mind.
+    // The lock of a running session does not prevent it.
     let held = fs::File::open(Path::new(&study).join("session.lock")).unwrap();
     held.lock().unwrap();
     assert!(text(folder.path(), &["study", "enqueue", &study, "Fx=77", "Fz=222.5"]).contains("trial 6"));
@@ -163,12 +163,11 @@ fn a_queued_point_runs_next_and_points_of_a_table_can_be_queued() {
     assert_eq!((&trials[1]["params"]["f0"], &trials[1]["params"]["Fx"]), (&1.25.into(), &66.0.into()));
 }
 
-/// A study's best as a configuration: the next study begins with it.
 #[test]
 fn the_best_begins_the_next_study() {
     let (folder, study) = study("twist-cw");
-    let said = text(folder.path(), &["study", "best", &study, "--config", "found"]);
-    assert!(said.contains("--config found"), "{said}");
+    let printed = text(folder.path(), &["study", "best", &study, "--config", "found"]);
+    assert!(printed.contains("--config found"), "{printed}");
     let output = text(
         folder.path(),
         &[
@@ -184,7 +183,7 @@ fn the_best_begins_the_next_study() {
         value(a).total_cmp(&value(b))
     });
     assert_eq!(first["params"], best.unwrap()["params"]);
-    // Nothing is overwritten, and what is written by hand is checked.
+    // No folder is overwritten, and values written by hand are checked.
     assert!(refused(folder.path(), &["study", "best", &study, "--config", "found"]).contains("new folder"));
     fs::create_dir(folder.path().join("mine")).unwrap();
     let write = |text: &str| fs::write(folder.path().join("mine/optimize.toml"), text).unwrap();
@@ -196,7 +195,7 @@ fn the_best_begins_the_next_study() {
 }
 
 #[test]
-fn a_reader_that_goes_away_ends_nothing_in_panic() {
+fn a_closed_output_pipe_is_no_error() {
     let (folder, study) = study("forward");
     for arguments in [&["study", "export", &study][..], &["study", "show", &study], &["study", "list"]] {
         let mut command = Command::new(env!("CARGO_BIN_EXE_quadfrog"));
@@ -209,7 +208,6 @@ fn a_reader_that_goes_away_ends_nothing_in_panic() {
     }
 }
 
-/// A journal that Python made, with its table, both ways.
 #[test]
 fn python_reads_our_table_and_we_read_its_journal_and_its_table() {
     let has = Command::new("python3").args(["-c", "import optuna, pandas"]).stderr(Stdio::null()).status();
@@ -232,63 +230,63 @@ fn python_reads_our_table_and_we_read_its_journal_and_its_table() {
     let show = text(folder.path(), &["study", "show", "python.log"]);
     assert!(show.contains("theirs") && show.contains("Fx from 0 to 150"), "{show}");
     assert_eq!(text(folder.path(), &["study", "export", "python.log"]).lines().count(), 6);
-    let said = text(folder.path(), &["study", "import", &ours, "python.csv"]);
-    assert!(said.starts_with("5 trials"), "{said}");
+    let printed = text(folder.path(), &["study", "import", &ours, "python.csv"]);
+    assert!(printed.starts_with("5 trials"), "{printed}");
     assert!(text(folder.path(), &["study", "enqueue", "python.log", "Fx=60"]).contains("trial 5"));
 }
 
-/// (A defect once: every row came in again, and each point looked as if it had been repeated.)
+/// Regression: every row was imported again, and each point appeared to be repeated.
 #[test]
-fn a_table_that_comes_twice_is_no_repeat() {
+fn a_table_that_is_imported_twice_is_no_repeat() {
     let (folder, study) = study("forward");
     text(folder.path(), &["study", "export", &study, "--output", "own.csv"]);
-    let said = text(folder.path(), &["study", "import", &study, "own.csv"]);
-    assert!(said.starts_with("0 trials") && said.contains("6 were there already"), "{said}");
-    // By hand and without times; twice the same in one table is a repeat.
+    let printed = text(folder.path(), &["study", "import", &study, "own.csv"]);
+    assert!(printed.starts_with("0 trials") && printed.contains("6 were there already"), "{printed}");
+    // Written by hand, without times: equal rows of one table are repeats.
     let rows = "params_f0,params_Fx,params_Fz,value\n1.0,100,250,0.5\n1.0,100,250,0.5\n";
     fs::write(folder.path().join("hand.csv"), rows).unwrap();
     assert!(text(folder.path(), &["study", "import", &study, "hand.csv"]).starts_with("2 trials"));
-    let said = text(folder.path(), &["study", "import", &study, "hand.csv"]);
-    assert!(said.starts_with("0 trials") && said.contains("2 were there already"), "{said}");
+    let printed = text(folder.path(), &["study", "import", &study, "hand.csv"]);
+    assert!(printed.starts_with("0 trials") && printed.contains("2 were there already"), "{printed}");
 }
 
-/// (A defect once: it went on with the budget of the configuration, and wrote that one down.)
+/// Regression: the budget of the configuration replaced the stored one.
 #[test]
-fn a_study_that_is_continued_keeps_its_budget() {
+fn a_continued_study_keeps_its_budget() {
     let (folder, study) = study("forward");
     let rest = text(folder.path(), &["optimize", "--resume", &study, "--json", "--record", "none"]);
-    assert_eq!(rest, "", "its six trials are all that it is to have");
+    assert_eq!(rest, "", "its budget of six is met");
     assert!(text(folder.path(), &["study", "show", &study]).contains("budget: 6"));
 }
 
-/// (A defect once: it went back to the configuration that it had begun with.)
+/// Regression: it ran with its first configuration.
 #[test]
-fn a_study_that_is_continued_goes_on_with_the_configuration_that_ran_last() {
+fn a_continued_study_keeps_its_last_configuration() {
     let (folder, study) = study("forward");
     fs::create_dir(folder.path().join("mine")).unwrap();
     fs::write(folder.path().join("mine/optimize.toml"), "[bounds]\nFz = [200.0, 210.0]\n").unwrap();
     let resume = |more: &[&str]| {
-        let words = ["optimize", "--resume", &study, "--json", "--record", "none"];
-        let output = quadfrog(folder.path(), &[&words, more].concat());
+        let base = ["optimize", "--resume", &study, "--json", "--record", "none"];
+        let output = quadfrog(folder.path(), &[&base, more].concat());
         assert!(output.status.success());
         (String::from_utf8(output.stdout).unwrap(), String::from_utf8(output.stderr).unwrap())
     };
     resume(&["--trials", "7", "--config", "mine"]);
-    let (trials, said) = resume(&["--trials", "9"]);
-    assert!(said.contains("config-2"), "{said}");
+    let (trials, printed) = resume(&["--trials", "9"]);
+    assert!(printed.contains("config-2"), "{printed}");
     assert_eq!(trials.lines().count(), 2);
     for line in trials.lines() {
         let trial: Value = serde_json::from_str(line).unwrap();
         assert!((200.0..=210.0).contains(&trial["params"]["Fz"].as_f64().unwrap()), "{line}");
     }
     assert!(text(folder.path(), &["study", "show", &study]).contains("Fz from 200 to 210"));
-    // Back to the first one on purpose: from then on that is the last.
+    // The first configuration, given explicitly, becomes the last one.
     resume(&["--trials", "10", "--config", &format!("{study}/config")]);
-    let (_, said) = resume(&[]);
-    assert!(said.contains("config-3") && !Path::new(&study).join("config-4").exists(), "{said}");
+    let (_, printed) = resume(&[]);
+    assert!(printed.contains("config-3") && !Path::new(&study).join("config-4").exists(), "{printed}");
 }
 
-/// (Defects once: a mistyped place became a new study, and a worker's folder had the name of another seed.)
+/// Regressions: a mistyped place became a new study, and a worker's folder had the name of another seed.
 #[test]
 fn a_mistyped_place_to_join_is_refused_and_a_worker_is_named_after_its_study() {
     let folder = tempfile::tempdir().unwrap();
@@ -299,8 +297,8 @@ fn a_mistyped_place_to_join_is_refused_and_a_worker_is_named_after_its_study() {
     assert!(!folder.path().join("recordigs").exists());
     let new = ["optimize", "--join", "shared.log", "--task", "twist-cw", "--seed", "5", "--trials", "1"];
     let made_new = quadfrog(folder.path(), &new);
-    let said = String::from_utf8_lossy(&made_new.stderr);
-    assert!(made_new.status.success() && said.contains("a new study of twist-cw seed 5 is made in"), "{said}");
+    let printed = String::from_utf8_lossy(&made_new.stderr);
+    assert!(made_new.status.success() && printed.contains("a new study of twist-cw seed 5 is made in"), "{printed}");
     let rest = text(folder.path(), &["optimize", "--join", "shared.log", "--json"]);
     assert_eq!(rest, "", "its budget of 1 is met");
     let names: Vec<String> = made(folder.path()).iter().map(|path| path.display().to_string()).collect();

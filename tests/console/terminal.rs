@@ -1,4 +1,4 @@
-//! The real program in a pseudo-terminal: a session by keys, and every way to lose or leave the terminal.
+//! The program in a pseudo-terminal: a session by keys, and all ways to lose or leave the terminal.
 
 #[path = "support/pty.rs"]
 mod pty;
@@ -17,7 +17,7 @@ use quadfrog::telemetry::Mode;
 use quadfrog::trial::{ProposalSource, TrialRecord, Verdict};
 use quadfrog_console::app::{self, ConsoleOptions};
 use quadfrog_console::feed::Feed;
-use quadfrog_console::settings::Settings;
+use quadfrog_console::settings::ConsoleSettings;
 
 const SIZE: (u16, u16) = (100, 30);
 
@@ -48,7 +48,7 @@ fn rows(player: &Player) -> Vec<TrialRecord> {
     rows.into_values().collect()
 }
 
-/// When the mode became `mode` for the first time, s.
+/// Time at which `mode` was first entered, s.
 fn entered(player: &Player, mode: Mode) -> f64 {
     let at = player.events().iter().find_map(|event| match &event.record {
         Record::Transition(change) if change.to == mode => Some(event.time_ns),
@@ -65,11 +65,11 @@ fn entered(player: &Player, mode: Mode) -> f64 {
 fn stored(file: &Path) -> Vec<Trial> {
     let journal = JournalFile::new(file, Durability::Synced, LOCK_GRACE).expect("a journal");
     let journal = Journal::open(journal).expect("a journal that can be read");
-    journal.replay().studies()[0].trials.clone()
+    journal.state().studies()[0].trials.clone()
 }
 
 #[test]
-fn a_session_by_keys_is_what_the_recording_and_the_study_say() {
+fn a_session_by_keys_agrees_with_the_recording_and_the_study() {
     let folder = folder();
     let mut session = Session::start(folder.path(), SIZE, &["--seed", "3"]);
     session.wait_for(&["DISARMED", "SIM", "Press A to arm", "STOP  Space F12"]);
@@ -82,7 +82,7 @@ fn a_session_by_keys_is_what_the_recording_and_the_study_say() {
     session.wait_for(&["Fx    120.0 N"]);
     session.approve();
     session.wait_for(&["Trial #0: judge it"]);
-    // A jump that the rules may think well of, marked a fall.
+    // The suggested verdict may be accept; the operator decides.
     session.send("f");
     session.wait_for(&["Trial #1, by the sampler"]);
     if session.screen().contains("DISARMED") {
@@ -128,7 +128,7 @@ fn a_session_by_keys_is_what_the_recording_and_the_study_say() {
     assert_eq!(
         states,
         [(TrialState::Complete, Some(0.0)), (TrialState::Fail, None), (TrialState::Waiting, None)],
-        "the fall counts with 0, the re-run one is void, its repetition waits"
+        "the fall counts with 0, the re-run trial is void, its repeat waits"
     );
     assert_eq!(study[0].parameter("Fx"), Some(120.0));
     assert_eq!(study[0].fixed(), [("Fx".to_owned(), 120.0)], "an override is a fixed parameter to the sampler");
@@ -149,7 +149,7 @@ fn stop_key_stops_at_once_and_k_acknowledges() {
     session.send("A");
     session.wait_for(&["Press g twice"]);
     session.send(" ");
-    session.wait_for(&["DAMPED", "then press k"]);
+    session.wait_for(&["DAMPED", "k acknowledges"]);
     session.send("k");
     session.wait_for(&["DISARMED", "Press A to arm"]);
     session.send("q");
@@ -163,7 +163,7 @@ fn a_terminal_that_does_not_read_delays_no_stop() {
     session.wait_for(&["Press A to arm"]);
     session.read(false);
     session.send("A");
-    // Long enough for the frames to fill the terminal's buffer.
+    // The frames fill the terminal's buffer.
     std::thread::sleep(Duration::from_secs(4));
     session.send(" ");
     std::thread::sleep(Duration::from_millis(500));
@@ -172,7 +172,7 @@ fn a_terminal_that_does_not_read_delays_no_stop() {
     session.send("kq");
     assert!(session.wait().success());
     let player = player(folder.path());
-    // Both keys would have been read at once, after the stall, if drawing had held them up.
+    // If drawing blocked the loop, both keys would be read together after the stall.
     let apart = entered(&player, Mode::Damped) - entered(&player, Mode::StandUp);
     assert!(apart > 3.0, "arming and stopping came {apart:.2} s apart, typed 4 s apart");
 }
@@ -183,7 +183,7 @@ fn resizing_at_any_moment_is_safe() {
     let mut session = Session::start(folder.path(), SIZE, &[]);
     session.wait_for(&["Press A to arm"]);
     session.send("A");
-    // Not before: on a terminal that is too small nothing is armed.
+    // Arming is refused on a terminal that is too small.
     session.wait_for(&["STAND UP"]);
     for step in 0..60_u16 {
         session.resize(20 + (step * 37) % 200, 5 + (step * 13) % 60);
@@ -205,7 +205,7 @@ fn signals_end_the_program_with_the_terminal_restored() {
         let folder = folder();
         let mut session = Session::start(folder.path(), SIZE, &[]);
         session.wait_for(&["Press A to arm"]);
-        // The mouse, too, is the terminal's own again afterwards.
+        // The mouse capture must end too.
         session.send("M");
         session.wait_for(&["mouse on"]);
         session.signal(signal);
@@ -229,7 +229,7 @@ fn suspending_gives_the_terminal_back_and_continuing_takes_it() {
     session.signal(Signal::SIGCONT);
     session.wait_for(&["Press A to arm", "STOP  Space F12"]);
     assert!(!session.restored());
-    // Armed, it is refused: a stopped process could not stop a robot.
+    // Refused while armed: a stopped process cannot stop a robot.
     session.send("A");
     session.wait_for(&["Press g twice"]);
     session.signal(Signal::SIGTSTP);
@@ -240,20 +240,20 @@ fn suspending_gives_the_terminal_back_and_continuing_takes_it() {
 }
 
 #[test]
-fn a_hang_up_closes_the_session_without_a_word() {
+fn a_hang_up_closes_the_session_without_output() {
     let folder = folder();
     let mut session = Session::start(folder.path(), SIZE, &[]);
     session.wait_for(&["Press A to arm"]);
     session.hang_up();
     session.wait();
-    assert!(!session.sent(b"\x1b[?1049l"), "nothing is written to a terminal that is gone");
+    assert!(!session.sent(b"\x1b[?1049l"), "no output after a hang-up");
     assert_eq!(player(folder.path()).damage(), None);
 }
 
-/// (A defect once: the robot went on jumping with nobody there, and the trial counted as cut off by a crash.)
+/// Regression: the robot continued to jump without an operator, and the trial counted as interrupted by a crash.
 #[test]
 fn losing_the_operator_in_mid_jump_lands_the_robot_and_voids_the_trial() {
-    // A series that takes seven seconds: whoever is lost is lost in the middle of it.
+    // A series of seven seconds, so that the loss falls into it.
     let config = folder();
     std::fs::write(config.path().join("control.toml"), "[tasks.forward]\njumps = 5\nf1_hz = 0.5\n").expect("written");
     let first = "[first.forward]\nf0 = 1.3\nFx = 20.0\nFz = 270.0\n";
@@ -283,7 +283,7 @@ fn losing_the_operator_in_mid_jump_lands_the_robot_and_voids_the_trial() {
         let after: Vec<Mode> = changes.skip_while(|mode| *mode != Mode::Jump).take(landed.len()).collect();
         assert_eq!(after, landed, "{way:?}");
 
-        // The verdict and its cause are on disk though nobody was there to give one.
+        // The verdict and its cause are on disk.
         let study = study(folder.path());
         let trials = stored(&study.join("study.log"));
         let states: Vec<_> = trials.iter().map(|trial| trial.state).collect();
@@ -292,7 +292,7 @@ fn losing_the_operator_in_mid_jump_lands_the_robot_and_voids_the_trial() {
         let cause = trials[0].user_attributes["cause"].as_str().expect("a cause");
         assert!(cause.starts_with("operator lost"), "{way:?}: {cause}");
 
-        // Another program takes it up where it was.
+        // Another program continues the study.
         let mut command = CommandBuilder::new(env!("CARGO_BIN_EXE_quadfrog"));
         command.arg("--resume");
         command.arg(&study);
@@ -304,9 +304,9 @@ fn losing_the_operator_in_mid_jump_lands_the_robot_and_voids_the_trial() {
 }
 
 #[test]
-fn a_hang_up_that_no_signal_tells_of_is_noticed() {
+fn a_hang_up_without_a_signal_is_detected() {
     let folder = folder();
-    // In a session of its own the program has no controlling terminal, so nobody sends it SIGHUP.
+    // After setsid the program has no controlling terminal and receives no SIGHUP.
     let mut command = CommandBuilder::new("setsid");
     command.args(["--wait", env!("CARGO_BIN_EXE_quadfrog"), "--output"]);
     command.arg(folder.path());
@@ -319,7 +319,7 @@ fn a_hang_up_that_no_signal_tells_of_is_noticed() {
 }
 
 #[test]
-fn a_panic_in_any_thread_restores_the_terminal_and_says_which() {
+fn a_panic_in_any_thread_restores_the_terminal_and_names_the_thread() {
     let folder = folder();
     let mut command = CommandBuilder::new(std::env::current_exe().expect("this program"));
     command.args(["--ignored", "--exact", "a_console_one_of_whose_threads_panics", "--nocapture"]);
@@ -331,11 +331,11 @@ fn a_panic_in_any_thread_restores_the_terminal_and_says_which() {
 }
 
 #[test]
-#[ignore = "a program that another test runs in a terminal"]
+#[ignore = "run by another test in a terminal"]
 fn a_console_one_of_whose_threads_panics() {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/console/session.mcap");
     let player = Player::open(file).expect("the recorded session");
-    let options = ConsoleOptions::new(Settings::built_in(), None, false, false);
+    let options = ConsoleOptions::new(ConsoleSettings::built_in(), None, false, false);
     let defect = || {
         std::thread::sleep(Duration::from_secs(1));
         panic!("an injected defect");
@@ -350,15 +350,15 @@ fn a_small_terminal_and_none_are_refused_with_status_2() {
     let folder = folder();
     let mut session = Session::start(folder.path(), (40, 10), &[]);
     assert_eq!(session.wait().exit_code(), 2);
-    let said: String = session.screen().split_whitespace().collect::<Vec<_>>().join(" ");
-    assert!(said.replace(' ', "").contains("40x10") && said.replace(' ', "").contains("80x24"), "{said}");
+    let printed: String = session.screen().split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(printed.replace(' ', "").contains("40x10") && printed.replace(' ', "").contains("80x24"), "{printed}");
     let output = std::process::Command::new(env!("CARGO_BIN_EXE_quadfrog"))
         .current_dir(folder.path())
         .stdin(std::process::Stdio::null())
         .output()
         .expect("run");
     assert_eq!(output.status.code(), Some(2));
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(said.contains("needs a terminal"), "{said}");
-    assert_eq!(std::fs::read_dir(folder.path()).expect("the folder").count(), 0, "nothing is left behind");
+    let printed = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(printed.contains("needs a terminal"), "{printed}");
+    assert_eq!(std::fs::read_dir(folder.path()).expect("the folder").count(), 0, "no file is left");
 }

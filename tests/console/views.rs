@@ -8,13 +8,15 @@ use quadfrog::recording::player::Player;
 use quadfrog::recording::record::Record;
 use quadfrog::telemetry::{Mode, Phase};
 use quadfrog::trial::{ExperimentStage, TrialRecord, Verdict};
-use quadfrog_console::dialog::Dialog;
 use quadfrog_console::feed::Feed;
+use quadfrog_console::message::{Effect, Mouse, Msg};
 use quadfrog_console::model::View;
-use quadfrog_console::settings::{BellCause, DEFAULT, Settings};
+use quadfrog_console::model::dialog::Dialog;
+use quadfrog_console::model::session::SessionModel;
+use quadfrog_console::settings::{BellCause, ConsoleSettings, DEFAULT};
+use quadfrog_console::text;
 use quadfrog_console::theme::{Colours, Glyphs, Theme};
-use quadfrog_console::update::{Effect, Mouse, Msg};
-use quadfrog_console::view::trial_text;
+use strum::VariantArray;
 use support::{Console, tick, trial};
 
 /// A console that has seen the jumps of some trials, each a second after the one before; roll says which one it was.
@@ -217,7 +219,7 @@ fn a_trial_without_a_trace_cannot_be_a_ghost() {
     let mut console = jumped(&[1]);
     console.record(Record::Trial(trial(0, Some(Verdict::Accept), None)));
     console.press(&["2", "Home", "c"]);
-    assert_eq!(console.said(), "no trace of that trial: this console did not see its jump");
+    assert_eq!(console.said(), "no recorded signals for trial 0");
 }
 
 /// Twelve trials: accept, fall, void in turn.
@@ -231,7 +233,7 @@ fn twelve() -> Console {
 }
 
 fn numbers(console: &Console) -> Vec<u32> {
-    console.model.table().iter().map(|row| row.trial).collect()
+    console.model.trial_rows().iter().map(|row| row.trial).collect()
 }
 
 #[test]
@@ -276,19 +278,19 @@ fn columns_are_chosen_in_a_dialog_and_in_the_settings() {
     let mut table: toml::Table = DEFAULT.parse().expect("the defaults");
     table.insert("trial_columns".into(), vec!["apex", "value"].into());
     table.insert("chart_series".into(), vec!["height"].into());
-    let settings = Settings::from_table(&table).expect("columns that exist");
+    let settings = ConsoleSettings::from_table(&table).expect("columns that exist");
     let mut console = Console::with(settings, Theme { colours: Colours::None, glyphs: Glyphs::Ascii });
     console.record(Record::Trial(trial(0, Some(Verdict::Accept), None)));
     console.press(&["2"]);
     let screen = console.screen(80, 24);
-    assert!(screen.contains("apex m") && !screen.contains("verdict  source"), "{screen}");
+    assert!(screen.contains("rise m") && !screen.contains("verdict  source"), "{screen}");
     for (key, wrong) in [("trial_columns", "colour"), ("chart_series", "mood")] {
         let mut table: toml::Table = DEFAULT.parse().expect("the defaults");
         table.insert(key.into(), vec![wrong].into());
-        let error = Settings::from_table(&table).expect_err(wrong).to_string();
+        let error = ConsoleSettings::from_table(&table).expect_err(wrong).to_string();
         assert!(error.contains(key) && error.contains(wrong) && error.contains("is not one of"), "{error}");
         table.insert(key.into(), toml::Value::Array(Vec::new()));
-        assert!(Settings::from_table(&table).is_err(), "no column at all");
+        assert!(ConsoleSettings::from_table(&table).is_err(), "no column at all");
     }
 }
 
@@ -302,7 +304,7 @@ fn the_filter_the_best_and_a_number_find_rows() {
     console.press(&["F", "b"]);
     assert_eq!(numbers(&console), [0, 3, 6, 9], "each was the best so far");
     console.press(&["b", "/", "7", "Enter"]);
-    assert_eq!(console.model.trials_view.selected, Some(7));
+    assert_eq!(console.model.trial_table.selected, Some(7));
     console.press(&["/", "9", "9", "Enter"]);
     assert!(console.screen(80, 24).contains("there is no trial 99"), "{}", console.screen(80, 24));
 }
@@ -332,8 +334,7 @@ fn details_tell_everything_that_is_known_of_a_trial() {
     console.record(Record::Trial(again));
     console.press(&["2", "Home", "Enter"]);
     let screen = console.screen(80, 24);
-    for part in
-        ["Trial #0", "void", "the rules said", "fall: roll 1.20 rad", "75.00000 N", "(0 to 150)", "slid on the mat"]
+    for part in ["Trial #0", "void", "suggested", "fall: roll 1.20 rad", "75.00000 N", "(0 to 150)", "slid on the mat"]
     {
         assert!(screen.contains(part), "no {part}:\n{screen}");
     }
@@ -350,18 +351,26 @@ fn a_row_is_copied_and_the_table_is_written_as_shown() {
     let mut console = twelve();
     console.press(&["Home"]);
     let effects = console.press(&["y"]);
-    let [Effect::Copy(text)] = effects.as_slice() else { panic!("{effects:?}") };
-    assert!(text.starts_with("trial 0\tf0=1.25\tFx=75\tFz=250\tJ=0.4 m\taccept"), "{text}");
+    assert_eq!(effects, [Effect::CopyTrial(0)]);
+    let row = text::as_text(&console.model.session.trials.records[&0], &console.model);
+    assert!(row.starts_with("trial 0\tf0=1.25\tFx=75\tFz=250\tJ=0.4 m\taccept"), "{row}");
     assert_eq!(console.press(&["e"]), [Effect::Export]);
     console.press(&["F", "F"]);
-    let csv = trial_text::as_csv(&console.model);
+    let csv = text::as_csv(&console.model);
     let lines: Vec<&str> = csv.lines().collect();
     assert_eq!(lines.len(), 5, "a heading and the four falls that the filter shows");
     assert!(lines[0].starts_with("trial,f0,Fx,Fz,value") && lines[1].starts_with("1,1.25,75,250,0,"), "{csv}");
     let columns = |line: &str| line.split(',').count();
     assert!(lines.iter().all(|line| columns(line) == columns(lines[0])), "{csv}");
-    let markdown = trial_text::as_markdown(&console.model);
+    let markdown = text::as_markdown(&console.model);
     assert!(markdown.starts_with("| trial | f0 |") && markdown.lines().nth(1).is_some_and(|l| l.contains(" --- |")));
+}
+
+#[test]
+fn a_rewound_replay_starts_from_an_empty_session() {
+    let mut console = Console::review(Mode::Damped, Verdict::Fall);
+    console.tell(Msg::Rewound);
+    assert_eq!(format!("{:?}", console.model.session), format!("{:?}", SessionModel::default()));
 }
 
 #[test]
@@ -369,7 +378,7 @@ fn csv_cells_with_commas_and_quotes_are_quoted() {
     let mut console = Console::ready();
     let row = TrialRecord { note: "slid, \"a bit\"".into(), ..trial(0, Some(Verdict::Accept), None) };
     console.record(Record::Trial(row));
-    let csv = trial_text::as_csv(&console.model);
+    let csv = text::as_csv(&console.model);
     assert!(csv.contains("\"slid, \"\"a bit\"\"\""), "{csv}");
 }
 
@@ -383,7 +392,8 @@ fn the_mouse_is_off_until_it_is_asked_for_and_never_commands() {
     assert_eq!(console.press(&["M"]), [Effect::Mouse(true)]);
     // Tabs.
     let tabs = console.screen(80, 24).lines().nth(2).expect("tabs").to_owned();
-    for (view, name) in View::ALL.into_iter().zip(["Live", "Trials", "Optimizer", "Override", "Health", "Log"]) {
+    for (view, name) in View::VARIANTS.iter().copied().zip(["Live", "Trials", "Optimizer", "Override", "Health", "Log"])
+    {
         let column = tabs.find(name).expect(name) as u16;
         assert_eq!(console.tell(click(column, 2)), []);
         assert_eq!(console.model.view, view);
@@ -402,11 +412,11 @@ fn the_mouse_is_off_until_it_is_asked_for_and_never_commands() {
     // The wheel.
     console.press(&["Home"]);
     console.tell(Msg::Mouse(Mouse::WheelDown));
-    assert_eq!(console.model.trials_view.selected, Some(3));
+    assert_eq!(console.model.trial_table.selected, Some(3));
     console.tell(Msg::Mouse(Mouse::WheelUp));
-    assert_eq!(console.model.trials_view.selected, Some(0));
+    assert_eq!(console.model.trial_table.selected, Some(0));
     // Wherever it is clicked, in whatever mode: nothing leaves for the robot.
-    for mode in Mode::ALL {
+    for &mode in Mode::ALL {
         console.mode(mode);
         for key in ["1", "2", "4"] {
             console.press(&[key]);
@@ -546,7 +556,7 @@ fn markers_take_a_replay_from_trial_to_trial_and_to_the_end() {
     }
     times.dedup();
     assert!(times.len() == 4 && times.is_sorted(), "{times:?}");
-    assert_eq!(played.console.model.trials.len(), 3, "all trials at the end");
+    assert_eq!(played.console.model.session.trials.records.len(), 3, "all trials at the end");
     played.press("[");
     let marker = played.time_ms();
     assert!(times.contains(&marker) && marker < times[times.len() - 1]);
@@ -554,7 +564,7 @@ fn markers_take_a_replay_from_trial_to_trial_and_to_the_end() {
         played.press("[");
     }
     assert_eq!(played.time_ms(), 0);
-    assert_eq!(played.console.model.trials.len(), 0, "what was not yet, is not shown");
+    assert_eq!(played.console.model.session.trials.records.len(), 0, "what was not yet, is not shown");
     // From the end, playing starts over.
     for _ in 0..20 {
         played.press("]");

@@ -1,5 +1,5 @@
-//! Several programs on one study: workers of this program as processes, one of them killed, and Python's, on a journal file
-//! and on a real Redis server (skipped with a message where `redis-server` or Optuna is missing).
+//! Several worker processes on one study, one of them killed, and a worker of Optuna, on a journal file and on a Redis
+//! server (skipped with a message if `redis-server` or Optuna is missing).
 
 #[path = "../support/redis.rs"]
 mod redis;
@@ -16,13 +16,13 @@ use quadfrog::optimize::trial::{Trial, TrialState};
 use redis::{Ended, server};
 use serde_json::Value;
 
-/// Trials of all workers together.
+/// Number of trials of all workers together.
 const BUDGET: usize = 400;
 
-/// Trials of a study that Python takes part in.
+/// Number of trials of the study that Optuna joins.
 const SHARED: usize = 120;
 
-/// A worker on `journal`; its trials come as JSON lines.
+/// Starts a worker on `journal` that prints JSON lines.
 fn worker(folder: &Path, journal: &str, budget: usize) -> Ended {
     let trials = budget.to_string();
     let mut command = Command::new(env!("CARGO_BIN_EXE_quadfrog"));
@@ -31,7 +31,7 @@ fn worker(folder: &Path, journal: &str, budget: usize) -> Ended {
     Ended(command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap())
 }
 
-/// A folder with a configuration in which a dead worker's trial is not waited for long.
+/// A folder with a configuration in which a dead worker's trial is abandoned after 10 s.
 fn folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     fs::create_dir(folder.path().join("mine")).unwrap();
@@ -39,7 +39,7 @@ fn folder() -> tempfile::TempDir {
     folder
 }
 
-/// The numbers of the trials that a worker printed until it ended by itself.
+/// The numbers of the trials that a worker printed until its end.
 fn printed(worker: Ended) -> Vec<u32> {
     let mut worker = worker;
     let mut output = String::new();
@@ -52,10 +52,10 @@ fn printed(worker: Ended) -> Vec<u32> {
 }
 
 fn trials(storage: &Storage) -> Vec<Trial> {
-    storage.journal(Durability::Buffered).unwrap().replay().studies()[0].trials.clone()
+    storage.journal(Durability::Buffered).unwrap().state().studies()[0].trials.clone()
 }
 
-/// Nothing is lost, nothing is there twice, and the budget is met to the trial.
+/// Checks that no trial is lost or duplicated and the budget is met exactly.
 fn check(trials: &[Trial], by_worker: &BTreeMap<u32, Vec<u32>>, printed: &[u32]) {
     let counted: Vec<&Trial> = trials.iter().filter(|t| t.state == TrialState::Complete).collect();
     assert_eq!(counted.len(), BUDGET, "the budget is met to the trial");
@@ -84,13 +84,13 @@ fn four_workers(journal: &str, storage: &Storage) {
     let folder = folder();
     let mut victim = worker(folder.path(), journal, BUDGET);
     let mut lines = BufReader::new(victim.0.stdout.take().unwrap()).lines();
-    // The first makes the study; the others then join it.
+    // The first worker makes the study.
     let mut seen: Vec<u32> = Vec::new();
     let number = |line: String| serde_json::from_str::<Value>(&line).unwrap()["trial"].as_u64().unwrap() as u32;
     seen.push(number(lines.next().expect("a first trial").unwrap()));
     let others: Vec<Ended> = (0..3).map(|_| worker(folder.path(), journal, BUDGET)).collect();
     seen.extend(lines.by_ref().take(30).map(|line| number(line.unwrap())));
-    // Killed in the middle of its work, whenever that is; what it had printed by then has been judged.
+    // The trials it printed before the kill are judged.
     victim.0.kill().unwrap();
     victim.0.wait().unwrap();
     seen.extend(lines.map_while(Result::ok).filter(|line| line.ends_with('}')).map(number));
@@ -104,7 +104,7 @@ fn four_workers(journal: &str, storage: &Storage) {
     check(&trials, &workers, &all);
     let seeds: BTreeSet<u64> =
         trials.iter().map(|t| t.system_attributes["quadfrog:draws"]["seed"].as_u64().unwrap()).collect();
-    assert_eq!(seeds.len(), 4, "each worker has streams of its own");
+    assert_eq!(seeds.len(), 4, "each worker has its own random streams");
 }
 
 #[test]
@@ -160,12 +160,11 @@ fn a_python_worker_joins_the_study() {
     println!("{count} trials of ours, {python} of Python's");
     assert_eq!(python, 25);
     assert_eq!(counted, count + python);
-    // Python does not know our budget: what it begins after ours have ended is beyond it.
+    // Optuna does not know the budget and may exceed it after our workers have ended.
     assert!((SHARED..=SHARED + 25).contains(&counted), "{counted}");
 }
 
-/// A worker that joins the study of a session's folder takes its budget, robot, task and configuration from there, leaves
-/// its running trials alone, and cannot be misled about them.
+/// It takes budget, robot, task and configuration from the folder; contradicting arguments are refused.
 #[test]
 fn a_worker_joins_the_study_of_a_folder() {
     let folder = tempfile::tempdir().unwrap();
@@ -181,7 +180,7 @@ fn a_worker_joins_the_study_of_a_folder() {
     assert!(made.status.success());
     let study = fs::read_dir(folder.path().join("first")).unwrap().next().unwrap().unwrap().path();
     let study = study.to_str().unwrap();
-    // The session itself may run at the same time: its lock is not in the way.
+    // The lock of a running session does not prevent joining.
     let held = fs::File::open(Path::new(study).join("session.lock")).unwrap();
     held.lock().unwrap();
     let joined = run(&["optimize", "--join", study, "--json", "--record", "none"]);
@@ -201,5 +200,5 @@ fn a_worker_joins_the_study_of_a_folder() {
     let message = String::from_utf8_lossy(&refused.stderr);
     assert!(refused.status.code() == Some(2) && message.contains("forward seed 2"), "{message}");
     let refused = run(&["optimize", "--join", "redis://127.0.0.1:1/0"]);
-    assert_eq!(refused.status.code(), Some(1), "a server that does not answer is no bad input");
+    assert_eq!(refused.status.code(), Some(1), "a server that does not answer is not unusable input");
 }

@@ -1,9 +1,9 @@
-//! Jumps that the controller makes on its own estimate, and how far the estimate was from the truth. Shared by
+//! Jumps with the controller on its own estimate, and the error of that estimate. Shared by
 //! `tests/estimator.rs` and `benches/estimator.rs`.
 #![allow(dead_code, reason = "test and bench each use their own part")]
 
 use nalgebra::Vector2;
-use quadfrog::config::{Backend, Config};
+use quadfrog::config::Config;
 use quadfrog::control::estimator::Estimator;
 use quadfrog::control::leg::feet;
 use quadfrog::control::settings::{ControlSettings, ObjectiveSource};
@@ -13,18 +13,18 @@ use quadfrog::session::objective;
 use quadfrog::session::rollout::Rollout;
 use quadfrog::sim::{ActuatorKind, SimConfig, Simulator};
 use quadfrog::telemetry::{Tick, TrialEnd, TrialSpec};
-use quadfrog::trial::{JumpParameters, MeasuredJump, Task, Verdict};
+use quadfrog::trial::{Backend, JumpParameters, MeasuredJump, Task, Verdict};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
 /// The world in which the robot jumps; sensors have their configured errors in all of them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum World {
-    /// Motors that give what is asked, friction 1.0.
+    /// Ideal motors, friction 1.0.
     Ideal,
     /// Motors with lag, friction and a torque-speed curve; friction 0.6, so that feet slip.
     HardwareLike,
-    /// That, and what no data sheet tells: see [`Imperfect`].
+    /// The same with calibration errors: see [`Imperfect`].
     Imperfect,
 }
 
@@ -56,7 +56,7 @@ pub fn settings_of(task: Task, source: ObjectiveSource) -> ControlSettings {
 
 /// A simulator whose machine was badly calibrated: joint zeros off by 0.01 rad (5 mm at the foot), an accelerometer with 1 %
 /// of scale error that clips at 8 g, joint velocities that lag by 3 ms, foot sensors with a gain of 0.7 to 1.3 and up to 5 N
-/// of offset. What is wrong is drawn anew for every trial.
+/// of offset. The errors are drawn for every trial.
 pub struct Imperfect {
     robot: Simulator,
     random: ChaCha8Rng,
@@ -82,7 +82,7 @@ impl Imperfect {
         }
     }
 
-    /// Evenly drawn between -1 and 1.
+    /// Uniform in -1..1.
     fn draw(&mut self) -> f64 {
         2.0 * even(&mut self.random) - 1.0
     }
@@ -117,7 +117,7 @@ impl Robot for Imperfect {
 
     fn place(&mut self, placement: &Placement) -> bool {
         self.random = ChaCha8Rng::seed_from_u64(placement.seed);
-        // Even between -a and a has a standard deviation of a / sqrt(3).
+        // The uniform distribution in -a..a has the standard deviation a / sqrt(3).
         self.joint_zero = std::array::from_fn(|_| 0.01 * 3.0_f64.sqrt() * self.draw());
         self.joint_velocity = [0.0; JOINTS];
         self.accel_scale = 1.0 + 0.01 * self.draw();
@@ -129,12 +129,12 @@ impl Robot for Imperfect {
     }
 }
 
-/// Evenly drawn between 0 and 1.
+/// Uniform in 0..1.
 fn even(random: &mut ChaCha8Rng) -> f64 {
     f64::from(random.next_u32()) / f64::from(u32::MAX)
 }
 
-/// One jump that did not fall: what the estimate makes of it less what it was.
+/// Errors of the estimate over one jump that did not fall: estimate minus truth.
 #[derive(Debug, Clone, Copy)]
 pub struct JumpError {
     pub task: Task,
@@ -160,8 +160,8 @@ impl JumpError {
     }
 }
 
-/// Makes `count` jumps of the five tasks in turn, with parameters drawn evenly within the shipped bounds. Returns those that
-/// landed, and how the others ended.
+/// Makes `count` jumps of the five tasks in turn, with uniform parameters within the shipped bounds. Returns those that landed, and
+/// the ends of the others.
 pub fn jumps(world: World, source: ObjectiveSource, count: u32, seed: u64) -> (Vec<JumpError>, Vec<TrialEnd>) {
     let robot = RobotDescription::embedded("go1").unwrap();
     let trials = jumps_on(source, count, seed, |_| {
@@ -182,7 +182,7 @@ pub fn jumps(world: World, source: ObjectiveSource, count: u32, seed: u64) -> (V
     (landed, fallen)
 }
 
-/// The same jumps on the machine that `machine` makes for each trial: every one of them, with how it ended.
+/// The same jumps on the machine that `machine` makes for each trial; returns every jump with its end.
 pub fn jumps_on<R: Robot>(
     source: ObjectiveSource,
     count: u32,
@@ -215,7 +215,7 @@ pub fn jumps_on<R: Robot>(
     trials
 }
 
-/// The same ticks with the simulator's own knowledge as the estimate.
+/// The same ticks with the simulator's true state as the estimate.
 pub fn in_truth(ticks: &[Tick], settings: &ControlSettings) -> Vec<Tick> {
     let settings = ControlSettings { objective: ObjectiveSource::Truth, ..*settings };
     let mut estimator = Estimator::default();

@@ -1,47 +1,53 @@
-//! A Go1 link and an emulated robot, millisecond by millisecond over a real loopback socket.
+//! A Go1 link and an emulated robot, stepped by the millisecond over a real loopback socket.
 #![allow(dead_code, reason = "each test uses its own part")]
 
 use std::net::{Ipv4Addr, SocketAddr};
 
-use quadfrog::robot::description::RobotDescription;
-use quadfrog::robot::go1::Go1;
+use quadfrog::robot::description::{RobotDescription, RobotFiles};
+use quadfrog::robot::go1::{Go1, Network};
 use quadfrog::robot::{JointCommand, LinkStatus, Placement, Robot, RobotError, RobotState};
 use quadfrog::sim::SimConfig;
 use quadfrog::sim::emulator::Emulator;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
-/// Any free port of this machine.
+/// Any free loopback port.
 pub const ANY_PORT: SocketAddr = SocketAddr::new(std::net::IpAddr::V4(Ipv4Addr::LOCALHOST), 0);
 
-/// The Go1 whose link takes any port and goes to `address`.
-pub fn description(address: SocketAddr) -> RobotDescription {
-    let mut description = RobotDescription::embedded("go1").unwrap();
-    let network = description.network.as_mut().unwrap();
-    network.local_port = 0;
-    network.address = address;
-    description
+/// The embedded Go1.
+pub fn description() -> RobotDescription {
+    RobotDescription::embedded("go1").unwrap()
 }
 
-/// An emulated robot on a port of its own, and a link to it.
+/// Network settings for a robot at `address`, with any local port.
+pub fn network(address: SocketAddr) -> Network {
+    let network = Network::read(&RobotFiles::embedded("go1").unwrap()).unwrap().unwrap();
+    Network { address, local_port: 0, ..network }
+}
+
+/// An emulated robot on a port of its own.
+pub fn emulator(config: &SimConfig, seed: u64) -> Emulator {
+    Emulator::bind(ANY_PORT, &description(), &network(ANY_PORT), config, seed).unwrap()
+}
+
+/// An emulated robot and a link to it.
 pub fn pair(config: &SimConfig, seed: u64) -> (Emulator, Go1) {
-    let emulator = Emulator::bind(ANY_PORT, &description(ANY_PORT), config, seed).unwrap();
-    let go1 = Go1::open(&description(emulator.local_address().unwrap()), false).unwrap();
+    let emulator = emulator(config, seed);
+    let go1 = Go1::open(&network(emulator.local_address().unwrap()), false).unwrap();
     (emulator, go1)
 }
 
-/// A control thread that does not always get its processor: now and then the robot lives on for some milliseconds under the
-/// last command. Half of the time the ticks that were missed follow at once and find nothing new; half of the time it is
-/// the robot that is late, and then catches up.
+/// Gaps in the timing of control thread and robot. In half of the gaps the robot runs some milliseconds ahead under the
+/// last command and the missed ticks then follow at once; in the other half the robot is late and then catches up.
 pub struct Late {
     random: ChaCha8Rng,
-    /// One tick of so many begins a gap.
+    /// One tick in this many starts a gap, on average.
     one_in: u32,
     /// The longest gap, ms.
     most_ms: u32,
-    /// Milliseconds that the robot is ahead of the ticks (or behind, if negative), and not yet made up for.
+    /// Milliseconds that the robot is ahead of the ticks (behind, if negative).
     ahead_ms: i32,
-    /// When a robot that is behind catches up.
+    /// Value of `ahead_ms` at which a late robot catches up.
     until_ms: i32,
 }
 
@@ -50,12 +56,12 @@ impl Late {
         Late { random: ChaCha8Rng::seed_from_u64(seed), one_in, most_ms, ahead_ms: 0, until_ms: 0 }
     }
 
-    /// The same with other moments.
+    /// The same rate of gaps with another seed.
     pub fn seeded(&self, seed: u64) -> Late {
         Late::new(self.one_in, self.most_ms, seed)
     }
 
-    /// How many milliseconds of the robot's life follow this tick.
+    /// Number of emulator steps after this tick.
     fn steps(&mut self) -> u32 {
         match self.ahead_ms {
             0 if self.random.next_u32().is_multiple_of(self.one_in) => {
@@ -84,28 +90,28 @@ impl Late {
     }
 }
 
-/// An emulated robot behind its link as one machine: every command that goes out is followed by one millisecond of the robot's
-/// life. A study over the network that repeats bit for bit.
+/// An emulated robot and its link as one [`Robot`]: every command is followed by one millisecond of the robot. Repeats
+/// bit for bit.
 pub struct Lockstep {
     pub emulator: Emulator,
     pub go1: Go1,
-    /// Cameras tell where the robot is: what is left to see is the link alone.
-    pub watched: bool,
-    /// Who does not keep time; none where every command is followed by one millisecond.
+    /// Whether states contain the emulator's true state, so that only the link differs from a simulator.
+    pub with_truth: bool,
+    /// Timing gaps; none if every command is followed by one millisecond.
     pub late: Option<Late>,
 }
 
 impl Lockstep {
     pub fn new(config: &SimConfig, seed: u64) -> Lockstep {
         let (emulator, go1) = pair(config, seed);
-        Lockstep { emulator, go1, watched: false, late: None }
+        Lockstep { emulator, go1, with_truth: false, late: None }
     }
 }
 
 impl Robot for Lockstep {
     fn read(&mut self) -> Result<RobotState, RobotError> {
         let mut state = self.go1.read()?;
-        if self.watched {
+        if self.with_truth {
             state.truth = self.emulator.status().truth;
         }
         Ok(state)
@@ -119,7 +125,7 @@ impl Robot for Lockstep {
         written
     }
 
-    /// What a person does, without the wait.
+    /// Places the robot as a person would, without the wait.
     fn place(&mut self, placement: &Placement) -> bool {
         self.emulator.place(placement);
         if let Some(late) = &mut self.late {

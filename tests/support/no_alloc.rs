@@ -1,5 +1,5 @@
-//! An allocator that ends the process on the spot where no memory may be allocated or freed. To be included by a test program,
-//! for which it is then the only allocator.
+//! A global allocator that aborts the process on an allocation or a free inside a guarded section. To be included by a test
+//! program.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -13,7 +13,7 @@ struct Forbidding;
 /// Ends the process: a panic would allocate its message.
 fn not_now() {
     if FORBIDDEN.with(Cell::get) {
-        // What is said must not allocate either.
+        // The message must not allocate either.
         let _ = nix::unistd::write(std::io::stderr(), b"the tick allocated or freed memory\n");
         std::process::abort();
     }
@@ -37,7 +37,7 @@ unsafe impl GlobalAlloc for Forbidding {
 #[global_allocator]
 static FORBIDDING: Forbidding = Forbidding;
 
-/// Does something in which nothing may allocate or free.
+/// Runs a closure that must not allocate or free.
 pub fn without_allocation<T>(act: impl FnOnce() -> T) -> T {
     FORBIDDEN.with(|forbidden| forbidden.set(true));
     let result = act();
@@ -45,7 +45,7 @@ pub fn without_allocation<T>(act: impl FnOnce() -> T) -> T {
     result
 }
 
-/// The watchman itself: an allocation where none is allowed ends the process.
+/// Tests the allocator: an allocation in a guarded section ends the process.
 #[test]
 fn an_allocation_would_be_noticed() {
     const CHILD: &str = "QUADFROG_ALLOCATES";

@@ -84,7 +84,7 @@ def bounds(path, seed, multivariate):
 
 
 def importances(path):
-    """PED-ANOVA's divergences, as Optuna reports them before it makes them sum to 1."""
+    """PED-ANOVA's divergences, as Optuna reports them before normalization."""
     study = load(path)
     values = optuna.importance.get_param_importances(
         study, evaluator=optuna.importance.PedAnovaImportanceEvaluator(), normalize=False

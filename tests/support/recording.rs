@@ -1,10 +1,11 @@
-//! Arbitrary ticks and records for the tests of recordings, and a session that looks like a real one.
+//! Arbitrary ticks and records for the tests of recordings, and a realistic session.
 #![allow(dead_code, reason = "each test uses its own part")]
 
 use std::path::Path;
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use proptest::prelude::*;
+use quadfrog::optimize::ask::SamplerKind;
 use quadfrog::recording::player::{Played, Player};
 use quadfrog::recording::record::*;
 use quadfrog::recording::writer::Writer;
@@ -83,8 +84,8 @@ impl Draw {
         Tick {
             number: self.word(),
             time_ns: self.word() >> 2,
-            mode: self.one_of(&Mode::ALL),
-            phase: self.one_of(&Phase::ALL),
+            mode: self.one_of(Mode::ALL),
+            phase: self.one_of(Phase::ALL),
             trial: self.option(|d| d.word() as u32),
             trial_time_s: self.number(),
             theta_rad: self.number(),
@@ -176,11 +177,13 @@ impl Draw {
         match kind {
             0 => Record::Session(SessionInfo {
                 version: self.string(),
-                backend: self.string(),
+                backend: self.option(|d| d.one_of(&[Backend::Simulator, Backend::Hardware])),
                 robot: self.string(),
-                task: self.string(),
+                task: self.option(|d| d.one_of(&Task::ALL)),
                 unit: self.string(),
-                sampler: self.string(),
+                sampler: self.option(|d| {
+                    d.one_of(&[SamplerKind::Tpe, SamplerKind::Gp, SamplerKind::Random, SamplerKind::Sobol])
+                }),
                 seed: self.word(),
                 budget: self.word() as u32,
                 parameters: self.several(|d| ParameterInfo {
@@ -199,11 +202,19 @@ impl Draw {
                     low: d.number(),
                     high: d.number(),
                 }),
-                approve: self.string(),
+                approve: self.one_of(&Approval::ALL),
+                limits: HealthLimits {
+                    state_age_ms: self.word() as u32,
+                    loss_share: self.number(),
+                    motor_c: self.number(),
+                    battery_percent: self.number(),
+                    late_share: self.number(),
+                    late_ms: self.number(),
+                },
             }),
             1 => Record::Transition(Transition {
-                from: self.one_of(&Mode::ALL),
-                to: self.one_of(&Mode::ALL),
+                from: self.one_of(Mode::ALL),
+                to: self.one_of(Mode::ALL),
                 cause: self.string(),
             }),
             2 => Record::Stage(StageRecord {
@@ -232,7 +243,7 @@ impl Draw {
                 trial: self.word() as u32,
                 source: self.one_of(&ProposalSource::ALL),
                 parent: self.option(|d| d.word() as u32),
-                parameters: self.several(|d| (d.string(), d.number())),
+                parameters: self.several(|d| (d.string(), d.number())).into(),
                 measured: self.option(|d| MeasuredJump {
                     dx_m: d.number(),
                     dy_m: d.number(),
@@ -247,7 +258,7 @@ impl Draw {
                 verdict: self.option(|d| d.one_of(&Verdict::ALL)),
                 note: self.string(),
                 risk: self.risk(),
-                gains: self.several(|d| (d.string(), d.number())),
+                gains: self.several(|d| (d.string(), d.number())).into(),
             }),
             5 => Record::Request(RequestRecord { wish: self.string(), accepted: self.yes(), answer: self.string() }),
             6 => Record::Counters(Counters {
@@ -265,10 +276,10 @@ impl Draw {
                 message: self.string(),
             }),
             8 => Record::ArmingChecks(self.several(|d| ArmingCheckRecord {
-                check: d.one_of(&ArmingCheck::ALL),
+                check: d.one_of(ArmingCheck::ALL),
                 found: d.string(),
                 needed: d.string(),
-                state: d.one_of(&ArmingCheckState::ALL),
+                state: d.one_of(ArmingCheckState::ALL),
             })),
             9 => Record::FaultTicks(vec![self.tick(), self.tick()]),
             10 => Record::Search(SearchStatus {
@@ -296,7 +307,7 @@ impl Draw {
                 }),
             }),
             _ => Record::Points(self.several(|d| PointRecord {
-                parameters: d.several(|d| (d.string(), d.number())),
+                parameters: d.several(|d| (d.string(), d.number())).into(),
                 trials: d.several(|d| d.word() as u32),
                 stood: d.word() as u32,
                 mean: d.number(),
@@ -313,7 +324,7 @@ fn draw(words: usize) -> impl Strategy<Value = Draw> {
         .prop_map(|(words, text)| Draw { words: words.into_iter(), text })
 }
 
-/// Any tick at all: every bit pattern in every number.
+/// Any tick, with any bit pattern in every number.
 pub fn any_tick() -> impl Strategy<Value = Tick> {
     draw(400).prop_map(|mut draw| draw.tick())
 }
@@ -323,17 +334,17 @@ pub fn any_record() -> impl Strategy<Value = Record> {
     (0..13_usize, draw(800)).prop_map(|(kind, mut draw)| draw.record(kind))
 }
 
-/// A session as a study in the simulator begins it.
+/// Returns the session of a study in the simulator.
 pub fn session() -> SessionInfo {
     let parameter =
         |name: &str, unit: &str, low, high| ParameterInfo { name: name.into(), unit: unit.into(), low, high };
     SessionInfo {
         version: "0.1.0".into(),
-        backend: "sim".into(),
+        backend: Some(Backend::Simulator),
         robot: "go1".into(),
-        task: "forward".into(),
+        task: Some(Task::Forward),
         unit: "m".into(),
-        sampler: "tpe".into(),
+        sampler: Some(SamplerKind::Tpe),
         seed: 7,
         budget: 20,
         parameters: vec![
@@ -346,11 +357,12 @@ pub fn session() -> SessionInfo {
         started: "2026-11-21T00:00:00Z".into(),
         observe: false,
         gains: vec![parameter("kp", "N/m", 100.0, 1000.0)],
-        approve: "each".into(),
+        approve: Approval::Each,
+        limits: HealthLimits::default(),
     }
 }
 
-/// Tick `number` of a robot that moves smoothly, with a little noise in every number, as a simulator gives it.
+/// Returns tick `number` of a robot that moves smoothly, with noise in every number, like a simulator's.
 pub fn moving_tick(number: u64) -> Tick {
     let time = number as f64 * 1e-3;
     let mut state = number.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
@@ -409,8 +421,7 @@ pub fn moving_tick(number: u64) -> Tick {
     }
 }
 
-/// What a jump study records: trials of a second from 1 s on, every 2 s, with the events that belong to them; `events`
-/// are in the order of time.
+/// Returns the ticks and records of a study: trials of 1 s from 1 s on, every 2 s; the records are in the order of time.
 pub fn study(seconds: u64) -> (Vec<Tick>, Vec<Stamped>) {
     let mut ticks: Vec<_> = (0..seconds * 1000).map(moving_tick).collect();
     let mut records = Vec::new();
@@ -425,7 +436,8 @@ pub fn study(seconds: u64) -> (Vec<Tick>, Vec<Stamped>) {
                 trial,
                 source: ProposalSource::Sampler,
                 parent: None,
-                parameters: vec![("f0".into(), 1.25), ("Fx".into(), 100.0 + f64::from(trial)), ("Fz".into(), 250.0)],
+                parameters: vec![("f0".into(), 1.25), ("Fx".into(), 100.0 + f64::from(trial)), ("Fz".into(), 250.0)]
+                    .into(),
                 measured: None,
                 value: verdict.map(|_| 0.1 * f64::from(trial)),
                 hand_value: None,
@@ -434,7 +446,7 @@ pub fn study(seconds: u64) -> (Vec<Tick>, Vec<Stamped>) {
                 verdict,
                 note: String::new(),
                 risk: None,
-                gains: Vec::new(),
+                gains: ParameterValues::default(),
             })
         };
         add(start - 500, stage(ExperimentStage::Proposed));
@@ -480,7 +492,7 @@ pub fn write(path: &Path, everything: &[Played]) {
     assert_eq!(writer.finish().unwrap(), path);
 }
 
-/// What the player gives, without the session's own first record.
+/// Plays a file and returns everything but the session's first record.
 pub fn play(path: &Path) -> Vec<Played> {
     let mut player = Player::open(path).unwrap_or_else(|error| panic!("{error}"));
     let first = player.next();

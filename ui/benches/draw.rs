@@ -1,8 +1,7 @@
-//! What drawing one frame costs: `cargo bench -p quadfrog-console --bench draw`.
+//! Duration of drawing a frame: `cargo bench -p quadfrog-console --bench draw`.
 //!
-//! Prints, for each view at 200x60 with a full minute of telemetry, a hundred trials and all series on, the time until
-//! the frame is in the buffer and compared with the one before. Wall time includes whatever else the machine does in that
-//! time; the processor time of the drawing thread does not.
+//! For each view at 200x60 with a minute of telemetry, 100 trials and all series: the time until the frame is drawn into
+//! the buffer and compared with the previous one. Wall time includes other work of the machine, processor time does not.
 
 #[path = "../../tests/console/support/mod.rs"]
 mod support;
@@ -14,22 +13,23 @@ use quadfrog::recording::record::Record;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::telemetry::{Phase, Snapshot};
 use quadfrog::trial::{ParameterInsight, ProposalInsight, Verdict};
+use quadfrog_console::message::Msg;
 use quadfrog_console::model::View;
-use quadfrog_console::series::SIGNALS;
-use quadfrog_console::update::Msg;
+use quadfrog_console::series::Series;
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
+use strum::VariantArray;
 use support::{Console, tick, trial};
 
-/// Frames that are drawn of each view.
+/// Number of frames per view.
 const FRAMES: u64 = 2_000;
 
-/// Processor time of this thread.
+/// Returns the processor time of this thread.
 fn processor_time() -> Duration {
     Duration::from(clock_gettime(ClockId::CLOCK_THREAD_CPUTIME_ID).expect("the system has this clock"))
 }
 
-/// One of the ticks of a session that jumps every four seconds.
+/// Returns a tick of a session with a jump every 4 s.
 fn sample(time_ms: u64) -> quadfrog::telemetry::Tick {
     let in_jump_ms = time_ms % 4_000;
     let phase = match in_jump_ms {
@@ -42,7 +42,7 @@ fn sample(time_ms: u64) -> quadfrog::telemetry::Tick {
     tick(time_ms, 0.3 * (time_ms as f64 / 300.0).sin(), jump)
 }
 
-/// Two densities of a hundred points, as the optimizer tells them with a proposal.
+/// Returns two densities of 100 points.
 fn insight(name: &str) -> ParameterInsight {
     let at: Vec<f64> = (0..100).map(|i| 0.75 + 0.01 * f64::from(i)).collect();
     let bump = |middle: f64| at.iter().map(|x| (-((x - middle) / 0.1).powi(2)).exp()).collect();
@@ -53,7 +53,7 @@ fn insight(name: &str) -> ParameterInsight {
 fn main() {
     let mut console = Console::ready();
     console.model.robot = Some(RobotDescription::embedded("go1").expect("the built-in robot"));
-    console.model.live.series = SIGNALS.map(|signal| signal.series).to_vec();
+    console.model.live.series = Series::VARIANTS.to_vec();
     for number in 0..100 {
         console.record(Record::Trial(trial(number, Some(Verdict::ALL[number as usize % 3]), None)));
     }
@@ -64,11 +64,11 @@ fn main() {
     console.record(Record::Insight(ProposalInsight { trial: 0, parameters: ["f0", "Fx", "Fz"].map(insight).to_vec() }));
     let mut terminal = Terminal::new(TestBackend::new(200, 60)).expect("a screen in memory");
     let mut time_ms = 60_000;
-    for view in View::ALL {
+    for view in View::VARIANTS.iter().copied() {
         console.model.view = view;
         let (mut wall, mut processor) = (Vec::new(), Vec::new());
         for _ in 0..FRAMES {
-            // Ten frames a second: twenty new ticks in each.
+            // 10 frames per second and 200 ticks per second.
             for _ in 0..20 {
                 time_ms += 5;
                 console.tell(Msg::Tick(Box::new(sample(time_ms))));

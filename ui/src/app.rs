@@ -1,7 +1,5 @@
-//! The loop: take keys, take the feed, update, draw.
-//!
-//! Keys go before the feed and the feed before drawing, so that a slow link or a busy engine never delays an answer to
-//! the operator. Nothing in the loop waits for the terminal, the engine or a disk other than where a table is exported.
+//! The event loop: input, feed, update, draw, in this order, so that neither a slow link nor a busy engine delays the
+//! response to a key. The loop waits for neither terminal nor engine; it waits for the disk when a table is exported.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -19,34 +17,40 @@ use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
 use tokio::time::{MissedTickBehavior, interval};
 
 use crate::action::Action;
+use crate::connection::{ConnectionMonitor, TerminalLocation};
 use crate::export::{self, ExportError};
 use crate::feed::Feed;
 use crate::keymap::{Key, Keymap};
-use crate::line::{Line, Place};
+use crate::message::{Effect, Mouse, Msg};
 use crate::model::Model;
-use crate::settings::{ChartMode, ColourChoice, GlyphChoice, Settings};
+use crate::settings::{ChartMode, ConsoleSettings};
 use crate::terminal::{self, Screen};
-use crate::theme::Theme;
-use crate::update::{Effect, Mouse, Msg, say, update};
-use crate::view;
+use crate::theme::{ColourChoice, GlyphChoice, Theme};
+use crate::update::{say, update};
+use crate::{text, view};
 
-/// The loop wakes at least this often: for the sign of life, twenty times a second.
+/// Maximum period of the loop and of the operator heartbeat.
 const PULSE: Duration = Duration::from_millis(50);
-/// Frames per second at most over a slow link.
+/// Maximum frames per second over a slow link.
 const LOW_BANDWIDTH_FRAMES: u32 = 2;
 
-/// How the console looks and behaves.
+/// Options of the console.
 #[derive(Debug, Clone)]
 pub struct ConsoleOptions {
     /// `console.toml`.
-    pub settings: Settings,
-    /// The machine, for limits; none where it is not known.
+    pub settings: ConsoleSettings,
+    /// The robot model, for limits; none if unknown.
     pub robot: Option<RobotDescription>,
 }
 
 impl ConsoleOptions {
-    /// The settings with what the command line says on top.
-    pub fn new(settings: Settings, colours: Option<ColourChoice>, ascii: bool, low_bandwidth: bool) -> ConsoleOptions {
+    /// Overrides the settings by those of the command line.
+    pub fn new(
+        settings: ConsoleSettings,
+        colours: Option<ColourChoice>,
+        ascii: bool,
+        low_bandwidth: bool,
+    ) -> ConsoleOptions {
         let mut settings = settings;
         settings.low_bandwidth = low_bandwidth;
         if low_bandwidth {
@@ -64,7 +68,7 @@ impl ConsoleOptions {
         ConsoleOptions { settings, robot: None }
     }
 
-    /// With the machine's limits and lengths.
+    /// Adds the robot model.
     #[must_use]
     pub fn with_robot(mut self, robot: RobotDescription) -> ConsoleOptions {
         self.robot = Some(robot);
@@ -72,19 +76,19 @@ impl ConsoleOptions {
     }
 }
 
-/// How the console ended.
+/// The reason for which the console ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Ended {
+pub enum ConsoleExit {
     /// The operator quit.
     Quit,
     /// SIGTERM.
     Terminated,
-    /// The terminal is gone: there is nowhere to print to.
+    /// The terminal hung up; nothing can be printed.
     HungUp,
 }
 
-/// What reached the process besides the feed.
-enum Input {
+/// Input from the terminal.
+enum TerminalInput {
     Key(Key),
     Paste(String),
     Mouse(Mouse),
@@ -92,21 +96,20 @@ enum Input {
     HungUp,
 }
 
-/// Opens the console on the feed and runs it until the operator or the system ends it. The session behind a live feed is
-/// ended with it.
+/// Opens the console on the feed and runs it until the operator or the system ends it; then ends the session of a live feed.
 ///
 /// # Errors
-/// When the terminal cannot be used, or a thread of the program panicked; the robot was stopped then.
-pub fn run(feed: Feed, options: ConsoleOptions) -> color_eyre::Result<Ended> {
+/// When the terminal cannot be used. When a thread panicked; STOP is set then.
+pub fn run(feed: Feed, options: ConsoleOptions) -> color_eyre::Result<ConsoleExit> {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().wrap_err("event loop")?;
     runtime.block_on(Console::open(feed, options)?.run())
 }
 
 struct Console {
     feed: Feed,
-    line: Line,
-    /// Whether the line was alive when it was looked at last.
-    reached: bool,
+    connection: ConnectionMonitor,
+    /// State of the connection at the last heartbeat.
+    connected: bool,
     model: Model,
     screen: Screen,
     started: Instant,
@@ -114,7 +117,7 @@ struct Console {
     last_frame: Option<Instant>,
     last_feed: Instant,
     redraw: bool,
-    ended: Option<Ended>,
+    ended: Option<ConsoleExit>,
 }
 
 impl Console {
@@ -128,15 +131,18 @@ impl Console {
         let mut screen = Screen::enter().wrap_err("the terminal cannot be used")?;
         screen.mouse(model.mouse).wrap_err("the terminal cannot be used")?;
         terminal::stop_on_panic(feed.stop_latch());
-        let line = match &feed {
-            Feed::Live(_) => Line::watch(Place::of(|name| std::env::var(name).ok())).wrap_err("line watcher")?,
-            Feed::Replay(_) => Line::here(),
+        let connection = match &feed {
+            Feed::Live(_) => {
+                let location = TerminalLocation::of(|name| std::env::var(name).ok());
+                ConnectionMonitor::watch(location).wrap_err("connection monitor")?
+            }
+            Feed::Replay(_) => ConnectionMonitor::unmonitored(),
         };
         let now = Instant::now();
         Ok(Console {
             feed,
-            line,
-            reached: true,
+            connection,
+            connected: true,
             model,
             screen,
             started: now,
@@ -148,10 +154,10 @@ impl Console {
         })
     }
 
-    async fn run(mut self) -> color_eyre::Result<Ended> {
+    async fn run(mut self) -> color_eyre::Result<ConsoleExit> {
         let (input, mut inputs) = unbounded_channel();
         read_input(input.clone(), self.model.keymap.clone(), self.feed.stop_latch())?;
-        terminal::watch_for_hang_up(move || drop(input.send(Input::HungUp))).wrap_err("hang-up watcher")?;
+        terminal::watch_for_hang_up(move || drop(input.send(TerminalInput::HungUp))).wrap_err("hang-up watcher")?;
         let mut interrupted = signal(SignalKind::interrupt())?;
         let mut terminated = signal(SignalKind::terminate())?;
         let mut hung_up = signal(SignalKind::hangup())?;
@@ -164,7 +170,7 @@ impl Console {
                 biased;
                 Some(input) = inputs.recv() => self.take_input(input, &mut inputs),
                 _ = hung_up.recv() => self.hang_up(),
-                _ = terminated.recv() => self.end(Ended::Terminated),
+                _ = terminated.recv() => self.end(ConsoleExit::Terminated),
                 _ = interrupted.recv() => {
                     let key = self.model.keymap.keys(Action::Interrupt).next();
                     self.tell(key.map(Msg::Key));
@@ -184,29 +190,30 @@ impl Console {
         self.close(&mut inputs)
     }
 
-    /// The sign of life, of a screen that somebody may see.
+    /// Sends the operator heartbeat while the connection is alive, and reports its loss and its return.
     fn beat(&mut self) {
-        let reached = self.line.alive();
-        if reached {
+        let connected = self.connection.alive();
+        if connected {
             self.feed.beat();
         }
-        if reached != self.reached {
-            self.reached = reached;
-            let words = if reached { "the SSH line answers again" } else { "the SSH line does not answer any more" };
-            say(&mut self.model, LogLevel::Warning, words.to_owned());
+        if connected != self.connected {
+            self.connected = connected;
+            let text =
+                if connected { "the SSH connection responds again" } else { "the SSH connection does not respond" };
+            say(&mut self.model, LogLevel::Warning, text.to_owned());
         }
     }
 
-    /// One input and all that wait behind it.
-    fn take_input(&mut self, input: Input, inputs: &mut UnboundedReceiver<Input>) {
+    /// Processes an input and all that are queued behind it.
+    fn take_input(&mut self, input: TerminalInput, inputs: &mut UnboundedReceiver<TerminalInput>) {
         let mut next = Some(input);
         while let Some(input) = next {
             match input {
-                Input::Key(key) => self.tell([Msg::Key(key)]),
-                Input::Paste(text) => self.tell([Msg::Paste(text)]),
-                Input::Mouse(event) => self.tell([Msg::Mouse(event)]),
-                Input::Resize(columns, rows) => self.tell([Msg::Resize(columns, rows)]),
-                Input::HungUp => self.hang_up(),
+                TerminalInput::Key(key) => self.tell([Msg::Key(key)]),
+                TerminalInput::Paste(text) => self.tell([Msg::Paste(text)]),
+                TerminalInput::Mouse(event) => self.tell([Msg::Mouse(event)]),
+                TerminalInput::Resize(columns, rows) => self.tell([Msg::Resize(columns, rows)]),
+                TerminalInput::HungUp => self.hang_up(),
             }
             self.redraw = true;
             next = inputs.try_recv().ok();
@@ -221,7 +228,7 @@ impl Console {
         self.tell(news);
     }
 
-    /// Updates the model and does what follows of it.
+    /// Updates the model and performs the effects.
     fn tell(&mut self, messages: impl IntoIterator<Item = Msg>) {
         update(&mut self.model, Msg::Clock(self.started.elapsed()));
         for message in messages {
@@ -234,35 +241,38 @@ impl Console {
     fn carry_out(&mut self, effect: Effect) {
         match effect {
             Effect::Stop => self.feed.stop(),
-            Effect::Wish(intent) => self.feed.wish(intent),
+            Effect::Request(intent) => self.feed.request(intent),
             Effect::Replay(command) => self.feed.command(command),
             Effect::Bell => self.send(b"\x07"),
-            Effect::Copy(text) => {
-                let mut bytes = Vec::new();
-                // Writing to memory does not fail.
-                let _ = crossterm::queue!(bytes, CopyToClipboard::to_clipboard_from(text));
-                self.send(&bytes);
-            }
+            Effect::CopyTrial(trial) => self.copy_trial(trial),
             Effect::Mouse(on) => {
-                // A failure shows with the next frame.
+                // A failure is reported with the next frame.
                 let _ = self.screen.mouse(on);
             }
             Effect::Export => self.export(),
             Effect::ExportBest => self.export_best(),
             Effect::Redraw => {
-                // A failure shows with the next frame.
+                // A failure is reported with the next frame.
                 let _ = self.screen.clear();
             }
             Effect::Suspend => self.suspend(),
-            Effect::Quit => self.end(Ended::Quit),
+            Effect::Quit => self.end(ConsoleExit::Quit),
         }
     }
 
-    /// A bell that a stalled terminal does not take is a bell that nobody hears: not worth waiting for.
+    /// Sends bytes, or drops them if the terminal is not ready: the loop never waits for a bell.
     fn send(&mut self, bytes: &[u8]) {
         if self.screen.ready() {
             let _ = self.screen.send(bytes);
         }
+    }
+
+    fn copy_trial(&mut self, trial: u32) {
+        let Some(trial) = self.model.session.trials.records.get(&trial) else { return };
+        let mut bytes = Vec::new();
+        // Writing to memory does not fail.
+        let _ = crossterm::queue!(bytes, CopyToClipboard::to_clipboard_from(text::as_text(trial, &self.model)));
+        self.send(&bytes);
     }
 
     fn export(&mut self) {
@@ -272,20 +282,20 @@ impl Console {
 
     fn export_best(&mut self) {
         let written = export::best(&self.model);
-        self.say_written(written, |path| format!("for --config: {}", path.display()));
+        self.say_written(written, |path| format!("exported; start with quadfrog --config {}", path.display()));
     }
 
-    fn say_written(&mut self, written: Result<PathBuf, ExportError>, words: impl FnOnce(&Path) -> String) {
+    fn say_written(&mut self, written: Result<PathBuf, ExportError>, text: impl FnOnce(&Path) -> String) {
         match written {
-            Ok(path) => say(&mut self.model, LogLevel::Info, words(&path)),
+            Ok(path) => say(&mut self.model, LogLevel::Info, text(&path)),
             Err(error) => say(&mut self.model, LogLevel::Error, format!("not written: {error}")),
         }
     }
 
-    /// Gives the terminal back and stops this process, as Ctrl-Z does, until it is continued.
+    /// Restores the terminal and stops this process, as Ctrl-Z does, until it is continued.
     fn suspend(&mut self) {
         self.screen.release();
-        // SIGSTOP cannot fail to be sent to oneself; if it did, the screen comes back at once.
+        // If SIGSTOP fails, the screen returns at once.
         let _ = raise(Signal::SIGSTOP);
         if self.screen.take().and_then(|()| self.screen.mouse(self.model.mouse)).is_err() {
             self.hang_up();
@@ -297,16 +307,16 @@ impl Console {
 
     fn hang_up(&mut self) {
         self.screen.hang_up();
-        self.end(Ended::HungUp);
+        self.end(ConsoleExit::HungUp);
     }
 
-    fn end(&mut self, ended: Ended) {
+    fn end(&mut self, ended: ConsoleExit) {
         self.ended.get_or_insert(ended);
     }
 
     fn draw_if_due(&mut self) -> color_eyre::Result<()> {
         let due = self.redraw || self.last_frame.is_none_or(|last| last.elapsed() + PULSE / 4 >= self.frame_period);
-        if !due || !self.screen.ready() || self.ended == Some(Ended::HungUp) {
+        if !due || !self.screen.ready() || self.ended == Some(ConsoleExit::HungUp) {
             return Ok(());
         }
         if self.screen.broken() {
@@ -319,27 +329,27 @@ impl Console {
         self.screen.draw(|frame| view::render(frame, model)).wrap_err("drawing")
     }
 
-    /// Ends the session while the operator can still see and stop: sitting down takes seconds.
-    fn close(mut self, inputs: &mut UnboundedReceiver<Input>) -> color_eyre::Result<Ended> {
-        let ended = self.ended.unwrap_or(Ended::Quit);
-        // An operator who quits still watches; whose terminal is gone, or whose program is ended from elsewhere, does not.
-        let heartbeat = self.feed.heartbeat().filter(|_| ended == Ended::Quit);
+    /// Ends the session. Sitting down takes seconds: the screen stays, and STOP keeps working.
+    fn close(mut self, inputs: &mut UnboundedReceiver<TerminalInput>) -> color_eyre::Result<ConsoleExit> {
+        let ended = self.ended.unwrap_or(ConsoleExit::Quit);
+        // The operator is present after a quit key, but not after a hang-up or SIGTERM.
+        let heartbeat = self.feed.heartbeat().filter(|_| ended == ConsoleExit::Quit);
         let stop = self.feed.stop_latch();
         if self.model.robot_needs_us() {
             say(&mut self.model, LogLevel::Info, "the robot sits down, then the program ends".to_owned());
         }
         self.redraw = true;
         self.draw_if_due()?;
-        let (feed, line) = (self.feed, self.line);
+        let (feed, connection) = (self.feed, self.connection);
         let closing = std::thread::Builder::new().name("close".into()).spawn(move || feed.shutdown())?;
         while !closing.is_finished() {
             if let Some(heartbeat) = &heartbeat
-                && line.alive()
+                && connection.alive()
             {
                 heartbeat.beat();
             }
             while let Ok(input) = inputs.try_recv() {
-                if let (Input::Key(key), Some(stop)) = (input, &stop)
+                if let (TerminalInput::Key(key), Some(stop)) = (input, &stop)
                     && matches!(self.model.keymap.action(key), Some(Action::Stop | Action::Interrupt))
                 {
                     stop.set();
@@ -348,15 +358,14 @@ impl Console {
             std::thread::sleep(PULSE / 5);
         }
         match closing.join() {
-            Ok(_) => Ok(ended),
+            Ok(()) => Ok(ended),
             Err(_) => Err(eyre!("ending the session panicked")),
         }
     }
 }
 
-/// Reads the terminal in a thread of its own. STOP keys that mean nothing else anywhere go to the latch from here, even
-/// if the loop should hang.
-fn read_input(inputs: UnboundedSender<Input>, keymap: Keymap, stop: Option<StopLatch>) -> io::Result<()> {
+/// Reads the terminal in a thread. STOP keys that are no text set the latch from this thread, even if the loop hangs.
+fn read_input(inputs: UnboundedSender<TerminalInput>, keymap: Keymap, stop: Option<StopLatch>) -> io::Result<()> {
     let read = move || {
         loop {
             let input = match crossterm::event::read() {
@@ -369,18 +378,18 @@ fn read_input(inputs: UnboundedSender<Input>, keymap: Keymap, stop: Option<StopL
                     {
                         stop.set();
                     }
-                    Input::Key(key)
+                    TerminalInput::Key(key)
                 }
-                Ok(Event::Paste(text)) => Input::Paste(text),
+                Ok(Event::Paste(text)) => TerminalInput::Paste(text),
                 Ok(Event::Mouse(event)) => match mouse(event) {
-                    Some(event) => Input::Mouse(event),
+                    Some(event) => TerminalInput::Mouse(event),
                     None => continue,
                 },
-                Ok(Event::Resize(columns, rows)) => Input::Resize(columns, rows),
+                Ok(Event::Resize(columns, rows)) => TerminalInput::Resize(columns, rows),
                 Ok(_) => continue,
-                Err(_) => Input::HungUp,
+                Err(_) => TerminalInput::HungUp,
             };
-            let gone = matches!(input, Input::HungUp);
+            let gone = matches!(input, TerminalInput::HungUp);
             if inputs.send(input).is_err() || gone {
                 return;
             }
@@ -389,7 +398,7 @@ fn read_input(inputs: UnboundedSender<Input>, keymap: Keymap, stop: Option<StopL
     std::thread::Builder::new().name("keys".into()).spawn(read).map(|_| ())
 }
 
-/// What the console takes of a mouse's event; moving and releasing mean nothing to it.
+/// Returns the click or wheel step of a mouse event; moves and releases are ignored.
 fn mouse(event: MouseEvent) -> Option<Mouse> {
     match event.kind {
         MouseEventKind::Down(MouseButton::Left) => Some(Mouse::Click { column: event.column, row: event.row }),

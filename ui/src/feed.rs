@@ -1,42 +1,41 @@
-//! Where the screen's news comes from: a running engine or a recording. Both give the same messages.
+//! The source of the screen's messages: a running engine or a recording. Both give the same messages.
 
 pub mod replay;
 
 use quadfrog::engine::Handle;
 use quadfrog::realtime::channel::{Heartbeat, StopLatch};
 use quadfrog::recording::player::Player;
-use quadfrog::recording::record::Stamped;
 use quadfrog::session::operator_request::OperatorRequest;
 
-use crate::update::{Msg, ReplayCommand};
-use replay::Replay;
+use crate::message::{Msg, ReplayCommand};
+use replay::ReplayFeed;
 
-/// Messages taken at once; more wait for the next time, so that keys are never kept waiting.
+/// Maximum number of records, and of ticks, per call of [`Feed::take`]: bounds the delay of the next key.
 const BATCH: usize = 4096;
 
 /// A running engine or a recording.
 pub enum Feed {
     /// A running engine.
     Live(Box<Handle>),
-    /// A recording; nothing can be sent to it.
-    Replay(Box<Replay>),
+    /// A recording, which ignores requests.
+    Replay(Box<ReplayFeed>),
 }
 
 impl Feed {
-    /// The feed of a running engine.
+    /// Creates the feed of a running engine.
     pub fn live(handle: Handle) -> Feed {
         Feed::Live(Box::new(handle))
     }
 
-    /// The feed of a recording; it plays from the start.
+    /// Creates the feed of a recording, playing from the start.
     pub fn replay(player: Player) -> Feed {
-        Feed::Replay(Box::new(Replay::new(player)))
+        Feed::Replay(Box::new(ReplayFeed::new(player)))
     }
 
-    /// The screen is alive.
+    /// Sends the operator heartbeat.
     pub fn beat(&self) {
         if let Feed::Live(handle) = self {
-            handle.beat();
+            handle.send_heartbeat();
         }
     }
 
@@ -47,7 +46,7 @@ impl Feed {
         }
     }
 
-    /// The stop latch itself, for threads that must be able to stop without the loop; none in a replay.
+    /// Returns the stop latch, for threads that stop the robot without the loop; none in a replay.
     pub fn stop_latch(&self) -> Option<StopLatch> {
         match self {
             Feed::Live(handle) => Some(handle.stop_latch()),
@@ -55,7 +54,7 @@ impl Feed {
         }
     }
 
-    /// The sign of life itself, for the time when the session is being ended; none in a replay.
+    /// Returns the operator heartbeat, for use while the session ends; none in a replay.
     pub fn heartbeat(&self) -> Option<Heartbeat> {
         match self {
             Feed::Live(handle) => Some(handle.heartbeat()),
@@ -63,43 +62,42 @@ impl Feed {
         }
     }
 
-    /// Asks the session; a recording is not asked.
-    pub fn wish(&self, intent: OperatorRequest) {
+    /// Sends a request to the session.
+    pub fn request(&self, request: OperatorRequest) {
         if let Feed::Live(handle) = self {
-            handle.wish(intent);
+            handle.request(request);
         }
     }
 
-    /// Moves the replay; a live session does not move.
+    /// Controls the replay.
     pub fn command(&mut self, command: ReplayCommand) {
         if let Feed::Replay(replay) = self {
             replay.command(command);
         }
     }
 
-    /// What is new since the last call, `elapsed_ns` later, oldest first.
+    /// Returns the messages since the last call, `elapsed_ns` ago, oldest first.
     pub fn take(&mut self, elapsed_ns: u64) -> Vec<Msg> {
-        let mut news = Vec::new();
+        let mut messages = Vec::new();
         match self {
             Feed::Live(handle) => {
-                // Records before ticks: a tick may belong to a trial that a record opens.
-                news.extend(std::iter::from_fn(|| handle.next_record()).take(BATCH).map(Msg::Record));
-                news.extend(
+                // Records before ticks: a tick may belong to a trial that a record begins.
+                messages.extend(std::iter::from_fn(|| handle.next_record()).take(BATCH).map(Msg::Record));
+                messages.extend(
                     std::iter::from_fn(|| handle.next_tick()).take(BATCH).map(|tick| Msg::Tick(Box::new(tick))),
                 );
-                news.push(Msg::Snapshot(Box::new(handle.snapshot())));
-                news.extend(handle.recorder().map(Msg::Recorder));
+                messages.push(Msg::Snapshot(Box::new(handle.snapshot())));
+                messages.extend(handle.recorder().map(Msg::Recorder));
             }
-            Feed::Replay(replay) => replay.take(elapsed_ns, &mut news),
+            Feed::Replay(replay) => replay.take(elapsed_ns, &mut messages),
         }
-        news
+        messages
     }
 
-    /// Ends the session and returns its last records: the robot sits down, the files are closed.
-    pub fn shutdown(self) -> Vec<Stamped> {
-        match self {
-            Feed::Live(handle) => handle.shutdown(),
-            Feed::Replay(_) => Vec::new(),
+    /// Ends the session: sits the robot down and closes the files.
+    pub fn shutdown(self) {
+        if let Feed::Live(handle) = self {
+            handle.shutdown();
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Keys and what they do: the active keymap, made of the actions' default keys and the operator's own choices.
+//! Keys and their actions: the active keymap, made of the actions' default keys and the operator's own choices.
 
 use std::fmt;
 use std::str::FromStr;
@@ -7,7 +7,7 @@ use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 
 use crate::action::{ACTIONS, Action};
 
-/// A key as the operator thinks of it: a character as typed (`A` is shift and a), or a named key, with Ctrl or Alt.
+/// A key: a character as typed (`A` is shift and a), or a named key, with Ctrl or Alt.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Key {
     code: KeyCode,
@@ -38,7 +38,7 @@ const NAMES: [(&str, KeyCode); 19] = [
 ];
 
 impl Key {
-    /// The key of a terminal's event. Shift is dropped where the character already says it, and for named keys where
+    /// The key of a terminal's event. Shift is dropped where the character already implies it, and for named keys where
     /// terminals disagree about reporting it.
     pub fn from_event(event: KeyEvent) -> Key {
         let shifted = event.modifiers.contains(KeyModifiers::SHIFT);
@@ -93,7 +93,7 @@ impl fmt::Display for Key {
     }
 }
 
-/// A key's name that means nothing.
+/// An unknown name of a key.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("`{0}` is no key; write a character (`g`, `A`), a name (`Enter`, `F5`, `PgUp`) or a chord (`Ctrl-R`)")]
 pub struct UnknownKey(pub String);
@@ -108,7 +108,7 @@ impl FromStr for Key {
         let mut rest = text;
         let mut modifiers = KeyModifiers::NONE;
         let code = loop {
-            // A name may hold a dash itself (`Shift-Tab`), so names go before prefixes.
+            // A name may contain a dash itself (`Shift-Tab`), so names go before prefixes.
             if let Some(code) = named(rest) {
                 break code;
             }
@@ -132,7 +132,7 @@ impl FromStr for Key {
     }
 }
 
-/// A key of `console.toml` that cannot be used.
+/// A refused key of `console.toml`.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("[keys] {action} = {key}: {reason}")]
 pub struct KeymapError {
@@ -140,7 +140,7 @@ pub struct KeymapError {
     pub action: String,
     /// Its key or keys, as written.
     pub key: String,
-    /// What is wrong, and what to do.
+    /// Reason and remedy.
     pub reason: String,
 }
 
@@ -197,7 +197,7 @@ impl Keymap {
         Ok(Keymap { bindings })
     }
 
-    /// What the key does.
+    /// The action of the key.
     pub fn action(&self, key: Key) -> Option<Action> {
         self.bindings.iter().find(|(bound, _)| *bound == key).map(|(_, action)| *action)
     }
@@ -207,7 +207,7 @@ impl Keymap {
         self.bindings.iter().filter(move |(_, bound)| *bound == action).map(|(key, _)| *key)
     }
 
-    /// The key to name where there is room for one.
+    /// The first key of an action, by name.
     pub fn key(&self, action: Action) -> String {
         self.keys(action).next().map(|key| key.to_string()).unwrap_or_default()
     }

@@ -1,7 +1,6 @@
-//! The program `quadfrog`: arguments, configuration, engine or player, console, exit status.
+//! The program `quadfrog`.
 //!
-//! Exit status: 0 when done, 2 for input that cannot be used (with a message that says which and what to do), 1 for
-//! everything else.
+//! Exit status: 0 when done, 2 for unusable input (the message names it and the remedy), 1 for every other error.
 
 mod command;
 
@@ -14,15 +13,10 @@ fn main() -> ExitCode {
     if let Err(error) = color_eyre::install() {
         eprintln!("quadfrog: {error}");
     }
-    match command::run(Arguments::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(Failure::Input(message)) => {
-            eprintln!("quadfrog: {message}");
-            ExitCode::from(2)
-        }
-        Err(Failure::Other(report)) => {
-            eprintln!("quadfrog: {report:?}");
-            ExitCode::FAILURE
-        }
+    let Err(failure) = command::run(Arguments::parse()) else { return ExitCode::SUCCESS };
+    failure.print();
+    match failure {
+        Failure::Input(_) => ExitCode::from(2),
+        Failure::Other(_) => ExitCode::FAILURE,
     }
 }

@@ -1,12 +1,12 @@
-//! The terminal: whether it can be used, entering and leaving it, and writing to it without ever waiting for it.
+//! The terminal: check, setup, restoration, and output that never blocks the event loop.
 //!
-//! Frames are written by a thread of their own. A terminal that does not read (a stalled SSH connection, a paused pty)
-//! then costs frames, not the event loop: keys, STOP and the sign of life go on.
+//! A thread writes the frames. A terminal that does not read (a stalled SSH connection, a paused pty) then costs frames,
+//! but delays neither keys nor STOP nor the operator heartbeat.
 
 use std::fs::File;
 use std::io::{self, IsTerminal, Write};
 use std::os::fd::AsFd;
-use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
@@ -26,43 +26,43 @@ use ratatui::buffer::Cell;
 use ratatui::layout::{Position, Size};
 use ratatui::{Terminal, TerminalOptions, Viewport};
 
-use crate::view::{MIN_COLUMNS, MIN_ROWS};
+use crate::layout::{MIN_COLUMNS, MIN_ROWS};
 
-/// How long leaving waits for a terminal that does not read.
+/// Time limit of the restoration of a terminal that does not read.
 const LEAVE_TIMEOUT: Duration = Duration::from_millis(500);
-/// How often the watcher looks for a hang-up when the system does not wake it.
+/// Time-out of each wait for a hang-up.
 const HANG_UP_PERIOD_MS: u16 = 200;
 
-/// Why the console cannot open here.
+/// The reason for which the console cannot open.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum TerminalError {
-    /// Input or output is no terminal.
+    /// Standard input or output is not a terminal.
     #[error(
-        "the console needs a terminal, but {0} is none; over SSH use `ssh -t`, for a study without a screen use `quadfrog optimize`"
+        "the console needs a terminal, but {0} is not one; over SSH use `ssh -t`, for a study without a screen use `quadfrog optimize`"
     )]
     NoTerminal(
-        /// Which of the two.
+        /// The stream.
         &'static str,
     ),
-    /// The terminal's size cannot be found out.
-    #[error("the terminal does not say how large it is; set it with `stty rows {MIN_ROWS} columns {MIN_COLUMNS}`")]
+    /// The size is unknown.
+    #[error("the size of the terminal is unknown; set it with `stty rows {MIN_ROWS} columns {MIN_COLUMNS}`")]
     NoSize,
-    /// Too small.
+    /// The terminal is too small.
     #[error(
         "the terminal has {columns}x{rows} characters, the console needs at least {MIN_COLUMNS}x{MIN_ROWS}; enlarge it"
     )]
     TooSmall {
-        /// Its columns.
+        /// Columns.
         columns: u16,
-        /// Its rows.
+        /// Rows.
         rows: u16,
     },
 }
 
-/// Whether the console can open on this terminal.
+/// Checks whether the console can open on this terminal.
 ///
 /// # Errors
-/// When there is no terminal, or it is too small. Shrinking later is not an error: a small screen is drawn then.
+/// When there is no terminal, or it is too small. A terminal that shrinks later shows a reduced screen.
 pub fn check() -> Result<(), TerminalError> {
     for (name, is_terminal) in
         [("standard input", io::stdin().is_terminal()), ("standard output", io::stdout().is_terminal())]
@@ -80,22 +80,20 @@ pub fn check() -> Result<(), TerminalError> {
     }
 }
 
-/// What the frame writer and its owner share.
+/// State shared by the writing thread and its owner.
 #[derive(Default)]
-struct Shared {
-    /// Pieces of frames on their way to the terminal.
+struct WriterState {
+    /// Number of frames not written yet.
     waiting: AtomicUsize,
-    /// The terminal cannot be written to any more.
+    /// Writing to the terminal failed.
     broken: AtomicBool,
-    /// Bytes written.
-    bytes: AtomicU64,
 }
 
-/// Takes the bytes of a frame and hands them to the writing thread when the frame is complete.
+/// Collects the bytes of a frame and sends the complete frame to the writing thread.
 pub struct FrameWriter {
     frame: Vec<u8>,
     frames: Sender<Vec<u8>>,
-    shared: Arc<Shared>,
+    state: Arc<WriterState>,
 }
 
 impl Write for FrameWriter {
@@ -107,7 +105,7 @@ impl Write for FrameWriter {
     /// Ends the frame.
     fn flush(&mut self) -> io::Result<()> {
         if !self.frame.is_empty() {
-            self.shared.waiting.fetch_add(1, Ordering::AcqRel);
+            self.state.waiting.fetch_add(1, Ordering::AcqRel);
             let gone = |_| io::Error::from(io::ErrorKind::BrokenPipe);
             self.frames.send(std::mem::take(&mut self.frame)).map_err(gone)?;
         }
@@ -115,28 +113,24 @@ impl Write for FrameWriter {
     }
 }
 
-/// Writes frames to the terminal until their sender is gone or the terminal fails.
-fn write_frames(frames: &Receiver<Vec<u8>>, shared: &Shared, mut terminal: File) {
+/// Writes frames until their sender is dropped.
+fn write_frames(frames: &Receiver<Vec<u8>>, state: &WriterState, mut terminal: File) {
     while let Ok(frame) = frames.recv() {
-        let _pen = PEN.lock().unwrap_or_else(PoisonError::into_inner);
-        // A frame that was drawn while another thread panicked would hide the cursor of a terminal that was given back.
-        if ENTERED.load(Ordering::Acquire) && !shared.broken.load(Ordering::Acquire) {
-            match terminal.write_all(&frame) {
-                Ok(()) => {
-                    shared.bytes.fetch_add(frame.len() as u64, Ordering::Relaxed);
-                }
-                Err(_) => shared.broken.store(true, Ordering::Release),
-            }
+        let _output = OUTPUT.lock().unwrap_or_else(PoisonError::into_inner);
+        // A frame drawn while another thread panicked would hide the cursor of a restored terminal.
+        let drop_frame = !ENTERED.load(Ordering::Acquire) || state.broken.load(Ordering::Acquire);
+        if !drop_frame && terminal.write_all(&frame).is_err() {
+            state.broken.store(true, Ordering::Release);
         }
-        shared.waiting.fetch_sub(1, Ordering::AcqRel);
+        state.waiting.fetch_sub(1, Ordering::AcqRel);
     }
 }
 
-/// The terminal as something that is written to and never asked. ratatui asks for the cursor's position whenever it
-/// clears; the answer would have to come through the thread that reads keys, and over a slow link after a long wait.
-struct OneWay(CrosstermBackend<FrameWriter>);
+/// A backend that never queries the terminal. ratatui asks for the cursor position whenever it clears; the answer would
+/// arrive in the thread that reads keys, and late over a slow link.
+struct WriteOnlyBackend(CrosstermBackend<FrameWriter>);
 
-impl Backend for OneWay {
+impl Backend for WriteOnlyBackend {
     type Error = io::Error;
 
     fn draw<'a, I>(&mut self, content: I) -> io::Result<()>
@@ -154,7 +148,7 @@ impl Backend for OneWay {
         self.0.show_cursor()
     }
 
-    /// The cursor is hidden and moved by every write: where it stands means nothing.
+    /// Returns the origin: the cursor is hidden and every write moves it.
     fn get_cursor_position(&mut self) -> io::Result<Position> {
         Ok(Position::ORIGIN)
     }
@@ -184,62 +178,60 @@ impl Backend for OneWay {
     }
 }
 
-/// Set while the terminal is ours; whoever clears it gives the terminal back, once.
+/// Set while the console has the terminal. The thread that clears it restores the terminal.
 static ENTERED: AtomicBool = AtomicBool::new(false);
-/// Who holds it writes to the terminal: a frame as a whole, or what gives the terminal back.
-static PEN: Mutex<()> = Mutex::new(());
-/// Set by the first panic: the robot is stopped before anything else is done.
+/// Held while a whole frame, or the restoration, is written.
+static OUTPUT: Mutex<()> = Mutex::new(());
+/// Set by the first panic, before anything else.
 static STOP: Mutex<Option<StopLatch>> = Mutex::new(None);
+/// Name of the first thread that panicked; the loop then ends instead of leaving a dead screen.
+static PANICKED: Mutex<Option<String>> = Mutex::new(None);
 
-/// The engine's thread that speaks to the robot.
+/// Name of the engine's control thread.
 const CONTROL: &str = "control";
 
-/// From now on a panic in any thread sets this latch first; none where there is nothing to stop.
+/// Makes a panic in any thread set this latch first; none if there is no robot to stop.
 pub fn stop_on_panic(stop: Option<StopLatch>) {
     *STOP.lock().unwrap_or_else(PoisonError::into_inner) = stop;
 }
 
-/// What panicked, for the loop to see; a thread's panic must not leave a dead screen.
-static PANICKED: Mutex<Option<String>> = Mutex::new(None);
-
-/// The terminal while the console has it. Dropping it gives it back.
+/// The terminal in use by the console; restored on drop.
 pub struct Screen {
-    terminal: Option<Terminal<OneWay>>,
-    shared: Arc<Shared>,
+    terminal: Option<Terminal<WriteOnlyBackend>>,
+    state: Arc<WriterState>,
     writer: Option<JoinHandle<()>>,
     mouse: bool,
     hung_up: bool,
 }
 
 impl Screen {
-    /// Enters: raw mode, the alternate screen, no cursor. From here on panics of any thread give the terminal back
-    /// before they are reported.
+    /// Enters raw mode and the alternate screen, and hides the cursor. From now on a panic in any thread restores the
+    /// terminal before it is reported.
     ///
     /// # Errors
-    /// When the terminal refuses.
+    /// When the terminal cannot be configured.
     pub fn enter() -> io::Result<Screen> {
         let terminal = own_file()?;
-        let shared = Arc::new(Shared::default());
-        // `ready` is asked before a frame is drawn, so no more than one frame is ever in the channel.
+        let state = Arc::new(WriterState::default());
+        // Holds at most one frame: the caller checks `ready` before it draws.
         let (frames, received) = channel();
-        let for_writer = shared.clone();
+        let for_writer = state.clone();
         let writer = std::thread::Builder::new()
             .name("screen".into())
             .spawn(move || write_frames(&received, &for_writer, terminal))?;
         install_panic_hook();
-        let writer_end = FrameWriter { frame: Vec::new(), frames, shared: shared.clone() };
-        let backend = OneWay(CrosstermBackend::new(writer_end));
+        let writer_end = FrameWriter { frame: Vec::new(), frames, state: state.clone() };
+        let backend = WriteOnlyBackend(CrosstermBackend::new(writer_end));
         let terminal = Terminal::with_options(backend, TerminalOptions { viewport: Viewport::Fullscreen })?;
-        let mut screen =
-            Screen { terminal: Some(terminal), shared, writer: Some(writer), mouse: false, hung_up: false };
+        let mut screen = Screen { terminal: Some(terminal), state, writer: Some(writer), mouse: false, hung_up: false };
         screen.take()?;
         Ok(screen)
     }
 
-    /// Takes the terminal (again, after a suspension).
+    /// Configures the terminal, also after a suspension.
     ///
     /// # Errors
-    /// When the terminal refuses.
+    /// When the terminal cannot be configured.
     pub fn take(&mut self) -> io::Result<()> {
         enable_raw_mode()?;
         ENTERED.store(true, Ordering::Release);
@@ -251,31 +243,26 @@ impl Screen {
         Ok(())
     }
 
-    /// Gives the terminal back for a while.
+    /// Restores the terminal for a suspension.
     pub fn release(&mut self) {
         self.wait_until_written();
-        give_back();
+        restore();
     }
 
-    /// Whether the last frame is written, so that another can be drawn without waiting.
+    /// Whether the last frame was written, so that the next one does not queue.
     pub fn ready(&self) -> bool {
-        self.shared.waiting.load(Ordering::Acquire) == 0
+        self.state.waiting.load(Ordering::Acquire) == 0
     }
 
     /// Whether writing to the terminal failed.
     pub fn broken(&self) -> bool {
-        self.shared.broken.load(Ordering::Acquire)
-    }
-
-    /// Bytes written so far.
-    pub fn bytes_written(&self) -> u64 {
-        self.shared.bytes.load(Ordering::Relaxed)
+        self.state.broken.load(Ordering::Acquire)
     }
 
     /// Draws a frame.
     ///
     /// # Errors
-    /// When the terminal's size cannot be found out or the writing thread is gone.
+    /// When the terminal's size is unknown or the writing thread has ended.
     pub fn draw(&mut self, render: impl FnOnce(&mut ratatui::Frame)) -> io::Result<()> {
         match &mut self.terminal {
             Some(terminal) => terminal.draw(render).map(|_| ()),
@@ -283,18 +270,18 @@ impl Screen {
         }
     }
 
-    /// Forgets what is on the screen, so that the next frame draws all of it.
+    /// Clears the screen, so that the next frame draws all cells.
     ///
     /// # Errors
-    /// When the writing thread is gone.
+    /// When the writing thread has ended.
     pub fn clear(&mut self) -> io::Result<()> {
         self.terminal.as_mut().map_or(Ok(()), Terminal::clear)
     }
 
-    /// Asks the terminal for the mouse's clicks, or leaves them to it.
+    /// Starts or ends the capture of mouse events.
     ///
     /// # Errors
-    /// When the writing thread is gone.
+    /// When the writing thread has ended.
     pub fn mouse(&mut self, on: bool) -> io::Result<()> {
         let Some(terminal) = &mut self.terminal else { return Ok(()) };
         let writer = &mut terminal.backend_mut().0;
@@ -307,10 +294,10 @@ impl Screen {
         Write::flush(writer)
     }
 
-    /// Sends bytes that are not part of a frame: a bell, the clipboard.
+    /// Sends bytes outside a frame: a bell, the clipboard.
     ///
     /// # Errors
-    /// When the writing thread is gone.
+    /// When the writing thread has ended.
     pub fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
         let Some(terminal) = &mut self.terminal else { return Ok(()) };
         let writer = &mut terminal.backend_mut().0;
@@ -318,11 +305,11 @@ impl Screen {
         Write::flush(writer)
     }
 
-    /// The terminal is gone: nothing more is written to it, not even what would restore it.
+    /// Stops all output, including the restoration, to a terminal that hung up.
     pub fn hang_up(&mut self) {
         self.hung_up = true;
         ENTERED.store(false, Ordering::Release);
-        self.shared.broken.store(true, Ordering::Release);
+        self.state.broken.store(true, Ordering::Release);
     }
 
     fn wait_until_written(&self) {
@@ -337,13 +324,13 @@ impl Drop for Screen {
     fn drop(&mut self) {
         if !self.hung_up {
             self.wait_until_written();
-            give_back();
+            restore();
         }
-        // Ends the writing thread, unless a terminal that does not read holds it: then it ends with the program.
+        // Ends the writing thread, unless it is blocked by a terminal that does not read.
         let done = self.ready();
         if let Some(terminal) = self.terminal.take() {
-            // Its own goodbye (showing the cursor) was said by `give_back`.
-            self.shared.broken.store(true, Ordering::Release);
+            // Suppresses its own restoration of the cursor, already written by `restore`.
+            self.state.broken.store(true, Ordering::Release);
             drop(terminal);
         }
         if done && let Some(writer) = self.writer.take() {
@@ -352,31 +339,30 @@ impl Drop for Screen {
     }
 }
 
-/// The terminal as a file of its own: no lock that a thread stuck in writing could hold.
+/// Duplicates standard output, without the lock of the library that a blocked write would hold.
 fn own_file() -> io::Result<File> {
     Ok(File::from(io::stdout().as_fd().try_clone_to_owned()?))
 }
 
-/// Gives the terminal back if it was taken: the screen as before, the cursor, cooked mode. Gives up on a terminal that
-/// does not read.
-fn give_back() {
+/// Restores screen, cursor and cooked mode, if the terminal was configured. Times out on a terminal that does not read.
+fn restore() {
     if !ENTERED.swap(false, Ordering::AcqRel) {
         return;
     }
     let (done, finished): (Sender<()>, Receiver<()>) = channel();
-    // Writing may wait for ever; leaving must not.
+    // In a thread, because the write may block for ever.
     let writing = std::thread::Builder::new().name("leave".into()).spawn(move || {
         if let Ok(mut terminal) = own_file() {
             let mut bytes = Vec::new();
-            // Writing to memory does not fail.
+            // Writing to memory cannot fail.
             let _ = queue!(bytes, ResetColor, DisableMouseCapture, DisableBracketedPaste, LeaveAlternateScreen, Show);
-            let _pen = PEN.lock().unwrap_or_else(PoisonError::into_inner);
+            let _output = OUTPUT.lock().unwrap_or_else(PoisonError::into_inner);
             let _ = terminal.write_all(&bytes);
         }
         let _ = done.send(());
     });
     if writing.is_ok() {
-        // After a time-out the bytes may still come out later, when somebody reads again.
+        // After a time-out the bytes are written when the terminal reads again.
         let _ = finished.recv_timeout(LEAVE_TIMEOUT);
     }
     let _ = disable_raw_mode();
@@ -389,36 +375,36 @@ fn install_panic_hook() {
     }
     let report = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |info| {
-        // Before anything that takes time: what unwinds next sits a robot down that nobody controls.
+        // First: the report and the unwinding take time, during which the robot would move without control.
         if let Some(stop) = &*STOP.lock().unwrap_or_else(PoisonError::into_inner) {
             stop.set();
         }
         let thread = std::thread::current();
         let name = thread.name().unwrap_or("unnamed").to_owned();
         if name == CONTROL {
-            // It must damp the robot now and cannot wait for a terminal; the report without its colours is for another.
+            // The control thread goes on to damp the robot and must not wait for the terminal: another thread reports.
             let report = info.to_string();
-            let tell = move || {
-                give_back();
+            let print = move || {
+                restore();
                 eprintln!("{report}");
                 PANICKED.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(name);
             };
-            let _ = std::thread::Builder::new().name("report".into()).spawn(tell);
+            let _ = std::thread::Builder::new().name("report".into()).spawn(print);
             return;
         }
-        give_back();
+        restore();
         PANICKED.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(name);
         report(info);
     }));
 }
 
-/// The name of the thread that panicked, if any did since the console was entered.
+/// Returns the name of the first thread that panicked, if any.
 pub fn panicked() -> Option<String> {
     PANICKED.lock().unwrap_or_else(PoisonError::into_inner).clone()
 }
 
-/// Watches for the terminal's hang-up in a thread of its own and calls `notify` once. The event loop cannot be trusted
-/// with it: without SIGHUP, reading events from a terminal that has hung up never returns.
+/// Watches for a hang-up of the terminal in a thread and calls `notify` once. The event loop cannot detect it: without
+/// SIGHUP, reading events from a terminal that hung up never returns.
 ///
 /// # Errors
 /// When the thread cannot be started.
@@ -426,7 +412,7 @@ pub fn watch_for_hang_up(notify: impl FnOnce() + Send + 'static) -> io::Result<(
     let terminal = io::stdin().as_fd().try_clone_to_owned()?;
     let watch = move || {
         loop {
-            // No events asked for: only a hang-up or an error is reported.
+            // No requested events: poll(2) then reports only a hang-up or an error.
             let mut descriptors = [PollFd::new(terminal.as_fd(), PollFlags::empty())];
             let found = poll(&mut descriptors, PollTimeout::from(HANG_UP_PERIOD_MS)).unwrap_or(0);
             let gone = PollFlags::POLLHUP | PollFlags::POLLERR | PollFlags::POLLNVAL;

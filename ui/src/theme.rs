@@ -1,10 +1,43 @@
-//! What colours and characters mean. A style never carries a meaning alone: text or a symbol says the same.
+//! Meaning of colours and characters. A style never carries a meaning alone: text or a symbol says the same.
 
 use ratatui::style::{Color, Modifier, Style};
+use serde::Deserialize;
 
-use crate::settings::{ColourChoice, GlyphChoice};
+/// Colours by the settings.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+pub enum ColourChoice {
+    /// As the environment says in `NO_COLOR`, `COLORTERM` and `TERM`.
+    #[serde(rename = "auto")]
+    Auto,
+    /// 24 bit.
+    #[serde(rename = "true")]
+    True,
+    /// The 256 indexed colours.
+    #[serde(rename = "256")]
+    Indexed,
+    /// The 16 named colours.
+    #[serde(rename = "16")]
+    Named,
+    /// None; bold and reverse remain.
+    #[serde(rename = "none")]
+    None,
+}
 
-/// How many colours the terminal has.
+/// Characters of charts and lines by the settings.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum GlyphChoice {
+    /// As the locale and `TERM` allow.
+    Auto,
+    /// Braille: 2 x 4 dots in a character.
+    Braille,
+    /// One dot in a character, and line characters.
+    Dots,
+    /// Nothing beyond ASCII.
+    Ascii,
+}
+
+/// Colours of the terminal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Colours {
     /// 24 bit.
@@ -17,7 +50,7 @@ pub enum Colours {
     None,
 }
 
-/// Which characters can be drawn.
+/// Characters that the terminal can draw.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Glyphs {
     /// Braille patterns and line characters.
@@ -28,26 +61,26 @@ pub enum Glyphs {
     Ascii,
 }
 
-/// What something on the screen is.
+/// Meaning of a text or symbol on the screen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
     /// Ordinary text and values.
     Text,
-    /// Labels, units and lines: there when looked for.
+    /// Labels, units and lines.
     Quiet,
     /// A heading.
     Heading,
     /// A key to press.
     Key,
-    /// All is well.
+    /// In order.
     Good,
-    /// Look at it.
+    /// Needs attention.
     Warning,
     /// Stopped, fallen, failed.
     Bad,
     /// STOP and the modes DAMPED and FAULT.
     Alarm,
-    /// The chosen row or tab.
+    /// The selected row or tab.
     Selected,
     /// The robot is hardware.
     Hardware,
@@ -68,9 +101,9 @@ pub enum Role {
 /// Colours and characters of this terminal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Theme {
-    /// How many colours.
+    /// Colours.
     pub colours: Colours,
-    /// Which characters.
+    /// Characters.
     pub glyphs: Glyphs,
 }
 
@@ -97,7 +130,7 @@ const NIGHT_FLIGHT: Shade = shade((20, 44, 58), 23, Color::Reset);
 const NIGHT_LANDING: Shade = shade((42, 34, 52), 53, Color::Reset);
 
 impl Theme {
-    /// The theme for a choice in the settings and an environment; `variable` looks one up.
+    /// Chooses the theme from the settings and the environment; `variable` returns an environment variable.
     pub fn detect(colours: ColourChoice, glyphs: GlyphChoice, variable: impl Fn(&str) -> Option<String>) -> Theme {
         let filled = |name: &str| variable(name).filter(|value| !value.is_empty());
         let term = filled("TERM").unwrap_or_default();
@@ -130,7 +163,7 @@ impl Theme {
         Theme { colours, glyphs }
     }
 
-    /// How something of that role looks.
+    /// The style of a role.
     pub fn style(&self, role: Role) -> Style {
         let plain = Style::new();
         match role {
@@ -165,12 +198,12 @@ impl Theme {
         if self.glyphs == Glyphs::Ascii { "|" } else { "│" }
     }
 
-    /// What separates two things on one line.
+    /// Separator of two items on one line.
     pub fn dot(&self) -> &'static str {
         if self.glyphs == Glyphs::Ascii { "-" } else { "·" }
     }
 
-    /// From one thing to another.
+    /// Arrow from one item to the next.
     pub fn arrow(&self) -> &'static str {
         if self.glyphs == Glyphs::Ascii { "->" } else { "→" }
     }

@@ -1,26 +1,21 @@
-//! The filter's covariance: symmetric, so that half of it is worked on.
+//! The filter's covariance; symmetric, so only its lower blocks are computed.
 
 use nalgebra::{Matrix3, SMatrix};
 
 /// Three columns: covariance of the whole state with three numbers.
 pub type Columns<const N: usize> = SMatrix<f64, N, 3>;
 
-/// A symmetric N x N matrix, N a multiple of three. Of its blocks of 3 x 3, those on the diagonal and below are kept; what stands
-/// above is never looked at. Every index that names a block is that of its first row or column.
+/// A symmetric N x N matrix, N a multiple of three. Only its 3 x 3 blocks on and below the diagonal are stored. The index of a
+/// block is that of its first row or column.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Covariance<const N: usize> {
     columns: [[f64; N]; N],
 }
 
 impl<const N: usize> Covariance<N> {
-    /// All zero: everything is known exactly.
+    /// The zero matrix.
     pub fn zeros() -> Self {
         Covariance { columns: [[0.0; N]; N] }
-    }
-
-    /// The element on the diagonal: the variance of state `i`.
-    pub fn variance(&self, i: usize) -> f64 {
-        self.columns[i][i]
     }
 
     /// Adds to the variance of the three states from `at` on.
@@ -30,7 +25,7 @@ impl<const N: usize> Covariance<N> {
         }
     }
 
-    /// Adds to the covariance of the two states. The block of `row` stands below that of `column`, or they are the same state.
+    /// Adds to the covariance of two states. The block of `row` is below that of `column`, or both are the same state.
     pub fn add(&mut self, row: usize, column: usize, covariance: f64) {
         self.columns[column][row] += covariance;
     }
@@ -59,10 +54,10 @@ impl<const N: usize> Covariance<N> {
         }
     }
 
-    /// P - U U^T. Both halves of a block on the diagonal come out the same to the bit.
+    /// P <- P - U U^T. A block on the diagonal stays symmetric to the bit.
     pub fn subtract_square(&mut self, u: &Columns<N>) {
         let [u0, u1, u2] = &u.data.0;
-        // Three columns at a time: each number of U that is loaded serves all of them.
+        // Three columns at a time, so that each number of U is loaded once.
         for (block, [a, b, c]) in self.columns.as_chunks_mut::<3>().0.iter_mut().enumerate() {
             let at = 3 * block;
             let [va, vb, vc] = [at, at + 1, at + 2].map(|j| [u0[j], u1[j], u2[j]]);
@@ -75,11 +70,10 @@ impl<const N: usize> Covariance<N> {
         }
     }
 
-    /// P <- F P F^T, where F is the identity but for two blocks: the three states from `position` on grow by `dt_s` times those
-    /// from `velocity` on, and these by `turned` times those from `bias` on. The three stand in this order.
+    /// P <- F P F^T, where F is the identity but for two blocks: d(position)/d(velocity) = `dt_s`, d(velocity)/d(bias) = `turned`.
+    /// The indices ascend in this order.
     pub fn carry(&mut self, [position, velocity, bias]: [usize; 3], dt_s: f64, turned: &Matrix3<f64>) {
-        // The two sets of columns of P F^T that differ from P's, then the two sets of rows of F of these: all else follows by
-        // symmetry.
+        // The two column blocks of P F^T that differ from P's, then their rows in F (P F^T); the rest follows by symmetry.
         let (of_velocity, of_bias) = (self.columns(velocity), self.columns(bias));
         let mut to_position = self.columns(position) + of_velocity * dt_s;
         let mut to_velocity = of_velocity + of_bias * turned.transpose();
@@ -90,7 +84,7 @@ impl<const N: usize> Covariance<N> {
             let mut rows = columns.fixed_rows_mut::<3>(velocity);
             rows += turned * b;
         }
-        // Rounding must not make the diagonal's blocks lopsided.
+        // Rounding would make the blocks on the diagonal asymmetric.
         for (columns, at) in [(&mut to_position, position), (&mut to_velocity, velocity)] {
             let mut square = block(columns, at);
             square.fill_upper_triangle_with_lower_triangle();
@@ -149,7 +143,7 @@ mod tests {
     fn it_is_the_whole_matrix() {
         let (mut covariance, mut full) = sample();
         assert_same(&covariance, &full);
-        assert_eq!(SVector::<f64, N>::from_fn(|i, _| covariance.variance(i)), full.diagonal());
+        assert_eq!(SVector::<f64, N>::from_fn(|i, _| covariance.columns[i][i]), full.diagonal());
 
         covariance.add_variance(3, 0.25);
         covariance.add(4, 0, 0.5);

@@ -1,10 +1,10 @@
-//! What the controller believes about the base and the feet.
+//! Estimate of the base and the feet.
 //!
-//! In simulation it may be the simulator's own truth. Elsewhere, and in simulation if `objective = "estimate"`, it comes
-//! from the sensors: the orientation is the inertial unit's; position and velocity are a Kalman filter's (`filter`), which
-//! holds the accelerometer against the legs that stand (`contact`); in flight the trunk moves as the accelerometer says.
+//! In simulation it may be the simulator's true state. On hardware, and in simulation if `objective = "estimate"`, it comes from
+//! the sensors: orientation from the inertial unit; position and velocity from a Kalman filter (`filter`) of the accelerometer and
+//! the standing legs (`contact`), in flight of the accelerometer alone.
 //!
-//! Yaw is what the inertial unit reports. Nothing on the robot can correct it, so its drift is the estimate's.
+//! Yaw is that of the inertial unit, with its drift: no other sensor measures it.
 
 mod contact;
 mod covariance;
@@ -13,28 +13,25 @@ mod filter;
 use nalgebra::Vector3;
 
 pub use contact::ContactGate;
-pub use filter::{Filter, FootMotion};
+pub use filter::{Filter, FootOdometry};
 
 use super::limits;
 use super::settings::{ControlSettings, ObjectiveSource};
-use crate::robot::kinematics::Foot;
+use crate::robot::kinematics::FootPosition;
 use crate::robot::{PerLeg, RobotState, Truth, leg_of, robot_time_passed};
 use crate::telemetry::Estimate;
 
-/// Acceleration of free fall, m/s^2.
-pub const GRAVITY: f64 = 9.81;
-
-/// Keeps what an estimate needs from one tick to the next.
+/// Estimator with its state from tick to tick.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Estimator {
     estimate: Estimate,
-    /// An orientation was seen: yaw counts on from it.
+    /// Whether there was an orientation, from which yaw is unwrapped.
     started: bool,
     contact: ContactGate,
     odometry: Option<Odometry>,
 }
 
-/// The filter, and what it last heard.
+/// The filter and the time of its last state.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Odometry {
     filter: Filter,
@@ -44,26 +41,26 @@ struct Odometry {
 }
 
 impl Estimator {
-    /// Forgets everything: the robot was put somewhere else.
+    /// Resets everything, after a placement.
     pub fn reset(&mut self) {
         *self = Estimator::default();
     }
 
-    /// The filter, where it runs.
+    /// The filter; none before the first state, or with the simulator's true state.
     pub fn filter(&self) -> Option<&Filter> {
         self.odometry.as_ref().map(|odometry| &odometry.filter)
     }
 
-    /// The estimate after one more state; `feet` belong to its joint angles. A state that was seen already changes nothing,
-    /// nor does one with a number that is not finite (the watchdog stops the robot).
-    pub fn update(&mut self, state: &RobotState, feet: &PerLeg<Foot>, settings: &ControlSettings) -> &Estimate {
+    /// Updates the estimate with a state and the feet at its joint angles. A repeated state, or one with a number that is not finite
+    /// (a failsafe stops the robot), changes nothing.
+    pub fn update(&mut self, state: &RobotState, feet: &PerLeg<FootPosition>, settings: &ControlSettings) -> &Estimate {
         let previous_yaw = self.estimate.roll_pitch_yaw.z;
         match &state.truth {
             Some(truth) if settings.objective == ObjectiveSource::Truth => {
                 self.estimate.contact = truth.foot_force_world.map(|force| force.z >= settings.contact_force_n);
-                self.believe(truth);
+                self.copy_truth(truth);
             }
-            _ if limits::finite(state).is_ok() => self.sense(state, feet, settings),
+            _ if limits::finite(state).is_ok() => self.fuse_sensors(state, feet, settings),
             _ => return &self.estimate,
         }
         let estimate = &mut self.estimate;
@@ -77,7 +74,7 @@ impl Estimator {
             yaw
         };
         if !unwrapped.is_finite() {
-            // The watchdog stops the robot; one bad number must not spoil every later yaw.
+            // A failsafe stops the robot; the yaw of later states stays valid.
             estimate.roll_pitch_yaw = Vector3::new(roll, pitch, previous_yaw);
             return &self.estimate;
         }
@@ -86,7 +83,7 @@ impl Estimator {
         &self.estimate
     }
 
-    fn believe(&mut self, truth: &Truth) {
+    fn copy_truth(&mut self, truth: &Truth) {
         let estimate = &mut self.estimate;
         estimate.position_world = truth.position_world;
         estimate.velocity_world = truth.velocity_world;
@@ -94,17 +91,17 @@ impl Estimator {
         estimate.angular_velocity_body = truth.angular_velocity_body;
     }
 
-    fn sense(&mut self, state: &RobotState, feet: &PerLeg<Foot>, settings: &ControlSettings) {
+    fn fuse_sensors(&mut self, state: &RobotState, feet: &PerLeg<FootPosition>, settings: &ControlSettings) {
         let estimate = &mut self.estimate;
         estimate.orientation_world = state.imu.orientation_world;
         estimate.angular_velocity_body = state.imu.gyro_body;
         let world_from_body = state.imu.orientation_world.to_rotation_matrix().into_inner();
         let unit_world = world_from_body * settings.imu_origin_body;
         let motions = foot_motions(state, feet, settings);
-        let chosen = &settings.estimator;
+        let weights = &settings.estimator;
 
         let passed_ms = |odometry: &Odometry| robot_time_passed(state.robot_time_ms, odometry.robot_time_ms);
-        // A clock that goes back is another robot's, or a restarted one's: begin anew.
+        // A clock that goes back belongs to another or a restarted robot: start again.
         let filter = match self.odometry.as_mut().filter(|odometry| passed_ms(odometry) >= 0) {
             Some(odometry) => {
                 let dt_s = f64::from(passed_ms(odometry)) * 1e-3;
@@ -112,26 +109,26 @@ impl Estimator {
                     return;
                 }
                 odometry.robot_time_ms = state.robot_time_ms;
-                estimate.contact = self.contact.update(&state.foot_force, dt_s, chosen);
+                estimate.contact = self.contact.update(&state.foot_force, dt_s, weights);
                 let standing = estimate.contact.contains(&true);
                 odometry.airborne_s = if standing { 0.0 } else { odometry.airborne_s + dt_s };
                 let filter = &mut odometry.filter;
-                if odometry.airborne_s > chosen.longest_flight_s {
-                    filter.rest(chosen);
+                if odometry.airborne_s > weights.longest_flight_s {
+                    filter.rest(weights);
                 } else {
-                    filter.predict(&state.imu.accel_body, &world_from_body, &motions, dt_s, chosen);
-                    filter.correct(&motions, &estimate.contact, dt_s, chosen);
+                    filter.predict(&state.imu.accel_body, &world_from_body, &motions, dt_s, weights);
+                    filter.correct(&motions, &estimate.contact, dt_s, weights);
                 }
                 &*filter
             }
             None => {
                 self.contact = ContactGate::default();
-                estimate.contact = self.contact.update(&state.foot_force, 0.0, chosen);
+                estimate.contact = self.contact.update(&state.foot_force, 0.0, weights);
                 // The world's origin is the ground under the trunk; the lowest foot stands on it.
                 let lowest = motions.iter().map(|motion| motion.offset_world.z).fold(f64::INFINITY, f64::min);
                 let start = Vector3::new(unit_world.x, unit_world.y, settings.foot_radius - lowest);
-                let mut filter = Filter::new(&start, chosen);
-                filter.correct(&motions, &estimate.contact, 0.0, chosen);
+                let mut filter = Filter::new(&start, weights);
+                filter.correct(&motions, &estimate.contact, 0.0, weights);
                 let begun = Odometry { filter, robot_time_ms: state.robot_time_ms, airborne_s: 0.0 };
                 &self.odometry.insert(begun).filter
             }
@@ -143,8 +140,8 @@ impl Estimator {
     }
 }
 
-/// How each foot moves relative to the inertial unit, and over the ground if it rolls there.
-fn foot_motions(state: &RobotState, feet: &PerLeg<Foot>, settings: &ControlSettings) -> PerLeg<FootMotion> {
+/// Motion of each foot relative to the inertial unit, and of a rolling foot over the ground.
+fn foot_motions(state: &RobotState, feet: &PerLeg<FootPosition>, settings: &ControlSettings) -> PerLeg<FootOdometry> {
     let rotation = state.imu.orientation_world;
     let gyro_body = state.imu.gyro_body;
     std::array::from_fn(|leg| {
@@ -155,7 +152,7 @@ fn foot_motions(state: &RobotState, feet: &PerLeg<Foot>, settings: &ControlSetti
         let (s1, c1) = q.x.sin_cos();
         let swing = dq.y + dq.z;
         let calf_rate_world = rotation * (gyro_body + Vector3::new(dq.x, c1 * swing, s1 * swing));
-        FootMotion {
+        FootOdometry {
             offset_world: rotation * offset_body,
             velocity_world: rotation * velocity_body,
             // A ball on level ground: omega x r, r from the point of contact up to the centre.

@@ -1,14 +1,14 @@
-//! Climbing a smooth function of a few variables inside a box: the BFGS method with projection onto the bounds.
+//! Maximization of a smooth function of a few variables inside a box: the BFGS method with projection onto the bounds.
 //!
 //! Nocedal and Wright, "Numerical Optimization", 2nd ed.: update 6.17, backtracking 3.1; Bertsekas, "Projected Newton
-//! methods", SIAM J. Control Optim. 20, 1982, for holding variables whose bound is in the way.
+//! methods", SIAM J. Control Optim. 20, 1982, for holding variables at an active bound.
 
 use nalgebra::{DMatrix, DVector};
 
 /// Sufficient increase of the backtracking search (Armijo's c_1).
 const ARMIJO: f64 = 1e-4;
 
-/// Climbs from `start`; `f` gives value and gradient. Returns the highest point found and its value.
+/// Maximizes `f` (value and gradient) from `start`. Returns the best point found and its value.
 pub fn maximize(
     f: impl Fn(&[f64]) -> (f64, Vec<f64>),
     start: &[f64],
@@ -18,7 +18,7 @@ pub fn maximize(
     let n = start.len();
     let mut x: Vec<f64> = start.iter().zip(bounds).map(|(x, (low, high))| x.clamp(*low, *high)).collect();
     let (mut value, mut gradient) = f(&x);
-    // H, the inverse of the negative Hessian as far as it is known
+    // H, the estimate of the inverse of the negative Hessian
     let mut inverse = DMatrix::<f64>::identity(n, n);
     let mut fresh = true;
     for _ in 0..iterations {
@@ -39,7 +39,7 @@ pub fn maximize(
             direction = free_gradient.clone();
             fresh = true;
         }
-        // A first step without knowledge of the curvature is a tenth of the box at most.
+        // Without a curvature estimate a step is limited to a tenth of the box.
         let longest = (0..n).map(|i| direction[i].abs() / (bounds[i].1 - bounds[i].0).max(1e-300)).fold(0.0, f64::max);
         let mut step = if fresh { (0.1 / longest).min(1.0) } else { 1.0 };
         let mut moved = None;

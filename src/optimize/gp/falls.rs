@@ -1,32 +1,32 @@
-//! How likely a point is to be stood through: a Gaussian-process classifier of the trials that fell.
+//! The probability of standing at a point: a Gaussian-process classifier of trials with and without a fall.
 //!
-//! A fall says where the edge lies, not how good the objective would have been. So the edge is learned by itself, and
-//! the improvement is weighed by the chance of standing, as Gelbart, Snoek and Adams do for unknown constraints
+//! A fall carries information about the boundary, not about the objective. So the boundary is learned separately and
+//! the improvement is weighted by the probability of standing, as Gelbart, Snoek and Adams do for unknown constraints
 //! ("Bayesian optimization with unknown constraints", UAI 2014). Laplace approximation with a logistic likelihood:
-//! Rasmussen and Williams (R&W), algorithms 3.1 and 3.2. The kernel is a Matern 5/2 for the shape of the edge, plus a
-//! linear trend (R&W 4.2.2), for the harder the push the likelier the fall.
+//! Rasmussen and Williams (R&W), algorithms 3.1 and 3.2. The kernel is a Matern 5/2 for the shape of the boundary plus a
+//! linear trend (R&W 4.2.2), because falls become likelier with a harder push.
 
 use super::process::Hyperparameters;
 use libm::{exp, log, log1p, sqrt};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use std::f64::consts::PI;
 
-/// Lengthscales that are tried, as shares of the range; the setting with the largest evidence is taken.
+/// Lengthscales that are tried, as shares of the range; the setting with the largest evidence is used.
 const LENGTHSCALES: [f64; 5] = [0.1, 0.2, 0.4, 0.8, 1.6];
-/// Variances of the latent function that are tried: chances that stay near the prior, or reach far from it.
+/// Variances of the latent function that are tried: probabilities near the prior, or far from it.
 const SIGNALS: [f64; 2] = [1.0, 9.0];
-/// Variances of the trend's slope that are tried, per unit of the cube: none, or from one side to the other as good as
-/// certain.
+/// Variances of the trend's slope that are tried, per unit of the cube: no trend, or one that is nearly certain from one
+/// side to the other.
 const TRENDS: [f64; 2] = [0.0, 50.0];
 
-/// The chance of standing, as a function of the point.
+/// The probability of standing, as a function of the point.
 #[derive(Debug, Clone)]
-pub struct Standing {
+pub struct StandProbability {
     points: Vec<Vec<f64>>,
     hyper: Hyperparameters,
     /// Variance of the linear trend's slope.
     trend: f64,
-    /// Latent mean far from everything: the log odds of standing over all trials.
+    /// Latent mean far from all points: the log odds of standing over all trials.
     prior: f64,
     /// Gradient of ln p(y|f) at the mode.
     gradient: DVector<f64>,
@@ -36,15 +36,15 @@ pub struct Standing {
     factor: Cholesky<f64, Dyn>,
 }
 
-impl Standing {
-    /// Learns from points of the unit cube and whether each was stood through. `None` if no trial has fallen.
+impl StandProbability {
+    /// Fits points of the unit cube; `stood`: whether each ended without a fall. `None` if no trial has fallen.
     pub fn fit(points: &[Vec<f64>], stood: &[bool]) -> Option<Self> {
         let stands = stood.iter().filter(|s| **s).count() as f64;
         let falls = stood.len() as f64 - stands;
         if falls == 0.0 {
             return None;
         }
-        // one imagined trial of each kind keeps the odds finite
+        // One pseudo-observation of each kind keeps the odds finite.
         let prior = log((stands + 1.0) / (falls + 1.0));
         let settings = LENGTHSCALES
             .iter()
@@ -68,9 +68,9 @@ impl Standing {
         let mut latent = DVector::from_element(n, prior);
         let mut objective = f64::NEG_INFINITY;
         for _ in 0..50 {
-            let chance = latent.map(sigmoid);
-            let gradient = &target - &chance;
-            let w = chance.map(|p| (p * (1.0 - p)).max(1e-12));
+            let probability = latent.map(sigmoid);
+            let gradient = &target - &probability;
+            let w = probability.map(|p| (p * (1.0 - p)).max(1e-12));
             let root_w = w.map(sqrt);
             // B = I + W^(1/2) K W^(1/2)
             let b_matrix =
@@ -88,7 +88,7 @@ impl Standing {
                 // ln q(y) = psi - sum ln L_ii   (R&W 3.32)
                 let evidence = next - (0..n).map(|i| log(factor.l_dirty()[(i, i)])).sum::<f64>();
                 return Some((
-                    Standing { points: points.to_vec(), hyper, trend, prior, gradient, root_w, factor },
+                    StandProbability { points: points.to_vec(), hyper, trend, prior, gradient, root_w, factor },
                     evidence,
                 ));
             }
@@ -97,8 +97,8 @@ impl Standing {
         None
     }
 
-    /// The chance of standing at `x`, averaged over the uncertainty of the latent function.
-    pub fn chance(&self, x: &[f64]) -> f64 {
+    /// The probability of standing at `x`, averaged over the uncertainty of the latent function.
+    pub fn probability(&self, x: &[f64]) -> f64 {
         let k = DVector::from_iterator(
             self.points.len(),
             self.points.iter().map(|p| kernel(&self.hyper, self.trend, p, x)),

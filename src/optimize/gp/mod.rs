@@ -1,66 +1,54 @@
-//! The Gaussian-process sampler: where a trial costs a jump of a real robot, the model may take its time.
+//! The Gaussian-process sampler, for robots: a trial is expensive, computing time is not.
 //!
 //! A space-filling start; then regression with a Matern 5/2 kernel, a lengthscale per parameter and estimated noise
 //! ([`process`]); the next point maximizes the logarithm of the expected improvement (Ament et al., "Unexpected
-//! improvements to expected improvement for Bayesian optimization", NeurIPS 2023) times the chance of standing
-//! ([`falls`]). Trials that other workers are running count as if they had given their expected value.
+//! improvements to expected improvement for Bayesian optimization", NeurIPS 2023) times the probability of standing
+//! ([`falls`]). Running trials of other workers count with their expected value.
 //!
-//! Falls: their value 0 beside a best jump is a cliff, and a cliff forces short lengthscales and a large noise on the
-//! whole space. So the regression sees a fall at the lower quartile of the jumps that were stood through: bad, but no
-//! cliff (padding, as Wakabayashi et al., "Bayesian optimization with experimental failure", npj Comput. Mater. 8, 180,
-//! 2022, who take the worst value instead); where the edge is, the classifier says.
+//! A fall's value of 0 beside a good jump is a cliff, which forces short lengthscales and a large noise on the whole
+//! space. So a fall enters the regression with the lower quartile of the values without a fall (padding, as Wakabayashi
+//! et al., "Bayesian optimization with experimental failure", npj Comput. Mater. 8, 180, 2022, who take the worst value);
+//! the classifier learns the position of the cliff.
 
 pub mod ascent;
 pub mod falls;
 pub mod process;
 
-use super::sampler::{Direction, Proposal, SamplerConfig, Streams, startup_point};
+use super::ask::{Ask, Candidate, Direction, Streams};
+use super::model_free;
 use super::sobol::Sobol;
-use super::space::Space;
-use super::trial::{Trial, TrialState};
+use super::space::Parameter;
+use super::trial::TrialState;
 use super::truncnorm::{HALF_LN_TWO_PI, log_cdf};
-use falls::Standing;
+use falls::StandProbability;
 use libm::{exp, log, log1p};
 use process::GaussianProcess;
 
-/// Points over the whole space at which the acquisition is tried before the best ones are climbed from.
+/// Points over the whole space at which the acquisition is evaluated.
 const SCATTERED: u32 = 512;
-/// Points around each of the best trials at which it is tried as well, and the widths of these clouds.
+/// Points per cloud around a centre at which it is evaluated as well.
 const CLOUD: u32 = 32;
+/// Half widths of the clouds of a centre, in units of the cube.
 const CLOUD_WIDTHS: [f64; 3] = [0.2, 0.05, 0.01];
-/// Best trials that get clouds, and best candidates that are climbed from.
+/// Number of best trials that are centres.
 const CENTRES: usize = 3;
+/// Number of best points from which the gradient ascent starts.
 const CLIMBS: usize = 6;
 
-/// The next point. `fixed` parameters are kept, the others are chosen for them.
-pub fn propose(
-    config: &SamplerConfig,
-    streams: &mut Streams,
-    trials: &[Trial],
-    space: &Space,
-    fixed: &[(String, f64)],
-    direction: Direction,
-) -> Proposal {
-    let parameters = space.parameters();
-    let given: Vec<Option<f64>> = parameters
-        .iter()
-        .map(|p| {
-            let value = fixed.iter().find(|(n, _)| *n == p.name).map(|(_, v)| *v);
-            value.or(p.range.is_point().then_some(p.range.low))
-        })
-        .collect();
+/// Proposes the next point for the given parameters.
+pub fn propose(ask: &Ask<'_>, streams: &mut Streams) -> Candidate {
+    let parameters = ask.space.parameters();
+    let given: Vec<Option<f64>> = parameters.iter().map(|p| ask.given(p)).collect();
     if given.iter().all(Option::is_some) {
-        return Proposal { values: given.into_iter().flatten().collect(), joint: Vec::new() };
+        return given.into_iter().flatten().collect::<Vec<f64>>().into();
     }
-    let history = History::gather(trials, space, direction);
-    let model = if history.points.len() < config.startup_trials(space) || history.values.len() < 2 {
+    let training = TrainingSet::gather(ask);
+    let model = if training.points.len() < ask.config.startup_trials(ask.space) || training.values.len() < 2 {
         None
     } else {
-        Acquisition::new(&history)
+        Acquisition::new(&training)
     };
-    let Some(model) = model else {
-        return startup_point(config.seed, streams, space, fixed);
-    };
+    let Some(model) = model else { return model_free::sobol(ask, streams) };
     let bounds: Vec<(f64, f64)> = parameters
         .iter()
         .zip(&given)
@@ -69,43 +57,45 @@ pub fn propose(
     let unit = model.best_point(&bounds, streams);
     let values =
         parameters.iter().zip(&given).zip(unit).map(|((p, given), u)| given.unwrap_or_else(|| p.range.unscale(u)));
-    Proposal { values: values.collect(), joint: Vec::new() }
+    values.collect::<Vec<f64>>().into()
 }
 
 /// The trials as points of the unit cube.
-struct History {
+struct TrainingSet {
     /// Points of all observed trials.
     points: Vec<Vec<f64>>,
-    /// Whether each was stood through.
+    /// Whether each trial ended without a fall.
     stood: Vec<bool>,
-    /// Values of those that were, larger is better.
+    /// Values of the trials without a fall, larger is better.
     values: Vec<f64>,
-    /// Points of trials that are running.
+    /// Points of running trials.
     pending: Vec<Vec<f64>>,
 }
 
-impl History {
-    fn gather(trials: &[Trial], space: &Space, direction: Direction) -> Self {
-        let mut history = History { points: Vec::new(), stood: Vec::new(), values: Vec::new(), pending: Vec::new() };
-        for trial in trials {
-            let coordinate = |p: &super::space::Parameter| trial.parameter(&p.name).map(|v| p.range.scale(v));
-            let Some(point) = space.parameters().iter().map(coordinate).collect::<Option<Vec<f64>>>() else { continue };
+impl TrainingSet {
+    fn gather(ask: &Ask<'_>) -> Self {
+        let mut set = TrainingSet { points: Vec::new(), stood: Vec::new(), values: Vec::new(), pending: Vec::new() };
+        for trial in ask.trials {
+            let coordinate = |p: &Parameter| trial.parameter(&p.name).map(|v| p.range.scale(v));
+            let Some(point) = ask.space.parameters().iter().map(coordinate).collect::<Option<Vec<f64>>>() else {
+                continue;
+            };
             match (trial.state, trial.value) {
-                (TrialState::Running, _) => history.pending.push(point),
+                (TrialState::Running, _) => set.pending.push(point),
                 (TrialState::Complete, Some(value)) if value.is_finite() && trial.violation() <= 0.0 => {
-                    history.points.push(point);
-                    history.stood.push(!trial.is_fall());
+                    set.points.push(point);
+                    set.stood.push(!trial.is_fall());
                     if !trial.is_fall() {
-                        history.values.push(if direction == Direction::Maximize { value } else { -value });
+                        set.values.push(if ask.direction == Direction::Maximize { value } else { -value });
                     }
                 }
                 _ => {}
             }
         }
-        history
+        set
     }
 
-    /// One value per point; falls have the lower quartile of the others.
+    /// One value per point; falls have the lower quartile of the other values.
     fn values_with_falls(&self) -> Vec<f64> {
         let mut sorted = self.values.clone();
         sorted.sort_by(f64::total_cmp);
@@ -116,36 +106,36 @@ impl History {
     }
 }
 
-/// What a trial is worth, as a function of its point.
+/// The acquisition function: the expected gain of a trial at a point.
 struct Acquisition {
     process: GaussianProcess,
-    standing: Option<Standing>,
-    /// The best expected value of a point that was tried.
+    stand_probability: Option<StandProbability>,
+    /// The largest expected value at the observed points.
     incumbent: f64,
-    /// The best points that were tried.
+    /// The observed points of largest expected value.
     centres: Vec<Vec<f64>>,
 }
 
 impl Acquisition {
-    fn new(history: &History) -> Option<Self> {
-        let process = GaussianProcess::fit(history.points.clone(), &history.values_with_falls())?;
+    fn new(training: &TrainingSet) -> Option<Self> {
+        let process = GaussianProcess::fit(training.points.clone(), &training.values_with_falls())?;
         let mut ranked: Vec<(f64, &Vec<f64>)> = process.points().iter().map(|p| (process.predict(p).0, p)).collect();
         ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
         let incumbent = ranked.first()?.0;
         let centres = ranked.iter().take(CENTRES).map(|(_, p)| (*p).clone()).collect();
-        let standing = Standing::fit(&history.points, &history.stood);
-        let process = process.believing(&history.pending)?;
-        Some(Acquisition { process, standing, incumbent, centres })
+        let stand_probability = StandProbability::fit(&training.points, &training.stood);
+        let process = process.believing(&training.pending)?;
+        Some(Acquisition { process, stand_probability, incumbent, centres })
     }
 
     /// ln EI(x) + ln P(stands at x)
     fn value(&self, x: &[f64]) -> f64 {
         let (mean, deviation) = self.process.predict(x);
-        let chance = self.standing.as_ref().map_or(1.0, |s| s.chance(x));
-        log(deviation) + log_improvement((mean - self.incumbent) / deviation) + log(chance)
+        let probability = self.stand_probability.as_ref().map_or(1.0, |s| s.probability(x));
+        log(deviation) + log_improvement((mean - self.incumbent) / deviation) + log(probability)
     }
 
-    /// The point of the box where the acquisition is largest. Takes one double per coordinate.
+    /// Returns the point of the box with the largest acquisition. Takes one double per coordinate.
     fn best_point(&self, bounds: &[(f64, f64)], streams: &mut Streams) -> Vec<f64> {
         let scatter = Sobol::new(bounds.len(), &mut streams.model);
         let into_box =
@@ -168,7 +158,7 @@ impl Acquisition {
     }
 }
 
-/// ln h(z), h(z) = phi(z) + z Phi(z): the expected improvement of a standard normal over -z, kept exact where it vanishes.
+/// ln h(z), h(z) = phi(z) + z Phi(z): the expected improvement of a standard normal over -z, accurate in the tail.
 pub fn log_improvement(z: f64) -> f64 {
     let log_phi = -0.5 * z * z - HALF_LN_TWO_PI;
     if z > -1.0 {

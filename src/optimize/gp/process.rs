@@ -15,12 +15,12 @@ const SIGNAL_PRIOR: (f64, f64) = (0.0, 1.0);
 /// ln of the noise variance's prior median and its width.
 const NOISE_PRIOR: (f64, f64) = (-7.0, 2.0);
 
-/// What is learned of the function before its values: how fast it changes, how much, and how noisy it is.
+/// Hyperparameters of the kernel and of the noise.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Hyperparameters {
     /// l_d, per coordinate, as a share of its range.
     pub lengthscale: Vec<f64>,
-    /// s^2.
+    /// s^2, variance of the function.
     pub signal: f64,
     /// Variance of the noise.
     pub noise: f64,
@@ -55,7 +55,7 @@ impl Hyperparameters {
     }
 }
 
-/// A Gaussian process that has seen some values.
+/// A Gaussian process conditioned on observed values.
 #[derive(Debug, Clone)]
 pub struct GaussianProcess {
     points: Vec<Vec<f64>>,
@@ -68,7 +68,7 @@ pub struct GaussianProcess {
 }
 
 impl GaussianProcess {
-    /// Learns the hyperparameters (maximum a posteriori) and conditions on the values. `points` lie in the unit cube.
+    /// Fits the hyperparameters (maximum a posteriori) and conditions on the values. `points` lie in the unit cube.
     /// `None` if there are no points or the covariance cannot be factored.
     pub fn fit(points: Vec<Vec<f64>>, values: &[f64]) -> Option<Self> {
         let d = points.first()?.len();
@@ -80,7 +80,7 @@ impl GaussianProcess {
         let mut bounds = vec![(log(0.03), log(20.0)); d];
         bounds.extend([(log(0.05), log(20.0)), (log(1e-7), log(0.5))]);
         let posterior = |theta: &[f64]| log_posterior(theta, &points, &y);
-        // Two starts: smooth and quiet, rough and noisy. The better summit counts.
+        // Two starts, smooth with little noise and rough with more; the better optimum counts.
         let starts = [(log(0.7), log(1e-4)), (log(0.25), log(1e-2))];
         let summit = starts.map(|(lengthscale, noise)| {
             let mut start = vec![lengthscale; d];
@@ -103,8 +103,8 @@ impl GaussianProcess {
         Some(GaussianProcess { points, hyper, factor, alpha, mean, deviation })
     }
 
-    /// The process as if each pending point had just given its expected value ("kriging believer", Ginsbourger et al.
-    /// 2010): the mean stays, the uncertainty around the points goes.
+    /// Conditions on the expected value at each pending point ("kriging believer", Ginsbourger et al. 2010): the mean
+    /// stays, the uncertainty around the points vanishes.
     pub fn believing(self, pending: &[Vec<f64>]) -> Option<Self> {
         if pending.is_empty() {
             return Some(self);
@@ -126,12 +126,12 @@ impl GaussianProcess {
         (self.mean + self.deviation * mean, self.deviation * sqrt(variance))
     }
 
-    /// What has been learned of the function.
+    /// The fitted hyperparameters.
     pub fn hyperparameters(&self) -> &Hyperparameters {
         &self.hyper
     }
 
-    /// Points that have been seen, believed ones among them.
+    /// Observed points, pending ones included after [`Self::believing`].
     pub fn points(&self) -> &[Vec<f64>] {
         &self.points
     }

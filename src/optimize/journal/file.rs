@@ -1,49 +1,49 @@
-//! The journal as a file shared by several programs: reading while others write, the lock, the append.
+//! The journal as a file shared by several programs: reading, locking, appending (`docs/journal.md`).
 
-use super::JournalError;
+use super::error::JournalError;
 use std::fs::{self, File, OpenOptions};
 use std::io::{ErrorKind, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
 
-/// How long a lock may stand while the journal does not change before its owner counts as dead. Optuna's.
+/// Age at which a lock without a change of the journal counts as stale; the value of Optuna.
 pub const LOCK_GRACE: Duration = Duration::from_secs(30);
 
 /// Whether an append waits for the disk.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Durability {
-    /// The lines are on the disk when a call returns: a power cut loses nothing.
+    /// The lines are on the disk when a call returns: safe against power loss.
     #[default]
     Synced,
-    /// The lines are with the operating system: a killed program loses nothing, a power cut may.
+    /// The lines are in the buffers of the operating system: safe against a crash of the program, not against power loss.
     Buffered,
 }
 
-/// A journal file and how far it has been read.
+/// A journal file with the read position.
 #[derive(Debug)]
 pub struct JournalFile {
     path: PathBuf,
     lock: PathBuf,
     durability: Durability,
     grace: Duration,
-    /// Bytes read so far, always the end of a line.
+    /// Bytes read, always up to the end of a line.
     offset: u64,
-    /// Lines read so far.
+    /// Lines read.
     lines: usize,
 }
 
-/// What lies beyond the last good line: an unfinished or unreadable last line, cut off before the next append.
-pub(super) struct Rest {
+/// The bytes after the last valid line: an incomplete or invalid line, removed before the next append.
+pub(super) struct UnreadTail {
     bytes: Vec<u8>,
 }
 
 impl JournalFile {
-    /// A journal at `path`, which need not exist yet.
+    /// The journal at `path`, which need not exist.
     ///
     /// # Errors
-    /// If the path has no folder, or the folder cannot be made.
+    /// If the folder cannot be created.
     pub fn new(path: &Path, durability: Durability, grace: Duration) -> Result<Self, JournalError> {
-        // Absolute, because other programs resolve the lock's link from where they run.
+        // Absolute, because other programs resolve the lock's link from their own working directories.
         let path = std::path::absolute(path).map_err(|e| JournalError::io("resolve", path, e))?;
         if let Some(folder) = path.parent() {
             fs::create_dir_all(folder).map_err(|e| JournalError::io("create the folder of", &path, e))?;
@@ -53,20 +53,25 @@ impl JournalFile {
         Ok(JournalFile { path, lock: lock.into(), durability, grace, offset: 0, lines: 0 })
     }
 
-    /// Where the journal is.
+    /// Absolute path of the journal.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Feeds every line that has been completed since the last call to `accept`, which says what is wrong with one.
-    /// A last line that is not complete or not readable is left for later and returned.
+    /// Passes every line completed since the last call to `accept`, which returns the fault of an invalid line. A last line
+    /// that is incomplete or invalid is returned and read again by the next call.
     ///
     /// # Errors
-    /// If the file cannot be read, has become shorter, or holds an unreadable line before its last.
-    pub(super) fn read(&mut self, mut accept: impl FnMut(&str) -> Result<(), String>) -> Result<Rest, JournalError> {
+    /// If the file cannot be read, has become shorter, or has an invalid line before its last.
+    pub(super) fn read(
+        &mut self,
+        mut accept: impl FnMut(&str) -> Result<(), String>,
+    ) -> Result<UnreadTail, JournalError> {
         let mut file = match File::open(&self.path) {
             Ok(file) => file,
-            Err(e) if e.kind() == ErrorKind::NotFound && self.offset == 0 => return Ok(Rest { bytes: Vec::new() }),
+            Err(e) if e.kind() == ErrorKind::NotFound && self.offset == 0 => {
+                return Ok(UnreadTail { bytes: Vec::new() });
+            }
             Err(e) => return Err(JournalError::io("open", &self.path, e)),
         };
         let io = |e| JournalError::io("read", &self.path, e);
@@ -75,7 +80,7 @@ impl JournalFile {
             return Err(JournalError::Shortened { path: self.path.clone(), had: self.offset, has: length });
         }
         if length == self.offset {
-            return Ok(Rest { bytes: Vec::new() });
+            return Ok(UnreadTail { bytes: Vec::new() });
         }
         file.seek(SeekFrom::Start(self.offset)).map_err(io)?;
         let mut bytes = Vec::with_capacity((length - self.offset) as usize);
@@ -85,33 +90,33 @@ impl JournalFile {
             let line = std::str::from_utf8(&bytes[start..end]).map_err(|e| format!("not UTF-8: {e}"));
             match line.and_then(|line| accept(line.trim_end_matches(['\n', '\r']))) {
                 Ok(()) => {}
-                // Writers cut an unreadable last line off, so it harms nobody; followed by another it stops every reader.
+                // Writers remove an invalid last line; an invalid line before another stops every reader.
                 Err(_) if !bytes[end..].contains(&b'\n') => break,
-                Err(what) => {
-                    return Err(JournalError::Line { path: self.path.clone(), line: self.lines + 1, what });
+                Err(fault) => {
+                    return Err(JournalError::Line { path: self.path.clone(), line: self.lines + 1, fault });
                 }
             }
             self.lines += 1;
             self.offset += (end - start) as u64;
             start = end;
         }
-        Ok(Rest { bytes: bytes.split_off(start) })
+        Ok(UnreadTail { bytes: bytes.split_off(start) })
     }
 
-    /// Takes the lock, waiting for others; a lock whose owner is dead is broken.
+    /// Acquires the lock, waiting for other writers; a stale lock is broken.
     ///
     /// # Errors
-    /// If the lock can neither be made nor waited for.
-    pub(super) fn lock(&self) -> Result<Lock, JournalError> {
+    /// If the lock cannot be created.
+    pub(super) fn lock(&self) -> Result<JournalLock, JournalError> {
         let mut pause = Duration::from_millis(1);
         let mut seen: Option<(Option<SystemTime>, Instant)> = None;
         loop {
             match make_link(&self.path, &self.lock) {
-                Ok(()) => return Ok(Lock { path: self.lock.clone() }),
+                Ok(()) => return Ok(JournalLock { path: self.lock.clone() }),
                 Err(e) if e.kind() == ErrorKind::AlreadyExists => {}
                 Err(e) => return Err(JournalError::io("lock", &self.lock, e)),
             }
-            // The lock is stale when nobody has written for the grace time although somebody holds it.
+            // Stale: held for the grace time without a change of the journal.
             let changed = fs::metadata(&self.path).and_then(|m| m.modified()).ok();
             match seen {
                 Some((before, since)) if before == changed => {
@@ -128,12 +133,11 @@ impl JournalFile {
         }
     }
 
-    /// Appends whole lines in one write. `_lock` shows that the lock is held; `rest`, what was found after the last good
-    /// line, is kept aside in `<path>.torn-<n>` and cut off first.
+    /// Appends whole lines in one write. `_lock` proves that the lock is held; `rest` is first moved to `<path>.torn-<n>`.
     ///
     /// # Errors
     /// If the file cannot be written or synced.
-    pub(super) fn append(&self, _lock: &Lock, rest: &Rest, lines: &str) -> Result<(), JournalError> {
+    pub(super) fn append(&self, _lock: &JournalLock, rest: &UnreadTail, lines: &str) -> Result<(), JournalError> {
         let io = |e| JournalError::io("append to", &self.path, e);
         let fresh = self.offset == 0 && !self.path.exists();
         let mut file = OpenOptions::new().create(true).append(true).open(&self.path).map_err(io)?;
@@ -145,7 +149,7 @@ impl JournalFile {
         if self.durability == Durability::Synced {
             file.sync_data().map_err(io)?;
             if fresh && let Some(folder) = self.path.parent() {
-                // a new name is only safe once its folder is
+                // A new name is durable only after a sync of its folder.
                 File::open(folder).and_then(|f| f.sync_all()).map_err(io)?;
             }
         }
@@ -165,23 +169,23 @@ impl JournalFile {
                 Err(e) => return Err(JournalError::io("keep a torn line in", &aside, e)),
             }
         }
-        unreachable!("there is always a free number")
+        unreachable!("one of all numbers is free")
     }
 }
 
 /// The lock of a journal, released when dropped.
-pub(super) struct Lock {
+pub(super) struct JournalLock {
     path: PathBuf,
 }
 
-impl Drop for Lock {
+impl Drop for JournalLock {
     fn drop(&mut self) {
         release(&self.path);
     }
 }
 
-/// Renames the lock to a name of its own before removing it, so that of two that release only one removes. A rename
-/// that fails means that somebody else has broken the lock; nothing is left to do then.
+/// Removes the lock after renaming it to a unique name, so that only one of two concurrent releases removes it. A failed
+/// rename means that another writer has broken the lock.
 fn release(lock: &Path) {
     let mut name = lock.as_os_str().to_owned();
     name.push(format!("{}.rename", uuid::Uuid::new_v4()));
@@ -190,7 +194,7 @@ fn release(lock: &Path) {
     }
 }
 
-/// Makes the lock: a symbolic link to the journal, as Optuna's default lock; elsewhere a file.
+/// Creates the lock: a symbolic link to the journal, as Optuna's default lock; a file on other systems.
 #[cfg(unix)]
 fn make_link(target: &Path, lock: &Path) -> std::io::Result<()> {
     std::os::unix::fs::symlink(target, lock)

@@ -1,4 +1,4 @@
-//! JSON as Python's `json` module writes it, and the members of a journal line.
+//! JSON in the form of Python's `json` module, and the members of a journal line.
 
 use crate::optimize::trial::{TrialState, number_of};
 use jiff::Timestamp;
@@ -6,10 +6,10 @@ use serde_json::{Map, Value};
 use std::borrow::Cow;
 use std::fmt::Write as _;
 
-/// The members of a line, with errors that name the member.
-pub struct Fields<'a>(pub &'a Map<String, Value>);
+/// The members of a line; errors name the member.
+pub struct LineFields<'a>(pub &'a Map<String, Value>);
 
-impl Fields<'_> {
+impl LineFields<'_> {
     pub fn get(&self, key: &str) -> Result<&Value, String> {
         self.0.get(key).ok_or_else(|| format!("`{key}` is missing"))
     }
@@ -45,15 +45,19 @@ impl Fields<'_> {
         }
     }
 
+    /// A member that may be missing.
+    pub fn optional<T>(
+        &self,
+        key: &str,
+        read: impl Fn(&Self, &str) -> Result<Option<T>, String>,
+    ) -> Result<Option<T>, String> {
+        if self.0.contains_key(key) { read(self, key) } else { Ok(None) }
+    }
+
     pub fn state(&self) -> Result<TrialState, String> {
-        match self.index("state")? {
-            0 => Ok(TrialState::Running),
-            1 => Ok(TrialState::Complete),
-            2 => Ok(TrialState::Pruned),
-            3 => Ok(TrialState::Fail),
-            4 => Ok(TrialState::Waiting),
-            other => Err(format!("state {other} is not one of 0 to 4")),
-        }
+        let code = self.index("state")?;
+        let state = u8::try_from(code).ok().and_then(TrialState::from_repr);
+        state.ok_or_else(|| format!("state {code} is not one of 0 to 4"))
     }
 
     pub fn attribute(&self, key: &str) -> Result<(String, Value), String> {
@@ -70,7 +74,7 @@ pub fn text(value: &str) -> String {
     Value::from(value).to_string()
 }
 
-/// A number as Python's JSON writes it, which has tokens for what is not finite.
+/// A number as Python writes it, with tokens for infinities and NaN.
 pub fn number(value: f64) -> String {
     match value {
         v if v.is_nan() => "NaN".to_owned(),
@@ -87,16 +91,12 @@ pub fn numbers(values: Option<&[f64]>) -> String {
     }
 }
 
-pub fn json(value: &Value) -> String {
-    value.to_string()
-}
-
 pub fn time(at: Option<Timestamp>) -> String {
     at.map_or_else(|| "null".to_owned(), |at| format!("\"{}\"", at.strftime("%Y-%m-%dT%H:%M:%S.%6f+00:00")))
 }
 
-/// Reads JSON as Python's `json` writes it: the bare tokens Infinity, -Infinity and NaN become text, and halves of
-/// surrogate pairs without the other half become U+FFFD.
+/// Parses JSON of Python's `json`: the bare tokens Infinity, -Infinity and NaN become text, unpaired surrogates become
+/// U+FFFD.
 pub fn parse_json(text: &str) -> Result<Value, String> {
     serde_json::from_str(text)
         .or_else(|strict| serde_json::from_str(&strictly(text)).map_err(|_| strict))
@@ -130,7 +130,7 @@ fn strictly(text: &str) -> Cow<'_, str> {
     Cow::Owned(out)
 }
 
-/// Length of the escape at the start of `rest` and what stands for it.
+/// Length of the escape at the start of `rest`, and its replacement.
 fn escape(rest: &str) -> (usize, &str) {
     let code = |at: usize| {
         let hex = rest.get(at..at + 6)?.strip_prefix("\\u")?;

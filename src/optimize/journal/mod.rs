@@ -1,189 +1,136 @@
-//! The study on disk: Optuna's journal, an append-only list of JSON operations that Optuna and optuna-dashboard read and
-//! write at the same time.
+//! The journal of studies: Optuna's append-only list of JSON operations (`docs/journal.md`), which Optuna and
+//! optuna-dashboard can read and write at the same time.
 //!
-//! The state is the replay of all lines. A writer takes the lock, reads what others have appended, decides, appends its
-//! lines in one write and reads them back; so what it decides on is what it appends to.
+//! The state is the result of all lines. A writer locks the journal, reads new lines, decides, appends its lines in one
+//! write and reads them back; so it decides on exactly the state to which it appends.
 
+mod codec;
+mod error;
 mod file;
 mod json;
 mod operation;
 mod redis;
-mod replay;
+mod state;
 
 pub use self::redis::JournalRedis;
+pub use error::JournalError;
 pub use file::{Durability, JournalFile, LOCK_GRACE};
-pub use operation::{Operation, Template};
-pub use replay::{Effect, Replay, StudyRecord};
+pub use operation::{Operation, TrialTemplate};
+pub use state::{Applied, JournalState, StudyRecord};
 
-use std::path::{Path, PathBuf};
-
-/// What can go wrong with a journal.
-#[derive(Debug, thiserror::Error)]
-pub enum JournalError {
-    /// The operating system refused.
-    #[error("cannot {action} {}: {source}", path.display())]
-    Io {
-        /// What was tried.
-        action: &'static str,
-        /// On which file.
-        path: PathBuf,
-        /// Why not.
-        source: std::io::Error,
-    },
-    /// A line that no reader can accept.
-    #[error(
-        "{}, line {line}: {what}. Every program that reads this journal stops here: keep a copy, then remove or repair the line",
-        path.display()
-    )]
-    Line {
-        /// The journal.
-        path: PathBuf,
-        /// Number of the line, from 1.
-        line: usize,
-        /// What is wrong with it.
-        what: String,
-    },
-    /// The file is not the one that was read before.
-    #[error(
-        "{} has {has} bytes, though {had} were read from it before: it was shortened or replaced; open the study again",
-        path.display()
-    )]
-    Shortened {
-        /// The journal.
-        path: PathBuf,
-        /// Bytes read before.
-        had: u64,
-        /// Bytes it has now.
-        has: u64,
-    },
-    /// The Redis server refused or was not there.
-    #[error("cannot {action} the journal on the Redis server {address}: {source}")]
-    Redis {
-        /// What was tried.
-        action: &'static str,
-        /// The server, without any password.
-        address: String,
-        /// Why not.
-        source: ::redis::RedisError,
-    },
-}
-
-impl JournalError {
-    pub(super) fn io(action: &'static str, path: &Path, source: std::io::Error) -> Self {
-        JournalError::Io { action, path: path.to_owned(), source }
-    }
-}
-
-/// Where a journal's lines are kept.
+/// Place of storage of the lines.
 #[derive(Debug)]
-enum Backend {
+enum JournalBackend {
     Memory,
     File(JournalFile),
     Redis(Box<JournalRedis>),
 }
 
-/// A journal: its state and the way to change it.
+/// A journal with its state.
 #[derive(Debug)]
 pub struct Journal {
-    backend: Backend,
+    backend: JournalBackend,
     worker: String,
-    replay: Replay,
+    state: JournalState,
 }
 
 impl Journal {
-    /// A journal that ends with the program; nothing is read or written.
+    /// A journal in memory only.
     pub fn in_memory() -> Self {
-        Journal { backend: Backend::Memory, worker: worker_id(), replay: Replay::default() }
+        Journal::new(JournalBackend::Memory)
     }
 
-    /// The journal of a file, which is made by the first commit if it does not exist.
+    /// The journal of a file, created by the first commit if it does not exist.
     ///
     /// # Errors
     /// [`JournalError`] if the file cannot be read.
     pub fn open(file: JournalFile) -> Result<Self, JournalError> {
-        let mut journal = Journal { backend: Backend::File(file), worker: worker_id(), replay: Replay::default() };
-        journal.refresh()?;
-        Ok(journal)
+        Self::read(JournalBackend::File(file))
     }
 
     /// The journal on a Redis server.
     ///
     /// # Errors
-    /// [`JournalError`] if the server cannot be reached or its journal not be read.
+    /// [`JournalError`] if the server cannot be reached or its journal cannot be read.
     pub fn connect(redis: JournalRedis) -> Result<Self, JournalError> {
-        let mut journal =
-            Journal { backend: Backend::Redis(Box::new(redis)), worker: worker_id(), replay: Replay::default() };
-        journal.refresh()?;
-        Ok(journal)
+        Self::read(JournalBackend::Redis(Box::new(redis)))
     }
 
-    /// The same state in memory: what happens to it reaches no disk and nobody else.
+    fn new(backend: JournalBackend) -> Self {
+        Journal { backend, worker: uuid::Uuid::new_v4().to_string(), state: JournalState::default() }
+    }
+
+    fn read(backend: JournalBackend) -> Result<Self, JournalError> {
+        let mut journal = Journal::new(backend);
+        journal.refresh().map(|()| journal)
+    }
+
+    /// Copies the state to a journal in memory.
     pub fn fork(&self) -> Self {
-        Journal { backend: Backend::Memory, worker: self.worker.clone(), replay: self.replay.clone() }
+        Journal { backend: JournalBackend::Memory, worker: self.worker.clone(), state: self.state.clone() }
     }
 
     /// The state as of the last refresh or commit.
-    pub fn replay(&self) -> &Replay {
-        &self.replay
+    pub fn state(&self) -> &JournalState {
+        &self.state
     }
 
-    /// This writer's identity, unique per opened journal.
+    /// Identity of this writer, unique per opened journal.
     pub fn worker(&self) -> &str {
         &self.worker
     }
 
-    /// Takes in what others have written.
+    /// Reads the lines of other writers.
     ///
     /// # Errors
     /// [`JournalError`] if the journal cannot be read.
     pub fn refresh(&mut self) -> Result<(), JournalError> {
         match &mut self.backend {
-            Backend::Memory => Ok(()),
-            Backend::File(file) => file.read(|line| accept(&mut self.replay, line).map(drop)).map(drop),
-            Backend::Redis(redis) => redis.read(|line| accept(&mut self.replay, line).map(drop)),
+            JournalBackend::Memory => Ok(()),
+            JournalBackend::File(file) => file.read(|line| accept(&mut self.state, line).map(drop)).map(drop),
+            JournalBackend::Redis(redis) => redis.read(|line| accept(&mut self.state, line).map(drop)),
         }
     }
 
-    /// Decides on the newest state and appends: `decide` sees the journal exactly as it is before its operations are
-    /// appended, and says which, none if nothing is to be done. It is asked again if another writer of a Redis journal was
-    /// faster. Returns what became of each operation.
+    /// Appends the operations that `decide` returns for the newest state; no other line comes in between. `decide` is called
+    /// again if another writer of a Redis journal was faster. Returns the result of each operation.
     ///
     /// # Errors
-    /// What `decide` refuses, with nothing written; [`JournalError`] if the journal cannot be read or written.
+    /// The error of `decide`, with nothing written; [`JournalError`] if the journal cannot be read or written.
     pub fn commit<E: From<JournalError>>(
         &mut self,
-        mut decide: impl FnMut(&Replay) -> Result<Vec<Operation>, E>,
-    ) -> Result<Vec<Effect>, E> {
+        mut decide: impl FnMut(&JournalState) -> Result<Vec<Operation>, E>,
+    ) -> Result<Vec<Applied>, E> {
         match &mut self.backend {
-            Backend::Memory => {
-                let operations = decide(&self.replay)?;
-                Ok(operations.into_iter().map(|o| self.replay.apply(o, &self.worker)).collect())
+            JournalBackend::Memory => {
+                let operations = decide(&self.state)?;
+                Ok(operations.into_iter().map(|o| self.state.apply(o, &self.worker)).collect())
             }
-            Backend::File(file) => {
+            JournalBackend::File(file) => {
                 let lock = file.lock()?;
-                let rest = file.read(|line| accept(&mut self.replay, line).map(drop))?;
-                let operations = decide(&self.replay)?;
+                let rest = file.read(|line| accept(&mut self.state, line).map(drop))?;
+                let operations = decide(&self.state)?;
                 if operations.is_empty() {
                     return Ok(Vec::new());
                 }
                 let lines: String = operations.iter().map(|o| o.to_line(&self.worker)).collect();
                 file.append(&lock, &rest, &lines)?;
                 drop(lock);
-                let mut effects = Vec::with_capacity(operations.len());
-                file.read(|line| collect(&mut self.replay, line, &self.worker, &mut effects))?;
-                Ok(effects)
+                let mut applied = Vec::with_capacity(operations.len());
+                file.read(|line| collect(&mut self.state, line, &self.worker, &mut applied))?;
+                Ok(applied)
             }
-            Backend::Redis(redis) => loop {
-                redis.read(|line| accept(&mut self.replay, line).map(drop))?;
-                let operations = decide(&self.replay)?;
+            JournalBackend::Redis(redis) => loop {
+                redis.read(|line| accept(&mut self.state, line).map(drop))?;
+                let operations = decide(&self.state)?;
                 if operations.is_empty() {
                     return Ok(Vec::new());
                 }
                 let lines: Vec<String> = operations.iter().map(|o| o.to_line(&self.worker)).collect();
                 if redis.append(&lines)? {
-                    let mut effects = Vec::with_capacity(operations.len());
-                    redis.read(|line| collect(&mut self.replay, line, &self.worker, &mut effects))?;
-                    return Ok(effects);
+                    let mut applied = Vec::with_capacity(operations.len());
+                    redis.read(|line| collect(&mut self.state, line, &self.worker, &mut applied))?;
+                    return Ok(applied);
                 }
                 std::thread::sleep(std::time::Duration::from_millis(1));
             },
@@ -191,21 +138,17 @@ impl Journal {
     }
 }
 
-fn accept(replay: &mut Replay, line: &str) -> Result<(String, Effect), String> {
+fn accept(state: &mut JournalState, line: &str) -> Result<(String, Applied), String> {
     let (worker, operation) = Operation::parse(line)?;
-    let effect = replay.apply(operation, &worker);
-    Ok((worker, effect))
+    let result = state.apply(operation, &worker);
+    Ok((worker, result))
 }
 
-/// Accepts a line and keeps its effect if it is our own.
-fn collect(replay: &mut Replay, line: &str, own: &str, effects: &mut Vec<Effect>) -> Result<(), String> {
-    let (worker, effect) = accept(replay, line)?;
+/// Accepts a line and stores its result if it is of writer `own`.
+fn collect(state: &mut JournalState, line: &str, own: &str, applied: &mut Vec<Applied>) -> Result<(), String> {
+    let (worker, result) = accept(state, line)?;
     if worker == own {
-        effects.push(effect);
+        applied.push(result);
     }
     Ok(())
-}
-
-fn worker_id() -> String {
-    uuid::Uuid::new_v4().to_string()
 }

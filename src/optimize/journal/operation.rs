@@ -1,364 +1,127 @@
-//! One line of the journal: an operation and who wrote it, to and from JSON text.
+//! The operations of which a journal consists.
 
-use super::json::{Fields, json, number, numbers, parse_json, text, time};
-use crate::optimize::space::Range;
-use crate::optimize::trial::{Distribution, TrialState, number_of};
+use crate::optimize::trial::{Distribution, FIXED_PARAMS, TrialState};
 use jiff::Timestamp;
 use serde_json::{Map, Value};
-use std::fmt::Write as _;
 
-/// What a line of the journal does. Codes and fields are Optuna's; see its `JournalStorage`.
+/// The operation of a journal line. Codes and members are those of Optuna's `JournalStorage` (`docs/journal.md`).
 #[derive(Debug, Clone, PartialEq)]
 pub enum Operation {
     /// 0: a new study.
     CreateStudy {
-        /// Its name, unique among the living.
+        /// Name, unique among studies that are not deleted.
         name: String,
         /// Per objective: 0 not set, 1 minimize, 2 maximize.
         directions: Vec<u64>,
     },
-    /// 1: a study ends to exist.
+    /// 1: deletion of a study.
     DeleteStudy {
-        /// Which.
+        /// Id of the study.
         study: usize,
     },
-    /// 2: an attribute of the user on a study.
+    /// 2: a user attribute of a study.
     StudyUserAttribute {
-        /// Which study.
+        /// Id of the study.
         study: usize,
-        /// Its name.
+        /// Name.
         key: String,
-        /// Its value.
+        /// Value.
         value: Value,
     },
-    /// 3: an attribute of the machinery on a study.
+    /// 3: a system attribute of a study.
     StudySystemAttribute {
-        /// Which study.
+        /// Id of the study.
         study: usize,
-        /// Its name.
+        /// Name.
         key: String,
-        /// Its value.
+        /// Value.
         value: Value,
     },
-    /// 4: a new trial, running unless the template says otherwise.
+    /// 4: a new trial, running unless the template has another state.
     CreateTrial {
-        /// Of which study.
+        /// Id of the study.
         study: usize,
-        /// When it began, if it did.
+        /// Time of the beginning.
         started: Option<Timestamp>,
-        /// What an enqueued or imported trial brings along.
-        template: Option<Box<Template>>,
+        /// Contents of an enqueued or imported trial.
+        template: Option<Box<TrialTemplate>>,
     },
     /// 5: a parameter of a running trial.
     SetParameter {
-        /// Which trial, counted over all studies.
+        /// Id of the trial, counted over all studies.
         trial: u64,
-        /// Its name.
+        /// Name.
         name: String,
-        /// Its value as the distribution keeps it: a float's is itself.
+        /// Value in the representation of the distribution; a float's own value.
         value: f64,
-        /// Its distribution.
+        /// Distribution.
         distribution: Distribution,
     },
-    /// 6: a trial begins to run, or ends.
+    /// 6: beginning or end of a trial.
     SetState {
-        /// Which trial.
+        /// Id of the trial.
         trial: u64,
-        /// Its new state.
+        /// New state.
         state: TrialState,
-        /// The objective, of a complete one.
+        /// Values of the objectives of a complete trial.
         values: Option<Vec<f64>>,
-        /// When.
+        /// Time of the change.
         at: Option<Timestamp>,
     },
     /// 7: an intermediate value.
     SetIntermediate {
-        /// Which trial.
+        /// Id of the trial.
         trial: u64,
-        /// At which step.
+        /// Step.
         step: i64,
-        /// How much.
+        /// Value.
         value: f64,
     },
-    /// 8: an attribute of the user on a trial.
+    /// 8: a user attribute of a trial.
     TrialUserAttribute {
-        /// Which trial.
+        /// Id of the trial.
         trial: u64,
-        /// Its name.
+        /// Name.
         key: String,
-        /// Its value.
+        /// Value.
         value: Value,
     },
-    /// 9: an attribute of the machinery on a trial.
+    /// 9: a system attribute of a trial.
     TrialSystemAttribute {
-        /// Which trial.
+        /// Id of the trial.
         trial: u64,
-        /// Its name.
+        /// Name.
         key: String,
-        /// Its value.
+        /// Value.
         value: Value,
     },
-    /// 10: written by other programs; without effect here as in Optuna 5.
+    /// 10: without effect, as in Optuna 5; written by other programs.
     Nothing,
 }
 
-/// The contents with which a trial is created when it is enqueued or imported.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Template {
-    /// Its state.
+/// The contents of an enqueued or imported trial.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct TrialTemplate {
+    /// State.
     pub state: TrialState,
-    /// The objective, if it has one.
+    /// Values of the objectives.
     pub values: Option<Vec<f64>>,
-    /// When it was finished.
+    /// Time of the end.
     pub completed: Option<Timestamp>,
     /// Parameters with their distributions.
     pub parameters: Vec<(String, f64, Distribution)>,
-    /// Attributes of the user.
+    /// User attributes.
     pub user_attributes: Map<String, Value>,
-    /// Attributes of the machinery.
+    /// System attributes.
     pub system_attributes: Map<String, Value>,
     /// Intermediate values by step.
     pub intermediate: Vec<(i64, f64)>,
 }
 
-impl Operation {
-    /// The operation as a line of JSON, with its line end.
-    pub fn to_line(&self, worker: &str) -> String {
-        let (code, fields) = self.fields();
-        format!("{{\"op_code\":{code},\"worker_id\":{}{fields}}}\n", text(worker))
-    }
-
-    fn fields(&self) -> (u8, String) {
-        let attribute = |of: &str, id: &dyn std::fmt::Display, kind: &str, key: &str, value: &Value| {
-            format!(",\"{of}\":{id},\"{kind}\":{{{}:{}}}", text(key), json(value))
-        };
-        match self {
-            Operation::CreateStudy { name, directions } => {
-                (0, format!(",\"study_name\":{},\"directions\":{}", text(name), Value::from(directions.clone())))
-            }
-            Operation::DeleteStudy { study } => (1, format!(",\"study_id\":{study}")),
-            Operation::StudyUserAttribute { study, key, value } => {
-                (2, attribute("study_id", study, "user_attr", key, value))
-            }
-            Operation::StudySystemAttribute { study, key, value } => {
-                (3, attribute("study_id", study, "system_attr", key, value))
-            }
-            Operation::CreateTrial { study, started, template } => {
-                let template = template.as_ref().map_or_else(String::new, |t| t.fields());
-                (4, format!(",\"study_id\":{study},\"datetime_start\":{}{template}", time(*started)))
-            }
-            Operation::SetParameter { trial, name, value, distribution } => {
-                let (name, value) = (text(name), number(*value));
-                let distribution = text(&distribution_text(distribution));
-                (
-                    5,
-                    format!(
-                        ",\"trial_id\":{trial},\"param_name\":{name},\"param_value_internal\":{value},\"distribution\":{distribution}"
-                    ),
-                )
-            }
-            Operation::SetState { trial, state, values, at } => {
-                let when = match (state, at) {
-                    (TrialState::Waiting, _) | (_, None) => String::new(),
-                    (TrialState::Running, at) => format!(",\"datetime_start\":{}", time(*at)),
-                    (_, at) => format!(",\"datetime_complete\":{}", time(*at)),
-                };
-                (
-                    6,
-                    format!(
-                        ",\"trial_id\":{trial},\"state\":{},\"values\":{}{when}",
-                        *state as u8,
-                        numbers(values.as_deref())
-                    ),
-                )
-            }
-            Operation::SetIntermediate { trial, step, value } => {
-                (7, format!(",\"trial_id\":{trial},\"step\":{step},\"intermediate_value\":{}", number(*value)))
-            }
-            Operation::TrialUserAttribute { trial, key, value } => {
-                (8, attribute("trial_id", trial, "user_attr", key, value))
-            }
-            Operation::TrialSystemAttribute { trial, key, value } => {
-                (9, attribute("trial_id", trial, "system_attr", key, value))
-            }
-            Operation::Nothing => (10, String::new()),
-        }
-    }
-
-    /// Reads a line: the writer's identity and the operation.
-    ///
-    /// # Errors
-    /// What is wrong with the line, in words that can follow "line 12: ".
-    pub fn parse(line: &str) -> Result<(String, Operation), String> {
-        let value = parse_json(line)?;
-        let fields = Fields(value.as_object().ok_or("not a JSON object")?);
-        let worker = fields.text("worker_id")?.to_owned();
-        let trial = || fields.index("trial_id");
-        let study = || fields.index("study_id").map(|s| s as usize);
-        let operation = match fields.index("op_code")? {
-            0 => {
-                let directions = fields.get("directions")?.as_array().ok_or("`directions` is not a list")?;
-                let directions = directions
-                    .iter()
-                    .map(|d| d.as_u64().ok_or("a direction is not a number"))
-                    .collect::<Result<_, _>>()?;
-                Operation::CreateStudy { name: fields.text("study_name")?.to_owned(), directions }
-            }
-            1 => Operation::DeleteStudy { study: study()? },
-            2 => {
-                let (key, value) = fields.attribute("user_attr")?;
-                Operation::StudyUserAttribute { study: study()?, key, value }
-            }
-            3 => {
-                let (key, value) = fields.attribute("system_attr")?;
-                Operation::StudySystemAttribute { study: study()?, key, value }
-            }
-            4 => {
-                let started = fields.time("datetime_start")?;
-                let template =
-                    if fields.0.contains_key("state") { Some(Box::new(Template::read(&fields)?)) } else { None };
-                Operation::CreateTrial { study: study()?, started, template }
-            }
-            5 => Operation::SetParameter {
-                trial: trial()?,
-                name: fields.text("param_name")?.to_owned(),
-                value: fields.number("param_value_internal")?,
-                distribution: parse_distribution(fields.text("distribution")?)?,
-            },
-            6 => {
-                let state = fields.state()?;
-                let at = if state == TrialState::Running { "datetime_start" } else { "datetime_complete" };
-                let at = if fields.0.contains_key(at) { fields.time(at)? } else { None };
-                Operation::SetState { trial: trial()?, state, values: fields.numbers("values")?, at }
-            }
-            7 => {
-                let step = fields.get("step")?.as_i64().ok_or("`step` is not an integer")?;
-                Operation::SetIntermediate { trial: trial()?, step, value: fields.number("intermediate_value")? }
-            }
-            8 => {
-                let (key, value) = fields.attribute("user_attr")?;
-                Operation::TrialUserAttribute { trial: trial()?, key, value }
-            }
-            9 => {
-                let (key, value) = fields.attribute("system_attr")?;
-                Operation::TrialSystemAttribute { trial: trial()?, key, value }
-            }
-            10 => Operation::Nothing,
-            other => return Err(format!("op_code {other} is not one of the journal's (0 to 10)")),
-        };
-        Ok((worker, operation))
-    }
-}
-
-impl Template {
-    /// A trial that waits to be run with the given parameters.
+impl TrialTemplate {
+    /// A waiting trial with the given parameters.
     pub fn waiting(fixed: Map<String, Value>, user_attributes: Map<String, Value>) -> Self {
-        let system_attributes =
-            Map::from_iter([(crate::optimize::trial::FIXED_PARAMS.to_owned(), Value::Object(fixed))]);
-        Template {
-            state: TrialState::Waiting,
-            values: None,
-            completed: None,
-            parameters: Vec::new(),
-            user_attributes,
-            system_attributes,
-            intermediate: Vec::new(),
-        }
+        let system_attributes = Map::from_iter([(FIXED_PARAMS.to_owned(), Value::Object(fixed))]);
+        TrialTemplate { state: TrialState::Waiting, user_attributes, system_attributes, ..TrialTemplate::default() }
     }
-
-    fn fields(&self) -> String {
-        let mut out = format!(",\"state\":{}", self.state as u8);
-        let value = match self.values.as_deref() {
-            Some([one]) => number(*one),
-            _ => "null".to_owned(),
-        };
-        let _ = write!(out, ",\"value\":{value},\"values\":null");
-        if let Some(at) = self.completed {
-            let _ = write!(out, ",\"datetime_complete\":{}", time(Some(at)));
-        }
-        let object = |members: Vec<String>| format!("{{{}}}", members.join(","));
-        let distributions =
-            self.parameters.iter().map(|(n, _, d)| format!("{}:{}", text(n), text(&distribution_text(d)))).collect();
-        let parameters = self.parameters.iter().map(|(n, v, _)| format!("{}:{}", text(n), number(*v))).collect();
-        let attributes =
-            |map: &Map<String, Value>| object(map.iter().map(|(k, v)| format!("{}:{}", text(k), json(v))).collect());
-        let intermediate = self.intermediate.iter().map(|(s, v)| format!("\"{s}\":{}", number(*v))).collect();
-        let _ = write!(
-            out,
-            ",\"distributions\":{},\"params\":{},\"user_attrs\":{},\"system_attrs\":{},\"intermediate_values\":{}",
-            object(distributions),
-            object(parameters),
-            attributes(&self.user_attributes),
-            attributes(&self.system_attributes),
-            object(intermediate),
-        );
-        out
-    }
-
-    fn read(fields: &Fields<'_>) -> Result<Self, String> {
-        let object = |key: &str| match fields.0.get(key) {
-            None | Some(Value::Null) => Ok(Map::new()),
-            Some(Value::Object(map)) => Ok(map.clone()),
-            Some(_) => Err(format!("`{key}` is not an object")),
-        };
-        let values = match fields.0.get("value") {
-            Some(value) if !value.is_null() => Some(vec![number_of(value).ok_or("`value` is not a number")?]),
-            _ => {
-                if fields.0.contains_key("values") {
-                    fields.numbers("values")?
-                } else {
-                    None
-                }
-            }
-        };
-        let distributions = object("distributions")?;
-        let mut parameters = Vec::new();
-        for (name, value) in object("params")? {
-            let value = number_of(&value).ok_or_else(|| format!("parameter `{name}` is not a number"))?;
-            let distribution = distributions.get(&name).and_then(Value::as_str);
-            let distribution = distribution.ok_or_else(|| format!("parameter `{name}` has no distribution"))?;
-            parameters.push((name, value, parse_distribution(distribution)?));
-        }
-        let mut intermediate = Vec::new();
-        for (step, value) in object("intermediate_values")? {
-            let step = step.parse().map_err(|_| format!("step `{step}` is not an integer"))?;
-            intermediate.push((step, number_of(&value).ok_or("an intermediate value is not a number")?));
-        }
-        Ok(Template {
-            state: fields.state()?,
-            values,
-            completed: if fields.0.contains_key("datetime_complete") {
-                fields.time("datetime_complete")?
-            } else {
-                None
-            },
-            parameters,
-            user_attributes: object("user_attrs")?,
-            system_attributes: object("system_attrs")?,
-            intermediate,
-        })
-    }
-}
-
-fn distribution_text(distribution: &Distribution) -> String {
-    match distribution {
-        Distribution::Float(Range { low, high, log }) => format!(
-            "{{\"name\": \"FloatDistribution\", \"attributes\": {{\"step\": null, \"low\": {}, \"high\": {}, \"log\": {log}}}}}",
-            number(*low),
-            number(*high)
-        ),
-        Distribution::Foreign { text, .. } => text.clone(),
-    }
-}
-
-fn parse_distribution(text: &str) -> Result<Distribution, String> {
-    let value = parse_json(text)?;
-    let kind = value["name"].as_str().ok_or("a distribution has no `name`")?;
-    let attributes = &value["attributes"];
-    if kind == "FloatDistribution" && attributes["step"].is_null() {
-        let bound = |key: &str| number_of(&attributes[key]).ok_or_else(|| format!("a distribution has no `{key}`"));
-        let log = attributes["log"].as_bool().unwrap_or(false);
-        return Ok(Distribution::Float(Range { low: bound("low")?, high: bound("high")?, log }));
-    }
-    Ok(Distribution::Foreign { kind: kind.to_owned(), text: text.to_owned() })
 }

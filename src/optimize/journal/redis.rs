@@ -1,17 +1,17 @@
-//! The journal on a Redis server, in the layout of Optuna's `JournalRedisBackend`: `P:log_number` holds the index of the
-//! last line, `P:log:<i>` the text of line i, P a prefix that is empty by default. Its snapshots are Python's own and not
-//! read.
+//! The journal on a Redis server, in the layout of Optuna's `JournalRedisBackend` (`docs/journal.md`): `P:log_number` is
+//! the index of the last line, `P:log:<i>` the text of line i, P a prefix that is empty by default. Snapshots of Python are
+//! not read.
 //!
-//! No lock is needed: lines are appended by a script that the server runs as one step, and only if nobody has appended
-//! since the journal was read.
+//! No lock is needed: lines are appended by a script that the server runs atomically, and only if no other writer has
+//! appended since the last read.
 
-use super::JournalError;
+use super::error::JournalError;
 use redis::{Client, Connection, IntoConnectionInfo, RedisError, RedisResult};
 
-/// Lines fetched at once.
+/// Lines per request.
 const BATCH: i64 = 1000;
 
-/// Appends ARGV[3..] after line ARGV[2] if that is still the last; P is ARGV[1]. Answers 1 if it did.
+/// Appends ARGV[3..] after line ARGV[2] if that is the last line; P is ARGV[1]. Returns 1 on success, else 0.
 const APPEND: &str = "\
 local number = ARGV[1] .. ':log_number'
 local last = tonumber(redis.call('get', number) or '-1')
@@ -23,32 +23,31 @@ end
 redis.call('set', number, string.format('%d', last))
 return 1";
 
-/// A journal on a Redis server and how far it has been read.
+/// A journal on a Redis server with the read position.
 pub struct JournalRedis {
     client: Client,
     connection: Option<Connection>,
     address: String,
     prefix: String,
-    /// Lines read so far; the next one has this index.
+    /// Lines read; the index of the next line.
     lines: i64,
 }
 
 impl JournalRedis {
-    /// The journal of the server of `url` (`redis://host:port/db`) under the key prefix `prefix`.
+    /// The journal of the server at `url` (`redis://host:port/db`) under the key prefix `prefix`; does not connect.
     ///
     /// # Errors
-    /// If the address cannot be understood. Nothing is connected yet.
+    /// If the address is invalid.
     pub fn new(url: &str, prefix: &str) -> Result<Self, JournalError> {
-        let refuse =
-            |source| JournalError::Redis { action: "understand the address of", address: url.to_owned(), source };
+        let refuse = |source| JournalError::Redis { action: "parse the address of", address: url.to_owned(), source };
         let info = url.into_connection_info().map_err(refuse)?;
         let address = info.addr().to_string();
         let client = Client::open(info).map_err(refuse)?;
         Ok(JournalRedis { client, connection: None, address, prefix: prefix.to_owned(), lines: 0 })
     }
 
-    /// Feeds every line appended since the last call to `accept`, which says what is wrong with one. A line
-    /// that is numbered but not there yet, as clusters can show it, is left for later.
+    /// Passes every line appended since the last call to `accept`, which returns the fault of an invalid line. A line that
+    /// is counted but not yet present, as on clusters, is left for the next call.
     pub(super) fn read(&mut self, mut accept: impl FnMut(&str) -> Result<(), String>) -> Result<(), JournalError> {
         let number = format!("{}:log_number", self.prefix);
         let last: Option<i64> = self.ask("read", |c| redis::cmd("GET").arg(&number).query(c))?;
@@ -61,9 +60,9 @@ impl JournalRedis {
                 let Some(line) = line else { return Ok(()) };
                 match accept(line.trim_end()) {
                     Ok(()) => self.lines += 1,
-                    Err(what) => {
+                    Err(fault) => {
                         let path = format!("{}, key {}:log:{}", self.address, self.prefix, self.lines).into();
-                        return Err(JournalError::Line { path, line: self.lines as usize + 1, what });
+                        return Err(JournalError::Line { path, line: self.lines as usize + 1, fault });
                     }
                 }
             }
@@ -71,7 +70,7 @@ impl JournalRedis {
         Ok(())
     }
 
-    /// Appends the lines if nobody has appended since the last read; says whether it did.
+    /// Appends the lines unless another writer has appended since the last read. Returns whether it has appended.
     pub(super) fn append(&mut self, lines: &[String]) -> Result<bool, JournalError> {
         let last = self.lines - 1;
         let prefix = self.prefix.clone();
@@ -83,8 +82,7 @@ impl JournalRedis {
         })
     }
 
-    /// Runs a command, connecting first where there is no connection. One that fails is dropped, so that the next call
-    /// connects anew.
+    /// Runs a command, connecting first if necessary. A failed connection is dropped; the next call reconnects.
     fn ask<T>(
         &mut self,
         action: &'static str,

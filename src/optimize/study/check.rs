@@ -1,18 +1,19 @@
-//! What a study refuses.
+//! Checks of a study against its options, and of parameters against the space.
 
 use super::{Study, StudyError, StudyOptions};
+use crate::optimize::ask::Direction;
 use crate::optimize::space::Parameter;
 use crate::optimize::trial::Distribution;
 
 impl Study {
     pub(super) fn check_compatible(&self) -> Result<(), StudyError> {
         let StudyOptions { name, direction, space, .. } = &self.options;
-        let words = ["not set", "minimize", "maximize"];
         let record = self.record();
         if record.directions != [*direction as u64] {
-            let word = |d: &u64| words.get(*d as usize).map_or_else(|| d.to_string(), |w| (*w).to_owned());
-            let stored = record.directions.iter().map(word).collect::<Vec<_>>().join(", ");
-            return Err(StudyError::Direction { name: name.clone(), stored, asked: words[*direction as usize] });
+            let names = ["not set", Direction::Minimize.into(), Direction::Maximize.into()];
+            let text = |d: &u64| names.get(*d as usize).map_or_else(|| d.to_string(), |name| (*name).to_owned());
+            let stored = record.directions.iter().map(text).collect::<Vec<_>>().join(", ");
+            return Err(StudyError::Direction { name: name.clone(), stored, asked: (*direction).into() });
         }
         for Parameter { name: parameter, range } in space.parameters() {
             let scale = |log: bool| if log { "a logarithmic float" } else { "a linear float" };
@@ -38,13 +39,13 @@ impl Study {
                     known,
                 });
             };
-            let what = || format!("parameter `{name}`");
+            let quantity = || format!("parameter `{name}`");
             if !value.is_finite() {
-                return Err(StudyError::Value { what: what(), value: *value, expected: "finite number" });
+                return Err(StudyError::Value { quantity: quantity(), value: *value, expected: "finite number" });
             }
             if range.log && *value <= 0.0 {
-                let expected = "number above 0, for it is searched in its logarithm";
-                return Err(StudyError::Value { what: what(), value: *value, expected });
+                let expected = "number above 0: its search is logarithmic";
+                return Err(StudyError::Value { quantity: quantity(), value: *value, expected });
             }
         }
         Ok(())

@@ -1,17 +1,35 @@
-//! A proposal before it begins.
+//! Proposals: drafted without effect, then begun.
 
-use crate::optimize::sampler::Draws;
-use serde_json::Value;
+use super::{Study, StudyError, StudyOptions, user_attributes};
+use crate::optimize::ask::{Ask, Draws};
+use crate::optimize::journal::Operation;
+use crate::optimize::sampler::propose;
+use crate::optimize::space::{Parameter, Range};
+use crate::optimize::trial::{Distribution, FIXED_PARAMS, Trial, TrialState, announcement, value_of};
+use jiff::Timestamp;
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
 use std::collections::BTreeMap;
+
+/// Trial system attribute: seed and positions of the random streams after the draws of the trial.
+pub const DRAWS: &str = "quadfrog:draws";
+
+/// Value of the attribute [`DRAWS`].
+#[derive(Serialize, Deserialize)]
+struct StreamPosition {
+    seed: u32,
+    #[serde(flatten)]
+    draws: Draws,
+}
 
 /// A parameter of a proposal.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Suggestion {
+pub struct SuggestedParameter {
     /// Name.
     pub name: String,
     /// Proposed value, in the parameter's own unit.
     pub value: f64,
-    /// Whether the value was given (enqueued), not suggested by the sampler.
+    /// Whether the value was given, not suggested by the sampler.
     pub fixed: bool,
     /// Lower bound.
     pub low: f64,
@@ -21,25 +39,174 @@ pub struct Suggestion {
     pub log: bool,
 }
 
-/// A proposal that has had no effect yet.
+/// A proposal without effect on the study.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Draft {
-    /// The number that the trial will have, unless another worker begins one first.
+pub struct TrialDraft {
+    /// Number of the trial, unless another worker begins one first.
     pub number: u32,
     /// The parameters in the order of the space.
-    pub parameters: Vec<Suggestion>,
+    pub parameters: Vec<SuggestedParameter>,
     /// Whether it is an enqueued trial.
     pub enqueued: bool,
-    /// User attributes that the enqueued trial brought along.
+    /// User attributes of the enqueued trial.
     pub attributes: BTreeMap<String, Value>,
-    /// The joint sample that TPE drew, by name; announced to other workers.
+    /// The joint sample of TPE, by name; announced to other workers.
     pub joint: Vec<(String, f64)>,
-    /// Seed of the streams behind it.
+    /// Seed of the random streams.
     pub seed: u32,
-    /// Where the streams stood before.
+    /// Positions of the streams before the draws.
     pub before: Draws,
-    /// Where they will stand after it has begun.
+    /// Positions of the streams after the draws.
     pub after: Draws,
-    /// The waiting trial behind it.
+    /// Id of the enqueued trial.
     pub(super) waiting: Option<u64>,
+}
+
+impl Study {
+    /// Computes the next proposal without effect; a second call returns the same. The enqueued trial of lowest number comes
+    /// first.
+    pub fn draft(&self) -> TrialDraft {
+        self.draft_with(&[])
+    }
+
+    /// Computes the next proposal with the parameters `fixed` given, as Optuna for a partly fixed trial. In the startup phase
+    /// and in univariate mode the other parameters can differ from those of [`Study::draft`], because given parameters
+    /// use no random numbers.
+    pub fn draft_with(&self, fixed: &[(String, f64)]) -> TrialDraft {
+        let trials = self.trials();
+        let waiting = trials.iter().find(|t| t.state == TrialState::Waiting);
+        let given = merged(waiting.map(Trial::fixed).unwrap_or_default(), fixed);
+        let before = self.streams.draws();
+        let mut streams = self.streams.clone();
+        let StudyOptions { sampler, space, direction, .. } = &self.options;
+        let ask = Ask { config: sampler, trials, space, fixed: &given, direction: *direction };
+        let candidate = propose(&ask, &mut streams);
+        let suggest = |(p, value): (&Parameter, f64)| SuggestedParameter {
+            name: p.name.clone(),
+            value,
+            fixed: value_of(&given, &p.name).is_some(),
+            low: p.range.low,
+            high: p.range.high,
+            log: p.range.log,
+        };
+        TrialDraft {
+            number: waiting.map_or(trials.len() as u32, |t| t.number),
+            parameters: space.parameters().iter().zip(candidate.values).map(suggest).collect(),
+            enqueued: waiting.is_some(),
+            attributes: waiting.map(|t| t.user_attributes.clone()).unwrap_or_default(),
+            joint: candidate.joint,
+            seed: sampler.seed,
+            before,
+            after: streams.draws(),
+            waiting: waiting.map(|t| t.id),
+        }
+    }
+
+    /// The draft with another waiting trial: for a trial that was queued in a fork and then in this study.
+    pub fn redirected(&self, draft: &TrialDraft, waiting: u32) -> Result<TrialDraft, StudyError> {
+        let id = self.trial(waiting)?.id;
+        Ok(TrialDraft { number: waiting, waiting: Some(id), ..draft.clone() })
+    }
+
+    /// Begins the trial of a draft and records it as running. Values in `overrides` replace those of the draft and are
+    /// recorded as fixed. If all parameters are given, no random numbers are used. Returns the number of the trial.
+    ///
+    /// # Errors
+    /// [`StudyError::StaleDraft`] if another trial has begun from the same streams, or another worker has begun the enqueued
+    /// trial; [`StudyError::UnknownParameter`] or [`StudyError::Value`] for an invalid override; journal errors. The study
+    /// is unchanged then.
+    pub fn begin(
+        &mut self,
+        draft: &TrialDraft,
+        overrides: &[(String, f64)],
+        attributes: &[(String, Value)],
+    ) -> Result<u32, StudyError> {
+        self.begin_if(draft, overrides, attributes, |_| true)
+    }
+
+    /// [`Study::begin`] if `room`, called with all trials while the journal is locked, returns true: workers on a shared
+    /// journal keep a common budget exactly.
+    ///
+    /// # Errors
+    /// As [`Study::begin`]; [`StudyError::Full`] if `room` returns false.
+    pub fn begin_if(
+        &mut self,
+        draft: &TrialDraft,
+        overrides: &[(String, f64)],
+        attributes: &[(String, Value)],
+        room: impl Fn(&[Trial]) -> bool,
+    ) -> Result<u32, StudyError> {
+        self.check_parameters(overrides)?;
+        let stale = || StudyError::StaleDraft { trial: draft.number };
+        if draft.before != self.streams.draws() || draft.seed != self.options.sampler.seed {
+            return Err(stale());
+        }
+        let given: Vec<(String, f64)> =
+            merged(draft.parameters.iter().filter(|s| s.fixed).map(|s| (s.name.clone(), s.value)).collect(), overrides);
+        let nothing_drawn = draft.parameters.iter().all(|s| value_of(&given, &s.name).is_some() || s.low == s.high);
+        let draws = if nothing_drawn { draft.before } else { draft.after };
+        let (study, seed) = (self.id, draft.seed);
+        let mut id = 0;
+        self.journal.commit(|journal| {
+            if !journal.studies().get(study).is_some_and(|record| room(&record.trials)) {
+                return Err(StudyError::Full);
+            }
+            let now = Timestamp::now();
+            let mut operations = Vec::new();
+            match draft.waiting {
+                Some(waiting) => {
+                    id = waiting;
+                    if journal.trial(id).is_none_or(|t| t.state != TrialState::Waiting) {
+                        return Err(stale());
+                    }
+                    let state = TrialState::Running;
+                    operations.push(Operation::SetState { trial: id, state, values: None, at: Some(now) });
+                }
+                None => {
+                    id = journal.next_trial_id();
+                    operations.push(Operation::CreateTrial { study, started: Some(now), template: None });
+                }
+            }
+            let mut system = announcement(&draft.joint);
+            if !given.is_empty() {
+                let object = given.iter().map(|(n, v)| (n.clone(), Value::from(*v))).collect();
+                system.push((FIXED_PARAMS.to_owned(), Value::Object(object)));
+            }
+            system.push((DRAWS.to_owned(), json!(StreamPosition { seed, draws })));
+            operations.extend(system.into_iter().map(|(key, value)| Operation::TrialSystemAttribute {
+                trial: id,
+                key,
+                value,
+            }));
+            operations.extend(draft.parameters.iter().map(|s| {
+                let value = value_of(overrides, &s.name).unwrap_or(s.value);
+                let range = Range { low: s.low, high: s.high, log: s.log };
+                Operation::SetParameter {
+                    trial: id,
+                    name: s.name.clone(),
+                    value,
+                    distribution: Distribution::Float(range),
+                }
+            }));
+            operations.extend(user_attributes(id, attributes));
+            Ok(operations)
+        })?;
+        self.streams.advance_to(draws);
+        self.journal.state().trial(id).map(|t| t.number).ok_or_else(|| StudyError::Gone(self.options.name.clone()))
+    }
+
+    /// The farthest position in the streams of the present seed over all trials.
+    pub(super) fn draws_so_far(&self) -> Draws {
+        let position = |t: &Trial| StreamPosition::deserialize(t.system_attributes.get(DRAWS)?).ok();
+        let own = self.trials().iter().filter_map(position).filter(|p| p.seed == self.options.sampler.seed);
+        own.map(|p| p.draws)
+            .fold(Draws::default(), |a, b| Draws { model: a.model.max(b.model), startup: a.startup.max(b.startup) })
+    }
+}
+
+/// `base` with the values of `over` replaced or added.
+fn merged(mut base: Vec<(String, f64)>, over: &[(String, f64)]) -> Vec<(String, f64)> {
+    base.retain(|(n, _)| over.iter().all(|(m, _)| m != n));
+    base.extend_from_slice(over);
+    base
 }

@@ -1,102 +1,102 @@
-//! What can go wrong with a study, in words for the operator.
+//! Errors of a study.
 
 use crate::optimize::journal::JournalError;
 use crate::optimize::trial::TrialState;
 
-/// What can go wrong with a study.
+/// Errors of a study.
 #[derive(Debug, thiserror::Error)]
 pub enum StudyError {
     /// The journal could not be read or written.
     #[error(transparent)]
     Journal(#[from] JournalError),
-    /// The stored study is of another kind.
+    /// The stored study has another direction.
     #[error(
-        "study `{name}` is stored with direction {stored}, asked for is {asked}: continue it so, or choose another name"
+        "study `{name}` is stored with direction {stored}, not {asked}: keep that direction, or choose another name"
     )]
     Direction {
-        /// Its name.
+        /// Name of the study.
         name: String,
-        /// As stored.
+        /// Stored direction.
         stored: String,
-        /// As asked for.
+        /// Direction of the options.
         asked: &'static str,
     },
-    /// A parameter was searched on another scale before.
+    /// The stored scale of a parameter differs.
     #[error(
-        "study `{name}`: parameter `{parameter}` was stored as {stored} before and is {asked} now; only its bounds may change within a study: choose another study name"
+        "study `{name}`: parameter `{parameter}` is stored as {stored}, not {asked}; only its bounds may change within a study: choose another study name"
     )]
     Incompatible {
         /// Name of the study.
         name: String,
         /// Name of the parameter.
         parameter: String,
-        /// As stored.
+        /// Stored kind.
         stored: String,
-        /// As asked for.
+        /// Kind in the present space.
         asked: &'static str,
     },
-    /// A parameter that the study does not have.
+    /// An unknown parameter.
     #[error("study `{study}` has no parameter `{parameter}`: it has {known}")]
     UnknownParameter {
         /// Name of the study.
         study: String,
-        /// The name that was given.
+        /// Name as given.
         parameter: String,
-        /// The names that there are.
+        /// Names of the space.
         known: String,
     },
-    /// A value that no parameter or objective can have.
-    #[error("{what} cannot be {value}: give a {expected}")]
+    /// An invalid value of a parameter or of the objective.
+    #[error("{quantity} cannot be {value}: give a {expected}")]
     Value {
-        /// What was to be set.
-        what: String,
-        /// To what.
+        /// Quantity.
+        quantity: String,
+        /// Value.
         value: f64,
-        /// What it can be.
+        /// Description of a valid value.
         expected: &'static str,
     },
     /// A value outside the bounds.
     #[error("{parameter} = {value} is outside its bounds {low} to {high}")]
     Outside {
-        /// The parameter.
+        /// Name of the parameter.
         parameter: String,
-        /// Its value.
+        /// Value.
         value: f64,
-        /// Its lower bound.
+        /// Lower bound.
         low: f64,
-        /// Its upper bound.
+        /// Upper bound.
         high: f64,
     },
-    /// The number of no trial.
-    #[error("study `{study}` has no trial {trial}: it has {count}")]
+    /// A number without a trial.
+    #[error("study `{study}` has no trial {trial}: it has {count} trials")]
     UnknownTrial {
         /// Name of the study.
         study: String,
-        /// The number.
+        /// Number.
         trial: u32,
-        /// How many trials there are.
+        /// Number of trials in the study.
         count: usize,
     },
-    /// A trial that cannot be changed as asked.
+    /// A change that the state of the trial excludes.
     #[error("trial {trial} is {state:?}, so {action}")]
     State {
         /// Number of the trial.
         trial: u32,
         /// Its state.
         state: TrialState,
-        /// What that excludes.
+        /// Consequence, with a remedy.
         action: &'static str,
     },
-    /// The draft was made before something else began.
-    #[error("the proposal for trial {trial} is out of date: the study has moved on since; ask for a new draft")]
+    /// Another trial has begun since the draft.
+    #[error("the proposal for trial {trial} is out of date: another trial has begun; ask for a new draft")]
     StaleDraft {
-        /// The number that it was drafted for.
+        /// Number in the draft.
         trial: u32,
     },
-    /// No trial more may begin at present.
-    #[error("the study has as many trials as it may have, those still running counted")]
+    /// The budget is used up at present.
+    #[error("the budget of trials is used up, running trials included")]
     Full,
-    /// The study was deleted meanwhile.
+    /// The study was deleted or renamed.
     #[error("study `{0}` is no longer in the journal: it was deleted or renamed by another program")]
     Gone(String),
 }

@@ -1,21 +1,20 @@
-//! Trials that were run elsewhere join the study.
+//! Import of trials that were run elsewhere.
 
 use jiff::Timestamp;
 
 use super::{Study, StudyError};
 use crate::optimize::exchange::TableTrial;
-use crate::optimize::journal::{Effect, JournalError, Operation, Template};
+use crate::optimize::journal::{Applied, JournalError, Operation, TrialTemplate};
 use crate::optimize::trial::{Distribution, Trial, TrialState};
 
 impl Study {
-    /// Adds finished trials as they are, all or none, with the present bounds: the samplers learn from them as from any
-    /// other. A row that the study has already, with the same parameters, value and times, is left out, or the same table
-    /// given twice would look like repeats; a row without times is there already if a trial has its parameters and value.
-    /// Two equal rows need two such trials. Returns the numbers of those that were added.
+    /// Adds finished trials, all or none, with the present bounds; the samplers learn from them as from any other. A row
+    /// that matches a trial of the study (parameters, value and, if given, times) is left out, so that a second import of
+    /// the same table adds no repeats. Each trial matches one row. Returns the numbers of the added trials.
     ///
     /// # Errors
     /// [`StudyError::State`] for a trial that is not finished, [`StudyError::UnknownParameter`], [`StudyError::Value`] or
-    /// [`StudyError::Outside`] for a parameter that cannot be; nothing is added then.
+    /// [`StudyError::Outside`] for an invalid parameter; nothing is added then.
     pub fn import(&mut self, trials: &[TableTrial]) -> Result<Vec<u32>, StudyError> {
         let mut creations = Vec::new();
         for (row, trial) in (1..).zip(trials) {
@@ -28,24 +27,23 @@ impl Study {
                 let range = self.options.space.range(name)?;
                 Some((name.clone(), *value, Distribution::Float(range)))
             };
-            let template = Template {
+            let template = TrialTemplate {
                 state: trial.state,
                 values: trial.value.filter(|_| trial.state != TrialState::Fail).map(|value| vec![value]),
                 completed: trial.completed.or(trial.started).or_else(|| Some(Timestamp::now())),
                 parameters: trial.parameters.iter().filter_map(parameter).collect(),
                 user_attributes: trial.attributes.clone(),
-                system_attributes: serde_json::Map::new(),
-                intermediate: Vec::new(),
+                ..TrialTemplate::default()
             };
             let started = trial.started.or(template.completed);
             let create = Operation::CreateTrial { study: self.id, started, template: Some(Box::new(template)) };
             creations.push((trial, create));
         }
         let study = self.id;
-        let effects = self.journal.commit(|replay| {
-            let mut there: Vec<&Trial> = replay.studies().get(study).map_or(Vec::new(), |s| s.trials.iter().collect());
+        let applied = self.journal.commit(|journal| {
+            let mut there: Vec<&Trial> = journal.studies().get(study).map_or(Vec::new(), |s| s.trials.iter().collect());
             let mut is_new = |row: &TableTrial| match there.iter().position(|trial| is_same(row, trial)) {
-                // It stands for one row.
+                // A trial matches one row.
                 Some(place) => {
                     there.swap_remove(place);
                     false
@@ -55,14 +53,14 @@ impl Study {
             let new = creations.iter().filter(|(row, _)| is_new(row)).map(|(_, create)| create.clone());
             Ok::<_, JournalError>(new.collect())
         })?;
-        let created = effects.iter().filter_map(|effect| match effect {
-            Effect::Created(id) => self.journal.replay().trial(*id).map(|trial| trial.number),
+        let created = applied.iter().filter_map(|result| match result {
+            Applied::Created(id) => self.journal.state().trial(*id).map(|trial| trial.number),
             _ => None,
         });
         Ok(created.collect())
     }
 
-    /// Whether the parameters of a point exist and lie within the present bounds.
+    /// Checks that the parameters of a point exist and lie within the present bounds.
     ///
     /// # Errors
     /// [`StudyError::UnknownParameter`], [`StudyError::Value`] or [`StudyError::Outside`].
@@ -76,7 +74,7 @@ impl Study {
     }
 }
 
-/// Whether a row of a table is this trial. Times are compared as the journal keeps them, to the microsecond.
+/// Whether a row of a table matches a trial. Times are compared to the microsecond, the resolution of the journal.
 fn is_same(row: &TableTrial, trial: &Trial) -> bool {
     let value = row.value.filter(|_| row.state != TrialState::Fail);
     let point = row.parameters.len() == trial.parameters.len()

@@ -1,25 +1,25 @@
-//! Where a study is kept.
+//! Place of storage of a study.
 
 use std::path::PathBuf;
 
 use crate::optimize::journal::{Durability, Journal, JournalError, JournalFile, JournalRedis, LOCK_GRACE};
 
-/// Where a study is kept.
+/// Place of storage of a study.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Storage {
-    /// Nowhere: it ends with the program.
+    /// Memory of the program.
     Memory,
-    /// In a journal file, made if it does not exist.
+    /// A journal file, created if it does not exist.
     File(PathBuf),
-    /// On a Redis server, given as `redis://host:port/db`: for workers on many hosts.
+    /// A Redis server, `redis://host:port/db`: for workers on several hosts.
     Redis(String),
 }
 
 impl Storage {
-    /// The journal that is kept there.
+    /// Opens the journal.
     ///
     /// # Errors
-    /// If it cannot be read.
+    /// If the journal cannot be read.
     pub fn journal(&self, durability: Durability) -> Result<Journal, JournalError> {
         match self {
             Storage::Memory => Ok(Journal::in_memory()),
@@ -34,7 +34,7 @@ impl std::fmt::Display for Storage {
         match self {
             Storage::Memory => write!(f, "memory"),
             Storage::File(path) => write!(f, "{}", path.display()),
-            // An address may hold a password before an @.
+            // Without the password before the @.
             Storage::Redis(url) => match url.rsplit_once('@') {
                 Some((_, address)) => write!(f, "redis://{address}"),
                 None => write!(f, "{url}"),

@@ -1,25 +1,26 @@
-//! Workers that take part in a study that others run too.
+//! Workers of a shared study.
 
 use serde_json::Value;
 
 use super::{Study, StudyError};
+use crate::optimize::ask::Streams;
 use crate::optimize::journal::{JournalError, Operation};
-use crate::optimize::sampler::Streams;
 
-/// Study system attribute: how many workers have joined so far.
+/// Study system attribute: number of workers that have joined.
 const WORKERS: &str = "quadfrog:workers";
 
 impl Study {
-    /// Takes part as one more worker: gets the next free number, from 1 (0 is the session that made the study), and
-    /// proposes from then on with streams of its own seed, [`worker_seed`].
+    /// Joins as a worker with the next free number, from 1 (0 is the session that created the study), and continues with
+    /// the random streams of that worker's seed, [`worker_seed`].
     ///
     /// # Errors
     /// If the journal cannot be read or written.
     pub fn join(&mut self) -> Result<u32, StudyError> {
         let study = self.id;
         let mut worker = 0;
-        self.journal.commit(|replay| {
-            let joined = replay.studies().get(study).and_then(|record| record.system_attributes.get(WORKERS)?.as_u64());
+        self.journal.commit(|journal| {
+            let joined =
+                journal.studies().get(study).and_then(|record| record.system_attributes.get(WORKERS)?.as_u64());
             worker = joined.unwrap_or(0) as u32 + 1;
             let key = WORKERS.to_owned();
             Ok::<_, JournalError>(vec![Operation::StudySystemAttribute { study, key, value: Value::from(worker) }])
@@ -31,8 +32,8 @@ impl Study {
     }
 }
 
-/// The seed of a worker's streams: that of the study for worker 0; for the others the upper half of a mix of both
-/// (SplitMix64 finalizer, Steele et al. 2014), so that no two workers propose the same points.
+/// The seed of a worker's streams: that of the study for worker 0; for others the upper half of a hash of study and worker
+/// (SplitMix64 finalizer, Steele et al. 2014), so that workers propose different points.
 pub fn worker_seed(study: u32, worker: u32) -> u32 {
     if worker == 0 {
         return study;

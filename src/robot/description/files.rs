@@ -1,29 +1,30 @@
-//! From the files of a robot's folder, or the copies in the program, to a description.
+//! Reads a robot's description from a folder, or from the copies embedded in the program.
 
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 use nalgebra::Vector3;
 use serde::Deserialize;
+use serde::de::{DeserializeOwned, IgnoredAny};
 
 use super::{RobotDescription, urdf};
-use crate::robot::go1::Network;
 use crate::robot::{JOINTS, Joints, Leg};
 
-/// The robots that the program carries: name, `robot.toml`, URDF.
+/// Embedded robots: name, `robot.toml`, URDF.
 const EMBEDDED: &[(&str, &str, &str)] = &[
     ("go1", include_str!("../../../robots/go1/robot.toml"), include_str!("../../../robots/go1/go1.urdf")),
     ("a1", include_str!("../../../robots/a1/robot.toml"), include_str!("../../../robots/a1/a1.urdf")),
 ];
 
-/// Why a robot's description was refused.
+/// Error in a robot's description.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum DescriptionError {
     /// No embedded robot has that name.
-    #[error("no robot named \"{name}\" is built in (there are: {known}); give the folder of its robot.toml instead")]
+    #[error("no robot named \"{name}\" is built in (built in: {known}); give the folder of its robot.toml instead")]
     Unknown {
-        /// The name asked for.
+        /// The requested name.
         name: String,
-        /// The names there are.
+        /// The names of the embedded robots.
         known: String,
     },
     /// A file cannot be read.
@@ -34,12 +35,12 @@ pub enum DescriptionError {
         /// The system's reason.
         reason: String,
     },
-    /// A file is not what its format asks for: TOML or XML syntax, a missing or unknown key.
+    /// Syntax error in TOML or XML, or a missing or unknown key.
     #[error("{}: {reason}", file.display())]
     Syntax {
         /// The file.
         file: PathBuf,
-        /// What the parser says, with the place.
+        /// Reason of the parser, with line and column.
         reason: String,
     },
     /// A value or the structure is impossible for a quadruped.
@@ -49,9 +50,9 @@ pub enum DescriptionError {
         file: PathBuf,
         /// The link, joint or key.
         element: String,
-        /// What is wrong, with the value.
+        /// The problem, with the value.
         problem: String,
-        /// What to do about it.
+        /// Required values.
         remedy: &'static str,
     },
 }
@@ -65,7 +66,9 @@ struct RobotToml {
     motor: MotorToml,
     pose: PoseToml,
     maker_limits: Option<MakerLimitsToml>,
-    network: Option<Network>,
+    /// Read by the module of the robot's protocol, see `robot::go1`.
+    #[serde(rename = "network")]
+    _network: Option<IgnoredAny>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -89,65 +92,89 @@ struct PoseToml {
     lying_rad: [f64; 3],
 }
 
-impl RobotDescription {
-    /// The names of the robots that the program carries.
-    pub fn embedded_names() -> impl Iterator<Item = &'static str> {
-        EMBEDDED.iter().map(|(name, ..)| *name)
-    }
+/// The files of one robot.
+#[derive(Debug, Clone)]
+pub struct RobotFiles {
+    folder: PathBuf,
+    toml: Cow<'static, str>,
+    embedded_urdf: Option<&'static str>,
+}
 
-    /// A robot that the program carries, for example `go1`.
+impl RobotFiles {
+    /// Opens an embedded robot, for example `go1`.
     ///
     /// # Errors
-    /// When there is none of that name.
-    pub fn embedded(name: &str) -> Result<RobotDescription, DescriptionError> {
+    /// There is none of that name.
+    pub fn embedded(name: &str) -> Result<RobotFiles, DescriptionError> {
         let found = EMBEDDED.iter().find(|(known, ..)| *known == name);
         let &(_, toml, urdf) = found.ok_or_else(|| DescriptionError::Unknown {
             name: name.to_owned(),
-            known: Self::embedded_names().collect::<Vec<_>>().join(", "),
+            known: RobotDescription::embedded_names().collect::<Vec<_>>().join(", "),
         })?;
-        let folder = Path::new("robots").join(name);
-        Self::from_texts(&folder, toml, |_| Ok(urdf.to_owned()))
+        Ok(RobotFiles { folder: Path::new("robots").join(name), toml: toml.into(), embedded_urdf: Some(urdf) })
     }
 
-    /// The robot described in `folder`: its `robot.toml` and the URDF that this names.
+    /// Opens the robot in `folder`: its `robot.toml` and the URDF that `robot.toml` names.
     ///
     /// # Errors
-    /// When a file is missing or malformed, or describes something other than a quadruped with three joints a leg:
-    /// the error names the file, the element, the value and the way out.
-    pub fn from_folder(folder: &Path) -> Result<RobotDescription, DescriptionError> {
-        let read = |file: PathBuf| {
-            std::fs::read_to_string(&file).map_err(|e| DescriptionError::Read { file, reason: e.to_string() })
-        };
+    /// `robot.toml` cannot be read.
+    pub fn from_folder(folder: &Path) -> Result<RobotFiles, DescriptionError> {
         let toml = read(folder.join("robot.toml"))?;
-        Self::from_texts(folder, &toml, |name| read(folder.join(name)))
+        Ok(RobotFiles { folder: folder.to_owned(), toml: toml.into(), embedded_urdf: None })
     }
 
-    /// Both files as texts; `folder` is for messages.
-    fn from_texts(
-        folder: &Path,
-        toml: &str,
-        read_urdf: impl Fn(&str) -> Result<String, DescriptionError>,
-    ) -> Result<RobotDescription, DescriptionError> {
-        let file = folder.join("robot.toml");
-        let robot: RobotToml =
-            toml::from_str(toml).map_err(|e| DescriptionError::Syntax { file: file.clone(), reason: e.to_string() })?;
-        let invalid = |element: &str, problem: String, remedy| {
-            Err(DescriptionError::Invalid { file: file.clone(), element: element.to_owned(), problem, remedy })
-        };
+    /// Opens the folder `model`, if there is one, or the embedded robot of that name.
+    ///
+    /// # Errors
+    /// As of [`RobotFiles::from_folder`] and [`RobotFiles::embedded`].
+    pub fn open(model: &str) -> Result<RobotFiles, DescriptionError> {
+        let folder = Path::new(model);
+        if folder.is_dir() { RobotFiles::from_folder(folder) } else { RobotFiles::embedded(model) }
+    }
+
+    /// Parses `robot.toml`.
+    ///
+    /// # Errors
+    /// The text does not fit `T`.
+    pub fn toml<T: DeserializeOwned>(&self) -> Result<T, DescriptionError> {
+        toml::from_str(&self.toml)
+            .map_err(|e| DescriptionError::Syntax { file: self.toml_file(), reason: e.to_string() })
+    }
+
+    /// Error about the key `element` of `robot.toml`.
+    pub fn invalid(&self, element: &str, problem: String, remedy: &'static str) -> DescriptionError {
+        DescriptionError::Invalid { file: self.toml_file(), element: element.to_owned(), problem, remedy }
+    }
+
+    fn toml_file(&self) -> PathBuf {
+        self.folder.join("robot.toml")
+    }
+
+    /// Reads the description.
+    ///
+    /// # Errors
+    /// A file is missing or malformed, or describes something other than a quadruped with three joints per leg.
+    pub fn description(&self) -> Result<RobotDescription, DescriptionError> {
+        let robot: RobotToml = self.toml()?;
+        let invalid = |element: &str, problem: String, remedy| Err(self.invalid(element, problem, remedy));
         let inertia = robot.motor.rotor_inertia_kgm2;
         if !(inertia.is_finite() && inertia >= 0.0) {
             return invalid("motor.rotor_inertia_kgm2", format!("{inertia} kg m^2"), "give zero or a positive number");
         }
         if let Some(ratio) = robot.motor.gear_ratio.iter().find(|r| !(r.is_finite() && **r > 0.0)) {
-            return invalid("motor.gear_ratio", format!("{ratio}"), "give rotor turns per joint turn, more than zero");
+            return invalid(
+                "motor.gear_ratio",
+                format!("{ratio}"),
+                "give rotor turns per joint turn, greater than zero",
+            );
         }
 
-        if let Some((element, value, remedy)) = robot.network.and_then(|network| network.problem()) {
-            return invalid(element, value, remedy);
-        }
-
-        let urdf_text = read_urdf(&robot.urdf)?;
-        let parts = urdf::parse(&folder.join(&robot.urdf), &urdf_text)?;
+        let file = self.folder.join(&robot.urdf);
+        let urdf = match self.embedded_urdf {
+            Some(text) => Cow::Borrowed(text),
+            None => read(file.clone())?.into(),
+        };
+        let parts = urdf::parse(&file, &urdf)?;
 
         let mut lying_position = Joints::default();
         let mut rotor_inertia = Joints::default();
@@ -179,7 +206,33 @@ impl RobotDescription {
             lying_position,
             rotor_inertia,
             imu_origin: parts.imu_origin.unwrap_or_else(Vector3::zeros),
-            network: robot.network,
         })
     }
+}
+
+impl RobotDescription {
+    /// Names of the embedded robots.
+    pub fn embedded_names() -> impl Iterator<Item = &'static str> {
+        EMBEDDED.iter().map(|(name, ..)| *name)
+    }
+
+    /// Reads the description of an embedded robot, for example `go1`.
+    ///
+    /// # Errors
+    /// There is none of that name.
+    pub fn embedded(name: &str) -> Result<RobotDescription, DescriptionError> {
+        RobotFiles::embedded(name)?.description()
+    }
+
+    /// Reads the description of the robot in `folder`.
+    ///
+    /// # Errors
+    /// As of [`RobotFiles::description`].
+    pub fn from_folder(folder: &Path) -> Result<RobotDescription, DescriptionError> {
+        RobotFiles::from_folder(folder)?.description()
+    }
+}
+
+fn read(file: PathBuf) -> Result<String, DescriptionError> {
+    std::fs::read_to_string(&file).map_err(|e| DescriptionError::Read { file, reason: e.to_string() })
 }

@@ -1,50 +1,50 @@
-//! From a URDF to bodies, legs and limits. Links joined by fixed joints are one body (Featherstone 2008, eq. 2.66,
-//! adds their inertias); what is left must be a trunk with four legs of hip, thigh and calf.
+//! Converts a URDF to bodies, legs and limits. Links joined by fixed joints become one body (Featherstone 2008, eq.
+//! 2.66, adds their inertias); the result must be a trunk with four legs of hip, thigh and calf.
 
 use std::path::Path;
 
 use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
 use urdf_rs::{Geometry, Joint, JointType, Link, Pose, Robot};
 
-use super::{Body, DescriptionError, JointLimits, LegDescription, Shape};
+use super::{CollisionShape, DescriptionError, JointLimits, LegDescription, RigidBody};
 use crate::robot::kinematics::LegGeometry;
 use crate::robot::{JOINT_NAMES, JOINTS, Joints, Leg, PerLeg};
 
-/// What the URDF says.
-pub(super) struct Parts {
-    pub trunk: Body,
+/// Contents of a URDF.
+pub(super) struct UrdfContents {
+    pub trunk: RigidBody,
     pub legs: PerLeg<LegDescription>,
     pub leg_geometry: LegGeometry,
     pub limits: JointLimits,
-    /// Origin of a link whose name has "imu" in it, trunk frame, m.
+    /// Origin of a link whose name contains "imu", trunk frame, m.
     pub imu_origin: Option<Vector3<f64>>,
 }
 
-/// Lengths and directions that should be equal or zero may differ by this much, m: the digits of a drawing.
+/// Tolerance for lengths and directions that must be equal or zero, m: the precision of a drawing.
 const TOLERANCE: f64 = 1e-6;
 
-/// Links joined by fixed joints, in the frame of the first of them.
-struct Group<'a> {
-    body: Body,
-    /// Moving joints that hang on it, with their origin in its frame.
+/// Links joined by fixed joints, in the frame of the first one.
+struct FixedLinks<'a> {
+    body: RigidBody,
+    /// Moving joints of these links, with their origin in the common frame.
     joints: Vec<(&'a Joint, Isometry3<f64>)>,
     imu_origin: Option<Vector3<f64>>,
 }
 
-/// The document with its file name for messages.
-struct Document<'a> {
+/// A parsed URDF with its file name for messages.
+struct UrdfDocument<'a> {
     file: &'a Path,
     robot: &'a Robot,
 }
 
-/// Reads the URDF in `text`; `file` is for messages.
-pub(super) fn parse(file: &Path, text: &str) -> Result<Parts, DescriptionError> {
+/// Converts the URDF in `text`; `file` is for messages.
+pub(super) fn parse(file: &Path, text: &str) -> Result<UrdfContents, DescriptionError> {
     let robot = urdf_rs::read_from_string(text)
         .map_err(|e| DescriptionError::Syntax { file: file.to_owned(), reason: e.to_string() })?;
-    Document { file, robot: &robot }.parts()
+    UrdfDocument { file, robot: &robot }.contents()
 }
 
-impl<'a> Document<'a> {
+impl<'a> UrdfDocument<'a> {
     fn invalid<T>(&self, element: &str, problem: String, remedy: &'static str) -> Result<T, DescriptionError> {
         Err(DescriptionError::Invalid { file: self.file.to_owned(), element: element.to_owned(), problem, remedy })
     }
@@ -52,11 +52,11 @@ impl<'a> Document<'a> {
     fn link(&self, name: &str) -> Result<&'a Link, DescriptionError> {
         match self.robot.links.iter().find(|link| link.name == name) {
             Some(link) => Ok(link),
-            None => self.invalid(&format!("link {name}"), "a joint names it, but it is not there".into(), "add it"),
+            None => self.invalid(&format!("link {name}"), "a joint names it, but it does not exist".into(), "add it"),
         }
     }
 
-    /// The one link that is nobody's child.
+    /// Returns the only link without a parent.
     fn root(&self) -> Result<&'a Link, DescriptionError> {
         let is_child = |link: &Link| self.robot.joints.iter().any(|joint| joint.child.link == link.name);
         let roots: Vec<&Link> = self.robot.links.iter().filter(|link| !is_child(link)).collect();
@@ -66,8 +66,8 @@ impl<'a> Document<'a> {
         }
     }
 
-    fn parts(&self) -> Result<Parts, DescriptionError> {
-        let trunk = self.group(self.root()?)?;
+    fn contents(&self) -> Result<UrdfContents, DescriptionError> {
+        let trunk = self.fixed_links(self.root()?)?;
         if trunk.joints.len() != 4 {
             let found = trunk.joints.iter().map(|(joint, _)| joint.name.as_str()).collect::<Vec<_>>().join(", ");
             let problem = format!("{} moving joints on the trunk ({found})", trunk.joints.len());
@@ -87,18 +87,18 @@ impl<'a> Document<'a> {
                 return self.invalid(&joint.name, problem, "put the trunk's origin between the four hips");
             };
             if legs[leg as usize].is_some() {
-                let problem = format!("a second hip where {} is", leg.name());
+                let problem = format!("a second hip in the place of {}", leg.name());
                 return self.invalid(&joint.name, problem, "put the trunk's origin between the four hips");
             }
             legs[leg as usize] = Some(self.leg(leg, joint, origin, &mut limits)?);
         }
-        // Four hips in four different quarters: every place is taken.
+        // Four hips, each in another quadrant.
         let legs = legs.map(|leg| leg.expect("four distinct legs"));
         let leg_geometry = self.geometry(&legs)?;
-        Ok(Parts { trunk: trunk.body, legs, leg_geometry, limits, imu_origin: trunk.imu_origin })
+        Ok(UrdfContents { trunk: trunk.body, legs, leg_geometry, limits, imu_origin: trunk.imu_origin })
     }
 
-    /// The chain of three joints that starts with `hip`.
+    /// Converts the chain of three joints that starts with `hip`.
     fn leg(
         &self,
         leg: Leg,
@@ -117,26 +117,26 @@ impl<'a> Document<'a> {
             limits.max_position[i] = joint.limit.upper;
             limits.max_torque[i] = joint.limit.effort;
             limits.max_velocity[i] = joint.limit.velocity;
-            let group = self.group(self.link(&joint.child.link)?)?;
-            match (part, &group.joints[..]) {
+            let links = self.fixed_links(self.link(&joint.child.link)?)?;
+            match (part, &links.joints[..]) {
                 (0 | 1, &[(next, next_origin)]) => (joint, origin) = (next, next_origin),
                 (2, []) => {}
                 (_, children) => {
                     let problem = format!("{} moving joints hang on this {}", children.len(), JOINT_NAMES[part]);
                     return self.invalid(
-                        &group.body.name,
+                        &links.body.name,
                         problem,
                         "a leg is hip, thigh, calf; make other joints fixed",
                     );
                 }
             }
-            chain.push(group.body);
+            chain.push(links.body);
         }
-        let [hip, thigh, mut calf]: [Body; 3] = chain.try_into().expect("three parts were pushed");
+        let [hip, thigh, mut calf]: [RigidBody; 3] = chain.try_into().expect("three parts were pushed");
 
-        // The foot: the lowest sphere of the calf.
-        let sphere = |shape: &Shape| match *shape {
-            Shape::Sphere { center, radius } => Some((center, radius)),
+        // The foot is the lowest sphere of the calf.
+        let sphere = |shape: &CollisionShape| match *shape {
+            CollisionShape::Sphere { center, radius } => Some((center, radius)),
             _ => None,
         };
         let feet = calf.collision.iter().enumerate().filter_map(|(i, shape)| sphere(shape).map(|s| (i, s)));
@@ -148,7 +148,7 @@ impl<'a> Document<'a> {
         Ok(LegDescription { bodies: [hip, thigh, calf], joint_origin, foot_origin, foot_radius })
     }
 
-    /// Whether `joint` is the hip (0), thigh (1) or calf (2) joint that the leg kinematics know, with usable limits.
+    /// Checks that `joint` is a hip (0), thigh (1) or calf (2) joint of the closed-form kinematics with valid limits.
     fn check_joint(&self, joint: &Joint, origin: &Isometry3<f64>, part: usize) -> Result<(), DescriptionError> {
         let element = format!("joint {}", joint.name);
         let wanted = if part == 0 { Vector3::x() } else { Vector3::y() };
@@ -176,13 +176,13 @@ impl<'a> Document<'a> {
         }
         for (name, value) in [("effort", limit.effort), ("velocity", limit.velocity)] {
             if !(value.is_finite() && value > 0.0) {
-                return self.invalid(&element, format!("limit {name} is {value}"), "it must be more than zero");
+                return self.invalid(&element, format!("limit {name} is {value}"), "it must be greater than zero");
             }
         }
         Ok(())
     }
 
-    /// The lengths of the closed-form kinematics, which all legs must share.
+    /// Returns the lengths of the closed-form kinematics, which must be the same for all legs.
     fn geometry(&self, legs: &PerLeg<LegDescription>) -> Result<LegGeometry, DescriptionError> {
         let first = &legs[0];
         let geometry = LegGeometry {
@@ -217,38 +217,42 @@ impl<'a> Document<'a> {
         Ok(geometry)
     }
 
-    /// `root` with everything that is fixed to it as one body.
-    fn group(&self, root: &'a Link) -> Result<Group<'a>, DescriptionError> {
-        let body = Body {
+    /// Returns `root` and all links fixed to it as one body.
+    fn fixed_links(&self, root: &'a Link) -> Result<FixedLinks<'a>, DescriptionError> {
+        let body = RigidBody {
             name: root.name.clone(),
             mass: 0.0,
             com: Vector3::zeros(),
             inertia_com: Matrix3::zeros(),
             collision: Vec::new(),
         };
-        let mut group = Group { body, joints: Vec::new(), imu_origin: None };
-        self.add(root, Isometry3::identity(), &mut group, 0)?;
-        let element = format!("link {}", group.body.name);
-        let mass = group.body.mass;
+        let mut links = FixedLinks { body, joints: Vec::new(), imu_origin: None };
+        self.add(root, Isometry3::identity(), &mut links, 0)?;
+        let element = format!("link {}", links.body.name);
+        let mass = links.body.mass;
         if !(mass.is_finite() && mass > 0.0) {
-            return self.invalid(&element, format!("mass {mass} kg"), "a body needs a mass of more than zero");
+            return self.invalid(&element, format!("mass {mass} kg"), "the mass of a body must be greater than zero");
         }
-        // A rigid body's principal moments are positive and none exceeds the sum of the others.
-        let moments = group.body.inertia_com.symmetric_eigenvalues();
+        // The principal moments of a rigid body are positive, and none exceeds the sum of the others.
+        let moments = links.body.inertia_com.symmetric_eigenvalues();
         let (least, sum) = (moments.min(), moments.sum());
         if !(least > 0.0 && moments.max() <= (sum - moments.max()) * (1.0 + 1e-6)) {
             let problem = format!("principal moments of inertia {:.3e} {:.3e} {:.3e}", moments.x, moments.y, moments.z);
-            return self.invalid(&element, problem, "they must be positive, none more than the other two together");
+            return self.invalid(
+                &element,
+                problem,
+                "they must be positive, none greater than the sum of the other two",
+            );
         }
-        Ok(group)
+        Ok(links)
     }
 
-    /// Adds `link`, whose frame is `pose` in the group's, and what is fixed to it.
+    /// Adds `link`, whose frame is `pose` in the common frame, and all links fixed to it.
     fn add(
         &self,
         link: &'a Link,
         pose: Isometry3<f64>,
-        group: &mut Group<'a>,
+        links: &mut FixedLinks<'a>,
         depth: usize,
     ) -> Result<(), DescriptionError> {
         if depth > self.robot.links.len() {
@@ -258,18 +262,18 @@ impl<'a> Document<'a> {
             let problem = format!("mass {} kg", link.inertial.mass.value);
             return self.invalid(&format!("link {}", link.name), problem, "a mass is not negative");
         }
-        merge_inertia(&mut group.body, &link.inertial, &pose);
+        merge_inertia(&mut links.body, &link.inertial, &pose);
         if link.name.contains("imu") {
-            group.imu_origin = Some(pose.translation.vector);
+            links.imu_origin = Some(pose.translation.vector);
         }
         for collision in &link.collision {
-            self.add_shapes(link, &collision.geometry, pose * isometry(&collision.origin), &mut group.body.collision)?;
+            self.add_shapes(link, &collision.geometry, pose * isometry(&collision.origin), &mut links.body.collision)?;
         }
         for joint in self.robot.joints.iter().filter(|joint| joint.parent.link == link.name) {
             let origin = pose * isometry(&joint.origin);
             match joint.joint_type {
-                JointType::Fixed => self.add(self.link(&joint.child.link)?, origin, group, depth + 1)?,
-                _ => group.joints.push((joint, origin)),
+                JointType::Fixed => self.add(self.link(&joint.child.link)?, origin, links, depth + 1)?,
+                _ => links.joints.push((joint, origin)),
             }
         }
         Ok(())
@@ -280,25 +284,25 @@ impl<'a> Document<'a> {
         link: &Link,
         geometry: &Geometry,
         pose: Isometry3<f64>,
-        shapes: &mut Vec<Shape>,
+        shapes: &mut Vec<CollisionShape>,
     ) -> Result<(), DescriptionError> {
         let center = pose.translation.vector;
         let rotation = pose.rotation.to_rotation_matrix().into_inner();
         match *geometry {
             Geometry::Box { size } => {
-                shapes.push(Shape::Box { center, rotation, half_extents: vector(&size.0) / 2.0 });
+                shapes.push(CollisionShape::Box { center, rotation, half_extents: vector(&size.0) / 2.0 });
             }
             Geometry::Cylinder { radius, length } => {
-                shapes.push(Shape::Cylinder { center, rotation, radius, half_length: length / 2.0 });
+                shapes.push(CollisionShape::Cylinder { center, rotation, radius, half_length: length / 2.0 });
             }
-            // The ground touches a capsule at its two ends.
+            // A capsule touches the ground at its two ends.
             Geometry::Capsule { radius, length } => {
                 for half in [-0.5, 0.5] {
                     let center = center + rotation.column(2) * (half * length);
-                    shapes.push(Shape::Sphere { center, radius });
+                    shapes.push(CollisionShape::Sphere { center, radius });
                 }
             }
-            Geometry::Sphere { radius } => shapes.push(Shape::Sphere { center, radius }),
+            Geometry::Sphere { radius } => shapes.push(CollisionShape::Sphere { center, radius }),
             Geometry::Mesh { ref filename, .. } => {
                 let remedy = "meshes do not collide here: describe the shape by boxes, cylinders, capsules or spheres";
                 return self.invalid(&format!("link {}", link.name), format!("collision mesh {filename}"), remedy);
@@ -308,8 +312,8 @@ impl<'a> Document<'a> {
     }
 }
 
-/// Adds a part's mass and inertia to `body`: both moved to the common centre of mass by the parallel-axis theorem.
-fn merge_inertia(body: &mut Body, part: &urdf_rs::Inertial, pose: &Isometry3<f64>) {
+/// Adds mass and inertia of a part to `body` by the parallel-axis theorem.
+fn merge_inertia(body: &mut RigidBody, part: &urdf_rs::Inertial, pose: &Isometry3<f64>) {
     let mass = part.mass.value;
     if mass == 0.0 {
         return;
@@ -333,7 +337,7 @@ fn vector(xyz: &[f64; 3]) -> Vector3<f64> {
     Vector3::from_column_slice(xyz)
 }
 
-/// A URDF pose: roll, pitch, yaw about fixed axes, then the translation.
+/// Converts a URDF pose: roll, pitch, yaw about fixed axes, then the translation.
 fn isometry(pose: &Pose) -> Isometry3<f64> {
     let [roll, pitch, yaw] = pose.rpy.0;
     let rotation = UnitQuaternion::from_euler_angles(roll, pitch, yaw);

@@ -1,28 +1,31 @@
-//! Between what the controller speaks and what the datagrams say. Pure functions; the conventions are those of
-//! `specs/go1-wire.md`, section 7.
+//! Conversion between the engine's commands and states and the Go1's datagrams; conventions as in `docs/go1-wire.md`,
+//! section 7.
 //!
-//! Motor order, joint signs and frames are the engine's own: the engine took them from this robot. Order FR, FL, RR, RL x hip,
-//! thigh, calf; quaternion w, x, y, z from body to world. That the inertial unit's axes are the trunk's, the feet's order that of
-//! the legs, and the current's sign ours (negative while discharging) is assumed; `robots/go1/README.md` says what to check.
+//! Motor order, joint signs and frames are the same in both: order FR, FL, RR, RL x hip, thigh, calf; quaternion w, x,
+//! y, z from body to world. Assumed: the inertial unit's axes are the trunk's, the order of the feet is that of the
+//! legs, and the current is negative while discharging. `robots/go1/README.md` lists the checks.
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use zerocopy::little_endian::F32;
 
-use super::packet::{CommandError, CrcForm, LowCmd, LowState, MODE_SERVO, MotorTarget, POSITION_STOP, VELOCITY_STOP};
+use super::packet::{
+    CommandError, CrcForm, LowCmd, LowState, MODE_DAMPING, MODE_SERVO, MotorRecord, MotorTarget, POSITION_STOP,
+    VELOCITY_STOP,
+};
 use crate::robot::{Battery, Imu, JOINTS, JointCommand, MotorCommand, RobotState};
 
-/// How far the norm of a reported orientation may be from 1; what is farther is no rotation.
+/// Largest deviation of the norm of a reported orientation from 1.
 const QUATERNION_TOLERANCE: f32 = 0.1;
 
-/// The datagram of `command`; motors 12 to 19 brake without a target.
+/// Encodes `command`; motors 12 to 19 brake without a target.
 ///
-/// Every motor is in servo mode, also while the robot is damped: damping is the gain `kd` alone. The motor's own braking (mode
-/// 0x00) is of unknown strength and may differ from joint to joint, where `kd` is the law that the controller was tested
-/// with; and a motor that reports another mode has then always left servo mode by itself. Without a stiffness there is no position target, without
-/// a damping no velocity target: the words that mean so are sent, never a position that a motor could run to.
+/// Every motor is in servo mode, also while the robot is damped: damping is the gain `kd` alone. The strength of the
+/// motor's own braking (mode 0x00) is unknown and may differ between joints; the controller was tested with `kd`. A
+/// motor that reports another mode has therefore always left servo mode by itself. Without stiffness the datagram holds
+/// no position target, without damping no velocity target, so a motor can never run to a stale target.
 ///
 /// # Errors
-/// When a number is not finite or does not fit the datagram.
+/// A number is not finite or does not fit the datagram.
 pub fn low_cmd(command: &JointCommand, form: CrcForm) -> Result<LowCmd, CommandError> {
     let mut datagram = LowCmd::unsealed();
     for (motor, command) in command.motor.iter().enumerate() {
@@ -48,7 +51,7 @@ fn target(motor: usize, command: &MotorCommand) -> Result<MotorTarget, CommandEr
     })
 }
 
-/// What a motor makes of its target; none outside of servo mode. The view from the other side, for the emulator.
+/// Decodes a motor's target, for the emulator; none outside of servo mode.
 pub fn motor_command(target: &MotorTarget) -> Option<MotorCommand> {
     if target.mode != MODE_SERVO {
         return None;
@@ -63,12 +66,12 @@ pub fn motor_command(target: &MotorTarget) -> Option<MotorCommand> {
     Some(command)
 }
 
-/// The state that a datagram tells. `foot_force_n` is the force of one step of a foot's sensor, N.
+/// Decodes a state. `foot_force_n` is the resolution of a foot sensor, N.
 ///
-/// `motor_enabled` is whether the motor reports servo mode. An orientation that is no rotation (all zero, for example) becomes
-/// one that is not finite: the watchdog stops at it by name.
+/// `motor_enabled` is whether the motor reports servo mode. An orientation that is no rotation (all zero, for example)
+/// becomes NaN, so that the watchdog reports it.
 pub fn robot_state(state: &LowState, foot_force_n: f64) -> RobotState {
-    let joints = |value: fn(&super::packet::MotorRecord) -> f64| std::array::from_fn(|i| value(&state.motor[i]));
+    let joints = |value: fn(&MotorRecord) -> f64| std::array::from_fn(|i| value(&state.motor[i]));
     let imu = &state.imu;
     let [w, x, y, z] = imu.quaternion.map(F32::get);
     let norm = (w * w + x * x + y * y + z * z).sqrt();
@@ -97,7 +100,7 @@ pub fn robot_state(state: &LowState, foot_force_n: f64) -> RobotState {
     }
 }
 
-/// The datagram of a state: the inverse of [`robot_state`] for the emulator, but for the checksum, which is the caller's to make.
+/// Encodes a state, for the emulator: the inverse of [`robot_state`]. The caller computes the checksum.
 pub fn low_state(state: &RobotState, foot_force_n: f64) -> LowState {
     let mut datagram = LowState::zero();
     datagram.tick = state.robot_time_ms.into();
@@ -110,7 +113,7 @@ pub fn low_state(state: &RobotState, foot_force_n: f64) -> LowState {
     datagram.imu.roll_pitch_yaw = [roll, pitch, yaw].map(float);
     for i in 0..JOINTS {
         let motor = &mut datagram.motor[i];
-        motor.mode = if state.motor_enabled[i] { MODE_SERVO } else { super::packet::MODE_DAMPING };
+        motor.mode = if state.motor_enabled[i] { MODE_SERVO } else { MODE_DAMPING };
         motor.position = float(state.joint_position[i]);
         motor.velocity = float(state.joint_velocity[i]);
         motor.position_raw = motor.position;

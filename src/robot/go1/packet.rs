@@ -1,10 +1,10 @@
-//! The Go1's low-level datagrams as bytes; no sockets here.
+//! The Go1's low-level datagrams; no sockets here.
 //!
-//! [`LowCmd`] and [`LowState`] *are* the datagrams: structures of unaligned little-endian fields that lie in memory as they
-//! travel, so that judging a state copies nothing. Layout, fixed point and checksums are facts observed on the official
-//! library (`specs/go1-wire.md`, sections 2 to 4); `tests/golden_wire.rs` compares with what it sent and accepted.
+//! [`LowCmd`] and [`LowState`] have the memory layout of the datagrams (unaligned little-endian fields), so parsing a
+//! state copies nothing. Layout, fixed point and checksums were observed on the official library (`docs/go1-wire.md`,
+//! sections 2 to 4); `tests/golden_wire.rs` compares with datagrams that it sent and accepted.
 //!
-//! The one dangerous byte cannot be written: see [`LowCmd`].
+//! The byte that switches the battery off cannot be written: see [`LowCmd`].
 
 mod command;
 mod crc;
@@ -17,16 +17,16 @@ pub use command::{COMMAND_LENGTH, LowCmd, MODE_DAMPING, MODE_SERVO, MotorTarget,
 pub use crc::{CrcForm, crc};
 pub use state::{BatteryRecord, ImuRecord, LowState, MotorRecord, STATE_LENGTH};
 
-/// Motor records in a datagram; the Go1 uses the first twelve.
+/// Number of motor records in a datagram; the Go1 uses the first twelve.
 pub const MOTORS: usize = 20;
 /// The first two bytes of every datagram.
 pub const HEAD: [u8; 2] = [0xFE, 0xEF];
 /// `Header::level` of the low-level protocol.
 pub const LOW_LEVEL: u8 = 0xFF;
-/// `Header::level` of the high-level protocol, whose states are sealed and laid out in another way.
+/// `Header::level` of the high-level protocol, whose states have another layout and the form [`CrcForm::Sealed`].
 pub const HIGH_LEVEL: u8 = 0xEE;
 
-/// The 22 bytes with which every datagram begins. What the fields after `level` mean to the robot is not established.
+/// First 22 bytes of every datagram. The meaning of the fields after `level` is unknown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, FromBytes, IntoBytes, Immutable, KnownLayout, Unaligned)]
 #[repr(C)]
 pub struct Header {
@@ -45,7 +45,7 @@ pub struct Header {
 }
 
 impl Header {
-    /// That of a low-level datagram, the rest zero.
+    /// Returns the header of a low-level datagram, all other fields zero.
     pub fn low_level() -> Header {
         Header {
             head: HEAD,
@@ -58,15 +58,15 @@ impl Header {
     }
 }
 
-/// Why a datagram is not one of ours.
+/// Reason for which a datagram is rejected.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum Rejection {
-    /// Too short, or for a command any other length.
+    /// A state that is too short, or a command of another length.
     #[error("a datagram of {length} bytes, expected {expected}")]
     Length {
-        /// Bytes that came.
+        /// Received bytes.
         length: usize,
-        /// Bytes that it should have (for a state: at least).
+        /// Expected bytes (of a state: at least).
         expected: usize,
     },
     /// Does not begin with [`HEAD`].
@@ -75,20 +75,20 @@ pub enum Rejection {
         /// The first two bytes.
         head: [u8; 2],
     },
-    /// The checksum is wrong for the form that the datagram must have.
+    /// Wrong checksum for the form of the datagram.
     #[error("checksum {found:08X}, computed {computed:08X}")]
     Crc {
-        /// In the datagram.
+        /// Checksum in the datagram.
         found: u32,
-        /// Computed over it.
+        /// Computed checksum.
         computed: u32,
     },
-    /// A command that asks to switch the battery off: the robot would drop. Never obeyed, never built.
-    #[error("a command that asks to switch the battery off (byte 562 is not zero)")]
+    /// A command that requests to switch the battery off, which drops the robot.
+    #[error("a command that requests to switch the battery off (byte 562 is not zero)")]
     BatteryOff,
 }
 
-/// A number that the fixed point of a command cannot hold.
+/// A number that a command cannot represent.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum CommandError {
     /// Not a finite number.
@@ -101,8 +101,8 @@ pub enum CommandError {
         /// The value.
         value: f32,
     },
-    /// Outside of what the datagram can say.
-    #[error("{quantity} of motor {motor} is {value} {unit}; a datagram can say {lowest} up to less than {highest}")]
+    /// Outside of the range of the fixed point.
+    #[error("{quantity} of motor {motor} is {value} {unit}; a datagram can hold {lowest} up to less than {highest}")]
     OutOfRange {
         /// The quantity.
         quantity: &'static str,
@@ -110,11 +110,11 @@ pub enum CommandError {
         motor: usize,
         /// The value.
         value: f32,
-        /// Its unit.
+        /// The unit.
         unit: &'static str,
         /// Lowest value.
         lowest: f32,
-        /// First value that is too much.
+        /// First value that is too large.
         highest: f32,
     },
 }

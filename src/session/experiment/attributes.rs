@@ -1,284 +1,415 @@
-//! What of a trial is kept in the study as attributes, so that the study alone tells the whole story: names, and both ways
-//! between attributes and rows of the table.
+//! User attributes of a study and of its trials in the journal, as typed data (`docs/journal.md`). They hold everything
+//! that a later session needs. An attribute of another program, or of another type, is ignored.
 
 use std::collections::BTreeMap;
 
-use serde_json::{Map, Value, json};
+use serde::de::value::MapDeserializer;
+use serde::de::{DeserializeOwned, MapAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use serde_json::{Map, Value};
 
+use super::confirmation::{Conclusion, RunningConfirmation};
+use super::search::FixedFrom;
+use crate::optimize::ask::SamplerConfig;
 use crate::optimize::study::{DRAWS, Outcome};
-use crate::optimize::trial::{GAINS, Trial, TrialState};
-use crate::trial::{FallRisk, MeasuredJump, ParameterInfo, Proposal, ProposalSource, TrialRecord, Verdict};
+use crate::optimize::trial::{Trial, TrialState};
+use crate::trial::{
+    FallRisk, MeasuredJump, ParameterInfo, ParameterValues, Proposal, ProposalSource, Task, TrialRecord, Verdict,
+};
 
-const SOURCE: &str = "source";
-const PARENT: &str = "parent";
-const SEED: &str = "seed";
-const RECORDING: &str = "recording";
-const VERSION: &str = "version";
-const VERDICT: &str = "verdict";
-const SUGGESTED: &str = "suggested";
-const CAUSE: &str = "cause";
-const VALUE: &str = "value";
-const HAND_VALUE: &str = "hand_value";
-const RERUN: &str = "rerun";
-const INTERRUPTED: &str = "interrupted";
-const RISK: &str = "risk";
-const FIXED: &str = "fixed";
-const WORKER: &str = "worker";
+/// Attributes in the order in which they are written.
+pub type Attributes = Vec<(String, Value)>;
 
-type Attributes = Vec<(String, Value)>;
+/// Attributes of a study that was made by this program.
+#[derive(Debug, Serialize)]
+pub struct NewStudyAttributes<'a> {
+    /// The task.
+    pub task: Task,
+    /// Name of the robot model.
+    pub robot: &'a str,
+    /// Seed of the study.
+    pub seed: u32,
+    /// Settings of the sampler.
+    pub sampler: &'a SamplerConfig,
+    /// Version of this program.
+    pub version: &'static str,
+    /// Trials that are to count.
+    pub budget: u32,
+}
 
-/// Where a queued point comes from.
-#[derive(Debug, Clone, PartialEq)]
+/// The budget of a study, for workers that join it and sessions that continue it.
+#[derive(Debug, Serialize)]
+pub struct BudgetAttribute {
+    /// Trials that are to count.
+    pub budget: u32,
+}
+
+/// Attributes of a study.
+#[derive(Debug, Clone, PartialEq, Default, Deserialize)]
+#[serde(default)]
+pub struct StudyAttributes {
+    /// The task.
+    #[serde(deserialize_with = "lenient")]
+    pub task: Option<Task>,
+    /// Name of the robot model.
+    #[serde(deserialize_with = "lenient")]
+    pub robot: Option<String>,
+    /// Seed of the study.
+    #[serde(deserialize_with = "lenient")]
+    pub seed: Option<u32>,
+    /// Trials that are to count.
+    #[serde(deserialize_with = "lenient")]
+    pub budget: Option<u32>,
+    /// Bounds that the operator has changed, `{"Fx": [40, 110]}`.
+    #[serde(deserialize_with = "lenient")]
+    pub bounds: Option<BTreeMap<String, [f64; 2]>>,
+    /// Fixed parameters, `{"Fx": {"value": 60, "trials": 5, "from": 12}}`.
+    #[serde(deserialize_with = "lenient")]
+    pub fixed: Option<BTreeMap<String, FixedFrom>>,
+    /// The confirmation that runs; null when it is over.
+    #[serde(deserialize_with = "lenient")]
+    pub confirm: Option<RunningConfirmation>,
+    /// Conclusion of the last confirmation.
+    #[serde(deserialize_with = "lenient")]
+    pub confirmed: Option<Conclusion>,
+}
+
+impl StudyAttributes {
+    /// Reads the attributes of a study.
+    pub fn of(attributes: &BTreeMap<String, Value>) -> StudyAttributes {
+        read(attributes)
+    }
+}
+
+/// Origin of a trial; kept with a queued trial. Without attributes the trial was queued by another program.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct Origin {
-    /// Who chose it.
+    /// Origin of the parameters.
+    #[serde(serialize_with = "name_of", deserialize_with = "source_or_queued")]
     pub source: ProposalSource,
     /// The trial that it repeats.
+    #[serde(skip_serializing_if = "Option::is_none", deserialize_with = "lenient")]
     pub parent: Option<u32>,
-    /// The seed that it is to run with; none for one of its own.
+    /// The seed of its noise and terrain; none for a new one. Text: JSON numbers of other programs do not hold 64 bits.
+    #[serde(skip_serializing_if = "Option::is_none", serialize_with = "as_text", deserialize_with = "from_text")]
     pub seed: Option<u64>,
-    /// The gains that it is to run with; empty for those of the configuration.
-    pub gains: Vec<(String, f64)>,
+    /// Its gains; empty for those of the configuration.
+    #[serde(skip_serializing_if = "is_empty", serialize_with = "as_object", deserialize_with = "numbers")]
+    pub gains: ParameterValues,
+}
+
+impl Default for Origin {
+    fn default() -> Origin {
+        Origin::new(ProposalSource::Queued)
+    }
 }
 
 impl Origin {
-    /// The sampler's own.
-    pub fn sampler() -> Origin {
-        Origin { source: ProposalSource::Sampler, parent: None, seed: None, gains: Vec::new() }
+    /// Returns the origin of new parameters with a seed of their own and the configured gains.
+    pub fn new(source: ProposalSource) -> Origin {
+        Origin { source, parent: None, seed: None, gains: ParameterValues::default() }
     }
 
-    /// A point that somebody queued.
-    pub fn queued() -> Origin {
-        Origin { source: ProposalSource::Queued, ..Origin::sampler() }
+    /// Returns the origin of a repetition with the same gains and new noise. The repetition of a repeat that confirms
+    /// the best confirms it, too.
+    pub fn rerun_of(trial: u32, source: ProposalSource, gains: ParameterValues) -> Origin {
+        let source = if source == ProposalSource::Confirm { source } else { ProposalSource::Rerun };
+        Origin { source, parent: Some(trial), seed: None, gains }
     }
 
-    /// A repetition with the same gains and with noise of its own. What confirmed the best still does.
-    pub fn rerun_of(row: &TrialRecord) -> Origin {
-        let source =
-            if row.source == ProposalSource::Confirm { ProposalSource::Confirm } else { ProposalSource::Rerun };
-        Origin { source, parent: Some(row.trial), seed: None, gains: row.gains.clone() }
-    }
-
-    /// A repeat of a point that may be the best, with the gains of its first trial.
+    /// Returns the origin of a repeat of a point that may be the best, with the gains of its first trial.
     pub fn confirming(first: &Trial) -> Origin {
-        Origin { source: ProposalSource::Confirm, parent: Some(first.number), seed: None, gains: gains_of(first) }
+        let gains = Origin::of_trial(first).gains;
+        Origin { source: ProposalSource::Confirm, parent: Some(first.number), seed: None, gains }
     }
 
-    /// The same trial once more, after a crash, as if nothing had happened.
+    /// Returns the origin of a repetition with the same gains and the same seed: after a crash the study continues
+    /// as if the crash had not happened.
     pub fn interrupted(trial: &Trial) -> Origin {
-        let confirms = source_of(trial) == ProposalSource::Confirm;
-        let source = if confirms { ProposalSource::Confirm } else { ProposalSource::Rerun };
-        Origin { source, parent: Some(trial.number), seed: seed_of(trial), gains: gains_of(trial) }
+        let Origin { source, seed, gains, .. } = Origin::of_trial(trial);
+        Origin { seed, ..Origin::rerun_of(trial.number, source, gains) }
     }
 
-    /// As kept with the queued trial; without attributes it was queued by another program.
+    /// Reads the origin from the attributes of a queued trial.
     pub fn of(attributes: &BTreeMap<String, Value>) -> Origin {
-        Origin {
-            source: named(attributes.get(SOURCE), ProposalSource::ALL, ProposalSource::name)
-                .unwrap_or(ProposalSource::Queued),
-            parent: number(attributes.get(PARENT)),
-            seed: attributes.get(SEED).and_then(seed_from),
-            gains: numbers(attributes.get(GAINS)),
-        }
+        read(attributes)
     }
 
-    /// To be kept with the queued trial.
+    /// Reads the origin of a trial.
+    pub fn of_trial(trial: &Trial) -> Origin {
+        read(&trial.user_attributes)
+    }
+
+    /// Returns the attributes of the queued trial.
     pub fn attributes(&self) -> Attributes {
-        let mut kept = vec![(SOURCE.to_owned(), json!(self.source.name()))];
-        if let Some(parent) = self.parent {
-            kept.push((PARENT.to_owned(), json!(parent)));
-        }
-        if let Some(seed) = self.seed {
-            kept.push((SEED.to_owned(), seed_text(seed)));
-        }
-        if !self.gains.is_empty() {
-            kept.push((GAINS.to_owned(), object(&self.gains)));
-        }
-        kept
+        write(self)
     }
 }
 
-/// What the study is to be told of a running trial whose verdict was on disk when the program ended; none without one.
-pub fn judgement_of(trial: &Trial) -> Option<Outcome> {
-    let kept = &trial.user_attributes;
-    match named(kept.get(VERDICT), Verdict::ALL, Verdict::name)? {
-        Verdict::Void => Some(Outcome::Fail),
-        Verdict::Accept | Verdict::Fall => kept.get(VALUE).and_then(Value::as_f64).map(Outcome::Complete),
+/// Attributes that are written when a trial begins.
+#[derive(Debug, Serialize)]
+pub struct BeganAttributes {
+    #[serde(flatten)]
+    origin: Origin,
+    version: &'static str,
+    worker: u32,
+    #[serde(skip_serializing_if = "String::is_empty")]
+    recording: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    risk: Option<FallRisk>,
+    #[serde(skip_serializing_if = "is_empty", serialize_with = "as_object")]
+    fixed: ParameterValues,
+}
+
+impl BeganAttributes {
+    /// Returns the attributes of a trial of `proposal`. `recording` is empty where the trial is not recorded; `fixed`
+    /// holds the parameters that the operator had fixed for some trials.
+    pub fn new(
+        proposal: &Proposal,
+        seed: u64,
+        worker: u32,
+        recording: &str,
+        fixed: ParameterValues,
+    ) -> BeganAttributes {
+        let gains = proposal.gains.iter().map(|gain| (gain.name.clone(), gain.value)).collect();
+        BeganAttributes {
+            origin: Origin { source: proposal.source, parent: proposal.parent, seed: Some(seed), gains },
+            version: env!("CARGO_PKG_VERSION"),
+            worker,
+            recording: recording.to_owned(),
+            risk: proposal.risk,
+            fixed,
+        }
     }
 }
 
-/// What is kept when a trial begins.
-pub fn began(proposal: &Proposal, began: &Began<'_>) -> Attributes {
-    let gains = proposal.gains.iter().map(|gain| (gain.name.clone(), gain.value)).collect();
-    let origin = Origin { source: proposal.source, parent: proposal.parent, seed: Some(began.seed), gains };
-    let mut kept = origin.attributes();
-    kept.push((VERSION.to_owned(), json!(env!("CARGO_PKG_VERSION"))));
-    kept.push((WORKER.to_owned(), json!(began.worker)));
-    if !began.recording.is_empty() {
-        kept.push((RECORDING.to_owned(), json!(began.recording)));
-    }
-    if let Some(risk) = &proposal.risk {
-        kept.push((RISK.to_owned(), json!(risk)));
-    }
-    if !began.fixed.is_empty() {
-        kept.push((FIXED.to_owned(), object(began.fixed)));
-    }
-    kept
+/// Attributes that are written when a trial is judged; a verdict that was taken back is null.
+#[derive(Debug, Serialize)]
+pub struct JudgedAttributes<'a> {
+    verdict: Option<Verdict>,
+    suggested: Option<Verdict>,
+    cause: &'a str,
+    value: Option<f64>,
+    hand_value: Option<f64>,
+    rerun: bool,
+    /// Numeric columns of their own, so that optuna-dashboard can sort by them.
+    #[serde(flatten)]
+    measured: Option<MeasuredJump>,
 }
 
-/// What is kept with a trial besides its proposal.
-pub struct Began<'a> {
-    /// Its seed.
-    pub seed: u64,
-    /// Who runs it: 0 is the session that has the study's folder.
-    pub worker: u32,
-    /// Where it is recorded; empty where it is not.
-    pub recording: &'a str,
+impl JudgedAttributes<'_> {
+    /// Returns the attributes of the row; `rerun` queues the parameters again.
+    pub fn of(row: &TrialRecord, rerun: bool) -> JudgedAttributes<'_> {
+        let TrialRecord { verdict, suggested, cause, value, hand_value, measured, .. } = row;
+        JudgedAttributes {
+            verdict: *verdict,
+            suggested: *suggested,
+            cause,
+            value: *value,
+            hand_value: *hand_value,
+            rerun,
+            measured: *measured,
+        }
+    }
+}
+
+/// Attributes of a trial whose program ended before the verdict.
+#[derive(Debug, Serialize)]
+pub struct InterruptedAttributes<'a> {
+    verdict: Verdict,
+    cause: &'a str,
+    rerun: bool,
+    interrupted: bool,
+}
+
+impl InterruptedAttributes<'_> {
+    /// Returns the attributes of a void trial whose parameters are queued again.
+    pub fn new(cause: &str) -> InterruptedAttributes<'_> {
+        InterruptedAttributes { verdict: Verdict::Void, cause, rerun: true, interrupted: true }
+    }
+}
+
+/// Attributes of a trial besides its [`Origin`].
+#[derive(Debug, Clone, PartialEq, Default, Deserialize)]
+#[serde(default)]
+pub struct TrialAttributes {
+    /// The worker that runs it: 0 is the session that has the study's folder.
+    #[serde(deserialize_with = "lenient")]
+    pub worker: Option<u32>,
+    /// Distance to earlier falls at its approval.
+    #[serde(deserialize_with = "lenient")]
+    pub risk: Option<FallRisk>,
     /// Parameters that the operator had fixed for some trials.
-    pub fixed: &'a [(String, f64)],
+    #[serde(deserialize_with = "numbers")]
+    pub fixed: ParameterValues,
+    /// The verdict.
+    #[serde(deserialize_with = "lenient")]
+    pub verdict: Option<Verdict>,
+    /// The verdict that the rules suggest.
+    #[serde(deserialize_with = "lenient")]
+    pub suggested: Option<Verdict>,
+    /// Reason of the suggestion, or of another verdict.
+    #[serde(deserialize_with = "lenient")]
+    pub cause: Option<String>,
+    /// The objective.
+    #[serde(deserialize_with = "lenient")]
+    pub value: Option<f64>,
+    /// A value measured by hand.
+    #[serde(deserialize_with = "lenient")]
+    pub hand_value: Option<f64>,
+    /// The parameters are to be queued again.
+    #[serde(deserialize_with = "lenient")]
+    pub rerun: Option<bool>,
+    /// The program ended before the verdict.
+    #[serde(deserialize_with = "lenient")]
+    pub interrupted: Option<bool>,
 }
 
-/// What is kept when a trial is judged; a verdict that was taken back is kept as null.
-pub fn judged(row: &TrialRecord, rerun: bool) -> Attributes {
-    let mut kept = vec![
-        (VERDICT.to_owned(), json!(row.verdict.map(Verdict::name))),
-        (SUGGESTED.to_owned(), json!(row.suggested.map(Verdict::name))),
-        (CAUSE.to_owned(), json!(row.cause)),
-        (VALUE.to_owned(), json!(row.value)),
-        (HAND_VALUE.to_owned(), json!(row.hand_value)),
-        (RERUN.to_owned(), json!(rerun)),
-    ];
-    if let Some(MeasuredJump { dx_m, dy_m, dyaw_rad, apex_m, air_s }) = row.measured {
-        // Numeric columns of their own, so that the dashboard can sort by them.
-        let terms = [("dx_m", dx_m), ("dy_m", dy_m), ("dyaw_rad", dyaw_rad), ("apex_m", apex_m), ("air_s", air_s)];
-        kept.extend(terms.map(|(name, value)| (name.to_owned(), json!(value))));
+impl TrialAttributes {
+    /// Reads the attributes of a trial.
+    pub fn of(trial: &Trial) -> TrialAttributes {
+        read(&trial.user_attributes)
     }
-    kept
+
+    /// Returns the outcome of a running trial whose verdict was on disk when the program ended; none without a verdict.
+    pub fn outcome(&self) -> Option<Outcome> {
+        match self.verdict? {
+            Verdict::Void => Some(Outcome::Fail),
+            Verdict::Accept | Verdict::Fall => self.value.map(Outcome::Complete),
+        }
+    }
 }
 
-/// What is kept of a trial whose program ended before the verdict.
-pub fn interrupted(cause: &str) -> Attributes {
-    vec![
-        (VERDICT.to_owned(), json!(Verdict::Void.name())),
-        (CAUSE.to_owned(), json!(cause)),
-        (RERUN.to_owned(), json!(true)),
-        (INTERRUPTED.to_owned(), json!(true)),
-    ]
-}
-
-/// What of the attributes still holds in another study: not its numbers, and no debt.
+/// Returns the attributes that hold in another study, too: without numbers of trials and workers, without a re-run.
 pub fn elsewhere(mut attributes: Map<String, Value>) -> Map<String, Value> {
-    for name in [PARENT, WORKER, RERUN, INTERRUPTED] {
+    for name in ["parent", "worker", "rerun", "interrupted"] {
         attributes.remove(name);
     }
     attributes
 }
 
-/// Whether the parameters of a finished trial are to come again.
-pub fn is_owed(trial: &Trial) -> bool {
-    trial.state == TrialState::Fail && trial.user_attributes.get(RERUN).and_then(Value::as_bool) == Some(true)
-}
-
-/// Whether a trial is void because its program ended before the verdict.
-pub fn was_interrupted(trial: &Trial) -> bool {
-    trial.user_attributes.get(INTERRUPTED).and_then(Value::as_bool) == Some(true)
-}
-
-/// Who chose a trial's parameters.
-pub fn source_of(trial: &Trial) -> ProposalSource {
-    named(trial.user_attributes.get(SOURCE), ProposalSource::ALL, ProposalSource::name)
-        .unwrap_or(ProposalSource::Queued)
-}
-
-/// The gains that a trial ran with; empty where nobody has kept them.
-pub fn gains_of(trial: &Trial) -> Vec<(String, f64)> {
-    numbers(trial.user_attributes.get(GAINS))
-}
-
-/// Whether `name` was fixed at `value` for this trial.
-pub fn was_fixed(trial: &Trial, name: &str, value: f64) -> bool {
-    numbers(trial.user_attributes.get(FIXED)).iter().any(|(n, v)| n == name && *v == value)
-}
-
-/// Which worker of this program runs a trial; none for a trial of another program.
+/// Returns the number of the worker of this program that runs a trial; none for a trial of another program.
 pub fn worker_of(trial: &Trial) -> Option<u32> {
     trial.system_attributes.get(DRAWS)?;
-    Some(number(trial.user_attributes.get(WORKER)).unwrap_or(0))
+    Some(TrialAttributes::of(trial).worker.unwrap_or(0))
 }
 
-/// The seed that a trial ran with.
-pub fn seed_of(trial: &Trial) -> Option<u64> {
-    trial.user_attributes.get(SEED).and_then(seed_from)
+/// Returns whether the trial is a repeat that confirms the best.
+pub fn confirms(trial: &Trial) -> bool {
+    Origin::of_trial(trial).source == ProposalSource::Confirm
 }
 
-/// The row of a trial that is in the study. A trial of another program has no verdict of its own: if it is complete, it
-/// counts as accepted.
+/// Returns the row of a trial of the study. A complete trial of another program has no verdict and counts as accepted.
 pub fn row_of(trial: &Trial, note: String, order: &[ParameterInfo]) -> TrialRecord {
-    let kept = &trial.user_attributes;
-    let number_of = |name: &str| kept.get(name).and_then(Value::as_f64);
-    let origin = Origin::of(kept);
-    let measured = (|| {
-        Some(MeasuredJump {
-            dx_m: number_of("dx_m")?,
-            dy_m: number_of("dy_m")?,
-            dyaw_rad: number_of("dyaw_rad")?,
-            apex_m: number_of("apex_m")?,
-            air_s: number_of("air_s")?,
-        })
-    })();
-    let default_verdict = match trial.state {
+    let Origin { source, parent, gains, .. } = Origin::of_trial(trial);
+    let kept = TrialAttributes::of(trial);
+    let fits = |verdict: &Verdict| match trial.state {
+        TrialState::Complete => *verdict != Verdict::Void,
+        TrialState::Fail | TrialState::Pruned => *verdict == Verdict::Void,
+        TrialState::Running | TrialState::Waiting => true,
+    };
+    let of_state = match trial.state {
         TrialState::Complete => Some(Verdict::Accept),
         TrialState::Fail | TrialState::Pruned => Some(Verdict::Void),
         TrialState::Running | TrialState::Waiting => None,
     };
     TrialRecord {
         trial: trial.number,
-        source: origin.source,
-        parent: origin.parent,
+        source,
+        parent,
         parameters: order.iter().filter_map(|p| Some((p.name.clone(), trial.parameter(&p.name)?))).collect(),
-        measured,
+        measured: read::<Measured>(&trial.user_attributes).0,
         value: trial.value,
-        hand_value: number_of(HAND_VALUE),
-        suggested: named(kept.get(SUGGESTED), Verdict::ALL, Verdict::name),
-        cause: kept.get(CAUSE).and_then(Value::as_str).unwrap_or_default().to_owned(),
-        // A verdict of ours that fits how the trial ended; otherwise another program ended it, and theirs stands.
-        verdict: named(kept.get(VERDICT), Verdict::ALL, Verdict::name)
-            .filter(|verdict| match trial.state {
-                TrialState::Complete => *verdict != Verdict::Void,
-                TrialState::Fail | TrialState::Pruned => *verdict == Verdict::Void,
-                TrialState::Running | TrialState::Waiting => true,
-            })
-            .or(default_verdict),
+        hand_value: kept.hand_value,
+        suggested: kept.suggested,
+        cause: kept.cause.unwrap_or_default(),
+        // A verdict that does not fit the trial's state was overruled by another program.
+        verdict: kept.verdict.filter(fits).or(of_state),
         note,
-        risk: kept.get(RISK).and_then(|risk| serde_json::from_value::<FallRisk>(risk.clone()).ok()),
-        gains: gains_of(trial),
+        risk: kept.risk,
+        gains,
     }
 }
 
-/// Numbers by name, as an attribute.
-pub fn object(list: &[(String, f64)]) -> Value {
-    Value::Object(list.iter().map(|(name, value)| (name.clone(), json!(value))).collect())
+/// Measured terms; none unless all are there.
+#[derive(Default)]
+struct Measured(Option<MeasuredJump>);
+
+impl<'de> Deserialize<'de> for Measured {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Measured, D::Error> {
+        lenient(deserializer).map(Measured)
+    }
 }
 
-/// Numbers by name of an attribute; empty where it is none.
-pub fn numbers(value: Option<&Value>) -> Vec<(String, f64)> {
-    let Some(Value::Object(map)) = value else { return Vec::new() };
-    map.iter().filter_map(|(name, value)| Some((name.clone(), value.as_f64()?))).collect()
+fn read<T: DeserializeOwned + Default>(attributes: &BTreeMap<String, Value>) -> T {
+    let pairs = attributes.iter().map(|(name, value)| (name.as_str(), value));
+    T::deserialize(MapDeserializer::<_, serde_json::Error>::new(pairs)).unwrap_or_default()
 }
 
-/// A seed as text: JSON numbers of other programs do not hold 64 bits.
-fn seed_text(seed: u64) -> Value {
-    json!(seed.to_string())
+/// Returns the fields of `attributes` in their order; a [`Value`] would sort them.
+pub fn write(attributes: &impl Serialize) -> Attributes {
+    let text = serde_json::to_string(attributes).and_then(|text| serde_json::from_str::<Ordered>(&text));
+    text.expect("attributes are a struct with text keys").0
 }
 
-fn seed_from(value: &Value) -> Option<u64> {
-    value.as_str()?.parse().ok()
+struct Ordered(Attributes);
+
+impl<'de> Deserialize<'de> for Ordered {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Ordered, D::Error> {
+        struct InOrder;
+        impl<'de> Visitor<'de> for InOrder {
+            type Value = Ordered;
+
+            fn expecting(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                formatter.write_str("attributes by name")
+            }
+
+            fn visit_map<M: MapAccess<'de>>(self, mut map: M) -> Result<Ordered, M::Error> {
+                let mut pairs = Vec::new();
+                while let Some(pair) = map.next_entry()? {
+                    pairs.push(pair);
+                }
+                Ok(Ordered(pairs))
+            }
+        }
+        deserializer.deserialize_map(InOrder)
+    }
 }
 
-fn number(value: Option<&Value>) -> Option<u32> {
-    u32::try_from(value?.as_u64()?).ok()
+/// Reads a value of another type as none.
+fn lenient<'de, D: Deserializer<'de>, T: DeserializeOwned>(deserializer: D) -> Result<Option<T>, D::Error> {
+    Ok(serde_json::from_value(Value::deserialize(deserializer)?).ok())
 }
 
-fn named<T: Copy, const N: usize>(value: Option<&Value>, all: [T; N], name: fn(T) -> &'static str) -> Option<T> {
-    let text = value?.as_str()?;
-    all.into_iter().find(|item| name(*item) == text)
+fn name_of<S: Serializer>(source: &ProposalSource, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(source.name())
+}
+
+fn source_or_queued<'de, D: Deserializer<'de>>(deserializer: D) -> Result<ProposalSource, D::Error> {
+    let name: Option<String> = lenient(deserializer)?;
+    Ok(name.and_then(|name| name.parse().ok()).unwrap_or(ProposalSource::Queued))
+}
+
+fn as_text<S: Serializer>(seed: &Option<u64>, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_str(&seed.unwrap_or_default())
+}
+
+fn from_text<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<u64>, D::Error> {
+    let text: Option<String> = lenient(deserializer)?;
+    Ok(text.and_then(|text| text.parse().ok()))
+}
+
+fn is_empty(values: &ParameterValues) -> bool {
+    (**values).is_empty()
+}
+
+fn as_object<S: Serializer>(values: &ParameterValues, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_map(values.iter().map(|(name, value)| (name, value)))
+}
+
+/// Reads the numbers of an object; empty where it is none.
+fn numbers<'de, D: Deserializer<'de>>(deserializer: D) -> Result<ParameterValues, D::Error> {
+    let Value::Object(map) = Value::deserialize(deserializer)? else { return Ok(ParameterValues::default()) };
+    Ok(map.iter().filter_map(|(name, value)| Some((name.clone(), value.as_f64()?))).collect())
 }

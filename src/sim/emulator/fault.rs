@@ -1,27 +1,27 @@
-//! What can be wrong with an emulated robot or its network, said in one line: `loss 5`, `hot FR_calf 82`, `clear`.
+//! Faults of an emulated robot or its network, each written as one line: `loss 5`, `hot FR_calf 82`, `clear`.
 
 use std::str::FromStr;
 
 use crate::robot::{JOINTS, joint_name};
 
-/// One thing that is wrong from now on, or that a person does to the robot.
+/// A fault from now on, or an action of a person on the robot.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Fault {
-    /// Share of datagrams that the network loses, each way, percent.
+pub enum EmulatorFault {
+    /// Share of datagrams lost, each way, percent.
     Loss(f64),
-    /// Time that every datagram is under way, each way, ms.
+    /// Delay of every datagram, each way, ms.
     Delay(f64),
-    /// More of it at random, up to this, ms: datagrams overtake each other.
+    /// Largest random addition to the delay, ms: datagrams overtake each other.
     Jitter(f64),
-    /// Share of datagrams that come twice, percent.
+    /// Share of datagrams duplicated, percent.
     Duplicate(f64),
-    /// Share of datagrams in which a bit is turned over, percent.
+    /// Share of datagrams with one flipped bit, percent.
     Corrupt(f64),
-    /// The robot's computer stands still: nothing is sent, no command is heard; the motors brake after their own time-out.
+    /// The robot's computer stops: no states are sent, no commands executed; the motors brake after their time-out.
     Freeze,
-    /// The same state is sent again and again.
+    /// The same state is sent repeatedly.
     Repeat,
-    /// The robot restarts; its clock begins anew.
+    /// The robot reboots; its clock restarts.
     Reboot,
     /// A motor reports this temperature, degrees Celsius.
     Hot {
@@ -32,12 +32,12 @@ pub enum Fault {
     },
     /// The battery reports this charge, percent.
     Battery(f64),
-    /// A motor leaves servo mode: it brakes and says so.
+    /// A motor leaves servo mode: it brakes and reports the mode.
     ServoOff {
         /// Joint, 0..12.
         joint: usize,
     },
-    /// A joint holds the angle that it has, as far as its motor can.
+    /// A joint is stuck at its current angle, up to its motor's torque.
     Stuck {
         /// Joint, 0..12.
         joint: usize,
@@ -63,155 +63,172 @@ pub enum Fault {
         /// Torque, N m.
         newton_metres: f64,
     },
-    /// An encoder reports an angle that is no number.
+    /// An encoder reports NaN as its angle.
     NotANumber {
         /// Joint, 0..12.
         joint: usize,
     },
-    /// The inertial unit reports a roll larger by this, rad.
+    /// Error of the reported roll, rad.
     Tilt(f64),
-    /// A person lifts the robot back on its mark, lying on its belly.
+    /// A person lays the robot down at its start position, on its belly.
     Place,
-    /// Everything is well again; the robot lies where it is.
+    /// All faults end; the robot stays where it is.
     Clear,
 }
 
-/// What an operand is.
+/// Operands of a fault.
 #[derive(Clone, Copy)]
-enum Operands {
-    None(Fault),
-    /// A number within these bounds.
-    Number(fn(f64) -> Fault, &'static str, f64, f64),
-    Joint(fn(usize) -> Fault),
-    JointNumber(fn(usize, f64) -> Fault, &'static str, f64, f64),
+enum FaultOperands {
+    None(EmulatorFault),
+    /// A number with its unit, lowest and highest value.
+    Number(fn(f64) -> EmulatorFault, &'static str, f64, f64),
+    Joint(fn(usize) -> EmulatorFault),
+    JointNumber(fn(usize, f64) -> EmulatorFault, &'static str, f64, f64),
 }
 
-use Operands::{Joint, JointNumber, Number};
+use FaultOperands::{Joint, JointNumber, Number};
 
-/// Every word, its operands, and what it does: read by the parser and by `help`.
-const WORDS: [(&str, Operands, &str); 19] = [
-    ("loss", Number(Fault::Loss, "PERCENT", 0.0, 100.0), "the network loses this share of the datagrams, each way"),
-    ("delay", Number(Fault::Delay, "MS", 0.0, 1000.0), "every datagram is under way for so long, each way"),
-    ("jitter", Number(Fault::Jitter, "MS", 0.0, 1000.0), "and up to so much longer, at random"),
-    ("duplicate", Number(Fault::Duplicate, "PERCENT", 0.0, 100.0), "this share of the datagrams comes twice"),
-    ("corrupt", Number(Fault::Corrupt, "PERCENT", 0.0, 100.0), "in this share of the datagrams one bit is turned over"),
-    ("freeze", Operands::None(Fault::Freeze), "the robot's computer stands still: no states, no ear for commands"),
-    ("repeat", Operands::None(Fault::Repeat), "the same state is sent again and again"),
-    ("reboot", Operands::None(Fault::Reboot), "the robot restarts; its clock begins anew"),
+/// Name, operands and description of every fault, for the parser and `help`.
+const FAULTS: [(&str, FaultOperands, &str); 19] = [
+    (
+        "loss",
+        Number(EmulatorFault::Loss, "PERCENT", 0.0, 100.0),
+        "the network loses this share of the datagrams, each way",
+    ),
+    ("delay", Number(EmulatorFault::Delay, "MS", 0.0, 1000.0), "every datagram is delayed by this time, each way"),
+    ("jitter", Number(EmulatorFault::Jitter, "MS", 0.0, 1000.0), "largest random addition to the delay"),
+    ("duplicate", Number(EmulatorFault::Duplicate, "PERCENT", 0.0, 100.0), "this share of the datagrams is duplicated"),
+    (
+        "corrupt",
+        Number(EmulatorFault::Corrupt, "PERCENT", 0.0, 100.0),
+        "one bit is flipped in this share of the datagrams",
+    ),
+    (
+        "freeze",
+        FaultOperands::None(EmulatorFault::Freeze),
+        "the robot's computer stops: no states, no commands executed",
+    ),
+    ("repeat", FaultOperands::None(EmulatorFault::Repeat), "the same state is sent repeatedly"),
+    ("reboot", FaultOperands::None(EmulatorFault::Reboot), "the robot reboots; its clock restarts"),
     (
         "hot",
-        JointNumber(|joint, celsius| Fault::Hot { joint, celsius }, "CELSIUS", -40.0, 127.0),
+        JointNumber(|joint, celsius| EmulatorFault::Hot { joint, celsius }, "CELSIUS", -40.0, 127.0),
         "a motor reports this temperature",
     ),
-    ("battery", Number(Fault::Battery, "PERCENT", 0.0, 100.0), "the battery reports this charge"),
-    ("servo-off", Joint(|joint| Fault::ServoOff { joint }), "a motor leaves servo mode"),
-    ("stuck", Joint(|joint| Fault::Stuck { joint }), "a joint holds the angle that it has"),
+    ("battery", Number(EmulatorFault::Battery, "PERCENT", 0.0, 100.0), "the battery reports this charge"),
+    ("servo-off", Joint(|joint| EmulatorFault::ServoOff { joint }), "a motor leaves servo mode"),
+    ("stuck", Joint(|joint| EmulatorFault::Stuck { joint }), "a joint is stuck at its current angle"),
     (
         "angle",
-        JointNumber(|joint, radians| Fault::Angle { joint, radians }, "RAD", -10.0, 10.0),
+        JointNumber(|joint, radians| EmulatorFault::Angle { joint, radians }, "RAD", -10.0, 10.0),
         "an encoder reports this angle",
     ),
     (
         "speed",
-        JointNumber(|joint, radians_per_s| Fault::Speed { joint, radians_per_s }, "RAD/S", -1000.0, 1000.0),
+        JointNumber(|joint, radians_per_s| EmulatorFault::Speed { joint, radians_per_s }, "RAD/S", -1000.0, 1000.0),
         "an encoder reports this velocity",
     ),
     (
         "torque",
-        JointNumber(|joint, newton_metres| Fault::Torque { joint, newton_metres }, "NM", -120.0, 120.0),
+        JointNumber(|joint, newton_metres| EmulatorFault::Torque { joint, newton_metres }, "NM", -120.0, 120.0),
         "a motor reports this torque",
     ),
-    ("nan", Joint(|joint| Fault::NotANumber { joint }), "an encoder reports an angle that is no number"),
-    ("tilt", Number(Fault::Tilt, "RAD", -3.2, 3.2), "the inertial unit reports so much more roll"),
-    ("place", Operands::None(Fault::Place), "a person lifts the robot back on its mark, lying on its belly"),
-    ("clear", Operands::None(Fault::Clear), "everything is well again"),
+    ("nan", Joint(|joint| EmulatorFault::NotANumber { joint }), "an encoder reports NaN as its angle"),
+    ("tilt", Number(EmulatorFault::Tilt, "RAD", -3.2, 3.2), "error of the reported roll"),
+    (
+        "place",
+        FaultOperands::None(EmulatorFault::Place),
+        "a person lays the robot down at its start position, on its belly",
+    ),
+    ("clear", FaultOperands::None(EmulatorFault::Clear), "all faults end"),
 ];
 
-/// A line that is no fault: what is wrong with it and what to write.
+/// Error of parsing a fault.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum FaultError {
-    /// The first word is none of ours.
-    #[error("\"{word}\" is nothing that can be done to the robot; the words are {known}")]
+pub enum EmulatorFaultError {
+    /// Unknown name.
+    #[error("\"{word}\" is not a known fault; known faults: {known}")]
     Unknown {
-        /// The word.
+        /// The given name.
         word: String,
-        /// The words there are.
+        /// All names.
         known: String,
     },
-    /// Too few or too many operands.
+    /// Wrong number of operands.
     #[error("write it as: {usage}")]
     Usage {
-        /// The word with its operands.
+        /// The name with its operands.
         usage: String,
     },
-    /// No such joint.
-    #[error("\"{name}\" is no joint; write it as FR_hip, FL_thigh, RL_calf and so on")]
+    /// Unknown joint.
+    #[error("\"{name}\" is not a joint; write it as FR_hip, FL_thigh, RL_calf and so on")]
     Joint {
         /// The name.
         name: String,
     },
-    /// A number that cannot be.
-    #[error("\"{value}\" cannot be: give {lowest} to {highest} ({unit})")]
+    /// Not a number within the bounds.
+    #[error("\"{value}\" is out of range: give {lowest} to {highest} ({unit})")]
     Number {
-        /// What stands there.
+        /// The given text.
         value: String,
         /// The unit.
         unit: &'static str,
-        /// The least that can be given.
+        /// Lowest value.
         lowest: f64,
-        /// The most that can be given.
+        /// Highest value.
         highest: f64,
     },
 }
 
-impl FromStr for Fault {
-    type Err = FaultError;
+impl FromStr for EmulatorFault {
+    type Err = EmulatorFaultError;
 
-    fn from_str(line: &str) -> Result<Fault, FaultError> {
+    fn from_str(line: &str) -> Result<EmulatorFault, EmulatorFaultError> {
         let mut words = line.split_whitespace();
         let word = words.next().unwrap_or_default();
-        let Some((word, operands, _)) = WORDS.iter().find(|(known, ..)| *known == word) else {
-            let known = WORDS.map(|(known, ..)| known).join(", ");
-            return Err(FaultError::Unknown { word: word.to_owned(), known });
+        let Some((word, operands, _)) = FAULTS.iter().find(|(known, ..)| *known == word) else {
+            let known = FAULTS.map(|(known, ..)| known).join(", ");
+            return Err(EmulatorFaultError::Unknown { word: word.to_owned(), known });
         };
         let given: Vec<&str> = words.collect();
         match (*operands, given.as_slice()) {
-            (Operands::None(fault), []) => Ok(fault),
+            (FaultOperands::None(fault), []) => Ok(fault),
             (Number(fault, unit, lowest, highest), [value]) => Ok(fault(number(value, unit, lowest, highest)?)),
             (Joint(fault), [name]) => Ok(fault(joint(name)?)),
             (JointNumber(fault, unit, lowest, highest), [name, value]) => {
                 Ok(fault(joint(name)?, number(value, unit, lowest, highest)?))
             }
-            _ => Err(FaultError::Usage { usage: usage(word, *operands) }),
+            _ => Err(EmulatorFaultError::Usage { usage: usage(word, *operands) }),
         }
     }
 }
 
-fn number(value: &str, unit: &'static str, lowest: f64, highest: f64) -> Result<f64, FaultError> {
+fn number(value: &str, unit: &'static str, lowest: f64, highest: f64) -> Result<f64, EmulatorFaultError> {
     match value.parse::<f64>() {
         Ok(number) if (lowest..=highest).contains(&number) => Ok(number),
-        _ => Err(FaultError::Number { value: value.to_owned(), unit, lowest, highest }),
+        _ => Err(EmulatorFaultError::Number { value: value.to_owned(), unit, lowest, highest }),
     }
 }
 
-fn joint(name: &str) -> Result<usize, FaultError> {
+fn joint(name: &str) -> Result<usize, EmulatorFaultError> {
     let found = (0..JOINTS).find(|&joint| joint_name(joint).eq_ignore_ascii_case(name));
-    found.ok_or_else(|| FaultError::Joint { name: name.to_owned() })
+    found.ok_or_else(|| EmulatorFaultError::Joint { name: name.to_owned() })
 }
 
-fn usage(word: &str, operands: Operands) -> String {
+fn usage(word: &str, operands: FaultOperands) -> String {
     match operands {
-        Operands::None(_) => word.to_owned(),
+        FaultOperands::None(_) => word.to_owned(),
         Number(_, unit, ..) => format!("{word} {unit}"),
         Joint(_) => format!("{word} JOINT"),
         JointNumber(_, unit, ..) => format!("{word} JOINT {unit}"),
     }
 }
 
-/// What can be written, one line each.
+/// Describes all faults, one line each.
 pub fn help() -> String {
-    let line = |(word, operands, what): &(&str, Operands, &str)| format!("  {:<20} {what}\n", usage(word, *operands));
-    WORDS.iter().map(line).collect()
+    let line =
+        |(word, operands, what): &(&str, FaultOperands, &str)| format!("  {:<20} {what}\n", usage(word, *operands));
+    FAULTS.iter().map(line).collect()
 }
 
 #[cfg(test)]
@@ -219,30 +236,30 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_word_is_read_as_help_writes_it() {
-        for (word, operands, _) in &WORDS {
+    fn every_fault_is_parsed_as_help_writes_it() {
+        for (word, operands, _) in &FAULTS {
             let line = usage(word, *operands).replace("JOINT", "RL_thigh");
             let value = |unit: &str| line.replace(unit, "3");
             let parsed = match operands {
-                Number(_, unit, ..) | JointNumber(_, unit, ..) => value(unit).parse::<Fault>(),
-                Operands::None(_) | Joint(_) => line.parse(),
+                Number(_, unit, ..) | JointNumber(_, unit, ..) => value(unit).parse::<EmulatorFault>(),
+                FaultOperands::None(_) | Joint(_) => line.parse(),
             };
             assert!(parsed.is_ok(), "{line}: {parsed:?}");
             assert!(help().contains(&usage(word, *operands)));
         }
-        assert_eq!("hot fr_CALF 82".parse(), Ok(Fault::Hot { joint: 2, celsius: 82.0 }));
+        assert_eq!("hot fr_CALF 82".parse(), Ok(EmulatorFault::Hot { joint: 2, celsius: 82.0 }));
     }
 
     #[test]
-    fn what_cannot_be_is_refused_with_what_can() {
-        let said = |line: &str| line.parse::<Fault>().unwrap_err().to_string();
-        assert!(said("los 5").contains("\"los\"") && said("los 5").contains("loss"));
-        assert_eq!(said("loss"), "write it as: loss PERCENT");
-        assert_eq!(said("hot FR_calf"), "write it as: hot JOINT CELSIUS");
-        assert!(said("loss 101").contains("give 0 to 100 (PERCENT)"));
-        assert!(said("loss nan").contains("nan"));
-        assert!(said("stuck FR_knee").contains("FR_hip"));
-        assert!(said("clear now").contains("write it as: clear"));
-        assert!(said("").contains("the words are"));
+    fn an_invalid_fault_is_refused_with_the_valid_form() {
+        let message = |line: &str| line.parse::<EmulatorFault>().unwrap_err().to_string();
+        assert!(message("los 5").contains("\"los\"") && message("los 5").contains("loss"));
+        assert_eq!(message("loss"), "write it as: loss PERCENT");
+        assert_eq!(message("hot FR_calf"), "write it as: hot JOINT CELSIUS");
+        assert!(message("loss 101").contains("give 0 to 100 (PERCENT)"));
+        assert!(message("loss nan").contains("nan"));
+        assert!(message("stuck FR_knee").contains("FR_hip"));
+        assert!(message("clear now").contains("write it as: clear"));
+        assert!(message("").contains("known faults"));
     }
 }

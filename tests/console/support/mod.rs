@@ -1,21 +1,24 @@
-//! A console without a terminal: keys and records in, effects and the screen as text out.
+//! A console without a terminal: input of keys and records, output of effects and of the screen as text.
 
 #![allow(dead_code, reason = "each test program uses a part")]
 
 use std::time::Duration;
 
+use quadfrog::optimize::ask::SamplerKind;
 use quadfrog::recording::record::{
-    ArmingCheckRecord, Record, RequestRecord, SessionInfo, StageRecord, Stamped, Transition,
+    ArmingCheckRecord, HealthLimits, Record, RequestRecord, SessionInfo, StageRecord, Stamped, Transition,
 };
 use quadfrog::telemetry::{ArmingCheck, ArmingCheckState, Mode, Phase, Snapshot, Tick};
 use quadfrog::trial::{
-    ExperimentStage, MeasuredJump, ParameterInfo, Proposal, ProposalSource, ProposedParameter, TrialRecord, Verdict,
+    Approval, Backend, ExperimentStage, MeasuredJump, ParameterInfo, Proposal, ProposalSource, ProposedParameter, Task,
+    TrialRecord, Verdict,
 };
 use quadfrog_console::keymap::Key;
+use quadfrog_console::message::{Effect, Msg};
 use quadfrog_console::model::Model;
-use quadfrog_console::settings::Settings;
+use quadfrog_console::settings::ConsoleSettings;
 use quadfrog_console::theme::{Colours, Glyphs, Theme};
-use quadfrog_console::update::{Effect, Msg, update};
+use quadfrog_console::update::update;
 use quadfrog_console::view;
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
@@ -27,12 +30,12 @@ pub struct Console {
 }
 
 impl Console {
-    /// Braille, 16 colours, nothing known yet.
+    /// Braille, 16 colours, no session.
     pub fn new() -> Console {
-        Console::with(Settings::built_in(), Theme { colours: Colours::Named, glyphs: Glyphs::Braille })
+        Console::with(ConsoleSettings::built_in(), Theme { colours: Colours::Named, glyphs: Glyphs::Braille })
     }
 
-    pub fn with(settings: Settings, theme: Theme) -> Console {
+    pub fn with(settings: ConsoleSettings, theme: Theme) -> Console {
         let mut model = Model::new(settings, theme, None);
         model.size = (80, 24);
         Console { model }
@@ -54,14 +57,14 @@ impl Console {
         console
     }
 
-    /// As [`Console::proposed`], the robot standing.
+    /// [`Console::proposed`] with the robot in READY.
     pub fn ready() -> Console {
         let mut console = Console::proposed();
         console.mode(Mode::Ready);
         console
     }
 
-    /// Trial 0 ran and waits for its verdict, the robot in `mode`.
+    /// Trial 0 under review, the robot in `mode`.
     pub fn review(mode: Mode, suggested: Verdict) -> Console {
         let mut console = Console::ready();
         console.stage(ExperimentStage::Running, 0);
@@ -80,7 +83,7 @@ impl Console {
         self.tell(Msg::Clock(now));
     }
 
-    /// Presses keys by their names, a tenth of a second apart.
+    /// Presses keys by name, 0.1 s apart.
     pub fn press(&mut self, keys: &[&str]) -> Vec<Effect> {
         keys.iter()
             .flat_map(|name| {
@@ -110,7 +113,7 @@ impl Console {
         self.tell(Msg::Snapshot(Box::new(Snapshot { tick, ..self.model.snapshot })));
     }
 
-    /// The screen as text, a line per row, without trailing spaces.
+    /// The screen as text without trailing spaces.
     pub fn screen(&self, columns: u16, rows: u16) -> String {
         let mut terminal = Terminal::new(TestBackend::new(columns, rows)).expect("a screen in memory");
         terminal.draw(|frame| view::render(frame, &self.model)).expect("drawn");
@@ -124,8 +127,7 @@ impl Console {
         text
     }
 
-    /// The colours of the screen: a letter for each style that occurs, in the place of each cell that has it, and what
-    /// the letters mean. Cells in the terminal's own style are blank.
+    /// The styles of the screen: a letter per cell, blank for the terminal's default style, and a legend of the letters.
     pub fn colours(&self, columns: u16, rows: u16) -> String {
         let mut terminal = Terminal::new(TestBackend::new(columns, rows)).expect("a screen in memory");
         terminal.draw(|frame| view::render(frame, &self.model)).expect("drawn");
@@ -140,7 +142,7 @@ impl Console {
             let letters: String = (0..columns)
                 .map(|x| {
                     let cell = &buffer[(x, y)];
-                    // A colour that no ink shows is none.
+                    // The foreground of a blank cell is invisible.
                     let plain = cell.bg == Color::Reset && cell.modifier.is_empty();
                     if plain && (cell.fg == Color::Reset || cell.symbol() == " ") {
                         return ' ';
@@ -162,12 +164,12 @@ impl Console {
         text
     }
 
-    /// What is said in answer to the operator.
+    /// The message to the operator.
     pub fn said(&self) -> &str {
         self.model.message.as_ref().map_or("", |message| message.text.as_str())
     }
 
-    /// The last line of the screen.
+    /// The text of the last line of the screen.
     pub fn next_step(&self) -> String {
         view::next_step::next_step(&self.model).lead
     }
@@ -178,11 +180,11 @@ pub fn session() -> SessionInfo {
         |name: &str, unit: &str, low, high| ParameterInfo { name: name.into(), unit: unit.into(), low, high };
     SessionInfo {
         version: "0.1.0".into(),
-        backend: "sim".into(),
+        backend: Some(Backend::Simulator),
         robot: "go1".into(),
-        task: "forward".into(),
+        task: Some(Task::Forward),
         unit: "m".into(),
-        sampler: "tpe".into(),
+        sampler: Some(SamplerKind::Tpe),
         seed: 0,
         budget: 20,
         parameters: vec![
@@ -200,7 +202,8 @@ pub fn session() -> SessionInfo {
             parameter("kd_joint", "N m s/rad", 0.0, 3.0),
             parameter("k_att", "N/m", 0.0, 600.0),
         ],
-        approve: "each".into(),
+        approve: Approval::Each,
+        limits: HealthLimits::default(),
     }
 }
 
@@ -232,7 +235,7 @@ pub fn trial(number: u32, verdict: Option<Verdict>, suggested: Option<Verdict>) 
         trial: number,
         source: ProposalSource::Sampler,
         parent: None,
-        parameters: vec![("f0".into(), 1.25), ("Fx".into(), 75.0), ("Fz".into(), 250.0)],
+        parameters: vec![("f0".into(), 1.25), ("Fx".into(), 75.0), ("Fz".into(), 250.0)].into(),
         measured: Some(MeasuredJump { dx_m: 0.42, dy_m: -0.01, dyaw_rad: 0.02, apex_m: 0.3, air_s: 0.25 }),
         value,
         hand_value: None,
@@ -242,7 +245,7 @@ pub fn trial(number: u32, verdict: Option<Verdict>, suggested: Option<Verdict>) 
         verdict,
         note: String::new(),
         risk: None,
-        gains: Vec::new(),
+        gains: Vec::new().into(),
     }
 }
 

@@ -1,4 +1,4 @@
-//! The real program in a real terminal: a pseudo-terminal whose screen is kept by `vt100`.
+//! The program in a pseudo-terminal whose screen `vt100` emulates.
 
 #![allow(dead_code, reason = "each test program uses a part")]
 
@@ -13,10 +13,10 @@ use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use portable_pty::{Child, CommandBuilder, ExitStatus, MasterPty, PtySize, native_pty_system};
 
-/// Longer than anything a test waits for: only a defect takes this long.
+/// Time limit of every wait.
 const PATIENCE: Duration = Duration::from_secs(30);
 
-/// What came out of the terminal so far.
+/// Output of the program so far.
 struct Output {
     parser: vt100::Parser,
     bytes: Vec<u8>,
@@ -71,7 +71,7 @@ impl Session {
                     std::thread::sleep(Duration::from_millis(5));
                 }
                 match reader.read(&mut buffer) {
-                    // The reader is an end of the terminal too: it must go for the terminal to hang up.
+                    // The reader keeps the terminal open; a hang-up needs its end.
                     Ok(0) | Err(_) => return,
                     Ok(_) if over.load(Ordering::Acquire) => return,
                     Ok(count) => {
@@ -95,22 +95,22 @@ impl Session {
         self.output().parser.screen().contents()
     }
 
-    /// How many bytes were sent to the terminal.
+    /// Number of bytes sent to the terminal.
     pub fn bytes(&self) -> usize {
         self.output().bytes.len()
     }
 
-    /// Whether the bytes so far hold these.
+    /// Whether the output contains these bytes.
     pub fn sent(&self, bytes: &[u8]) -> bool {
         self.output().bytes.windows(bytes.len()).any(|window| window == bytes)
     }
 
-    /// Whether the bytes after the first `from` hold these.
+    /// Whether the output after its first `from` bytes contains these.
     pub fn sent_after(&self, from: usize, bytes: &[u8]) -> bool {
         self.output().bytes[from..].windows(bytes.len()).any(|window| window == bytes)
     }
 
-    /// Whether the terminal is as a shell wants it: the normal screen, a cursor, no special paste, its own mouse.
+    /// Whether the terminal is restored: normal screen, visible cursor, no bracketed paste, no mouse capture.
     pub fn restored(&self) -> bool {
         let output = self.output();
         let screen = output.parser.screen();
@@ -118,7 +118,7 @@ impl Session {
         !screen.alternate_screen() && !screen.hide_cursor() && !screen.bracketed_paste() && own_mouse
     }
 
-    /// Whether the terminal's line discipline edits lines and makes signals, as a shell wants it.
+    /// Whether the line discipline is in cooked mode with signals.
     pub fn cooked(&self) -> bool {
         use nix::libc::{ECHO, ICANON, ISIG};
         let attributes = self.master.as_ref().and_then(|master| master.get_termios());
@@ -169,7 +169,7 @@ impl Session {
         self.master.as_ref().expect("the terminal is there").resize(size).expect("resized");
     }
 
-    /// Stops or goes on reading what the program writes.
+    /// Pauses or resumes reading the program's output.
     pub fn read(&self, on: bool) {
         self.reading.store(on, Ordering::Release);
     }
@@ -182,7 +182,7 @@ impl Session {
         kill(self.pid(), signal).expect("signalled");
     }
 
-    /// Closes the terminal's other end, as a lost connection does.
+    /// Closes the other end of the terminal, as a lost connection does.
     pub fn hang_up(&mut self) {
         self.closed.store(true, Ordering::Release);
         self.writer = None;
@@ -198,7 +198,7 @@ impl Session {
         let begun = Instant::now();
         loop {
             if let Some(status) = self.finished() {
-                // The reader takes the rest.
+                // Time for the reader to receive the rest.
                 std::thread::sleep(Duration::from_millis(100));
                 return status;
             }
@@ -210,7 +210,7 @@ impl Session {
 
 impl Drop for Session {
     fn drop(&mut self) {
-        // A failed test must not leave a program behind.
+        // Ends the program of a failed test.
         let _ = self.child.kill();
     }
 }

@@ -3,91 +3,78 @@
 use std::net::{SocketAddr, ToSocketAddrs};
 use std::path::{Path, PathBuf};
 
-use clap::{Args, ValueEnum};
-use quadfrog::config::Backend;
-use quadfrog::engine::{Engine, Options};
-use quadfrog::trial::{Approval, Task};
-use quadfrog_console::app::{self, ConsoleOptions, Ended};
+use clap::Args;
+use clap::builder::TypedValueParser;
+use quadfrog::config::Config;
+use quadfrog::engine::{self, Options};
+use quadfrog::robot::go1::Network;
+use quadfrog::trial::{Approval, Backend, Task};
+use quadfrog_console::app::{self, ConsoleExit, ConsoleOptions};
 use quadfrog_console::feed::Feed;
-use quadfrog_console::settings::{ColourChoice, Settings};
+use quadfrog_console::settings::ConsoleSettings;
 use quadfrog_console::terminal;
+use quadfrog_console::theme::ColourChoice;
 
-use super::chosen::{Chosen, continued};
-use super::{Failure, StudyArguments, TaskName};
+use super::arguments::{self, StudyArguments, one_of};
+use super::failure::Failure;
+use super::selection::{SelectedStudy, study_to_continue};
 
-/// How many colours are used.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Colour {
-    /// As many as the terminal says it has; none with NO_COLOR
-    Auto,
-    /// 16 colours
-    #[value(name = "16")]
-    Sixteen,
-    /// 256 colours
-    #[value(name = "256")]
-    TwoHundredFiftySix,
-    /// 24 bits
-    True,
-    /// None
-    Never,
+fn colour() -> impl TypedValueParser<Value = ColourChoice> {
+    one_of([
+        (ColourChoice::Auto, "auto", "As the terminal reports; none with NO_COLOR"),
+        (ColourChoice::Named, "16", "16 colours"),
+        (ColourChoice::Indexed, "256", "256 colours"),
+        (ColourChoice::True, "true", "24 bits"),
+        (ColourChoice::None, "never", "None"),
+    ])
 }
 
-/// What the person at the console is asked.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Asked {
-    /// Approve and judge each jump
-    Each,
-    /// Judge falls and what is odd; the rest is accepted, and on the simulator approved, by itself
-    FallsOnly,
-    /// Nothing: on the simulator only
-    Auto,
+fn backend() -> impl TypedValueParser<Value = Backend> {
+    one_of([
+        (Backend::Simulator, "sim", "The built-in simulator"),
+        (Backend::Hardware, "go1", "A Unitree Go1 over its network, or `quadfrog emulate`"),
+    ])
 }
 
-impl From<Asked> for Approval {
-    fn from(asked: Asked) -> Approval {
-        match asked {
-            Asked::Each => Approval::Each,
-            Asked::FallsOnly => Approval::FallsOnly,
-            Asked::Auto => Approval::Auto,
-        }
-    }
+fn approval() -> impl TypedValueParser<Value = Approval> {
+    one_of(Approval::ALL.map(|approval| {
+        let help = match approval {
+            Approval::Each => "Approve and judge each jump",
+            Approval::FallsOnly => {
+                "Judge falls and anomalies; other jumps are accepted, and on the simulator approved, automatically"
+            }
+            Approval::Auto => "Nothing: on the simulator only",
+        };
+        (approval, approval.name(), help)
+    }))
 }
 
-/// How the console looks, live and in replay.
+/// Arguments of the screen, live and in replay.
 #[derive(Debug, Clone, Args)]
 pub struct ScreenArguments {
-    /// Only ASCII characters, for consoles without braille
+    /// Draw ASCII characters only, for terminals without braille
     #[arg(long)]
     pub ascii: bool,
     /// Colours
-    #[arg(long, value_name = "WHICH", default_value = "auto")]
-    pub color: Colour,
-    /// Fewer frames and colours, for a slow link
+    #[arg(long, value_name = "WHICH", default_value = "auto", value_parser = colour())]
+    pub color: ColourChoice,
+    /// Draw fewer frames and colours, for a slow link
     #[arg(long)]
     pub low_bandwidth: bool,
 }
 
-/// Which machine is driven.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Machine {
-    /// The built-in simulator
-    Sim,
-    /// A Unitree Go1 over its network, or `quadfrog emulate`
-    Go1,
-}
-
 #[derive(Debug, Args)]
 pub struct ConsoleArguments {
-    /// Which machine is driven
-    #[arg(long, value_name = "WHICH", default_value = "sim")]
-    robot: Machine,
-    /// Where the robot listens, with `--robot go1` [default: that of its robot.toml]
+    /// Robot to drive
+    #[arg(long, value_name = "WHICH", default_value = "sim", value_parser = backend())]
+    robot: Backend,
+    /// Address of the robot, with `--robot go1` [default: from its robot.toml]
     #[arg(long, value_name = "HOST:PORT")]
     address: Option<String>,
-    /// What the robot is to learn [default: forward]
-    #[arg(long, value_name = "TASK")]
-    task: Option<TaskName>,
-    /// Seed of the study [default: that of optimize.toml]
+    /// Task of the study [default: forward]
+    #[arg(long, value_name = "TASK", value_parser = arguments::task())]
+    task: Option<Task>,
+    /// Seed of the study [default: from optimize.toml]
     #[arg(long, value_name = "N")]
     seed: Option<u32>,
     #[command(flatten)]
@@ -95,100 +82,90 @@ pub struct ConsoleArguments {
     /// Continue the study in this folder
     #[arg(long, value_name = "DIR")]
     resume: Option<PathBuf>,
-    /// Look, and change nothing
+    /// Observe only
     #[arg(long)]
     observe: bool,
-    /// What is asked of you: every jump, only falls, or (on the simulator) nothing
-    #[arg(long, value_name = "WHAT", default_value = "each")]
-    approve: Asked,
+    /// Jumps that wait for the operator's approval and verdict
+    #[arg(long, value_name = "WHAT", default_value = "each", value_parser = approval())]
+    approve: Approval,
     #[command(flatten)]
     screen: ScreenArguments,
 }
 
 pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
     let config = arguments.study.load_config(arguments.resume.as_deref())?;
-    let mut robot = arguments.study.load_robot()?;
-    let backend = match arguments.robot {
-        Machine::Sim => Backend::Simulator,
-        Machine::Go1 => Backend::Hardware,
-    };
-    match (&arguments.address, &mut robot.network) {
-        (Some(text), _) if backend == Backend::Simulator => {
-            return Err(Failure::input(format!("--address {text}: the simulator has none; add --robot go1")));
-        }
-        (Some(text), Some(network)) => network.address = address(text)?,
-        // A robot without a network is refused by the engine, with or without an address.
-        _ => {}
+    let (files, robot) = arguments::load_model(&arguments.study.model)?;
+    let backend = arguments.robot;
+    let mut network = None;
+    if backend == Backend::Hardware {
+        network = Network::read(&files).map_err(Failure::input)?;
+    } else if let Some(text) = &arguments.address {
+        return Err(Failure::input(format!("--address {text}: the simulator has none; add --robot go1")));
+    }
+    // The engine refuses a robot without a network.
+    if let (Some(text), Some(network)) = (&arguments.address, &mut network) {
+        network.address = address(text)?;
     }
     let console = options(&arguments.screen, &config)?.with_robot(robot.clone());
     terminal::check().map_err(Failure::input)?;
-    let (task, seed) = (arguments.task.map(Task::from), arguments.seed);
-    let chosen = match &arguments.resume {
-        Some(folder) => continued(folder, task, seed, &robot)?,
+    let selected = match &arguments.resume {
+        Some(folder) => study_to_continue(folder, arguments.task, arguments.seed, &robot)?,
         None => {
-            let task = task.unwrap_or(Task::Forward);
-            let seed = seed.unwrap_or(config.optimize.sampler.seed);
-            Chosen { task, seed, folder: arguments.study.new_folder(task, seed), budget: None }
+            let task = arguments.task.unwrap_or(Task::Forward);
+            let seed = arguments.seed.unwrap_or(config.optimize.sampler.seed);
+            SelectedStudy { task, seed, folder: arguments.study.new_folder(task, seed), budget: None }
         }
     };
-    let folder = chosen.folder.clone();
-    let cut_short = left_behind(&folder);
-    let handle = Engine::start(Options {
-        seed: chosen.seed,
-        trials: arguments.study.trials.or(chosen.budget),
-        // Who only looks leaves nothing behind.
-        folder: (!arguments.observe).then_some(chosen.folder),
+    let folder = selected.folder.clone();
+    let incomplete = incomplete_recordings(&folder);
+    let handle = engine::start(Options {
+        seed: selected.seed,
+        trials: arguments.study.trials.or(selected.budget),
+        // An observer writes no files.
+        folder: (!arguments.observe).then_some(selected.folder),
         observe: arguments.observe,
-        approve: arguments.approve.into(),
-        // This program, also where its file was replaced since it was started.
+        approve: arguments.approve,
+        // The running program, even if its file was replaced since the start.
         guard: Some(PathBuf::from("/proc/self/exe")),
-        ..Options::new(config, robot, backend, chosen.task)
+        network,
+        ..Options::new(config, robot, backend, selected.task)
     })?;
     let recording = handle.recording().map(Path::to_owned);
-    if app::run(Feed::live(handle), console)? == Ended::HungUp {
-        // There is nowhere to print to.
-        return Ok(());
-    }
-    if arguments.observe {
+    let exit = app::run(Feed::live(handle), console)?;
+    if exit == ConsoleExit::HungUp || arguments.observe {
         return Ok(());
     }
     println!("The study and its recording are in {}", folder.display());
-    println!("  continue it:  quadfrog --resume {}", folder.display());
+    println!("  continue the study:  quadfrog --resume {}", folder.display());
     if let Some(recording) = recording {
-        println!("  look at it:   quadfrog replay {}", recording.display());
+        println!("  play the recording:  quadfrog replay {}", recording.display());
     }
-    for part in cut_short {
-        println!("  an earlier recording was cut short; make it whole:  quadfrog recover {}", part.display());
+    for part in incomplete {
+        println!("  repair an incomplete recording:  quadfrog recover {}", part.display());
     }
     Ok(())
 }
 
-/// The address that `HOST:PORT` means.
+/// Resolves `HOST:PORT`.
 fn address(text: &str) -> Result<SocketAddr, Failure> {
-    let no_address = |reason: String| {
+    let refuse = |reason: String| {
         Failure::input(format!("--address {text}: {reason}; give HOST:PORT, for example 192.168.123.10:8007"))
     };
-    let mut found = text.to_socket_addrs().map_err(|error| no_address(error.to_string()))?;
-    found.next().ok_or_else(|| no_address("no such host".to_owned()))
+    let mut found = text.to_socket_addrs().map_err(|error| refuse(error.to_string()))?;
+    found.next().ok_or_else(|| refuse("no such host".to_owned()))
 }
 
-/// Recordings that an earlier session of this study could not finish.
-fn left_behind(folder: &Path) -> Vec<PathBuf> {
+/// Returns the recordings that earlier sessions of this study did not finish.
+fn incomplete_recordings(folder: &Path) -> Vec<PathBuf> {
     let Ok(entries) = std::fs::read_dir(folder) else { return Vec::new() };
     let paths = entries.filter_map(|entry| Some(entry.ok()?.path()));
     paths.filter(|path| path.extension().is_some_and(|extension| extension == "part")).collect()
 }
 
-/// The console's options from the arguments and `console.toml`.
-pub fn options(screen: &ScreenArguments, config: &quadfrog::config::Config) -> Result<ConsoleOptions, Failure> {
-    let settings = Settings::from_table(&config.console)
+/// Returns the console's options from the arguments and `console.toml`.
+pub fn options(screen: &ScreenArguments, config: &Config) -> Result<ConsoleOptions, Failure> {
+    let settings = ConsoleSettings::from_table(&config.console)
         .map_err(|error| config.refuse("console.toml", &error.key, &error.value, &error.reason))?;
-    let colours = match screen.color {
-        Colour::Auto => None,
-        Colour::Sixteen => Some(ColourChoice::Named),
-        Colour::TwoHundredFiftySix => Some(ColourChoice::Indexed),
-        Colour::True => Some(ColourChoice::True),
-        Colour::Never => Some(ColourChoice::None),
-    };
+    let colours = (screen.color != ColourChoice::Auto).then_some(screen.color);
     Ok(ConsoleOptions::new(settings, colours, screen.ascii, screen.low_bandwidth))
 }

@@ -1,5 +1,4 @@
-//! `quadfrog doctor`: what this machine can do for a control thread and for the console, line by line, and what to do about the
-//! rest.
+//! `quadfrog doctor`: checks of this machine for the control thread and the console, one line each, with remedies.
 
 use std::fmt;
 use std::ops::ControlFlow;
@@ -8,20 +7,21 @@ use std::time::Duration;
 
 use clap::Args;
 use color_eyre::eyre::eyre;
-use quadfrog::config::{Backend, Config};
+use quadfrog::config::Config;
 use quadfrog::realtime::scheduling::{ALLOW_LOCKING, ALLOW_PRIORITY, Scheduling};
 use quadfrog::realtime::{system, thread};
 use quadfrog::recording::disk;
-use quadfrog_console::line::Place;
+use quadfrog::trial::Backend;
+use quadfrog_console::connection::TerminalLocation;
 
-use super::Failure;
+use super::failure::Failure;
 
-/// Wake-ups that are measured: one second of them.
+/// Number of wake-ups measured, at 1 kHz.
 const WAKE_UPS: usize = 1000;
 
 #[derive(Debug, Args)]
 pub struct DoctorArguments {
-    /// Where the folders of new studies are made
+    /// Parent folder of new studies
     #[arg(long, value_name = "DIR", default_value = "recordings")]
     output: PathBuf,
     /// Folder whose TOML files replace those of the configuration, whole or key by key
@@ -29,36 +29,41 @@ pub struct DoctorArguments {
     config: Option<PathBuf>,
 }
 
-/// How an item stands.
-enum Verdict {
+/// The status of an item, with the remedy.
+enum ItemStatus {
     Good,
-    /// The simulator works all the same; a robot may not.
+    /// The simulator works; a robot may not.
     Weak(String),
     /// Nothing works.
     Broken(String),
 }
 
-struct Line {
-    item: &'static str,
+/// A checked property of the machine.
+struct DoctorItem {
+    name: &'static str,
     found: String,
-    verdict: Verdict,
+    status: ItemStatus,
 }
 
-impl Line {
-    fn new(item: &'static str, found: impl Into<String>, good: bool, remedy: &str) -> Line {
-        let verdict = if good { Verdict::Good } else { Verdict::Weak(remedy.to_owned()) };
-        Line { item, found: found.into(), verdict }
+impl DoctorItem {
+    fn new(name: &'static str, found: impl Into<String>, good: bool, remedy: &str) -> DoctorItem {
+        let status = if good { ItemStatus::Good } else { ItemStatus::Weak(remedy.to_owned()) };
+        DoctorItem { name, found: found.into(), status }
+    }
+
+    fn broken(name: &'static str, found: String, remedy: &str) -> DoctorItem {
+        DoctorItem { name, found, status: ItemStatus::Broken(remedy.to_owned()) }
     }
 }
 
-impl fmt::Display for Line {
+impl fmt::Display for DoctorItem {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (word, remedy) = match &self.verdict {
-            Verdict::Good => ("ok", None),
-            Verdict::Weak(remedy) => ("warn", Some(remedy)),
-            Verdict::Broken(remedy) => ("FAIL", Some(remedy)),
+        let (label, remedy) = match &self.status {
+            ItemStatus::Good => ("ok", None),
+            ItemStatus::Weak(remedy) => ("warn", Some(remedy)),
+            ItemStatus::Broken(remedy) => ("FAIL", Some(remedy)),
         };
-        write!(f, "{word:<5} {:<18} {}", self.item, self.found)?;
+        write!(f, "{label:<5} {:<18} {}", self.name, self.found)?;
         remedy.map_or(Ok(()), |remedy| write!(f, "\n{:>24} {remedy}", "->"))
     }
 }
@@ -66,84 +71,80 @@ impl fmt::Display for Line {
 pub fn run(arguments: &DoctorArguments) -> Result<(), Failure> {
     let config = Config::load(arguments.config.as_deref())?;
     let scheduling = config.scheduling(Backend::Hardware);
-    let mut lines = vec![kernel(), priority(scheduling), memory(), cores(), governor(), timer()];
-    lines.extend(wake_up(scheduling));
-    lines.extend([characters(), colours(), size(), connection()]);
-    lines.push(room(&arguments.output, config.safety.pre_arm.disk_free_mb));
-    for line in &lines {
-        println!("{line}");
+    let mut items = vec![kernel(), priority(scheduling), memory(), cores(), governor(), timer()];
+    items.extend(wake_up(scheduling));
+    items.extend([characters(), colours(), size(), connection()]);
+    items.push(disk_space(&arguments.output, config.safety.pre_arm.disk_free_mb));
+    for item in &items {
+        println!("{item}");
     }
-    let weak = lines.iter().filter(|line| matches!(line.verdict, Verdict::Weak(_))).count();
-    let broken = lines.iter().filter(|line| matches!(line.verdict, Verdict::Broken(_))).count();
+    let weak = items.iter().filter(|item| matches!(item.status, ItemStatus::Weak(_))).count();
+    let broken = items.iter().filter(|item| matches!(item.status, ItemStatus::Broken(_))).count();
     println!();
     match (weak, broken) {
-        (_, 1..) => return Err(eyre!("{broken} of {} items make quadfrog unusable here", lines.len()).into()),
-        (0, _) => println!("Everything is as it should be, for the simulator and for a robot."),
-        (weak, _) => println!(
-            "Usable. The simulator needs nothing of the {weak} marked warn; look at them before a real robot jumps."
-        ),
+        (_, 1..) => return Err(eyre!("{broken} of {} items make quadfrog unusable here", items.len()).into()),
+        (0, _) => println!("All items are ok, for the simulator and for a robot."),
+        (weak, _) => println!("Usable with the simulator. Resolve the {weak} warnings before a real robot jumps."),
     }
     Ok(())
 }
 
-fn kernel() -> Line {
+fn kernel() -> DoctorItem {
     let build = system::kernel_build();
-    let kind = build.split_whitespace().find(|word| word.starts_with("PREEMPT")).unwrap_or("no preemption named");
-    Line::new(
+    let kind = build.split_whitespace().find(|word| word.starts_with("PREEMPT")).unwrap_or("unknown preemption model");
+    DoctorItem::new(
         "kernel",
         format!("{}, {kind}", system::kernel_release()),
         system::kernel_is_realtime(),
-        "a PREEMPT_RT kernel bounds the wake-up (Debian: apt-get install linux-image-rt-amd64); others are late now and then",
+        "a PREEMPT_RT kernel bounds the wake-up latency (Debian: apt-get install linux-image-rt-amd64)",
     )
 }
 
-fn priority(scheduling: Scheduling) -> Line {
+fn priority(scheduling: Scheduling) -> DoctorItem {
     let (limit, asked) = (system::priority_limit(), u64::from(scheduling.priority));
-    let found = format!("may be {limit}, asked for {asked} (realtime.hardware_priority)");
-    Line::new("real-time priority", found, limit >= asked, ALLOW_PRIORITY)
+    let found = format!("allowed {limit}, requested {asked} (realtime.hardware_priority)");
+    DoctorItem::new("real-time priority", found, limit >= asked, ALLOW_PRIORITY)
 }
 
-fn memory() -> Line {
+fn memory() -> DoctorItem {
     match system::memlock_limit() {
-        None => Line::new("locked memory", "without limit", true, ""),
-        Some(bytes) => Line::new("locked memory", format!("{} MB at most", bytes / 1_000_000), false, ALLOW_LOCKING),
+        None => DoctorItem::new("locked memory", "unlimited", true, ""),
+        Some(bytes) => {
+            DoctorItem::new("locked memory", format!("{} MB at most", bytes / 1_000_000), false, ALLOW_LOCKING)
+        }
     }
 }
 
-fn cores() -> Line {
+fn cores() -> DoctorItem {
     let count = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     let isolated = system::isolated_cores();
     let found = match isolated.as_slice() {
         [] => format!("{count}, none isolated"),
         cores => format!("{count}, isolated: {cores:?}"),
     };
-    let remedy = "keep one of two or more free for the control thread (boot parameter isolcpus=N, or realtime.core): it is late less often";
-    Line::new("cores", found, count >= 2 && !isolated.is_empty(), remedy)
+    let remedy = "reserve one of two or more cores for the control thread (boot parameter isolcpus=N, or realtime.core): fewer late ticks";
+    DoctorItem::new("cores", found, count >= 2 && !isolated.is_empty(), remedy)
 }
 
-fn governor() -> Line {
+fn governor() -> DoctorItem {
     let governors = system::governors();
     let good = governors.iter().all(|governor| governor == "performance");
     let found = if governors.is_empty() { "no frequency control".to_owned() } else { governors.join(", ") };
-    Line::new("cpu governor", found, good, "sudo cpupower frequency-set -g performance")
+    DoctorItem::new("cpu governor", found, good, "sudo cpupower frequency-set -g performance")
 }
 
-fn timer() -> Line {
+fn timer() -> DoctorItem {
     match system::timer_resolution_ns() {
         Ok(ns) => {
             let remedy = "the kernel has no high-resolution timers (CONFIG_HIGH_RES_TIMERS): 1 kHz cannot be kept";
-            Line::new("timer", format!("{ns} ns"), ns <= 1000, remedy)
+            DoctorItem::new("timer", format!("{ns} ns"), ns <= 1000, remedy)
         }
-        Err(error) => Line {
-            item: "timer",
-            found: error.to_string(),
-            verdict: Verdict::Broken("the monotonic clock cannot be read".to_owned()),
-        },
+        Err(error) => DoctorItem::broken("timer", error.to_string(), "the monotonic clock cannot be read"),
     }
 }
 
-/// What a thread is granted that is scheduled as the control thread on hardware would be, and a second of its wake-ups.
-fn wake_up(scheduling: Scheduling) -> Vec<Line> {
+/// Requests the scheduling of the control thread on hardware, and measures wake-ups with what was granted.
+fn wake_up(scheduling: Scheduling) -> Vec<DoctorItem> {
     let measured = std::thread::spawn(move || {
         let granted = scheduling.apply();
         let mut lateness = Vec::with_capacity(WAKE_UPS);
@@ -154,102 +155,97 @@ fn wake_up(scheduling: Scheduling) -> Vec<Line> {
         lateness.sort_unstable();
         paced.map(|()| (granted, lateness))
     });
-    let broken = |found: String, remedy: &str| {
-        vec![Line { item: "wake-up lateness", found, verdict: Verdict::Broken(remedy.to_owned()) }]
-    };
+    const LATENCY: &str = "wake-up latency";
     match measured.join() {
         Ok(Ok((granted, lateness))) => {
-            let favours: Vec<_> = granted.favours.iter().map(ToString::to_string).collect();
-            let mut lines = vec![Line::new("control thread", favours.join(", "), true, "")];
-            lines.extend(granted.shortfalls.iter().map(|shortfall| {
-                let found = format!("not {}: {}", shortfall.favour, shortfall.reason);
-                Line::new("control thread", found, false, shortfall.remedy)
+            let settings: Vec<_> = granted.granted.iter().map(ToString::to_string).collect();
+            let mut items = vec![DoctorItem::new("control thread", settings.join(", "), true, "")];
+            items.extend(granted.denied.iter().map(|denied| {
+                let found = format!("not {}: {}", denied.setting, denied.reason);
+                DoctorItem::new("control thread", found, false, denied.remedy)
             }));
             let at = |rank: usize| lateness[rank.min(lateness.len() - 1)] as f64 * 1e-3;
-            let (p50, p99, most) = (at(WAKE_UPS / 2), at(WAKE_UPS * 99 / 100), at(WAKE_UPS - 1));
-            let found = format!("p50 {p50:.0} us, p99 {p99:.0} us, worst {most:.0} us of {WAKE_UPS}");
-            let remedy = "a robot is not armed while p99 is above 500 us: see the lines above; end other programs";
-            lines.push(Line::new("wake-up lateness", found, p99 < 500.0, remedy));
-            lines
+            let (p50, p99, max) = (at(WAKE_UPS / 2), at(WAKE_UPS * 99 / 100), at(WAKE_UPS - 1));
+            let found = format!("p50 {p50:.0} us, p99 {p99:.0} us, max {max:.0} us of {WAKE_UPS}");
+            let remedy = "a robot is not armed while p99 exceeds 500 us: see the items above; end other programs";
+            items.push(DoctorItem::new(LATENCY, found, p99 < 500.0, remedy));
+            items
         }
-        Ok(Err(error)) => broken(error.to_string(), "the monotonic clock cannot be waited on"),
-        Err(_) => broken("the measuring thread broke down".to_owned(), "please report it"),
+        Ok(Err(error)) => {
+            vec![DoctorItem::broken(LATENCY, error.to_string(), "the monotonic clock cannot be waited on")]
+        }
+        Err(_) => vec![DoctorItem::broken(LATENCY, "the measuring thread panicked".to_owned(), "please report it")],
     }
 }
 
-/// Whether the console would notice that its operator is gone.
-fn connection() -> Line {
-    let (found, remedy) = match Place::of(|name| std::env::var(name).ok()) {
-        Place::Multiplexer => (
+/// Checks whether the console can detect the loss of its operator.
+fn connection() -> DoctorItem {
+    let (found, remedy) = match TerminalLocation::of(|name| std::env::var(name).ok()) {
+        TerminalLocation::Multiplexer => (
             "tmux or screen",
-            "it lives on when your connection ends, and the robot with it: for a robot start quadfrog outside",
+            "the session keeps running when your connection ends, and so does the robot: for a robot start quadfrog outside",
         ),
-        Place::Ssh(Some(_)) => (
+        TerminalLocation::Ssh(Some(_)) => (
             "SSH",
-            "a dead line lands the robot after two seconds or more, but only the line from this machine to the next is seen: \
-             ClientAliveInterval 1, ClientAliveCountMax 2 in sshd_config sees all of it",
+            "a dead connection lands the robot after two seconds or more, but only the last hop to this machine is monitored: \
+             ClientAliveInterval 1, ClientAliveCountMax 2 in sshd_config monitors the whole path",
         ),
-        Place::Ssh(None) => (
+        TerminalLocation::Ssh(None) => (
             "SSH, but SSH_CONNECTION cannot be read",
-            "a dead line is noticed only if sshd looks for it: ClientAliveInterval 1, ClientAliveCountMax 2 in sshd_config",
+            "a dead connection is detected only by sshd: ClientAliveInterval 1, ClientAliveCountMax 2 in sshd_config",
         ),
-        Place::Here => ("a terminal of this machine", ""),
+        TerminalLocation::Local => ("a terminal of this machine", ""),
     };
-    Line::new("connection", found, remedy.is_empty(), remedy)
+    DoctorItem::new("connection", found, remedy.is_empty(), remedy)
 }
 
-/// The first that is set decides (POSIX, Base Definitions, 8.2).
-fn characters() -> Line {
+/// Checks the character set; the first variable that is set takes precedence (POSIX, Base Definitions, 8.2).
+fn characters() -> DoctorItem {
     let set = ["LC_ALL", "LC_CTYPE", "LANG"].iter().find_map(|name| std::env::var(name).ok().filter(|v| !v.is_empty()));
     let locale = set.unwrap_or_else(|| "no locale".to_owned());
     let upper = locale.to_uppercase();
     let good = upper.contains("UTF-8") || upper.contains("UTF8");
-    Line::new(
-        "characters",
-        locale,
-        good,
-        "without UTF-8 charts are drawn in ASCII (--ascii); set LANG=C.UTF-8 for finer ones",
-    )
+    DoctorItem::new("characters", locale, good, "without UTF-8 charts are drawn in ASCII (--ascii); set LANG=C.UTF-8")
 }
 
-fn colours() -> Line {
+fn colours() -> DoctorItem {
     let variable = |name| std::env::var(name).unwrap_or_default();
     let (term, depth) = (variable("TERM"), variable("COLORTERM"));
     let found = match (term.as_str(), depth.as_str()) {
-        _ if !variable("NO_COLOR").is_empty() => "none asked for (NO_COLOR)",
+        _ if !variable("NO_COLOR").is_empty() => "none (NO_COLOR)",
         (_, "truecolor" | "24bit") => "24 bits",
         (term, _) if term.contains("256color") => "256",
         ("" | "dumb", _) => "unknown",
         _ => "16",
     };
-    let remedy = "TERM says nothing of this terminal; --color 16, 256 or true chooses";
-    Line::new("colours", format!("{found} (TERM={term})"), !["", "dumb"].contains(&term.as_str()), remedy)
+    let remedy = "TERM does not describe this terminal; choose with --color 16, 256 or true";
+    DoctorItem::new("colours", format!("{found} (TERM={term})"), !["", "dumb"].contains(&term.as_str()), remedy)
 }
 
-fn size() -> Line {
+fn size() -> DoctorItem {
     match crossterm::terminal::size() {
         Ok((columns, rows)) => {
             let remedy = "below 80x24 only the mode, STOP and the link are shown; make the window larger";
-            Line::new("terminal size", format!("{columns}x{rows}"), columns >= 80 && rows >= 24, remedy)
+            DoctorItem::new("terminal size", format!("{columns}x{rows}"), columns >= 80 && rows >= 24, remedy)
         }
-        Err(_) => Line::new("terminal size", "not a terminal", false, "run the console itself in a terminal"),
+        Err(_) => DoctorItem::new("terminal size", "not a terminal", false, "run the console itself in a terminal"),
     }
 }
 
-/// Room in the folder, or in the nearest one above it that exists.
-fn room(folder: &Path, needed_mb: u32) -> Line {
+/// Checks the free space in the folder, or in its nearest ancestor that exists.
+fn disk_space(folder: &Path, needed_mb: u32) -> DoctorItem {
     let absolute = std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned());
     let existing = absolute.ancestors().find(|path| path.exists()).unwrap_or(Path::new("/"));
     match disk::free_mb(existing) {
         Ok(free) => {
             let found = format!("{free} MB free for {}", absolute.display());
-            let remedy = format!("a robot is not armed with less than {needed_mb} MB; make room, or choose --output");
-            Line::new("disk", found, free >= u64::from(needed_mb), &remedy)
+            let remedy = format!("a robot is not armed with less than {needed_mb} MB; free space, or choose --output");
+            DoctorItem::new("disk", found, free >= u64::from(needed_mb), &remedy)
         }
-        Err(error) => Line {
-            item: "disk",
-            found: format!("{}: {error}", existing.display()),
-            verdict: Verdict::Broken("nothing can be recorded there; choose another --output".to_owned()),
-        },
+        Err(error) => DoctorItem::broken(
+            "disk",
+            format!("{}: {error}", existing.display()),
+            "nothing can be recorded there; choose another --output",
+        ),
     }
 }

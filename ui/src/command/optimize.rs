@@ -1,4 +1,4 @@
-//! `quadfrog optimize`: whole studies on the simulator without a screen, alone or as one more worker on a shared one.
+//! `quadfrog optimize`: complete studies on the simulator without a screen, or a worker on a shared study.
 
 mod printer;
 
@@ -8,7 +8,7 @@ use std::sync::{Mutex, PoisonError};
 
 use clap::{Args, ValueEnum};
 use color_eyre::eyre::eyre;
-use quadfrog::config::{Backend, Config};
+use quadfrog::config::Config;
 use quadfrog::engine::{self, EngineError, Options, StoredStudy};
 use quadfrog::optimize::journal::Durability;
 use quadfrog::optimize::study::Storage;
@@ -19,16 +19,17 @@ use quadfrog::session::automatic;
 use quadfrog::session::rollout::Rollout;
 use quadfrog::sim::Simulator;
 use quadfrog::telemetry::Tick;
-use quadfrog::trial::{Approval, Task, TrialRecord, Verdict};
+use quadfrog::trial::{Approval, Backend, Task, TrialRecord, Verdict};
 
 use printer::Printer;
 
-use super::chosen::{Chosen, continued, joined, journal};
-use super::{Failure, StudyArguments, TaskName};
+use super::arguments::{self, StudyArguments};
+use super::failure::Failure;
+use super::selection::{SelectedStudy, parse_storage, study_to_continue, study_to_join};
 
-/// What is recorded.
+/// The trials whose ticks are recorded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Kept {
+enum RecordChoice {
     /// Nothing
     None,
     /// The best trial
@@ -39,10 +40,10 @@ enum Kept {
 
 #[derive(Debug, Args)]
 pub struct OptimizeArguments {
-    /// What the robot is to learn; several with commas, each a study of its own [default: forward]
-    #[arg(long, value_name = "TASK", value_delimiter = ',')]
-    task: Vec<TaskName>,
-    /// Seed of the study; several as 0-4 or 0,3,7, each a study of its own [default: that of optimize.toml]
+    /// Task of the study; several with commas, a study each [default: forward]
+    #[arg(long, value_name = "TASK", value_delimiter = ',', value_parser = arguments::task())]
+    task: Vec<Task>,
+    /// Seed of the study; several as 0-4 or 0,3,7, a study each [default: from optimize.toml]
     #[arg(long, value_name = "N", value_parser = parse_seeds)]
     seed: Option<Seeds>,
     #[command(flatten)]
@@ -50,22 +51,32 @@ pub struct OptimizeArguments {
     /// Continue the study in this folder
     #[arg(long, value_name = "DIR", conflicts_with = "output")]
     resume: Option<PathBuf>,
-    /// Take part in the study of this folder, journal file or redis://HOST:PORT/DB as one more worker; --trials is the
-    /// budget of all workers together
+    /// Join the study of this folder, journal file or redis://HOST:PORT/DB as another worker; --trials is the budget of all
+    /// workers together
     #[arg(long, value_name = "JOURNAL", conflicts_with = "resume")]
     join: Option<String>,
-    /// One JSON object per finished trial on standard output; table and messages go to standard error
+    /// Print one JSON object per finished trial on standard output; table and messages go to standard error
     #[arg(long)]
     json: bool,
-    /// What is recorded
+    /// Trials to record
     #[arg(long, value_name = "WHAT", default_value = "best")]
-    record: Kept,
+    record: RecordChoice,
     /// Studies that run at the same time [default: the number of cores]; with --join: workers [default: 1]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     jobs: Option<u16>,
 }
 
-/// Seeds as on the command line.
+impl OptimizeArguments {
+    /// Returns the only seed, if one is given; more than one is refused with `message`.
+    fn only_seed(&self, message: &str) -> Result<Option<u32>, Failure> {
+        match self.seed.as_ref().map(|seeds| seeds.0.as_slice()) {
+            None => Ok(None),
+            Some([seed]) => Ok(Some(*seed)),
+            Some(_) => Err(Failure::input(message)),
+        }
+    }
+}
+
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct Seeds(Vec<u32>);
 
@@ -79,7 +90,7 @@ fn parse_seeds(text: &str) -> Result<Seeds, String> {
             Some((first, last)) => {
                 let (first, last) = (number(first)?, number(last)?);
                 if last < first || last - first >= 10_000 {
-                    return Err(format!("`{part}` is no range of at most 10000 seeds; write it as 0-4"));
+                    return Err(format!("`{part}` is not a range of at most 10000 seeds; write it as 0-4"));
                 }
                 seeds.extend(first..=last);
             }
@@ -90,18 +101,19 @@ fn parse_seeds(text: &str) -> Result<Seeds, String> {
 }
 
 pub fn run(arguments: &OptimizeArguments) -> Result<(), Failure> {
-    let joined = arguments.join.as_deref().map(journal);
-    let beside = match &joined {
+    let joined = arguments.join.as_deref().map(parse_storage);
+    let existing = match &joined {
         Some(Storage::File(file)) => file.parent(),
         _ => arguments.resume.as_deref(),
     };
-    let config = arguments.study.load_config(beside)?;
-    let robot = arguments.study.load_robot()?;
+    let config = arguments.study.load_config(existing)?;
+    let (_, robot) = arguments::load_model(&arguments.study.model)?;
     let studies = match &joined {
         Some(storage) => workers(arguments, storage, &robot)?,
-        None => choose(arguments, &config, &robot)?,
+        None => select(arguments, &config, &robot)?,
     };
-    let printer = Printer::new(arguments, &config, &studies);
+    let budgets = studies.iter().map(|study| arguments.study.trials.or(study.budget).unwrap_or(config.optimize.trials));
+    let printer = Printer::new(arguments.json, joined.is_some(), &config, &budgets.collect::<Vec<_>>());
     let failures = Mutex::new(Vec::new());
     let next = AtomicUsize::new(0);
     let jobs = match arguments.jobs {
@@ -125,59 +137,54 @@ pub fn run(arguments: &OptimizeArguments) -> Result<(), Failure> {
     }
     let mut failures = failures.into_inner().unwrap_or_else(PoisonError::into_inner);
     drop(printer);
-    // Every one of them is said; the last decides the exit status, unless an earlier one is graver than bad input.
+    // All failures are printed. The last one decides the exit status, so other errors come after unusable input.
     failures.sort_by_key(|failure| matches!(failure, Failure::Other(_)));
     let last = failures.pop();
-    for failure in failures {
-        match failure {
-            Failure::Input(message) => eprintln!("quadfrog: {message}"),
-            Failure::Other(report) => eprintln!("quadfrog: {report:?}"),
-        }
-    }
+    failures.iter().for_each(Failure::print);
     last.map_or(Ok(()), Err)
 }
 
-/// As many workers on the study of `storage` as `--jobs` says, each with a folder of its own.
-fn workers(arguments: &OptimizeArguments, storage: &Storage, robot: &RobotDescription) -> Result<Vec<Chosen>, Failure> {
-    let several = || Failure::input("--join: a worker takes part in one study; give one --task and one --seed");
+/// Returns the `--jobs` workers on the study of `storage`, each with its own folder.
+fn workers(
+    arguments: &OptimizeArguments,
+    storage: &Storage,
+    robot: &RobotDescription,
+) -> Result<Vec<SelectedStudy>, Failure> {
+    const SEVERAL: &str = "--join: a worker takes part in one study; give one --task and one --seed";
     let task = match arguments.task.as_slice() {
         [] => None,
-        [task] => Some(Task::from(*task)),
-        _ => return Err(several()),
+        [task] => Some(*task),
+        _ => return Err(Failure::input(SEVERAL)),
     };
-    let seed = match arguments.seed.as_ref().map(|seeds| seeds.0.as_slice()) {
-        None => None,
-        Some([seed]) => Some(*seed),
-        Some(_) => return Err(several()),
-    };
-    let StoredStudy { task, seed, budget, .. } = joined(storage, task, seed, robot)?;
+    let seed = arguments.only_seed(SEVERAL)?;
+    let StoredStudy { task, seed, budget, .. } = study_to_join(storage, task, seed, robot)?;
     let name = arguments.study.new_folder(task, seed);
-    // Many may begin in the same second.
+    // With the process number: several programs may start in the same second.
     let folder = |worker| PathBuf::from(format!("{}-joined-{}-{worker}", name.display(), std::process::id()));
-    let worker = |worker: u16| Chosen { task, seed, folder: folder(worker), budget };
+    let worker = |worker: u16| SelectedStudy { task, seed, folder: folder(worker), budget };
     Ok((0..arguments.jobs.unwrap_or(1)).map(worker).collect())
 }
 
-/// The studies that the arguments ask for: every task with every seed.
-fn choose(arguments: &OptimizeArguments, config: &Config, robot: &RobotDescription) -> Result<Vec<Chosen>, Failure> {
-    let one = |task: &TaskName| Task::from(*task);
+/// Returns the continued study, or a new study for each pair of task and seed.
+fn select(
+    arguments: &OptimizeArguments,
+    config: &Config,
+    robot: &RobotDescription,
+) -> Result<Vec<SelectedStudy>, Failure> {
     if let Some(folder) = &arguments.resume {
-        let seed = match arguments.seed.as_ref().map(|seeds| seeds.0.as_slice()) {
-            None => None,
-            Some([seed]) => Some(*seed),
-            Some(_) => return Err(Failure::input("--seed: a study that is continued has one seed")),
-        };
-        return Ok(vec![continued(folder, arguments.task.first().map(one), seed, robot)?]);
+        let seed = arguments.only_seed("--seed: a study that is continued has one seed")?;
+        return Ok(vec![study_to_continue(folder, arguments.task.first().copied(), seed, robot)?]);
     }
-    let tasks: Vec<Task> =
-        if arguments.task.is_empty() { vec![Task::Forward] } else { arguments.task.iter().map(one).collect() };
+    let tasks = if arguments.task.is_empty() { &[Task::Forward][..] } else { &arguments.task };
     let seeds = arguments.seed.as_ref().map_or_else(|| vec![config.optimize.sampler.seed], |seeds| seeds.0.clone());
-    let distinct = |(place, item): (usize, &(Task, u32)), all: &[(Task, u32)]| !all[..place].contains(item);
-    let every: Vec<_> = tasks.iter().flat_map(|task| seeds.iter().map(|seed| (*task, *seed))).collect();
-    let once =
-        every.iter().enumerate().filter(|(place, item)| distinct((*place, *item), &every)).map(|(_, item)| *item);
-    let new = |(task, seed)| Chosen { task, seed, folder: arguments.study.new_folder(task, seed), budget: None };
-    Ok(once.map(new).collect())
+    let mut pairs: Vec<(Task, u32)> = Vec::new();
+    for pair in tasks.iter().flat_map(|task| seeds.iter().map(|seed| (*task, *seed))) {
+        if !pairs.contains(&pair) {
+            pairs.push(pair);
+        }
+    }
+    let new = |(task, seed)| SelectedStudy { task, seed, folder: arguments.study.new_folder(task, seed), budget: None };
+    Ok(pairs.into_iter().map(new).collect())
 }
 
 fn run_one(
@@ -185,7 +192,7 @@ fn run_one(
     join: Option<&Storage>,
     config: &Config,
     robot: &RobotDescription,
-    study: &Chosen,
+    study: &SelectedStudy,
     printer: &Printer,
 ) -> Result<(), Failure> {
     let options = Options {
@@ -200,43 +207,44 @@ fn run_one(
     let simulator = Simulator::new(robot, &config.simulator).map_err(EngineError::from)?;
     let mut rollout = Rollout::new(simulator, &settings);
     let prepared = engine::prepare_folder(&options)?;
-    let recording = prepared.recording.clone().filter(|_| arguments.record != Kept::None);
+    let recording = prepared.recording.clone().filter(|_| arguments.record != RecordChoice::None);
     let name = match &recording {
-        // Beside other workers' recordings the name alone says nothing.
+        // Workers of a shared study have their own folders: the file name alone is ambiguous.
         Some(path) if join.is_some() => Some(path.display().to_string()),
         Some(path) => path.file_name().map(|name| name.to_string_lossy().into_owned()),
         None => None,
     };
-    // The trial is on its way to the disk when it is judged, and on it before the next one is proposed.
-    let mut life = engine::open_life(&options, Durability::Synced, name.as_deref().unwrap_or_default())?;
+    // Synced: a judged trial is on disk before the next one is proposed.
+    let mut experiment = engine::open_experiment(&options, Durability::Synced, name.as_deref().unwrap_or_default())?;
     let mut recorder = match &recording {
         Some(path) => Some(StudyRecorder::create(path, &options)?),
         None => None,
     };
     let mut failed = None;
-    let kept = arguments.record;
     let mut best: Option<(TrialRecord, Vec<Tick>)> = None;
-    let ran = automatic::run_watched(&mut life, &mut rollout, |life, row, ticks| {
-        printer.trial(study, row, life.counted());
+    let ran = automatic::run_watched(&mut experiment, &mut rollout, |experiment, row, ticks| {
+        printer.trial(study, row, experiment.counted());
         let accepted = row.verdict == Some(Verdict::Accept);
         let better = |best: &(TrialRecord, Vec<Tick>)| row.value > best.0.value;
-        match kept {
-            Kept::All => {
+        match arguments.record {
+            RecordChoice::All => {
                 if let Some(recorder) = &mut recorder
                     && let Err(error) = recorder.trial(row, ticks)
                 {
                     failed.get_or_insert(error);
                 }
             }
-            Kept::Best if accepted && best.as_ref().is_none_or(better) => best = Some((row.clone(), ticks.to_vec())),
-            Kept::Best | Kept::None => {}
+            RecordChoice::Best if accepted && best.as_ref().is_none_or(better) => {
+                best = Some((row.clone(), ticks.to_vec()))
+            }
+            RecordChoice::Best | RecordChoice::None => {}
         }
     });
     if let Some(mut recorder) = recorder {
         if let Some((row, ticks)) = &best {
             recorder.trial(row, ticks).map_err(EngineError::from)?;
         }
-        for row in life.rows() {
+        for row in experiment.rows() {
             recorder.row(row).map_err(EngineError::from)?;
         }
         recorder.finish().map_err(EngineError::from)?;
@@ -248,11 +256,11 @@ fn run_one(
         let place = join.map_or_else(|| study.folder.display().to_string(), ToString::to_string);
         return Err(Failure::Other(eyre!("{place}: {refusal}")));
     }
-    printer.finished(study, &life.rows().cloned().collect::<Vec<_>>(), life.best(), &options);
+    printer.finished(study, &experiment.rows().cloned().collect::<Vec<_>>(), experiment.best(), &options);
     Ok(())
 }
 
-/// A recording of trials that ran in simulated time: each follows the last one.
+/// A recording of trials that ran in simulated time, one after the other on the recording's clock.
 struct StudyRecorder {
     writer: Writer,
     time_ns: u64,
@@ -261,8 +269,7 @@ struct StudyRecorder {
 impl StudyRecorder {
     fn create(path: &Path, options: &Options) -> Result<StudyRecorder, EngineError> {
         let info = engine::session_info(options, &path.display().to_string());
-        let mut writer = Writer::create(path, &info, engine::utc_ns(), &engine::attachments(&options.config))?;
-        writer.record(&Stamped { time_ns: 0, record: Record::Session(info) })?;
+        let writer = Writer::create(path, &info, engine::utc_ns(), &engine::attachments(&options.config))?;
         Ok(StudyRecorder { writer, time_ns: 0 })
     }
 

@@ -1,15 +1,15 @@
-//! `quadfrog recover`: a recording that was cut short becomes a whole file of what is left.
+//! `quadfrog recover`: repairs an incomplete recording.
 
 use std::path::PathBuf;
 
 use clap::Args;
 use quadfrog::recording::recover;
 
-use super::Failure;
+use super::failure::Failure;
 
 #[derive(Debug, Args)]
 pub struct RecoverArguments {
-    /// The recording: a session.mcap.part that a killed program left behind, or a damaged session.mcap
+    /// A session.mcap.part left by a killed program, or a damaged session.mcap
     file: PathBuf,
 }
 
@@ -20,6 +20,6 @@ pub fn run(arguments: &RecoverArguments) -> Result<(), Failure> {
         Some(lost) => println!("Lost: {lost}"),
         None => println!("Nothing was lost."),
     }
-    println!("{} is left as it was.", arguments.file.display());
+    println!("{} is unchanged.", arguments.file.display());
     Ok(())
 }

@@ -1,4 +1,4 @@
-//! The console on a recorded session.
+//! `quadfrog replay`: the console on a recorded session.
 
 use std::path::PathBuf;
 
@@ -6,18 +6,18 @@ use clap::Args;
 use quadfrog::config::Config;
 use quadfrog::recording::player::Player;
 use quadfrog::robot::description::RobotDescription;
-use quadfrog_console::app::{self, Ended};
+use quadfrog_console::app::{self, ConsoleExit};
 use quadfrog_console::feed::Feed;
 use quadfrog_console::terminal;
 
-use super::Failure;
 use super::console::{ScreenArguments, options};
+use super::failure::Failure;
 
 #[derive(Debug, Args)]
 pub struct ReplayArguments {
-    /// The recording: a session.mcap, also one that was cut short
+    /// The recording: a session.mcap, complete or incomplete
     file: PathBuf,
-    /// Folder with a console.toml of your own
+    /// Folder with your own console.toml
     #[arg(long, value_name = "DIR")]
     config: Option<PathBuf>,
     #[command(flatten)]
@@ -28,10 +28,10 @@ pub fn run(arguments: &ReplayArguments) -> Result<(), Failure> {
     let config = Config::load(arguments.config.as_deref())?;
     let console = options(&arguments.screen, &config)?;
     let player = Player::open(&arguments.file).map_err(Failure::input)?;
-    // A recording that was cut short is played as far as it goes, but never as if it were whole: the exit status says so.
+    // An incomplete recording is played as far as it goes; the exit status reports the damage.
     let damage = player.damage().map(|damage| {
         let file = arguments.file.display();
-        format!("{damage}; what is left can be played, and quadfrog recover {file} makes a whole file of it")
+        format!("{damage}; the rest can be played; quadfrog recover {file} repairs it")
     });
     terminal::check().map_err(|error| match &damage {
         Some(damage) => Failure::Input(format!("{damage}\n{error}")),
@@ -43,7 +43,7 @@ pub fn run(arguments: &ReplayArguments) -> Result<(), Failure> {
         Err(_) => console,
     };
     match (app::run(Feed::replay(player), console)?, damage) {
-        (Ended::HungUp, _) | (_, None) => Ok(()),
+        (ConsoleExit::HungUp, _) | (_, None) => Ok(()),
         (_, Some(damage)) => Err(Failure::Input(damage)),
     }
 }

@@ -1,4 +1,4 @@
-//! `quadfrog study`: studies as they lie on disk or on a server, ours and those of other Optuna programs.
+//! `quadfrog study`: stored studies, of this program and of other Optuna programs.
 
 use std::collections::HashMap;
 use std::fmt::Write as _;
@@ -8,104 +8,101 @@ use std::path::{Path, PathBuf};
 use clap::{Args, Subcommand, ValueEnum};
 use color_eyre::eyre::{WrapErr, eyre};
 use quadfrog::config::Config;
-use quadfrog::engine::{Opened, newest_config, open_stored, stored_studies, study_files};
+use quadfrog::engine::{Opened, StoredStudy, newest_config, open_stored, stored_studies, study_files, study_name};
 use quadfrog::optimize::exchange::{self, TableTrial};
 use quadfrog::optimize::repeats;
 use quadfrog::optimize::study::Storage;
 use quadfrog::optimize::trial::{Trial, TrialState};
 use quadfrog::report::table;
-use quadfrog::session::experiment;
-use quadfrog::session::experiment::rows_of;
+use quadfrog::session::experiment::{self, rows_of};
 use quadfrog::trial::TrialRecord;
 
-use super::Failure;
-use super::chosen::journal;
+use super::failure::Failure;
+use super::selection::parse_storage;
 
 #[derive(Debug, Args)]
 pub struct StudyCommand {
     #[command(subcommand)]
-    what: What,
+    command: StudySubcommand,
 }
 
 #[derive(Debug, Subcommand)]
-enum What {
-    /// All studies below a folder: task, trials, falls, best
+enum StudySubcommand {
+    /// List all studies below a folder: task, trials, falls, best
     List {
         /// The folder
         #[arg(value_name = "DIR", default_value = "recordings")]
         folder: PathBuf,
     },
-    /// One study: its table and what it was made with
+    /// Show a study: its attributes, parameters and trials
     Show {
         #[command(flatten)]
-        which: Which,
+        study: StudySelector,
     },
-    /// All trials as a table, with the columns of Optuna's trials_dataframe
+    /// Export all trials as a table with the columns of Optuna's trials_dataframe
     Export {
         #[command(flatten)]
-        which: Which,
-        /// The form of the table [default: by the name of the file, else csv]
+        study: StudySelector,
+        /// Format of the table [default: by the file's name, else csv]
         #[arg(long, value_name = "FORM")]
-        format: Option<Format>,
-        /// Where it goes [default: standard output]
+        format: Option<TableFormat>,
+        /// Output file [default: standard output]
         #[arg(long, short, value_name = "FILE")]
         output: Option<PathBuf>,
     },
-    /// Trials of a table, as this program or Optuna's trials_dataframe wrote it, join a study as finished ones
+    /// Add the trials of a table, written by this program or Optuna's trials_dataframe, as finished trials
     Import {
         #[command(flatten)]
-        which: Which,
+        study: StudySelector,
         /// The table
         #[arg(value_name = "FILE")]
         table: PathBuf,
-        /// The form of the table [default: by the name of the file, else csv]
+        /// Format of the table [default: by the file's name, else csv]
         #[arg(long, value_name = "FORM")]
-        format: Option<Format>,
-        /// Queue the points to be run instead; their results are left out
+        format: Option<TableFormat>,
+        /// Queue the points to be run instead; their results are ignored
         #[arg(long)]
         queue: bool,
     },
-    /// The best trial
+    /// Show the best trial
     Best {
         #[command(flatten)]
-        which: Which,
-        /// Write a configuration into this folder whose next study begins with it: quadfrog --config DIR
+        study: StudySelector,
+        /// Write a configuration into this folder with which the next study starts at the best: quadfrog --config DIR
         #[arg(long, value_name = "DIR")]
         config: Option<PathBuf>,
     },
-    /// Queue a point: it is proposed next, also by a session that is running
+    /// Queue a point: it is proposed next, also by a running session
     Enqueue {
         #[command(flatten)]
-        which: Which,
-        /// Parameters; those left out are proposed when it is its turn
+        study: StudySelector,
+        /// Parameters; omitted ones are proposed when the point is run
         #[arg(value_name = "PARAM=VALUE", required = true, value_parser = parse_setting)]
         point: Vec<(String, f64)>,
     },
 }
 
-/// Which study.
 #[derive(Debug, Args)]
-struct Which {
-    /// A study's folder, its study.log, any Optuna journal, or redis://HOST:PORT/DB
+struct StudySelector {
+    /// Folder of a study, its study.log, any Optuna journal, or redis://HOST:PORT/DB
     #[arg(value_name = "STUDY")]
-    study: String,
-    /// Its name, where the journal holds several
+    place: String,
+    /// Name of the study, if the journal holds several
     #[arg(long, value_name = "NAME")]
     name: Option<String>,
 }
 
-/// The form of a table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Format {
+enum TableFormat {
     Csv,
     Json,
 }
 
-impl Format {
-    /// As given, else by the file's name.
-    fn of(given: Option<Format>, file: Option<&Path>) -> Format {
+impl TableFormat {
+    /// Returns the given format, else that of the file's extension.
+    fn of(given: Option<TableFormat>, file: Option<&Path>) -> TableFormat {
         let json = file.is_some_and(|file| file.extension().is_some_and(|extension| extension == "json"));
-        given.unwrap_or(if json { Format::Json } else { Format::Csv })
+        given.unwrap_or(if json { TableFormat::Json } else { TableFormat::Csv })
     }
 }
 
@@ -117,20 +114,20 @@ fn parse_setting(text: &str) -> Result<(String, f64), String> {
 }
 
 pub fn run(command: &StudyCommand) -> Result<(), Failure> {
-    match &command.what {
-        What::List { folder } => list(folder),
-        What::Show { which } => show(which),
-        What::Export { which, format, output } => export(which, *format, output.as_deref()),
-        What::Import { which, table, format, queue } => import(which, table, *format, *queue),
-        What::Best { which, config } => best(which, config.as_deref()),
-        What::Enqueue { which, point } => enqueue(which, point),
+    match &command.command {
+        StudySubcommand::List { folder } => list(folder),
+        StudySubcommand::Show { study } => show(study),
+        StudySubcommand::Export { study, format, output } => export(study, *format, output.as_deref()),
+        StudySubcommand::Import { study, table, format, queue } => import(study, table, *format, *queue),
+        StudySubcommand::Best { study, config } => best(study, config.as_deref()),
+        StudySubcommand::Enqueue { study, point } => enqueue(study, point),
     }
 }
 
-impl Which {
-    /// The configuration that the study ran with last, where its folder has kept it.
+impl StudySelector {
+    /// Returns the last configuration that the study ran with, if its folder holds one, else the built-in one.
     fn config(&self) -> Result<Config, Failure> {
-        let own = match journal(&self.study) {
+        let own = match parse_storage(&self.place) {
             Storage::File(file) => file.parent().and_then(newest_config),
             _ => None,
         };
@@ -138,12 +135,12 @@ impl Which {
     }
 
     fn open(&self) -> Result<Opened, Failure> {
-        Ok(open_stored(&journal(&self.study), self.name.as_deref(), &self.config()?)?)
+        Ok(open_stored(&parse_storage(&self.place), self.name.as_deref(), &self.config()?)?)
     }
 }
 
-/// Text on standard output; a reader that has gone away (`| head`) wants no more.
-fn say(text: &str) -> Result<(), Failure> {
+/// Prints a text; a closed pipe (`| head`) is no error.
+fn print(text: &str) -> Result<(), Failure> {
     let mut output = std::io::stdout();
     match output.write_all(text.as_bytes()).and_then(|()| output.flush()) {
         Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
@@ -157,41 +154,22 @@ fn list(folder: &Path) -> Result<(), Failure> {
     let files = study_files(folder)
         .map_err(|error| Failure::input(format!("{}: {error}; give a folder that holds studies", folder.display())))?;
     if files.is_empty() {
-        return say(&format!("There is no study in {}\n", folder.display()));
+        return print(&format!("There is no study in {}\n", folder.display()));
     }
     let mut rows = vec![["study", "task", "seed", "trials", "counted", "falls", "best"].map(str::to_owned)];
     for file in &files {
-        let place = file.parent().unwrap_or(file).display().to_string();
-        // One study that cannot be read does not hide the others.
-        match stored_studies(&Storage::File(file.clone())) {
-            Err(error) => eprintln!("quadfrog: {error}"),
-            Ok(studies) => {
-                for stored in studies {
-                    let which = Which {
-                        study: file.display().to_string(),
-                        name: Some(quadfrog::engine::study_name(stored.task, stored.seed)),
-                    };
-                    match which.open() {
-                        Err(Failure::Input(message)) => eprintln!("quadfrog: {message}"),
-                        Err(other) => return Err(other),
-                        Ok(opened) => {
-                            let trials = opened.study.trials();
-                            let counted = trials.iter().filter(|t| t.state == TrialState::Complete).count();
-                            let falls = trials.iter().filter(|t| t.is_fall()).count();
-                            let best = best_of(&opened).and_then(|trial| trial.value);
-                            let best = best.map_or("-".to_owned(), |best| format!("{best:.3} {}", opened.unit()));
-                            rows.push([
-                                place.clone(),
-                                stored.task.name().to_owned(),
-                                stored.seed.to_string(),
-                                trials.len().to_string(),
-                                counted.to_string(),
-                                falls.to_string(),
-                                best,
-                            ]);
-                        }
-                    }
-                }
+        // A study that cannot be read is reported, and the others are listed.
+        let studies = match stored_studies(&Storage::File(file.clone())) {
+            Ok(studies) => studies,
+            Err(error) => {
+                eprintln!("quadfrog: {error}");
+                continue;
+            }
+        };
+        for stored in studies {
+            match list_row(file, &stored) {
+                Err(failure @ Failure::Input(_)) => failure.print(),
+                row => rows.push(row?),
             }
         }
     }
@@ -205,23 +183,40 @@ fn list(folder: &Path) -> Result<(), Failure> {
         };
         let _ = writeln!(text, "{}", row.iter().enumerate().map(cell).collect::<Vec<_>>().join("  ").trim_end());
     }
-    say(&text)
+    print(&text)
 }
 
-/// The best trial that the robot stood through.
-fn best_of(opened: &Opened) -> Option<&Trial> {
-    // As everywhere: a repeated point is worth the mean of its repeats.
+fn list_row(file: &Path, stored: &StoredStudy) -> Result<[String; 7], Failure> {
+    let name = Some(study_name(stored.task, stored.seed));
+    let opened = StudySelector { place: file.display().to_string(), name }.open()?;
+    let trials = opened.study.trials();
+    let counted = trials.iter().filter(|trial| trial.state == TrialState::Complete).count();
+    let falls = trials.iter().filter(|trial| trial.is_fall()).count();
+    let best = best_trial(&opened).and_then(|trial| trial.value);
+    Ok([
+        file.parent().unwrap_or(file).display().to_string(),
+        stored.task.name().to_owned(),
+        stored.seed.to_string(),
+        trials.len().to_string(),
+        counted.to_string(),
+        falls.to_string(),
+        best.map_or("-".to_owned(), |best| format!("{best:.3} {}", opened.unit())),
+    ])
+}
+
+/// Returns the first landed trial of the point with the best mean over its repeats.
+fn best_trial(opened: &Opened) -> Option<&Trial> {
     let best_first = repeats::contenders(opened.study.trials(), opened.study.options().direction, usize::MAX);
     let best = best_first.iter().find(|point| point.stood > 0)?;
-    let standing = |trial: &&Trial| best.trials.contains(&trial.number) && !trial.is_fall();
-    opened.study.trials().iter().find(standing)
+    let landed = |trial: &&Trial| best.trials.contains(&trial.number) && !trial.is_fall();
+    opened.study.trials().iter().find(landed)
 }
 
-fn show(which: &Which) -> Result<(), Failure> {
-    let opened = which.open()?;
+fn show(selector: &StudySelector) -> Result<(), Failure> {
+    let opened = selector.open()?;
     let Opened { study, ours, parameters } = &opened;
     let mut text = String::new();
-    let _ = writeln!(text, "{} in {}", study.options().name, journal(&which.study));
+    let _ = writeln!(text, "{} in {}", study.options().name, parse_storage(&selector.place));
     for (name, value) in study.attributes() {
         let value = value.as_str().map_or_else(|| value.to_string(), str::to_owned);
         let _ = writeln!(text, "  {name}: {value}");
@@ -240,7 +235,7 @@ fn show(which: &Which) -> Result<(), Failure> {
         let trials: Vec<String> = point.trials.iter().map(u32::to_string).collect();
         let _ = writeln!(
             text,
-            "Trials {} are one point: stood {}/{}, mean {:.3} {unit}, deviation {:.3}",
+            "Trials {} are one point: landed {}/{}, mean {:.3} {unit}, std {:.3}",
             trials.join(", "),
             point.stood,
             point.repeats(),
@@ -254,11 +249,11 @@ fn show(which: &Which) -> Result<(), Failure> {
         let _ = writeln!(text, "{running} running, {waiting} queued");
     }
     text += &best_line(&opened, &rows);
-    say(&text)
+    print(&text)
 }
 
 fn best_line(opened: &Opened, rows: &[TrialRecord]) -> String {
-    let best = best_of(opened).and_then(|best| rows.iter().find(|row| row.trial == best.number));
+    let best = best_trial(opened).and_then(|best| rows.iter().find(|row| row.trial == best.number));
     let units: HashMap<String, String> =
         opened.parameters.iter().map(|parameter| (parameter.name.clone(), parameter.unit.clone())).collect();
     match best {
@@ -267,84 +262,83 @@ fn best_line(opened: &Opened, rows: &[TrialRecord]) -> String {
     }
 }
 
-fn export(which: &Which, format: Option<Format>, output: Option<&Path>) -> Result<(), Failure> {
-    let opened = which.open()?;
+fn export(selector: &StudySelector, format: Option<TableFormat>, output: Option<&Path>) -> Result<(), Failure> {
+    let opened = selector.open()?;
     let note = |number| opened.study.note_of(number);
-    let text = match Format::of(format, output) {
-        Format::Csv => exchange::to_csv(opened.study.trials(), note),
-        Format::Json => exchange::to_json(opened.study.trials(), note),
+    let text = match TableFormat::of(format, output) {
+        TableFormat::Csv => exchange::to_csv(opened.study.trials(), note),
+        TableFormat::Json => exchange::to_json(opened.study.trials(), note),
     };
     match output {
-        None => say(&text),
+        None => print(&text),
         Some(path) => std::fs::write(path, text)
             .wrap_err_with(|| format!("{}: cannot be written", path.display()))
             .map_err(Failure::Other),
     }
 }
 
-fn import(which: &Which, table: &Path, format: Option<Format>, queue: bool) -> Result<(), Failure> {
-    let wrong = |error: &dyn std::fmt::Display| Failure::input(format!("{}: {error}", table.display()));
-    let text = std::fs::read_to_string(table).map_err(|error| wrong(&error))?;
-    let trials = match Format::of(format, Some(table)) {
-        Format::Csv => exchange::from_csv(&text),
-        Format::Json => exchange::from_json(&text),
+fn import(selector: &StudySelector, table: &Path, format: Option<TableFormat>, queue: bool) -> Result<(), Failure> {
+    let refuse = |error: &dyn std::fmt::Display| Failure::input(format!("{}: {error}", table.display()));
+    let text = std::fs::read_to_string(table).map_err(|error| refuse(&error))?;
+    let trials = match TableFormat::of(format, Some(table)) {
+        TableFormat::Csv => exchange::from_csv(&text),
+        TableFormat::Json => exchange::from_json(&text),
     }
-    .map_err(|error| wrong(&error))?;
-    let mut study = which.open()?.study;
+    .map_err(|error| refuse(&error))?;
+    let mut study = selector.open()?.study;
     let (finished, unfinished): (Vec<TableTrial>, Vec<TableTrial>) =
         trials.into_iter().partition(|trial| trial.state.is_finished());
     if !queue {
         let given = finished.len();
-        let added = experiment::import(&mut study, finished).map_err(|error| wrong(&error))?.len();
+        let added = experiment::import(&mut study, finished).map_err(|error| refuse(&error))?.len();
         let known = match given - added {
             0 => String::new(),
-            known => format!("; {known} were there already, with the same parameters, value and times"),
+            known => format!("; {known} were there already (same parameters, value and times)"),
         };
-        let left = if unfinished.is_empty() {
+        let ignored = if unfinished.is_empty() {
             String::new()
         } else {
-            format!("; {} that had not finished are left out, --queue queues them", unfinished.len())
+            format!("; {} unfinished trials are ignored, --queue queues them", unfinished.len())
         };
-        return say(&format!("{added} trials are in the study now{known}{left}\n"));
+        return print(&format!("{added} trials imported{known}{ignored}\n"));
     }
     let points: Vec<TableTrial> = finished.into_iter().chain(unfinished).collect();
-    // All or none: looked at before the first is queued.
+    // All or none: every point is checked before the first is queued.
     for point in &points {
-        study.check_point(&point.parameters).map_err(|error| wrong(&error))?;
+        study.check_point(&point.parameters).map_err(|error| refuse(&error))?;
     }
     for point in &points {
         study.enqueue(&point.parameters, &[])?;
     }
-    say(&format!("{} points are queued\n", points.len()))
+    print(&format!("{} points are queued\n", points.len()))
 }
 
-fn best(which: &Which, config: Option<&Path>) -> Result<(), Failure> {
-    let opened = which.open()?;
+fn best(selector: &StudySelector, config: Option<&Path>) -> Result<(), Failure> {
+    let opened = selector.open()?;
     let rows = rows_of(&opened.study, &opened.parameters);
     let Some(folder) = config else {
-        return say(&best_line(&opened, &rows));
+        return print(&best_line(&opened, &rows));
     };
-    let best = best_of(&opened).and_then(|best| rows.iter().find(|row| row.trial == best.number));
+    let best = best_trial(&opened).and_then(|best| rows.iter().find(|row| row.trial == best.number));
     let (Some(best), Some(ours)) = (best, &opened.ours) else {
-        return Err(Failure::input(format!("{}: no accepted trial of this program to write", which.study)));
+        return Err(Failure::input(format!("{}: no accepted trial of this program to export", selector.place)));
     };
-    which.config()?.export(folder, ours.task, &best.parameters, &best.gains)?;
+    selector.config()?.export(folder, ours.task, &best.parameters, &best.gains)?;
     let text = best_line(&opened, &rows);
-    say(&format!(
-        "{text}Begin a new study with it:  quadfrog --task {} --config {}\n",
+    print(&format!(
+        "{text}Start a new study with it:  quadfrog --task {} --config {}\n",
         ours.task.name(),
         folder.display()
     ))
 }
 
-fn enqueue(which: &Which, point: &[(String, f64)]) -> Result<(), Failure> {
-    if let Some((name, _)) =
-        point.iter().enumerate().find(|(i, (name, _))| point[..*i].iter().any(|(n, _)| n == name)).map(|(_, p)| p)
-    {
+fn enqueue(selector: &StudySelector, point: &[(String, f64)]) -> Result<(), Failure> {
+    let duplicate = |(i, (name, _)): &(usize, &(String, f64))| point[..*i].iter().any(|(earlier, _)| earlier == name);
+    if let Some((_, (name, _))) = point.iter().enumerate().find(duplicate) {
         return Err(Failure::input(format!("{name} is given twice")));
     }
-    let mut study = which.open()?.study;
+    let mut study = selector.open()?.study;
     study.check_point(point)?;
     let number = study.enqueue(point, &[])?;
-    say(&format!("Queued as trial {number}\n"))
+    print(&format!("Queued as trial {number}\n"))
 }

@@ -1,4 +1,4 @@
-//! Playing a recording at a speed, step by step, from marker to marker.
+//! Playback of a recording: speeds, single steps, jumps between markers.
 
 use std::collections::VecDeque;
 
@@ -6,37 +6,36 @@ use quadfrog::recording::player::{Played, Player};
 use quadfrog::recording::record::{Record, Stamped};
 use quadfrog::telemetry::{Counters, Snapshot};
 
-use crate::model::ReplayStatus;
-use crate::update::{Msg, ReplayCommand};
+use crate::message::{Msg, ReplayCommand, ReplayStatus};
 
-/// One tick in so many reaches the charts: 200 a second, as live.
+/// Ticks per tick of the charts: 200 per second, as live.
 const SHOWN_EVERY: u64 = quadfrog::realtime::channel::SHOWN_EVERY;
-/// Ticks are 1 ms apart; a step moves by one tick of the charts.
+/// Length of a single step: one tick of the charts.
 const STEP_NS: u64 = SHOWN_EVERY * 1_000_000;
-/// Charts are filled with this much of the past after a jump, ns.
+/// Length of the past that fills the charts after a jump.
 const PAST_NS: u64 = 8_000_000_000;
-/// Speeds that can be chosen.
+/// Speeds relative to the recording.
 const SPEEDS: [f64; 9] = [0.0625, 0.125, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0];
 
-/// A recording being played.
-pub struct Replay {
+/// A recording during playback.
+pub struct ReplayFeed {
     player: Player,
     file: String,
     playing: bool,
-    /// Index of the speed.
+    /// Index in [`SPEEDS`].
     speed: usize,
     time_ns: u64,
-    /// Read, but later than the present.
+    /// Items read that are later than `time_ns`.
     next: VecDeque<Played>,
     snapshot: Snapshot,
-    /// Messages that a jump has brought, not yet taken.
+    /// Messages of a jump or a step that were not taken yet.
     jumped: Vec<Msg>,
 }
 
-impl Replay {
-    /// From the start, playing.
-    pub fn new(player: Player) -> Replay {
-        let mut replay = Replay {
+impl ReplayFeed {
+    /// Starts playback at the beginning.
+    pub fn new(player: Player) -> ReplayFeed {
+        let mut replay = ReplayFeed {
             file: player.session().recording.clone(),
             player,
             playing: true,
@@ -50,7 +49,7 @@ impl Replay {
         replay
     }
 
-    /// Moves as the operator wants.
+    /// Executes a command of the operator.
     pub fn command(&mut self, command: ReplayCommand) {
         match command {
             ReplayCommand::PlayPause => {
@@ -65,9 +64,9 @@ impl Replay {
             ReplayCommand::Faster => self.speed = (self.speed + 1).min(SPEEDS.len() - 1),
             ReplayCommand::StepForward => {
                 self.playing = false;
-                let mut news = Vec::new();
-                self.advance(STEP_NS, &mut news);
-                self.jumped.extend(news);
+                let mut messages = Vec::new();
+                self.advance(STEP_NS, &mut messages);
+                self.jumped.extend(messages);
             }
             ReplayCommand::StepBack => {
                 self.playing = false;
@@ -78,7 +77,7 @@ impl Replay {
                 self.jump(next.unwrap_or(self.player.duration_ns()));
             }
             ReplayCommand::PreviousMarker => {
-                // While it plays, the marker just passed is not the one that is meant.
+                // During playback a marker passed less than 1 s ago is skipped.
                 let before = self.time_ns.saturating_sub(if self.playing { 1_000_000_000 } else { 0 });
                 let markers = self.player.markers().iter().rev();
                 let previous = markers.map(|marker| marker.time_ns).find(|time| *time < before);
@@ -87,17 +86,17 @@ impl Replay {
         }
     }
 
-    /// What `elapsed_ns` of the operator's time brings.
-    pub fn take(&mut self, elapsed_ns: u64, news: &mut Vec<Msg>) {
-        news.append(&mut self.jumped);
+    /// Appends the messages of `elapsed_ns` of real time.
+    pub fn take(&mut self, elapsed_ns: u64, messages: &mut Vec<Msg>) {
+        messages.append(&mut self.jumped);
         if self.playing {
-            self.advance((elapsed_ns as f64 * SPEEDS[self.speed]) as u64, news);
+            self.advance((elapsed_ns as f64 * SPEEDS[self.speed]) as u64, messages);
             if self.time_ns >= self.player.duration_ns() {
                 self.playing = false;
             }
         }
-        news.push(Msg::Snapshot(Box::new(self.snapshot)));
-        news.push(Msg::Replay(ReplayStatus {
+        messages.push(Msg::Snapshot(Box::new(self.snapshot)));
+        messages.push(Msg::Replay(ReplayStatus {
             file: self.file.clone(),
             playing: self.playing,
             speed: SPEEDS[self.speed],
@@ -106,8 +105,8 @@ impl Replay {
         }));
     }
 
-    /// Plays up to a later time.
-    fn advance(&mut self, by_ns: u64, news: &mut Vec<Msg>) {
+    /// Plays the next `by_ns` of the recording.
+    fn advance(&mut self, by_ns: u64, messages: &mut Vec<Msg>) {
         self.time_ns = (self.time_ns + by_ns).min(self.player.duration_ns());
         loop {
             let played = match self.next.pop_front().or_else(|| self.player.next()) {
@@ -118,42 +117,42 @@ impl Replay {
                 }
                 None => return,
             };
-            self.show(played, news);
+            self.show(played, messages);
         }
     }
 
-    fn show(&mut self, played: Played, news: &mut Vec<Msg>) {
+    fn show(&mut self, played: Played, messages: &mut Vec<Msg>) {
         match played {
             Played::Tick(tick) => {
                 self.snapshot.tick = tick;
                 if tick.number % SHOWN_EVERY == 0 {
-                    news.push(Msg::Tick(Box::new(tick)));
+                    messages.push(Msg::Tick(Box::new(tick)));
                 }
             }
             Played::Record(stamped) => {
                 if let Record::Counters(counters) = stamped.record {
                     self.snapshot.counters = counters;
                 }
-                news.push(Msg::Record(stamped));
+                messages.push(Msg::Record(stamped));
             }
         }
     }
 
-    /// Goes to a time: the state of the session then, and the seconds before it for the charts.
+    /// Jumps to a time: replays all events before it, and the ticks of the last seconds for the charts.
     fn jump(&mut self, time_ns: u64) {
         let time_ns = time_ns.min(self.player.duration_ns());
         let from_ns = time_ns.saturating_sub(PAST_NS);
-        let mut news = vec![Msg::Rewound];
-        news.extend(self.log_until(from_ns).map(Msg::Record));
+        let mut messages = vec![Msg::Rewound];
+        messages.extend(self.log_until(from_ns).map(Msg::Record));
         self.snapshot.counters = Counters::default();
         self.next.clear();
         self.player.seek(from_ns);
         self.time_ns = from_ns;
-        self.advance(time_ns - from_ns, &mut news);
-        self.jumped = news;
+        self.advance(time_ns - from_ns, &mut messages);
+        self.jumped = messages;
     }
 
-    /// All events before a time: what the model holds of the session is their fold.
+    /// Returns all events before a time; the model of the session is folded from them.
     fn log_until(&self, time_ns: u64) -> impl Iterator<Item = Stamped> + '_ {
         self.player.events().iter().take_while(move |event| event.time_ns < time_ns).cloned()
     }

@@ -1,30 +1,17 @@
-//! The mouse, where it is on: it chooses and scrolls. It never commands the robot: a click is too easily made by accident.
+//! The mouse: it selects and scrolls. It never commands the robot, since an accidental click is too easy.
+
+use ratatui::layout::Size;
 
 use super::navigate::move_by;
-use super::{Effect, perform};
+use super::perform::perform;
+use crate::layout::{Areas, areas, first_row, tab_at, trial_rows};
+use crate::message::{Effect, Mouse};
 use crate::model::{Model, View};
-use crate::view::{self, frame, trials};
 
 /// Rows that one notch of the wheel moves by.
 const NOTCH: isize = 3;
 
-/// One use of the mouse; columns and rows count from 0 at the upper left.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Mouse {
-    /// The left button was pressed.
-    Click {
-        /// Column.
-        column: u16,
-        /// Row.
-        row: u16,
-    },
-    /// The wheel was turned away from the operator.
-    WheelUp,
-    /// The wheel was turned towards the operator.
-    WheelDown,
-}
-
-/// What a use of the mouse does.
+/// Handles mouse input.
 pub(super) fn take(model: &mut Model, event: Mouse) -> Vec<Effect> {
     if !model.mouse || model.dialog.is_some() {
         return Vec::new();
@@ -32,16 +19,27 @@ pub(super) fn take(model: &mut Model, event: Mouse) -> Vec<Effect> {
     match event {
         Mouse::WheelUp => move_by(model, -NOTCH),
         Mouse::WheelDown => move_by(model, NOTCH),
-        Mouse::Click { column, row } if row == view::TABS_ROW => match frame::tab_at(model, column) {
-            Some(action) => perform(model, action),
-            None => Vec::new(),
-        },
-        Mouse::Click { row, .. } if model.view == View::Trials => {
-            if let Some(trial) = trials::trial_at(model, row) {
-                model.trials_view.selected = Some(trial);
+        Mouse::Click { column, row } => {
+            let Some(areas) = areas(Size::from(model.size)) else { return Vec::new() };
+            if row == areas.tabs.y {
+                return tab_at(&model.keymap, column).map_or_else(Vec::new, |action| perform(model, action));
+            }
+            if let Some(trial) = trial_at(model, &areas, row) {
+                model.trial_table.selected = Some(trial);
             }
             Vec::new()
         }
-        Mouse::Click { .. } => Vec::new(),
     }
+}
+
+/// The trial that the view Trials shows in a row of the terminal.
+fn trial_at(model: &Model, areas: &Areas, row: u16) -> Option<u32> {
+    let place = trial_rows(areas.body);
+    if model.view != View::Trials || !(place.top()..place.bottom()).contains(&row) {
+        return None;
+    }
+    let rows = model.trial_rows();
+    let selected = model.selected_trial().and_then(|trial| rows.iter().position(|row| row.trial == trial.trial));
+    let first = first_row(rows.len(), selected, usize::from(place.height));
+    rows.get(first + usize::from(row - place.top())).map(|trial| trial.trial)
 }

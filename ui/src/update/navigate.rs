@@ -1,13 +1,18 @@
-//! Moving about: rows, pages, the charts' cursor, freezing, zooming, ghosts, sorting and filtering.
+//! Movement within the views: rows, pages, the charts' cursor, freezing, zooming, ghosts, sorting and filtering.
 
 use quadfrog::recording::record::LogLevel;
 use quadfrog::trial::Verdict;
 
-use super::{Effect, say};
+use strum::VariantArray;
+
+use super::answer::say;
 use crate::action::Action;
-use crate::column::{Column, SortBy};
-use crate::comparison::Comparison;
-use crate::model::{Model, Panel, View};
+use crate::column::Column;
+use crate::message::Effect;
+use crate::model::comparison::Comparison;
+use crate::model::live::Panel;
+use crate::model::trials::SortBy;
+use crate::model::{Model, View};
 use crate::series::Series;
 use crate::settings::ChartMode;
 
@@ -15,16 +20,16 @@ use crate::settings::ChartMode;
 pub(super) fn move_by(model: &mut Model, step: isize) -> Vec<Effect> {
     match model.view {
         View::Trials | View::Live => {
-            let rows: Vec<u32> = model.table().iter().map(|trial| trial.trial).collect();
+            let rows: Vec<u32> = model.trial_rows().iter().map(|trial| trial.trial).collect();
             let Some(last) = rows.len().checked_sub(1) else { return Vec::new() };
-            let at = model.trials_view.selected.and_then(|n| rows.iter().position(|row| *row == n)).unwrap_or(last);
+            let at = model.trial_table.selected.and_then(|n| rows.iter().position(|row| *row == n)).unwrap_or(last);
             let to = at.saturating_add_signed(step).min(last);
-            // Standing on the newest row follows it.
-            let follow = to == last && model.trials_view.sort == SortBy::Number && !model.trials_view.reversed;
-            model.trials_view.selected = if follow { None } else { Some(rows[to]) };
+            // The newest row is followed.
+            let follow = to == last && model.trial_table.sort == SortBy::Number && !model.trial_table.reversed;
+            model.trial_table.selected = if follow { None } else { Some(rows[to]) };
         }
         View::Log => {
-            let last = model.log_lines().count().saturating_sub(1);
+            let last = model.log_view.lines(&model.session.log).count().saturating_sub(1);
             model.log_view.back = match step {
                 isize::MIN => last,
                 isize::MAX => 0,
@@ -32,7 +37,7 @@ pub(super) fn move_by(model: &mut Model, step: isize) -> Vec<Effect> {
             };
         }
         View::Override => {
-            let rows = model.session.parameters.len() + model.session.gains.len();
+            let rows = model.session.info.parameters.len() + model.session.info.gains.len();
             let last = rows.saturating_sub(1);
             model.override_row = model.override_row.saturating_add_signed(step).min(last);
         }
@@ -90,7 +95,7 @@ pub(super) fn ghost(model: &mut Model) -> Vec<Effect> {
             first_ghost(model, chosen)
         }
         (_, None, false) => {
-            let best = model.best().map(|trial| trial.trial);
+            let best = model.session.trials.best().map(|trial| trial.trial);
             first_ghost(model, best)
         }
         _ => no_ghost(model),
@@ -111,8 +116,15 @@ fn first_ghost(model: &mut Model, trial: Option<u32>) -> String {
         Some(trial) => {
             format!("trial {trial} is laid under the charts of a jump; a second one in Trials compares the two")
         }
-        None => "no trace of that trial: this console did not see its jump".to_owned(),
+        None => match trial {
+            Some(trial) => no_signals(trial),
+            None => "no trial was accepted yet".to_owned(),
+        },
     }
+}
+
+fn no_signals(trial: u32) -> String {
+    format!("no recorded signals for trial {trial}")
 }
 
 fn second_ghost(model: &mut Model, a: u32) -> String {
@@ -123,7 +135,7 @@ fn second_ghost(model: &mut Model, a: u32) -> String {
             let live = model.keymap.key(Action::LiveView);
             format!("A is trial {a}, B is trial {b}: {live} shows both in Live")
         }
-        None => format!("no trace of trial {b}: this console did not see its jump"),
+        None => no_signals(b),
     }
 }
 
@@ -149,20 +161,20 @@ pub(super) fn next_mode(model: &mut Model) -> Vec<Effect> {
 
 /// Sorts by the next shown column: number, value and verdict first, then the others from left to right.
 pub(super) fn next_sort(model: &mut Model) -> Vec<Effect> {
-    let view = &model.trials_view;
+    let view = &model.trial_table;
     let mut orders = vec![SortBy::Number];
     let shown = |column: &Column| view.columns.contains(column);
     let first = [Column::Value, Column::Verdict];
     orders.extend(first.into_iter().filter(shown).map(SortBy::Column));
-    for column in Column::ALL.into_iter().filter(shown).filter(|column| !first.contains(column)) {
+    for column in Column::VARIANTS.iter().copied().filter(shown).filter(|column| !first.contains(column)) {
         match column {
-            Column::Parameters => orders.extend((0..model.session.parameters.len()).map(SortBy::Parameter)),
+            Column::Parameters => orders.extend((0..model.session.info.parameters.len()).map(SortBy::Parameter)),
             column => orders.push(SortBy::Column(column)),
         }
     }
     let at = orders.iter().position(|order| *order == view.sort).unwrap_or(0);
-    model.trials_view.sort = orders[(at + 1) % orders.len()];
-    model.trials_view.reversed = false;
+    model.trial_table.sort = orders[(at + 1) % orders.len()];
+    model.trial_table.reversed = false;
     Vec::new()
 }
 
@@ -177,7 +189,7 @@ pub(super) fn filter(model: &mut Model) -> Vec<Effect> {
             };
         }
         _ => {
-            model.trials_view.filter = match model.trials_view.filter {
+            model.trial_table.filter = match model.trial_table.filter {
                 None => Some(Verdict::Accept),
                 Some(Verdict::Accept) => Some(Verdict::Fall),
                 Some(Verdict::Fall) => Some(Verdict::Void),

@@ -1,31 +1,36 @@
-//! What a record of the session changes on the screen: rows, the log, the answer to the operator, the bell.
+//! The fold of the session's records: rows, the log, the answer to the operator, the bell.
 
 use quadfrog::recording::record::{LogLevel, Record, RequestRecord, StageRecord, Stamped};
 use quadfrog::telemetry::Mode;
 use quadfrog::trial::{ExperimentStage, ProposalSource, TrialRecord, Verdict};
 
-use super::{Effect, say};
+use super::answer::say;
 use crate::action::Action;
-use crate::dialog::Dialog;
-use crate::model::{LOG_LINES, LogLine, Model, RunTime};
+use crate::legal::legal;
+use crate::message::Effect;
+use crate::model::Model;
+use crate::model::dialog::Dialog;
+use crate::model::log::LogLine;
+use crate::model::trials::RunTime;
 use crate::settings::BellCause;
 
-/// An approval holds for the card that was on the screen and while the robot stands; anything else closes the question.
+/// Closes a question that no longer applies: an approval holds for the shown revision and while the robot stands.
 pub(super) fn close_stale_dialog(model: &mut Model) {
     let stale = match &model.dialog {
         Some(Dialog::Approve { trial, revision, .. }) => {
-            let on_table = model.proposal.as_ref().map(|p| (p.trial, p.revision));
-            on_table != Some((*trial, *revision)) || Action::Approve.legal(model).is_err()
+            let shown = model.session.proposal.as_ref().map(|p| (p.trial, p.revision));
+            shown != Some((*trial, *revision)) || legal(Action::Approve, model).is_err()
         }
-        Some(Dialog::Arm { .. }) => Action::Arm.legal(model).is_err(),
+        Some(Dialog::Arm { .. }) => legal(Action::Arm, model).is_err(),
         Some(Dialog::Override(form)) => {
-            model.proposal.as_ref().is_none_or(|p| p.trial != form.trial) || Action::Override.legal(model).is_err()
+            model.session.proposal.as_ref().is_none_or(|p| p.trial != form.trial)
+                || legal(Action::Override, model).is_err()
         }
         _ => false,
     };
     if stale {
         model.dialog = None;
-        say(model, LogLevel::Warning, "the question was closed: the situation has changed".to_owned());
+        say(model, LogLevel::Warning, "the question was closed: the situation has changed");
     }
 }
 
@@ -36,9 +41,14 @@ pub(super) fn take(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
         Record::Session(info) => {
             let text = format!(
                 "{} on {} ({}), {} {}, seed {}",
-                info.task, info.robot, info.backend, info.sampler, info.version, info.seed
+                info.task_name(),
+                info.robot,
+                info.backend_name(),
+                info.sampler_name(),
+                info.version,
+                info.seed
             );
-            model.session = info;
+            model.session.info = info;
             log(model, time_ns, LogLevel::Info, "session", text, false);
         }
         Record::Transition(change) => {
@@ -49,11 +59,11 @@ pub(super) fn take(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
                 _ => LogLevel::Info,
             };
             if stopped {
-                model.stopped_because = change.cause.clone();
-                // The key that stopped has been answered already.
-                if change.cause != "STOP"
-                    || !model.message.as_ref().is_some_and(|message| message.text.starts_with("STOP"))
-                {
+                model.session.stopped_because = change.cause.clone();
+                // The STOP key was answered already.
+                let answered = change.cause == "STOP"
+                    && model.message.as_ref().is_some_and(|message| message.text.starts_with("STOP"));
+                if !answered {
                     say(model, level, format!("{}: {}", change.to.name(), change.cause));
                 }
             }
@@ -64,8 +74,9 @@ pub(super) fn take(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
             log(model, time_ns, level, "mode", text, change.to == Mode::Fault);
         }
         Record::Stage(info) => {
-            let entered = model.stage.is_none_or(|before| (before.stage, before.trial) != (info.stage, info.trial));
-            model.stage = Some(info);
+            let entered =
+                model.session.stage.is_none_or(|before| (before.stage, before.trial) != (info.stage, info.trial));
+            model.session.stage = Some(info);
             if entered {
                 note_time(model, info, time_ns);
                 match info.stage {
@@ -76,9 +87,9 @@ pub(super) fn take(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
                     }
                     ExperimentStage::Running => {}
                     ExperimentStage::Finished => {
-                        let best = model.best().and_then(|best| Some((best.trial, best.value?)));
+                        let best = model.session.trials.best().and_then(|best| Some((best.trial, best.value?)));
                         let best = best.map_or("no trial was accepted".to_owned(), |(trial, value)| {
-                            format!("the best is trial {trial}, J = {value:.3} {}", model.session.unit)
+                            format!("the best is trial {trial}, J = {value:.3} {}", model.session.info.unit)
                         });
                         let text = format!("the study is finished: {best}");
                         say(model, LogLevel::Info, text.clone());
@@ -92,7 +103,7 @@ pub(super) fn take(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
                 proposal.parameters.iter().map(|p| format!("{} {:.4}", p.name, p.value)).collect();
             let text = format!("trial {} ({}): {}", proposal.trial, proposal.source.name(), values.join(", "));
             log(model, time_ns, LogLevel::Info, "proposal", text, proposal.revision == 0);
-            model.proposal = Some(proposal);
+            model.session.proposal = Some(proposal);
         }
         Record::Trial(trial) => {
             if trial.verdict.is_none() && trial.suggested == Some(Verdict::Fall) {
@@ -100,8 +111,8 @@ pub(super) fn take(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
             }
             log_trial(model, time_ns, &trial);
             let number = trial.trial;
-            model.trials.insert(number, trial);
-            if model.under_review().is_some_and(|trial| trial.trial == number && trial.hand_value.is_none()) {
+            model.session.trials.records.insert(number, trial);
+            if model.session.under_review().is_some_and(|trial| trial.trial == number && trial.hand_value.is_none()) {
                 say_suggestion(model, number);
             }
         }
@@ -113,10 +124,10 @@ pub(super) fn take(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
             }
             log(model, time_ns, line.level, &line.source, line.message, false);
         }
-        Record::ArmingChecks(list) => model.pre_arm = list,
-        Record::Search(search) => model.search = Some(search),
-        Record::Insight(insight) => model.insight = Some(insight),
-        Record::Points(points) => model.points = points,
+        Record::ArmingChecks(list) => model.session.arming_checks = list,
+        Record::Search(search) => model.session.search = Some(search),
+        Record::Insight(insight) => model.session.insight = Some(insight),
+        Record::Points(points) => model.session.trials.points = points,
         Record::FaultTicks(ticks) => {
             let text = format!("the last {} ticks before the fault are in the recording", ticks.len());
             log(model, time_ns, LogLevel::Error, "control", text, false);
@@ -127,14 +138,14 @@ pub(super) fn take(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
     if rings { vec![Effect::Bell] } else { Vec::new() }
 }
 
-/// Keeps when a trial began and ended.
+/// Keeps the run time of a trial.
 fn note_time(model: &mut Model, info: StageRecord, time_ns: u64) {
     match info.stage {
         ExperimentStage::Running => {
-            model.ran.insert(info.trial, RunTime { begun_ns: time_ns, ended_ns: None });
+            model.session.trials.ran.insert(info.trial, RunTime { begun_ns: time_ns, ended_ns: None });
         }
         ExperimentStage::Review => {
-            if let Some(ran) = model.ran.get_mut(&info.trial) {
+            if let Some(ran) = model.session.trials.ran.get_mut(&info.trial) {
                 ran.ended_ns.get_or_insert(time_ns);
             }
         }
@@ -142,12 +153,12 @@ fn note_time(model: &mut Model, info: StageRecord, time_ns: u64) {
     }
 }
 
-/// What the rules think of the trial under review; its row and its stage come in either order.
+/// Reports the suggested verdict of the trial under review; its row and its stage come in either order.
 fn say_suggestion(model: &mut Model, trial: u32) {
-    let Some(row) = model.trials.get(&trial).filter(|row| row.verdict.is_none()) else { return };
+    let Some(row) = model.session.trials.records.get(&trial).filter(|row| row.verdict.is_none()) else { return };
     let Some(suggested) = row.suggested else { return };
     let level = if suggested == Verdict::Accept { LogLevel::Info } else { LogLevel::Warning };
-    let text = format!("trial #{trial} looks like {}: {}", suggested.name(), row.cause);
+    let text = format!("trial #{trial}, suggested verdict: {} ({})", suggested.name(), row.cause);
     say(model, level, text);
 }
 
@@ -161,13 +172,13 @@ fn answer(model: &mut Model, time_ns: u64, command: RequestRecord) {
     log(model, time_ns, level, "operator", text, false);
 }
 
-/// A line where a trial's verdict or suggestion is new; rows repeat for other reasons too.
+/// Logs a new verdict or suggestion; rows are also repeated for other reasons.
 fn log_trial(model: &mut Model, time_ns: u64, trial: &TrialRecord) {
-    let before = model.trials.get(&trial.trial);
+    let before = model.session.trials.records.get(&trial.trial);
     let known = |field: fn(&TrialRecord) -> Option<Verdict>| before.and_then(field) == field(trial);
     let text = match (trial.verdict, trial.suggested) {
         (Some(verdict), _) if !known(|t| t.verdict) => {
-            let value = trial.value.map(|v| format!(", J = {v:.3} {}", model.session.unit)).unwrap_or_default();
+            let value = trial.value.map(|v| format!(", J = {v:.3} {}", model.session.info.unit)).unwrap_or_default();
             let source = if trial.source == ProposalSource::Sampler {
                 String::new()
             } else {
@@ -176,8 +187,8 @@ fn log_trial(model: &mut Model, time_ns: u64, trial: &TrialRecord) {
             format!("trial {}{source}: {}{value}", trial.trial, verdict.name())
         }
         (None, Some(verdict)) if !known(|t| t.suggested) => {
-            let cause = if trial.cause.is_empty() { String::new() } else { format!(": {}", trial.cause) };
-            format!("trial {} looks like {}{cause}", trial.trial, verdict.name())
+            let cause = if trial.cause.is_empty() { String::new() } else { format!(" ({})", trial.cause) };
+            format!("trial {}, suggested verdict: {}{cause}", trial.trial, verdict.name())
         }
         _ => return,
     };
@@ -185,10 +196,7 @@ fn log_trial(model: &mut Model, time_ns: u64, trial: &TrialRecord) {
 }
 
 fn log(model: &mut Model, time_ns: u64, level: LogLevel, source: &str, text: String, marker: bool) {
-    if model.log.len() == LOG_LINES {
-        model.log.pop_front();
-    }
-    model.log.push_back(LogLine { time_ns, level, source: source.to_owned(), text, marker });
+    model.session.log.push(LogLine { time_ns, level, source: source.to_owned(), text, marker });
     // A reader who has scrolled back stays on the same lines.
     if model.log_view.back > 0 {
         model.log_view.back += 1;

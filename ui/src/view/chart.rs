@@ -1,4 +1,4 @@
-//! A chart of one signal over time, in sweep or scroll mode, of braille dots or what the terminal has instead.
+//! A chart of one signal over time, in sweep or scroll mode.
 //!
 //! ```text
 //! roll +0.021 rad             ±0.50
@@ -9,16 +9,16 @@
 use quadfrog::telemetry::Phase;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
-use ratatui::style::Style;
 
-use super::cut;
-use crate::comparison::time_after;
-use crate::history::{History, Sample, at_trial_time};
-use crate::series::Signal;
+use super::dots::DotGrid;
+use super::draw::cut;
+use super::signal::Signal;
+use crate::model::comparison::time_after;
+use crate::model::history::{ChartSample, SignalHistory, at_trial_time};
 use crate::settings::ChartMode;
 use crate::theme::{Glyphs, Role, Theme};
 
-/// How time is laid out, the same for all charts of a view.
+/// The time axis, the same for all charts of a view.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TimeAxis {
     /// Sweep or scroll.
@@ -33,7 +33,7 @@ pub struct TimeAxis {
 const GAP: f64 = 0.06;
 
 impl TimeAxis {
-    /// Where a time is drawn, 0 at the left to 1 at the right; none outside of the window.
+    /// The position of a time, 0 at the left to 1 at the right; none outside of the window.
     pub fn position(&self, time_ns: u64) -> Option<f64> {
         let age = self.newest_ns.checked_sub(time_ns)? as f64 / self.window_ns as f64;
         match self.mode {
@@ -49,116 +49,32 @@ impl TimeAxis {
     }
 }
 
-/// Dots in a character: across and down.
-fn resolution(glyphs: Glyphs) -> (usize, usize) {
-    match glyphs {
-        Glyphs::Braille => (2, 4),
-        Glyphs::Dots | Glyphs::Ascii => (1, 3),
-    }
-}
-
-/// The character with these dots set (`dots[x][y]`, from the top).
-fn character(glyphs: Glyphs, dots: &[[bool; 4]; 2]) -> char {
-    // Unicode 16, Braille Patterns: bits of the dots 1-8, by column and row.
-    const BRAILLE: [[u32; 4]; 2] = [[0x01, 0x02, 0x04, 0x40], [0x08, 0x10, 0x20, 0x80]];
-    if glyphs == Glyphs::Braille {
-        let mut bits = 0;
-        for x in 0..2 {
-            for y in 0..4 {
-                bits |= if dots[x][y] { BRAILLE[x][y] } else { 0 };
-            }
-        }
-        return char::from_u32(0x2800 + bits).unwrap_or(' ');
-    }
-    let (middle, several) = if glyphs == Glyphs::Dots { ('·', ':') } else { ('-', '|') };
-    match dots[0] {
-        [true, false, false, _] => '\'',
-        [false, true, false, _] => middle,
-        [false, false, true, _] => '.',
-        _ => several,
-    }
-}
-
-/// A grid of dots over an area.
-pub struct Dots {
-    glyphs: Glyphs,
-    /// Dots across and down.
-    pub size: (usize, usize),
-    set: Vec<bool>,
-}
-
-impl Dots {
-    /// An empty grid.
-    pub fn new(area: Rect, glyphs: Glyphs) -> Dots {
-        let (across, down) = resolution(glyphs);
-        let size = (usize::from(area.width) * across, usize::from(area.height) * down);
-        Dots { glyphs, size, set: vec![false; size.0 * size.1] }
-    }
-
-    /// Sets a dot; outside of the grid nothing happens.
-    pub fn set(&mut self, x: i64, y: i64) {
-        let (Ok(x), Ok(y)) = (usize::try_from(x), usize::try_from(y)) else { return };
-        if x < self.size.0 && y < self.size.1 {
-            self.set[y * self.size.0 + x] = true;
-        }
-    }
-
-    /// A straight line of dots (in steps along the longer side).
-    pub fn line(&mut self, (x0, y0): (f64, f64), (x1, y1): (f64, f64)) {
-        let steps = (x1 - x0).abs().max((y1 - y0).abs()).ceil().clamp(1.0, 4096.0) as usize;
-        for i in 0..=steps {
-            let s = i as f64 / steps as f64;
-            self.set((x0 + s * (x1 - x0)).round() as i64, (y0 + s * (y1 - y0)).round() as i64);
-        }
-    }
-
-    /// Draws the characters that have dots; the others keep what lies below.
-    pub fn draw(&self, buffer: &mut Buffer, area: Rect, style: Style) {
-        let (across, down) = resolution(self.glyphs);
-        for row in 0..usize::from(area.height) {
-            for column in 0..usize::from(area.width) {
-                let mut dots = [[false; 4]; 2];
-                let mut any = false;
-                for (x, dots) in dots.iter_mut().enumerate().take(across) {
-                    for (y, dot) in dots.iter_mut().enumerate().take(down) {
-                        *dot = self.set[(row * down + y) * self.size.0 + column * across + x];
-                        any |= *dot;
-                    }
-                }
-                if any && let Some(cell) = buffer.cell_mut((area.x + column as u16, area.y + row as u16)) {
-                    cell.set_char(character(self.glyphs, &dots)).set_style(style);
-                }
-            }
-        }
-    }
-}
-
 /// A trial laid under the charts.
 #[derive(Clone, Copy)]
 pub struct Ghost<'a> {
     /// Its samples.
-    pub trace: &'a [Sample],
+    pub trace: &'a [ChartSample],
     /// Where its impulse begins on the charts' axis, ns.
     pub start_ns: u64,
-    /// How its line is drawn.
+    /// Style of its line.
     pub role: Role,
     /// Whether its value stands beside the other in the heading.
     pub named: bool,
 }
 
-/// A chart with its heading line; below two rows nothing is drawn.
+/// A chart with its heading line. Under two rows nothing is drawn.
 pub struct Chart<'a> {
-    /// What it shows.
+    /// The signal.
     pub signal: Signal,
-    /// How time is laid out.
+    /// The time axis.
     pub axis: TimeAxis,
-    /// Where the samples come from.
-    pub history: &'a History,
-    /// The phase of each column, as [`phases`] finds them.
+    /// The samples.
+    pub history: &'a SignalHistory,
+    /// The phase of each column, from [`phases`].
     pub phases: &'a [Option<Phase>],
     /// A trial to lay under the samples.
     pub ghost: Option<Ghost<'a>>,
-    /// The time that the heading's value is read at; the newest without it.
+    /// Time of the value in the heading; the newest without it.
     pub cursor_ns: Option<u64>,
     /// Whether the sweep's cursor is drawn as a line.
     pub cursor_line: bool,
@@ -179,7 +95,7 @@ impl Chart<'_> {
         if let Some(ghost) = self.ghost {
             self.draw_ghost(buffer, plot, ghost, (low, high));
         }
-        let mut dots = Dots::new(plot, self.theme.glyphs);
+        let mut dots = DotGrid::new(plot, self.theme.glyphs);
         let samples =
             self.history.window(self.axis.window_ns).map(|sample| (sample.time_ns, (self.signal.value)(sample)));
         self.trace(&mut dots, samples, (low, high));
@@ -228,8 +144,8 @@ impl Chart<'_> {
             let sample = at_trial_time(ghost.trace, time_s as f32);
             (sample.map_or("-".to_owned(), |sample| self.number(sample)), ghost.role)
         });
-        let unit = self.signal.unit;
-        let mut pieces = vec![(format!("{}{lamp} ", self.signal.name), self.signal.role)];
+        let unit = self.signal.series.unit();
+        let mut pieces = vec![(format!("{}{lamp} ", self.signal.series.name()), self.signal.role)];
         match ghost {
             Some((other, role)) => {
                 pieces.push((format!("A {value} "), Role::Text));
@@ -251,16 +167,16 @@ impl Chart<'_> {
         }
     }
 
-    /// The signal's value with as many digits as are worth reading.
-    fn number(&self, sample: &Sample) -> String {
+    /// The signal's value to three decimals, or none from 100 on.
+    fn number(&self, sample: &ChartSample) -> String {
         let value = (self.signal.value)(sample);
-        // -0.000 would flicker with +0.000.
+        // Otherwise the text would alternate between -0.000 and +0.000.
         let value = if value.abs() < 0.0005 { 0.0 } else { value };
         if value.abs() >= 100.0 { format!("{value:+.0}") } else { format!("{value:+.3}") }
     }
 
     /// Sets the dots of a line through the points, as far as the axis shows them.
-    fn trace(&self, dots: &mut Dots, points: impl Iterator<Item = (u64, f32)>, (low, high): (f32, f32)) {
+    fn trace(&self, dots: &mut DotGrid, points: impl Iterator<Item = (u64, f32)>, (low, high): (f32, f32)) {
         let (across, down) = dots.size;
         if across == 0 || down == 0 {
             return;
@@ -283,7 +199,7 @@ impl Chart<'_> {
 
     /// The ghost's samples at the time that they would have if its impulse had begun where the axis says.
     fn draw_ghost(&self, buffer: &mut Buffer, plot: Rect, ghost: Ghost, range: (f32, f32)) {
-        let mut dots = Dots::new(plot, self.theme.glyphs);
+        let mut dots = DotGrid::new(plot, self.theme.glyphs);
         let points = ghost
             .trace
             .iter()
@@ -292,7 +208,7 @@ impl Chart<'_> {
         dots.draw(buffer, plot, self.theme.style(ghost.role));
     }
 
-    /// Colours the columns of a jump's phases; [`draw_phases`] says the same in letters.
+    /// Colours the columns of a jump's phases; [`draw_phases`] shows the same in letters.
     fn shade(&self, buffer: &mut Buffer, plot: Rect) {
         for (column, phase) in self.phases.iter().enumerate().take(usize::from(plot.width)) {
             let role = match phase {
@@ -322,7 +238,7 @@ impl Chart<'_> {
 }
 
 /// The phase that is drawn in each column; the one of a jump wins over stance.
-pub fn phases(axis: &TimeAxis, history: &History, width: u16) -> Vec<Option<Phase>> {
+pub fn phases(axis: &TimeAxis, history: &SignalHistory, width: u16) -> Vec<Option<Phase>> {
     let mut phases = vec![None; usize::from(width)];
     for sample in history.window(axis.window_ns) {
         if let Some(column) = axis.column(sample.time_ns, usize::from(width)) {

@@ -1,52 +1,51 @@
-//! Why the sampler proposed a value: TPE's two densities along a parameter, l(x) of the good trials and g(x) of the others,
-//! with the proposal where it lies. A proposal is where l is high and g is low.
+//! TPE's two densities along a parameter, l(x) of the good trials and g(x) of the others, with the proposed value: TPE
+//! proposes where l is high and g is low.
 //!
 //! ```text
-//! f0 l(x), g(x) ──────────── matters 62 %
+//! TPE density of f0 ─────── importance 62 %
 //!      l⡠⠒⢄│             g
 //!    ⡠⠊   ⠈│⢄      ⡠⠒⠒⠤⡀
 //! 0.75    1.243             1.75
 //! ```
 
-use quadfrog::trial::ParameterInsight;
+use quadfrog::trial::{ParameterInsight, ProposalInsight};
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 
-use super::chart::Dots;
-use super::{heading, number};
-use crate::model::Model;
-use crate::theme::Role;
+use super::dots::DotGrid;
+use super::draw::{cut, heading, number};
+use crate::theme::{Role, Theme};
 
 /// Draws the panel of one parameter.
-pub fn render(frame: &mut Frame, area: Rect, model: &Model, name: &str) {
-    let theme = &model.theme;
-    let insight = model.insight.as_ref().and_then(|insight| insight.parameters.iter().find(|p| p.name == *name));
-    let title = match &model.insight {
-        Some(insight) if area.width >= 36 => format!("Why {name} (#{})", insight.trial),
-        _ => format!("Why {name}"),
+pub fn render(frame: &mut Frame, area: Rect, insight: Option<&ProposalInsight>, name: &str, theme: &Theme) {
+    let title = match insight {
+        Some(insight) if area.width >= 58 => format!("TPE density of {name} (#{}): l good, g rest", insight.trial),
+        Some(insight) if area.width >= 36 => format!("TPE {name} (#{})", insight.trial),
+        _ => format!("TPE {name}"),
     };
+    let insight = insight.and_then(|insight| insight.parameters.iter().find(|p| p.name == *name));
     let importance = insight.and_then(|insight| insight.importance);
-    let aside = importance.map_or(String::new(), |share| format!("matters {:.0} %", share * 100.0));
+    let aside = importance.map_or(String::new(), |share| format!("importance {:.0} %", share * 100.0));
     let body = heading(frame, area, theme, &title, &aside);
     let [plot, scale] = Layout::vertical([Constraint::Fill(1), Constraint::Length(1)]).areas(body);
     if plot.height < 2 || plot.width < 8 {
         return;
     }
     let Some(insight) = insight.filter(|insight| insight.at.len() > 1) else {
-        let text = if insight.is_some() { "drawn without a model" } else { "no proposal yet" };
-        let text = super::cut(text, usize::from(plot.width));
+        let text = if insight.is_some() { "sampled without a model" } else { "no proposal yet" };
+        let text = cut(text, usize::from(plot.width));
         frame.buffer_mut().set_string(plot.x, plot.y, text, theme.style(Role::Quiet));
         return;
     };
     let (low, high) = (insight.at[0], insight.at[insight.at.len() - 1]);
     let top = insight.good.iter().chain(&insight.bad).copied().fold(0.0, f64::max);
     let buffer = frame.buffer_mut();
-    // Before the first trials both are the prior.
+    // Before the first trials both equal the prior.
     let equal = insight.good.iter().zip(&insight.bad).all(|(l, g)| (l - g).abs() <= 1e-9 * top);
     let good_label = if equal { "l = g" } else { "l" };
     let curves = [(&insight.bad, Role::SeriesB, "g"), (&insight.good, Role::Good, good_label)];
     for (density, role, _) in curves {
-        let mut dots = Dots::new(plot, theme.glyphs);
+        let mut dots = DotGrid::new(plot, theme.glyphs);
         let (across, down) = (dots.size.0 as f64 - 1.0, dots.size.1 as f64 - 1.0);
         let place = |(x, y): (f64, f64)| ((x - low) / (high - low) * across, (1.0 - y / top) * down);
         let points: Vec<(f64, f64)> = insight.at.iter().copied().zip(density.iter().copied()).map(place).collect();
@@ -59,7 +58,7 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model, name: &str) {
     for y in plot.y..plot.bottom() {
         buffer.set_string(plot.x + column, y, theme.bar(), theme.style(Role::Key));
     }
-    // A letter stands at each curve's peak, above all else: the two are told apart without colours.
+    // A letter at each curve's peak distinguishes the curves without colours.
     for (density, role, label) in curves {
         let Some((x, y)) = insight.at.iter().zip(density).max_by(|a, b| a.1.total_cmp(b.1)) else { continue };
         let column = ((x - low) / (high - low) * f64::from(plot.width - 1)).round() as u16;

@@ -1,9 +1,9 @@
-//! What lies over the view. A dialog stays inside the view's area: the frame, the answer and the next step remain.
+//! Dialogs over the view. A dialog stays inside the view's area: the frame, the message and the next step remain visible.
 //!
 //! ```text
 //!          ┌ Jump? ──────────────────────────────────────────┐
 //!          │ Trial 8: f0 1.243 Hz, Fx 118.2 N, Fz 243.9 N    │
-//!          │ The area is clear and nobody is near the robot? │
+//!          │ Is the area clear of people and objects?        │
 //!          │                                                 │
 //!          │ [Cancel: Enter]     g jump                      │
 //!          └─────────────────────────────────────────────────┘
@@ -17,10 +17,13 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::{Block, Clear, Paragraph, Wrap};
 use tui_input::Input;
 
-use super::{cut, help, number, pre_arm, proposal, span, trial_text};
+use super::details::details;
+use super::draw::{cut, number, scale, span};
+use super::{arming, help};
 use crate::action::Action;
-use crate::dialog::{APPROVAL_PAUSE, Choice, Dialog, OverrideForm, Purpose, arming_word, palette_rows};
+use crate::legal::palette;
 use crate::model::Model;
+use crate::model::dialog::{APPROVAL_PAUSE, Choice, Dialog, OverrideForm, Purpose};
 use crate::theme::{Glyphs, Role, Theme};
 
 /// Draws the open dialog.
@@ -32,10 +35,11 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
             popup(frame, area, model, "Jump?", 60, approve(model, *trial, waited));
         }
         Dialog::Arm { typed } => popup(frame, area, model, "Arm?", 60, arm(model, *typed)),
-        Dialog::PreArm { selected } => {
+        Dialog::ArmingChecks { selected } => {
             let chosen = OperatorCheck::ALL.get(*selected).copied();
-            let lines = pre_arm::lines(model, 74, usize::from(area.height.saturating_sub(2)), chosen);
-            popup(frame, area, model, &format!("Pre-arm list: {}", pre_arm::summary(model)), 78, lines);
+            let lines =
+                arming::lines(&model.session, &model.theme, 74, usize::from(area.height.saturating_sub(2)), chosen);
+            popup(frame, area, model, &format!("Arming checks: {}", arming::summary(&model.session)), 78, lines);
         }
         Dialog::Quit => popup(frame, area, model, "Quit?", 58, quit(model)),
         Dialog::Override(form) => {
@@ -58,14 +62,14 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     }
 }
 
-/// All about a trial; what does not fit is reached with the paging keys.
+/// The details of a trial; the paging keys scroll.
 fn render_details(frame: &mut Frame, area: Rect, model: &Model, trial: u32, scroll: usize) {
-    let Some(record) = model.trials.get(&trial) else { return };
+    let Some(record) = model.session.trials.records.get(&trial) else { return };
     const WIDTH: u16 = 76;
     let inside = usize::from(WIDTH - 4);
     let mut lines: Vec<Line> = Vec::new();
-    for (name, value) in trial_text::details(model, record) {
-        // Long causes and notes go on below themselves.
+    for (name, value) in details(&model.session, &model.theme, record) {
+        // Long values continue on the next line.
         let chars: Vec<char> = value.chars().collect();
         let mut pieces = chars.chunks(inside - 15);
         let first: String = pieces.next().unwrap_or_default().iter().collect();
@@ -83,7 +87,7 @@ fn render_details(frame: &mut Frame, area: Rect, model: &Model, trial: u32, scro
     frame.render_widget(Paragraph::new(shown), inner);
 }
 
-/// A box with a line around it; returns its inside.
+/// Draws an empty bordered box; returns its inside.
 fn open_box(frame: &mut Frame, area: Rect, theme: &Theme, title: &str, width: u16, height: u16) -> Rect {
     const ASCII: border::Set = border::Set {
         top_left: "+",
@@ -117,8 +121,7 @@ fn popup(frame: &mut Frame, area: Rect, model: &Model, title: &str, width: u16, 
 }
 
 /// The two answers; Cancel is the default and comes first.
-fn choice(model: &Model, key: &str, text: &str) -> Line<'static> {
-    let theme = &model.theme;
+fn answers(theme: &Theme, key: &str, text: &str) -> Line<'static> {
     Line::from(vec![
         span(theme, Role::Selected, " Cancel "),
         span(theme, Role::Quiet, " Enter, or any other key     "),
@@ -129,10 +132,10 @@ fn choice(model: &Model, key: &str, text: &str) -> Line<'static> {
 
 fn arm(model: &Model, typed: usize) -> Vec<Line<'static>> {
     let theme = &model.theme;
-    let word = arming_word(model);
-    let mut lines = vec![Line::from("The robot will stand up. Is nobody near it?"), Line::default()];
+    let word = model.session.arming_word();
+    let mut lines = vec![Line::from("The robot will stand up. Is the area clear?"), Line::default()];
     if word.len() == 1 {
-        lines.push(choice(model, word, "stand up"));
+        lines.push(answers(&model.theme, word, "stand up"));
     } else {
         let (done, left) = word.split_at(typed.min(word.len()));
         lines.push(Line::from(vec![
@@ -150,22 +153,22 @@ fn approve(model: &Model, trial: u32, waited: bool) -> Vec<Line<'static>> {
     let theme = &model.theme;
     let key = model.keymap.key(Action::Approve);
     let mut lines = Vec::new();
-    if let Some(proposal) = &model.proposal {
+    if let Some(proposal) = &model.session.proposal {
         let values: Vec<String> = proposal
             .parameters
             .iter()
             .map(|p| {
-                let unit = model.parameter(&p.name).map_or(String::new(), |info| info.unit);
+                let unit = model.session.parameter(&p.name).map_or(String::new(), |info| info.unit);
                 format!("{} {} {unit}", p.name, number(p.value))
             })
             .collect();
         lines.push(Line::from(format!("Trial #{trial}: {}", values.join(", "))));
     }
-    lines.push(Line::from("The area is clear, and nobody is near the robot?"));
+    lines.push(Line::from("Is the area clear of people and objects?"));
     lines.push(Line::default());
-    let mut answer = choice(model, &key, "jump");
+    let mut answer = answers(&model.theme, &key, "jump");
     if !waited {
-        answer.push_span(span(theme, Role::Quiet, " (in a moment)"));
+        answer.push_span(span(theme, Role::Quiet, " (after 0.8 s)"));
     }
     lines.push(answer);
     lines
@@ -176,11 +179,11 @@ fn quit(model: &Model) -> Vec<Line<'static>> {
     if model.robot_needs_us() {
         lines.push(Line::from("The robot is armed: it will sit down before the program ends."));
     }
-    if let Some(trial) = model.under_review() {
+    if let Some(trial) = model.session.under_review() {
         lines.push(Line::from(format!("Trial #{} has no verdict yet.", trial.trial)));
     }
     lines.push(Line::default());
-    lines.push(choice(model, "y", "quit"));
+    lines.push(answers(&model.theme, "y", "quit"));
     lines
 }
 
@@ -197,7 +200,7 @@ fn overrides(model: &Model, form: &OverrideForm) -> Vec<Line<'static>> {
             vec![span(theme, if selected { Role::Key } else { Role::Text }, format!("{mark} {:<8}", row.name))];
         match &form.typing {
             Some(input) if selected => {
-                // As wide as the number it replaces, so that the line does not jump.
+                // As wide as the number that it replaces, so that the line does not shift.
                 spans.push(Span::raw(" ".repeat(8_usize.saturating_sub(input.value().chars().count() + 1))));
                 spans.extend(edited(theme, input));
             }
@@ -205,7 +208,7 @@ fn overrides(model: &Model, form: &OverrideForm) -> Vec<Line<'static>> {
         }
         spans.push(span(theme, Role::Quiet, format!(" {:<9}", row.unit)));
         spans.push(span(theme, Role::Quiet, format!(" {:>6} ", number(row.low))));
-        spans.push(span(theme, Role::Quiet, proposal::place(theme, row.value, row.low, row.high, 14)));
+        spans.push(span(theme, Role::Quiet, scale(theme, row.value, row.low, row.high, 14)));
         spans.push(span(theme, Role::Quiet, format!(" {:<6}", number(row.high))));
         if row.value != row.before {
             spans.push(span(theme, Role::Warning, format!(" was {}", number(row.before))));
@@ -218,7 +221,7 @@ fn overrides(model: &Model, form: &OverrideForm) -> Vec<Line<'static>> {
         None => lines.push(Line::from(span(
             theme,
             Role::Quiet,
-            "Nothing moves by this: it is approved like any other proposal.",
+            "This does not move the robot: it is approved like any other proposal.",
         ))),
     }
     lines
@@ -242,12 +245,12 @@ fn field_title(model: &Model, purpose: Purpose) -> String {
         Purpose::HandValue(trial) => format!("Trial #{trial}, measured by hand"),
         Purpose::Continue => "How many more trials?".to_owned(),
         Purpose::Fix { parameter, value } => {
-            let info = model.session.parameters.get(parameter);
+            let info = model.session.info.parameters.get(parameter);
             let (name, unit) = info.map_or(("", ""), |info| (&info.name, &info.unit));
             format!("Fix {name} at {} {unit} for how many trials?", number(value))
         }
         Purpose::Bounds { parameter } => {
-            format!("Search {} from .. to", model.session.parameters.get(parameter).map_or("", |info| &info.name))
+            format!("Search {} from .. to", model.session.info.parameters.get(parameter).map_or("", |info| &info.name))
         }
         Purpose::ConfirmBest => "How many repeats at most, to confirm the best?".to_owned(),
         Purpose::TrialNumber => "Go to trial".to_owned(),
@@ -259,7 +262,7 @@ fn field(model: &Model, purpose: Purpose, input: &Input, problem: Option<&str>) 
     let theme = &model.theme;
     let mut spans = edited(theme, input);
     if matches!(purpose, Purpose::HandValue(_)) {
-        spans.push(span(theme, Role::Quiet, format!(" {}", model.session.unit)));
+        spans.push(span(theme, Role::Quiet, format!(" {}", model.session.info.unit)));
     }
     let below = match (problem, purpose) {
         (Some(problem), _) => span(theme, Role::Bad, problem.to_owned()),
@@ -267,8 +270,8 @@ fn field(model: &Model, purpose: Purpose, input: &Input, problem: Option<&str>) 
             span(theme, Role::Quiet, "replaces the measured value; empty: back to the measured one")
         }
         (None, Purpose::Bounds { parameter }) => {
-            let info = model.session.parameters.get(parameter);
-            let searched = info.and_then(|info| model.searched(&info.name));
+            let info = model.session.info.parameters.get(parameter);
+            let searched = info.and_then(|info| model.session.searched(&info.name));
             let allowed = searched.map_or(String::new(), |p| format!("; safety.toml allows {} to {}", p.least, p.most));
             span(theme, Role::Quiet, format!("write it as 50..120{allowed}; past trials stay"))
         }
@@ -293,7 +296,7 @@ fn render_palette(frame: &mut Frame, area: Rect, model: &Model, input: &Input, s
     let mut spans = vec![span(theme, Role::Key, ":")];
     spans.extend(edited(theme, input));
     frame.render_widget(Line::from(spans), Rect { height: 1, ..inner });
-    let rows = palette_rows(input.value(), model);
+    let rows = palette(input.value(), model);
     let space = usize::from(inner.height.saturating_sub(2)).max(1);
     let first = selected.saturating_sub(space - 1);
     for (line, (index, (info, legal))) in rows.iter().enumerate().skip(first).take(space).enumerate() {
@@ -316,7 +319,7 @@ fn render_choice(frame: &mut Frame, area: Rect, model: &Model, what: Choice, sel
         Choice::Series => "Series of the charts",
         Choice::Columns => "Columns of the trial table",
     };
-    let rows = what.rows(model);
+    let rows = model.choices(what);
     let inner = open_box(frame, area, theme, title, 66, rows.len() as u16 + 2);
     // A terminal that is too low shows the lines around the chosen one.
     let first = (selected + 1).saturating_sub(usize::from(inner.height));

@@ -1,4 +1,4 @@
-//! The permanent frame: two lines at the top, the tabs, the answer line, and what remains of them on a small terminal.
+//! The permanent frame: two lines at the top, the tabs, the message line; a reduced form on a small terminal.
 //!
 //! ```text
 //!  READY      SIM  forward   trial #8   7 of 20 judged   best 0.642 m (#3)       REC 03:12
@@ -8,20 +8,22 @@
 use quadfrog::recording::record::LogLevel;
 use quadfrog::robot::joint_name;
 use quadfrog::telemetry::Mode;
+use quadfrog::trial::{Approval, Backend};
 use ratatui::Frame;
 use ratatui::layout::{Alignment, Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
 
-use super::{MIN_COLUMNS, MIN_ROWS, clock, clock_ms, cut, number, span};
+use super::draw::{clock, clock_ms, cut, number, span};
 use crate::action::Action;
-use crate::model::{Model, View};
+use crate::layout::{MIN_COLUMNS, MIN_ROWS, tabs};
+use crate::model::Model;
 use crate::theme::Role;
 
-/// Age of the newest tick at which the numbers on the screen are called old, ms.
+/// Age of the newest tick from which the numbers count as old, ms.
 const STALE_MS: u128 = 500;
 
-/// The two lines that nothing covers.
+/// The two lines that no dialog covers.
 pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let [first, second] = rows(area);
     let recording = Line::from(recording(model));
@@ -36,7 +38,7 @@ fn rows(area: Rect) -> [Rect; 2] {
     [Rect { height: 1, ..area }, Rect { y: area.y + 1, height: area.height.saturating_sub(1).min(1), ..area }]
 }
 
-/// The mode as a word on its colour.
+/// The mode.
 pub fn mode_span(model: &Model) -> Span<'static> {
     let mode = model.mode();
     let role = match mode {
@@ -48,45 +50,45 @@ pub fn mode_span(model: &Model) -> Span<'static> {
     span(&model.theme, role, format!(" {:<9} ", mode.name()))
 }
 
-/// What is being driven: never a guess, and never by colour alone.
+/// The driven machine, in words and colour.
 fn backend(model: &Model) -> Span<'static> {
     let theme = &model.theme;
-    match model.session.backend.as_str() {
+    match model.session.info.backend {
         _ if model.replay.is_some() => span(theme, Role::Heading, "REPLAY"),
-        "" => span(theme, Role::Quiet, "starting"),
-        "sim" => span(theme, Role::Heading, "SIM"),
-        hardware => span(theme, Role::Hardware, format!(" {} ", hardware.to_uppercase())),
+        None => span(theme, Role::Quiet, "starting"),
+        Some(Backend::Simulator) => span(theme, Role::Heading, "SIM"),
+        Some(hardware) => span(theme, Role::Hardware, format!(" {} ", hardware.name().to_uppercase())),
     }
 }
 
-/// What runs where, as far as `room` characters take it: a number is shown whole or not at all.
+/// Mode, machine, task, trial and best, within `room` characters: a number is shown whole or not at all.
 fn identity(model: &Model, width: u16, room: usize) -> Line<'static> {
     let theme = &model.theme;
     let mut spans = vec![mode_span(model), Span::raw(" "), backend(model), Span::raw("  ")];
-    let session = &model.session;
+    let session = &model.session.info;
     if session.observe {
         spans.push(span(theme, Role::Warning, "OBSERVING  "));
     }
     // A narrow terminal has room for the best value only if the words are left out.
     let narrow = width < 100;
-    if !matches!(session.approve.as_str(), "" | "each") && model.replay.is_none() {
-        let approve = session.approve.to_uppercase();
+    if session.approve != Approval::Each && model.replay.is_none() {
+        let approve = session.approve.name().to_uppercase();
         spans.push(span(
             theme,
             Role::Warning,
             if narrow { format!("{approve}  ") } else { format!("APPROVE {approve}  ") },
         ));
     }
-    spans.push(Span::raw(session.task.clone()));
-    if let Some(info) = model.stage {
-        let (finished, budget) = (model.counted(), model.budget());
+    spans.push(Span::raw(session.task_name()));
+    if let Some(info) = model.session.stage {
+        let (finished, budget) = (model.session.counted(), model.session.budget());
         let text = match narrow {
             true => format!("  trial #{}  {finished}/{budget}", info.trial),
             false => format!("   trial #{}   {finished} of {budget} judged", info.trial),
         };
         spans.push(Span::raw(text));
     }
-    if let Some((best, value)) = model.best().and_then(|best| Some((best, best.value?))) {
+    if let Some((best, value)) = model.session.trials.best().and_then(|best| Some((best, best.value?))) {
         let before = spans.len();
         spans.push(Span::raw(if narrow { "  best " } else { "   best " }));
         spans.push(span(theme, Role::Good, format!("{} {}", number(value), session.unit)));
@@ -103,7 +105,7 @@ fn identity(model: &Model, width: u16, room: usize) -> Line<'static> {
 fn recording(model: &Model) -> Vec<Span<'static>> {
     let theme = &model.theme;
     if let Some(replay) = &model.replay {
-        // Steps are milliseconds; while it plays they would only flicker.
+        // Milliseconds are readable only while it does not play.
         let at = if replay.playing { clock(replay.time_ns) } else { clock_ms(replay.time_ns) };
         let speed = if replay.playing || replay.speed != 1.0 { format!(" x{}", replay.speed) } else { String::new() };
         let paused = if replay.playing { "" } else { " paused" };
@@ -112,7 +114,7 @@ fn recording(model: &Model) -> Vec<Span<'static>> {
     }
     let counters = &model.snapshot.counters;
     let elapsed = clock(model.snapshot.tick.time_ns);
-    match (model.session.recording.is_empty(), counters.ticks_not_recorded) {
+    match (model.session.info.recording.is_empty(), counters.ticks_not_recorded) {
         (true, _) => vec![span(theme, Role::Quiet, format!("not recording {elapsed} "))],
         (false, 0) => vec![span(theme, Role::Good, "REC "), Span::raw(format!("{elapsed} "))],
         (false, lost) => {
@@ -137,19 +139,23 @@ fn condition(model: &Model, width: u16) -> Vec<Span<'static>> {
     };
     let snapshot = &model.snapshot;
     let counters = &snapshot.counters;
+    let limits = &model.session.info.limits;
     let late_share = counters.late_ticks as f64 / snapshot.tick.number.max(1) as f64;
     let late = match narrow {
         true => format!("{} late", counters.late_ticks),
         false => format!("{} late, worst {:.1} ms", counters.late_ticks, counters.worst_lateness_ns as f64 / 1e6),
     };
-    part("loop ", look(late_share > 0.001), late);
-    match (counters.link, model.session.backend.as_str()) {
-        (_, "") => {}
-        (None, "sim") => part("link ", Role::Quiet, "none: SIM".to_owned()),
-        (None, _) => part("link ", bad(counters.state_age_ms > 5), format!("{} ms", counters.state_age_ms)),
+    part("loop ", warning(late_share > limits.late_share), late);
+    match (counters.link, model.session.info.backend) {
+        (_, None) => {}
+        (None, Some(Backend::Simulator)) => part("link ", Role::Quiet, "none: SIM".to_owned()),
+        (None, _) => {
+            part("link ", bad(counters.state_age_ms > limits.state_age_ms), format!("{} ms", counters.state_age_ms))
+        }
         (Some(link), _) => {
             let loss = 100.0 * link.loss_share();
-            let role = bad(link.state_age_ms > 5 || loss >= 1.0 || link.rate_hz == 0);
+            let lossy = loss >= 100.0 * limits.loss_share;
+            let role = bad(link.state_age_ms > limits.state_age_ms || lossy || link.rate_hz == 0);
             part("link ", role, format!("{} ms, {loss:.1} % lost", link.state_age_ms));
         }
     }
@@ -157,11 +163,19 @@ fn condition(model: &Model, width: u16) -> Vec<Span<'static>> {
     let hottest = temperatures.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1));
     if let Some((joint, hottest)) = hottest.filter(|(_, hottest)| *hottest > 0.0) {
         let joint = if narrow { String::new() } else { format!(" {}", joint_name(joint)) };
-        part(if narrow { "motor " } else { "hottest " }, bad(hottest >= 60.0), format!("{hottest:.0} C{joint}"));
+        part(
+            if narrow { "motor " } else { "hottest " },
+            bad(f64::from(hottest) >= limits.motor_c),
+            format!("{hottest:.0} C{joint}"),
+        );
     }
     if let Some(battery) = snapshot.tick.state.battery {
         let charge = battery.charge_percent;
-        part(if narrow { "bat " } else { "battery " }, bad(charge < 30.0), format!("{charge:.0} %"));
+        part(
+            if narrow { "bat " } else { "battery " },
+            bad(f64::from(charge) < limits.battery_percent),
+            format!("{charge:.0} %"),
+        );
     }
     let age_ms = model.clock.saturating_sub(model.snapshot_at).as_millis();
     if age_ms > STALE_MS && model.replay.is_none() {
@@ -170,43 +184,18 @@ fn condition(model: &Model, width: u16) -> Vec<Span<'static>> {
     spans
 }
 
-fn look(worth_it: bool) -> Role {
-    if worth_it { Role::Warning } else { Role::Text }
+fn warning(condition: bool) -> Role {
+    if condition { Role::Warning } else { Role::Text }
 }
 
-fn bad(it_is: bool) -> Role {
-    if it_is { Role::Bad } else { Role::Text }
+fn bad(condition: bool) -> Role {
+    if condition { Role::Bad } else { Role::Text }
 }
 
-/// The tabs with their actions.
-fn tabs(model: &Model) -> impl Iterator<Item = (View, Action, String)> + '_ {
-    let actions = [
-        Action::LiveView,
-        Action::TrialsView,
-        Action::OptimizerView,
-        Action::OverrideView,
-        Action::HealthView,
-        Action::LogView,
-    ];
-    View::ALL
-        .into_iter()
-        .zip(actions)
-        .map(|(view, action)| (view, action, format!(" {} {} ", model.keymap.key(action), view.name())))
-}
-
-/// The action of the tab in a column of the terminal.
-pub fn tab_at(model: &Model, column: u16) -> Option<Action> {
-    let mut end = 0;
-    tabs(model).find_map(|(_, action, text)| {
-        end += text.chars().count();
-        (usize::from(column) < end).then_some(action)
-    })
-}
-
-/// The tabs, and at the right where help is; while the charts are frozen, that they are, in every view.
+/// The tabs, and at the right the keys of the help, or that the charts are frozen.
 pub fn render_tabs(frame: &mut Frame, area: Rect, model: &Model) {
     let theme = &model.theme;
-    let spans: Vec<Span> = tabs(model)
+    let spans: Vec<Span> = tabs(&model.keymap)
         .map(|(view, _, text)| span(theme, if view == model.view { Role::Selected } else { Role::Quiet }, text))
         .collect();
     frame.render_widget(Line::from(spans), area);
@@ -240,11 +229,11 @@ pub fn render_message(frame: &mut Frame, area: Rect, model: &Model) {
     frame.render_widget(Line::from(vec![Span::raw(" "), span(&model.theme, role, text)]), area);
 }
 
-/// What remains on a terminal that is too small: the mode, STOP, the link and the size that is needed.
+/// The reduced form on a terminal that is too small: mode, STOP, link, needed size.
 pub fn render_small(frame: &mut Frame, area: Rect, model: &Model) {
     let theme = &model.theme;
     let keys = model.keymap.all_keys(Action::Stop);
-    let link = match (model.snapshot.counters.link, model.is_hardware()) {
+    let link = match (model.snapshot.counters.link, model.session.is_hardware()) {
         (Some(link), _) => format!("link {} ms, {:.1} % lost", link.state_age_ms, 100.0 * link.loss_share()),
         (None, true) => format!("link {} ms", model.snapshot.counters.state_age_ms),
         (None, false) => "link none: SIM".to_owned(),

@@ -1,11 +1,12 @@
-//! View 5, Health: is the machine, and are we, fit for the next jump?
+//! View 5, Health: loop timing, recorder, link, motors, battery, arming checks.
 //!
 //! ```text
 //! Loop ──────────────────────────   Motors ────────────────────────────
-//! late ticks   0 (0.000 %)          FR_hip       31 C  -0.33 rad  +4.4 Nm on
-//!   wakes late p50 61 us, p99 94 us ...
+//! late ticks   0 (0.000 %)          FR_hip       31 C  -0.33 rad  +4.4 N m
+//! wake-up      p50 61 us, p99 94 us ...
 //! ```
 
+use quadfrog::recording::record::HealthLimits;
 use quadfrog::recording::recorder::RecorderStatus;
 use quadfrog::robot::{JOINTS, LinkStatus, joint_name};
 use quadfrog::telemetry::{ArmingCheck, StageTimes};
@@ -14,10 +15,11 @@ use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
 
-use super::{heading, pre_arm, span};
+use super::arming;
+use super::draw::{heading, span};
 use crate::action::Action;
-use crate::history::Sample;
 use crate::model::Model;
+use crate::model::history::ChartSample;
 use crate::theme::Role;
 
 /// Draws the view.
@@ -36,15 +38,15 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     panel(frame, timing, model, "Loop", timing_rows);
     if lateness_rows_shown > 0 {
         let rows = lateness_rows(model, usize::from(lateness.width));
-        panel(frame, lateness, model, "How late ticks wake, last minute", rows);
+        panel(frame, lateness, model, "Wake-up latency, last minute", rows);
     }
     panel(frame, recording, model, "Recorder and screen", recorder_rows(model));
     panel(frame, robot, model, "Link and battery", robot_rows(model));
     let [motors, checks] = Layout::vertical([Constraint::Length(JOINTS as u16 + 1), Constraint::Fill(1)]).areas(right);
     panel_named(frame, motors, model, ("Motors", MOTOR_NAME_WIDTH), motor_rows(model));
-    let aside = format!("{} ({})", pre_arm::summary(model), model.keymap.key(Action::PreArm));
-    let body = heading(frame, checks, &model.theme, "Pre-arm list", &aside);
-    let lines = pre_arm::lines(model, usize::from(body.width), usize::from(body.height), None);
+    let aside = format!("{} ({})", arming::summary(&model.session), model.keymap.key(Action::ArmingChecks));
+    let body = heading(frame, checks, &model.theme, "Arming checks", &aside);
+    let lines = arming::lines(&model.session, &model.theme, usize::from(body.width), usize::from(body.height), None);
     frame.render_widget(Paragraph::new(lines), body);
 }
 
@@ -53,26 +55,26 @@ const NAME_WIDTH: usize = 13;
 /// Width of the joints' names.
 const MOTOR_NAME_WIDTH: usize = 9;
 
-/// A line of a panel: name, value, and whether it needs a look.
-type Row = (String, String, bool);
+/// A line of a panel: name, value, and whether it is beyond its limit.
+type HealthRow = (String, String, bool);
 
-fn panel(frame: &mut Frame, area: Rect, model: &Model, title: &str, rows: Vec<Row>) {
+fn panel(frame: &mut Frame, area: Rect, model: &Model, title: &str, rows: Vec<HealthRow>) {
     panel_named(frame, area, model, (title, NAME_WIDTH), rows);
 }
 
 /// A panel with its title and the width of its names.
-fn panel_named(frame: &mut Frame, area: Rect, model: &Model, (title, name_width): (&str, usize), rows: Vec<Row>) {
+fn panel_named(frame: &mut Frame, area: Rect, model: &Model, (title, name_width): (&str, usize), rows: Vec<HealthRow>) {
     let theme = &model.theme;
     let body = heading(frame, area, theme, title, "");
-    let line = |(name, value, look): Row| {
-        let value = if look { span(theme, Role::Warning, format!("{value} !")) } else { Span::raw(value) };
+    let line = |(name, value, beyond): HealthRow| {
+        let value = if beyond { span(theme, Role::Warning, format!("{value} !")) } else { Span::raw(value) };
         Line::from(vec![span(theme, Role::Quiet, format!("{name:<name_width$}")), value])
     };
     frame.render_widget(Paragraph::new(rows.into_iter().map(line).collect::<Vec<_>>()), body);
 }
 
-fn row(name: &str, value: String, look: bool) -> Row {
-    (name.to_owned(), value, look)
+fn row(name: &str, value: String, beyond: bool) -> HealthRow {
+    (name.to_owned(), value, beyond)
 }
 
 /// Upper ends of the histogram's classes, microseconds; the last class has none.
@@ -84,11 +86,12 @@ fn percentile(sorted: &[u32], share: f64) -> f64 {
     sorted.get((last * share).round() as usize).copied().map_or(0.0, f64::from)
 }
 
-fn timing_rows(model: &Model) -> Vec<Row> {
+fn timing_rows(model: &Model) -> Vec<HealthRow> {
     let tick = &model.snapshot.tick;
     let counters = &model.snapshot.counters;
+    let limits = &model.session.info.limits;
     let share = counters.late_ticks as f64 / tick.number.max(1) as f64;
-    let sorted = |value: fn(&Sample) -> u32| {
+    let sorted = |value: fn(&ChartSample) -> u32| {
         let mut values: Vec<u32> = model.history.samples().map(value).collect();
         values.sort_unstable();
         values
@@ -101,15 +104,15 @@ fn timing_rows(model: &Model) -> Vec<Row> {
     let worst_ms = counters.worst_lateness_ns as f64 / 1e6;
     vec![
         row("ticks", tick.number.to_string(), false),
-        row("late ticks", format!("{} ({:.3} %)", counters.late_ticks, share * 100.0), share > 0.001),
-        row("worst", format!("{worst_ms:.2} ms late"), worst_ms > 10.0),
-        row("wakes late", micro(&late), percentile(&late, 0.99) > 5e5),
+        row("late ticks", format!("{} ({:.3} %)", counters.late_ticks, share * 100.0), share > limits.late_share),
+        row("worst", format!("{worst_ms:.2} ms late"), worst_ms > limits.late_ms),
+        row("wake-up", micro(&late), percentile(&late, 0.99) > 5e5),
         row("tick takes", micro(&busy), percentile(&busy, 0.99) > 5e5),
         row("stages, us", stages(&tick.stages), false),
     ]
 }
 
-/// The stages of a tick, each on its own.
+/// The durations of a tick's stages.
 fn stages(stages: &StageTimes) -> String {
     let micro = |ns: u32| f64::from(ns) / 1e3;
     format!(
@@ -120,8 +123,8 @@ fn stages(stages: &StageTimes) -> String {
     )
 }
 
-/// How late the ticks of the last minute woke, as bars.
-fn lateness_rows(model: &Model, width: usize) -> Vec<Row> {
+/// Histogram of the wake-up latency of the last minute.
+fn lateness_rows(model: &Model, width: usize) -> Vec<HealthRow> {
     let mut counts = [0_u32; CLASSES_US.len() + 1];
     for sample in model.history.samples() {
         let class = CLASSES_US.iter().position(|limit| sample.lateness_ns < limit * 1000);
@@ -138,17 +141,21 @@ fn lateness_rows(model: &Model, width: usize) -> Vec<Row> {
     counts.into_iter().enumerate().map(bar).collect()
 }
 
-fn recorder_rows(model: &Model) -> Vec<Row> {
+fn recorder_rows(model: &Model) -> Vec<HealthRow> {
     let counters = &model.snapshot.counters;
     let name = |path: &str| match path.rsplit_once('/') {
-        // The end of the path says which study and which recording it is; more has no room.
+        // The end of the path identifies the study and the recording; more has no room.
         Some((folder, file)) => format!("{file} in {}", folder.rsplit('/').next().unwrap_or_default()),
         None if path.is_empty() => "none".to_owned(),
         None => path.to_owned(),
     };
     vec![
-        row("recording", name(&model.session.recording), model.session.recording.is_empty() && model.replay.is_none()),
-        row("study", name(&model.session.study), false),
+        row(
+            "recording",
+            name(&model.session.info.recording),
+            model.session.info.recording.is_empty() && model.replay.is_none(),
+        ),
+        row("study", name(&model.session.info.study), false),
         match &model.recorder {
             Some(RecorderStatus { error: Some(error), .. }) => row("writing", error.clone(), true),
             Some(status) => row("written", written(status, model.snapshot.tick.time_ns), false),
@@ -161,14 +168,19 @@ fn recorder_rows(model: &Model) -> Vec<Row> {
     ]
 }
 
-fn robot_rows(model: &Model) -> Vec<Row> {
+fn robot_rows(model: &Model) -> Vec<HealthRow> {
     let tick = &model.snapshot.tick;
     let counters = &model.snapshot.counters;
+    let limits = &model.session.info.limits;
     let mut rows = Vec::new();
     match counters.link {
-        Some(link) => rows.extend(link_rows(&link)),
-        None if model.is_hardware() => {
-            rows.push(row("state age", format!("{} ms", counters.state_age_ms), counters.state_age_ms > 5));
+        Some(link) => rows.extend(link_rows(&link, limits)),
+        None if model.session.is_hardware() => {
+            rows.push(row(
+                "state age",
+                format!("{} ms", counters.state_age_ms),
+                counters.state_age_ms > limits.state_age_ms,
+            ));
         }
         None => rows.push(row("link", "SIM: no link".to_owned(), false)),
     }
@@ -178,7 +190,8 @@ fn robot_rows(model: &Model) -> Vec<Row> {
             let cells: Vec<f64> = battery.cell_v.into_iter().filter(|v| *v > 0.0).collect();
             let low = cells.iter().copied().fold(f64::INFINITY, f64::min);
             let high = cells.iter().copied().fold(0.0, f64::max);
-            rows.push(row("battery", format!("{:.0} %", battery.charge_percent), battery.charge_percent < 30.0));
+            let low_charge = f64::from(battery.charge_percent) < limits.battery_percent;
+            rows.push(row("battery", format!("{:.0} %", battery.charge_percent), low_charge));
             rows.push(row("", format!("{:.1} V, {:.1} A", battery.voltage_v, battery.current_a), false));
             if !cells.is_empty() {
                 rows.push(row("cells", format!("{low:.3} to {high:.3} V",), high - low > 0.1));
@@ -189,39 +202,47 @@ fn robot_rows(model: &Model) -> Vec<Row> {
     rows
 }
 
-/// How much is on the disk, and how fast it grew.
+/// Size of the recording and its mean rate.
 fn written(status: &RecorderStatus, time_ns: u64) -> String {
     let megabytes = status.bytes as f64 / 1e6;
     let rate = status.bytes as f64 / 1e3 / (time_ns as f64 / 1e9).max(1.0);
     format!("{megabytes:.1} MB, {rate:.0} kB/s, {} ticks", status.ticks)
 }
 
-/// The room on the disk, as the pre-arm list found it.
-fn disk_row(model: &Model) -> Row {
-    let disk = model.pre_arm.iter().find(|item| item.check == ArmingCheck::Disk);
+/// Free space on the disk, from the arming checks.
+fn disk_row(model: &Model) -> HealthRow {
+    let disk = model.session.arming_checks.iter().find(|item| item.check == ArmingCheck::Disk);
     match disk {
         Some(disk) => row("disk", disk.found.clone(), !disk.state.allows()),
         None => row("disk", "-".to_owned(), false),
     }
 }
 
-fn link_rows(link: &LinkStatus) -> Vec<Row> {
+fn link_rows(link: &LinkStatus, limits: &HealthLimits) -> Vec<HealthRow> {
     let loss = 100.0 * link.loss_share();
     vec![
-        row("states", format!("{} Hz, newest {} ms old", link.rate_hz, link.state_age_ms), link.state_age_ms > 5),
-        row("lost", format!("{loss:.2} % of 5 s, {} in all", link.lost), loss >= 1.0),
-        row("odd ones", format!("{} late, {} twice, {} foreign", link.late, link.duplicate, link.foreign), false),
+        row(
+            "states",
+            format!("{} Hz, newest {} ms old", link.rate_hz, link.state_age_ms),
+            link.state_age_ms > limits.state_age_ms,
+        ),
+        row("lost", format!("{loss:.2} % of 5 s, {} in all", link.lost), loss >= 100.0 * limits.loss_share),
+        row(
+            "unusual",
+            format!("{} out of order, {} duplicate, {} unknown source", link.late, link.duplicate, link.foreign),
+            false,
+        ),
         row(
             "broken",
             format!("{} corrupt ({} in 5 s), {} short", link.corrupt, link.recent_corrupt, link.wrong_length),
             link.recent_corrupt > 0,
         ),
-        row("sent", format!("{}, {} not", link.sent, link.send_errors), link.send_errors > 0),
+        row("sent", format!("{}, failed {}", link.sent, link.send_errors), link.send_errors > 0),
         row("restarts", link.reboots.to_string(), link.reboots > 0),
     ]
 }
 
-fn motor_rows(model: &Model) -> Vec<Row> {
+fn motor_rows(model: &Model) -> Vec<HealthRow> {
     let tick = &model.snapshot.tick;
     let mut rows = Vec::new();
     for joint in 0..JOINTS {
@@ -229,8 +250,8 @@ fn motor_rows(model: &Model) -> Vec<Row> {
         let state = if tick.state.motor_enabled[joint] { "on" } else { "off" };
         let limited = if tick.limited & (1 << joint) != 0 { " limited" } else { "" };
         let (q, torque) = (tick.state.joint_position[joint], tick.state.joint_torque[joint]);
-        let text = format!("{temperature:3.0} C {state:<3}{q:+6.2} rad{torque:+6.1} Nm{limited}");
-        rows.push((joint_name(joint), text, temperature >= 60.0));
+        let text = format!("{temperature:3.0} C {state:<3}{q:+6.2} rad{torque:+6.1} N m{limited}");
+        rows.push((joint_name(joint), text, f64::from(temperature) >= model.session.info.limits.motor_c));
     }
     rows
 }

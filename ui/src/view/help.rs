@@ -9,9 +9,11 @@
 //! ```
 
 use ratatui::text::Line;
+use strum::VariantArray;
 
-use super::span;
-use crate::action::{ACTIONS, Group};
+use super::draw::span;
+use crate::action::{ACTIONS, ActionGroup};
+use crate::legal::legal;
 use crate::model::Model;
 use crate::theme::Role;
 
@@ -19,13 +21,13 @@ use crate::theme::Role;
 pub fn lines(model: &Model) -> Vec<Line<'static>> {
     let theme = &model.theme;
     let mut lines = Vec::new();
-    for group in Group::ALL {
+    for group in ActionGroup::VARIANTS {
         if !lines.is_empty() {
             lines.push(Line::default());
         }
-        lines.push(Line::from(span(theme, Role::Heading, group.title())));
-        for info in ACTIONS.iter().filter(|info| info.group == group) {
-            let legal = (info.legal)(model).is_ok();
+        lines.push(Line::from(span(theme, Role::Heading, <&str>::from(group))));
+        for info in ACTIONS.iter().filter(|info| info.group == *group) {
+            let legal = legal(info.action, model).is_ok();
             let (key, text) = if legal { (Role::Key, Role::Text) } else { (Role::Quiet, Role::Quiet) };
             lines.push(Line::from(vec![
                 span(theme, key, format!("  {:<10} ", model.keymap.all_keys(info.action))),

@@ -1,27 +1,30 @@
-//! View 1, Live: what the robot does now, what comes next and what came of the last trials.
+//! View 1, Live: charts of the robot's state, the present proposal and the last trials.
 //!
 //! ```text
 //! roll +0.021 rad    ±0.50   pitch -0.013 rad   ±0.50   Trial 8, by the sampler ────
 //! ⣀⣀⣀⠤⠔⠊⠁⠀⠀⠀⠈⠒⠤⢄⣀          ⣀⣀⣀⣀⣀⣀⣀⣀⣀⣀⣀⣀⣀           f0    1.243 Hz  ├────●─────┤
-//! FL foot -0.196 m           FR foot -0.196 m            Fx    118.2 N   ├───────●──┤
+//! FR foot z -0.196 m         FL foot z -0.196 m          Fx    118.2 N   ├───────●──┤
 //! ⠤⠤⠤⠤⠤⠤⠤⠤⠤⠤⠤⠤⠤⠤⠤          ⠤⠤⠤⠤⠤⠤⠤⠤⠤⠤⠤⠤⠤           Fz    243.9 N   ├───●──────┤
-//! RL foot -0.197 m           RR foot -0.196 m           J over trials ──── best 0.642 m
+//! RR foot z -0.196 m         RL foot z -0.197 m         J over trials ──── best 0.642 m
 //! ⠤⠤⠤⠤⠤⠤⠤⠤⠤⠤⠤⠤⠤⠤⠤          ⠤⠤⠤⠤⠤⠤⠤⠤⠤⠤⠤⠤⠤           o  o x o O
 //!     iifffl                     iifffl
 //!    #  f0 Hz   Fx N    Fz N    J m     verdict  source    cause
 //!    7  1.243   118.2   243.9   0.642   accept   sampler
 //! ```
 
-use quadfrog::robot::{JOINTS, LEGS, joint_name};
+use quadfrog::robot::{JOINTS, joint_name};
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
 
 use super::chart::{Chart, Ghost, TimeAxis, draw_phases, phases};
-use super::{heading, objective, proposal, span, trials, wireframe};
-use crate::comparison::{Comparison, impulse_start_ns};
-use crate::history::History;
-use crate::model::{Model, Panel};
+use super::draw::{bar, heading, span};
+use super::signal::signal;
+use super::{objective, proposal, trials, wireframe};
+use crate::model::Model;
+use crate::model::comparison::{Comparison, impulse_start_ns};
+use crate::model::history::SignalHistory;
+use crate::model::live::Panel;
 use crate::settings::ChartMode;
 use crate::theme::Role;
 
@@ -37,10 +40,10 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let side = if area.width >= 120 { SIDE + 10 } else { SIDE };
     let [charts, _, side] =
         Layout::horizontal([Constraint::Fill(1), Constraint::Length(1), Constraint::Length(side)]).areas(upper);
-    let card_rows = proposal::rows(model).min(side.height.saturating_sub(5));
+    let card_rows = proposal::rows(&model.session).min(side.height.saturating_sub(5));
     let joints_only = model.live.panel == Panel::Joints;
     let room = side.height - card_rows;
-    // Where there is no room for both, the panel of the joints has the robot and the others the objective.
+    // Without room for both, the panel of the joints shows the robot and the others the objective.
     let picture_rows = if room >= 18 {
         12
     } else if joints_only {
@@ -61,31 +64,31 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
         render_charts(frame, charts, model);
     }
     proposal::render(frame, card, model);
-    objective::render(frame, objective_area, model);
+    objective::render(frame, objective_area, &model.session, &model.theme);
     if picture_rows > 0 {
-        wireframe::render(frame, picture, model);
+        wireframe::render(frame, picture, model.robot.as_ref(), &model.snapshot.tick, &model.theme);
     }
     trials::render_table(frame, table, model, false);
 }
 
-/// What all charts of the view draw from.
-struct Source<'a> {
-    history: &'a History,
+/// Data of all charts of the view.
+struct ChartSource<'a> {
+    history: &'a SignalHistory,
     axis: TimeAxis,
     ghost: Option<Ghost<'a>>,
     cursor_ns: Option<u64>,
 }
 
-impl<'a> Source<'a> {
-    fn of(model: &'a Model) -> Source<'a> {
+impl<'a> ChartSource<'a> {
+    fn of(model: &'a Model) -> ChartSource<'a> {
         match &model.live.comparison {
-            Some(comparison) => Source::compared(comparison),
-            None => Source::running(model),
+            Some(comparison) => ChartSource::compared(comparison),
+            None => ChartSource::running(model),
         }
     }
 
-    /// The present, or what was frozen of it.
-    fn running(model: &'a Model) -> Source<'a> {
+    /// The present, or the frozen history.
+    fn running(model: &'a Model) -> ChartSource<'a> {
         let history = model.charted();
         let axis = TimeAxis {
             mode: model.live.mode,
@@ -97,22 +100,22 @@ impl<'a> Source<'a> {
         let ghost =
             trace.zip(under).map(|(trace, start_ns)| Ghost { trace, start_ns, role: Role::Ghost, named: false });
         let cursor_ns = model.live.frozen.is_some().then_some(model.live.cursor_ns);
-        Source { history, axis, ghost, cursor_ns }
+        ChartSource { history, axis, ghost, cursor_ns }
     }
 
     /// Two trials, from the first sample to the last.
-    fn compared(comparison: &'a Comparison) -> Source<'a> {
+    fn compared(comparison: &'a Comparison) -> ChartSource<'a> {
         let (first, last) = comparison.span_ns();
         let axis = TimeAxis { mode: ChartMode::Scroll, window_ns: last - first + 1, newest_ns: last };
         let ghost = Ghost { trace: &comparison.trace_b, start_ns: comparison.start_ns, role: Role::Good, named: true };
-        Source { history: &comparison.history_a, axis, ghost: Some(ghost), cursor_ns: Some(comparison.cursor_ns) }
+        ChartSource { history: &comparison.history_a, axis, ghost: Some(ghost), cursor_ns: Some(comparison.cursor_ns) }
     }
 }
 
 fn render_charts(frame: &mut Frame, area: Rect, model: &Model) {
     let theme = model.theme;
     let [charts, strip] = Layout::vertical([Constraint::Fill(1), Constraint::Length(1)]).areas(area);
-    let source = Source::of(model);
+    let source = ChartSource::of(model);
     let series = &model.live.series;
     let across = if series.len() == 1 { 1 } else { 2 };
     let down = series.len().div_ceil(across).min(usize::from(charts.height / CHART_ROWS)).max(1);
@@ -122,7 +125,7 @@ fn render_charts(frame: &mut Frame, area: Rect, model: &Model) {
     let rows = Layout::vertical(vec![Constraint::Fill(1); down]).split(charts);
     for (index, series) in series.iter().enumerate().take(across * down) {
         let chart = Chart {
-            signal: series.signal(),
+            signal: signal(*series),
             axis: source.axis,
             history: source.history,
             phases: &of_columns[index % across].1,
@@ -139,7 +142,7 @@ fn render_charts(frame: &mut Frame, area: Rect, model: &Model) {
     render_axis(frame, strip, model, series.len().saturating_sub(across * down));
 }
 
-/// What the time axis is, at the right end of the strip under the charts, and how many charts have no room.
+/// Describes the time axis at the right end of the strip under the charts, and counts the charts without room.
 fn render_axis(frame: &mut Frame, strip: Rect, model: &Model, without_room: usize) {
     let live = &model.live;
     let (role, mut text) = match (&live.comparison, &live.frozen) {
@@ -164,22 +167,21 @@ fn render_axis(frame: &mut Frame, strip: Rect, model: &Model, without_room: usiz
     frame.render_widget(Line::from(span(&model.theme, role, text)), area);
 }
 
-/// Torque and speed of each joint as bars against their limits; `!` where the last gate cut the command.
+/// Torque and speed of each joint with bars of their share of the limit; `!` where the limiter clamped the command.
 fn render_joints(frame: &mut Frame, area: Rect, model: &Model) {
     let theme = &model.theme;
     let tick = &model.snapshot.tick;
-    let aside =
-        if area.width >= 60 { "torque in N m, speed in rad/s, of their limits" } else { "N m, rad/s of limits" };
+    let aside = if area.width >= 60 { "torque in N m, speed in rad/s; bars: share of the limit" } else { "N m, rad/s" };
     let body = heading(frame, area, theme, "Joints", aside);
     let Some(robot) = &model.robot else {
         frame.render_widget(Line::from(span(theme, Role::Quiet, "the robot's limits are not known here")), body);
         return;
     };
-    // Two legs beside the other two where the bars stay long enough to be read.
+    // Two legs beside the other two where the bars stay long enough to read.
     let across = if body.width >= 90 { 2 } else { 1 };
     let columns = Layout::horizontal(vec![Constraint::Fill(1); across]).spacing(2).split(body);
     let down = JOINTS / across;
-    for joint in 0..LEGS * 3 {
+    for joint in 0..JOINTS {
         let column = columns[joint / down];
         let row = (joint % down) as u16;
         if row >= column.height {
@@ -191,20 +193,10 @@ fn render_joints(frame: &mut Frame, area: Rect, model: &Model) {
         let width = usize::from(column.width).saturating_sub(24) / 2;
         let limited = if tick.limited & (1 << joint) != 0 { "!" } else { " " };
         let mut spans = vec![span(theme, Role::Quiet, format!("{:<9}", joint_name(joint).replace('_', " ")))];
-        spans.extend(bar(model, torque / limits.max_torque[joint], width));
+        spans.extend(bar(theme, torque / limits.max_torque[joint], width));
         spans.push(Span::raw(format!("{torque:6.1}{limited} ")));
-        spans.extend(bar(model, speed / limits.max_velocity[joint], width));
+        spans.extend(bar(theme, speed / limits.max_velocity[joint], width));
         spans.push(Span::raw(format!("{speed:6.1}")));
         frame.render_widget(Line::from(spans), Rect { y: column.y + row, height: 1, ..column });
     }
-}
-
-/// A share of a limit as a bar; beyond nine tenths it warns.
-pub fn bar(model: &Model, share: f64, width: usize) -> [Span<'static>; 2] {
-    let theme = &model.theme;
-    let size = if share.is_finite() { share.abs().min(1.0) } else { 1.0 };
-    let filled = (size * width as f64).round() as usize;
-    let (full, empty) = theme.fill();
-    let role = if size >= 0.9 { Role::Warning } else { Role::SeriesA };
-    [span(theme, role, full.repeat(filled)), span(theme, Role::Quiet, empty.repeat(width - filled))]
 }

@@ -1,4 +1,4 @@
-//! View 6, Log: what happened, every command and its outcome, and markers at trials and faults.
+//! View 6, Log: events, every request and its outcome, and markers at trials and faults.
 //!
 //! ```text
 //! Log ─────────────────────────────────── 214 lines; F all levels; / search
@@ -12,21 +12,22 @@ use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 
-use super::{cut, heading, span};
+use super::draw::{cut, heading, span};
 use crate::action::Action;
-use crate::model::{LogLine, Model};
-use crate::theme::Role;
+use crate::model::Model;
+use crate::model::log::LogLine;
+use crate::theme::{Role, Theme};
 
 /// Draws the view.
 pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
-    let lines: Vec<&LogLine> = model.log_lines().collect();
+    let lines: Vec<&LogLine> = model.log_view.lines(&model.session.log).collect();
     let body = heading(frame, area, &model.theme, "Log", &summary(model, lines.len()));
     let space = usize::from(body.height);
     let last = lines.len().saturating_sub(model.log_view.back).max(space.min(lines.len()));
     let first = last.saturating_sub(space);
     for (row, line) in lines[first..last].iter().enumerate() {
         let area = Rect { y: body.y + row as u16, height: 1, ..body };
-        frame.render_widget(line_of(model, line, usize::from(body.width)), area);
+        frame.render_widget(line_of(&model.theme, line, usize::from(body.width)), area);
     }
 }
 
@@ -43,8 +44,7 @@ fn summary(model: &Model, shown: usize) -> String {
     format!("{shown} lines{back}; {level} ({}), {search} ({})", key(Action::Filter), key(Action::Search))
 }
 
-fn line_of(model: &Model, line: &LogLine, width: usize) -> Line<'static> {
-    let theme = &model.theme;
+fn line_of(theme: &Theme, line: &LogLine, width: usize) -> Line<'static> {
     let ms = line.time_ns / 1_000_000;
     let time = format!("{:>3}:{:02}.{:03} ", ms / 60_000, ms / 1000 % 60, ms % 1000);
     let (mark, role) = match line.level {

@@ -1,4 +1,4 @@
-//! The last line: what the operator can do next, in words.
+//! The last line: the operator's next possible step.
 //!
 //! ```text
 //!  Press g twice to jump  ·  o override  ·  n skip  ·  D sit down
@@ -10,10 +10,11 @@ use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 
-use super::span;
+use super::draw::span;
 use crate::action::Action;
-use crate::dialog::{Dialog, Purpose, arming_word};
+use crate::legal::legal;
 use crate::model::Model;
+use crate::model::dialog::{Dialog, Purpose};
 use crate::theme::Role;
 
 /// The most likely next step, and the others.
@@ -21,16 +22,16 @@ use crate::theme::Role;
 pub struct NextStep {
     /// The step itself, a sentence.
     pub lead: String,
-    /// Key and what it does.
+    /// Keys and their effects.
     pub others: Vec<(String, &'static str)>,
 }
 
-/// What can be done next.
+/// The next possible step.
 pub fn next_step(model: &Model) -> NextStep {
     match &model.dialog {
         Some(dialog) => in_dialog(model, dialog),
         None if model.replay.is_some() => replay(model),
-        None if model.session.observe && Action::Acknowledge.legal(model).is_err() => {
+        None if model.session.info.observe && legal(Action::Acknowledge, model).is_err() => {
             step("Observing: this session can change nothing.", model, &[(Action::Quit, "quit")])
         }
         None => live(model),
@@ -40,7 +41,7 @@ pub fn next_step(model: &Model) -> NextStep {
 fn step(lead: impl Into<String>, model: &Model, others: &[(Action, &'static str)]) -> NextStep {
     let others = others
         .iter()
-        .filter(|(action, _)| action.legal(model).is_ok())
+        .filter(|(action, _)| legal(*action, model).is_ok())
         .map(|(action, text)| (model.keymap.key(*action), *text))
         .collect();
     NextStep { lead: lead.into(), others }
@@ -50,26 +51,27 @@ fn live(model: &Model) -> NextStep {
     let key = |action| model.keymap.key(action);
     let quit = (Action::Quit, "quit");
     match model.mode() {
-        Mode::Countdown => return step("Jump in a moment: any key cancels it.", model, &[]),
+        Mode::Countdown => return step("Countdown to the jump: any key cancels it.", model, &[]),
         Mode::StandUp => return step("Standing up.", model, &[(Action::SitDown, "sit down")]),
         Mode::Jump => return step("Jumping.", model, &[]),
         Mode::Settle => return step("Landed; waiting until the robot is quiet.", model, &[]),
         Mode::SitDown => return step("Sitting down.", model, &[]),
         _ => {}
     }
-    let stage = model.stage.map(|info| info.stage);
+    let stage = model.session.stage.map(|info| info.stage);
     if stage == Some(ExperimentStage::Review) {
         return review(model);
     }
     match model.mode() {
         Mode::Damped | Mode::Fault => {
-            let because = if model.stopped_because.is_empty() { "stopped" } else { &model.stopped_because };
-            step(
-                // The key first: a long reason is what may be cut.
-                format!("Look at the robot, then press {}: {because}", key(Action::Acknowledge)),
-                model,
-                &[(Action::Undo, "undo"), quit],
-            )
+            let stopped = if model.mode() == Mode::Fault { "FAULT" } else { "STOPPED" };
+            let because = match model.session.stopped_because.as_str() {
+                "" => String::new(),
+                because => format!(": {because}"),
+            };
+            // The key first: a long reason may be cut.
+            let lead = format!("{stopped}; check the robot, then {} acknowledges{because}", key(Action::Acknowledge));
+            step(lead, model, &[(Action::Undo, "undo"), quit])
         }
         Mode::Offline | Mode::Observe => step("Waiting for the robot to answer.", model, &[quit]),
         Mode::Disarmed if stage == Some(ExperimentStage::Finished) => step(
@@ -83,16 +85,16 @@ fn live(model: &Model) -> NextStep {
                 quit,
             ],
         ),
-        Mode::Disarmed if model.pre_arm.is_empty() => step(
+        Mode::Disarmed if model.session.arming_checks.is_empty() => step(
             "Checking the robot.",
             model,
             &[(Action::Override, "override"), (Action::Undo, "undo"), (Action::Help, "help"), quit],
         ),
-        Mode::Disarmed if model.pre_arm_failing().count() > 0 => step(
+        Mode::Disarmed if model.session.failing_checks() > 0 => step(
             format!(
-                "Not ready to arm: {} checks. {} shows them.",
-                model.pre_arm_failing().count(),
-                key(Action::PreArm)
+                "Not ready to arm: {} checks have not passed. {} shows them.",
+                model.session.failing_checks(),
+                key(Action::ArmingChecks)
             ),
             model,
             &[(Action::Override, "override"), (Action::Undo, "undo"), (Action::Help, "help"), quit],
@@ -113,7 +115,7 @@ fn live(model: &Model) -> NextStep {
                 (Action::Undo, "undo"),
             ],
         ),
-        Mode::Ready if model.proposal_on_table().is_some() => step(
+        Mode::Ready if model.session.open_proposal().is_some() => step(
             format!("Press {} twice to jump.", key(Action::Approve)),
             model,
             &[
@@ -129,13 +131,13 @@ fn live(model: &Model) -> NextStep {
 
 fn review(model: &Model) -> NextStep {
     let key = |action| model.keymap.key(action);
-    let lead = match model.under_review().and_then(|trial| trial.suggested) {
+    let lead = match model.session.under_review().and_then(|trial| trial.suggested) {
         Some(Verdict::Accept) => format!("Judge it: {} accept (suggested)", key(Action::Accept)),
         Some(Verdict::Fall) => format!("Judge it: {} fall (suggested)", key(Action::Fall)),
         Some(Verdict::Void) => format!("Judge it: {} void (suggested)", key(Action::Void)),
         None => "Judge it".to_owned(),
     };
-    let suggested = model.under_review().and_then(|trial| trial.suggested);
+    let suggested = model.session.under_review().and_then(|trial| trial.suggested);
     let mut verdicts = vec![(Action::Accept, "accept"), (Action::Fall, "fall"), (Action::Void, "void")];
     verdicts.retain(|(action, _)| {
         !matches!(
@@ -145,7 +147,7 @@ fn review(model: &Model) -> NextStep {
                 | (Action::Void, Some(Verdict::Void))
         )
     });
-    verdicts.extend([(Action::Rerun, "re-run"), (Action::HandValue, "own value"), (Action::Note, "note")]);
+    verdicts.extend([(Action::Rerun, "re-run"), (Action::HandValue, "value by hand"), (Action::Note, "note")]);
     step(lead, model, &verdicts)
 }
 
@@ -175,17 +177,17 @@ fn in_dialog(model: &Model, dialog: &Dialog) -> NextStep {
             model.keymap.key(Action::Approve)
         )),
         Dialog::Arm { typed } => {
-            let word = arming_word(model);
+            let word = model.session.arming_word();
             let left = word.get(*typed..).unwrap_or_default();
             plain(format!("Type {left} to stand the robot up. Any other key cancels."))
         }
-        Dialog::PreArm { .. } => {
-            let arm = if Action::Arm.legal(model).is_ok() {
+        Dialog::ArmingChecks { .. } => {
+            let arm = if legal(Action::Arm, model).is_ok() {
                 format!(" {} arms.", model.keymap.key(Action::Arm))
             } else {
                 String::new()
             };
-            plain(format!("Up Down choose your items, x gives your word, Enter closes.{arm}"))
+            plain(format!("Up Down choose an item, x confirms it, Enter closes.{arm}"))
         }
         Dialog::Quit => plain("Press y to quit. Any other key cancels.".to_owned()),
         Dialog::Override(form) if form.typing.is_some() => {
@@ -196,7 +198,7 @@ fn in_dialog(model: &Model, dialog: &Dialog) -> NextStep {
             plain(format!("Type, or Left Right 1 %, PgUp PgDn 10 %. Enter applies, {queue} queues, Esc cancels."))
         }
         Dialog::Field { purpose: Purpose::Note(_), .. } if model.robot_needs_us() => {
-            plain("Enter keeps the note, Esc cancels. Armed: Space is STOP, _ writes a space.".to_owned())
+            plain("Enter saves the note, Esc cancels. Armed: Space is STOP, _ writes a space.".to_owned())
         }
         Dialog::Field { .. } => plain("Enter confirms, Esc cancels.".to_owned()),
         Dialog::Palette { .. } => plain("Type to filter, Up Down choose, Enter does it, Esc closes.".to_owned()),

@@ -12,47 +12,34 @@ use quadfrog::trial::{TrialRecord, Verdict};
 use ratatui::Frame;
 use ratatui::layout::Rect;
 
-use super::{heading, number};
-use crate::model::{Model, accepted_value};
-use crate::theme::Role;
-
-/// The sign of a verdict: on charts and in tables, with or without colours.
-pub fn sign(verdict: Option<Verdict>) -> (&'static str, Role) {
-    match verdict {
-        Some(Verdict::Accept) => ("o", Role::Good),
-        Some(Verdict::Fall) => ("x", Role::Bad),
-        Some(Verdict::Void) => ("v", Role::Quiet),
-        None => ("?", Role::Warning),
-    }
-}
+use super::draw::{heading, number, sign};
+use crate::model::session::SessionModel;
+use crate::model::trials::accepted_value;
+use crate::theme::{Role, Theme};
 
 /// Width of the numbers at the left.
 const SCALE: u16 = 6;
 
 /// Draws the panel.
-pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
-    let theme = &model.theme;
-    let best = model.best();
+pub fn render(frame: &mut Frame, area: Rect, session: &SessionModel, theme: &Theme) {
+    let best = session.trials.best();
     let aside = match best.and_then(|trial| Some((trial.trial, trial.value?))) {
-        Some((trial, value)) => format!("best {} {} #{trial}", number(value), model.session.unit),
+        Some((trial, value)) => format!("best {} {} #{trial}", number(value), session.info.unit),
         None => "no value yet".to_owned(),
     };
     let plot = heading(frame, area, theme, "J over trials", &aside);
-    if plot.height < 2 || plot.width <= SCALE {
+    if plot.height < 2 || plot.width <= SCALE || session.trials.records.is_empty() {
         return;
     }
-    if model.trials.is_empty() {
-        return;
-    }
-    let values = || model.trials.values().filter_map(|trial| trial.value);
+    let values = || session.trials.records.values().filter_map(|trial| trial.value);
     let low = values().fold(0.0, f64::min);
     let high = values().fold(0.0, f64::max).max(low + 1e-3);
     let buffer = frame.buffer_mut();
     buffer.set_string(plot.x, plot.y, number(high), theme.style(Role::Quiet));
     let bottom = plot.bottom() - 1;
     buffer.set_string(plot.x, bottom, if low < 0.0 { number(low) } else { "0".to_owned() }, theme.style(Role::Quiet));
-    let last = model.trials.keys().next_back().map_or(0, |trial| trial + 1);
-    let slots = usize::try_from(last.max(model.budget()).max(1)).unwrap_or(1);
+    let last = session.trials.records.keys().next_back().map_or(0, |trial| trial + 1);
+    let slots = usize::try_from(last.max(session.budget()).max(1)).unwrap_or(1);
     let width = usize::from(plot.width - SCALE);
     // Whole columns per trial while they fit, so that the distance between points does not wobble.
     let column = |trial: u32| {
@@ -64,7 +51,7 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
         plot.y + (share * f64::from(plot.height - 1)).round() as u16
     };
     // Best so far: a level line from each new best to the next.
-    let bests: Vec<&TrialRecord> = model.best_so_far().collect();
+    let bests: Vec<&TrialRecord> = session.trials.best_so_far().collect();
     for (index, trial) in bests.iter().enumerate() {
         let Some(value) = trial.value else { continue };
         let until = bests.get(index + 1).map_or(last, |next| next.trial);
@@ -72,7 +59,7 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
         let line = theme.line().repeat(usize::from(to - from) + 1);
         buffer.set_string(from, row(value), line, theme.style(Role::Quiet));
     }
-    for trial in model.trials.values() {
+    for trial in session.trials.records.values() {
         let (mark, role) = sign(trial.verdict);
         let y = match trial.verdict {
             Some(Verdict::Void) => bottom,

@@ -1,4 +1,4 @@
-//! View 3, Optimizer: how the study goes, what each parameter does, and where the robot landed.
+//! View 3, Optimizer: objective over trials and parameters, TPE's densities, landing places.
 //!
 //! ```text
 //! J over trials ──────── best 0.642 m   Landings, from above ─── x forward, y left
@@ -15,14 +15,14 @@ use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::widgets::Paragraph;
 
-use super::objective::{self, sign};
-use super::{densities, heading, number, points};
-use crate::model::Model;
-use crate::theme::Role;
+use super::draw::{heading, number, sign};
+use super::{densities, objective, points};
+use crate::model::session::SessionModel;
+use crate::theme::{Role, Theme};
 
 /// Draws the view.
-pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
-    let repeated = points::lines(model, usize::from(area.width));
+pub fn render(frame: &mut Frame, area: Rect, session: &SessionModel, theme: &Theme) {
+    let repeated = points::lines(session, theme, usize::from(area.width));
     // Repeats have rows of their own where there are any to spare.
     let repeat_rows = if repeated.is_empty() || area.height < 30 { 0 } else { repeated.len().min(5) as u16 + 1 };
     let [upper, repeats, scatters, why] = Layout::vertical([
@@ -34,36 +34,35 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     .areas(area);
     let [history, _, landings] =
         Layout::horizontal([Constraint::Fill(3), Constraint::Length(2), Constraint::Fill(2)]).areas(upper);
-    objective::render(frame, history, model);
-    render_landings(frame, landings, model);
+    objective::render(frame, history, session, theme);
+    render_landings(frame, landings, session, theme);
     if repeat_rows > 0 {
-        let body = heading(frame, repeats, &model.theme, "Repeated points", "stood of repeats, mean, spread");
+        let body = heading(frame, repeats, theme, "Repeated points", "landed/repeats, mean, std");
         frame.render_widget(Paragraph::new(repeated), body);
     }
-    let parameters = &model.session.parameters;
+    let parameters = &session.info.parameters;
     if parameters.is_empty() {
         return;
     }
     let columns = |area: Rect| Layout::horizontal(vec![Constraint::Fill(1); parameters.len()]).spacing(2).split(area);
     let (above, below) = (columns(scatters), columns(why));
     for (index, info) in parameters.iter().enumerate() {
-        render_scatter(frame, above[index], model, index);
-        densities::render(frame, below[index], model, &info.name);
+        render_scatter(frame, above[index], session, theme, index);
+        densities::render(frame, below[index], session.insight.as_ref(), &info.name, theme);
     }
 }
 
 /// Every judged trial's value over one parameter; the proposal as a line.
-fn render_scatter(frame: &mut Frame, area: Rect, model: &Model, index: usize) {
-    let theme = &model.theme;
+fn render_scatter(frame: &mut Frame, area: Rect, session: &SessionModel, theme: &Theme, index: usize) {
     // The study's own bounds: past trials stay where they were when the search is narrowed.
-    let info = &model.session.parameters[index];
+    let info = &session.info.parameters[index];
     let body = heading(frame, area, theme, &format!("J over {}", info.name), &info.unit);
     let [plot, scale] = Layout::vertical([Constraint::Fill(1), Constraint::Length(1)]).areas(body);
     if plot.height == 0 || plot.width < 8 {
         return;
     }
-    let high = model.trials.values().filter_map(|trial| trial.value).fold(1e-3, f64::max);
-    let low = model.trials.values().filter_map(|trial| trial.value).fold(0.0, f64::min);
+    let high = session.trials.records.values().filter_map(|trial| trial.value).fold(1e-3, f64::max);
+    let low = session.trials.records.values().filter_map(|trial| trial.value).fold(0.0, f64::min);
     let column = |value: f64| {
         let share = ((value - info.low) / (info.high - info.low)).clamp(0.0, 1.0);
         plot.x + (share * f64::from(plot.width - 1)).round() as u16
@@ -73,22 +72,23 @@ fn render_scatter(frame: &mut Frame, area: Rect, model: &Model, index: usize) {
         plot.y + (share * f64::from(plot.height - 1)).round() as u16
     };
     let buffer = frame.buffer_mut();
-    let proposed = model.proposal_on_table().and_then(|p| p.parameters.iter().find(|p| p.name == info.name));
+    let proposed = session.open_proposal().and_then(|p| p.parameters.iter().find(|p| p.name == info.name));
     if let Some(proposed) = proposed {
         for y in plot.y..plot.bottom() {
             buffer.set_string(column(proposed.value), y, theme.bar(), theme.style(Role::Quiet));
         }
     }
-    let best = model.best().map(|trial| trial.trial);
+    let best = session.trials.best().map(|trial| trial.trial);
     // The best last: its repeats lie at the same place.
-    let mut trials: Vec<_> = model.trials.values().filter(|trial| trial.verdict != Some(Verdict::Void)).collect();
+    let mut trials: Vec<_> =
+        session.trials.records.values().filter(|trial| trial.verdict != Some(Verdict::Void)).collect();
     trials.sort_by_key(|trial| best == Some(trial.trial));
     for trial in trials {
-        let Some((_, value)) = trial.parameters.iter().find(|(name, _)| *name == info.name) else { continue };
+        let Some(value) = trial.parameters.get(&info.name) else { continue };
         let Some(objective) = trial.value else { continue };
         let (mark, role) = sign(trial.verdict);
         let mark = if best == Some(trial.trial) { "*" } else { mark };
-        buffer.set_string(column(*value), row(objective), mark, theme.style(role));
+        buffer.set_string(column(value), row(objective), mark, theme.style(role));
     }
     let (low, high) = (number(info.low), number(info.high));
     buffer.set_string(scale.x, scale.y, &low, theme.style(Role::Quiet));
@@ -105,9 +105,8 @@ fn render_scatter(frame: &mut Frame, area: Rect, model: &Model, index: usize) {
 }
 
 /// Where the trunk came to rest, from above: forward is up, left is left, the start is `+`.
-fn render_landings(frame: &mut Frame, area: Rect, model: &Model) {
-    let theme = &model.theme;
-    let landed = || model.trials.values().filter_map(|trial| Some((trial, trial.measured?)));
+fn render_landings(frame: &mut Frame, area: Rect, session: &SessionModel, theme: &Theme) {
+    let landed = || session.trials.records.values().filter_map(|trial| Some((trial, trial.measured?)));
     let body = heading(frame, area, theme, "Landings, from above", "forward is up");
     if body.height < 3 || body.width < 10 {
         return;
@@ -128,15 +127,15 @@ fn render_landings(frame: &mut Frame, area: Rect, model: &Model) {
     let buffer = frame.buffer_mut();
     let (x, y) = place(0.0, 0.0);
     buffer.set_string(x, y, "+", theme.style(Role::Quiet));
-    let best = model.best().map(|trial| trial.trial);
-    let mut marks: Vec<_> = landed().collect();
-    marks.sort_by_key(|(trial, _)| best == Some(trial.trial));
-    for (trial, m) in marks {
+    let best = session.trials.best().map(|trial| trial.trial);
+    let mut landings: Vec<_> = landed().collect();
+    landings.sort_by_key(|(trial, _)| best == Some(trial.trial));
+    for (trial, m) in landings {
         let (mark, role) = sign(trial.verdict);
         let mark = if best == Some(trial.trial) { "*" } else { mark };
         let (x, y) = place(m.dx_m, m.dy_m);
         buffer.set_string(x, y, mark, theme.style(role));
     }
-    let text = if landed().next().is_none() { "none yet".to_owned() } else { format!("farthest {} m", number(reach)) };
+    let text = if landed().next().is_none() { "none yet".to_owned() } else { format!("scale {} m", number(reach)) };
     buffer.set_string(body.x, body.y, text, theme.style(Role::Quiet));
 }

@@ -1,4 +1,4 @@
-//! View 4, Override: the proposal with its bounds, the controller's gains, and what can be done about the chosen one.
+//! View 4, Override: the proposal with its bounds, the controller's gains, and the actions on the selected one.
 //!
 //! ```text
 //! Trial #8, by: sampler ─────────────────────────────────────────────────
@@ -6,7 +6,7 @@
 //! > Fx    120.0 N      0.000 [--------o--] 150.0    proposed was 118.2
 //! Gains of the controller, for this trial ───────────────────────────────
 //!   kp    400.0 N/m    100.0 [---o-------] 1000
-//! What can be done ──────────────────────────────────────────────────────
+//! Actions ───────────────────────────────────────────────────────────────
 //!   o  change values and gains
 //!   X  fix Fx at 120.0 N for the next trials
 //! ```
@@ -17,33 +17,34 @@ use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
 
-use super::{cut, heading, number, proposal, span};
+use super::draw::{cut, heading, number, scale, span};
 use crate::action::Action;
+use crate::legal::legal;
 use crate::model::Model;
 use crate::theme::Role;
 
 /// Draws the view.
 pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let theme = &model.theme;
-    let on_table = model.proposal_on_table();
-    let values = |card: Option<&[ProposedParameter]>, name: &str| {
-        card.and_then(|card| card.iter().find(|p| p.name == *name)).cloned()
+    let proposal = model.session.open_proposal();
+    let values = |values: Option<&[ProposedParameter]>, name: &str| {
+        values.and_then(|values| values.iter().find(|p| p.name == *name)).cloned()
     };
     let mut rows: Vec<Line> = Vec::new();
-    let parameters = &model.session.parameters;
+    let parameters = &model.session.info.parameters;
     for (index, info) in parameters.iter().enumerate() {
-        let value = values(on_table.map(|card| card.parameters.as_slice()), &info.name);
-        let present = model.parameter(&info.name).unwrap_or_else(|| info.clone());
+        let value = values(proposal.map(|p| p.parameters.as_slice()), &info.name);
+        let present = model.session.parameter(&info.name).unwrap_or_else(|| info.clone());
         let mut spans = row(model, index, &present, value.as_ref());
         spans.extend(search_state(model, info));
         rows.push(Line::from(spans));
     }
     let mut gains: Vec<Line> = Vec::new();
-    for (index, info) in model.session.gains.iter().enumerate() {
-        let value = values(on_table.map(|card| card.gains.as_slice()), &info.name);
+    for (index, info) in model.session.info.gains.iter().enumerate() {
+        let value = values(proposal.map(|p| p.gains.as_slice()), &info.name);
         gains.push(Line::from(row(model, parameters.len() + index, info, value.as_ref())));
     }
-    let title = match on_table {
+    let title = match proposal {
         Some(proposal) => format!("Trial #{}, by: {}", proposal.trial, proposal.source.name()),
         None => "Parameters".to_owned(),
     };
@@ -60,8 +61,8 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
         let body = heading(frame, middle, theme, "Gains of the controller, for this trial", "safe ranges");
         frame.render_widget(Paragraph::new(gains), body);
     }
-    let body = heading(frame, lower, theme, "What can be done", "nothing moves before it is approved");
-    frame.render_widget(Paragraph::new(deeds(model, usize::from(body.width))), body);
+    let body = heading(frame, lower, theme, "Actions", "the robot moves only after an approval");
+    frame.render_widget(Paragraph::new(actions(model, usize::from(body.width))), body);
 }
 
 /// One value with its place in its range.
@@ -77,7 +78,7 @@ fn row(model: &Model, index: usize, info: &ParameterInfo, p: Option<&ProposedPar
         Span::raw(format!("{:>7} {:<9}", p.map_or("-".to_owned(), |p| number(p.value)), info.unit)),
         span(theme, Role::Quiet, format!("{:>6} ", number(info.low))),
         match p {
-            Some(p) => span(theme, Role::Quiet, proposal::place(theme, p.value, info.low, info.high, 16)),
+            Some(p) => span(theme, Role::Quiet, scale(theme, p.value, info.low, info.high, 16)),
             None => span(theme, Role::Quiet, format!("{:^16}", "to")),
         },
         span(theme, Role::Quiet, format!(" {:<6}", number(info.high))),
@@ -88,45 +89,46 @@ fn row(model: &Model, index: usize, info: &ParameterInfo, p: Option<&ProposedPar
     spans
 }
 
-/// Whether a parameter is fixed, or searched within other bounds than the study began with.
+/// The fixed value of a parameter, or its initial bounds where they have changed.
 fn search_state(model: &Model, info: &ParameterInfo) -> Option<Span<'static>> {
     let theme = &model.theme;
-    let searched = model.searched(&info.name)?;
+    let searched = model.session.searched(&info.name)?;
     match searched.fixed {
         Some(fixed) => {
             Some(span(theme, Role::Warning, format!(" fixed at {}, {} more", number(fixed.value), fixed.trials)))
         }
         None if (searched.low, searched.high) != (info.low, info.high) => {
             let (low, high) = (number(info.low), number(info.high));
-            Some(span(theme, Role::Warning, format!(" began {low}..{high}")))
+            Some(span(theme, Role::Warning, format!(" initial {low}..{high}")))
         }
         None => None,
     }
 }
 
-/// What can be done, each with its key; and why some of it not now.
-fn deeds(model: &Model, width: usize) -> Vec<Line<'static>> {
+/// The actions with their keys, and the reason where one is not possible now.
+fn actions(model: &Model, width: usize) -> Vec<Line<'static>> {
     let theme = &model.theme;
     let chosen = model.override_parameter();
     let name = chosen.map_or("the parameter", |info| info.name.as_str());
     let unit = chosen.map_or("", |info| info.unit.as_str());
-    let is_fixed = chosen.and_then(|info| model.searched(&info.name)?.fixed).is_some();
+    let is_fixed = chosen.and_then(|info| model.session.searched(&info.name)?.fixed).is_some();
     let fix = match (is_fixed, model.override_value()) {
         (true, _) => format!("search {name} again"),
         (false, Some(value)) => format!("fix {name} at {} {unit} for the next trials", number(value)),
         (false, None) => format!("fix {name} for the next trials"),
     };
-    let deeds = [
+    let help = |action: Action| action.info().help.to_owned();
+    let offered = [
         (Action::Override, "change values and gains: typed, or in steps of 1 % and 10 %".to_owned()),
-        (Action::ClearOverrides, "back to what was proposed".to_owned()),
+        (Action::ClearOverrides, help(Action::ClearOverrides)),
         (Action::Fix, fix),
         (Action::Bounds, format!("search {name} within other bounds")),
-        (Action::QueuePoint, "queue this point; it comes before the sampler's".to_owned()),
-        (Action::Skip, "refuse the proposal and ask for another".to_owned()),
+        (Action::QueuePoint, help(Action::QueuePoint)),
+        (Action::Skip, help(Action::Skip)),
     ];
     let line = |(action, text): (Action, String)| {
         let key = model.keymap.key(action);
-        match action.legal(model) {
+        match legal(action, model) {
             Ok(()) => Line::from(vec![span(theme, Role::Key, format!("  {key:<3}")), Span::raw(text)]),
             Err(reason) => {
                 let text = cut(&format!("  {key:<3}{text} ({reason})"), width);
@@ -134,8 +136,8 @@ fn deeds(model: &Model, width: usize) -> Vec<Line<'static>> {
             }
         }
     };
-    let mut lines: Vec<Line> = deeds.into_iter().map(line).collect();
-    if let Err(reason) = Action::Override.legal(model) {
+    let mut lines: Vec<Line> = offered.into_iter().map(line).collect();
+    if let Err(reason) = legal(Action::Override, model) {
         lines.push(Line::from(span(theme, Role::Quiet, format!("  Nothing can be changed now: {reason}."))));
     }
     lines

@@ -1,4 +1,4 @@
-//! Points that were run more than once: how often they stood, their mean and spread, and which one leads.
+//! Points that ran more than once: landed repeats of all, mean, standard deviation, and the confidence of the leading one.
 //!
 //! ```text
 //! #3    3/3  0.641 m +-0.012  leads, 96 %
@@ -8,25 +8,24 @@
 use quadfrog::trial::PointRecord;
 use ratatui::text::{Line, Span};
 
-use super::{number, span};
-use crate::model::Model;
-use crate::theme::Role;
+use super::draw::{number, span};
+use crate::model::session::SessionModel;
+use crate::theme::{Role, Theme};
 
 /// A line for each repeated point, best mean first; narrow ones leave words out.
-pub fn lines(model: &Model, width: usize) -> Vec<Line<'static>> {
-    let mut points: Vec<&PointRecord> = model.points.iter().filter(|point| !point.trials.is_empty()).collect();
+pub fn lines(session: &SessionModel, theme: &Theme, width: usize) -> Vec<Line<'static>> {
+    let mut points: Vec<&PointRecord> = session.trials.points.iter().filter(|point| !point.trials.is_empty()).collect();
     points.sort_by(|a, b| b.mean.total_cmp(&a.mean));
-    points.into_iter().map(|point| line(model, point, width)).collect()
+    points.into_iter().map(|point| line(session, theme, point, width)).collect()
 }
 
-fn line(model: &Model, point: &PointRecord, width: usize) -> Line<'static> {
-    let theme = &model.theme;
+fn line(session: &SessionModel, theme: &Theme, point: &PointRecord, width: usize) -> Line<'static> {
     let first = point.trials.first().copied().unwrap_or(0);
     let spread = point.deviation.map_or(String::new(), |sd| format!(" {}{}", theme.plus_minus(), number(sd)));
     let mut spans = vec![
         span(theme, Role::Quiet, format!(" {:<5}", format!("#{first}"))),
         Span::raw(format!("{}/{} ", point.stood, point.trials.len())),
-        Span::raw(format!(" {} {}", number(point.mean), model.session.unit)),
+        Span::raw(format!(" {} {}", number(point.mean), session.info.unit)),
         span(theme, Role::Quiet, spread),
     ];
     if let Some(confidence) = point.confidence {
@@ -38,17 +37,17 @@ fn line(model: &Model, point: &PointRecord, width: usize) -> Line<'static> {
     Line::from(spans)
 }
 
-/// How a trial's point did over its repeats, in words; none where it ran once.
-pub fn repeats_of(model: &Model, trial: u32) -> Option<String> {
-    let point = model.points.iter().find(|point| point.trials.contains(&trial) && point.trials.len() > 1)?;
-    let spread = point.deviation.map_or(String::new(), |sd| format!(" {} {:.4}", model.theme.plus_minus(), sd));
+/// The repeats of a trial's point in words; none where it ran once.
+pub fn repeats_of(session: &SessionModel, theme: &Theme, trial: u32) -> Option<String> {
+    let point = session.trials.points.iter().find(|point| point.trials.contains(&trial) && point.trials.len() > 1)?;
+    let spread = point.deviation.map_or(String::new(), |sd| format!(" {} {:.4}", theme.plus_minus(), sd));
     let trials: Vec<String> = point.trials.iter().map(|trial| format!("#{trial}")).collect();
     Some(format!(
-        "{}/{} stood, {:.4}{spread} {} ({})",
+        "{}/{} landed, {:.4}{spread} {} ({})",
         point.stood,
         point.trials.len(),
         point.mean,
-        model.session.unit,
+        session.info.unit,
         trials.join(" ")
     ))
 }

@@ -1,4 +1,4 @@
-//! View 2, Trials: the whole table; the same table, without sorting marks, is the lower part of Live.
+//! View 2, Trials: the whole table. Its newest rows are the lower part of Live.
 //!
 //! ```text
 //! Trials ──────────────── 12 accept, 5 fall, 1 void; by number; all; F filter s sort
@@ -14,12 +14,13 @@ use ratatui::style::Style;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
 
-use super::objective::sign;
-use super::trial_text::remark;
-use super::{clock, cut, heading, number, span};
+use super::draw::{clock, cut, heading, number, sign, span};
 use crate::action::Action;
-use crate::column::{Column, SortBy, measured};
+use crate::column::Column;
+use crate::layout::first_row;
 use crate::model::Model;
+use crate::model::trials::{SortBy, measured};
+use crate::text::remark;
 use crate::theme::Role;
 
 /// Draws the view.
@@ -28,11 +29,11 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     render_table(frame, body, model, true);
 }
 
-/// How many of each verdict, and what the table is sorted and filtered by.
+/// The number of each verdict, and the order and filter of the table.
 fn summary(model: &Model) -> String {
-    let count = |verdict| model.trials.values().filter(|trial| trial.verdict == Some(verdict)).count();
-    let counts = Verdict::ALL.map(|verdict| format!("{} {}", count(verdict), verdict.name())).join(", ");
-    let view = &model.trials_view;
+    let trials = &model.session.trials;
+    let counts = Verdict::ALL.map(|verdict| format!("{} {}", trials.count(verdict), verdict.name())).join(", ");
+    let view = &model.trial_table;
     let shown = match (view.best_only, view.filter) {
         (true, _) => "best only".to_owned(),
         (false, Some(verdict)) => format!("only {}", verdict.name()),
@@ -40,7 +41,9 @@ fn summary(model: &Model) -> String {
     };
     let sort = match view.sort {
         SortBy::Number => "number",
-        SortBy::Parameter(index) => model.session.parameters.get(index).map_or("number", |info| info.name.as_str()),
+        SortBy::Parameter(index) => {
+            model.session.info.parameters.get(index).map_or("number", |info| info.name.as_str())
+        }
         SortBy::Column(column) => column.name(),
     };
     let turned = if view.reversed { " reversed" } else { "" };
@@ -54,43 +57,43 @@ fn summary(model: &Model) -> String {
 }
 
 /// One column as drawn.
-struct Shown {
+struct ShownColumn {
     title: String,
     width: usize,
-    cell: Cell,
+    cell: CellContent,
 }
 
-/// Where a cell's text comes from.
-enum Cell {
+/// Content of a cell.
+enum CellContent {
     Parameter(String),
     Of(Column),
 }
 
 /// The columns as the operator has chosen them, as far as `width` characters take them.
-fn shown_columns(model: &Model, width: usize) -> Vec<Shown> {
+fn shown_columns(model: &Model, width: usize) -> Vec<ShownColumn> {
     let mut shown = Vec::new();
-    for column in &model.trials_view.columns {
+    for column in &model.trial_table.columns {
         let (title, width) = match column {
             Column::Parameters => {
-                shown.extend(model.session.parameters.iter().map(|info| Shown {
+                shown.extend(model.session.info.parameters.iter().map(|info| ShownColumn {
                     title: format!("{:>7}", format!("{} {}", info.name, info.unit)),
                     width: 7,
-                    cell: Cell::Parameter(info.name.clone()),
+                    cell: CellContent::Parameter(info.name.clone()),
                 }));
                 continue;
             }
             Column::Dx | Column::Dy => (format!("{:>7}", format!("{} m", column.name())), 7),
             Column::Yaw => (format!("{:>7}", "yaw rad"), 7),
-            Column::Apex => (format!("{:>7}", "apex m"), 7),
+            Column::Rise => (format!("{:>7}", "rise m"), 7),
             Column::Air => (format!("{:>7}", "air s"), 7),
-            Column::Value => (format!("{:>8}", format!("J {}", model.session.unit)), 9),
+            Column::Value => (format!("{:>8}", format!("J {}", model.session.info.unit)), 9),
             Column::Verdict => ("  verdict".to_owned(), 10),
             Column::Source => ("source".to_owned(), 9),
             Column::Risk => ("fell".to_owned(), 4),
             Column::Time => ("   ran".to_owned(), 7),
             Column::Cause => ("cause, note".to_owned(), usize::MAX),
         };
-        shown.push(Shown { title, width, cell: Cell::Of(*column) });
+        shown.push(ShownColumn { title, width, cell: CellContent::Of(*column) });
     }
     let mut left = width.saturating_sub(NUMBER_WIDTH);
     for column in &mut shown {
@@ -104,7 +107,7 @@ fn shown_columns(model: &Model, width: usize) -> Vec<Shown> {
 /// Width of the trial's number and the space behind it.
 const NUMBER_WIDTH: usize = 5;
 
-/// The table, scrolled so that the chosen row is seen. `full` shows the choice; without it the newest rows are shown.
+/// The table, scrolled so that the selected row is seen. `full` shows the choice; without it the newest rows are shown.
 pub fn render_table(frame: &mut Frame, area: Rect, model: &Model, full: bool) {
     if area.height < 2 {
         return;
@@ -115,16 +118,18 @@ pub fn render_table(frame: &mut Frame, area: Rect, model: &Model, full: bool) {
     let titles: Vec<String> = columns.iter().map(|column| padded(&column.title, column.width)).collect();
     let title = format!("{:>4} {}", "#", titles.join(" "));
     frame.render_widget(Line::from(span(theme, Role::Heading, cut(&title, width))), Rect { height: 1, ..area });
-    let rows: Vec<&TrialRecord> = if full { model.table() } else { model.trials.values().collect() };
+    let rows: Vec<&TrialRecord> =
+        if full { model.trial_rows() } else { model.session.trials.records.values().collect() };
     if rows.is_empty() {
         let below = Rect { y: area.y + 1, height: area.height - 1, ..area };
         return render_empty(frame, below, model);
     }
-    let chosen = if full { model.selected_trial().map(|trial| trial.trial) } else { None };
-    let first = first_row(&rows, chosen, usize::from(area.height) - 1);
-    let best = model.best().map(|trial| trial.trial);
+    let selected_trial = if full { model.selected_trial().map(|trial| trial.trial) } else { None };
+    let position = selected_trial.and_then(|number| rows.iter().position(|row| row.trial == number));
+    let first = first_row(rows.len(), position, usize::from(area.height) - 1);
+    let best = model.session.trials.best().map(|trial| trial.trial);
     for (line, trial) in rows.iter().skip(first).take(usize::from(area.height) - 1).enumerate() {
-        let selected = chosen == Some(trial.trial);
+        let selected = selected_trial == Some(trial.trial);
         let style = if selected { theme.style(Role::Selected) } else { Style::new() };
         let area = Rect { y: area.y + 1 + line as u16, height: 1, ..area };
         let ghost = [model.live.ghost, model.live.comparison.as_ref().map(|c| c.b)].contains(&Some(trial.trial));
@@ -143,38 +148,20 @@ pub fn render_table(frame: &mut Frame, area: Rect, model: &Model, full: bool) {
     }
 }
 
-/// The row that stands first: the chosen one, or else the newest, is seen, in the middle where it can be.
-fn first_row(rows: &[&TrialRecord], chosen: Option<u32>, space: usize) -> usize {
-    let last = rows.len().saturating_sub(1);
-    let at = chosen.and_then(|number| rows.iter().position(|row| row.trial == number)).unwrap_or(last);
-    at.saturating_sub(space / 2).min(rows.len().saturating_sub(space))
-}
-
-/// The trial that the view Trials shows in a row of the terminal.
-pub fn trial_at(model: &Model, row: u16) -> Option<u32> {
-    // Below the frame, the tabs, the heading and the titles; above the answer and the next step.
-    let (top, bottom) = (super::TABS_ROW + 3, model.size.1.checked_sub(2)?);
-    let line = row.checked_sub(top).filter(|_| row < bottom)?;
-    let rows = model.table();
-    let chosen = model.selected_trial().map(|trial| trial.trial);
-    let first = first_row(&rows, chosen, usize::from(bottom - top));
-    rows.get(first + usize::from(line)).map(|trial| trial.trial)
-}
-
 /// Text as wide as its column.
 fn padded(text: &str, width: usize) -> String {
     let text = cut(text, width);
-    // The last column takes all that is left and needs no filling.
+    // The last column takes the rest of the line and needs no filling.
     if width > 40 { text } else { format!("{text:<width$}") }
 }
 
-/// What stands in place of the rows while there are none: before the first trial, how one goes.
+/// The text in place of the rows: before the first trial, the keys of a trial.
 fn render_empty(frame: &mut Frame, area: Rect, model: &Model) {
     let theme = &model.theme;
-    if !model.trials.is_empty() {
+    if !model.session.trials.records.is_empty() {
         return frame.render_widget(Line::from(span(theme, Role::Quiet, "     no trial passes the filter")), area);
     }
-    if model.replay.is_some() || model.session.observe {
+    if model.replay.is_some() || model.session.info.observe {
         return frame.render_widget(Line::from(span(theme, Role::Quiet, "     no trial yet")), area);
     }
     let step = |number: &str, words: &[(Action, &'static str)]| {
@@ -212,19 +199,19 @@ fn render_empty(frame: &mut Frame, area: Rect, model: &Model) {
     frame.render_widget(Paragraph::new(lines), area);
 }
 
-/// A cell's text and how it is drawn.
-fn cell(model: &Model, trial: &TrialRecord, column: &Shown, best: bool) -> (String, Role) {
-    let (mark, role) = sign(trial.verdict);
+/// Text and role of a cell.
+fn cell(model: &Model, trial: &TrialRecord, column: &ShownColumn, best: bool) -> (String, Role) {
+    let (symbol, role) = sign(trial.verdict);
     let column = match &column.cell {
-        Cell::Parameter(name) => {
+        CellContent::Parameter(name) => {
             let value = trial.parameters.iter().find(|(known, _)| known == name);
             return (format!("{:>7}", value.map_or("-".to_owned(), |(_, value)| number(*value))), Role::Text);
         }
-        Cell::Of(column) => *column,
+        CellContent::Of(column) => *column,
     };
     match column {
         Column::Parameters => (String::new(), Role::Text),
-        Column::Dx | Column::Dy | Column::Yaw | Column::Apex | Column::Air => {
+        Column::Dx | Column::Dy | Column::Yaw | Column::Rise | Column::Air => {
             let value = measured(trial, column).map_or("-".to_owned(), |value| format!("{value:+.3}"));
             (format!("{value:>7}"), Role::Text)
         }
@@ -238,7 +225,7 @@ fn cell(model: &Model, trial: &TrialRecord, column: &Shown, best: bool) -> (Stri
                 (None, Some(suggested)) => format!("{}?", suggested.name()),
                 (None, None) => "runs".to_owned(),
             };
-            (format!("{mark} {verdict:<7}{}", if best { "*" } else { " " }), role)
+            (format!("{symbol} {verdict:<7}{}", if best { "*" } else { " " }), role)
         }
         Column::Source => {
             let parent = trial.parent.map_or(String::new(), |parent| format!(" {parent}"));
@@ -249,7 +236,7 @@ fn cell(model: &Model, trial: &TrialRecord, column: &Shown, best: bool) -> (Stri
             (risk.map_or("-".to_owned(), |risk| format!("{}/{}", risk.falls, risk.neighbours)), Role::Quiet)
         }
         Column::Time => {
-            let begun = model.ran.get(&trial.trial).map(|ran| clock(ran.begun_ns));
+            let begun = model.session.trials.ran.get(&trial.trial).map(|ran| clock(ran.begun_ns));
             (format!("{:>6}", begun.unwrap_or("-".to_owned())), Role::Quiet)
         }
         Column::Cause => (remark(trial), Role::Quiet),

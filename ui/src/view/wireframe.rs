@@ -1,4 +1,4 @@
-//! The robot as lines, from the side and from above, by the model's own kinematics.
+//! The robot as a wireframe, from the side and from above.
 //!
 //! ```text
 //! Robot ─────────────── FR# FL# RR# RL#
@@ -9,39 +9,33 @@
 
 use nalgebra::{UnitQuaternion, Vector3};
 use quadfrog::robot::description::RobotDescription;
+use quadfrog::robot::kinematics::LegGeometry;
 use quadfrog::robot::{LEGS, Leg, leg_of};
+use quadfrog::telemetry::Tick;
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 
-use super::chart::Dots;
-use super::heading;
-use crate::model::Model;
-use crate::theme::Role;
+use super::dots::DotGrid;
+use super::draw::heading;
+use crate::theme::{Role, Theme};
 
-/// Half of the width that a picture shows, m: the robot with its legs stretched.
+/// Half of the width of a picture, m: the robot with its legs stretched.
 const REACH: f64 = 0.45;
 
-/// Hip, thigh joint, knee and foot of a leg in the body frame, m.
+/// Hip, thigh joint, knee and foot of a leg in the body frame, m: the forward kinematics with the links beyond a joint
+/// left out.
 fn leg_points(robot: &RobotDescription, leg: Leg, q: &Vector3<f64>) -> [Vector3<f64>; 4] {
     let geometry = &robot.leg_geometry;
     let hip = robot.legs[leg as usize].joint_origin[0];
-    let l1 = leg.side() * geometry.abduction;
-    let ((s1, c1), (s2, c2)) = (q.x.sin_cos(), q.y.sin_cos());
-    // As the foot in `robot::kinematics`, with the calf's part left out: a = l2 cos q2.
-    let a = geometry.thigh * c2;
-    let thigh_leg = Vector3::new(0.0, l1 * c1, l1 * s1);
-    let knee_leg = Vector3::new(-geometry.thigh * s2, l1 * c1 + a * s1, l1 * s1 - a * c1);
-    let foot_leg = geometry.foot(q, leg.side()).position_leg;
-    [hip, hip + thigh_leg, hip + knee_leg, hip + foot_leg]
+    let end = |thigh, calf| hip + LegGeometry { thigh, calf, ..*geometry }.foot(q, leg.side()).position_leg;
+    [hip, end(0.0, 0.0), end(geometry.thigh, 0.0), end(geometry.thigh, geometry.calf)]
 }
 
 /// Draws the panel.
-pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
-    let theme = &model.theme;
-    let tick = &model.snapshot.tick;
+pub fn render(frame: &mut Frame, area: Rect, robot: Option<&RobotDescription>, tick: &Tick, theme: &Theme) {
     let lamps = Leg::ALL.map(|leg| format!("{}{}", leg.name(), theme.lamp(tick.estimate.contact[leg as usize])));
     let body = heading(frame, area, theme, "Robot", &lamps.join(" "));
-    let Some(robot) = &model.robot else { return };
+    let Some(robot) = robot else { return };
     if body.height < 4 || body.width < 20 {
         return;
     }
@@ -60,21 +54,21 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     for (from, to) in [(0, 1), (1, 3), (3, 2), (2, 0)] {
         lines.push([legs[from][0], legs[to][0]]);
     }
-    draw(frame, side, model, &lines, |p| (p.x, p.z), Some(-height));
+    draw(frame, side, theme, &lines, |p| (p.x, p.z), Some(-height));
     // From above: forward up, left to the left.
-    draw(frame, above, model, &lines, |p| (-p.y, p.x), None);
+    draw(frame, above, theme, &lines, |p| (-p.y, p.x), None);
 }
 
 /// Draws lines projected to (right, up), in m around the trunk; `floor` is the height of the ground there.
 fn draw(
     frame: &mut Frame,
     area: Rect,
-    model: &Model,
+    theme: &Theme,
     lines: &[[Vector3<f64>; 2]],
     project: impl Fn(&Vector3<f64>) -> (f64, f64),
     floor: Option<f64>,
 ) {
-    let mut dots = Dots::new(area, model.theme.glyphs);
+    let mut dots = DotGrid::new(area, theme.glyphs);
     let (across, down) = (dots.size.0 as f64, dots.size.1 as f64);
     // A character is about twice as high as wide, so the area is `width` by `2 height` in the same unit.
     let (width, height) = (f64::from(area.width), 2.0 * f64::from(area.height));
@@ -95,5 +89,5 @@ fn draw(
     for [from, to] in lines {
         dots.line(place(project(from)), place(project(to)));
     }
-    dots.draw(frame.buffer_mut(), area, model.theme.style(Role::SeriesA));
+    dots.draw(frame.buffer_mut(), area, theme.style(Role::SeriesA));
 }

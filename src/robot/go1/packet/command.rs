@@ -7,25 +7,25 @@ use super::{CommandError, CrcForm, HEAD, Header, MOTORS, Rejection, crc};
 
 /// Length of a command, bytes.
 pub const COMMAND_LENGTH: usize = 614;
-/// Bytes that its checksum covers.
+/// Bytes covered by the checksum.
 const COVERED: usize = 608;
 
 /// Motor mode: the motor follows its target.
 pub const MODE_SERVO: u8 = 0x0A;
-/// Motor mode: the motor brakes by itself; how strongly is not established.
+/// Motor mode: the motor brakes by itself, with unknown strength.
 pub const MODE_DAMPING: u8 = 0x00;
 /// The position that means "no position target".
 pub const POSITION_STOP: f32 = 2.146e9;
 /// The velocity that means "no velocity target".
 pub const VELOCITY_STOP: f32 = 16000.0;
 
-/// Steps of the fixed point: words per N m, per N m/rad, per N m s/rad.
+/// Resolution of the fixed point: steps per N m, per N m/rad, per N m s/rad.
 const TORQUE_STEPS: f32 = 256.0;
 const KP_STEPS: f32 = 32.0;
 const KD_STEPS: f32 = 16.0;
 
-/// The byte with which a program can switch the robot's battery off (0xA5), which drops the robot. The type has one value:
-/// a command with the request cannot be built, and one that comes over the network is no command.
+/// The byte that switches the robot's battery off (0xA5), which drops the robot. The type has one value: a command with
+/// the request cannot be built, and a datagram with it is rejected.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, FromZeros, IntoBytes, Immutable, KnownLayout, Unaligned)]
 #[repr(u8)]
 enum BatteryOff {
@@ -33,26 +33,26 @@ enum BatteryOff {
     Never = 0,
 }
 
-/// What one motor is told, in the datagram's own resolution: `tau + kp (q_des - q) + kd (dq_des - dq)` inside the motor.
+/// Target of one motor in the datagram's resolution: `tau + kp (q_des - q) + kd (dq_des - dq)` inside the motor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MotorTarget {
     /// [`MODE_SERVO`] or [`MODE_DAMPING`].
     pub mode: u8,
-    /// Desired angle, rad, or [`POSITION_STOP`]. Any bit pattern travels.
+    /// Desired angle, rad, or [`POSITION_STOP`].
     pub position: f32,
-    /// Desired velocity, rad/s, or [`VELOCITY_STOP`]. Any bit pattern travels.
+    /// Desired velocity, rad/s, or [`VELOCITY_STOP`].
     pub velocity: f32,
     /// Feed-forward torque, N m, in steps of 1/256: -128 up to less than 128.
     pub torque: f32,
-    /// Stiffness, N m/rad, in steps of 1/32: 0 up to less than 1024. More would fit if the robot reads the word as unsigned,
-    /// which is not established.
+    /// Stiffness, N m/rad, in steps of 1/32: 0 up to less than 1024. Whether the robot reads the word as unsigned,
+    /// which allows more, is unknown.
     pub kp: f32,
     /// Damping, N m s/rad, in steps of 1/16: 0 up to less than 2048.
     pub kd: f32,
 }
 
 impl MotorTarget {
-    /// Braking, no target, no gain.
+    /// Braking without target and gain.
     pub const DAMPING: MotorTarget = MotorTarget {
         mode: MODE_DAMPING,
         position: POSITION_STOP,
@@ -63,7 +63,7 @@ impl MotorTarget {
     };
 }
 
-/// One motor's 27 bytes.
+/// Record of one motor, 27 bytes.
 #[derive(Debug, Clone, Copy, PartialEq, FromBytes, IntoBytes, Immutable, KnownLayout, Unaligned)]
 #[repr(C)]
 struct TargetRecord {
@@ -76,50 +76,50 @@ struct TargetRecord {
     reserve: [U32; 3],
 }
 
-/// The command datagram, 614 bytes. There is no field for the battery's switch: byte 562 is zero in every value of this type.
+/// The command datagram, 614 bytes. Byte 562, which switches the battery off, is zero in every value of this type.
 #[derive(Debug, Clone, Copy, PartialEq, FromZeros, IntoBytes, Immutable, KnownLayout, Unaligned)]
 #[repr(C)]
 pub struct LowCmd {
-    /// How it begins.
+    /// Header.
     pub header: Header,
     motor: [TargetRecord; MOTORS],
     battery_off: BatteryOff,
-    /// Reserved bytes behind the battery's.
+    /// Reserved bytes of the battery.
     pub battery_reserve: [u8; 3],
     /// Bytes of the remote control.
     pub remote: [u8; 40],
-    /// Reserved; the checksum covers its lower half alone.
+    /// Reserved; the checksum covers the lower half alone.
     pub reserve: U32,
     crc: U32,
 }
 
 impl LowCmd {
-    /// A command that moves nothing: every motor brakes.
+    /// Returns a command in which every motor brakes.
     pub fn damping(form: CrcForm) -> LowCmd {
         let mut command = LowCmd::unsealed();
         command.seal(form);
         command
     }
 
-    /// The same before its checksum is computed: to be changed first.
+    /// Returns the command of [`LowCmd::damping`] without a checksum.
     pub fn unsealed() -> LowCmd {
         let mut command = LowCmd::new_zeroed();
         command.header = Header::low_level();
         for motor in 0..MOTORS {
-            command.put(motor, &MotorTarget::DAMPING, [0; 3]);
+            command.put(motor, &MotorTarget::DAMPING, [U32::ZERO; 3]);
         }
         command
     }
 
-    /// Sets one motor's target, rounded towards zero to the datagram's steps as the official library does. The checksum is
-    /// that of before until [`LowCmd::seal`].
+    /// Sets one motor's target, rounded towards zero to the resolution as by the official library. The checksum does
+    /// not change until [`LowCmd::seal`].
     ///
     /// # Errors
-    /// When torque or a gain is not finite or does not fit; nothing is changed then. (The official library lets the words
-    /// wrap: 200 N m would be sent as -56.)
+    /// Torque or a gain is not finite or out of range; the command is unchanged. (The official library lets the number
+    /// wrap around: it sends 200 N m as -56.)
     ///
     /// # Panics
-    /// When there is no such motor.
+    /// There is no such motor.
     pub fn set(&mut self, motor: usize, target: &MotorTarget) -> Result<(), CommandError> {
         let check = |quantity, unit, value: f32, lowest, highest| {
             if !value.is_finite() {
@@ -130,16 +130,16 @@ impl LowCmd {
                 Err(CommandError::OutOfRange { quantity, motor, value, unit, lowest, highest })
             }
         };
-        // The words' range as signed 16-bit numbers: what every way of reading them agrees on.
+        // Positive range of signed 16-bit numbers: the same if the robot reads the words as unsigned.
         let words = 32768.0;
         check("torque", "N m", target.torque, -words / TORQUE_STEPS, words / TORQUE_STEPS)?;
         check("kp", "N m/rad", target.kp, 0.0, words / KP_STEPS)?;
         check("kd", "N m s/rad", target.kd, 0.0, words / KD_STEPS)?;
-        self.put(motor, target, self.reserve_of(motor));
+        self.put(motor, target, self.motor[motor].reserve);
         Ok(())
     }
 
-    fn put(&mut self, motor: usize, target: &MotorTarget, reserve: [u32; 3]) {
+    fn put(&mut self, motor: usize, target: &MotorTarget, reserve: [U32; 3]) {
         self.motor[motor] = TargetRecord {
             mode: target.mode,
             position: target.position.into(),
@@ -147,14 +147,14 @@ impl LowCmd {
             torque: ((target.torque * TORQUE_STEPS) as i16).into(),
             kp: ((target.kp * KP_STEPS) as u16).into(),
             kd: ((target.kd * KD_STEPS) as u16).into(),
-            reserve: reserve.map(U32::new),
+            reserve,
         };
     }
 
-    /// What `motor` is told.
+    /// Returns the target of `motor`.
     ///
     /// # Panics
-    /// When there is no such motor.
+    /// There is no such motor.
     pub fn motor(&self, motor: usize) -> MotorTarget {
         let record = &self.motor[motor];
         MotorTarget {
@@ -167,37 +167,21 @@ impl LowCmd {
         }
     }
 
-    /// The reserved words of `motor`'s record.
-    ///
-    /// # Panics
-    /// When there is no such motor.
-    pub fn reserve_of(&self, motor: usize) -> [u32; 3] {
-        self.motor[motor].reserve.map(U32::get)
-    }
-
-    /// Sets the reserved words of `motor`'s record.
-    ///
-    /// # Panics
-    /// When there is no such motor.
-    pub fn set_reserve(&mut self, motor: usize, reserve: [u32; 3]) {
-        self.motor[motor].reserve = reserve.map(U32::new);
-    }
-
-    /// Computes the checksum; to be called once all is set.
+    /// Computes the checksum; call after all fields are set.
     pub fn seal(&mut self, form: CrcForm) {
         self.crc = form.apply(crc(&self.as_bytes()[..COVERED])).into();
     }
 
-    /// The bytes that travel.
+    /// The bytes of the datagram.
     pub fn bytes(&self) -> &[u8] {
         self.as_bytes()
     }
 
-    /// Reads a datagram as the robot would have to: the view from the other side, for the emulator.
+    /// Parses a datagram, for the emulator.
     ///
     /// # Errors
-    /// When it is not a command in that form, or asks for the battery to be switched off.
-    pub fn judge(datagram: &[u8], form: CrcForm) -> Result<&LowCmd, Rejection> {
+    /// The datagram is no command with that form of the checksum, or requests to switch the battery off.
+    pub fn parse(datagram: &[u8], form: CrcForm) -> Result<&LowCmd, Rejection> {
         let length = datagram.len();
         if length != COMMAND_LENGTH {
             return Err(Rejection::Length { length, expected: COMMAND_LENGTH });

@@ -1,13 +1,13 @@
-//! The checksum of both datagrams: a 32-bit register, start FFFFFFFF, polynomial 04C11DB7, not reflected, no final xor, over
-//! little-endian words taken from their highest bit down (`specs/go1-wire.md`, section 3).
+//! Checksum of both datagrams: a 32-bit register, start FFFFFFFF, polynomial 04C11DB7, not reflected, no final xor,
+//! over little-endian words, each from bit 31 to bit 0 (`docs/go1-wire.md`, section 3).
 
-/// Words that are turned round at a time: more than a datagram has.
+/// Words that are reflected at a time: more than a datagram has.
 const BLOCK: usize = 256;
 
-/// The checksum of the whole words in `data`; what is left over is not covered.
+/// Computes the checksum of the whole words in `data`; remaining bytes are not covered.
 ///
-/// It is the common CRC-32 seen in a mirror: that one has the same polynomial and start, takes every byte from its lowest bit up,
-/// shifts the other way, and inverts the register at the end. So the words go in mirrored and the register comes out so.
+/// Uses the common CRC-32, which has the same polynomial and start but is reflected and inverts the register at the
+/// end: the words are bit-reversed before, the result after.
 pub fn crc(data: &[u8]) -> u32 {
     let (words, _) = data.as_chunks::<4>();
     let mut common = crc32fast::Hasher::new();
@@ -21,18 +21,18 @@ pub fn crc(data: &[u8]) -> u32 {
     (!common.finalize()).reverse_bits()
 }
 
-/// How the checksum stands in a datagram.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
+/// Form of the checksum in a datagram.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum CrcForm {
-    /// As it is: what the official library sends in every command, and what low-level states have.
+    /// Unchanged: in every command of the official library and in low-level states.
     Plain,
-    /// Disguised: in states of the high-level protocol, and in the commands of the robot's own factory controller.
+    /// Xored and rotated: in states of the high-level protocol, and in commands of the robot's factory controller.
     Sealed,
 }
 
 impl CrcForm {
-    /// The number that stands in a datagram whose checksum is `crc`.
+    /// Returns the number in a datagram whose checksum is `crc`.
     pub const fn apply(self, crc: u32) -> u32 {
         match self {
             CrcForm::Plain => crc,
@@ -45,9 +45,9 @@ impl CrcForm {
 mod tests {
     use super::*;
 
-    /// The worked examples of `specs/go1-wire.md`, section 3.
+    /// The worked examples of `docs/go1-wire.md`, section 3.
     #[test]
-    fn the_specifications_examples() {
+    fn the_documented_examples() {
         assert_eq!(crc(&[0; 4]), 0xC704_DD7B);
         assert_eq!(crc(&[0xFE, 0xEF, 0xFF, 0]), 0x9BF0_26DF);
         assert_eq!(crc(&[0; 608]), 0xE7CD_1C3B);
@@ -55,7 +55,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_a_whole_word_is_not_covered() {
+    fn an_incomplete_word_is_not_covered() {
         assert_eq!(crc(&[1, 2, 3, 4, 5, 6, 7]), crc(&[1, 2, 3, 4]));
     }
 }

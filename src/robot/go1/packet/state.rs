@@ -5,20 +5,20 @@ use zerocopy::{FromBytes, FromZeros, Immutable, IntoBytes, KnownLayout, Unaligne
 
 use super::{CrcForm, HEAD, HIGH_LEVEL, Header, MOTORS, Rejection, crc};
 
-/// Bytes of a state that are read; a real robot is reported to send 13 more, of unknown meaning.
+/// Bytes of a state that are read; a real robot is reported to send 13 more of unknown meaning.
 pub const STATE_LENGTH: usize = 807;
-/// Bytes that its checksum covers.
+/// Bytes covered by the checksum.
 const COVERED: usize = 800;
-/// Steps of the reported torque, per N m.
+/// Resolution of the reported torque, steps per N m.
 const TORQUE_STEPS: f32 = 256.0;
-/// What one step of a cell's voltage is, V.
+/// Resolution of a cell's voltage, V.
 const CELL_STEP_V: f32 = 0.032;
 
-/// The inertial unit's 53 bytes. That its axes are the trunk's is assumed.
+/// Record of the inertial unit, 53 bytes. Assumed: its axes are the trunk's.
 #[derive(Debug, Clone, Copy, PartialEq, FromBytes, IntoBytes, Immutable, KnownLayout, Unaligned)]
 #[repr(C)]
 pub struct ImuRecord {
-    /// Rotation that takes body axes to world axes: w, x, y, z.
+    /// Rotation from body axes to world axes: w, x, y, z.
     pub quaternion: [F32; 4],
     /// Angular velocity, rad/s.
     pub gyroscope: [F32; 3],
@@ -30,7 +30,7 @@ pub struct ImuRecord {
     pub temperature: i8,
 }
 
-/// One motor's 32 bytes.
+/// Record of one motor, 32 bytes.
 #[derive(Debug, Clone, Copy, PartialEq, FromBytes, IntoBytes, Immutable, KnownLayout, Unaligned)]
 #[repr(C)]
 pub struct MotorRecord {
@@ -42,13 +42,13 @@ pub struct MotorRecord {
     pub velocity: F32,
     /// Acceleration, rad/s^2.
     pub acceleration: I16,
-    /// Torque as the motor estimates it, words of 1/256 N m: see [`MotorRecord::torque`].
+    /// Torque as the motor estimates it, 1/256 N m; see [`MotorRecord::torque`].
     pub torque_word: I16,
-    /// Angle before the motor's own filter, rad.
+    /// Angle before the motor's filter, rad.
     pub position_raw: F32,
-    /// Velocity before the motor's own filter, rad/s.
+    /// Velocity before the motor's filter, rad/s.
     pub velocity_raw: F32,
-    /// Acceleration before the motor's own filter, rad/s^2.
+    /// Acceleration before the motor's filter, rad/s^2.
     pub acceleration_raw: I16,
     /// Temperature, degrees Celsius.
     pub temperature: i8,
@@ -62,19 +62,19 @@ impl MotorRecord {
         f32::from(self.torque_word.get()) / TORQUE_STEPS
     }
 
-    /// Sets the torque, N m, as near as the word can say it.
+    /// Sets the torque, N m, rounded to the resolution.
     pub fn set_torque(&mut self, torque: f32) {
         self.torque_word = ((torque * TORQUE_STEPS).round() as i16).into();
     }
 }
 
-/// The battery's 24 bytes.
+/// Record of the battery, 24 bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, FromBytes, IntoBytes, Immutable, KnownLayout, Unaligned)]
 #[repr(C)]
 pub struct BatteryRecord {
     /// Version, high and low.
     pub version: [u8; 2],
-    /// Status: 1 discharging, 2 charging, others in `specs/go1-wire.md`, section 4.
+    /// Status: 1 discharging, 2 charging, others in `docs/go1-wire.md`, section 4.
     pub status: u8,
     /// State of charge, percent.
     pub charge: u8,
@@ -84,19 +84,19 @@ pub struct BatteryRecord {
     pub cycles: U16,
     /// Temperatures at the cells, degrees Celsius.
     pub cell_temperature: [i8; 2],
-    /// Temperatures of its controller, degrees Celsius.
+    /// Temperatures of the controller, degrees Celsius.
     pub controller_temperature: [i8; 2],
-    /// Cell voltages in steps of 32 mV: see [`BatteryRecord::cell_v`].
+    /// Cell voltages, 32 mV; see [`BatteryRecord::cell_v`].
     pub cell_steps: [u8; 10],
 }
 
 impl BatteryRecord {
-    /// Voltage of each cell, V; zero where there is no such cell.
+    /// Voltage of each cell, V; zero for absent cells.
     pub fn cell_v(&self) -> [f32; 10] {
         self.cell_steps.map(|steps| f32::from(steps) * CELL_STEP_V)
     }
 
-    /// Sets the voltages of the cells, V, as near as the steps can say them.
+    /// Sets the voltages of the cells, V, rounded to the resolution.
     pub fn set_cell_v(&mut self, cell_v: &[f32; 10]) {
         self.cell_steps = cell_v.map(|v| (v / CELL_STEP_V).round() as u8);
     }
@@ -106,7 +106,7 @@ impl BatteryRecord {
 #[derive(Debug, Clone, Copy, PartialEq, FromBytes, IntoBytes, Immutable, KnownLayout, Unaligned)]
 #[repr(C)]
 pub struct LowState {
-    /// How it begins.
+    /// Header.
     pub header: Header,
     /// Inertial unit.
     pub imu: ImuRecord,
@@ -114,7 +114,7 @@ pub struct LowState {
     pub motor: [MotorRecord; MOTORS],
     /// Battery.
     pub battery: BatteryRecord,
-    /// Foot sensors; their order is assumed to be that of the legs, their unit is not established.
+    /// Foot sensors. Assumed: the order of the legs. The unit is unknown.
     pub foot_force: [I16; 4],
     /// Foot forces as the robot estimates them.
     pub foot_force_estimated: [I16; 4],
@@ -122,13 +122,13 @@ pub struct LowState {
     pub tick: U32,
     /// Bytes of the remote control.
     pub remote: [u8; 40],
-    /// Reserved; the checksum covers its first byte alone.
+    /// Reserved; the checksum covers the first byte alone.
     pub reserve: U32,
     crc: U32,
 }
 
 impl LowState {
-    /// A low-level state in which all is zero.
+    /// Returns a low-level state with all fields zero.
     pub fn zero() -> LowState {
         let mut state = LowState::new_zeroed();
         state.header = Header::low_level();
@@ -136,22 +136,23 @@ impl LowState {
         state
     }
 
-    /// Computes the checksum, in the form that the level demands; to be called once all is set.
+    /// Computes the checksum in the form of the level; call after all fields are set.
     pub fn seal(&mut self) {
         self.crc = form_of(self.header.level).apply(crc(&self.as_bytes()[..COVERED])).into();
     }
 
-    /// The bytes that travel.
+    /// The bytes of the datagram.
     pub fn bytes(&self) -> &[u8] {
         self.as_bytes()
     }
 
-    /// Judges one datagram by itself, as the official endpoint judges the last of a queue: head, then checksum in the form that
-    /// the level demands. What is longer is judged on its first 807 bytes.
+    /// Parses a datagram and checks head and checksum, as the official endpoint does with the last datagram of a queue.
+    /// Bytes after the first 807 are ignored.
     ///
     /// # Errors
-    /// When it is no state. A datagram that is too short is refused as such; the official endpoint finds its checksum wrong.
-    pub fn judge(datagram: &[u8]) -> Result<&LowState, Rejection> {
+    /// The datagram is no state. A datagram that is too short is an error of its own; the official endpoint reports a
+    /// wrong checksum.
+    pub fn parse(datagram: &[u8]) -> Result<&LowState, Rejection> {
         let Ok((state, _)) = LowState::ref_from_prefix(datagram) else {
             return Err(Rejection::Length { length: datagram.len(), expected: STATE_LENGTH });
         };
@@ -163,7 +164,7 @@ impl LowState {
     }
 }
 
-/// The form that a state of `level` must have.
+/// Returns the checksum's form in a state of `level`.
 fn form_of(level: u8) -> CrcForm {
     if level == HIGH_LEVEL { CrcForm::Sealed } else { CrcForm::Plain }
 }

@@ -1,4 +1,4 @@
-//! What a study without a screen prints.
+//! Output of a study without a screen: a progress bar on a terminal, lines elsewhere, JSON on request.
 
 use std::collections::HashMap;
 use std::io::{IsTerminal, Write};
@@ -11,16 +11,15 @@ use quadfrog::report::table;
 use quadfrog::trial::{MeasuredJump, Task, TrialRecord, Verdict};
 use serde::{Serialize, Serializer};
 
-use super::OptimizeArguments;
-use crate::command::chosen::Chosen;
+use crate::command::selection::SelectedStudy;
 
-/// What the operator sees: a bar on a terminal, lines elsewhere, JSON if asked for.
 pub struct Printer {
     json: bool,
     several: bool,
     bar: Option<ProgressBar>,
-    /// Whether the bar is that of one study, whoever runs its trials.
+    /// Whether the bar counts the trials of one study, of all its workers.
     one: bool,
+    /// Unit of each parameter.
     units: HashMap<String, String>,
     output: Mutex<()>,
     /// Task, best value and falls of each finished study.
@@ -28,31 +27,22 @@ pub struct Printer {
 }
 
 impl Printer {
-    pub fn new(arguments: &OptimizeArguments, config: &Config, studies: &[Chosen]) -> Printer {
-        let budget =
-            |study: &Chosen| u64::from(arguments.study.trials.or(study.budget).unwrap_or(config.optimize.trials));
-        // All workers that join work off the budget of the same study.
-        let one = arguments.join.is_some() || studies.len() == 1;
+    /// `budgets`: number of trials of each study, or, if `joined`, of the one study for each worker here.
+    pub fn new(json: bool, joined: bool, config: &Config, budgets: &[u32]) -> Printer {
+        let one = joined || budgets.len() == 1;
         let bar = std::io::stderr().is_terminal().then(|| {
-            let bar = ProgressBar::new(studies.iter().take(if one { 1 } else { studies.len() }).map(budget).sum());
+            let budgets = if one { &budgets[..1] } else { budgets };
+            let bar = ProgressBar::new(budgets.iter().copied().map(u64::from).sum());
             let style = ProgressStyle::with_template("{bar:30} {pos}/{len} trials  {msg}");
             bar.with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
         });
         let units = Task::ALL.iter().flat_map(|task| config.parameters(*task)).map(|p| (p.name, p.unit)).collect();
-        Printer {
-            json: arguments.json,
-            several: studies.len() > 1,
-            bar,
-            one,
-            units,
-            output: Mutex::new(()),
-            results: Mutex::default(),
-        }
+        Printer { json, several: budgets.len() > 1, bar, one, units, output: Mutex::new(()), results: Mutex::default() }
     }
 
-    /// A trial has been judged; `counted` are those of its study that count by now, other workers' among them.
-    pub fn trial(&self, study: &Chosen, row: &TrialRecord, counted: u32) {
-        let _alone = self.output.lock();
+    /// Prints a judged trial; `counted` is the number of counted trials of its study, of all workers.
+    pub fn trial(&self, study: &SelectedStudy, row: &TrialRecord, counted: u32) {
+        let _output = self.output.lock();
         if self.json {
             let line = JsonLine {
                 task: self.several.then(|| study.task.name()),
@@ -63,27 +53,27 @@ impl Printer {
                 verdict: row.verdict,
                 measured: row.measured,
             };
-            // Numbers and names: there is nothing in it that JSON cannot say.
-            say(&serde_json::to_string(&line).unwrap_or_default());
+            // Numbers and names always serialize.
+            print_line(&serde_json::to_string(&line).unwrap_or_default());
         }
         let line = table::line(row, study.task.unit(), &self.units);
         match &self.bar {
             Some(bar) => {
                 match self.one {
-                    // Of several workers here one may know more than the other.
+                    // Counts of several workers may arrive out of order.
                     true => bar.set_position(bar.position().max(u64::from(counted))),
                     false => bar.inc(1),
                 }
                 bar.set_message(line);
             }
             None if self.json => {}
-            None if self.several => say(&format!("{} seed {}: {line}", study.task.name(), study.seed)),
-            None => say(&line),
+            None if self.several => print_line(&format!("{} seed {}: {line}", study.task.name(), study.seed)),
+            None => print_line(&line),
         }
     }
 
-    pub fn finished(&self, study: &Chosen, rows: &[TrialRecord], best: Option<&TrialRecord>, options: &Options) {
-        let _alone = self.output.lock();
+    pub fn finished(&self, study: &SelectedStudy, rows: &[TrialRecord], best: Option<&TrialRecord>, options: &Options) {
+        let _output = self.output.lock();
         let falls = rows.iter().filter(|row| row.verdict == Some(Verdict::Fall)).count();
         let value = best.and_then(|best| best.value).unwrap_or(0.0);
         self.results.lock().unwrap_or_else(PoisonError::into_inner).push((study.task, value, falls));
@@ -97,21 +87,23 @@ impl Printer {
             None => "No trial was accepted.\n".to_owned(),
         };
         text += &match &options.join {
-            Some(storage) => format!("The study is in {storage}; this worker's part in {}\n", study.folder.display()),
+            Some(storage) => {
+                format!("The study is in {storage}; the files of this worker are in {}\n", study.folder.display())
+            }
             None => format!("The study is in {}\n", study.folder.display()),
         };
         self.print(&text);
     }
 
     fn print(&self, text: &str) {
-        let print = || if self.json { eprint!("{text}") } else { say(text.trim_end()) };
+        let print = || if self.json { eprint!("{text}") } else { print_line(text.trim_end()) };
         match &self.bar {
             Some(bar) => bar.suspend(print),
             None => print(),
         }
     }
 
-    /// What several studies of a task amount to; a study in which nothing was accepted counts with 0.
+    /// Prints mean best value and falls of each task with several studies; a study without an accepted trial counts with 0.
     pub fn summary(&self) {
         let results = self.results.lock().unwrap_or_else(PoisonError::into_inner);
         for task in Task::ALL {
@@ -139,12 +131,12 @@ impl Drop for Printer {
     }
 }
 
-/// One line on standard output; a reader that has gone away (`| head`) wants no more.
-fn say(line: &str) {
+/// Prints a line; a closed pipe (`| head`) is no error.
+fn print_line(line: &str) {
     let _ = writeln!(std::io::stdout(), "{line}");
 }
 
-/// A finished trial as the JSON line says it; task and seed only where several studies run at once.
+/// A finished trial in JSON; task and seed only if several studies run.
 #[derive(Serialize)]
 struct JsonLine<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]

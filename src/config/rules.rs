@@ -1,0 +1,172 @@
+//! Rules between the keys of a configuration, and between a configuration and a robot.
+
+use super::ConfigError;
+use super::checked::Config;
+use super::files::SafetyFile;
+use crate::control::leg::stance_of;
+use crate::robot::Leg;
+use crate::robot::description::RobotDescription;
+use crate::sim::SimError;
+use crate::trial::{Backend, Task, parameter_unit};
+
+const CONTROL: &str = "control.toml";
+const SAFETY: &str = "safety.toml";
+const OPTIMIZE: &str = "optimize.toml";
+
+impl Config {
+    pub(super) fn check(&self) -> Result<(), ConfigError> {
+        self.check_control()?;
+        self.check_safety()?;
+        self.check_optimize()?;
+        self.simulator.check().map_err(|error| match error {
+            SimError::Value { key, value, remedy } => self.refuse("simulator.toml", key, value, remedy),
+            SimError::Syntax { reason } => {
+                ConfigError::Syntax { file: "simulator.toml".to_owned(), line: 1, message: reason }
+            }
+        })
+    }
+
+    fn check_control(&self) -> Result<(), ConfigError> {
+        for task in Task::ALL {
+            let chosen = self.task(task);
+            let tables = format!("tasks.{}", task.name());
+            for (key, value) in
+                [("kp", chosen.kp), ("kd", chosen.kd), ("kd_joint", chosen.kd_joint), ("k_att", chosen.k_att)]
+            {
+                let [least, most] = self.safety.gains[key];
+                if !(value >= least && value <= most) {
+                    let reason =
+                        format!("must be within the safe range [{least}, {most}] of safety.toml, [gains] {key}");
+                    return Err(self.refuse(CONTROL, &format!("{tables}.{key}"), value, reason));
+                }
+            }
+            let f1_is_parameter = self.optimize.parameters[task.name()].iter().any(|name| name == "f1");
+            if chosen.jumps > 1 && chosen.f1_hz <= 0.0 && !f1_is_parameter {
+                let reason = "several jumps in a row need a frequency between them; give one above 0 Hz, or make f1 a parameter in optimize.toml";
+                return Err(self.refuse(CONTROL, &format!("{tables}.f1_hz"), chosen.f1_hz, reason));
+            }
+        }
+        let estimator = &self.control.estimator;
+        if estimator.contact_off_n >= estimator.contact_on_n {
+            let reason = format!("must be below estimator.contact_on_n = {}", estimator.contact_on_n);
+            return Err(self.refuse(CONTROL, "estimator.contact_off_n", estimator.contact_off_n, reason));
+        }
+        Ok(())
+    }
+
+    fn check_safety(&self) -> Result<(), ConfigError> {
+        let SafetyFile { fall, gate, watchdog, parameters, gains, .. } = &self.safety;
+        if gate.damping_kd > gate.kd_max {
+            let reason =
+                format!("must not be above gate.kd_max = {}, which would reduce the stop's damping", gate.kd_max);
+            return Err(self.refuse(SAFETY, "gate.damping_kd", gate.damping_kd, reason));
+        }
+        // A warning comes before the stop that it announces.
+        let [warn, gap, lost] =
+            [watchdog.state_age_warn_ms, watchdog.state_age_ms, watchdog.link_lost_ms].map(f64::from);
+        for (key, value, stop, limit) in [
+            ("watchdog.motor_warm_c", watchdog.motor_warm_c, "watchdog.motor_c", watchdog.motor_c),
+            ("watchdog.state_age_ms", gap, "watchdog.link_lost_ms", lost),
+            ("watchdog.state_age_warn_ms", warn, "watchdog.state_age_ms", gap),
+            ("watchdog.stance_tilt_rad", watchdog.stance_tilt_rad, "watchdog.tilt_rad", watchdog.tilt_rad),
+            ("fall.roll_rad", fall.roll_rad, "watchdog.tilt_rad", watchdog.tilt_rad),
+            ("fall.pitch_rad", fall.pitch_rad, "watchdog.tilt_rad", watchdog.tilt_rad),
+        ] {
+            if value > limit {
+                return Err(self.refuse(SAFETY, key, value, format!("must not be above {stop} = {limit}")));
+            }
+        }
+        for (name, [low, high]) in gains {
+            if !(low.is_finite() && high.is_finite() && low <= high && *low >= 0.0) {
+                let reason = "must be [lowest, highest] with 0 <= lowest <= highest";
+                return Err(self.refuse(SAFETY, &format!("gains.{name}"), format!("[{low}, {high}]"), reason));
+            }
+        }
+        for (name, [low, high]) in parameters {
+            if !(low.is_finite() && high.is_finite() && low < high && *low >= 0.0) {
+                let reason = "must be [lowest, highest] with 0 <= lowest < highest";
+                return Err(self.refuse(SAFETY, &format!("parameters.{name}"), format!("[{low}, {high}]"), reason));
+            }
+        }
+        Ok(())
+    }
+
+    fn check_optimize(&self) -> Result<(), ConfigError> {
+        self.objective(Backend::Simulator)?;
+        for (name, [low, high]) in &self.optimize.bounds {
+            let key = format!("bounds.{name}");
+            let value = format!("[{low}, {high}]");
+            let [least, most] = self.safety.parameters[name];
+            if !(low.is_finite() && high.is_finite() && low <= high) {
+                return Err(self.refuse(OPTIMIZE, &key, value, "must be [lower, upper] with lower <= upper"));
+            }
+            if parameter_unit(name) == "Hz" && *low <= 0.0 {
+                return Err(self.refuse(OPTIMIZE, &key, value, "a frequency must be above 0 Hz"));
+            }
+            if *low < least || *high > most {
+                let reason = format!(
+                    "outside the robot's limits [{least}, {most}] of safety.toml, [parameters] {name}; narrow the bounds"
+                );
+                return Err(self.refuse(OPTIMIZE, &key, value, reason));
+            }
+        }
+        for (task, point) in &self.optimize.first {
+            for (name, value) in point {
+                let [low, high] = self.optimize.bounds[name];
+                if !(*value >= low && *value <= high) {
+                    let reason =
+                        format!("outside its bounds [{low}, {high}]: widen the bounds or remove the first point");
+                    return Err(self.refuse(OPTIMIZE, &format!("first.{task}.{name}"), value, reason));
+                }
+            }
+        }
+        for (task, names) in &self.optimize.parameters {
+            let key = format!("parameters.{task}");
+            if names.is_empty() {
+                return Err(self.refuse(OPTIMIZE, &key, "[]", "a task needs at least one parameter"));
+            }
+            if !names.iter().any(|name| name == "f0") {
+                let reason = "a jump needs f0, the frequency of its impulse; add it (equal bounds fix it)";
+                return Err(self.refuse(OPTIMIZE, &key, format!("{names:?}"), reason));
+            }
+            for (i, name) in names.iter().enumerate() {
+                if !self.optimize.bounds.contains_key(name) {
+                    let known: Vec<_> = self.optimize.bounds.keys().map(String::as_str).collect();
+                    let reason = format!("there is no parameter `{name}`; the parameters are {}", known.join(", "));
+                    return Err(self.refuse(OPTIMIZE, &key, format!("{names:?}"), reason));
+                }
+                if names[..i].contains(name) {
+                    return Err(self.refuse(OPTIMIZE, &key, format!("{names:?}"), format!("`{name}` is listed twice")));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Checks that the stance of `task` is within the robot's reach and joint limits.
+    pub(super) fn check_stance(&self, robot: &RobotDescription, task: Task) -> Result<(), ConfigError> {
+        let key = format!("tasks.{}.stance_m", task.name());
+        let chosen = self.task(task);
+        let value = format!("{:?}", chosen.stance_m);
+        let (min_position, max_position) = robot.allowed_positions();
+        for leg in Leg::ALL {
+            let foot = stance_of(&chosen.stance_leg(), leg);
+            let q = robot
+                .leg_geometry
+                .inverse(&foot, leg.side())
+                .map_err(|error| self.refuse(CONTROL, &key, &value, error))?;
+            for (joint, angle) in q.iter().enumerate() {
+                let i = 3 * leg as usize + joint;
+                let (least, most) = (min_position[i], max_position[i]);
+                if !(least..=most).contains(angle) {
+                    let reason = format!(
+                        "needs {} at {angle:.3} rad, which the robot's limits [{least}, {most}] forbid",
+                        crate::robot::joint_name(i)
+                    );
+                    return Err(self.refuse(CONTROL, &key, &value, reason));
+                }
+            }
+        }
+        Ok(())
+    }
+}

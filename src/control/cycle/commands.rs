@@ -1,0 +1,141 @@
+//! Commands of the session: carried out, or refused with the reason.
+
+use super::{Cycle, Inputs};
+use crate::control::failsafe;
+use crate::control::jump::Jump;
+use crate::control::leg;
+use crate::control::mode::{self, Trigger};
+use crate::robot::{Leg, Placement, Robot};
+use crate::telemetry::{Command, CommandRefusal, Event, Permit, TransitionCause, TrialSpec};
+
+impl Cycle {
+    /// Carries out a command, or reports its refusal as an event.
+    pub(super) fn handle_command<R: Robot + ?Sized>(&mut self, command: &Command, inputs: &Inputs, robot: &mut R) {
+        let trigger = match command {
+            Command::TakeControl => Trigger::TakeControl,
+            Command::Release => Trigger::Release,
+            Command::Arm(_) => Trigger::Arm,
+            Command::SitDown => Trigger::SitDown,
+            Command::RunTrial(..) => Trigger::Approve,
+            Command::Cancel => Trigger::Cancel,
+            // The verdict on a fall acknowledges it; the robot still has to be armed again.
+            Command::EndReview if matches!(self.cause, TransitionCause::Fell(_)) => Trigger::Acknowledge,
+            Command::EndReview => Trigger::EndReview,
+            Command::Acknowledge { .. } => Trigger::Acknowledge,
+            // No trigger: from the next tick on the failsafes land an energised robot.
+            Command::Leave => {
+                self.session_left = true;
+                return;
+            }
+        };
+        if let Some(because) = self.refusal(command, trigger, inputs) {
+            self.events.push(Event::Refused { command: *command, mode: self.mode, because });
+            return;
+        }
+        match command {
+            Command::RunTrial(spec, _) => {
+                self.place_for_trial(robot, spec);
+                self.jump = Some(Jump::begin(spec, &self.settings));
+                self.trial_ticks = 0;
+            }
+            Command::Arm(_) => {
+                // The robot may have been carried since the last arming, which voids position and velocity.
+                self.estimator.reset();
+                self.estimate();
+                if self.needs_placing() {
+                    let lying = Placement { joint_position: self.settings.lying_position, lying: true, seed: 0 };
+                    self.place(robot, &lying);
+                }
+            }
+            _ => {}
+        }
+        self.request(trigger, TransitionCause::Command);
+    }
+
+    /// The reason to refuse a command; none if it is carried out.
+    ///
+    /// 1. While STOP is set, every command is refused. An acknowledgement of the last STOP clears the latch before the tick.
+    /// 2. `mode::next` must allow the trigger in the present mode.
+    /// 3. Taking control and arming need an operator's screen with a heartbeat, and a session that has not ended.
+    /// 4. Arming and approval need a fresh permit.
+    /// 5. Arming needs every arming check of the control thread, whatever the session says.
+    /// 6. Approval needs that nothing inhibits trials.
+    /// 7. An acknowledgement needs that no failsafe trips any more.
+    fn refusal(&self, command: &Command, trigger: Trigger, inputs: &Inputs) -> Option<CommandRefusal> {
+        if inputs.stop {
+            return Some(CommandRefusal::Stopped);
+        }
+        if mode::next(self.mode, trigger).is_none() {
+            return Some(CommandRefusal::Mode);
+        }
+        match *command {
+            Command::TakeControl => self.operator_absent(inputs),
+            Command::Arm(permit) => {
+                self.operator_absent(inputs).or_else(|| self.permit_expired(permit, inputs)).or_else(|| {
+                    let failing = self.findings.failing();
+                    (!failing.is_empty()).then_some(CommandRefusal::Checks(failing))
+                })
+            }
+            Command::Acknowledge { .. } => self.tripped.map(CommandRefusal::Standing),
+            Command::RunTrial(_, permit) => self
+                .permit_expired(permit, inputs)
+                .or_else(|| failsafe::trial_inhibit(&self.tick.state, &self.settings).map(CommandRefusal::Inhibited)),
+            _ => None,
+        }
+    }
+
+    /// Refuses without a heartbeat of the operator's screen, or after the end of the session.
+    fn operator_absent(&self, inputs: &Inputs) -> Option<CommandRefusal> {
+        let (silent_ms, allowed_ms) = (inputs.operator_silent_ms, self.settings.watchdog.operator_silent_ms);
+        if self.session_left {
+            Some(CommandRefusal::Leaving)
+        } else if silent_ms > allowed_ms {
+            Some(CommandRefusal::OperatorSilent { silent_ms, allowed_ms })
+        } else {
+            None
+        }
+    }
+
+    /// Refuses a permit that is older than a change of mode, or too old.
+    fn permit_expired(&self, Permit { mode_changes, given_ns }: Permit, inputs: &Inputs) -> Option<CommandRefusal> {
+        let age_s = inputs.time_ns.saturating_sub(given_ns) as f64 * 1e-9;
+        let allowed_s = self.settings.approval.expires_s;
+        if self.session_left {
+            Some(CommandRefusal::Leaving)
+        } else if mode_changes != self.mode_changes {
+            Some(CommandRefusal::Stale)
+        } else if age_s > allowed_s {
+            Some(CommandRefusal::Expired { age_s, allowed_s })
+        } else {
+            None
+        }
+    }
+
+    /// Whether the robot lies in an attitude from which it cannot stand up.
+    fn needs_placing(&self) -> bool {
+        let [roll, pitch, _] = self.tick.estimate.roll_pitch_yaw.into();
+        roll.abs().max(pitch.abs()) > self.settings.watchdog.stance_tilt_rad
+    }
+
+    /// Places a simulated robot at the origin, feet at the trial's stance.
+    fn place_for_trial<R: Robot + ?Sized>(&mut self, robot: &mut R, spec: &TrialSpec) {
+        let mut joint_position = self.tick.state.joint_position;
+        for leg in Leg::ALL {
+            let foot = leg::stance_of(&spec.stance_leg, leg);
+            // The session has checked that the stance can be reached; a leg that cannot keeps its angles.
+            if let Ok(q) = self.settings.geometry.inverse(&foot, leg.side()) {
+                joint_position[3 * leg as usize..3 * leg as usize + 3].copy_from_slice(q.as_slice());
+            }
+        }
+        self.place(robot, &Placement { joint_position, lying: false, seed: spec.seed });
+    }
+
+    fn place<R: Robot + ?Sized>(&mut self, robot: &mut R, placement: &Placement) {
+        if robot.place(placement) {
+            self.estimator.reset();
+            self.gate.reset();
+            self.read(robot);
+            self.estimate();
+        }
+    }
+}

@@ -1,0 +1,91 @@
+//! Actions of the failsafes: damping, landing, sitting down.
+
+use super::{Cycle, Inputs};
+use crate::control::failsafe::{self, FailsafeAction, FailsafeInputs};
+use crate::control::jump::FallWatch;
+use crate::control::limits::ticks;
+use crate::control::mode::Trigger;
+use crate::robot::Robot;
+use crate::telemetry::{Fault, Mode, TransitionCause};
+
+/// Ticks for which a warning stays set; the session polls at 10 Hz.
+const WARNING_TICKS: u32 = 1000;
+
+impl Cycle {
+    /// Applies, in this order:
+    ///
+    /// 1. The first row of the failsafe table that trips. CUT ends the list.
+    /// 2. Landing, after the end of the session.
+    /// 3. Damping for a fall in REVIEW. It is no fault, so the verdict is asked for as after any other fall.
+    /// 4. Sitting down, after too long a wait in READY or REVIEW.
+    pub(super) fn run_failsafes<R: Robot + ?Sized>(&mut self, inputs: &Inputs, restarted: bool, robot: &R) {
+        self.failsafe.begin(inputs.time_ns, inputs.lateness_ns, &self.settings);
+        let failsafe_inputs = FailsafeInputs {
+            mode: self.mode,
+            state: &self.tick.state,
+            estimate: &self.tick.estimate,
+            state_age_ms: self.state_age_ms,
+            restarted,
+            link: robot.link(),
+            lateness_ns: inputs.lateness_ns,
+            send_error: self.send_error.take(),
+            operator_silent_ms: inputs.operator_silent_ms,
+            events_lost: inputs.events_lost,
+        };
+        let trip = self.failsafe.check(&failsafe_inputs, &self.settings);
+        self.warning = match (failsafe::warning(&failsafe_inputs, &self.settings), self.warning) {
+            (Some(warning), _) => Some((warning, WARNING_TICKS)),
+            (None, Some((warning, left))) if left > 1 => Some((warning, left - 1)),
+            _ => None,
+        };
+        self.tripped = None;
+        match trip {
+            Some(trip) if trip.action == FailsafeAction::Cut => {
+                self.tripped = Some(trip.fault);
+                self.cut(trip.fault);
+                return;
+            }
+            Some(trip) => self.land(trip.fault),
+            None if self.session_left => self.land(Fault::OperatorLeft),
+            None if self.mode == Mode::Ready => self.landing = None,
+            None => {}
+        }
+        if self.mode != Mode::Review {
+            self.fall = FallWatch::default();
+        } else if let Some(cause) = self.fall.observe_standing(&self.tick.state, &self.tick.estimate, &self.settings) {
+            self.request(Trigger::Fell, TransitionCause::Fell(cause));
+        }
+        let allowed_s = self.settings.idle_s;
+        if matches!(self.mode, Mode::Ready | Mode::Review) && allowed_s > 0.0 && self.mode_ticks > ticks(allowed_s) {
+            self.request(Trigger::SitDown, TransitionCause::Idle { allowed_s });
+        }
+    }
+
+    /// Damps and latches the fault. A latched fault keeps its name, unless a fault of another kind voids confirmations: that one
+    /// is reported too.
+    fn cut(&mut self, fault: Fault) {
+        let kind = std::mem::discriminant::<Fault>;
+        let reported = matches!(self.cause, TransitionCause::Fault(latched) if kind(&latched) == kind(&fault));
+        if self.mode != Mode::Fault {
+            self.request(Trigger::Fault, TransitionCause::Fault(fault));
+        } else if !reported && fault.voids_confirmations() {
+            self.change(Mode::Fault, TransitionCause::Fault(fault));
+        }
+    }
+
+    /// Sits down at once, or in a jump after the landing. SETTLE runs to its end, so that the trial can be measured.
+    fn land(&mut self, fault: Fault) {
+        match self.mode {
+            Mode::StandUp | Mode::Ready | Mode::Countdown | Mode::Review => {
+                self.request(Trigger::SitDown, TransitionCause::Fault(fault));
+            }
+            Mode::Jump => {
+                self.landing.get_or_insert(fault);
+                if let Some(jump) = &mut self.jump {
+                    jump.land();
+                }
+            }
+            _ => {}
+        }
+    }
+}

@@ -1,0 +1,454 @@
+//! One control tick: read, estimate, failsafes, command, decide, limit, send, publish. A plain call: the control thread makes
+//! it at 1 kHz, a rollout as fast as the machine allows.
+
+mod commands;
+mod failsafes;
+
+use super::arming::{self, ArmingHistory};
+use super::failsafe::{self, Failsafe};
+use super::jump::{FallWatch, Jump, TrialProgress};
+use super::leg::{self, LegTarget};
+use super::limits::CommandGate;
+use super::mode::{self, Trigger};
+use super::ramp::{PoseRamp, RampProgress};
+use super::settings::ControlSettings;
+use crate::control::estimator::Estimator;
+use crate::realtime::clock::Clock;
+use crate::robot::kinematics::FootPosition;
+use crate::robot::{JointCommand, Joints, LEGS, Leg, PerLeg, Robot, RobotError, robot_time_passed};
+use crate::telemetry::{
+    ArmingFindings, Command, Event, FailsafeWarning, Fault, Mode, Phase, Readiness, StageTimes, Tick, TransitionCause,
+    TrialEnd,
+};
+use nalgebra::{Matrix3, Vector3};
+
+/// Inputs of one tick.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Inputs {
+    /// Planned start of the tick, ns since the engine started.
+    pub time_ns: u64,
+    /// Delay of the real start, ns.
+    pub lateness_ns: u64,
+    /// The STOP latch.
+    pub stop: bool,
+    /// Time since the last heartbeat of the operator's screen, ms.
+    pub operator_silent_ms: u32,
+    /// The next waiting command.
+    pub command: Option<Command>,
+    /// The ring of events was full: the session takes none.
+    pub events_lost: bool,
+}
+
+/// Events of one tick.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Events {
+    list: [Option<Event>; Events::MOST],
+    count: usize,
+}
+
+impl Events {
+    /// One tick causes at most a refusal, changes of mode and the end of a trial: fewer than this.
+    const MOST: usize = 8;
+    const NONE: Events = Events { list: [None; Events::MOST], count: 0 };
+
+    fn push(&mut self, event: Event) {
+        debug_assert!(self.count < Self::MOST, "a tick caused more than {} events", Self::MOST);
+        if let Some(place) = self.list.get_mut(self.count) {
+            *place = Some(event);
+            self.count += 1;
+        }
+    }
+
+    /// The events, oldest first.
+    pub fn iter(&self) -> impl Iterator<Item = Event> + '_ {
+        self.list.iter().flatten().copied()
+    }
+}
+
+/// The control cycle of one robot. `Copy`: a tick on a copy does not change the original.
+#[derive(Debug, Clone, Copy)]
+pub struct Cycle {
+    settings: ControlSettings,
+    mode: Mode,
+    /// Cause of the last change of mode.
+    cause: TransitionCause,
+    mode_changes: u64,
+    /// Ticks since the last change of mode.
+    mode_ticks: u32,
+    estimator: Estimator,
+    failsafe: Failsafe,
+    /// The fault whose failsafe trips in this tick.
+    tripped: Option<Fault>,
+    /// The newest warning and the ticks for which it stays set.
+    warning: Option<(FailsafeWarning, u32)>,
+    arming_history: ArmingHistory,
+    findings: ArmingFindings,
+    gate: CommandGate,
+    ramp: Option<PoseRamp>,
+    jump: Option<Jump>,
+    /// Ticks of the running trial so far.
+    trial_ticks: u64,
+    /// Fall detection in REVIEW.
+    fall: FallWatch,
+    /// The trial that ended in this tick; the tick still belongs to it.
+    ended: Option<Jump>,
+    feet: PerLeg<FootPosition>,
+    state_age_ms: u32,
+    /// `errno` of the last failed send; taken by the failsafes of the next tick.
+    send_error: Option<i32>,
+    /// Fault during a jump after which the robot sits down once it has landed.
+    landing: Option<Fault>,
+    /// The session ended: the robot sits down, and nothing energises it again.
+    session_left: bool,
+    tick: Tick,
+    events: Events,
+}
+
+impl Cycle {
+    /// A cycle in OFFLINE, without a state of its robot.
+    pub fn new(settings: &ControlSettings) -> Cycle {
+        Cycle {
+            settings: *settings,
+            mode: Mode::Offline,
+            cause: TransitionCause::Course,
+            mode_changes: 0,
+            mode_ticks: 0,
+            estimator: Estimator::default(),
+            failsafe: Failsafe::default(),
+            tripped: None,
+            warning: None,
+            arming_history: ArmingHistory::default(),
+            findings: ArmingFindings::default(),
+            gate: CommandGate::default(),
+            ramp: None,
+            jump: None,
+            trial_ticks: 0,
+            fall: FallWatch::default(),
+            ended: None,
+            feet: [FootPosition { position_leg: Vector3::zeros(), jacobian_leg: Matrix3::zeros() }; LEGS],
+            state_age_ms: 0,
+            send_error: None,
+            landing: None,
+            session_left: false,
+            tick: Tick::default(),
+            events: Events::NONE,
+        }
+    }
+
+    /// A cycle in READY, for rollouts without an operator.
+    pub fn ready(settings: &ControlSettings) -> Cycle {
+        Cycle { mode: Mode::Ready, ..Cycle::new(settings) }
+    }
+
+    /// The mode in which the last tick ended.
+    pub fn mode(&self) -> Mode {
+        self.mode
+    }
+
+    /// Age of the robot's newest state, ms; zero while states arrive.
+    pub fn state_age_ms(&self) -> u32 {
+        self.state_age_ms
+    }
+
+    /// Arming findings, trial inhibit and warning as of the last tick.
+    pub fn readiness(&self) -> Readiness {
+        Readiness {
+            findings: self.findings,
+            inhibit: failsafe::trial_inhibit(&self.tick.state, &self.settings),
+            warning: self.warning.map(|(warning, _)| warning),
+        }
+    }
+
+    /// Events of the last tick.
+    pub fn events(&self) -> &Events {
+        &self.events
+    }
+
+    /// The last tick.
+    pub fn last(&self) -> &Tick {
+        &self.tick
+    }
+
+    /// Runs one tick. STOP acts before every failsafe, command and decision.
+    pub fn tick<C: Clock, R: Robot + ?Sized>(&mut self, inputs: &Inputs, clock: &C, robot: &mut R) -> &Tick {
+        let started_ns = clock.now_ns();
+        let previous_robot_time_ms = self.tick.state.robot_time_ms;
+        self.begin(inputs);
+
+        self.read(robot);
+        let read_ns = clock.now_ns();
+        if inputs.stop {
+            self.request(Trigger::Stop, TransitionCause::Stop);
+        }
+        self.estimate();
+        let restarted = robot_time_passed(self.tick.state.robot_time_ms, previous_robot_time_ms) < 0;
+        self.run_failsafes(inputs, restarted, robot);
+        self.arming_history.observe(inputs.lateness_ns, &self.tick.state, self.state_age_ms, restarted, &self.settings);
+        self.run_arming_checks(robot);
+        if let Some(command) = &inputs.command {
+            self.handle_command(command, inputs, robot);
+        }
+        let wanted = self.decide();
+        let (sent, limited) = self.limit(&wanted);
+        let decided_ns = clock.now_ns();
+        self.send(&sent, robot);
+        let written_ns = clock.now_ns();
+        if self.mode_ticks == 0 {
+            // Disarmed in this tick: the session reads current findings together with the event.
+            self.run_arming_checks(robot);
+        }
+
+        self.publish(sent, limited);
+        self.stamp(inputs.lateness_ns, [started_ns, read_ns, decided_ns, written_ns]);
+        if let Some(jump) = &mut self.jump {
+            jump.advance();
+        }
+        &self.tick
+    }
+
+    fn begin(&mut self, inputs: &Inputs) {
+        self.events = Events::NONE;
+        self.tick.time_ns = inputs.time_ns;
+        self.mode_ticks = self.mode_ticks.saturating_add(1);
+    }
+
+    /// Takes the newest state, or the age of the last one.
+    fn read<R: Robot + ?Sized>(&mut self, robot: &mut R) {
+        match robot.read() {
+            Ok(state) => {
+                self.tick.state = state;
+                self.state_age_ms = 0;
+                if self.mode == Mode::Offline {
+                    self.request(Trigger::Connected, TransitionCause::Connected);
+                }
+            }
+            Err(RobotError::Silent { age_ms }) => self.state_age_ms = age_ms,
+            Err(RobotError::Send { errno }) => self.send_error = Some(errno),
+        }
+    }
+
+    /// Computes feet, Jacobians and the base's estimate.
+    fn estimate(&mut self) {
+        self.feet = leg::feet(&self.settings.geometry, &self.tick.state.joint_position);
+        self.tick.estimate = *self.estimator.update(&self.tick.state, &self.feet, &self.settings);
+    }
+
+    /// Runs the arming checks while DISARMED.
+    fn run_arming_checks<R: Robot + ?Sized>(&mut self, robot: &R) {
+        if self.mode == Mode::Disarmed {
+            let inputs = arming::ArmingInputs {
+                state: &self.tick.state,
+                estimate: &self.tick.estimate,
+                state_age_ms: self.state_age_ms,
+                link: robot.link(),
+                history: &self.arming_history,
+            };
+            self.findings = arming::findings(&inputs, &self.settings);
+        }
+    }
+
+    /// Passes `wanted` through the last gate; a fault there damps. Returns the command to send and the mask of limited joints.
+    fn limit(&mut self, wanted: &JointCommand) -> (JointCommand, u16) {
+        let passed = self.gate.pass(wanted, &self.tick.state, &self.settings);
+        match passed.fault {
+            None => (passed.command, passed.limited),
+            Some(fault) => {
+                self.request(Trigger::Fault, TransitionCause::Fault(fault));
+                (JointCommand::damping(self.settings.gate.damping_kd), passed.limited)
+            }
+        }
+    }
+
+    /// Sends the command, in modes in which the robot is sent any. The failsafes of the next tick take a failure.
+    fn send<R: Robot + ?Sized>(&mut self, command: &JointCommand, robot: &mut R) {
+        if self.mode.commanded()
+            && let Err(RobotError::Send { errno }) = robot.write(command)
+        {
+            self.send_error = Some(errno);
+        }
+    }
+
+    /// Returns the motor command of this mode, after the changes of mode that need no command.
+    fn decide(&mut self) -> JointCommand {
+        self.follow_jump();
+        self.follow_ramp();
+        self.motor_command()
+    }
+
+    /// Changes the mode as the jump progresses.
+    fn follow_jump(&mut self) {
+        if let Some(jump) = &mut self.jump {
+            let progress = match jump.observe(&self.tick.state, &self.tick.estimate, &self.settings) {
+                // Landing on a fault: standing suffices, it need not become quiet.
+                TrialProgress::Settle if self.landing.is_some() && jump.landed_s() >= self.settings.watchdog.land_s => {
+                    TrialProgress::Over(TrialEnd::NotQuiet)
+                }
+                progress => progress,
+            };
+            match (self.mode, progress) {
+                (Mode::Countdown, TrialProgress::Jump | TrialProgress::Settle) => {
+                    self.request(Trigger::CountdownOver, TransitionCause::Course);
+                }
+                (Mode::Jump, TrialProgress::Settle) => self.request(Trigger::Landed, TransitionCause::Course),
+                (_, TrialProgress::Over(TrialEnd::Fell(cause))) => {
+                    self.request(Trigger::Fell, TransitionCause::Fell(cause))
+                }
+                (_, TrialProgress::Over(end)) => {
+                    // A jump may end without SETTLE.
+                    if self.mode == Mode::Jump {
+                        self.request(Trigger::Landed, TransitionCause::Course);
+                    }
+                    self.finish_trial(self.landing.map_or(end, TrialEnd::Fault));
+                    self.request(Trigger::Settled, TransitionCause::Course);
+                }
+                _ => {}
+            }
+        }
+    }
+
+    /// Changes the mode when a ramp has reached its pose or timed out.
+    fn follow_ramp(&mut self) {
+        if let Some(ramp) = &self.ramp {
+            match ramp.progress(&self.tick.state.joint_position) {
+                RampProgress::Moving => {}
+                RampProgress::Reached => self.request(Trigger::PoseReached, TransitionCause::Course),
+                RampProgress::Late { .. } if self.mode == Mode::SitDown => {
+                    // The floor may stop the robot short of the lying pose; damping is safe there.
+                    self.request(Trigger::PoseReached, TransitionCause::Course);
+                }
+                RampProgress::Late { error_rad } => {
+                    self.request(Trigger::Fault, TransitionCause::Fault(Fault::PoseTimeout { error_rad }));
+                }
+            }
+        }
+    }
+
+    fn motor_command(&mut self) -> JointCommand {
+        self.tick.torque_demanded = Joints::default();
+        match (self.mode, &mut self.ramp, &self.jump) {
+            (Mode::StandUp | Mode::SitDown, Some(ramp), _) => ramp.command(),
+            (Mode::Countdown | Mode::Jump | Mode::Settle, _, Some(jump)) => {
+                let target = jump.target(&self.tick.estimate);
+                self.legs(&target)
+            }
+            (Mode::Ready | Mode::Review, _, _) => {
+                let stand = &self.settings.stand;
+                self.legs(&LegTarget {
+                    gains: stand.gains,
+                    stance_leg: stand.stance_leg,
+                    vmc: stand.vmc,
+                    attitude_rate_gain: stand.attitude_rate_gain,
+                    foot_offset_leg: [Vector3::zeros(); LEGS],
+                    amplitudes_leg: [Vector3::zeros(); LEGS],
+                    theta_rad: 0.0,
+                })
+            }
+            _ => JointCommand::damping(self.settings.gate.damping_kd),
+        }
+    }
+
+    fn legs(&mut self, target: &LegTarget) -> JointCommand {
+        let (state, estimate) = (&self.tick.state, &self.tick.estimate);
+        let torques = leg::torques(target, &self.feet, &state.joint_velocity, estimate);
+        self.tick.torque_demanded = torques;
+        JointCommand::torques(&torques)
+    }
+
+    /// Changes the mode if `mode::next` allows it.
+    fn request(&mut self, trigger: Trigger, cause: TransitionCause) {
+        if let Some(to) = mode::next(self.mode, trigger).filter(|to| *to != self.mode) {
+            self.change(to, cause);
+        }
+    }
+
+    /// Enters a mode: event, ramp, end of the trial.
+    fn change(&mut self, to: Mode, cause: TransitionCause) {
+        let from = self.mode;
+        self.mode = to;
+        self.cause = cause;
+        self.mode_changes += 1;
+        self.mode_ticks = 0;
+        self.events.push(Event::Mode { from, to, cause, time_ns: self.tick.time_ns });
+        self.ramp = match to {
+            Mode::StandUp => Some(PoseRamp::begin(&self.tick.state, &self.standing_pose(), &self.settings.stand_up)),
+            Mode::SitDown => {
+                Some(PoseRamp::begin(&self.tick.state, &self.settings.lying_position, &self.settings.sit_down))
+            }
+            _ => None,
+        };
+        if !matches!(to, Mode::Countdown | Mode::Jump | Mode::Settle) {
+            self.finish_trial(match cause {
+                TransitionCause::Stop => TrialEnd::Stopped,
+                TransitionCause::Fell(cause) => TrialEnd::Fell(cause),
+                TransitionCause::Fault(fault) => TrialEnd::Fault(fault),
+                TransitionCause::Command
+                | TransitionCause::Course
+                | TransitionCause::Connected
+                | TransitionCause::Idle { .. } => TrialEnd::Cancelled,
+            });
+        }
+    }
+
+    /// Ends the running trial, if any.
+    fn finish_trial(&mut self, end: TrialEnd) {
+        if let Some(jump) = self.jump.take() {
+            let ticks = self.trial_ticks + 1;
+            self.events.push(Event::TrialEnded { trial: jump.spec().trial, ticks, end });
+            self.ended = Some(jump);
+        }
+    }
+
+    /// Joint angles of standing, rad: the nominal stance lowered by dz with 4 kp dz = m g, where the impedance carries the weight.
+    /// The change from the ramp to impedance control then has no step.
+    fn standing_pose(&self) -> Joints {
+        let stand = &self.settings.stand;
+        let sag = self.settings.weight_n / (LEGS as f64 * stand.gains.kp);
+        let mut pose = self.settings.lying_position;
+        for leg in Leg::ALL {
+            let i = 3 * leg as usize;
+            let foot = leg::stance_of(&stand.stance_leg, leg) + Vector3::new(0.0, 0.0, sag);
+            if let Ok(q) = self.settings.geometry.inverse(&foot, leg.side()) {
+                pose[i..i + 3].copy_from_slice(q.as_slice());
+            }
+        }
+        pose
+    }
+
+    /// Completes the tick for recorder, screen and session.
+    fn publish(&mut self, sent: JointCommand, limited: u16) {
+        let tick = &mut self.tick;
+        tick.number += 1;
+        tick.mode = self.mode;
+        tick.command = sent;
+        tick.limited = limited;
+        match self.jump.or(self.ended.take()) {
+            Some(jump) => {
+                self.trial_ticks += 1;
+                tick.phase = jump.phase();
+                tick.trial = Some(jump.spec().trial);
+                tick.trial_time_s = jump.time_s();
+                tick.theta_rad = jump.theta_rad();
+            }
+            None => {
+                tick.phase = Phase::Stance;
+                tick.trial = None;
+                tick.trial_time_s = 0.0;
+                tick.theta_rad = 0.0;
+            }
+        }
+    }
+
+    fn stamp(&mut self, lateness_ns: u64, [started, read, decided, written]: [u64; 4]) {
+        self.tick.stages = StageTimes {
+            lateness_ns: span_ns(0, lateness_ns),
+            read_ns: span_ns(started, read),
+            decide_ns: span_ns(read, decided),
+            write_ns: span_ns(decided, written),
+        };
+    }
+}
+
+/// Nanoseconds from `from` to `to`, saturated.
+fn span_ns(from: u64, to: u64) -> u32 {
+    u32::try_from(to.saturating_sub(from)).unwrap_or(u32::MAX)
+}

@@ -1,0 +1,115 @@
+//! The folder of a study: its lock, the configuration that ran, the recordings.
+
+use std::path::{Path, PathBuf};
+
+use super::options::{EngineError, Options};
+use crate::config::Config;
+
+/// Name of the study's journal in its folder.
+pub const STUDY_FILE: &str = "study.log";
+
+/// Creates and locks the folder of `options`, keeps the configuration in it, and names the next recording there:
+/// `session.mcap`, `session-2.mcap`, ...; none without a folder.
+///
+/// # Errors
+/// When the folder cannot be created or written, or another session has it.
+pub fn prepare_folder(options: &Options) -> Result<LockedFolder, EngineError> {
+    let Some(folder) = &options.folder else { return Ok(LockedFolder { recording: None, _lock: None }) };
+    let system = |what: String| move |source| EngineError::System { what, source };
+    std::fs::create_dir_all(folder).map_err(system(format!("{}: cannot be made", folder.display())))?;
+    // The operating system releases the lock however the session ends.
+    let path = folder.join("session.lock");
+    let lock = std::fs::File::create(&path).map_err(system(format!("{}: cannot be made", path.display())))?;
+    match lock.try_lock() {
+        Ok(()) => {}
+        Err(std::fs::TryLockError::WouldBlock) => return Err(EngineError::InUse { folder: folder.clone() }),
+        Err(std::fs::TryLockError::Error(source)) => {
+            return Err(system(format!("{}: cannot be locked", path.display()))(source));
+        }
+    }
+    keep_config(options, folder)?;
+    let taken = |path: &PathBuf| path.exists() || path.with_extension("mcap.part").exists();
+    let names = std::iter::once("session.mcap".to_owned()).chain((2..).map(|n| format!("session-{n}.mcap")));
+    let recording = names.map(|name| folder.join(name)).find(|path| !taken(path));
+    Ok(LockedFolder { recording, _lock: Some(lock) })
+}
+
+/// A study's folder, locked for this session until this is dropped.
+pub struct LockedFolder {
+    /// Path of the recording.
+    pub recording: Option<PathBuf>,
+    _lock: Option<std::fs::File>,
+}
+
+/// Keeps the running configuration in `config/`, or in `config-2/`, ... if the session before ran with another one: the
+/// highest number is the configuration that ran last.
+fn keep_config(options: &Options, folder: &Path) -> Result<(), EngineError> {
+    let system = |what: String| move |source| EngineError::System { what, source };
+    let config = match newest_config(folder) {
+        None => folder.join("config"),
+        Some((number, newest)) => {
+            let same = |(name, text): &(String, String)| {
+                std::fs::read_to_string(newest.join(name)).is_ok_and(|kept| kept == *text)
+            };
+            if options.config.as_run.iter().all(same) {
+                return Ok(());
+            }
+            folder.join(format!("config-{}", number + 1))
+        }
+    };
+    std::fs::create_dir(&config).map_err(system(format!("{}: cannot be made", config.display())))?;
+    for (name, text) in &options.config.as_run {
+        let path = config.join(name);
+        std::fs::write(&path, text).map_err(system(format!("{}: cannot be written", path.display())))?;
+    }
+    Ok(())
+}
+
+/// Returns the configuration that ran last in a study's folder, with its number: 1 for `config/`, N for `config-N/`; none
+/// where none was kept.
+pub fn newest_config(folder: &Path) -> Option<(u32, PathBuf)> {
+    let numbered = |path: PathBuf| {
+        let number = match path.file_name()?.to_str()? {
+            "config" => 1,
+            name => name.strip_prefix("config-")?.parse().ok()?,
+        };
+        path.is_dir().then_some((number, path))
+    };
+    let entries = std::fs::read_dir(folder).ok()?;
+    entries.filter_map(|entry| numbered(entry.ok()?.path())).max_by_key(|(number, _)| *number)
+}
+
+/// Returns the study files of `folder` and of the folders in it, in the order of their names.
+///
+/// # Errors
+/// When the folder cannot be read.
+pub fn study_files(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
+    let own = folder.join(STUDY_FILE);
+    let mut files: Vec<PathBuf> = std::fs::read_dir(folder)?
+        .filter_map(|entry| Some(entry.ok()?.path().join(STUDY_FILE)))
+        .chain([own])
+        .filter(|file| file.is_file())
+        .collect();
+    files.sort();
+    Ok(files)
+}
+
+/// Returns the attachments of a recording: the running configuration.
+pub fn attachments(config: &Config) -> Vec<(&str, &str, &[u8])> {
+    config.as_run.iter().map(|(name, text)| (name.as_str(), "application/toml", text.as_bytes())).collect()
+}
+
+/// Returns a short name of the configuration, for an operator to compare: FNV-1a of all files, 64 bits (Fowler, Noll and
+/// Vo, draft-eastlake-fnv).
+pub fn fingerprint(config: &Config) -> String {
+    let texts = config.as_run.iter().flat_map(|(name, text)| [name.as_bytes(), text.as_bytes()]);
+    let hash = texts
+        .flatten()
+        .fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01b3));
+    format!("{hash:016x}")
+}
+
+/// Returns the present time, UTC, ns since 1970.
+pub fn utc_ns() -> u64 {
+    u64::try_from(jiff::Timestamp::now().as_nanosecond()).unwrap_or(0)
+}

@@ -1,0 +1,62 @@
+//! The session thread: requests as they come, events every few milliseconds.
+
+use std::sync::mpsc::{Receiver, RecvTimeoutError};
+use std::time::Duration;
+
+use super::guard::Guard;
+use crate::realtime::clock::{Clock, MonotonicClock};
+use crate::session::operator_request::StampedRequest;
+use crate::session::supervisor::Supervisor;
+use crate::telemetry::Mode;
+
+/// Longest time between two polls of the control thread's events.
+const SESSION_PERIOD: Duration = Duration::from_millis(5);
+/// Longest time for landing and sitting down at the end.
+const LONGEST_SIT_DOWN: Duration = Duration::from_secs(10);
+/// Time for which damping is sent to a real robot at the end: it sinks softly in that time.
+const DAMPING_AT_THE_END: Duration = Duration::from_millis(500);
+/// Longest wait for the effect of the last STOP; the control thread acts within a millisecond.
+const LONGEST_STOP: Duration = Duration::from_secs(2);
+
+/// Runs the session until the screen drops its handle. Returns the supervisor with the session's channel ends, because a
+/// control thread takes their loss for a crash of the session, and the guard, because the control thread commands the
+/// robot until its own end.
+pub fn run(
+    mut supervisor: Supervisor,
+    mut guard: Option<Guard>,
+    requests: &Receiver<StampedRequest>,
+    clock: &MonotonicClock,
+    sits_down: bool,
+) -> (Supervisor, Option<Guard>) {
+    loop {
+        supervisor.poll(clock.now_ns());
+        if guard.as_mut().is_some_and(Guard::lost) {
+            supervisor.report_guard_lost(clock.now_ns());
+        }
+        if supervisor.mode() == Mode::Observe {
+            supervisor.take_control();
+        }
+        match requests.recv_timeout(SESSION_PERIOD) {
+            Ok(request) => supervisor.carry_out(&request, clock.now_ns()),
+            Err(RecvTimeoutError::Timeout) => {}
+            Err(RecvTimeoutError::Disconnected) => break,
+        }
+    }
+    let begun = clock.now_ns();
+    let within = |begun: u64, limit: Duration| clock.now_ns() - begun < limit.as_nanos() as u64;
+    while supervisor.wind_down(sits_down) && within(begun, LONGEST_SIT_DOWN) {
+        std::thread::sleep(SESSION_PERIOD);
+        supervisor.poll(clock.now_ns());
+    }
+    if sits_down {
+        supervisor.stop();
+        let begun = clock.now_ns();
+        // Until nothing is energised. A control thread that does not report that any more damps by itself.
+        while within(begun, DAMPING_AT_THE_END) || supervisor.mode().energised() && within(begun, LONGEST_STOP) {
+            std::thread::sleep(SESSION_PERIOD);
+            supervisor.poll(clock.now_ns());
+        }
+    }
+    supervisor.close(clock.now_ns());
+    (supervisor, guard)
+}

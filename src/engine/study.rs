@@ -1,0 +1,111 @@
+//! The study of a session: opened as an experiment, described for the recording.
+
+use std::time::Duration;
+
+use super::folder::STUDY_FILE;
+use super::options::{EngineError, Options};
+use crate::optimize::ask::Direction;
+use crate::optimize::journal::Durability;
+use crate::optimize::space::{Range, Space};
+use crate::optimize::study::{Storage, Study, StudyError, StudyOptions};
+use crate::recording::record::SessionInfo;
+use crate::session::experiment::attributes::{self, BudgetAttribute, NewStudyAttributes, Origin, StudyAttributes};
+use crate::session::experiment::{Experiment, ExperimentPlan};
+use crate::trial::Task;
+
+/// Opens the study of `options` as an experiment, for the console and for `optimize`.
+///
+/// # Errors
+/// When the study cannot be read, or is of another task.
+pub fn open_experiment(options: &Options, durability: Durability, recording: &str) -> Result<Experiment, EngineError> {
+    let parameters = options.config.parameters(options.task);
+    let space = Space::new(parameters.iter().map(|p| (p.name.clone(), Range::linear(p.low, p.high))))?;
+    let mut sampler = options.config.optimize.sampler.clone();
+    sampler.seed = options.seed;
+    let storage = match (&options.join, &options.folder) {
+        (Some(storage), _) => storage.clone(),
+        (None, Some(folder)) => Storage::File(folder.join(STUDY_FILE)),
+        (None, None) => Storage::Memory,
+    };
+    let budget = options.budget();
+    let mut study = Study::open(
+        storage,
+        StudyOptions {
+            name: study_name(options.task, options.seed),
+            direction: Direction::Maximize,
+            metric: format!("J_{} ({})", options.task.name(), options.task.unit()),
+            space,
+            sampler,
+            attributes: attributes::write(&NewStudyAttributes {
+                task: options.task,
+                robot: &options.robot.name,
+                seed: options.seed,
+                sampler: &options.config.optimize.sampler,
+                version: env!("CARGO_PKG_VERSION"),
+                budget,
+            }),
+            durability,
+        },
+    )?;
+    if options.join.is_none() && study.trials().is_empty() {
+        enqueue_first(&mut study, &options.config.first(options.task))?;
+    }
+    let worker = if options.join.is_some() { study.join()? } else { 0 };
+    if worker == 0 && StudyAttributes::of(study.attributes()).budget != Some(budget) {
+        study.annotate_study(&attributes::write(&BudgetAttribute { budget }))?;
+    }
+    let plan = ExperimentPlan {
+        task: options.task,
+        control: *options.config.task(options.task),
+        parameters,
+        seed: u64::from(options.seed),
+        budget,
+        recording: recording.to_owned(),
+        widest: options.config.widest(options.task),
+        gains: options.config.gains(),
+        contenders: options.config.optimize.confirm.contenders,
+        confidence: options.config.optimize.confirm.confidence,
+        worker,
+        abandoned: Duration::from_secs_f64(options.config.optimize.workers.abandoned_s),
+    };
+    Ok(Experiment::open(plan, study)?)
+}
+
+/// Queues the first point of the configuration.
+fn enqueue_first(study: &mut Study, point: &[(String, f64)]) -> Result<(), StudyError> {
+    if point.is_empty() {
+        return Ok(());
+    }
+    study.enqueue_unless(point, &Origin::default().attributes(), |trials| !trials.is_empty()).map(drop)
+}
+
+/// Returns the name of a study in its journal.
+pub fn study_name(task: Task, seed: u32) -> String {
+    format!("{}-seed{seed}", task.name())
+}
+
+/// Returns the session record of the recording `recording`.
+pub fn session_info(options: &Options, recording: &str) -> SessionInfo {
+    SessionInfo {
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        backend: Some(options.backend),
+        robot: options.robot.name.clone(),
+        task: Some(options.task),
+        unit: options.task.unit().to_owned(),
+        sampler: Some(options.config.optimize.sampler.kind),
+        seed: u64::from(options.seed),
+        budget: options.budget(),
+        parameters: options.config.parameters(options.task),
+        study: match (&options.join, &options.folder) {
+            (Some(storage), _) => storage.to_string(),
+            (None, Some(folder)) => folder.join(STUDY_FILE).display().to_string(),
+            (None, None) => String::new(),
+        },
+        recording: recording.to_owned(),
+        started: jiff::Timestamp::now().to_string(),
+        observe: options.observe,
+        gains: options.config.gains(),
+        approve: options.approve,
+        limits: options.config.health_limits(),
+    }
+}

@@ -1,0 +1,164 @@
+//! The vocabulary of an ask: direction, settings, random streams, question ([`Ask`]) and answer ([`Candidate`]).
+
+use super::mt19937::Mt19937;
+use super::space::{Parameter, Space};
+use super::trial::{Trial, value_of};
+use serde::{Deserialize, Serialize};
+use std::cmp::Ordering;
+
+/// Whether the objective is minimized or maximized; the discriminants are the journal's.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, strum::IntoStaticStr)]
+#[serde(rename_all = "lowercase")]
+#[strum(serialize_all = "lowercase")]
+pub enum Direction {
+    /// Smaller is better.
+    Minimize = 1,
+    /// Larger is better.
+    Maximize = 2,
+}
+
+impl Direction {
+    /// Orders two objective values, the better one first.
+    pub fn best_first(self, a: f64, b: f64) -> Ordering {
+        let ascending = a.partial_cmp(&b).unwrap_or(Ordering::Equal);
+        if self == Direction::Maximize { ascending.reverse() } else { ascending }
+    }
+}
+
+/// The algorithm that proposes candidates.
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, strum::VariantArray, strum::IntoStaticStr,
+)]
+#[serde(rename_all = "lowercase")]
+#[strum(serialize_all = "lowercase")]
+pub enum SamplerKind {
+    /// Tree-structured Parzen estimator, as Optuna 5.0.
+    #[default]
+    Tpe,
+    /// Gaussian process with expected improvement: better with only some tens of trials.
+    Gp,
+    /// Uniform random points.
+    Random,
+    /// Points of the Sobol sequence: evenly spread, independent of results.
+    Sobol,
+}
+
+impl SamplerKind {
+    /// All samplers.
+    pub const ALL: &[SamplerKind] = <SamplerKind as strum::VariantArray>::VARIANTS;
+
+    /// Returns the name in files, recordings and on the command line.
+    pub fn name(self) -> &'static str {
+        self.into()
+    }
+
+    /// Returns the sampler of that name.
+    pub fn from_name(name: &str) -> Option<SamplerKind> {
+        SamplerKind::ALL.iter().copied().find(|kind| kind.name() == name)
+    }
+}
+
+/// The settings of `[sampler]` in `config/optimize.toml`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SamplerConfig {
+    /// The sampler.
+    pub kind: SamplerKind,
+    /// TPE: whether all parameters are sampled jointly (Optuna 5) or one by one (Optuna 3, the paper).
+    pub multivariate: bool,
+    /// Seed of the random streams.
+    pub seed: u32,
+    /// Finished trials before the model proposes; until then points are drawn over the whole space.
+    /// Default: 10 for TPE, as Optuna; the number of parameters plus two for the Gaussian process.
+    pub startup_trials: Option<usize>,
+    /// TPE: candidates drawn from l(x) for one proposal.
+    pub candidates: usize,
+}
+
+impl Default for SamplerConfig {
+    fn default() -> Self {
+        SamplerConfig { kind: SamplerKind::Tpe, multivariate: true, seed: 0, startup_trials: None, candidates: 24 }
+    }
+}
+
+impl SamplerConfig {
+    /// Number of finished trials from which on the model proposes.
+    pub fn startup_trials(&self, space: &Space) -> usize {
+        let default = if self.kind == SamplerKind::Gp { space.parameters().len() + 2 } else { 10 };
+        self.startup_trials.unwrap_or(default)
+    }
+}
+
+/// The two random streams of a sampler, both of the same seed. They are independent, so that the number of startup
+/// points does not change the draws of the model.
+#[derive(Debug, Clone)]
+pub struct Streams {
+    /// Read when the model proposes.
+    pub model: Mt19937,
+    /// Read when a point is drawn over the whole space.
+    pub startup: Mt19937,
+}
+
+/// Positions in the streams of one seed, from which they can be continued.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Draws {
+    /// Doubles taken from [`Streams::model`].
+    pub model: u64,
+    /// Doubles taken from [`Streams::startup`].
+    pub startup: u64,
+}
+
+impl Streams {
+    /// Both streams at their start.
+    pub fn new(seed: u32) -> Self {
+        Streams { model: Mt19937::new(seed), startup: Mt19937::new(seed) }
+    }
+
+    /// Present positions.
+    pub fn draws(&self) -> Draws {
+        Draws { model: self.model.drawn(), startup: self.startup.drawn() }
+    }
+
+    /// Reads on to `draws`; a stream beyond its position there does not move.
+    pub fn advance_to(&mut self, draws: Draws) {
+        self.model.advance_to(draws.model);
+        self.startup.advance_to(draws.startup);
+    }
+}
+
+/// The inputs of a sampler.
+#[derive(Debug, Clone, Copy)]
+pub struct Ask<'a> {
+    /// Settings of the sampler.
+    pub config: &'a SamplerConfig,
+    /// All trials except the one that is asked for.
+    pub trials: &'a [Trial],
+    /// Parameters to choose, with their bounds.
+    pub space: &'a Space,
+    /// Given parameters of the trial that is asked for.
+    pub fixed: &'a [(String, f64)],
+    /// Direction of the objective.
+    pub direction: Direction,
+}
+
+impl Ask<'_> {
+    /// The value of a parameter that needs no choice: a given one, or the only one in its range.
+    pub fn given(&self, parameter: &Parameter) -> Option<f64> {
+        value_of(self.fixed, &parameter.name).or(parameter.range.is_point().then_some(parameter.range.low))
+    }
+}
+
+/// A point that a sampler proposes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Candidate {
+    /// One value per parameter, in the order of the space.
+    pub values: Vec<f64>,
+    /// TPE: the joint sample behind it, by name, including parameters that were fixed; empty if none was drawn.
+    pub joint: Vec<(String, f64)>,
+}
+
+impl From<Vec<f64>> for Candidate {
+    fn from(values: Vec<f64>) -> Self {
+        Candidate { values, joint: Vec::new() }
+    }
+}

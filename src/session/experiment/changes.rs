@@ -1,0 +1,236 @@
+//! Changes of the proposal, the search and the queue by the operator. Each request is checked; a refusal names the limit.
+//! Nothing runs before it is approved.
+
+use super::attributes::{self, BudgetAttribute, Origin};
+use super::proposal_card::ProposalCard;
+use super::{Experiment, ExperimentState, RequestRefusal, confirmation, not_now};
+use crate::trial::{ParameterInfo, ProposalSource};
+
+impl Experiment {
+    /// Sets one parameter of the proposal.
+    ///
+    /// # Errors
+    /// When there is no proposal, no such parameter, or the value is outside its bounds.
+    pub fn set_parameter(&mut self, name: &str, value: f64) -> Result<(), RequestRefusal> {
+        self.change_card()?;
+        must_be_within(&self.search.parameters(&self.plan), "parameter", name, value)?;
+        let revision = self.next_revision();
+        self.change_card()?.set(name, value, revision);
+        self.publish_proposal();
+        Ok(())
+    }
+
+    /// Sets one of the controller's gains for the proposed trial.
+    ///
+    /// # Errors
+    /// When there is no proposal, no such gain, or the value is outside its safe range.
+    pub fn set_gain(&mut self, name: &str, value: f64) -> Result<(), RequestRefusal> {
+        self.change_card()?;
+        must_be_within(&self.plan.gains, "gain", name, value)?;
+        let revision = self.next_revision();
+        self.change_card()?.set_gain(name, value, revision);
+        self.publish_proposal();
+        Ok(())
+    }
+
+    /// Takes all changes of the proposal back, also those of gains.
+    ///
+    /// # Errors
+    /// When there is no proposal.
+    pub fn clear_overrides(&mut self) -> Result<(), RequestRefusal> {
+        let revision = self.next_revision();
+        self.change_card()?.clear(revision);
+        self.publish_proposal();
+        Ok(())
+    }
+
+    fn change_card(&mut self) -> Result<&mut ProposalCard, RequestRefusal> {
+        match &mut self.state {
+            ExperimentState::Proposed(card) => Ok(card),
+            _ => not_now("there is no proposal to change"),
+        }
+    }
+
+    /// Fixes a parameter for the next `trials` trials that count; the other parameters are proposed for that value. A point
+    /// that was queued with a value of its own keeps it. Replaces an earlier fix of the same parameter.
+    ///
+    /// # Errors
+    /// When a trial is under way, there is no such parameter, the value is outside its bounds, nothing would be left to
+    /// search, or the study cannot be written.
+    pub fn fix(&mut self, name: &str, value: f64, trials: u32) -> Result<(), RequestRefusal> {
+        self.must_be_idle()?;
+        let bounds = self.search.parameters(&self.plan);
+        must_be_within(&bounds, "parameter", name, value)?;
+        if trials == 0 {
+            return not_now("fix it for one trial at least");
+        }
+        let others = self.search.fixed(self.study.trials());
+        let free = bounds.iter().any(|p| p.name != name && p.low < p.high && !others.contains_key(&p.name));
+        if !free {
+            return not_now(format!("with {name} fixed nothing would be left to search; queue the point instead"));
+        }
+        let from =
+            self.pending.as_ref().map_or(self.study.trials().len() as u32, |pending| pending.suggestion.trial + 1);
+        self.search.fix(name, value, trials, from);
+        self.write_search()
+    }
+
+    /// Lets a fixed parameter be searched again.
+    ///
+    /// # Errors
+    /// When a trial is under way, the parameter is not fixed, or the study cannot be written.
+    pub fn unfix(&mut self, name: &str) -> Result<(), RequestRefusal> {
+        self.must_be_idle()?;
+        if !self.search.unfix(name) {
+            return not_now(format!("{name} is not fixed"));
+        }
+        self.write_search()
+    }
+
+    /// Searches a parameter between `low` and `high` from now on. As in Optuna, it is then sampled by itself until no
+    /// finished trial has other bounds; trials outside stay in the history. The configured bounds undo it.
+    ///
+    /// # Errors
+    /// When a trial is under way, there is no such parameter, the bounds are no range or wider than `safety.toml` allows,
+    /// the parameter is fixed outside them, or the study cannot be written.
+    pub fn narrow_bounds(&mut self, name: &str, low: f64, high: f64) -> Result<(), RequestRefusal> {
+        self.must_be_idle()?;
+        let widest = named(&self.plan.widest, "parameter", name)?;
+        if low >= high || low.is_nan() || high.is_nan() {
+            return not_now(format!(
+                "{name}: {low} to {high} is no range; the lower bound must be below the upper one"
+            ));
+        }
+        if !(low >= widest.low && high <= widest.high) {
+            let ParameterInfo { unit, low: least, high: most, .. } = widest;
+            return not_now(format!(
+                "{name} from {low} to {high} {unit} is wider than safety.toml allows: {least} to {most} {unit}"
+            ));
+        }
+        if let Some(fixed) = self.search.fixed(self.study.trials()).get(name)
+            && !(fixed.value >= low && fixed.value <= high)
+        {
+            return not_now(format!(
+                "{name} is fixed at {}, outside these bounds; let it be searched first",
+                fixed.value
+            ));
+        }
+        self.search.set_bounds(name, low, high, &self.plan);
+        self.write_search()
+    }
+
+    /// Writes bounds and fixed parameters, and makes a new proposal with them.
+    fn write_search(&mut self) -> Result<(), RequestRefusal> {
+        self.study.annotate_study(&self.search.attributes())?;
+        Ok(self.repropose()?)
+    }
+
+    /// Queues the parameters of an earlier trial again, with its gains.
+    ///
+    /// # Errors
+    /// When there is no such trial, a trial is under way, or the study cannot be written.
+    pub fn repeat(&mut self, trial: u32) -> Result<(), RequestRefusal> {
+        let Some(row) = self.rows.get(&trial) else { return not_now(format!("there is no trial {trial}")) };
+        let parameters = row.parameters.clone();
+        let origin = Origin::rerun_of(trial, row.source, row.gains.clone());
+        self.queue(&parameters, &origin)
+    }
+
+    /// Queues a point, which may hold gains, too; the parameters that it lacks are proposed when it is its turn.
+    ///
+    /// # Errors
+    /// When a value is outside its bounds, a trial is under way, or the study cannot be written.
+    pub fn enqueue(&mut self, point: &[(String, f64)]) -> Result<(), RequestRefusal> {
+        let bounds = self.search.parameters(&self.plan);
+        let is_gain = |(name, _): &(String, f64)| self.plan.gains.iter().any(|gain| gain.name == *name);
+        let (gains, parameters): (Vec<_>, Vec<_>) = point.iter().cloned().partition(is_gain);
+        for (name, value) in &parameters {
+            must_be_within(&bounds, "parameter", name, *value)?;
+        }
+        for (name, value) in &gains {
+            must_be_within(&self.plan.gains, "gain", name, *value)?;
+        }
+        self.queue(&parameters, &Origin { gains: gains.into(), ..Origin::new(ProposalSource::Queued) })
+    }
+
+    fn queue(&mut self, parameters: &[(String, f64)], origin: &Origin) -> Result<(), RequestRefusal> {
+        self.must_be_idle()?;
+        self.study.enqueue(parameters, &origin.attributes())?;
+        Ok(self.propose()?)
+    }
+
+    /// Repeats the best points up to `repeats` times in all; 0 ends the confirmation. Makes the last verdict final. Returns
+    /// the first trials of the compared points.
+    ///
+    /// # Errors
+    /// When a trial is under way, there are fewer than two points to compare, or the study cannot be written.
+    pub fn confirm_best(&mut self, repeats: u32) -> Result<Vec<u32>, RequestRefusal> {
+        self.must_be_idle()?;
+        self.study.refresh()?;
+        if repeats == 0 {
+            if confirmation::running(&self.study).is_none() {
+                return not_now("no confirmation of the best is running");
+            }
+            self.report_pending()?;
+            self.confirmation.abort(&mut self.study)?;
+            self.propose()?;
+            return Ok(Vec::new());
+        }
+        // In the outlook: a refused request does not make the last verdict final.
+        let trials = self.confirmation.candidates(&self.outlook()?);
+        if trials.len() < 2 {
+            return not_now("fewer than two points ended without a fall: nothing to compare");
+        }
+        self.report_pending()?;
+        self.confirmation.start(&mut self.study, trials.clone(), repeats)?;
+        self.propose()?;
+        Ok(trials)
+    }
+
+    /// Sets the note of a trial.
+    ///
+    /// # Errors
+    /// When there is no such trial or the study cannot be written.
+    pub fn note(&mut self, trial: u32, text: &str) -> Result<(), RequestRefusal> {
+        let Some(row) = self.rows.get_mut(&trial) else { return not_now(format!("there is no trial {trial}")) };
+        row.note = text.to_owned();
+        self.study.note(trial, text)?;
+        self.publish_row(trial);
+        Ok(())
+    }
+
+    /// Raises the budget, also for sessions that continue the study or join it later.
+    ///
+    /// # Errors
+    /// When the study cannot be read or written.
+    pub fn extend(&mut self, trials: u32) -> Result<(), RequestRefusal> {
+        let budget = self.plan.budget.saturating_add(trials);
+        self.study.annotate_study(&attributes::write(&BudgetAttribute { budget }))?;
+        self.plan.budget = budget;
+        match self.state {
+            ExperimentState::Finished => self.propose()?,
+            _ => self.publish_search(&self.study.fork()),
+        }
+        Ok(())
+    }
+}
+
+fn named<'a>(all: &'a [ParameterInfo], what: &str, name: &str) -> Result<&'a ParameterInfo, RequestRefusal> {
+    match all.iter().find(|parameter| parameter.name == name) {
+        Some(parameter) => Ok(parameter),
+        None => {
+            let known: Vec<_> = all.iter().map(|parameter| parameter.name.as_str()).collect();
+            not_now(format!("there is no {what} {name}; the {what}s are {}", known.join(", ")))
+        }
+    }
+}
+
+/// Refuses a value outside the bounds of its parameter, or a name that is not in the list.
+pub fn must_be_within(all: &[ParameterInfo], what: &str, name: &str, value: f64) -> Result<(), RequestRefusal> {
+    let ParameterInfo { unit, low, high, .. } = named(all, what, name)?;
+    if value >= *low && value <= *high {
+        Ok(())
+    } else {
+        not_now(format!("{name} = {value} {unit} is outside its bounds {low} to {high} {unit}"))
+    }
+}

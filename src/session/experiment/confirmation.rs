@@ -1,0 +1,253 @@
+//! Confirmation of the best: the best points are repeated until one leads with enough confidence, or the repeats are used
+//! up. The rule is that of [`crate::optimize::repeats`]; the repeats are proposals like any other, beyond the budget.
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use super::attributes::{self, StudyAttributes};
+use crate::optimize::repeats::{Confirmation, LEAST_REPEATS, RepeatedPoint, confirm, contenders, points, rank};
+use crate::optimize::study::{Study, StudyError};
+use crate::optimize::trial::{Trial, TrialState};
+use crate::trial::PointRecord;
+
+/// A confirmation that runs.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RunningConfirmation {
+    /// First trials of the compared points.
+    trials: Vec<u32>,
+    /// Most repeats.
+    repeats: u32,
+    /// Number of the first trial that may be one of them.
+    from: u32,
+}
+
+/// Conclusion of a confirmation.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Conclusion {
+    /// First trials of the compared points.
+    trials: Vec<u32>,
+    /// First trial of the leading point.
+    leader: u32,
+    /// Confidence that the leading point is the best.
+    confidence: f64,
+    /// Whether the confidence is enough.
+    sure: bool,
+}
+
+/// Next step of a confirmation.
+pub enum NextRepeat {
+    /// No confirmation runs, or other workers run the last repeats.
+    None,
+    /// Repeat the point of this first trial.
+    Repeat(Box<Trial>),
+    /// The confirmation is over; with a line for the log.
+    Over(Conclusion, String),
+}
+
+/// The part of an experiment that confirms the best.
+#[derive(Debug)]
+pub struct BestConfirmation {
+    /// Number of best points that are compared.
+    contenders: u32,
+    /// Confidence at which one of them is the best.
+    confidence: f64,
+    /// Conclusion that is not written yet, because the last verdict can still be undone.
+    concluded: Option<Conclusion>,
+    /// Points as they were published last.
+    published: Vec<PointRecord>,
+}
+
+impl BestConfirmation {
+    /// No conclusion yet.
+    pub fn new(contenders: u32, confidence: f64) -> BestConfirmation {
+        BestConfirmation { contenders, confidence, concluded: None, published: Vec::new() }
+    }
+
+    /// Returns the first trials of the points that a confirmation in `outlook` would compare.
+    pub fn candidates(&self, outlook: &Study) -> Vec<u32> {
+        let best = contenders(outlook.trials(), outlook.options().direction, self.contenders as usize);
+        best.iter().filter(|point| point.stood > 0).map(|point| point.trials[0]).collect()
+    }
+
+    /// Starts a confirmation of the points of `trials` with at most `repeats` repeats.
+    pub fn start(&mut self, study: &mut Study, trials: Vec<u32>, repeats: u32) -> Result<(), StudyError> {
+        #[derive(Serialize)]
+        struct Started {
+            confirm: RunningConfirmation,
+            confirmed: Option<Conclusion>,
+        }
+        let confirm = RunningConfirmation { trials, repeats, from: study.trials().len() as u32 };
+        study.annotate_study(&attributes::write(&Started { confirm, confirmed: None }))?;
+        self.concluded = None;
+        Ok(())
+    }
+
+    /// Ends a confirmation without a conclusion.
+    pub fn abort(&self, study: &mut Study) -> Result<(), StudyError> {
+        #[derive(Serialize)]
+        struct Aborted {
+            confirm: Option<RunningConfirmation>,
+        }
+        study.annotate_study(&attributes::write(&Aborted { confirm: None }))
+    }
+
+    /// Drops a conclusion that is not written: the trials have changed.
+    pub fn reopen(&mut self) {
+        self.concluded = None;
+    }
+
+    /// Keeps a conclusion until it can be written.
+    pub fn conclude(&mut self, conclusion: Conclusion) {
+        self.concluded = Some(conclusion);
+    }
+
+    /// Writes the conclusion, once no verdict that it rests on can be undone any more.
+    pub fn write_conclusion(&self, study: &mut Study) -> Result<(), StudyError> {
+        #[derive(Serialize)]
+        struct Concluded<'a> {
+            confirmed: &'a Conclusion,
+            confirm: Option<RunningConfirmation>,
+        }
+        let Some(confirmed) = self.concluded.as_ref().filter(|_| running(study).is_some()) else { return Ok(()) };
+        study.annotate_study(&attributes::write(&Concluded { confirmed, confirm: None }))
+    }
+
+    /// Returns the next step of the confirmation in the study `outlook`.
+    pub fn next(&self, outlook: &Study) -> NextRepeat {
+        let Some(running) = running(outlook) else { return NextRepeat::None };
+        let direction = outlook.options().direction;
+        let compared = compared(&running.trials, outlook);
+        let Some(first) = compared.first() else { return NextRepeat::None };
+        let over = |leader: usize, confidence: f64, message: String| {
+            let (trials, leader) = (running.trials.clone(), compared[leader].trials[0]);
+            let sure = confidence >= self.confidence;
+            NextRepeat::Over(Conclusion { trials, leader, confidence, sure }, message)
+        };
+        if compared.len() < 2 {
+            let message = format!("only the point of trial {} is left to compare: nothing to confirm", first.trials[0]);
+            return over(0, 0.0, message);
+        }
+        match confirm(&compared, direction, self.confidence) {
+            Confirmation::Leads(leader, confidence) => {
+                over(leader, confidence, format!("confirmed: {}", lead_text(&compared[leader], confidence)))
+            }
+            Confirmation::Repeat(point) if running.left(outlook.trials()) > 0 => {
+                match outlook.trial(compared[point].trials[0]) {
+                    Ok(first) => NextRepeat::Repeat(Box::new(first.clone())),
+                    Err(_) => NextRepeat::None,
+                }
+            }
+            // Other workers run the last repeats.
+            Confirmation::Repeat(_) if running.used(outlook.trials(), |state| !state.is_finished()) > 0 => {
+                NextRepeat::None
+            }
+            Confirmation::Repeat(_) => {
+                let rank = rank(&compared, direction);
+                let message = format!(
+                    "the {} repeats are used up: {}, short of {:.0} %",
+                    running.repeats,
+                    lead_text(&compared[rank.leader], rank.confidence),
+                    100.0 * self.confidence
+                );
+                over(rank.leader, rank.confidence, message)
+            }
+        }
+    }
+
+    /// Returns the number of repeats that are still to be completed; none while no confirmation runs.
+    pub fn repeats_left(&self, outlook: &Study) -> Option<u32> {
+        let running = running(outlook).filter(|_| self.concluded.is_none())?;
+        let completed = running.used(outlook.trials(), |state| state == TrialState::Complete);
+        Some(running.repeats.saturating_sub(completed))
+    }
+
+    /// Returns all repeated and compared points of `outlook`, if they have changed since the last call.
+    pub fn changed_points(&mut self, outlook: &Study) -> Option<Vec<PointRecord>> {
+        let kept = StudyAttributes::of(outlook.attributes());
+        let running = kept.confirm;
+        let concluded = self.concluded.clone().or(kept.confirmed);
+        let trials = match (&running, &concluded) {
+            (Some(RunningConfirmation { trials, .. }), _) | (None, Some(Conclusion { trials, .. })) => {
+                trials.as_slice()
+            }
+            (None, None) => &[],
+        };
+        let leader = match (&concluded, &running) {
+            (Some(concluded), _) => Some((concluded.leader, concluded.confidence)),
+            (None, Some(running)) => {
+                let compared = compared(&running.trials, outlook);
+                // Before every point has been repeated the spread is not known.
+                let repeated = compared.len() > 1 && compared.iter().all(|point| point.repeats() >= LEAST_REPEATS);
+                repeated
+                    .then(|| rank(&compared, outlook.options().direction))
+                    .map(|rank| (compared[rank.leader].trials[0], rank.confidence))
+            }
+            (None, None) => None,
+        };
+        let record = |point: RepeatedPoint| {
+            let contender = trials.iter().any(|first| point.trials.contains(first));
+            (point.repeats() > 1 || contender).then(|| PointRecord {
+                stood: point.stood as u32,
+                mean: point.mean(),
+                deviation: point.deviation(),
+                contender,
+                confidence: leader.filter(|(first, _)| point.trials.contains(first)).map(|(_, confidence)| confidence),
+                parameters: point.parameters.into(),
+                trials: point.trials,
+            })
+        };
+        let points: Vec<PointRecord> = points(outlook.trials()).into_iter().filter_map(record).collect();
+        if points == self.published {
+            return None;
+        }
+        self.published.clone_from(&points);
+        Some(points)
+    }
+}
+
+/// Returns the confirmation that runs.
+pub fn running(study: &Study) -> Option<RunningConfirmation> {
+    StudyAttributes::of(study.attributes()).confirm
+}
+
+/// Queues a repeat, unless other workers have begun or queued the last ones. Returns its number.
+pub fn queue_repeat(
+    study: &mut Study,
+    parameters: &[(String, f64)],
+    attributes: &[(String, Value)],
+) -> Result<Option<u32>, StudyError> {
+    let Some(running) = running(study) else { return Ok(None) };
+    study.enqueue_unless(parameters, attributes, |trials| running.left(trials) == 0)
+}
+
+impl RunningConfirmation {
+    /// Returns the number of repeats that may still be queued. Repeats that run or wait are used, void ones are not.
+    fn left(&self, trials: &[Trial]) -> u32 {
+        let used = self.used(trials, |state| !matches!(state, TrialState::Fail | TrialState::Pruned));
+        self.repeats.saturating_sub(used)
+    }
+
+    /// Returns the number of repeats in one of the states `of`.
+    fn used(&self, trials: &[Trial], of: impl Fn(TrialState) -> bool) -> u32 {
+        let repeat = |trial: &&Trial| trial.number >= self.from && of(trial.state) && attributes::confirms(trial);
+        trials.iter().filter(repeat).count() as u32
+    }
+}
+
+/// Returns the compared points; a point whose trials do not count any more is left out.
+fn compared(first_trials: &[u32], study: &Study) -> Vec<RepeatedPoint> {
+    let points = points(study.trials());
+    first_trials.iter().filter_map(|first| points.iter().find(|point| point.trials.contains(first)).cloned()).collect()
+}
+
+fn lead_text(point: &RepeatedPoint, confidence: f64) -> String {
+    let spread = point.deviation().map(|deviation| format!(" +- {deviation:.3}")).unwrap_or_default();
+    format!(
+        "the point of trial {} leads with {:.1} % confidence: mean {:.3}{spread}, stood {} of {}",
+        point.trials[0],
+        100.0 * confidence,
+        point.mean(),
+        point.stood,
+        point.repeats()
+    )
+}

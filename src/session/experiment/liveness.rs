@@ -1,0 +1,43 @@
+//! Liveness of the running trials of other workers. Workers may run on hosts whose clocks disagree, so no time stamp of
+//! the journal is compared: a trial counts as abandoned when this session has seen it run for too long without news.
+
+use std::collections::BTreeMap;
+use std::time::{Duration, Instant};
+
+use crate::optimize::trial::{Trial, TrialState};
+
+/// Times at which this session has seen the last news of running trials.
+#[derive(Debug)]
+pub struct Liveness {
+    /// Time without news after which a running trial counts as abandoned.
+    abandoned: Duration,
+    /// By number: time of the last news, and the number of attributes then.
+    last_news: BTreeMap<u32, (Instant, usize)>,
+}
+
+impl Liveness {
+    /// Starts without any trial.
+    pub fn new(abandoned: Duration) -> Liveness {
+        Liveness { abandoned, last_news: BTreeMap::new() }
+    }
+
+    /// Takes in the present state of the trials; to be called whenever the study was read.
+    pub fn observe(&mut self, trials: &[Trial]) {
+        let now = Instant::now();
+        let before = std::mem::take(&mut self.last_news);
+        let running = trials.iter().filter(|trial| trial.state == TrialState::Running);
+        self.last_news = running
+            .map(|trial| {
+                // A judgement is news: it adds attributes.
+                let attributes = trial.user_attributes.len();
+                let since = before.get(&trial.number).filter(|(_, had)| *had == attributes);
+                (trial.number, since.copied().unwrap_or((now, attributes)))
+            })
+            .collect();
+    }
+
+    /// Returns whether a running trial may still be run by its worker; true for one that was never seen before.
+    pub fn is_alive(&self, trial: &Trial) -> bool {
+        self.last_news.get(&trial.number).is_none_or(|(since, _)| since.elapsed() < self.abandoned)
+    }
+}

@@ -1,0 +1,218 @@
+//! The proposal that waits for approval: a draft of the study and the operator's changes to it.
+
+use std::collections::BTreeMap;
+
+use super::attributes::Origin;
+use crate::optimize::ask::SamplerKind;
+use crate::optimize::insight;
+use crate::optimize::study::{Study, TrialDraft};
+use crate::optimize::trial::Trial;
+use crate::trial::{
+    FallRisk, Gains, ParameterInsight, ParameterValues, Proposal, ProposalInsight, ProposalSource, ProposedParameter,
+};
+
+/// Values at which the densities are given: the width of a chart in a terminal.
+const INSIGHT_POINTS: usize = 41;
+
+/// A draft with the operator's changes.
+pub struct ProposalCard {
+    draft: TrialDraft,
+    /// Changed by every change of the card: no approval of an earlier one fits a later one.
+    revision: u32,
+    /// The study at the time at which the trial begins: every verdict is reported in it.
+    outlook: Study,
+    changes: Changes,
+    /// The draft was queued in the outlook only: in the study its number may belong to another trial by now.
+    only_in_outlook: bool,
+    /// The configured gains, in table order.
+    configured: ParameterValues,
+    /// The gains of the trial without changes: the configured ones, or those of its origin.
+    gains: ParameterValues,
+    /// Parameters of the draft that the operator has fixed for some trials.
+    fixed: Vec<(String, f64)>,
+}
+
+/// The operator's changes to a proposal, by name.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Changes {
+    parameters: BTreeMap<String, f64>,
+    gains: BTreeMap<String, f64>,
+}
+
+/// The values of a card at its approval.
+pub struct ApprovedCard {
+    /// The proposal as it was seen.
+    pub proposal: Proposal,
+    /// Origin of the draft.
+    pub origin: Origin,
+    /// The draft.
+    pub draft: TrialDraft,
+    /// The changed parameters.
+    pub overrides: Vec<(String, f64)>,
+    /// The fixed parameters, without those that were changed for this trial.
+    pub fixed: ParameterValues,
+    /// Whether the draft was queued in the outlook only.
+    pub only_in_outlook: bool,
+}
+
+impl ProposalCard {
+    /// Drafts the next trial of `outlook`. The parameters `fixed` are not searched unless the draft was queued with values
+    /// of its own. `in_study` is true if the waiting trial of the outlook waits in the study, too. `gains` are the
+    /// configured ones; `revision` must be one that no earlier card had.
+    pub fn new(outlook: Study, in_study: bool, fixed: &[(String, f64)], gains: &Gains, revision: u32) -> ProposalCard {
+        let queued = outlook.waiting().next().map(Trial::fixed).unwrap_or_default();
+        let fixed: Vec<_> = fixed.iter().filter(|(name, _)| queued.iter().all(|(n, _)| n != name)).cloned().collect();
+        let draft = outlook.draft_with(&fixed);
+        let mut card = ProposalCard {
+            only_in_outlook: draft.enqueued && !in_study,
+            draft,
+            revision,
+            outlook,
+            changes: Changes::default(),
+            configured: gains.values(),
+            gains: ParameterValues::default(),
+            fixed,
+        };
+        card.gains = gains.with(&card.origin().gains).values();
+        card
+    }
+
+    /// Returns the number that the trial will have.
+    pub fn number(&self) -> u32 {
+        self.draft.number
+    }
+
+    /// Returns whether the proposal is the one with this number and revision.
+    pub fn is(&self, trial: u32, revision: u32) -> bool {
+        self.number() == trial && self.revision == revision
+    }
+
+    /// Returns the number of the waiting trial of the study that this card proposes; none if it does not wait there.
+    pub fn waits_as(&self) -> Option<u32> {
+        (self.draft.enqueued && !self.only_in_outlook).then_some(self.number())
+    }
+
+    /// Changes one parameter; the proposed value is no change.
+    pub fn set(&mut self, name: &str, value: f64, revision: u32) {
+        let proposed = self.draft.parameters.iter().any(|p| p.name == name && p.value == value);
+        change(&mut self.changes.parameters, name, value, proposed);
+        self.revision = revision;
+    }
+
+    /// Changes one gain; the value that it has without changes is no change.
+    pub fn set_gain(&mut self, name: &str, value: f64, revision: u32) {
+        change(&mut self.changes.gains, name, value, self.gains.get(name) == Some(value));
+        self.revision = revision;
+    }
+
+    /// Makes the changes of an earlier card, parameters only where `keeps` is true.
+    pub fn inherit(&mut self, earlier: &Changes, revision: u32, keeps: impl Fn(&str, f64) -> bool) {
+        self.revision = revision;
+        for (name, value) in earlier.parameters.iter().filter(|(name, value)| keeps(name, **value)) {
+            self.set(name, *value, revision);
+        }
+        for (name, value) in &earlier.gains {
+            self.set_gain(name, *value, revision);
+        }
+    }
+
+    /// Returns the operator's changes; none without any.
+    pub fn changes(&self) -> Option<&Changes> {
+        (self.changes != Changes::default()).then_some(&self.changes)
+    }
+
+    /// Takes all changes back.
+    pub fn clear(&mut self, revision: u32) {
+        self.changes = Changes::default();
+        self.revision = revision;
+    }
+
+    /// Returns the values for the trial.
+    pub fn approved(&self) -> ApprovedCard {
+        let changed = &self.changes.parameters;
+        ApprovedCard {
+            proposal: self.proposal(),
+            origin: self.origin(),
+            draft: self.draft.clone(),
+            overrides: changed.iter().map(|(name, value)| (name.clone(), *value)).collect(),
+            fixed: self.fixed.iter().filter(|(name, _)| !changed.contains_key(name)).cloned().collect(),
+            only_in_outlook: self.only_in_outlook,
+        }
+    }
+
+    fn origin(&self) -> Origin {
+        if self.draft.enqueued { Origin::of(&self.draft.attributes) } else { Origin::new(ProposalSource::Sampler) }
+    }
+
+    /// Returns the proposal for the operator. A gain that differs from the configuration shows as changed, also where the
+    /// trial's origin brought it.
+    pub fn proposal(&self) -> Proposal {
+        let changed = |changes: &BTreeMap<String, f64>, name: &str, own| changes.get(name).copied().unwrap_or(own);
+        let parameter = |name: &str, own: f64| ProposedParameter {
+            name: name.to_owned(),
+            value: changed(&self.changes.parameters, name, own),
+            proposed: own,
+        };
+        let gain = |((name, own), (_, configured)): (&(String, f64), &(String, f64))| ProposedParameter {
+            name: name.clone(),
+            value: changed(&self.changes.gains, name, *own),
+            proposed: *configured,
+        };
+        let parameters: Vec<_> = self.draft.parameters.iter().map(|p| parameter(&p.name, p.value)).collect();
+        let origin = self.origin();
+        Proposal {
+            trial: self.number(),
+            revision: self.revision,
+            source: if self.changes().is_some() { ProposalSource::Operator } else { origin.source },
+            parent: origin.parent,
+            risk: self.risk(&parameters),
+            parameters,
+            gains: self.gains.iter().zip(&self.configured).map(gain).collect(),
+        }
+    }
+
+    /// Returns the distance to earlier falls; none before the first trial that counts.
+    fn risk(&self, point: &[ProposedParameter]) -> Option<FallRisk> {
+        let point: Vec<_> = point.iter().map(|p| (p.name.clone(), p.value)).collect();
+        let risk = insight::FallProximity::of(&point, self.outlook.trials(), &self.outlook.options().space);
+        (risk.neighbours > 0).then(|| FallRisk {
+            nearest_fall: risk.falls.first().map(|(_, distance)| *distance),
+            nearest_fall_trial: risk.falls.first().map(|(trial, _)| *trial),
+            falls: risk.fell_near as u32,
+            neighbours: risk.neighbours as u32,
+        })
+    }
+
+    /// Returns the reasons of the draft.
+    pub fn insight(&self) -> ProposalInsight {
+        let (trials, options) = (self.outlook.trials(), self.outlook.options());
+        let densities = match options.sampler.kind {
+            SamplerKind::Tpe => {
+                insight::densities(&options.sampler, trials, &options.space, options.direction, INSIGHT_POINTS)
+            }
+            _ => Vec::new(),
+        };
+        let importances: ParameterValues = insight::importances(trials, &options.space, options.direction).into();
+        let parameter = |(name, proposed): (String, f64)| {
+            let density = densities.iter().find(|density| density.name == name);
+            ParameterInsight {
+                proposed,
+                importance: importances.get(&name),
+                at: density.map(|density| density.at.clone()).unwrap_or_default(),
+                good: density.map(|density| density.good.clone()).unwrap_or_default(),
+                bad: density.map(|density| density.bad.clone()).unwrap_or_default(),
+                name,
+            }
+        };
+        let parameters = self.draft.parameters.iter().map(|p| (p.name.clone(), p.value)).map(parameter).collect();
+        ProposalInsight { trial: self.number(), parameters }
+    }
+}
+
+fn change(changes: &mut BTreeMap<String, f64>, name: &str, value: f64, unchanged: bool) {
+    if unchanged {
+        changes.remove(name);
+    } else {
+        changes.insert(name.to_owned(), value);
+    }
+}

@@ -1,0 +1,126 @@
+//! The contact law at one contact: the exact impulse while all other impulses are fixed.
+
+use nalgebra::{Matrix3, Vector2, Vector3};
+
+use crate::sim::config::ContactLaw;
+
+/// One contact in the coordinates normal, tangent, tangent.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct LocalProblem {
+    law: ContactLaw,
+    friction: f64,
+    /// A = W W^T + U U^T: the contact's block of the Delassus matrix, and its inverse.
+    pub delassus: Matrix3<f64>,
+    delassus_inverse: Matrix3<f64>,
+    /// Slip per tangential impulse, s in [`LocalProblem::solve`], at the end of the last search.
+    slip_ratio: f64,
+}
+
+impl LocalProblem {
+    pub fn new(law: ContactLaw, friction: f64, delassus: Matrix3<f64>) -> LocalProblem {
+        LocalProblem { law, friction, delassus, delassus_inverse: symmetric_inverse(&delassus), slip_ratio: 0.0 }
+    }
+
+    /// Returns the impulse that satisfies the law when the velocity without it is `c`.
+    pub fn solve(&mut self, c: &Vector3<f64>) -> Vector3<f64> {
+        if c.x >= 0.0 {
+            return Vector3::zeros();
+        }
+        let friction = self.friction;
+        // Sticking: v = A p + c = 0.
+        let stick = -(self.delassus_inverse * c);
+        if stick.x >= 0.0 && stick.y * stick.y + stick.z * stick.z <= (friction * stick.x).powi(2) {
+            self.slip_ratio = 0.0;
+            return stick;
+        }
+        let a_nn = self.delassus.m11;
+        if friction < 1e-9 {
+            return Vector3::new(-c.x / a_nn, 0.0, 0.0);
+        }
+        // Sliding: v_t = -s p_t with s > 0 and |p_t| = mu p_n; v_n = 0 (Coulomb) or mu |v_t| = mu^2 s p_n (convex):
+        //   (A + s D) p = -c,  D = diag(0 or -mu^2, 1, 1).
+        let weight = match self.law {
+            ContactLaw::Coulomb => 0.0,
+            ContactLaw::Convex => -friction * friction,
+        };
+        let m = &self.delassus;
+        // p(s), and dp/ds = -(A + s D)^-1 D p; none where A + s D is not positive definite: s is too large.
+        let at = |s: f64| {
+            let (m11, m22, m33) = (m.m11 + s * weight, m.m22 + s, m.m33 + s);
+            let (i11, i12, i13) = (m22 * m33 - m.m23 * m.m23, m.m13 * m.m23 - m.m12 * m33, m.m12 * m.m23 - m.m13 * m22);
+            let determinant = m11 * i11 + m.m12 * i12 + m.m13 * i13;
+            if m11 <= 0.0 || determinant <= 0.0 {
+                return None;
+            }
+            let (i22, i23, i33) = (m11 * m33 - m.m13 * m.m13, m.m12 * m.m13 - m11 * m.m23, m11 * m22 - m.m12 * m.m12);
+            let solve = |v: Vector3<f64>| {
+                let product = Vector3::new(
+                    i11 * v.x + i12 * v.y + i13 * v.z,
+                    i12 * v.x + i22 * v.y + i23 * v.z,
+                    i13 * v.x + i23 * v.y + i33 * v.z,
+                );
+                product / -determinant
+            };
+            let p = solve(*c);
+            Some((p, solve(Vector3::new(weight * p.x, p.y, p.z))))
+        };
+        // f(s) = |p_t| - mu p_n has a root in (0, high]: at 0 the impulse is outside the cone, at `high` inside.
+        let a = Vector2::new(m.m12, m.m13);
+        let d = Vector2::new(c.y, c.z) - a * (c.x / a_nn);
+        let (mut low, mut high) = (0.0, d.norm() * (a_nn + friction * a.norm()) / (friction * -c.x));
+        let mut s = if self.slip_ratio > low && self.slip_ratio < high { self.slip_ratio } else { 0.0 };
+        let mut best = stick;
+        for _ in 0..60 {
+            let Some((p, dp)) = at(s) else {
+                high = s;
+                s = 0.5 * (low + high);
+                continue;
+            };
+            best = p;
+            let size = (p.y * p.y + p.z * p.z).sqrt();
+            let f = size - friction * p.x;
+            if f.abs() <= 1e-14 * size {
+                break;
+            }
+            if f > 0.0 {
+                low = s
+            } else {
+                high = s
+            }
+            let slope = (p.y * dp.y + p.z * dp.z) / size - friction * dp.x;
+            let newton = s - f / slope;
+            let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
+            if next == s {
+                break;
+            }
+            s = next;
+        }
+        self.slip_ratio = s;
+        into_cone(&best, friction)
+    }
+}
+
+/// Shortens the tangential part of the impulse to Coulomb's limit; returns zero for an impulse that pulls.
+pub(super) fn into_cone(impulse: &Vector3<f64>, friction: f64) -> Vector3<f64> {
+    if impulse.x <= 0.0 {
+        return Vector3::zeros();
+    }
+    let size = (impulse.y * impulse.y + impulse.z * impulse.z).sqrt();
+    let limit = friction * impulse.x;
+    if size <= limit {
+        return *impulse;
+    }
+    Vector3::new(impulse.x, impulse.y * limit / size, impulse.z * limit / size)
+}
+
+/// Returns the inverse of a symmetric positive matrix by cofactors.
+fn symmetric_inverse(m: &Matrix3<f64>) -> Matrix3<f64> {
+    let i11 = m.m22 * m.m33 - m.m23 * m.m23;
+    let i12 = m.m13 * m.m23 - m.m12 * m.m33;
+    let i13 = m.m12 * m.m23 - m.m13 * m.m22;
+    let i22 = m.m11 * m.m33 - m.m13 * m.m13;
+    let i23 = m.m12 * m.m13 - m.m11 * m.m23;
+    let i33 = m.m11 * m.m22 - m.m12 * m.m12;
+    let determinant = m.m11 * i11 + m.m12 * i12 + m.m13 * i13;
+    Matrix3::new(i11, i12, i13, i12, i22, i23, i13, i23, i33) / determinant
+}

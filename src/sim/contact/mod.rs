@@ -1,0 +1,53 @@
+//! Rigid unilateral contacts with Coulomb friction, joint stops and dry joint friction, all solved together.
+//!
+//! The unknowns are the impulses p of one step, each in its friction cone K: |p_t| <= mu p_n. The cone is exact, not a
+//! pyramid. Two laws select the impulse of the cone (`contact.law`):
+//!
+//! - **Coulomb**: gap after the step >= 0, p_n >= 0, one of them zero (Signorini); a sliding point slides against p_t
+//!   with |p_t| = mu p_n and stays on the ground.
+//! - **Convex**, as in MuJoCo: v' - k v in the dual cone K* and orthogonal to p, which makes all contacts one convex
+//!   problem (Anitescu, "Optimization-based simulation of nonsmooth rigid multibody dynamics", Math. Program. 105,
+//!   2006; Todorov, "Convex and analytically-invertible dynamics with contacts and constraints", ICRA 2014). k = exp(-h
+//!   / slip_time) is the share of a slip velocity that a step keeps. The price is dilatancy: a sliding point also
+//!   rises, so fast sliding feet hop. Normal contact is rigid here; in MuJoCo it is soft.
+//!
+//! [`solver`] sweeps over the contacts (Gauss-Seidel) and solves each exactly with the others fixed: Hwangbo, Lee,
+//! Hutter, "Per-contact iteration method for solving contact dynamics", IEEE RA-L 3(2), 2018. That paper bisects for
+//! the impulse of most dissipation; [`law`] solves the contact law itself, reduced to one scalar equation as in
+//! Bonnefon and Daviet, "Quartic formulation of Coulomb 3D frictional contact", INRIA RT-0400, 2011.
+//!
+//! With the factors of [`super::dynamics`] the Delassus matrix is J M^-1 J^T = W W^T + (within a leg) U U^T with W =
+//! (J_0 - J_l G_l) L^-T and U = J_l C_l^-T. The sweep keeps the sums y_0 = sum W^T p and y_l = sum U^T p, so the cost
+//! of one visit does not depend on the number of contacts.
+
+mod law;
+mod solver;
+
+use nalgebra::{Matrix3, Vector3};
+
+pub(super) use solver::ContactSolver;
+
+/// A point that touches the ground or can within the step.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct ContactPoint {
+    /// Leg of the point, or [`super::motion::TRUNK`].
+    pub leg: usize,
+    /// Index of its warm-start impulse.
+    pub warm_start_slot: usize,
+    /// Position, body axes, m.
+    pub position_body: Vector3<f64>,
+    /// Out of the ground, body axes.
+    pub normal_body: Vector3<f64>,
+    /// J_l: velocity of the point per joint velocity of its leg, body axes; zero for the trunk.
+    pub leg_jacobian: Matrix3<f64>,
+    /// Distance to the ground at the start of the step, m; negative inside.
+    pub gap: f64,
+    /// Coulomb coefficient.
+    pub friction: f64,
+    /// Velocity relative to the ground at the start of the step, body axes, m/s.
+    pub velocity_body: Vector3<f64>,
+    /// Velocity relative to the ground at the end of the step without constraint impulses, body axes, m/s.
+    pub free_velocity_body: Vector3<f64>,
+    /// Loose block under the point.
+    pub block: Option<usize>,
+}

@@ -1,0 +1,287 @@
+//! Projected Gauss-Seidel over all constraint rows, started from the impulses of the last step (warm start).
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::ContactPoint;
+use super::law::{LocalProblem, into_cone};
+use crate::robot::{JOINTS, LEGS};
+use crate::sim::config::{ContactConfig, ContactLaw, SolverConfig};
+use crate::sim::dynamics::{Dynamics, Six, add_scaled, dot};
+use crate::sim::motion::{GeneralizedVelocity, StepContext, TRUNK};
+use crate::sim::quantities::stack;
+
+/// Most contacts at a time; a robot that lies on blocks has about twenty. Contacts found beyond that are left out until
+/// the next step.
+const MAX_CONTACTS: usize = 40;
+/// A stop and a friction row per joint.
+const MAX_JOINT_ROWS: usize = 2 * JOINTS;
+
+/// Three constraint rows of one contact: normal, tangent, tangent.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::sim) struct ContactConstraint {
+    /// Leg of the point, or [`TRUNK`].
+    leg: usize,
+    /// Index of its warm-start impulse.
+    pub warm_start_slot: usize,
+    /// Loose block under the point.
+    pub block: Option<usize>,
+    /// Columns normal, two tangents, body axes.
+    axes_body: Matrix3<f64>,
+    /// W.
+    trunk_rows: [Six; 3],
+    /// U; zero for the trunk.
+    leg_rows: Matrix3<f64>,
+    /// Right-hand side: velocity without impulses, less the velocity that may remain after the step.
+    rhs: Vector3<f64>,
+    local: LocalProblem,
+    impulse: Vector3<f64>,
+}
+
+/// The constraint row of a joint's stop or dry friction: an impulse between two bounds.
+#[derive(Debug, Clone, Copy)]
+struct JointConstraint {
+    leg: usize,
+    trunk_row: Six,
+    leg_row: Vector3<f64>,
+    /// Diagonal element of the Delassus matrix.
+    delassus: f64,
+    /// Right-hand side, as for a contact.
+    rhs: f64,
+    lowest: f64,
+    highest: f64,
+    impulse: f64,
+}
+
+/// The constraints of one step, and the impulses of the last one.
+#[derive(Debug, Clone)]
+pub(in crate::sim) struct ContactSolver {
+    config: SolverConfig,
+    law: ContactLaw,
+    slip_time_s: f64,
+    contacts: Vec<ContactConstraint>,
+    joint_rows: Vec<JointConstraint>,
+    /// Impulses of the last step in world axes, by [`ContactPoint::warm_start_slot`].
+    warm_start: Vec<Option<Vector3<f64>>>,
+    /// Slots of `warm_start` that hold an impulse.
+    warm_slots: Vec<usize>,
+    /// Share of a slip velocity that the convex law keeps over this step.
+    kept_slip: f64,
+}
+
+impl ContactSolver {
+    pub fn new(config: SolverConfig, contact: &ContactConfig, warm_start_slots: usize) -> ContactSolver {
+        ContactSolver {
+            config,
+            contacts: Vec::with_capacity(MAX_CONTACTS),
+            joint_rows: Vec::with_capacity(MAX_JOINT_ROWS),
+            warm_start: vec![None; warm_start_slots],
+            warm_slots: Vec::with_capacity(MAX_CONTACTS),
+            law: contact.law,
+            slip_time_s: contact.slip_time_s,
+            kept_slip: 0.0,
+        }
+    }
+
+    /// Removes all constraints and warm-start impulses.
+    pub fn reset(&mut self) {
+        self.contacts.clear();
+        self.joint_rows.clear();
+        self.warm_start.fill(None);
+        self.warm_slots.clear();
+    }
+
+    /// Starts a step of `h` seconds.
+    pub fn start(&mut self, h: f64) {
+        self.contacts.clear();
+        self.joint_rows.clear();
+        self.kept_slip = if self.slip_time_s > 0.0 { (-h / self.slip_time_s).exp() } else { 0.0 };
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.contacts.is_empty() && self.joint_rows.is_empty()
+    }
+
+    /// The contacts of this step; their impulses are those of the last step until [`ContactSolver::solve`].
+    pub fn contacts(&self) -> &[ContactConstraint] {
+        &self.contacts
+    }
+
+    /// Part of the right-hand side that a gap adds, from gap + h v >= 0, m/s or rad/s. Of a penetration only a share is
+    /// recovered per step.
+    #[inline]
+    pub fn gap_velocity(&self, gap: f64, h: f64) -> f64 {
+        let share = if gap > 0.0 { 1.0 } else { self.config.penetration_recovery };
+        share * gap / h
+    }
+
+    /// Adds a contact.
+    pub fn add_point(&mut self, step: &StepContext, point: &ContactPoint) {
+        if self.contacts.len() == MAX_CONTACTS {
+            return;
+        }
+        let axes_body = axes_about(&point.normal_body);
+        // Rows of J_0: axis . (v + w x p) = axis . v + (p x axis) . w
+        let mut trunk_rows = [0, 1, 2].map(|i| {
+            let axis: Vector3<f64> = axes_body.column(i).into();
+            stack(&axis, &point.position_body.cross(&axis))
+        });
+        let mut leg_rows = Matrix3::zeros();
+        if point.leg != TRUNK {
+            // J_0 - J_l G  and  U = J_l C^-T
+            let leg = &step.legs[point.leg];
+            let jacobian = axes_body.tr_mul(&point.leg_jacobian);
+            for (i, row) in trunk_rows.iter_mut().enumerate() {
+                for (j, gain) in leg.gain.iter().enumerate() {
+                    add_scaled(row, gain, -jacobian[(i, j)]);
+                }
+            }
+            leg_rows = jacobian * leg.factor_inverse.transpose();
+        }
+        // W = (J_0 - J_l G) L^-T
+        for row in &mut trunk_rows {
+            step.dynamics.solve_lower(row);
+        }
+        let [w1, w2, w3] = &trunk_rows;
+        let (a12, a13, a23) = (dot(w1, w2), dot(w1, w3), dot(w2, w3));
+        #[rustfmt::skip]
+        let trunk_part = Matrix3::new(
+            dot(w1, w1), a12,         a13,
+            a12,         dot(w2, w2), a23,
+            a13,         a23,         dot(w3, w3),
+        );
+        let delassus = trunk_part + leg_rows * leg_rows.transpose();
+        let mut rhs = axes_body.tr_mul(&point.free_velocity_body);
+        rhs.x += self.gap_velocity(point.gap, step.h);
+        if let ContactLaw::Convex = self.law {
+            let before = axes_body.tr_mul(&point.velocity_body);
+            rhs.y -= self.kept_slip * before.y;
+            rhs.z -= self.kept_slip * before.z;
+        }
+
+        let warm_start = match self.warm_start[point.warm_start_slot] {
+            Some(impulse_world) => axes_body.tr_mul(&step.world_from_body.tr_mul(&impulse_world)),
+            None => Vector3::zeros(),
+        };
+        self.contacts.push(ContactConstraint {
+            leg: point.leg,
+            warm_start_slot: point.warm_start_slot,
+            block: point.block,
+            axes_body,
+            trunk_rows,
+            leg_rows,
+            rhs,
+            local: LocalProblem::new(self.law, point.friction, delassus),
+            impulse: into_cone(&warm_start, point.friction),
+        });
+    }
+
+    /// Adds the row of a joint's stop or friction that acts on joint `joint` in the direction `sign`. `rhs` is the
+    /// velocity in that direction, to be taken to zero or above; `bounds` are those of the impulse, N m s.
+    pub fn add_joint(&mut self, step: &StepContext, joint: usize, sign: f64, rhs: f64, bounds: [f64; 2]) {
+        let (leg, part) = (joint / 3, joint % 3);
+        let mut u = Vector3::zeros();
+        u[part] = sign;
+        let l = &step.legs[leg];
+        let mut trunk_row = l.gain[part].map(|g| -sign * g);
+        step.dynamics.solve_lower(&mut trunk_row);
+        let leg_row = l.factor_inverse * u;
+        let delassus = dot(&trunk_row, &trunk_row) + leg_row.norm_squared();
+        let [lowest, highest] = bounds;
+        self.joint_rows.push(JointConstraint { leg, trunk_row, leg_row, delassus, rhs, lowest, highest, impulse: 0.0 });
+    }
+
+    /// Solves for all impulses; returns the change of velocity that they make.
+    pub fn solve(&mut self, dynamics: &Dynamics, world_from_body: &Matrix3<f64>) -> GeneralizedVelocity {
+        let mut sums = ImpulseSums { trunk: [0.0; 6], legs: [Vector3::zeros(); LEGS + 1] };
+        for contact in &self.contacts {
+            contact.add(&mut sums, &contact.impulse);
+        }
+        for _ in 0..self.config.max_sweeps {
+            let mut change: f64 = 0.0;
+            for contact in &mut self.contacts {
+                // Velocity due to all other impulses.
+                let others = contact.velocity(&sums) - contact.local.delassus * contact.impulse;
+                let impulse = contact.local.solve(&others);
+                let step = impulse - contact.impulse;
+                contact.impulse = impulse;
+                contact.add(&mut sums, &step);
+                change = change.max((contact.local.delassus * step).amax());
+            }
+            for row in &mut self.joint_rows {
+                let velocity = row.rhs + dot(&row.trunk_row, &sums.trunk) + row.leg_row.dot(&sums.legs[row.leg]);
+                let impulse = (row.impulse - velocity / row.delassus).clamp(row.lowest, row.highest);
+                let step = impulse - row.impulse;
+                row.impulse = impulse;
+                add_scaled(&mut sums.trunk, &row.trunk_row, step);
+                sums.legs[row.leg] += row.leg_row * step;
+                change = change.max((row.delassus * step).abs());
+            }
+            if change < self.config.tolerance_m_s {
+                break;
+            }
+        }
+        for slot in self.warm_slots.drain(..) {
+            self.warm_start[slot] = None;
+        }
+        for contact in &self.contacts {
+            self.warm_start[contact.warm_start_slot] = Some(world_from_body * contact.impulse_body());
+            self.warm_slots.push(contact.warm_start_slot);
+        }
+        // dv_0 = L^-T y_0,  ddq_l = C^-T y_l - G dv_0
+        let mut trunk = sums.trunk;
+        dynamics.solve_upper(&mut trunk);
+        let [fr, fl, rr, rl, _] = sums.legs;
+        let legs = dynamics.joint_change(&[fr, fl, rr, rl], &trunk);
+        GeneralizedVelocity { trunk, legs }
+    }
+}
+
+/// y_0 = sum W^T p and y_l = sum U^T p; the last leg stands for the trunk and stays zero.
+struct ImpulseSums {
+    trunk: Six,
+    legs: [Vector3<f64>; LEGS + 1],
+}
+
+impl ContactConstraint {
+    /// Velocity less the velocity that may remain: W y_0 + U y_l + rhs.
+    #[inline]
+    fn velocity(&self, sums: &ImpulseSums) -> Vector3<f64> {
+        let [w1, w2, w3] = &self.trunk_rows;
+        let trunk = Vector3::new(dot(w1, &sums.trunk), dot(w2, &sums.trunk), dot(w3, &sums.trunk));
+        self.rhs + trunk + self.leg_rows * sums.legs[self.leg]
+    }
+
+    /// Adds the impulse `p` to the sums.
+    #[inline]
+    fn add(&self, sums: &mut ImpulseSums, p: &Vector3<f64>) {
+        for (row, p) in self.trunk_rows.iter().zip(p.iter()) {
+            add_scaled(&mut sums.trunk, row, *p);
+        }
+        sums.legs[self.leg] += self.leg_rows.tr_mul(p);
+    }
+
+    /// Impulse of the ground on the robot, body axes at the start of the step, N s.
+    pub fn impulse_body(&self) -> Vector3<f64> {
+        self.axes_body * self.impulse
+    }
+
+    /// Normal component of the impulse, out of the ground, N s.
+    pub fn normal_impulse(&self) -> f64 {
+        self.impulse.x
+    }
+}
+
+/// Returns the normal and two tangents as columns (Duff et al., "Building an orthonormal basis, revisited", JCGT 6(1),
+/// 2017).
+fn axes_about(n: &Vector3<f64>) -> Matrix3<f64> {
+    let sign = 1.0_f64.copysign(n.z);
+    let a = -1.0 / (sign + n.z);
+    let b = n.x * n.y * a;
+    #[rustfmt::skip]
+    let axes = Matrix3::new(
+        n.x, 1.0 + sign * n.x * n.x * a, b,
+        n.y, sign * b,                   sign + n.y * n.y * a,
+        n.z, -sign * n.x,                -n.y,
+    );
+    axes
+}

@@ -1,0 +1,261 @@
+//! The simulator served as a Go1 over UDP: commands are received, the motors' control law is simulated, states are sent
+//! at 1 kHz, and faults are injected on demand. One [`Emulator::step`] is one millisecond of the robot: called at 1 kHz
+//! it is a robot in real time, called in turn with a control cycle it repeats bit for bit.
+//!
+//! Unknown properties of the real robot are keys of `[emulator]` in `config/simulator.toml`, with the assumption.
+
+mod fault;
+mod network;
+mod robot;
+
+use std::net::{SocketAddr, UdpSocket};
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::SeedableRng;
+
+pub use fault::{EmulatorFault, EmulatorFaultError, help};
+
+use super::{EmulatorConfig, SimConfig, SimError};
+use crate::robot::description::RobotDescription;
+use crate::robot::go1::packet::{CrcForm, LowCmd};
+use crate::robot::go1::{Network, convert};
+use crate::robot::{JOINTS, Placement, Truth};
+use network::{NetworkConditions, NetworkPath};
+use robot::{EmulatedRobot, RobotDefects};
+
+/// Size of the receive buffer.
+const BUFFER: usize = 2048;
+
+/// Error of starting an emulator.
+#[derive(Debug, thiserror::Error)]
+pub enum EmulatorError {
+    /// The address is not available.
+    #[error("{address}: {source}; give an address of this machine and a free port, for example 127.0.0.1:8007")]
+    Bind {
+        /// The address.
+        address: SocketAddr,
+        /// Error of the operating system.
+        source: std::io::Error,
+    },
+    /// The simulator's configuration.
+    #[error(transparent)]
+    Simulator(#[from] SimError),
+}
+
+/// Status of an emulated robot.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct EmulatorStatus {
+    /// Source of the last command; states are sent there.
+    pub client: Option<SocketAddr>,
+    /// Executed commands.
+    pub commands: u64,
+    /// Received datagrams that were no command.
+    pub rejected: u64,
+    /// Sent states, those lost in the emulated network among them.
+    pub states: u64,
+    /// Whether the motors brake because no command arrived within their time-out.
+    pub timed_out: bool,
+    /// Faults applied so far.
+    pub faults: u64,
+    /// True state of the robot.
+    pub truth: Option<Truth>,
+}
+
+/// Handle of an emulator in another thread.
+#[derive(Debug, Clone)]
+pub struct EmulatorHandle {
+    faults: Sender<EmulatorFault>,
+    status: Arc<Mutex<EmulatorStatus>>,
+}
+
+impl EmulatorHandle {
+    /// Applies a fault from the next millisecond on; no effect on an emulator that has ended.
+    pub fn apply(&self, fault: EmulatorFault) {
+        let _ = self.faults.send(fault);
+    }
+
+    /// Returns the status after the last step.
+    pub fn status(&self) -> EmulatorStatus {
+        *self.status.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// An emulated Go1.
+#[derive(Debug)]
+pub struct Emulator {
+    robot: EmulatedRobot,
+    config: EmulatorConfig,
+    crc: CrcForm,
+    socket: UdpSocket,
+    /// Time since the emulator's start, ms. The robot's own clock restarts when it reboots.
+    now_ms: u64,
+    to_robot: NetworkPath<SocketAddr>,
+    from_robot: NetworkPath<SocketAddr>,
+    conditions: NetworkConditions,
+    random: ChaCha8Rng,
+    since_command_ms: u32,
+    /// End of the last reboot, ms.
+    booting_until_ms: u64,
+    faults: (Sender<EmulatorFault>, Receiver<EmulatorFault>),
+    status: EmulatorStatus,
+    shared: Arc<Mutex<EmulatorStatus>>,
+}
+
+impl Emulator {
+    /// Starts a robot that lies folded on its belly and receives on `address` (port 0 takes any free one).
+    ///
+    /// # Errors
+    /// The address is taken, or a value of `config` is out of range.
+    pub fn bind(
+        address: SocketAddr,
+        description: &RobotDescription,
+        network: &Network,
+        config: &SimConfig,
+        seed: u64,
+    ) -> Result<Emulator, EmulatorError> {
+        let robot = EmulatedRobot::new(description, network.foot_force_n, config, seed)?;
+        let socket = UdpSocket::bind(address).and_then(|socket| {
+            socket.set_nonblocking(true)?;
+            Ok(socket)
+        });
+        // Not the streams of the simulator's sensors and terrain, which have the same seed.
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        random.set_stream(2);
+        Ok(Emulator {
+            robot,
+            config: config.emulator,
+            crc: network.crc,
+            socket: socket.map_err(|source| EmulatorError::Bind { address, source })?,
+            now_ms: 0,
+            to_robot: NetworkPath::new(),
+            from_robot: NetworkPath::new(),
+            conditions: NetworkConditions::default(),
+            random,
+            since_command_ms: 0,
+            booting_until_ms: 0,
+            faults: channel(),
+            status: EmulatorStatus::default(),
+            shared: Arc::default(),
+        })
+    }
+
+    /// Returns the address on which the robot receives.
+    ///
+    /// # Errors
+    /// Error of the operating system.
+    pub fn local_address(&self) -> std::io::Result<SocketAddr> {
+        self.socket.local_addr()
+    }
+
+    /// Returns a handle for another thread.
+    pub fn handle(&self) -> EmulatorHandle {
+        EmulatorHandle { faults: self.faults.0.clone(), status: self.shared.clone() }
+    }
+
+    /// Returns the status.
+    pub fn status(&self) -> &EmulatorStatus {
+        &self.status
+    }
+
+    /// Applies one fault.
+    pub fn apply(&mut self, fault: EmulatorFault) {
+        let (conditions, defects) = (&mut self.conditions, &mut self.robot.defects);
+        match fault {
+            EmulatorFault::Loss(percent) => conditions.loss = percent / 100.0,
+            EmulatorFault::Delay(ms) => conditions.delay_ms = ms,
+            EmulatorFault::Jitter(ms) => conditions.jitter_ms = ms,
+            EmulatorFault::Duplicate(percent) => conditions.duplicate = percent / 100.0,
+            EmulatorFault::Corrupt(percent) => conditions.corrupt = percent / 100.0,
+            EmulatorFault::Freeze => defects.frozen = true,
+            EmulatorFault::Repeat => defects.repeating = true,
+            EmulatorFault::Reboot => {
+                self.booting_until_ms = self.now_ms + u64::from(self.config.reboot_ms);
+                self.robot.time_ms = 0;
+                self.robot.motors = [None; JOINTS];
+                self.status.client = None;
+            }
+            EmulatorFault::Hot { joint, celsius } => defects.hot[joint] = Some(celsius),
+            EmulatorFault::Battery(percent) => defects.charge_percent = Some(percent),
+            EmulatorFault::ServoOff { joint } => defects.servo_off[joint] = true,
+            EmulatorFault::Stuck { joint } => self.robot.block(joint),
+            EmulatorFault::Angle { joint, radians } => defects.angle[joint] = Some(radians),
+            EmulatorFault::Speed { joint, radians_per_s } => defects.speed[joint] = Some(radians_per_s),
+            EmulatorFault::Torque { joint, newton_metres } => defects.torque[joint] = Some(newton_metres),
+            EmulatorFault::NotANumber { joint } => defects.angle[joint] = Some(f64::NAN),
+            EmulatorFault::Tilt(radians) => defects.tilt_rad = radians,
+            EmulatorFault::Place => self.robot.lay_down(),
+            EmulatorFault::Clear => {
+                self.conditions = NetworkConditions::default();
+                self.robot.defects = RobotDefects::default();
+            }
+        }
+        self.status.faults += 1;
+    }
+
+    /// Places the robot.
+    pub fn place(&mut self, placement: &Placement) {
+        self.robot.place(placement);
+    }
+
+    /// Emulates one millisecond: receives commands, simulates, sends a state.
+    pub fn step(&mut self) {
+        while let Ok(fault) = self.faults.1.try_recv() {
+            self.apply(fault);
+        }
+        self.now_ms += 1;
+        self.receive_commands();
+        self.robot.step();
+        self.send_state();
+        self.status.truth = self.robot.truth();
+        *self.shared.lock().unwrap_or_else(PoisonError::into_inner) = self.status;
+    }
+
+    /// Whether the robot's computer runs.
+    fn is_awake(&self) -> bool {
+        !self.robot.defects.frozen && self.now_ms >= self.booting_until_ms
+    }
+
+    fn receive_commands(&mut self) {
+        let mut buffer = [0; BUFFER];
+        while let Ok((length, from)) = self.socket.recv_from(&mut buffer) {
+            self.to_robot.send(self.now_ms, from, &buffer[..length], &self.conditions, &mut self.random);
+        }
+        self.since_command_ms = self.since_command_ms.saturating_add(1);
+        for (from, datagram) in self.to_robot.arrived(self.now_ms) {
+            if self.is_awake() {
+                self.execute(from, &datagram);
+            }
+        }
+        self.status.timed_out = self.since_command_ms > self.config.command_timeout_ms;
+        if self.status.timed_out {
+            self.robot.motors = [None; JOINTS];
+        }
+    }
+
+    fn execute(&mut self, from: SocketAddr, datagram: &[u8]) {
+        let Ok(command) = LowCmd::parse(datagram, self.crc) else {
+            self.status.rejected += 1;
+            return;
+        };
+        self.robot.motors = std::array::from_fn(|i| convert::motor_command(&command.motor(i)));
+        self.since_command_ms = 0;
+        self.status.client = Some(from);
+        self.status.commands += 1;
+    }
+
+    fn send_state(&mut self) {
+        if self.is_awake() {
+            let state = self.robot.next_state();
+            if let Some(client) = self.status.client {
+                self.from_robot.send(self.now_ms, client, state, &self.conditions, &mut self.random);
+                self.status.states += 1;
+            }
+        }
+        for (client, datagram) in self.from_robot.arrived(self.now_ms) {
+            // The robot goes on if the controller's port is closed.
+            let _ = self.socket.send_to(&datagram, client);
+        }
+    }
+}

@@ -1,0 +1,163 @@
+//! The emulated robot without its network: motors, body and reported state, with the injected defects.
+
+use nalgebra::{UnitQuaternion, Vector3};
+
+use crate::robot::description::RobotDescription;
+use crate::robot::go1::convert;
+use crate::robot::{Battery, JOINTS, JointCommand, Joints, MotorCommand, Placement, Robot, RobotState, Truth};
+use crate::sim::{EmulatorConfig, SimConfig, SimError, Simulator};
+
+/// Number of cells of the battery, and voltage of an empty and of a full one, V. Assumption: a six-cell pack, from the
+/// Go1's nominal 21.6 V.
+const CELLS: usize = 6;
+const CELL_V: [f64; 2] = [3.3, 4.2];
+/// Power of the robot's computers, W. Assumption.
+const IDLE_W: f64 = 30.0;
+/// Stiffness, N m/rad, and damping, N m s/rad, of a stuck joint, up to the motor's torque.
+const STUCK_GAINS: [f64; 2] = [600.0, 10.0];
+
+/// Injected defects of the robot.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct RobotDefects {
+    pub frozen: bool,
+    pub repeating: bool,
+    pub hot: [Option<f64>; JOINTS],
+    pub charge_percent: Option<f64>,
+    pub servo_off: [bool; JOINTS],
+    pub stuck_at: [Option<f64>; JOINTS],
+    pub angle: [Option<f64>; JOINTS],
+    pub speed: [Option<f64>; JOINTS],
+    pub torque: [Option<f64>; JOINTS],
+    pub tilt_rad: f64,
+}
+
+/// The emulated robot.
+#[derive(Debug)]
+pub(super) struct EmulatedRobot {
+    simulator: Simulator,
+    config: EmulatorConfig,
+    foot_force_n: f64,
+    lying_position: Joints,
+    seed: u64,
+    /// Number of times that the robot was laid down.
+    placed: u64,
+    /// Clock of the robot, ms since its boot.
+    pub time_ms: u32,
+    pub defects: RobotDefects,
+    /// Command of each motor; none if it brakes.
+    pub motors: [Option<MotorCommand>; JOINTS],
+    last_state: Vec<u8>,
+}
+
+impl EmulatedRobot {
+    pub fn new(
+        description: &RobotDescription,
+        foot_force_n: f64,
+        config: &SimConfig,
+        seed: u64,
+    ) -> Result<EmulatedRobot, SimError> {
+        let mut robot = EmulatedRobot {
+            simulator: Simulator::new(description, config)?,
+            config: config.emulator,
+            foot_force_n,
+            lying_position: description.lying_position,
+            seed,
+            placed: 0,
+            time_ms: 0,
+            defects: RobotDefects::default(),
+            motors: [None; JOINTS],
+            last_state: Vec::new(),
+        };
+        robot.lay_down();
+        Ok(robot)
+    }
+
+    pub fn place(&mut self, placement: &Placement) {
+        self.simulator.place(placement);
+    }
+
+    /// Lays the robot down at the world's origin, as a person would.
+    pub fn lay_down(&mut self) {
+        let seed = self.seed.wrapping_add(self.placed);
+        self.place(&Placement { joint_position: self.lying_position, lying: true, seed });
+        self.placed += 1;
+    }
+
+    /// Blocks a joint at its current angle.
+    pub fn block(&mut self, joint: usize) {
+        self.defects.stuck_at[joint] = Some(self.simulator.state().joint_position[joint]);
+    }
+
+    /// True state of the simulator.
+    pub fn truth(&mut self) -> Option<Truth> {
+        self.simulator.read().ok().and_then(|state| state.truth)
+    }
+
+    /// Simulates one millisecond.
+    pub fn step(&mut self) {
+        let braking = MotorCommand { kd: self.config.braking_kd, ..MotorCommand::default() };
+        let mut drive = JointCommand::default();
+        for (joint, motor) in drive.motor.iter_mut().enumerate() {
+            *motor = match (self.defects.stuck_at[joint], self.motors[joint]) {
+                (Some(position), _) => {
+                    MotorCommand { position, kp: STUCK_GAINS[0], kd: STUCK_GAINS[1], ..MotorCommand::default() }
+                }
+                (None, Some(command)) if self.in_servo(joint) => command,
+                _ => braking,
+            };
+        }
+        // The simulator's write never fails.
+        let _ = self.simulator.write(&drive);
+    }
+
+    /// Advances the robot's clock, and returns the next state datagram.
+    pub fn next_state(&mut self) -> &[u8] {
+        self.time_ms += 1;
+        if !self.defects.repeating || self.last_state.is_empty() {
+            self.last_state = self.state();
+        }
+        &self.last_state
+    }
+
+    /// Whether a motor is in servo mode.
+    fn in_servo(&self, joint: usize) -> bool {
+        self.motors[joint].is_some() && !self.defects.servo_off[joint]
+    }
+
+    /// Encodes the reported state.
+    fn state(&mut self) -> Vec<u8> {
+        let mut state = self.simulator.read().unwrap_or_default();
+        state.robot_time_ms = self.time_ms;
+        state.motor_enabled = std::array::from_fn(|joint| self.in_servo(joint));
+        state.motor_temperature_c = self.defects.hot.map(|celsius| celsius.unwrap_or(self.config.motor_temperature_c));
+        state.battery = Some(self.battery(&state));
+        let replace = |reported: &mut Joints, defects: &[Option<f64>; JOINTS]| {
+            for (value, defect) in reported.iter_mut().zip(defects) {
+                *value = defect.unwrap_or(*value);
+            }
+        };
+        replace(&mut state.joint_position, &self.defects.angle);
+        replace(&mut state.joint_velocity, &self.defects.speed);
+        replace(&mut state.joint_torque, &self.defects.torque);
+        state.imu.orientation_world *= UnitQuaternion::from_axis_angle(&Vector3::x_axis(), self.defects.tilt_rad);
+        let mut datagram = convert::low_state(&state, self.foot_force_n);
+        datagram.seal();
+        let mut bytes = datagram.bytes().to_vec();
+        bytes.resize(self.config.state_length, 0);
+        bytes
+    }
+
+    fn battery(&self, state: &RobotState) -> Battery {
+        let charge_percent = self.defects.charge_percent.unwrap_or(self.config.battery_percent);
+        let cell = CELL_V[0] + (CELL_V[1] - CELL_V[0]) * charge_percent / 100.0;
+        let voltage_v = cell * CELLS as f64;
+        let mechanical: f64 =
+            state.joint_torque.iter().zip(&state.joint_velocity).map(|(torque, dq)| torque * dq).sum();
+        Battery {
+            charge_percent,
+            voltage_v,
+            current_a: -(IDLE_W + mechanical.max(0.0)) / voltage_v,
+            cell_v: std::array::from_fn(|i| if i < CELLS { cell } else { 0.0 }),
+        }
+    }
+}

@@ -1,0 +1,230 @@
+//! The actions of the operator: names, default keys, help. [`crate::legal`] says when each is possible.
+
+use strum::{IntoStaticStr, VariantArray};
+
+/// An action that a key can trigger.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, VariantArray)]
+#[expect(missing_docs, reason = "the help text of each action is in `ACTIONS`")]
+pub enum Action {
+    Stop,
+    Interrupt,
+    Arm,
+    ArmingChecks,
+    SitDown,
+    Acknowledge,
+    Approve,
+    Override,
+    ClearOverrides,
+    Fix,
+    Bounds,
+    QueuePoint,
+    Skip,
+    Continue,
+    ConfirmBest,
+    ExportBest,
+    Accept,
+    Fall,
+    Void,
+    Rerun,
+    Undo,
+    HandValue,
+    Note,
+    LiveView,
+    TrialsView,
+    OptimizerView,
+    OverrideView,
+    HealthView,
+    LogView,
+    NextView,
+    PreviousView,
+    Up,
+    Down,
+    Left,
+    Right,
+    PageUp,
+    PageDown,
+    First,
+    Last,
+    Open,
+    Freeze,
+    ZoomIn,
+    ZoomOut,
+    ChartMode,
+    Series,
+    ChooseSeries,
+    Ghost,
+    Sort,
+    Reverse,
+    Filter,
+    Columns,
+    BestOnly,
+    Search,
+    Copy,
+    Export,
+    PlayPause,
+    StepForward,
+    StepBack,
+    Slower,
+    Faster,
+    PreviousMarker,
+    NextMarker,
+    Palette,
+    Help,
+    Mouse,
+    Redraw,
+    Suspend,
+    Quit,
+}
+
+/// One row of the table of actions.
+pub struct ActionInfo {
+    /// The action.
+    pub action: Action,
+    /// Its name in `console.toml` and in the palette.
+    pub name: &'static str,
+    /// Its default keys.
+    pub keys: &'static [&'static str],
+    /// Whether the keys cannot be changed.
+    pub fixed: bool,
+    /// Its section of the help.
+    pub group: ActionGroup,
+    /// Its effect, for the help.
+    pub help: &'static str,
+}
+
+/// A section of the help, in the help's order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, VariantArray, IntoStaticStr)]
+pub enum ActionGroup {
+    /// Stopping, arming, sitting down.
+    Robot,
+    /// The present proposal.
+    Proposal,
+    /// Judging a trial.
+    Verdict,
+    /// Tabs and movement within them.
+    Views,
+    /// Charts of the live view.
+    Charts,
+    /// Tables and the log.
+    #[strum(serialize = "Tables and log")]
+    Tables,
+    /// Playing a recording.
+    Replay,
+    /// The program itself.
+    Program,
+}
+
+impl Action {
+    /// The action's row of the table.
+    pub fn info(self) -> &'static ActionInfo {
+        &ACTIONS[self as usize]
+    }
+}
+
+const fn row(
+    action: Action,
+    name: &'static str,
+    keys: &'static [&'static str],
+    group: ActionGroup,
+    help: &'static str,
+) -> ActionInfo {
+    ActionInfo { action, name, keys, fixed: false, group, help }
+}
+
+const fn fixed(info: ActionInfo) -> ActionInfo {
+    ActionInfo { fixed: true, ..info }
+}
+
+/// Every action, in the order of [`Action`].
+#[rustfmt::skip]
+pub static ACTIONS: [ActionInfo; 68] = {
+    use Action as A;
+    use ActionGroup as G;
+    [
+        fixed(row(A::Stop, "stop", &["Space", "F12"], G::Robot, "STOP: damp all motors at once, from any screen")),
+        fixed(row(A::Interrupt, "interrupt", &["Ctrl-C"], G::Robot, "STOP; again within 2 s: quit")),
+        row(A::Arm, "arm", &["A"], G::Robot, "arm: the robot stands up"),
+        row(A::ArmingChecks, "pre-arm", &["P"], G::Robot, "arming checks, and your confirmation where one is needed"),
+        row(A::SitDown, "sit-down", &["D"], G::Robot, "sit down and disarm"),
+        row(A::Acknowledge, "acknowledge", &["k"], G::Robot, "acknowledge a stop or a fault: back to DISARMED"),
+
+        row(A::Approve, "approve", &["g"], G::Proposal, "approve the jump; again after 0.8 s: countdown and jump"),
+        row(A::Override, "override", &["o"], G::Proposal, "change parameters and gains of the proposal"),
+        row(A::ClearOverrides, "clear-overrides", &["O"], G::Proposal, "restore the proposed values"),
+        row(A::Fix, "fix", &["X"], G::Proposal, "Override: fix the parameter for the next trials, or search it again"),
+        row(A::Bounds, "bounds", &["B"], G::Proposal, "Override: search the parameter within other bounds"),
+        row(A::QueuePoint, "queue-point", &["Q"], G::Proposal, "queue this point ahead of the sampler's"),
+        row(A::Skip, "skip", &["n"], G::Proposal, "refuse the proposal; another follows"),
+        row(A::Continue, "continue", &["C"], G::Proposal, "give a finished study more trials"),
+        row(A::ConfirmBest, "confirm-best", &["K"], G::Proposal, "repeat the best points until one leads; again: end the repeats"),
+        row(A::ExportBest, "export-best", &["E"], G::Proposal, "write the best parameters as a configuration beside the study"),
+
+        row(A::Accept, "accept", &["a"], G::Verdict, "accept: it counts with its value"),
+        row(A::Fall, "fall", &["f"], G::Verdict, "fall: it counts as J = 0"),
+        row(A::Void, "void", &["v"], G::Verdict, "void: cause outside the parameters; hidden from the sampler"),
+        row(A::Rerun, "re-run", &["r"], G::Verdict, "re-run: void, and the same parameters again (Trials: queue the row)"),
+        row(A::Undo, "undo", &["u"], G::Verdict, "take the last verdict back, until the next approval"),
+        row(A::HandValue, "hand-value", &["="], G::Verdict, "use a value measured by hand"),
+        row(A::Note, "note", &["m"], G::Verdict, "write a note on a trial"),
+
+        row(A::LiveView, "view-live", &["1"], G::Views, "Live: charts, proposal, trials"),
+        row(A::TrialsView, "view-trials", &["2"], G::Views, "Trials: the whole table and details"),
+        row(A::OptimizerView, "view-optimizer", &["3"], G::Views, "Optimizer: history, scatter, landings"),
+        row(A::OverrideView, "view-override", &["4"], G::Views, "Override: the proposal and its bounds"),
+        row(A::HealthView, "view-health", &["5"], G::Views, "Health: loop, link, motors, battery"),
+        row(A::LogView, "view-log", &["6"], G::Views, "Log: events"),
+        row(A::NextView, "next-view", &["Tab"], G::Views, "next view"),
+        row(A::PreviousView, "previous-view", &["Shift-Tab"], G::Views, "previous view"),
+        row(A::Up, "up", &["Up"], G::Views, "move up"),
+        row(A::Down, "down", &["Down"], G::Views, "move down"),
+        row(A::Left, "left", &["Left"], G::Views, "move left; Live: cursor back"),
+        row(A::Right, "right", &["Right"], G::Views, "move right; Live: cursor on"),
+        row(A::PageUp, "page-up", &["PgUp"], G::Views, "a page up"),
+        row(A::PageDown, "page-down", &["PgDn"], G::Views, "a page down"),
+        row(A::First, "first", &["Home"], G::Views, "to the first"),
+        row(A::Last, "last", &["End"], G::Views, "to the last"),
+        row(A::Open, "open", &["Enter"], G::Views, "details; acknowledges while DAMPED or FAULT; never starts motion"),
+
+        row(A::Freeze, "freeze", &["z"], G::Charts, "freeze the charts; recording goes on"),
+        row(A::ZoomIn, "zoom-in", &["+"], G::Charts, "shorter time window"),
+        row(A::ZoomOut, "zoom-out", &["-"], G::Charts, "longer time window"),
+        row(A::ChartMode, "chart-mode", &["w"], G::Charts, "sweep or scroll"),
+        row(A::Series, "series", &["t"], G::Charts, "next set: attitude and feet, forces, joints"),
+        row(A::ChooseSeries, "choose-series", &["T"], G::Charts, "choose the series of the charts"),
+        row(A::Ghost, "ghost", &["c"], G::Charts, "best (Trials: selected) trial under the charts; a second one: compare both"),
+
+        row(A::Sort, "sort", &["s"], G::Tables, "sort by the next column"),
+        row(A::Reverse, "reverse", &["S"], G::Tables, "reverse the order"),
+        row(A::Filter, "filter", &["F"], G::Tables, "Trials: only a verdict; Log: only a level"),
+        row(A::Columns, "columns", &["x"], G::Tables, "choose the columns"),
+        row(A::BestOnly, "best-only", &["b"], G::Tables, "only trials that were the best so far"),
+        row(A::Search, "search", &["/"], G::Tables, "Trials: jump to a number; Log: search"),
+        row(A::Copy, "copy", &["y"], G::Tables, "copy the row to the terminal's clipboard"),
+        row(A::Export, "export", &["e"], G::Tables, "write the table as CSV and Markdown beside the study"),
+
+        row(A::PlayPause, "play-pause", &["p"], G::Replay, "play or pause"),
+        row(A::StepForward, "step-forward", &["."], G::Replay, "a step forward"),
+        row(A::StepBack, "step-back", &[","], G::Replay, "a step back"),
+        row(A::Slower, "slower", &["<"], G::Replay, "half the speed"),
+        row(A::Faster, "faster", &[">"], G::Replay, "twice the speed"),
+        row(A::PreviousMarker, "previous-marker", &["["], G::Replay, "to the previous trial or fault"),
+        row(A::NextMarker, "next-marker", &["]"], G::Replay, "to the next trial or fault"),
+
+        row(A::Palette, "palette", &[":"], G::Program, "all actions, and why some are not possible now"),
+        row(A::Help, "help", &["?"], G::Program, "this help"),
+        row(A::Mouse, "mouse", &["M"], G::Program, "mouse on or off: tabs, rows, wheel"),
+        row(A::Redraw, "redraw", &["Ctrl-L"], G::Program, "draw the whole screen again"),
+        row(A::Suspend, "suspend", &["Ctrl-Z"], G::Program, "suspend the program (only while the robot is not armed)"),
+        row(A::Quit, "quit", &["q"], G::Program, "quit; needs confirmation while the robot is armed"),
+    ]
+};
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_table_has_the_order_of_the_actions() {
+        assert!(ACTIONS.iter().map(|info| info.action).eq(Action::VARIANTS.iter().copied()));
+    }
+}

@@ -1,0 +1,104 @@
+//! Arguments that several commands share, and parsers for the engine's named values.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use quadfrog::config::Config;
+use quadfrog::engine::newest_config;
+use quadfrog::optimize::ask::SamplerKind;
+use quadfrog::robot::description::{RobotDescription, RobotFiles};
+use quadfrog::trial::Task;
+
+use super::failure::Failure;
+
+/// Parses one of several named values; each row is a value, its name and its line of help.
+pub fn one_of<T: Copy + Send + Sync + 'static>(
+    rows: impl IntoIterator<Item = (T, &'static str, &'static str)>,
+) -> impl TypedValueParser<Value = T> {
+    let rows: Vec<_> = rows.into_iter().collect();
+    let values: Vec<_> = rows.iter().map(|(_, name, help)| PossibleValue::new(*name).help(*help)).collect();
+    PossibleValuesParser::new(values).try_map(move |text| {
+        rows.iter().find(|(_, name, _)| *name == text).map(|(value, ..)| *value).ok_or("not one of the values")
+    })
+}
+
+/// Parses a task.
+pub fn task() -> impl TypedValueParser<Value = Task> {
+    one_of(Task::ALL.map(|task| {
+        let help = match task {
+            Task::Forward => "Jump forward",
+            Task::LateralLeft => "Jump to the left",
+            Task::LateralRight => "Jump to the right",
+            Task::TwistCcw => "Turn counterclockwise",
+            Task::TwistCw => "Turn clockwise",
+        };
+        (task, task.name(), help)
+    }))
+}
+
+fn sampler() -> impl TypedValueParser<Value = SamplerKind> {
+    one_of([
+        (SamplerKind::Tpe, "tpe", "Tree-structured Parzen estimator, as Optuna"),
+        (SamplerKind::Gp, "gp", "Gaussian process, better with some tens of trials"),
+        (SamplerKind::Random, "random", "Uniform random"),
+        (SamplerKind::Sobol, "sobol", "Sobol sequence (quasi-random)"),
+    ])
+}
+
+/// Returns the robot model of a name, or of a folder with a URDF and a robot.toml.
+pub fn load_model(model: &str) -> Result<(RobotFiles, RobotDescription), Failure> {
+    let files = RobotFiles::open(model).map_err(Failure::input)?;
+    let description = files.description().map_err(Failure::input)?;
+    Ok((files, description))
+}
+
+/// Arguments of the console and of `optimize`.
+#[derive(Debug, Clone, Args)]
+pub struct StudyArguments {
+    /// Budget: number of trials that count [default: from optimize.toml]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub trials: Option<u32>,
+    /// Folder whose TOML files replace those of the configuration, whole or key by key
+    #[arg(long, value_name = "DIR")]
+    config: Option<PathBuf>,
+    /// Robot model: go1, a1, or a folder with a URDF and a robot.toml
+    #[arg(long, value_name = "MODEL", default_value = "go1")]
+    pub model: String,
+    /// Sampler that proposes the parameters [default: from optimize.toml]
+    #[arg(long, value_name = "SAMPLER", value_parser = sampler())]
+    sampler: Option<SamplerKind>,
+    /// Parent folder of new studies
+    #[arg(long, value_name = "DIR", default_value = "recordings")]
+    output: PathBuf,
+}
+
+impl StudyArguments {
+    /// Loads the configuration: that of `--config`, else the last one that the study in `resume` ran with.
+    pub fn load_config(&self, resume: Option<&Path>) -> Result<Config, Failure> {
+        let own = match &self.config {
+            None => resume.and_then(newest_config).map(|(_, config)| config),
+            Some(_) => None,
+        };
+        if let Some(own) = &own {
+            eprintln!("quadfrog: continuing with the last configuration of the study, {}", own.display());
+        }
+        let mut config = Config::load(self.config.as_deref().or(own.as_deref()))?;
+        if let Some(sampler) = self.sampler {
+            config.choose_sampler(sampler);
+        }
+        Ok(config)
+    }
+
+    /// Returns the folder of a new study: `<output>/<date>T<time>-<task>-seed<seed>`, with a number appended if that
+    /// folder exists.
+    pub fn new_folder(&self, task: Task, seed: u32) -> PathBuf {
+        let now = jiff::Zoned::now().strftime("%Y-%m-%dT%H-%M-%S").to_string();
+        let name = format!("{now}-{}-seed{seed}", task.name());
+        let names = std::iter::once(name.clone()).chain((2..).map(|n| format!("{name}-{n}")));
+        names
+            .map(|name| self.output.join(name))
+            .find(|folder| !folder.exists())
+            .unwrap_or_else(|| self.output.join(name))
+    }
+}

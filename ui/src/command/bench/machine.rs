@@ -1,0 +1,154 @@
+//! The machine's share of a tick, without quadfrog's code: the wake-up latency of cyclictest and the duration of the
+//! system calls of a tick.
+
+use std::net::{Ipv4Addr, UdpSocket};
+use std::ops::ControlFlow;
+use std::process::Command;
+use std::time::Duration;
+
+use color_eyre::eyre::{WrapErr, eyre};
+use hdrhistogram::Histogram;
+use quadfrog::realtime::clock::{Clock, MonotonicClock};
+use quadfrog::realtime::scheduling::Scheduling;
+use quadfrog::realtime::thread::{CONTROL_PHASE, PeriodicTask, TickStart, pace_with_warm_up};
+use quadfrog::robot::go1::packet::{COMMAND_LENGTH, STATE_LENGTH};
+
+use crate::command::failure::Failure;
+
+/// The control period.
+pub const PERIOD: Duration = Duration::from_millis(1);
+
+/// Durations in ns, 1 to 1e9 with three digits; longer ones count as 1 s.
+pub type Durations = Histogram<u64>;
+
+/// Returns an empty histogram. Its bounds are fixed, so recording does not allocate.
+pub fn durations() -> Durations {
+    Histogram::new_with_bounds(1, 1_000_000_000, 3).unwrap_or_else(|error| unreachable!("{error}"))
+}
+
+/// Prints processor, version and a warning about a debug build.
+pub fn print_header(more: &str) {
+    let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let model = text.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':'));
+    let processor = model.map_or(std::env::consts::ARCH, |(_, name)| name.trim());
+    println!("{processor}{more}, quadfrog {}", env!("CARGO_PKG_VERSION"));
+    if cfg!(debug_assertions) {
+        println!("This is a debug build; for valid figures use cargo run --release.");
+    }
+}
+
+/// Runs `act` in a new thread, so that its priority ends with it.
+pub fn in_a_thread<T: Send + 'static>(
+    act: impl FnOnce() -> Result<T, color_eyre::Report> + Send + 'static,
+) -> Result<T, Failure> {
+    let thread = std::thread::Builder::new().name("control".into()).spawn(act).wrap_err("control thread")?;
+    Ok(thread.join().map_err(|_| eyre!("the control thread panicked"))??)
+}
+
+/// Two non-blocking UDP sockets connected over the loopback.
+struct LoopbackPair {
+    controller: UdpSocket,
+    robot: UdpSocket,
+}
+
+impl LoopbackPair {
+    fn open() -> std::io::Result<LoopbackPair> {
+        let bind = || UdpSocket::bind((Ipv4Addr::LOCALHOST, 0));
+        let pair = LoopbackPair { controller: bind()?, robot: bind()? };
+        pair.controller.connect(pair.robot.local_addr()?)?;
+        pair.robot.connect(pair.controller.local_addr()?)?;
+        pair.controller.set_nonblocking(true)?;
+        pair.robot.set_nonblocking(true)?;
+        Ok(pair)
+    }
+
+    /// Makes the system calls of a tick: receives the state until the queue is empty, sends a command. A failed call
+    /// takes its time too.
+    fn tick(&self) {
+        let mut buffer = [0; 2048];
+        while self.controller.recv(&mut buffer).is_ok() {}
+        let _ = self.controller.send(&[0; COMMAND_LENGTH]);
+    }
+
+    /// Sends the state that the next tick receives.
+    fn answer(&self) {
+        let mut buffer = [0; 2048];
+        while self.robot.recv(&mut buffer).is_ok() {}
+        let _ = self.robot.send(&[0; STATE_LENGTH]);
+    }
+}
+
+/// A loop of the system calls of a tick, with the warm-up of a tick.
+struct SystemCallLoop {
+    pair: LoopbackPair,
+    warm_up: LoopbackPair,
+    clock: MonotonicClock,
+    durations: Durations,
+    remaining: u64,
+}
+
+impl PeriodicTask for SystemCallLoop {
+    fn warm_up(&mut self) {
+        self.warm_up.answer();
+        self.warm_up.tick();
+    }
+
+    fn tick(&mut self, _: TickStart) -> ControlFlow<()> {
+        let start_ns = self.clock.now_ns();
+        self.pair.tick();
+        self.durations.saturating_record((self.clock.now_ns() - start_ns).max(1));
+        self.pair.answer();
+        self.remaining -= 1;
+        if self.remaining == 0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    }
+}
+
+/// Adds `ticks` measurements of the system calls of a tick, at the period and priority of the control thread.
+pub fn system_calls(
+    scheduling: Scheduling,
+    lead: Duration,
+    ticks: u64,
+    durations: Durations,
+) -> Result<Durations, Failure> {
+    let open = || LoopbackPair::open().wrap_err("sockets on the loopback");
+    let (pair, warm_up, clock) = (open()?, open()?, MonotonicClock::start());
+    let mut calls = SystemCallLoop { pair, warm_up, clock, durations, remaining: ticks };
+    in_a_thread(move || {
+        let _granted = scheduling.apply();
+        pace_with_warm_up(PERIOD, CONTROL_PHASE, lead, &mut calls).wrap_err("waiting on the monotonic clock")?;
+        Ok(calls.durations)
+    })
+}
+
+/// Runs cyclictest once and adds its histogram, in whole microseconds, to `durations`.
+pub fn cyclictest(scheduling: Scheduling, loops: u64, durations: &mut Durations) -> Result<(), Failure> {
+    let mut program = Command::new("cyclictest");
+    program.args(["--quiet", "--mlockall", "--threads=1", "--interval=1000", "--histogram=100000"]);
+    program.arg(format!("--loops={loops}"));
+    if scheduling.priority > 0 {
+        program.arg(format!("--priority={}", scheduling.priority)).arg("--policy=fifo");
+    }
+    if let Some(core) = scheduling.core {
+        program.arg(format!("--affinity={core}"));
+    }
+    let output = program
+        .output()
+        .map_err(|error| Failure::input(format!("cyclictest: {error}; install it: apt-get install rt-tests")))?;
+    let text = String::from_utf8_lossy(&output.stdout);
+    if !output.status.success() {
+        let errors = String::from_utf8_lossy(&output.stderr);
+        return Err(eyre!("cyclictest ended with {}: {} {}", output.status, text.trim(), errors.trim()).into());
+    }
+    let mut total = 0;
+    for line in text.lines().filter(|line| line.starts_with(|c: char| c.is_ascii_digit())) {
+        let mut numbers = line.split_whitespace().filter_map(|number| number.parse::<u64>().ok());
+        if let (Some(us), Some(count)) = (numbers.next(), numbers.next()) {
+            durations.saturating_record_n((us * 1000).max(1), count);
+            total += count;
+        }
+    }
+    if total == 0 {
+        return Err(eyre!("cyclictest printed no histogram: {}", text.trim()).into());
+    }
+    Ok(())
+}

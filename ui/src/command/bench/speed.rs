@@ -1,0 +1,92 @@
+//! Speed of the simulator and of whole studies on this machine, compared with MuJoCo on request.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::Instant;
+
+use clap::Args;
+use color_eyre::eyre::{WrapErr, eyre};
+use quadfrog::sim::bench::{BenchScene, SimulatorBench};
+
+use super::machine;
+use crate::command::failure::Failure;
+
+#[derive(Debug, Args)]
+pub struct SpeedArguments {
+    /// Duration of each measurement, s
+    #[arg(long, value_name = "S", default_value_t = 3.0)]
+    seconds: f64,
+    /// Python script whose `bench SECONDS` prints MuJoCo's {"mj_steps_per_s_standing": ...} on the same model
+    #[arg(long, value_name = "FILE")]
+    mujoco: Option<PathBuf>,
+    /// Also run 5 seeds of 3 tasks of 100 trials
+    #[arg(long)]
+    long: bool,
+}
+
+pub fn run(arguments: &SpeedArguments) -> Result<(), Failure> {
+    if !(arguments.seconds > 0.0 && arguments.seconds <= 600.0) {
+        return Err(Failure::input(format!("--seconds {}: give more than 0 and at most 600", arguments.seconds)));
+    }
+    if let Some(script) = arguments.mujoco.as_ref().filter(|script| !script.is_file()) {
+        return Err(Failure::input(format!("--mujoco {}: there is no such file", script.display())));
+    }
+    let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+    machine::print_header(&format!(", {cores} cores"));
+    println!();
+    let figures = SimulatorBench::new().measure(arguments.seconds * 5.0);
+    println!("accelerations from torques                {:8.2} us", figures.dynamics_s * 1e6);
+    for (scene, seconds) in BenchScene::ALL.iter().zip(figures.step_s) {
+        println!("1 ms step, {:<31}{:8.2} us  {:8.0} steps/s", scene.name(), seconds * 1e6, 1.0 / seconds);
+    }
+    if let Some(script) = &arguments.mujoco {
+        let theirs = mujoco(script, arguments.seconds)?;
+        // The robot of the script stands on four feet, as in Scene::ALL[1].
+        let ours = 1.0 / figures.step_s[1];
+        println!(
+            "MuJoCo, 1 ms step, standing on four feet  {:8.2} us  {theirs:8.0} steps/s; quadfrog / MuJoCo: {:.1}",
+            1e6 / theirs,
+            ours / theirs
+        );
+    }
+    println!();
+    println!("optimize, 20 trials, start to finish      {:8.2} s", studies(&["--trials", "20"])?);
+    if arguments.long {
+        let several = ["--task", "forward,lateral-left,twist-ccw", "--seed", "0-4", "--trials", "100"];
+        println!("optimize, 5 seeds of 3 tasks of 100 trials{:8.2} s", studies(&several)?);
+    }
+    Ok(())
+}
+
+/// Returns the duration of `quadfrog optimize` with these arguments in a temporary folder, s.
+fn studies(arguments: &[&str]) -> Result<f64, Failure> {
+    let program = std::env::current_exe().wrap_err("the path of this program")?;
+    let folder = std::env::temp_dir().join(format!("quadfrog-bench-{}", std::process::id()));
+    let start = Instant::now();
+    let status = Command::new(program)
+        .arg("optimize")
+        .args(arguments)
+        .arg("--output")
+        .arg(&folder)
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .status()
+        .wrap_err("optimize could not be started")?;
+    let seconds = start.elapsed().as_secs_f64();
+    // A leftover in the temporary directory is harmless.
+    let _ = std::fs::remove_dir_all(&folder);
+    if status.success() { Ok(seconds) } else { Err(eyre!("optimize ended with {status}").into()) }
+}
+
+/// Returns MuJoCo's steps per second, measured by the script.
+fn mujoco(script: &Path, seconds: f64) -> Result<f64, Failure> {
+    let output = Command::new("python3").arg(script).arg("bench").arg(seconds.to_string()).output();
+    let output = output.wrap_err("python3 could not be started")?;
+    let text = String::from_utf8_lossy(&output.stdout);
+    let value: Option<serde_json::Value> = text.lines().rev().find_map(|line| serde_json::from_str(line).ok());
+    value.and_then(|value| value["mj_steps_per_s_standing"].as_f64()).ok_or_else(|| {
+        let errors = String::from_utf8_lossy(&output.stderr);
+        Failure::Other(eyre!("{}: printed no mj_steps_per_s_standing: {}", script.display(), errors.trim()))
+    })
+}

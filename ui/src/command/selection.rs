@@ -1,0 +1,108 @@
+//! Selection of the study to run: a new one, a continued one or a joined one.
+
+use std::path::{Path, PathBuf};
+
+use quadfrog::engine::{STUDY_FILE, StoredStudy, stored_studies, stored_study};
+use quadfrog::optimize::study::Storage;
+use quadfrog::robot::description::RobotDescription;
+use quadfrog::trial::Task;
+
+use super::failure::Failure;
+
+/// A study to run.
+pub struct SelectedStudy {
+    pub task: Task,
+    pub seed: u32,
+    /// Its folder, which exists if the study is continued.
+    pub folder: PathBuf,
+    /// Number of trials that count, as stored in the study; none for a new study.
+    pub budget: Option<u32>,
+}
+
+/// Parses the place of a study: its folder, its journal file or a Redis address.
+pub fn parse_storage(place: &str) -> Storage {
+    if place.starts_with("redis://") || place.starts_with("rediss://") {
+        return Storage::Redis(place.to_owned());
+    }
+    let path = Path::new(place);
+    Storage::File(if path.is_dir() { path.join(STUDY_FILE) } else { path.to_owned() })
+}
+
+fn label(study: &StoredStudy) -> String {
+    format!("{} seed {}", study.task.name(), study.seed)
+}
+
+/// Returns the study of `storage` with this task and seed, where given. If there is none, a new study needs both;
+/// otherwise the place may be mistyped and is refused.
+pub fn study_to_join(
+    storage: &Storage,
+    task: Option<Task>,
+    seed: Option<u32>,
+    robot: &RobotDescription,
+) -> Result<StoredStudy, Failure> {
+    let exists = match storage {
+        // Opening a journal file would create its folder.
+        Storage::File(file) => file.is_file(),
+        _ => true,
+    };
+    let all = if exists { stored_studies(storage)? } else { Vec::new() };
+    let matches =
+        |study: &&StoredStudy| task.is_none_or(|task| task == study.task) && seed.is_none_or(|seed| seed == study.seed);
+    let matching: Vec<&StoredStudy> = all.iter().filter(matches).collect();
+    match matching.as_slice() {
+        [] => {
+            if let (Some(task), Some(seed)) = (task, seed) {
+                eprintln!("quadfrog: a new study of {} seed {seed} is made in {storage}", task.name());
+                return Ok(StoredStudy { task, seed, robot: robot.name.clone(), budget: None });
+            }
+            let labels: Vec<String> = all.iter().map(label).collect();
+            let found = match (exists, labels.as_slice()) {
+                (false, _) => "there is no such journal".to_owned(),
+                (true, []) => "there is no study of this program in it".to_owned(),
+                (true, labels) => format!("there is no such study in it, only {}", labels.join(", ")),
+            };
+            Err(Failure::Input(format!("--join {storage}: {found}; for a new study give --task and --seed")))
+        }
+        [study] if study.robot != robot.name => Err(Failure::Input(format!(
+            "--model {}: {storage} holds a study of the {}; give --model {}",
+            robot.name, study.robot, study.robot
+        ))),
+        [study] => Ok((*study).clone()),
+        several => {
+            let labels: Vec<String> = several.iter().copied().map(label).collect();
+            let labels = labels.join(", ");
+            Err(Failure::Input(format!("--join {storage}: several studies; select with --task and --seed: {labels}")))
+        }
+    }
+}
+
+/// Returns the study in `folder`; task, seed and robot must agree with it, where given.
+pub fn study_to_continue(
+    folder: &Path,
+    task: Option<Task>,
+    seed: Option<u32>,
+    robot: &RobotDescription,
+) -> Result<SelectedStudy, Failure> {
+    let file = folder.join(STUDY_FILE);
+    if !file.is_file() {
+        return Err(Failure::Input(format!(
+            "{}: there is no {STUDY_FILE} in this folder; give the folder of an earlier study, as printed at its end",
+            folder.display()
+        )));
+    }
+    let stored = stored_study(&file)?;
+    let refuse = |option: String, holds: String, remedy: String| {
+        Err(Failure::Input(format!("{option}: {} holds a study of {holds}; {remedy}", file.display())))
+    };
+    if task.is_some_and(|task| task != stored.task) {
+        return refuse("--task".into(), stored.task.name().into(), "omit --task to continue it".into());
+    }
+    if seed.is_some_and(|seed| seed != stored.seed) {
+        return refuse("--seed".into(), format!("seed {}", stored.seed), "omit --seed to continue it".into());
+    }
+    if robot.name != stored.robot {
+        let option = format!("--model {}", robot.name);
+        return refuse(option, format!("the {}", stored.robot), format!("give --model {}", stored.robot));
+    }
+    Ok(SelectedStudy { task: stored.task, seed: stored.seed, folder: folder.to_owned(), budget: stored.budget })
+}

@@ -1,0 +1,79 @@
+//! The places of the screen's parts, for drawing and for the mouse.
+
+use ratatui::layout::{Constraint, Layout, Rect, Size};
+use strum::VariantArray;
+
+use crate::action::Action;
+use crate::keymap::Keymap;
+use crate::model::View;
+
+/// Columns that the console needs.
+pub const MIN_COLUMNS: u16 = 80;
+/// Rows that the console needs.
+pub const MIN_ROWS: u16 = 24;
+
+/// The parts of the screen, from the top.
+#[derive(Debug, Clone, Copy)]
+pub struct Areas {
+    /// The frame: mode, STOP, counters.
+    pub frame: Rect,
+    /// The tabs.
+    pub tabs: Rect,
+    /// The open view.
+    pub body: Rect,
+    /// The newest answer to the operator.
+    pub message: Rect,
+    /// The next possible step.
+    pub next_step: Rect,
+}
+
+/// The parts of a screen of that size; none if it is too small.
+pub fn areas(size: Size) -> Option<Areas> {
+    if size.width < MIN_COLUMNS || size.height < MIN_ROWS {
+        return None;
+    }
+    let [frame, tabs, body, message, next_step] = Layout::vertical([
+        Constraint::Length(2),
+        Constraint::Length(1),
+        Constraint::Fill(1),
+        Constraint::Length(1),
+        Constraint::Length(1),
+    ])
+    .areas(Rect::from(((0, 0).into(), size)));
+    Some(Areas { frame, tabs, body, message, next_step })
+}
+
+/// The rows of the trial table in view Trials: the body below its heading and the column titles.
+pub fn trial_rows(body: Rect) -> Rect {
+    Rect { y: body.y + 2, height: body.height.saturating_sub(2), ..body }
+}
+
+/// The index of the first row shown of a table, with the selected row (or else the last) near the middle.
+pub fn first_row(rows: usize, selected: Option<usize>, space: usize) -> usize {
+    let at = selected.unwrap_or(rows.saturating_sub(1));
+    at.saturating_sub(space / 2).min(rows.saturating_sub(space))
+}
+
+/// The tabs with their actions and texts, from the left.
+pub fn tabs(keymap: &Keymap) -> impl Iterator<Item = (View, Action, String)> + '_ {
+    View::VARIANTS.iter().map(move |view| {
+        let action = match view {
+            View::Live => Action::LiveView,
+            View::Trials => Action::TrialsView,
+            View::Optimizer => Action::OptimizerView,
+            View::Override => Action::OverrideView,
+            View::Health => Action::HealthView,
+            View::Log => Action::LogView,
+        };
+        (*view, action, format!(" {} {} ", keymap.key(action), view.name()))
+    })
+}
+
+/// The action of the tab in a column of the terminal.
+pub fn tab_at(keymap: &Keymap, column: u16) -> Option<Action> {
+    let mut end = 0;
+    tabs(keymap).find_map(|(_, action, text)| {
+        end += text.chars().count();
+        (usize::from(column) < end).then_some(action)
+    })
+}

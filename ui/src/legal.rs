@@ -1,0 +1,246 @@
+//! The conditions of each action, with the reason where it is not possible. The session checks every request again.
+
+use quadfrog::control::mode::{self, Trigger};
+use quadfrog::telemetry::Mode;
+use quadfrog::trial::{ExperimentStage, Verdict};
+
+use crate::action::{ACTIONS, Action, ActionInfo};
+use crate::layout::{MIN_COLUMNS, MIN_ROWS};
+use crate::model::{Model, View};
+
+/// Whether an action is possible now; the reason if it is not.
+pub type Legality = Result<(), String>;
+
+/// Whether `action` is possible now.
+pub fn legal(action: Action, model: &Model) -> Legality {
+    use Action as A;
+    match action {
+        A::Arm => may_arm(model),
+        A::SitDown => may_sit_down(model),
+        A::Acknowledge => may_acknowledge(model),
+        A::Approve => may_approve(model),
+        A::Override | A::QueuePoint | A::Skip => may_change_proposal(model),
+        A::ClearOverrides => may_clear_overrides(model),
+        A::Fix => may_fix(model),
+        A::Bounds => may_bound(model),
+        A::Continue => may_continue(model),
+        A::ConfirmBest => may_confirm(model),
+        A::ExportBest => may_export_best(model),
+        A::Accept | A::Fall | A::Void | A::HandValue => may_judge(model),
+        A::Rerun => may_rerun(model),
+        A::Undo => may_undo(model),
+        A::Note => may_note(model),
+        A::Ghost => may_ghost(model),
+        A::Sort | A::Reverse | A::Columns | A::BestOnly | A::Copy | A::Export => {
+            require(model.view == View::Trials, "only in the view Trials")
+        }
+        A::Filter | A::Search => {
+            require(matches!(model.view, View::Trials | View::Log), "only in the views Trials and Log")
+        }
+        A::PlayPause | A::StepForward | A::StepBack | A::Slower | A::Faster | A::PreviousMarker | A::NextMarker => {
+            require(model.replay.is_some(), "only in a replay")
+        }
+        A::Suspend => may_suspend(model),
+        _ => Ok(()),
+    }
+}
+
+/// The actions whose name or help contains the filter's words, possible ones first.
+pub fn palette(filter: &str, model: &Model) -> Vec<(&'static ActionInfo, Legality)> {
+    let words: Vec<String> = filter.split_whitespace().map(str::to_lowercase).collect();
+    let matches = |info: &&ActionInfo| {
+        let text = format!("{} {}", info.name, info.help.to_lowercase());
+        words.iter().all(|word| text.contains(word))
+    };
+    let mut rows: Vec<_> = ACTIONS.iter().filter(matches).map(|info| (info, legal(info.action, model))).collect();
+    rows.sort_by_key(|(_, legal)| legal.is_err());
+    rows
+}
+
+/// Whether this session accepts requests.
+pub fn may_request(model: &Model) -> Legality {
+    require(model.replay.is_none(), "this is a replay: there is nothing to command")?;
+    require(!model.session.info.observe, "this session only observes")
+}
+
+/// Whether a stop can be acknowledged. An observer may acknowledge too, since an observer's STOP stops the robot.
+pub fn may_acknowledge(model: &Model) -> Legality {
+    if !model.session.info.observe {
+        may_request(model)?;
+    }
+    require(mode::next(model.mode(), Trigger::Acknowledge).is_some(), "nothing waits to be acknowledged")
+}
+
+fn require(condition: bool, reason: &str) -> Legality {
+    if condition { Ok(()) } else { Err(reason.to_owned()) }
+}
+
+fn refuse(reason: impl Into<String>) -> Legality {
+    Err(reason.into())
+}
+
+/// The reason why the robot accepts no command at present; none while it lies or stands waiting.
+fn busy(mode: Mode) -> Option<&'static str> {
+    match mode {
+        Mode::Offline | Mode::Observe => Some("the robot does not answer yet"),
+        Mode::StandUp => Some("the robot is standing up"),
+        Mode::Countdown => Some("the countdown runs"),
+        Mode::Jump => Some("the robot is jumping"),
+        Mode::Settle => Some("the robot is settling"),
+        Mode::SitDown => Some("the robot is sitting down"),
+        Mode::Damped => Some("the robot was stopped: acknowledge first"),
+        Mode::Fault => Some("a fault is latched: acknowledge first"),
+        Mode::Disarmed | Mode::Ready | Mode::Review => None,
+    }
+}
+
+fn may_arm(model: &Model) -> Legality {
+    may_request(model)?;
+    must_be_visible(model)?;
+    if mode::next(model.mode(), Trigger::Arm).is_none() {
+        return refuse(busy(model.mode()).unwrap_or("the robot is armed already"));
+    }
+    require(!model.session.stage_is(ExperimentStage::Review), "the last trial waits for its verdict")?;
+    require(!model.session.arming_checks.is_empty(), "the arming checks are not finished")?;
+    match model.session.failing_checks() {
+        0 => Ok(()),
+        count => refuse(format!(
+            "{count} arming checks have not passed: {} shows them",
+            model.keymap.key(Action::ArmingChecks)
+        )),
+    }
+}
+
+fn may_sit_down(model: &Model) -> Legality {
+    may_request(model)?;
+    match (mode::next(model.mode(), Trigger::SitDown), model.mode()) {
+        (Some(_), _) => Ok(()),
+        (None, Mode::Disarmed) => refuse("the robot is disarmed already"),
+        (None, mode) => refuse(busy(mode).unwrap_or("not now")),
+    }
+}
+
+/// Energising the robot requires a screen that shows it.
+fn must_be_visible(model: &Model) -> Legality {
+    let (columns, rows) = model.size;
+    if columns >= MIN_COLUMNS && rows >= MIN_ROWS {
+        return Ok(());
+    }
+    refuse(format!("enlarge the terminal to {MIN_COLUMNS}x{MIN_ROWS}: the proposal must be visible"))
+}
+
+fn may_approve(model: &Model) -> Legality {
+    may_change_proposal(model)?;
+    must_be_visible(model)?;
+    match (mode::next(model.mode(), Trigger::Approve), model.mode()) {
+        (Some(_), _) => Ok(()),
+        (None, Mode::Disarmed) => {
+            refuse(format!("the robot is not standing: press {} first", model.keymap.key(Action::Arm)))
+        }
+        (None, mode) => refuse(busy(mode).unwrap_or("the robot is not ready")),
+    }
+}
+
+fn may_change_proposal(model: &Model) -> Legality {
+    may_request(model)?;
+    match model.session.stage.map(|info| info.stage) {
+        Some(ExperimentStage::Proposed) if model.session.open_proposal().is_some() => Ok(()),
+        Some(ExperimentStage::Review) => refuse("the last trial waits for its verdict"),
+        Some(ExperimentStage::Running) => refuse("a trial is running"),
+        Some(ExperimentStage::Finished) => {
+            refuse(format!("the study is finished: {} gives it more trials", model.keymap.key(Action::Continue)))
+        }
+        _ => refuse("there is no proposal yet"),
+    }
+}
+
+/// Whether the search may be changed: not during a trial.
+fn may_search(model: &Model) -> Legality {
+    may_request(model)?;
+    match model.session.stage.map(|info| info.stage) {
+        Some(ExperimentStage::Proposed | ExperimentStage::Finished) => Ok(()),
+        Some(ExperimentStage::Review) => refuse("the last trial waits for its verdict"),
+        Some(ExperimentStage::Running) => refuse("a trial is running"),
+        None => refuse("the session has not begun"),
+    }
+}
+
+fn may_bound(model: &Model) -> Legality {
+    may_search(model)?;
+    require(model.view == View::Override, "only in the view Override")?;
+    require(model.override_parameter().is_some(), "gains are not searched")
+}
+
+fn may_fix(model: &Model) -> Legality {
+    may_bound(model)?;
+    let fixed = model.override_parameter().and_then(|info| model.session.searched(&info.name)?.fixed);
+    require(fixed.is_some() || model.override_value().is_some(), "there is no proposal whose value could be kept")
+}
+
+fn may_confirm(model: &Model) -> Legality {
+    may_search(model)?;
+    let accepted = model.session.trials.count(Verdict::Accept);
+    require(accepted >= 2, "two accepted trials are needed to compare")
+}
+
+fn may_export_best(model: &Model) -> Legality {
+    may_request(model)?;
+    require(model.session.trials.best().is_some(), "no trial was accepted yet")?;
+    require(!model.session.info.study.is_empty(), "this session keeps no study")
+}
+
+fn may_clear_overrides(model: &Model) -> Legality {
+    may_change_proposal(model)?;
+    let overridden = model
+        .session
+        .open_proposal()
+        .is_some_and(|proposal| proposal.parameters.iter().chain(&proposal.gains).any(|p| p.value != p.proposed));
+    require(overridden, "nothing was overridden")
+}
+
+fn may_continue(model: &Model) -> Legality {
+    may_request(model)?;
+    require(model.session.stage_is(ExperimentStage::Finished), "the study is not finished")
+}
+
+fn may_judge(model: &Model) -> Legality {
+    may_request(model)?;
+    require(model.session.stage_is(ExperimentStage::Review), "no trial waits for a verdict")
+}
+
+fn may_rerun(model: &Model) -> Legality {
+    may_request(model)?;
+    if model.session.stage_is(ExperimentStage::Review) {
+        return Ok(());
+    }
+    match model.selected_trial() {
+        Some(trial) if model.view == View::Trials && trial.verdict.is_some() => Ok(()),
+        _ => refuse("no trial waits for a verdict; in Trials, select a judged one"),
+    }
+}
+
+fn may_undo(model: &Model) -> Legality {
+    may_request(model)?;
+    require(model.session.stage.is_some_and(|info| info.can_undo), "no verdict can be taken back")
+}
+
+fn may_note(model: &Model) -> Legality {
+    may_request(model)?;
+    require(model.trial_in_view().is_some(), "there is no trial yet")
+}
+
+fn may_ghost(model: &Model) -> Legality {
+    require(model.history.traces().next().is_some(), "no jump has been recorded yet")
+}
+
+/// A stopped process sends nothing, not even the damping commands that a real robot needs.
+fn may_suspend(model: &Model) -> Legality {
+    if model.replay.is_none() && model.session.is_hardware() && model.mode().commanded() {
+        refuse("a suspended program sends the robot nothing, not even damping; quit it instead")
+    } else if model.robot_needs_us() {
+        let sit_down = model.keymap.key(Action::SitDown);
+        refuse(format!("the robot is armed; {sit_down} sits it down, then the program can be suspended"))
+    } else {
+        Ok(())
+    }
+}

@@ -1,0 +1,160 @@
+//! Samples of the charts: the last minute of telemetry, and a short trace of each trial.
+
+use std::collections::{BTreeMap, VecDeque};
+
+use quadfrog::robot::{LEGS, PerLeg};
+use quadfrog::telemetry::{Mode, Phase, Tick};
+
+/// Samples that are kept: a minute at 200 a second.
+const CAPACITY: usize = 12_000;
+/// Traces of trials that are kept; the oldest go first.
+const TRACES: usize = 256;
+/// Samples of one trace: ten seconds at 200 a second.
+const TRACE_CAPACITY: usize = 2_000;
+
+/// The part of one tick that the charts draw; single precision is finer than any screen.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ChartSample {
+    /// Time since the engine started, ns.
+    pub time_ns: u64,
+    /// Mode at the end of the tick.
+    pub mode: Mode,
+    /// Phase of the jump.
+    pub phase: Phase,
+    /// The running trial.
+    pub trial: Option<u32>,
+    /// Time since the impulse began, s.
+    pub trial_time_s: f32,
+    /// Roll, rad.
+    pub roll: f32,
+    /// Pitch, rad.
+    pub pitch: f32,
+    /// Height of the trunk's origin over the world's zero, m.
+    pub height: f32,
+    /// From the planned start of the tick to its real start, ns.
+    pub lateness_ns: u32,
+    /// From its start to its end, ns.
+    pub busy_ns: u32,
+    /// Phase of the oscillator, rad.
+    pub theta: f32,
+    /// z of each foot in its leg frame, m.
+    pub foot_z: PerLeg<f32>,
+    /// Normal force at each foot's sensor, N.
+    pub foot_force: PerLeg<f32>,
+    /// Whether each foot is on the ground.
+    pub contact: PerLeg<bool>,
+}
+
+impl From<&Tick> for ChartSample {
+    fn from(tick: &Tick) -> ChartSample {
+        let rpy = tick.estimate.roll_pitch_yaw;
+        let mut foot_z = [0.0; LEGS];
+        for (z, foot) in foot_z.iter_mut().zip(&tick.estimate.foot_position_leg) {
+            *z = foot.z as f32;
+        }
+        ChartSample {
+            time_ns: tick.time_ns,
+            mode: tick.mode,
+            phase: tick.phase,
+            trial: tick.trial,
+            trial_time_s: tick.trial_time_s as f32,
+            roll: rpy.x as f32,
+            pitch: rpy.y as f32,
+            height: tick.estimate.position_world.z as f32,
+            lateness_ns: tick.stages.lateness_ns,
+            busy_ns: tick.stages.read_ns.saturating_add(tick.stages.decide_ns).saturating_add(tick.stages.write_ns),
+            theta: tick.theta_rad as f32,
+            foot_z,
+            foot_force: tick.state.foot_force.map(|force| force as f32),
+            contact: tick.estimate.contact,
+        }
+    }
+}
+
+/// The sample whose time within its trial is nearest.
+pub fn at_trial_time(trace: &[ChartSample], trial_time_s: f32) -> Option<&ChartSample> {
+    let distance = |sample: &&ChartSample| (sample.trial_time_s - trial_time_s).abs();
+    trace.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)))
+}
+
+/// The newest samples, oldest first, and the trials' traces.
+#[derive(Debug, Clone, Default)]
+pub struct SignalHistory {
+    samples: VecDeque<ChartSample>,
+    traces: BTreeMap<u32, Vec<ChartSample>>,
+}
+
+impl SignalHistory {
+    /// Appends one tick. A tick older than the newest one (a replay was rewound) clears the samples first.
+    pub fn push(&mut self, tick: &Tick) {
+        let sample = ChartSample::from(tick);
+        if self.samples.back().is_some_and(|newest| newest.time_ns >= sample.time_ns) {
+            self.samples.clear();
+        }
+        if self.samples.len() == CAPACITY {
+            self.samples.pop_front();
+        }
+        self.samples.push_back(sample);
+        if let Some(trial) = sample.trial {
+            let trace = self.traces.entry(trial).or_default();
+            // A trial that starts again (a cancelled countdown, a replay) replaces its trace.
+            if trace
+                .last()
+                .is_some_and(|last| last.time_ns >= sample.time_ns || last.trial_time_s > sample.trial_time_s)
+            {
+                trace.clear();
+            }
+            if trace.len() < TRACE_CAPACITY {
+                trace.push(sample);
+            }
+            if self.traces.len() > TRACES {
+                self.traces.pop_first();
+            }
+        }
+    }
+
+    /// The samples of one trace.
+    pub fn of_trace(trace: &[ChartSample]) -> SignalHistory {
+        SignalHistory { samples: trace.iter().copied().collect(), traces: BTreeMap::new() }
+    }
+
+    /// Clears the samples, not the traces: time has jumped.
+    pub fn clear(&mut self) {
+        self.samples.clear();
+    }
+
+    /// All samples, oldest first.
+    pub fn samples(&self) -> impl DoubleEndedIterator<Item = &ChartSample> + '_ {
+        self.samples.iter()
+    }
+
+    /// The samples of the last `window_ns`, oldest first.
+    pub fn window(&self, window_ns: u64) -> impl Iterator<Item = &ChartSample> + '_ {
+        let from = self.newest_ns().saturating_sub(window_ns);
+        let start = self.samples.partition_point(|sample| sample.time_ns <= from && from > 0);
+        self.samples.range(start..)
+    }
+
+    /// Time of the newest sample, ns; 0 without any.
+    pub fn newest_ns(&self) -> u64 {
+        self.samples.back().map_or(0, |sample| sample.time_ns)
+    }
+
+    /// The sample nearest to a time.
+    pub fn at(&self, time_ns: u64) -> Option<&ChartSample> {
+        let after = self.samples.partition_point(|sample| sample.time_ns < time_ns);
+        let before = after.checked_sub(1).and_then(|index| self.samples.get(index));
+        let after = self.samples.get(after);
+        [before, after].into_iter().flatten().min_by_key(|sample| sample.time_ns.abs_diff(time_ns))
+    }
+
+    /// The trace of a trial, countdown to end.
+    pub fn trace(&self, trial: u32) -> Option<&[ChartSample]> {
+        self.traces.get(&trial).map(Vec::as_slice)
+    }
+
+    /// The trials that have a trace.
+    pub fn traces(&self) -> impl Iterator<Item = u32> + '_ {
+        self.traces.keys().copied()
+    }
+}

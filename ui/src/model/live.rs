@@ -1,0 +1,41 @@
+//! State of the live view: chart mode, window, freeze, ghost, comparison.
+
+use std::time::Duration;
+
+use super::comparison::Comparison;
+use super::history::SignalHistory;
+use crate::series::Series;
+use crate::settings::ChartMode;
+
+/// State of the live view.
+#[derive(Debug, Clone)]
+pub struct LiveView {
+    /// Sweep or scroll.
+    pub mode: ChartMode,
+    /// Time that a chart shows, s.
+    pub window_s: f64,
+    /// Whether the sweep's cursor is drawn as a line; without it the gap ahead of the newest value shows the same with
+    /// less to send.
+    pub cursor_line: bool,
+    /// Charts, or the joints in their place.
+    pub panel: Panel,
+    /// Drawn series, in the order of the charts.
+    pub series: Vec<Series>,
+    /// The history at the moment of freezing, and that moment on the console's clock.
+    pub frozen: Option<(SignalHistory, Duration)>,
+    /// Time under the cursor while frozen, ns.
+    pub cursor_ns: u64,
+    /// The trial laid under the charts of a jump.
+    pub ghost: Option<u32>,
+    /// Two trials in place of the present; none shows the present.
+    pub comparison: Option<Comparison>,
+}
+
+/// Content of the large area of the live view.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Panel {
+    /// Signals over time.
+    Charts,
+    /// Torque and speed of the joints, and the robot as a wireframe.
+    Joints,
+}

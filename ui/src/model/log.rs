@@ -1,0 +1,61 @@
+//! The log's lines and the state of its view.
+
+use std::collections::VecDeque;
+
+use quadfrog::recording::record::LogLevel;
+
+/// Lines that the log keeps.
+const CAPACITY: usize = 10_000;
+
+/// A line of the log.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LogLine {
+    /// Time since the engine started, ns.
+    pub time_ns: u64,
+    /// Severity.
+    pub level: LogLevel,
+    /// Part of the program.
+    pub source: String,
+    /// The line.
+    pub text: String,
+    /// Whether a trial was proposed or judged, or a fault latched.
+    pub marker: bool,
+}
+
+/// The newest lines, oldest first.
+#[derive(Debug, Clone, Default)]
+pub struct SessionLog {
+    lines: VecDeque<LogLine>,
+}
+
+impl SessionLog {
+    /// Appends a line; the oldest one goes when the log is full.
+    pub fn push(&mut self, line: LogLine) {
+        if self.lines.len() == CAPACITY {
+            self.lines.pop_front();
+        }
+        self.lines.push_back(line);
+    }
+}
+
+/// State of the log view.
+#[derive(Debug, Clone, Default)]
+pub struct LogView {
+    /// Lines above the newest; 0 follows.
+    pub back: usize,
+    /// The lowest level shown.
+    pub level: Option<LogLevel>,
+    /// Text that a shown line contains.
+    pub search: String,
+}
+
+impl LogView {
+    /// Returns the lines that pass the filter, oldest first.
+    pub fn lines<'a>(&'a self, log: &'a SessionLog) -> impl DoubleEndedIterator<Item = &'a LogLine> + 'a {
+        let search = self.search.to_lowercase();
+        log.lines.iter().filter(move |line| {
+            self.level.is_none_or(|level| line.level >= level)
+                && (search.is_empty() || line.text.to_lowercase().contains(&search) || line.source.contains(&search))
+        })
+    }
+}

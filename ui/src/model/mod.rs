@@ -1,0 +1,207 @@
+//! The content of the screen: plain data and questions to it. [`crate::update`] alone changes it.
+
+pub mod comparison;
+pub mod dialog;
+pub mod history;
+pub mod live;
+pub mod log;
+pub mod session;
+pub mod trials;
+
+use std::time::Duration;
+
+use quadfrog::recording::record::LogLevel;
+use quadfrog::recording::recorder::RecorderStatus;
+use quadfrog::robot::description::RobotDescription;
+use quadfrog::telemetry::{Mode, Snapshot};
+use quadfrog::trial::{ParameterInfo, TrialRecord};
+use strum::{IntoStaticStr, VariantArray};
+
+use crate::column::Column;
+use crate::keymap::Keymap;
+use crate::message::ReplayStatus;
+use crate::series::Series;
+use crate::settings::{BellCause, ConsoleSettings};
+use crate::theme::Theme;
+use dialog::{Choice, Dialog};
+use history::SignalHistory;
+use live::{LiveView, Panel};
+use log::LogView;
+use session::SessionModel;
+use trials::TrialTable;
+
+/// One of the tabs, in their order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, VariantArray, IntoStaticStr)]
+#[expect(missing_docs, reason = "the words of the tabs")]
+pub enum View {
+    Live,
+    Trials,
+    Optimizer,
+    Override,
+    Health,
+    Log,
+}
+
+impl View {
+    /// The word on its tab.
+    pub fn name(self) -> &'static str {
+        self.into()
+    }
+}
+
+/// The message line: the newest answer to the operator.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Notice {
+    /// Severity.
+    pub level: LogLevel,
+    /// The text.
+    pub text: String,
+}
+
+/// The content of the screen.
+#[derive(Debug, Clone)]
+pub struct Model {
+    /// Colours and characters.
+    pub theme: Theme,
+    /// The active keys.
+    pub keymap: Keymap,
+    /// Causes that ring the bell.
+    pub bell: Vec<BellCause>,
+    /// The robot's limits and geometry; none where they are not known.
+    pub robot: Option<RobotDescription>,
+    /// Time since the console started.
+    pub clock: Duration,
+    /// The session, from its records.
+    pub session: SessionModel,
+    /// The newest tick and counters.
+    pub snapshot: Snapshot,
+    /// Arrival of the newest tick, on the console's clock.
+    pub snapshot_at: Duration,
+    /// State of the recorder; none in a replay.
+    pub recorder: Option<RecorderStatus>,
+    /// Samples of the charts.
+    pub history: SignalHistory,
+    /// The newest answer to the operator.
+    pub message: Option<Notice>,
+    /// The open tab.
+    pub view: View,
+    /// The dialog over it.
+    pub dialog: Option<Dialog>,
+    /// Live view.
+    pub live: LiveView,
+    /// Trial table.
+    pub trial_table: TrialTable,
+    /// Selected row of view Override.
+    pub override_row: usize,
+    /// Log view.
+    pub log_view: LogView,
+    /// State of the replay; none in a live session.
+    pub replay: Option<ReplayStatus>,
+    /// Time of the last Ctrl-C.
+    pub interrupted_at: Option<Duration>,
+    /// The terminal's columns and rows.
+    pub size: (u16, u16),
+    /// Rows that page up and page down move by, from the terminal's height.
+    pub page: usize,
+    /// Whether the console receives clicks and the wheel; otherwise the terminal keeps them for selecting and copying.
+    pub mouse: bool,
+}
+
+impl Model {
+    /// An empty screen.
+    pub fn new(settings: ConsoleSettings, theme: Theme, robot: Option<RobotDescription>) -> Model {
+        Model {
+            theme,
+            keymap: settings.keymap,
+            bell: settings.bell,
+            robot,
+            clock: Duration::ZERO,
+            session: SessionModel::default(),
+            snapshot: Snapshot::default(),
+            snapshot_at: Duration::ZERO,
+            recorder: None,
+            history: SignalHistory::default(),
+            message: None,
+            view: View::Live,
+            dialog: None,
+            live: LiveView {
+                mode: settings.chart_mode,
+                window_s: settings.chart_window_s,
+                cursor_line: !settings.low_bandwidth,
+                panel: Panel::Charts,
+                series: settings.chart_series,
+                frozen: None,
+                cursor_ns: 0,
+                ghost: None,
+                comparison: None,
+            },
+            trial_table: TrialTable { columns: settings.trial_columns, ..TrialTable::default() },
+            override_row: 0,
+            log_view: LogView::default(),
+            replay: None,
+            interrupted_at: None,
+            size: (0, 0),
+            page: 10,
+            mouse: settings.mouse,
+        }
+    }
+
+    /// The robot's mode, from the newest tick.
+    pub fn mode(&self) -> Mode {
+        self.snapshot.tick.mode
+    }
+
+    /// Whether the robot is energised and this console commands it.
+    pub fn robot_needs_us(&self) -> bool {
+        self.replay.is_none() && self.mode().energised()
+    }
+
+    /// The parameter of the selected row of view Override; none for a gain.
+    pub fn override_parameter(&self) -> Option<&ParameterInfo> {
+        self.session.info.parameters.get(self.override_row)
+    }
+
+    /// The proposed value of that parameter.
+    pub fn override_value(&self) -> Option<f64> {
+        let name = &self.override_parameter()?.name;
+        self.session.open_proposal()?.parameters.iter().find(|p| p.name == *name).map(|p| p.value)
+    }
+
+    /// The rows of the trial table, sorted and filtered.
+    pub fn trial_rows(&self) -> Vec<&TrialRecord> {
+        self.trial_table.rows(&self.session.trials, &self.session.info.parameters)
+    }
+
+    /// The trial that actions of the trial table apply to: the selected one, or the newest.
+    pub fn selected_trial(&self) -> Option<&TrialRecord> {
+        self.trial_table.selected(&self.session.trials)
+    }
+
+    /// The trial that a note and the details apply to.
+    pub fn trial_in_view(&self) -> Option<&TrialRecord> {
+        if self.view == View::Trials {
+            self.selected_trial()
+        } else {
+            self.session.under_review().or(self.session.trials.newest())
+        }
+    }
+
+    /// The samples that the charts draw: the running history, or the frozen one.
+    pub fn charted(&self) -> &SignalHistory {
+        self.live.frozen.as_ref().map_or(&self.history, |(history, _)| history)
+    }
+
+    /// The rows of a list of switches: name, help, and whether it is on.
+    pub fn choices(&self, choice: Choice) -> Vec<(&'static str, &'static str, bool)> {
+        match choice {
+            Choice::Series => {
+                let on = |series| self.live.series.contains(series);
+                Series::VARIANTS.iter().map(|series| (series.name(), series.help(), on(series))).collect()
+            }
+            Choice::Columns => {
+                let on = |column| self.trial_table.columns.contains(column);
+                Column::VARIANTS.iter().map(|column| (column.name(), column.help(), on(column))).collect()
+            }
+        }
+    }
+}

@@ -1,0 +1,109 @@
+//! The session as its records have reported it.
+
+use quadfrog::recording::record::{ArmingCheckRecord, SessionInfo, StageRecord};
+use quadfrog::session::objective;
+use quadfrog::trial::{
+    ExperimentStage, ParameterInfo, Proposal, ProposalInsight, SearchStatus, SearchedParameter, TrialRecord, Verdict,
+};
+
+use super::log::SessionLog;
+use super::trials::Trials;
+
+/// The fold of the session's records. A replay that jumps resets it whole.
+#[derive(Debug, Clone, Default)]
+pub struct SessionModel {
+    /// Task, robot, sampler, parameters, files.
+    pub info: SessionInfo,
+    /// ExperimentStage of the present trial; none before the session has begun.
+    pub stage: Option<StageRecord>,
+    /// The newest proposal; its trial may run already.
+    pub proposal: Option<Proposal>,
+    /// The newest arming checks; empty before the robot was disarmed for the first time.
+    pub arming_checks: Vec<ArmingCheckRecord>,
+    /// Present bounds, fixed parameters and budget.
+    pub search: Option<SearchStatus>,
+    /// Densities and importances behind the sampler's newest proposal.
+    pub insight: Option<ProposalInsight>,
+    /// The study.
+    pub trials: Trials,
+    /// The log.
+    pub log: SessionLog,
+    /// Cause of the newest DAMPED or FAULT.
+    pub stopped_because: String,
+}
+
+impl SessionModel {
+    /// Whether the session is in this stage.
+    pub fn stage_is(&self, stage: ExperimentStage) -> bool {
+        self.stage.is_some_and(|info| info.stage == stage)
+    }
+
+    /// The trial that waits for its verdict.
+    pub fn under_review(&self) -> Option<&TrialRecord> {
+        let info = self.stage.filter(|info| info.stage == ExperimentStage::Review)?;
+        self.trials.records.get(&info.trial)
+    }
+
+    /// The proposal that waits for approval.
+    pub fn open_proposal(&self) -> Option<&Proposal> {
+        let info = self.stage.filter(|info| info.stage == ExperimentStage::Proposed)?;
+        self.proposal.as_ref().filter(|proposal| proposal.trial == info.trial)
+    }
+
+    /// The number of arming checks that forbid arming.
+    pub fn failing_checks(&self) -> usize {
+        self.arming_checks.iter().filter(|item| !item.state.allows()).count()
+    }
+
+    /// Whether the session drives hardware.
+    pub fn is_hardware(&self) -> bool {
+        self.info.is_hardware()
+    }
+
+    /// The letters that arm the robot, typed in order: on hardware several, against a single accidental press.
+    pub fn arming_word(&self) -> &'static str {
+        if self.is_hardware() { "stand" } else { "y" }
+    }
+
+    /// The parameter of that name with its present bounds.
+    pub fn parameter(&self, name: &str) -> Option<ParameterInfo> {
+        let info = self.info.parameters.iter().find(|parameter| parameter.name == name)?;
+        Some(match self.searched(name) {
+            Some(searched) => ParameterInfo { low: searched.low, high: searched.high, ..info.clone() },
+            None => info.clone(),
+        })
+    }
+
+    /// The gain of that name with its allowed range.
+    pub fn gain(&self, name: &str) -> Option<&ParameterInfo> {
+        self.info.gains.iter().find(|gain| gain.name == name)
+    }
+
+    /// The parameter of that name as the search treats it at present.
+    pub fn searched(&self, name: &str) -> Option<&SearchedParameter> {
+        self.search.as_ref()?.parameters.iter().find(|parameter| parameter.name == name)
+    }
+
+    /// Repeats left to confirm the best; none while nothing is being confirmed.
+    pub fn confirming(&self) -> Option<u32> {
+        self.search.as_ref()?.confirming
+    }
+
+    /// The number of trials that count for the budget: the session's, or else those with a verdict other than void.
+    pub fn counted(&self) -> usize {
+        match &self.search {
+            Some(search) => search.counted as usize,
+            None => self.trials.count(Verdict::Accept) + self.trials.count(Verdict::Fall),
+        }
+    }
+
+    /// The number of trials of the study.
+    pub fn budget(&self) -> u32 {
+        self.search.as_ref().map_or(self.info.budget, |search| search.budget)
+    }
+
+    /// The measured objective of a trial, before any verdict.
+    pub fn measured_objective(&self, trial: &TrialRecord) -> Option<f64> {
+        Some(objective::value(self.info.task?, &trial.measured?, 1))
+    }
+}

@@ -1,0 +1,89 @@
+//! Rows of the trial table as text: clipboard, CSV, Markdown.
+
+use quadfrog::trial::{TrialRecord, Verdict};
+
+use crate::model::Model;
+
+/// Cause and note on one line.
+pub fn remark(trial: &TrialRecord) -> String {
+    match (trial.cause.as_str(), trial.note.as_str()) {
+        (cause, "") => cause.to_owned(),
+        ("", note) => format!("| {note}"),
+        (cause, note) => format!("{cause} | {note}"),
+    }
+}
+
+/// A trial as one line of text, for the clipboard.
+pub fn as_text(trial: &TrialRecord, model: &Model) -> String {
+    let mut text = format!("trial {}", trial.trial);
+    for (name, value) in &trial.parameters {
+        text.push_str(&format!("\t{name}={value}"));
+    }
+    let value = trial.value.map_or("-".to_owned(), |value| value.to_string());
+    let verdict = trial.verdict.map_or("-", Verdict::name);
+    text.push_str(&format!(
+        "\tJ={value} {}\t{verdict}\t{}\t{}",
+        model.session.info.unit,
+        trial.source.name(),
+        remark(trial)
+    ));
+    text
+}
+
+/// The names of the exported columns and the rows of the table as shown.
+fn export_cells(model: &Model) -> (Vec<String>, Vec<Vec<String>>) {
+    let mut names = vec!["trial".to_owned()];
+    names.extend(model.session.info.parameters.iter().map(|info| info.name.clone()));
+    let rest = ["value", "hand_value", "verdict", "suggested", "cause", "source", "parent", "attempt"];
+    names.extend(rest.map(str::to_owned));
+    names.extend(["dx_m", "dy_m", "dyaw_rad", "apex_m", "air_s", "note"].map(str::to_owned));
+    let optional = |value: Option<f64>| value.map(|value| value.to_string()).unwrap_or_default();
+    let row = |trial: &&TrialRecord| {
+        let mut cells = vec![trial.trial.to_string()];
+        for info in &model.session.info.parameters {
+            cells.push(optional(trial.parameters.iter().find(|(name, _)| *name == info.name).map(|(_, value)| *value)));
+        }
+        cells.extend([
+            optional(trial.value),
+            optional(trial.hand_value),
+            trial.verdict.map_or("", Verdict::name).to_owned(),
+            trial.suggested.map_or("", Verdict::name).to_owned(),
+            trial.cause.clone(),
+            trial.source.name().to_owned(),
+            trial.parent.map(|parent| parent.to_string()).unwrap_or_default(),
+            model.session.trials.attempt(trial).to_string(),
+        ]);
+        let m = trial.measured;
+        cells.extend([
+            optional(m.map(|m| m.dx_m)),
+            optional(m.map(|m| m.dy_m)),
+            optional(m.map(|m| m.dyaw_rad)),
+            optional(m.map(|m| m.apex_m)),
+            optional(m.map(|m| m.air_s)),
+            trial.note.clone(),
+        ]);
+        cells
+    };
+    (names, model.trial_rows().iter().map(row).collect())
+}
+
+/// The table as shown, as comma-separated values (RFC 4180).
+pub fn as_csv(model: &Model) -> String {
+    let (names, rows) = export_cells(model);
+    let quote = |cell: &String| {
+        if cell.contains([',', '"', '\n', '\r']) { format!("\"{}\"", cell.replace('"', "\"\"")) } else { cell.clone() }
+    };
+    let line = |cells: &Vec<String>| cells.iter().map(quote).collect::<Vec<_>>().join(",") + "\r\n";
+    std::iter::once(&names).chain(&rows).map(line).collect()
+}
+
+/// The table as shown, as a Markdown table.
+pub fn as_markdown(model: &Model) -> String {
+    let (names, rows) = export_cells(model);
+    let line = |cells: &Vec<String>| {
+        let cells: Vec<String> = cells.iter().map(|cell| cell.replace('|', "\\|").replace('\n', " ")).collect();
+        format!("| {} |\n", cells.join(" | "))
+    };
+    let ruler = format!("|{}\n", " --- |".repeat(names.len()));
+    line(&names) + &ruler + &rows.iter().map(line).collect::<String>()
+}

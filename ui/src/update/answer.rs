@@ -1,0 +1,63 @@
+//! The message line, requests to the session, and STOP.
+
+use std::time::Duration;
+
+use quadfrog::recording::record::LogLevel;
+use quadfrog::session::operator_request::OperatorRequest;
+
+use crate::legal::{may_acknowledge, may_request};
+use crate::message::Effect;
+use crate::model::dialog::Dialog;
+use crate::model::{Model, Notice};
+
+/// A second Ctrl-C within this time quits.
+const INTERRUPT_WINDOW: Duration = Duration::from_secs(2);
+
+/// Shows a line to the operator.
+pub fn say(model: &mut Model, level: LogLevel, text: impl Into<String>) {
+    model.message = Some(Notice { level, text: text.into() });
+}
+
+/// Reports that a dialog ended without effect.
+pub(super) fn cancelled(model: &mut Model, text: &str) -> Vec<Effect> {
+    say(model, LogLevel::Info, format!("cancelled: {text}"));
+    Vec::new()
+}
+
+/// Sends a request to the session, except in a replay or from an observer.
+pub(super) fn request(model: &mut Model, intent: OperatorRequest) -> Vec<Effect> {
+    let allowed = if intent == OperatorRequest::Acknowledge { may_acknowledge(model) } else { may_request(model) };
+    match allowed {
+        Ok(()) => vec![Effect::Request(intent)],
+        Err(reason) => {
+            say(model, LogLevel::Warning, format!("refused: {reason}"));
+            Vec::new()
+        }
+    }
+}
+
+/// Stops the robot. The dialog closes, so that the robot is visible; a half-written text stays.
+pub(super) fn stop(model: &mut Model) -> Vec<Effect> {
+    if model.replay.is_some() {
+        say(model, LogLevel::Info, "this is a replay: there is no robot to stop");
+        return Vec::new();
+    }
+    if !matches!(model.dialog, Some(Dialog::Field { .. })) {
+        model.dialog = None;
+    }
+    say(model, LogLevel::Warning, "STOP: damping");
+    vec![Effect::Stop]
+}
+
+/// Stops the robot; a second time within the window quits.
+pub(super) fn interrupt(model: &mut Model) -> Vec<Effect> {
+    let again = model.interrupted_at.is_some_and(|at| model.clock.saturating_sub(at) < INTERRUPT_WINDOW);
+    model.interrupted_at = Some(model.clock);
+    if again {
+        return vec![Effect::Quit];
+    }
+    let effects = stop(model);
+    let stopped = if effects.is_empty() { "" } else { "STOP: damping. " };
+    say(model, LogLevel::Warning, format!("{stopped}Ctrl-C again within 2 s quits"));
+    effects
+}

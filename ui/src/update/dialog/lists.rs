@@ -1,0 +1,122 @@
+//! Keys of the lists: palette, help, switches, details of a trial.
+
+use crossterm::event::KeyCode;
+use strum::VariantArray;
+use tui_input::Input;
+
+use super::text_field::edit;
+use crate::action::Action;
+use crate::keymap::Key;
+use crate::legal::palette;
+use crate::message::Effect;
+use crate::model::Model;
+use crate::model::dialog::{Choice, Dialog};
+use crate::model::live::Panel;
+use crate::update::answer::cancelled;
+
+/// Lines that a page of a trial's details moves by; there are never more than two pages of them.
+const DETAILS_PAGE: usize = 10;
+
+/// The action that Enter chooses in the palette. Arming is not among them: it is confirmed first.
+pub(super) fn chosen_action(model: &Model, key: Key, filter: &str, selected: usize) -> Option<Action> {
+    if key.code() != KeyCode::Enter {
+        return None;
+    }
+    let (info, legal) = palette(filter, model).into_iter().nth(selected)?;
+    (info.action != Action::Arm || legal.is_err()).then_some(info.action)
+}
+
+pub(super) fn palette_key(model: &mut Model, key: Key, mut input: Input, mut selected: usize) -> Vec<Effect> {
+    let rows = palette(input.value(), model);
+    match key.code() {
+        KeyCode::Esc => return Vec::new(),
+        KeyCode::Up => selected = selected.saturating_sub(1),
+        KeyCode::Down => selected = (selected + 1).min(rows.len().saturating_sub(1)),
+        // Enter never starts motion: `chosen_action` leaves arming, which is confirmed here.
+        KeyCode::Enter if rows.get(selected).is_some() => {
+            model.dialog = Some(Dialog::Arm { typed: 0 });
+            return Vec::new();
+        }
+        KeyCode::Enter => return cancelled(model, "no such action"),
+        _ => {
+            edit(&mut input, key);
+            selected = 0;
+        }
+    }
+    model.dialog = Some(Dialog::Palette { input, selected });
+    Vec::new()
+}
+
+pub(super) fn help_key(model: &mut Model, key: Key, scroll: usize) -> Vec<Effect> {
+    let page = model.page.max(2) - 1;
+    let scroll = match key.code() {
+        KeyCode::Up => scroll.saturating_sub(1),
+        KeyCode::Down => scroll + 1,
+        KeyCode::PageUp => scroll.saturating_sub(page),
+        KeyCode::PageDown => scroll + page,
+        KeyCode::Home => 0,
+        _ => return Vec::new(),
+    };
+    model.dialog = Some(Dialog::Help { scroll });
+    Vec::new()
+}
+
+/// Switches in a list, which stays open; the change shows at once.
+pub(super) fn choice_key(model: &mut Model, key: Key, what: Choice, mut selected: usize) -> Vec<Effect> {
+    let last = model.choices(what).len().saturating_sub(1);
+    match key.code() {
+        KeyCode::Esc | KeyCode::Enter => return Vec::new(),
+        KeyCode::Up => selected = selected.saturating_sub(1),
+        KeyCode::Down => selected = (selected + 1).min(last),
+        KeyCode::Home => selected = 0,
+        KeyCode::End => selected = last,
+        KeyCode::Left | KeyCode::Right | KeyCode::Char('x') => match what {
+            Choice::Series => {
+                model.live.panel = Panel::Charts;
+                toggle(&mut model.live.series, selected);
+            }
+            Choice::Columns => toggle(&mut model.trial_table.columns, selected),
+        },
+        _ => {}
+    }
+    model.dialog = Some(Dialog::Choose { what, selected });
+    Vec::new()
+}
+
+/// Switches one item on or off; the last one stays on. The items keep the order of their enum.
+fn toggle<T: Copy + PartialEq + VariantArray>(on: &mut Vec<T>, index: usize) {
+    let Some(chosen) = T::VARIANTS.get(index) else { return };
+    let switched: Vec<T> = T::VARIANTS.iter().copied().filter(|item| on.contains(item) != (item == chosen)).collect();
+    if !switched.is_empty() {
+        *on = switched;
+    }
+}
+
+/// The action of a key over the details: verdicts and others work while the details are read.
+pub(super) fn action_over_details(model: &Model, key: Key) -> Option<Action> {
+    match key.code() {
+        KeyCode::PageUp | KeyCode::PageDown | KeyCode::Up | KeyCode::Down | KeyCode::Esc | KeyCode::Enter => None,
+        _ => model.keymap.action(key),
+    }
+}
+
+pub(super) fn details_key(model: &mut Model, key: Key, trial: u32, scroll: usize) -> Vec<Effect> {
+    let neighbour = match key.code() {
+        KeyCode::PageUp | KeyCode::PageDown => {
+            // The drawing stops at the last line.
+            let scroll = match key.code() {
+                KeyCode::PageUp => scroll.saturating_sub(DETAILS_PAGE),
+                _ => scroll + DETAILS_PAGE,
+            };
+            model.dialog = Some(Dialog::Details { trial, scroll: scroll.min(DETAILS_PAGE * 2) });
+            return Vec::new();
+        }
+        KeyCode::Up => model.session.trials.records.range(..trial).next_back(),
+        KeyCode::Down => model.session.trials.records.range(trial + 1..).next(),
+        _ => return Vec::new(),
+    };
+    let trial = neighbour.map_or(trial, |(number, _)| *number);
+    model.trial_table.selected = Some(trial);
+    model.dialog = Some(Dialog::Details { trial, scroll: 0 });
+    Vec::new()
+}

@@ -1,0 +1,47 @@
+//! Keys while a dialog is open.
+
+mod confirm;
+mod lists;
+mod override_form;
+mod text_field;
+
+use crate::action::Action;
+use crate::keymap::Key;
+use crate::message::Effect;
+use crate::model::Model;
+use crate::model::dialog::Dialog;
+
+/// KeyOutcome of a key in a dialog.
+pub(super) enum KeyOutcome {
+    /// Effects of the dialog itself.
+    Effects(Vec<Effect>),
+    /// An action to perform, as if its key had been pressed without the dialog.
+    Perform(Action),
+}
+
+/// One key while `dialog`, which was taken out of the model, is open. STOP and Ctrl-C were handled before.
+pub(super) fn key(model: &mut Model, dialog: Dialog, key: Key) -> KeyOutcome {
+    let action = match &dialog {
+        Dialog::ArmingChecks { .. } => confirm::action_over_checks(model, key),
+        Dialog::Palette { input, selected } => lists::chosen_action(model, key, input.value(), *selected),
+        Dialog::Details { .. } => lists::action_over_details(model, key),
+        _ => None,
+    };
+    if let Some(action) = action {
+        return KeyOutcome::Perform(action);
+    }
+    KeyOutcome::Effects(match dialog {
+        Dialog::Approve { trial, revision, pressed_at } => {
+            confirm::approve_key(model, key, (trial, revision, pressed_at))
+        }
+        Dialog::Arm { typed } => confirm::arm_key(model, key, typed),
+        Dialog::ArmingChecks { selected } => confirm::arming_checks_key(model, key, selected),
+        Dialog::Quit => confirm::quit_key(model, key),
+        Dialog::Override(form) => override_form::key(model, key, form),
+        Dialog::Field { purpose, input, .. } => text_field::key(model, key, purpose, input),
+        Dialog::Palette { input, selected } => lists::palette_key(model, key, input, selected),
+        Dialog::Help { scroll } => lists::help_key(model, key, scroll),
+        Dialog::Choose { what, selected } => lists::choice_key(model, key, what, selected),
+        Dialog::Details { trial, scroll } => lists::details_key(model, key, trial, scroll),
+    })
+}

@@ -1,0 +1,101 @@
+//! Keys of the form that changes a proposal.
+
+use crossterm::event::KeyCode;
+use quadfrog::session::operator_request::OperatorRequest;
+
+use super::text_field::edit;
+use crate::action::Action;
+use crate::keymap::Key;
+use crate::message::Effect;
+use crate::model::Model;
+use crate::model::dialog::{Dialog, OverrideForm, OverrideRow};
+use crate::update::answer::{cancelled, request};
+
+/// The request that sends a row's value to the session.
+fn intent(row: &OverrideRow) -> OperatorRequest {
+    match row.gain {
+        true => OperatorRequest::OverrideGain { gain: row.name.clone(), value: row.value },
+        false => OperatorRequest::Override { parameter: row.name.clone(), value: row.value },
+    }
+}
+
+impl OverrideForm {
+    /// Moves the selected value by `share` of its range, stopping at the bounds.
+    fn step(&mut self, share: f64) {
+        self.typing = None;
+        self.problem = None;
+        if let Some(row) = self.rows.get_mut(self.selected) {
+            row.value = (row.value + share * (row.high - row.low)).clamp(row.low, row.high);
+        }
+    }
+
+    /// Takes the typed value over; false if it is refused, with the reason in `problem`.
+    fn take_typed(&mut self) -> bool {
+        let (Some(input), Some(row)) = (&self.typing, self.rows.get_mut(self.selected)) else { return true };
+        self.problem = match input.value().trim().replace(',', ".").parse::<f64>() {
+            Ok(value) if (row.low..=row.high).contains(&value) => {
+                row.value = value;
+                self.typing = None;
+                None
+            }
+            Ok(value) => {
+                let (name, low, high, unit) = (&row.name, row.low, row.high, &row.unit);
+                Some(format!("{name} = {value} {unit} is outside {low} to {high} {unit}"))
+            }
+            Err(_) => Some(format!("`{}` is not a number", input.value())),
+        };
+        self.problem.is_none()
+    }
+
+    fn select(&mut self, selected: usize) {
+        if self.take_typed() {
+            self.selected = selected.min(self.rows.len().saturating_sub(1));
+        }
+    }
+}
+
+/// One key while the form is open.
+pub(super) fn key(model: &mut Model, key: Key, mut form: OverrideForm) -> Vec<Effect> {
+    match key.code() {
+        KeyCode::Esc if form.typing.is_some() => {
+            form.typing = None;
+            form.problem = None;
+        }
+        KeyCode::Esc => return cancelled(model, "nothing was changed"),
+        KeyCode::Enter => {
+            if form.take_typed() {
+                let changed = form.rows.iter().filter(|row| row.value != row.before);
+                let intents: Vec<OperatorRequest> = changed.map(intent).collect();
+                if intents.is_empty() {
+                    return cancelled(model, "nothing was changed");
+                }
+                return intents.into_iter().flat_map(|intent| request(model, intent)).collect();
+            }
+        }
+        // Queues the form's point with the gains that differ from the configuration.
+        _ if model.keymap.action(key) == Some(Action::QueuePoint) => {
+            if form.take_typed() {
+                let set = form.rows.iter().filter(|row| !row.gain || row.value != row.proposed);
+                let point = set.map(|row| (row.name.clone(), row.value)).collect();
+                return request(model, OperatorRequest::Enqueue(point));
+            }
+        }
+        KeyCode::Up => form.select(form.selected.saturating_sub(1)),
+        KeyCode::Down | KeyCode::Tab => form.select(form.selected + 1),
+        KeyCode::Left if form.typing.is_none() => form.step(-0.01),
+        KeyCode::Right if form.typing.is_none() => form.step(0.01),
+        KeyCode::PageDown => form.step(-0.1),
+        KeyCode::PageUp => form.step(0.1),
+        _ => {
+            // Only the characters of a number can be typed here.
+            let digit = matches!(key.typed(), Some('0'..='9' | '.' | ',' | '-' | '+' | 'e'));
+            if digit || form.typing.is_some() && key.typed().is_none() {
+                form.problem = None;
+                edit(form.typing.get_or_insert_default(), key);
+            }
+        }
+    }
+    model.override_row = form.selected;
+    model.dialog = Some(Dialog::Override(form));
+    Vec::new()
+}

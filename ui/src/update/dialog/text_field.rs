@@ -1,0 +1,108 @@
+//! Keys of the one-line text fields, and the effect of their text.
+
+use crossterm::event::KeyCode;
+use quadfrog::session::operator_request::OperatorRequest;
+use tui_input::{Input, InputRequest};
+
+use crate::keymap::Key;
+use crate::message::Effect;
+use crate::model::Model;
+use crate::model::dialog::{Dialog, Purpose};
+use crate::update::answer::{cancelled, request};
+
+pub(super) fn key(model: &mut Model, key: Key, purpose: Purpose, mut input: Input) -> Vec<Effect> {
+    let mut problem = None;
+    match key.code() {
+        KeyCode::Esc => return cancelled(model, "nothing was changed"),
+        KeyCode::Enter => match submit(model, purpose, input.value().trim()) {
+            Ok(effects) => return effects,
+            Err(reason) => problem = Some(reason),
+        },
+        // Space is STOP while the robot is armed, so a note needs another key for it.
+        KeyCode::Char('_')
+            if key.typed().is_some() && model.robot_needs_us() && matches!(purpose, Purpose::Note(_)) =>
+        {
+            input.handle(InputRequest::InsertChar(' '));
+        }
+        _ => edit(&mut input, key),
+    }
+    model.dialog = Some(Dialog::Field { purpose, input, problem });
+    Vec::new()
+}
+
+/// Carries out a field's text.
+///
+/// # Errors
+/// The reason when the text is refused.
+fn submit(model: &mut Model, purpose: Purpose, text: &str) -> Result<Vec<Effect>, String> {
+    let intent = match purpose {
+        Purpose::Note(trial) => OperatorRequest::Note { trial, text: text.to_owned() },
+        Purpose::HandValue(_) if text.is_empty() => OperatorRequest::HandValue(None),
+        Purpose::HandValue(_) => match text.replace(',', ".").parse::<f64>() {
+            Ok(value) if value.is_finite() => OperatorRequest::HandValue(Some(value)),
+            _ => return Err(format!("`{text}` is not a number")),
+        },
+        Purpose::Continue => OperatorRequest::Continue(count(text, "trials")?),
+        Purpose::Fix { parameter, value } => {
+            let trials = count(text, "trials")?;
+            let info = model.session.info.parameters.get(parameter).ok_or("there is no such parameter")?;
+            OperatorRequest::Fix { parameter: info.name.clone(), value, trials }
+        }
+        Purpose::Bounds { parameter } => bounds(model, parameter, text)?,
+        Purpose::ConfirmBest => OperatorRequest::ConfirmBest { repeats: count(text, "repeats")? },
+        Purpose::TrialNumber => {
+            let number = text.parse::<u32>().map_err(|_| format!("`{text}` is not the number of a trial"))?;
+            if !model.session.trials.records.contains_key(&number) {
+                return Err(format!("there is no trial {number}"));
+            }
+            model.trial_table.selected = Some(number);
+            return Ok(Vec::new());
+        }
+        Purpose::LogSearch => {
+            model.log_view.search = text.to_owned();
+            model.log_view.back = 0;
+            return Ok(Vec::new());
+        }
+    };
+    Ok(request(model, intent))
+}
+
+fn count(text: &str, things: &str) -> Result<u32, String> {
+    let number = text.parse().ok().filter(|number| (1..=1000).contains(number));
+    number.ok_or_else(|| format!("`{text}` is not a number of {things} from 1 to 1000"))
+}
+
+/// Bounds typed as `low..high`, checked as far as the screen can know; the session checks all of it again.
+fn bounds(model: &Model, parameter: usize, text: &str) -> Result<OperatorRequest, String> {
+    let info = model.session.info.parameters.get(parameter).ok_or("there is no such parameter")?;
+    let (name, unit) = (&info.name, &info.unit);
+    let number = |text: &str| text.trim().parse::<f64>().ok().filter(|value| value.is_finite());
+    let ends = text.split_once("..").and_then(|(low, high)| Some((number(low)?, number(high)?)));
+    let Some((low, high)) = ends else { return Err(format!("`{text}` is no range; write it as 50..120")) };
+    if low >= high {
+        return Err(format!("{low} is not below {high}"));
+    }
+    match model.session.searched(name) {
+        Some(p) if low < p.least || high > p.most => {
+            Err(format!("{name} may be searched from {} to {} {unit} (safety.toml)", p.least, p.most))
+        }
+        _ => Ok(OperatorRequest::NarrowBounds { parameter: name.clone(), low, high }),
+    }
+}
+
+/// Edits a line of text.
+pub(super) fn edit(input: &mut Input, key: Key) {
+    let request = match (key.typed(), key.code()) {
+        (Some(c), _) => InputRequest::InsertChar(c),
+        (None, KeyCode::Backspace) => InputRequest::DeletePrevChar,
+        (None, KeyCode::Delete) => InputRequest::DeleteNextChar,
+        (None, KeyCode::Left) => InputRequest::GoToPrevChar,
+        (None, KeyCode::Right) => InputRequest::GoToNextChar,
+        (None, KeyCode::Home) => InputRequest::GoToStart,
+        (None, KeyCode::End) => InputRequest::GoToEnd,
+        (None, KeyCode::Char('u')) => InputRequest::DeleteLine,
+        (None, KeyCode::Char('w')) => InputRequest::DeletePrevWord,
+        _ => return,
+    };
+    input.handle(request);
+}

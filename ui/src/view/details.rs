@@ -1,0 +1,75 @@
+//! All details of one trial, for their dialog.
+//!
+//! ```text
+//! verdict        accept
+//! value          0.6420 m, reported to the optimizer
+//! f0             1.24300 Hz  (0.75 to 1.75)
+//! ```
+
+use quadfrog::trial::TrialRecord;
+
+use super::draw::clock;
+use super::points;
+use crate::model::session::SessionModel;
+use crate::theme::Theme;
+
+/// All details of one trial: names and values.
+pub fn details(session: &SessionModel, theme: &Theme, trial: &TrialRecord) -> Vec<(String, String)> {
+    let unit = &session.info.unit;
+    let mut rows: Vec<(String, String)> = Vec::new();
+    let mut row = |name: &str, value: String| rows.push((name.to_owned(), value));
+    let verdict = trial.verdict.map_or("not judged".to_owned(), |verdict| verdict.name().to_owned());
+    row("verdict", verdict);
+    if let Some(suggested) = trial.suggested {
+        let cause = if trial.cause.is_empty() { String::new() } else { format!(": {}", trial.cause) };
+        row("suggested", format!("{}{cause}", suggested.name()));
+    }
+    row(
+        "value",
+        trial.value.map_or("none".to_owned(), |value| format!("{value:.4} {unit}, reported to the optimizer")),
+    );
+    if let Some(value) = trial.hand_value {
+        row("by hand", format!("{value:.4} {unit}"));
+    }
+    if let Some(value) = session.measured_objective(trial) {
+        row("measured", format!("{value:.4} {unit}"));
+    }
+    let source = trial.parent.map_or(String::new(), |parent| format!(" of trial {parent}"));
+    row("source", format!("{}{source}", trial.source.name()));
+    row("attempt", session.trials.attempt(trial).to_string());
+    if let Some(repeats) = points::repeats_of(session, theme, trial.trial) {
+        row("repeats", repeats);
+    }
+    if let Some(ran) = session.trials.ran.get(&trial.trial) {
+        let took = ran.ended_ns.map_or("still runs".to_owned(), |ended| {
+            format!("took {:.1} s", ended.saturating_sub(ran.begun_ns) as f64 / 1e9)
+        });
+        row("ran", format!("at {} of the session, {took}", clock(ran.begun_ns)));
+    }
+    for (name, value) in &trial.parameters {
+        let info = session.parameter(name);
+        let unit = info.as_ref().map_or("", |info| info.unit.as_str());
+        let bounds = info.as_ref().map_or(String::new(), |info| format!("  ({} to {})", info.low, info.high));
+        row(name, format!("{value:.5} {unit}{bounds}"));
+    }
+    if !trial.gains.is_empty() {
+        let gain = |(name, value): &(String, f64)| format!("{name} {value}");
+        row("gains", trial.gains.iter().map(gain).collect::<Vec<_>>().join(", "));
+    }
+    if let Some(m) = trial.measured {
+        row("displacement", format!("{:+.4} m forward, {:+.4} m left", m.dx_m, m.dy_m));
+        row("turn", format!("{:+.4} rad", m.dyaw_rad));
+        row("rise, air", format!("{:.4} m, {:.3} s", m.apex_m, m.air_s));
+    }
+    if let Some(risk) = trial.risk.filter(|risk| risk.neighbours > 0) {
+        let nearest = match (risk.nearest_fall_trial, risk.nearest_fall) {
+            (Some(trial), Some(distance)) => format!("; nearest fall #{trial}, normalised distance {distance:.3}"),
+            _ => String::new(),
+        };
+        row("risk before", format!("{} of the {} nearest fell{nearest}", risk.falls, risk.neighbours));
+    }
+    if !trial.note.is_empty() {
+        row("note", trial.note.clone());
+    }
+    rows
+}

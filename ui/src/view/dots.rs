@@ -1,0 +1,91 @@
+//! A grid of dots within characters: braille, or one dot in a character.
+
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+use ratatui::style::Style;
+
+use crate::theme::Glyphs;
+
+/// Dots in a character: across and down.
+fn resolution(glyphs: Glyphs) -> (usize, usize) {
+    match glyphs {
+        Glyphs::Braille => (2, 4),
+        Glyphs::Dots | Glyphs::Ascii => (1, 3),
+    }
+}
+
+/// The character with these dots set (`dots[x][y]`, from the top).
+fn character(glyphs: Glyphs, dots: &[[bool; 4]; 2]) -> char {
+    // Unicode 16, Braille Patterns: bits of the dots 1-8, by column and row.
+    const BRAILLE: [[u32; 4]; 2] = [[0x01, 0x02, 0x04, 0x40], [0x08, 0x10, 0x20, 0x80]];
+    if glyphs == Glyphs::Braille {
+        let mut bits = 0;
+        for x in 0..2 {
+            for y in 0..4 {
+                bits |= if dots[x][y] { BRAILLE[x][y] } else { 0 };
+            }
+        }
+        return char::from_u32(0x2800 + bits).unwrap_or(' ');
+    }
+    let (middle, several) = if glyphs == Glyphs::Dots { ('·', ':') } else { ('-', '|') };
+    match dots[0] {
+        [true, false, false, _] => '\'',
+        [false, true, false, _] => middle,
+        [false, false, true, _] => '.',
+        _ => several,
+    }
+}
+
+/// A grid of dots over an area.
+pub struct DotGrid {
+    glyphs: Glyphs,
+    /// Dots across and down.
+    pub size: (usize, usize),
+    set: Vec<bool>,
+}
+
+impl DotGrid {
+    /// An empty grid.
+    pub fn new(area: Rect, glyphs: Glyphs) -> DotGrid {
+        let (across, down) = resolution(glyphs);
+        let size = (usize::from(area.width) * across, usize::from(area.height) * down);
+        DotGrid { glyphs, size, set: vec![false; size.0 * size.1] }
+    }
+
+    /// Sets a dot; outside of the grid nothing happens.
+    pub fn set(&mut self, x: i64, y: i64) {
+        let (Ok(x), Ok(y)) = (usize::try_from(x), usize::try_from(y)) else { return };
+        if x < self.size.0 && y < self.size.1 {
+            self.set[y * self.size.0 + x] = true;
+        }
+    }
+
+    /// A straight line of dots (in steps along the longer side).
+    pub fn line(&mut self, (x0, y0): (f64, f64), (x1, y1): (f64, f64)) {
+        let steps = (x1 - x0).abs().max((y1 - y0).abs()).ceil().clamp(1.0, 4096.0) as usize;
+        for i in 0..=steps {
+            let s = i as f64 / steps as f64;
+            self.set((x0 + s * (x1 - x0)).round() as i64, (y0 + s * (y1 - y0)).round() as i64);
+        }
+    }
+
+    /// Draws the characters that have dots; the others keep what lies below.
+    pub fn draw(&self, buffer: &mut Buffer, area: Rect, style: Style) {
+        let (across, down) = resolution(self.glyphs);
+        for row in 0..usize::from(area.height) {
+            for column in 0..usize::from(area.width) {
+                let mut dots = [[false; 4]; 2];
+                let mut any = false;
+                for (x, dots) in dots.iter_mut().enumerate().take(across) {
+                    for (y, dot) in dots.iter_mut().enumerate().take(down) {
+                        *dot = self.set[(row * down + y) * self.size.0 + column * across + x];
+                        any |= *dot;
+                    }
+                }
+                if any && let Some(cell) = buffer.cell_mut((area.x + column as u16, area.y + row as u16)) {
+                    cell.set_char(character(self.glyphs, &dots)).set_style(style);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,88 @@
+//! Parts that several panels draw, and the formats of numbers and times.
+
+use quadfrog::trial::Verdict;
+use ratatui::Frame;
+use ratatui::layout::{Constraint, Layout, Rect};
+use ratatui::text::{Line, Span};
+
+use crate::theme::{Role, Theme};
+
+/// Text in a role's style.
+pub fn span(theme: &Theme, role: Role, text: impl Into<String>) -> Span<'static> {
+    Span::styled(text.into(), theme.style(role))
+}
+
+/// A heading with a line to the right edge; returns the area below it.
+pub fn heading(frame: &mut Frame, area: Rect, theme: &Theme, title: &str, aside: &str) -> Rect {
+    let [top, rest] = Layout::vertical([Constraint::Length(1), Constraint::Fill(1)]).areas(area);
+    // Where there is no room for both, the title stays.
+    let aside = if title.chars().count() + aside.chars().count() + 4 > usize::from(area.width) { "" } else { aside };
+    let used = title.chars().count() + aside.chars().count() + 2 + usize::from(!aside.is_empty());
+    let fill = theme.line().repeat(usize::from(area.width).saturating_sub(used));
+    let mut spans = vec![span(theme, Role::Heading, title), Span::raw(" "), span(theme, Role::Quiet, fill)];
+    if !aside.is_empty() {
+        spans.extend([Span::raw(" "), span(theme, Role::Quiet, aside)]);
+    }
+    frame.render_widget(Line::from(spans), top);
+    rest
+}
+
+/// A number with four significant digits, as far as they fit: 1.243, 18.20, 118.2, 1240.
+pub fn number(value: f64) -> String {
+    match value.abs() {
+        _ if !value.is_finite() => "-".to_owned(),
+        size if size >= 1000.0 => format!("{value:.0}"),
+        size if size >= 100.0 => format!("{value:.1}"),
+        size if size >= 10.0 => format!("{value:.2}"),
+        _ => format!("{value:.3}"),
+    }
+}
+
+/// Hours, minutes and seconds of a time in ns; hours only where there are any.
+pub fn clock(time_ns: u64) -> String {
+    let seconds = time_ns / 1_000_000_000;
+    let (h, m, s) = (seconds / 3600, seconds / 60 % 60, seconds % 60);
+    if h > 0 { format!("{h}:{m:02}:{s:02}") } else { format!("{m:02}:{s:02}") }
+}
+
+/// As [`clock`], with milliseconds.
+pub fn clock_ms(time_ns: u64) -> String {
+    format!("{}.{:03}", clock(time_ns), time_ns / 1_000_000 % 1000)
+}
+
+/// The text cut to a number of characters, ending in `..` where something is missing.
+pub fn cut(text: &str, width: usize) -> String {
+    if text.chars().count() <= width {
+        return text.to_owned();
+    }
+    let mut short: String = text.chars().take(width.saturating_sub(2)).collect();
+    short.push_str("..");
+    short
+}
+
+/// The sign of a verdict: on charts and in tables, with or without colours.
+pub fn sign(verdict: Option<Verdict>) -> (&'static str, Role) {
+    match verdict {
+        Some(Verdict::Accept) => ("o", Role::Good),
+        Some(Verdict::Fall) => ("x", Role::Bad),
+        Some(Verdict::Void) => ("v", Role::Quiet),
+        None => ("?", Role::Warning),
+    }
+}
+
+/// A share of a limit as a bar; beyond nine tenths it warns.
+pub fn bar(theme: &Theme, share: f64, width: usize) -> [Span<'static>; 2] {
+    let size = if share.is_finite() { share.abs().min(1.0) } else { 1.0 };
+    let filled = (size * width as f64).round() as usize;
+    let (full, empty) = theme.fill();
+    let role = if size >= 0.9 { Role::Warning } else { Role::SeriesA };
+    [span(theme, role, full.repeat(filled)), span(theme, Role::Quiet, empty.repeat(width - filled))]
+}
+
+/// The place of a value between two bounds: `[---o------]`.
+pub fn scale(theme: &Theme, value: f64, low: f64, high: f64, width: usize) -> String {
+    let inner = width.saturating_sub(2).max(1);
+    let share = if high > low { ((value - low) / (high - low)).clamp(0.0, 1.0) } else { 0.5 };
+    let at = (share * (inner - 1) as f64).round() as usize;
+    format!("[{}o{}]", theme.line().repeat(at), theme.line().repeat(inner - 1 - at))
+}
