@@ -5,8 +5,9 @@ mod support;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use quadfrog::control::force_profile::amplitudes_leg;
 use quadfrog::control::leg::{self, LegTarget};
-use quadfrog::robot::Joints;
 use quadfrog::robot::kinematics::LegGeometry;
+use quadfrog::robot::{Joints, PerLeg};
+use quadfrog::telemetry::Estimate;
 use quadfrog::trial::{Gains, JumpParameters, Task};
 use serde::Deserialize;
 
@@ -57,13 +58,16 @@ fn golden_controller() {
             gains: Gains { kp: 400.0, kd: 8.0, kd_joint: 0.8, k_att: 200.0 },
             stance_leg: Vector3::new(0.0, 0.14, -0.25),
             vmc: case.vmc,
+            attitude_rate_gain: 0.0,
+            foot_offset_leg: PerLeg::default(),
             amplitudes_leg: amplitudes_leg(&jump, task),
             theta_rad: case.theta_rad,
         };
         let [w, x, y, z] = case.base_quat_wxyz;
         let orientation = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
+        let estimate = Estimate { world_from_body: orientation, contact: case.contact, ..Estimate::default() };
         let feet = leg::feet(&geometry, &case.joint_q);
-        let torques = leg::torques(&target, &feet, &case.joint_v, &orientation, &case.contact);
+        let torques = leg::torques(&target, &feet, &case.joint_v, &estimate);
         for (joint, (torque_nm, expected)) in torques.iter().zip(&case.expect.torque_unclamped_nm).enumerate() {
             torque.see(torque_nm - expected, || format!("case {number} joint {joint}"));
         }

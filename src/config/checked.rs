@@ -224,7 +224,12 @@ impl Config {
             // A folded leg rests on its mechanical stop, beyond the limit of the commanded positions.
             lying_position: std::array::from_fn(|i| robot.lying_position[i].clamp(min_position[i], max_position[i])),
             weight_n: robot.total_mass() * GRAVITY,
-            stand: StandSettings { gains: chosen.gains(), stance_leg: chosen.stance_leg(), vmc: chosen.vmc },
+            stand: StandSettings {
+                gains: chosen.gains(),
+                stance_leg: chosen.stance_leg(),
+                vmc: chosen.vmc,
+                attitude_rate_gain: chosen.attitude_rate_gain,
+            },
             stand_up: self.control.stand_up,
             sit_down: self.control.sit_down,
             countdown_s: if hardware { self.control.countdown.hardware_s } else { self.control.countdown.simulator_s },

@@ -14,6 +14,11 @@ const IDLE_TIME: NumberRange =
 const FACTOR: NumberRange =
     NumberRange { allows: |v| v >= 1.0, text: "must be 1 or more: below 1 it trips on allowed values" };
 const COUNTDOWN: NumberRange = NumberRange { allows: |v| (0.0..=60.0).contains(&v), text: "must be 0 to 60 s" };
+/// At 1 rad/s the force is then half of that of the stiffness at a tilt of 1 rad.
+const ATTITUDE_RATE_GAIN: NumberRange =
+    NumberRange { allows: |v| (0.0..=100.0).contains(&v), text: "must be 0 to 100 N s/m" };
+/// At 1 m/s the foot is then placed 0.3 m ahead, the end of the leg's reach.
+const FOOT_PLACEMENT: NumberRange = NumberRange { allows: |v| (0.0..=0.3).contains(&v), text: "must be 0 to 0.3 s" };
 const JUMPS: NumberRange = NumberRange { allows: |v| (1.0..=100.0).contains(&v), text: "must be 1 to 100 jumps" };
 const PRIORITY: NumberRange =
     NumberRange { allows: |v| (0.0..=99.0).contains(&v), text: "must be 1 to 99, or 0 to request none" };
@@ -26,6 +31,8 @@ const CONFIDENCE: NumberRange = NumberRange { allows: |v| v > 0.5 && v < 1.0, te
 const CONTROL: &[Row] = &[
     (&["countdown.simulator_s"], COUNTDOWN),
     (&["tasks.*.jumps"], JUMPS),
+    (&["tasks.*.attitude_rate_gain"], ATTITUDE_RATE_GAIN),
+    (&["tasks.*.foot_placement_s"], FOOT_PLACEMENT),
     (&["tasks.*.f1_hz"], NOT_NEGATIVE),
     (&["realtime.hardware_priority", "realtime.simulator_priority"], PRIORITY),
     (&["realtime.core"], CORE),

@@ -1,10 +1,12 @@
 //! The leg controller: sum of force profile, impedance and Virtual Model Control (paper, last equation of section II-C).
 
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::Vector3;
 
+use super::vmc::VmcGains;
 use super::{force_profile, impedance, vmc};
 use crate::robot::kinematics::{FootPosition, LegGeometry};
 use crate::robot::{Joints, Leg, PerLeg, leg_of};
+use crate::telemetry::Estimate;
 use crate::trial::Gains;
 
 /// Target of the legs in one tick.
@@ -16,6 +18,10 @@ pub struct LegTarget {
     pub stance_leg: Vector3<f64>,
     /// Whether Virtual Model Control acts.
     pub vmc: bool,
+    /// Damping of Virtual Model Control, N s/m; acts only where `vmc` does.
+    pub attitude_rate_gain: f64,
+    /// Shift of each leg's nominal foot position, leg frame, m; zero for legs that are not in swing.
+    pub foot_offset_leg: PerLeg<Vector3<f64>>,
     /// Signed force amplitudes per leg, leg frame, N; zero outside an impulse.
     pub amplitudes_leg: PerLeg<Vector3<f64>>,
     /// Phase of the oscillator, rad.
@@ -32,16 +38,20 @@ pub fn torques(
     target: &LegTarget,
     feet: &PerLeg<FootPosition>,
     joint_velocity: &Joints,
-    world_from_body: &UnitQuaternion<f64>,
-    contact: &PerLeg<bool>,
+    estimate: &Estimate,
 ) -> Joints {
-    let k_att = if target.vmc { target.gains.k_att } else { 0.0 };
-    let vmc_z = vmc::forces_leg_z(k_att, world_from_body, contact);
+    let vmc_gains = if target.vmc {
+        VmcGains { attitude: target.gains.k_att, attitude_rate: target.attitude_rate_gain }
+    } else {
+        VmcGains { attitude: 0.0, attitude_rate: 0.0 }
+    };
+    let vmc_z =
+        vmc::forces_leg_z(vmc_gains, &estimate.world_from_body, &estimate.angular_velocity_body, &estimate.contact);
     let mut torques = Joints::default();
     for leg in Leg::ALL {
         let i = leg as usize;
         let dq = leg_of(joint_velocity, i);
-        let desired = leg.mirrored(&target.stance_leg);
+        let desired = leg.mirrored(&target.stance_leg) + target.foot_offset_leg[i];
         let mut force = impedance::force_leg(&target.gains, &desired, &feet[i], &dq);
         force += force_profile::force_leg(&target.amplitudes_leg[i], target.theta_rad);
         force.z += vmc_z[i];

@@ -5,6 +5,7 @@ pub mod control_loop;
 pub mod cycle;
 pub mod estimator;
 pub mod failsafe;
+pub mod foot_placement;
 pub mod force_profile;
 pub mod impedance;
 pub mod leg;

@@ -1,5 +1,6 @@
 //! One trial: countdown, impulse, flight, landing, settle. Its settings are latched when it begins.
 
+use super::foot_placement::{SHORTEST_FLIGHT_S, SwingLegs};
 use super::force_profile::{Oscillator, amplitudes_leg};
 use super::leg::LegTarget;
 use super::limits::ticks;
@@ -30,8 +31,7 @@ pub struct RunningTrial {
     /// Ticks since the trial began; the oscillator enters pi at `countdown`.
     elapsed: u32,
     countdown: u32,
-    /// Ticks without any foot on the ground since the last one.
-    airborne: u32,
+    swing: SwingLegs,
     /// Whether the robot has flown and touched down since the last impulse.
     flown: bool,
     /// Ticks since the touchdown after the last impulse.
@@ -41,8 +41,6 @@ pub struct RunningTrial {
     fall: FallWatch,
 }
 
-/// Shortest time without any foot on the ground that counts as a flight, s.
-const SHORTEST_FLIGHT_S: f64 = 0.02;
 /// An impulse without take-off within this time counts as landed, s.
 const LATEST_TAKEOFF_S: f64 = 0.1;
 
@@ -58,7 +56,7 @@ impl RunningTrial {
             amplitudes_leg: amplitudes_leg(&spec.jump, spec.task),
             elapsed: 0,
             countdown: ticks(settings.countdown_s),
-            airborne: 0,
+            swing: SwingLegs::default(),
             flown: false,
             landed: 0,
             quiet: 0,
@@ -109,11 +107,16 @@ impl RunningTrial {
     }
 
     /// Target of the legs in this tick.
-    pub fn target(&self) -> LegTarget {
+    pub fn target(&self, estimate: &Estimate) -> LegTarget {
         LegTarget {
             gains: self.spec.gains,
             stance_leg: self.spec.stance_leg,
             vmc: self.spec.vmc,
+            attitude_rate_gain: self.spec.attitude_rate_gain,
+            foot_offset_leg: self.swing.offsets_leg(
+                self.spec.foot_placement_s,
+                &estimate.world_from_body.inverse_transform_vector(&estimate.velocity_world),
+            ),
             amplitudes_leg: self.amplitudes_leg,
             theta_rad: self.theta_rad(),
         }
@@ -129,12 +132,8 @@ impl RunningTrial {
             return TrialProgress::Countdown;
         }
         let feet_down = estimate.contact.iter().filter(|&&down| down).count();
-        if feet_down == 0 {
-            self.airborne += 1;
-        } else {
-            self.flown |= self.airborne >= ticks(SHORTEST_FLIGHT_S);
-            self.airborne = 0;
-        }
+        self.flown |= feet_down > 0 && self.swing.airborne_ticks() >= ticks(SHORTEST_FLIGHT_S);
+        self.swing.observe(&estimate.contact);
         let impulse = self.theta_rad() >= std::f64::consts::PI;
         if impulse {
             self.flown = false;
@@ -149,7 +148,7 @@ impl RunningTrial {
         if since_impulse_s < 0.0 {
             return TrialProgress::Jump;
         }
-        let stayed = self.airborne == 0 && since_impulse_s > LATEST_TAKEOFF_S;
+        let stayed = self.swing.airborne_ticks() == 0 && since_impulse_s > LATEST_TAKEOFF_S;
         if !self.flown && !stayed && since_impulse_s < settings.settle.cap_s {
             return TrialProgress::Jump;
         }

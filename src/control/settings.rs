@@ -18,6 +18,8 @@ pub struct StandSettings {
     pub stance_leg: Vector3<f64>,
     /// Whether Virtual Model Control acts.
     pub vmc: bool,
+    /// Damping of Virtual Model Control, N s/m.
+    pub attitude_rate_gain: f64,
 }
 
 /// Standing up and sitting down: a ramp of joint targets from the measured pose.
@@ -251,6 +253,10 @@ pub struct TaskControl {
     pub stance_m: [f64; 3],
     /// Virtual Model Control on or off.
     pub vmc: bool,
+    /// Damping of Virtual Model Control, N s/m; zero in the paper.
+    pub attitude_rate_gain: f64,
+    /// Time T of the foot placement, s: a swing foot is placed T times the trunk's velocity ahead; zero in the paper.
+    pub foot_placement_s: f64,
     /// Jumps in a row.
     pub jumps: u32,
     /// Frequency between impulses, Hz.
@@ -277,6 +283,8 @@ impl TaskControl {
             gains: self.gains(),
             stance_leg: self.stance_leg(),
             vmc: self.vmc,
+            attitude_rate_gain: self.attitude_rate_gain,
+            foot_placement_s: self.foot_placement_s,
             jumps: self.jumps,
             seed: 0,
         }

@@ -2,6 +2,7 @@
 
 pub mod arming_checklist;
 pub mod automatic;
+pub mod evaluation;
 pub mod experiment;
 pub mod objective;
 pub mod operator_request;

@@ -19,6 +19,10 @@ pub struct TrialSpec {
     pub stance_leg: Vector3<f64>,
     /// Whether Virtual Model Control is on.
     pub vmc: bool,
+    /// Damping of Virtual Model Control, N s/m.
+    pub attitude_rate_gain: f64,
+    /// Time of the foot placement, s.
+    pub foot_placement_s: f64,
     /// Jumps in a row; 1 for a single jump.
     pub jumps: u32,
     /// Seed of the simulator's random numbers.

@@ -42,6 +42,8 @@ pub fn plan(budget: u32) -> ExperimentPlan {
             k_att: 200.0,
             stance_m: [0.0, 0.14, -0.25],
             vmc: true,
+            attitude_rate_gain: 0.0,
+            foot_placement_s: 0.0,
             jumps: 1,
             f1_hz: 0.0,
         },

@@ -327,7 +327,7 @@ impl Cycle {
         match (self.mode, &mut self.ramp, &self.jump) {
             (Mode::StandUp | Mode::SitDown, Some(ramp), _) => ramp.command(),
             (Mode::Countdown | Mode::Jump | Mode::Settle, _, Some(jump)) => {
-                let target = jump.target();
+                let target = jump.target(&self.tick.estimate);
                 self.legs(&target)
             }
             (Mode::Ready | Mode::Review, _, _) => {
@@ -336,6 +336,8 @@ impl Cycle {
                     gains: stand.gains,
                     stance_leg: stand.stance_leg,
                     vmc: stand.vmc,
+                    attitude_rate_gain: stand.attitude_rate_gain,
+                    foot_offset_leg: [Vector3::zeros(); LEGS],
                     amplitudes_leg: [Vector3::zeros(); LEGS],
                     theta_rad: 0.0,
                 })
@@ -346,8 +348,7 @@ impl Cycle {
 
     fn legs(&mut self, target: &LegTarget) -> JointCommand {
         let (state, estimate) = (&self.tick.state, &self.tick.estimate);
-        let torques =
-            leg::torques(target, &self.feet, &state.joint_velocity, &estimate.world_from_body, &estimate.contact);
+        let torques = leg::torques(target, &self.feet, &state.joint_velocity, estimate);
         self.tick.torque_demanded = torques;
         JointCommand::torques(&torques)
     }

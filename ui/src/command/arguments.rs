@@ -105,3 +105,28 @@ impl StudyArguments {
         folders.find(|folder| !folder.exists()).unwrap_or_else(|| self.output.join(&name))
     }
 }
+
+/// Seeds of the command line.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Seeds(pub Vec<u32>);
+
+/// Parses seeds: 7, 0-4 or 0,3,7.
+pub fn parse_seeds(text: &str) -> Result<Seeds, String> {
+    let number = |text: &str| {
+        text.trim().parse::<u32>().map_err(|_| format!("`{text}` is not a whole number from 0 to 4294967295"))
+    };
+    let mut seeds = Vec::new();
+    for part in text.split(',') {
+        match part.split_once('-') {
+            Some((first, last)) => {
+                let (first, last) = (number(first)?, number(last)?);
+                if last < first || last - first >= 10_000 {
+                    return Err(format!("`{part}` is not a range of at most 10000 seeds; write it as 0-4"));
+                }
+                seeds.extend(first..=last);
+            }
+            None => seeds.push(number(part)?),
+        }
+    }
+    Ok(Seeds(seeds))
+}

@@ -5,6 +5,7 @@ mod bench;
 mod console;
 mod doctor;
 mod emulate;
+mod evaluate;
 mod failure;
 mod guard;
 mod optimize;
@@ -33,6 +34,8 @@ pub struct Arguments {
 enum Subcommands {
     /// Run a complete study on the simulator without a screen
     Optimize(optimize::OptimizeArguments),
+    /// Run one point over several seeds on the simulator: falls, value, attitude
+    Evaluate(evaluate::EvaluateArguments),
     /// Play a recorded session in the console's panels
     Replay(replay::ReplayArguments),
     /// Repair an incomplete recording
@@ -54,6 +57,7 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
     match arguments.command {
         None => console::run(&arguments.console),
         Some(Subcommands::Optimize(optimize)) => optimize::run(&optimize),
+        Some(Subcommands::Evaluate(evaluate)) => evaluate::run(&evaluate),
         Some(Subcommands::Replay(replay)) => replay::run(&replay),
         Some(Subcommands::Recover(recover)) => recover::run(&recover),
         Some(Subcommands::Emulate(emulate)) => emulate::run(&emulate),

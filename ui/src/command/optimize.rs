@@ -24,7 +24,7 @@ use quadfrog::trial::{Approval, Backend, Task, TrialRecord, Verdict};
 
 use printer::Printer;
 
-use super::arguments::{self, StudyArguments};
+use super::arguments::{self, Seeds, StudyArguments, parse_seeds};
 use super::failure::Failure;
 use super::selection::{SelectedStudy, parse_storage, study_to_continue, study_to_join};
 
@@ -73,29 +73,6 @@ impl OptimizeArguments {
         let seeds = self.seed.as_ref().map_or(&[][..], |seeds| &seeds.0);
         if seeds.len() > 1 { Err(Failure::input(message)) } else { Ok(seeds.first().copied()) }
     }
-}
-
-#[derive(Debug, Clone, PartialEq, Eq)]
-struct Seeds(Vec<u32>);
-
-fn parse_seeds(text: &str) -> Result<Seeds, String> {
-    let number = |text: &str| {
-        text.trim().parse::<u32>().map_err(|_| format!("`{text}` is not a whole number from 0 to 4294967295"))
-    };
-    let mut seeds = Vec::new();
-    for part in text.split(',') {
-        match part.split_once('-') {
-            Some((first, last)) => {
-                let (first, last) = (number(first)?, number(last)?);
-                if last < first || last - first >= 10_000 {
-                    return Err(format!("`{part}` is not a range of at most 10000 seeds; write it as 0-4"));
-                }
-                seeds.extend(first..=last);
-            }
-            None => seeds.push(number(part)?),
-        }
-    }
-    Ok(Seeds(seeds))
 }
 
 pub fn run(arguments: &OptimizeArguments) -> Result<(), Failure> {

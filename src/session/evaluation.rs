@@ -1,0 +1,87 @@
+//! One point of a task over several seeds: falls with cause and time, value, attitude. Simulated time, no study.
+
+use nalgebra::Vector3;
+
+use super::objective;
+use super::rollout::Rollout;
+use crate::control::force_profile::Oscillator;
+use crate::robot::Robot;
+use crate::telemetry::{Phase, Tick, TrialEnd, TrialSpec};
+use crate::trial::{JumpParameters, MeasuredJump};
+
+/// Result of one run of a point.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EvaluatedRun {
+    /// Seed of sensor noise and terrain.
+    pub seed: u64,
+    /// End of the run.
+    pub end: TrialEnd,
+    /// Time of the fall since the first impulse began, s; none without a fall.
+    pub fall_time_s: Option<f64>,
+    /// Impulses that ended before the run did.
+    pub jumps: u32,
+    /// Displacement, turn, rise and time in the air of the whole run; none if it ended before the first impulse.
+    pub measured: Option<MeasuredJump>,
+    /// Objective per jump, in the task's unit; 0 unless the robot stands at the end.
+    pub value: f64,
+    /// Mean angle between the trunk's and the world's z axis at the starts of the impulses, rad.
+    pub tilt_at_impulse_rad: f64,
+    /// Difference of the largest and the smallest roll from the first impulse on, rad.
+    pub roll_range_rad: f64,
+    /// The same of pitch, rad.
+    pub pitch_range_rad: f64,
+}
+
+impl EvaluatedRun {
+    /// Whether the robot stands still at the end.
+    pub fn stood(&self) -> bool {
+        self.end == TrialEnd::Settled
+    }
+}
+
+/// Returns the number of impulses that begin within `duration_s`, at least one.
+pub fn jumps_within(jump: &JumpParameters, duration_s: f64) -> u32 {
+    let oscillator = Oscillator { f0_hz: jump.f0_hz, f1_hz: jump.f1_hz };
+    ((duration_s / oscillator.period_s()).ceil() as u32).max(1)
+}
+
+/// Runs one trial and evaluates its ticks.
+pub fn evaluate<R: Robot>(rollout: &mut Rollout<R>, spec: &TrialSpec) -> EvaluatedRun {
+    let (end, ticks) = rollout.run(spec);
+    let begun = ticks.iter().position(|tick| tick.trial_time_s >= 0.0).unwrap_or(ticks.len());
+    let ticks = &ticks[begun..];
+    let measured = objective::measure(ticks);
+    let range = |axis: usize| {
+        let angles = ticks.iter().map(|tick| tick.estimate.roll_pitch_yaw[axis]);
+        angles.clone().fold(f64::NEG_INFINITY, f64::max) - angles.fold(f64::INFINITY, f64::min)
+    };
+    let starts: Vec<f64> = impulse_edges(ticks, true).map(|tick| tilt_rad(tick)).collect();
+    let value = measured.as_ref().map(|measured| objective::value(spec.task, measured, spec.jumps));
+    EvaluatedRun {
+        seed: spec.seed,
+        fall_time_s: matches!(end, TrialEnd::Fell(_)).then(|| ticks.last().map_or(0.0, |tick| tick.trial_time_s)),
+        jumps: impulse_edges(ticks, false).count() as u32,
+        value: value.filter(|_| end == TrialEnd::Settled).unwrap_or(0.0),
+        measured,
+        tilt_at_impulse_rad: starts.iter().sum::<f64>() / starts.len().max(1) as f64,
+        roll_range_rad: if ticks.is_empty() { 0.0 } else { range(0) },
+        pitch_range_rad: if ticks.is_empty() { 0.0 } else { range(1) },
+        end,
+    }
+}
+
+/// Returns the first ticks of the impulses, or the first ticks after them.
+fn impulse_edges(ticks: &[Tick], rising: bool) -> impl Iterator<Item = &Tick> {
+    let mut before = false;
+    ticks.iter().filter(move |tick| {
+        let impulse = tick.phase == Phase::Impulse;
+        let edge = impulse != before && impulse == rising;
+        before = impulse;
+        edge
+    })
+}
+
+fn tilt_rad(tick: &Tick) -> f64 {
+    let up_world = tick.estimate.world_from_body * Vector3::z();
+    up_world.z.clamp(-1.0, 1.0).acos()
+}
