@@ -38,7 +38,6 @@ const CONSOLE: [&[&str]; 9] = [
     &["command"],
 ];
 
-/// Longest source file, lines.
 const LONGEST_FILE: usize = 500;
 
 /// Folders at the beginning of a cited path.
@@ -144,7 +143,6 @@ struct Module {
     items: BTreeSet<String>,
     /// Paths of more than one name.
     paths: Vec<Vec<String>>,
-    /// Names of its public types.
     types: Vec<String>,
 }
 
@@ -301,7 +299,6 @@ impl Package {
         None
     }
 
-    /// The modules that each module uses.
     fn graph(&self) -> BTreeMap<&[String], BTreeSet<Vec<String>>> {
         let uses = |(path, module): (&Vec<String>, &Module)| {
             let named = module.used.iter().chain(&module.paths);
@@ -478,7 +475,6 @@ fn the_engine_depends_on_no_terminal() {
     }
 }
 
-/// `unsafe` is in `src/realtime` alone.
 #[test]
 fn unsafe_code_is_in_realtime_alone() {
     let outside = |file: &PathBuf| !file.starts_with(root().join("src/realtime"));

@@ -88,7 +88,6 @@ fn file(folder: &Path, name: &str, bytes: &[u8]) -> PathBuf {
     path
 }
 
-/// Plays a file: its session and what follows.
 fn play_damaged(path: &Path) -> Result<(Vec<Played>, Option<String>), RecordingError> {
     let mut player = Player::open(path)?;
     let mut played: Vec<_> = player.by_ref().collect();

@@ -39,7 +39,6 @@ fn record(writer: Option<Writer>, ticks: &[Tick], records: &[Stamped]) -> (Recor
     (handle, trials.collect())
 }
 
-/// Returns the trials of the ticks.
 fn trials_of(ticks: &[Tick]) -> Vec<TrialTicks> {
     let runs = ticks.chunk_by(|a, b| a.trial == b.trial);
     runs.filter_map(|run| run[0].trial.map(|trial| TrialTicks { trial, ticks: run.to_vec() })).collect()

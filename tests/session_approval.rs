@@ -36,7 +36,6 @@ impl Screen {
         }
     }
 
-    /// Runs for a while.
     fn pass(&mut self, time: Duration) {
         let end = Instant::now() + time;
         while Instant::now() < end {

@@ -13,7 +13,6 @@ use quadfrog::telemetry::{FallCause, TrialEnd};
 use quadfrog::trial::{ExperimentStage, ProposalSource, Verdict};
 use support::{accept, approve, experiment, far, joined, open, parameters, run, study_in, ticks};
 
-/// Longer than any test.
 const PATIENT: Duration = Duration::from_secs(3600);
 
 #[test]
@@ -271,7 +270,6 @@ fn a_trial_with_lost_ticks_is_suggested_void() {
     assert!(row.cause.contains("39 ticks"), "{}", row.cause);
 }
 
-/// What the screen is shown and what the study holds are the same.
 #[test]
 fn the_records_tell_what_the_study_holds() {
     let folder = tempfile::tempdir().unwrap();

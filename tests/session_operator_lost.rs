@@ -87,7 +87,6 @@ impl Screen {
         })
     }
 
-    /// Stands, approves what is on the table, and flies.
     fn jump(&mut self) -> Proposal {
         self.until_mode(Mode::Disarmed);
         self.handle.request(OperatorRequest::Arm);

@@ -409,7 +409,6 @@ fn control_is_taken_only_once_a_screen_was_heard() {
     assert_eq!(session.body.mode(), Mode::Disarmed);
 }
 
-/// One thing that happens.
 #[derive(Debug, Clone, Copy)]
 enum Step {
     Request(fn() -> OperatorRequest),

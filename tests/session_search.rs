@@ -16,7 +16,6 @@ use quadfrog::trial::{
 };
 use support::{accept, approve, experiment, far, joined, open, plan, run, study_in, ticks};
 
-/// The newest records.
 #[derive(Default)]
 struct News {
     search: Option<SearchStatus>,

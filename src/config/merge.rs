@@ -10,7 +10,6 @@ use super::ConfigError;
 /// Origin of the values of a file, for messages.
 #[derive(Debug, Clone)]
 pub struct FileOrigin {
-    /// Path of the file.
     pub file: String,
     /// Line of every key that the file gave, by the key with its tables, joined by dots.
     pub lines: HashMap<String, usize>,

@@ -225,7 +225,6 @@ impl Container {
         }
     }
 
-    /// Returns the body of a record.
     pub fn read_record(&mut self, span: RecordSpan) -> Result<Vec<u8>, McapError> {
         self.read_at(span.offset + RECORD_HEAD, span.bytes)
     }

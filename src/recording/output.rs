@@ -181,7 +181,6 @@ impl Write for SharedSink {
     }
 }
 
-/// Returns the path with `suffix` appended to its name.
 pub fn with_suffix(path: &Path, suffix: &str) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
     name.push(suffix);

@@ -54,12 +54,10 @@ impl Topic {
     /// All topics; the place of one, plus 1, is its channel in files written here.
     pub const ALL: &'static [Topic] = Topic::VARIANTS;
 
-    /// Returns the name in the file.
     pub fn name(self) -> &'static str {
         self.into()
     }
 
-    /// Returns the topic of that name.
     pub fn from_name(name: &str) -> Option<Topic> {
         name.parse().ok()
     }
@@ -72,7 +70,6 @@ impl Topic {
         )
     }
 
-    /// Returns the schema of its messages.
     pub fn schema(self) -> Schema {
         let own = |name: &str| Schema::new(format!("frog.v1.{name}"), "protobuf", FROG_DESCRIPTORS);
         match self {

@@ -9,16 +9,12 @@ use crate::trial::ParameterValues;
 /// A message that does not match its schema.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum DecodeError {
-    /// Not protobuf, or not of this message.
     #[error("not a message of its schema: {0}")]
     Protobuf(#[from] prost::DecodeError),
-    /// A required part is missing.
     #[error("{0} is missing")]
     Missing(&'static str),
-    /// A number without a variant.
     #[error("{1} is no {0} that this version knows")]
     Unknown(&'static str, i32),
-    /// An array of the wrong length.
     #[error("{1} {0}: another number than this version expects")]
     Length(&'static str, usize),
 }
@@ -35,14 +31,12 @@ pub enum Way {
 /// Copies every field between our type and its message.
 pub type Fields<T, M> = fn(Way, &mut T, &mut M) -> Result<(), DecodeError>;
 
-/// Returns the message of `ours`.
 pub fn encoded<T: Clone, M: Default>(fields: Fields<T, M>, ours: &T) -> M {
     let mut message = M::default();
     fields(Way::Encode, &mut ours.clone(), &mut message).expect("encoding does not fail");
     message
 }
 
-/// Returns our type from its message.
 pub fn decoded<T: Default, M>(fields: Fields<T, M>, mut message: M) -> Result<T, DecodeError> {
     let mut ours = T::default();
     fields(Way::Decode, &mut ours, &mut message)?;

@@ -65,7 +65,6 @@ pub struct SupervisorParts {
     pub info: SessionInfo,
 }
 
-/// A trial that has ended.
 #[derive(Debug, Clone, Copy)]
 struct Ended {
     trial: u32,
@@ -89,16 +88,13 @@ pub struct Supervisor {
     mode_changes: u64,
     /// An observer's STOP was acknowledged: the release of the robot was commanded.
     releasing: bool,
-    /// The end of the session was commanded.
     leaving: bool,
     /// Reason that forbids the next trial, as it was logged last.
     inhibited: Option<String>,
     caution_ns: Option<u64>,
-    /// The trial that has ended, until its ticks have arrived.
     ended: Option<Ended>,
     measured: VecDeque<TrialTicks>,
     recorder_error: Option<String>,
-    /// The recorder's thread has ended.
     recorder_gone: bool,
     guard_lost: bool,
     observe: bool,

@@ -4,9 +4,7 @@ use toml::{Table, Value};
 
 /// Allowed numbers, all finite, and their description for the message.
 pub struct NumberRange {
-    /// Whether a finite number is allowed.
     pub allows: fn(f64) -> bool,
-    /// Description of the allowed numbers.
     pub text: &'static str,
 }
 

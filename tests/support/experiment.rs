@@ -91,7 +91,6 @@ pub fn ticks(trial: u32, dx_m: f64) -> Vec<Tick> {
         .to_vec()
 }
 
-/// Approves the proposal.
 pub fn approve(experiment: &mut Experiment) -> TrialSpec {
     let card = experiment.proposal().expect("a proposal");
     experiment.approve(card.trial, card.revision).unwrap()

@@ -16,7 +16,6 @@ use quadfrog::trial::*;
 /// Log time of engine time 0 in these tests: 2026-11-21 00:00 UTC.
 pub const START_UTC_NS: u64 = 1_795_219_200_000_000_000;
 
-/// One millisecond in ns.
 pub const MS: u64 = 1_000_000;
 
 /// Values drawn from words that proptest chose.
@@ -180,7 +179,6 @@ impl Draw {
         ProposedParameter { name: self.string(), value: self.number(), proposed: self.number() }
     }
 
-    /// A record of the kind `kind`.
     fn record(&mut self, kind: usize) -> Record {
         match kind {
             0 => Record::Session(SessionInfo {
@@ -314,12 +312,10 @@ fn draw(words: usize) -> impl Strategy<Value = Draw> {
         .prop_map(|(words, text)| Draw { words: words.into_iter(), text })
 }
 
-/// Any tick, with any bit pattern in every number.
 pub fn any_tick() -> impl Strategy<Value = Tick> {
     draw(400).prop_map(|mut draw| draw.tick())
 }
 
-/// Any record; every kind is as likely.
 pub fn any_record() -> impl Strategy<Value = Record> {
     (0..13_usize, draw(800)).prop_map(|(kind, mut draw)| draw.record(kind))
 }
@@ -459,7 +455,6 @@ pub fn write(path: &Path, everything: &[Played]) {
     assert_eq!(writer.finish().unwrap(), path);
 }
 
-/// Writes everything in the given order.
 pub fn write_all(writer: &mut Writer, everything: &[Played]) {
     for played in everything {
         match played {
@@ -469,7 +464,6 @@ pub fn write_all(writer: &mut Writer, everything: &[Played]) {
     }
 }
 
-/// Plays a file and returns everything but the session's first record.
 pub fn play(path: &Path) -> Vec<Played> {
     let mut player = Player::open(path).unwrap_or_else(|error| panic!("{error}"));
     let first = player.next();

@@ -26,25 +26,21 @@ pub struct NewStudyAttributes<'a> {
     pub seed: u32,
     pub sampler: &'a SamplerConfig,
     pub version: &'static str,
-    /// Trials that are to count.
     pub budget: u32,
 }
 
 /// The budget of a study, for workers that join it and sessions that continue it.
 #[derive(Debug, Serialize)]
 pub struct BudgetAttribute {
-    /// Trials that are to count.
     pub budget: u32,
 }
 
-/// Attributes of a study.
 #[derive(Debug, Clone, PartialEq, Default, Deserialize)]
 #[serde(default)]
 pub struct StudyAttributes {
     pub task: Option<Task>,
     pub robot: Option<String>,
     pub seed: Option<u32>,
-    /// Trials that are to count.
     pub budget: Option<u32>,
     /// Bounds that the operator has changed, `{"Fx": [40, 110]}`.
     pub bounds: Option<BTreeMap<String, [f64; 2]>>,
@@ -52,11 +48,9 @@ pub struct StudyAttributes {
     pub fixed: Option<BTreeMap<String, FixedFrom>>,
     /// The confirmation that runs; null when it is over.
     pub confirm: Option<RunningConfirmation>,
-    /// Conclusion of the last confirmation.
     pub confirmed: Option<Conclusion>,
 }
 
-/// A parameter that is fixed for some trials.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct FixedFrom {
     pub value: f64,
@@ -66,7 +60,6 @@ pub struct FixedFrom {
     pub from: u32,
 }
 
-/// A confirmation that runs.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RunningConfirmation {
     /// First trials of the compared points.
@@ -77,7 +70,6 @@ pub struct RunningConfirmation {
     pub from: u32,
 }
 
-/// Conclusion of a confirmation.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Conclusion {
     /// First trials of the compared points.
@@ -101,7 +93,6 @@ impl StudyAttributes {
 #[serde(default)]
 pub struct Origin {
     pub source: ProposalSource,
-    /// The trial that it repeats.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub parent: Option<u32>,
     /// The seed of its noise and terrain; none for a new one. Text: JSON numbers of other programs do not hold 64 bits.
@@ -144,7 +135,6 @@ impl Origin {
         Origin { seed, ..Origin::rerun_of(trial.number, source, gains) }
     }
 
-    /// Reads the origin from the attributes of a queued trial.
     pub fn of(attributes: &BTreeMap<String, Value>) -> Origin {
         read(attributes)
     }
@@ -244,13 +234,11 @@ pub struct InterruptedAttributes<'a> {
 pub struct TrialAttributes {
     /// The worker that runs it: 0 is the session that has the study's folder.
     pub worker: Option<u32>,
-    /// Distance to earlier falls at its approval.
     pub risk: Option<FallRisk>,
     /// Parameters that the operator had fixed for some trials.
     #[serde(deserialize_with = "numbers")]
     pub fixed: ParameterValues,
     pub verdict: Option<Verdict>,
-    /// The verdict that the rules suggest.
     pub suggested: Option<Verdict>,
     /// Reason of the suggestion, or of another verdict.
     pub cause: Option<String>,
@@ -290,7 +278,6 @@ pub fn worker_of(trial: &Trial) -> Option<u32> {
     Some(TrialAttributes::of(trial).worker.unwrap_or(0))
 }
 
-/// Returns whether the trial is a repeat that confirms the best.
 pub fn confirms(trial: &Trial) -> bool {
     Origin::of_trial(trial).source == ProposalSource::Confirm
 }

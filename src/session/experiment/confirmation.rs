@@ -10,7 +10,6 @@ use crate::optimize::study::{Study, StudyError};
 use crate::optimize::trial::{Trial, TrialState};
 use crate::trial::PointRecord;
 
-/// Next step of a confirmation.
 pub enum NextRepeat {
     /// No confirmation runs, or other workers run the last repeats.
     None,
@@ -20,16 +19,13 @@ pub enum NextRepeat {
     Over(Conclusion, String),
 }
 
-/// The part of an experiment that confirms the best.
 #[derive(Debug)]
 pub struct BestConfirmation {
-    /// Number of best points that are compared.
     contenders: u32,
     /// Confidence at which one of them is the best.
     confidence: f64,
     /// Conclusion that is not written yet, because the last verdict can still be undone.
     concluded: Option<Conclusion>,
-    /// Points as they were published last.
     published: Vec<PointRecord>,
 }
 
@@ -57,7 +53,6 @@ impl BestConfirmation {
         Ok(())
     }
 
-    /// Ends a confirmation without a conclusion.
     pub fn abort(&self, study: &mut Study) -> Result<(), StudyError> {
         #[derive(Serialize)]
         struct Aborted {

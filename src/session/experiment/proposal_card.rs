@@ -24,7 +24,6 @@ pub struct ProposalCard {
     changes: Changes,
     /// The draft was queued in the outlook only: in the study its number may belong to another trial by now.
     only_in_outlook: bool,
-    /// The configured gains, in table order.
     configured: ParameterValues,
     /// The gains of the trial without changes: the configured ones, or those of its origin.
     gains: ParameterValues,
@@ -47,7 +46,6 @@ pub struct ApprovedCard {
     pub overrides: Vec<(String, f64)>,
     /// The fixed parameters, without those that were changed for this trial.
     pub fixed: ParameterValues,
-    /// Whether the draft was queued in the outlook only.
     pub only_in_outlook: bool,
 }
 
@@ -77,7 +75,6 @@ impl ProposalCard {
         self.draft.number
     }
 
-    /// Returns whether the proposal is the one with this number and revision.
     pub fn is(&self, trial: u32, revision: u32) -> bool {
         self.number() == trial && self.revision == revision
     }
@@ -111,7 +108,6 @@ impl ProposalCard {
         }
     }
 
-    /// Returns the operator's changes; none without any.
     pub fn changes(&self) -> Option<&Changes> {
         (self.changes != Changes::default()).then_some(&self.changes)
     }

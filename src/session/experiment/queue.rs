@@ -13,7 +13,6 @@ use crate::optimize::study::{Outcome, Study, StudyError, TellOutcome};
 use crate::optimize::trial::{Trial, TrialState};
 use crate::trial::{ParameterValues, Verdict};
 
-/// The part of an experiment that closes unfinished trials and queues repetitions.
 #[derive(Debug)]
 pub struct TrialQueue {
     worker: u32,
@@ -117,7 +116,6 @@ fn queue_owed(study: &mut Study) -> Result<(), StudyError> {
     Ok(())
 }
 
-/// Returns the parameters and the origin of a repetition of `trial`.
 pub fn rerun_of(trial: &Trial) -> (ParameterValues, Origin) {
     let Origin { source, gains, .. } = Origin::of_trial(trial);
     (trial.parameters.clone().into(), Origin::rerun_of(trial.number, source, gains))

@@ -45,7 +45,6 @@ impl SearchSettings {
         plan.parameters.iter().map(present).collect()
     }
 
-    /// Makes the study search within the present bounds.
     pub fn apply(&self, plan: &ExperimentPlan, study: &mut Study) -> Result<(), StudyError> {
         let present = self.parameters(plan);
         let mut space = Vec::new();
@@ -86,7 +85,6 @@ impl SearchSettings {
         }
     }
 
-    /// Fixes a parameter for `trials` trials from number `from` on.
     pub fn fix(&mut self, name: &str, value: f64, trials: u32, from: u32) {
         self.fixed.insert(name.to_owned(), FixedFrom { value, trials, from });
     }

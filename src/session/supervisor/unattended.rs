@@ -7,7 +7,6 @@ use crate::session::operator_request::OperatorRequest;
 use crate::telemetry::{Mode, TransitionCause};
 use crate::trial::Approval;
 
-/// State of the automatic rule.
 #[derive(Debug, Default)]
 pub struct Unattended {
     pub approval: Approval,
@@ -40,7 +39,6 @@ impl Unattended {
         self.retry_ns = time_ns + RETRY_NS;
     }
 
-    /// Takes in a request of the operator.
     pub fn requested(&mut self, request: &OperatorRequest) {
         match request {
             OperatorRequest::Cancel
