@@ -1,47 +1,35 @@
 //! Time of one ask and of a whole study on disk.
 
-use criterion::{Criterion, criterion_group, criterion_main};
-use quadfrog::optimize::ask::{Direction, SamplerConfig, SamplerKind};
-use quadfrog::optimize::journal::Durability;
-use quadfrog::optimize::space::{Range, Space};
-use quadfrog::optimize::study::{Outcome, Storage, Study, StudyOptions, SuggestedParameter};
-use std::hint::black_box;
+#[path = "../tests/support/optimize.rs"]
+mod support;
 
-fn options(sampler: SamplerConfig, durability: Durability) -> StudyOptions {
-    let ranges = [("f0", 0.75, 1.75), ("Fx", 0.0, 150.0), ("Fy", 0.0, 150.0), ("Fz", 150.0, 350.0)];
-    StudyOptions {
-        name: "bench".into(),
-        direction: Direction::Maximize,
-        metric: "value".into(),
-        space: Space::new(ranges.map(|(n, low, high)| (n.to_owned(), Range::linear(low, high)))).expect("a space"),
-        sampler,
-        attributes: Vec::new(),
-        durability,
-    }
+use criterion::{Criterion, criterion_group, criterion_main};
+use quadfrog::optimize::ask::{SamplerConfig, SamplerKind};
+use quadfrog::optimize::journal::Durability;
+use quadfrog::optimize::study::{Storage, Study, StudyOptions};
+use std::hint::black_box;
+use support::{in_memory, sideways};
+
+fn options(sampler: SamplerConfig) -> StudyOptions {
+    support::options(sideways(), sampler)
 }
 
 /// A study with `trials` finished trials of a smooth objective, at points of the random sampler, which is fast.
 fn history(sampler: SamplerConfig, trials: u32) -> Study {
     let random = SamplerConfig { kind: SamplerKind::Random, ..SamplerConfig::default() };
-    let mut points = Study::open(Storage::Memory, options(random, Durability::Buffered)).expect("memory");
-    let mut study = Study::open(Storage::Memory, options(sampler, Durability::Buffered)).expect("memory");
+    let (mut points, mut study) = (in_memory(options(random)), in_memory(options(sampler)));
     for _ in 0..trials {
-        let draft = points.draft();
-        let number = points.begin(&draft, &[], &[]).expect("begins");
-        let point: Vec<_> = points.trial(number).expect("begun").parameters.clone();
-        points.tell(number, Outcome::Complete(0.0)).expect("running");
-        study.enqueue(&point, &[]).expect("queued");
+        let number = support::run(&mut points, |_| 0.0);
+        study.enqueue(&points.trial(number).expect("begun").parameters, &[]).expect("queued");
         run(&mut study);
     }
     study
 }
 
 fn run(study: &mut Study) {
-    let draft = study.draft();
-    let number = study.begin(&draft, &[], &[]).expect("begins");
-    let u = |s: &SuggestedParameter| (s.value - s.low) / (s.high - s.low) - 0.4;
-    let value = -draft.parameters.iter().map(|s| u(s) * u(s)).sum::<f64>();
-    study.tell(number, Outcome::Complete(value)).expect("running");
+    let space = sideways();
+    let u = |(name, value): &(String, f64)| space.range(name).expect("a parameter").scale(*value) - 0.4;
+    support::run(study, |parameters| -parameters.iter().map(|p| u(p) * u(p)).sum::<f64>());
 }
 
 fn ask(c: &mut Criterion) {
@@ -71,7 +59,8 @@ fn study_on_disk(c: &mut Criterion) {
             b.iter(|| {
                 let _ = std::fs::remove_file(&path);
                 let storage = Storage::File(path.clone());
-                let mut study = Study::open(storage, options(SamplerConfig::default(), durability)).expect("opens");
+                let options = StudyOptions { durability, ..options(SamplerConfig::default()) };
+                let mut study = Study::open(storage, options).expect("opens");
                 for _ in 0..20 {
                     run(&mut study);
                 }

@@ -3,10 +3,13 @@
 //!
 //! `cargo run --release --example compare_samplers [SEEDS] [SAMPLER...]`
 
-use quadfrog::optimize::ask::{Direction, SamplerConfig, SamplerKind};
-use quadfrog::optimize::space::{Range, Space};
-use quadfrog::optimize::study::{Outcome, Storage, Study, StudyOptions};
+#[path = "../tests/support/optimize.rs"]
+mod support;
+
+use quadfrog::optimize::ask::{SamplerConfig, SamplerKind};
+use quadfrog::optimize::study::Outcome;
 use quadfrog::optimize::trial::{FALL, VERDICT};
+use support::{in_memory, options, sideways};
 
 /// -sum (u - c)^2
 fn sphere(u: &[f64]) -> f64 {
@@ -54,22 +57,12 @@ type Function = fn(&[f64]) -> f64;
 
 /// Best values after 20 and after 50 trials, and falls among the first 20.
 fn run(sampler: SamplerConfig, function: Function, falls: bool) -> [f64; 3] {
-    let ranges = [("f0", 0.75, 1.75), ("Fx", 0.0, 150.0), ("Fy", 0.0, 150.0), ("Fz", 150.0, 350.0)];
-    let options = StudyOptions {
-        name: "comparison".into(),
-        direction: Direction::Maximize,
-        metric: "value".into(),
-        space: Space::new(ranges.map(|(n, low, high)| (n.to_owned(), Range::linear(low, high)))).expect("a space"),
-        sampler,
-        attributes: Vec::new(),
-        durability: Default::default(),
-    };
-    let mut study = Study::open(Storage::Memory, options).expect("in memory");
+    let mut study = in_memory(options(sideways(), sampler));
     let mut best = [f64::NEG_INFINITY, f64::NEG_INFINITY, 0.0];
     for trial in 0..50 {
         let draft = study.draft();
         let number = study.begin(&draft, &[], &[]).expect("begins");
-        let u: Vec<f64> = draft.parameters.iter().map(|s| (s.value - s.low) / (s.high - s.low)).collect();
+        let u: Vec<f64> = draft.parameters.iter().map(|s| s.range.scale(s.value)).collect();
         let value = function(&u);
         let fell = falls && value == 0.0;
         if fell {
@@ -92,13 +85,13 @@ fn main() {
     let samplers = [
         ("tpe multivariate", SamplerConfig::default()),
         ("tpe univariate", SamplerConfig { multivariate: false, ..SamplerConfig::default() }),
-        ("gp", SamplerConfig { kind: SamplerKind::Gp, ..SamplerConfig::default() }),
-        ("random", SamplerConfig { kind: SamplerKind::Random, ..SamplerConfig::default() }),
-        ("sobol", SamplerConfig { kind: SamplerKind::Sobol, ..SamplerConfig::default() }),
     ];
+    let others = [SamplerKind::Gp, SamplerKind::Random, SamplerKind::Sobol];
+    let others = others.map(|kind| (kind.name(), SamplerConfig { kind, ..SamplerConfig::default() }));
     println!("Mean of {seeds} seeds: best at 20 / 50 trials (falls among the first 20)\n");
     println!("| | sphere | ridge | Hartmann-4 | edge | pocket |\n|---|---|---|---|---|---|");
-    for (name, config) in samplers.iter().filter(|(n, _)| wanted.is_empty() || wanted.iter().any(|w| n.starts_with(w)))
+    for (name, config) in
+        samplers.iter().chain(&others).filter(|(n, _)| wanted.is_empty() || wanted.iter().any(|w| n.starts_with(w)))
     {
         let cell = |function: Function, falls: bool| {
             let seeded = |seed| SamplerConfig { seed, ..config.clone() };

@@ -1,5 +1,8 @@
 //! Properties of the samplers beyond equality with Optuna: bounds, repeatability, better results than random points.
 
+#[path = "support/optimize.rs"]
+mod support;
+
 use quadfrog::optimize::ask::{Direction, SamplerConfig, SamplerKind};
 use quadfrog::optimize::gp::falls::StandProbability;
 use quadfrog::optimize::gp::process::GaussianProcess;
@@ -7,43 +10,31 @@ use quadfrog::optimize::gp::{ascent, log_improvement};
 use quadfrog::optimize::mt19937::Mt19937;
 use quadfrog::optimize::sobol::{MAX_DIMENSIONS, Sobol};
 use quadfrog::optimize::space::{Range, Space, SpaceError};
-use quadfrog::optimize::study::{Outcome, Storage, Study, StudyOptions};
+use quadfrog::optimize::study::{Outcome, Study, StudyOptions};
 use quadfrog::optimize::trial::{FALL, VERDICT};
+use support::{begin, forward_log, in_memory, options, run};
 
 fn study(kind: SamplerKind, seed: u32, direction: Direction) -> Study {
-    let space = Space::new([
-        ("f0".into(), Range::linear(0.75, 1.75)),
-        ("Fx".into(), Range::linear(0.0, 150.0)),
-        ("Fz".into(), Range::logarithmic(150.0, 350.0)),
-    ]);
-    let options = StudyOptions {
-        name: "s".into(),
-        direction,
-        metric: "m".into(),
-        space: space.unwrap(),
-        sampler: SamplerConfig { kind, seed, ..SamplerConfig::default() },
-        attributes: Vec::new(),
-        durability: Default::default(),
-    };
-    Study::open(Storage::Memory, options).unwrap()
+    let sampler = SamplerConfig { kind, seed, ..SamplerConfig::default() };
+    in_memory(StudyOptions { direction, ..options(forward_log(), sampler) })
+}
+
+/// The parameters of all trials.
+fn points(study: &Study) -> Vec<Vec<(String, f64)>> {
+    study.trials().iter().map(|t| t.parameters.clone()).collect()
 }
 
 /// Runs trials of a jump that improves with u1 + u2 up to a fall beyond 1.3; returns (best value, falls).
-fn jumps(study: &mut Study, trials: u32, overrides: &[(String, f64)]) -> (f64, usize) {
+fn jumps(study: &mut Study, trials: u32) -> (f64, usize) {
     for _ in 0..trials {
         let draft = study.draft();
-        let number = study.begin(&draft, overrides, &[]).unwrap();
+        let number = study.begin(&draft, &[], &[]).unwrap();
         let trial = study.trial(number).unwrap();
         for s in &draft.parameters {
-            assert!(s.low <= s.value && s.value <= s.high, "{} = {}", s.name, s.value);
+            assert!(s.range.contains(s.value), "{} = {}", s.name, s.value);
         }
-        let u: Vec<f64> = study
-            .options()
-            .space
-            .parameters()
-            .iter()
-            .map(|p| p.range.scale(trial.parameter(&p.name).unwrap()))
-            .collect();
+        let parameters = study.options().space.parameters().iter();
+        let u: Vec<f64> = parameters.map(|p| p.range.scale(trial.parameter(&p.name).unwrap())).collect();
         let push = u[0] + u[1];
         let fell = push > 1.3;
         let value = if fell { 0.0 } else { push - (u[2] - 0.5) * (u[2] - 0.5) };
@@ -55,11 +46,11 @@ fn jumps(study: &mut Study, trials: u32, overrides: &[(String, f64)]) -> (f64, u
 
 #[test]
 fn every_sampler_repeats_for_a_seed_and_stays_inside() {
-    for kind in [SamplerKind::Tpe, SamplerKind::Gp, SamplerKind::Random, SamplerKind::Sobol] {
+    for &kind in SamplerKind::ALL {
         let run = |seed| {
             let mut study = study(kind, seed, Direction::Maximize);
-            jumps(&mut study, 18, &[]);
-            study.trials().iter().map(|t| t.parameters.clone()).collect::<Vec<_>>()
+            jumps(&mut study, 18);
+            points(&study)
         };
         assert_eq!(run(3), run(3), "{kind:?}");
         assert_ne!(run(3), run(4), "{kind:?}");
@@ -70,23 +61,20 @@ fn every_sampler_repeats_for_a_seed_and_stays_inside() {
 fn the_gaussian_process_goes_to_the_edge_and_falls_less_than_tpe() {
     let total = |kind| {
         (0..20).fold((0.0, 0), |sum, seed| {
-            let (best, falls) = jumps(&mut study(kind, seed, Direction::Maximize), 20, &[]);
+            let (best, falls) = jumps(&mut study(kind, seed, Direction::Maximize), 20);
             (sum.0 + best / 20.0, sum.1 + falls)
         })
     };
     let (gp, tpe) = (total(SamplerKind::Gp), total(SamplerKind::Tpe));
-    println!(
-        "edge at 1.3, 20 seeds of 20 trials: gp best {:.3}, {} falls; tpe best {:.3}, {} falls",
-        gp.0, gp.1, tpe.0, tpe.1
-    );
+    println!("edge at 1.3, 20 seeds of 20 trials (best, falls): gp {gp:.3?}; tpe {tpe:.3?}");
     assert!(gp.0 >= tpe.0 && gp.1 < tpe.1, "gp {gp:?}, tpe {tpe:?}");
 }
 
 #[test]
 fn given_parameters_are_kept_by_every_sampler() {
-    for kind in [SamplerKind::Tpe, SamplerKind::Gp, SamplerKind::Random, SamplerKind::Sobol] {
+    for &kind in SamplerKind::ALL {
         let mut study = study(kind, 0, Direction::Maximize);
-        jumps(&mut study, 12, &[]);
+        jumps(&mut study, 12);
         let draft = study.draft_with(&[("Fx".into(), 33.0)]);
         assert_eq!((draft.parameters[1].value, draft.parameters[1].fixed), (33.0, true), "{kind:?}");
         let all = study.draft_with(&[("Fx".into(), 33.0), ("f0".into(), 1.0), ("Fz".into(), 200.0)]);
@@ -97,33 +85,26 @@ fn given_parameters_are_kept_by_every_sampler() {
 #[test]
 fn minimizing_is_maximizing_the_negative() {
     for kind in [SamplerKind::Tpe, SamplerKind::Gp] {
-        let points = |direction, sign: f64| {
+        let optimized = |direction, sign: f64| {
             let mut study = study(kind, 7, direction);
             for _ in 0..16 {
-                let number = study.begin(&study.draft(), &[], &[]).unwrap();
-                let value = study.trial(number).unwrap().parameters[1].1 / 150.0;
-                study.tell(number, Outcome::Complete(sign * value)).unwrap();
+                run(&mut study, |parameters| sign * parameters[1].1 / 150.0);
             }
-            study.trials().iter().map(|t| t.parameters.clone()).collect::<Vec<_>>()
+            points(&study)
         };
-        assert_eq!(points(Direction::Maximize, 1.0), points(Direction::Minimize, -1.0), "{kind:?}");
+        assert_eq!(optimized(Direction::Maximize, 1.0), optimized(Direction::Minimize, -1.0), "{kind:?}");
     }
 }
 
 #[test]
 fn running_trials_of_others_keep_the_gaussian_process_away() {
     let mut study = study(SamplerKind::Gp, 1, Direction::Maximize);
-    jumps(&mut study, 15, &[]);
-    let first = study.draft();
-    study.begin(&first, &[], &[]).unwrap();
-    let second = study.draft();
-    let apart: f64 = first
-        .parameters
-        .iter()
-        .zip(&second.parameters)
-        .map(|(a, b)| ((a.value - b.value) / (a.high - a.low)).powi(2))
-        .sum::<f64>()
-        .sqrt();
+    jumps(&mut study, 15);
+    let first = study.draft().parameters;
+    begin(&mut study);
+    let second = study.draft().parameters;
+    let squares = first.iter().zip(&second).map(|(a, b)| (a.range.scale(a.value) - b.range.scale(b.value)).powi(2));
+    let apart = squares.sum::<f64>().sqrt();
     assert!(apart > 0.01, "two workers got candidates {apart} apart");
 }
 
@@ -168,13 +149,8 @@ fn noise_is_estimated() {
     let mut stream = Mt19937::new(4);
     let xs: Vec<Vec<f64>> = (0..80).map(|_| vec![stream.double()]).collect();
     let mut noisy = |noise: f64| -> f64 {
-        let values: Vec<f64> = xs
-            .iter()
-            .map(|x| {
-                let uniform: f64 = (0..12).map(|_| stream.double()).sum::<f64>() - 6.0;
-                (6.0 * x[0]).sin() + noise * uniform
-            })
-            .collect();
+        let mut normal = || (0..12).map(|_| stream.double()).sum::<f64>() - 6.0;
+        let values: Vec<f64> = xs.iter().map(|x| (6.0 * x[0]).sin() + noise * normal()).collect();
         let n = values.len() as f64;
         let mean = values.iter().sum::<f64>() / n;
         let variance = values.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>() / n;

@@ -1,56 +1,42 @@
 //! The study: drafts without effect, interruptions without loss, other writers.
 
+#[path = "support/optimize.rs"]
+mod support;
+
 use quadfrog::optimize::ask::{Direction, SamplerConfig};
-use quadfrog::optimize::journal::Durability;
 use quadfrog::optimize::space::{Range, Space};
 use quadfrog::optimize::study::{Outcome, Storage, Study, StudyError, StudyOptions, TellOutcome};
-use quadfrog::optimize::trial::TrialState;
+use quadfrog::optimize::trial::{Trial, TrialState, value_of};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
+use support::{begin, forward_log, in_memory};
+use tempfile::{TempDir, tempdir};
 
 fn options(seed: u32, multivariate: bool) -> StudyOptions {
-    StudyOptions {
-        name: "forward".into(),
-        direction: Direction::Maximize,
-        metric: "distance [m]".into(),
-        space: Space::new([
-            ("f0".into(), Range::linear(0.75, 1.75)),
-            ("Fx".into(), Range::linear(0.0, 150.0)),
-            ("Fz".into(), Range::logarithmic(150.0, 350.0)),
-        ])
-        .unwrap(),
-        sampler: SamplerConfig { seed, multivariate, ..SamplerConfig::default() },
-        attributes: vec![("robot".into(), json!("go1"))],
-        durability: Durability::Buffered,
-    }
+    support::options(forward_log(), SamplerConfig { seed, multivariate, ..SamplerConfig::default() })
 }
 
-/// A temporary folder, removed if the test passes.
-struct Folder(PathBuf);
-
-impl Folder {
-    fn new(name: &str) -> Self {
-        let path = std::env::temp_dir().join(format!("quadfrog-{name}-{}", std::process::id()));
-        let _ = std::fs::remove_dir_all(&path);
-        std::fs::create_dir_all(&path).unwrap();
-        Folder(path)
-    }
-
-    fn file(&self, name: &str) -> PathBuf {
-        self.0.join(name)
-    }
+fn open(path: &Path, seed: u32, multivariate: bool) -> Study {
+    Study::open(Storage::File(path.to_owned()), options(seed, multivariate)).unwrap()
 }
 
-impl Drop for Folder {
-    fn drop(&mut self) {
-        if !std::thread::panicking() {
-            let _ = std::fs::remove_dir_all(&self.0);
-        }
-    }
+/// A study on disk with its folder and journal.
+fn on_disk() -> (TempDir, PathBuf, Study) {
+    let folder = tempdir().unwrap();
+    let path = folder.path().join("study.log");
+    let study = open(&path, 0, true);
+    (folder, path, study)
+}
+
+/// [`on_disk`] with one trial.
+fn with_a_trial() -> (TempDir, PathBuf, Study) {
+    let (folder, path, mut study) = on_disk();
+    one_trial(&mut study, &[]);
+    (folder, path, study)
 }
 
 fn objective(parameters: &[(String, f64)]) -> f64 {
-    let x = |name: &str| parameters.iter().find(|(n, _)| n == name).unwrap().1;
+    let x = |name: &str| value_of(parameters, name).unwrap();
     let (a, b, c) = (x("f0") - 1.1, x("Fx") / 150.0 - 0.6, x("Fz") / 350.0 - 0.7);
     1.0 / (1.0 + 4.0 * a * a + 3.0 * b * b + 5.0 * c * c)
 }
@@ -73,21 +59,14 @@ fn one_trial(study: &mut Study, overrides: &[(String, f64)]) {
 type Row = (u32, TrialState, Vec<(String, f64)>, Option<f64>, Value);
 
 fn table(study: &Study) -> Vec<Row> {
-    let row = |t: &quadfrog::optimize::trial::Trial| {
-        (t.number, t.state, t.parameters.clone(), t.value, t.system_attributes["quadfrog:draws"].clone())
-    };
+    let row =
+        |t: &Trial| (t.number, t.state, t.parameters.clone(), t.value, t.system_attributes["quadfrog:draws"].clone());
     study.trials().iter().map(row).collect()
-}
-
-fn open(path: &Path, seed: u32, multivariate: bool) -> Study {
-    Study::open(Storage::File(path.to_owned()), options(seed, multivariate)).unwrap()
 }
 
 #[test]
 fn a_draft_has_no_effect_and_is_what_begins() {
-    let folder = Folder::new("draft");
-    let path = folder.file("study.log");
-    let mut study = open(&path, 5, true);
+    let (_folder, path, mut study) = on_disk();
     for _ in 0..14 {
         let before = std::fs::read(&path).unwrap();
         let draft = study.draft();
@@ -106,32 +85,28 @@ fn a_draft_has_no_effect_and_is_what_begins() {
 #[test]
 fn interrupted_at_every_trial_it_equals_the_unbroken_one() {
     for (seed, multivariate) in [(0, true), (1, false), (4_000_000_000, true)] {
-        let folder = Folder::new(&format!("resume-{seed}"));
-        let mut unbroken = Study::open(Storage::Memory, options(seed, multivariate)).unwrap();
+        let folder = tempdir().unwrap();
+        let path = folder.path().join("study.log");
+        let mut unbroken = in_memory(options(seed, multivariate));
         for number in 0..30 {
             let override_fx = [("Fx".to_owned(), 75.0)];
             let overrides: &[_] = if number % 5 == 4 { &override_fx } else { &[] };
             one_trial(&mut unbroken, overrides);
-            let mut broken = open(&folder.file("study.log"), seed, multivariate);
-            one_trial(&mut broken, overrides);
+            one_trial(&mut open(&path, seed, multivariate), overrides);
         }
-        assert_eq!(table(&open(&folder.file("study.log"), seed, multivariate)), table(&unbroken));
+        assert_eq!(table(&open(&path, seed, multivariate)), table(&unbroken));
     }
 }
 
 #[test]
 fn a_verdict_given_before_a_crash_is_there_afterwards() {
-    let folder = Folder::new("crash");
-    let path = folder.file("study.log");
-    let mut study = open(&path, 0, true);
-    let draft = study.draft();
-    let trial = study.begin(&draft, &[], &[]).unwrap();
+    let (_folder, path, mut study) = on_disk();
+    let trial = begin(&mut study);
     study.annotate(trial, &[("verdict".into(), json!("fall")), ("value".into(), json!(0.0))]).unwrap();
     drop(study); // as if killed before the tell
 
     let mut study = open(&path, 0, true);
-    let left: Vec<u32> = study.running().map(|t| t.number).collect();
-    assert_eq!(left, [trial]);
+    assert!(study.running().map(|t| t.number).eq([trial]));
     assert_eq!(study.trial(trial).unwrap().user_attributes["verdict"], json!("fall"));
     assert_eq!(study.tell(trial, Outcome::Complete(0.0)).unwrap(), TellOutcome::Recorded);
     assert_eq!(study.running().count(), 0);
@@ -139,7 +114,7 @@ fn a_verdict_given_before_a_crash_is_there_afterwards() {
 
 #[test]
 fn overrides_are_recorded_as_fixed() {
-    let mut study = Study::open(Storage::Memory, options(0, true)).unwrap();
+    let mut study = in_memory(options(0, true));
     let draft = study.draft();
     let trial = study.begin(&draft, &[("Fz".into(), 200.0)], &[]).unwrap();
     let trial = study.trial(trial).unwrap();
@@ -149,14 +124,14 @@ fn overrides_are_recorded_as_fixed() {
 
     // A trial with all parameters given uses no random numbers.
     let before = study.draft();
-    let all: Vec<_> = before.parameters.iter().map(|s| (s.name.clone(), s.low)).collect();
+    let all: Vec<_> = before.parameters.iter().map(|s| (s.name.clone(), s.range.low)).collect();
     study.begin(&before, &all, &[]).unwrap();
     assert_eq!(study.draft().parameters, before.parameters);
 }
 
 #[test]
 fn refusals_say_what_is_wrong() {
-    let mut study = Study::open(Storage::Memory, options(0, true)).unwrap();
+    let mut study = in_memory(options(0, true));
     let draft = study.draft();
     let error = |e: Result<u32, StudyError>| e.unwrap_err().to_string();
     let unknown = error(study.begin(&draft, &[("Fq".into(), 1.0)], &[]));
@@ -178,7 +153,7 @@ fn refusals_say_what_is_wrong() {
 
 #[test]
 fn enqueued_trials_come_first_in_their_order_and_keep_their_numbers() {
-    let mut study = Study::open(Storage::Memory, options(0, true)).unwrap();
+    let mut study = in_memory(options(0, true));
     let draft = study.draft();
     let first =
         study.enqueue(&[("f0".into(), 1.0), ("Fx".into(), 1.5), ("Fz".into(), 160.0)], &[("by".into(), json!("A"))]);
@@ -187,10 +162,8 @@ fn enqueued_trials_come_first_in_their_order_and_keep_their_numbers() {
     assert!(study.draft().enqueued);
     let taken = study.draft();
     assert_eq!((taken.number, taken.attributes["by"].clone()), (0, json!("A")));
-    assert_eq!(
-        taken.parameters.iter().map(|s| (s.value, s.fixed)).collect::<Vec<_>>(),
-        [(1.0, true), (1.5, true), (160.0, true)]
-    );
+    let values = taken.parameters.iter().map(|s| (s.value, s.fixed));
+    assert!(values.eq([(1.0, true), (1.5, true), (160.0, true)]));
     study.begin(&taken, &[], &[]).unwrap();
     let partly = study.draft();
     assert_eq!(partly.number, 1);
@@ -202,17 +175,9 @@ fn enqueued_trials_come_first_in_their_order_and_keep_their_numbers() {
 
 #[test]
 fn a_torn_last_line_is_cut_off_and_kept_aside() {
-    for torn in [
-        "{\"op_code\":6,\"worker_id\":\"x\",\"tri",
-        "garbage\n",
-        "\n",
-        "garbage\n{\"op",
-        "{\"op_code\":8,\"worker_id\":\"\u{e9}",
-    ] {
-        let folder = Folder::new("torn");
-        let path = folder.file("study.log");
-        let mut study = open(&path, 0, true);
-        one_trial(&mut study, &[]);
+    let (cut, cut_in_text) = (r#"{"op_code":6,"worker_id":"x","tri"#, "{\"op_code\":8,\"worker_id\":\"\u{e9}");
+    for torn in [cut, "garbage\n", "\n", "garbage\n{\"op", cut_in_text] {
+        let (folder, path, mut study) = with_a_trial();
         let before = table(&study);
         let whole = std::fs::read(&path).unwrap();
         std::fs::write(&path, [&whole, torn.as_bytes()].concat()).unwrap();
@@ -222,7 +187,7 @@ fn a_torn_last_line_is_cut_off_and_kept_aside() {
         study.refresh().unwrap();
         assert_eq!(table(&study), before);
         one_trial(&mut resumed, &[]);
-        assert_eq!(std::fs::read(folder.file("study.log.torn-0")).unwrap(), torn.as_bytes());
+        assert_eq!(std::fs::read(folder.path().join("study.log.torn-0")).unwrap(), torn.as_bytes());
         study.refresh().unwrap();
         assert_eq!(study.trials().len(), 2, "the other session continues reading");
         assert_eq!(table(&open(&path, 0, true)), table(&study));
@@ -231,23 +196,17 @@ fn a_torn_last_line_is_cut_off_and_kept_aside() {
 
 #[test]
 fn an_unreadable_line_in_the_middle_is_named() {
-    let folder = Folder::new("middle");
-    let path = folder.file("study.log");
-    let mut study = open(&path, 0, true);
-    one_trial(&mut study, &[]);
+    let (_folder, path, _) = with_a_trial();
     let mut text = std::fs::read_to_string(&path).unwrap();
     text.insert_str(text.find('\n').unwrap() + 1, "{\"op_code\":77,\"worker_id\":\"x\"}\n");
     std::fs::write(&path, text).unwrap();
-    let error = Study::open(Storage::File(path.clone()), options(0, true)).unwrap_err().to_string();
+    let error = Study::open(Storage::File(path), options(0, true)).unwrap_err().to_string();
     assert!(error.contains("study.log, line 2") && error.contains("77"), "{error}");
 }
 
 #[test]
 fn a_file_that_became_shorter_is_noticed() {
-    let folder = Folder::new("shorter");
-    let path = folder.file("study.log");
-    let mut study = open(&path, 0, true);
-    one_trial(&mut study, &[]);
+    let (_folder, path, mut study) = with_a_trial();
     std::fs::write(&path, "").unwrap();
     let error = study.refresh().unwrap_err().to_string();
     assert!(error.contains("shortened or replaced"), "{error}");
@@ -255,16 +214,12 @@ fn a_file_that_became_shorter_is_noticed() {
 
 #[test]
 fn infinities_and_nan_are_read_and_written_as_by_python() {
-    let folder = Folder::new("infinite");
-    let path = folder.file("study.log");
-    let mut study = open(&path, 0, true);
-    let draft = study.draft();
-    let trial = study.begin(&draft, &[], &[]).unwrap();
+    let (_folder, path, mut study) = on_disk();
+    let trial = begin(&mut study);
     study.tell(trial, Outcome::Complete(f64::NEG_INFINITY)).unwrap();
     let text = std::fs::read_to_string(&path).unwrap();
     assert!(text.contains("\"values\":[-Infinity]"), "{text}");
-    let draft = study.draft();
-    let trial = study.begin(&draft, &[], &[]).unwrap();
+    let trial = begin(&mut study);
     let id = study.trial(trial).unwrap().id;
     let lines = format!(
         "{{\"op_code\":7,\"worker_id\":\"p\",\"trial_id\":{id},\"step\":1,\"intermediate_value\":NaN}}\n\
@@ -280,10 +235,7 @@ fn infinities_and_nan_are_read_and_written_as_by_python() {
 
 #[test]
 fn notes_can_be_written_on_finished_trials_and_shortened() {
-    let folder = Folder::new("notes");
-    let path = folder.file("study.log");
-    let mut study = open(&path, 0, true);
-    one_trial(&mut study, &[]);
+    let (_folder, path, mut study) = with_a_trial();
     let long = "é".repeat(5000);
     study.note(0, &long).unwrap();
     assert_eq!(study.note_of(0), long);
@@ -293,9 +245,7 @@ fn notes_can_be_written_on_finished_trials_and_shortened() {
 
 #[test]
 fn a_study_of_another_kind_is_refused() {
-    let folder = Folder::new("kind");
-    let path = folder.file("study.log");
-    one_trial(&mut open(&path, 0, true), &[]);
+    let (_folder, path, _) = with_a_trial();
     let refuse = |options: StudyOptions| Study::open(Storage::File(path.clone()), options).unwrap_err().to_string();
     let direction = refuse(StudyOptions { direction: Direction::Minimize, ..options(0, true) });
     assert!(direction.contains("maximize") && direction.contains("another name"), "{direction}");

@@ -14,48 +14,29 @@ const ATTRIBUTE: &str = "user_attrs_";
 
 /// Error in a table of trials.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[expect(missing_docs, reason = "the message of each variant has its meaning")]
 pub enum ExchangeError {
-    /// Text that the parser of the format rejects.
+    /// Text that the parser of the format, `CSV` or `JSON`, rejects.
     #[error("not {format}: {message}")]
-    Format {
-        /// `CSV` or `JSON`.
-        format: &'static str,
-        /// Message of the parser.
-        message: String,
-    },
-    /// A required column or member is missing.
+    Format { format: &'static str, message: String },
     #[error(
         "there is no {0}; give one parameter per column `params_<name>` (JSON: an object `params`), `value` and `state`"
     )]
     Missing(&'static str),
-    /// A cell with a value that its column does not allow.
+    /// Rows are counted from 1.
     #[error("trial {row}: {column} = {found}: {expected}")]
-    Cell {
-        /// Number of the trial within the table, from 1.
-        row: usize,
-        /// The column.
-        column: String,
-        /// Content.
-        found: String,
-        /// Rule for the content.
-        expected: &'static str,
-    },
+    Cell { row: usize, column: String, found: String, expected: &'static str },
 }
 
 /// A trial of a table.
 #[derive(Debug, Clone, PartialEq)]
+#[expect(missing_docs, reason = "the fields are those of a trial")]
 pub struct TableTrial {
-    /// State.
     pub state: TrialState,
-    /// Value of a complete trial.
     pub value: Option<f64>,
-    /// Parameters by name.
     pub parameters: Vec<(String, f64)>,
-    /// User attributes.
     pub attributes: Map<String, Value>,
-    /// Time of the beginning.
     pub started: Option<Timestamp>,
-    /// Time of the end.
     pub completed: Option<Timestamp>,
 }
 
@@ -76,11 +57,10 @@ pub fn to_csv(trials: &[Trial], note: impl Fn(u32) -> String) -> String {
         }
         attributes.extend(trial.user_attributes.keys().map(String::as_str));
     }
-    let mut header: Vec<String> =
-        ["number", "value", "datetime_start", "datetime_complete"].map(str::to_owned).to_vec();
+    let mut header = ["number", "value", "datetime_start", "datetime_complete"].map(str::to_owned).to_vec();
     header.extend(parameters.iter().map(|name| format!("{PARAMETER}{name}")));
     header.extend(attributes.iter().map(|name| format!("{ATTRIBUTE}{name}")));
-    header.extend(["note".to_owned(), "state".to_owned()]);
+    header.extend(["note", "state"].map(str::to_owned));
     let mut writer = csv::Writer::from_writer(Vec::new());
     let time = |at: Option<Timestamp>| at.map(|at| at.to_string()).unwrap_or_default();
     let number = |value: Option<f64>| value.map(|value| format!("{value:?}")).unwrap_or_default();
@@ -90,16 +70,13 @@ pub fn to_csv(trials: &[Trial], note: impl Fn(u32) -> String) -> String {
         Some(Value::String(text)) if plain(text).is_string() => text.clone(),
         Some(other) => other.to_string(),
     };
-    let mut rows = vec![header];
+    writer.write_record(header).expect("a write to memory");
     for trial in trials {
         let given = parameters_of(trial);
         let mut row = vec![trial.number.to_string(), number(trial.value), time(trial.started), time(trial.completed)];
         row.extend(parameters.iter().map(|name| number(value_of(&given, name))));
         row.extend(attributes.iter().map(|name| text(trial.user_attributes.get(*name))));
         row.extend([note(trial.number), <&str>::from(trial.state).to_owned()]);
-        rows.push(row);
-    }
-    for row in rows {
         writer.write_record(row).expect("rows of equal length");
     }
     String::from_utf8(writer.into_inner().expect("a write to memory")).expect("UTF-8 cells")
@@ -125,9 +102,6 @@ pub fn to_json(trials: &[Trial], note: impl Fn(u32) -> String) -> String {
 }
 
 /// Reads a CSV table.
-///
-/// # Errors
-/// [`ExchangeError`] for text that is not CSV, a missing column and an invalid cell.
 pub fn from_csv(text: &str) -> Result<Vec<TableTrial>, ExchangeError> {
     let format = |error: csv::Error| ExchangeError::Format { format: "CSV", message: error.to_string() };
     let mut reader = csv::Reader::from_reader(text.as_bytes());
@@ -138,19 +112,14 @@ pub fn from_csv(text: &str) -> Result<Vec<TableTrial>, ExchangeError> {
     let mut trials = Vec::new();
     for (row, record) in reader.records().enumerate() {
         let record = record.map_err(format)?;
-        let mut members = Map::new();
-        let (mut parameters, mut attributes) = (Map::new(), Map::new());
-        for (column, cell) in header.iter().zip(&record) {
-            if cell.is_empty() {
-                continue;
-            }
-            if let Some(name) = column.strip_prefix(PARAMETER) {
-                parameters.insert(name.to_owned(), plain(cell));
-            } else if let Some(name) = column.strip_prefix(ATTRIBUTE) {
-                attributes.insert(name.to_owned(), plain(cell));
-            } else {
-                members.insert(column.to_owned(), plain(cell));
-            }
+        let (mut members, mut parameters, mut attributes) = (Map::new(), Map::new(), Map::new());
+        for (column, cell) in header.iter().zip(&record).filter(|(_, cell)| !cell.is_empty()) {
+            let (map, name) = match (column.strip_prefix(PARAMETER), column.strip_prefix(ATTRIBUTE)) {
+                (Some(name), _) => (&mut parameters, name),
+                (_, Some(name)) => (&mut attributes, name),
+                _ => (&mut members, column),
+            };
+            map.insert(name.to_owned(), plain(cell));
         }
         members.insert("params".to_owned(), Value::Object(parameters));
         members.insert("user_attrs".to_owned(), Value::Object(attributes));
@@ -159,10 +128,7 @@ pub fn from_csv(text: &str) -> Result<Vec<TableTrial>, ExchangeError> {
     Ok(trials)
 }
 
-/// Reads a JSON array.
-///
-/// # Errors
-/// [`ExchangeError`] for text that is not a JSON array, a missing member and an invalid one.
+/// Reads a JSON array of objects.
 pub fn from_json(text: &str) -> Result<Vec<TableTrial>, ExchangeError> {
     let format = |message: String| ExchangeError::Format { format: "JSON", message };
     let value: Value = serde_json::from_str(text).map_err(|error| format(error.to_string()))?;
@@ -192,19 +158,12 @@ fn trial(row: usize, members: &Map<String, Value>) -> Result<TableTrial, Exchang
         let number = value.as_f64().filter(|number| number.is_finite());
         number.ok_or_else(|| cell(column, value, "must be a finite number"))
     };
-    let value = match members.get("value").or_else(|| members.get("values_0")) {
-        None | Some(Value::Null) => None,
-        Some(value) => Some(number("value", value)?),
-    };
+    let value = members.get("value").or_else(|| members.get("values_0")).filter(|value| !value.is_null());
+    let value = value.map(|value| number("value", value)).transpose()?;
     let state = match members.get("state") {
         // Optional: follows from the value.
-        None => {
-            if value.is_some() {
-                TrialState::Complete
-            } else {
-                TrialState::Waiting
-            }
-        }
+        None if value.is_some() => TrialState::Complete,
+        None => TrialState::Waiting,
         Some(name) => {
             let known = name.as_str().and_then(|name| name.parse().ok());
             known.ok_or_else(|| cell("state", name, "must be COMPLETE, PRUNED, FAIL, RUNNING or WAITING"))?
@@ -218,21 +177,16 @@ fn trial(row: usize, members: &Map<String, Value>) -> Result<TableTrial, Exchang
     };
     let parameters =
         given.iter().map(|(name, value)| Ok((name.clone(), number(&format!("{PARAMETER}{name}"), value)?)));
-    let time = |column: &str| match members.get(column) {
-        None | Some(Value::Null) => Ok(None),
-        Some(value) => {
-            let text = value.as_str().unwrap_or_default();
-            moment(text).map(Some).ok_or_else(|| cell(column, value, "must be a time such as 2026-11-21T09:30:00Z"))
-        }
+    let time = |column: &str| {
+        let value = members.get(column).filter(|value| !value.is_null());
+        let expected = "must be a time such as 2026-11-21T09:30:00Z";
+        value.map(|value| value.as_str().and_then(moment).ok_or_else(|| cell(column, value, expected))).transpose()
     };
     Ok(TableTrial {
         state,
         value,
         parameters: parameters.collect::<Result<_, _>>()?,
-        attributes: match members.get("user_attrs") {
-            Some(Value::Object(attributes)) => attributes.clone(),
-            _ => Map::new(),
-        },
+        attributes: members.get("user_attrs").and_then(Value::as_object).cloned().unwrap_or_default(),
         started: time("datetime_start")?,
         completed: time("datetime_complete")?,
     })
@@ -240,9 +194,9 @@ fn trial(row: usize, members: &Map<String, Value>) -> Result<TableTrial, Exchang
 
 /// A time with its offset, or without one as in Optuna's tables, which have local time.
 fn moment(text: &str) -> Option<Timestamp> {
-    if let Ok(at) = text.parse::<Timestamp>() {
-        return Some(at);
-    }
-    let local: jiff::civil::DateTime = text.replacen(' ', "T", 1).parse().ok()?;
-    Some(local.to_zoned(jiff::tz::TimeZone::system()).ok()?.timestamp())
+    let local = || -> Option<Timestamp> {
+        let local: jiff::civil::DateTime = text.replacen(' ', "T", 1).parse().ok()?;
+        Some(local.to_zoned(jiff::tz::TimeZone::system()).ok()?.timestamp())
+    };
+    text.parse().ok().or_else(local)
 }

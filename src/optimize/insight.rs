@@ -37,20 +37,14 @@ pub fn densities(
     let together = TpeModel::fit(&parts, &joint, true);
     let density = |p: &Parameter| {
         let axis = joint.iter().position(|j| j == p);
-        let alone;
-        let (model, axis) = match axis {
-            Some(axis) => (&together, axis),
-            None => {
-                alone = TpeModel::fit(&parts, std::slice::from_ref(p), config.multivariate);
-                (&alone, 0)
-            }
-        };
+        let alone = axis.is_none().then(|| TpeModel::fit(&parts, std::slice::from_ref(p), config.multivariate));
+        let (model, axis) = (alone.as_ref().unwrap_or(&together), axis.unwrap_or(0));
         let last = points.max(2) - 1;
         let at: Vec<f64> = (0..=last).map(|i| p.range.unscale(i as f64 / last as f64)).collect();
         // p(x) = p(ln x) / x for a logarithmic parameter
         let per_unit = |x: f64| if p.range.log { 1.0 / x } else { 1.0 };
-        let good = at.iter().map(|&x| model.good.marginal(axis, p.range.inner(x)) * per_unit(x)).collect();
-        let bad = at.iter().map(|&x| model.bad.marginal(axis, p.range.inner(x)) * per_unit(x)).collect();
+        let [good, bad] = [&model.good, &model.bad]
+            .map(|part| at.iter().map(|&x| part.marginal(axis, p.range.inner(x)) * per_unit(x)).collect());
         Density { name: p.name.clone(), at, good, bad }
     };
     space.parameters().iter().filter(|p| !p.range.is_point()).map(density).collect()

@@ -110,14 +110,11 @@ pub fn choose(weight: &[f64], stream: &mut Mt19937) -> usize {
     let u = stream.double();
     let total: f64 = weight.iter().fold(0.0, |sum, w| sum + w);
     let mut sum = 0.0;
-    let below = weight
-        .iter()
-        .take_while(|w| {
-            sum += **w;
-            sum / total <= u
-        })
-        .count();
-    below.min(weight.len() - 1)
+    let not_above = |w: &&f64| {
+        sum += **w;
+        sum / total <= u
+    };
+    weight.iter().take_while(not_above).count().min(weight.len() - 1)
 }
 
 /// Weights of `m` observations, oldest first: 1 for the newest 25, a ramp from 1/m for the older ones.

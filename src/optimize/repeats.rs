@@ -7,13 +7,14 @@
 
 use super::ask::Direction;
 use super::trial::{GAINS, Trial, TrialState, value_of};
+use serde_json::Value;
 use std::f64::consts::PI;
 
 /// Least repeats of a contender before its spread is used.
 pub const LEAST_REPEATS: usize = 3;
 
 /// A point and the results of its repeats.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct RepeatedPoint {
     /// The parameters.
     pub parameters: Vec<(String, f64)>,
@@ -50,30 +51,21 @@ impl RepeatedPoint {
 
 /// All points with a complete trial, in the order of their first trials.
 pub fn points(trials: &[Trial]) -> Vec<RepeatedPoint> {
-    let mut points: Vec<RepeatedPoint> = Vec::new();
+    let mut points: Vec<(Option<&Value>, RepeatedPoint)> = Vec::new();
     let complete = trials.iter().filter(|t| t.state == TrialState::Complete);
     for (trial, value) in complete.filter_map(|t| Some((t, t.value?))) {
-        let first = |p: &RepeatedPoint| trials.iter().find(|t| t.number == p.trials[0]);
-        let conditions = |t: &Trial| t.user_attributes.get(GAINS).cloned();
-        let known = points
-            .iter_mut()
-            .find(|p| same(&p.parameters, &trial.parameters) && first(p).map(conditions) == Some(conditions(trial)));
-        let stood = usize::from(!trial.is_fall());
-        match known {
-            Some(point) => {
-                point.trials.push(trial.number);
-                point.values.push(value);
-                point.stood += stood;
-            }
-            None => points.push(RepeatedPoint {
-                parameters: trial.parameters.clone(),
-                trials: vec![trial.number],
-                values: vec![value],
-                stood,
-            }),
+        let (parameters, gains) = (&trial.parameters, trial.user_attributes.get(GAINS));
+        let known = points.iter().position(|(g, point)| *g == gains && same(&point.parameters, parameters));
+        let index = known.unwrap_or(points.len());
+        if index == points.len() {
+            points.push((gains, RepeatedPoint { parameters: parameters.clone(), ..RepeatedPoint::default() }));
         }
+        let point = &mut points[index].1;
+        point.trials.push(trial.number);
+        point.values.push(value);
+        point.stood += usize::from(!trial.is_fall());
     }
-    points
+    points.into_iter().map(|(_, point)| point).collect()
 }
 
 fn same(a: &[(String, f64)], b: &[(String, f64)]) -> bool {

@@ -79,41 +79,22 @@ pub struct Space(Vec<Parameter>);
 
 /// Reason why a space cannot be searched.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[expect(missing_docs, reason = "the message of each variant has its meaning")]
 pub enum SpaceError {
-    /// No parameter.
     #[error("the space has no parameter: give at least one")]
     Empty,
-    /// Two parameters of one name.
     #[error("parameter `{0}` is given twice: names must differ")]
     Duplicate(String),
-    /// Bounds that are not a range.
     #[error(
         "parameter `{name}`: bounds {low}..{high} are not a range: both must be finite and low must not exceed high"
     )]
-    Bounds {
-        /// The parameter.
-        name: String,
-        /// Lower bound as given.
-        low: f64,
-        /// Upper bound as given.
-        high: f64,
-    },
-    /// A logarithmic range that is not positive.
+    Bounds { name: String, low: f64, high: f64 },
     #[error("parameter `{name}` is logarithmic, so its lower bound must be above 0, not {low}")]
-    LogBounds {
-        /// The parameter.
-        name: String,
-        /// Lower bound as given.
-        low: f64,
-    },
+    LogBounds { name: String, low: f64 },
 }
 
 impl Space {
-    /// Checks the parameters.
-    ///
-    /// # Errors
-    /// [`SpaceError`] without any parameter, for a name given twice, and for bounds that are not finite, reversed, or not
-    /// positive though logarithmic.
+    /// Checks the parameters: at least one, no name twice, bounds finite, ascending, and positive if logarithmic.
     pub fn new(parameters: impl IntoIterator<Item = (String, Range)>) -> Result<Self, SpaceError> {
         let mut space: Vec<Parameter> = Vec::new();
         for (name, range) in parameters {

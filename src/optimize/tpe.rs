@@ -117,18 +117,11 @@ impl TpeModel {
 /// Search coordinates, by parameter, of the trials that have every parameter.
 fn observations(trials: &[&Trial], parameters: &[Parameter], announced: bool) -> Vec<Vec<f64>> {
     let mut columns = vec![Vec::with_capacity(trials.len()); parameters.len()];
-    let mut row = Vec::with_capacity(parameters.len());
     for trial in trials {
         let sample = if announced && trial.state == TrialState::Running { trial.announced() } else { Vec::new() };
-        row.clear();
-        row.extend(
-            parameters.iter().map_while(|p| {
-                trial.parameter(&p.name).or_else(|| value_of(&sample, &p.name)).map(|v| p.range.inner(v))
-            }),
-        );
-        if row.len() == parameters.len() {
-            columns.iter_mut().zip(&row).for_each(|(column, x)| column.push(*x));
-        }
+        let value = |p: &Parameter| trial.parameter(&p.name).or_else(|| value_of(&sample, &p.name));
+        let row: Option<Vec<f64>> = parameters.iter().map(|p| Some(p.range.inner(value(p)?))).collect();
+        columns.iter_mut().zip(row.into_iter().flatten()).for_each(|(column, x)| column.push(x));
     }
     columns
 }

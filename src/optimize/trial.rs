@@ -36,16 +36,13 @@ impl TrialState {
 
 /// Distribution of a parameter of a trial.
 #[derive(Debug, Clone, PartialEq)]
+#[expect(missing_docs, reason = "the variant describes its fields")]
 pub enum Distribution {
     /// A float range.
     Float(Range),
-    /// An integer, stepped or categorical distribution of another program; left out of the joint space.
-    Foreign {
-        /// Kind, for example `IntDistribution`.
-        kind: String,
-        /// JSON text in the journal.
-        text: String,
-    },
+    /// An integer, stepped or categorical distribution of another program, left out of the joint space: its kind, for
+    /// example `IntDistribution`, and its JSON text in the journal.
+    Foreign { kind: String, text: String },
 }
 
 impl Distribution {
@@ -95,15 +92,11 @@ impl Trial {
 
     /// Sets or replaces a parameter.
     pub fn set(&mut self, name: &str, value: f64, distribution: Distribution) {
-        match self.parameters.iter().position(|(n, _)| n == name) {
-            Some(i) => {
-                self.parameters[i].1 = value;
-                self.distributions[i] = distribution;
-            }
-            None => {
-                self.parameters.push((name.to_owned(), value));
-                self.distributions.push(distribution);
-            }
+        if let Some(i) = self.parameters.iter().position(|(n, _)| n == name) {
+            (self.parameters[i].1, self.distributions[i]) = (value, distribution);
+        } else {
+            self.parameters.push((name.to_owned(), value));
+            self.distributions.push(distribution);
         }
     }
 
@@ -137,17 +130,9 @@ impl Trial {
     /// Sum of the positive constraint values: above 0 the trial is infeasible for Optuna.
     pub fn violation(&self) -> f64 {
         let positive = |v: &Value| number_of(v).unwrap_or(0.0).max(0.0);
-        let named: f64 = self
-            .system_attributes
-            .iter()
-            .filter(|(k, _)| k.starts_with("constraints:"))
-            .map(|(_, v)| positive(v))
-            .sum();
-        let listed: f64 = match self.system_attributes.get("constraints") {
-            Some(Value::Array(list)) => list.iter().map(positive).sum(),
-            _ => 0.0,
-        };
-        named + listed
+        let named = self.system_attributes.iter().filter(|(k, _)| k.starts_with("constraints:"));
+        let listed = self.system_attributes.get("constraints").and_then(Value::as_array).into_iter().flatten();
+        named.map(|(_, v)| positive(v)).sum::<f64>() + listed.map(positive).sum::<f64>()
     }
 }
 
@@ -162,17 +147,21 @@ pub const FIXED_PARAMS: &str = "fixed_params";
 /// Trial system attribute: the announced joint sample; its pieces have the suffixes `:0`, `:1` ...
 pub const RELATIVE_PARAMS: &str = "tpe:relative_params";
 
-/// The attributes that announce a joint sample: an object as JSON text, in pieces of 2045 characters.
+/// Text of an attribute in the pieces of 2045 characters in which Optuna and its dashboard store it.
+pub(super) fn pieces(text: &str) -> Vec<String> {
+    let characters: Vec<char> = text.chars().collect();
+    characters.chunks(2045).map(|piece| piece.iter().collect()).collect()
+}
+
+/// The attributes that announce a joint sample: an object as JSON text.
 pub fn announcement(joint: &[(String, f64)]) -> Vec<(String, Value)> {
     if joint.is_empty() {
         return Vec::new();
     }
     let members: Vec<String> =
         joint.iter().map(|(n, v)| format!("{}: {}", Value::from(n.as_str()), Value::from(*v))).collect();
-    let text: Vec<char> = format!("{{{}}}", members.join(", ")).chars().collect();
-    let piece =
-        |(i, c): (usize, &[char])| (format!("{RELATIVE_PARAMS}:{i}"), Value::from(c.iter().collect::<String>()));
-    text.chunks(2045).enumerate().map(piece).collect()
+    let text = format!("{{{}}}", members.join(", "));
+    pieces(&text).into_iter().enumerate().map(|(i, text)| (format!("{RELATIVE_PARAMS}:{i}"), text.into())).collect()
 }
 
 /// The value of parameter `name`.

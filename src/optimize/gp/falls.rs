@@ -87,10 +87,8 @@ impl StandProbability {
             if (next - objective).abs() < 1e-9 {
                 // ln q(y) = psi - sum ln L_ii   (R&W 3.32)
                 let evidence = next - (0..n).map(|i| log(factor.l_dirty()[(i, i)])).sum::<f64>();
-                return Some((
-                    StandProbability { points: points.to_vec(), hyper, trend, prior, gradient, root_w, factor },
-                    evidence,
-                ));
+                let fit = StandProbability { points: points.to_vec(), hyper, trend, prior, gradient, root_w, factor };
+                return Some((fit, evidence));
             }
             objective = next;
         }
@@ -99,10 +97,8 @@ impl StandProbability {
 
     /// The probability of standing at `x`, averaged over the uncertainty of the latent function.
     pub fn probability(&self, x: &[f64]) -> f64 {
-        let k = DVector::from_iterator(
-            self.points.len(),
-            self.points.iter().map(|p| kernel(&self.hyper, self.trend, p, x)),
-        );
+        let k = self.points.iter().map(|p| kernel(&self.hyper, self.trend, p, x));
+        let k = DVector::from_iterator(self.points.len(), k);
         let mean = self.prior + k.dot(&self.gradient);
         // v = L^-1 W^(1/2) k,  variance = k(x,x) - v'v   (R&W algorithm 3.2)
         let weighted = self.root_w.component_mul(&k);

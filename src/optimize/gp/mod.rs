@@ -43,17 +43,12 @@ pub fn propose(ask: &Ask<'_>, streams: &mut Streams) -> Candidate {
         return given.into_iter().flatten().collect::<Vec<f64>>().into();
     }
     let training = TrainingSet::gather(ask);
-    let model = if training.points.len() < ask.config.startup_trials(ask.space) || training.values.len() < 2 {
-        None
-    } else {
-        Acquisition::new(&training)
-    };
+    let enough = training.points.len() >= ask.config.startup_trials(ask.space) && training.values.len() >= 2;
+    let model = enough.then(|| Acquisition::new(&training)).flatten();
     let Some(model) = model else { return model_free::sobol(ask, streams) };
-    let bounds: Vec<(f64, f64)> = parameters
-        .iter()
-        .zip(&given)
-        .map(|(p, given)| given.map_or((0.0, 1.0), |v| (p.range.scale(v), p.range.scale(v))))
-        .collect();
+    let bound =
+        |(p, given): (&Parameter, &Option<f64>)| given.map_or((0.0, 1.0), |v| (p.range.scale(v), p.range.scale(v)));
+    let bounds: Vec<(f64, f64)> = parameters.iter().zip(&given).map(bound).collect();
     let unit = model.best_point(&bounds, streams);
     let values =
         parameters.iter().zip(&given).zip(unit).map(|((p, given), u)| given.unwrap_or_else(|| p.range.unscale(u)));

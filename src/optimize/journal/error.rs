@@ -4,53 +4,23 @@ use std::path::{Path, PathBuf};
 
 /// Errors of a journal.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the message of each variant has its meaning")]
 pub enum JournalError {
-    /// An operation of the operating system failed.
     #[error("cannot {action} {}: {source}", path.display())]
-    Io {
-        /// Operation.
-        action: &'static str,
-        /// File.
-        path: PathBuf,
-        /// Cause.
-        source: std::io::Error,
-    },
-    /// An invalid line.
+    Io { action: &'static str, path: PathBuf, source: std::io::Error },
     #[error(
         "{}, line {line}: {fault}. Every reader of this journal stops here: keep a copy, then remove or repair the line",
         path.display()
     )]
-    Line {
-        /// Path of the journal.
-        path: PathBuf,
-        /// Number of the line, from 1.
-        line: usize,
-        /// Fault of the line.
-        fault: String,
-    },
-    /// The file was truncated or replaced.
+    Line { path: PathBuf, line: usize, fault: String },
     #[error(
         "{} has {has} bytes, after {had} were read: it was shortened or replaced; open the study again",
         path.display()
     )]
-    Shortened {
-        /// Path of the journal.
-        path: PathBuf,
-        /// Bytes read earlier.
-        had: u64,
-        /// Present size, bytes.
-        has: u64,
-    },
-    /// The Redis server refused or could not be reached.
+    Shortened { path: PathBuf, had: u64, has: u64 },
+    /// The address has no password.
     #[error("cannot {action} the journal on the Redis server {address}: {source}")]
-    Redis {
-        /// Operation.
-        action: &'static str,
-        /// Address of the server, without password.
-        address: String,
-        /// Cause.
-        source: ::redis::RedisError,
-    },
+    Redis { action: &'static str, address: String, source: ::redis::RedisError },
 }
 
 impl JournalError {

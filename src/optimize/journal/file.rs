@@ -33,15 +33,13 @@ pub struct JournalFile {
 }
 
 /// The bytes after the last valid line: an incomplete or invalid line, removed before the next append.
+#[derive(Default)]
 pub(super) struct UnreadTail {
     bytes: Vec<u8>,
 }
 
 impl JournalFile {
     /// The journal at `path`, which need not exist.
-    ///
-    /// # Errors
-    /// If the folder cannot be created.
     pub fn new(path: &Path, durability: Durability, grace: Duration) -> Result<Self, JournalError> {
         // Absolute, because other programs resolve the lock's link from their own working directories.
         let path = std::path::absolute(path).map_err(|e| JournalError::io("resolve", path, e))?;
@@ -51,11 +49,6 @@ impl JournalFile {
         let mut lock = path.clone().into_os_string();
         lock.push(".lock");
         Ok(JournalFile { path, lock: lock.into(), durability, grace, offset: 0, lines: 0 })
-    }
-
-    /// Absolute path of the journal.
-    pub fn path(&self) -> &Path {
-        &self.path
     }
 
     /// Passes every line completed since the last call to `accept`, which returns the fault of an invalid line. A last line
@@ -69,18 +62,13 @@ impl JournalFile {
     ) -> Result<UnreadTail, JournalError> {
         let mut file = match File::open(&self.path) {
             Ok(file) => file,
-            Err(e) if e.kind() == ErrorKind::NotFound && self.offset == 0 => {
-                return Ok(UnreadTail { bytes: Vec::new() });
-            }
+            Err(e) if e.kind() == ErrorKind::NotFound && self.offset == 0 => return Ok(UnreadTail::default()),
             Err(e) => return Err(JournalError::io("open", &self.path, e)),
         };
         let io = |e| JournalError::io("read", &self.path, e);
         let length = file.metadata().map_err(io)?.len();
         if length < self.offset {
             return Err(JournalError::Shortened { path: self.path.clone(), had: self.offset, has: length });
-        }
-        if length == self.offset {
-            return Ok(UnreadTail { bytes: Vec::new() });
         }
         file.seek(SeekFrom::Start(self.offset)).map_err(io)?;
         let mut bytes = Vec::with_capacity((length - self.offset) as usize);
@@ -92,9 +80,7 @@ impl JournalFile {
                 Ok(()) => {}
                 // Writers remove an invalid last line; an invalid line before another stops every reader.
                 Err(_) if !bytes[end..].contains(&b'\n') => break,
-                Err(fault) => {
-                    return Err(JournalError::Line { path: self.path.clone(), line: self.lines + 1, fault });
-                }
+                Err(fault) => return Err(JournalError::Line { path: self.path.clone(), line: self.lines + 1, fault }),
             }
             self.lines += 1;
             self.offset += (end - start) as u64;
@@ -104,14 +90,12 @@ impl JournalFile {
     }
 
     /// Acquires the lock, waiting for other writers; a stale lock is broken.
-    ///
-    /// # Errors
-    /// If the lock cannot be created.
     pub(super) fn lock(&self) -> Result<JournalLock, JournalError> {
         let mut pause = Duration::from_millis(1);
         let mut seen: Option<(Option<SystemTime>, Instant)> = None;
         loop {
-            match make_link(&self.path, &self.lock) {
+            // A symbolic link to the journal, as Optuna's default lock.
+            match std::os::unix::fs::symlink(&self.path, &self.lock) {
                 Ok(()) => return Ok(JournalLock { path: self.lock.clone() }),
                 Err(e) if e.kind() == ErrorKind::AlreadyExists => {}
                 Err(e) => return Err(JournalError::io("lock", &self.lock, e)),
@@ -134,9 +118,6 @@ impl JournalFile {
     }
 
     /// Appends whole lines in one write. `_lock` proves that the lock is held; `rest` is first moved to `<path>.torn-<n>`.
-    ///
-    /// # Errors
-    /// If the file cannot be written or synced.
     pub(super) fn append(&self, _lock: &JournalLock, rest: &UnreadTail, lines: &str) -> Result<(), JournalError> {
         let io = |e| JournalError::io("append to", &self.path, e);
         let fresh = self.offset == 0 && !self.path.exists();
@@ -157,19 +138,15 @@ impl JournalFile {
     }
 
     fn keep_aside(&self, bytes: &[u8]) -> Result<(), JournalError> {
-        for n in 0.. {
+        let torn = |n: u32| {
             let mut name = self.path.clone().into_os_string();
             name.push(format!(".torn-{n}"));
-            let aside = PathBuf::from(name);
-            match OpenOptions::new().write(true).create_new(true).open(&aside) {
-                Ok(mut file) => {
-                    return file.write_all(bytes).map_err(|e| JournalError::io("keep a torn line in", &aside, e));
-                }
-                Err(e) if e.kind() == ErrorKind::AlreadyExists => {}
-                Err(e) => return Err(JournalError::io("keep a torn line in", &aside, e)),
-            }
-        }
-        unreachable!("one of all numbers is free")
+            PathBuf::from(name)
+        };
+        let aside = (0..).map(torn).find(|aside| !aside.exists()).expect("one of all numbers is free");
+        let created = OpenOptions::new().write(true).create_new(true).open(&aside);
+        let kept = created.and_then(|mut file| file.write_all(bytes));
+        kept.map_err(|e| JournalError::io("keep a torn line in", &aside, e))
     }
 }
 
@@ -192,15 +169,4 @@ fn release(lock: &Path) {
     if fs::rename(lock, &name).is_ok() {
         let _ = fs::remove_file(&name);
     }
-}
-
-/// Creates the lock: a symbolic link to the journal, as Optuna's default lock; a file on other systems.
-#[cfg(unix)]
-fn make_link(target: &Path, lock: &Path) -> std::io::Result<()> {
-    std::os::unix::fs::symlink(target, lock)
-}
-
-#[cfg(not(unix))]
-fn make_link(_target: &Path, lock: &Path) -> std::io::Result<()> {
-    OpenOptions::new().write(true).create_new(true).open(lock).map(|_| ())
 }

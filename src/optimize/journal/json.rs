@@ -3,7 +3,6 @@
 use crate::optimize::trial::{TrialState, number_of};
 use jiff::Timestamp;
 use serde_json::{Map, Value};
-use std::borrow::Cow;
 use std::fmt::Write as _;
 
 /// The members of a line; errors name the member.
@@ -103,7 +102,7 @@ pub fn parse_json(text: &str) -> Result<Value, String> {
         .map_err(|e| format!("not JSON: {e}"))
 }
 
-fn strictly(text: &str) -> Cow<'_, str> {
+fn strictly(text: &str) -> String {
     let mut out = String::with_capacity(text.len() + 16);
     let mut rest = text;
     let mut quoted = false;
@@ -127,7 +126,7 @@ fn strictly(text: &str) -> Cow<'_, str> {
         };
         rest = &rest[taken..];
     }
-    Cow::Owned(out)
+    out
 }
 
 /// Length of the escape at the start of `rest`, and its replacement.

@@ -12,10 +12,11 @@ mod operation;
 mod redis;
 mod state;
 
-pub use self::redis::JournalRedis;
+pub(super) use self::redis::JournalRedis;
 pub use error::JournalError;
+use file::UnreadTail;
 pub use file::{Durability, JournalFile, LOCK_GRACE};
-pub use operation::{Operation, TrialTemplate};
+pub use operation::{AttributeKind, Operation};
 pub use state::{Applied, JournalState, StudyRecord};
 
 /// Place of storage of the lines.
@@ -35,24 +36,16 @@ pub struct Journal {
 }
 
 impl Journal {
-    /// A journal in memory only.
-    pub fn in_memory() -> Self {
+    pub(super) fn in_memory() -> Self {
         Journal::new(JournalBackend::Memory)
     }
 
     /// The journal of a file, created by the first commit if it does not exist.
-    ///
-    /// # Errors
-    /// [`JournalError`] if the file cannot be read.
     pub fn open(file: JournalFile) -> Result<Self, JournalError> {
         Self::read(JournalBackend::File(file))
     }
 
-    /// The journal on a Redis server.
-    ///
-    /// # Errors
-    /// [`JournalError`] if the server cannot be reached or its journal cannot be read.
-    pub fn connect(redis: JournalRedis) -> Result<Self, JournalError> {
+    pub(super) fn connect(redis: JournalRedis) -> Result<Self, JournalError> {
         Self::read(JournalBackend::Redis(Box::new(redis)))
     }
 
@@ -81,15 +74,25 @@ impl Journal {
     }
 
     /// Reads the lines of other writers.
-    ///
-    /// # Errors
-    /// [`JournalError`] if the journal cannot be read.
     pub fn refresh(&mut self) -> Result<(), JournalError> {
-        match &mut self.backend {
-            JournalBackend::Memory => Ok(()),
-            JournalBackend::File(file) => file.read(|line| accept(&mut self.state, line).map(drop)).map(drop),
-            JournalBackend::Redis(redis) => redis.read(|line| accept(&mut self.state, line).map(drop)),
-        }
+        self.apply_lines().map(drop)
+    }
+
+    /// Applies new lines. Returns the results of this writer's own lines and what follows the last valid line.
+    fn apply_lines(&mut self) -> Result<(Vec<Applied>, UnreadTail), JournalError> {
+        let mut own = Vec::new();
+        let accept = |line: &str| {
+            let (worker, operation) = Operation::parse(line)?;
+            let result = self.state.apply(operation, &worker);
+            own.extend((worker == self.worker).then_some(result));
+            Ok(())
+        };
+        let tail = match &mut self.backend {
+            JournalBackend::Memory => UnreadTail::default(),
+            JournalBackend::File(file) => file.read(accept)?,
+            JournalBackend::Redis(redis) => redis.read(accept).map(|()| UnreadTail::default())?,
+        };
+        Ok((own, tail))
     }
 
     /// Appends the operations that `decide` returns for the newest state; no other line comes in between. `decide` is called
@@ -101,54 +104,25 @@ impl Journal {
         &mut self,
         mut decide: impl FnMut(&JournalState) -> Result<Vec<Operation>, E>,
     ) -> Result<Vec<Applied>, E> {
-        match &mut self.backend {
-            JournalBackend::Memory => {
-                let operations = decide(&self.state)?;
-                Ok(operations.into_iter().map(|o| self.state.apply(o, &self.worker)).collect())
+        loop {
+            let lock = if let JournalBackend::File(file) = &self.backend { Some(file.lock()?) } else { None };
+            let (_, tail) = self.apply_lines()?;
+            let operations = decide(&self.state)?;
+            let worker = &self.worker;
+            let lines = operations.iter().map(|operation| operation.to_line(worker));
+            let appended = match (&mut self.backend, &lock) {
+                _ if operations.is_empty() => return Ok(Vec::new()),
+                (JournalBackend::Redis(redis), _) => redis.append(&lines.collect::<Vec<_>>())?,
+                (JournalBackend::File(file), Some(lock)) => {
+                    file.append(lock, &tail, &lines.collect::<String>()).map(|()| true)?
+                }
+                _ => return Ok(operations.into_iter().map(|o| self.state.apply(o, &self.worker)).collect()),
+            };
+            drop(lock);
+            if appended {
+                return Ok(self.apply_lines()?.0);
             }
-            JournalBackend::File(file) => {
-                let lock = file.lock()?;
-                let rest = file.read(|line| accept(&mut self.state, line).map(drop))?;
-                let operations = decide(&self.state)?;
-                if operations.is_empty() {
-                    return Ok(Vec::new());
-                }
-                let lines: String = operations.iter().map(|o| o.to_line(&self.worker)).collect();
-                file.append(&lock, &rest, &lines)?;
-                drop(lock);
-                let mut applied = Vec::with_capacity(operations.len());
-                file.read(|line| collect(&mut self.state, line, &self.worker, &mut applied))?;
-                Ok(applied)
-            }
-            JournalBackend::Redis(redis) => loop {
-                redis.read(|line| accept(&mut self.state, line).map(drop))?;
-                let operations = decide(&self.state)?;
-                if operations.is_empty() {
-                    return Ok(Vec::new());
-                }
-                let lines: Vec<String> = operations.iter().map(|o| o.to_line(&self.worker)).collect();
-                if redis.append(&lines)? {
-                    let mut applied = Vec::with_capacity(operations.len());
-                    redis.read(|line| collect(&mut self.state, line, &self.worker, &mut applied))?;
-                    return Ok(applied);
-                }
-                std::thread::sleep(std::time::Duration::from_millis(1));
-            },
+            std::thread::sleep(std::time::Duration::from_millis(1));
         }
     }
-}
-
-fn accept(state: &mut JournalState, line: &str) -> Result<(String, Applied), String> {
-    let (worker, operation) = Operation::parse(line)?;
-    let result = state.apply(operation, &worker);
-    Ok((worker, result))
-}
-
-/// Accepts a line and stores its result if it is of writer `own`.
-fn collect(state: &mut JournalState, line: &str, own: &str, applied: &mut Vec<Applied>) -> Result<(), String> {
-    let (worker, result) = accept(state, line)?;
-    if worker == own {
-        applied.push(result);
-    }
-    Ok(())
 }

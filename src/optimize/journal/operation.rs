@@ -1,127 +1,61 @@
 //! The operations of which a journal consists.
 
-use crate::optimize::trial::{Distribution, FIXED_PARAMS, TrialState};
+use crate::optimize::trial::{Distribution, Trial, TrialState};
 use jiff::Timestamp;
-use serde_json::{Map, Value};
+use serde_json::Value;
 
-/// The operation of a journal line. Codes and members are those of Optuna's `JournalStorage` (`docs/journal.md`).
+/// The operation of a journal line. Codes and members are those of Optuna's `JournalStorage` (`docs/journal.md`). Studies
+/// and trials are given by their ids; those of trials are counted over all studies.
 #[derive(Debug, Clone, PartialEq)]
+#[expect(missing_docs, reason = "fields have the names of the journal's members")]
 pub enum Operation {
-    /// 0: a new study.
-    CreateStudy {
-        /// Name, unique among studies that are not deleted.
-        name: String,
-        /// Per objective: 0 not set, 1 minimize, 2 maximize.
-        directions: Vec<u64>,
-    },
+    /// 0: a new study; per objective 0 not set, 1 minimize, 2 maximize.
+    CreateStudy { name: String, directions: Vec<u64> },
     /// 1: deletion of a study.
-    DeleteStudy {
-        /// Id of the study.
-        study: usize,
-    },
-    /// 2: a user attribute of a study.
-    StudyUserAttribute {
-        /// Id of the study.
-        study: usize,
-        /// Name.
-        key: String,
-        /// Value.
-        value: Value,
-    },
-    /// 3: a system attribute of a study.
-    StudySystemAttribute {
-        /// Id of the study.
-        study: usize,
-        /// Name.
-        key: String,
-        /// Value.
-        value: Value,
-    },
-    /// 4: a new trial, running unless the template has another state.
-    CreateTrial {
-        /// Id of the study.
-        study: usize,
-        /// Time of the beginning.
-        started: Option<Timestamp>,
-        /// Contents of an enqueued or imported trial.
-        template: Option<Box<TrialTemplate>>,
-    },
-    /// 5: a parameter of a running trial.
-    SetParameter {
-        /// Id of the trial, counted over all studies.
-        trial: u64,
-        /// Name.
-        name: String,
-        /// Value in the representation of the distribution; a float's own value.
-        value: f64,
-        /// Distribution.
-        distribution: Distribution,
-    },
-    /// 6: beginning or end of a trial.
-    SetState {
-        /// Id of the trial.
-        trial: u64,
-        /// New state.
-        state: TrialState,
-        /// Values of the objectives of a complete trial.
-        values: Option<Vec<f64>>,
-        /// Time of the change.
-        at: Option<Timestamp>,
-    },
+    DeleteStudy { study: usize },
+    /// 2, 3: an attribute of a study.
+    StudyAttribute { study: usize, kind: AttributeKind, key: String, value: Value },
+    /// 4: a new trial, running unless the template, the contents of an enqueued or imported trial, has another state.
+    CreateTrial { study: usize, started: Option<Timestamp>, template: Option<Box<Trial>> },
+    /// 5: a parameter of a running trial, its value in the representation of the distribution; a float's own value.
+    SetParameter { trial: u64, name: String, value: f64, distribution: Distribution },
+    /// 6: beginning or end of a trial, with the values of the objectives of a complete one.
+    SetState { trial: u64, state: TrialState, values: Option<Vec<f64>>, at: Option<Timestamp> },
     /// 7: an intermediate value.
-    SetIntermediate {
-        /// Id of the trial.
-        trial: u64,
-        /// Step.
-        step: i64,
-        /// Value.
-        value: f64,
-    },
-    /// 8: a user attribute of a trial.
-    TrialUserAttribute {
-        /// Id of the trial.
-        trial: u64,
-        /// Name.
-        key: String,
-        /// Value.
-        value: Value,
-    },
-    /// 9: a system attribute of a trial.
-    TrialSystemAttribute {
-        /// Id of the trial.
-        trial: u64,
-        /// Name.
-        key: String,
-        /// Value.
-        value: Value,
-    },
+    SetIntermediate { trial: u64, step: i64, value: f64 },
+    /// 8, 9: an attribute of a trial.
+    TrialAttribute { trial: u64, kind: AttributeKind, key: String, value: Value },
     /// 10: without effect, as in Optuna 5; written by other programs.
     Nothing,
 }
 
-/// The contents of an enqueued or imported trial.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct TrialTemplate {
-    /// State.
-    pub state: TrialState,
-    /// Values of the objectives.
-    pub values: Option<Vec<f64>>,
-    /// Time of the end.
-    pub completed: Option<Timestamp>,
-    /// Parameters with their distributions.
-    pub parameters: Vec<(String, f64, Distribution)>,
-    /// User attributes.
-    pub user_attributes: Map<String, Value>,
-    /// System attributes.
-    pub system_attributes: Map<String, Value>,
-    /// Intermediate values by step.
-    pub intermediate: Vec<(i64, f64)>,
+impl Operation {
+    pub(crate) fn study_attribute(study: usize, kind: AttributeKind, key: &str, value: impl Into<Value>) -> Self {
+        Operation::StudyAttribute { study, kind, key: key.to_owned(), value: value.into() }
+    }
+
+    pub(crate) fn trial_attribute(trial: u64, kind: AttributeKind, key: &str, value: impl Into<Value>) -> Self {
+        Operation::TrialAttribute { trial, kind, key: key.to_owned(), value: value.into() }
+    }
 }
 
-impl TrialTemplate {
-    /// A waiting trial with the given parameters.
-    pub fn waiting(fixed: Map<String, Value>, user_attributes: Map<String, Value>) -> Self {
-        let system_attributes = Map::from_iter([(FIXED_PARAMS.to_owned(), Value::Object(fixed))]);
-        TrialTemplate { state: TrialState::Waiting, user_attributes, system_attributes, ..TrialTemplate::default() }
+/// The two kinds of attributes; the discriminants are added to the code of the operation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum AttributeKind {
+    /// Set by a program.
+    User = 0,
+    /// Set by Optuna, a sampler or the dashboard.
+    System = 1,
+}
+
+impl AttributeKind {
+    /// The member of a journal line that holds the attribute.
+    pub(super) fn member(self) -> &'static str {
+        self.of("user_attr", "system_attr")
+    }
+
+    /// The one of two values that belongs to this kind.
+    pub(super) fn of<T>(self, user: T, system: T) -> T {
+        if self == AttributeKind::User { user } else { system }
     }
 }

@@ -35,9 +35,6 @@ pub struct JournalRedis {
 
 impl JournalRedis {
     /// The journal of the server at `url` (`redis://host:port/db`) under the key prefix `prefix`; does not connect.
-    ///
-    /// # Errors
-    /// If the address is invalid.
     pub fn new(url: &str, prefix: &str) -> Result<Self, JournalError> {
         let refuse = |source| JournalError::Redis { action: "parse the address of", address: url.to_owned(), source };
         let info = url.into_connection_info().map_err(refuse)?;
@@ -58,13 +55,11 @@ impl JournalRedis {
             let batch: Vec<Option<String>> = self.ask("read", |c| redis::cmd("MGET").arg(&keys).query(c))?;
             for line in batch {
                 let Some(line) = line else { return Ok(()) };
-                match accept(line.trim_end()) {
-                    Ok(()) => self.lines += 1,
-                    Err(fault) => {
-                        let path = format!("{}, key {}:log:{}", self.address, self.prefix, self.lines).into();
-                        return Err(JournalError::Line { path, line: self.lines as usize + 1, fault });
-                    }
-                }
+                accept(line.trim_end()).map_err(|fault| {
+                    let path = format!("{}, key {}:log:{}", self.address, self.prefix, self.lines).into();
+                    JournalError::Line { path, line: self.lines as usize + 1, fault }
+                })?;
+                self.lines += 1;
             }
         }
         Ok(())

@@ -1,6 +1,6 @@
 //! The state of a journal: the result of all its lines by Optuna's rules of acceptance (`docs/journal.md`).
 
-use super::operation::{Operation, TrialTemplate};
+use super::operation::Operation;
 use crate::optimize::trial::{Distribution, Trial, TrialState};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -74,23 +74,17 @@ impl JournalState {
                 free
             }
             Operation::DeleteStudy { study } => self.study(study).map(|s| s.deleted = true).is_some(),
-            Operation::StudyUserAttribute { study, key, value } => {
-                self.study(study).map(|s| s.user_attributes.insert(key, value)).is_some()
-            }
-            Operation::StudySystemAttribute { study, key, value } => {
-                self.study(study).map(|s| s.system_attributes.insert(key, value)).is_some()
+            Operation::StudyAttribute { study, kind, key, value } => {
+                let study = self.study(study);
+                study.map(|s| kind.of(&mut s.user_attributes, &mut s.system_attributes).insert(key, value)).is_some()
             }
             Operation::CreateTrial { study, started, template } => {
                 let id = self.trials.len() as u64;
                 let Some(record) = self.study(study) else { return Applied::Ignored };
-                let number = record.trials.len();
-                let mut trial = Trial::new(number as u32, TrialState::Running);
-                (trial.id, trial.started, trial.worker) = (id, started, worker.to_owned());
-                if let Some(template) = template {
-                    fill(&mut trial, *template);
-                }
-                record.trials.push(trial);
-                self.trials.push((study, number));
+                let (index, worker) = (record.trials.len(), worker.to_owned());
+                let template = template.map_or_else(Trial::default, |template| *template);
+                record.trials.push(Trial { number: index as u32, id, started, worker, ..template });
+                self.trials.push((study, index));
                 return Applied::Created(id);
             }
             Operation::SetParameter { trial, name, value, distribution } => {
@@ -116,11 +110,9 @@ impl JournalState {
             Operation::SetIntermediate { trial, step, value } => {
                 self.unfinished(trial).map(|t| t.intermediate.insert(step, value)).is_some()
             }
-            Operation::TrialUserAttribute { trial, key, value } => {
-                self.unfinished(trial).map(|t| t.user_attributes.insert(key, value)).is_some()
-            }
-            Operation::TrialSystemAttribute { trial, key, value } => {
-                self.unfinished(trial).map(|t| t.system_attributes.insert(key, value)).is_some()
+            Operation::TrialAttribute { trial, kind, key, value } => {
+                let trial = self.unfinished(trial);
+                trial.map(|t| kind.of(&mut t.user_attributes, &mut t.system_attributes).insert(key, value)).is_some()
             }
             Operation::Nothing => false,
         };
@@ -149,16 +141,4 @@ impl JournalState {
             | (Some(Distribution::Foreign { kind, .. }), Distribution::Float(_)) => kind == "FloatDistribution",
         }
     }
-}
-
-fn fill(trial: &mut Trial, template: TrialTemplate) {
-    trial.state = template.state;
-    trial.value = template.values.and_then(|v| v.first().copied());
-    trial.completed = template.completed;
-    for (name, value, distribution) in template.parameters {
-        trial.set(&name, value, distribution);
-    }
-    trial.intermediate = template.intermediate.into_iter().collect();
-    trial.user_attributes = template.user_attributes.into_iter().collect();
-    trial.system_attributes = template.system_attributes.into_iter().collect();
 }

@@ -31,22 +31,16 @@ impl Study {
     pub(super) fn check_parameters(&self, parameters: &[(String, f64)]) -> Result<(), StudyError> {
         for (name, value) in parameters {
             let Some(range) = self.options.space.range(name) else {
-                let known =
-                    self.options.space.parameters().iter().map(|p| p.name.as_str()).collect::<Vec<_>>().join(", ");
-                return Err(StudyError::UnknownParameter {
-                    study: self.options.name.clone(),
-                    parameter: name.clone(),
-                    known,
-                });
+                let known: Vec<&str> = self.options.space.parameters().iter().map(|p| p.name.as_str()).collect();
+                let (study, parameter, known) = (self.options.name.clone(), name.clone(), known.join(", "));
+                return Err(StudyError::UnknownParameter { study, parameter, known });
             };
-            let quantity = || format!("parameter `{name}`");
-            if !value.is_finite() {
-                return Err(StudyError::Value { quantity: quantity(), value: *value, expected: "finite number" });
-            }
-            if range.log && *value <= 0.0 {
-                let expected = "number above 0: its search is logarithmic";
-                return Err(StudyError::Value { quantity: quantity(), value: *value, expected });
-            }
+            let expected = match value {
+                value if !value.is_finite() => "finite number",
+                value if range.log && *value <= 0.0 => "number above 0: its search is logarithmic",
+                _ => continue,
+            };
+            return Err(StudyError::Value { quantity: format!("parameter `{name}`"), value: *value, expected });
         }
         Ok(())
     }

@@ -2,7 +2,7 @@
 
 use super::{Study, StudyError, StudyOptions, user_attributes};
 use crate::optimize::ask::{Ask, Draws};
-use crate::optimize::journal::Operation;
+use crate::optimize::journal::{AttributeKind, Operation};
 use crate::optimize::sampler::propose;
 use crate::optimize::space::{Parameter, Range};
 use crate::optimize::trial::{Distribution, FIXED_PARAMS, Trial, TrialState, announcement, value_of};
@@ -31,12 +31,8 @@ pub struct SuggestedParameter {
     pub value: f64,
     /// Whether the value was given, not suggested by the sampler.
     pub fixed: bool,
-    /// Lower bound.
-    pub low: f64,
-    /// Upper bound.
-    pub high: f64,
-    /// Whether the search is logarithmic.
-    pub log: bool,
+    /// Bounds and scale of the search.
+    pub range: Range,
 }
 
 /// A proposal without effect on the study.
@@ -85,9 +81,7 @@ impl Study {
             name: p.name.clone(),
             value,
             fixed: value_of(&given, &p.name).is_some(),
-            low: p.range.low,
-            high: p.range.high,
-            log: p.range.log,
+            range: p.range,
         };
         TrialDraft {
             number: waiting.map_or(trials.len() as u32, |t| t.number),
@@ -113,8 +107,7 @@ impl Study {
     ///
     /// # Errors
     /// [`StudyError::StaleDraft`] if another trial has begun from the same streams, or another worker has begun the enqueued
-    /// trial; [`StudyError::UnknownParameter`] or [`StudyError::Value`] for an invalid override; journal errors. The study
-    /// is unchanged then.
+    /// trial; [`StudyError::UnknownParameter`] or [`StudyError::Value`] for an override. The study is unchanged then.
     pub fn begin(
         &mut self,
         draft: &TrialDraft,
@@ -125,10 +118,7 @@ impl Study {
     }
 
     /// [`Study::begin`] if `room`, called with all trials while the journal is locked, returns true: workers on a shared
-    /// journal keep a common budget exactly.
-    ///
-    /// # Errors
-    /// As [`Study::begin`]; [`StudyError::Full`] if `room` returns false.
+    /// journal keep a common budget exactly. [`StudyError::Full`] if it returns false.
     pub fn begin_if(
         &mut self,
         draft: &TrialDraft,
@@ -141,9 +131,9 @@ impl Study {
         if draft.before != self.streams.draws() || draft.seed != self.options.sampler.seed {
             return Err(stale());
         }
-        let given: Vec<(String, f64)> =
-            merged(draft.parameters.iter().filter(|s| s.fixed).map(|s| (s.name.clone(), s.value)).collect(), overrides);
-        let nothing_drawn = draft.parameters.iter().all(|s| value_of(&given, &s.name).is_some() || s.low == s.high);
+        let fixed = draft.parameters.iter().filter(|s| s.fixed).map(|s| (s.name.clone(), s.value));
+        let given = merged(fixed.collect(), overrides);
+        let nothing_drawn = draft.parameters.iter().all(|s| value_of(&given, &s.name).is_some() || s.range.is_point());
         let draws = if nothing_drawn { draft.before } else { draft.after };
         let (study, seed) = (self.id, draft.seed);
         let mut id = 0;
@@ -151,42 +141,28 @@ impl Study {
             if !journal.studies().get(study).is_some_and(|record| room(&record.trials)) {
                 return Err(StudyError::Full);
             }
-            let now = Timestamp::now();
-            let mut operations = Vec::new();
-            match draft.waiting {
-                Some(waiting) => {
-                    id = waiting;
-                    if journal.trial(id).is_none_or(|t| t.state != TrialState::Waiting) {
-                        return Err(stale());
-                    }
-                    let state = TrialState::Running;
-                    operations.push(Operation::SetState { trial: id, state, values: None, at: Some(now) });
+            id = draft.waiting.unwrap_or(journal.next_trial_id());
+            let (waiting, now) = (journal.trial(id).map(|t| t.state), Some(Timestamp::now()));
+            let mut operations = match (draft.waiting, waiting) {
+                (None, _) => vec![Operation::CreateTrial { study, started: now, template: None }],
+                (_, Some(TrialState::Waiting)) => {
+                    vec![Operation::SetState { trial: id, state: TrialState::Running, values: None, at: now }]
                 }
-                None => {
-                    id = journal.next_trial_id();
-                    operations.push(Operation::CreateTrial { study, started: Some(now), template: None });
-                }
-            }
+                _ => return Err(stale()),
+            };
             let mut system = announcement(&draft.joint);
             if !given.is_empty() {
                 let object = given.iter().map(|(n, v)| (n.clone(), Value::from(*v))).collect();
                 system.push((FIXED_PARAMS.to_owned(), Value::Object(object)));
             }
             system.push((DRAWS.to_owned(), json!(StreamPosition { seed, draws })));
-            operations.extend(system.into_iter().map(|(key, value)| Operation::TrialSystemAttribute {
-                trial: id,
-                key,
-                value,
-            }));
+            let set =
+                |(key, value): (String, Value)| Operation::trial_attribute(id, AttributeKind::System, &key, value);
+            operations.extend(system.into_iter().map(set));
             operations.extend(draft.parameters.iter().map(|s| {
                 let value = value_of(overrides, &s.name).unwrap_or(s.value);
-                let range = Range { low: s.low, high: s.high, log: s.log };
-                Operation::SetParameter {
-                    trial: id,
-                    name: s.name.clone(),
-                    value,
-                    distribution: Distribution::Float(range),
-                }
+                let distribution = Distribution::Float(s.range);
+                Operation::SetParameter { trial: id, name: s.name.clone(), value, distribution }
             }));
             operations.extend(user_attributes(id, attributes));
             Ok(operations)

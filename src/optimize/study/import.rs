@@ -4,7 +4,7 @@ use jiff::Timestamp;
 
 use super::{Study, StudyError};
 use crate::optimize::exchange::TableTrial;
-use crate::optimize::journal::{Applied, JournalError, Operation, TrialTemplate};
+use crate::optimize::journal::{JournalError, Operation};
 use crate::optimize::trial::{Distribution, Trial, TrialState};
 
 impl Study {
@@ -23,17 +23,15 @@ impl Study {
                 return Err(StudyError::State { trial: row, state: trial.state, action });
             }
             self.check_point(&trial.parameters)?;
-            let parameter = |(name, value): &(String, f64)| {
-                let range = self.options.space.range(name)?;
-                Some((name.clone(), *value, Distribution::Float(range)))
-            };
-            let template = TrialTemplate {
+            let range = |(name, _): &(String, f64)| self.options.space.range(name).map(Distribution::Float);
+            let template = Trial {
                 state: trial.state,
-                values: trial.value.filter(|_| trial.state != TrialState::Fail).map(|value| vec![value]),
+                value: trial.value.filter(|_| trial.state != TrialState::Fail),
                 completed: trial.completed.or(trial.started).or_else(|| Some(Timestamp::now())),
-                parameters: trial.parameters.iter().filter_map(parameter).collect(),
-                user_attributes: trial.attributes.clone(),
-                ..TrialTemplate::default()
+                parameters: trial.parameters.clone(),
+                distributions: trial.parameters.iter().filter_map(range).collect(),
+                user_attributes: trial.attributes.clone().into_iter().collect(),
+                ..Trial::default()
             };
             let started = trial.started.or(template.completed);
             let create = Operation::CreateTrial { study: self.id, started, template: Some(Box::new(template)) };
@@ -53,17 +51,10 @@ impl Study {
             let new = creations.iter().filter(|(row, _)| is_new(row)).map(|(_, create)| create.clone());
             Ok::<_, JournalError>(new.collect())
         })?;
-        let created = applied.iter().filter_map(|result| match result {
-            Applied::Created(id) => self.journal.state().trial(*id).map(|trial| trial.number),
-            _ => None,
-        });
-        Ok(created.collect())
+        Ok(self.created(&applied).collect())
     }
 
     /// Checks that the parameters of a point exist and lie within the present bounds.
-    ///
-    /// # Errors
-    /// [`StudyError::UnknownParameter`], [`StudyError::Value`] or [`StudyError::Outside`].
     pub fn check_point(&self, point: &[(String, f64)]) -> Result<(), StudyError> {
         self.check_parameters(point)?;
         let outside = point.iter().find_map(|(name, value)| {

@@ -20,7 +20,7 @@ pub use storage::Storage;
 pub use workers::worker_seed;
 
 use crate::optimize::ask::{Direction, SamplerConfig, Streams};
-use crate::optimize::journal::{Durability, Journal, JournalError, Operation, StudyRecord};
+use crate::optimize::journal::{Applied, AttributeKind, Durability, Journal, JournalError, Operation, StudyRecord};
 use crate::optimize::repeats;
 use crate::optimize::space::Space;
 use crate::optimize::trial::{Trial, TrialState};
@@ -79,18 +79,13 @@ pub struct Study {
 
 impl Study {
     /// Creates the study, or continues the one of that name. Trials of a session that was killed are still running; see
-    /// [`Study::running`].
-    ///
-    /// # Errors
-    /// If the journal cannot be read or written, or has a study of that name with another direction or another scale of a
-    /// parameter.
+    /// [`Study::running`]. A study of that name with another direction or another scale of a parameter is refused.
     pub fn open(storage: Storage, options: StudyOptions) -> Result<Study, StudyError> {
         let mut journal = storage.journal(options.durability)?;
         if journal.state().find(&options.name).is_none() {
             journal.commit(|journal| {
                 let exists = journal.find(&options.name).is_some();
-                let id = journal.studies().len();
-                Ok::<_, JournalError>(if exists { Vec::new() } else { creation(id, &options) })
+                Ok::<_, JournalError>(if exists { Vec::new() } else { creation(journal.studies().len(), &options) })
             })?;
         }
         let Some(id) = journal.state().find(&options.name) else { return Err(StudyError::Gone(options.name)) };
@@ -102,9 +97,6 @@ impl Study {
     }
 
     /// Reads the lines of other writers.
-    ///
-    /// # Errors
-    /// If the journal cannot be read.
     pub fn refresh(&mut self) -> Result<(), StudyError> {
         Ok(self.journal.refresh()?)
     }
@@ -112,19 +104,13 @@ impl Study {
     /// Copies the study to memory: its changes are not stored, and its next proposal is the one that this study would make
     /// after the same changes.
     pub fn fork(&self) -> Study {
-        Study {
-            journal: self.journal.fork(),
-            id: self.id,
-            options: self.options.clone(),
-            streams: self.streams.clone(),
-        }
+        let (options, streams) = (self.options.clone(), self.streams.clone());
+        Study { journal: self.journal.fork(), id: self.id, options, streams }
     }
 
     /// Replaces the search space; only bounds may differ. As in Optuna, a parameter whose bounds have changed leaves the
-    /// joint space and is sampled separately; earlier trials outside the new bounds stay in the history.
-    ///
-    /// # Errors
-    /// [`StudyError::Incompatible`] if the scale of a parameter differs from the stored one; the space is unchanged then.
+    /// joint space and is sampled separately; earlier trials outside the new bounds stay in the history. With
+    /// [`StudyError::Incompatible`], for a scale that differs from the stored one, the space is unchanged.
     pub fn search(&mut self, space: Space) -> Result<(), StudyError> {
         let before = std::mem::replace(&mut self.options.space, space);
         self.check_compatible().inspect_err(|_| self.options.space = before)
@@ -135,10 +121,7 @@ impl Study {
         &self.record().trials
     }
 
-    /// The trial of that number.
-    ///
-    /// # Errors
-    /// [`StudyError::UnknownTrial`] if there is none.
+    /// The trial of that number, or [`StudyError::UnknownTrial`].
     pub fn trial(&self, number: u32) -> Result<&Trial, StudyError> {
         let (study, count) = (self.options.name.clone(), self.trials().len());
         self.trials().get(number as usize).ok_or(StudyError::UnknownTrial { study, trial: number, count })
@@ -174,6 +157,14 @@ impl Study {
         self.journal.worker()
     }
 
+    /// Numbers of the trials that a commit has created.
+    fn created(&self, applied: &[Applied]) -> impl Iterator<Item = u32> {
+        applied.iter().filter_map(|result| match result {
+            Applied::Created(id) => self.journal.state().trial(*id).map(|trial| trial.number),
+            _ => None,
+        })
+    }
+
     fn record(&self) -> &StudyRecord {
         &self.journal.state().studies()[self.id]
     }
@@ -182,21 +173,21 @@ impl Study {
 /// The operations that create a study.
 fn creation(study: usize, options: &StudyOptions) -> Vec<Operation> {
     let create = Operation::CreateStudy { name: options.name.clone(), directions: vec![options.direction as u64] };
-    let metric = Operation::StudySystemAttribute {
-        study,
-        key: METRIC_NAMES.to_owned(),
-        value: Value::from(vec![options.metric.clone()]),
+    let metric = vec![options.metric.clone()];
+    let metric = Operation::study_attribute(study, AttributeKind::System, METRIC_NAMES, metric);
+    [create, metric].into_iter().chain(study_attributes(study, &options.attributes)).collect()
+}
+
+fn study_attributes(study: usize, attributes: &[(String, Value)]) -> impl Iterator<Item = Operation> {
+    let set = move |(key, value): &(String, Value)| {
+        Operation::study_attribute(study, AttributeKind::User, key, value.clone())
     };
-    let attribute = |(key, value): &(String, Value)| {
-        let (key, value) = (key.clone(), value.clone());
-        Operation::StudyUserAttribute { study, key, value }
-    };
-    [create, metric].into_iter().chain(options.attributes.iter().map(attribute)).collect()
+    attributes.iter().map(set)
 }
 
 fn user_attributes(trial: u64, attributes: &[(String, Value)]) -> impl Iterator<Item = Operation> {
-    attributes.iter().map(move |(key, value)| {
-        let (key, value) = (key.clone(), value.clone());
-        Operation::TrialUserAttribute { trial, key, value }
-    })
+    let set = move |(key, value): &(String, Value)| {
+        Operation::trial_attribute(trial, AttributeKind::User, key, value.clone())
+    };
+    attributes.iter().map(set)
 }

@@ -2,17 +2,12 @@
 //! end of a trial.
 
 use super::{Study, StudyError};
-use crate::optimize::journal::{JournalError, Operation};
+use crate::optimize::journal::{AttributeKind, JournalError, Operation};
+use crate::optimize::trial::pieces;
 use serde_json::Value;
-
-/// Characters per piece of a note of the dashboard.
-const NOTE_PIECE: usize = 2045;
 
 impl Study {
     /// Writes or replaces the note (Markdown) that the dashboard shows with a trial, also with a finished one.
-    ///
-    /// # Errors
-    /// [`StudyError::UnknownTrial`], or journal errors.
     pub fn note(&mut self, trial: u32, text: &str) -> Result<(), StudyError> {
         let id = self.trial(trial)?.id;
         let study = self.id;
@@ -20,15 +15,14 @@ impl Study {
             let attributes = &journal.studies()[study].system_attributes;
             let version = format!("dashboard:{id}:note_ver");
             let next = attributes.get(&version).and_then(Value::as_u64).map_or(1, |v| v + 1);
-            let characters: Vec<char> = text.chars().collect();
-            let mut pieces: Vec<String> = characters.chunks(NOTE_PIECE).map(|c| c.iter().collect()).collect();
+            let mut pieces = pieces(text);
             let key = |i: usize| format!("dashboard:{id}:note_str:{i}");
             while attributes.contains_key(&key(pieces.len())) {
                 pieces.push(String::new()); // left over from a longer note
             }
-            let set = |key, value| Operation::StudySystemAttribute { study, key, value };
-            let pieces = pieces.into_iter().enumerate().map(|(i, piece)| set(key(i), Value::from(piece)));
-            Ok::<_, JournalError>(std::iter::once(set(version.clone(), Value::from(next))).chain(pieces).collect())
+            let set = |key: &str, value| Operation::study_attribute(study, AttributeKind::System, key, value);
+            let pieces = pieces.into_iter().enumerate().map(|(i, piece)| set(&key(i), Value::from(piece)));
+            Ok::<_, JournalError>(std::iter::once(set(&version, Value::from(next))).chain(pieces).collect())
         })?;
         Ok(())
     }

@@ -17,9 +17,6 @@ pub enum Storage {
 
 impl Storage {
     /// Opens the journal.
-    ///
-    /// # Errors
-    /// If the journal cannot be read.
     pub fn journal(&self, durability: Durability) -> Result<Journal, JournalError> {
         match self {
             Storage::Memory => Ok(Journal::in_memory()),

@@ -3,15 +3,13 @@
 use jiff::Timestamp;
 use serde_json::{Map, Value};
 
-use super::{Outcome, Study, StudyError, TellOutcome, user_attributes};
-use crate::optimize::journal::{Applied, JournalError, Operation, TrialTemplate};
-use crate::optimize::trial::{Trial, TrialState};
+use super::{Outcome, Study, StudyError, TellOutcome, study_attributes, user_attributes};
+use crate::optimize::journal::{Applied, JournalError, Operation};
+use crate::optimize::trial::{FIXED_PARAMS, Trial, TrialState};
 
 impl Study {
-    /// Sets user attributes of a running or waiting trial: verdict, cause, measured terms.
-    ///
-    /// # Errors
-    /// [`StudyError::State`] if the trial is finished and thus immutable; use [`Study::note`].
+    /// Sets user attributes of a running or waiting trial: verdict, cause, measured terms. A finished trial is immutable
+    /// ([`StudyError::State`]), see [`Study::note`].
     pub fn annotate(&mut self, trial: u32, attributes: &[(String, Value)]) -> Result<(), StudyError> {
         let id = self.trial(trial)?.id;
         self.journal.commit(|journal| match journal.trial(id) {
@@ -34,10 +32,8 @@ impl Study {
     }
 
     /// Sets user attributes and finishes a trial in one commit, if `holds(trial)` is true while the journal is locked.
-    /// Otherwise nothing is recorded and the answer is [`TellOutcome::AlreadyFinished`].
-    ///
-    /// # Errors
-    /// As [`Study::tell`].
+    /// Otherwise nothing is recorded and the answer is [`TellOutcome::AlreadyFinished`]. Errors are those of
+    /// [`Study::tell`].
     pub fn tell_if(
         &mut self,
         trial: u32,
@@ -66,16 +62,11 @@ impl Study {
                 Ok(user_attributes(id, attributes).chain([end]).collect())
             }
         })?;
-        Ok(if applied.last() == Some(&Applied::Accepted) {
-            TellOutcome::Recorded
-        } else {
-            TellOutcome::AlreadyFinished
-        })
+        let recorded = applied.last() == Some(&Applied::Accepted);
+        Ok(if recorded { TellOutcome::Recorded } else { TellOutcome::AlreadyFinished })
     }
 
-    /// Enqueues a trial with the given parameters; the others are suggested when it begins. Returns its number.
-    ///
-    /// # Errors
+    /// Enqueues a trial with the given parameters; the others are suggested when it begins. Returns its number, or
     /// [`StudyError::UnknownParameter`] or [`StudyError::Value`] for an invalid parameter.
     pub fn enqueue(&mut self, parameters: &[(String, f64)], attributes: &[(String, Value)]) -> Result<u32, StudyError> {
         let queued = self.enqueue_unless(parameters, attributes, |_| false)?;
@@ -84,9 +75,6 @@ impl Study {
 
     /// [`Study::enqueue`] unless `done`, called with all trials while the journal is locked, returns true: of several workers
     /// only one enqueues. Returns `None` if `done` was true.
-    ///
-    /// # Errors
-    /// As [`Study::enqueue`].
     pub fn enqueue_unless(
         &mut self,
         parameters: &[(String, f64)],
@@ -95,29 +83,25 @@ impl Study {
     ) -> Result<Option<u32>, StudyError> {
         self.check_parameters(parameters)?;
         let fixed: Map<String, Value> = parameters.iter().map(|(n, v)| (n.clone(), Value::from(*v))).collect();
-        let user: Map<String, Value> = attributes.iter().cloned().collect();
-        let template = Some(Box::new(TrialTemplate::waiting(fixed, user)));
+        let template = Trial {
+            state: TrialState::Waiting,
+            user_attributes: attributes.iter().cloned().collect(),
+            system_attributes: [(FIXED_PARAMS.to_owned(), Value::Object(fixed))].into(),
+            ..Trial::default()
+        };
         let study = self.id;
-        let create = Operation::CreateTrial { study, started: None, template };
+        let create = Operation::CreateTrial { study, started: None, template: Some(Box::new(template)) };
         let applied = self.journal.commit(|journal| {
             let needed = journal.studies().get(study).is_some_and(|record| !done(&record.trials));
             Ok::<_, JournalError>(if needed { vec![create.clone()] } else { Vec::new() })
         })?;
-        let created = applied.iter().find_map(|e| if let Applied::Created(id) = e { Some(*id) } else { None });
-        Ok(created.and_then(|id| self.journal.state().trial(id)).map(|t| t.number))
+        Ok(self.created(&applied).next())
     }
 
     /// Sets user attributes of the study.
-    ///
-    /// # Errors
-    /// Journal errors.
     pub fn annotate_study(&mut self, attributes: &[(String, Value)]) -> Result<(), StudyError> {
         let study = self.id;
-        let set = |(key, value): &(String, Value)| {
-            let (key, value) = (key.clone(), value.clone());
-            Operation::StudyUserAttribute { study, key, value }
-        };
-        self.journal.commit(|_| Ok::<_, JournalError>(attributes.iter().map(set).collect()))?;
+        self.journal.commit(|_| Ok::<_, JournalError>(study_attributes(study, attributes).collect()))?;
         Ok(())
     }
 }

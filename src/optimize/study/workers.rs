@@ -1,10 +1,8 @@
 //! Workers of a shared study.
 
-use serde_json::Value;
-
 use super::{Study, StudyError};
 use crate::optimize::ask::Streams;
-use crate::optimize::journal::{JournalError, Operation};
+use crate::optimize::journal::{AttributeKind, JournalError, Operation};
 
 /// Study system attribute: number of workers that have joined.
 const WORKERS: &str = "quadfrog:workers";
@@ -12,9 +10,6 @@ const WORKERS: &str = "quadfrog:workers";
 impl Study {
     /// Joins as a worker with the next free number, from 1 (0 is the session that created the study), and continues with
     /// the random streams of that worker's seed, [`worker_seed`].
-    ///
-    /// # Errors
-    /// If the journal cannot be read or written.
     pub fn join(&mut self) -> Result<u32, StudyError> {
         let study = self.id;
         let mut worker = 0;
@@ -22,8 +17,7 @@ impl Study {
             let joined =
                 journal.studies().get(study).and_then(|record| record.system_attributes.get(WORKERS)?.as_u64());
             worker = joined.unwrap_or(0) as u32 + 1;
-            let key = WORKERS.to_owned();
-            Ok::<_, JournalError>(vec![Operation::StudySystemAttribute { study, key, value: Value::from(worker) }])
+            Ok::<_, JournalError>(vec![Operation::study_attribute(study, AttributeKind::System, WORKERS, worker)])
         })?;
         self.options.sampler.seed = worker_seed(self.options.sampler.seed, worker);
         self.streams = Streams::new(self.options.sampler.seed);
