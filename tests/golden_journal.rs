@@ -1,6 +1,8 @@
 //! A journal written by Optuna 5.0.0, compared with the contents that Optuna itself reports. `QUADFROG_GOLDEN` selects
 //! another folder of golden data.
 
+mod support;
+
 use quadfrog::optimize::ask::{Ask, Direction, SamplerConfig, Streams};
 use quadfrog::optimize::journal::{Durability, Journal, JournalFile, LOCK_GRACE, Operation};
 use quadfrog::optimize::sampler::propose;
@@ -8,12 +10,10 @@ use quadfrog::optimize::space::Space;
 use quadfrog::optimize::trial::{Distribution, Trial, TrialState};
 use serde_json::{Map, Value, json};
 use std::path::PathBuf;
+use support::{golden_folder, golden_tpe_file};
 
 fn golden(name: &str) -> PathBuf {
-    let root = std::env::var_os("QUADFROG_GOLDEN")
-        .map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/golden"), PathBuf::from);
-    let candidates = [root.join("tpe").join(name), root.join(name)];
-    candidates.iter().find(|p| p.exists()).unwrap_or_else(|| panic!("no {name} in {}", root.display())).clone()
+    golden_tpe_file(name).unwrap_or_else(|| panic!("no {name} in {}", golden_folder().display()))
 }
 
 /// A trial in the shape of the expected file.
@@ -71,10 +71,9 @@ fn suggested_again(trials: &[Trial], expected: &Value, direction: Direction, com
         let range = |d: &Distribution| d.range().expect("the golden journal has floats only");
         let names = trial.parameters.iter().map(|(n, _)| n.clone());
         let space = Space::new(names.zip(trial.distributions.iter().map(range))).unwrap();
-        let candidate = propose(
-            &Ask { config: &config, trials: &trials[..i], space: &space, fixed: &trial.fixed(), direction },
-            &mut streams,
-        );
+        let fixed = trial.fixed();
+        let ask = Ask { config: &config, trials: &trials[..i], space: &space, fixed: &fixed, direction };
+        let candidate = propose(&ask, &mut streams);
         for (p, value) in space.parameters().iter().zip(candidate.values) {
             let theirs = trial.parameter(&p.name).unwrap();
             let difference = (value - theirs).abs() / (p.range.high - p.range.low);
@@ -95,8 +94,7 @@ fn lines_are_written_as_they_were_read() {
         let (again, reread) = Operation::parse(ours.trim_end()).unwrap();
         assert_eq!((again, reread), (worker, operation), "{line}");
         // And equal member by member to the line of Python.
-        let (ours, theirs): (Value, Value) =
-            (serde_json::from_str(&ours).unwrap(), serde_json::from_str(line).unwrap());
-        assert_eq!(ours, theirs);
+        let value = |text: &str| serde_json::from_str::<Value>(text).unwrap();
+        assert_eq!(value(&ours), value(line));
     }
 }

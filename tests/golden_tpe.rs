@@ -1,9 +1,11 @@
 //! Every suggestion of Optuna 5.0.0's TPE in `tests/golden/tpe`, closed loop: the objective is computed here, so one wrong
 //! suggestion changes all later ones. `QUADFROG_GOLDEN` selects another folder of golden data.
 
+mod support;
+
 use quadfrog::optimize::ask::{Ask, Direction, SamplerConfig, Streams};
 use quadfrog::optimize::mt19937::Mt19937;
-use quadfrog::optimize::parzen::observation_weights;
+use quadfrog::optimize::parzen::{choose, observation_weights};
 use quadfrog::optimize::sampler::propose;
 use quadfrog::optimize::space::{Range, Space};
 use quadfrog::optimize::tpe::good_count;
@@ -11,15 +13,13 @@ use quadfrog::optimize::trial::{Distribution, Trial, TrialState, announcement};
 use quadfrog::optimize::truncnorm::{log_cdf, log_mass, quantile};
 use serde_json::Value;
 use std::collections::HashMap;
-use std::path::PathBuf;
+use support::golden_tpe_file;
 
 /// Largest difference allowed, as a share of the parameter's range.
 const TOLERANCE: f64 = 1e-10;
 
 fn golden(name: &str) -> Option<Value> {
-    let root = std::env::var_os("QUADFROG_GOLDEN")
-        .map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/golden"), PathBuf::from);
-    let path = [root.join("tpe").join(name), root.join(name)].into_iter().find(|p| p.exists())?;
+    let path = golden_tpe_file(name)?;
     let text = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
     Some(serde_json::from_str(&text).unwrap_or_else(|e| panic!("{}: {e}", path.display())))
 }
@@ -71,8 +71,7 @@ impl<'a> Scenario<'a> {
                 let (a, b, c) = (u("f0") - 0.35, u("Fx") - 0.6, u("Fz") - 0.25 - 0.5 * u("Fx"));
                 let mut s = 1.0 + 4.0 * a * a + 3.0 * b * b + 5.0 * c * c;
                 if lateral {
-                    let e = u("Fy") - 0.4;
-                    s += 2.0 * e * e;
+                    s += 2.0 * (u("Fy") - 0.4) * (u("Fy") - 0.4);
                 }
                 100.0 / s
             }
@@ -110,11 +109,22 @@ struct Tally {
 }
 
 impl Tally {
+    fn add(&mut self, other: &Tally) {
+        self.compared += other.compared;
+        self.largest = self.largest.max(other.largest);
+    }
+
     fn compare(&mut self, ours: f64, theirs: f64, scale: f64, what: impl Fn() -> String) {
         let difference = (ours - theirs).abs() / scale;
         self.compared += 1;
         self.largest = self.largest.max(difference);
         assert!(difference <= TOLERANCE, "{}: ours {ours:e}, Optuna's {theirs:e}", what());
+    }
+}
+
+impl std::fmt::Display for Tally {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} cases compared, largest difference {:.1e}", self.compared, self.largest)
     }
 }
 
@@ -130,30 +140,24 @@ fn run(scenario: &Scenario<'_>, run: &Value, name: &str, tally: &mut Tally) -> [
     let mut streams = Streams::new(config.seed);
     let expected = run["x"].as_array().unwrap();
     let (fixed_plan, states) = (&run["fixed"], run["s"].as_str().unwrap().as_bytes());
-    let zombies: HashMap<u64, (usize, Option<u64>)> = scenario.file["zombie_plan"]
-        .as_array()
-        .map(|plan| {
-            plan.iter().map(|z| (z[0].as_u64().unwrap(), (z[1].as_u64().unwrap() as usize, z[2].as_u64()))).collect()
-        })
-        .unwrap_or_default();
+    let zombie = |z: &Value| (z[0].as_u64().unwrap(), (z[1].as_u64().unwrap() as usize, z[2].as_u64()));
+    let zombies = scenario.file["zombie_plan"].as_array().into_iter().flatten();
+    let zombies: HashMap<u64, (usize, Option<u64>)> = zombies.map(zombie).collect();
     let mut trials: Vec<Trial> = Vec::new();
     for (index, theirs) in expected.iter().enumerate() {
         for (&late, _) in zombies.iter().filter(|(_, (_, end))| *end == Some(index as u64)) {
             let trial = &mut trials[late as usize];
             (trial.state, trial.value) = scenario.evaluate(trial);
         }
-        let fixed: Vec<(String, f64)> = fixed_plan[index.to_string()]
-            .as_object()
-            .map(|map| map.iter().map(|(k, v)| (k.clone(), v.as_f64().unwrap())).collect())
-            .unwrap_or_default();
+        let fixed = fixed_plan[index.to_string()].as_object().into_iter().flatten();
+        let fixed = fixed.map(|(name, value)| (name.clone(), value.as_f64().unwrap())).collect();
         let fixed = scenario.rerun(index, &trials).unwrap_or(fixed);
         let zombie = zombies.get(&(index as u64));
         let asked = &names[..zombie.map_or(names.len(), |(suggested, _)| *suggested)];
         let space = Space::new(asked.iter().map(|n| ((*n).to_owned(), scenario.range(n)))).unwrap();
-        let candidate = propose(
-            &Ask { config: &config, trials: &trials, space: &space, fixed: &fixed, direction: scenario.direction },
-            &mut streams,
-        );
+        let direction = scenario.direction;
+        let ask = Ask { config: &config, trials: &trials, space: &space, fixed: &fixed, direction };
+        let candidate = propose(&ask, &mut streams);
         let mut trial = Trial::new(index as u32, TrialState::Running);
         for (k, (&parameter, value)) in asked.iter().zip(&candidate.values).enumerate() {
             let range = scenario.range(parameter);
@@ -165,12 +169,7 @@ fn run(scenario: &Scenario<'_>, run: &Value, name: &str, tally: &mut Tally) -> [
         trial.system_attributes.extend(announcement(&candidate.joint));
         if zombie.is_none() {
             (trial.state, trial.value) = scenario.evaluate(&trial);
-            let state = match trial.state {
-                TrialState::Complete => b'C',
-                TrialState::Fail => b'F',
-                _ => b'P',
-            };
-            assert_eq!(states[index], state, "{name}: state of trial {index}");
+            assert_eq!(states[index], <&str>::from(trial.state).as_bytes()[0], "{name}: state of trial {index}");
         }
         trials.push(trial);
     }
@@ -209,25 +208,20 @@ fn units(file: &Value, after: &HashMap<String, [[f64; 2]; 2]>, tally: &mut Tally
     }
     let (q, a, b) = (floats(&file["ppf"]["q"]), floats(&file["ppf"]["a"]), floats(&file["ppf"]["b"]));
     for (i, theirs) in floats(&file["ppf"]["x"]).into_iter().enumerate() {
-        tally.compare(quantile(q[i], a[i], b[i]), theirs, b[i] - a[i], || {
-            format!("quantile {} of {}..{}", q[i], a[i], b[i])
-        });
+        let what = || format!("quantile {} of {}..{}", q[i], a[i], b[i]);
+        tally.compare(quantile(q[i], a[i], b[i]), theirs, b[i] - a[i], what);
+    }
+    let mut stream = Mt19937::new(file["choice"]["seed"].as_u64().unwrap() as u32);
+    let weights = floats(&file["choice"]["p"]);
+    for theirs in file["choice"]["idx"].as_array().unwrap() {
+        assert_eq!(choose(&weights, &mut stream) as u64, theirs.as_u64().unwrap());
+        tally.compared += 1;
     }
     for (run, next) in file["rng_after_run"].as_object().unwrap() {
         let [model, startup] = after.get(run).unwrap_or_else(|| panic!("no run `{run}` in the golden files"));
         assert_eq!(floats(&next["tpe_rng_next"]), model, "{run}: model stream");
         assert_eq!(floats(&next["random_sampler_rng_next"]), startup, "{run}: startup stream");
         tally.compared += 4;
-    }
-}
-
-/// The component choice of `units.json`: with one observation per component and their weights given, only the count of
-/// cumulative weights not above u decides.
-fn choice(file: &Value, tally: &mut Tally) {
-    let (p, mut stream) = (floats(&file["choice"]["p"]), Mt19937::new(file["choice"]["seed"].as_u64().unwrap() as u32));
-    for theirs in file["choice"]["idx"].as_array().unwrap() {
-        assert_eq!(quadfrog::optimize::parzen::choose(&p, &mut stream) as u64, theirs.as_u64().unwrap());
-        tally.compared += 1;
     }
 }
 
@@ -248,23 +242,15 @@ fn golden_tpe() {
                 next,
             );
         }
-        println!(
-            "golden_tpe: {name}: {} runs, {} suggestions, largest difference {:.1e} of the range",
-            runs.len(),
-            tally.compared,
-            tally.largest
-        );
-        total.compared += tally.compared;
-        total.largest = total.largest.max(tally.largest);
+        println!("golden_tpe: {name}: {} runs, {tally}", runs.len());
+        total.add(&tally);
     }
     if let Some(file) = golden("units.json") {
         let mut tally = Tally::default();
         units(&file, &after, &mut tally);
-        choice(&file, &mut tally);
-        println!("golden_tpe: units: {} values, largest difference {:.1e}", tally.compared, tally.largest);
-        total.compared += tally.compared;
-        total.largest = total.largest.max(tally.largest);
+        println!("golden_tpe: units: {tally}");
+        total.add(&tally);
     }
     assert!(total.compared > 0, "no golden data of the TPE found: is QUADFROG_GOLDEN right?");
-    println!("golden_tpe: {} cases compared, largest difference {:.1e}", total.compared, total.largest);
+    println!("golden_tpe: {total}");
 }

@@ -43,9 +43,8 @@ fn both_densities_have_mass_one_over_the_range() {
             assert_eq!(all.iter().map(|d| d.name.as_str()).collect::<Vec<_>>(), ["f0", "Fz"]);
             for d in all {
                 for density in [&d.good, &d.bad] {
-                    // trapezoids
-                    let mass: f64 =
-                        (1..d.at.len()).map(|i| 0.5 * (density[i] + density[i - 1]) * (d.at[i] - d.at[i - 1])).sum();
+                    let trapezoid = |i: usize| 0.5 * (density[i] + density[i - 1]) * (d.at[i] - d.at[i - 1]);
+                    let mass = (1..d.at.len()).map(trapezoid).sum::<f64>();
                     assert!((mass - 1.0).abs() < 1e-4, "{} after {count} trials: mass {mass}", d.name);
                 }
             }
@@ -143,14 +142,8 @@ fn normal(stream: &mut Mt19937) -> f64 {
 /// Confirms among three points of given true means; returns the leader, if any, and the number of repeats.
 fn confirmation(truth: [f64; 3], noise: f64, budget: usize, stream: &mut Mt19937) -> (Option<usize>, usize) {
     let mut run = |i: usize| truth[i] + noise * normal(stream);
-    let mut contenders: Vec<RepeatedPoint> = (0..3)
-        .map(|i| RepeatedPoint {
-            parameters: vec![("x".into(), i as f64)],
-            trials: vec![i as u32],
-            values: vec![run(i)],
-            stood: 1,
-        })
-        .collect();
+    let mut contenders: Vec<RepeatedPoint> =
+        (0..3).map(|i| RepeatedPoint { values: vec![run(i)], ..RepeatedPoint::default() }).collect();
     for repeats in 0..budget {
         match confirm(&contenders, Direction::Maximize, 0.95) {
             Confirmation::Leads(i, confidence) => {

@@ -1,19 +1,27 @@
 //! Interoperability of the journal with Python's Optuna 5 and optuna-dashboard. Tests are skipped with a message if Python
 //! lacks them; `pip install optuna==5.0.0 optuna-dashboard` installs them.
 
+#[path = "support/redis.rs"]
+mod redis;
+#[path = "support/optimize.rs"]
+mod support;
+
 use quadfrog::optimize::ask::{Ask, Direction, SamplerConfig, Streams};
 use quadfrog::optimize::importance::divergences;
 use quadfrog::optimize::journal::{Durability, Journal, JournalError, JournalFile, Operation};
 use quadfrog::optimize::sampler::propose;
 use quadfrog::optimize::space::{Range, Space};
-use quadfrog::optimize::study::{Outcome, Storage, Study, StudyOptions};
-use quadfrog::optimize::trial::{Distribution, Trial, TrialState};
+use quadfrog::optimize::study::{Outcome, Storage, Study};
+use quadfrog::optimize::trial::{Distribution, Trial, TrialState, value_of};
+use redis::Ended;
 use serde_json::{Value, json};
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+use std::process::{Command, Stdio};
 use std::time::Duration;
+use support::{begin, forward, linear, options};
+use tempfile::{TempDir, tempdir};
 
 const SCRIPT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/support/optuna_study.py");
 
@@ -40,34 +48,17 @@ fn optuna(arguments: &[&str]) -> Value {
     serde_json::from_slice(&output.stdout).expect("the script answers in JSON")
 }
 
-struct Folder(PathBuf);
-
-impl Folder {
-    fn new(name: &str) -> Self {
-        let path = std::env::temp_dir().join(format!("quadfrog-python-{name}-{}", std::process::id()));
-        let _ = std::fs::remove_dir_all(&path);
-        std::fs::create_dir_all(&path).unwrap();
-        Folder(path)
-    }
-
-    fn journal(&self) -> (PathBuf, String) {
-        let path = self.0.join("study.log");
-        let text = path.to_str().unwrap().to_owned();
-        (path, text)
-    }
+/// A journal in a temporary folder: its path, also as an argument of the script.
+fn journal() -> (TempDir, PathBuf, String) {
+    let folder = tempdir().unwrap();
+    let path = folder.path().join("study.log");
+    let text = path.to_str().unwrap().to_owned();
+    (folder, path, text)
 }
 
-impl Drop for Folder {
-    fn drop(&mut self) {
-        if !std::thread::panicking() {
-            let _ = std::fs::remove_dir_all(&self.0);
-        }
-    }
-}
-
-fn space() -> Space {
-    let ranges = [("f0", 0.75, 1.75), ("Fx", 0.0, 150.0), ("Fz", 150.0, 350.0)];
-    Space::new(ranges.map(|(n, low, high)| (n.to_owned(), Range::linear(low, high)))).unwrap()
+/// [`journal`] if Python has Optuna.
+fn shared_journal() -> Option<(TempDir, PathBuf, String)> {
+    python_has("optuna", "5.").then(journal)
 }
 
 fn ask<'a>(config: &'a SamplerConfig, trials: &'a [Trial], space: &'a Space, fixed: &'a [(String, f64)]) -> Ask<'a> {
@@ -75,25 +66,13 @@ fn ask<'a>(config: &'a SamplerConfig, trials: &'a [Trial], space: &'a Space, fix
 }
 
 fn open(path: &Path, seed: u32) -> Study {
-    let options = StudyOptions {
-        name: "forward".into(),
-        direction: Direction::Maximize,
-        metric: "distance [m]".into(),
-        space: space(),
-        sampler: SamplerConfig { seed, ..SamplerConfig::default() },
-        attributes: vec![("robot".into(), json!("go1"))],
-        durability: Durability::Buffered,
-    };
+    let options = options(forward(), SamplerConfig { seed, ..SamplerConfig::default() });
     Study::open(Storage::File(path.to_owned()), options).unwrap()
 }
 
 /// The script's objective.
 fn objective(parameters: &[(String, f64)]) -> f64 {
-    let u = |name: &str| {
-        let value = parameters.iter().find(|(n, _)| n == name).map_or(1.0, |(_, v)| *v);
-        let range = space().range(name).unwrap();
-        (value - range.low) / (range.high - range.low)
-    };
+    let u = |name: &str| forward().range(name).unwrap().scale(value_of(parameters, name).unwrap_or(1.0));
     1.0 - (u("f0") - 0.35).powi(2) - (u("Fx") - 0.6).powi(2) - (u("Fz") - 0.55).powi(2)
 }
 
@@ -107,20 +86,19 @@ fn run(study: &mut Study, overrides: &[(String, f64)]) -> u32 {
     number
 }
 
+fn run_several(study: &mut Study, count: usize) -> Vec<u32> {
+    (0..count).map(|_| run(study, &[])).collect()
+}
+
 #[test]
 fn python_reads_what_we_wrote() {
-    if !python_has("optuna", "5.") {
-        return;
-    }
-    let folder = Folder::new("reads");
-    let (path, journal) = folder.journal();
+    let Some((_folder, path, journal)) = shared_journal() else { return };
     let mut study = open(&path, 3);
     for number in 0..14 {
         let overrides = [("Fx".to_owned(), 80.0)];
         run(&mut study, if number == 12 { &overrides } else { &[] });
     }
-    let failing = study.draft();
-    let failing = study.begin(&failing, &[], &[]).unwrap();
+    let failing = begin(&mut study);
     study.tell(failing, Outcome::Fail).unwrap();
     study.enqueue(&[("Fz".into(), 200.0)], &[("by".into(), json!("Zoë"))]).unwrap();
 
@@ -146,15 +124,9 @@ fn python_reads_what_we_wrote() {
 
 #[test]
 fn we_run_what_python_enqueued_and_both_continue_each_other() {
-    if !python_has("optuna", "5.") {
-        return;
-    }
-    let folder = Folder::new("continue");
-    let (path, journal) = folder.journal();
+    let Some((_folder, path, journal)) = shared_journal() else { return };
     let mut study = open(&path, 3);
-    (0..6).for_each(|_| {
-        run(&mut study, &[]);
-    });
+    run_several(&mut study, 6);
 
     optuna(&["enqueue", &journal, r#"{"f0": 1.25, "Fx": 60.5, "Fz": 240.0}"#]);
     study.refresh().unwrap();
@@ -172,16 +144,14 @@ fn we_run_what_python_enqueued_and_both_continue_each_other() {
         assert_eq!(ours.state, TrialState::Complete);
         ours.parameters.iter().for_each(|(n, v)| assert_eq!(theirs["params"][n], json!(v)));
     }
-    (0..5).for_each(|_| {
-        run(&mut study, &[]);
-    });
+    run_several(&mut study, 5);
 
     // The next suggestion of Python equals ours for the same seed and history.
     let before = study.trials().to_vec();
     let next = optuna(&["continue", &journal, "1", "5"]);
     let config = SamplerConfig { seed: 5, ..SamplerConfig::default() };
-    let ours = propose(&ask(&config, &before, &space(), &[]), &mut Streams::new(5));
-    for (p, value) in space().parameters().iter().zip(ours.values) {
+    let ours = propose(&ask(&config, &before, &forward(), &[]), &mut Streams::new(5));
+    for (p, value) in forward().parameters().iter().zip(ours.values) {
         let theirs = next[0]["params"][&p.name].as_f64().unwrap();
         assert!((value - theirs).abs() <= 1e-10 * (p.range.high - p.range.low), "{}: {value}, not {theirs}", p.name);
     }
@@ -199,7 +169,7 @@ fn bounds_changed_in_mid_study_are_treated_as_optuna_does() {
         let mut streams = Streams::new(seed);
         let mut trials: Vec<Trial> = Vec::new();
         for (i, theirs) in theirs.as_array().unwrap().iter().enumerate() {
-            let ranges = space().parameters().to_vec().into_iter().filter(|p| i < 32 || p.name != "f0");
+            let ranges = forward().parameters().to_vec().into_iter().filter(|p| i < 32 || p.name != "f0");
             let ranges = ranges.map(|p| match p.name.as_str() {
                 "Fx" if (15..25).contains(&i) => (p.name, Range::linear(40.0, 110.0)),
                 _ => (p.name, p.range),
@@ -215,11 +185,7 @@ fn bounds_changed_in_mid_study_are_treated_as_optuna_does() {
                 trial.set(&p.name, value, Distribution::Float(p.range));
                 compared += 1;
             }
-            let mut point = trial.parameters.clone();
-            if trial.parameter("f0").is_none() {
-                point.push(("f0".into(), 1.0));
-            }
-            trial.value = Some(objective(&point));
+            trial.value = Some(objective(&trial.parameters));
             trials.push(trial);
         }
     }
@@ -228,20 +194,13 @@ fn bounds_changed_in_mid_study_are_treated_as_optuna_does() {
 
 #[test]
 fn three_writers_at_once_lose_nothing() {
-    if !python_has("optuna", "5.") {
-        return;
-    }
-    let folder = Folder::new("writers");
-    let (path, journal) = folder.journal();
+    let Some((_folder, path, journal)) = shared_journal() else { return };
     drop(open(&path, 0));
     let theirs = python(&["continue", &journal, "100", "9"]).stdout(Stdio::piped()).spawn().unwrap();
     let ours: Vec<_> = (1..3)
         .map(|seed| {
             let path = path.clone();
-            std::thread::spawn(move || {
-                let mut study = open(&path, seed);
-                (0..100).map(|_| run(&mut study, &[])).collect::<Vec<u32>>()
-            })
+            std::thread::spawn(move || run_several(&mut open(&path, seed), 100))
         })
         .collect();
     let mut numbers: Vec<u64> = ours.into_iter().flat_map(|t| t.join().unwrap()).map(u64::from).collect();
@@ -252,48 +211,38 @@ fn three_writers_at_once_lose_nothing() {
     let study = open(&path, 0);
     assert_eq!(study.trials().iter().filter(|t| t.state == TrialState::Complete).count(), 300);
     assert_eq!(optuna(&["summary", &journal])["trials"].as_array().unwrap().len(), 300);
-    assert!(!folder.0.join("study.log.lock").exists());
+    assert!(!path.with_extension("log.lock").exists());
 }
 
 /// PED-ANOVA's divergences equal those of Optuna's evaluator, also after a change of the bounds.
 #[test]
 fn importances_are_optunas() {
-    if !python_has("optuna", "5.") {
-        return;
-    }
-    let folder = Folder::new("importance");
-    let (path, journal) = folder.journal();
+    let Some((_folder, path, journal)) = shared_journal() else { return };
     let mut study = open(&path, 3);
     for trials in [12, 30, 80, 110] {
         while study.trials().len() < trials {
             run(&mut study, &[]);
         }
         if trials == 80 {
-            let narrow = [("f0", 0.75, 1.75), ("Fx", 40.0, 110.0), ("Fz", 150.0, 350.0)];
-            let narrow = narrow.map(|(n, low, high)| (n.to_owned(), Range::linear(low, high)));
-            study.search(Space::new(narrow).unwrap()).unwrap();
+            study.search(linear([("f0", 0.75, 1.75), ("Fx", 40.0, 110.0), ("Fz", 150.0, 350.0)])).unwrap();
         }
         let theirs = optuna(&["importances", &journal]);
         for (name, ours) in divergences(study.trials(), &study.options().space, Direction::Maximize) {
             let theirs = theirs[&name].as_f64().unwrap();
-            assert!(
-                (ours - theirs).abs() <= 1e-9 * theirs.abs().max(1e-6),
-                "{trials} trials, {name}: {ours} is not {theirs}"
-            );
+            let same = (ours - theirs).abs() <= 1e-9 * theirs.abs().max(1e-6);
+            assert!(same, "{trials} trials, {name}: {ours} is not {theirs}");
         }
     }
 }
 
 /// Creates the lock that a killed writer leaves.
 fn dead_writers_lock(path: &Path) {
-    #[cfg(unix)]
     std::os::unix::fs::symlink(path, path.with_extension("log.lock")).unwrap();
 }
 
 #[test]
 fn the_lock_of_a_dead_writer_is_broken() {
-    let folder = Folder::new("stale");
-    let (path, _) = folder.journal();
+    let (_folder, path, _) = journal();
     dead_writers_lock(&path);
     let file = JournalFile::new(&path, Durability::Buffered, Duration::from_millis(200)).unwrap();
     let mut journal = Journal::open(file).unwrap();
@@ -306,24 +255,13 @@ fn the_lock_of_a_dead_writer_is_broken() {
 #[test]
 #[ignore = "takes 30 s, the grace time that Optuna gives a lock"]
 fn the_lock_of_a_dead_writer_is_broken_after_thirty_seconds() {
-    let folder = Folder::new("stale30");
-    let (path, _) = folder.journal();
+    let (_folder, path, _) = journal();
     drop(open(&path, 0));
     dead_writers_lock(&path);
     let began = std::time::Instant::now();
     run(&mut open(&path, 0), &[]);
     println!("the lock of a dead writer was broken after {:.1} s", began.elapsed().as_secs_f64());
     assert!(began.elapsed() >= Duration::from_secs(30), "a lock may be held for 30 s");
-}
-
-/// The process of the dashboard, killed on drop.
-struct Dashboard(Child);
-
-impl Drop for Dashboard {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
 }
 
 /// GETs a path of the dashboard; `None` until it answers.
@@ -348,38 +286,29 @@ fn until<T>(what: &str, mut ask: impl FnMut() -> Option<T>) -> T {
 
 #[test]
 fn the_dashboard_shows_our_study_while_we_write() {
-    if !python_has("optuna", "5.") || !python_has("optuna_dashboard", "0.") {
+    let Some((_folder, path, journal)) = shared_journal().filter(|_| python_has("optuna_dashboard", "0.")) else {
         return;
-    }
-    let folder = Folder::new("dashboard");
-    let (path, journal) = folder.journal();
+    };
     let mut study = open(&path, 1);
-    (0..4).for_each(|_| {
-        run(&mut study, &[]);
-    });
+    run_several(&mut study, 4);
     study.note(2, "slipped a little").unwrap();
     let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
     let server = "import sys, optuna_dashboard\n\
                   from optuna.storages import JournalStorage\n\
                   from optuna.storages.journal import JournalFileBackend\n\
                   optuna_dashboard.run_server(JournalStorage(JournalFileBackend(sys.argv[1])), port=int(sys.argv[2]))";
-    let child = Command::new("python3")
-        .args(["-c", server, &journal, &port.to_string()])
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .spawn()
-        .unwrap();
-    let _dashboard = Dashboard(child);
+    let mut dashboard = Command::new("python3");
+    dashboard.args(["-c", server, &journal, &port.to_string()]).stdout(Stdio::null()).stderr(Stdio::null());
+    let _dashboard = Ended(dashboard.spawn().unwrap());
     let studies = until("the dashboard's answer", || get(port, "/api/studies"));
     let shown = &studies["study_summaries"][0];
     assert_eq!(shown["study_name"], "forward", "{studies}");
-    let detail = until("four trials on the dashboard", || {
-        get(port, "/api/studies/0?after=0").filter(|d| d["trials"].as_array().is_some_and(|t| t.len() == 4))
-    });
+    let shows = |count: usize| {
+        get(port, "/api/studies/0?after=0").filter(|d| d["trials"].as_array().is_some_and(|t| t.len() == count))
+    };
+    let detail = until("four trials on the dashboard", || shows(4));
     assert_eq!(detail["trials"][2]["note"]["body"], "slipped a little", "{}", detail["trials"][2]);
     assert_eq!(detail["best_trials"][0]["number"].as_u64(), study.best().map(|t| u64::from(t.number)));
     run(&mut study, &[]);
-    until("the fifth trial on the dashboard", || {
-        get(port, "/api/studies/0?after=0").filter(|d| d["trials"].as_array().is_some_and(|t| t.len() == 5))
-    });
+    until("the fifth trial on the dashboard", || shows(5));
 }

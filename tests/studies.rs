@@ -19,10 +19,10 @@ fn study(task: Task, seed: u32) -> (Vec<TrialRecord>, f64) {
     let settings = options.config.settings(&options.robot, task, Backend::Simulator).unwrap();
     let simulator = Simulator::new(&options.robot, &options.config.simulator).unwrap();
     let mut rollout = Rollout::new(simulator, &settings);
-    let mut life = open_experiment(&options, Durability::Buffered, "").unwrap();
-    automatic::run(&mut life, &mut rollout, |_, _| {}).unwrap();
-    let best = life.best().and_then(|row| row.value).unwrap_or(0.0);
-    (life.rows().cloned().collect(), best)
+    let mut experiment = open_experiment(&options, Durability::Buffered, "").unwrap();
+    automatic::run(&mut experiment, &mut rollout, |_, _| {}).unwrap();
+    let best = experiment.best().and_then(|row| row.value).unwrap_or(0.0);
+    (experiment.rows().cloned().collect(), best)
 }
 
 /// Best values of seeds 0 to 4; prints them with those of MuJoCo with the same controller.
@@ -63,10 +63,7 @@ fn the_mirrored_tasks_learn_too() {
 fn the_same_seed_gives_the_same_table_bit_for_bit() {
     let (first, _) = study(Task::Forward, 3);
     let (second, _) = std::thread::spawn(|| study(Task::Forward, 3)).join().unwrap();
-    assert_eq!(first.len(), second.len());
-    for (a, b) in first.iter().zip(&second) {
-        assert_eq!(a, b);
-        let bits = |row: &TrialRecord| row.value.map(f64::to_bits);
-        assert_eq!(bits(a), bits(b), "trial {}", a.trial);
-    }
+    assert_eq!(first, second);
+    let bits = |rows: &[TrialRecord]| rows.iter().map(|row| row.value.map(f64::to_bits)).collect::<Vec<_>>();
+    assert_eq!(bits(&first), bits(&second));
 }

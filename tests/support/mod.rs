@@ -13,6 +13,11 @@ pub fn golden_folder() -> PathBuf {
     }
 }
 
+/// A file of Optuna's results, if it exists; the folder of golden data can be theirs alone.
+pub fn golden_tpe_file(name: &str) -> Option<PathBuf> {
+    [golden_folder().join("tpe").join(name), golden_folder().join(name)].into_iter().find(|path| path.exists())
+}
+
 /// Reads one golden JSON file.
 pub fn golden<T: DeserializeOwned>(name: &str) -> T {
     let path = golden_folder().join(name);
