@@ -12,58 +12,58 @@ pub fn line(row: &TrialRecord, unit: &str, units: &HashMap<String, String>) -> S
         let of = units.get(name).map_or("", String::as_str);
         let _ = write!(text, "  {name} {value:.*} {of}", digits(of));
     }
-    let _ = write!(text, "  {}", outcome(row, unit));
-    text
+    if let Some(value) = row.value.filter(|_| row.verdict == Some(Verdict::Accept)) {
+        let _ = write!(text, "  {value:.3} {unit}");
+    }
+    text + "  " + &verdict(row)
 }
 
-/// Value and verdict of a trial as text.
-fn outcome(row: &TrialRecord, unit: &str) -> String {
-    match (row.verdict, row.value) {
-        (Some(Verdict::Accept), Some(value)) => format!("{value:.3} {unit}  accept"),
-        (Some(verdict), _) if row.cause.is_empty() => verdict.name().to_owned(),
-        (Some(verdict), _) => format!("{}: {}", verdict.name(), row.cause),
-        (None, _) => "not judged".to_owned(),
+/// The best trial as a line, or a line about its absence.
+pub fn best_line(best: Option<&TrialRecord>, unit: &str, units: &HashMap<String, String>) -> String {
+    best.map_or_else(|| "No trial was accepted.\n".to_owned(), |best| format!("Best: {}\n", line(best, unit, units)))
+}
+
+/// Verdict of a trial with its cause.
+fn verdict(row: &TrialRecord) -> String {
+    match row.verdict {
+        None => "not judged".to_owned(),
+        Some(verdict) if verdict == Verdict::Accept || row.cause.is_empty() => verdict.name().to_owned(),
+        Some(verdict) => format!("{}: {}", verdict.name(), row.cause),
     }
 }
 
-/// All trials as an aligned table; the best has an asterisk.
-pub fn table(rows: &[TrialRecord], parameters: &[ParameterInfo], unit: &str) -> String {
+/// All trials as an aligned table; the trial of number `best` has an asterisk.
+pub fn table(rows: &[TrialRecord], best: Option<u32>, parameters: &[ParameterInfo], unit: &str) -> String {
     let mut header: Vec<String> = vec!["trial".into()];
     header.extend(parameters.iter().map(|p| format!("{} ({})", p.name, p.unit)));
     header.extend([format!("J ({unit})"), "rise (m)".into(), "air (s)".into(), "source".into(), "verdict".into()]);
-    let accepted = |row: &&TrialRecord| row.verdict == Some(Verdict::Accept);
-    let best = rows.iter().filter(accepted).filter_map(|row| row.value).fold(f64::NEG_INFINITY, f64::max);
+    let columns = header.len();
     let mut lines = vec![header];
     for row in rows {
-        let asterisk = if row.verdict == Some(Verdict::Accept) && row.value == Some(best) { "*" } else { "" };
+        let asterisk = if best == Some(row.trial) { "*" } else { "" };
         let mut cells = vec![format!("{asterisk}{}", row.trial)];
         for parameter in parameters {
             let value = row.parameters.get(&parameter.name);
             cells.push(value.map_or_else(String::new, |v| format!("{v:.*}", digits(&parameter.unit))));
         }
-        cells.push(row.value.map_or_else(|| "-".into(), |value| format!("{value:.3}")));
-        cells.push(row.measured.map_or_else(|| "-".into(), |measured| format!("{:.3}", measured.apex_m)));
-        cells.push(row.measured.map_or_else(|| "-".into(), |measured| format!("{:.3}", measured.air_s)));
-        cells.push(row.source.name().into());
-        cells.push(match row.verdict {
-            Some(Verdict::Accept) => "accept".into(),
-            Some(verdict) => format!("{}: {}", verdict.name(), row.cause),
-            None => "not judged".into(),
-        });
+        let measured = [row.measured.map(|measured| measured.apex_m), row.measured.map(|measured| measured.air_s)];
+        let numbers = [row.value, measured[0], measured[1]];
+        cells.extend(numbers.map(|number| number.map_or_else(|| "-".into(), |number| format!("{number:.3}"))));
+        cells.extend([row.source.name().into(), verdict(row)]);
         lines.push(cells);
     }
-    let columns = lines[0].len();
+    aligned(&lines, |column| column + 2 >= columns)
+}
+
+/// Lines of equally many cells in columns; texts are left-aligned, numbers right-aligned.
+pub fn aligned(lines: &[Vec<String>], is_text: impl Fn(usize) -> bool) -> String {
     let width = |column: usize| lines.iter().map(|line| line[column].chars().count()).max().unwrap_or(0);
-    let widths: Vec<_> = (0..columns).map(width).collect();
+    let widths: Vec<_> = (0..lines.first().map_or(0, Vec::len)).map(width).collect();
     let mut text = String::new();
-    for line in &lines {
+    for line in lines {
         for (column, cell) in line.iter().enumerate() {
-            // Numbers right-aligned; the texts of the last two columns left-aligned.
-            let is_text = column + 2 >= columns;
-            let pad = " ".repeat(widths[column] - cell.chars().count());
-            let cell = if is_text { format!("{cell}{pad}") } else { format!("{pad}{cell}") };
-            text.push_str(&cell);
-            text.push_str("  ");
+            let width = widths[column];
+            text += &if is_text(column) { format!("{cell:<width$}  ") } else { format!("{cell:>width$}  ") };
         }
         text.truncate(text.trim_end().len());
         text.push('\n');

@@ -1,6 +1,5 @@
 //! `quadfrog study`: stored studies, of this program and of other Optuna programs.
 
-use std::collections::HashMap;
 use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -12,10 +11,11 @@ use quadfrog::engine::{Opened, StoredStudy, newest_config, open_stored, stored_s
 use quadfrog::optimize::exchange::{self, TableTrial};
 use quadfrog::optimize::repeats;
 use quadfrog::optimize::study::Storage;
-use quadfrog::optimize::trial::{Trial, TrialState};
+use quadfrog::optimize::trial::TrialState;
 use quadfrog::report::table;
 use quadfrog::session::experiment::{self, rows_of};
 use quadfrog::trial::TrialRecord;
+use serde_json::Value;
 
 use super::failure::Failure;
 use super::selection::parse_storage;
@@ -156,44 +156,28 @@ fn list(folder: &Path) -> Result<(), Failure> {
     if files.is_empty() {
         return print(&format!("There is no study in {}\n", folder.display()));
     }
-    let mut rows = vec![["study", "task", "seed", "trials", "counted", "falls", "best"].map(str::to_owned)];
+    let mut rows = vec![["study", "task", "seed", "trials", "counted", "falls", "best"].map(str::to_owned).to_vec()];
     for file in &files {
         // A study that cannot be read is reported, and the others are listed.
-        let studies = match stored_studies(&Storage::File(file.clone())) {
-            Ok(studies) => studies,
-            Err(error) => {
-                eprintln!("quadfrog: {error}");
-                continue;
-            }
-        };
-        for stored in studies {
+        let studies = stored_studies(&Storage::File(file.clone()));
+        for stored in studies.inspect_err(|error| eprintln!("quadfrog: {error}")).unwrap_or_default() {
             match list_row(file, &stored) {
                 Err(failure @ Failure::Input(_)) => failure.print(),
                 row => rows.push(row?),
             }
         }
     }
-    let mut text = String::new();
-    let width = |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
-    let widths: Vec<usize> = (0..7).map(width).collect();
-    for row in &rows {
-        let cell = |(column, cell): (usize, &String)| match column {
-            0 | 1 => format!("{cell:<0$}", widths[column]),
-            _ => format!("{cell:>0$}", widths[column]),
-        };
-        let _ = writeln!(text, "{}", row.iter().enumerate().map(cell).collect::<Vec<_>>().join("  ").trim_end());
-    }
-    print(&text)
+    print(&table::aligned(&rows, |column| column < 2))
 }
 
-fn list_row(file: &Path, stored: &StoredStudy) -> Result<[String; 7], Failure> {
+fn list_row(file: &Path, stored: &StoredStudy) -> Result<Vec<String>, Failure> {
     let name = Some(study_name(stored.task, stored.seed));
     let opened = StudySelector { place: file.display().to_string(), name }.open()?;
     let trials = opened.study.trials();
     let counted = trials.iter().filter(|trial| trial.state == TrialState::Complete).count();
     let falls = trials.iter().filter(|trial| trial.is_fall()).count();
-    let best = best_trial(&opened).and_then(|trial| trial.value);
-    Ok([
+    let best = opened.study.best().and_then(|trial| trial.value);
+    Ok(vec![
         file.parent().unwrap_or(file).display().to_string(),
         stored.task.name().to_owned(),
         stored.seed.to_string(),
@@ -204,12 +188,23 @@ fn list_row(file: &Path, stored: &StoredStudy) -> Result<[String; 7], Failure> {
     ])
 }
 
-/// Returns the first landed trial of the point with the best mean over its repeats.
-fn best_trial(opened: &Opened) -> Option<&Trial> {
-    let best_first = repeats::contenders(opened.study.trials(), opened.study.options().direction, usize::MAX);
-    let best = best_first.iter().find(|point| point.stood > 0)?;
-    let landed = |trial: &&Trial| best.trials.contains(&trial.number) && !trial.is_fall();
-    opened.study.trials().iter().find(landed)
+/// Returns the row of the best trial.
+fn best_row<'a>(opened: &Opened, rows: &'a [TrialRecord]) -> Option<&'a TrialRecord> {
+    opened.study.best().and_then(|best| rows.iter().find(|row| row.trial == best.number))
+}
+
+/// Returns the value of an attribute without the syntax of JSON; `between` separates the elements of a list.
+fn in_words(value: &Value, between: &str) -> String {
+    let join = |parts: &mut dyn Iterator<Item = String>, between: &str| parts.collect::<Vec<_>>().join(between);
+    match value {
+        Value::Null => "none".to_owned(),
+        Value::String(text) => text.clone(),
+        Value::Array(list) => join(&mut list.iter().map(|value| in_words(value, between)), between),
+        Value::Object(members) => {
+            join(&mut members.iter().map(|(name, value)| format!("{name} {}", in_words(value, between))), ", ")
+        }
+        value => value.to_string(),
+    }
 }
 
 fn show(selector: &StudySelector) -> Result<(), Failure> {
@@ -218,8 +213,7 @@ fn show(selector: &StudySelector) -> Result<(), Failure> {
     let mut text = String::new();
     let _ = writeln!(text, "{} in {}", study.options().name, parse_storage(&selector.place));
     for (name, value) in study.attributes() {
-        let value = value.as_str().map_or_else(|| value.to_string(), str::to_owned);
-        let _ = writeln!(text, "  {name}: {value}");
+        let _ = writeln!(text, "  {name}: {}", in_words(value, if name == "bounds" { " to " } else { " " }));
     }
     for parameter in parameters {
         let _ = writeln!(text, "  {} from {} to {} {}", parameter.name, parameter.low, parameter.high, parameter.unit);
@@ -227,39 +221,28 @@ fn show(selector: &StudySelector) -> Result<(), Failure> {
     text.push('\n');
     let rows: Vec<TrialRecord> = rows_of(study, parameters);
     let unit = if ours.is_some() { opened.unit() } else { "value" };
-    text += &table::table(&rows, parameters, unit);
+    text += &table::table(&rows, study.best().map(|best| best.number), parameters, unit);
     for row in rows.iter().filter(|row| !row.note.is_empty()) {
         let _ = writeln!(text, "Note on trial {}: {}", row.trial, row.note);
     }
     for point in repeats::points(study.trials()).iter().filter(|point| point.repeats() > 1) {
-        let trials: Vec<String> = point.trials.iter().map(u32::to_string).collect();
-        let _ = writeln!(
-            text,
-            "Trials {} are one point: landed {}/{}, mean {:.3} {unit}, std {:.3}",
-            trials.join(", "),
-            point.stood,
-            point.repeats(),
-            point.mean(),
-            point.deviation().unwrap_or(0.0)
-        );
+        let trials = point.trials.iter().map(u32::to_string).collect::<Vec<_>>().join(", ");
+        let (stood, repeats, mean, std) =
+            (point.stood, point.repeats(), point.mean(), point.deviation().unwrap_or(0.0));
+        let line = format!("landed {stood}/{repeats}, mean {mean:.3} {unit}, std {std:.3}");
+        let _ = writeln!(text, "Trials {trials} are one point: {line}");
     }
     let count = |state: TrialState| study.trials().iter().filter(|trial| trial.state == state).count();
     let (running, waiting) = (count(TrialState::Running), count(TrialState::Waiting));
     if running + waiting > 0 {
         let _ = writeln!(text, "{running} running, {waiting} queued");
     }
-    text += &best_line(&opened, &rows);
-    print(&text)
+    print(&(text + &best_line(&opened, &rows)))
 }
 
 fn best_line(opened: &Opened, rows: &[TrialRecord]) -> String {
-    let best = best_trial(opened).and_then(|best| rows.iter().find(|row| row.trial == best.number));
-    let units: HashMap<String, String> =
-        opened.parameters.iter().map(|parameter| (parameter.name.clone(), parameter.unit.clone())).collect();
-    match best {
-        Some(best) => format!("Best: {}\n", table::line(best, opened.unit(), &units)),
-        None => "No trial was accepted.\n".to_owned(),
-    }
+    let units = opened.parameters.iter().map(|parameter| (parameter.name.clone(), parameter.unit.clone())).collect();
+    table::best_line(best_row(opened, rows), opened.unit(), &units)
 }
 
 fn export(selector: &StudySelector, format: Option<TableFormat>, output: Option<&Path>) -> Result<(), Failure> {
@@ -291,16 +274,14 @@ fn import(selector: &StudySelector, table: &Path, format: Option<TableFormat>, q
     if !queue {
         let given = finished.len();
         let added = experiment::import(&mut study, finished).map_err(|error| refuse(&error))?.len();
-        let known = match given - added {
-            0 => String::new(),
-            known => format!("; {known} were there already (same parameters, value and times)"),
-        };
-        let ignored = if unfinished.is_empty() {
-            String::new()
-        } else {
-            format!("; {} unfinished trials are ignored, --queue queues them", unfinished.len())
-        };
-        return print(&format!("{added} trials imported{known}{ignored}\n"));
+        let mut text = format!("{added} trials imported");
+        if given > added {
+            let _ = write!(text, "; {} were there already (same parameters, value and times)", given - added);
+        }
+        if !unfinished.is_empty() {
+            let _ = write!(text, "; {} unfinished trials are ignored, --queue queues them", unfinished.len());
+        }
+        return print(&(text + "\n"));
     }
     let points: Vec<TableTrial> = finished.into_iter().chain(unfinished).collect();
     // All or none: every point is checked before the first is queued.
@@ -319,22 +300,16 @@ fn best(selector: &StudySelector, config: Option<&Path>) -> Result<(), Failure> 
     let Some(folder) = config else {
         return print(&best_line(&opened, &rows));
     };
-    let best = best_trial(&opened).and_then(|best| rows.iter().find(|row| row.trial == best.number));
-    let (Some(best), Some(ours)) = (best, &opened.ours) else {
+    let (Some(best), Some(ours)) = (best_row(&opened, &rows), &opened.ours) else {
         return Err(Failure::input(format!("{}: no accepted trial of this program to export", selector.place)));
     };
     selector.config()?.export(folder, ours.task, &best.parameters, &best.gains)?;
-    let text = best_line(&opened, &rows);
-    print(&format!(
-        "{text}Start a new study with it:  quadfrog --task {} --config {}\n",
-        ours.task.name(),
-        folder.display()
-    ))
+    let (text, task, folder) = (best_line(&opened, &rows), ours.task.name(), folder.display());
+    print(&format!("{text}Start a new study with it:  quadfrog --task {task} --config {folder}\n"))
 }
 
 fn enqueue(selector: &StudySelector, point: &[(String, f64)]) -> Result<(), Failure> {
-    let duplicate = |(i, (name, _)): &(usize, &(String, f64))| point[..*i].iter().any(|(earlier, _)| earlier == name);
-    if let Some((_, (name, _))) = point.iter().enumerate().find(duplicate) {
+    if let Some((name, _)) = point.iter().find(|(name, _)| point.iter().filter(|(n, _)| n == name).count() > 1) {
         return Err(Failure::input(format!("{name} is given twice")));
     }
     let mut study = selector.open()?.study;

@@ -81,16 +81,13 @@ impl Printer {
         if self.several {
             text += &format!("{} seed {}\n", study.task.name(), study.seed);
         }
-        text += &table::table(rows, &options.config.parameters(study.task), study.task.unit());
-        text += &match best {
-            Some(best) => format!("Best: {}\n", table::line(best, study.task.unit(), &self.units)),
-            None => "No trial was accepted.\n".to_owned(),
-        };
+        let (parameters, unit) = (options.config.parameters(study.task), study.task.unit());
+        text += &table::table(rows, best.map(|best| best.trial), &parameters, unit);
+        text += &table::best_line(best, unit, &self.units);
+        let folder = study.folder.display();
         text += &match &options.join {
-            Some(storage) => {
-                format!("The study is in {storage}; the files of this worker are in {}\n", study.folder.display())
-            }
-            None => format!("The study is in {}\n", study.folder.display()),
+            Some(storage) => format!("The study is in {storage}; the files of this worker are in {folder}\n"),
+            None => format!("The study is in {folder}\n"),
         };
         self.print(&text);
     }
@@ -112,12 +109,8 @@ impl Printer {
             if of.len() > 1 {
                 let best = of.iter().map(|(_, best, _)| best).sum::<f64>() / count;
                 let falls = of.iter().map(|(.., falls)| *falls as f64).sum::<f64>() / count;
-                self.print(&format!(
-                    "{}: {} studies, mean best {best:.4} {}, {falls:.2} falls a study\n",
-                    task.name(),
-                    of.len(),
-                    task.unit()
-                ));
+                let (name, unit) = (task.name(), task.unit());
+                self.print(&format!("{name}: {count} studies, mean best {best:.4} {unit}, {falls:.2} falls a study\n"));
             }
         }
     }
