@@ -38,12 +38,20 @@ pub fn task() -> impl TypedValueParser<Value = Task> {
 }
 
 fn sampler() -> impl TypedValueParser<Value = SamplerKind> {
-    one_of([
-        (SamplerKind::Tpe, "tpe", "Tree-structured Parzen estimator, as Optuna"),
-        (SamplerKind::Gp, "gp", "Gaussian process, better with some tens of trials"),
-        (SamplerKind::Random, "random", "Uniform random"),
-        (SamplerKind::Sobol, "sobol", "Sobol sequence (quasi-random)"),
-    ])
+    one_of(SamplerKind::ALL.iter().map(|&kind| {
+        let help = match kind {
+            SamplerKind::Tpe => "Tree-structured Parzen estimator, as Optuna",
+            SamplerKind::Gp => "Gaussian process, better with some tens of trials",
+            SamplerKind::Random => "Uniform random",
+            SamplerKind::Sobol => "Sobol sequence (quasi-random)",
+        };
+        (kind, kind.name(), help)
+    }))
+}
+
+/// Returns the number of cores that this process may use.
+pub fn cores() -> usize {
+    std::thread::available_parallelism().map_or(1, std::num::NonZero::get)
 }
 
 /// Returns the robot model of a name, or of a folder with a URDF and a robot.toml.
@@ -76,10 +84,7 @@ pub struct StudyArguments {
 impl StudyArguments {
     /// Loads the configuration: that of `--config`, else the last one that the study in `resume` ran with.
     pub fn load_config(&self, resume: Option<&Path>) -> Result<Config, Failure> {
-        let own = match &self.config {
-            None => resume.and_then(newest_config).map(|(_, config)| config),
-            Some(_) => None,
-        };
+        let own = resume.filter(|_| self.config.is_none()).and_then(newest_config).map(|(_, config)| config);
         if let Some(own) = &own {
             eprintln!("quadfrog: continuing with the last configuration of the study, {}", own.display());
         }
@@ -95,10 +100,8 @@ impl StudyArguments {
     pub fn new_folder(&self, task: Task, seed: u32) -> PathBuf {
         let now = jiff::Zoned::now().strftime("%Y-%m-%dT%H-%M-%S").to_string();
         let name = format!("{now}-{}-seed{seed}", task.name());
-        let names = std::iter::once(name.clone()).chain((2..).map(|n| format!("{name}-{n}")));
-        names
-            .map(|name| self.output.join(name))
-            .find(|folder| !folder.exists())
-            .unwrap_or_else(|| self.output.join(name))
+        let numbered = (2..).map(|n| self.output.join(format!("{name}-{n}")));
+        let mut folders = std::iter::once(self.output.join(&name)).chain(numbered);
+        folders.find(|folder| !folder.exists()).unwrap_or_else(|| self.output.join(&name))
     }
 }

@@ -31,8 +31,8 @@ fn colour() -> impl TypedValueParser<Value = ColourChoice> {
 
 fn backend() -> impl TypedValueParser<Value = Backend> {
     one_of([
-        (Backend::Simulator, "sim", "The built-in simulator"),
-        (Backend::Hardware, "go1", "A Unitree Go1 over its network, or `quadfrog emulate`"),
+        (Backend::Simulator, Backend::Simulator.name(), "The built-in simulator"),
+        (Backend::Hardware, Backend::Hardware.name(), "A Unitree Go1 over its network, or `quadfrog emulate`"),
     ])
 }
 

@@ -14,6 +14,7 @@ use quadfrog::recording::disk;
 use quadfrog::trial::Backend;
 use quadfrog_console::connection::TerminalLocation;
 
+use super::arguments;
 use super::failure::Failure;
 
 /// Number of wake-ups measured, at 1 kHz.
@@ -107,16 +108,13 @@ fn priority(scheduling: Scheduling) -> DoctorItem {
 }
 
 fn memory() -> DoctorItem {
-    match system::memlock_limit() {
-        None => DoctorItem::new("locked memory", "unlimited", true, ""),
-        Some(bytes) => {
-            DoctorItem::new("locked memory", format!("{} MB at most", bytes / 1_000_000), false, ALLOW_LOCKING)
-        }
-    }
+    let limit = system::memlock_limit();
+    let found = limit.map_or("unlimited".to_owned(), |bytes| format!("{} MB at most", bytes / 1_000_000));
+    DoctorItem::new("locked memory", found, limit.is_none(), ALLOW_LOCKING)
 }
 
 fn cores() -> DoctorItem {
-    let count = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+    let count = arguments::cores();
     let isolated = system::isolated_cores();
     let found = match isolated.as_slice() {
         [] => format!("{count}, none isolated"),
@@ -134,11 +132,9 @@ fn governor() -> DoctorItem {
 }
 
 fn timer() -> DoctorItem {
+    let remedy = "the kernel has no high-resolution timers (CONFIG_HIGH_RES_TIMERS): 1 kHz cannot be kept";
     match system::timer_resolution_ns() {
-        Ok(ns) => {
-            let remedy = "the kernel has no high-resolution timers (CONFIG_HIGH_RES_TIMERS): 1 kHz cannot be kept";
-            DoctorItem::new("timer", format!("{ns} ns"), ns <= 1000, remedy)
-        }
+        Ok(ns) => DoctorItem::new("timer", format!("{ns} ns"), ns <= 1000, remedy),
         Err(error) => DoctorItem::broken("timer", error.to_string(), "the monotonic clock cannot be read"),
     }
 }
@@ -223,13 +219,11 @@ fn colours() -> DoctorItem {
 }
 
 fn size() -> DoctorItem {
-    match crossterm::terminal::size() {
-        Ok((columns, rows)) => {
-            let remedy = "below 80x24 only the mode, STOP and the link are shown; make the window larger";
-            DoctorItem::new("terminal size", format!("{columns}x{rows}"), columns >= 80 && rows >= 24, remedy)
-        }
-        Err(_) => DoctorItem::new("terminal size", "not a terminal", false, "run the console itself in a terminal"),
-    }
+    let Ok((columns, rows)) = crossterm::terminal::size() else {
+        return DoctorItem::new("terminal size", "not a terminal", false, "run the console itself in a terminal");
+    };
+    let remedy = "below 80x24 only the mode, STOP and the link are shown; make the window larger";
+    DoctorItem::new("terminal size", format!("{columns}x{rows}"), columns >= 80 && rows >= 24, remedy)
 }
 
 /// Checks the free space in the folder, or in its nearest ancestor that exists.
@@ -242,10 +236,9 @@ fn disk_space(folder: &Path, needed_mb: u32) -> DoctorItem {
             let remedy = format!("a robot is not armed with less than {needed_mb} MB; free space, or choose --output");
             DoctorItem::new("disk", found, free >= u64::from(needed_mb), &remedy)
         }
-        Err(error) => DoctorItem::broken(
-            "disk",
-            format!("{}: {error}", existing.display()),
-            "nothing can be recorded there; choose another --output",
-        ),
+        Err(error) => {
+            let found = format!("{}: {error}", existing.display());
+            DoctorItem::broken("disk", found, "nothing can be recorded there; choose another --output")
+        }
     }
 }

@@ -48,11 +48,9 @@ pub fn run(arguments: &EmulateArguments) -> Result<(), Failure> {
     let (files, description) = load_model(&arguments.model)?;
     let no_network = || EngineError::NoNetwork { robot: description.name.clone() };
     let network = Network::read(&files).map_err(Failure::input)?.ok_or_else(no_network)?;
-    let mut emulator = Emulator::bind(arguments.bind, &description, &network, &config.simulator, arguments.seed)
-        .map_err(Failure::input)?;
-    for &fault in &arguments.faults {
-        emulator.apply(fault);
-    }
+    let emulator = Emulator::bind(arguments.bind, &description, &network, &config.simulator, arguments.seed);
+    let mut emulator = emulator.map_err(Failure::input)?;
+    arguments.faults.iter().for_each(|&fault| emulator.apply(fault));
     // Before the threads start, so that all of them inherit the blocked signals and only `wait` receives them.
     let ends = SigSet::from_iter([Signal::SIGINT, Signal::SIGTERM]);
     ends.thread_block().wrap_err("blocking signals")?;
@@ -107,9 +105,7 @@ fn report(handle: &EmulatorHandle, ending: &AtomicBool) {
     let mut last = EmulatorStatus::default();
     while !ending.load(Ordering::Acquire) {
         let now = handle.status();
-        if now.client != last.client
-            && let Some(client) = now.client
-        {
+        if let Some(client) = now.client.filter(|client| last.client != Some(*client)) {
             println!("commands come from {client}");
         }
         if now.timed_out && !last.timed_out && now.commands > 0 {

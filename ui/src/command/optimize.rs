@@ -2,6 +2,7 @@
 
 mod printer;
 
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
@@ -69,11 +70,8 @@ pub struct OptimizeArguments {
 impl OptimizeArguments {
     /// Returns the only seed, if one is given; more than one is refused with `message`.
     fn only_seed(&self, message: &str) -> Result<Option<u32>, Failure> {
-        match self.seed.as_ref().map(|seeds| seeds.0.as_slice()) {
-            None => Ok(None),
-            Some([seed]) => Ok(Some(*seed)),
-            Some(_) => Err(Failure::input(message)),
-        }
+        let seeds = self.seed.as_ref().map_or(&[][..], |seeds| &seeds.0);
+        if seeds.len() > 1 { Err(Failure::input(message)) } else { Ok(seeds.first().copied()) }
     }
 }
 
@@ -116,11 +114,8 @@ pub fn run(arguments: &OptimizeArguments) -> Result<(), Failure> {
     let printer = Printer::new(arguments.json, joined.is_some(), &config, &budgets.collect::<Vec<_>>());
     let failures = Mutex::new(Vec::new());
     let next = AtomicUsize::new(0);
-    let jobs = match arguments.jobs {
-        Some(jobs) => usize::from(jobs),
-        None if joined.is_some() => 1,
-        None => std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
-    };
+    let cores = if joined.is_some() { 1 } else { arguments::cores() };
+    let jobs = arguments.jobs.map_or(cores, usize::from);
     std::thread::scope(|scope| {
         for _ in 0..jobs.min(studies.len()) {
             scope.spawn(|| {
@@ -151,11 +146,10 @@ fn workers(
     robot: &RobotDescription,
 ) -> Result<Vec<SelectedStudy>, Failure> {
     const SEVERAL: &str = "--join: a worker takes part in one study; give one --task and one --seed";
-    let task = match arguments.task.as_slice() {
-        [] => None,
-        [task] => Some(*task),
-        _ => return Err(Failure::input(SEVERAL)),
-    };
+    if arguments.task.len() > 1 {
+        return Err(Failure::input(SEVERAL));
+    }
+    let task = arguments.task.first().copied();
     let seed = arguments.only_seed(SEVERAL)?;
     let StoredStudy { task, seed, budget, .. } = study_to_join(storage, task, seed, robot)?;
     let name = arguments.study.new_folder(task, seed);
@@ -177,12 +171,9 @@ fn select(
     }
     let tasks = if arguments.task.is_empty() { &[Task::Forward][..] } else { &arguments.task };
     let seeds = arguments.seed.as_ref().map_or_else(|| vec![config.optimize.sampler.seed], |seeds| seeds.0.clone());
-    let mut pairs: Vec<(Task, u32)> = Vec::new();
-    for pair in tasks.iter().flat_map(|task| seeds.iter().map(|seed| (*task, *seed))) {
-        if !pairs.contains(&pair) {
-            pairs.push(pair);
-        }
-    }
+    let mut pairs: Vec<(Task, u32)> = tasks.iter().flat_map(|task| seeds.iter().map(|seed| (*task, *seed))).collect();
+    let mut seen = HashSet::new();
+    pairs.retain(|pair| seen.insert(*pair));
     let new = |(task, seed)| SelectedStudy { task, seed, folder: arguments.study.new_folder(task, seed), budget: None };
     Ok(pairs.into_iter().map(new).collect())
 }
@@ -208,18 +199,14 @@ fn run_one(
     let mut rollout = Rollout::new(simulator, &settings);
     let prepared = engine::prepare_folder(&options)?;
     let recording = prepared.recording.clone().filter(|_| arguments.record != RecordChoice::None);
-    let name = match &recording {
-        // Workers of a shared study have their own folders: the file name alone is ambiguous.
-        Some(path) if join.is_some() => Some(path.display().to_string()),
-        Some(path) => path.file_name().map(|name| name.to_string_lossy().into_owned()),
-        None => None,
+    // Workers of a shared study have their own folders: the file name alone is ambiguous.
+    let name = |path: &PathBuf| {
+        if join.is_some() { Some(path.clone().into()) } else { path.file_name().map(ToOwned::to_owned) }
     };
+    let name = recording.as_ref().and_then(name).unwrap_or_default();
     // Synced: a judged trial is on disk before the next one is proposed.
-    let mut experiment = engine::open_experiment(&options, Durability::Synced, name.as_deref().unwrap_or_default())?;
-    let mut recorder = match &recording {
-        Some(path) => Some(StudyRecorder::create(path, &options)?),
-        None => None,
-    };
+    let mut experiment = engine::open_experiment(&options, Durability::Synced, &name.to_string_lossy())?;
+    let mut recorder = recording.as_ref().map(|path| StudyRecorder::create(path, &options)).transpose()?;
     let mut failed = None;
     let mut best: Option<(TrialRecord, Vec<Tick>)> = None;
     let ran = automatic::run_watched(&mut experiment, &mut rollout, |experiment, row, ticks| {
@@ -228,9 +215,7 @@ fn run_one(
         let better = |best: &(TrialRecord, Vec<Tick>)| row.value > best.0.value;
         match arguments.record {
             RecordChoice::All => {
-                if let Some(recorder) = &mut recorder
-                    && let Err(error) = recorder.trial(row, ticks)
-                {
+                if let Some(Err(error)) = recorder.as_mut().map(|recorder| recorder.trial(row, ticks)) {
                     failed.get_or_insert(error);
                 }
             }
@@ -242,15 +227,15 @@ fn run_one(
     });
     if let Some(mut recorder) = recorder {
         if let Some((row, ticks)) = &best {
-            recorder.trial(row, ticks).map_err(EngineError::from)?;
+            recorder.trial(row, ticks)?;
         }
         for row in experiment.rows() {
-            recorder.row(row).map_err(EngineError::from)?;
+            recorder.row(row)?;
         }
-        recorder.finish().map_err(EngineError::from)?;
+        recorder.writer.finish().map_err(EngineError::from)?;
     }
     if let Some(error) = failed {
-        return Err(EngineError::from(error).into());
+        return Err(error.into());
     }
     if let Err(refusal) = ran {
         let place = join.map_or_else(|| study.folder.display().to_string(), ToString::to_string);
@@ -273,7 +258,7 @@ impl StudyRecorder {
         Ok(StudyRecorder { writer, time_ns: 0 })
     }
 
-    fn trial(&mut self, row: &TrialRecord, ticks: &[Tick]) -> Result<(), quadfrog::recording::RecordingError> {
+    fn trial(&mut self, row: &TrialRecord, ticks: &[Tick]) -> Result<(), EngineError> {
         let start_ns = self.time_ns;
         for tick in ticks {
             let time_ns = start_ns + tick.time_ns;
@@ -283,11 +268,7 @@ impl StudyRecorder {
         self.row(row)
     }
 
-    fn row(&mut self, row: &TrialRecord) -> Result<(), quadfrog::recording::RecordingError> {
-        self.writer.record(&Stamped { time_ns: self.time_ns, record: Record::Trial(row.clone()) })
-    }
-
-    fn finish(self) -> Result<(), quadfrog::recording::RecordingError> {
-        self.writer.finish().map(|_| ())
+    fn row(&mut self, row: &TrialRecord) -> Result<(), EngineError> {
+        Ok(self.writer.record(&Stamped { time_ns: self.time_ns, record: Record::Trial(row.clone()) })?)
     }
 }

@@ -28,8 +28,9 @@ pub fn parse_storage(place: &str) -> Storage {
     Storage::File(if path.is_dir() { path.join(STUDY_FILE) } else { path.to_owned() })
 }
 
-fn label(study: &StoredStudy) -> String {
-    format!("{} seed {}", study.task.name(), study.seed)
+fn labels<'a>(studies: impl IntoIterator<Item = &'a StoredStudy>) -> String {
+    let label = |study: &StoredStudy| format!("{} seed {}", study.task.name(), study.seed);
+    studies.into_iter().map(label).collect::<Vec<_>>().join(", ")
 }
 
 /// Returns the study of `storage` with this task and seed, where given. If there is none, a new study needs both;
@@ -55,11 +56,10 @@ pub fn study_to_join(
                 eprintln!("quadfrog: a new study of {} seed {seed} is made in {storage}", task.name());
                 return Ok(StoredStudy { task, seed, robot: robot.name.clone(), budget: None });
             }
-            let labels: Vec<String> = all.iter().map(label).collect();
-            let found = match (exists, labels.as_slice()) {
+            let found = match (exists, all.as_slice()) {
                 (false, _) => "there is no such journal".to_owned(),
                 (true, []) => "there is no study of this program in it".to_owned(),
-                (true, labels) => format!("there is no such study in it, only {}", labels.join(", ")),
+                (true, all) => format!("there is no such study in it, only {}", labels(all)),
             };
             Err(Failure::Input(format!("--join {storage}: {found}; for a new study give --task and --seed")))
         }
@@ -69,8 +69,7 @@ pub fn study_to_join(
         ))),
         [study] => Ok((*study).clone()),
         several => {
-            let labels: Vec<String> = several.iter().copied().map(label).collect();
-            let labels = labels.join(", ");
+            let labels = labels(several.iter().copied());
             Err(Failure::Input(format!("--join {storage}: several studies; select with --task and --seed: {labels}")))
         }
     }

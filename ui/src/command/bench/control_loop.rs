@@ -77,11 +77,8 @@ struct LoopMeasurement {
     /// End of the last tick, ns since the start of the turn.
     end_ns: u64,
     tick: Durations,
-    read: Durations,
-    decide: Durations,
-    write: Durations,
-    /// Remainder of the tick: the rings and two clock readings.
-    publish: Durations,
+    /// Read, decide, write, publish; the last is the remainder of the tick: the rings and two clock readings.
+    stages: [Durations; 4],
     /// After the tick: prefetch of the ring slots of the next one.
     prepare: Durations,
     /// Before the tick: a discarded tick on a copy.
@@ -93,15 +90,9 @@ struct LoopMeasurement {
 
 impl LoopMeasurement {
     fn new() -> LoopMeasurement {
-        let lateness = durations();
-        let [wake_up, wake_up_floor, tick, read, decide, write, publish, prepare, warm_up] =
-            std::array::from_fn(|_| lateness.clone());
-        let (end_ns, not_ready, granted) = (0, 0, None);
-        #[rustfmt::skip]
-        let measurement = LoopMeasurement {
-            lateness, wake_up, wake_up_floor, end_ns, tick, read, decide, write, publish, prepare, warm_up, not_ready, granted,
-        };
-        measurement
+        let [lateness, wake_up, wake_up_floor, tick, prepare, warm_up] = std::array::from_fn(|_| durations());
+        let (stages, end_ns, not_ready, granted) = (std::array::from_fn(|_| durations()), 0, 0, None);
+        LoopMeasurement { lateness, wake_up, wake_up_floor, end_ns, tick, stages, prepare, warm_up, not_ready, granted }
     }
 
     fn record(&mut self, instant: TickStart, duration_ns: u64, tick: &Tick) {
@@ -115,9 +106,7 @@ impl LoopMeasurement {
         let stages = &tick.stages;
         let [read, decide, write] = [stages.read_ns, stages.decide_ns, stages.write_ns].map(u64::from);
         let publish = duration_ns.saturating_sub(read + decide + write);
-        for (durations, ns) in
-            [(&mut self.read, read), (&mut self.decide, decide), (&mut self.write, write), (&mut self.publish, publish)]
-        {
+        for (durations, ns) in self.stages.iter_mut().zip([read, decide, write, publish]) {
             durations.saturating_record(ns.max(1));
         }
         self.not_ready += u64::from(tick.mode != Mode::Ready);
@@ -172,10 +161,10 @@ fn report(arguments: &LoopArguments, ours: &LoopMeasurement, cyclictest: &Durati
     }
     line("start of all ticks", &ours.lateness);
     line("tick", &ours.tick);
-    line("  read", &ours.read);
-    line("  estimate, check, decide", &ours.decide);
-    line(if arguments.with_link { "  send" } else { "  write (with physics)" }, &ours.write);
-    line("  publish", &ours.publish);
+    let write = if arguments.with_link { "  send" } else { "  write (with physics)" };
+    for (name, durations) in ["  read", "  estimate, check, decide", write, "  publish"].iter().zip(&ours.stages) {
+        line(name, durations);
+    }
     line("after the tick: prefetch", &ours.prepare);
     if !arguments.lead().is_zero() {
         line("before the tick: warm-up", &ours.warm_up);
@@ -196,8 +185,7 @@ fn report(arguments: &LoopArguments, ours: &LoopMeasurement, cyclictest: &Durati
         println!("p99.9 of the wake-up latency: {ratio:.2} times cyclictest's, in whole us (limit {RATIO_LIMIT})");
     }
     if arguments.with_link {
-        let tick = us(ours.tick.value_at_quantile(0.999));
-        let calls = us(system_calls.value_at_quantile(0.999));
+        let [tick, calls] = [&ours.tick, system_calls].map(|durations| us(durations.value_at_quantile(0.999)));
         println!(
             "p99.9 of a tick over the Go1's link: {tick:.1} us (limit {TICK_LIMIT_US}); its system calls: {calls:.1} us"
         );
@@ -357,10 +345,8 @@ fn stand_and_measure(
     pace_with_warm_up(PERIOD, CONTROL_PHASE, lead, &mut standing).wrap_err("waiting on the monotonic clock")?;
     if standing.standing_up.is_some() {
         let mode = standing.control.mode().name();
-        return Err(eyre!(
-            "the robot did not reach READY within {} s; its mode is {mode}",
-            STAND_UP_LIMIT_TICKS / 1000
-        ));
+        let limit_s = STAND_UP_LIMIT_TICKS / 1000;
+        return Err(eyre!("the robot did not reach READY within {limit_s} s; its mode is {mode}"));
     }
     Ok(standing.measurement)
 }

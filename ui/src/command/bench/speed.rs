@@ -9,6 +9,7 @@ use color_eyre::eyre::{WrapErr, eyre};
 use quadfrog::sim::bench::{BenchScene, SimulatorBench};
 
 use super::machine;
+use crate::command::arguments::cores;
 use crate::command::failure::Failure;
 
 #[derive(Debug, Args)]
@@ -31,8 +32,7 @@ pub fn run(arguments: &SpeedArguments) -> Result<(), Failure> {
     if let Some(script) = arguments.mujoco.as_ref().filter(|script| !script.is_file()) {
         return Err(Failure::input(format!("--mujoco {}: there is no such file", script.display())));
     }
-    let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
-    machine::print_header(&format!(", {cores} cores"));
+    machine::print_header(&format!(", {} cores", cores()));
     println!();
     let figures = SimulatorBench::new().measure(arguments.seconds * 5.0);
     println!("accelerations from torques                {:8.2} us", figures.dynamics_s * 1e6);
@@ -42,11 +42,9 @@ pub fn run(arguments: &SpeedArguments) -> Result<(), Failure> {
     if let Some(script) = &arguments.mujoco {
         let theirs = mujoco(script, arguments.seconds)?;
         // The robot of the script stands on four feet, as in Scene::ALL[1].
-        let ours = 1.0 / figures.step_s[1];
+        let (us, ratio) = (1e6 / theirs, 1.0 / figures.step_s[1] / theirs);
         println!(
-            "MuJoCo, 1 ms step, standing on four feet  {:8.2} us  {theirs:8.0} steps/s; quadfrog / MuJoCo: {:.1}",
-            1e6 / theirs,
-            ours / theirs
+            "MuJoCo, 1 ms step, standing on four feet  {us:8.2} us  {theirs:8.0} steps/s; quadfrog / MuJoCo: {ratio:.1}"
         );
     }
     println!();
@@ -63,16 +61,10 @@ fn studies(arguments: &[&str]) -> Result<f64, Failure> {
     let program = std::env::current_exe().wrap_err("the path of this program")?;
     let folder = std::env::temp_dir().join(format!("quadfrog-bench-{}", std::process::id()));
     let start = Instant::now();
-    let status = Command::new(program)
-        .arg("optimize")
-        .args(arguments)
-        .arg("--output")
-        .arg(&folder)
-        .stdin(Stdio::null())
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .status()
-        .wrap_err("optimize could not be started")?;
+    let mut optimize = Command::new(program);
+    optimize.arg("optimize").args(arguments).arg("--output").arg(&folder);
+    optimize.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+    let status = optimize.status().wrap_err("optimize could not be started")?;
     let seconds = start.elapsed().as_secs_f64();
     // A leftover in the temporary directory is harmless.
     let _ = std::fs::remove_dir_all(&folder);
