@@ -55,7 +55,7 @@ pub fn evaluate<R: Robot>(rollout: &mut Rollout<R>, spec: &TrialSpec) -> Evaluat
         let angles = ticks.iter().map(|tick| tick.estimate.roll_pitch_yaw[axis]);
         angles.clone().fold(f64::NEG_INFINITY, f64::max) - angles.fold(f64::INFINITY, f64::min)
     };
-    let starts: Vec<f64> = impulse_edges(ticks, true).map(|tick| tilt_rad(tick)).collect();
+    let starts: Vec<f64> = impulse_edges(ticks, true).map(tilt_rad).collect();
     let value = measured.as_ref().map(|measured| objective::value(spec.task, measured, spec.jumps));
     EvaluatedRun {
         seed: spec.seed,
