@@ -42,7 +42,7 @@ impl ArmingBench {
             Some(CommandRefusal::Checks(checks)) => checks.iter().collect(),
             other => other.map(|other| panic!("{other}")).unwrap_or_default(),
         };
-        assert_eq!(checks == [], self.cycle.mode() == Mode::StandUp);
+        assert_eq!(checks.is_empty(), self.cycle.mode() == Mode::StandUp);
         checks
     }
 }
