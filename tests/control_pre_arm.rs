@@ -38,7 +38,7 @@ impl ArmingBench {
     /// Arms; returns the failing checks of a refusal.
     fn failing(&mut self) -> Vec<ArmingCheck> {
         self.command(self.arm());
-        let checks = match self.refusal() {
+        let checks: Vec<ArmingCheck> = match self.refusal() {
             Some(CommandRefusal::Checks(checks)) => checks.iter().collect(),
             other => other.map(|other| panic!("{other}")).unwrap_or_default(),
         };
