@@ -1,4 +1,4 @@
-//! The actions of the operator: names, default keys, help. [`crate::legal`] says when each is possible.
+//! The actions of the operator: names, default keys, help. `legal` says when each is possible.
 
 use strum::{IntoStaticStr, VariantArray};
 
