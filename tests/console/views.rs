@@ -142,9 +142,9 @@ fn joints_contact_and_wireframe_are_there_at_every_size() {
         console.press(&["t", "t"]);
         let screen = console.screen(columns, rows);
         assert!(screen.contains("FR● FL○ RR● RL○"), "{screen}");
-        let thigh = line_with(&screen, "FR thigh");
+        let thigh = line_with(&screen, "FR_thigh");
         assert!(thigh.contains("-20.0!") && thigh.contains('█'), "{thigh}");
-        for joint in ["FR hip", "FL calf", "RR thigh", "RL calf"] {
+        for joint in ["FR_hip", "FL_calf", "RR_thigh", "RL_calf"] {
             assert!(screen.contains(joint), "no {joint}:\n{screen}");
         }
     }

@@ -171,7 +171,7 @@ fn render_joints(frame: &mut Frame, area: Rect, model: &Model) {
         let limits = &robot.limits;
         let width = usize::from(column.width).saturating_sub(24) / 2;
         let limited = if tick.limited & (1 << joint) != 0 { "!" } else { " " };
-        let mut spans = vec![span(theme, Role::Quiet, format!("{:<9}", joint_name(joint).replace('_', " ")))];
+        let mut spans = vec![span(theme, Role::Quiet, format!("{:<9}", joint_name(joint)))];
         spans.extend(bar(theme, torque / limits.max_torque[joint], width));
         spans.push(Span::raw(format!("{torque:6.1}{limited} ")));
         spans.extend(bar(theme, speed / limits.max_velocity[joint], width));
