@@ -3,7 +3,7 @@
 mod support;
 
 use quadfrog::config::Config;
-use quadfrog::recording::record::{ArmingCheckRecord, Record, SessionInfo};
+use quadfrog::recording::record::{ArmingCheckRecord, HealthLimits, Record, SessionInfo};
 use quadfrog::recording::recorder::RecorderStatus;
 use quadfrog::robot::{Battery, LinkStatus};
 use quadfrog::session::operator_request::{OperatorCheck, OperatorRequest};
@@ -415,6 +415,27 @@ fn the_frame_says_how_link_battery_and_the_hottest_motor_are_at_every_size() {
     assert!(motor.contains("63 C") && motor.contains('!'), "{motor}");
     // Too small for anything else, the link is still there.
     assert!(console.screen(40, 10).contains("link 3 ms, 2.0 % lost"));
+}
+
+/// (A defect once: the screen compared with 60 C, 30 % and 5 ms, whatever `safety.toml` said.)
+#[test]
+fn health_is_coloured_by_the_limits_of_the_session() {
+    let mut console = on_hardware(Vec::new());
+    let mut newest = tick(5_000, 0.0, None);
+    newest.state.motor_temperature_c[5] = 63.0;
+    newest.state.battery = Some(Battery { charge_percent: 87.0, voltage_v: 24.1, current_a: -2.0, cell_v: [3.4; 10] });
+    let link = LinkStatus { state_age_ms: 8, rate_hz: 998, recent_received: 5_000, ..LinkStatus::default() };
+    let counters = Counters { link: Some(link), ..Counters::default() };
+    console.tell(Msg::Snapshot(Box::new(Snapshot { tick: newest, counters })));
+    console.model.view = View::Health;
+    let mut marked = |limits: HealthLimits| {
+        console.record(Record::Session(SessionInfo { backend: Some(Backend::Hardware), limits, ..session() }));
+        let screen = console.screen(120, 40);
+        ["63 C off", "battery      87 %", "998 Hz"].map(|row| line_with(&screen, row).contains('!'))
+    };
+    assert_eq!(marked(HealthLimits::default()), [true, false, true]);
+    let limits = HealthLimits { motor_c: 80.0, battery_percent: 90.0, state_age_ms: 10, ..HealthLimits::default() };
+    assert_eq!(marked(limits), [false, true, false]);
 }
 
 #[test]
