@@ -1,4 +1,4 @@
-//! Starts the threads of a session from a checked configuration and gives a screen its [`Handle`].
+//! Starts the threads of a session from a checked configuration and gives a screen its [`EngineHandle`].
 
 mod control_thread;
 mod folder;
@@ -9,7 +9,7 @@ mod stored;
 mod study;
 
 pub use folder::{STUDY_FILE, attachments, fingerprint, newest_config, prepare_folder, study_files, utc_ns};
-pub use guard::{GUARD, GuardError, Watch, stand as stand_guard};
+pub use guard::{GUARD, GuardError, GuardOutcome, run_guard};
 pub use options::{EngineError, Options};
 pub use stored::{Opened, StoredStudy, open_stored, stored_studies, stored_study};
 pub use study::{open_experiment, session_info, study_name};
@@ -41,7 +41,7 @@ use crate::trial::{Approval, Backend};
 ///
 /// # Errors
 /// When the configuration, the study, the recording or the system does not allow it; no thread runs then.
-pub fn start(options: Options) -> Result<Handle, EngineError> {
+pub fn start(options: Options) -> Result<EngineHandle, EngineError> {
     if options.approve == Approval::Auto && options.backend == Backend::Hardware {
         return Err(EngineError::Unattended);
     }
@@ -54,7 +54,7 @@ pub fn start(options: Options) -> Result<Handle, EngineError> {
         Backend::Hardware => {
             let no_network = || EngineError::NoNetwork { robot: options.robot.name.clone() };
             let go1 = Go1::open(&options.network.ok_or_else(no_network)?, options.observe)?;
-            let post = |program: &PathBuf| Guard::post(program, &go1, &settings);
+            let post = |program: &PathBuf| Guard::start(program, &go1, &settings);
             let guard = options.guard.as_ref().map(post).transpose().map_err(system("guard"))?;
             (Box::new(go1), guard)
         }
@@ -90,7 +90,7 @@ pub fn start(options: Options) -> Result<Handle, EngineError> {
     let real = options.backend == Backend::Hardware;
     let control = thread
         .spawn(move || {
-            let start = control_thread::Start {
+            let start = control_thread::ControlThreadParts {
                 settings: &settings,
                 scheduling,
                 report: report_scheduling,
@@ -118,7 +118,7 @@ pub fn start(options: Options) -> Result<Handle, EngineError> {
         .spawn(move || session_thread::run(supervisor, guard, &requests, &clock, sits_down))
         .map_err(system("session thread"))?;
 
-    Ok(Handle {
+    Ok(EngineHandle {
         screen: screen_end,
         recording,
         _folder: folder,
@@ -133,7 +133,7 @@ pub fn start(options: Options) -> Result<Handle, EngineError> {
 }
 
 /// Access of a screen to a running engine. Dropping it ends the engine as `shutdown` does.
-pub struct Handle {
+pub struct EngineHandle {
     screen: ScreenEnd,
     recording: Option<PathBuf>,
     _folder: LockedFolder,
@@ -146,7 +146,7 @@ pub struct Handle {
     recorder: Option<RecorderHandle>,
 }
 
-impl Handle {
+impl EngineHandle {
     /// Stops the robot: damping in the next tick, in every mode. Neither waits nor fails.
     pub fn stop(&self) {
         self.screen.stop.set();
@@ -229,7 +229,7 @@ impl Handle {
     }
 }
 
-impl Drop for Handle {
+impl Drop for EngineHandle {
     fn drop(&mut self) {
         self.end();
     }

@@ -85,7 +85,7 @@ fn a_stopped_robot_stays_damped_until_it_is_acknowledged_and_armed_anew() {
 #[test]
 fn an_operator_lost_in_mid_jump_is_landed_and_sat_down() {
     let mut bench = simulated().reach(Mode::Jump);
-    bench.inputs.operator_silent_ms = bench.settings.watchdog.operator_silent_ms + 1;
+    bench.inputs.operator_silent_ms = bench.settings.failsafe.operator_silent_ms + 1;
     let modes = bench.modes_until(Mode::Disarmed);
     assert_eq!(modes, [Mode::Jump, Mode::Settle, Mode::Review, Mode::SitDown, Mode::Disarmed]);
     assert!(matches!(bench.ends()[..], [TrialEnd::Fault(_)]), "{:?}", bench.ends());
@@ -94,7 +94,7 @@ fn an_operator_lost_in_mid_jump_is_landed_and_sat_down() {
 #[test]
 fn an_operator_lost_in_the_countdown_never_jumps() {
     let mut bench = simulated().reach(Mode::Countdown);
-    bench.inputs.operator_silent_ms = bench.settings.watchdog.operator_silent_ms + 1;
+    bench.inputs.operator_silent_ms = bench.settings.failsafe.operator_silent_ms + 1;
     assert_eq!(bench.tick(None).mode, Mode::SitDown);
     assert!(matches!(bench.ends()[..], [TrialEnd::Fault(_)]), "{:?}", bench.ends());
 }

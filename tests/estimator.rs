@@ -6,7 +6,7 @@ mod estimation;
 use estimation::{JumpError, World, jumps, percentile, settings, settings_of};
 use nalgebra::Vector3;
 use quadfrog::config::Config;
-use quadfrog::control::cycle::{Cycle, Inputs};
+use quadfrog::control::cycle::{Cycle, TickInputs};
 use quadfrog::control::estimator::{ContactGate, Estimator};
 use quadfrog::control::leg::feet;
 use quadfrog::control::settings::{ControlSettings, ObjectiveSource};
@@ -105,7 +105,7 @@ fn a_robot_that_stands_for_a_minute_stays_where_it_is() {
     let mut start = None;
     let (mut farthest, mut fastest) = (0.0_f64, 0.0_f64);
     for ms in 0..60_000_u64 {
-        let inputs = Inputs { time_ns: ms * 1_000_000, ..Inputs::default() };
+        let inputs = TickInputs { time_ns: ms * 1_000_000, ..TickInputs::default() };
         let tick = *cycle.tick(&inputs, &SimulatedClock, &mut robot);
         if ms < 2_000 {
             continue;
@@ -358,7 +358,7 @@ fn the_truth_is_passed_through_where_it_is_asked_for() {
     simulator.place(&Placement { joint_position: stance(&settings), lying: false, seed: 1 });
     let mut cycle = Cycle::ready(&settings);
     for _ in 0..200 {
-        let tick = *cycle.tick(&Inputs::default(), &SimulatedClock, &mut simulator);
+        let tick = *cycle.tick(&TickInputs::default(), &SimulatedClock, &mut simulator);
         let truth = tick.state.truth.unwrap();
         assert_eq!(tick.estimate.position_world, truth.position_world);
         assert_eq!(tick.estimate.velocity_world, truth.velocity_world);

@@ -200,11 +200,11 @@ const CUT: [Row; 16] = [
 ];
 
 fn corrupted(bench: &TappedBench, _: &Tick) -> bool {
-    bench.link_status().recent_corrupt > bench.settings.watchdog.corrupt
+    bench.link_status().recent_corrupt > bench.settings.failsafe.corrupt
 }
 
 fn slow(bench: &TappedBench, tick: &Tick) -> bool {
-    tick.number >= bench.robot.injected_at + u64::from(bench.settings.watchdog.period_ticks)
+    tick.number >= bench.robot.injected_at + u64::from(bench.settings.failsafe.period_ticks)
 }
 
 /// Control ticks between the first bad one and the first damping on the wire; 0 if it is the same tick.
@@ -270,7 +270,7 @@ fn a_silence_of_more_than_200_ms_is_a_lost_link() {
 #[test]
 fn a_power_cycle_behind_another_fault_is_reported() {
     let mut bench = restarting_in(None).reach(Mode::Ready);
-    assert!(bench.config.simulator.emulator.reboot_ms > bench.settings.watchdog.link_lost_ms);
+    assert!(bench.config.simulator.emulator.reboot_ms > bench.settings.failsafe.link_lost_ms);
     bench.inject("angle FL_hip 1.3");
     bench.until(Mode::Fault);
     bench.robot.emulator.apply("clear".parse().unwrap());

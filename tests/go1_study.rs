@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 
 use go1::{Lockstep, description, emulator, network};
 use quadfrog::config::Config;
-use quadfrog::engine::{self, Handle, Options, open_experiment};
+use quadfrog::engine::{self, EngineHandle, Options, open_experiment};
 use quadfrog::optimize::journal::Durability;
 use quadfrog::realtime::thread::pace;
 use quadfrog::recording::record::{Record, StageRecord};
@@ -38,10 +38,10 @@ fn config(late_ms: f64) -> Config {
     // As long as in the simulator: no person is beside the robot.
     config.control.countdown.hardware_s = config.control.countdown.simulator_s;
     // The test machine has other load: its delays would be faults at a robot.
-    config.safety.watchdog.hardware_late_ms = late_ms;
-    config.safety.watchdog.state_age_ms = (2.0 * late_ms).max(20.0) as u32;
-    config.safety.watchdog.period_ticks = 1000;
-    config.safety.pre_arm.late_share = 1.0;
+    config.safety.failsafe.hardware_late_ms = late_ms;
+    config.safety.failsafe.state_age_ms = (2.0 * late_ms).max(20.0) as u32;
+    config.safety.failsafe.period_ticks = 1000;
+    config.safety.arming.late_share = 1.0;
     config
 }
 
@@ -97,7 +97,7 @@ struct Outcome {
 
 /// An operator who follows the screen.
 struct Operator {
-    engine: Handle,
+    engine: EngineHandle,
     robot: EmulatorHandle,
     stage: Option<StageRecord>,
     card: Option<Proposal>,

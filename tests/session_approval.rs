@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use quadfrog::config::Config;
-use quadfrog::engine::{self, EngineError, Handle, Options};
+use quadfrog::engine::{self, EngineError, EngineHandle, Options};
 use quadfrog::recording::record::{Record, Stamped};
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::session::operator_request::OperatorRequest;
@@ -18,7 +18,7 @@ fn options(approve: Approval, backend: Backend) -> Options {
 
 /// A screen that sends heartbeats and presses no key by itself.
 struct Screen {
-    handle: Handle,
+    handle: EngineHandle,
     records: Vec<Record>,
 }
 

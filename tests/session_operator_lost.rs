@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use quadfrog::config::Config;
-use quadfrog::engine::{self, Handle, Options};
+use quadfrog::engine::{self, EngineHandle, Options};
 use quadfrog::recording::player::Player;
 use quadfrog::recording::record::Record;
 use quadfrog::robot::description::RobotDescription;
@@ -18,7 +18,7 @@ use quadfrog::trial::{Backend, ExperimentStage, Proposal, Task, TrialRecord, Ver
 /// Longest wait; ends only a test that fails.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-fn start(folder: &Path, config: Option<&Path>) -> Handle {
+fn start(folder: &Path, config: Option<&Path>) -> EngineHandle {
     let config = Config::load(config).unwrap();
     let robot = RobotDescription::embedded("go1").unwrap();
     let options = Options::new(config, robot, Backend::Simulator, Task::Forward);
@@ -28,13 +28,13 @@ fn start(folder: &Path, config: Option<&Path>) -> Handle {
 
 /// A screen: it beats in a thread of its own until it is lost, and keeps what it is told.
 struct Screen {
-    handle: Handle,
+    handle: EngineHandle,
     records: Vec<Record>,
     alive: Arc<AtomicBool>,
 }
 
 impl Screen {
-    fn new(handle: Handle) -> Screen {
+    fn new(handle: EngineHandle) -> Screen {
         let alive = Arc::new(AtomicBool::new(true));
         let (heart, flag) = (handle.heartbeat(), alive.clone());
         std::thread::spawn(move || {

@@ -164,12 +164,12 @@ impl Config {
     pub fn health_limits(&self) -> HealthLimits {
         let (safety, default) = (&self.safety, HealthLimits::default());
         HealthLimits {
-            state_age_ms: safety.watchdog.state_age_warn_ms,
-            loss_share: safety.pre_arm.loss_share,
-            motor_c: safety.pre_arm.motor_c,
-            battery_percent: safety.pre_arm.battery_percent,
+            state_age_ms: safety.failsafe.state_age_warn_ms,
+            loss_share: safety.arming.loss_share,
+            motor_c: safety.arming.motor_c,
+            battery_percent: safety.arming.battery_percent,
             // 0: late ticks trip nothing.
-            late_ms: Some(safety.watchdog.hardware_late_ms).filter(|ms| *ms > 0.0).unwrap_or(default.late_ms),
+            late_ms: Some(safety.failsafe.hardware_late_ms).filter(|ms| *ms > 0.0).unwrap_or(default.late_ms),
             late_share: default.late_share,
         }
     }
@@ -210,7 +210,7 @@ impl Config {
         let chosen = self.task(task);
         self.check_stance(robot, task)?;
         let hardware = backend == Backend::Hardware;
-        let SafetyFile { watchdog, fall, .. } = &self.safety;
+        let SafetyFile { failsafe, fall, .. } = &self.safety;
         let (min_position, max_position) = robot.allowed_positions();
         Ok(ControlSettings {
             geometry: robot.leg_geometry,
@@ -241,11 +241,11 @@ impl Config {
             estimator: self.control.estimator,
             gate: self.safety.gate,
             hardware,
-            pre_arm: self.safety.pre_arm,
+            arming: self.safety.arming,
             approval: self.safety.approval,
-            watchdog: *watchdog,
-            late_ms: if hardware { watchdog.hardware_late_ms } else { watchdog.simulator_late_ms },
-            idle_s: if hardware { watchdog.hardware_idle_s } else { watchdog.simulator_idle_s },
+            failsafe: *failsafe,
+            late_ms: if hardware { failsafe.hardware_late_ms } else { failsafe.simulator_late_ms },
+            idle_s: if hardware { failsafe.hardware_idle_s } else { failsafe.simulator_idle_s },
         })
     }
 

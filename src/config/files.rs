@@ -82,9 +82,11 @@ pub struct WorkersFile {
 pub struct SafetyFile {
     pub fall: FallLimits,
     pub gate: GateLimits,
-    pub pre_arm: ArmingLimits,
+    #[serde(rename = "pre_arm")]
+    pub arming: ArmingLimits,
     pub approval: ApprovalLimits,
-    pub watchdog: FailsafeLimits,
+    #[serde(rename = "watchdog")]
+    pub failsafe: FailsafeLimits,
     pub parameters: BTreeMap<String, [f64; 2]>,
     pub gains: BTreeMap<String, [f64; 2]>,
 }

@@ -54,7 +54,7 @@ impl Config {
     }
 
     fn check_safety(&self) -> Result<(), ConfigError> {
-        let SafetyFile { fall, gate, watchdog, parameters, gains, .. } = &self.safety;
+        let SafetyFile { fall, gate, failsafe, parameters, gains, .. } = &self.safety;
         if gate.damping_kd > gate.kd_max {
             let reason =
                 format!("must not be above gate.kd_max = {}, which would reduce the stop's damping", gate.kd_max);
@@ -62,14 +62,14 @@ impl Config {
         }
         // A warning comes before the stop that it announces.
         let [warn, gap, lost] =
-            [watchdog.state_age_warn_ms, watchdog.state_age_ms, watchdog.link_lost_ms].map(f64::from);
+            [failsafe.state_age_warn_ms, failsafe.state_age_ms, failsafe.link_lost_ms].map(f64::from);
         for (key, value, stop, limit) in [
-            ("watchdog.motor_warm_c", watchdog.motor_warm_c, "watchdog.motor_c", watchdog.motor_c),
+            ("watchdog.motor_warm_c", failsafe.motor_warm_c, "watchdog.motor_c", failsafe.motor_c),
             ("watchdog.state_age_ms", gap, "watchdog.link_lost_ms", lost),
             ("watchdog.state_age_warn_ms", warn, "watchdog.state_age_ms", gap),
-            ("watchdog.stance_tilt_rad", watchdog.stance_tilt_rad, "watchdog.tilt_rad", watchdog.tilt_rad),
-            ("fall.roll_rad", fall.roll_rad, "watchdog.tilt_rad", watchdog.tilt_rad),
-            ("fall.pitch_rad", fall.pitch_rad, "watchdog.tilt_rad", watchdog.tilt_rad),
+            ("watchdog.stance_tilt_rad", failsafe.stance_tilt_rad, "watchdog.tilt_rad", failsafe.tilt_rad),
+            ("fall.roll_rad", fall.roll_rad, "watchdog.tilt_rad", failsafe.tilt_rad),
+            ("fall.pitch_rad", fall.pitch_rad, "watchdog.tilt_rad", failsafe.tilt_rad),
         ] {
             if value > limit {
                 return Err(self.refuse(SAFETY, key, value, format!("must not be above {stop} = {limit}")));

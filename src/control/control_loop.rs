@@ -7,7 +7,7 @@
 //! changes no result (`tests/control_warm_up.rs`). The longest of a thousand ticks take a third less time with it (loopback:
 //! `quadfrog bench loop --with-link`, compared with `--unrehearsed`).
 
-use super::cycle::{Cycle, Inputs};
+use super::cycle::{Cycle, TickInputs};
 use super::settings::ControlSettings;
 use crate::realtime::channel::{ControlEnd, SHOWN_EVERY};
 use crate::realtime::clock::Clock;
@@ -56,7 +56,7 @@ impl ControlLoop {
         // `TickStart` counts from the loop's start, the clock from its own.
         let passed_ns = start.planned_ns + start.lateness_ns;
         let time_ns = *start_ns.get_or_insert_with(|| clock.now_ns().saturating_sub(passed_ns)) + start.planned_ns;
-        let inputs = Inputs {
+        let inputs = TickInputs {
             time_ns,
             lateness_ns: start.lateness_ns,
             stop: end.stop.is_set(),
@@ -102,7 +102,7 @@ impl ControlLoop {
     pub fn warm_up<C: Clock>(&mut self, clock: &C, robot: &mut dyn Robot) {
         robot.warm_up();
         let last = self.cycle.last();
-        let inputs = Inputs { time_ns: last.time_ns, ..Inputs::default() };
+        let inputs = TickInputs { time_ns: last.time_ns, ..TickInputs::default() };
         let mut state = last.state;
         state.robot_time_ms = state.robot_time_ms.wrapping_add(1);
         let mut repeated = LastState { state, link: robot.link() };

@@ -116,7 +116,7 @@ impl Failsafe {
         let began_ns = time_ns + lateness_ns;
         self.period_ms = self.began_ns.map_or(0.0, |before| began_ns.saturating_sub(before) as f64 * 1e-6);
         self.began_ns = Some(began_ns);
-        let slow = self.period_ms > settings.watchdog.period_factor * CONTROL_PERIOD_S * 1e3;
+        let slow = self.period_ms > settings.failsafe.period_factor * CONTROL_PERIOD_S * 1e3;
         self.slow = if slow { self.slow + 1 } else { 0 };
     }
 
@@ -134,7 +134,7 @@ impl Failsafe {
 /// 1. Battery below its limit.
 /// 2. A motor at its warm limit.
 pub fn trial_inhibit(state: &RobotState, settings: &ControlSettings) -> Option<TrialInhibit> {
-    let limits = &settings.watchdog;
+    let limits = &settings.failsafe;
     let low = state.battery.map(|battery| battery.charge_percent).filter(|charge| *charge < limits.battery_percent);
     if let Some(measured_percent) = low {
         return Some(TrialInhibit::BatteryLow { measured_percent, allowed_percent: limits.battery_percent });
@@ -149,7 +149,7 @@ pub fn trial_inhibit(state: &RobotState, settings: &ControlSettings) -> Option<T
 
 /// Returns the warning that precedes a failsafe: an old state before a silent operator's screen.
 pub fn warning(inputs: &FailsafeInputs, settings: &ControlSettings) -> Option<FailsafeWarning> {
-    let limits = &settings.watchdog;
+    let limits = &settings.failsafe;
     if inputs.mode.commanded() && inputs.state_age_ms > limits.state_age_warn_ms {
         Some(FailsafeWarning::StateAge { age_ms: inputs.state_age_ms, allowed_ms: limits.state_age_warn_ms })
     } else if inputs.mode.energised() && inputs.operator_silent_ms > limits.operator_warn_ms {
@@ -167,12 +167,12 @@ fn events_lost(_: &Failsafe, inputs: &FailsafeInputs, _: &ControlSettings) -> Op
 }
 
 fn link_lost(_: &Failsafe, inputs: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {
-    let (age_ms, allowed_ms) = (inputs.state_age_ms, settings.watchdog.link_lost_ms);
+    let (age_ms, allowed_ms) = (inputs.state_age_ms, settings.failsafe.link_lost_ms);
     (age_ms > allowed_ms).then_some(Fault::LinkLost { age_ms, allowed_ms })
 }
 
 fn state_age(_: &Failsafe, inputs: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {
-    let (age_ms, allowed_ms) = (inputs.state_age_ms, settings.watchdog.state_age_ms);
+    let (age_ms, allowed_ms) = (inputs.state_age_ms, settings.failsafe.state_age_ms);
     (age_ms > allowed_ms).then_some(Fault::StateAge { age_ms, allowed_ms })
 }
 
@@ -185,7 +185,7 @@ fn reboot(_: &Failsafe, inputs: &FailsafeInputs, _: &ControlSettings) -> Option<
 }
 
 fn corrupt(_: &Failsafe, inputs: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {
-    let (count, allowed) = (inputs.link?.recent_corrupt, settings.watchdog.corrupt);
+    let (count, allowed) = (inputs.link?.recent_corrupt, settings.failsafe.corrupt);
     (count > allowed).then_some(Fault::Corrupt { count, allowed })
 }
 
@@ -199,7 +199,7 @@ fn late(_: &Failsafe, inputs: &FailsafeInputs, settings: &ControlSettings) -> Op
 }
 
 fn slow(failsafe: &Failsafe, _: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {
-    let limits = &settings.watchdog;
+    let limits = &settings.failsafe;
     let slow = settings.late_ms > 0.0 && failsafe.slow >= limits.period_ticks;
     slow.then_some(Fault::Slow {
         ticks: failsafe.slow,
@@ -209,7 +209,7 @@ fn slow(failsafe: &Failsafe, _: &FailsafeInputs, settings: &ControlSettings) -> 
 }
 
 fn motor_hot(_: &Failsafe, inputs: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {
-    let ((joint, measured_c), allowed_c) = (hottest(inputs.state), settings.watchdog.motor_c);
+    let ((joint, measured_c), allowed_c) = (hottest(inputs.state), settings.failsafe.motor_c);
     (measured_c >= allowed_c).then_some(Fault::MotorTemperature { joint, measured_c, allowed_c })
 }
 
@@ -219,7 +219,7 @@ fn motor_mode(_: &Failsafe, inputs: &FailsafeInputs, _: &ControlSettings) -> Opt
 }
 
 fn joint_position(_: &Failsafe, inputs: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {
-    let margin = settings.watchdog.joint_margin_rad;
+    let margin = settings.failsafe.joint_margin_rad;
     (0..JOINTS).find_map(|joint| {
         let measured_rad = inputs.state.joint_position[joint];
         let (least, most) = (settings.min_position[joint] - margin, settings.max_position[joint] + margin);
@@ -232,7 +232,7 @@ fn joint_position(_: &Failsafe, inputs: &FailsafeInputs, settings: &ControlSetti
 fn joint_velocity(_: &Failsafe, inputs: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {
     (0..JOINTS).find_map(|joint| {
         let measured_rad_s = inputs.state.joint_velocity[joint];
-        let allowed_rad_s = settings.max_velocity[joint] * settings.watchdog.velocity_factor;
+        let allowed_rad_s = settings.max_velocity[joint] * settings.failsafe.velocity_factor;
         let fault = Fault::JointVelocity { joint: joint as u8, measured_rad_s, allowed_rad_s };
         (measured_rad_s.abs() > allowed_rad_s).then_some(fault)
     })
@@ -241,7 +241,7 @@ fn joint_velocity(_: &Failsafe, inputs: &FailsafeInputs, settings: &ControlSetti
 fn joint_torque(_: &Failsafe, inputs: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {
     (0..JOINTS).find_map(|joint| {
         let measured_nm = inputs.state.joint_torque[joint];
-        let allowed_nm = settings.max_torque[joint] * settings.watchdog.torque_factor;
+        let allowed_nm = settings.max_torque[joint] * settings.failsafe.torque_factor;
         let fault = Fault::JointTorque { joint: joint as u8, measured_nm, allowed_nm };
         (measured_nm.is_nan() || measured_nm.abs() > allowed_nm).then_some(fault)
     })
@@ -251,14 +251,14 @@ fn tilt(_: &Failsafe, inputs: &FailsafeInputs, settings: &ControlSettings) -> Op
     let [roll, pitch, _] = inputs.estimate.roll_pitch_yaw.into();
     let measured_rad = roll.abs().max(pitch.abs());
     // The tilt limit is larger while the robot sits down.
-    let limits = &settings.watchdog;
+    let limits = &settings.failsafe;
     let allowed_rad = if inputs.mode == Mode::SitDown { limits.tilt_rad } else { limits.stance_tilt_rad };
     (measured_rad > allowed_rad).then_some(Fault::Tilt { measured_rad, allowed_rad })
 }
 
 fn operator_silent(_: &Failsafe, inputs: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {
     let silent_ms = inputs.operator_silent_ms;
-    (silent_ms > settings.watchdog.operator_silent_ms).then_some(Fault::OperatorLost { silent_ms })
+    (silent_ms > settings.failsafe.operator_silent_ms).then_some(Fault::OperatorLost { silent_ms })
 }
 
 /// Index and temperature (degrees Celsius) of the hottest motor.

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::limits::ticks;
+use super::limits::ticks_in;
 use crate::robot::{LEGS, PerLeg};
 
 /// Shortest absence of all feet that counts as a flight, s; a foot may lift for a moment in stance.
@@ -22,7 +22,7 @@ impl SwingLegs {
     pub fn observe(&mut self, contact: &PerLeg<bool>) {
         let airborne = contact.iter().all(|&down| !down);
         self.airborne = if airborne { self.airborne + 1 } else { 0 };
-        if self.airborne >= ticks(SHORTEST_FLIGHT_S) {
+        if self.airborne >= ticks_in(SHORTEST_FLIGHT_S) {
             self.swing = [true; LEGS];
         }
         for (swing, &down) in self.swing.iter_mut().zip(contact) {

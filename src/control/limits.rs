@@ -110,6 +110,6 @@ pub fn finite(state: &RobotState) -> Result<(), Fault> {
 }
 
 /// Number of ticks in `seconds`.
-pub fn ticks(seconds: f64) -> u32 {
+pub fn ticks_in(seconds: f64) -> u32 {
     (seconds / CONTROL_PERIOD_S).round() as u32
 }

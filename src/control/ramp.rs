@@ -1,6 +1,6 @@
 //! Standing up and sitting down: a smooth ramp of joint targets from the measured pose.
 
-use super::limits::ticks;
+use super::limits::ticks_in;
 use super::settings::RampSettings;
 use crate::robot::{JointCommand, Joints, RobotState};
 
@@ -13,7 +13,7 @@ pub enum RampProgress {
     /// The joints are within the tolerance.
     Reached,
     /// The joints are not within the tolerance after the time-out; the error is the largest of a joint.
-    Late { error_rad: f64 },
+    TimedOut { error_rad: f64 },
 }
 
 /// A ramp under way.
@@ -33,14 +33,14 @@ impl PoseRamp {
 
     /// Compares the measured angles with the pose.
     pub fn progress(&self, joint_position: &Joints) -> RampProgress {
-        if self.elapsed < ticks(self.settings.duration_s) {
+        if self.elapsed < ticks_in(self.settings.duration_s) {
             return RampProgress::Moving;
         }
         let error_rad = joint_position.iter().zip(&self.to).map(|(q, to)| (q - to).abs()).fold(0.0, f64::max);
         if error_rad <= self.settings.tolerance_rad {
             RampProgress::Reached
-        } else if self.elapsed >= ticks(self.settings.duration_s + self.settings.timeout_s) {
-            RampProgress::Late { error_rad }
+        } else if self.elapsed >= ticks_in(self.settings.duration_s + self.settings.timeout_s) {
+            RampProgress::TimedOut { error_rad }
         } else {
             RampProgress::Moving
         }
@@ -48,7 +48,7 @@ impl PoseRamp {
 
     /// Returns the targets of this tick and advances the ramp.
     pub fn command(&mut self) -> JointCommand {
-        let duration = f64::from(ticks(self.settings.duration_s).max(1));
+        let duration = f64::from(ticks_in(self.settings.duration_s).max(1));
         let part = (f64::from(self.elapsed) / duration).min(1.0);
         // Smoothstep 3 s^2 - 2 s^3: starts and ends at rest.
         let smooth = part * part * (3.0 - 2.0 * part);

@@ -3,7 +3,7 @@
 use super::foot_placement::{SHORTEST_FLIGHT_S, SwingLegs};
 use super::force_profile::{Oscillator, amplitudes_leg};
 use super::leg::LegTarget;
-use super::limits::ticks;
+use super::limits::ticks_in;
 use super::settings::ControlSettings;
 use crate::robot::{CONTROL_PERIOD_S, LEGS, PerLeg, RobotState};
 use crate::telemetry::{Estimate, FallCause, Phase, TrialEnd, TrialSpec};
@@ -55,7 +55,7 @@ impl RunningTrial {
             },
             amplitudes_leg: amplitudes_leg(&spec.jump, spec.task),
             elapsed: 0,
-            countdown: ticks(settings.countdown_s),
+            countdown: ticks_in(settings.countdown_s),
             swing: SwingLegs::default(),
             flown: false,
             landed: 0,
@@ -132,7 +132,7 @@ impl RunningTrial {
             return TrialProgress::Countdown;
         }
         let feet_down = estimate.contact.iter().filter(|&&down| down).count();
-        self.flown |= feet_down > 0 && self.swing.airborne_ticks() >= ticks(SHORTEST_FLIGHT_S);
+        self.flown |= feet_down > 0 && self.swing.airborne_ticks() >= ticks_in(SHORTEST_FLIGHT_S);
         self.swing.observe(&estimate.contact);
         let impulse = self.theta_rad() >= std::f64::consts::PI;
         if impulse {
@@ -157,7 +157,7 @@ impl RunningTrial {
             && estimate.velocity_world.norm() < settings.settle.speed_m_s
             && estimate.angular_velocity_body.norm() < settings.settle.rate_rad_s;
         self.quiet = if quiet { self.quiet + 1 } else { 0 };
-        if self.quiet >= ticks(settings.settle.quiet_s) {
+        if self.quiet >= ticks_in(settings.settle.quiet_s) {
             TrialProgress::Over(TrialEnd::Settled)
         } else if since_impulse_s >= settings.settle.cap_s {
             TrialProgress::Over(TrialEnd::NotQuiet)
@@ -202,6 +202,6 @@ impl FallWatch {
         if pitch.abs() > allowed_pitch {
             return Some(FallCause::Pitch { measured_rad: pitch, allowed_rad: allowed_pitch });
         }
-        (self.touching >= ticks(settings.fall.body_contact_s)).then_some(FallCause::BodyContact)
+        (self.touching >= ticks_in(settings.fall.body_contact_s)).then_some(FallCause::BodyContact)
     }
 }

@@ -339,11 +339,11 @@ pub struct ControlSettings {
     /// Real hardware: all arming checks apply.
     pub hardware: bool,
     /// Limits of the arming checks.
-    pub pre_arm: ArmingLimits,
+    pub arming: ArmingLimits,
     /// Expiry of an approval.
     pub approval: ApprovalLimits,
     /// Limits of the failsafes.
-    pub watchdog: FailsafeLimits,
+    pub failsafe: FailsafeLimits,
     /// Latest start of a tick, ms; zero only counts late ticks.
     pub late_ms: f64,
     /// Longest wait in READY or REVIEW, s; zero disables the limit.

@@ -17,7 +17,7 @@ use crate::realtime::thread::{CONTROL_TICK_OFFSET, PeriodicTask, TickStart, WARM
 use crate::robot::{CONTROL_PERIOD_S, JointCommand, Robot};
 
 /// Parts of the control thread.
-pub struct Start<'a, C> {
+pub struct ControlThreadParts<'a, C> {
     pub settings: &'a ControlSettings,
     /// Real-time settings that are requested of the system.
     pub scheduling: Scheduling,
@@ -40,7 +40,7 @@ const LAST_DAMPINGS: u32 = 500;
 ///
 /// # Panics
 /// When a tick does, or the clock cannot be read: once the robot has been damped, and `closing` is set.
-pub fn run<C: Clock>(mut start: Start<C>, end: ControlEnd, robot: &mut dyn Robot) {
+pub fn run<C: Clock>(mut start: ControlThreadParts<C>, end: ControlEnd, robot: &mut dyn Robot) {
     let granted = start.scheduling.apply();
     let _ = start.report.send((granted.granted.clone(), granted.denied.clone()));
     let period = Duration::from_secs_f64(CONTROL_PERIOD_S);
@@ -89,7 +89,7 @@ impl<C: Clock> PeriodicTask for Ticking<'_, C> {
 
 /// Ticks as `paced` calls them, then the damping with `wait` after each; what panicked is given back.
 fn drive<C: Clock>(
-    start: &mut Start<C>,
+    start: &mut ControlThreadParts<C>,
     end: ControlEnd,
     robot: &mut dyn Robot,
     paced: impl FnOnce(&mut dyn PeriodicTask) -> Result<(), nix::Error>,
@@ -158,8 +158,8 @@ mod tests {
     }
 
     /// What a robot is sent, and how often was waited, if `reads` ticks or `warm_ups` go well with it and the thread is
-    /// told to end after `told_after` waits.
-    fn damped(controlled: bool, [reads, warm_ups]: [u32; 2], told_after: u32) -> (Vec<JointCommand>, u32) {
+    /// closed after `closes_after` waits.
+    fn damped(controlled: bool, [reads, warm_ups]: [u32; 2], closes_after: u32) -> (Vec<JointCommand>, u32) {
         let description = RobotDescription::embedded("go1").unwrap();
         let settings = Config::load(None).unwrap().settings(&description, Task::Forward, Backend::Hardware).unwrap();
         let (control, mut session, screen, _ticks) = channels();
@@ -168,8 +168,8 @@ mod tests {
             session.commands.push(Command::TakeControl).unwrap();
         }
         let mut robot = Brittle { reads, warm_ups, sent: Vec::new() };
-        let closing = AtomicBool::new(told_after == 0);
-        let mut start = Start {
+        let closing = AtomicBool::new(closes_after == 0);
+        let mut start = ControlThreadParts {
             settings: &settings,
             scheduling: Scheduling::default(),
             report: std::sync::mpsc::channel().0,
@@ -189,9 +189,9 @@ mod tests {
         let mut waited = 0;
         let ended = drive(&mut start, control, &mut robot, unpaced, || {
             waited += 1;
-            closing.fetch_or(waited >= told_after, Ordering::AcqRel);
+            closing.fetch_or(waited >= closes_after, Ordering::AcqRel);
         });
-        assert_eq!(ended.is_err(), told_after > 0, "a panic is not swallowed");
+        assert_eq!(ended.is_err(), closes_after > 0, "a panic is not swallowed");
         let is_damping = |command: &&JointCommand| **command == JointCommand::damping(settings.gate.damping_kd);
         let last = robot.sent.iter().rev().take_while(is_damping).copied().collect();
         (last, waited)

@@ -33,9 +33,9 @@ const LEFT_ALONE: u8 = b'-';
 /// Ticks between two heartbeats to the guard.
 const HEARTBEAT_TICKS: u32 = 10;
 /// Silence of the control thread that is allowed beyond its own limit for late ticks, ms: several heartbeats.
-const PATIENCE_MS: f64 = 50.0;
+const ALLOWED_SILENCE_MS: f64 = 50.0;
 /// Allowed silence where late ticks have no limit, ms.
-const LONGEST_PATIENCE_MS: f64 = 1000.0;
+const LONGEST_ALLOWED_SILENCE_MS: f64 = 1000.0;
 /// Damping datagrams, one per millisecond, after the pipe has ended: several times the duration of sinking.
 const DAMPINGS: u32 = 3000;
 
@@ -59,11 +59,14 @@ pub struct GuardHeartbeat {
 
 impl Guard {
     /// Starts `program guard` over `robot`.
-    pub fn post(program: &Path, robot: &Go1, settings: &ControlSettings) -> std::io::Result<(Guard, GuardHeartbeat)> {
+    pub fn start(program: &Path, robot: &Go1, settings: &ControlSettings) -> std::io::Result<(Guard, GuardHeartbeat)> {
         let (socket, damping) = (robot.socket()?, robot.damping(settings.gate.damping_kd));
         let damping = damping.map_err(std::io::Error::other)?;
-        let allowed_ms =
-            if settings.late_ms > 0.0 { 2.0 * settings.late_ms + PATIENCE_MS } else { LONGEST_PATIENCE_MS };
+        let allowed_ms = if settings.late_ms > 0.0 {
+            2.0 * settings.late_ms + ALLOWED_SILENCE_MS
+        } else {
+            LONGEST_ALLOWED_SILENCE_MS
+        };
         let (theirs, ours) = std::io::pipe()?;
         let process = Command::new(program)
             .arg0("quadfrog-guard")
@@ -139,7 +142,7 @@ pub struct GuardError {
 
 /// End of a guard.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Watch {
+pub enum GuardOutcome {
     /// The robot was not commanded at the end.
     Quiet,
     /// The pipe ended while the robot was commanded.
@@ -150,7 +153,7 @@ pub enum Watch {
 }
 
 /// Runs the guard until `pipe` ends.
-pub fn stand(mut pipe: impl Read + AsFd, socket: &UdpSocket) -> Result<Watch, GuardError> {
+pub fn run_guard(mut pipe: impl Read + AsFd, socket: &UdpSocket) -> Result<GuardOutcome, GuardError> {
     let refused = |reason: &dyn ToString| GuardError { reason: reason.to_string() };
     let (mut damping, mut silence_ms) = ([0; COMMAND_LENGTH], [0; 2]);
     pipe.read_exact(&mut damping).map_err(|error| refused(&error))?;
@@ -179,7 +182,7 @@ pub fn stand(mut pipe: impl Read + AsFd, socket: &UdpSocket) -> Result<Watch, Gu
         }
     }
     if timeout == PollTimeout::NONE {
-        return Ok(Watch::Quiet);
+        return Ok(GuardOutcome::Quiet);
     }
     let mut sent = 0;
     for _ in 0..DAMPINGS {
@@ -188,5 +191,5 @@ pub fn stand(mut pipe: impl Read + AsFd, socket: &UdpSocket) -> Result<Watch, Gu
         // Slept, not paced: the clock may be what failed.
         std::thread::sleep(Duration::from_millis(1));
     }
-    Ok(Watch::Damped { sent })
+    Ok(GuardOutcome::Damped { sent })
 }

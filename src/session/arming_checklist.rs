@@ -44,8 +44,8 @@ impl ArmingChecklist {
     /// recording, none where nothing is kept.
     pub fn new(settings: &ControlSettings, configuration: String, folder: Option<PathBuf>) -> ArmingChecklist {
         ArmingChecklist {
-            limits: settings.pre_arm,
-            trial_mb: settings.watchdog.disk_free_mb,
+            limits: settings.arming,
+            trial_mb: settings.failsafe.disk_free_mb,
             hardware: settings.hardware,
             configuration,
             folder,

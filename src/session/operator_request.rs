@@ -1,5 +1,5 @@
 //! Requests of the operator to the session. Every request is answered by a `RequestRecord`: carried out, or refused with the
-//! reason. STOP is not among them: it has its own latch (`engine::Handle::stop`).
+//! reason. STOP is not among them: it has its own latch (`engine::EngineHandle::stop`).
 
 use std::fmt;
 

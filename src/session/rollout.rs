@@ -1,8 +1,8 @@
 //! The control cycle and the simulator on simulated time: without a thread, as fast as possible, bit-for-bit repeatable for a
 //! seed.
 
-use crate::control::cycle::{Cycle, Inputs};
-use crate::control::limits::ticks;
+use crate::control::cycle::{Cycle, TickInputs};
+use crate::control::limits::ticks_in;
 use crate::control::settings::ControlSettings;
 use crate::realtime::clock::SimulatedClock;
 use crate::robot::{CONTROL_PERIOD_S, Placement, Robot};
@@ -26,11 +26,12 @@ impl<R: Robot> Rollout<R> {
         // The last trial may have left the robot fallen.
         self.robot.place(&Placement { joint_position: self.settings.lying_position, lying: true, seed: spec.seed });
         let mut cycle = Cycle::ready(&self.settings);
-        let mut inputs = Inputs { command: Some(Command::RunTrial(*spec, Permit::default())), ..Inputs::default() };
+        let mut inputs =
+            TickInputs { command: Some(Command::RunTrial(*spec, Permit::default())), ..TickInputs::default() };
         self.ticks.clear();
         // The cycle ends a trial `cap_s` after its last impulse at the latest; a longer one is an error of this program.
         let profile_s = f64::from(spec.jumps) * (0.5 / spec.jump.f0_hz + 0.5 / spec.jump.f1_hz.max(0.05));
-        let most = ticks(self.settings.countdown_s + profile_s + self.settings.settle.cap_s + 1.0);
+        let most = ticks_in(self.settings.countdown_s + profile_s + self.settings.settle.cap_s + 1.0);
         for number in 0..most {
             inputs.time_ns = u64::from(number) * (CONTROL_PERIOD_S * 1e9) as u64;
             self.ticks.push(*cycle.tick(&inputs, &SimulatedClock, &mut self.robot));

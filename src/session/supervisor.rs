@@ -1,8 +1,8 @@
 //! The work of the session thread: requests of the operator in, commands to the control thread, its events and ticks back,
 //! records to the screen and the recording. Every request is answered: carried out, or refused with the reason.
 
-mod answering;
 mod automatic;
+mod request_handler;
 mod standing;
 mod unattended;
 

@@ -205,7 +205,7 @@ fn an_observed_robot_receives_nothing_from_the_guard_unless_it_was_stopped() {
     }
 }
 
-/// `session_pre_arm` checks that arming is then refused.
+/// `session_arming` checks that arming is then refused.
 #[test]
 fn a_lost_guard_is_reported() {
     let (_folder, _robot, mut session) = controlling();

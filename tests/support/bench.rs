@@ -3,7 +3,7 @@
 
 use quadfrog::config::Config;
 use quadfrog::control::control_loop::ControlLoop;
-use quadfrog::control::cycle::{Cycle, Inputs};
+use quadfrog::control::cycle::{Cycle, TickInputs};
 use quadfrog::control::settings::ControlSettings;
 use quadfrog::realtime::channel::{ScreenEnd, SessionEnd, channels};
 use quadfrog::realtime::clock::{MonotonicClock, SimulatedClock};
@@ -39,8 +39,8 @@ pub struct Bench<R> {
     pub settings: ControlSettings,
     pub cycle: Cycle,
     pub robot: R,
-    /// Inputs of the next tick, but for its command.
-    pub inputs: Inputs,
+    /// TickInputs of the next tick, but for its command.
+    pub inputs: TickInputs,
     pub period_ns: u64,
     pub events: Vec<Event>,
     pub mode_changes: u64,
@@ -57,7 +57,7 @@ impl<R: Robot> Bench<R> {
             settings,
             cycle: Cycle::new(&settings),
             robot,
-            inputs: Inputs::default(),
+            inputs: TickInputs::default(),
             period_ns: 1_000_000,
             events: Vec::new(),
             mode_changes: 0,
@@ -68,7 +68,7 @@ impl<R: Robot> Bench<R> {
 
     pub fn tick(&mut self, command: Option<Command>) -> Tick {
         self.inputs.time_ns += self.period_ns;
-        let inputs = Inputs { command, ..self.inputs };
+        let inputs = TickInputs { command, ..self.inputs };
         let tick = *self.cycle.tick(&inputs, &SimulatedClock, &mut self.robot);
         let new: Vec<Event> = self.cycle.events().iter().collect();
         self.mode_changes += mode_changes(&new);

@@ -9,7 +9,7 @@ use color_eyre::eyre::{WrapErr, eyre};
 use crossterm::clipboard::CopyToClipboard;
 use crossterm::event::{Event, KeyEventKind, MouseButton, MouseEvent, MouseEventKind};
 use nix::sys::signal::{Signal, raise};
-use quadfrog::engine::Handle;
+use quadfrog::engine::EngineHandle;
 use quadfrog::realtime::channel::StopLatch;
 use quadfrog::recording::record::LogLevel;
 use quadfrog::robot::description::RobotDescription;
@@ -124,7 +124,7 @@ impl Console {
         update(&mut model, Msg::Resize(columns, rows));
         let mut screen = Screen::enter().wrap_err("the terminal cannot be used")?;
         screen.mouse(model.mouse).wrap_err("the terminal cannot be used")?;
-        terminal::stop_on_panic(feed.handle().map(Handle::stop_latch));
+        terminal::stop_on_panic(feed.handle().map(EngineHandle::stop_latch));
         let connection = match &feed {
             Feed::Live(_) => {
                 let location = TerminalLocation::of(|name| std::env::var(name).ok());
@@ -150,7 +150,7 @@ impl Console {
 
     async fn run(mut self) -> color_eyre::Result<ConsoleExit> {
         let (input, mut inputs) = unbounded_channel();
-        read_input(input.clone(), self.model.keymap.clone(), self.feed.handle().map(Handle::stop_latch))?;
+        read_input(input.clone(), self.model.keymap.clone(), self.feed.handle().map(EngineHandle::stop_latch))?;
         terminal::watch_for_hang_up(move || drop(input.send(None))).wrap_err("hang-up watcher")?;
         let mut interrupted = signal(SignalKind::interrupt())?;
         let mut terminated = signal(SignalKind::terminate())?;
@@ -230,7 +230,7 @@ impl Console {
 
     fn carry_out(&mut self, effect: Effect) {
         match effect {
-            Effect::Stop => self.feed.handle().into_iter().for_each(Handle::stop),
+            Effect::Stop => self.feed.handle().into_iter().for_each(EngineHandle::stop),
             Effect::Request(request) => {
                 self.feed.handle().into_iter().for_each(|handle| handle.request(request.clone()))
             }
@@ -316,8 +316,8 @@ impl Console {
     fn close(mut self, inputs: &mut UnboundedReceiver<TerminalInput>) -> color_eyre::Result<ConsoleExit> {
         let ended = self.ended.unwrap_or(ConsoleExit::Quit);
         // The operator is present after a quit key, but not after a hang-up or SIGTERM.
-        let heartbeat = self.feed.handle().map(Handle::heartbeat).filter(|_| ended == ConsoleExit::Quit);
-        let stop = self.feed.handle().map(Handle::stop_latch);
+        let heartbeat = self.feed.handle().map(EngineHandle::heartbeat).filter(|_| ended == ConsoleExit::Quit);
+        let stop = self.feed.handle().map(EngineHandle::stop_latch);
         if self.model.robot_needs_us() {
             say(&mut self.model, LogLevel::Info, "the robot sits down, then the program ends".to_owned());
         }

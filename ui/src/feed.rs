@@ -2,7 +2,7 @@
 
 mod replay;
 
-use quadfrog::engine::Handle;
+use quadfrog::engine::EngineHandle;
 use quadfrog::recording::player::Player;
 
 use crate::message::{Msg, ReplayCommand};
@@ -14,13 +14,13 @@ const BATCH: usize = 4096;
 /// A running engine or a recording.
 #[expect(missing_docs, reason = "the names say the rest")]
 pub enum Feed {
-    Live(Box<Handle>),
+    Live(Box<EngineHandle>),
     Replay(Box<ReplayFeed>),
 }
 
 impl Feed {
     /// Creates the feed of a running engine.
-    pub fn live(handle: Handle) -> Feed {
+    pub fn live(handle: EngineHandle) -> Feed {
         Feed::Live(Box::new(handle))
     }
 
@@ -30,7 +30,7 @@ impl Feed {
     }
 
     /// Returns the running engine; none in a replay, which nothing commands.
-    pub fn handle(&self) -> Option<&Handle> {
+    pub fn handle(&self) -> Option<&EngineHandle> {
         match self {
             Feed::Live(handle) => Some(handle),
             Feed::Replay(_) => None,

@@ -53,11 +53,11 @@ impl ArmingHistory {
         restarted: bool,
         settings: &ControlSettings,
     ) {
-        let limits = &settings.pre_arm;
+        let limits = &settings.arming;
         self.late.advance();
         self.late.add(u32::from(lateness_ns as f64 * 1e-6 > limits.late_ms));
         let still = state.imu.gyro_body.norm() <= limits.gyro_rad_s;
-        if restarted || !still || state_age_ms > settings.watchdog.state_age_ms {
+        if restarted || !still || state_age_ms > settings.failsafe.state_age_ms {
             self.still = 0;
         } else if state_age_ms == 0 {
             self.still = self.still.saturating_add(1);

@@ -6,7 +6,7 @@ pub(super) const CHECK: ControlCheck = ControlCheck {
     check: ArmingCheck::Checksums,
     measure: |inputs, settings| {
         let corrupt = inputs.link.map_or(0, |link| link.recent_corrupt);
-        Reading::at_most(corrupt.into(), settings.pre_arm.corrupt.into())
+        Reading::at_most(corrupt.into(), settings.arming.corrupt.into())
     },
     found: |finding| format!("{:.0} corrupt", finding.measured),
     needed: |limits| format!("at most {} in 5 s", limits.corrupt),

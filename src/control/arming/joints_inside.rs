@@ -5,7 +5,7 @@ use super::check::*;
 pub(super) const CHECK: ControlCheck = ControlCheck {
     check: ArmingCheck::JointsInside,
     measure: |inputs, settings| {
-        Reading::worst_joint(settings.pre_arm.joint_margin_rad, |joint| {
+        Reading::worst_joint(settings.arming.joint_margin_rad, |joint| {
             let q = inputs.state.joint_position[joint];
             let (least, most) = (settings.min_position[joint], settings.max_position[joint]);
             if q.is_nan() { q } else { (least - q).max(q - most) }

@@ -5,7 +5,7 @@ use super::check::*;
 pub(super) const CHECK: ControlCheck = ControlCheck {
     check: ArmingCheck::LyingDown,
     measure: |inputs, settings| {
-        Reading::worst_joint(settings.pre_arm.lying_tolerance_rad, |joint| {
+        Reading::worst_joint(settings.arming.lying_tolerance_rad, |joint| {
             (inputs.state.joint_position[joint] - settings.lying_position[joint]).abs()
         })
     },

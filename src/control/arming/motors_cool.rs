@@ -5,7 +5,7 @@ use super::check::*;
 pub(super) const CHECK: ControlCheck = ControlCheck {
     check: ArmingCheck::MotorsCool,
     measure: |inputs, settings| {
-        Reading::worst_joint(settings.pre_arm.motor_c, |joint| inputs.state.motor_temperature_c[joint])
+        Reading::worst_joint(settings.arming.motor_c, |joint| inputs.state.motor_temperature_c[joint])
     },
     found: |finding| format!("{} {:.0} C", joint_of(finding), finding.measured),
     needed: |limits| format!("at most {:.0} C", limits.motor_c),

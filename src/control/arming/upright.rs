@@ -8,7 +8,7 @@ pub(super) const CHECK: ControlCheck = ControlCheck {
         let [roll, pitch, _] = inputs.estimate.roll_pitch_yaw.into();
         // `f64::max` drops a NaN.
         let tilt = if (roll + pitch).is_nan() { f64::NAN } else { roll.abs().max(pitch.abs()) };
-        Reading::at_most(tilt, settings.pre_arm.tilt_rad)
+        Reading::at_most(tilt, settings.arming.tilt_rad)
     },
     found: |finding| format!("tilted {:.2} rad", finding.measured),
     needed: |limits| format!("at most {:.2} rad", limits.tilt_rad),

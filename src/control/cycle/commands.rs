@@ -1,6 +1,6 @@
 //! Commands of the session: carried out, or refused with the reason.
 
-use super::{Cycle, Inputs};
+use super::{Cycle, TickInputs};
 use crate::control::failsafe;
 use crate::control::mode::{self, Trigger};
 use crate::control::running_trial::RunningTrial;
@@ -9,7 +9,7 @@ use crate::telemetry::{Command, CommandRefusal, Event, Permit, TransitionCause, 
 
 impl Cycle {
     /// Carries out a command, or reports its refusal as an event.
-    pub(super) fn handle_command<R: Robot + ?Sized>(&mut self, command: &Command, inputs: &Inputs, robot: &mut R) {
+    pub(super) fn handle_command<R: Robot + ?Sized>(&mut self, command: &Command, inputs: &TickInputs, robot: &mut R) {
         let trigger = match command {
             Command::TakeControl => Trigger::TakeControl,
             Command::Release => Trigger::Release,
@@ -60,7 +60,7 @@ impl Cycle {
     /// 5. Arming needs every arming check of the control thread, whatever the session says.
     /// 6. Approval needs that nothing inhibits trials.
     /// 7. An acknowledgement needs that no failsafe trips any more.
-    fn refusal(&self, command: &Command, trigger: Trigger, inputs: &Inputs) -> Option<CommandRefusal> {
+    fn refusal(&self, command: &Command, trigger: Trigger, inputs: &TickInputs) -> Option<CommandRefusal> {
         if inputs.stop {
             return Some(CommandRefusal::Stopped);
         }
@@ -84,8 +84,8 @@ impl Cycle {
     }
 
     /// Refuses without a heartbeat of the operator's screen, or after the end of the session.
-    fn operator_absent(&self, inputs: &Inputs) -> Option<CommandRefusal> {
-        let (silent_ms, allowed_ms) = (inputs.operator_silent_ms, self.settings.watchdog.operator_silent_ms);
+    fn operator_absent(&self, inputs: &TickInputs) -> Option<CommandRefusal> {
+        let (silent_ms, allowed_ms) = (inputs.operator_silent_ms, self.settings.failsafe.operator_silent_ms);
         if self.session_left {
             Some(CommandRefusal::Leaving)
         } else if silent_ms > allowed_ms {
@@ -96,7 +96,7 @@ impl Cycle {
     }
 
     /// Refuses a permit that is older than a change of mode, or too old.
-    fn permit_expired(&self, Permit { mode_changes, given_ns }: Permit, inputs: &Inputs) -> Option<CommandRefusal> {
+    fn permit_expired(&self, Permit { mode_changes, given_ns }: Permit, inputs: &TickInputs) -> Option<CommandRefusal> {
         let age_s = inputs.time_ns.saturating_sub(given_ns) as f64 * 1e-9;
         let allowed_s = self.settings.approval.expires_s;
         if self.session_left {
@@ -113,7 +113,7 @@ impl Cycle {
     /// Whether the robot lies in an attitude from which it cannot stand up.
     fn needs_placing(&self) -> bool {
         let [roll, pitch, _] = self.tick.estimate.roll_pitch_yaw.into();
-        roll.abs().max(pitch.abs()) > self.settings.watchdog.stance_tilt_rad
+        roll.abs().max(pitch.abs()) > self.settings.failsafe.stance_tilt_rad
     }
 
     /// Places a simulated robot at the origin, feet at the trial's stance.

@@ -1,8 +1,8 @@
 //! Actions of the failsafes: damping, landing, sitting down.
 
-use super::{Cycle, Inputs};
+use super::{Cycle, TickInputs};
 use crate::control::failsafe::{self, FailsafeAction, FailsafeInputs};
-use crate::control::limits::ticks;
+use crate::control::limits::ticks_in;
 use crate::control::mode::Trigger;
 use crate::control::running_trial::FallWatch;
 use crate::robot::Robot;
@@ -18,7 +18,7 @@ impl Cycle {
     /// 2. Landing, after the end of the session.
     /// 3. Damping for a fall in REVIEW. It is no fault, so the verdict is asked for as after any other fall.
     /// 4. Sitting down, after too long a wait in READY or REVIEW.
-    pub(super) fn run_failsafes<R: Robot + ?Sized>(&mut self, inputs: &Inputs, restarted: bool, robot: &R) {
+    pub(super) fn run_failsafes<R: Robot + ?Sized>(&mut self, inputs: &TickInputs, restarted: bool, robot: &R) {
         self.failsafe.begin(inputs.time_ns, inputs.lateness_ns, &self.settings);
         let failsafe_inputs = FailsafeInputs {
             mode: self.mode,
@@ -51,14 +51,14 @@ impl Cycle {
             None => {}
         }
         let Tick { state, estimate, .. } = &self.tick;
-        let stance_tilt_rad = self.settings.watchdog.stance_tilt_rad;
+        let stance_tilt_rad = self.settings.failsafe.stance_tilt_rad;
         if self.mode != Mode::Review {
             self.fall = FallWatch::default();
         } else if let Some(cause) = self.fall.observe(state, estimate, &self.settings, stance_tilt_rad) {
             self.trigger(Trigger::Fell, TransitionCause::Fell(cause));
         }
         let allowed_s = self.settings.idle_s;
-        if matches!(self.mode, Mode::Ready | Mode::Review) && allowed_s > 0.0 && self.mode_ticks > ticks(allowed_s) {
+        if matches!(self.mode, Mode::Ready | Mode::Review) && allowed_s > 0.0 && self.mode_ticks > ticks_in(allowed_s) {
             self.trigger(Trigger::SitDown, TransitionCause::Idle { allowed_s });
         }
     }

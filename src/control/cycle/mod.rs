@@ -22,9 +22,9 @@ use crate::telemetry::{
 };
 use nalgebra::Vector3;
 
-/// Inputs of one tick.
+/// TickInputs of one tick.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Inputs {
+pub struct TickInputs {
     /// Planned start of the tick, ns since the engine started.
     pub time_ns: u64,
     /// Delay of the real start, ns.
@@ -169,7 +169,7 @@ impl Cycle {
     }
 
     /// Runs one tick. STOP acts before every failsafe, command and decision.
-    pub fn tick<C: Clock, R: Robot + ?Sized>(&mut self, inputs: &Inputs, clock: &C, robot: &mut R) -> &Tick {
+    pub fn tick<C: Clock, R: Robot + ?Sized>(&mut self, inputs: &TickInputs, clock: &C, robot: &mut R) -> &Tick {
         let started_ns = clock.now_ns();
         let previous_robot_time_ms = self.tick.state.robot_time_ms;
         self.begin(inputs);
@@ -205,7 +205,7 @@ impl Cycle {
         &self.tick
     }
 
-    fn begin(&mut self, inputs: &Inputs) {
+    fn begin(&mut self, inputs: &TickInputs) {
         self.events = Events::default();
         self.tick.time_ns = inputs.time_ns;
         self.mode_ticks = self.mode_ticks.saturating_add(1);
@@ -279,7 +279,7 @@ impl Cycle {
         if let Some(jump) = &mut self.jump {
             let progress = match jump.observe(&self.tick.state, &self.tick.estimate, &self.settings) {
                 // After a fault the landing ends when the robot stands; rest is not required.
-                TrialProgress::Settle if self.landing.is_some() && jump.landed_s() >= self.settings.watchdog.land_s => {
+                TrialProgress::Settle if self.landing.is_some() && jump.landed_s() >= self.settings.failsafe.land_s => {
                     TrialProgress::Over(TrialEnd::NotQuiet)
                 }
                 progress => progress,
@@ -311,11 +311,11 @@ impl Cycle {
             match ramp.progress(&self.tick.state.joint_position) {
                 RampProgress::Moving => {}
                 RampProgress::Reached => self.trigger(Trigger::PoseReached, TransitionCause::StepFinished),
-                RampProgress::Late { .. } if self.mode == Mode::SitDown => {
+                RampProgress::TimedOut { .. } if self.mode == Mode::SitDown => {
                     // The floor may stop the robot short of the lying pose; damping is safe there.
                     self.trigger(Trigger::PoseReached, TransitionCause::StepFinished);
                 }
-                RampProgress::Late { error_rad } => {
+                RampProgress::TimedOut { error_rad } => {
                     self.trigger(Trigger::Fault, TransitionCause::Fault(Fault::PoseTimeout { error_rad }));
                 }
             }

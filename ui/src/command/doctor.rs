@@ -75,7 +75,7 @@ pub fn run(arguments: &DoctorArguments) -> Result<(), Failure> {
     let mut items = vec![kernel(), priority(scheduling), memory(), cores(), governor(), timer()];
     items.extend(wake_up(scheduling));
     items.extend([characters(), colours(), size(), connection()]);
-    items.push(disk_space(&arguments.output, config.safety.pre_arm.disk_free_mb));
+    items.push(disk_space(&arguments.output, config.safety.arming.disk_free_mb));
     for item in &items {
         println!("{item}");
     }

@@ -9,7 +9,7 @@ use std::os::fd::AsFd;
 use color_eyre::eyre::WrapErr;
 use nix::sys::signal::{SigSet, Signal};
 use nix::unistd::dup2_stdout;
-use quadfrog::engine::{Watch, stand_guard};
+use quadfrog::engine::{GuardOutcome, run_guard};
 use quadfrog::realtime::scheduling::Scheduling;
 
 use super::failure::Failure;
@@ -30,10 +30,10 @@ pub fn run() -> Result<(), Failure> {
     // has reported denied settings.
     let _granted = Scheduling { priority: 1, core: None, lock_memory: true }.apply();
     // Unbuffered: poll(2) does not report bytes that a buffer has read ahead.
-    let watch = stand_guard(File::from(pipe.as_fd().try_clone_to_owned().wrap_err("standard input")?), &socket);
+    let watch = run_guard(File::from(pipe.as_fd().try_clone_to_owned().wrap_err("standard input")?), &socket);
     // Frees the port before the terminal may delay the report.
     drop(socket);
-    if let Watch::Damped { sent } = watch.map_err(Failure::input)? {
+    if let GuardOutcome::Damped { sent } = watch.map_err(Failure::input)? {
         let result = match sent {
             0 => "damping could not be sent to the robot: cut its power".to_owned(),
             _ => format!("the robot was damped, {sent} times"),

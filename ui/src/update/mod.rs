@@ -3,12 +3,12 @@
 //! `perform` carries out an action, `navigate` moves within views, `dialog` handles keys while a dialog is open, `records`
 //! folds the session's records, `mouse` handles the mouse, `answer` writes the message line and makes requests.
 
-mod answer;
 mod dialog;
 mod mouse;
 mod navigate;
 mod perform;
 mod records;
+mod request;
 
 use quadfrog::recording::record::LogLevel;
 use quadfrog::session::operator_request::OperatorRequest;
@@ -21,11 +21,11 @@ use crate::message::{Effect, Msg};
 use crate::model::Model;
 use crate::model::dialog::Dialog;
 use crate::model::session::SessionModel;
-use answer::{interrupt, request, stop};
 use dialog::KeyOutcome;
 use perform::perform;
+use request::{interrupt, request, stop};
 
-pub use answer::say;
+pub use request::say;
 
 /// Folds one message into the model.
 pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {

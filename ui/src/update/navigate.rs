@@ -4,7 +4,7 @@ use quadfrog::recording::record::LogLevel;
 use quadfrog::trial::Verdict;
 use strum::VariantArray;
 
-use super::answer::say;
+use super::request::say;
 use crate::action::Action;
 use crate::column::Column;
 use crate::model::comparison::Comparison;

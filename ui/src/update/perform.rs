@@ -6,8 +6,8 @@ use quadfrog::telemetry::Mode;
 use quadfrog::trial::{ExperimentStage, Proposal, Verdict};
 use strum::VariantArray;
 
-use super::answer::{interrupt, request, say, stop};
 use super::navigate::{filter, freeze, ghost, move_by, move_cursor, next_mode, next_series, next_sort, zoom};
+use super::request::{interrupt, request, say, stop};
 use crate::action::Action;
 use crate::legal::{legal, may_acknowledge, may_request};
 use crate::message::{Effect, ReplayCommand};

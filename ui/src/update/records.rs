@@ -4,7 +4,7 @@ use quadfrog::recording::record::{LogLevel, Record, RequestRecord, StageRecord, 
 use quadfrog::telemetry::Mode;
 use quadfrog::trial::{ExperimentStage, ProposalSource, TrialRecord, Verdict};
 
-use super::answer::say;
+use super::request::say;
 use crate::action::Action;
 use crate::legal::legal;
 use crate::message::Effect;

@@ -11,7 +11,7 @@ use crate::legal::legal;
 use crate::message::Effect;
 use crate::model::Model;
 use crate::model::dialog::{APPROVAL_PAUSE, Dialog};
-use crate::update::answer::{cancelled, refused, request};
+use crate::update::request::{cancelled, refused, request};
 
 /// The second press of an approval. Only the approving key approves, and only after a pause: a bounced or held key starts
 /// the pause again. Every other key, Enter included, cancels.

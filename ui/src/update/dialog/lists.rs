@@ -12,7 +12,7 @@ use crate::message::Effect;
 use crate::model::Model;
 use crate::model::dialog::{Choice, Dialog};
 use crate::model::live::Panel;
-use crate::update::answer::cancelled;
+use crate::update::request::cancelled;
 
 /// Lines that a page of a trial's details moves by; there are never more than two pages of them.
 const DETAILS_PAGE: usize = 10;

@@ -9,7 +9,7 @@ use crate::keymap::Key;
 use crate::message::Effect;
 use crate::model::Model;
 use crate::model::dialog::{Dialog, OverrideForm, OverrideRow};
-use crate::update::answer::{cancelled, request};
+use crate::update::request::{cancelled, request};
 
 fn override_request(row: &OverrideRow) -> OperatorRequest {
     match row.gain {

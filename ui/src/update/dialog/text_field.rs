@@ -8,7 +8,7 @@ use crate::keymap::Key;
 use crate::message::Effect;
 use crate::model::Model;
 use crate::model::dialog::{Dialog, Purpose};
-use crate::update::answer::{cancelled, request};
+use crate::update::request::{cancelled, request};
 
 pub(super) fn key(model: &mut Model, key: Key, purpose: Purpose, mut input: Input) -> Vec<Effect> {
     let mut problem = None;

@@ -111,7 +111,7 @@ fn a_gap_is_cut_at_its_limit_and_becomes_a_lost_link() {
     bench.robot.silent_ms = 1;
     let damped = bench.ticks_until_damping(300);
     // The first silent tick reports 2 ms.
-    assert_eq!(damped, Some(bench.settings.watchdog.state_age_ms));
+    assert_eq!(damped, Some(bench.settings.failsafe.state_age_ms));
     let faults = bench.faults();
     let [Fault::StateAge { age_ms: 21, allowed_ms: 20 }, Fault::LinkLost { age_ms: 201, .. }] = faults[..] else {
         panic!("{faults:?}")
