@@ -134,7 +134,7 @@ impl Operator {
         (snapshot.tick.mode, snapshot.counters.link.unwrap_or_default())
     }
 
-    /// What a person would wish now; none to wait.
+    /// The next request of an operator; none to wait.
     fn act(&mut self, mode: Mode) -> Option<OperatorRequest> {
         let (stage, trial) = (self.stage.map(|stage| stage.stage), self.stage.map_or(0, |stage| stage.trial));
         match (mode, stage) {

@@ -179,7 +179,7 @@ fn a_real_robot_is_not_armed_before_every_item_holds_and_the_refusal_names_all()
     assert_eq!(session.body.mode(), Mode::StandUp);
 }
 
-/// The word that the area is clear holds for one arming: afterwards somebody has been at the robot.
+/// The confirmation of a clear area holds for one arming: afterwards a person may have been at the robot.
 #[test]
 fn the_area_is_asked_about_before_each_arming() {
     let mut session = Session::hardware();
@@ -200,7 +200,7 @@ fn the_area_is_asked_about_before_each_arming() {
     assert!(!answer.accepted && answer.answer.contains("area clear"), "{answer:?}");
 }
 
-/// Nothing new is begun with a robot that nobody would damp if this program were killed.
+/// Nothing new begins on a robot without a guard: it would not be damped if this program were killed.
 #[test]
 fn without_its_guard_a_robot_is_not_armed() {
     let mut session = Session::cleared();
@@ -214,7 +214,7 @@ fn without_its_guard_a_robot_is_not_armed() {
     assert_eq!(session.body.mode(), Mode::Disarmed);
 }
 
-/// (A defect once: a word given in the morning armed the robot in the evening.)
+/// (A defect once: a confirmation of the morning armed the robot in the evening.)
 #[test]
 fn the_word_on_the_area_is_forgotten_after_a_minute() {
     let mut session = Session::cleared();
@@ -261,7 +261,7 @@ impl Session {
     }
 }
 
-/// A power cycle behind another fault: the lost link and the restart are told, too, and take the operator's word back. (A defect
+/// A power cycle behind another fault: the lost link and the restart are reported as well and withdraw the operator's confirmations. (A defect
 /// once: the first fault hid them, and a robot whose own controller ran again was armed.)
 #[test]
 fn a_restart_during_another_fault_is_told_and_takes_the_word_back() {
@@ -293,7 +293,7 @@ fn a_restart_during_another_fault_is_told_and_takes_the_word_back() {
     session.must_confirm_low_level_again();
 }
 
-/// The link's count of restarts alone takes the word back, whatever the mode and whether or not it changed.
+/// The link's count of restarts alone withdraws the confirmations, whatever the mode and whether or not it changed.
 #[test]
 fn a_restart_that_changes_no_mode_takes_the_word_back() {
     let mut session = Session::cleared();
@@ -355,7 +355,7 @@ fn an_observer_may_stop_and_then_lets_go_of_the_robot() {
     assert_eq!(session.robot.writes, writes, "nothing is sent any more");
 }
 
-/// (A defect once: the goodbye judged by the mode that was heard, and an arming on its way left the robot standing.)
+/// (A defect once: the end of the session judged by the last known mode, and an arming on its way left the robot standing.)
 #[test]
 fn an_arming_on_its_way_when_the_session_ends_energises_nothing() {
     let mut session = Session::new(Backend::Simulator, None);
@@ -393,7 +393,7 @@ fn nothing_is_done_by_itself_any_more_once_the_session_ends() {
     assert_eq!(session.body.mode(), Mode::Disarmed);
 }
 
-/// (A defect once: a robot was taken control of before any screen was heard.)
+/// (A defect once: control of a robot was taken before the first heartbeat of a screen.)
 #[test]
 fn control_is_taken_only_once_a_screen_was_heard() {
     let mut session = Session::begin(Backend::Simulator, None, false);
@@ -458,7 +458,7 @@ proptest! {
         begins_cleared: bool,
     ) {
         let mut session = if begins_cleared { Session::cleared() } else { Session::hardware() };
-        // The operator's words on the robot as it now runs; whether its motors follow.
+        // The operator's confirmations since the robot's last boot; whether its motors follow.
         let (mut low_level, mut area, mut follow) = (begins_cleared, begins_cleared, true);
         for (step, ticks) in steps {
             let before = session.body.mode();

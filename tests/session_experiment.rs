@@ -186,7 +186,7 @@ fn eventful(experiment: &mut Experiment, step: u32) {
     }
 }
 
-/// The study is killed (dropped without a word) between any two steps; verdicts given before survive, and the next
+/// The study is killed (dropped without closing it) between any two steps; verdicts given before survive, and the next
 /// proposal is the one of the unbroken run.
 #[test]
 fn a_study_interrupted_after_every_verdict_equals_the_unbroken_one() {
@@ -246,7 +246,7 @@ fn a_rerun_survives_every_moment_of_a_kill_and_comes_once() {
     }
 }
 
-/// (A defect once: after an undo the revisions began anew, and an old approval fitted a card that nobody had seen.)
+/// (A defect once: after an undo the revisions began anew, and an old approval matched a proposal that the operator had not seen.)
 #[test]
 fn an_approval_from_before_an_undo_is_refused() {
     let mut experiment = experiment(5);
@@ -342,7 +342,7 @@ fn a_rerun_that_another_worker_has_queued_comes_once() {
     let mut slow = joined(folder.path(), 1000, PATIENT);
     let first = run(&mut slow, TrialEnd::Stopped);
     slow.judge(Verdict::Void, true).unwrap();
-    // Judged and not told yet: another worker takes its owner for dead, tells it and queues it again.
+    // Judged but not reported: another worker closes the trial as abandoned, reports it and queues it again.
     let mut other = joined(folder.path(), 1000, Duration::from_millis(1));
     std::thread::sleep(Duration::from_millis(20));
     other.refresh().unwrap();
@@ -354,7 +354,7 @@ fn a_rerun_that_another_worker_has_queued_comes_once() {
     assert_eq!(study.trials().iter().filter(parent).count(), 1);
 }
 
-/// (A defect once: a session that accepts by itself looked at the newest trial instead.)
+/// (A defect once: a session that accepts by itself judged the newest trial instead.)
 #[test]
 fn a_trial_under_review_need_not_be_the_newest() {
     let folder = tempfile::tempdir().unwrap();

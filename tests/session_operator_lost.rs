@@ -26,7 +26,7 @@ fn start(folder: &Path, config: Option<&Path>) -> EngineHandle {
         .unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// A screen: it beats in a thread of its own until it is lost, and keeps what it is told.
+/// A screen: sends heartbeats in a thread of its own until it is lost, and keeps the records that it receives.
 struct Screen {
     handle: EngineHandle,
     records: Vec<Record>,

@@ -390,7 +390,7 @@ fn gains_that_a_queued_point_brings_are_seen_on_its_card() {
     assert!(refusal.contains("kp = 5000"), "{refusal}");
 }
 
-/// (A defect once: the refused wish had told the verdict, and it could not be undone any more.)
+/// (A defect once: the refused request had reported the verdict, which could then not be undone.)
 #[test]
 fn a_confirmation_that_is_refused_tells_nothing() {
     let mut experiment = experiment(5);
@@ -425,7 +425,7 @@ fn workers_together_run_no_more_repeats_than_were_asked_for() {
     let refused = second.approve(seen.trial, seen.revision);
     assert!(matches!(refused, Err(RequestRefusal::Overtaken(_))), "{refused:?}");
     assert!(second.proposal().is_none() && second.others_run(), "the only repeat runs already");
-    // It comes to nothing: whoever is faster takes it up.
+    // The trial is abandoned; the first worker that sees this queues it again.
     first.judge(Verdict::Void, false).unwrap();
     first.close().unwrap();
     second.refresh().unwrap();

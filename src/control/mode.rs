@@ -33,7 +33,7 @@ pub enum Trigger {
     Fell,
     /// The operator's STOP.
     Stop,
-    /// A failsafe or the last gate tripped.
+    /// A failsafe or the last gate tripped, or a ramp timed out.
     Fault,
     /// The operator acknowledged DAMPED or FAULT.
     Acknowledge,

@@ -157,7 +157,7 @@ mod tests {
         }
     }
 
-    /// What a robot is sent, and how often was waited, if `reads` ticks or `warm_ups` go well with it and the thread is
+    /// Returns the commands that a robot received and the number of waits, if `reads` ticks or `warm_ups` go well with it and the thread is
     /// closed after `closes_after` waits.
     fn damped(controlled: bool, [reads, warm_ups]: [u32; 2], closes_after: u32) -> (Vec<JointCommand>, u32) {
         let description = RobotDescription::embedded("go1").unwrap();

@@ -223,7 +223,8 @@ impl Recorder {
 
     fn deliver_trial(&mut self) {
         if let Some(trial) = self.trial.take() {
-            let _ = self.handed.send(CollectedTicks::Trial(trial)); // nobody measures any more: nothing is lost, the file has them
+            // A closed channel means that the session has ended; the file holds the ticks.
+            let _ = self.handed.send(CollectedTicks::Trial(trial));
         }
     }
 }

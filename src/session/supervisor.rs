@@ -160,7 +160,7 @@ impl Supervisor {
         }
     }
 
-    /// Takes in that the guard process has ended. Nothing that energises the robot is begun any more: without the guard
+    /// Records that the guard process has ended. Nothing that energises the robot is begun any more: without the guard
     /// nothing damps the robot if this process is killed.
     pub fn report_guard_lost(&mut self, time_ns: u64) {
         self.guard_lost = true;

@@ -100,7 +100,7 @@ pub enum TransitionCause {
     Connected,
     /// The robot fell.
     Fell(FallCause),
-    /// A failsafe or the last gate.
+    /// A failsafe, the last gate, or a ramp that timed out.
     Fault(Fault),
     /// The robot waited for too long in READY or REVIEW.
     Idle { allowed_s: f64 },

@@ -1,4 +1,4 @@
-//! What several tests need: golden files and the largest difference seen.
+//! Shared by tests: golden files and the largest difference.
 #![allow(dead_code, reason = "each test uses its own part")]
 
 use std::path::PathBuf;

@@ -298,6 +298,7 @@ impl Console {
     }
 
     fn draw_if_due(&mut self) -> color_eyre::Result<()> {
+        // A quarter of the loop period early, so that a frame is not delayed by one whole period.
         let due = self.redraw || self.last_frame.is_none_or(|last| last.elapsed() + PULSE / 4 >= self.frame_period);
         if !due || !self.screen.ready() || self.ended == Some(ConsoleExit::HungUp) {
             return Ok(());
@@ -318,7 +319,7 @@ impl Console {
         // The operator is present after a quit key, but not after a hang-up or SIGTERM.
         let heartbeat = self.feed.handle().map(EngineHandle::heartbeat).filter(|_| ended == ConsoleExit::Quit);
         let stop = self.feed.handle().map(EngineHandle::stop_latch);
-        if self.model.robot_needs_us() {
+        if self.model.robot_is_energised() {
             say(&mut self.model, LogLevel::Info, "the robot sits down, then the program ends".to_owned());
         }
         self.redraw = true;

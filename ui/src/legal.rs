@@ -217,7 +217,7 @@ fn may_rerun(model: &Model) -> Legality {
 fn may_suspend(model: &Model) -> Legality {
     if model.replay.is_none() && model.session.info.is_hardware() && model.mode().commanded() {
         refuse("a suspended program sends the robot nothing, not even damping; quit it instead")
-    } else if model.robot_needs_us() {
+    } else if model.robot_is_energised() {
         let sit_down = model.keymap.key(Action::SitDown);
         refuse(format!("the robot is armed; {sit_down} sits it down, then the program can be suspended"))
     } else {

@@ -143,7 +143,7 @@ impl Model {
     }
 
     /// Whether the robot is energised and this console commands it.
-    pub fn robot_needs_us(&self) -> bool {
+    pub fn robot_is_energised(&self) -> bool {
         self.replay.is_none() && self.mode().energised()
     }
 

@@ -9,7 +9,7 @@ use quadfrog::trial::{
 use super::log::SessionLog;
 use super::trials::Trials;
 
-/// The fold of the session's records. A replay that jumps resets it whole.
+/// State of the session, from its records. A replay that jumps resets it whole.
 #[derive(Debug, Clone, Default)]
 #[expect(missing_docs, reason = "the names say the rest")]
 pub struct SessionModel {

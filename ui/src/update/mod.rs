@@ -65,7 +65,7 @@ fn press(model: &mut Model, key: Key) -> Vec<Effect> {
     let typing = model.dialog.as_ref().is_some_and(Dialog::takes_text);
     match action {
         // A text field may have the space bar only while the robot is not armed.
-        Some(Action::Stop) if key.typed().is_some() && typing && !model.robot_needs_us() => {}
+        Some(Action::Stop) if key.typed().is_some() && typing && !model.robot_is_energised() => {}
         Some(Action::Stop) => return stop(model),
         Some(Action::Interrupt) => return interrupt(model),
         _ => {}

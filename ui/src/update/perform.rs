@@ -131,7 +131,8 @@ pub(super) fn perform(model: &mut Model, action: Action) -> Vec<Effect> {
         }
         Action::Suspend => return vec![Effect::Suspend],
         Action::Quit
-            if model.robot_needs_us() || model.session.stage_is(ExperimentStage::Review) && model.replay.is_none() =>
+            if model.robot_is_energised()
+                || model.session.stage_is(ExperimentStage::Review) && model.replay.is_none() =>
         {
             open(model, Dialog::Quit);
         }

@@ -1,4 +1,4 @@
-//! The fold of the session's records: rows, the log, the answer to the operator, the bell.
+//! Applies the session's records to the model: rows, the log, the answer to the operator, the bell.
 
 use quadfrog::recording::record::{LogLevel, Record, RequestRecord, StageRecord, Stamped};
 use quadfrog::telemetry::Mode;

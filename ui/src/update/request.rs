@@ -36,10 +36,10 @@ pub(super) fn refused(model: &mut Model, subject: &str, reason: &str) -> Vec<Eff
 }
 
 /// Sends a request to the session, except in a replay or from an observer.
-pub(super) fn request(model: &mut Model, intent: OperatorRequest) -> Vec<Effect> {
-    let allowed = if intent == OperatorRequest::Acknowledge { may_acknowledge(model) } else { may_request(model) };
+pub(super) fn request(model: &mut Model, request: OperatorRequest) -> Vec<Effect> {
+    let allowed = if request == OperatorRequest::Acknowledge { may_acknowledge(model) } else { may_request(model) };
     match allowed {
-        Ok(()) => vec![Effect::Request(intent)],
+        Ok(()) => vec![Effect::Request(request)],
         Err(reason) => refused(model, "refused", &reason),
     }
 }

@@ -164,7 +164,7 @@ fn approve(model: &Model, trial: u32, waited: bool) -> Vec<Line<'static>> {
 
 fn quit(model: &Model) -> Vec<Line<'static>> {
     let mut lines = Vec::new();
-    if model.robot_needs_us() {
+    if model.robot_is_energised() {
         lines.push(Line::from("The robot is armed: it will sit down before the program ends."));
     }
     if let Some(trial) = model.session.under_review() {
@@ -259,7 +259,9 @@ fn field(model: &Model, purpose: Purpose, input: &Input, problem: Option<&str>) 
             "the best points run again until one leads; each repeat is approved like any other".to_owned()
         }
         Purpose::LogSearch => "empty: all lines".to_owned(),
-        Purpose::Note(_) if model.robot_needs_us() => "the robot is armed: Space is STOP, _ writes a space".to_owned(),
+        Purpose::Note(_) if model.robot_is_energised() => {
+            "the robot is armed: Space is STOP, _ writes a space".to_owned()
+        }
         Purpose::Note(_) | Purpose::Continue | Purpose::TrialNumber => String::new(),
     };
     let below = problem.map_or_else(|| span(theme, Role::Quiet, hint), |problem| span(theme, Role::Bad, problem));

@@ -20,7 +20,7 @@ pub(super) fn key(model: &mut Model, key: Key, purpose: Purpose, mut input: Inpu
         },
         // Space is STOP while the robot is armed, so a note needs another key for it.
         KeyCode::Char('_')
-            if key.typed().is_some() && model.robot_needs_us() && matches!(purpose, Purpose::Note(_)) =>
+            if key.typed().is_some() && model.robot_is_energised() && matches!(purpose, Purpose::Note(_)) =>
         {
             input.handle(InputRequest::InsertChar(' '));
         }
