@@ -1,7 +1,7 @@
 //! `quadfrog evaluate`: one point of a task over several seeds and variants on the simulator, without a study.
 
+use std::panic::resume_unwind;
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use clap::Args;
@@ -19,6 +19,7 @@ use serde_json::json;
 
 use super::arguments::{self, Seeds, load_model, parse_seeds};
 use super::failure::Failure;
+use super::optimize::print_line;
 
 #[derive(Debug, Args)]
 pub struct EvaluateArguments {
@@ -89,7 +90,7 @@ pub fn run(arguments: &EvaluateArguments) -> Result<(), Failure> {
     let runs = on_all_cores(&specs, rollout)?;
     if arguments.json {
         for (spec, run) in specs.iter().zip(&runs) {
-            println!("{}", line(spec, run));
+            print_line(&line(spec, run).to_string());
         }
     }
     print_table(arguments.json, task, &point, &robot, &variants, &specs, &runs);
@@ -101,27 +102,19 @@ fn on_all_cores(
     specs: &[TrialSpec],
     rollout: impl Fn() -> Result<Rollout<Simulator>, Failure> + Sync,
 ) -> Result<Vec<EvaluatedRun>, Failure> {
-    rollout()?; // A robot or a configuration that cannot be simulated is refused once, before the threads start.
-    let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     let next = AtomicUsize::new(0);
-    let done = Mutex::new(vec![None; specs.len()]);
-    std::thread::scope(|scope| {
-        for _ in 0..cores.min(specs.len()) {
-            scope.spawn(|| {
-                let Ok(mut rollout) = rollout() else { return };
-                while let Some((index, spec)) =
-                    Some(next.fetch_add(1, Ordering::Relaxed)).and_then(|i| Some((i, specs.get(i)?)))
-                {
-                    let run = evaluate(&mut rollout, spec);
-                    if let Ok(mut done) = done.lock() {
-                        done[index] = Some(run);
-                    }
-                }
-            });
-        }
-    });
-    let done = done.into_inner().unwrap_or_default();
-    Ok(done.into_iter().flatten().collect())
+    let worker = || -> Result<Vec<(usize, EvaluatedRun)>, Failure> {
+        let mut rollout = rollout()?;
+        let indices = std::iter::repeat_with(|| next.fetch_add(1, Ordering::Relaxed));
+        Ok(indices.map_while(|i| Some((i, evaluate(&mut rollout, specs.get(i)?)))).collect())
+    };
+    let mut runs = std::thread::scope(|scope| {
+        let workers: Vec<_> = (0..arguments::cores().min(specs.len())).map(|_| scope.spawn(worker)).collect();
+        let results = workers.into_iter().map(|worker| worker.join().unwrap_or_else(|panic| resume_unwind(panic)));
+        results.collect::<Result<Vec<_>, _>>().map(|parts| parts.concat())
+    })?;
+    runs.sort_by_key(|(index, _)| *index);
+    Ok(runs.into_iter().map(|(_, run)| run).collect())
 }
 
 /// Returns the point of the arguments, else that of the configuration; parameters that the task does not optimize may be given.
@@ -250,5 +243,5 @@ fn print_table(
             text += &format!("     seed {}: {}{time}\n", run.seed, objective::suggest(&run.end).1);
         }
     }
-    if to_error { eprint!("{text}") } else { print!("{text}") }
+    if to_error { eprint!("{text}") } else { print_line(text.trim_end()) }
 }

@@ -23,6 +23,7 @@ use quadfrog::telemetry::Tick;
 use quadfrog::trial::{Approval, Backend, Task, TrialRecord, Verdict};
 
 use printer::Printer;
+pub use printer::print_line;
 
 use super::arguments::{self, Seeds, StudyArguments, parse_seeds};
 use super::failure::Failure;

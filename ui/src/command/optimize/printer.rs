@@ -125,7 +125,7 @@ impl Drop for Printer {
 }
 
 /// Prints a line; a closed pipe (`| head`) is no error.
-fn print_line(line: &str) {
+pub fn print_line(line: &str) {
     let _ = writeln!(std::io::stdout(), "{line}");
 }
 
