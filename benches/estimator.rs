@@ -75,8 +75,8 @@ fn cost(criterion: &mut Criterion) {
         criterion.bench_function(&format!("estimator update, {name}"), |b| {
             let mut estimator = Estimator::default();
             let mut state = simulator.read().expect("the simulator answers");
-            state.foot_force = [force_n; 4];
-            let feet = feet(&settings.geometry, &state.joint_position);
+            state.foot_force_n = [force_n; 4];
+            let feet = feet(&settings.geometry, &state.joint_position_rad);
             b.iter(|| {
                 state.robot_time_ms = state.robot_time_ms.wrapping_add(1);
                 // No flight lasts longer than 1 s.

@@ -22,13 +22,13 @@
 //!
 //! | from | to | data |
 //! |---|---|---|
-//! | screen (the program's main thread) | session | requests |
-//! | screen | control | STOP, heartbeat |
+//! | console (the program's main thread) | session | requests |
+//! | console | control | STOP, heartbeat |
 //! | session | control, 1 kHz | commands |
 //! | control | session | events, readiness |
 //! | control | recorder | every tick |
-//! | control | screen | every fifth tick, snapshot |
-//! | session | screen, recorder | records |
+//! | control | console | every fifth tick, snapshot |
+//! | session | console, recorder | records |
 //! | recorder | session | ticks of a trial |
 //!
 //! Everything that crosses to and from `control` is `Copy` ([`telemetry`]) and goes through wait-free channels

@@ -236,7 +236,7 @@ impl ExperimentStage {
     pub const ALL: [ExperimentStage; ExperimentStage::VARIANTS.len()] =
         *ExperimentStage::VARIANTS.first_chunk().unwrap();
 
-    /// Returns the name on the screen and in files.
+    /// Returns the name on screens and in files.
     pub fn name(self) -> &'static str {
         self.into()
     }
@@ -268,7 +268,7 @@ impl ProposalSource {
     /// All sources.
     pub const ALL: [ProposalSource; ProposalSource::VARIANTS.len()] = *ProposalSource::VARIANTS.first_chunk().unwrap();
 
-    /// Returns the name on the screen and in files.
+    /// Returns the name on screens and in files.
     pub fn name(self) -> &'static str {
         self.into()
     }
@@ -334,7 +334,7 @@ impl Verdict {
     /// All verdicts.
     pub const ALL: [Verdict; Verdict::VARIANTS.len()] = *Verdict::VARIANTS.first_chunk().unwrap();
 
-    /// Returns the name on the screen and in files.
+    /// Returns the name on screens and in files.
     pub fn name(self) -> &'static str {
         self.into()
     }
@@ -460,7 +460,7 @@ pub struct PointRecord {
     /// Its trials that count, ascending: n is their number.
     pub trials: Vec<u32>,
     /// k: number of them that did not fall.
-    pub stood: u32,
+    pub without_fall: u32,
     /// Mean value, falls included.
     pub mean: f64,
     /// Standard deviation of a single repeat, from two repeats on.

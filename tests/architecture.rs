@@ -35,7 +35,7 @@ const CONSOLE: [&[&str]; 9] = [
     &["legal"],
     &["update", "view", "feed", "export", "terminal"],
     &["app"],
-    &["command"],
+    &["subcommand"],
 ];
 
 const LONGEST_FILE: usize = 500;

@@ -18,7 +18,7 @@ type ArmingBench = Bench<ScriptedRobot>;
 fn lying_still() -> ArmingBench {
     let (config, _, settings) = shipped(Backend::Hardware);
     let state = RobotState {
-        joint_position: settings.lying_position,
+        joint_position_rad: settings.lying_position,
         motor_enabled: [true; 12],
         motor_temperature_c: [30.0; 12],
         battery: Some(Battery { charge_percent: 80.0, voltage_v: 24.0, current_a: 0.0, cell_v: [0.0; 10] }),
@@ -63,8 +63,8 @@ fn each_check_refuses_arming_by_itself() {
         (ArmingCheck::Upright, |b| {
             b.state().imu.world_from_body = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), 0.25);
         }),
-        (ArmingCheck::JointsInside, |b| b.state().joint_position[2] = -2.83),
-        (ArmingCheck::LyingDown, |b| b.state().joint_position[4] = 0.6),
+        (ArmingCheck::JointsInside, |b| b.state().joint_position_rad[2] = -2.83),
+        (ArmingCheck::LyingDown, |b| b.state().joint_position_rad[4] = 0.6),
         (ArmingCheck::Battery, |b| b.state().battery.as_mut().unwrap().charge_percent = 29.0),
         (ArmingCheck::Battery, |b| b.state().battery = None),
         (ArmingCheck::MotorsCool, |b| b.state().motor_temperature_c[11] = 61.0),

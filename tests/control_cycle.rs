@@ -7,8 +7,8 @@ mod robots;
 
 use bench::{Bench, shipped};
 use proptest::prelude::*;
+use quadfrog::control::command_gate::CommandGate;
 use quadfrog::control::cycle::Cycle;
-use quadfrog::control::limits::CommandGate;
 use quadfrog::robot::go1::convert::low_cmd;
 use quadfrog::robot::go1::packet::CrcForm;
 use quadfrog::robot::{JOINTS, JointCommand, MotorCommand, RobotState};
@@ -107,7 +107,7 @@ fn a_number_that_is_none_is_a_fault_and_damps_at_once() {
     bench.cycle = Cycle::ready(&bench.settings);
     bench.robot.keeps_commands = true;
     bench.tick(None);
-    bench.robot.tamper = |state| state.joint_velocity[4] = f64::NAN;
+    bench.robot.tamper = |state| state.joint_velocity_rad_s[4] = f64::NAN;
     for _ in 0..51 {
         let tick = bench.tick(None);
         assert!(tick.mode == Mode::Fault && bench.damps(&tick));
@@ -115,7 +115,7 @@ fn a_number_that_is_none_is_a_fault_and_damps_at_once() {
     let faults = bench.faults();
     assert!(faults.iter().any(|fault| fault.to_string().contains("joint velocity")), "{faults:?}");
     for motor in bench.robot.sent.iter().flat_map(|command| command.motor) {
-        let numbers = [motor.position, motor.velocity, motor.kp, motor.kd, motor.torque];
+        let numbers = [motor.position_rad, motor.velocity_rad_s, motor.kp_joint, motor.kd_joint, motor.torque_n_m];
         assert!(numbers.iter().all(|number| number.is_finite()), "{motor:?}");
     }
 }
@@ -133,7 +133,7 @@ fn a_fallen_robot_is_damped_and_comes_to_rest() {
         last = bench.tick(None);
         assert_eq!(last.mode, Mode::Damped);
     }
-    let speed = last.state.joint_velocity.iter().fold(0.0_f64, |most, dq| most.max(dq.abs()));
+    let speed = last.state.joint_velocity_rad_s.iter().fold(0.0_f64, |most, dq| most.max(dq.abs()));
     assert!(speed < 0.5, "a joint still turns at {speed} rad/s");
     let motion = last.estimate.velocity_world.norm();
     assert!(motion < 0.1, "the trunk still moves at {motion} m/s");
@@ -163,14 +163,14 @@ proptest! {
     ) {
         let Bench { settings, .. } = simulated();
         let mut gate = CommandGate::default();
-        let state = RobotState { joint_velocity: [speed; JOINTS], ..RobotState::default() };
+        let state = RobotState { joint_velocity_rad_s: [speed; JOINTS], ..RobotState::default() };
         gate.pass(&JointCommand::torques(&[before; JOINTS]), &RobotState::default(), &settings);
-        let wanted = JointCommand { motor: [MotorCommand { position, velocity: 0.0, kp, kd, torque }; JOINTS] };
+        let wanted = JointCommand { motor: [MotorCommand { position_rad: position, velocity_rad_s: 0.0, kp_joint: kp, kd_joint: kd, torque_n_m: torque }; JOINTS] };
         let passed = gate.pass(&wanted, &state, &settings);
         prop_assert!(passed.fault.is_none());
         for (joint, motor) in passed.command.motor.iter().enumerate() {
             let most = settings.max_torque[joint] + 1e-9;
-            prop_assert!(motor.torque.abs() <= most && motor.torque_at(0.0, speed).abs() <= most, "{motor:?}");
+            prop_assert!(motor.torque_n_m.abs() <= most && motor.torque_at(0.0, speed).abs() <= most, "{motor:?}");
         }
         prop_assert!(low_cmd(&passed.command, CrcForm::Plain).is_ok());
     }
@@ -214,7 +214,7 @@ proptest! {
                 let state = &tick.state;
                 if tick.mode.energised() {
                     for (joint, motor) in tick.command.motor.iter().enumerate() {
-                        let torque = motor.torque_at(state.joint_position[joint], state.joint_velocity[joint]);
+                        let torque = motor.torque_at(state.joint_position_rad[joint], state.joint_velocity_rad_s[joint]);
                         prop_assert!(torque.abs() <= bench.settings.max_torque[joint] + 1e-9, "joint {joint}: {torque}");
                     }
                 }

@@ -68,12 +68,12 @@ impl LinkedBench {
 fn every_cut_row_damps_within_two_ticks_and_names_its_fault() {
     type Inject = fn(&mut LinkedBench);
     let rows: [(Inject, &str); 16] = [
-        (|b| b.robot.tamper = |s| s.joint_velocity[4] = f64::NAN, "a joint velocity is not a finite number"),
-        (|b| b.robot.tamper = |s| s.joint_position[2] = -0.7, "FR_calf at -0.700 rad exceeds -0.788 rad"),
-        (|b| b.robot.tamper = |s| s.joint_position[7] = -0.8, "RR_thigh at -0.800 rad exceeds -0.763 rad"),
-        (|b| b.robot.tamper = |s| s.joint_velocity[11] = -41.0, "RL_calf at -41.0 rad/s exceeds 40.1 rad/s"),
-        (|b| b.robot.tamper = |s| s.joint_torque[0] = 29.0, "FR_hip at 29.0 N m exceeds 28.4 N m"),
-        (|b| b.robot.tamper = |s| s.joint_torque[3] = f64::NAN, "FL_hip at NaN N m"),
+        (|b| b.robot.tamper = |s| s.joint_velocity_rad_s[4] = f64::NAN, "a joint velocity is not a finite number"),
+        (|b| b.robot.tamper = |s| s.joint_position_rad[2] = -0.7, "FR_calf at -0.700 rad exceeds -0.788 rad"),
+        (|b| b.robot.tamper = |s| s.joint_position_rad[7] = -0.8, "RR_thigh at -0.800 rad exceeds -0.763 rad"),
+        (|b| b.robot.tamper = |s| s.joint_velocity_rad_s[11] = -41.0, "RL_calf at -41.0 rad/s exceeds 40.1 rad/s"),
+        (|b| b.robot.tamper = |s| s.joint_torque_n_m[0] = 29.0, "FR_hip at 29.0 N m exceeds 28.4 N m"),
+        (|b| b.robot.tamper = |s| s.joint_torque_n_m[3] = f64::NAN, "FL_hip at NaN N m"),
         (|b| b.robot.tamper = |s| s.motor_enabled[5] = false, "motor FL_calf left servo mode"),
         (|b| b.robot.tamper = |s| s.motor_temperature_c[9] = 80.0, "RL_hip at 80 degrees Celsius, limit 80"),
         (|b| b.robot.link.recent_corrupt = 11, "11 states with a wrong checksum within 5 s, limit 10"),
@@ -124,11 +124,11 @@ fn a_fault_that_voids_confirmations_is_reported_behind_another_fault() {
     let mut bench = in_mode(Mode::Ready);
     bench.events.clear();
     let faults: [fn(&mut LinkedBench); 5] = [
-        |b| b.robot.tamper = |s| s.joint_position[2] = -0.7,
+        |b| b.robot.tamper = |s| s.joint_position_rad[2] = -0.7,
         |b| b.robot.tamper = |s| s.motor_temperature_c[0] = 85.0,
         |b| b.robot.tamper = |s| s.motor_enabled[5] = false,
         |b| b.robot.silent_ms = 1,
-        |b| b.robot.tamper = |s| (s.robot_time_ms, s.joint_velocity[1]) = (3, f64::NAN),
+        |b| b.robot.tamper = |s| (s.robot_time_ms, s.joint_velocity_rad_s[1]) = (3, f64::NAN),
     ];
     for inject in faults {
         inject(&mut bench);
@@ -258,8 +258,8 @@ fn sitting_down_is_cut_at_the_outer_tilt() {
 fn a_disarmed_robot_may_be_handled() {
     let mut bench = in_mode(Mode::Disarmed);
     bench.robot.tamper = |state| {
-        state.joint_position[2] = -0.5;
-        state.joint_velocity[2] = 40.0;
+        state.joint_position_rad[2] = -0.5;
+        state.joint_velocity_rad_s[2] = 40.0;
         state.motor_enabled[2] = false;
         tilt(state, Vector3::x_axis(), 1.5);
     };
@@ -391,7 +391,7 @@ fn an_approval_is_single_use_expires_and_dies_with_a_change_of_mode() {
     assert_eq!(bench.cycle.mode(), Mode::Countdown);
 }
 
-/// Regression: arming did not expire, and needed no heartbeat of the operator's screen.
+/// Regression: arming did not expire, and needed no heartbeat of the operator's console.
 #[test]
 fn arming_expires_dies_with_a_change_of_mode_and_needs_somebody_who_watches() {
     let mut bench = in_mode(Mode::Disarmed);
@@ -483,13 +483,13 @@ fn after_a_fall_the_robot_stands_up_from_its_measured_pose_once_it_is_upright_ag
         bench.acknowledge();
     }
     bench.ticks(1500);
-    let before = bench.cycle.last().state.joint_position;
+    let before = bench.cycle.last().state.joint_position_rad;
     let tick = bench.command(bench.arm());
     assert_eq!(tick.mode, Mode::StandUp);
     for (joint, motor) in tick.command.motor.iter().enumerate() {
         // Targets end at the limit, also for a folded leg that rests beyond it.
         let measured = before[joint].clamp(bench.settings.min_position[joint], bench.settings.max_position[joint]);
-        assert!((motor.position - measured).abs() < 0.01, "joint {joint} begins at its measured angle");
+        assert!((motor.position_rad - measured).abs() < 0.01, "joint {joint} begins at its measured angle");
     }
     bench.until(Mode::Ready);
 }
@@ -513,10 +513,10 @@ fn whole_studies_on_the_simulator_trip_no_limit() {
             assert!(faulty.is_none(), "{}, trial {}: {}", task.name(), row.trial, row.cause);
             for tick in ticks.iter().filter(|tick| tick.mode.energised()) {
                 for i in 0..JOINTS {
-                    let q = tick.state.joint_position[i];
+                    let q = tick.state.joint_position_rad[i];
                     beyond[i % 3] = beyond[i % 3].max(settings.min_position[i] - q).max(q - settings.max_position[i]);
-                    speed = speed.max(tick.state.joint_velocity[i].abs() / settings.max_velocity[i]);
-                    torque = torque.max(tick.state.joint_torque[i].abs() / settings.max_torque[i]);
+                    speed = speed.max(tick.state.joint_velocity_rad_s[i].abs() / settings.max_velocity[i]);
+                    torque = torque.max(tick.state.joint_torque_n_m[i].abs() / settings.max_torque[i]);
                 }
             }
         })
@@ -543,7 +543,7 @@ enum Step {
 
 fn any_step() -> impl Strategy<Value = Step> {
     let tampers: [Tamper; 6] = [
-        |state| state.joint_velocity[1] = f64::NAN,
+        |state| state.joint_velocity_rad_s[1] = f64::NAN,
         |state| state.motor_enabled[3] = false,
         |state| state.motor_temperature_c[3] = 75.0,
         |state| state.battery = None,
@@ -631,7 +631,7 @@ proptest! {
                     prop_assert!(sent.iter().all(|command| *command == damping), "{:?}", tick.mode);
                 }
                 for motor in sent.iter().flat_map(|command| &command.motor) {
-                    let numbers = [motor.position, motor.velocity, motor.kp, motor.kd, motor.torque];
+                    let numbers = [motor.position_rad, motor.velocity_rad_s, motor.kp_joint, motor.kd_joint, motor.torque_n_m];
                     prop_assert!(numbers.iter().all(|number| number.is_finite()));
                 }
                 if bench.inputs.stop {

@@ -78,9 +78,9 @@ fn everything(backend: Backend) {
     recover(&mut bench, &lying);
 
     let tampers: [fn(&mut RobotState); 4] = [
-        |state| state.joint_velocity[3] = f64::NAN,
+        |state| state.joint_velocity_rad_s[3] = f64::NAN,
         |state| state.motor_enabled[3] = false,
-        |state| state.joint_position[3] = 2.0,
+        |state| state.joint_position_rad[3] = 2.0,
         |state| state.motor_temperature_c[3] = 90.0,
     ];
     for tamper in tampers {

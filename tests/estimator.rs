@@ -37,7 +37,7 @@ impl Feed {
     fn standing() -> Feed {
         let settings = settings(Task::Forward);
         let mut state =
-            RobotState { joint_position: stance(&settings), foot_force: [32.0; LEGS], ..Default::default() };
+            RobotState { joint_position_rad: stance(&settings), foot_force_n: [32.0; LEGS], ..Default::default() };
         state.imu.accel_body = Vector3::new(0.0, 0.0, GRAVITY);
         let mut feed = Feed { settings, estimator: Estimator::default(), state };
         feed.update();
@@ -46,7 +46,7 @@ impl Feed {
 
     /// Estimate of the present state.
     fn update(&mut self) -> Estimate {
-        let feet = feet(&self.settings.geometry, &self.state.joint_position);
+        let feet = feet(&self.settings.geometry, &self.state.joint_position_rad);
         *self.estimator.update(&self.state, &feet, &self.settings)
     }
 
@@ -133,7 +133,7 @@ fn the_bias_of_the_accelerometer_is_learnt_while_standing() {
 fn a_flight_is_ballistic() {
     let mut feed = Feed::standing();
     let start = feed.run(2_000).position_world;
-    feed.state.foot_force = [0.0; LEGS];
+    feed.state.foot_force_n = [0.0; LEGS];
     feed.state.imu.accel_body = Vector3::zeros();
     let estimate = feed.run(400);
     // The first two milliseconds count as standing; feet that do not move agree.
@@ -151,17 +151,17 @@ fn a_slipping_foot_is_gated() {
     let forward = Vector3::new(0.2, 0.0, 0.0);
     let mut farthest = 0.0_f64;
     for _ in 0..300 {
-        let foot = feet(&feed.settings.geometry, &feed.state.joint_position)[0];
+        let foot = feet(&feed.settings.geometry, &feed.state.joint_position_rad)[0];
         let dq = foot.jacobian_leg.try_inverse().unwrap() * forward;
         for joint in 0..3 {
-            feed.state.joint_velocity[joint] = dq[joint];
-            feed.state.joint_position[joint] += dq[joint] * 1e-3;
+            feed.state.joint_velocity_rad_s[joint] = dq[joint];
+            feed.state.joint_position_rad[joint] += dq[joint] * 1e-3;
         }
         farthest = farthest.max((feed.run(1).position_world - start).norm());
     }
     assert!(farthest < 0.002, "the sliding foot dragged the trunk by {farthest} m");
     // It stops, and is accepted at its new position.
-    feed.state.joint_velocity = [0.0; 12];
+    feed.state.joint_velocity_rad_s = [0.0; 12];
     let estimate = feed.run(500);
     assert!((estimate.position_world - start).norm() < 0.002 && estimate.velocity_world.norm() < 0.01);
 }
@@ -175,9 +175,9 @@ fn a_wrong_velocity_is_given_up() {
     let mut estimate = Estimate::default();
     for _ in 0..400 {
         for leg in 0..LEGS {
-            let foot = feet(&feed.settings.geometry, &feed.state.joint_position)[leg];
+            let foot = feet(&feed.settings.geometry, &feed.state.joint_position_rad)[leg];
             let dq = foot.jacobian_leg.try_inverse().unwrap() * forward;
-            feed.state.joint_velocity[3 * leg..][..3].copy_from_slice(dq.as_slice());
+            feed.state.joint_velocity_rad_s[3 * leg..][..3].copy_from_slice(dq.as_slice());
         }
         estimate = feed.run(1);
     }
@@ -220,9 +220,9 @@ fn one_number_that_is_none_spoils_nothing() {
         |state| state.imu.accel_body.x = f64::NAN,
         |state| state.imu.gyro_body.z = f64::INFINITY,
         |state| state.imu.world_from_body.as_mut_unchecked().coords.w = f64::NAN,
-        |state| state.joint_position[4] = f64::NAN,
-        |state| state.joint_velocity[11] = f64::NEG_INFINITY,
-        |state| state.foot_force[2] = f64::NAN,
+        |state| state.joint_position_rad[4] = f64::NAN,
+        |state| state.joint_velocity_rad_s[11] = f64::NEG_INFINITY,
+        |state| state.foot_force_n[2] = f64::NAN,
     ];
     for (case, spoil) in spoil.into_iter().enumerate() {
         let mut feed = Feed::standing();
@@ -254,7 +254,7 @@ fn a_reset_forgets_everything() {
 #[test]
 fn a_state_counts_once_and_a_gap_is_bridged() {
     let mut feed = Feed::standing();
-    feed.state.foot_force = [0.0; LEGS];
+    feed.state.foot_force_n = [0.0; LEGS];
     feed.state.imu.accel_body = Vector3::new(1.0, 0.0, GRAVITY);
     let first = feed.run(20);
     assert_eq!(feed.update(), first);
@@ -268,7 +268,7 @@ fn a_state_counts_once_and_a_gap_is_bridged() {
 #[test]
 fn a_clock_that_goes_back_begins_anew() {
     let mut feed = Feed::standing();
-    feed.state.foot_force = [0.0; LEGS];
+    feed.state.foot_force_n = [0.0; LEGS];
     feed.state.imu.accel_body.x = 3.0;
     assert!(feed.run(500).position_world.x > 0.1);
     feed.state.robot_time_ms = 7;
@@ -283,7 +283,7 @@ fn the_estimate_goes_on_across_the_end_of_the_robots_clock() {
     let mut feed = Feed::standing();
     feed.state.robot_time_ms = u32::MAX - 100;
     feed.update();
-    feed.state.foot_force = [0.0; LEGS];
+    feed.state.foot_force_n = [0.0; LEGS];
     feed.state.imu.accel_body.x = 3.0;
     let before = feed.run(100);
     assert_eq!(feed.state.robot_time_ms, u32::MAX);
@@ -297,13 +297,13 @@ fn the_estimate_goes_on_across_the_end_of_the_robots_clock() {
 #[test]
 fn a_robot_that_hangs_does_not_fly_away() {
     let mut feed = Feed::standing();
-    feed.state.foot_force = [0.0; LEGS];
+    feed.state.foot_force_n = [0.0; LEGS];
     feed.state.imu.accel_body.x = 0.3;
     let estimate = feed.run(60_000);
     assert_eq!(estimate.velocity_world, Vector3::zeros());
     assert!(estimate.position_world.norm() < 1.0, "{}", estimate.position_world);
     // Put down, it stands at once.
-    feed.state.foot_force = [32.0; LEGS];
+    feed.state.foot_force_n = [32.0; LEGS];
     assert!(feed.run(200).velocity_world.norm() < 0.02);
 }
 
@@ -322,7 +322,7 @@ fn contact_does_not_flicker_in_the_noise_of_a_sensor() {
                 position_world: Vector3::new(0.0, 0.0, 9.0),
                 ..*simulator.state()
             });
-            let noisy = simulator.read().unwrap().foot_force.map(|noise| force_n + noise);
+            let noisy = simulator.read().unwrap().foot_force_n.map(|noise| force_n + noise);
             let down = gate.update(&noisy, 1e-3, &settings.estimator);
             if ms > 100 {
                 changes += down.iter().filter(|&&down| down != (force_n > 0.0)).count();
@@ -340,7 +340,7 @@ fn contact_does_not_flicker_in_the_noise_of_a_sensor() {
 #[test]
 fn yaw_counts_full_turns_on_sensors_as_on_truth() {
     let mut feed = Feed::standing();
-    feed.state.foot_force = [0.0; LEGS];
+    feed.state.foot_force_n = [0.0; LEGS];
     for ms in 1..=700 {
         let yaw = f64::from(ms) * 0.01;
         feed.state.imu.world_from_body = nalgebra::UnitQuaternion::from_euler_angles(0.0, 0.0, yaw);

@@ -58,7 +58,7 @@ impl Tap {
             if self.no_rotation {
                 let mut state = *LowState::parse(&buffer[..length]).unwrap();
                 state.imu.quaternion = Default::default();
-                state.seal();
+                state.write_crc();
                 self.to_controller.send_to(state.bytes(), controller).unwrap();
             } else {
                 self.to_controller.send_to(&buffer[..length], controller).unwrap();
@@ -182,12 +182,12 @@ const OLD: &[&str] = &["no state from the robot for 21 ms, limit 20 ms"];
 
 const CUT: [Row; 16] = [
     ("STOP key", SENT_TO, |_, _| true, &["STOP"]),
-    ("angle FL_hip 1.3", ENERGISED, |_, t| t.state.joint_position[3] > 1.2, &["FL_hip at 1.300 rad"]),
-    ("speed RR_thigh 90", ENERGISED, |_, t| t.state.joint_velocity[7] > 80.0, &["RR_thigh at 90.0 rad/s"]),
-    ("torque RR_calf 50", ENERGISED, |_, t| t.state.joint_torque[8] > 45.0, &["RR_calf at 50.0 N m"]),
+    ("angle FL_hip 1.3", ENERGISED, |_, t| t.state.joint_position_rad[3] > 1.2, &["FL_hip at 1.300 rad"]),
+    ("speed RR_thigh 90", ENERGISED, |_, t| t.state.joint_velocity_rad_s[7] > 80.0, &["RR_thigh at 90.0 rad/s"]),
+    ("torque RR_calf 50", ENERGISED, |_, t| t.state.joint_torque_n_m[8] > 45.0, &["RR_calf at 50.0 N m"]),
     ("servo-off RL_thigh", ENERGISED, |_, t| !t.state.motor_enabled[10], &["motor RL_thigh left servo mode"]),
     ("hot FR_calf 80", SENT_TO, |_, t| t.state.motor_temperature_c[2] >= 80.0, &["motor FR_calf at 80 degrees"]),
-    ("nan FL_calf", SENT_TO, |_, t| t.state.joint_position[5].is_nan(), &["a joint angle is not a finite"]),
+    ("nan FL_calf", SENT_TO, |_, t| t.state.joint_position_rad[5].is_nan(), &["a joint angle is not a finite"]),
     ("no rotation", SENT_TO, |_, t| t.state.imu.world_from_body.w.is_nan(), &["the orientation is not a finite"]),
     ("corrupt 100", SENT_TO, corrupted, &["states with a wrong checksum"]),
     ("reboot", SENT_TO, |bench, _| bench.link_status().reboots > 0, &["the robot restarted"]),

@@ -42,7 +42,10 @@ fn with(fault: &str, ms: u32) -> (u64, LinkStatus) {
 fn a_good_network_loses_nothing() {
     let (states, link) = with("clear", 4000);
     assert_eq!(link.received, states);
-    assert_eq!((link.lost, link.late, link.duplicate, link.corrupt, link.foreign, link.reboots), (0, 0, 0, 0, 0, 0));
+    assert_eq!(
+        (link.lost, link.out_of_order, link.duplicate, link.corrupt, link.foreign, link.reboots),
+        (0, 0, 0, 0, 0, 0)
+    );
     assert_eq!((link.state_age_ms, link.rate_hz, link.loss_share()), (0, 1000, 0.0));
 }
 
@@ -91,8 +94,8 @@ fn an_overtaken_state_is_late_and_not_lost() {
     run(&mut emulator, &mut go1, 20);
     let _ = go1.read();
     let link = status(&go1);
-    assert!(link.late > 1000, "{link:?}");
-    assert_eq!((link.received + link.late, link.lost), (emulator.status().states, 0), "{link:?}");
+    assert!(link.out_of_order > 1000, "{link:?}");
+    assert_eq!((link.received + link.out_of_order, link.lost), (emulator.status().states, 0), "{link:?}");
 }
 
 /// With a delay the rate of the states is unchanged.
@@ -182,9 +185,9 @@ impl Robots {
 
 fn state(tick: u32) -> LowState {
     let mut state = LowState::zero();
-    state.tick = tick.into();
+    state.robot_time_ms = tick.into();
     state.imu.quaternion[0] = 1.0.into();
-    state.seal();
+    state.write_crc();
     state
 }
 
@@ -201,7 +204,7 @@ fn a_good_state_is_not_lost_to_bad_ones_behind_it() {
     robot.send(&[0; 807]);
     let mut high = state(8);
     high.header.level = HIGH_LEVEL;
-    high.seal();
+    high.write_crc();
     robot.send(high.bytes());
     assert_eq!(robot.go1.read().unwrap().robot_time_ms, 5);
     let link = status(&robot.go1);
@@ -265,7 +268,7 @@ fn a_motor_leaves_servo_mode_only_after_it_was_in_it() {
         tick += 1;
         let mut state = state(tick);
         state.motor[4].mode = MODE_BRAKE;
-        state.seal();
+        state.write_crc();
         robot.send(state.bytes());
         robot.go1.read().unwrap().motor_enabled
     };
@@ -285,7 +288,7 @@ fn a_command_that_is_no_number_becomes_the_last_damping_and_an_error() {
     robot.socket.set_nonblocking(true).unwrap();
     let mut buffer = [0; 2000];
     let mut unsayable = JointCommand::damping(8.0);
-    unsayable.motor[7].torque = f64::NAN;
+    unsayable.motor[7].torque_n_m = f64::NAN;
     assert!(matches!(robot.go1.write(&unsayable), Err(RobotError::Send { .. })));
     assert!(robot.socket.recv(&mut buffer).is_err(), "nothing was ever commanded, so nothing is sent");
 
@@ -311,7 +314,7 @@ fn a_restart_gives_the_motors_their_time_to_servo_mode_again() {
         tick = if restart { 0 } else { tick + 1 };
         let mut state = state(tick);
         state.motor[4].mode = MODE_BRAKE;
-        state.seal();
+        state.write_crc();
         robot.send(state.bytes());
         let enabled = robot.go1.read().unwrap().motor_enabled[4];
         robot.go1.write(&JointCommand::damping(3.0)).unwrap();

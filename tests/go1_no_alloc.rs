@@ -55,7 +55,7 @@ fn a_tick_over_the_link_does_not_allocate() {
         assert!(bench.seen.contains(mode.name()), "{mode:?} is not among {:?}", bench.seen);
     }
     let link = bench.robot.link().unwrap();
-    assert!(link.corrupt > 50 && link.duplicate > 50 && link.lost > 50 && link.late > 50, "{link:?}");
+    assert!(link.corrupt > 50 && link.duplicate > 50 && link.lost > 50 && link.out_of_order > 50, "{link:?}");
     assert_eq!(link.reboots, 1);
 }
 

@@ -11,8 +11,15 @@ use quadfrog::robot::{Battery, JOINTS, JointCommand, MotorCommand, RobotState};
 
 fn motor() -> impl Strategy<Value = MotorCommand> {
     let gain = |most: f64| prop_oneof![Just(0.0), 0.0..most];
-    (-10.0..10.0, -50.0..50.0, gain(1023.9), gain(2047.9), -127.9..127.9)
-        .prop_map(|(position, velocity, kp, kd, torque)| MotorCommand { position, velocity, kp, kd, torque })
+    (-10.0..10.0, -50.0..50.0, gain(1023.9), gain(2047.9), -127.9..127.9).prop_map(
+        |(position, velocity, kp, kd, torque)| MotorCommand {
+            position_rad: position,
+            velocity_rad_s: velocity,
+            kp_joint: kp,
+            kd_joint: kd,
+            torque_n_m: torque,
+        },
+    )
 }
 
 fn command() -> impl Strategy<Value = JointCommand> {
@@ -20,7 +27,7 @@ fn command() -> impl Strategy<Value = JointCommand> {
 }
 
 fn form() -> impl Strategy<Value = CrcForm> {
-    prop_oneof![Just(CrcForm::Plain), Just(CrcForm::Sealed)]
+    prop_oneof![Just(CrcForm::Plain), Just(CrcForm::Transformed)]
 }
 
 proptest! {
@@ -33,15 +40,15 @@ proptest! {
             // Truncated towards zero: not more than the command, and less than one step less, except for the rounding
             // to 32 bits.
             for (got, wanted, step) in
-                [(got.torque, wanted.torque, 1.0 / 256.0), (got.kp, wanted.kp, 1.0 / 32.0), (got.kd, wanted.kd, 1.0 / 16.0)]
+                [(got.torque_n_m, wanted.torque_n_m, 1.0 / 256.0), (got.kp_joint, wanted.kp_joint, 1.0 / 32.0), (got.kd_joint, wanted.kd_joint, 1.0 / 16.0)]
             {
                 prop_assert!(got.abs() <= wanted.abs() + 1e-4 && (got - wanted).abs() < step + 1e-4);
             }
-            if wanted.kp > 0.0 {
-                prop_assert!((got.position - wanted.position).abs() < 1e-5);
+            if wanted.kp_joint > 0.0 {
+                prop_assert!((got.position_rad - wanted.position_rad).abs() < 1e-5);
             }
-            if wanted.kd > 0.0 {
-                prop_assert!((got.velocity - wanted.velocity).abs() < 1e-5);
+            if wanted.kd_joint > 0.0 {
+                prop_assert!((got.velocity_rad_s - wanted.velocity_rad_s).abs() < 1e-5);
             }
         }
         for motor in JOINTS..20 {
@@ -56,8 +63,8 @@ proptest! {
         for (joint, wanted) in command.motor.iter().enumerate() {
             let target = datagram.motor(joint);
             prop_assert_eq!(target.mode, MODE_SERVO);
-            prop_assert_eq!(target.position == POSITION_STOP, wanted.kp == 0.0);
-            prop_assert_eq!(target.velocity == VELOCITY_STOP, wanted.kd == 0.0);
+            prop_assert_eq!(target.position == POSITION_STOP, wanted.kp_joint == 0.0);
+            prop_assert_eq!(target.velocity == VELOCITY_STOP, wanted.kd_joint == 0.0);
         }
     }
 
@@ -67,7 +74,7 @@ proptest! {
     fn no_command_switches_the_battery_off(numbers in proptest::array::uniform12(proptest::array::uniform5(any::<u64>())), form in form()) {
         let motor = numbers.map(|bits| {
             let [position, velocity, kp, kd, torque] = bits.map(f64::from_bits);
-            MotorCommand { position, velocity, kp, kd, torque }
+            MotorCommand { position_rad: position, velocity_rad_s: velocity, kp_joint: kp, kd_joint: kd, torque_n_m: torque }
         });
         if let Ok(datagram) = low_cmd(&JointCommand { motor }, form) {
             prop_assert_eq!(datagram.bytes()[562], 0);
@@ -82,7 +89,7 @@ proptest! {
     ) {
         let mut command = command;
         let motor = &mut command.motor[joint];
-        *[&mut motor.position, &mut motor.velocity, &mut motor.torque, &mut motor.kp, &mut motor.kd][which] = bad;
+        *[&mut motor.position_rad, &mut motor.velocity_rad_s, &mut motor.torque_n_m, &mut motor.kp_joint, &mut motor.kd_joint][which] = bad;
         let name = ["position", "velocity", "torque", "kp", "kd"][which];
         match low_cmd(&command, CrcForm::Plain) {
             Err(CommandError::NotFinite { quantity, motor, .. }) => prop_assert_eq!((quantity, motor), (name, joint)),
@@ -113,10 +120,10 @@ proptest! {
     ) {
         let mut told = RobotState {
             robot_time_ms: tick,
-            joint_position: q,
-            joint_velocity: dq,
-            joint_torque: torque,
-            foot_force: force.map(f64::from),
+            joint_position_rad: q,
+            joint_velocity_rad_s: dq,
+            joint_torque_n_m: torque,
+            foot_force_n: force.map(f64::from),
             motor_temperature_c: [41.0; JOINTS],
             motor_enabled: enabled,
             battery: Some(Battery { charge_percent: charge.into(), voltage_v: 6.0 * 3.84, current_a: -2.5, cell_v: [0.0; 10] }),
@@ -126,16 +133,16 @@ proptest! {
         told.imu.world_from_body = nalgebra::UnitQuaternion::from_scaled_axis(nalgebra::Vector3::from(axis));
         told.imu.gyro_body = axis.into();
         let mut datagram = low_state(&told, 1.0);
-        datagram.seal();
+        datagram.write_crc();
         let heard = robot_state(LowState::parse(datagram.bytes()).unwrap(), 1.0);
         let near = |a: &[f64], b: &[f64], step: f64| a.iter().zip(b).all(|(a, b)| (a - b).abs() <= step);
-        prop_assert!(near(&heard.joint_position, &told.joint_position, 1e-6));
-        prop_assert!(near(&heard.joint_velocity, &told.joint_velocity, 1e-5));
-        prop_assert!(near(&heard.joint_torque, &told.joint_torque, 0.5 / 256.0 + 1e-5));
+        prop_assert!(near(&heard.joint_position_rad, &told.joint_position_rad, 1e-6));
+        prop_assert!(near(&heard.joint_velocity_rad_s, &told.joint_velocity_rad_s, 1e-5));
+        prop_assert!(near(&heard.joint_torque_n_m, &told.joint_torque_n_m, 0.5 / 256.0 + 1e-5));
         prop_assert!(heard.imu.world_from_body.angle_to(&told.imu.world_from_body) < 1e-6);
         prop_assert!((heard.imu.gyro_body - told.imu.gyro_body).norm() < 1e-6);
         prop_assert_eq!((heard.robot_time_ms, heard.motor_enabled), (told.robot_time_ms, told.motor_enabled));
-        prop_assert_eq!((heard.foot_force, heard.motor_temperature_c), (told.foot_force, told.motor_temperature_c));
+        prop_assert_eq!((heard.foot_force_n, heard.motor_temperature_c), (told.foot_force_n, told.motor_temperature_c));
         let (heard, told) = (heard.battery.unwrap(), told.battery.unwrap());
         prop_assert_eq!(heard.charge_percent, told.charge_percent);
         prop_assert!((heard.current_a - told.current_a).abs() < 1e-3 && (heard.voltage_v - told.voltage_v).abs() < 1e-3);

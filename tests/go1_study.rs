@@ -100,7 +100,7 @@ struct Operator {
     engine: EngineHandle,
     robot: EmulatorHandle,
     stage: Option<StageRecord>,
-    card: Option<Proposal>,
+    proposal: Option<Proposal>,
     rows: BTreeMap<u32, TrialRecord>,
     /// True state at the approval of the trial.
     stood: Option<Truth>,
@@ -119,7 +119,7 @@ impl Operator {
         while let Some(stamped) = self.engine.next_record() {
             match stamped.record {
                 Record::Stage(stage) => self.stage = Some(stage),
-                Record::Proposal(card) => self.card = Some(card),
+                Record::Proposal(proposal) => self.proposal = Some(proposal),
                 Record::Trial(row) => drop(self.rows.insert(row.trial, row)),
                 Record::Transition(change) if matches!(change.to, Mode::Damped | Mode::Fault) => {
                     self.stops += 1;
@@ -170,9 +170,9 @@ impl Operator {
                 still.then_some(OperatorRequest::Arm)
             }
             (Mode::Ready, Some(ExperimentStage::Proposed)) => {
-                let card = self.card.as_ref()?;
+                let proposal = self.proposal.as_ref()?;
                 self.stood = self.robot.status().truth;
-                Some(OperatorRequest::Approve { trial: card.trial, revision: card.revision })
+                Some(OperatorRequest::Approve { trial: proposal.trial, revision: proposal.revision })
             }
             _ => None,
         }
@@ -211,7 +211,7 @@ fn over_the_network(seed: u32, trials: u32, late_ms: f64) -> Outcome {
         engine: engine::start(options).unwrap(),
         robot: robot.handle.clone(),
         stage: None,
-        card: None,
+        proposal: None,
         rows: BTreeMap::default(),
         stood: None,
         in_truth: BTreeMap::default(),
@@ -254,7 +254,7 @@ fn median(values: &[f64]) -> f64 {
     sorted[sorted.len() / 2]
 }
 
-fn tell(seed: u32, outcome: &Outcome) {
+fn print_outcome(seed: u32, outcome: &Outcome) {
     for row in &outcome.rows {
         let value = row.value.map_or_else(|| "     ".to_owned(), |value| format!("{value:.3}"));
         let truth = outcome.in_truth.get(&row.trial).copied().unwrap_or(f64::NAN);
@@ -315,7 +315,7 @@ fn compare(network: &[f64], simulator: &[f64]) -> f64 {
 #[test]
 fn three_trials_run_from_end_to_end() {
     let outcome = over_the_network(0, 3, 50.0);
-    tell(0, &outcome);
+    print_outcome(0, &outcome);
     let counted = outcome.rows.iter().filter(|row| matches!(row.verdict, Some(Verdict::Accept | Verdict::Fall)));
     assert_eq!(counted.count(), 3);
     assert!(outcome.link.received > 10_000, "{:?}", outcome.link);
@@ -329,7 +329,7 @@ fn a_study_in_real_time_ends_as_one_in_the_simulator() {
         (0..5).map(|seed| std::thread::spawn(move || (seed, over_the_network(seed, TRIALS, 10.0)))).collect();
     let outcomes: Vec<_> = studies.into_iter().map(|study| study.join().unwrap()).collect();
     for (seed, outcome) in &outcomes {
-        tell(*seed, outcome);
+        print_outcome(*seed, outcome);
     }
     let errors: Vec<f64> = outcomes.iter().flat_map(|(_, outcome)| measured_wrong_by(outcome)).collect();
     let most = errors.iter().copied().fold(0.0, f64::max);

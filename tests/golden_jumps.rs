@@ -106,7 +106,7 @@ fn jump(robot: &RobotDescription, config: &SimConfig, file: &File, case: &Case) 
             ..Estimate::default()
         };
         if t > start {
-            swing.observe(&truth.foot_contact);
+            swing.update(&truth.foot_contact);
         }
         let velocity_body = estimate.world_from_body.inverse_transform_vector(&estimate.velocity_world);
         let target = LegTarget {
@@ -118,8 +118,8 @@ fn jump(robot: &RobotDescription, config: &SimConfig, file: &File, case: &Case) 
             amplitudes_leg: if active { amplitudes_leg(&profile, task) } else { PerLeg::default() },
             theta_rad: std::f64::consts::PI + std::f64::consts::TAU * case.f0_hz * since.max(0.0),
         };
-        let feet = feet(&robot.leg_geometry, &state.joint_position);
-        let torque = torques(&target, &feet, &state.joint_velocity, &estimate);
+        let feet = feet(&robot.leg_geometry, &state.joint_position_rad);
+        let torque = torques(&target, &feet, &state.joint_velocity_rad_s, &estimate);
         if let Some((origin, _)) = initial {
             outcome.apex_rise_m = outcome.apex_rise_m.max(truth.position_world.z - origin.z);
             if outcome.takeoff_s.is_none() && truth.foot_contact == [false; 4] {

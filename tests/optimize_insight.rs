@@ -91,7 +91,7 @@ fn repeats_are_one_point() {
     ];
     let all = points(&trials);
     assert_eq!(all.len(), 2);
-    assert_eq!((all[0].trials.as_slice(), all[0].stood, all[0].repeats()), ([0, 2, 3].as_slice(), 2, 3));
+    assert_eq!((all[0].trials.as_slice(), all[0].without_fall, all[0].repeats()), ([0, 2, 3].as_slice(), 2, 3));
     assert!((all[0].mean() - 4.0 / 3.0).abs() < 1e-15);
     assert!((all[0].deviation().unwrap() - (7.0_f64 / 3.0).sqrt()).abs() < 1e-12);
     assert_eq!(all[1].deviation(), None);

@@ -95,7 +95,7 @@ fn python_reads_every_topic() {
         let [roll, foot_z] = [tick.estimate.roll_pitch_yaw.x, tick.estimate.foot_position_leg[3].z];
         let expected = json!([START_UTC_NS + tick.time_ns, tick.number, roll, foot_z, force, mode]);
         assert_eq!(found["ticks"][index], expected);
-        let joint = |i: usize| json!([joint_name(i), tick.state.joint_position[i], tick.state.joint_torque[i]]);
+        let joint = |i: usize| json!([joint_name(i), tick.state.joint_position_rad[i], tick.state.joint_torque_n_m[i]]);
         assert_eq!(found["joints"][index], (0..JOINTS).map(joint).collect::<Value>());
         assert_eq!(found["commands"][index], json!(tick.torque_demanded));
     }
@@ -133,7 +133,7 @@ fn frames_reach_the_feet(frames: &Value, tick: &Tick) {
             let rotation = UnitQuaternion::from_quaternion(Quaternion::new(q(3), q(0), q(1), q(2)));
             foot *= Isometry3::from_parts(Translation3::new(at(0), at(1), at(2)), rotation);
         }
-        let angles = quadfrog::robot::leg_of(&tick.state.joint_position, leg as usize);
+        let angles = quadfrog::robot::leg_of(&tick.state.joint_position_rad, leg as usize);
         let position_leg =
             RobotDescription::embedded("go1").unwrap().leg_geometry.foot(&angles, leg.side()).position_leg;
         let difference = foot.translation.vector - (description.joint_origin[0] + position_leg);

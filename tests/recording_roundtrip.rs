@@ -96,14 +96,14 @@ fn the_payload_of_a_nan_comes_back() {
     let patterns = [0x7ff0_0000_dead_beef, 0xfff8_0000_0000_0001, 0x7ff8_0000_0000_0000_u64];
     let mut tick = Tick::default();
     for (joint, pattern) in patterns.into_iter().cycle().take(12).enumerate() {
-        tick.state.joint_velocity[joint] = f64::from_bits(pattern);
-        tick.command.motor[joint].kp = f64::from_bits(pattern);
+        tick.state.joint_velocity_rad_s[joint] = f64::from_bits(pattern);
+        tick.command.motor[joint].kp_joint = f64::from_bits(pattern);
     }
     tick.theta_rad = f64::from_bits(patterns[0]);
     write(&path, &[Played::Tick(tick)]);
     let [Played::Tick(found)] = play(&path)[..] else { panic!("one tick was written") };
-    assert_eq!(found.state.joint_velocity.map(f64::to_bits), tick.state.joint_velocity.map(f64::to_bits));
-    assert_eq!(found.command.motor.map(|m| m.kp.to_bits()), tick.command.motor.map(|m| m.kp.to_bits()));
+    assert_eq!(found.state.joint_velocity_rad_s.map(f64::to_bits), tick.state.joint_velocity_rad_s.map(f64::to_bits));
+    assert_eq!(found.command.motor.map(|m| m.kp_joint.to_bits()), tick.command.motor.map(|m| m.kp_joint.to_bits()));
     assert_eq!(found.theta_rad.to_bits(), patterns[0]);
 }
 

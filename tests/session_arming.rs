@@ -11,7 +11,7 @@ use quadfrog::control::control_loop::ControlLoop;
 use quadfrog::control::settings::ControlSettings;
 use quadfrog::engine::{Options, fingerprint, open_experiment, session_info};
 use quadfrog::optimize::journal::Durability;
-use quadfrog::realtime::channel::{ScreenEnd, channels};
+use quadfrog::realtime::channel::{ConsoleEnd, channels};
 use quadfrog::realtime::clock::SimulatedClock;
 use quadfrog::realtime::thread::TickStart;
 use quadfrog::recording::record::{ArmingCheckRecord, Record, RequestRecord, Stamped};
@@ -28,7 +28,7 @@ use robots::LinkedRobot;
 /// A session and the control thread's body that share channels, on one thread and in simulated time.
 struct Session {
     supervisor: Supervisor,
-    operator: ScreenEnd,
+    operator: ConsoleEnd,
     _ticks: rtrb::Consumer<Tick>,
     body: ControlLoop,
     robot: LinkedRobot,
@@ -71,7 +71,7 @@ impl Session {
             experiment: open_experiment(&options, Durability::Buffered, "").unwrap(),
             control: session_end,
             ticks: collected,
-            sinks: RecordSinks { recorder: to_recorder, screen: to_screen },
+            sinks: RecordSinks { recorder: to_recorder, console: to_screen },
             recorder: RecorderWatch::default(),
             checklist: ArmingChecklist::new(&settings, fingerprint(&options.config), folder),
             info: session_info(&options, ""),
@@ -106,7 +106,8 @@ impl Session {
 
     fn request(&mut self, request: OperatorRequest) -> RequestRecord {
         let time_ns = self.time_ms * 1_000_000;
-        self.supervisor.carry_out(&StampedRequest { request, stops: self.operator.stop.count(), time_ns }, time_ns);
+        self.supervisor
+            .handle_request(&StampedRequest { request, stops: self.operator.stop.count(), time_ns }, time_ns);
         let mut records = self.screen.try_iter().map(|stamped| stamped.record);
         let answer = records.find_map(|record| match record {
             Record::Request(command) => Some(command),
@@ -267,7 +268,7 @@ impl Session {
 fn a_restart_during_another_fault_is_told_and_takes_the_word_back() {
     let mut session = Session::cleared();
     assert!(session.request(OperatorRequest::Arm).accepted);
-    session.robot.tamper = |state| state.joint_position[3] = 2.0;
+    session.robot.tamper = |state| state.joint_position_rad[3] = 2.0;
     session.ticks(10);
     session.robot.tamper = |_| {};
     session.ticks(10);
@@ -360,9 +361,9 @@ fn an_observer_may_stop_and_then_lets_go_of_the_robot() {
 fn an_arming_on_its_way_when_the_session_ends_energises_nothing() {
     let mut session = Session::new(Backend::Simulator, None);
     let time_ns = session.time_ms * 1_000_000;
-    session.supervisor.carry_out(&StampedRequest { request: OperatorRequest::Arm, stops: 0, time_ns }, time_ns);
+    session.supervisor.handle_request(&StampedRequest { request: OperatorRequest::Arm, stops: 0, time_ns }, time_ns);
     assert_eq!(session.supervisor.mode(), Mode::Disarmed, "of the arming nothing is heard yet");
-    session.supervisor.wind_down(true);
+    session.supervisor.end_session_step(true);
     session.supervisor.stop();
     for _ in 0..3000 {
         session.ticks(1);
@@ -375,7 +376,7 @@ fn an_arming_on_its_way_when_the_session_ends_energises_nothing() {
 fn the_end_of_a_session_that_only_observes_sends_nothing() {
     let mut session = Session::begin(Backend::Hardware, None, true);
     session.ticks(20);
-    assert!(!session.supervisor.wind_down(true));
+    assert!(!session.supervisor.end_session_step(true));
     session.supervisor.stop();
     session.ticks(100);
     assert_eq!((session.body.mode(), session.robot.writes), (Mode::Observe, 0));
@@ -388,7 +389,7 @@ fn nothing_is_done_by_itself_any_more_once_the_session_ends() {
     session.supervisor = session.supervisor.approving(Approval::Auto, true);
     session.ticks(10);
     session.supervisor.take_control();
-    session.supervisor.wind_down(true);
+    session.supervisor.end_session_step(true);
     session.ticks(3000);
     assert_eq!(session.body.mode(), Mode::Disarmed);
 }
@@ -433,7 +434,7 @@ fn any_step() -> impl Strategy<Value = Step> {
         |state| state.motor_enabled[7] = false,
         |state| state.motor_temperature_c[3] = 90.0,
         |state| state.imu.gyro_body.z = 0.5,
-        |state| state.joint_velocity[4] = f64::NAN,
+        |state| state.joint_velocity_rad_s[4] = f64::NAN,
     ];
     prop_oneof![
         3 => Just(Step::Request(wishes[0])),

@@ -45,8 +45,8 @@ fn a_void_trial_does_not_count_and_a_rerun_repeats_its_parameters() {
     let first = run(&mut experiment, TrialEnd::Stopped);
     experiment.judge(Verdict::Void, true).unwrap();
     assert_eq!(experiment.counted(), 0);
-    let card = experiment.proposal().unwrap();
-    assert_eq!((card.source, card.parent), (ProposalSource::Rerun, Some(first.trial)));
+    let proposal = experiment.proposal().unwrap();
+    assert_eq!((proposal.source, proposal.parent), (ProposalSource::Rerun, Some(first.trial)));
     assert_eq!(parameters(&experiment), before);
     let second = accept(&mut experiment);
     assert_eq!(second.jump, first.jump);
@@ -70,10 +70,10 @@ fn an_override_runs_as_the_operators_and_keeps_what_was_proposed() {
     let mut experiment = experiment(5);
     let proposed = experiment.proposal().unwrap();
     experiment.set_parameter("Fx", 120.0).unwrap();
-    let card = experiment.proposal().unwrap();
-    assert_eq!(card.source, ProposalSource::Operator);
-    assert_eq!(card.parameters[1].value, 120.0);
-    assert_eq!(card.parameters[1].proposed, proposed.parameters[1].proposed);
+    let proposal = experiment.proposal().unwrap();
+    assert_eq!(proposal.source, ProposalSource::Operator);
+    assert_eq!(proposal.parameters[1].value, 120.0);
+    assert_eq!(proposal.parameters[1].proposed, proposed.parameters[1].proposed);
     let spec = accept(&mut experiment);
     assert_eq!(spec.jump.fx_n, 120.0);
     assert_eq!(experiment.row(spec.trial).unwrap().source, ProposalSource::Operator);
@@ -102,8 +102,8 @@ fn a_verdict_can_be_undone_until_the_next_trial_begins() {
     accept(&mut experiment);
     experiment.undo().unwrap();
     experiment.judge(Verdict::Fall, false).unwrap();
-    let card = experiment.proposal().unwrap();
-    experiment.approve(card.trial, card.revision).unwrap();
+    let proposal = experiment.proposal().unwrap();
+    experiment.approve(proposal.trial, proposal.revision).unwrap();
     assert!(experiment.undo().is_err(), "the verdict was told when the next trial began");
 }
 
@@ -222,9 +222,9 @@ fn a_trial_interrupted_in_mid_jump_is_void_and_comes_again() {
     let row = experiment.row(spec.trial).unwrap();
     assert_eq!(row.verdict, Some(Verdict::Void));
     assert!(row.cause.contains("interrupted"), "{}", row.cause);
-    let card = experiment.proposal().unwrap();
-    assert_eq!((card.source, card.parent), (ProposalSource::Rerun, Some(spec.trial)));
-    let again = experiment.approve(card.trial, card.revision).unwrap();
+    let proposal = experiment.proposal().unwrap();
+    assert_eq!((proposal.source, proposal.parent), (ProposalSource::Rerun, Some(spec.trial)));
+    let again = experiment.approve(proposal.trial, proposal.revision).unwrap();
     assert_eq!((again.jump, again.seed), (spec.jump, spec.seed));
     assert!(again.trial > spec.trial);
 }
@@ -239,8 +239,8 @@ fn a_rerun_survives_every_moment_of_a_kill_and_comes_once() {
     drop(experiment);
     for _ in 0..3 {
         let experiment = open(folder.path());
-        let card = experiment.proposal().unwrap();
-        assert_eq!((card.source, card.parent), (ProposalSource::Rerun, Some(spec.trial)));
+        let proposal = experiment.proposal().unwrap();
+        assert_eq!((proposal.source, proposal.parent), (ProposalSource::Rerun, Some(spec.trial)));
         let waiting = study_in(folder.path()).waiting().count();
         assert_eq!(waiting, 1);
     }
@@ -331,8 +331,8 @@ fn a_trial_that_was_seen_running_for_too_long_is_void_and_comes_again() {
     std::thread::sleep(Duration::from_millis(20));
     ours.refresh().unwrap();
     assert_eq!(ours.row(spec.trial).unwrap().verdict, Some(Verdict::Void));
-    let card = ours.proposal().unwrap();
-    assert_eq!((card.source, card.parent), (ProposalSource::Rerun, Some(spec.trial)));
+    let proposal = ours.proposal().unwrap();
+    assert_eq!((proposal.source, proposal.parent), (ProposalSource::Rerun, Some(spec.trial)));
 }
 
 /// (A defect once: the verdict's teller did not look whether another worker had paid the debt already.)

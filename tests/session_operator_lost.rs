@@ -1,4 +1,4 @@
-//! The operator's screen falls silent in mid-jump, on a running engine: the robot lands, sits down and is damped, the trial is
+//! The operator's console falls silent in mid-jump, on a running engine: the robot lands, sits down and is damped, the trial is
 //! void with that cause, and the next session goes on with the same parameters.
 
 use std::path::Path;
@@ -116,7 +116,7 @@ fn a_lost_operator_costs_the_trial_but_nothing_else() {
     let row = screen.row(trial).unwrap().clone();
     // A silence of a second may end after the landing of a short jump; then the trial counts as it is.
     if row.suggested == Some(Verdict::Void) {
-        assert!(row.cause.contains("no heartbeat of the operator's screen"), "{}", row.cause);
+        assert!(row.cause.contains("no heartbeat of the operator's console"), "{}", row.cause);
     } else {
         assert!(row.measured.is_some(), "{row:?}");
     }

@@ -63,9 +63,9 @@ fn a_gain_is_checked_runs_in_one_trial_alone_and_stays_with_it() {
     assert!(experiment.set_gain("kd", f64::NAN).is_err());
 
     experiment.set_gain("kp", 500.0).unwrap();
-    let card = experiment.proposal().unwrap();
-    assert_eq!(card.source, ProposalSource::Operator);
-    let kp = &card.gains[0];
+    let proposal = experiment.proposal().unwrap();
+    assert_eq!(proposal.source, ProposalSource::Operator);
+    let kp = &proposal.gains[0];
     assert_eq!((kp.name.as_str(), kp.value, kp.proposed), ("kp", 500.0, 400.0));
     let spec = accept(&mut experiment);
     assert_eq!((spec.gains.kp, spec.gains.kd), (500.0, 8.0));
@@ -89,8 +89,8 @@ fn changes_of_a_card_are_taken_back_together() {
     experiment.set_gain("kp", 500.0).unwrap();
     experiment.set_parameter("Fx", 100.0).unwrap();
     experiment.clear_overrides().unwrap();
-    let card = experiment.proposal().unwrap();
-    assert_eq!((card.source, card.gains[0].value), (ProposalSource::Sampler, 400.0));
+    let proposal = experiment.proposal().unwrap();
+    assert_eq!((proposal.source, proposal.gains[0].value), (ProposalSource::Sampler, 400.0));
 }
 
 #[test]
@@ -155,7 +155,7 @@ fn bounds_are_changed_within_what_safety_allows_and_kept() {
     }
     experiment.set_parameter("Fz", 200.0).unwrap();
     experiment.narrow_bounds("Fx", 40.0, 50.0).unwrap();
-    assert_eq!(value(&experiment, "Fz"), 200.0, "what was set on the card stays");
+    assert_eq!(value(&experiment, "Fz"), 200.0, "what was set on the proposal stays");
     experiment.clear_overrides().unwrap();
     for _ in 0..6 {
         let mut experiment = open(folder.path());
@@ -176,7 +176,7 @@ fn bounds_are_changed_within_what_safety_allows_and_kept() {
     let now = search(&mut experiment);
     let fx = &now.parameters[1];
     assert_eq!((fx.low, fx.high, fx.least, fx.most), (0.0, 150.0, 0.0, 300.0));
-    assert!(value(&experiment, "Fx") <= 150.0, "a value that the bounds exclude does not stay on the card");
+    assert!(value(&experiment, "Fx") <= 150.0, "a value that the bounds exclude does not stay on the proposal");
 }
 
 /// A jump whose length is what its parameters say, plus noise of its seed.
@@ -204,9 +204,9 @@ fn the_best_of_a_finished_study_is_confirmed_beyond_its_budget() {
             break;
         }
         assert_eq!(news.search.as_ref().unwrap().confirming, Some(60 - repeats));
-        let card = experiment.proposal().unwrap();
-        assert_eq!(card.source, ProposalSource::Confirm);
-        assert!(trials.contains(&card.parent.unwrap()));
+        let proposal = experiment.proposal().unwrap();
+        assert_eq!(proposal.source, ProposalSource::Confirm);
+        assert!(trials.contains(&proposal.parent.unwrap()));
         jump(&mut experiment, 0.02);
         repeats += 1;
         // Ended and taken up again in between: that costs nothing.
@@ -219,7 +219,7 @@ fn the_best_of_a_finished_study_is_confirmed_beyond_its_budget() {
     let leader: Vec<_> = news.points.iter().filter(|point| point.confidence.is_some()).collect();
     assert_eq!(leader.len(), 1);
     assert!(leader[0].contender && leader[0].confidence.unwrap() >= 0.95 && leader[0].deviation.unwrap() > 0.0);
-    assert_eq!(leader[0].stood as usize, leader[0].trials.len());
+    assert_eq!(leader[0].without_fall as usize, leader[0].trials.len());
     assert_eq!(news.points.iter().filter(|point| point.contender).count(), 3);
     let words = news.log.iter().find(|line| line.starts_with("confirmed")).expect("it is said");
     assert!(words.contains("% confidence") && words.contains("stood"), "{words}");
@@ -278,12 +278,12 @@ fn a_proposal_comes_with_its_densities_and_what_matters() {
     several(&mut experiment, 5);
     told(&mut experiment, &mut news);
     let insight = news.insight.unwrap();
-    let card = experiment.proposal().unwrap();
-    assert_eq!(insight.trial, card.trial);
+    let proposal = experiment.proposal().unwrap();
+    assert_eq!(insight.trial, proposal.trial);
     let shares: f64 = insight.parameters.iter().filter_map(|p| p.importance).sum();
     assert!((shares - 1.0).abs() < 1e-12, "{shares}");
     let bounds: BTreeMap<&str, (f64, f64)> = support::BOUNDS.iter().map(|(n, low, high)| (*n, (*low, *high))).collect();
-    for (parameter, proposed) in insight.parameters.iter().zip(&card.parameters) {
+    for (parameter, proposed) in insight.parameters.iter().zip(&proposal.parameters) {
         assert_eq!((&parameter.name, parameter.proposed), (&proposed.name, proposed.proposed));
         let (low, high) = bounds[parameter.name.as_str()];
         assert_eq!((parameter.at[0], *parameter.at.last().unwrap()), (low, high));
@@ -368,11 +368,11 @@ fn a_point_of_another_program_beyond_the_limits_cannot_run() {
             gains.map(|kp| ("gains".to_owned(), serde_json::json!({ "kp": kp }))).into_iter().collect();
         other.enqueue(&point, &attributes).unwrap();
         experiment.refresh().unwrap();
-        let card = experiment.proposal().unwrap();
-        let refusal = experiment.approve(card.trial, card.revision).unwrap_err().to_string();
+        let proposal = experiment.proposal().unwrap();
+        let refusal = experiment.approve(proposal.trial, proposal.revision).unwrap_err().to_string();
         assert!(refusal.contains(word), "{refusal}");
         experiment.skip().unwrap();
-        let row = experiment.row(card.trial).unwrap();
+        let row = experiment.row(proposal.trial).unwrap();
         assert!(row.verdict == Some(Verdict::Void) && row.cause.contains(word), "{row:?}");
         let next = accept(&mut experiment);
         assert!(next.jump.fx_n <= 200.0 && next.jump.f0_hz > 0.0 && next.gains.kp == 400.0);
@@ -383,8 +383,11 @@ fn a_point_of_another_program_beyond_the_limits_cannot_run() {
 fn gains_that_a_queued_point_brings_are_seen_on_its_card() {
     let mut experiment = experiment(5);
     experiment.enqueue(&[("Fx".into(), 60.0), ("kp".into(), 500.0)]).unwrap();
-    let card = experiment.proposal().unwrap();
-    assert_eq!((card.gains[0].value, card.gains[0].proposed, card.source), (500.0, 400.0, ProposalSource::Queued));
+    let proposal = experiment.proposal().unwrap();
+    assert_eq!(
+        (proposal.gains[0].value, proposal.gains[0].proposed, proposal.source),
+        (500.0, 400.0, ProposalSource::Queued)
+    );
     assert_eq!(accept(&mut experiment).gains.kp, 500.0);
     let refusal = experiment.enqueue(&[("Fx".into(), 60.0), ("kp".into(), 5000.0)]).unwrap_err().to_string();
     assert!(refusal.contains("kp = 5000"), "{refusal}");

@@ -50,9 +50,9 @@ fn mean_and_deviation(values: &[f64]) -> (f64, f64) {
 fn ideal_torques_are_clamped_to_the_limits() {
     let mut simulator = floating(&SimConfig::default());
     simulator.write(&JointCommand::torques(&[100.0; 12])).unwrap();
-    assert_eq!(simulator.read().unwrap().joint_torque, go1().limits.max_torque);
+    assert_eq!(simulator.read().unwrap().joint_torque_n_m, go1().limits.max_torque);
     simulator.write(&JointCommand::torques(&[3.0; 12])).unwrap();
-    assert_eq!(simulator.read().unwrap().joint_torque, [3.0; 12]);
+    assert_eq!(simulator.read().unwrap().joint_torque_n_m, [3.0; 12]);
 }
 
 /// Damping much stiffer than inertia over step is stable and stops the motion.
@@ -79,7 +79,7 @@ fn hardware_torque_lags() {
     for tick in 1..=8 {
         simulator.write(&JointCommand::torques(&[wanted; 12])).unwrap();
         let expected = wanted * (1.0 - (-f64::from(tick) * 1e-3 / config.actuator.hardware_like.torque_lag_s).exp());
-        let found = simulator.read().unwrap().joint_torque[0];
+        let found = simulator.read().unwrap().joint_torque_n_m[0];
         assert!((found - expected).abs() < 1e-9, "{found} N m after {tick} ms where {expected} was due");
     }
 }
@@ -101,7 +101,7 @@ fn hardware_torque_falls_with_speed() {
         let mut fast = Simulator::new(&go1(), &one).unwrap();
         fast.set_state(&state);
         fast.write(&JointCommand::torques(&command)).unwrap();
-        fast.read().unwrap().joint_torque[1]
+        fast.read().unwrap().joint_torque_n_m[1]
     };
     let most = limits.max_torque[1];
     assert_eq!(torque_at(0.5, 100.0), most, "below 60 % of the no-load speed");
@@ -150,11 +150,11 @@ fn noise_has_the_configured_size() {
     let (bias, deviation) = mean_and_deviation(&gyro);
     assert!((deviation / config.sensors.gyro_noise_rad_s - 1.0).abs() < 0.1, "gyro noise {deviation}");
     assert!(bias.abs() < 5.0 * config.sensors.gyro_bias_rad_s && bias != 0.0, "gyro bias {bias}");
-    let speed: Vec<f64> = states[2000..].iter().map(|s| s.joint_velocity[4]).collect();
+    let speed: Vec<f64> = states[2000..].iter().map(|s| s.joint_velocity_rad_s[4]).collect();
     let (_, deviation) = mean_and_deviation(&speed);
     assert!((deviation / config.sensors.joint_velocity_noise_rad_s - 1.0).abs() < 0.1, "velocity noise {deviation}");
     let step = config.sensors.encoder_step_rad;
-    for q in states[5999].joint_position {
+    for q in states[5999].joint_position_rad {
         assert!((q / step - (q / step).round()).abs() < 1e-6, "{q} rad is between two encoder steps");
     }
     // The biases differ between seeds and are equal for the same seed.
@@ -182,8 +182,8 @@ fn delay_is_that_many_ticks_and_spares_the_truth() {
 fn a_motor_holds_its_position() {
     let mut simulator = floating(&SimConfig::default());
     let mut command = JointCommand::hold(&[0.0; 12], 40.0, 1.0);
-    command.motor[1].position = 1.5;
-    command.motor[2].position = -1.0;
+    command.motor[1].position_rad = 1.5;
+    command.motor[2].position_rad = -1.0;
     for _ in 0..1500 {
         simulator.write(&command).unwrap();
     }

@@ -71,7 +71,7 @@ fn a_run_repeats_bit_for_bit() {
             let torque = std::array::from_fn(|i| 15.0 * (f64::from(tick) * 0.02 + i as f64).sin());
             simulator.write(&JointCommand::torques(&torque)).unwrap();
             let state = simulator.read().unwrap();
-            bits.extend(state.joint_position.iter().chain(state.imu.accel_body.iter()).map(|x| x.to_bits()));
+            bits.extend(state.joint_position_rad.iter().chain(state.imu.accel_body.iter()).map(|x| x.to_bits()));
         }
         bits
     };

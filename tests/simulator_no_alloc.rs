@@ -34,7 +34,7 @@ fn a_step_does_not_allocate() {
                     let command = JointCommand::torques(&std::array::from_fn(|i| 25.0 * (7.0 * t + i as f64).sin()));
                     simulator.write(&command).unwrap();
                     let state = simulator.read().unwrap();
-                    assert!(state.joint_position[0].is_finite());
+                    assert!(state.joint_position_rad[0].is_finite());
                 }
             });
         }

@@ -85,7 +85,7 @@ fn every_robot_lies_stands_and_jumps() {
                 let foot = robot.leg_geometry.foot(&Vector3::new(q[i], q[i + 1], q[i + 2]), leg.side());
                 let torque = foot.jacobian_leg.tr_mul(&Vector3::new(0.0, 0.0, -150.0));
                 for (motor, torque) in push.motor[i..i + 3].iter_mut().zip(torque.iter()) {
-                    *motor = MotorCommand { torque: *torque, kd: 0.5, ..MotorCommand::default() };
+                    *motor = MotorCommand { torque_n_m: *torque, kd_joint: 0.5, ..MotorCommand::default() };
                 }
             }
             simulator.write(if tick < 100 { &push } else { &command }).unwrap();

@@ -48,7 +48,7 @@ fn a_riser_is_a_wall() {
     let (mut simulator, mut command) = stand(&config, 0);
     // The thighs swing the front feet forward against the riser.
     for leg in [Leg::FR, Leg::FL] {
-        command.motor[3 * leg as usize + 1].position -= 0.15;
+        command.motor[3 * leg as usize + 1].position_rad -= 0.15;
     }
     for _ in 0..1500 {
         simulator.write(&command).unwrap();
@@ -110,7 +110,7 @@ fn loose_blocks_move_when_kicked() {
             let mut kick = command;
             let swing = 0.4 * (f64::from(tick) * 0.02).sin();
             for leg in 0..4 {
-                kick.motor[3 * leg + 1].position += swing;
+                kick.motor[3 * leg + 1].position_rad += swing;
             }
             simulator.write(&kick).unwrap();
         }

@@ -160,7 +160,7 @@ impl Config {
             .collect()
     }
 
-    /// Returns the limits by which a screen colours its values.
+    /// Returns the limits by which a console colours its values.
     pub fn health_limits(&self) -> HealthLimits {
         let (safety, default) = (&self.safety, HealthLimits::default());
         HealthLimits {

@@ -148,7 +148,7 @@ fn fetch_next(ring: &mut rtrb::Producer<Tick>) {
     }
 }
 
-/// Time-out of the operator screen's heartbeat.
+/// Time-out of the operator console's heartbeat.
 #[derive(Default)]
 struct HeartbeatWatch {
     count: u64,

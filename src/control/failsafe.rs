@@ -3,7 +3,7 @@
 //!
 //! A fall during a trial is an outcome of the trial, detected by `running_trial::FallWatch`; it damps as well.
 
-use super::limits;
+use super::command_gate;
 use super::settings::ControlSettings;
 use crate::robot::{CONTROL_PERIOD_S, JOINTS, LinkStatus, RobotState};
 use crate::telemetry::{Estimate, FailsafeWarning, Fault, Mode, TrialInhibit};
@@ -27,7 +27,7 @@ pub struct FailsafeInputs<'a> {
     pub lateness_ns: u64,
     /// `errno` of a failed send.
     pub send_error: Option<i32>,
-    /// Time since the last heartbeat of the operator's screen, ms.
+    /// Time since the last heartbeat of the operator's console, ms.
     pub operator_silent_ms: u32,
     /// The session takes no events.
     pub events_lost: bool,
@@ -147,7 +147,7 @@ pub fn trial_inhibit(state: &RobotState, settings: &ControlSettings) -> Option<T
     })
 }
 
-/// Returns the warning that precedes a failsafe: an old state before a silent operator's screen.
+/// Returns the warning that precedes a failsafe: an old state before a silent operator's console.
 pub fn warning(inputs: &FailsafeInputs, settings: &ControlSettings) -> Option<FailsafeWarning> {
     let limits = &settings.failsafe;
     if inputs.mode.commanded() && inputs.state_age_ms > limits.state_age_warn_ms {
@@ -177,7 +177,7 @@ fn state_age(_: &Failsafe, inputs: &FailsafeInputs, settings: &ControlSettings) 
 }
 
 fn not_finite(_: &Failsafe, inputs: &FailsafeInputs, _: &ControlSettings) -> Option<Fault> {
-    limits::finite(inputs.state).err()
+    command_gate::finite(inputs.state).err()
 }
 
 fn reboot(_: &Failsafe, inputs: &FailsafeInputs, _: &ControlSettings) -> Option<Fault> {
@@ -221,7 +221,7 @@ fn motor_mode(_: &Failsafe, inputs: &FailsafeInputs, _: &ControlSettings) -> Opt
 fn joint_position(_: &Failsafe, inputs: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {
     let margin = settings.failsafe.joint_margin_rad;
     (0..JOINTS).find_map(|joint| {
-        let measured_rad = inputs.state.joint_position[joint];
+        let measured_rad = inputs.state.joint_position_rad[joint];
         let (least, most) = (settings.min_position[joint] - margin, settings.max_position[joint] + margin);
         let allowed_rad = measured_rad.clamp(least, most);
         let fault = Fault::JointPosition { joint: joint as u8, measured_rad, allowed_rad };
@@ -231,7 +231,7 @@ fn joint_position(_: &Failsafe, inputs: &FailsafeInputs, settings: &ControlSetti
 
 fn joint_velocity(_: &Failsafe, inputs: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {
     (0..JOINTS).find_map(|joint| {
-        let measured_rad_s = inputs.state.joint_velocity[joint];
+        let measured_rad_s = inputs.state.joint_velocity_rad_s[joint];
         let allowed_rad_s = settings.max_velocity[joint] * settings.failsafe.velocity_factor;
         let fault = Fault::JointVelocity { joint: joint as u8, measured_rad_s, allowed_rad_s };
         (measured_rad_s.abs() > allowed_rad_s).then_some(fault)
@@ -240,7 +240,7 @@ fn joint_velocity(_: &Failsafe, inputs: &FailsafeInputs, settings: &ControlSetti
 
 fn joint_torque(_: &Failsafe, inputs: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {
     (0..JOINTS).find_map(|joint| {
-        let measured_nm = inputs.state.joint_torque[joint];
+        let measured_nm = inputs.state.joint_torque_n_m[joint];
         let allowed_nm = settings.max_torque[joint] * settings.failsafe.torque_factor;
         let fault = Fault::JointTorque { joint: joint as u8, measured_nm, allowed_nm };
         (measured_nm.is_nan() || measured_nm.abs() > allowed_nm).then_some(fault)

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::limits::ticks_in;
+use crate::robot::ticks_in;
 use crate::robot::{LEGS, PerLeg};
 
 /// Shortest absence of all feet that counts as a flight, s; a foot may lift for a moment in stance.
@@ -19,7 +19,7 @@ pub struct SwingLegs {
 
 impl SwingLegs {
     /// Takes in the contacts of one tick. Called once per tick.
-    pub fn observe(&mut self, contact: &PerLeg<bool>) {
+    pub fn update(&mut self, contact: &PerLeg<bool>) {
         let airborne = contact.iter().all(|&down| !down);
         self.airborne = if airborne { self.airborne + 1 } else { 0 };
         if self.airborne >= ticks_in(SHORTEST_FLIGHT_S) {

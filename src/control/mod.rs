@@ -1,6 +1,7 @@
 //! The 1 kHz control cycle: pure functions and one `tick()`, without thread, file, lock or allocation.
 
 pub mod arming;
+pub mod command_gate;
 pub mod control_loop;
 pub mod cycle;
 pub mod estimator;
@@ -9,7 +10,6 @@ pub mod foot_placement;
 pub mod force_profile;
 pub mod impedance;
 pub mod leg;
-pub mod limits;
 pub mod mode;
 pub mod ramp;
 pub mod running_trial;

@@ -1,7 +1,7 @@
 //! Standing up and sitting down: a smooth ramp of joint targets from the measured pose.
 
-use super::limits::ticks_in;
 use super::settings::RampSettings;
+use crate::robot::ticks_in;
 use crate::robot::{JointCommand, Joints, RobotState};
 
 /// Progress of a ramp.
@@ -28,7 +28,7 @@ pub struct PoseRamp {
 impl PoseRamp {
     /// Starts at the measured angles.
     pub fn begin(state: &RobotState, to: &Joints, settings: &RampSettings) -> PoseRamp {
-        PoseRamp { from: state.joint_position, to: *to, settings: *settings, elapsed: 0 }
+        PoseRamp { from: state.joint_position_rad, to: *to, settings: *settings, elapsed: 0 }
     }
 
     /// Compares the measured angles with the pose.

@@ -3,8 +3,8 @@
 use super::foot_placement::{SHORTEST_FLIGHT_S, SwingLegs};
 use super::force_profile::{Oscillator, amplitudes_leg};
 use super::leg::LegTarget;
-use super::limits::ticks_in;
 use super::settings::ControlSettings;
+use crate::robot::ticks_in;
 use crate::robot::{CONTROL_PERIOD_S, LEGS, PerLeg, RobotState};
 use crate::telemetry::{Estimate, FallCause, Phase, TrialEnd, TrialSpec};
 use nalgebra::Vector3;
@@ -123,8 +123,8 @@ impl RunningTrial {
     }
 
     /// Advances phase and progress with the newest state. To be called once per tick, before `target`.
-    pub fn observe(&mut self, state: &RobotState, estimate: &Estimate, settings: &ControlSettings) -> TrialProgress {
-        if let Some(cause) = self.fall.observe(state, estimate, settings, f64::INFINITY) {
+    pub fn update(&mut self, state: &RobotState, estimate: &Estimate, settings: &ControlSettings) -> TrialProgress {
+        if let Some(cause) = self.fall.update(state, estimate, settings, f64::INFINITY) {
             return TrialProgress::Over(TrialEnd::Fell(cause));
         }
         let time_s = self.time_s();
@@ -133,7 +133,7 @@ impl RunningTrial {
         }
         let feet_down = estimate.contact.iter().filter(|&&down| down).count();
         self.flown |= feet_down > 0 && self.swing.airborne_ticks() >= ticks_in(SHORTEST_FLIGHT_S);
-        self.swing.observe(&estimate.contact);
+        self.swing.update(&estimate.contact);
         let impulse = self.theta_rad() >= std::f64::consts::PI;
         if impulse {
             self.flown = false;
@@ -181,7 +181,7 @@ pub struct FallWatch {
 
 impl FallWatch {
     /// Returns the cause of a fall; `most_rad` is a limit of the tilt beside those of a trial. To be called once per tick.
-    pub fn observe(
+    pub fn update(
         &mut self,
         state: &RobotState,
         estimate: &Estimate,

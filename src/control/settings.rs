@@ -157,9 +157,9 @@ pub struct FailsafeLimits {
     pub period_factor: f64,
     /// Ticks in a row with a longer period: CUT, unless late ticks are only counted.
     pub period_ticks: u32,
-    /// Time without a heartbeat of the operator's screen that gives a warning, ms.
+    /// Time without a heartbeat of the operator's console that gives a warning, ms.
     pub operator_warn_ms: u32,
-    /// Longest time without a heartbeat of the operator's screen, ms: LAND.
+    /// Longest time without a heartbeat of the operator's console, ms: LAND.
     pub operator_silent_ms: u32,
     /// LAND: longest time from touchdown to sitting down, s.
     pub land_s: f64,

@@ -116,7 +116,7 @@ fn drive<C: Clock>(
         }
     }
     if let Some(guard_heartbeat) = ticking.guard_heartbeat {
-        guard_heartbeat.leave();
+        guard_heartbeat.release();
     }
     ended
 }
@@ -162,8 +162,8 @@ mod tests {
     fn damped(controlled: bool, [reads, warm_ups]: [u32; 2], closes_after: u32) -> (Vec<JointCommand>, u32) {
         let description = RobotDescription::embedded("go1").unwrap();
         let settings = Config::load(None).unwrap().settings(&description, Task::Forward, Backend::Hardware).unwrap();
-        let (control, mut session, screen, _ticks) = channels();
-        screen.heartbeat.beat();
+        let (control, mut session, console, _ticks) = channels();
+        console.heartbeat.beat();
         if controlled {
             session.commands.push(Command::TakeControl).unwrap();
         }

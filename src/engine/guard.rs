@@ -102,7 +102,7 @@ impl Guard {
     }
 
     /// Kills the guard, also a stopped one; to be called after the last command.
-    pub fn dismiss(mut self) {
+    pub fn end(mut self) {
         // An error means that it has exited already.
         let _ = self.process.kill();
         let _ = self.process.wait();
@@ -120,7 +120,7 @@ impl GuardHeartbeat {
     }
 
     /// Tells the guard that the robot is not commanded any more.
-    pub fn leave(mut self) {
+    pub fn release(mut self) {
         self.send(false);
     }
 
@@ -160,7 +160,7 @@ pub fn run_guard(mut pipe: impl Read + AsFd, socket: &UdpSocket) -> Result<Guard
     pipe.read_exact(&mut silence_ms).map_err(|error| refused(&error))?;
     // The guard sends only datagrams that pass the checks of the packets.
     LowCmd::parse(&damping, CrcForm::Plain)
-        .or_else(|_| LowCmd::parse(&damping, CrcForm::Sealed))
+        .or_else(|_| LowCmd::parse(&damping, CrcForm::Transformed))
         .map_err(|rejection| refused(&rejection))?;
     let silence = PollTimeout::from(u16::from_le_bytes(silence_ms));
     let (mut timeout, mut signs) = (PollTimeout::NONE, [0; 64]);

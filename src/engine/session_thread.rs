@@ -18,7 +18,7 @@ const DAMPING_AT_THE_END: Duration = Duration::from_millis(500);
 /// Longest wait for the effect of the last STOP; the control thread acts within a millisecond.
 const LONGEST_STOP: Duration = Duration::from_secs(2);
 
-/// Runs the session until the screen drops its handle. Returns the supervisor with the session's channel ends, because a
+/// Runs the session until the console drops its handle. Returns the supervisor with the session's channel ends, because a
 /// control thread takes their loss for a crash of the session, and the guard, because the control thread commands the
 /// robot until its own end.
 pub fn run(
@@ -37,14 +37,14 @@ pub fn run(
             supervisor.take_control();
         }
         match requests.recv_timeout(SESSION_PERIOD) {
-            Ok(request) => supervisor.carry_out(&request, clock.now_ns()),
+            Ok(request) => supervisor.handle_request(&request, clock.now_ns()),
             Err(RecvTimeoutError::Timeout) => {}
             Err(RecvTimeoutError::Disconnected) => break,
         }
     }
     let begun = clock.now_ns();
     let within = |begun: u64, limit: Duration| clock.now_ns() - begun < limit.as_nanos() as u64;
-    while supervisor.wind_down(sits_down) && within(begun, LONGEST_SIT_DOWN) {
+    while supervisor.end_session_step(sits_down) && within(begun, LONGEST_SIT_DOWN) {
         std::thread::sleep(SESSION_PERIOD);
         supervisor.poll(clock.now_ns());
     }

@@ -23,7 +23,7 @@ pub struct RepeatedPoint {
     /// Values of these trials.
     pub values: Vec<f64>,
     /// k: number of trials without a fall.
-    pub stood: usize,
+    pub without_fall: usize,
 }
 
 impl RepeatedPoint {
@@ -63,7 +63,7 @@ pub fn points(trials: &[Trial]) -> Vec<RepeatedPoint> {
         let point = &mut points[index].1;
         point.trials.push(trial.number);
         point.values.push(value);
-        point.stood += usize::from(!trial.is_fall());
+        point.without_fall += usize::from(!trial.is_fall());
     }
     points.into_iter().map(|(_, point)| point).collect()
 }

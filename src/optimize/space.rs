@@ -66,7 +66,7 @@ impl Range {
 /// A named range.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Parameter {
-    /// Name, as in the journal and on the screen: `f0`, `Fx`.
+    /// Name, as in the journal and on screens: `f0`, `Fx`.
     pub name: String,
     /// Bounds and scale.
     #[serde(flatten)]

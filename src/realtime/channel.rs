@@ -10,9 +10,9 @@ use crate::telemetry::{Command, Counters, Event, Readiness, Snapshot, Tick};
 pub const COMMANDS: usize = 64;
 /// Capacity of the recorder's ring, ticks: four seconds.
 pub const TICKS: usize = 4096;
-/// Capacity of the screen's ring, decimated ticks.
+/// Capacity of the console's ring, decimated ticks.
 pub const SHOWN_TICKS: usize = 1024;
-/// Decimation of the ticks for the screen's charts.
+/// Decimation of the ticks for the console's charts.
 pub const SHOWN_EVERY: u64 = 5;
 /// Capacity of the ring of events.
 pub const EVENTS: usize = 256;
@@ -52,7 +52,7 @@ impl StopLatch {
     }
 }
 
-/// Heartbeat counter of the operator's screen.
+/// Heartbeat counter of the operator's console.
 #[derive(Debug, Clone, Default)]
 pub struct Heartbeat(Arc<AtomicU64>);
 
@@ -74,11 +74,11 @@ pub struct ControlEnd {
     pub commands: rtrb::Consumer<Command>,
     /// STOP.
     pub stop: StopLatch,
-    /// Heartbeat of the screen.
+    /// Heartbeat of the console.
     pub heartbeat: Heartbeat,
     /// Every tick, for the recorder.
     pub ticks: rtrb::Producer<Tick>,
-    /// Every n-th tick, for the screen.
+    /// Every n-th tick, for the console.
     pub shown: rtrb::Producer<Tick>,
     /// The newest tick and the counters.
     pub snapshot: triple_buffer::Input<Snapshot>,
@@ -96,7 +96,7 @@ pub struct SessionEnd {
     pub commands: rtrb::Producer<Command>,
     /// STOP, to detect one that came after an operator's request.
     pub stop: StopLatch,
-    /// Heartbeat of the screen, to detect a missing screen.
+    /// Heartbeat of the console, to detect a missing console.
     pub heartbeat: Heartbeat,
     /// The newest counters.
     pub counters: triple_buffer::Output<Counters>,
@@ -106,11 +106,11 @@ pub struct SessionEnd {
     pub events: rtrb::Consumer<Event>,
 }
 
-/// The screen's ends.
-pub struct ScreenEnd {
+/// The console's ends.
+pub struct ConsoleEnd {
     /// STOP.
     pub stop: StopLatch,
-    /// Heartbeat of this screen.
+    /// Heartbeat of this console.
     pub heartbeat: Heartbeat,
     /// Ticks for charts.
     pub shown: rtrb::Consumer<Tick>,
@@ -119,7 +119,7 @@ pub struct ScreenEnd {
 }
 
 /// Creates all channels of one engine; the last is the recorder's end.
-pub fn channels() -> (ControlEnd, SessionEnd, ScreenEnd, rtrb::Consumer<Tick>) {
+pub fn channels() -> (ControlEnd, SessionEnd, ConsoleEnd, rtrb::Consumer<Tick>) {
     let (command_in, command_out) = rtrb::RingBuffer::new(COMMANDS);
     let (tick_in, tick_out) = rtrb::RingBuffer::new(TICKS);
     let (shown_in, shown_out) = rtrb::RingBuffer::new(SHOWN_TICKS);
@@ -147,6 +147,6 @@ pub fn channels() -> (ControlEnd, SessionEnd, ScreenEnd, rtrb::Consumer<Tick>) {
         readiness: readiness_out,
         events: event_out,
     };
-    let screen = ScreenEnd { stop, heartbeat, shown: shown_out, snapshot: snapshot_out };
-    (control, session, screen, tick_out)
+    let console = ConsoleEnd { stop, heartbeat, shown: shown_out, snapshot: snapshot_out };
+    (control, session, console, tick_out)
 }

@@ -5,9 +5,9 @@
 //! fields. While it grows it is named `*.mcap.part`; only a finished one is named `*.mcap`.
 
 mod container;
+mod coordinate_frames;
 pub mod disk;
 mod error;
-mod frames;
 mod output;
 pub mod player;
 pub mod record;

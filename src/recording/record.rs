@@ -1,4 +1,4 @@
-//! Records of a session besides its ticks. The screen and the recording receive the same records, so a replay shows the
+//! Records of a session besides its ticks. The console and the recording receive the same records, so a replay shows the
 //! same screen as the live session.
 
 use crate::optimize::ask::SamplerKind;
@@ -38,7 +38,7 @@ pub enum Record {
     Log(LogRecord),
     /// Last ticks up to a fault, oldest first.
     FaultTicks(Vec<Tick>),
-    /// All arming checks. Sent to the screen twice a second while the robot is disarmed, recorded when a check changes its
+    /// All arming checks. Sent to the console twice a second while the robot is disarmed, recorded when a check changes its
     /// state.
     ArmingChecks(Vec<ArmingCheckRecord>),
     /// Searched parameters and progress of the study.
@@ -95,7 +95,7 @@ pub struct SessionInfo {
     pub gains: Vec<ParameterInfo>,
     /// The jumps that a person approves and judges.
     pub approve: Approval,
-    /// Limits by which a screen colours its values.
+    /// Limits by which a console colours its values.
     pub limits: HealthLimits,
 }
 
@@ -121,7 +121,7 @@ impl SessionInfo {
     }
 }
 
-/// Limits by which a screen colours the health of link, motors, battery and control loop. The default holds for recordings
+/// Limits by which a console colours the health of link, motors, battery and control loop. The default holds for recordings
 /// without them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HealthLimits {

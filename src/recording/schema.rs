@@ -186,7 +186,7 @@ fn counters(way: Way, ours: &mut Counters, m: &mut frog::Counters) -> Result<(),
 fn link(way: Way, ours: &mut LinkStatus, m: &mut frog::Link) -> Result<(), DecodeError> {
     way.copy(&mut ours.received, &mut m.received);
     way.copy(&mut ours.lost, &mut m.lost);
-    way.copy(&mut ours.late, &mut m.late);
+    way.copy(&mut ours.out_of_order, &mut m.late);
     way.copy(&mut ours.duplicate, &mut m.duplicate);
     way.copy(&mut ours.corrupt, &mut m.corrupt);
     way.copy(&mut ours.wrong_length, &mut m.wrong_length);

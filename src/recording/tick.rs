@@ -26,9 +26,9 @@ pub fn named_joints() -> JointStates {
 pub fn joint_states(state: &RobotState, log_time: u64, message: &mut JointStates) {
     message.timestamp = Some(timestamp(log_time));
     for (index, joint) in message.joints.iter_mut().enumerate() {
-        joint.position = Some(state.joint_position[index]);
-        joint.velocity = Some(state.joint_velocity[index]);
-        joint.effort = Some(state.joint_torque[index]);
+        joint.position = Some(state.joint_position_rad[index]);
+        joint.velocity = Some(state.joint_velocity_rad_s[index]);
+        joint.effort = Some(state.joint_torque_n_m[index]);
     }
 }
 
@@ -45,11 +45,11 @@ pub fn control_tick(tick: &Tick) -> frog::ControlTick {
 fn joint_command_fields(way: Way, tick: &mut Tick, m: &mut frog::JointCommand) -> Result<(), DecodeError> {
     type Field = fn(&mut MotorCommand) -> &mut f64;
     let fields: [(Field, &mut Vec<f64>); 5] = [
-        (|motor| &mut motor.position, &mut m.position),
-        (|motor| &mut motor.velocity, &mut m.velocity),
-        (|motor| &mut motor.kp, &mut m.kp),
-        (|motor| &mut motor.kd, &mut m.kd),
-        (|motor| &mut motor.torque, &mut m.torque),
+        (|motor| &mut motor.position_rad, &mut m.position),
+        (|motor| &mut motor.velocity_rad_s, &mut m.velocity),
+        (|motor| &mut motor.kp_joint, &mut m.kp),
+        (|motor| &mut motor.kd_joint, &mut m.kd),
+        (|motor| &mut motor.torque_n_m, &mut m.torque),
     ];
     for (field, theirs) in fields {
         let mut ours: Joints = tick.command.motor.map(|mut motor| *field(&mut motor));
@@ -100,7 +100,7 @@ fn control_tick_fields(way: Way, tick: &mut Tick, m: &mut frog::ControlTick) -> 
     vector(way, &mut state.imu.gyro_body, [&mut m.gyro_x, &mut m.gyro_y, &mut m.gyro_z]);
     vector(way, &mut state.imu.accel_body, [&mut m.acc_x, &mut m.acc_y, &mut m.acc_z]);
     let force = [&mut m.force_fr, &mut m.force_fl, &mut m.force_rr, &mut m.force_rl];
-    way.numbers(state.foot_force.each_mut(), force);
+    way.numbers(state.foot_force_n.each_mut(), force);
     way.array(&mut state.motor_temperature_c, &mut m.motor_temperature, JOINT_VALUES)?;
     let mut enabled = (0..JOINTS).map(|motor| u32::from(state.motor_enabled[motor]) << motor).sum();
     way.copy(&mut enabled, &mut m.motor_enabled);
@@ -158,9 +158,9 @@ pub fn whole(tick: &Tick) -> frog::fault_ticks::Whole {
     frog::fault_ticks::Whole {
         tick: Some(control_tick(tick)),
         command: Some(joint_command(tick)),
-        position: tick.state.joint_position.to_vec(),
-        velocity: tick.state.joint_velocity.to_vec(),
-        torque: tick.state.joint_torque.to_vec(),
+        position: tick.state.joint_position_rad.to_vec(),
+        velocity: tick.state.joint_velocity_rad_s.to_vec(),
+        torque: tick.state.joint_torque_n_m.to_vec(),
     }
 }
 
@@ -179,9 +179,9 @@ fn joined(
     let mut tick = Tick::default();
     control_tick_fields(Way::Decode, &mut tick, control)?;
     joint_command_fields(Way::Decode, &mut tick, command)?;
-    Way::Decode.array(&mut tick.state.joint_position, &mut position, JOINT_VALUES)?;
-    Way::Decode.array(&mut tick.state.joint_velocity, &mut velocity, JOINT_VALUES)?;
-    Way::Decode.array(&mut tick.state.joint_torque, &mut torque, JOINT_VALUES)?;
+    Way::Decode.array(&mut tick.state.joint_position_rad, &mut position, JOINT_VALUES)?;
+    Way::Decode.array(&mut tick.state.joint_velocity_rad_s, &mut velocity, JOINT_VALUES)?;
+    Way::Decode.array(&mut tick.state.joint_torque_n_m, &mut torque, JOINT_VALUES)?;
     Ok(tick)
 }
 

@@ -105,7 +105,7 @@ pub fn points(way: Way, ours: &mut Vec<PointRecord>, m: &mut frog::Points) -> Do
 fn point(way: Way, ours: &mut PointRecord, m: &mut frog::points::Point) -> Done {
     way.values(&mut ours.parameters, &mut m.parameters);
     way.copy(&mut ours.trials, &mut m.trials);
-    way.copy(&mut ours.stood, &mut m.stood);
+    way.copy(&mut ours.without_fall, &mut m.stood);
     way.number(&mut ours.mean, &mut m.mean);
     way.copy(&mut ours.deviation, &mut m.deviation);
     way.copy(&mut ours.contender, &mut m.contender);

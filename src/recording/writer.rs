@@ -12,7 +12,7 @@ pub use super::output::Sink;
 use super::output::{Output, with_suffix};
 use super::record::{Record, SessionInfo, Stamped};
 use super::topic::Topic;
-use super::{frames, frog, tick};
+use super::{coordinate_frames, frog, tick};
 use crate::robot::description::RobotDescription;
 use crate::telemetry::{Mode, Tick};
 
@@ -131,9 +131,14 @@ impl Writer {
         let period = tick.time_ns / FRAMES_PERIOD_NS;
         if self.last_frames != Some(period) {
             self.last_frames = Some(period);
-            self.out.message(Topic::Pose, sequence, log_time, &frames::pose(tick, log_time))?;
+            self.out.message(Topic::Pose, sequence, log_time, &coordinate_frames::pose(tick, log_time))?;
             if let Some(robot) = &self.robot {
-                self.out.message(Topic::Tf, sequence, log_time, &frames::transforms(tick, robot, log_time))?;
+                self.out.message(
+                    Topic::Tf,
+                    sequence,
+                    log_time,
+                    &coordinate_frames::transforms(tick, robot, log_time),
+                )?;
             }
         }
         self.ticks += 1;

@@ -25,6 +25,11 @@ pub type Joints = [f64; JOINTS];
 /// One number per leg, FR, FL, RR, RL.
 pub type PerLeg<T> = [T; LEGS];
 
+/// Returns the number of control cycles in `seconds`, rounded.
+pub fn ticks_in(seconds: f64) -> u32 {
+    (seconds / CONTROL_PERIOD_S).round() as u32
+}
+
 /// A leg; the discriminant is its index, the variant's name that of URDF links.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, strum::IntoStaticStr)]
 pub enum Leg {
@@ -131,15 +136,15 @@ pub struct RobotState {
     /// Clock of the robot, ms since its boot; it decreases when the robot has rebooted.
     pub robot_time_ms: u32,
     /// Joint angles, rad.
-    pub joint_position: Joints,
+    pub joint_position_rad: Joints,
     /// Joint velocities, rad/s.
-    pub joint_velocity: Joints,
+    pub joint_velocity_rad_s: Joints,
     /// Joint torques as the motors estimate them, N m.
-    pub joint_torque: Joints,
+    pub joint_torque_n_m: Joints,
     /// Inertial unit.
     pub imu: Imu,
     /// Normal force at each foot sensor, N.
-    pub foot_force: PerLeg<f64>,
+    pub foot_force_n: PerLeg<f64>,
     /// Motor temperatures, degrees Celsius.
     pub motor_temperature_c: Joints,
     /// Whether each motor follows commands: it reports servo mode, or commands have not been sent for long enough to change it.
@@ -162,22 +167,22 @@ pub fn robot_time_passed(now_ms: u32, before_ms: u32) -> i32 {
 /// velocity = 0` is damping.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct MotorCommand {
-    /// Desired angle, rad; ignored while `kp` is zero.
-    pub position: f64,
-    /// Desired velocity, rad/s; ignored while `kd` is zero.
-    pub velocity: f64,
+    /// Desired angle, rad; ignored while `kp_joint` is zero.
+    pub position_rad: f64,
+    /// Desired velocity, rad/s; ignored while `kd_joint` is zero.
+    pub velocity_rad_s: f64,
     /// Stiffness, N m/rad.
-    pub kp: f64,
+    pub kp_joint: f64,
     /// Damping, N m s/rad.
-    pub kd: f64,
+    pub kd_joint: f64,
     /// Feed-forward torque, N m.
-    pub torque: f64,
+    pub torque_n_m: f64,
 }
 
 impl MotorCommand {
     /// Returns the torque of the motor's control law at joint angle `q` and velocity `dq`, N m.
     pub fn torque_at(&self, q: f64, dq: f64) -> f64 {
-        self.torque + self.kp * (self.position - q) + self.kd * (self.velocity - dq)
+        self.torque_n_m + self.kp_joint * (self.position_rad - q) + self.kd_joint * (self.velocity_rad_s - dq)
     }
 }
 
@@ -191,17 +196,24 @@ pub struct JointCommand {
 impl JointCommand {
     /// Damps every joint with gain `kd` (N m s/rad): the safe command, which only dissipates energy.
     pub fn damping(kd: f64) -> Self {
-        JointCommand { motor: [MotorCommand { kd, ..MotorCommand::default() }; JOINTS] }
+        JointCommand { motor: [MotorCommand { kd_joint: kd, ..MotorCommand::default() }; JOINTS] }
     }
 
     /// Commands torques alone, N m.
     pub fn torques(torque: &Joints) -> Self {
-        JointCommand { motor: torque.map(|torque| MotorCommand { torque, ..MotorCommand::default() }) }
+        JointCommand { motor: torque.map(|torque| MotorCommand { torque_n_m: torque, ..MotorCommand::default() }) }
     }
 
     /// Holds the joint angles `position` (rad) at rest with stiffness `kp` (N m/rad) and damping `kd` (N m s/rad).
     pub fn hold(position: &Joints, kp: f64, kd: f64) -> Self {
-        JointCommand { motor: position.map(|position| MotorCommand { position, kp, kd, ..MotorCommand::default() }) }
+        JointCommand {
+            motor: position.map(|position| MotorCommand {
+                position_rad: position,
+                kp_joint: kp,
+                kd_joint: kd,
+                ..MotorCommand::default()
+            }),
+        }
     }
 }
 
@@ -234,7 +246,7 @@ pub struct LinkStatus {
     /// Lost states, from gaps in the robot's clock; a state that arrives late is no longer counted.
     pub lost: u64,
     /// Valid states that were older than the newest one (overtaken).
-    pub late: u64,
+    pub out_of_order: u64,
     /// Valid states with the time of an earlier one: duplicated datagrams, or a robot whose clock stands still.
     pub duplicate: u64,
     /// Datagrams with a wrong checksum.

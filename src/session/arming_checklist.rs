@@ -212,7 +212,7 @@ impl ArmingChecklist {
 }
 
 /// Returns all failing checks; none if arming is allowed.
-pub fn objections(list: &[ArmingCheckRecord]) -> Option<String> {
+pub fn refusals(list: &[ArmingCheckRecord]) -> Option<String> {
     let open: Vec<String> = list
         .iter()
         .filter(|item| !item.state.allows())

@@ -37,7 +37,7 @@ pub fn run_watched<R: Robot>(
 ) -> Result<(), RequestRefusal> {
     let mut voids = 0;
     loop {
-        // There is neither a screen nor a recording of them.
+        // There is neither a console nor a recording of them.
         experiment.take_records();
         let Some(proposal) = experiment.proposal().filter(|_| experiment.stage() == ExperimentStage::Proposed) else {
             // The pending verdict must be reported before this worker waits: the others wait for it.
@@ -54,7 +54,7 @@ pub fn run_watched<R: Robot>(
             }
             continue;
         };
-        if experiment.objection().is_some() {
+        if experiment.refusal().is_some() {
             // Another program has queued a point outside the limits: it is void with this cause.
             experiment.skip()?;
             continue;

@@ -2,9 +2,9 @@
 //! seed.
 
 use crate::control::cycle::{Cycle, TickInputs};
-use crate::control::limits::ticks_in;
 use crate::control::settings::ControlSettings;
 use crate::realtime::clock::SimulatedClock;
+use crate::robot::ticks_in;
 use crate::robot::{CONTROL_PERIOD_S, Placement, Robot};
 use crate::telemetry::{Command, Event, Fault, Permit, Tick, TrialEnd, TrialSpec};
 

@@ -55,8 +55,8 @@ impl Actuator {
             // A saturated torque does not depend on velocity. Otherwise kp (q_d - q) + kd (dq_d - dq) is evaluated at
             // the end of the step, where q has moved by h dq: its slope in dq is -(kd + h kp).
             if wanted.abs() < most {
-                drive.damping[i] = motor.kd + h * motor.kp;
-                drive.torque[i] -= h * motor.kp * dq[i];
+                drive.damping[i] = motor.kd_joint + h * motor.kp_joint;
+                drive.torque[i] -= h * motor.kp_joint * dq[i];
             }
         }
         self.torque = drive.torque;

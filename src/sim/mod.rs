@@ -149,15 +149,15 @@ impl Simulator {
         let state = &self.state;
         let exact = RobotState {
             robot_time_ms: self.ticks,
-            joint_position: state.joint_position,
-            joint_velocity: state.joint_velocity,
-            joint_torque: *self.actuator.torque(),
+            joint_position_rad: state.joint_position,
+            joint_velocity_rad_s: state.joint_velocity,
+            joint_torque_n_m: *self.actuator.torque(),
             imu: Imu {
                 world_from_body: state.world_from_body,
                 gyro_body: state.angular_velocity_body,
                 accel_body: self.specific_force_body,
             },
-            foot_force: self.contacts.foot_normal_impulse.map(|impulse| impulse / CONTROL_PERIOD_S),
+            foot_force_n: self.contacts.foot_normal_impulse.map(|impulse| impulse / CONTROL_PERIOD_S),
             motor_enabled: [true; JOINTS],
             truth: Some(self.truth()),
             ..RobotState::default()

@@ -77,13 +77,13 @@ impl Sensors {
         let share = 1.0 / ORIENTATION_DRIFT_MS;
         self.tilt = self.tilt * (1.0 - share) + self.normal(config.orientation_noise_rad * (2.0 * share).sqrt());
         state.imu.world_from_body *= UnitQuaternion::from_scaled_axis(self.tilt);
-        for q in &mut state.joint_position {
+        for q in &mut state.joint_position_rad {
             *q = rounded(*q, config.encoder_step_rad);
         }
-        for dq in &mut state.joint_velocity {
+        for dq in &mut state.joint_velocity_rad_s {
             *dq += self.sample(config.joint_velocity_noise_rad_s);
         }
-        for force in &mut state.foot_force {
+        for force in &mut state.foot_force_n {
             let noisy = *force + self.sample(config.foot_force_noise_n);
             *force = rounded(noisy.max(0.0), config.foot_force_step_n);
         }

@@ -58,7 +58,7 @@ impl ArmingCheck {
     /// All values in order.
     pub const ALL: &'static [ArmingCheck] = Self::VARIANTS;
 
-    /// Name on the screen and in files.
+    /// Name on screens and in files.
     pub fn name(self) -> &'static str {
         self.into()
     }
@@ -89,7 +89,7 @@ impl ArmingCheckState {
     /// All values in order.
     pub const ALL: &'static [ArmingCheckState] = Self::VARIANTS;
 
-    /// Name on the screen and in files.
+    /// Name on screens and in files.
     pub fn name(self) -> &'static str {
         self.into()
     }

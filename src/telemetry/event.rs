@@ -52,7 +52,7 @@ pub enum CommandRefusal {
     #[error("the key press is {age_s:.0} s old, limit {allowed_s:.0} s; check the robot and press again")]
     Expired { age_s: f64, allowed_s: f64 },
     /// `silent_ms` is `u32::MAX` before the first heartbeat.
-    #[error("{}", if *.silent_ms == u32::MAX { "no heartbeat of the operator's screen yet; wait for the first".to_owned() } else { format!("no heartbeat of the operator's screen for {silent_ms} ms, limit {allowed_ms} ms; check its connection") })]
+    #[error("{}", if *.silent_ms == u32::MAX { "no heartbeat of the operator's console yet; wait for the first".to_owned() } else { format!("no heartbeat of the operator's console for {silent_ms} ms, limit {allowed_ms} ms; check its connection") })]
     OperatorSilent { silent_ms: u32, allowed_ms: u32 },
     #[error("the session is ending")]
     Leaving,

@@ -51,7 +51,7 @@ pub enum Fault {
     /// Standing up or sitting down; the error is the largest of a joint.
     #[error("pose not reached in time: joint error {error_rad:.3} rad")]
     PoseTimeout { error_rad: f64 },
-    #[error("operator lost: no heartbeat of the operator's screen for {silent_ms} ms")]
+    #[error("operator lost: no heartbeat of the operator's console for {silent_ms} ms")]
     OperatorLost { silent_ms: u32 },
     /// Also when the session's terminal was lost.
     #[error("operator lost: the session ended before the robot had landed")]
@@ -94,7 +94,7 @@ pub enum TrialInhibit {
 pub enum FailsafeWarning {
     #[error("no state from the robot for {age_ms} ms, usually at most {allowed_ms} ms")]
     StateAge { age_ms: u32, allowed_ms: u32 },
-    #[error("no heartbeat of the operator's screen for {silent_ms} ms, usually at most {allowed_ms} ms")]
+    #[error("no heartbeat of the operator's console for {silent_ms} ms, usually at most {allowed_ms} ms")]
     OperatorQuiet { silent_ms: u32, allowed_ms: u32 },
 }
 

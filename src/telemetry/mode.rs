@@ -42,7 +42,7 @@ impl Mode {
     /// All values in order.
     pub const ALL: &'static [Mode] = Self::VARIANTS;
 
-    /// Name on the screen and in files.
+    /// Name on screens and in files.
     pub fn name(self) -> &'static str {
         self.into()
     }
@@ -80,7 +80,7 @@ impl Phase {
     /// All values in order.
     pub const ALL: &'static [Phase] = Self::VARIANTS;
 
-    /// Name on the screen and in files.
+    /// Name on screens and in files.
     pub fn name(self) -> &'static str {
         self.into()
     }
@@ -110,7 +110,7 @@ impl std::fmt::Display for TransitionCause {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             TransitionCause::Stop => write!(f, "STOP"),
-            TransitionCause::Command => write!(f, "operator"),
+            TransitionCause::Command => write!(f, "request"),
             TransitionCause::StepFinished => write!(f, "done"),
             TransitionCause::Connected => write!(f, "the robot answers"),
             TransitionCause::Fell(cause) => write!(f, "fell: {cause}"),

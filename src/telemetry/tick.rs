@@ -77,7 +77,7 @@ pub struct Counters {
     pub worst_lateness_ns: u64,
     /// Ticks lost because the recorder's ring was full.
     pub ticks_not_recorded: u64,
-    /// Ticks lost because the screen's ring was full.
+    /// Ticks lost because the console's ring was full.
     pub ticks_not_shown: u64,
     /// Refused commands.
     pub commands_refused: u64,
@@ -87,7 +87,7 @@ pub struct Counters {
     pub link: Option<LinkStatus>,
 }
 
-/// The newest tick and the counters, for the screen.
+/// The newest tick and the counters, for the console.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Snapshot {
     /// The newest tick.

@@ -48,7 +48,7 @@ impl RecordingRobot {
                 kept.lock().unwrap().push(datagram[..length].to_vec());
                 state.robot_time_ms += 1;
                 let mut answer = low_state(&state, 1.0);
-                answer.seal();
+                answer.write_crc();
                 // Fails if the sender was killed.
                 let _ = socket.send_to(answer.bytes(), from);
             }

@@ -248,7 +248,7 @@ fn an_observer_and_a_replay_send_nothing() {
     observer.record(Record::Proposal(proposal(0, 0)));
     observer.stage(ExperimentStage::Proposed, 0);
     let mut replay = Console::proposed();
-    replay.tell(Msg::Replay(quadfrog_console::message::ReplayStatus {
+    replay.update(Msg::Replay(quadfrog_console::message::ReplayStatus {
         playing: true,
         speed: 1.0,
         time_ns: 0,
@@ -307,11 +307,11 @@ fn the_palette_gives_reasons_and_never_moves_the_robot_with_enter() {
 #[test]
 fn pasted_text_is_never_read_as_keys() {
     let mut console = Console::ready();
-    assert_eq!(console.tell(Msg::Paste("ggA q".into())), []);
+    assert_eq!(console.update(Msg::Paste("ggA q".into())), []);
     assert!(console.model.dialog.is_none());
     let mut console = Console::review(Mode::Review, Verdict::Accept);
     console.press(&["m"]);
-    console.tell(Msg::Paste("slid on the mat\n".into()));
+    console.update(Msg::Paste("slid on the mat\n".into()));
     let sent = console.requests(&["Enter"]);
     assert_eq!(sent, [OperatorRequest::Note { trial: 0, text: "slid on the mat".into() }]);
 }
@@ -333,7 +333,7 @@ fn numbers_and_tab_change_the_view() {
 fn suspending_is_refused_while_the_robot_is_armed() {
     assert_eq!(Console::proposed().press(&["Ctrl-Z"]), [Effect::Suspend]);
     let mut console = Console::ready();
-    assert_eq!(console.tell(Msg::Suspend), []);
+    assert_eq!(console.update(Msg::Suspend), []);
     assert!(console.said().contains("the robot is armed; D sits it down"), "{}", console.said());
 }
 
@@ -344,7 +344,7 @@ fn suspending_is_refused_while_anything_is_sent_to_a_real_robot() {
         let mut console = Console::proposed();
         console.record(Record::Session(SessionInfo { backend: Some(Backend::Hardware), ..session() }));
         console.mode(mode);
-        let suspends = console.tell(Msg::Suspend) == [Effect::Suspend];
+        let suspends = console.update(Msg::Suspend) == [Effect::Suspend];
         assert_eq!(suspends, matches!(mode, Mode::Offline | Mode::Observe), "{mode:?}: {}", console.said());
         assert!(suspends || console.said().contains("sends the robot nothing, not even damping"), "{}", console.said());
     }
@@ -429,7 +429,7 @@ fn settings_out_of_range_are_refused_by_name() {
 #[test]
 fn a_terminal_too_small_for_the_card_neither_approves_nor_arms() {
     let mut console = Console::ready();
-    console.tell(Msg::Resize(60, 15));
+    console.update(Msg::Resize(60, 15));
     console.press(&["g"]);
     console.wait(1000);
     assert_eq!(console.requests(&["g"]), []);

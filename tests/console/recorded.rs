@@ -33,8 +33,8 @@ fn console(colours: Colours, glyphs: Glyphs) -> Console {
     console.model.robot = Some(robot);
     let mut feed = Feed::replay(player);
     // One hour, longer than the recording.
-    for msg in feed.take(3_600_000_000_000) {
-        console.tell(msg);
+    for msg in feed.poll(3_600_000_000_000) {
+        console.update(msg);
     }
     console
 }

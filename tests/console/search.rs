@@ -241,7 +241,7 @@ fn repeats_are_shown_as_k_of_n_with_their_spread() {
     let point = |trials: Vec<u32>, stood, mean, deviation, confidence| PointRecord {
         parameters: vec![("f0".into(), 1.25)].into(),
         trials,
-        stood,
+        without_fall: stood,
         mean,
         deviation,
         contender: true,
@@ -330,7 +330,7 @@ fn arming_shows_every_check_that_fails_and_takes_the_operators_confirmation() {
     ]);
     assert_eq!(console.next_step(), "Not ready to arm: 3 checks have not passed. P shows them.");
     let mut resumed = on_hardware(vec![fresh()]);
-    resumed.tell(Msg::Resumed);
+    resumed.update(Msg::Resumed);
     assert_eq!(resumed.next_step(), "Checking the robot.");
     assert_eq!(resumed.press(&["A"]), [], "what was checked before the program was stopped is old");
     assert_eq!(console.press(&["A"]), [], "nothing is armed");
@@ -397,7 +397,7 @@ fn the_frame_says_how_link_battery_and_the_hottest_motor_are_at_every_size() {
         ..LinkStatus::default()
     };
     let counters = Counters { link: Some(link), ..Counters::default() };
-    console.tell(Msg::Snapshot(Box::new(Snapshot { tick: newest, counters })));
+    console.update(Msg::Snapshot(Box::new(Snapshot { tick: newest, counters })));
     for (columns, rows) in [(80, 24), (120, 40), (200, 60)] {
         for view in View::VARIANTS.iter().copied() {
             console.model.view = view;
@@ -426,7 +426,7 @@ fn health_is_coloured_by_the_limits_of_the_session() {
     newest.state.battery = Some(Battery { charge_percent: 87.0, voltage_v: 24.1, current_a: -2.0, cell_v: [3.4; 10] });
     let link = LinkStatus { state_age_ms: 8, rate_hz: 998, recent_received: 5_000, ..LinkStatus::default() };
     let counters = Counters { link: Some(link), ..Counters::default() };
-    console.tell(Msg::Snapshot(Box::new(Snapshot { tick: newest, counters })));
+    console.update(Msg::Snapshot(Box::new(Snapshot { tick: newest, counters })));
     console.model.view = View::Health;
     let mut marked = |limits: HealthLimits| {
         console.record(Record::Session(SessionInfo { backend: Some(Backend::Hardware), limits, ..session() }));
@@ -454,14 +454,14 @@ fn health_says_what_the_recorder_writes_and_why_it_stopped() {
     console.press(&["5"]);
     let newest = Tick { mode: Mode::Disarmed, ..tick(10_000, 0.0, None) };
     let counters = Counters { ticks_not_recorded: 12, ..Counters::default() };
-    console.tell(Msg::Snapshot(Box::new(Snapshot { tick: newest, counters })));
-    console.tell(Msg::Recorder(RecorderStatus { bytes: 4_000_000, ticks: 10_000, ..RecorderStatus::default() }));
+    console.update(Msg::Snapshot(Box::new(Snapshot { tick: newest, counters })));
+    console.update(Msg::Recorder(RecorderStatus { bytes: 4_000_000, ticks: 10_000, ..RecorderStatus::default() }));
     let disk = item(ArmingCheck::Disk, ArmingCheckState::Failed, "812 MB", "at least 1000 MB");
     console.record(Record::ArmingChecks(vec![disk]));
     let screen = console.screen(120, 40);
     assert_shows(&screen, &["4.0 MB, 400 kB/s, 10000 ticks", "812 MB !", "12 ticks !"]);
     let error = Some("no space left on device".to_owned());
-    console.tell(Msg::Recorder(RecorderStatus { error, ..RecorderStatus::default() }));
+    console.update(Msg::Recorder(RecorderStatus { error, ..RecorderStatus::default() }));
     assert!(console.screen(120, 40).contains("no space left on device !"));
 }
 

@@ -135,10 +135,10 @@ fn joints_contact_and_wireframe_are_there_at_every_size() {
         let robot = quadfrog::robot::description::RobotDescription::embedded("go1").expect("the robot");
         console.model.robot = Some(robot);
         let mut newest = tick(9_000, 0.0, None);
-        newest.state.joint_torque[1] = -20.0;
+        newest.state.joint_torque_n_m[1] = -20.0;
         newest.limited = 0b10;
         newest.estimate.contact = [true, false, true, false];
-        console.tell(Msg::Snapshot(Box::new(Snapshot { tick: newest, ..console.model.snapshot })));
+        console.update(Msg::Snapshot(Box::new(Snapshot { tick: newest, ..console.model.snapshot })));
         console.press(&["t", "t"]);
         let screen = console.screen(columns, rows);
         assert!(screen.contains("FR● FL○ RR● RL○"), "{screen}");
@@ -336,7 +336,7 @@ fn a_row_is_copied_and_the_table_is_written_as_shown() {
 #[test]
 fn a_rewound_replay_starts_from_an_empty_session() {
     let mut console = Console::review(Mode::Damped, Verdict::Fall);
-    console.tell(Msg::Rewound);
+    console.update(Msg::Rewound);
     assert_eq!(format!("{:?}", console.model.session), format!("{:?}", SessionModel::default()));
 }
 
@@ -352,9 +352,9 @@ fn csv_cells_with_commas_and_quotes_are_quoted() {
 #[test]
 fn the_mouse_is_off_until_it_is_asked_for_and_never_commands() {
     let mut console = twelve();
-    console.tell(Msg::Resize(80, 24));
+    console.update(Msg::Resize(80, 24));
     let click = |column, row| Msg::Mouse(Mouse::Click { column, row });
-    console.tell(click(2, 2));
+    console.update(click(2, 2));
     assert_eq!(console.model.view, View::Trials, "off");
     assert_eq!(console.press(&["M"]), [Effect::Mouse(true)]);
     // Tabs.
@@ -362,7 +362,7 @@ fn the_mouse_is_off_until_it_is_asked_for_and_never_commands() {
     for (view, name) in View::VARIANTS.iter().copied().zip(["Live", "Trials", "Optimizer", "Override", "Health", "Log"])
     {
         let column = tabs.find(name).expect(name) as u16;
-        assert_eq!(console.tell(click(column, 2)), []);
+        assert_eq!(console.update(click(column, 2)), []);
         assert_eq!(console.model.view, view);
     }
     // Rows of the table, as they stand on the screen.
@@ -373,14 +373,14 @@ fn the_mouse_is_off_until_it_is_asked_for_and_never_commands() {
             .lines()
             .position(|line| line.get(1..).is_some_and(|line| line.starts_with(&format!("{number:>3} "))))
             .expect("its row");
-        console.tell(click(10, row as u16));
+        console.update(click(10, row as u16));
         assert_eq!(console.model.selected_trial().map(|trial| trial.trial), Some(number));
     }
     // The wheel.
     console.press(&["Home"]);
-    console.tell(Msg::Mouse(Mouse::WheelDown));
+    console.update(Msg::Mouse(Mouse::WheelDown));
     assert_eq!(console.model.trial_table.selected, Some(3));
-    console.tell(Msg::Mouse(Mouse::WheelUp));
+    console.update(Msg::Mouse(Mouse::WheelUp));
     assert_eq!(console.model.trial_table.selected, Some(0));
     // Wherever it is clicked, in whatever mode: nothing leaves for the robot.
     for &mode in Mode::ALL {
@@ -389,7 +389,7 @@ fn the_mouse_is_off_until_it_is_asked_for_and_never_commands() {
             console.press(&[key]);
             for row in 0..24 {
                 for column in (0..80).step_by(4) {
-                    assert_eq!(console.tell(click(column, row)), [], "{mode:?} at {column}, {row}");
+                    assert_eq!(console.update(click(column, row)), [], "{mode:?} at {column}, {row}");
                 }
             }
         }
@@ -401,7 +401,7 @@ fn the_mouse_is_off_until_it_is_asked_for_and_never_commands() {
 fn the_mouse_leaves_dialogs_alone() {
     let mut console = Console::ready();
     console.press(&["M", "g"]);
-    console.tell(Msg::Mouse(Mouse::Click { column: 2, row: 2 }));
+    console.update(Msg::Mouse(Mouse::Click { column: 2, row: 2 }));
     assert!(matches!(console.model.dialog, Some(Dialog::Approve { .. })));
 }
 
@@ -459,15 +459,15 @@ impl Played {
 
     /// Lets time pass.
     fn wait(&mut self, milliseconds: u64) {
-        for msg in self.feed.take(milliseconds * 1_000_000) {
-            self.console.tell(msg);
+        for msg in self.feed.poll(milliseconds * 1_000_000) {
+            self.console.update(msg);
         }
     }
 
     fn press(&mut self, key: &str) {
         for effect in self.console.press(&[key]) {
             let Effect::Replay(command) = effect else { panic!("{key}: {effect:?}") };
-            self.feed.command(command);
+            self.feed.control_replay(command);
         }
         self.wait(0);
     }

@@ -5,7 +5,7 @@ use quadfrog::config::Config;
 use quadfrog::control::control_loop::ControlLoop;
 use quadfrog::control::cycle::{Cycle, TickInputs};
 use quadfrog::control::settings::ControlSettings;
-use quadfrog::realtime::channel::{ScreenEnd, SessionEnd, channels};
+use quadfrog::realtime::channel::{ConsoleEnd, SessionEnd, channels};
 use quadfrog::realtime::clock::{MonotonicClock, SimulatedClock};
 use quadfrog::realtime::thread::TickStart;
 use quadfrog::robot::description::RobotDescription;
@@ -221,14 +221,14 @@ pub struct LoopBench<R> {
     pub config: Config,
     pub body: ControlLoop,
     pub session: SessionEnd,
-    pub screen: ScreenEnd,
+    pub screen: ConsoleEnd,
     pub recorder: rtrb::Consumer<Tick>,
     pub robot: R,
     clock: MonotonicClock,
     pub time_ms: u64,
     mode_changes: u64,
     pub seen: std::collections::BTreeSet<&'static str>,
-    /// Whether the operator's screen sends heartbeats.
+    /// Whether the operator's console sends heartbeats.
     pub beats: bool,
     /// Calls the body of a tick.
     guard: fn(&mut dyn FnMut()),

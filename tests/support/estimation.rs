@@ -89,15 +89,16 @@ impl Imperfect {
 
     fn look(&mut self) {
         let mut state = self.robot.read().unwrap();
-        for (q, zero) in state.joint_position.iter_mut().zip(&self.joint_zero) {
+        for (q, zero) in state.joint_position_rad.iter_mut().zip(&self.joint_zero) {
             *q += zero;
         }
-        for (lagging, dq) in self.joint_velocity.iter_mut().zip(&mut state.joint_velocity) {
+        for (lagging, dq) in self.joint_velocity.iter_mut().zip(&mut state.joint_velocity_rad_s) {
             *lagging += (*dq - *lagging) * (1.0 - (-1.0_f64 / 3.0).exp());
             *dq = *lagging;
         }
         state.imu.accel_body = (state.imu.accel_body * self.accel_scale).map(|a| a.clamp(-80.0, 80.0));
-        for (force, (gain, offset)) in state.foot_force.iter_mut().zip(self.force_gain.iter().zip(&self.force_offset)) {
+        for (force, (gain, offset)) in state.foot_force_n.iter_mut().zip(self.force_gain.iter().zip(&self.force_offset))
+        {
             *force = *force * gain + offset;
         }
         self.reported = state;
@@ -220,7 +221,7 @@ pub fn in_truth(ticks: &[Tick], settings: &ControlSettings) -> Vec<Tick> {
     let settings = ControlSettings { objective: ObjectiveSource::Truth, ..*settings };
     let mut estimator = Estimator::default();
     let believed = ticks.iter().map(|tick| {
-        let feet = feet(&settings.geometry, &tick.state.joint_position);
+        let feet = feet(&settings.geometry, &tick.state.joint_position_rad);
         Tick { estimate: *estimator.update(&tick.state, &feet, &settings), ..*tick }
     });
     believed.collect()

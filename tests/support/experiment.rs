@@ -92,8 +92,8 @@ pub fn ticks(trial: u32, dx_m: f64) -> Vec<Tick> {
 }
 
 pub fn approve(experiment: &mut Experiment) -> TrialSpec {
-    let card = experiment.proposal().expect("a proposal");
-    experiment.approve(card.trial, card.revision).unwrap()
+    let proposal = experiment.proposal().expect("a proposal");
+    experiment.approve(proposal.trial, proposal.revision).unwrap()
 }
 
 /// Approves the proposal and ends its trial with `end`, up to the review.

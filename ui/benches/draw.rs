@@ -58,7 +58,7 @@ fn main() {
         console.record(Record::Trial(trial(number, Some(Verdict::ALL[number as usize % 3]), None)));
     }
     for time_ms in (0..60_000).step_by(5) {
-        console.tell(Msg::Tick(Box::new(sample(time_ms))));
+        console.update(Msg::Tick(Box::new(sample(time_ms))));
     }
     console.press(&["c"]);
     console.record(Record::Insight(ProposalInsight { trial: 0, parameters: ["f0", "Fx", "Fz"].map(insight).to_vec() }));
@@ -71,10 +71,10 @@ fn main() {
             // 10 frames per second and 200 ticks per second.
             for _ in 0..20 {
                 time_ms += 5;
-                console.tell(Msg::Tick(Box::new(sample(time_ms))));
+                console.update(Msg::Tick(Box::new(sample(time_ms))));
             }
             let snapshot = Snapshot { tick: sample(time_ms), ..console.model.snapshot };
-            console.tell(Msg::Snapshot(Box::new(snapshot)));
+            console.update(Msg::Snapshot(Box::new(snapshot)));
             let (begun, used) = (Instant::now(), processor_time());
             terminal.draw(|frame| quadfrog_console::view::render(frame, &console.model)).expect("drawn");
             processor.push(processor_time() - used);

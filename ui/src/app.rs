@@ -25,7 +25,7 @@ use crate::keymap::{Key, Keymap};
 use crate::message::{Effect, Mouse, Msg};
 use crate::model::Model;
 use crate::settings::{ChartMode, ConsoleSettings};
-use crate::terminal::{self, Screen};
+use crate::terminal::{self, TerminalScreen};
 use crate::theme::{ColourChoice, GlyphChoice, Theme};
 use crate::update::{say, update};
 use crate::{export, text, view};
@@ -105,7 +105,7 @@ struct Console {
     /// State of the connection at the last heartbeat.
     connected: bool,
     model: Model,
-    screen: Screen,
+    screen: TerminalScreen,
     started: Instant,
     frame_period: Duration,
     last_frame: Option<Instant>,
@@ -122,7 +122,7 @@ impl Console {
         let mut model = Model::new(settings, theme, options.robot);
         let (columns, rows) = crossterm::terminal::size().wrap_err("the terminal's size")?;
         update(&mut model, Msg::Resize(columns, rows));
-        let mut screen = Screen::enter().wrap_err("the terminal cannot be used")?;
+        let mut screen = TerminalScreen::enter().wrap_err("the terminal cannot be used")?;
         screen.mouse(model.mouse).wrap_err("the terminal cannot be used")?;
         terminal::stop_on_panic(feed.handle().map(EngineHandle::stop_latch));
         let connection = match &feed {
@@ -162,26 +162,26 @@ impl Console {
             self.beat();
             tokio::select! {
                 biased;
-                Some(input) = inputs.recv() => self.take_input(input, &mut inputs),
+                Some(input) = inputs.recv() => self.process_input(input, &mut inputs),
                 _ = hung_up.recv() => self.hang_up(),
-                _ = terminated.recv() => self.end(ConsoleExit::Terminated),
+                _ = terminated.recv() => self.exit_with(ConsoleExit::Terminated),
                 _ = interrupted.recv() => {
                     let key = self.model.keymap.keys(Action::Interrupt).next();
-                    self.take(key.map(Msg::Key));
+                    self.update_with(key.map(Msg::Key));
                 }
-                _ = suspended.recv() => self.take([Msg::Suspend]),
+                _ = suspended.recv() => self.update_with([Msg::Suspend]),
                 _ = pulse.tick() => {}
             }
             if let Some(thread) = terminal::panicked() {
-                self.carry_out(Effect::Stop);
+                self.perform_effect(Effect::Stop);
                 self.screen.hang_up();
                 self.feed.shutdown();
                 return Err(eyre!("the thread `{thread}` panicked; the robot was stopped and the session was ended"));
             }
-            self.take_feed();
+            self.poll_feed();
             self.draw_if_due()?;
         }
-        self.close(&mut inputs)
+        self.end_session(&mut inputs)
     }
 
     /// Sends the operator heartbeat while the connection is alive, and reports its loss and its return.
@@ -198,11 +198,11 @@ impl Console {
     }
 
     /// Processes an input and all that are queued behind it.
-    fn take_input(&mut self, input: TerminalInput, inputs: &mut UnboundedReceiver<TerminalInput>) {
+    fn process_input(&mut self, input: TerminalInput, inputs: &mut UnboundedReceiver<TerminalInput>) {
         let mut next = Some(input);
         while let Some(input) = next {
             match input {
-                Some(message) => self.take([message]),
+                Some(message) => self.update_with([message]),
                 None => self.hang_up(),
             }
             self.redraw = true;
@@ -210,31 +210,31 @@ impl Console {
         }
     }
 
-    fn take_feed(&mut self) {
+    fn poll_feed(&mut self) {
         let now = Instant::now();
         let elapsed = now.duration_since(self.last_feed);
         self.last_feed = now;
-        let news = self.feed.take(u64::try_from(elapsed.as_nanos()).unwrap_or(0));
-        self.take(news);
+        let news = self.feed.poll(u64::try_from(elapsed.as_nanos()).unwrap_or(0));
+        self.update_with(news);
     }
 
     /// Updates the model and performs the effects.
-    fn take(&mut self, messages: impl IntoIterator<Item = Msg>) {
+    fn update_with(&mut self, messages: impl IntoIterator<Item = Msg>) {
         update(&mut self.model, Msg::Clock(self.started.elapsed()));
         for message in messages {
             for effect in update(&mut self.model, message) {
-                self.carry_out(effect);
+                self.perform_effect(effect);
             }
         }
     }
 
-    fn carry_out(&mut self, effect: Effect) {
+    fn perform_effect(&mut self, effect: Effect) {
         match effect {
             Effect::Stop => self.feed.handle().into_iter().for_each(EngineHandle::stop),
             Effect::Request(request) => {
                 self.feed.handle().into_iter().for_each(|handle| handle.request(request.clone()))
             }
-            Effect::Replay(command) => self.feed.command(command),
+            Effect::Replay(command) => self.feed.control_replay(command),
             Effect::Bell => self.send(b"\x07"),
             Effect::CopyTrial(trial) => self.copy_trial(trial),
             // A failure of these two is reported with the next frame.
@@ -249,7 +249,7 @@ impl Console {
                 self.say_written(written, |path| format!("exported; start with quadfrog --config {}", path.display()));
             }
             Effect::Suspend => self.suspend(),
-            Effect::Quit => self.end(ConsoleExit::Quit),
+            Effect::Quit => self.exit_with(ConsoleExit::Quit),
         }
     }
 
@@ -280,7 +280,7 @@ impl Console {
         self.screen.release();
         // If SIGSTOP fails, the screen returns at once.
         let _ = raise(Signal::SIGSTOP);
-        if self.screen.take().and_then(|()| self.screen.mouse(self.model.mouse)).is_err() {
+        if self.screen.configure().and_then(|()| self.screen.mouse(self.model.mouse)).is_err() {
             self.hang_up();
         }
         update(&mut self.model, Msg::Resumed);
@@ -290,10 +290,10 @@ impl Console {
 
     fn hang_up(&mut self) {
         self.screen.hang_up();
-        self.end(ConsoleExit::HungUp);
+        self.exit_with(ConsoleExit::HungUp);
     }
 
-    fn end(&mut self, ended: ConsoleExit) {
+    fn exit_with(&mut self, ended: ConsoleExit) {
         self.ended.get_or_insert(ended);
     }
 
@@ -314,7 +314,7 @@ impl Console {
     }
 
     /// Ends the session. Sitting down takes seconds: the screen stays, and STOP keeps working.
-    fn close(mut self, inputs: &mut UnboundedReceiver<TerminalInput>) -> color_eyre::Result<ConsoleExit> {
+    fn end_session(mut self, inputs: &mut UnboundedReceiver<TerminalInput>) -> color_eyre::Result<ConsoleExit> {
         let ended = self.ended.unwrap_or(ConsoleExit::Quit);
         // The operator is present after a quit key, but not after a hang-up or SIGTERM.
         let heartbeat = self.feed.handle().map(EngineHandle::heartbeat).filter(|_| ended == ConsoleExit::Quit);

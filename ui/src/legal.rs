@@ -99,7 +99,7 @@ fn refuse(reason: impl Into<String>) -> Legality {
 }
 
 /// The reason why the robot accepts no command at present; none while it lies or stands waiting.
-fn busy(mode: Mode) -> Option<&'static str> {
+fn busy_reason(mode: Mode) -> Option<&'static str> {
     match mode {
         Mode::Offline | Mode::Observe => Some("the robot does not answer yet"),
         Mode::StandUp => Some("the robot is standing up"),
@@ -117,7 +117,7 @@ fn may_arm(model: &Model) -> Legality {
     may_request(model)?;
     must_be_visible(model)?;
     if mode::next(model.mode(), Trigger::Arm).is_none() {
-        return refuse(busy(model.mode()).unwrap_or("the robot is armed already"));
+        return refuse(busy_reason(model.mode()).unwrap_or("the robot is armed already"));
     }
     require(!model.session.stage_is(ExperimentStage::Review), "the last trial waits for its verdict")?;
     require(!model.session.arming_checks.is_empty(), "the arming checks are not finished")?;
@@ -135,7 +135,7 @@ fn may_sit_down(model: &Model) -> Legality {
     match (mode::next(model.mode(), Trigger::SitDown), model.mode()) {
         (Some(_), _) => Ok(()),
         (None, Mode::Disarmed) => refuse("the robot is disarmed already"),
-        (None, mode) => refuse(busy(mode).unwrap_or("not now")),
+        (None, mode) => refuse(busy_reason(mode).unwrap_or("not now")),
     }
 }
 
@@ -156,7 +156,7 @@ fn may_approve(model: &Model) -> Legality {
         (None, Mode::Disarmed) => {
             refuse(format!("the robot is not standing: press {} first", model.keymap.key(Action::Arm)))
         }
-        (None, mode) => refuse(busy(mode).unwrap_or("the robot is not ready")),
+        (None, mode) => refuse(busy_reason(mode).unwrap_or("the robot is not ready")),
     }
 }
 

@@ -185,7 +185,7 @@ pub(crate) fn stop_on_panic(stop: Option<StopLatch>) {
 }
 
 /// The terminal in use by the console; restored on drop.
-pub(crate) struct Screen {
+pub(crate) struct TerminalScreen {
     terminal: Option<Terminal<WriteOnlyBackend>>,
     state: Arc<WriterState>,
     writer: Option<JoinHandle<()>>,
@@ -193,10 +193,10 @@ pub(crate) struct Screen {
     hung_up: bool,
 }
 
-impl Screen {
+impl TerminalScreen {
     /// Enters raw mode and the alternate screen, and hides the cursor. From now on a panic in any thread restores the
     /// terminal before it is reported.
-    pub fn enter() -> io::Result<Screen> {
+    pub fn enter() -> io::Result<TerminalScreen> {
         let terminal = own_file()?;
         let state = Arc::new(WriterState::default());
         // Holds at most one frame: the caller checks `ready` before it draws.
@@ -209,13 +209,14 @@ impl Screen {
         let writer_end = FrameWriter { frame: Vec::new(), frames, state: state.clone() };
         let backend = WriteOnlyBackend(CrosstermBackend::new(writer_end));
         let terminal = Terminal::with_options(backend, TerminalOptions { viewport: Viewport::Fullscreen })?;
-        let mut screen = Screen { terminal: Some(terminal), state, writer: Some(writer), mouse: false, hung_up: false };
-        screen.take()?;
+        let mut screen =
+            TerminalScreen { terminal: Some(terminal), state, writer: Some(writer), mouse: false, hung_up: false };
+        screen.configure()?;
         Ok(screen)
     }
 
     /// Configures the terminal, also after a suspension.
-    pub fn take(&mut self) -> io::Result<()> {
+    pub fn configure(&mut self) -> io::Result<()> {
         enable_raw_mode()?;
         ENTERED.store(true, Ordering::Release);
         if let Some(terminal) = &mut self.terminal {
@@ -291,7 +292,7 @@ impl Screen {
     }
 }
 
-impl Drop for Screen {
+impl Drop for TerminalScreen {
     fn drop(&mut self) {
         if !self.hung_up {
             self.wait_until_written();

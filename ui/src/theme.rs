@@ -198,7 +198,7 @@ impl Theme {
         self.pick("+-", "±")
     }
 
-    pub fn lamp(&self, on: bool) -> &'static str {
+    pub fn contact_indicator(&self, on: bool) -> &'static str {
         if on { self.pick("#", "●") } else { self.pick(".", "○") }
     }
 

@@ -45,7 +45,7 @@ impl ArmingHistory {
     ///
     /// 1. Motion, a restart of the robot, or a silence that trips the failsafe resets the count of still states.
     /// 2. A tick without a new state does not change it.
-    pub fn observe(
+    pub fn update(
         &mut self,
         lateness_ns: u64,
         state: &RobotState,

@@ -1,7 +1,7 @@
 //! The robot lies still, so that the gyroscope's bias can be trusted.
 
 use super::check::*;
-use crate::control::limits::ticks_in;
+use crate::robot::ticks_in;
 
 pub(super) const CHECK: ControlCheck = ControlCheck {
     check: ArmingCheck::GyroStill,

@@ -6,7 +6,7 @@ pub(super) const CHECK: ControlCheck = ControlCheck {
     check: ArmingCheck::JointsInside,
     measure: |inputs, settings| {
         Reading::worst_joint(settings.arming.joint_margin_rad, |joint| {
-            let q = inputs.state.joint_position[joint];
+            let q = inputs.state.joint_position_rad[joint];
             let (least, most) = (settings.min_position[joint], settings.max_position[joint]);
             if q.is_nan() { q } else { (least - q).max(q - most) }
         })

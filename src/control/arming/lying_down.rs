@@ -6,7 +6,7 @@ pub(super) const CHECK: ControlCheck = ControlCheck {
     check: ArmingCheck::LyingDown,
     measure: |inputs, settings| {
         Reading::worst_joint(settings.arming.lying_tolerance_rad, |joint| {
-            (inputs.state.joint_position[joint] - settings.lying_position[joint]).abs()
+            (inputs.state.joint_position_rad[joint] - settings.lying_position[joint]).abs()
         })
     },
     found: |finding| format!("{} {:.2} rad away", joint_of(finding), finding.measured),

@@ -55,7 +55,7 @@ impl Cycle {
     ///
     /// 1. While STOP is set, every command but `Leave` is refused. An acknowledgement of the last STOP clears the latch before the tick.
     /// 2. `mode::next` must allow the trigger in the present mode.
-    /// 3. Taking control and arming need an operator's screen with a heartbeat, and a session that has not ended.
+    /// 3. Taking control and arming need an operator's console with a heartbeat, and a session that has not ended.
     /// 4. Arming and approval need a fresh permit.
     /// 5. Arming needs every arming check of the control thread, whatever the session says.
     /// 6. Approval needs that nothing inhibits trials.
@@ -83,7 +83,7 @@ impl Cycle {
         }
     }
 
-    /// Refuses without a heartbeat of the operator's screen, or after the end of the session.
+    /// Refuses without a heartbeat of the operator's console, or after the end of the session.
     fn operator_absent(&self, inputs: &TickInputs) -> Option<CommandRefusal> {
         let (silent_ms, allowed_ms) = (inputs.operator_silent_ms, self.settings.failsafe.operator_silent_ms);
         if self.session_left {
@@ -119,7 +119,7 @@ impl Cycle {
     /// Places a simulated robot at the origin, feet at the trial's stance.
     fn place_for_trial<R: Robot + ?Sized>(&mut self, robot: &mut R, spec: &TrialSpec) {
         // The session has checked that the stance can be reached.
-        let joint_position = self.settings.geometry.stance(&spec.stance_leg, &self.tick.state.joint_position);
+        let joint_position = self.settings.geometry.stance(&spec.stance_leg, &self.tick.state.joint_position_rad);
         self.place(robot, &Placement { joint_position, lying: false, seed: spec.seed });
     }
 

@@ -2,10 +2,10 @@
 
 use super::{Cycle, TickInputs};
 use crate::control::failsafe::{self, FailsafeAction, FailsafeInputs};
-use crate::control::limits::ticks_in;
 use crate::control::mode::Trigger;
 use crate::control::running_trial::FallWatch;
 use crate::robot::Robot;
+use crate::robot::ticks_in;
 use crate::telemetry::{Fault, Mode, Tick, TransitionCause};
 
 /// Ticks for which a warning stays set; the session polls at 10 Hz.
@@ -54,7 +54,7 @@ impl Cycle {
         let stance_tilt_rad = self.settings.failsafe.stance_tilt_rad;
         if self.mode != Mode::Review {
             self.fall = FallWatch::default();
-        } else if let Some(cause) = self.fall.observe(state, estimate, &self.settings, stance_tilt_rad) {
+        } else if let Some(cause) = self.fall.update(state, estimate, &self.settings, stance_tilt_rad) {
             self.trigger(Trigger::Fell, TransitionCause::Fell(cause));
         }
         let allowed_s = self.settings.idle_s;

@@ -5,9 +5,9 @@ mod commands;
 mod failsafes;
 
 use super::arming::{self, ArmingHistory};
+use super::command_gate::CommandGate;
 use super::failsafe::{self, Failsafe};
 use super::leg::{self, LegTarget};
-use super::limits::CommandGate;
 use super::mode::{self, Trigger};
 use super::ramp::{PoseRamp, RampProgress};
 use super::running_trial::{FallWatch, RunningTrial, TrialProgress};
@@ -31,7 +31,7 @@ pub struct TickInputs {
     pub lateness_ns: u64,
     /// The STOP latch.
     pub stop: bool,
-    /// Time since the last heartbeat of the operator's screen, ms.
+    /// Time since the last heartbeat of the operator's console, ms.
     pub operator_silent_ms: u32,
     /// The next waiting command.
     pub command: Option<Command>,
@@ -182,7 +182,7 @@ impl Cycle {
         self.estimate();
         let restarted = robot_time_passed(self.tick.state.robot_time_ms, previous_robot_time_ms) < 0;
         self.run_failsafes(inputs, restarted, robot);
-        self.arming_history.observe(inputs.lateness_ns, &self.tick.state, self.state_age_ms, restarted, &self.settings);
+        self.arming_history.update(inputs.lateness_ns, &self.tick.state, self.state_age_ms, restarted, &self.settings);
         self.run_arming_checks(robot);
         if let Some(command) = &inputs.command {
             self.handle_command(command, inputs, robot);
@@ -228,7 +228,7 @@ impl Cycle {
 
     /// Computes feet, Jacobians and the base's estimate.
     fn estimate(&mut self) {
-        self.feet = leg::feet(&self.settings.geometry, &self.tick.state.joint_position);
+        self.feet = leg::feet(&self.settings.geometry, &self.tick.state.joint_position_rad);
         self.tick.estimate = *self.estimator.update(&self.tick.state, &self.feet, &self.settings);
     }
 
@@ -277,7 +277,7 @@ impl Cycle {
     /// Changes the mode as the jump progresses.
     fn follow_jump(&mut self) {
         if let Some(jump) = &mut self.jump {
-            let progress = match jump.observe(&self.tick.state, &self.tick.estimate, &self.settings) {
+            let progress = match jump.update(&self.tick.state, &self.tick.estimate, &self.settings) {
                 // After a fault the landing ends when the robot stands; rest is not required.
                 TrialProgress::Settle if self.landing.is_some() && jump.landed_s() >= self.settings.failsafe.land_s => {
                     TrialProgress::Over(TrialEnd::NotQuiet)
@@ -308,7 +308,7 @@ impl Cycle {
     /// Changes the mode when a ramp has reached its pose or timed out.
     fn follow_ramp(&mut self) {
         if let Some(ramp) = &self.ramp {
-            match ramp.progress(&self.tick.state.joint_position) {
+            match ramp.progress(&self.tick.state.joint_position_rad) {
                 RampProgress::Moving => {}
                 RampProgress::Reached => self.trigger(Trigger::PoseReached, TransitionCause::StepFinished),
                 RampProgress::TimedOut { .. } if self.mode == Mode::SitDown => {
@@ -348,7 +348,7 @@ impl Cycle {
 
     fn legs(&mut self, target: &LegTarget) -> JointCommand {
         let (state, estimate) = (&self.tick.state, &self.tick.estimate);
-        let torques = leg::torques(target, &self.feet, &state.joint_velocity, estimate);
+        let torques = leg::torques(target, &self.feet, &state.joint_velocity_rad_s, estimate);
         self.tick.torque_demanded = torques;
         JointCommand::torques(&torques)
     }
@@ -406,7 +406,7 @@ impl Cycle {
         self.settings.geometry.stance(&foot_leg, &self.settings.lying_position)
     }
 
-    /// Completes the tick for recorder, screen and session.
+    /// Completes the tick for recorder, console and session.
     fn complete_tick(&mut self, sent: JointCommand, limited: u16) {
         let tick = &mut self.tick;
         tick.number += 1;

@@ -15,7 +15,7 @@ use nalgebra::Vector3;
 pub use contact::ContactGate;
 pub use filter::{Filter, FootOdometry};
 
-use super::limits;
+use super::command_gate;
 use super::settings::{ControlSettings, ObjectiveSource};
 use crate::robot::kinematics::FootPosition;
 use crate::robot::{PerLeg, RobotState, Truth, leg_of, robot_time_passed};
@@ -60,7 +60,7 @@ impl Estimator {
                 self.estimate.contact = truth.foot_force_world.map(|force| force.z >= settings.contact_force_n);
                 self.copy_truth(truth);
             }
-            _ if limits::finite(state).is_ok() => self.fuse_sensors(state, feet, settings),
+            _ if command_gate::finite(state).is_ok() => self.fuse_sensors(state, feet, settings),
             _ => return &self.estimate,
         }
         let estimate = &mut self.estimate;
@@ -109,7 +109,7 @@ impl Estimator {
                     return;
                 }
                 odometry.robot_time_ms = state.robot_time_ms;
-                estimate.contact = self.contact.update(&state.foot_force, dt_s, weights);
+                estimate.contact = self.contact.update(&state.foot_force_n, dt_s, weights);
                 let standing = estimate.contact.contains(&true);
                 odometry.airborne_s = if standing { 0.0 } else { odometry.airborne_s + dt_s };
                 let filter = &mut odometry.filter;
@@ -123,7 +123,7 @@ impl Estimator {
             }
             None => {
                 self.contact = ContactGate::default();
-                estimate.contact = self.contact.update(&state.foot_force, 0.0, weights);
+                estimate.contact = self.contact.update(&state.foot_force_n, 0.0, weights);
                 // The world's origin is the ground under the trunk; the lowest foot stands on it.
                 let lowest = motions.iter().map(|motion| motion.offset_world.z).fold(f64::INFINITY, f64::min);
                 let start = Vector3::new(unit_world.x, unit_world.y, settings.foot_radius - lowest);
@@ -145,7 +145,7 @@ fn foot_motions(state: &RobotState, feet: &PerLeg<FootPosition>, settings: &Cont
     let rotation = state.imu.world_from_body;
     let gyro_body = state.imu.gyro_body;
     std::array::from_fn(|leg| {
-        let (q, dq) = (leg_of(&state.joint_position, leg), leg_of(&state.joint_velocity, leg));
+        let (q, dq) = (leg_of(&state.joint_position_rad, leg), leg_of(&state.joint_velocity_rad_s, leg));
         let offset_body = settings.hip_origin_body[leg] + feet[leg].position_leg - settings.imu_origin_body;
         let velocity_body = gyro_body.cross(&offset_body) + feet[leg].jacobian_leg * dq;
         // The calf turns about the hip's x axis and about the y axis that the hip has turned by q1.

@@ -10,8 +10,8 @@ mod draft;
 mod error;
 mod import;
 mod notes;
+mod results;
 mod storage;
-mod telling;
 mod workers;
 
 pub use draft::{DRAWS, SuggestedParameter, TrialDraft};

@@ -27,11 +27,11 @@ const QUATERNION_TOLERANCE: f32 = 0.1;
 /// # Errors
 /// A number is not finite or does not fit the datagram.
 pub fn low_cmd(command: &JointCommand, form: CrcForm) -> Result<LowCmd, CommandError> {
-    let mut datagram = LowCmd::unsealed();
+    let mut datagram = LowCmd::without_crc();
     for (motor, command) in command.motor.iter().enumerate() {
         datagram.set(motor, &target(motor, command)?)?;
     }
-    datagram.seal(form);
+    datagram.write_crc(form);
     Ok(datagram)
 }
 
@@ -40,14 +40,14 @@ fn target(motor: usize, command: &MotorCommand) -> Result<MotorTarget, CommandEr
         let value = value as f32;
         if value.is_finite() { Ok(value) } else { Err(CommandError::NotFinite { quantity, motor, value }) }
     };
-    let (position, velocity) = (finite("position", command.position)?, finite("velocity", command.velocity)?);
+    let (position, velocity) = (finite("position", command.position_rad)?, finite("velocity", command.velocity_rad_s)?);
     Ok(MotorTarget {
         mode: MODE_SERVO,
-        position: if command.kp == 0.0 { POSITION_STOP } else { position },
-        velocity: if command.kd == 0.0 { VELOCITY_STOP } else { velocity },
-        torque: command.torque as f32,
-        kp: command.kp as f32,
-        kd: command.kd as f32,
+        position: if command.kp_joint == 0.0 { POSITION_STOP } else { position },
+        velocity: if command.kd_joint == 0.0 { VELOCITY_STOP } else { velocity },
+        torque: command.torque_n_m as f32,
+        kp: command.kp_joint as f32,
+        kd: command.kd_joint as f32,
     })
 }
 
@@ -56,12 +56,12 @@ pub fn motor_command(target: &MotorTarget) -> Option<MotorCommand> {
     if target.mode != MODE_SERVO {
         return None;
     }
-    let mut command = MotorCommand { torque: target.torque.into(), ..MotorCommand::default() };
+    let mut command = MotorCommand { torque_n_m: target.torque.into(), ..MotorCommand::default() };
     if target.position != POSITION_STOP {
-        (command.position, command.kp) = (target.position.into(), target.kp.into());
+        (command.position_rad, command.kp_joint) = (target.position.into(), target.kp.into());
     }
     if target.velocity != VELOCITY_STOP {
-        (command.velocity, command.kd) = (target.velocity.into(), target.kd.into());
+        (command.velocity_rad_s, command.kd_joint) = (target.velocity.into(), target.kd.into());
     }
     Some(command)
 }
@@ -82,12 +82,12 @@ pub fn robot_state(state: &LowState, foot_force_n: f64) -> RobotState {
     };
     let cell_v = state.battery.cell_v().map(f64::from);
     RobotState {
-        robot_time_ms: state.tick.get(),
-        joint_position: joints(|motor| motor.position.get().into()),
-        joint_velocity: joints(|motor| motor.velocity.get().into()),
-        joint_torque: joints(|motor| motor.torque().into()),
+        robot_time_ms: state.robot_time_ms.get(),
+        joint_position_rad: joints(|motor| motor.position.get().into()),
+        joint_velocity_rad_s: joints(|motor| motor.velocity.get().into()),
+        joint_torque_n_m: joints(|motor| motor.torque().into()),
         imu: Imu { world_from_body, gyro_body: vector(&imu.gyroscope), accel_body: vector(&imu.accelerometer) },
-        foot_force: state.foot_force.map(|force| f64::from(force.get()) * foot_force_n),
+        foot_force_n: state.foot_force.map(|force| f64::from(force.get()) * foot_force_n),
         motor_temperature_c: joints(|motor| motor.temperature.into()),
         motor_enabled: std::array::from_fn(|i| state.motor[i].mode == MODE_SERVO),
         battery: Some(Battery {
@@ -103,7 +103,7 @@ pub fn robot_state(state: &LowState, foot_force_n: f64) -> RobotState {
 /// Encodes a state, for the emulator: the inverse of [`robot_state`]. The caller computes the checksum.
 pub fn low_state(state: &RobotState, foot_force_n: f64) -> LowState {
     let mut datagram = LowState::zero();
-    datagram.tick = state.robot_time_ms.into();
+    datagram.robot_time_ms = state.robot_time_ms.into();
     let orientation = &state.imu.world_from_body;
     let [x, y, z, w]: [f64; 4] = orientation.coords.into();
     datagram.imu.quaternion = [w, x, y, z].map(float);
@@ -114,11 +114,11 @@ pub fn low_state(state: &RobotState, foot_force_n: f64) -> LowState {
     for i in 0..JOINTS {
         let motor = &mut datagram.motor[i];
         motor.mode = if state.motor_enabled[i] { MODE_SERVO } else { MODE_BRAKE };
-        motor.position = float(state.joint_position[i]);
-        motor.velocity = float(state.joint_velocity[i]);
+        motor.position = float(state.joint_position_rad[i]);
+        motor.velocity = float(state.joint_velocity_rad_s[i]);
         motor.position_raw = motor.position;
         motor.velocity_raw = motor.velocity;
-        motor.set_torque(state.joint_torque[i] as f32);
+        motor.set_torque(state.joint_torque_n_m[i] as f32);
         motor.temperature = state.motor_temperature_c[i].round() as i8;
     }
     if let Some(battery) = &state.battery {
@@ -126,7 +126,7 @@ pub fn low_state(state: &RobotState, foot_force_n: f64) -> LowState {
         datagram.battery.current = ((battery.current_a * 1e3).round() as i32).into();
         datagram.battery.set_cell_v(&battery.cell_v.map(|v| v as f32));
     }
-    datagram.foot_force = state.foot_force.map(|force| ((force / foot_force_n).round() as i16).into());
+    datagram.foot_force = state.foot_force_n.map(|force| ((force / foot_force_n).round() as i16).into());
     datagram.foot_force_estimated = datagram.foot_force;
     datagram
 }

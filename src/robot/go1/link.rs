@@ -175,7 +175,7 @@ impl Link {
             self.status.foreign += 1;
             return false;
         }
-        if !self.classify(state.tick.get()) {
+        if !self.classify(state.robot_time_ms.get()) {
             return false;
         }
         self.newest = Some(state);
@@ -192,7 +192,7 @@ impl Link {
             self.arrived = 1;
             return true;
         };
-        let newer_by = robot_time_passed(tick, newest.tick.get());
+        let newer_by = robot_time_passed(tick, newest.robot_time_ms.get());
         let older_by = newer_by.unsigned_abs();
         if newer_by > 0 {
             let gap = (older_by / self.options.state_period_ms).saturating_sub(1);
@@ -209,7 +209,7 @@ impl Link {
             if self.arrived & bit != 0 {
                 self.status.duplicate += 1;
             } else {
-                self.status.late += 1;
+                self.status.out_of_order += 1;
                 if bit != 0 {
                     // It was counted as lost when a newer state arrived.
                     self.arrived |= bit;

@@ -171,7 +171,7 @@ impl Robot for Go1 {
     /// is sent to it.
     fn write(&mut self, command: &JointCommand) -> Result<(), RobotError> {
         let encoded = convert::low_cmd(command, self.network.crc);
-        if *command == JointCommand::damping(command.motor[0].kd) {
+        if *command == JointCommand::damping(command.motor[0].kd_joint) {
             self.damping = encoded.as_ref().ok().copied().or(self.damping);
         }
         if let Some(datagram) = encoded.as_ref().ok().or(self.damping.as_ref()) {

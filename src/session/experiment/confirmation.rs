@@ -34,10 +34,10 @@ impl BestConfirmation {
         BestConfirmation { contenders, confidence, concluded: None, published: Vec::new() }
     }
 
-    /// Returns the first trials of the points that a confirmation in `outlook` would compare.
-    pub fn candidates(&self, outlook: &Study) -> Vec<u32> {
-        let best = contenders(outlook.trials(), outlook.options().direction, self.contenders as usize);
-        best.iter().filter(|point| point.stood > 0).map(|point| point.trials[0]).collect()
+    /// Returns the first trials of the points that a confirmation in `study` would compare.
+    pub fn candidates(&self, study: &Study) -> Vec<u32> {
+        let best = contenders(study.trials(), study.options().direction, self.contenders as usize);
+        best.iter().filter(|point| point.without_fall > 0).map(|point| point.trials[0]).collect()
     }
 
     /// Starts a confirmation of the points of `trials` with at most `repeats` repeats.
@@ -81,10 +81,10 @@ impl BestConfirmation {
         study.annotate_study(&attributes::write(&Concluded { confirmed, confirm: None }))
     }
 
-    pub fn next(&self, outlook: &Study) -> NextRepeat {
-        let Some(running) = running(outlook) else { return NextRepeat::None };
-        let direction = outlook.options().direction;
-        let compared = compared(&running.trials, outlook);
+    pub fn next(&self, study: &Study) -> NextRepeat {
+        let Some(running) = running(study) else { return NextRepeat::None };
+        let direction = study.options().direction;
+        let compared = compared(&running.trials, study);
         let Some(first) = compared.first() else { return NextRepeat::None };
         let over = |leader: usize, confidence: f64, message: String| {
             let (trials, leader) = (running.trials.clone(), compared[leader].trials[0]);
@@ -99,14 +99,14 @@ impl BestConfirmation {
             Confirmation::Leads(leader, confidence) => {
                 over(leader, confidence, format!("confirmed: {}", lead_text(&compared[leader], confidence)))
             }
-            Confirmation::Repeat(point) if running.left(outlook.trials()) > 0 => {
-                match outlook.trial(compared[point].trials[0]) {
+            Confirmation::Repeat(point) if running.left(study.trials()) > 0 => {
+                match study.trial(compared[point].trials[0]) {
                     Ok(first) => NextRepeat::Repeat(Box::new(first.clone())),
                     Err(_) => NextRepeat::None,
                 }
             }
             // Other workers run the last repeats.
-            Confirmation::Repeat(_) if running.used(outlook.trials(), |state| !state.is_finished()) > 0 => {
+            Confirmation::Repeat(_) if running.used(study.trials(), |state| !state.is_finished()) > 0 => {
                 NextRepeat::None
             }
             Confirmation::Repeat(_) => {
@@ -123,15 +123,15 @@ impl BestConfirmation {
     }
 
     /// Returns the number of repeats that are still to be completed; none while no confirmation runs.
-    pub fn repeats_left(&self, outlook: &Study) -> Option<u32> {
-        let running = running(outlook).filter(|_| self.concluded.is_none())?;
-        let completed = running.used(outlook.trials(), |state| state == TrialState::Complete);
+    pub fn repeats_left(&self, study: &Study) -> Option<u32> {
+        let running = running(study).filter(|_| self.concluded.is_none())?;
+        let completed = running.used(study.trials(), |state| state == TrialState::Complete);
         Some(running.repeats.saturating_sub(completed))
     }
 
-    /// Returns all repeated and compared points of `outlook`, if they have changed since the last call.
-    pub fn changed_points(&mut self, outlook: &Study) -> Option<Vec<PointRecord>> {
-        let kept = StudyAttributes::of(outlook.attributes());
+    /// Returns all repeated and compared points of `study`, if they have changed since the last call.
+    pub fn changed_points(&mut self, study: &Study) -> Option<Vec<PointRecord>> {
+        let kept = StudyAttributes::of(study.attributes());
         let running = kept.confirm;
         let concluded = self.concluded.clone().or(kept.confirmed);
         let trials = match (&running, &concluded) {
@@ -143,11 +143,11 @@ impl BestConfirmation {
         let leader = match (&concluded, &running) {
             (Some(concluded), _) => Some((concluded.leader, concluded.confidence)),
             (None, Some(running)) => {
-                let compared = compared(&running.trials, outlook);
+                let compared = compared(&running.trials, study);
                 // Before every point has been repeated the spread is not known.
                 let repeated = compared.len() > 1 && compared.iter().all(|point| point.repeats() >= LEAST_REPEATS);
                 repeated
-                    .then(|| rank(&compared, outlook.options().direction))
+                    .then(|| rank(&compared, study.options().direction))
                     .map(|rank| (compared[rank.leader].trials[0], rank.confidence))
             }
             (None, None) => None,
@@ -155,7 +155,7 @@ impl BestConfirmation {
         let record = |point: RepeatedPoint| {
             let contender = trials.iter().any(|first| point.trials.contains(first));
             (point.repeats() > 1 || contender).then(|| PointRecord {
-                stood: point.stood as u32,
+                without_fall: point.without_fall as u32,
                 mean: point.mean(),
                 deviation: point.deviation(),
                 contender,
@@ -164,7 +164,7 @@ impl BestConfirmation {
                 trials: point.trials,
             })
         };
-        let points: Vec<PointRecord> = points(outlook.trials()).into_iter().filter_map(record).collect();
+        let points: Vec<PointRecord> = points(study.trials()).into_iter().filter_map(record).collect();
         if points == self.published {
             return None;
         }
@@ -214,7 +214,7 @@ fn lead_text(point: &RepeatedPoint, confidence: f64) -> String {
         point.trials[0],
         100.0 * confidence,
         point.mean(),
-        point.stood,
+        point.without_fall,
         point.repeats()
     )
 }

@@ -21,7 +21,7 @@ impl Liveness {
     }
 
     /// Takes in the present state of the trials; to be called whenever the study was read.
-    pub fn observe(&mut self, trials: &[Trial]) {
+    pub fn update(&mut self, trials: &[Trial]) {
         let now = Instant::now();
         let before = std::mem::take(&mut self.last_news);
         let running = trials.iter().filter(|trial| trial.state == TrialState::Running);

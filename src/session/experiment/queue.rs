@@ -36,7 +36,7 @@ impl TrialQueue {
 
     /// Closes the trials that joined workers have abandoned. Returns lines for the log.
     pub fn close_abandoned(&mut self, study: &mut Study) -> Result<Vec<String>, StudyError> {
-        self.liveness.observe(study.trials());
+        self.liveness.update(study.trials());
         let joined = |trial: &&Trial| attributes::worker_of(trial).is_some_and(|worker| worker > 0);
         let abandoned = |trial: &&Trial| joined(trial) && !self.is_own(study, trial) && !self.liveness.is_alive(trial);
         let abandoned: Vec<Trial> = study.running().filter(abandoned).cloned().collect();

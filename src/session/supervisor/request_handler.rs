@@ -2,7 +2,7 @@
 
 use super::Supervisor;
 use crate::control::mode::{self, Trigger};
-use crate::session::arming_checklist::objections;
+use crate::session::arming_checklist::refusals;
 use crate::session::experiment::RequestRefusal;
 use crate::session::operator_request::{OperatorRequest, StampedRequest};
 use crate::telemetry::{Command, Mode, Permit, TransitionCause, TrialEnd};
@@ -14,10 +14,10 @@ impl Supervisor {
         let reason = |refusal: RequestRefusal| refusal.to_string();
         match &stamped.request {
             OperatorRequest::Arm => {
-                self.must_allow(Trigger::Arm)?;
+                self.require_allowed(Trigger::Arm)?;
                 let findings = self.control.readiness.read().findings;
-                if let Some(objections) = objections(&self.checklist.items(&findings, &self.recorder.get())) {
-                    return Err(objections);
+                if let Some(refusals) = refusals(&self.checklist.items(&findings, &self.recorder.get())) {
+                    return Err(refusals);
                 }
                 let permit = self.permit(stamped);
                 self.ask(Trigger::Arm, Command::Arm(permit), "the robot stands up")
@@ -128,12 +128,12 @@ impl Supervisor {
 
     /// Sends `command` if the mode allows `request`.
     fn ask(&mut self, request: Trigger, command: Command, answer: &str) -> Result<String, String> {
-        self.must_allow(request)?;
+        self.require_allowed(request)?;
         self.command(command)?;
         Ok(answer.to_owned())
     }
 
-    fn must_allow(&self, request: Trigger) -> Result<(), String> {
+    fn require_allowed(&self, request: Trigger) -> Result<(), String> {
         match mode::next(self.mode, request) {
             Some(_) => Ok(()),
             None => Err(format!("not while the robot is {}", self.mode.name())),

@@ -6,7 +6,7 @@ use crate::telemetry::{Command, Mode};
 
 /// Least time between two logged cautions, ns.
 const CAUTION_PERIOD_NS: u64 = 10_000_000_000;
-/// Period of the arming checklist's records for the screen, ns.
+/// Period of the arming checklist's records for the console, ns.
 const CHECKLIST_PERIOD_NS: u64 = 500_000_000;
 
 impl Supervisor {
@@ -39,7 +39,7 @@ impl Supervisor {
         }
     }
 
-    /// Publishes the arming checklist while the robot is disarmed: to the screen twice a second, to the recorder, too, when a
+    /// Publishes the arming checklist while the robot is disarmed: to the console twice a second, to the recorder, too, when a
     /// check changes its state.
     pub(super) fn publish_checklist(&mut self, time_ns: u64) {
         if self.mode != Mode::Disarmed || self.observe {
@@ -52,7 +52,7 @@ impl Supervisor {
         if states(&list) != states(&self.published_checklist) {
             self.recorder_gone |= !self.sinks.send(stamped);
         } else if time_ns >= self.checklist_ns + CHECKLIST_PERIOD_NS {
-            let _ = self.sinks.screen.send(stamped);
+            let _ = self.sinks.console.send(stamped);
         } else {
             return;
         }

@@ -95,13 +95,16 @@ impl EmulatedRobot {
 
     /// Simulates one millisecond.
     pub fn step(&mut self) {
-        let braking = MotorCommand { kd: self.config.braking_kd, ..MotorCommand::default() };
+        let braking = MotorCommand { kd_joint: self.config.braking_kd, ..MotorCommand::default() };
         let mut drive = JointCommand::default();
         for (joint, motor) in drive.motor.iter_mut().enumerate() {
             *motor = match (self.defects.stuck_at[joint], self.motors[joint]) {
-                (Some(position), _) => {
-                    MotorCommand { position, kp: STUCK_GAINS[0], kd: STUCK_GAINS[1], ..MotorCommand::default() }
-                }
+                (Some(position), _) => MotorCommand {
+                    position_rad: position,
+                    kp_joint: STUCK_GAINS[0],
+                    kd_joint: STUCK_GAINS[1],
+                    ..MotorCommand::default()
+                },
                 (None, Some(command)) if self.in_servo(joint) => command,
                 _ => braking,
             };
@@ -136,12 +139,12 @@ impl EmulatedRobot {
                 *value = defect.unwrap_or(*value);
             }
         };
-        replace(&mut state.joint_position, &self.defects.angle);
-        replace(&mut state.joint_velocity, &self.defects.speed);
-        replace(&mut state.joint_torque, &self.defects.torque);
+        replace(&mut state.joint_position_rad, &self.defects.angle);
+        replace(&mut state.joint_velocity_rad_s, &self.defects.speed);
+        replace(&mut state.joint_torque_n_m, &self.defects.torque);
         state.imu.world_from_body *= UnitQuaternion::from_axis_angle(&Vector3::x_axis(), self.defects.tilt_rad);
         let mut datagram = convert::low_state(&state, self.foot_force_n);
-        datagram.seal();
+        datagram.write_crc();
         let mut bytes = datagram.bytes().to_vec();
         bytes.resize(self.config.state_length, 0);
         bytes
@@ -152,7 +155,7 @@ impl EmulatedRobot {
         let cell = CELL_V[0] + (CELL_V[1] - CELL_V[0]) * charge_percent / 100.0;
         let voltage_v = cell * CELLS as f64;
         let mechanical: f64 =
-            state.joint_torque.iter().zip(&state.joint_velocity).map(|(torque, dq)| torque * dq).sum();
+            state.joint_torque_n_m.iter().zip(&state.joint_velocity_rad_s).map(|(torque, dq)| torque * dq).sum();
         Battery {
             charge_percent,
             voltage_v,

@@ -80,13 +80,13 @@ impl Console {
         console
     }
 
-    pub fn tell(&mut self, msg: Msg) -> Vec<Effect> {
+    pub fn update(&mut self, msg: Msg) -> Vec<Effect> {
         update(&mut self.model, msg)
     }
 
     pub fn wait(&mut self, milliseconds: u64) {
         let now = self.model.clock + Duration::from_millis(milliseconds);
-        self.tell(Msg::Clock(now));
+        self.update(Msg::Clock(now));
     }
 
     /// Presses keys by name, 0.1 s apart.
@@ -95,13 +95,13 @@ impl Console {
             .flat_map(|name| {
                 self.wait(100);
                 let key: Key = name.parse().expect("a key's name");
-                self.tell(Msg::Key(key))
+                self.update(Msg::Key(key))
             })
             .collect()
     }
 
     pub fn record(&mut self, record: Record) -> Vec<Effect> {
-        self.tell(Msg::Record(Stamped { time_ns: self.model.snapshot.tick.time_ns, record }))
+        self.update(Msg::Record(Stamped { time_ns: self.model.snapshot.tick.time_ns, record }))
     }
 
     pub fn stage(&mut self, stage: ExperimentStage, trial: u32) -> Vec<Effect> {
@@ -116,7 +116,7 @@ impl Console {
         let from = self.model.mode();
         self.record(Record::Transition(Transition { from, to: mode, cause: "test".into() }));
         let tick = Tick { mode, ..self.model.snapshot.tick };
-        self.tell(Msg::Snapshot(Box::new(Snapshot { tick, ..self.model.snapshot })));
+        self.update(Msg::Snapshot(Box::new(Snapshot { tick, ..self.model.snapshot })));
     }
 
     /// Presses keys; the requests to the session.
@@ -138,7 +138,7 @@ impl Console {
 
     /// A tick for the charts.
     pub fn tick(&mut self, tick: Tick) {
-        self.tell(Msg::Tick(Box::new(tick)));
+        self.update(Msg::Tick(Box::new(tick)));
     }
 
     /// Trials that are judged accept, fall, void in turn.

@@ -45,7 +45,7 @@ impl ReplayFeed {
         replay
     }
 
-    pub fn command(&mut self, command: ReplayCommand) {
+    pub fn control_replay(&mut self, command: ReplayCommand) {
         match command {
             ReplayCommand::PlayPause => {
                 if self.time_ns >= self.player.duration_ns() {
@@ -82,7 +82,7 @@ impl ReplayFeed {
     }
 
     /// Appends the messages of `elapsed_ns` of real time.
-    pub fn take(&mut self, elapsed_ns: u64, messages: &mut Vec<Msg>) {
+    pub fn poll(&mut self, elapsed_ns: u64, messages: &mut Vec<Msg>) {
         messages.append(&mut self.jumped);
         if self.playing {
             self.advance((elapsed_ns as f64 * SPEEDS[self.speed]) as u64, messages);

@@ -58,7 +58,7 @@ impl From<&Tick> for ChartSample {
             busy_ns: tick.stages.read_ns.saturating_add(tick.stages.decide_ns).saturating_add(tick.stages.write_ns),
             theta: tick.theta_rad as f32,
             foot_z: tick.estimate.foot_position_leg.map(|foot| foot.z as f32),
-            foot_force: tick.state.foot_force.map(|force| force as f32),
+            foot_force: tick.state.foot_force_n.map(|force| force as f32),
             contact: tick.estimate.contact,
         }
     }

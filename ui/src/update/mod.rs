@@ -31,8 +31,8 @@ pub use request::say;
 pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
     match msg {
         Msg::Key(key) => return press(model, key),
-        Msg::Mouse(event) => return mouse::take(model, event),
-        Msg::Record(stamped) => return records::take(model, stamped),
+        Msg::Mouse(event) => return mouse::handle(model, event),
+        Msg::Record(stamped) => return records::apply(model, stamped),
         Msg::Suspend => return perform(model, Action::Suspend),
         Msg::Clock(now) => model.clock = now,
         Msg::Resize(columns, rows) => {

@@ -11,7 +11,7 @@ use crate::model::{Model, View};
 /// Rows that one notch of the wheel moves by.
 const NOTCH: isize = 3;
 
-pub(super) fn take(model: &mut Model, event: Mouse) -> Vec<Effect> {
+pub(super) fn handle(model: &mut Model, event: Mouse) -> Vec<Effect> {
     if !model.mouse || model.dialog.is_some() {
         return Vec::new();
     }

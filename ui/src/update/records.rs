@@ -34,7 +34,7 @@ pub(super) fn close_stale_dialog(model: &mut Model) {
     }
 }
 
-pub(super) fn take(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
+pub(super) fn apply(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
     let time_ns = stamped.time_ns;
     let mut bells = Vec::new();
     match stamped.record {

@@ -6,7 +6,7 @@ use ratatui::layout::Rect;
 
 use super::dots::DotGrid;
 use super::draw::cut;
-use super::signal::Signal;
+use super::series_style::Signal;
 use crate::model::comparison::time_after;
 use crate::model::history::{ChartSample, SignalHistory, at_trial_time};
 use crate::settings::ChartMode;
@@ -111,15 +111,15 @@ impl Chart<'_> {
         }
     }
 
-    /// Name, contact lamp, value and, where there is room, the range.
+    /// Name, contact indicator, value and, where there is room, the range.
     fn draw_heading(&self, buffer: &mut Buffer, area: Rect, (low, high): (f32, f32)) {
         let theme = &self.theme;
         let sample = match self.cursor_ns {
             Some(time_ns) => self.history.at(time_ns),
             None => self.history.samples().next_back(),
         };
-        let lamp = match (self.signal.foot, sample) {
-            (Some(leg), Some(sample)) => theme.lamp(sample.contact[leg as usize]),
+        let contact = match (self.signal.foot, sample) {
+            (Some(leg), Some(sample)) => theme.contact_indicator(sample.contact[leg as usize]),
             (Some(_), None) => " ",
             (None, _) => "",
         };
@@ -130,7 +130,7 @@ impl Chart<'_> {
             (sample.map_or("-".to_owned(), |sample| self.number(sample)), ghost.role)
         });
         let unit = self.signal.series.unit();
-        let mut pieces = vec![(format!("{}{lamp} ", self.signal.series.name()), self.signal.role)];
+        let mut pieces = vec![(format!("{}{contact} ", self.signal.series.name()), self.signal.role)];
         match ghost {
             Some((other, role)) => {
                 pieces.push((format!("A {value} "), Role::Text));

@@ -182,7 +182,8 @@ fn written(status: &RecorderStatus, time_ns: u64) -> String {
 fn link_rows(link: &LinkStatus, limits: &HealthLimits) -> Vec<HealthRow> {
     let loss = 100.0 * link.loss_share();
     let states = format!("{} Hz, newest {} ms old", link.rate_hz, link.state_age_ms);
-    let unusual = format!("{} out of order, {} duplicate, {} unknown source", link.late, link.duplicate, link.foreign);
+    let unusual =
+        format!("{} out of order, {} duplicate, {} unknown source", link.out_of_order, link.duplicate, link.foreign);
     let broken = format!("{} corrupt ({} in 5 s), {} short", link.corrupt, link.recent_corrupt, link.wrong_length);
     vec![
         row("states", states, link.state_age_ms > limits.state_age_ms),
@@ -201,7 +202,7 @@ fn motor_rows(model: &Model) -> Vec<HealthRow> {
         let temperature = tick.state.motor_temperature_c[joint];
         let state = if tick.state.motor_enabled[joint] { "on" } else { "off" };
         let limited = if tick.limited & (1 << joint) != 0 { " limited" } else { "" };
-        let (q, torque) = (tick.state.joint_position[joint], tick.state.joint_torque[joint]);
+        let (q, torque) = (tick.state.joint_position_rad[joint], tick.state.joint_torque_n_m[joint]);
         let text = format!("{temperature:3.0} C {state:<3}{q:+6.2} rad{torque:+6.1} N m{limited}");
         rows.push((joint_name(joint), text, temperature >= model.session.info.limits.motor_c));
     }

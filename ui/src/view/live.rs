@@ -7,7 +7,7 @@ use ratatui::text::{Line, Span};
 
 use super::chart::{Chart, Ghost, TimeAxis, draw_phases, phases};
 use super::draw::{bar, heading, span};
-use super::signal::signal;
+use super::series_style::signal;
 use super::{objective, proposal, trials, wireframe};
 use crate::model::Model;
 use crate::model::comparison::{Comparison, impulse_start_ns};
@@ -166,8 +166,8 @@ fn render_joints(frame: &mut Frame, area: Rect, model: &Model) {
         if row >= column.height {
             continue;
         }
-        let torque = tick.state.joint_torque[joint];
-        let speed = tick.state.joint_velocity[joint];
+        let torque = tick.state.joint_torque_n_m[joint];
+        let speed = tick.state.joint_velocity_rad_s[joint];
         let limits = &robot.limits;
         let width = usize::from(column.width).saturating_sub(24) / 2;
         let limited = if tick.limited & (1 << joint) != 0 { "!" } else { " " };

@@ -18,7 +18,6 @@ mod details;
 mod dialogs;
 mod dots;
 mod draw;
-mod frame;
 mod health;
 mod help;
 mod live;
@@ -29,7 +28,8 @@ mod optimizer;
 mod overrides;
 mod points;
 mod proposal;
-mod signal;
+mod series_style;
+mod status_bar;
 mod trials;
 mod wireframe;
 
@@ -41,10 +41,10 @@ use crate::model::{Model, View};
 /// Draws everything.
 pub fn render(frame: &mut Frame, model: &Model) {
     let Some(Areas { frame: top, tabs, body, message, next_step }) = areas(frame.area().as_size()) else {
-        return frame::render_small(frame, frame.area(), model);
+        return status_bar::render_small(frame, frame.area(), model);
     };
-    frame::render(frame, top, model);
-    frame::render_tabs(frame, tabs, model);
+    status_bar::render(frame, top, model);
+    status_bar::render_tabs(frame, tabs, model);
     match model.view {
         View::Live => live::render(frame, body, model),
         View::Trials => trials::render(frame, body, model),
@@ -54,6 +54,6 @@ pub fn render(frame: &mut Frame, model: &Model) {
         View::Log => log::render(frame, body, model),
     }
     dialogs::render(frame, body, model);
-    frame::render_message(frame, message, model);
+    status_bar::render_message(frame, message, model);
     next_step::render(frame, next_step, model);
 }

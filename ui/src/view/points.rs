@@ -19,7 +19,7 @@ fn line(session: &SessionModel, theme: &Theme, point: &PointRecord, width: usize
     let spread = point.deviation.map_or(String::new(), |sd| format!(" {}{}", theme.plus_minus(), number(sd)));
     let mut spans = vec![
         span(theme, Role::Quiet, format!(" {:<5}", format!("#{first}"))),
-        Span::raw(format!("{}/{} ", point.stood, point.trials.len())),
+        Span::raw(format!("{}/{} ", point.without_fall, point.trials.len())),
         Span::raw(format!(" {} {}", number(point.mean), session.info.unit)),
         span(theme, Role::Quiet, spread),
     ];
@@ -37,6 +37,6 @@ pub fn repeats_of(session: &SessionModel, theme: &Theme, trial: u32) -> Option<S
     let point = session.trials.points.iter().find(|point| point.trials.contains(&trial) && point.trials.len() > 1)?;
     let spread = point.deviation.map_or(String::new(), |sd| format!(" {} {:.4}", theme.plus_minus(), sd));
     let trials: Vec<String> = point.trials.iter().map(|trial| format!("#{trial}")).collect();
-    let (stood, of, unit) = (point.stood, point.trials.len(), &session.info.unit);
+    let (stood, of, unit) = (point.without_fall, point.trials.len(), &session.info.unit);
     Some(format!("{stood}/{of} landed, {:.4}{spread} {unit} ({})", point.mean, trials.join(" ")))
 }

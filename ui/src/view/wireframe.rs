@@ -25,8 +25,9 @@ fn leg_points(robot: &RobotDescription, leg: Leg, q: &Vector3<f64>) -> [Vector3<
 }
 
 pub fn render(frame: &mut Frame, area: Rect, robot: Option<&RobotDescription>, tick: &Tick, theme: &Theme) {
-    let lamps = Leg::ALL.map(|leg| format!("{}{}", leg.name(), theme.lamp(tick.estimate.contact[leg as usize])));
-    let body = heading(frame, area, theme, "Robot", &lamps.join(" "));
+    let contacts =
+        Leg::ALL.map(|leg| format!("{}{}", leg.name(), theme.contact_indicator(tick.estimate.contact[leg as usize])));
+    let body = heading(frame, area, theme, "Robot", &contacts.join(" "));
     let Some(robot) = robot else { return };
     if body.height < 4 || body.width < 20 {
         return;
@@ -37,8 +38,8 @@ pub fn render(frame: &mut Frame, area: Rect, robot: Option<&RobotDescription>, t
     let tilt = UnitQuaternion::from_euler_angles(rpy.x, rpy.y, 0.0);
     let height = tick.estimate.position_world.z;
     let mut lines: Vec<[Vector3<f64>; 2]> = Vec::with_capacity(4 * LEGS + 5);
-    let legs =
-        Leg::ALL.map(|leg| leg_points(robot, leg, &leg_of(&tick.state.joint_position, leg as usize)).map(|p| tilt * p));
+    let legs = Leg::ALL
+        .map(|leg| leg_points(robot, leg, &leg_of(&tick.state.joint_position_rad, leg as usize)).map(|p| tilt * p));
     for points in &legs {
         lines.extend(points.windows(2).map(|pair| [pair[0], pair[1]]));
     }

@@ -96,13 +96,13 @@ pub struct LowCmd {
 impl LowCmd {
     /// Returns a command in which every motor brakes.
     pub fn braking(form: CrcForm) -> LowCmd {
-        let mut command = LowCmd::unsealed();
-        command.seal(form);
+        let mut command = LowCmd::without_crc();
+        command.write_crc(form);
         command
     }
 
     /// Returns the command of [`LowCmd::braking`] without a checksum.
-    pub fn unsealed() -> LowCmd {
+    pub fn without_crc() -> LowCmd {
         let mut command = LowCmd::new_zeroed();
         command.header = Header::low_level();
         for motor in 0..MOTORS {
@@ -112,7 +112,7 @@ impl LowCmd {
     }
 
     /// Sets one motor's target, rounded towards zero to the resolution as by the official library. The checksum does
-    /// not change until [`LowCmd::seal`].
+    /// not change until [`LowCmd::write_crc`].
     ///
     /// # Errors
     /// Torque or a gain is not finite or out of range; the command is unchanged. (The official library lets the number
@@ -168,7 +168,7 @@ impl LowCmd {
     }
 
     /// Computes the checksum; call after all fields are set.
-    pub fn seal(&mut self, form: CrcForm) {
+    pub fn write_crc(&mut self, form: CrcForm) {
         self.crc = form.apply(crc(&self.as_bytes()[..COVERED])).into();
     }
 

@@ -119,7 +119,7 @@ pub struct LowState {
     /// Foot forces as the robot estimates them.
     pub foot_force_estimated: [I16; 4],
     /// The robot's clock, ms.
-    pub tick: U32,
+    pub robot_time_ms: U32,
     /// Bytes of the remote control.
     pub remote: [u8; 40],
     /// Reserved; the checksum covers the first byte alone.
@@ -132,12 +132,12 @@ impl LowState {
     pub fn zero() -> LowState {
         let mut state = LowState::new_zeroed();
         state.header = Header::low_level();
-        state.seal();
+        state.write_crc();
         state
     }
 
     /// Computes the checksum in the form of the level; call after all fields are set.
-    pub fn seal(&mut self) {
+    pub fn write_crc(&mut self) {
         self.crc = form_of(self.header.level).apply(crc(&self.as_bytes()[..COVERED])).into();
     }
 
@@ -166,8 +166,9 @@ impl LowState {
 
 /// Returns the checksum's form in a state of `level`.
 fn form_of(level: u8) -> CrcForm {
-    if level == HIGH_LEVEL { CrcForm::Sealed } else { CrcForm::Plain }
+    if level == HIGH_LEVEL { CrcForm::Transformed } else { CrcForm::Plain }
 }
 
 const _: () = assert!(size_of::<LowState>() == STATE_LENGTH);
-const _: () = assert!(std::mem::offset_of!(LowState, motor) == 75 && std::mem::offset_of!(LowState, tick) == 755);
+const _: () =
+    assert!(std::mem::offset_of!(LowState, motor) == 75 && std::mem::offset_of!(LowState, robot_time_ms) == 755);

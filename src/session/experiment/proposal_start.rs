@@ -1,11 +1,11 @@
 //! The next proposal, and its start as a running trial.
 
 use super::attributes::{self, BeganAttributes, Origin};
-use super::changes::must_be_within;
 use super::confirmation::{self, NextRepeat};
+use super::pending_proposal::{ApprovedProposal, PendingProposal};
 use super::plan::{RequestRefusal, not_now};
-use super::proposal_card::{ApprovedCard, ProposalCard};
 use super::search::SearchSettings;
+use super::trial_changes::must_be_within;
 use super::{Experiment, ExperimentState, queue};
 use crate::optimize::study::{Study, StudyError, TellOutcome};
 use crate::optimize::trial::Trial;
@@ -25,11 +25,11 @@ impl Experiment {
         self.search = SearchSettings::of(&self.study, &self.plan);
         self.search.apply(&self.plan, &mut self.study)?;
         self.confirmation.reopen();
-        let mut outlook = self.outlook()?;
-        if outlook.waiting().next().is_none() {
-            match self.confirmation.next(&outlook) {
+        let mut study = self.study_with_pending()?;
+        if study.waiting().next().is_none() {
+            match self.confirmation.next(&study) {
                 NextRepeat::Repeat(first) => {
-                    outlook.enqueue(&first.parameters, &Origin::confirming(&first).attributes())?;
+                    study.enqueue(&first.parameters, &Origin::confirming(&first).attributes())?;
                 }
                 NextRepeat::Over(conclusion, message) => {
                     self.log(message);
@@ -41,32 +41,31 @@ impl Experiment {
         if self.pending.is_none() {
             self.confirmation.write_conclusion(&mut self.study)?;
         }
-        self.outbox.extend(self.confirmation.changed_points(&outlook).map(Record::Points));
-        self.publish_search(&outlook);
-        let confirms = outlook.waiting().next().is_some_and(attributes::confirms);
-        if !confirms && self.queue.occupied(outlook.trials()) >= self.plan.budget {
+        self.outbox.extend(self.confirmation.changed_points(&study).map(Record::Points));
+        self.publish_search(&study);
+        let confirms = study.waiting().next().is_some_and(attributes::confirms);
+        if !confirms && self.queue.occupied(study.trials()) >= self.plan.budget {
             let last = self.rows.keys().next_back().copied().unwrap_or(0);
             self.enter(ExperimentState::Finished, last);
             return Ok(());
         }
-        let fixed: Vec<_> =
-            self.search.fixed(outlook.trials()).into_iter().map(|(n, fixed)| (n, fixed.value)).collect();
+        let fixed: Vec<_> = self.search.fixed(study.trials()).into_iter().map(|(n, fixed)| (n, fixed.value)).collect();
         let in_study = self.study.waiting().next().is_some();
         let revision = self.next_revision();
-        let card = ProposalCard::new(outlook, in_study, &fixed, &self.plan.control.gains(), revision);
-        let number = card.number();
-        self.outbox.push(Record::Insight(card.insight()));
-        self.outbox.push(Record::Proposal(card.proposal()));
-        self.enter(ExperimentState::Proposed(Box::new(card)), number);
-        if let Some(objection) = self.objection() {
-            self.log(format!("trial {number} cannot run as it was queued: {objection}"));
+        let pending = PendingProposal::new(study, in_study, &fixed, &self.plan.control.gains(), revision);
+        let number = pending.number();
+        self.outbox.push(Record::Insight(pending.insight()));
+        self.outbox.push(Record::Proposal(pending.proposal()));
+        self.enter(ExperimentState::Proposed(Box::new(pending)), number);
+        if let Some(refusal) = self.refusal() {
+            self.log(format!("trial {number} cannot run as it was queued: {refusal}"));
         }
         Ok(())
     }
 
     /// Returns the reason for which the proposal cannot run, or none. Other programs may queue any values, and bounds may have
     /// become narrower since.
-    pub fn objection(&self) -> Option<String> {
+    pub fn refusal(&self) -> Option<String> {
         let proposal = self.proposal()?;
         let beyond = |list: &[ProposedParameter], ranges: &[ParameterInfo], what| {
             list.iter().find_map(|p| must_be_within(ranges, what, &p.name, p.value).err())
@@ -79,7 +78,7 @@ impl Experiment {
     /// Makes a new proposal because the search has changed. The operator's changes stay where they are within the bounds.
     pub fn repropose(&mut self) -> Result<(), StudyError> {
         let changes = match &self.state {
-            ExperimentState::Proposed(card) => card.changes().cloned(),
+            ExperimentState::Proposed(pending) => pending.changes().cloned(),
             _ => None,
         };
         self.propose()?;
@@ -87,15 +86,15 @@ impl Experiment {
         let within = |name: &str, value: f64| bounds.iter().any(|p| p.name == name && p.contains(value));
         let Some(changes) = changes else { return Ok(()) };
         let revision = self.next_revision();
-        if let ExperimentState::Proposed(card) = &mut self.state {
-            card.inherit(&changes, revision, within);
+        if let ExperimentState::Proposed(pending) = &mut self.state {
+            pending.inherit(&changes, revision, within);
             self.publish_proposal();
         }
         Ok(())
     }
 
     /// Returns the study at the time at which the next trial begins: the pending verdict is reported in it.
-    pub fn outlook(&self) -> Result<Study, StudyError> {
+    pub fn study_with_pending(&self) -> Result<Study, StudyError> {
         let mut fork = self.study.fork();
         if let Some(pending) = &self.pending {
             let trial = pending.suggestion.trial;
@@ -108,11 +107,11 @@ impl Experiment {
         Ok(fork)
     }
 
-    /// Makes the approved card a running trial of the study. Returns its number.
-    pub fn begin(&mut self, card: ApprovedCard) -> Result<u32, RequestRefusal> {
-        let ApprovedCard { proposal, origin, mut draft, overrides, fixed, only_in_outlook } = card;
+    /// Makes the approved proposal a running trial of the study. Returns its number.
+    pub fn begin(&mut self, approved: ApprovedProposal) -> Result<u32, RequestRefusal> {
+        let ApprovedProposal { proposal, origin, mut draft, overrides, fixed, only_with_pending } = approved;
         let mut queued = self.report_pending()?;
-        if only_in_outlook {
+        if only_with_pending {
             // The study does not have the queued trial yet, and another program may have taken its number.
             if queued.is_none() {
                 let given: Vec<_> = draft.parameters.iter().map(|p| (p.name.clone(), p.value)).collect();
@@ -185,9 +184,9 @@ impl Experiment {
     }
 
     /// Publishes the search if it has changed.
-    pub fn publish_search(&mut self, outlook: &Study) {
-        let confirming = self.confirmation.repeats_left(outlook);
-        let search = self.search.status(&self.plan, self.counted(), outlook.trials(), confirming);
+    pub fn publish_search(&mut self, study: &Study) {
+        let confirming = self.confirmation.repeats_left(study);
+        let search = self.search.status(&self.plan, self.counted(), study.trials(), confirming);
         if self.published_search.as_ref() != Some(&search) {
             self.published_search = Some(search.clone());
             self.outbox.push(Record::Search(search));

@@ -15,15 +15,15 @@ use crate::trial::{
 const INSIGHT_POINTS: usize = 41;
 
 /// A draft with the operator's changes.
-pub struct ProposalCard {
+pub struct PendingProposal {
     draft: TrialDraft,
-    /// Changed by every change of the card: no approval of an earlier one fits a later one.
+    /// Changed by every change of the proposal: no approval of an earlier one fits a later one.
     revision: u32,
     /// The study at the time at which the trial begins: every verdict is reported in it.
-    outlook: Study,
+    study: Study,
     changes: Changes,
-    /// The draft was queued in the outlook only: in the study its number may belong to another trial by now.
-    only_in_outlook: bool,
+    /// The draft was queued in the study with the pending verdict only: in the study its number may belong to another trial by now.
+    only_with_pending: bool,
     configured: ParameterValues,
     /// The gains of the trial without changes: the configured ones, or those of its origin.
     gains: ParameterValues,
@@ -38,37 +38,37 @@ pub struct Changes {
     gains: BTreeMap<String, f64>,
 }
 
-/// The values of a card at its approval.
-pub struct ApprovedCard {
+/// The values of a pending proposal at its approval.
+pub struct ApprovedProposal {
     pub proposal: Proposal,
     pub origin: Origin,
     pub draft: TrialDraft,
     pub overrides: Vec<(String, f64)>,
     /// The fixed parameters, without those that were changed for this trial.
     pub fixed: ParameterValues,
-    pub only_in_outlook: bool,
+    pub only_with_pending: bool,
 }
 
-impl ProposalCard {
-    /// Drafts the next trial of `outlook`. The parameters `fixed` are not searched unless the draft was queued with values
-    /// of its own. `in_study` is true if the waiting trial of the outlook waits in the study, too. `gains` are the
-    /// configured ones; `revision` must be one that no earlier card had.
-    pub fn new(outlook: Study, in_study: bool, fixed: &[(String, f64)], gains: &Gains, revision: u32) -> ProposalCard {
-        let queued = outlook.waiting().next().map(Trial::fixed).unwrap_or_default();
+impl PendingProposal {
+    /// Drafts the next trial of `study`. The parameters `fixed` are not searched unless the draft was queued with values
+    /// of its own. `in_study` is true if the waiting trial of the study with the pending verdict waits in the study, too. `gains` are the
+    /// configured ones; `revision` must be one that no earlier proposal had.
+    pub fn new(study: Study, in_study: bool, fixed: &[(String, f64)], gains: &Gains, revision: u32) -> PendingProposal {
+        let queued = study.waiting().next().map(Trial::fixed).unwrap_or_default();
         let fixed: Vec<_> = fixed.iter().filter(|(name, _)| queued.iter().all(|(n, _)| n != name)).cloned().collect();
-        let draft = outlook.draft_with(&fixed);
-        let mut card = ProposalCard {
-            only_in_outlook: draft.enqueued && !in_study,
+        let draft = study.draft_with(&fixed);
+        let mut pending = PendingProposal {
+            only_with_pending: draft.enqueued && !in_study,
             draft,
             revision,
-            outlook,
+            study,
             changes: Changes::default(),
             configured: gains.values(),
             gains: ParameterValues::default(),
             fixed,
         };
-        card.gains = gains.with(&card.origin().gains).values();
-        card
+        pending.gains = gains.with(&pending.origin().gains).values();
+        pending
     }
 
     pub fn number(&self) -> u32 {
@@ -79,9 +79,9 @@ impl ProposalCard {
         self.number() == trial && self.revision == revision
     }
 
-    /// Returns the number of the waiting trial of the study that this card proposes; none if it does not wait there.
+    /// Returns the number of the waiting trial of the study that this proposal proposes; none if it does not wait there.
     pub fn waits_as(&self) -> Option<u32> {
-        (self.draft.enqueued && !self.only_in_outlook).then_some(self.number())
+        (self.draft.enqueued && !self.only_with_pending).then_some(self.number())
     }
 
     /// Changes one parameter; the proposed value is no change.
@@ -97,7 +97,7 @@ impl ProposalCard {
         self.revision = revision;
     }
 
-    /// Makes the changes of an earlier card, parameters only where `keeps` is true.
+    /// Makes the changes of an earlier proposal, parameters only where `keeps` is true.
     pub fn inherit(&mut self, earlier: &Changes, revision: u32, keeps: impl Fn(&str, f64) -> bool) {
         self.revision = revision;
         for (name, value) in earlier.parameters.iter().filter(|(name, value)| keeps(name, **value)) {
@@ -117,15 +117,15 @@ impl ProposalCard {
         self.revision = revision;
     }
 
-    pub fn approved(&self) -> ApprovedCard {
+    pub fn approved(&self) -> ApprovedProposal {
         let changed = &self.changes.parameters;
-        ApprovedCard {
+        ApprovedProposal {
             proposal: self.proposal(),
             origin: self.origin(),
             draft: self.draft.clone(),
             overrides: changed.iter().map(|(name, value)| (name.clone(), *value)).collect(),
             fixed: self.fixed.iter().filter(|(name, _)| !changed.contains_key(name)).cloned().collect(),
-            only_in_outlook: self.only_in_outlook,
+            only_with_pending: self.only_with_pending,
         }
     }
 
@@ -163,7 +163,7 @@ impl ProposalCard {
     /// Returns the distance to earlier falls; none before the first trial that counts.
     fn risk(&self, point: &[ProposedParameter]) -> Option<FallRisk> {
         let point: Vec<_> = point.iter().map(|p| (p.name.clone(), p.value)).collect();
-        let risk = insight::FallProximity::of(&point, self.outlook.trials(), &self.outlook.options().space);
+        let risk = insight::FallProximity::of(&point, self.study.trials(), &self.study.options().space);
         (risk.neighbours > 0).then(|| FallRisk {
             nearest_fall: risk.falls.first().map(|(_, distance)| *distance),
             nearest_fall_trial: risk.falls.first().map(|(trial, _)| *trial),
@@ -173,7 +173,7 @@ impl ProposalCard {
     }
 
     pub fn insight(&self) -> ProposalInsight {
-        let (trials, options) = (self.outlook.trials(), self.outlook.options());
+        let (trials, options) = (self.study.trials(), self.study.options());
         let densities = match options.sampler.kind {
             SamplerKind::Tpe => {
                 insight::densities(&options.sampler, trials, &options.space, options.direction, INSIGHT_POINTS)

@@ -6,14 +6,14 @@
 //! and is therefore what the study itself will propose.
 
 pub(crate) mod attributes;
-mod changes;
 mod confirmation;
 mod liveness;
+mod pending_proposal;
 mod plan;
-mod proposal_card;
-mod proposing;
+mod proposal_start;
 mod queue;
 mod search;
+mod trial_changes;
 
 pub use self::plan::{ExperimentPlan, RequestRefusal};
 
@@ -21,8 +21,8 @@ use std::collections::BTreeMap;
 
 use self::attributes::JudgedAttributes;
 use self::confirmation::{BestConfirmation, NextRepeat};
+use self::pending_proposal::PendingProposal;
 use self::plan::not_now;
-use self::proposal_card::ProposalCard;
 use self::queue::TrialQueue;
 use self::search::SearchSettings;
 use super::objective;
@@ -48,7 +48,7 @@ struct PendingVerdict {
 /// State of the current trial.
 enum ExperimentState {
     /// A proposal waits for approval.
-    Proposed(Box<ProposalCard>),
+    Proposed(Box<PendingProposal>),
     /// This trial runs.
     Running(u32),
     /// This trial waits for its verdict.
@@ -64,7 +64,7 @@ pub struct Experiment {
     state: ExperimentState,
     /// Rows of the trial table, by number.
     rows: BTreeMap<u32, TrialRecord>,
-    /// Number of cards and changes of cards: the newest revision.
+    /// Number of pending proposals and of their changes: the newest revision.
     revisions: u32,
     pending: Option<PendingVerdict>,
     queue: TrialQueue,
@@ -97,7 +97,7 @@ impl Experiment {
         Ok(experiment)
     }
 
-    /// Takes the records since the last call, for the screen and the recording.
+    /// Takes the records since the last call, for the console and the recording.
     pub fn take_records(&mut self) -> Vec<Record> {
         std::mem::take(&mut self.outbox)
     }
@@ -142,7 +142,7 @@ impl Experiment {
     /// Returns the proposal that waits for approval.
     pub fn proposal(&self) -> Option<Proposal> {
         match &self.state {
-            ExperimentState::Proposed(card) => Some(card.proposal()),
+            ExperimentState::Proposed(pending) => Some(pending.proposal()),
             _ => None,
         }
     }
@@ -169,18 +169,18 @@ impl Experiment {
     /// Approves the proposal as it was seen: it becomes a running trial, on disk before this returns.
     /// Refused when there is another proposal by now or its values are outside the limits.
     pub fn approve(&mut self, trial: u32, revision: u32) -> Result<TrialSpec, RequestRefusal> {
-        let ExperimentState::Proposed(card) = &self.state else { return not_now("there is no proposal to approve") };
-        if !card.is(trial, revision) {
+        let ExperimentState::Proposed(pending) = &self.state else { return not_now("there is no proposal to approve") };
+        if !pending.is(trial, revision) {
             return not_now(format!(
                 "the proposal for trial {trial} has changed since it was shown; check the new one (trial {}) and approve it",
-                card.number()
+                pending.number()
             ));
         }
-        if let Some(objection) = self.objection() {
-            return not_now(format!("{objection}; change it, or refuse the proposal"));
+        if let Some(refusal) = self.refusal() {
+            return not_now(format!("{refusal}; change it, or refuse the proposal"));
         }
-        let card = card.approved();
-        let number = self.begin(card)?;
+        let approved = pending.approved();
+        let number = self.begin(approved)?;
         self.enter(ExperimentState::Running(number), number);
         Ok(self.spec(number))
     }
@@ -188,13 +188,13 @@ impl Experiment {
     /// Refuses the proposal: it becomes a void trial, which the sampler does not see.
     /// Refused when there is no proposal.
     pub fn skip(&mut self) -> Result<(), RequestRefusal> {
-        let ExperimentState::Proposed(card) = &self.state else { return not_now("there is no proposal to skip") };
-        let cause = match self.objection() {
-            Some(objection) => format!("not run: {objection}"),
+        let ExperimentState::Proposed(pending) = &self.state else { return not_now("there is no proposal to skip") };
+        let cause = match self.refusal() {
+            Some(refusal) => format!("not run: {refusal}"),
             None => "skipped before the jump".to_owned(),
         };
-        let card = card.approved();
-        let number = self.begin(card)?;
+        let approved = pending.approved();
+        let number = self.begin(approved)?;
         if let Some(row) = self.rows.get_mut(&number) {
             row.verdict = Some(Verdict::Void);
             row.cause = cause;
@@ -312,9 +312,9 @@ impl Experiment {
         self.log_all(log);
         self.take_rows();
         match &self.state {
-            ExperimentState::Proposed(card) => {
+            ExperimentState::Proposed(pending) => {
                 let next = self.study.waiting().next().map(|trial| trial.number);
-                if next != card.waits_as() && card.changes().is_none() {
+                if next != pending.waits_as() && pending.changes().is_none() {
                     self.log("another program has changed the queue: a new proposal follows".to_owned());
                     self.propose()?;
                 }
@@ -336,7 +336,7 @@ impl Experiment {
     /// Ends the session during a review: a trial that is to be void by the rules (stopped, or its operator is gone) is void
     /// with its cause, and its parameters are queued again as after a crash. Any other waits for its verdict until the
     /// study is opened again.
-    pub fn leave(&mut self) -> Result<(), StudyError> {
+    pub fn void_unreviewed(&mut self) -> Result<(), StudyError> {
         let ExperimentState::Review(trial) = self.state else { return Ok(()) };
         let Some(row) = self.rows.get_mut(&trial).filter(|row| row.suggested == Some(Verdict::Void)) else {
             return Ok(());

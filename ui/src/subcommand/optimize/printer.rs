@@ -11,7 +11,7 @@ use quadfrog::report::table;
 use quadfrog::trial::{MeasuredJump, Task, TrialRecord, Verdict};
 use serde::{Serialize, Serializer};
 
-use crate::command::selection::SelectedStudy;
+use crate::subcommand::selection::SelectedStudy;
 
 pub struct Printer {
     json: bool,

@@ -15,7 +15,7 @@ pub struct Signal {
     /// Ranges, narrowest first; the first one that holds the window's values is drawn.
     pub ranges: &'static [(f32, f32)],
     pub role: Role,
-    /// The foot whose contact lamp stands beside the name.
+    /// The foot whose contact indicator stands beside the name.
     pub foot: Option<Leg>,
 }
 

@@ -12,7 +12,7 @@ use color_eyre::eyre::{WrapErr, eyre};
 use quadfrog::config::Config;
 use quadfrog::control::control_loop::ControlLoop;
 use quadfrog::control::settings::ControlSettings;
-use quadfrog::realtime::channel::{ScreenEnd, SessionEnd, channels};
+use quadfrog::realtime::channel::{ConsoleEnd, SessionEnd, channels};
 use quadfrog::realtime::clock::{Clock, MonotonicClock};
 use quadfrog::realtime::scheduling::{GrantedSettings, Scheduling};
 use quadfrog::realtime::system::isolated_cores;
@@ -26,7 +26,7 @@ use quadfrog::telemetry::{Command, Event, Mode, Permit, Tick};
 use quadfrog::trial::{Backend, Task};
 
 use super::machine::{self, Durations, PERIOD, durations};
-use crate::command::failure::Failure;
+use crate::subcommand::failure::Failure;
 
 /// Limit of the ratio of the 99.9th percentiles of the wake-up latency, ours to cyclictest's.
 const RATIO_LIMIT: f64 = 1.2;
@@ -245,7 +245,7 @@ fn measure(
 /// The other ends of the control thread's channels, kept open and empty as the engine's threads do.
 struct ChannelEnds {
     session: SessionEnd,
-    screen: ScreenEnd,
+    screen: ConsoleEnd,
     ticks: rtrb::Consumer<Tick>,
     mode_changes: u64,
 }

@@ -1,4 +1,4 @@
-//! Starts the threads of a session from a checked configuration and gives a screen its [`EngineHandle`].
+//! Starts the threads of a session from a checked configuration and gives a console its [`EngineHandle`].
 
 mod control_thread;
 mod folder;
@@ -23,7 +23,7 @@ use std::thread::JoinHandle;
 use self::folder::LockedFolder;
 use self::guard::Guard;
 use crate::optimize::journal::Durability;
-use crate::realtime::channel::{Heartbeat, ScreenEnd, StopLatch, channels};
+use crate::realtime::channel::{ConsoleEnd, Heartbeat, StopLatch, channels};
 use crate::realtime::clock::{Clock, MonotonicClock};
 use crate::recording::record::{Record, Stamped};
 use crate::recording::recorder::{Recorder, RecorderHandle, RecorderStatus};
@@ -74,12 +74,12 @@ pub fn start(options: Options) -> Result<EngineHandle, EngineError> {
         None => None,
     };
 
-    let (control_end, session_end, screen_end, tick_end) = channels();
+    let (control_end, session_end, console_end, tick_end) = channels();
     let (to_recorder, recorder_records) = channel();
-    let (to_screen, screen_records) = channel();
+    let (to_console, console_records) = channel();
     let (to_session, ticks) = channel();
     let recorder = Recorder::spawn(tick_end, recorder_records, writer, to_session);
-    let sinks = RecordSinks { recorder: to_recorder, screen: to_screen };
+    let sinks = RecordSinks { recorder: to_recorder, console: to_console };
     let status = recorder.watch();
     let closing = Arc::new(AtomicBool::new(false));
 
@@ -119,12 +119,12 @@ pub fn start(options: Options) -> Result<EngineHandle, EngineError> {
         .map_err(system("session thread"))?;
 
     Ok(EngineHandle {
-        screen: screen_end,
+        console: console_end,
         recording,
         _folder: folder,
         requests: Some(to_supervisor),
         clock,
-        records: screen_records,
+        records: console_records,
         closing,
         control: Some(control),
         session: Some(session),
@@ -132,9 +132,9 @@ pub fn start(options: Options) -> Result<EngineHandle, EngineError> {
     })
 }
 
-/// Access of a screen to a running engine. Dropping it ends the engine as `shutdown` does.
+/// Access of a console to a running engine. Dropping it ends the engine as `shutdown` does.
 pub struct EngineHandle {
-    screen: ScreenEnd,
+    console: ConsoleEnd,
     recording: Option<PathBuf>,
     _folder: LockedFolder,
     requests: Option<Sender<StampedRequest>>,
@@ -149,12 +149,12 @@ pub struct EngineHandle {
 impl EngineHandle {
     /// Stops the robot: damping in the next tick, in every mode. Neither waits nor fails.
     pub fn stop(&self) {
-        self.screen.stop.set();
+        self.console.stop.set();
     }
 
-    /// Returns the stop latch, for a thread that must be able to stop without the screen.
+    /// Returns the stop latch, for a thread that must be able to stop without the console.
     pub fn stop_latch(&self) -> StopLatch {
-        self.screen.stop.clone()
+        self.console.stop.clone()
     }
 
     /// Returns the recording of this session; none where nothing is kept.
@@ -167,36 +167,36 @@ impl EngineHandle {
         self.recording.as_ref().and(self.recorder.as_ref()).map(|recorder| recorder.status())
     }
 
-    /// Sends a heartbeat of the screen; to be called at least ten times a second.
+    /// Sends a heartbeat of the console; to be called at least ten times a second.
     pub fn send_heartbeat(&self) {
-        self.screen.heartbeat.beat();
+        self.console.heartbeat.beat();
     }
 
-    /// Returns the heartbeat, for a screen that sends it from another thread.
+    /// Returns the heartbeat, for a console that sends it from another thread.
     pub fn heartbeat(&self) -> Heartbeat {
-        self.screen.heartbeat.clone()
+        self.console.heartbeat.clone()
     }
 
     /// Sends a request of the operator. The answer comes as a [`RequestRecord`](crate::recording::record::RequestRecord).
     pub fn request(&self, request: OperatorRequest) {
         if let Some(requests) = &self.requests {
-            // A session that has ended does not answer; the screen sees that its records end.
-            let (stops, time_ns) = (self.screen.stop.count(), self.clock.now_ns());
+            // A session that has ended does not answer; the console sees that its records end.
+            let (stops, time_ns) = (self.console.stop.count(), self.clock.now_ns());
             let _ = requests.send(StampedRequest { request, stops, time_ns });
         }
     }
 
     /// Returns the newest tick and counters.
     pub fn snapshot(&mut self) -> Snapshot {
-        *self.screen.snapshot.read()
+        *self.console.snapshot.read()
     }
 
     /// Takes the next of the ticks for charts, 200 a second.
     pub fn next_tick(&mut self) -> Option<Tick> {
-        self.screen.shown.pop().ok()
+        self.console.shown.pop().ok()
     }
 
-    /// Takes the next record for the screen.
+    /// Takes the next record for the console.
     pub fn next_record(&mut self) -> Option<Stamped> {
         self.records.try_recv().ok()
     }
@@ -220,7 +220,7 @@ impl EngineHandle {
             // The last sender to the recorder.
             drop(supervisor);
             if let Some(guard) = guard {
-                guard.dismiss();
+                guard.end();
             }
         }
         if let Some(recorder) = self.recorder.take() {

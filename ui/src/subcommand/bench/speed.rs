@@ -9,8 +9,8 @@ use color_eyre::eyre::{WrapErr, eyre};
 use quadfrog::sim::bench::{BenchScene, SimulatorBench};
 
 use super::machine;
-use crate::command::arguments::cores;
-use crate::command::failure::Failure;
+use crate::subcommand::arguments::cores;
+use crate::subcommand::failure::Failure;
 
 #[derive(Debug, Args)]
 pub struct SpeedArguments {

@@ -228,7 +228,7 @@ fn show(selector: &StudySelector) -> Result<(), Failure> {
     for point in repeats::points(study.trials()).iter().filter(|point| point.repeats() > 1) {
         let trials = point.trials.iter().map(u32::to_string).collect::<Vec<_>>().join(", ");
         let (stood, repeats, mean, std) =
-            (point.stood, point.repeats(), point.mean(), point.deviation().unwrap_or(0.0));
+            (point.without_fall, point.repeats(), point.mean(), point.deviation().unwrap_or(0.0));
         let line = format!("landed {stood}/{repeats}, mean {mean:.3} {unit}, std {std:.3}");
         let _ = writeln!(text, "Trials {trials} are one point: {line}");
     }

@@ -38,14 +38,14 @@ impl Feed {
     }
 
     /// Controls the replay.
-    pub fn command(&mut self, command: ReplayCommand) {
+    pub fn control_replay(&mut self, command: ReplayCommand) {
         if let Feed::Replay(replay) = self {
-            replay.command(command);
+            replay.control_replay(command);
         }
     }
 
     /// Returns the messages since the last call, `elapsed_ns` ago, oldest first.
-    pub fn take(&mut self, elapsed_ns: u64) -> Vec<Msg> {
+    pub fn poll(&mut self, elapsed_ns: u64) -> Vec<Msg> {
         let mut messages = Vec::new();
         match self {
             Feed::Live(handle) => {
@@ -57,7 +57,7 @@ impl Feed {
                 messages.push(Msg::Snapshot(Box::new(handle.snapshot())));
                 messages.extend(handle.recorder().map(Msg::Recorder));
             }
-            Feed::Replay(replay) => replay.take(elapsed_ns, &mut messages),
+            Feed::Replay(replay) => replay.poll(elapsed_ns, &mut messages),
         }
         messages
     }

@@ -1,7 +1,7 @@
 //! The last gate before the motors, after every controller: finite, clamp, rate.
 
 use super::settings::ControlSettings;
-use crate::robot::{CONTROL_PERIOD_S, JOINTS, JointCommand, Joints, MotorCommand, RobotState};
+use crate::robot::{JOINTS, JointCommand, Joints, MotorCommand, RobotState};
 use crate::telemetry::Fault;
 
 /// Result of the gate.
@@ -51,41 +51,43 @@ impl CommandGate {
         };
         for joint in 0..JOINTS {
             let motor = &mut passed.command.motor[joint];
-            let finite = [motor.position, motor.velocity, motor.kp, motor.kd, motor.torque];
+            let finite = [motor.position_rad, motor.velocity_rad_s, motor.kp_joint, motor.kd_joint, motor.torque_n_m];
             if !finite.iter().all(|value| value.is_finite()) {
                 self.reset();
                 return refused("a motor command");
             }
             let before = *motor;
-            motor.position = motor.position.clamp(settings.min_position[joint], settings.max_position[joint]);
-            motor.kp = motor.kp.clamp(0.0, settings.gate.kp_max);
-            motor.kd = motor.kd.clamp(0.0, settings.gate.kd_max);
+            motor.position_rad = motor.position_rad.clamp(settings.min_position[joint], settings.max_position[joint]);
+            motor.kp_joint = motor.kp_joint.clamp(0.0, settings.gate.kp_max);
+            motor.kd_joint = motor.kd_joint.clamp(0.0, settings.gate.kd_max);
             // tau_motor = tau + kp (q_d - q) + kd (dq_d - dq)
-            let feedback = motor.torque_at(state.joint_position[joint], state.joint_velocity[joint]) - motor.torque;
+            let feedback =
+                motor.torque_at(state.joint_position_rad[joint], state.joint_velocity_rad_s[joint]) - motor.torque_n_m;
             if !feedback.is_finite() {
                 self.reset();
                 return refused("a joint's angle or velocity");
             }
-            let mut torque = (motor.torque + feedback).clamp(-settings.max_torque[joint], settings.max_torque[joint]);
+            let mut torque =
+                (motor.torque_n_m + feedback).clamp(-settings.max_torque[joint], settings.max_torque[joint]);
             if let Some(last) = self.last_torque {
                 let step = settings.gate.torque_step_nm;
                 torque = torque.clamp(last[joint] - step, last[joint] + step);
             }
-            motor.torque = torque - feedback;
-            if motor.torque.abs() > settings.max_torque[joint] {
-                *motor = MotorCommand { torque, ..MotorCommand::default() };
+            motor.torque_n_m = torque - feedback;
+            if motor.torque_n_m.abs() > settings.max_torque[joint] {
+                *motor = MotorCommand { torque_n_m: torque, ..MotorCommand::default() };
             }
             torques[joint] = torque;
             // Rounding of the subtraction does not count as limited.
-            let moved = (motor.torque - before.torque).abs() > 1e-9;
+            let moved = (motor.torque_n_m - before.torque_n_m).abs() > 1e-9;
             if moved
-                || motor.kp != before.kp
-                || motor.kd != before.kd
-                || (motor.kp > 0.0 && motor.position != before.position)
+                || motor.kp_joint != before.kp_joint
+                || motor.kd_joint != before.kd_joint
+                || (motor.kp_joint > 0.0 && motor.position_rad != before.position_rad)
             {
                 passed.limited |= 1 << joint;
             } else {
-                motor.torque = before.torque;
+                motor.torque_n_m = before.torque_n_m;
             }
         }
         self.last_torque = Some(torques);
@@ -101,15 +103,10 @@ pub fn finite(state: &RobotState) -> Result<(), Fault> {
     let all = |values: &[f64], what| {
         if values.iter().all(|value| value.is_finite()) { Ok(()) } else { Err(Fault::NotFinite { what }) }
     };
-    all(&state.joint_position, "a joint angle")?;
-    all(&state.joint_velocity, "a joint velocity")?;
+    all(&state.joint_position_rad, "a joint angle")?;
+    all(&state.joint_velocity_rad_s, "a joint velocity")?;
     all(state.imu.world_from_body.coords.as_slice(), "the orientation")?;
     all(state.imu.gyro_body.as_slice(), "the angular velocity")?;
     all(state.imu.accel_body.as_slice(), "the acceleration")?;
-    all(&state.foot_force, "a foot's force")
-}
-
-/// Number of ticks in `seconds`.
-pub fn ticks_in(seconds: f64) -> u32 {
-    (seconds / CONTROL_PERIOD_S).round() as u32
+    all(&state.foot_force_n, "a foot's force")
 }

@@ -45,7 +45,7 @@ pub fn transforms(tick: &Tick, robot: &RobotDescription, log_time: u64) -> Frame
         for (joint, name) in JOINT_NAMES.iter().enumerate() {
             // Hip about x, thigh and calf about y.
             let axis = if joint == 0 { Vector3::x_axis() } else { Vector3::y_axis() };
-            let angle = tick.state.joint_position[3 * leg as usize + joint];
+            let angle = tick.state.joint_position_rad[3 * leg as usize + joint];
             let rotation = UnitQuaternion::from_axis_angle(&axis, angle);
             transforms.push(frame(parent, link(name), &description.joint_origin[joint], &rotation));
             parent = link(name);

@@ -1,5 +1,5 @@
 //! The work of the session thread: requests of the operator in, commands to the control thread, its events and ticks back,
-//! records to the screen and the recording. Every request is answered: carried out, or refused with the reason.
+//! records to the console and the recording. Every request is answered: carried out, or refused with the reason.
 
 mod automatic;
 mod request_handler;
@@ -35,18 +35,18 @@ const REFRESH_PERIOD_NS: u64 = 500_000_000;
 /// Longest wait for a trial's ticks from the recorder, ns.
 const LONGEST_WAIT_FOR_TICKS_NS: u64 = 10_000_000_000;
 
-/// Receivers of the records: the recorder and the screen get the same.
+/// Receivers of the records: the recorder and the console get the same.
 #[expect(missing_docs, reason = "the types say the rest")]
 pub struct RecordSinks {
     pub recorder: Sender<Stamped>,
-    pub screen: Sender<Stamped>,
+    pub console: Sender<Stamped>,
 }
 
 impl RecordSinks {
-    /// Sends a record to both. Returns false if the recorder's thread has ended. A screen that is gone ends the session
+    /// Sends a record to both. Returns false if the recorder's thread has ended. A console that is gone ends the session
     /// elsewhere.
     fn send(&self, stamped: Stamped) -> bool {
-        let _ = self.screen.send(stamped.clone());
+        let _ = self.console.send(stamped.clone());
         self.recorder.send(stamped).is_ok()
     }
 }
@@ -61,7 +61,7 @@ pub struct SupervisorParts {
     pub sinks: RecordSinks,
     pub recorder: RecorderWatch,
     pub checklist: ArmingChecklist,
-    /// The session's record for the screen; the recording begins with it already.
+    /// The session's record for the console; the recording begins with it already.
     pub info: SessionInfo,
 }
 
@@ -99,7 +99,7 @@ pub struct Supervisor {
     guard_lost: bool,
     observe: bool,
     control_requested: bool,
-    /// Heartbeats of the screen when control was refused last: it is requested again after the next.
+    /// Heartbeats of the console when control was refused last: it is requested again after the next.
     heartbeats: u64,
     counters_ns: u64,
     checklist: ArmingChecklist,
@@ -144,7 +144,7 @@ impl Supervisor {
             unattended: Unattended::default(),
         };
         // Not to the recorder: its file begins with this record.
-        let _ = supervisor.sinks.screen.send(Stamped { time_ns, record: Record::Session(info) });
+        let _ = supervisor.sinks.console.send(Stamped { time_ns, record: Record::Session(info) });
         supervisor.publish_experiment(time_ns);
         supervisor
     }
@@ -221,9 +221,9 @@ impl Supervisor {
     }
 
     /// Carries out one request and publishes the answer.
-    pub fn carry_out(&mut self, stamped: &StampedRequest, time_ns: u64) {
+    pub fn handle_request(&mut self, stamped: &StampedRequest, time_ns: u64) {
         let StampedRequest { request, stops, .. } = stamped;
-        // The screen may have shown a change of mode whose event is still in the ring.
+        // The console may have shown a change of mode whose event is still in the ring.
         self.poll(time_ns);
         let energises = matches!(request, OperatorRequest::Arm | OperatorRequest::Approve { .. });
         // An observer may stop the robot and release it again.
@@ -247,13 +247,13 @@ impl Supervisor {
 
     /// Ends the session: the pending verdict is reported, and a trial under review that is void by the rules is void.
     pub fn close(&mut self, time_ns: u64) {
-        if let Err(error) = self.experiment.leave().and_then(|()| self.experiment.close()) {
+        if let Err(error) = self.experiment.void_unreviewed().and_then(|()| self.experiment.close()) {
             self.log(LogLevel::Error, format!("the study could not be written: {error}"), time_ns);
         }
         self.publish_experiment(time_ns);
     }
 
-    /// Takes control of a robot that answers, once there is a screen, unless this session only observes.
+    /// Takes control of a robot that answers, once there is a console, unless this session only observes.
     pub fn take_control(&mut self) {
         if !self.observe && !self.control_requested && self.control.heartbeat.count() > self.heartbeats {
             self.control_requested = self.command(Command::TakeControl).is_ok();
@@ -270,7 +270,7 @@ impl Supervisor {
 
     /// Winds the session down: a standing robot sits down, a jumping one after its landing, and nothing new begins. Returns
     /// false once no trial is under way and, if `sits_down`, nothing is energised.
-    pub fn wind_down(&mut self, sits_down: bool) -> bool {
+    pub fn end_session_step(&mut self, sits_down: bool) -> bool {
         if !self.leaving {
             self.unattended = Unattended::default();
             // A full ring is emptied at 1 kHz: the next call succeeds.

@@ -2,8 +2,8 @@
 //! Nothing runs before it is approved.
 
 use super::attributes::{self, BudgetAttribute, Origin};
+use super::pending_proposal::PendingProposal;
 use super::plan::{RequestRefusal, not_now};
-use super::proposal_card::ProposalCard;
 use super::{Experiment, ExperimentState, confirmation};
 use crate::trial::{ParameterInfo, ProposalSource};
 
@@ -11,10 +11,10 @@ impl Experiment {
     /// Sets one parameter of the proposal.
     /// Refused when there is no proposal, no such parameter, or the value is outside its bounds.
     pub fn set_parameter(&mut self, name: &str, value: f64) -> Result<(), RequestRefusal> {
-        self.change_card()?;
+        self.change_pending()?;
         must_be_within(&self.search.parameters(&self.plan), "parameter", name, value)?;
         let revision = self.next_revision();
-        self.change_card()?.set(name, value, revision);
+        self.change_pending()?.set(name, value, revision);
         self.publish_proposal();
         Ok(())
     }
@@ -22,10 +22,10 @@ impl Experiment {
     /// Sets one of the controller's gains for the proposed trial.
     /// Refused when there is no proposal, no such gain, or the value is outside its safe range.
     pub fn set_gain(&mut self, name: &str, value: f64) -> Result<(), RequestRefusal> {
-        self.change_card()?;
+        self.change_pending()?;
         must_be_within(&self.plan.gains, "gain", name, value)?;
         let revision = self.next_revision();
-        self.change_card()?.set_gain(name, value, revision);
+        self.change_pending()?.set_gain(name, value, revision);
         self.publish_proposal();
         Ok(())
     }
@@ -33,14 +33,14 @@ impl Experiment {
     /// Takes all changes of the proposal back, also those of gains.
     pub fn clear_overrides(&mut self) -> Result<(), RequestRefusal> {
         let revision = self.next_revision();
-        self.change_card()?.clear(revision);
+        self.change_pending()?.clear(revision);
         self.publish_proposal();
         Ok(())
     }
 
-    fn change_card(&mut self) -> Result<&mut ProposalCard, RequestRefusal> {
+    fn change_pending(&mut self) -> Result<&mut PendingProposal, RequestRefusal> {
         match &mut self.state {
-            ExperimentState::Proposed(card) => Ok(card),
+            ExperimentState::Proposed(pending) => Ok(pending),
             _ => not_now("there is no proposal to change"),
         }
     }
@@ -158,8 +158,8 @@ impl Experiment {
             self.propose()?;
             return Ok(Vec::new());
         }
-        // In the outlook: a refused request does not make the last verdict final.
-        let trials = self.confirmation.candidates(&self.outlook()?);
+        // In the study with the pending verdict: a refused request does not make the last verdict final.
+        let trials = self.confirmation.candidates(&self.study_with_pending()?);
         if trials.len() < 2 {
             return not_now("fewer than two points ended without a fall: nothing to compare");
         }
