@@ -20,7 +20,9 @@ pub use storage::Storage;
 pub use workers::worker_seed;
 
 use crate::optimize::ask::{Direction, SamplerConfig, Streams};
-use crate::optimize::journal::{Applied, AttributeKind, Durability, Journal, JournalError, Operation, StudyRecord};
+use crate::optimize::journal::{
+    Applied, AttributeKind, Durability, Journal, JournalError, LockWait, Operation, StudyRecord,
+};
 use crate::optimize::repeats;
 use crate::optimize::space::Space;
 use crate::optimize::trial::{Trial, TrialState};
@@ -94,6 +96,11 @@ impl Study {
         study.check_compatible()?;
         study.streams.advance_to(study.draws_so_far());
         Ok(study)
+    }
+
+    /// Returns the wait for the lock of the journal's file.
+    pub fn lock_wait(&self) -> LockWait {
+        self.journal.lock_wait()
     }
 
     /// Reads the lines of other writers.

@@ -150,7 +150,10 @@ impl Experiment {
         };
         if !row.note.is_empty() {
             // The sampler learns from this trial like from any other; the note shows that the controller differed.
-            self.study.note(number, &row.note)?;
+            // Without it the trial has begun all the same: it must run.
+            if let Err(error) = self.study.note(number, &row.note) {
+                self.log(format!("the note of trial {number} could not be written: {error}"));
+            }
         }
         self.rows.insert(number, row);
         self.publish_row(number);

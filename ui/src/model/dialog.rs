@@ -74,6 +74,11 @@ pub enum Purpose {
         parameter: usize,
     },
     ConfirmBest,
+    /// The reason to judge a trial that tripped a limit void.
+    VoidReason {
+        trial: u32,
+        rerun: bool,
+    },
     TrialNumber,
     LogSearch,
 }
