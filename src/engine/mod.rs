@@ -12,7 +12,7 @@ pub use folder::{STUDY_FILE, attachments, fingerprint, newest_config, prepare_fo
 pub use guard::{GUARD, GuardError, GuardOutcome, run_guard};
 pub use options::{EngineError, Options};
 pub use stored::{Opened, StoredStudy, open_stored, stored_studies, stored_study};
-pub use study::{open_experiment, session_info, study_name};
+pub use study::{check_backend, open_experiment, session_info, study_name};
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -46,6 +46,8 @@ pub fn start(options: Options) -> Result<EngineHandle, EngineError> {
     if options.approve == Approval::Auto && options.backend == Backend::Hardware {
         return Err(EngineError::Unattended);
     }
+    // Before a word goes to the robot.
+    check_backend(&options)?;
     let settings = options.config.settings(&options.robot, options.task, options.backend)?;
     let system = |what: &'static str| {
         move |source| EngineError::System { what: format!("the {what} could not be started"), source }

@@ -7,6 +7,7 @@
 
 pub(crate) mod attributes;
 mod confirmation;
+mod envelope;
 mod judging;
 mod liveness;
 mod pending_proposal;
@@ -72,6 +73,8 @@ pub struct Experiment {
     confirmation: BestConfirmation,
     outbox: Vec<Record>,
     published_search: Option<SearchStatus>,
+    /// Share of the force bounds that the next trial may use.
+    hop_share: Option<f64>,
 }
 
 impl Experiment {
@@ -90,6 +93,7 @@ impl Experiment {
             search: SearchSettings::default(),
             outbox: Vec::new(),
             published_search: None,
+            hop_share: None,
         };
         let log = experiment.queue.close_interrupted(&mut experiment.study)?;
         experiment.log_all(log);
