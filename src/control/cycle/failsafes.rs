@@ -31,6 +31,7 @@ impl Cycle {
             send_error: self.send_error.take(),
             operator_silent_ms: inputs.operator_silent_ms,
             events_lost: inputs.events_lost,
+            consistency: &self.consistency,
         };
         let trip = self.failsafe.check(&failsafe_inputs, &self.settings);
         self.warning = match (failsafe::warning(&failsafe_inputs, &self.settings), self.warning) {

@@ -6,6 +6,7 @@ mod failsafes;
 
 use super::arming::{self, ArmingHistory};
 use super::command_gate::CommandGate;
+use super::consistency::{Consistency, ConsistencyInputs};
 use super::failsafe::{self, Failsafe};
 use super::leg::{self, LegTarget};
 use super::mode::{self, Trigger};
@@ -76,6 +77,7 @@ pub struct Cycle {
     mode_ticks: u32,
     estimator: Estimator,
     failsafe: Failsafe,
+    consistency: Consistency,
     /// The fault whose failsafe trips in this tick.
     tripped: Option<Fault>,
     /// The newest warning and the ticks for which it stays set.
@@ -114,6 +116,7 @@ impl Cycle {
             mode_ticks: 0,
             estimator: Estimator::default(),
             failsafe: Failsafe::default(),
+            consistency: Consistency::default(),
             tripped: None,
             warning: None,
             arming_history: ArmingHistory::default(),
@@ -158,6 +161,11 @@ impl Cycle {
         }
     }
 
+    /// Consistency of sensors, clocks and commands as of the last tick.
+    pub fn consistency(&self) -> &Consistency {
+        &self.consistency
+    }
+
     /// Events of the last tick.
     pub fn events(&self) -> &Events {
         &self.events
@@ -181,6 +189,7 @@ impl Cycle {
         }
         self.estimate();
         let restarted = robot_time_passed(self.tick.state.robot_time_ms, previous_robot_time_ms) < 0;
+        self.check_consistency(inputs, restarted, robot);
         self.run_failsafes(inputs, restarted, robot);
         self.arming_history.update(inputs.lateness_ns, &self.tick.state, self.state_age_ms, restarted, &self.settings);
         self.run_arming_checks(robot);
@@ -232,6 +241,21 @@ impl Cycle {
         self.tick.estimate = *self.estimator.update(&self.tick.state, &self.feet, &self.settings);
     }
 
+    /// Compares sensors, clocks and commands with each other.
+    fn check_consistency<R: Robot + ?Sized>(&mut self, inputs: &TickInputs, restarted: bool, robot: &R) {
+        let consistency_inputs = ConsistencyInputs {
+            mode: self.mode,
+            state: &self.tick.state,
+            is_new: self.state_age_ms == 0,
+            restarted,
+            estimate: &self.tick.estimate,
+            now_ns: inputs.time_ns.saturating_add(inputs.lateness_ns),
+            link: robot.link(),
+            sent: &self.tick.command,
+        };
+        self.consistency.update(&consistency_inputs, &self.settings);
+    }
+
     /// Runs the arming checks while DISARMED.
     fn run_arming_checks<R: Robot + ?Sized>(&mut self, robot: &R) {
         if self.mode == Mode::Disarmed {
@@ -241,6 +265,7 @@ impl Cycle {
                 state_age_ms: self.state_age_ms,
                 link: robot.link(),
                 history: &self.arming_history,
+                consistency: &self.consistency,
             };
             self.findings = arming::findings(&inputs, &self.settings);
         }

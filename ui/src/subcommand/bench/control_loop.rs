@@ -210,6 +210,8 @@ fn measure(
     let mut settings = config.settings(&description, Task::Forward, backend)?;
     // Neither a late tick nor a long stand may end the measurement.
     (settings.late_ms, settings.idle_s) = (0.0, 0.0);
+    // Nor a stall of the emulated robot, whose clock then stands still.
+    settings.consistency.clock_step_ms = f64::INFINITY;
     let lead = arguments.lead();
     if !arguments.with_link {
         let mut robot = Simulator::new(&description, &config.simulator).map_err(Failure::input)?;
