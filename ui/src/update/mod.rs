@@ -62,10 +62,8 @@ pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
 /// One key. STOP comes before everything else, on every screen.
 fn press(model: &mut Model, key: Key) -> Vec<Effect> {
     let action = model.keymap.action(key);
-    let typing = model.dialog.as_ref().is_some_and(Dialog::takes_text);
     match action {
-        // A text field may have the space bar only while the robot is not armed.
-        Some(Action::Stop) if key.typed().is_some() && typing && !model.robot_is_energised() => {}
+        Some(Action::Stop) if key.typed().is_some() && model.space_types() => {}
         Some(Action::Stop) => return stop(model),
         Some(Action::Interrupt) => return interrupt(model),
         _ => {}
