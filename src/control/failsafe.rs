@@ -107,7 +107,7 @@ const fn outside_a_trial(mode: Mode) -> bool {
     matches!(mode, Mode::StandUp | Mode::Ready | Mode::Countdown | Mode::SitDown)
 }
 
-/// Timing of the last ticks, for the rows `late` and `slow`.
+/// Periods of the last ticks, for the row `slow`.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Failsafe {
     /// Start of the last tick, ns.

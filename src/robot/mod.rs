@@ -1,7 +1,7 @@
 //! The robot as the controller sees it: reported state, commands, and the trait [`Robot`] that the Go1 and the
 //! simulator implement.
 //!
-//! Frames: **world** z up; **body** origin at the trunk's, x forward, y left, z up; **leg** origin at the leg's
+//! Frames: **world** z up; **body** origin at the trunk's origin, x forward, y left, z up; **leg** origin at the leg's
 //! hip joint, axes of the body. Legs are always in the order FR, FL, RR, RL; joints hip (abduction, about x),
 //! thigh (about y), calf (about y). SI units and radians throughout.
 

@@ -8,7 +8,7 @@ use crate::robot::Robot;
 use crate::robot::ticks_in;
 use crate::telemetry::{Fault, Mode, Tick, TransitionCause};
 
-/// Ticks for which a warning stays set; the session polls at 10 Hz.
+/// Ticks for which a warning stays set; the session reads it at 10 Hz.
 const WARNING_TICKS: u32 = 1000;
 
 impl Cycle {

@@ -1,5 +1,5 @@
-//! One control tick: read, estimate, failsafes, command, decide, limit, send, publish. A plain call: the control thread makes
-//! it at 1 kHz, a rollout as fast as the machine allows.
+//! One control tick: read, STOP, estimate, failsafes, arming checks, command, decide, limit, send. A plain call: the control
+//! thread makes it at 1 kHz, a rollout as fast as the machine allows.
 
 mod commands;
 mod failsafes;
@@ -23,7 +23,7 @@ use crate::telemetry::{
 };
 use nalgebra::Vector3;
 
-/// TickInputs of one tick.
+/// Inputs of one tick.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct TickInputs {
     /// Planned start of the tick, ns since the engine started.
