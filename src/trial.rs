@@ -168,7 +168,7 @@ impl Gains {
     }
 }
 
-/// The jumps that a person approves and judges. STOP, the loss of the operator and every limit work the same in all.
+/// Rule by which jumps are approved and judged. STOP, the loss of the operator and every limit work the same in all.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, EnumString, IntoStaticStr, VariantArray)]
 #[strum(serialize_all = "kebab-case")]
 pub enum Approval {

@@ -247,6 +247,8 @@ impl Config {
             gate: self.safety.gate,
             hardware,
             arming: self.safety.arming,
+            consistency: self.safety.consistency,
+            remote: self.safety.remote,
             approval: self.safety.approval,
             failsafe: *failsafe,
             late_ms: if hardware { failsafe.hardware_late_ms } else { failsafe.simulator_late_ms },

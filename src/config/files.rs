@@ -6,8 +6,8 @@ use std::collections::BTreeMap;
 use serde::Deserialize;
 
 use crate::control::settings::{
-    ApprovalLimits, ArmingLimits, EstimatorSettings, FailsafeLimits, FallLimits, GateLimits, RampSettings,
-    SettleSettings, TaskControl,
+    ApprovalLimits, ArmingLimits, ConsistencyLimits, EstimatorSettings, FailsafeLimits, FallLimits, GateLimits,
+    RampSettings, RemoteSettings, SettleSettings, TaskControl,
 };
 use crate::optimize::ask::SamplerConfig;
 use crate::trial::HopEnvelope;
@@ -89,6 +89,8 @@ pub struct SafetyFile {
     pub hop_envelope: HopEnvelope,
     #[serde(rename = "watchdog")]
     pub failsafe: FailsafeLimits,
+    pub consistency: ConsistencyLimits,
+    pub remote: RemoteSettings,
     pub parameters: BTreeMap<String, [f64; 2]>,
     pub gains: BTreeMap<String, [f64; 2]>,
 }

@@ -20,7 +20,7 @@ pub enum Msg {
     /// Columns and rows of the terminal.
     Resize(u16, u16),
     Key(Key),
-    /// Pasted text; never read as keys.
+    /// Pasted text of the terminal of a replay. In a live session a paste arrives as keys.
     Paste(String),
     /// Mouse input, while the mouse is on.
     Mouse(Mouse),

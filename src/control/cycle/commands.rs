@@ -131,6 +131,7 @@ impl Cycle {
     fn place<R: Robot + ?Sized>(&mut self, robot: &mut R, placement: &Placement) {
         if robot.place(placement) {
             self.estimator.reset();
+            self.consistency.reset();
             self.gate.reset();
             self.read(robot);
             self.estimate();

@@ -98,7 +98,9 @@ impl Experiment {
     /// Refused when it was reported already.
     pub fn undo(&mut self) -> Result<(), RequestRefusal> {
         let Some(pending) = self.pending.as_ref().filter(|_| self.is_idle()) else {
-            return not_now("there is no verdict to undo; the last one became final when the next trial began");
+            return not_now(
+                "there is no verdict to undo; the last one became final when the next trial was approved or refused",
+            );
         };
         let mut row = pending.suggestion.clone();
         let trial = row.trial;

@@ -97,6 +97,17 @@ impl Dialog {
         Dialog::Field { purpose, input: Input::new(text.to_owned()), problem: None }
     }
 
+    /// Whether a space is text here: not where a number is typed.
+    pub fn takes_spaces(&self) -> bool {
+        match self {
+            Dialog::Field { purpose, .. } => {
+                matches!(purpose, Purpose::Note(_) | Purpose::VoidReason { .. } | Purpose::LogSearch)
+            }
+            Dialog::Palette { .. } => true,
+            _ => false,
+        }
+    }
+
     /// Whether keys are text here.
     pub fn takes_text(&self) -> bool {
         matches!(self, Dialog::Field { .. } | Dialog::Palette { .. })

@@ -67,6 +67,8 @@ pub struct Model {
     pub theme: Theme,
     pub keymap: Keymap,
     pub bell: Vec<BellCause>,
+    /// Whether Space stops an energised robot in a text field, too.
+    pub space_always_stops: bool,
     /// The robot's limits and geometry; none where they are not known.
     pub robot: Option<RobotDescription>,
     /// Time since the console started.
@@ -108,6 +110,7 @@ impl Model {
             theme,
             keymap: settings.keymap,
             bell: settings.bell,
+            space_always_stops: settings.space_always_stops,
             robot,
             clock: Duration::ZERO,
             session: SessionModel::default(),
@@ -149,6 +152,21 @@ impl Model {
     /// Whether the robot is energised and this console commands it.
     pub fn robot_is_energised(&self) -> bool {
         self.replay.is_none() && self.mode().energised()
+    }
+
+    /// Whether Space is text: a text field is open in which a space has a meaning.
+    pub fn space_types(&self) -> bool {
+        self.dialog.as_ref().is_some_and(Dialog::takes_spaces) && !self.space_must_stop()
+    }
+
+    /// Whether Space is STOP in a text field, too.
+    pub fn space_must_stop(&self) -> bool {
+        self.space_always_stops && self.robot_is_energised()
+    }
+
+    /// Whether Space types although the robot is energised: the screen shows it in the colour of STOP.
+    pub fn space_is_no_stop(&self) -> bool {
+        self.robot_is_energised() && self.space_types()
     }
 
     /// The parameter of the selected row of view Override; none for a gain.

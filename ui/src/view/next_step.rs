@@ -148,8 +148,8 @@ fn in_dialog(model: &Model, dialog: &Dialog) -> NextStep {
         }
         Dialog::Override(_) => "Enter takes the value and applies. Esc drops it.".to_owned(),
         Dialog::Quit => "Press y to quit. Any other key cancels.".to_owned(),
-        Dialog::Field { purpose: Purpose::Note(_) | Purpose::VoidReason { .. }, .. } if model.robot_is_energised() => {
-            "Enter saves the text, Esc cancels. Armed: Space is STOP, _ writes a space.".to_owned()
+        Dialog::Field { purpose: Purpose::Note(_) | Purpose::VoidReason { .. }, .. } if model.space_must_stop() => {
+            "Enter saves the text, Esc cancels. Energised: Space is STOP, _ writes a space.".to_owned()
         }
         Dialog::Field { .. } => "Enter confirms, Esc cancels.".to_owned(),
         Dialog::Palette { .. } => "Type to filter, Up Down choose, Enter does it, Esc closes.".to_owned(),

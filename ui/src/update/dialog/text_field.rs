@@ -18,10 +18,10 @@ pub(super) fn key(model: &mut Model, key: Key, purpose: Purpose, mut input: Inpu
             Ok(effects) => return effects,
             Err(reason) => problem = Some(reason),
         },
-        // Space is STOP while the robot is armed, so a note needs another key for it.
+        // Where Space is always STOP, a note needs another key for it.
         KeyCode::Char('_')
             if key.typed().is_some()
-                && model.robot_is_energised()
+                && model.space_must_stop()
                 && matches!(purpose, Purpose::Note(_) | Purpose::VoidReason { .. }) =>
         {
             input.handle(InputRequest::InsertChar(' '));
