@@ -7,6 +7,7 @@ mod request_handler;
 mod standing;
 mod study_requests;
 mod unattended;
+mod unfinished;
 
 use std::collections::VecDeque;
 use std::sync::mpsc::{Receiver, Sender};
@@ -22,8 +23,8 @@ use crate::recording::record::{ArmingCheckRecord, LogLevel, LogRecord, Record, S
 use crate::recording::recorder::{CollectedTicks, RecorderWatch, TrialTicks};
 use crate::telemetry::{Command, Event, Mode, TransitionCause, TrialEnd};
 use crate::trial::ExperimentStage;
-use jobs::{Asker, JobPurpose, UnfinishedJob};
 use unattended::Unattended;
+use unfinished::{Asker, JobPurpose, UnfinishedJob};
 
 /// Period of the counters' records, ns.
 const COUNTERS_PERIOD_NS: u64 = 100_000_000;

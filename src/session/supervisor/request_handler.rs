@@ -1,6 +1,6 @@
 //! Answers to the operator's requests.
 
-use super::jobs::{ApprovalState, Asker, JobPurpose};
+use super::unfinished::{ApprovalState, Asker, JobPurpose};
 use super::{Supervisor, study_requests};
 use crate::control::mode::{self, Trigger};
 use crate::realtime::channel::Lowering;

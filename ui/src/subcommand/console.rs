@@ -110,7 +110,6 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
         network.address = address(text)?;
     }
     let console = options(&arguments.screen, &config)?.with_robot(robot.clone());
-    terminal::check().map_err(Failure::input)?;
     let selected = match &arguments.resume {
         Some(folder) => study_to_continue(folder, arguments.task, arguments.seed, &robot)?,
         None => {
@@ -121,7 +120,7 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
     };
     let folder = selected.folder.clone();
     let incomplete = incomplete_recordings(&folder);
-    let handle = engine::start(Options {
+    let options = Options {
         seed: selected.seed,
         trials: arguments.study.trials.or(selected.budget),
         // An observer writes no files.
@@ -133,7 +132,10 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
         guard: Some(PathBuf::from("/proc/self/exe")),
         network,
         ..Options::new(config, robot, backend, selected.task)
-    })?;
+    };
+    engine::check_backend(&options)?;
+    terminal::check().map_err(Failure::input)?;
+    let handle = engine::start(options)?;
     let recording = handle.recording().map(Path::to_owned);
     let exit = app::run(Feed::live(handle), console)?;
     if exit == ConsoleExit::HungUp || arguments.observe {
