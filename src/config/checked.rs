@@ -8,7 +8,7 @@ use toml::Table;
 
 use super::ConfigError;
 use super::files::{ControlFile, OptimizeFile, SafetyFile};
-use super::merge::{FileOrigin, merge};
+use super::merge::{FileOrigin, lookup, merge};
 use super::ranges;
 use crate::control::settings::{ControlSettings, ObjectiveSource, StandSettings, TaskControl};
 use crate::optimize::ask::SamplerKind;
@@ -95,8 +95,8 @@ impl Config {
             origins,
         };
         // After the types, whose error names the kind of number that a key holds.
-        for (name, _) in FILES {
-            ranges::check(name, &tables[name], &config.origins[name])?;
+        for (name, default) in FILES {
+            ranges::check(name, &tables[name], &template(default), &config.origins[name])?;
         }
         config.check()?;
         Ok(config)
@@ -200,7 +200,8 @@ impl Config {
     /// Returns the settings of the control cycle.
     ///
     /// # Errors
-    /// When the stance of `task` is out of the robot's reach, or the objective cannot be measured on `backend`.
+    /// When the stance of `task` is out of the robot's reach, the objective cannot be measured on `backend`, or a limit is
+    /// outside its range for hardware.
     pub fn settings(
         &self,
         robot: &RobotDescription,
@@ -210,6 +211,9 @@ impl Config {
         let chosen = self.task(task);
         self.check_stance(robot, task)?;
         let hardware = backend == Backend::Hardware;
+        if hardware {
+            self.check_hardware(robot)?;
+        }
         let SafetyFile { failsafe, fall, .. } = &self.safety;
         let (min_position, max_position) = robot.allowed_positions();
         Ok(ControlSettings {
@@ -247,6 +251,15 @@ impl Config {
             late_ms: if hardware { failsafe.hardware_late_ms } else { failsafe.simulator_late_ms },
             idle_s: if hardware { failsafe.hardware_idle_s } else { failsafe.simulator_idle_s },
         })
+    }
+
+    /// Checks the limits of the files, as loaded, and of the robot's motors against their ranges for hardware.
+    fn check_hardware(&self, robot: &RobotDescription) -> Result<(), ConfigError> {
+        for (name, default) in FILES {
+            let text = self.as_run.iter().find(|(file, _)| file == name).map_or("", |(_, text)| text.as_str());
+            ranges::check_hardware(name, &template(text), &template(default), &self.origins[name])?;
+        }
+        ranges::check_motors(robot)
     }
 
     /// Returns the scheduling that the control thread requests.
@@ -300,13 +313,6 @@ fn without_type_names(message: &str) -> String {
         kind => kind.to_owned(),
     };
     format!("{found}expected {kind}")
-}
-
-/// Returns the value of a key with its tables.
-fn lookup<'a>(table: &'a Table, key: &str) -> Option<&'a toml::Value> {
-    let mut parts = key.split('.');
-    let first = table.get(parts.next()?)?;
-    parts.try_fold(first, |value, part| value.get(part))
 }
 
 /// Rejects a folder that does not exist, and TOML files that are not read: probably a misspelt name.

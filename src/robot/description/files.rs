@@ -117,15 +117,11 @@ impl RobotFiles {
         let robot: RobotToml = self.toml()?;
         let invalid = |element: &str, problem: String, remedy| Err(self.invalid(element, problem, remedy));
         let inertia = robot.motor.rotor_inertia_kgm2;
-        if !(inertia.is_finite() && inertia >= 0.0) {
-            return invalid("motor.rotor_inertia_kgm2", format!("{inertia} kg m^2"), "give zero or a positive number");
+        if !(0.0..=0.1).contains(&inertia) {
+            return invalid("motor.rotor_inertia_kgm2", format!("{inertia} kg m^2"), "give 0 to 0.1 kg m^2");
         }
-        if let Some(ratio) = robot.motor.gear_ratio.iter().find(|r| !(r.is_finite() && **r > 0.0)) {
-            return invalid(
-                "motor.gear_ratio",
-                format!("{ratio}"),
-                "give rotor turns per joint turn, greater than zero",
-            );
+        if let Some(ratio) = robot.motor.gear_ratio.iter().find(|ratio| !(0.1..=1000.0).contains(*ratio)) {
+            return invalid("motor.gear_ratio", format!("{ratio}"), "give 0.1 to 1000 rotor turns per joint turn");
         }
 
         let file = self.folder.join(&robot.urdf);
