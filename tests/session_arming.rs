@@ -73,7 +73,7 @@ impl Session {
             ticks: collected,
             sinks: RecordSinks { recorder: to_recorder, console: to_screen },
             recorder: RecorderWatch::default(),
-            checklist: ArmingChecklist::new(&settings, fingerprint(&options.config), folder),
+            checklist: ArmingChecklist::new(&settings, fingerprint(&options.config, &options.robot), folder),
             info: session_info(&options, ""),
         };
         Session {

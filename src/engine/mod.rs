@@ -70,7 +70,7 @@ pub fn start(options: Options) -> Result<EngineHandle, EngineError> {
     let (guard, guard_heartbeat) = guard.unzip();
     let clock = MonotonicClock::start();
     let writer = match &recording {
-        Some(path) => Some(Writer::create(path, &info, utc_ns(), &attachments(&options.config))?),
+        Some(path) => Some(Writer::create(path, &info, utc_ns(), &attachments(&options))?),
         None => None,
     };
 
@@ -105,7 +105,7 @@ pub fn start(options: Options) -> Result<EngineHandle, EngineError> {
 
     let (to_supervisor, requests) = channel();
     let recorded_in = recording.as_ref().and(options.folder.clone());
-    let checklist = ArmingChecklist::new(&settings, fingerprint(&options.config), recorded_in);
+    let checklist = ArmingChecklist::new(&settings, fingerprint(&options.config, &options.robot), recorded_in);
     let parts = SupervisorParts { experiment, control: session_end, ticks, sinks, recorder: status, checklist, info };
     let simulated = options.backend == Backend::Simulator;
     let mut supervisor = Supervisor::new(parts, clock.now_ns()).approving(options.approve, simulated);

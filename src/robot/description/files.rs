@@ -130,6 +130,7 @@ impl RobotFiles {
             None => read(file.clone())?.into(),
         };
         let parts = urdf::parse(&file, &urdf)?;
+        let urdf_name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
 
         let mut lying_position = Joints::default();
         let mut rotor_inertia = Joints::default();
@@ -161,6 +162,7 @@ impl RobotFiles {
             lying_position,
             rotor_inertia,
             imu_origin: parts.imu_origin.unwrap_or_else(Vector3::zeros),
+            files: vec![("robot.toml".to_owned(), self.toml.to_string()), (urdf_name, urdf.into_owned())],
         })
     }
 }

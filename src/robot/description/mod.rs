@@ -92,6 +92,8 @@ pub struct RobotDescription {
     pub rotor_inertia: Joints,
     /// Position of the inertial unit, trunk frame, m; its axes are the trunk's.
     pub imu_origin: Vector3<f64>,
+    /// Name and text of the files: `robot.toml` and the URDF.
+    pub files: Vec<(String, String)>,
 }
 
 impl RobotDescription {

@@ -232,7 +232,7 @@ struct StudyRecorder {
 impl StudyRecorder {
     fn create(path: &Path, options: &Options) -> Result<StudyRecorder, EngineError> {
         let info = engine::session_info(options, &path.display().to_string());
-        let writer = Writer::create(path, &info, engine::utc_ns(), &engine::attachments(&options.config))?;
+        let writer = Writer::create(path, &info, engine::utc_ns(), &engine::attachments(options))?;
         Ok(StudyRecorder { writer, time_ns: 0 })
     }
 
