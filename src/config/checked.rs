@@ -16,7 +16,7 @@ use crate::realtime::scheduling::Scheduling;
 use crate::recording::record::HealthLimits;
 use crate::robot::GRAVITY;
 use crate::robot::Leg;
-use crate::robot::description::RobotDescription;
+use crate::robot::description::{RobotDescription, read_text};
 use crate::sim::SimConfig;
 use crate::trial::{Backend, GAIN_UNITS, ParameterInfo, ParameterValues, Task, parameter_unit};
 
@@ -75,8 +75,7 @@ impl Config {
             let default = merge(&embedded, default_text, &template(default_text), &optional)?;
             let (table, origin) = match folder.map(|folder| folder.join(name)).filter(|path| path.exists()) {
                 Some(path) => {
-                    let text = std::fs::read_to_string(&path)
-                        .map_err(|source| ConfigError::Read { path: path.clone(), source })?;
+                    let text = read_text(&path).map_err(|source| ConfigError::Read { path: path.clone(), source })?;
                     merge(&path.display().to_string(), &text, &default.0, &optional)?
                 }
                 None => default,

@@ -1,6 +1,8 @@
 //! Reads a robot's description from a folder, or from the copies embedded in the program.
 
 use std::borrow::Cow;
+use std::fs::File;
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 use nalgebra::Vector3;
@@ -190,6 +192,31 @@ impl RobotDescription {
     }
 }
 
+/// Largest file of a robot or of a configuration, bytes: a hundred times the largest of the repository.
+pub const LARGEST_FILE: u64 = 1 << 20;
+
+/// Reads a text file of at most [`LARGEST_FILE`] bytes.
+///
+/// # Errors
+/// The file cannot be read, is not a regular file (a device may have no end), is larger, or is not UTF-8.
+pub fn read_text(file: &Path) -> io::Result<String> {
+    let metadata = std::fs::metadata(file)?;
+    if !metadata.is_file() {
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, "it is not a regular file"));
+    }
+    let too_large = || {
+        let reason = format!("it has more than {LARGEST_FILE} bytes, the most for a description or configuration");
+        io::Error::new(io::ErrorKind::FileTooLarge, reason)
+    };
+    if metadata.len() > LARGEST_FILE {
+        return Err(too_large());
+    }
+    let mut text = String::new();
+    // The file may grow meanwhile, and some of the system's files have no length.
+    let read = File::open(file)?.take(LARGEST_FILE + 1).read_to_string(&mut text)?;
+    if read as u64 > LARGEST_FILE { Err(too_large()) } else { Ok(text) }
+}
+
 fn read(file: PathBuf) -> Result<String, DescriptionError> {
-    std::fs::read_to_string(&file).map_err(|e| DescriptionError::Read { file, reason: e.to_string() })
+    read_text(&file).map_err(|e| DescriptionError::Read { file, reason: e.to_string() })
 }

@@ -7,12 +7,13 @@
 
 mod files;
 mod urdf;
+mod urdf_checks;
 
 use std::path::PathBuf;
 
 use nalgebra::{Matrix3, Vector3};
 
-pub use files::RobotFiles;
+pub use files::{LARGEST_FILE, RobotFiles, read_text};
 
 use super::kinematics::LegGeometry;
 use super::{JOINTS, Joints, PerLeg};
