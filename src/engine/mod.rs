@@ -121,9 +121,18 @@ pub fn start(options: Options) -> Result<EngineHandle, EngineError> {
         supervisor.report_scheduling(&granted, &denied, clock.now_ns());
     }
     let sits_down = options.backend == Backend::Hardware;
+    let inhibits = sits_down && !options.observe && SleepLock::available();
+    let sleep_lock = match inhibits.then(|| SleepLock::take(Path::new(INHIBITOR))).transpose() {
+        Ok(lock) => lock,
+        Err(error) => {
+            let message = format!("{INHIBITOR} cannot be run ({error}): the computer may suspend; {ALLOW_INHIBITOR}");
+            supervisor.report_warning(message, clock.now_ns());
+            None
+        }
+    };
     let session = std::thread::Builder::new()
         .name("session".into())
-        .spawn(move || session_thread::run(supervisor, guard, &requests, &clock, sits_down))
+        .spawn(move || session_thread::run(supervisor, guard, sleep_lock, &requests, &clock, sits_down))
         .map_err(system("session thread"))?;
 
     Ok(EngineHandle {

@@ -61,13 +61,26 @@ pub enum Fault {
     /// The ring of events is full or abandoned.
     #[error("the session does not take events")]
     EventsLost,
+    /// Time is that by which CLOCK_BOOTTIME ran ahead of CLOCK_MONOTONIC.
+    #[error("the computer was suspended for {suspended_ms} ms, limit {allowed_ms} ms")]
+    Suspended { suspended_ms: u32, allowed_ms: u32 },
+    /// The time is `u32::MAX` when the guard process has ended.
+    #[error("{}", guard_silent(*.silent_ms, *.allowed_ms))]
+    GuardSilent { silent_ms: u32, allowed_ms: u32 },
 }
 
 impl Fault {
     /// Whether the fault voids the operator's confirmations: the robot may have restarted, which ends low-level mode, or a person
     /// may have been at it. Such a fault is reported also when another one is latched.
     pub fn voids_confirmations(&self) -> bool {
-        matches!(self, Fault::Reboot | Fault::LinkLost { .. } | Fault::MotorMode { .. })
+        matches!(self, Fault::Reboot | Fault::LinkLost { .. } | Fault::MotorMode { .. } | Fault::Suspended { .. })
+    }
+}
+
+fn guard_silent(silent_ms: u32, allowed_ms: u32) -> String {
+    match silent_ms {
+        u32::MAX => "the guard process has ended: nothing damps the robot if quadfrog is killed".to_owned(),
+        _ => format!("the guard process does not answer for {silent_ms} ms, limit {allowed_ms} ms"),
     }
 }
 

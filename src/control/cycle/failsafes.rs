@@ -31,6 +31,8 @@ impl Cycle {
             send_error: self.send_error.take(),
             operator_silent_ms: inputs.operator_silent_ms,
             events_lost: inputs.events_lost,
+            suspended_ms: inputs.suspended_ms,
+            guard_silent_ms: inputs.guard_silent_ms,
         };
         let trip = self.failsafe.check(&failsafe_inputs, &self.settings);
         self.warning = match (failsafe::warning(&failsafe_inputs, &self.settings), self.warning) {
