@@ -37,6 +37,10 @@ pub enum ArmingCheck {
     StopTested,
     #[strum(serialize = "motors follow")]
     MotorsFollow,
+    #[strum(serialize = "real-time priority")]
+    Priority,
+    #[strum(serialize = "locked memory")]
+    LockedMemory,
 }
 
 impl ArmingCheck {

@@ -151,8 +151,9 @@ impl Supervisor {
         supervisor
     }
 
-    /// Logs the real-time settings that the control thread was granted and denied.
+    /// Takes in the real-time settings that the control thread was granted and denied: arming checks on hardware.
     pub fn report_scheduling(&mut self, granted: &[RealtimeSetting], denied: &[DeniedSetting], time_ns: u64) {
+        self.checklist.scheduled(granted, denied);
         if !granted.is_empty() {
             let granted: Vec<_> = granted.iter().map(ToString::to_string).collect();
             self.log(LogLevel::Info, format!("control thread: {}", granted.join(", ")), time_ns);
