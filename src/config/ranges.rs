@@ -66,6 +66,34 @@ const CONTROL_HARDWARE: &[Row] = &[
 ];
 
 const SAFETY: &[Row] = &[
+    (&["consistency.repeated_states"], within!(10, 200, "states")),
+    // Gravity is 9.81.
+    (&["consistency.gravity_m_s2", "pre_arm.gravity_m_s2"], within!(0.1, 3, "m/s^2")),
+    // A robot tips beyond.
+    (
+        &[
+            "consistency.orientation_rad",
+            "consistency.turn_rad",
+            "consistency.joint_velocity_rad",
+            "pre_arm.gravity_rad",
+        ],
+        within!(0.01, 0.3, "rad"),
+    ),
+    (&["consistency.foot_load_least_share"], within!(0.05, 0.9, "of the weight")),
+    (&["consistency.foot_load_most_share", "pre_arm.foot_load_share"], within!(1.1, 3, "weights")),
+    // A flight lasts half a second.
+    (
+        &["consistency.foot_load_s", "consistency.free_fall_contact_s", "consistency.unsupported_s"],
+        within!(0.02, 1, "s"),
+    ),
+    // Zero in free fall, 9.81 at rest.
+    (&["consistency.free_fall_m_s2"], within!(0.5, 5, "m/s^2")),
+    (&["consistency.clock_step_ms"], within!(20, 1000, "ms")),
+    (&["consistency.loss_share"], within!(0.005, 0.5, "of the states")),
+    (&["consistency.torque_n_m"], within!(0.5, 20, "N m")),
+    // Below 0.2 s a slow disk would refuse every approval.
+    (&["approval.expires_s"], within!(0.2, 30, "s")),
+    (&["hop_envelope.*"], within!(0.01, 1)),
     (&["fall.body_contact_s"], within!(0.001, 60, "s")),
     (&["fall.*"], within!(0.01, 3.15, "rad")),
     (&["gate.torque_step_nm"], within!(0.01, 1000, "N m")),
@@ -84,7 +112,7 @@ const SAFETY: &[Row] = &[
     (&["*.motor_c", "watchdog.motor_warm_c"], within!(1, 200, "degrees Celsius")),
     (&["pre_arm.gyro_rad_s"], within!(0.001, 100, "rad/s")),
     (&["pre_arm.still_s"], within!(0.01, 60, "s")),
-    (&["pre_arm.area_clear_s", "approval.expires_s"], within!(0.1, 86400, "s")),
+    (&["pre_arm.area_clear_s"], within!(0.1, 86400, "s")),
     (&["*.disk_free_mb"], within!(0, 1e9, "MB")),
     (&["watchdog.velocity_factor", "watchdog.torque_factor"], within!(1, 100, "(below 1 it trips on allowed values)")),
     (&["watchdog.period_factor"], within!(1, 1000, "(below 1 it trips on allowed values)")),

@@ -4,6 +4,7 @@
 //! A fall during a trial is an outcome of the trial, detected by `running_trial::FallWatch`; it damps as well.
 
 use super::command_gate;
+use super::consistency::Consistency;
 use super::settings::ControlSettings;
 use crate::robot::{CONTROL_PERIOD_S, JOINTS, LinkStatus, RobotState};
 use crate::telemetry::{Estimate, FailsafeWarning, Fault, Mode, TrialInhibit};
@@ -31,6 +32,8 @@ pub struct FailsafeInputs<'a> {
     pub operator_silent_ms: u32,
     /// The session takes no events.
     pub events_lost: bool,
+    /// Consistency of sensors, clocks and commands.
+    pub consistency: &'a Consistency,
     /// Time for which the computer was suspended since the last tick, ms.
     pub suspended_ms: u32,
     /// Time for which the guard has not answered, ms; `u32::MAX` when it is gone, zero without a guard.
@@ -72,7 +75,8 @@ const fn cut(
 
 /// The table, by precedence: the first row that trips counts. A cause that makes measured numbers invalid stands above the rows
 /// that compare them.
-const TABLE: [FailsafeRow; 18] = [
+const TABLE: [FailsafeRow; 22] = [
+    cut(remote_stop, Mode::commanded),
     cut(events_lost, Mode::commanded),
     // True in one tick only.
     cut(suspended, Mode::commanded),
@@ -80,17 +84,21 @@ const TABLE: [FailsafeRow; 18] = [
     cut(state_age, Mode::commanded),
     // True in one tick only, and a robot that boots may report numbers that are not finite.
     cut(reboot, Mode::commanded),
+    cut(robot_clock, Mode::commanded),
     cut(not_finite, Mode::commanded),
     cut(corrupt, Mode::commanded),
     cut(send_error, Mode::commanded),
     cut(late, Mode::commanded),
     cut(slow, Mode::commanded),
     cut(motor_hot, Mode::commanded),
+    // Above the single motor: no command of ours takes all of them out of servo mode.
+    cut(other_commander, Mode::energised),
     cut(motor_mode, energised_or_faulted),
     cut(joint_position, Mode::energised),
     cut(joint_velocity, Mode::energised),
     cut(joint_torque, Mode::energised),
     cut(tilt, outside_a_trial),
+    cut(sensors, Mode::energised),
     FailsafeRow { cause: operator_silent, modes: Mode::energised, action: FailsafeAction::Land },
     FailsafeRow { cause: guard_silent, modes: Mode::energised, action: FailsafeAction::Land },
 ];
@@ -106,7 +114,7 @@ const fn outside_a_trial(mode: Mode) -> bool {
     matches!(mode, Mode::StandUp | Mode::Ready | Mode::Countdown | Mode::SitDown)
 }
 
-/// Timing of the last ticks, for the rows `late` and `slow`.
+/// Periods of the last ticks, for the row `slow`.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Failsafe {
     /// Start of the last tick, ns.
@@ -181,6 +189,23 @@ fn suspended(_: &Failsafe, inputs: &FailsafeInputs, settings: &ControlSettings) 
 fn guard_silent(_: &Failsafe, inputs: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {
     let (silent_ms, allowed_ms) = (inputs.guard_silent_ms, settings.failsafe.guard_silent_ms);
     (silent_ms > allowed_ms).then_some(Fault::GuardSilent { silent_ms, allowed_ms })
+}
+
+fn remote_stop(_: &Failsafe, inputs: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {
+    let pressed = inputs.state.remote.is_some_and(|remote| remote.buttons.contains(settings.remote.stop));
+    pressed.then_some(Fault::RemoteStop)
+}
+
+fn robot_clock(_: &Failsafe, inputs: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {
+    inputs.consistency.clock_fault(&settings.consistency)
+}
+
+fn sensors(_: &Failsafe, inputs: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {
+    inputs.consistency.sensor_fault(inputs.mode, &settings.consistency)
+}
+
+fn other_commander(_: &Failsafe, inputs: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {
+    inputs.consistency.commander_fault(inputs.mode, &settings.consistency)
 }
 
 fn link_lost(_: &Failsafe, inputs: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {

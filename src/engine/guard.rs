@@ -79,7 +79,7 @@ pub struct Guard {
     gone: bool,
 }
 
-/// The control thread's end of the connection. Dropped without [`GuardHeartbeat::release`], as in a panic, it makes the guard
+/// The control thread's end of the connection. Dropped without [`GuardHeartbeat::release`], as when the process ends, it makes the guard
 /// damp the robot.
 #[derive(Debug)]
 pub struct GuardHeartbeat {
