@@ -13,6 +13,7 @@ use quadfrog::engine::{Options, fingerprint, open_experiment, session_info};
 use quadfrog::optimize::journal::Durability;
 use quadfrog::realtime::channel::{ConsoleEnd, channels};
 use quadfrog::realtime::clock::SimulatedClock;
+use quadfrog::realtime::scheduling::{ALLOW_LOCKING, ALLOW_PRIORITY, DeniedSetting, RealtimeSetting};
 use quadfrog::realtime::thread::TickStart;
 use quadfrog::recording::record::{ArmingCheckRecord, Record, RequestRecord, Stamped};
 use quadfrog::recording::recorder::RecorderWatch;
@@ -73,7 +74,7 @@ impl Session {
             ticks: collected,
             sinks: RecordSinks { recorder: to_recorder, console: to_screen },
             recorder: RecorderWatch::default(),
-            checklist: ArmingChecklist::new(&settings, fingerprint(&options.config), folder),
+            checklist: ArmingChecklist::new(&settings, fingerprint(&options.config, &options.robot), folder),
             approval: settings.approval,
             info: session_info(&options, ""),
         };
@@ -214,6 +215,48 @@ fn without_its_guard_a_robot_is_not_armed() {
         "what energises nothing goes on"
     );
     assert_eq!(session.body.mode(), Mode::Disarmed);
+}
+
+/// (A defect once: a stopped guard was not noticed, and jumps were approved meanwhile.)
+#[test]
+fn while_its_guard_does_not_answer_a_robot_is_not_armed() {
+    let mut session = Session::cleared();
+    session.supervisor.report_guard_silent(true, session.time_ms * 1_000_000);
+    let answer = session.request(OperatorRequest::Arm);
+    assert!(!answer.accepted && answer.answer.contains("does not answer"), "{answer:?}");
+    session.supervisor.report_guard_silent(false, session.time_ms * 1_000_000);
+    assert!(session.request(OperatorRequest::Arm).accepted);
+}
+
+/// (A defect once: what the system denied was a line in the log.)
+#[test]
+fn denied_real_time_settings_are_confirmed_before_arming_each_with_its_remedy() {
+    let cleared = |granted: &[RealtimeSetting], denied: &[DeniedSetting]| {
+        let mut session = Session::hardware();
+        session.supervisor.report_scheduling(granted, denied, session.time_ms * 1_000_000);
+        session.test_stop();
+        for check in [OperatorCheck::LowLevel, OperatorCheck::Configuration, OperatorCheck::AreaClear] {
+            assert!(session.request(OperatorRequest::Confirm(check)).accepted);
+        }
+        session
+    };
+    let settings = [RealtimeSetting::Priority(80), RealtimeSetting::LockedMemory];
+    assert!(cleared(&settings, &[]).request(OperatorRequest::Arm).accepted, "granted");
+
+    let remedies = [ALLOW_PRIORITY, ALLOW_LOCKING];
+    let denied = |i: usize| DeniedSetting { setting: settings[i], reason: "not permitted".into(), remedy: remedies[i] };
+    let checks = [OperatorCheck::Priority, OperatorCheck::LockedMemory];
+    for i in [0, 1] {
+        let mut session = cleared(&[settings[1 - i]], &[denied(i)]);
+        let answer = session.request(OperatorRequest::Arm);
+        let name = checks[i].check().name();
+        assert!(!answer.accepted && answer.answer.starts_with(name), "{answer:?}");
+        assert!(answer.answer.contains(remedies[i]) && answer.answer.contains("not permitted"), "{answer:?}");
+        assert!(session.request(OperatorRequest::Confirm(checks[i])).accepted);
+        assert!(session.request(OperatorRequest::Arm).accepted);
+    }
+    let answer = cleared(&[], &[]).request(OperatorRequest::Arm);
+    assert!(!answer.accepted && answer.answer.contains("not requested"), "{answer:?}");
 }
 
 /// (A defect once: a confirmation of the morning armed the robot in the evening.)

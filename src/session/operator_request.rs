@@ -15,12 +15,21 @@ pub enum OperatorCheck {
     Configuration,
     /// No person is within 2 m of the robot, and the remote is in hand. Holds for one arming.
     AreaClear,
+    /// The control thread may run without the real-time priority that the system denied.
+    Priority,
+    /// The program may run without the locked memory that the system denied.
+    LockedMemory,
 }
 
 impl OperatorCheck {
     /// All of them.
-    pub const ALL: [OperatorCheck; 3] =
-        [OperatorCheck::LowLevel, OperatorCheck::Configuration, OperatorCheck::AreaClear];
+    pub const ALL: [OperatorCheck; 5] = [
+        OperatorCheck::LowLevel,
+        OperatorCheck::Configuration,
+        OperatorCheck::AreaClear,
+        OperatorCheck::Priority,
+        OperatorCheck::LockedMemory,
+    ];
 
     /// Returns the arming check.
     pub const fn check(self) -> ArmingCheck {
@@ -28,6 +37,8 @@ impl OperatorCheck {
             OperatorCheck::LowLevel => ArmingCheck::LowLevel,
             OperatorCheck::Configuration => ArmingCheck::Configuration,
             OperatorCheck::AreaClear => ArmingCheck::AreaClear,
+            OperatorCheck::Priority => ArmingCheck::Priority,
+            OperatorCheck::LockedMemory => ArmingCheck::LockedMemory,
         }
     }
 }

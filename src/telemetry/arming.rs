@@ -51,6 +51,10 @@ pub enum ArmingCheck {
     JointVelocity,
     #[strum(serialize = "remote answers")]
     Remote,
+    #[strum(serialize = "real-time priority")]
+    Priority,
+    #[strum(serialize = "locked memory")]
+    LockedMemory,
 }
 
 impl ArmingCheck {

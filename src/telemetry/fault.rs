@@ -74,6 +74,12 @@ pub enum Fault {
     OtherCommander { sign: CommanderSign, measured: f64, allowed: f64 },
     #[error("stop buttons of the remote control pressed")]
     RemoteStop,
+    /// Time is that by which CLOCK_BOOTTIME ran ahead of CLOCK_MONOTONIC.
+    #[error("the computer was suspended for {suspended_ms} ms, limit {allowed_ms} ms")]
+    Suspended { suspended_ms: u32, allowed_ms: u32 },
+    /// The time is `u32::MAX` when the guard process has ended.
+    #[error("{}", guard_silent(*.silent_ms, *.allowed_ms))]
+    GuardSilent { silent_ms: u32, allowed_ms: u32 },
 }
 
 /// A check of sensors against each other while the robot is commanded. The order is the order of the checks.
@@ -166,7 +172,15 @@ impl Fault {
                 | Fault::MotorMode { .. }
                 | Fault::RobotClock { .. }
                 | Fault::OtherCommander { .. }
+                | Fault::Suspended { .. }
         )
+    }
+}
+
+fn guard_silent(silent_ms: u32, allowed_ms: u32) -> String {
+    match silent_ms {
+        u32::MAX => "the guard process has ended: nothing damps the robot if quadfrog is killed".to_owned(),
+        _ => format!("the guard process does not answer for {silent_ms} ms, limit {allowed_ms} ms"),
     }
 }
 

@@ -32,6 +32,7 @@ const COUNTERS_PERIOD_NS: u64 = 100_000_000;
 const RECORDER_GONE: &str = "the recorder's thread has ended";
 const GUARD_LOST: &str =
     "the guard process has ended: nothing damps the robot if quadfrog is killed; sit down, quit and start again";
+const GUARD_SILENT: &str = "the guard process does not answer: nothing damps the robot if quadfrog is killed; continue the process if it is stopped (`kill -CONT`), otherwise sit down, quit and start again";
 
 /// Period of reading the changes of other programs to the study, ns.
 const REFRESH_PERIOD_NS: u64 = 500_000_000;
@@ -107,7 +108,8 @@ pub struct Supervisor {
     measured: VecDeque<TrialTicks>,
     recorder_error: Option<String>,
     recorder_gone: bool,
-    guard_lost: bool,
+    /// Reason for which the guard does not protect the robot; none while it does.
+    guard_objection: Option<&'static str>,
     observe: bool,
     control_requested: bool,
     /// Heartbeats of the console when control was refused last: it is requested again after the next.
@@ -152,7 +154,7 @@ impl Supervisor {
             measured: VecDeque::new(),
             recorder_error: None,
             recorder_gone: false,
-            guard_lost: false,
+            guard_objection: None,
             observe,
             control_requested: false,
             heartbeats: 0,
@@ -173,8 +175,9 @@ impl Supervisor {
         supervisor
     }
 
-    /// Logs the real-time settings that the control thread was granted and denied.
+    /// Takes in the real-time settings that the control thread was granted and denied: arming checks on hardware.
     pub fn report_scheduling(&mut self, granted: &[RealtimeSetting], denied: &[DeniedSetting], time_ns: u64) {
+        self.checklist.scheduled(granted, denied);
         if !granted.is_empty() {
             let granted: Vec<_> = granted.iter().map(ToString::to_string).collect();
             self.log(LogLevel::Info, format!("control thread: {}", granted.join(", ")), time_ns);
@@ -187,8 +190,22 @@ impl Supervisor {
     /// Records that the guard process has ended. Nothing that energises the robot is begun any more: without the guard
     /// nothing damps the robot if this process is killed.
     pub fn report_guard_lost(&mut self, time_ns: u64) {
-        self.guard_lost = true;
+        self.guard_objection = Some(GUARD_LOST);
         self.log(LogLevel::Error, GUARD_LOST.to_owned(), time_ns);
+    }
+
+    /// Records whether the guard process answers. While it does not, nothing that energises the robot is begun.
+    pub fn report_guard_silent(&mut self, silent: bool, time_ns: u64) {
+        self.guard_objection = silent.then_some(GUARD_SILENT);
+        match silent {
+            true => self.log(LogLevel::Error, GUARD_SILENT.to_owned(), time_ns),
+            false => self.log(LogLevel::Info, "the guard process answers again".to_owned(), time_ns),
+        }
+    }
+
+    /// Logs a warning of the engine.
+    pub fn report_warning(&mut self, message: String, time_ns: u64) {
+        self.log(LogLevel::Warning, message, time_ns);
     }
 
     /// Returns the mode that was reported to the session last.
@@ -255,8 +272,8 @@ impl Supervisor {
             Some(Err("this session only observes".to_owned()))
         } else if energises && self.control.stop.count() != *stops {
             Some(Err("STOP was pressed after it".to_owned()))
-        } else if energises && self.guard_lost {
-            Some(Err(GUARD_LOST.to_owned()))
+        } else if energises && let Some(objection) = self.guard_objection {
+            Some(Err(objection.to_owned()))
         } else {
             self.unattended.requested(request);
             self.answer(stamped, Asker::Operator, time_ns)
