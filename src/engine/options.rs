@@ -33,6 +33,8 @@ pub struct Options {
     /// The program that guards a real robot when it is run with [`GUARD`](super::GUARD): it damps the robot when this process
     /// sends no heartbeat. None: no guard.
     pub guard: Option<PathBuf>,
+    /// Reason why the loss of the operator's connection cannot be detected; none if it can. An arming check on hardware.
+    pub unseen_connection: Option<String>,
 }
 
 impl Options {
@@ -51,6 +53,7 @@ impl Options {
             approve: Approval::Each,
             join: None,
             guard: None,
+            unseen_connection: None,
         }
     }
 

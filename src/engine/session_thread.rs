@@ -33,7 +33,8 @@ pub fn run(
         if guard.as_mut().is_some_and(Guard::lost) {
             supervisor.report_guard_lost(clock.now_ns());
         }
-        if supervisor.mode() == Mode::Observe {
+        // A real robot is taken control of with a key: another program may command it.
+        if supervisor.mode() == Mode::Observe && (!sits_down || supervisor.control_wanted()) {
             supervisor.take_control();
         }
         match requests.recv_timeout(SESSION_PERIOD) {

@@ -37,6 +37,8 @@ pub struct ArmingChecklist {
     /// Restarts of the robot that were taken in.
     reboots: u64,
     stop: StopTest,
+    /// Reason why the loss of the operator's connection cannot be detected; none if it can.
+    unseen_connection: Option<String>,
 }
 
 impl ArmingChecklist {
@@ -53,7 +55,14 @@ impl ArmingChecklist {
             area_ns: 0,
             reboots: 0,
             stop: StopTest::Open,
+            unseen_connection: None,
         }
+    }
+
+    /// Adds the reason why the loss of the operator's connection cannot be detected; none if it can.
+    pub fn with_unseen_connection(mut self, reason: Option<String>) -> ArmingChecklist {
+        self.unseen_connection = reason;
+        self
     }
 
     /// Takes in the operator's confirmation of a check.
@@ -140,6 +149,7 @@ impl ArmingChecklist {
                 "no person within 2 m; the operator's confirmation",
             ),
             self.stop_tested(),
+            self.connection(),
         ];
         found.chain(own).collect()
     }
@@ -186,6 +196,17 @@ impl ArmingChecklist {
         let state = if given { ArmingCheckState::Passed } else { ArmingCheckState::Waiting };
         let found = format!("{about}{}", if given { "confirmed" } else { "not confirmed" });
         self.item(check, state, found, needed.to_owned())
+    }
+
+    fn connection(&self) -> ArmingCheckRecord {
+        let needed = "its loss is detected, or the operator's confirmation";
+        match &self.unseen_connection {
+            Some(reason) => self.confirmation(OperatorCheck::Connection, format!("{reason}, "), needed),
+            None => {
+                let found = "its loss is detected".to_owned();
+                self.item(ArmingCheck::Connection, ArmingCheckState::Passed, found, needed.to_owned())
+            }
+        }
     }
 
     fn stop_tested(&self) -> ArmingCheckRecord {

@@ -15,12 +15,14 @@ pub enum OperatorCheck {
     Configuration,
     /// No person is within 2 m of the robot, and the remote is in hand. Holds for one arming.
     AreaClear,
+    /// The loss of the operator's connection cannot be detected; somebody else watches the robot.
+    Connection,
 }
 
 impl OperatorCheck {
     /// All of them.
-    pub const ALL: [OperatorCheck; 3] =
-        [OperatorCheck::LowLevel, OperatorCheck::Configuration, OperatorCheck::AreaClear];
+    pub const ALL: [OperatorCheck; 4] =
+        [OperatorCheck::LowLevel, OperatorCheck::Configuration, OperatorCheck::AreaClear, OperatorCheck::Connection];
 
     /// Returns the arming check.
     pub const fn check(self) -> ArmingCheck {
@@ -28,6 +30,7 @@ impl OperatorCheck {
             OperatorCheck::LowLevel => ArmingCheck::LowLevel,
             OperatorCheck::Configuration => ArmingCheck::Configuration,
             OperatorCheck::AreaClear => ArmingCheck::AreaClear,
+            OperatorCheck::Connection => ArmingCheck::Connection,
         }
     }
 }
@@ -91,6 +94,8 @@ pub enum OperatorRequest {
     Enqueue(Vec<(String, f64)>),
     /// Raise the budget by this many trials.
     Continue(u32),
+    /// Take control of a real robot: the first commands are sent to it.
+    TakeControl,
 }
 
 impl fmt::Display for OperatorRequest {
@@ -127,6 +132,7 @@ impl fmt::Display for OperatorRequest {
                 write!(f, "queue {}", values.join(", "))
             }
             OperatorRequest::Continue(trials) => write!(f, "continue for {trials} trials"),
+            OperatorRequest::TakeControl => f.write_str("take control"),
         }
     }
 }

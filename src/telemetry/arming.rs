@@ -51,6 +51,8 @@ pub enum ArmingCheck {
     JointVelocity,
     #[strum(serialize = "remote answers")]
     Remote,
+    #[strum(serialize = "operator's connection")]
+    Connection,
 }
 
 impl ArmingCheck {

@@ -119,6 +119,18 @@ impl Supervisor {
                 self.experiment.enqueue(parameters).map_err(reason)?;
                 Ok("queued".to_owned())
             }
+            OperatorRequest::TakeControl => match self.mode {
+                Mode::Offline => {
+                    self.command(Command::Contact)?;
+                    self.control_wanted = true;
+                    Ok("braking commands are sent until the robot answers, then damping".to_owned())
+                }
+                Mode::Observe => {
+                    self.control_wanted = true;
+                    Ok("damping is sent from now on".to_owned())
+                }
+                mode => Err(format!("the robot is {}: this session commands it already", mode.name())),
+            },
             OperatorRequest::Continue(trials) => {
                 self.experiment.extend(*trials).map_err(reason)?;
                 Ok(format!("the study now has {} trials", self.experiment.budget()))
