@@ -59,6 +59,14 @@ impl Session {
     }
 
     fn begin(backend: Backend, folder: Option<std::path::PathBuf>, observe: bool) -> Session {
+        Session::start(backend, folder, observe, None)
+    }
+
+    fn begin_unseen(backend: Backend, folder: Option<std::path::PathBuf>, unseen: Option<String>) -> Session {
+        Session::start(backend, folder, false, unseen)
+    }
+
+    fn start(backend: Backend, folder: Option<std::path::PathBuf>, observe: bool, unseen: Option<String>) -> Session {
         let config = Config::load(None).unwrap();
         let robot = RobotDescription::embedded("go1").unwrap();
         let options = Options { trials: Some(5), observe, ..Options::new(config, robot, backend, Task::Forward) };
@@ -74,7 +82,8 @@ impl Session {
             ticks: collected,
             sinks: RecordSinks { recorder: to_recorder, console: to_screen },
             recorder: RecorderWatch::default(),
-            checklist: ArmingChecklist::new(&settings, fingerprint(&options.config, &options.robot), folder),
+            checklist: ArmingChecklist::new(&settings, fingerprint(&options.config, &options.robot), folder)
+                .with_unseen_connection(unseen),
             approval: settings.approval,
             info: session_info(&options, ""),
         };
@@ -550,4 +559,64 @@ proptest! {
             area &= session.body.mode().energised() || !before.energised();
         }
     }
+}
+
+/// A person with a tape goes to the robot in REVIEW.
+#[test]
+fn a_robot_sits_down_at_the_end_of_a_trial_if_so_configured() {
+    for sits_down in [true, false] {
+        let session = Session::hardware();
+        let supervisor = session.supervisor.sitting_down_for_review(sits_down);
+        let mut session = Session { supervisor, ..session };
+        session.test_stop();
+        for check in OperatorCheck::ALL {
+            assert!(session.request(OperatorRequest::Confirm(check)).accepted);
+        }
+        let answer = session.request(OperatorRequest::Arm);
+        assert!(answer.accepted, "{answer:?}");
+        session.ticks(4000);
+        assert_eq!(session.body.mode(), Mode::Ready);
+        let proposal = session.records.iter().rev().find_map(|record| match record {
+            Record::Proposal(proposal) => Some((proposal.trial, proposal.revision)),
+            _ => None,
+        });
+        let (trial, revision) = proposal.expect("a proposal");
+        let answer = session.request(OperatorRequest::Approve { trial, revision });
+        assert!(answer.accepted, "{answer:?}");
+        session.records.clear();
+        session.ticks(15_000);
+        let entered = session.records.iter().filter_map(|record| match record {
+            Record::Transition(change) => Some(change.to),
+            _ => None,
+        });
+        let after: Vec<Mode> = entered.skip_while(|mode| *mode != Mode::Review).collect();
+        let expected = if sits_down { &[Mode::Review, Mode::SitDown, Mode::Disarmed][..] } else { &[Mode::Review] };
+        assert_eq!(after, expected);
+        if sits_down {
+            assert_eq!(session.state(ArmingCheck::AreaClear), ArmingCheckState::Waiting, "a person may go to it now");
+        }
+    }
+}
+
+/// With mosh or in tmux the loss of the operator is not detected, so the robot would go on.
+#[test]
+fn a_connection_that_cannot_be_seen_is_confirmed_before_a_real_robot_is_armed() {
+    let mut session = Session::hardware();
+    assert_eq!(session.state(ArmingCheck::Connection), ArmingCheckState::Passed);
+    let folder = tempfile::tempdir().unwrap();
+    session =
+        Session::begin_unseen(Backend::Hardware, Some(folder.path().to_owned()), Some("tmux hides it".to_owned()));
+    session.ticks(10);
+    session.supervisor.take_control();
+    session.ticks(1500);
+    session.test_stop();
+    for check in OperatorCheck::ALL.into_iter().filter(|check| *check != OperatorCheck::Connection) {
+        session.request(OperatorRequest::Confirm(check));
+    }
+    let answer = session.request(OperatorRequest::Arm);
+    assert!(!answer.accepted, "{answer:?}");
+    assert!(answer.answer.contains("operator's connection: tmux hides it, not confirmed"), "{answer:?}");
+    session.request(OperatorRequest::Confirm(OperatorCheck::Connection));
+    let answer = session.request(OperatorRequest::Arm);
+    assert!(answer.accepted, "{answer:?}");
 }

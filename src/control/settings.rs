@@ -244,6 +244,8 @@ pub struct FailsafeLimits {
     pub suspended_ms: u32,
     /// Longest time without an answer of the guard, ms: LAND.
     pub guard_silent_ms: u32,
+    /// Whether a robot sits down at the end of a trial on hardware.
+    pub hardware_review_sits_down: bool,
 }
 
 /// Source of the base's position, velocity and orientation, and of the objective.

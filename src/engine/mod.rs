@@ -63,7 +63,7 @@ pub fn start(options: Options) -> Result<EngineHandle, EngineError> {
         Backend::Simulator => (Box::new(Simulator::new(&options.robot, &options.config.simulator)?), None),
         Backend::Hardware => {
             let no_network = || EngineError::NoNetwork { robot: options.robot.name.clone() };
-            let go1 = Go1::open(&options.network.ok_or_else(no_network)?, options.observe)?;
+            let go1 = Go1::open(&options.network.ok_or_else(no_network)?, true)?;
             let post = |program: &PathBuf| Guard::start(program, &go1, &settings);
             let guard = options.guard.as_ref().map(post).transpose().map_err(system("guard"))?;
             (Box::new(go1), guard)
@@ -116,7 +116,8 @@ pub fn start(options: Options) -> Result<EngineHandle, EngineError> {
 
     let (to_supervisor, requests) = channel();
     let recorded_in = recording.as_ref().and(options.folder.clone());
-    let checklist = ArmingChecklist::new(&settings, fingerprint(&options.config, &options.robot), recorded_in);
+    let checklist = ArmingChecklist::new(&settings, fingerprint(&options.config, &options.robot), recorded_in)
+        .with_unseen_connection(options.unseen_connection.clone());
     let parts = SupervisorParts {
         experiment,
         control: session_end,
@@ -128,8 +129,10 @@ pub fn start(options: Options) -> Result<EngineHandle, EngineError> {
         info,
     };
     let simulated = options.backend == Backend::Simulator;
+    let review_sits_down = !simulated && options.config.safety.failsafe.hardware_review_sits_down;
     let mut supervisor = Supervisor::new(parts, clock.now_ns())
         .approving(options.approve, simulated)
+        .sitting_down_for_review(review_sits_down && !options.observe)
         .with_storage_thread()
         .map_err(system("storage thread"))?;
     let storage = supervisor.storage_watch();

@@ -51,7 +51,8 @@ pub fn run(
                 format!("systemd refused the sleep lock or ended it: the computer may suspend; {ALLOW_INHIBITOR}");
             supervisor.report_warning(message, clock.now_ns());
         }
-        if supervisor.mode() == Mode::Observe {
+        // A real robot is taken control of with a key: another program may command it.
+        if supervisor.mode() == Mode::Observe && (!sits_down || supervisor.control_wanted()) {
             supervisor.take_control();
         }
         match requests.recv_timeout(SESSION_PERIOD) {

@@ -42,6 +42,8 @@ pub struct ArmingChecklist {
     granted: Vec<RealtimeSetting>,
     /// Those that it was denied.
     denied: Vec<DeniedSetting>,
+    /// Reason why the loss of the operator's connection cannot be detected; none if it can.
+    unseen_connection: Option<String>,
 }
 
 impl ArmingChecklist {
@@ -60,12 +62,19 @@ impl ArmingChecklist {
             stop: StopTest::Open,
             granted: Vec::new(),
             denied: Vec::new(),
+            unseen_connection: None,
         }
     }
 
     /// Takes in the real-time settings of the control thread.
     pub fn scheduled(&mut self, granted: &[RealtimeSetting], denied: &[DeniedSetting]) {
         (self.granted, self.denied) = (granted.to_vec(), denied.to_vec());
+    }
+
+    /// Adds the reason why the loss of the operator's connection cannot be detected; none if it can.
+    pub fn with_unseen_connection(mut self, reason: Option<String>) -> ArmingChecklist {
+        self.unseen_connection = reason;
+        self
     }
 
     /// Takes in the operator's confirmation of a check.
@@ -154,6 +163,7 @@ impl ArmingChecklist {
             self.stop_tested(),
             self.realtime(OperatorCheck::Priority, |setting| matches!(setting, RealtimeSetting::Priority(_))),
             self.realtime(OperatorCheck::LockedMemory, |setting| *setting == RealtimeSetting::LockedMemory),
+            self.connection(),
         ];
         found.chain(own).collect()
     }
@@ -217,6 +227,17 @@ impl ArmingChecklist {
                 "not requested, ".to_owned(),
                 "[realtime] of control.toml requests it, or the operator's confirmation",
             ),
+        }
+    }
+
+    fn connection(&self) -> ArmingCheckRecord {
+        let needed = "its loss is detected, or the operator's confirmation";
+        match &self.unseen_connection {
+            Some(reason) => self.confirmation(OperatorCheck::Connection, format!("{reason}, "), needed),
+            None => {
+                let found = "its loss is detected".to_owned();
+                self.item(ArmingCheck::Connection, ArmingCheckState::Passed, found, needed.to_owned())
+            }
         }
     }
 

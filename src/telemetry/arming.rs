@@ -55,6 +55,8 @@ pub enum ArmingCheck {
     Priority,
     #[strum(serialize = "locked memory")]
     LockedMemory,
+    #[strum(serialize = "operator's connection")]
+    Connection,
 }
 
 impl ArmingCheck {

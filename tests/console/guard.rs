@@ -109,9 +109,38 @@ fn console(folder: &Path, robot: &RecordingRobot, more: &[&str]) -> Session {
 /// A robot and the console in control of it, before arming.
 fn controlling() -> (TempDir, RecordingRobot, Session) {
     let (folder, robot) = (tempfile::tempdir().unwrap(), RecordingRobot::start());
-    let session = console(folder.path(), &robot, &[]);
+    let mut session = console(folder.path(), &robot, &[]);
+    take_control(&mut session);
     damped(&session, &robot);
     (folder, robot, session)
+}
+
+/// Takes control with the keys, once the console has listened for a second.
+fn take_control(session: &mut Session) {
+    session.wait_for(&["L takes control"]);
+    std::thread::sleep(Duration::from_millis(1100));
+    session.send("L");
+    session.wait_for(&["Take control?"]);
+    session.send("y");
+}
+
+/// A second console once damped the robot that another one drove, without a key.
+#[test]
+fn a_console_sends_nothing_to_a_robot_before_a_key() {
+    let (folder, robot) = (tempfile::tempdir().unwrap(), RecordingRobot::start());
+    let mut session = console(folder.path(), &robot, &[]);
+    session.wait_for(&["OFFLINE", "The robot is silent, nothing was sent to it. L takes control."]);
+    std::thread::sleep(Duration::from_secs(3));
+    session.send("L");
+    session.wait_for(&["Take control?", "has sent nothing since the start"]);
+    session.send("n");
+    session.wait_for(&["cancelled: nothing was sent to the robot"]);
+    assert_eq!(robot.count(), 0, "datagrams before the key");
+    take_control(&mut session);
+    damped(&session, &robot);
+    session.wait_for(&["DISARMED"]);
+    session.signal(Signal::SIGTERM);
+    assert!(session.wait().success());
 }
 
 /// Waits until the last 100 commands are damping.

@@ -68,9 +68,9 @@ impl Network {
 
 /// A Go1 behind its link.
 ///
-/// Assumed: the robot sends its states to the source address of the commands. Until the first state arrives, a hello
-/// command, in which every motor brakes without a target, is sent a few times per second; afterwards only the
-/// controller's commands.
+/// Assumed: the robot sends its states to the source address of the commands. From `begin_contact` until the first state
+/// arrives, a hello command, in which every motor brakes without a target, is sent a few times per second; afterwards
+/// only the controller's commands.
 #[derive(Debug)]
 pub struct Go1 {
     link: Link,
@@ -88,7 +88,7 @@ pub struct Go1 {
 }
 
 impl Go1 {
-    /// Opens the link. With `listen_only` no hello commands are sent.
+    /// Opens the link. With `listen_only` no hello commands are sent before `begin_contact`.
     ///
     /// # Errors
     /// The local port is taken, or there is no route to the address.
@@ -192,6 +192,10 @@ impl Robot for Go1 {
 
     fn link(&self) -> Option<LinkStatus> {
         Some(*self.link.status())
+    }
+
+    fn begin_contact(&mut self) {
+        self.sends_hello = true;
     }
 
     fn warm_up(&mut self) {

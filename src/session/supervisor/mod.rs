@@ -112,6 +112,8 @@ pub struct Supervisor {
     guard_objection: Option<&'static str>,
     observe: bool,
     control_requested: bool,
+    /// The operator has asked for control of a real robot.
+    control_wanted: bool,
     /// Heartbeats of the console when control was refused last: it is requested again after the next.
     heartbeats: u64,
     counters_ns: u64,
@@ -124,6 +126,10 @@ pub struct Supervisor {
     checklist_ns: u64,
     refreshed_ns: u64,
     unattended: Unattended,
+    /// Whether the robot sits down when a trial is over.
+    review_sits_down: bool,
+    /// The robot was sent to sit down for the review: no interruption of the automatic rule.
+    sitting_for_review: bool,
 }
 
 impl Supervisor {
@@ -157,6 +163,7 @@ impl Supervisor {
             guard_objection: None,
             observe,
             control_requested: false,
+            control_wanted: false,
             heartbeats: 0,
             counters_ns: 0,
             checklist,
@@ -166,6 +173,8 @@ impl Supervisor {
             checklist_ns: 0,
             refreshed_ns: 0,
             unattended: Unattended::default(),
+            review_sits_down: false,
+            sitting_for_review: false,
         };
         // Not to the recorder: its file begins with this record.
         let _ = supervisor.sinks.console.send(Stamped { time_ns, record: Record::Session(info) });
@@ -173,6 +182,12 @@ impl Supervisor {
             supervisor.publish(record, time_ns);
         }
         supervisor
+    }
+
+    /// Returns the session with a robot that sits down at the end of each trial, if `sits_down`: a person may then go to it.
+    pub fn sitting_down_for_review(mut self, sits_down: bool) -> Supervisor {
+        self.review_sits_down = sits_down;
+        self
     }
 
     /// Takes in the real-time settings that the control thread was granted and denied: arming checks on hardware.
@@ -307,6 +322,11 @@ impl Supervisor {
         }
     }
 
+    /// Whether the operator has asked for control of the robot.
+    pub fn control_wanted(&self) -> bool {
+        self.control_wanted
+    }
+
     /// STOP by the session at its end: the last reported mode may be old, and a command that energises the robot may still be
     /// in the ring. A robot that was never taken control of receives nothing.
     pub fn stop(&self) {
@@ -342,7 +362,12 @@ impl Supervisor {
                 self.releasing = false;
                 self.checklist.mode_changed(from, to, &cause);
                 self.published_checklist.clear();
-                self.unattended.mode_changed(to, cause);
+                if !(self.sitting_for_review && to == Mode::SitDown) {
+                    self.unattended.mode_changed(to, cause);
+                }
+                // A full ring leaves the robot standing in REVIEW, where it may stand.
+                self.sitting_for_review =
+                    to == Mode::Review && self.review_sits_down && self.command(Command::SitDown).is_ok();
                 self.publish(Record::Transition(Transition { from, to, cause: cause.to_string() }), time_ns);
             }
             Event::TrialEnded { trial, ticks, end } => {

@@ -10,6 +10,7 @@ use quadfrog::engine::{self, Options};
 use quadfrog::robot::go1::Network;
 use quadfrog::trial::{Approval, Backend, Task};
 use quadfrog_console::app::{self, ConsoleExit, ConsoleOptions};
+use quadfrog_console::connection::TerminalLocation;
 use quadfrog_console::feed::Feed;
 use quadfrog_console::settings::ConsoleSettings;
 use quadfrog_console::terminal;
@@ -130,6 +131,7 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
         approve: arguments.approve,
         // The running program, even if its file was replaced since the start.
         guard: Some(PathBuf::from("/proc/self/exe")),
+        unseen_connection: TerminalLocation::of(|name| std::env::var(name).ok()).unseen().map(str::to_owned),
         network,
         ..Options::new(config, robot, backend, selected.task)
     };
