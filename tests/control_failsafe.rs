@@ -381,7 +381,7 @@ fn an_approval_is_single_use_expires_and_dies_with_a_change_of_mode() {
     assert_eq!((bench.cycle.mode(), bench.refusal()), (Mode::Ready, Some(CommandRefusal::Stale)), "used up");
 
     let approval = bench.approved();
-    bench.ticks(30_001);
+    bench.ticks(2001);
     bench.command(approval);
     assert!(matches!(bench.refusal(), Some(CommandRefusal::Expired { .. })), "{:?}", bench.refusal());
     assert_eq!(bench.cycle.mode(), Mode::Ready);
@@ -404,7 +404,7 @@ fn an_approval_is_single_use_expires_and_dies_with_a_change_of_mode() {
 fn arming_expires_dies_with_a_change_of_mode_and_needs_somebody_who_watches() {
     let mut bench = in_mode(Mode::Disarmed);
     let arm = bench.arm();
-    bench.ticks(30_001);
+    bench.ticks(2001);
     bench.command(arm);
     assert!(matches!(bench.refusal(), Some(CommandRefusal::Expired { .. })), "{:?}", bench.refusal());
 

@@ -18,7 +18,7 @@ use crate::robot::GRAVITY;
 use crate::robot::Leg;
 use crate::robot::description::RobotDescription;
 use crate::sim::SimConfig;
-use crate::trial::{Backend, GAIN_UNITS, ParameterInfo, ParameterValues, Task, parameter_unit};
+use crate::trial::{Backend, GAIN_UNITS, HopEnvelope, ParameterInfo, ParameterValues, Task, parameter_unit};
 
 /// The files of a configuration folder and their defaults.
 const FILES: [(&str, &str); 5] = [
@@ -147,6 +147,11 @@ impl Config {
             ParameterInfo { low, high, ..parameter }
         };
         self.parameters(task).into_iter().map(widest).collect()
+    }
+
+    /// Returns the growth of the largest forces; none on the simulator.
+    pub fn hop_envelope(&self, backend: Backend) -> Option<HopEnvelope> {
+        (backend == Backend::Hardware).then_some(self.safety.hop_envelope)
     }
 
     /// Returns the controller's gains with their allowed ranges, in table order.

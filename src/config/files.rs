@@ -10,6 +10,7 @@ use crate::control::settings::{
     RampSettings, RemoteSettings, SettleSettings, TaskControl,
 };
 use crate::optimize::ask::SamplerConfig;
+use crate::trial::HopEnvelope;
 
 /// `control.toml`.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -85,6 +86,7 @@ pub struct SafetyFile {
     #[serde(rename = "pre_arm")]
     pub arming: ArmingLimits,
     pub approval: ApprovalLimits,
+    pub hop_envelope: HopEnvelope,
     #[serde(rename = "watchdog")]
     pub failsafe: FailsafeLimits,
     pub consistency: ConsistencyLimits,

@@ -13,6 +13,9 @@ const IDLE_TIME: NumberRange =
     NumberRange { allows: |v| v >= 0.0, text: "must be a number of seconds, or 0 for never" };
 const FACTOR: NumberRange =
     NumberRange { allows: |v| v >= 1.0, text: "must be 1 or more: below 1 it trips on allowed values" };
+/// Below 0.2 s a slow disk would refuse every approval.
+const KEY_PRESS: NumberRange = NumberRange { allows: |v| (0.2..=30.0).contains(&v), text: "must be 0.2 to 30 s" };
+const SHARE: NumberRange = NumberRange { allows: |v| v > 0.0 && v <= 1.0, text: "must be above 0, at most 1" };
 const COUNTDOWN: NumberRange = NumberRange { allows: |v| (0.0..=60.0).contains(&v), text: "must be 0 to 60 s" };
 /// At 1 rad/s the force is then half of that of the stiffness at a tilt of 1 rad.
 const ATTITUDE_RATE_GAIN: NumberRange =
@@ -81,6 +84,8 @@ const SAFETY: &[Row] = &[
         &["*.corrupt", "*.disk_free_mb", "*.joint_margin_rad", "*.battery_percent", "*.loss_share", "*.late_share"],
         NOT_NEGATIVE,
     ),
+    (&["approval.expires_s"], KEY_PRESS),
+    (&["hop_envelope.*"], SHARE),
     (&["watchdog.simulator_late_ms", "watchdog.hardware_late_ms"], LATENESS),
     (&["watchdog.simulator_idle_s", "watchdog.hardware_idle_s"], IDLE_TIME),
     (&["watchdog.velocity_factor", "watchdog.torque_factor", "watchdog.period_factor"], FACTOR),

@@ -5,7 +5,7 @@ mod support;
 use quadfrog::recording::record::{Record, SessionInfo, StageRecord};
 use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::telemetry::Mode;
-use quadfrog::trial::{Backend, ExperimentStage, Verdict};
+use quadfrog::trial::{Backend, ExperimentStage, TrialRecord, Verdict};
 use quadfrog_console::action::{ACTIONS, Action};
 use quadfrog_console::keymap::{Key, Keymap};
 use quadfrog_console::message::{Effect, Msg};
@@ -14,7 +14,7 @@ use quadfrog_console::model::dialog::Dialog;
 use quadfrog_console::settings::{ConsoleSettings, DEFAULT};
 use quadfrog_console::theme::Role;
 use strum::VariantArray;
-use support::{Console, VIEWS, proposal, requests, session, trial};
+use support::{Console, VIEWS, assert_shows, proposal, requests, session, trial};
 
 fn approval(trial: u32, revision: u32) -> Vec<OperatorRequest> {
     vec![OperatorRequest::Approve { trial, revision }]
@@ -490,4 +490,21 @@ fn a_terminal_too_small_for_the_card_neither_approves_nor_arms() {
     assert_eq!(console.press(&["Space"]), [Effect::Stop]);
     console.mode(Mode::Disarmed);
     assert_eq!(console.requests(&["A"]), []);
+}
+
+/// By the rules a tripped limit is a fall of the parameters: whoever voids it says why.
+#[test]
+fn voiding_a_tripped_limit_asks_for_the_reason() {
+    for (key, rerun) in [("v", false), ("r", true)] {
+        let mut console = Console::review(Mode::Fault, Verdict::Fall);
+        let cause = "limit: FR_calf at 70.0 rad/s exceeds 60.0 rad/s".to_owned();
+        console.record(Record::Trial(TrialRecord { cause, ..trial(0, None, Some(Verdict::Fall)) }));
+        assert_eq!(console.requests(&[key]), []);
+        assert_shows(&console.screen(80, 24), &["Why is trial #0 void?", "it tripped a limit"]);
+        assert_eq!(console.requests(&["Enter"]), [], "an empty reason is refused");
+        let sent = console.requests(&["t", "e", "t", "h", "e", "r", "Enter"]);
+        assert_eq!(sent, [OperatorRequest::VoidBecause { reason: "tether".into(), rerun }]);
+    }
+    // A fall may be voided with one key.
+    assert_eq!(Console::review(Mode::Damped, Verdict::Fall).requests(&["v"]), [OperatorRequest::Judge(Verdict::Void)]);
 }

@@ -286,6 +286,7 @@ impl Draw {
                     fixed: d.option(|d| FixedParameter { value: d.number(), trials: d.word() as u32 }),
                 }),
                 confirming: self.option(|d| d.word() as u32),
+                hop_share: self.option(|d| d.number()),
             }),
             11 => Record::Insight(ProposalInsight {
                 trial: self.word() as u32,

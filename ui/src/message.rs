@@ -5,6 +5,7 @@ use std::time::Duration;
 use quadfrog::recording::record::Stamped;
 use quadfrog::recording::recorder::RecorderStatus;
 use quadfrog::session::operator_request::OperatorRequest;
+use quadfrog::session::storage::StorageWait;
 use quadfrog::telemetry::{Snapshot, Tick};
 
 use crate::keymap::Key;
@@ -26,6 +27,8 @@ pub enum Msg {
     /// The newest tick and counters, for numbers and the mode.
     Snapshot(Box<Snapshot>),
     Recorder(RecorderStatus),
+    /// The wait of the session for the storage of its study; none while there is none.
+    Storage(Option<StorageWait>),
     /// One of the ticks for the charts.
     Tick(Box<Tick>),
     Record(Stamped),

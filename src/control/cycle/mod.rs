@@ -101,6 +101,8 @@ pub struct Cycle {
     landing: Option<Fault>,
     /// The session ended: the robot sits down, and nothing energises it again.
     session_left: bool,
+    /// Time of the newest command to sit down or to cancel, ns: a permit from before it is void.
+    lowered_ns: u64,
     tick: Tick,
     events: Events,
 }
@@ -132,6 +134,7 @@ impl Cycle {
             send_error: None,
             landing: None,
             session_left: false,
+            lowered_ns: 0,
             tick: Tick::default(),
             events: Events::default(),
         }

@@ -56,6 +56,7 @@ impl Feed {
                 );
                 messages.push(Msg::Snapshot(Box::new(handle.snapshot())));
                 messages.extend(handle.recorder().map(Msg::Recorder));
+                messages.push(Msg::Storage(handle.storage_wait()));
             }
             Feed::Replay(replay) => replay.poll(elapsed_ns, &mut messages),
         }

@@ -74,6 +74,11 @@ pub enum Purpose {
         parameter: usize,
     },
     ConfirmBest,
+    /// The reason to judge a trial that tripped a limit void.
+    VoidReason {
+        trial: u32,
+        rerun: bool,
+    },
     TrialNumber,
     LogSearch,
 }
@@ -95,7 +100,9 @@ impl Dialog {
     /// Whether a space is text here: not where a number is typed.
     pub fn takes_spaces(&self) -> bool {
         match self {
-            Dialog::Field { purpose, .. } => matches!(purpose, Purpose::Note(_) | Purpose::LogSearch),
+            Dialog::Field { purpose, .. } => {
+                matches!(purpose, Purpose::Note(_) | Purpose::VoidReason { .. } | Purpose::LogSearch)
+            }
             Dialog::Palette { .. } => true,
             _ => false,
         }

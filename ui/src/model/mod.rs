@@ -13,6 +13,7 @@ use std::time::Duration;
 use quadfrog::recording::record::LogLevel;
 use quadfrog::recording::recorder::RecorderStatus;
 use quadfrog::robot::description::RobotDescription;
+use quadfrog::session::storage::StorageWait;
 use quadfrog::telemetry::{Mode, Snapshot};
 use quadfrog::trial::{ParameterInfo, TrialRecord};
 use strum::{IntoStaticStr, VariantArray};
@@ -79,6 +80,8 @@ pub struct Model {
     pub snapshot_at: Duration,
     /// State of the recorder; none in a replay.
     pub recorder: Option<RecorderStatus>,
+    /// Wait of the session for the storage of its study.
+    pub storage: Option<StorageWait>,
     pub history: SignalHistory,
     pub message: Option<Notice>,
     pub view: View,
@@ -114,6 +117,7 @@ impl Model {
             snapshot: Snapshot::default(),
             snapshot_at: Duration::ZERO,
             recorder: None,
+            storage: None,
             history: SignalHistory::default(),
             message: None,
             view: View::Live,

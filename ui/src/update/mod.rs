@@ -50,6 +50,7 @@ pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
             records::close_stale_dialog(model);
         }
         Msg::Recorder(status) => model.recorder = Some(status),
+        Msg::Storage(wait) => model.storage = wait,
         Msg::Tick(tick) => model.history.push(&tick),
         Msg::Replay(status) => model.replay = Some(status),
         Msg::Rewound => {

@@ -241,6 +241,7 @@ fn field_title(model: &Model, purpose: Purpose) -> String {
             format!("Search {} from .. to", model.session.info.parameters.get(parameter).map_or("", |info| &info.name))
         }
         Purpose::ConfirmBest => "How many repeats at most, to confirm the best?".to_owned(),
+        Purpose::VoidReason { trial, .. } => format!("Why is trial #{trial} void?"),
         Purpose::TrialNumber => "Go to trial".to_owned(),
         Purpose::LogSearch => "Search the log".to_owned(),
     }
@@ -268,6 +269,7 @@ fn field(model: &Model, purpose: Purpose, input: &Input, problem: Option<&str>) 
         Purpose::Note(_) if model.space_must_stop() => {
             "the robot is energised: Space is STOP, _ writes a space".to_owned()
         }
+        Purpose::VoidReason { .. } => "it tripped a limit: by the rules that is a fall of its parameters".to_owned(),
         Purpose::Note(_) | Purpose::Continue | Purpose::TrialNumber => String::new(),
     };
     let below = problem.map_or_else(|| span(theme, Role::Quiet, hint), |problem| span(theme, Role::Bad, problem));
