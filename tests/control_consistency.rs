@@ -146,7 +146,9 @@ fn is_inconsistency(fault: &Fault) -> bool {
 fn jumps_without_alarm(world: World, count: u32) {
     let mut bench = emulated(world, 7).reach(Mode::Ready);
     if world == World::Delayed {
-        ["delay 1", "jitter 2", "loss 0.3"].map(|fault| bench.inject(fault));
+        for fault in ["delay 1", "jitter 2", "loss 0.3"] {
+            bench.inject(fault);
+        }
     }
     let mut random = ChaCha8Rng::seed_from_u64(11);
     let mut largest = vec![0.0_f64; SensorCheck::ALL.len()];
