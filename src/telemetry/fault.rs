@@ -63,7 +63,7 @@ pub enum Fault {
     /// The ring of events is full or abandoned.
     #[error("the session does not take events")]
     EventsLost,
-    #[error("sensor check \"{}\" failed: {}; check {}", .check.name(), exceeds(*.measured, *.allowed, .check.unit(), 3), .check.suspect())]
+    #[error("sensor check \"{}\" failed: {}; check {}", .check.name(), exceeds(*.measured, *.allowed, .check.unit(), .check.digits()), .check.suspect())]
     Sensors { check: SensorCheck, measured: f64, allowed: f64 },
     #[error(
         "the robot's clock is off by {measured_ms:.0} ms against this computer's, limit {allowed_ms:.0} ms: one of them stepped or stood still"
@@ -121,6 +121,11 @@ impl SensorCheck {
             SensorCheck::Orientation | SensorCheck::TurnRate | SensorCheck::JointVelocity => "rad",
             SensorCheck::FeetLoaded | SensorCheck::FeetInFreeFall | SensorCheck::FeetAfterLanding => "s",
         }
+    }
+
+    /// Decimals of the measured value.
+    const fn digits(self) -> usize {
+        if matches!(self, SensorCheck::InertialUnitLive) { 0 } else { 3 }
     }
 
     /// The sensors to check.
