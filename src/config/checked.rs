@@ -242,6 +242,7 @@ impl Config {
             gate: self.safety.gate,
             hardware,
             arming: self.safety.arming,
+            ready: self.safety.ready,
             approval: self.safety.approval,
             failsafe: *failsafe,
             late_ms: if hardware { failsafe.hardware_late_ms } else { failsafe.simulator_late_ms },

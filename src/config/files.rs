@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use serde::Deserialize;
 
 use crate::control::settings::{
-    ApprovalLimits, ArmingLimits, EstimatorSettings, FailsafeLimits, FallLimits, GateLimits, RampSettings,
+    ApprovalLimits, ArmingLimits, EstimatorSettings, FailsafeLimits, FallLimits, GateLimits, RampSettings, ReadyLimits,
     SettleSettings, TaskControl,
 };
 use crate::optimize::ask::SamplerConfig;
@@ -84,6 +84,7 @@ pub struct SafetyFile {
     pub gate: GateLimits,
     #[serde(rename = "pre_arm")]
     pub arming: ArmingLimits,
+    pub ready: ReadyLimits,
     pub approval: ApprovalLimits,
     #[serde(rename = "watchdog")]
     pub failsafe: FailsafeLimits,

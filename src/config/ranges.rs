@@ -27,6 +27,16 @@ const CORE: NumberRange =
 const TRIALS: NumberRange = NumberRange { allows: |v| v >= 1.0, text: "a study needs at least one trial" };
 const CONTENDERS: NumberRange = NumberRange { allows: |v| (2.0..=10.0).contains(&v), text: "must be 2 to 10 points" };
 const CONFIDENCE: NumberRange = NumberRange { allows: |v| v > 0.5 && v < 1.0, text: "must be above 0.5 and below 1" };
+const LEAST_FORCE: NumberRange =
+    NumberRange { allows: |v| (0.2..=1.0).contains(&v), text: "must be 0.2 to 1 times the weight" };
+const MOST_FORCE: NumberRange =
+    NumberRange { allows: |v| (1.0..=3.0).contains(&v), text: "must be 1 to 3 times the weight" };
+const READY_TILT: NumberRange =
+    NumberRange { allows: |v| v > 0.0 && v <= 0.35, text: "must be above 0 and at most 0.35 rad" };
+const READY_STANCE: NumberRange =
+    NumberRange { allows: |v| v > 0.0 && v <= 0.5, text: "must be above 0 and at most 0.5 rad" };
+const CLOCK_DRIFT: NumberRange =
+    NumberRange { allows: |v| (0.0..=1000.0).contains(&v), text: "must be 0 to 1000 parts per million" };
 
 const CONTROL: &[Row] = &[
     (&["countdown.simulator_s"], COUNTDOWN),
@@ -46,6 +56,11 @@ const SAFETY: &[Row] = &[
     (&["watchdog.simulator_late_ms", "watchdog.hardware_late_ms"], LATENESS),
     (&["watchdog.simulator_idle_s", "watchdog.hardware_idle_s"], IDLE_TIME),
     (&["watchdog.velocity_factor", "watchdog.torque_factor", "watchdog.period_factor"], FACTOR),
+    (&["ready.force_share_min"], LEAST_FORCE),
+    (&["ready.force_share_max"], MOST_FORCE),
+    (&["ready.tilt_rad"], READY_TILT),
+    (&["ready.stance_rad"], READY_STANCE),
+    (&["watchdog.clock_drift_ppm"], CLOCK_DRIFT),
     (&["*.*"], POSITIVE),
 ];
 const OPTIMIZE: &[Row] = &[

@@ -18,7 +18,7 @@ use crate::recording::record::{
     ArmingCheckRecord, LogLevel, LogRecord, Record, RequestRecord, SessionInfo, Stamped, Transition,
 };
 use crate::recording::recorder::{CollectedTicks, RecorderWatch, TrialTicks};
-use crate::telemetry::{Command, Event, Mode, TransitionCause, TrialEnd};
+use crate::telemetry::{Command, CommandRefusal, Event, Mode, TransitionCause, TrialEnd};
 use crate::trial::ExperimentStage;
 use unattended::Unattended;
 
@@ -297,6 +297,9 @@ impl Supervisor {
                 self.published_checklist.clear();
                 self.unattended.mode_changed(to, cause);
                 self.publish(Record::Transition(Transition { from, to, cause: cause.to_string() }), time_ns);
+                if let TransitionCause::NotReady(inhibit) = cause {
+                    self.log(LogLevel::Warning, format!("the countdown was cancelled: {inhibit}"), time_ns);
+                }
             }
             Event::TrialEnded { trial, ticks, end } => {
                 self.ended = Some(Ended { trial, end, ticks, time_ns });
@@ -306,7 +309,11 @@ impl Supervisor {
                 self.log(LogLevel::Warning, message, time_ns);
                 match command {
                     Command::RunTrial(spec, _) => {
-                        self.ended = Some(Ended { trial: spec.trial, end: TrialEnd::Cancelled, ticks: 0, time_ns });
+                        let end = match because {
+                            CommandRefusal::Inhibited(inhibit) => TrialEnd::NotReady(inhibit),
+                            _ => TrialEnd::Cancelled,
+                        };
+                        self.ended = Some(Ended { trial: spec.trial, end, ticks: 0, time_ns });
                         self.measured.push_back(TrialTicks { trial: spec.trial, ticks: Vec::new() });
                     }
                     Command::Arm(_) => self.unattended.arming_refused(time_ns),

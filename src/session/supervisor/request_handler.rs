@@ -47,6 +47,9 @@ impl Supervisor {
                 if let Some(inhibit) = self.inhibit() {
                     return Err(inhibit);
                 }
+                if let Some(unready) = self.control.readiness.read().unready {
+                    return Err(unready.to_string());
+                }
                 let spec = self.experiment.approve(*trial, *revision).map_err(reason)?;
                 let permit = self.permit(stamped);
                 if let Err(reason) = self.command(Command::RunTrial(spec, permit)) {
