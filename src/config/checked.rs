@@ -218,13 +218,6 @@ impl Config {
         if hardware {
             self.check_hardware(robot)?;
         }
-        let expires_s = self.safety.approval.expires_s;
-        if hardware && expires_s > LONGEST_APPROVAL_S {
-            let reason = format!(
-                "must be at most {LONGEST_APPROVAL_S} s on hardware; the configuration of a study of an earlier version holds 30: set 2.0 there"
-            );
-            return Err(self.refuse("safety.toml", "approval.expires_s", expires_s, reason));
-        }
         let SafetyFile { failsafe, fall, .. } = &self.safety;
         let (min_position, max_position) = robot.allowed_positions();
         Ok(ControlSettings {
@@ -259,6 +252,7 @@ impl Config {
             arming: self.safety.arming,
             consistency: self.safety.consistency,
             remote: self.safety.remote,
+            ready: self.safety.ready,
             approval: self.safety.approval,
             failsafe: *failsafe,
             late_ms: if hardware { failsafe.hardware_late_ms } else { failsafe.simulator_late_ms },
@@ -293,9 +287,6 @@ impl Config {
         self.origins[file].refuse(key, value, reason)
     }
 }
-
-/// Longest time from a key press to its effect on hardware, s: people walk.
-const LONGEST_APPROVAL_S: f64 = 5.0;
 
 /// Parses a default file; its keys are the known keys.
 fn template(text: &str) -> Table {

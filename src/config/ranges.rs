@@ -91,6 +91,10 @@ const SAFETY: &[Row] = &[
     (&["consistency.clock_step_ms"], within!(20, 1000, "ms")),
     (&["consistency.loss_share"], within!(0.005, 0.5, "of the states")),
     (&["consistency.torque_n_m"], within!(0.5, 20, "N m")),
+    (&["ready.force_share_min"], within!(0.2, 1, "of the weight")),
+    (&["ready.force_share_max"], within!(1, 3, "of the weight")),
+    (&["ready.tilt_rad"], within!(0.001, 0.35, "rad")),
+    (&["ready.stance_rad"], within!(0.001, 0.5, "rad")),
     // Below 0.2 s a slow disk would refuse every approval.
     (&["approval.expires_s"], within!(0.2, 30, "s")),
     (&["hop_envelope.*"], within!(0.01, 1)),
@@ -120,6 +124,7 @@ const SAFETY: &[Row] = &[
     (&["watchdog.simulator_late_ms", "watchdog.hardware_late_ms"], within!(0, 60000, "ms (0 only counts)")),
     (&["watchdog.simulator_idle_s", "watchdog.hardware_idle_s"], within!(0, 86400, "s (0 is never)")),
     (&["watchdog.land_s"], within!(0.01, 60, "s")),
+    (&["watchdog.clock_drift_ppm"], within!(0, 1000, "parts per million")),
     (&["watchdog.*"], within!(1, 600000, "ms")),
     (&["parameters.f0", "parameters.f1"], within!(0, 100, "Hz")),
     (&["parameters.*"], within!(0, 10000, "N")),
@@ -150,7 +155,8 @@ const SAFETY_HARDWARE: &[Row] = &[
     (&["pre_arm.late_ms"], within!(0.1, 2, "ms")),
     (&["pre_arm.area_clear_s"], within!(5, 120, "s")),
     (&["pre_arm.disk_free_mb", "watchdog.disk_free_mb"], within!(50, 1e9, "MB")),
-    (&["approval.expires_s"], within!(0.5, 30, "s")),
+    // An older approval is not of the present situation.
+    (&["approval.expires_s"], within!(0.5, 5, "s")),
     (&["watchdog.stance_tilt_rad"], within!(0.1, 0.6, "rad")),
     (&["watchdog.tilt_rad"], within!(0.3, 1.2, "rad")),
     // A free fall from the stance (0.25 m) takes 226 ms; half of that.

@@ -21,7 +21,7 @@ use crate::realtime::channel::SessionEnd;
 use crate::realtime::scheduling::{DeniedSetting, RealtimeSetting};
 use crate::recording::record::{ArmingCheckRecord, LogLevel, LogRecord, Record, SessionInfo, Stamped, Transition};
 use crate::recording::recorder::{CollectedTicks, RecorderWatch, TrialTicks};
-use crate::telemetry::{Command, Event, Mode, TransitionCause, TrialEnd};
+use crate::telemetry::{Command, CommandRefusal, Event, Mode, TransitionCause, TrialEnd};
 use crate::trial::ExperimentStage;
 use unattended::Unattended;
 use unfinished::{Asker, JobPurpose, UnfinishedJob};
@@ -369,6 +369,9 @@ impl Supervisor {
                 self.sitting_for_review =
                     to == Mode::Review && self.review_sits_down && self.command(Command::SitDown).is_ok();
                 self.publish(Record::Transition(Transition { from, to, cause: cause.to_string() }), time_ns);
+                if let TransitionCause::NotReady(inhibit) = cause {
+                    self.log(LogLevel::Warning, format!("the countdown was cancelled: {inhibit}"), time_ns);
+                }
             }
             Event::TrialEnded { trial, ticks, end } => {
                 self.ended = Some(Ended { trial, end, ticks, time_ns });
@@ -378,7 +381,11 @@ impl Supervisor {
                 self.log(LogLevel::Warning, message, time_ns);
                 match command {
                     Command::RunTrial(spec, _) => {
-                        self.ended = Some(Ended { trial: spec.trial, end: TrialEnd::Cancelled, ticks: 0, time_ns });
+                        let end = match because {
+                            CommandRefusal::Inhibited(inhibit) => TrialEnd::NotReady(inhibit),
+                            _ => TrialEnd::Cancelled,
+                        };
+                        self.ended = Some(Ended { trial: spec.trial, end, ticks: 0, time_ns });
                         self.measured.push_back(TrialTicks { trial: spec.trial, ticks: Vec::new() });
                     }
                     Command::Arm(_) => self.unattended.arming_refused(time_ns),

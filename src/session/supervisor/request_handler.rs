@@ -92,6 +92,9 @@ impl Supervisor {
         if let Some(inhibit) = self.inhibit() {
             return Err(inhibit);
         }
+        if let Some(unready) = self.control.readiness.read().unready {
+            return Err(unready.to_string());
+        }
         let state = ApprovalState { permit: self.permit(stamped), stops: stamped.stops };
         self.approval_holds(&state, time_ns)?;
         self.give(JobPurpose::Approve(stamped.clone(), asker, state), time_ns, move |experiment| {
