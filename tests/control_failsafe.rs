@@ -339,6 +339,7 @@ fn a_trial_that_had_landed_counts_though_the_operator_is_lost() {
 #[test]
 fn an_operator_lost_between_jumps_ends_the_series() {
     let mut bench = in_mode(Mode::Ready);
+    bench.settle();
     let mut spec = bench.spec();
     (spec.jumps, spec.jump.f1_hz, spec.jump.fx_n) = (5, 0.5, 20.0);
     bench.command(Command::RunTrial(spec, bench.permit()));
@@ -373,6 +374,7 @@ fn an_idle_robot_sits_down() {
 #[test]
 fn an_approval_is_single_use_expires_and_dies_with_a_change_of_mode() {
     let mut bench = in_mode(Mode::Ready);
+    bench.settle();
     let approval = bench.approved();
     bench.command(approval);
     bench.command(Command::Cancel);
@@ -395,6 +397,7 @@ fn an_approval_is_single_use_expires_and_dies_with_a_change_of_mode() {
     bench.until(Mode::Ready);
     bench.command(approval);
     assert_eq!((bench.cycle.mode(), bench.refusal()), (Mode::Ready, Some(CommandRefusal::Stale)), "another standing");
+    bench.settle();
     bench.command(bench.approved());
     assert_eq!(bench.cycle.mode(), Mode::Countdown);
 }

@@ -24,6 +24,8 @@ use robots::LinkedRobot;
 fn approve(bench: &mut LoopBench<LinkedRobot>, fx_n: f64, f0_hz: f64) {
     let jump = JumpParameters { f0_hz, f1_hz: 0.0, fx_n, fy_n: 0.0, fz_n: 220.0 };
     let spec = bench.config.task(Task::Forward).trial(Task::Forward, jump);
+    // Still for long enough to be ready.
+    bench.ticks(1200);
     bench.command(Command::RunTrial(spec, bench.permit()));
 }
 

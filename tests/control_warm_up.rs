@@ -22,7 +22,7 @@ fn session(warm_up: bool) -> (Vec<Tick>, Vec<Event>, LinkStatus, EmulatorStatus)
     let (mut emulator, mut robot) = pair(&config.simulator, 1);
     let (control, mut session, screen, mut recorder) = channels();
     let mut body = ControlLoop::new(&settings, control);
-    let (mut ticks, mut events, mut asked_in) = (Vec::new(), Vec::new(), None);
+    let (mut ticks, mut events) = (Vec::new(), Vec::new());
     for ms in 0..20_000 {
         screen.heartbeat.beat();
         let permit = Permit {
@@ -32,18 +32,17 @@ fn session(warm_up: bool) -> (Vec<Tick>, Vec<Event>, LinkStatus, EmulatorStatus)
         let command = match body.mode() {
             Mode::Observe if ms == 100 => Some(Command::TakeControl),
             Mode::Disarmed if ms == 2000 => Some(Command::Arm(permit)),
-            Mode::Ready if asked_in != Some(Mode::Ready) => Some(Command::RunTrial(spec(&config), permit)),
+            Mode::Ready if ms == 5000 => Some(Command::RunTrial(spec(&config), permit)),
             _ => None,
         };
         if let Some(command) = command {
-            asked_in = Some(body.mode());
             session.commands.push(command).unwrap();
         }
         match ms {
             1000 => emulator.apply("jitter 2".parse().unwrap()),
-            // Arming would be refused with such a network; it can degrade later.
-            5000 => emulator.apply("loss 2".parse().unwrap()),
-            5001 => emulator.apply("duplicate 2".parse().unwrap()),
+            // Arming and jump would be refused with such a network; it can degrade later.
+            8500 => emulator.apply("loss 2".parse().unwrap()),
+            8501 => emulator.apply("duplicate 2".parse().unwrap()),
             16_000 => session.stop.set(),
             16_500 => emulator.apply("corrupt 5".parse().unwrap()),
             17_000 => emulator.apply(EmulatorFault::Reboot),

@@ -344,6 +344,7 @@ fn after_a_restart_the_robot_is_put_back_and_jumps_again() {
     bench.ticks(1500);
     bench.command(bench.arm());
     bench.until(Mode::Ready);
+    bench.settle();
     bench.command(bench.approved());
     bench.until(Mode::Review);
 }

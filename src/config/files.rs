@@ -7,7 +7,7 @@ use serde::Deserialize;
 
 use crate::control::settings::{
     ApprovalLimits, ArmingLimits, ConsistencyLimits, EstimatorSettings, FailsafeLimits, FallLimits, GateLimits,
-    RampSettings, RemoteSettings, SettleSettings, TaskControl,
+    RampSettings, ReadyLimits, RemoteSettings, SettleSettings, TaskControl,
 };
 use crate::optimize::ask::SamplerConfig;
 use crate::trial::HopEnvelope;
@@ -85,6 +85,7 @@ pub struct SafetyFile {
     pub gate: GateLimits,
     #[serde(rename = "pre_arm")]
     pub arming: ArmingLimits,
+    pub ready: ReadyLimits,
     pub approval: ApprovalLimits,
     pub hop_envelope: HopEnvelope,
     #[serde(rename = "watchdog")]

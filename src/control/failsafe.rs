@@ -34,6 +34,10 @@ pub struct FailsafeInputs<'a> {
     pub events_lost: bool,
     /// Consistency of sensors, clocks and commands.
     pub consistency: &'a Consistency,
+    /// Time for which the computer was suspended since the last tick, ms.
+    pub suspended_ms: u32,
+    /// Time for which the guard has not answered, ms; `u32::MAX` when it is gone, zero without a guard.
+    pub guard_silent_ms: u32,
 }
 
 /// The action of a failsafe and the condition that clears it.
@@ -71,9 +75,11 @@ const fn cut(
 
 /// The table, by precedence: the first row that trips counts. A cause that makes measured numbers invalid stands above the rows
 /// that compare them.
-const TABLE: [FailsafeRow; 20] = [
+const TABLE: [FailsafeRow; 22] = [
     cut(remote_stop, Mode::commanded),
     cut(events_lost, Mode::commanded),
+    // True in one tick only.
+    cut(suspended, Mode::commanded),
     cut(link_lost, Mode::commanded),
     cut(state_age, Mode::commanded),
     // True in one tick only, and a robot that boots may report numbers that are not finite.
@@ -94,6 +100,7 @@ const TABLE: [FailsafeRow; 20] = [
     cut(tilt, outside_a_trial),
     cut(sensors, Mode::energised),
     FailsafeRow { cause: operator_silent, modes: Mode::energised, action: FailsafeAction::Land },
+    FailsafeRow { cause: guard_silent, modes: Mode::energised, action: FailsafeAction::Land },
 ];
 
 /// Also reported when another fault is latched: the motors' power may have been cut. While disarmed it is an arming check.
@@ -172,6 +179,16 @@ pub fn warning(inputs: &FailsafeInputs, settings: &ControlSettings) -> Option<Fa
 
 fn events_lost(_: &Failsafe, inputs: &FailsafeInputs, _: &ControlSettings) -> Option<Fault> {
     inputs.events_lost.then_some(Fault::EventsLost)
+}
+
+fn suspended(_: &Failsafe, inputs: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {
+    let (suspended_ms, allowed_ms) = (inputs.suspended_ms, settings.failsafe.suspended_ms);
+    (suspended_ms > allowed_ms).then_some(Fault::Suspended { suspended_ms, allowed_ms })
+}
+
+fn guard_silent(_: &Failsafe, inputs: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {
+    let (silent_ms, allowed_ms) = (inputs.guard_silent_ms, settings.failsafe.guard_silent_ms);
+    (silent_ms > allowed_ms).then_some(Fault::GuardSilent { silent_ms, allowed_ms })
 }
 
 fn remote_stop(_: &Failsafe, inputs: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {

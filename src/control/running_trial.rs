@@ -5,7 +5,7 @@ use super::force_profile::{Oscillator, amplitudes_leg};
 use super::leg::LegTarget;
 use super::settings::ControlSettings;
 use crate::robot::ticks_in;
-use crate::robot::{CONTROL_PERIOD_S, LEGS, PerLeg, RobotState};
+use crate::robot::{CONTROL_PERIOD_S, PerLeg, RobotState};
 use crate::telemetry::{Estimate, FallCause, Phase, TrialEnd, TrialSpec};
 use nalgebra::Vector3;
 
@@ -153,10 +153,7 @@ impl RunningTrial {
             return TrialProgress::Jump;
         }
         self.landed += 1;
-        let quiet = feet_down == LEGS
-            && estimate.velocity_world.norm() < settings.settle.speed_m_s
-            && estimate.angular_velocity_body.norm() < settings.settle.rate_rad_s;
-        self.quiet = if quiet { self.quiet + 1 } else { 0 };
+        self.quiet = if settings.settle.is_quiet(estimate) { self.quiet + 1 } else { 0 };
         if self.quiet >= ticks_in(settings.settle.quiet_s) {
             TrialProgress::Over(TrialEnd::Settled)
         } else if since_impulse_s >= settings.settle.cap_s {

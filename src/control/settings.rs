@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::robot::kinematics::LegGeometry;
 use crate::robot::remote::RemoteButtons;
-use crate::robot::{Joints, PerLeg};
-use crate::telemetry::{SensorCheck, TrialSpec};
+use crate::robot::{Joints, LEGS, PerLeg};
+use crate::telemetry::{Estimate, SensorCheck, TrialSpec};
 use crate::trial::{Gains, JumpParameters, Task};
 
 /// Stance between trials.
@@ -51,6 +51,15 @@ pub struct SettleSettings {
     pub speed_m_s: f64,
     /// Quiet: angular speed of the trunk at most, rad/s.
     pub rate_rad_s: f64,
+}
+
+impl SettleSettings {
+    /// Whether all feet are down and the trunk is quiet.
+    pub fn is_quiet(&self, estimate: &Estimate) -> bool {
+        estimate.contact == [true; LEGS]
+            && estimate.velocity_world.norm() < self.speed_m_s
+            && estimate.angular_velocity_body.norm() < self.rate_rad_s
+    }
 }
 
 /// Limits of a fall.
@@ -183,6 +192,20 @@ pub struct RemoteSettings {
     pub needed: bool,
 }
 
+/// Conditions of a jump on hardware: section `[ready]` of `config/safety.toml`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ReadyLimits {
+    /// Least sum of the foot forces, share of the weight.
+    pub force_share_min: f64,
+    /// Largest sum of the foot forces, share of the weight.
+    pub force_share_max: f64,
+    /// Largest roll or pitch, rad.
+    pub tilt_rad: f64,
+    /// Largest distance of a joint from the stance, rad.
+    pub stance_rad: f64,
+}
+
 /// Expiry of an approval.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -230,6 +253,8 @@ pub struct FailsafeLimits {
     pub operator_silent_ms: u32,
     /// LAND: longest time from touchdown to sitting down, s.
     pub land_s: f64,
+    /// Largest drift of the robot's clock against this machine's that is not taken for a growing delay, parts per million.
+    pub clock_drift_ppm: f64,
     /// Least free space where the recording goes, MB: HOLD.
     pub disk_free_mb: u32,
     /// Latest start of a tick on the simulator, ms; zero only counts late ticks.
@@ -240,6 +265,12 @@ pub struct FailsafeLimits {
     pub simulator_idle_s: f64,
     /// Longest wait in READY or REVIEW on hardware, s: sit down; zero disables the limit.
     pub hardware_idle_s: f64,
+    /// Longest suspension of the computer, ms: CUT.
+    pub suspended_ms: u32,
+    /// Longest time without an answer of the guard, ms: LAND.
+    pub guard_silent_ms: u32,
+    /// Whether a robot sits down at the end of a trial on hardware.
+    pub hardware_review_sits_down: bool,
 }
 
 /// Source of the base's position, velocity and orientation, and of the objective.
@@ -411,6 +442,8 @@ pub struct ControlSettings {
     pub consistency: ConsistencyLimits,
     /// The remote control.
     pub remote: RemoteSettings,
+    /// Conditions of a jump.
+    pub ready: ReadyLimits,
     /// Expiry of an approval.
     pub approval: ApprovalLimits,
     /// Limits of the failsafes.

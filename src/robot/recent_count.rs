@@ -65,6 +65,12 @@ impl RecentCount {
         (1..=SECOND).map(|back| self.blocks[self.before(back)]).sum()
     }
 
+    /// Number of events in the last second and in the newest, incomplete block; and that time, ms: 1001 to 1100, shorter at first.
+    pub fn last_second(&self) -> (u32, u32) {
+        let events = (0..=SECOND).map(|back| self.blocks[self.before(back)]).fold(0, u32::saturating_add);
+        (events, self.full.min(SECOND as u32) * BLOCK_MS + self.ms)
+    }
+
     /// Index of the block that is `back` blocks older than the newest.
     fn before(&self, back: usize) -> usize {
         (self.newest + BLOCKS - back) % BLOCKS
@@ -114,6 +120,19 @@ mod tests {
         assert_eq!(recent.sum(), 99);
         pass(&mut recent, 10_000, 3);
         assert_eq!((recent.in_a_second(), recent.sum()), (3000, 3 * recent.span_ms()));
+    }
+
+    #[test]
+    fn the_last_second_holds_the_newest_event() {
+        let mut recent = RecentCount::default();
+        pass(&mut recent, 50, 0);
+        assert_eq!(recent.last_second(), (0, 50));
+        pass(&mut recent, 1, 1);
+        assert_eq!(recent.last_second(), (1, 51));
+        pass(&mut recent, 999, 0);
+        assert_eq!(recent.last_second(), (1, 1050));
+        pass(&mut recent, 100, 0);
+        assert_eq!(recent.last_second(), (0, 1050));
     }
 
     #[test]

@@ -19,6 +19,8 @@ pub enum TrialEnd {
     Cancelled,
     /// A fault ended it.
     Fault(Fault),
+    /// The countdown was cancelled: the robot was not ready for the jump.
+    NotReady(TrialInhibit),
 }
 
 /// An event of the control thread.
@@ -67,6 +69,8 @@ pub struct Readiness {
     pub findings: ArmingFindings,
     /// Reason to refuse the next trial.
     pub inhibit: Option<TrialInhibit>,
+    /// In READY: condition of a jump that does not hold at present, on hardware.
+    pub unready: Option<TrialInhibit>,
     /// The newest warning of the last second.
     pub warning: Option<FailsafeWarning>,
 }

@@ -74,6 +74,12 @@ pub enum Fault {
     OtherCommander { sign: CommanderSign, measured: f64, allowed: f64 },
     #[error("stop buttons of the remote control pressed")]
     RemoteStop,
+    /// Time is that by which CLOCK_BOOTTIME ran ahead of CLOCK_MONOTONIC.
+    #[error("the computer was suspended for {suspended_ms} ms, limit {allowed_ms} ms")]
+    Suspended { suspended_ms: u32, allowed_ms: u32 },
+    /// The time is `u32::MAX` when the guard process has ended.
+    #[error("{}", guard_silent(*.silent_ms, *.allowed_ms))]
+    GuardSilent { silent_ms: u32, allowed_ms: u32 },
 }
 
 /// A check of sensors against each other while the robot is commanded. The order is the order of the checks.
@@ -171,15 +177,28 @@ impl Fault {
                 | Fault::MotorMode { .. }
                 | Fault::RobotClock { .. }
                 | Fault::OtherCommander { .. }
+                | Fault::Suspended { .. }
         )
+    }
+}
+
+fn guard_silent(silent_ms: u32, allowed_ms: u32) -> String {
+    match silent_ms {
+        u32::MAX => "the guard process has ended: nothing damps the robot if quadfrog is killed".to_owned(),
+        _ => format!("the guard process does not answer for {silent_ms} ms, limit {allowed_ms} ms"),
     }
 }
 
 /// "1.004 rad exceeds 1.000 rad": at least `digits` decimals, more where both numbers would print alike.
 fn exceeds(measured: f64, limit: f64, unit: &str, digits: usize) -> String {
-    let alike = |digits: &usize| format!("{:.digits$}", measured.abs()) == format!("{:.digits$}", limit.abs());
-    let digits = (digits..9).find(|digits| !alike(digits)).unwrap_or(digits);
+    let digits = digits_apart(measured, limit, digits);
     format!("{measured:.digits$} {unit} exceeds {limit:.digits$} {unit}")
+}
+
+/// Least number of decimals, from `digits` on, at which both numbers print differently.
+fn digits_apart(measured: f64, limit: f64, digits: usize) -> usize {
+    let alike = |digits: &usize| format!("{:.digits$}", measured.abs()) == format!("{:.digits$}", limit.abs());
+    (digits..9).find(|digits| !alike(digits)).unwrap_or(digits)
 }
 
 /// Reason to refuse the next trial; a running one finishes.
@@ -190,6 +209,33 @@ pub enum TrialInhibit {
     BatteryLow { measured_percent: f64, allowed_percent: f64 },
     #[error("motor {} at {measured_c:.0} degrees Celsius, a jump needs less than {allowed_c:.0}; sit down and wait", joint_name(*.joint as usize))]
     MotorWarm { joint: u8, measured_c: f64, allowed_c: f64 },
+    #[error("{down} of 4 feet on the ground, a jump needs all; check stance and foot sensors")]
+    FeetUp { down: u8 },
+    #[error(
+        "foot forces add up to {measured_n:.0} N, a jump needs {least_n:.0} to {most_n:.0} N; check the foot sensors and their scale"
+    )]
+    FootForces { measured_n: f64, least_n: f64, most_n: f64 },
+    /// The larger of roll and pitch.
+    #[error("tilt {}; put the robot on level ground", at_most(*.measured_rad, *.allowed_rad, "rad"))]
+    NotLevel { measured_rad: f64, allowed_rad: f64 },
+    #[error("{} off its stance by {}; sit down and stand up again", joint_name(*.joint as usize), at_most(*.measured_rad, *.allowed_rad, "rad"))]
+    NotAtStance { joint: u8, measured_rad: f64, allowed_rad: f64 },
+    #[error("all feet down and the trunk at rest for {measured_s:.1} s, a jump needs {needed_s} s; wait")]
+    NotQuiet { measured_s: f64, needed_s: f64 },
+    #[error(
+        "a state was {age_ms} ms old within the last second, a jump needs at most {allowed_ms} ms; check the cable"
+    )]
+    StatesOld { age_ms: u32, allowed_ms: u32 },
+    #[error("{:.1} % of the states of the last second lost, a jump needs at most {} %; check the cable", 100.0 * .measured_share, 100.0 * .allowed_share)]
+    StatesLost { measured_share: f64, allowed_share: f64 },
+    #[error("{:.1} % of the control ticks of the last second late, a jump needs at most {} %; end other programs", 100.0 * .measured_share, 100.0 * .allowed_share)]
+    TicksLate { measured_share: f64, allowed_share: f64 },
+}
+
+/// "0.120 rad, a jump needs at most 0.100 rad": more decimals where both numbers would print alike.
+fn at_most(measured: f64, limit: f64, unit: &str) -> String {
+    let digits = digits_apart(measured, limit, 3);
+    format!("{measured:.digits$} {unit}, a jump needs at most {limit:.digits$} {unit}")
 }
 
 /// Warning before a failsafe trips.

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use strum::{IntoStaticStr, VariantArray};
 
-use super::{FallCause, Fault};
+use super::{FallCause, Fault, TrialInhibit};
 
 /// Mode of the machine; `control::mode::next` decides its changes. The order is the number in recordings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, IntoStaticStr, VariantArray)]
@@ -104,6 +104,8 @@ pub enum TransitionCause {
     Fault(Fault),
     /// The robot waited for too long in READY or REVIEW.
     Idle { allowed_s: f64 },
+    /// The countdown was cancelled: the robot was not ready for the jump.
+    NotReady(TrialInhibit),
 }
 
 impl std::fmt::Display for TransitionCause {
@@ -115,6 +117,7 @@ impl std::fmt::Display for TransitionCause {
             TransitionCause::Connected => write!(f, "the robot answers"),
             TransitionCause::Fell(cause) => write!(f, "fell: {cause}"),
             TransitionCause::Fault(fault) => write!(f, "{fault}"),
+            TransitionCause::NotReady(inhibit) => write!(f, "not ready: {inhibit}"),
             TransitionCause::Idle { allowed_s } => write!(f, "idle: no approval or verdict for {allowed_s:.0} s"),
         }
     }

@@ -132,6 +132,13 @@ impl<R: Robot> Bench<R> {
         Command::RunTrial(self.spec(), self.permit())
     }
 
+    /// Waits in READY, on hardware, until the robot is ready for a jump: still, and a second after the last disturbance.
+    pub fn settle(&mut self) {
+        if self.settings.hardware {
+            self.ticks(1200);
+        }
+    }
+
     pub fn arm(&self) -> Command {
         Command::Arm(self.permit())
     }
@@ -152,7 +159,10 @@ impl<R: Robot> Bench<R> {
                     }
                 }
                 StandUp => drop(self.command(self.arm())),
-                Countdown => drop(self.command(self.approved())),
+                Countdown => {
+                    self.settle();
+                    self.command(self.approved());
+                }
                 SitDown => drop(self.command(Command::SitDown)),
                 _ => drop(self.until(step)),
             }

@@ -66,6 +66,12 @@ impl ArmingHistory {
             self.still = self.still.saturating_add(1);
         }
     }
+
+    /// Share of late ticks in the last second, 0 to 1.
+    pub fn late_share_of_a_second(&self) -> f64 {
+        let (late, span_ms) = self.late.last_second();
+        f64::from(late) / f64::from(span_ms.max(1))
+    }
 }
 
 /// Measured value and limit of one check, in the check's unit. A value that is not a number fails.

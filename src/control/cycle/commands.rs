@@ -21,6 +21,11 @@ impl Cycle {
             Command::EndReview if matches!(self.cause, TransitionCause::Fell(_)) => Trigger::Acknowledge,
             Command::EndReview => Trigger::EndReview,
             Command::Acknowledge { .. } => Trigger::Acknowledge,
+            // No trigger: the mode changes when the robot answers.
+            Command::Contact => {
+                robot.begin_contact();
+                return;
+            }
             // No trigger: from the next tick on the failsafes land an energised robot.
             Command::Leave => {
                 self.session_left = true;
@@ -36,7 +41,14 @@ impl Cycle {
         }
         match command {
             Command::RunTrial(spec, _) => {
-                self.place_for_trial(robot, spec);
+                // A robot that was placed is in its stance; another one must be ready where it stands.
+                if !self.place_for_trial(robot, spec)
+                    && let Some(unready) = self.unready(&self.standing_pose())
+                {
+                    let because = CommandRefusal::Inhibited(unready);
+                    self.events.push(Event::Refused { command: *command, mode: self.mode, because });
+                    return;
+                }
                 self.jump = Some(RunningTrial::begin(spec, &self.settings));
                 self.trial_ticks = 0;
             }
@@ -61,7 +73,7 @@ impl Cycle {
     /// 3. Taking control and arming need an operator's console with a heartbeat, and a session that has not ended.
     /// 4. Arming and approval need a fresh permit.
     /// 5. Arming needs every arming check of the control thread, whatever the session says.
-    /// 6. Approval needs that nothing inhibits trials.
+    /// 6. Approval needs that nothing inhibits trials. Whether the robot is ready for a jump is known after its placement alone.
     /// 7. An acknowledgement needs that no failsafe trips any more.
     fn refusal(&self, command: &Command, trigger: Trigger, inputs: &TickInputs) -> Option<CommandRefusal> {
         if inputs.stop {
@@ -121,20 +133,22 @@ impl Cycle {
         roll.abs().max(pitch.abs()) > self.settings.failsafe.stance_tilt_rad
     }
 
-    /// Places a simulated robot at the origin, feet at the trial's stance.
-    fn place_for_trial<R: Robot + ?Sized>(&mut self, robot: &mut R, spec: &TrialSpec) {
+    /// Places a simulated robot at the origin, feet at the trial's stance. Returns false for a robot that only a person can place.
+    fn place_for_trial<R: Robot + ?Sized>(&mut self, robot: &mut R, spec: &TrialSpec) -> bool {
         // The session has checked that the stance can be reached.
         let joint_position = self.settings.geometry.stance(&spec.stance_leg, &self.tick.state.joint_position_rad);
-        self.place(robot, &Placement { joint_position, lying: false, seed: spec.seed });
+        self.place(robot, &Placement { joint_position, lying: false, seed: spec.seed })
     }
 
-    fn place<R: Robot + ?Sized>(&mut self, robot: &mut R, placement: &Placement) {
-        if robot.place(placement) {
+    fn place<R: Robot + ?Sized>(&mut self, robot: &mut R, placement: &Placement) -> bool {
+        let placed = robot.place(placement);
+        if placed {
             self.estimator.reset();
             self.consistency.reset();
             self.gate.reset();
             self.read(robot);
             self.estimate();
         }
+        placed
     }
 }

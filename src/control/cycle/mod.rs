@@ -2,26 +2,28 @@
 //! thread makes it at 1 kHz, a rollout as fast as the machine allows.
 
 mod commands;
+mod decision;
 mod failsafes;
 
 use super::arming::{self, ArmingHistory};
 use super::command_gate::CommandGate;
 use super::consistency::{Consistency, ConsistencyInputs};
 use super::failsafe::{self, Failsafe};
-use super::leg::{self, LegTarget};
+use super::leg;
+use super::link_quality::LinkQuality;
 use super::mode::{self, Trigger};
-use super::ramp::{PoseRamp, RampProgress};
-use super::running_trial::{FallWatch, RunningTrial, TrialProgress};
+use super::ramp::PoseRamp;
+use super::readiness::{self, QuietTime, ReadinessInputs};
+use super::running_trial::{FallWatch, RunningTrial};
 use super::settings::ControlSettings;
 use crate::control::estimator::Estimator;
 use crate::realtime::clock::Clock;
 use crate::robot::kinematics::FootPosition;
-use crate::robot::{JointCommand, Joints, LEGS, PerLeg, Robot, RobotError, robot_time_passed};
+use crate::robot::{JointCommand, Joints, PerLeg, Robot, RobotError, robot_time_passed};
 use crate::telemetry::{
     ArmingFindings, Command, Event, FailsafeWarning, Fault, Mode, Readiness, Tick, TickDurations, TransitionCause,
-    TrialEnd,
+    TrialEnd, TrialInhibit,
 };
-use nalgebra::Vector3;
 
 /// Inputs of one tick.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -38,6 +40,10 @@ pub struct TickInputs {
     pub command: Option<Command>,
     /// The ring of events was full: the session takes none.
     pub events_lost: bool,
+    /// Time for which the computer was suspended since the last tick, ms.
+    pub suspended_ms: u32,
+    /// Time for which the guard has not answered, ms; `u32::MAX` when it is gone, zero without a guard.
+    pub guard_silent_ms: u32,
 }
 
 /// Events of one tick.
@@ -83,6 +89,8 @@ pub struct Cycle {
     /// The newest warning and the ticks for which it stays set.
     warning: Option<(FailsafeWarning, u32)>,
     arming_history: ArmingHistory,
+    link_quality: LinkQuality,
+    quiet: QuietTime,
     findings: ArmingFindings,
     gate: CommandGate,
     ramp: Option<PoseRamp>,
@@ -122,6 +130,8 @@ impl Cycle {
             tripped: None,
             warning: None,
             arming_history: ArmingHistory::default(),
+            link_quality: LinkQuality::default(),
+            quiet: QuietTime::default(),
             findings: ArmingFindings::default(),
             gate: CommandGate::default(),
             ramp: None,
@@ -160,6 +170,7 @@ impl Cycle {
         Readiness {
             findings: self.findings,
             inhibit: failsafe::trial_inhibit(&self.tick.state, &self.settings),
+            unready: if self.mode == Mode::Ready { self.unready(&self.standing_pose()) } else { None },
             warning: self.warning.map(|(warning, _)| warning),
         }
     }
@@ -167,6 +178,19 @@ impl Cycle {
     /// Consistency of sensors, clocks and commands as of the last tick.
     pub fn consistency(&self) -> &Consistency {
         &self.consistency
+    }
+
+    /// Returns a condition of a jump from the joint angles `pose_rad` that does not hold.
+    fn unready(&self, pose_rad: &Joints) -> Option<TrialInhibit> {
+        let inputs = ReadinessInputs {
+            state: &self.tick.state,
+            estimate: &self.tick.estimate,
+            quiet: &self.quiet,
+            history: &self.arming_history,
+            link: &self.link_quality,
+            pose_rad,
+        };
+        readiness::unready(&inputs, &self.settings)
     }
 
     /// Events of the last tick.
@@ -186,11 +210,13 @@ impl Cycle {
         self.begin(inputs);
 
         self.read(robot);
+        self.measure_link(inputs, robot);
         let read_ns = clock.now_ns();
         if inputs.stop {
             self.trigger(Trigger::Stop, TransitionCause::Stop);
         }
         self.estimate();
+        self.quiet.update(&self.tick.estimate, self.state_age_ms, &self.settings);
         let restarted = robot_time_passed(self.tick.state.robot_time_ms, previous_robot_time_ms) < 0;
         self.check_consistency(inputs, restarted, robot);
         self.run_failsafes(inputs, restarted, robot);
@@ -236,6 +262,13 @@ impl Cycle {
             Err(RobotError::NoNewState { age_ms }) => self.state_age_ms = age_ms,
             Err(RobotError::Send { errno }) => self.send_error = Some(errno),
         }
+    }
+
+    /// Measures the quality of the link with the state of this tick.
+    fn measure_link<R: Robot + ?Sized>(&mut self, inputs: &TickInputs, robot: &R) {
+        let now_ns = inputs.time_ns + inputs.lateness_ns;
+        let (robot_time_ms, drift_ppm) = (self.tick.state.robot_time_ms, self.settings.failsafe.clock_drift_ppm);
+        self.link_quality.update(now_ns, robot_time_ms, self.state_age_ms, robot.link(), drift_ppm);
     }
 
     /// Computes feet, Jacobians and the base's estimate.
@@ -295,92 +328,6 @@ impl Cycle {
         }
     }
 
-    /// Returns the motor command of this mode, after the changes of mode that need no command.
-    fn decide(&mut self) -> JointCommand {
-        self.follow_jump();
-        self.follow_ramp();
-        self.motor_command()
-    }
-
-    /// Changes the mode as the jump progresses.
-    fn follow_jump(&mut self) {
-        if let Some(jump) = &mut self.jump {
-            let progress = match jump.update(&self.tick.state, &self.tick.estimate, &self.settings) {
-                // After a fault the landing ends when the robot stands; rest is not required.
-                TrialProgress::Settle if self.landing.is_some() && jump.landed_s() >= self.settings.failsafe.land_s => {
-                    TrialProgress::Over(TrialEnd::NotQuiet)
-                }
-                progress => progress,
-            };
-            match (self.mode, progress) {
-                (Mode::Countdown, TrialProgress::Jump | TrialProgress::Settle) => {
-                    self.trigger(Trigger::CountdownOver, TransitionCause::StepFinished);
-                }
-                (Mode::Jump, TrialProgress::Settle) => self.trigger(Trigger::Landed, TransitionCause::StepFinished),
-                (_, TrialProgress::Over(TrialEnd::Fell(cause))) => {
-                    self.trigger(Trigger::Fell, TransitionCause::Fell(cause))
-                }
-                (_, TrialProgress::Over(end)) => {
-                    // A jump may end without SETTLE.
-                    if self.mode == Mode::Jump {
-                        self.trigger(Trigger::Landed, TransitionCause::StepFinished);
-                    }
-                    self.finish_trial(self.landing.map_or(end, TrialEnd::Fault));
-                    self.trigger(Trigger::Settled, TransitionCause::StepFinished);
-                }
-                _ => {}
-            }
-        }
-    }
-
-    /// Changes the mode when a ramp has reached its pose or timed out.
-    fn follow_ramp(&mut self) {
-        if let Some(ramp) = &self.ramp {
-            match ramp.progress(&self.tick.state.joint_position_rad) {
-                RampProgress::Moving => {}
-                RampProgress::Reached => self.trigger(Trigger::PoseReached, TransitionCause::StepFinished),
-                RampProgress::TimedOut { .. } if self.mode == Mode::SitDown => {
-                    // The floor may stop the robot short of the lying pose; damping is safe there.
-                    self.trigger(Trigger::PoseReached, TransitionCause::StepFinished);
-                }
-                RampProgress::TimedOut { error_rad } => {
-                    self.trigger(Trigger::Fault, TransitionCause::Fault(Fault::PoseTimeout { error_rad }));
-                }
-            }
-        }
-    }
-
-    fn motor_command(&mut self) -> JointCommand {
-        self.tick.torque_demanded = Joints::default();
-        match (self.mode, &mut self.ramp, &self.jump) {
-            (Mode::StandUp | Mode::SitDown, Some(ramp), _) => ramp.command(),
-            (Mode::Countdown | Mode::Jump | Mode::Settle, _, Some(jump)) => {
-                let target = jump.target(&self.tick.estimate);
-                self.legs(&target)
-            }
-            (Mode::Ready | Mode::Review, _, _) => {
-                let stand = &self.settings.stand;
-                self.legs(&LegTarget {
-                    gains: stand.gains,
-                    stance_leg: stand.stance_leg,
-                    vmc: stand.vmc,
-                    attitude_rate_gain: stand.attitude_rate_gain,
-                    foot_offset_leg: [Vector3::zeros(); LEGS],
-                    amplitudes_leg: [Vector3::zeros(); LEGS],
-                    theta_rad: 0.0,
-                })
-            }
-            _ => JointCommand::damping(self.settings.gate.damping_kd),
-        }
-    }
-
-    fn legs(&mut self, target: &LegTarget) -> JointCommand {
-        let (state, estimate) = (&self.tick.state, &self.tick.estimate);
-        let torques = leg::torques(target, &self.feet, &state.joint_velocity_rad_s, estimate);
-        self.tick.torque_demanded = torques;
-        JointCommand::torques(&torques)
-    }
-
     /// Changes the mode if `mode::next` allows it.
     fn trigger(&mut self, trigger: Trigger, cause: TransitionCause) {
         if let Some(to) = mode::next(self.mode, trigger).filter(|to| *to != self.mode) {
@@ -408,6 +355,7 @@ impl Cycle {
                 TransitionCause::Stop => TrialEnd::Stopped,
                 TransitionCause::Fell(cause) => TrialEnd::Fell(cause),
                 TransitionCause::Fault(fault) => TrialEnd::Fault(fault),
+                TransitionCause::NotReady(inhibit) => TrialEnd::NotReady(inhibit),
                 TransitionCause::Command
                 | TransitionCause::StepFinished
                 | TransitionCause::Connected
@@ -423,15 +371,6 @@ impl Cycle {
             self.events.push(Event::TrialEnded { trial: jump.spec().trial, ticks, end });
             self.ended = Some(jump);
         }
-    }
-
-    /// Joint angles of standing, rad: the nominal stance lowered by dz with 4 kp dz = m g, where the impedance carries the weight.
-    /// The change from the ramp to impedance control then has no step.
-    fn standing_pose(&self) -> Joints {
-        let stand = &self.settings.stand;
-        let sag = self.settings.weight_n / (LEGS as f64 * stand.gains.kp);
-        let foot_leg = stand.stance_leg + Vector3::new(0.0, 0.0, sag);
-        self.settings.geometry.stance(&foot_leg, &self.settings.lying_position)
     }
 
     /// Completes the tick for recorder, console and session.

@@ -1,0 +1,121 @@
+//! The motor command of each mode, and the changes of mode as jump and ramp progress.
+
+use super::Cycle;
+use crate::control::failsafe;
+use crate::control::leg::{self, LegTarget};
+use crate::control::mode::Trigger;
+use crate::control::ramp::RampProgress;
+use crate::control::running_trial::TrialProgress;
+use crate::robot::{JointCommand, Joints, LEGS};
+use crate::telemetry::{Fault, Mode, TransitionCause, TrialEnd};
+use crate::trial::Gains;
+use nalgebra::Vector3;
+
+impl Cycle {
+    /// Returns the motor command of this mode, after the changes of mode that need no command.
+    pub(super) fn decide(&mut self) -> JointCommand {
+        self.follow_jump();
+        self.follow_ramp();
+        self.motor_command()
+    }
+
+    /// Changes the mode as the jump progresses.
+    fn follow_jump(&mut self) {
+        if let Some(jump) = &mut self.jump {
+            let progress = match jump.update(&self.tick.state, &self.tick.estimate, &self.settings) {
+                // After a fault the landing ends when the robot stands; rest is not required.
+                TrialProgress::Settle if self.landing.is_some() && jump.landed_s() >= self.settings.failsafe.land_s => {
+                    TrialProgress::Over(TrialEnd::NotQuiet)
+                }
+                progress => progress,
+            };
+            match (self.mode, progress) {
+                (Mode::Countdown, TrialProgress::Jump | TrialProgress::Settle) => self.begin_impulse(),
+                (Mode::Jump, TrialProgress::Settle) => self.trigger(Trigger::Landed, TransitionCause::StepFinished),
+                (_, TrialProgress::Over(TrialEnd::Fell(cause))) => {
+                    self.trigger(Trigger::Fell, TransitionCause::Fell(cause))
+                }
+                (_, TrialProgress::Over(end)) => {
+                    // A jump may end without SETTLE.
+                    if self.mode == Mode::Jump {
+                        self.trigger(Trigger::Landed, TransitionCause::StepFinished);
+                    }
+                    self.finish_trial(self.landing.map_or(end, TrialEnd::Fault));
+                    self.trigger(Trigger::Settled, TransitionCause::StepFinished);
+                }
+                _ => {}
+            }
+        }
+    }
+
+    /// Begins the impulse of a robot that is ready for it; otherwise cancels the countdown.
+    fn begin_impulse(&mut self) {
+        let Some(jump) = &self.jump else { return };
+        let pose_rad = self.pose_of(&jump.spec().gains, &jump.spec().stance_leg);
+        match failsafe::trial_inhibit(&self.tick.state, &self.settings).or_else(|| self.unready(&pose_rad)) {
+            None => self.trigger(Trigger::CountdownOver, TransitionCause::StepFinished),
+            Some(inhibit) => self.trigger(Trigger::Cancel, TransitionCause::NotReady(inhibit)),
+        }
+    }
+
+    /// Changes the mode when a ramp has reached its pose or timed out.
+    fn follow_ramp(&mut self) {
+        if let Some(ramp) = &self.ramp {
+            match ramp.progress(&self.tick.state.joint_position_rad) {
+                RampProgress::Moving => {}
+                RampProgress::Reached => self.trigger(Trigger::PoseReached, TransitionCause::StepFinished),
+                RampProgress::TimedOut { .. } if self.mode == Mode::SitDown => {
+                    // The floor may stop the robot short of the lying pose; damping is safe there.
+                    self.trigger(Trigger::PoseReached, TransitionCause::StepFinished);
+                }
+                RampProgress::TimedOut { error_rad } => {
+                    self.trigger(Trigger::Fault, TransitionCause::Fault(Fault::PoseTimeout { error_rad }));
+                }
+            }
+        }
+    }
+
+    fn motor_command(&mut self) -> JointCommand {
+        self.tick.torque_demanded = Joints::default();
+        match (self.mode, &mut self.ramp, &self.jump) {
+            (Mode::StandUp | Mode::SitDown, Some(ramp), _) => ramp.command(),
+            (Mode::Countdown | Mode::Jump | Mode::Settle, _, Some(jump)) => {
+                let target = jump.target(&self.tick.estimate);
+                self.legs(&target)
+            }
+            (Mode::Ready | Mode::Review, _, _) => {
+                let stand = &self.settings.stand;
+                self.legs(&LegTarget {
+                    gains: stand.gains,
+                    stance_leg: stand.stance_leg,
+                    vmc: stand.vmc,
+                    attitude_rate_gain: stand.attitude_rate_gain,
+                    foot_offset_leg: [Vector3::zeros(); LEGS],
+                    amplitudes_leg: [Vector3::zeros(); LEGS],
+                    theta_rad: 0.0,
+                })
+            }
+            _ => JointCommand::damping(self.settings.gate.damping_kd),
+        }
+    }
+
+    fn legs(&mut self, target: &LegTarget) -> JointCommand {
+        let (state, estimate) = (&self.tick.state, &self.tick.estimate);
+        let torques = leg::torques(target, &self.feet, &state.joint_velocity_rad_s, estimate);
+        self.tick.torque_demanded = torques;
+        JointCommand::torques(&torques)
+    }
+
+    /// Joint angles of standing between trials, rad.
+    pub(super) fn standing_pose(&self) -> Joints {
+        self.pose_of(&self.settings.stand.gains, &self.settings.stand.stance_leg)
+    }
+
+    /// Joint angles of standing, rad: the nominal stance lowered by dz with 4 kp dz = m g, where the impedance carries the weight.
+    /// The change from the ramp to impedance control then has no step.
+    fn pose_of(&self, gains: &Gains, stance_leg: &Vector3<f64>) -> Joints {
+        let sag = self.settings.weight_n / (LEGS as f64 * gains.kp);
+        let foot_leg = stance_leg + Vector3::new(0.0, 0.0, sag);
+        self.settings.geometry.stance(&foot_leg, &self.settings.lying_position)
+    }
+}
