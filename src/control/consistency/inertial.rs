@@ -44,7 +44,8 @@ impl InertialUnit {
         let reported_up_body = reported_up(imu);
         InertialUnit {
             repeated: [0; 3],
-            accel_body: imu.accel_body,
+            // Not the first measurement: one sample, of a robot that was just laid down, is no average.
+            accel_body: reported_up_body * GRAVITY,
             up_body: if at_rest { imu.accel_body / magnitude } else { reported_up_body },
             reported_up_body,
             turn_error: Vector3::zeros(),
