@@ -53,6 +53,9 @@ struct PoseToml {
     lying_rad: [f64; 3],
 }
 
+/// Largest angle of a joint's limit, rad: two turns.
+const LARGEST_ANGLE_RAD: f64 = 12.6;
+
 /// The files of one robot.
 #[derive(Debug, Clone)]
 pub struct RobotFiles {
@@ -149,8 +152,11 @@ impl RobotFiles {
         let maker_limits = robot.maker_limits.map(|limits| [limits.hip_rad, limits.thigh_rad, limits.calf_rad]);
         for (i, [low, high]) in maker_limits.iter().flatten().copied().enumerate() {
             let (lowest, highest) = (parts.limits.min_position[i], parts.limits.max_position[i]);
-            if !(low.is_finite() && high.is_finite()) || low.max(lowest) >= high.min(highest) {
-                let problem = format!("[{low}, {high}] rad leaves nothing of the URDF's {lowest}..{highest}");
+            let possible = |angle: f64| angle.abs() <= LARGEST_ANGLE_RAD;
+            if !(possible(low) && possible(high)) || low.max(lowest) >= high.min(highest) {
+                let problem = format!(
+                    "[{low}, {high}] rad is not within {LARGEST_ANGLE_RAD}, or has nothing of the URDF's {lowest}..{highest}"
+                );
                 return invalid("maker_limits", problem, "give [lowest, highest] of hip, thigh and calf");
             }
         }
