@@ -168,7 +168,7 @@ impl Gains {
     }
 }
 
-/// The jumps that a person approves and judges. STOP, the loss of the operator and every limit work the same in all.
+/// Rule by which jumps are approved and judged. STOP, the loss of the operator and every limit work the same in all.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, EnumString, IntoStaticStr, VariantArray)]
 #[strum(serialize_all = "kebab-case")]
 pub enum Approval {
@@ -386,6 +386,16 @@ pub struct TrialRecord {
     pub gains: ParameterValues,
 }
 
+/// Growth of the largest forces on a robot: section `[hop_envelope]` of `config/safety.toml`.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct HopEnvelope {
+    /// Share of the force bounds before the first accepted trial.
+    pub start: f64,
+    /// Growth of the share with each accepted trial.
+    pub step: f64,
+}
+
 /// The present search space and the progress of the study.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct SearchStatus {
@@ -397,6 +407,8 @@ pub struct SearchStatus {
     pub parameters: Vec<SearchedParameter>,
     /// Repeats left to confirm the best; none while no confirmation runs.
     pub confirming: Option<u32>,
+    /// Share of the force bounds that trials on the robot may use; none where the whole bounds are open.
+    pub hop_share: Option<f64>,
 }
 
 /// One parameter as it is searched at present.

@@ -110,6 +110,16 @@ fn a_negative_duration_is_refused() {
     refuses("control.toml", "[stand_up]\nduration_s = -1.0\n", &["stand_up.duration_s", "-1"]);
 }
 
+/// A limit that would never trip, and buttons that no remote has.
+#[test]
+fn consistency_limits_have_ranges_and_the_remote_its_buttons() {
+    refuses("safety.toml", "[consistency]\nclock_step_ms = 5000\n", &["consistency.clock_step_ms", "20 to 1000 ms"]);
+    refuses("safety.toml", "[consistency]\norientation_rad = 3.0\n", &["consistency.orientation_rad", "0.3 rad"]);
+    refuses("safety.toml", "[consistency]\nrepeated_states = 1000000\n", &["consistency.repeated_states", "200"]);
+    refuses("safety.toml", "[remote]\nstop = \"L9\"\n", &["remote.stop", "L9", "known buttons"]);
+    refuses("safety.toml", "[remote]\nstop = \"none\"\n", &["remote.stop", "at least one button"]);
+}
+
 #[test]
 fn a_misspelt_file_name_is_refused() {
     refuses("saftey.toml", "", &["safety.toml"]);

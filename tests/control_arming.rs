@@ -7,7 +7,8 @@ mod robots;
 
 use bench::{Bench, shipped};
 use nalgebra::{UnitQuaternion, Vector3};
-use quadfrog::robot::{Battery, LinkStatus, RobotError, RobotState};
+use quadfrog::robot::remote::Remote;
+use quadfrog::robot::{Battery, GRAVITY, Imu, LinkStatus, RobotError, RobotState};
 use quadfrog::telemetry::{ArmingCheck, Command, CommandRefusal, Mode};
 use quadfrog::trial::Backend;
 use robots::ScriptedRobot;
@@ -22,10 +23,13 @@ fn lying_still() -> ArmingBench {
         motor_enabled: [true; 12],
         motor_temperature_c: [30.0; 12],
         battery: Some(Battery { charge_percent: 80.0, voltage_v: 24.0, current_a: 0.0, cell_v: [0.0; 10] }),
+        imu: Imu { accel_body: Vector3::new(0.0, 0.0, GRAVITY), ..Imu::default() },
+        remote: Some(Remote::default()),
         ..RobotState::default()
     };
     let link = LinkStatus { recent_received: 5000, ..LinkStatus::default() };
-    let mut bench = Bench::new(config, settings, ScriptedRobot { state: Ok(state), link }).reach(Mode::Disarmed);
+    let mut bench =
+        Bench::new(config, settings, ScriptedRobot { state: Ok(state), link, noisy: true }).reach(Mode::Disarmed);
     bench.ticks(4500);
     bench
 }
@@ -52,11 +56,11 @@ fn a_sound_robot_is_armed() {
     assert_eq!(lying_still().failing(), []);
 }
 
-/// Each check fails alone and is named alone.
+/// Each check fails and is named alone; a jump of an angle is also a contradiction to the velocities.
 #[test]
 fn each_check_refuses_arming_by_itself() {
     type Breaks = fn(&mut ArmingBench);
-    let table: [(ArmingCheck, Breaks); 14] = [
+    let table: [(ArmingCheck, Breaks); 17] = [
         (ArmingCheck::StateFresh, |b| b.robot.state = Err(RobotError::NoNewState { age_ms: 12 })),
         (ArmingCheck::Loss, |b| b.robot.link.recent_lost = 60),
         (ArmingCheck::Checksums, |b| b.robot.link.recent_corrupt = 1),
@@ -75,13 +79,28 @@ fn each_check_refuses_arming_by_itself() {
             b.ticks(60);
             b.inputs.lateness_ns = 0;
         }),
+        (ArmingCheck::InertialLive, |b| {
+            b.robot.noisy = false;
+            b.ticks(60);
+        }),
+        (ArmingCheck::Gravity, |b| {
+            b.state().imu.accel_body.z = 8.9;
+            b.ticks(1500);
+        }),
+        (ArmingCheck::Remote, |b| b.state().remote = None),
         (ArmingCheck::MotorsCool, |b| b.state().motor_temperature_c[3] = f64::NAN),
         (ArmingCheck::Battery, |b| b.state().battery.as_mut().unwrap().charge_percent = f64::NAN),
     ];
     for (check, breaks) in table {
         let mut bench = lying_still();
         breaks(&mut bench);
-        assert_eq!(bench.failing(), [check]);
+        let mut failing = bench.failing();
+        match check {
+            ArmingCheck::Upright => failing.retain(|check| *check != ArmingCheck::Orientation),
+            ArmingCheck::LyingDown => failing.retain(|check| *check != ArmingCheck::JointVelocity),
+            _ => {}
+        }
+        assert_eq!(failing, [check]);
         assert_eq!(bench.cycle.mode(), Mode::Disarmed);
     }
 }
@@ -134,7 +153,7 @@ fn silence_is_not_stillness() {
             bench.robot.state = Err(RobotError::NoNewState { age_ms });
             bench.tick(None);
         }
-        bench.robot.state = state;
+        bench.robot.state = state.map(|state| RobotState { robot_time_ms: state.robot_time_ms + ticks, ..state });
     };
     let moved = || {
         let mut bench = lying_still();

@@ -31,7 +31,9 @@ type Tamper = fn(&mut RobotState);
 
 /// A robot with hardware settings that lies and passes every arming check.
 fn linked() -> LinkedBench {
-    let (config, description, settings) = shipped(Backend::Hardware);
+    let (config, description, mut settings) = shipped(Backend::Hardware);
+    // An injected tilt is one that no gyroscope has measured (tests/control_consistency.rs).
+    (settings.consistency.orientation_rad, settings.consistency.turn_rad) = (f64::INFINITY, f64::INFINITY);
     let lying = LinkedRobot::lying(&description, &config.simulator);
     Bench::new(config, settings, LinkedRobot { with_truth: true, keeps_commands: true, ..lying })
 }
@@ -137,8 +139,14 @@ fn a_fault_that_voids_confirmations_is_reported_behind_another_fault() {
         bench.robot.silent_ms = 0;
     }
     let reported = bench.faults();
-    let [Fault::JointPosition { .. }, Fault::MotorMode { joint: 5 }, Fault::LinkLost { .. }, Fault::Reboot] =
-        reported[..]
+    // The clock of the last injection stands still.
+    let [
+        Fault::JointPosition { .. },
+        Fault::MotorMode { joint: 5 },
+        Fault::LinkLost { .. },
+        Fault::Reboot,
+        Fault::RobotClock { .. },
+    ] = reported[..]
     else {
         panic!("{reported:?}")
     };
@@ -375,7 +383,7 @@ fn an_approval_is_single_use_expires_and_dies_with_a_change_of_mode() {
     assert_eq!((bench.cycle.mode(), bench.refusal()), (Mode::Ready, Some(CommandRefusal::Stale)), "used up");
 
     let approval = bench.approved();
-    bench.ticks(30_001);
+    bench.ticks(2001);
     bench.command(approval);
     assert!(matches!(bench.refusal(), Some(CommandRefusal::Expired { .. })), "{:?}", bench.refusal());
     assert_eq!(bench.cycle.mode(), Mode::Ready);
@@ -399,7 +407,7 @@ fn an_approval_is_single_use_expires_and_dies_with_a_change_of_mode() {
 fn arming_expires_dies_with_a_change_of_mode_and_needs_somebody_who_watches() {
     let mut bench = in_mode(Mode::Disarmed);
     let arm = bench.arm();
-    bench.ticks(30_001);
+    bench.ticks(2001);
     bench.command(arm);
     assert!(matches!(bench.refusal(), Some(CommandRefusal::Expired { .. })), "{:?}", bench.refusal());
 

@@ -7,6 +7,7 @@ use quadfrog::robot::go1::packet::{
     COMMAND_LENGTH, CommandError, CrcForm, LowCmd, LowState, MODE_BRAKE, MODE_SERVO, POSITION_STOP, Rejection,
     VELOCITY_STOP, crc,
 };
+use quadfrog::robot::remote::{Remote, RemoteButtons};
 use quadfrog::robot::{Battery, JOINTS, JointCommand, MotorCommand, RobotState};
 
 fn motor() -> impl Strategy<Value = MotorCommand> {
@@ -147,6 +148,27 @@ proptest! {
         prop_assert_eq!(heard.charge_percent, told.charge_percent);
         prop_assert!((heard.current_a - told.current_a).abs() < 1e-3 && (heard.voltage_v - told.voltage_v).abs() < 1e-3);
     }
+}
+
+/// The remote control's bytes at their offsets (`docs/go1-wire.md`, section 4), and back.
+#[test]
+fn the_remote_control_is_decoded() {
+    let mut bytes = LowState::zero().bytes().to_vec();
+    assert_eq!(robot_state(LowState::parse(&bytes).unwrap(), 1.0).remote, None, "zeros are no answer");
+    // Bit 5 of the first byte is L2, bit 1 of the second is B.
+    bytes[759..763].copy_from_slice(&[0x55, 0x51, 0x20, 0x02]);
+    for (place, axis) in [0.25_f32, -0.5, 1.0, 0.75, -1.0].iter().enumerate() {
+        bytes[763 + 4 * place..767 + 4 * place].copy_from_slice(&axis.to_le_bytes());
+    }
+    let sum = crc(&bytes[..800]);
+    bytes[803..807].copy_from_slice(&sum.to_le_bytes());
+    let state = robot_state(LowState::parse(&bytes).unwrap(), 1.0);
+    let pressed: RemoteButtons = "L2+B".parse().unwrap();
+    let expected = Remote { buttons: pressed, left_stick: [0.25, -1.0], right_stick: [-0.5, 1.0], l2_travel: 0.75 };
+    assert_eq!(state.remote, Some(expected));
+    let mut datagram = low_state(&state, 1.0);
+    datagram.write_crc();
+    assert_eq!(datagram.bytes()[759..799], bytes[759..799]);
 }
 
 /// The default command of `docs/go1-wire.md`, section 3, in both forms.

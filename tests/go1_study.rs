@@ -39,9 +39,13 @@ fn config(late_ms: f64) -> Config {
     config.control.countdown.hardware_s = config.control.countdown.simulator_s;
     // The test machine has other load: its delays would be faults at a robot.
     config.safety.failsafe.hardware_late_ms = late_ms;
+    // The whole bounds, as in the simulator.
+    config.safety.hop_envelope.start = 1.0;
     config.safety.failsafe.state_age_ms = (2.0 * late_ms).max(20.0) as u32;
     config.safety.failsafe.period_ticks = 1000;
     config.safety.arming.late_share = 1.0;
+    config.safety.consistency.clock_step_ms = 1000.0;
+    config.safety.consistency.loss_share = 0.5;
     config
 }
 

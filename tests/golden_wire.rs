@@ -256,6 +256,10 @@ fn compare(ours: &LowState, theirs: &Value, case: &str) {
     same("footForce", ours.foot_force.map(|v| v.get().into()).to_vec(), &theirs["footForce"]);
     same("footForceEst", ours.foot_force_estimated.map(|v| v.get().into()).to_vec(), &theirs["footForceEst"]);
     one("tick", ours.robot_time_ms.get().into(), &theirs["tick"]);
-    assert_eq!(bytes(theirs["wirelessRemote"].as_str().unwrap()), ours.remote, "{case}: wirelessRemote");
+    assert_eq!(
+        bytes(theirs["wirelessRemote"].as_str().unwrap()),
+        zerocopy::IntoBytes::as_bytes(&ours.remote),
+        "{case}: wirelessRemote"
+    );
     one("reserve", ours.reserve.get().into(), &theirs["reserve"]);
 }

@@ -215,3 +215,37 @@ fn spaces_that_cannot_be_searched_are_refused() {
     let twice = [("f0".to_owned(), Range::linear(0.0, 1.0)), ("f0".to_owned(), Range::linear(0.0, 2.0))];
     assert_eq!(Space::new(twice), Err(SpaceError::Duplicate("f0".into())));
 }
+
+/// (A defect once: a void trial told the samplers nothing, and a deterministic one proposed its point again, ten times in a row.)
+#[test]
+fn no_sampler_proposes_the_point_of_a_void_trial_again() {
+    for &kind in SamplerKind::ALL {
+        let mut study = study(kind, 0, Direction::Maximize);
+        // Better towards the corner, so that a model proposes the corner.
+        let scaled = |study: &Study, parameters: &[(String, f64)]| -> Vec<f64> {
+            parameters.iter().map(|(name, v)| study.options().space.range(name).unwrap().scale(*v)).collect()
+        };
+        for _ in 0..12 {
+            let number = begin(&mut study);
+            let u = scaled(&study, &study.trial(number).unwrap().parameters.clone());
+            study.tell(number, Outcome::Complete(u.iter().sum())).unwrap();
+        }
+        let mut void: Vec<Vec<f64>> = Vec::new();
+        for _ in 0..10 {
+            let number = begin(&mut study);
+            let u = scaled(&study, &study.trial(number).unwrap().parameters.clone());
+            let nearest = void
+                .iter()
+                .map(|v| v.iter().zip(&u).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max))
+                .fold(f64::INFINITY, f64::min);
+            assert!(nearest > 1e-3, "{kind:?}: {u:?} is {nearest} from a void trial");
+            study.tell(number, Outcome::Fail).unwrap();
+            void.push(u);
+        }
+        // A queued point is the operator's wish.
+        let queued = study.trials().last().unwrap().parameters.clone();
+        study.enqueue(&queued, &[]).unwrap();
+        let again = begin(&mut study);
+        assert_eq!(study.trial(again).unwrap().parameters, queued);
+    }
+}

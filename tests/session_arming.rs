@@ -74,6 +74,7 @@ impl Session {
             sinks: RecordSinks { recorder: to_recorder, console: to_screen },
             recorder: RecorderWatch::default(),
             checklist: ArmingChecklist::new(&settings, fingerprint(&options.config), folder),
+            approval: settings.approval,
             info: session_info(&options, ""),
         };
         Session {

@@ -18,7 +18,7 @@ use crate::robot::GRAVITY;
 use crate::robot::Leg;
 use crate::robot::description::RobotDescription;
 use crate::sim::SimConfig;
-use crate::trial::{Backend, GAIN_UNITS, ParameterInfo, ParameterValues, Task, parameter_unit};
+use crate::trial::{Backend, GAIN_UNITS, HopEnvelope, ParameterInfo, ParameterValues, Task, parameter_unit};
 
 /// The files of a configuration folder and their defaults.
 const FILES: [(&str, &str); 5] = [
@@ -149,6 +149,11 @@ impl Config {
         self.parameters(task).into_iter().map(widest).collect()
     }
 
+    /// Returns the growth of the largest forces; none on the simulator.
+    pub fn hop_envelope(&self, backend: Backend) -> Option<HopEnvelope> {
+        (backend == Backend::Hardware).then_some(self.safety.hop_envelope)
+    }
+
     /// Returns the controller's gains with their allowed ranges, in table order.
     pub fn gains(&self) -> Vec<ParameterInfo> {
         GAIN_UNITS
@@ -243,6 +248,8 @@ impl Config {
             hardware,
             arming: self.safety.arming,
             ready: self.safety.ready,
+            consistency: self.safety.consistency,
+            remote: self.safety.remote,
             approval: self.safety.approval,
             failsafe: *failsafe,
             late_ms: if hardware { failsafe.hardware_late_ms } else { failsafe.simulator_late_ms },

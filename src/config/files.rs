@@ -6,10 +6,11 @@ use std::collections::BTreeMap;
 use serde::Deserialize;
 
 use crate::control::settings::{
-    ApprovalLimits, ArmingLimits, EstimatorSettings, FailsafeLimits, FallLimits, GateLimits, RampSettings, ReadyLimits,
-    SettleSettings, TaskControl,
+    ApprovalLimits, ArmingLimits, ConsistencyLimits, EstimatorSettings, FailsafeLimits, FallLimits, GateLimits,
+    RampSettings, ReadyLimits, RemoteSettings, SettleSettings, TaskControl,
 };
 use crate::optimize::ask::SamplerConfig;
+use crate::trial::HopEnvelope;
 
 /// `control.toml`.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -86,8 +87,11 @@ pub struct SafetyFile {
     pub arming: ArmingLimits,
     pub ready: ReadyLimits,
     pub approval: ApprovalLimits,
+    pub hop_envelope: HopEnvelope,
     #[serde(rename = "watchdog")]
     pub failsafe: FailsafeLimits,
+    pub consistency: ConsistencyLimits,
+    pub remote: RemoteSettings,
     pub parameters: BTreeMap<String, [f64; 2]>,
     pub gains: BTreeMap<String, [f64; 2]>,
 }

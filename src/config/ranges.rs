@@ -13,6 +13,9 @@ const IDLE_TIME: NumberRange =
     NumberRange { allows: |v| v >= 0.0, text: "must be a number of seconds, or 0 for never" };
 const FACTOR: NumberRange =
     NumberRange { allows: |v| v >= 1.0, text: "must be 1 or more: below 1 it trips on allowed values" };
+/// Below 0.2 s a slow disk would refuse every approval.
+const KEY_PRESS: NumberRange = NumberRange { allows: |v| (0.2..=30.0).contains(&v), text: "must be 0.2 to 30 s" };
+const SHARE: NumberRange = NumberRange { allows: |v| v > 0.0 && v <= 1.0, text: "must be above 0, at most 1" };
 const COUNTDOWN: NumberRange = NumberRange { allows: |v| (0.0..=60.0).contains(&v), text: "must be 0 to 60 s" };
 /// At 1 rad/s the force is then half of that of the stiffness at a tilt of 1 rad.
 const ATTITUDE_RATE_GAIN: NumberRange =
@@ -38,6 +41,26 @@ const READY_STANCE: NumberRange =
 const CLOCK_DRIFT: NumberRange =
     NumberRange { allows: |v| (0.0..=1000.0).contains(&v), text: "must be 0 to 1000 parts per million" };
 
+const REPEATED_STATES: NumberRange =
+    NumberRange { allows: |v| (10.0..=200.0).contains(&v), text: "must be 10 to 200 states" };
+const GRAVITY_ERROR: NumberRange =
+    NumberRange { allows: |v| (0.1..=3.0).contains(&v), text: "must be 0.1 to 3 m/s^2: gravity is 9.81" };
+const SENSOR_ANGLE: NumberRange =
+    NumberRange { allows: |v| (0.01..=0.3).contains(&v), text: "must be 0.01 to 0.3 rad: a robot tips beyond" };
+const LEAST_LOAD: NumberRange =
+    NumberRange { allows: |v| (0.05..=0.9).contains(&v), text: "must be 0.05 to 0.9 of the weight" };
+const MOST_LOAD: NumberRange = NumberRange { allows: |v| (1.1..=3.0).contains(&v), text: "must be 1.1 to 3 weights" };
+const CONTACT_TIME: NumberRange =
+    NumberRange { allows: |v| (0.02..=1.0).contains(&v), text: "must be 0.02 to 1 s: a flight lasts half a second" };
+const FREE_FALL: NumberRange = NumberRange {
+    allows: |v| (0.5..=5.0).contains(&v),
+    text: "must be 0.5 to 5 m/s^2: zero in free fall, 9.81 at rest",
+};
+const CLOCK_STEP: NumberRange = NumberRange { allows: |v| (20.0..=1000.0).contains(&v), text: "must be 20 to 1000 ms" };
+const IN_SERVICE_LOSS: NumberRange =
+    NumberRange { allows: |v| (0.005..=0.5).contains(&v), text: "must be 0.005 to 0.5 of the states" };
+const TORQUE_ERROR: NumberRange = NumberRange { allows: |v| (0.5..=20.0).contains(&v), text: "must be 0.5 to 20 N m" };
+
 const CONTROL: &[Row] = &[
     (&["countdown.simulator_s"], COUNTDOWN),
     (&["tasks.*.jumps"], JUMPS),
@@ -49,10 +72,30 @@ const CONTROL: &[Row] = &[
     (&["stand_up.*", "sit_down.*", "countdown.*", "settle.*", "contact.*", "estimator.*"], POSITIVE),
 ];
 const SAFETY: &[Row] = &[
+    (&["consistency.repeated_states"], REPEATED_STATES),
+    (&["consistency.gravity_m_s2", "pre_arm.gravity_m_s2"], GRAVITY_ERROR),
+    (
+        &[
+            "consistency.orientation_rad",
+            "consistency.turn_rad",
+            "consistency.joint_velocity_rad",
+            "pre_arm.gravity_rad",
+        ],
+        SENSOR_ANGLE,
+    ),
+    (&["consistency.foot_load_least_share"], LEAST_LOAD),
+    (&["consistency.foot_load_most_share", "pre_arm.foot_load_share"], MOST_LOAD),
+    (&["consistency.foot_load_s", "consistency.free_fall_contact_s", "consistency.unsupported_s"], CONTACT_TIME),
+    (&["consistency.free_fall_m_s2"], FREE_FALL),
+    (&["consistency.clock_step_ms"], CLOCK_STEP),
+    (&["consistency.loss_share"], IN_SERVICE_LOSS),
+    (&["consistency.torque_n_m"], TORQUE_ERROR),
     (
         &["*.corrupt", "*.disk_free_mb", "*.joint_margin_rad", "*.battery_percent", "*.loss_share", "*.late_share"],
         NOT_NEGATIVE,
     ),
+    (&["approval.expires_s"], KEY_PRESS),
+    (&["hop_envelope.*"], SHARE),
     (&["watchdog.simulator_late_ms", "watchdog.hardware_late_ms"], LATENESS),
     (&["watchdog.simulator_idle_s", "watchdog.hardware_idle_s"], IDLE_TIME),
     (&["watchdog.velocity_factor", "watchdog.torque_factor", "watchdog.period_factor"], FACTOR),

@@ -75,6 +75,14 @@ impl Config {
                 return Err(self.refuse(SAFETY, key, value, format!("must not be above {stop} = {limit}")));
             }
         }
+        if self.safety.remote.stop.is_empty() {
+            return Err(self.refuse(
+                SAFETY,
+                "remote.stop",
+                "\"none\"",
+                "give at least one button, for example \"L2+B\"",
+            ));
+        }
         for (name, [low, high]) in gains {
             if !(low.is_finite() && high.is_finite() && low <= high && *low >= 0.0) {
                 let reason = "must be [lowest, highest] with 0 <= lowest <= highest";

@@ -5,11 +5,11 @@
 //! cold caches takes longer. Therefore [`ControlLoop::warm_up`], 0.1 ms before each tick of a real robot, runs a tick on a copy of
 //! the cycle with the last state and discards the result; [`Robot::warm_up`] does the same for the system calls of the link. It
 //! changes no result (`tests/control_warm_up.rs`). The longest of a thousand ticks take a third less time with it (loopback:
-//! `quadfrog bench loop --with-link`, compared with `--unrehearsed`).
+//! `quadfrog bench loop --with-link`, compared with `--without-warm-up`).
 
 use super::cycle::{Cycle, TickInputs};
 use super::settings::ControlSettings;
-use crate::realtime::channel::{ControlEnd, SHOWN_EVERY};
+use crate::realtime::channel::{ControlEnd, Lowering, LoweringLatch, SHOWN_EVERY};
 use crate::realtime::clock::Clock;
 use crate::realtime::thread::TickStart;
 use crate::robot::{CONTROL_PERIOD_S, JointCommand, LinkStatus, Placement, Robot, RobotError, RobotState};
@@ -24,6 +24,7 @@ pub struct ControlLoop {
     end: ControlEnd,
     counters: Counters,
     heartbeat: HeartbeatWatch,
+    lowering: LoweringWatch,
     events_lost: bool,
     /// Clock time of the loop's start, ns; known from the first tick on.
     start_ns: Option<u64>,
@@ -37,6 +38,7 @@ impl ControlLoop {
             end,
             counters: Counters::default(),
             heartbeat: HeartbeatWatch::default(),
+            lowering: LoweringWatch::default(),
             events_lost: false,
             start_ns: None,
         }
@@ -47,7 +49,8 @@ impl ControlLoop {
         let ControlLoop { cycle, end, counters, start_ns, .. } = self;
         // A session that broke down takes no events, even into a ring with space.
         self.events_lost |= end.events.is_abandoned();
-        let command = end.commands.pop().ok();
+        // Before the queue, whose next command may be one that energises.
+        let command = self.lowering.next(&end.lowering).or_else(|| end.commands.pop().ok());
         if let Some(Command::Acknowledge { stops }) = command
             && matches!(cycle.mode(), Mode::Damped | Mode::Fault)
         {
@@ -145,6 +148,29 @@ fn fetch_next(ring: &mut rtrb::Producer<Tick>) {
         && let Some(tick) = place.as_mut_slices().0.first_mut()
     {
         tick.write(Tick::default());
+    }
+}
+
+/// Presses of sit down and cancel that were carried out.
+#[derive(Default)]
+struct LoweringWatch {
+    sit_downs: u64,
+    cancels: u64,
+}
+
+impl LoweringWatch {
+    /// Returns the command of a new press; sit down comes first.
+    fn next(&mut self, latch: &LoweringLatch) -> Option<Command> {
+        let (sit_downs, cancels) = (latch.count(Lowering::SitDown), latch.count(Lowering::Cancel));
+        if sit_downs != self.sit_downs {
+            self.sit_downs = sit_downs;
+            Some(Command::SitDown)
+        } else if cancels != self.cancels {
+            self.cancels = cancels;
+            Some(Command::Cancel)
+        } else {
+            None
+        }
     }
 }
 

@@ -4,6 +4,7 @@
 //! A fall during a trial is an outcome of the trial, detected by `running_trial::FallWatch`; it damps as well.
 
 use super::command_gate;
+use super::consistency::Consistency;
 use super::settings::ControlSettings;
 use crate::robot::{CONTROL_PERIOD_S, JOINTS, LinkStatus, RobotState};
 use crate::telemetry::{Estimate, FailsafeWarning, Fault, Mode, TrialInhibit};
@@ -31,6 +32,8 @@ pub struct FailsafeInputs<'a> {
     pub operator_silent_ms: u32,
     /// The session takes no events.
     pub events_lost: bool,
+    /// Consistency of sensors, clocks and commands.
+    pub consistency: &'a Consistency,
 }
 
 /// The action of a failsafe and the condition that clears it.
@@ -68,23 +71,28 @@ const fn cut(
 
 /// The table, by precedence: the first row that trips counts. A cause that makes measured numbers invalid stands above the rows
 /// that compare them.
-const TABLE: [FailsafeRow; 16] = [
+const TABLE: [FailsafeRow; 20] = [
+    cut(remote_stop, Mode::commanded),
     cut(events_lost, Mode::commanded),
     cut(link_lost, Mode::commanded),
     cut(state_age, Mode::commanded),
     // True in one tick only, and a robot that boots may report numbers that are not finite.
     cut(reboot, Mode::commanded),
+    cut(robot_clock, Mode::commanded),
     cut(not_finite, Mode::commanded),
     cut(corrupt, Mode::commanded),
     cut(send_error, Mode::commanded),
     cut(late, Mode::commanded),
     cut(slow, Mode::commanded),
     cut(motor_hot, Mode::commanded),
+    // Above the single motor: no command of ours takes all of them out of servo mode.
+    cut(other_commander, Mode::energised),
     cut(motor_mode, energised_or_faulted),
     cut(joint_position, Mode::energised),
     cut(joint_velocity, Mode::energised),
     cut(joint_torque, Mode::energised),
     cut(tilt, outside_a_trial),
+    cut(sensors, Mode::energised),
     FailsafeRow { cause: operator_silent, modes: Mode::energised, action: FailsafeAction::Land },
 ];
 
@@ -99,7 +107,7 @@ const fn outside_a_trial(mode: Mode) -> bool {
     matches!(mode, Mode::StandUp | Mode::Ready | Mode::Countdown | Mode::SitDown)
 }
 
-/// Timing of the last ticks, for the rows `late` and `slow`.
+/// Periods of the last ticks, for the row `slow`.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Failsafe {
     /// Start of the last tick, ns.
@@ -164,6 +172,23 @@ pub fn warning(inputs: &FailsafeInputs, settings: &ControlSettings) -> Option<Fa
 
 fn events_lost(_: &Failsafe, inputs: &FailsafeInputs, _: &ControlSettings) -> Option<Fault> {
     inputs.events_lost.then_some(Fault::EventsLost)
+}
+
+fn remote_stop(_: &Failsafe, inputs: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {
+    let pressed = inputs.state.remote.is_some_and(|remote| remote.buttons.contains(settings.remote.stop));
+    pressed.then_some(Fault::RemoteStop)
+}
+
+fn robot_clock(_: &Failsafe, inputs: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {
+    inputs.consistency.clock_fault(&settings.consistency)
+}
+
+fn sensors(_: &Failsafe, inputs: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {
+    inputs.consistency.sensor_fault(inputs.mode, &settings.consistency)
+}
+
+fn other_commander(_: &Failsafe, inputs: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {
+    inputs.consistency.commander_fault(inputs.mode, &settings.consistency)
 }
 
 fn link_lost(_: &Failsafe, inputs: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {

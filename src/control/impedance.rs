@@ -1,4 +1,4 @@
-//! Cartesian impedance with joint damping, and the map from foot forces to joint torques (paper, equations 3 to 4).
+//! Cartesian impedance with joint damping, and the map from foot forces to joint torques (paper, equations 3 and 4).
 
 use nalgebra::Vector3;
 

@@ -1,4 +1,4 @@
-//! The leg controller: sum of force profile, impedance and Virtual Model Control (paper, last equation of section II-C).
+//! The leg controller: sum of force profile, impedance and Virtual Model Control (paper, equation 8).
 
 use nalgebra::Vector3;
 

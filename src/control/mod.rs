@@ -2,6 +2,7 @@
 
 pub mod arming;
 pub mod command_gate;
+pub mod consistency;
 pub mod control_loop;
 pub mod cycle;
 pub mod estimator;

@@ -5,8 +5,9 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use crate::robot::kinematics::LegGeometry;
+use crate::robot::remote::RemoteButtons;
 use crate::robot::{Joints, LEGS, PerLeg};
-use crate::telemetry::{Estimate, TrialSpec};
+use crate::telemetry::{Estimate, SensorCheck, TrialSpec};
 use crate::trial::{Gains, JumpParameters, Task};
 
 /// Stance between trials.
@@ -115,6 +116,12 @@ pub struct ArmingLimits {
     pub gyro_rad_s: f64,
     /// Time for which the robot must be still, s.
     pub still_s: f64,
+    /// Largest deviation of the averaged specific force from gravity, m/s^2.
+    pub gravity_m_s2: f64,
+    /// Largest angle from the averaged specific force to the orientation's upward direction, rad.
+    pub gravity_rad: f64,
+    /// Largest sum of the foot forces of a lying robot, share of the weight.
+    pub foot_load_share: f64,
     /// Ticks that begin later than this are late, ms.
     pub late_ms: f64,
     /// Largest share of late ticks in the last 5 s.
@@ -137,6 +144,66 @@ pub struct ReadyLimits {
     pub tilt_rad: f64,
     /// Largest distance of a joint from the stance, rad.
     pub stance_rad: f64,
+}
+
+/// Limits of the consistency of sensors, clocks and commands: section `[consistency]` of `config/safety.toml`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ConsistencyLimits {
+    /// Most states in a row with the same measurement of the inertial unit.
+    pub repeated_states: u32,
+    /// Largest deviation of the averaged specific force from gravity while standing, m/s^2.
+    pub gravity_m_s2: f64,
+    /// Largest angle from the orientation's upward direction to that of gyroscope and accelerometer, rad.
+    pub orientation_rad: f64,
+    /// Largest rotation of the orientation that the gyroscope does not measure, rad.
+    pub turn_rad: f64,
+    /// Least and largest sum of the foot forces while standing, share of the weight.
+    pub foot_load_least_share: f64,
+    /// See `foot_load_least_share`.
+    pub foot_load_most_share: f64,
+    /// Longest time of another sum, s.
+    pub foot_load_s: f64,
+    /// Specific force below which the robot falls freely, m/s^2.
+    pub free_fall_m_s2: f64,
+    /// Longest contact of a foot in free fall, s.
+    pub free_fall_contact_s: f64,
+    /// Longest time without load on the feet after a landing, s.
+    pub unsupported_s: f64,
+    /// Largest change of a joint's angle that its velocity does not report, rad.
+    pub joint_velocity_rad: f64,
+    /// Largest step of the robot's clock against this computer's, ms.
+    pub clock_step_ms: f64,
+    /// Largest share of states lost in a second while energised.
+    pub loss_share: f64,
+    /// Largest averaged difference of a reported torque from the command's while standing, N m.
+    pub torque_n_m: f64,
+}
+
+impl ConsistencyLimits {
+    /// The limit of a sensor check, in its unit.
+    pub fn allowed(&self, check: SensorCheck) -> f64 {
+        match check {
+            SensorCheck::InertialUnitLive => self.repeated_states.into(),
+            SensorCheck::GravityMagnitude => self.gravity_m_s2,
+            SensorCheck::Orientation => self.orientation_rad,
+            SensorCheck::TurnRate => self.turn_rad,
+            SensorCheck::FeetLoaded => self.foot_load_s,
+            SensorCheck::FeetInFreeFall => self.free_fall_contact_s,
+            SensorCheck::FeetAfterLanding => self.unsupported_s,
+            SensorCheck::JointVelocity => self.joint_velocity_rad,
+        }
+    }
+}
+
+/// The robot's remote control: section `[remote]` of `config/safety.toml`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RemoteSettings {
+    /// Buttons that damp the robot when they are pressed together.
+    pub stop: RemoteButtons,
+    /// Whether arming needs a remote control that answers.
+    pub needed: bool,
 }
 
 /// Expiry of an approval.
@@ -367,6 +434,10 @@ pub struct ControlSettings {
     pub arming: ArmingLimits,
     /// Conditions of a jump.
     pub ready: ReadyLimits,
+    /// Limits of the consistency of sensors, clocks and commands.
+    pub consistency: ConsistencyLimits,
+    /// The remote control.
+    pub remote: RemoteSettings,
     /// Expiry of an approval.
     pub approval: ApprovalLimits,
     /// Limits of the failsafes.

@@ -1,4 +1,4 @@
-//! Virtual Model Control: springs and dampers between a plane through the trunk and the horizontal (paper, section II-C).
+//! Virtual Model Control: springs and dampers between a plane through the trunk and the horizontal (paper, equations 5 to 7).
 
 use nalgebra::{UnitQuaternion, Vector3};
 

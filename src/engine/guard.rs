@@ -47,7 +47,7 @@ pub struct Guard {
     gone: bool,
 }
 
-/// The control thread's end of the pipe. Dropped without [`GuardHeartbeat::leave`], as in a panic, it makes the guard damp the
+/// The control thread's end of the pipe. Dropped without [`GuardHeartbeat::release`], as when the process ends, it makes the guard damp the
 /// robot.
 #[derive(Debug)]
 pub struct GuardHeartbeat {

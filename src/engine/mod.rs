@@ -12,7 +12,7 @@ pub use folder::{STUDY_FILE, attachments, fingerprint, newest_config, prepare_fo
 pub use guard::{GUARD, GuardError, GuardOutcome, run_guard};
 pub use options::{EngineError, Options};
 pub use stored::{Opened, StoredStudy, open_stored, stored_studies, stored_study};
-pub use study::{open_experiment, session_info, study_name};
+pub use study::{check_backend, open_experiment, session_info, study_name};
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -23,7 +23,7 @@ use std::thread::JoinHandle;
 use self::folder::LockedFolder;
 use self::guard::Guard;
 use crate::optimize::journal::Durability;
-use crate::realtime::channel::{ConsoleEnd, Heartbeat, StopLatch, channels};
+use crate::realtime::channel::{ConsoleEnd, Heartbeat, Lowering, StopLatch, channels};
 use crate::realtime::clock::{Clock, MonotonicClock};
 use crate::recording::record::{Record, Stamped};
 use crate::recording::recorder::{Recorder, RecorderHandle, RecorderStatus};
@@ -32,6 +32,7 @@ use crate::robot::go1::Go1;
 use crate::robot::{Placement, Robot};
 use crate::session::arming_checklist::ArmingChecklist;
 use crate::session::operator_request::{OperatorRequest, StampedRequest};
+use crate::session::storage::{StorageWait, StorageWatch};
 use crate::session::supervisor::{RecordSinks, Supervisor, SupervisorParts};
 use crate::sim::Simulator;
 use crate::telemetry::{Snapshot, Tick};
@@ -45,6 +46,8 @@ pub fn start(options: Options) -> Result<EngineHandle, EngineError> {
     if options.approve == Approval::Auto && options.backend == Backend::Hardware {
         return Err(EngineError::Unattended);
     }
+    // Before a word goes to the robot.
+    check_backend(&options)?;
     let settings = options.config.settings(&options.robot, options.task, options.backend)?;
     let system = |what: &'static str| {
         move |source| EngineError::System { what: format!("the {what} could not be started"), source }
@@ -106,9 +109,22 @@ pub fn start(options: Options) -> Result<EngineHandle, EngineError> {
     let (to_supervisor, requests) = channel();
     let recorded_in = recording.as_ref().and(options.folder.clone());
     let checklist = ArmingChecklist::new(&settings, fingerprint(&options.config), recorded_in);
-    let parts = SupervisorParts { experiment, control: session_end, ticks, sinks, recorder: status, checklist, info };
+    let parts = SupervisorParts {
+        experiment,
+        control: session_end,
+        ticks,
+        sinks,
+        recorder: status,
+        checklist,
+        approval: settings.approval,
+        info,
+    };
     let simulated = options.backend == Backend::Simulator;
-    let mut supervisor = Supervisor::new(parts, clock.now_ns()).approving(options.approve, simulated);
+    let mut supervisor = Supervisor::new(parts, clock.now_ns())
+        .approving(options.approve, simulated)
+        .with_storage_thread()
+        .map_err(system("storage thread"))?;
+    let storage = supervisor.storage_watch();
     if let Ok((granted, denied)) = scheduled.recv() {
         supervisor.report_scheduling(&granted, &denied, clock.now_ns());
     }
@@ -120,6 +136,8 @@ pub fn start(options: Options) -> Result<EngineHandle, EngineError> {
 
     Ok(EngineHandle {
         console: console_end,
+        observe: options.observe,
+        storage,
         recording,
         _folder: folder,
         requests: Some(to_supervisor),
@@ -135,6 +153,8 @@ pub fn start(options: Options) -> Result<EngineHandle, EngineError> {
 /// Access of a console to a running engine. Dropping it ends the engine as `shutdown` does.
 pub struct EngineHandle {
     console: ConsoleEnd,
+    observe: bool,
+    storage: StorageWatch,
     recording: Option<PathBuf>,
     _folder: LockedFolder,
     requests: Option<Sender<StampedRequest>>,
@@ -167,6 +187,11 @@ impl EngineHandle {
         self.recording.as_ref().and(self.recorder.as_ref()).map(|recorder| recorder.status())
     }
 
+    /// Returns the wait of the session for the storage of its study; none while there is none worth showing.
+    pub fn storage_wait(&self) -> Option<StorageWait> {
+        self.storage.get(self.clock.now_ns())
+    }
+
     /// Sends a heartbeat of the console; to be called at least ten times a second.
     pub fn send_heartbeat(&self) {
         self.console.heartbeat.beat();
@@ -182,6 +207,15 @@ impl EngineHandle {
         if let Some(requests) = &self.requests {
             // A session that has ended does not answer; the console sees that its records end.
             let (stops, time_ns) = (self.console.stop.count(), self.clock.now_ns());
+            // Straight to the control thread; the session answers.
+            let lowering = match request {
+                OperatorRequest::SitDown => Some(Lowering::SitDown),
+                OperatorRequest::Cancel => Some(Lowering::Cancel),
+                _ => None,
+            };
+            if let Some(lowering) = lowering.filter(|_| !self.observe) {
+                self.console.lowering.press(lowering, time_ns);
+            }
             let _ = requests.send(StampedRequest { request, stops, time_ns });
         }
     }

@@ -33,6 +33,8 @@ pub struct Options {
     /// The program that guards a real robot when it is run with [`GUARD`](super::GUARD): it damps the robot when this process
     /// sends no heartbeat. None: no guard.
     pub guard: Option<PathBuf>,
+    /// Whether hardware may continue a study that was made on another backend or robot.
+    pub accept_backend_change: bool,
 }
 
 impl Options {
@@ -51,6 +53,7 @@ impl Options {
             approve: Approval::Each,
             join: None,
             guard: None,
+            accept_backend_change: false,
         }
     }
 
@@ -96,6 +99,10 @@ pub enum EngineError {
     NoStudy { file: PathBuf },
     #[error("{}: another session is running in this folder; end it first, or view the study with optuna-dashboard", folder.display())]
     InUse { folder: PathBuf },
+    #[error(
+        "{study}: it was made on {made}, this session runs on {asked}: its points and verdicts are those of another machine. Begin a new study, or give --accept-backend-change to continue it"
+    )]
+    OtherBackend { study: String, made: String, asked: String },
     #[error("{what}: {source}")]
     System { what: String, source: std::io::Error },
 }

@@ -4,6 +4,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::Duration;
 
 use super::guard::Guard;
+use crate::optimize::journal::LOCK_GRACE;
 use crate::realtime::clock::{Clock, MonotonicClock};
 use crate::session::operator_request::StampedRequest;
 use crate::session::supervisor::Supervisor;
@@ -17,6 +18,10 @@ const LONGEST_SIT_DOWN: Duration = Duration::from_secs(10);
 const DAMPING_AT_THE_END: Duration = Duration::from_millis(500);
 /// Longest wait for the effect of the last STOP; the control thread acts within a millisecond.
 const LONGEST_STOP: Duration = Duration::from_secs(2);
+
+/// Longest wait for the storage of the study at the end: a lock that another program left behind is broken before. What is not
+/// stored then was judged and is on disk, and is reported when the study is opened again.
+const LONGEST_CLOSE: Duration = Duration::from_secs(LOCK_GRACE.as_secs() + 5);
 
 /// Runs the session until the console drops its handle. Returns the supervisor with the session's channel ends, because a
 /// control thread takes their loss for a crash of the session, and the guard, because the control thread commands the
@@ -58,5 +63,10 @@ pub fn run(
         }
     }
     supervisor.close(clock.now_ns());
+    let begun = clock.now_ns();
+    while !supervisor.is_closed() && within(begun, LONGEST_CLOSE) {
+        std::thread::sleep(SESSION_PERIOD);
+        supervisor.poll(clock.now_ns());
+    }
     (supervisor, guard)
 }

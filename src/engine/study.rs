@@ -9,24 +9,23 @@ use crate::optimize::journal::Durability;
 use crate::optimize::space::{Range, Space};
 use crate::optimize::study::{Storage, Study, StudyError, StudyOptions};
 use crate::recording::record::SessionInfo;
-use crate::session::experiment::attributes::{self, BudgetAttribute, NewStudyAttributes, Origin, StudyAttributes};
+use crate::session::experiment::attributes::{
+    self, BackendAttribute, BudgetAttribute, NewStudyAttributes, Origin, StudyAttributes,
+};
 use crate::session::experiment::{Experiment, ExperimentPlan};
-use crate::trial::Task;
+use crate::trial::{Backend, Task};
 
 /// Opens the study of `options` as an experiment, for the console and for `optimize`.
 ///
 /// # Errors
 /// When the study cannot be read, or is of another task.
 pub fn open_experiment(options: &Options, durability: Durability, recording: &str) -> Result<Experiment, EngineError> {
+    check_backend(options)?;
     let parameters = options.config.parameters(options.task);
     let space = Space::new(parameters.iter().map(|p| (p.name.clone(), Range::linear(p.low, p.high))))?;
     let mut sampler = options.config.optimize.sampler.clone();
     sampler.seed = options.seed;
-    let storage = match (&options.join, &options.folder) {
-        (Some(storage), _) => storage.clone(),
-        (None, Some(folder)) => Storage::File(folder.join(STUDY_FILE)),
-        (None, None) => Storage::Memory,
-    };
+    let storage = storage(options);
     let budget = options.budget();
     let mut study = Study::open(
         storage,
@@ -43,6 +42,7 @@ pub fn open_experiment(options: &Options, durability: Durability, recording: &st
                 sampler: &options.config.optimize.sampler,
                 version: env!("CARGO_PKG_VERSION"),
                 budget,
+                backend: options.backend.name(),
             }),
             durability,
         },
@@ -53,6 +53,10 @@ pub fn open_experiment(options: &Options, durability: Durability, recording: &st
     let worker = if options.join.is_some() { study.join()? } else { 0 };
     if worker == 0 && StudyAttributes::of(study.attributes()).budget != Some(budget) {
         study.annotate_study(&attributes::write(&BudgetAttribute { budget }))?;
+    }
+    let backend = options.backend.name();
+    if made_on(&StudyAttributes::of(study.attributes())) != backend {
+        study.annotate_study(&attributes::write(&BackendAttribute { backend }))?;
     }
     let plan = ExperimentPlan {
         task: options.task,
@@ -67,8 +71,54 @@ pub fn open_experiment(options: &Options, durability: Durability, recording: &st
         confidence: options.config.optimize.confirm.confidence,
         worker,
         abandoned: Duration::from_secs_f64(options.config.optimize.workers.abandoned_s),
+        backend: options.backend,
+        envelope: options.config.hop_envelope(options.backend),
     };
     Ok(Experiment::open(plan, study)?)
+}
+
+fn storage(options: &Options) -> Storage {
+    match (&options.join, &options.folder) {
+        (Some(storage), _) => storage.clone(),
+        (None, Some(folder)) => Storage::File(folder.join(STUDY_FILE)),
+        (None, None) => Storage::Memory,
+    }
+}
+
+/// Returns the backend of a study. One of an earlier version, without the attribute, counts as simulated.
+fn made_on(attributes: &StudyAttributes) -> &str {
+    attributes.backend.as_deref().unwrap_or(Backend::Simulator.name())
+}
+
+/// Refuses to continue on hardware a study that was made or continued on another backend or robot, unless the options accept
+/// it: its points and its verdicts are those of another machine.
+///
+/// # Errors
+/// When it is one, or the study cannot be read.
+pub fn check_backend(options: &Options) -> Result<(), EngineError> {
+    let storage = storage(options);
+    let exists = match &storage {
+        Storage::Memory => false,
+        // Opening a journal file would create its folder.
+        Storage::File(file) => file.is_file(),
+        Storage::Redis(_) => true,
+    };
+    if options.backend != Backend::Hardware || options.accept_backend_change || !exists {
+        return Ok(());
+    }
+    let journal = storage.journal(Durability::Buffered).map_err(StudyError::from)?;
+    let name = study_name(options.task, options.seed);
+    let Some(study) = journal.state().find(&name) else { return Ok(()) };
+    let attributes = StudyAttributes::of(&journal.state().studies()[study].user_attributes);
+    let (made, robot) = (made_on(&attributes), attributes.robot.as_deref().unwrap_or("unknown robot"));
+    if made == options.backend.name() && robot == options.robot.name {
+        return Ok(());
+    }
+    Err(EngineError::OtherBackend {
+        study: format!("{storage}, study {name}"),
+        made: format!("{made} ({robot})"),
+        asked: format!("{} ({})", options.backend.name(), options.robot.name),
+    })
 }
 
 /// Queues the first point of the configuration.

@@ -52,6 +52,44 @@ impl StopLatch {
     }
 }
 
+/// A request towards less energy.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Lowering {
+    /// Sit down and disarm.
+    SitDown,
+    /// Cancel the countdown.
+    Cancel,
+}
+
+/// The latch of sit down and cancel. The control thread acts in the tick in which it sees a press, apart from the queue of
+/// commands: no lock, slow disk or busy session delays it. An arming or an approval from before a press is void.
+#[derive(Debug, Clone, Default)]
+pub struct LoweringLatch(Arc<Lowerings>);
+
+#[derive(Debug, Default)]
+struct Lowerings {
+    presses: [AtomicU64; 2],
+    newest_ns: AtomicU64,
+}
+
+impl LoweringLatch {
+    /// Sets the latch at `time_ns` since the engine's start. Cannot queue, wait or fail.
+    pub fn press(&self, lowering: Lowering, time_ns: u64) {
+        self.0.newest_ns.fetch_max(time_ns, Ordering::AcqRel);
+        self.0.presses[lowering as usize].fetch_add(1, Ordering::AcqRel);
+    }
+
+    /// Number of presses since the start.
+    pub fn count(&self, lowering: Lowering) -> u64 {
+        self.0.presses[lowering as usize].load(Ordering::Acquire)
+    }
+
+    /// Time of the newest press, ns since the engine's start; 0 without one.
+    pub fn newest_ns(&self) -> u64 {
+        self.0.newest_ns.load(Ordering::Acquire)
+    }
+}
+
 /// Heartbeat counter of the operator's console.
 #[derive(Debug, Clone, Default)]
 pub struct Heartbeat(Arc<AtomicU64>);
@@ -74,6 +112,8 @@ pub struct ControlEnd {
     pub commands: rtrb::Consumer<Command>,
     /// STOP.
     pub stop: StopLatch,
+    /// Sit down and cancel.
+    pub lowering: LoweringLatch,
     /// Heartbeat of the console.
     pub heartbeat: Heartbeat,
     /// Every tick, for the recorder.
@@ -96,6 +136,8 @@ pub struct SessionEnd {
     pub commands: rtrb::Producer<Command>,
     /// STOP, to detect one that came after an operator's request.
     pub stop: StopLatch,
+    /// Sit down and cancel, to detect a press after an operator's request.
+    pub lowering: LoweringLatch,
     /// Heartbeat of the console, to detect a missing console.
     pub heartbeat: Heartbeat,
     /// The newest counters.
@@ -110,6 +152,8 @@ pub struct SessionEnd {
 pub struct ConsoleEnd {
     /// STOP.
     pub stop: StopLatch,
+    /// Sit down and cancel.
+    pub lowering: LoweringLatch,
     /// Heartbeat of this console.
     pub heartbeat: Heartbeat,
     /// Ticks for charts.
@@ -127,10 +171,11 @@ pub fn channels() -> (ControlEnd, SessionEnd, ConsoleEnd, rtrb::Consumer<Tick>) 
     let (snapshot_in, snapshot_out) = triple_buffer::triple_buffer(&Snapshot::default());
     let (counters_in, counters_out) = triple_buffer::triple_buffer(&Counters::default());
     let (readiness_in, readiness_out) = triple_buffer::triple_buffer(&Readiness::default());
-    let (stop, heartbeat) = (StopLatch::default(), Heartbeat::default());
+    let (stop, lowering, heartbeat) = (StopLatch::default(), LoweringLatch::default(), Heartbeat::default());
     let control = ControlEnd {
         commands: command_out,
         stop: stop.clone(),
+        lowering: lowering.clone(),
         heartbeat: heartbeat.clone(),
         ticks: tick_in,
         shown: shown_in,
@@ -142,11 +187,12 @@ pub fn channels() -> (ControlEnd, SessionEnd, ConsoleEnd, rtrb::Consumer<Tick>) 
     let session = SessionEnd {
         commands: command_in,
         stop: stop.clone(),
+        lowering: lowering.clone(),
         heartbeat: heartbeat.clone(),
         counters: counters_out,
         readiness: readiness_out,
         events: event_out,
     };
-    let console = ConsoleEnd { stop, heartbeat, shown: shown_out, snapshot: snapshot_out };
+    let console = ConsoleEnd { stop, lowering, heartbeat, shown: shown_out, snapshot: snapshot_out };
     (control, session, console, tick_out)
 }

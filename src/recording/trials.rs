@@ -64,6 +64,7 @@ pub fn search(way: Way, ours: &mut SearchStatus, m: &mut frog::Search) -> Done {
     way.copy(&mut ours.budget, &mut m.budget);
     way.copy(&mut ours.counted, &mut m.counted);
     way.list(&mut ours.parameters, &mut m.parameters, searched)?;
+    way.copy(&mut ours.hop_share, &mut m.hop_share);
     way.copy(&mut ours.confirming, &mut m.confirming);
     Ok(())
 }

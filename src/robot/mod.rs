@@ -1,7 +1,7 @@
 //! The robot as the controller sees it: reported state, commands, and the trait [`Robot`] that the Go1 and the
 //! simulator implement.
 //!
-//! Frames: **world** z up; **body** origin at the trunk's, x forward, y left, z up; **leg** origin at the leg's
+//! Frames: **world** z up; **body** origin at the trunk's origin, x forward, y left, z up; **leg** origin at the leg's
 //! hip joint, axes of the body. Legs are always in the order FR, FL, RR, RL; joints hip (abduction, about x),
 //! thigh (about y), calf (about y). SI units and radians throughout.
 
@@ -9,8 +9,10 @@ pub mod description;
 pub mod go1;
 pub mod kinematics;
 pub mod recent_count;
+pub mod remote;
 
 use nalgebra::{UnitQuaternion, Vector3};
+use remote::Remote;
 
 /// Acceleration of free fall, m/s^2.
 pub const GRAVITY: f64 = 9.81;
@@ -153,6 +155,8 @@ pub struct RobotState {
     pub battery: Option<Battery>,
     /// True state; none on hardware.
     pub truth: Option<Truth>,
+    /// Remote control; none if it does not answer, or the robot has none.
+    pub remote: Option<Remote>,
 }
 
 /// Returns the time between two values of the robot's clock, ms; negative if the robot rebooted. Correct also when the
@@ -271,6 +275,8 @@ pub struct LinkStatus {
     pub recent_lost: u32,
     /// Corrupt datagrams in the last five seconds.
     pub recent_corrupt: u32,
+    /// Age of the last rejected older state against the newest one, ms.
+    pub older_by_ms: u32,
 }
 
 impl LinkStatus {

@@ -16,7 +16,7 @@ pub struct EvaluatedRun {
     pub seed: u64,
     /// End of the run.
     pub end: TrialEnd,
-    /// Time of the fall since the first impulse began, s; none without a fall.
+    /// Time of the fall, or at which a limit tripped, since the first impulse began, s; none without either.
     pub fall_time_s: Option<f64>,
     /// Impulses that ended before the run did.
     pub jumps: u32,
@@ -59,7 +59,8 @@ pub fn evaluate<R: Robot>(rollout: &mut Rollout<R>, spec: &TrialSpec) -> Evaluat
     let value = measured.as_ref().map(|measured| objective::value(spec.task, measured, spec.jumps));
     EvaluatedRun {
         seed: spec.seed,
-        fall_time_s: matches!(end, TrialEnd::Fell(_)).then(|| ticks.last().map_or(0.0, |tick| tick.trial_time_s)),
+        fall_time_s: (matches!(end, TrialEnd::Fell(_)) || objective::trips_limit(&end))
+            .then(|| ticks.last().map_or(0.0, |tick| tick.trial_time_s)),
         jumps: impulse_edges(ticks, false).count() as u32,
         value: value.filter(|_| end == TrialEnd::Settled).unwrap_or(0.0),
         measured,

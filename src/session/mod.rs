@@ -7,4 +7,5 @@ pub mod experiment;
 pub mod objective;
 pub mod operator_request;
 pub mod rollout;
+pub mod storage;
 pub mod supervisor;

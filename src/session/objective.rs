@@ -3,8 +3,11 @@
 use nalgebra::{Rotation3, Vector3};
 
 use crate::robot::CONTROL_PERIOD_S;
-use crate::telemetry::{Tick, TrialEnd};
-use crate::trial::{MeasuredJump, Task, Verdict};
+use crate::telemetry::{Fault, Tick, TrialEnd};
+use crate::trial::{MeasuredJump, Task, TrialRecord, Verdict};
+
+/// Beginning of the cause of a trial that tripped a limit.
+const LIMIT: &str = "limit: ";
 
 /// Measures a trial from its ticks; none if they end before the impulse.
 ///
@@ -49,7 +52,8 @@ pub fn value(task: Task, measured: &MeasuredJump, jumps: u32) -> f64 {
     whole / f64::from(jumps.max(1))
 }
 
-/// Returns the verdict that the rules suggest, and its reason.
+/// Returns the verdict that the rules suggest, and its reason. A limit that the motion trips is the outcome of the parameters,
+/// as a fall is; void is a trial whose end they did not cause: link, console, operator, temperature of a motor.
 pub fn suggest(end: &TrialEnd) -> (Verdict, String) {
     match end {
         TrialEnd::Settled => (Verdict::Accept, "landed and settled".into()),
@@ -58,6 +62,21 @@ pub fn suggest(end: &TrialEnd) -> (Verdict, String) {
         TrialEnd::Stopped => (Verdict::Void, "stopped by the operator".into()),
         TrialEnd::Cancelled => (Verdict::Void, "cancelled by the operator".into()),
         TrialEnd::NotReady(inhibit) => (Verdict::Void, format!("not begun: {inhibit}")),
+        TrialEnd::Fault(fault) if trips_limit(end) => (Verdict::Fall, format!("{LIMIT}{fault}")),
         TrialEnd::Fault(fault) => (Verdict::Void, fault.to_string()),
     }
+}
+
+/// Whether a limit of the motion ended the trial: position, velocity or torque of a joint, or tilt.
+pub fn trips_limit(end: &TrialEnd) -> bool {
+    let TrialEnd::Fault(fault) = end else { return false };
+    matches!(
+        fault,
+        Fault::JointPosition { .. } | Fault::JointVelocity { .. } | Fault::JointTorque { .. } | Fault::Tilt { .. }
+    )
+}
+
+/// Whether the trial under review tripped a limit of the motion; to judge it void the operator gives a reason.
+pub fn tripped_limit(row: &TrialRecord) -> bool {
+    row.suggested == Some(Verdict::Fall) && row.cause.starts_with(LIMIT)
 }

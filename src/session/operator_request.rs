@@ -91,6 +91,9 @@ pub enum OperatorRequest {
     Enqueue(Vec<(String, f64)>),
     /// Raise the budget by this many trials.
     Continue(u32),
+    /// Void the trial under review for this reason, with `rerun` also queue the parameters again. Needed where the trial
+    /// tripped a limit.
+    VoidBecause { reason: String, rerun: bool },
 }
 
 impl fmt::Display for OperatorRequest {
@@ -127,6 +130,8 @@ impl fmt::Display for OperatorRequest {
                 write!(f, "queue {}", values.join(", "))
             }
             OperatorRequest::Continue(trials) => write!(f, "continue for {trials} trials"),
+            OperatorRequest::VoidBecause { reason, rerun: false } => write!(f, "void because: {reason}"),
+            OperatorRequest::VoidBecause { reason, rerun: true } => write!(f, "re-run because: {reason}"),
         }
     }
 }

@@ -37,11 +37,25 @@ pub enum ArmingCheck {
     StopTested,
     #[strum(serialize = "motors follow")]
     MotorsFollow,
+    #[strum(serialize = "inertial unit live")]
+    InertialLive,
+    #[strum(serialize = "gravity")]
+    Gravity,
+    #[strum(serialize = "orientation")]
+    Orientation,
+    #[strum(serialize = "foot sensors")]
+    FootSensors,
+    #[strum(serialize = "robot clock")]
+    RobotClock,
+    #[strum(serialize = "joint velocity")]
+    JointVelocity,
+    #[strum(serialize = "remote answers")]
+    Remote,
 }
 
 impl ArmingCheck {
     /// The checks of the control thread, in the order of the list.
-    pub const CONTROL: [ArmingCheck; 11] = [
+    pub const CONTROL: [ArmingCheck; 18] = [
         ArmingCheck::StateFresh,
         ArmingCheck::Loss,
         ArmingCheck::Checksums,
@@ -53,6 +67,13 @@ impl ArmingCheck {
         ArmingCheck::MotorsFollow,
         ArmingCheck::GyroStill,
         ArmingCheck::OnTime,
+        ArmingCheck::InertialLive,
+        ArmingCheck::Gravity,
+        ArmingCheck::Orientation,
+        ArmingCheck::FootSensors,
+        ArmingCheck::RobotClock,
+        ArmingCheck::JointVelocity,
+        ArmingCheck::Remote,
     ];
 
     /// All values in order.

@@ -51,13 +51,15 @@ pub enum CommandRefusal {
     Inhibited(TrialInhibit),
     #[error("the robot's mode changed after the key press; check the mode and press again")]
     Stale,
-    #[error("the key press is {age_s:.0} s old, limit {allowed_s:.0} s; check the robot and press again")]
+    #[error("the key press is {age_s:.1} s old, limit {allowed_s:.1} s; check the robot and press again")]
     Expired { age_s: f64, allowed_s: f64 },
     /// `silent_ms` is `u32::MAX` before the first heartbeat.
     #[error("{}", if *.silent_ms == u32::MAX { "no heartbeat of the operator's console yet; wait for the first".to_owned() } else { format!("no heartbeat of the operator's console for {silent_ms} ms, limit {allowed_ms} ms; check its connection") })]
     OperatorSilent { silent_ms: u32, allowed_ms: u32 },
     #[error("the session is ending")]
     Leaving,
+    #[error("sit down or cancel was pressed after it; check the robot and press again")]
+    Lowered,
 }
 
 /// Conditions of the next arming and the next trial.

@@ -1,5 +1,7 @@
 //! Faults, falls, warnings and trial inhibits: quantity, measured value and limit. A joint is an index, 0..12.
 
+use strum::{IntoStaticStr, VariantArray};
+
 use crate::robot::joint_name;
 
 /// Cause of a fall.
@@ -61,13 +63,110 @@ pub enum Fault {
     /// The ring of events is full or abandoned.
     #[error("the session does not take events")]
     EventsLost,
+    #[error("sensor check \"{}\" failed: {}; check {}", .check.name(), exceeds(*.measured, *.allowed, .check.unit(), 3), .check.suspect())]
+    Sensors { check: SensorCheck, measured: f64, allowed: f64 },
+    #[error(
+        "the robot's clock is off by {measured_ms:.0} ms against this computer's, limit {allowed_ms:.0} ms: one of them stepped or stood still"
+    )]
+    RobotClock { measured_ms: f64, allowed_ms: f64 },
+    /// Or the cable is bad; the sign is the same.
+    #[error("another program commands the robot: {}; end it, then check the cable", .sign.words(*.measured, *.allowed))]
+    OtherCommander { sign: CommanderSign, measured: f64, allowed: f64 },
+    #[error("stop buttons of the remote control pressed")]
+    RemoteStop,
+}
+
+/// A check of sensors against each other while the robot is commanded. The order is the order of the checks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, VariantArray, IntoStaticStr)]
+#[expect(missing_docs, reason = "`control::consistency` describes each check")]
+pub enum SensorCheck {
+    #[strum(serialize = "inertial unit live")]
+    InertialUnitLive,
+    #[strum(serialize = "magnitude of gravity")]
+    GravityMagnitude,
+    #[strum(serialize = "orientation against gyroscope and gravity")]
+    Orientation,
+    #[strum(serialize = "turn against gyroscope")]
+    TurnRate,
+    #[strum(serialize = "feet carry the weight")]
+    FeetLoaded,
+    #[strum(serialize = "no foot down in free fall")]
+    FeetInFreeFall,
+    #[strum(serialize = "feet down after landing")]
+    FeetAfterLanding,
+    #[strum(serialize = "joint velocity")]
+    JointVelocity,
+}
+
+impl SensorCheck {
+    /// All values in order.
+    pub const ALL: &'static [SensorCheck] = Self::VARIANTS;
+
+    /// Name on screens and in files.
+    pub fn name(self) -> &'static str {
+        self.into()
+    }
+
+    /// Unit of the measured value.
+    pub const fn unit(self) -> &'static str {
+        match self {
+            SensorCheck::InertialUnitLive => "repeated states",
+            SensorCheck::GravityMagnitude => "m/s^2",
+            SensorCheck::Orientation | SensorCheck::TurnRate | SensorCheck::JointVelocity => "rad",
+            SensorCheck::FeetLoaded | SensorCheck::FeetInFreeFall | SensorCheck::FeetAfterLanding => "s",
+        }
+    }
+
+    /// The sensors to check.
+    const fn suspect(self) -> &'static str {
+        match self {
+            SensorCheck::InertialUnitLive
+            | SensorCheck::GravityMagnitude
+            | SensorCheck::Orientation
+            | SensorCheck::TurnRate => "the inertial unit and its axes",
+            SensorCheck::FeetLoaded | SensorCheck::FeetInFreeFall | SensorCheck::FeetAfterLanding => {
+                "the foot sensors and foot_force_n"
+            }
+            SensorCheck::JointVelocity => "the joint's encoder",
+        }
+    }
+}
+
+/// A sign that another program commands the robot.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CommanderSign {
+    /// No motor is in servo mode, which every command requests.
+    ForeignMode,
+    /// States are lost, percent: the robot sends them to another program.
+    LostStates,
+    /// A motor reports another torque than that of the command, N m.
+    ForeignTorque,
+}
+
+impl CommanderSign {
+    fn words(self, measured: f64, allowed: f64) -> String {
+        match self {
+            CommanderSign::ForeignMode => "no motor is in servo mode".to_owned(),
+            CommanderSign::LostStates => format!("{measured:.1} % of the states lost in 1 s, limit {allowed:.1} %"),
+            CommanderSign::ForeignTorque => {
+                format!("a torque differs from the command by {measured:.1} N m, limit {allowed:.1} N m")
+            }
+        }
+    }
 }
 
 impl Fault {
     /// Whether the fault voids the operator's confirmations: the robot may have restarted, which ends low-level mode, or a person
     /// may have been at it. Such a fault is reported also when another one is latched.
     pub fn voids_confirmations(&self) -> bool {
-        matches!(self, Fault::Reboot | Fault::LinkLost { .. } | Fault::MotorMode { .. })
+        matches!(
+            self,
+            Fault::Reboot
+                | Fault::LinkLost { .. }
+                | Fault::MotorMode { .. }
+                | Fault::RobotClock { .. }
+                | Fault::OtherCommander { .. }
+        )
     }
 }
 

@@ -10,6 +10,6 @@ mod tick;
 pub use arming::{ArmingCheck, ArmingCheckSet, ArmingCheckState, ArmingFinding, ArmingFindings};
 pub use command::{Command, Permit, TrialSpec};
 pub use event::{CommandRefusal, Event, Readiness, TrialEnd};
-pub use fault::{FailsafeWarning, FallCause, Fault, TrialInhibit};
+pub use fault::{CommanderSign, FailsafeWarning, FallCause, Fault, SensorCheck, TrialInhibit};
 pub use mode::{Mode, Phase, TransitionCause};
 pub use tick::{Counters, Estimate, Snapshot, Tick, TickDurations};

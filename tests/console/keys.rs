@@ -5,15 +5,16 @@ mod support;
 use quadfrog::recording::record::{Record, SessionInfo, StageRecord};
 use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::telemetry::Mode;
-use quadfrog::trial::{Backend, ExperimentStage, Verdict};
+use quadfrog::trial::{Backend, ExperimentStage, TrialRecord, Verdict};
 use quadfrog_console::action::{ACTIONS, Action};
 use quadfrog_console::keymap::{Key, Keymap};
 use quadfrog_console::message::{Effect, Msg};
 use quadfrog_console::model::View;
 use quadfrog_console::model::dialog::Dialog;
 use quadfrog_console::settings::{ConsoleSettings, DEFAULT};
+use quadfrog_console::theme::Role;
 use strum::VariantArray;
-use support::{Console, VIEWS, proposal, requests, session, trial};
+use support::{Console, VIEWS, assert_shows, proposal, requests, session, trial};
 
 fn approval(trial: u32, revision: u32) -> Vec<OperatorRequest> {
     vec![OperatorRequest::Approve { trial, revision }]
@@ -82,7 +83,7 @@ fn an_approval_ends_with_readiness() {
 
 #[test]
 fn stop_works_on_every_screen_and_over_every_dialog() {
-    for stop in ["Space", "F12"] {
+    for stop in ["Space", "F12", "Ctrl-C", "Alt-Space", "Ctrl-Space", "Ctrl-F12", "Alt-F12", "Ctrl-Alt-C"] {
         for &mode in Mode::ALL {
             for view in VIEWS {
                 let mut console = Console::proposed();
@@ -92,6 +93,9 @@ fn stop_works_on_every_screen_and_over_every_dialog() {
             }
         }
         for opening in ["g", "o", "m", ":", "?", "q", "Enter"] {
+            if stop == "Space" && ["m", ":"].contains(&opening) {
+                continue;
+            }
             let mut console = Console::ready();
             console.record(Record::Trial(trial(0, Some(Verdict::Accept), None)));
             console.press(&[opening]);
@@ -101,10 +105,55 @@ fn stop_works_on_every_screen_and_over_every_dialog() {
     }
 }
 
+/// Space types in a note, also while the robot is energised: the other STOP keys stop, and the frame says so in the colour
+/// of STOP.
 #[test]
-fn a_text_field_takes_space_only_while_the_robot_is_not_armed() {
+fn a_text_field_takes_space_and_its_frame_names_the_keys_that_stop() {
+    let noted = [OperatorRequest::Note { trial: 0, text: "ok y".into() }];
+    for mode in [Mode::Review, Mode::Disarmed] {
+        let mut console = Console::review(mode, Verdict::Accept);
+        console.press(&["m"]);
+        assert_eq!(requests(&console.press(&["o", "k", "Space", "y", "Enter"])), noted, "{mode:?}");
+        for stop in ["F12", "Ctrl-C", "Alt-Space", "Ctrl-Space"] {
+            let mut console = Console::review(mode, Verdict::Accept);
+            console.press(&["m", "o"]);
+            assert_eq!(console.press(&[stop]), [Effect::Stop], "{stop} in {mode:?}");
+            assert!(matches!(console.model.dialog, Some(Dialog::Field { .. })), "the half-written note stays");
+        }
+        let mut console = Console::review(mode, Verdict::Accept);
+        console.press(&["m"]);
+        let screen = console.screen(80, 24);
+        let energised = mode == Mode::Review;
+        assert_eq!(screen.contains("Space types here. STOP: F12 or Ctrl-C"), energised, "{screen}");
+        assert_eq!(screen.contains("STOP  F12 Ctrl-C"), energised, "{screen}");
+        let corner = console.draw(80, 24).content().iter().find(|cell| cell.symbol() == "┌").cloned().unwrap();
+        let alarm = console.model.theme.style(Role::Alarm);
+        assert_eq!((Some(corner.fg), Some(corner.bg)) == (alarm.fg, alarm.bg), energised, "{corner:?}");
+    }
+}
+
+#[test]
+fn space_stops_where_a_number_is_typed() {
+    for opening in [&["="][..], &["o", "1"], &["C"], &["2", "/"]] {
+        let mut console = Console::review(Mode::Review, Verdict::Accept);
+        if opening != ["="] {
+            console = Console::ready();
+            console.record(Record::Trial(trial(0, Some(Verdict::Accept), None)));
+        }
+        if opening == ["C"] {
+            console.stage(ExperimentStage::Finished, 0);
+        }
+        console.press(opening);
+        assert!(console.model.dialog.is_some(), "{opening:?}");
+        assert_eq!(console.press(&["Space"]), [Effect::Stop], "{opening:?}");
+    }
+}
+
+#[test]
+fn a_setting_makes_space_stop_in_a_text_field_of_an_energised_robot() {
     let note = |mode: Mode, keys: &[&str]| {
         let mut console = Console::review(mode, Verdict::Accept);
+        console.model.space_always_stops = true;
         console.press(&["m"]);
         let effects = console.press(keys);
         (effects, console)
@@ -400,6 +449,10 @@ fn rebinding_refuses_collisions_and_stop() {
     assert!(message.contains("`accept`") && message.contains("`fall`"), "{message}");
     let message = keymap_of(&[("stop", &["s"])]).expect_err("STOP stays");
     assert!(message.contains("Space and F12"), "{message}");
+    for stop in ["Alt-Space", "Ctrl-Space", "Ctrl-F12", "Alt-Ctrl-C"] {
+        let message = keymap_of(&[("accept", &[stop])]).expect_err("STOP with any modifier");
+        assert!(message.contains("STOP with any modifier"), "{message}");
+    }
     assert!(keymap_of(&[("acept", &["y"])]).is_err());
     assert!(keymap_of(&[("accept", &[])]).is_err());
     assert!(keymap_of(&[("accept", &["Hyper-y"])]).is_err());
@@ -437,4 +490,21 @@ fn a_terminal_too_small_for_the_card_neither_approves_nor_arms() {
     assert_eq!(console.press(&["Space"]), [Effect::Stop]);
     console.mode(Mode::Disarmed);
     assert_eq!(console.requests(&["A"]), []);
+}
+
+/// By the rules a tripped limit is a fall of the parameters: whoever voids it says why.
+#[test]
+fn voiding_a_tripped_limit_asks_for_the_reason() {
+    for (key, rerun) in [("v", false), ("r", true)] {
+        let mut console = Console::review(Mode::Fault, Verdict::Fall);
+        let cause = "limit: FR_calf at 70.0 rad/s exceeds 60.0 rad/s".to_owned();
+        console.record(Record::Trial(TrialRecord { cause, ..trial(0, None, Some(Verdict::Fall)) }));
+        assert_eq!(console.requests(&[key]), []);
+        assert_shows(&console.screen(80, 24), &["Why is trial #0 void?", "it tripped a limit"]);
+        assert_eq!(console.requests(&["Enter"]), [], "an empty reason is refused");
+        let sent = console.requests(&["t", "e", "t", "h", "e", "r", "Enter"]);
+        assert_eq!(sent, [OperatorRequest::VoidBecause { reason: "tether".into(), rerun }]);
+    }
+    // A fall may be voided with one key.
+    assert_eq!(Console::review(Mode::Damped, Verdict::Fall).requests(&["v"]), [OperatorRequest::Judge(Verdict::Void)]);
 }

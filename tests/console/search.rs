@@ -38,6 +38,7 @@ fn search(fx: (f64, f64), fixed: Option<FixedParameter>) -> SearchStatus {
             parameter("Fz", (150.0, 350.0), (0.0, 400.0), None),
         ],
         confirming: None,
+        hop_share: None,
     }
 }
 

@@ -528,3 +528,15 @@ fn markers_take_a_replay_from_trial_to_trial_and_to_the_end() {
     played.wait(500);
     assert_eq!(played.time_ms(), 500);
 }
+
+/// Regression: every reading of the newest tick counted as news, so a control thread that hangs was never shown.
+#[test]
+fn the_numbers_of_a_control_thread_that_hangs_are_shown_as_old() {
+    let mut console = Console::ready();
+    console.wait(1_000);
+    assert!(!console.screen(120, 40).contains("OLD"));
+    console.hang(700);
+    assert_shows(&console.screen(120, 40), &["OLD: nothing new for 0.7 s"]);
+    console.wait(10);
+    assert!(!console.screen(120, 40).contains("OLD"));
+}

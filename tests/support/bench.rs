@@ -39,7 +39,7 @@ pub struct Bench<R> {
     pub settings: ControlSettings,
     pub cycle: Cycle,
     pub robot: R,
-    /// TickInputs of the next tick, but for its command.
+    /// Inputs of the next tick, but for its command.
     pub inputs: TickInputs,
     pub period_ns: u64,
     pub events: Vec<Event>,

@@ -11,7 +11,7 @@ use quadfrog::optimize::space::{Range, Space};
 use quadfrog::optimize::study::{Storage, Study, StudyOptions};
 use quadfrog::session::experiment::{Experiment, ExperimentPlan};
 use quadfrog::telemetry::{Tick, TrialEnd, TrialSpec};
-use quadfrog::trial::{ExperimentStage, ParameterInfo, Task, Verdict};
+use quadfrog::trial::{Backend, ExperimentStage, ParameterInfo, Task, Verdict};
 
 pub const BOUNDS: [(&str, f64, f64); 3] = [("f0", 0.75, 1.75), ("Fx", 0.0, 150.0), ("Fz", 150.0, 350.0)];
 
@@ -59,6 +59,8 @@ pub fn plan(budget: u32) -> ExperimentPlan {
         confidence: 0.95,
         worker: 0,
         abandoned: Duration::from_secs(60),
+        backend: Backend::Simulator,
+        envelope: None,
     }
 }
 

@@ -112,6 +112,8 @@ impl Draw {
                     foot_force_world: std::array::from_fn(|_| d.vector()),
                     body_contact: d.yes(),
                 }),
+                // Not recorded.
+                remote: None,
             },
             estimate: Estimate {
                 position_world: self.vector(),
@@ -159,6 +161,8 @@ impl Draw {
             recent_received: self.word() as u32,
             recent_lost: self.word() as u32,
             recent_corrupt: self.word() as u32,
+            // Not recorded.
+            older_by_ms: 0,
         }
     }
 
@@ -282,6 +286,7 @@ impl Draw {
                     fixed: d.option(|d| FixedParameter { value: d.number(), trials: d.word() as u32 }),
                 }),
                 confirming: self.option(|d| d.word() as u32),
+                hop_share: self.option(|d| d.number()),
             }),
             11 => Record::Insight(ProposalInsight {
                 trial: self.word() as u32,
@@ -398,6 +403,7 @@ pub fn moving_tick(number: u64) -> Tick {
             motor_enabled: [true; 12],
             battery: None,
             truth: Some(truth),
+            remote: None,
         },
         estimate,
         torque_demanded: torque,

@@ -1,9 +1,19 @@
 //! Robots with injected faults, for tests of control and session.
 #![allow(dead_code, reason = "each test uses its own part")]
 
+use nalgebra::{UnitQuaternion, Vector3};
 use quadfrog::robot::description::RobotDescription;
+use quadfrog::robot::remote::Remote;
 use quadfrog::robot::{Battery, JOINTS, JointCommand, LinkStatus, Placement, Robot, RobotError, RobotState};
 use quadfrog::sim::{SimConfig, Simulator};
+
+/// Noise of an inertial unit, so small that it changes no result: without it a robot at rest repeats its measurements.
+pub fn noise(state: &mut RobotState) {
+    let sign = if state.robot_time_ms.is_multiple_of(2) { 1.0 } else { -1.0 };
+    state.imu.gyro_body.z += sign * 1e-7;
+    state.imu.accel_body.z += sign * 1e-7;
+    state.imu.world_from_body *= UnitQuaternion::from_axis_angle(&Vector3::z_axis(), sign * 1e-9);
+}
 
 /// A simulator behind the border of a hardware robot: it has a link and a battery, reports may be changed, reads and writes
 /// may fail, and the program cannot place it.
@@ -60,6 +70,8 @@ impl Robot for LinkedRobot {
             state.motor_temperature_c = [35.0; JOINTS];
             let charge_percent = self.charge_percent;
             state.battery = Some(Battery { charge_percent, voltage_v: 24.0, current_a: -2.0, cell_v: [0.0; 10] });
+            state.remote = Some(Remote::default());
+            noise(&mut state);
         }
         (self.tamper)(&mut state);
         Ok(state)
@@ -84,12 +96,17 @@ impl Robot for LinkedRobot {
 pub struct ScriptedRobot {
     pub state: Result<RobotState, RobotError>,
     pub link: LinkStatus,
+    /// Whether the inertial unit has noise.
+    pub noisy: bool,
 }
 
 impl Robot for ScriptedRobot {
     fn read(&mut self) -> Result<RobotState, RobotError> {
         if let Ok(state) = &mut self.state {
             state.robot_time_ms += 1;
+            if self.noisy {
+                noise(state);
+            }
         }
         self.state
     }

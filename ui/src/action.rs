@@ -132,7 +132,7 @@ pub static ACTIONS: [ActionInfo; 68] = {
     use Action as A;
     use ActionGroup as G;
     [
-        fixed(row(A::Stop, "stop", &["Space", "F12"], G::Robot, "STOP: damp all motors at once, from any screen")),
+        fixed(row(A::Stop, "stop", &["Space", "F12"], G::Robot, "STOP: damp all motors at once")),
         fixed(row(A::Interrupt, "interrupt", &["Ctrl-C"], G::Robot, "STOP; again within 2 s: quit")),
         row(A::Arm, "arm", &["A"], G::Robot, "arm: the robot stands up"),
         row(A::ArmingChecks, "pre-arm", &["P"], G::Robot, "arming checks, and your confirmation where one is needed"),
@@ -154,7 +154,7 @@ pub static ACTIONS: [ActionInfo; 68] = {
         row(A::Fall, "fall", &["f"], G::Verdict, "fall: it counts as J = 0"),
         row(A::Void, "void", &["v"], G::Verdict, "void: cause outside the parameters; hidden from the sampler"),
         row(A::Rerun, "re-run", &["r"], G::Verdict, "re-run: void, and the same parameters again (Trials: queue the row)"),
-        row(A::Undo, "undo", &["u"], G::Verdict, "take the last verdict back, until the next approval"),
+        row(A::Undo, "undo", &["u"], G::Verdict, "take the last verdict back, until the next trial is approved or refused"),
         row(A::HandValue, "hand-value", &["="], G::Verdict, "use a value measured by hand"),
         row(A::Note, "note", &["m"], G::Verdict, "write a note on a trial"),
 

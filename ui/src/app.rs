@@ -2,15 +2,14 @@
 //! response to a key. The loop waits for neither terminal nor engine; it waits for the disk when a table is exported.
 
 use std::io;
+use std::os::fd::AsFd;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use color_eyre::eyre::{WrapErr, eyre};
 use crossterm::clipboard::CopyToClipboard;
-use crossterm::event::{Event, KeyEventKind, MouseButton, MouseEvent, MouseEventKind};
 use nix::sys::signal::{Signal, raise};
 use quadfrog::engine::EngineHandle;
-use quadfrog::realtime::channel::StopLatch;
 use quadfrog::recording::record::LogLevel;
 use quadfrog::robot::description::RobotDescription;
 use tokio::signal::unix::{SignalKind, signal};
@@ -21,8 +20,8 @@ use crate::action::Action;
 use crate::connection::{ConnectionMonitor, TerminalLocation};
 
 use crate::feed::Feed;
-use crate::keymap::{Key, Keymap};
-use crate::message::{Effect, Mouse, Msg};
+use crate::input::{CountedInput, Input, KeyReader, SpaceTypes, read_terminal};
+use crate::message::{Effect, Msg};
 use crate::model::Model;
 use crate::settings::{ChartMode, ConsoleSettings};
 use crate::terminal::{self, TerminalScreen};
@@ -88,7 +87,7 @@ pub enum ConsoleExit {
 }
 
 /// Input from the terminal; none when it hung up.
-type TerminalInput = Option<Msg>;
+type TerminalInput = Option<CountedInput>;
 
 /// Opens the console on the feed and runs it until the operator or the system ends it; then ends the session of a live feed.
 ///
@@ -105,6 +104,9 @@ struct Console {
     /// State of the connection at the last heartbeat.
     connected: bool,
     model: Model,
+    /// Report to the thread that reads the terminal, and the number of keys that were processed.
+    space_types: SpaceTypes,
+    keys: u64,
     screen: TerminalScreen,
     started: Instant,
     frame_period: Duration,
@@ -122,7 +124,8 @@ impl Console {
         let mut model = Model::new(settings, theme, options.robot);
         let (columns, rows) = crossterm::terminal::size().wrap_err("the terminal's size")?;
         update(&mut model, Msg::Resize(columns, rows));
-        let mut screen = TerminalScreen::enter().wrap_err("the terminal cannot be used")?;
+        let mut screen =
+            TerminalScreen::enter(matches!(feed, Feed::Replay(_))).wrap_err("the terminal cannot be used")?;
         screen.mouse(model.mouse).wrap_err("the terminal cannot be used")?;
         terminal::stop_on_panic(feed.handle().map(EngineHandle::stop_latch));
         let connection = match &feed {
@@ -138,6 +141,8 @@ impl Console {
             connection,
             connected: true,
             model,
+            space_types: SpaceTypes::default(),
+            keys: 0,
             screen,
             started: now,
             frame_period,
@@ -150,11 +155,13 @@ impl Console {
 
     async fn run(mut self) -> color_eyre::Result<ConsoleExit> {
         let (input, mut inputs) = unbounded_channel();
-        read_input(input.clone(), self.model.keymap.clone(), self.feed.handle().map(EngineHandle::stop_latch))?;
+        let stop = self.feed.handle().map(EngineHandle::stop_latch);
+        read_input(input.clone(), KeyReader::new(stop.is_none(), stop, self.space_types.clone()))?;
         terminal::watch_for_hang_up(move || drop(input.send(None))).wrap_err("hang-up watcher")?;
         let mut interrupted = signal(SignalKind::interrupt())?;
         let mut terminated = signal(SignalKind::terminate())?;
         let mut hung_up = signal(SignalKind::hangup())?;
+        let mut resized = signal(SignalKind::window_change())?;
         let mut suspended = signal(SignalKind::from_raw(Signal::SIGTSTP as i32))?;
         let mut pulse = interval(PULSE.min(self.frame_period));
         pulse.set_missed_tick_behavior(MissedTickBehavior::Skip);
@@ -169,6 +176,7 @@ impl Console {
                     let key = self.model.keymap.keys(Action::Interrupt).next();
                     self.update_with(key.map(Msg::Key));
                 }
+                _ = resized.recv() => self.resize(),
                 _ = suspended.recv() => self.update_with([Msg::Suspend]),
                 _ = pulse.tick() => {}
             }
@@ -202,7 +210,14 @@ impl Console {
         let mut next = Some(input);
         while let Some(input) = next {
             match input {
-                Some(message) => self.update_with([message]),
+                Some(CountedInput { input, keys }) => {
+                    self.keys = keys;
+                    self.update_with([match input {
+                        Input::Key(key) => Msg::Key(key),
+                        Input::Paste(text) => Msg::Paste(text),
+                        Input::Mouse(event) => Msg::Mouse(event),
+                    }]);
+                }
                 None => self.hang_up(),
             }
             self.redraw = true;
@@ -225,6 +240,14 @@ impl Console {
             for effect in update(&mut self.model, message) {
                 self.perform_effect(effect);
             }
+            self.space_types.report(self.keys, self.model.space_types());
+        }
+    }
+
+    fn resize(&mut self) {
+        if let Ok((columns, rows)) = crossterm::terminal::size() {
+            self.update_with([Msg::Resize(columns, rows)]);
+            self.redraw = true;
         }
     }
 
@@ -324,6 +347,7 @@ impl Console {
         }
         self.redraw = true;
         self.draw_if_due()?;
+        self.space_types.report(self.keys, false);
         let (feed, connection) = (self.feed, self.connection);
         let closing = std::thread::Builder::new().name("close".into()).spawn(move || feed.shutdown())?;
         while !closing.is_finished() {
@@ -333,8 +357,8 @@ impl Console {
                 heartbeat.beat();
             }
             while let Ok(input) = inputs.try_recv() {
-                if let (Some(Msg::Key(key)), Some(stop)) = (input, &stop)
-                    && matches!(self.model.keymap.action(key), Some(Action::Stop | Action::Interrupt))
+                if let (Some(CountedInput { input: Input::Key(key), .. }), Some(stop)) = (input, &stop)
+                    && key.stops()
                 {
                     stop.set();
                 }
@@ -348,46 +372,13 @@ impl Console {
     }
 }
 
-/// Reads the terminal in a thread. STOP keys that are no text set the latch from this thread, even if the loop hangs.
-fn read_input(inputs: UnboundedSender<TerminalInput>, keymap: Keymap, stop: Option<StopLatch>) -> io::Result<()> {
+/// Reads the terminal in a thread, which sets the STOP latch by itself, even if the loop hangs.
+fn read_input(inputs: UnboundedSender<TerminalInput>, reader: KeyReader) -> io::Result<()> {
+    let terminal = io::stdin().as_fd().try_clone_to_owned()?;
     let read = move || {
-        loop {
-            let input = match crossterm::event::read() {
-                Ok(Event::Key(event)) if event.kind != KeyEventKind::Release => {
-                    let key = Key::from_event(event);
-                    let stops = matches!(keymap.action(key), Some(Action::Stop | Action::Interrupt));
-                    if let Some(stop) = &stop
-                        && stops
-                        && key.typed().is_none()
-                    {
-                        stop.set();
-                    }
-                    Some(Msg::Key(key))
-                }
-                Ok(Event::Paste(text)) => Some(Msg::Paste(text)),
-                Ok(Event::Mouse(event)) => match mouse(event) {
-                    Some(event) => Some(Msg::Mouse(event)),
-                    None => continue,
-                },
-                Ok(Event::Resize(columns, rows)) => Some(Msg::Resize(columns, rows)),
-                Ok(_) => continue,
-                Err(_) => None,
-            };
-            let gone = input.is_none();
-            if inputs.send(input).is_err() || gone {
-                return;
-            }
-        }
+        // Either way the terminal cannot be read any more.
+        let _ = read_terminal(&terminal, reader, |input| inputs.send(Some(input)).is_ok());
+        let _ = inputs.send(None);
     };
     std::thread::Builder::new().name("keys".into()).spawn(read).map(|_| ())
-}
-
-/// Returns the click or wheel step of a mouse event; moves and releases are ignored.
-fn mouse(event: MouseEvent) -> Option<Mouse> {
-    match event.kind {
-        MouseEventKind::Down(MouseButton::Left) => Some(Mouse::Click { column: event.column, row: event.row }),
-        MouseEventKind::ScrollUp => Some(Mouse::WheelUp),
-        MouseEventKind::ScrollDown => Some(Mouse::WheelDown),
-        _ => None,
-    }
 }

@@ -60,6 +60,15 @@ impl Key {
         }
     }
 
+    /// Whether the key stops the robot: Space, F12 and Ctrl-C, with any further modifier.
+    pub fn stops(self) -> bool {
+        match self.code {
+            KeyCode::Char(' ') | KeyCode::F(12) => true,
+            KeyCode::Char('c') => self.modifiers.contains(KeyModifiers::CONTROL),
+            _ => false,
+        }
+    }
+
     /// The terminal's name of the key, without modifiers.
     pub fn code(self) -> KeyCode {
         self.code
@@ -181,6 +190,10 @@ impl Keymap {
                 None => info.keys.iter().map(|key| key.parse().expect("a default key has a valid name")).collect(),
             };
             for key in keys {
+                if key.stops() && !info.fixed {
+                    let reason = "the key is STOP with any modifier; give the action another key".to_owned();
+                    return Err(refused(info.name, &key.to_string(), reason));
+                }
                 if let Some((_, other)) = bindings.iter().find(|(bound, _)| *bound == key) {
                     let (one, other) = (other.info().name, info.name);
                     let reason = format!("the key is bound to `{one}` and to `{other}`; give one of them another key");
@@ -192,8 +205,11 @@ impl Keymap {
         Ok(Keymap { bindings })
     }
 
-    /// The action of the key.
+    /// The action of the key. A STOP key keeps its action with any modifier.
     pub fn action(&self, key: Key) -> Option<Action> {
+        if key.stops() {
+            return Some(if matches!(key.code(), KeyCode::Char('c')) { Action::Interrupt } else { Action::Stop });
+        }
         self.bindings.iter().find(|(bound, _)| *bound == key).map(|(_, action)| *action)
     }
 

@@ -17,6 +17,7 @@ mod column;
 pub mod connection;
 pub mod export;
 pub mod feed;
+pub mod input;
 pub mod keymap;
 mod layout;
 mod legal;

@@ -5,6 +5,7 @@ use std::time::Duration;
 use quadfrog::recording::record::Stamped;
 use quadfrog::recording::recorder::RecorderStatus;
 use quadfrog::session::operator_request::OperatorRequest;
+use quadfrog::session::storage::StorageWait;
 use quadfrog::telemetry::{Snapshot, Tick};
 
 use crate::keymap::Key;
@@ -19,13 +20,15 @@ pub enum Msg {
     /// Columns and rows of the terminal.
     Resize(u16, u16),
     Key(Key),
-    /// Pasted text; never read as keys.
+    /// Pasted text of the terminal of a replay. In a live session a paste arrives as keys.
     Paste(String),
     /// Mouse input, while the mouse is on.
     Mouse(Mouse),
     /// The newest tick and counters, for numbers and the mode.
     Snapshot(Box<Snapshot>),
     Recorder(RecorderStatus),
+    /// The wait of the session for the storage of its study; none while there is none.
+    Storage(Option<StorageWait>),
     /// One of the ticks for the charts.
     Tick(Box<Tick>),
     Record(Stamped),

@@ -36,6 +36,8 @@ pub struct ConsoleSettings {
     /// Whether clicks and the wheel reach the console.
     pub mouse: bool,
     pub bell: Vec<BellCause>,
+    /// Whether Space stops an energised robot in a text field, too.
+    pub space_always_stops: bool,
     /// Whether to save bandwidth; from the command line, not from the file.
     pub low_bandwidth: bool,
     pub keymap: Keymap,
@@ -108,6 +110,7 @@ impl ConsoleSettings {
             trial_columns: named(table, "trial_columns")?,
             mouse: read(table, "mouse")?,
             bell: read(table, "bell")?,
+            space_always_stops: read(table, "space_always_stops")?,
             low_bandwidth: false,
             keymap,
         })

@@ -190,13 +190,16 @@ pub(crate) struct TerminalScreen {
     state: Arc<WriterState>,
     writer: Option<JoinHandle<()>>,
     mouse: bool,
+    /// Whether bracketed paste is on.
+    pastes: bool,
     hung_up: bool,
 }
 
 impl TerminalScreen {
-    /// Enters raw mode and the alternate screen, and hides the cursor. From now on a panic in any thread restores the
+    /// Enters raw mode and the alternate screen, and hides the cursor. Bracketed paste is on with `pastes` only: text that
+    /// begins with its first mark and never ends would hide the keys behind it. From now on a panic in any thread restores the
     /// terminal before it is reported.
-    pub fn enter() -> io::Result<TerminalScreen> {
+    pub fn enter(pastes: bool) -> io::Result<TerminalScreen> {
         let terminal = own_file()?;
         let state = Arc::new(WriterState::default());
         // Holds at most one frame: the caller checks `ready` before it draws.
@@ -209,8 +212,14 @@ impl TerminalScreen {
         let writer_end = FrameWriter { frame: Vec::new(), frames, state: state.clone() };
         let backend = WriteOnlyBackend(CrosstermBackend::new(writer_end));
         let terminal = Terminal::with_options(backend, TerminalOptions { viewport: Viewport::Fullscreen })?;
-        let mut screen =
-            TerminalScreen { terminal: Some(terminal), state, writer: Some(writer), mouse: false, hung_up: false };
+        let mut screen = TerminalScreen {
+            terminal: Some(terminal),
+            state,
+            writer: Some(writer),
+            mouse: false,
+            pastes,
+            hung_up: false,
+        };
         screen.configure()?;
         Ok(screen)
     }
@@ -221,7 +230,12 @@ impl TerminalScreen {
         ENTERED.store(true, Ordering::Release);
         if let Some(terminal) = &mut self.terminal {
             let writer = &mut terminal.backend_mut().0;
-            queue!(writer, EnterAlternateScreen, EnableBracketedPaste, Hide, Clear(ClearType::All))?;
+            queue!(writer, EnterAlternateScreen, Hide, Clear(ClearType::All))?;
+            match self.pastes {
+                true => queue!(writer, EnableBracketedPaste)?,
+                // An earlier program may have left it on.
+                false => queue!(writer, DisableBracketedPaste)?,
+            }
             terminal.clear()?;
         }
         Ok(())

@@ -1,5 +1,6 @@
 //! One arming check: its inputs, its measurement and its words.
 
+use crate::control::consistency::Consistency;
 use crate::control::settings::{ArmingLimits, ControlSettings};
 use crate::robot::recent_count::RecentCount;
 use crate::robot::{JOINTS, LinkStatus, RobotState, joint_name};
@@ -30,6 +31,8 @@ pub struct ArmingInputs<'a> {
     pub link: Option<LinkStatus>,
     /// Late ticks and stillness up to now.
     pub history: &'a ArmingHistory,
+    /// Consistency of sensors, clocks and commands.
+    pub consistency: &'a Consistency,
 }
 
 /// Late ticks of the last 5 s, and for how long the robot has been still.

@@ -4,13 +4,20 @@
 mod battery;
 mod check;
 mod checksums;
+mod foot_sensors;
+mod gravity;
 mod gyro_still;
+mod inertial_live;
+mod joint_velocity;
 mod joints_inside;
 mod loss;
 mod lying_down;
 mod motors_cool;
 mod motors_follow;
 mod on_time;
+mod orientation;
+mod remote;
+mod robot_clock;
 mod state_fresh;
 mod upright;
 
@@ -33,6 +40,13 @@ const CHECKS: [ControlCheck; ArmingCheck::CONTROL.len()] = [
     motors_follow::CHECK,
     gyro_still::CHECK,
     on_time::CHECK,
+    inertial_live::CHECK,
+    gravity::CHECK,
+    orientation::CHECK,
+    foot_sensors::CHECK,
+    robot_clock::CHECK,
+    joint_velocity::CHECK,
+    remote::CHECK,
 ];
 
 /// A finding in words with units.

@@ -27,6 +27,9 @@ impl Cycle {
                 return;
             }
         };
+        if matches!(trigger, Trigger::SitDown | Trigger::Cancel) {
+            self.lowered_ns = inputs.time_ns + inputs.lateness_ns;
+        }
         if let Some(because) = self.refusal(command, trigger, inputs) {
             self.events.push(Event::Refused { command: *command, mode: self.mode, because });
             return;
@@ -102,7 +105,7 @@ impl Cycle {
         }
     }
 
-    /// Refuses a permit that is older than a change of mode, or too old.
+    /// Refuses a permit that is older than a change of mode or a command to sit down or to cancel, or too old.
     fn permit_expired(&self, Permit { mode_changes, given_ns }: Permit, inputs: &TickInputs) -> Option<CommandRefusal> {
         let age_s = inputs.time_ns.saturating_sub(given_ns) as f64 * 1e-9;
         let allowed_s = self.settings.approval.expires_s;
@@ -110,6 +113,8 @@ impl Cycle {
             Some(CommandRefusal::Leaving)
         } else if mode_changes != self.mode_changes {
             Some(CommandRefusal::Stale)
+        } else if given_ns < self.lowered_ns {
+            Some(CommandRefusal::Lowered)
         } else if age_s > allowed_s {
             Some(CommandRefusal::Expired { age_s, allowed_s })
         } else {
@@ -134,6 +139,7 @@ impl Cycle {
         let placed = robot.place(placement);
         if placed {
             self.estimator.reset();
+            self.consistency.reset();
             self.gate.reset();
             self.read(robot);
             self.estimate();

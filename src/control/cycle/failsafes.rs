@@ -8,7 +8,7 @@ use crate::robot::Robot;
 use crate::robot::ticks_in;
 use crate::telemetry::{Fault, Mode, Tick, TransitionCause};
 
-/// Ticks for which a warning stays set; the session polls at 10 Hz.
+/// Ticks for which a warning stays set; the session reads it at 10 Hz.
 const WARNING_TICKS: u32 = 1000;
 
 impl Cycle {
@@ -31,6 +31,7 @@ impl Cycle {
             send_error: self.send_error.take(),
             operator_silent_ms: inputs.operator_silent_ms,
             events_lost: inputs.events_lost,
+            consistency: &self.consistency,
         };
         let trip = self.failsafe.check(&failsafe_inputs, &self.settings);
         self.warning = match (failsafe::warning(&failsafe_inputs, &self.settings), self.warning) {

@@ -1,5 +1,5 @@
-//! One control tick: read, estimate, failsafes, command, decide, limit, send, publish. A plain call: the control thread makes
-//! it at 1 kHz, a rollout as fast as the machine allows.
+//! One control tick: read, STOP, estimate, failsafes, arming checks, command, decide, limit, send. A plain call: the control
+//! thread makes it at 1 kHz, a rollout as fast as the machine allows.
 
 mod commands;
 mod decision;
@@ -7,6 +7,7 @@ mod failsafes;
 
 use super::arming::{self, ArmingHistory};
 use super::command_gate::CommandGate;
+use super::consistency::{Consistency, ConsistencyInputs};
 use super::failsafe::{self, Failsafe};
 use super::leg;
 use super::link_quality::LinkQuality;
@@ -24,7 +25,7 @@ use crate::telemetry::{
     TrialEnd, TrialInhibit,
 };
 
-/// TickInputs of one tick.
+/// Inputs of one tick.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct TickInputs {
     /// Planned start of the tick, ns since the engine started.
@@ -78,6 +79,7 @@ pub struct Cycle {
     mode_ticks: u32,
     estimator: Estimator,
     failsafe: Failsafe,
+    consistency: Consistency,
     /// The fault whose failsafe trips in this tick.
     tripped: Option<Fault>,
     /// The newest warning and the ticks for which it stays set.
@@ -103,6 +105,8 @@ pub struct Cycle {
     landing: Option<Fault>,
     /// The session ended: the robot sits down, and nothing energises it again.
     session_left: bool,
+    /// Time of the newest command to sit down or to cancel, ns: a permit from before it is void.
+    lowered_ns: u64,
     tick: Tick,
     events: Events,
 }
@@ -118,6 +122,7 @@ impl Cycle {
             mode_ticks: 0,
             estimator: Estimator::default(),
             failsafe: Failsafe::default(),
+            consistency: Consistency::default(),
             tripped: None,
             warning: None,
             arming_history: ArmingHistory::default(),
@@ -135,6 +140,7 @@ impl Cycle {
             send_error: None,
             landing: None,
             session_left: false,
+            lowered_ns: 0,
             tick: Tick::default(),
             events: Events::default(),
         }
@@ -178,6 +184,11 @@ impl Cycle {
         readiness::unready(&inputs, &self.settings)
     }
 
+    /// Consistency of sensors, clocks and commands as of the last tick.
+    pub fn consistency(&self) -> &Consistency {
+        &self.consistency
+    }
+
     /// Events of the last tick.
     pub fn events(&self) -> &Events {
         &self.events
@@ -203,6 +214,7 @@ impl Cycle {
         self.estimate();
         self.quiet.update(&self.tick.estimate, self.state_age_ms, &self.settings);
         let restarted = robot_time_passed(self.tick.state.robot_time_ms, previous_robot_time_ms) < 0;
+        self.check_consistency(inputs, restarted, robot);
         self.run_failsafes(inputs, restarted, robot);
         self.arming_history.update(inputs.lateness_ns, &self.tick.state, self.state_age_ms, restarted, &self.settings);
         self.run_arming_checks(robot);
@@ -261,6 +273,21 @@ impl Cycle {
         self.tick.estimate = *self.estimator.update(&self.tick.state, &self.feet, &self.settings);
     }
 
+    /// Compares sensors, clocks and commands with each other.
+    fn check_consistency<R: Robot + ?Sized>(&mut self, inputs: &TickInputs, restarted: bool, robot: &R) {
+        let consistency_inputs = ConsistencyInputs {
+            mode: self.mode,
+            state: &self.tick.state,
+            is_new: self.state_age_ms == 0,
+            restarted,
+            estimate: &self.tick.estimate,
+            now_ns: inputs.time_ns.saturating_add(inputs.lateness_ns),
+            link: robot.link(),
+            sent: &self.tick.command,
+        };
+        self.consistency.update(&consistency_inputs, &self.settings);
+    }
+
     /// Runs the arming checks while DISARMED.
     fn run_arming_checks<R: Robot + ?Sized>(&mut self, robot: &R) {
         if self.mode == Mode::Disarmed {
@@ -270,6 +297,7 @@ impl Cycle {
                 state_age_ms: self.state_age_ms,
                 link: robot.link(),
                 history: &self.arming_history,
+                consistency: &self.consistency,
             };
             self.findings = arming::findings(&inputs, &self.settings);
         }

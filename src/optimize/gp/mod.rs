@@ -9,6 +9,9 @@
 //! space. So a fall enters the regression with the lower quartile of the values without a fall (padding, as Wakabayashi
 //! et al., "Bayesian optimization with experimental failure", npj Comput. Mater. 8, 180, 2022, who take the worst value);
 //! the classifier learns the position of the cliff.
+//!
+//! A void trial gives no value, so the acquisition is reduced around its point (local penalization, Gonzalez et al., "Batch
+//! Bayesian optimization via local penalization", AISTATS 2016).
 
 pub mod ascent;
 pub mod falls;
@@ -21,7 +24,7 @@ use super::space::Parameter;
 use super::trial::TrialState;
 use super::truncnorm::{HALF_LN_TWO_PI, log_cdf};
 use falls::StandProbability;
-use libm::{exp, log, log1p};
+use libm::{exp, expm1, log, log1p};
 use process::GaussianProcess;
 
 /// Points over the whole space at which the acquisition is evaluated.
@@ -32,6 +35,8 @@ const CLOUD: u32 = 32;
 const CLOUD_WIDTHS: [f64; 3] = [0.2, 0.05, 0.01];
 /// Number of best trials that are centres.
 const CENTRES: usize = 3;
+/// Distance from a void trial, in units of the cube, at which the acquisition is reduced to 0.39 of its value.
+const VOID_RADIUS: f64 = 0.1;
 /// Number of best points from which the gradient ascent starts.
 const CLIMBS: usize = 6;
 
@@ -56,6 +61,7 @@ pub fn propose(ask: &Ask<'_>, streams: &mut Streams) -> Candidate {
 }
 
 /// The trials as points of the unit cube.
+#[derive(Default)]
 struct TrainingSet {
     /// Points of all observed trials.
     points: Vec<Vec<f64>>,
@@ -65,11 +71,13 @@ struct TrainingSet {
     values: Vec<f64>,
     /// Points of running trials.
     pending: Vec<Vec<f64>>,
+    /// Points of void trials.
+    void: Vec<Vec<f64>>,
 }
 
 impl TrainingSet {
     fn gather(ask: &Ask<'_>) -> Self {
-        let mut set = TrainingSet { points: Vec::new(), stood: Vec::new(), values: Vec::new(), pending: Vec::new() };
+        let mut set = TrainingSet::default();
         for trial in ask.trials {
             let coordinate = |p: &Parameter| trial.parameter(&p.name).map(|v| p.range.scale(v));
             let Some(point) = ask.space.parameters().iter().map(coordinate).collect::<Option<Vec<f64>>>() else {
@@ -77,6 +85,7 @@ impl TrainingSet {
             };
             match (trial.state, trial.value) {
                 (TrialState::Running, _) => set.pending.push(point),
+                (TrialState::Fail, _) => set.void.push(point),
                 (TrialState::Complete, Some(value)) if value.is_finite() && trial.violation() <= 0.0 => {
                     set.points.push(point);
                     set.stood.push(!trial.is_fall());
@@ -109,6 +118,8 @@ struct Acquisition {
     incumbent: f64,
     /// The observed points of largest expected value.
     centres: Vec<Vec<f64>>,
+    /// Points of void trials.
+    void: Vec<Vec<f64>>,
 }
 
 impl Acquisition {
@@ -120,14 +131,22 @@ impl Acquisition {
         let centres = ranked.iter().take(CENTRES).map(|(_, p)| (*p).clone()).collect();
         let stand_probability = StandProbability::fit(&training.points, &training.stood);
         let process = process.believing(&training.pending)?;
-        Some(Acquisition { process, stand_probability, incumbent, centres })
+        Some(Acquisition { process, stand_probability, incumbent, centres, void: training.void.clone() })
     }
 
-    /// ln EI(x) + ln P(stands at x)
+    /// ln EI(x) + ln P(stands at x) + sum over void points v of ln(1 - exp(-|x - v|^2 / 2 r^2))
     fn value(&self, x: &[f64]) -> f64 {
         let (mean, deviation) = self.process.predict(x);
         let probability = self.stand_probability.as_ref().map_or(1.0, |s| s.probability(x));
-        log(deviation) + log_improvement((mean - self.incumbent) / deviation) + log(probability)
+        log(deviation) + log_improvement((mean - self.incumbent) / deviation) + log(probability) + self.log_distance(x)
+    }
+
+    fn log_distance(&self, x: &[f64]) -> f64 {
+        let away = |v: &Vec<f64>| {
+            let squared: f64 = x.iter().zip(v).map(|(x, v)| (x - v) * (x - v)).sum();
+            log((-expm1(-0.5 * squared / (VOID_RADIUS * VOID_RADIUS))).max(1e-300))
+        };
+        self.void.iter().map(away).sum()
     }
 
     /// Returns the point of the box with the largest acquisition. Takes one double per coordinate.

@@ -18,6 +18,8 @@ pub enum JournalError {
         path.display()
     )]
     Shortened { path: PathBuf, had: u64, has: u64 },
+    #[error("{}: another program holds the lock of the study; the wait was ended, nothing was written", lock.display())]
+    Interrupted { lock: PathBuf },
     /// The address has no password.
     #[error("cannot {action} the journal on the Redis server {address}: {source}")]
     Redis { action: &'static str, address: String, source: ::redis::RedisError },

@@ -15,7 +15,7 @@ mod state;
 pub(super) use self::redis::JournalRedis;
 pub use error::JournalError;
 use file::UnreadTail;
-pub use file::{Durability, JournalFile, LOCK_GRACE};
+pub use file::{Durability, JournalFile, LOCK_GRACE, LockWait};
 pub use operation::{AttributeKind, Operation};
 pub use state::{Applied, JournalState, StudyRecord};
 
@@ -71,6 +71,14 @@ impl Journal {
     /// Identity of this writer, unique per opened journal.
     pub fn worker(&self) -> &str {
         &self.worker
+    }
+
+    /// Returns the wait for the lock of the journal's file.
+    pub fn lock_wait(&self) -> LockWait {
+        match &self.backend {
+            JournalBackend::File(file) => file.lock_wait().clone(),
+            JournalBackend::Memory | JournalBackend::Redis(_) => LockWait::default(),
+        }
     }
 
     /// Reads the lines of other writers.

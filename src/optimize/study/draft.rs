@@ -75,7 +75,8 @@ impl Study {
         let before = self.streams.draws();
         let mut streams = self.streams.clone();
         let StudyOptions { sampler, space, direction, .. } = &self.options;
-        let ask = Ask { config: sampler, trials, space, fixed: &given, direction: *direction };
+        let inside = self.inside.as_ref().unwrap_or(space);
+        let ask = Ask { config: sampler, trials, space: inside, fixed: &given, direction: *direction };
         let candidate = propose(&ask, &mut streams);
         let suggest = |(p, value): (&Parameter, f64)| SuggestedParameter {
             name: p.name.clone(),

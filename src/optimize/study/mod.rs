@@ -20,7 +20,9 @@ pub use storage::Storage;
 pub use workers::worker_seed;
 
 use crate::optimize::ask::{Direction, SamplerConfig, Streams};
-use crate::optimize::journal::{Applied, AttributeKind, Durability, Journal, JournalError, Operation, StudyRecord};
+use crate::optimize::journal::{
+    Applied, AttributeKind, Durability, Journal, JournalError, LockWait, Operation, StudyRecord,
+};
 use crate::optimize::repeats;
 use crate::optimize::space::Space;
 use crate::optimize::trial::{Trial, TrialState};
@@ -75,6 +77,8 @@ pub struct Study {
     id: usize,
     options: StudyOptions,
     streams: Streams,
+    /// Part of the search space in which points are drawn; none for the whole space.
+    inside: Option<Space>,
 }
 
 impl Study {
@@ -90,10 +94,15 @@ impl Study {
         }
         let Some(id) = journal.state().find(&options.name) else { return Err(StudyError::Gone(options.name)) };
         let streams = Streams::new(options.sampler.seed);
-        let mut study = Study { journal, id, options, streams };
+        let mut study = Study { journal, id, options, streams, inside: None };
         study.check_compatible()?;
         study.streams.advance_to(study.draws_so_far());
         Ok(study)
+    }
+
+    /// Returns the wait for the lock of the journal's file.
+    pub fn lock_wait(&self) -> LockWait {
+        self.journal.lock_wait()
     }
 
     /// Reads the lines of other writers.
@@ -105,7 +114,7 @@ impl Study {
     /// after the same changes.
     pub fn fork(&self) -> Study {
         let (options, streams) = (self.options.clone(), self.streams.clone());
-        Study { journal: self.journal.fork(), id: self.id, options, streams }
+        Study { journal: self.journal.fork(), id: self.id, options, streams, inside: self.inside.clone() }
     }
 
     /// Replaces the search space; only bounds may differ. As in Optuna, a parameter whose bounds have changed leaves the
@@ -114,6 +123,12 @@ impl Study {
     pub fn search(&mut self, space: Space) -> Result<(), StudyError> {
         let before = std::mem::replace(&mut self.options.space, space);
         self.check_compatible().inspect_err(|_| self.options.space = before)
+    }
+
+    /// Draws the next points inside `space`, a part of the search space with the same parameters. Unlike the bounds of
+    /// [`Study::search`] it is not stored with the trials, so the joint space of TPE stays as it is.
+    pub fn draw_inside(&mut self, space: Space) {
+        self.inside = Some(space);
     }
 
     /// All trials in the order of their numbers.

@@ -205,6 +205,7 @@ impl Link {
             self.arrived = 1;
             true
         } else {
+            self.status.older_by_ms = older_by;
             let bit = 1u64.checked_shl(older_by).unwrap_or(0);
             if self.arrived & bit != 0 {
                 self.status.duplicate += 1;

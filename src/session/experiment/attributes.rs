@@ -8,11 +8,13 @@ use serde::de::{DeserializeOwned, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::{Map, Value};
 
+use super::plan::ExperimentPlan;
 use crate::optimize::ask::SamplerConfig;
 use crate::optimize::study::{DRAWS, Outcome};
 use crate::optimize::trial::{Trial, TrialState};
 use crate::trial::{
-    FallRisk, MeasuredJump, ParameterInfo, ParameterValues, Proposal, ProposalSource, Task, TrialRecord, Verdict,
+    Backend, FallRisk, MeasuredJump, ParameterInfo, ParameterValues, Proposal, ProposalSource, Task, TrialRecord,
+    Verdict,
 };
 
 /// Attributes in the order in which they are written.
@@ -27,6 +29,13 @@ pub struct NewStudyAttributes<'a> {
     pub sampler: &'a SamplerConfig,
     pub version: &'static str,
     pub budget: u32,
+    pub backend: &'a str,
+}
+
+/// The backend on which a study was continued last.
+#[derive(Debug, Serialize)]
+pub struct BackendAttribute {
+    pub backend: &'static str,
 }
 
 /// The budget of a study, for workers that join it and sessions that continue it.
@@ -42,6 +51,8 @@ pub struct StudyAttributes {
     pub robot: Option<String>,
     pub seed: Option<u32>,
     pub budget: Option<u32>,
+    /// The backend on which it was made or continued last; none for a study of an earlier version, which was simulated.
+    pub backend: Option<String>,
     /// Bounds that the operator has changed, `{"Fx": [40, 110]}`.
     pub bounds: Option<BTreeMap<String, [f64; 2]>>,
     /// Fixed parameters, `{"Fx": {"value": 60, "trials": 5, "from": 12}}`.
@@ -159,6 +170,9 @@ pub struct BeganAttributes {
     origin: Origin,
     version: &'static str,
     worker: u32,
+    /// None on the simulator.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    backend: Option<&'static str>,
     #[serde(skip_serializing_if = "String::is_empty")]
     recording: String,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -168,21 +182,16 @@ pub struct BeganAttributes {
 }
 
 impl BeganAttributes {
-    /// Returns the attributes of a trial of `proposal`. `recording` is empty where the trial is not recorded; `fixed`
-    /// holds the parameters that the operator had fixed for some trials.
-    pub fn new(
-        proposal: &Proposal,
-        seed: u64,
-        worker: u32,
-        recording: &str,
-        fixed: ParameterValues,
-    ) -> BeganAttributes {
+    /// Returns the attributes of a trial of `proposal`; `fixed` holds the parameters that the operator had fixed for some
+    /// trials.
+    pub fn new(proposal: &Proposal, seed: u64, plan: &ExperimentPlan, fixed: ParameterValues) -> BeganAttributes {
         let gains = proposal.gains.iter().map(|gain| (gain.name.clone(), gain.value)).collect();
         BeganAttributes {
             origin: Origin { source: proposal.source, parent: proposal.parent, seed: Some(seed.to_string()), gains },
             version: env!("CARGO_PKG_VERSION"),
-            worker,
-            recording: recording.to_owned(),
+            worker: plan.worker,
+            backend: (plan.backend != Backend::Simulator).then(|| plan.backend.name()),
+            recording: plan.recording.clone(),
             risk: proposal.risk,
             fixed,
         }
@@ -234,6 +243,8 @@ pub struct InterruptedAttributes<'a> {
 pub struct TrialAttributes {
     /// The worker that runs it: 0 is the session that has the study's folder.
     pub worker: Option<u32>,
+    /// The robot on which it ran; none on the simulator.
+    pub backend: Option<String>,
     pub risk: Option<FallRisk>,
     /// Parameters that the operator had fixed for some trials.
     #[serde(deserialize_with = "numbers")]
@@ -266,7 +277,7 @@ impl TrialAttributes {
 
 /// Returns the attributes that hold in another study, too: without numbers of trials and workers, without a re-run.
 pub fn elsewhere(mut attributes: Map<String, Value>) -> Map<String, Value> {
-    for name in ["parent", "worker", "rerun", "interrupted"] {
+    for name in ["parent", "worker", "backend", "rerun", "interrupted"] {
         attributes.remove(name);
     }
     attributes

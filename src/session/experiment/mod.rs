@@ -7,6 +7,8 @@
 
 pub(crate) mod attributes;
 mod confirmation;
+mod envelope;
+mod judging;
 mod liveness;
 mod pending_proposal;
 mod plan;
@@ -19,20 +21,19 @@ pub use self::plan::{ExperimentPlan, RequestRefusal};
 
 use std::collections::BTreeMap;
 
-use self::attributes::JudgedAttributes;
 use self::confirmation::{BestConfirmation, NextRepeat};
 use self::pending_proposal::PendingProposal;
 use self::plan::not_now;
 use self::queue::TrialQueue;
 use self::search::SearchSettings;
-use super::objective;
 use crate::optimize::ask::Direction;
 use crate::optimize::exchange::TableTrial;
+use crate::optimize::journal::LockWait;
 use crate::optimize::repeats::{RepeatedPoint, improvements, points};
 use crate::optimize::study::{Outcome, Study, StudyError};
 use crate::optimize::trial::TrialState;
 use crate::recording::record::{LogLevel, LogRecord, Record, StageRecord};
-use crate::telemetry::{Tick, TrialEnd, TrialSpec};
+use crate::telemetry::TrialSpec;
 use crate::trial::{ExperimentStage, ParameterInfo, Proposal, ProposalSource, SearchStatus, TrialRecord, Verdict};
 
 /// A verdict that can still be undone.
@@ -72,6 +73,8 @@ pub struct Experiment {
     confirmation: BestConfirmation,
     outbox: Vec<Record>,
     published_search: Option<SearchStatus>,
+    /// Share of the force bounds that the next trial may use.
+    hop_share: Option<f64>,
 }
 
 impl Experiment {
@@ -90,6 +93,7 @@ impl Experiment {
             search: SearchSettings::default(),
             outbox: Vec::new(),
             published_search: None,
+            hop_share: None,
         };
         let log = experiment.queue.close_interrupted(&mut experiment.study)?;
         experiment.log_all(log);
@@ -206,101 +210,6 @@ impl Experiment {
         Ok(())
     }
 
-    /// Measures the trial that has ended; it waits for its verdict then. `recorded` is its number of ticks: if some are
-    /// missing in `ticks`, nothing is measured.
-    pub fn ended(&mut self, trial: u32, end: &TrialEnd, ticks: &[Tick], recorded: u64) {
-        if !matches!(self.state, ExperimentState::Running(running) if running == trial) {
-            return;
-        }
-        let (mut suggested, mut cause) = objective::suggest(end);
-        let missing = recorded.saturating_sub(ticks.len() as u64);
-        if missing > 0 {
-            (suggested, cause) = (Verdict::Void, format!("{missing} ticks of it were not recorded: not measured"));
-        }
-        if let Some(row) = self.rows.get_mut(&trial) {
-            row.measured = if missing == 0 { objective::measure(ticks) } else { None };
-            row.suggested = Some(suggested);
-            row.cause = cause;
-            row.value = value_of(row, suggested, &self.plan);
-        }
-        self.publish_row(trial);
-        self.enter(ExperimentState::Review(trial), trial);
-    }
-
-    /// Judges the trial under review; with `rerun` its parameters are queued again.
-    /// Refused when no trial is under review or an accepted trial has no value.
-    pub fn judge(&mut self, verdict: Verdict, rerun: bool) -> Result<(), RequestRefusal> {
-        let trial = self.reviewed()?;
-        let Some(row) = self.rows.get_mut(&trial) else { return not_now(NOT_UNDER_REVIEW) };
-        let value = value_of(row, verdict, &self.plan);
-        let outcome = match (verdict, value) {
-            (Verdict::Void, _) => Outcome::Fail,
-            (_, Some(value)) => Outcome::Complete(value),
-            (_, None) => {
-                return not_now("nothing was measured in this trial; enter a value measured by hand, or judge it void");
-            }
-        };
-        let suggestion = row.clone();
-        row.verdict = Some(verdict);
-        row.value = value;
-        if let Some(suggested) = row.suggested.filter(|suggested| *suggested != verdict) {
-            row.cause = format!("by the operator; looked like {}: {}", suggested.name(), row.cause);
-        }
-        match self.write_judgement(trial, rerun) {
-            // Another worker has closed the trial as abandoned, or another program has ended it.
-            Err(StudyError::State { .. }) => {
-                self.rows.remove(&trial);
-                self.state = ExperimentState::Finished;
-                self.propose()?;
-                return Err(RequestRefusal::EndedElsewhere(trial));
-            }
-            Err(error) => {
-                self.rows.insert(trial, suggestion);
-                return Err(error.into());
-            }
-            Ok(()) => {}
-        }
-        self.publish_row(trial);
-        self.pending = Some(PendingVerdict { suggestion, outcome, rerun });
-        self.propose()?;
-        Ok(())
-    }
-
-    /// Takes the last verdict back.
-    /// Refused when it was reported already.
-    pub fn undo(&mut self) -> Result<(), RequestRefusal> {
-        let Some(pending) = self.pending.as_ref().filter(|_| self.is_idle()) else {
-            return not_now("there is no verdict to undo; the last one became final when the next trial began");
-        };
-        let mut row = pending.suggestion.clone();
-        let trial = row.trial;
-        if let Some(judged) = self.rows.get(&trial) {
-            row.note.clone_from(&judged.note);
-        }
-        // If this fails, the verdict stands on the disk and must still be reported.
-        self.study.annotate(trial, &attributes::write(&JudgedAttributes::of(&row, false)))?;
-        self.pending = None;
-        self.rows.insert(trial, row);
-        self.publish_row(trial);
-        self.enter(ExperimentState::Review(trial), trial);
-        Ok(())
-    }
-
-    /// Uses a value measured by hand for the trial under review; none returns to the measured one.
-    /// Refused when no trial is under review or the value is not finite.
-    pub fn set_hand_value(&mut self, value: Option<f64>) -> Result<(), RequestRefusal> {
-        let trial = self.reviewed()?;
-        if value.is_some_and(|value| !value.is_finite()) {
-            return not_now("a measured value must be a finite number");
-        }
-        if let Some(row) = self.rows.get_mut(&trial) {
-            row.hand_value = value;
-            row.value = row.suggested.and_then(|suggested| value_of(row, suggested, &self.plan));
-        }
-        self.publish_row(trial);
-        Ok(())
-    }
-
     /// Takes in the changes of other programs: their trials join the table, and a point that they have queued is proposed
     /// next if the operator has not changed the proposal. To be called regularly.
     pub fn refresh(&mut self) -> Result<(), RequestRefusal> {
@@ -333,21 +242,25 @@ impl Experiment {
         Ok(())
     }
 
-    /// Ends the session during a review: a trial that is to be void by the rules (stopped, or its operator is gone) is void
-    /// with its cause, and its parameters are queued again as after a crash. Any other waits for its verdict until the
-    /// study is opened again.
-    pub fn void_unreviewed(&mut self) -> Result<(), StudyError> {
-        let ExperimentState::Review(trial) = self.state else { return Ok(()) };
-        let Some(row) = self.rows.get_mut(&trial).filter(|row| row.suggested == Some(Verdict::Void)) else {
+    /// Returns the wait of this experiment for the lock of its study.
+    pub fn lock_wait(&self) -> LockWait {
+        self.study.lock_wait()
+    }
+
+    /// Voids a trial that was approved and not run, for `cause`, and queues its parameters again.
+    pub fn withdraw(&mut self, trial: u32, cause: &str) -> Result<(), RequestRefusal> {
+        if !matches!(self.state, ExperimentState::Running(running) if running == trial) {
             return Ok(());
-        };
-        row.verdict = Some(Verdict::Void);
-        let cause = row.cause.clone();
+        }
+        let log = self.queue.close(&mut self.study, trial, cause)?;
+        self.log_all(log);
+        if let Some(row) = self.rows.get_mut(&trial) {
+            row.verdict = Some(Verdict::Void);
+            row.cause = cause.to_owned();
+        }
         self.publish_row(trial);
         self.state = ExperimentState::Finished;
-        let log = self.queue.close(&mut self.study, trial, &cause)?;
-        self.log_all(log);
-        Ok(())
+        Ok(self.propose()?)
     }
 
     /// Reports the pending verdict: the session ends.
@@ -357,20 +270,6 @@ impl Experiment {
 
     fn is_idle(&self) -> bool {
         matches!(self.state, ExperimentState::Proposed(_) | ExperimentState::Finished)
-    }
-
-    fn reviewed(&self) -> Result<u32, RequestRefusal> {
-        match self.state {
-            ExperimentState::Review(trial) => Ok(trial),
-            _ => not_now(NOT_UNDER_REVIEW),
-        }
-    }
-
-    fn write_judgement(&mut self, trial: u32, rerun: bool) -> Result<(), StudyError> {
-        match self.rows.get(&trial) {
-            Some(row) => self.study.annotate(trial, &attributes::write(&JudgedAttributes::of(row, rerun))),
-            None => Ok(()),
-        }
     }
 
     /// Adds the trials that other programs have run or are running to the table.
@@ -413,8 +312,6 @@ impl Experiment {
     }
 }
 
-const NOT_UNDER_REVIEW: &str = "no trial is under review";
-
 /// Returns the trial table of a stored study: every trial but those that wait.
 pub fn rows_of(study: &Study, order: &[ParameterInfo]) -> Vec<TrialRecord> {
     let begun = study.trials().iter().filter(|trial| trial.state != TrialState::Waiting);
@@ -428,16 +325,4 @@ pub fn import(study: &mut Study, trials: Vec<TableTrial>) -> Result<Vec<u32>, St
         .map(|trial| TableTrial { attributes: attributes::elsewhere(trial.attributes), ..trial })
         .collect();
     study.import(&trials)
-}
-
-/// Returns the value of a row with a verdict: 0 for a fall (paper, section II-D), none for void, else the value measured by
-/// hand or by the robot.
-fn value_of(row: &TrialRecord, verdict: Verdict, plan: &ExperimentPlan) -> Option<f64> {
-    match verdict {
-        Verdict::Fall => Some(0.0),
-        Verdict::Void => None,
-        Verdict::Accept => row.hand_value.or_else(|| {
-            row.measured.as_ref().map(|measured| objective::value(plan.task, measured, plan.control.jumps))
-        }),
-    }
 }

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use crate::control::settings::TaskControl;
 use crate::optimize::study::StudyError;
-use crate::trial::{ParameterInfo, Task};
+use crate::trial::{Backend, HopEnvelope, ParameterInfo, Task};
 
 /// Refusal of a request, as a message for the operator.
 #[derive(Debug, thiserror::Error)]
@@ -51,4 +51,7 @@ pub struct ExperimentPlan {
     pub worker: u32,
     /// Time without news after which a running trial of another worker counts as abandoned.
     pub abandoned: Duration,
+    pub backend: Backend,
+    /// Growth of the largest forces; none where the whole bounds are open.
+    pub envelope: Option<HopEnvelope>,
 }

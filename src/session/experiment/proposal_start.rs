@@ -2,6 +2,7 @@
 
 use super::attributes::{self, BeganAttributes, Origin};
 use super::confirmation::{self, NextRepeat};
+use super::envelope;
 use super::pending_proposal::{ApprovedProposal, PendingProposal};
 use super::plan::{RequestRefusal, not_now};
 use super::search::SearchSettings;
@@ -12,7 +13,7 @@ use crate::optimize::trial::Trial;
 use crate::recording::record::Record;
 use crate::telemetry::TrialSpec;
 use crate::trial::{
-    Gains, JumpParameters, ParameterInfo, ParameterValues, ProposalSource, ProposedParameter, TrialRecord,
+    Gains, JumpParameters, ParameterInfo, ParameterValues, ProposalSource, ProposedParameter, SearchStatus, TrialRecord,
 };
 
 impl Experiment {
@@ -41,6 +42,12 @@ impl Experiment {
         if self.pending.is_none() {
             self.confirmation.write_conclusion(&mut self.study)?;
         }
+        self.hop_share = envelope::share(&self.plan, study.trials());
+        if let Some(inside) =
+            self.hop_share.and_then(|share| envelope::inside(&study.options().space, &self.plan, share))
+        {
+            study.draw_inside(inside);
+        }
         self.outbox.extend(self.confirmation.changed_points(&study).map(Record::Points));
         self.publish_search(&study);
         let confirms = study.waiting().next().is_some_and(attributes::confirms);
@@ -64,7 +71,7 @@ impl Experiment {
     }
 
     /// Returns the reason for which the proposal cannot run, or none. Other programs may queue any values, and bounds may have
-    /// become narrower since.
+    /// become narrower since; a re-run is held to the present ones.
     pub fn refusal(&self) -> Option<String> {
         let proposal = self.proposal()?;
         let beyond = |list: &[ProposedParameter], ranges: &[ParameterInfo], what| {
@@ -72,6 +79,15 @@ impl Experiment {
         };
         beyond(&proposal.parameters, &self.plan.widest, "parameter")
             .or_else(|| beyond(&proposal.gains, &self.plan.gains, "gain"))
+            .or_else(|| {
+                let rerun = proposal.source == ProposalSource::Rerun;
+                rerun.then(|| beyond(&proposal.parameters, &self.search.parameters(&self.plan), "parameter"))?
+            })
+            .or_else(|| {
+                let inside =
+                    |p: &ProposedParameter| envelope::must_be_inside(&self.plan, self.hop_share, &p.name, p.value);
+                proposal.parameters.iter().find_map(|p| inside(p).err())
+            })
             .map(|refusal| refusal.to_string())
     }
 
@@ -125,7 +141,7 @@ impl Experiment {
         }
         let worker = self.plan.worker;
         let seed = origin.seed().unwrap_or_else(|| trial_seed(self.plan.seed, worker, draft.number));
-        let began = BeganAttributes::new(&proposal, seed, worker, &self.plan.recording, fixed);
+        let began = BeganAttributes::new(&proposal, seed, &self.plan, fixed);
         let beyond_budget = [proposal.source, origin.source].contains(&ProposalSource::Confirm);
         let (queue, budget) = (&self.queue, self.plan.budget);
         let room = |trials: &[Trial]| beyond_budget || queue.occupied(trials) < budget;
@@ -150,7 +166,10 @@ impl Experiment {
         };
         if !row.note.is_empty() {
             // The sampler learns from this trial like from any other; the note shows that the controller differed.
-            self.study.note(number, &row.note)?;
+            // Without it the trial has begun all the same: it must run.
+            if let Err(error) = self.study.note(number, &row.note) {
+                self.log(format!("the note of trial {number} could not be written: {error}"));
+            }
         }
         self.rows.insert(number, row);
         self.publish_row(number);
@@ -186,7 +205,10 @@ impl Experiment {
     /// Publishes the search if it has changed.
     pub fn publish_search(&mut self, study: &Study) {
         let confirming = self.confirmation.repeats_left(study);
-        let search = self.search.status(&self.plan, self.counted(), study.trials(), confirming);
+        let search = SearchStatus {
+            hop_share: self.hop_share,
+            ..self.search.status(&self.plan, self.counted(), study.trials(), confirming)
+        };
         if self.published_search.as_ref() != Some(&search) {
             self.published_search = Some(search.clone());
             self.outbox.push(Record::Search(search));

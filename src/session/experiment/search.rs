@@ -114,6 +114,6 @@ impl SearchSettings {
             }
         };
         let parameters = self.parameters(plan).into_iter().map(searched).collect();
-        SearchStatus { budget: plan.budget, counted, parameters, confirming }
+        SearchStatus { budget: plan.budget, counted, parameters, confirming, hop_share: None }
     }
 }

@@ -4,7 +4,7 @@
 use super::attributes::{self, BudgetAttribute, Origin};
 use super::pending_proposal::PendingProposal;
 use super::plan::{RequestRefusal, not_now};
-use super::{Experiment, ExperimentState, confirmation};
+use super::{Experiment, ExperimentState, confirmation, envelope};
 use crate::trial::{ParameterInfo, ProposalSource};
 
 impl Experiment {
@@ -13,6 +13,7 @@ impl Experiment {
     pub fn set_parameter(&mut self, name: &str, value: f64) -> Result<(), RequestRefusal> {
         self.change_pending()?;
         must_be_within(&self.search.parameters(&self.plan), "parameter", name, value)?;
+        envelope::must_be_inside(&self.plan, self.hop_share, name, value)?;
         let revision = self.next_revision();
         self.change_pending()?.set(name, value, revision);
         self.publish_proposal();
@@ -53,6 +54,7 @@ impl Experiment {
         self.must_be_idle()?;
         let bounds = self.search.parameters(&self.plan);
         must_be_within(&bounds, "parameter", name, value)?;
+        envelope::must_be_inside(&self.plan, self.hop_share, name, value)?;
         if trials == 0 {
             return not_now("fix it for one trial at least");
         }
@@ -114,27 +116,35 @@ impl Experiment {
     }
 
     /// Queues the parameters of an earlier trial again, with its gains.
-    /// Refused when there is no such trial or a trial is under way.
+    /// Refused when there is no such trial, a value is outside its present bounds, or a trial is under way.
     pub fn repeat(&mut self, trial: u32) -> Result<(), RequestRefusal> {
         let Some(row) = self.rows.get(&trial) else { return not_now(format!("there is no trial {trial}")) };
         let parameters = row.parameters.clone();
         let origin = Origin::rerun_of(trial, row.source, row.gains.clone());
+        self.must_be_allowed(&parameters, &origin.gains)?;
         self.queue(&parameters, &origin)
     }
 
     /// Queues a point, which may hold gains, too; the parameters that it lacks are proposed when it is its turn.
     /// Refused when a value is outside its bounds or a trial is under way.
     pub fn enqueue(&mut self, point: &[(String, f64)]) -> Result<(), RequestRefusal> {
-        let bounds = self.search.parameters(&self.plan);
         let is_gain = |(name, _): &(String, f64)| self.plan.gains.iter().any(|gain| gain.name == *name);
         let (gains, parameters): (Vec<_>, Vec<_>) = point.iter().cloned().partition(is_gain);
-        for (name, value) in &parameters {
+        self.must_be_allowed(&parameters, &gains)?;
+        self.queue(&parameters, &Origin { gains: gains.into(), ..Origin::new(ProposalSource::Queued) })
+    }
+
+    /// Refuses a point with a value outside its present bounds.
+    fn must_be_allowed(&self, parameters: &[(String, f64)], gains: &[(String, f64)]) -> Result<(), RequestRefusal> {
+        let bounds = self.search.parameters(&self.plan);
+        for (name, value) in parameters {
             must_be_within(&bounds, "parameter", name, *value)?;
+            envelope::must_be_inside(&self.plan, self.hop_share, name, *value)?;
         }
-        for (name, value) in &gains {
+        for (name, value) in gains {
             must_be_within(&self.plan.gains, "gain", name, *value)?;
         }
-        self.queue(&parameters, &Origin { gains: gains.into(), ..Origin::new(ProposalSource::Queued) })
+        Ok(())
     }
 
     fn queue(&mut self, parameters: &[(String, f64)], origin: &Origin) -> Result<(), RequestRefusal> {

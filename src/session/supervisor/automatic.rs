@@ -1,6 +1,7 @@
 //! Steps of the automatic rule.
 
 use super::Supervisor;
+use super::jobs::Asker;
 use super::unattended::Unattended;
 use crate::recording::record::LogLevel;
 use crate::session::operator_request::{OperatorRequest, StampedRequest};
@@ -17,22 +18,21 @@ impl Supervisor {
     /// Takes the next step, if the rule allows one.
     pub fn act_unattended(&mut self, time_ns: u64) {
         let Unattended { approval, simulated, paused, arming, retry_ns, .. } = self.unattended;
-        if approval == Approval::Each || paused || self.observe || self.ended.is_some() {
+        if approval == Approval::Each || paused || self.observe || self.ended.is_some() || !self.unfinished.is_empty() {
             return;
         }
         let auto = approval == Approval::Auto && simulated;
         let stops = self.control.stop.count();
-        let step = match self.experiment.stage() {
+        let step = match self.experiment.view().stage {
             ExperimentStage::Review => {
-                let suggested = self.experiment.under_review().and_then(|row| row.suggested).unwrap_or(Verdict::Void);
+                let suggested = self.experiment.view().suggested.unwrap_or(Verdict::Void);
                 // A trial that was cancelled or stopped waits for a person under every rule.
                 let judged = if auto { suggested != Verdict::Void } else { suggested == Verdict::Accept };
                 judged.then_some(OperatorRequest::Judge(suggested))
             }
-            ExperimentStage::Proposed if self.mode == Mode::Ready && simulated => self
-                .experiment
-                .proposal()
-                .map(|proposal| OperatorRequest::Approve { trial: proposal.trial, revision: proposal.revision }),
+            ExperimentStage::Proposed if self.mode == Mode::Ready && simulated => {
+                self.experiment.view().proposal.map(|(trial, revision)| OperatorRequest::Approve { trial, revision })
+            }
             ExperimentStage::Proposed if self.mode == Mode::Disarmed && auto && !arming && time_ns >= retry_ns => {
                 Some(OperatorRequest::Arm)
             }
@@ -41,11 +41,18 @@ impl Supervisor {
         let Some(request) = step else { return };
         self.unattended.arming = request == OperatorRequest::Arm;
         let stamped = StampedRequest { request, stops, time_ns };
-        match self.answer(&stamped) {
-            Ok(answer) => {
-                self.log(LogLevel::Info, format!("{}: {}: {answer}", approval.name(), stamped.request), time_ns);
-            }
-            Err(reason) if stamped.request == OperatorRequest::Arm => {
+        if let Some(answer) = self.answer(&stamped, Asker::Rule, time_ns) {
+            self.respond(&stamped, Asker::Rule, answer, time_ns);
+        }
+        self.finish_jobs(time_ns);
+    }
+
+    /// Takes in the answer to a request of the rule.
+    pub(super) fn rule_answered(&mut self, request: &OperatorRequest, answer: Result<String, String>, time_ns: u64) {
+        let approval = self.unattended.approval;
+        match answer {
+            Ok(answer) => self.log(LogLevel::Info, format!("{}: {request}: {answer}", approval.name()), time_ns),
+            Err(reason) if *request == OperatorRequest::Arm => {
                 self.unattended.arming_refused(time_ns);
                 if self.unattended.refused != reason {
                     self.log(LogLevel::Info, format!("{} cannot arm yet: {reason}", approval.name()), time_ns);
@@ -57,6 +64,5 @@ impl Supervisor {
                 self.log(LogLevel::Warning, format!("{} waits for a person: {reason}", approval.name()), time_ns);
             }
         }
-        self.publish_experiment(time_ns);
     }
 }

@@ -2,24 +2,27 @@
 //! records to the console and the recording. Every request is answered: carried out, or refused with the reason.
 
 mod automatic;
+mod jobs;
 mod request_handler;
 mod standing;
+mod study_requests;
 mod unattended;
 
 use std::collections::VecDeque;
 use std::sync::mpsc::{Receiver, Sender};
 
 use super::arming_checklist::ArmingChecklist;
-use super::experiment::Experiment;
+use super::experiment::{Experiment, RequestRefusal};
 use super::operator_request::{OperatorRequest, StampedRequest};
+use super::storage::{ExperimentQueue, JobOutput};
+use crate::control::settings::ApprovalLimits;
 use crate::realtime::channel::SessionEnd;
 use crate::realtime::scheduling::{DeniedSetting, RealtimeSetting};
-use crate::recording::record::{
-    ArmingCheckRecord, LogLevel, LogRecord, Record, RequestRecord, SessionInfo, Stamped, Transition,
-};
+use crate::recording::record::{ArmingCheckRecord, LogLevel, LogRecord, Record, SessionInfo, Stamped, Transition};
 use crate::recording::recorder::{CollectedTicks, RecorderWatch, TrialTicks};
 use crate::telemetry::{Command, CommandRefusal, Event, Mode, TransitionCause, TrialEnd};
 use crate::trial::ExperimentStage;
+use jobs::{Asker, JobPurpose, UnfinishedJob};
 use unattended::Unattended;
 
 /// Period of the counters' records, ns.
@@ -61,6 +64,7 @@ pub struct SupervisorParts {
     pub sinks: RecordSinks,
     pub recorder: RecorderWatch,
     pub checklist: ArmingChecklist,
+    pub approval: ApprovalLimits,
     /// The session's record for the console; the recording begins with it already.
     pub info: SessionInfo,
 }
@@ -77,7 +81,13 @@ struct Ended {
 
 /// The session.
 pub struct Supervisor {
-    experiment: Experiment,
+    experiment: ExperimentQueue,
+    /// Jobs on the experiment whose results were not taken yet, oldest first.
+    unfinished: VecDeque<UnfinishedJob>,
+    /// Time at which the job was given whose wait was logged, ns.
+    waited_since_ns: Option<u64>,
+    storage_lost: bool,
+    closing: bool,
     control: SessionEnd,
     ticks: Receiver<CollectedTicks>,
     sinks: RecordSinks,
@@ -103,6 +113,9 @@ pub struct Supervisor {
     heartbeats: u64,
     counters_ns: u64,
     checklist: ArmingChecklist,
+    approval: ApprovalLimits,
+    /// Presses of sit down and cancel that were answered.
+    lowerings_answered: [u64; 2],
     /// The checklist as it was published last, and its time.
     published_checklist: Vec<ArmingCheckRecord>,
     checklist_ns: u64,
@@ -113,10 +126,16 @@ pub struct Supervisor {
 impl Supervisor {
     /// Starts the session of an experiment.
     pub fn new(parts: SupervisorParts, time_ns: u64) -> Supervisor {
-        let SupervisorParts { experiment, control, ticks, sinks, recorder, checklist, info } = parts;
+        let SupervisorParts { experiment, control, ticks, sinks, recorder, checklist, approval, info } = parts;
         let observe = info.observe;
+        let mut experiment = experiment;
+        let records = experiment.take_records();
         let mut supervisor = Supervisor {
-            experiment,
+            experiment: ExperimentQueue::here(experiment),
+            unfinished: VecDeque::new(),
+            waited_since_ns: None,
+            storage_lost: false,
+            closing: false,
             control,
             ticks,
             sinks,
@@ -138,6 +157,8 @@ impl Supervisor {
             heartbeats: 0,
             counters_ns: 0,
             checklist,
+            approval,
+            lowerings_answered: [0; 2],
             published_checklist: Vec::new(),
             checklist_ns: 0,
             refreshed_ns: 0,
@@ -145,7 +166,9 @@ impl Supervisor {
         };
         // Not to the recorder: its file begins with this record.
         let _ = supervisor.sinks.console.send(Stamped { time_ns, record: Record::Session(info) });
-        supervisor.publish_experiment(time_ns);
+        for record in records {
+            supervisor.publish(record, time_ns);
+        }
         supervisor
     }
 
@@ -210,17 +233,17 @@ impl Supervisor {
             self.publish_checklist(time_ns);
             self.warn(time_ns);
         }
-        if time_ns >= self.refreshed_ns + REFRESH_PERIOD_NS {
+        let idle = self.unfinished.is_empty() && !self.closing;
+        if idle && time_ns >= self.refreshed_ns + REFRESH_PERIOD_NS {
             self.refreshed_ns = time_ns;
-            if let Err(error) = self.experiment.refresh() {
-                self.log(LogLevel::Error, format!("the study could not be read: {error}"), time_ns);
-            }
+            self.give(JobPurpose::Refresh, time_ns, |experiment| JobOutput::Done(experiment.refresh()));
         }
-        self.publish_experiment(time_ns);
+        self.finish_jobs(time_ns);
         self.act_unattended(time_ns);
     }
 
-    /// Carries out one request and publishes the answer.
+    /// Carries out one request and publishes the answer; that of the study comes with a later [`Supervisor::poll`] if the
+    /// experiment has a thread of its own.
     pub fn handle_request(&mut self, stamped: &StampedRequest, time_ns: u64) {
         let StampedRequest { request, stops, .. } = stamped;
         // The console may have shown a change of mode whose event is still in the ring.
@@ -228,29 +251,35 @@ impl Supervisor {
         let energises = matches!(request, OperatorRequest::Arm | OperatorRequest::Approve { .. });
         // An observer may stop the robot and release it again.
         let answer = if self.observe && *request != OperatorRequest::Acknowledge {
-            Err("this session only observes".to_owned())
+            Some(Err("this session only observes".to_owned()))
         } else if energises && self.control.stop.count() != *stops {
-            Err("STOP was pressed after it".to_owned())
+            Some(Err("STOP was pressed after it".to_owned()))
         } else if energises && self.guard_lost {
-            Err(GUARD_LOST.to_owned())
+            Some(Err(GUARD_LOST.to_owned()))
         } else {
             self.unattended.requested(request);
-            self.answer(stamped)
+            self.answer(stamped, Asker::Operator, time_ns)
         };
-        let (accepted, answer) = match answer {
-            Ok(answer) => (true, answer),
-            Err(reason) => (false, reason),
-        };
-        self.publish(Record::Request(RequestRecord { request: request.to_string(), accepted, answer }), time_ns);
-        self.publish_experiment(time_ns);
+        if let Some(answer) = answer {
+            self.respond(stamped, Asker::Operator, answer, time_ns);
+        }
+        self.finish_jobs(time_ns);
     }
 
     /// Ends the session: the pending verdict is reported, and a trial under review that is void by the rules is void.
+    /// Complete once [`Supervisor::is_closed`].
     pub fn close(&mut self, time_ns: u64) {
-        if let Err(error) = self.experiment.void_unreviewed().and_then(|()| self.experiment.close()) {
-            self.log(LogLevel::Error, format!("the study could not be written: {error}"), time_ns);
-        }
-        self.publish_experiment(time_ns);
+        self.closing = true;
+        self.give(JobPurpose::Close, time_ns, |experiment| {
+            let closed = experiment.close_unreviewed().and_then(|()| experiment.close());
+            JobOutput::Done(closed.map_err(RequestRefusal::from))
+        });
+        self.finish_jobs(time_ns);
+    }
+
+    /// Whether the study has stored everything; to be asked after [`Supervisor::close`].
+    pub fn is_closed(&self) -> bool {
+        self.unfinished.is_empty()
     }
 
     /// Takes control of a robot that answers, once there is a console, unless this session only observes.
@@ -278,7 +307,7 @@ impl Supervisor {
         }
         let trial = matches!(self.mode, Mode::Countdown | Mode::Jump | Mode::Settle);
         // Also a trial that has not begun yet, or whose ticks have not arrived yet.
-        let running = self.experiment.stage() == ExperimentStage::Running && !self.control.events.is_abandoned();
+        let running = self.experiment.view().stage == ExperimentStage::Running && !self.control.events.is_abandoned();
         trial || running || sits_down && self.mode.energised()
     }
 
@@ -340,18 +369,10 @@ impl Supervisor {
         };
         self.measured.clear();
         self.ended = None;
-        self.experiment.ended(trial, &end, &ticks, whole);
-        if self.experiment.stage() == ExperimentStage::Review && matches!(self.mode, Mode::Damped | Mode::Fault) {
-            let message = format!("trial {trial} ended in {}: {}", self.mode.name(), self.cause);
-            self.log(LogLevel::Warning, message, time_ns);
-        }
-    }
-
-    /// Publishes the experiment's records.
-    fn publish_experiment(&mut self, time_ns: u64) {
-        for record in self.experiment.take_records() {
-            self.recorder_gone |= !self.sinks.send(Stamped { time_ns, record });
-        }
+        self.give(JobPurpose::Measure(trial), time_ns, move |experiment| {
+            experiment.ended(trial, &end, &ticks, whole);
+            JobOutput::Done(Ok(()))
+        });
     }
 
     fn publish(&mut self, record: Record, time_ns: u64) {

@@ -1,20 +1,41 @@
 //! Answers to the operator's requests.
 
-use super::Supervisor;
+use super::jobs::{ApprovalState, Asker, JobPurpose};
+use super::{Supervisor, study_requests};
 use crate::control::mode::{self, Trigger};
+use crate::realtime::channel::Lowering;
 use crate::session::arming_checklist::refusals;
-use crate::session::experiment::RequestRefusal;
 use crate::session::operator_request::{OperatorRequest, StampedRequest};
-use crate::telemetry::{Command, Mode, Permit, TransitionCause, TrialEnd};
-use crate::trial::Verdict;
+use crate::session::storage::JobOutput;
+use crate::telemetry::{Command, Mode, Permit, TransitionCause};
 
 impl Supervisor {
-    /// Carries out a request. Returns its answer, or the reason of the refusal.
-    pub fn answer(&mut self, stamped: &StampedRequest) -> Result<String, String> {
-        let reason = |refusal: RequestRefusal| refusal.to_string();
+    /// Carries out a request. Returns its answer, or the reason of the refusal; none if the study answers.
+    pub fn answer(&mut self, stamped: &StampedRequest, asker: Asker, time_ns: u64) -> Option<Result<String, String>> {
+        match &stamped.request {
+            OperatorRequest::Arm
+            | OperatorRequest::Confirm(_)
+            | OperatorRequest::SitDown
+            | OperatorRequest::Acknowledge
+            | OperatorRequest::Cancel => Some(self.answer_about_robot(stamped, time_ns)),
+            OperatorRequest::Approve { trial, revision } => {
+                self.approve(stamped, (*trial, *revision), asker, time_ns).err().map(Err)
+            }
+            request => {
+                let request = request.clone();
+                self.give(JobPurpose::Request(stamped.clone(), asker), time_ns, move |experiment| {
+                    study_requests::carry_out(experiment, &request)
+                });
+                None
+            }
+        }
+    }
+
+    fn answer_about_robot(&mut self, stamped: &StampedRequest, time_ns: u64) -> Result<String, String> {
         match &stamped.request {
             OperatorRequest::Arm => {
                 self.require_allowed(Trigger::Arm)?;
+                self.fresh(stamped.time_ns, time_ns)?;
                 let findings = self.control.readiness.read().findings;
                 if let Some(refusals) = refusals(&self.checklist.items(&findings, &self.recorder.get())) {
                     return Err(refusals);
@@ -30,103 +51,60 @@ impl Supervisor {
                 self.checklist_ns = 0;
                 Ok("confirmed".to_owned())
             }
-            OperatorRequest::SitDown => self.ask(Trigger::SitDown, Command::SitDown, "the robot sits down"),
+            OperatorRequest::SitDown => self.lower(Lowering::SitDown),
             OperatorRequest::Acknowledge => self.ask(
                 Trigger::Acknowledge,
                 Command::Acknowledge { stops: stamped.stops },
                 "acknowledged; arm when ready",
             ),
-            OperatorRequest::Cancel => self.ask(Trigger::Cancel, Command::Cancel, "the countdown is cancelled"),
-            OperatorRequest::Approve { trial, revision } => {
-                if mode::next(self.mode, Trigger::Approve).is_none() {
-                    return Err(format!("the robot is {}, not READY{}", self.mode.name(), way_to_ready(self.mode)));
-                }
-                if let Some(error) = &self.recorder_error {
-                    return Err(format!("nothing is recorded ({error}); a jump without a recording is not measured"));
-                }
-                if let Some(inhibit) = self.inhibit() {
-                    return Err(inhibit);
-                }
-                if let Some(unready) = self.control.readiness.read().unready {
-                    return Err(unready.to_string());
-                }
-                let spec = self.experiment.approve(*trial, *revision).map_err(reason)?;
-                let permit = self.permit(stamped);
-                if let Err(reason) = self.command(Command::RunTrial(spec, permit)) {
-                    self.experiment.ended(spec.trial, &TrialEnd::Cancelled, &[], 0);
-                    return Err(reason);
-                }
-                Ok(format!("trial {} runs", spec.trial))
-            }
-            OperatorRequest::Skip => {
-                self.experiment.skip().map_err(reason).map(|()| "skipped; a new proposal follows".to_owned())
-            }
-            OperatorRequest::Override { parameter, value } => {
-                self.experiment.set_parameter(parameter, *value).map_err(reason)?;
-                Ok(format!("{parameter} will be {value}"))
-            }
-            OperatorRequest::ClearOverrides => {
-                self.experiment.clear_overrides().map_err(reason).map(|()| "as it was proposed".to_owned())
-            }
-            OperatorRequest::OverrideGain { gain, value } => {
-                self.experiment.set_gain(gain, *value).map_err(reason)?;
-                Ok(format!("{gain} will be {value} in this trial"))
-            }
-            OperatorRequest::Fix { parameter, value, trials } => {
-                self.experiment.fix(parameter, *value, *trials).map_err(reason)?;
-                Ok(format!("{parameter} is {value} for the next {trials} trials that count"))
-            }
-            OperatorRequest::Unfix { parameter } => {
-                self.experiment.unfix(parameter).map_err(reason)?;
-                Ok(format!("{parameter} is searched again"))
-            }
-            OperatorRequest::NarrowBounds { parameter, low, high } => {
-                self.experiment.narrow_bounds(parameter, *low, *high).map_err(reason)?;
-                Ok(format!("{parameter} is searched from {low} to {high}"))
-            }
-            OperatorRequest::ConfirmBest { repeats } => {
-                let trials = self.experiment.confirm_best(*repeats).map_err(reason)?;
-                let trials: Vec<String> = trials.iter().map(u32::to_string).collect();
-                Ok(match trials.len() {
-                    0 => "no more repeats".to_owned(),
-                    _ => format!("the points of trials {} are repeated, at most {repeats} times", trials.join(", ")),
-                })
-            }
-            OperatorRequest::Judge(verdict) => {
-                self.judge(*verdict, false)?;
-                Ok("u takes it back until the next trial is approved or skipped".to_owned())
-            }
-            OperatorRequest::Rerun { trial: None } => {
-                self.judge(Verdict::Void, true)?;
-                Ok("void, and its parameters are proposed again".to_owned())
-            }
-            OperatorRequest::Rerun { trial: Some(trial) } => {
-                self.experiment.repeat(*trial).map_err(reason)?;
-                Ok(format!("the parameters of trial {trial} are queued"))
-            }
-            OperatorRequest::Undo => {
-                self.experiment.undo().map_err(reason).map(|()| "the verdict is taken back".to_owned())
-            }
-            OperatorRequest::HandValue(value) => {
-                self.experiment.set_hand_value(*value).map_err(reason)?;
-                Ok(match value {
-                    Some(value) => format!("{value} counts instead of the measured value"),
-                    None => "the measured value counts".to_owned(),
-                })
-            }
-            OperatorRequest::Note { trial, text } => {
-                self.experiment.note(*trial, text).map_err(reason)?;
-                Ok("noted".to_owned())
-            }
-            OperatorRequest::Enqueue(parameters) => {
-                self.experiment.enqueue(parameters).map_err(reason)?;
-                Ok("queued".to_owned())
-            }
-            OperatorRequest::Continue(trials) => {
-                self.experiment.extend(*trials).map_err(reason)?;
-                Ok(format!("the study now has {} trials", self.experiment.budget()))
-            }
+            OperatorRequest::Cancel => self.lower(Lowering::Cancel),
+            _ => Err("this is no request to the robot".to_owned()),
         }
+    }
+
+    /// Gives an approval to the study; the trial runs once the study has stored it, if the approval still holds.
+    fn approve(
+        &mut self,
+        stamped: &StampedRequest,
+        (trial, revision): (u32, u32),
+        asker: Asker,
+        time_ns: u64,
+    ) -> Result<(), String> {
+        if mode::next(self.mode, Trigger::Approve).is_none() {
+            return Err(format!("the robot is {}, not READY{}", self.mode.name(), way_to_ready(self.mode)));
+        }
+        if let Some(error) = &self.recorder_error {
+            return Err(format!("nothing is recorded ({error}); a jump without a recording is not measured"));
+        }
+        if let Some(inhibit) = self.inhibit() {
+            return Err(inhibit);
+        }
+        if let Some(unready) = self.control.readiness.read().unready {
+            return Err(unready.to_string());
+        }
+        let state = ApprovalState { permit: self.permit(stamped), stops: stamped.stops };
+        self.approval_holds(&state, time_ns)?;
+        self.give(JobPurpose::Approve(stamped.clone(), asker, state), time_ns, move |experiment| {
+            JobOutput::Approved(experiment.approve(trial, revision).map_err(|refusal| refusal.to_string()))
+        });
+        Ok(())
+    }
+
+    /// Answers a request to sit down or to cancel. One that has reached the control thread by its latch is not commanded again.
+    fn lower(&mut self, lowering: Lowering) -> Result<String, String> {
+        let (trigger, command, reached, text) = match lowering {
+            Lowering::SitDown => (Trigger::SitDown, Command::SitDown, Mode::SitDown, "the robot sits down"),
+            Lowering::Cancel => (Trigger::Cancel, Command::Cancel, Mode::Ready, "the countdown is cancelled"),
+        };
+        let answered = &mut self.lowerings_answered[lowering as usize];
+        if self.control.lowering.count(lowering) == *answered {
+            return self.ask(trigger, command, text);
+        }
+        *answered += 1;
+        if self.mode != reached {
+            self.require_allowed(trigger)?;
+        }
+        Ok(text.to_owned())
     }
 
     /// Sends `command` if the mode allows `request`.
@@ -147,17 +125,8 @@ impl Supervisor {
         Permit { mode_changes: self.mode_changes, given_ns: stamped.time_ns }
     }
 
-    /// Judges the trial under review. If another program has ended it, the review is over as well.
-    fn judge(&mut self, verdict: Verdict, rerun: bool) -> Result<(), String> {
-        let judged = self.experiment.judge(verdict, rerun);
-        if matches!(judged, Ok(()) | Err(RequestRefusal::EndedElsewhere(_))) {
-            self.end_review()?;
-        }
-        judged.map_err(|refusal| refusal.to_string())
-    }
-
     /// Ends the review: a standing robot is ready again, a fallen one is disarmed.
-    fn end_review(&mut self) -> Result<(), String> {
+    pub(super) fn end_review(&mut self) -> Result<(), String> {
         let fallen = self.mode == Mode::Damped && matches!(self.cause, TransitionCause::Fell(_));
         if self.mode == Mode::Review || fallen { self.command(Command::EndReview) } else { Ok(()) }
     }

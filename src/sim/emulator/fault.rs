@@ -2,6 +2,7 @@
 
 use std::str::FromStr;
 
+use crate::robot::remote::RemoteButtons;
 use crate::robot::{JOINTS, joint_name};
 
 /// A fault from now on, or an action of a person on the robot. A joint is an index, 0..12.
@@ -46,6 +47,31 @@ pub enum EmulatorFault {
     Place,
     /// All faults end; the robot stays where it is.
     Clear,
+    /// Delay of the commands alone, ms.
+    CommandDelay(f64),
+    /// Delay of the states alone, ms.
+    StateDelay(f64),
+    /// The inertial unit repeats its last measurement.
+    ImuFreeze,
+    /// The reported orientation has the wrong sign of roll.
+    FlipRoll,
+    /// The reported orientation has the wrong sign of pitch.
+    FlipPitch,
+    /// Every foot sensor reports this force, N.
+    Feet(f64),
+    /// Step of the robot's clock, ms.
+    ClockStep(f64),
+    /// Error of the rate of the robot's clock, ms per second.
+    ClockDrift(f64),
+    /// A second program damps the robot in this share of the milliseconds, percent, and receives the states of these
+    /// milliseconds.
+    Commander(f64),
+    /// The same, on a robot that sends all states to the first program.
+    HiddenCommander(f64),
+    /// Buttons that a person holds on the remote control.
+    Remote(RemoteButtons),
+    /// The remote control is switched off: its bytes are zero.
+    RemoteOff,
 }
 
 /// Operands of a fault.
@@ -56,12 +82,13 @@ enum FaultOperands {
     Number(fn(f64) -> EmulatorFault, &'static str, f64, f64),
     Joint(fn(usize) -> EmulatorFault),
     JointNumber(fn(usize, f64) -> EmulatorFault, &'static str, f64, f64),
+    Buttons(fn(RemoteButtons) -> EmulatorFault),
 }
 
-use FaultOperands::{Joint, JointNumber, Number, Plain};
+use FaultOperands::{Buttons, Joint, JointNumber, Number, Plain};
 
 /// Name, operands and description of every fault, for the parser and `help`.
-const FAULTS: [(&str, FaultOperands, &str); 19] = {
+const FAULTS: [(&str, FaultOperands, &str); 31] = {
     use EmulatorFault::*;
     [
         ("loss", Number(Loss, "PERCENT", 0.0, 100.0), "the network loses this share of the datagrams, each way"),
@@ -97,6 +124,26 @@ const FAULTS: [(&str, FaultOperands, &str); 19] = {
         ),
         ("nan", Joint(|joint| NotANumber { joint }), "an encoder reports NaN as its angle"),
         ("tilt", Number(Tilt, "RAD", -3.2, 3.2), "error of the reported roll"),
+        ("delay-commands", Number(CommandDelay, "MS", 0.0, 1000.0), "only commands are delayed by this time"),
+        ("delay-states", Number(StateDelay, "MS", 0.0, 1000.0), "only states are delayed by this time"),
+        ("imu-freeze", Plain(ImuFreeze), "the inertial unit repeats its last measurement"),
+        ("flip-roll", Plain(FlipRoll), "the reported orientation has the wrong sign of roll"),
+        ("flip-pitch", Plain(FlipPitch), "the reported orientation has the wrong sign of pitch"),
+        ("feet", Number(Feet, "N", 0.0, 500.0), "every foot sensor reports this force; 0: stuck up, 33: stuck down"),
+        ("clock-step", Number(ClockStep, "MS", -1e6, 1e6), "the robot's clock steps by this time"),
+        ("clock-drift", Number(ClockDrift, "MS/S", -500.0, 500.0), "the robot's clock gains this time"),
+        (
+            "commander",
+            Number(Commander, "PERCENT", 0.0, 100.0),
+            "a second program damps the robot in this share of the milliseconds and receives their states",
+        ),
+        (
+            "hidden-commander",
+            Number(HiddenCommander, "PERCENT", 0.0, 100.0),
+            "the same; the robot sends all states to the first program",
+        ),
+        ("remote", Buttons(Remote), "a person holds these buttons of the remote, for example L2+B; none: released"),
+        ("remote-off", Plain(RemoteOff), "the remote control is switched off"),
         ("place", Plain(Place), "a person lays the robot down at its start position, on its belly"),
         ("clear", Plain(Clear), "all faults end"),
     ]
@@ -114,6 +161,8 @@ pub enum EmulatorFaultError {
     Joint { name: String },
     #[error("\"{value}\" is out of range: give {lowest} to {highest} ({unit})")]
     Number { value: String, unit: &'static str, lowest: f64, highest: f64 },
+    #[error("{0}")]
+    Buttons(String),
 }
 
 impl FromStr for EmulatorFault {
@@ -134,6 +183,7 @@ impl FromStr for EmulatorFault {
             (JointNumber(fault, unit, lowest, highest), [name, value]) => {
                 Ok(fault(joint(name)?, number(value, unit, lowest, highest)?))
             }
+            (Buttons(fault), [names]) => names.parse().map(fault).map_err(EmulatorFaultError::Buttons),
             _ => Err(EmulatorFaultError::Usage { usage: usage(word, *operands) }),
         }
     }
@@ -157,13 +207,14 @@ fn usage(word: &str, operands: FaultOperands) -> String {
         Number(_, unit, ..) => format!("{word} {unit}"),
         Joint(_) => format!("{word} JOINT"),
         JointNumber(_, unit, ..) => format!("{word} JOINT {unit}"),
+        Buttons(_) => format!("{word} BUTTONS"),
     }
 }
 
 /// Describes all faults, one line each.
 pub fn help() -> String {
     let line =
-        |(word, operands, what): &(&str, FaultOperands, &str)| format!("  {:<20} {what}\n", usage(word, *operands));
+        |(word, operands, what): &(&str, FaultOperands, &str)| format!("  {:<24} {what}\n", usage(word, *operands));
     FAULTS.iter().map(line).collect()
 }
 
@@ -179,6 +230,7 @@ mod tests {
             let parsed = match operands {
                 Number(_, unit, ..) | JointNumber(_, unit, ..) => value(unit).parse::<EmulatorFault>(),
                 Plain(_) | Joint(_) => line.parse(),
+                Buttons(_) => line.replace("BUTTONS", "L2+B").parse(),
             };
             assert!(parsed.is_ok(), "{line}: {parsed:?}");
             assert!(help().contains(&usage(word, *operands)));
@@ -197,5 +249,6 @@ mod tests {
         assert!(message("stuck FR_knee").contains("FR_hip"));
         assert!(message("clear now").contains("write it as: clear"));
         assert!(message("").contains("known faults"));
+        assert!(message("remote L9").contains("L2") && message("clock-step far").contains("MS"));
     }
 }

@@ -21,7 +21,8 @@ use super::{EmulatorConfig, SimConfig, SimError};
 use crate::robot::description::RobotDescription;
 use crate::robot::go1::packet::{CrcForm, LowCmd};
 use crate::robot::go1::{Network, convert};
-use crate::robot::{JOINTS, Placement, Truth};
+use crate::robot::{JOINTS, JointCommand, Placement, Truth};
+use crate::sim::terrain::unit_interval;
 use network::{NetworkConditions, NetworkPath};
 use robot::{EmulatedRobot, RobotDefects};
 
@@ -78,6 +79,15 @@ impl EmulatorHandle {
     }
 }
 
+/// A second program that commands the robot: it damps every joint.
+#[derive(Debug, Clone, Copy)]
+struct SecondCommander {
+    /// Share of the milliseconds in which its command is the last one.
+    share: f64,
+    /// Whether the robot sends it the states of these milliseconds.
+    takes_states: bool,
+}
+
 /// An emulated Go1.
 #[derive(Debug)]
 pub struct Emulator {
@@ -90,6 +100,9 @@ pub struct Emulator {
     to_robot: NetworkPath<SocketAddr>,
     from_robot: NetworkPath<SocketAddr>,
     conditions: NetworkConditions,
+    second: Option<SecondCommander>,
+    /// Whether the state of this millisecond goes to the second program.
+    state_taken: bool,
     random: ChaCha8Rng,
     since_command_ms: u32,
     /// End of the last reboot, ms.
@@ -128,6 +141,8 @@ impl Emulator {
             to_robot: NetworkPath::new(),
             from_robot: NetworkPath::new(),
             conditions: NetworkConditions::default(),
+            second: None,
+            state_taken: false,
             random,
             since_command_ms: 0,
             booting_until_ms: 0,
@@ -182,8 +197,25 @@ impl Emulator {
             EmulatorFault::NotANumber { joint } => defects.angle[joint] = Some(f64::NAN),
             EmulatorFault::Tilt(radians) => defects.tilt_rad = radians,
             EmulatorFault::Place => self.robot.lay_down(),
+            EmulatorFault::CommandDelay(ms) => conditions.command_delay_ms = ms,
+            EmulatorFault::StateDelay(ms) => conditions.state_delay_ms = ms,
+            EmulatorFault::ImuFreeze => defects.imu_frozen = true,
+            EmulatorFault::FlipRoll => defects.flipped[0] = true,
+            EmulatorFault::FlipPitch => defects.flipped[1] = true,
+            EmulatorFault::Feet(newtons) => defects.foot_force_n = Some(newtons),
+            EmulatorFault::ClockStep(ms) => self.robot.step_clock(ms),
+            EmulatorFault::ClockDrift(ms_per_s) => defects.clock_drift_ms_per_s = ms_per_s,
+            EmulatorFault::Commander(percent) => {
+                self.second = Some(SecondCommander { share: percent / 100.0, takes_states: true });
+            }
+            EmulatorFault::HiddenCommander(percent) => {
+                self.second = Some(SecondCommander { share: percent / 100.0, takes_states: false });
+            }
+            EmulatorFault::Remote(buttons) => defects.remote_buttons = buttons,
+            EmulatorFault::RemoteOff => defects.remote_off = true,
             EmulatorFault::Clear => {
                 self.conditions = NetworkConditions::default();
+                self.second = None;
                 self.robot.defects = RobotDefects::default();
             }
         }
@@ -216,7 +248,8 @@ impl Emulator {
     fn receive_commands(&mut self) {
         let mut buffer = [0; BUFFER];
         while let Ok((length, from)) = self.socket.recv_from(&mut buffer) {
-            self.to_robot.send(self.now_ms, from, &buffer[..length], &self.conditions, &mut self.random);
+            let conditions = self.conditions.of_commands();
+            self.to_robot.send(self.now_ms, from, &buffer[..length], &conditions, &mut self.random);
         }
         self.since_command_ms = self.since_command_ms.saturating_add(1);
         for (from, datagram) in self.to_robot.arrived(self.now_ms) {
@@ -224,9 +257,23 @@ impl Emulator {
                 self.execute(from, &datagram);
             }
         }
+        self.receive_second_commander();
         self.status.timed_out = self.since_command_ms > self.config.command_timeout_ms;
         if self.status.timed_out {
             self.robot.motors = [None; JOINTS];
+        }
+    }
+
+    /// Executes the second program's command after those of the first.
+    fn receive_second_commander(&mut self) {
+        self.state_taken = false;
+        if let Some(SecondCommander { share, takes_states }) = self.second
+            && unit_interval(&mut self.random) < share
+            && self.is_awake()
+        {
+            self.robot.motors = JointCommand::damping(self.config.braking_kd).motor.map(Some);
+            self.since_command_ms = 0;
+            self.state_taken = takes_states;
         }
     }
 
@@ -244,8 +291,9 @@ impl Emulator {
     fn send_state(&mut self) {
         if self.is_awake() {
             let state = self.robot.next_state();
-            if let Some(client) = self.status.client {
-                self.from_robot.send(self.now_ms, client, state, &self.conditions, &mut self.random);
+            if let Some(client) = self.status.client.filter(|_| !self.state_taken) {
+                let conditions = self.conditions.of_states();
+                self.from_robot.send(self.now_ms, client, state, &conditions, &mut self.random);
                 self.status.states += 1;
             }
         }

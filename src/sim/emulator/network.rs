@@ -4,7 +4,7 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::sim::terrain::unit_interval;
 
-/// Conditions of the network, the same for both directions.
+/// Conditions of the network; those without a direction in their name hold for both.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct NetworkConditions {
     /// Shares of datagrams, 0 to 1.
@@ -14,6 +14,21 @@ pub(super) struct NetworkConditions {
     /// Delay, and largest random addition to it, ms.
     pub delay_ms: f64,
     pub jitter_ms: f64,
+    /// Additional delay of commands, and of states, ms.
+    pub command_delay_ms: f64,
+    pub state_delay_ms: f64,
+}
+
+impl NetworkConditions {
+    /// Conditions of the path to the robot.
+    pub fn of_commands(&self) -> NetworkConditions {
+        NetworkConditions { delay_ms: self.delay_ms + self.command_delay_ms, ..*self }
+    }
+
+    /// Conditions of the path from the robot.
+    pub fn of_states(&self) -> NetworkConditions {
+        NetworkConditions { delay_ms: self.delay_ms + self.state_delay_ms, ..*self }
+    }
 }
 
 /// One direction: datagrams under way with time of arrival, ms, and address.

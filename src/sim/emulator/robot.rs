@@ -1,10 +1,14 @@
 //! The emulated robot without its network: motors, body and reported state, with the injected defects.
 
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use crate::robot::description::RobotDescription;
 use crate::robot::go1::convert;
-use crate::robot::{Battery, JOINTS, JointCommand, Joints, MotorCommand, Placement, Robot, RobotState, Truth};
+use crate::robot::remote::{Remote, RemoteButtons};
+use crate::robot::{
+    Battery, CONTROL_PERIOD_S, Imu, JOINTS, JointCommand, Joints, LEGS, MotorCommand, Placement, Robot, RobotState,
+    Truth,
+};
 use crate::sim::{EmulatorConfig, SimConfig, SimError, Simulator};
 
 /// Number of cells of the battery, and voltage of an empty and of a full one, V. Assumption: a six-cell pack, from the
@@ -15,6 +19,9 @@ const CELL_V: [f64; 2] = [3.3, 4.2];
 const IDLE_W: f64 = 30.0;
 /// Stiffness, N m/rad, and damping, N m s/rad, of a stuck joint, up to the motor's torque.
 const STUCK_GAINS: [f64; 2] = [600.0, 10.0];
+
+/// Noise of the inertial unit, rad/s, m/s^2 and rad. Assumption: far below that of a real unit, above the resolution of a state.
+const IMU_NOISE: f64 = 1e-5;
 
 /// Injected defects of the robot.
 #[derive(Debug, Clone, Copy, Default)]
@@ -29,6 +36,13 @@ pub(super) struct RobotDefects {
     pub speed: [Option<f64>; JOINTS],
     pub torque: [Option<f64>; JOINTS],
     pub tilt_rad: f64,
+    pub imu_frozen: bool,
+    /// Wrong sign of roll and of pitch.
+    pub flipped: [bool; 2],
+    pub foot_force_n: Option<f64>,
+    pub clock_drift_ms_per_s: f64,
+    pub remote_buttons: RemoteButtons,
+    pub remote_off: bool,
 }
 
 /// The emulated robot.
@@ -47,6 +61,10 @@ pub(super) struct EmulatedRobot {
     /// Command of each motor; none if it brakes.
     pub motors: [Option<MotorCommand>; JOINTS],
     last_state: Vec<u8>,
+    /// The last reported measurement of the inertial unit.
+    last_imu: Imu,
+    /// Fraction of a millisecond by which the robot's clock is ahead.
+    clock_ahead_ms: f64,
 }
 
 impl EmulatedRobot {
@@ -67,6 +85,8 @@ impl EmulatedRobot {
             defects: RobotDefects::default(),
             motors: [None; JOINTS],
             last_state: Vec::new(),
+            last_imu: Imu::default(),
+            clock_ahead_ms: 0.0,
         };
         robot.lay_down();
         Ok(robot)
@@ -115,11 +135,19 @@ impl EmulatedRobot {
 
     /// Advances the robot's clock, and returns the next state datagram.
     pub fn next_state(&mut self) -> &[u8] {
-        self.time_ms += 1;
+        self.time_ms = self.time_ms.wrapping_add(1);
+        self.clock_ahead_ms += self.defects.clock_drift_ms_per_s * CONTROL_PERIOD_S;
+        self.step_clock(self.clock_ahead_ms.trunc());
+        self.clock_ahead_ms = self.clock_ahead_ms.fract();
         if !self.defects.repeating || self.last_state.is_empty() {
             self.last_state = self.state();
         }
         &self.last_state
+    }
+
+    /// Steps the robot's clock by whole milliseconds.
+    pub fn step_clock(&mut self, ms: f64) {
+        self.time_ms = self.time_ms.wrapping_add_signed(ms as i32);
     }
 
     /// Whether a motor is in servo mode.
@@ -143,11 +171,32 @@ impl EmulatedRobot {
         replace(&mut state.joint_velocity_rad_s, &self.defects.speed);
         replace(&mut state.joint_torque_n_m, &self.defects.torque);
         state.imu.world_from_body *= UnitQuaternion::from_axis_angle(&Vector3::x_axis(), self.defects.tilt_rad);
+        let [flips_roll, flips_pitch] = self.defects.flipped.map(|flipped| if flipped { -1.0 } else { 1.0 });
+        let [x, y, z, w]: [f64; 4] = state.imu.world_from_body.coords.into();
+        let reported = Quaternion::new(w, flips_roll * x, flips_pitch * y, z);
+        state.imu.world_from_body = UnitQuaternion::new_unchecked(reported);
+        if self.defects.imu_frozen {
+            state.imu = self.last_imu;
+        } else {
+            self.add_imu_noise(&mut state.imu);
+        }
+        self.last_imu = state.imu;
+        state.foot_force_n = self.defects.foot_force_n.map_or(state.foot_force_n, |newtons| [newtons; LEGS]);
+        let buttons = self.defects.remote_buttons;
+        state.remote = (!self.defects.remote_off).then_some(Remote { buttons, ..Remote::default() });
         let mut datagram = convert::low_state(&state, self.foot_force_n);
         datagram.write_crc();
         let mut bytes = datagram.bytes().to_vec();
         bytes.resize(self.config.state_length, 0);
         bytes
+    }
+
+    /// Adds the least noise of an inertial unit: one that is alive never repeats a measurement.
+    fn add_imu_noise(&self, imu: &mut Imu) {
+        let sign = if self.time_ms.is_multiple_of(2) { 1.0 } else { -1.0 };
+        imu.gyro_body.z += sign * IMU_NOISE;
+        imu.accel_body.z += sign * IMU_NOISE;
+        imu.world_from_body *= UnitQuaternion::from_axis_angle(&Vector3::z_axis(), sign * IMU_NOISE);
     }
 
     fn battery(&self, state: &RobotState) -> Battery {

@@ -84,9 +84,19 @@ impl Console {
         update(&mut self.model, msg)
     }
 
+    /// Time passes; the engine goes on.
     pub fn wait(&mut self, milliseconds: u64) {
+        self.hang(milliseconds);
+        let Tick { number, .. } = self.model.snapshot.tick;
+        let tick = Tick { number: number + milliseconds, ..self.model.snapshot.tick };
+        self.update(Msg::Snapshot(Box::new(Snapshot { tick, ..self.model.snapshot })));
+    }
+
+    /// Time passes without a new tick.
+    pub fn hang(&mut self, milliseconds: u64) {
         let now = self.model.clock + Duration::from_millis(milliseconds);
         self.update(Msg::Clock(now));
+        self.update(Msg::Snapshot(Box::new(self.model.snapshot)));
     }
 
     /// Presses keys by name, 0.1 s apart.

@@ -8,7 +8,7 @@ use quadfrog::recording::player::Player;
 use crate::message::{Msg, ReplayCommand};
 use replay::ReplayFeed;
 
-/// Maximum number of records, and of ticks, per call of [`Feed::take`]: bounds the delay of the next key.
+/// Maximum number of records, and of ticks, per call of [`Feed::poll`]: bounds the delay of the next key.
 const BATCH: usize = 4096;
 
 /// A running engine or a recording.
@@ -56,6 +56,7 @@ impl Feed {
                 );
                 messages.push(Msg::Snapshot(Box::new(handle.snapshot())));
                 messages.extend(handle.recorder().map(Msg::Recorder));
+                messages.push(Msg::Storage(handle.storage_wait()));
             }
             Feed::Replay(replay) => replay.poll(elapsed_ns, &mut messages),
         }

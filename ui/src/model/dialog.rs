@@ -74,6 +74,11 @@ pub enum Purpose {
         parameter: usize,
     },
     ConfirmBest,
+    /// The reason to judge a trial that tripped a limit void.
+    VoidReason {
+        trial: u32,
+        rerun: bool,
+    },
     TrialNumber,
     LogSearch,
 }
@@ -90,6 +95,17 @@ impl Dialog {
     /// A text field with an initial text.
     pub fn field(purpose: Purpose, text: &str) -> Dialog {
         Dialog::Field { purpose, input: Input::new(text.to_owned()), problem: None }
+    }
+
+    /// Whether a space is text here: not where a number is typed.
+    pub fn takes_spaces(&self) -> bool {
+        match self {
+            Dialog::Field { purpose, .. } => {
+                matches!(purpose, Purpose::Note(_) | Purpose::VoidReason { .. } | Purpose::LogSearch)
+            }
+            Dialog::Palette { .. } => true,
+            _ => false,
+        }
     }
 
     /// Whether keys are text here.

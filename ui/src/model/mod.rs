@@ -13,6 +13,7 @@ use std::time::Duration;
 use quadfrog::recording::record::LogLevel;
 use quadfrog::recording::recorder::RecorderStatus;
 use quadfrog::robot::description::RobotDescription;
+use quadfrog::session::storage::StorageWait;
 use quadfrog::telemetry::{Mode, Snapshot};
 use quadfrog::trial::{ParameterInfo, TrialRecord};
 use strum::{IntoStaticStr, VariantArray};
@@ -66,6 +67,8 @@ pub struct Model {
     pub theme: Theme,
     pub keymap: Keymap,
     pub bell: Vec<BellCause>,
+    /// Whether Space stops an energised robot in a text field, too.
+    pub space_always_stops: bool,
     /// The robot's limits and geometry; none where they are not known.
     pub robot: Option<RobotDescription>,
     /// Time since the console started.
@@ -77,6 +80,8 @@ pub struct Model {
     pub snapshot_at: Duration,
     /// State of the recorder; none in a replay.
     pub recorder: Option<RecorderStatus>,
+    /// Wait of the session for the storage of its study.
+    pub storage: Option<StorageWait>,
     pub history: SignalHistory,
     pub message: Option<Notice>,
     pub view: View,
@@ -105,12 +110,14 @@ impl Model {
             theme,
             keymap: settings.keymap,
             bell: settings.bell,
+            space_always_stops: settings.space_always_stops,
             robot,
             clock: Duration::ZERO,
             session: SessionModel::default(),
             snapshot: Snapshot::default(),
             snapshot_at: Duration::ZERO,
             recorder: None,
+            storage: None,
             history: SignalHistory::default(),
             message: None,
             view: View::Live,
@@ -145,6 +152,21 @@ impl Model {
     /// Whether the robot is energised and this console commands it.
     pub fn robot_is_energised(&self) -> bool {
         self.replay.is_none() && self.mode().energised()
+    }
+
+    /// Whether Space is text: a text field is open in which a space has a meaning.
+    pub fn space_types(&self) -> bool {
+        self.dialog.as_ref().is_some_and(Dialog::takes_spaces) && !self.space_must_stop()
+    }
+
+    /// Whether Space is STOP in a text field, too.
+    pub fn space_must_stop(&self) -> bool {
+        self.space_always_stops && self.robot_is_energised()
+    }
+
+    /// Whether Space types although the robot is energised: the screen shows it in the colour of STOP.
+    pub fn space_is_no_stop(&self) -> bool {
+        self.robot_is_energised() && self.space_types()
     }
 
     /// The parameter of the selected row of view Override; none for a gain.

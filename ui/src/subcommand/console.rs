@@ -82,6 +82,9 @@ pub struct ConsoleArguments {
     /// Continue the study in this folder
     #[arg(long, value_name = "DIR")]
     resume: Option<PathBuf>,
+    /// Continue on the robot a study that was made on the simulator or on another robot
+    #[arg(long, requires = "resume")]
+    accept_backend_change: bool,
     /// Observe only
     #[arg(long)]
     observe: bool,
@@ -124,6 +127,7 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
         // An observer writes no files.
         folder: (!arguments.observe).then_some(selected.folder),
         observe: arguments.observe,
+        accept_backend_change: arguments.accept_backend_change,
         approve: arguments.approve,
         // The running program, even if its file was replaced since the start.
         guard: Some(PathBuf::from("/proc/self/exe")),

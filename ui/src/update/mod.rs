@@ -1,7 +1,7 @@
 //! The only code that changes the [`Model`]: messages in, effects out.
 //!
 //! `perform` carries out an action, `navigate` moves within views, `dialog` handles keys while a dialog is open, `records`
-//! folds the session's records, `mouse` handles the mouse, `answer` writes the message line and makes requests.
+//! folds the session's records, `mouse` handles the mouse, `request` writes the message line and makes requests.
 
 mod dialog;
 mod mouse;
@@ -42,11 +42,15 @@ pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
         }
         Msg::Paste(text) => paste(model, &text),
         Msg::Snapshot(snapshot) => {
+            // The newest tick is read again until there is another: only that is news.
+            if snapshot.tick.number != model.snapshot.tick.number {
+                model.snapshot_at = model.clock;
+            }
             model.snapshot = *snapshot;
-            model.snapshot_at = model.clock;
             records::close_stale_dialog(model);
         }
         Msg::Recorder(status) => model.recorder = Some(status),
+        Msg::Storage(wait) => model.storage = wait,
         Msg::Tick(tick) => model.history.push(&tick),
         Msg::Replay(status) => model.replay = Some(status),
         Msg::Rewound => {
@@ -62,10 +66,8 @@ pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
 /// One key. STOP comes before everything else, on every screen.
 fn press(model: &mut Model, key: Key) -> Vec<Effect> {
     let action = model.keymap.action(key);
-    let typing = model.dialog.as_ref().is_some_and(Dialog::takes_text);
     match action {
-        // A text field may have the space bar only while the robot is not armed.
-        Some(Action::Stop) if key.typed().is_some() && typing && !model.robot_is_energised() => {}
+        Some(Action::Stop) if key.typed().is_some() && model.space_types() => {}
         Some(Action::Stop) => return stop(model),
         Some(Action::Interrupt) => return interrupt(model),
         _ => {}

@@ -1,6 +1,7 @@
 //! The effect of each action.
 
 use quadfrog::recording::record::LogLevel;
+use quadfrog::session::objective;
 use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::telemetry::Mode;
 use quadfrog::trial::{ExperimentStage, Proposal, Verdict};
@@ -53,7 +54,7 @@ pub(super) fn perform(model: &mut Model, action: Action) -> Vec<Effect> {
         Action::ExportBest => return vec![Effect::ExportBest],
         Action::Accept => return request(model, OperatorRequest::Judge(Verdict::Accept)),
         Action::Fall => return request(model, OperatorRequest::Judge(Verdict::Fall)),
-        Action::Void => return request(model, OperatorRequest::Judge(Verdict::Void)),
+        Action::Void => return void(model, false),
         Action::Rerun => return rerun(model),
         Action::Undo => return request(model, OperatorRequest::Undo),
         Action::HandValue => {
@@ -191,13 +192,25 @@ fn open_details(model: &mut Model) -> Vec<Effect> {
     Vec::new()
 }
 
+/// Voids the trial under review; asks for the reason if it tripped a limit.
+fn void(model: &mut Model, rerun: bool) -> Vec<Effect> {
+    match model.session.under_review().filter(|row| objective::tripped_limit(row)).map(|row| row.trial) {
+        Some(trial) => open(model, Dialog::field(Purpose::VoidReason { trial, rerun }, "")),
+        None if rerun => return request(model, OperatorRequest::Rerun { trial: None }),
+        None => return request(model, OperatorRequest::Judge(Verdict::Void)),
+    }
+    Vec::new()
+}
+
 /// Under review: voids the trial and queues it again. In the table: queues the selected trial.
 fn rerun(model: &mut Model) -> Vec<Effect> {
-    let trial = match model.session.stage_is(ExperimentStage::Review) {
-        true => None,
-        false => model.selected_trial().map(|trial| trial.trial),
-    };
-    request(model, OperatorRequest::Rerun { trial })
+    match model.session.stage_is(ExperimentStage::Review) {
+        true => void(model, true),
+        false => {
+            let trial = model.selected_trial().map(|trial| trial.trial);
+            request(model, OperatorRequest::Rerun { trial })
+        }
+    }
 }
 
 fn neighbour_view(view: View, step: usize) -> View {

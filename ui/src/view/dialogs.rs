@@ -77,12 +77,14 @@ fn render_details(frame: &mut Frame, area: Rect, model: &Model, trial: u32, scro
         _ => format!("Trial #{trial} (PgUp PgDn: {} lines)", lines.len()),
     };
     let shown: Vec<Line> = lines.into_iter().skip(scroll.min(more)).take(room).collect();
-    let inner = open_box(frame, area, &model.theme, &title, WIDTH, shown.len() as u16 + 2);
+    let inner = open_box(frame, area, model, &title, WIDTH, shown.len() as u16 + 2);
     frame.render_widget(Paragraph::new(shown), inner);
 }
 
-/// Draws an empty bordered box; returns its inside.
-fn open_box(frame: &mut Frame, area: Rect, theme: &Theme, title: &str, width: u16, height: u16) -> Rect {
+/// Draws an empty bordered box; returns its inside. Where Space types although the robot is energised, the frame has the
+/// colour of STOP and names the keys that stop.
+fn open_box(frame: &mut Frame, area: Rect, model: &Model, title: &str, width: u16, height: u16) -> Rect {
+    let theme = &model.theme;
     const ASCII: border::Set = border::Set {
         top_left: "+",
         top_right: "+",
@@ -96,8 +98,12 @@ fn open_box(frame: &mut Frame, area: Rect, theme: &Theme, title: &str, width: u1
     let set = if theme.glyphs == Glyphs::Ascii { ASCII } else { border::PLAIN };
     let (width, height) = (width.min(area.width), height.min(area.height));
     let at = Rect { x: area.x + (area.width - width) / 2, y: area.y + (area.height - height) / 2, width, height };
-    let title = span(theme, Role::Heading, format!(" {title} "));
-    let block = Block::bordered().border_set(set).border_style(theme.style(Role::Heading)).title(title);
+    let role = if model.space_is_no_stop() { Role::Alarm } else { Role::Heading };
+    let title = span(theme, role, format!(" {title} "));
+    let mut block = Block::bordered().border_set(set).border_style(theme.style(role)).title(title);
+    if model.space_is_no_stop() {
+        block = block.title_bottom(span(theme, role, " Space types here. STOP: F12 or Ctrl-C "));
+    }
     let inner = block.inner(at);
     frame.render_widget(Clear, at);
     frame.render_widget(block, at);
@@ -107,7 +113,7 @@ fn open_box(frame: &mut Frame, area: Rect, theme: &Theme, title: &str, width: u1
 fn popup(frame: &mut Frame, area: Rect, model: &Model, title: &str, width: u16, lines: Vec<Line<'static>>) {
     let inside = usize::from(width.saturating_sub(4)).max(1);
     let rows: usize = lines.iter().map(|line| line.width().div_ceil(inside).max(1)).sum();
-    let inner = open_box(frame, area, &model.theme, title, width, rows as u16 + 2);
+    let inner = open_box(frame, area, model, title, width, rows as u16 + 2);
     frame.render_widget(Paragraph::new(lines).wrap(Wrap { trim: false }), inner);
 }
 
@@ -235,6 +241,7 @@ fn field_title(model: &Model, purpose: Purpose) -> String {
             format!("Search {} from .. to", model.session.info.parameters.get(parameter).map_or("", |info| &info.name))
         }
         Purpose::ConfirmBest => "How many repeats at most, to confirm the best?".to_owned(),
+        Purpose::VoidReason { trial, .. } => format!("Why is trial #{trial} void?"),
         Purpose::TrialNumber => "Go to trial".to_owned(),
         Purpose::LogSearch => "Search the log".to_owned(),
     }
@@ -259,9 +266,10 @@ fn field(model: &Model, purpose: Purpose, input: &Input, problem: Option<&str>) 
             "the best points run again until one leads; each repeat is approved like any other".to_owned()
         }
         Purpose::LogSearch => "empty: all lines".to_owned(),
-        Purpose::Note(_) if model.robot_is_energised() => {
-            "the robot is armed: Space is STOP, _ writes a space".to_owned()
+        Purpose::Note(_) if model.space_must_stop() => {
+            "the robot is energised: Space is STOP, _ writes a space".to_owned()
         }
+        Purpose::VoidReason { .. } => "it tripped a limit: by the rules that is a fall of its parameters".to_owned(),
         Purpose::Note(_) | Purpose::Continue | Purpose::TrialNumber => String::new(),
     };
     let below = problem.map_or_else(|| span(theme, Role::Quiet, hint), |problem| span(theme, Role::Bad, problem));
@@ -270,7 +278,7 @@ fn field(model: &Model, purpose: Purpose, input: &Input, problem: Option<&str>) 
 
 fn render_palette(frame: &mut Frame, area: Rect, model: &Model, input: &Input, selected: usize) {
     let theme = &model.theme;
-    let inner = open_box(frame, area, theme, "Actions", 80, area.height.min(24));
+    let inner = open_box(frame, area, model, "Actions", 80, area.height.min(24));
     let mut spans = vec![span(theme, Role::Key, ":")];
     spans.extend(edited(theme, input));
     frame.render_widget(Line::from(spans), Rect { height: 1, ..inner });
@@ -298,7 +306,7 @@ fn render_choice(frame: &mut Frame, area: Rect, model: &Model, subject: Choice, 
         Choice::Columns => "Columns of the trial table",
     };
     let rows = model.choices(subject);
-    let inner = open_box(frame, area, theme, title, 66, rows.len() as u16 + 2);
+    let inner = open_box(frame, area, model, title, 66, rows.len() as u16 + 2);
     // A terminal that is too low shows the lines around the chosen one.
     let first = (selected + 1).saturating_sub(usize::from(inner.height));
     for (line, (index, (name, help, on))) in
@@ -326,7 +334,7 @@ fn render_help(frame: &mut Frame, area: Rect, model: &Model, scroll: usize) {
     } else {
         "Keys".to_owned()
     };
-    let inner = open_box(frame, area, &model.theme, &more, 78, height);
+    let inner = open_box(frame, area, model, &more, 78, height);
     let shown: Vec<Line> = lines.into_iter().skip(scroll).take(room).collect();
     frame.render_widget(Paragraph::new(shown), inner);
 }

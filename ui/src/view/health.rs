@@ -182,8 +182,10 @@ fn written(status: &RecorderStatus, time_ns: u64) -> String {
 fn link_rows(link: &LinkStatus, limits: &HealthLimits) -> Vec<HealthRow> {
     let loss = 100.0 * link.loss_share();
     let states = format!("{} Hz, newest {} ms old", link.rate_hz, link.state_age_ms);
-    let unusual =
-        format!("{} out of order, {} duplicate, {} unknown source", link.out_of_order, link.duplicate, link.foreign);
+    let unusual = format!(
+        "{} out of order, {} duplicate, {} with another header",
+        link.out_of_order, link.duplicate, link.foreign
+    );
     let broken = format!("{} corrupt ({} in 5 s), {} short", link.corrupt, link.recent_corrupt, link.wrong_length);
     vec![
         row("states", states, link.state_age_ms > limits.state_age_ms),

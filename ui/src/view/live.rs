@@ -146,7 +146,7 @@ fn render_axis(frame: &mut Frame, strip: Rect, model: &Model, without_room: usiz
     frame.render_widget(Line::from(span(&model.theme, role, text)), area);
 }
 
-/// Torque and speed of each joint with bars of their share of the limit; `!` where the limiter clamped the command.
+/// Torque and speed of each joint with bars of their share of the limit; `!` where the last gate changed the command.
 fn render_joints(frame: &mut Frame, area: Rect, model: &Model) {
     let theme = &model.theme;
     let tick = &model.snapshot.tick;

@@ -55,6 +55,12 @@ fn live(model: &Model) -> NextStep {
         Mode::Jump => step("Jumping.", model, &[]),
         Mode::Settle => step("Landed; waiting until the robot is quiet.", model, &[]),
         Mode::SitDown => step("Sitting down.", model, &[]),
+        mode if model.storage.is_some() && !matches!(mode, Mode::Damped | Mode::Fault) => {
+            let wait =
+                model.storage.map(|wait| format!("Waiting for {}, {:.0} s", wait.place(), wait.waited.as_secs_f64()));
+            let lead = format!("{}: the study answers later.", wait.unwrap_or_default());
+            step(lead, model, &[sit_down, quit])
+        }
         _ if stage == Some(ExperimentStage::Review) => review(model),
         mode @ (Mode::Damped | Mode::Fault) => {
             let stopped = if mode == Mode::Fault { "FAULT" } else { "STOPPED" };
@@ -142,8 +148,8 @@ fn in_dialog(model: &Model, dialog: &Dialog) -> NextStep {
         }
         Dialog::Override(_) => "Enter takes the value and applies. Esc drops it.".to_owned(),
         Dialog::Quit => "Press y to quit. Any other key cancels.".to_owned(),
-        Dialog::Field { purpose: Purpose::Note(_), .. } if model.robot_is_energised() => {
-            "Enter saves the note, Esc cancels. Armed: Space is STOP, _ writes a space.".to_owned()
+        Dialog::Field { purpose: Purpose::Note(_) | Purpose::VoidReason { .. }, .. } if model.space_must_stop() => {
+            "Enter saves the text, Esc cancels. Energised: Space is STOP, _ writes a space.".to_owned()
         }
         Dialog::Field { .. } => "Enter confirms, Esc cancels.".to_owned(),
         Dialog::Palette { .. } => "Type to filter, Up Down choose, Enter does it, Esc closes.".to_owned(),

@@ -107,6 +107,14 @@ fn recording(model: &Model) -> Vec<Span<'static>> {
     }
 }
 
+/// The keys that stop now.
+fn stop_keys(model: &Model) -> String {
+    match model.space_is_no_stop() {
+        true => "F12 Ctrl-C".to_owned(),
+        false => model.keymap.all_keys(Action::Stop),
+    }
+}
+
 fn condition(model: &Model, width: u16) -> Vec<Span<'static>> {
     let theme = &model.theme;
     let narrow = width < 100;
@@ -114,7 +122,7 @@ fn condition(model: &Model, width: u16) -> Vec<Span<'static>> {
         Span::raw(" "),
         span(theme, Role::Alarm, " STOP "),
         Span::raw(" "),
-        span(theme, Role::Key, model.keymap.all_keys(Action::Stop)),
+        span(theme, Role::Key, stop_keys(model)),
     ];
     let gap = if narrow { "  " } else { "   " };
     let mut part = |name: &str, role, value: String| {
@@ -209,7 +217,7 @@ pub fn render_message(frame: &mut Frame, area: Rect, model: &Model) {
 /// The reduced form on a terminal that is too small: mode, STOP, link, needed size.
 pub fn render_small(frame: &mut Frame, area: Rect, model: &Model) {
     let theme = &model.theme;
-    let keys = model.keymap.all_keys(Action::Stop);
+    let keys = stop_keys(model);
     let link = match (model.snapshot.counters.link, model.session.info.is_hardware()) {
         (Some(link), _) => format!("link {} ms, {:.1} % lost", link.state_age_ms, 100.0 * link.loss_share()),
         (None, true) => format!("link {} ms", model.snapshot.counters.state_age_ms),

@@ -102,6 +102,33 @@ impl BatteryRecord {
     }
 }
 
+/// Record of the remote control, 40 bytes: Unitree's `xRockerBtnDataStruct` (joystick.h of unitree_legged_sdk).
+#[derive(Debug, Clone, Copy, PartialEq, FromBytes, IntoBytes, Immutable, KnownLayout, Unaligned)]
+#[repr(C)]
+pub struct RemoteRecord {
+    /// Head; its value is not established.
+    pub head: [u8; 2],
+    /// Pressed buttons, one bit each.
+    pub buttons: U16,
+    /// Left stick, x.
+    pub left_x: F32,
+    /// Right stick, x and y.
+    pub right: [F32; 2],
+    /// Travel of L2.
+    pub l2: F32,
+    /// Left stick, y.
+    pub left_y: F32,
+    /// Unused.
+    pub idle: [u8; 16],
+}
+
+impl RemoteRecord {
+    /// Whether the remote control answers: a byte is not zero.
+    pub fn answers(&self) -> bool {
+        self.as_bytes().iter().any(|byte| *byte != 0)
+    }
+}
+
 /// The state datagram, 807 bytes.
 #[derive(Debug, Clone, Copy, PartialEq, FromBytes, IntoBytes, Immutable, KnownLayout, Unaligned)]
 #[repr(C)]
@@ -120,8 +147,8 @@ pub struct LowState {
     pub foot_force_estimated: [I16; 4],
     /// The robot's clock, ms.
     pub robot_time_ms: U32,
-    /// Bytes of the remote control.
-    pub remote: [u8; 40],
+    /// Remote control (`wirelessRemote`).
+    pub remote: RemoteRecord,
     /// Reserved; the checksum covers the first byte alone.
     pub reserve: U32,
     crc: U32,
@@ -169,6 +196,7 @@ fn form_of(level: u8) -> CrcForm {
     if level == HIGH_LEVEL { CrcForm::Transformed } else { CrcForm::Plain }
 }
 
-const _: () = assert!(size_of::<LowState>() == STATE_LENGTH);
+const _: () = assert!(size_of::<LowState>() == STATE_LENGTH && size_of::<RemoteRecord>() == 40);
+const _: () = assert!(std::mem::offset_of!(LowState, remote) == 759);
 const _: () =
     assert!(std::mem::offset_of!(LowState, motor) == 75 && std::mem::offset_of!(LowState, robot_time_ms) == 755);

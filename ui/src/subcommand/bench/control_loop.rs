@@ -48,7 +48,7 @@ pub struct LoopArguments {
     with_link: bool,
     /// Omit the warm-up before each tick over the link (--cyclictest omits it too)
     #[arg(long, requires = "with_link")]
-    unrehearsed: bool,
+    without_warm_up: bool,
     /// Also run cyclictest (package rt-tests) in alternation, and compare
     #[arg(long)]
     cyclictest: bool,
@@ -61,7 +61,7 @@ impl LoopArguments {
     /// Returns the time from the start of a warm-up to its tick; zero for no warm-up. cyclictest wakes once per period,
     /// so the thread compared with it does too.
     fn lead(&self) -> Duration {
-        if self.with_link && !self.unrehearsed && !self.cyclictest { WARM_UP_LEAD } else { Duration::ZERO }
+        if self.with_link && !self.without_warm_up && !self.cyclictest { WARM_UP_LEAD } else { Duration::ZERO }
     }
 }
 
@@ -210,6 +210,8 @@ fn measure(
     let mut settings = config.settings(&description, Task::Forward, backend)?;
     // Neither a late tick nor a long stand may end the measurement.
     (settings.late_ms, settings.idle_s) = (0.0, 0.0);
+    // Nor a stall of the emulated robot, whose clock then stands still.
+    settings.consistency.clock_step_ms = f64::INFINITY;
     let lead = arguments.lead();
     if !arguments.with_link {
         let mut robot = Simulator::new(&description, &config.simulator).map_err(Failure::input)?;

@@ -18,9 +18,11 @@ pub(super) fn key(model: &mut Model, key: Key, purpose: Purpose, mut input: Inpu
             Ok(effects) => return effects,
             Err(reason) => problem = Some(reason),
         },
-        // Space is STOP while the robot is armed, so a note needs another key for it.
+        // Where Space is always STOP, a note needs another key for it.
         KeyCode::Char('_')
-            if key.typed().is_some() && model.robot_is_energised() && matches!(purpose, Purpose::Note(_)) =>
+            if key.typed().is_some()
+                && model.space_must_stop()
+                && matches!(purpose, Purpose::Note(_) | Purpose::VoidReason { .. }) =>
         {
             input.handle(InputRequest::InsertChar(' '));
         }
@@ -50,6 +52,10 @@ fn submit(model: &mut Model, purpose: Purpose, text: &str) -> Result<Vec<Effect>
         }
         Purpose::Bounds { parameter } => bounds(model, parameter, text)?,
         Purpose::ConfirmBest => OperatorRequest::ConfirmBest { repeats: count(text, "repeats")? },
+        Purpose::VoidReason { .. } if text.is_empty() => {
+            return Err("give the reason why the parameters did not cause it".to_owned());
+        }
+        Purpose::VoidReason { rerun, .. } => OperatorRequest::VoidBecause { reason: text.to_owned(), rerun },
         Purpose::TrialNumber => {
             let number = text.parse::<u32>().map_err(|_| format!("`{text}` is not the number of a trial"))?;
             if !model.session.trials.records.contains_key(&number) {

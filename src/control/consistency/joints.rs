@@ -1,0 +1,32 @@
+//! Joint velocities against differentiated joint angles.
+
+use super::inputs::StateStep;
+use super::leaky::kept;
+use crate::robot::{JOINTS, Joints, RobotState};
+
+/// Time constant of the sum of the angle's change less that of the velocity, s.
+const SUM_S: f64 = 0.1;
+
+/// History of the joints.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct JointRates {
+    /// Change of the angle less the integral of the velocity, rad.
+    error_rad: Joints,
+}
+
+impl JointRates {
+    pub fn update(&mut self, last: &RobotState, now: &RobotState, step: &StateStep) {
+        for joint in 0..JOINTS {
+            let moved = now.joint_position_rad[joint] - last.joint_position_rad[joint];
+            let reported = 0.5 * (last.joint_velocity_rad_s[joint] + now.joint_velocity_rad_s[joint]) * step.dt_s;
+            let added = if step.is_short { moved - reported } else { 0.0 };
+            self.error_rad[joint] = self.error_rad[joint] * kept(step.dt_s, SUM_S) + added;
+        }
+    }
+
+    /// Index and error of the joint with the largest error, rad.
+    pub fn worst(&self) -> (u8, f64) {
+        let errors = self.error_rad.iter().map(|error| error.abs()).enumerate();
+        errors.fold((0, 0.0), |worst, (joint, error)| if error > worst.1 { (joint as u8, error) } else { worst })
+    }
+}

@@ -1,0 +1,47 @@
+//! The hop envelope: on a robot a study begins with weak jumps. The largest forces of its trials are a share of the configured
+//! bounds, which grows with each trial that was accepted on that robot (`safety.toml`, `[hop_envelope]`).
+
+use super::attributes::TrialAttributes;
+use super::plan::{ExperimentPlan, RequestRefusal, not_now};
+use crate::optimize::space::{Parameter, Range, Space};
+use crate::optimize::trial::{Trial, TrialState};
+use crate::trial::{HopEnvelope, ParameterInfo, Verdict, parameter_unit};
+
+/// Returns the share of the force bounds that the next trial may use; none where the whole bounds are open.
+pub fn share(plan: &ExperimentPlan, trials: &[Trial]) -> Option<f64> {
+    let HopEnvelope { start, step } = plan.envelope?;
+    let accepted = |trial: &&Trial| {
+        let kept = TrialAttributes::of(trial);
+        let here = kept.backend.as_deref() == Some(plan.backend.name());
+        here && trial.state == TrialState::Complete && kept.verdict == Some(Verdict::Accept)
+    };
+    let share = start + step * trials.iter().filter(accepted).count() as f64;
+    (share < 1.0).then_some(share)
+}
+
+/// Returns the largest allowed value of a force, N; none for a parameter that is no force.
+fn largest(plan: &ExperimentPlan, share: f64, name: &str) -> Option<f64> {
+    let ParameterInfo { low, high, .. } = plan.parameters.iter().find(|parameter| parameter.name == name)?;
+    (parameter_unit(name) == "N").then_some(low + share * (high - low))
+}
+
+/// Returns the part of `space` inside the envelope.
+pub fn inside(space: &Space, plan: &ExperimentPlan, share: f64) -> Option<Space> {
+    let limited = |Parameter { name, range }: &Parameter| {
+        let most = largest(plan, share, name).unwrap_or(f64::INFINITY);
+        (name.clone(), Range { low: range.low.min(most), high: range.high.min(most), ..*range })
+    };
+    Space::new(space.parameters().iter().map(limited)).ok()
+}
+
+/// Refuses a value beyond the envelope.
+pub fn must_be_inside(plan: &ExperimentPlan, share: Option<f64>, name: &str, value: f64) -> Result<(), RequestRefusal> {
+    let Some(share) = share else { return Ok(()) };
+    match largest(plan, share, name) {
+        Some(most) if value > most => not_now(format!(
+            "{name} = {value} N is beyond the hop envelope, at present {most:.0} N ({:.0} % of the bounds); each trial that is accepted on this robot widens it",
+            100.0 * share
+        )),
+        _ => Ok(()),
+    }
+}

@@ -1,0 +1,187 @@
+//! The end of a trial: measurement, suggestion, verdict.
+
+use super::attributes::{self, JudgedAttributes};
+use super::plan::{ExperimentPlan, RequestRefusal, not_now};
+use super::{Experiment, ExperimentState, PendingVerdict};
+use crate::optimize::study::{Outcome, StudyError};
+use crate::session::objective;
+use crate::telemetry::{Tick, TrialEnd};
+use crate::trial::{TrialRecord, Verdict};
+
+const NOT_UNDER_REVIEW: &str = "no trial is under review";
+
+impl Experiment {
+    /// Measures the trial that has ended; it waits for its verdict then. `recorded` is its number of ticks: if some are
+    /// missing in `ticks`, nothing is measured.
+    pub fn ended(&mut self, trial: u32, end: &TrialEnd, ticks: &[Tick], recorded: u64) {
+        if !matches!(self.state, ExperimentState::Running(running) if running == trial) {
+            return;
+        }
+        let (mut suggested, mut cause) = objective::suggest(end);
+        let missing = recorded.saturating_sub(ticks.len() as u64);
+        let jumped = missing > 0 || ticks.iter().any(|tick| tick.trial.is_some() && tick.trial_time_s >= 0.0);
+        if missing > 0 && suggested == Verdict::Accept {
+            (suggested, cause) = (Verdict::Void, format!("{missing} ticks of it were not recorded: not measured"));
+        } else if objective::trips_limit(end) && !jumped {
+            (suggested, cause) = (Verdict::Void, format!("before the jump: {cause}"));
+        }
+        if let Some(row) = self.rows.get_mut(&trial) {
+            row.measured = if missing == 0 { objective::measure(ticks) } else { None };
+            row.suggested = Some(suggested);
+            row.cause = cause;
+            row.value = value_of(row, suggested, &self.plan);
+        }
+        self.publish_row(trial);
+        self.enter(ExperimentState::Review(trial), trial);
+    }
+
+    /// Judges the trial under review; with `rerun` its parameters are queued again.
+    /// Refused when no trial is under review, an accepted trial has no value, or a trial that tripped a limit is judged void
+    /// without a reason.
+    pub fn judge(&mut self, verdict: Verdict, rerun: bool) -> Result<(), RequestRefusal> {
+        self.judge_because(verdict, rerun, "")
+    }
+
+    /// Judges the trial under review void for a reason of the operator; with `rerun` its parameters are queued again.
+    /// Refused when no trial is under review.
+    pub fn void_because(&mut self, reason: &str, rerun: bool) -> Result<(), RequestRefusal> {
+        self.judge_because(Verdict::Void, rerun, reason.trim())
+    }
+
+    fn judge_because(&mut self, verdict: Verdict, rerun: bool, reason: &str) -> Result<(), RequestRefusal> {
+        let trial = self.reviewed()?;
+        let Some(row) = self.rows.get_mut(&trial) else { return not_now(NOT_UNDER_REVIEW) };
+        if verdict == Verdict::Void && reason.is_empty() && objective::tripped_limit(row) {
+            return not_now(format!(
+                "trial {trial} tripped a limit ({}), which is its parameters' outcome; to judge it void give the reason why they did not cause it",
+                row.cause
+            ));
+        }
+        let value = value_of(row, verdict, &self.plan);
+        let outcome = match (verdict, value) {
+            (Verdict::Void, _) => Outcome::Fail,
+            (_, Some(value)) => Outcome::Complete(value),
+            (_, None) => {
+                return not_now("nothing was measured in this trial; enter a value measured by hand, or judge it void");
+            }
+        };
+        let suggestion = row.clone();
+        row.verdict = Some(verdict);
+        row.value = value;
+        if let Some(suggested) = row.suggested.filter(|suggested| *suggested != verdict) {
+            let given = if reason.is_empty() { String::new() } else { format!(": {reason}") };
+            row.cause = format!("by the operator{given}; looked like {}: {}", suggested.name(), row.cause);
+        } else if !reason.is_empty() {
+            row.cause = format!("by the operator: {reason}; {}", row.cause);
+        }
+        match self.write_judgement(trial, rerun) {
+            // Another worker has closed the trial as abandoned, or another program has ended it.
+            Err(StudyError::State { .. }) => {
+                self.rows.remove(&trial);
+                self.state = ExperimentState::Finished;
+                self.propose()?;
+                return Err(RequestRefusal::EndedElsewhere(trial));
+            }
+            Err(error) => {
+                self.rows.insert(trial, suggestion);
+                return Err(error.into());
+            }
+            Ok(()) => {}
+        }
+        self.publish_row(trial);
+        self.pending = Some(PendingVerdict { suggestion, outcome, rerun });
+        self.propose()?;
+        Ok(())
+    }
+
+    /// Takes the last verdict back.
+    /// Refused when it was reported already.
+    pub fn undo(&mut self) -> Result<(), RequestRefusal> {
+        let Some(pending) = self.pending.as_ref().filter(|_| self.is_idle()) else {
+            return not_now(
+                "there is no verdict to undo; the last one became final when the next trial was approved or refused",
+            );
+        };
+        let mut row = pending.suggestion.clone();
+        let trial = row.trial;
+        if let Some(judged) = self.rows.get(&trial) {
+            row.note.clone_from(&judged.note);
+        }
+        // If this fails, the verdict stands on the disk and must still be reported.
+        self.study.annotate(trial, &attributes::write(&JudgedAttributes::of(&row, false)))?;
+        self.pending = None;
+        self.rows.insert(trial, row);
+        self.publish_row(trial);
+        self.enter(ExperimentState::Review(trial), trial);
+        Ok(())
+    }
+
+    /// Uses a value measured by hand for the trial under review; none returns to the measured one.
+    /// Refused when no trial is under review or the value is not finite.
+    pub fn set_hand_value(&mut self, value: Option<f64>) -> Result<(), RequestRefusal> {
+        let trial = self.reviewed()?;
+        if value.is_some_and(|value| !value.is_finite()) {
+            return not_now("a measured value must be a finite number");
+        }
+        if let Some(row) = self.rows.get_mut(&trial) {
+            row.hand_value = value;
+            row.value = row.suggested.and_then(|suggested| value_of(row, suggested, &self.plan));
+        }
+        self.publish_row(trial);
+        Ok(())
+    }
+
+    /// Ends the session during a review: a trial that is to be void by the rules (stopped, or its operator is gone) is void
+    /// with its cause, and its parameters are queued again as after a crash. A trial that tripped a limit is a fall and is not
+    /// queued. Any other waits for its verdict until the study is opened again.
+    pub fn close_unreviewed(&mut self) -> Result<(), StudyError> {
+        let ExperimentState::Review(trial) = self.state else { return Ok(()) };
+        let Some(row) = self.rows.get_mut(&trial) else { return Ok(()) };
+        let limit = objective::tripped_limit(row);
+        let verdict = if limit { Verdict::Fall } else { Verdict::Void };
+        if row.suggested != Some(verdict) {
+            return Ok(());
+        }
+        row.verdict = Some(verdict);
+        let cause = row.cause.clone();
+        self.publish_row(trial);
+        self.state = ExperimentState::Finished;
+        if limit {
+            return match self.write_judgement(trial, false) {
+                Ok(()) => self.study.tell(trial, Outcome::Complete(0.0)).map(drop),
+                // Ended by another program: that result stands.
+                Err(StudyError::State { .. }) => Ok(()),
+                Err(error) => Err(error),
+            };
+        }
+        let log = self.queue.close(&mut self.study, trial, &cause)?;
+        self.log_all(log);
+        Ok(())
+    }
+
+    fn reviewed(&self) -> Result<u32, RequestRefusal> {
+        match self.state {
+            ExperimentState::Review(trial) => Ok(trial),
+            _ => not_now(NOT_UNDER_REVIEW),
+        }
+    }
+
+    pub(super) fn write_judgement(&mut self, trial: u32, rerun: bool) -> Result<(), StudyError> {
+        match self.rows.get(&trial) {
+            Some(row) => self.study.annotate(trial, &attributes::write(&JudgedAttributes::of(row, rerun))),
+            None => Ok(()),
+        }
+    }
+}
+
+/// Returns the value of a row with a verdict: 0 for a fall (paper, section II-D), none for void, else the value measured by
+/// hand or by the robot.
+fn value_of(row: &TrialRecord, verdict: Verdict, plan: &ExperimentPlan) -> Option<f64> {
+    match verdict {
+        Verdict::Fall => Some(0.0),
+        Verdict::Void => None,
+        Verdict::Accept => row.hand_value.or_else(|| {
+            row.measured.as_ref().map(|measured| objective::value(plan.task, measured, plan.control.jumps))
+        }),
+    }
+}

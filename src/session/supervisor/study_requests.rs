@@ -1,0 +1,97 @@
+//! Requests that change the study, as jobs on the experiment.
+
+use crate::session::experiment::{Experiment, RequestRefusal};
+use crate::session::operator_request::OperatorRequest;
+use crate::session::storage::JobOutput;
+use crate::trial::Verdict;
+
+/// Carries out a request. One that is not of the study is refused.
+pub fn carry_out(experiment: &mut Experiment, request: &OperatorRequest) -> JobOutput {
+    match request {
+        OperatorRequest::Judge(verdict) => {
+            judged(experiment.judge(*verdict, false), "u takes it back until the next trial is approved or skipped")
+        }
+        OperatorRequest::Rerun { trial: None } => {
+            judged(experiment.judge(Verdict::Void, true), "void, and its parameters are proposed again")
+        }
+        OperatorRequest::VoidBecause { reason, rerun: false } => judged(experiment.void_because(reason, false), "void"),
+        OperatorRequest::VoidBecause { reason, rerun: true } => {
+            judged(experiment.void_because(reason, true), "void, and its parameters are proposed again")
+        }
+        _ => JobOutput::Answer(change(experiment, request).map_err(|refusal| refusal.to_string())),
+    }
+}
+
+/// The answer to a verdict. If another program has ended the trial, the review is over as well.
+fn judged(judged: Result<(), RequestRefusal>, answer: &str) -> JobOutput {
+    let over = matches!(judged, Ok(()) | Err(RequestRefusal::EndedElsewhere(_)));
+    JobOutput::Judged(judged.map(|()| answer.to_owned()).map_err(|refusal| refusal.to_string()), over)
+}
+
+fn change(experiment: &mut Experiment, request: &OperatorRequest) -> Result<String, RequestRefusal> {
+    Ok(match request {
+        OperatorRequest::Skip => {
+            experiment.skip()?;
+            "skipped; a new proposal follows".to_owned()
+        }
+        OperatorRequest::Override { parameter, value } => {
+            experiment.set_parameter(parameter, *value)?;
+            format!("{parameter} will be {value}")
+        }
+        OperatorRequest::ClearOverrides => {
+            experiment.clear_overrides()?;
+            "as it was proposed".to_owned()
+        }
+        OperatorRequest::OverrideGain { gain, value } => {
+            experiment.set_gain(gain, *value)?;
+            format!("{gain} will be {value} in this trial")
+        }
+        OperatorRequest::Fix { parameter, value, trials } => {
+            experiment.fix(parameter, *value, *trials)?;
+            format!("{parameter} is {value} for the next {trials} trials that count")
+        }
+        OperatorRequest::Unfix { parameter } => {
+            experiment.unfix(parameter)?;
+            format!("{parameter} is searched again")
+        }
+        OperatorRequest::NarrowBounds { parameter, low, high } => {
+            experiment.narrow_bounds(parameter, *low, *high)?;
+            format!("{parameter} is searched from {low} to {high}")
+        }
+        OperatorRequest::ConfirmBest { repeats } => {
+            let trials: Vec<String> = experiment.confirm_best(*repeats)?.iter().map(u32::to_string).collect();
+            match trials.len() {
+                0 => "no more repeats".to_owned(),
+                _ => format!("the points of trials {} are repeated, at most {repeats} times", trials.join(", ")),
+            }
+        }
+        OperatorRequest::Rerun { trial: Some(trial) } => {
+            experiment.repeat(*trial)?;
+            format!("the parameters of trial {trial} are queued")
+        }
+        OperatorRequest::Undo => {
+            experiment.undo()?;
+            "the verdict is taken back".to_owned()
+        }
+        OperatorRequest::HandValue(value) => {
+            experiment.set_hand_value(*value)?;
+            match value {
+                Some(value) => format!("{value} counts instead of the measured value"),
+                None => "the measured value counts".to_owned(),
+            }
+        }
+        OperatorRequest::Note { trial, text } => {
+            experiment.note(*trial, text)?;
+            "noted".to_owned()
+        }
+        OperatorRequest::Enqueue(parameters) => {
+            experiment.enqueue(parameters)?;
+            "queued".to_owned()
+        }
+        OperatorRequest::Continue(trials) => {
+            experiment.extend(*trials)?;
+            format!("the study now has {} trials", experiment.budget())
+        }
+        _ => return Err(RequestRefusal::NotNow("this is no request to the study".to_owned())),
+    })
+}

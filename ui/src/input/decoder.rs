@@ -1,0 +1,366 @@
+//! Bytes of the terminal as keys, pasted text and mouse input.
+//!
+//! A STOP key is reported with its last byte in every state: after an Esc, inside an unfinished sequence and inside a
+//! begun paste. `Space` (0x20), `Ctrl-C` (0x03) and `Ctrl-Space` (0x00) are one byte, which occurs in no sequence that
+//! this program requests from a terminal; the sequence of `F12` is searched for in the raw bytes.
+//! Sequences: ECMA-48, 5.4; XTerm Control Sequences ("PC-Style Function Keys", "Mouse Tracking").
+
+use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
+
+use crate::keymap::Key;
+use crate::message::Mouse;
+
+/// One input of the terminal.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[expect(missing_docs, reason = "the names say the rest")]
+pub enum Input {
+    Key(Key),
+    Paste(String),
+    Mouse(Mouse),
+}
+
+/// Longest control sequence, bytes; a longer one is dropped.
+const LONGEST_SEQUENCE: usize = 64;
+/// Final bytes of a paste.
+const PASTE_END: &[u8] = b"\x1b[201~";
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum State {
+    /// Between inputs.
+    Ground,
+    /// Inside a character of several bytes.
+    Character,
+    /// After ESC.
+    Escape,
+    /// After ESC O.
+    Function,
+    /// After ESC [.
+    Control,
+    /// After ESC [ [, the function keys of the Linux console.
+    LinuxFunction,
+    /// Inside a mouse report of the old form, with the number of bytes left.
+    OldMouse(u8),
+    Paste,
+}
+
+/// Decoder of the terminal's bytes.
+#[derive(Debug)]
+pub struct Decoder {
+    state: State,
+    /// Bytes of the unfinished character, sequence or paste.
+    bytes: Vec<u8>,
+    /// ESC preceded the unfinished character.
+    alt: bool,
+    /// Raw bytes since the last ESC, whatever was made of them; empty without one.
+    since_escape: Vec<u8>,
+    /// Whether bracketed paste is on.
+    pastes: bool,
+}
+
+impl Decoder {
+    /// A decoder between inputs. Without `pastes` the marks of a bracketed paste are ignored and its text is keys.
+    pub fn new(pastes: bool) -> Decoder {
+        Decoder { state: State::Ground, bytes: Vec::new(), alt: false, since_escape: Vec::new(), pastes }
+    }
+
+    /// Whether a further byte may belong to the present input.
+    pub fn pending(&self) -> bool {
+        self.state != State::Ground
+    }
+
+    /// Whether the last byte was a lone ESC.
+    pub fn escaped(&self) -> bool {
+        self.state == State::Escape
+    }
+
+    /// Whether a paste has begun and not ended.
+    pub fn pasting(&self) -> bool {
+        self.state == State::Paste
+    }
+
+    /// Takes one byte; appends the inputs that it completes.
+    pub fn take(&mut self, byte: u8, inputs: &mut Vec<Input>) {
+        if let Some(key) = self.stop_in_sequence(byte).or_else(|| self.stop_in_byte(byte)) {
+            self.reset();
+            inputs.push(Input::Key(key));
+            return;
+        }
+        match self.state {
+            State::Paste => self.paste(byte, inputs),
+            // A new sequence ends an unfinished one; two in a row are the key Esc and a sequence.
+            _ if byte == 0x1b => {
+                if self.state == State::Escape {
+                    inputs.push(Input::Key(named(KeyCode::Esc)));
+                }
+                self.enter(State::Escape);
+            }
+            State::Ground => self.ground(byte, inputs),
+            State::Character => self.character(byte, inputs),
+            State::Escape => match byte {
+                b'[' => self.enter(State::Control),
+                b'O' => self.enter(State::Function),
+                _ => {
+                    self.reset();
+                    self.alt = true;
+                    self.ground(byte, inputs);
+                }
+            },
+            State::Function => {
+                self.reset();
+                inputs.extend(letter(byte).map(|code| Input::Key(named(code))));
+            }
+            State::LinuxFunction => {
+                self.reset();
+                if let b'A'..=b'E' = byte {
+                    inputs.push(Input::Key(named(KeyCode::F(byte - b'A' + 1))));
+                }
+            }
+            State::OldMouse(left) if left > 1 => self.state = State::OldMouse(left - 1),
+            State::OldMouse(_) => self.reset(),
+            State::Control => self.control(byte, inputs),
+        }
+    }
+
+    /// Takes in that no byte has followed for a while: a lone ESC is the key Esc.
+    pub fn idle(&mut self, inputs: &mut Vec<Input>) {
+        match self.state {
+            State::Escape => inputs.push(Input::Key(named(KeyCode::Esc))),
+            State::Control if self.bytes.is_empty() => inputs.push(Input::Key(alt('['))),
+            State::Function => inputs.push(Input::Key(alt('O'))),
+            State::Paste => inputs.push(Input::Paste(String::from_utf8_lossy(&self.bytes).into_owned())),
+            _ => {}
+        }
+        self.enter(State::Ground);
+    }
+
+    fn enter(&mut self, state: State) {
+        self.state = state;
+        self.bytes.clear();
+        self.alt = false;
+    }
+
+    fn reset(&mut self) {
+        self.enter(State::Ground);
+    }
+
+    /// Returns the STOP key whose sequence this byte ends. The raw bytes are compared, so that neither a pause inside the
+    /// sequence nor the decoder's state can hide it.
+    fn stop_in_sequence(&mut self, byte: u8) -> Option<Key> {
+        if byte == 0x1b {
+            self.since_escape.clear();
+        } else if self.since_escape.is_empty() || self.since_escape.len() > LONGEST_SEQUENCE {
+            self.since_escape.clear();
+            return None;
+        }
+        self.since_escape.push(byte);
+        let [0x1b, b'[', parameters @ .., end] = &self.since_escape[..] else { return None };
+        match sequence(parameters, *end)? {
+            Input::Key(key) if key.stops() => {
+                self.since_escape.clear();
+                Some(key)
+            }
+            _ => None,
+        }
+    }
+
+    /// Returns the STOP key that this byte is. Inside a sequence it is no text.
+    fn stop_in_byte(&self, byte: u8) -> Option<Key> {
+        let modifiers = match self.state {
+            State::Ground | State::Character => KeyModifiers::NONE,
+            _ => KeyModifiers::ALT,
+        };
+        match byte {
+            0x03 => Some(key(KeyCode::Char('c'), KeyModifiers::CONTROL | modifiers)),
+            0x00 => Some(key(KeyCode::Char(' '), KeyModifiers::CONTROL | modifiers)),
+            b' ' if self.state != State::Paste => Some(key(KeyCode::Char(' '), modifiers)),
+            _ => None,
+        }
+    }
+
+    fn ground(&mut self, byte: u8, inputs: &mut Vec<Input>) {
+        let modifiers = if self.alt { KeyModifiers::ALT } else { KeyModifiers::NONE };
+        let code = match byte {
+            b'\r' => KeyCode::Enter,
+            b'\t' => KeyCode::Tab,
+            0x7f => KeyCode::Backspace,
+            0x01..=0x1a => {
+                let letter = char::from(byte - 1 + b'a');
+                self.reset();
+                inputs.push(Input::Key(key(KeyCode::Char(letter), KeyModifiers::CONTROL | modifiers)));
+                return;
+            }
+            0x1b..=0x1f => {
+                let digit = char::from(byte - 0x1b + b'3');
+                self.reset();
+                inputs.push(Input::Key(key(KeyCode::Char(digit), KeyModifiers::CONTROL | modifiers)));
+                return;
+            }
+            0xc2..=0xf4 => {
+                self.state = State::Character;
+                self.bytes.push(byte);
+                return;
+            }
+            // Not the first byte of a character.
+            0x80.. => return self.reset(),
+            _ => KeyCode::Char(char::from(byte)),
+        };
+        self.reset();
+        inputs.push(Input::Key(key(code, modifiers)));
+    }
+
+    fn character(&mut self, byte: u8, inputs: &mut Vec<Input>) {
+        if !(0x80..0xc0).contains(&byte) {
+            // The character is incomplete: it is dropped, the byte is not.
+            self.reset();
+            return self.ground(byte, inputs);
+        }
+        self.bytes.push(byte);
+        let length = match self.bytes[0] {
+            0xc2..=0xdf => 2,
+            0xe0..=0xef => 3,
+            _ => 4,
+        };
+        if self.bytes.len() < length {
+            return;
+        }
+        let modifiers = if self.alt { KeyModifiers::ALT } else { KeyModifiers::NONE };
+        let typed = std::str::from_utf8(&self.bytes).ok().and_then(|text| text.chars().next());
+        self.reset();
+        inputs.extend(typed.map(|c| Input::Key(key(KeyCode::Char(c), modifiers))));
+    }
+
+    fn control(&mut self, byte: u8, inputs: &mut Vec<Input>) {
+        match byte {
+            b'[' if self.bytes.is_empty() => self.enter(State::LinuxFunction),
+            b'M' if self.bytes.is_empty() => self.enter(State::OldMouse(3)),
+            0x40..=0x7e => {
+                let parameters = std::mem::take(&mut self.bytes);
+                self.reset();
+                if self.pastes && (&parameters[..], byte) == (b"200", b'~') {
+                    self.enter(State::Paste);
+                } else {
+                    inputs.extend(sequence(&parameters, byte));
+                }
+            }
+            0x21..=0x3f if self.bytes.len() < LONGEST_SEQUENCE => self.bytes.push(byte),
+            _ => {
+                self.reset();
+                self.ground(byte, inputs);
+            }
+        }
+    }
+
+    fn paste(&mut self, byte: u8, inputs: &mut Vec<Input>) {
+        self.bytes.push(byte);
+        if let Some(text) = self.bytes.strip_suffix(PASTE_END) {
+            inputs.push(Input::Paste(String::from_utf8_lossy(text).into_owned()));
+            self.reset();
+        }
+    }
+}
+
+fn key(code: KeyCode, modifiers: KeyModifiers) -> Key {
+    Key::from_event(KeyEvent::new(code, modifiers))
+}
+
+fn named(code: KeyCode) -> Key {
+    key(code, KeyModifiers::NONE)
+}
+
+fn alt(c: char) -> Key {
+    key(KeyCode::Char(c), KeyModifiers::ALT)
+}
+
+/// The key of a final letter.
+fn letter(end: u8) -> Option<KeyCode> {
+    Some(match end {
+        b'A' => KeyCode::Up,
+        b'B' => KeyCode::Down,
+        b'C' => KeyCode::Right,
+        b'D' => KeyCode::Left,
+        b'H' => KeyCode::Home,
+        b'F' => KeyCode::End,
+        b'Z' => KeyCode::BackTab,
+        b'P'..=b'S' => KeyCode::F(end - b'P' + 1),
+        _ => return None,
+    })
+}
+
+/// The key of a number before `~`.
+fn numbered(number: u32) -> Option<KeyCode> {
+    Some(match number {
+        1 | 7 => KeyCode::Home,
+        2 => KeyCode::Insert,
+        3 => KeyCode::Delete,
+        4 | 8 => KeyCode::End,
+        5 => KeyCode::PageUp,
+        6 => KeyCode::PageDown,
+        11..=15 => KeyCode::F(number as u8 - 10),
+        17..=21 => KeyCode::F(number as u8 - 11),
+        23..=26 => KeyCode::F(number as u8 - 12),
+        _ => return None,
+    })
+}
+
+/// The key of a code point.
+fn code_point(number: u32) -> Option<KeyCode> {
+    Some(match number {
+        9 => KeyCode::Tab,
+        13 => KeyCode::Enter,
+        27 => KeyCode::Esc,
+        127 => KeyCode::Backspace,
+        _ => KeyCode::Char(char::from_u32(number).filter(|c| !c.is_control())?),
+    })
+}
+
+/// Modifiers as a terminal encodes them: 1 and a bit each.
+fn modifiers(number: u32) -> KeyModifiers {
+    let bits = number.saturating_sub(1);
+    let bit = |bit, modifier| if bits & bit == 0 { KeyModifiers::NONE } else { modifier };
+    bit(1, KeyModifiers::SHIFT) | bit(2, KeyModifiers::ALT) | bit(4, KeyModifiers::CONTROL)
+}
+
+/// The input of a control sequence, by its parameters and final byte; none if it is not known, or the release of a key.
+fn sequence(parameters: &[u8], end: u8) -> Option<Input> {
+    let text = std::str::from_utf8(parameters).ok()?;
+    if let Some(report) = text.strip_prefix('<') {
+        return mouse(report, end).map(Input::Mouse);
+    }
+    // Sub-parameters follow a colon: of the modifiers the kind of the event.
+    let mut fields = text.split(';').map(|field| field.split(':').map(|part| part.parse::<u32>().ok()));
+    let mut field = || fields.next().map(|mut parts| (parts.next().flatten(), parts.next().flatten()));
+    let (first, second, third) = (field(), field(), field());
+    let value = |field: Option<(Option<u32>, Option<u32>)>| field.and_then(|(value, _)| value);
+    const RELEASE: u32 = 3;
+    if second.is_some_and(|(_, kind)| kind == Some(RELEASE)) {
+        return None;
+    }
+    let (number, held) = (value(first), modifiers(value(second).unwrap_or(1)));
+    let (code, held) = match end {
+        // xterm's modifyOtherKeys.
+        b'~' if number == Some(27) => (code_point(value(third)?)?, held),
+        b'~' => (numbered(number?)?, held),
+        // rxvt's Shift, Ctrl, and both.
+        b'$' => (numbered(number?)?, KeyModifiers::SHIFT),
+        b'^' => (numbered(number?)?, KeyModifiers::CONTROL),
+        b'@' => (numbered(number?)?, KeyModifiers::SHIFT | KeyModifiers::CONTROL),
+        b'u' => (code_point(number?)?, held),
+        // Alone it is a function key, with two numbers the position of the cursor.
+        b'R' if number.is_some_and(|number| number > 1) => return None,
+        _ => (letter(end)?, held),
+    };
+    Some(Input::Key(key(code, held)))
+}
+
+/// A mouse report of the form `button;column;row`. Moves, releases and other buttons are ignored.
+fn mouse(report: &str, end: u8) -> Option<Mouse> {
+    let mut numbers = report.split(';').map(|number| number.parse::<u16>().ok());
+    let (button, column, row) = (numbers.next()??, numbers.next()??, numbers.next()??);
+    // Bits 4, 8 and 16 are Shift, Alt and Ctrl.
+    match (button & !0b1_1100, end) {
+        (0, b'M') => Some(Mouse::Click { column: column.checked_sub(1)?, row: row.checked_sub(1)? }),
+        (64, b'M') => Some(Mouse::WheelUp),
+        (65, b'M') => Some(Mouse::WheelDown),
+        _ => None,
+    }
+}
