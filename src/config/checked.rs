@@ -238,6 +238,7 @@ impl Config {
             stand_up: self.control.stand_up,
             sit_down: self.control.sit_down,
             countdown_s: if hardware { self.control.countdown.hardware_s } else { self.control.countdown.simulator_s },
+            blend_s: self.control.countdown.blend_s,
             settle: self.control.settle,
             fall: self.safety.fall,
             flight_tilt_rad: if hardware { fall.hardware_flight_rad } else { fall.simulator_flight_rad },

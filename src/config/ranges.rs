@@ -40,6 +40,15 @@ const READY_STANCE: NumberRange =
     NumberRange { allows: |v| v > 0.0 && v <= 0.5, text: "must be above 0 and at most 0.5 rad" };
 const CLOCK_DRIFT: NumberRange =
     NumberRange { allows: |v| (0.0..=1000.0).contains(&v), text: "must be 0 to 1000 parts per million" };
+const DELAY_GROWTH: NumberRange =
+    NumberRange { allows: |v| v > 0.0 && v <= 50.0, text: "must be above 0 and at most 50 ms" };
+const LOSS: NumberRange = NumberRange { allows: |v| v > 0.0 && v <= 0.5, text: "must be above 0 and at most 0.5" };
+const TAKEOFF_SPEED: NumberRange = NumberRange { allows: |v| (0.1..=2.0).contains(&v), text: "must be 0.1 to 2 m/s" };
+const HOLD_TIME: NumberRange = NumberRange { allows: |v| (0.1..=1.5).contains(&v), text: "must be 0.1 to 1.5 s" };
+const HOLD_KP: NumberRange = NumberRange { allows: |v| (20.0..=100.0).contains(&v), text: "must be 20 to 100 N m/rad" };
+const HOLD_KD: NumberRange = NumberRange { allows: |v| (1.0..=5.0).contains(&v), text: "must be 1 to 5 N m s/rad" };
+const RAMP: NumberRange = NumberRange { allows: |v| (0.02..=1.0).contains(&v), text: "must be 0.02 to 1" };
+const BLEND: NumberRange = NumberRange { allows: |v| (0.1..=5.0).contains(&v), text: "must be 0.1 to 5 s" };
 
 const REPEATED_STATES: NumberRange =
     NumberRange { allows: |v| (10.0..=200.0).contains(&v), text: "must be 10 to 200 states" };
@@ -63,6 +72,7 @@ const TORQUE_ERROR: NumberRange = NumberRange { allows: |v| (0.5..=20.0).contain
 
 const CONTROL: &[Row] = &[
     (&["countdown.simulator_s"], COUNTDOWN),
+    (&["countdown.blend_s"], BLEND),
     (&["tasks.*.jumps"], JUMPS),
     (&["tasks.*.attitude_rate_gain"], ATTITUDE_RATE_GAIN),
     (&["tasks.*.foot_placement_s"], FOOT_PLACEMENT),
@@ -104,6 +114,13 @@ const SAFETY: &[Row] = &[
     (&["ready.tilt_rad"], READY_TILT),
     (&["ready.stance_rad"], READY_STANCE),
     (&["watchdog.clock_drift_ppm"], CLOCK_DRIFT),
+    (&["watchdog.delay_warn_ms", "watchdog.delay_hold_ms", "watchdog.delay_land_ms"], DELAY_GROWTH),
+    (&["watchdog.loss_warn_share"], LOSS),
+    (&["watchdog.takeoff_speed_m_s"], TAKEOFF_SPEED),
+    (&["watchdog.hold_s"], HOLD_TIME),
+    (&["watchdog.hold_kp"], HOLD_KP),
+    (&["watchdog.hold_kd"], HOLD_KD),
+    (&["watchdog.ramp_error_rad", "watchdog.ramp_torque_share", "watchdog.ramp_limit_s"], RAMP),
     (&["*.*"], POSITIVE),
 ];
 const OPTIMIZE: &[Row] = &[

@@ -253,6 +253,28 @@ pub struct FailsafeLimits {
     pub operator_silent_ms: u32,
     /// LAND: longest time from touchdown to sitting down, s.
     pub land_s: f64,
+    /// Growth of the link's delay that gives a warning, ms.
+    pub delay_warn_ms: f64,
+    /// Growth of the link's delay, ms: HOLD.
+    pub delay_hold_ms: f64,
+    /// Growth of the link's delay, ms: LAND.
+    pub delay_land_ms: f64,
+    /// Share of the states of the last second lost that gives a warning.
+    pub loss_warn_share: f64,
+    /// Upward speed of the trunk in an impulse from which the robot flies whatever the motors do, m/s.
+    pub takeoff_speed_m_s: f64,
+    /// A fault in the air without a known state: time for which the motors hold the stance, s.
+    pub hold_s: f64,
+    /// The same: joint stiffness, N m/rad.
+    pub hold_kp: f64,
+    /// The same: joint damping, N m s/rad.
+    pub hold_kd: f64,
+    /// Ramps: largest distance of a joint from its target, rad: CUT.
+    pub ramp_error_rad: f64,
+    /// Ramps: largest torque, share of the joint's limit; a larger demand is limited, then CUT.
+    pub ramp_torque_share: f64,
+    /// Ramps: time for which a joint may exceed either, s.
+    pub ramp_limit_s: f64,
     /// Largest drift of the robot's clock against this machine's that is not taken for a growing delay, parts per million.
     pub clock_drift_ppm: f64,
     /// Least free space where the recording goes, MB: HOLD.
@@ -414,6 +436,8 @@ pub struct ControlSettings {
     pub sit_down: RampSettings,
     /// From approval to the impulse, standing still, s.
     pub countdown_s: f64,
+    /// Time in which the gains change at the begin of the countdown and after a trial, s.
+    pub blend_s: f64,
     /// End of a trial.
     pub settle: SettleSettings,
     /// Limits of a fall.
