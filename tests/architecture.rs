@@ -33,7 +33,7 @@ const CONSOLE: [&[&str]; 9] = [
     &["model"],
     &["layout", "text"],
     &["legal"],
-    &["update", "view", "feed", "export", "terminal"],
+    &["update", "view", "feed", "export", "terminal", "input"],
     &["app"],
     &["subcommand"],
 ];

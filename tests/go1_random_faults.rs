@@ -62,6 +62,9 @@ fn operand(unit: &str, random: &mut ChaCha8Rng) -> String {
         "RAD" => number(-1.5, 1.5),
         "RAD/S" => number(-90.0, 90.0),
         "NM" => number(-60.0, 60.0),
+        "N" => number(0.0, 100.0),
+        "MS/S" => number(-30.0, 30.0),
+        "BUTTONS" => ["none", "L2+B", "L2", "R1+up"][random.next_u32() as usize % 4].to_owned(),
         "JOINT" => joint_name(random.next_u32() as usize % JOINTS),
         _ => unit.to_owned(),
     }

@@ -50,6 +50,8 @@ fn config(late_ms: f64) -> Config {
     config.safety.arming.late_share = 1.0;
     config.safety.consistency.clock_step_ms = 1000.0;
     config.safety.consistency.loss_share = 0.5;
+    // The true displacement is taken in REVIEW.
+    config.safety.failsafe.hardware_review_sits_down = false;
     config
 }
 
@@ -146,6 +148,7 @@ impl Operator {
     fn act(&mut self, mode: Mode) -> Option<OperatorRequest> {
         let (stage, trial) = (self.stage.map(|stage| stage.stage), self.stage.map_or(0, |stage| stage.trial));
         match (mode, stage) {
+            (Mode::Offline | Mode::Observe, _) => Some(OperatorRequest::TakeControl),
             (_, Some(ExperimentStage::Review)) if mode != Mode::Settle && mode != Mode::Jump => {
                 let row = self.rows.get(&trial)?;
                 if let (Some(from), Some(to)) = (self.stood.take(), self.robot.status().truth) {

@@ -19,7 +19,7 @@ fn record(writer: Option<Writer>, ticks: &[Tick], records: &[Stamped]) -> (Recor
     let (mut ring, consumer) = rtrb::RingBuffer::new(64);
     let (sender, receiver) = mpsc::channel();
     let (trial_sender, trials) = mpsc::channel();
-    let handle = Recorder::spawn(consumer, receiver, writer, trial_sender);
+    let handle = Recorder::spawn(consumer, receiver, writer, trial_sender).unwrap();
     let mut records = records.iter().peekable();
     for tick in ticks {
         while let Some(stamped) = records.next_if(|stamped| stamped.time_ns <= tick.time_ns) {
@@ -159,7 +159,7 @@ fn a_recording_of_a_session_that_runs_can_be_played() {
     let (mut ring, consumer) = rtrb::RingBuffer::new(2048);
     let (sender, receiver) = mpsc::channel();
     let (trial_sender, _trials) = mpsc::channel();
-    let handle = Recorder::spawn(consumer, receiver, Some(writer), trial_sender);
+    let handle = Recorder::spawn(consumer, receiver, Some(writer), trial_sender).unwrap();
     for number in 0..500 {
         ring.push(moving_tick(number)).unwrap();
     }
@@ -182,7 +182,7 @@ fn the_last_200_ticks_are_delivered_with_each_fault() {
     let (mut ring, consumer) = rtrb::RingBuffer::new(4096);
     let (sender, receiver) = mpsc::channel();
     let (handed_in, handed) = mpsc::channel();
-    let handle = Recorder::spawn(consumer, receiver, None, handed_in);
+    let handle = Recorder::spawn(consumer, receiver, None, handed_in).unwrap();
     for number in 0..1000 {
         let faulty = (100..150).contains(&number) || (700..800).contains(&number);
         let mode = if faulty { Mode::Fault } else { Mode::Disarmed };

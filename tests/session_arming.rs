@@ -13,6 +13,7 @@ use quadfrog::engine::{Options, fingerprint, open_experiment, session_info};
 use quadfrog::optimize::journal::Durability;
 use quadfrog::realtime::channel::{ConsoleEnd, channels};
 use quadfrog::realtime::clock::SimulatedClock;
+use quadfrog::realtime::scheduling::{ALLOW_LOCKING, ALLOW_PRIORITY, DeniedSetting, RealtimeSetting};
 use quadfrog::realtime::thread::TickStart;
 use quadfrog::recording::record::{ArmingCheckRecord, Record, RequestRecord, Stamped};
 use quadfrog::recording::recorder::RecorderWatch;
@@ -58,6 +59,14 @@ impl Session {
     }
 
     fn begin(backend: Backend, folder: Option<std::path::PathBuf>, observe: bool) -> Session {
+        Session::start(backend, folder, observe, None)
+    }
+
+    fn begin_unseen(backend: Backend, folder: Option<std::path::PathBuf>, unseen: Option<String>) -> Session {
+        Session::start(backend, folder, false, unseen)
+    }
+
+    fn start(backend: Backend, folder: Option<std::path::PathBuf>, observe: bool, unseen: Option<String>) -> Session {
         let config = Config::load(None).unwrap();
         let robot = RobotDescription::embedded("go1").unwrap();
         let options = Options { trials: Some(5), observe, ..Options::new(config, robot, backend, Task::Forward) };
@@ -73,7 +82,8 @@ impl Session {
             ticks: collected,
             sinks: RecordSinks { recorder: to_recorder, console: to_screen },
             recorder: RecorderWatch::default(),
-            checklist: ArmingChecklist::new(&settings, fingerprint(&options.config), folder),
+            checklist: ArmingChecklist::new(&settings, fingerprint(&options.config, &options.robot), folder)
+                .with_unseen_connection(unseen),
             approval: settings.approval,
             info: session_info(&options, ""),
         };
@@ -216,6 +226,48 @@ fn without_its_guard_a_robot_is_not_armed() {
     assert_eq!(session.body.mode(), Mode::Disarmed);
 }
 
+/// (A defect once: a stopped guard was not noticed, and jumps were approved meanwhile.)
+#[test]
+fn while_its_guard_does_not_answer_a_robot_is_not_armed() {
+    let mut session = Session::cleared();
+    session.supervisor.report_guard_silent(true, session.time_ms * 1_000_000);
+    let answer = session.request(OperatorRequest::Arm);
+    assert!(!answer.accepted && answer.answer.contains("does not answer"), "{answer:?}");
+    session.supervisor.report_guard_silent(false, session.time_ms * 1_000_000);
+    assert!(session.request(OperatorRequest::Arm).accepted);
+}
+
+/// (A defect once: what the system denied was a line in the log.)
+#[test]
+fn denied_real_time_settings_are_confirmed_before_arming_each_with_its_remedy() {
+    let cleared = |granted: &[RealtimeSetting], denied: &[DeniedSetting]| {
+        let mut session = Session::hardware();
+        session.supervisor.report_scheduling(granted, denied, session.time_ms * 1_000_000);
+        session.test_stop();
+        for check in [OperatorCheck::LowLevel, OperatorCheck::Configuration, OperatorCheck::AreaClear] {
+            assert!(session.request(OperatorRequest::Confirm(check)).accepted);
+        }
+        session
+    };
+    let settings = [RealtimeSetting::Priority(80), RealtimeSetting::LockedMemory];
+    assert!(cleared(&settings, &[]).request(OperatorRequest::Arm).accepted, "granted");
+
+    let remedies = [ALLOW_PRIORITY, ALLOW_LOCKING];
+    let denied = |i: usize| DeniedSetting { setting: settings[i], reason: "not permitted".into(), remedy: remedies[i] };
+    let checks = [OperatorCheck::Priority, OperatorCheck::LockedMemory];
+    for i in [0, 1] {
+        let mut session = cleared(&[settings[1 - i]], &[denied(i)]);
+        let answer = session.request(OperatorRequest::Arm);
+        let name = checks[i].check().name();
+        assert!(!answer.accepted && answer.answer.starts_with(name), "{answer:?}");
+        assert!(answer.answer.contains(remedies[i]) && answer.answer.contains("not permitted"), "{answer:?}");
+        assert!(session.request(OperatorRequest::Confirm(checks[i])).accepted);
+        assert!(session.request(OperatorRequest::Arm).accepted);
+    }
+    let answer = cleared(&[], &[]).request(OperatorRequest::Arm);
+    assert!(!answer.accepted && answer.answer.contains("not requested"), "{answer:?}");
+}
+
 /// (A defect once: a confirmation of the morning armed the robot in the evening.)
 #[test]
 fn the_word_on_the_area_is_forgotten_after_a_minute() {
@@ -282,9 +334,8 @@ fn a_restart_during_another_fault_is_told_and_takes_the_word_back() {
     session.robot.silent_ms = 1;
     session.ticks(2000);
     session.robot.silent_ms = 0;
-    session.robot.tamper = |state| state.robot_time_ms = 0;
-    session.ticks(1);
-    session.robot.tamper = |_| {};
+    // Both clocks go on from there.
+    session.robot.tamper = |state| state.robot_time_ms = state.robot_time_ms.saturating_sub(5000);
     session.ticks(100);
     let told = session.faults_told();
     let words = ["FL_hip at 2.000 rad", "link to the robot lost", "the robot restarted"];
@@ -507,4 +558,64 @@ proptest! {
             area &= session.body.mode().energised() || !before.energised();
         }
     }
+}
+
+/// A person with a tape goes to the robot in REVIEW.
+#[test]
+fn a_robot_sits_down_at_the_end_of_a_trial_if_so_configured() {
+    for sits_down in [true, false] {
+        let session = Session::hardware();
+        let supervisor = session.supervisor.sitting_down_for_review(sits_down);
+        let mut session = Session { supervisor, ..session };
+        session.test_stop();
+        for check in OperatorCheck::ALL {
+            assert!(session.request(OperatorRequest::Confirm(check)).accepted);
+        }
+        let answer = session.request(OperatorRequest::Arm);
+        assert!(answer.accepted, "{answer:?}");
+        session.ticks(4000);
+        assert_eq!(session.body.mode(), Mode::Ready);
+        let proposal = session.records.iter().rev().find_map(|record| match record {
+            Record::Proposal(proposal) => Some((proposal.trial, proposal.revision)),
+            _ => None,
+        });
+        let (trial, revision) = proposal.expect("a proposal");
+        let answer = session.request(OperatorRequest::Approve { trial, revision });
+        assert!(answer.accepted, "{answer:?}");
+        session.records.clear();
+        session.ticks(15_000);
+        let entered = session.records.iter().filter_map(|record| match record {
+            Record::Transition(change) => Some(change.to),
+            _ => None,
+        });
+        let after: Vec<Mode> = entered.skip_while(|mode| *mode != Mode::Review).collect();
+        let expected = if sits_down { &[Mode::Review, Mode::SitDown, Mode::Disarmed][..] } else { &[Mode::Review] };
+        assert_eq!(after, expected);
+        if sits_down {
+            assert_eq!(session.state(ArmingCheck::AreaClear), ArmingCheckState::Waiting, "a person may go to it now");
+        }
+    }
+}
+
+/// With mosh or in tmux the loss of the operator is not detected, so the robot would go on.
+#[test]
+fn a_connection_that_cannot_be_seen_is_confirmed_before_a_real_robot_is_armed() {
+    let mut session = Session::hardware();
+    assert_eq!(session.state(ArmingCheck::Connection), ArmingCheckState::Passed);
+    let folder = tempfile::tempdir().unwrap();
+    session =
+        Session::begin_unseen(Backend::Hardware, Some(folder.path().to_owned()), Some("tmux hides it".to_owned()));
+    session.ticks(10);
+    session.supervisor.take_control();
+    session.ticks(1500);
+    session.test_stop();
+    for check in OperatorCheck::ALL.into_iter().filter(|check| *check != OperatorCheck::Connection) {
+        session.request(OperatorRequest::Confirm(check));
+    }
+    let answer = session.request(OperatorRequest::Arm);
+    assert!(!answer.accepted, "{answer:?}");
+    assert!(answer.answer.contains("operator's connection: tmux hides it, not confirmed"), "{answer:?}");
+    session.request(OperatorRequest::Confirm(OperatorCheck::Connection));
+    let answer = session.request(OperatorRequest::Arm);
+    assert!(answer.accepted, "{answer:?}");
 }

@@ -1,8 +1,11 @@
 //! A limit that a jump trips is the outcome of its parameters; void is for causes outside of them.
 
+#[path = "support/go1.rs"]
+mod go1;
 #[path = "support/experiment.rs"]
 mod support;
 
+use go1::Lockstep;
 use quadfrog::config::Config;
 use quadfrog::engine::{Options, open_experiment};
 use quadfrog::optimize::ask::SamplerKind;
@@ -11,8 +14,8 @@ use quadfrog::robot::description::RobotDescription;
 use quadfrog::session::rollout::Rollout;
 use quadfrog::session::{automatic, objective};
 use quadfrog::sim::Simulator;
-use quadfrog::telemetry::{Fault, TrialEnd};
-use quadfrog::trial::{Backend, Task, TrialRecord, Verdict};
+use quadfrog::telemetry::{Fault, TrialEnd, TrialSpec};
+use quadfrog::trial::{Backend, JumpParameters, Task, TrialRecord, Verdict};
 use support::{accept, approve, experiment, open, parameters, run, ticks};
 
 const TOO_FAST: TrialEnd =
@@ -123,6 +126,20 @@ fn a_tripped_limit_without_a_verdict_is_a_fall_at_the_end_of_the_session() {
     assert_ne!(parameters(&again), row.parameters.iter().map(|(_, value)| *value).collect::<Vec<_>>());
 }
 
+/// A jump beyond the motors, over the link of an emulated Go1.
+#[test]
+fn a_limit_that_an_emulated_robot_trips_is_a_fall() {
+    let config = Config::load(None).unwrap();
+    let settings = config.settings(&go1::description(), Task::Forward, Backend::Simulator).unwrap();
+    let mut rollout = Rollout::new(Lockstep::new(&config.simulator, 0), &settings);
+    let jump = JumpParameters { f0_hz: 0.8, f1_hz: 0.0, fx_n: 400.0, fy_n: 0.0, fz_n: 700.0 };
+    let (end, ticks) = rollout.run(&TrialSpec { trial: 3, ..config.task(Task::Forward).trial(Task::Forward, jump) });
+    assert!(objective::trips_limit(&end), "{end:?} after {} ticks", ticks.len());
+    let (verdict, cause) = objective::suggest(&end);
+    assert_eq!(verdict, Verdict::Fall);
+    assert!(cause.starts_with("limit: ") && cause.contains("exceeds"), "{cause}");
+}
+
 /// (A defect once: with these bounds the Gaussian process proposed `f0 0.800 Fx 400 Fz 700` ten times in a row, each time void
 /// by the velocity of a joint, and the study ended.)
 #[test]
@@ -136,14 +153,14 @@ fn the_gaussian_process_leaves_a_corner_that_trips_a_limit() {
     let robot = RobotDescription::embedded("go1").unwrap();
     let settings = config.settings(&robot, Task::Forward, Backend::Simulator).unwrap();
     let mut rollout = Rollout::new(Simulator::new(&robot, &config.simulator).unwrap(), &settings);
-    let options = Options { trials: Some(20), ..Options::new(config, robot, Backend::Simulator, Task::Forward) };
+    let options = Options { trials: Some(12), ..Options::new(config, robot, Backend::Simulator, Task::Forward) };
     let mut experiment = open_experiment(&options, Durability::Buffered, "").unwrap();
     let mut rows: Vec<TrialRecord> = Vec::new();
     automatic::run(&mut experiment, &mut rollout, |row, _| rows.push(row.clone())).unwrap();
     for row in &rows {
         println!("{:3} {:?} {:?} {:?} {}", row.trial, row.parameters, row.verdict, row.value, row.cause);
     }
-    assert_eq!(experiment.counted(), 20);
+    assert_eq!(experiment.counted(), 12);
     let limits = rows.iter().filter(|row| row.cause.starts_with("limit: ")).count();
     assert!(limits > 0 && rows.iter().all(|row| row.verdict != Some(Verdict::Void)), "{limits} limits");
     let apart = |a: &TrialRecord, b: &TrialRecord| {

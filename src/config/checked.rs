@@ -8,7 +8,7 @@ use toml::Table;
 
 use super::ConfigError;
 use super::files::{ControlFile, OptimizeFile, SafetyFile};
-use super::merge::{FileOrigin, merge};
+use super::merge::{FileOrigin, lookup, merge};
 use super::ranges;
 use crate::control::settings::{ControlSettings, ObjectiveSource, StandSettings, TaskControl};
 use crate::optimize::ask::SamplerKind;
@@ -16,7 +16,7 @@ use crate::realtime::scheduling::Scheduling;
 use crate::recording::record::HealthLimits;
 use crate::robot::GRAVITY;
 use crate::robot::Leg;
-use crate::robot::description::RobotDescription;
+use crate::robot::description::{RobotDescription, read_text};
 use crate::sim::SimConfig;
 use crate::trial::{Backend, GAIN_UNITS, HopEnvelope, ParameterInfo, ParameterValues, Task, parameter_unit};
 
@@ -75,8 +75,7 @@ impl Config {
             let default = merge(&embedded, default_text, &template(default_text), &optional)?;
             let (table, origin) = match folder.map(|folder| folder.join(name)).filter(|path| path.exists()) {
                 Some(path) => {
-                    let text = std::fs::read_to_string(&path)
-                        .map_err(|source| ConfigError::Read { path: path.clone(), source })?;
+                    let text = read_text(&path).map_err(|source| ConfigError::Read { path: path.clone(), source })?;
                     merge(&path.display().to_string(), &text, &default.0, &optional)?
                 }
                 None => default,
@@ -95,8 +94,8 @@ impl Config {
             origins,
         };
         // After the types, whose error names the kind of number that a key holds.
-        for (name, _) in FILES {
-            ranges::check(name, &tables[name], &config.origins[name])?;
+        for (name, default) in FILES {
+            ranges::check(name, &tables[name], &template(default), &config.origins[name])?;
         }
         config.check()?;
         Ok(config)
@@ -205,7 +204,8 @@ impl Config {
     /// Returns the settings of the control cycle.
     ///
     /// # Errors
-    /// When the stance of `task` is out of the robot's reach, or the objective cannot be measured on `backend`.
+    /// When the stance of `task` is out of the robot's reach, the objective cannot be measured on `backend`, or a limit is
+    /// outside its range for hardware.
     pub fn settings(
         &self,
         robot: &RobotDescription,
@@ -215,6 +215,16 @@ impl Config {
         let chosen = self.task(task);
         self.check_stance(robot, task)?;
         let hardware = backend == Backend::Hardware;
+        if hardware {
+            self.check_hardware(robot)?;
+        }
+        let expires_s = self.safety.approval.expires_s;
+        if hardware && expires_s > LONGEST_APPROVAL_S {
+            let reason = format!(
+                "must be at most {LONGEST_APPROVAL_S} s on hardware; the configuration of a study of an earlier version holds 30: set 2.0 there"
+            );
+            return Err(self.refuse("safety.toml", "approval.expires_s", expires_s, reason));
+        }
         let SafetyFile { failsafe, fall, .. } = &self.safety;
         let (min_position, max_position) = robot.allowed_positions();
         Ok(ControlSettings {
@@ -258,6 +268,15 @@ impl Config {
         })
     }
 
+    /// Checks the limits of the files, as loaded, and of the robot's motors against their ranges for hardware.
+    fn check_hardware(&self, robot: &RobotDescription) -> Result<(), ConfigError> {
+        for (name, default) in FILES {
+            let text = self.as_run.iter().find(|(file, _)| file == name).map_or("", |(_, text)| text.as_str());
+            ranges::check_hardware(name, &template(text), &template(default), &self.origins[name])?;
+        }
+        ranges::check_motors(robot)
+    }
+
     /// Returns the scheduling that the control thread requests.
     pub fn scheduling(&self, backend: Backend) -> Scheduling {
         let realtime = &self.control.realtime;
@@ -276,6 +295,9 @@ impl Config {
         self.origins[file].refuse(key, value, reason)
     }
 }
+
+/// Longest time from a key press to its effect on hardware, s: people walk.
+const LONGEST_APPROVAL_S: f64 = 5.0;
 
 /// Parses a default file; its keys are the known keys.
 fn template(text: &str) -> Table {
@@ -309,13 +331,6 @@ fn without_type_names(message: &str) -> String {
         kind => kind.to_owned(),
     };
     format!("{found}expected {kind}")
-}
-
-/// Returns the value of a key with its tables.
-fn lookup<'a>(table: &'a Table, key: &str) -> Option<&'a toml::Value> {
-    let mut parts = key.split('.');
-    let first = table.get(parts.next()?)?;
-    parts.try_fold(first, |value, part| value.get(part))
 }
 
 /// Rejects a folder that does not exist, and TOML files that are not read: probably a misspelt name.

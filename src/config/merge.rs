@@ -103,6 +103,13 @@ impl Overlay<'_> {
     }
 }
 
+/// Returns the value of a key with its tables.
+pub fn lookup<'a>(table: &'a Table, key: &str) -> Option<&'a Value> {
+    let mut parts = key.split('.');
+    let first = table.get(parts.next()?)?;
+    parts.try_fold(first, |value, part| value.get(part))
+}
+
 /// Returns the value without the positions in the text.
 fn plain(value: &DeValue<'_>) -> Value {
     match value {

@@ -1,89 +1,76 @@
-//! Allowed range of every single number in the files; that of `simulator.toml` is in `crate::sim::ranges`, because a
-//! simulator checks it, too. Rules between keys are in `rules.rs`.
+//! Allowed range of every single number in the files: one for every backend, within which the program works, and a narrower
+//! one for hardware, compiled in: a limit that is mistyped, or copied from a simulation, does not reach a robot. The ranges
+//! of `simulator.toml` are in `crate::sim::ranges`, because a simulator checks them, too. Rules between keys are in
+//! `rules.rs`.
 
 use toml::Table;
 
 use super::ConfigError;
-use super::merge::FileOrigin;
-use crate::sim::ranges::{NOT_NEGATIVE, NumberRange, POSITIVE, Row, first_outside};
-
-const LATENESS: NumberRange =
-    NumberRange { allows: |v| v >= 0.0, text: "must be a number of milliseconds, or 0 to only count" };
-const IDLE_TIME: NumberRange =
-    NumberRange { allows: |v| v >= 0.0, text: "must be a number of seconds, or 0 for never" };
-const FACTOR: NumberRange =
-    NumberRange { allows: |v| v >= 1.0, text: "must be 1 or more: below 1 it trips on allowed values" };
-/// Below 0.2 s a slow disk would refuse every approval.
-const KEY_PRESS: NumberRange = NumberRange { allows: |v| (0.2..=30.0).contains(&v), text: "must be 0.2 to 30 s" };
-const SHARE: NumberRange = NumberRange { allows: |v| v > 0.0 && v <= 1.0, text: "must be above 0, at most 1" };
-const COUNTDOWN: NumberRange = NumberRange { allows: |v| (0.0..=60.0).contains(&v), text: "must be 0 to 60 s" };
-/// At 1 rad/s the force is then half of that of the stiffness at a tilt of 1 rad.
-const ATTITUDE_RATE_GAIN: NumberRange =
-    NumberRange { allows: |v| (0.0..=100.0).contains(&v), text: "must be 0 to 100 N s/m" };
-/// At 1 m/s the foot is then placed 0.3 m ahead, the end of the leg's reach.
-const FOOT_PLACEMENT: NumberRange = NumberRange { allows: |v| (0.0..=0.3).contains(&v), text: "must be 0 to 0.3 s" };
-const JUMPS: NumberRange = NumberRange { allows: |v| (1.0..=100.0).contains(&v), text: "must be 1 to 100 jumps" };
-const PRIORITY: NumberRange =
-    NumberRange { allows: |v| (0.0..=99.0).contains(&v), text: "must be 1 to 99, or 0 to request none" };
-const CORE: NumberRange =
-    NumberRange { allows: |v| v >= -1.0, text: "must be the number of a core, from 0, or -1 for any" };
-const TRIALS: NumberRange = NumberRange { allows: |v| v >= 1.0, text: "a study needs at least one trial" };
-const CONTENDERS: NumberRange = NumberRange { allows: |v| (2.0..=10.0).contains(&v), text: "must be 2 to 10 points" };
-const CONFIDENCE: NumberRange = NumberRange { allows: |v| v > 0.5 && v < 1.0, text: "must be above 0.5 and below 1" };
-const LEAST_FORCE: NumberRange =
-    NumberRange { allows: |v| (0.2..=1.0).contains(&v), text: "must be 0.2 to 1 times the weight" };
-const MOST_FORCE: NumberRange =
-    NumberRange { allows: |v| (1.0..=3.0).contains(&v), text: "must be 1 to 3 times the weight" };
-const READY_TILT: NumberRange =
-    NumberRange { allows: |v| v > 0.0 && v <= 0.35, text: "must be above 0 and at most 0.35 rad" };
-const READY_STANCE: NumberRange =
-    NumberRange { allows: |v| v > 0.0 && v <= 0.5, text: "must be above 0 and at most 0.5 rad" };
-const CLOCK_DRIFT: NumberRange =
-    NumberRange { allows: |v| (0.0..=1000.0).contains(&v), text: "must be 0 to 1000 parts per million" };
-const DELAY_GROWTH: NumberRange =
-    NumberRange { allows: |v| v > 0.0 && v <= 50.0, text: "must be above 0 and at most 50 ms" };
-const LOSS: NumberRange = NumberRange { allows: |v| v > 0.0 && v <= 0.5, text: "must be above 0 and at most 0.5" };
-const TAKEOFF_SPEED: NumberRange = NumberRange { allows: |v| (0.1..=2.0).contains(&v), text: "must be 0.1 to 2 m/s" };
-const HOLD_TIME: NumberRange = NumberRange { allows: |v| (0.1..=1.5).contains(&v), text: "must be 0.1 to 1.5 s" };
-const HOLD_KP: NumberRange = NumberRange { allows: |v| (20.0..=100.0).contains(&v), text: "must be 20 to 100 N m/rad" };
-const HOLD_KD: NumberRange = NumberRange { allows: |v| (1.0..=5.0).contains(&v), text: "must be 1 to 5 N m s/rad" };
-const RAMP: NumberRange = NumberRange { allows: |v| (0.02..=1.0).contains(&v), text: "must be 0.02 to 1" };
-const BLEND: NumberRange = NumberRange { allows: |v| (0.1..=5.0).contains(&v), text: "must be 0.1 to 5 s" };
-
-const REPEATED_STATES: NumberRange =
-    NumberRange { allows: |v| (10.0..=200.0).contains(&v), text: "must be 10 to 200 states" };
-const GRAVITY_ERROR: NumberRange =
-    NumberRange { allows: |v| (0.1..=3.0).contains(&v), text: "must be 0.1 to 3 m/s^2: gravity is 9.81" };
-const SENSOR_ANGLE: NumberRange =
-    NumberRange { allows: |v| (0.01..=0.3).contains(&v), text: "must be 0.01 to 0.3 rad: a robot tips beyond" };
-const LEAST_LOAD: NumberRange =
-    NumberRange { allows: |v| (0.05..=0.9).contains(&v), text: "must be 0.05 to 0.9 of the weight" };
-const MOST_LOAD: NumberRange = NumberRange { allows: |v| (1.1..=3.0).contains(&v), text: "must be 1.1 to 3 weights" };
-const CONTACT_TIME: NumberRange =
-    NumberRange { allows: |v| (0.02..=1.0).contains(&v), text: "must be 0.02 to 1 s: a flight lasts half a second" };
-const FREE_FALL: NumberRange = NumberRange {
-    allows: |v| (0.5..=5.0).contains(&v),
-    text: "must be 0.5 to 5 m/s^2: zero in free fall, 9.81 at rest",
-};
-const CLOCK_STEP: NumberRange = NumberRange { allows: |v| (20.0..=1000.0).contains(&v), text: "must be 20 to 1000 ms" };
-const IN_SERVICE_LOSS: NumberRange =
-    NumberRange { allows: |v| (0.005..=0.5).contains(&v), text: "must be 0.005 to 0.5 of the states" };
-const TORQUE_ERROR: NumberRange = NumberRange { allows: |v| (0.5..=20.0).contains(&v), text: "must be 0.5 to 20 N m" };
+use super::merge::{FileOrigin, lookup};
+use crate::robot::description::RobotDescription;
+use crate::robot::joint_name;
+use crate::sim::ranges::{NumberRange, Row, first_outside, within};
 
 const CONTROL: &[Row] = &[
-    (&["countdown.simulator_s"], COUNTDOWN),
-    (&["countdown.blend_s"], BLEND),
-    (&["tasks.*.jumps"], JUMPS),
-    (&["tasks.*.attitude_rate_gain"], ATTITUDE_RATE_GAIN),
-    (&["tasks.*.foot_placement_s"], FOOT_PLACEMENT),
-    (&["tasks.*.f1_hz"], NOT_NEGATIVE),
-    (&["realtime.hardware_priority", "realtime.simulator_priority"], PRIORITY),
-    (&["realtime.core"], CORE),
-    (&["stand_up.*", "sit_down.*", "countdown.*", "settle.*", "contact.*", "estimator.*"], POSITIVE),
+    (&["stand_up.duration_s", "sit_down.duration_s"], within!(0.1, 60, "s")),
+    (&["stand_up.kp", "sit_down.kp"], within!(1, 1000, "N m/rad")),
+    (&["stand_up.kd", "sit_down.kd"], within!(0.1, 100, "N m s/rad")),
+    (&["stand_up.tolerance_rad", "sit_down.tolerance_rad"], within!(0.001, 3, "rad")),
+    (&["stand_up.timeout_s", "sit_down.timeout_s"], within!(0.01, 60, "s")),
+    (&["countdown.*"], within!(0, 60, "s")),
+    (&["settle.quiet_s"], within!(0.001, 60, "s")),
+    (&["settle.cap_s"], within!(0.01, 60, "s")),
+    (&["settle.speed_m_s"], within!(1e-4, 100, "m/s")),
+    (&["settle.rate_rad_s"], within!(1e-4, 100, "rad/s")),
+    (&["contact.force_n"], within!(0.001, 1000, "N")),
+    (&["estimator.contact_on_n", "estimator.contact_off_n"], within!(0.001, 1000, "N")),
+    (&["estimator.contact_time_s"], within!(1e-4, 1, "s")),
+    (&["estimator.gate_sigma"], within!(0.1, 1000, "standard deviations")),
+    (&["estimator.longest_slip_s"], within!(0.001, 60, "s")),
+    (&["estimator.longest_flight_s"], within!(0.01, 60, "s")),
+    (&["estimator.*"], within!(1e-9, 1000)),
+    (&["realtime.hardware_priority", "realtime.simulator_priority"], within!(0, 99, "(0 requests none)")),
+    (&["realtime.core"], within!(-1, 1023, "(-1 is any core)")),
+    (&["tasks.*.stance_m"], within!(-2, 2, "m")),
+    (&["tasks.*.jumps"], within!(1, 100, "jumps")),
+    (&["tasks.*.f1_hz"], within!(0, 100, "Hz")),
+    // At 1 rad/s the force is then half of that of the stiffness at a tilt of 1 rad.
+    (&["tasks.*.attitude_rate_gain"], within!(0, 100, "N s/m")),
+    // At 1 m/s the foot is then placed 0.3 m ahead, the end of the leg's reach.
+    (&["tasks.*.foot_placement_s"], within!(0, 0.3, "s")),
+    // The gains; `safety.toml`, [gains], has their narrower ranges.
+    (&["tasks.*.*"], within!(0, 10000)),
+    (&["*.*"], within!(1e-9, 1e6)),
 ];
+
+/// `control.toml` on hardware.
+const CONTROL_HARDWARE: &[Row] = &[
+    // Shorter, a joint that lies folded moves faster than 6 rad/s.
+    (&["stand_up.duration_s", "sit_down.duration_s"], within!(0.5, 10, "s")),
+    // Below 20 the robot does not leave the ground; above 150 the gate would cut the stiffness.
+    (&["stand_up.kp", "sit_down.kp"], within!(20, 150, "N m/rad")),
+    (&["stand_up.kd", "sit_down.kd"], within!(0.5, 10, "N m s/rad")),
+    (&["stand_up.tolerance_rad", "sit_down.tolerance_rad"], within!(0.02, 0.5, "rad")),
+    (&["stand_up.timeout_s", "sit_down.timeout_s"], within!(0.1, 5, "s")),
+    // Time to step back.
+    (&["countdown.hardware_s"], within!(1, 60, "s")),
+    (&["countdown.blend_s"], within!(0.2, 5, "s")),
+    (&["settle.quiet_s"], within!(0.05, 5, "s")),
+    (&["settle.cap_s"], within!(0.5, 15, "s")),
+    (&["settle.speed_m_s"], within!(0.01, 0.5, "m/s")),
+    (&["settle.rate_rad_s"], within!(0.01, 1, "rad/s")),
+    // A fifteenth to three times the load of a foot in stance, 32 N.
+    (&["estimator.contact_on_n", "estimator.contact_off_n"], within!(2, 100, "N")),
+    (&["estimator.contact_time_s"], within!(0.001, 0.02, "s")),
+    (&["estimator.longest_slip_s"], within!(0.01, 1, "s")),
+    (&["estimator.longest_flight_s"], within!(0.2, 10, "s")),
+];
+
 const SAFETY: &[Row] = &[
-    (&["consistency.repeated_states"], REPEATED_STATES),
-    (&["consistency.gravity_m_s2", "pre_arm.gravity_m_s2"], GRAVITY_ERROR),
+    (&["consistency.repeated_states"], within!(10, 200, "states")),
+    // Gravity is 9.81.
+    (&["consistency.gravity_m_s2", "pre_arm.gravity_m_s2"], within!(0.1, 3, "m/s^2")),
+    // A robot tips beyond.
     (
         &[
             "consistency.orientation_rad",
@@ -91,46 +78,147 @@ const SAFETY: &[Row] = &[
             "consistency.joint_velocity_rad",
             "pre_arm.gravity_rad",
         ],
-        SENSOR_ANGLE,
+        within!(0.01, 0.3, "rad"),
     ),
-    (&["consistency.foot_load_least_share"], LEAST_LOAD),
-    (&["consistency.foot_load_most_share", "pre_arm.foot_load_share"], MOST_LOAD),
-    (&["consistency.foot_load_s", "consistency.free_fall_contact_s", "consistency.unsupported_s"], CONTACT_TIME),
-    (&["consistency.free_fall_m_s2"], FREE_FALL),
-    (&["consistency.clock_step_ms"], CLOCK_STEP),
-    (&["consistency.loss_share"], IN_SERVICE_LOSS),
-    (&["consistency.torque_n_m"], TORQUE_ERROR),
+    (&["consistency.foot_load_least_share"], within!(0.05, 0.9, "of the weight")),
+    (&["consistency.foot_load_most_share", "pre_arm.foot_load_share"], within!(1.1, 3, "weights")),
+    // A flight lasts half a second.
     (
-        &["*.corrupt", "*.disk_free_mb", "*.joint_margin_rad", "*.battery_percent", "*.loss_share", "*.late_share"],
-        NOT_NEGATIVE,
+        &["consistency.foot_load_s", "consistency.free_fall_contact_s", "consistency.unsupported_s"],
+        within!(0.02, 1, "s"),
     ),
-    (&["approval.expires_s"], KEY_PRESS),
-    (&["hop_envelope.*"], SHARE),
-    (&["watchdog.simulator_late_ms", "watchdog.hardware_late_ms"], LATENESS),
-    (&["watchdog.simulator_idle_s", "watchdog.hardware_idle_s"], IDLE_TIME),
-    (&["watchdog.velocity_factor", "watchdog.torque_factor", "watchdog.period_factor"], FACTOR),
-    (&["ready.force_share_min"], LEAST_FORCE),
-    (&["ready.force_share_max"], MOST_FORCE),
-    (&["ready.tilt_rad"], READY_TILT),
-    (&["ready.stance_rad"], READY_STANCE),
-    (&["watchdog.clock_drift_ppm"], CLOCK_DRIFT),
-    (&["watchdog.delay_warn_ms", "watchdog.delay_hold_ms", "watchdog.delay_land_ms"], DELAY_GROWTH),
-    (&["watchdog.loss_warn_share"], LOSS),
-    (&["watchdog.takeoff_speed_m_s"], TAKEOFF_SPEED),
-    (&["watchdog.hold_s"], HOLD_TIME),
-    (&["watchdog.hold_kp"], HOLD_KP),
-    (&["watchdog.hold_kd"], HOLD_KD),
-    (&["watchdog.ramp_error_rad", "watchdog.ramp_torque_share", "watchdog.ramp_limit_s"], RAMP),
-    (&["*.*"], POSITIVE),
-];
-const OPTIMIZE: &[Row] = &[
-    (&["workers.abandoned_s"], POSITIVE),
-    (&["trials"], TRIALS),
-    (&["confirm.contenders"], CONTENDERS),
-    (&["confirm.confidence"], CONFIDENCE),
+    // Zero in free fall, 9.81 at rest.
+    (&["consistency.free_fall_m_s2"], within!(0.5, 5, "m/s^2")),
+    (&["consistency.clock_step_ms"], within!(20, 1000, "ms")),
+    (&["consistency.loss_share"], within!(0.005, 0.5, "of the states")),
+    (&["consistency.torque_n_m"], within!(0.5, 20, "N m")),
+    // Below 0.2 s a slow disk would refuse every approval.
+    (&["approval.expires_s"], within!(0.2, 30, "s")),
+    (&["hop_envelope.*"], within!(0.01, 1)),
+    (&["fall.body_contact_s"], within!(0.001, 60, "s")),
+    (&["fall.*"], within!(0.01, 3.15, "rad")),
+    (&["gate.torque_step_nm"], within!(0.01, 1000, "N m")),
+    // The datagram holds less than 1024 N m/rad.
+    (&["gate.kp_max"], within!(1, 1000, "N m/rad")),
+    (&["gate.kd_max"], within!(1, 100, "N m s/rad")),
+    // In steps of 1/16 on the wire: 1 is the word 16, 0.06 would be 0, a limp robot.
+    (&["gate.damping_kd"], within!(1, 50, "N m s/rad (less does not carry the robot down softly)")),
+    (&["pre_arm.state_age_ms", "pre_arm.late_ms"], within!(0.01, 10000, "ms")),
+    (&["pre_arm.loss_share", "pre_arm.late_share"], within!(0, 1)),
+    (&["*.corrupt"], within!(0, 1e6, "datagrams")),
+    (&["pre_arm.tilt_rad", "watchdog.stance_tilt_rad", "watchdog.tilt_rad"], within!(0.01, 3.15, "rad")),
+    (&["*.joint_margin_rad"], within!(0, 3.15, "rad")),
+    (&["pre_arm.lying_tolerance_rad"], within!(0.01, 7, "rad")),
+    (&["*.battery_percent"], within!(0, 100, "percent")),
+    (&["*.motor_c", "watchdog.motor_warm_c"], within!(1, 200, "degrees Celsius")),
+    (&["pre_arm.gyro_rad_s"], within!(0.001, 100, "rad/s")),
+    (&["pre_arm.still_s"], within!(0.01, 60, "s")),
+    (&["pre_arm.area_clear_s"], within!(0.1, 86400, "s")),
+    (&["*.disk_free_mb"], within!(0, 1e9, "MB")),
+    (&["watchdog.velocity_factor", "watchdog.torque_factor"], within!(1, 100, "(below 1 it trips on allowed values)")),
+    (&["watchdog.period_factor"], within!(1, 1000, "(below 1 it trips on allowed values)")),
+    (&["watchdog.period_ticks"], within!(1, 1e6, "ticks")),
+    (&["watchdog.simulator_late_ms", "watchdog.hardware_late_ms"], within!(0, 60000, "ms (0 only counts)")),
+    (&["watchdog.simulator_idle_s", "watchdog.hardware_idle_s"], within!(0, 86400, "s (0 is never)")),
+    (&["watchdog.land_s", "watchdog.hold_s", "watchdog.ramp_limit_s"], within!(0.01, 60, "s")),
+    (&["watchdog.clock_drift_ppm"], within!(0, 10000, "parts per million")),
+    (&["watchdog.delay_warn_ms", "watchdog.delay_hold_ms", "watchdog.delay_land_ms"], within!(0.1, 10000, "ms")),
+    (&["watchdog.loss_warn_share", "watchdog.ramp_torque_share"], within!(0.001, 1)),
+    (&["watchdog.takeoff_speed_m_s"], within!(0.05, 10, "m/s")),
+    (&["watchdog.hold_kp"], within!(1, 1000, "N m/rad")),
+    (&["watchdog.hold_kd"], within!(0.1, 100, "N m s/rad")),
+    (&["watchdog.ramp_error_rad", "ready.tilt_rad", "ready.stance_rad"], within!(0.01, 3.15, "rad")),
+    (&["ready.*"], within!(0.01, 10, "of the weight")),
+    (&["watchdog.*"], within!(1, 600000, "ms")),
+    (&["parameters.f0", "parameters.f1"], within!(0, 100, "Hz")),
+    (&["parameters.*"], within!(0, 10000, "N")),
+    (&["gains.*"], within!(0, 10000)),
+    (&["*.*"], within!(1e-9, 1e6)),
 ];
 
-/// Returns the ranges of a file's numbers; the first row that fits applies.
+/// `safety.toml` on hardware.
+const SAFETY_HARDWARE: &[Row] = &[
+    // Beyond 1.2 rad (69 degrees) the robot has fallen.
+    (&["fall.roll_rad", "fall.pitch_rad"], within!(0.3, 1.2, "rad")),
+    (&["fall.hardware_flight_rad"], within!(0.2, 1, "rad")),
+    // The largest torque of a joint is 35.6 N m.
+    (&["gate.torque_step_nm"], within!(5, 40, "N m")),
+    (&["gate.kp_max"], within!(20, 200, "N m/rad")),
+    (&["gate.kd_max"], within!(2, 20, "N m s/rad")),
+    (&["gate.damping_kd"], within!(1, 10, "N m s/rad")),
+    (&["pre_arm.state_age_ms"], within!(1, 50, "ms")),
+    (&["pre_arm.loss_share", "pre_arm.late_share"], within!(0, 0.1)),
+    (&["pre_arm.corrupt"], within!(0, 10, "datagrams")),
+    (&["pre_arm.tilt_rad"], within!(0.02, 0.35, "rad")),
+    (&["pre_arm.joint_margin_rad", "watchdog.joint_margin_rad"], within!(0, 0.2, "rad")),
+    (&["pre_arm.lying_tolerance_rad"], within!(0.05, 0.8, "rad")),
+    (&["pre_arm.battery_percent"], within!(10, 100, "percent")),
+    (&["pre_arm.motor_c"], within!(20, 75, "degrees Celsius")),
+    (&["pre_arm.gyro_rad_s"], within!(0.01, 0.5, "rad/s")),
+    (&["pre_arm.still_s"], within!(0.2, 10, "s")),
+    (&["pre_arm.late_ms"], within!(0.1, 2, "ms")),
+    (&["pre_arm.area_clear_s"], within!(5, 120, "s")),
+    (&["pre_arm.disk_free_mb", "watchdog.disk_free_mb"], within!(50, 1e9, "MB")),
+    (&["approval.expires_s"], within!(0.5, 30, "s")),
+    (&["watchdog.stance_tilt_rad"], within!(0.1, 0.6, "rad")),
+    (&["watchdog.tilt_rad"], within!(0.3, 1.2, "rad")),
+    // A free fall from the stance (0.25 m) takes 226 ms; half of that.
+    (&["watchdog.state_age_warn_ms"], within!(1, 100, "ms")),
+    (&["watchdog.state_age_ms"], within!(5, 100, "ms")),
+    (&["watchdog.hardware_late_ms"], within!(1, 100, "ms")),
+    (&["watchdog.link_lost_ms"], within!(20, 1000, "ms")),
+    (&["watchdog.velocity_factor"], within!(1, 3, "times the no-load speed")),
+    (&["watchdog.torque_factor"], within!(1, 1.5, "times the largest torque")),
+    (&["watchdog.motor_warm_c"], within!(30, 80, "degrees Celsius")),
+    (&["watchdog.motor_c"], within!(30, 90, "degrees Celsius")),
+    (&["watchdog.battery_percent"], within!(5, 100, "percent")),
+    (&["watchdog.corrupt"], within!(0, 100, "datagrams")),
+    (&["watchdog.period_factor"], within!(1.2, 10, "periods")),
+    (&["watchdog.period_ticks"], within!(1, 20, "ticks")),
+    (&["watchdog.operator_warn_ms"], within!(50, 1000, "ms")),
+    (&["watchdog.operator_silent_ms"], within!(200, 2000, "ms")),
+    (&["watchdog.land_s"], within!(0.1, 3, "s")),
+    // Two quartz clocks differ by less than 200.
+    (&["watchdog.clock_drift_ppm"], within!(0, 1000, "parts per million")),
+    (&["watchdog.delay_warn_ms", "watchdog.delay_hold_ms", "watchdog.delay_land_ms"], within!(1, 50, "ms")),
+    (&["watchdog.loss_warn_share"], within!(0.001, 0.1)),
+    (&["watchdog.takeoff_speed_m_s"], within!(0.2, 2, "m/s")),
+    (&["watchdog.hold_s"], within!(0.2, 1.5, "s")),
+    (&["watchdog.hold_kp"], within!(20, 100, "N m/rad")),
+    (&["watchdog.hold_kd"], within!(1, 5, "N m s/rad")),
+    // A sound robot needs 0.15 rad and 0.33 of the torque.
+    (&["watchdog.ramp_error_rad"], within!(0.2, 0.6, "rad")),
+    (&["watchdog.ramp_torque_share"], within!(0.35, 0.8)),
+    (&["watchdog.ramp_limit_s"], within!(0.02, 0.5, "s")),
+    (&["ready.force_share_min"], within!(0.2, 1, "of the weight")),
+    (&["ready.force_share_max"], within!(1, 3, "of the weight")),
+    (&["ready.tilt_rad"], within!(0.02, 0.35, "rad")),
+    (&["ready.stance_rad"], within!(0.05, 0.5, "rad")),
+    (&["watchdog.suspended_ms"], within!(20, 200, "ms")),
+    (&["watchdog.guard_silent_ms"], within!(30, 500, "ms")),
+    (&["watchdog.hardware_idle_s"], within!(5, 600, "s")),
+    (&["parameters.f0", "parameters.f1"], within!(0.1, 5, "Hz")),
+    (&["parameters.Fx", "parameters.Fy"], within!(0, 300, "N per foot")),
+    // Fifteen times the weight with four feet.
+    (&["parameters.Fz"], within!(0, 500, "N per foot")),
+    (&["gains.kp"], within!(100, 1200, "N/m")),
+    (&["gains.kd"], within!(0.5, 40, "N s/m")),
+    (&["gains.kd_joint"], within!(0.1, 4, "N m s/rad")),
+    (&["gains.k_att"], within!(0, 1000, "N/m")),
+];
+
+const OPTIMIZE: &[Row] = &[
+    (&["trials"], within!(1, 1e6, "trials")),
+    (&["sampler.candidates"], within!(1, 10000, "points")),
+    (&["sampler.startup_trials"], within!(0, 1e6, "trials")),
+    (&["sampler.seed"], within!(0, 4294967295.0)),
+    (&["workers.abandoned_s"], within!(0.1, 604800, "s")),
+    (&["confirm.contenders"], within!(2, 10, "points")),
+    (&["confirm.confidence"], within!(0.501, 0.9999)),
+    (&["bounds.*", "first.*.*"], within!(-10000, 10000)),
+];
+
+/// Returns the ranges of a file's numbers on every backend; the first row that fits applies.
 fn rows(file: &str) -> &'static [Row] {
     match file {
         "control.toml" => CONTROL,
@@ -140,12 +228,57 @@ fn rows(file: &str) -> &'static [Row] {
     }
 }
 
-/// Checks every number of `file`.
-pub fn check(file: &str, table: &Table, origin: &FileOrigin) -> Result<(), ConfigError> {
-    match first_outside(rows(file), table) {
-        Some((key, value, text)) => Err(origin.refuse(&key, value, text)),
-        None => Ok(()),
+/// Returns the narrower ranges of a file's numbers on hardware.
+fn hardware_rows(file: &str) -> &'static [Row] {
+    match file {
+        "control.toml" => CONTROL_HARDWARE,
+        "safety.toml" => SAFETY_HARDWARE,
+        _ => &[],
     }
+}
+
+/// Checks every number of `file`.
+pub fn check(file: &str, table: &Table, default: &Table, origin: &FileOrigin) -> Result<(), ConfigError> {
+    check_rows(rows(file), "", table, default, origin)
+}
+
+/// Checks every number of `file` for hardware.
+pub fn check_hardware(file: &str, table: &Table, default: &Table, origin: &FileOrigin) -> Result<(), ConfigError> {
+    check_rows(hardware_rows(file), " on hardware", table, default, origin)
+}
+
+/// Limits of the motors on hardware: the Go1's largest are 35.6 N m and 30.1 rad/s.
+const MOTOR_TORQUE: NumberRange = within!(1, 40, "N m");
+const MOTOR_VELOCITY: NumberRange = within!(1, 40, "rad/s");
+
+/// Checks the limits of the robot's motors for hardware.
+pub fn check_motors(robot: &RobotDescription) -> Result<(), ConfigError> {
+    let limits = &robot.limits;
+    let quantities = [("effort", &limits.max_torque, MOTOR_TORQUE), ("velocity", &limits.max_velocity, MOTOR_VELOCITY)];
+    for (name, values, range) in quantities {
+        if let Some(joint) = values.iter().position(|value| !(range.allows)(*value)) {
+            return Err(ConfigError::Value {
+                file: format!("URDF of {}", robot.name),
+                key: format!("{} limit {name}", joint_name(joint)),
+                value: values[joint].to_string(),
+                reason: format!("{} on hardware; give the value of the motor's data sheet", range.text),
+            });
+        }
+    }
+    Ok(())
+}
+
+fn check_rows(
+    rows: &'static [Row],
+    place: &str,
+    table: &Table,
+    default: &Table,
+    origin: &FileOrigin,
+) -> Result<(), ConfigError> {
+    let Some((key, value, text)) = first_outside(rows, table) else { return Ok(()) };
+    let remedy = lookup(default, &key)
+        .map_or_else(String::new, |default| format!(", or remove the key for the default {default}"));
+    Err(origin.refuse(&key, value, format!("{text}{place}; give such a value{remedy}")))
 }
 
 #[cfg(test)]
@@ -153,20 +286,43 @@ mod tests {
     use super::*;
     use crate::sim::ranges::{numbers, range};
 
-    /// Gains have their ranges in `safety.toml`; the sampler's numbers are whole and may all be given.
-    #[test]
-    fn every_number_of_the_defaults_has_a_range() {
-        let files = [
-            ("control.toml", include_str!("../../config/control.toml")),
-            ("safety.toml", include_str!("../../config/safety.toml")),
-            ("optimize.toml", include_str!("../../config/optimize.toml")),
-        ];
-        for (file, text) in files {
-            for (key, _) in numbers(&text.parse().unwrap(), "") {
-                let elsewhere = ["kp", "kd", "kd_joint", "k_att"].iter().any(|gain| key.ends_with(&format!(".{gain}")));
-                let known = range(rows(file), &key).is_some();
-                assert!(elsewhere || key.starts_with("sampler.") || known, "{file}: `{key}`");
+    const FILES: [(&str, &str); 3] = [
+        ("control.toml", include_str!("../../config/control.toml")),
+        ("safety.toml", include_str!("../../config/safety.toml")),
+        ("optimize.toml", include_str!("../../config/optimize.toml")),
+    ];
+
+    /// Calls `check` with each number of the files: its name, its value, its range on every backend and on hardware.
+    fn each(check: impl Fn(&str, f64, &NumberRange, Option<&NumberRange>)) {
+        for (file, text) in FILES {
+            for (key, value) in numbers(&text.parse().unwrap(), "") {
+                let name = format!("{file}: `{key}`");
+                let wide = range(rows(file), &key).unwrap_or_else(|| panic!("{name} has no range"));
+                check(&name, value, wide, range(hardware_rows(file), &key));
             }
         }
+    }
+
+    #[test]
+    fn every_number_of_the_defaults_has_a_range_and_is_inside() {
+        each(|name, value, wide, narrow| {
+            assert!((wide.allows)(value) && narrow.is_none_or(|narrow| (narrow.allows)(value)), "{name}");
+        });
+    }
+
+    /// No limit of a robot can be so large that it limits nothing.
+    #[test]
+    fn every_number_has_a_ceiling_on_hardware() {
+        each(|name, _, wide, narrow| assert!(!(narrow.unwrap_or(wide).allows)(1e12), "{name}"));
+    }
+
+    #[test]
+    fn a_range_for_hardware_is_part_of_the_range_for_every_backend() {
+        let grid: Vec<f64> = (-60..=60).flat_map(|i| [1.0, 2.5, 5.0].map(|d| d * 10_f64.powi(i / 5))).collect();
+        each(|name, _, wide, narrow| {
+            let Some(narrow) = narrow else { return };
+            let outside = grid.iter().find(|value| (narrow.allows)(**value) && !(wide.allows)(**value));
+            assert_eq!(outside, None, "{name}");
+        });
     }
 }

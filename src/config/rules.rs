@@ -13,6 +13,9 @@ const CONTROL: &str = "control.toml";
 const SAFETY: &str = "safety.toml";
 const OPTIMIZE: &str = "optimize.toml";
 
+/// Least frequency between jumps in a row, Hz: a pause of 10 s.
+const LEAST_F1_HZ: f64 = 0.05;
+
 impl Config {
     pub(super) fn check(&self) -> Result<(), ConfigError> {
         self.check_control()?;
@@ -41,8 +44,8 @@ impl Config {
                 }
             }
             let f1_is_parameter = self.optimize.parameters[task.name()].iter().any(|name| name == "f1");
-            if chosen.jumps > 1 && chosen.f1_hz <= 0.0 && !f1_is_parameter {
-                let reason = "several jumps in a row need a frequency between them; give one above 0 Hz, or make f1 a parameter in optimize.toml";
+            if chosen.jumps > 1 && chosen.f1_hz < LEAST_F1_HZ && !f1_is_parameter {
+                let reason = "several jumps in a row need a frequency between them; give at least 0.05 Hz, or make f1 a parameter in optimize.toml";
                 return Err(self.refuse(CONTROL, &format!("{tables}.f1_hz"), chosen.f1_hz, reason));
             }
         }

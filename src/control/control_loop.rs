@@ -10,7 +10,7 @@
 use super::cycle::{Cycle, TickInputs};
 use super::settings::ControlSettings;
 use crate::realtime::channel::{ControlEnd, Lowering, LoweringLatch, SHOWN_EVERY};
-use crate::realtime::clock::Clock;
+use crate::realtime::clock::{Clock, SuspendWatch};
 use crate::realtime::thread::TickStart;
 use crate::robot::{CONTROL_PERIOD_S, JointCommand, LinkStatus, Placement, Robot, RobotError, RobotState};
 use crate::telemetry::{Command, Counters, Event, Mode, Snapshot, Tick};
@@ -26,6 +26,9 @@ pub struct ControlLoop {
     heartbeat: HeartbeatWatch,
     lowering: LoweringWatch,
     events_lost: bool,
+    suspend: SuspendWatch,
+    /// Time for which the guard has not answered, ms.
+    guard_silent_ms: u32,
     /// Clock time of the loop's start, ns; known from the first tick on.
     start_ns: Option<u64>,
 }
@@ -40,6 +43,8 @@ impl ControlLoop {
             heartbeat: HeartbeatWatch::default(),
             lowering: LoweringWatch::default(),
             events_lost: false,
+            suspend: SuspendWatch::default(),
+            guard_silent_ms: 0,
             start_ns: None,
         }
     }
@@ -66,6 +71,8 @@ impl ControlLoop {
             operator_silent_ms: self.heartbeat.silent_ms(end.heartbeat.count(), time_ns),
             command,
             events_lost: self.events_lost,
+            suspended_ms: clock.suspended_ns().map_or(0, |bounds| self.suspend.observe(bounds)),
+            guard_silent_ms: self.guard_silent_ms,
         };
         let tick = *cycle.tick(&inputs, clock, robot);
 
@@ -113,6 +120,11 @@ impl ControlLoop {
         let mut copy = self.cycle;
         std::hint::black_box(copy.tick(&inputs, clock, &mut repeated as &mut dyn Robot));
         self.prepare();
+    }
+
+    /// Sets the time for which the guard has not answered, ms, as of the next tick; `u32::MAX` when it is gone.
+    pub fn set_guard_silent(&mut self, silent_ms: u32) {
+        self.guard_silent_ms = silent_ms;
     }
 
     /// The mode in which the last tick ended.

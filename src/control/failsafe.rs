@@ -4,9 +4,9 @@
 //! A fall during a trial is an outcome of the trial, detected by `running_trial::FallWatch`; it damps as well.
 
 use super::failsafe_causes::{
-    body_not_finite, corrupt, delay, events_lost, hottest, joint_position, joint_torque, joint_velocity,
+    body_not_finite, corrupt, delay, events_lost, guard_silent, hottest, joint_position, joint_torque, joint_velocity,
     joints_not_finite, late, link_lost, motor_hot, motor_mode, operator_silent, other_commander, reboot, remote_stop,
-    robot_clock, send_error, sensors, slow, state_age, tilt,
+    robot_clock, send_error, sensors, slow, state_age, suspended, tilt,
 };
 pub use super::failsafe_inputs::{Failsafe, FailsafeInputs, MotionPhase};
 use super::settings::ControlSettings;
@@ -89,7 +89,7 @@ const SIT_DOWN: [FailsafeAction; 3] = [FailsafeAction::Land; 3];
 
 /// The table, by precedence: of the rows that trip the strictest action counts, of equal ones the first row. A cause that makes
 /// measured numbers invalid stands above the rows that compare them.
-const TABLE: [FailsafeRow; 22] = [
+const TABLE: [FailsafeRow; 24] = [
     row(
         "stop buttons of the remote",
         |_| "pressed together (`[remote]`)".to_owned(),
@@ -103,6 +103,14 @@ const TABLE: [FailsafeRow; 22] = [
         events_lost,
         Mode::commanded,
         STATE_KNOWN,
+    ),
+    // True in one tick only.
+    row(
+        "computer suspended",
+        |s| format!("CLOCK_BOOTTIME ran ahead of CLOCK_MONOTONIC by more than {} ms", s.failsafe.suspended_ms),
+        suspended,
+        Mode::commanded,
+        MOTORS,
     ),
     row(
         "link lost",
@@ -246,6 +254,13 @@ const TABLE: [FailsafeRow; 22] = [
             format!("no heartbeat for {silent_s} s (warning {warn_s} s)")
         },
         operator_silent,
+        Mode::energised,
+        SIT_DOWN,
+    ),
+    row(
+        "guard",
+        |s| format!("no answer for {} ms, or ended", s.failsafe.guard_silent_ms),
+        guard_silent,
         Mode::energised,
         SIT_DOWN,
     ),

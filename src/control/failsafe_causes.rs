@@ -27,6 +27,16 @@ pub(super) fn other_commander(_: &Failsafe, inputs: &FailsafeInputs, settings: &
     inputs.consistency.commander_fault(inputs.mode, &settings.consistency)
 }
 
+pub(super) fn suspended(_: &Failsafe, inputs: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {
+    let (suspended_ms, allowed_ms) = (inputs.suspended_ms, settings.failsafe.suspended_ms);
+    (suspended_ms > allowed_ms).then_some(Fault::Suspended { suspended_ms, allowed_ms })
+}
+
+pub(super) fn guard_silent(_: &Failsafe, inputs: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {
+    let (silent_ms, allowed_ms) = (inputs.guard_silent_ms, settings.failsafe.guard_silent_ms);
+    (silent_ms > allowed_ms).then_some(Fault::GuardSilent { silent_ms, allowed_ms })
+}
+
 pub(super) fn link_lost(_: &Failsafe, inputs: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {
     let (age_ms, allowed_ms) = (inputs.state_age_ms, settings.failsafe.link_lost_ms);
     (age_ms > allowed_ms).then_some(Fault::LinkLost { age_ms, allowed_ms })

@@ -36,6 +36,10 @@ pub struct FailsafeInputs<'a> {
     pub events_lost: bool,
     /// Consistency of sensors, clocks and commands.
     pub consistency: &'a Consistency,
+    /// Time for which the computer was suspended since the last tick, ms.
+    pub suspended_ms: u32,
+    /// Time for which the guard has not answered, ms; `u32::MAX` when it is gone, zero without a guard.
+    pub guard_silent_ms: u32,
 }
 
 /// Phase of the motion, on which the action of a failsafe depends.

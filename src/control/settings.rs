@@ -287,6 +287,12 @@ pub struct FailsafeLimits {
     pub simulator_idle_s: f64,
     /// Longest wait in READY or REVIEW on hardware, s: sit down; zero disables the limit.
     pub hardware_idle_s: f64,
+    /// Longest suspension of the computer, ms: CUT.
+    pub suspended_ms: u32,
+    /// Longest time without an answer of the guard, ms: LAND.
+    pub guard_silent_ms: u32,
+    /// Whether a robot sits down at the end of a trial on hardware.
+    pub hardware_review_sits_down: bool,
 }
 
 /// Source of the base's position, velocity and orientation, and of the objective.

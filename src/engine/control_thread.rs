@@ -69,7 +69,8 @@ struct Ticking<'a, C> {
 impl<C> Ticking<'_, C> {
     fn send_guard_heartbeat(&mut self) {
         if let Some(guard_heartbeat) = &mut self.guard_heartbeat {
-            guard_heartbeat.tick(self.body.mode().commanded());
+            let silent_ms = guard_heartbeat.tick(self.body.mode().commanded());
+            self.body.set_guard_silent(silent_ms);
         }
     }
 }

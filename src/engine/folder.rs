@@ -4,9 +4,12 @@ use std::path::{Path, PathBuf};
 
 use super::options::{EngineError, Options};
 use crate::config::Config;
+use crate::robot::description::RobotDescription;
 
 /// Name of the study's journal in its folder.
 pub const STUDY_FILE: &str = "study.log";
+/// Name of the folder of the robot's files in a kept configuration.
+const ROBOT_FOLDER: &str = "robot";
 
 /// Creates and locks the folder of `options`, keeps the configuration in it, and names the next recording there:
 /// `session.mcap`, `session-2.mcap`, ...; none without a folder.
@@ -42,27 +45,38 @@ pub struct LockedFolder {
 }
 
 /// Keeps the running configuration in `config/`, or in `config-2/`, ... if the session before ran with another one: the
-/// highest number is the configuration that ran last.
+/// highest number is the configuration that ran last. The robot's files are in the folder `robot` in it, a folder for
+/// `--model`. A session before that kept none, as of older versions, counts as another one.
 fn keep_config(options: &Options, folder: &Path) -> Result<(), EngineError> {
     let system = |what: String| move |source| EngineError::System { what, source };
+    let files = kept_files(options);
     let config = match newest_config(folder) {
         None => folder.join("config"),
         Some((number, newest)) => {
-            let same = |(name, text): &(String, String)| {
+            let same = |(name, text): &(PathBuf, &str)| {
                 std::fs::read_to_string(newest.join(name)).is_ok_and(|kept| kept == *text)
             };
-            if options.config.as_run.iter().all(same) {
+            if files.iter().all(same) {
                 return Ok(());
             }
             folder.join(format!("config-{}", number + 1))
         }
     };
     std::fs::create_dir(&config).map_err(system(format!("{}: cannot be made", config.display())))?;
-    for (name, text) in &options.config.as_run {
+    let robot = config.join(ROBOT_FOLDER);
+    std::fs::create_dir(&robot).map_err(system(format!("{}: cannot be made", robot.display())))?;
+    for (name, text) in files {
         let path = config.join(name);
         std::fs::write(&path, text).map_err(system(format!("{}: cannot be written", path.display())))?;
     }
     Ok(())
+}
+
+/// Returns the files of the configuration and of the robot by their path in the kept folder.
+fn kept_files(options: &Options) -> Vec<(PathBuf, &str)> {
+    let config = options.config.as_run.iter().map(|(name, text)| (PathBuf::from(name), text.as_str()));
+    let robot = options.robot.files.iter();
+    config.chain(robot.map(|(name, text)| (Path::new(ROBOT_FOLDER).join(name), text.as_str()))).collect()
 }
 
 /// Returns the configuration that ran last in a study's folder, with its number: 1 for `config/`, N for `config-N/`; none
@@ -91,15 +105,17 @@ pub fn study_files(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-/// Returns the attachments of a recording: the running configuration.
-pub fn attachments(config: &Config) -> Vec<(&str, &str, &[u8])> {
-    config.as_run.iter().map(|(name, text)| (name.as_str(), "application/toml", text.as_bytes())).collect()
+/// Returns the attachments of a recording: the running configuration and the robot's files.
+pub fn attachments(options: &Options) -> Vec<(&str, &str, &[u8])> {
+    let media = |name: &str| if name.ends_with(".toml") { "application/toml" } else { "application/xml" };
+    let files = options.config.as_run.iter().chain(&options.robot.files);
+    files.map(|(name, text)| (name.as_str(), media(name), text.as_bytes())).collect()
 }
 
-/// Returns a short name of the configuration, for an operator to compare: FNV-1a of all files, 64 bits (Fowler, Noll and
-/// Vo, draft-eastlake-fnv).
-pub fn fingerprint(config: &Config) -> String {
-    let texts = config.as_run.iter().flat_map(|(name, text)| [name.as_bytes(), text.as_bytes()]);
+/// Returns a short name of the configuration and of the robot's files, for an operator to compare: FNV-1a of all files, 64
+/// bits (Fowler, Noll and Vo, draft-eastlake-fnv).
+pub fn fingerprint(config: &Config, robot: &RobotDescription) -> String {
+    let texts = config.as_run.iter().chain(&robot.files).flat_map(|(name, text)| [name.as_bytes(), text.as_bytes()]);
     let hash = texts
         .flatten()
         .fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01b3));

@@ -2,34 +2,41 @@
 //!
 //! A control thread that ends sends damping, also after a panic. A process that is killed or stopped sends nothing, and the
 //! robot's reaction to silence is not established (`robots/go1/README.md`). The guard holds one datagram, and the control
-//! thread sends it a heartbeat every few ticks. Without heartbeats the guard damps a commanded robot. It stops when they
-//! resume, because the control thread then finds itself late and damps the robot.
+//! thread sends it a heartbeat every few ticks. Without heartbeats, and after a suspension of the computer, the guard damps
+//! a commanded robot. It stops when they resume, because the control thread then finds itself late, or the computer
+//! suspended, and damps the robot.
 //!
-//! On the pipe: the damping datagram, the longest silence in ms (two bytes, little endian), then the heartbeats, [`COMMANDED`]
-//! or [`LEFT_ALONE`].
+//! The guard answers every heartbeat, so that a stopped guard is noticed: without answers the robot lands and sits down
+//! (`src/control/failsafe.rs`), and nothing energises it.
+//!
+//! On the connection to the guard: the damping datagram, the longest silence in ms (two bytes, little endian), then the
+//! heartbeats, [`COMMANDED`] or [`LEFT_ALONE`]. On the connection from the guard: one byte after each read of heartbeats.
 
-use std::fs::File;
-use std::io::{Read, Write};
+use std::io::{ErrorKind, Read, Write};
 use std::net::UdpSocket;
 use std::os::fd::{AsFd, OwnedFd};
+use std::os::unix::net::UnixStream;
 use std::os::unix::process::CommandExt;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::time::Duration;
 
 use nix::fcntl::{FcntlArg, OFlag, fcntl};
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 
 use crate::control::settings::ControlSettings;
+use crate::realtime::clock::{SuspendWatch, suspended_ns};
+use crate::robot::JOINTS;
 use crate::robot::go1::Go1;
-use crate::robot::go1::packet::{COMMAND_LENGTH, CrcForm, LowCmd};
+use crate::robot::go1::packet::{COMMAND_LENGTH, CrcForm, LowCmd, MODE_SERVO};
 
 /// Argument that runs the program as the guard.
 pub const GUARD: &str = "guard";
 const COMMANDED: u8 = b'+';
 const LEFT_ALONE: u8 = b'-';
+const ANSWER: u8 = b'!';
 /// Ticks between two heartbeats to the guard.
 const HEARTBEAT_TICKS: u32 = 10;
 /// Silence of the control thread that is allowed beyond its own limit for late ticks, ms: several heartbeats.
@@ -38,23 +45,52 @@ const ALLOWED_SILENCE_MS: f64 = 50.0;
 const LONGEST_ALLOWED_SILENCE_MS: f64 = 1000.0;
 /// Damping datagrams, one per millisecond, after the pipe has ended: several times the duration of sinking.
 const DAMPINGS: u32 = 3000;
+/// Longest time to the first answer of a guard that starts, ms: it loads the program and locks its memory.
+const LONGEST_START_MS: u32 = 5000;
+/// Suspension of the computer after which the guard damps, ms; as `watchdog.suspended_ms` of `config/safety.toml`.
+const SUSPENDED_MS: u32 = 50;
+/// Least damping that the guard accepts, N m s/rad: less does not carry the robot down softly.
+const LEAST_DAMPING: f32 = 1.0;
+
+/// State of the guard process as the engine sees it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum GuardState {
+    /// It answers the heartbeats.
+    Answering,
+    /// It does not answer: it is stopped, or has no processor time.
+    Silent,
+    /// It has exited, or the connection to it is broken.
+    Gone,
+}
+
+/// Findings of the control thread about the guard.
+#[derive(Debug, Default)]
+struct GuardFindings {
+    broken: AtomicBool,
+    silent_ms: AtomicU32,
+}
 
 /// The guard process, seen from the engine.
 #[derive(Debug)]
 pub struct Guard {
     process: Child,
-    broken: Arc<AtomicBool>,
+    findings: Arc<GuardFindings>,
+    allowed_silent_ms: u32,
     gone: bool,
 }
 
-/// The control thread's end of the pipe. Dropped without [`GuardHeartbeat::release`], as when the process ends, it makes the guard damp the
-/// robot.
+/// The control thread's end of the connection. Dropped without [`GuardHeartbeat::release`], as when the process ends, it makes the guard
+/// damp the robot.
 #[derive(Debug)]
 pub struct GuardHeartbeat {
-    pipe: File,
-    broken: Arc<AtomicBool>,
+    connection: UnixStream,
+    findings: Arc<GuardFindings>,
     commanded: bool,
     ticks: u32,
+    /// Ticks since the last answer that were followed by a heartbeat.
+    silent_ms: u32,
+    /// Whether the guard has answered yet.
+    answered: bool,
 }
 
 impl Guard {
@@ -67,41 +103,43 @@ impl Guard {
         } else {
             LONGEST_ALLOWED_SILENCE_MS
         };
-        let (theirs, ours) = std::io::pipe()?;
+        let (theirs, mut connection) = UnixStream::pair()?;
         let process = Command::new(program)
             .arg0("quadfrog-guard")
             .arg(GUARD)
-            .stdin(theirs)
+            .stdin(OwnedFd::from(theirs))
             .stdout(OwnedFd::from(socket))
             .stderr(Stdio::inherit())
             // Signals of the terminal must not reach the guard.
             .process_group(0)
             .spawn()?;
-        let mut pipe = File::from(OwnedFd::from(ours));
-        pipe.write_all(damping.bytes())?;
-        pipe.write_all(&(allowed_ms as u16).to_le_bytes())?;
-        fcntl(&pipe, FcntlArg::F_SETFL(OFlag::O_NONBLOCK))?;
-        let broken = Arc::<AtomicBool>::default();
-        let guard = Guard { process, broken: broken.clone(), gone: false };
-        Ok((guard, GuardHeartbeat { pipe, broken, commanded: false, ticks: 0 }))
+        connection.write_all(damping.bytes())?;
+        connection.write_all(&(allowed_ms as u16).to_le_bytes())?;
+        connection.set_nonblocking(true)?;
+        let findings = Arc::<GuardFindings>::default();
+        let allowed_silent_ms = settings.failsafe.guard_silent_ms;
+        let guard = Guard { process, findings: findings.clone(), allowed_silent_ms, gone: false };
+        Ok((guard, GuardHeartbeat::new(connection, findings)))
     }
 
-    /// Returns true once, when the guard has exited or its pipe is broken. A guard with a broken pipe is killed so that it does
-    /// not start damping.
-    pub fn lost(&mut self) -> bool {
-        if self.gone {
-            return false;
-        }
-        let broken = self.broken.load(Ordering::Acquire);
-        if broken {
+    /// Returns the present state. A guard whose connection is broken is killed so that it does not start damping.
+    pub fn state(&mut self) -> GuardState {
+        let broken = self.findings.broken.load(Ordering::Acquire);
+        if broken && !self.gone {
             // An error means that it has exited already.
             let _ = self.process.kill();
         }
-        self.gone = broken || self.process.try_wait().is_ok_and(|status| status.is_some());
-        self.gone
+        self.gone |= broken || self.process.try_wait().is_ok_and(|status| status.is_some());
+        if self.gone {
+            GuardState::Gone
+        } else if self.findings.silent_ms.load(Ordering::Acquire) > self.allowed_silent_ms {
+            GuardState::Silent
+        } else {
+            GuardState::Answering
+        }
     }
 
-    /// Kills the guard, also a stopped one; to be called after the last command.
+    /// Ends the guard, also a stopped one; to be called after the last command.
     pub fn end(mut self) {
         // An error means that it has exited already.
         let _ = self.process.kill();
@@ -110,13 +148,19 @@ impl Guard {
 }
 
 impl GuardHeartbeat {
-    /// Counts a tick, or a datagram that is sent without one, and sends a heartbeat when it is due. Neither blocks nor
-    /// allocates.
-    pub fn tick(&mut self, commanded: bool) {
+    fn new(connection: UnixStream, findings: Arc<GuardFindings>) -> GuardHeartbeat {
+        GuardHeartbeat { connection, findings, commanded: false, ticks: 0, silent_ms: 0, answered: false }
+    }
+
+    /// Counts a tick, or a datagram that is sent without one, and sends a heartbeat when it is due. Returns the time for
+    /// which the guard has not answered, ms; `u32::MAX` when it is gone. Neither blocks nor allocates.
+    pub fn tick(&mut self, commanded: bool) -> u32 {
         self.ticks += 1;
-        if self.ticks == HEARTBEAT_TICKS || commanded != self.commanded {
+        if self.ticks >= HEARTBEAT_TICKS || commanded != self.commanded {
+            self.listen();
             self.send(commanded);
         }
+        if self.findings.broken.load(Ordering::Relaxed) { u32::MAX } else { self.reported_ms() }
     }
 
     /// Tells the guard that the robot is not commanded any more.
@@ -124,11 +168,28 @@ impl GuardHeartbeat {
         self.send(false);
     }
 
+    /// Time without an answer, ms; the time that a guard needs to start is not counted.
+    fn reported_ms(&self) -> u32 {
+        if self.answered || self.silent_ms > LONGEST_START_MS { self.silent_ms } else { 0 }
+    }
+
+    /// Takes the answers to the heartbeats before. Ticks are counted, not the time: a control thread that was delayed
+    /// makes up for its ticks at once, and sends no more heartbeats than they demand.
+    fn listen(&mut self) {
+        let mut answers = [0; 64];
+        match self.connection.read(&mut answers) {
+            Ok(0) => self.findings.broken.store(true, Ordering::Release),
+            Ok(_) => (self.silent_ms, self.answered) = (0, true),
+            Err(_) => self.silent_ms = self.silent_ms.saturating_add(self.ticks),
+        }
+        self.findings.silent_ms.store(self.reported_ms(), Ordering::Release);
+    }
+
     fn send(&mut self, commanded: bool) {
         (self.ticks, self.commanded) = (0, commanded);
         let byte = if commanded { COMMANDED } else { LEFT_ALONE };
-        if self.pipe.write_all(&[byte]).is_err() {
-            self.broken.store(true, Ordering::Release);
+        if self.connection.write_all(&[byte]).is_err() {
+            self.findings.broken.store(true, Ordering::Release);
         }
     }
 }
@@ -145,40 +206,59 @@ pub struct GuardError {
 pub enum GuardOutcome {
     /// The robot was not commanded at the end.
     Quiet,
-    /// The pipe ended while the robot was commanded.
+    /// The connection ended while the robot was commanded.
     Damped {
         /// Damping datagrams since then.
         sent: u32,
     },
 }
 
-/// Runs the guard until `pipe` ends.
-pub fn run_guard(mut pipe: impl Read + AsFd, socket: &UdpSocket) -> Result<GuardOutcome, GuardError> {
+/// Runs the guard until `connection` ends.
+pub fn run_guard(connection: impl Read + Write + AsFd, socket: &UdpSocket) -> Result<GuardOutcome, GuardError> {
+    let mut watch = SuspendWatch::default();
+    guard_with(connection, socket, || suspended_ns().map_or(0, |bounds| watch.observe(bounds)))
+}
+
+/// As [`run_guard`]; `suspended_ms` returns the time for which the computer was suspended since its last call.
+fn guard_with(
+    mut connection: impl Read + Write + AsFd,
+    socket: &UdpSocket,
+    mut suspended_ms: impl FnMut() -> u32,
+) -> Result<GuardOutcome, GuardError> {
     let refused = |reason: &dyn ToString| GuardError { reason: reason.to_string() };
     let (mut damping, mut silence_ms) = ([0; COMMAND_LENGTH], [0; 2]);
-    pipe.read_exact(&mut damping).map_err(|error| refused(&error))?;
-    pipe.read_exact(&mut silence_ms).map_err(|error| refused(&error))?;
-    // The guard sends only datagrams that pass the checks of the packets.
-    LowCmd::parse(&damping, CrcForm::Plain)
-        .or_else(|_| LowCmd::parse(&damping, CrcForm::Transformed))
-        .map_err(|rejection| refused(&rejection))?;
+    connection.read_exact(&mut damping).map_err(|error| refused(&error))?;
+    connection.read_exact(&mut silence_ms).map_err(|error| refused(&error))?;
+    check_damping(&damping)?;
+    // An answer that does not fit is left out; the guard never waits for the console. A pipe takes no answers.
+    let _ = fcntl(&connection, FcntlArg::F_SETFL(OFlag::O_NONBLOCK));
     let silence = PollTimeout::from(u16::from_le_bytes(silence_ms));
     let (mut timeout, mut signs) = (PollTimeout::NONE, [0; 64]);
     loop {
-        match poll(&mut [PollFd::new(pipe.as_fd(), PollFlags::POLLIN)], timeout) {
-            Err(nix::Error::EINTR) => continue,
+        let woken = poll(&mut [PollFd::new(connection.as_fd(), PollFlags::POLLIN)], timeout);
+        // The heartbeats until then were sent before the suspension.
+        let resumed = suspended_ms() > SUSPENDED_MS && timeout != PollTimeout::NONE;
+        match woken {
+            Err(nix::Error::EINTR) => {}
             // Silence: a datagram now, and one every millisecond until the next heartbeat.
             Ok(0) => {
                 let _ = socket.send(&damping);
                 timeout = PollTimeout::from(1_u16);
             }
-            // After an error of poll, the read tells the state of the pipe.
-            Ok(_) | Err(_) => match pipe.read(&mut signs) {
-                Err(error) if error.kind() == std::io::ErrorKind::Interrupted => {}
-                // A pipe that cannot be read has ended.
+            // After an error of poll, the read tells the state of the connection.
+            Ok(_) | Err(_) => match connection.read(&mut signs) {
+                Err(error) if matches!(error.kind(), ErrorKind::Interrupted | ErrorKind::WouldBlock) => {}
+                // A connection that cannot be read has ended.
                 Ok(0) | Err(_) => break,
-                Ok(count) => timeout = if signs[count - 1] == COMMANDED { silence } else { PollTimeout::NONE },
+                Ok(count) => {
+                    let _ = connection.write(&[ANSWER]);
+                    timeout = if signs[count - 1] == COMMANDED { silence } else { PollTimeout::NONE };
+                }
             },
+        }
+        if resumed {
+            let _ = socket.send(&damping);
+            timeout = PollTimeout::from(1_u16);
         }
     }
     if timeout == PollTimeout::NONE {
@@ -192,4 +272,129 @@ pub fn run_guard(mut pipe: impl Read + AsFd, socket: &UdpSocket) -> Result<Guard
         std::thread::sleep(Duration::from_millis(1));
     }
     Ok(GuardOutcome::Damped { sent })
+}
+
+/// Checks that the datagram passes the checks of the packets and damps every joint.
+fn check_damping(datagram: &[u8]) -> Result<(), GuardError> {
+    let refused = |reason: String| GuardError { reason };
+    let command = LowCmd::parse(datagram, CrcForm::Plain)
+        .or_else(|_| LowCmd::parse(datagram, CrcForm::Transformed))
+        .map_err(|rejection| refused(rejection.to_string()))?;
+    let limp = (0..JOINTS).map(|joint| command.motor(joint)).find(|m| m.mode != MODE_SERVO || m.kd < LEAST_DAMPING);
+    limp.map_or(Ok(()), |m| Err(refused(format!("kd {} N m s/rad does not damp; at least {LEAST_DAMPING}", m.kd))))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::control::settings::ControlSettings;
+    use crate::robot::JointCommand;
+    use crate::robot::go1::convert::low_cmd;
+
+    fn settings() -> ControlSettings {
+        let robot = crate::robot::description::RobotDescription::embedded("go1").unwrap();
+        let config = crate::config::Config::load(None).unwrap();
+        config.settings(&robot, crate::trial::Task::Forward, crate::trial::Backend::Hardware).unwrap()
+    }
+
+    fn heartbeat() -> (GuardHeartbeat, UnixStream) {
+        let (ours, theirs) = UnixStream::pair().unwrap();
+        ours.set_nonblocking(true).unwrap();
+        (GuardHeartbeat::new(ours, Arc::default()), theirs)
+    }
+
+    /// (A defect once: a stopped guard was noticed only when its pipe was full, after eleven minutes.) In ticks, so that
+    /// the result does not depend on the machine's speed.
+    #[test]
+    fn a_guard_that_stops_answering_is_silent_within_a_hundred_ticks_and_one_that_answers_is_not() {
+        let allowed_ms = settings().failsafe.guard_silent_ms;
+        let (mut heartbeat, mut guard) = heartbeat();
+        let answer = |guard: &mut UnixStream| guard.write_all(&[ANSWER]).unwrap();
+        for _ in 0..1000 {
+            assert_eq!(heartbeat.tick(true), 0, "a guard that starts needs its time");
+        }
+        for _ in 0..1000 {
+            answer(&mut guard);
+            assert!(heartbeat.tick(true) < allowed_ms);
+        }
+        let mut ticks = 0;
+        while heartbeat.tick(true) <= allowed_ms {
+            ticks += 1;
+        }
+        assert!((60..100).contains(&ticks), "noticed after {ticks} ticks");
+        answer(&mut guard);
+        for _ in 0..HEARTBEAT_TICKS {
+            heartbeat.tick(true);
+        }
+        assert_eq!(heartbeat.tick(true), 0, "it answers again");
+        drop(guard);
+        for _ in 0..HEARTBEAT_TICKS {
+            heartbeat.tick(true);
+        }
+        assert_eq!(heartbeat.tick(true), u32::MAX, "it is gone");
+    }
+
+    #[test]
+    fn a_guard_that_never_answers_is_silent_after_the_time_to_start() {
+        let (mut heartbeat, _guard) = heartbeat();
+        let ticks = (0..20_000).position(|_| heartbeat.tick(false) > 0).unwrap() as u32;
+        assert!(ticks.abs_diff(LONGEST_START_MS) < 20, "{ticks}");
+    }
+
+    fn command(kd: f64) -> Vec<u8> {
+        low_cmd(&JointCommand::damping(kd), CrcForm::Plain).unwrap().bytes().to_vec()
+    }
+
+    /// Two sockets in place of the robot and of the connection to it.
+    fn robot() -> (UdpSocket, UdpSocket) {
+        let robot = UdpSocket::bind(("127.0.0.1", 0)).unwrap();
+        robot.set_nonblocking(true).unwrap();
+        let socket = UdpSocket::bind(("127.0.0.1", 0)).unwrap();
+        socket.connect(robot.local_addr().unwrap()).unwrap();
+        (robot, socket)
+    }
+
+    /// Runs a guard with two heartbeats of a commanded robot; the computer was suspended for `suspended_ms` before the
+    /// second. Returns the number of datagrams until it is told that the robot is left alone.
+    fn datagrams(suspended_ms: u32) -> usize {
+        let ((robot, socket), (mut ours, theirs)) = (robot(), UnixStream::pair().unwrap());
+        ours.write_all(&[&command(3.0)[..], &60_000_u16.to_le_bytes(), &[COMMANDED]].concat()).unwrap();
+        let resumes = suspended_ms > SUSPENDED_MS;
+        let mut wakes = 0;
+        let outcome = guard_with(theirs, &socket, || {
+            wakes += 1;
+            match wakes {
+                1 => ours.write_all(&[COMMANDED]).unwrap(),
+                2..=5 if resumes => {}
+                2 | 6 => ours.write_all(&[LEFT_ALONE]).unwrap(),
+                _ => ours.shutdown(std::net::Shutdown::Write).unwrap(),
+            }
+            if wakes == 2 { suspended_ms } else { 0 }
+        });
+        assert_eq!(outcome.unwrap(), GuardOutcome::Quiet);
+        std::iter::from_fn(|| robot.recv(&mut [0; 2048]).ok()).count()
+    }
+
+    /// The heartbeat that wakes the guard was sent before the suspension: it damps until the next.
+    #[test]
+    fn a_guard_on_a_resumed_computer_damps_until_the_next_heartbeat() {
+        assert_eq!(datagrams(SUSPENDED_MS), 0);
+        assert_eq!(datagrams(SUSPENDED_MS + 1), 5);
+    }
+
+    #[test]
+    fn a_guard_refuses_a_datagram_that_does_not_damp() {
+        let guard = |input: &[u8]| {
+            let (mut ours, theirs) = UnixStream::pair().unwrap();
+            ours.write_all(input).unwrap();
+            run_guard(theirs, &robot().1)
+        };
+        for kd in [0.03, 0.9] {
+            let start = [command(kd), 70_u16.to_le_bytes().to_vec()].concat();
+            let error = guard(&start).unwrap_err().to_string();
+            assert!(error.contains("does not damp"), "{error}");
+        }
+        let braking = [LowCmd::braking(CrcForm::Plain).bytes(), &[70, 0]].concat();
+        assert!(guard(&braking).is_err());
+    }
 }

@@ -14,6 +14,7 @@ pub use options::{EngineError, Options};
 pub use stored::{Opened, StoredStudy, open_stored, stored_studies, stored_study};
 pub use study::{check_backend, open_experiment, session_info, study_name};
 
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -25,6 +26,8 @@ use self::guard::Guard;
 use crate::optimize::journal::Durability;
 use crate::realtime::channel::{ConsoleEnd, Heartbeat, Lowering, StopLatch, channels};
 use crate::realtime::clock::{Clock, MonotonicClock};
+use crate::realtime::sleep_lock::{ALLOW_INHIBITOR, INHIBITOR, SleepLock};
+use crate::realtime::system::descriptors;
 use crate::recording::record::{Record, Stamped};
 use crate::recording::recorder::{Recorder, RecorderHandle, RecorderStatus};
 use crate::recording::writer::Writer;
@@ -38,6 +41,9 @@ use crate::sim::Simulator;
 use crate::telemetry::{Snapshot, Tick};
 use crate::trial::{Approval, Backend};
 
+/// File descriptors of a session: some twenty for files, sockets, the terminal and the guard.
+const NEEDED_DESCRIPTORS: u64 = 32;
+
 /// Starts the control, recorder and session threads.
 ///
 /// # Errors
@@ -49,6 +55,7 @@ pub fn start(options: Options) -> Result<EngineHandle, EngineError> {
     // Before a word goes to the robot.
     check_backend(&options)?;
     let settings = options.config.settings(&options.robot, options.task, options.backend)?;
+    require_descriptors()?;
     let system = |what: &'static str| {
         move |source| EngineError::System { what: format!("the {what} could not be started"), source }
     };
@@ -56,7 +63,7 @@ pub fn start(options: Options) -> Result<EngineHandle, EngineError> {
         Backend::Simulator => (Box::new(Simulator::new(&options.robot, &options.config.simulator)?), None),
         Backend::Hardware => {
             let no_network = || EngineError::NoNetwork { robot: options.robot.name.clone() };
-            let go1 = Go1::open(&options.network.ok_or_else(no_network)?, options.observe)?;
+            let go1 = Go1::open(&options.network.ok_or_else(no_network)?, true)?;
             let post = |program: &PathBuf| Guard::start(program, &go1, &settings);
             let guard = options.guard.as_ref().map(post).transpose().map_err(system("guard"))?;
             (Box::new(go1), guard)
@@ -73,7 +80,7 @@ pub fn start(options: Options) -> Result<EngineHandle, EngineError> {
     let (guard, guard_heartbeat) = guard.unzip();
     let clock = MonotonicClock::start();
     let writer = match &recording {
-        Some(path) => Some(Writer::create(path, &info, utc_ns(), &attachments(&options.config))?),
+        Some(path) => Some(Writer::create(path, &info, utc_ns(), &attachments(&options))?),
         None => None,
     };
 
@@ -81,7 +88,8 @@ pub fn start(options: Options) -> Result<EngineHandle, EngineError> {
     let (to_recorder, recorder_records) = channel();
     let (to_console, console_records) = channel();
     let (to_session, ticks) = channel();
-    let recorder = Recorder::spawn(tick_end, recorder_records, writer, to_session);
+    let recorder =
+        Recorder::spawn(tick_end, recorder_records, writer, to_session).map_err(system("recorder's thread"))?;
     let sinks = RecordSinks { recorder: to_recorder, console: to_console };
     let status = recorder.watch();
     let closing = Arc::new(AtomicBool::new(false));
@@ -108,7 +116,8 @@ pub fn start(options: Options) -> Result<EngineHandle, EngineError> {
 
     let (to_supervisor, requests) = channel();
     let recorded_in = recording.as_ref().and(options.folder.clone());
-    let checklist = ArmingChecklist::new(&settings, fingerprint(&options.config), recorded_in);
+    let checklist = ArmingChecklist::new(&settings, fingerprint(&options.config, &options.robot), recorded_in)
+        .with_unseen_connection(options.unseen_connection.clone());
     let parts = SupervisorParts {
         experiment,
         control: session_end,
@@ -120,8 +129,10 @@ pub fn start(options: Options) -> Result<EngineHandle, EngineError> {
         info,
     };
     let simulated = options.backend == Backend::Simulator;
+    let review_sits_down = !simulated && options.config.safety.failsafe.hardware_review_sits_down;
     let mut supervisor = Supervisor::new(parts, clock.now_ns())
         .approving(options.approve, simulated)
+        .sitting_down_for_review(review_sits_down && !options.observe)
         .with_storage_thread()
         .map_err(system("storage thread"))?;
     let storage = supervisor.storage_watch();
@@ -129,9 +140,18 @@ pub fn start(options: Options) -> Result<EngineHandle, EngineError> {
         supervisor.report_scheduling(&granted, &denied, clock.now_ns());
     }
     let sits_down = options.backend == Backend::Hardware;
+    let inhibits = sits_down && !options.observe && SleepLock::available();
+    let sleep_lock = match inhibits.then(|| SleepLock::take(Path::new(INHIBITOR))).transpose() {
+        Ok(lock) => lock,
+        Err(error) => {
+            let message = format!("{INHIBITOR} cannot be run ({error}): the computer may suspend; {ALLOW_INHIBITOR}");
+            supervisor.report_warning(message, clock.now_ns());
+            None
+        }
+    };
     let session = std::thread::Builder::new()
         .name("session".into())
-        .spawn(move || session_thread::run(supervisor, guard, &requests, &clock, sits_down))
+        .spawn(move || session_thread::run(supervisor, guard, sleep_lock, &requests, &clock, sits_down))
         .map_err(system("session thread"))?;
 
     Ok(EngineHandle {
@@ -148,6 +168,24 @@ pub fn start(options: Options) -> Result<EngineHandle, EngineError> {
         session: Some(session),
         recorder: Some(recorder),
     })
+}
+
+/// Checks that the session will not run out of file descriptors while it drives a robot.
+fn require_descriptors() -> Result<(), EngineError> {
+    let lacking = |source| EngineError::System { what: "too few file descriptors".to_owned(), source };
+    let (free, allowed) = match descriptors() {
+        Ok(found) => found,
+        // Without /proc they are not known.
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(()),
+        Err(error) => return Err(lacking(error)),
+    };
+    if free >= NEEDED_DESCRIPTORS {
+        return Ok(());
+    }
+    let reason = format!(
+        "{free} of {allowed} are free, a session needs {NEEDED_DESCRIPTORS}; raise the limit, for example `ulimit -n 1024`"
+    );
+    Err(lacking(std::io::Error::other(reason)))
 }
 
 /// Access of a console to a running engine. Dropping it ends the engine as `shutdown` does.

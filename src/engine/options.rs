@@ -35,6 +35,8 @@ pub struct Options {
     pub guard: Option<PathBuf>,
     /// Whether hardware may continue a study that was made on another backend or robot.
     pub accept_backend_change: bool,
+    /// Reason why the loss of the operator's connection cannot be detected; none if it can. An arming check on hardware.
+    pub unseen_connection: Option<String>,
 }
 
 impl Options {
@@ -54,6 +56,7 @@ impl Options {
             join: None,
             guard: None,
             accept_backend_change: false,
+            unseen_connection: None,
         }
     }
 

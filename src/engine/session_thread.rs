@@ -3,9 +3,10 @@
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::Duration;
 
-use super::guard::Guard;
+use super::guard::{Guard, GuardState};
 use crate::optimize::journal::LOCK_GRACE;
 use crate::realtime::clock::{Clock, MonotonicClock};
+use crate::realtime::sleep_lock::{ALLOW_INHIBITOR, SleepLock};
 use crate::session::operator_request::StampedRequest;
 use crate::session::supervisor::Supervisor;
 use crate::telemetry::Mode;
@@ -29,16 +30,29 @@ const LONGEST_CLOSE: Duration = Duration::from_secs(LOCK_GRACE.as_secs() + 5);
 pub fn run(
     mut supervisor: Supervisor,
     mut guard: Option<Guard>,
+    mut sleep_lock: Option<SleepLock>,
     requests: &Receiver<StampedRequest>,
     clock: &MonotonicClock,
     sits_down: bool,
 ) -> (Supervisor, Option<Guard>) {
+    let mut guard_state = GuardState::Answering;
     loop {
         supervisor.poll(clock.now_ns());
-        if guard.as_mut().is_some_and(Guard::lost) {
-            supervisor.report_guard_lost(clock.now_ns());
+        if let Some(guard) = &mut guard {
+            let before = std::mem::replace(&mut guard_state, guard.state());
+            match guard_state {
+                state if state == before => {}
+                GuardState::Gone => supervisor.report_guard_lost(clock.now_ns()),
+                state => supervisor.report_guard_silent(state == GuardState::Silent, clock.now_ns()),
+            }
         }
-        if supervisor.mode() == Mode::Observe {
+        if sleep_lock.as_mut().is_some_and(SleepLock::lost) {
+            let message =
+                format!("systemd refused the sleep lock or ended it: the computer may suspend; {ALLOW_INHIBITOR}");
+            supervisor.report_warning(message, clock.now_ns());
+        }
+        // A real robot is taken control of with a key: another program may command it.
+        if supervisor.mode() == Mode::Observe && (!sits_down || supervisor.control_wanted()) {
             supervisor.take_control();
         }
         match requests.recv_timeout(SESSION_PERIOD) {

@@ -3,5 +3,6 @@
 pub mod channel;
 pub mod clock;
 pub mod scheduling;
+pub mod sleep_lock;
 pub mod system;
 pub mod thread;

@@ -36,6 +36,17 @@ pub fn memlock_limit() -> Option<u64> {
     (soft != RLIM_INFINITY).then_some(soft)
 }
 
+/// File descriptors of this process: free and allowed ones.
+///
+/// # Errors
+/// When the system does not report them; without a free descriptor it cannot.
+pub fn descriptors() -> std::io::Result<(u64, u64)> {
+    let (allowed, _) = getrlimit(Resource::RLIMIT_NOFILE)?;
+    // One of them reads the folder.
+    let open = std::fs::read_dir("/proc/self/fd")?.count().saturating_sub(1);
+    Ok((allowed.saturating_sub(open as u64), allowed))
+}
+
 /// Cores without ordinary threads (boot parameter `isolcpus`).
 pub fn isolated_cores() -> Vec<usize> {
     cores(&read_to_string("/sys/devices/system/cpu/isolated").unwrap_or_default())

@@ -89,14 +89,14 @@ impl Recorder {
     /// dropped and everything from them is written. Without a writer it records nothing and only delivers ticks: those of
     /// a trial at its end, the last ones at a fault.
     ///
-    /// # Panics
+    /// # Errors
     /// When the system cannot start a thread.
     pub fn spawn(
         ticks: Consumer<Tick>,
         records: Receiver<Stamped>,
         writer: Option<Writer>,
         handed: Sender<CollectedTicks>,
-    ) -> RecorderHandle {
+    ) -> std::io::Result<RecorderHandle> {
         let status = Arc::new(Mutex::new(RecorderStatus::default()));
         let mut recorder = Recorder {
             ticks,
@@ -110,11 +110,8 @@ impl Recorder {
             status: status.clone(),
         };
         recorder.publish();
-        let thread = std::thread::Builder::new()
-            .name("recorder".into())
-            .spawn(move || recorder.run())
-            .expect("a thread can be started");
-        RecorderHandle { status, thread }
+        let thread = std::thread::Builder::new().name("recorder".into()).spawn(move || recorder.run())?;
+        Ok(RecorderHandle { status, thread })
     }
 
     fn run(&mut self) {

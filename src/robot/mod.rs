@@ -318,6 +318,9 @@ pub trait Robot: Send {
         None
     }
 
+    /// Begins to call a robot that sends nothing until it is commanded. A robot that answers by itself ignores it.
+    fn begin_contact(&mut self) {}
+
     /// Warms the caches for `read` and `write`, under the same real-time rules; see [`crate::control::control_loop`].
     /// Sends nothing to the robot, and changes no result of later calls.
     fn warm_up(&mut self) {}
@@ -335,6 +338,9 @@ impl<R: Robot + ?Sized> Robot for Box<R> {
     }
     fn link(&self) -> Option<LinkStatus> {
         (**self).link()
+    }
+    fn begin_contact(&mut self) {
+        (**self).begin_contact();
     }
     fn warm_up(&mut self) {
         (**self).warm_up();

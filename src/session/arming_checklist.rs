@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use crate::control::arming::{self, Sentence};
 use crate::control::settings::{ArmingLimits, ControlSettings};
+use crate::realtime::scheduling::{DeniedSetting, RealtimeSetting};
 use crate::recording::disk;
 use crate::recording::record::ArmingCheckRecord;
 use crate::recording::recorder::RecorderStatus;
@@ -37,6 +38,12 @@ pub struct ArmingChecklist {
     /// Restarts of the robot that were taken in.
     reboots: u64,
     stop: StopTest,
+    /// Real-time settings that the control thread was granted.
+    granted: Vec<RealtimeSetting>,
+    /// Those that it was denied.
+    denied: Vec<DeniedSetting>,
+    /// Reason why the loss of the operator's connection cannot be detected; none if it can.
+    unseen_connection: Option<String>,
 }
 
 impl ArmingChecklist {
@@ -53,7 +60,21 @@ impl ArmingChecklist {
             area_ns: 0,
             reboots: 0,
             stop: StopTest::Open,
+            granted: Vec::new(),
+            denied: Vec::new(),
+            unseen_connection: None,
         }
+    }
+
+    /// Takes in the real-time settings of the control thread.
+    pub fn scheduled(&mut self, granted: &[RealtimeSetting], denied: &[DeniedSetting]) {
+        (self.granted, self.denied) = (granted.to_vec(), denied.to_vec());
+    }
+
+    /// Adds the reason why the loss of the operator's connection cannot be detected; none if it can.
+    pub fn with_unseen_connection(mut self, reason: Option<String>) -> ArmingChecklist {
+        self.unseen_connection = reason;
+        self
     }
 
     /// Takes in the operator's confirmation of a check.
@@ -140,6 +161,9 @@ impl ArmingChecklist {
                 "no person within 2 m; the operator's confirmation",
             ),
             self.stop_tested(),
+            self.realtime(OperatorCheck::Priority, |setting| matches!(setting, RealtimeSetting::Priority(_))),
+            self.realtime(OperatorCheck::LockedMemory, |setting| *setting == RealtimeSetting::LockedMemory),
+            self.connection(),
         ];
         found.chain(own).collect()
     }
@@ -186,6 +210,35 @@ impl ArmingChecklist {
         let state = if given { ArmingCheckState::Passed } else { ArmingCheckState::Waiting };
         let found = format!("{about}{}", if given { "confirmed" } else { "not confirmed" });
         self.item(check, state, found, needed.to_owned())
+    }
+
+    /// A real-time setting: granted, or confirmed by an operator who knows that it was denied.
+    fn realtime(&self, check: OperatorCheck, is: fn(&RealtimeSetting) -> bool) -> ArmingCheckRecord {
+        if let Some(setting) = self.granted.iter().find(|setting| is(setting)) {
+            return self.item(check.check(), ArmingCheckState::Passed, setting.to_string(), String::new());
+        }
+        match self.denied.iter().find(|denied| is(&denied.setting)) {
+            Some(denied) => {
+                let needed = format!("{} ({}), or the operator's confirmation", denied.remedy, denied.reason);
+                self.confirmation(check, "denied, ".to_owned(), &needed)
+            }
+            None => self.confirmation(
+                check,
+                "not requested, ".to_owned(),
+                "[realtime] of control.toml requests it, or the operator's confirmation",
+            ),
+        }
+    }
+
+    fn connection(&self) -> ArmingCheckRecord {
+        let needed = "its loss is detected, or the operator's confirmation";
+        match &self.unseen_connection {
+            Some(reason) => self.confirmation(OperatorCheck::Connection, format!("{reason}, "), needed),
+            None => {
+                let found = "its loss is detected".to_owned();
+                self.item(ArmingCheck::Connection, ArmingCheckState::Passed, found, needed.to_owned())
+            }
+        }
     }
 
     fn stop_tested(&self) -> ArmingCheckRecord {

@@ -15,12 +15,24 @@ pub enum OperatorCheck {
     Configuration,
     /// No person is within 2 m of the robot, and the remote is in hand. Holds for one arming.
     AreaClear,
+    /// The control thread may run without the real-time priority that the system denied.
+    Priority,
+    /// The program may run without the locked memory that the system denied.
+    LockedMemory,
+    /// The loss of the operator's connection cannot be detected; somebody else watches the robot.
+    Connection,
 }
 
 impl OperatorCheck {
     /// All of them.
-    pub const ALL: [OperatorCheck; 3] =
-        [OperatorCheck::LowLevel, OperatorCheck::Configuration, OperatorCheck::AreaClear];
+    pub const ALL: [OperatorCheck; 6] = [
+        OperatorCheck::LowLevel,
+        OperatorCheck::Configuration,
+        OperatorCheck::AreaClear,
+        OperatorCheck::Priority,
+        OperatorCheck::LockedMemory,
+        OperatorCheck::Connection,
+    ];
 
     /// Returns the arming check.
     pub const fn check(self) -> ArmingCheck {
@@ -28,6 +40,9 @@ impl OperatorCheck {
             OperatorCheck::LowLevel => ArmingCheck::LowLevel,
             OperatorCheck::Configuration => ArmingCheck::Configuration,
             OperatorCheck::AreaClear => ArmingCheck::AreaClear,
+            OperatorCheck::Priority => ArmingCheck::Priority,
+            OperatorCheck::LockedMemory => ArmingCheck::LockedMemory,
+            OperatorCheck::Connection => ArmingCheck::Connection,
         }
     }
 }
@@ -94,6 +109,8 @@ pub enum OperatorRequest {
     /// Void the trial under review for this reason, with `rerun` also queue the parameters again. Needed where the trial
     /// tripped a limit.
     VoidBecause { reason: String, rerun: bool },
+    /// Take control of a real robot: the first commands are sent to it.
+    TakeControl,
 }
 
 impl fmt::Display for OperatorRequest {
@@ -132,6 +149,7 @@ impl fmt::Display for OperatorRequest {
             OperatorRequest::Continue(trials) => write!(f, "continue for {trials} trials"),
             OperatorRequest::VoidBecause { reason, rerun: false } => write!(f, "void because: {reason}"),
             OperatorRequest::VoidBecause { reason, rerun: true } => write!(f, "re-run because: {reason}"),
+            OperatorRequest::TakeControl => f.write_str("take control"),
         }
     }
 }

@@ -222,10 +222,7 @@ impl SimConfig {
             return refuse(key, value, remedy);
         }
         let [shorter, longer] = self.terrain.blocks.edge_m;
-        if !(shorter > 0.0 && shorter.is_finite()) {
-            return refuse("terrain.blocks.edge_m".to_owned(), shorter, ranges::POSITIVE.text);
-        }
-        if !(longer >= shorter && longer.is_finite()) {
+        if longer < shorter {
             return refuse("terrain.blocks.edge_m".to_owned(), longer, "give the shorter edge first");
         }
         Ok(())

@@ -3,50 +3,70 @@
 use toml::{Table, Value};
 
 /// Allowed numbers, all finite, and their description for the message.
+#[derive(Debug, Clone, Copy)]
 pub struct NumberRange {
+    /// Whether a number is allowed.
     pub allows: fn(f64) -> bool,
+    /// Description of the range.
     pub text: &'static str,
 }
+
+/// A range from a least to a greatest number, both included, with their unit.
+macro_rules! within {
+    ($least:expr, $most:expr) => {
+        $crate::sim::ranges::NumberRange {
+            allows: |value| ($least as f64..=$most as f64).contains(&value),
+            text: concat!("must be ", stringify!($least), " to ", stringify!($most)),
+        }
+    };
+    ($least:expr, $most:expr, $unit:literal) => {
+        $crate::sim::ranges::NumberRange {
+            allows: |value| ($least as f64..=$most as f64).contains(&value),
+            text: concat!("must be ", stringify!($least), " to ", stringify!($most), " ", $unit),
+        }
+    };
+}
+pub(crate) use within;
 
 /// Keys with their tables, and their range. `*` stands for any name.
 pub type Row = (&'static [&'static str], NumberRange);
 
-pub const POSITIVE: NumberRange = NumberRange { allows: |v| v > 0.0, text: "must be a number above 0" };
-pub const NOT_NEGATIVE: NumberRange = NumberRange { allows: |v| v >= 0.0, text: "must be 0 or more" };
-const FINITE: NumberRange = NumberRange { allows: |_| true, text: "must be a finite number" };
-const SHARE: NumberRange = NumberRange { allows: |v| (0.0..=1.0).contains(&v), text: "must be a share, 0 to 1" };
-const TO_10: NumberRange = NumberRange { allows: |v| (1.0..=10.0).contains(&v), text: "must be 1 to 10" };
-const TO_100: NumberRange = NumberRange { allows: |v| (1.0..=100.0).contains(&v), text: "must be 1 to 100" };
-const TO_500: NumberRange = NumberRange { allows: |v| (1.0..=500.0).contains(&v), text: "must be 1 to 500" };
-const TO_10000: NumberRange = NumberRange { allows: |v| (1.0..=10_000.0).contains(&v), text: "must be 1 to 10000" };
-const SLOPE: NumberRange = NumberRange { allows: |v| (0.0..1.5).contains(&v), text: "must be 0 to 1.5 rad" };
-const SPEED_SHARE: NumberRange = NumberRange { allows: |v| (0.0..1.0).contains(&v), text: "must be 0 to 0.99" };
-const DELAY: NumberRange = NumberRange { allows: |v| (0.0..=20.0).contains(&v), text: "must be 0 to 20 ms" };
-const TIMEOUT: NumberRange = NumberRange { allows: |v| (1.0..=6e4).contains(&v), text: "must be 1 to 60000 ms" };
-const LENGTH: NumberRange =
-    NumberRange { allows: |v| (807.0..=1400.0).contains(&v), text: "must be 807 to 1400 bytes" };
-const TEMPERATURE: NumberRange =
-    NumberRange { allows: |v| (-40.0..=120.0).contains(&v), text: "must be -40 to 120 degrees Celsius" };
-const CHARGE: NumberRange = NumberRange { allows: |v| (0.0..=100.0).contains(&v), text: "must be 0 to 100 percent" };
-
-/// `config/simulator.toml`; the first row that fits applies.
+/// `config/simulator.toml`; the first row that fits applies. Beyond these ranges the equations of motion overflow, or a trial
+/// takes minutes.
 pub const SIMULATOR: &[Row] = &[
-    (&["step.*", "terrain.steps.count"], TO_100),
-    (&["solver.tolerance_m_s", "terrain.steps.rise_m", "terrain.steps.run_m"], POSITIVE),
-    (&["solver.max_sweeps"], TO_10000),
-    (&["solver.penetration_recovery"], SHARE),
-    (&["terrain.slope.angle_rad"], SLOPE),
-    (&["terrain.slope.heading_rad", "terrain.steps.start_m"], FINITE),
-    (&["terrain.blocks.count"], TO_500),
-    (&["terrain.blocks.layers"], TO_10),
-    (&["terrain.blocks.thickness_m", "terrain.blocks.mass_kg"], POSITIVE),
-    (&["actuator.hardware_like.full_torque_speed_share"], SPEED_SHARE),
-    (&["sensors.delay_ms"], DELAY),
-    (&["emulator.command_timeout_ms", "emulator.reboot_ms"], TIMEOUT),
-    (&["emulator.state_length"], LENGTH),
-    (&["emulator.motor_temperature_c"], TEMPERATURE),
-    (&["emulator.battery_percent"], CHARGE),
-    (&["*.*", "terrain.blocks.*", "actuator.hardware_like.*"], NOT_NEGATIVE),
+    (&["step.*", "terrain.steps.count"], within!(1, 100)),
+    (&["solver.tolerance_m_s"], within!(1e-15, 0.01, "m/s")),
+    (&["solver.max_sweeps"], within!(1, 10000)),
+    (&["solver.penetration_recovery"], within!(0, 1)),
+    (&["contact.slip_time_s"], within!(0, 1, "s")),
+    (&["terrain.friction", "terrain.blocks.friction", "terrain.blocks.floor_friction"], within!(0, 10)),
+    (&["terrain.slope.angle_rad"], within!(0, 1.49, "rad")),
+    (&["terrain.slope.heading_rad"], within!(-100, 100, "rad")),
+    (&["terrain.steps.rise_m"], within!(1e-4, 1, "m")),
+    (&["terrain.steps.run_m"], within!(0.01, 100, "m")),
+    (&["terrain.steps.start_m"], within!(-100, 100, "m")),
+    (&["terrain.blocks.count"], within!(1, 500)),
+    (&["terrain.blocks.layers"], within!(1, 10)),
+    (&["terrain.blocks.thickness_m"], within!(1e-4, 0.5, "m")),
+    (&["terrain.blocks.edge_m"], within!(0.01, 10, "m")),
+    (&["terrain.blocks.reach_m"], within!(0, 100, "m")),
+    (&["terrain.blocks.mass_kg"], within!(0.001, 100, "kg")),
+    (&["actuator.hardware_like.full_torque_speed_share"], within!(0, 0.99)),
+    (&["actuator.hardware_like.torque_lag_s"], within!(0, 1, "s")),
+    (&["actuator.hardware_like.dry_friction_nm"], within!(0, 100, "N m")),
+    (&["actuator.hardware_like.viscous_friction_nm_s"], within!(0, 100, "N m s/rad")),
+    (&["sensors.gyro_noise_rad_s", "sensors.gyro_bias_rad_s"], within!(0, 10, "rad/s")),
+    (&["sensors.accel_noise_m_s2", "sensors.accel_bias_m_s2"], within!(0, 100, "m/s^2")),
+    (&["sensors.orientation_noise_rad"], within!(0, 1, "rad")),
+    (&["sensors.encoder_step_rad"], within!(0, 0.1, "rad")),
+    (&["sensors.joint_velocity_noise_rad_s"], within!(0, 100, "rad/s")),
+    (&["sensors.foot_force_noise_n", "sensors.foot_force_step_n"], within!(0, 1000, "N")),
+    (&["sensors.delay_ms"], within!(0, 20, "ms")),
+    (&["emulator.command_timeout_ms", "emulator.reboot_ms"], within!(1, 60000, "ms")),
+    (&["emulator.braking_kd"], within!(0, 100, "N m s/rad")),
+    (&["emulator.state_length"], within!(807, 1400, "bytes")),
+    (&["emulator.motor_temperature_c"], within!(-40, 120, "degrees Celsius")),
+    (&["emulator.battery_percent"], within!(0, 100, "percent")),
 ];
 
 /// Returns the first number of `table` out of its range in `rows`, with its key and the description of the range.
@@ -66,17 +86,41 @@ pub fn range(rows: &'static [Row], key: &str) -> Option<&'static NumberRange> {
     rows.iter().find(|(keys, _)| keys.iter().any(&fits)).map(|(_, range)| range)
 }
 
-/// Returns the numbers outside of lists, by their key with its tables.
+/// Returns the numbers by their key with its tables; those of a list have the key of the list.
 pub fn numbers(table: &Table, tables: &str) -> Vec<(String, f64)> {
     let mut found = Vec::new();
     for (name, value) in table {
-        let key = format!("{tables}{name}");
-        match value {
-            Value::Integer(value) => found.push((key, *value as f64)),
-            Value::Float(value) => found.push((key, *value)),
-            Value::Table(inner) => found.extend(numbers(inner, &format!("{key}."))),
-            _ => {}
-        }
+        collect(&format!("{tables}{name}"), value, &mut found);
     }
     found
+}
+
+fn collect(key: &str, value: &Value, found: &mut Vec<(String, f64)>) {
+    match value {
+        Value::Integer(value) => found.push((key.to_owned(), *value as f64)),
+        Value::Float(value) => found.push((key.to_owned(), *value)),
+        Value::Table(inner) => found.extend(numbers(inner, &format!("{key}."))),
+        Value::Array(list) => list.iter().for_each(|item| collect(key, item, found)),
+        Value::String(_) | Value::Boolean(_) | Value::Datetime(_) => {}
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_number_of_the_simulator_has_a_range() {
+        for (key, value) in numbers(&include_str!("../../config/simulator.toml").parse().unwrap(), "") {
+            assert!(range(SIMULATOR, &key).is_some_and(|range| (range.allows)(value)), "{key}");
+        }
+    }
+
+    #[test]
+    fn a_range_includes_its_ends_and_no_other_number() {
+        let range = within!(0.5, 2, "s");
+        assert!([0.5, 1.0, 2.0].into_iter().all(range.allows));
+        assert!(![0.49, 2.01, f64::NAN, f64::INFINITY, f64::NEG_INFINITY].into_iter().any(range.allows));
+        assert_eq!(range.text, "must be 0.5 to 2 s");
+    }
 }

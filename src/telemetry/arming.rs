@@ -51,6 +51,12 @@ pub enum ArmingCheck {
     JointVelocity,
     #[strum(serialize = "remote answers")]
     Remote,
+    #[strum(serialize = "real-time priority")]
+    Priority,
+    #[strum(serialize = "locked memory")]
+    LockedMemory,
+    #[strum(serialize = "operator's connection")]
+    Connection,
 }
 
 impl ArmingCheck {

@@ -60,6 +60,8 @@ pub enum Command {
     Leave,
     /// Acknowledge DAMPED or FAULT and the first `stops` STOPs: back to DISARMED. A later STOP stays set.
     Acknowledge { stops: u64 },
+    /// Call a robot that sends nothing until it is commanded; the operator has pressed a key for it.
+    Contact,
 }
 
 impl std::fmt::Display for Command {
@@ -74,6 +76,7 @@ impl std::fmt::Display for Command {
             Command::Cancel => f.write_str("to cancel"),
             Command::EndReview => f.write_str("to end the review"),
             Command::Acknowledge { .. } => f.write_str("the acknowledgement"),
+            Command::Contact => f.write_str("to call the robot"),
         }
     }
 }

@@ -63,7 +63,7 @@ pub enum Fault {
     /// The ring of events is full or abandoned.
     #[error("the session does not take events")]
     EventsLost,
-    #[error("sensor check \"{}\" failed: {}; check {}", .check.name(), exceeds(*.measured, *.allowed, .check.unit(), 3), .check.suspect())]
+    #[error("sensor check \"{}\" failed: {}; check {}", .check.name(), exceeds(*.measured, *.allowed, .check.unit(), .check.digits()), .check.suspect())]
     Sensors { check: SensorCheck, measured: f64, allowed: f64 },
     #[error(
         "the robot's clock is off by {measured_ms:.0} ms against this computer's, limit {allowed_ms:.0} ms: one of them stepped or stood still"
@@ -74,6 +74,12 @@ pub enum Fault {
     OtherCommander { sign: CommanderSign, measured: f64, allowed: f64 },
     #[error("stop buttons of the remote control pressed")]
     RemoteStop,
+    /// Time is that by which CLOCK_BOOTTIME ran ahead of CLOCK_MONOTONIC.
+    #[error("the computer was suspended for {suspended_ms} ms, limit {allowed_ms} ms")]
+    Suspended { suspended_ms: u32, allowed_ms: u32 },
+    /// The time is `u32::MAX` when the guard process has ended.
+    #[error("{}", guard_silent(*.silent_ms, *.allowed_ms))]
+    GuardSilent { silent_ms: u32, allowed_ms: u32 },
     /// Growth of local time minus robot time above its least value.
     #[error("the link's delay grew: {}", exceeds(*.measured_ms, *.allowed_ms, "ms", 1))]
     LinkDelay { measured_ms: f64, allowed_ms: f64 },
@@ -126,6 +132,11 @@ impl SensorCheck {
         }
     }
 
+    /// Decimals of the measured value.
+    const fn digits(self) -> usize {
+        if matches!(self, SensorCheck::InertialUnitLive) { 0 } else { 3 }
+    }
+
     /// The sensors to check.
     const fn suspect(self) -> &'static str {
         match self {
@@ -175,7 +186,15 @@ impl Fault {
                 | Fault::MotorMode { .. }
                 | Fault::RobotClock { .. }
                 | Fault::OtherCommander { .. }
+                | Fault::Suspended { .. }
         )
+    }
+}
+
+fn guard_silent(silent_ms: u32, allowed_ms: u32) -> String {
+    match silent_ms {
+        u32::MAX => "the guard process has ended: nothing damps the robot if quadfrog is killed".to_owned(),
+        _ => format!("the guard process does not answer for {silent_ms} ms, limit {allowed_ms} ms"),
     }
 }
 

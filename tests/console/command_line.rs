@@ -264,3 +264,16 @@ fn without_a_terminal_the_console_names_the_alternatives() {
     assert_shows(&program.refused(&[]), &["terminal", "optimize"]);
     assert!(program.studies("recordings").is_empty());
 }
+
+/// (A defect once: the study was continued on the robot without a word.)
+#[test]
+fn a_simulated_study_is_not_continued_on_the_robot_without_the_flag() {
+    let program = Program::new();
+    program.text(&["optimize", "--trials", "1", "--record", "none"]);
+    let study = program.study("recordings");
+    let study = study.to_str().unwrap();
+    let message = program.refused(&["--robot", "go1", "--resume", study]);
+    assert_shows(&message, &["forward-seed0", "made on sim (go1)", "runs on go1 (go1)", "--accept-backend-change"]);
+    let accepted = program.refused(&["--robot", "go1", "--resume", study, "--accept-backend-change"]);
+    assert_shows(&accepted, &["terminal"]);
+}

@@ -54,10 +54,32 @@ fn an_invalid_connection_is_none() {
         (&[("SSH_CONNECTION", ssh)], TerminalLocation::Ssh(SshConnection::parse(ssh))),
         (&[("SSH_CONNECTION", ssh), ("TMUX", "x")], TerminalLocation::Multiplexer),
         (&[("STY", "x")], TerminalLocation::Multiplexer),
+        (&[("SUDO_USER", "x")], TerminalLocation::Sudo),
+        (&[("SUDO_USER", "x"), ("SSH_CONNECTION", ssh)], TerminalLocation::Ssh(SshConnection::parse(ssh))),
     ] {
         let found =
             TerminalLocation::of(|name| set.iter().find(|(n, _)| *n == name).map(|(_, value)| (*value).to_owned()));
         assert_eq!(found, place, "{set:?}");
         assert!(ConnectionMonitor::watch(found).unwrap().alive());
     }
+}
+
+/// A connection that cannot be seen once counted as alive: the robot was armed without a word.
+#[test]
+fn a_connection_that_cannot_be_seen_says_why() {
+    let unseen = |variables: &[(&str, &str)]| {
+        let value = |name: &str| variables.iter().find(|(n, _)| *n == name).map(|(_, value)| (*value).to_owned());
+        TerminalLocation::of(value).unseen()
+    };
+    assert_eq!(unseen(&[]), None);
+    assert_eq!(unseen(&[("TMUX", "x")]), Some("tmux or screen hides its loss"));
+    assert_eq!(unseen(&[("SUDO_USER", "x")]), Some("sudo removed SSH_CONNECTION"));
+    assert_eq!(unseen(&[("SSH_CONNECTION", "nonsense")]), Some("SSH_CONNECTION cannot be read"));
+    let elsewhere = "192.0.2.1 45268 192.0.2.2 22";
+    assert_eq!(unseen(&[("SSH_CONNECTION", elsewhere)]), Some("SSH_CONNECTION is not in /proc/net/tcp"));
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let client = TcpStream::connect(listener.local_addr().unwrap()).unwrap();
+    let (_server, _) = listener.accept().unwrap();
+    let here = text(client.local_addr().unwrap(), client.peer_addr().unwrap());
+    assert_eq!(unseen(&[("SSH_CONNECTION", &here)]), None);
 }

@@ -44,6 +44,7 @@ const fn row(action: Action, key: &'static str, seen: Seen, after: (&'static str
 
 /// A session of one trial on the simulator, in this order.
 const LIVE: &[Row] = &[
+    row(Action::TakeControl, "L", Shows("the simulator is under control"), ("", "")),
     row(Action::Override, "o", Shows("Override trial #0"), ("\x1b[B120\r", "was 106.2")),
     row(Action::ClearOverrides, "O", Hides("was 106.2"), ("", "")),
     row(Action::ArmingChecks, "P", Shows("Arming checks: all passed"), ("\x1b", "Press A to arm")),

@@ -2,11 +2,14 @@
 
 mod support;
 
+use std::time::Duration;
+
 use quadfrog::config::Config;
 use quadfrog::recording::record::{ArmingCheckRecord, HealthLimits, Record, SessionInfo};
 use quadfrog::recording::recorder::RecorderStatus;
 use quadfrog::robot::{Battery, LinkStatus};
 use quadfrog::session::operator_request::{OperatorCheck, OperatorRequest};
+use quadfrog::session::storage::StorageWait;
 use quadfrog::telemetry::{ArmingCheck, ArmingCheckState, Counters, Mode, Snapshot, Tick};
 use quadfrog::trial::{
     Backend, ExperimentStage, FixedParameter, ParameterInsight, PointRecord, ProposalInsight, SearchStatus,
@@ -484,4 +487,26 @@ fn details_that_do_not_fit_are_reached_with_the_paging_keys() {
     assert!(bottom != top && bottom.contains("STOP") && !bottom.contains("verdict  "), "{bottom}");
     console.press(&["PgUp"]);
     assert_eq!(console.screen(80, 24), top);
+}
+
+/// The operator sees why nothing happens, and since when.
+#[test]
+fn a_wait_for_the_storage_is_shown_until_it_ends() {
+    let mut console = Console::ready();
+    let waited = Duration::from_secs(14);
+    console.update(Msg::Storage(Some(StorageWait { waited, lock: true })));
+    assert_shows(&console.screen(80, 24), &["Waiting for the study's lock, 14 s"]);
+    console.update(Msg::Storage(Some(StorageWait { waited, lock: false })));
+    assert_shows(&console.screen(80, 24), &["Waiting for the disk, 14 s"]);
+    console.update(Msg::Storage(None));
+    assert!(!console.screen(80, 24).contains("Waiting for"));
+}
+
+#[test]
+fn the_hop_envelope_is_shown_beside_the_proposal() {
+    let mut console = Console::ready();
+    console.record(Record::Search(SearchStatus { hop_share: Some(0.5), ..search((0.0, 150.0), None) }));
+    assert_shows(&console.screen(80, 24), &["hop envelope: 50 % of the forces"]);
+    console.record(Record::Search(search((0.0, 150.0), None)));
+    assert!(!console.screen(80, 24).contains("hop envelope"));
 }

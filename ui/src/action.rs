@@ -8,6 +8,7 @@ use strum::{IntoStaticStr, VariantArray};
 pub enum Action {
     Stop,
     Interrupt,
+    TakeControl,
     Arm,
     ArmingChecks,
     SitDown,
@@ -128,12 +129,13 @@ const fn fixed(info: ActionInfo) -> ActionInfo {
 
 /// Every action, in the order of [`Action`].
 #[rustfmt::skip]
-pub static ACTIONS: [ActionInfo; 68] = {
+pub static ACTIONS: [ActionInfo; 69] = {
     use Action as A;
     use ActionGroup as G;
     [
         fixed(row(A::Stop, "stop", &["Space", "F12"], G::Robot, "STOP: damp all motors at once")),
         fixed(row(A::Interrupt, "interrupt", &["Ctrl-C"], G::Robot, "STOP; again within 2 s: quit")),
+        row(A::TakeControl, "take-control", &["L"], G::Robot, "take control of a real robot: its first command"),
         row(A::Arm, "arm", &["A"], G::Robot, "arm: the robot stands up"),
         row(A::ArmingChecks, "pre-arm", &["P"], G::Robot, "arming checks, and your confirmation where one is needed"),
         row(A::SitDown, "sit-down", &["D"], G::Robot, "sit down and disarm"),

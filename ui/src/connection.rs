@@ -50,8 +50,17 @@ impl SshConnection {
     }
 
     fn dead(&self) -> bool {
+        self.in_tables().is_some_and(|count| count >= DEAD_RETRANSMISSIONS)
+    }
+
+    /// Whether the kernel of this network namespace has the connection; mosh and a container's network hide it.
+    fn listed(&self) -> bool {
+        self.in_tables().is_some()
+    }
+
+    fn in_tables(&self) -> Option<u32> {
         let tables = TABLES.iter().filter_map(|path| std::fs::read_to_string(path).ok());
-        tables.filter_map(|table| self.retransmissions(&table)).any(|count| count >= DEAD_RETRANSMISSIONS)
+        tables.filter_map(|table| self.retransmissions(&table)).max()
     }
 }
 
@@ -82,6 +91,8 @@ pub enum TerminalLocation {
     Multiplexer,
     /// Another machine, over SSH; the connection, if `SSH_CONNECTION` can be parsed.
     Ssh(Option<SshConnection>),
+    /// Not known: sudo removes `SSH_CONNECTION`.
+    Sudo,
 }
 
 impl TerminalLocation {
@@ -90,8 +101,25 @@ impl TerminalLocation {
         if ["TMUX", "STY"].iter().any(|name| variable(name).is_some()) {
             return TerminalLocation::Multiplexer;
         }
-        variable("SSH_CONNECTION")
-            .map_or(TerminalLocation::Local, |text| TerminalLocation::Ssh(SshConnection::parse(&text)))
+        match variable("SSH_CONNECTION") {
+            Some(text) => TerminalLocation::Ssh(SshConnection::parse(&text)),
+            None if variable("SUDO_USER").is_some() => TerminalLocation::Sudo,
+            None => TerminalLocation::Local,
+        }
+    }
+}
+
+impl TerminalLocation {
+    /// Returns the reason why the loss of the connection cannot be detected; none if it can, or if there is no connection.
+    pub fn unseen(self) -> Option<&'static str> {
+        match self {
+            TerminalLocation::Local => None,
+            TerminalLocation::Multiplexer => Some("tmux or screen hides its loss"),
+            TerminalLocation::Sudo => Some("sudo removed SSH_CONNECTION"),
+            TerminalLocation::Ssh(None) => Some("SSH_CONNECTION cannot be read"),
+            TerminalLocation::Ssh(Some(connection)) if connection.listed() => None,
+            TerminalLocation::Ssh(Some(_)) => Some("SSH_CONNECTION is not in /proc/net/tcp"),
+        }
     }
 }
 

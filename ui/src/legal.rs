@@ -14,6 +14,7 @@ pub type Legality = Result<(), String>;
 pub fn legal(action: Action, model: &Model) -> Legality {
     use Action as A;
     match action {
+        A::TakeControl => may_take_control(model),
         A::Arm => may_arm(model),
         A::SitDown => may_sit_down(model),
         A::Acknowledge => may_acknowledge(model),
@@ -101,7 +102,8 @@ fn refuse(reason: impl Into<String>) -> Legality {
 /// The reason why the robot accepts no command at present; none while it lies or stands waiting.
 fn busy_reason(mode: Mode) -> Option<&'static str> {
     match mode {
-        Mode::Offline | Mode::Observe => Some("the robot does not answer yet"),
+        Mode::Offline => Some("the robot does not answer yet"),
+        Mode::Observe => Some("the robot is not under control yet"),
         Mode::StandUp => Some("the robot is standing up"),
         Mode::Countdown => Some("the countdown runs"),
         Mode::Jump => Some("the robot is jumping"),
@@ -111,6 +113,18 @@ fn busy_reason(mode: Mode) -> Option<&'static str> {
         Mode::Fault => Some("a fault is latched: acknowledge first"),
         Mode::Disarmed | Mode::Ready | Mode::Review => None,
     }
+}
+
+/// Time for which the console listens before it may send the first command, s: another commander is then visible.
+const LISTENING_S: f64 = 1.0;
+
+/// A real robot receives nothing before the operator's key: another console may drive it.
+fn may_take_control(model: &Model) -> Legality {
+    may_request(model)?;
+    require(model.session.info.is_hardware(), "the simulator is under control from the start")?;
+    require(matches!(model.mode(), Mode::Offline | Mode::Observe), "this console commands the robot already")?;
+    let left_s = LISTENING_S - model.clock.as_secs_f64();
+    require(left_s <= 0.0, &format!("listening to the robot for another {left_s:.1} s"))
 }
 
 fn may_arm(model: &Model) -> Legality {

@@ -65,6 +65,8 @@ pub enum BellCause {
     Verdict,
     /// A proposal waits for approval.
     Proposal,
+    /// Each second of the countdown to a jump.
+    Countdown,
 }
 
 /// A setting that is refused.

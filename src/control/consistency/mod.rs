@@ -26,6 +26,9 @@ use inertial::InertialUnit;
 use inputs::StateStep;
 use joints::JointRates;
 
+/// Tolerance of a comparison: times are sums of rounded milliseconds.
+const ROUNDING: f64 = 5e-4;
+
 /// Sensors, clocks and commands over the last seconds.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Consistency {
@@ -121,7 +124,7 @@ impl Consistency {
     pub fn sensor_fault(&self, mode: Mode, limits: &ConsistencyLimits) -> Option<Fault> {
         SensorCheck::ALL.iter().filter(|check| watched(**check, mode)).find_map(|&check| {
             let (measured, allowed) = (self.measured(check), limits.allowed(check));
-            (measured > allowed).then_some(Fault::Sensors { check, measured, allowed })
+            (measured > allowed + ROUNDING).then_some(Fault::Sensors { check, measured, allowed })
         })
     }
 

@@ -20,6 +20,11 @@ impl Cycle {
             Command::EndReview if matches!(self.cause, TransitionCause::Fell(_)) => Trigger::Acknowledge,
             Command::EndReview => Trigger::EndReview,
             Command::Acknowledge { .. } => Trigger::Acknowledge,
+            // No trigger: the mode changes when the robot answers.
+            Command::Contact => {
+                robot.begin_contact();
+                return;
+            }
             // No trigger: from the next tick on the failsafes land an energised robot.
             Command::Leave => {
                 self.session_left = true;

@@ -35,6 +35,8 @@ impl Cycle {
             operator_silent_ms: inputs.operator_silent_ms,
             events_lost: inputs.events_lost,
             consistency: &self.consistency,
+            suspended_ms: inputs.suspended_ms,
+            guard_silent_ms: inputs.guard_silent_ms,
         };
         let trip = self.failsafe.check(&failsafe_inputs, &self.settings);
         self.warning = match (failsafe::warning(&failsafe_inputs, &self.settings), self.warning) {

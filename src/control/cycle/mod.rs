@@ -43,6 +43,10 @@ pub struct TickInputs {
     pub command: Option<Command>,
     /// The ring of events was full: the session takes none.
     pub events_lost: bool,
+    /// Time for which the computer was suspended since the last tick, ms.
+    pub suspended_ms: u32,
+    /// Time for which the guard has not answered, ms; `u32::MAX` when it is gone, zero without a guard.
+    pub guard_silent_ms: u32,
 }
 
 /// Events of one tick.

@@ -175,7 +175,14 @@ fn parse_distribution(text: &str) -> Result<Distribution, String> {
     if kind == "FloatDistribution" && attributes["step"].is_null() {
         let bound = |key: &str| number_of(&attributes[key]).ok_or_else(|| format!("a distribution has no `{key}`"));
         let log = attributes["log"].as_bool().unwrap_or(false);
-        return Ok(Distribution::Float(Range { low: bound("low")?, high: bound("high")?, log }));
+        let (low, high) = (bound("low")?, bound("high")?);
+        // Optuna refuses such a distribution, too. Infinite bounds are another program's; nothing is sampled from them.
+        if low.is_nan() || high.is_nan() || low > high || log && low <= 0.0 {
+            return Err(format!("the bounds {low} and {high} of a distribution are no range"));
+        }
+        if low.is_finite() && high.is_finite() {
+            return Ok(Distribution::Float(Range { low, high, log }));
+        }
     }
     Ok(Distribution::Foreign { kind: kind.to_owned(), text: text.to_owned() })
 }

@@ -14,6 +14,13 @@ pub const LOCK_GRACE: Duration = Duration::from_secs(30);
 /// Longest pause between two attempts to lock: an interrupted wait ends within it.
 const LONGEST_PAUSE: Duration = Duration::from_millis(50);
 
+/// Longest line, bytes: a thousand times the longest that this program writes; room for the attributes of other programs.
+const LONGEST_LINE: usize = 16 << 20;
+
+fn too_long(length: usize) -> String {
+    format!("the line has {length} bytes, more than {LONGEST_LINE}")
+}
+
 /// Whether an append waits for the disk.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Durability {
@@ -122,7 +129,10 @@ impl JournalFile {
         file.take(length - self.offset).read_to_end(&mut bytes).map_err(io)?;
         let mut start = 0;
         while let Some(end) = bytes[start..].iter().position(|b| *b == b'\n').map(|i| start + i + 1) {
-            let line = std::str::from_utf8(&bytes[start..end]).map_err(|e| format!("not UTF-8: {e}"));
+            let line = match end - start {
+                length if length > LONGEST_LINE => Err(too_long(length)),
+                _ => std::str::from_utf8(&bytes[start..end]).map_err(|e| format!("not UTF-8: {e}")),
+            };
             match line.and_then(|line| accept(line.trim_end_matches(['\n', '\r']))) {
                 Ok(()) => {}
                 // Writers remove an invalid last line; an invalid line before another stops every reader.
@@ -133,7 +143,12 @@ impl JournalFile {
             self.offset += (end - start) as u64;
             start = end;
         }
-        Ok(UnreadTail { bytes: bytes.split_off(start) })
+        let tail = bytes.split_off(start);
+        if tail.len() > LONGEST_LINE {
+            let fault = too_long(tail.len());
+            return Err(JournalError::Line { path: self.path.clone(), line: self.lines + 1, fault });
+        }
+        Ok(UnreadTail { bytes: tail })
     }
 
     /// Returns the wait for the lock.

@@ -1,6 +1,8 @@
 //! Reads a robot's description from a folder, or from the copies embedded in the program.
 
 use std::borrow::Cow;
+use std::fs::File;
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 use nalgebra::Vector3;
@@ -117,15 +119,11 @@ impl RobotFiles {
         let robot: RobotToml = self.toml()?;
         let invalid = |element: &str, problem: String, remedy| Err(self.invalid(element, problem, remedy));
         let inertia = robot.motor.rotor_inertia_kgm2;
-        if !(inertia.is_finite() && inertia >= 0.0) {
-            return invalid("motor.rotor_inertia_kgm2", format!("{inertia} kg m^2"), "give zero or a positive number");
+        if !(0.0..=0.1).contains(&inertia) {
+            return invalid("motor.rotor_inertia_kgm2", format!("{inertia} kg m^2"), "give 0 to 0.1 kg m^2");
         }
-        if let Some(ratio) = robot.motor.gear_ratio.iter().find(|r| !(r.is_finite() && **r > 0.0)) {
-            return invalid(
-                "motor.gear_ratio",
-                format!("{ratio}"),
-                "give rotor turns per joint turn, greater than zero",
-            );
+        if let Some(ratio) = robot.motor.gear_ratio.iter().find(|ratio| !(0.1..=1000.0).contains(*ratio)) {
+            return invalid("motor.gear_ratio", format!("{ratio}"), "give 0.1 to 1000 rotor turns per joint turn");
         }
 
         let file = self.folder.join(&robot.urdf);
@@ -134,6 +132,7 @@ impl RobotFiles {
             None => read(file.clone())?.into(),
         };
         let parts = urdf::parse(&file, &urdf)?;
+        let urdf_name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
 
         let mut lying_position = Joints::default();
         let mut rotor_inertia = Joints::default();
@@ -165,6 +164,7 @@ impl RobotFiles {
             lying_position,
             rotor_inertia,
             imu_origin: parts.imu_origin.unwrap_or_else(Vector3::zeros),
+            files: vec![("robot.toml".to_owned(), self.toml.to_string()), (urdf_name, urdf.into_owned())],
         })
     }
 }
@@ -192,6 +192,31 @@ impl RobotDescription {
     }
 }
 
+/// Largest file of a robot or of a configuration, bytes: a hundred times the largest of the repository.
+pub const LARGEST_FILE: u64 = 1 << 20;
+
+/// Reads a text file of at most [`LARGEST_FILE`] bytes.
+///
+/// # Errors
+/// The file cannot be read, is not a regular file (a device may have no end), is larger, or is not UTF-8.
+pub fn read_text(file: &Path) -> io::Result<String> {
+    let metadata = std::fs::metadata(file)?;
+    if !metadata.is_file() {
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, "it is not a regular file"));
+    }
+    let too_large = || {
+        let reason = format!("it has more than {LARGEST_FILE} bytes, the most for a description or configuration");
+        io::Error::new(io::ErrorKind::FileTooLarge, reason)
+    };
+    if metadata.len() > LARGEST_FILE {
+        return Err(too_large());
+    }
+    let mut text = String::new();
+    // The file may grow meanwhile, and some of the system's files have no length.
+    let read = File::open(file)?.take(LARGEST_FILE + 1).read_to_string(&mut text)?;
+    if read as u64 > LARGEST_FILE { Err(too_large()) } else { Ok(text) }
+}
+
 fn read(file: PathBuf) -> Result<String, DescriptionError> {
-    std::fs::read_to_string(&file).map_err(|e| DescriptionError::Read { file, reason: e.to_string() })
+    read_text(&file).map_err(|e| DescriptionError::Read { file, reason: e.to_string() })
 }

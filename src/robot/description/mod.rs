@@ -7,12 +7,13 @@
 
 mod files;
 mod urdf;
+mod urdf_checks;
 
 use std::path::PathBuf;
 
 use nalgebra::{Matrix3, Vector3};
 
-pub use files::RobotFiles;
+pub use files::{LARGEST_FILE, RobotFiles, read_text};
 
 use super::kinematics::LegGeometry;
 use super::{JOINTS, Joints, PerLeg};
@@ -92,6 +93,8 @@ pub struct RobotDescription {
     pub rotor_inertia: Joints,
     /// Position of the inertial unit, trunk frame, m; its axes are the trunk's.
     pub imu_origin: Vector3<f64>,
+    /// Name and text of the files: `robot.toml` and the URDF.
+    pub files: Vec<(String, String)>,
 }
 
 impl RobotDescription {

@@ -6,6 +6,7 @@ use std::path::Path;
 use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
 use urdf_rs::{Geometry, Joint, JointType, Link, Pose, Robot};
 
+use super::urdf_checks;
 use super::{CollisionShape, DescriptionError, JointLimits, LegDescription, RigidBody};
 use crate::robot::kinematics::LegGeometry;
 use crate::robot::{JOINT_NAMES, JOINTS, Joints, Leg, PerLeg};
@@ -39,8 +40,15 @@ struct UrdfDocument<'a> {
 
 /// Converts the URDF in `text`; `file` is for messages.
 pub(super) fn parse(file: &Path, text: &str) -> Result<UrdfContents, DescriptionError> {
-    let robot = urdf_rs::read_from_string(text)
-        .map_err(|e| DescriptionError::Syntax { file: file.to_owned(), reason: e.to_string() })?;
+    let syntax = |reason: String| DescriptionError::Syntax { file: file.to_owned(), reason };
+    urdf_checks::check_text(text).map_err(syntax)?;
+    let robot = urdf_rs::read_from_string(text).map_err(|e| syntax(e.to_string()))?;
+    urdf_checks::check_robot(&robot).map_err(|(element, problem, remedy)| DescriptionError::Invalid {
+        file: file.to_owned(),
+        element,
+        problem,
+        remedy,
+    })?;
     UrdfDocument { file, robot: &robot }.contents()
 }
 

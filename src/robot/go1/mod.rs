@@ -47,17 +47,20 @@ impl Network {
             network: Option<Network>,
         }
         let Some(network) = files.toml::<NetworkToml>()?.network else { return Ok(None) };
-        let periods = [
-            ("network.state_period_ms", network.state_period_ms),
-            ("network.restart_ms", network.restart_ms),
-            ("network.hello_ms", network.hello_ms),
+        let times = [
+            ("network.state_period_ms", network.state_period_ms, 1..=20, "give 1 to 20 milliseconds"),
+            ("network.restart_ms", network.restart_ms, 20..=10_000, "give 20 to 10000 milliseconds"),
+            ("network.hello_ms", network.hello_ms, 10..=10_000, "give 10 to 10000 milliseconds"),
+            ("network.servo_grace_ms", network.servo_grace_ms, 0..=2000, "give 0 to 2000 milliseconds"),
         ];
-        if let Some((key, _)) = periods.iter().find(|(_, ms)| *ms == 0) {
-            return Err(files.invalid(key, "0".to_owned(), "give 1 or more milliseconds"));
+        for (key, ms, range, remedy) in times {
+            if !range.contains(&ms) {
+                return Err(files.invalid(key, format!("{ms} ms"), remedy));
+            }
         }
         let force = network.foot_force_n;
-        if !(force.is_finite() && force > 0.0) {
-            return Err(files.invalid("network.foot_force_n", force.to_string(), "give a number greater than zero"));
+        if !(0.01..=100.0).contains(&force) {
+            return Err(files.invalid("network.foot_force_n", format!("{force} N"), "give 0.01 to 100 N a step"));
         }
         Ok(Some(network))
     }
@@ -65,9 +68,9 @@ impl Network {
 
 /// A Go1 behind its link.
 ///
-/// Assumed: the robot sends its states to the source address of the commands. Until the first state arrives, a hello
-/// command, in which every motor brakes without a target, is sent a few times per second; afterwards only the
-/// controller's commands.
+/// Assumed: the robot sends its states to the source address of the commands. From `begin_contact` until the first state
+/// arrives, a hello command, in which every motor brakes without a target, is sent a few times per second; afterwards
+/// only the controller's commands.
 #[derive(Debug)]
 pub struct Go1 {
     link: Link,
@@ -85,7 +88,7 @@ pub struct Go1 {
 }
 
 impl Go1 {
-    /// Opens the link. With `listen_only` no hello commands are sent.
+    /// Opens the link. With `listen_only` no hello commands are sent before `begin_contact`.
     ///
     /// # Errors
     /// The local port is taken, or there is no route to the address.
@@ -189,6 +192,10 @@ impl Robot for Go1 {
 
     fn link(&self) -> Option<LinkStatus> {
         Some(*self.link.status())
+    }
+
+    fn begin_contact(&mut self) {
+        self.sends_hello = true;
     }
 
     fn warm_up(&mut self) {

@@ -1,8 +1,8 @@
 //! Steps of the automatic rule.
 
 use super::Supervisor;
-use super::jobs::Asker;
 use super::unattended::Unattended;
+use super::unfinished::Asker;
 use crate::recording::record::LogLevel;
 use crate::session::operator_request::{OperatorRequest, StampedRequest};
 use crate::telemetry::Mode;

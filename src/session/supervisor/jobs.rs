@@ -1,51 +1,17 @@
 //! Jobs on the experiment: given without waiting; their answers are published when they are finished.
 
 use super::Supervisor;
+use super::unfinished::{ApprovalState, Asker, JobPurpose, UnfinishedJob};
 use crate::recording::record::{LogLevel, Record, RequestRecord};
 use crate::session::experiment::Experiment;
 use crate::session::operator_request::StampedRequest;
 use crate::session::storage::{FinishedJob, JobOutput, StorageWatch};
-use crate::telemetry::{Command, CommandRefusal, Mode, Permit, TrialSpec};
+use crate::telemetry::{Command, CommandRefusal, Mode, TrialSpec};
 use crate::trial::ExperimentStage;
 
 /// A longer wait for the storage of the study is logged, ns.
 const LOGGED_WAIT_NS: u64 = 1_000_000_000;
 const STORAGE_LOST: &str = "the thread that stores the study has ended: sit down, quit and start again";
-
-/// Origin of a request.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Asker {
-    Operator,
-    /// The automatic rule of approval.
-    Rule,
-}
-
-/// An unfinished job.
-#[derive(Debug)]
-pub struct UnfinishedJob {
-    number: u64,
-    given_ns: u64,
-    purpose: JobPurpose,
-}
-
-#[derive(Debug)]
-pub enum JobPurpose {
-    Request(StampedRequest, Asker),
-    Approve(StampedRequest, Asker, ApprovalState),
-    Measure(u32),
-    /// A trial that was approved and not run.
-    Withdraw,
-    Refresh,
-    Close,
-}
-
-/// State at the key press of an approval: the trial runs only if it still holds when the study has stored the trial.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ApprovalState {
-    pub permit: Permit,
-    /// STOPs until then.
-    pub stops: u64,
-}
 
 impl Supervisor {
     /// Moves the experiment to a thread of its own: neither a lock nor a slow disk delays this session then.

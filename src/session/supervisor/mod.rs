@@ -7,6 +7,7 @@ mod request_handler;
 mod standing;
 mod study_requests;
 mod unattended;
+mod unfinished;
 
 use std::collections::VecDeque;
 use std::sync::mpsc::{Receiver, Sender};
@@ -22,8 +23,8 @@ use crate::recording::record::{ArmingCheckRecord, LogLevel, LogRecord, Record, S
 use crate::recording::recorder::{CollectedTicks, RecorderWatch, TrialTicks};
 use crate::telemetry::{Command, CommandRefusal, Event, Mode, TransitionCause, TrialEnd};
 use crate::trial::ExperimentStage;
-use jobs::{Asker, JobPurpose, UnfinishedJob};
 use unattended::Unattended;
+use unfinished::{Asker, JobPurpose, UnfinishedJob};
 
 /// Period of the counters' records, ns.
 const COUNTERS_PERIOD_NS: u64 = 100_000_000;
@@ -31,6 +32,7 @@ const COUNTERS_PERIOD_NS: u64 = 100_000_000;
 const RECORDER_GONE: &str = "the recorder's thread has ended";
 const GUARD_LOST: &str =
     "the guard process has ended: nothing damps the robot if quadfrog is killed; sit down, quit and start again";
+const GUARD_SILENT: &str = "the guard process does not answer: nothing damps the robot if quadfrog is killed; continue the process if it is stopped (`kill -CONT`), otherwise sit down, quit and start again";
 
 /// Period of reading the changes of other programs to the study, ns.
 const REFRESH_PERIOD_NS: u64 = 500_000_000;
@@ -106,9 +108,12 @@ pub struct Supervisor {
     measured: VecDeque<TrialTicks>,
     recorder_error: Option<String>,
     recorder_gone: bool,
-    guard_lost: bool,
+    /// Reason for which the guard does not protect the robot; none while it does.
+    guard_objection: Option<&'static str>,
     observe: bool,
     control_requested: bool,
+    /// The operator has asked for control of a real robot.
+    control_wanted: bool,
     /// Heartbeats of the console when control was refused last: it is requested again after the next.
     heartbeats: u64,
     counters_ns: u64,
@@ -121,6 +126,10 @@ pub struct Supervisor {
     checklist_ns: u64,
     refreshed_ns: u64,
     unattended: Unattended,
+    /// Whether the robot sits down when a trial is over.
+    review_sits_down: bool,
+    /// The robot was sent to sit down for the review: no interruption of the automatic rule.
+    sitting_for_review: bool,
 }
 
 impl Supervisor {
@@ -151,9 +160,10 @@ impl Supervisor {
             measured: VecDeque::new(),
             recorder_error: None,
             recorder_gone: false,
-            guard_lost: false,
+            guard_objection: None,
             observe,
             control_requested: false,
+            control_wanted: false,
             heartbeats: 0,
             counters_ns: 0,
             checklist,
@@ -163,6 +173,8 @@ impl Supervisor {
             checklist_ns: 0,
             refreshed_ns: 0,
             unattended: Unattended::default(),
+            review_sits_down: false,
+            sitting_for_review: false,
         };
         // Not to the recorder: its file begins with this record.
         let _ = supervisor.sinks.console.send(Stamped { time_ns, record: Record::Session(info) });
@@ -172,8 +184,15 @@ impl Supervisor {
         supervisor
     }
 
-    /// Logs the real-time settings that the control thread was granted and denied.
+    /// Returns the session with a robot that sits down at the end of each trial, if `sits_down`: a person may then go to it.
+    pub fn sitting_down_for_review(mut self, sits_down: bool) -> Supervisor {
+        self.review_sits_down = sits_down;
+        self
+    }
+
+    /// Takes in the real-time settings that the control thread was granted and denied: arming checks on hardware.
     pub fn report_scheduling(&mut self, granted: &[RealtimeSetting], denied: &[DeniedSetting], time_ns: u64) {
+        self.checklist.scheduled(granted, denied);
         if !granted.is_empty() {
             let granted: Vec<_> = granted.iter().map(ToString::to_string).collect();
             self.log(LogLevel::Info, format!("control thread: {}", granted.join(", ")), time_ns);
@@ -186,8 +205,22 @@ impl Supervisor {
     /// Records that the guard process has ended. Nothing that energises the robot is begun any more: without the guard
     /// nothing damps the robot if this process is killed.
     pub fn report_guard_lost(&mut self, time_ns: u64) {
-        self.guard_lost = true;
+        self.guard_objection = Some(GUARD_LOST);
         self.log(LogLevel::Error, GUARD_LOST.to_owned(), time_ns);
+    }
+
+    /// Records whether the guard process answers. While it does not, nothing that energises the robot is begun.
+    pub fn report_guard_silent(&mut self, silent: bool, time_ns: u64) {
+        self.guard_objection = silent.then_some(GUARD_SILENT);
+        match silent {
+            true => self.log(LogLevel::Error, GUARD_SILENT.to_owned(), time_ns),
+            false => self.log(LogLevel::Info, "the guard process answers again".to_owned(), time_ns),
+        }
+    }
+
+    /// Logs a warning of the engine.
+    pub fn report_warning(&mut self, message: String, time_ns: u64) {
+        self.log(LogLevel::Warning, message, time_ns);
     }
 
     /// Returns the mode that was reported to the session last.
@@ -254,8 +287,8 @@ impl Supervisor {
             Some(Err("this session only observes".to_owned()))
         } else if energises && self.control.stop.count() != *stops {
             Some(Err("STOP was pressed after it".to_owned()))
-        } else if energises && self.guard_lost {
-            Some(Err(GUARD_LOST.to_owned()))
+        } else if energises && let Some(objection) = self.guard_objection {
+            Some(Err(objection.to_owned()))
         } else {
             self.unattended.requested(request);
             self.answer(stamped, Asker::Operator, time_ns)
@@ -287,6 +320,11 @@ impl Supervisor {
         if !self.observe && !self.control_requested && self.control.heartbeat.count() > self.heartbeats {
             self.control_requested = self.command(Command::TakeControl).is_ok();
         }
+    }
+
+    /// Whether the operator has asked for control of the robot.
+    pub fn control_wanted(&self) -> bool {
+        self.control_wanted
     }
 
     /// STOP by the session at its end: the last reported mode may be old, and a command that energises the robot may still be
@@ -324,7 +362,12 @@ impl Supervisor {
                 self.releasing = false;
                 self.checklist.mode_changed(from, to, &cause);
                 self.published_checklist.clear();
-                self.unattended.mode_changed(to, cause);
+                if !(self.sitting_for_review && to == Mode::SitDown) {
+                    self.unattended.mode_changed(to, cause);
+                }
+                // A full ring leaves the robot standing in REVIEW, where it may stand.
+                self.sitting_for_review =
+                    to == Mode::Review && self.review_sits_down && self.command(Command::SitDown).is_ok();
                 self.publish(Record::Transition(Transition { from, to, cause: cause.to_string() }), time_ns);
                 if let TransitionCause::NotReady(inhibit) = cause {
                     self.log(LogLevel::Warning, format!("the countdown was cancelled: {inhibit}"), time_ns);

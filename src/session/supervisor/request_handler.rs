@@ -1,6 +1,6 @@
 //! Answers to the operator's requests.
 
-use super::jobs::{ApprovalState, Asker, JobPurpose};
+use super::unfinished::{ApprovalState, Asker, JobPurpose};
 use super::{Supervisor, study_requests};
 use crate::control::mode::{self, Trigger};
 use crate::realtime::channel::Lowering;
@@ -17,6 +17,7 @@ impl Supervisor {
             | OperatorRequest::Confirm(_)
             | OperatorRequest::SitDown
             | OperatorRequest::Acknowledge
+            | OperatorRequest::TakeControl
             | OperatorRequest::Cancel => Some(self.answer_about_robot(stamped, time_ns)),
             OperatorRequest::Approve { trial, revision } => {
                 self.approve(stamped, (*trial, *revision), asker, time_ns).err().map(Err)
@@ -58,6 +59,18 @@ impl Supervisor {
                 "acknowledged; arm when ready",
             ),
             OperatorRequest::Cancel => self.lower(Lowering::Cancel),
+            OperatorRequest::TakeControl => match self.mode {
+                Mode::Offline => {
+                    self.command(Command::Contact)?;
+                    self.control_wanted = true;
+                    Ok("braking commands are sent until the robot answers, then damping".to_owned())
+                }
+                Mode::Observe => {
+                    self.control_wanted = true;
+                    Ok("damping is sent from now on".to_owned())
+                }
+                mode => Err(format!("the robot is {}: this session commands it already", mode.name())),
+            },
             _ => Err("this is no request to the robot".to_owned()),
         }
     }

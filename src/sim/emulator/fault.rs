@@ -214,7 +214,7 @@ fn usage(word: &str, operands: FaultOperands) -> String {
 /// Describes all faults, one line each.
 pub fn help() -> String {
     let line =
-        |(word, operands, what): &(&str, FaultOperands, &str)| format!("  {:<24} {what}\n", usage(word, *operands));
+        |(word, operands, what): &(&str, FaultOperands, &str)| format!("  {:<26} {what}\n", usage(word, *operands));
     FAULTS.iter().map(line).collect()
 }
 

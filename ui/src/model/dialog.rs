@@ -7,6 +7,9 @@ use tui_input::Input;
 
 use super::session::SessionModel;
 
+/// Least time in which a person types the letters that arm the robot: a pasted text arrives at once.
+pub const ARMING_TIME: Duration = Duration::from_millis(250);
+
 /// Least time between the two presses that approve a jump. It exceeds the delay before a held key repeats (660 ms on X11,
 /// at most 500 ms elsewhere as delivered): a repetition cannot be distinguished from a press.
 pub const APPROVAL_PAUSE: Duration = Duration::from_millis(800);
@@ -21,10 +24,15 @@ pub enum Dialog {
         revision: u32,
         /// Time of the last press of the approving key.
         pressed_at: Duration,
+        /// Whether the operator has confirmed that the area is clear; needed on hardware, for each jump.
+        area_clear: bool,
     },
+    /// Confirmation of the first command to a real robot.
+    TakeControl,
     /// Confirmation of arming, on hardware and where arming was chosen with Enter, with the number of letters typed.
     Arm {
         typed: usize,
+        opened_at: Duration,
     },
     /// The arming checks; those of the operator can be selected.
     ArmingChecks {

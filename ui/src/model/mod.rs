@@ -31,6 +31,9 @@ use log::LogView;
 use session::SessionModel;
 use trials::TrialTable;
 
+/// Torque of a joint at rest that damping leaves: friction and the error of the motor's estimate, N m.
+const DAMPED_TORQUE_N_M: f64 = 2.0;
+
 /// One of the tabs, in their order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, VariantArray, IntoStaticStr)]
 #[expect(missing_docs, reason = "the labels of the tabs")]
@@ -93,6 +96,8 @@ pub struct Model {
     pub log_view: LogView,
     /// State of the replay; none in a live session.
     pub replay: Option<ReplayStatus>,
+    /// Whole seconds left of a countdown, as the bell last rang them.
+    pub countdown_s: Option<u32>,
     /// Time of the last Ctrl-C.
     pub interrupted_at: Option<Duration>,
     /// The terminal's columns and rows.
@@ -137,6 +142,7 @@ impl Model {
             override_row: 0,
             log_view: LogView::default(),
             replay: None,
+            countdown_s: None,
             interrupted_at: None,
             size: (0, 0),
             page: 10,
@@ -152,6 +158,23 @@ impl Model {
     /// Whether the robot is energised and this console commands it.
     pub fn robot_is_energised(&self) -> bool {
         self.replay.is_none() && self.mode().energised()
+    }
+
+    /// Whether an observer's STOP is in force.
+    pub fn stop_requested(&self) -> bool {
+        self.replay.is_none() && matches!(self.mode(), Mode::Damped | Mode::Fault)
+    }
+
+    /// The joint and the torque, N m, that contradict damping most; none while the robot follows it.
+    pub fn torque_against_stop(&self) -> Option<(usize, f64)> {
+        let tick = &self.snapshot.tick;
+        let (torque, velocity) = (&tick.state.joint_torque_n_m, &tick.state.joint_velocity_rad_s);
+        let beyond = |joint: usize| {
+            let damping = tick.command.motor[joint].kd_joint * velocity[joint].abs();
+            torque[joint].abs() - 2.0 * damping - DAMPED_TORQUE_N_M
+        };
+        let worst = (0..tick.command.motor.len()).max_by(|a, b| beyond(*a).total_cmp(&beyond(*b)))?;
+        (beyond(worst) > 0.0).then(|| (worst, torque[worst]))
     }
 
     /// Whether Space is text: a text field is open in which a space has a meaning.

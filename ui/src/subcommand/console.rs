@@ -10,6 +10,7 @@ use quadfrog::engine::{self, Options};
 use quadfrog::robot::go1::Network;
 use quadfrog::trial::{Approval, Backend, Task};
 use quadfrog_console::app::{self, ConsoleExit, ConsoleOptions};
+use quadfrog_console::connection::TerminalLocation;
 use quadfrog_console::feed::Feed;
 use quadfrog_console::settings::ConsoleSettings;
 use quadfrog_console::terminal;
@@ -110,7 +111,6 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
         network.address = address(text)?;
     }
     let console = options(&arguments.screen, &config)?.with_robot(robot.clone());
-    terminal::check().map_err(Failure::input)?;
     let selected = match &arguments.resume {
         Some(folder) => study_to_continue(folder, arguments.task, arguments.seed, &robot)?,
         None => {
@@ -121,7 +121,7 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
     };
     let folder = selected.folder.clone();
     let incomplete = incomplete_recordings(&folder);
-    let handle = engine::start(Options {
+    let options = Options {
         seed: selected.seed,
         trials: arguments.study.trials.or(selected.budget),
         // An observer writes no files.
@@ -131,9 +131,13 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
         approve: arguments.approve,
         // The running program, even if its file was replaced since the start.
         guard: Some(PathBuf::from("/proc/self/exe")),
+        unseen_connection: TerminalLocation::of(|name| std::env::var(name).ok()).unseen().map(str::to_owned),
         network,
         ..Options::new(config, robot, backend, selected.task)
-    })?;
+    };
+    engine::check_backend(&options)?;
+    terminal::check().map_err(Failure::input)?;
+    let handle = engine::start(options)?;
     let recording = handle.recording().map(Path::to_owned);
     let exit = app::run(Feed::live(handle), console)?;
     if exit == ConsoleExit::HungUp || arguments.observe {

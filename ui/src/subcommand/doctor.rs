@@ -176,21 +176,23 @@ fn wake_up(scheduling: Scheduling) -> Vec<DoctorItem> {
 
 /// Checks whether the console can detect the loss of its operator.
 fn connection() -> DoctorItem {
-    let (found, remedy) = match TerminalLocation::of(|name| std::env::var(name).ok()) {
-        TerminalLocation::Multiplexer => (
+    let location = TerminalLocation::of(|name| std::env::var(name).ok());
+    let (found, remedy) = match (location, location.unseen()) {
+        (TerminalLocation::Multiplexer, _) => (
             "tmux or screen",
             "the session keeps running when your connection ends, and so does the robot: for a robot start quadfrog outside",
         ),
-        TerminalLocation::Ssh(Some(_)) => (
+        (_, Some(reason)) => (
+            reason,
+            "a dead connection is detected only by sshd (ClientAliveInterval 1, ClientAliveCountMax 2 in sshd_config); \
+             arming a robot asks for your confirmation",
+        ),
+        (TerminalLocation::Ssh(_), None) => (
             "SSH",
             "a dead connection lands the robot after two seconds or more, but only the last hop to this machine is monitored: \
              ClientAliveInterval 1, ClientAliveCountMax 2 in sshd_config monitors the whole path",
         ),
-        TerminalLocation::Ssh(None) => (
-            "SSH, but SSH_CONNECTION cannot be read",
-            "a dead connection is detected only by sshd: ClientAliveInterval 1, ClientAliveCountMax 2 in sshd_config",
-        ),
-        TerminalLocation::Local => ("a terminal of this machine", ""),
+        (_, None) => ("a terminal of this machine", ""),
     };
     DoctorItem::new("connection", found, remedy.is_empty(), remedy)
 }

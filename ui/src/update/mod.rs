@@ -21,6 +21,7 @@ use crate::message::{Effect, Msg};
 use crate::model::Model;
 use crate::model::dialog::Dialog;
 use crate::model::session::SessionModel;
+use crate::settings::BellCause;
 use dialog::KeyOutcome;
 use perform::perform;
 use request::{interrupt, request, stop};
@@ -48,6 +49,7 @@ pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
             }
             model.snapshot = *snapshot;
             records::close_stale_dialog(model);
+            return count_down(model);
         }
         Msg::Recorder(status) => model.recorder = Some(status),
         Msg::Storage(wait) => model.storage = wait,
@@ -61,6 +63,15 @@ pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
         Msg::Resumed => model.session.arming_checks.clear(),
     }
     Vec::new()
+}
+
+/// Rings the bell at the beginning of the countdown and of each of its seconds.
+fn count_down(model: &mut Model) -> Vec<Effect> {
+    let left_s = -model.snapshot.tick.trial_time_s;
+    let left = (model.mode() == Mode::Countdown && left_s > 0.0).then(|| left_s.ceil() as u32);
+    let rings = left.is_some() && left != model.countdown_s && model.replay.is_none();
+    model.countdown_s = left;
+    if rings && model.bell.contains(&BellCause::Countdown) { vec![Effect::Bell] } else { Vec::new() }
 }
 
 /// One key. STOP comes before everything else, on every screen.

@@ -29,15 +29,18 @@ pub(super) fn perform(model: &mut Model, action: Action) -> Vec<Effect> {
     match action {
         Action::Stop => return stop(model),
         Action::Interrupt => return interrupt(model),
+        Action::TakeControl => open(model, Dialog::TakeControl),
         // Arming hardware needs a typed confirmation, not a single key.
-        Action::Arm if model.session.info.is_hardware() => open(model, Dialog::Arm { typed: 0 }),
+        Action::Arm if model.session.info.is_hardware() => {
+            open(model, Dialog::Arm { typed: 0, opened_at: model.clock })
+        }
         Action::Arm => return request(model, OperatorRequest::Arm),
         Action::ArmingChecks => open(model, Dialog::ArmingChecks { selected: 0 }),
         Action::SitDown => return request(model, OperatorRequest::SitDown),
         Action::Acknowledge => return request(model, OperatorRequest::Acknowledge),
         Action::Approve => {
             if let Some(&Proposal { trial, revision, .. }) = model.session.open_proposal() {
-                open(model, Dialog::Approve { trial, revision, pressed_at: model.clock });
+                open(model, Dialog::Approve { trial, revision, pressed_at: model.clock, area_clear: false });
             }
         }
         Action::Override => open_override(model),

@@ -21,6 +21,7 @@ pub(super) fn close_stale_dialog(model: &mut Model) {
             let shown = model.session.proposal.as_ref().map(|p| (p.trial, p.revision));
             shown != Some((*trial, *revision)) || legal(Action::Approve, model).is_err()
         }
+        Some(Dialog::TakeControl) => legal(Action::TakeControl, model).is_err(),
         Some(Dialog::Arm { .. }) => legal(Action::Arm, model).is_err(),
         Some(Dialog::Override(form)) => {
             model.session.proposal.as_ref().is_none_or(|p| p.trial != form.trial)

@@ -53,7 +53,11 @@ pub(super) fn stop(model: &mut Model) -> Vec<Effect> {
     if !matches!(model.dialog, Some(Dialog::Field { .. })) {
         model.dialog = None;
     }
-    say_stop(model, "STOP: damping");
+    let text = match model.session.info.observe {
+        true => "STOP requested: damping is sent, a console in control may go on commanding",
+        false => "STOP: damping",
+    };
+    say_stop(model, text);
     vec![Effect::Stop]
 }
 

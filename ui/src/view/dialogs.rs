@@ -10,6 +10,7 @@
 //! ```
 
 use quadfrog::session::operator_request::OperatorCheck;
+use quadfrog::telemetry::Mode;
 use quadfrog::trial::ProposedParameter;
 use ratatui::Frame;
 use ratatui::layout::Rect;
@@ -30,11 +31,12 @@ use crate::theme::{Glyphs, Role, Theme};
 pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let Some(dialog) = &model.dialog else { return };
     match dialog {
-        Dialog::Approve { trial, pressed_at, .. } => {
+        Dialog::Approve { trial, pressed_at, area_clear, .. } => {
             let waited = model.clock.saturating_sub(*pressed_at) >= APPROVAL_PAUSE;
-            popup(frame, area, model, "Jump?", 60, approve(model, *trial, waited));
+            popup(frame, area, model, "Jump?", 60, approve(model, *trial, waited, *area_clear));
         }
-        Dialog::Arm { typed } => popup(frame, area, model, "Arm?", 60, arm(model, *typed)),
+        Dialog::TakeControl => popup(frame, area, model, "Take control?", 66, take_control(model)),
+        Dialog::Arm { typed, .. } => popup(frame, area, model, "Arm?", 60, arm(model, *typed)),
         Dialog::ArmingChecks { selected } => {
             let chosen = OperatorCheck::ALL.get(*selected).copied();
             let lines =
@@ -127,6 +129,25 @@ fn answers(theme: &Theme, key: &str, text: &str) -> Line<'static> {
     ])
 }
 
+fn take_control(model: &Model) -> Vec<Line<'static>> {
+    let heard = match model.mode() {
+        Mode::Offline => {
+            "The robot has sent nothing since the start: it answers only after a command. This console then sends braking \
+             commands without a target, and damping once the robot answers."
+        }
+        _ => {
+            "States arrive although this console has sent nothing: another program may command the robot. Damping is \
+             sent from now on."
+        }
+    };
+    vec![
+        Line::from(heard),
+        Line::from("A robot that another program drives at present falls."),
+        Line::default(),
+        answers(&model.theme, "y", "take control"),
+    ]
+}
+
 fn arm(model: &Model, typed: usize) -> Vec<Line<'static>> {
     let theme = &model.theme;
     let letters = model.session.arming_confirmation();
@@ -146,7 +167,7 @@ fn arm(model: &Model, typed: usize) -> Vec<Line<'static>> {
     lines
 }
 
-fn approve(model: &Model, trial: u32, waited: bool) -> Vec<Line<'static>> {
+fn approve(model: &Model, trial: u32, waited: bool, area_clear: bool) -> Vec<Line<'static>> {
     let theme = &model.theme;
     let key = model.keymap.key(Action::Approve);
     let mut lines = Vec::new();
@@ -158,10 +179,17 @@ fn approve(model: &Model, trial: u32, waited: bool) -> Vec<Line<'static>> {
         let values: Vec<String> = proposal.parameters.iter().map(value).collect();
         lines.push(Line::from(format!("Trial #{trial}: {}", values.join(", "))));
     }
-    lines.push(Line::from("Is the area clear of people and objects?"));
+    lines.push(Line::from(match area_clear {
+        true => "The area is clear, confirmed for this jump.",
+        false => "Is the area clear of people and objects?",
+    }));
     lines.push(Line::default());
-    let mut answer = answers(&model.theme, &key, "jump");
-    if !waited {
+    let area_asked = model.session.info.is_hardware() && !area_clear;
+    let mut answer = match area_asked {
+        true => answers(&model.theme, "y", "the area is clear"),
+        false => answers(&model.theme, &key, "jump"),
+    };
+    if !area_asked && !waited {
         answer.push_span(span(theme, Role::Quiet, " (after 0.8 s)"));
     }
     lines.push(answer);

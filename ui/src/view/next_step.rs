@@ -1,5 +1,6 @@
 //! The last line: the operator's next possible step.
 
+use quadfrog::robot::joint_name;
 use quadfrog::telemetry::Mode;
 use quadfrog::trial::{ExperimentStage, Verdict};
 use ratatui::Frame;
@@ -27,6 +28,7 @@ pub fn next_step(model: &Model) -> NextStep {
     match &model.dialog {
         Some(dialog) => in_dialog(model, dialog),
         None if model.replay.is_some() => replay(model),
+        None if model.session.info.observe && model.stop_requested() => observers_stop(model),
         None if model.session.info.observe && legal(Action::Acknowledge, model).is_err() => {
             step("Observing: this session can change nothing.", model, &[(Action::Quit, "quit")])
         }
@@ -70,6 +72,11 @@ fn live(model: &Model) -> NextStep {
             let lead = format!("{stopped}; check the robot, then {} acknowledges{because}", key(Action::Acknowledge));
             step(lead, model, &[undo, quit])
         }
+        mode @ (Mode::Offline | Mode::Observe) if session.info.is_hardware() => {
+            let heard = if mode == Mode::Offline { "The robot is silent" } else { "The robot sends states" };
+            let lead = format!("{heard}, nothing was sent to it. {} takes control.", key(Action::TakeControl));
+            step(lead, model, &[quit])
+        }
         Mode::Offline | Mode::Observe => step("Waiting for the robot to answer.", model, &[quit]),
         mode @ (Mode::Disarmed | Mode::Ready) if finished => {
             let more = [(Action::Continue, "more trials"), (Action::ConfirmBest, "confirm best")];
@@ -93,6 +100,19 @@ fn live(model: &Model) -> NextStep {
         }
         _ => step("The sampler is choosing the next trial.", model, &[sit_down]),
     }
+}
+
+/// The effect of an observer's STOP, which another commander may counteract.
+fn observers_stop(model: &Model) -> NextStep {
+    let key = model.keymap.key(Action::Acknowledge);
+    let lead = match model.torque_against_stop() {
+        Some((joint, torque)) => {
+            let name = joint_name(joint);
+            format!("NOT STOPPED: {name} holds {torque:.1} N m, another console commands. Use the remote.")
+        }
+        None => format!("STOP requested and followed: the joints are damped. {key} releases the robot."),
+    };
+    step(lead, model, &[(Action::Quit, "quit")])
 }
 
 fn review(model: &Model) -> NextStep {
@@ -131,10 +151,13 @@ fn replay(model: &Model) -> NextStep {
 fn in_dialog(model: &Model, dialog: &Dialog) -> NextStep {
     let key = |action| model.keymap.key(action);
     let lead = match dialog {
+        Dialog::Approve { trial, area_clear: false, .. } if model.session.info.is_hardware() => {
+            format!("Type y if the area is clear (trial #{trial}). Any other key cancels.")
+        }
         Dialog::Approve { trial, .. } => {
             format!("Press {} again to jump (trial #{trial}). Any other key cancels.", key(Action::Approve))
         }
-        Dialog::Arm { typed } => {
+        Dialog::Arm { typed, .. } => {
             let left = model.session.arming_confirmation().get(*typed..).unwrap_or_default();
             format!("Type {left} to stand the robot up. Any other key cancels.")
         }
@@ -147,6 +170,7 @@ fn in_dialog(model: &Model, dialog: &Dialog) -> NextStep {
             format!("Type, or Left Right 1 %, PgUp PgDn 10 %. Enter applies, {queue} queues, Esc cancels.")
         }
         Dialog::Override(_) => "Enter takes the value and applies. Esc drops it.".to_owned(),
+        Dialog::TakeControl => "Press y to take control. Any other key cancels.".to_owned(),
         Dialog::Quit => "Press y to quit. Any other key cancels.".to_owned(),
         Dialog::Field { purpose: Purpose::Note(_) | Purpose::VoidReason { .. }, .. } if model.space_must_stop() => {
             "Enter saves the text, Esc cancels. Energised: Space is STOP, _ writes a space.".to_owned()

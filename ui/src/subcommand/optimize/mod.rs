@@ -94,15 +94,21 @@ pub fn run(arguments: &OptimizeArguments) -> Result<(), Failure> {
     let next = AtomicUsize::new(0);
     let cores = if joined.is_some() { 1 } else { arguments::cores() };
     let jobs = arguments.jobs.map_or(cores, usize::from);
+    let fail = |failure| failures.lock().unwrap_or_else(PoisonError::into_inner).push(failure);
+    let work = || {
+        while let Some(study) = studies.get(next.fetch_add(1, Ordering::Relaxed)) {
+            if let Err(failure) = run_one(arguments, joined.as_ref(), &config, &robot, study, &printer) {
+                fail(failure);
+            }
+        }
+    };
     std::thread::scope(|scope| {
         for _ in 0..jobs.min(studies.len()) {
-            scope.spawn(|| {
-                while let Some(study) = studies.get(next.fetch_add(1, Ordering::Relaxed)) {
-                    if let Err(failure) = run_one(arguments, joined.as_ref(), &config, &robot, study, &printer) {
-                        failures.lock().unwrap_or_else(PoisonError::into_inner).push(failure);
-                    }
-                }
-            });
+            if let Err(error) = std::thread::Builder::new().spawn_scoped(scope, work) {
+                let what =
+                    "a worker's thread could not be started; allow more threads (`ulimit -u`) or give fewer --jobs";
+                fail(EngineError::System { what: what.to_owned(), source: error }.into());
+            }
         }
     });
     if joined.is_none() {
@@ -232,7 +238,7 @@ struct StudyRecorder {
 impl StudyRecorder {
     fn create(path: &Path, options: &Options) -> Result<StudyRecorder, EngineError> {
         let info = engine::session_info(options, &path.display().to_string());
-        let writer = Writer::create(path, &info, engine::utc_ns(), &engine::attachments(&options.config))?;
+        let writer = Writer::create(path, &info, engine::utc_ns(), &engine::attachments(options))?;
         Ok(StudyRecorder { writer, time_ns: 0 })
     }
 

@@ -10,34 +10,46 @@ use crate::keymap::Key;
 use crate::legal::legal;
 use crate::message::Effect;
 use crate::model::Model;
-use crate::model::dialog::{APPROVAL_PAUSE, Dialog};
+use crate::model::dialog::{APPROVAL_PAUSE, ARMING_TIME, Dialog};
 use crate::update::request::{cancelled, refused, request};
 
 /// The second press of an approval. Only the approving key approves, and only after a pause: a bounced or held key starts
-/// the pause again. Every other key, Enter included, cancels.
+/// the pause again. On hardware `y` confirms before that the area is clear. Every other key, Enter included, cancels.
 pub(super) fn approve_key(
     model: &mut Model,
     key: Key,
     (trial, revision, pressed_at): (u32, u32, Duration),
+    area_clear: bool,
 ) -> Vec<Effect> {
+    let area_asked = model.session.info.is_hardware() && !area_clear;
+    if area_asked && key.is(KeyCode::Char('y')) {
+        model.dialog = Some(Dialog::Approve { trial, revision, pressed_at, area_clear: true });
+        return Vec::new();
+    }
     if model.keymap.action(key) != Some(Action::Approve) {
         return cancelled(model, "no jump");
     }
-    if model.clock.saturating_sub(pressed_at) < APPROVAL_PAUSE {
-        model.dialog = Some(Dialog::Approve { trial, revision, pressed_at: model.clock });
+    if area_asked || model.clock.saturating_sub(pressed_at) < APPROVAL_PAUSE {
+        model.dialog = Some(Dialog::Approve { trial, revision, pressed_at: model.clock, area_clear });
         return Vec::new();
     }
     request_if_legal(model, Action::Approve, OperatorRequest::Approve { trial, revision }, "not approved")
 }
 
-pub(super) fn arm_key(model: &mut Model, key: Key, typed: usize) -> Vec<Effect> {
+pub(super) fn arm_key(model: &mut Model, key: Key, (typed, opened_at): (usize, Duration)) -> Vec<Effect> {
     let letters = model.session.arming_confirmation();
     if key.typed() != letters.chars().nth(typed) {
         return cancelled(model, "not armed");
     }
     if typed + 1 < letters.len() {
-        model.dialog = Some(Dialog::Arm { typed: typed + 1 });
+        model.dialog = Some(Dialog::Arm { typed: typed + 1, opened_at });
         return Vec::new();
+    }
+    let took = model.clock.saturating_sub(opened_at);
+    if letters.len() > 1 && took < ARMING_TIME {
+        let text =
+            format!("the letters came within {} ms, a person needs {}", took.as_millis(), ARMING_TIME.as_millis());
+        return refused(model, "not armed", &text);
     }
     request_if_legal(model, Action::Arm, OperatorRequest::Arm, "not armed")
 }
@@ -46,6 +58,13 @@ fn request_if_legal(model: &mut Model, action: Action, intent: OperatorRequest, 
     match legal(action, model) {
         Ok(()) => request(model, intent),
         Err(reason) => refused(model, text, &reason),
+    }
+}
+
+pub(super) fn take_control_key(model: &mut Model, key: Key) -> Vec<Effect> {
+    match key.typed() {
+        Some('y' | 'Y') => request_if_legal(model, Action::TakeControl, OperatorRequest::TakeControl, "not taken"),
+        _ => cancelled(model, "nothing was sent to the robot"),
     }
 }
 

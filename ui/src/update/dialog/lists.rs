@@ -34,7 +34,7 @@ pub(super) fn palette_key(model: &mut Model, key: Key, mut input: Input, mut sel
         KeyCode::Down => selected = (selected + 1).min(rows.len().saturating_sub(1)),
         // Enter never starts motion: `chosen_action` leaves arming, which is confirmed here.
         KeyCode::Enter if rows.get(selected).is_some() => {
-            model.dialog = Some(Dialog::Arm { typed: 0 });
+            model.dialog = Some(Dialog::Arm { typed: 0, opened_at: model.clock });
             return Vec::new();
         }
         KeyCode::Enter => return cancelled(model, "no such action"),

@@ -31,10 +31,11 @@ pub(super) fn key(model: &mut Model, dialog: Dialog, key: Key) -> KeyOutcome {
         return KeyOutcome::Perform(action);
     }
     KeyOutcome::Effects(match dialog {
-        Dialog::Approve { trial, revision, pressed_at } => {
-            confirm::approve_key(model, key, (trial, revision, pressed_at))
+        Dialog::Approve { trial, revision, pressed_at, area_clear } => {
+            confirm::approve_key(model, key, (trial, revision, pressed_at), area_clear)
         }
-        Dialog::Arm { typed } => confirm::arm_key(model, key, typed),
+        Dialog::TakeControl => confirm::take_control_key(model, key),
+        Dialog::Arm { typed, opened_at } => confirm::arm_key(model, key, (typed, opened_at)),
         Dialog::ArmingChecks { selected } => confirm::arming_checks_key(model, key, selected),
         Dialog::Quit => confirm::quit_key(model, key),
         Dialog::Override(form) => override_form::key(model, key, form),

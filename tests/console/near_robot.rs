@@ -1,0 +1,105 @@
+//! Safety of people near the robot: the first command, approvals on hardware, the countdown, an observer's STOP.
+
+mod support;
+
+use quadfrog::recording::record::{Record, SessionInfo};
+use quadfrog::session::operator_request::OperatorRequest;
+use quadfrog::telemetry::{Mode, Snapshot, Tick};
+use quadfrog::trial::Backend;
+use quadfrog_console::message::{Effect, Msg};
+use support::{Console, session};
+
+fn approval(trial: u32, revision: u32) -> Vec<OperatorRequest> {
+    vec![OperatorRequest::Approve { trial, revision }]
+}
+
+fn on_hardware(mut console: Console) -> Console {
+    console.record(Record::Session(SessionInfo { backend: Some(Backend::Hardware), ..session() }));
+    console
+}
+
+/// People walk between two jumps: arming once is not enough.
+#[test]
+fn a_jump_on_hardware_needs_a_clear_area_each_time() {
+    let mut console = on_hardware(Console::ready());
+    console.press(&["g"]);
+    console.wait(1000);
+    assert_eq!(console.press(&["g"]), [], "the area was not confirmed");
+    assert!(console.next_step().contains("Type y if the area is clear"), "{}", console.next_step());
+    console.wait(1000);
+    assert_eq!(console.press(&["y"]), []);
+    assert!(console.screen(80, 24).contains("The area is clear, confirmed for this jump."));
+    console.wait(1000);
+    assert_eq!(console.requests(&["g"]), approval(0, 0));
+    console.press(&["g"]);
+    console.wait(1000);
+    assert_eq!(console.press(&["g"]), [], "the next jump is asked for again");
+    assert_eq!(console.press(&["n"]), [], "any other key cancels");
+    assert_eq!(console.said(), "cancelled: no jump");
+}
+
+#[test]
+fn pasted_letters_do_not_arm_a_real_robot() {
+    let mut console = on_hardware(Console::proposed());
+    let paste = |console: &mut Console| {
+        "Astand".chars().flat_map(|c| console.update(Msg::Key(c.to_string().parse().unwrap()))).collect::<Vec<_>>()
+    };
+    assert_eq!(paste(&mut console), []);
+    assert!(console.said().contains("the letters came within 0 ms"), "{}", console.said());
+    assert_eq!(console.requests(&["A", "s", "t", "a", "n", "d"]), [OperatorRequest::Arm]);
+}
+
+#[test]
+fn each_second_of_a_countdown_rings_the_bell() {
+    let mut console = Console::ready();
+    let mut shown = |mode, trial_time_s| {
+        let tick = Tick { mode, trial_time_s, ..Tick::default() };
+        console.update(Msg::Snapshot(Box::new(Snapshot { tick, ..Snapshot::default() }))) == [Effect::Bell]
+    };
+    let countdown = (1..=60).rev().map(|fifties| f64::from(fifties) * 0.05);
+    let rung: Vec<f64> = countdown.filter(|left_s| shown(Mode::Countdown, -left_s)).collect();
+    assert_eq!(rung, [3.0, 2.0, 1.0]);
+    assert!(!shown(Mode::Jump, 0.1));
+    assert!(shown(Mode::Countdown, -3.0), "the next countdown");
+}
+
+/// A STOP that another console's commands follow is no stop; the screen says what it achieved.
+#[test]
+fn an_observers_stop_is_a_request_and_its_effect_is_shown() {
+    let mut observer = Console::new();
+    observer.record(Record::Session(SessionInfo { observe: true, ..session() }));
+    assert_eq!(observer.press(&["Space"]), [Effect::Stop]);
+    assert!(
+        observer.said().starts_with("STOP requested: damping is sent, a console in control"),
+        "{}",
+        observer.said()
+    );
+    observer.mode(Mode::Damped);
+    assert!(observer.next_step().starts_with("STOP requested and followed"), "{}", observer.next_step());
+    let mut tick = Tick { mode: Mode::Damped, ..Tick::default() };
+    tick.state.joint_torque_n_m[2] = -12.3;
+    observer.update(Msg::Snapshot(Box::new(Snapshot { tick, ..Snapshot::default() })));
+    let step = observer.next_step();
+    assert!(step.starts_with("NOT STOPPED: ") && step.contains(" holds -12.3 N m, another console"), "{step}");
+}
+
+#[test]
+fn control_of_a_real_robot_is_taken_with_a_key_after_a_second_of_listening() {
+    for mode in [Mode::Offline, Mode::Observe] {
+        let mut console = on_hardware(Console::new());
+        console.mode(mode);
+        assert_eq!(console.press(&["L", "y"]), []);
+        console.wait(1000);
+        console.press(&["L"]);
+        let screen = console.screen(80, 24);
+        let expected =
+            if mode == Mode::Offline { "has sent nothing since the start" } else { "States arrive although" };
+        assert!(screen.contains("Take control?") && screen.contains(expected), "{screen}");
+        assert_eq!(console.press(&["Enter"]), [], "Cancel is the default");
+        assert_eq!(console.said(), "cancelled: nothing was sent to the robot");
+        assert_eq!(console.requests(&["L", "y"]), [OperatorRequest::TakeControl]);
+    }
+    let mut console = Console::proposed();
+    console.wait(2000);
+    assert_eq!(console.press(&["L", "y"]), []);
+}
