@@ -141,6 +141,21 @@ fn a_stance_out_of_reach_is_refused_with_the_reason() {
     assert!(error.contains("control.toml:2") && error.contains("stance_m") && error.contains("stretched"), "{error}");
 }
 
+/// Regression: the sagged robot knelt, and every trial ended in the countdown (`docs/method.md`, "High twist").
+#[test]
+fn a_stance_that_kneels_is_refused_and_the_shipped_ones_do_not() {
+    let robot = RobotDescription::embedded("go1").unwrap();
+    let settings = |config: &Config| config.settings(&robot, Task::TwistCcw, Backend::Simulator);
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("control.toml"), "[tasks.twist-ccw]\nstance_m = [0.03, 0.045, -0.172]\n").unwrap();
+    let error = settings(&Config::load(Some(folder.path())).unwrap()).unwrap_err().to_string();
+    assert!(error.contains("control.toml:2") && error.contains("kneels before the jump"), "{error}");
+    for example in ["high_twist", "stable_landing", "continuous", "rough_terrain", "hardware_like"] {
+        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("examples").join(example);
+        settings(&Config::load(Some(&path)).unwrap()).unwrap();
+    }
+}
+
 #[test]
 fn a_stop_that_the_gate_would_cut_is_refused() {
     refuses("safety.toml", "[gate]\ndamping_kd = 20.0\n", &["gate.damping_kd", "kd_max"]);

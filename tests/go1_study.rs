@@ -43,6 +43,10 @@ fn config(late_ms: f64) -> Config {
     config.safety.hop_envelope.start = 1.0;
     config.safety.failsafe.state_age_ms = (2.0 * late_ms).max(20.0) as u32;
     config.safety.failsafe.period_ticks = 1000;
+    let delay_ms = (2.0 * late_ms).max(50.0);
+    let failsafe = &mut config.safety.failsafe;
+    (failsafe.delay_warn_ms, failsafe.delay_hold_ms, failsafe.delay_land_ms) = (delay_ms, delay_ms, delay_ms);
+    config.safety.arming.state_age_ms = config.safety.failsafe.state_age_ms;
     config.safety.arming.late_share = 1.0;
     config.safety.consistency.clock_step_ms = 1000.0;
     config.safety.consistency.loss_share = 0.5;

@@ -21,6 +21,9 @@ struct File {
     gains: Gains,
     floor_friction: f64,
     cases: Vec<Case>,
+    /// Whether the motors compute the joint damping, as on hardware.
+    #[serde(skip)]
+    motor_damping: bool,
 }
 
 #[derive(Deserialize)]
@@ -127,7 +130,12 @@ fn jump(robot: &RobotDescription, config: &SimConfig, file: &File, case: &Case) 
             }
             outcome.fell |= roll.abs() > 1.0 || pitch.abs() > 1.0;
         }
-        simulator.write(&JointCommand::torques(&torque)).unwrap();
+        let command = if file.motor_damping {
+            JointCommand::damped_torques(&torque, file.gains.kd_joint, &state.joint_velocity_rad_s)
+        } else {
+            JointCommand::torques(&torque)
+        };
+        simulator.write(&command).unwrap();
     }
     let (origin, initial_yaw) = initial.unwrap();
     outcome.displacement_m = (simulator.state().position_world - origin).into();
@@ -224,6 +232,18 @@ fn reference_setup(file: &File) -> (RobotDescription, SimConfig) {
     config.terrain.friction = file.floor_friction;
     config.contact.bodies = vec![BodyKind::Trunk];
     (RobotDescription::embedded("go1").unwrap(), config)
+}
+
+/// The joint damping in the motors, evaluated at each step of the simulator instead of each tick, is the same law: the same limits hold.
+#[test]
+fn golden_jumps_with_damping_in_the_motors() {
+    let file = File { motor_damping: true, ..support::golden("jumps.json") };
+    let (robot, config) = reference_setup(&file);
+    let found = compare(&robot, &config, &file);
+    println!("golden_jumps: {} cases, damping in the motors: {found}", file.cases.len());
+    assert!(found.apex <= 1.0 && found.apex_95 <= 4.0, "apex");
+    assert!(found.takeoff_ms <= 5.0 && found.landing_cm <= 3.0 && found.twist <= 5.0, "take-off, landing, yaw");
+    assert!(found.agreement >= 90.0, "falls");
 }
 
 /// With MuJoCo's convex contact law, as shipped, all quantities agree. With Coulomb's law feet that slide at the end of

@@ -41,6 +41,7 @@ pub struct RealtimeFile {
 pub struct CountdownSettings {
     pub simulator_s: f64,
     pub hardware_s: f64,
+    pub blend_s: f64,
 }
 
 /// Contact of a foot, from the simulator's true forces.

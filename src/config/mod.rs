@@ -4,6 +4,7 @@
 mod checked;
 mod export;
 mod files;
+mod kneeling;
 mod merge;
 mod ranges;
 mod rules;

@@ -3,6 +3,7 @@
 use super::ConfigError;
 use super::checked::Config;
 use super::files::SafetyFile;
+use super::kneeling;
 use crate::robot::Leg;
 use crate::robot::description::RobotDescription;
 use crate::sim::SimError;
@@ -68,6 +69,8 @@ impl Config {
             [failsafe.state_age_warn_ms, failsafe.state_age_ms, failsafe.link_lost_ms].map(f64::from);
         for (key, value, stop, limit) in [
             ("watchdog.motor_warm_c", failsafe.motor_warm_c, "watchdog.motor_c", failsafe.motor_c),
+            ("watchdog.delay_warn_ms", failsafe.delay_warn_ms, "watchdog.delay_hold_ms", failsafe.delay_hold_ms),
+            ("watchdog.delay_hold_ms", failsafe.delay_hold_ms, "watchdog.delay_land_ms", failsafe.delay_land_ms),
             ("watchdog.state_age_ms", gap, "watchdog.link_lost_ms", lost),
             ("watchdog.state_age_warn_ms", warn, "watchdog.state_age_ms", gap),
             ("watchdog.stance_tilt_rad", failsafe.stance_tilt_rad, "watchdog.tilt_rad", failsafe.tilt_rad),
@@ -176,6 +179,14 @@ impl Config {
                     return Err(self.refuse(CONTROL, &key, &value, reason));
                 }
             }
+        }
+        let clearance_m = kneeling::clearance_m(robot, &chosen.stance_leg(), chosen.kp);
+        if clearance_m < 0.0 {
+            let reason = format!(
+                "the robot kneels before the jump: sagged under its weight with kp = {} N/m, thigh or calf is {:.3} m in the ground; lower the feet or raise kp",
+                chosen.kp, -clearance_m
+            );
+            return Err(self.refuse(CONTROL, &key, &value, reason));
         }
         Ok(())
     }

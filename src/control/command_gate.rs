@@ -1,7 +1,7 @@
 //! The last gate before the motors, after every controller: finite, clamp, rate.
 
 use super::settings::ControlSettings;
-use crate::robot::{JOINTS, JointCommand, Joints, MotorCommand, RobotState};
+use crate::robot::{JOINTS, JointCommand, Joints, MOTOR_DAMPING_STEP, MotorCommand, RobotState};
 use crate::telemetry::Fault;
 
 /// Result of the gate.
@@ -27,16 +27,49 @@ impl CommandGate {
         self.last_torque = None;
     }
 
+    /// As [`CommandGate::pass_within`], with the whole of each joint's limit.
+    pub fn pass(&mut self, wanted: &JointCommand, state: &RobotState, settings: &ControlSettings) -> GateOutput {
+        self.pass_within(1.0, wanted, state, settings)
+    }
+
+    /// Limits a command without regard to the measured state: positions and gains are clamped, the motors limit the torque.
+    pub fn pass_unmeasured(&mut self, wanted: &JointCommand, settings: &ControlSettings) -> GateOutput {
+        self.reset();
+        let mut passed = GateOutput { command: *wanted, limited: 0, fault: None };
+        for (joint, motor) in passed.command.motor.iter_mut().enumerate() {
+            let finite = [motor.position_rad, motor.kp_joint, motor.kd_joint];
+            if !finite.iter().all(|value| value.is_finite()) {
+                let command = JointCommand::damping(settings.gate.damping_kd);
+                let fault = Some(Fault::NotFinite { what: "a motor command" });
+                return GateOutput { command, limited: u16::MAX >> (16 - JOINTS), fault };
+            }
+            *motor = MotorCommand {
+                position_rad: motor.position_rad.clamp(settings.min_position[joint], settings.max_position[joint]),
+                kp_joint: motor.kp_joint.clamp(0.0, settings.gate.kp_max),
+                kd_joint: motor.kd_joint.clamp(0.0, settings.gate.kd_max),
+                ..MotorCommand::default()
+            };
+        }
+        passed
+    }
+
     /// Limits `wanted`.
     ///
     /// 1. Damping passes unchanged: it needs no measured number.
     /// 2. A number that is not finite gives damping and a fault.
     /// 3. Position and gains are clamped.
-    /// 4. The torque of the motor's own law at the measured angle and velocity is clamped to the joint's limit and rate, by a change
-    ///    of the feed-forward torque.
-    /// 5. If that feed-forward torque exceeds the joint's limit (an encoder that jumps), the limited torque is sent alone, without
-    ///    the law: equal if the measured numbers are right, harmless if they are not.
-    pub fn pass(&mut self, wanted: &JointCommand, state: &RobotState, settings: &ControlSettings) -> GateOutput {
+    /// 4. The torque of the motor's own law at the measured angle and velocity is clamped to `torque_share` of the joint's limit and to
+    ///    its rate, by a change of the feed-forward torque.
+    /// 5. If that feed-forward torque exceeds the joint's limit (a fast joint, an encoder that jumps), a law without stiffness keeps as
+    ///    much damping as the limit allows; a law with stiffness is replaced by the limited torque alone. Both give the same torque if
+    ///    the measured numbers are right, and no more than the limit if they are not.
+    pub fn pass_within(
+        &mut self,
+        torque_share: f64,
+        wanted: &JointCommand,
+        state: &RobotState,
+        settings: &ControlSettings,
+    ) -> GateOutput {
         let damping = JointCommand::damping(settings.gate.damping_kd);
         if *wanted == damping {
             self.reset();
@@ -67,26 +100,40 @@ impl CommandGate {
                 self.reset();
                 return refused("a joint's angle or velocity");
             }
-            let mut torque =
-                (motor.torque_n_m + feedback).clamp(-settings.max_torque[joint], settings.max_torque[joint]);
+            let most_n_m = torque_share * settings.max_torque[joint];
+            let wanted_n_m = motor.torque_n_m + feedback;
+            let mut torque = wanted_n_m.clamp(-most_n_m, most_n_m);
             if let Some(last) = self.last_torque {
                 let step = settings.gate.torque_step_nm;
                 torque = torque.clamp(last[joint] - step, last[joint] + step);
             }
             motor.torque_n_m = torque - feedback;
+            let damped = motor.kp_joint == 0.0 && motor.velocity_rad_s == 0.0;
+            let kd_joint = motor.kd_joint;
             if motor.torque_n_m.abs() > settings.max_torque[joint] {
-                *motor = MotorCommand { torque_n_m: torque, ..MotorCommand::default() };
+                // tau_motor = tau - kd dq, |tau| at most the limit.
+                let dq = state.joint_velocity_rad_s[joint];
+                let most_kd = (settings.max_torque[joint] - torque * dq.signum()) / dq.abs();
+                let kd_joint = (most_kd / MOTOR_DAMPING_STEP).floor() * MOTOR_DAMPING_STEP;
+                *motor = if damped && kd_joint > 0.0 {
+                    MotorCommand { torque_n_m: torque + kd_joint * dq, kd_joint, ..MotorCommand::default() }
+                } else {
+                    MotorCommand { torque_n_m: torque, ..MotorCommand::default() }
+                };
             }
             torques[joint] = torque;
-            // Rounding of the subtraction does not count as limited.
-            let moved = (motor.torque_n_m - before.torque_n_m).abs() > 1e-9;
+            // Rounding of the subtraction does not count as limited, nor does damping that moved to the feed-forward torque.
+            let moved = if damped {
+                (torque - wanted_n_m).abs() > 1e-9 || kd_joint != before.kd_joint
+            } else {
+                (motor.torque_n_m - before.torque_n_m).abs() > 1e-9 || motor.kd_joint != before.kd_joint
+            };
             if moved
                 || motor.kp_joint != before.kp_joint
-                || motor.kd_joint != before.kd_joint
                 || (motor.kp_joint > 0.0 && motor.position_rad != before.position_rad)
             {
                 passed.limited |= 1 << joint;
-            } else {
+            } else if motor.kd_joint == before.kd_joint {
                 motor.torque_n_m = before.torque_n_m;
             }
         }
@@ -100,11 +147,28 @@ impl CommandGate {
 /// # Errors
 /// The first quantity that is not.
 pub fn finite(state: &RobotState) -> Result<(), Fault> {
-    let all = |values: &[f64], what| {
-        if values.iter().all(|value| value.is_finite()) { Ok(()) } else { Err(Fault::NotFinite { what }) }
-    };
-    all(&state.joint_position_rad, "a joint angle")?;
-    all(&state.joint_velocity_rad_s, "a joint velocity")?;
+    joints_finite(state).and_then(|()| body_finite(state))
+}
+
+fn all_finite(values: &[f64], what: &'static str) -> Result<(), Fault> {
+    if values.iter().all(|value| value.is_finite()) { Ok(()) } else { Err(Fault::NotFinite { what }) }
+}
+
+/// Checks that every measured angle and velocity of a joint is finite.
+///
+/// # Errors
+/// The first quantity that is not.
+pub fn joints_finite(state: &RobotState) -> Result<(), Fault> {
+    all_finite(&state.joint_position_rad, "a joint angle")?;
+    all_finite(&state.joint_velocity_rad_s, "a joint velocity")
+}
+
+/// Checks that every number of the inertial unit and the foot sensors is finite.
+///
+/// # Errors
+/// The first quantity that is not.
+pub fn body_finite(state: &RobotState) -> Result<(), Fault> {
+    let all = all_finite;
     all(state.imu.world_from_body.coords.as_slice(), "the orientation")?;
     all(state.imu.gyro_body.as_slice(), "the angular velocity")?;
     all(state.imu.accel_body.as_slice(), "the acceleration")?;

@@ -1,52 +1,41 @@
-//! The failsafe table: cause, modes in which it is watched, action. Reasons: `docs/safety.md`; every limit is a key of
-//! `config/safety.toml`, `[watchdog]`.
+//! The failsafe table: cause, modes in which it is watched, action by phase of the motion. Reasons: `docs/safety.md`, whose table a test
+//! compares with this one; every limit is a key of `config/safety.toml`, `[watchdog]`.
 //!
 //! A fall during a trial is an outcome of the trial, detected by `running_trial::FallWatch`; it damps as well.
 
-use super::command_gate;
-use super::consistency::Consistency;
+use super::failsafe_causes::{
+    body_not_finite, corrupt, delay, events_lost, guard_silent, hottest, joint_position, joint_torque, joint_velocity,
+    joints_not_finite, late, link_lost, motor_hot, motor_mode, operator_silent, other_commander, reboot, remote_stop,
+    robot_clock, send_error, sensors, slow, state_age, suspended, tilt,
+};
+pub use super::failsafe_inputs::{Failsafe, FailsafeInputs, MotionPhase};
 use super::settings::ControlSettings;
-use crate::robot::{CONTROL_PERIOD_S, JOINTS, LinkStatus, RobotState};
-use crate::telemetry::{Estimate, FailsafeWarning, Fault, Mode, TrialInhibit};
+use crate::robot::{CONTROL_PERIOD_S, RobotState};
+use crate::telemetry::{FailsafeWarning, Fault, Mode, TrialInhibit};
 
-/// Data of one tick for the failsafes.
-#[derive(Debug, Clone, Copy)]
-pub struct FailsafeInputs<'a> {
-    /// Mode in which the failsafes run.
-    pub mode: Mode,
-    /// Newest state of the robot.
-    pub state: &'a RobotState,
-    /// Estimate from that state.
-    pub estimate: &'a Estimate,
-    /// Age of that state, ms; zero while states arrive.
-    pub state_age_ms: u32,
-    /// The robot's clock went backwards since the last tick.
-    pub restarted: bool,
-    /// The link; none for a machine without one.
-    pub link: Option<LinkStatus>,
-    /// Delay of the start of the tick, ns.
-    pub lateness_ns: u64,
-    /// `errno` of a failed send.
-    pub send_error: Option<i32>,
-    /// Time since the last heartbeat of the operator's console, ms.
-    pub operator_silent_ms: u32,
-    /// The session takes no events.
-    pub events_lost: bool,
-    /// Consistency of sensors, clocks and commands.
-    pub consistency: &'a Consistency,
-    /// Time for which the computer was suspended since the last tick, ms.
-    pub suspended_ms: u32,
-    /// Time for which the guard has not answered, ms; `u32::MAX` when it is gone, zero without a guard.
-    pub guard_silent_ms: u32,
-}
-
-/// The action of a failsafe and the condition that clears it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// The action of a failsafe and the condition that clears it, from the mildest to the strictest.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum FailsafeAction {
-    /// Damping in the same tick, latched as FAULT. Cleared by an acknowledgement once no row with this action trips.
-    Damp,
     /// No further impulse; after the landing the robot sits down and is disarmed. Cleared when the cause is gone, and by arming.
     Land,
+    /// The controller lands the robot, without the rest of the impulse; then damping, latched as FAULT.
+    LandThenDamp,
+    /// The motors hold the joint angles of the stance by themselves, without measured state; then damping, latched as FAULT.
+    HoldThenDamp,
+    /// Damping in the same tick, latched as FAULT. Cleared by an acknowledgement once no row with this action trips.
+    Damp,
+}
+
+impl FailsafeAction {
+    /// Name in `docs/safety.md`.
+    pub const fn name(self) -> &'static str {
+        match self {
+            FailsafeAction::Land => "LAND",
+            FailsafeAction::LandThenDamp => "LAND, then DAMP",
+            FailsafeAction::HoldThenDamp => "STANCE, then DAMP",
+            FailsafeAction::Damp => "DAMP",
+        }
+    }
 }
 
 /// A failsafe that tripped.
@@ -58,50 +47,261 @@ pub struct Trip {
     pub fault: Fault,
 }
 
+type Cause = fn(&Failsafe, &FailsafeInputs, &ControlSettings) -> Option<Fault>;
+
 /// One row of the table.
 struct FailsafeRow {
-    cause: fn(&Failsafe, &FailsafeInputs, &ControlSettings) -> Option<Fault>,
+    name: &'static str,
+    /// Limit in words.
+    limit: fn(&ControlSettings) -> String,
+    cause: Cause,
     /// Modes in which the cause is watched.
     modes: fn(Mode) -> bool,
-    action: FailsafeAction,
+    /// Actions on the ground, in the air, in the landing.
+    actions: [FailsafeAction; 3],
 }
 
-const fn cut(
-    cause: fn(&Failsafe, &FailsafeInputs, &ControlSettings) -> Option<Fault>,
+const fn row(
+    name: &'static str,
+    limit: fn(&ControlSettings) -> String,
+    cause: Cause,
     modes: fn(Mode) -> bool,
+    actions: [FailsafeAction; 3],
 ) -> FailsafeRow {
-    FailsafeRow { cause, modes, action: FailsafeAction::Damp }
+    FailsafeRow { name, limit, cause, modes, actions }
 }
 
-/// The table, by precedence: the first row that trips counts. A cause that makes measured numbers invalid stands above the rows
-/// that compare them.
-const TABLE: [FailsafeRow; 22] = [
-    cut(remote_stop, Mode::commanded),
-    cut(events_lost, Mode::commanded),
+/// A fault of the motors or of measured values, or STOP by the remote control: no controller may use them.
+const MOTORS: [FailsafeAction; 3] = [FailsafeAction::Damp; 3];
+/// The state is known and commands arrive: the controller lands the robot. Damped legs in the air tilt it by 0.6 rad before the touchdown.
+const STATE_KNOWN: [FailsafeAction; 3] =
+    [FailsafeAction::Damp, FailsafeAction::LandThenDamp, FailsafeAction::LandThenDamp];
+/// The state is not known: in the air the motors alone hold the stance. With a foot on the ground the legs are compressed, and the
+/// motors' springs would throw the robot: damping (simulated landings: largest tilt 3.1 rad held, 0.5 rad damped).
+const STATE_UNKNOWN: [FailsafeAction; 3] = [FailsafeAction::Damp, FailsafeAction::HoldThenDamp, FailsafeAction::Damp];
+/// Commands leave seldom: in the air the motors alone hold the stance; a landing under the controller is finished.
+const COMMANDS_SELDOM: [FailsafeAction; 3] =
+    [FailsafeAction::Damp, FailsafeAction::HoldThenDamp, FailsafeAction::LandThenDamp];
+/// The state is late: standing, the ramp of sitting down runs in the motors; a jump as without a state.
+const STATE_LATE: [FailsafeAction; 3] = [FailsafeAction::Land, FailsafeAction::HoldThenDamp, FailsafeAction::Damp];
+/// A cause that leaves time.
+const SIT_DOWN: [FailsafeAction; 3] = [FailsafeAction::Land; 3];
+
+/// The table, by precedence: of the rows that trip the strictest action counts, of equal ones the first row. A cause that makes
+/// measured numbers invalid stands above the rows that compare them.
+const TABLE: [FailsafeRow; 24] = [
+    row(
+        "stop buttons of the remote",
+        |_| "pressed together (`[remote]`)".to_owned(),
+        remote_stop,
+        Mode::commanded,
+        MOTORS,
+    ),
+    row(
+        "session takes no events",
+        |_| "ring of events full or abandoned".to_owned(),
+        events_lost,
+        Mode::commanded,
+        STATE_KNOWN,
+    ),
     // True in one tick only.
-    cut(suspended, Mode::commanded),
-    cut(link_lost, Mode::commanded),
-    cut(state_age, Mode::commanded),
+    row(
+        "computer suspended",
+        |s| format!("CLOCK_BOOTTIME ran ahead of CLOCK_MONOTONIC by more than {} ms", s.failsafe.suspended_ms),
+        suspended,
+        Mode::commanded,
+        MOTORS,
+    ),
+    row(
+        "link lost",
+        |s| format!("newest state older than {} ms", s.failsafe.link_lost_ms),
+        link_lost,
+        Mode::commanded,
+        STATE_UNKNOWN,
+    ),
+    row(
+        "state age",
+        |s| {
+            let limits = &s.failsafe;
+            format!("newest state older than {} ms (warning {} ms)", limits.state_age_ms, limits.state_age_warn_ms)
+        },
+        state_age,
+        Mode::commanded,
+        STATE_UNKNOWN,
+    ),
     // True in one tick only, and a robot that boots may report numbers that are not finite.
-    cut(reboot, Mode::commanded),
-    cut(robot_clock, Mode::commanded),
-    cut(not_finite, Mode::commanded),
-    cut(corrupt, Mode::commanded),
-    cut(send_error, Mode::commanded),
-    cut(late, Mode::commanded),
-    cut(slow, Mode::commanded),
-    cut(motor_hot, Mode::commanded),
+    row("reboot", |_| "robot's clock went backwards".to_owned(), reboot, Mode::commanded, MOTORS),
+    row(
+        "robot's clock",
+        |s| {
+            format!(
+                "off by more than {} ms against this computer's within 10 s, on hardware",
+                s.consistency.clock_step_ms
+            )
+        },
+        robot_clock,
+        Mode::commanded,
+        MOTORS,
+    ),
+    row(
+        "joint not finite",
+        |_| "angle or velocity of a joint is NaN or infinite".to_owned(),
+        joints_not_finite,
+        Mode::commanded,
+        MOTORS,
+    ),
+    row(
+        "body not finite",
+        |_| "a number of the inertial unit or a foot sensor is NaN or infinite".to_owned(),
+        body_not_finite,
+        Mode::commanded,
+        STATE_UNKNOWN,
+    ),
+    row(
+        "corrupt datagrams",
+        |s| format!("more than {} wrong checksums in 5 s", s.failsafe.corrupt),
+        corrupt,
+        Mode::commanded,
+        STATE_KNOWN,
+    ),
+    row("send error", |_| "the system refused to send".to_owned(), send_error, Mode::commanded, COMMANDS_SELDOM),
+    row(
+        "late tick",
+        |s| format!("more than {} ms late, on hardware", s.failsafe.hardware_late_ms),
+        late,
+        Mode::commanded,
+        STATE_KNOWN,
+    ),
+    row(
+        "slow loop",
+        |s| {
+            let period_ms = s.failsafe.period_factor * CONTROL_PERIOD_S * 1e3;
+            format!("period above {period_ms} ms in {} ticks in a row, on hardware", s.failsafe.period_ticks)
+        },
+        slow,
+        Mode::commanded,
+        COMMANDS_SELDOM,
+    ),
+    row(
+        "motor temperature",
+        |s| format!("{} degrees Celsius", s.failsafe.motor_c),
+        motor_hot,
+        Mode::commanded,
+        STATE_KNOWN,
+    ),
     // Above the single motor: no command of ours takes all of them out of servo mode.
-    cut(other_commander, Mode::energised),
-    cut(motor_mode, energised_or_faulted),
-    cut(joint_position, Mode::energised),
-    cut(joint_velocity, Mode::energised),
-    cut(joint_torque, Mode::energised),
-    cut(tilt, outside_a_trial),
-    cut(sensors, Mode::energised),
-    FailsafeRow { cause: operator_silent, modes: Mode::energised, action: FailsafeAction::Land },
-    FailsafeRow { cause: guard_silent, modes: Mode::energised, action: FailsafeAction::Land },
+    row(
+        "another commander",
+        |s| {
+            let [loss, torque] = [100.0 * s.consistency.loss_share, s.consistency.torque_n_m];
+            format!(
+                "{loss} % of the states of 1 s lost, no motor in servo mode, or a torque {torque} N m off, on hardware"
+            )
+        },
+        other_commander,
+        Mode::energised,
+        MOTORS,
+    ),
+    row("motor mode", |_| "a motor reports no servo mode".to_owned(), motor_mode, energised_or_faulted, MOTORS),
+    row(
+        "joint angle",
+        |s| format!("{} rad beyond a limit", s.failsafe.joint_margin_rad),
+        joint_position,
+        Mode::energised,
+        MOTORS,
+    ),
+    row(
+        "joint velocity",
+        |s| format!("{} times the no-load speed", s.failsafe.velocity_factor),
+        joint_velocity,
+        Mode::energised,
+        MOTORS,
+    ),
+    row(
+        "joint torque",
+        |s| format!("{} times the largest torque", s.failsafe.torque_factor),
+        joint_torque,
+        Mode::energised,
+        MOTORS,
+    ),
+    row(
+        "tilt",
+        |s| {
+            let limits = &s.failsafe;
+            format!("{} rad standing; {:.1} rad while sitting down", limits.stance_tilt_rad, limits.tilt_rad)
+        },
+        tilt,
+        outside_a_trial,
+        MOTORS,
+    ),
+    row("sensors", |_| "see \"Sensors against each other\", on hardware".to_owned(), sensors, Mode::energised, MOTORS),
+    row(
+        "link delay",
+        |s| {
+            let limits = &s.failsafe;
+            let [land, warn, hold] = [limits.delay_land_ms, limits.delay_warn_ms, limits.delay_hold_ms];
+            format!("grown by more than {land} ms (warning {warn} ms, HOLD {hold} ms), on hardware")
+        },
+        delay,
+        Mode::energised,
+        STATE_LATE,
+    ),
+    row(
+        "operator lost",
+        |s| {
+            let [silent_s, warn_s] =
+                [s.failsafe.operator_silent_ms, s.failsafe.operator_warn_ms].map(|ms| f64::from(ms) * 1e-3);
+            format!("no heartbeat for {silent_s} s (warning {warn_s} s)")
+        },
+        operator_silent,
+        Mode::energised,
+        SIT_DOWN,
+    ),
+    row(
+        "guard",
+        |s| format!("no answer for {} ms, or ended", s.failsafe.guard_silent_ms),
+        guard_silent,
+        Mode::energised,
+        SIT_DOWN,
+    ),
 ];
+
+/// One row of the table in words.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FailsafeDescription {
+    /// Cause.
+    pub cause: &'static str,
+    /// Limit.
+    pub limit: String,
+    /// Modes in which the cause is watched.
+    pub watched: String,
+    /// Actions on the ground, in the air, in the landing.
+    pub actions: [FailsafeAction; 3],
+}
+
+/// Describes the table for the documentation. Allocates: not for the tick.
+pub fn descriptions(settings: &ControlSettings) -> Vec<FailsafeDescription> {
+    let watched = |modes: fn(Mode) -> bool| {
+        let all = |known: fn(Mode) -> bool| Mode::ALL.iter().all(|&mode| modes(mode) == known(mode));
+        if all(Mode::commanded) {
+            "commanded".to_owned()
+        } else if all(Mode::energised) {
+            "energised".to_owned()
+        } else if all(energised_or_faulted) {
+            "energised, FAULT".to_owned()
+        } else {
+            let names: Vec<&str> = Mode::ALL.iter().filter(|&&mode| modes(mode)).map(|mode| mode.name()).collect();
+            names.join(", ")
+        }
+    };
+    let describe = |row: &FailsafeRow| FailsafeDescription {
+        cause: row.name,
+        limit: (row.limit)(settings),
+        watched: watched(row.modes),
+        actions: row.actions,
+    };
+    TABLE.iter().map(describe).collect()
+}
 
 /// Also reported when another fault is latched: the motors' power may have been cut. While disarmed it is an arming check.
 const fn energised_or_faulted(mode: Mode) -> bool {
@@ -114,33 +314,14 @@ const fn outside_a_trial(mode: Mode) -> bool {
     matches!(mode, Mode::StandUp | Mode::Ready | Mode::Countdown | Mode::SitDown)
 }
 
-/// Periods of the last ticks, for the row `slow`.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Failsafe {
-    /// Start of the last tick, ns.
-    began_ns: Option<u64>,
-    /// Time between the last two starts, ms.
-    period_ms: f64,
-    /// Ticks in a row with too long a period.
-    slow: u32,
-}
-
 impl Failsafe {
-    /// Measures the period; to be called once per tick, before `check`.
-    pub fn begin(&mut self, time_ns: u64, lateness_ns: u64, settings: &ControlSettings) {
-        let began_ns = time_ns + lateness_ns;
-        self.period_ms = self.began_ns.map_or(0.0, |before| began_ns.saturating_sub(before) as f64 * 1e-6);
-        self.began_ns = Some(began_ns);
-        let slow = self.period_ms > settings.failsafe.period_factor * CONTROL_PERIOD_S * 1e3;
-        self.slow = if slow { self.slow + 1 } else { 0 };
-    }
-
-    /// Returns the first row that trips.
+    /// Returns the strictest action of the rows that trip; of equal ones the first row's.
     pub fn check(&self, inputs: &FailsafeInputs, settings: &ControlSettings) -> Option<Trip> {
-        TABLE.iter().filter(|row| (row.modes)(inputs.mode)).find_map(|row| {
+        let trips = TABLE.iter().filter(|row| (row.modes)(inputs.mode)).filter_map(|row| {
             let fault = (row.cause)(self, inputs, settings)?;
-            Some(Trip { action: row.action, fault })
-        })
+            Some(Trip { action: row.actions[inputs.phase as usize], fault })
+        });
+        trips.reduce(|strictest, trip| if trip.action > strictest.action { trip } else { strictest })
     }
 }
 
@@ -148,25 +329,30 @@ impl Failsafe {
 ///
 /// 1. Battery below its limit.
 /// 2. A motor at its warm limit.
-pub fn trial_inhibit(state: &RobotState, settings: &ControlSettings) -> Option<TrialInhibit> {
+/// 3. Delay of the link, `delay_growth_ms`, above its limit.
+pub fn trial_inhibit(state: &RobotState, delay_growth_ms: f64, settings: &ControlSettings) -> Option<TrialInhibit> {
     let limits = &settings.failsafe;
     let low = state.battery.map(|battery| battery.charge_percent).filter(|charge| *charge < limits.battery_percent);
     if let Some(measured_percent) = low {
         return Some(TrialInhibit::BatteryLow { measured_percent, allowed_percent: limits.battery_percent });
     }
     let (joint, measured_c) = hottest(state);
-    (measured_c >= limits.motor_warm_c).then_some(TrialInhibit::MotorWarm {
-        joint,
-        measured_c,
-        allowed_c: limits.motor_warm_c,
-    })
+    if measured_c >= limits.motor_warm_c {
+        return Some(TrialInhibit::MotorWarm { joint, measured_c, allowed_c: limits.motor_warm_c });
+    }
+    let delayed = settings.hardware && delay_growth_ms > limits.delay_hold_ms;
+    delayed.then_some(TrialInhibit::LinkDelay { measured_ms: delay_growth_ms, allowed_ms: limits.delay_hold_ms })
 }
 
-/// Returns the warning that precedes a failsafe: an old state before a silent operator's console.
+/// Returns the warning that precedes a failsafe: the state before a silent operator's console.
 pub fn warning(inputs: &FailsafeInputs, settings: &ControlSettings) -> Option<FailsafeWarning> {
     let limits = &settings.failsafe;
     if inputs.mode.commanded() && inputs.state_age_ms > limits.state_age_warn_ms {
         Some(FailsafeWarning::StateAge { age_ms: inputs.state_age_ms, allowed_ms: limits.state_age_warn_ms })
+    } else if inputs.mode.commanded() && settings.hardware && inputs.delay_growth_ms > limits.delay_warn_ms {
+        Some(FailsafeWarning::LinkDelay { measured_ms: inputs.delay_growth_ms, allowed_ms: limits.delay_warn_ms })
+    } else if inputs.mode.energised() && settings.hardware && inputs.loss_share > limits.loss_warn_share {
+        Some(FailsafeWarning::StatesLost { measured_share: inputs.loss_share, allowed_share: limits.loss_warn_share })
     } else if inputs.mode.energised() && inputs.operator_silent_ms > limits.operator_warn_ms {
         Some(FailsafeWarning::OperatorQuiet {
             silent_ms: inputs.operator_silent_ms,
@@ -175,136 +361,4 @@ pub fn warning(inputs: &FailsafeInputs, settings: &ControlSettings) -> Option<Fa
     } else {
         None
     }
-}
-
-fn events_lost(_: &Failsafe, inputs: &FailsafeInputs, _: &ControlSettings) -> Option<Fault> {
-    inputs.events_lost.then_some(Fault::EventsLost)
-}
-
-fn suspended(_: &Failsafe, inputs: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {
-    let (suspended_ms, allowed_ms) = (inputs.suspended_ms, settings.failsafe.suspended_ms);
-    (suspended_ms > allowed_ms).then_some(Fault::Suspended { suspended_ms, allowed_ms })
-}
-
-fn guard_silent(_: &Failsafe, inputs: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {
-    let (silent_ms, allowed_ms) = (inputs.guard_silent_ms, settings.failsafe.guard_silent_ms);
-    (silent_ms > allowed_ms).then_some(Fault::GuardSilent { silent_ms, allowed_ms })
-}
-
-fn remote_stop(_: &Failsafe, inputs: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {
-    let pressed = inputs.state.remote.is_some_and(|remote| remote.buttons.contains(settings.remote.stop));
-    pressed.then_some(Fault::RemoteStop)
-}
-
-fn robot_clock(_: &Failsafe, inputs: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {
-    inputs.consistency.clock_fault(&settings.consistency)
-}
-
-fn sensors(_: &Failsafe, inputs: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {
-    inputs.consistency.sensor_fault(inputs.mode, &settings.consistency)
-}
-
-fn other_commander(_: &Failsafe, inputs: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {
-    inputs.consistency.commander_fault(inputs.mode, &settings.consistency)
-}
-
-fn link_lost(_: &Failsafe, inputs: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {
-    let (age_ms, allowed_ms) = (inputs.state_age_ms, settings.failsafe.link_lost_ms);
-    (age_ms > allowed_ms).then_some(Fault::LinkLost { age_ms, allowed_ms })
-}
-
-fn state_age(_: &Failsafe, inputs: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {
-    let (age_ms, allowed_ms) = (inputs.state_age_ms, settings.failsafe.state_age_ms);
-    (age_ms > allowed_ms).then_some(Fault::StateAge { age_ms, allowed_ms })
-}
-
-fn not_finite(_: &Failsafe, inputs: &FailsafeInputs, _: &ControlSettings) -> Option<Fault> {
-    command_gate::finite(inputs.state).err()
-}
-
-fn reboot(_: &Failsafe, inputs: &FailsafeInputs, _: &ControlSettings) -> Option<Fault> {
-    inputs.restarted.then_some(Fault::Reboot)
-}
-
-fn corrupt(_: &Failsafe, inputs: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {
-    let (count, allowed) = (inputs.link?.recent_corrupt, settings.failsafe.corrupt);
-    (count > allowed).then_some(Fault::Corrupt { count, allowed })
-}
-
-fn send_error(_: &Failsafe, inputs: &FailsafeInputs, _: &ControlSettings) -> Option<Fault> {
-    inputs.send_error.map(|errno| Fault::Send { errno })
-}
-
-fn late(_: &Failsafe, inputs: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {
-    let (measured_ms, allowed_ms) = (inputs.lateness_ns as f64 * 1e-6, settings.late_ms);
-    (allowed_ms > 0.0 && measured_ms > allowed_ms).then_some(Fault::Late { measured_ms, allowed_ms })
-}
-
-fn slow(failsafe: &Failsafe, _: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {
-    let limits = &settings.failsafe;
-    let slow = settings.late_ms > 0.0 && failsafe.slow >= limits.period_ticks;
-    slow.then_some(Fault::Slow {
-        ticks: failsafe.slow,
-        measured_ms: failsafe.period_ms,
-        allowed_ms: limits.period_factor * CONTROL_PERIOD_S * 1e3,
-    })
-}
-
-fn motor_hot(_: &Failsafe, inputs: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {
-    let ((joint, measured_c), allowed_c) = (hottest(inputs.state), settings.failsafe.motor_c);
-    (measured_c >= allowed_c).then_some(Fault::MotorTemperature { joint, measured_c, allowed_c })
-}
-
-fn motor_mode(_: &Failsafe, inputs: &FailsafeInputs, _: &ControlSettings) -> Option<Fault> {
-    let joint = inputs.state.motor_enabled.iter().position(|enabled| !enabled)?;
-    Some(Fault::MotorMode { joint: joint as u8 })
-}
-
-fn joint_position(_: &Failsafe, inputs: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {
-    let margin = settings.failsafe.joint_margin_rad;
-    (0..JOINTS).find_map(|joint| {
-        let measured_rad = inputs.state.joint_position_rad[joint];
-        let (least, most) = (settings.min_position[joint] - margin, settings.max_position[joint] + margin);
-        let allowed_rad = measured_rad.clamp(least, most);
-        let fault = Fault::JointPosition { joint: joint as u8, measured_rad, allowed_rad };
-        (measured_rad != allowed_rad).then_some(fault)
-    })
-}
-
-fn joint_velocity(_: &Failsafe, inputs: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {
-    (0..JOINTS).find_map(|joint| {
-        let measured_rad_s = inputs.state.joint_velocity_rad_s[joint];
-        let allowed_rad_s = settings.max_velocity[joint] * settings.failsafe.velocity_factor;
-        let fault = Fault::JointVelocity { joint: joint as u8, measured_rad_s, allowed_rad_s };
-        (measured_rad_s.abs() > allowed_rad_s).then_some(fault)
-    })
-}
-
-fn joint_torque(_: &Failsafe, inputs: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {
-    (0..JOINTS).find_map(|joint| {
-        let measured_nm = inputs.state.joint_torque_n_m[joint];
-        let allowed_nm = settings.max_torque[joint] * settings.failsafe.torque_factor;
-        let fault = Fault::JointTorque { joint: joint as u8, measured_nm, allowed_nm };
-        (measured_nm.is_nan() || measured_nm.abs() > allowed_nm).then_some(fault)
-    })
-}
-
-fn tilt(_: &Failsafe, inputs: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {
-    let [roll, pitch, _] = inputs.estimate.roll_pitch_yaw.into();
-    let measured_rad = roll.abs().max(pitch.abs());
-    // The tilt limit is larger while the robot sits down.
-    let limits = &settings.failsafe;
-    let allowed_rad = if inputs.mode == Mode::SitDown { limits.tilt_rad } else { limits.stance_tilt_rad };
-    (measured_rad > allowed_rad).then_some(Fault::Tilt { measured_rad, allowed_rad })
-}
-
-fn operator_silent(_: &Failsafe, inputs: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {
-    let silent_ms = inputs.operator_silent_ms;
-    (silent_ms > settings.failsafe.operator_silent_ms).then_some(Fault::OperatorLost { silent_ms })
-}
-
-/// Index and temperature (degrees Celsius) of the hottest motor.
-fn hottest(state: &RobotState) -> (u8, f64) {
-    let temperatures = state.motor_temperature_c.iter().enumerate();
-    temperatures.fold((0, f64::MIN), |hottest, (joint, &c)| if c > hottest.1 { (joint as u8, c) } else { hottest })
 }

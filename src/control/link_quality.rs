@@ -34,7 +34,8 @@ pub struct LinkQuality {
 
 impl LinkQuality {
     /// Takes in one tick; to be called once per tick, after reading the robot. `now_ns` is the local time at which the tick began,
-    /// `drift_ppm` the clocks' largest drift, parts per million. After a restart of the robot's clock the delay is measured anew.
+    /// `drift_ppm` the clocks' largest drift, parts per million. When the robot's clock restarts or stands still, the delay is measured
+    /// anew.
     pub fn update(
         &mut self,
         now_ns: u64,
@@ -73,7 +74,7 @@ impl LinkQuality {
 
     fn measure_delay(&mut self, now_ns: u64, robot_time_ms: u32, drift_ppm: f64) {
         let passed_ms = robot_time_passed(robot_time_ms, self.newest_ms);
-        let known = self.least_ns.filter(|_| passed_ms >= 0);
+        let known = self.least_ns.filter(|_| passed_ms > 0);
         self.newest_ms = robot_time_ms;
         self.robot_ms = if known.is_some() { self.robot_ms + i64::from(passed_ms) } else { 0 };
         let offset_ns = now_ns as f64 - self.robot_ms as f64 * 1e6;

@@ -1,5 +1,6 @@
 //! One trial: countdown, impulse, flight, landing, settle. Its settings are latched when it begins.
 
+use super::failsafe_inputs::MotionPhase;
 use super::foot_placement::{SHORTEST_FLIGHT_S, SwingLegs};
 use super::force_profile::{Oscillator, amplitudes_leg};
 use super::leg::LegTarget;
@@ -39,6 +40,8 @@ pub struct RunningTrial {
     quiet: u32,
     phase: Phase,
     fall: FallWatch,
+    /// Time at which the impulses were cut off, s.
+    cut_s: Option<f64>,
 }
 
 /// An impulse without take-off within this time counts as landed, s.
@@ -62,6 +65,7 @@ impl RunningTrial {
             quiet: 0,
             phase: Phase::Stance,
             fall: FallWatch::default(),
+            cut_s: None,
         }
     }
 
@@ -79,7 +83,28 @@ impl RunningTrial {
     fn impulses_end_s(&self) -> f64 {
         let before = self.spec.jumps.saturating_sub(1);
         let waited = if before == 0 { 0.0 } else { f64::from(before) * self.oscillator.period_s() };
-        waited + self.oscillator.impulse_s()
+        let end_s = waited + self.oscillator.impulse_s();
+        self.cut_s.map_or(end_s, |cut_s| end_s.min(cut_s))
+    }
+
+    /// Ends the impulse that is under way and drops all others.
+    pub fn cut(&mut self) {
+        self.cut_s = self.cut_s.or(Some(self.time_s().max(0.0)));
+    }
+
+    /// Phase of the motion, for the failsafes.
+    pub fn motion_phase(&self, estimate: &Estimate, settings: &ControlSettings) -> MotionPhase {
+        let airborne = estimate.contact.iter().all(|&down| !down);
+        let rising = self.phase == Phase::Impulse && estimate.velocity_world.z >= settings.failsafe.takeoff_speed_m_s;
+        match self.phase {
+            _ if self.time_s() <= 0.0 => MotionPhase::Ground,
+            _ if airborne || rising => MotionPhase::Air,
+            // In the tick of the touchdown the phase is still that of the last tick.
+            Phase::Flight | Phase::Landing => MotionPhase::Landing,
+            // An impulse without a flight counts as landed after a time.
+            _ if self.landed > 0 => MotionPhase::Landing,
+            _ => MotionPhase::Ground,
+        }
     }
 
     /// Drops all impulses that have not begun, so that the robot lands.

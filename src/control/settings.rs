@@ -132,6 +132,20 @@ pub struct ArmingLimits {
     pub disk_free_mb: u32,
 }
 
+/// Conditions of a jump on hardware: section `[ready]` of `config/safety.toml`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ReadyLimits {
+    /// Least sum of the foot forces, share of the weight.
+    pub force_share_min: f64,
+    /// Largest sum of the foot forces, share of the weight.
+    pub force_share_max: f64,
+    /// Largest roll or pitch, rad.
+    pub tilt_rad: f64,
+    /// Largest distance of a joint from the stance, rad.
+    pub stance_rad: f64,
+}
+
 /// Limits of the consistency of sensors, clocks and commands: section `[consistency]` of `config/safety.toml`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -192,20 +206,6 @@ pub struct RemoteSettings {
     pub needed: bool,
 }
 
-/// Conditions of a jump on hardware: section `[ready]` of `config/safety.toml`.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ReadyLimits {
-    /// Least sum of the foot forces, share of the weight.
-    pub force_share_min: f64,
-    /// Largest sum of the foot forces, share of the weight.
-    pub force_share_max: f64,
-    /// Largest roll or pitch, rad.
-    pub tilt_rad: f64,
-    /// Largest distance of a joint from the stance, rad.
-    pub stance_rad: f64,
-}
-
 /// Expiry of an approval.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -253,6 +253,28 @@ pub struct FailsafeLimits {
     pub operator_silent_ms: u32,
     /// LAND: longest time from touchdown to sitting down, s.
     pub land_s: f64,
+    /// Growth of the link's delay that gives a warning, ms.
+    pub delay_warn_ms: f64,
+    /// Growth of the link's delay, ms: HOLD.
+    pub delay_hold_ms: f64,
+    /// Growth of the link's delay, ms: LAND.
+    pub delay_land_ms: f64,
+    /// Share of the states of the last second lost that gives a warning.
+    pub loss_warn_share: f64,
+    /// Upward speed of the trunk in an impulse from which the robot flies whatever the motors do, m/s.
+    pub takeoff_speed_m_s: f64,
+    /// A fault in the air without a known state: time for which the motors hold the stance, s.
+    pub hold_s: f64,
+    /// The same: joint stiffness, N m/rad.
+    pub hold_kp: f64,
+    /// The same: joint damping, N m s/rad.
+    pub hold_kd: f64,
+    /// Ramps: largest distance of a joint from its target, rad: CUT.
+    pub ramp_error_rad: f64,
+    /// Ramps: largest torque, share of the joint's limit; a larger demand is limited, then CUT.
+    pub ramp_torque_share: f64,
+    /// Ramps: time for which a joint may exceed either, s.
+    pub ramp_limit_s: f64,
     /// Largest drift of the robot's clock against this machine's that is not taken for a growing delay, parts per million.
     pub clock_drift_ppm: f64,
     /// Least free space where the recording goes, MB: HOLD.
@@ -420,6 +442,8 @@ pub struct ControlSettings {
     pub sit_down: RampSettings,
     /// From approval to the impulse, standing still, s.
     pub countdown_s: f64,
+    /// Time in which the gains change at the begin of the countdown and after a trial, s.
+    pub blend_s: f64,
     /// End of a trial.
     pub settle: SettleSettings,
     /// Limits of a fall.
@@ -438,12 +462,12 @@ pub struct ControlSettings {
     pub hardware: bool,
     /// Limits of the arming checks.
     pub arming: ArmingLimits,
+    /// Conditions of a jump.
+    pub ready: ReadyLimits,
     /// Limits of the consistency of sensors, clocks and commands.
     pub consistency: ConsistencyLimits,
     /// The remote control.
     pub remote: RemoteSettings,
-    /// Conditions of a jump.
-    pub ready: ReadyLimits,
     /// Expiry of an approval.
     pub approval: ApprovalLimits,
     /// Limits of the failsafes.

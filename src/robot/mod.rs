@@ -18,6 +18,8 @@ use remote::Remote;
 pub const GRAVITY: f64 = 9.81;
 /// Period of the control cycle, s: a command holds for this long.
 pub const CONTROL_PERIOD_S: f64 = 0.001;
+/// Step of the damping of a motor in a Go1's datagram, N m s/rad (`docs/go1-wire.md`).
+pub const MOTOR_DAMPING_STEP: f64 = 1.0 / 16.0;
 /// Number of legs.
 pub const LEGS: usize = 4;
 /// Number of actuated joints; index `3 * leg + joint`.
@@ -206,6 +208,18 @@ impl JointCommand {
     /// Commands torques alone, N m.
     pub fn torques(torque: &Joints) -> Self {
         JointCommand { motor: torque.map(|torque| MotorCommand { torque_n_m: torque, ..MotorCommand::default() }) }
+    }
+
+    /// Commands torques, N m, of which the motors compute the damping: torque + kd (dq - dq) at the measured velocities, with `kd`
+    /// rounded down to what a Go1's datagram holds. If no further command arrives, the joint stays damped.
+    pub fn damped_torques(torque: &Joints, kd: f64, joint_velocity_rad_s: &Joints) -> Self {
+        let kd_joint = (kd / MOTOR_DAMPING_STEP).floor() * MOTOR_DAMPING_STEP;
+        let motor = |joint: usize| MotorCommand {
+            torque_n_m: torque[joint] + kd_joint * joint_velocity_rad_s[joint],
+            kd_joint,
+            ..MotorCommand::default()
+        };
+        JointCommand { motor: std::array::from_fn(motor) }
     }
 
     /// Holds the joint angles `position` (rad) at rest with stiffness `kp` (N m/rad) and damping `kd` (N m s/rad).

@@ -61,8 +61,8 @@ pub fn suggest(end: &TrialEnd) -> (Verdict, String) {
         TrialEnd::Fell(cause) => (Verdict::Fall, cause.to_string()),
         TrialEnd::Stopped => (Verdict::Void, "stopped by the operator".into()),
         TrialEnd::Cancelled => (Verdict::Void, "cancelled by the operator".into()),
-        TrialEnd::Fault(fault) if trips_limit(end) => (Verdict::Fall, format!("{LIMIT}{fault}")),
         TrialEnd::NotReady(inhibit) => (Verdict::Void, format!("not begun: {inhibit}")),
+        TrialEnd::Fault(fault) if trips_limit(end) => (Verdict::Fall, format!("{LIMIT}{fault}")),
         TrialEnd::Fault(fault) => (Verdict::Void, fault.to_string()),
     }
 }

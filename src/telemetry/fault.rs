@@ -80,6 +80,15 @@ pub enum Fault {
     /// The time is `u32::MAX` when the guard process has ended.
     #[error("{}", guard_silent(*.silent_ms, *.allowed_ms))]
     GuardSilent { silent_ms: u32, allowed_ms: u32 },
+    /// Growth of local time minus robot time above its least value.
+    #[error("the link's delay grew: {}", exceeds(*.measured_ms, *.allowed_ms, "ms", 1))]
+    LinkDelay { measured_ms: f64, allowed_ms: f64 },
+    /// Standing up or sitting down.
+    #[error("{} blocked: distance from its target {}", joint_name(*.joint as usize), exceeds(*.measured_rad, *.allowed_rad, "rad", 3))]
+    FollowingError { joint: u8, measured_rad: f64, allowed_rad: f64 },
+    /// Standing up or sitting down: torque that the ramp demands.
+    #[error("{} blocked: demanded torque {}", joint_name(*.joint as usize), exceeds(*.measured_nm, *.allowed_nm, "N m", 1))]
+    RampTorque { joint: u8, measured_nm: f64, allowed_nm: f64 },
 }
 
 /// A check of sensors against each other while the robot is commanded. The order is the order of the checks.
@@ -230,6 +239,8 @@ pub enum TrialInhibit {
     StatesLost { measured_share: f64, allowed_share: f64 },
     #[error("{:.1} % of the control ticks of the last second late, a jump needs at most {} %; end other programs", 100.0 * .measured_share, 100.0 * .allowed_share)]
     TicksLate { measured_share: f64, allowed_share: f64 },
+    #[error("the link's delay grew by {measured_ms:.1} ms, a jump needs at most {allowed_ms} ms; check the cable")]
+    LinkDelay { measured_ms: f64, allowed_ms: f64 },
 }
 
 /// "0.120 rad, a jump needs at most 0.100 rad": more decimals where both numbers would print alike.
@@ -246,6 +257,12 @@ pub enum FailsafeWarning {
     StateAge { age_ms: u32, allowed_ms: u32 },
     #[error("no heartbeat of the operator's console for {silent_ms} ms, usually at most {allowed_ms} ms")]
     OperatorQuiet { silent_ms: u32, allowed_ms: u32 },
+    #[error("the link's delay grew by {measured_ms:.1} ms, usually at most {allowed_ms} ms")]
+    LinkDelay { measured_ms: f64, allowed_ms: f64 },
+    #[error("{:.1} % of the states of the last second lost, usually at most {} %", 100.0 * .measured_share, 100.0 * .allowed_share)]
+    StatesLost { measured_share: f64, allowed_share: f64 },
+    #[error("the robot lands before it is damped: {0}")]
+    Landing(Fault),
 }
 
 #[cfg(test)]

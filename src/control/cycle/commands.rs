@@ -1,7 +1,6 @@
 //! Commands of the session: carried out, or refused with the reason.
 
 use super::{Cycle, TickInputs};
-use crate::control::failsafe;
 use crate::control::mode::{self, Trigger};
 use crate::control::running_trial::RunningTrial;
 use crate::robot::{Placement, Robot};
@@ -91,9 +90,9 @@ impl Cycle {
                 })
             }
             Command::Acknowledge { .. } => self.tripped.map(CommandRefusal::FaultPersists),
-            Command::RunTrial(_, permit) => self
-                .permit_expired(permit, inputs)
-                .or_else(|| failsafe::trial_inhibit(&self.tick.state, &self.settings).map(CommandRefusal::Inhibited)),
+            Command::RunTrial(_, permit) => {
+                self.permit_expired(permit, inputs).or_else(|| self.inhibit().map(CommandRefusal::Inhibited))
+            }
             _ => None,
         }
     }
@@ -146,6 +145,7 @@ impl Cycle {
             self.estimator.reset();
             self.consistency.reset();
             self.gate.reset();
+            self.gains.reset();
             self.read(robot);
             self.estimate();
         }

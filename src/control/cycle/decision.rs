@@ -1,7 +1,6 @@
 //! The motor command of each mode, and the changes of mode as jump and ramp progress.
 
 use super::Cycle;
-use crate::control::failsafe;
 use crate::control::leg::{self, LegTarget};
 use crate::control::mode::Trigger;
 use crate::control::ramp::RampProgress;
@@ -21,6 +20,9 @@ impl Cycle {
 
     /// Changes the mode as the jump progresses.
     fn follow_jump(&mut self) {
+        if self.holds_stance() {
+            return;
+        }
         if let Some(jump) = &mut self.jump {
             let progress = match jump.update(&self.tick.state, &self.tick.estimate, &self.settings) {
                 // After a fault the landing ends when the robot stands; rest is not required.
@@ -32,6 +34,7 @@ impl Cycle {
             match (self.mode, progress) {
                 (Mode::Countdown, TrialProgress::Jump | TrialProgress::Settle) => self.begin_impulse(),
                 (Mode::Jump, TrialProgress::Settle) => self.trigger(Trigger::Landed, TransitionCause::StepFinished),
+                (_, TrialProgress::Over(_)) if self.fault_landing.is_some() => self.end_fault_landing(),
                 (_, TrialProgress::Over(TrialEnd::Fell(cause))) => {
                     self.trigger(Trigger::Fell, TransitionCause::Fell(cause))
                 }
@@ -52,7 +55,7 @@ impl Cycle {
     fn begin_impulse(&mut self) {
         let Some(jump) = &self.jump else { return };
         let pose_rad = self.pose_of(&jump.spec().gains, &jump.spec().stance_leg);
-        match failsafe::trial_inhibit(&self.tick.state, &self.settings).or_else(|| self.unready(&pose_rad)) {
+        match self.inhibit().or_else(|| self.unready(&pose_rad)) {
             None => self.trigger(Trigger::CountdownOver, TransitionCause::StepFinished),
             Some(inhibit) => self.trigger(Trigger::Cancel, TransitionCause::NotReady(inhibit)),
         }
@@ -60,7 +63,13 @@ impl Cycle {
 
     /// Changes the mode when a ramp has reached its pose or timed out.
     fn follow_ramp(&mut self) {
-        if let Some(ramp) = &self.ramp {
+        if let Some(ramp) = &mut self.ramp {
+            // The floor ends sitting down; a joint that it stops is not blocked.
+            let watched = self.mode == Mode::StandUp || ramp.is_moving();
+            if let Some(fault) = ramp.blocked(&self.tick.state, &self.settings).filter(|_| watched) {
+                self.trigger(Trigger::Fault, TransitionCause::Fault(fault));
+                return;
+            }
             match ramp.progress(&self.tick.state.joint_position_rad) {
                 RampProgress::Moving => {}
                 RampProgress::Reached => self.trigger(Trigger::PoseReached, TransitionCause::StepFinished),
@@ -77,16 +86,21 @@ impl Cycle {
 
     fn motor_command(&mut self) -> JointCommand {
         self.tick.torque_demanded = Joints::default();
+        if let Some(hold) = self.fault_landing.as_mut().and_then(|landing| landing.hold.as_mut()) {
+            return hold.command();
+        }
         match (self.mode, &mut self.ramp, &self.jump) {
             (Mode::StandUp | Mode::SitDown, Some(ramp), _) => ramp.command(),
             (Mode::Countdown | Mode::Jump | Mode::Settle, _, Some(jump)) => {
-                let target = jump.target(&self.tick.estimate);
+                let mut target = jump.target(&self.tick.estimate);
+                target.gains = self.blended(&target.gains);
                 self.legs(&target)
             }
             (Mode::Ready | Mode::Review, _, _) => {
-                let stand = &self.settings.stand;
+                let stand = self.settings.stand;
+                let gains = self.blended(&stand.gains);
                 self.legs(&LegTarget {
-                    gains: stand.gains,
+                    gains,
                     stance_leg: stand.stance_leg,
                     vmc: stand.vmc,
                     attitude_rate_gain: stand.attitude_rate_gain,
@@ -103,7 +117,23 @@ impl Cycle {
         let (state, estimate) = (&self.tick.state, &self.tick.estimate);
         let torques = leg::torques(target, &self.feet, &state.joint_velocity_rad_s, estimate);
         self.tick.torque_demanded = torques;
-        JointCommand::torques(&torques)
+        // The same law: tau + kd (0 - dq). A robot over a network stays damped if no further command arrives; a simulated one keeps the
+        // torque of a tick, so that its results do not depend on this.
+        if self.settings.hardware {
+            JointCommand::damped_torques(&torques, target.gains.kd_joint, &state.joint_velocity_rad_s)
+        } else {
+            JointCommand::torques(&torques)
+        }
+    }
+
+    /// Returns the gains of this tick on the way to `gains`. A simulated robot is placed with the gains of its trial.
+    fn blended(&mut self, gains: &Gains) -> Gains {
+        let settings = &self.settings;
+        if settings.hardware {
+            self.gains.next(gains, settings.blend_s.min(0.5 * settings.countdown_s))
+        } else {
+            *gains
+        }
     }
 
     /// Joint angles of standing between trials, rad.

@@ -1,7 +1,7 @@
 //! Actions of the failsafes: damping, landing, sitting down.
 
 use super::{Cycle, TickInputs};
-use crate::control::failsafe::{self, FailsafeAction, FailsafeInputs};
+use crate::control::failsafe::{self, FailsafeAction, FailsafeInputs, Trip};
 use crate::control::mode::Trigger;
 use crate::control::running_trial::FallWatch;
 use crate::robot::Robot;
@@ -9,12 +9,12 @@ use crate::robot::ticks_in;
 use crate::telemetry::{Fault, Mode, Tick, TransitionCause};
 
 /// Ticks for which a warning stays set; the session reads it at 10 Hz.
-const WARNING_TICKS: u32 = 1000;
+pub(super) const WARNING_TICKS: u32 = 1000;
 
 impl Cycle {
     /// Applies, in this order:
     ///
-    /// 1. The first row of the failsafe table that trips. CUT ends the list.
+    /// 1. The strictest row of the failsafe table that trips. DAMP ends the list, also at the end of a landing with a fault.
     /// 2. Landing, after the end of the session.
     /// 3. Damping for a fall in REVIEW. It is no fault, so the verdict is asked for as after any other fall.
     /// 4. Sitting down, after too long a wait in READY or REVIEW.
@@ -22,11 +22,14 @@ impl Cycle {
         self.failsafe.begin(inputs.time_ns, inputs.lateness_ns, &self.settings);
         let failsafe_inputs = FailsafeInputs {
             mode: self.mode,
+            phase: self.motion_phase(),
             state: &self.tick.state,
             estimate: &self.tick.estimate,
             state_age_ms: self.state_age_ms,
             restarted,
             link: robot.link(),
+            delay_growth_ms: self.link_quality.delay_growth_ms(),
+            loss_share: self.link_quality.loss_share(),
             lateness_ns: inputs.lateness_ns,
             send_error: self.send_error.take(),
             operator_silent_ms: inputs.operator_silent_ms,
@@ -48,10 +51,15 @@ impl Cycle {
                 self.damp_and_latch(trip.fault);
                 return;
             }
+            Some(Trip { action: FailsafeAction::LandThenDamp, fault }) => self.land_then_damp(fault, false),
+            Some(Trip { action: FailsafeAction::HoldThenDamp, fault }) => self.land_then_damp(fault, true),
             Some(trip) => self.land(trip.fault),
             None if self.session_left => self.land(Fault::OperatorLeft),
             None if self.mode == Mode::Ready => self.landing = None,
             None => {}
+        }
+        if self.follow_fault_landing() {
+            return;
         }
         let Tick { state, estimate, .. } = &self.tick;
         let stance_tilt_rad = self.settings.failsafe.stance_tilt_rad;
@@ -68,7 +76,7 @@ impl Cycle {
 
     /// Damps and latches the fault. A latched fault keeps its name, unless a fault of another kind voids confirmations: that one
     /// is reported too.
-    fn damp_and_latch(&mut self, fault: Fault) {
+    pub(super) fn damp_and_latch(&mut self, fault: Fault) {
         let kind = std::mem::discriminant::<Fault>;
         let reported = matches!(self.cause, TransitionCause::Fault(latched) if kind(&latched) == kind(&fault));
         if self.mode != Mode::Fault {

@@ -4,11 +4,14 @@
 mod commands;
 mod decision;
 mod failsafes;
+mod fault_landing;
 
 use super::arming::{self, ArmingHistory};
 use super::command_gate::CommandGate;
 use super::consistency::{Consistency, ConsistencyInputs};
 use super::failsafe::{self, Failsafe};
+use super::fault_landing::FaultLanding;
+use super::gain_blend::GainBlend;
 use super::leg;
 use super::link_quality::LinkQuality;
 use super::mode::{self, Trigger};
@@ -107,6 +110,9 @@ pub struct Cycle {
     send_error: Option<i32>,
     /// Fault during a jump after which the robot sits down once it has landed.
     landing: Option<Fault>,
+    /// Fault in the air or in the landing after which the robot is damped once it has landed.
+    fault_landing: Option<FaultLanding>,
+    gains: GainBlend,
     /// The session ended: the robot sits down, and nothing energises it again.
     session_left: bool,
     /// Time of the newest command to sit down or to cancel, ns: a permit from before it is void.
@@ -143,6 +149,8 @@ impl Cycle {
             state_age_ms: 0,
             send_error: None,
             landing: None,
+            fault_landing: None,
+            gains: GainBlend::default(),
             session_left: false,
             lowered_ns: 0,
             tick: Tick::default(),
@@ -169,15 +177,15 @@ impl Cycle {
     pub fn readiness(&self) -> Readiness {
         Readiness {
             findings: self.findings,
-            inhibit: failsafe::trial_inhibit(&self.tick.state, &self.settings),
+            inhibit: self.inhibit(),
             unready: if self.mode == Mode::Ready { self.unready(&self.standing_pose()) } else { None },
             warning: self.warning.map(|(warning, _)| warning),
         }
     }
 
-    /// Consistency of sensors, clocks and commands as of the last tick.
-    pub fn consistency(&self) -> &Consistency {
-        &self.consistency
+    /// Returns the reason to refuse the next trial.
+    fn inhibit(&self) -> Option<TrialInhibit> {
+        failsafe::trial_inhibit(&self.tick.state, self.link_quality.delay_growth_ms(), &self.settings)
     }
 
     /// Returns a condition of a jump from the joint angles `pose_rad` that does not hold.
@@ -191,6 +199,11 @@ impl Cycle {
             pose_rad,
         };
         readiness::unready(&inputs, &self.settings)
+    }
+
+    /// Consistency of sensors, clocks and commands as of the last tick.
+    pub fn consistency(&self) -> &Consistency {
+        &self.consistency
     }
 
     /// Events of the last tick.
@@ -309,7 +322,12 @@ impl Cycle {
 
     /// Passes `wanted` through the last gate; a fault there damps. Returns the command to send and the mask of limited joints.
     fn limit(&mut self, wanted: &JointCommand) -> (JointCommand, u16) {
-        let passed = self.gate.pass(wanted, &self.tick.state, &self.settings);
+        let passed = if self.holds_stance() {
+            self.gate.pass_unmeasured(wanted, &self.settings)
+        } else {
+            let torque_share = if self.ramp.is_some() { self.settings.failsafe.ramp_torque_share } else { 1.0 };
+            self.gate.pass_within(torque_share, wanted, &self.tick.state, &self.settings)
+        };
         match passed.fault {
             None => (passed.command, passed.limited),
             Some(fault) => {
@@ -350,7 +368,11 @@ impl Cycle {
             }
             _ => None,
         };
+        if to == Mode::StandUp {
+            self.gains.reset();
+        }
         if !matches!(to, Mode::Countdown | Mode::Jump | Mode::Settle) {
+            self.fault_landing = None;
             self.finish_trial(match cause {
                 TransitionCause::Stop => TrialEnd::Stopped,
                 TransitionCause::Fell(cause) => TrialEnd::Fell(cause),
