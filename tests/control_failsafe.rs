@@ -65,7 +65,7 @@ impl LinkedBench {
     }
 }
 
-/// Every CUT row, injected in READY: damping within two ticks of the first bad one; the fault names measured value and limit.
+/// Every DAMP row, injected in READY: damping within two ticks of the first bad one; the fault names measured value and limit.
 #[test]
 fn every_cut_row_damps_within_two_ticks_and_names_its_fault() {
     type Inject = fn(&mut LinkedBench);
@@ -174,7 +174,7 @@ fn a_clock_that_runs_over_is_no_restart() {
 }
 
 /// A robot that tips over in REVIEW is damped at the limit of READY; it counts as fallen, without a fault. Regression: only
-/// 1.0 rad cut.
+/// 1.0 rad damps.
 #[test]
 fn a_robot_that_tips_over_in_review_is_damped_at_the_limit_of_standing() {
     let tips: [Tamper; 2] =

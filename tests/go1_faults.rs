@@ -185,7 +185,7 @@ type Row = (&'static str, &'static [Mode], fn(&TappedBench, &Tick) -> bool, &'st
 const TILTED: &[&str] = &["tilt ", "fell: roll", "orientation against gyroscope"];
 const OLD: &[&str] = &["no state from the robot for 21 ms, limit 20 ms"];
 
-const CUT: [Row; 16] = [
+const DAMP: [Row; 16] = [
     ("STOP key", SENT_TO, |_, _| true, &["STOP"]),
     ("angle FL_hip 1.3", ENERGISED, |_, t| t.state.joint_position_rad[3] > 1.2, &["FL_hip at 1.300 rad"]),
     ("speed RR_thigh 90", ENERGISED, |_, t| t.state.joint_velocity_rad_s[7] > 80.0, &["RR_thigh at 90.0 rad/s"]),
@@ -235,7 +235,7 @@ fn reaction(bench: &mut TappedBench, (fault, _, bad, words): &Row) -> u32 {
 #[test]
 fn every_cut_is_on_the_wire_within_two_ticks() {
     let mut slowest = 0;
-    for row in &CUT {
+    for row in &DAMP {
         let (fault, modes, ..) = row;
         for mode in *modes {
             let mut bench = in_mode(*mode);

@@ -2,7 +2,7 @@
 //! the battery is never switched off.
 
 use proptest::prelude::*;
-use quadfrog::robot::go1::convert::{low_cmd, low_state, motor_command, robot_state};
+use quadfrog::robot::go1::convert::{decode_motor, low_cmd, low_state, robot_state};
 use quadfrog::robot::go1::packet::{
     COMMAND_LENGTH, CommandError, CrcForm, LowCmd, LowState, MODE_BRAKE, MODE_SERVO, POSITION_STOP, Rejection,
     VELOCITY_STOP, crc,
@@ -28,7 +28,7 @@ fn command() -> impl Strategy<Value = JointCommand> {
 }
 
 fn form() -> impl Strategy<Value = CrcForm> {
-    prop_oneof![Just(CrcForm::Plain), Just(CrcForm::Transformed)]
+    prop_oneof![Just(CrcForm::Plain), Just(CrcForm::Sealed)]
 }
 
 proptest! {
@@ -37,7 +37,7 @@ proptest! {
         let datagram = low_cmd(&command, form).unwrap();
         let read = LowCmd::parse(datagram.bytes(), form).unwrap();
         for (joint, wanted) in command.motor.iter().enumerate() {
-            let got = motor_command(&read.motor(joint)).expect("servo mode");
+            let got = decode_motor(&read.motor(joint)).expect("servo mode");
             // Truncated towards zero: not more than the command, and less than one step less, except for the rounding
             // to 32 bits.
             for (got, wanted, step) in

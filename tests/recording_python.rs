@@ -135,7 +135,7 @@ fn frames_reach_the_feet(frames: &Value, tick: &Tick) {
         }
         let angles = quadfrog::robot::leg_of(&tick.state.joint_position_rad, leg as usize);
         let position_leg =
-            RobotDescription::embedded("go1").unwrap().leg_geometry.foot(&angles, leg.side()).position_leg;
+            RobotDescription::embedded("go1").unwrap().leg_geometry.foot(&angles, leg.left_sign()).position_leg;
         let difference = foot.translation.vector - (description.joint_origin[0] + position_leg);
         assert!(difference.norm() < 1e-12, "{}: {difference:?}", leg.name());
     }

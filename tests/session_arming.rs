@@ -11,7 +11,7 @@ use quadfrog::control::control_loop::ControlLoop;
 use quadfrog::control::settings::ControlSettings;
 use quadfrog::engine::{Options, fingerprint, open_experiment, session_info};
 use quadfrog::optimize::journal::Durability;
-use quadfrog::realtime::channel::{ConsoleEnd, channels};
+use quadfrog::realtime::channel::{ConsolePorts, channels};
 use quadfrog::realtime::clock::SimulatedClock;
 use quadfrog::realtime::scheduling::{ALLOW_LOCKING, ALLOW_PRIORITY, DeniedSetting, RealtimeSetting};
 use quadfrog::realtime::thread::TickStart;
@@ -29,7 +29,7 @@ use robots::LinkedRobot;
 /// A session and the control thread's body that share channels, on one thread and in simulated time.
 struct Session {
     supervisor: Supervisor,
-    operator: ConsoleEnd,
+    operator: ConsolePorts,
     _ticks: rtrb::Consumer<Tick>,
     body: ControlLoop,
     robot: LinkedRobot,

@@ -82,7 +82,7 @@ fn every_robot_lies_stands_and_jumps() {
             let q = simulator.state().joint_position;
             for leg in Leg::ALL {
                 let i = 3 * leg as usize;
-                let foot = robot.leg_geometry.foot(&Vector3::new(q[i], q[i + 1], q[i + 2]), leg.side());
+                let foot = robot.leg_geometry.foot(&Vector3::new(q[i], q[i + 1], q[i + 2]), leg.left_sign());
                 let torque = foot.jacobian_leg.tr_mul(&Vector3::new(0.0, 0.0, -150.0));
                 for (motor, torque) in push.motor[i..i + 3].iter_mut().zip(torque.iter()) {
                     *motor = MotorCommand { torque_n_m: *torque, kd_joint: 0.5, ..MotorCommand::default() };

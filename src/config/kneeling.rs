@@ -12,7 +12,7 @@ pub(super) fn clearance_m(robot: &RobotDescription, stance_leg: &Vector3<f64>, k
     let sag = robot.total_mass() * GRAVITY / (LEGS as f64 * kp);
     let clearances = Leg::ALL.map(|leg| {
         let foot_leg = leg.mirrored(&(stance_leg + Vector3::new(0.0, 0.0, sag)));
-        let Ok(q) = robot.leg_geometry.inverse(&foot_leg, leg.side()) else { return -sag };
+        let Ok(q) = robot.leg_geometry.inverse(&foot_leg, leg.left_sign()) else { return -sag };
         let part = &robot.legs[leg as usize];
         let hip = Rotation3::from_axis_angle(&Vector3::x_axis(), q.x);
         let thigh = hip * Rotation3::from_axis_angle(&Vector3::y_axis(), q.y);

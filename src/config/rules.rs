@@ -166,7 +166,7 @@ impl Config {
             let foot = leg.mirrored(&chosen.stance_leg());
             let q = robot
                 .leg_geometry
-                .inverse(&foot, leg.side())
+                .inverse(&foot, leg.left_sign())
                 .map_err(|error| self.refuse(CONTROL, &key, &value, error))?;
             for (joint, angle) in q.iter().enumerate() {
                 let i = 3 * leg as usize + joint;

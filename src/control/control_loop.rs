@@ -9,7 +9,7 @@
 
 use super::cycle::{Cycle, TickInputs};
 use super::settings::ControlSettings;
-use crate::realtime::channel::{ControlEnd, Lowering, LoweringLatch, SHOWN_EVERY};
+use crate::realtime::channel::{ControlPorts, Lowering, LoweringLatch, SHOWN_EVERY};
 use crate::realtime::clock::{Clock, SuspendWatch};
 use crate::realtime::thread::TickStart;
 use crate::robot::{CONTROL_PERIOD_S, JointCommand, LinkStatus, Placement, Robot, RobotError, RobotState};
@@ -21,7 +21,7 @@ const COUNTERS_EVERY: u64 = 100;
 /// A control cycle with its channels.
 pub struct ControlLoop {
     cycle: Cycle,
-    end: ControlEnd,
+    end: ControlPorts,
     counters: Counters,
     heartbeat: HeartbeatWatch,
     lowering: LoweringWatch,
@@ -35,7 +35,7 @@ pub struct ControlLoop {
 
 impl ControlLoop {
     /// A loop before its first tick.
-    pub fn new(settings: &ControlSettings, end: ControlEnd) -> ControlLoop {
+    pub fn new(settings: &ControlSettings, end: ControlPorts) -> ControlLoop {
         ControlLoop {
             cycle: Cycle::new(settings),
             end,

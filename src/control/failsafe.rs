@@ -231,7 +231,7 @@ const TABLE: [FailsafeRow; 24] = [
             format!("{} rad standing; {:.1} rad while sitting down", limits.stance_tilt_rad, limits.tilt_rad)
         },
         tilt,
-        outside_a_trial,
+        standing_or_ramping,
         MOTORS,
     ),
     row("sensors", |_| "see \"Sensors against each other\", on hardware".to_owned(), sensors, Mode::energised, MOTORS),
@@ -310,7 +310,7 @@ const fn energised_or_faulted(mode: Mode) -> bool {
 
 /// Energised, without a trial and its review, where tilt is a fall: `running_trial::FallWatch` compares it with this row's limit in REVIEW,
 /// and with the limit of a fall in SETTLE, where a landing may swing.
-const fn outside_a_trial(mode: Mode) -> bool {
+const fn standing_or_ramping(mode: Mode) -> bool {
     matches!(mode, Mode::StandUp | Mode::Ready | Mode::Countdown | Mode::SitDown)
 }
 

@@ -57,8 +57,8 @@ pub fn amplitudes_leg(jump: &JumpParameters, task: Task) -> PerLeg<Vector3<f64>>
             Task::Forward => Vector3::new(jump.fx_n, 0.0, jump.fz_n),
             Task::LateralLeft => Vector3::new(0.0, jump.fy_n, jump.fz_n),
             Task::LateralRight => Vector3::new(0.0, -jump.fy_n, jump.fz_n),
-            Task::TwistCcw => Vector3::new(0.0, leg.end() * jump.fy_n, jump.fz_n),
-            Task::TwistCw => Vector3::new(0.0, -leg.end() * jump.fy_n, jump.fz_n),
+            Task::TwistCcw => Vector3::new(0.0, leg.front_sign() * jump.fy_n, jump.fz_n),
+            Task::TwistCw => Vector3::new(0.0, -leg.front_sign() * jump.fy_n, jump.fz_n),
         };
     }
     amplitudes

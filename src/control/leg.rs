@@ -30,7 +30,7 @@ pub struct LegTarget {
 
 /// Foot positions and Jacobians of all legs at the joint angles, rad.
 pub fn feet(geometry: &LegGeometry, joint_position: &Joints) -> PerLeg<FootPosition> {
-    Leg::ALL.map(|leg| geometry.foot(&leg_of(joint_position, leg as usize), leg.side()))
+    Leg::ALL.map(|leg| geometry.foot(&leg_of(joint_position, leg as usize), leg.left_sign()))
 }
 
 /// Joint torques before the actuators' limits, N m: tau_i = tau_f,i + tau_imp,i + tau_VMC,i.

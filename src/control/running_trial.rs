@@ -88,7 +88,7 @@ impl RunningTrial {
     }
 
     /// Ends the impulse that is under way and drops all others.
-    pub fn cut(&mut self) {
+    pub fn end_impulses(&mut self) {
         self.cut_s = self.cut_s.or(Some(self.time_s().max(0.0)));
     }
 

@@ -214,38 +214,38 @@ pub struct ApprovalLimits {
     pub expires_s: f64,
 }
 
-/// Limits of the failsafes: section `[watchdog]` of `config/safety.toml`. CUT damps in the same tick, LAND finishes the landing and
+/// Limits of the failsafes: section `[watchdog]` of `config/safety.toml`. DAMP damps in the same tick, LAND finishes the landing and
 /// sits down, HOLD finishes the trial and refuses approvals.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FailsafeLimits {
-    /// Largest tilt while standing, rad: CUT.
+    /// Largest tilt while standing, rad: DAMP.
     pub stance_tilt_rad: f64,
-    /// Largest tilt while sitting down, rad: CUT; and what the flight limits of `[fall]` may not exceed.
+    /// Largest tilt while sitting down, rad: DAMP; and what the flight limits of `[fall]` may not exceed.
     pub tilt_rad: f64,
     /// Age of the robot's state that gives a warning, ms.
     pub state_age_warn_ms: u32,
-    /// Oldest state of the robot, ms: CUT.
+    /// Oldest state of the robot, ms: DAMP.
     pub state_age_ms: u32,
     /// Age of the state from which the link counts as lost, ms.
     pub link_lost_ms: u32,
-    /// Largest distance of a joint beyond its limit, rad: CUT.
+    /// Largest distance of a joint beyond its limit, rad: DAMP.
     pub joint_margin_rad: f64,
-    /// Largest joint velocity, times the motor's no-load speed: CUT.
+    /// Largest joint velocity, times the motor's no-load speed: DAMP.
     pub velocity_factor: f64,
-    /// Largest joint torque as the motor estimates it, times the joint's limit: CUT.
+    /// Largest joint torque as the motor estimates it, times the joint's limit: DAMP.
     pub torque_factor: f64,
     /// Warm motor, degrees Celsius: HOLD.
     pub motor_warm_c: f64,
-    /// Hottest motor, degrees Celsius: CUT.
+    /// Hottest motor, degrees Celsius: DAMP.
     pub motor_c: f64,
     /// Least charge, percent: HOLD.
     pub battery_percent: f64,
-    /// Most corrupt datagrams in the last 5 s: CUT.
+    /// Most corrupt datagrams in the last 5 s: DAMP.
     pub corrupt: u32,
     /// Longest time between two ticks, periods.
     pub period_factor: f64,
-    /// Ticks in a row with a longer period: CUT, unless late ticks are only counted.
+    /// Ticks in a row with a longer period: DAMP, unless late ticks are only counted.
     pub period_ticks: u32,
     /// Time without a heartbeat of the operator's console that gives a warning, ms.
     pub operator_warn_ms: u32,
@@ -269,9 +269,9 @@ pub struct FailsafeLimits {
     pub hold_kp: f64,
     /// The same: joint damping, N m s/rad.
     pub hold_kd: f64,
-    /// Ramps: largest distance of a joint from its target, rad: CUT.
+    /// Ramps: largest distance of a joint from its target, rad: DAMP.
     pub ramp_error_rad: f64,
-    /// Ramps: largest torque, share of the joint's limit; a larger demand is limited, then CUT.
+    /// Ramps: largest torque, share of the joint's limit; a larger demand is limited, then DAMP.
     pub ramp_torque_share: f64,
     /// Ramps: time for which a joint may exceed either, s.
     pub ramp_limit_s: f64,
@@ -281,13 +281,13 @@ pub struct FailsafeLimits {
     pub disk_free_mb: u32,
     /// Latest start of a tick on the simulator, ms; zero only counts late ticks.
     pub simulator_late_ms: f64,
-    /// Latest start of a tick on hardware, ms: CUT; zero only counts late ticks.
+    /// Latest start of a tick on hardware, ms: DAMP; zero only counts late ticks.
     pub hardware_late_ms: f64,
     /// Longest wait in READY or REVIEW on the simulator, s; zero disables the limit.
     pub simulator_idle_s: f64,
     /// Longest wait in READY or REVIEW on hardware, s: sit down; zero disables the limit.
     pub hardware_idle_s: f64,
-    /// Longest suspension of the computer, ms: CUT.
+    /// Longest suspension of the computer, ms: DAMP.
     pub suspended_ms: u32,
     /// Longest time without an answer of the guard, ms: LAND.
     pub guard_silent_ms: u32,

@@ -26,7 +26,7 @@ pub fn forces_leg_z(
         if !contact[leg as usize] {
             return 0.0;
         }
-        let corner_body = Vector3::new(leg.end(), leg.side(), 0.0);
+        let corner_body = Vector3::new(leg.front_sign(), leg.left_sign(), 0.0);
         let spring = gains.attitude * (world_from_body * corner_body).z;
         // Without the damper the sum is the spring's force to the last bit.
         if gains.attitude_rate == 0.0 {

@@ -10,7 +10,7 @@ use std::time::Duration;
 use super::guard::GuardHeartbeat;
 use crate::control::control_loop::ControlLoop;
 use crate::control::settings::ControlSettings;
-use crate::realtime::channel::ControlEnd;
+use crate::realtime::channel::ControlPorts;
 use crate::realtime::clock::Clock;
 use crate::realtime::scheduling::{DeniedSetting, RealtimeSetting, Scheduling};
 use crate::realtime::thread::{CONTROL_TICK_OFFSET, PeriodicTask, TickStart, WARM_UP_LEAD, pace_with_warm_up};
@@ -40,7 +40,7 @@ const LAST_DAMPINGS: u32 = 500;
 ///
 /// # Panics
 /// When a tick does, or the clock cannot be read: once the robot has been damped, and `closing` is set.
-pub fn run<C: Clock>(mut start: ControlThreadParts<C>, end: ControlEnd, robot: &mut dyn Robot) {
+pub fn run<C: Clock>(mut start: ControlThreadParts<C>, end: ControlPorts, robot: &mut dyn Robot) {
     let granted = start.scheduling.apply();
     let _ = start.report.send((granted.granted.clone(), granted.denied.clone()));
     let period = Duration::from_secs_f64(CONTROL_PERIOD_S);
@@ -59,7 +59,7 @@ const fn lead(real: bool) -> Duration {
 
 /// The control loop and its robot, until the engine closes.
 struct Ticking<'a, C> {
-    body: ControlLoop,
+    control_loop: ControlLoop,
     robot: &'a mut dyn Robot,
     clock: &'a C,
     closing: &'a AtomicBool,
@@ -69,20 +69,20 @@ struct Ticking<'a, C> {
 impl<C> Ticking<'_, C> {
     fn send_guard_heartbeat(&mut self) {
         if let Some(guard_heartbeat) = &mut self.guard_heartbeat {
-            let silent_ms = guard_heartbeat.tick(self.body.mode().commanded());
-            self.body.set_guard_silent(silent_ms);
+            let silent_ms = guard_heartbeat.count_tick(self.control_loop.mode().commanded());
+            self.control_loop.set_guard_silent(silent_ms);
         }
     }
 }
 
 impl<C: Clock> PeriodicTask for Ticking<'_, C> {
     fn warm_up(&mut self) {
-        self.body.warm_up(self.clock, self.robot);
+        self.control_loop.warm_up(self.clock, self.robot);
     }
 
     fn tick(&mut self, instant: TickStart) -> ControlFlow<()> {
-        self.body.tick(instant, self.clock, self.robot);
-        self.body.prepare();
+        self.control_loop.tick(instant, self.clock, self.robot);
+        self.control_loop.prepare();
         self.send_guard_heartbeat();
         if self.closing.load(Ordering::Acquire) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
@@ -91,21 +91,21 @@ impl<C: Clock> PeriodicTask for Ticking<'_, C> {
 /// Ticks as `paced` calls them, then the damping with `wait` after each; what panicked is given back.
 fn drive<C: Clock>(
     start: &mut ControlThreadParts<C>,
-    end: ControlEnd,
+    end: ControlPorts,
     robot: &mut dyn Robot,
     paced: impl FnOnce(&mut dyn PeriodicTask) -> Result<(), nix::Error>,
     mut wait: impl FnMut(),
 ) -> std::thread::Result<()> {
-    let body = ControlLoop::new(start.settings, end);
+    let control_loop = ControlLoop::new(start.settings, end);
     let guard_heartbeat = start.guard_heartbeat.take();
-    let mut ticking = Ticking { body, robot, clock: start.clock, closing: start.closing, guard_heartbeat };
-    // Afterwards the body is only asked for its mode, which a panic does not leave half changed.
+    let mut ticking = Ticking { control_loop, robot, clock: start.clock, closing: start.closing, guard_heartbeat };
+    // Afterwards the control loop is only asked for its mode, which a panic does not leave half changed.
     let ended = catch_unwind(AssertUnwindSafe(|| {
         if let Err(error) = paced(&mut ticking) {
             panic!("the control thread cannot read the monotonic clock: {error}");
         }
     }));
-    if start.real && ticking.body.mode().commanded() {
+    if start.real && ticking.control_loop.mode().commanded() {
         let damping = JointCommand::damping(start.settings.gate.damping_kd);
         let mut sent = 0;
         while sent < LAST_DAMPINGS || !start.closing.load(Ordering::Acquire) {

@@ -154,7 +154,7 @@ impl GuardHeartbeat {
 
     /// Counts a tick, or a datagram that is sent without one, and sends a heartbeat when it is due. Returns the time for
     /// which the guard has not answered, ms; `u32::MAX` when it is gone. Neither blocks nor allocates.
-    pub fn tick(&mut self, commanded: bool) -> u32 {
+    pub fn count_tick(&mut self, commanded: bool) -> u32 {
         self.ticks += 1;
         if self.ticks >= HEARTBEAT_TICKS || commanded != self.commanded {
             self.listen();
@@ -281,7 +281,7 @@ fn guard_with(
 fn check_damping(datagram: &[u8]) -> Result<(), GuardError> {
     let refused = |reason: String| GuardError { reason };
     let command = LowCmd::parse(datagram, CrcForm::Plain)
-        .or_else(|_| LowCmd::parse(datagram, CrcForm::Transformed))
+        .or_else(|_| LowCmd::parse(datagram, CrcForm::Sealed))
         .map_err(|rejection| refused(rejection.to_string()))?;
     let limp = (0..JOINTS).map(|joint| command.motor(joint)).find(|m| m.mode != MODE_SERVO || m.kd < LEAST_DAMPING);
     limp.map_or(Ok(()), |m| Err(refused(format!("kd {} N m s/rad does not damp; at least {LEAST_DAMPING}", m.kd))))
@@ -314,37 +314,37 @@ mod tests {
         let (mut heartbeat, mut guard) = heartbeat();
         let answer = |guard: &mut UnixStream| guard.write_all(&[ANSWER]).unwrap();
         for _ in 0..1000 {
-            assert_eq!(heartbeat.tick(true), 0, "a guard that starts needs its time");
+            assert_eq!(heartbeat.count_tick(true), 0, "a guard that starts needs its time");
         }
         for _ in 0..1000 {
             answer(&mut guard);
-            assert!(heartbeat.tick(true) < allowed_ms);
+            assert!(heartbeat.count_tick(true) < allowed_ms);
         }
         let mut ticks = 0;
-        while heartbeat.tick(true) <= allowed_ms {
+        while heartbeat.count_tick(true) <= allowed_ms {
             ticks += 1;
         }
         assert!((60..100).contains(&ticks), "noticed after {ticks} ticks");
         answer(&mut guard);
         for _ in 0..HEARTBEAT_TICKS {
-            heartbeat.tick(true);
+            heartbeat.count_tick(true);
         }
-        assert_eq!(heartbeat.tick(true), 0, "it answers again");
+        assert_eq!(heartbeat.count_tick(true), 0, "it answers again");
         drop(guard);
         for _ in 0..HEARTBEAT_TICKS {
-            heartbeat.tick(true);
+            heartbeat.count_tick(true);
         }
-        assert_eq!(heartbeat.tick(true), u32::MAX, "it is gone");
+        assert_eq!(heartbeat.count_tick(true), u32::MAX, "it is gone");
     }
 
     #[test]
     fn a_guard_that_never_answers_is_silent_after_the_time_to_start() {
         let (mut heartbeat, _guard) = heartbeat();
-        let ticks = (0..20_000).position(|_| heartbeat.tick(false) > 0).unwrap() as u32;
+        let ticks = (0..20_000).position(|_| heartbeat.count_tick(false) > 0).unwrap() as u32;
         assert!(ticks.abs_diff(LONGEST_START_MS) < 20, "{ticks}");
         // It stays silent, not gone: a stopped process may continue.
         for _ in 0..20_000 {
-            assert_ne!(heartbeat.tick(false), u32::MAX);
+            assert_ne!(heartbeat.count_tick(false), u32::MAX);
         }
     }
 

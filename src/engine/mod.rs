@@ -24,7 +24,7 @@ use std::thread::JoinHandle;
 use self::folder::LockedFolder;
 use self::guard::Guard;
 use crate::optimize::journal::Durability;
-use crate::realtime::channel::{ConsoleEnd, Heartbeat, Lowering, StopLatch, channels};
+use crate::realtime::channel::{ConsolePorts, Heartbeat, Lowering, StopLatch, channels};
 use crate::realtime::clock::{Clock, MonotonicClock};
 use crate::realtime::sleep_lock::{ALLOW_INHIBITOR, INHIBITOR, SleepLock};
 use crate::realtime::system::descriptors;
@@ -190,7 +190,7 @@ fn require_descriptors() -> Result<(), EngineError> {
 
 /// Access of a console to a running engine. Dropping it ends the engine as `shutdown` does.
 pub struct EngineHandle {
-    console: ConsoleEnd,
+    console: ConsolePorts,
     observe: bool,
     storage: StorageWatch,
     recording: Option<PathBuf>,

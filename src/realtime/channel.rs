@@ -107,7 +107,7 @@ impl Heartbeat {
 }
 
 /// The control thread's ends.
-pub struct ControlEnd {
+pub struct ControlPorts {
     /// Commands of the session.
     pub commands: rtrb::Consumer<Command>,
     /// STOP.
@@ -131,7 +131,7 @@ pub struct ControlEnd {
 }
 
 /// The session's ends.
-pub struct SessionEnd {
+pub struct SessionPorts {
     /// Commands to the control thread.
     pub commands: rtrb::Producer<Command>,
     /// STOP, to detect one that came after an operator's request.
@@ -149,7 +149,7 @@ pub struct SessionEnd {
 }
 
 /// The console's ends.
-pub struct ConsoleEnd {
+pub struct ConsolePorts {
     /// STOP.
     pub stop: StopLatch,
     /// Sit down and cancel.
@@ -163,7 +163,7 @@ pub struct ConsoleEnd {
 }
 
 /// Creates all channels of one engine; the last is the recorder's end.
-pub fn channels() -> (ControlEnd, SessionEnd, ConsoleEnd, rtrb::Consumer<Tick>) {
+pub fn channels() -> (ControlPorts, SessionPorts, ConsolePorts, rtrb::Consumer<Tick>) {
     let (command_in, command_out) = rtrb::RingBuffer::new(COMMANDS);
     let (tick_in, tick_out) = rtrb::RingBuffer::new(TICKS);
     let (shown_in, shown_out) = rtrb::RingBuffer::new(SHOWN_TICKS);
@@ -172,7 +172,7 @@ pub fn channels() -> (ControlEnd, SessionEnd, ConsoleEnd, rtrb::Consumer<Tick>) 
     let (counters_in, counters_out) = triple_buffer::triple_buffer(&Counters::default());
     let (readiness_in, readiness_out) = triple_buffer::triple_buffer(&Readiness::default());
     let (stop, lowering, heartbeat) = (StopLatch::default(), LoweringLatch::default(), Heartbeat::default());
-    let control = ControlEnd {
+    let control = ControlPorts {
         commands: command_out,
         stop: stop.clone(),
         lowering: lowering.clone(),
@@ -184,7 +184,7 @@ pub fn channels() -> (ControlEnd, SessionEnd, ConsoleEnd, rtrb::Consumer<Tick>) 
         readiness: readiness_in,
         events: event_in,
     };
-    let session = SessionEnd {
+    let session = SessionPorts {
         commands: command_in,
         stop: stop.clone(),
         lowering: lowering.clone(),
@@ -193,6 +193,6 @@ pub fn channels() -> (ControlEnd, SessionEnd, ConsoleEnd, rtrb::Consumer<Tick>) 
         readiness: readiness_out,
         events: event_out,
     };
-    let console = ConsoleEnd { stop, lowering, heartbeat, shown: shown_out, snapshot: snapshot_out };
+    let console = ConsolePorts { stop, lowering, heartbeat, shown: shown_out, snapshot: snapshot_out };
     (control, session, console, tick_out)
 }

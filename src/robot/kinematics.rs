@@ -100,7 +100,7 @@ impl LegGeometry {
     pub fn stance(&self, foot_leg: &Vector3<f64>, otherwise: &Joints) -> Joints {
         let mut joints = *otherwise;
         for leg in Leg::ALL {
-            if let Ok(q) = self.inverse(&leg.mirrored(foot_leg), leg.side()) {
+            if let Ok(q) = self.inverse(&leg.mirrored(foot_leg), leg.left_sign()) {
                 joints[3 * leg as usize..][..3].copy_from_slice(q.as_slice());
             }
         }

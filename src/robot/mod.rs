@@ -57,7 +57,7 @@ impl Leg {
     }
 
     /// +1 for a left leg, -1 for a right one: the sign s in `docs/method.md`.
-    pub const fn side(self) -> f64 {
+    pub const fn left_sign(self) -> f64 {
         match self {
             Leg::FL | Leg::RL => 1.0,
             Leg::FR | Leg::RR => -1.0,
@@ -66,11 +66,11 @@ impl Leg {
 
     /// Returns a point of a left leg's frame as that of this leg: y is mirrored for a right leg.
     pub fn mirrored(self, point_leg: &Vector3<f64>) -> Vector3<f64> {
-        Vector3::new(point_leg.x, self.side() * point_leg.y, point_leg.z)
+        Vector3::new(point_leg.x, self.left_sign() * point_leg.y, point_leg.z)
     }
 
     /// +1 for a front leg, -1 for a rear one.
-    pub const fn end(self) -> f64 {
+    pub const fn front_sign(self) -> f64 {
         match self {
             Leg::FR | Leg::FL => 1.0,
             Leg::RR | Leg::RL => -1.0,

@@ -115,7 +115,7 @@ impl SimulatorBench {
             BenchScene::Lying => folded,
             // Hips inwards until their cylinders touch, feet folded behind.
             BenchScene::Sprawling => std::array::from_fn(|i| match i % 3 {
-                0 => -0.113 * Leg::ALL[i / 3].side(),
+                0 => -0.113 * Leg::ALL[i / 3].left_sign(),
                 1 => 2.6,
                 _ => -2.75,
             }),

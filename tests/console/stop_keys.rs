@@ -15,7 +15,7 @@ use quadfrog::realtime::channel::StopLatch;
 use quadfrog::recording::player::Player;
 use quadfrog::recording::record::Record;
 use quadfrog::telemetry::Mode;
-use quadfrog_console::input::{CountedInput, Input, KeyReader, SpaceTypes, read_terminal};
+use quadfrog_console::input::{KeyReader, NumberedEvent, SpaceBarIsText, TerminalEvent, read_terminal};
 
 /// The STOP keys as terminals send them: plain, with Alt, Ctrl and Shift, in xterm's, rxvt's and kitty's encodings.
 const STOPS: [&[u8]; 18] = [
@@ -99,10 +99,10 @@ impl Random {
 }
 
 fn reader(stop: &StopLatch) -> KeyReader {
-    KeyReader::new(false, Some(stop.clone()), SpaceTypes::default())
+    KeyReader::new(false, Some(stop.clone()), SpaceBarIsText::default())
 }
 
-fn drop_input(_: CountedInput) {}
+fn drop_input(_: NumberedEvent) {}
 
 #[test]
 fn no_stop_is_lost_in_any_stream_at_any_split() {
@@ -144,9 +144,13 @@ fn a_stop_key_ends_an_unfinished_sequence_or_paste_and_the_next_keys_work() {
             let stop = StopLatch::default();
             let mut reader = reader(&stop);
             let mut inputs = Vec::new();
-            reader.take(&[before, key, b"q"].concat(), |counted| inputs.push(counted.input));
+            reader.take(&[before, key, b"q"].concat(), |counted| inputs.push(counted.event));
             assert!(stop.is_set(), "{before:?} {key:?}");
-            assert_eq!(inputs.last(), Some(&Input::Key("q".parse().unwrap())), "{before:?} {key:?}: {inputs:?}");
+            assert_eq!(
+                inputs.last(),
+                Some(&TerminalEvent::Key("q".parse().unwrap())),
+                "{before:?} {key:?}: {inputs:?}"
+            );
         }
     }
 }
@@ -190,31 +194,35 @@ fn keys_clicks_and_pastes_are_decoded_as_terminals_send_them() {
         ("🐸", "🐸"),
     ] {
         let mut inputs = Vec::new();
-        KeyReader::new(false, None, SpaceTypes::default()).take(bytes.as_bytes(), |counted| inputs.push(counted.input));
-        assert_eq!(inputs, [Input::Key(name.parse().expect(name))], "{bytes:?}");
+        KeyReader::new(false, None, SpaceBarIsText::default())
+            .take(bytes.as_bytes(), |counted| inputs.push(counted.event));
+        assert_eq!(inputs, [TerminalEvent::Key(name.parse().expect(name))], "{bytes:?}");
     }
     let decoded = |bytes: &[u8]| {
         let mut inputs = Vec::new();
-        KeyReader::new(true, None, SpaceTypes::default()).take(bytes, |counted| inputs.push(counted.input));
+        KeyReader::new(true, None, SpaceBarIsText::default()).take(bytes, |counted| inputs.push(counted.event));
         inputs
     };
-    assert_eq!(decoded(b"\x1b[<0;3;4M"), [Input::Mouse(Click { column: 2, row: 3 })]);
-    assert_eq!(decoded(b"\x1b[<64;1;1M\x1b[<65;1;1M"), [Input::Mouse(WheelUp), Input::Mouse(WheelDown)]);
+    assert_eq!(decoded(b"\x1b[<0;3;4M"), [TerminalEvent::Mouse(Click { column: 2, row: 3 })]);
+    assert_eq!(
+        decoded(b"\x1b[<64;1;1M\x1b[<65;1;1M"),
+        [TerminalEvent::Mouse(WheelUp), TerminalEvent::Mouse(WheelDown)]
+    );
     assert_eq!(decoded(b"\x1b[<0;3;4m\x1b[<35;3;4M\x1b[I\x1b[?1;2c"), [], "a release, a move, focus, an answer");
-    assert_eq!(decoded(b"\x1b[200~g g\x1b[A\r\x1b[201~"), [Input::Paste("g g\x1b[A\r".into())]);
+    assert_eq!(decoded(b"\x1b[200~g g\x1b[A\r\x1b[201~"), [TerminalEvent::Paste("g g\x1b[A\r".into())]);
     let mut inputs = Vec::new();
-    let mut lone = KeyReader::new(false, None, SpaceTypes::default());
-    lone.take(b"\x1b", |counted| inputs.push(counted.input));
+    let mut lone = KeyReader::new(false, None, SpaceBarIsText::default());
+    lone.take(b"\x1b", |counted| inputs.push(counted.event));
     assert_eq!(inputs, []);
-    lone.idle(|counted| inputs.push(counted.input));
-    assert_eq!(inputs, [Input::Key("Esc".parse().unwrap())]);
+    lone.idle(|counted| inputs.push(counted.event));
+    assert_eq!(inputs, [TerminalEvent::Key("Esc".parse().unwrap())]);
 }
 
 /// In a text field `Space` types, and every other STOP key stops. After a key that may have closed the field, `Space` is
 /// STOP until the event loop has reported the field again.
 #[test]
 fn space_types_only_in_the_text_field_that_the_screen_has_reported() {
-    let (stop, types) = (StopLatch::default(), SpaceTypes::default());
+    let (stop, types) = (StopLatch::default(), SpaceBarIsText::default());
     let mut reader = KeyReader::new(false, Some(stop.clone()), types.clone());
     let mut keys = 0;
     let mut press = |bytes: &[u8]| reader.take(bytes, |counted| keys = counted.keys);
@@ -238,7 +246,7 @@ fn space_types_only_in_the_text_field_that_the_screen_has_reported() {
 }
 
 /// A terminal whose inputs nobody takes: a blocked screen.
-fn blocked() -> (OwnedFd, std::fs::File, StopLatch, Receiver<CountedInput>) {
+fn blocked() -> (OwnedFd, std::fs::File, StopLatch, Receiver<NumberedEvent>) {
     let (read, write) = nix::unistd::pipe().unwrap();
     (read, std::fs::File::from(write), StopLatch::default(), channel().1)
 }

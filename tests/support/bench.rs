@@ -5,7 +5,7 @@ use quadfrog::config::Config;
 use quadfrog::control::control_loop::ControlLoop;
 use quadfrog::control::cycle::{Cycle, TickInputs};
 use quadfrog::control::settings::ControlSettings;
-use quadfrog::realtime::channel::{ConsoleEnd, SessionEnd, channels};
+use quadfrog::realtime::channel::{ConsolePorts, SessionPorts, channels};
 use quadfrog::realtime::clock::{MonotonicClock, SimulatedClock};
 use quadfrog::realtime::thread::TickStart;
 use quadfrog::robot::description::RobotDescription;
@@ -230,8 +230,8 @@ impl<R: Robot> Bench<R> {
 pub struct LoopBench<R> {
     pub config: Config,
     pub body: ControlLoop,
-    pub session: SessionEnd,
-    pub screen: ConsoleEnd,
+    pub session: SessionPorts,
+    pub screen: ConsolePorts,
     pub recorder: rtrb::Consumer<Tick>,
     pub robot: R,
     clock: MonotonicClock,

@@ -20,7 +20,7 @@ use crate::action::Action;
 use crate::connection::{ConnectionMonitor, TerminalLocation};
 
 use crate::feed::Feed;
-use crate::input::{CountedInput, Input, KeyReader, SpaceTypes, read_terminal};
+use crate::input::{KeyReader, NumberedEvent, SpaceBarIsText, TerminalEvent, read_terminal};
 use crate::message::{Effect, Msg};
 use crate::model::Model;
 use crate::settings::{ChartMode, ConsoleSettings};
@@ -86,8 +86,8 @@ pub enum ConsoleExit {
     HungUp,
 }
 
-/// Input from the terminal; none when it hung up.
-type TerminalInput = Option<CountedInput>;
+/// Event of the terminal; none when it hung up.
+type ReadEvent = Option<NumberedEvent>;
 
 /// Opens the console on the feed and runs it until the operator or the system ends it; then ends the session of a live feed.
 ///
@@ -105,7 +105,7 @@ struct Console {
     connected: bool,
     model: Model,
     /// Report to the thread that reads the terminal, and the number of keys that were processed.
-    space_types: SpaceTypes,
+    space_bar_is_text: SpaceBarIsText,
     keys: u64,
     screen: TerminalScreen,
     started: Instant,
@@ -141,7 +141,7 @@ impl Console {
             connection,
             connected: true,
             model,
-            space_types: SpaceTypes::default(),
+            space_bar_is_text: SpaceBarIsText::default(),
             keys: 0,
             screen,
             started: now,
@@ -156,7 +156,7 @@ impl Console {
     async fn run(mut self) -> color_eyre::Result<ConsoleExit> {
         let (input, mut inputs) = unbounded_channel();
         let stop = self.feed.handle().map(EngineHandle::stop_latch);
-        read_input(input.clone(), KeyReader::new(stop.is_none(), stop, self.space_types.clone()))?;
+        read_input(input.clone(), KeyReader::new(stop.is_none(), stop, self.space_bar_is_text.clone()))?;
         terminal::watch_for_hang_up(move || drop(input.send(None))).wrap_err("hang-up watcher")?;
         let mut interrupted = signal(SignalKind::interrupt())?;
         let mut terminated = signal(SignalKind::terminate())?;
@@ -206,16 +206,16 @@ impl Console {
     }
 
     /// Processes an input and all that are queued behind it.
-    fn process_input(&mut self, input: TerminalInput, inputs: &mut UnboundedReceiver<TerminalInput>) {
+    fn process_input(&mut self, input: ReadEvent, inputs: &mut UnboundedReceiver<ReadEvent>) {
         let mut next = Some(input);
         while let Some(input) = next {
             match input {
-                Some(CountedInput { input, keys }) => {
+                Some(NumberedEvent { event, keys }) => {
                     self.keys = keys;
-                    self.update_with([match input {
-                        Input::Key(key) => Msg::Key(key),
-                        Input::Paste(text) => Msg::Paste(text),
-                        Input::Mouse(event) => Msg::Mouse(event),
+                    self.update_with([match event {
+                        TerminalEvent::Key(key) => Msg::Key(key),
+                        TerminalEvent::Paste(text) => Msg::Paste(text),
+                        TerminalEvent::Mouse(event) => Msg::Mouse(event),
                     }]);
                 }
                 None => self.hang_up(),
@@ -240,7 +240,7 @@ impl Console {
             for effect in update(&mut self.model, message) {
                 self.perform_effect(effect);
             }
-            self.space_types.report(self.keys, self.model.space_types());
+            self.space_bar_is_text.report(self.keys, self.model.space_bar_is_text());
         }
     }
 
@@ -337,7 +337,7 @@ impl Console {
     }
 
     /// Ends the session. Sitting down takes seconds: the screen stays, and STOP keeps working.
-    fn end_session(mut self, inputs: &mut UnboundedReceiver<TerminalInput>) -> color_eyre::Result<ConsoleExit> {
+    fn end_session(mut self, inputs: &mut UnboundedReceiver<ReadEvent>) -> color_eyre::Result<ConsoleExit> {
         let ended = self.ended.unwrap_or(ConsoleExit::Quit);
         // The operator is present after a quit key, but not after a hang-up or SIGTERM.
         let heartbeat = self.feed.handle().map(EngineHandle::heartbeat).filter(|_| ended == ConsoleExit::Quit);
@@ -347,7 +347,7 @@ impl Console {
         }
         self.redraw = true;
         self.draw_if_due()?;
-        self.space_types.report(self.keys, false);
+        self.space_bar_is_text.report(self.keys, false);
         let (feed, connection) = (self.feed, self.connection);
         let closing = std::thread::Builder::new().name("close".into()).spawn(move || feed.shutdown())?;
         while !closing.is_finished() {
@@ -357,7 +357,7 @@ impl Console {
                 heartbeat.beat();
             }
             while let Ok(input) = inputs.try_recv() {
-                if let (Some(CountedInput { input: Input::Key(key), .. }), Some(stop)) = (input, &stop)
+                if let (Some(NumberedEvent { event: TerminalEvent::Key(key), .. }), Some(stop)) = (input, &stop)
                     && key.stops()
                 {
                     stop.set();
@@ -373,7 +373,7 @@ impl Console {
 }
 
 /// Reads the terminal in a thread, which sets the STOP latch by itself, even if the loop hangs.
-fn read_input(inputs: UnboundedSender<TerminalInput>, reader: KeyReader) -> io::Result<()> {
+fn read_input(inputs: UnboundedSender<ReadEvent>, reader: KeyReader) -> io::Result<()> {
     let terminal = io::stdin().as_fd().try_clone_to_owned()?;
     let read = move || {
         // Either way the terminal cannot be read any more.

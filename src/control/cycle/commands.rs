@@ -48,7 +48,7 @@ impl Cycle {
                     self.events.push(Event::Refused { command: *command, mode: self.mode, because });
                     return;
                 }
-                self.jump = Some(RunningTrial::begin(spec, &self.settings));
+                self.trial = Some(RunningTrial::begin(spec, &self.settings));
                 self.trial_ticks = 0;
             }
             Command::Arm(_) => {

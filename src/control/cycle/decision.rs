@@ -13,17 +13,17 @@ use nalgebra::Vector3;
 impl Cycle {
     /// Returns the motor command of this mode, after the changes of mode that need no command.
     pub(super) fn decide(&mut self) -> JointCommand {
-        self.follow_jump();
+        self.follow_trial();
         self.follow_ramp();
-        self.motor_command()
+        self.joint_command()
     }
 
     /// Changes the mode as the jump progresses.
-    fn follow_jump(&mut self) {
+    fn follow_trial(&mut self) {
         if self.holds_stance() {
             return;
         }
-        if let Some(jump) = &mut self.jump {
+        if let Some(jump) = &mut self.trial {
             let progress = match jump.update(&self.tick.state, &self.tick.estimate, &self.settings) {
                 // After a fault the landing ends when the robot stands; rest is not required.
                 TrialProgress::Settle if self.landing.is_some() && jump.landed_s() >= self.settings.failsafe.land_s => {
@@ -53,7 +53,7 @@ impl Cycle {
 
     /// Begins the impulse of a robot that is ready for it; otherwise cancels the countdown.
     fn begin_impulse(&mut self) {
-        let Some(jump) = &self.jump else { return };
+        let Some(jump) = &self.trial else { return };
         let pose_rad = self.pose_of(&jump.spec().gains, &jump.spec().stance_leg);
         match self.inhibit().or_else(|| self.unready(&pose_rad)) {
             None => self.trigger(Trigger::CountdownOver, TransitionCause::StepFinished),
@@ -84,22 +84,22 @@ impl Cycle {
         }
     }
 
-    fn motor_command(&mut self) -> JointCommand {
+    fn joint_command(&mut self) -> JointCommand {
         self.tick.torque_demanded = Joints::default();
         if let Some(hold) = self.fault_landing.as_mut().and_then(|landing| landing.hold.as_mut()) {
             return hold.command();
         }
-        match (self.mode, &mut self.ramp, &self.jump) {
+        match (self.mode, &mut self.ramp, &self.trial) {
             (Mode::StandUp | Mode::SitDown, Some(ramp), _) => ramp.command(),
             (Mode::Countdown | Mode::Jump | Mode::Settle, _, Some(jump)) => {
                 let mut target = jump.target(&self.tick.estimate);
                 target.gains = self.blended(&target.gains);
-                self.legs(&target)
+                self.leg_command(&target)
             }
             (Mode::Ready | Mode::Review, _, _) => {
                 let stand = self.settings.stand;
                 let gains = self.blended(&stand.gains);
-                self.legs(&LegTarget {
+                self.leg_command(&LegTarget {
                     gains,
                     stance_leg: stand.stance_leg,
                     vmc: stand.vmc,
@@ -113,7 +113,7 @@ impl Cycle {
         }
     }
 
-    fn legs(&mut self, target: &LegTarget) -> JointCommand {
+    fn leg_command(&mut self, target: &LegTarget) -> JointCommand {
         let (state, estimate) = (&self.tick.state, &self.tick.estimate);
         let torques = leg::torques(target, &self.feet, &state.joint_velocity_rad_s, estimate);
         self.tick.torque_demanded = torques;

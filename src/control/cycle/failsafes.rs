@@ -53,8 +53,8 @@ impl Cycle {
             }
             Some(Trip { action: FailsafeAction::LandThenDamp, fault }) => self.land_then_damp(fault, false),
             Some(Trip { action: FailsafeAction::HoldThenDamp, fault }) => self.land_then_damp(fault, true),
-            Some(trip) => self.land(trip.fault),
-            None if self.session_left => self.land(Fault::OperatorLeft),
+            Some(trip) => self.land_and_sit_down(trip.fault),
+            None if self.session_left => self.land_and_sit_down(Fault::OperatorLeft),
             None if self.mode == Mode::Ready => self.landing = None,
             None => {}
         }
@@ -87,14 +87,14 @@ impl Cycle {
     }
 
     /// Sits down at once, or in a jump after the landing. SETTLE runs to its end, so that the trial can be measured.
-    fn land(&mut self, fault: Fault) {
+    fn land_and_sit_down(&mut self, fault: Fault) {
         match self.mode {
             Mode::StandUp | Mode::Ready | Mode::Countdown | Mode::Review => {
                 self.trigger(Trigger::SitDown, TransitionCause::Fault(fault));
             }
             Mode::Jump => {
                 self.landing.get_or_insert(fault);
-                if let Some(jump) = &mut self.jump {
+                if let Some(jump) = &mut self.trial {
                     jump.land();
                 }
             }

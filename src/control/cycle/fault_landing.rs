@@ -16,7 +16,7 @@ const HOLD_RAMP_S: f64 = 0.1;
 impl Cycle {
     /// Phase of the motion.
     pub(super) fn motion_phase(&self) -> MotionPhase {
-        match (&self.jump, self.mode) {
+        match (&self.trial, self.mode) {
             (Some(jump), Mode::Jump | Mode::Settle) => {
                 let phase = jump.motion_phase(&self.tick.estimate, &self.settings);
                 let lands = self.fault_landing.is_some() && phase == MotionPhase::Ground;
@@ -34,12 +34,12 @@ impl Cycle {
     /// Begins a landing with a fault, or gives up the controller in one that is under way: `hold` is whether the motors hold the stance
     /// by themselves. The fault that came first is the one that is latched.
     pub(super) fn land_then_damp(&mut self, fault: Fault, hold: bool) {
-        let Some(jump) = &mut self.jump else { return self.damp_and_latch(fault) };
+        let Some(jump) = &mut self.trial else { return self.damp_and_latch(fault) };
         let known = self.fault_landing;
         if known.is_some_and(|landing| landing.hold.is_some() || !hold) {
             return;
         }
-        jump.cut();
+        jump.end_impulses();
         let limits = &self.settings.failsafe;
         let ramp = RampSettings {
             duration_s: HOLD_RAMP_S,
@@ -65,7 +65,7 @@ impl Cycle {
         landing.ticks += 1;
         self.warning = Some((FailsafeWarning::Landing(landing.fault), WARNING_TICKS));
         let limits = &self.settings.failsafe;
-        let landed_s = self.jump.map_or(f64::INFINITY, |jump| jump.landed_s());
+        let landed_s = self.trial.map_or(f64::INFINITY, |jump| jump.landed_s());
         let over = match landing.hold {
             Some(_) => landing.ticks > ticks_in(limits.hold_s),
             None => landed_s >= limits.land_s || landing.ticks > ticks_in(2.0 * limits.land_s),

@@ -97,7 +97,7 @@ pub struct Cycle {
     findings: ArmingFindings,
     gate: CommandGate,
     ramp: Option<PoseRamp>,
-    jump: Option<RunningTrial>,
+    trial: Option<RunningTrial>,
     /// Ticks of the running trial so far.
     trial_ticks: u64,
     /// Fall detection in REVIEW.
@@ -141,7 +141,7 @@ impl Cycle {
             findings: ArmingFindings::default(),
             gate: CommandGate::default(),
             ramp: None,
-            jump: None,
+            trial: None,
             trial_ticks: 0,
             fall: FallWatch::default(),
             ended: None,
@@ -250,7 +250,7 @@ impl Cycle {
 
         self.complete_tick(sent, limited);
         self.stamp(inputs.lateness_ns, [started_ns, read_ns, decided_ns, written_ns]);
-        if let Some(jump) = &mut self.jump {
+        if let Some(jump) = &mut self.trial {
             jump.advance();
         }
         &self.tick
@@ -388,7 +388,7 @@ impl Cycle {
 
     /// Ends the running trial, if any.
     fn finish_trial(&mut self, end: TrialEnd) {
-        if let Some(jump) = self.jump.take() {
+        if let Some(jump) = self.trial.take() {
             let ticks = self.trial_ticks + 1;
             self.events.push(Event::TrialEnded { trial: jump.spec().trial, ticks, end });
             self.ended = Some(jump);
@@ -402,7 +402,7 @@ impl Cycle {
         tick.mode = self.mode;
         tick.command = sent;
         tick.limited = limited;
-        match self.jump.or(self.ended.take()) {
+        match self.trial.or(self.ended.take()) {
             Some(jump) => {
                 self.trial_ticks += 1;
                 tick.phase = jump.phase();

@@ -140,7 +140,7 @@ impl RobotFiles {
         let mut lying_position = Joints::default();
         let mut rotor_inertia = Joints::default();
         for i in 0..JOINTS {
-            let mirror = if i % 3 == 0 { Leg::ALL[i / 3].side() } else { 1.0 };
+            let mirror = if i % 3 == 0 { Leg::ALL[i / 3].left_sign() } else { 1.0 };
             lying_position[i] = mirror * robot.pose.lying_rad[i % 3];
             rotor_inertia[i] = inertia * robot.motor.gear_ratio[i % 3].powi(2);
             let (lowest, highest) = (parts.limits.min_position[i], parts.limits.max_position[i]);

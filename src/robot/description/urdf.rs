@@ -90,7 +90,9 @@ impl<'a> UrdfDocument<'a> {
         };
         for &(joint, origin) in &trunk.joints {
             let hip = origin.translation.vector;
-            let Some(leg) = Leg::ALL.into_iter().find(|leg| leg.end() * hip.x > 0.0 && leg.side() * hip.y > 0.0) else {
+            let Some(leg) =
+                Leg::ALL.into_iter().find(|leg| leg.front_sign() * hip.x > 0.0 && leg.left_sign() * hip.y > 0.0)
+            else {
                 let problem = format!("its origin ({}, {}) m is on an axis of the trunk", hip.x, hip.y);
                 return self.invalid(&joint.name, problem, "put the trunk's origin between the four hips");
             };
@@ -200,7 +202,7 @@ impl<'a> UrdfDocument<'a> {
         };
         for (leg, found) in Leg::ALL.into_iter().zip(legs) {
             let expected = [
-                (leg.side() * Vector3::y() * geometry.abduction, found.joint_origin[1], "thigh joint"),
+                (leg.left_sign() * Vector3::y() * geometry.abduction, found.joint_origin[1], "thigh joint"),
                 (-Vector3::z() * geometry.thigh, found.joint_origin[2], "calf joint"),
                 (-Vector3::z() * geometry.calf, found.foot_origin, "foot"),
             ];

@@ -32,13 +32,13 @@ const QUATERNION_TOLERANCE: f32 = 0.1;
 pub fn low_cmd(command: &JointCommand, form: CrcForm) -> Result<LowCmd, CommandError> {
     let mut datagram = LowCmd::without_crc();
     for (motor, command) in command.motor.iter().enumerate() {
-        datagram.set(motor, &target(motor, command)?)?;
+        datagram.set(motor, &encode_motor(motor, command)?)?;
     }
     datagram.write_crc(form);
     Ok(datagram)
 }
 
-fn target(motor: usize, command: &MotorCommand) -> Result<MotorTarget, CommandError> {
+fn encode_motor(motor: usize, command: &MotorCommand) -> Result<MotorTarget, CommandError> {
     let finite = |quantity, value: f64| {
         let value = value as f32;
         if value.is_finite() { Ok(value) } else { Err(CommandError::NotFinite { quantity, motor, value }) }
@@ -55,7 +55,7 @@ fn target(motor: usize, command: &MotorCommand) -> Result<MotorTarget, CommandEr
 }
 
 /// Decodes a motor's target, for the emulator; none outside of servo mode.
-pub fn motor_command(target: &MotorTarget) -> Option<MotorCommand> {
+pub fn decode_motor(target: &MotorTarget) -> Option<MotorCommand> {
     if target.mode != MODE_SERVO {
         return None;
     }
@@ -72,7 +72,7 @@ pub fn motor_command(target: &MotorTarget) -> Option<MotorCommand> {
 /// Decodes a state. `foot_force_n` is the resolution of a foot sensor, N.
 ///
 /// `motor_enabled` is whether the motor reports servo mode. An orientation that is no rotation (all zero, for example)
-/// becomes NaN, so that the watchdog reports it.
+/// becomes NaN, so that the failsafe reports it.
 pub fn robot_state(state: &LowState, foot_force_n: f64) -> RobotState {
     let joints = |value: fn(&MotorRecord) -> f64| std::array::from_fn(|i| value(&state.motor[i]));
     let imu = &state.imu;

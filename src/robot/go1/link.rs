@@ -187,12 +187,12 @@ impl Link {
 
     /// Counts a valid state of the robot's time `tick` as new, lost, late, duplicate or reboot. Returns true if it is
     /// newer.
-    fn classify(&mut self, tick: u32) -> bool {
+    fn classify(&mut self, robot_time_ms: u32) -> bool {
         let Some(newest) = &self.newest else {
             self.arrived = 1;
             return true;
         };
-        let newer_by = robot_time_passed(tick, newest.robot_time_ms.get());
+        let newer_by = robot_time_passed(robot_time_ms, newest.robot_time_ms.get());
         let older_by = newer_by.unsigned_abs();
         if newer_by > 0 {
             let gap = (older_by / self.options.state_period_ms).saturating_sub(1);

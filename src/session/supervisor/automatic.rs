@@ -41,7 +41,7 @@ impl Supervisor {
         let Some(request) = step else { return };
         self.unattended.arming = request == OperatorRequest::Arm;
         let stamped = StampedRequest { request, stops, time_ns };
-        if let Some(answer) = self.answer(&stamped, Asker::Rule, time_ns) {
+        if let Some(answer) = self.execute(&stamped, Asker::Rule, time_ns) {
             self.respond(&stamped, Asker::Rule, answer, time_ns);
         }
         self.finish_jobs(time_ns);

@@ -17,7 +17,7 @@ use super::experiment::{Experiment, RequestRefusal};
 use super::operator_request::{OperatorRequest, StampedRequest};
 use super::storage::{ExperimentQueue, JobOutput};
 use crate::control::settings::ApprovalLimits;
-use crate::realtime::channel::SessionEnd;
+use crate::realtime::channel::SessionPorts;
 use crate::realtime::scheduling::{DeniedSetting, RealtimeSetting};
 use crate::recording::record::{ArmingCheckRecord, LogLevel, LogRecord, Record, SessionInfo, Stamped, Transition};
 use crate::recording::recorder::{CollectedTicks, RecorderWatch, TrialTicks};
@@ -60,7 +60,7 @@ impl RecordSinks {
 #[expect(missing_docs, reason = "the types say the rest")]
 pub struct SupervisorParts {
     pub experiment: Experiment,
-    pub control: SessionEnd,
+    pub control: SessionPorts,
     /// The ticks of each trial and of each fault, from the recorder.
     pub ticks: Receiver<CollectedTicks>,
     pub sinks: RecordSinks,
@@ -90,7 +90,7 @@ pub struct Supervisor {
     waited_since_ns: Option<u64>,
     storage_lost: bool,
     closing: bool,
-    control: SessionEnd,
+    control: SessionPorts,
     ticks: Receiver<CollectedTicks>,
     sinks: RecordSinks,
     recorder: RecorderWatch,
@@ -291,7 +291,7 @@ impl Supervisor {
             Some(Err(objection.to_owned()))
         } else {
             self.unattended.requested(request);
-            self.answer(stamped, Asker::Operator, time_ns)
+            self.execute(stamped, Asker::Operator, time_ns)
         };
         if let Some(answer) = answer {
             self.respond(stamped, Asker::Operator, answer, time_ns);

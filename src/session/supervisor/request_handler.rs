@@ -1,4 +1,4 @@
-//! Answers to the operator's requests.
+//! Execution of the operator's requests.
 
 use super::unfinished::{ApprovalState, Asker, JobPurpose};
 use super::{Supervisor, study_requests};
@@ -11,14 +11,14 @@ use crate::telemetry::{Command, Mode, Permit, TransitionCause};
 
 impl Supervisor {
     /// Carries out a request. Returns its answer, or the reason of the refusal; none if the study answers.
-    pub fn answer(&mut self, stamped: &StampedRequest, asker: Asker, time_ns: u64) -> Option<Result<String, String>> {
+    pub fn execute(&mut self, stamped: &StampedRequest, asker: Asker, time_ns: u64) -> Option<Result<String, String>> {
         match &stamped.request {
             OperatorRequest::Arm
             | OperatorRequest::Confirm(_)
             | OperatorRequest::SitDown
             | OperatorRequest::Acknowledge
             | OperatorRequest::TakeControl
-            | OperatorRequest::Cancel => Some(self.answer_about_robot(stamped, time_ns)),
+            | OperatorRequest::Cancel => Some(self.execute_on_robot(stamped, time_ns)),
             OperatorRequest::Approve { trial, revision } => {
                 self.approve(stamped, (*trial, *revision), asker, time_ns).err().map(Err)
             }
@@ -32,7 +32,7 @@ impl Supervisor {
         }
     }
 
-    fn answer_about_robot(&mut self, stamped: &StampedRequest, time_ns: u64) -> Result<String, String> {
+    fn execute_on_robot(&mut self, stamped: &StampedRequest, time_ns: u64) -> Result<String, String> {
         match &stamped.request {
             OperatorRequest::Arm => {
                 self.require_allowed(Trigger::Arm)?;

@@ -282,7 +282,7 @@ impl Emulator {
             self.status.rejected += 1;
             return;
         };
-        self.robot.motors = std::array::from_fn(|i| convert::motor_command(&command.motor(i)));
+        self.robot.motors = std::array::from_fn(|i| convert::decode_motor(&command.motor(i)));
         self.since_command_ms = 0;
         self.status.client = Some(from);
         self.status.commands += 1;

@@ -13,7 +13,7 @@ use crate::message::Mouse;
 /// One input of the terminal.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[expect(missing_docs, reason = "the names say the rest")]
-pub enum Input {
+pub enum TerminalEvent {
     Key(Key),
     Paste(String),
     Mouse(Mouse),
@@ -79,10 +79,10 @@ impl Decoder {
     }
 
     /// Takes one byte; appends the inputs that it completes.
-    pub fn take(&mut self, byte: u8, inputs: &mut Vec<Input>) {
+    pub fn take(&mut self, byte: u8, inputs: &mut Vec<TerminalEvent>) {
         if let Some(key) = self.stop_in_sequence(byte).or_else(|| self.stop_in_byte(byte)) {
             self.reset();
-            inputs.push(Input::Key(key));
+            inputs.push(TerminalEvent::Key(key));
             return;
         }
         match self.state {
@@ -90,7 +90,7 @@ impl Decoder {
             // A new sequence ends an unfinished one; two in a row are the key Esc and a sequence.
             _ if byte == 0x1b => {
                 if self.state == State::Escape {
-                    inputs.push(Input::Key(named(KeyCode::Esc)));
+                    inputs.push(TerminalEvent::Key(named(KeyCode::Esc)));
                 }
                 self.enter(State::Escape);
             }
@@ -107,12 +107,12 @@ impl Decoder {
             },
             State::Function => {
                 self.reset();
-                inputs.extend(letter(byte).map(|code| Input::Key(named(code))));
+                inputs.extend(letter(byte).map(|code| TerminalEvent::Key(named(code))));
             }
             State::LinuxFunction => {
                 self.reset();
                 if let b'A'..=b'E' = byte {
-                    inputs.push(Input::Key(named(KeyCode::F(byte - b'A' + 1))));
+                    inputs.push(TerminalEvent::Key(named(KeyCode::F(byte - b'A' + 1))));
                 }
             }
             State::OldMouse(left) if left > 1 => self.state = State::OldMouse(left - 1),
@@ -122,12 +122,12 @@ impl Decoder {
     }
 
     /// Takes in that no byte has followed for a while: a lone ESC is the key Esc.
-    pub fn idle(&mut self, inputs: &mut Vec<Input>) {
+    pub fn idle(&mut self, inputs: &mut Vec<TerminalEvent>) {
         match self.state {
-            State::Escape => inputs.push(Input::Key(named(KeyCode::Esc))),
-            State::Control if self.bytes.is_empty() => inputs.push(Input::Key(alt('['))),
-            State::Function => inputs.push(Input::Key(alt('O'))),
-            State::Paste => inputs.push(Input::Paste(String::from_utf8_lossy(&self.bytes).into_owned())),
+            State::Escape => inputs.push(TerminalEvent::Key(named(KeyCode::Esc))),
+            State::Control if self.bytes.is_empty() => inputs.push(TerminalEvent::Key(alt('['))),
+            State::Function => inputs.push(TerminalEvent::Key(alt('O'))),
+            State::Paste => inputs.push(TerminalEvent::Paste(String::from_utf8_lossy(&self.bytes).into_owned())),
             _ => {}
         }
         self.enter(State::Ground);
@@ -155,7 +155,7 @@ impl Decoder {
         self.since_escape.push(byte);
         let [0x1b, b'[', parameters @ .., end] = &self.since_escape[..] else { return None };
         match sequence(parameters, *end)? {
-            Input::Key(key) if key.stops() => {
+            TerminalEvent::Key(key) if key.stops() => {
                 self.since_escape.clear();
                 Some(key)
             }
@@ -177,7 +177,7 @@ impl Decoder {
         }
     }
 
-    fn ground(&mut self, byte: u8, inputs: &mut Vec<Input>) {
+    fn ground(&mut self, byte: u8, inputs: &mut Vec<TerminalEvent>) {
         let modifiers = if self.alt { KeyModifiers::ALT } else { KeyModifiers::NONE };
         let code = match byte {
             b'\r' => KeyCode::Enter,
@@ -186,13 +186,13 @@ impl Decoder {
             0x01..=0x1a => {
                 let letter = char::from(byte - 1 + b'a');
                 self.reset();
-                inputs.push(Input::Key(key(KeyCode::Char(letter), KeyModifiers::CONTROL | modifiers)));
+                inputs.push(TerminalEvent::Key(key(KeyCode::Char(letter), KeyModifiers::CONTROL | modifiers)));
                 return;
             }
             0x1b..=0x1f => {
                 let digit = char::from(byte - 0x1b + b'3');
                 self.reset();
-                inputs.push(Input::Key(key(KeyCode::Char(digit), KeyModifiers::CONTROL | modifiers)));
+                inputs.push(TerminalEvent::Key(key(KeyCode::Char(digit), KeyModifiers::CONTROL | modifiers)));
                 return;
             }
             0xc2..=0xf4 => {
@@ -205,10 +205,10 @@ impl Decoder {
             _ => KeyCode::Char(char::from(byte)),
         };
         self.reset();
-        inputs.push(Input::Key(key(code, modifiers)));
+        inputs.push(TerminalEvent::Key(key(code, modifiers)));
     }
 
-    fn character(&mut self, byte: u8, inputs: &mut Vec<Input>) {
+    fn character(&mut self, byte: u8, inputs: &mut Vec<TerminalEvent>) {
         if !(0x80..0xc0).contains(&byte) {
             // The character is incomplete: it is dropped, the byte is not.
             self.reset();
@@ -226,10 +226,10 @@ impl Decoder {
         let modifiers = if self.alt { KeyModifiers::ALT } else { KeyModifiers::NONE };
         let typed = std::str::from_utf8(&self.bytes).ok().and_then(|text| text.chars().next());
         self.reset();
-        inputs.extend(typed.map(|c| Input::Key(key(KeyCode::Char(c), modifiers))));
+        inputs.extend(typed.map(|c| TerminalEvent::Key(key(KeyCode::Char(c), modifiers))));
     }
 
-    fn control(&mut self, byte: u8, inputs: &mut Vec<Input>) {
+    fn control(&mut self, byte: u8, inputs: &mut Vec<TerminalEvent>) {
         match byte {
             b'[' if self.bytes.is_empty() => self.enter(State::LinuxFunction),
             b'M' if self.bytes.is_empty() => self.enter(State::OldMouse(3)),
@@ -250,10 +250,10 @@ impl Decoder {
         }
     }
 
-    fn paste(&mut self, byte: u8, inputs: &mut Vec<Input>) {
+    fn paste(&mut self, byte: u8, inputs: &mut Vec<TerminalEvent>) {
         self.bytes.push(byte);
         if let Some(text) = self.bytes.strip_suffix(PASTE_END) {
-            inputs.push(Input::Paste(String::from_utf8_lossy(text).into_owned()));
+            inputs.push(TerminalEvent::Paste(String::from_utf8_lossy(text).into_owned()));
             self.reset();
         }
     }
@@ -321,10 +321,10 @@ fn modifiers(number: u32) -> KeyModifiers {
 }
 
 /// The input of a control sequence, by its parameters and final byte; none if it is not known, or the release of a key.
-fn sequence(parameters: &[u8], end: u8) -> Option<Input> {
+fn sequence(parameters: &[u8], end: u8) -> Option<TerminalEvent> {
     let text = std::str::from_utf8(parameters).ok()?;
     if let Some(report) = text.strip_prefix('<') {
-        return mouse(report, end).map(Input::Mouse);
+        return mouse(report, end).map(TerminalEvent::Mouse);
     }
     // Sub-parameters follow a colon: of the modifiers the kind of the event.
     let mut fields = text.split(';').map(|field| field.split(':').map(|part| part.parse::<u32>().ok()));
@@ -349,7 +349,7 @@ fn sequence(parameters: &[u8], end: u8) -> Option<Input> {
         b'R' if number.is_some_and(|number| number > 1) => return None,
         _ => (letter(end)?, held),
     };
-    Some(Input::Key(key(code, held)))
+    Some(TerminalEvent::Key(key(code, held)))
 }
 
 /// A mouse report of the form `button;column;row`. Moves, releases and other buttons are ignored.

@@ -14,7 +14,7 @@ use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use nix::unistd::read;
 use quadfrog::realtime::channel::StopLatch;
 
-pub use decoder::{Decoder, Input};
+pub use decoder::{Decoder, TerminalEvent};
 
 use crate::keymap::Key;
 
@@ -30,9 +30,9 @@ const PASTE_WAIT: Duration = Duration::from_secs(1);
 /// The report counts for the keys up to one number: once the thread has read a further key that may close the text field,
 /// `Space` is STOP until the next report.
 #[derive(Debug, Clone, Default)]
-pub struct SpaceTypes(Arc<AtomicU64>);
+pub struct SpaceBarIsText(Arc<AtomicU64>);
 
-impl SpaceTypes {
+impl SpaceBarIsText {
     /// Reports whether a text field takes spaces once `keys` keys have been processed.
     pub fn report(&self, keys: u64, types: bool) {
         self.0.store(keys << 1 | u64::from(types), Ordering::Release);
@@ -43,11 +43,11 @@ impl SpaceTypes {
     }
 }
 
-/// One input with the number of keys so far that may open or close a text field.
+/// An event with the number of keys so far that may open or close a text field.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[expect(missing_docs, reason = "the type says the rest")]
-pub struct CountedInput {
-    pub input: Input,
+pub struct NumberedEvent {
+    pub event: TerminalEvent,
     pub keys: u64,
 }
 
@@ -57,19 +57,19 @@ pub struct KeyReader {
     decoder: Decoder,
     /// None without a robot.
     stop: Option<StopLatch>,
-    space_types: SpaceTypes,
+    space_bar_is_text: SpaceBarIsText,
     keys: u64,
-    decoded: Vec<Input>,
+    decoded: Vec<TerminalEvent>,
 }
 
 impl KeyReader {
-    /// A reader whose STOP keys set `stop`, `Space` unless `space_types` says otherwise. `pastes` as in [`Decoder::new`].
-    pub fn new(pastes: bool, stop: Option<StopLatch>, space_types: SpaceTypes) -> KeyReader {
-        KeyReader { decoder: Decoder::new(pastes), stop, space_types, keys: 0, decoded: Vec::new() }
+    /// A reader whose STOP keys set `stop`, `Space` unless `space_bar_is_text` says otherwise. `pastes` as in [`Decoder::new`].
+    pub fn new(pastes: bool, stop: Option<StopLatch>, space_bar_is_text: SpaceBarIsText) -> KeyReader {
+        KeyReader { decoder: Decoder::new(pastes), stop, space_bar_is_text, keys: 0, decoded: Vec::new() }
     }
 
     /// Takes bytes of the terminal; calls `forward` with each input, after its STOP.
-    pub fn take(&mut self, bytes: &[u8], mut forward: impl FnMut(CountedInput)) {
+    pub fn take(&mut self, bytes: &[u8], mut forward: impl FnMut(NumberedEvent)) {
         for byte in bytes {
             self.decoder.take(*byte, &mut self.decoded);
             self.forward(&mut forward);
@@ -77,7 +77,7 @@ impl KeyReader {
     }
 
     /// Takes in that no byte came for [`KeyReader::wait`].
-    pub fn idle(&mut self, mut forward: impl FnMut(CountedInput)) {
+    pub fn idle(&mut self, mut forward: impl FnMut(NumberedEvent)) {
         self.decoder.idle(&mut self.decoded);
         self.forward(&mut forward);
     }
@@ -92,10 +92,10 @@ impl KeyReader {
         }
     }
 
-    fn forward(&mut self, forward: &mut impl FnMut(CountedInput)) {
+    fn forward(&mut self, forward: &mut impl FnMut(NumberedEvent)) {
         for input in self.decoded.drain(..) {
-            if let Input::Key(key) = input {
-                let types = key.is(KeyCode::Char(' ')) && self.space_types.holds(self.keys);
+            if let TerminalEvent::Key(key) = input {
+                let types = key.is(KeyCode::Char(' ')) && self.space_bar_is_text.holds(self.keys);
                 if let Some(stop) = &self.stop
                     && key.stops()
                     && !types
@@ -106,7 +106,7 @@ impl KeyReader {
                     self.keys += 1;
                 }
             }
-            forward(CountedInput { input, keys: self.keys });
+            forward(NumberedEvent { event: input, keys: self.keys });
         }
     }
 }
@@ -124,7 +124,7 @@ fn edits(key: Key) -> bool {
 pub fn read_terminal(
     terminal: &OwnedFd,
     mut reader: KeyReader,
-    mut forward: impl FnMut(CountedInput) -> bool,
+    mut forward: impl FnMut(NumberedEvent) -> bool,
 ) -> io::Result<()> {
     let mut bytes = [0; 1024];
     let mut open = true;

@@ -178,18 +178,18 @@ impl Model {
     }
 
     /// Whether Space is text: a text field is open in which a space has a meaning.
-    pub fn space_types(&self) -> bool {
-        self.dialog.as_ref().is_some_and(Dialog::takes_spaces) && !self.space_must_stop()
+    pub fn space_bar_is_text(&self) -> bool {
+        self.dialog.as_ref().is_some_and(Dialog::takes_spaces) && !self.space_bar_must_stop()
     }
 
     /// Whether Space is STOP in a text field, too.
-    pub fn space_must_stop(&self) -> bool {
+    pub fn space_bar_must_stop(&self) -> bool {
         self.space_always_stops && self.robot_is_energised()
     }
 
     /// Whether Space types although the robot is energised: the screen shows it in the colour of STOP.
-    pub fn space_is_no_stop(&self) -> bool {
-        self.robot_is_energised() && self.space_types()
+    pub fn space_bar_is_text_while_energised(&self) -> bool {
+        self.robot_is_energised() && self.space_bar_is_text()
     }
 
     /// The parameter of the selected row of view Override; none for a gain.

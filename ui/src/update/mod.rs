@@ -78,7 +78,7 @@ fn count_down(model: &mut Model) -> Vec<Effect> {
 fn press(model: &mut Model, key: Key) -> Vec<Effect> {
     let action = model.keymap.action(key);
     match action {
-        Some(Action::Stop) if key.typed().is_some() && model.space_types() => {}
+        Some(Action::Stop) if key.typed().is_some() && model.space_bar_is_text() => {}
         Some(Action::Stop) => return stop(model),
         Some(Action::Interrupt) => return interrupt(model),
         _ => {}

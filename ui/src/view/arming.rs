@@ -5,7 +5,7 @@ use quadfrog::session::operator_request::OperatorCheck;
 use quadfrog::telemetry::ArmingCheckState;
 use ratatui::text::{Line, Span};
 
-use super::draw::{cut, span};
+use super::draw::{span, truncate};
 use crate::model::session::SessionModel;
 use crate::theme::{Role, Theme};
 
@@ -46,7 +46,7 @@ pub fn lines(
             }
             ("", text) | (text, _) => text.to_owned(),
         };
-        let text = cut(&text, width.saturating_sub(6 + name.chars().count() + gap));
+        let text = truncate(&text, width.saturating_sub(6 + name.chars().count() + gap));
         Line::from(vec![
             Span::raw(if selected { ">" } else { " " }),
             span(theme, role, format!("{state:<5}")),
@@ -57,7 +57,7 @@ pub fn lines(
     };
     if items.is_empty() {
         let text = " not checked yet: the checks run while the robot is disarmed";
-        return vec![Line::from(span(theme, Role::Quiet, cut(text, width)))];
+        return vec![Line::from(span(theme, Role::Quiet, truncate(text, width)))];
     }
     items.into_iter().map(line).collect()
 }

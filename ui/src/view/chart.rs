@@ -5,7 +5,7 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
 use super::dots::DotGrid;
-use super::draw::cut;
+use super::draw::truncate;
 use super::series_style::Signal;
 use crate::model::comparison::time_after;
 use crate::model::history::{ChartSample, SignalHistory, at_trial_time};
@@ -141,7 +141,7 @@ impl Chart<'_> {
         let width = usize::from(area.width);
         let mut used = 0;
         for (text, role) in pieces {
-            let text = cut(&text, width - used);
+            let text = truncate(&text, width - used);
             buffer.set_string(area.x + used as u16, area.y, &text, theme.style(role));
             used += text.chars().count();
         }

@@ -6,7 +6,7 @@ use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 
 use super::dots::DotGrid;
-use super::draw::{cell_at, cut, heading, number};
+use super::draw::{cell_at, heading, number, truncate};
 use crate::theme::{Role, Theme};
 
 pub fn render(frame: &mut Frame, area: Rect, insight: Option<&ProposalInsight>, name: &str, theme: &Theme) {
@@ -25,7 +25,7 @@ pub fn render(frame: &mut Frame, area: Rect, insight: Option<&ProposalInsight>, 
     }
     let Some(insight) = insight.filter(|insight| insight.at.len() > 1) else {
         let text = if insight.is_some() { "sampled without a model" } else { "no proposal yet" };
-        let text = cut(text, usize::from(plot.width));
+        let text = truncate(text, usize::from(plot.width));
         frame.buffer_mut().set_string(plot.x, plot.y, text, theme.style(Role::Quiet));
         return;
     };

@@ -20,7 +20,7 @@ use ratatui::widgets::{Block, Clear, Paragraph, Wrap};
 use tui_input::Input;
 
 use super::details::details;
-use super::draw::{cut, number, scale, span};
+use super::draw::{number, scale, span, truncate};
 use super::{arming, help};
 use crate::action::Action;
 use crate::legal::palette;
@@ -100,10 +100,10 @@ fn open_box(frame: &mut Frame, area: Rect, model: &Model, title: &str, width: u1
     let set = if theme.glyphs == Glyphs::Ascii { ASCII } else { border::PLAIN };
     let (width, height) = (width.min(area.width), height.min(area.height));
     let at = Rect { x: area.x + (area.width - width) / 2, y: area.y + (area.height - height) / 2, width, height };
-    let role = if model.space_is_no_stop() { Role::Alarm } else { Role::Heading };
+    let role = if model.space_bar_is_text_while_energised() { Role::Alarm } else { Role::Heading };
     let title = span(theme, role, format!(" {title} "));
     let mut block = Block::bordered().border_set(set).border_style(theme.style(role)).title(title);
-    if model.space_is_no_stop() {
+    if model.space_bar_is_text_while_energised() {
         block = block.title_bottom(span(theme, role, " Space types here. STOP: F12 or Ctrl-C "));
     }
     let inner = block.inner(at);
@@ -294,7 +294,7 @@ fn field(model: &Model, purpose: Purpose, input: &Input, problem: Option<&str>) 
             "the best points run again until one leads; each repeat is approved like any other".to_owned()
         }
         Purpose::LogSearch => "empty: all lines".to_owned(),
-        Purpose::Note(_) if model.space_must_stop() => {
+        Purpose::Note(_) if model.space_bar_must_stop() => {
             "the robot is energised: Space is STOP, _ writes a space".to_owned()
         }
         Purpose::VoidReason { .. } => "it tripped a limit: by the rules that is a fall of its parameters".to_owned(),
@@ -321,7 +321,7 @@ fn render_palette(frame: &mut Frame, area: Rect, model: &Model, input: &Input, s
             Err(reason) => format!("({reason})"),
         };
         let role = if legal.is_ok() { Role::Text } else { Role::Quiet };
-        let text = cut(&format!("{key:<9} {name:<16}{text}"), usize::from(inner.width));
+        let text = truncate(&format!("{key:<9} {name:<16}{text}"), usize::from(inner.width));
         let style = if index == selected { theme.style(Role::Selected) } else { theme.style(role) };
         frame.render_widget(Line::from(Span::styled(text, style)), area);
     }
@@ -342,7 +342,7 @@ fn render_choice(frame: &mut Frame, area: Rect, model: &Model, subject: Choice, 
     {
         let area = Rect { y: inner.y + line as u16, height: 1, ..inner };
         let symbol = if *on { "[x]" } else { "[ ]" };
-        let text = cut(&format!("{symbol} {name:<11} {help}"), usize::from(inner.width));
+        let text = truncate(&format!("{symbol} {name:<11} {help}"), usize::from(inner.width));
         let role = match (index == selected, on) {
             (true, _) => Role::Selected,
             (false, true) => Role::Text,

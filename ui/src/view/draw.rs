@@ -49,7 +49,7 @@ pub fn clock_ms(time_ns: u64) -> String {
 }
 
 /// The text cut to a number of characters, ending in `..` where something is missing.
-pub fn cut(text: &str, width: usize) -> String {
+pub fn truncate(text: &str, width: usize) -> String {
     if text.chars().count() <= width {
         return text.to_owned();
     }

@@ -5,7 +5,7 @@ use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 
-use super::draw::{cut, heading, span};
+use super::draw::{heading, span, truncate};
 use crate::action::Action;
 use crate::model::Model;
 use crate::model::log::LogLine;
@@ -48,10 +48,10 @@ fn line_of(theme: &Theme, line: &LogLine, width: usize) -> Line<'static> {
     Line::from(vec![
         span(theme, Role::Quiet, time),
         span(theme, role, format!("{symbol} ")),
-        span(theme, Role::Quiet, format!("{:<9} ", cut(&line.source, 9))),
+        span(theme, Role::Quiet, format!("{:<9} ", truncate(&line.source, 9))),
         match line.level {
-            LogLevel::Info => Span::raw(cut(&line.text, width.saturating_sub(23))),
-            _ => span(theme, role, cut(&line.text, width.saturating_sub(23))),
+            LogLevel::Info => Span::raw(truncate(&line.text, width.saturating_sub(23))),
+            _ => span(theme, role, truncate(&line.text, width.saturating_sub(23))),
         },
     ])
 }

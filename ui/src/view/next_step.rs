@@ -172,7 +172,7 @@ fn in_dialog(model: &Model, dialog: &Dialog) -> NextStep {
         Dialog::Override(_) => "Enter takes the value and applies. Esc drops it.".to_owned(),
         Dialog::TakeControl => "Press y to take control. Any other key cancels.".to_owned(),
         Dialog::Quit => "Press y to quit. Any other key cancels.".to_owned(),
-        Dialog::Field { purpose: Purpose::Note(_) | Purpose::VoidReason { .. }, .. } if model.space_must_stop() => {
+        Dialog::Field { purpose: Purpose::Note(_) | Purpose::VoidReason { .. }, .. } if model.space_bar_must_stop() => {
             "Enter saves the text, Esc cancels. Energised: Space is STOP, _ writes a space.".to_owned()
         }
         Dialog::Field { .. } => "Enter confirms, Esc cancels.".to_owned(),

@@ -6,7 +6,7 @@ use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
 
-use super::draw::{cut, heading, number, scale, span};
+use super::draw::{heading, number, scale, span, truncate};
 use crate::action::Action;
 use crate::legal::legal;
 use crate::model::Model;
@@ -116,7 +116,7 @@ fn actions(model: &Model, width: usize) -> Vec<Line<'static>> {
         match legal(action, model) {
             Ok(()) => Line::from(vec![span(theme, Role::Key, format!("  {key:<3}")), Span::raw(text)]),
             Err(reason) => {
-                let text = cut(&format!("  {key:<3}{text} ({reason})"), width);
+                let text = truncate(&format!("  {key:<3}{text} ({reason})"), width);
                 Line::from(span(theme, Role::Quiet, text))
             }
         }

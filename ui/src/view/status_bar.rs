@@ -9,7 +9,7 @@ use ratatui::layout::{Alignment, Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
 
-use super::draw::{clock, clock_ms, cut, number, span};
+use super::draw::{clock, clock_ms, number, span, truncate};
 use crate::action::Action;
 use crate::layout::{MIN_COLUMNS, MIN_ROWS, tabs};
 use crate::model::Model;
@@ -109,7 +109,7 @@ fn recording(model: &Model) -> Vec<Span<'static>> {
 
 /// The keys that stop now.
 fn stop_keys(model: &Model) -> String {
-    match model.space_is_no_stop() {
+    match model.space_bar_is_text_while_energised() {
         true => "F12 Ctrl-C".to_owned(),
         false => model.keymap.all_keys(Action::Stop),
     }
@@ -210,7 +210,7 @@ pub fn render_message(frame: &mut Frame, area: Rect, model: &Model) {
         LogLevel::Warning => Role::Warning,
         LogLevel::Error => Role::Bad,
     };
-    let text = cut(&message.text, usize::from(area.width).saturating_sub(1));
+    let text = truncate(&message.text, usize::from(area.width).saturating_sub(1));
     frame.render_widget(Line::from(vec![Span::raw(" "), span(&model.theme, role, text)]), area);
 }
 

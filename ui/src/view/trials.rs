@@ -7,7 +7,7 @@ use ratatui::style::Style;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
 
-use super::draw::{clock, cut, heading, number, sign, span};
+use super::draw::{clock, heading, number, sign, span, truncate};
 use crate::action::Action;
 use crate::column::Column;
 use crate::layout::first_row;
@@ -102,7 +102,7 @@ pub fn render_table(frame: &mut Frame, area: Rect, model: &Model, full: bool) {
     let columns = shown_columns(model, width);
     let titles: Vec<String> = columns.iter().map(|column| padded(&column.title, column.width)).collect();
     let title = format!("{:>4} {}", "#", titles.join(" "));
-    frame.render_widget(Line::from(span(theme, Role::Heading, cut(&title, width))), Rect { height: 1, ..area });
+    frame.render_widget(Line::from(span(theme, Role::Heading, truncate(&title, width))), Rect { height: 1, ..area });
     let rows: Vec<&TrialRecord> =
         if full { model.trial_rows() } else { model.session.trials.records.values().collect() };
     if rows.is_empty() {
@@ -134,7 +134,7 @@ pub fn render_table(frame: &mut Frame, area: Rect, model: &Model, full: bool) {
 }
 
 fn padded(text: &str, width: usize) -> String {
-    let text = cut(text, width);
+    let text = truncate(text, width);
     // The last column takes the rest of the line and needs no filling.
     if width > 40 { text } else { format!("{text:<width$}") }
 }

@@ -20,7 +20,7 @@ const REACH: f64 = 0.45;
 fn leg_points(robot: &RobotDescription, leg: Leg, q: &Vector3<f64>) -> [Vector3<f64>; 4] {
     let geometry = &robot.leg_geometry;
     let hip = robot.legs[leg as usize].joint_origin[0];
-    let end = |thigh, calf| hip + LegGeometry { thigh, calf, ..*geometry }.foot(q, leg.side()).position_leg;
+    let end = |thigh, calf| hip + LegGeometry { thigh, calf, ..*geometry }.foot(q, leg.left_sign()).position_leg;
     [hip, end(0.0, 0.0), end(geometry.thigh, 0.0), end(geometry.thigh, geometry.calf)]
 }
 

@@ -28,8 +28,7 @@ pub enum CrcForm {
     /// Unchanged: in every command of the official library and in low-level states.
     Plain,
     /// Xored and rotated: in states of the high-level protocol, and in commands of the robot's factory controller.
-    #[serde(rename = "sealed")]
-    Transformed,
+    Sealed,
 }
 
 impl CrcForm {
@@ -37,7 +36,7 @@ impl CrcForm {
     pub const fn apply(self, crc: u32) -> u32 {
         match self {
             CrcForm::Plain => crc,
-            CrcForm::Transformed => (crc ^ 0xEDCA_B9DE).rotate_right(8),
+            CrcForm::Sealed => (crc ^ 0xEDCA_B9DE).rotate_right(8),
         }
     }
 }
@@ -52,7 +51,7 @@ mod tests {
         assert_eq!(crc(&[0; 4]), 0xC704_DD7B);
         assert_eq!(crc(&[0xFE, 0xEF, 0xFF, 0]), 0x9BF0_26DF);
         assert_eq!(crc(&[0; 608]), 0xE7CD_1C3B);
-        assert_eq!(CrcForm::Transformed.apply(crc(&[0; 608])), 0xE50A_07A5);
+        assert_eq!(CrcForm::Sealed.apply(crc(&[0; 608])), 0xE50A_07A5);
     }
 
     #[test]

@@ -23,7 +23,7 @@ pub const MOTORS: usize = 20;
 pub const HEAD: [u8; 2] = [0xFE, 0xEF];
 /// `Header::level` of the low-level protocol.
 pub const LOW_LEVEL: u8 = 0xFF;
-/// `Header::level` of the high-level protocol, whose states have another layout and the form [`CrcForm::Transformed`].
+/// `Header::level` of the high-level protocol, whose states have another layout and the form [`CrcForm::Sealed`].
 pub const HIGH_LEVEL: u8 = 0xEE;
 
 /// First 22 bytes of every datagram. The meaning of the fields after `level` is unknown.

@@ -193,7 +193,7 @@ impl LowState {
 
 /// Returns the checksum's form in a state of `level`.
 fn form_of(level: u8) -> CrcForm {
-    if level == HIGH_LEVEL { CrcForm::Transformed } else { CrcForm::Plain }
+    if level == HIGH_LEVEL { CrcForm::Sealed } else { CrcForm::Plain }
 }
 
 const _: () = assert!(size_of::<LowState>() == STATE_LENGTH && size_of::<RemoteRecord>() == 40);

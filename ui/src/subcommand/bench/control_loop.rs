@@ -12,7 +12,7 @@ use color_eyre::eyre::{WrapErr, eyre};
 use quadfrog::config::Config;
 use quadfrog::control::control_loop::ControlLoop;
 use quadfrog::control::settings::ControlSettings;
-use quadfrog::realtime::channel::{ConsoleEnd, SessionEnd, channels};
+use quadfrog::realtime::channel::{ConsolePorts, SessionPorts, channels};
 use quadfrog::realtime::clock::{Clock, MonotonicClock};
 use quadfrog::realtime::scheduling::{GrantedSettings, Scheduling};
 use quadfrog::realtime::system::isolated_cores;
@@ -246,8 +246,8 @@ fn measure(
 
 /// The other ends of the control thread's channels, kept open and empty as the engine's threads do.
 struct ChannelEnds {
-    session: SessionEnd,
-    screen: ConsoleEnd,
+    session: SessionPorts,
+    screen: ConsolePorts,
     ticks: rtrb::Consumer<Tick>,
     mode_changes: u64,
 }

@@ -21,7 +21,7 @@ pub(super) fn key(model: &mut Model, key: Key, purpose: Purpose, mut input: Inpu
         // Where Space is always STOP, a note needs another key for it.
         KeyCode::Char('_')
             if key.typed().is_some()
-                && model.space_must_stop()
+                && model.space_bar_must_stop()
                 && matches!(purpose, Purpose::Note(_) | Purpose::VoidReason { .. }) =>
         {
             input.handle(InputRequest::InsertChar(' '));
