@@ -156,10 +156,11 @@ fn the_gaussian_process_leaves_a_corner_that_trips_a_limit() {
     let options = Options { trials: Some(12), ..Options::new(config, robot, Backend::Simulator, Task::Forward) };
     let mut experiment = open_experiment(&options, Durability::Buffered, "").unwrap();
     let mut rows: Vec<TrialRecord> = Vec::new();
-    automatic::run(&mut experiment, &mut rollout, |row, _| rows.push(row.clone())).unwrap();
-    for row in &rows {
+    automatic::run(&mut experiment, &mut rollout, |row, _| {
         println!("{:3} {:?} {:?} {:?} {}", row.trial, row.parameters, row.verdict, row.value, row.cause);
-    }
+        rows.push(row.clone());
+    })
+    .unwrap();
     assert_eq!(experiment.counted(), 12);
     let limits = rows.iter().filter(|row| row.cause.starts_with("limit: ")).count();
     assert!(limits > 0 && rows.iter().all(|row| row.verdict != Some(Verdict::Void)), "{limits} limits");

@@ -506,7 +506,7 @@ fn a_wait_for_the_storage_is_shown_until_it_ends() {
 fn the_hop_envelope_is_shown_beside_the_proposal() {
     let mut console = Console::ready();
     console.record(Record::Search(SearchStatus { hop_share: Some(0.5), ..search((0.0, 150.0), None) }));
-    assert_shows(&console.screen(80, 24), &["hop envelope: 50 % of the forces"]);
+    assert_shows(&console.screen(80, 24), &["hop envelope: 50 % of force"]);
     console.record(Record::Search(search((0.0, 150.0), None)));
     assert!(!console.screen(80, 24).contains("hop envelope"));
 }

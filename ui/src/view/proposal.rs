@@ -58,7 +58,7 @@ fn content(model: &Model, width: usize) -> (String, Vec<Line<'static>>) {
             lines.extend(changed.map(|gain| parameter(session, theme, gain, width)));
             lines.push(risk(theme, proposal.risk));
             if let Some(share) = session.search.as_ref().and_then(|search| search.hop_share) {
-                let text = format!(" hop envelope: {:.0} % of the forces", 100.0 * share);
+                let text = format!(" hop envelope: {:.0} % of force", 100.0 * share);
                 lines.push(Line::from(span(theme, Role::Warning, text)));
             }
             if let Some(left) = session.confirming() {
