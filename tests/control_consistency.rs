@@ -155,6 +155,7 @@ fn jumps_without_alarm(world: World, count: u32) {
     let (mut clock_ms, mut ended, mut alarms) = (0.0_f64, [0; 2], Vec::new());
     for trial in 0..count {
         let spec = random_jump(&bench.config, &mut random, trial);
+        bench.settle();
         bench.events.clear();
         bench.command(Command::RunTrial(spec, bench.permit()));
         assert_eq!(bench.cycle.mode(), Mode::Countdown, "{world:?} {trial}: {:?}", bench.events);

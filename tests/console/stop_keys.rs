@@ -235,7 +235,6 @@ fn space_types_only_in_the_text_field_that_the_screen_has_reported() {
         press(key);
         assert!(stop.count() > before, "{key:?}");
     }
-    drop(press);
     types.report(keys, true);
     let mut press = |bytes: &[u8]| reader.take(bytes, |counted| keys = counted.keys);
     let before = stop.count();
