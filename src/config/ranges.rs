@@ -187,9 +187,9 @@ const SAFETY_HARDWARE: &[Row] = &[
     (&["watchdog.hold_s"], within!(0.2, 1.5, "s")),
     (&["watchdog.hold_kp"], within!(20, 100, "N m/rad")),
     (&["watchdog.hold_kd"], within!(1, 5, "N m s/rad")),
-    // A sound robot needs 0.15 rad and 0.33 of the torque.
+    // A sound robot needs 0.15 rad and 0.33 of the torque, 0.41 on blocks.
     (&["watchdog.ramp_error_rad"], within!(0.2, 0.6, "rad")),
-    (&["watchdog.ramp_torque_share"], within!(0.35, 0.8)),
+    (&["watchdog.ramp_torque_share"], within!(0.4, 0.8)),
     (&["watchdog.ramp_limit_s"], within!(0.02, 0.5, "s")),
     (&["ready.force_share_min"], within!(0.2, 1, "of the weight")),
     (&["ready.force_share_max"], within!(1, 3, "of the weight")),
