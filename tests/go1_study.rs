@@ -201,8 +201,8 @@ impl Operator {
             let here = (mode, self.stage.map(|stage| stage.stage), self.stage.map_or(0, |stage| stage.trial));
             // Once is enough, unless nothing comes of it.
             let wishes = self.wished_in != Some(here) || wished_at.elapsed() > Duration::from_secs(3);
-            if wishes && let Some(intent) = self.act(mode) {
-                self.engine.request(intent);
+            if wishes && let Some(wanted) = self.act(mode) {
+                self.engine.request(wanted);
                 wished_at = Instant::now();
                 self.wished_in = Some(here);
             }

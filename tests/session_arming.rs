@@ -516,13 +516,13 @@ proptest! {
         for (step, ticks) in steps {
             let before = session.body.mode();
             match step {
-                Step::Request(intent) => {
-                    let intent = intent();
-                    let answer = session.request(intent.clone());
-                    low_level |= answer.accepted && intent == OperatorRequest::Confirm(OperatorCheck::LowLevel);
-                    area |= answer.accepted && intent == OperatorRequest::Confirm(OperatorCheck::AreaClear);
+                Step::Request(wanted) => {
+                    let wanted = wanted();
+                    let answer = session.request(wanted.clone());
+                    low_level |= answer.accepted && wanted == OperatorRequest::Confirm(OperatorCheck::LowLevel);
+                    area |= answer.accepted && wanted == OperatorRequest::Confirm(OperatorCheck::AreaClear);
                     if !before.energised() && session.body.mode().energised() {
-                        prop_assert!(answer.accepted && intent == OperatorRequest::Arm, "{intent:?} energises");
+                        prop_assert!(answer.accepted && wanted == OperatorRequest::Arm, "{wanted:?} energises");
                         prop_assert!(before == Mode::Disarmed && low_level && area && follow, "armed without a word");
                     }
                 }

@@ -52,7 +52,7 @@ impl ControlLoop {
     /// Runs one tick.
     pub fn tick<C: Clock, R: Robot + ?Sized>(&mut self, start: TickStart, clock: &C, robot: &mut R) -> &Tick {
         let ControlLoop { cycle, end, counters, start_ns, .. } = self;
-        // A session that broke down takes no events, even into a ring with space.
+        // The ring is abandoned when the session thread has panicked, even into a ring with space.
         self.events_lost |= end.events.is_abandoned();
         // Before the queue, whose next command may be one that energises.
         let command = self.lowering.next(&end.lowering).or_else(|| end.commands.pop().ok());

@@ -8,7 +8,7 @@ use super::failsafe_causes::{
     joints_not_finite, late, link_lost, motor_hot, motor_mode, operator_silent, other_commander, reboot, remote_stop,
     robot_clock, send_error, sensors, slow, state_age, suspended, tilt,
 };
-pub use super::failsafe_inputs::{Failsafe, FailsafeInputs, MotionPhase};
+pub use super::failsafe_inputs::{FailsafeInputs, MotionPhase, PeriodWatch};
 use super::settings::ControlSettings;
 use crate::robot::{CONTROL_PERIOD_S, RobotState};
 use crate::telemetry::{FailsafeWarning, Fault, Mode, TrialInhibit};
@@ -47,7 +47,7 @@ pub struct Trip {
     pub fault: Fault,
 }
 
-type Cause = fn(&Failsafe, &FailsafeInputs, &ControlSettings) -> Option<Fault>;
+type Cause = fn(&PeriodWatch, &FailsafeInputs, &ControlSettings) -> Option<Fault>;
 
 /// One row of the table.
 struct FailsafeRow {
@@ -308,13 +308,12 @@ const fn energised_or_faulted(mode: Mode) -> bool {
     mode.energised() || matches!(mode, Mode::Fault)
 }
 
-/// Energised, without a trial and its review, where tilt is a fall: `running_trial::FallWatch` compares it with this row's limit in REVIEW,
-/// and with the limit of a fall in SETTLE, where a landing may swing.
+/// Modes in which tilt is a fault. In JUMP, SETTLE and REVIEW it is a fall (`running_trial::FallWatch`).
 const fn standing_or_ramping(mode: Mode) -> bool {
     matches!(mode, Mode::StandUp | Mode::Ready | Mode::Countdown | Mode::SitDown)
 }
 
-impl Failsafe {
+impl PeriodWatch {
     /// Returns the strictest action of the rows that trip; of equal ones the first row's.
     pub fn check(&self, inputs: &FailsafeInputs, settings: &ControlSettings) -> Option<Trip> {
         let trips = TABLE.iter().filter(|row| (row.modes)(inputs.mode)).filter_map(|row| {

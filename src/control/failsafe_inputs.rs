@@ -56,7 +56,7 @@ pub enum MotionPhase {
 
 /// Periods of the last ticks, for the row `slow`.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Failsafe {
+pub struct PeriodWatch {
     /// Start of the last tick, ns.
     began_ns: Option<u64>,
     /// Time between the last two starts, ms.
@@ -65,7 +65,7 @@ pub struct Failsafe {
     pub(super) slow: u32,
 }
 
-impl Failsafe {
+impl PeriodWatch {
     /// Measures the period; to be called once per tick, before `check`.
     pub fn begin(&mut self, time_ns: u64, lateness_ns: u64, settings: &ControlSettings) {
         let began_ns = time_ns + lateness_ns;

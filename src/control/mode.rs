@@ -9,7 +9,7 @@ pub enum Trigger {
     Connected,
     /// The operator takes control.
     TakeControl,
-    /// The operator releases the robot: it is only observed.
+    /// An observer has acknowledged its STOP: the robot is only observed again.
     Release,
     /// The operator arms the robot.
     Arm,
@@ -81,28 +81,28 @@ mod tests {
     #[test]
     fn every_pair_of_mode_and_trigger_is_in_the_table() {
         use Mode::*;
-        use Trigger as R;
+        use Trigger as T;
         type Row = (Mode, bool, Option<Mode>, &'static [(Trigger, Mode)]);
         let table: [Row; 12] = [
-            (Offline, false, None, &[(R::Connected, Observe)]),
-            (Observe, false, None, &[(R::TakeControl, Disarmed)]),
-            (Disarmed, false, Some(Fault), &[(R::Release, Observe), (R::Arm, StandUp)]),
-            (StandUp, true, Some(Fault), &[(R::PoseReached, Ready), (R::SitDown, SitDown)]),
-            (Ready, true, Some(Fault), &[(R::Approve, Countdown), (R::SitDown, SitDown)]),
-            (Countdown, true, Some(Fault), &[(R::Cancel, Ready), (R::CountdownOver, Jump), (R::SitDown, SitDown)]),
-            (Jump, true, Some(Fault), &[(R::Landed, Settle)]),
-            (Settle, true, Some(Fault), &[(R::Settled, Review)]),
-            (Review, true, Some(Fault), &[(R::EndReview, Ready), (R::SitDown, SitDown)]),
-            (SitDown, true, Some(Fault), &[(R::PoseReached, Disarmed)]),
-            (Damped, false, Some(Fault), &[(R::Acknowledge, Disarmed)]),
-            (Fault, false, Some(Fault), &[(R::Acknowledge, Disarmed)]),
+            (Offline, false, None, &[(T::Connected, Observe)]),
+            (Observe, false, None, &[(T::TakeControl, Disarmed)]),
+            (Disarmed, false, Some(Fault), &[(T::Release, Observe), (T::Arm, StandUp)]),
+            (StandUp, true, Some(Fault), &[(T::PoseReached, Ready), (T::SitDown, SitDown)]),
+            (Ready, true, Some(Fault), &[(T::Approve, Countdown), (T::SitDown, SitDown)]),
+            (Countdown, true, Some(Fault), &[(T::Cancel, Ready), (T::CountdownOver, Jump), (T::SitDown, SitDown)]),
+            (Jump, true, Some(Fault), &[(T::Landed, Settle)]),
+            (Settle, true, Some(Fault), &[(T::Settled, Review)]),
+            (Review, true, Some(Fault), &[(T::EndReview, Ready), (T::SitDown, SitDown)]),
+            (SitDown, true, Some(Fault), &[(T::PoseReached, Disarmed)]),
+            (Damped, false, Some(Fault), &[(T::Acknowledge, Disarmed)]),
+            (Fault, false, Some(Fault), &[(T::Acknowledge, Disarmed)]),
         ];
         for (mode, falls, fault, legal) in table {
             for &trigger in Trigger::VARIANTS {
                 let expected = match trigger {
-                    R::Stop => Some(if mode == Fault { Fault } else { Damped }),
-                    R::Fault => fault,
-                    R::Fell => falls.then_some(Damped),
+                    T::Stop => Some(if mode == Fault { Fault } else { Damped }),
+                    T::Fault => fault,
+                    T::Fell => falls.then_some(Damped),
                     _ => legal.iter().find(|(r, _)| *r == trigger).map(|(_, to)| *to),
                 };
                 assert_eq!(next(mode, trigger), expected, "{mode:?} {trigger:?}");

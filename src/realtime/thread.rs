@@ -55,17 +55,17 @@ impl<F: FnMut(TickStart) -> ControlFlow<()>> PeriodicTask for F {
     }
 }
 
-/// Calls `body` once per period until it breaks, each time `phase` after a whole period of the system's monotonic
+/// Calls `body` once per period until it breaks, each time `offset` after a whole period of the system's monotonic
 /// clock.
 ///
 /// # Errors
 /// When the system's monotonic clock cannot be read or waited on.
 pub fn pace(
     period: Duration,
-    phase: Duration,
+    offset: Duration,
     mut body: impl FnMut(TickStart) -> ControlFlow<()>,
 ) -> Result<(), nix::Error> {
-    pace_with_warm_up(period, phase, Duration::ZERO, &mut body)
+    pace_with_warm_up(period, offset, Duration::ZERO, &mut body)
 }
 
 /// As [`pace`], with a cache warm-up that starts `lead` before each tick, unless there is no time for it. The thread
@@ -75,13 +75,13 @@ pub fn pace(
 /// When the system's monotonic clock cannot be read or waited on.
 pub fn pace_with_warm_up(
     period: Duration,
-    phase: Duration,
+    offset: Duration,
     lead: Duration,
     body: &mut (impl PeriodicTask + ?Sized),
 ) -> Result<(), nix::Error> {
-    let [period_ns, phase_ns, lead_ns, needs_ns] =
-        [period, phase, lead, WARM_UP_TIME].map(|time| time.as_nanos() as u64);
-    let mut start_ns = monotonic_ns()?.next_multiple_of(period_ns) + phase_ns;
+    let [period_ns, offset_ns, lead_ns, needs_ns] =
+        [period, offset, lead, WARM_UP_TIME].map(|time| time.as_nanos() as u64);
+    let mut start_ns = monotonic_ns()?.next_multiple_of(period_ns) + offset_ns;
     let mut count = 0u64;
     let mut skipped_ns = 0;
     let (mut overruns, mut resting_ticks) = (0, 0);

@@ -29,10 +29,10 @@ pub struct TrialSpec {
     pub seed: u64,
 }
 
-/// Permit of one key press that energises; void after any change of mode, and after a time limit.
+/// Permit of one key press, or of the automatic rule, that energises; void after any change of mode, and after a time limit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Permit {
-    /// Changes of mode that the session had received at the key press.
+    /// Changes of mode that the session had received when it handled the request.
     pub mode_changes: u64,
     /// Time of the key press, ns since the engine started.
     pub given_ns: u64,

@@ -23,9 +23,9 @@ pub enum Mode {
     Ready,
     /// A trial is approved: standing still before the impulse.
     Countdown,
-    /// Impulse, flight and landing.
+    /// Impulse and flight, until the touchdown after the last impulse; between jumps in a row also landing.
     Jump,
-    /// Feet down, waiting until the robot is quiet.
+    /// Landing: standing until the robot is quiet.
     Settle,
     /// The trial is measured; the operator gives the verdict.
     Review,

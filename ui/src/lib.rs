@@ -1,7 +1,6 @@
 //! The terminal console of the operator: draws the state of the engine and sends requests to it; decides nothing.
 //!
-//! One loop (`app`) folds keys and feed into the [`model::Model`] with [`update::update`], the only function that changes
-//! it, and draws it with free functions ([`view::render`]).
+//! One loop (`app`) folds keys and feed into the [`model::Model`] with X//! it, and draws it with free functions ([`view::render`]).
 //!
 //! ```text
 //! keys, signals ──┐                      ┌── effects: requests, STOP, bell, quit ──> app ──> engine

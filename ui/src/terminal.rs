@@ -171,7 +171,7 @@ impl Backend for WriteOnlyBackend {
 static ENTERED: AtomicBool = AtomicBool::new(false);
 /// Held while a whole frame, or the restoration, is written.
 static OUTPUT: Mutex<()> = Mutex::new(());
-/// Set by the first panic, before anything else.
+/// STOP latch that a panic in any thread sets, before anything else.
 static STOP: Mutex<Option<StopLatch>> = Mutex::new(None);
 /// Name of the first thread that panicked; the loop then ends instead of leaving a dead screen.
 static PANICKED: Mutex<Option<String>> = Mutex::new(None);

@@ -9,7 +9,7 @@ mod fault_landing;
 use super::arming::{self, ArmingHistory};
 use super::command_gate::CommandGate;
 use super::consistency::{Consistency, ConsistencyInputs};
-use super::failsafe::{self, Failsafe};
+use super::failsafe::{self, PeriodWatch};
 use super::fault_landing::FaultLanding;
 use super::gain_blend::GainBlend;
 use super::leg;
@@ -85,7 +85,7 @@ pub struct Cycle {
     /// Ticks since the last change of mode.
     mode_ticks: u32,
     estimator: Estimator,
-    failsafe: Failsafe,
+    failsafe: PeriodWatch,
     consistency: Consistency,
     /// The fault whose failsafe trips in this tick.
     tripped: Option<Fault>,
@@ -131,7 +131,7 @@ impl Cycle {
             mode_changes: 0,
             mode_ticks: 0,
             estimator: Estimator::default(),
-            failsafe: Failsafe::default(),
+            failsafe: PeriodWatch::default(),
             consistency: Consistency::default(),
             tripped: None,
             warning: None,

@@ -69,11 +69,11 @@ pub fn decode_motor(target: &MotorTarget) -> Option<MotorCommand> {
     Some(command)
 }
 
-/// Decodes a state. `foot_force_n` is the resolution of a foot sensor, N.
+/// Decodes a state. `foot_step_n` is the force per step of a foot sensor, N.
 ///
 /// `motor_enabled` is whether the motor reports servo mode. An orientation that is no rotation (all zero, for example)
 /// becomes NaN, so that the failsafe reports it.
-pub fn robot_state(state: &LowState, foot_force_n: f64) -> RobotState {
+pub fn robot_state(state: &LowState, foot_step_n: f64) -> RobotState {
     let joints = |value: fn(&MotorRecord) -> f64| std::array::from_fn(|i| value(&state.motor[i]));
     let imu = &state.imu;
     let [w, x, y, z] = imu.quaternion.map(F32::get);
@@ -90,7 +90,7 @@ pub fn robot_state(state: &LowState, foot_force_n: f64) -> RobotState {
         joint_velocity_rad_s: joints(|motor| motor.velocity.get().into()),
         joint_torque_n_m: joints(|motor| motor.torque().into()),
         imu: Imu { world_from_body, gyro_body: vector(&imu.gyroscope), accel_body: vector(&imu.accelerometer) },
-        foot_force_n: state.foot_force.map(|force| f64::from(force.get()) * foot_force_n),
+        foot_force_n: state.foot_force.map(|force| f64::from(force.get()) * foot_step_n),
         motor_temperature_c: joints(|motor| motor.temperature.into()),
         motor_enabled: std::array::from_fn(|i| state.motor[i].mode == MODE_SERVO),
         battery: Some(Battery {
@@ -116,7 +116,7 @@ fn remote(record: &RemoteRecord) -> Remote {
 }
 
 /// Encodes a state, for the emulator: the inverse of [`robot_state`]. The caller computes the checksum.
-pub fn low_state(state: &RobotState, foot_force_n: f64) -> LowState {
+pub fn low_state(state: &RobotState, foot_step_n: f64) -> LowState {
     let mut datagram = LowState::zero();
     datagram.robot_time_ms = state.robot_time_ms.into();
     let orientation = &state.imu.world_from_body;
@@ -141,7 +141,7 @@ pub fn low_state(state: &RobotState, foot_force_n: f64) -> LowState {
         datagram.battery.current = ((battery.current_a * 1e3).round() as i32).into();
         datagram.battery.set_cell_v(&battery.cell_v.map(|v| v as f32));
     }
-    datagram.foot_force = state.foot_force_n.map(|force| ((force / foot_force_n).round() as i16).into());
+    datagram.foot_force = state.foot_force_n.map(|force| ((force / foot_step_n).round() as i16).into());
     datagram.foot_force_estimated = datagram.foot_force;
     if let Some(remote) = &state.remote {
         datagram.remote = RemoteRecord {

@@ -89,7 +89,7 @@ impl Experiment {
             Ok(()) => {}
         }
         self.publish_row(trial);
-        self.pending = Some(PendingVerdict { suggestion, outcome, rerun });
+        self.pending_verdict = Some(PendingVerdict { suggestion, outcome, rerun });
         self.propose()?;
         Ok(())
     }
@@ -97,7 +97,7 @@ impl Experiment {
     /// Takes the last verdict back.
     /// Refused when it was reported already.
     pub fn undo(&mut self) -> Result<(), RequestRefusal> {
-        let Some(pending) = self.pending.as_ref().filter(|_| self.is_idle()) else {
+        let Some(pending) = self.pending_verdict.as_ref().filter(|_| self.is_idle()) else {
             return not_now(
                 "there is no verdict to undo; the last one became final when the next trial was approved or refused",
             );
@@ -109,7 +109,7 @@ impl Experiment {
         }
         // If this fails, the verdict stands on the disk and must still be reported.
         self.study.annotate(trial, &attributes::write(&JudgedAttributes::of(&row, false)))?;
-        self.pending = None;
+        self.pending_verdict = None;
         self.rows.insert(trial, row);
         self.publish_row(trial);
         self.enter(ExperimentState::Review(trial), trial);

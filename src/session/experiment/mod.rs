@@ -10,7 +10,7 @@ mod confirmation;
 mod envelope;
 mod judging;
 mod liveness;
-mod pending_proposal;
+mod open_proposal;
 mod plan;
 mod proposal_start;
 mod queue;
@@ -22,7 +22,7 @@ pub use self::plan::{ExperimentPlan, RequestRefusal};
 use std::collections::BTreeMap;
 
 use self::confirmation::{BestConfirmation, NextRepeat};
-use self::pending_proposal::PendingProposal;
+use self::open_proposal::OpenProposal;
 use self::plan::not_now;
 use self::queue::TrialQueue;
 use self::search::SearchSettings;
@@ -49,7 +49,7 @@ struct PendingVerdict {
 /// State of the current trial.
 enum ExperimentState {
     /// A proposal waits for approval.
-    Proposed(Box<PendingProposal>),
+    Proposed(Box<OpenProposal>),
     /// This trial runs.
     Running(u32),
     /// This trial waits for its verdict.
@@ -65,9 +65,9 @@ pub struct Experiment {
     state: ExperimentState,
     /// Rows of the trial table, by number.
     rows: BTreeMap<u32, TrialRecord>,
-    /// Number of pending proposals and of their changes: the newest revision.
+    /// Number of open proposals and of their changes: the newest revision.
     revisions: u32,
-    pending: Option<PendingVerdict>,
+    pending_verdict: Option<PendingVerdict>,
     queue: TrialQueue,
     search: SearchSettings,
     confirmation: BestConfirmation,
@@ -89,7 +89,7 @@ impl Experiment {
             state: ExperimentState::Finished,
             rows: BTreeMap::new(),
             revisions: 0,
-            pending: None,
+            pending_verdict: None,
             search: SearchSettings::default(),
             outbox: Vec::new(),
             published_search: None,
@@ -146,7 +146,7 @@ impl Experiment {
     /// Returns the proposal that waits for approval.
     pub fn proposal(&self) -> Option<Proposal> {
         match &self.state {
-            ExperimentState::Proposed(pending) => Some(pending.proposal()),
+            ExperimentState::Proposed(open) => Some(open.proposal()),
             _ => None,
         }
     }
@@ -173,17 +173,17 @@ impl Experiment {
     /// Approves the proposal as it was seen: it becomes a running trial, on disk before this returns.
     /// Refused when there is another proposal by now or its values are outside the limits.
     pub fn approve(&mut self, trial: u32, revision: u32) -> Result<TrialSpec, RequestRefusal> {
-        let ExperimentState::Proposed(pending) = &self.state else { return not_now("there is no proposal to approve") };
-        if !pending.is(trial, revision) {
+        let ExperimentState::Proposed(open) = &self.state else { return not_now("there is no proposal to approve") };
+        if !open.is(trial, revision) {
             return not_now(format!(
                 "the proposal for trial {trial} has changed since it was shown; check the new one (trial {}) and approve it",
-                pending.number()
+                open.number()
             ));
         }
         if let Some(refusal) = self.refusal() {
             return not_now(format!("{refusal}; change it, or refuse the proposal"));
         }
-        let approved = pending.approved();
+        let approved = open.approved();
         let number = self.begin(approved)?;
         self.enter(ExperimentState::Running(number), number);
         Ok(self.spec(number))
@@ -192,12 +192,12 @@ impl Experiment {
     /// Refuses the proposal: it becomes a void trial, which the sampler does not see.
     /// Refused when there is no proposal.
     pub fn skip(&mut self) -> Result<(), RequestRefusal> {
-        let ExperimentState::Proposed(pending) = &self.state else { return not_now("there is no proposal to skip") };
+        let ExperimentState::Proposed(open) = &self.state else { return not_now("there is no proposal to skip") };
         let cause = match self.refusal() {
             Some(refusal) => format!("not run: {refusal}"),
             None => "skipped before the jump".to_owned(),
         };
-        let approved = pending.approved();
+        let approved = open.approved();
         let number = self.begin(approved)?;
         if let Some(row) = self.rows.get_mut(&number) {
             row.verdict = Some(Verdict::Void);
@@ -221,9 +221,9 @@ impl Experiment {
         self.log_all(log);
         self.take_rows();
         match &self.state {
-            ExperimentState::Proposed(pending) => {
+            ExperimentState::Proposed(open) => {
                 let next = self.study.waiting().next().map(|trial| trial.number);
-                if next != pending.waits_as() && pending.changes().is_none() {
+                if next != open.waits_as() && open.changes().is_none() {
                     self.log("another program has changed the queue: a new proposal follows".to_owned());
                     self.propose()?;
                 }
@@ -233,7 +233,7 @@ impl Experiment {
                 let queued = self.study.waiting().any(attributes::confirms);
                 // A repeat of another worker may have been void, or may have been the last.
                 let confirms =
-                    self.pending.is_none() && !matches!(self.confirmation.next(&self.study), NextRepeat::None);
+                    self.pending_verdict.is_none() && !matches!(self.confirmation.next(&self.study), NextRepeat::None);
                 if room || queued || confirms {
                     self.propose()?;
                 }
@@ -265,7 +265,7 @@ impl Experiment {
 
     /// Reports the pending verdict: the session ends.
     pub fn close(&mut self) -> Result<(), StudyError> {
-        self.report_pending().map(drop)
+        self.report_verdict().map(drop)
     }
 
     fn is_idle(&self) -> bool {
@@ -289,7 +289,7 @@ impl Experiment {
 
     fn enter(&mut self, state: ExperimentState, trial: u32) {
         self.state = state;
-        let (stage, can_undo) = (self.stage(), self.pending.is_some());
+        let (stage, can_undo) = (self.stage(), self.pending_verdict.is_some());
         self.outbox.push(Record::Stage(StageRecord { stage, trial, can_undo }));
     }
 

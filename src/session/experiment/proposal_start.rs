@@ -3,7 +3,7 @@
 use super::attributes::{self, BeganAttributes, Origin};
 use super::confirmation::{self, NextRepeat};
 use super::envelope;
-use super::pending_proposal::{ApprovedProposal, PendingProposal};
+use super::open_proposal::{ApprovedProposal, OpenProposal};
 use super::plan::{RequestRefusal, not_now};
 use super::search::SearchSettings;
 use super::trial_changes::must_be_within;
@@ -26,7 +26,7 @@ impl Experiment {
         self.search = SearchSettings::of(&self.study, &self.plan);
         self.search.apply(&self.plan, &mut self.study)?;
         self.confirmation.reopen();
-        let mut study = self.study_with_pending()?;
+        let mut study = self.study_with_verdict()?;
         if study.waiting().next().is_none() {
             match self.confirmation.next(&study) {
                 NextRepeat::Repeat(first) => {
@@ -39,7 +39,7 @@ impl Experiment {
                 NextRepeat::None => {}
             }
         }
-        if self.pending.is_none() {
+        if self.pending_verdict.is_none() {
             self.confirmation.write_conclusion(&mut self.study)?;
         }
         self.hop_share = envelope::share(&self.plan, study.trials());
@@ -59,11 +59,11 @@ impl Experiment {
         let fixed: Vec<_> = self.search.fixed(study.trials()).into_iter().map(|(n, fixed)| (n, fixed.value)).collect();
         let in_study = self.study.waiting().next().is_some();
         let revision = self.next_revision();
-        let pending = PendingProposal::new(study, in_study, &fixed, &self.plan.control.gains(), revision);
-        let number = pending.number();
-        self.outbox.push(Record::Insight(pending.insight()));
-        self.outbox.push(Record::Proposal(pending.proposal()));
-        self.enter(ExperimentState::Proposed(Box::new(pending)), number);
+        let open = OpenProposal::new(study, in_study, &fixed, &self.plan.control.gains(), revision);
+        let number = open.number();
+        self.outbox.push(Record::Insight(open.insight()));
+        self.outbox.push(Record::Proposal(open.proposal()));
+        self.enter(ExperimentState::Proposed(Box::new(open)), number);
         if let Some(refusal) = self.refusal() {
             self.log(format!("trial {number} cannot run as it was queued: {refusal}"));
         }
@@ -94,7 +94,7 @@ impl Experiment {
     /// Makes a new proposal because the search has changed. The operator's changes stay where they are within the bounds.
     pub fn repropose(&mut self) -> Result<(), StudyError> {
         let changes = match &self.state {
-            ExperimentState::Proposed(pending) => pending.changes().cloned(),
+            ExperimentState::Proposed(open) => open.changes().cloned(),
             _ => None,
         };
         self.propose()?;
@@ -102,20 +102,20 @@ impl Experiment {
         let within = |name: &str, value: f64| bounds.iter().any(|p| p.name == name && p.contains(value));
         let Some(changes) = changes else { return Ok(()) };
         let revision = self.next_revision();
-        if let ExperimentState::Proposed(pending) = &mut self.state {
-            pending.inherit(&changes, revision, within);
+        if let ExperimentState::Proposed(open) = &mut self.state {
+            open.inherit(&changes, revision, within);
             self.publish_proposal();
         }
         Ok(())
     }
 
     /// Returns the study at the time at which the next trial begins: the pending verdict is reported in it.
-    pub fn study_with_pending(&self) -> Result<Study, StudyError> {
+    pub fn study_with_verdict(&self) -> Result<Study, StudyError> {
         let mut fork = self.study.fork();
-        if let Some(pending) = &self.pending {
-            let trial = pending.suggestion.trial;
-            fork.tell(trial, pending.outcome)?;
-            if pending.rerun {
+        if let Some(verdict) = &self.pending_verdict {
+            let trial = verdict.suggestion.trial;
+            fork.tell(trial, verdict.outcome)?;
+            if verdict.rerun {
                 let (parameters, origin) = queue::rerun_of(self.study.trial(trial)?);
                 fork.enqueue(&parameters, &origin.attributes())?;
             }
@@ -125,9 +125,9 @@ impl Experiment {
 
     /// Makes the approved proposal a running trial of the study. Returns its number.
     pub fn begin(&mut self, approved: ApprovedProposal) -> Result<u32, RequestRefusal> {
-        let ApprovedProposal { proposal, origin, mut draft, overrides, fixed, only_with_pending } = approved;
-        let mut queued = self.report_pending()?;
-        if only_with_pending {
+        let ApprovedProposal { proposal, origin, mut draft, overrides, fixed, only_with_verdict } = approved;
+        let mut queued = self.report_verdict()?;
+        if only_with_verdict {
             // The study does not have the queued trial yet, and another program may have taken its number.
             if queued.is_none() {
                 let given: Vec<_> = draft.parameters.iter().map(|p| (p.name.clone(), p.value)).collect();
@@ -177,21 +177,21 @@ impl Experiment {
     }
 
     /// Reports the pending verdict to the study. Returns the number of the re-run that was asked for with it.
-    pub fn report_pending(&mut self) -> Result<Option<u32>, StudyError> {
+    pub fn report_verdict(&mut self) -> Result<Option<u32>, StudyError> {
         let mut queued = None;
-        if let Some(pending) = self.pending.clone() {
-            let trial = pending.suggestion.trial;
-            if self.study.tell(trial, pending.outcome)? == TellOutcome::AlreadyFinished {
+        if let Some(verdict) = self.pending_verdict.clone() {
+            let trial = verdict.suggestion.trial;
+            if self.study.tell(trial, verdict.outcome)? == TellOutcome::AlreadyFinished {
                 // The row is read again with the next proposal.
                 self.log(RequestRefusal::EndedElsewhere(trial).to_string());
                 self.rows.remove(&trial);
             }
-            if pending.rerun {
+            if verdict.rerun {
                 let (parameters, origin) = queue::rerun_of(self.study.trial(trial)?);
                 queued = queue::queue_again(&mut self.study, trial, &parameters, &origin)?;
             }
             // Only now: after an error above it is still to be reported.
-            self.pending = None;
+            self.pending_verdict = None;
         }
         self.confirmation.write_conclusion(&mut self.study)?;
         Ok(queued)

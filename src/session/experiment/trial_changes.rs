@@ -2,7 +2,7 @@
 //! Nothing runs before it is approved.
 
 use super::attributes::{self, BudgetAttribute, Origin};
-use super::pending_proposal::PendingProposal;
+use super::open_proposal::OpenProposal;
 use super::plan::{RequestRefusal, not_now};
 use super::{Experiment, ExperimentState, confirmation, envelope};
 use crate::trial::{ParameterInfo, ProposalSource};
@@ -11,11 +11,11 @@ impl Experiment {
     /// Sets one parameter of the proposal.
     /// Refused when there is no proposal, no such parameter, or the value is outside its bounds.
     pub fn set_parameter(&mut self, name: &str, value: f64) -> Result<(), RequestRefusal> {
-        self.change_pending()?;
+        self.change_open()?;
         must_be_within(&self.search.parameters(&self.plan), "parameter", name, value)?;
         envelope::must_be_inside(&self.plan, self.hop_share, name, value)?;
         let revision = self.next_revision();
-        self.change_pending()?.set(name, value, revision);
+        self.change_open()?.set(name, value, revision);
         self.publish_proposal();
         Ok(())
     }
@@ -23,10 +23,10 @@ impl Experiment {
     /// Sets one of the controller's gains for the proposed trial.
     /// Refused when there is no proposal, no such gain, or the value is outside its safe range.
     pub fn set_gain(&mut self, name: &str, value: f64) -> Result<(), RequestRefusal> {
-        self.change_pending()?;
+        self.change_open()?;
         must_be_within(&self.plan.gains, "gain", name, value)?;
         let revision = self.next_revision();
-        self.change_pending()?.set_gain(name, value, revision);
+        self.change_open()?.set_gain(name, value, revision);
         self.publish_proposal();
         Ok(())
     }
@@ -34,14 +34,14 @@ impl Experiment {
     /// Takes all changes of the proposal back, also those of gains.
     pub fn clear_overrides(&mut self) -> Result<(), RequestRefusal> {
         let revision = self.next_revision();
-        self.change_pending()?.clear(revision);
+        self.change_open()?.clear(revision);
         self.publish_proposal();
         Ok(())
     }
 
-    fn change_pending(&mut self) -> Result<&mut PendingProposal, RequestRefusal> {
+    fn change_open(&mut self) -> Result<&mut OpenProposal, RequestRefusal> {
         match &mut self.state {
-            ExperimentState::Proposed(pending) => Ok(pending),
+            ExperimentState::Proposed(open) => Ok(open),
             _ => not_now("there is no proposal to change"),
         }
     }
@@ -63,8 +63,10 @@ impl Experiment {
         if !free {
             return not_now(format!("with {name} fixed nothing would be left to search; queue the point instead"));
         }
-        let from =
-            self.pending.as_ref().map_or(self.study.trials().len() as u32, |pending| pending.suggestion.trial + 1);
+        let from = self
+            .pending_verdict
+            .as_ref()
+            .map_or(self.study.trials().len() as u32, |pending| pending.suggestion.trial + 1);
         self.search.fix(name, value, trials, from);
         self.write_search()
     }
@@ -163,17 +165,17 @@ impl Experiment {
             if confirmation::running(&self.study).is_none() {
                 return not_now("no confirmation of the best is running");
             }
-            self.report_pending()?;
+            self.report_verdict()?;
             self.confirmation.abort(&mut self.study)?;
             self.propose()?;
             return Ok(Vec::new());
         }
         // In the study with the pending verdict: a refused request does not make the last verdict final.
-        let trials = self.confirmation.candidates(&self.study_with_pending()?);
+        let trials = self.confirmation.candidates(&self.study_with_verdict()?);
         if trials.len() < 2 {
             return not_now("fewer than two points ended without a fall: nothing to compare");
         }
-        self.report_pending()?;
+        self.report_verdict()?;
         self.confirmation.start(&mut self.study, trials.clone(), repeats)?;
         self.propose()?;
         Ok(trials)

@@ -103,9 +103,9 @@ pub struct Supervisor {
     leaving: bool,
     /// Reason that forbids the next trial, as it was logged last.
     inhibited: Option<String>,
-    caution_ns: Option<u64>,
+    warned_ns: Option<u64>,
     ended: Option<Ended>,
-    measured: VecDeque<TrialTicks>,
+    unmeasured: VecDeque<TrialTicks>,
     recorder_error: Option<String>,
     recorder_gone: bool,
     /// Reason for which the guard does not protect the robot; none while it does.
@@ -155,9 +155,9 @@ impl Supervisor {
             releasing: false,
             leaving: false,
             inhibited: None,
-            caution_ns: None,
+            warned_ns: None,
             ended: None,
-            measured: VecDeque::new(),
+            unmeasured: VecDeque::new(),
             recorder_error: None,
             recorder_gone: false,
             guard_objection: None,
@@ -246,7 +246,7 @@ impl Supervisor {
         }
         while let Ok(collected) = self.ticks.try_recv() {
             match collected {
-                CollectedTicks::Trial(ticks) => self.measured.push_back(ticks),
+                CollectedTicks::Trial(ticks) => self.unmeasured.push_back(ticks),
                 CollectedTicks::Fault(ticks) => self.publish(Record::FaultTicks(ticks), time_ns),
             }
         }
@@ -386,7 +386,7 @@ impl Supervisor {
                             _ => TrialEnd::Cancelled,
                         };
                         self.ended = Some(Ended { trial: spec.trial, end, ticks: 0, time_ns });
-                        self.measured.push_back(TrialTicks { trial: spec.trial, ticks: Vec::new() });
+                        self.unmeasured.push_back(TrialTicks { trial: spec.trial, ticks: Vec::new() });
                     }
                     Command::Arm(_) => self.unattended.arming_refused(time_ns),
                     Command::TakeControl => {
@@ -402,15 +402,15 @@ impl Supervisor {
     /// Measures a trial that has ended, once its ticks have arrived.
     fn measure(&mut self, time_ns: u64) {
         let Some(Ended { trial, end, ticks: whole, time_ns: ended_ns }) = self.ended else { return };
-        let ticks = match self.measured.iter().position(|ticks| ticks.trial == trial) {
-            Some(place) => self.measured.remove(place).map(|found| found.ticks).unwrap_or_default(),
+        let ticks = match self.unmeasured.iter().position(|ticks| ticks.trial == trial) {
+            Some(place) => self.unmeasured.remove(place).map(|found| found.ticks).unwrap_or_default(),
             None if time_ns < ended_ns + LONGEST_WAIT_FOR_TICKS_NS => return,
             None => {
                 self.log(LogLevel::Error, format!("the recorder did not send the ticks of trial {trial}"), time_ns);
                 Vec::new()
             }
         };
-        self.measured.clear();
+        self.unmeasured.clear();
         self.ended = None;
         self.give(JobPurpose::Measure(trial), time_ns, move |experiment| {
             experiment.ended(trial, &end, &ticks, whole);

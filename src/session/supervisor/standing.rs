@@ -5,7 +5,7 @@ use crate::recording::record::{ArmingCheckRecord, LogLevel, Record, Stamped};
 use crate::telemetry::{Command, Mode};
 
 /// Least time between two logged cautions, ns.
-const CAUTION_PERIOD_NS: u64 = 10_000_000_000;
+const WARNING_PERIOD_NS: u64 = 10_000_000_000;
 /// Period of the arming checklist's records for the console, ns.
 const CHECKLIST_PERIOD_NS: u64 = 500_000_000;
 
@@ -25,10 +25,10 @@ impl Supervisor {
             self.log(LogLevel::Warning, format!("no further trial can be approved: {reason}"), time_ns);
         }
         self.inhibited = inhibit;
-        let due = self.caution_ns.is_none_or(|logged_ns| time_ns >= logged_ns + CAUTION_PERIOD_NS);
-        if let Some(caution) = self.control.readiness.read().warning.filter(|_| due) {
-            self.caution_ns = Some(time_ns);
-            self.log(LogLevel::Warning, caution.to_string(), time_ns);
+        let due = self.warned_ns.is_none_or(|logged_ns| time_ns >= logged_ns + WARNING_PERIOD_NS);
+        if let Some(warning) = self.control.readiness.read().warning.filter(|_| due) {
+            self.warned_ns = Some(time_ns);
+            self.log(LogLevel::Warning, warning.to_string(), time_ns);
         }
     }
 

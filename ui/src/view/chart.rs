@@ -1,4 +1,4 @@
-//! A chart of one signal over time, in sweep or scroll mode.
+//! A chart of one series over time, in sweep or scroll mode.
 
 use quadfrog::telemetry::Phase;
 use ratatui::buffer::Buffer;
@@ -6,7 +6,7 @@ use ratatui::layout::Rect;
 
 use super::dots::DotGrid;
 use super::draw::truncate;
-use super::series_style::Signal;
+use super::series_style::SeriesStyle;
 use crate::model::comparison::time_after;
 use crate::model::history::{ChartSample, SignalHistory, at_trial_time};
 use crate::settings::ChartMode;
@@ -54,7 +54,7 @@ pub struct Ghost<'a> {
 
 /// A chart with its heading line. Under two rows nothing is drawn.
 pub struct Chart<'a> {
-    pub signal: Signal,
+    pub style: SeriesStyle,
     pub axis: TimeAxis,
     pub history: &'a SignalHistory,
     /// The phase of each column, from [`phases`].
@@ -82,21 +82,21 @@ impl Chart<'_> {
         }
         let mut dots = DotGrid::new(plot, self.theme.glyphs);
         let samples =
-            self.history.window(self.axis.window_ns).map(|sample| (sample.time_ns, (self.signal.value)(sample)));
+            self.history.window(self.axis.window_ns).map(|sample| (sample.time_ns, (self.style.value)(sample)));
         self.trace(&mut dots, samples, (low, high));
-        dots.draw(buffer, plot, self.theme.style(self.signal.role));
+        dots.draw(buffer, plot, self.theme.style(self.style.role));
         self.shade(buffer, plot);
         self.draw_cursor(buffer, plot);
     }
 
-    /// The first of the signal's ranges that holds what is drawn.
+    /// The first of the series' ranges that holds what is drawn.
     fn range(&self) -> (f32, f32) {
         let ghost = self.ghost.iter().flat_map(|ghost| ghost.trace);
-        let values = self.history.window(self.axis.window_ns).chain(ghost).map(|sample| (self.signal.value)(sample));
+        let values = self.history.window(self.axis.window_ns).chain(ghost).map(|sample| (self.style.value)(sample));
         let (low, high) = values
             .filter(|value| value.is_finite())
             .fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
-        let ranges = self.signal.ranges;
+        let ranges = self.style.ranges;
         let widest = ranges.last().copied().unwrap_or((-1.0, 1.0));
         ranges.iter().find(|range| low >= range.0 && high <= range.1).copied().unwrap_or(widest)
     }
@@ -118,7 +118,7 @@ impl Chart<'_> {
             Some(time_ns) => self.history.at(time_ns),
             None => self.history.samples().next_back(),
         };
-        let contact = match (self.signal.foot, sample) {
+        let contact = match (self.style.foot, sample) {
             (Some(leg), Some(sample)) => theme.contact_indicator(sample.contact[leg as usize]),
             (Some(_), None) => " ",
             (None, _) => "",
@@ -129,8 +129,8 @@ impl Chart<'_> {
             let sample = at_trial_time(ghost.trace, time_s as f32);
             (sample.map_or("-".to_owned(), |sample| self.number(sample)), ghost.role)
         });
-        let unit = self.signal.series.unit();
-        let mut pieces = vec![(format!("{}{contact} ", self.signal.series.name()), self.signal.role)];
+        let unit = self.style.series.unit();
+        let mut pieces = vec![(format!("{}{contact} ", self.style.series.name()), self.style.role)];
         match ghost {
             Some((other, role)) => {
                 pieces.push((format!("A {value} "), Role::Text));
@@ -152,9 +152,9 @@ impl Chart<'_> {
         }
     }
 
-    /// The signal's value to three decimals, or none from 100 on.
+    /// The value to three decimals, or none from 100 on.
     fn number(&self, sample: &ChartSample) -> String {
-        let value = (self.signal.value)(sample);
+        let value = (self.style.value)(sample);
         // Otherwise the text would alternate between -0.000 and +0.000.
         let value = if value.abs() < 0.0005 { 0.0 } else { value };
         if value.abs() >= 100.0 { format!("{value:+.0}") } else { format!("{value:+.3}") }
@@ -188,7 +188,7 @@ impl Chart<'_> {
         let points = ghost
             .trace
             .iter()
-            .map(|sample| (time_after(ghost.start_ns, sample.trial_time_s), (self.signal.value)(sample)));
+            .map(|sample| (time_after(ghost.start_ns, sample.trial_time_s), (self.style.value)(sample)));
         self.trace(&mut dots, points, range);
         dots.draw(buffer, plot, self.theme.style(ghost.role));
     }

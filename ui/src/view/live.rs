@@ -7,7 +7,7 @@ use ratatui::text::{Line, Span};
 
 use super::chart::{Chart, Ghost, TimeAxis, draw_phases, phases};
 use super::draw::{bar, heading, span};
-use super::series_style::signal;
+use super::series_style::style;
 use super::{objective, proposal, trials, wireframe};
 use crate::model::Model;
 use crate::model::comparison::{Comparison, impulse_start_ns};
@@ -104,7 +104,7 @@ fn render_charts(frame: &mut Frame, area: Rect, model: &Model) {
     let rows = Layout::vertical(vec![Constraint::Fill(1); down]).split(charts);
     for (index, series) in series.iter().enumerate().take(across * down) {
         let chart = Chart {
-            signal: signal(*series),
+            style: style(*series),
             axis: source.axis,
             history: source.history,
             phases: &of_columns[index % across].1,

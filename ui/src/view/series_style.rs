@@ -8,7 +8,7 @@ use crate::theme::Role;
 
 /// Drawing of a series.
 #[derive(Clone, Copy)]
-pub struct Signal {
+pub struct SeriesStyle {
     pub series: Series,
     /// Its value in a sample.
     pub value: fn(&ChartSample) -> f32,
@@ -25,10 +25,10 @@ const FORCE: &[(f32, f32)] = &[(0.0, 100.0), (0.0, 400.0), (0.0, 1000.0)];
 const HEIGHT: &[(f32, f32)] = &[(0.0, 0.5), (0.0, 1.0), (0.0, 2.0)];
 const TURN: &[(f32, f32)] = &[(0.0, 6.3)];
 
-pub fn signal(series: Series) -> Signal {
-    let base = |value, ranges, role| Signal { series, value, ranges, role, foot: None };
-    let foot = |leg: Leg, value| Signal { foot: Some(leg), ..base(value, FOOT, role_of(leg)) };
-    let force = |leg: Leg, value| Signal { foot: Some(leg), ..base(value, FORCE, role_of(leg)) };
+pub fn style(series: Series) -> SeriesStyle {
+    let base = |value, ranges, role| SeriesStyle { series, value, ranges, role, foot: None };
+    let foot = |leg: Leg, value| SeriesStyle { foot: Some(leg), ..base(value, FOOT, role_of(leg)) };
+    let force = |leg: Leg, value| SeriesStyle { foot: Some(leg), ..base(value, FORCE, role_of(leg)) };
     match series {
         Series::Roll => base(|s| s.roll, TILT, Role::SeriesA),
         Series::Pitch => base(|s| s.pitch, TILT, Role::SeriesB),

@@ -34,7 +34,7 @@ pub struct ImuRecord {
 #[derive(Debug, Clone, Copy, PartialEq, FromBytes, IntoBytes, Immutable, KnownLayout, Unaligned)]
 #[repr(C)]
 pub struct MotorRecord {
-    /// Mode: 0x0A servo, 0x00 damping, 0x08 overheated.
+    /// Mode: 0x0A servo, 0x00 braking, 0x08 overheated.
     pub mode: u8,
     /// Angle, rad.
     pub position: F32,

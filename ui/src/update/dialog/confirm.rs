@@ -54,9 +54,9 @@ pub(super) fn arm_key(model: &mut Model, key: Key, (typed, opened_at): (usize, D
     request_if_legal(model, Action::Arm, OperatorRequest::Arm, "not armed")
 }
 
-fn request_if_legal(model: &mut Model, action: Action, intent: OperatorRequest, text: &str) -> Vec<Effect> {
+fn request_if_legal(model: &mut Model, action: Action, wanted: OperatorRequest, text: &str) -> Vec<Effect> {
     match legal(action, model) {
-        Ok(()) => request(model, intent),
+        Ok(()) => request(model, wanted),
         Err(reason) => refused(model, text, &reason),
     }
 }

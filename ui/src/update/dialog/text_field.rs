@@ -37,7 +37,7 @@ pub(super) fn key(model: &mut Model, key: Key, purpose: Purpose, mut input: Inpu
 /// # Errors
 /// The reason when the text is refused.
 fn submit(model: &mut Model, purpose: Purpose, text: &str) -> Result<Vec<Effect>, String> {
-    let intent = match purpose {
+    let wanted = match purpose {
         Purpose::Note(trial) => OperatorRequest::Note { trial, text: text.to_owned() },
         Purpose::HandValue(_) if text.is_empty() => OperatorRequest::HandValue(None),
         Purpose::HandValue(_) => match text.replace(',', ".").parse::<f64>() {
@@ -70,7 +70,7 @@ fn submit(model: &mut Model, purpose: Purpose, text: &str) -> Result<Vec<Effect>
             return Ok(Vec::new());
         }
     };
-    Ok(request(model, intent))
+    Ok(request(model, wanted))
 }
 
 fn count(text: &str, things: &str) -> Result<u32, String> {

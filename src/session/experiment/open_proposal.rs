@@ -15,7 +15,7 @@ use crate::trial::{
 const INSIGHT_POINTS: usize = 41;
 
 /// A draft with the operator's changes.
-pub struct PendingProposal {
+pub struct OpenProposal {
     draft: TrialDraft,
     /// Changed by every change of the proposal: no approval of an earlier one fits a later one.
     revision: u32,
@@ -23,7 +23,7 @@ pub struct PendingProposal {
     study: Study,
     changes: Changes,
     /// The draft was queued in the study with the pending verdict only: in the study its number may belong to another trial by now.
-    only_with_pending: bool,
+    only_with_verdict: bool,
     configured: ParameterValues,
     /// The gains of the trial without changes: the configured ones, or those of its origin.
     gains: ParameterValues,
@@ -38,7 +38,7 @@ pub struct Changes {
     gains: BTreeMap<String, f64>,
 }
 
-/// The values of a pending proposal at its approval.
+/// The values of a open proposals at its approval.
 pub struct ApprovedProposal {
     pub proposal: Proposal,
     pub origin: Origin,
@@ -46,19 +46,19 @@ pub struct ApprovedProposal {
     pub overrides: Vec<(String, f64)>,
     /// The fixed parameters, without those that were changed for this trial.
     pub fixed: ParameterValues,
-    pub only_with_pending: bool,
+    pub only_with_verdict: bool,
 }
 
-impl PendingProposal {
+impl OpenProposal {
     /// Drafts the next trial of `study`. The parameters `fixed` are not searched unless the draft was queued with values
     /// of its own. `in_study` is true if the waiting trial of the study with the pending verdict waits in the study, too. `gains` are the
     /// configured ones; `revision` must be one that no earlier proposal had.
-    pub fn new(study: Study, in_study: bool, fixed: &[(String, f64)], gains: &Gains, revision: u32) -> PendingProposal {
+    pub fn new(study: Study, in_study: bool, fixed: &[(String, f64)], gains: &Gains, revision: u32) -> OpenProposal {
         let queued = study.waiting().next().map(Trial::fixed).unwrap_or_default();
         let fixed: Vec<_> = fixed.iter().filter(|(name, _)| queued.iter().all(|(n, _)| n != name)).cloned().collect();
         let draft = study.draft_with(&fixed);
-        let mut pending = PendingProposal {
-            only_with_pending: draft.enqueued && !in_study,
+        let mut open = OpenProposal {
+            only_with_verdict: draft.enqueued && !in_study,
             draft,
             revision,
             study,
@@ -67,8 +67,8 @@ impl PendingProposal {
             gains: ParameterValues::default(),
             fixed,
         };
-        pending.gains = gains.with(&pending.origin().gains).values();
-        pending
+        open.gains = gains.with(&open.origin().gains).values();
+        open
     }
 
     pub fn number(&self) -> u32 {
@@ -81,7 +81,7 @@ impl PendingProposal {
 
     /// Returns the number of the waiting trial of the study that this proposal proposes; none if it does not wait there.
     pub fn waits_as(&self) -> Option<u32> {
-        (self.draft.enqueued && !self.only_with_pending).then_some(self.number())
+        (self.draft.enqueued && !self.only_with_verdict).then_some(self.number())
     }
 
     /// Changes one parameter; the proposed value is no change.
@@ -125,7 +125,7 @@ impl PendingProposal {
             draft: self.draft.clone(),
             overrides: changed.iter().map(|(name, value)| (name.clone(), *value)).collect(),
             fixed: self.fixed.iter().filter(|(name, _)| !changed.contains_key(name)).cloned().collect(),
-            only_with_pending: self.only_with_pending,
+            only_with_verdict: self.only_with_verdict,
         }
     }
 
