@@ -159,7 +159,7 @@ fn a_sound_robot_is_ready() {
 /// In simulation the conditions belong to the trial: rough ground and soft gains are what it measures.
 #[test]
 fn a_simulated_robot_needs_no_readiness() {
-    let mut bench = emulated_on(Backend::Simulator, |_| {}).reach(Mode::Ready);
+    let mut bench = emulated_on(Backend::Simulator, 0, |_| {}).reach(Mode::Ready);
     bench.robot.tamper = |state| state.foot_force_n = [0.0; 4];
     bench.ticks(300);
     assert_eq!(bench.cycle.readiness().unready, None);

@@ -4,6 +4,8 @@
 
 #[path = "support/bench.rs"]
 mod bench;
+#[path = "support/emulated.rs"]
+mod emulated;
 #[path = "support/go1.rs"]
 mod go1;
 
@@ -11,11 +13,9 @@ use std::collections::BTreeMap;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use bench::{Bench, shipped};
-use go1::pair;
-use quadfrog::robot::go1::Go1;
-use quadfrog::robot::{JOINTS, JointCommand, LinkStatus, Placement, Robot, RobotError, RobotState, joint_name};
-use quadfrog::sim::emulator::{Emulator, EmulatorFault, help};
+use emulated::{EmulatedBench, emulated_on};
+use quadfrog::robot::{JOINTS, joint_name};
+use quadfrog::sim::emulator::{EmulatorFault, help};
 use quadfrog::telemetry::{Command, Event, Mode, Permit, Tick, TrialEnd};
 use quadfrog::trial::Backend;
 use rand_chacha::ChaCha8Rng;
@@ -106,29 +106,8 @@ fn sequence(seed: u64) -> Vec<(u64, Injected)> {
     faults
 }
 
-/// A link and an emulated robot; every tick is followed by one millisecond of the robot.
-struct LinkedRobot {
-    go1: Go1,
-    emulator: Emulator,
-}
-
-impl Robot for LinkedRobot {
-    fn read(&mut self) -> Result<RobotState, RobotError> {
-        self.go1.read()
-    }
-    fn write(&mut self, command: &JointCommand) -> Result<(), RobotError> {
-        self.go1.write(command)
-    }
-    fn place(&mut self, placement: &Placement) -> bool {
-        self.go1.place(placement)
-    }
-    fn link(&self) -> Option<LinkStatus> {
-        self.go1.link()
-    }
-}
-
 struct Sequence {
-    bench: Bench<LinkedRobot>,
+    bench: EmulatedBench,
     silent: bool,
     /// The first permit of the run; stale after any change of mode.
     old_permit: Permit,
@@ -138,13 +117,7 @@ struct Sequence {
 
 impl Sequence {
     fn new(seed: u64) -> Sequence {
-        let (config, _, settings) = shipped(Backend::Hardware);
-        let (emulator, go1) = pair(&config.simulator, seed);
-        let robot = LinkedRobot { go1, emulator };
-        let bench = Bench {
-            after_tick: |robot: &mut LinkedRobot| robot.emulator.step(),
-            ..Bench::new(config, settings, robot)
-        };
+        let bench = emulated_on(Backend::Hardware, seed, |_| {});
         let old_permit = bench.permit();
         Sequence { bench, silent: false, old_permit, log: Vec::new() }
     }

@@ -46,11 +46,11 @@ impl Robot for EmulatedGo1 {
 
 pub type EmulatedBench = Bench<EmulatedGo1>;
 
-/// A robot that lies, with the simulator's configuration changed.
-pub fn emulated_on(backend: Backend, simulator: impl Fn(&mut SimConfig)) -> EmulatedBench {
+/// A robot that lies, with the simulator's configuration changed and the seed of its random numbers.
+pub fn emulated_on(backend: Backend, seed: u64, simulator: impl Fn(&mut SimConfig)) -> EmulatedBench {
     let (mut config, _, settings) = shipped(backend);
     simulator(&mut config.simulator);
-    let emulator = emulator(&config.simulator, 0);
+    let emulator = emulator(&config.simulator, seed);
     let network = network(emulator.local_address().unwrap());
     let go1 = Go1::open(&network, false).unwrap();
     let robot = EmulatedGo1 { go1, emulator, tamper: |_| {}, deaf_ms: 0, sent: JointCommand::default() };
@@ -58,7 +58,7 @@ pub fn emulated_on(backend: Backend, simulator: impl Fn(&mut SimConfig)) -> Emul
 }
 
 pub fn emulated(simulator: impl Fn(&mut SimConfig)) -> EmulatedBench {
-    emulated_on(Backend::Hardware, simulator)
+    emulated_on(Backend::Hardware, 0, simulator)
 }
 
 /// Actuators, friction and sensors of the hardware-like model.
