@@ -97,7 +97,7 @@ fn a_parameter_that_does_not_exist_is_refused_with_those_that_do() {
     refuses("optimize.toml", "[parameters]\nforward = [\"f0\", \"Fw\"]\n", &["Fw", "Fx"]);
 }
 
-/// (A defect once: without f0 the impulse never ended.)
+/// Regression: without f0 the impulse never ended.
 #[test]
 fn a_task_without_f0_or_a_frequency_of_zero_is_refused() {
     refuses("optimize.toml", "[parameters]\nforward = [\"Fx\", \"Fz\"]\n", &["parameters.forward", "needs f0"]);
@@ -161,7 +161,7 @@ fn a_stop_that_the_gate_would_cut_is_refused() {
     refuses("safety.toml", "[gate]\ndamping_kd = 20.0\n", &["gate.damping_kd", "kd_max"]);
 }
 
-/// (A defect once: such values were reported in line 1.)
+/// Regression: such values were reported in line 1.
 #[test]
 fn values_that_no_kind_can_hold_are_refused_with_their_line_key_and_value() {
     refuses(

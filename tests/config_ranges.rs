@@ -224,7 +224,7 @@ fn limits_that_protect_nothing_are_refused_on_hardware_with_range_and_remedy() {
     }
 }
 
-/// (A defect once: 0.03 for 3.0 was the word 0 on the wire, and STOP and guard left the robot limp.)
+/// Regression: 0.03 for 3.0 was the word 0 on the wire, and STOP and guard left the robot limp.
 #[test]
 fn damping_that_is_nothing_on_the_wire_is_refused_on_every_backend() {
     for kd in ["0.03", "0.9", "0", "nan"] {

@@ -6,7 +6,7 @@ use quadfrog::engine::{self, Options};
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::trial::{Backend, Task};
 
-/// (A defect once: a console with 14 descriptors ended at once with exit status 0, without a word.)
+/// Regression: a console with 14 descriptors ended at once with exit status 0, without a word.
 #[test]
 fn a_session_with_too_few_descriptors_is_refused_with_the_remedy() {
     let (config, robot) = (Config::load(None).unwrap(), RobotDescription::embedded("go1").unwrap());

@@ -281,7 +281,7 @@ fn a_motor_leaves_servo_mode_only_after_it_was_in_it() {
 }
 
 /// In place of a command that does not fit a datagram, the last damping command is sent, in servo mode, and the caller
-/// gets an error. (A defect once: all motors got mode 0x00, their own braking of unknown strength.)
+/// gets an error. Regression: all motors got mode 0x00, their own braking of unknown strength.
 #[test]
 fn a_command_that_is_no_number_becomes_the_last_damping_and_an_error() {
     let mut robot = Robots::new();

@@ -68,7 +68,7 @@ fn endless_and_deep_descriptions_are_refused() {
     assert!(refused("<").contains("go1.urdf"));
 }
 
-/// (A defect once: the read never ended.)
+/// Regression: the read never ended.
 #[test]
 fn a_file_without_an_end_is_refused() {
     let folder = tempfile::tempdir().unwrap();
@@ -106,7 +106,7 @@ fn parameter(low: &str, high: &str, log: bool) -> String {
     )
 }
 
-/// (A defect once: the sampler panicked.)
+/// Regression: the sampler panicked.
 #[test]
 fn a_distribution_that_is_no_range_is_refused_with_its_line() {
     let folder = tempfile::tempdir().unwrap();

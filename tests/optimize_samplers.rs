@@ -216,7 +216,7 @@ fn spaces_that_cannot_be_searched_are_refused() {
     assert_eq!(Space::new(twice), Err(SpaceError::Duplicate("f0".into())));
 }
 
-/// (A defect once: a void trial told the samplers nothing, and a deterministic one proposed its point again, ten times in a row.)
+/// Regression: a void trial had no effect on the samplers, and a deterministic one proposed its point again, ten times in a row.
 #[test]
 fn no_sampler_proposes_the_point_of_a_void_trial_again() {
     for &kind in SamplerKind::ALL {

@@ -226,7 +226,7 @@ fn without_its_guard_a_robot_is_not_armed() {
     assert_eq!(session.body.mode(), Mode::Disarmed);
 }
 
-/// (A defect once: a stopped guard was not noticed, and jumps were approved meanwhile.)
+/// Regression: a stopped guard was not noticed, and jumps were approved meanwhile.
 #[test]
 fn while_its_guard_does_not_answer_a_robot_is_not_armed() {
     let mut session = Session::cleared();
@@ -237,7 +237,7 @@ fn while_its_guard_does_not_answer_a_robot_is_not_armed() {
     assert!(session.request(OperatorRequest::Arm).accepted);
 }
 
-/// (A defect once: what the system denied was a line in the log.)
+/// Regression: what the system denied was a line in the log.
 #[test]
 fn denied_real_time_settings_are_confirmed_before_arming_each_with_its_remedy() {
     let cleared = |granted: &[RealtimeSetting], denied: &[DeniedSetting]| {
@@ -268,7 +268,7 @@ fn denied_real_time_settings_are_confirmed_before_arming_each_with_its_remedy() 
     assert!(!answer.accepted && answer.answer.contains("not requested"), "{answer:?}");
 }
 
-/// (A defect once: a confirmation of the morning armed the robot in the evening.)
+/// Regression: a confirmation of the morning armed the robot in the evening.
 #[test]
 fn the_word_on_the_area_is_forgotten_after_a_minute() {
     let mut session = Session::cleared();
@@ -389,7 +389,7 @@ fn a_full_disk_and_a_missing_recording_are_named() {
 }
 
 /// STOP is everybody's: who only looks may press it, damping is sent then, and an acknowledgement gives the robot back to whose
-/// it is. (A defect once: a session that only observes was damping for ever after its STOP.)
+/// it is. Regression: a session that only observes was damping for ever after its STOP.
 #[test]
 fn an_observer_may_stop_and_then_lets_go_of_the_robot() {
     let mut session = Session::begin(Backend::Hardware, None, true);
@@ -408,7 +408,7 @@ fn an_observer_may_stop_and_then_lets_go_of_the_robot() {
     assert_eq!(session.robot.writes, writes, "nothing is sent any more");
 }
 
-/// (A defect once: the end of the session judged by the last known mode, and an arming on its way left the robot standing.)
+/// Regression: the end of the session judged by the last known mode, and an arming on its way left the robot standing.
 #[test]
 fn an_arming_on_its_way_when_the_session_ends_energises_nothing() {
     let mut session = Session::new(Backend::Simulator, None);
@@ -434,7 +434,7 @@ fn the_end_of_a_session_that_only_observes_sends_nothing() {
     assert_eq!((session.body.mode(), session.robot.writes), (Mode::Observe, 0));
 }
 
-/// (A defect once: `auto` went on judging and arming while the program said goodbye.)
+/// Regression: `auto` went on judging and arming while the program said goodbye.
 #[test]
 fn nothing_is_done_by_itself_any_more_once_the_session_ends() {
     let mut session = Session::begin(Backend::Simulator, None, false);
@@ -446,7 +446,7 @@ fn nothing_is_done_by_itself_any_more_once_the_session_ends() {
     assert_eq!(session.body.mode(), Mode::Disarmed);
 }
 
-/// (A defect once: control of a robot was taken before the first heartbeat of a screen.)
+/// Regression: control of a robot was taken before the first heartbeat of a screen.
 #[test]
 fn control_is_taken_only_once_a_screen_was_heard() {
     let mut session = Session::begin(Backend::Simulator, None, false);

@@ -26,7 +26,7 @@ fn open(options: &Options) -> Result<Experiment, EngineError> {
     open_experiment(options, Durability::Buffered, "")
 }
 
-/// (A defect once: twelve simulated trials were continued on the robot without a word, the first at 310 N.)
+/// Regression: twelve simulated trials were continued on the robot without a word, the first at 310 N.
 #[test]
 fn a_simulated_study_is_continued_on_hardware_by_the_flag_alone() {
     let folder = tempfile::tempdir().unwrap();
@@ -153,7 +153,7 @@ fn a_queued_point_beyond_the_envelope_is_not_approved() {
     experiment.approve(proposal.trial, proposal.revision).unwrap();
 }
 
-/// (A defect once: a re-run was held to the widest bounds of safety.toml only.)
+/// Regression: a re-run was held to the widest bounds of safety.toml only.
 #[test]
 fn a_rerun_is_held_to_the_present_bounds() {
     let mut experiment = support::experiment(9);

@@ -246,7 +246,7 @@ fn a_rerun_survives_every_moment_of_a_kill_and_comes_once() {
     }
 }
 
-/// (A defect once: after an undo the revisions began anew, and an old approval matched a proposal that the operator had not seen.)
+/// Regression: after an undo the revisions began anew, and an old approval matched a proposal that the operator had not seen.
 #[test]
 fn an_approval_from_before_an_undo_is_refused() {
     let mut experiment = experiment(5);
@@ -258,8 +258,8 @@ fn an_approval_from_before_an_undo_is_refused() {
     assert!(experiment.approve(seen.trial, seen.revision).is_err());
 }
 
-/// A trial of which ticks were lost is not measured, and says so. (A defect once: only a gap between two ticks was seen, not a
-/// trial without its end.)
+/// A trial of which ticks were lost is not measured, and says so. Regression: only a gap between two ticks was seen, not a
+/// trial without its end.
 #[test]
 fn a_trial_with_lost_ticks_is_suggested_void() {
     let mut experiment = experiment(5);
@@ -296,8 +296,8 @@ fn the_records_tell_what_the_study_holds() {
     }
 }
 
-/// (A defect once: the age of a trial was the difference of two hosts' clocks, and one that ran ahead voided every trial of
-/// the others.)
+/// Regression: the age of a trial was the difference of two hosts' clocks, and one that ran ahead voided every trial of
+/// the others.
 #[test]
 fn a_worker_whose_clock_is_behind_keeps_its_trial() {
     let folder = tempfile::tempdir().unwrap();
@@ -335,7 +335,7 @@ fn a_trial_that_was_seen_running_for_too_long_is_void_and_comes_again() {
     assert_eq!((proposal.source, proposal.parent), (ProposalSource::Rerun, Some(spec.trial)));
 }
 
-/// (A defect once: the verdict's teller did not look whether another worker had paid the debt already.)
+/// Regression: the verdict's teller did not look whether another worker had paid the debt already.
 #[test]
 fn a_rerun_that_another_worker_has_queued_comes_once() {
     let folder = tempfile::tempdir().unwrap();
@@ -354,7 +354,7 @@ fn a_rerun_that_another_worker_has_queued_comes_once() {
     assert_eq!(study.trials().iter().filter(parent).count(), 1);
 }
 
-/// (A defect once: a session that accepts by itself judged the newest trial instead.)
+/// Regression: a session that accepts by itself judged the newest trial instead.
 #[test]
 fn a_trial_under_review_need_not_be_the_newest() {
     let folder = tempfile::tempdir().unwrap();

@@ -50,7 +50,7 @@ fn limits_of_the_motion_are_falls_and_other_faults_are_void() {
     }
 }
 
-/// (A defect once: the trial was void, so the sampler did not learn from it.)
+/// Regression: the trial was void, so the sampler did not learn from it.
 #[test]
 fn a_tripped_limit_counts_with_the_value_0() {
     let mut experiment = experiment(5);
@@ -140,8 +140,8 @@ fn a_limit_that_an_emulated_robot_trips_is_a_fall() {
     assert!(cause.starts_with("limit: ") && cause.contains("exceeds"), "{cause}");
 }
 
-/// (A defect once: with these bounds the Gaussian process proposed `f0 0.800 Fx 400 Fz 700` ten times in a row, each time void
-/// by the velocity of a joint, and the study ended.)
+/// Regression: with these bounds the Gaussian process proposed `f0 0.800 Fx 400 Fz 700` ten times in a row, each time void
+/// by the velocity of a joint, and the study ended.
 #[test]
 fn the_gaussian_process_leaves_a_corner_that_trips_a_limit() {
     let folder = tempfile::tempdir().unwrap();

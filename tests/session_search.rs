@@ -338,7 +338,7 @@ fn a_rerun_runs_its_own_parameters_though_another_program_queues_a_point_at_the_
     assert_eq!(value(&experiment, "Fx"), 77.0);
 }
 
-/// (A defect once: seen now and then, as a session looks, the point took the re-run's parameters and was lost.)
+/// Regression: seen now and then, as a session looks, the point took the re-run's parameters and was lost.
 #[test]
 fn a_point_queued_beside_a_rerun_runs_and_so_does_the_rerun() {
     let folder = tempfile::tempdir().unwrap();
@@ -393,7 +393,7 @@ fn gains_that_a_queued_point_brings_are_seen_on_its_card() {
     assert!(refusal.contains("kp = 5000"), "{refusal}");
 }
 
-/// (A defect once: the refused request had reported the verdict, which could then not be undone.)
+/// Regression: the refused request had reported the verdict, which could then not be undone.
 #[test]
 fn a_confirmation_that_is_refused_tells_nothing() {
     let mut experiment = experiment(5);
@@ -414,7 +414,7 @@ fn a_verdict_against_the_suggestion_says_so_until_it_is_undone() {
     assert_eq!(experiment.row(spec.trial).unwrap().cause, "landed and settled");
 }
 
-/// (A defect once: each worker counted only the repeats that were complete, and all queued the last one.)
+/// Regression: each worker counted only the repeats that were complete, and all queued the last one.
 #[test]
 fn workers_together_run_no_more_repeats_than_were_asked_for() {
     let folder = tempfile::tempdir().unwrap();

@@ -33,8 +33,8 @@ fn changed(text: &str, from: &str, to: &str) -> String {
     text.replacen(from, to, 1)
 }
 
-/// (A defect once: a sensor scale of 0.05 instead of 1, with which four standing feet are in the air, gave the same
-/// fingerprint.)
+/// Regression: a sensor scale of 0.05 instead of 1, with which four standing feet are in the air, gave the same
+/// fingerprint.
 #[test]
 fn the_fingerprint_covers_the_robots_files() {
     let config = Config::load(None).unwrap();

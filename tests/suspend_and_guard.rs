@@ -22,7 +22,7 @@ fn linked(mode: Mode) -> Bench<LinkedRobot> {
     Bench::new(config, settings, LinkedRobot { with_truth: true, keeps_commands: true, ..lying }).reach(mode)
 }
 
-/// (A defect once: CLOCK_MONOTONIC stands still in a suspension, so nothing was late, and torques went on.)
+/// Regression: CLOCK_MONOTONIC stands still in a suspension, so nothing was late, and torques went on.
 #[test]
 fn a_suspension_of_the_computer_damps_in_the_same_tick_in_every_commanded_mode() {
     use Mode::*;

@@ -18,7 +18,7 @@ pub struct SwingLegs {
 }
 
 impl SwingLegs {
-    /// Takes in the contacts of one tick. Called once per tick.
+    /// Records the contacts of one tick. Called once per tick.
     pub fn update(&mut self, contact: &PerLeg<bool>) {
         let airborne = contact.iter().all(|&down| !down);
         self.airborne = if airborne { self.airborne + 1 } else { 0 };

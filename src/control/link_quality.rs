@@ -33,7 +33,7 @@ pub struct LinkQuality {
 }
 
 impl LinkQuality {
-    /// Takes in one tick; to be called once per tick, after reading the robot. `now_ns` is the local time at which the tick began,
+    /// Records one tick; to be called once per tick, after reading the robot. `now_ns` is the local time at which the tick began,
     /// `drift_ppm` the clocks' largest drift, parts per million. When the robot's clock restarts or stands still, the delay is measured
     /// anew.
     pub fn update(

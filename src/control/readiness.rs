@@ -16,7 +16,7 @@ pub struct QuietTime {
 }
 
 impl QuietTime {
-    /// Takes in the estimate of one tick; to be called once per tick. A tick without a new state does not count.
+    /// Records the estimate of one tick; to be called once per tick. A tick without a new state does not count.
     pub fn update(&mut self, estimate: &Estimate, state_age_ms: u32, settings: &ControlSettings) {
         if !settings.settle.is_quiet(estimate) {
             self.ticks = 0;

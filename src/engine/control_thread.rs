@@ -198,7 +198,7 @@ mod tests {
         (last, waited)
     }
 
-    /// (A defect once: a panic in a tick ended the thread, and the motors kept the last torques.)
+    /// Regression: a panic in a tick ended the thread, and the motors kept the last torques.
     #[test]
     fn a_panic_in_a_tick_or_its_warm_up_is_followed_by_damping_for_half_a_second_and_until_the_end() {
         for until in [[20, u32::MAX], [u32::MAX, 20]] {

@@ -306,7 +306,7 @@ mod tests {
         (GuardHeartbeat::new(ours, Arc::default()), theirs)
     }
 
-    /// (A defect once: a stopped guard was noticed only when its pipe was full, after eleven minutes.) In ticks, so that
+    /// Regression: a stopped guard was noticed only when its pipe was full, after eleven minutes. In ticks, so that
     /// the result does not depend on the machine's speed.
     #[test]
     fn a_guard_that_stops_answering_is_silent_within_a_hundred_ticks_and_one_that_answers_is_not() {
@@ -362,7 +362,7 @@ mod tests {
     }
 
     /// Runs a guard with the heartbeats of a commanded robot, which it reads at two wakes; the computer was suspended for
-    /// `suspended_ms` before the second. Returns the number of datagrams until it is told that the robot is left alone.
+    /// `suspended_ms` before the second. Returns the number of datagrams until the message that the robot is left alone.
     fn datagrams(suspended_ms: u32) -> usize {
         let ((robot, socket), (mut ours, theirs)) = (robot(), UnixStream::pair().unwrap());
         // One more than it reads at once.

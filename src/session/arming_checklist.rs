@@ -66,7 +66,7 @@ impl ArmingChecklist {
         }
     }
 
-    /// Takes in the real-time settings of the control thread.
+    /// Records the real-time settings of the control thread.
     pub fn scheduled(&mut self, granted: &[RealtimeSetting], denied: &[DeniedSetting]) {
         (self.granted, self.denied) = (granted.to_vec(), denied.to_vec());
     }
@@ -77,7 +77,7 @@ impl ArmingChecklist {
         self
     }
 
-    /// Takes in the operator's confirmation of a check.
+    /// Records the operator's confirmation of a check.
     pub fn confirm(&mut self, check: OperatorCheck, time_ns: u64) {
         self.confirmed.insert(check.check());
         if check == OperatorCheck::AreaClear {
@@ -98,7 +98,7 @@ impl ArmingChecklist {
         ))
     }
 
-    /// Takes in a change of mode: confirmations that it invalidates are withdrawn, and a STOP may be the test of the key.
+    /// Records a change of mode: confirmations that it invalidates are withdrawn, and a STOP may be the test of the key.
     pub fn mode_changed(&mut self, from: Mode, to: Mode, cause: &TransitionCause) {
         if from.energised() && !to.energised() {
             // A person may go to the robot now.
@@ -119,7 +119,7 @@ impl ArmingChecklist {
         };
     }
 
-    /// Takes in the number of restarts of the robot. Returns true if there was one since the last call: the operator's
+    /// Records the number of restarts of the robot. Returns true if there was one since the last call: the operator's
     /// confirmations are withdrawn then, in every mode.
     pub fn robot_restarted(&mut self, reboots: u64) -> bool {
         let restarted = reboots > self.reboots;

@@ -19,7 +19,7 @@ pub enum OperatorCheck {
     Priority,
     /// The program may run without the locked memory that the system denied.
     LockedMemory,
-    /// The loss of the operator's connection cannot be detected; somebody else watches the robot.
+    /// The loss of the operator's connection cannot be detected; another person watches the robot.
     Connection,
 }
 

@@ -37,7 +37,7 @@ fn optimize_prints_one_json_object_per_trial_in_the_promised_form() {
     assert!(study.join("config/control.toml").is_file());
 }
 
-/// (A defect once: the writer's own session record was followed by a second one.)
+/// Regression: the writer's own session record was followed by a second one.
 #[test]
 fn the_recording_of_optimize_holds_one_session_record() {
     let program = Program::new();
@@ -265,7 +265,7 @@ fn without_a_terminal_the_console_names_the_alternatives() {
     assert!(program.studies("recordings").is_empty());
 }
 
-/// (A defect once: the study was continued on the robot without a word.)
+/// Regression: the study was continued on the robot without a word.
 #[test]
 fn a_simulated_study_is_not_continued_on_the_robot_without_the_flag() {
     let program = Program::new();

@@ -248,7 +248,7 @@ fn a_lost_guard_is_reported() {
     assert!(session.wait().success());
 }
 
-/// (A defect once: it was noticed only when its pipe was full, after eleven minutes.) `session_arming` checks that arming is
+/// Regression: it was noticed only when its pipe was full, after eleven minutes. `session_arming` checks that arming is
 /// refused meanwhile.
 #[test]
 fn a_stopped_guard_is_reported_and_so_is_its_return() {

@@ -492,7 +492,7 @@ fn a_terminal_too_small_for_the_card_neither_approves_nor_arms() {
     assert_eq!(console.requests(&["A"]), []);
 }
 
-/// By the rules a tripped limit is a fall of the parameters: whoever voids it says why.
+/// A tripped limit is an outcome of the parameters, a fall: voiding it needs a reason.
 #[test]
 fn voiding_a_tripped_limit_asks_for_the_reason() {
     for (key, rerun) in [("v", false), ("r", true)] {

@@ -421,7 +421,7 @@ fn the_frame_says_how_link_battery_and_the_hottest_motor_are_at_every_size() {
     assert!(console.screen(40, 10).contains("link 3 ms, 2.0 % lost"));
 }
 
-/// (A defect once: the screen compared with 60 C, 30 % and 5 ms, whatever `safety.toml` said.)
+/// Regression: the screen compared with 60 C, 30 % and 5 ms, whatever `safety.toml` said.
 #[test]
 fn health_is_coloured_by_the_limits_of_the_session() {
     let mut console = on_hardware(Vec::new());

@@ -244,7 +244,7 @@ fn space_types_only_in_the_text_field_that_the_screen_has_reported() {
     assert_eq!(stop.count(), before + 1, "Enter may have closed the field");
 }
 
-/// A terminal whose inputs nobody takes: a blocked screen.
+/// A terminal whose inputs are not read: a blocked console.
 fn blocked() -> (OwnedFd, std::fs::File, StopLatch, Receiver<NumberedEvent>) {
     let (read, write) = nix::unistd::pipe().unwrap();
     (read, std::fs::File::from(write), StopLatch::default(), channel().1)

@@ -46,7 +46,7 @@ impl Consistency {
         *self = Consistency::default();
     }
 
-    /// Takes in one tick; to be called once per tick, before the failsafes.
+    /// Records one tick; to be called once per tick, before the failsafes.
     pub fn update(&mut self, inputs: &ConsistencyInputs, settings: &ControlSettings) {
         if !settings.hardware {
             return;

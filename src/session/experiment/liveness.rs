@@ -20,7 +20,7 @@ impl Liveness {
         Liveness { abandoned, last_news: BTreeMap::new() }
     }
 
-    /// Takes in the present state of the trials; to be called whenever the study was read.
+    /// Records the present state of the trials; to be called whenever the study was read.
     pub fn update(&mut self, trials: &[Trial]) {
         let now = Instant::now();
         let before = std::mem::take(&mut self.last_news);

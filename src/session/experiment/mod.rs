@@ -210,7 +210,7 @@ impl Experiment {
         Ok(())
     }
 
-    /// Takes in the changes of other programs: their trials join the table, and a point that they have queued is proposed
+    /// Records the changes of other programs: their trials join the table, and a point that they have queued is proposed
     /// next if the operator has not changed the proposal. To be called regularly.
     pub fn refresh(&mut self) -> Result<(), RequestRefusal> {
         if !self.is_idle() {

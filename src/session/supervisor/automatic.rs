@@ -47,7 +47,7 @@ impl Supervisor {
         self.finish_jobs(time_ns);
     }
 
-    /// Takes in the answer to a request of the rule.
+    /// Records the answer to a request of the rule.
     pub(super) fn rule_answered(&mut self, request: &OperatorRequest, answer: Result<String, String>, time_ns: u64) {
         let approval = self.unattended.approval;
         match answer {

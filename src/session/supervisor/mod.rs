@@ -190,7 +190,7 @@ impl Supervisor {
         self
     }
 
-    /// Takes in the real-time settings that the control thread was granted and denied: arming checks on hardware.
+    /// Records the real-time settings that the control thread was granted and denied: arming checks on hardware.
     pub fn report_scheduling(&mut self, granted: &[RealtimeSetting], denied: &[DeniedSetting], time_ns: u64) {
         self.checklist.scheduled(granted, denied);
         if !granted.is_empty() {
@@ -228,7 +228,7 @@ impl Supervisor {
         self.mode
     }
 
-    /// Takes in the events and ticks since the last call; to be called every few milliseconds.
+    /// Records the events and ticks since the last call; to be called every few milliseconds.
     pub fn poll(&mut self, time_ns: u64) {
         while let Ok(event) = self.control.events.pop() {
             self.event(event, time_ns);

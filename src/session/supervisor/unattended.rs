@@ -33,7 +33,7 @@ impl Unattended {
         }
     }
 
-    /// Takes in that arming was refused: it is tried again later.
+    /// Records that arming was refused: it is tried again later.
     pub fn arming_refused(&mut self, time_ns: u64) {
         self.arming = false;
         self.retry_ns = time_ns + RETRY_NS;

@@ -121,7 +121,7 @@ impl Decoder {
         }
     }
 
-    /// Takes in that no byte has followed for a while: a lone ESC is the key Esc.
+    /// Records that no byte has followed for a while: a lone ESC is the key Esc.
     pub fn idle(&mut self, inputs: &mut Vec<TerminalEvent>) {
         match self.state {
             State::Escape => inputs.push(TerminalEvent::Key(named(KeyCode::Esc))),

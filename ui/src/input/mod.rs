@@ -76,7 +76,7 @@ impl KeyReader {
         }
     }
 
-    /// Takes in that no byte came for [`KeyReader::wait`].
+    /// Records that no byte came for [`KeyReader::wait`].
     pub fn idle(&mut self, mut forward: impl FnMut(NumberedEvent)) {
         self.decoder.idle(&mut self.decoded);
         self.forward(&mut forward);
