@@ -13,7 +13,7 @@ use quadfrog::session::objective;
 use quadfrog::session::rollout::Rollout;
 use quadfrog::sim::{ActuatorKind, SimConfig, Simulator};
 use quadfrog::telemetry::{Tick, TrialEnd, TrialSpec};
-use quadfrog::trial::{Backend, JumpParameters, MeasuredJump, Task, Verdict};
+use quadfrog::trial::{Backend, JumpParameters, MeasuredJump, ObjectiveRule, Task, Verdict};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
@@ -209,8 +209,8 @@ pub fn jumps_on<R: Robot>(
         let mut rollout = Rollout::new(machine(spec.seed), &settings);
         let (end, ticks) = rollout.run(&spec);
         // A trial that is refused or falls before its impulse measures nothing.
-        let Some(estimate) = objective::measure(ticks) else { continue };
-        let truth = objective::measure(&in_truth(ticks, &settings)).unwrap();
+        let Some(estimate) = objective::measure(&ObjectiveRule::single(task), ticks) else { continue };
+        let truth = objective::measure(&ObjectiveRule::single(task), &in_truth(ticks, &settings)).unwrap();
         trials.push((JumpError { task, truth, estimate }, end));
     }
     trials
