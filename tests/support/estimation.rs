@@ -136,7 +136,7 @@ fn even(random: &mut ChaCha8Rng) -> f64 {
 }
 
 /// Errors of the estimate over one jump that did not fall: estimate minus truth.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct JumpError {
     pub task: Task,
     pub truth: MeasuredJump,
