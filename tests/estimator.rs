@@ -19,7 +19,7 @@ use quadfrog::session::rollout::Rollout;
 use quadfrog::session::{automatic, objective};
 use quadfrog::sim::Simulator;
 use quadfrog::telemetry::Estimate;
-use quadfrog::trial::{Backend, Task, TrialRecord, Verdict};
+use quadfrog::trial::{Backend, ObjectiveRule, Task, TrialRecord, Verdict};
 
 /// Joint angles of a stance, feet at the task's nominal positions.
 fn stance(settings: &ControlSettings) -> Joints {
@@ -423,8 +423,8 @@ fn study(source: &str, seed: u32) -> (TrialRecord, f64) {
     let mut life = open_experiment(&options, Durability::Buffered, "").unwrap();
     let mut in_truth = Vec::new();
     automatic::run(&mut life, &mut Rollout::new(simulator, &settings), |row, ticks| {
-        let truth = objective::measure(&estimation::in_truth(ticks, &settings)).unwrap();
-        in_truth.push((row.trial, objective::value(task, &truth, 1)));
+        let truth = objective::measure(&ObjectiveRule::single(task), &estimation::in_truth(ticks, &settings)).unwrap();
+        in_truth.push((row.trial, objective::value(&ObjectiveRule::single(task), &truth)));
     })
     .unwrap();
     let best = life.best().unwrap().clone();

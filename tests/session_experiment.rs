@@ -127,7 +127,7 @@ fn a_hand_measured_value_replaces_the_measured_one_and_both_are_kept() {
     experiment.judge(Verdict::Accept, false).unwrap();
     let row = experiment.row(spec.trial).unwrap();
     assert_eq!((row.value, row.hand_value), (Some(0.5), Some(0.5)));
-    assert_eq!(row.measured.unwrap().dx_m, far(&spec));
+    assert_eq!(row.measured.as_ref().unwrap().dx_m, far(&spec));
 }
 
 #[test]
@@ -266,7 +266,7 @@ fn a_trial_with_lost_ticks_is_suggested_void() {
     let spec = approve(&mut experiment);
     experiment.ended(spec.trial, &TrialEnd::Settled, &ticks(spec.trial, 0.6), 41);
     let row = experiment.row(spec.trial).unwrap();
-    assert_eq!((row.suggested, row.measured), (Some(Verdict::Void), None));
+    assert_eq!((row.suggested, row.measured.as_ref()), (Some(Verdict::Void), None));
     assert!(row.cause.contains("39 ticks"), "{}", row.cause);
 }
 

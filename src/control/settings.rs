@@ -8,7 +8,7 @@ use crate::robot::kinematics::LegGeometry;
 use crate::robot::remote::RemoteButtons;
 use crate::robot::{Joints, LEGS, PerLeg};
 use crate::telemetry::{Estimate, SensorCheck, TrialSpec};
-use crate::trial::{Gains, JumpParameters, Task};
+use crate::trial::{BounceRule, Gains, JumpParameters, ObjectiveRule, Task};
 
 /// Stance between trials.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -381,6 +381,8 @@ pub struct TaskControl {
     pub jumps: u32,
     /// Frequency between impulses, Hz.
     pub f1_hz: f64,
+    /// Rule for a robot that bounces on after its landing.
+    pub bounce: BounceRule,
 }
 
 impl TaskControl {
@@ -392,6 +394,11 @@ impl TaskControl {
     /// The nominal foot of a left leg, leg frame, m.
     pub fn stance_leg(&self) -> Vector3<f64> {
         self.stance_m.into()
+    }
+
+    /// Computation of the objective of `task`.
+    pub fn objective(&self, task: Task) -> ObjectiveRule {
+        ObjectiveRule { task, jumps: self.jumps, bounce: self.bounce }
     }
 
     /// A trial of `task` with this force profile, as configured: number 0 and seed 0.
@@ -406,6 +413,7 @@ impl TaskControl {
             attitude_rate_gain: self.attitude_rate_gain,
             foot_placement_s: self.foot_placement_s,
             jumps: self.jumps,
+            bounce: self.bounce,
             seed: 0,
         }
     }

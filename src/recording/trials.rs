@@ -3,8 +3,8 @@
 use super::frog;
 use super::wire::{DecodeError, Way};
 use crate::trial::{
-    FallRisk, FixedParameter, MeasuredJump, ParameterInsight, PointRecord, Proposal, ProposalInsight,
-    ProposedParameter, SearchStatus, SearchedParameter, TrialRecord,
+    Displacement, FallRisk, FixedParameter, JumpRow, MeasuredJump, ParameterInsight, PointRecord, Proposal,
+    ProposalInsight, ProposedParameter, SearchStatus, SearchedParameter, TrialRecord,
 };
 
 type Done = Result<(), DecodeError>;
@@ -49,6 +49,30 @@ fn measured(way: Way, ours: &mut MeasuredJump, m: &mut frog::trial::Measured) ->
     way.number(&mut ours.dyaw_rad, &mut m.dyaw);
     way.number(&mut ours.apex_m, &mut m.apex);
     way.number(&mut ours.air_s, &mut m.air);
+    way.copy(&mut ours.measured_value, &mut m.value);
+    way.copy(&mut ours.flights, &mut m.flights);
+    way.option(&mut ours.touchdown, &mut m.touchdown, displacement)?;
+    way.option(&mut ours.first_landing, &mut m.first_landing, displacement)?;
+    way.list(&mut ours.jumps, &mut m.jumps, jump)
+}
+
+fn displacement(way: Way, ours: &mut Displacement, m: &mut frog::trial::Displacement) -> Done {
+    way.number(&mut ours.time_s, &mut m.time);
+    way.number(&mut ours.dx_m, &mut m.dx);
+    way.number(&mut ours.dy_m, &mut m.dy);
+    way.number(&mut ours.dyaw_rad, &mut m.dyaw);
+    Ok(())
+}
+
+fn jump(way: Way, ours: &mut JumpRow, m: &mut frog::trial::Jump) -> Done {
+    way.number(&mut ours.time_s, &mut m.time);
+    way.number(&mut ours.x_m, &mut m.x);
+    way.number(&mut ours.y_m, &mut m.y);
+    way.number(&mut ours.yaw_rad, &mut m.yaw);
+    way.number(&mut ours.tilt_rad, &mut m.tilt);
+    way.number(&mut ours.rise_m, &mut m.rise);
+    way.number(&mut ours.air_s, &mut m.air);
+    way.number(&mut ours.value, &mut m.value);
     Ok(())
 }
 

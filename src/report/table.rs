@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::fmt::Write;
 
-use crate::trial::{ParameterInfo, TrialRecord, Verdict};
+use crate::trial::{JumpRow, ParameterInfo, TrialRecord, Verdict};
 
 /// One trial as a line: number, parameters with their units, value, verdict with its cause.
 pub fn line(row: &TrialRecord, unit: &str, units: &HashMap<String, String>) -> String {
@@ -46,13 +46,28 @@ pub fn table(rows: &[TrialRecord], best: Option<u32>, parameters: &[ParameterInf
             let value = row.parameters.get(&parameter.name);
             cells.push(value.map_or_else(String::new, |v| format!("{v:.*}", digits(&parameter.unit))));
         }
-        let measured = [row.measured.map(|measured| measured.apex_m), row.measured.map(|measured| measured.air_s)];
-        let numbers = [row.value, measured[0], measured[1]];
+        let measured = row.measured.as_ref();
+        let numbers = [row.value, measured.map(|measured| measured.apex_m), measured.map(|measured| measured.air_s)];
         cells.extend(numbers.map(|number| number.map_or_else(|| "-".into(), |number| format!("{number:.3}"))));
         cells.extend([row.source.name().into(), verdict(row)]);
         lines.push(cells);
     }
     aligned(&lines, |column| column + 2 >= columns)
+}
+
+/// The jumps of a trial as an aligned table; `unit` is that of the task's displacement or turn.
+pub fn jumps(rows: &[JumpRow], unit: &str) -> String {
+    let header = ["jump", "start (s)", "x (m)", "y (m)", "yaw (rad)", "tilt (rad)", "rise (m)", "air (s)"];
+    let mut lines = vec![header.map(str::to_owned).to_vec()];
+    lines[0].push(format!("value ({unit})"));
+    for (index, row) in rows.iter().enumerate() {
+        let JumpRow { time_s, x_m, y_m, yaw_rad, tilt_rad, rise_m, air_s, value } = *row;
+        let numbers = [time_s, x_m, y_m, yaw_rad, tilt_rad, rise_m, air_s, value];
+        let mut cells = vec![(index + 1).to_string()];
+        cells.extend(numbers.map(|number| format!("{number:.3}")));
+        lines.push(cells);
+    }
+    aligned(&lines, |_| false)
 }
 
 /// Lines of equally many cells in columns; texts are left-aligned, numbers right-aligned.

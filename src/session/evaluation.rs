@@ -1,7 +1,5 @@
 //! One point of a task over several seeds: falls with cause and time, value, attitude. Simulated time, no study.
 
-use nalgebra::Vector3;
-
 use super::objective;
 use super::rollout::Rollout;
 use crate::control::force_profile::Oscillator;
@@ -16,6 +14,8 @@ pub struct EvaluatedRun {
     pub seed: u64,
     /// End of the run.
     pub end: TrialEnd,
+    /// Reason of the verdict on the end.
+    pub cause: String,
     /// Time of the fall, or at which a limit tripped, since the first impulse began, s; none without either.
     pub fall_time_s: Option<f64>,
     /// Impulses that ended before the run did.
@@ -37,6 +37,11 @@ impl EvaluatedRun {
     pub fn stood(&self) -> bool {
         self.end == TrialEnd::Settled
     }
+
+    /// Whether the robot bounced on, and the rule of the task judges that.
+    pub fn bounced(&self) -> bool {
+        self.stood() && self.cause != objective::suggest(&self.end).1
+    }
 }
 
 /// Returns the number of impulses that begin within `duration_s`, at least one.
@@ -50,19 +55,22 @@ pub fn evaluate<R: Robot>(rollout: &mut Rollout<R>, spec: &TrialSpec) -> Evaluat
     let (end, ticks) = rollout.run(spec);
     let begun = ticks.iter().position(|tick| tick.trial_time_s >= 0.0).unwrap_or(ticks.len());
     let ticks = &ticks[begun..];
-    let measured = objective::measure(ticks);
+    let rule = spec.objective();
+    let measured = objective::measure(&rule, ticks);
     let range = |axis: usize| {
         let angles = ticks.iter().map(|tick| tick.estimate.roll_pitch_yaw[axis]);
         angles.clone().fold(f64::NEG_INFINITY, f64::max) - angles.fold(f64::INFINITY, f64::min)
     };
-    let starts: Vec<f64> = impulse_edges(ticks, true).map(tilt_rad).collect();
-    let value = measured.as_ref().map(|measured| objective::value(spec.task, measured, spec.jumps));
+    let starts: Vec<f64> = impulse_edges(ticks, true).map(objective::tilt_rad).collect();
+    let value = measured.as_ref().and_then(|measured| measured.measured_value);
+    let (_, cause) = objective::suggest_measured(&end, measured.as_ref(), spec.bounce);
     EvaluatedRun {
         seed: spec.seed,
         fall_time_s: (matches!(end, TrialEnd::Fell(_)) || objective::trips_limit(&end))
             .then(|| ticks.last().map_or(0.0, |tick| tick.trial_time_s)),
         jumps: impulse_edges(ticks, false).count() as u32,
         value: value.filter(|_| end == TrialEnd::Settled).unwrap_or(0.0),
+        cause,
         measured,
         tilt_at_impulse_rad: starts.iter().sum::<f64>() / starts.len().max(1) as f64,
         roll_range_rad: if ticks.is_empty() { 0.0 } else { range(0) },
@@ -80,9 +88,4 @@ fn impulse_edges(ticks: &[Tick], rising: bool) -> impl Iterator<Item = &Tick> {
         before = impulse;
         edge
     })
-}
-
-fn tilt_rad(tick: &Tick) -> f64 {
-    let up_world = tick.estimate.world_from_body * Vector3::z();
-    up_world.z.clamp(-1.0, 1.0).acos()
 }

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use crate::trial::{Gains, JumpParameters, Task};
+use crate::trial::{BounceRule, Gains, JumpParameters, ObjectiveRule, Task};
 
 /// Settings of one trial; latched when the trial starts.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -25,8 +25,17 @@ pub struct TrialSpec {
     pub foot_placement_s: f64,
     /// Jumps in a row; 1 for a single jump.
     pub jumps: u32,
+    /// Rule for a robot that bounces on.
+    pub bounce: BounceRule,
     /// Seed of the simulator's random numbers.
     pub seed: u64,
+}
+
+impl TrialSpec {
+    /// Computation of the trial's objective.
+    pub fn objective(&self) -> ObjectiveRule {
+        ObjectiveRule { task: self.task, jumps: self.jumps, bounce: self.bounce }
+    }
 }
 
 /// Permit of one key press, or of the automatic rule, that energises; void after any change of mode, and after a time limit.

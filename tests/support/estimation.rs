@@ -13,7 +13,7 @@ use quadfrog::session::objective;
 use quadfrog::session::rollout::Rollout;
 use quadfrog::sim::{ActuatorKind, SimConfig, Simulator};
 use quadfrog::telemetry::{Tick, TrialEnd, TrialSpec};
-use quadfrog::trial::{Backend, JumpParameters, MeasuredJump, Task, Verdict};
+use quadfrog::trial::{Backend, JumpParameters, MeasuredJump, ObjectiveRule, Task, Verdict};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
@@ -136,7 +136,7 @@ fn even(random: &mut ChaCha8Rng) -> f64 {
 }
 
 /// Errors of the estimate over one jump that did not fall: estimate minus truth.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct JumpError {
     pub task: Task,
     pub truth: MeasuredJump,
@@ -209,8 +209,8 @@ pub fn jumps_on<R: Robot>(
         let mut rollout = Rollout::new(machine(spec.seed), &settings);
         let (end, ticks) = rollout.run(&spec);
         // A trial that is refused or falls before its impulse measures nothing.
-        let Some(estimate) = objective::measure(ticks) else { continue };
-        let truth = objective::measure(&in_truth(ticks, &settings)).unwrap();
+        let Some(estimate) = objective::measure(&ObjectiveRule::single(task), ticks) else { continue };
+        let truth = objective::measure(&ObjectiveRule::single(task), &in_truth(ticks, &settings)).unwrap();
         trials.push((JumpError { task, truth, estimate }, end));
     }
     trials

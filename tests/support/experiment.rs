@@ -11,7 +11,7 @@ use quadfrog::optimize::space::{Range, Space};
 use quadfrog::optimize::study::{Storage, Study, StudyOptions};
 use quadfrog::session::experiment::{Experiment, ExperimentPlan};
 use quadfrog::telemetry::{Tick, TrialEnd, TrialSpec};
-use quadfrog::trial::{Backend, ExperimentStage, ParameterInfo, Task, Verdict};
+use quadfrog::trial::{Backend, BounceRule, ExperimentStage, ParameterInfo, Task, Verdict};
 
 pub const BOUNDS: [(&str, f64, f64); 3] = [("f0", 0.75, 1.75), ("Fx", 0.0, 150.0), ("Fz", 150.0, 350.0)];
 
@@ -46,6 +46,7 @@ pub fn plan(budget: u32) -> ExperimentPlan {
             foot_placement_s: 0.0,
             jumps: 1,
             f1_hz: 0.0,
+            bounce: BounceRule::Ignore,
         },
         parameters: bounds(|low, high| (low, high)),
         seed: 0,

@@ -183,6 +183,23 @@ impl Draw {
         ProposedParameter { name: self.string(), value: self.number(), proposed: self.number() }
     }
 
+    fn displacement(&mut self) -> Displacement {
+        Displacement { time_s: self.number(), dx_m: self.number(), dy_m: self.number(), dyaw_rad: self.number() }
+    }
+
+    fn jump_row(&mut self) -> JumpRow {
+        JumpRow {
+            time_s: self.number(),
+            x_m: self.number(),
+            y_m: self.number(),
+            yaw_rad: self.number(),
+            tilt_rad: self.number(),
+            rise_m: self.number(),
+            air_s: self.number(),
+            value: self.number(),
+        }
+    }
+
     fn record(&mut self, kind: usize) -> Record {
         match kind {
             0 => Record::Session(SessionInfo {
@@ -242,6 +259,11 @@ impl Draw {
                     dyaw_rad: d.number(),
                     apex_m: d.number(),
                     air_s: d.number(),
+                    measured_value: d.option(Draw::number),
+                    flights: d.word() as u32,
+                    touchdown: d.option(Draw::displacement),
+                    first_landing: d.option(Draw::displacement),
+                    jumps: d.several(Draw::jump_row),
                 }),
                 value: self.option(Draw::number),
                 hand_value: self.option(Draw::number),

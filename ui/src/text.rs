@@ -1,6 +1,6 @@
 //! Rows of the trial table as text: clipboard, CSV, Markdown.
 
-use quadfrog::trial::{TrialRecord, Verdict};
+use quadfrog::trial::{Displacement, TrialRecord, Verdict};
 
 use crate::column::Column;
 use crate::model::Model;
@@ -34,6 +34,7 @@ fn export_cells(model: &Model) -> (Vec<String>, Vec<Vec<String>>) {
     let rest = ["value", "hand_value", "verdict", "suggested", "cause", "source", "parent", "attempt"];
     names.extend(rest.map(str::to_owned));
     names.extend(["dx_m", "dy_m", "dyaw_rad", "apex_m", "air_s", "note"].map(str::to_owned));
+    names.extend(["flights", "touchdown_dx_m", "touchdown_dy_m", "touchdown_dyaw_rad", "jumps"].map(str::to_owned));
     let optional = |value: Option<f64>| value.map(|value| value.to_string()).unwrap_or_default();
     let row = |trial: &&TrialRecord| {
         let mut cells = vec![trial.trial.to_string()];
@@ -51,6 +52,13 @@ fn export_cells(model: &Model) -> (Vec<String>, Vec<Vec<String>>) {
         let quantities = [Column::Dx, Column::Dy, Column::Yaw, Column::Rise, Column::Air];
         cells.extend(quantities.map(|column| optional(measured(trial, column))));
         cells.push(trial.note.clone());
+        let measured = trial.measured.as_ref();
+        let touchdown = measured.and_then(|m| m.touchdown);
+        cells.push(measured.map(|m| m.flights.to_string()).unwrap_or_default());
+        let along: [fn(Displacement) -> f64; 3] = [|at| at.dx_m, |at| at.dy_m, |at| at.dyaw_rad];
+        cells.extend(along.map(|of| optional(touchdown.map(of))));
+        // The rows as JSON; numbers always serialize.
+        cells.push(measured.and_then(|m| serde_json::to_string(&m.jumps).ok()).unwrap_or_default());
         cells
     };
     (names, model.trial_rows().iter().map(row).collect())

@@ -209,7 +209,7 @@ pub struct JudgedAttributes<'a> {
     rerun: bool,
     /// Numeric columns of their own, so that optuna-dashboard can sort by them.
     #[serde(flatten)]
-    measured: Option<MeasuredJump>,
+    measured: Option<&'a MeasuredJump>,
 }
 
 impl JudgedAttributes<'_> {
@@ -223,7 +223,7 @@ impl JudgedAttributes<'_> {
             value: *value,
             hand_value: *hand_value,
             rerun,
-            measured: *measured,
+            measured: measured.as_ref(),
         }
     }
 }

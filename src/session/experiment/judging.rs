@@ -17,8 +17,10 @@ impl Experiment {
         if !matches!(self.state, ExperimentState::Running(running) if running == trial) {
             return;
         }
-        let (mut suggested, mut cause) = objective::suggest(end);
         let missing = recorded.saturating_sub(ticks.len() as u64);
+        let rule = self.plan.control.objective(self.plan.task);
+        let measured = if missing == 0 { objective::measure(&rule, ticks) } else { None };
+        let (mut suggested, mut cause) = objective::suggest_measured(end, measured.as_ref(), rule.bounce);
         let jumped = missing > 0 || ticks.iter().any(|tick| tick.trial.is_some() && tick.trial_time_s >= 0.0);
         if missing > 0 && suggested == Verdict::Accept {
             (suggested, cause) = (Verdict::Void, format!("{missing} ticks of it were not recorded: not measured"));
@@ -26,7 +28,7 @@ impl Experiment {
             (suggested, cause) = (Verdict::Void, format!("before the jump: {cause}"));
         }
         if let Some(row) = self.rows.get_mut(&trial) {
-            row.measured = if missing == 0 { objective::measure(ticks) } else { None };
+            row.measured = measured;
             row.suggested = Some(suggested);
             row.cause = cause;
             row.value = value_of(row, suggested, &self.plan);
@@ -181,7 +183,8 @@ fn value_of(row: &TrialRecord, verdict: Verdict, plan: &ExperimentPlan) -> Optio
         Verdict::Fall => Some(0.0),
         Verdict::Void => None,
         Verdict::Accept => row.hand_value.or_else(|| {
-            row.measured.as_ref().map(|measured| objective::value(plan.task, measured, plan.control.jumps))
+            let rule = plan.control.objective(plan.task);
+            row.measured.as_ref().map(|measured| objective::value(&rule, measured))
         }),
     }
 }

@@ -299,7 +299,14 @@ pub fn trial(number: u32, verdict: Option<Verdict>, suggested: Option<Verdict>) 
         source: ProposalSource::Sampler,
         parent: None,
         parameters: vec![("f0".into(), 1.25), ("Fx".into(), 75.0), ("Fz".into(), 250.0)].into(),
-        measured: Some(MeasuredJump { dx_m: 0.42, dy_m: -0.01, dyaw_rad: 0.02, apex_m: 0.3, air_s: 0.25 }),
+        measured: Some(MeasuredJump {
+            dx_m: 0.42,
+            dy_m: -0.01,
+            dyaw_rad: 0.02,
+            apex_m: 0.3,
+            air_s: 0.25,
+            ..MeasuredJump::default()
+        }),
         value,
         hand_value: None,
         suggested,

@@ -3,7 +3,8 @@
 use quadfrog::recording::record::{ArmingCheckRecord, SessionInfo, StageRecord};
 use quadfrog::session::objective;
 use quadfrog::trial::{
-    ExperimentStage, ParameterInfo, Proposal, ProposalInsight, SearchStatus, SearchedParameter, TrialRecord, Verdict,
+    ExperimentStage, ObjectiveRule, ParameterInfo, Proposal, ProposalInsight, SearchStatus, SearchedParameter,
+    TrialRecord, Verdict,
 };
 
 use super::log::SessionLog;
@@ -98,6 +99,9 @@ impl SessionModel {
 
     /// The measured objective of a trial, before any verdict.
     pub fn measured_objective(&self, trial: &TrialRecord) -> Option<f64> {
-        Some(objective::value(self.info.task?, &trial.measured?, 1))
+        let measured = trial.measured.as_ref()?;
+        // A recording of an older version holds the displacement alone.
+        let of_one_jump = || Some(objective::value(&ObjectiveRule::single(self.info.task?), measured));
+        measured.measured_value.or_else(of_one_jump)
     }
 }

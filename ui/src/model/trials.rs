@@ -66,7 +66,7 @@ pub fn accepted_value(trial: &TrialRecord) -> Option<f64> {
 
 /// The measured quantity of a column, where it is one.
 pub fn measured(trial: &TrialRecord, column: Column) -> Option<f64> {
-    let m = trial.measured?;
+    let m = trial.measured.as_ref()?;
     match column {
         Column::Dx => Some(m.dx_m),
         Column::Dy => Some(m.dy_m),

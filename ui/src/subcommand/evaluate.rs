@@ -10,7 +10,6 @@ use quadfrog::engine::{EngineError, STUDY_FILE, open_stored};
 use quadfrog::optimize::study::Storage;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::session::evaluation::{EvaluatedRun, evaluate, jumps_within};
-use quadfrog::session::objective;
 use quadfrog::session::rollout::Rollout;
 use quadfrog::sim::Simulator;
 use quadfrog::telemetry::TrialSpec;
@@ -183,7 +182,7 @@ fn best(folder: Option<&Path>, task: Task, config: &Config) -> Result<ParameterV
 
 /// Returns one run as a line of JSON.
 fn line(spec: &TrialSpec, run: &EvaluatedRun) -> serde_json::Value {
-    let cause = (!run.stood()).then(|| objective::suggest(&run.end).1);
+    let cause = (!run.stood() || run.bounced()).then_some(&run.cause);
     json!({
         "variant": { "vmc": on_off(spec.vmc) },
         "seed": run.seed,
@@ -238,9 +237,9 @@ fn print_table(
             true => format!("{counts}  {:>7} {:>12}  {tilt:>7.3}  {:>10}  {:>11}\n", "-", "", "-", "-"),
             false => format!("{counts}  {value:>7.3} (std {spread:.3})  {tilt:>7.3}  {roll:>10.3}  {pitch:>11.3}\n"),
         };
-        for run in runs.iter().filter(|run| !run.stood()) {
+        for run in runs.iter().filter(|run| !run.stood() || run.bounced()) {
             let time = run.fall_time_s.map_or(String::new(), |time| format!(" at {time:.2} s"));
-            text += &format!("     seed {}: {}{time}\n", run.seed, objective::suggest(&run.end).1);
+            text += &format!("     seed {}: {}{time}\n", run.seed, run.cause);
         }
     }
     if to_error { eprint!("{text}") } else { print_line(text.trim_end()) }

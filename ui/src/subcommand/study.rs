@@ -237,7 +237,12 @@ fn show(selector: &StudySelector) -> Result<(), Failure> {
     if running + waiting > 0 {
         let _ = writeln!(text, "{running} running, {waiting} queued");
     }
-    print(&(text + &best_line(&opened, &rows)))
+    text += &best_line(&opened, &rows);
+    let jumps = best_row(&opened, &rows).and_then(|best| best.measured.as_ref()).map(|measured| &measured.jumps);
+    if let (Some(jumps), Some(ours)) = (jumps.filter(|jumps| jumps.len() > 1), ours) {
+        text += &table::jumps(jumps, ours.task.unit());
+    }
+    print(&text)
 }
 
 fn best_line(opened: &Opened, rows: &[TrialRecord]) -> String {

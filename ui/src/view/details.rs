@@ -1,6 +1,6 @@
 //! All details of one trial, for their dialog.
 
-use quadfrog::trial::TrialRecord;
+use quadfrog::trial::{Displacement, JumpRow, TrialRecord};
 
 use super::draw::clock;
 use super::points;
@@ -49,10 +49,20 @@ pub fn details(session: &SessionModel, theme: &Theme, trial: &TrialRecord) -> Ve
         let gain = |(name, value): &(String, f64)| format!("{name} {value}");
         row("gains", trial.gains.iter().map(gain).collect::<Vec<_>>().join(", "));
     }
-    if let Some(m) = trial.measured {
+    if let Some(m) = &trial.measured {
         row("displacement", format!("{:+.4} m forward, {:+.4} m left", m.dx_m, m.dy_m));
         row("turn", format!("{:+.4} rad", m.dyaw_rad));
         row("rise, air", format!("{:.4} m, {:.3} s", m.apex_m, m.air_s));
+        if let Some(at) = m.touchdown {
+            let Displacement { time_s, dx_m, dy_m, dyaw_rad } = at;
+            row("touchdown", format!("{dx_m:+.4} m, {dy_m:+.4} m, {dyaw_rad:+.4} rad at {time_s:.3} s"));
+        }
+        if m.flights > 1 {
+            row("bounced", format!("{} flights after the impulse", m.flights));
+        }
+        for (index, jump) in m.jumps.iter().enumerate().filter(|_| m.jumps.len() > 1) {
+            row(&format!("jump {}", index + 1), jump_line(jump, session.info.task.map_or("", |task| task.unit())));
+        }
     }
     if let Some(risk) = trial.risk.filter(|risk| risk.neighbours > 0) {
         let nearest = match (risk.nearest_fall_trial, risk.nearest_fall) {
@@ -65,4 +75,12 @@ pub fn details(session: &SessionModel, theme: &Theme, trial: &TrialRecord) -> Ve
         row("note", trial.note.clone());
     }
     rows
+}
+
+/// Start, place, attitude, rise, time in the air and value of one jump.
+fn jump_line(jump: &JumpRow, unit: &str) -> String {
+    let JumpRow { time_s, x_m, y_m, yaw_rad, tilt_rad, rise_m, air_s, value } = jump;
+    format!(
+        "{time_s:.2} s, x {x_m:+.3} m, y {y_m:+.3} m, yaw {yaw_rad:+.2}, tilt {tilt_rad:.2} rad, rise {rise_m:.3} m, air {air_s:.3} s, {value:+.3} {unit}"
+    )
 }

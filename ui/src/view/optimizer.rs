@@ -89,7 +89,7 @@ fn render_scatter(frame: &mut Frame, area: Rect, session: &SessionModel, theme: 
 
 /// Where the trunk came to rest, from above: forward is up, left is left, the start is `+`.
 fn render_landings(frame: &mut Frame, area: Rect, session: &SessionModel, theme: &Theme) {
-    let landed = || session.trials.records.values().filter_map(|trial| Some((trial, trial.measured?)));
+    let landed = || session.trials.records.values().filter_map(|trial| Some((trial, trial.measured.as_ref()?)));
     let body = heading(frame, area, theme, "Landings, from above", "forward is up");
     if body.height < 3 || body.width < 10 {
         return;

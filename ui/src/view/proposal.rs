@@ -117,7 +117,7 @@ fn review(session: &SessionModel, theme: &Theme, trial: &TrialRecord) -> Vec<Lin
         }
         None => lines.push(Line::from(label(" nothing was measured"))),
     }
-    if let Some(m) = trial.measured {
+    if let Some(m) = &trial.measured {
         let pair = |a, x, b, y| Line::from(vec![label(a), Span::raw(x), label(b), Span::raw(y)]);
         lines.push(pair(" dx   ", format!("{:+.3} m", m.dx_m), "  dy  ", format!("{:+.3} m", m.dy_m)));
         lines.push(pair(" rise ", format!("{:+.3} m", m.apex_m), "  air ", format!(" {:.3} s", m.air_s)));

@@ -51,7 +51,7 @@ impl Printer {
                 params: &row.parameters,
                 value: row.value,
                 verdict: row.verdict,
-                measured: row.measured,
+                measured: row.measured.as_ref(),
             };
             // Numbers and names always serialize.
             print_line(&serde_json::to_string(&line).unwrap_or_default());
@@ -141,7 +141,7 @@ struct JsonLine<'a> {
     params: &'a [(String, f64)],
     value: Option<f64>,
     verdict: Option<Verdict>,
-    measured: Option<MeasuredJump>,
+    measured: Option<&'a MeasuredJump>,
 }
 
 fn in_table_order<S: Serializer>(parameters: &&[(String, f64)], serializer: S) -> Result<S::Ok, S::Error> {
