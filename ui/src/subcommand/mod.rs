@@ -9,6 +9,7 @@ mod evaluate;
 mod failure;
 mod guard;
 mod optimize;
+mod parallel;
 mod recover;
 mod replay;
 mod selection;
