@@ -12,11 +12,11 @@ use quadfrog::session::rollout::Rollout;
 use quadfrog::sim::Simulator;
 use quadfrog::telemetry::TrialSpec;
 use quadfrog::trial::{Backend, JumpParameters, ParameterValues, Task};
+use quadfrog_console::output;
 use serde_json::json;
 
 use super::arguments::{self, Seeds, load_model, parse_seeds};
 use super::failure::Failure;
-use super::optimize::print_line;
 use super::parallel::in_parallel;
 
 #[derive(Debug, Args)]
@@ -88,7 +88,7 @@ pub fn run(arguments: &EvaluateArguments) -> Result<(), Failure> {
     let runs = in_parallel(arguments::cores(), &specs, rollout, |rollout, spec| Ok(evaluate(rollout, spec)))?;
     if arguments.json {
         for (spec, run) in specs.iter().zip(&runs) {
-            print_line(&line(spec, run).to_string());
+            output::line(&line(spec, run).to_string());
         }
     }
     print_table(arguments.json, task, &point, &robot, &variants, &specs, &runs);
@@ -221,5 +221,5 @@ fn print_table(
             text += &format!("     seed {}: {}{time}\n", run.seed, run.cause);
         }
     }
-    if to_error { eprint!("{text}") } else { print_line(text.trim_end()) }
+    if to_error { output::message(&text) } else { output::text(&text) }
 }
