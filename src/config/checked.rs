@@ -30,9 +30,19 @@ const FILES: [(&str, &str); 5] = [
 ];
 
 /// Optional keys, which the defaults leave out, each with an example of its kind.
-const OPTIONAL: [(&str, &str); 1] = [(
-    "optimize.toml",
-    "objective = \"truth\"
+const OPTIONAL: [(&str, &str); 2] = [
+    (
+        "simulator.toml",
+        "[terrain]
+friction_range = [1.0, 1.0]
+[terrain.blocks]
+area_m = [0.0, 0.0, 0.0, 0.0]
+friction_range = [1.0, 1.0]
+",
+    ),
+    (
+        "optimize.toml",
+        "objective = \"truth\"
 [sampler]
 startup_trials = 10
 [first]
@@ -42,7 +52,8 @@ lateral-right = { f0 = 1.0, f1 = 1.0, Fx = 1.0, Fy = 1.0, Fz = 1.0 }
 twist-ccw = { f0 = 1.0, f1 = 1.0, Fx = 1.0, Fy = 1.0, Fz = 1.0 }
 twist-cw = { f0 = 1.0, f1 = 1.0, Fx = 1.0, Fy = 1.0, Fz = 1.0 }
 ",
-)];
+    ),
+];
 
 /// A text laid over the file of a name.
 #[derive(Debug, Clone, Copy)]
