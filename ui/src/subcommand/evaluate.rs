@@ -9,7 +9,7 @@ use quadfrog::config::Config;
 use quadfrog::engine::{EngineError, STUDY_FILE, open_stored};
 use quadfrog::optimize::study::Storage;
 use quadfrog::robot::description::RobotDescription;
-use quadfrog::session::evaluation::{EvaluatedRun, evaluate, jumps_within};
+use quadfrog::session::evaluation::{EvaluatedRun, evaluate};
 use quadfrog::session::rollout::Rollout;
 use quadfrog::sim::Simulator;
 use quadfrog::telemetry::TrialSpec;
@@ -75,7 +75,8 @@ pub fn run(arguments: &EvaluateArguments) -> Result<(), Failure> {
             let message = "--duration: jumps in a row need f1, the frequency between impulses; give it in --point or control.toml";
             return Err(Failure::input(message));
         }
-        spec.jumps = jumps_within(&jump, duration_s);
+        spec.jumps = jump.within(duration_s);
+        spec.duration_s = duration_s;
     }
     let variants = if arguments.vmc.is_empty() { vec![spec.vmc] } else { arguments.vmc.clone() };
     let settings = config.settings(&robot, task, Backend::Simulator)?;
@@ -212,12 +213,14 @@ fn print_table(
     specs: &[TrialSpec],
     runs: &[EvaluatedRun],
 ) {
+    let rate = specs.first().is_some_and(|spec| spec.rate);
     let mut text = format!("{} of the {}, ", task.name(), robot.name);
     let values: Vec<String> = point.iter().map(|(name, value)| format!("{name} {value:.4}")).collect();
     text += &format!("{}, {} jumps\n", values.join(", "), specs.first().map_or(0, |spec| spec.jumps));
     text += &format!(
-        "vmc  runs falls  jumps  value per jump, {:<3}      tilt  roll range  pitch range, rad\n",
-        task.unit()
+        "vmc  runs falls  jumps  value{}, {:<5}    tilt  roll range  pitch range, rad\n",
+        if rate { "         " } else { " per jump" },
+        task.objective_unit(rate)
     );
     for &vmc in variants {
         let runs: Vec<&EvaluatedRun> =
