@@ -32,11 +32,13 @@ const CONTROL: &str = "control.toml";
 /// trial: some limits have a key for the simulator and one for hardware.
 pub fn limit_key(end: &TrialEnd, settings: &ControlSettings) -> Option<LimitKey> {
     let ((key, value), file) = match end {
-        TrialEnd::Settled | TrialEnd::Stopped | TrialEnd::Cancelled => return None,
+        TrialEnd::Settled | TrialEnd::Stopped | TrialEnd::Cancelled | TrialEnd::SatDown => return None,
         TrialEnd::NotQuiet => (("settle.cap_s", settings.settle.cap_s), CONTROL),
         TrialEnd::Fell(cause) => (fall_key(cause, settings), SAFETY),
-        TrialEnd::NotReady(TrialInhibit::NotQuiet { .. }) => (("settle.quiet_s", settings.settle.quiet_s), CONTROL),
-        TrialEnd::NotReady(inhibit) => (inhibit_key(inhibit, settings)?, SAFETY),
+        TrialEnd::NotReady(TrialInhibit::NotQuiet { .. }) | TrialEnd::Held(TrialInhibit::NotQuiet { .. }) => {
+            (("settle.quiet_s", settings.settle.quiet_s), CONTROL)
+        }
+        TrialEnd::NotReady(inhibit) | TrialEnd::Held(inhibit) => (inhibit_key(inhibit, settings)?, SAFETY),
         TrialEnd::Fault(Fault::PoseTimeout { .. }) => (("stand_up.timeout_s", settings.stand_up.timeout_s), CONTROL),
         TrialEnd::Fault(fault) => (fault_key(fault, settings)?, SAFETY),
     };

@@ -22,4 +22,5 @@ pub mod ramp;
 pub mod readiness;
 pub mod running_trial;
 pub mod settings;
+mod task_control;
 pub mod vmc;

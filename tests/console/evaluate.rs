@@ -28,6 +28,13 @@ fn every_variant_and_seed_is_one_object_with_the_same_bits_each_time() {
         assert!(run["cause"].is_null() && run["fall_time_s"].is_null());
         let per_jump = run["measured"]["dx_m"].as_f64().unwrap() / 5.0;
         assert!((run["value"].as_f64().unwrap() - per_jump).abs() < 1e-12, "{run}");
+        let jumps = run["measured"]["jumps"].as_array().unwrap();
+        let shares = jumps.iter().map(|jump| jump["value"].as_f64().unwrap()).sum::<f64>();
+        assert!(jumps.len() == 5 && (shares - 5.0 * per_jump).abs() < 1e-9, "{run}");
+        for name in ["time_s", "x_m", "y_m", "yaw_rad", "tilt_rad", "rise_m", "air_s"] {
+            assert!(jumps[1][name].is_f64(), "{run}");
+        }
+        assert!(run["measured"]["touchdown"]["dx_m"].as_f64().unwrap() > jumps[4]["x_m"].as_f64().unwrap(), "{run}");
     }
     for run in first.iter().filter(|run| run["fell"] == true) {
         assert!(run["cause"].is_string() && run["value"] == 0.0, "{run}");
@@ -151,5 +158,17 @@ fn wrong_input_is_refused_with_name_value_and_remedy() {
         let message = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
         assert!(parts.iter().all(|part| message.contains(part)), "{arguments:?}: {message}");
+    }
+}
+
+/// Of the seeds that no value of the example was chosen on.
+#[test]
+fn the_fast_example_stands_at_more_than_1_3_m_per_second() {
+    let runs = runs(&["--task", "forward", "--config", "examples/continuous_fast", "--seeds", "200-203", "--json"]);
+    for run in &runs {
+        let touchdown_s = run["measured"]["touchdown"]["time_s"].as_f64().unwrap();
+        let speed = run["measured"]["dx_m"].as_f64().unwrap() / touchdown_s;
+        assert!(run["fell"] == false && run["measured"]["flights"] == 1, "{run}");
+        assert!(speed > 1.3 && (run["value"].as_f64().unwrap() - speed).abs() < 1e-12, "{run}");
     }
 }

@@ -30,6 +30,9 @@ pub struct NewStudyAttributes<'a> {
     pub version: &'static str,
     pub budget: u32,
     pub backend: &'a str,
+    /// Unit of the objective; none for that of the task.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unit: Option<&'static str>,
 }
 
 /// The backend on which a study was continued last.
@@ -51,6 +54,8 @@ pub struct StudyAttributes {
     pub robot: Option<String>,
     pub seed: Option<u32>,
     pub budget: Option<u32>,
+    /// Unit of the objective; none for that of the task.
+    pub unit: Option<String>,
     /// The backend on which it was made or continued last; none for a study of an earlier version, which was simulated.
     pub backend: Option<String>,
     /// Bounds that the operator has changed, `{"Fx": [40, 110]}`.

@@ -130,6 +130,8 @@ pub struct Supervisor {
     limits: Option<ControlSettings>,
     /// Whether the robot sits down when a trial is over.
     review_sits_down: bool,
+    /// Whether the newest trial has several jumps in a row.
+    in_a_row: bool,
     /// The robot was sent to sit down for the review: no interruption of the automatic rule.
     sitting_for_review: bool,
 }
@@ -170,6 +172,7 @@ impl Supervisor {
             counters_ns: 0,
             checklist,
             approval,
+            in_a_row: false,
             lowerings_answered: [0; 2],
             published_checklist: Vec::new(),
             checklist_ns: 0,

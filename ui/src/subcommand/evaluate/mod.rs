@@ -13,7 +13,7 @@ use quadfrog::config::Config;
 use quadfrog::engine::{EngineError, STUDY_FILE, newest_config, open_stored, stored_study};
 use quadfrog::optimize::study::Storage;
 use quadfrog::robot::description::RobotDescription;
-use quadfrog::session::evaluation::{EvaluatedRun, evaluate, jumps_within};
+use quadfrog::session::evaluation::{EvaluatedRun, evaluate};
 use quadfrog::session::rollout::Rollout;
 use quadfrog::sim::{SimConfig, Simulator};
 use quadfrog::telemetry::TrialSpec;
@@ -96,7 +96,8 @@ pub fn run(arguments: &EvaluateArguments) -> Result<(), Failure> {
             let message = "--duration: jumps in a row need f1, the frequency between impulses; give it in --point or control.toml";
             return Err(Failure::input(message));
         }
-        spec.jumps = jumps_within(&jump, duration_s);
+        spec.jumps = jump.within(duration_s);
+        spec.duration_s = duration_s;
     }
     let settings = config.settings(robot, *task, Backend::Simulator)?;
     let simulators = simulators(arguments, config)?;
@@ -137,7 +138,7 @@ pub fn run(arguments: &EvaluateArguments) -> Result<(), Failure> {
     }
     let variants: Vec<(Variant, EvaluatedRun)> =
         runs.iter().zip(results).map(|(run, result)| (run.variant, result)).collect();
-    let text = table::table(*task, &robot.name, &point, spec.jumps, &variants);
+    let text = table::table(&spec, &robot.name, &point, &variants);
     if arguments.json {
         output::message(&text)
     } else {

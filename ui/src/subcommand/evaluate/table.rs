@@ -1,12 +1,14 @@
 //! The table of an evaluation: a row per variant, and the falls below it.
 
 use quadfrog::session::evaluation::EvaluatedRun;
-use quadfrog::trial::{ParameterValues, Task};
+use quadfrog::telemetry::TrialSpec;
+use quadfrog::trial::ParameterValues;
 
 use super::variant::{Variant, on_off};
 
 /// Returns the table as text. Jumps and tilt are those of all runs, the other columns those of the runs that stood.
-pub fn table(task: Task, robot: &str, point: &ParameterValues, jumps: u32, runs: &[(Variant, EvaluatedRun)]) -> String {
+pub fn table(spec: &TrialSpec, robot: &str, point: &ParameterValues, runs: &[(Variant, EvaluatedRun)]) -> String {
+    let TrialSpec { task, jumps, rate, .. } = *spec;
     let values: Vec<String> = point.iter().map(|(name, value)| format!("{name} {value:.4}")).collect();
     let mut text = format!("{} of the {robot}, {}, {jumps} jumps\n", task.name(), values.join(", "));
     let with_friction = runs.iter().any(|(variant, _)| variant.friction.is_some());
@@ -15,7 +17,7 @@ pub fn table(task: Task, robot: &str, point: &ParameterValues, jumps: u32, runs:
         "vmc  {}runs  falls  {:>13}  {:>20}  {:>13}  {:>15}  {:>16}\n",
         friction("friction"),
         "jumps",
-        format!("value per jump, {}", task.unit()),
+        format!("{}, {}", if rate { "value" } else { "value per jump" }, task.objective_unit(rate)),
         "tilt, rad",
         "roll range, rad",
         "pitch range, rad"
