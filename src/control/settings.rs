@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::robot::kinematics::LegGeometry;
 use crate::robot::remote::RemoteButtons;
 use crate::robot::{Joints, LEGS, PerLeg};
-use crate::telemetry::{Estimate, SensorCheck, TrialSpec};
+use crate::telemetry::{Estimate, LandingTerms, SensorCheck, TrialSpec};
 use crate::trial::{BounceRule, Gains, JumpParameters, ObjectiveRule, Task};
 
 /// Stance between trials.
@@ -377,6 +377,8 @@ pub struct TaskControl {
     pub attitude_rate_gain: f64,
     /// Time T of the foot placement, s: a swing foot is placed T times the trunk's velocity ahead; zero in the paper.
     pub foot_placement_s: f64,
+    /// Landing terms.
+    pub landing: LandingTerms,
     /// Jumps in a row.
     pub jumps: u32,
     /// Frequency between impulses, Hz.
@@ -412,6 +414,7 @@ impl TaskControl {
             vmc: self.vmc,
             attitude_rate_gain: self.attitude_rate_gain,
             foot_placement_s: self.foot_placement_s,
+            landing: self.landing,
             jumps: self.jumps,
             bounce: self.bounce,
             seed: 0,
