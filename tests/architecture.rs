@@ -28,7 +28,7 @@ const ENGINE: [(&str, &[&str]); 12] = [
 /// Layers of the console, lowest first: a module uses modules of lower layers only.
 const CONSOLE: [&[&str]; 9] = [
     &["action", "column", "series", "connection"],
-    &["keymap", "theme"],
+    &["keymap", "output", "theme"],
     &["settings", "message"],
     &["model"],
     &["layout", "text"],
