@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::PathBuf;
 
-use quadfrog::config::Config;
+use quadfrog::config::{Config, ConfigLayer};
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::trial::{Backend, JumpParameters, Task};
 
@@ -154,6 +154,20 @@ fn a_stance_that_kneels_is_refused_and_the_shipped_ones_do_not() {
         let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("examples").join(example);
         settings(&Config::load(Some(&path)).unwrap()).unwrap();
     }
+}
+
+#[test]
+fn a_later_text_replaces_keys_of_an_earlier_one_and_an_unknown_key_names_its_origin() {
+    let layer = |origin, text| ConfigLayer { file: "control.toml", origin, text };
+    let first = layer("first", "[tasks.forward]\njumps = 5\nf1_hz = 1.0\n");
+    let second = layer("second", "[tasks.forward]\nf1_hz = 1.5\n");
+    let config = Config::layered(&[first, second]).unwrap();
+    assert_eq!((config.task(Task::Forward).jumps, config.task(Task::Forward).f1_hz), (5, 1.5));
+    let error = Config::layered(&[first, layer("second", "\njumpz = 1\n")]).unwrap_err().to_string();
+    assert!(error.contains("second:2") && error.contains("jumpz"), "{error}");
+    let stray = ConfigLayer { file: "controls.toml", origin: "a/controls.toml", text: "" };
+    let error = Config::layered(&[stray]).unwrap_err().to_string();
+    assert!(error.contains("a/controls.toml") && error.contains("control.toml"), "{error}");
 }
 
 #[test]

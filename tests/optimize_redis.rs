@@ -9,10 +9,13 @@ mod support;
 use quadfrog::optimize::ask::SamplerConfig;
 use quadfrog::optimize::study::{Storage, Study, StudyError};
 use quadfrog::optimize::trial::{Trial, TrialState};
-use redis::{Ended, server};
+use redis::{Ended, address, free_port, server, start};
 use serde_json::{Value, json};
-use std::net::TcpListener;
+use std::io::{Read, Write};
+use std::net::{Shutdown, TcpListener, TcpStream};
 use std::process::{Command, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use support::{forward, options};
 
 /// Set for the processes that this test starts as workers: `URL SEED TRIALS`.
@@ -119,10 +122,127 @@ fn a_python_worker_joins_the_study() {
 
 #[test]
 fn a_server_that_is_not_there_is_named_without_its_password() {
-    let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
+    let port = free_port();
     let url = format!("redis://:secret@127.0.0.1:{port}/0");
     let error = open(&url, 0).unwrap_err().to_string();
     assert!(error.contains(&format!("127.0.0.1:{port}")) && !error.contains("secret"), "{error}");
+    assert!(!Storage::Redis(url).to_string().contains("secret"));
     let error = open("nowhere", 0).unwrap_err().to_string();
-    assert!(error.contains("nowhere"), "{error}");
+    assert!(error.contains("redis://HOST:PORT/DB"), "{error}");
+}
+
+#[test]
+fn an_address_that_cannot_be_parsed_is_refused_without_its_password() {
+    for url in ["redis://:secret@:port/0", "redis://user:secret@127.0.0.1:99999/0", "redis://:secret@127.0.0.1/x"] {
+        let error = open(url, 0).unwrap_err().to_string();
+        assert!(!error.contains("secret") && error.contains("redis://HOST:PORT/DB"), "{error}");
+        assert!(!Storage::Redis(url.to_owned()).to_string().contains("secret"));
+    }
+}
+
+#[test]
+fn workers_continue_after_a_restart_of_the_server() {
+    let folder = tempfile::tempdir().unwrap();
+    let port = free_port();
+    let kept = ["--appendonly", "yes", "--appendfsync", "always", "--dir", folder.path().to_str().unwrap()];
+    let Some(server) = start(port, &kept) else { return };
+    let url = address(port);
+    let mut study = open(&url, 0).unwrap();
+    let mut worker = spawn(&url, 1, 60);
+    while complete(study.trials()) < 20 {
+        run(&mut study);
+    }
+    // SIGKILL in the middle of the worker's requests.
+    drop(server);
+    let restarted = std::thread::spawn(move || {
+        std::thread::sleep(std::time::Duration::from_millis(500));
+        start(port, &["--appendonly", "yes", "--dir", folder.path().to_str().unwrap()]).map(|server| (server, folder))
+    });
+    while complete(study.trials()) < 80 {
+        run(&mut study);
+    }
+    assert!(worker.0.wait().unwrap().success(), "the worker ended with the server");
+    let _server = restarted.join().unwrap().expect("the server started before");
+    study.refresh().unwrap();
+    let of_worker = study.trials().iter().filter(|t| t.system_attributes["quadfrog:draws"]["seed"] == 1);
+    assert_eq!(complete(of_worker), 60);
+    assert!(study.trials().iter().enumerate().all(|(i, t)| t.number as usize == i));
+    assert_eq!(study.running().count(), 0);
+}
+
+#[test]
+fn a_server_that_lost_its_data_ends_the_study_with_its_name() {
+    let Some((_server, url)) = server() else { return };
+    let mut study = open(&url, 0).unwrap();
+    run(&mut study);
+    let mut connection = ::redis::Client::open(url.as_str()).unwrap().get_connection().unwrap();
+    ::redis::cmd("FLUSHALL").exec(&mut connection).unwrap();
+    let error = study.refresh().unwrap_err().to_string();
+    assert!(error.contains("lost its data") && error.contains("127.0.0.1"), "{error}");
+    // Also without a read in between: a worker that only writes.
+    let draft = study.draft();
+    let error = study.begin(&draft, &[], &[]).unwrap_err().to_string();
+    assert!(error.contains("lost its data"), "{error}");
+}
+
+/// Accepts connections and never answers.
+#[test]
+fn a_server_that_does_not_answer_is_given_up() {
+    let silent = TcpListener::bind("127.0.0.1:0").unwrap();
+    let url = address(silent.local_addr().unwrap().port());
+    let _accepting = std::thread::spawn(move || silent.incoming().filter_map(Result::ok).collect::<Vec<_>>());
+    let error = open(&url, 0).unwrap_err().to_string();
+    assert!(error.contains("127.0.0.1"), "{error}");
+}
+
+/// Forwards to a server; the answers to the first `lost` appends are dropped together with their connections.
+fn proxy(server: String, lost: usize) -> String {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let url = address(listener.local_addr().unwrap().port());
+    let lost = Arc::new(AtomicUsize::new(lost));
+    std::thread::spawn(move || {
+        for mut client in listener.incoming().filter_map(Result::ok) {
+            let (mut upstream, lost) = (TcpStream::connect(&server).unwrap(), lost.clone());
+            let (mut to_client, mut answers) = (client.try_clone().unwrap(), upstream.try_clone().unwrap());
+            let drops = Arc::new(AtomicBool::new(false));
+            let drop_answer = drops.clone();
+            std::thread::spawn(move || {
+                let mut bytes = vec![0; 1 << 16];
+                while let Ok(length @ 1..) = answers.read(&mut bytes) {
+                    if drop_answer.load(Ordering::Acquire) || to_client.write_all(&bytes[..length]).is_err() {
+                        break;
+                    }
+                }
+                let _ = to_client.shutdown(Shutdown::Both);
+            });
+            std::thread::spawn(move || {
+                let mut bytes = vec![0; 1 << 16];
+                while let Ok(length @ 1..) = client.read(&mut bytes) {
+                    let appends = bytes[..length].windows(4).any(|word| word == b"EVAL");
+                    let one_less = |left: usize| left.checked_sub(1);
+                    if appends && lost.fetch_update(Ordering::AcqRel, Ordering::Acquire, one_less).is_ok() {
+                        drops.store(true, Ordering::Release);
+                    }
+                    if upstream.write_all(&bytes[..length]).is_err() {
+                        break;
+                    }
+                }
+            });
+        }
+    });
+    url
+}
+
+#[test]
+fn a_lost_answer_doubles_no_line() {
+    let Some((_server, url)) = server() else { return };
+    let server = url.trim_start_matches("redis://").trim_end_matches("/0").to_owned();
+    let mut study = open(&proxy(server, 5), 0).unwrap();
+    for _ in 0..4 {
+        run(&mut study);
+    }
+    let seen = open(&url, 0).unwrap();
+    assert_eq!(complete(seen.trials()), 4);
+    assert_eq!(seen.trials().len(), 4, "a trial was begun twice");
+    assert_eq!(seen.trials(), study.trials());
 }

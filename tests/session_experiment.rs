@@ -386,3 +386,28 @@ fn a_raised_budget_is_kept_with_the_study() {
     let study = study_in(folder.path());
     assert_eq!(study.attributes()["budget"].as_u64(), Some(1005));
 }
+
+#[test]
+fn an_interrupted_study_runs_the_trials_of_an_unbroken_one_with_the_same_seeds() {
+    let seeds_of = |killed_in: &[u32]| {
+        let folder = tempfile::tempdir().unwrap();
+        let (mut experiment, mut seeds) = (open(folder.path()), Vec::new());
+        for trial in 0..8 {
+            if killed_in.contains(&trial) {
+                // A program that was killed between the approval and the verdict.
+                approve(&mut experiment);
+                drop(experiment);
+                experiment = open(folder.path());
+            }
+            seeds.push(accept(&mut experiment).seed);
+        }
+        seeds
+    };
+    let unbroken = seeds_of(&[]);
+    assert_eq!(seeds_of(&[0]), unbroken);
+    assert_eq!(seeds_of(&[2, 3, 6]), unbroken);
+    let mut distinct = unbroken.clone();
+    distinct.sort_unstable();
+    distinct.dedup();
+    assert_eq!(distinct.len(), 8, "each trial has noise of its own");
+}

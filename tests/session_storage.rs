@@ -11,7 +11,7 @@ use std::time::Duration;
 use attached_console::AttachedConsole;
 use quadfrog::config::Config;
 use quadfrog::engine::Options;
-use quadfrog::optimize::journal::{Durability, Journal, JournalFile, LOCK_GRACE, StudyRecord};
+use quadfrog::optimize::journal::{Durability, Journal, JournalFile, LOCK_GRACE, StudyRecord, WaitedFor};
 use quadfrog::optimize::trial::TrialState;
 use quadfrog::recording::record::{LogLevel, Record, RequestRecord};
 use quadfrog::robot::description::RobotDescription;
@@ -102,7 +102,9 @@ fn sit_down_acts_and_an_approval_dies_while_another_program_holds_the_lock() {
     let mut screen = AttachedConsole::ready(folder.path());
     let lock = HeldLock::hold(folder.path());
     screen.approve();
-    screen.until("the wait on the screen", |s| s.handle.storage_wait().is_some_and(|wait| wait.lock));
+    screen.until("the wait on the screen", |s| {
+        s.handle.storage_wait().is_some_and(|wait| wait.journal == Some(WaitedFor::Lock))
+    });
     assert_eq!(screen.handle.storage_wait().unwrap().place(), "the study's lock");
     screen.handle.request(OperatorRequest::SitDown);
     screen.until("sitting down", |s| s.mode() == Some(Mode::SitDown));
@@ -157,7 +159,9 @@ fn a_verdict_waits_for_the_lock_and_the_robot_does_not() {
     let before = screen.records.len();
     screen.handle.request(OperatorRequest::Judge(suggested.unwrap()));
     screen.handle.request(OperatorRequest::Note { trial: 0, text: "while it waits".into() });
-    screen.until("the wait on the screen", |s| s.handle.storage_wait().is_some_and(|wait| wait.lock));
+    screen.until("the wait on the screen", |s| {
+        s.handle.storage_wait().is_some_and(|wait| wait.journal == Some(WaitedFor::Lock))
+    });
     let ticks = screen.handle.snapshot().tick.number;
     screen.handle.stop();
     screen.until("damping", |s| s.mode() == Some(Mode::Damped));

@@ -56,6 +56,17 @@ twist-cw = { f0 = 1.0, f1 = 1.0, Fx = 1.0, Fy = 1.0, Fz = 1.0 }
     ),
 ];
 
+/// A text laid over the file of a name.
+#[derive(Debug, Clone, Copy)]
+pub struct ConfigLayer<'a> {
+    /// Name of the file, for example `control.toml`.
+    pub file: &'a str,
+    /// Place of the text, for messages: the path of its file.
+    pub origin: &'a str,
+    /// TOML with the keys that differ.
+    pub text: &'a str,
+}
+
 /// All files, checked.
 #[expect(missing_docs, reason = "a field has the name of its file")]
 #[derive(Debug, Clone)]
@@ -74,24 +85,39 @@ pub struct Config {
 impl Config {
     /// Loads the defaults, with the files of `folder` laid over them.
     pub fn load(folder: Option<&Path>) -> Result<Config, ConfigError> {
-        if let Some(folder) = folder {
-            refuse_unknown_files(folder)?;
+        let Some(folder) = folder else { return Config::layered(&[]) };
+        refuse_unknown_files(folder)?;
+        let mut texts = Vec::new();
+        for (name, _) in FILES {
+            let path = folder.join(name);
+            if path.exists() {
+                let text = read_text(&path).map_err(|source| ConfigError::Read { path: path.clone(), source })?;
+                texts.push((name, path.display().to_string(), text));
+            }
+        }
+        let layers = texts.iter().map(|(file, origin, text)| ConfigLayer { file, origin, text });
+        Config::layered(&layers.collect::<Vec<_>>())
+    }
+
+    /// Returns the defaults with texts laid over them; a later text of a file replaces keys of an earlier one.
+    ///
+    /// # Errors
+    /// When a text is no TOML, has an unknown key or a value outside its range, or is of an unknown file.
+    pub fn layered(layers: &[ConfigLayer<'_>]) -> Result<Config, ConfigError> {
+        if let Some(layer) = layers.iter().find(|layer| FILES.iter().all(|(name, _)| *name != layer.file)) {
+            let known = FILES.map(|(file, _)| file).join(", ");
+            return Err(ConfigError::UnknownFile { path: layer.origin.into(), known });
         }
         let mut origins = HashMap::new();
         let mut as_run = Vec::new();
         let mut tables = HashMap::new();
         for (name, default_text) in FILES {
-            let embedded = format!("config/{name}");
             let optional = OPTIONAL.iter().find(|(file, _)| *file == name).map_or("", |(_, example)| example);
             let optional = template(optional);
-            let default = merge(&embedded, default_text, &template(default_text), &optional)?;
-            let (table, origin) = match folder.map(|folder| folder.join(name)).filter(|path| path.exists()) {
-                Some(path) => {
-                    let text = read_text(&path).map_err(|source| ConfigError::Read { path: path.clone(), source })?;
-                    merge(&path.display().to_string(), &text, &default.0, &optional)?
-                }
-                None => default,
-            };
+            let default = merge(&format!("config/{name}"), default_text, &template(default_text), &optional)?;
+            let mut of_file = layers.iter().filter(|layer| layer.file == name);
+            let (table, origin) =
+                of_file.try_fold(default, |(under, _), layer| merge(layer.origin, layer.text, &under, &optional))?;
             as_run.push((name.to_owned(), without_unused_jumps(&table).to_string()));
             origins.insert(name, origin);
             tables.insert(name, table);

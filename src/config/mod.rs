@@ -9,7 +9,7 @@ mod merge;
 mod ranges;
 mod rules;
 
-pub use checked::Config;
+pub use checked::{Config, ConfigLayer};
 pub use files::{ConfirmFile, ControlFile, OptimizeFile, SafetyFile, WorkersFile};
 
 use std::path::PathBuf;

@@ -33,6 +33,8 @@ pub struct Writer {
     ticks: u64,
     part: PathBuf,
     path: PathBuf,
+    /// Error number of the first failed write: the encoder refuses every later one without its reason.
+    failed: Option<i32>,
 }
 
 impl Writer {
@@ -102,9 +104,9 @@ impl Writer {
             ticks: 0,
             part,
             path: path.into(),
+            failed: None,
         };
-        let part = writer.part.clone();
-        writer.out.head(session, start_utc_ns, attachments).map_err(|error| error_at(&part, error))?;
+        writer.out.head(session, start_utc_ns, attachments).map_err(|error| error_at(&writer.part, error))?;
         writer.record(&Stamped { time_ns: 0, record: Record::Session(session.clone()) })?;
         writer.sync()?;
         Ok(writer)
@@ -117,7 +119,7 @@ impl Writer {
 
     /// Writes one tick.
     pub fn tick(&mut self, tick: &Tick) -> Result<(), RecordingError> {
-        self.write_tick(tick).map_err(|error| error_at(&self.part, error))
+        self.write_tick(tick).map_err(|error| self.failure(error))
     }
 
     fn write_tick(&mut self, tick: &Tick) -> Result<(), McapError> {
@@ -167,18 +169,18 @@ impl Writer {
         self.out
             .record(&stamped.record, self.start_utc_ns, self.records, log_time)
             .and_then(|()| self.out.close_full_chunk())
-            .map_err(|error| error_at(&self.part, error))
+            .map_err(|error| self.failure(error))
     }
 
     /// Passes everything to the operating system: it then survives a crash of the program.
     pub fn flush(&mut self) -> Result<(), RecordingError> {
-        self.out.close_chunk().map_err(|error| error_at(&self.part, error))
+        self.out.close_chunk().map_err(|error| self.failure(error))
     }
 
     /// Waits until everything is on the disk: it then survives a power cut. Takes milliseconds.
     pub fn sync(&mut self) -> Result<(), RecordingError> {
         self.flush()?;
-        self.out.sync().map_err(|error| error_at(&self.part, error))
+        self.out.sync().map_err(|error| self.failure(error))
     }
 
     /// Completes the file with its index, waits until it is on the disk, renames it and returns its final name.
@@ -186,7 +188,7 @@ impl Writer {
     /// # Errors
     /// When the disk fails, or when a file of the final name exists by now; the recording then keeps the name `*.part`.
     pub fn finish(mut self) -> Result<PathBuf, RecordingError> {
-        self.out.finish().map_err(|error| error_at(&self.part, error))?;
+        self.out.finish().map_err(|error| self.failure(error))?;
         if self.part != self.path {
             if self.path.exists() {
                 return Err(RecordingError::Exists { path: self.path.clone() });
@@ -198,6 +200,15 @@ impl Writer {
             })?;
         }
         Ok(self.path.clone())
+    }
+
+    /// Returns the error of a failed write: that of the first one, for example a full disk, if there were several.
+    fn failure(&mut self, error: McapError) -> RecordingError {
+        if let McapError::Io(source) = &error {
+            self.failed = self.failed.or(source.raw_os_error());
+        }
+        let first = self.failed.map(|number| McapError::Io(io::Error::from_raw_os_error(number)));
+        error_at(&self.part, first.unwrap_or(error))
     }
 
     /// Returns the ticks written so far.

@@ -8,6 +8,7 @@ use std::time::Duration;
 
 use super::experiment::{Experiment, RequestRefusal};
 use super::rollout::Rollout;
+use crate::optimize::journal::LongWait;
 use crate::robot::Robot;
 use crate::telemetry::Tick;
 use crate::trial::{ExperimentStage, TrialRecord, Verdict};
@@ -36,6 +37,7 @@ pub fn run_watched<R: Robot>(
     mut each: impl FnMut(&Experiment, &TrialRecord, &[Tick]),
 ) -> Result<(), RequestRefusal> {
     let mut voids = 0;
+    let mut waited: Option<LongWait> = None;
     loop {
         // There is neither a console nor a recording of them.
         experiment.take_records();
@@ -43,6 +45,11 @@ pub fn run_watched<R: Robot>(
             // The pending verdict must be reported before this worker waits: the others wait for it.
             experiment.close()?;
             if experiment.others_run() {
+                waited.get_or_insert_with(LongWait::begin).announce(|| {
+                    "waiting for the trials of other workers, which may end void; a worker that is silent for \
+                     [workers] abandoned_s counts as ended; Ctrl-C ends the wait"
+                        .to_owned()
+                });
                 std::thread::sleep(WAIT_PERIOD);
                 experiment.refresh()?;
                 continue;
@@ -54,6 +61,7 @@ pub fn run_watched<R: Robot>(
             }
             continue;
         };
+        waited = None;
         if experiment.refusal().is_some() {
             // Another program has queued a point outside the limits: it is void with this cause.
             experiment.skip()?;

@@ -11,7 +11,7 @@ use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
 use std::time::Duration;
 
 use super::experiment::{Experiment, RequestRefusal};
-use crate::optimize::journal::LockWait;
+use crate::optimize::journal::{JournalWait, WaitedFor};
 use crate::recording::record::Record;
 use crate::telemetry::TrialSpec;
 use crate::trial::{ExperimentStage, Verdict};
@@ -68,14 +68,18 @@ impl ExperimentView {
 pub struct StorageWait {
     /// Time since the oldest unfinished job was given.
     pub waited: Duration,
-    /// Whether another program holds the lock of the journal; otherwise the disk is slow.
-    pub lock: bool,
+    /// What the journal waits for; none where the disk is slow.
+    pub journal: Option<WaitedFor>,
 }
 
 impl StorageWait {
     /// Returns what is waited for.
     pub fn place(&self) -> &'static str {
-        if self.lock { "the study's lock" } else { "the disk" }
+        match self.journal {
+            Some(WaitedFor::Lock) => "the study's lock",
+            Some(WaitedFor::Server) => "the study's server",
+            None => "the disk",
+        }
     }
 }
 
@@ -84,7 +88,7 @@ impl StorageWait {
 pub struct StorageWatch {
     /// Time at which the oldest unfinished job was given, ns; 0 without one.
     since_ns: Arc<AtomicU64>,
-    lock: LockWait,
+    journal: JournalWait,
 }
 
 /// Jobs that take less are not shown as a wait.
@@ -95,7 +99,7 @@ impl StorageWatch {
     pub fn get(&self, now_ns: u64) -> Option<StorageWait> {
         let since_ns = self.since_ns.load(Ordering::Acquire);
         let waited = Duration::from_nanos(now_ns.saturating_sub(since_ns));
-        (since_ns > 0 && waited >= SHOWN_AFTER).then(|| StorageWait { waited, lock: self.lock.is_waiting() })
+        (since_ns > 0 && waited >= SHOWN_AFTER).then(|| StorageWait { waited, journal: self.journal.waits_for() })
     }
 }
 
@@ -121,7 +125,7 @@ enum JobPlace {
 impl ExperimentQueue {
     /// Carries out the jobs in the calling thread.
     pub fn here(experiment: Experiment) -> ExperimentQueue {
-        let watch = StorageWatch { since_ns: Arc::default(), lock: experiment.lock_wait() };
+        let watch = StorageWatch { since_ns: Arc::default(), journal: experiment.journal_wait() };
         ExperimentQueue {
             view: ExperimentView::of(&experiment),
             place: JobPlace::Here(Box::new(experiment), VecDeque::new()),
@@ -145,10 +149,10 @@ impl ExperimentQueue {
         };
         let (jobs, to_do) = channel::<(u64, ExperimentJob)>();
         let (to_session, done) = channel();
-        let lock = self.watch.lock.clone();
+        let journal = self.watch.journal.clone();
         std::thread::Builder::new().name("storage".into()).spawn(move || {
             while let Ok((number, job)) = to_do.recv() {
-                lock.begin(number);
+                journal.begin(number);
                 if to_session.send(carry_out(&mut experiment, number, job)).is_err() {
                     break;
                 }
@@ -194,12 +198,12 @@ impl ExperimentQueue {
 
     /// Returns what an unfinished job waits for.
     pub fn waits_for(&self) -> &'static str {
-        if self.watch.lock.is_waiting() { "the study's lock, which another program holds" } else { "the disk" }
+        self.watch.journal.waits_for().map_or("the disk", WaitedFor::words)
     }
 
-    /// Ends the wait of job `number` for the lock of the journal: it fails, with nothing written.
+    /// Ends the wait of job `number` for the journal: it fails, with nothing written.
     pub fn interrupt(&self, number: u64) {
-        self.watch.lock.interrupt(number);
+        self.watch.journal.interrupt(number);
     }
 
     /// State after the last job that was taken.
@@ -230,7 +234,7 @@ impl ExperimentQueue {
 impl Drop for ExperimentQueue {
     /// A thread that waits for a lock must not write after the session has ended: the folder is free then.
     fn drop(&mut self) {
-        self.watch.lock.interrupt_all();
+        self.watch.journal.interrupt_all();
     }
 }
 

@@ -5,6 +5,7 @@ mod support;
 use std::time::Duration;
 
 use quadfrog::config::Config;
+use quadfrog::optimize::journal::WaitedFor;
 use quadfrog::recording::record::{ArmingCheckRecord, HealthLimits, Record, SessionInfo};
 use quadfrog::recording::recorder::RecorderStatus;
 use quadfrog::robot::{Battery, LinkStatus};
@@ -494,9 +495,9 @@ fn details_that_do_not_fit_are_reached_with_the_paging_keys() {
 fn a_wait_for_the_storage_is_shown_until_it_ends() {
     let mut console = Console::ready();
     let waited = Duration::from_secs(14);
-    console.update(Msg::Storage(Some(StorageWait { waited, lock: true })));
+    console.update(Msg::Storage(Some(StorageWait { waited, journal: Some(WaitedFor::Lock) })));
     assert_shows(&console.screen(80, 24), &["Waiting for the study's lock, 14 s"]);
-    console.update(Msg::Storage(Some(StorageWait { waited, lock: false })));
+    console.update(Msg::Storage(Some(StorageWait { waited, journal: None })));
     assert_shows(&console.screen(80, 24), &["Waiting for the disk, 14 s"]);
     console.update(Msg::Storage(None));
     assert!(!console.screen(80, 24).contains("Waiting for"));

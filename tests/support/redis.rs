@@ -20,18 +20,34 @@ impl Drop for Ended {
 
 /// A server of the test's own, and its address; none where there is none to start.
 pub fn server() -> Option<(Ended, String)> {
-    let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
-    let arguments = ["--port", &port.to_string(), "--bind", "127.0.0.1", "--save", "", "--appendonly", "no"];
-    let Ok(child) = Command::new("redis-server").args(arguments).stdout(Stdio::null()).spawn() else {
+    let port = free_port();
+    let server = start(port, &["--save", "", "--appendonly", "no"])?;
+    Some((server, address(port)))
+}
+
+/// A port that no program uses.
+pub fn free_port() -> u16 {
+    TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port()
+}
+
+/// The address of the journal of a server on this computer.
+pub fn address(port: u16) -> String {
+    format!("redis://127.0.0.1:{port}/0")
+}
+
+/// Starts a server with `arguments` and waits for its answer; none where there is none to start.
+pub fn start(port: u16, arguments: &[&str]) -> Option<Ended> {
+    let port_text = port.to_string();
+    let common = ["--port", &port_text, "--bind", "127.0.0.1"];
+    let Ok(child) = Command::new("redis-server").args(common).args(arguments).stdout(Stdio::null()).spawn() else {
         println!("skipped: redis-server is not installed");
         return None;
     };
     let server = Ended(child);
-    let url = format!("redis://127.0.0.1:{port}/0");
     let end = Instant::now() + Duration::from_secs(30);
-    while Storage::Redis(url.clone()).journal(Durability::Buffered).is_err() {
+    while Storage::Redis(address(port)).journal(Durability::Buffered).is_err() {
         assert!(Instant::now() < end, "redis-server did not answer within half a minute");
         std::thread::sleep(Duration::from_millis(50));
     }
-    Some((server, url))
+    Some(server)
 }

@@ -6,7 +6,7 @@ use std::os::fd::AsFd;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use color_eyre::eyre::{WrapErr, eyre};
+use anyhow::{Context, anyhow};
 use crossterm::clipboard::CopyToClipboard;
 use nix::sys::signal::{Signal, raise};
 use quadfrog::engine::EngineHandle;
@@ -93,8 +93,8 @@ type ReadEvent = Option<NumberedEvent>;
 ///
 /// # Errors
 /// When the terminal cannot be used. When a thread panicked; STOP is set then.
-pub fn run(feed: Feed, options: ConsoleOptions) -> color_eyre::Result<ConsoleExit> {
-    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().wrap_err("event loop")?;
+pub fn run(feed: Feed, options: ConsoleOptions) -> anyhow::Result<ConsoleExit> {
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().context("event loop")?;
     runtime.block_on(Console::open(feed, options)?.run())
 }
 
@@ -117,21 +117,21 @@ struct Console {
 }
 
 impl Console {
-    fn open(feed: Feed, options: ConsoleOptions) -> color_eyre::Result<Console> {
+    fn open(feed: Feed, options: ConsoleOptions) -> anyhow::Result<Console> {
         let settings = options.settings;
         let theme = Theme::detect(settings.colours, settings.glyphs, |name| std::env::var(name).ok());
         let frame_period = Duration::from_secs(1) / settings.frames_per_second.max(1);
         let mut model = Model::new(settings, theme, options.robot);
-        let (columns, rows) = crossterm::terminal::size().wrap_err("the terminal's size")?;
+        let (columns, rows) = crossterm::terminal::size().context("the terminal's size")?;
         update(&mut model, Msg::Resize(columns, rows));
         let mut screen =
-            TerminalScreen::enter(matches!(feed, Feed::Replay(_))).wrap_err("the terminal cannot be used")?;
-        screen.mouse(model.mouse).wrap_err("the terminal cannot be used")?;
+            TerminalScreen::enter(matches!(feed, Feed::Replay(_))).context("the terminal cannot be used")?;
+        screen.mouse(model.mouse).context("the terminal cannot be used")?;
         terminal::stop_on_panic(feed.handle().map(EngineHandle::stop_latch));
         let connection = match &feed {
             Feed::Live(_) => {
                 let location = TerminalLocation::of(|name| std::env::var(name).ok());
-                ConnectionMonitor::watch(location).wrap_err("connection monitor")?
+                ConnectionMonitor::watch(location).context("connection monitor")?
             }
             Feed::Replay(_) => ConnectionMonitor::unmonitored(),
         };
@@ -153,11 +153,11 @@ impl Console {
         })
     }
 
-    async fn run(mut self) -> color_eyre::Result<ConsoleExit> {
+    async fn run(mut self) -> anyhow::Result<ConsoleExit> {
         let (input, mut inputs) = unbounded_channel();
         let stop = self.feed.handle().map(EngineHandle::stop_latch);
         read_input(input.clone(), KeyReader::new(stop.is_none(), stop, self.space_bar_is_text.clone()))?;
-        terminal::watch_for_hang_up(move || drop(input.send(None))).wrap_err("hang-up watcher")?;
+        terminal::watch_for_hang_up(move || drop(input.send(None))).context("hang-up watcher")?;
         let mut interrupted = signal(SignalKind::interrupt())?;
         let mut terminated = signal(SignalKind::terminate())?;
         let mut hung_up = signal(SignalKind::hangup())?;
@@ -184,7 +184,7 @@ impl Console {
                 self.perform_effect(Effect::Stop);
                 self.screen.hang_up();
                 self.feed.shutdown();
-                return Err(eyre!("the thread `{thread}` panicked; the robot was stopped and the session was ended"));
+                return Err(anyhow!("the thread `{thread}` panicked; the robot was stopped and the session was ended"));
             }
             self.poll_feed();
             self.draw_if_due()?;
@@ -291,7 +291,7 @@ impl Console {
         self.send(&bytes);
     }
 
-    fn say_written(&mut self, written: color_eyre::Result<PathBuf>, text: impl FnOnce(&Path) -> String) {
+    fn say_written(&mut self, written: anyhow::Result<PathBuf>, text: impl FnOnce(&Path) -> String) {
         match written {
             Ok(path) => say(&mut self.model, LogLevel::Info, text(&path)),
             Err(error) => say(&mut self.model, LogLevel::Error, format!("not written: {error}")),
@@ -320,7 +320,7 @@ impl Console {
         self.ended.get_or_insert(ended);
     }
 
-    fn draw_if_due(&mut self) -> color_eyre::Result<()> {
+    fn draw_if_due(&mut self) -> anyhow::Result<()> {
         // A quarter of the loop period early, so that a frame is not delayed by one whole period.
         let due = self.redraw || self.last_frame.is_none_or(|last| last.elapsed() + PULSE / 4 >= self.frame_period);
         if !due || !self.screen.ready() || self.ended == Some(ConsoleExit::HungUp) {
@@ -333,11 +333,11 @@ impl Console {
         self.redraw = false;
         self.last_frame = Some(Instant::now());
         let model = &self.model;
-        self.screen.draw(|frame| view::render(frame, model)).wrap_err("drawing")
+        self.screen.draw(|frame| view::render(frame, model)).context("drawing")
     }
 
     /// Ends the session. Sitting down takes seconds: the screen stays, and STOP keeps working.
-    fn end_session(mut self, inputs: &mut UnboundedReceiver<ReadEvent>) -> color_eyre::Result<ConsoleExit> {
+    fn end_session(mut self, inputs: &mut UnboundedReceiver<ReadEvent>) -> anyhow::Result<ConsoleExit> {
         let ended = self.ended.unwrap_or(ConsoleExit::Quit);
         // The operator is present after a quit key, but not after a hang-up or SIGTERM.
         let heartbeat = self.feed.handle().map(EngineHandle::heartbeat).filter(|_| ended == ConsoleExit::Quit);
@@ -367,7 +367,7 @@ impl Console {
         }
         match closing.join() {
             Ok(()) => Ok(ended),
-            Err(_) => Err(eyre!("ending the session panicked")),
+            Err(_) => Err(anyhow!("ending the session panicked")),
         }
     }
 }

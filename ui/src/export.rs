@@ -2,15 +2,15 @@
 
 use std::path::{Path, PathBuf};
 
-use color_eyre::eyre::{OptionExt, eyre};
+use anyhow::{Context, anyhow};
 use quadfrog::config::Config;
 use quadfrog::engine::newest_config;
 
 use crate::model::Model;
 use crate::text;
 
-fn write(path: &Path, text: &str) -> color_eyre::Result<()> {
-    std::fs::write(path, text).map_err(|error| eyre!("{}: {error}", path.display()))
+fn write(path: &Path, text: &str) -> anyhow::Result<()> {
+    std::fs::write(path, text).map_err(|error| anyhow!("{}: {error}", path.display()))
 }
 
 /// The folder of the study, or the working directory where that folder does not exist (a replay from elsewhere).
@@ -23,7 +23,7 @@ fn folder(model: &Model) -> PathBuf {
 ///
 /// # Errors
 /// When one of them cannot be written.
-pub fn table(model: &Model) -> color_eyre::Result<PathBuf> {
+pub fn table(model: &Model) -> anyhow::Result<PathBuf> {
     let csv = folder(model).join("trials.csv");
     write(&csv, &text::as_csv(model))?;
     write(&csv.with_extension("md"), &text::as_markdown(model))?;
@@ -35,9 +35,8 @@ pub fn table(model: &Model) -> color_eyre::Result<PathBuf> {
 ///
 /// # Errors
 /// When no trial was accepted, the study's configuration cannot be read, or a file is there already or cannot be written.
-pub fn best(model: &Model) -> color_eyre::Result<PathBuf> {
-    let (best, task) =
-        model.session.trials.best().zip(model.session.info.task).ok_or_eyre("no trial was accepted yet")?;
+pub fn best(model: &Model) -> anyhow::Result<PathBuf> {
+    let (best, task) = model.session.trials.best().zip(model.session.info.task).context("no trial was accepted yet")?;
     let study = folder(model);
     let as_run = newest_config(&study).map(|(_, config)| config);
     let config = Config::load(as_run.as_deref())?;

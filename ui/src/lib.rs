@@ -22,6 +22,7 @@ mod layout;
 mod legal;
 pub mod message;
 pub mod model;
+pub mod output;
 pub mod series;
 pub mod settings;
 pub mod terminal;

@@ -1,22 +1,55 @@
 //! The program `quadfrog`.
 //!
 //! Exit status: 0 when done, 2 for unusable input (the message names it and the remedy), 1 for every other error.
+#![warn(clippy::print_stdout, clippy::print_stderr)] // every text crosses the border of `output`
 
 mod subcommand;
 
 use std::process::ExitCode;
 
 use clap::Parser;
+use clap::error::ErrorKind;
+use quadfrog_console::output;
 use subcommand::{Arguments, Failure};
 
 fn main() -> ExitCode {
-    if let Err(error) = color_eyre::install() {
-        eprintln!("quadfrog: {error}");
-    }
-    let Err(failure) = subcommand::run(Arguments::parse()) else { return ExitCode::SUCCESS };
+    std::panic::set_hook(Box::new(|info| output::message(&defect_report(&info.to_string()))));
+    let arguments = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(error) => return refuse(&error),
+    };
+    let done = subcommand::run(arguments).and_then(|()| match output::failure() {
+        Some(error) => Err(Failure::Other(anyhow::anyhow!("standard output: {error}; the output is not complete"))),
+        None => Ok(()),
+    });
+    let Err(failure) = done else { return ExitCode::SUCCESS };
     failure.print();
     match failure {
         Failure::Input(_) => ExitCode::from(2),
         Failure::Other(_) => ExitCode::FAILURE,
     }
+}
+
+/// Prints an error of the command line without what its arguments may hold; help and version as they are.
+fn refuse(error: &clap::Error) -> ExitCode {
+    if matches!(error.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion) {
+        let _ = error.print();
+        return ExitCode::SUCCESS;
+    }
+    output::message(&error.render().to_string());
+    ExitCode::from(2)
+}
+
+/// Returns the text about a defect of the program: what it is, and what a report of it needs.
+fn defect_report(panic: &str) -> String {
+    let thread = std::thread::current();
+    let (name, version) = (thread.name().unwrap_or("unnamed"), env!("CARGO_PKG_VERSION"));
+    let command = std::env::args().collect::<Vec<_>>().join(" ");
+    format!(
+        "\nquadfrog: a defect of the program, in thread `{name}`: {panic}\n\
+         Nothing that was judged is lost; the study continues with --resume FOLDER.\n\
+         Please report it to the maintainers (issues of the project's repository) with this text, the study's folder\n\
+         (study.log, session.mcap, config/), and what was done before. Version {version}, {}, command: {command}\n",
+        std::env::consts::ARCH
+    )
 }

@@ -3,6 +3,7 @@
 //! A thread writes the frames. A terminal that does not read (a stalled SSH connection, a paused pty) then costs frames,
 //! but delays neither keys nor STOP nor the operator heartbeat.
 
+use crate::output;
 use std::fs::File;
 use std::io::{self, IsTerminal, Write};
 use std::os::fd::AsFd;
@@ -372,7 +373,7 @@ fn install_panic_hook() {
             let report = info.to_string();
             let print = move || {
                 restore();
-                eprintln!("{report}");
+                output::message(&format!("{report}\n"));
                 PANICKED.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(name);
             };
             let _ = std::thread::Builder::new().name("report".into()).spawn(print);

@@ -20,6 +20,15 @@ pub enum JournalError {
     Shortened { path: PathBuf, had: u64, has: u64 },
     #[error("{}: another program holds the lock of the study; the wait was ended, nothing was written", lock.display())]
     Interrupted { lock: PathBuf },
+    #[error(
+        "the journal on the Redis server {address} has {has} lines, after {had} were read: the server lost its data or it was \
+         cleared; every trial told before is gone from the server. Open the study again once the data is restored"
+    )]
+    RedisShortened { address: String, had: i64, has: i64 },
+    #[error("{address} is not an address of a Redis server ({fault}); write it as redis://HOST:PORT/DB")]
+    RedisAddress { address: String, fault: String },
+    #[error("the wait for the Redis server {address} was ended; it is not known whether the last lines were written")]
+    ServerWaitEnded { address: String },
     /// The address has no password.
     #[error("cannot {action} the journal on the Redis server {address}: {source}")]
     Redis { action: &'static str, address: String, source: ::redis::RedisError },

@@ -1,11 +1,10 @@
 //! The journal as a file shared by several programs: reading, locking, appending (`docs/journal.md`).
 
 use super::error::JournalError;
+use super::wait::{JournalWait, LongWait, WaitedFor};
 use std::fs::{self, File, OpenOptions};
 use std::io::{ErrorKind, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant, SystemTime};
 
 /// Age at which a lock without a change of the journal counts as stale; the value of Optuna.
@@ -31,52 +30,12 @@ pub enum Durability {
     Buffered,
 }
 
-/// The wait of one thread for the lock of a journal, seen and ended from another thread.
-#[derive(Debug, Clone, Default)]
-pub struct LockWait(Arc<LockWaitState>);
-
-#[derive(Debug, Default)]
-struct LockWaitState {
-    waiting: AtomicBool,
-    /// Number of the present job.
-    job: AtomicU64,
-    /// Number of the job that is not to wait any more; `u64::MAX` for every job.
-    interrupted: AtomicU64,
-}
-
-impl LockWait {
-    /// Whether another program holds the lock and this one waits.
-    pub fn is_waiting(&self) -> bool {
-        self.0.waiting.load(Ordering::Acquire)
-    }
-
-    /// Begins job `number`, counted from 1, in the thread that writes.
-    pub fn begin(&self, number: u64) {
-        self.0.job.store(number, Ordering::Release);
-    }
-
-    /// Lets job `number` fail before it writes again; other jobs are not affected.
-    pub fn interrupt(&self, number: u64) {
-        self.0.interrupted.fetch_max(number, Ordering::AcqRel);
-    }
-
-    /// Lets every job fail before it writes again.
-    pub fn interrupt_all(&self) {
-        self.interrupt(u64::MAX);
-    }
-
-    fn is_interrupted(&self) -> bool {
-        let (job, interrupted) = (self.0.job.load(Ordering::Acquire), self.0.interrupted.load(Ordering::Acquire));
-        job > 0 && (interrupted == job || interrupted == u64::MAX)
-    }
-}
-
 /// A journal file with the read position.
 #[derive(Debug)]
 pub struct JournalFile {
     path: PathBuf,
     lock: PathBuf,
-    wait: LockWait,
+    wait: JournalWait,
     durability: Durability,
     grace: Duration,
     /// Bytes read, always up to the end of a line.
@@ -101,7 +60,7 @@ impl JournalFile {
         }
         let mut lock = path.clone().into_os_string();
         lock.push(".lock");
-        let wait = LockWait::default();
+        let wait = JournalWait::default();
         Ok(JournalFile { path, lock: lock.into(), wait, durability, grace, offset: 0, lines: 0 })
     }
 
@@ -152,22 +111,23 @@ impl JournalFile {
     }
 
     /// Returns the wait for the lock.
-    pub(super) fn lock_wait(&self) -> &LockWait {
+    pub(super) fn wait(&self) -> &JournalWait {
         &self.wait
     }
 
     /// Acquires the lock, waiting for other writers; a stale lock is broken.
     ///
     /// # Errors
-    /// [`JournalError::Interrupted`] after [`LockWait::interrupt`].
+    /// [`JournalError::Interrupted`] after [`JournalWait::interrupt`].
     pub(super) fn lock(&self) -> Result<JournalLock, JournalError> {
         let locked = self.acquire();
-        self.wait.0.waiting.store(false, Ordering::Release);
+        self.wait.set(None);
         locked
     }
 
     fn acquire(&self) -> Result<JournalLock, JournalError> {
         let mut pause = Duration::from_millis(1);
+        let mut waited = LongWait::begin();
         let mut seen: Option<(Option<SystemTime>, Instant)> = None;
         loop {
             if self.wait.is_interrupted() {
@@ -191,7 +151,15 @@ impl JournalFile {
                 }
                 _ => seen = Some((changed, Instant::now())),
             }
-            self.wait.0.waiting.store(true, Ordering::Release);
+            self.wait.set(Some(WaitedFor::Lock));
+            waited.announce(|| {
+                format!(
+                    "waiting for {}, which another program holds; a lock without a change of the journal is broken after {} s; \
+                     Ctrl-C ends the wait",
+                    self.lock.display(),
+                    self.grace.as_secs()
+                )
+            });
             std::thread::sleep(pause);
             pause = (pause * 2).min(LONGEST_PAUSE).min(self.grace);
         }

@@ -11,13 +11,15 @@ mod json;
 mod operation;
 mod redis;
 mod state;
+mod wait;
 
-pub(super) use self::redis::JournalRedis;
+pub(super) use self::redis::{JournalRedis, public_address};
 pub use error::JournalError;
 use file::UnreadTail;
-pub use file::{Durability, JournalFile, LOCK_GRACE, LockWait};
+pub use file::{Durability, JournalFile, LOCK_GRACE};
 pub use operation::{AttributeKind, Operation};
 pub use state::{Applied, JournalState, StudyRecord};
+pub use wait::{JournalWait, LongWait, WaitedFor, notice_waits};
 
 /// Place of storage of the lines.
 #[derive(Debug)]
@@ -73,11 +75,12 @@ impl Journal {
         &self.worker
     }
 
-    /// Returns the wait for the lock of the journal's file.
-    pub fn lock_wait(&self) -> LockWait {
+    /// Returns the wait for the lock of the journal's file, or for its server.
+    pub fn wait(&self) -> JournalWait {
         match &self.backend {
-            JournalBackend::File(file) => file.lock_wait().clone(),
-            JournalBackend::Memory | JournalBackend::Redis(_) => LockWait::default(),
+            JournalBackend::File(file) => file.wait().clone(),
+            JournalBackend::Redis(redis) => redis.wait().clone(),
+            JournalBackend::Memory => JournalWait::default(),
         }
     }
 

@@ -3,19 +3,41 @@
 //! not read.
 //!
 //! No lock is needed: lines are appended by a script that the server runs atomically, and only if no other writer has
-//! appended since the last read.
+//! appended since the last read. After a lost connection the same request is sent again; the script recognizes lines that it
+//! has appended already, so that a lost answer doubles nothing.
+
+use std::time::Duration;
 
 use super::error::JournalError;
-use redis::{Client, Connection, IntoConnectionInfo, RedisError, RedisResult};
+use super::wait::{JournalWait, LongWait, WaitedFor};
+use redis::{Client, Connection, ErrorKind, IntoConnectionInfo, RedisError, RedisResult, ServerErrorKind};
 
 /// Lines per request.
 const BATCH: i64 = 1000;
 
-/// Appends ARGV[3..] after line ARGV[2] if that is the last line; P is ARGV[1]. Returns 1 on success, else 0.
+/// Longest time for a connection, and for the answer to one request: a server that loads its data, or one that a thousand
+/// workers ask at once, answers within a second.
+const ANSWER_TIMEOUT: Duration = Duration::from_secs(5);
+
+/// Longest time without a connection after the first one: a server that restarts and loads its data takes less.
+const RECONNECT_TIMEOUT: Duration = Duration::from_secs(120);
+
+/// Shortest and longest pause between two attempts to connect.
+const PAUSES: [Duration; 2] = [Duration::from_millis(50), Duration::from_secs(2)];
+
+/// A wait is ended within this time.
+const STEP: Duration = Duration::from_millis(50);
+
+/// Appends ARGV[3..] after line ARGV[2] if that is the last line; P is ARGV[1]. Returns 1 if these lines follow that line, now
+/// or since an earlier request, else 0. Each line names its writer, so that no other writer's line is equal.
 const APPEND: &str = "\
 local number = ARGV[1] .. ':log_number'
 local last = tonumber(redis.call('get', number) or '-1')
-if last ~= tonumber(ARGV[2]) then return 0 end
+local next = string.format('%d', tonumber(ARGV[2]) + 1)
+if last ~= tonumber(ARGV[2]) then
+  if redis.call('get', ARGV[1] .. ':log:' .. next) == ARGV[3] then return 1 end
+  return 0
+end
 for i = 3, #ARGV do
   last = last + 1
   redis.call('set', ARGV[1] .. ':log:' .. string.format('%d', last), ARGV[i])
@@ -27,28 +49,67 @@ return 1";
 pub struct JournalRedis {
     client: Client,
     connection: Option<Connection>,
+    /// Whether the server has answered before: only then a lost connection is waited for.
+    answered: bool,
+    wait: JournalWait,
     address: String,
     prefix: String,
     /// Lines read; the index of the next line.
     lines: i64,
 }
 
+/// Returns the address of a Redis journal for messages, without user and password; nothing but the scheme where the
+/// address cannot be parsed, because any part of it may be the password.
+pub(in crate::optimize) fn public_address(url: &str) -> String {
+    match url.into_connection_info() {
+        Ok(info) => format!("redis://{}/{}", info.addr(), info.redis_settings().db()),
+        Err(_) => {
+            let scheme = url.split_once("://").map_or("", |(scheme, _)| scheme);
+            format!("{scheme}://... (the rest is not shown: it may hold a password)")
+        }
+    }
+}
+
 impl JournalRedis {
     /// The journal of the server at `url` (`redis://host:port/db`) under the key prefix `prefix`; does not connect.
     pub fn new(url: &str, prefix: &str) -> Result<Self, JournalError> {
-        let refuse = |source| JournalError::Redis { action: "parse the address of", address: url.to_owned(), source };
+        let refuse = |error: RedisError| JournalError::RedisAddress {
+            address: public_address(url),
+            // The detail may repeat the address.
+            fault: error.category().to_owned(),
+        };
         let info = url.into_connection_info().map_err(refuse)?;
-        let address = info.addr().to_string();
+        let address = public_address(url);
         let client = Client::open(info).map_err(refuse)?;
-        Ok(JournalRedis { client, connection: None, address, prefix: prefix.to_owned(), lines: 0 })
+        Ok(JournalRedis {
+            client,
+            connection: None,
+            answered: false,
+            wait: JournalWait::default(),
+            address,
+            prefix: prefix.to_owned(),
+            lines: 0,
+        })
+    }
+
+    /// Returns the wait for the server.
+    pub(super) fn wait(&self) -> &JournalWait {
+        &self.wait
     }
 
     /// Passes every line appended since the last call to `accept`, which returns the fault of an invalid line. A line that
     /// is counted but not yet present, as on clusters, is left for the next call.
+    ///
+    /// # Errors
+    /// If the server cannot be read, has fewer lines than were read before, or has an invalid line.
     pub(super) fn read(&mut self, mut accept: impl FnMut(&str) -> Result<(), String>) -> Result<(), JournalError> {
         let number = format!("{}:log_number", self.prefix);
         let last: Option<i64> = self.ask("read", |c| redis::cmd("GET").arg(&number).query(c))?;
         let last = last.unwrap_or(-1);
+        if last + 1 < self.lines {
+            let (address, had, has) = (self.address.clone(), self.lines, last + 1);
+            return Err(JournalError::RedisShortened { address, had, has });
+        }
         while self.lines <= last {
             let until = last.min(self.lines + BATCH - 1);
             let keys: Vec<String> = (self.lines..=until).map(|i| format!("{}:log:{i}", self.prefix)).collect();
@@ -77,21 +138,70 @@ impl JournalRedis {
         })
     }
 
-    /// Runs a command, connecting first if necessary. A failed connection is dropped; the next call reconnects.
+    /// Runs a command, connecting first if necessary. After a lost connection it is run again, with growing pauses.
+    ///
+    /// # Errors
+    /// If the server was never reached, refuses the command, stays away for [`RECONNECT_TIMEOUT`], or the wait was ended.
     fn ask<T>(
         &mut self,
         action: &'static str,
-        command: impl FnOnce(&mut Connection) -> RedisResult<T>,
+        command: impl Fn(&mut Connection) -> RedisResult<T>,
     ) -> Result<T, JournalError> {
-        let name = |source: RedisError| JournalError::Redis { action, address: self.address.clone(), source };
-        let mut connection = match self.connection.take() {
-            Some(connection) => connection,
-            None => self.client.get_connection().map_err(name)?,
+        let mut waited = LongWait::begin();
+        let mut pause = PAUSES[0];
+        let answer = loop {
+            let source = match self.attempt(&command) {
+                Ok(answer) => break Ok(answer),
+                Err(error) => error,
+            };
+            self.connection = None;
+            let address = self.address.clone();
+            if !self.answered || !is_passing(&source) || waited.elapsed() >= RECONNECT_TIMEOUT {
+                break Err(JournalError::Redis { action, address, source });
+            }
+            self.wait.set(Some(WaitedFor::Server));
+            let until = waited.elapsed() + pause;
+            while waited.elapsed() < until && !self.wait.is_interrupted() {
+                std::thread::sleep(STEP.min(pause));
+            }
+            if self.wait.is_interrupted() {
+                break Err(JournalError::ServerWaitEnded { address });
+            }
+            pause = (pause * 2).min(PAUSES[1]);
+            waited.announce(|| {
+                format!(
+                    "waiting for the Redis server {address}, for {} s at most ({source}); Ctrl-C ends the wait",
+                    RECONNECT_TIMEOUT.as_secs()
+                )
+            });
         };
-        let answer = command(&mut connection).map_err(name)?;
-        self.connection = Some(connection);
+        self.wait.set(None);
+        answer
+    }
+
+    fn attempt<T>(&mut self, command: impl Fn(&mut Connection) -> RedisResult<T>) -> RedisResult<T> {
+        let connection = match &mut self.connection {
+            Some(connection) => connection,
+            none => {
+                let connection = self.client.get_connection_with_timeout(ANSWER_TIMEOUT)?;
+                connection.set_read_timeout(Some(ANSWER_TIMEOUT))?;
+                connection.set_write_timeout(Some(ANSWER_TIMEOUT))?;
+                none.insert(connection)
+            }
+        };
+        let answer = command(connection)?;
+        self.answered = true;
         Ok(answer)
     }
+}
+
+/// Whether an error may pass with time: no connection, a lost one, no answer in time, or a server that starts or hands over.
+fn is_passing(error: &RedisError) -> bool {
+    let starting = matches!(
+        error.kind(),
+        ErrorKind::Server(ServerErrorKind::BusyLoading | ServerErrorKind::MasterDown | ServerErrorKind::TryAgain)
+    );
+    starting || error.is_io_error() || error.is_connection_dropped() || error.is_timeout()
 }
 
 impl std::fmt::Debug for JournalRedis {

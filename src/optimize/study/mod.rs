@@ -21,7 +21,7 @@ pub use workers::worker_seed;
 
 use crate::optimize::ask::{Direction, SamplerConfig, Streams};
 use crate::optimize::journal::{
-    Applied, AttributeKind, Durability, Journal, JournalError, LockWait, Operation, StudyRecord,
+    Applied, AttributeKind, Durability, Journal, JournalError, JournalWait, Operation, StudyRecord,
 };
 use crate::optimize::repeats;
 use crate::optimize::space::Space;
@@ -100,9 +100,9 @@ impl Study {
         Ok(study)
     }
 
-    /// Returns the wait for the lock of the journal's file.
-    pub fn lock_wait(&self) -> LockWait {
-        self.journal.lock_wait()
+    /// Returns the wait for the lock of the journal's file, or for its server.
+    pub fn journal_wait(&self) -> JournalWait {
+        self.journal.wait()
     }
 
     /// Reads the lines of other writers.

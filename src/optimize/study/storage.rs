@@ -2,7 +2,9 @@
 
 use std::path::PathBuf;
 
-use crate::optimize::journal::{Durability, Journal, JournalError, JournalFile, JournalRedis, LOCK_GRACE};
+use crate::optimize::journal::{
+    Durability, Journal, JournalError, JournalFile, JournalRedis, LOCK_GRACE, public_address,
+};
 
 /// Place of storage of a study.
 #[derive(Debug, Clone, PartialEq)]
@@ -31,11 +33,7 @@ impl std::fmt::Display for Storage {
         match self {
             Storage::Memory => write!(f, "memory"),
             Storage::File(path) => write!(f, "{}", path.display()),
-            // Without the password before the @.
-            Storage::Redis(url) => match url.rsplit_once('@') {
-                Some((_, address)) => write!(f, "redis://{address}"),
-                None => write!(f, "{url}"),
-            },
+            Storage::Redis(url) => f.write_str(&public_address(url)),
         }
     }
 }

@@ -28,7 +28,7 @@ use self::queue::TrialQueue;
 use self::search::SearchSettings;
 use crate::optimize::ask::Direction;
 use crate::optimize::exchange::TableTrial;
-use crate::optimize::journal::LockWait;
+use crate::optimize::journal::JournalWait;
 use crate::optimize::repeats::{RepeatedPoint, improvements, points};
 use crate::optimize::study::{Outcome, Study, StudyError};
 use crate::optimize::trial::TrialState;
@@ -243,8 +243,8 @@ impl Experiment {
     }
 
     /// Returns the wait of this experiment for the lock of its study.
-    pub fn lock_wait(&self) -> LockWait {
-        self.study.lock_wait()
+    pub fn journal_wait(&self) -> JournalWait {
+        self.study.journal_wait()
     }
 
     /// Voids a trial that was approved and not run, for `cause`, and queues its parameters again.

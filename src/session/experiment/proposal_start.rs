@@ -139,8 +139,7 @@ impl Experiment {
             };
             draft = self.study.redirected(&draft, number)?;
         }
-        let worker = self.plan.worker;
-        let seed = origin.seed().unwrap_or_else(|| trial_seed(self.plan.seed, worker, draft.number));
+        let seed = origin.seed().unwrap_or_else(|| self.trial_seed(draft.number));
         let began = BeganAttributes::new(&proposal, seed, &self.plan, fixed);
         let beyond_budget = [proposal.source, origin.source].contains(&ProposalSource::Confirm);
         let (queue, budget) = (&self.queue, self.plan.budget);
@@ -221,6 +220,19 @@ impl Experiment {
         self.revisions
     }
 
+    /// Returns the seed of the noise and terrain of new trial `number`. Repetitions of interrupted trials, which run with the
+    /// seeds of those, are not counted: an interrupted and an unbroken study run the same trials with the same seeds.
+    fn trial_seed(&self, number: u32) -> u64 {
+        let trials = self.study.trials();
+        let seed_of = |number: u32| trials.get(number as usize).and_then(|trial| Origin::of_trial(trial).seed());
+        let repeats = |trial: &&Trial| {
+            let origin = Origin::of_trial(trial);
+            origin.seed().is_some() && origin.seed() == origin.parent.and_then(seed_of)
+        };
+        let repeated = trials.iter().take(number as usize).filter(repeats).count() as u32;
+        trial_seed(self.plan.seed, self.plan.worker, number - repeated)
+    }
+
     /// Returns the command data of the trial `number` for the control thread.
     pub fn spec(&self, number: u32) -> TrialSpec {
         let row = &self.rows[&number];
@@ -229,7 +241,7 @@ impl Experiment {
         TrialSpec {
             trial: number,
             gains: control.gains().with(&row.gains),
-            seed: seed.unwrap_or_else(|| trial_seed(self.plan.seed, self.plan.worker, number)),
+            seed: seed.unwrap_or_else(|| self.trial_seed(number)),
             ..control.trial(self.plan.task, JumpParameters::from_values(&row.parameters, control.f1_hz))
         }
     }
@@ -248,8 +260,9 @@ fn gains_note(gains: &ParameterValues, configured: &Gains) -> String {
     if different.is_empty() { String::new() } else { format!("other gains: {}", different.join(", ")) }
 }
 
-/// Returns the seed of one trial's noise and terrain: the study's seed, the worker and the number, mixed (SplitMix64 finalizer,
-/// Steele et al. 2014). No two trials of a study have the same unless one repeats the other.
+/// Returns the seed of one trial's noise and terrain: the study's seed, the worker and the trial's place in the order of
+/// proposals, mixed (SplitMix64 finalizer, Steele et al. 2014). No two trials of a study have the same unless one repeats the
+/// other.
 fn trial_seed(study: u64, worker: u32, trial: u32) -> u64 {
     let place = (u64::from(worker) << 32) + u64::from(trial) + 1;
     let mut z = study.wrapping_add(place.wrapping_mul(0x9E37_79B9_7F4A_7C15));

@@ -1,14 +1,16 @@
 //! Arguments that several commands share, and parsers for the engine's named values.
 
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use quadfrog::config::Config;
-use quadfrog::engine::newest_config;
+use quadfrog::engine::{EngineError, newest_config};
 use quadfrog::optimize::ask::SamplerKind;
 use quadfrog::robot::description::{RobotDescription, RobotFiles};
 use quadfrog::trial::Task;
+use quadfrog_console::notice;
 
 use super::failure::Failure;
 
@@ -86,7 +88,7 @@ impl StudyArguments {
     pub fn load_config(&self, resume: Option<&Path>) -> Result<Config, Failure> {
         let own = resume.filter(|_| self.config.is_none()).and_then(newest_config).map(|(_, config)| config);
         if let Some(own) = &own {
-            eprintln!("quadfrog: continuing with the last configuration of the study, {}", own.display());
+            notice!("continuing with the last configuration of the study, {}", own.display());
         }
         let mut config = Config::load(self.config.as_deref().or(own.as_deref()))?;
         if let Some(sampler) = self.sampler {
@@ -95,14 +97,27 @@ impl StudyArguments {
         Ok(config)
     }
 
-    /// Returns the folder of a new study: `<output>/<date>T<time>-<task>-seed<seed>`, with a number appended if that
-    /// folder exists.
-    pub fn new_folder(&self, task: Task, seed: u32) -> PathBuf {
+    /// Makes the folder of a new study and returns it: `<output>/<date>T<time>-<task>-seed<seed>`, with a number appended if
+    /// that folder exists. Of two programs that start in the same second each gets its own, because only one can make a folder.
+    ///
+    /// # Errors
+    /// If it cannot be made.
+    pub fn new_folder(&self, task: Task, seed: u32) -> Result<PathBuf, Failure> {
         let now = jiff::Zoned::now().strftime("%Y-%m-%dT%H-%M-%S").to_string();
         let name = format!("{now}-{}-seed{seed}", task.name());
         let numbered = (2..).map(|n| self.output.join(format!("{name}-{n}")));
-        let mut folders = std::iter::once(self.output.join(&name)).chain(numbered);
-        folders.find(|folder| !folder.exists()).unwrap_or_else(|| self.output.join(&name))
+        let failed = |folder: &Path, source| {
+            Failure::from(EngineError::System { what: format!("{}: cannot be made", folder.display()), source })
+        };
+        std::fs::create_dir_all(&self.output).map_err(|error| failed(&self.output, error))?;
+        for folder in std::iter::once(self.output.join(&name)).chain(numbered) {
+            match std::fs::create_dir(&folder) {
+                Ok(()) => return Ok(folder),
+                Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
+                Err(error) => return Err(failed(&folder, error)),
+            }
+        }
+        unreachable!("the numbers have no end")
     }
 }
 

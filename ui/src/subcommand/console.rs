@@ -7,11 +7,13 @@ use clap::Args;
 use clap::builder::TypedValueParser;
 use quadfrog::config::Config;
 use quadfrog::engine::{self, Options};
+use quadfrog::optimize::journal::notice_waits;
 use quadfrog::robot::go1::Network;
 use quadfrog::trial::{Approval, Backend, Task};
 use quadfrog_console::app::{self, ConsoleExit, ConsoleOptions};
 use quadfrog_console::connection::TerminalLocation;
 use quadfrog_console::feed::Feed;
+use quadfrog_console::put_line;
 use quadfrog_console::settings::ConsoleSettings;
 use quadfrog_console::terminal;
 use quadfrog_console::theme::ColourChoice;
@@ -116,7 +118,9 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
         None => {
             let task = arguments.task.unwrap_or(Task::Forward);
             let seed = arguments.seed.unwrap_or(config.optimize.sampler.seed);
-            SelectedStudy { task, seed, folder: arguments.study.new_folder(task, seed), budget: None }
+            // An observer writes no files.
+            let folder = if arguments.observe { PathBuf::new() } else { arguments.study.new_folder(task, seed)? };
+            SelectedStudy { task, seed, folder, budget: None }
         }
     };
     let folder = selected.folder.clone();
@@ -124,7 +128,6 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
     let options = Options {
         seed: selected.seed,
         trials: arguments.study.trials.or(selected.budget),
-        // An observer writes no files.
         folder: (!arguments.observe).then_some(selected.folder),
         observe: arguments.observe,
         accept_backend_change: arguments.accept_backend_change,
@@ -139,17 +142,18 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
     terminal::check().map_err(Failure::input)?;
     let handle = engine::start(options)?;
     let recording = handle.recording().map(Path::to_owned);
+    notice_waits(None);
     let exit = app::run(Feed::live(handle), console)?;
     if exit == ConsoleExit::HungUp || arguments.observe {
         return Ok(());
     }
-    println!("The study and its recording are in {}", folder.display());
-    println!("  continue the study:  quadfrog --resume {}", folder.display());
+    put_line!("The study and its recording are in {}", folder.display());
+    put_line!("  continue the study:  quadfrog --resume {}", folder.display());
     if let Some(recording) = recording {
-        println!("  play the recording:  quadfrog replay {}", recording.display());
+        put_line!("  play the recording:  quadfrog replay {}", recording.display());
     }
     for part in incomplete {
-        println!("  repair an incomplete recording:  quadfrog recover {}", part.display());
+        put_line!("  repair an incomplete recording:  quadfrog recover {}", part.display());
     }
     Ok(())
 }

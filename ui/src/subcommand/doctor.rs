@@ -1,18 +1,20 @@
 //! `quadfrog doctor`: checks of this machine for the control thread and the console, one line each, with remedies.
 
 use std::fmt;
+use std::io::Write;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use anyhow::anyhow;
 use clap::Args;
-use color_eyre::eyre::eyre;
 use quadfrog::config::Config;
 use quadfrog::realtime::scheduling::{ALLOW_LOCKING, ALLOW_PRIORITY, Scheduling};
 use quadfrog::realtime::{system, thread};
 use quadfrog::recording::disk;
 use quadfrog::trial::Backend;
 use quadfrog_console::connection::TerminalLocation;
+use quadfrog_console::put_line;
 
 use super::arguments;
 use super::failure::Failure;
@@ -76,16 +78,17 @@ pub fn run(arguments: &DoctorArguments) -> Result<(), Failure> {
     items.extend(wake_up(scheduling));
     items.extend([characters(), colours(), size(), connection()]);
     items.push(disk_space(&arguments.output, config.safety.arming.disk_free_mb));
+    items.push(folder(&arguments.output));
     for item in &items {
-        println!("{item}");
+        put_line!("{item}");
     }
     let weak = items.iter().filter(|item| matches!(item.status, ItemStatus::Weak(_))).count();
     let broken = items.iter().filter(|item| matches!(item.status, ItemStatus::Broken(_))).count();
-    println!();
+    put_line!();
     match (weak, broken) {
-        (_, 1..) => return Err(eyre!("{broken} of {} items make quadfrog unusable here", items.len()).into()),
-        (0, _) => println!("All items are ok, for the simulator and for a robot."),
-        (weak, _) => println!("Usable with the simulator. Resolve the {weak} warnings before a real robot jumps."),
+        (_, 1..) => return Err(anyhow!("{broken} of {} items make quadfrog unusable here", items.len()).into()),
+        (0, _) => put_line!("All items are ok, for the simulator and for a robot."),
+        (weak, _) => put_line!("Usable with the simulator. Resolve the {weak} warnings before a real robot jumps."),
     }
     Ok(())
 }
@@ -155,7 +158,10 @@ fn wake_up(scheduling: Scheduling) -> Vec<DoctorItem> {
     match measured.join() {
         Ok(Ok((granted, lateness))) => {
             let settings: Vec<_> = granted.granted.iter().map(ToString::to_string).collect();
-            let mut items = vec![DoctorItem::new("control thread", settings.join(", "), true, "")];
+            let mut items = Vec::new();
+            if !settings.is_empty() {
+                items.push(DoctorItem::new("control thread", settings.join(", "), true, ""));
+            }
             items.extend(granted.denied.iter().map(|denied| {
                 let found = format!("not {}: {}", denied.setting, denied.reason);
                 DoctorItem::new("control thread", found, false, denied.remedy)
@@ -226,6 +232,25 @@ fn size() -> DoctorItem {
     };
     let remedy = "below 80x24 only the mode, STOP and the link are shown; make the window larger";
     DoctorItem::new("terminal size", format!("{columns}x{rows}"), columns >= 80 && rows >= 24, remedy)
+}
+
+/// Checks whether studies can be written into the folder, or into its nearest ancestor that exists, by writing a file.
+fn folder(folder: &Path) -> DoctorItem {
+    const NAME: &str = "folder";
+    let absolute = std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned());
+    let existing = absolute.ancestors().find(|path| path.exists()).unwrap_or(Path::new("/"));
+    let probe = existing.join(format!(".quadfrog-doctor-{}", std::process::id()));
+    let written = std::fs::File::create_new(&probe).and_then(|mut file| {
+        let written = file.write_all(b"quadfrog doctor").and_then(|()| file.sync_all());
+        std::fs::remove_file(&probe).and(written)
+    });
+    match written {
+        Ok(()) => DoctorItem::new(NAME, format!("{} can be written", existing.display()), true, ""),
+        Err(error) => {
+            let remedy = "no study can be kept there; choose another --output, or change the folder's permissions";
+            DoctorItem::broken(NAME, format!("{}: {error}", existing.display()), remedy)
+        }
+    }
 }
 
 /// Checks the free space in the folder, or in its nearest ancestor that exists.

@@ -8,8 +8,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
+use anyhow::{Context, anyhow};
 use clap::Args;
-use color_eyre::eyre::{WrapErr, eyre};
 use nix::sys::signal::{SigSet, Signal};
 use quadfrog::config::Config;
 use quadfrog::engine::EngineError;
@@ -17,6 +17,7 @@ use quadfrog::realtime::thread::pace;
 use quadfrog::robot::CONTROL_PERIOD_S;
 use quadfrog::robot::go1::Network;
 use quadfrog::sim::emulator::{self, Emulator, EmulatorFault, EmulatorHandle, EmulatorStatus};
+use quadfrog_console::{notice, put, put_line};
 
 use super::arguments::load_model;
 use super::failure::Failure;
@@ -53,10 +54,10 @@ pub fn run(arguments: &EmulateArguments) -> Result<(), Failure> {
     arguments.faults.iter().for_each(|&fault| emulator.apply(fault));
     // Before the threads start, so that all of them inherit the blocked signals and only `wait` receives them.
     let ends = SigSet::from_iter([Signal::SIGINT, Signal::SIGTERM]);
-    ends.thread_block().wrap_err("blocking signals")?;
-    let address = emulator.local_address().wrap_err("the address of the socket")?;
-    println!("A {} listens on {address}. Drive it:  quadfrog --robot go1 --address {address}", description.name);
-    println!("Type a fault, help, or Ctrl-C.");
+    ends.thread_block().context("blocking signals")?;
+    let address = emulator.local_address().context("the address of the socket")?;
+    put_line!("A {} listens on {address}. Drive it:  quadfrog --robot go1 --address {address}", description.name);
+    put_line!("Type a fault, help, or Ctrl-C.");
 
     let handle = emulator.handle();
     let ending = Arc::new(AtomicBool::new(false));
@@ -76,10 +77,10 @@ pub fn run(arguments: &EmulateArguments) -> Result<(), Failure> {
     if ends.wait().is_ok() {
         ending.store(true, Ordering::Release);
     }
-    let paced = robot.join().map_err(|_| eyre!("the robot's thread panicked"))?;
+    let paced = robot.join().map_err(|_| anyhow!("the robot's thread panicked"))?;
     let _ = reporter.join();
-    paced.wrap_err("the monotonic clock")?;
-    println!("The robot is switched off.");
+    paced.context("the monotonic clock")?;
+    put_line!("The robot is switched off.");
     Ok(())
 }
 
@@ -88,13 +89,13 @@ fn read_faults(handle: &EmulatorHandle) {
     for line in std::io::stdin().lock().lines().map_while(Result::ok) {
         match line.trim() {
             "" => {}
-            "help" => print!("{}", emulator::help()),
+            "help" => put!("{}", emulator::help()),
             line => match line.parse() {
                 Ok(fault) => {
                     handle.apply(fault);
-                    println!("done: {line}");
+                    put_line!("done: {line}");
                 }
-                Err(error) => eprintln!("quadfrog emulate: {error}"),
+                Err(error) => notice!("{error}"),
             },
         }
     }
@@ -106,16 +107,16 @@ fn report(handle: &EmulatorHandle, ending: &AtomicBool) {
     while !ending.load(Ordering::Acquire) {
         let now = handle.status();
         if let Some(client) = now.client.filter(|client| last.client != Some(*client)) {
-            println!("commands come from {client}");
+            put_line!("commands come from {client}");
         }
         if now.timed_out && !last.timed_out && now.commands > 0 {
-            println!("commands timed out: the motors brake");
+            put_line!("commands timed out: the motors brake");
         }
         if !now.timed_out && last.timed_out && last.commands > 0 {
-            println!("commands resumed");
+            put_line!("commands resumed");
         }
         if now.rejected > last.rejected && last.rejected == 0 {
-            println!("rejected a datagram (checksum, length or head); further ones are counted, not printed");
+            put_line!("rejected a datagram (checksum, length or head); further ones are counted, not printed");
         }
         last = now;
         std::thread::sleep(REPORT_PERIOD);

@@ -1,8 +1,6 @@
 //! `quadfrog evaluate`: one point of a task over several seeds and variants on the simulator, without a study.
 
-use std::panic::resume_unwind;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use clap::Args;
 use quadfrog::config::Config;
@@ -14,11 +12,12 @@ use quadfrog::session::rollout::Rollout;
 use quadfrog::sim::Simulator;
 use quadfrog::telemetry::TrialSpec;
 use quadfrog::trial::{Backend, JumpParameters, ParameterValues, Task};
+use quadfrog_console::output;
 use serde_json::json;
 
 use super::arguments::{self, Seeds, load_model, parse_seeds};
 use super::failure::Failure;
-use super::optimize::print_line;
+use super::parallel::in_parallel;
 
 #[derive(Debug, Args)]
 pub struct EvaluateArguments {
@@ -87,34 +86,14 @@ pub fn run(arguments: &EvaluateArguments) -> Result<(), Failure> {
     let rollout = || -> Result<_, Failure> {
         Ok(Rollout::new(Simulator::new(&robot, &config.simulator).map_err(EngineError::from)?, &settings))
     };
-    let runs = on_all_cores(&specs, rollout)?;
+    let runs = in_parallel(arguments::cores(), &specs, rollout, |rollout, spec| Ok(evaluate(rollout, spec)))?;
     if arguments.json {
         for (spec, run) in specs.iter().zip(&runs) {
-            print_line(&line(spec, run).to_string());
+            output::line(&line(spec, run).to_string());
         }
     }
     print_table(arguments.json, task, &point, &robot, &variants, &specs, &runs);
     Ok(())
-}
-
-/// Runs every trial, on all cores; the order of the results is that of `specs`.
-fn on_all_cores(
-    specs: &[TrialSpec],
-    rollout: impl Fn() -> Result<Rollout<Simulator>, Failure> + Sync,
-) -> Result<Vec<EvaluatedRun>, Failure> {
-    let next = AtomicUsize::new(0);
-    let worker = || -> Result<Vec<(usize, EvaluatedRun)>, Failure> {
-        let mut rollout = rollout()?;
-        let indices = std::iter::repeat_with(|| next.fetch_add(1, Ordering::Relaxed));
-        Ok(indices.map_while(|i| Some((i, evaluate(&mut rollout, specs.get(i)?)))).collect())
-    };
-    let mut runs = std::thread::scope(|scope| {
-        let workers: Vec<_> = (0..arguments::cores().min(specs.len())).map(|_| scope.spawn(worker)).collect();
-        let results = workers.into_iter().map(|worker| worker.join().unwrap_or_else(|panic| resume_unwind(panic)));
-        results.collect::<Result<Vec<_>, _>>().map(|parts| parts.concat())
-    })?;
-    runs.sort_by_key(|(index, _)| *index);
-    Ok(runs.into_iter().map(|(_, run)| run).collect())
 }
 
 /// Returns the point of the arguments, else that of the configuration; parameters that the task does not optimize may be given.
@@ -245,5 +224,5 @@ fn print_table(
             text += &format!("     seed {}: {}{time}\n", run.seed, run.cause);
         }
     }
-    if to_error { eprint!("{text}") } else { print_line(text.trim_end()) }
+    if to_error { output::message(&text) } else { output::text(&text) }
 }

@@ -5,13 +5,14 @@ use quadfrog::engine::EngineError;
 use quadfrog::optimize::journal::JournalError;
 use quadfrog::optimize::study::StudyError;
 use quadfrog::recording::RecordingError;
+use quadfrog_console::notice;
 
 /// The reason for which a command ends before it is done.
 pub enum Failure {
     /// Unusable input, with the remedy; exit status 2.
     Input(String),
     /// Every other error; exit status 1.
-    Other(color_eyre::Report),
+    Other(anyhow::Error),
 }
 
 impl Failure {
@@ -22,8 +23,8 @@ impl Failure {
     /// Prints the message on standard error.
     pub fn print(&self) {
         match self {
-            Failure::Input(message) => eprintln!("quadfrog: {message}"),
-            Failure::Other(report) => eprintln!("quadfrog: {report:?}"),
+            Failure::Input(message) => notice!("{message}"),
+            Failure::Other(error) => notice!("{}", with_causes(error)),
         }
     }
 }
@@ -38,7 +39,12 @@ impl From<EngineError> for Failure {
     fn from(error: EngineError) -> Failure {
         match &error {
             EngineError::System { .. }
-            | EngineError::Study(StudyError::Journal(JournalError::Io { .. } | JournalError::Redis { .. }))
+            | EngineError::Study(StudyError::Journal(
+                JournalError::Io { .. }
+                | JournalError::Redis { .. }
+                | JournalError::RedisShortened { .. }
+                | JournalError::ServerWaitEnded { .. },
+            ))
             | EngineError::Recording(RecordingError::Io { .. }) => Failure::Other(error.into()),
             _ => Failure::input(error),
         }
@@ -51,8 +57,19 @@ impl From<StudyError> for Failure {
     }
 }
 
-impl From<color_eyre::Report> for Failure {
-    fn from(report: color_eyre::Report) -> Failure {
+impl From<anyhow::Error> for Failure {
+    fn from(report: anyhow::Error) -> Failure {
         Failure::Other(report)
     }
+}
+
+/// Returns the message of an error and of its causes, each once: many messages end with their cause already.
+fn with_causes(error: &anyhow::Error) -> String {
+    let mut text = error.to_string();
+    for cause in error.chain().skip(1).map(ToString::to_string) {
+        if !text.contains(&cause) {
+            text += &format!(": {cause}");
+        }
+    }
+    text
 }

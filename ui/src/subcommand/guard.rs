@@ -6,7 +6,7 @@ use std::io::{IsTerminal, Write};
 use std::net::UdpSocket;
 use std::os::fd::AsFd;
 
-use color_eyre::eyre::WrapErr;
+use anyhow::Context;
 use nix::sys::signal::{SigSet, Signal};
 use nix::unistd::dup2_stdout;
 use quadfrog::engine::{GuardOutcome, run_guard};
@@ -21,16 +21,16 @@ pub fn run() -> Result<(), Failure> {
     }
     // Signals that end the console by name, or come from its terminal, must not end the guard.
     let ignored = SigSet::from_iter([Signal::SIGINT, Signal::SIGTERM, Signal::SIGHUP, Signal::SIGTTOU]);
-    ignored.thread_block().wrap_err("blocking signals")?;
+    ignored.thread_block().context("blocking signals")?;
     // The buffered standard output would split a datagram at a line feed, and no printed text may reach the robot.
-    let socket = UdpSocket::from(std::io::stdout().as_fd().try_clone_to_owned().wrap_err("standard output")?);
-    let null = File::options().write(true).open("/dev/null").wrap_err("/dev/null")?;
-    dup2_stdout(null).wrap_err("standard output")?;
+    let socket = UdpSocket::from(std::io::stdout().as_fd().try_clone_to_owned().context("standard output")?);
+    let null = File::options().write(true).open("/dev/null").context("/dev/null")?;
+    dup2_stdout(null).context("standard output")?;
     // Real-time priority and locked memory: CPU or memory starvation of the console must not delay the guard. The console
     // has reported denied settings.
     let _granted = Scheduling { priority: 1, core: None, lock_memory: true }.apply();
     // Unbuffered: poll(2) does not report bytes that a buffer has read ahead.
-    let watch = run_guard(File::from(pipe.as_fd().try_clone_to_owned().wrap_err("standard input")?), &socket);
+    let watch = run_guard(File::from(pipe.as_fd().try_clone_to_owned().context("standard input")?), &socket);
     // Frees the port before the terminal may delay the report.
     drop(socket);
     if let GuardOutcome::Damped { sent } = watch.map_err(Failure::input)? {

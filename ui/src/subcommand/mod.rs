@@ -9,6 +9,7 @@ mod evaluate;
 mod failure;
 mod guard;
 mod optimize;
+mod parallel;
 mod recover;
 mod replay;
 mod selection;
@@ -17,6 +18,8 @@ mod study;
 use clap::{Parser, Subcommand};
 
 pub use failure::Failure;
+use quadfrog::optimize::journal::notice_waits;
+use quadfrog_console::output;
 
 /// Optimize the jumps of a quadruped, on the robot or on the built-in simulator.
 ///
@@ -54,6 +57,8 @@ enum Subcommands {
 }
 
 pub fn run(arguments: Arguments) -> Result<(), Failure> {
+    // While the console has the screen it shows the waits there.
+    notice_waits(Some(Box::new(output::notice)));
     match arguments.command {
         None => console::run(&arguments.console),
         Some(Subcommands::Optimize(optimize)) => optimize::run(&optimize),

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use quadfrog::recording::recover;
+use quadfrog_console::put_line;
 
 use super::failure::Failure;
 
@@ -15,11 +16,11 @@ pub struct RecoverArguments {
 
 pub fn run(arguments: &RecoverArguments) -> Result<(), Failure> {
     let recovered = recover::recover(&arguments.file).map_err(Failure::input)?;
-    println!("{}: {} ticks, {} messages", recovered.path.display(), recovered.ticks, recovered.messages);
+    put_line!("{}: {} ticks, {} messages", recovered.path.display(), recovered.ticks, recovered.messages);
     match recovered.lost {
-        Some(lost) => println!("Lost: {lost}"),
-        None => println!("Nothing was lost."),
+        Some(lost) => put_line!("Lost: {lost}"),
+        None => put_line!("Nothing was lost."),
     }
-    println!("{} is unchanged.", arguments.file.display());
+    put_line!("{} is unchanged.", arguments.file.display());
     Ok(())
 }

@@ -6,6 +6,7 @@ use quadfrog::engine::{STUDY_FILE, StoredStudy, stored_studies, stored_study};
 use quadfrog::optimize::study::Storage;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::trial::Task;
+use quadfrog_console::notice;
 
 use super::failure::Failure;
 
@@ -53,7 +54,7 @@ pub fn study_to_join(
     match matching.as_slice() {
         [] => {
             if let (Some(task), Some(seed)) = (task, seed) {
-                eprintln!("quadfrog: a new study of {} seed {seed} is made in {storage}", task.name());
+                notice!("a new study of {} seed {seed} is made in {storage}", task.name());
                 return Ok(StoredStudy { task, seed, robot: robot.name.clone(), budget: None, unit: None });
             }
             let found = match (exists, all.as_slice()) {

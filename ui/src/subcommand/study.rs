@@ -1,11 +1,10 @@
 //! `quadfrog study`: stored studies, of this program and of other Optuna programs.
 
 use std::fmt::Write as _;
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
+use anyhow::Context;
 use clap::{Args, Subcommand, ValueEnum};
-use color_eyre::eyre::{WrapErr, eyre};
 use quadfrog::config::Config;
 use quadfrog::engine::{Opened, StoredStudy, newest_config, open_stored, stored_studies, study_files, study_name};
 use quadfrog::optimize::exchange::{self, TableTrial};
@@ -15,6 +14,7 @@ use quadfrog::optimize::trial::TrialState;
 use quadfrog::report::table;
 use quadfrog::session::experiment::{self, rows_of};
 use quadfrog::trial::TrialRecord;
+use quadfrog_console::{notice, output};
 use serde_json::Value;
 
 use super::failure::Failure;
@@ -139,35 +139,26 @@ impl StudySelector {
     }
 }
 
-/// Prints a text; a closed pipe (`| head`) is no error.
-fn print(text: &str) -> Result<(), Failure> {
-    let mut output = std::io::stdout();
-    match output.write_all(text.as_bytes()).and_then(|()| output.flush()) {
-        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
-            Err(Failure::Other(eyre!("standard output: {error}")))
-        }
-        _ => Ok(()),
-    }
-}
-
 fn list(folder: &Path) -> Result<(), Failure> {
     let files = study_files(folder)
         .map_err(|error| Failure::input(format!("{}: {error}; give a folder that holds studies", folder.display())))?;
     if files.is_empty() {
-        return print(&format!("There is no study in {}\n", folder.display()));
+        output::text(&format!("There is no study in {}\n", folder.display()));
+        return Ok(());
     }
     let mut rows = vec![["study", "task", "seed", "trials", "counted", "falls", "best"].map(str::to_owned).to_vec()];
     for file in &files {
         // A study that cannot be read is reported, and the others are listed.
         let studies = stored_studies(&Storage::File(file.clone()));
-        for stored in studies.inspect_err(|error| eprintln!("quadfrog: {error}")).unwrap_or_default() {
+        for stored in studies.inspect_err(|error| notice!("{error}")).unwrap_or_default() {
             match list_row(file, &stored) {
                 Err(failure @ Failure::Input(_)) => failure.print(),
                 row => rows.push(row?),
             }
         }
     }
-    print(&table::aligned(&rows, |column| column < 2))
+    output::text(&table::aligned(&rows, |column| column < 2));
+    Ok(())
 }
 
 fn list_row(file: &Path, stored: &StoredStudy) -> Result<Vec<String>, Failure> {
@@ -242,7 +233,8 @@ fn show(selector: &StudySelector) -> Result<(), Failure> {
     if let (Some(jumps), Some(ours)) = (jumps.filter(|jumps| jumps.len() > 1), ours) {
         text += &table::jumps(jumps, ours.task.unit());
     }
-    print(&text)
+    output::text(&text);
+    Ok(())
 }
 
 fn best_line(opened: &Opened, rows: &[TrialRecord]) -> String {
@@ -258,9 +250,12 @@ fn export(selector: &StudySelector, format: Option<TableFormat>, output: Option<
         TableFormat::Json => exchange::to_json(opened.study.trials(), note),
     };
     match output {
-        None => print(&text),
+        None => {
+            output::data(&text);
+            Ok(())
+        }
         Some(path) => std::fs::write(path, text)
-            .wrap_err_with(|| format!("{}: cannot be written", path.display()))
+            .with_context(|| format!("{}: cannot be written", path.display()))
             .map_err(Failure::Other),
     }
 }
@@ -286,7 +281,8 @@ fn import(selector: &StudySelector, table: &Path, format: Option<TableFormat>, q
         if !unfinished.is_empty() {
             let _ = write!(text, "; {} unfinished trials are ignored, --queue queues them", unfinished.len());
         }
-        return print(&(text + "\n"));
+        output::text(&(text + "\n"));
+        return Ok(());
     }
     let points: Vec<TableTrial> = finished.into_iter().chain(unfinished).collect();
     // All or none: every point is checked before the first is queued.
@@ -296,21 +292,24 @@ fn import(selector: &StudySelector, table: &Path, format: Option<TableFormat>, q
     for point in &points {
         study.enqueue(&point.parameters, &[])?;
     }
-    print(&format!("{} points are queued\n", points.len()))
+    output::text(&format!("{} points are queued\n", points.len()));
+    Ok(())
 }
 
 fn best(selector: &StudySelector, config: Option<&Path>) -> Result<(), Failure> {
     let opened = selector.open()?;
     let rows = rows_of(&opened.study, &opened.parameters);
     let Some(folder) = config else {
-        return print(&best_line(&opened, &rows));
+        output::text(&best_line(&opened, &rows));
+        return Ok(());
     };
     let (Some(best), Some(ours)) = (best_row(&opened, &rows), &opened.ours) else {
         return Err(Failure::input(format!("{}: no accepted trial of this program to export", selector.place)));
     };
     selector.config()?.export(folder, ours.task, &best.parameters, &best.gains)?;
     let (text, task, folder) = (best_line(&opened, &rows), ours.task.name(), folder.display());
-    print(&format!("{text}Start a new study with it:  quadfrog --task {task} --config {folder}\n"))
+    output::text(&format!("{text}Start a new study with it:  quadfrog --task {task} --config {folder}\n"));
+    Ok(())
 }
 
 fn enqueue(selector: &StudySelector, point: &[(String, f64)]) -> Result<(), Failure> {
@@ -320,5 +319,6 @@ fn enqueue(selector: &StudySelector, point: &[(String, f64)]) -> Result<(), Fail
     let mut study = selector.open()?.study;
     study.check_point(point)?;
     let number = study.enqueue(point, &[])?;
-    print(&format!("Queued as trial {number}\n"))
+    output::text(&format!("Queued as trial {number}\n"));
+    Ok(())
 }

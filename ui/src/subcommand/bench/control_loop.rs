@@ -7,8 +7,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
+use anyhow::{Context, anyhow};
 use clap::Args;
-use color_eyre::eyre::{WrapErr, eyre};
 use quadfrog::config::Config;
 use quadfrog::control::control_loop::ControlLoop;
 use quadfrog::control::settings::ControlSettings;
@@ -24,6 +24,7 @@ use quadfrog::sim::Simulator;
 use quadfrog::sim::emulator::Emulator;
 use quadfrog::telemetry::{Command, Event, Mode, Permit, Tick};
 use quadfrog::trial::{Backend, Task};
+use quadfrog_console::{put, put_line};
 
 use super::machine::{self, Durations, PERIOD, durations};
 use crate::subcommand::failure::Failure;
@@ -144,16 +145,16 @@ pub fn run(arguments: &LoopArguments) -> Result<(), Failure> {
 fn report(arguments: &LoopArguments, ours: &LoopMeasurement, cyclictest: &Durations, system_calls: &Durations) {
     if let Some(granted) = &ours.granted {
         let settings: Vec<_> = granted.granted.iter().map(ToString::to_string).collect();
-        println!("granted: {}", if settings.is_empty() { "nothing".to_owned() } else { settings.join(", ") });
+        put_line!("granted: {}", if settings.is_empty() { "nothing".to_owned() } else { settings.join(", ") });
         for denied in &granted.denied {
-            println!("{denied}");
+            put_line!("{denied}");
         }
     }
-    println!();
-    println!("{:<26}{:>10}{:>10}{:>10}{:>10}   us", "", "p50", "p99", "p99.9", "max");
+    put_line!();
+    put_line!("{:<26}{:>10}{:>10}{:>10}{:>10}   us", "", "p50", "p99", "p99.9", "max");
     let line = |name: &str, durations: &Durations| {
         let at = |quantile| us(durations.value_at_quantile(quantile));
-        println!("{name:<26}{:>10.1}{:>10.1}{:>10.1}{:>10.1}", at(0.5), at(0.99), at(0.999), us(durations.max()));
+        put_line!("{name:<26}{:>10.1}{:>10.1}{:>10.1}{:>10.1}", at(0.5), at(0.99), at(0.999), us(durations.max()));
     };
     line("wake-up latency", &ours.wake_up);
     if arguments.cyclictest {
@@ -172,21 +173,21 @@ fn report(arguments: &LoopArguments, ours: &LoopMeasurement, cyclictest: &Durati
     if arguments.with_link {
         line("system calls of a tick", system_calls);
     }
-    println!();
+    put_line!();
     let (ticks, slept) = (ours.lateness.len(), ours.wake_up.len());
-    print!("{ticks} ticks, {} without sleep after a stall, {} not in READY", ticks - slept, ours.not_ready);
+    put!("{ticks} ticks, {} without sleep after a stall, {} not in READY", ticks - slept, ours.not_ready);
     if !arguments.lead().is_zero() {
-        print!(", {} with a warm-up", ours.warm_up.len());
+        put!(", {} with a warm-up", ours.warm_up.len());
     }
-    println!();
+    put_line!();
     if arguments.cyclictest {
         let (own, other) = (ours.wake_up_floor.value_at_quantile(0.999), cyclictest.value_at_quantile(0.999));
         let ratio = own.max(1000) as f64 / other.max(1000) as f64;
-        println!("p99.9 of the wake-up latency: {ratio:.2} times cyclictest's, in whole us (limit {RATIO_LIMIT})");
+        put_line!("p99.9 of the wake-up latency: {ratio:.2} times cyclictest's, in whole us (limit {RATIO_LIMIT})");
     }
     if arguments.with_link {
         let [tick, calls] = [&ours.tick, system_calls].map(|durations| us(durations.value_at_quantile(0.999)));
-        println!(
+        put_line!(
             "p99.9 of a tick over the Go1's link: {tick:.1} us (limit {TICK_LIMIT_US}); its system calls: {calls:.1} us"
         );
     }
@@ -224,7 +225,7 @@ fn measure(
     let network = Network::read(&files).map_err(Failure::input)?.expect("the embedded go1 has a network");
     let mut emulator =
         Emulator::bind(any_port, &description, &network, &config.simulator, 0).map_err(Failure::input)?;
-    let address = emulator.local_address().wrap_err("the address of the emulator")?;
+    let address = emulator.local_address().context("the address of the emulator")?;
     let mut robot = Go1::open(&Network { address, local_port: 0, ..network }, false).map_err(Failure::input)?;
     let ending = Arc::new(AtomicBool::new(false));
     let flag = ending.clone();
@@ -335,7 +336,7 @@ fn stand_and_measure(
     lead: Duration,
     mut measurement: LoopMeasurement,
     robot: &mut dyn Robot,
-) -> Result<LoopMeasurement, color_eyre::Report> {
+) -> Result<LoopMeasurement, anyhow::Error> {
     (measurement.end_ns, measurement.granted) = (0, Some(scheduling.apply()));
     let clock = MonotonicClock::start();
     let (end, session, screen, ring) = channels();
@@ -344,11 +345,11 @@ fn stand_and_measure(
     let control = ControlLoop::new(settings, end);
     let mut standing =
         StandingLoop { control, robot, clock, channels, standing_up: Some(0), remaining: ticks, measurement };
-    pace_with_warm_up(PERIOD, CONTROL_TICK_OFFSET, lead, &mut standing).wrap_err("waiting on the monotonic clock")?;
+    pace_with_warm_up(PERIOD, CONTROL_TICK_OFFSET, lead, &mut standing).context("waiting on the monotonic clock")?;
     if standing.standing_up.is_some() {
         let mode = standing.control.mode().name();
         let limit_s = STAND_UP_LIMIT_TICKS / 1000;
-        return Err(eyre!("the robot did not reach READY within {limit_s} s; its mode is {mode}"));
+        return Err(anyhow!("the robot did not reach READY within {limit_s} s; its mode is {mode}"));
     }
     Ok(standing.measurement)
 }

@@ -6,7 +6,7 @@ use std::ops::ControlFlow;
 use std::process::Command;
 use std::time::Duration;
 
-use color_eyre::eyre::{WrapErr, eyre};
+use anyhow::{Context, anyhow};
 use hdrhistogram::Histogram;
 use quadfrog::realtime::clock::{Clock, MonotonicClock};
 use quadfrog::realtime::scheduling::Scheduling;
@@ -14,6 +14,7 @@ use quadfrog::realtime::thread::{CONTROL_TICK_OFFSET, PeriodicTask, TickStart, p
 use quadfrog::robot::go1::packet::{COMMAND_LENGTH, STATE_LENGTH};
 
 use crate::subcommand::failure::Failure;
+use quadfrog_console::put_line;
 
 /// The control period.
 pub const PERIOD: Duration = Duration::from_millis(1);
@@ -31,18 +32,18 @@ pub fn print_header(more: &str) {
     let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let model = text.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':'));
     let processor = model.map_or(std::env::consts::ARCH, |(_, name)| name.trim());
-    println!("{processor}{more}, quadfrog {}", env!("CARGO_PKG_VERSION"));
+    put_line!("{processor}{more}, quadfrog {}", env!("CARGO_PKG_VERSION"));
     if cfg!(debug_assertions) {
-        println!("This is a debug build; for valid figures use cargo run --release.");
+        put_line!("This is a debug build; for valid figures use cargo run --release.");
     }
 }
 
 /// Runs `act` in a new thread, so that its priority ends with it.
 pub fn in_a_thread<T: Send + 'static>(
-    act: impl FnOnce() -> Result<T, color_eyre::Report> + Send + 'static,
+    act: impl FnOnce() -> Result<T, anyhow::Error> + Send + 'static,
 ) -> Result<T, Failure> {
-    let thread = std::thread::Builder::new().name("control".into()).spawn(act).wrap_err("control thread")?;
-    Ok(thread.join().map_err(|_| eyre!("the control thread panicked"))??)
+    let thread = std::thread::Builder::new().name("control".into()).spawn(act).context("control thread")?;
+    Ok(thread.join().map_err(|_| anyhow!("the control thread panicked"))??)
 }
 
 /// Two non-blocking UDP sockets connected over the loopback.
@@ -110,12 +111,12 @@ pub fn system_calls(
     ticks: u64,
     durations: Durations,
 ) -> Result<Durations, Failure> {
-    let open = || LoopbackPair::open().wrap_err("sockets on the loopback");
+    let open = || LoopbackPair::open().context("sockets on the loopback");
     let (pair, warm_up, clock) = (open()?, open()?, MonotonicClock::start());
     let mut calls = SystemCallLoop { pair, warm_up, clock, durations, remaining: ticks };
     in_a_thread(move || {
         let _granted = scheduling.apply();
-        pace_with_warm_up(PERIOD, CONTROL_TICK_OFFSET, lead, &mut calls).wrap_err("waiting on the monotonic clock")?;
+        pace_with_warm_up(PERIOD, CONTROL_TICK_OFFSET, lead, &mut calls).context("waiting on the monotonic clock")?;
         Ok(calls.durations)
     })
 }
@@ -137,7 +138,7 @@ pub fn cyclictest(scheduling: Scheduling, loops: u64, durations: &mut Durations)
     let text = String::from_utf8_lossy(&output.stdout);
     if !output.status.success() {
         let errors = String::from_utf8_lossy(&output.stderr);
-        return Err(eyre!("cyclictest ended with {}: {} {}", output.status, text.trim(), errors.trim()).into());
+        return Err(anyhow!("cyclictest ended with {}: {} {}", output.status, text.trim(), errors.trim()).into());
     }
     let before = durations.len();
     for line in text.lines().filter(|line| line.starts_with(|c: char| c.is_ascii_digit())) {
@@ -147,7 +148,7 @@ pub fn cyclictest(scheduling: Scheduling, loops: u64, durations: &mut Durations)
         }
     }
     if durations.len() == before {
-        return Err(eyre!("cyclictest printed no histogram: {}", text.trim()).into());
+        return Err(anyhow!("cyclictest printed no histogram: {}", text.trim()).into());
     }
     Ok(())
 }

@@ -4,9 +4,10 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Instant;
 
+use anyhow::{Context, anyhow};
 use clap::Args;
-use color_eyre::eyre::{WrapErr, eyre};
 use quadfrog::sim::bench::{BenchScene, SimulatorBench};
+use quadfrog_console::put_line;
 
 use super::machine;
 use crate::subcommand::arguments::cores;
@@ -33,52 +34,52 @@ pub fn run(arguments: &SpeedArguments) -> Result<(), Failure> {
         return Err(Failure::input(format!("--mujoco {}: there is no such file", script.display())));
     }
     machine::print_header(&format!(", {} cores", cores()));
-    println!();
+    put_line!();
     let figures = SimulatorBench::new().measure(arguments.seconds * 5.0);
-    println!("accelerations from torques                {:8.2} us", figures.dynamics_s * 1e6);
+    put_line!("accelerations from torques                {:8.2} us", figures.dynamics_s * 1e6);
     for (scene, seconds) in BenchScene::ALL.iter().zip(figures.step_s) {
-        println!("1 ms step, {:<31}{:8.2} us  {:8.0} steps/s", scene.name(), seconds * 1e6, 1.0 / seconds);
+        put_line!("1 ms step, {:<31}{:8.2} us  {:8.0} steps/s", scene.name(), seconds * 1e6, 1.0 / seconds);
     }
     if let Some(script) = &arguments.mujoco {
         let theirs = mujoco(script, arguments.seconds)?;
         // The robot of the script stands on four feet, as in Scene::ALL[1].
         let (us, ratio) = (1e6 / theirs, 1.0 / figures.step_s[1] / theirs);
-        println!(
+        put_line!(
             "MuJoCo, 1 ms step, standing on four feet  {us:8.2} us  {theirs:8.0} steps/s; quadfrog / MuJoCo: {ratio:.1}"
         );
     }
-    println!();
-    println!("optimize, 20 trials, start to finish      {:8.2} s", studies(&["--trials", "20"])?);
+    put_line!();
+    put_line!("optimize, 20 trials, start to finish      {:8.2} s", studies(&["--trials", "20"])?);
     if arguments.long {
         let several = ["--task", "forward,lateral-left,twist-ccw", "--seed", "0-4", "--trials", "100"];
-        println!("optimize, 5 seeds of 3 tasks of 100 trials{:8.2} s", studies(&several)?);
+        put_line!("optimize, 5 seeds of 3 tasks of 100 trials{:8.2} s", studies(&several)?);
     }
     Ok(())
 }
 
 /// Returns the duration of `quadfrog optimize` with these arguments in a temporary folder, s.
 fn studies(arguments: &[&str]) -> Result<f64, Failure> {
-    let program = std::env::current_exe().wrap_err("the path of this program")?;
+    let program = std::env::current_exe().context("the path of this program")?;
     let folder = std::env::temp_dir().join(format!("quadfrog-bench-{}", std::process::id()));
     let start = Instant::now();
     let mut optimize = Command::new(program);
     optimize.arg("optimize").args(arguments).arg("--output").arg(&folder);
     optimize.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
-    let status = optimize.status().wrap_err("optimize could not be started")?;
+    let status = optimize.status().context("optimize could not be started")?;
     let seconds = start.elapsed().as_secs_f64();
     // A leftover in the temporary directory is harmless.
     let _ = std::fs::remove_dir_all(&folder);
-    if status.success() { Ok(seconds) } else { Err(eyre!("optimize ended with {status}").into()) }
+    if status.success() { Ok(seconds) } else { Err(anyhow!("optimize ended with {status}").into()) }
 }
 
 /// Returns MuJoCo's steps per second, measured by the script.
 fn mujoco(script: &Path, seconds: f64) -> Result<f64, Failure> {
     let output = Command::new("python3").arg(script).arg("bench").arg(seconds.to_string()).output();
-    let output = output.wrap_err("python3 could not be started")?;
+    let output = output.context("python3 could not be started")?;
     let text = String::from_utf8_lossy(&output.stdout);
     let value: Option<serde_json::Value> = text.lines().rev().find_map(|line| serde_json::from_str(line).ok());
     value.and_then(|value| value["mj_steps_per_s_standing"].as_f64()).ok_or_else(|| {
         let errors = String::from_utf8_lossy(&output.stderr);
-        Failure::Other(eyre!("{}: printed no mj_steps_per_s_standing: {}", script.display(), errors.trim()))
+        Failure::Other(anyhow!("{}: printed no mj_steps_per_s_standing: {}", script.display(), errors.trim()))
     })
 }

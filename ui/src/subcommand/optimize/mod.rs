@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
+use anyhow::anyhow;
 use clap::{Args, ValueEnum};
-use color_eyre::eyre::eyre;
 use quadfrog::config::Config;
 use quadfrog::engine::{self, EngineError, Options, StoredStudy};
 use quadfrog::optimize::journal::Durability;
@@ -23,7 +23,6 @@ use quadfrog::telemetry::Tick;
 use quadfrog::trial::{Approval, Backend, Task, TrialRecord, Verdict};
 
 use printer::Printer;
-pub use printer::print_line;
 
 use super::arguments::{self, Seeds, StudyArguments, parse_seeds};
 use super::failure::Failure;
@@ -136,11 +135,8 @@ fn workers(
     let task = arguments.task.first().copied();
     let seed = arguments.only_seed(SEVERAL)?;
     let StoredStudy { task, seed, budget, .. } = study_to_join(storage, task, seed, robot)?;
-    let name = arguments.study.new_folder(task, seed);
-    // With the process number: several programs may start in the same second.
-    let folder = |worker| PathBuf::from(format!("{}-joined-{}-{worker}", name.display(), std::process::id()));
-    let worker = |worker: u16| SelectedStudy { task, seed, folder: folder(worker), budget };
-    Ok((0..arguments.jobs.unwrap_or(1)).map(worker).collect())
+    let worker = |_| Ok(SelectedStudy { task, seed, folder: arguments.study.new_folder(task, seed)?, budget });
+    (0..arguments.jobs.unwrap_or(1)).map(worker).collect()
 }
 
 /// Returns the continued study, or a new study for each pair of task and seed.
@@ -158,8 +154,9 @@ fn select(
     let mut pairs: Vec<(Task, u32)> = tasks.iter().flat_map(|task| seeds.iter().map(|seed| (*task, *seed))).collect();
     let mut seen = HashSet::new();
     pairs.retain(|pair| seen.insert(*pair));
-    let new = |(task, seed)| SelectedStudy { task, seed, folder: arguments.study.new_folder(task, seed), budget: None };
-    Ok(pairs.into_iter().map(new).collect())
+    let new =
+        |(task, seed)| Ok(SelectedStudy { task, seed, folder: arguments.study.new_folder(task, seed)?, budget: None });
+    pairs.into_iter().map(new).collect()
 }
 
 fn run_one(
@@ -209,21 +206,22 @@ fn run_one(
             RecordChoice::Best | RecordChoice::None => {}
         }
     });
-    if let Some(mut recorder) = recorder {
-        if let Some((row, ticks)) = &best {
-            recorder.trial(row, ticks)?;
-        }
-        for row in experiment.rows() {
-            recorder.row(row)?;
-        }
-        recorder.writer.finish().map_err(EngineError::from)?;
+    if let Some(recorder) = recorder {
+        let finished = match failed {
+            None => recorder.finish(best.as_ref(), experiment.rows()),
+            Some(error) => Err(error),
+        };
+        failed = finished.err();
+    }
+    // A full disk fails the journal and the recording: the journal, with every verdict, is named first.
+    if let Err(refusal) = ran {
+        let place = join.map_or_else(|| study.folder.display().to_string(), ToString::to_string);
+        let recording =
+            failed.map_or_else(String::new, |error| format!("; and the recording is not complete: {error}"));
+        return Err(Failure::Other(anyhow!("{place}: {refusal}{recording}")));
     }
     if let Some(error) = failed {
         return Err(error.into());
-    }
-    if let Err(refusal) = ran {
-        let place = join.map_or_else(|| study.folder.display().to_string(), ToString::to_string);
-        return Err(Failure::Other(eyre!("{place}: {refusal}")));
     }
     printer.finished(study, &experiment.rows().cloned().collect::<Vec<_>>(), experiment.best(), &options);
     Ok(())
@@ -250,6 +248,21 @@ impl StudyRecorder {
             self.time_ns = time_ns + 1_000_000;
         }
         self.row(row)
+    }
+
+    /// Adds the best trial, where only that one is recorded, and the whole table, and completes the file.
+    fn finish<'a>(
+        mut self,
+        best: Option<&(TrialRecord, Vec<Tick>)>,
+        rows: impl Iterator<Item = &'a TrialRecord>,
+    ) -> Result<(), EngineError> {
+        if let Some((row, ticks)) = best {
+            self.trial(row, ticks)?;
+        }
+        for row in rows {
+            self.row(row)?;
+        }
+        Ok(self.writer.finish().map(drop)?)
     }
 
     fn row(&mut self, row: &TrialRecord) -> Result<(), EngineError> {

@@ -1,7 +1,7 @@
 //! Output of a study without a screen: a progress bar on a terminal, lines elsewhere, JSON on request.
 
 use std::collections::HashMap;
-use std::io::{IsTerminal, Write};
+use std::io::IsTerminal;
 use std::sync::{Mutex, PoisonError};
 
 use indicatif::{ProgressBar, ProgressStyle};
@@ -12,6 +12,7 @@ use quadfrog::trial::{MeasuredJump, Task, TrialRecord, Verdict};
 use serde::{Serialize, Serializer};
 
 use crate::subcommand::selection::SelectedStudy;
+use quadfrog_console::output;
 
 pub struct Printer {
     json: bool,
@@ -69,7 +70,7 @@ impl Printer {
                 measured: row.measured.as_ref(),
             };
             // Numbers and names always serialize.
-            print_line(&serde_json::to_string(&line).unwrap_or_default());
+            output::line(&serde_json::to_string(&line).unwrap_or_default());
         }
         let line = table::line(row, self.unit(study.task), &self.units);
         match &self.bar {
@@ -79,11 +80,11 @@ impl Printer {
                     true => bar.set_position(bar.position().max(u64::from(counted))),
                     false => bar.inc(1),
                 }
-                bar.set_message(line);
+                bar.set_message(output::printable(&line).into_owned());
             }
             None if self.json => {}
-            None if self.several => print_line(&format!("{} seed {}: {line}", study.task.name(), study.seed)),
-            None => print_line(&line),
+            None if self.several => output::line(&format!("{} seed {}: {line}", study.task.name(), study.seed)),
+            None => output::line(&line),
         }
     }
 
@@ -108,7 +109,7 @@ impl Printer {
     }
 
     fn print(&self, text: &str) {
-        let print = || if self.json { eprint!("{text}") } else { print_line(text.trim_end()) };
+        let print = || if self.json { output::message(text) } else { output::line(text.trim_end()) };
         match &self.bar {
             Some(bar) => bar.suspend(print),
             None => print(),
@@ -137,11 +138,6 @@ impl Drop for Printer {
             bar.finish_and_clear();
         }
     }
-}
-
-/// Prints a line; a closed pipe (`| head`) is no error.
-pub fn print_line(line: &str) {
-    let _ = writeln!(std::io::stdout(), "{line}");
 }
 
 /// A finished trial in JSON; task and seed only if several studies run.

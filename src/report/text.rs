@@ -1,0 +1,121 @@
+//! A page as text for a terminal.
+
+use super::page::{Block, Cell, Column, Page, Table, is_unprintable, printable};
+
+/// Least width of a column of wrapped text, characters.
+const LEAST_TEXT: usize = 16;
+
+/// Returns the page as lines of at most `width` characters where its words allow that; no figures, no folded texts, no
+/// control characters but line breaks.
+pub fn render(page: &Page, width: usize) -> String {
+    let mut text = heading(&page.title, '=');
+    if !page.subtitle.is_empty() {
+        text += &paragraph(&page.subtitle, width, "");
+    }
+    for section in &page.sections {
+        let parts: Vec<String> = section.blocks.iter().filter_map(|part| block(part, width)).collect();
+        if !parts.is_empty() {
+            text += &format!("\n{}{}", heading(&section.heading, '-'), parts.join("\n"));
+        }
+    }
+    text
+}
+
+fn heading(title: &str, underline: char) -> String {
+    let title = printable(title);
+    let line: String = std::iter::repeat_n(underline, title.chars().count()).collect();
+    format!("{title}\n{line}\n")
+}
+
+fn block(block: &Block, width: usize) -> Option<String> {
+    match block {
+        Block::Paragraph(text) => Some(paragraph(text, width, "")),
+        Block::Equation(text) => Some(paragraph(text, width, "    ")),
+        Block::Quote { text, source } => Some(paragraph(&format!("\"{text}\" ({source})"), width, "  | ")),
+        Block::Table(table) => Some(self::table(table, width)),
+        Block::Figure(_) | Block::Folded { .. } => None,
+    }
+}
+
+fn paragraph(text: &str, width: usize, indent: &str) -> String {
+    let lines = text.lines().flat_map(|line| wrapped(line, width.saturating_sub(indent.len()).max(LEAST_TEXT)));
+    lines.map(|line| format!("{indent}{line}\n")).collect()
+}
+
+/// Returns the lines of a text, broken at spaces; a longer word has a line of its own.
+pub fn wrapped(text: &str, width: usize) -> Vec<String> {
+    let text: String =
+        text.chars().map(|c| if is_unprintable(c) { printable(&c.to_string()) } else { c.into() }).collect();
+    let mut lines = vec![String::new()];
+    for word in text.split_whitespace() {
+        let line = lines.last_mut().expect("there is a first line");
+        if line.is_empty() {
+            line.push_str(word);
+        } else if line.chars().count() + 1 + word.chars().count() <= width {
+            line.push(' ');
+            line.push_str(word);
+        } else {
+            lines.push(word.to_owned());
+        }
+    }
+    lines
+}
+
+/// Returns a table in columns; one that is wider than `width` continues below with its first column repeated.
+fn table(table: &Table, width: usize) -> String {
+    let header = |column: &Column| printable(&column.header());
+    let cell = |row: &[Cell], at: usize| row.get(at).map_or_else(String::new, |cell| printable(&cell.shown()));
+    let natural: Vec<usize> = (0..table.columns.len())
+        .map(|at| {
+            let cells = table.rows.iter().map(|row| cell(row, at).chars().count());
+            cells.max().unwrap_or(0).max(header(&table.columns[at]).chars().count())
+        })
+        .collect();
+    let mut text = if table.caption.is_empty() { String::new() } else { paragraph(&table.caption, width, "") };
+    for group in groups(&natural, &table.columns, width) {
+        let others: usize = group.iter().filter(|&&at| !table.columns[at].text).map(|&at| natural[at] + 2).sum();
+        let texts = group.iter().filter(|&&at| table.columns[at].text).count().max(1);
+        let share = (width.saturating_sub(others) / texts).saturating_sub(2).max(LEAST_TEXT);
+        let fits = group.iter().map(|&at| natural[at] + 2).sum::<usize>() <= width + 2;
+        let widths: Vec<usize> = group
+            .iter()
+            .map(|&at| if table.columns[at].text && !fits { natural[at].min(share) } else { natural[at] })
+            .collect();
+        let rows = table.rows.iter().map(|row| group.iter().map(|&at| cell(row, at)).collect());
+        let head = group.iter().map(|&at| header(&table.columns[at])).collect();
+        for (number, row) in std::iter::once::<Vec<String>>(head).chain(rows).enumerate() {
+            let cells: Vec<Vec<String>> = row.iter().zip(&widths).map(|(cell, &width)| wrapped(cell, width)).collect();
+            for line in 0..cells.iter().map(Vec::len).max().unwrap_or(0) {
+                let mut whole = String::new();
+                for ((cell, &width), &at) in cells.iter().zip(&widths).zip(&group) {
+                    let part = cell.get(line).map_or("", String::as_str);
+                    whole +=
+                        &if table.columns[at].text { format!("{part:<width$}  ") } else { format!("{part:>width$}  ") };
+                }
+                text += whole.trim_end();
+                text.push('\n');
+            }
+            if number == 0 {
+                let rule: Vec<String> = widths.iter().map(|&width| "-".repeat(width)).collect();
+                text += &(rule.join("  ") + "\n");
+            }
+        }
+    }
+    text
+}
+
+/// Returns the columns that stand side by side; the first column begins each group.
+fn groups(natural: &[usize], columns: &[Column], width: usize) -> Vec<Vec<usize>> {
+    let needed = |at: usize| if columns[at].text { natural[at].min(LEAST_TEXT) } else { natural[at] } + 2;
+    let mut groups: Vec<Vec<usize>> = vec![Vec::new()];
+    let mut used = 0;
+    for at in 0..natural.len() {
+        if at > 1 && used + needed(at) > width + 2 && groups.last().is_some_and(|group| group.len() > 1) {
+            groups.push(vec![0]);
+            used = needed(0);
+        }
+        used += needed(at);
+        groups.last_mut().expect("there is a first group").push(at);
+    }
+    groups
+}

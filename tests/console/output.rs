@@ -1,0 +1,189 @@
+//! What the commands print: no control character of any file, name or argument reaches the terminal, a full disk behind
+//! standard output is an error, colours and defect reports.
+
+#[path = "support/program.rs"]
+mod program;
+#[path = "support/pty.rs"]
+mod pty;
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+use portable_pty::CommandBuilder;
+use program::Program;
+use pty::Session;
+
+/// Sets the title of a terminal, rings, and colours the rest red by an 8-bit control character.
+const HOSTILE: &str = "\u{1b}]0;owned\u{7}\u{9b}31m";
+/// The same in a string of JSON or of TOML.
+const ESCAPED: &str = r"\u001b]0;owned\u0007\u009b31m";
+
+/// A study whose name, notes, causes and attributes are hostile, in a folder with a hostile name.
+fn hostile_study(program: &Program) -> String {
+    program.text(&["optimize", "--trials", "2", "--record", "all"]);
+    let study = program.study("recordings");
+    let journal = study.join("study.log");
+    let text = fs::read_to_string(&journal).unwrap();
+    let hostile = text
+        .replace("forward-seed0", &format!("forward-seed0{ESCAPED}"))
+        .replace("\"landed and settled\"", &format!("\"landed {ESCAPED}\""))
+        .replace("\"robot\":\"go1\"", &format!("\"robot\":\"go1\",\"extra\":\"{ESCAPED}\""));
+    assert_ne!(hostile, text);
+    fs::write(&journal, hostile).unwrap();
+    let named = study.with_file_name(format!("study{HOSTILE}"));
+    fs::rename(study, &named).unwrap();
+    named.to_str().unwrap().to_owned()
+}
+
+/// Runs a command in a terminal to its end.
+fn in_terminal(program: &Program, arguments: &[&str]) -> Session {
+    let mut command = CommandBuilder::new(env!("CARGO_BIN_EXE_quadfrog"));
+    command.args(arguments);
+    let mut session = Session::run(&program.path(""), (120, 40), command);
+    session.wait();
+    session
+}
+
+#[test]
+fn no_control_character_of_a_file_a_name_or_an_argument_reaches_the_terminal() {
+    let program = Program::new();
+    let study = hostile_study(&program);
+    program.write("bad/optimize.toml", &format!("trials = \"{ESCAPED}\"\n"));
+    program.write("unknown/control.toml", &format!("\"{ESCAPED}\" = 1\n"));
+    program.write("robot/robot.toml", &format!("name = \"{ESCAPED}\"\nurdf = \"{ESCAPED}.urdf\"\n"));
+    program.write("table.csv", &format!("number,state,value,params_{HOSTILE}\n0,COMPLETE,1,2\n"));
+    let mcap = Path::new(&study).join("session.mcap");
+    let mcap = mcap.to_str().unwrap();
+    let log = format!("{study}/study.log");
+    let commands: &[&[&str]] = &[
+        &["study", "list"],
+        &["study", "show", &study],
+        &["study", "best", &study],
+        &["study", "export", &study, "--format", "csv"],
+        &["study", "export", &study, "--format", "json"],
+        &["study", "import", &study, "table.csv"],
+        &["study", "enqueue", &study, HOSTILE],
+        &["study", "show", &study, "--name", HOSTILE],
+        &["optimize", "--resume", &study, "--trials", "3"],
+        &["optimize", "--join", &log, "--trials", "3"],
+        &["optimize", "--join", HOSTILE, "--trials", "3"],
+        &["optimize", "--trials", "1", "--output", HOSTILE],
+        &["optimize", "--config", "bad"],
+        &["optimize", "--config", "unknown"],
+        &["optimize", "--config", HOSTILE],
+        &["optimize", "--model", "robot"],
+        &["optimize", "--task", HOSTILE],
+        &["optimize", "--trials", HOSTILE],
+        &["evaluate", "--point", HOSTILE],
+        &["evaluate", "--config", HOSTILE],
+        &["replay", HOSTILE],
+        &["replay", &log],
+        &["recover", HOSTILE],
+        &["recover", mcap],
+        &["emulate", "--model", "robot"],
+        &["emulate", "--bind", HOSTILE],
+        &["doctor", "--output", HOSTILE],
+        &["doctor", "--config", "bad"],
+        &["--config", "bad"],
+        &["--resume", HOSTILE],
+        &["--robot", "go1", "--address", HOSTILE],
+        &[HOSTILE],
+    ];
+    for command in commands {
+        let session = in_terminal(&program, command);
+        for part in ["\u{1b}]0;", "\u{7}", "\u{9b}"] {
+            assert!(!session.sent(part.as_bytes()), "{command:?} prints {part:?}:\n{}", session.screen());
+        }
+    }
+    assert!(in_terminal(&program, &["study", "list"]).sent(br"\u001b]0;owned"), "what was removed is not shown");
+}
+
+#[test]
+fn a_full_disk_behind_the_standard_output_is_an_error() {
+    let program = Program::new();
+    program.text(&["optimize", "--trials", "1", "--record", "none"]);
+    let study = program.study("recordings");
+    let study = study.to_str().unwrap();
+    let evaluate: &[&str] = &["evaluate", "--point", "f0=1.3,Fx=40,Fz=210", "--json"];
+    for arguments in [
+        &["optimize", "--trials", "1", "--record", "none", "--json"][..],
+        &["optimize", "--trials", "1", "--record", "none"],
+        &["study", "show", study],
+        &["study", "export", study],
+        evaluate,
+    ] {
+        let full = fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+        let output = program.command(arguments).stdout(full).output().unwrap();
+        let message = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(1), "{arguments:?}: {message}");
+        assert!(message.contains("No space left on device"), "{message}");
+    }
+    // A reader that has read enough is no error.
+    let mut child = program.command(&["study", "export", study]).stdout(Stdio::piped()).spawn().unwrap();
+    drop(child.stdout.take());
+    assert!(child.wait().unwrap().success());
+}
+
+/// Runs the command with files of at most `blocks` of 512 bytes, as on a disk that is full beyond.
+fn with_small_files(program: &Program, blocks: u32, arguments: &[&str]) -> (Option<i32>, String) {
+    // With SIGXFSZ ignored a write beyond the limit fails.
+    let shell = format!("trap '' XFSZ; ulimit -f {blocks}; exec \"$0\" \"$@\"");
+    let mut command = Command::new("sh");
+    command.args(["-c", &shell, env!("CARGO_BIN_EXE_quadfrog")]).args(arguments).current_dir(program.path(""));
+    let output = command.output().unwrap();
+    (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+}
+
+/// Regression: the message was "attempted another write after a write method failed", with status 2.
+#[test]
+fn a_recording_that_does_not_fit_is_named_with_its_cause() {
+    let program = Program::new();
+    let (status, message) = with_small_files(&program, 600, &["optimize", "--trials", "4", "--record", "all"]);
+    assert_eq!(status, Some(1), "{message}");
+    assert!(message.contains("session.mcap") && message.contains("File too large"), "{message}");
+    assert!(!message.contains("another write"), "{message}");
+    // No judged trial is lost.
+    let study = program.study("recordings");
+    let table = program.text(&["study", "show", study.to_str().unwrap()]);
+    assert!(table.contains("4") && table.contains("Best: trial"), "{table}");
+}
+
+#[test]
+fn two_studies_that_begin_in_the_same_second_have_two_folders() {
+    let program = Program::new();
+    let arguments = ["optimize", "--trials", "1", "--record", "none"];
+    let children: Vec<_> = (0..6).map(|_| program.command(&arguments).stdout(Stdio::null()).spawn().unwrap()).collect();
+    for mut child in children {
+        assert!(child.wait().unwrap().success());
+    }
+    assert_eq!(program.studies("recordings").len(), 6);
+}
+
+#[test]
+fn doctor_names_a_folder_that_cannot_be_written() {
+    let program = Program::new();
+    program.write("file", "");
+    for folder in ["/proc/quadfrog", "file/below"] {
+        let output = program.run(&["doctor", "--output", folder]);
+        let text = String::from_utf8_lossy(&output.stdout).into_owned();
+        assert_eq!(output.status.code(), Some(1), "{text}");
+        let line = text.lines().find(|line| line.contains("folder")).expect("a line about the folder");
+        assert!(line.starts_with("FAIL"), "{line}");
+    }
+    let text = String::from_utf8(program.run(&["doctor", "--output", "new/studies"]).stdout).unwrap();
+    assert!(text.lines().any(|line| line.starts_with("ok") && line.contains("can be written")), "{text}");
+    assert!(!program.path("new").exists(), "doctor changes nothing");
+}
+
+#[test]
+fn an_error_is_one_plain_line_without_colours_and_repetitions() {
+    let program = Program::new();
+    program.write("recordings", "a file in place of the folder");
+    let output = program.command(&["optimize", "--trials", "1"]).env_remove("NO_COLOR").output().unwrap();
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(1), "{message}");
+    assert!(!message.contains('\u{1b}') && !message.contains("BACKTRACE"), "{message}");
+    assert_eq!(message.trim_end().lines().count(), 1, "{message}");
+    assert_eq!(message.matches("(os error").count(), 1, "the cause stands once: {message}");
+}

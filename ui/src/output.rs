@@ -1,0 +1,85 @@
+//! Standard output and standard error: the border that every text of a command crosses. Names of files, notes and journals of
+//! other programs may hold escape sequences, which would steer the terminal: no control character passes.
+
+use std::borrow::Cow;
+use std::fmt::Write as _;
+use std::io::{self, ErrorKind, IsTerminal, Write};
+use std::sync::{Mutex, PoisonError};
+
+/// The first error of standard output; a reader that has closed the pipe is none.
+static FAILED: Mutex<Option<io::Error>> = Mutex::new(None);
+
+/// Returns the text with every control character but line feed and tab as `\u001b`, which JSON strings allow, too.
+pub fn printable(text: &str) -> Cow<'_, str> {
+    let harmless = |c: char| !c.is_control() || c == '\n' || c == '\t';
+    if text.chars().all(harmless) {
+        return Cow::Borrowed(text);
+    }
+    let mut escaped = String::with_capacity(text.len() + 16);
+    for c in text.chars() {
+        if harmless(c) {
+            escaped.push(c);
+        } else {
+            let _ = write!(escaped, "\\u{:04x}", u32::from(c));
+        }
+    }
+    Cow::Owned(escaped)
+}
+
+/// Prints a line on standard output, as [`text`].
+pub fn line(line: &str) {
+    text(&format!("{line}\n"));
+}
+
+/// Prints text on standard output. An error is kept for [`failure`].
+pub fn text(text: &str) {
+    write(printable(text).as_bytes());
+}
+
+/// Prints data, for example a table of trials, unchanged for another program; on a terminal as [`text`].
+pub fn data(data: &str) {
+    if io::stdout().is_terminal() { text(data) } else { write(data.as_bytes()) }
+}
+
+fn write(bytes: &[u8]) {
+    let mut output = io::stdout().lock();
+    if let Err(error) = output.write_all(bytes).and_then(|()| output.flush())
+        && error.kind() != ErrorKind::BrokenPipe
+    {
+        FAILED.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
+    }
+}
+
+/// Prints text on standard error.
+pub fn message(text: &str) {
+    let _ = write!(io::stderr().lock(), "{}", printable(text));
+}
+
+/// Prints a line on standard error with the name of the program.
+pub fn notice(text: &str) {
+    message(&format!("quadfrog: {text}\n"));
+}
+
+/// Returns the first error of standard output, for example a full disk.
+pub fn failure() -> Option<io::Error> {
+    FAILED.lock().unwrap_or_else(PoisonError::into_inner).take()
+}
+
+/// Prints a formatted line on standard output, as [`line`].
+#[macro_export]
+macro_rules! put_line {
+    () => { $crate::output::line("") };
+    ($($text:tt)*) => { $crate::output::line(&format!($($text)*)) };
+}
+
+/// Prints formatted text on standard output.
+#[macro_export]
+macro_rules! put {
+    ($($text:tt)*) => { $crate::output::text(&format!($($text)*)) };
+}
+
+/// Prints a formatted line on standard error with the name of the program, as [`notice`].
+#[macro_export]
+macro_rules! notice {
+    ($($text:tt)*) => { $crate::output::notice(&format!($($text)*)) };
+}
