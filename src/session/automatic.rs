@@ -80,6 +80,7 @@ pub fn run_watched<R: Robot>(
         }
         voids = if suggested == Verdict::Void { voids + 1 } else { 0 };
         if let Some(row) = experiment.row(spec.trial) {
+            // Between the rollouts of a trial its row has no verdict.
             each(experiment, row, ticks);
             if voids >= VOIDS_IN_A_ROW {
                 let cause = row.cause.clone();

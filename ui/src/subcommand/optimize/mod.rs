@@ -191,7 +191,9 @@ fn run_one(
     let mut failed = None;
     let mut best: Option<(TrialRecord, Vec<Tick>)> = None;
     let ran = automatic::run_watched(&mut experiment, &mut rollout, |experiment, row, ticks| {
-        printer.trial(study, row, experiment.counted());
+        if row.verdict.is_some() {
+            printer.trial(study, row, experiment.counted());
+        }
         let accepted = row.verdict == Some(Verdict::Accept);
         let better = |best: &(TrialRecord, Vec<Tick>)| row.value > best.0.value;
         match arguments.record {
