@@ -15,6 +15,7 @@ pub mod force_profile;
 pub mod gain_blend;
 pub mod impedance;
 pub mod leg;
+pub mod limit_key;
 pub mod link_quality;
 pub mod mode;
 pub mod ramp;

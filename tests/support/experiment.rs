@@ -65,6 +65,7 @@ pub fn plan(budget: u32) -> ExperimentPlan {
         worker: 0,
         abandoned: Duration::from_secs(60),
         backend: Backend::Simulator,
+        terrain: None,
         envelope: None,
     }
 }

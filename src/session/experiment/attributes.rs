@@ -188,6 +188,9 @@ pub struct BeganAttributes {
     risk: Option<FallRisk>,
     #[serde(skip_serializing_if = "is_empty", serialize_with = "as_object")]
     fixed: ParameterValues,
+    /// Coulomb coefficient of the ground; none where it is not drawn for each trial.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    friction: Option<f64>,
 }
 
 impl BeganAttributes {
@@ -201,6 +204,7 @@ impl BeganAttributes {
         fixed: ParameterValues,
     ) -> BeganAttributes {
         let gains = proposal.gains.iter().map(|gain| (gain.name.clone(), gain.value)).collect();
+        let drawn = plan.terrain.filter(|terrain| terrain.friction_range.is_some());
         BeganAttributes {
             origin: Origin {
                 source: proposal.source,
@@ -215,6 +219,7 @@ impl BeganAttributes {
             recording: plan.recording.clone(),
             risk: proposal.risk,
             fixed,
+            friction: drawn.map(|terrain| terrain.friction_of(seed)),
         }
     }
 }
