@@ -30,7 +30,16 @@ const FILES: [(&str, &str); 5] = [
 ];
 
 /// Optional keys, which the defaults leave out, each with an example of its kind.
-const OPTIONAL: [(&str, &str); 2] = [
+const OPTIONAL: [(&str, &str); 3] = [
+    (
+        "simulator.toml",
+        "[terrain]
+friction_range = [1.0, 1.0]
+[terrain.blocks]
+area_m = [0.0, 0.0, 0.0, 0.0]
+friction_range = [1.0, 1.0]
+",
+    ),
     (
         "control.toml",
         "[tasks]

@@ -73,6 +73,7 @@ pub fn open_experiment(options: &Options, durability: Durability, recording: &st
         worker,
         abandoned: Duration::from_secs_f64(options.config.optimize.workers.abandoned_s),
         backend: options.backend,
+        terrain: (options.backend == Backend::Simulator).then_some(options.config.simulator.terrain),
         envelope: options.config.hop_envelope(options.backend),
     };
     Ok(Experiment::open(plan, study)?)

@@ -6,7 +6,7 @@ use crate::control::settings::ControlSettings;
 use crate::realtime::clock::SimulatedClock;
 use crate::robot::ticks_in;
 use crate::robot::{CONTROL_PERIOD_S, Placement, Robot};
-use crate::telemetry::{Command, Event, Fault, Permit, Tick, TrialEnd, TrialSpec};
+use crate::telemetry::{Command, CommandRefusal, Event, Fault, Permit, Tick, TrialEnd, TrialSpec};
 
 /// A robot in simulated time.
 pub struct Rollout<R: Robot> {
@@ -19,6 +19,11 @@ impl<R: Robot> Rollout<R> {
     /// A rollout of `robot`, which must support [`Robot::place`].
     pub fn new(robot: R, settings: &ControlSettings) -> Rollout<R> {
         Rollout { robot, settings: *settings, ticks: Vec::new() }
+    }
+
+    /// The settings of the control cycle.
+    pub fn settings(&self) -> &ControlSettings {
+        &self.settings
     }
 
     /// Runs one trial from the start pose. Returns its end and its ticks, countdown included.
@@ -39,6 +44,7 @@ impl<R: Robot> Rollout<R> {
             inputs.command = None;
             let ended = cycle.events().iter().find_map(|event| match event {
                 Event::TrialEnded { end, .. } => Some(end),
+                Event::Refused { because: CommandRefusal::Inhibited(inhibit), .. } => Some(TrialEnd::NotReady(inhibit)),
                 Event::Refused { .. } => Some(TrialEnd::Cancelled),
                 Event::Mode { .. } => None,
             });

@@ -184,6 +184,9 @@ pub struct BeganAttributes {
     risk: Option<FallRisk>,
     #[serde(skip_serializing_if = "is_empty", serialize_with = "as_object")]
     fixed: ParameterValues,
+    /// Coulomb coefficient of the ground; none where it is not drawn for each trial.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    friction: Option<f64>,
 }
 
 impl BeganAttributes {
@@ -191,6 +194,7 @@ impl BeganAttributes {
     /// trials.
     pub fn new(proposal: &Proposal, seed: u64, plan: &ExperimentPlan, fixed: ParameterValues) -> BeganAttributes {
         let gains = proposal.gains.iter().map(|gain| (gain.name.clone(), gain.value)).collect();
+        let drawn = plan.terrain.filter(|terrain| terrain.friction_range.is_some());
         BeganAttributes {
             origin: Origin { source: proposal.source, parent: proposal.parent, seed: Some(seed.to_string()), gains },
             version: env!("CARGO_PKG_VERSION"),
@@ -199,6 +203,7 @@ impl BeganAttributes {
             recording: plan.recording.clone(),
             risk: proposal.risk,
             fixed,
+            friction: drawn.map(|terrain| terrain.friction_of(seed)),
         }
     }
 }

@@ -88,6 +88,16 @@ impl Printer {
         }
     }
 
+    /// Prints a warning about a study on standard error.
+    pub fn warn(&self, study: &SelectedStudy, warning: &str) {
+        let _output = self.output.lock();
+        let print = || output::notice(&format!("{} seed {}: {warning}", study.task.name(), study.seed));
+        match &self.bar {
+            Some(bar) => bar.suspend(print),
+            None => print(),
+        }
+    }
+
     pub fn finished(&self, study: &SelectedStudy, rows: &[TrialRecord], best: Option<&TrialRecord>, options: &Options) {
         let _output = self.output.lock();
         let falls = rows.iter().filter(|row| row.verdict == Some(Verdict::Fall)).count();
