@@ -6,6 +6,7 @@
 //! and is therefore what the study itself will propose.
 
 pub(crate) mod attributes;
+mod between_repeats;
 mod confirmation;
 mod envelope;
 mod judging;
@@ -22,11 +23,11 @@ pub use self::plan::{ExperimentPlan, RequestRefusal};
 
 use std::collections::BTreeMap;
 
+use self::between_repeats::BetweenRepeats;
 use self::confirmation::{BestConfirmation, NextRepeat};
 use self::open_proposal::OpenProposal;
 use self::plan::not_now;
 use self::queue::TrialQueue;
-use self::repeats::BetweenRepeats;
 use self::search::SearchSettings;
 use crate::optimize::ask::Direction;
 use crate::optimize::exchange::TableTrial;

@@ -3,24 +3,12 @@
 //! crash the trial is queued again with it.
 
 use super::attributes::{self, RepeatsAttribute};
+use super::between_repeats::BetweenRepeats;
 use super::plan::{RequestRefusal, not_now};
 use super::{Experiment, ExperimentState};
 use crate::optimize::study::{Outcome, StudyError};
 use crate::telemetry::TrialSpec;
 use crate::trial::{Proposal, ProposedParameter, RepeatRecord, TrialRecord, Verdict};
-
-/// A trial of which further rollouts are to be done.
-pub struct BetweenRepeats {
-    revision: u32,
-    /// The row before the last verdict, for undo.
-    suggestion: Box<TrialRecord>,
-}
-
-impl BetweenRepeats {
-    pub fn trial(&self) -> u32 {
-        self.suggestion.trial
-    }
-}
 
 impl Experiment {
     /// Returns the proposal of the trial's next rollout.
