@@ -33,6 +33,7 @@ const CONTROL: &[Row] = &[
     (&["realtime.core"], within!(-1, 1023, "(-1 is any core)")),
     (&["tasks.*.stance_m"], within!(-2, 2, "m")),
     (&["tasks.*.jumps"], within!(1, 100, "jumps")),
+    (&["tasks.*.repeats"], within!(1, 50, "rollouts")),
     (&["tasks.*.duration_s"], within!(0.1, 600, "s")),
     (&["tasks.*.landing_wait_s"], within!(0, 5, "s")),
     (&["tasks.*.f1_hz"], within!(0, 100, "Hz")),
@@ -74,6 +75,7 @@ const CONTROL_HARDWARE: &[Row] = &[
     // A series on a robot ends before its motors are warm.
     (&["tasks.*.jumps"], within!(1, 20, "jumps")),
     (&["tasks.*.duration_s"], within!(0.1, 20, "s")),
+    (&["tasks.*.repeats"], within!(1, 10, "jumps of a trial")),
     (&["tasks.*.landing_wait_s"], within!(0, 2, "s")),
     // A fifteenth to three times the load of a foot in stance, 32 N.
     (&["estimator.contact_on_n", "estimator.contact_off_n"], within!(2, 100, "N")),

@@ -41,6 +41,8 @@ pub struct TaskControl {
     pub bounce: BounceRule,
     /// Whether the objective is per second instead of per jump.
     pub rate: bool,
+    /// Rollouts of a trial, each with a seed of its own; its value is their mean.
+    pub repeats: u32,
 }
 
 impl TaskControl {

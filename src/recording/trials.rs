@@ -4,7 +4,7 @@ use super::frog;
 use super::wire::{DecodeError, Way};
 use crate::trial::{
     Displacement, FallRisk, FixedParameter, JumpRow, MeasuredJump, ParameterInsight, PointRecord, Proposal,
-    ProposalInsight, ProposedParameter, SearchStatus, SearchedParameter, TrialRecord,
+    ProposalInsight, ProposedParameter, RepeatRecord, SearchStatus, SearchedParameter, TrialRecord,
 };
 
 type Done = Result<(), DecodeError>;
@@ -16,7 +16,10 @@ pub fn proposal(way: Way, ours: &mut Proposal, m: &mut frog::Proposal) -> Done {
     way.copy(&mut ours.parent, &mut m.parent);
     way.list(&mut ours.parameters, &mut m.parameters, proposed)?;
     way.option(&mut ours.risk, &mut m.risk, risk)?;
-    way.list(&mut ours.gains, &mut m.gains, proposed)
+    way.list(&mut ours.gains, &mut m.gains, proposed)?;
+    way.copy(&mut ours.repeat, &mut m.repeat);
+    way.copy(&mut ours.repeats, &mut m.repeats);
+    Ok(())
 }
 
 fn proposed(way: Way, ours: &mut ProposedParameter, m: &mut frog::proposal::Parameter) -> Done {
@@ -40,7 +43,15 @@ pub fn trial(way: Way, ours: &mut TrialRecord, m: &mut frog::Trial) -> Done {
     way.copy(&mut ours.note, &mut m.note);
     way.option(&mut ours.risk, &mut m.risk, risk)?;
     way.values(&mut ours.gains, &mut m.gains);
-    Ok(())
+    way.list(&mut ours.repeats, &mut m.repeats, repeat)
+}
+
+fn repeat(way: Way, ours: &mut RepeatRecord, m: &mut frog::trial::Repeat) -> Done {
+    way.copy(&mut ours.seed, &mut m.seed);
+    way.maybe_variant(&mut ours.verdict, &mut m.verdict, "verdict")?;
+    way.copy(&mut ours.value, &mut m.value);
+    way.copy(&mut ours.cause, &mut m.cause);
+    way.option(&mut ours.measured, &mut m.measured, measured)
 }
 
 fn measured(way: Way, ours: &mut MeasuredJump, m: &mut frog::trial::Measured) -> Done {

@@ -130,6 +130,7 @@ pub fn run_watched<R: Robot>(
             let warning = repeated.filter(|_| suggested != Verdict::Void).map(|count| {
                 format!("{count} trials in a row ended by the same limit, the last because: {cause}. Change the limit, or the bounds in optimize.toml")
             });
+            // Between the rollouts of a trial its row has no verdict.
             each(&JudgedTrial { experiment, row, ticks, warning: warning.as_deref() });
             if voids >= VOIDS_IN_A_ROW {
                 experiment.close()?;

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use strum::{IntoStaticStr, VariantArray};
 
-use super::Task;
+use super::{Task, TrialRecord, Verdict};
 
 /// Rule for a trial in which the robot bounces on after its landing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, IntoStaticStr, VariantArray)]
@@ -106,4 +106,40 @@ pub struct MeasuredJump {
     /// Every jump, in order; empty in records of an older version.
     #[serde(default)]
     pub jumps: Vec<JumpRow>,
+}
+
+/// One rollout of a trial that has several.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default)]
+pub struct RepeatRecord {
+    /// Seed of its noise and terrain. Text in JSON: numbers of other programs do not hold 64 bits.
+    #[serde(with = "seed_as_text")]
+    pub seed: u64,
+    /// Its verdict; a void repeat is done again.
+    pub verdict: Option<Verdict>,
+    /// Its value: 0 for a fall, none for void.
+    pub value: Option<f64>,
+    /// Reason of the verdict.
+    pub cause: String,
+    /// Measured values.
+    pub measured: Option<MeasuredJump>,
+}
+
+mod seed_as_text {
+    use serde::{Deserialize, Deserializer, Serializer, de};
+
+    pub fn serialize<S: Serializer>(seed: &u64, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(seed)
+    }
+
+    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u64, D::Error> {
+        String::deserialize(deserializer)?.parse().map_err(de::Error::custom)
+    }
+}
+
+impl TrialRecord {
+    /// Returns the number of repeats that count.
+    pub fn counted_repeats(&self) -> u32 {
+        self.repeats.iter().filter(|repeat| repeat.verdict != Some(Verdict::Void)).count() as u32
+    }
 }

@@ -51,6 +51,7 @@ pub fn plan(budget: u32) -> ExperimentPlan {
             landing_wait_s: 0.0,
             bounce: BounceRule::Ignore,
             rate: false,
+            repeats: 1,
         },
         parameters: bounds(|low, high| (low, high)),
         seed: 0,

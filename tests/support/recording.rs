@@ -183,6 +183,22 @@ impl Draw {
         ProposedParameter { name: self.string(), value: self.number(), proposed: self.number() }
     }
 
+    fn measured(&mut self) -> MeasuredJump {
+        MeasuredJump {
+            dx_m: self.number(),
+            dy_m: self.number(),
+            dyaw_rad: self.number(),
+            apex_m: self.number(),
+            air_s: self.number(),
+            end_s: self.number(),
+            measured_value: self.option(Draw::number),
+            flights: self.word() as u32,
+            touchdown: self.option(Draw::displacement),
+            first_landing: self.option(Draw::displacement),
+            jumps: self.several(Draw::jump_row),
+        }
+    }
+
     fn displacement(&mut self) -> Displacement {
         Displacement { time_s: self.number(), dx_m: self.number(), dy_m: self.number(), dyaw_rad: self.number() }
     }
@@ -248,25 +264,15 @@ impl Draw {
                 parameters: self.several(Draw::proposed),
                 risk: self.risk(),
                 gains: self.several(Draw::proposed),
+                repeat: self.word() as u32,
+                repeats: self.word() as u32,
             }),
             4 => Record::Trial(TrialRecord {
                 trial: self.word() as u32,
                 source: self.one_of(&ProposalSource::ALL),
                 parent: self.option(|d| d.word() as u32),
                 parameters: self.several(|d| (d.string(), d.number())).into(),
-                measured: self.option(|d| MeasuredJump {
-                    dx_m: d.number(),
-                    dy_m: d.number(),
-                    dyaw_rad: d.number(),
-                    apex_m: d.number(),
-                    air_s: d.number(),
-                    end_s: d.number(),
-                    measured_value: d.option(Draw::number),
-                    flights: d.word() as u32,
-                    touchdown: d.option(Draw::displacement),
-                    first_landing: d.option(Draw::displacement),
-                    jumps: d.several(Draw::jump_row),
-                }),
+                measured: self.option(Draw::measured),
                 value: self.option(Draw::number),
                 hand_value: self.option(Draw::number),
                 suggested: self.option(|d| d.one_of(&Verdict::ALL)),
@@ -275,6 +281,13 @@ impl Draw {
                 note: self.string(),
                 risk: self.risk(),
                 gains: self.several(|d| (d.string(), d.number())).into(),
+                repeats: self.several(|d| RepeatRecord {
+                    seed: d.word(),
+                    verdict: d.option(|d| d.one_of(&Verdict::ALL)),
+                    value: d.option(Draw::number),
+                    cause: d.string(),
+                    measured: d.option(Draw::measured),
+                }),
             }),
             5 => Record::Request(RequestRecord { request: self.string(), accepted: self.yes(), answer: self.string() }),
             6 => Record::Counters(Counters {

@@ -13,8 +13,8 @@ use crate::optimize::ask::SamplerConfig;
 use crate::optimize::study::{DRAWS, Outcome};
 use crate::optimize::trial::{Trial, TrialState};
 use crate::trial::{
-    Backend, FallRisk, MeasuredJump, ParameterInfo, ParameterValues, Proposal, ProposalSource, Task, TrialRecord,
-    Verdict,
+    Backend, FallRisk, MeasuredJump, ParameterInfo, ParameterValues, Proposal, ProposalSource, RepeatRecord, Task,
+    TrialRecord, Verdict,
 };
 
 /// Attributes in the order in which they are written.
@@ -117,6 +117,9 @@ pub struct Origin {
     /// Its gains; empty for those of the configuration.
     #[serde(skip_serializing_if = "is_empty", serialize_with = "as_object", deserialize_with = "numbers")]
     pub gains: ParameterValues,
+    /// Judged rollouts, its own or those of the interrupted trial that it continues.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub repeats: Vec<RepeatRecord>,
 }
 
 impl Default for Origin {
@@ -128,27 +131,28 @@ impl Default for Origin {
 impl Origin {
     /// Returns the origin of new parameters with a seed of their own and the configured gains.
     pub fn new(source: ProposalSource) -> Origin {
-        Origin { source, parent: None, seed: None, gains: ParameterValues::default() }
+        Origin { source, parent: None, seed: None, gains: ParameterValues::default(), repeats: Vec::new() }
     }
 
     /// Returns the origin of a repetition with the same gains and new noise. The repetition of a repeat that confirms
     /// the best confirms it, too.
     pub fn rerun_of(trial: u32, source: ProposalSource, gains: ParameterValues) -> Origin {
         let source = if source == ProposalSource::Confirm { source } else { ProposalSource::Rerun };
-        Origin { source, parent: Some(trial), seed: None, gains }
+        Origin { source, parent: Some(trial), seed: None, gains, repeats: Vec::new() }
     }
 
     /// Returns the origin of a repeat of a point that may be the best, with the gains of its first trial.
     pub fn confirming(first: &Trial) -> Origin {
         let gains = Origin::of_trial(first).gains;
-        Origin { source: ProposalSource::Confirm, parent: Some(first.number), seed: None, gains }
+        let source = ProposalSource::Confirm;
+        Origin { source, parent: Some(first.number), seed: None, gains, repeats: Vec::new() }
     }
 
-    /// Returns the origin of a repetition with the same gains and the same seed: after a crash the study continues
-    /// as if the crash had not happened.
+    /// Returns the origin of a repetition with the same gains, the same seed and the judged rollouts: after a crash the study
+    /// continues as if the crash had not happened.
     pub fn interrupted(trial: &Trial) -> Origin {
-        let Origin { source, seed, gains, .. } = Origin::of_trial(trial);
-        Origin { seed, ..Origin::rerun_of(trial.number, source, gains) }
+        let Origin { source, seed, gains, repeats, .. } = Origin::of_trial(trial);
+        Origin { seed, repeats, ..Origin::rerun_of(trial.number, source, gains) }
     }
 
     pub fn of(attributes: &BTreeMap<String, Value>) -> Origin {
@@ -192,11 +196,23 @@ pub struct BeganAttributes {
 impl BeganAttributes {
     /// Returns the attributes of a trial of `proposal`; `fixed` holds the parameters that the operator had fixed for some
     /// trials.
-    pub fn new(proposal: &Proposal, seed: u64, plan: &ExperimentPlan, fixed: ParameterValues) -> BeganAttributes {
+    pub fn new(
+        proposal: &Proposal,
+        seed: u64,
+        repeats: Vec<RepeatRecord>,
+        plan: &ExperimentPlan,
+        fixed: ParameterValues,
+    ) -> BeganAttributes {
         let gains = proposal.gains.iter().map(|gain| (gain.name.clone(), gain.value)).collect();
         let drawn = plan.terrain.filter(|terrain| terrain.friction_range.is_some());
         BeganAttributes {
-            origin: Origin { source: proposal.source, parent: proposal.parent, seed: Some(seed.to_string()), gains },
+            origin: Origin {
+                source: proposal.source,
+                parent: proposal.parent,
+                seed: Some(seed.to_string()),
+                gains,
+                repeats,
+            },
             version: env!("CARGO_PKG_VERSION"),
             worker: plan.worker,
             backend: (plan.backend != Backend::Simulator).then(|| plan.backend.name()),
@@ -206,6 +222,12 @@ impl BeganAttributes {
             friction: drawn.map(|terrain| terrain.friction_of(seed)),
         }
     }
+}
+
+/// Attributes that are written when a rollout of several is judged.
+#[derive(Debug, Serialize)]
+pub struct RepeatsAttribute<'a> {
+    pub repeats: &'a [RepeatRecord],
 }
 
 /// Attributes that are written when a trial is judged; a verdict that was taken back is null.
@@ -220,12 +242,14 @@ pub struct JudgedAttributes<'a> {
     /// Numeric columns of their own, so that optuna-dashboard can sort by them.
     #[serde(flatten)]
     measured: Option<&'a MeasuredJump>,
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    repeats: &'a [RepeatRecord],
 }
 
 impl JudgedAttributes<'_> {
     /// Returns the attributes of the row; `rerun` queues the parameters again.
     pub fn of(row: &TrialRecord, rerun: bool) -> JudgedAttributes<'_> {
-        let TrialRecord { verdict, suggested, cause, value, hand_value, measured, .. } = row;
+        let TrialRecord { verdict, suggested, cause, value, hand_value, measured, repeats, .. } = row;
         JudgedAttributes {
             verdict: *verdict,
             suggested: *suggested,
@@ -234,6 +258,7 @@ impl JudgedAttributes<'_> {
             hand_value: *hand_value,
             rerun,
             measured: measured.as_ref(),
+            repeats,
         }
     }
 }
@@ -305,7 +330,7 @@ pub fn confirms(trial: &Trial) -> bool {
 
 /// Returns the row of a trial of the study. A complete trial of another program has no verdict and counts as accepted.
 pub fn row_of(trial: &Trial, note: String, order: &[ParameterInfo]) -> TrialRecord {
-    let Origin { source, parent, gains, .. } = Origin::of_trial(trial);
+    let Origin { source, parent, gains, repeats, .. } = Origin::of_trial(trial);
     let kept = TrialAttributes::of(trial);
     let fits = |verdict: &Verdict| match trial.state {
         TrialState::Complete => *verdict != Verdict::Void,
@@ -332,6 +357,7 @@ pub fn row_of(trial: &Trial, note: String, order: &[ParameterInfo]) -> TrialReco
         note,
         risk: kept.risk,
         gains,
+        repeats,
     }
 }
 

@@ -70,11 +70,20 @@ impl Experiment {
         let suggestion = row.clone();
         row.verdict = Some(verdict);
         row.value = value;
+        let repeats = self.plan.control.repeats;
         if let Some(suggested) = row.suggested.filter(|suggested| *suggested != verdict) {
             let given = if reason.is_empty() { String::new() } else { format!(": {reason}") };
             row.cause = format!("by the operator{given}; looked like {}: {}", suggested.name(), row.cause);
         } else if !reason.is_empty() {
             row.cause = format!("by the operator: {reason}; {}", row.cause);
+        }
+        let mut outcome = outcome;
+        if repeats > 1 {
+            let seed = self.spec(trial).seed;
+            match self.judge_repeat(trial, seed, suggestion.clone())? {
+                Some(mean) => outcome = Outcome::Complete(mean),
+                None => return Ok(()),
+            }
         }
         match self.write_judgement(trial, rerun) {
             // Another worker has closed the trial as abandoned, or another program has ended it.
@@ -99,6 +108,9 @@ impl Experiment {
     /// Takes the last verdict back.
     /// Refused when it was reported already.
     pub fn undo(&mut self) -> Result<(), RequestRefusal> {
+        if matches!(self.state, ExperimentState::BetweenRepeats(_)) {
+            return self.undo_repeat();
+        }
         let Some(pending) = self.pending_verdict.as_ref().filter(|_| self.is_idle()) else {
             return not_now(
                 "there is no verdict to undo; the last one became final when the next trial was approved or refused",
@@ -140,6 +152,13 @@ impl Experiment {
         let ExperimentState::Review(trial) = self.state else { return Ok(()) };
         let Some(row) = self.rows.get_mut(&trial) else { return Ok(()) };
         let limit = objective::tripped_limit(row);
+        if limit && self.plan.control.repeats > 1 {
+            // The judged rollouts are kept; a session that continues the study does the others.
+            if let Err(error) = self.judge(Verdict::Fall, false) {
+                self.log(error.to_string());
+            }
+            return self.report_verdict().map(drop);
+        }
         let verdict = if limit { Verdict::Fall } else { Verdict::Void };
         if row.suggested != Some(verdict) {
             return Ok(());

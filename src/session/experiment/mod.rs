@@ -6,6 +6,7 @@
 //! and is therefore what the study itself will propose.
 
 pub(crate) mod attributes;
+mod between_repeats;
 mod confirmation;
 mod envelope;
 mod judging;
@@ -14,6 +15,7 @@ mod open_proposal;
 mod plan;
 mod proposal_start;
 mod queue;
+mod repeats;
 mod search;
 mod trial_changes;
 
@@ -21,6 +23,7 @@ pub use self::plan::{ExperimentPlan, RequestRefusal};
 
 use std::collections::BTreeMap;
 
+use self::between_repeats::BetweenRepeats;
 use self::confirmation::{BestConfirmation, NextRepeat};
 use self::open_proposal::OpenProposal;
 use self::plan::not_now;
@@ -54,6 +57,8 @@ enum ExperimentState {
     Running(u32),
     /// This trial waits for its verdict.
     Review(u32),
+    /// The next rollout of this trial waits for approval.
+    BetweenRepeats(BetweenRepeats),
     /// The budget is used up.
     Finished,
 }
@@ -109,7 +114,7 @@ impl Experiment {
     /// Returns the stage of the current trial.
     pub fn stage(&self) -> ExperimentStage {
         match self.state {
-            ExperimentState::Proposed(_) => ExperimentStage::Proposed,
+            ExperimentState::Proposed(_) | ExperimentState::BetweenRepeats(_) => ExperimentStage::Proposed,
             ExperimentState::Running(_) => ExperimentStage::Running,
             ExperimentState::Review(_) => ExperimentStage::Review,
             ExperimentState::Finished => ExperimentStage::Finished,
@@ -146,7 +151,12 @@ impl Experiment {
     /// Returns the proposal that waits for approval.
     pub fn proposal(&self) -> Option<Proposal> {
         match &self.state {
-            ExperimentState::Proposed(open) => Some(open.proposal()),
+            ExperimentState::Proposed(open) => {
+                let repeats = if self.plan.control.repeats > 1 { self.plan.control.repeats } else { 0 };
+                let repeat = if repeats > 0 { open.continued_repeats() + 1 } else { 0 };
+                Some(Proposal { repeat, repeats, ..open.proposal() })
+            }
+            ExperimentState::BetweenRepeats(between) => self.repeat_proposal(between),
             _ => None,
         }
     }
@@ -173,6 +183,9 @@ impl Experiment {
     /// Approves the proposal as it was seen: it becomes a running trial, on disk before this returns.
     /// Refused when there is another proposal by now or its values are outside the limits.
     pub fn approve(&mut self, trial: u32, revision: u32) -> Result<TrialSpec, RequestRefusal> {
+        if matches!(self.state, ExperimentState::BetweenRepeats(_)) {
+            return self.approve_repeat(trial, revision);
+        }
         let ExperimentState::Proposed(open) = &self.state else { return not_now("there is no proposal to approve") };
         if !open.is(trial, revision) {
             return not_now(format!(
@@ -192,6 +205,9 @@ impl Experiment {
     /// Refuses the proposal: it becomes a void trial, which the sampler does not see.
     /// Refused when there is no proposal.
     pub fn skip(&mut self) -> Result<(), RequestRefusal> {
+        if let ExperimentState::BetweenRepeats(between) = &self.state {
+            return self.give_up(between.trial());
+        }
         let ExperimentState::Proposed(open) = &self.state else { return not_now("there is no proposal to skip") };
         let cause = match self.refusal() {
             Some(refusal) => format!("not run: {refusal}"),
@@ -289,7 +305,8 @@ impl Experiment {
 
     fn enter(&mut self, state: ExperimentState, trial: u32) {
         self.state = state;
-        let (stage, can_undo) = (self.stage(), self.pending_verdict.is_some());
+        let between = matches!(self.state, ExperimentState::BetweenRepeats(_));
+        let (stage, can_undo) = (self.stage(), between || self.pending_verdict.is_some());
         let jumps = if stage == ExperimentStage::Running { self.spec(trial).jumps } else { 0 };
         self.outbox.push(Record::Stage(StageRecord { stage, trial, can_undo, jumps }));
     }

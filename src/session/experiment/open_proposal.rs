@@ -9,6 +9,7 @@ use crate::optimize::study::{Study, TrialDraft};
 use crate::optimize::trial::Trial;
 use crate::trial::{
     FallRisk, Gains, ParameterInsight, ParameterValues, Proposal, ProposalInsight, ProposalSource, ProposedParameter,
+    Verdict,
 };
 
 /// Values at which the densities are given: the width of a chart in a terminal.
@@ -129,6 +130,11 @@ impl OpenProposal {
         }
     }
 
+    /// Rollouts of an interrupted trial that this one continues, without void ones.
+    pub fn continued_repeats(&self) -> u32 {
+        self.origin().repeats.iter().filter(|repeat| repeat.verdict != Some(Verdict::Void)).count() as u32
+    }
+
     fn origin(&self) -> Origin {
         if self.draft.enqueued { Origin::of(&self.draft.attributes) } else { Origin::new(ProposalSource::Sampler) }
     }
@@ -157,6 +163,8 @@ impl OpenProposal {
             risk: self.risk(&parameters),
             parameters,
             gains: self.gains.iter().zip(&self.configured).map(gain).collect(),
+            repeat: 0,
+            repeats: 0,
         }
     }
 

@@ -140,7 +140,7 @@ impl Experiment {
             draft = self.study.redirected(&draft, number)?;
         }
         let seed = origin.seed().unwrap_or_else(|| self.trial_seed(draft.number));
-        let began = BeganAttributes::new(&proposal, seed, &self.plan, fixed);
+        let began = BeganAttributes::new(&proposal, seed, origin.repeats.clone(), &self.plan, fixed);
         let beyond_budget = [proposal.source, origin.source].contains(&ProposalSource::Confirm);
         let (queue, budget) = (&self.queue, self.plan.budget);
         let room = |trials: &[Trial]| beyond_budget || queue.occupied(trials) < budget;
@@ -161,6 +161,7 @@ impl Experiment {
             note: gains_note(&gains, &self.plan.control.gains()),
             risk: proposal.risk,
             gains,
+            repeats: origin.repeats,
             ..TrialRecord::default()
         };
         if !row.note.is_empty() {
@@ -238,10 +239,11 @@ impl Experiment {
         let row = &self.rows[&number];
         let control = &self.plan.control;
         let seed = self.study.trial(number).ok().and_then(|trial| Origin::of_trial(trial).seed());
+        let seed = seed.unwrap_or_else(|| self.trial_seed(number));
         TrialSpec {
             trial: number,
             gains: control.gains().with(&row.gains),
-            seed: seed.unwrap_or_else(|| self.trial_seed(number)),
+            seed: repeat_seed(seed, row.repeats.len() as u64),
             ..control.trial(self.plan.task, JumpParameters::from_values(&row.parameters, control.f1_hz))
         }
     }
@@ -261,11 +263,20 @@ fn gains_note(gains: &ParameterValues, configured: &Gains) -> String {
 }
 
 /// Returns the seed of one trial's noise and terrain: the study's seed, the worker and the trial's place in the order of
-/// proposals, mixed (SplitMix64 finalizer, Steele et al. 2014). No two trials of a study have the same unless one repeats the
+/// proposals, mixed. No two trials of a study have the same unless one repeats the
 /// other.
 fn trial_seed(study: u64, worker: u32, trial: u32) -> u64 {
-    let place = (u64::from(worker) << 32) + u64::from(trial) + 1;
-    let mut z = study.wrapping_add(place.wrapping_mul(0x9E37_79B9_7F4A_7C15));
+    mixed(study, (u64::from(worker) << 32) + u64::from(trial) + 1)
+}
+
+/// Returns the seed of a trial's rollout after `before` judged ones, void ones included: that of the trial for the first.
+fn repeat_seed(trial: u64, before: u64) -> u64 {
+    if before == 0 { trial } else { mixed(trial, before) }
+}
+
+/// SplitMix64 (Steele et al. 2014): output number `place` of the generator with this seed.
+fn mixed(seed: u64, place: u64) -> u64 {
+    let mut z = seed.wrapping_add(place.wrapping_mul(0x9E37_79B9_7F4A_7C15));
     z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
     z ^ (z >> 31)

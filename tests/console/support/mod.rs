@@ -285,6 +285,8 @@ pub fn proposal(trial: u32, revision: u32) -> Proposal {
             parameter("kd_joint", 0.8),
             parameter("k_att", 200.0),
         ],
+        repeat: 0,
+        repeats: 0,
     }
 }
 
@@ -316,6 +318,7 @@ pub fn trial(number: u32, verdict: Option<Verdict>, suggested: Option<Verdict>) 
         note: String::new(),
         risk: None,
         gains: Vec::new().into(),
+        repeats: Vec::new(),
     }
 }
 

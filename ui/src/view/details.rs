@@ -64,6 +64,11 @@ pub fn details(session: &SessionModel, theme: &Theme, trial: &TrialRecord) -> Ve
             row(&format!("jump {}", index + 1), jump_line(jump, session.info.task.map_or("", |task| task.unit())));
         }
     }
+    for (index, repeat) in trial.repeats.iter().enumerate() {
+        let verdict = repeat.verdict.map_or("not judged", |verdict| verdict.name());
+        let value = repeat.value.map_or(String::new(), |value| format!(" {value:.4} {unit}"));
+        row(&format!("repeat {}", index + 1), format!("{verdict}{value}, seed {}: {}", repeat.seed, repeat.cause));
+    }
     if let Some(risk) = trial.risk.filter(|risk| risk.neighbours > 0) {
         let nearest = match (risk.nearest_fall_trial, risk.nearest_fall) {
             (Some(trial), Some(distance)) => format!("; nearest fall #{trial}, normalised distance {distance:.3}"),

@@ -51,7 +51,11 @@ fn content(model: &Model, width: usize) -> (String, Vec<Line<'static>>) {
                 (ProposalSource::Confirm, _) => ", to confirm the best".to_owned(),
                 (ProposalSource::Queued, _) => ", from the queue".to_owned(),
             };
-            let title = format!("Trial #{}{cause}", proposal.trial);
+            let repeat = match proposal.repeats {
+                0 => String::new(),
+                repeats => format!(", repeat {} of {repeats}", proposal.repeat),
+            };
+            let title = format!("Trial #{}{repeat}{cause}", proposal.trial);
             let mut lines: Vec<Line> =
                 proposal.parameters.iter().map(|p| parameter(session, theme, p, width)).collect();
             let changed = proposal.gains.iter().filter(|gain| gain.value != gain.proposed);

@@ -192,7 +192,9 @@ fn run_one(
     let mut best: Option<(TrialRecord, Vec<Tick>)> = None;
     let ran = automatic::run_watched(&mut experiment, &mut rollout, |trial| {
         let JudgedTrial { experiment, row, ticks, warning } = *trial;
-        printer.trial(study, row, experiment.counted());
+        if row.verdict.is_some() {
+            printer.trial(study, row, experiment.counted());
+        }
         if let Some(warning) = warning {
             printer.warn(study, warning);
         }

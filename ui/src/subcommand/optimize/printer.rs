@@ -8,7 +8,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use quadfrog::config::Config;
 use quadfrog::engine::Options;
 use quadfrog::report::table;
-use quadfrog::trial::{MeasuredJump, Task, TrialRecord, Verdict};
+use quadfrog::trial::{MeasuredJump, RepeatRecord, Task, TrialRecord, Verdict};
 use serde::{Serialize, Serializer};
 
 use crate::subcommand::selection::SelectedStudy;
@@ -68,6 +68,7 @@ impl Printer {
                 value: row.value,
                 verdict: row.verdict,
                 measured: row.measured.as_ref(),
+                repeats: &row.repeats,
             };
             // Numbers and names always serialize.
             output::line(&serde_json::to_string(&line).unwrap_or_default());
@@ -163,6 +164,8 @@ struct JsonLine<'a> {
     value: Option<f64>,
     verdict: Option<Verdict>,
     measured: Option<&'a MeasuredJump>,
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    repeats: &'a [RepeatRecord],
 }
 
 fn in_table_order<S: Serializer>(parameters: &&[(String, f64)], serializer: S) -> Result<S::Ok, S::Error> {

@@ -1,0 +1,126 @@
+//! Trials of several rollouts: each is approved and judged by itself, with a seed of its own. The value of the trial is the mean of
+//! the rollouts that count, with 0 for a fall; a void rollout is done again. A judged rollout is on disk when it is shown: after a
+//! crash the trial is queued again with it.
+
+use super::attributes::{self, RepeatsAttribute};
+use super::between_repeats::BetweenRepeats;
+use super::plan::{RequestRefusal, not_now};
+use super::{Experiment, ExperimentState};
+use crate::optimize::study::{Outcome, StudyError};
+use crate::telemetry::TrialSpec;
+use crate::trial::{Proposal, ProposedParameter, RepeatRecord, TrialRecord, Verdict};
+
+impl Experiment {
+    /// Returns the proposal of the trial's next rollout.
+    pub(super) fn repeat_proposal(&self, between: &BetweenRepeats) -> Option<Proposal> {
+        let row = self.rows.get(&between.trial())?;
+        let values = |list: &[(String, f64)]| -> Vec<ProposedParameter> {
+            list.iter()
+                .map(|(name, value)| ProposedParameter { name: name.clone(), value: *value, proposed: *value })
+                .collect()
+        };
+        Some(Proposal {
+            trial: row.trial,
+            revision: between.revision,
+            source: row.source,
+            parent: row.parent,
+            parameters: values(&row.parameters),
+            risk: row.risk,
+            gains: values(&row.gains),
+            repeat: row.counted_repeats() + 1,
+            repeats: self.plan.control.repeats,
+        })
+    }
+
+    pub(super) fn approve_repeat(&mut self, trial: u32, revision: u32) -> Result<TrialSpec, RequestRefusal> {
+        let ExperimentState::BetweenRepeats(between) = &self.state else {
+            return not_now("there is no repeat to approve");
+        };
+        if (between.trial(), between.revision) != (trial, revision) {
+            return not_now(format!(
+                "the proposal for trial {trial} has changed since it was shown; check the new one (trial {}) and approve it",
+                between.trial()
+            ));
+        }
+        self.enter(ExperimentState::Running(trial), trial);
+        Ok(self.spec(trial))
+    }
+
+    /// Records the judged rollout of the trial under review: `suggestion` is its row before the verdict. Returns the trial's
+    /// value, with its verdict in the row, after the last rollout; none while others are to be done.
+    pub(super) fn judge_repeat(
+        &mut self,
+        trial: u32,
+        seed: u64,
+        suggestion: TrialRecord,
+    ) -> Result<Option<f64>, RequestRefusal> {
+        let wanted = self.plan.control.repeats;
+        let Some(row) = self.rows.get_mut(&trial) else { return not_now("no trial is under review") };
+        let TrialRecord { verdict, value, cause, measured, .. } = row.clone();
+        row.repeats.push(RepeatRecord { seed, verdict, value, cause, measured });
+        let counted = row.counted_repeats();
+        let done = counted >= wanted;
+        if done {
+            let values: Vec<f64> = row.repeats.iter().filter_map(|repeat| repeat.value).collect();
+            let falls = row.repeats.iter().filter(|repeat| repeat.verdict == Some(Verdict::Fall)).count() as u32;
+            let mean = values.iter().sum::<f64>() / f64::from(counted.max(1));
+            let verdict = if falls == counted { Verdict::Fall } else { Verdict::Accept };
+            (row.verdict, row.suggested, row.value) = (Some(verdict), Some(verdict), Some(mean));
+            row.cause = format!("mean of {counted} repeats, {falls} fell");
+            return Ok(Some(mean));
+        }
+        let repeats = row.repeats.clone();
+        (row.verdict, row.suggested, row.value, row.hand_value, row.measured) = (None, None, None, None, None);
+        row.cause = String::new();
+        if let Err(error) = self.study.annotate(trial, &attributes::write(&RepeatsAttribute { repeats: &repeats })) {
+            self.rows.insert(trial, suggestion);
+            return match error {
+                StudyError::State { .. } => {
+                    self.rows.remove(&trial);
+                    self.state = ExperimentState::Finished;
+                    self.propose()?;
+                    Err(RequestRefusal::EndedElsewhere(trial))
+                }
+                error => Err(error.into()),
+            };
+        }
+        self.publish_row(trial);
+        let revision = self.next_revision();
+        self.enter(
+            ExperimentState::BetweenRepeats(BetweenRepeats { revision, suggestion: Box::new(suggestion) }),
+            trial,
+        );
+        self.publish_proposal();
+        Ok(None)
+    }
+
+    /// Takes the verdict on the last rollout back.
+    pub(super) fn undo_repeat(&mut self) -> Result<(), RequestRefusal> {
+        let ExperimentState::BetweenRepeats(between) = &self.state else {
+            return not_now("there is no verdict to undo");
+        };
+        let mut row = (*between.suggestion).clone();
+        let trial = row.trial;
+        self.study.annotate(trial, &attributes::write(&RepeatsAttribute { repeats: &row.repeats }))?;
+        if let Some(judged) = self.rows.get(&trial) {
+            row.note.clone_from(&judged.note);
+        }
+        self.rows.insert(trial, row);
+        self.publish_row(trial);
+        self.enter(ExperimentState::Review(trial), trial);
+        Ok(())
+    }
+
+    /// Gives the trial up between its rollouts: it is void, its rollouts stay on record.
+    pub(super) fn give_up(&mut self, trial: u32) -> Result<(), RequestRefusal> {
+        if let Some(row) = self.rows.get_mut(&trial) {
+            row.verdict = Some(Verdict::Void);
+            row.cause = "given up between its repeats".to_owned();
+        }
+        self.write_judgement(trial, false)?;
+        self.study.tell(trial, Outcome::Fail)?;
+        self.publish_row(trial);
+        self.state = ExperimentState::Finished;
+        Ok(self.propose()?)
+    }
+}

@@ -1,0 +1,90 @@
+//! Search space, reasons of a proposal and statistics of repeated points, as they are shown.
+
+use super::ParameterValues;
+
+/// The present search space and the progress of the study.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct SearchStatus {
+    /// Trials that are to count.
+    pub budget: u32,
+    /// Trials that count so far: accepted or fallen, without repeats that confirm the best.
+    pub counted: u32,
+    /// Every parameter, in table order.
+    pub parameters: Vec<SearchedParameter>,
+    /// Repeats left to confirm the best; none while no confirmation runs.
+    pub confirming: Option<u32>,
+    /// Share of the force bounds that trials on the robot may use; none where the whole bounds are open.
+    pub hop_share: Option<f64>,
+}
+
+/// One parameter as it is searched at present.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct SearchedParameter {
+    /// Name.
+    pub name: String,
+    /// Present lower bound, in the parameter's unit.
+    pub low: f64,
+    /// Present upper bound.
+    pub high: f64,
+    /// The least lower bound that it may be given (`safety.toml`).
+    pub least: f64,
+    /// The greatest upper bound that it may be given.
+    pub most: f64,
+    /// Its value for the next trials, if the operator has fixed it.
+    pub fixed: Option<FixedParameter>,
+}
+
+/// A parameter that is fixed for some trials.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct FixedParameter {
+    /// Its value, in the parameter's unit.
+    pub value: f64,
+    /// Trials left, including the proposed one.
+    pub trials: u32,
+}
+
+/// Reasons of a proposal.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ProposalInsight {
+    /// The proposed trial.
+    pub trial: u32,
+    /// Every parameter, in table order.
+    pub parameters: Vec<ParameterInsight>,
+}
+
+/// Reasons of one parameter's proposed value, and its importance.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ParameterInsight {
+    /// Name.
+    pub name: String,
+    /// The proposed value, in the parameter's unit.
+    pub proposed: f64,
+    /// Share of this parameter in reaching the best tenth of the trials, 0 to 1, all together 1 (PED-ANOVA); none while
+    /// there are too few trials to tell.
+    pub importance: Option<f64>,
+    /// Values at which the densities are given, from the lower to the upper bound; empty where TPE does not propose.
+    pub at: Vec<f64>,
+    /// TPE's l(x), of the good trials, per unit of the parameter.
+    pub good: Vec<f64>,
+    /// TPE's g(x), of the others.
+    pub bad: Vec<f64>,
+}
+
+/// A point that was run more than once or is being confirmed; repeats are aggregated as in `optimize::repeats`.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct PointRecord {
+    /// Parameters by name, in table order.
+    pub parameters: ParameterValues,
+    /// Its trials that count, ascending: n is their number.
+    pub trials: Vec<u32>,
+    /// k: number of them that did not fall.
+    pub without_fall: u32,
+    /// Mean value, falls included.
+    pub mean: f64,
+    /// Standard deviation of a single repeat, from two repeats on.
+    pub deviation: Option<f64>,
+    /// Whether it is or was one of the points among which the best is confirmed.
+    pub contender: bool,
+    /// The confidence that it is the best of the contenders; of the leading one alone.
+    pub confidence: Option<f64>,
+}
