@@ -87,6 +87,7 @@ fn study(seed: u32, rows: Vec<TrialRecord>) -> ReportedStudy {
         seed: Some(seed),
         robot: "go1, simulated".into(),
         direction: Direction::Maximize,
+        unit: "m".into(),
         jumps: 1,
         f1_hz: 0.0,
         parameters: vec![info("f0", "Hz", 0.75, 1.75), info("Fx", "N", 0.0, 150.0), info("Fz", "N", 150.0, 350.0)],

@@ -123,7 +123,7 @@ fn table(table: &Table, number: u32) -> Markup {
                     @for row in &table.rows {
                         tr {
                             @for (column, cell) in table.columns.iter().zip(row) {
-                                td class=(class(column)) { (shown(cell)) }
+                                td class=(class(column)) { (shown(column, cell)) }
                             }
                         }
                     }
@@ -133,9 +133,10 @@ fn table(table: &Table, number: u32) -> Markup {
     }
 }
 
-/// Returns a cell as it is shown, with the minus sign of print.
-fn shown(cell: &Cell) -> String {
+/// Returns a cell as it is shown, with the signs of print in columns of numbers.
+fn shown(column: &Column, cell: &Cell) -> String {
     match cell {
+        Cell::Text(text) if !column.text => printable(text).replace("+-", "\u{b1}"),
         Cell::Number { .. } => cell.shown().replace('-', "\u{2212}"),
         Cell::Missing => "\u{2013}".to_owned(),
         Cell::Text(_) => printable(&cell.shown()),

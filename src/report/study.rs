@@ -22,7 +22,9 @@ pub struct ReportedStudy {
     pub robot: String,
     /// Whether J is minimised, as another program's may be.
     pub direction: Direction,
-    /// Jumps in a row of a trial.
+    /// Unit of J; empty for a study of another program.
+    pub unit: String,
+    /// Most jumps in a row of a trial.
     pub jumps: u32,
     /// Frequency of the pause where it is no parameter, Hz.
     pub f1_hz: f64,
@@ -43,11 +45,6 @@ pub struct ReportedStudy {
 }
 
 impl ReportedStudy {
-    /// Unit of J; empty for a study of another program.
-    pub fn unit(&self) -> &'static str {
-        self.task.map_or("", Task::unit)
-    }
-
     /// Short label: seed, or the name in the journal.
     pub fn label(&self) -> String {
         self.seed.map_or_else(|| self.name.clone(), |seed| format!("seed {seed}"))

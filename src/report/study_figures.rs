@@ -64,8 +64,8 @@ impl<'a> TaskStudies<'a> {
         format!("{}-{what}", self.name.chars().map(plain).collect::<String>())
     }
 
-    fn unit(&self) -> &'static str {
-        self.studies.first().map_or("", |study| study.unit())
+    fn unit(&self) -> &str {
+        self.studies.first().map_or("", |study| study.unit.as_str())
     }
 
     /// Axis of the numbers of the trials.

@@ -42,7 +42,7 @@ pub fn summary(study: &ReportedStudy) -> Page {
 }
 
 /// Equation of the objective of a task.
-fn equation(task: Task, jumps: u32) -> String {
+fn equation(task: Task, jumps: u32, unit: &str) -> String {
     let (left, right) = match task {
         Task::Forward => ("J_forward", "x_final - x_init"),
         Task::LateralLeft => ("J_lateral-left", "y_final - y_init"),
@@ -51,8 +51,9 @@ fn equation(task: Task, jumps: u32) -> String {
         Task::TwistCw => ("J_twist-cw", "-(yaw_final - yaw_init)"),
     };
     match jumps {
-        0 | 1 => format!("{left} = {right}   [{}]", task.unit()),
-        jumps => format!("{left} = ({right}) / {jumps}   [{} per jump]", task.unit()),
+        _ if unit.ends_with("/s") => format!("{left} = ({right}) / t_touchdown   [{unit}]"),
+        0 | 1 => format!("{left} = {right}   [{unit}]"),
+        _ => format!("{left} = ({right}) / jumps   [{unit} per jump]"),
     }
 }
 
@@ -60,7 +61,7 @@ fn objective(groups: &[Vec<&ReportedStudy>]) -> Section {
     let mut section = Section::new("Objective");
     for study in groups.iter().map(|group| group[0]) {
         match study.task {
-            Some(task) => section.blocks.push(Block::Equation(equation(task, study.jumps))),
+            Some(task) => section.blocks.push(Block::Equation(equation(task, study.jumps, &study.unit))),
             None => {
                 let direction = if study.direction == Direction::Minimize { "minimized" } else { "maximized" };
                 section.paragraph(format!("{}: a study of another program; its value is {direction}.", study.name));

@@ -4,7 +4,7 @@ use super::page::{Cell, Column, Table};
 use super::study::{ReportedStudy, mean_and_deviation};
 use super::study_figures::DrawnTrial;
 use crate::robot::JOINT_NAMES;
-use crate::trial::{TrialRecord, Verdict};
+use crate::trial::{Task, TrialRecord, Verdict};
 
 /// Numbers of trials at which the best so far is listed.
 const CHECKPOINTS: [usize; 6] = [5, 10, 20, 50, 100, 200];
@@ -40,7 +40,7 @@ pub fn studies(studies: &[ReportedStudy]) -> Table {
             count(Verdict::Fall),
             count(Verdict::Void),
             Cell::optional(best.and_then(|row| row.value), 3),
-            Cell::text(study.unit()),
+            Cell::text(study.unit.clone()),
             best.map_or(Cell::Missing, |row| Cell::count(row.trial as usize)),
         ]);
     }
@@ -73,7 +73,7 @@ pub fn checkpoints(groups: &[Vec<&ReportedStudy>]) -> Table {
             })
         };
         let name = group[0].task.map_or_else(|| group[0].name.clone(), |task| task.name().to_owned());
-        let unit = group[0].unit();
+        let unit = &group[0].unit;
         let name = if unit.is_empty() { name } else { format!("{name} ({unit})") };
         let cells = [Cell::text(name), Cell::count(group.len())].into_iter().chain(at.iter().map(cell));
         table.rows.push(cells.collect());
@@ -84,7 +84,7 @@ pub fn checkpoints(groups: &[Vec<&ReportedStudy>]) -> Table {
 /// The best trial of each study of one task.
 pub fn best(group: &[&ReportedStudy]) -> Table {
     let name = group[0].task.map_or(group[0].name.as_str(), |task| task.name());
-    let columns = [Column::text("study"), Column::number("trial", ""), Column::number("J", group[0].unit())];
+    let columns = [Column::text("study"), Column::number("trial", ""), Column::number("J", group[0].unit.as_str())];
     let columns = columns.into_iter().chain(parameter_columns(group[0])).chain([
         Column::number("dx", "m"),
         Column::number("dy", "m"),
@@ -120,7 +120,7 @@ pub fn jumps(study: &ReportedStudy, drawn: &[DrawnTrial]) -> Option<Table> {
         [("start", "s"), ("x", "m"), ("y", "m"), ("yaw", "rad"), ("tilt", "rad"), ("rise", "m"), ("air", "s")];
     let columns = [Column::text("trial"), Column::number("jump", "")].into_iter();
     let columns = columns.chain(numbers.map(|(name, unit)| Column::number(name, unit)));
-    let columns = columns.chain([Column::number("value", study.unit())]);
+    let columns = columns.chain([Column::number("value", study.task.map_or("", Task::unit))]);
     let caption = "Jumps in a row: time, position, turn and tilt at the start of each impulse; rise, longest flight and \
                    share of the objective up to the next.";
     let mut table = Table::new(caption, columns);
@@ -172,7 +172,7 @@ pub fn takeoff(study: &ReportedStudy, drawn: &[DrawnTrial]) -> Option<Table> {
 /// All trials of a study.
 pub fn trials(study: &ReportedStudy) -> Table {
     let columns = [Column::number("trial", "")].into_iter().chain(parameter_columns(study)).chain([
-        Column::number("J", study.unit()),
+        Column::number("J", study.unit.as_str()),
         Column::number("dx", "m"),
         Column::number("dy", "m"),
         Column::number("dyaw", "rad"),

@@ -71,6 +71,10 @@ fn reported(
 ) -> Result<ReportedStudy, Failure> {
     let (study, ours) = (&opened.study, opened.ours.as_ref());
     let robot = ours.and_then(|ours| description(kept, &ours.robot));
+    let rows = rows_of(study, &opened.parameters);
+    // A trial of a given duration has as many jumps as fit.
+    let jumps = rows.iter().filter_map(|row| row.measured.as_ref()).map(|measured| measured.jumps.len() as u32);
+    let jumps = jumps.max().unwrap_or(1);
     let control = ours.map(|ours| config.task(ours.task));
     let recordings = match &robot {
         Some(robot) => Recordings::read(&recordings(opened, folder), robot),
@@ -85,10 +89,11 @@ fn reported(
         seed: ours.map(|ours| ours.seed),
         robot: ours.map_or_else(String::new, |ours| format!("{}, {machine}", ours.robot)),
         direction: study.options().direction,
-        jumps: control.map_or(1, |control| control.jumps),
+        unit: opened.unit().to_owned(),
+        jumps: control.map_or(1, |control| control.jumps).max(jumps),
         f1_hz: control.map_or(0.0, |control| control.f1_hz),
         parameters: opened.parameters.clone(),
-        rows: rows_of(study, &opened.parameters),
+        rows,
         best: study.best().map(|best| best.number),
         limits: robot.as_ref().map(limits_of),
         recordings,
