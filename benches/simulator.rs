@@ -1,8 +1,8 @@
-//! Duration of the dynamics alone and of a step by number of contacts: `cargo bench --bench simulator`. The counterpart in
+//! Duration of the dynamics alone and of a step by number of contacts and of blocks: `cargo bench --bench simulator`. The counterpart in
 //! MuJoCo is `mj_step` on the same model and machine.
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use quadfrog::sim::bench::{BenchScene, SimulatorBench};
+use quadfrog::sim::bench::{BLOCK_COUNTS, BenchScene, SimulatorBench};
 
 fn benches(criterion: &mut Criterion) {
     let speed = SimulatorBench::new();
@@ -13,6 +13,12 @@ fn benches(criterion: &mut Criterion) {
     for scene in BenchScene::ALL {
         criterion.bench_function(&format!("1 ms step, {}", scene.name()), |b| {
             let mut stand = speed.scene(scene);
+            b.iter(|| stand.step());
+        });
+    }
+    for count in BLOCK_COUNTS {
+        criterion.bench_function(&format!("1 ms step, standing on {count} blocks"), |b| {
+            let mut stand = speed.blocks(count);
             b.iter(|| stand.step());
         });
     }

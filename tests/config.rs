@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use quadfrog::config::{Config, ConfigLayer};
 use quadfrog::robot::description::RobotDescription;
-use quadfrog::trial::{Backend, Task};
+use quadfrog::trial::{Backend, JumpParameters, Task};
 
 /// Asserts that a folder with one file is refused, and that the message names the file and has all `words`.
 fn refuses(name: &str, text: &str, words: &[&str]) {
@@ -185,4 +185,36 @@ fn values_that_no_kind_can_hold_are_refused_with_their_line_key_and_value() {
     );
     refuses("control.toml", "\n[tasks.forward]\nstance_m = [0.0, 0.14]\n", &[":3", "tasks.forward.stance_m", "0.14"]);
     refuses("optimize.toml", "[sampler]\nkind = \"cma\"\n", &[":2", "sampler.kind", "cma"]);
+}
+
+#[test]
+fn jumps_and_a_duration_exclude_each_other() {
+    let both = "[tasks.forward]\njumps = 5\nduration_s = 4.0\nf1_hz = 1.0\n";
+    refuses(
+        "control.toml",
+        both,
+        &["control.toml:3", "tasks.forward.duration_s", "tasks.forward.jumps = 5", "one of them"],
+    );
+    refuses("control.toml", "[tasks.forward]\nduration_s = 4.0\n", &["tasks.forward.f1_hz", "0.05 Hz"]);
+    refuses("control.toml", "[tasks.forward]\nduration_s = 0.0\nf1_hz = 1.0\n", &["tasks.forward.duration_s", "0.1"]);
+    refuses("control.toml", "[tasks.forward]\nbounce = \"jump\"\n", &["tasks.forward.bounce", "jump", "first-landing"]);
+}
+
+/// The files as run, loaded again, are the same configuration.
+#[test]
+fn a_duration_alone_counts_and_its_copy_loads_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = "[tasks.forward]\nduration_s = 2.5\nf1_hz = 0.8333333333333334\nrate = true\n";
+    fs::write(folder.path().join("control.toml"), text).unwrap();
+    let config = Config::load(Some(folder.path())).unwrap();
+    let control = config.task(Task::Forward);
+    // One period lasts 1 s: impulses begin at 0, 1 and 2 s.
+    let jump = JumpParameters { f0_hz: 1.25, f1_hz: control.f1_hz, fx_n: 0.0, fy_n: 0.0, fz_n: 200.0 };
+    assert_eq!((control.jumps(&jump), control.unit(Task::Forward), control.unit(Task::TwistCw)), (3, "m/s", "rad/s"));
+    let copy = tempfile::tempdir().unwrap();
+    for (name, text) in &config.as_run {
+        fs::write(copy.path().join(name), text).unwrap();
+    }
+    let again = Config::load(Some(copy.path())).unwrap();
+    assert_eq!((again.task(Task::Forward), &again.as_run), (control, &config.as_run));
 }

@@ -462,6 +462,35 @@ fn control_is_taken_only_once_a_screen_was_heard() {
     assert_eq!(session.body.mode(), Mode::Disarmed);
 }
 
+/// On the console, too, the operator reads which number ended the trial.
+#[test]
+fn a_limit_that_ends_a_trial_is_logged_with_its_key() {
+    let mut session = Session::new(Backend::Simulator, None);
+    let config = Config::load(None).unwrap();
+    let robot = RobotDescription::embedded("go1").unwrap();
+    let settings = config.settings(&robot, Task::Forward, Backend::Simulator).unwrap();
+    session.supervisor = session.supervisor.naming_limits(settings);
+    assert!(session.request(OperatorRequest::Arm).accepted);
+    session.ticks(4000);
+    assert_eq!(session.body.mode(), Mode::Ready);
+    let proposal = session.records.iter().rev().find_map(|record| match record {
+        Record::Proposal(proposal) => Some((proposal.trial, proposal.revision)),
+        _ => None,
+    });
+    let (trial, revision) = proposal.expect("a proposal");
+    assert!(session.request(OperatorRequest::Approve { trial, revision }).accepted);
+    session.ticks(500);
+    session.robot.tamper = |state| state.joint_velocity_rad_s[2] = 90.0;
+    session.ticks(20);
+    assert_eq!(session.body.mode(), Mode::Fault);
+    let logged = session.records.iter().find_map(|record| match record {
+        Record::Log(line) if line.message.contains("FR_calf at 90.0 rad/s") => Some(line.message.clone()),
+        _ => None,
+    });
+    let logged = logged.expect("the end of the trial is logged");
+    assert!(logged.contains("watchdog.velocity_factor = 2 in safety.toml"), "{logged}");
+}
+
 #[derive(Debug, Clone, Copy)]
 enum Step {
     Request(fn() -> OperatorRequest),

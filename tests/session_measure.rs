@@ -82,7 +82,7 @@ fn a_robot_that_bounces_on_is_judged_by_the_rule() {
     let ticks = ticks(&[IMPULSE, FLIGHT, landing, hop, landing, hop, (Phase::Landing, true, 0.5)]);
     let settled = TrialEnd::Settled;
     for (bounce, expected, verdict) in [
-        (BounceRule::Ignore, 1.599, Verdict::Accept),
+        (BounceRule::Ignore, 1.499, Verdict::Accept),
         (BounceRule::FirstLanding, 0.799, Verdict::Accept),
         (BounceRule::Zero, 0.0, Verdict::Fall),
     ] {

@@ -20,6 +20,7 @@ fn a_step_does_not_allocate() {
             let mut config = SimConfig::default();
             config.terrain.kind = kind;
             config.terrain.blocks.loose = true;
+            config.terrain.blocks.count = 500;
             config.actuator.kind = actuator;
             config.sensors.enabled = true;
             config.sensors.delay_ms = 3;

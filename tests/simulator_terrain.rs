@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::robot::{JointCommand, Leg, Placement, Robot};
-use quadfrog::sim::{SimConfig, Simulator, TerrainKind};
+use quadfrog::sim::{BodyKind, SimConfig, SimState, Simulator, TerrainKind};
 
 fn config(kind: TerrainKind) -> SimConfig {
     let mut config = SimConfig::default();
@@ -123,4 +123,128 @@ fn loose_blocks_move_when_kicked() {
     };
     assert_eq!(moved(false), 0.0);
     assert!(moved(true) > 0.01, "moved {} m", moved(true));
+}
+
+/// A sliding block does not stop in mid-slide when the robot has left the ground. (Regression: with damping in the motors it did.)
+#[test]
+fn loose_blocks_slide_on_while_the_robot_is_in_the_air() {
+    let mut config = config(TerrainKind::Blocks);
+    config.terrain.blocks.loose = true;
+    config.terrain.blocks.count = 80;
+    config.terrain.blocks.reach_m = 0.5;
+    config.terrain.blocks.floor_friction = 0.01;
+    let (mut simulator, command) = stand(&config, 4);
+    for tick in 0..2000_u32 {
+        let mut kick = command;
+        let swing = 0.4 * (f64::from(tick) * 0.02).sin();
+        (0..4).for_each(|leg| kick.motor[3 * leg + 1].position_rad += swing);
+        simulator.write(&kick).unwrap();
+    }
+    let centers = |simulator: &Simulator| simulator.terrain_boxes().map(|b| b.center).collect::<Vec<_>>();
+    let mut state = *simulator.state();
+    state.position_world.z += 3.0;
+    simulator.set_state(&state);
+    let before = centers(&simulator);
+    for _ in 0..100 {
+        simulator.write(&command).unwrap();
+    }
+    assert_eq!(simulator.contact_count(), 0);
+    assert_ne!(before, centers(&simulator));
+}
+
+#[test]
+fn an_area_holds_the_centres_of_thousands_of_blocks() {
+    let mut config = config(TerrainKind::Blocks);
+    config.terrain.blocks.count = 4000;
+    config.terrain.blocks.area_m = Some([-1.0, 60.0, -4.0, 4.0]);
+    let (simulator, _) = stand(&config, 0);
+    let boxes: Vec<_> = simulator.terrain_boxes().collect();
+    assert_eq!(boxes.len(), 4000);
+    assert!(boxes.iter().all(|b| (-1.0..=60.0).contains(&b.center[0]) && b.center[1].abs() <= 4.0));
+    // Everywhere in the corridor, not only around the start.
+    for x in 0..60 {
+        let strip = f64::from(x) - 0.5..f64::from(x) + 0.5;
+        assert!(boxes.iter().filter(|b| strip.contains(&b.center[0])).count() > 20, "at x = {x} m");
+    }
+}
+
+#[test]
+fn a_square_area_lays_the_blocks_of_its_reach() {
+    let square = config(TerrainKind::Blocks);
+    let mut area = square.clone();
+    let reach_m = square.terrain.blocks.reach_m;
+    area.terrain.blocks.area_m = Some([-reach_m, reach_m, -reach_m, reach_m]);
+    let boxes = |config: &SimConfig| stand(config, 3).0.terrain_boxes().collect::<Vec<_>>();
+    assert_eq!(boxes(&square), boxes(&area));
+}
+
+/// Simulates two seconds in which the hips swing; returns the last state and all reported accelerations.
+fn swing(config: &SimConfig, seed: u64) -> (SimState, Vec<Vector3<f64>>) {
+    let (mut simulator, command) = stand(config, seed);
+    let mut accelerations = Vec::new();
+    for tick in 0..2000_u32 {
+        let mut swing = command;
+        (0..4).for_each(|leg| swing.motor[3 * leg].position_rad += 0.4 * (f64::from(tick) * 0.02).sin());
+        simulator.write(&swing).unwrap();
+        accelerations.push(simulator.read().unwrap().imu.accel_body);
+    }
+    (*simulator.state(), accelerations)
+}
+
+#[test]
+fn friction_drawn_by_the_seed_changes_neither_blocks_nor_noise() {
+    let plain = config(TerrainKind::Blocks);
+    let mut drawn = plain.clone();
+    drawn.terrain.friction_range = Some([0.3, 0.9]);
+    drawn.terrain.blocks.friction_range = Some([0.2, 0.7]);
+    let boxes = |config: &SimConfig| stand(config, 5).0.terrain_boxes().collect::<Vec<_>>();
+    assert_eq!(boxes(&plain), boxes(&drawn));
+    // At rest no foot slides: the accelerations differ by the noise alone, if at all.
+    let noise = |config: &SimConfig| {
+        let mut config = config.clone();
+        config.sensors.enabled = true;
+        stand(&config, 5).0.read().unwrap().imu
+    };
+    assert_eq!(noise(&plain), noise(&drawn));
+    assert_ne!(swing(&plain, 5).0, swing(&drawn, 5).0);
+
+    let coefficients: Vec<f64> = (0..200).map(|seed| drawn.terrain.friction_of(seed)).collect();
+    assert!(coefficients.iter().all(|mu| (0.3..=0.9).contains(mu)));
+    let mean = coefficients.iter().sum::<f64>() / 200.0;
+    assert!((mean - 0.6).abs() < 0.05, "mean of 200 seeds {mean}");
+    assert_eq!(coefficients[7], drawn.terrain.friction_of(7));
+    assert_eq!(plain.terrain.friction_of(7), plain.terrain.friction);
+}
+
+#[test]
+fn a_range_of_one_coefficient_is_that_coefficient() {
+    for kind in [TerrainKind::Flat, TerrainKind::Steps, TerrainKind::Blocks] {
+        let mut fixed = config(kind);
+        (fixed.terrain.friction, fixed.terrain.blocks.friction) = (0.3, 0.2);
+        let mut drawn = config(kind);
+        drawn.terrain.friction_range = Some([0.3; 2]);
+        drawn.terrain.blocks.friction_range = Some([0.2; 2]);
+        assert_eq!(swing(&fixed, 2), swing(&drawn, 2), "{kind:?}");
+        assert_ne!(swing(&config(kind), 2).0, swing(&drawn, 2).0, "{kind:?}");
+    }
+}
+
+/// The list of falls changes the report alone: the collision stays.
+#[test]
+fn contact_of_a_body_outside_the_list_is_no_fall_and_still_carries() {
+    let lie = |fall_bodies: &[BodyKind]| {
+        let mut config = SimConfig::default();
+        config.contact.fall_bodies = fall_bodies.to_vec();
+        let robot = RobotDescription::embedded("go1").unwrap();
+        let mut simulator = Simulator::new(&robot, &config).unwrap();
+        simulator.place(&Placement { joint_position: robot.lying_position, lying: true, seed: 0 });
+        for _ in 0..1000 {
+            simulator.write(&JointCommand::damping(2.0)).unwrap();
+        }
+        (simulator.read().unwrap().truth.unwrap().body_contact, *simulator.state())
+    };
+    let everything = lie(&SimConfig::default().contact.fall_bodies);
+    let without_trunk = lie(&[BodyKind::Thigh, BodyKind::Calf]);
+    assert!(everything.0 && lie(&[BodyKind::Trunk]).0 && !without_trunk.0 && !lie(&[]).0);
+    assert_eq!(everything.1, without_trunk.1);
 }

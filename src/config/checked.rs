@@ -30,9 +30,29 @@ const FILES: [(&str, &str); 5] = [
 ];
 
 /// Optional keys, which the defaults leave out, each with an example of its kind.
-const OPTIONAL: [(&str, &str); 1] = [(
-    "optimize.toml",
-    "objective = \"truth\"
+const OPTIONAL: [(&str, &str); 3] = [
+    (
+        "simulator.toml",
+        "[terrain]
+friction_range = [1.0, 1.0]
+[terrain.blocks]
+area_m = [0.0, 0.0, 0.0, 0.0]
+friction_range = [1.0, 1.0]
+",
+    ),
+    (
+        "control.toml",
+        "[tasks]
+forward = { duration_s = 1.0 }
+lateral-left = { duration_s = 1.0 }
+lateral-right = { duration_s = 1.0 }
+twist-ccw = { duration_s = 1.0 }
+twist-cw = { duration_s = 1.0 }
+",
+    ),
+    (
+        "optimize.toml",
+        "objective = \"truth\"
 [sampler]
 startup_trials = 10
 [first]
@@ -42,7 +62,8 @@ lateral-right = { f0 = 1.0, f1 = 1.0, Fx = 1.0, Fy = 1.0, Fz = 1.0 }
 twist-ccw = { f0 = 1.0, f1 = 1.0, Fx = 1.0, Fy = 1.0, Fz = 1.0 }
 twist-cw = { f0 = 1.0, f1 = 1.0, Fx = 1.0, Fy = 1.0, Fz = 1.0 }
 ",
-)];
+    ),
+];
 
 /// A text laid over the file of a name.
 #[derive(Debug, Clone, Copy)]
@@ -106,7 +127,7 @@ impl Config {
             let mut of_file = layers.iter().filter(|layer| layer.file == name);
             let (table, origin) =
                 of_file.try_fold(default, |(under, _), layer| merge(layer.origin, layer.text, &under, &optional))?;
-            as_run.push((name.to_owned(), table.to_string()));
+            as_run.push((name.to_owned(), without_unused_jumps(&table).to_string()));
             origins.insert(name, origin);
             tables.insert(name, table);
         }
@@ -309,10 +330,27 @@ impl Config {
         }
     }
 
+    /// Whether the loaded file itself gives a key, by its name with its tables.
+    pub(super) fn gives(&self, file: &'static str, key: &str) -> bool {
+        self.origins[file].lines.contains_key(key)
+    }
+
     /// Returns the error of a value: file, line, key, value and reason.
     pub fn refuse(&self, file: &'static str, key: &str, value: impl ToString, reason: impl ToString) -> ConfigError {
         self.origins[file].refuse(key, value, reason)
     }
+}
+
+/// Returns the files' values without the number of jumps of tasks that have a duration: both may not be given.
+fn without_unused_jumps(table: &Table) -> Table {
+    let mut table = table.clone();
+    let tasks = table.get_mut("tasks").and_then(toml::Value::as_table_mut);
+    for task in tasks.into_iter().flat_map(|tasks| tasks.iter_mut().filter_map(|(_, task)| task.as_table_mut())) {
+        if task.contains_key("duration_s") {
+            task.remove("jumps");
+        }
+    }
+    table
 }
 
 /// Parses a default file; its keys are the known keys.

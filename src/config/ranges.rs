@@ -33,6 +33,8 @@ const CONTROL: &[Row] = &[
     (&["realtime.core"], within!(-1, 1023, "(-1 is any core)")),
     (&["tasks.*.stance_m"], within!(-2, 2, "m")),
     (&["tasks.*.jumps"], within!(1, 100, "jumps")),
+    (&["tasks.*.duration_s"], within!(0.1, 600, "s")),
+    (&["tasks.*.landing_wait_s"], within!(0, 5, "s")),
     (&["tasks.*.f1_hz"], within!(0, 100, "Hz")),
     // At 1 rad/s the force is then half of that of the stiffness at a tilt of 1 rad.
     (&["tasks.*.attitude_rate_gain"], within!(0, 100, "N s/m")),
@@ -69,6 +71,10 @@ const CONTROL_HARDWARE: &[Row] = &[
     (&["settle.cap_s"], within!(0.5, 15, "s")),
     (&["settle.speed_m_s"], within!(0.01, 0.5, "m/s")),
     (&["settle.rate_rad_s"], within!(0.01, 1, "rad/s")),
+    // A series on a robot ends before its motors are warm.
+    (&["tasks.*.jumps"], within!(1, 20, "jumps")),
+    (&["tasks.*.duration_s"], within!(0.1, 20, "s")),
+    (&["tasks.*.landing_wait_s"], within!(0, 2, "s")),
     // A fifteenth to three times the load of a foot in stance, 32 N.
     (&["estimator.contact_on_n", "estimator.contact_off_n"], within!(2, 100, "N")),
     (&["estimator.contact_time_s"], within!(0.001, 0.02, "s")),

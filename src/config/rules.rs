@@ -43,8 +43,14 @@ impl Config {
                     return Err(self.refuse(CONTROL, &format!("{tables}.{key}"), value, reason));
                 }
             }
+            let (jumps, duration) = (format!("{tables}.jumps"), format!("{tables}.duration_s"));
+            if let Some(duration_s) = chosen.duration_s.filter(|_| self.gives(CONTROL, &jumps)) {
+                let reason = format!("{jumps} = {} is given, too; give one of them", chosen.jumps);
+                return Err(self.refuse(CONTROL, &duration, duration_s, reason));
+            }
             let f1_is_parameter = self.optimize.parameters[task.name()].iter().any(|name| name == "f1");
-            if chosen.jumps > 1 && chosen.f1_hz < LEAST_F1_HZ && !f1_is_parameter {
+            let in_a_row = chosen.jumps > 1 || chosen.duration_s.is_some();
+            if in_a_row && chosen.f1_hz < LEAST_F1_HZ && !f1_is_parameter {
                 let reason = "several jumps in a row need a frequency between them; give at least 0.05 Hz, or make f1 a parameter in optimize.toml";
                 return Err(self.refuse(CONTROL, &format!("{tables}.f1_hz"), chosen.f1_hz, reason));
             }

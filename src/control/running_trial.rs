@@ -33,6 +33,11 @@ pub struct RunningTrial {
     /// Ticks since the trial began; the oscillator enters pi at `countdown`.
     elapsed: u32,
     countdown: u32,
+    /// Impulses that have begun.
+    begun: u32,
+    /// Ticks for which the oscillator has waited at the end of the present pause, and of all pauses.
+    waiting: u32,
+    waited: u32,
     swing: SwingLegs,
     landing: LandingLegs,
     /// Whether the robot has flown and touched down since the last impulse.
@@ -61,6 +66,9 @@ impl RunningTrial {
             amplitudes_leg: amplitudes_leg(&spec.jump, spec.task),
             elapsed: 0,
             countdown: ticks_in(settings.countdown_s),
+            begun: 0,
+            waiting: 0,
+            waited: 0,
             swing: SwingLegs::default(),
             landing: LandingLegs::default(),
             flown: false,
@@ -82,11 +90,16 @@ impl RunningTrial {
         (f64::from(self.elapsed) - f64::from(self.countdown)) * CONTROL_PERIOD_S
     }
 
+    /// Time of the oscillator since it entered pi, s: the time without that of its waits.
+    fn oscillator_s(&self) -> f64 {
+        (f64::from(self.elapsed) - f64::from(self.countdown) - f64::from(self.waited)) * CONTROL_PERIOD_S
+    }
+
     /// Time at which the last impulse ends, s.
     fn impulses_end_s(&self) -> f64 {
         let before = self.spec.jumps.saturating_sub(1);
-        let waited = if before == 0 { 0.0 } else { f64::from(before) * self.oscillator.period_s() };
-        let end_s = waited + self.oscillator.impulse_s();
+        let passed_s = if before == 0 { 0.0 } else { f64::from(before) * self.oscillator.period_s() };
+        let end_s = passed_s + self.oscillator.impulse_s() + f64::from(self.waited) * CONTROL_PERIOD_S;
         self.cut_s.map_or(end_s, |cut_s| end_s.min(cut_s))
     }
 
@@ -110,12 +123,36 @@ impl RunningTrial {
         }
     }
 
-    /// Drops all impulses that have not begun, so that the robot lands.
-    pub fn land(&mut self) {
-        let period_s = self.oscillator.period_s();
-        let begun =
-            if self.time_s() < 0.0 || self.spec.jumps <= 1 { 1.0 } else { (self.time_s() / period_s).floor() + 1.0 };
-        self.spec.jumps = self.spec.jumps.min(begun as u32);
+    /// Drops all impulses that have not begun, so that the robot lands. Returns whether there were any.
+    pub fn land(&mut self) -> bool {
+        let dropped = self.has_further_impulses();
+        self.spec.jumps = self.spec.jumps.min(self.begun.max(1));
+        dropped
+    }
+
+    /// Whether an impulse is to begin after the present one.
+    pub fn has_further_impulses(&self) -> bool {
+        self.spec.jumps > self.begun.max(1) && self.cut_s.is_none()
+    }
+
+    /// Counts the impulse that begins in this tick. Before it the oscillator waits for all feet down and quiet, if it may; an
+    /// impulse beyond the duration of the trial is dropped.
+    fn begin_impulse(&mut self, estimate: &Estimate, settings: &ControlSettings) {
+        let due =
+            if self.spec.jumps <= 1 { 1.0 } else { (self.oscillator_s() / self.oscillator.period_s()).floor() + 1.0 };
+        if due <= f64::from(self.begun) || due > f64::from(self.spec.jumps) {
+            return;
+        }
+        let may_wait = self.begun > 0 && self.waiting < ticks_in(self.spec.landing_wait_s);
+        if may_wait && !settings.settle.is_quiet(estimate) {
+            self.waiting += 1;
+            self.waited += 1;
+        } else if self.begun > 0 && self.time_s() >= self.spec.duration_s {
+            self.spec.jumps = self.begun;
+        } else {
+            self.begun += 1;
+            self.waiting = 0;
+        }
     }
 
     /// Time on the ground since the last flight, s; zero before the landing.
@@ -126,7 +163,7 @@ impl RunningTrial {
     /// Phase of the oscillator, rad; zero once the last impulse is over.
     pub fn theta_rad(&self) -> f64 {
         let time_s = self.time_s();
-        if time_s < self.impulses_end_s() { self.oscillator.theta_rad(time_s) } else { 0.0 }
+        if time_s < self.impulses_end_s() { self.oscillator.theta_rad(self.oscillator_s()) } else { 0.0 }
     }
 
     /// Phase of the jump.
@@ -161,6 +198,7 @@ impl RunningTrial {
         if time_s < 0.0 {
             return TrialProgress::Countdown;
         }
+        self.begin_impulse(estimate, settings);
         let feet_down = estimate.contact.iter().filter(|&&down| down).count();
         self.flown |= feet_down > 0 && self.swing.airborne_ticks() >= ticks_in(SHORTEST_FLIGHT_S);
         self.swing.update(&estimate.contact);

@@ -4,11 +4,12 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
+pub use super::task_control::TaskControl;
 use crate::robot::kinematics::LegGeometry;
 use crate::robot::remote::RemoteButtons;
 use crate::robot::{Joints, LEGS, PerLeg};
-use crate::telemetry::{Estimate, LandingTerms, SensorCheck, TrialSpec};
-use crate::trial::{BounceRule, Gains, JumpParameters, ObjectiveRule, Task};
+use crate::telemetry::{Estimate, SensorCheck};
+use crate::trial::Gains;
 
 /// Stance between trials.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -355,71 +356,6 @@ pub struct EstimatorSettings {
     pub longest_slip_s: f64,
     /// Longest flight, s; after it the robot counts as hanging.
     pub longest_flight_s: f64,
-}
-
-/// Trial settings of one task: section `[tasks.<task>]` of `config/control.toml`.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct TaskControl {
-    /// Cartesian stiffness, N/m.
-    pub kp: f64,
-    /// Cartesian damping, N s/m.
-    pub kd: f64,
-    /// Joint damping, N m s/rad.
-    pub kd_joint: f64,
-    /// Attitude gain, N/m.
-    pub k_att: f64,
-    /// Nominal foot of a left leg, leg frame, m.
-    pub stance_m: [f64; 3],
-    /// Virtual Model Control on or off.
-    pub vmc: bool,
-    /// Damping of Virtual Model Control, N s/m; zero in the paper.
-    pub attitude_rate_gain: f64,
-    /// Time T of the foot placement, s: a swing foot is placed T times the trunk's velocity ahead; zero in the paper.
-    pub foot_placement_s: f64,
-    /// Landing terms.
-    pub landing: LandingTerms,
-    /// Jumps in a row.
-    pub jumps: u32,
-    /// Frequency between impulses, Hz.
-    pub f1_hz: f64,
-    /// Rule for a robot that bounces on after its landing.
-    pub bounce: BounceRule,
-}
-
-impl TaskControl {
-    /// The gains.
-    pub fn gains(&self) -> Gains {
-        Gains { kp: self.kp, kd: self.kd, kd_joint: self.kd_joint, k_att: self.k_att }
-    }
-
-    /// The nominal foot of a left leg, leg frame, m.
-    pub fn stance_leg(&self) -> Vector3<f64> {
-        self.stance_m.into()
-    }
-
-    /// Computation of the objective of `task`.
-    pub fn objective(&self, task: Task) -> ObjectiveRule {
-        ObjectiveRule { task, jumps: self.jumps, bounce: self.bounce }
-    }
-
-    /// A trial of `task` with this force profile, as configured: number 0 and seed 0.
-    pub fn trial(&self, task: Task, jump: JumpParameters) -> TrialSpec {
-        TrialSpec {
-            trial: 0,
-            task,
-            jump,
-            gains: self.gains(),
-            stance_leg: self.stance_leg(),
-            vmc: self.vmc,
-            attitude_rate_gain: self.attitude_rate_gain,
-            foot_placement_s: self.foot_placement_s,
-            landing: self.landing,
-            jumps: self.jumps,
-            bounce: self.bounce,
-            seed: 0,
-        }
-    }
 }
 
 /// Settings of the control cycle.

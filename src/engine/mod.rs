@@ -132,6 +132,7 @@ pub fn start(options: Options) -> Result<EngineHandle, EngineError> {
     let review_sits_down = !simulated && options.config.safety.failsafe.hardware_review_sits_down;
     let mut supervisor = Supervisor::new(parts, clock.now_ns())
         .approving(options.approve, simulated)
+        .naming_limits(settings)
         .sitting_down_for_review(review_sits_down && !options.observe)
         .with_storage_thread()
         .map_err(system("storage thread"))?;

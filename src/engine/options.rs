@@ -60,6 +60,11 @@ impl Options {
         }
     }
 
+    /// Returns the unit of the objective.
+    pub fn unit(&self) -> &'static str {
+        self.config.task(self.task).unit(self.task)
+    }
+
     /// Returns the number of trials that are to count.
     pub fn budget(&self) -> u32 {
         self.trials.unwrap_or(self.config.optimize.trials)

@@ -20,6 +20,8 @@ pub struct StoredStudy {
     pub robot: String,
     /// Trials that are to count; none where an older version made it.
     pub budget: Option<u32>,
+    /// Unit of the objective; none for that of the task.
+    pub unit: Option<String>,
 }
 
 /// Returns the studies of this program in `storage`; none if the file does not exist.
@@ -36,8 +38,8 @@ pub fn stored_study(file: &Path) -> Result<StoredStudy, EngineError> {
 }
 
 fn stored(study: &StudyRecord) -> Option<StoredStudy> {
-    let StudyAttributes { task, seed, robot, budget, .. } = StudyAttributes::of(&study.user_attributes);
-    Some(StoredStudy { task: task?, seed: seed?, robot: robot?, budget })
+    let StudyAttributes { task, seed, robot, budget, unit, .. } = StudyAttributes::of(&study.user_attributes);
+    Some(StoredStudy { task: task?, seed: seed?, robot: robot?, budget, unit })
 }
 
 /// A study of any program, opened for reading or adding trials.
@@ -53,8 +55,8 @@ pub struct Opened {
 
 impl Opened {
     /// Returns the unit of the objective; empty where it is not known.
-    pub fn unit(&self) -> &'static str {
-        self.ours.as_ref().map_or("", |ours| ours.task.unit())
+    pub fn unit(&self) -> &str {
+        self.ours.as_ref().map_or("", |ours| ours.unit.as_deref().unwrap_or(ours.task.unit()))
     }
 }
 

@@ -32,7 +32,7 @@ pub fn open_experiment(options: &Options, durability: Durability, recording: &st
         StudyOptions {
             name: study_name(options.task, options.seed),
             direction: Direction::Maximize,
-            metric: format!("J_{} ({})", options.task.name(), options.task.unit()),
+            metric: format!("J_{} ({})", options.task.name(), options.unit()),
             space,
             sampler,
             attributes: attributes::write(&NewStudyAttributes {
@@ -43,6 +43,7 @@ pub fn open_experiment(options: &Options, durability: Durability, recording: &st
                 version: env!("CARGO_PKG_VERSION"),
                 budget,
                 backend: options.backend.name(),
+                unit: Some(options.unit()).filter(|unit| *unit != options.task.unit()),
             }),
             durability,
         },
@@ -72,6 +73,7 @@ pub fn open_experiment(options: &Options, durability: Durability, recording: &st
         worker,
         abandoned: Duration::from_secs_f64(options.config.optimize.workers.abandoned_s),
         backend: options.backend,
+        terrain: (options.backend == Backend::Simulator).then_some(options.config.simulator.terrain),
         envelope: options.config.hop_envelope(options.backend),
     };
     Ok(Experiment::open(plan, study)?)
@@ -141,7 +143,7 @@ pub fn session_info(options: &Options, recording: &str) -> SessionInfo {
         backend: Some(options.backend),
         robot: options.robot.name.clone(),
         task: Some(options.task),
-        unit: options.task.unit().to_owned(),
+        unit: options.unit().to_owned(),
         sampler: Some(options.config.optimize.sampler.kind),
         seed: u64::from(options.seed),
         budget: options.budget(),

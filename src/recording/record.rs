@@ -179,6 +179,8 @@ pub struct StageRecord {
     pub trial: u32,
     /// Whether the last verdict can still be undone.
     pub can_undo: bool,
+    /// Most jumps in a row of the running trial; 0 in other stages.
+    pub jumps: u32,
 }
 
 /// An operator's request and its result.

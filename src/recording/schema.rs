@@ -113,6 +113,7 @@ fn stage(way: Way, ours: &mut StageRecord, m: &mut frog::StageInfo) -> Result<()
     way.variant(&mut ours.stage, &mut m.stage, "stage")?;
     way.copy(&mut ours.trial, &mut m.trial);
     way.copy(&mut ours.can_undo, &mut m.can_undo);
+    way.copy(&mut ours.jumps, &mut m.jumps);
     Ok(())
 }
 

@@ -50,6 +50,7 @@ fn measured(way: Way, ours: &mut MeasuredJump, m: &mut frog::trial::Measured) ->
     way.number(&mut ours.apex_m, &mut m.apex);
     way.number(&mut ours.air_s, &mut m.air);
     way.copy(&mut ours.measured_value, &mut m.value);
+    way.number(&mut ours.end_s, &mut m.end);
     way.copy(&mut ours.flights, &mut m.flights);
     way.option(&mut ours.touchdown, &mut m.touchdown, displacement)?;
     way.option(&mut ours.first_landing, &mut m.first_landing, displacement)?;

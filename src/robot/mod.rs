@@ -117,7 +117,7 @@ pub struct Truth {
     pub foot_contact: PerLeg<bool>,
     /// Force of the ground on each foot, world axes, N.
     pub foot_force_world: PerLeg<Vector3<f64>>,
-    /// Whether any part other than the feet is in contact: the robot has fallen.
+    /// Whether a part other than the feet is in contact whose contact is a sign of a fall (`contact.fall_bodies`).
     pub body_contact: bool,
 }
 

@@ -8,6 +8,7 @@ use std::time::Duration;
 
 use super::experiment::{Experiment, RequestRefusal};
 use super::rollout::Rollout;
+use crate::control::limit_key::{LimitKey, limit_key};
 use crate::optimize::journal::LongWait;
 use crate::robot::Robot;
 use crate::telemetry::Tick;
@@ -15,28 +16,71 @@ use crate::trial::{ExperimentStage, TrialRecord, Verdict};
 
 /// Void trials in a row after which the run ends: their cause does not depend on the parameters.
 const VOIDS_IN_A_ROW: u32 = 10;
+/// Trials in a row that end by the same limit after which the run warns.
+const SAME_LIMIT_IN_A_ROW: u32 = 10;
 /// Time between two reads of the study by a worker that waits.
 const WAIT_PERIOD: Duration = Duration::from_millis(50);
+
+/// A judged trial.
+#[derive(Clone, Copy)]
+pub struct JudgedTrial<'a> {
+    /// The experiment, which includes the trials of other workers.
+    pub experiment: &'a Experiment,
+    /// Its row.
+    pub row: &'a TrialRecord,
+    /// Its ticks.
+    pub ticks: &'a [Tick],
+    /// Warning: the same limit has ended many trials in a row.
+    pub warning: Option<&'a str>,
+}
+
+/// Trials in a row that ended by the same limit.
+#[derive(Debug, Default)]
+struct SameLimit {
+    key: Option<LimitKey>,
+    count: u32,
+}
+
+impl SameLimit {
+    /// Counts a trial; returns the number of trials in a row when it is time to warn again.
+    fn count(&mut self, key: Option<LimitKey>) -> Option<u32> {
+        self.count = if key.is_some() && key == self.key { self.count + 1 } else { u32::from(key.is_some()) };
+        self.key = key;
+        (self.count > 0 && self.count.is_multiple_of(SAME_LIMIT_IN_A_ROW)).then_some(self.count)
+    }
+
+    /// Names the limit behind `cause`.
+    fn explain(&self, cause: &str) -> String {
+        match self.key {
+            Some(key) => format!("{cause}; the limit is {key}"),
+            None => cause.to_owned(),
+        }
+    }
+}
 
 /// Runs trials until the study has its budget; `each` receives every judged trial with its ticks.
 ///
 /// # Errors
-/// When the study cannot be read or written, or too many trials in a row are void.
+/// When the study cannot be read or written, or too many trials in a row are void: the error names the limit of the last one.
 pub fn run<R: Robot>(
     experiment: &mut Experiment,
     rollout: &mut Rollout<R>,
     mut each: impl FnMut(&TrialRecord, &[Tick]),
 ) -> Result<(), RequestRefusal> {
-    run_watched(experiment, rollout, |_, row, ticks| each(row, ticks))
+    run_watched(experiment, rollout, |trial| each(trial.row, trial.ticks))
 }
 
-/// [`run`] in which `each` also receives the experiment, which includes the trials of other workers.
+/// [`run`] in which `each` also receives the experiment and a warning.
+///
+/// # Errors
+/// As of [`run`].
 pub fn run_watched<R: Robot>(
     experiment: &mut Experiment,
     rollout: &mut Rollout<R>,
-    mut each: impl FnMut(&Experiment, &TrialRecord, &[Tick]),
+    mut each: impl FnMut(&JudgedTrial),
 ) -> Result<(), RequestRefusal> {
     let mut voids = 0;
+    let mut same = SameLimit::default();
     let mut waited: Option<LongWait> = None;
     loop {
         // There is neither a console nor a recording of them.
@@ -71,6 +115,7 @@ pub fn run_watched<R: Robot>(
             Err(RequestRefusal::Overtaken(_)) => continue,
             approved => approved?,
         };
+        let settings = *rollout.settings();
         let (end, ticks) = rollout.run(&spec);
         experiment.ended(spec.trial, &end, ticks, ticks.len() as u64);
         let suggested = experiment.row(spec.trial).and_then(|row| row.suggested).unwrap_or(Verdict::Void);
@@ -79,10 +124,14 @@ pub fn run_watched<R: Robot>(
             judged => judged?,
         }
         voids = if suggested == Verdict::Void { voids + 1 } else { 0 };
+        let repeated = same.count(limit_key(&end, &settings));
         if let Some(row) = experiment.row(spec.trial) {
-            each(experiment, row, ticks);
+            let cause = same.explain(&row.cause);
+            let warning = repeated.filter(|_| suggested != Verdict::Void).map(|count| {
+                format!("{count} trials in a row ended by the same limit, the last because: {cause}. Change the limit, or the bounds in optimize.toml")
+            });
+            each(&JudgedTrial { experiment, row, ticks, warning: warning.as_deref() });
             if voids >= VOIDS_IN_A_ROW {
-                let cause = row.cause.clone();
                 experiment.close()?;
                 return Err(RequestRefusal::NotNow(format!(
                     "{voids} trials in a row were void, the last because: {cause}"

@@ -2,10 +2,9 @@
 
 use super::objective;
 use super::rollout::Rollout;
-use crate::control::force_profile::Oscillator;
 use crate::robot::Robot;
 use crate::telemetry::{Phase, Tick, TrialEnd, TrialSpec};
-use crate::trial::{JumpParameters, MeasuredJump};
+use crate::trial::MeasuredJump;
 
 /// Result of one run of a point.
 #[derive(Debug, Clone, PartialEq)]
@@ -22,7 +21,7 @@ pub struct EvaluatedRun {
     pub jumps: u32,
     /// Displacement, turn, rise and time in the air of the whole run; none if it ended before the first impulse.
     pub measured: Option<MeasuredJump>,
-    /// Objective per jump, in the task's unit; 0 unless the robot stands at the end.
+    /// Objective, in the task's unit; 0 unless the robot stands at the end.
     pub value: f64,
     /// Mean angle between the trunk's and the world's z axis at the starts of the impulses, rad.
     pub tilt_at_impulse_rad: f64,
@@ -42,12 +41,6 @@ impl EvaluatedRun {
     pub fn bounced(&self) -> bool {
         self.stood() && self.cause != objective::suggest(&self.end).1
     }
-}
-
-/// Returns the number of impulses that begin within `duration_s`, at least one.
-pub fn jumps_within(jump: &JumpParameters, duration_s: f64) -> u32 {
-    let oscillator = Oscillator { f0_hz: jump.f0_hz, f1_hz: jump.f1_hz };
-    ((duration_s / oscillator.period_s()).ceil() as u32).max(1)
 }
 
 /// Runs one trial and evaluates its ticks.

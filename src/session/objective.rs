@@ -39,6 +39,7 @@ pub fn measure(rule: &ObjectiveRule, ticks: &[Tick]) -> Option<MeasuredJump> {
         dyaw_rad,
         apex_m: rise_m(ticks),
         air_s: longest_s(airborne.iter()),
+        end_s: ticks.last()?.trial_time_s,
         measured_value: None,
         flights: landing.flights,
         touchdown: landing.touchdown.map(|index| displacement(&ticks[index])),
@@ -49,8 +50,9 @@ pub fn measure(rule: &ObjectiveRule, ticks: &[Tick]) -> Option<MeasuredJump> {
     Some(measured)
 }
 
-/// Returns the objective J, maximised: m for forward and lateral, rad for twist (paper, section II-D); mean per jump. Of a robot
-/// that bounced on it is the displacement that the rule names.
+/// Returns the objective J, maximised: m for forward and lateral, rad for twist (paper, section II-D). It is the mean per jump,
+/// or with `rate` the mean per second from the start of the first impulse to the first touchdown after the last one (to the end
+/// of a trial without a flight). Of a robot that bounced on it is of the displacement that the rule names.
 pub fn value(rule: &ObjectiveRule, measured: &MeasuredJump) -> f64 {
     let MeasuredJump { dx_m, dy_m, dyaw_rad, .. } = *measured;
     let rest = Displacement { time_s: 0.0, dx_m, dy_m, dyaw_rad };
@@ -59,7 +61,12 @@ pub fn value(rule: &ObjectiveRule, measured: &MeasuredJump) -> f64 {
         (true, BounceRule::FirstLanding) => along(rule.task, &measured.first_landing.unwrap_or(rest)),
         _ => along(rule.task, &rest),
     };
-    whole / f64::from(rule.jumps.max(1))
+    if rule.rate {
+        let time_s = measured.touchdown.map_or(measured.end_s, |touchdown| touchdown.time_s);
+        return if time_s > 0.0 { whole / time_s } else { 0.0 };
+    }
+    let jumps = if measured.jumps.is_empty() { rule.jumps } else { measured.jumps.len() as u32 };
+    whole / f64::from(jumps.max(1))
 }
 
 /// Whether the robot flew again after its first landing.
@@ -200,6 +207,8 @@ pub fn suggest(end: &TrialEnd) -> (Verdict, String) {
         TrialEnd::Stopped => (Verdict::Void, "stopped by the operator".into()),
         TrialEnd::Cancelled => (Verdict::Void, "cancelled by the operator".into()),
         TrialEnd::NotReady(inhibit) => (Verdict::Void, format!("not begun: {inhibit}")),
+        TrialEnd::Held(inhibit) => (Verdict::Void, format!("no further jump: {inhibit}")),
+        TrialEnd::SatDown => (Verdict::Void, "no further jump: sat down by the operator".into()),
         TrialEnd::Fault(fault) if trips_limit(end) => (Verdict::Fall, format!("{LIMIT}{fault}")),
         TrialEnd::Fault(fault) => (Verdict::Void, fault.to_string()),
     }

@@ -6,7 +6,7 @@ use crate::control::settings::ControlSettings;
 use crate::realtime::clock::SimulatedClock;
 use crate::robot::ticks_in;
 use crate::robot::{CONTROL_PERIOD_S, Placement, Robot};
-use crate::telemetry::{Command, Event, Fault, Permit, Tick, TrialEnd, TrialSpec};
+use crate::telemetry::{Command, CommandRefusal, Event, Fault, Permit, Tick, TrialEnd, TrialSpec};
 
 /// A robot in simulated time.
 pub struct Rollout<R: Robot> {
@@ -21,6 +21,11 @@ impl<R: Robot> Rollout<R> {
         Rollout { robot, settings: *settings, ticks: Vec::new() }
     }
 
+    /// The settings of the control cycle.
+    pub fn settings(&self) -> &ControlSettings {
+        &self.settings
+    }
+
     /// Runs one trial from the start pose. Returns its end and its ticks, countdown included.
     pub fn run(&mut self, spec: &TrialSpec) -> (TrialEnd, &[Tick]) {
         // The last trial may have left the robot fallen.
@@ -30,7 +35,8 @@ impl<R: Robot> Rollout<R> {
             TickInputs { command: Some(Command::RunTrial(*spec, Permit::default())), ..TickInputs::default() };
         self.ticks.clear();
         // The cycle ends a trial `cap_s` after its last impulse at the latest; a longer one is an error of this program.
-        let profile_s = f64::from(spec.jumps) * (0.5 / spec.jump.f0_hz + 0.5 / spec.jump.f1_hz.max(0.05));
+        let pause_s = 0.5 / spec.jump.f1_hz.max(0.05) + spec.landing_wait_s;
+        let profile_s = f64::from(spec.jumps) * (0.5 / spec.jump.f0_hz + pause_s);
         let most = ticks_in(self.settings.countdown_s + profile_s + self.settings.settle.cap_s + 1.0);
         for number in 0..most {
             inputs.time_ns = u64::from(number) * (CONTROL_PERIOD_S * 1e9) as u64;
@@ -38,6 +44,7 @@ impl<R: Robot> Rollout<R> {
             inputs.command = None;
             let ended = cycle.events().iter().find_map(|event| match event {
                 Event::TrialEnded { end, .. } => Some(end),
+                Event::Refused { because: CommandRefusal::Inhibited(inhibit), .. } => Some(TrialEnd::NotReady(inhibit)),
                 Event::Refused { .. } => Some(TrialEnd::Cancelled),
                 Event::Mode { .. } => None,
             });

@@ -6,7 +6,7 @@
 
 use std::time::Instant;
 
-use super::{RobotModel, SimConfig, SimState, Simulator};
+use super::{RobotModel, SimConfig, SimState, Simulator, TerrainKind};
 use crate::robot::description::RobotDescription;
 use crate::robot::{JointCommand, Joints, Leg, Placement, Robot};
 use nalgebra::Vector3;
@@ -42,6 +42,20 @@ impl BenchScene {
     pub const fn contacts(self) -> usize {
         4 * self as usize
     }
+}
+
+/// Numbers of blocks whose cost is measured.
+pub const BLOCK_COUNTS: [u32; 4] = [50, 500, 5000, 10_000];
+
+/// Measured times on blocks.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BlockTimes {
+    /// Number of blocks.
+    pub blocks: u32,
+    /// One step of 1 ms of a robot that stands on them, s.
+    pub step_s: f64,
+    /// One layout, with the placement of the robot on it, s.
+    pub layout_s: f64,
 }
 
 /// Measured times.
@@ -101,6 +115,39 @@ impl SimulatorBench {
             ..SimState::default()
         };
         DynamicsRun { model: RobotModel::new(&self.robot), state, torque: [1.0; 12] }
+    }
+
+    /// Sets up a robot that stands on `count` blocks, 7 a square metre in two layers, in a corridor of 8 m.
+    pub fn blocks(&self, count: u32) -> SceneRun {
+        let mut config = self.config.clone();
+        config.terrain.kind = TerrainKind::Blocks;
+        config.terrain.blocks.count = count;
+        let length_m = f64::from(count) / 7.0 / 8.0;
+        config.terrain.blocks.area_m = Some([-0.5 * length_m, 0.5 * length_m, -4.0, 4.0]);
+        let mut simulator = Simulator::new(&self.robot, &config).expect("the count is within its range");
+        let folded = self.robot.lying_position;
+        let joint_position = self.robot.leg_geometry.stance(&Vector3::new(0.0, 0.14, -0.25), &folded);
+        simulator.place(&Placement { joint_position, lying: false, seed: 0 });
+        let mut run =
+            SceneRun { simulator, command: JointCommand::hold(&joint_position, 60.0, 2.0), start: None, steps: 0 };
+        for _ in 0..500 {
+            run.step();
+        }
+        run
+    }
+
+    /// Measures steps on blocks and their layout, each for about `seconds`.
+    pub fn measure_blocks(&self, seconds: f64) -> [BlockTimes; 4] {
+        BLOCK_COUNTS.map(|blocks| {
+            let mut run = self.blocks(blocks);
+            let step_s = time(seconds, || run.step());
+            let (start, mut layouts) = (Instant::now(), 0_u32);
+            while layouts == 0 || start.elapsed().as_secs_f64() < seconds {
+                run.lay_blocks(u64::from(layouts));
+                layouts += 1;
+            }
+            BlockTimes { blocks, step_s, layout_s: start.elapsed().as_secs_f64() / f64::from(layouts) }
+        })
     }
 
     /// Sets up `scene` and simulates half a second.
@@ -171,6 +218,12 @@ impl SceneRun {
         self.steps = self.steps.wrapping_add(1);
         // The simulator's write never fails.
         let _ = self.simulator.write(&self.command);
+    }
+
+    /// Lays the blocks of `seed` and places the robot on them.
+    pub fn lay_blocks(&mut self, seed: u64) {
+        let joint_position = self.simulator.state().joint_position;
+        self.simulator.place(&Placement { joint_position, lying: false, seed });
     }
 
     /// Number of contacts in the last step.

@@ -66,13 +66,15 @@ pub(super) struct Collider {
     /// The feet first, one per leg.
     probes: Vec<Probe>,
     bounds: Vec<BoundingSphere>,
+    /// Whether contact of each probe is a sign of a fall.
+    falls: Vec<bool>,
     /// Upper bound of the distance of a point from the trunk's origin or from a joint that moves it, m.
     extent: f64,
 }
 
 impl Collider {
     pub fn new(description: &RobotDescription, config: &SimConfig) -> Collider {
-        let mut collider = Collider { probes: Vec::new(), bounds: Vec::new(), extent: 0.0 };
+        let mut collider = Collider { probes: Vec::new(), bounds: Vec::new(), falls: Vec::new(), extent: 0.0 };
         let spacing = match config.terrain.kind {
             TerrainKind::Flat | TerrainKind::Slope => f64::INFINITY,
             TerrainKind::Steps | TerrainKind::Blocks => EDGE_SPACING,
@@ -93,6 +95,16 @@ impl Collider {
                 }
             }
         }
+        collider.falls = (collider.probes.iter().enumerate().map(|(i, probe)| {
+            let kind = match (probe.leg, probe.link) {
+                (TRUNK, _) => BodyKind::Trunk,
+                (_, 0) => BodyKind::Hip,
+                (_, 1) => BodyKind::Thigh,
+                _ => BodyKind::Calf,
+            };
+            i >= LEGS && config.contact.fall_bodies.contains(&kind)
+        }))
+        .collect();
         // The length of the stretched leg, plus the shape at its end.
         for bound in &collider.bounds {
             let origins = description.legs.get(bound.leg).map_or(&[][..], |leg| &leg.joint_origin[..=bound.link]);
@@ -110,6 +122,11 @@ impl Collider {
     /// Leg whose foot has the warm-start impulse `slot`; none for other parts.
     pub fn foot_of(slot: usize) -> Option<Leg> {
         Leg::ALL.get(slot / MAX_TERRAIN_CONTACTS).copied()
+    }
+
+    /// Whether contact of the part with the warm-start impulse `slot` is a sign of a fall.
+    pub fn signals_fall(&self, slot: usize) -> bool {
+        self.falls[slot / MAX_TERRAIN_CONTACTS]
     }
 
     fn add_body(&mut self, body: &RigidBody, leg: usize, link: usize, spacing: f64) {
@@ -173,11 +190,20 @@ impl Collider {
     pub fn smallest_gap(&self, legs: &PerLeg<LegDynamics>, state: &SimState, terrain: &Terrain) -> f64 {
         let world_from_body = state.world_from_body.to_rotation_matrix().into_inner();
         let mut smallest = f64::INFINITY;
-        self.near(legs, state, terrain, &world_from_body, f64::INFINITY, |_, _, sphere| {
-            for contact in terrain.contacts(&sphere.center_world, sphere.radius, f64::INFINITY).into_iter().flatten() {
-                smallest = smallest.min(contact.gap);
-            }
-        });
+        self.near(
+            legs,
+            state,
+            terrain,
+            &world_from_body,
+            f64::INFINITY,
+            |_, _, ProbeSphere { center_world, radius, .. }| {
+                smallest = smallest.min(terrain.plane_gap(&center_world, radius));
+                // Of the blocks only one nearer than the smallest gap so far counts.
+                for contact in terrain.contacts(&center_world, radius, smallest.max(0.0)).into_iter().flatten() {
+                    smallest = smallest.min(contact.gap);
+                }
+            },
+        );
         smallest
     }
 

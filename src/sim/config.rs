@@ -40,6 +40,8 @@ pub struct ContactConfig {
     pub law: ContactLaw,
     pub slip_time_s: f64,
     pub bodies: Vec<BodyKind>,
+    /// Those of `bodies` whose contact is a sign of a fall.
+    pub fall_bodies: Vec<BodyKind>,
 }
 
 /// Contact law: selects the impulse in the friction cone.
@@ -75,6 +77,9 @@ pub enum TerrainKind {
 pub struct TerrainConfig {
     pub kind: TerrainKind,
     pub friction: f64,
+    /// Lowest and highest coefficient of a trial, drawn by its seed; none for `friction` in every trial.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub friction_range: Option<[f64; 2]>,
     /// Used where `kind` is a slope.
     pub slope: SlopeConfig,
     /// Used where `kind` is steps.
@@ -111,10 +116,24 @@ pub struct BlocksConfig {
     pub edge_m: [f64; 2],
     /// Half of the edge of the square that holds the centres, m.
     pub reach_m: f64,
+    /// Rectangle that holds the centres instead, world: x from, x to, y from, y to, m; the robot starts at 0, 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub area_m: Option<[f64; 4]>,
     pub friction: f64,
+    /// Lowest and highest coefficient of a block, drawn for each by the trial's seed; none for `friction` on every block.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub friction_range: Option<[f64; 2]>,
     pub loose: bool,
     pub mass_kg: f64,
     pub floor_friction: f64,
+}
+
+impl BlocksConfig {
+    /// Returns the rectangle that holds the centres: x from, x to, y from, y to, m.
+    pub fn area(&self) -> [f64; 4] {
+        let reach_m = self.reach_m;
+        self.area_m.unwrap_or([-reach_m, reach_m, -reach_m, reach_m])
+    }
 }
 
 /// Motor model.
@@ -221,9 +240,18 @@ impl SimConfig {
         if let Some((key, value, remedy)) = ranges::first_outside(ranges::SIMULATOR, &table) {
             return refuse(key, value, remedy);
         }
-        let [shorter, longer] = self.terrain.blocks.edge_m;
-        if longer < shorter {
-            return refuse("terrain.blocks.edge_m".to_owned(), longer, "give the shorter edge first");
+        let blocks = &self.terrain.blocks;
+        let [x_from, x_to, y_from, y_to] = blocks.area();
+        for (key, [low, high], remedy) in [
+            ("terrain.blocks.edge_m", blocks.edge_m, "give the shorter edge first"),
+            ("terrain.blocks.area_m", [x_from, x_to], "give [x from, x to, y from, y to] with from at most to"),
+            ("terrain.blocks.area_m", [y_from, y_to], "give [x from, x to, y from, y to] with from at most to"),
+            ("terrain.friction_range", self.terrain.friction_range.unwrap_or_default(), "give the lower value first"),
+            ("terrain.blocks.friction_range", blocks.friction_range.unwrap_or_default(), "give the lower value first"),
+        ] {
+            if high < low {
+                return refuse(key.to_owned(), high, remedy);
+            }
         }
         Ok(())
     }

@@ -52,6 +52,6 @@ pub(super) struct PeriodContacts {
     pub foot_impulse_world: PerLeg<Vector3<f64>>,
     /// Normal component of `foot_impulse_world`, out of the ground, N s.
     pub foot_normal_impulse: PerLeg<f64>,
-    /// Whether any other part had a contact force.
+    /// Whether a part whose contact is a sign of a fall had a contact force.
     pub body: bool,
 }

@@ -52,7 +52,7 @@ impl Simulator {
             return false;
         }
         self.state = runge_kutta_4(&self.model, &self.state, acceleration, &drive.torque, h);
-        self.terrain.advance(|_| false, h);
+        self.terrain.advance(h);
         true
     }
 
@@ -74,6 +74,7 @@ impl Simulator {
             }
             self.sum_contacts(&world_from_body, h);
         }
+        self.terrain.advance(h);
         semi_implicit_euler(&mut self.state, &velocity, h);
     }
 
@@ -100,7 +101,6 @@ impl Simulator {
     /// Adds up the contact impulses, and pushes loose blocks.
     fn sum_contacts(&mut self, world_from_body: &Matrix3<f64>, h: f64) {
         self.contacts.foot = [false; 4];
-        let mut pushed = 0u64;
         for contact in self.solver.contacts() {
             let normal = contact.normal_impulse();
             if normal <= 0.0 {
@@ -113,13 +113,11 @@ impl Simulator {
                     self.contacts.foot_impulse_world[leg as usize] += impulse_world;
                     self.contacts.foot_normal_impulse[leg as usize] += normal;
                 }
-                None => self.contacts.body = true,
+                None => self.contacts.body |= self.collider.signals_fall(contact.warm_start_slot),
             }
             if let Some(block) = contact.block {
                 self.terrain.push_block(block, &-impulse_world, h);
-                pushed |= 1 << (block % 64);
             }
         }
-        self.terrain.advance(|block| pushed >> (block % 64) & 1 == 1, h);
     }
 }

@@ -28,8 +28,14 @@ pub struct TrialSpec {
     pub landing: LandingTerms,
     /// Jumps in a row; 1 for a single jump.
     pub jumps: u32,
+    /// No impulse begins at this time since the first one or later, s; infinite without a limit.
+    pub duration_s: f64,
+    /// Longest wait of the oscillator at the end of a pause for all feet down and quiet, s; 0 for none.
+    pub landing_wait_s: f64,
     /// Rule for a robot that bounces on.
     pub bounce: BounceRule,
+    /// Whether the objective is per second instead of per jump.
+    pub rate: bool,
     /// Seed of the simulator's random numbers.
     pub seed: u64,
 }
@@ -37,7 +43,7 @@ pub struct TrialSpec {
 impl TrialSpec {
     /// Computation of the trial's objective.
     pub fn objective(&self) -> ObjectiveRule {
-        ObjectiveRule { task: self.task, jumps: self.jumps, bounce: self.bounce }
+        ObjectiveRule { task: self.task, jumps: self.jumps, bounce: self.bounce, rate: self.rate }
     }
 }
 

@@ -21,6 +21,10 @@ pub enum TrialEnd {
     Fault(Fault),
     /// The countdown was cancelled: the robot was not ready for the jump.
     NotReady(TrialInhibit),
+    /// Jumps in a row ended before the last one: something inhibits jumps.
+    Held(TrialInhibit),
+    /// Jumps in a row ended before the last one: the operator sits the robot down.
+    SatDown,
 }
 
 /// An event of the control thread.

@@ -28,11 +28,109 @@ fn every_variant_and_seed_is_one_object_with_the_same_bits_each_time() {
         assert!(run["cause"].is_null() && run["fall_time_s"].is_null());
         let per_jump = run["measured"]["dx_m"].as_f64().unwrap() / 5.0;
         assert!((run["value"].as_f64().unwrap() - per_jump).abs() < 1e-12, "{run}");
+        let jumps = run["measured"]["jumps"].as_array().unwrap();
+        let shares = jumps.iter().map(|jump| jump["value"].as_f64().unwrap()).sum::<f64>();
+        assert!(jumps.len() == 5 && (shares - 5.0 * per_jump).abs() < 1e-9, "{run}");
+        for name in ["time_s", "x_m", "y_m", "yaw_rad", "tilt_rad", "rise_m", "air_s"] {
+            assert!(jumps[1][name].is_f64(), "{run}");
+        }
+        assert!(run["measured"]["touchdown"]["dx_m"].as_f64().unwrap() > jumps[4]["x_m"].as_f64().unwrap(), "{run}");
     }
     for run in first.iter().filter(|run| run["fell"] == true) {
         assert!(run["cause"].is_string() && run["value"] == 0.0, "{run}");
     }
     assert_eq!(first, runs(&arguments));
+}
+
+/// More jobs than cores, and more than runs.
+#[test]
+fn the_results_do_not_depend_on_the_number_of_jobs() {
+    let output = |jobs: &str| {
+        let arguments = ["--config", "examples/rough_terrain", "--seeds", "0-3", "--vmc", "on,off", "--duration", "3"];
+        let output = evaluate(&[&arguments[..], &["--json", "--jobs", jobs]].concat());
+        assert!(output.status.success());
+        (output.stdout, output.stderr)
+    };
+    let one = output("1");
+    assert_eq!(one.0.iter().filter(|&&byte| byte == b'\n').count(), 8);
+    assert_eq!(one, output("3"));
+    assert_eq!(one, output("16"));
+}
+
+/// The task, the configuration and the robot are those of the study.
+#[test]
+fn the_best_point_of_a_study_gives_the_value_of_its_trial() {
+    let folder = tempfile::tempdir().unwrap();
+    let parent = folder.path().to_str().unwrap();
+    let mut optimize = Command::new(env!("CARGO_BIN_EXE_quadfrog"));
+    let arguments = ["optimize", "--task", "twist-ccw", "--trials", "4", "--model", "a1", "--json", "--output", parent];
+    let output = optimize.args(arguments).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let trials: Vec<Value> =
+        String::from_utf8(output.stdout).unwrap().lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let best = trials.iter().filter_map(|trial| trial["value"].as_f64()).fold(0.0, f64::max);
+    assert!(best > 0.1, "{trials:?}");
+    let study = std::fs::read_dir(folder.path()).unwrap().next().unwrap().unwrap().path();
+    for place in [study.clone(), study.join("config")] {
+        let run = &runs(&["--point", "best", "--config", place.to_str().unwrap(), "--json"])[0];
+        assert_eq!((run["value"].as_f64(), run["fell"].as_bool()), (Some(best), Some(false)), "{run}");
+    }
+    let place = study.to_str().unwrap();
+    let refused = evaluate(&["--task", "forward", "--point", "best", "--config", place]);
+    let message = String::from_utf8_lossy(&refused.stderr);
+    assert!(refused.status.code() == Some(2) && message.contains("twist-ccw"), "{message}");
+}
+
+#[test]
+fn friction_is_a_variant_and_is_reported_for_each_seed_where_it_is_drawn() {
+    let point = ["--point", "f0=1.3,Fx=40,Fz=210", "--json"];
+    let variants = runs(&[&point[..], &["--friction", "0.5,1", "--seeds", "0,1", "--vmc", "on,off"]].concat());
+    let named: Vec<_> =
+        variants.iter().map(|run| (run["variant"].clone(), run["friction"].as_f64().unwrap())).collect();
+    assert_eq!(named.len(), 8);
+    for (variant, friction) in named {
+        assert_eq!(variant["friction"], friction);
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("simulator.toml");
+    let configured = |text: &str| {
+        std::fs::write(&file, text).unwrap();
+        evaluate(&[&point[..], &["--config", folder.path().to_str().unwrap(), "--seeds", "0-9"]].concat())
+    };
+    let drawn = String::from_utf8(configured("[terrain]\nfriction_range = [0.4, 0.9]\n").stdout).unwrap();
+    let drawn: Vec<Value> = drawn.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let drawn: Vec<f64> = drawn.iter().map(|run| run["friction"].as_f64().unwrap()).collect();
+    assert!(drawn.len() == 10 && drawn.iter().all(|friction| (0.4..=0.9).contains(friction)), "{drawn:?}");
+    assert!(drawn.windows(2).all(|pair| pair[0] != pair[1]), "{drawn:?}");
+    for (text, key) in [
+        ("[terrain]\nfriction_range = [0.9, 0.4]", "`terrain.friction_range` = 0.4"),
+        ("[terrain]\nfriction_range = [0.4, 11]", "`terrain.friction_range` = 11"),
+        ("[terrain.blocks]\narea_m = [2, 1, 0, 1]", "`terrain.blocks.area_m` = 1"),
+        ("[terrain.blocks]\narea_m = [0, 1]", "`terrain.blocks.area_m`"),
+        ("[terrain.blocks]\ncount = 20000", "1 to 10000"),
+        ("[contact]\nfall_bodies = [\"knee\"]", "`contact.fall_bodies`"),
+    ] {
+        let refused = configured(text);
+        let message = String::from_utf8_lossy(&refused.stderr);
+        assert!(refused.status.code() == Some(2) && message.contains("simulator.toml:2"), "{text}: {message}");
+        assert!(message.contains(key), "{key} is not in: {message}");
+    }
+}
+
+#[test]
+fn the_table_shows_means_with_spread_and_each_fall_with_cause_time_and_jumps() {
+    let point = "f0=1.3,Fx=40,Fz=210,f1=0.8";
+    let arguments = ["--config", "examples/rough_terrain", "--point", point, "--seeds", "300-305", "--vmc", "off"];
+    let output = evaluate(&[&arguments[..], &["--duration", "8"]].concat());
+    let text = String::from_utf8(output.stdout).unwrap();
+    for part in ["value per jump, m", "tilt, rad", "roll range, rad", "pitch range, rad", "standard deviations"] {
+        assert!(text.contains(part), "{part} is not in: {text}");
+    }
+    let row = text.lines().find(|line| line.starts_with("off")).unwrap();
+    assert!(row.matches('(').count() >= 2, "{row}");
+    let falls = text.lines().filter(|line| line.trim_start().starts_with("seed ")).collect::<Vec<_>>();
+    assert!(!falls.is_empty(), "{text}");
+    assert!(falls.iter().all(|fall| fall.contains(" s, after ") && fall.ends_with(" jumps")), "{falls:?}");
 }
 
 #[test]
@@ -54,10 +152,23 @@ fn wrong_input_is_refused_with_name_value_and_remedy() {
         (vec!["--point", "f0=1.3", "--duration", "5"], vec!["--duration", "f1"]),
         (vec!["--point", "best"], vec!["--point best", "--config"]),
         (vec!["--point", "f0=1.3", "--vmc", "maybe"], vec!["maybe", "on,off"]),
+        (vec!["--point", "f0=1.3", "--friction", "99"], vec!["--friction 99", "0 to 10"]),
     ] {
         let output = evaluate(&arguments);
         let message = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
         assert!(parts.iter().all(|part| message.contains(part)), "{arguments:?}: {message}");
+    }
+}
+
+/// Of the seeds that no value of the example was chosen on.
+#[test]
+fn the_fast_example_stands_at_more_than_1_3_m_per_second() {
+    let runs = runs(&["--task", "forward", "--config", "examples/continuous_fast", "--seeds", "200-203", "--json"]);
+    for run in &runs {
+        let touchdown_s = run["measured"]["touchdown"]["time_s"].as_f64().unwrap();
+        let speed = run["measured"]["dx_m"].as_f64().unwrap() / touchdown_s;
+        assert!(run["fell"] == false && run["measured"]["flights"] == 1, "{run}");
+        assert!(speed > 1.3 && (run["value"].as_f64().unwrap() - speed).abs() < 1e-12, "{run}");
     }
 }

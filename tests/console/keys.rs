@@ -228,7 +228,7 @@ fn verdicts_are_legal_in_review_alone() {
 fn undo_is_offered_while_the_session_says_so() {
     let mut console = Console::ready();
     assert_eq!(console.press(&["u"]), []);
-    console.record(Record::Stage(StageRecord { stage: ExperimentStage::Proposed, trial: 0, can_undo: true }));
+    console.record(Record::Stage(StageRecord { stage: ExperimentStage::Proposed, trial: 0, can_undo: true, jumps: 0 }));
     assert_eq!(console.requests(&["u"]), [OperatorRequest::Undo]);
 }
 

@@ -5,9 +5,10 @@ mod support;
 use std::path::Path;
 
 use quadfrog::recording::player::Player;
-use quadfrog::recording::record::{Record, Transition};
+use quadfrog::recording::record::{Record, StageRecord, Transition};
+use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::telemetry::{Mode, Phase, Snapshot};
-use quadfrog::trial::{ExperimentStage, TrialRecord, Verdict};
+use quadfrog::trial::{Displacement, ExperimentStage, JumpRow, TrialRecord, Verdict};
 use quadfrog_console::feed::Feed;
 use quadfrog_console::message::{Effect, Mouse, Msg};
 use quadfrog_console::model::View;
@@ -539,4 +540,65 @@ fn the_numbers_of_a_control_thread_that_hangs_are_shown_as_old() {
     assert_shows(&console.screen(120, 40), &["OLD: nothing new for 0.7 s"]);
     console.wait(10);
     assert!(!console.screen(120, 40).contains("OLD"));
+}
+
+/// Ticks of a trial with two of three jumps, 0.8 m and 0.3 m high each.
+fn jumping_in_a_row() -> Console {
+    let mut console = Console::ready();
+    console.record(Record::Stage(StageRecord { stage: ExperimentStage::Running, trial: 0, can_undo: false, jumps: 3 }));
+    console.mode(Mode::Jump);
+    for time_ms in (0..1_300).step_by(5) {
+        let phase = match time_ms % 1_000 {
+            0..300 => Phase::Impulse,
+            300..700 => Phase::Flight,
+            _ => Phase::Landing,
+        };
+        let mut tick = tick(1_000 + time_ms, 0.0, Some((0, time_ms as f64 / 1e3, phase)));
+        tick.estimate.position_world.x = 0.8e-3 * time_ms as f64;
+        tick.estimate.position_world.z = if phase == Phase::Flight { 0.5 } else { 0.2 };
+        console.tick(tick);
+    }
+    console
+}
+
+#[test]
+fn jumps_in_a_row_are_counted_while_they_run_with_the_values_of_the_last() {
+    let console = jumping_in_a_row();
+    assert_shows(&console.screen(120, 40), &["Jump 2 of 3; the last +0.80 m, rise 0.30 m.", "sit down"]);
+}
+
+/// Sitting down between jumps drops the further ones; a single jump cannot be sat down.
+#[test]
+fn a_series_of_jumps_can_be_sat_down_and_a_single_jump_cannot() {
+    assert_eq!(jumping_in_a_row().requests(&["D"]), [OperatorRequest::SitDown]);
+    let mut single = Console::ready();
+    single.stage(ExperimentStage::Running, 0);
+    single.mode(Mode::Jump);
+    assert_eq!(single.requests(&["D"]), []);
+    assert!(single.said().contains("the robot is jumping"), "{}", single.said());
+}
+
+#[test]
+fn the_details_and_the_exported_table_hold_touchdown_bounces_and_every_jump() {
+    let mut console = Console::ready();
+    let mut row = trial(0, Some(Verdict::Accept), None);
+    let jump = |time_s: f64, value: f64| JumpRow { time_s, x_m: 0.4 * time_s, value, ..JumpRow::default() };
+    let measured = row.measured.as_mut().unwrap();
+    measured.flights = 3;
+    measured.touchdown = Some(Displacement { time_s: 1.7, dx_m: 0.75, dy_m: 0.01, dyaw_rad: 0.02 });
+    measured.jumps = vec![jump(0.0, 0.4), jump(1.0, 0.5)];
+    console.record(Record::Trial(row));
+    console.press(&["2", "Enter"]);
+    let parts = [
+        "+0.7500 m, +0.0100 m",
+        "at 1.700 s",
+        "3 flights after the impulse",
+        "0.00 s, x +0.000 m",
+        "1.00 s, x +0.400 m",
+    ];
+    assert_shows(&console.screen(160, 50), &parts);
+    let csv = text::as_csv(&console.model);
+    let (header, line) = csv.split_once("\r\n").unwrap();
+    assert!(header.ends_with("flights,touchdown_dx_m,touchdown_dy_m,touchdown_dyaw_rad,jumps"), "{header}");
+    assert!(line.contains(",3,0.75,0.01,0.02,") && line.contains("\"\"time_s\"\":1.0"), "{line}");
 }

@@ -47,7 +47,10 @@ pub fn plan(budget: u32) -> ExperimentPlan {
             landing: LandingTerms::default(),
             jumps: 1,
             f1_hz: 0.0,
+            duration_s: None,
+            landing_wait_s: 0.0,
             bounce: BounceRule::Ignore,
+            rate: false,
         },
         parameters: bounds(|low, high| (low, high)),
         seed: 0,
@@ -62,6 +65,7 @@ pub fn plan(budget: u32) -> ExperimentPlan {
         worker: 0,
         abandoned: Duration::from_secs(60),
         backend: Backend::Simulator,
+        terrain: None,
         envelope: None,
     }
 }

@@ -238,6 +238,7 @@ impl Draw {
                 stage: self.one_of(&ExperimentStage::ALL),
                 trial: self.word() as u32,
                 can_undo: self.yes(),
+                jumps: self.word() as u32,
             }),
             3 => Record::Proposal(Proposal {
                 trial: self.word() as u32,
@@ -259,6 +260,7 @@ impl Draw {
                     dyaw_rad: d.number(),
                     apex_m: d.number(),
                     air_s: d.number(),
+                    end_s: d.number(),
                     measured_value: d.option(Draw::number),
                     flights: d.word() as u32,
                     touchdown: d.option(Draw::displacement),
@@ -444,7 +446,7 @@ pub fn study(seconds: u64) -> (Vec<Tick>, Vec<Stamped>) {
             (tick.trial, tick.mode) = (Some(trial), Mode::Jump);
         }
         let mut add = |ms: u64, record| records.push(Stamped { time_ns: ms * MS, record });
-        let stage = |stage| Record::Stage(StageRecord { stage, trial, can_undo: trial > 0 });
+        let stage = |stage| Record::Stage(StageRecord { stage, trial, can_undo: trial > 0, jumps: 0 });
         let row = |verdict: Option<Verdict>| {
             Record::Trial(TrialRecord {
                 trial,

@@ -4,7 +4,7 @@ use super::{Cycle, TickInputs};
 use crate::control::mode::{self, Trigger};
 use crate::control::running_trial::RunningTrial;
 use crate::robot::{Placement, Robot};
-use crate::telemetry::{Command, CommandRefusal, Event, Permit, TransitionCause, TrialSpec};
+use crate::telemetry::{Command, CommandRefusal, Event, Mode, Permit, TransitionCause, TrialEnd, TrialSpec};
 
 impl Cycle {
     /// Carries out a command, or reports its refusal as an event.
@@ -34,6 +34,10 @@ impl Cycle {
         if matches!(trigger, Trigger::SitDown | Trigger::Cancel) {
             self.lowered_ns = inputs.time_ns + inputs.lateness_ns;
         }
+        // A jump cannot be sat down; between jumps in a row the further ones are dropped, then the robot sits down.
+        if trigger == Trigger::SitDown && self.mode == Mode::Jump && self.drop_further_jumps(TrialEnd::SatDown) {
+            return;
+        }
         if let Some(because) = self.refusal(command, trigger, inputs) {
             self.events.push(Event::Refused { command: *command, mode: self.mode, because });
             return;
@@ -50,6 +54,7 @@ impl Cycle {
                 }
                 self.trial = Some(RunningTrial::begin(spec, &self.settings));
                 self.trial_ticks = 0;
+                self.dropped = None;
             }
             Command::Arm(_) => {
                 // The robot may have been carried since the last arming, which voids position and velocity.

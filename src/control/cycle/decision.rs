@@ -4,7 +4,7 @@ use super::Cycle;
 use crate::control::leg::{self, LegTarget};
 use crate::control::mode::Trigger;
 use crate::control::ramp::RampProgress;
-use crate::control::running_trial::TrialProgress;
+use crate::control::running_trial::{RunningTrial, TrialProgress};
 use crate::robot::{JointCommand, Joints, LEGS};
 use crate::telemetry::{Fault, Mode, TransitionCause, TrialEnd};
 use crate::trial::Gains;
@@ -23,6 +23,7 @@ impl Cycle {
         if self.holds_stance() {
             return;
         }
+        self.hold_further_jumps();
         if let Some(jump) = &mut self.trial {
             let progress = match jump.update(&self.tick.state, &self.tick.estimate, &self.settings) {
                 // After a fault the landing ends when the robot stands; rest is not required.
@@ -43,12 +44,30 @@ impl Cycle {
                     if self.mode == Mode::Jump {
                         self.trigger(Trigger::Landed, TransitionCause::StepFinished);
                     }
-                    self.finish_trial(self.landing.map_or(end, TrialEnd::Fault));
+                    self.finish_trial(self.landing.map(TrialEnd::Fault).or(self.dropped).unwrap_or(end));
                     self.trigger(Trigger::Settled, TransitionCause::StepFinished);
                 }
                 _ => {}
             }
         }
+    }
+
+    /// Between jumps in a row, drops the further ones if something inhibits trials (HOLD).
+    fn hold_further_jumps(&mut self) {
+        if self.mode == Mode::Jump
+            && let Some(inhibit) = self.inhibit()
+        {
+            self.drop_further_jumps(TrialEnd::Held(inhibit));
+        }
+    }
+
+    /// Drops the jumps that have not begun; the trial ends with `end` once the robot has landed. Returns whether there were any.
+    pub(super) fn drop_further_jumps(&mut self, end: TrialEnd) -> bool {
+        let dropped = self.trial.as_mut().is_some_and(RunningTrial::land);
+        if dropped {
+            self.dropped.get_or_insert(end);
+        }
+        dropped
     }
 
     /// Begins the impulse of a robot that is ready for it; otherwise cancels the countdown.

@@ -115,6 +115,8 @@ pub struct Cycle {
     gains: GainBlend,
     /// The session ended: the robot sits down, and nothing energises it again.
     session_left: bool,
+    /// End of a trial of which jumps in a row were dropped.
+    dropped: Option<TrialEnd>,
     /// Time of the newest command to sit down or to cancel, ns: a permit from before it is void.
     lowered_ns: u64,
     tick: Tick,
@@ -152,6 +154,7 @@ impl Cycle {
             fault_landing: None,
             gains: GainBlend::default(),
             session_left: false,
+            dropped: None,
             lowered_ns: 0,
             tick: Tick::default(),
             events: Events::default(),

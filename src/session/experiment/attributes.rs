@@ -30,6 +30,9 @@ pub struct NewStudyAttributes<'a> {
     pub version: &'static str,
     pub budget: u32,
     pub backend: &'a str,
+    /// Unit of the objective; none for that of the task.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unit: Option<&'static str>,
 }
 
 /// The backend on which a study was continued last.
@@ -51,6 +54,8 @@ pub struct StudyAttributes {
     pub robot: Option<String>,
     pub seed: Option<u32>,
     pub budget: Option<u32>,
+    /// Unit of the objective; none for that of the task.
+    pub unit: Option<String>,
     /// The backend on which it was made or continued last; none for a study of an earlier version, which was simulated.
     pub backend: Option<String>,
     /// Bounds that the operator has changed, `{"Fx": [40, 110]}`.
@@ -179,6 +184,9 @@ pub struct BeganAttributes {
     risk: Option<FallRisk>,
     #[serde(skip_serializing_if = "is_empty", serialize_with = "as_object")]
     fixed: ParameterValues,
+    /// Coulomb coefficient of the ground; none where it is not drawn for each trial.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    friction: Option<f64>,
 }
 
 impl BeganAttributes {
@@ -186,6 +194,7 @@ impl BeganAttributes {
     /// trials.
     pub fn new(proposal: &Proposal, seed: u64, plan: &ExperimentPlan, fixed: ParameterValues) -> BeganAttributes {
         let gains = proposal.gains.iter().map(|gain| (gain.name.clone(), gain.value)).collect();
+        let drawn = plan.terrain.filter(|terrain| terrain.friction_range.is_some());
         BeganAttributes {
             origin: Origin { source: proposal.source, parent: proposal.parent, seed: Some(seed.to_string()), gains },
             version: env!("CARGO_PKG_VERSION"),
@@ -194,6 +203,7 @@ impl BeganAttributes {
             recording: plan.recording.clone(),
             risk: proposal.risk,
             fixed,
+            friction: drawn.map(|terrain| terrain.friction_of(seed)),
         }
     }
 }

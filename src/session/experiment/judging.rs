@@ -6,7 +6,7 @@ use super::{Experiment, ExperimentState, PendingVerdict};
 use crate::optimize::study::{Outcome, StudyError};
 use crate::session::objective;
 use crate::telemetry::{Tick, TrialEnd};
-use crate::trial::{TrialRecord, Verdict};
+use crate::trial::{JumpParameters, TrialRecord, Verdict};
 
 const NOT_UNDER_REVIEW: &str = "no trial is under review";
 
@@ -18,7 +18,7 @@ impl Experiment {
             return;
         }
         let missing = recorded.saturating_sub(ticks.len() as u64);
-        let rule = self.plan.control.objective(self.plan.task);
+        let rule = self.spec(trial).objective();
         let measured = if missing == 0 { objective::measure(&rule, ticks) } else { None };
         let (mut suggested, mut cause) = objective::suggest_measured(end, measured.as_ref(), rule.bounce);
         let jumped = missing > 0 || ticks.iter().any(|tick| tick.trial.is_some() && tick.trial_time_s >= 0.0);
@@ -183,7 +183,8 @@ fn value_of(row: &TrialRecord, verdict: Verdict, plan: &ExperimentPlan) -> Optio
         Verdict::Fall => Some(0.0),
         Verdict::Void => None,
         Verdict::Accept => row.hand_value.or_else(|| {
-            let rule = plan.control.objective(plan.task);
+            let jump = JumpParameters::from_values(&row.parameters, plan.control.f1_hz);
+            let rule = plan.control.trial(plan.task, jump).objective();
             row.measured.as_ref().map(|measured| objective::value(&rule, measured))
         }),
     }

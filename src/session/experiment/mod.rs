@@ -290,7 +290,8 @@ impl Experiment {
     fn enter(&mut self, state: ExperimentState, trial: u32) {
         self.state = state;
         let (stage, can_undo) = (self.stage(), self.pending_verdict.is_some());
-        self.outbox.push(Record::Stage(StageRecord { stage, trial, can_undo }));
+        let jumps = if stage == ExperimentStage::Running { self.spec(trial).jumps } else { 0 };
+        self.outbox.push(Record::Stage(StageRecord { stage, trial, can_undo, jumps }));
     }
 
     fn publish_proposal(&mut self) {

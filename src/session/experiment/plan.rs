@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use crate::control::settings::TaskControl;
 use crate::optimize::study::StudyError;
+use crate::sim::TerrainConfig;
 use crate::trial::{Backend, HopEnvelope, ParameterInfo, Task};
 
 /// Refusal of a request, as a message for the operator.
@@ -52,6 +53,8 @@ pub struct ExperimentPlan {
     /// Time without news after which a running trial of another worker counts as abandoned.
     pub abandoned: Duration,
     pub backend: Backend,
+    /// Ground of simulated trials, whose friction the seed of a trial may draw.
+    pub terrain: Option<TerrainConfig>,
     /// Growth of the largest forces; none where the whole bounds are open.
     pub envelope: Option<HopEnvelope>,
 }

@@ -3,9 +3,12 @@
 use super::Supervisor;
 use super::unattended::Unattended;
 use super::unfinished::Asker;
+use crate::control::limit_key::limit_key;
+use crate::control::settings::ControlSettings;
 use crate::recording::record::LogLevel;
+use crate::session::objective;
 use crate::session::operator_request::{OperatorRequest, StampedRequest};
-use crate::telemetry::Mode;
+use crate::telemetry::{Mode, TrialEnd};
 use crate::trial::{Approval, ExperimentStage, Verdict};
 
 impl Supervisor {
@@ -13,6 +16,20 @@ impl Supervisor {
     pub fn approving(mut self, approval: Approval, simulated: bool) -> Supervisor {
         self.unattended = Unattended { approval, simulated, ..Unattended::default() };
         self
+    }
+
+    /// Returns the session that logs the key of a limit that ended a trial under `settings`.
+    pub fn naming_limits(mut self, settings: ControlSettings) -> Supervisor {
+        self.limits = Some(settings);
+        self
+    }
+
+    /// Logs the limit that ended a trial, with its key.
+    pub(super) fn log_limit(&mut self, trial: u32, end: &TrialEnd, time_ns: u64) {
+        if let Some(key) = self.limits.and_then(|settings| limit_key(end, &settings)) {
+            let cause = objective::suggest(end).1;
+            self.log(LogLevel::Info, format!("trial {trial}: {cause}; the limit is {key}"), time_ns);
+        }
     }
 
     /// Takes the next step, if the rule allows one.

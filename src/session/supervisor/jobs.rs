@@ -113,6 +113,7 @@ impl Supervisor {
         time_ns: u64,
     ) -> Result<String, String> {
         let trial = spec.trial;
+        self.in_a_row = spec.jumps > 1;
         match holds.and_then(|()| self.command(Command::RunTrial(*spec, state.permit))) {
             Ok(()) => Ok(format!("trial {trial} runs")),
             Err(reason) => {

@@ -16,7 +16,7 @@ use super::arming_checklist::ArmingChecklist;
 use super::experiment::{Experiment, RequestRefusal};
 use super::operator_request::{OperatorRequest, StampedRequest};
 use super::storage::{ExperimentQueue, JobOutput};
-use crate::control::settings::ApprovalLimits;
+use crate::control::settings::{ApprovalLimits, ControlSettings};
 use crate::realtime::channel::SessionPorts;
 use crate::realtime::scheduling::{DeniedSetting, RealtimeSetting};
 use crate::recording::record::{ArmingCheckRecord, LogLevel, LogRecord, Record, SessionInfo, Stamped, Transition};
@@ -126,8 +126,12 @@ pub struct Supervisor {
     checklist_ns: u64,
     refreshed_ns: u64,
     unattended: Unattended,
+    /// Settings of the control thread, which name the limit that ended a trial.
+    limits: Option<ControlSettings>,
     /// Whether the robot sits down when a trial is over.
     review_sits_down: bool,
+    /// Whether the newest trial has several jumps in a row.
+    in_a_row: bool,
     /// The robot was sent to sit down for the review: no interruption of the automatic rule.
     sitting_for_review: bool,
 }
@@ -168,11 +172,13 @@ impl Supervisor {
             counters_ns: 0,
             checklist,
             approval,
+            in_a_row: false,
             lowerings_answered: [0; 2],
             published_checklist: Vec::new(),
             checklist_ns: 0,
             refreshed_ns: 0,
             unattended: Unattended::default(),
+            limits: None,
             review_sits_down: false,
             sitting_for_review: false,
         };
@@ -374,6 +380,7 @@ impl Supervisor {
                 }
             }
             Event::TrialEnded { trial, ticks, end } => {
+                self.log_limit(trial, &end, time_ns);
                 self.ended = Some(Ended { trial, end, ticks, time_ns });
             }
             Event::Refused { command, mode, because } => {

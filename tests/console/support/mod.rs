@@ -115,7 +115,7 @@ impl Console {
     }
 
     pub fn stage(&mut self, stage: ExperimentStage, trial: u32) -> Vec<Effect> {
-        self.record(Record::Stage(StageRecord { stage, trial, can_undo: false }))
+        self.record(Record::Stage(StageRecord { stage, trial, can_undo: false, jumps: 0 }))
     }
 
     pub fn answer(&mut self, request: &str, accepted: bool, answer: &str) {

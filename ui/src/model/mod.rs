@@ -3,6 +3,7 @@
 pub(crate) mod comparison;
 pub mod dialog;
 pub(crate) mod history;
+pub mod jump_series;
 pub(crate) mod live;
 pub(crate) mod log;
 pub mod session;
@@ -26,6 +27,7 @@ use crate::settings::{BellCause, ConsoleSettings};
 use crate::theme::Theme;
 use dialog::{Choice, Dialog};
 use history::SignalHistory;
+use jump_series::JumpSeries;
 use live::{LiveView, Panel};
 use log::LogView;
 use session::SessionModel;
@@ -86,6 +88,8 @@ pub struct Model {
     /// Wait of the session for the storage of its study.
     pub storage: Option<StorageWait>,
     pub history: SignalHistory,
+    /// The jumps of the running trial.
+    pub jump_series: JumpSeries,
     pub message: Option<Notice>,
     pub view: View,
     pub dialog: Option<Dialog>,
@@ -124,6 +128,7 @@ impl Model {
             recorder: None,
             storage: None,
             history: SignalHistory::default(),
+            jump_series: JumpSeries::default(),
             message: None,
             view: View::Live,
             dialog: None,

@@ -51,6 +51,11 @@ impl SessionModel {
         self.proposal.as_ref().filter(|proposal| proposal.trial == trial)
     }
 
+    /// Most jumps in a row of the running trial; 0 while none runs.
+    pub fn jumps_in_a_row(&self) -> u32 {
+        self.stage.map_or(0, |info| info.jumps)
+    }
+
     /// The number of arming checks that forbid arming.
     pub fn failing_checks(&self) -> usize {
         self.arming_checks.iter().filter(|item| !item.state.allows()).count()

@@ -55,7 +55,7 @@ pub fn study_to_join(
         [] => {
             if let (Some(task), Some(seed)) = (task, seed) {
                 notice!("a new study of {} seed {seed} is made in {storage}", task.name());
-                return Ok(StoredStudy { task, seed, robot: robot.name.clone(), budget: None });
+                return Ok(StoredStudy { task, seed, robot: robot.name.clone(), budget: None, unit: None });
             }
             let found = match (exists, all.as_slice()) {
                 (false, _) => "there is no such journal".to_owned(),

@@ -53,7 +53,10 @@ pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
         }
         Msg::Recorder(status) => model.recorder = Some(status),
         Msg::Storage(wait) => model.storage = wait,
-        Msg::Tick(tick) => model.history.push(&tick),
+        Msg::Tick(tick) => {
+            model.jump_series.push(&tick);
+            model.history.push(&tick);
+        }
         Msg::Replay(status) => model.replay = Some(status),
         Msg::Rewound => {
             model.session = SessionModel::default();

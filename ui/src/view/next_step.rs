@@ -54,6 +54,7 @@ fn live(model: &Model) -> NextStep {
     match model.mode() {
         Mode::Countdown => step("Countdown to the jump: any key cancels it.", model, &[]),
         Mode::StandUp => step("Standing up.", model, &[sit_down]),
+        Mode::Jump if session.jumps_in_a_row() > 1 => step(model.jump_series.line(session), model, &[sit_down]),
         Mode::Jump => step("Jumping.", model, &[]),
         Mode::Settle => step("Landed; waiting until the robot is quiet.", model, &[]),
         Mode::SitDown => step("Sitting down.", model, &[]),

@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use anyhow::{Context, anyhow};
 use clap::Args;
-use quadfrog::sim::bench::{BenchScene, SimulatorBench};
+use quadfrog::sim::bench::{BenchScene, BlockTimes, SimulatorBench};
 use quadfrog_console::put_line;
 
 use super::machine;
@@ -39,6 +39,10 @@ pub fn run(arguments: &SpeedArguments) -> Result<(), Failure> {
     put_line!("accelerations from torques                {:8.2} us", figures.dynamics_s * 1e6);
     for (scene, seconds) in BenchScene::ALL.iter().zip(figures.step_s) {
         put_line!("1 ms step, {:<31}{:8.2} us  {:8.0} steps/s", scene.name(), seconds * 1e6, 1.0 / seconds);
+    }
+    for BlockTimes { blocks, step_s, layout_s } in SimulatorBench::new().measure_blocks(arguments.seconds / 3.0) {
+        let (step_us, layout_ms) = (step_s * 1e6, layout_s * 1e3);
+        put_line!("1 ms step, standing on {blocks:>5} blocks        {step_us:8.2} us  laid in {layout_ms:.2} ms");
     }
     if let Some(script) = &arguments.mujoco {
         let theirs = mujoco(script, arguments.seconds)?;

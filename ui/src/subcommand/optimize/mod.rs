@@ -16,7 +16,7 @@ use quadfrog::optimize::study::Storage;
 use quadfrog::recording::record::{Record, Stamped};
 use quadfrog::recording::writer::Writer;
 use quadfrog::robot::description::RobotDescription;
-use quadfrog::session::automatic;
+use quadfrog::session::automatic::{self, JudgedTrial};
 use quadfrog::session::rollout::Rollout;
 use quadfrog::sim::Simulator;
 use quadfrog::telemetry::Tick;
@@ -190,8 +190,12 @@ fn run_one(
     let mut recorder = recording.as_ref().map(|path| StudyRecorder::create(path, &options)).transpose()?;
     let mut failed = None;
     let mut best: Option<(TrialRecord, Vec<Tick>)> = None;
-    let ran = automatic::run_watched(&mut experiment, &mut rollout, |experiment, row, ticks| {
+    let ran = automatic::run_watched(&mut experiment, &mut rollout, |trial| {
+        let JudgedTrial { experiment, row, ticks, warning } = *trial;
         printer.trial(study, row, experiment.counted());
+        if let Some(warning) = warning {
+            printer.warn(study, warning);
+        }
         let accepted = row.verdict == Some(Verdict::Accept);
         let better = |best: &(TrialRecord, Vec<Tick>)| row.value > best.0.value;
         match arguments.record {

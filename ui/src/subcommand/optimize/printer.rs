@@ -22,6 +22,8 @@ pub struct Printer {
     one: bool,
     /// Unit of each parameter.
     units: HashMap<String, String>,
+    /// Unit of the objective of each task, in the order of [`Task::ALL`].
+    objective_units: [&'static str; Task::ALL.len()],
     output: Mutex<()>,
     /// Task, best value and falls of each finished study.
     results: Mutex<Vec<(Task, f64, usize)>>,
@@ -38,7 +40,20 @@ impl Printer {
             bar.with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
         });
         let units = Task::ALL.iter().flat_map(|task| config.parameters(*task)).map(|p| (p.name, p.unit)).collect();
-        Printer { json, several: budgets.len() > 1, bar, one, units, output: Mutex::new(()), results: Mutex::default() }
+        Printer {
+            json,
+            several: budgets.len() > 1,
+            bar,
+            one,
+            units,
+            objective_units: Task::ALL.map(|task| config.task(task).unit(task)),
+            output: Mutex::new(()),
+            results: Mutex::default(),
+        }
+    }
+
+    fn unit(&self, task: Task) -> &'static str {
+        self.objective_units[task as usize]
     }
 
     /// Prints a judged trial; `counted` is the number of counted trials of its study, of all workers.
@@ -57,7 +72,7 @@ impl Printer {
             // Numbers and names always serialize.
             output::line(&serde_json::to_string(&line).unwrap_or_default());
         }
-        let line = table::line(row, study.task.unit(), &self.units);
+        let line = table::line(row, self.unit(study.task), &self.units);
         match &self.bar {
             Some(bar) => {
                 match self.one {
@@ -73,6 +88,16 @@ impl Printer {
         }
     }
 
+    /// Prints a warning about a study on standard error.
+    pub fn warn(&self, study: &SelectedStudy, warning: &str) {
+        let _output = self.output.lock();
+        let print = || output::notice(&format!("{} seed {}: {warning}", study.task.name(), study.seed));
+        match &self.bar {
+            Some(bar) => bar.suspend(print),
+            None => print(),
+        }
+    }
+
     pub fn finished(&self, study: &SelectedStudy, rows: &[TrialRecord], best: Option<&TrialRecord>, options: &Options) {
         let _output = self.output.lock();
         let falls = rows.iter().filter(|row| row.verdict == Some(Verdict::Fall)).count();
@@ -82,7 +107,7 @@ impl Printer {
         if self.several {
             text += &format!("{} seed {}\n", study.task.name(), study.seed);
         }
-        let (parameters, unit) = (options.config.parameters(study.task), study.task.unit());
+        let (parameters, unit) = (options.config.parameters(study.task), self.unit(study.task));
         text += &table::table(rows, best.map(|best| best.trial), &parameters, unit);
         text += &table::best_line(best, unit, &self.units);
         let folder = study.folder.display();
@@ -110,7 +135,7 @@ impl Printer {
             if of.len() > 1 {
                 let best = of.iter().map(|(_, best, _)| best).sum::<f64>() / count;
                 let falls = of.iter().map(|(.., falls)| *falls as f64).sum::<f64>() / count;
-                let (name, unit) = (task.name(), task.unit());
+                let (name, unit) = (task.name(), self.unit(task));
                 self.print(&format!("{name}: {count} studies, mean best {best:.4} {unit}, {falls:.2} falls a study\n"));
             }
         }

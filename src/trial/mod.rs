@@ -1,5 +1,9 @@
 //! Vocabulary of a trial: task, parameters with units, proposal, status, verdict, measured values.
 
+mod measured;
+
+pub use self::measured::{BounceRule, Displacement, JumpRow, MeasuredJump, ObjectiveRule};
+
 use serde::{Deserialize, Serialize};
 use strum::{EnumString, IntoStaticStr, VariantArray};
 
@@ -43,11 +47,20 @@ impl Task {
         self.into()
     }
 
-    /// Returns the unit of the objective: m, or rad for a twist.
+    /// Returns the unit of a jump's displacement or turn: m, or rad for a twist.
     pub const fn unit(self) -> &'static str {
         match self {
             Task::Forward | Task::LateralLeft | Task::LateralRight => "m",
             Task::TwistCcw | Task::TwistCw => "rad",
+        }
+    }
+
+    /// Returns the unit of the objective: that of a jump, or with `rate` per second.
+    pub fn objective_unit(self, rate: bool) -> &'static str {
+        match (self.unit(), rate) {
+            (unit, false) => unit,
+            ("m", true) => "m/s",
+            (_, true) => "rad/s",
         }
     }
 }
@@ -132,6 +145,18 @@ impl JumpParameters {
             fy_n: value("Fy"),
             fz_n: value("Fz"),
         }
+    }
+}
+
+impl JumpParameters {
+    /// Duration of one impulse and the pause after it, s; infinite without a pause.
+    fn period_s(&self) -> f64 {
+        0.5 / self.f0_hz + if self.f1_hz > 0.0 { 0.5 / self.f1_hz } else { f64::INFINITY }
+    }
+
+    /// Returns the number of impulses that begin within `duration_s`, at least one.
+    pub fn within(&self, duration_s: f64) -> u32 {
+        ((duration_s / self.period_s()).ceil() as u32).max(1)
     }
 }
 
@@ -338,104 +363,6 @@ impl Verdict {
     pub fn name(self) -> &'static str {
         self.into()
     }
-}
-
-/// Rule for a trial in which the robot bounces on after its landing.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, IntoStaticStr, VariantArray)]
-#[serde(rename_all = "kebab-case")]
-#[strum(serialize_all = "kebab-case")]
-pub enum BounceRule {
-    /// J is the displacement at rest, however often the robot flew.
-    #[default]
-    Ignore,
-    /// J is the displacement at the end of the first landing.
-    FirstLanding,
-    /// J is 0, as of a fall.
-    Zero,
-}
-
-/// Computation of the objective J from the measured values.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ObjectiveRule {
-    /// Direction of the displacement, or of the turn.
-    pub task: Task,
-    /// Jumps in a row.
-    pub jumps: u32,
-    /// Rule for a robot that bounces on.
-    pub bounce: BounceRule,
-}
-
-impl ObjectiveRule {
-    /// The rule of one jump of `task`, bounces ignored.
-    pub fn single(task: Task) -> ObjectiveRule {
-        ObjectiveRule { task, jumps: 1, bounce: BounceRule::Ignore }
-    }
-}
-
-/// Displacement and turn since the start of a trial, in the world frame turned so that the trial starts at yaw 0.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-#[serde(default)]
-pub struct Displacement {
-    /// Time since the start of the first impulse, s.
-    pub time_s: f64,
-    /// Forward, m.
-    pub dx_m: f64,
-    /// To the left, m.
-    pub dy_m: f64,
-    /// Turn, unwrapped, counterclockwise positive, rad.
-    pub dyaw_rad: f64,
-}
-
-/// One jump of a trial: from the start of its impulse to the start of the next one; the last one to the end of the trial.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-#[serde(default)]
-pub struct JumpRow {
-    /// Start of the impulse, s since the start of the first one.
-    pub time_s: f64,
-    /// Position at the start of the impulse, forward of that of the trial, m.
-    pub x_m: f64,
-    /// The same to the left, m.
-    pub y_m: f64,
-    /// Turn up to the start of the impulse, unwrapped, rad.
-    pub yaw_rad: f64,
-    /// Angle between the trunk's and the world's z axis at the start of the impulse, rad.
-    pub tilt_rad: f64,
-    /// Largest height of the trunk above its height at the start of the impulse, m.
-    pub rise_m: f64,
-    /// Longest flight that begins in this jump, s.
-    pub air_s: f64,
-    /// Share of this jump in the displacement or turn of the task, m or rad.
-    pub value: f64,
-}
-
-/// Measured values of a trial, in the world frame turned so that the trial starts at yaw 0.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub struct MeasuredJump {
-    /// Forward displacement x_final - x_init, m.
-    pub dx_m: f64,
-    /// Displacement to the left y_final - y_init, m.
-    pub dy_m: f64,
-    /// Turn, unwrapped, counterclockwise positive, rad.
-    pub dyaw_rad: f64,
-    /// Highest rise of the trunk over its height at the start, m.
-    pub apex_m: f64,
-    /// Longest time without any foot on the ground, s.
-    pub air_s: f64,
-    /// Objective J of a robot that does not fall, in the unit of the study; none in records of an older version.
-    #[serde(default)]
-    pub measured_value: Option<f64>,
-    /// Flights after the last impulse; more than one means that the robot bounced on.
-    #[serde(default)]
-    pub flights: u32,
-    /// Displacement at the first touchdown after the last impulse; none if the robot did not fly or did not land.
-    #[serde(default)]
-    pub touchdown: Option<Displacement>,
-    /// Displacement at the end of the first landing after the last impulse; none unless the robot bounced on.
-    #[serde(default)]
-    pub first_landing: Option<Displacement>,
-    /// Every jump, in order; empty in records of an older version.
-    #[serde(default)]
-    pub jumps: Vec<JumpRow>,
 }
 
 /// A row of the trial table.

@@ -1,0 +1,441 @@
+//! The ground: a plane, optionally with upright boxes on it (stairs, blocks).
+
+mod block;
+mod grid;
+
+use nalgebra::{Vector2, Vector3};
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
+
+use super::config::{BlocksConfig, TerrainConfig, TerrainKind};
+use crate::robot::GRAVITY;
+use block::TerrainBlock;
+use grid::BlockGrid;
+
+/// Length and half of the width of a step: each extends to the far end, below all later ones, m.
+const FAR_M: f64 = 100.0;
+/// Random stream of the ground's friction.
+const FRICTION_STREAM: u64 = 2;
+/// Random stream of the blocks' friction.
+const BLOCK_FRICTION_STREAM: u64 = 3;
+
+/// Most contacts of one sphere at a time: a floor and a wall.
+pub(super) const MAX_TERRAIN_CONTACTS: usize = 2;
+
+/// Contact of a sphere with the ground, or one within reach.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct TerrainContact {
+    /// Distance between the surfaces, m; negative inside.
+    pub gap: f64,
+    /// Out of the ground, world.
+    pub normal_world: Vector3<f64>,
+    /// Coulomb coefficient.
+    pub friction: f64,
+    /// Index of the loose block.
+    pub block: Option<usize>,
+}
+
+/// A step or block on the ground: an upright box, for displays.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TerrainBox {
+    /// Centre in the world's horizontal plane, m.
+    pub center: [f64; 2],
+    /// Half of the two edges, m.
+    pub half_edges: [f64; 2],
+    /// Direction of the first edge.
+    pub axis: [f64; 2],
+    /// Height of the top, m.
+    pub top: f64,
+}
+
+/// The ground.
+#[derive(Debug, Clone)]
+pub(super) struct Terrain {
+    config: TerrainConfig,
+    /// Normal of the plane through the world's origin.
+    normal: Vector3<f64>,
+    /// Coulomb coefficient of the plane and of steps.
+    friction: f64,
+    blocks: Vec<TerrainBlock>,
+    grid: BlockGrid,
+    /// Loose blocks that a foot has pushed or that move.
+    moving: Vec<u32>,
+    /// Largest height of the ground above the plane, m.
+    highest: f64,
+}
+
+impl Terrain {
+    pub fn new(config: &TerrainConfig) -> Terrain {
+        let angle = if config.kind == TerrainKind::Slope { config.slope.angle_rad } else { 0.0 };
+        let (sin, cos) = angle.sin_cos();
+        let (heading_sin, heading_cos) = config.slope.heading_rad.sin_cos();
+        let normal = Vector3::new(-sin * heading_cos, -sin * heading_sin, cos);
+        let (capacity, grid) = match config.kind {
+            TerrainKind::Flat | TerrainKind::Slope => (0, BlockGrid::new([0.0; 4], 1.0, 0)),
+            // One cell: every step reaches the far end.
+            TerrainKind::Steps => {
+                let count = config.steps.count as usize;
+                (count, BlockGrid::new([0.0; 4], FAR_M, count))
+            }
+            TerrainKind::Blocks => {
+                let count = config.blocks.count as usize;
+                (count, BlockGrid::new(config.blocks.area(), config.blocks.edge_m[1], count))
+            }
+        };
+        let mut terrain = Terrain {
+            config: *config,
+            normal,
+            friction: config.friction,
+            blocks: Vec::with_capacity(capacity),
+            grid,
+            moving: Vec::with_capacity(capacity),
+            highest: 0.0,
+        };
+        terrain.reset(0);
+        terrain
+    }
+
+    /// Builds the ground; random parts depend on `seed` alone.
+    pub fn reset(&mut self, seed: u64) {
+        self.blocks.clear();
+        self.grid.clear();
+        self.moving.clear();
+        self.friction = self.config.friction_of(seed);
+        match self.config.kind {
+            TerrainKind::Flat | TerrainKind::Slope => {}
+            TerrainKind::Steps => self.build_steps(),
+            TerrainKind::Blocks => self.lay_blocks(seed),
+        }
+        if let (TerrainKind::Blocks, Some([low, high])) = (self.config.kind, self.config.blocks.friction_range) {
+            let mut random = stream(seed, BLOCK_FRICTION_STREAM);
+            for block in &mut self.blocks {
+                block.friction = between(low, high, &mut random);
+            }
+        }
+        self.highest = self.blocks.iter().fold(0.0, |highest, block| block.top.max(highest));
+    }
+
+    fn push(&mut self, block: TerrainBlock) {
+        self.grid.push(&block.center, block.extent_m());
+        self.blocks.push(block);
+    }
+
+    fn build_steps(&mut self) {
+        let steps = self.config.steps;
+        for i in 0..steps.count {
+            let start = steps.start_m + f64::from(i) * steps.run_m;
+            let center = Vector2::new(start + FAR_M / 2.0, 0.0);
+            let step = TerrainBlock::new(center, Vector2::new(FAR_M / 2.0, FAR_M), Vector2::x(), self.friction);
+            self.push(TerrainBlock { top: f64::from(i + 1) * steps.rise_m, ..step });
+        }
+    }
+
+    fn lay_blocks(&mut self, seed: u64) {
+        let BlocksConfig { count, layers, thickness_m, edge_m, friction, .. } = self.config.blocks;
+        let [x_from, x_to, y_from, y_to] = self.config.blocks.area();
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let mut uniform = |low: f64, high: f64| between(low, high, &mut random);
+        let mut tries = 0;
+        while self.blocks.len() < count as usize && tries < 50 * count {
+            tries += 1;
+            let center = Vector2::new(uniform(x_from, x_to), uniform(y_from, y_to));
+            let half = Vector2::new(uniform(edge_m[0], edge_m[1]), uniform(edge_m[0], edge_m[1])) / 2.0;
+            let (sin, cos) = uniform(0.0, std::f64::consts::PI).sin_cos();
+            let mut block = TerrainBlock::new(center, half, Vector2::new(cos, sin), friction);
+            // A block lies on the highest one below it; a block that would be too high is drawn again.
+            let mut under = 0.0_f64;
+            self.grid.near(&center, block.extent_m(), |i| {
+                let other = &self.blocks[i];
+                if other.top > under && block.overlaps(other) {
+                    under = other.top;
+                }
+            });
+            block.top = under + thickness_m;
+            if block.top < (f64::from(layers) + 0.5) * thickness_m {
+                self.push(block);
+            }
+        }
+    }
+
+    /// Height of a point above the highest ground, m.
+    #[inline]
+    pub fn clearance(&self, point_world: &Vector3<f64>) -> f64 {
+        self.normal.dot(point_world) - self.highest
+    }
+
+    /// Distance of a sphere from the plane, m; negative inside.
+    #[inline]
+    pub fn plane_gap(&self, center_world: &Vector3<f64>, radius: f64) -> f64 {
+        self.normal.dot(center_world) - radius
+    }
+
+    /// Contacts of a sphere within `reach` of the ground: highest floor and nearest wall.
+    pub fn contacts(
+        &self,
+        center_world: &Vector3<f64>,
+        radius: f64,
+        reach: f64,
+    ) -> [Option<TerrainContact>; MAX_TERRAIN_CONTACTS] {
+        let height = self.plane_gap(center_world, radius);
+        let plane = (height < reach).then_some(TerrainContact {
+            gap: height,
+            normal_world: self.normal,
+            friction: self.friction,
+            block: None,
+        });
+        if self.blocks.is_empty() || height > self.highest + reach {
+            return [plane, None];
+        }
+        // The top of a box replaces the floor under it; of all boxes the highest top and the nearest wall count. Of equal
+        // ones the first box counts, and the plane before all boxes: the order of the search has no effect.
+        let loose = self.config.kind == TerrainKind::Blocks && self.config.blocks.loose;
+        let (mut floor, mut wall) = ((plane, 0), (None::<TerrainContact>, 0));
+        self.grid.near(&center_world.xy(), radius + reach, |i| {
+            let block = &self.blocks[i];
+            let Some((gap, normal_world)) = block.nearest(center_world, radius, reach) else { return };
+            let (slot, first) = if normal_world.z > 0.999 { &mut floor } else { &mut wall };
+            if slot.is_none_or(|other| gap < other.gap || (gap == other.gap && i < *first)) {
+                let friction = block.friction;
+                *slot = Some(TerrainContact { gap, normal_world, friction, block: loose.then_some(i) });
+                *first = i;
+            }
+        });
+        [floor.0, wall.0]
+    }
+
+    /// Normal of the plane, world.
+    pub fn normal(&self) -> Vector3<f64> {
+        self.normal
+    }
+
+    /// Velocity of loose block `block`, world, m/s.
+    pub fn block_velocity(&self, block: usize) -> Vector3<f64> {
+        let v = self.blocks[block].velocity;
+        Vector3::new(v.x, v.y, 0.0)
+    }
+
+    /// The steps or blocks.
+    pub fn boxes(&self) -> impl Iterator<Item = TerrainBox> + '_ {
+        self.blocks.iter().map(|b| TerrainBox {
+            center: b.center.into(),
+            half_edges: b.half.into(),
+            axis: b.axis.into(),
+            top: b.top,
+        })
+    }
+
+    /// Applies a foot's impulse (world, N s) to loose block `block` in a step of `h` seconds, less the friction on the
+    /// floor.
+    pub fn push_block(&mut self, block: usize, impulse_world: &Vector3<f64>, h: f64) {
+        self.blocks[block].pushed = true;
+        if !std::mem::replace(&mut self.blocks[block].listed, true) {
+            self.moving.push(block as u32);
+        }
+        self.accelerate(block, impulse_world, h);
+    }
+
+    fn accelerate(&mut self, block: usize, impulse_world: &Vector3<f64>, h: f64) {
+        let BlocksConfig { mass_kg, floor_friction, .. } = self.config.blocks;
+        let block = &mut self.blocks[block];
+        // Coulomb: the floor takes at most mu (m g h + normal impulse) of the momentum.
+        let momentum = block.velocity * mass_kg + impulse_world.xy();
+        let most = floor_friction * (mass_kg * GRAVITY * h - impulse_world.z.min(0.0));
+        let size = momentum.norm();
+        block.velocity = if size <= most { Vector2::zeros() } else { momentum * ((1.0 - most / size) / mass_kg) };
+    }
+
+    /// Advances the loose blocks by `h` seconds; those that no foot has pushed since the last call are slowed by friction
+    /// on the floor.
+    pub fn advance(&mut self, h: f64) {
+        let mut listed = 0;
+        while listed < self.moving.len() {
+            let i = self.moving[listed] as usize;
+            if !std::mem::replace(&mut self.blocks[i].pushed, false) {
+                self.accelerate(i, &Vector3::zeros(), h);
+            }
+            let block = &mut self.blocks[i];
+            block.center += block.velocity * h;
+            self.grid.relocate(i, &block.center);
+            if block.velocity == Vector2::zeros() {
+                block.listed = false;
+                self.moving.swap_remove(listed);
+            } else {
+                listed += 1;
+            }
+        }
+    }
+}
+
+impl TerrainConfig {
+    /// Returns the Coulomb coefficient of the ground in a trial with `seed`, blocks excepted.
+    pub fn friction_of(&self, seed: u64) -> f64 {
+        match self.friction_range {
+            None => self.friction,
+            Some([low, high]) => between(low, high, &mut stream(seed, FRICTION_STREAM)),
+        }
+    }
+}
+
+/// Returns the random numbers of `stream` of the seed. Stream 0 lays the blocks, stream 1 draws the sensors' errors.
+fn stream(seed: u64, stream: u64) -> ChaCha8Rng {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    random.set_stream(stream);
+    random
+}
+
+/// Returns a uniform number in [low, high).
+fn between(low: f64, high: f64, random: &mut ChaCha8Rng) -> f64 {
+    low + (high - low) * unit_interval(random)
+}
+
+/// Returns a uniform number in [0, 1) with 53 random bits.
+pub(super) fn unit_interval(random: &mut ChaCha8Rng) -> f64 {
+    (random.next_u64() >> 11) as f64 / (1u64 << 53) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sim::SimConfig;
+
+    fn config(count: u32, area_m: [f64; 4], edge_m: [f64; 2], layers: u32) -> TerrainConfig {
+        let terrain = SimConfig::default().terrain;
+        let blocks = BlocksConfig { count, area_m: Some(area_m), edge_m, layers, loose: true, ..terrain.blocks };
+        TerrainConfig { kind: TerrainKind::Blocks, blocks, ..terrain }
+    }
+
+    /// Sparse and dense, small and large blocks, far more cells than blocks and a single cell.
+    fn configs() -> [TerrainConfig; 5] {
+        [
+            TerrainConfig { kind: TerrainKind::Blocks, ..SimConfig::default().terrain },
+            config(3000, [-1.0, 20.0, -3.0, 3.0], [0.05, 0.5], 3),
+            config(200, [-60.0, 60.0, -0.1, 0.1], [0.01, 0.02], 2),
+            config(100, [0.5, 0.5, -0.5, 0.5], [0.3, 2.0], 10),
+            config(400, [-1.0, 1.0, -1.0, 1.0], [0.1, 0.1], 10),
+        ]
+    }
+
+    /// All blocks in order: the search without a grid.
+    fn linear(terrain: &Terrain, center: &Vector3<f64>, radius: f64, reach: f64) -> [Option<TerrainContact>; 2] {
+        let gap = terrain.plane_gap(center, radius);
+        let plane = TerrainContact { gap, normal_world: terrain.normal, friction: terrain.friction, block: None };
+        let (mut floor, mut wall) = ((gap < reach).then_some(plane), None);
+        for (i, block) in terrain.blocks.iter().enumerate() {
+            let Some((gap, normal_world)) = block.nearest(center, radius, reach) else { continue };
+            let loose = (terrain.config.blocks.loose).then_some(i);
+            let slot: &mut Option<TerrainContact> = if normal_world.z > 0.999 { &mut floor } else { &mut wall };
+            if slot.is_none_or(|other| gap < other.gap) {
+                *slot = Some(TerrainContact { gap, normal_world, friction: block.friction, block: loose });
+            }
+        }
+        [floor, wall]
+    }
+
+    /// Compares both searches at random points in and around the area; returns the number of contacts with blocks.
+    fn compare(terrain: &Terrain, random: &mut ChaCha8Rng) -> usize {
+        let [x_from, x_to, y_from, y_to] = terrain.config.blocks.area();
+        let mut contacts = 0;
+        for _ in 0..2000 {
+            let x = between(x_from - 1.0, x_to + 1.0, random);
+            let center = Vector3::new(x, between(y_from - 1.0, y_to + 1.0, random), between(-0.05, 0.4, random));
+            for (radius, reach) in [(0.02, 0.005), (0.0, 0.0), (0.02, 0.3), (0.1, 5.0)] {
+                let found = terrain.contacts(&center, radius, reach);
+                assert_eq!(found, linear(terrain, &center, radius, reach), "{center}, {radius}, {reach}");
+                contacts += found.iter().flatten().filter(|contact| contact.block.is_some()).count();
+            }
+        }
+        contacts
+    }
+
+    #[test]
+    fn the_grid_finds_the_contacts_of_a_search_over_all_blocks() {
+        for (number, config) in configs().into_iter().enumerate() {
+            let mut terrain = Terrain::new(&config);
+            let mut random = stream(7, 9);
+            for seed in 0..3 {
+                terrain.reset(seed);
+                assert!(terrain.blocks.len() >= 10, "configuration {number}: {} blocks", terrain.blocks.len());
+                compare(&terrain, &mut random);
+            }
+        }
+    }
+
+    #[test]
+    fn blocks_that_slide_stay_found_also_outside_the_area() {
+        let mut contacts = 0;
+        for config in &configs()[1..] {
+            let mut terrain = Terrain::new(config);
+            let mut random = stream(8, 9);
+            for _ in 0..20 {
+                for _ in 0..20 {
+                    let block = between(0.0, terrain.blocks.len() as f64, &mut random) as usize;
+                    let push = Vector3::new(between(-1.0, 1.0, &mut random), between(-1.0, 1.0, &mut random), 0.0);
+                    terrain.push_block(block, &push, 0.001);
+                }
+                for _ in 0..100 {
+                    terrain.advance(0.001);
+                }
+            }
+            contacts += compare(&terrain, &mut random);
+        }
+        assert!(contacts > 1000, "{contacts} contacts with blocks");
+    }
+
+    #[test]
+    fn blocks_are_laid_as_by_a_search_over_all_blocks() {
+        for config in configs() {
+            let BlocksConfig { count, layers, thickness_m, edge_m, .. } = config.blocks;
+            let [x_from, x_to, y_from, y_to] = config.blocks.area();
+            let mut random = stream(3, 0);
+            let mut uniform = |low: f64, high: f64| between(low, high, &mut random);
+            let mut blocks: Vec<TerrainBlock> = Vec::new();
+            for _ in 0..50 * count {
+                let center = Vector2::new(uniform(x_from, x_to), uniform(y_from, y_to));
+                let half = Vector2::new(uniform(edge_m[0], edge_m[1]), uniform(edge_m[0], edge_m[1])) / 2.0;
+                let (sin, cos) = uniform(0.0, std::f64::consts::PI).sin_cos();
+                let mut block = TerrainBlock::new(center, half, Vector2::new(cos, sin), 0.0);
+                let under = blocks.iter().filter(|other| block.overlaps(other)).fold(0.0_f64, |z, b| z.max(b.top));
+                block.top = under + thickness_m;
+                if blocks.len() < count as usize && block.top < (f64::from(layers) + 0.5) * thickness_m {
+                    blocks.push(block);
+                }
+                if blocks.len() == count as usize {
+                    break;
+                }
+            }
+            let mut terrain = Terrain::new(&config);
+            terrain.reset(3);
+            let places = |blocks: &[TerrainBlock]| blocks.iter().map(|b| (b.center, b.half, b.top)).collect::<Vec<_>>();
+            assert_eq!(places(&terrain.blocks), places(&blocks));
+        }
+    }
+
+    #[test]
+    fn of_two_equal_blocks_the_first_one_is_touched() {
+        let mut terrain = Terrain::new(&config(2, [-1.0, 1.0, -1.0, 1.0], [0.2, 0.2], 1));
+        terrain.reset(0);
+        let first = terrain.blocks[0];
+        terrain.blocks.clear();
+        terrain.grid.clear();
+        terrain.push(first);
+        terrain.push(TerrainBlock { friction: 0.1, ..first });
+        let above = Vector3::new(first.center.x, first.center.y, first.top + 0.02);
+        let floor = terrain.contacts(&above, 0.02, 0.01)[0].unwrap();
+        assert_eq!((floor.block, floor.friction), (Some(0), first.friction));
+    }
+
+    /// Regression: of more than 64 loose blocks, some were not slowed by the floor while a foot pushed another one.
+    #[test]
+    fn every_block_that_no_foot_pushes_comes_to_rest() {
+        let mut terrain = Terrain::new(&config(100, [-3.0, 3.0, -3.0, 3.0], [0.1, 0.2], 1));
+        terrain.push_block(3, &Vector3::new(0.06, 0.0, 0.0), 0.001);
+        terrain.advance(0.001);
+        assert!(terrain.block_velocity(3).x > 0.5);
+        for _ in 0..1000 {
+            terrain.push_block(67, &Vector3::new(0.0, 0.0, -0.01), 0.001);
+            terrain.advance(0.001);
+        }
+        assert_eq!(terrain.block_velocity(3), Vector3::zeros());
+        assert!(terrain.moving.is_empty());
+    }
+}
