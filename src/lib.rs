@@ -42,7 +42,7 @@
 //! ui         -> the engine's public interface          draws and sends requests; decides nothing
 //! engine     -> everything below                       starts the threads and connects them
 //! config     -> everything below but report, session   files to checked values
-//! report     -> recording, optimize, trial             tables of trials
+//! report     -> recording, optimize, control, telemetry, robot, trial    figures, pages and tables of studies
 //! session    -> optimize, recording, control, sim, realtime, telemetry, trial, robot    proposes, runs and judges trials
 //! recording  -> telemetry, trial, optimize, robot      writes and reads sessions
 //! control    -> telemetry, realtime, trial, robot      computes the torques of a tick

@@ -18,7 +18,7 @@ const ENGINE: [(&str, &[&str]); 12] = [
     ("sim", &["robot"]),
     ("control", &["robot", "trial", "telemetry", "realtime"]),
     ("recording", &["telemetry", "trial", "robot", "optimize"]),
-    ("report", &["recording", "optimize", "trial"]),
+    ("report", &["recording", "optimize", "control", "telemetry", "robot", "trial"]),
     ("session", &["optimize", "recording", "control", "sim", "realtime", "telemetry", "trial", "robot"]),
     ("config", &["optimize", "recording", "control", "sim", "realtime", "telemetry", "trial", "robot"]),
     // The engine may use every module.

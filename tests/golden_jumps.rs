@@ -1,17 +1,19 @@
 //! Whole jumps against MuJoCo, by the protocol of the reference: only feet and trunk collide, friction 1.0, ideal motors, 1.0 s of
 //! settling, one impulse or several, 1.5 s until the outcome is read. `golden/jumps.json` holds jumps of the paper's controller,
-//! `golden/jumps_terms.json` jumps with the attitude rate term and the foot placement, `golden/jumps_continuous.json` jumps in a row.
+//! `golden/jumps_terms.json` jumps with the attitude rate term and the foot placement, `golden/jumps_landing.json` with the landing
+//! terms as well (written by `tests/support/reference_landing.py`), `golden/jumps_continuous.json` jumps in a row.
 
 mod support;
 
 use nalgebra::Vector3;
 use quadfrog::control::foot_placement::SwingLegs;
 use quadfrog::control::force_profile::amplitudes_leg;
+use quadfrog::control::landing::LandingLegs;
 use quadfrog::control::leg::{LegTarget, feet, torques};
 use quadfrog::robot::description::RobotDescription;
-use quadfrog::robot::{JointCommand, PerLeg, Placement, Robot};
+use quadfrog::robot::{JointCommand, LEGS, PerLeg, Placement, Robot};
 use quadfrog::sim::{BodyKind, ContactLaw, SimConfig, Simulator};
-use quadfrog::telemetry::Estimate;
+use quadfrog::telemetry::{Cutoff, Estimate, LandingTerms};
 use quadfrog::trial::{Gains, JumpParameters, Task};
 use serde::Deserialize;
 
@@ -59,6 +61,8 @@ fn one() -> u32 {
 struct Terms {
     attitude_rate_gain: f64,
     foot_placement_s: f64,
+    #[serde(default)]
+    landing: LandingTerms,
 }
 
 #[derive(Deserialize, Default, Debug)]
@@ -84,7 +88,7 @@ fn jump(robot: &RobotDescription, config: &SimConfig, file: &File, case: &Case) 
     let period = impulse + if case.jumps > 1 { 0.5 / case.f1_hz } else { 0.0 };
     let end = start + f64::from(case.jumps - 1) * period + impulse;
     let ticks = ((end + 1.5) * 1000.0_f64).round_ties_even() as u32;
-    let mut swing = SwingLegs::default();
+    let (mut swing, mut landing) = (SwingLegs::default(), LandingLegs::default());
     let mut outcome = Outcome::default();
     let (mut yaw, mut last_yaw) = (0.0, 0.0);
     let mut initial: Option<(Vector3<f64>, f64)> = None;
@@ -110,16 +114,22 @@ fn jump(robot: &RobotDescription, config: &SimConfig, file: &File, case: &Case) 
         };
         if t > start {
             swing.update(&truth.foot_contact);
+            landing.update(&truth.foot_contact, swing.legs());
         }
+        let theta_rad = std::f64::consts::PI + std::f64::consts::TAU * case.f0_hz * since.max(0.0);
+        let cut_off = landing.cut_off(&case.terms.landing, theta_rad);
+        let amplitudes = if active { amplitudes_leg(&profile, task) } else { PerLeg::default() };
         let velocity_body = estimate.world_from_body.inverse_transform_vector(&estimate.velocity_world);
+        let placement_leg = swing.offsets_leg(case.terms.foot_placement_s, &velocity_body);
+        let spread_leg = landing.spread_leg(&case.terms.landing);
         let target = LegTarget {
             gains: file.gains,
             stance_leg,
             vmc: true,
             attitude_rate_gain: case.terms.attitude_rate_gain,
-            foot_offset_leg: swing.offsets_leg(case.terms.foot_placement_s, &velocity_body),
-            amplitudes_leg: if active { amplitudes_leg(&profile, task) } else { PerLeg::default() },
-            theta_rad: std::f64::consts::PI + std::f64::consts::TAU * case.f0_hz * since.max(0.0),
+            foot_offset_leg: std::array::from_fn::<_, LEGS, _>(|i| placement_leg[i] + spread_leg[i]),
+            amplitudes_leg: std::array::from_fn(|i| if cut_off[i] { Vector3::zeros() } else { amplitudes[i] }),
+            theta_rad,
         };
         let feet = feet(&robot.leg_geometry, &state.joint_position_rad);
         let torque = torques(&target, &feet, &state.joint_velocity_rad_s, &estimate);
@@ -284,6 +294,22 @@ fn golden_jumps_with_the_added_terms() {
     let (robot, config) = reference_setup(&file);
     let found = compare(&robot, &config, &file);
     println!("golden_jumps: {} cases with the added terms: {found}", file.cases.len());
+    assert!(found.apex <= 1.0 && found.apex_95 <= 4.0, "apex");
+    assert!(found.takeoff_ms <= 5.0, "take-off");
+    assert!(found.landing_cm <= 3.0, "landing");
+    assert!(found.twist <= 5.0, "yaw of twists");
+    assert!(found.agreement >= 90.0, "falls");
+}
+
+/// The cut-off of the profile force and the spread of the swing feet do in this simulator what they do in MuJoCo.
+#[test]
+fn golden_jumps_with_the_landing_terms() {
+    let file: File = support::golden("jumps_landing.json");
+    let landing = |case: &Case| case.terms.landing;
+    assert!(file.cases.iter().all(|case| landing(case).cutoff == Cutoff::Foot && landing(case).spread_m > 0.0));
+    let (robot, config) = reference_setup(&file);
+    let found = compare(&robot, &config, &file);
+    println!("golden_jumps: {} cases with the landing terms: {found}", file.cases.len());
     assert!(found.apex <= 1.0 && found.apex_95 <= 4.0, "apex");
     assert!(found.takeoff_ms <= 5.0, "take-off");
     assert!(found.landing_cm <= 3.0, "landing");

@@ -95,7 +95,7 @@ fn a_page_is_one_html_file_without_scripts_and_references() {
     for reference in ["<script", "http:", "https:", "src=", "href=", "url(", "@import", "\u{1b}", "\u{202e}"] {
         assert!(!document.contains(reference), "the page contains {reference}");
     }
-    assert!(document.contains("&lt;script&gt;") && document.contains("\\u{1b}[2J"));
+    assert!(document.contains("&lt;script&gt;") && document.contains("\\u001b[2J"));
     // HTML without void elements is XML.
     let closed = document.replace("<!DOCTYPE html>", "").replace("\">", "\" >");
     let closed = closed.split("<meta").map(|part| part.to_owned()).collect::<Vec<_>>();
@@ -114,7 +114,7 @@ fn a_page_is_one_html_file_without_scripts_and_references() {
 fn a_page_as_text_is_narrow_and_has_no_control_characters() {
     let shown = text::render(&page(), 80);
     assert!(shown.chars().all(|c| c == '\n' || !c.is_control()), "{shown}");
-    assert!(!shown.contains('\u{202e}') && shown.contains("\\u{1b}[2J"));
+    assert!(!shown.contains('\u{202e}') && shown.contains("\\u001b[2J"));
     for line in shown.lines().skip(2) {
         assert!(line.chars().count() <= 80 || line.chars().all(|c| c == '-'), "{line}");
     }
@@ -131,8 +131,8 @@ fn a_table_wider_than_the_terminal_continues_below_with_its_first_column() {
     section.blocks.push(Block::Table(table));
     let shown = text::render(&Page { sections: vec![section], ..Page::new("Page", "") }, 80);
     assert!(shown.lines().all(|line| line.chars().count() <= 80), "{shown}");
-    assert_eq!(shown.matches("first").count(), 3, "{shown}");
-    assert!(shown.contains("quantity 11 (m)") && shown.contains("11.00"), "{shown}");
+    assert_eq!(shown.matches("first").count(), 2, "{shown}");
+    assert!(shown.contains("(m)") && shown.contains("11.00"), "{shown}");
 }
 
 #[test]

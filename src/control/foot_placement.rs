@@ -30,6 +30,11 @@ impl SwingLegs {
         }
     }
 
+    /// Returns whether each leg is in swing.
+    pub fn legs(&self) -> &PerLeg<bool> {
+        &self.swing
+    }
+
     /// Ticks without any foot on the ground, the newest one included.
     pub fn airborne_ticks(&self) -> u32 {
         self.airborne

@@ -20,9 +20,9 @@ pub struct LegTarget {
     pub vmc: bool,
     /// Damping of Virtual Model Control, N s/m; acts only where `vmc` does.
     pub attitude_rate_gain: f64,
-    /// Shift of each leg's nominal foot position, leg frame, m; zero for legs that are not in swing.
+    /// Shift of each leg's nominal foot position, leg frame, m.
     pub foot_offset_leg: PerLeg<Vector3<f64>>,
-    /// Signed force amplitudes per leg, leg frame, N; zero outside an impulse.
+    /// Signed force amplitudes per leg, leg frame, N; zero outside an impulse and for a foot that is cut off.
     pub amplitudes_leg: PerLeg<Vector3<f64>>,
     /// Phase of the oscillator, rad.
     pub theta_rad: f64,

@@ -14,6 +14,7 @@ pub mod foot_placement;
 pub mod force_profile;
 pub mod gain_blend;
 pub mod impedance;
+pub mod landing;
 pub mod leg;
 pub mod limit_key;
 pub mod link_quality;

@@ -3,6 +3,7 @@
 use super::failsafe_inputs::MotionPhase;
 use super::foot_placement::{SHORTEST_FLIGHT_S, SwingLegs};
 use super::force_profile::{Oscillator, amplitudes_leg};
+use super::landing::LandingLegs;
 use super::leg::LegTarget;
 use super::settings::ControlSettings;
 use crate::robot::ticks_in;
@@ -38,6 +39,7 @@ pub struct RunningTrial {
     waiting: u32,
     waited: u32,
     swing: SwingLegs,
+    landing: LandingLegs,
     /// Whether the robot has flown and touched down since the last impulse.
     flown: bool,
     /// Ticks since the touchdown after the last impulse.
@@ -68,6 +70,7 @@ impl RunningTrial {
             waiting: 0,
             waited: 0,
             swing: SwingLegs::default(),
+            landing: LandingLegs::default(),
             flown: false,
             landed: 0,
             quiet: 0,
@@ -170,17 +173,19 @@ impl RunningTrial {
 
     /// Target of the legs in this tick.
     pub fn target(&self, estimate: &Estimate) -> LegTarget {
+        let theta_rad = self.theta_rad();
+        let velocity_body = estimate.world_from_body.inverse_transform_vector(&estimate.velocity_world);
+        let placement_leg = self.swing.offsets_leg(self.spec.foot_placement_s, &velocity_body);
+        let spread_leg = self.landing.spread_leg(&self.spec.landing);
+        let cut_off = self.landing.cut_off(&self.spec.landing, theta_rad);
         LegTarget {
             gains: self.spec.gains,
             stance_leg: self.spec.stance_leg,
             vmc: self.spec.vmc,
             attitude_rate_gain: self.spec.attitude_rate_gain,
-            foot_offset_leg: self.swing.offsets_leg(
-                self.spec.foot_placement_s,
-                &estimate.world_from_body.inverse_transform_vector(&estimate.velocity_world),
-            ),
-            amplitudes_leg: self.amplitudes_leg,
-            theta_rad: self.theta_rad(),
+            foot_offset_leg: std::array::from_fn(|i| placement_leg[i] + spread_leg[i]),
+            amplitudes_leg: std::array::from_fn(|i| if cut_off[i] { Vector3::zeros() } else { self.amplitudes_leg[i] }),
+            theta_rad,
         }
     }
 
@@ -197,6 +202,7 @@ impl RunningTrial {
         let feet_down = estimate.contact.iter().filter(|&&down| down).count();
         self.flown |= feet_down > 0 && self.swing.airborne_ticks() >= ticks_in(SHORTEST_FLIGHT_S);
         self.swing.update(&estimate.contact);
+        self.landing.update(&estimate.contact, self.swing.legs());
         let impulse = self.theta_rad() >= std::f64::consts::PI;
         if impulse {
             self.flown = false;

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use crate::telemetry::TrialSpec;
+use crate::telemetry::{LandingTerms, TrialSpec};
 use crate::trial::{BounceRule, Gains, JumpParameters, Task};
 
 /// Trial settings of one task: section `[tasks.<task>]` of `config/control.toml`.
@@ -26,6 +26,8 @@ pub struct TaskControl {
     pub attitude_rate_gain: f64,
     /// Time T of the foot placement, s: a swing foot is placed T times the trunk's velocity ahead; zero in the paper.
     pub foot_placement_s: f64,
+    /// Landing terms.
+    pub landing: LandingTerms,
     /// Jumps in a row, where no duration is given.
     pub jumps: u32,
     /// Duration of jumps in a row, s: the last impulse begins before it. None: `jumps` counts.
@@ -73,6 +75,7 @@ impl TaskControl {
             vmc: self.vmc,
             attitude_rate_gain: self.attitude_rate_gain,
             foot_placement_s: self.foot_placement_s,
+            landing: self.landing,
             jumps: self.jumps(&jump),
             duration_s: self.duration_s.unwrap_or(f64::INFINITY),
             landing_wait_s: self.landing_wait_s,

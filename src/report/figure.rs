@@ -22,6 +22,9 @@
 
 use serde::Serialize;
 
+/// Short names, for modules that draw.
+pub use self::{FigurePanel as Panel, FigureSeries as Series};
+
 /// A figure: panels in a grid with one legend and one caption.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Figure {
@@ -50,7 +53,7 @@ impl Figure {
 
 /// One plot of a figure.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Panel {
+pub struct FigurePanel {
     /// Title above the plot; empty for none.
     pub title: String,
     /// Horizontal axis.
@@ -67,7 +70,7 @@ pub struct Panel {
     pub height: Option<u32>,
 }
 
-impl Panel {
+impl FigurePanel {
     /// A panel without series.
     pub fn new(title: impl Into<String>, x: Axis, y: Axis) -> Panel {
         Panel { title: title.into(), x, y, series: Vec::new(), limits: Vec::new(), equal: false, height: None }
@@ -127,7 +130,7 @@ pub struct Limit {
 
 /// A series of a panel.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Series {
+pub struct FigureSeries {
     /// Label in the legend; empty for no entry.
     pub label: String,
     /// Number of its [`Style`].
@@ -154,7 +157,7 @@ pub enum Shape {
     Band(Vec<[f64; 3]>),
 }
 
-impl Series {
+impl FigureSeries {
     fn new(label: impl Into<String>, style: usize, shape: Shape) -> Series {
         Series { label: label.into(), style, shape }
     }
@@ -222,7 +225,7 @@ pub fn thinned(points: &[[f64; 2]], buckets: usize) -> Vec<[f64; 2]> {
 /// Kinds of markers, by their order in [`Style::of`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[expect(missing_docs, reason = "the names say the form")]
-pub enum Marker {
+pub enum PointMarker {
     Circle,
     Cross,
     Triangle,
@@ -238,8 +241,8 @@ pub struct Style {
     pub colour: (u8, u8, u8),
     /// Length of a dash and of the gap after it, pixels of a figure 720 wide; none for a solid line.
     pub dash: Option<(u32, u32)>,
-    /// Marker of points.
-    pub marker: Marker,
+    /// PointMarker of points.
+    pub marker: PointMarker,
 }
 
 /// Number of the style for falls: vermillion crosses.
@@ -253,13 +256,13 @@ impl Style {
     pub fn of(number: usize) -> Style {
         let style = |colour, dash, marker| Style { colour, dash, marker };
         match number % 7 {
-            0 => style((0, 114, 178), None, Marker::Circle),
-            1 => style((213, 94, 0), Some((7, 4)), Marker::Cross),
-            2 => style((0, 158, 115), Some((2, 3)), Marker::Triangle),
-            3 => style((204, 121, 167), Some((14, 4)), Marker::Square),
-            4 => style((230, 159, 0), Some((4, 4)), Marker::Ring),
-            5 => style((86, 180, 233), Some((10, 8)), Marker::Plus),
-            _ => style((0, 0, 0), Some((3, 3)), Marker::Ring),
+            0 => style((0, 114, 178), None, PointMarker::Circle),
+            1 => style((213, 94, 0), Some((7, 4)), PointMarker::Cross),
+            2 => style((0, 158, 115), Some((2, 3)), PointMarker::Triangle),
+            3 => style((204, 121, 167), Some((14, 4)), PointMarker::Square),
+            4 => style((230, 159, 0), Some((4, 4)), PointMarker::Ring),
+            5 => style((86, 180, 233), Some((10, 8)), PointMarker::Plus),
+            _ => style((0, 0, 0), Some((3, 3)), PointMarker::Ring),
         }
     }
 }

@@ -61,7 +61,7 @@ struct Numbers {
 fn block(block: &Block, numbers: &mut Numbers) -> Markup {
     match block {
         Block::Paragraph(text) => html! { p { (printable(text)) } },
-        Block::Equation(text) => html! { p.equation { (printable(text)) } },
+        Block::Equation(text) => html! { p.equation { (equation(&printable(text))) } },
         Block::Quote { text, source } => html! {
             blockquote { p { (printable(text)) } footer { (printable(source)) } }
         },
@@ -84,6 +84,19 @@ fn block(block: &Block, numbers: &mut Numbers) -> Markup {
     }
 }
 
+/// Returns an equation with the words after underscores as indices.
+fn equation(text: &str) -> Markup {
+    let mut parts = text.split('_');
+    let first = parts.next().unwrap_or_default();
+    html! {
+        (first)
+        @for part in parts {
+            @let end = part.find(|c: char| !c.is_alphanumeric() && c != '-').unwrap_or(part.len());
+            sub { (part[..end]) } (part[end..].replace(" - ", " \u{2212} ").replace("= -", "= \u{2212}"))
+        }
+    }
+}
+
 /// Returns a text with its line breaks and without other control characters.
 fn lines(text: &str) -> String {
     let shown = |c: char| if c != '\n' && is_unprintable(c) { printable(&c.to_string()) } else { c.to_string() };
@@ -99,7 +112,10 @@ fn table(table: &Table, number: u32) -> Markup {
                 thead {
                     tr {
                         @for column in &table.columns {
-                            th scope="col" class=(class(column)) { (printable(&column.header())) }
+                            th scope="col" class=(class(column)) {
+                                (printable(&column.name))
+                                @if !column.unit.is_empty() { " " span.unit { "(" (printable(&column.unit)) ")" } }
+                            }
                         }
                     }
                 }

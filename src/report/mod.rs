@@ -10,9 +10,16 @@
 //! | [`text::render`] | a page for a terminal: tables, no figures, control characters replaced |
 //! | [`page::Page::to_json`] | a page as JSON, numbers unrounded |
 
+pub mod configuration;
 pub mod figure;
 pub mod html;
+pub mod jump;
 pub mod page;
+pub mod recorded;
+pub mod study;
+pub mod study_figures;
+pub mod study_page;
+mod study_tables;
 pub mod svg;
 pub mod table;
 pub mod text;

@@ -26,6 +26,9 @@ use serde_json::Value;
 
 use super::figure::Figure;
 
+/// Short name, for modules that fill tables.
+pub use self::TableColumn as Column;
+
 /// A page.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Page {
@@ -118,7 +121,7 @@ impl Table {
 
 /// A column of a table.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Column {
+pub struct TableColumn {
     /// Name.
     pub name: String,
     /// Unit; empty for a text or a pure number.
@@ -127,7 +130,7 @@ pub struct Column {
     pub text: bool,
 }
 
-impl Column {
+impl TableColumn {
     /// A column of texts.
     pub fn text(name: impl Into<String>) -> Column {
         Column { name: name.into(), unit: String::new(), text: true }
@@ -204,13 +207,13 @@ impl Serialize for Cell {
     }
 }
 
-/// Returns a text without control characters: each is shown as its code, `\u{1b}`, a tab or a line break as a space.
+/// Returns a text without control characters: each is shown as its code, `\u001b`, a tab or a line break as a space.
 pub fn printable(text: &str) -> String {
     let mut shown = String::with_capacity(text.len());
     for c in text.chars() {
         match c {
             '\n' | '\t' | '\r' => shown.push(' '),
-            c if is_unprintable(c) => shown.extend(c.escape_unicode()),
+            c if is_unprintable(c) => shown += &format!("\\u{:04x}", u32::from(c)),
             c => shown.push(c),
         }
     }

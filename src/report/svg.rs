@@ -7,10 +7,12 @@ use plotters::element::DashedPathElement;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use super::figure::{Axis, Figure, LIMIT_STYLE, Marker, Panel, Series, Shape, Style, thinned};
+use super::figure::{Axis, Figure, LIMIT_STYLE, Panel, PointMarker, Series, Shape, Style, thinned};
 use super::page::printable;
 use super::ticks::{decimals, padded, round_ticks};
 
+/// Beginning of a figure's file.
+const HEADER: &str = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<!-- quadfrog report -->\n";
 /// Width of a figure, pixels.
 const WIDTH: u32 = 720;
 /// Units of the drawing in one pixel: plotters draws at whole numbers.
@@ -64,7 +66,12 @@ impl Ranged for Scale {
 pub fn draw(figure: &Figure) -> String {
     let (body, height) = body(figure);
     let attributes = "xmlns=\"http://www.w3.org/2000/svg\"";
-    format!("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n{}", document(figure, &body, height, attributes))
+    format!("{HEADER}{}", document(figure, &body, height, attributes))
+}
+
+/// Whether a text is a figure that [`draw`] made.
+pub fn is_figure(text: &str) -> bool {
+    text.starts_with(HEADER)
 }
 
 /// Returns a figure as an SVG element of an HTML document.
@@ -230,17 +237,17 @@ fn marker(area: &Area, style: Style, (x, y): (i32, i32)) -> Drawn {
     let r = fine(4);
     let line = |from: (i32, i32), to: (i32, i32)| PathElement::new([from, to], stroke);
     match style.marker {
-        Marker::Circle => area.draw(&Circle::new((x, y), r, ink.filled())),
-        Marker::Ring => area.draw(&Circle::new((x, y), r, stroke)),
-        Marker::Square => area.draw(&Rectangle::new([(x - r, y - r), (x + r, y + r)], ink.filled())),
-        Marker::Triangle => {
+        PointMarker::Circle => area.draw(&Circle::new((x, y), r, ink.filled())),
+        PointMarker::Ring => area.draw(&Circle::new((x, y), r, stroke)),
+        PointMarker::Square => area.draw(&Rectangle::new([(x - r, y - r), (x + r, y + r)], ink.filled())),
+        PointMarker::Triangle => {
             area.draw(&Polygon::new([(x, y - r - r / 4), (x - r, y + r), (x + r, y + r)], ink.filled()))
         }
-        Marker::Cross => {
+        PointMarker::Cross => {
             area.draw(&line((x - r, y - r), (x + r, y + r)))?;
             area.draw(&line((x - r, y + r), (x + r, y - r)))
         }
-        Marker::Plus => {
+        PointMarker::Plus => {
             area.draw(&line((x - r, y), (x + r, y)))?;
             area.draw(&line((x, y - r), (x, y + r)))
         }
@@ -265,7 +272,7 @@ fn panel(cell: &Area, panel: &Panel, width: u32, height: u32) -> Drawn {
         (x, y) = (widened(x, plot_width), widened(y, plot_height));
         left = left.max(y_labels(&panel.y, y, plot_height).1);
     }
-    let x_ticks = ticks(&panel.x, x, plot_width / 80);
+    let x_ticks = ticks(&panel.x, x, plot_width / 55);
     let (y_ticks, _) = y_labels(&panel.y, y, plot_height);
     let x_name = |value: &f64| name(&panel.x, &x_ticks, *value);
     let y_name = |value: &f64| name(&panel.y, &y_ticks, *value);
@@ -276,8 +283,9 @@ fn panel(cell: &Area, panel: &Panel, width: u32, height: u32) -> Drawn {
     let mut chart = ChartBuilder::on(cell)
         .margin_top(title * FINE)
         .margin_right(16 * FINE)
+        .margin_left(6 * FINE)
         .x_label_area_size(40 * FINE)
-        .y_label_area_size(left * FINE)
+        .y_label_area_size((left - 6) * FINE)
         .build_cartesian_2d(Scale::new(x, x_ticks.clone()), Scale::new(y, y_ticks.clone()))?;
     chart
         .configure_mesh()

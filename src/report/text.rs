@@ -63,16 +63,18 @@ pub fn wrapped(text: &str, width: usize) -> Vec<String> {
 
 /// Returns a table in columns; one that is wider than `width` continues below with its first column repeated.
 fn table(table: &Table, width: usize) -> String {
-    let header = |column: &Column| printable(&column.header());
     let cell = |row: &[Cell], at: usize| row.get(at).map_or_else(String::new, |cell| printable(&cell.shown()));
     let natural: Vec<usize> = (0..table.columns.len())
         .map(|at| {
             let cells = table.rows.iter().map(|row| cell(row, at).chars().count());
-            cells.max().unwrap_or(0).max(header(&table.columns[at]).chars().count())
+            cells.max().unwrap_or(0).max(header_width(&table.columns[at]))
         })
         .collect();
     let mut text = if table.caption.is_empty() { String::new() } else { paragraph(&table.caption, width, "") };
-    for group in groups(&natural, &table.columns, width) {
+    for (part, group) in groups(&natural, &table.columns, width).into_iter().enumerate() {
+        if part > 0 {
+            text.push('\n');
+        }
         let others: usize = group.iter().filter(|&&at| !table.columns[at].text).map(|&at| natural[at] + 2).sum();
         let texts = group.iter().filter(|&&at| table.columns[at].text).count().max(1);
         let share = (width.saturating_sub(others) / texts).saturating_sub(2).max(LEAST_TEXT);
@@ -81,10 +83,12 @@ fn table(table: &Table, width: usize) -> String {
             .iter()
             .map(|&at| if table.columns[at].text && !fits { natural[at].min(share) } else { natural[at] })
             .collect();
-        let rows = table.rows.iter().map(|row| group.iter().map(|&at| cell(row, at)).collect());
-        let head = group.iter().map(|&at| header(&table.columns[at])).collect();
-        for (number, row) in std::iter::once::<Vec<String>>(head).chain(rows).enumerate() {
-            let cells: Vec<Vec<String>> = row.iter().zip(&widths).map(|(cell, &width)| wrapped(cell, width)).collect();
+        let head = group.iter().zip(&widths).map(|(&at, &width)| header(&table.columns[at], width)).collect();
+        let rows = table
+            .rows
+            .iter()
+            .map(|row| group.iter().zip(&widths).map(|(&at, &width)| wrapped(&cell(row, at), width)).collect());
+        for (number, cells) in std::iter::once::<Vec<Vec<String>>>(head).chain(rows).enumerate() {
             for line in 0..cells.iter().map(Vec::len).max().unwrap_or(0) {
                 let mut whole = String::new();
                 for ((cell, &width), &at) in cells.iter().zip(&widths).zip(&group) {
@@ -102,6 +106,32 @@ fn table(table: &Table, width: usize) -> String {
         }
     }
     text
+}
+
+/// Least width of a column's header: its longest word, or its unit.
+fn header_width(column: &Column) -> usize {
+    let longest = printable(&column.name).split_whitespace().map(|word| word.chars().count()).max().unwrap_or(0);
+    longest.max(unit(column).chars().count())
+}
+
+fn unit(column: &Column) -> String {
+    if column.unit.is_empty() { String::new() } else { format!("({})", printable(&column.unit)) }
+}
+
+/// Returns the lines of a column's header; the unit is on a line of its own where it does not fit.
+fn header(column: &Column, width: usize) -> Vec<String> {
+    let mut lines = wrapped(&column.name, width);
+    let unit = unit(column);
+    if let Some(last) = lines.last_mut()
+        && !unit.is_empty()
+    {
+        if last.chars().count() + 1 + unit.chars().count() <= width {
+            *last += &format!(" {unit}");
+        } else {
+            lines.push(unit);
+        }
+    }
+    lines
 }
 
 /// Returns the columns that stand side by side; the first column begins each group.

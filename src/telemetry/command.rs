@@ -2,6 +2,7 @@
 
 use nalgebra::Vector3;
 
+use super::LandingTerms;
 use crate::trial::{BounceRule, Gains, JumpParameters, ObjectiveRule, Task};
 
 /// Settings of one trial; latched when the trial starts.
@@ -23,6 +24,8 @@ pub struct TrialSpec {
     pub attitude_rate_gain: f64,
     /// Time of the foot placement, s.
     pub foot_placement_s: f64,
+    /// Landing terms.
+    pub landing: LandingTerms,
     /// Jumps in a row; 1 for a single jump.
     pub jumps: u32,
     /// No impulse begins at this time since the first one or later, s; infinite without a limit.

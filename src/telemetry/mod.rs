@@ -4,6 +4,7 @@ mod arming;
 mod command;
 mod event;
 mod fault;
+mod landing_terms;
 mod mode;
 mod tick;
 
@@ -11,5 +12,6 @@ pub use arming::{ArmingCheck, ArmingCheckSet, ArmingCheckState, ArmingFinding, A
 pub use command::{Command, Permit, TrialSpec};
 pub use event::{CommandRefusal, Event, Readiness, TrialEnd};
 pub use fault::{CommanderSign, FailsafeWarning, FallCause, Fault, SensorCheck, TrialInhibit};
+pub use landing_terms::{Cutoff, LandingTerms};
 pub use mode::{Mode, Phase, TransitionCause};
 pub use tick::{Counters, Estimate, Snapshot, Tick, TickDurations};

@@ -12,6 +12,7 @@ mod optimize;
 mod parallel;
 mod recover;
 mod replay;
+mod report;
 mod selection;
 mod study;
 
@@ -54,6 +55,8 @@ enum Subcommands {
     Guard,
     /// List, show, export, import and extend studies
     Study(study::StudyCommand),
+    /// Report studies: tables on the terminal, one HTML file with figures, SVG files, JSON
+    Report(report::ReportArguments),
 }
 
 pub fn run(arguments: Arguments) -> Result<(), Failure> {
@@ -70,5 +73,6 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
         Some(Subcommands::Doctor(doctor)) => doctor::run(&doctor),
         Some(Subcommands::Guard) => guard::run(),
         Some(Subcommands::Study(study)) => study::run(&study),
+        Some(Subcommands::Report(report)) => report::run(&report),
     }
 }

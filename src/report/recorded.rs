@@ -1,0 +1,76 @@
+//! Recorded trials of a study, read from its recordings.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use super::jump::{JumpCurves, JumpQuantities};
+use crate::recording::player::{Played, Player};
+use crate::robot::description::RobotDescription;
+use crate::telemetry::Tick;
+
+/// Time before the impulse from which curves are shown, s.
+const BEFORE_S: f64 = 0.1;
+
+/// One trial whose ticks were recorded.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RecordedTrial {
+    /// Take-off, torque and power; none if the ticks hold no flight.
+    pub quantities: Option<JumpQuantities>,
+    /// Curves over time.
+    pub curves: JumpCurves,
+}
+
+impl RecordedTrial {
+    /// Measures a trial's ticks; none if they end before the impulse.
+    pub fn of(ticks: &[Tick], robot: &RobotDescription) -> Option<RecordedTrial> {
+        let curves = JumpCurves::of(ticks, robot, BEFORE_S);
+        (!curves.roll_rad.is_empty()).then(|| RecordedTrial { quantities: JumpQuantities::of(ticks), curves })
+    }
+}
+
+/// Recorded trials by number, with everything about the recordings that a reader needs to know.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Recordings {
+    /// Trials with ticks.
+    pub trials: BTreeMap<u32, RecordedTrial>,
+    /// Recordings that were read.
+    pub files: Vec<PathBuf>,
+    /// Damaged and unreadable recordings, as sentences.
+    pub damages: Vec<String>,
+}
+
+impl Recordings {
+    /// Reads all recordings, finished or not. A file that cannot be read is noted in `damages`. Of a trial that is in
+    /// several recordings the last counts.
+    pub fn read(files: &[PathBuf], robot: &RobotDescription) -> Recordings {
+        let mut read = Recordings { files: files.to_vec(), ..Recordings::default() };
+        for file in files {
+            match Player::open(file) {
+                Ok(player) => read.play(player, robot),
+                Err(error) => read.damages.push(error.to_string()),
+            }
+        }
+        read
+    }
+
+    fn play(&mut self, mut player: Player, robot: &RobotDescription) {
+        let mut ticks: Vec<Tick> = Vec::new();
+        for played in player.by_ref() {
+            let Played::Tick(tick) = played else { continue };
+            if ticks.last().is_some_and(|last| last.trial != tick.trial) {
+                self.end(&mut ticks, robot);
+            }
+            if tick.trial.is_some() {
+                ticks.push(tick);
+            }
+        }
+        self.end(&mut ticks, robot);
+        self.damages.extend(player.damage());
+    }
+
+    fn end(&mut self, ticks: &mut Vec<Tick>, robot: &RobotDescription) {
+        let trial = ticks.last().and_then(|tick| tick.trial).zip(RecordedTrial::of(ticks, robot));
+        self.trials.extend(trial);
+        ticks.clear();
+    }
+}

@@ -1,0 +1,171 @@
+//! Studies as a report takes them, and statistics over several seeds.
+
+use super::configuration::ChangedKey;
+use super::jump::force_angle_rad;
+use super::recorded::{RecordedTrial, Recordings};
+use crate::optimize::ask::Direction;
+use crate::robot::description::RobotDescription;
+use crate::trial::{JumpParameters, ParameterInfo, ProposalSource, Task, TrialRecord, Verdict};
+
+/// A study with everything that its report shows.
+#[derive(Debug, Clone)]
+pub struct ReportedStudy {
+    /// Folder, journal or address.
+    pub place: String,
+    /// Name in its journal.
+    pub name: String,
+    /// Task; none for a study of another program.
+    pub task: Option<Task>,
+    /// Seed; none for a study of another program.
+    pub seed: Option<u32>,
+    /// Robot model and backend as text, for example `go1, simulated`.
+    pub robot: String,
+    /// Whether J is minimised, as another program's may be.
+    pub direction: Direction,
+    /// Jumps in a row of a trial.
+    pub jumps: u32,
+    /// Frequency of the pause where it is no parameter, Hz.
+    pub f1_hz: f64,
+    /// Parameters with their bounds.
+    pub parameters: Vec<ParameterInfo>,
+    /// Trials by number.
+    pub rows: Vec<TrialRecord>,
+    /// Number of the best trial.
+    pub best: Option<u32>,
+    /// Largest torque of hip, thigh and calf, N m, and their no-load speeds, rad/s; none for an unknown robot.
+    pub limits: Option<[[f64; 3]; 2]>,
+    /// Recorded trials.
+    pub recordings: Recordings,
+    /// Keys that differ from the defaults.
+    pub changed: Vec<ChangedKey>,
+    /// Name and text of the files of its configuration; empty where none was kept.
+    pub configuration: Vec<(String, String)>,
+}
+
+impl ReportedStudy {
+    /// Unit of J; empty for a study of another program.
+    pub fn unit(&self) -> &'static str {
+        self.task.map_or("", Task::unit)
+    }
+
+    /// Short label: seed, or the name in the journal.
+    pub fn label(&self) -> String {
+        self.seed.map_or_else(|| self.name.clone(), |seed| format!("seed {seed}"))
+    }
+
+    /// Returns a trial.
+    pub fn row(&self, trial: u32) -> Option<&TrialRecord> {
+        self.rows.iter().find(|row| row.trial == trial)
+    }
+
+    /// The best trial.
+    pub fn best_row(&self) -> Option<&TrialRecord> {
+        self.row(self.best?)
+    }
+
+    /// A trial's ticks, if they were recorded.
+    pub fn recorded(&self, trial: u32) -> Option<&RecordedTrial> {
+        self.recordings.trials.get(&trial)
+    }
+
+    /// Trials of a verdict.
+    pub fn with(&self, verdict: Verdict) -> impl Iterator<Item = &TrialRecord> {
+        self.rows.iter().filter(move |row| row.verdict == Some(verdict))
+    }
+
+    /// Trials that count: accepted or fallen, without repeats that confirm the best.
+    pub fn counted(&self) -> impl Iterator<Item = &TrialRecord> {
+        let counts = |row: &&TrialRecord| matches!(row.verdict, Some(Verdict::Accept | Verdict::Fall));
+        self.rows.iter().filter(counts).filter(|row| row.source != ProposalSource::Confirm)
+    }
+
+    /// Best accepted value after each trial that counts; not a number before the first accepted trial.
+    pub fn best_so_far(&self) -> Vec<f64> {
+        let mut best = f64::NAN;
+        let values = self.counted().map(|row| row.value.filter(|_| row.verdict == Some(Verdict::Accept)));
+        values
+            .map(|value| {
+                if let Some(value) = value
+                    && (best.is_nan() || self.direction.best_first(value, best).is_lt())
+                {
+                    best = value;
+                }
+                best
+            })
+            .collect()
+    }
+
+    /// The force profile of a trial.
+    pub fn jump(&self, row: &TrialRecord) -> JumpParameters {
+        JumpParameters::from_values(&row.parameters, self.f1_hz)
+    }
+
+    /// Angle of the profile's force from the horizontal, rad; none for a trial without force.
+    pub fn force_angle_rad(&self, row: &TrialRecord) -> Option<f64> {
+        row.parameters.get("Fz")?;
+        Some(force_angle_rad(&self.jump(row), self.task?))
+    }
+}
+
+/// Returns the largest torques and the no-load speeds of hip, thigh and calf, the smallest of the four legs.
+pub fn limits_of(robot: &RobotDescription) -> [[f64; 3]; 2] {
+    let least = |joints: &[f64]| {
+        std::array::from_fn(|kind| joints.iter().skip(kind).step_by(3).copied().fold(f64::INFINITY, f64::min))
+    };
+    [least(&robot.limits.max_torque), least(&robot.limits.max_velocity)]
+}
+
+/// Returns the studies by task, in the order of the tasks; those of other programs come last, each by itself.
+pub fn by_task(studies: &[ReportedStudy]) -> Vec<Vec<&ReportedStudy>> {
+    let of = |task: Task| studies.iter().filter(move |study| study.task == Some(task)).collect::<Vec<_>>();
+    let others = studies.iter().filter(|study| study.task.is_none()).map(|study| vec![study]);
+    Task::ALL.into_iter().map(of).filter(|group| !group.is_empty()).chain(others).collect()
+}
+
+/// Mean and standard deviation of a sample (n - 1); the deviation is 0 for one value, both are not a number for none.
+pub fn mean_and_deviation(values: &[f64]) -> (f64, f64) {
+    let count = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    let squares = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>();
+    (mean, if values.len() > 1 { (squares / (count - 1.0)).sqrt() } else { squares })
+}
+
+/// Returns mean and deviation of the best so far after each trial, as far as every study has a value.
+pub fn mean_best_so_far(studies: &[&ReportedStudy]) -> Vec<(usize, f64, f64)> {
+    let curves: Vec<Vec<f64>> = studies.iter().map(|study| study.best_so_far()).collect();
+    let shortest = curves.iter().map(Vec::len).min().unwrap_or(0);
+    let at = |index: usize| curves.iter().map(|curve| curve[index]).collect::<Vec<_>>();
+    let all = (0..shortest).map(|index| (index + 1, mean_and_deviation(&at(index))));
+    all.filter(|(_, (mean, _))| mean.is_finite()).map(|(trial, (mean, deviation))| (trial, mean, deviation)).collect()
+}
+
+/// Trials whose ticks are drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TrialChoice {
+    /// The best trial.
+    Best,
+    /// The first trial that counts.
+    First,
+    /// The last trial that counts.
+    Last,
+    /// The last fall.
+    LastFall,
+    /// The trial of that number.
+    Number(u32),
+}
+
+impl TrialChoice {
+    /// Returns the trial of `study` and its label; none if there is no such trial.
+    pub fn of<'a>(&self, study: &'a ReportedStudy) -> Option<(&'a TrialRecord, String)> {
+        let (row, what) = match self {
+            TrialChoice::Best => (study.best_row()?, "best"),
+            TrialChoice::First => (study.counted().next()?, "first"),
+            TrialChoice::Last => (study.counted().last()?, "last"),
+            TrialChoice::LastFall => (study.with(Verdict::Fall).last()?, "last fall"),
+            TrialChoice::Number(number) => (study.row(*number)?, ""),
+        };
+        let fell = if row.verdict == Some(Verdict::Fall) && *self != TrialChoice::LastFall { ", fall" } else { "" };
+        let what = if what.is_empty() { String::new() } else { format!("{what}, ") };
+        Some((row, format!("{what}trial {}{fell}", row.trial)))
+    }
+}

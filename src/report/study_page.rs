@@ -1,0 +1,194 @@
+//! The page of one or several studies.
+
+use super::page::{Block, Page, Section};
+use super::study::{ReportedStudy, TrialChoice, by_task};
+use super::study_figures::{DrawnTrial, TaskStudies, drawn};
+use super::study_tables::{self as tables, title};
+use crate::optimize::ask::Direction;
+use crate::trial::Task;
+
+/// Returns the report of `studies`, at least one; `choices`: the trials whose ticks are drawn.
+pub fn page(studies: &[ReportedStudy], choices: &[TrialChoice]) -> Page {
+    let groups = by_task(studies);
+    let name = match studies {
+        [only] => format!("Study {}", title(only)),
+        several => format!("{} studies", several.len()),
+    };
+    let places: Vec<&str> = studies.iter().map(|study| study.place.as_str()).collect();
+    let version = env!("CARGO_PKG_VERSION");
+    let mut page = Page::new(format!("quadfrog report: {name}"), format!("{}; quadfrog {version}", places.join(", ")));
+    page.sections.push(objective(&groups));
+    page.sections.push(results(studies, &groups));
+    let mut trials = Section::new("Parameters and landings");
+    for group in &groups {
+        let figures = TaskStudies::new(group);
+        trials.blocks.extend([figures.parameters(), figures.landings()].map(Block::Figure));
+    }
+    page.sections.push(trials);
+    for group in &groups {
+        page.sections.push(jumps(group, choices));
+    }
+    page.sections.push(verdicts(studies));
+    page.sections.push(configuration(studies));
+    page.sections.push(recordings(studies));
+    page
+}
+
+/// Returns the tables of a running study: objective, results, falls and trials.
+pub fn summary(study: &ReportedStudy) -> Page {
+    let studies = std::slice::from_ref(study);
+    let sections = vec![objective(&by_task(studies)), results(studies, &by_task(studies)), verdicts(studies)];
+    Page { sections, ..Page::new(format!("Study {}", title(study)), study.place.clone()) }
+}
+
+/// Equation of the objective of a task.
+fn equation(task: Task, jumps: u32) -> String {
+    let (left, right) = match task {
+        Task::Forward => ("J_forward", "x_final - x_init"),
+        Task::LateralLeft => ("J_lateral-left", "y_final - y_init"),
+        Task::LateralRight => ("J_lateral-right", "-(y_final - y_init)"),
+        Task::TwistCcw => ("J_twist-ccw", "yaw_final - yaw_init"),
+        Task::TwistCw => ("J_twist-cw", "-(yaw_final - yaw_init)"),
+    };
+    match jumps {
+        0 | 1 => format!("{left} = {right}   [{}]", task.unit()),
+        jumps => format!("{left} = ({right}) / {jumps}   [{} per jump]", task.unit()),
+    }
+}
+
+fn objective(groups: &[Vec<&ReportedStudy>]) -> Section {
+    let mut section = Section::new("Objective");
+    for study in groups.iter().map(|group| group[0]) {
+        match study.task {
+            Some(task) => section.blocks.push(Block::Equation(equation(task, study.jumps))),
+            None => {
+                let direction = if study.direction == Direction::Minimize { "minimized" } else { "maximized" };
+                section.paragraph(format!("{}: a study of another program; its value is {direction}.", study.name));
+            }
+        }
+    }
+    if groups.iter().any(|group| group[0].task.is_some()) {
+        section.paragraph(
+            "J is maximized. The initial values are read when the impulse begins, the final ones when the robot has come to \
+             rest, both in the world frame turned so that the trial starts at yaw 0; yaw is unwrapped. A fall gives J = 0 \
+             and is reported to the sampler; a void trial is not. The paper is Quadruped-Frog (ICRA 2024), section II-D.",
+        );
+    }
+    section
+}
+
+fn results(studies: &[ReportedStudy], groups: &[Vec<&ReportedStudy>]) -> Section {
+    let mut section = Section::new("Results");
+    section.blocks.push(Block::Table(tables::studies(studies)));
+    section.blocks.push(Block::Table(tables::checkpoints(groups)));
+    for group in groups {
+        section.blocks.push(Block::Figure(TaskStudies::new(group).convergence()));
+        let best = tables::best(group);
+        if best.rows.is_empty() {
+            section.paragraph(format!("No trial of {} was accepted.", title(group[0])));
+        } else {
+            section.blocks.push(Block::Table(best));
+        }
+    }
+    section
+}
+
+/// Motion, force, torque and power of chosen trials of the best study of a task.
+fn jumps(group: &[&ReportedStudy], choices: &[TrialChoice]) -> Section {
+    let figures = TaskStudies::new(group);
+    let mut section = Section::new(format!("Jumps, {}", figures.name));
+    // The best study with ticks; without ticks the best study.
+    let rank = |study: &&&ReportedStudy| {
+        let value = study.best_row().and_then(|row| row.value).unwrap_or(f64::NEG_INFINITY);
+        let value = if study.direction == Direction::Minimize { -value } else { value };
+        (!study.recordings.trials.is_empty(), value)
+    };
+    let best = group.iter().max_by(|a, b| {
+        let (a, b) = (rank(a), rank(b));
+        a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
+    });
+    let Some(&study) = best else { return section };
+    let trials: Vec<DrawnTrial> = drawn(study, choices);
+    if trials.is_empty() {
+        section.paragraph("None of the chosen trials exists.");
+        return section;
+    }
+    let labels: Vec<&str> = trials.iter().map(|trial| trial.label.as_str()).collect();
+    let of = if group.len() > 1 { format!(" of {}, the best study with ticks", study.label()) } else { String::new() };
+    section.paragraph(format!("Drawn trials{of}: {}.", labels.join("; ")));
+    section.paragraph(ticks(study, &trials));
+    section.blocks.extend(figures.force(study, &trials).map(Block::Figure));
+    section.blocks.extend(tables::takeoff(study, &trials).map(Block::Table));
+    section.blocks.extend(tables::jumps(study, &trials).map(Block::Table));
+    let drawings =
+        [figures.motion(&trials), figures.torque(study, &trials), figures.peaks(study, &trials), figures.angles()];
+    section.blocks.extend(drawings.into_iter().flatten().map(Block::Figure));
+    section
+}
+
+/// Returns which of the drawn trials have ticks, and the remedy where some are missing.
+fn ticks(study: &ReportedStudy, trials: &[DrawnTrial]) -> String {
+    let missing: Vec<String> =
+        trials.iter().filter(|trial| trial.curves.is_none()).map(|trial| trial.row.trial.to_string()).collect();
+    let recorded = study.recordings.trials.len();
+    match (study.recordings.files.is_empty(), missing.len()) {
+        (true, _) => "No recording of this study exists: motion, torque and power cannot be drawn. `quadfrog optimize \
+                      --record all` and the console record ticks."
+            .to_owned(),
+        (false, 0) => format!("Ticks of {recorded} of {} trials are recorded.", study.rows.len()),
+        (false, _) => format!(
+            "Ticks of {recorded} of {} trials are recorded; those of trial {} are missing: its motion, torque and power \
+             cannot be drawn. `quadfrog optimize --record all` and the console record the ticks of every trial.",
+            study.rows.len(),
+            missing.join(", ")
+        ),
+    }
+}
+
+fn verdicts(studies: &[ReportedStudy]) -> Section {
+    let mut section = Section::new("Trials, verdicts and notes");
+    section.blocks.extend(tables::remarks(studies).map(Block::Table));
+    section.blocks.extend(studies.iter().map(|study| Block::Table(tables::trials(study))));
+    section
+}
+
+fn configuration(studies: &[ReportedStudy]) -> Section {
+    let mut section = Section::new("Configuration");
+    let mut shown: Vec<&ReportedStudy> = Vec::new();
+    for study in studies {
+        if study.configuration.is_empty() {
+            section.paragraph(format!("{}: no configuration was kept.", title(study)));
+            continue;
+        }
+        if let Some(same) = shown.iter().find(|known| known.configuration == study.configuration) {
+            section.paragraph(format!("{}: the configuration of {}.", title(study), title(same)));
+            continue;
+        }
+        match tables::configuration(study) {
+            Some(table) => {
+                section.paragraph(format!("{}:", title(study)));
+                section.blocks.push(Block::Table(table));
+            }
+            None => section.paragraph(format!("{}: the defaults.", title(study))),
+        }
+        for (name, text) in &study.configuration {
+            let summary = format!("{name}, {}", title(study));
+            section.blocks.push(Block::Folded { summary, text: text.clone() });
+        }
+        shown.push(study);
+    }
+    section
+}
+
+fn recordings(studies: &[ReportedStudy]) -> Section {
+    let mut section = Section::new("Recordings");
+    for study in studies {
+        let files: Vec<String> = study.recordings.files.iter().map(|file| file.display().to_string()).collect();
+        let read = if files.is_empty() { "no recording exists".to_owned() } else { files.join(", ") };
+        section.paragraph(format!("{}: {} with {read}.", title(study), study.place));
+        for damage in &study.recordings.damages {
+            section.paragraph(format!("{}: {damage}.", title(study)));
+        }
+    }
+    section
+}

@@ -1,0 +1,228 @@
+//! Tables of studies.
+
+use super::page::{Cell, Column, Table};
+use super::study::{ReportedStudy, mean_and_deviation};
+use super::study_figures::DrawnTrial;
+use crate::robot::JOINT_NAMES;
+use crate::trial::{TrialRecord, Verdict};
+
+/// Numbers of trials at which the best so far is listed.
+const CHECKPOINTS: [usize; 6] = [5, 10, 20, 50, 100, 200];
+
+/// Decimal places of a parameter: about four significant digits.
+fn digits(low: f64, high: f64) -> usize {
+    let most = low.abs().max(high.abs());
+    if most < 10.0 { 3 } else { usize::from(most < 1000.0) }
+}
+
+fn parameter_columns(study: &ReportedStudy) -> impl Iterator<Item = Column> {
+    study.parameters.iter().map(|parameter| Column::number(parameter.name.clone(), parameter.unit.clone()))
+}
+
+fn parameter_cells(study: &ReportedStudy, row: &TrialRecord) -> impl Iterator<Item = Cell> {
+    study.parameters.iter().map(|p| Cell::optional(row.parameters.get(&p.name), digits(p.low, p.high)))
+}
+
+/// Studies with counts of their trials and their best values.
+pub fn studies(studies: &[ReportedStudy]) -> Table {
+    let counts = ["trials", "accepted", "falls", "void"].map(|name| Column::number(name, ""));
+    let columns = [Column::text("study"), Column::text("robot")].into_iter().chain(counts);
+    let columns = columns.chain([Column::number("best J", ""), Column::text("unit"), Column::number("trial", "")]);
+    let mut table = Table::new("Studies.", columns);
+    for study in studies {
+        let count = |verdict| Cell::count(study.with(verdict).count());
+        let best = study.best_row();
+        table.rows.push(vec![
+            Cell::text(title(study)),
+            Cell::text(study.robot.clone()),
+            Cell::count(study.rows.len()),
+            count(Verdict::Accept),
+            count(Verdict::Fall),
+            count(Verdict::Void),
+            Cell::optional(best.and_then(|row| row.value), 3),
+            Cell::text(study.unit()),
+            best.map_or(Cell::Missing, |row| Cell::count(row.trial as usize)),
+        ]);
+    }
+    table
+}
+
+/// Task and seed, or the name of a study of another program.
+pub fn title(study: &ReportedStudy) -> String {
+    study.task.map_or_else(|| study.name.clone(), |task| format!("{}, {}", task.name(), study.label()))
+}
+
+/// Best so far after some numbers of trials, mean and deviation over the studies of each task.
+pub fn checkpoints(groups: &[Vec<&ReportedStudy>]) -> Table {
+    let longest = groups.iter().flatten().map(|study| study.best_so_far().len()).max().unwrap_or(0);
+    let mut at: Vec<usize> = CHECKPOINTS.into_iter().filter(|count| *count < longest).collect();
+    at.push(longest);
+    let columns = [Column::text("task"), Column::number("studies", "")].into_iter();
+    let columns = columns.chain(at.iter().map(|count| Column::number(format!("{count} trials"), "")));
+    let caption = "Best value so far, mean and standard deviation over the studies, in the unit of J.";
+    let mut table = Table::new(caption, columns);
+    for group in groups {
+        let curves: Vec<Vec<f64>> = group.iter().map(|study| study.best_so_far()).collect();
+        let cell = |count: &usize| {
+            let values: Option<Vec<f64>> =
+                curves.iter().map(|curve| curve.get(count - 1).copied().filter(|value| value.is_finite())).collect();
+            values.filter(|values| !values.is_empty()).map_or(Cell::Missing, |values| {
+                let (mean, deviation) = mean_and_deviation(&values);
+                let spread = if values.len() > 1 { format!(" +- {deviation:.3}") } else { String::new() };
+                Cell::text(format!("{mean:.3}{spread}"))
+            })
+        };
+        let name = group[0].task.map_or_else(|| group[0].name.clone(), |task| task.name().to_owned());
+        let unit = group[0].unit();
+        let name = if unit.is_empty() { name } else { format!("{name} ({unit})") };
+        let cells = [Cell::text(name), Cell::count(group.len())].into_iter().chain(at.iter().map(cell));
+        table.rows.push(cells.collect());
+    }
+    table
+}
+
+/// The best trial of each study of one task.
+pub fn best(group: &[&ReportedStudy]) -> Table {
+    let name = group[0].task.map_or(group[0].name.as_str(), |task| task.name());
+    let columns = [Column::text("study"), Column::number("trial", ""), Column::number("J", group[0].unit())];
+    let columns = columns.into_iter().chain(parameter_columns(group[0])).chain([
+        Column::number("dx", "m"),
+        Column::number("dy", "m"),
+        Column::number("dyaw", "rad"),
+        Column::number("rise", "m"),
+        Column::number("air", "s"),
+    ]);
+    let mut table = Table::new(format!("Best trial of each study, {name}."), columns);
+    for study in group {
+        let Some(row) = study.best_row() else { continue };
+        let own =
+            group[0].parameters.iter().map(|p| Cell::optional(row.parameters.get(&p.name), digits(p.low, p.high)));
+        let cells = [Cell::text(study.label()), Cell::count(row.trial as usize), Cell::optional(row.value, 3)];
+        table.rows.push(cells.into_iter().chain(own).chain(measured(row)).collect());
+    }
+    table
+}
+
+fn measured(row: &TrialRecord) -> [Cell; 5] {
+    let jump = row.measured.as_ref();
+    [
+        Cell::optional(jump.map(|jump| jump.dx_m), 3),
+        Cell::optional(jump.map(|jump| jump.dy_m), 3),
+        Cell::optional(jump.map(|jump| jump.dyaw_rad), 3),
+        Cell::optional(jump.map(|jump| jump.apex_m), 3),
+        Cell::optional(jump.map(|jump| jump.air_s), 3),
+    ]
+}
+
+/// The jumps of the drawn trials of several jumps in a row; none without such a trial.
+pub fn jumps(study: &ReportedStudy, drawn: &[DrawnTrial]) -> Option<Table> {
+    let numbers =
+        [("start", "s"), ("x", "m"), ("y", "m"), ("yaw", "rad"), ("tilt", "rad"), ("rise", "m"), ("air", "s")];
+    let columns = [Column::text("trial"), Column::number("jump", "")].into_iter();
+    let columns = columns.chain(numbers.map(|(name, unit)| Column::number(name, unit)));
+    let columns = columns.chain([Column::number("value", study.unit())]);
+    let caption = "Jumps in a row: time, position, turn and tilt at the start of each impulse; rise, longest flight and \
+                   share of the objective up to the next.";
+    let mut table = Table::new(caption, columns);
+    for trial in drawn {
+        let jumps = trial.row.measured.iter().flat_map(|measured| &measured.jumps);
+        let several = trial.row.measured.as_ref().is_some_and(|measured| measured.jumps.len() > 1);
+        for (index, jump) in jumps.enumerate().filter(|_| several) {
+            let numbers =
+                [jump.time_s, jump.x_m, jump.y_m, jump.yaw_rad, jump.tilt_rad, jump.rise_m, jump.air_s, jump.value];
+            let cells = [Cell::text(trial.label.clone()), Cell::count(index + 1)].into_iter();
+            table.rows.push(cells.chain(numbers.map(|number| Cell::number(number, 3))).collect());
+        }
+    }
+    (!table.rows.is_empty()).then_some(table)
+}
+
+/// Take-off, torque and power of the drawn trials; none without ticks.
+pub fn takeoff(study: &ReportedStudy, drawn: &[DrawnTrial]) -> Option<Table> {
+    let kinds = |what: &str, unit: &str| JOINT_NAMES.map(|name| Column::number(format!("{what} {name}"), unit));
+    let columns = [
+        Column::text("trial"),
+        Column::number("take-off", "s"),
+        Column::number("speed", "m/s"),
+        Column::number("angle of v", "deg"),
+        Column::number("angle of F", "deg"),
+    ];
+    let columns = columns.into_iter().chain(kinds("push torque", "N m")).chain(kinds("landing torque", "N m"));
+    let columns = columns.chain([Column::number("push power", "W"), Column::number("joint power", "W")]);
+    let caption = "Take-off, peak torque of each kind of joint before and after it, largest sum of positive joint powers \
+                   and largest power of one joint before it.";
+    let mut table = Table::new(caption, columns);
+    for trial in drawn {
+        let Some(jump) = study.recorded(trial.row.trial).and_then(|recorded| recorded.quantities) else { continue };
+        let mut cells = vec![
+            Cell::text(trial.label.clone()),
+            Cell::number(jump.takeoff_s, 3),
+            Cell::number(jump.takeoff_speed_m_s, 2),
+            Cell::number(jump.takeoff_angle_rad.to_degrees(), 1),
+            Cell::optional(study.force_angle_rad(trial.row).map(f64::to_degrees), 1),
+        ];
+        cells.extend(jump.push_torque_n_m.iter().chain(&jump.landing_torque_n_m).map(|value| Cell::number(*value, 1)));
+        cells.push(Cell::number(jump.push_power_w, 0));
+        cells.push(Cell::number(jump.joint_power_w.iter().copied().fold(0.0, f64::max), 0));
+        table.rows.push(cells);
+    }
+    (!table.rows.is_empty()).then_some(table)
+}
+
+/// All trials of a study.
+pub fn trials(study: &ReportedStudy) -> Table {
+    let columns = [Column::number("trial", "")].into_iter().chain(parameter_columns(study)).chain([
+        Column::number("J", study.unit()),
+        Column::number("dx", "m"),
+        Column::number("dy", "m"),
+        Column::number("dyaw", "rad"),
+        Column::number("rise", "m"),
+        Column::number("air", "s"),
+        Column::text("verdict"),
+        Column::text("source"),
+    ]);
+    let known = !study.recordings.files.is_empty();
+    let columns = columns.chain(known.then(|| Column::text("ticks")));
+    let mut table = Table::new(format!("Trials of {}.", title(study)), columns);
+    for row in &study.rows {
+        let ticks = if study.recorded(row.trial).is_some() { "yes" } else { "no" };
+        let verdict = row.verdict.map_or("none", Verdict::name);
+        let verdict = if study.best == Some(row.trial) { format!("{verdict}, best") } else { verdict.to_owned() };
+        let cells = std::iter::once(Cell::count(row.trial as usize)).chain(parameter_cells(study, row));
+        let cells = cells.chain([Cell::optional(row.value, 3)]).chain(measured(row));
+        let texts = [Cell::text(verdict), Cell::text(row.source.name())];
+        table.rows.push(cells.chain(texts).chain(known.then(|| Cell::text(ticks))).collect());
+    }
+    table
+}
+
+/// Falls, void trials and notes; none if there are none.
+pub fn remarks(studies: &[ReportedStudy]) -> Option<Table> {
+    let columns = ["study", "trial", "verdict", "cause", "note"].map(Column::text);
+    let mut table = Table::new("Falls and void trials with their causes, and notes.", columns);
+    for study in studies {
+        for row in &study.rows {
+            let failed = matches!(row.verdict, Some(Verdict::Fall | Verdict::Void));
+            if failed || !row.note.is_empty() {
+                table.rows.push(vec![
+                    Cell::text(title(study)),
+                    Cell::text(row.trial.to_string()),
+                    Cell::text(row.verdict.map_or("none", Verdict::name)),
+                    Cell::text(if failed { row.cause.clone() } else { String::new() }),
+                    Cell::text(row.note.clone()),
+                ]);
+            }
+        }
+    }
+    (!table.rows.is_empty()).then_some(table)
+}
+
+/// Keys of a configuration that differ from the defaults; none without a difference.
+pub fn configuration(study: &ReportedStudy) -> Option<Table> {
+    let mut table = Table::new("Keys that differ from the defaults.", ["key", "default", "value"].map(Column::text));
+    table.rows.extend(study.changed.iter().map(|changed| {
+        let shown = |text: &str| if text.is_empty() { Cell::Missing } else { Cell::text(text) };
+        vec![Cell::text(changed.key.clone()), shown(&changed.default), shown(&changed.value)]
+    }));
+    (!table.rows.is_empty()).then_some(table)
+}

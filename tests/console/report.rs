@@ -1,0 +1,305 @@
+//! `quadfrog report` on studies that the program made.
+
+#[path = "support/program.rs"]
+mod program;
+
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
+use program::{Program, assert_shows};
+use serde_json::Value;
+use xml::reader::{EventReader, XmlEvent};
+
+/// A finished study of five trials with all ticks, and its folder.
+fn study(more: &[&str]) -> (Program, String) {
+    let program = Program::new();
+    program.text(&[&["optimize", "--trials", "5", "--record", "all"], more].concat());
+    let study = program.study("recordings").to_str().unwrap().to_owned();
+    (program, study)
+}
+
+/// The exported trials of a study.
+fn exported(program: &Program, study: &str) -> Vec<Value> {
+    serde_json::from_str(&program.text(&["study", "export", study, "--format", "json"])).unwrap()
+}
+
+/// The page of `--json`.
+fn page(program: &Program, arguments: &[&str]) -> Value {
+    serde_json::from_str(&program.text(&[&["report", "--json"], arguments].concat())).unwrap()
+}
+
+/// The blocks of a page that are of a kind.
+fn blocks<'a>(page: &'a Value, kind: &'a str) -> Vec<&'a Value> {
+    let sections = page["sections"].as_array().unwrap().iter();
+    sections.flat_map(|section| section["blocks"].as_array().unwrap()).filter_map(|block| block.get(kind)).collect()
+}
+
+/// The table whose caption begins so.
+#[track_caller]
+fn table<'a>(page: &'a Value, caption: &str) -> &'a Value {
+    let found = |table: &&Value| table["caption"].as_str().unwrap().starts_with(caption);
+    blocks(page, "table").into_iter().find(found).unwrap_or_else(|| panic!("no table {caption}"))
+}
+
+/// The cells of a column.
+fn column(table: &Value, name: &str) -> Vec<Value> {
+    let columns = table["columns"].as_array().unwrap();
+    let at = columns.iter().position(|column| column["name"] == name).unwrap();
+    table["rows"].as_array().unwrap().iter().map(|row| row[at].clone()).collect()
+}
+
+/// Names and texts of the elements; fails where the document is not well-formed.
+fn parse(document: &str) -> (Vec<String>, Vec<String>) {
+    let (mut names, mut texts) = (Vec::new(), Vec::new());
+    for event in EventReader::from_str(document) {
+        match event.unwrap_or_else(|error| panic!("{error}")) {
+            XmlEvent::StartElement { name, .. } => names.push(name.local_name),
+            XmlEvent::Characters(text) => texts.push(text.trim().to_owned()),
+            _ => {}
+        }
+    }
+    (names, texts)
+}
+
+/// An HTML document as XML: the only void elements of a report are `meta`.
+fn as_xml(html: &str) -> String {
+    let parts = html.strip_prefix("<!DOCTYPE html>").unwrap().split("<meta ");
+    let closed = parts.enumerate().map(|(i, part)| if i == 0 { part.into() } else { part.replacen("\">", "\"/>", 1) });
+    closed.collect::<Vec<String>>().join("<meta ")
+}
+
+fn svgs(folder: &Path) -> Vec<(String, String)> {
+    let mut files: Vec<(String, String)> = fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .map(|path| (path.file_name().unwrap().to_str().unwrap().to_owned(), fs::read_to_string(path).unwrap()))
+        .collect();
+    files.sort();
+    files
+}
+
+#[test]
+fn a_page_is_well_formed_opens_offline_and_has_the_numbers_of_the_export() {
+    let (program, study) = study(&[]);
+    program.text(&["report", &study, "--output", "page.html", "--figures", "figures"]);
+    let html = fs::read_to_string(program.path("page.html")).unwrap();
+    let (names, texts) = parse(&as_xml(&html));
+    for reference in ["<script", "http:", "https:", "src=", "href=", "url(", "@import"] {
+        assert!(!html.contains(reference), "the page contains {reference}");
+    }
+    let page = page(&program, &[&study]);
+    let figures = blocks(&page, "figure");
+    assert_eq!(names.iter().filter(|name| *name == "svg").count(), figures.len());
+    for name in ["convergence", "parameters", "landings", "force", "motion", "torque", "peaks", "angles"] {
+        assert!(figures.iter().any(|figure| figure["name"] == format!("forward-{name}")), "no figure {name}");
+    }
+    let files = svgs(&program.path("figures"));
+    assert_eq!(files.len(), figures.len());
+    for (file, svg) in &files {
+        parse(svg);
+        let figure =
+            figures.iter().find(|figure| format!("{}.svg", figure["name"].as_str().unwrap()) == *file).unwrap();
+        for panel in figure["panels"].as_array().unwrap() {
+            for axis in [&panel["x"], &panel["y"]] {
+                let (label, unit) = (axis["label"].as_str().unwrap(), axis["unit"].as_str().unwrap());
+                let counted = label.starts_with("Trial") || label == "Joint";
+                assert_eq!(unit.is_empty(), counted, "{file}: axis {label}");
+                let shown = if unit.is_empty() { label.to_owned() } else { format!("{label} ({unit})") };
+                assert!(svg.contains(&format!("\n{shown}\n")), "{file}: axis {shown} is not drawn");
+            }
+        }
+    }
+    let trials = exported(&program, &study);
+    assert_eq!(trials.len(), 5);
+    let rows = table(&page, "Trials of forward, seed 0");
+    for (column_name, of) in [("J", "value"), ("rise", "apex_m"), ("dx", "dx_m"), ("air", "air_s")] {
+        let shown = column(rows, column_name);
+        for (trial, shown) in trials.iter().zip(&shown) {
+            let own = if of == "value" { &trial["value"] } else { &trial["user_attrs"][of] };
+            assert_eq!(shown.as_f64(), own.as_f64(), "trial {}: {column_name}", trial["number"]);
+            if let Some(number) = own.as_f64() {
+                let text = format!("{number:.3}").replace('-', "\u{2212}");
+                assert!(texts.contains(&text), "{column_name} {text} is not on the page");
+            }
+        }
+    }
+    for (trial, fx) in trials.iter().zip(column(rows, "Fx")) {
+        assert_eq!(trial["params"]["Fx"].as_f64(), fx.as_f64());
+    }
+}
+
+#[test]
+fn text_fits_a_terminal_and_has_the_tables_of_the_page() {
+    let (program, study) = study(&[]);
+    let text = program.text(&["report", &study]);
+    let place_lines = |line: &&str| !line.contains('/');
+    for line in text.lines().filter(place_lines) {
+        assert!(line.chars().count() <= 80, "{line}");
+    }
+    assert_shows(&text, &["J_forward = x_final - x_init", "Studies.", "(deg)", "(N m)", "(W)", "Best value so far"]);
+    let best = exported(&program, &study).iter().filter_map(|trial| trial["value"].as_f64()).fold(0.0, f64::max);
+    assert!(text.contains(&format!("{best:.3}")), "{text}");
+}
+
+#[test]
+fn takeoff_and_power_are_those_of_the_recorded_ticks() {
+    let (program, study) = study(&[]);
+    let page = page(&program, &[&study, "--trials", "best,1"]);
+    let takeoff = table(&page, "Take-off");
+    let number = |name: &str| column(takeoff, name)[0].as_f64().unwrap();
+    let trials = exported(&program, &study);
+    let best =
+        trials.iter().max_by(|a, b| a["value"].as_f64().unwrap().total_cmp(&b["value"].as_f64().unwrap())).unwrap();
+    let (fx, fz) = (best["params"]["Fx"].as_f64().unwrap(), best["params"]["Fz"].as_f64().unwrap());
+    assert!((number("angle of F") - fz.atan2(fx).to_degrees()).abs() < 1e-9);
+    // A ballistic flight of the recorded rise and time: v.z = g t / 2, and not below sqrt(2 g rise) less the push's part.
+    assert!((45.0..85.0).contains(&number("angle of v")), "{takeoff}");
+    assert!((2.0..4.5).contains(&number("speed")), "{takeoff}");
+    for (name, limit) in [("push torque hip", 23.7), ("push torque thigh", 23.7), ("push torque calf", 35.55)] {
+        let torque = number(name);
+        assert!(torque > 1.0 && torque <= limit + 1e-9, "{name} {torque}");
+    }
+    assert!(number("push power") > number("joint power") && number("push power") < 4000.0, "{takeoff}");
+}
+
+#[test]
+fn hostile_notes_are_text_in_every_form() {
+    let (program, study) = study(&[]);
+    let note = "<script>alert(1)</script> \\u001b[31mred & \\\"x\\\"";
+    let line = |name: &str, value: &str| {
+        format!(
+            "{{\"op_code\": 3, \"worker_id\": \"other\", \"study_id\": 0, \"system_attr\": {{\"{name}\": {value}}}}}\n"
+        )
+    };
+    let journal = Path::new(&study).join("study.log");
+    let mut text = fs::read_to_string(&journal).unwrap();
+    text += &line("dashboard:0:note_ver", "0");
+    text += &line("dashboard:0:note_str:0", &format!("\"{note}\""));
+    fs::write(&journal, text).unwrap();
+    let shown = program.text(&["report", &study]);
+    assert!(shown.contains("<script>alert(1)</script>") && shown.contains("\\u001b[31mred"), "{shown}");
+    assert!(shown.chars().all(|c| c == '\n' || !c.is_control()));
+    program.text(&["report", &study, "--output", "page.html"]);
+    let html = fs::read_to_string(program.path("page.html")).unwrap();
+    assert!(html.contains("&lt;script&gt;alert(1)&lt;/script&gt;") && !html.contains("<script"));
+    assert!(html.chars().all(|c| c == '\n' || !c.is_control()));
+    parse(&as_xml(&html));
+    let page = page(&program, &[&study]);
+    assert!(column(table(&page, "Falls"), "note").iter().any(|cell| cell.as_str().unwrap().contains('\u{1b}')));
+}
+
+#[test]
+fn several_studies_are_grouped_by_task_with_mean_and_deviation() {
+    let program = Program::new();
+    program.text(&["optimize", "--task", "forward,twist-ccw", "--seed", "0-1", "--trials", "5", "--record", "best"]);
+    let page = page(&program, &["recordings"]);
+    assert_eq!(table(&page, "Studies")["rows"].as_array().unwrap().len(), 4);
+    let best: Vec<f64> = program
+        .studies("recordings")
+        .iter()
+        .filter(|study| study.to_str().unwrap().contains("forward"))
+        .map(|study| {
+            let values = exported(&program, study.to_str().unwrap());
+            values.iter().filter_map(|trial| trial["value"].as_f64()).fold(0.0, f64::max)
+        })
+        .collect();
+    let (mean, deviation) = ((best[0] + best[1]) / 2.0, (best[0] - best[1]).abs() / 2f64.sqrt());
+    let row = &table(&page, "Best value so far")["rows"][0];
+    assert_eq!(row.as_array().unwrap().last().unwrap(), &format!("{mean:.3} +- {deviation:.3}"));
+    let names: Vec<&str> = blocks(&page, "figure").iter().map(|figure| figure["name"].as_str().unwrap()).collect();
+    assert!(names.contains(&"forward-convergence") && names.contains(&"twist-ccw-motion"), "{names:?}");
+    let convergence =
+        blocks(&page, "figure").into_iter().find(|figure| figure["name"] == "forward-convergence").unwrap();
+    let band = convergence["panels"][0]["series"][0]["shape"]["band"].as_array().unwrap().last().unwrap().clone();
+    assert!((band[1].as_f64().unwrap() - mean).abs() < 1e-12 && (band[2].as_f64().unwrap() - deviation).abs() < 1e-12);
+}
+
+#[test]
+fn trials_without_ticks_are_named() {
+    let program = Program::new();
+    program.text(&["optimize", "--trials", "3", "--record", "none"]);
+    let study = program.study("recordings").to_str().unwrap().to_owned();
+    assert_shows(&program.text(&["report", &study]), &["No recording of this study exists", "--record"]);
+    let program = Program::new();
+    program.text(&["optimize", "--trials", "4", "--record", "best"]);
+    let study = program.study("recordings").to_str().unwrap().to_owned();
+    let trials = exported(&program, &study);
+    let best =
+        trials.iter().max_by(|a, b| a["value"].as_f64().unwrap().total_cmp(&b["value"].as_f64().unwrap())).unwrap();
+    let other = if best["number"] == 3 { 2 } else { 3 };
+    let text = program.text(&["report", &study, "--trials", &format!("best,{other}")]).replace('\n', " ");
+    assert_shows(&text, &["Ticks of 1 of 4 trials are recorded", &format!("those of trial {other} are missing")]);
+}
+
+#[test]
+fn a_recording_that_was_cut_off_is_used_and_reported() {
+    let (program, study) = study(&[]);
+    let whole = Path::new(&study).join("session.mcap");
+    let bytes = fs::read(&whole).unwrap();
+    fs::write(whole.with_extension("mcap.part"), &bytes[..bytes.len() * 2 / 3]).unwrap();
+    fs::remove_file(&whole).unwrap();
+    let page = page(&program, &[&study]);
+    let ticks = column(table(&page, "Trials of"), "ticks");
+    assert_eq!(ticks[0], "yes");
+    assert_eq!(ticks[4], "no");
+    let paragraphs: Vec<&str> = blocks(&page, "paragraph").iter().map(|text| text.as_str().unwrap()).collect();
+    assert!(
+        paragraphs.iter().any(|text| text.contains("session.mcap.part") && text.contains("cut off")),
+        "{paragraphs:?}"
+    );
+}
+
+#[test]
+fn a_hardware_like_study_lists_the_keys_that_differ() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/hardware_like");
+    let (program, study) = study(&["--config", folder.to_str().unwrap()]);
+    let page = page(&program, &[&study]);
+    let keys = column(table(&page, "Keys that differ"), "key");
+    assert!(keys.iter().any(|key| key.as_str().unwrap().starts_with("simulator.toml: ")), "{keys:?}");
+    assert!(
+        blocks(&page, "folded").iter().any(|folded| folded["summary"].as_str().unwrap().starts_with("control.toml"))
+    );
+    assert!(!blocks(&page, "figure").is_empty());
+}
+
+#[test]
+fn other_files_are_not_overwritten_and_a_report_is() {
+    let (program, study) = study(&[]);
+    program.write("letter.html", "<!DOCTYPE html><p>mine</p>");
+    let message = program.refused(&["report", &study, "--output", "letter.html"]);
+    assert_shows(&message, &["letter.html", "not part of a report", "another name"]);
+    assert_eq!(fs::read_to_string(program.path("letter.html")).unwrap(), "<!DOCTYPE html><p>mine</p>");
+    program.write("figures/forward-motion.svg", "<svg/>");
+    assert!(program.refused(&["report", &study, "--figures", "figures"]).contains("forward-motion.svg"));
+    assert_eq!(svgs(&program.path("figures")).len(), 1);
+    assert!(program.refused(&["report", &study, "--output", "missing/page.html"]).contains("missing"));
+    assert!(program.refused(&["report", &study, "--output", "figures"]).contains("folder"));
+    program.text(&["report", &study, "--output", "page.html"]);
+    let first = fs::read_to_string(program.path("page.html")).unwrap();
+    program.text(&["report", &study, "--output", "page.html", "--trials", "1"]);
+    assert_ne!(fs::read_to_string(program.path("page.html")).unwrap(), first);
+    // A file of at most 4 kB, as on a full disk: the report of before stays, and nothing else.
+    let program_path = env!("CARGO_BIN_EXE_quadfrog");
+    let limited = format!("trap '' XFSZ; ulimit -f 8; exec {program_path} report {study} --output page.html");
+    let before = fs::read_to_string(program.path("page.html")).unwrap();
+    let output = Command::new("sh").args(["-c", &limited]).current_dir(program.path("")).output().unwrap();
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(1), "{message}");
+    assert_shows(&message, &["page.html", "cannot be written"]);
+    assert_eq!(fs::read_to_string(program.path("page.html")).unwrap(), before);
+    let names = fs::read_dir(program.path("")).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
+    assert!(names.into_iter().all(|name| !name.ends_with(".part")));
+}
+
+#[test]
+fn unusable_input_is_refused_with_the_remedy() {
+    let (program, study) = study(&[]);
+    assert_shows(&program.refused(&["report", "elsewhere"]), &["elsewhere", "no such journal"]);
+    assert!(!program.path("elsewhere").exists());
+    fs::create_dir(program.path("empty")).unwrap();
+    assert_shows(&program.refused(&["report", "empty"]), &["no study in this folder", "give"]);
+    assert_shows(&program.refused(&["report", &study, "--trials", "99"]), &["--trials 99", "at most 5 trials"]);
+    assert!(program.refused(&["report", &study, "--trials", "worst"]).contains("last-fall"));
+    program.refused(&["report"]);
+}

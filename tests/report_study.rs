@@ -1,0 +1,155 @@
+//! Derived quantities of a jump, measured from made-up ticks with known answers.
+
+use nalgebra::Vector3;
+use quadfrog::optimize::ask::Direction;
+use quadfrog::report::jump::{JumpCurves, JumpQuantities, force_angle_rad};
+use quadfrog::report::recorded::{RecordedTrial, Recordings};
+use quadfrog::report::study::{ReportedStudy, TrialChoice, mean_and_deviation, mean_best_so_far};
+use quadfrog::report::{study_page, text};
+use quadfrog::robot::description::RobotDescription;
+use quadfrog::telemetry::Tick;
+use quadfrog::trial::{JumpParameters, ParameterInfo, ProposalSource, Task, TrialRecord, Verdict};
+
+/// Ticks from -0.2 s: on the ground until 0.3 s but for a lift of 5 ms at 0.1 s, in the air until 0.8 s, then landed.
+fn ticks() -> Vec<Tick> {
+    (0..1400)
+        .map(|number: u64| {
+            let time_s = number as f64 * 1e-3 - 0.2;
+            let mut tick = Tick { number, trial: Some(4), trial_time_s: time_s, ..Tick::default() };
+            let lifted = (0.1..0.105).contains(&time_s);
+            tick.estimate.contact = [!(lifted || (0.3..0.8).contains(&time_s)); 4];
+            tick.estimate.velocity_world = Vector3::new(1.0, -1.0, if time_s < 0.2995 { 9.0 } else { 2.0 });
+            tick.estimate.roll_pitch_yaw = Vector3::new(0.1, 0.2, 0.3);
+            tick.estimate.position_world.z = if time_s < 0.0 { 0.2 } else { 0.25 };
+            let push = time_s < 0.2995;
+            tick.state.joint_torque_n_m[5] = if push { -20.0 } else { 30.0 };
+            tick.state.joint_velocity_rad_s[5] = -4.0;
+            tick.state.joint_torque_n_m[3] = 5.0;
+            tick.state.joint_velocity_rad_s[3] = if push { 2.0 } else { 50.0 };
+            // Brakes: its power is no part of the sum.
+            tick.state.joint_torque_n_m[1] = 7.0;
+            tick.state.joint_velocity_rad_s[1] = -9.0;
+            tick
+        })
+        .collect()
+}
+
+#[test]
+fn takeoff_is_the_first_flight_and_splits_push_and_landing() {
+    let jump = JumpQuantities::of(&ticks()).unwrap();
+    assert!((jump.takeoff_s - 0.3).abs() < 1e-9, "{jump:?}");
+    assert!((jump.takeoff_speed_m_s - 6f64.sqrt()).abs() < 1e-12);
+    assert!((jump.takeoff_angle_rad - 2f64.atan2(2f64.sqrt())).abs() < 1e-12);
+    assert_eq!(jump.push_torque_n_m, [5.0, 7.0, 20.0]);
+    assert_eq!(jump.landing_torque_n_m, [5.0, 7.0, 30.0]);
+    assert_eq!(jump.joint_power_w, [10.0, 0.0, 80.0]);
+    assert_eq!(jump.push_power_w, 90.0);
+    let standing: Vec<Tick> = ticks().into_iter().filter(|tick| tick.trial_time_s < 0.29).collect();
+    assert_eq!(JumpQuantities::of(&standing), None);
+    assert_eq!(JumpQuantities::of(&[]), None);
+}
+
+#[test]
+fn the_force_angle_is_that_of_the_amplitudes() {
+    let jump = JumpParameters { f0_hz: 1.0, f1_hz: 0.0, fx_n: 140.0, fy_n: 0.0, fz_n: 239.0 };
+    assert!((force_angle_rad(&jump, Task::Forward).to_degrees() - 59.64).abs() < 0.01);
+    let twist = JumpParameters { fx_n: 0.0, fy_n: 150.0, fz_n: 150.0, ..jump };
+    for task in [Task::LateralLeft, Task::LateralRight, Task::TwistCcw, Task::TwistCw] {
+        assert!((force_angle_rad(&twist, task).to_degrees() - 45.0).abs() < 1e-9);
+    }
+}
+
+#[test]
+fn feet_are_measured_from_the_beginning_of_the_impulse() {
+    let robot = RobotDescription::embedded("go1").unwrap();
+    let curves = JumpCurves::of(&ticks(), &robot, 0.1);
+    for foot in &curves.foot_height_m {
+        let at = |time: f64| foot.iter().rfind(|point| point[0] <= time).unwrap()[1];
+        assert!(at(0.5).abs() < 1e-12 && (at(-0.05) + 0.05).abs() < 1e-12);
+        assert!((foot[0][0] + 0.1).abs() < 1.5e-3, "begins at {}", foot[0][0]);
+    }
+    assert!(curves.torque_n_m[2].iter().any(|point| point[1] == 30.0));
+    assert_eq!(JumpCurves::of(&ticks()[..100], &robot, 0.1), JumpCurves::default());
+}
+
+fn row(trial: u32, verdict: Verdict, value: f64) -> TrialRecord {
+    let parameters = vec![("f0".to_owned(), 1.0), ("Fx".to_owned(), 100.0), ("Fz".to_owned(), 200.0)];
+    let value = (verdict != Verdict::Void).then_some(value);
+    TrialRecord { trial, verdict: Some(verdict), value, parameters: parameters.into(), ..TrialRecord::default() }
+}
+
+fn study(seed: u32, rows: Vec<TrialRecord>) -> ReportedStudy {
+    let info = |name: &str, unit: &str, low, high| ParameterInfo { name: name.into(), unit: unit.into(), low, high };
+    ReportedStudy {
+        place: "study".into(),
+        name: format!("forward-seed{seed}"),
+        task: Some(Task::Forward),
+        seed: Some(seed),
+        robot: "go1, simulated".into(),
+        direction: Direction::Maximize,
+        jumps: 1,
+        f1_hz: 0.0,
+        parameters: vec![info("f0", "Hz", 0.75, 1.75), info("Fx", "N", 0.0, 150.0), info("Fz", "N", 150.0, 350.0)],
+        best: Some(1),
+        limits: None,
+        recordings: Recordings::default(),
+        changed: Vec::new(),
+        configuration: Vec::new(),
+        rows,
+    }
+}
+
+fn rows() -> Vec<TrialRecord> {
+    let confirmed = TrialRecord { source: ProposalSource::Confirm, ..row(5, Verdict::Accept, 9.0) };
+    vec![
+        row(0, Verdict::Fall, 0.0),
+        row(1, Verdict::Accept, 0.5),
+        row(2, Verdict::Void, 0.0),
+        row(3, Verdict::Accept, 0.4),
+        row(4, Verdict::Accept, 0.7),
+        confirmed,
+    ]
+}
+
+#[test]
+fn best_so_far_counts_accepted_trials_alone() {
+    let best = study(0, rows()).best_so_far();
+    assert!(best[0].is_nan());
+    assert_eq!(best[1..], [0.5, 0.5, 0.7]);
+    let (first, second) =
+        (study(0, rows()), study(1, vec![row(0, Verdict::Accept, 0.1), row(1, Verdict::Accept, 0.3)]));
+    let mean = mean_best_so_far(&[&first, &second]);
+    assert_eq!(mean.len(), 1, "{mean:?}");
+    assert_eq!(mean[0].0, 2);
+    assert!((mean[0].1 - 0.4).abs() < 1e-12 && (mean[0].2 - 0.02f64.sqrt()).abs() < 1e-12);
+    assert_eq!(mean_and_deviation(&[3.0]), (3.0, 0.0));
+}
+
+#[test]
+fn chosen_trials_are_found_or_left_out() {
+    let study = study(0, rows());
+    let label = |choice: TrialChoice| choice.of(&study).map(|(_, label)| label);
+    assert_eq!(label(TrialChoice::Best).as_deref(), Some("best, trial 1"));
+    assert_eq!(label(TrialChoice::First).as_deref(), Some("first, trial 0, fall"));
+    assert_eq!(label(TrialChoice::Last).as_deref(), Some("last, trial 4"));
+    assert_eq!(label(TrialChoice::LastFall).as_deref(), Some("last fall, trial 0"));
+    assert_eq!(label(TrialChoice::Number(3)).as_deref(), Some("trial 3"));
+    assert_eq!(label(TrialChoice::Number(17)), None);
+}
+
+#[test]
+fn a_page_of_a_study_names_missing_ticks_and_draws_the_others() {
+    let mut study = study(0, rows());
+    let choices = [TrialChoice::Best, TrialChoice::First, TrialChoice::LastFall];
+    let without = study_page::page(std::slice::from_ref(&study), &choices);
+    assert!(text::render(&without, 80).contains("No recording of this study exists"));
+    let robot = RobotDescription::embedded("go1").unwrap();
+    study.recordings.files.push("session.mcap".into());
+    study.recordings.trials.insert(1, RecordedTrial::of(&ticks(), &robot).unwrap());
+    let page = study_page::page(std::slice::from_ref(&study), &choices);
+    let shown = text::render(&page, 80).replace('\n', " ");
+    assert!(shown.contains("Ticks of 1 of 6 trials are recorded; those of trial 0 are missing"), "{shown}");
+    let motion = page.figures().find(|figure| figure.name == "forward-motion").unwrap();
+    assert_eq!(motion.panels.len(), 6);
+    assert!(motion.panels.iter().all(|panel| panel.series.len() == 1 && panel.series[0].label == "best, trial 1"));
+}

@@ -1,0 +1,127 @@
+//! Studies of a place with their recordings and configuration.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use quadfrog::config::Config;
+use quadfrog::engine::{Opened, newest_config, open_stored, stored_studies, study_files, study_name};
+use quadfrog::optimize::study::Storage;
+use quadfrog::report::configuration;
+use quadfrog::report::recorded::Recordings;
+use quadfrog::report::study::{ReportedStudy, limits_of};
+use quadfrog::robot::description::{RobotDescription, RobotFiles};
+use quadfrog::session::experiment::rows_of;
+use quadfrog::trial::Backend;
+use serde_json::Value;
+
+use crate::subcommand::failure::Failure;
+use crate::subcommand::selection::parse_storage;
+
+/// Returns the studies of a place: of a study's folder, of the studies in a folder, of a journal's file or of a server.
+pub fn load(place: &str) -> Result<Vec<ReportedStudy>, Failure> {
+    let path = Path::new(place);
+    let storage = parse_storage(place);
+    if let Storage::File(file) = &storage
+        && !file.is_file()
+        && path.is_dir()
+    {
+        let files = study_files(path).map_err(|error| Failure::input(format!("{place}: {error}")))?;
+        if files.is_empty() {
+            let message =
+                format!("{place}: there is no study in this folder; give the folder of a study, as printed at its end");
+            return Err(Failure::input(message));
+        }
+        let studies = files.iter().map(|file| of_storage(&Storage::File(file.clone())));
+        return Ok(studies.collect::<Result<Vec<_>, _>>()?.concat());
+    }
+    of_storage(&storage)
+}
+
+/// Returns all studies of this program in a journal, or its only study of another program.
+fn of_storage(storage: &Storage) -> Result<Vec<ReportedStudy>, Failure> {
+    let folder = match storage {
+        Storage::File(file) => file.parent().map(Path::to_owned),
+        _ => None,
+    };
+    let kept = folder.as_deref().and_then(newest_config).map(|(_, config)| config);
+    let config = Config::load(kept.as_deref())?;
+    let exists = !matches!(storage, Storage::File(file) if !file.is_file());
+    let ours = if exists { stored_studies(storage)? } else { Vec::new() };
+    let mut opened: Vec<Opened> = Vec::new();
+    for study in &ours {
+        opened.push(open_stored(storage, Some(&study_name(study.task, study.seed)), &config)?);
+    }
+    if opened.is_empty() {
+        opened.push(open_stored(storage, None, &config)?);
+    }
+    let defaults = Config::load(None)?;
+    opened
+        .iter()
+        .map(|opened| reported(opened, storage, folder.as_deref(), kept.as_deref(), &config, &defaults))
+        .collect()
+}
+
+fn reported(
+    opened: &Opened,
+    storage: &Storage,
+    folder: Option<&Path>,
+    kept: Option<&Path>,
+    config: &Config,
+    defaults: &Config,
+) -> Result<ReportedStudy, Failure> {
+    let (study, ours) = (&opened.study, opened.ours.as_ref());
+    let robot = ours.and_then(|ours| description(kept, &ours.robot));
+    let control = ours.map(|ours| config.task(ours.task));
+    let recordings = match &robot {
+        Some(robot) => Recordings::read(&recordings(opened, folder), robot),
+        None => Recordings::default(),
+    };
+    let backend = study.attributes().get("backend").and_then(Value::as_str);
+    let machine = if backend == Some(Backend::Hardware.name()) { "hardware" } else { "simulated" };
+    Ok(ReportedStudy {
+        place: folder.map_or_else(|| storage.to_string(), |folder| folder.display().to_string()),
+        name: study.options().name.clone(),
+        task: ours.map(|ours| ours.task),
+        seed: ours.map(|ours| ours.seed),
+        robot: ours.map_or_else(String::new, |ours| format!("{}, {machine}", ours.robot)),
+        direction: study.options().direction,
+        jumps: control.map_or(1, |control| control.jumps),
+        f1_hz: control.map_or(0.0, |control| control.f1_hz),
+        parameters: opened.parameters.clone(),
+        rows: rows_of(study, &opened.parameters),
+        best: study.best().map(|best| best.number),
+        limits: robot.as_ref().map(limits_of),
+        recordings,
+        changed: kept.map_or_else(Vec::new, |_| configuration::differences(&defaults.as_run, &config.as_run)),
+        configuration: kept.map_or_else(Vec::new, |_| config.as_run.clone()),
+    })
+}
+
+/// Returns the robot of a kept configuration, else the built-in one of that name.
+fn description(kept: Option<&Path>, name: &str) -> Option<RobotDescription> {
+    let own = kept.map(|config| config.join("robot")).filter(|robot| robot.is_dir());
+    let own = own.and_then(|robot| RobotFiles::open(robot.to_str()?).ok()?.description().ok());
+    own.or_else(|| RobotDescription::embedded(name).ok())
+}
+
+/// Returns the recordings in a study's folder in the order of their sessions, then those that its trials name elsewhere.
+fn recordings(opened: &Opened, folder: Option<&Path>) -> Vec<PathBuf> {
+    let number = |path: &Path| -> Option<u32> {
+        let name = path.file_name()?.to_str()?;
+        let stem = name.strip_suffix(".part").unwrap_or(name).strip_suffix(".mcap")?.strip_prefix("session")?;
+        if stem.is_empty() { Some(1) } else { stem.strip_prefix('-')?.parse().ok() }
+    };
+    let entries = folder.and_then(|folder| std::fs::read_dir(folder).ok()).into_iter().flatten();
+    let paths = entries.filter_map(|entry| Some(entry.ok()?.path()));
+    let mut own: Vec<(u32, PathBuf)> = paths.filter_map(|path| Some((number(&path)?, path))).collect();
+    own.sort();
+    let named = opened.study.trials().iter().filter_map(|trial| trial.user_attributes.get("recording")?.as_str());
+    // A name without a folder is that of a file beside the journal.
+    let elsewhere: BTreeSet<PathBuf> = named.filter(|name| name.contains('/')).map(PathBuf::from).collect();
+    let mut all: Vec<PathBuf> = own.into_iter().map(|(_, path)| path).collect();
+    for path in elsewhere {
+        let found = [path.clone(), path.with_extension("mcap.part")].into_iter().find(|path| path.is_file());
+        all.extend(found.filter(|path| !all.contains(path)));
+    }
+    all
+}

@@ -1,0 +1,89 @@
+//! `quadfrog report`: studies as a page, as tables on the terminal, as JSON and as figures.
+
+mod load;
+mod write;
+
+use std::io::IsTerminal;
+use std::path::PathBuf;
+
+use clap::Args;
+use quadfrog::report::study::TrialChoice;
+use quadfrog::report::{html, study_page, svg, text};
+use quadfrog_console::{notice, output};
+
+use super::failure::Failure;
+pub use load::load;
+pub use write::{write_figures, write_page};
+
+/// Width of tables where the output is no terminal, characters.
+const WIDTH: usize = 80;
+
+#[derive(Debug, Args)]
+pub struct ReportArguments {
+    /// Folders of studies, folders that hold them, study.log files, Optuna journals, or redis://HOST:PORT/DB
+    #[arg(value_name = "STUDY", required = true)]
+    places: Vec<String>,
+    /// Write one HTML file with tables and figures that opens without a network
+    #[arg(long, short, value_name = "FILE.html")]
+    output: Option<PathBuf>,
+    /// Write each figure as an SVG file into this folder
+    #[arg(long, value_name = "DIR")]
+    figures: Option<PathBuf>,
+    /// Print the report as one JSON object, numbers unrounded, with the points of the figures
+    #[arg(long)]
+    json: bool,
+    /// Trials whose ticks are drawn: best, first, last, last-fall or numbers, separated by commas
+    #[arg(long, value_name = "WHICH", value_delimiter = ',', default_value = "best,first,last-fall", value_parser = choice)]
+    trials: Vec<TrialChoice>,
+}
+
+fn choice(text: &str) -> Result<TrialChoice, String> {
+    match text {
+        "best" => Ok(TrialChoice::Best),
+        "first" => Ok(TrialChoice::First),
+        "last" => Ok(TrialChoice::Last),
+        "last-fall" => Ok(TrialChoice::LastFall),
+        number => {
+            let number = number.parse().map(TrialChoice::Number);
+            number.map_err(|_| "give best, first, last, last-fall or the number of a trial".to_owned())
+        }
+    }
+}
+
+pub fn run(arguments: &ReportArguments) -> Result<(), Failure> {
+    let mut studies = Vec::new();
+    for place in &arguments.places {
+        studies.extend(load(place)?);
+    }
+    for choice in &arguments.trials {
+        if let TrialChoice::Number(number) = choice
+            && !studies.iter().any(|study| study.row(*number).is_some())
+        {
+            let most = studies.iter().map(|study| study.rows.len()).max().unwrap_or(0);
+            let message =
+                format!("--trials {number}: there is no such trial; the studies have at most {most} trials, from 0");
+            return Err(Failure::input(message));
+        }
+    }
+    let page = study_page::page(&studies, &arguments.trials);
+    if let Some(file) = &arguments.output {
+        write_page(file, &html::render(&page))?;
+        notice!("report: {}", file.display());
+    }
+    if let Some(folder) = &arguments.figures {
+        let count = write_figures(folder, page.figures().map(|figure| (figure.name.as_str(), svg::draw(figure))))?;
+        notice!("{count} figures: {}", folder.display());
+    }
+    if arguments.json {
+        output::line(&page.to_json().to_string());
+    } else if arguments.output.is_none() {
+        output::text(&text::render(&page, width()));
+    }
+    Ok(())
+}
+
+/// Width of the terminal, at least 80; 80 for other outputs.
+fn width() -> usize {
+    let terminal = std::io::stdout().is_terminal().then(crossterm::terminal::size);
+    terminal.and_then(Result::ok).map_or(WIDTH, |(columns, _)| usize::from(columns).max(WIDTH))
+}

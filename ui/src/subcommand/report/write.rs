@@ -1,0 +1,73 @@
+//! Files of a report: written beside their place and renamed, so that a file is whole or as before.
+
+use std::io::Write as _;
+use std::path::Path;
+
+use anyhow::Context;
+use quadfrog::report::{html, svg};
+
+use crate::subcommand::failure::Failure;
+
+/// Writes a page; an existing file is replaced only if it is a report.
+///
+/// # Errors
+/// When the file is something else, its folder does not exist, or it cannot be written.
+pub fn write_page(file: &Path, text: &str) -> Result<(), Failure> {
+    check(file, "--output", html::is_report)?;
+    write(file, text)
+}
+
+/// Writes figures as SVG files of their names into a folder, which is made; an existing file is replaced only if it is a
+/// figure of a report. Returns their number. Nothing is written if one of them is refused.
+///
+/// # Errors
+/// As of [`write_page`].
+pub fn write_figures<'a>(
+    folder: &Path,
+    figures: impl IntoIterator<Item = (&'a str, String)>,
+) -> Result<usize, Failure> {
+    if folder.exists() && !folder.is_dir() {
+        return Err(Failure::input(format!("--figures {}: it is a file; give a folder", folder.display())));
+    }
+    let files: Vec<_> = figures.into_iter().map(|(name, text)| (folder.join(format!("{name}.svg")), text)).collect();
+    std::fs::create_dir_all(folder)
+        .with_context(|| format!("{}: cannot be made", folder.display()))
+        .map_err(Failure::Other)?;
+    for (file, _) in &files {
+        check(file, "--figures", svg::is_figure)?;
+    }
+    for (file, text) in &files {
+        write(file, text)?;
+    }
+    Ok(files.len())
+}
+
+fn check(file: &Path, option: &str, is_ours: fn(&str) -> bool) -> Result<(), Failure> {
+    let refuse = |what: &str| Err(Failure::input(format!("{option}: {}: {what}", file.display())));
+    let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty());
+    if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
+        return refuse(&format!("the folder {} does not exist; make it first", folder.display()));
+    }
+    if file.is_dir() || file.file_name().is_none() {
+        return refuse("it is a folder; give the name of a file in it");
+    }
+    match std::fs::read(file) {
+        Ok(bytes) if is_ours(&String::from_utf8_lossy(&bytes)) => Ok(()),
+        Ok(_) => refuse("the file exists and is not part of a report; give another name or remove it"),
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(()),
+        Err(error) => refuse(&format!("cannot be read: {error}; give another name")),
+    }
+}
+
+fn write(file: &Path, text: &str) -> Result<(), Failure> {
+    let name = file.file_name().unwrap_or_default().to_string_lossy();
+    let part = file.with_file_name(format!(".{name}.{}.part", std::process::id()));
+    let written = std::fs::File::create(&part)
+        .and_then(|mut to| to.write_all(text.as_bytes()).and_then(|()| to.sync_all()))
+        .and_then(|()| std::fs::rename(&part, file));
+    if written.is_err() {
+        // The error that is reported is that of the writing.
+        let _ = std::fs::remove_file(&part);
+    }
+    written.with_context(|| format!("{}: cannot be written", file.display())).map_err(Failure::Other)
+}
