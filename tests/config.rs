@@ -97,6 +97,78 @@ fn a_parameter_that_does_not_exist_is_refused_with_those_that_do() {
     refuses("optimize.toml", "[parameters]\nforward = [\"f0\", \"Fw\"]\n", &["Fw", "Fx"]);
 }
 
+fn loads(text: &str) -> Config {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("optimize.toml"), text).unwrap();
+    Config::load(Some(folder.path())).unwrap()
+}
+
+fn bounds(config: &Config, task: Task, name: &str) -> Option<[f64; 2]> {
+    let found = config.parameters(task).into_iter().find(|parameter| parameter.name == name);
+    found.map(|parameter| [parameter.low, parameter.high])
+}
+
+/// `docs/method.md`, "Amplitude signs".
+#[test]
+fn only_the_second_direction_of_a_task_has_negative_bounds() {
+    let lateral = "lateral-left = [\"f0\", \"Fx\", \"Fy\", \"Fz\"]\n";
+    let config = loads(&format!("[bounds]\nFx = [-50, 120]\nFy = [0, 90]\n[parameters]\n{lateral}"));
+    assert_eq!(bounds(&config, Task::LateralLeft, "Fx"), Some([-50.0, 120.0]));
+    assert_eq!(bounds(&config, Task::Forward, "Fx"), Some([0.0, 120.0]), "its own direction is positive");
+    assert_eq!(bounds(&config, Task::LateralLeft, "Fy"), Some([0.0, 90.0]));
+    assert_eq!(config.limits(Task::LateralLeft, "Fx"), Some([-200.0, 200.0]), "the limit is of the magnitude");
+    assert_eq!(config.limits(Task::Forward, "Fx"), Some([0.0, 200.0]));
+    let widest = config.widest(Task::LateralLeft);
+    let fx = widest.iter().find(|parameter| parameter.name == "Fx").unwrap();
+    assert_eq!([fx.low, fx.high], [-200.0, 200.0]);
+    refuses(
+        "optimize.toml",
+        "[bounds]\nFx = [-50, 120]\n",
+        &[":2", "bounds.Fx", "[-50, 120]", "[0, 200]", "[parameters] Fx"],
+    );
+    refuses("optimize.toml", "[bounds]\nFz = [-50, 300]\n", &["bounds.Fz", "[0, 400]"]);
+    let beyond = format!("[bounds]\nFx = [-201, 120]\n[parameters]\n{lateral}");
+    refuses("optimize.toml", &beyond, &[":2", "bounds.Fx", "[-201, 120]", "[-200, 200]"]);
+    let backward = format!("[bounds]\nFx = [-50, -20]\n[parameters]\n{lateral}");
+    let config = loads(&backward);
+    assert_eq!(bounds(&config, Task::LateralLeft, "Fx"), Some([-50.0, -20.0]));
+    let robot = RobotDescription::embedded("go1").unwrap();
+    config.settings(&robot, Task::LateralLeft, Backend::Simulator).unwrap();
+    let error = config.settings(&robot, Task::Forward, Backend::Simulator).unwrap_err().to_string();
+    assert!(
+        error.contains("bounds.Fx") && error.contains("[-50.0, -20.0]: forward pushes with positive Fx"),
+        "{error}"
+    );
+    let first = |task: &str| {
+        format!("[bounds]\nFx = [-50, 120]\n[parameters]\n{lateral}[first.{task}]\nf0 = 1.0\nFx = -10.0\n")
+    };
+    assert_eq!(loads(&first("lateral-left")).first(Task::LateralLeft).get("Fx"), Some(-10.0));
+    refuses("optimize.toml", &first("forward"), &["first.forward.Fx", "-10", "[0, 120]"]);
+}
+
+#[test]
+fn gains_may_be_parameters_within_the_limits_of_gains() {
+    let config =
+        loads("[bounds]\nkp = [350, 700]\n[parameters]\nforward = [\"f0\", \"Fx\", \"Fz\", \"kp\", \"kd_joint\"]\n");
+    let parameters = config.parameters(Task::Forward);
+    let named: Vec<_> = parameters.iter().map(|p| (p.name.as_str(), p.unit.as_str(), p.low, p.high)).collect();
+    assert_eq!(named[3..], [("kp", "N/m", 350.0, 700.0), ("kd_joint", "N m s/rad", 0.2, 2.0)]);
+    let names =
+        |gains: Vec<quadfrog::trial::ParameterInfo>| gains.into_iter().map(|gain| gain.name).collect::<Vec<_>>();
+    assert_eq!(names(config.fixed_gains(Task::Forward)), ["kd", "k_att"]);
+    assert_eq!(names(config.fixed_gains(Task::TwistCw)), ["kp", "kd", "kd_joint", "k_att"]);
+    let searched = "[parameters]\nforward = [\"f0\", \"Fx\", \"Fz\", \"kp\"]\n";
+    let beyond = format!("[bounds]\nkp = [200, 700]\n{searched}");
+    refuses("optimize.toml", &beyond, &[":2", "bounds.kp", "[200, 700]", "[300, 800]", "safety.toml, [gains] kp"]);
+    // The shipped bounds bind nothing where no task searches the gain.
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("safety.toml"), "[gains]\nkp = [350.0, 450.0]\n").unwrap();
+    Config::load(Some(folder.path())).unwrap();
+    fs::write(folder.path().join("optimize.toml"), searched).unwrap();
+    let error = Config::load(Some(folder.path())).unwrap_err().to_string();
+    assert!(error.contains("bounds.kp") && error.contains("[350, 450]"), "{error}");
+}
+
 /// Regression: without f0 the impulse never ended.
 #[test]
 fn a_task_without_f0_or_a_frequency_of_zero_is_refused() {
@@ -150,7 +222,14 @@ fn a_stance_that_kneels_is_refused_and_the_shipped_ones_do_not() {
     fs::write(folder.path().join("control.toml"), "[tasks.twist-ccw]\nstance_m = [0.03, 0.045, -0.172]\n").unwrap();
     let error = settings(&Config::load(Some(folder.path())).unwrap()).unwrap_err().to_string();
     assert!(error.contains("control.toml:2") && error.contains("kneels before the jump"), "{error}");
-    for example in ["high_twist", "stable_landing", "continuous", "rough_terrain", "hardware_like"] {
+    // The softest gain of a study counts: at 400 N/m this stance stands.
+    fs::write(folder.path().join("control.toml"), "[tasks.twist-ccw]\nstance_m = [0.03, 0.045, -0.22]\n").unwrap();
+    settings(&Config::load(Some(folder.path())).unwrap()).unwrap();
+    let search = "[parameters]\ntwist-ccw = [\"f0\", \"Fy\", \"Fz\", \"kp\"]\n";
+    fs::write(folder.path().join("optimize.toml"), search).unwrap();
+    let error = settings(&Config::load(Some(folder.path())).unwrap()).unwrap_err().to_string();
+    assert!(error.contains("kneels before the jump") && error.contains("kp = 300"), "{error}");
+    for example in ["high_twist", "stable_landing", "continuous", "rough_terrain", "hardware_like", "far"] {
         let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("examples").join(example);
         settings(&Config::load(Some(&path)).unwrap()).unwrap();
     }

@@ -9,11 +9,12 @@ use quadfrog::config::Config;
 use quadfrog::engine::{EngineError, Options, check_backend, open_experiment};
 use quadfrog::optimize::ask::{SamplerConfig, SamplerKind};
 use quadfrog::optimize::journal::Durability;
-use quadfrog::optimize::study::Storage;
+use quadfrog::optimize::space::{Range, Space};
+use quadfrog::optimize::study::{Storage, Study, StudyOptions};
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::session::experiment::{Experiment, ExperimentPlan};
 use quadfrog::telemetry::TrialEnd;
-use quadfrog::trial::{Backend, HopEnvelope, Task, Verdict};
+use quadfrog::trial::{Backend, HopEnvelope, ParameterInfo, Task, Verdict};
 use support::{BOUNDS, accept, plan, run, study};
 
 fn options(folder: &Path, backend: Backend) -> Options {
@@ -75,11 +76,7 @@ fn a_study_of_an_earlier_version_counts_as_simulated_and_another_robot_is_refuse
 fn on_hardware(kind: SamplerKind) -> Experiment {
     let mut study = study(Storage::Memory);
     let sampler = SamplerConfig { kind, ..study.options().sampler.clone() };
-    study = quadfrog::optimize::study::Study::open(
-        Storage::Memory,
-        quadfrog::optimize::study::StudyOptions { sampler, ..study.options().clone() },
-    )
-    .unwrap();
+    study = Study::open(Storage::Memory, StudyOptions { sampler, ..study.options().clone() }).unwrap();
     let envelope = Some(HopEnvelope { start: 0.4, step: 0.1 });
     Experiment::open(ExperimentPlan { backend: Backend::Hardware, envelope, ..plan(30) }, study).unwrap()
 }
@@ -135,6 +132,46 @@ fn values_beyond_the_envelope_are_refused_with_the_reason() {
     experiment.undo().unwrap();
     experiment.judge(Verdict::Fall, false).unwrap();
     assert!(experiment.set_parameter("Fz", 250.0).is_err());
+}
+
+/// The share acts on the magnitude of a force with both signs.
+#[test]
+fn the_envelope_holds_on_both_sides_of_a_second_direction() {
+    for (bounds, allowed, beyond) in [
+        ([-50.0, 100.0], [-20.0, 40.0], [-21.0, 41.0]),
+        ([0.0, 100.0], [-40.0, 40.0], [-41.0, 41.0]),
+        ([-50.0, -20.0], [-32.0, 32.0], [-33.0, 33.0]),
+    ] {
+        let mut plan = ExperimentPlan {
+            backend: Backend::Hardware,
+            envelope: Some(HopEnvelope { start: 0.4, step: 0.1 }),
+            ..plan(30)
+        };
+        let [low, high] = bounds;
+        plan.parameters.push(ParameterInfo { name: "Fy".into(), unit: "N".into(), low, high });
+        plan.widest.push(ParameterInfo { name: "Fy".into(), unit: "N".into(), low: -200.0, high: 200.0 });
+        let base = study(Storage::Memory);
+        let ranges = plan.parameters.iter().map(|p| (p.name.clone(), Range::linear(p.low, p.high)));
+        let options = StudyOptions { space: Space::new(ranges).unwrap(), ..base.options().clone() };
+        let mut experiment = Experiment::open(plan, Study::open(Storage::Memory, options).unwrap()).unwrap();
+        for _ in 0..8 {
+            let point = experiment.proposal().unwrap().parameters;
+            let fy = point.iter().find(|p| p.name == "Fy").unwrap().value;
+            assert!((allowed[0]..=allowed[1]).contains(&fy), "{bounds:?}: drawn {fy}");
+            experiment.skip().unwrap();
+        }
+        // Wider bounds of the operator change nothing.
+        experiment.narrow_bounds("Fy", -200.0, 200.0).unwrap();
+        for value in allowed {
+            experiment.set_parameter("Fy", value).unwrap();
+        }
+        for value in beyond {
+            let refusal = experiment.set_parameter("Fy", value).unwrap_err().to_string();
+            assert!(refusal.contains("Fy") && refusal.contains("beyond the hop envelope"), "{bounds:?}: {refusal}");
+            assert!(experiment.enqueue(&[("Fy".into(), value)]).is_err());
+            assert!(experiment.fix("Fy", value, 2).is_err());
+        }
+    }
 }
 
 /// A point that another program has queued cannot run.

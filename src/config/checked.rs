@@ -10,6 +10,7 @@ use super::ConfigError;
 use super::files::{ControlFile, OptimizeFile, SafetyFile};
 use super::merge::{FileOrigin, lookup, merge};
 use super::ranges;
+use crate::control::force_profile::second_direction;
 use crate::control::settings::{ControlSettings, ObjectiveSource, StandSettings, TaskControl};
 use crate::optimize::ask::SamplerKind;
 use crate::realtime::scheduling::Scheduling;
@@ -56,11 +57,11 @@ twist-cw = { duration_s = 1.0 }
 [sampler]
 startup_trials = 10
 [first]
-forward = { f0 = 1.0, f1 = 1.0, Fx = 1.0, Fy = 1.0, Fz = 1.0 }
-lateral-left = { f0 = 1.0, f1 = 1.0, Fx = 1.0, Fy = 1.0, Fz = 1.0 }
-lateral-right = { f0 = 1.0, f1 = 1.0, Fx = 1.0, Fy = 1.0, Fz = 1.0 }
-twist-ccw = { f0 = 1.0, f1 = 1.0, Fx = 1.0, Fy = 1.0, Fz = 1.0 }
-twist-cw = { f0 = 1.0, f1 = 1.0, Fx = 1.0, Fy = 1.0, Fz = 1.0 }
+forward = { f0 = 1.0, f1 = 1.0, Fx = 1.0, Fy = 1.0, Fz = 1.0, kp = 1.0, kd = 1.0, kd_joint = 1.0, k_att = 1.0 }
+lateral-left = { f0 = 1.0, f1 = 1.0, Fx = 1.0, Fy = 1.0, Fz = 1.0, kp = 1.0, kd = 1.0, kd_joint = 1.0, k_att = 1.0 }
+lateral-right = { f0 = 1.0, f1 = 1.0, Fx = 1.0, Fy = 1.0, Fz = 1.0, kp = 1.0, kd = 1.0, kd_joint = 1.0, k_att = 1.0 }
+twist-ccw = { f0 = 1.0, f1 = 1.0, Fx = 1.0, Fy = 1.0, Fz = 1.0, kp = 1.0, kd = 1.0, kd_joint = 1.0, k_att = 1.0 }
+twist-cw = { f0 = 1.0, f1 = 1.0, Fx = 1.0, Fy = 1.0, Fz = 1.0, kp = 1.0, kd = 1.0, kd_joint = 1.0, k_att = 1.0 }
 ",
     ),
 ];
@@ -168,15 +169,22 @@ impl Config {
         &self.control.tasks[task.name()]
     }
 
-    /// Returns the parameters of `task` with their bounds, in table order.
+    /// Returns the parameters of `task`, gains among them, with their bounds, in table order. Only the second direction of a task has
+    /// negative bounds; for other parameters the part above zero holds.
     pub fn parameters(&self, task: Task) -> Vec<ParameterInfo> {
         self.optimize.parameters[task.name()]
             .iter()
             .map(|name| {
                 let [low, high] = self.optimize.bounds[name];
+                let low = if name == second_direction(task) { low } else { low.max(0.0) };
                 ParameterInfo { name: name.clone(), unit: parameter_unit(name).to_owned(), low, high }
             })
             .collect()
+    }
+
+    /// Whether `task` optimizes the parameter or gain `name`.
+    pub fn optimizes(&self, task: Task, name: &str) -> bool {
+        self.optimize.parameters[task.name()].iter().any(|parameter| parameter == name)
     }
 
     /// Returns the first point of a new study of `task`; empty if none is given.
@@ -188,16 +196,28 @@ impl Config {
 
     /// Returns the same parameters with the widest bounds that `safety.toml` allows.
     pub fn widest(&self, task: Task) -> Vec<ParameterInfo> {
-        let widest = |parameter: ParameterInfo| {
-            let [low, high] = self.safety.parameters[&parameter.name];
-            ParameterInfo { low, high, ..parameter }
+        let widest = |parameter: ParameterInfo| match self.limits(task, &parameter.name) {
+            Some([low, high]) => ParameterInfo { low, high, ..parameter },
+            None => parameter,
         };
         self.parameters(task).into_iter().map(widest).collect()
+    }
+
+    /// Returns the limits of `safety.toml` for a parameter or gain of `task`, in its unit; none for an unknown name. The limit of
+    /// a second direction is of the magnitude.
+    pub fn limits(&self, task: Task, name: &str) -> Option<[f64; 2]> {
+        let &[least, most] = self.safety.parameters.get(name).or_else(|| self.safety.gains.get(name))?;
+        Some([if name == second_direction(task) { -most } else { least }, most])
     }
 
     /// Returns the growth of the largest forces; none on the simulator.
     pub fn hop_envelope(&self, backend: Backend) -> Option<HopEnvelope> {
         (backend == Backend::Hardware).then_some(self.safety.hop_envelope)
+    }
+
+    /// Returns the gains that are no parameters of `task`, with their allowed ranges, in table order.
+    pub fn fixed_gains(&self, task: Task) -> Vec<ParameterInfo> {
+        self.gains().into_iter().filter(|gain| !self.optimizes(task, &gain.name)).collect()
     }
 
     /// Returns the controller's gains with their allowed ranges, in table order.
@@ -261,6 +281,7 @@ impl Config {
     ) -> Result<ControlSettings, ConfigError> {
         let chosen = self.task(task);
         self.check_stance(robot, task)?;
+        self.check_directions(task)?;
         let hardware = backend == Backend::Hardware;
         if hardware {
             self.check_hardware(robot)?;

@@ -11,7 +11,8 @@ use crate::trial::Task;
 
 impl Config {
     /// Writes the files of this configuration into `folder`: a new study of `task` begins with `point` (`[first.<task>]` in
-    /// `optimize.toml`), and its trials run with `gains`, both by name. Returns the written files.
+    /// `optimize.toml`), and its trials run with `gains`, both by name. A gain that is a parameter of `task` is part of the point
+    /// only. Returns the written files.
     ///
     /// # Errors
     /// [`ConfigError::Write`] when a file exists already or cannot be written: nothing is overwritten.
@@ -31,10 +32,11 @@ impl Config {
         if let Some(path) = paths.iter().find(|path| path.exists()) {
             return Err(ConfigError::Write { path: path.clone(), source: std::io::ErrorKind::AlreadyExists.into() });
         }
+        let gains: Vec<_> = gains.iter().filter(|(name, _)| !self.optimizes(task, name)).cloned().collect();
         for ((name, text), path) in self.as_run.iter().zip(&paths) {
             let text = match name.as_str() {
                 "optimize.toml" => with(text, &["first", task.name()], point),
-                "control.toml" => with(text, &["tasks", task.name()], gains),
+                "control.toml" => with(text, &["tasks", task.name()], &gains),
                 _ => text.clone(),
             };
             let mut file = OpenOptions::new().write(true).create_new(true).open(path).map_err(write(path))?;

@@ -4,10 +4,11 @@ use super::ConfigError;
 use super::checked::Config;
 use super::files::SafetyFile;
 use super::kneeling;
+use crate::control::force_profile::second_direction;
 use crate::robot::Leg;
 use crate::robot::description::RobotDescription;
 use crate::sim::SimError;
-use crate::trial::{Backend, Task, parameter_unit};
+use crate::trial::{Backend, ParameterInfo, Task, is_gain, parameter_unit};
 
 const CONTROL: &str = "control.toml";
 const SAFETY: &str = "safety.toml";
@@ -48,9 +49,8 @@ impl Config {
                 let reason = format!("{jumps} = {} is given, too; give one of them", chosen.jumps);
                 return Err(self.refuse(CONTROL, &duration, duration_s, reason));
             }
-            let f1_is_parameter = self.optimize.parameters[task.name()].iter().any(|name| name == "f1");
             let in_a_row = chosen.jumps > 1 || chosen.duration_s.is_some();
-            if in_a_row && chosen.f1_hz < LEAST_F1_HZ && !f1_is_parameter {
+            if in_a_row && chosen.f1_hz < LEAST_F1_HZ && !self.optimizes(task, "f1") {
                 let reason = "several jumps in a row need a frequency between them; give at least 0.05 Hz, or make f1 a parameter in optimize.toml";
                 return Err(self.refuse(CONTROL, &format!("{tables}.f1_hz"), chosen.f1_hz, reason));
             }
@@ -115,29 +115,13 @@ impl Config {
         for (name, [low, high]) in &self.optimize.bounds {
             let key = format!("bounds.{name}");
             let value = format!("[{low}, {high}]");
-            let [least, most] = self.safety.parameters[name];
             if !(low.is_finite() && high.is_finite() && low <= high) {
                 return Err(self.refuse(OPTIMIZE, &key, value, "must be [lower, upper] with lower <= upper"));
             }
             if parameter_unit(name) == "Hz" && *low <= 0.0 {
                 return Err(self.refuse(OPTIMIZE, &key, value, "a frequency must be above 0 Hz"));
             }
-            if *low < least || *high > most {
-                let reason = format!(
-                    "outside the robot's limits [{least}, {most}] of safety.toml, [parameters] {name}; narrow the bounds"
-                );
-                return Err(self.refuse(OPTIMIZE, &key, value, reason));
-            }
-        }
-        for (task, point) in &self.optimize.first {
-            for (name, value) in point {
-                let [low, high] = self.optimize.bounds[name];
-                if !(*value >= low && *value <= high) {
-                    let reason =
-                        format!("outside its bounds [{low}, {high}]: widen the bounds or remove the first point");
-                    return Err(self.refuse(OPTIMIZE, &format!("first.{task}.{name}"), value, reason));
-                }
-            }
+            self.check_bound_limits(name, [*low, *high])?;
         }
         for (task, names) in &self.optimize.parameters {
             let key = format!("parameters.{task}");
@@ -159,7 +143,57 @@ impl Config {
                 }
             }
         }
+        Task::ALL.into_iter().try_for_each(|task| self.check_first(task))
+    }
+
+    /// Checks that the first point of `task` is within the bounds.
+    fn check_first(&self, task: Task) -> Result<(), ConfigError> {
+        let searched = self.parameters(task);
+        for (name, value) in self.optimize.first.get(task.name()).into_iter().flatten() {
+            let of_task = searched.iter().find(|p| p.name == *name).map(|p| [p.low, p.high]);
+            let [low, high] = of_task.unwrap_or(self.optimize.bounds[name]);
+            if !(*value >= low && *value <= high) {
+                let reason = format!("outside its bounds [{low}, {high}]: widen the bounds or remove the first point");
+                return Err(self.refuse(OPTIMIZE, &format!("first.{}.{name}", task.name()), value, reason));
+            }
+        }
         Ok(())
+    }
+
+    /// Checks the bounds of a parameter against its limits in `safety.toml`, those of a gain only where a task optimizes it.
+    /// Negative bounds need a task whose second direction it is; the other tasks search the part above zero.
+    fn check_bound_limits(&self, name: &str, [low, high]: [f64; 2]) -> Result<(), ConfigError> {
+        let refuse =
+            |reason: String| self.refuse(OPTIMIZE, &format!("bounds.{name}"), format!("[{low}, {high}]"), reason);
+        let tasks: Vec<Task> = Task::ALL.into_iter().filter(|task| self.optimizes(*task, name)).collect();
+        let is_second = |task: &Task| second_direction(*task) == name;
+        let outside = |[least, most]: [f64; 2], low: f64| {
+            let table = if is_gain(name) { "gains" } else { "parameters" };
+            (low < least || high > most).then(|| {
+                format!(
+                    "outside the robot's limits [{least}, {most}] of safety.toml, [{table}] {name}; narrow the bounds"
+                )
+            })
+        };
+        let both_signs = tasks.iter().any(is_second);
+        let of_task = |task: &Task| {
+            let low = if both_signs && !is_second(task) { low.max(0.0) } else { low };
+            outside(self.limits(*task, name)?, low)
+        };
+        let unused =
+            || self.safety.parameters.get(name).filter(|_| tasks.is_empty()).and_then(|limits| outside(*limits, low));
+        let reason = tasks.iter().find_map(of_task).or_else(unused);
+        reason.map_or(Ok(()), |reason| Err(refuse(reason)))
+    }
+
+    /// Checks that bounds below zero leave something to search for `task`: they are those of another task's second direction.
+    pub(super) fn check_directions(&self, task: Task) -> Result<(), ConfigError> {
+        let searched = self.parameters(task);
+        let Some(ParameterInfo { name, .. }) = searched.iter().find(|parameter| parameter.low > parameter.high) else {
+            return Ok(());
+        };
+        let reason = format!("{} pushes with positive {name} only; give an upper bound above 0", task.name());
+        Err(self.refuse(OPTIMIZE, &format!("bounds.{name}"), format!("{:?}", self.optimize.bounds[name]), reason))
     }
 
     /// Checks that the stance of `task` is within the robot's reach and joint limits.
@@ -186,11 +220,13 @@ impl Config {
                 }
             }
         }
-        let clearance_m = kneeling::clearance_m(robot, &chosen.stance_leg(), chosen.kp);
+        let softest = self.parameters(task).into_iter().find(|parameter| parameter.name == "kp");
+        let kp = softest.map_or(chosen.kp, |parameter| parameter.low.min(chosen.kp));
+        let clearance_m = kneeling::clearance_m(robot, &chosen.stance_leg(), kp);
         if clearance_m < 0.0 {
             let reason = format!(
-                "the robot kneels before the jump: sagged under its weight with kp = {} N/m, thigh or calf is {:.3} m in the ground; lower the feet or raise kp",
-                chosen.kp, -clearance_m
+                "the robot kneels before the jump: sagged under its weight with kp = {kp} N/m, thigh or calf is {:.3} m in the ground; lower the feet or raise kp",
+                -clearance_m
             );
             return Err(self.refuse(CONTROL, &key, &value, reason));
         }

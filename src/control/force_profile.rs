@@ -48,18 +48,27 @@ pub fn force_leg(amplitude_leg: &Vector3<f64>, theta_rad: f64) -> Vector3<f64> {
     amplitude_leg * theta_rad.sin().min(0.0)
 }
 
+/// Returns the amplitude across the direction of `task`: optional, and the only one that may be negative. `Fx` is positive
+/// forward in every task, `Fy` of a forward jump to the left (`docs/method.md`, "Amplitude signs").
+pub const fn second_direction(task: Task) -> &'static str {
+    match task {
+        Task::Forward => "Fy",
+        Task::LateralLeft | Task::LateralRight | Task::TwistCcw | Task::TwistCw => "Fx",
+    }
+}
+
 /// Returns the amplitude `[Fx Fy Fz]` of each foot with the signs of `task` (`docs/method.md`, "Amplitude signs"): the
 /// force that the foot exerts divided by sin(theta), leg frame, N.
 pub fn amplitudes_leg(jump: &JumpParameters, task: Task) -> PerLeg<Vector3<f64>> {
     let mut amplitudes = [Vector3::zeros(); LEGS];
     for (amplitude, leg) in amplitudes.iter_mut().zip(Leg::ALL) {
-        *amplitude = match task {
-            Task::Forward => Vector3::new(jump.fx_n, 0.0, jump.fz_n),
-            Task::LateralLeft => Vector3::new(0.0, jump.fy_n, jump.fz_n),
-            Task::LateralRight => Vector3::new(0.0, -jump.fy_n, jump.fz_n),
-            Task::TwistCcw => Vector3::new(0.0, leg.front_sign() * jump.fy_n, jump.fz_n),
-            Task::TwistCw => Vector3::new(0.0, -leg.front_sign() * jump.fy_n, jump.fz_n),
+        let y_sign = match task {
+            Task::Forward | Task::LateralLeft => 1.0,
+            Task::LateralRight => -1.0,
+            Task::TwistCcw => leg.front_sign(),
+            Task::TwistCw => -leg.front_sign(),
         };
+        *amplitude = Vector3::new(jump.fx_n, y_sign * jump.fy_n, jump.fz_n);
     }
     amplitudes
 }

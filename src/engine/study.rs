@@ -156,7 +156,7 @@ pub fn session_info(options: &Options, recording: &str) -> SessionInfo {
         recording: recording.to_owned(),
         started: jiff::Timestamp::now().to_string(),
         observe: options.observe,
-        gains: options.config.gains(),
+        gains: options.config.fixed_gains(options.task),
         approve: options.approve,
         limits: options.config.health_limits(),
     }

@@ -72,12 +72,17 @@ impl Task {
 /// The gains of the controller, in table order, with their units.
 pub const GAIN_UNITS: [(&str, &str); 4] = [("kp", "N/m"), ("kd", "N s/m"), ("kd_joint", "N m s/rad"), ("k_att", "N/m")];
 
+/// Whether `name` is a gain of the controller.
+pub fn is_gain(name: &str) -> bool {
+    GAIN_UNITS.iter().any(|(gain, _)| *gain == name)
+}
+
 /// Returns the unit of an optimized parameter; empty for an unknown name.
 pub fn parameter_unit(name: &str) -> &'static str {
     match name {
         "f0" | "f1" => "Hz",
         "Fx" | "Fy" | "Fz" => "N",
-        _ => "",
+        _ => GAIN_UNITS.iter().find(|(gain, _)| *gain == name).map_or("", |(_, unit)| unit),
     }
 }
 
@@ -130,9 +135,9 @@ pub struct JumpParameters {
     pub f0_hz: f64,
     /// Frequency of the off phase, Hz, for continuous jumping: the pause lasts 1 / (2 f1). Zero for single jumps.
     pub f1_hz: f64,
-    /// Amplitude along x, N per foot, positive.
+    /// Amplitude along x, N per foot; positive, or of either sign where the task moves along y.
     pub fx_n: f64,
-    /// Amplitude along y, N per foot, positive.
+    /// Amplitude along y, N per foot; positive, or of either sign where the task moves along x.
     pub fy_n: f64,
     /// Amplitude along z, N per foot, positive.
     pub fz_n: f64,

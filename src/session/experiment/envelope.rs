@@ -19,17 +19,24 @@ pub fn share(plan: &ExperimentPlan, trials: &[Trial]) -> Option<f64> {
     (share < 1.0).then_some(share)
 }
 
-/// Returns the largest allowed value of a force, N; none for a parameter that is no force.
-fn largest(plan: &ExperimentPlan, share: f64, name: &str) -> Option<f64> {
-    let ParameterInfo { low, high, .. } = plan.parameters.iter().find(|parameter| parameter.name == name)?;
-    (parameter_unit(name) == "N").then_some(low + share * (high - low))
+/// Returns the least and the largest allowed value of a force, N; none for a parameter that is no force. The share acts on
+/// the magnitude: it counts from the value of the bounds that is nearest to zero, to both sides of it.
+fn allowed(plan: &ExperimentPlan, share: f64, name: &str) -> Option<[f64; 2]> {
+    let &ParameterInfo { low, high, .. } = plan.parameters.iter().find(|parameter| parameter.name == name)?;
+    if parameter_unit(name) != "N" {
+        return None;
+    }
+    let weakest = 0.0_f64.clamp(low, high);
+    let [least, most] = [low, high].map(|bound| weakest + share * (bound - weakest));
+    // Where the bounds are on one side of zero, the operator's may reach beyond: the same magnitude holds there.
+    Some([if low < 0.0 { least } else { -most }, if high > 0.0 { most } else { -least }])
 }
 
 /// Returns the part of `space` inside the envelope.
 pub fn inside(space: &Space, plan: &ExperimentPlan, share: f64) -> Option<Space> {
     let limited = |Parameter { name, range }: &Parameter| {
-        let most = largest(plan, share, name).unwrap_or(f64::INFINITY);
-        (name.clone(), Range { low: range.low.min(most), high: range.high.min(most), ..*range })
+        let [least, most] = allowed(plan, share, name).unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
+        (name.clone(), Range { low: range.low.clamp(least, most), high: range.high.clamp(least, most), ..*range })
     };
     Space::new(space.parameters().iter().map(limited)).ok()
 }
@@ -37,11 +44,13 @@ pub fn inside(space: &Space, plan: &ExperimentPlan, share: f64) -> Option<Space>
 /// Refuses a value beyond the envelope.
 pub fn must_be_inside(plan: &ExperimentPlan, share: Option<f64>, name: &str, value: f64) -> Result<(), RequestRefusal> {
     let Some(share) = share else { return Ok(()) };
-    match largest(plan, share, name) {
-        Some(most) if value > most => not_now(format!(
-            "{name} = {value} N is beyond the hop envelope, at present {most:.0} N ({:.0} % of the bounds); each trial that is accepted on this robot widens it",
+    let beyond = allowed(plan, share, name)
+        .and_then(|[least, most]| if value > most { Some(most) } else { (value < least).then_some(least) });
+    match beyond {
+        Some(limit) => not_now(format!(
+            "{name} = {value} N is beyond the hop envelope, at present {limit:.0} N ({:.0} % of the bounds); each trial that is accepted on this robot widens it",
             100.0 * share
         )),
-        _ => Ok(()),
+        None => Ok(()),
     }
 }

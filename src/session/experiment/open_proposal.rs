@@ -26,7 +26,8 @@ pub struct OpenProposal {
     /// The draft was queued in the study with the pending verdict only: in the study its number may belong to another trial by now.
     only_with_verdict: bool,
     configured: ParameterValues,
-    /// The gains of the trial without changes: the configured ones, or those of its origin.
+    /// The gains of the trial without changes: the configured ones, or those of its origin. Those that are parameters of the
+    /// study have the values of the point instead.
     gains: ParameterValues,
     /// Parameters of the draft that the operator has fixed for some trials.
     fixed: Vec<(String, f64)>,
@@ -148,12 +149,16 @@ impl OpenProposal {
             value: changed(&self.changes.parameters, name, own),
             proposed: own,
         };
-        let gain = |((name, own), (_, configured)): (&(String, f64), &(String, f64))| ProposedParameter {
-            name: name.clone(),
-            value: changed(&self.changes.gains, name, *own),
-            proposed: *configured,
-        };
         let parameters: Vec<_> = self.draft.parameters.iter().map(|p| parameter(&p.name, p.value)).collect();
+        let gain = |((name, own), (_, configured)): (&(String, f64), &(String, f64))| {
+            let optimized = parameters.iter().find(|p| p.name == *name).map(|p| p.value);
+            ProposedParameter {
+                name: name.clone(),
+                value: optimized.unwrap_or_else(|| changed(&self.changes.gains, name, *own)),
+                proposed: optimized.unwrap_or(*configured),
+            }
+        };
+        let gains = self.gains.iter().zip(&self.configured).map(gain).collect();
         let origin = self.origin();
         Proposal {
             trial: self.number(),
@@ -162,7 +167,7 @@ impl OpenProposal {
             parent: origin.parent,
             risk: self.risk(&parameters),
             parameters,
-            gains: self.gains.iter().zip(&self.configured).map(gain).collect(),
+            gains,
             repeat: 0,
             repeats: 0,
         }

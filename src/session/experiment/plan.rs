@@ -42,7 +42,7 @@ pub struct ExperimentPlan {
     pub recording: String,
     /// The same parameters with the widest bounds that they may be given.
     pub widest: Vec<ParameterInfo>,
-    /// The controller's gains with the ranges in which they may be set.
+    /// The controller's gains with the ranges in which they may be set; one that is a parameter is set as such.
     pub gains: Vec<ParameterInfo>,
     /// Number of best points that are repeated to confirm the best.
     pub contenders: u32,
@@ -57,4 +57,11 @@ pub struct ExperimentPlan {
     pub terrain: Option<TerrainConfig>,
     /// Growth of the largest forces; none where the whole bounds are open.
     pub envelope: Option<HopEnvelope>,
+}
+
+impl ExperimentPlan {
+    /// Whether the study optimizes the parameter or gain `name`.
+    pub fn optimizes(&self, name: &str) -> bool {
+        self.parameters.iter().any(|parameter| parameter.name == name)
+    }
 }

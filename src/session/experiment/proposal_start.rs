@@ -4,7 +4,7 @@ use super::attributes::{self, BeganAttributes, Origin};
 use super::confirmation::{self, NextRepeat};
 use super::envelope;
 use super::open_proposal::{ApprovedProposal, OpenProposal};
-use super::plan::{RequestRefusal, not_now};
+use super::plan::{ExperimentPlan, RequestRefusal, not_now};
 use super::search::SearchSettings;
 use super::trial_changes::must_be_within;
 use super::{Experiment, ExperimentState, queue};
@@ -13,7 +13,7 @@ use crate::optimize::trial::Trial;
 use crate::recording::record::Record;
 use crate::telemetry::TrialSpec;
 use crate::trial::{
-    Gains, JumpParameters, ParameterInfo, ParameterValues, ProposalSource, ProposedParameter, SearchStatus, TrialRecord,
+    JumpParameters, ParameterInfo, ParameterValues, ProposalSource, ProposedParameter, SearchStatus, TrialRecord,
 };
 
 impl Experiment {
@@ -158,7 +158,7 @@ impl Experiment {
             source: proposal.source,
             parent: proposal.parent,
             parameters: proposal.parameters.iter().map(|p| (p.name.clone(), p.value)).collect(),
-            note: gains_note(&gains, &self.plan.control.gains()),
+            note: gains_note(&gains, &self.plan),
             risk: proposal.risk,
             gains,
             repeats: origin.repeats,
@@ -242,18 +242,22 @@ impl Experiment {
         let seed = seed.unwrap_or_else(|| self.trial_seed(number));
         TrialSpec {
             trial: number,
-            gains: control.gains().with(&row.gains),
+            gains: control.gains().with(&row.gains).with(&row.parameters),
             seed: repeat_seed(seed, row.repeats.len() as u64),
             ..control.trial(self.plan.task, JumpParameters::from_values(&row.parameters, control.f1_hz))
         }
     }
 }
 
-/// Returns the note on gains that differ from the configured ones, `other gains: kp 500 (configured 400)`; empty without.
-fn gains_note(gains: &ParameterValues, configured: &Gains) -> String {
-    let different: Vec<String> = configured
+/// Returns the note on gains that differ from the configured ones, `other gains: kp 500 (configured 400)`; empty without. Gains
+/// that are parameters of the study are not among them.
+fn gains_note(gains: &ParameterValues, plan: &ExperimentPlan) -> String {
+    let different: Vec<String> = plan
+        .control
+        .gains()
         .values()
         .iter()
+        .filter(|(name, _)| !plan.optimizes(name))
         .filter_map(|(name, usual)| {
             let value = gains.get(name)?;
             (value != *usual).then(|| format!("{name} {value} (configured {usual})"))

@@ -21,9 +21,12 @@ impl Experiment {
     }
 
     /// Sets one of the controller's gains for the proposed trial.
-    /// Refused when there is no proposal, no such gain, or the value is outside its safe range.
+    /// Refused when there is no proposal, no such gain, the gain is a parameter of the study, or the value is outside its safe range.
     pub fn set_gain(&mut self, name: &str, value: f64) -> Result<(), RequestRefusal> {
         self.change_open()?;
+        if self.plan.optimizes(name) {
+            return not_now(format!("{name} is a parameter of this study; set it as a parameter"));
+        }
         must_be_within(&self.plan.gains, "gain", name, value)?;
         let revision = self.next_revision();
         self.change_open()?.set_gain(name, value, revision);
@@ -130,7 +133,9 @@ impl Experiment {
     /// Queues a point, which may hold gains, too; the parameters that it lacks are proposed when it is its turn.
     /// Refused when a value is outside its bounds or a trial is under way.
     pub fn enqueue(&mut self, point: &[(String, f64)]) -> Result<(), RequestRefusal> {
-        let is_gain = |(name, _): &(String, f64)| self.plan.gains.iter().any(|gain| gain.name == *name);
+        let is_gain = |(name, _): &(String, f64)| {
+            !self.plan.optimizes(name) && self.plan.gains.iter().any(|gain| gain.name == *name)
+        };
         let (gains, parameters): (Vec<_>, Vec<_>) = point.iter().cloned().partition(is_gain);
         self.must_be_allowed(&parameters, &gains)?;
         self.queue(&parameters, &Origin { gains: gains.into(), ..Origin::new(ProposalSource::Queued) })

@@ -90,7 +90,7 @@ pub fn run(arguments: &EvaluateArguments) -> Result<(), Failure> {
     let control = config.task(*task);
     let point = point(arguments, &source)?;
     let jump = JumpParameters::from_values(&point, control.f1_hz);
-    let mut spec = control.trial(*task, jump);
+    let mut spec = TrialSpec { gains: control.gains().with(&point), ..control.trial(*task, jump) };
     if let Some(duration_s) = arguments.duration {
         if jump.f1_hz <= 0.0 {
             let message = "--duration: jumps in a row need f1, the frequency between impulses; give it in --point or control.toml";
@@ -247,7 +247,7 @@ fn point(arguments: &EvaluateArguments, source: &Source) -> Result<ParameterValu
                 let number = value.trim().parse::<f64>().ok().filter(|number| number.is_finite());
                 let number =
                     number.ok_or_else(|| Failure::input(format!("--point: {name} = {value} is not a number")))?;
-                let Some([least, most]) = config.safety.parameters.get(name).copied() else {
+                let Some([least, most]) = config.limits(*task, name) else {
                     return Err(Failure::input(format!("--point: there is no parameter {name}; there are {known:?}")));
                 };
                 if !(least..=most).contains(&number) || (name == "f0" && number <= 0.0) {
