@@ -2,6 +2,7 @@
 
 pub mod arming_checklist;
 pub mod automatic;
+pub mod effort;
 pub mod evaluation;
 pub mod experiment;
 pub mod objective;

@@ -21,6 +21,11 @@ impl<R: Robot> Rollout<R> {
         Rollout { robot, settings: *settings, ticks: Vec::new() }
     }
 
+    /// Ticks of the last trial, countdown included.
+    pub fn ticks(&self) -> &[Tick] {
+        &self.ticks
+    }
+
     /// The settings of the control cycle.
     pub fn settings(&self) -> &ControlSettings {
         &self.settings

@@ -13,6 +13,7 @@ mod parallel;
 mod recover;
 mod replay;
 mod report;
+mod reproduce;
 mod selection;
 mod study;
 
@@ -40,6 +41,8 @@ enum Subcommands {
     Optimize(optimize::OptimizeArguments),
     /// Run one point over several seeds on the simulator: falls, value, attitude
     Evaluate(evaluate::EvaluateArguments),
+    /// Run the experiments of the paper on the simulator and compare them with its statements
+    Reproduce(reproduce::ReproduceArguments),
     /// Play a recorded session in the console's panels
     Replay(replay::ReplayArguments),
     /// Repair an incomplete recording
@@ -66,6 +69,7 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
         None => console::run(&arguments.console),
         Some(Subcommands::Optimize(optimize)) => optimize::run(&optimize),
         Some(Subcommands::Evaluate(evaluate)) => evaluate::run(&evaluate),
+        Some(Subcommands::Reproduce(reproduce)) => reproduce::run(&reproduce),
         Some(Subcommands::Replay(replay)) => replay::run(&replay),
         Some(Subcommands::Recover(recover)) => recover::run(&recover),
         Some(Subcommands::Emulate(emulate)) => emulate::run(&emulate),

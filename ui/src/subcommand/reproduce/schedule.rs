@@ -1,0 +1,187 @@
+//! Order of the work, progress with the time left, and the end by Ctrl-C.
+
+use std::io::IsTerminal;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
+
+use anyhow::anyhow;
+use indicatif::{ProgressBar, ProgressStyle};
+use quadfrog::robot::description::RobotDescription;
+use quadfrog_console::notice;
+use tokio::signal::unix::{SignalKind, signal};
+
+use super::plan::{ExperimentSize, PaperExperiment, ReproduceJob, all_jobs};
+use super::results::ReproduceResults;
+use super::work::{JobResult, Workplace};
+use crate::subcommand::failure::Failure;
+use crate::subcommand::parallel::in_parallel;
+
+/// Share of the work after which the rate is known well enough for a time left.
+const ESTIMATE_FROM: f64 = 0.05;
+/// Exit status of a program that SIGINT ended.
+const INTERRUPTED: i32 = 130;
+
+/// Runs the experiments on `threads` threads; when Ctrl-C or SIGTERM ends the program, what is complete is written to `file`.
+/// The results do not depend on the number of threads.
+///
+/// # Errors
+/// When a configuration or a study fails.
+pub fn run_experiments(
+    experiments: &[PaperExperiment],
+    size: ExperimentSize,
+    quick: bool,
+    threads: usize,
+    file: &Path,
+) -> Result<ReproduceResults, Failure> {
+    let jobs = all_jobs(experiments, &size);
+    let robot = RobotDescription::embedded("go1").map_err(Failure::input)?;
+    let workplace = Workplace::new(robot, &jobs)?;
+    let kept = Arc::new(KeptResults {
+        results: Mutex::new(ReproduceResults::new(size, quick)),
+        asked: experiments.to_vec(),
+        file: file.to_owned(),
+    });
+    write_when_interrupted(Arc::clone(&kept))?;
+    let progress = JobProgress::new(&jobs, threads);
+    let (later, first): (Vec<&ReproduceJob>, Vec<&ReproduceJob>) = jobs.iter().partition(|job| job.depends());
+    for mut stage in [first, later] {
+        let studies = kept.lock().studies.clone();
+        // The longest first: the threads then end together.
+        stage.sort_by_key(|job| std::cmp::Reverse(job.cost()));
+        let run = |(): &mut (), job: &&ReproduceJob| {
+            let result = workplace.run(job, &studies, |work| progress.add(work))?;
+            match result {
+                JobResult::Study(study) => kept.lock().studies.push(study),
+                JobResult::Run(run) => kept.lock().runs.push(run),
+            }
+            Ok(())
+        };
+        in_parallel(threads, &stage, || Ok(()), run)?;
+    }
+    let mut results = kept.lock().clone();
+    results.complete(experiments, &jobs);
+    for job in results.runs_to_trace() {
+        results.traces.push(workplace.trace(&job)?);
+    }
+    progress.finish();
+    Ok(results)
+}
+
+/// Results of the complete jobs, written when the program is interrupted.
+struct KeptResults {
+    results: Mutex<ReproduceResults>,
+    asked: Vec<PaperExperiment>,
+    file: PathBuf,
+}
+
+impl KeptResults {
+    fn lock(&self) -> MutexGuard<'_, ReproduceResults> {
+        self.results.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Writes the results of the complete experiments and returns a sentence for the operator.
+    fn keep(&self) -> String {
+        let mut results = self.lock().clone();
+        let complete: Vec<PaperExperiment> =
+            self.asked.iter().copied().filter(|experiment| results.covers(*experiment)).collect();
+        if complete.is_empty() {
+            return "interrupted: no experiment was complete, nothing was written".to_owned();
+        }
+        let jobs = all_jobs(&complete, &results.size);
+        results.complete(&complete, &jobs);
+        let names: Vec<_> = complete.iter().map(|experiment| experiment.title()).collect();
+        let file = self.file.display();
+        match results.write(&self.file) {
+            Ok(()) => format!(
+                "interrupted: {file} has the complete experiments ({}); `quadfrog reproduce --from {file}` makes their report",
+                names.join("; ")
+            ),
+            Err(failure) => format!("interrupted: {file} could not be written: {failure}"),
+        }
+    }
+}
+
+/// Ends the process on Ctrl-C, SIGTERM or the loss of the terminal, at once, after the complete experiments were written.
+fn write_when_interrupted(kept: Arc<KeptResults>) -> Result<(), Failure> {
+    let failed = |error: std::io::Error| Failure::Other(anyhow!("signals cannot be received: {error}"));
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(failed)?;
+    let register = |kind| {
+        let _context = runtime.enter();
+        signal(kind).map_err(failed)
+    };
+    // Registered here: from now on a signal does not end the process before the results are written.
+    let (mut interrupt, mut terminate, mut hang_up) =
+        (register(SignalKind::interrupt())?, register(SignalKind::terminate())?, register(SignalKind::hangup())?);
+    let wait = move || {
+        runtime.block_on(async {
+            tokio::select! {
+                _ = interrupt.recv() => {}
+                _ = terminate.recv() => {}
+                _ = hang_up.recv() => {}
+            }
+        });
+        let message = kept.keep();
+        notice!("{message}");
+        std::process::exit(INTERRUPTED);
+    };
+    std::thread::Builder::new().name("interrupt".to_owned()).spawn(wait).map_err(failed)?;
+    Ok(())
+}
+
+/// Share of the work that is done, and the time left at the rate so far.
+struct JobProgress {
+    bar: ProgressBar,
+    done: AtomicU64,
+    all: u64,
+    begun: Instant,
+}
+
+impl JobProgress {
+    fn new(jobs: &[ReproduceJob], threads: usize) -> JobProgress {
+        let all = jobs.iter().map(ReproduceJob::cost).sum::<u64>().max(1);
+        let studies = jobs.iter().filter(|job| matches!(job, ReproduceJob::Study(_))).count();
+        notice!("{studies} studies and {} runs on {threads} threads", jobs.len() - studies);
+        let bar = if std::io::stderr().is_terminal() { ProgressBar::new(all) } else { ProgressBar::hidden() };
+        let style = ProgressStyle::with_template("{bar:30} {percent} %  {msg}");
+        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+        JobProgress { bar, done: AtomicU64::new(0), all, begun: Instant::now() }
+    }
+
+    fn add(&self, work: u64) {
+        let done = self.done.fetch_add(work, Ordering::Relaxed) + work;
+        self.bar.set_position(done.min(self.all));
+        if let Some(left_s) = seconds_left(done, self.all, self.begun.elapsed().as_secs_f64()) {
+            self.bar.set_message(format!("about {} left", minutes(left_s)));
+        }
+    }
+
+    fn finish(&self) {
+        self.bar.finish_and_clear();
+        notice!("the experiments took {}", minutes(self.begun.elapsed().as_secs_f64()));
+    }
+}
+
+/// Returns the time left at the rate so far, s; none before enough of the work is done.
+fn seconds_left(done: u64, all: u64, passed_s: f64) -> Option<f64> {
+    let share = done as f64 / all as f64;
+    (share >= ESTIMATE_FROM).then(|| passed_s * (1.0 - share).max(0.0) / share)
+}
+
+fn minutes(seconds: f64) -> String {
+    if seconds < 90.0 { format!("{:.0} s", seconds.ceil()) } else { format!("{:.1} min", seconds / 60.0) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_time_left_follows_the_rate_and_is_not_given_before_it_is_known() {
+        assert_eq!(seconds_left(4, 100, 10.0), None);
+        assert_eq!(seconds_left(25, 100, 30.0), Some(90.0));
+        assert_eq!(seconds_left(100, 100, 30.0), Some(0.0));
+        assert_eq!((minutes(89.2), minutes(150.0)), ("90 s".to_owned(), "2.5 min".to_owned()));
+    }
+}
