@@ -8,7 +8,7 @@ use quadfrog::control::landing::LandingLegs;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::session::rollout::Rollout;
 use quadfrog::sim::Simulator;
-use quadfrog::telemetry::{Cutoff, LandingTerms, TrialEnd};
+use quadfrog::telemetry::{Cutoff, LandingTerms, TrialEnd, TrialSpec};
 use quadfrog::trial::{Backend, JumpParameters, Task};
 
 const FOOT: LandingTerms = LandingTerms { cutoff: Cutoff::Foot, cutoff_lost_s: 0.02, spread_m: 0.04, spread_s: 0.3 };
@@ -66,9 +66,9 @@ fn a_robot_that_lands_during_a_long_impulse_stands_with_the_terms() {
     let jump = JumpParameters { f0_hz: 0.795, f1_hz: 0.0, fx_n: 0.0, fy_n: 90.4, fz_n: 154.0 };
     let mut control = *config.task(Task::LateralLeft);
     (control.attitude_rate_gain, control.foot_placement_s) = (30.0, 0.08);
-    let mut end = |landing| {
-        control.landing = landing;
-        rollout.run(&control.trial(Task::LateralLeft, jump)).0
+    let mut end = |landing: LandingTerms| {
+        let spec = TrialSpec { landing, ..control.trial(Task::LateralLeft, jump) };
+        rollout.run(&spec).0
     };
     let without = end(LandingTerms::default());
     assert!(matches!(without, TrialEnd::Fell(_)), "without the terms: {without:?}");
@@ -81,19 +81,19 @@ fn keys_of_the_landing_are_checked() {
     let folder = tempfile::tempdir().unwrap();
     let robot = RobotDescription::embedded("go1").unwrap();
     let load = |text: &str, backend| {
-        let text = format!("[tasks.forward.landing]\n{text}\n");
+        let text = format!("[tasks.forward]\n{text}\n");
         fs::write(folder.path().join("control.toml"), text).unwrap();
         let loaded = Config::load(Some(folder.path())).map_err(|error| error.to_string())?;
         loaded.settings(&robot, Task::Forward, backend).map(|_| loaded).map_err(|error| error.to_string())
     };
-    let loaded = load("cutoff = \"foot\"\nspread_m = 0.08", Backend::Simulator).unwrap();
+    let loaded = load("cutoff = \"foot\"\nlanding_spread_m = 0.08", Backend::Simulator).unwrap();
     let expected = LandingTerms { cutoff: Cutoff::Foot, spread_m: 0.08, ..LandingTerms::default() };
-    assert_eq!(loaded.task(Task::Forward).landing, expected);
-    assert_eq!(loaded.task(Task::TwistCw).landing, LandingTerms::default());
+    assert_eq!(loaded.task(Task::Forward).landing(), expected);
+    assert_eq!(loaded.task(Task::TwistCw).landing(), LandingTerms::default());
     for (text, backend, parts) in [
-        ("spread_m = 0.2", Backend::Simulator, ["tasks.forward.landing.spread_m", "0 to 0.1"]),
-        ("cutoff_lost_s = 0.0", Backend::Simulator, ["tasks.forward.landing.cutoff_lost_s", "0.001 to 0.5"]),
-        ("spread_m = 0.08", Backend::Hardware, ["tasks.forward.landing.spread_m", "0 to 0.06"]),
+        ("landing_spread_m = 0.2", Backend::Simulator, ["tasks.forward.landing_spread_m", "0 to 0.1"]),
+        ("cutoff_lost_s = 0.0", Backend::Simulator, ["tasks.forward.cutoff_lost_s", "0.001 to 0.5"]),
+        ("landing_spread_m = 0.08", Backend::Hardware, ["tasks.forward.landing_spread_m", "0 to 0.06"]),
         ("cutoff = \"leg\"", Backend::Simulator, ["control.toml", "`none` or `foot`"]),
     ] {
         let error = load(text, backend).unwrap_err();

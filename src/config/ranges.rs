@@ -42,10 +42,10 @@ const CONTROL: &[Row] = &[
     // At 1 m/s the foot is then placed 0.3 m ahead, the end of the leg's reach.
     (&["tasks.*.foot_placement_s"], within!(0, 0.3, "s")),
     // A foot that flickers at take-off is off the ground for some milliseconds; an impulse lasts 0.3 to 0.7 s.
-    (&["tasks.*.landing.cutoff_lost_s"], within!(0.001, 0.5, "s")),
+    (&["tasks.*.cutoff_lost_s"], within!(0.001, 0.5, "s")),
     // The hip reaches its limit 0.1 m outward of the stance.
-    (&["tasks.*.landing.spread_m"], within!(0, 0.1, "m")),
-    (&["tasks.*.landing.spread_s"], within!(0, 2, "s")),
+    (&["tasks.*.landing_spread_m"], within!(0, 0.1, "m")),
+    (&["tasks.*.landing_spread_s"], within!(0, 2, "s")),
     // The gains; `safety.toml`, [gains], has their narrower ranges.
     (&["tasks.*.*"], within!(0, 10000)),
     (&["*.*"], within!(1e-9, 1e6)),
@@ -64,10 +64,10 @@ const CONTROL_HARDWARE: &[Row] = &[
     (&["countdown.hardware_s"], within!(1, 60, "s")),
     (&["countdown.blend_s"], within!(0.2, 5, "s")),
     // Shorter than the estimator's contact, 2 ms, it would end the push of a foot that flickers.
-    (&["tasks.*.landing.cutoff_lost_s"], within!(0.005, 0.1, "s")),
+    (&["tasks.*.cutoff_lost_s"], within!(0.005, 0.1, "s")),
     // A foot that is 0.24 m outward carries its share of the landing with less than the hip's largest torque.
-    (&["tasks.*.landing.spread_m"], within!(0, 0.06, "m")),
-    (&["tasks.*.landing.spread_s"], within!(0, 1, "s")),
+    (&["tasks.*.landing_spread_m"], within!(0, 0.06, "m")),
+    (&["tasks.*.landing_spread_s"], within!(0, 1, "s")),
     (&["settle.quiet_s"], within!(0.05, 5, "s")),
     (&["settle.cap_s"], within!(0.5, 15, "s")),
     (&["settle.speed_m_s"], within!(0.01, 0.5, "m/s")),

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use crate::telemetry::{LandingTerms, TrialSpec};
+use crate::telemetry::{Cutoff, LandingTerms, TrialSpec};
 use crate::trial::{BounceRule, Gains, JumpParameters, Task};
 
 /// Trial settings of one task: section `[tasks.<task>]` of `config/control.toml`.
@@ -26,8 +26,14 @@ pub struct TaskControl {
     pub attitude_rate_gain: f64,
     /// Time T of the foot placement, s: a swing foot is placed T times the trunk's velocity ahead; zero in the paper.
     pub foot_placement_s: f64,
-    /// Landing terms.
-    pub landing: LandingTerms,
+    /// End of the profile force of a foot.
+    pub cutoff: Cutoff,
+    /// Time without contact after which `cutoff` ends the profile force of a foot, s.
+    pub cutoff_lost_s: f64,
+    /// Outward shift of a swing foot's nominal position, m; zero in the paper.
+    pub landing_spread_m: f64,
+    /// Time after the touchdown of a foot in which its shift returns to zero, s.
+    pub landing_spread_s: f64,
     /// Jumps in a row, where no duration is given.
     pub jumps: u32,
     /// Duration of jumps in a row, s: the last impulse begins before it. None: `jumps` counts.
@@ -56,6 +62,16 @@ impl TaskControl {
         self.stance_m.into()
     }
 
+    /// Landing terms.
+    pub fn landing(&self) -> LandingTerms {
+        LandingTerms {
+            cutoff: self.cutoff,
+            cutoff_lost_s: self.cutoff_lost_s,
+            spread_m: self.landing_spread_m,
+            spread_s: self.landing_spread_s,
+        }
+    }
+
     /// Unit of the objective of `task`.
     pub fn unit(&self, task: Task) -> &'static str {
         task.objective_unit(self.rate)
@@ -77,7 +93,7 @@ impl TaskControl {
             vmc: self.vmc,
             attitude_rate_gain: self.attitude_rate_gain,
             foot_placement_s: self.foot_placement_s,
-            landing: self.landing,
+            landing: self.landing(),
             jumps: self.jumps(&jump),
             duration_s: self.duration_s.unwrap_or(f64::INFINITY),
             landing_wait_s: self.landing_wait_s,

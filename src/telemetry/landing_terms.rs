@@ -13,7 +13,7 @@ pub enum Cutoff {
     Foot,
 }
 
-/// Landing terms: section `[tasks.<task>.landing]` of `config/control.toml`. The default is the paper's controller.
+/// Landing terms: keys of `[tasks.<task>]` in `config/control.toml`. The default is the paper's controller.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LandingTerms {

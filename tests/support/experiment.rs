@@ -10,7 +10,7 @@ use quadfrog::optimize::journal::Durability;
 use quadfrog::optimize::space::{Range, Space};
 use quadfrog::optimize::study::{Storage, Study, StudyOptions};
 use quadfrog::session::experiment::{Experiment, ExperimentPlan};
-use quadfrog::telemetry::{LandingTerms, Tick, TrialEnd, TrialSpec};
+use quadfrog::telemetry::{Cutoff, Tick, TrialEnd, TrialSpec};
 use quadfrog::trial::{Backend, BounceRule, ExperimentStage, ParameterInfo, Task, Verdict};
 
 pub const BOUNDS: [(&str, f64, f64); 3] = [("f0", 0.75, 1.75), ("Fx", 0.0, 150.0), ("Fz", 150.0, 350.0)];
@@ -44,7 +44,10 @@ pub fn plan(budget: u32) -> ExperimentPlan {
             vmc: true,
             attitude_rate_gain: 0.0,
             foot_placement_s: 0.0,
-            landing: LandingTerms::default(),
+            cutoff: Cutoff::None,
+            cutoff_lost_s: 0.02,
+            landing_spread_m: 0.0,
+            landing_spread_s: 0.3,
             jumps: 1,
             f1_hz: 0.0,
             duration_s: None,
