@@ -155,7 +155,8 @@ impl Module {
             let word = words[at].as_str();
             let public = at > 0 && matches!(words[at - 1].as_str(), "pub" | ")");
             match word {
-                "use" => {
+                // `use<..>` in a type is no import.
+                "use" if words.get(at + 1).is_some_and(|word| word != "<") => {
                     let mut found = Vec::new();
                     at = use_tree(&words, at + 1, &[], &mut found);
                     if !public {

@@ -117,6 +117,7 @@ const REPLAY: &[Row] = &[
     row(Action::PreviousView, "Shift-Tab", Shows("all levels"), ("", "")),
     row(Action::LiveView, "1", Shows("8 s sweep"), ("", "")),
     row(Action::Palette, ":", Shows("Actions"), ("\x1b", "8 s sweep")),
+    row(Action::Report, "R", Shows("J_forward = x_final"), ("\x1b", "8 s sweep")),
     row(Action::Help, "?", Shows("Keys (1"), ("\x1b", "8 s sweep")),
     row(Action::Mouse, "M", Shows("mouse on"), ("M", "mouse off")),
     row(Action::Redraw, "Ctrl-L", Shows("the screen was drawn again"), ("", "")),

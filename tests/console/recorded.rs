@@ -57,6 +57,21 @@ fn views_of_a_recorded_session() {
 }
 
 #[test]
+fn the_tables_of_a_recorded_study_open_scroll_and_close() {
+    let mut console = console(Colours::Named, Glyphs::Braille);
+    console.press(&["R"]);
+    let first = console.screen(80, 24);
+    assert!(first.contains("Study (1-") && first.contains("J_forward = x_final - x_init"), "{first}");
+    console.press(&["End"]);
+    let last = console.screen(80, 24);
+    assert!(!last.contains("J_forward") && last.contains("accept"), "{last}");
+    console.press(&["Home"]);
+    assert_eq!(console.screen(80, 24), first);
+    console.press(&["Esc"]);
+    assert!(!console.screen(80, 24).contains("Study (1-"));
+}
+
+#[test]
 fn views_of_a_recorded_session_in_ascii() {
     compare(Colours::None, Glyphs::Ascii, "-ascii", |console, columns, rows| {
         let screen = console.screen(columns, rows);

@@ -47,6 +47,7 @@ pub enum Action {
     First,
     Last,
     Open,
+    Report,
     Freeze,
     ZoomIn,
     ZoomOut,
@@ -129,7 +130,7 @@ const fn fixed(info: ActionInfo) -> ActionInfo {
 
 /// Every action, in the order of [`Action`].
 #[rustfmt::skip]
-pub static ACTIONS: [ActionInfo; 69] = {
+pub static ACTIONS: [ActionInfo; 70] = {
     use Action as A;
     use ActionGroup as G;
     [
@@ -177,6 +178,7 @@ pub static ACTIONS: [ActionInfo; 69] = {
         row(A::First, "first", &["Home"], G::Views, "to the first"),
         row(A::Last, "last", &["End"], G::Views, "to the last"),
         row(A::Open, "open", &["Enter"], G::Views, "details; acknowledges while DAMPED or FAULT; never starts motion"),
+        row(A::Report, "report", &["R"], G::Views, "tables of the study, as quadfrog report prints them"),
 
         row(A::Freeze, "freeze", &["z"], G::Charts, "freeze the charts; recording goes on"),
         row(A::ZoomIn, "zoom-in", &["+"], G::Charts, "shorter time window"),

@@ -1,9 +1,14 @@
 //! Rows of the trial table as text: clipboard, CSV, Markdown.
 
+use quadfrog::optimize::ask::Direction;
+use quadfrog::report::recorded::Recordings;
+use quadfrog::report::study::ReportedStudy;
+use quadfrog::report::{study_page, text};
 use quadfrog::trial::{Displacement, TrialRecord, Verdict};
 
 use crate::column::Column;
 use crate::model::Model;
+use crate::model::session::SessionModel;
 use crate::model::trials::measured;
 
 /// Cause and note on one line.
@@ -13,6 +18,36 @@ pub fn remark(trial: &TrialRecord) -> String {
         ("", note) => format!("| {note}"),
         (cause, note) => format!("{cause} | {note}"),
     }
+}
+
+/// Width of the tables of a study in the console, characters.
+const REPORT_WIDTH: usize = 74;
+
+/// Returns the tables of the session's study as lines, as `quadfrog report` prints them.
+pub fn report(session: &SessionModel) -> Vec<String> {
+    let info = &session.info;
+    let rows: Vec<TrialRecord> = session.trials.records.values().cloned().collect();
+    let jumps = rows.iter().filter_map(|row| row.measured.as_ref()).map(|measured| measured.jumps.len()).max();
+    let machine = if info.is_hardware() { "hardware" } else { "simulated" };
+    let study = ReportedStudy {
+        place: info.study.clone(),
+        name: info.study.clone(),
+        task: info.task,
+        seed: u32::try_from(info.seed).ok(),
+        robot: format!("{}, {machine}", info.robot),
+        direction: Direction::Maximize,
+        jumps: jumps.unwrap_or(1).max(1) as u32,
+        f1_hz: 0.0,
+        parameters: info.parameters.iter().filter_map(|parameter| session.parameter(&parameter.name)).collect(),
+        best: session.trials.best().map(|best| best.trial),
+        limits: None,
+        recordings: Recordings::default(),
+        changed: Vec::new(),
+        unit: info.unit.clone(),
+        configuration: Vec::new(),
+        rows,
+    };
+    text::render(&study_page::summary(&study), REPORT_WIDTH).lines().map(str::to_owned).collect()
 }
 
 /// A trial as one line of text, for the clipboard.

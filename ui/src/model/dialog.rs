@@ -55,6 +55,11 @@ pub enum Dialog {
     Help {
         scroll: usize,
     },
+    /// The tables of the study as they were when it was opened.
+    Report {
+        lines: Vec<String>,
+        scroll: usize,
+    },
     Choose {
         subject: Choice,
         selected: usize,

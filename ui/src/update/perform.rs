@@ -14,6 +14,7 @@ use crate::legal::{legal, may_acknowledge, may_request};
 use crate::message::{Effect, ReplayCommand};
 use crate::model::dialog::{Choice, Dialog, OverrideForm, Purpose};
 use crate::model::{Model, View};
+use crate::text::report;
 
 /// Performs an action, or reports why it is not possible.
 pub(super) fn perform(model: &mut Model, action: Action) -> Vec<Effect> {
@@ -120,6 +121,10 @@ pub(super) fn perform(model: &mut Model, action: Action) -> Vec<Effect> {
         Action::NextMarker => return vec![Effect::Replay(ReplayCommand::NextMarker)],
         Action::Palette => open(model, Dialog::Palette { input: Default::default(), selected: 0 }),
         Action::Help => open(model, Dialog::Help { scroll: 0 }),
+        Action::Report => {
+            let lines = report(&model.session);
+            open(model, Dialog::Report { lines, scroll: 0 });
+        }
         Action::Mouse => {
             model.mouse = !model.mouse;
             let text = match model.mouse {

@@ -53,7 +53,11 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
         }
         Dialog::Palette { input, selected } => render_palette(frame, area, model, input, *selected),
         Dialog::Choose { subject, selected } => render_choice(frame, area, model, *subject, *selected),
-        Dialog::Help { scroll } => render_help(frame, area, model, *scroll),
+        Dialog::Help { scroll } => render_lines(frame, area, model, "Keys", help::lines(model), *scroll),
+        Dialog::Report { lines, scroll } => {
+            let lines = lines.iter().cloned().map(Line::from).collect();
+            render_lines(frame, area, model, "Study", lines, *scroll);
+        }
         Dialog::Details { trial, scroll } => render_details(frame, area, model, *trial, *scroll),
     }
 }
@@ -352,17 +356,17 @@ fn render_choice(frame: &mut Frame, area: Rect, model: &Model, subject: Choice, 
     }
 }
 
-fn render_help(frame: &mut Frame, area: Rect, model: &Model, scroll: usize) {
-    let lines = help::lines(model);
-    let height = area.height.min(lines.len() as u16 + 2);
+/// Draws lines that scroll.
+fn render_lines(frame: &mut Frame, area: Rect, model: &Model, title: &str, lines: Vec<Line>, scroll: usize) {
+    let height = usize::from(area.height).min(lines.len() + 2) as u16;
     let room = usize::from(height.saturating_sub(2));
     let scroll = scroll.min(lines.len().saturating_sub(room));
-    let more = if lines.len() > room {
-        format!("Keys ({}-{} of {}, Up Down)", scroll + 1, scroll + room, lines.len())
+    let title = if lines.len() > room {
+        format!("{title} ({}-{} of {}, Up Down)", scroll + 1, scroll + room, lines.len())
     } else {
-        "Keys".to_owned()
+        title.to_owned()
     };
-    let inner = open_box(frame, area, model, &more, 78, height);
+    let inner = open_box(frame, area, model, &title, 78, height);
     let shown: Vec<Line> = lines.into_iter().skip(scroll).take(room).collect();
     frame.render_widget(Paragraph::new(shown), inner);
 }

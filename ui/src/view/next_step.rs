@@ -179,7 +179,7 @@ fn in_dialog(model: &Model, dialog: &Dialog) -> NextStep {
         Dialog::Field { .. } => "Enter confirms, Esc cancels.".to_owned(),
         Dialog::Palette { .. } => "Type to filter, Up Down choose, Enter does it, Esc closes.".to_owned(),
         Dialog::Choose { .. } => "Up Down choose, x switches it on or off, Enter closes.".to_owned(),
-        Dialog::Help { .. } => "Up Down scroll, any other key closes.".to_owned(),
+        Dialog::Report { .. } | Dialog::Help { .. } => "Up Down scroll, any other key closes.".to_owned(),
         Dialog::Details { .. } => "Up Down other trials, Esc closes.".to_owned(),
     };
     NextStep { lead, others: Vec::new() }

@@ -48,17 +48,32 @@ pub(super) fn palette_key(model: &mut Model, key: Key, mut input: Input, mut sel
 }
 
 pub(super) fn help_key(model: &mut Model, key: Key, scroll: usize) -> Vec<Effect> {
-    let page = model.page.max(2) - 1;
-    let scroll = match key.code() {
-        KeyCode::Up => scroll.saturating_sub(1),
-        KeyCode::Down => scroll + 1,
-        KeyCode::PageUp => scroll.saturating_sub(page),
-        KeyCode::PageDown => scroll + page,
-        KeyCode::Home => 0,
-        _ => return Vec::new(),
-    };
-    model.dialog = Some(Dialog::Help { scroll });
+    if let Some(scroll) = scrolled(model, key, scroll) {
+        model.dialog = Some(Dialog::Help { scroll });
+    }
     Vec::new()
+}
+
+pub(super) fn report_key(model: &mut Model, key: Key, lines: Vec<String>, scroll: usize) -> Vec<Effect> {
+    let scroll = if key.code() == KeyCode::End { Some(lines.len()) } else { scrolled(model, key, scroll) };
+    if let Some(scroll) = scroll {
+        let scroll = scroll.min(lines.len().saturating_sub(1));
+        model.dialog = Some(Dialog::Report { lines, scroll });
+    }
+    Vec::new()
+}
+
+/// Returns the lines above the shown ones after a key; none for a key that does not scroll.
+fn scrolled(model: &Model, key: Key, scroll: usize) -> Option<usize> {
+    let page = model.page.max(2) - 1;
+    match key.code() {
+        KeyCode::Up => Some(scroll.saturating_sub(1)),
+        KeyCode::Down => Some(scroll + 1),
+        KeyCode::PageUp => Some(scroll.saturating_sub(page)),
+        KeyCode::PageDown => Some(scroll + page),
+        KeyCode::Home => Some(0),
+        _ => None,
+    }
 }
 
 /// Switches in a list, which stays open; the change shows at once.

@@ -42,6 +42,7 @@ pub(super) fn key(model: &mut Model, dialog: Dialog, key: Key) -> KeyOutcome {
         Dialog::Field { purpose, input, .. } => text_field::key(model, key, purpose, input),
         Dialog::Palette { input, selected } => lists::palette_key(model, key, input, selected),
         Dialog::Help { scroll } => lists::help_key(model, key, scroll),
+        Dialog::Report { lines, scroll } => lists::report_key(model, key, lines, scroll),
         Dialog::Choose { subject, selected } => lists::choice_key(model, key, subject, selected),
         Dialog::Details { trial, scroll } => lists::details_key(model, key, trial, scroll),
     })

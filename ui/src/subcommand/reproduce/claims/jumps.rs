@@ -6,7 +6,7 @@ use quadfrog::optimize::ask::SamplerKind;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::trial::{Task, Verdict};
 
-use super::{ClaimJudgement, PaperClaim, REACHED, mean, robot_value, spread};
+use super::claim::{ClaimJudgement, PaperClaim, REACHED, mean, robot_value, spread};
 use crate::subcommand::reproduce::configuration::ExperimentConfiguration::{self, *};
 use crate::subcommand::reproduce::plan::{PAPER_POINT_F0_HZ, PAPER_TRIALS, PaperExperiment, RunPoint, THREE_TASKS};
 use crate::subcommand::reproduce::results::{ReproduceResults, TrialResult};

@@ -3,7 +3,7 @@
 use quadfrog::optimize::ask::SamplerKind;
 use quadfrog::trial::Task;
 
-use super::{ClaimJudgement, PaperClaim, mean, spread};
+use super::claim::{ClaimJudgement, PaperClaim, mean, spread};
 use crate::subcommand::reproduce::configuration::ExperimentConfiguration::{self, *};
 use crate::subcommand::reproduce::plan::{F1_HZ, PaperExperiment, RunPoint, THREE_TASKS};
 use crate::subcommand::reproduce::results::{ReproduceResults, RunResult};
