@@ -1,12 +1,11 @@
 //! Arguments that several commands share, and parsers for the engine's named values.
 
-use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use quadfrog::config::Config;
-use quadfrog::engine::{EngineError, newest_config};
+use quadfrog::engine::newest_config;
 use quadfrog::optimize::ask::SamplerKind;
 use quadfrog::robot::description::{RobotDescription, RobotFiles};
 use quadfrog::trial::Task;
@@ -97,27 +96,10 @@ impl StudyArguments {
         Ok(config)
     }
 
-    /// Makes the folder of a new study and returns it: `<output>/<date>T<time>-<task>-seed<seed>`, with a number appended if
-    /// that folder exists. Of two programs that start in the same second each gets its own, because only one can make a folder.
-    ///
-    /// # Errors
-    /// If it cannot be made.
-    pub fn new_folder(&self, task: Task, seed: u32) -> Result<PathBuf, Failure> {
-        let now = jiff::Zoned::now().strftime("%Y-%m-%dT%H-%M-%S").to_string();
-        let name = format!("{now}-{}-seed{seed}", task.name());
-        let numbered = (2..).map(|n| self.output.join(format!("{name}-{n}")));
-        let failed = |folder: &Path, source| {
-            Failure::from(EngineError::System { what: format!("{}: cannot be made", folder.display()), source })
-        };
-        std::fs::create_dir_all(&self.output).map_err(|error| failed(&self.output, error))?;
-        for folder in std::iter::once(self.output.join(&name)).chain(numbered) {
-            match std::fs::create_dir(&folder) {
-                Ok(()) => return Ok(folder),
-                Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
-                Err(error) => return Err(failed(&folder, error)),
-            }
-        }
-        unreachable!("the numbers have no end")
+    /// Returns the folder of a new study, before a number is appended: `<output>/<date>T<time>-<task>-seed<seed>`.
+    pub fn new_folder(&self, task: Task, seed: u32) -> PathBuf {
+        let now = jiff::Zoned::now().strftime("%Y-%m-%dT%H-%M-%S");
+        self.output.join(format!("{now}-{}-seed{seed}", task.name()))
     }
 }
 

@@ -118,17 +118,14 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
         None => {
             let task = arguments.task.unwrap_or(Task::Forward);
             let seed = arguments.seed.unwrap_or(config.optimize.sampler.seed);
-            // An observer writes no files.
-            let folder = if arguments.observe { PathBuf::new() } else { arguments.study.new_folder(task, seed)? };
-            SelectedStudy { task, seed, folder, budget: None }
+            SelectedStudy { task, seed, folder: arguments.study.new_folder(task, seed), new: true, budget: None }
         }
     };
-    let folder = selected.folder.clone();
-    let incomplete = incomplete_recordings(&folder);
-    let options = Options {
+    let incomplete = incomplete_recordings(&selected.folder);
+    let mut options = Options {
         seed: selected.seed,
         trials: arguments.study.trials.or(selected.budget),
-        folder: (!arguments.observe).then_some(selected.folder),
+        folder: (!arguments.observe).then(|| selected.folder.clone()),
         observe: arguments.observe,
         accept_backend_change: arguments.accept_backend_change,
         approve: arguments.approve,
@@ -140,6 +137,10 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
     };
     engine::check_backend(&options)?;
     terminal::check().map_err(Failure::input)?;
+    // An observer writes no files.
+    let selected = if arguments.observe { selected } else { selected.with_folder()? };
+    let folder = selected.folder;
+    options.folder = (!arguments.observe).then(|| folder.clone());
     let handle = engine::start(options)?;
     let recording = handle.recording().map(Path::to_owned);
     notice_waits(None);

@@ -1,8 +1,9 @@
 //! Selection of the study to run: a new one, a continued one or a joined one.
 
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-use quadfrog::engine::{STUDY_FILE, StoredStudy, stored_studies, stored_study};
+use quadfrog::engine::{EngineError, STUDY_FILE, StoredStudy, stored_studies, stored_study};
 use quadfrog::optimize::study::Storage;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::trial::Task;
@@ -11,13 +12,45 @@ use quadfrog_console::notice;
 use super::failure::Failure;
 
 /// A study to run.
+#[derive(Clone)]
 pub struct SelectedStudy {
     pub task: Task,
     pub seed: u32,
     /// Its folder, which exists if the study is continued.
     pub folder: PathBuf,
+    /// Whether the folder is to be made; a number is appended to its name if it exists by then.
+    pub new: bool,
     /// Number of trials that count, as stored in the study; none for a new study.
     pub budget: Option<u32>,
+}
+
+impl SelectedStudy {
+    /// Makes the folder of a new study. Of two programs that start in the same second each gets its own, because only one can
+    /// make a folder.
+    ///
+    /// # Errors
+    /// If it cannot be made.
+    pub fn with_folder(&self) -> Result<SelectedStudy, Failure> {
+        if !self.new {
+            return Ok(self.clone());
+        }
+        let failed = |folder: &Path, source| {
+            Failure::from(EngineError::System { what: format!("{}: cannot be made", folder.display()), source })
+        };
+        let name = self.folder.display();
+        let numbered = (2..).map(|number| PathBuf::from(format!("{name}-{number}")));
+        if let Some(parent) = self.folder.parent() {
+            std::fs::create_dir_all(parent).map_err(|error| failed(&self.folder, error))?;
+        }
+        for folder in std::iter::once(self.folder.clone()).chain(numbered) {
+            match std::fs::create_dir(&folder) {
+                Ok(()) => return Ok(SelectedStudy { folder, new: false, ..self.clone() }),
+                Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
+                Err(error) => return Err(failed(&folder, error)),
+            }
+        }
+        unreachable!("the numbers have no end")
+    }
 }
 
 /// Parses the place of a study: its folder, its journal file or a Redis address.
@@ -104,5 +137,11 @@ pub fn study_to_continue(
         let option = format!("--model {}", robot.name);
         return refuse(option, format!("the {}", stored.robot), format!("give --model {}", stored.robot));
     }
-    Ok(SelectedStudy { task: stored.task, seed: stored.seed, folder: folder.to_owned(), budget: stored.budget })
+    Ok(SelectedStudy {
+        task: stored.task,
+        seed: stored.seed,
+        folder: folder.to_owned(),
+        new: false,
+        budget: stored.budget,
+    })
 }

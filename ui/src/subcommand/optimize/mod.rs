@@ -135,8 +135,10 @@ fn workers(
     let task = arguments.task.first().copied();
     let seed = arguments.only_seed(SEVERAL)?;
     let StoredStudy { task, seed, budget, .. } = study_to_join(storage, task, seed, robot)?;
-    let worker = |_| Ok(SelectedStudy { task, seed, folder: arguments.study.new_folder(task, seed)?, budget });
-    (0..arguments.jobs.unwrap_or(1)).map(worker).collect()
+    let name = arguments.study.new_folder(task, seed);
+    let folder = |worker| PathBuf::from(format!("{}-joined-{worker}", name.display()));
+    let worker = |worker: u16| SelectedStudy { task, seed, folder: folder(worker), new: true, budget };
+    Ok((0..arguments.jobs.unwrap_or(1)).map(worker).collect())
 }
 
 /// Returns the continued study, or a new study for each pair of task and seed.
@@ -154,9 +156,11 @@ fn select(
     let mut pairs: Vec<(Task, u32)> = tasks.iter().flat_map(|task| seeds.iter().map(|seed| (*task, *seed))).collect();
     let mut seen = HashSet::new();
     pairs.retain(|pair| seen.insert(*pair));
-    let new =
-        |(task, seed)| Ok(SelectedStudy { task, seed, folder: arguments.study.new_folder(task, seed)?, budget: None });
-    pairs.into_iter().map(new).collect()
+    let new = |(task, seed)| {
+        let folder = arguments.study.new_folder(task, seed);
+        SelectedStudy { task, seed, folder, new: true, budget: None }
+    };
+    Ok(pairs.into_iter().map(new).collect())
 }
 
 fn run_one(
@@ -167,6 +171,10 @@ fn run_one(
     study: &SelectedStudy,
     printer: &Printer,
 ) -> Result<(), Failure> {
+    let settings = config.settings(robot, study.task, Backend::Simulator)?;
+    let simulator = Simulator::new(robot, &config.simulator).map_err(EngineError::from)?;
+    let mut rollout = Rollout::new(simulator, &settings);
+    let study = &study.with_folder()?;
     let options = Options {
         seed: study.seed,
         trials: arguments.study.trials.or(study.budget),
@@ -175,9 +183,6 @@ fn run_one(
         join: join.cloned(),
         ..Options::new(config.clone(), robot.clone(), Backend::Simulator, study.task)
     };
-    let settings = config.settings(robot, study.task, Backend::Simulator)?;
-    let simulator = Simulator::new(robot, &config.simulator).map_err(EngineError::from)?;
-    let mut rollout = Rollout::new(simulator, &settings);
     let prepared = engine::prepare_folder(&options)?;
     let recording = prepared.recording.clone().filter(|_| arguments.record != RecordChoice::None);
     // Workers of a shared study have their own folders: the file name alone is ambiguous.
