@@ -1,7 +1,7 @@
 //! Reports: typed figures and pages, and their forms as SVG, HTML, text and JSON; tables of trials.
 //!
 //! A [`page::Page`] has headed sections of paragraphs, equations, quotes, [`page::Table`]s, [`figure::Figure`]s and folded
-//! texts. It is data alone: whoever makes a report fills pages and figures and never writes markup.
+//! texts. It is data alone: a report fills pages and figures and never writes markup.
 //!
 //! | function | form |
 //! |---|---|

@@ -65,7 +65,7 @@ pub fn failure() -> Option<io::Error> {
     FAILED.lock().unwrap_or_else(PoisonError::into_inner).take()
 }
 
-/// Prints a formatted line on standard output, as [`line`].
+/// Prints a formatted line on standard output, as [`line()`].
 #[macro_export]
 macro_rules! put_line {
     () => { $crate::output::line("") };

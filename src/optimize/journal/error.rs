@@ -22,7 +22,7 @@ pub enum JournalError {
     Interrupted { lock: PathBuf },
     #[error(
         "the journal on the Redis server {address} has {has} lines, after {had} were read: the server lost its data or it was \
-         cleared; every trial told before is gone from the server. Open the study again once the data is restored"
+         cleared; every trial reported before is gone from the server. Open the study again once the data is restored"
     )]
     RedisShortened { address: String, had: i64, has: i64 },
     #[error("{address} is not an address of a Redis server ({fault}); write it as redis://HOST:PORT/DB")]

@@ -54,7 +54,7 @@ pub fn run_experiments(
             let result = workplace.run(job, &studies, |work| progress.add(work))?;
             match result {
                 JobResult::Study(study) => kept.lock().studies.push(study),
-                JobResult::Run(run) => kept.lock().runs.push(run),
+                JobResult::Run(run) => kept.lock().runs.push(*run),
             }
             Ok(())
         };

@@ -1,6 +1,7 @@
 //! Execution of the jobs: studies as of `quadfrog optimize`, runs as of `quadfrog evaluate`, with the same bits.
 
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 
 use quadfrog::config::Config;
 use quadfrog::engine::{self, EngineError, Options};
@@ -25,7 +26,7 @@ const TRACE_STEP: usize = 20;
 /// Result of a job.
 pub enum JobResult {
     Study(StudyResult),
-    Run(RunResult),
+    Run(Box<RunResult>),
 }
 
 /// The robot, the configurations, and the studies that are complete already.
@@ -46,8 +47,8 @@ impl Workplace {
                 ReproduceJob::Study(job) => job.configuration,
                 ReproduceJob::Run(job) => job.configuration,
             };
-            if !configurations.contains_key(&configuration) {
-                configurations.insert(configuration, configuration.load()?);
+            if let Entry::Vacant(unknown) = configurations.entry(configuration) {
+                unknown.insert(configuration.load()?);
             }
         }
         Ok(Workplace { robot, configurations })
@@ -63,7 +64,7 @@ impl Workplace {
         match job {
             ReproduceJob::Study(job) => self.study(job, studies, progress).map(JobResult::Study),
             ReproduceJob::Run(run) => {
-                let result = self.evaluate(run, studies).map(|(result, _)| JobResult::Run(result));
+                let result = self.evaluate(run, studies).map(|(result, _)| JobResult::Run(Box::new(result)));
                 progress(job.cost());
                 result
             }
