@@ -72,7 +72,7 @@ fn suggested_again(trials: &[Trial], expected: &Value, direction: Direction, com
         let names = trial.parameters.iter().map(|(n, _)| n.clone());
         let space = Space::new(names.zip(trial.distributions.iter().map(range))).unwrap();
         let fixed = trial.fixed();
-        let ask = Ask { config: &config, trials: &trials[..i], space: &space, fixed: &fixed, direction };
+        let ask = Ask { config: &config, trials: &trials[..i], space: &space, fixed: &fixed, direction, prior: None };
         let candidate = propose(&ask, &mut streams);
         for (p, value) in space.parameters().iter().zip(candidate.values) {
             let theirs = trial.parameter(&p.name).unwrap();

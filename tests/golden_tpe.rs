@@ -156,7 +156,7 @@ fn run(scenario: &Scenario<'_>, run: &Value, name: &str, tally: &mut Tally) -> [
         let asked = &names[..zombie.map_or(names.len(), |(suggested, _)| *suggested)];
         let space = Space::new(asked.iter().map(|n| ((*n).to_owned(), scenario.range(n)))).unwrap();
         let direction = scenario.direction;
-        let ask = Ask { config: &config, trials: &trials, space: &space, fixed: &fixed, direction };
+        let ask = Ask { config: &config, trials: &trials, space: &space, fixed: &fixed, direction, prior: None };
         let candidate = propose(&ask, &mut streams);
         let mut trial = Trial::new(index as u32, TrialState::Running);
         for (k, (&parameter, value)) in asked.iter().zip(&candidate.values).enumerate() {

@@ -62,7 +62,7 @@ fn shared_journal() -> Option<(TempDir, PathBuf, String)> {
 }
 
 fn ask<'a>(config: &'a SamplerConfig, trials: &'a [Trial], space: &'a Space, fixed: &'a [(String, f64)]) -> Ask<'a> {
-    Ask { config, trials, space, fixed, direction: Direction::Maximize }
+    Ask { config, trials, space, fixed, direction: Direction::Maximize, prior: None }
 }
 
 fn open(path: &Path, seed: u32) -> Study {

@@ -1,6 +1,7 @@
 //! The vocabulary of an ask: direction, settings, random streams, question ([`Ask`]) and answer ([`Candidate`]).
 
 use super::mt19937::Mt19937;
+use super::prior::PriorModel;
 use super::space::{Parameter, Space};
 use super::trial::{Trial, value_of};
 use serde::{Deserialize, Serialize};
@@ -38,6 +39,8 @@ pub enum SamplerKind {
     Tpe,
     /// Gaussian process with expected improvement: better with only some tens of trials.
     Gp,
+    /// Gaussian process about the results of simulated robots: for some five trials on a robot.
+    Sim,
     /// Uniform random points.
     Random,
     /// Points of the Sobol sequence: evenly spread, independent of results.
@@ -80,7 +83,8 @@ impl Default for SamplerConfig {
 impl SamplerConfig {
     /// Number of finished trials from which on the model proposes.
     pub fn startup_trials(&self, space: &Space) -> usize {
-        let default = if self.kind == SamplerKind::Gp { space.parameters().len() + 2 } else { 10 };
+        let default =
+            if matches!(self.kind, SamplerKind::Gp | SamplerKind::Sim) { space.parameters().len() + 2 } else { 10 };
         self.startup_trials.unwrap_or(default)
     }
 }
@@ -135,6 +139,8 @@ pub struct Ask<'a> {
     pub fixed: &'a [(String, f64)],
     /// Direction of the objective.
     pub direction: Direction,
+    /// Results of simulated robots, for [`SamplerKind::Sim`].
+    pub prior: Option<&'a PriorModel>,
 }
 
 impl Ask<'_> {
@@ -151,10 +157,29 @@ pub struct Candidate {
     pub values: Vec<f64>,
     /// TPE: the joint sample behind it, by name, including parameters that were fixed; empty if none was drawn.
     pub joint: Vec<(String, f64)>,
+    /// What the sampler's model expects of a trial there; none for a sampler without a model of the objective.
+    pub expected: Option<Expectation>,
 }
 
 impl From<Vec<f64>> for Candidate {
     fn from(values: Vec<f64>) -> Self {
-        Candidate { values, joint: Vec::new() }
+        Candidate { values, joint: Vec::new(), expected: None }
     }
+}
+
+/// What a model expects of a trial before it runs.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Expectation {
+    /// Mean of the objective if the robot stands, in the objective's unit.
+    pub value: f64,
+    /// Standard deviation of this mean, without the noise of a trial, in the objective's unit.
+    pub deviation: f64,
+    /// Probability that the trial ends without a fall, 0..1.
+    pub p_stand: f64,
+    /// Smallest and largest value of the simulated robots there; none without a prior.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub worlds: Option<(f64, f64)>,
+    /// Whether the gain that is expected anywhere is worth its risk of a fall: if not, the sampler advises to end the search and
+    /// to confirm the best.
+    pub worth_the_risk: bool,
 }

@@ -11,6 +11,7 @@ pub mod journal;
 pub mod model_free;
 pub mod mt19937;
 pub mod parzen;
+pub mod prior;
 pub mod repeats;
 pub mod sampler;
 pub mod sobol;

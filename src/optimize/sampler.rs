@@ -31,7 +31,8 @@ pub fn propose(ask: &Ask<'_>, streams: &mut Streams) -> Candidate {
 fn propose_once(ask: &Ask<'_>, streams: &mut Streams) -> Candidate {
     match ask.config.kind {
         SamplerKind::Tpe => tpe::propose(ask, streams),
-        SamplerKind::Gp => gp::propose(ask, streams),
+        // The sampler `sim` without a prior is `gp`.
+        SamplerKind::Gp | SamplerKind::Sim => gp::propose(ask, streams),
         SamplerKind::Random => model_free::random(ask, streams),
         SamplerKind::Sobol => model_free::sobol(ask, streams),
     }

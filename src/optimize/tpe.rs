@@ -156,5 +156,5 @@ pub fn propose(ask: &Ask<'_>, streams: &mut Streams) -> Candidate {
         };
         values.push(value);
     }
-    Candidate { values, joint: joint.unwrap_or_default() }
+    Candidate { values, joint: joint.unwrap_or_default(), expected: None }
 }

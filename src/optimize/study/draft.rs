@@ -1,7 +1,7 @@
 //! Proposals: drafted without effect, then begun.
 
 use super::{Study, StudyError, StudyOptions, user_attributes};
-use crate::optimize::ask::{Ask, Draws};
+use crate::optimize::ask::{Ask, Draws, Expectation};
 use crate::optimize::journal::{AttributeKind, Operation};
 use crate::optimize::sampler::propose;
 use crate::optimize::space::{Parameter, Range};
@@ -48,6 +48,8 @@ pub struct TrialDraft {
     pub attributes: BTreeMap<String, Value>,
     /// The joint sample of TPE, by name; announced to other workers.
     pub joint: Vec<(String, f64)>,
+    /// What the sampler's model expects of the trial at the values above.
+    pub expected: Option<Expectation>,
     /// Seed of the random streams.
     pub seed: u32,
     /// Positions of the streams before the draws.
@@ -76,7 +78,14 @@ impl Study {
         let mut streams = self.streams.clone();
         let StudyOptions { sampler, space, direction, .. } = &self.options;
         let inside = self.inside.as_ref().unwrap_or(space);
-        let ask = Ask { config: sampler, trials, space: inside, fixed: &given, direction: *direction };
+        let ask = Ask {
+            config: sampler,
+            trials,
+            space: inside,
+            fixed: &given,
+            direction: *direction,
+            prior: self.prior.as_deref(),
+        };
         let candidate = propose(&ask, &mut streams);
         let suggest = |(p, value): (&Parameter, f64)| SuggestedParameter {
             name: p.name.clone(),
@@ -90,6 +99,7 @@ impl Study {
             enqueued: waiting.is_some(),
             attributes: waiting.map(|t| t.user_attributes.clone()).unwrap_or_default(),
             joint: candidate.joint,
+            expected: candidate.expected,
             seed: sampler.seed,
             before,
             after: streams.draws(),

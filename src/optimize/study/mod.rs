@@ -23,11 +23,13 @@ use crate::optimize::ask::{Direction, SamplerConfig, Streams};
 use crate::optimize::journal::{
     Applied, AttributeKind, Durability, Journal, JournalError, JournalWait, Operation, StudyRecord,
 };
+use crate::optimize::prior::PriorModel;
 use crate::optimize::repeats;
 use crate::optimize::space::Space;
 use crate::optimize::trial::{Trial, TrialState};
 use serde_json::Value;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// Study system attribute of Optuna and its dashboard: names of the objectives.
 const METRIC_NAMES: &str = "study:metric_names";
@@ -79,6 +81,8 @@ pub struct Study {
     streams: Streams,
     /// Part of the search space in which points are drawn; none for the whole space.
     inside: Option<Space>,
+    /// Results of simulated robots, for the sampler `sim`.
+    prior: Option<Arc<PriorModel>>,
 }
 
 impl Study {
@@ -94,7 +98,7 @@ impl Study {
         }
         let Some(id) = journal.state().find(&options.name) else { return Err(StudyError::Gone(options.name)) };
         let streams = Streams::new(options.sampler.seed);
-        let mut study = Study { journal, id, options, streams, inside: None };
+        let mut study = Study { journal, id, options, streams, inside: None, prior: None };
         study.check_compatible()?;
         study.streams.advance_to(study.draws_so_far());
         Ok(study)
@@ -114,7 +118,19 @@ impl Study {
     /// after the same changes.
     pub fn fork(&self) -> Study {
         let (options, streams) = (self.options.clone(), self.streams.clone());
-        Study { journal: self.journal.fork(), id: self.id, options, streams, inside: self.inside.clone() }
+        Study {
+            journal: self.journal.fork(),
+            id: self.id,
+            options,
+            streams,
+            inside: self.inside.clone(),
+            prior: self.prior.clone(),
+        }
+    }
+
+    /// Gives the results of simulated robots to the sampler `sim`; without them it proposes as `gp`.
+    pub fn use_prior(&mut self, prior: Arc<PriorModel>) {
+        self.prior = Some(prior);
     }
 
     /// Replaces the search space; only bounds may differ. As in Optuna, a parameter whose bounds have changed leaves the

@@ -43,6 +43,7 @@ fn sampler() -> impl TypedValueParser<Value = SamplerKind> {
         let help = match kind {
             SamplerKind::Tpe => "Tree-structured Parzen estimator, as Optuna",
             SamplerKind::Gp => "Gaussian process, better with some tens of trials",
+            SamplerKind::Sim => "Gaussian process about simulated robots, for some five trials on a robot",
             SamplerKind::Random => "Uniform random",
             SamplerKind::Sobol => "Sobol sequence (quasi-random)",
         };
