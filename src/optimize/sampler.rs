@@ -2,7 +2,7 @@
 
 use super::ask::{Ask, Candidate, SamplerKind, Streams};
 use super::trial::TrialState;
-use super::{gp, model_free, tpe};
+use super::{gp, model_free, sim, tpe};
 
 /// Distance in every parameter, as a share of its range, below which a proposal repeats a void trial.
 const SAME_POINT: f64 = 1e-3;
@@ -31,8 +31,8 @@ pub fn propose(ask: &Ask<'_>, streams: &mut Streams) -> Candidate {
 fn propose_once(ask: &Ask<'_>, streams: &mut Streams) -> Candidate {
     match ask.config.kind {
         SamplerKind::Tpe => tpe::propose(ask, streams),
-        // The sampler `sim` without a prior is `gp`.
-        SamplerKind::Gp | SamplerKind::Sim => gp::propose(ask, streams),
+        SamplerKind::Gp => gp::propose(ask, streams),
+        SamplerKind::Sim => sim::propose(ask, streams),
         SamplerKind::Random => model_free::random(ask, streams),
         SamplerKind::Sobol => model_free::sobol(ask, streams),
     }

@@ -15,9 +15,11 @@
 
 pub mod ascent;
 pub mod falls;
+pub mod laplace;
 pub mod process;
+pub mod regression;
 
-use super::ask::{Ask, Candidate, Direction, Streams};
+use super::ask::{Ask, Candidate, Direction, Expectation, Streams};
 use super::model_free;
 use super::sobol::Sobol;
 use super::space::Parameter;
@@ -36,7 +38,7 @@ const CLOUD_WIDTHS: [f64; 3] = [0.2, 0.05, 0.01];
 /// Number of best trials that are centres.
 const CENTRES: usize = 3;
 /// Distance from a void trial, in units of the cube, at which the acquisition is reduced to 0.39 of its value.
-const VOID_RADIUS: f64 = 0.1;
+pub const VOID_RADIUS: f64 = 0.1;
 /// Number of best points from which the gradient ascent starts.
 const CLIMBS: usize = 6;
 
@@ -56,8 +58,11 @@ pub fn propose(ask: &Ask<'_>, streams: &mut Streams) -> Candidate {
     let bounds: Vec<(f64, f64)> = parameters.iter().zip(&given).map(bound).collect();
     let unit = model.best_point(&bounds, streams);
     let values =
-        parameters.iter().zip(&given).zip(unit).map(|((p, given), u)| given.unwrap_or_else(|| p.range.unscale(u)));
-    values.collect::<Vec<f64>>().into()
+        parameters.iter().zip(&given).zip(&unit).map(|((p, given), u)| given.unwrap_or_else(|| p.range.unscale(*u)));
+    Candidate {
+        expected: Some(model.expectation(&unit, ask.direction)),
+        ..Candidate::from(values.collect::<Vec<f64>>())
+    }
 }
 
 /// The trials as points of the unit cube.
@@ -147,6 +152,15 @@ impl Acquisition {
             log((-expm1(-0.5 * squared / (VOID_RADIUS * VOID_RADIUS))).max(1e-300))
         };
         self.void.iter().map(away).sum()
+    }
+
+    /// The prediction at `x` in the objective's own sign. Falls count with the padding of the regression; before the first fall the
+    /// probability of standing is 1.
+    fn expectation(&self, x: &[f64], direction: Direction) -> Expectation {
+        let (mean, deviation) = self.process.predict(x);
+        let value = if direction == Direction::Maximize { mean } else { -mean };
+        let p_stand = self.stand_probability.as_ref().map_or(1.0, |s| s.probability(x));
+        Expectation { value, deviation, p_stand, worlds: None, worth_the_risk: true }
     }
 
     /// Returns the point of the box with the largest acquisition. Takes one double per coordinate.
