@@ -101,7 +101,8 @@ pub fn simulate(
     let worlds = values.chunks(points.len()).enumerate();
     let worlds = worlds.map(|(i, values)| World { name: format!("world {}", i + 1), values: values.to_vec() });
     let worlds = worlds.collect();
-    Ok(Prior { slip: slip(&parameters), parameters, points, worlds })
+    let slip = slip(&parameters);
+    Ok(Prior::new(parameters, points, worlds, slip))
 }
 
 /// Returns the robots of an ensemble: points of a Sobol sequence over the ranges.
