@@ -4,6 +4,7 @@ mod control_thread;
 mod folder;
 mod guard;
 mod options;
+mod prior;
 mod session_thread;
 mod stored;
 mod study;
@@ -11,6 +12,7 @@ mod study;
 pub use folder::{STUDY_FILE, attachments, fingerprint, newest_config, prepare_folder, study_files, utc_ns};
 pub use guard::{GUARD, GuardError, GuardOutcome, run_guard};
 pub use options::{EngineError, Options};
+pub use prior::prior_plan;
 pub use stored::{Opened, StoredStudy, open_stored, stored_studies, stored_study};
 pub use study::{check_backend, open_experiment, session_info, study_name};
 

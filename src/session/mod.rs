@@ -7,6 +7,8 @@ pub mod evaluation;
 pub mod experiment;
 pub mod objective;
 pub mod operator_request;
+pub mod parallel;
+pub mod prior;
 pub mod rollout;
 pub mod storage;
 pub mod supervisor;

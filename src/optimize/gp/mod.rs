@@ -15,7 +15,9 @@
 
 pub mod ascent;
 pub mod falls;
+pub mod laplace;
 pub mod process;
+pub mod regression;
 
 use super::ask::{Ask, Candidate, Direction, Expectation, Prediction, Streams};
 use super::model_free;
@@ -36,7 +38,7 @@ const CLOUD_WIDTHS: [f64; 3] = [0.2, 0.05, 0.01];
 /// Number of best trials that are centres.
 const CENTRES: usize = 3;
 /// Distance from a void trial, in units of the cube, at which the acquisition is reduced to 0.39 of its value.
-const VOID_RADIUS: f64 = 0.1;
+pub const VOID_RADIUS: f64 = 0.1;
 /// Finished trials from which on a proposal must stand with [`LEAST_P_STAND`]. Before, the classifier knows little, and the search
 /// would stay among the careful points.
 const CAREFUL_FROM: usize = 10;
@@ -171,14 +173,6 @@ impl Acquisition {
         Some(Acquisition { process, stand_probability, incumbent, centres, void: training.void.clone(), least_p_stand })
     }
 
-    /// The expectation of a trial at a point of the unit cube. Without a fall the probability of standing is unknown: 1.
-    fn expectation(&self, x: &[f64], direction: Direction) -> Expectation {
-        let (mean, deviation) = self.process.predict(x);
-        let value = if direction == Direction::Maximize { mean } else { -mean };
-        let p_stand = self.stand_probability.as_ref().map_or(1.0, |s| s.probability(x));
-        Expectation { value, deviation, p_stand, worlds: None, worth_the_risk: true }
-    }
-
     /// ln EI(x) + ln P(stands at x) - c max(p - P(stands at x), 0) + sum over void points v of ln(1 - exp(-|x - v|^2 / 2 r^2))
     fn value(&self, x: &[f64]) -> f64 {
         let (mean, deviation) = self.process.predict(x);
@@ -194,6 +188,15 @@ impl Acquisition {
             log((-expm1(-0.5 * squared / (VOID_RADIUS * VOID_RADIUS))).max(1e-300))
         };
         self.void.iter().map(away).sum()
+    }
+
+    /// The prediction at `x` in the objective's own sign. Falls count with the padding of the regression; before the first fall the
+    /// probability of standing is 1.
+    fn expectation(&self, x: &[f64], direction: Direction) -> Expectation {
+        let (mean, deviation) = self.process.predict(x);
+        let value = if direction == Direction::Maximize { mean } else { -mean };
+        let p_stand = self.stand_probability.as_ref().map_or(1.0, |s| s.probability(x));
+        Expectation { value, deviation, p_stand, worlds: None, worth_the_risk: true }
     }
 
     /// Returns the point of the box with the largest acquisition. Takes one double per coordinate.

@@ -51,11 +51,6 @@ fn sampler() -> impl TypedValueParser<Value = SamplerKind> {
     }))
 }
 
-/// Returns the number of cores that this process may use.
-pub fn cores() -> usize {
-    std::thread::available_parallelism().map_or(1, std::num::NonZero::get)
-}
-
 /// Returns the robot model of a name, or of a folder with a URDF and a robot.toml.
 pub fn load_model(model: &str) -> Result<(RobotFiles, RobotDescription), Failure> {
     let files = RobotFiles::open(model).map_err(Failure::input)?;

@@ -9,7 +9,6 @@ mod evaluate;
 mod failure;
 mod guard;
 mod optimize;
-mod parallel;
 mod recover;
 mod replay;
 mod report;

@@ -17,6 +17,7 @@ use quadfrog::recording::record::{Record, Stamped};
 use quadfrog::recording::writer::Writer;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::session::automatic::{self, JudgedTrial};
+use quadfrog::session::parallel;
 use quadfrog::session::rollout::Rollout;
 use quadfrog::sim::Simulator;
 use quadfrog::telemetry::Tick;
@@ -91,7 +92,7 @@ pub fn run(arguments: &OptimizeArguments) -> Result<(), Failure> {
     let printer = Printer::new(arguments.json, joined.is_some(), &config, &budgets.collect::<Vec<_>>());
     let failures = Mutex::new(Vec::new());
     let next = AtomicUsize::new(0);
-    let cores = if joined.is_some() { 1 } else { arguments::cores() };
+    let cores = if joined.is_some() { 1 } else { parallel::cores() };
     let jobs = arguments.jobs.map_or(cores, usize::from);
     let fail = |failure| failures.lock().unwrap_or_else(PoisonError::into_inner).push(failure);
     let work = || {
