@@ -9,6 +9,7 @@ mod evaluate;
 mod failure;
 mod guard;
 mod optimize;
+mod prior;
 mod recover;
 mod replay;
 mod report;
@@ -38,6 +39,8 @@ pub struct Arguments {
 enum Subcommands {
     /// Run a complete study on the simulator without a screen
     Optimize(optimize::OptimizeArguments),
+    /// Simulate the robots of the sampler sim before a study
+    Prior(prior::PriorArguments),
     /// Run one point over several seeds on the simulator: falls, value, attitude
     Evaluate(evaluate::EvaluateArguments),
     /// Run the experiments of the paper on the simulator and compare them with its statements
@@ -67,6 +70,7 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
     match arguments.command {
         None => console::run(&arguments.console),
         Some(Subcommands::Optimize(optimize)) => optimize::run(&optimize),
+        Some(Subcommands::Prior(prior)) => prior::run(&prior),
         Some(Subcommands::Evaluate(evaluate)) => evaluate::run(&evaluate),
         Some(Subcommands::Reproduce(reproduce)) => reproduce::run(&reproduce),
         Some(Subcommands::Replay(replay)) => replay::run(&replay),
