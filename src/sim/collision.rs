@@ -48,12 +48,13 @@ struct ProbeSphere {
     radius: f64,
 }
 
-/// Bounding sphere of a run of probes on one link, link frame.
+/// Bounds of a run of probes on one link: a box along the link's axes that holds their centres, and the largest radius about them.
 #[derive(Debug, Clone, Copy)]
-struct BoundingSphere {
+struct ProbeBounds {
     leg: usize,
     link: usize,
     center: Vector3<f64>,
+    half_extents: Vector3<f64>,
     radius: f64,
     /// First probe, and number of probes.
     first: usize,
@@ -65,7 +66,7 @@ struct BoundingSphere {
 pub(super) struct Collider {
     /// The feet first, one per leg.
     probes: Vec<Probe>,
-    bounds: Vec<BoundingSphere>,
+    bounds: Vec<ProbeBounds>,
     /// Whether contact of each probe is a sign of a fall.
     falls: Vec<bool>,
     /// Upper bound of the distance of a point from the trunk's origin or from a joint that moves it, m.
@@ -109,7 +110,7 @@ impl Collider {
         for bound in &collider.bounds {
             let origins = description.legs.get(bound.leg).map_or(&[][..], |leg| &leg.joint_origin[..=bound.link]);
             let leg: f64 = origins.iter().map(|origin| origin.norm()).sum();
-            collider.extent = collider.extent.max(leg + bound.center.norm() + bound.radius);
+            collider.extent = collider.extent.max(leg + bound.center.norm() + bound.half_extents.norm() + bound.radius);
         }
         collider
     }
@@ -154,14 +155,21 @@ impl Collider {
         }
     }
 
-    /// Adds the bounding sphere of the probes from `first` on, which belong to one link.
+    /// Adds the bounds of the probes from `first` on, which belong to one link.
     fn add_bound(&mut self, first: usize) {
         let probes = &self.probes[first..];
-        let center = probes.iter().map(|p| p.center).sum::<Vector3<f64>>() / probes.len() as f64;
-        let reach = |p: &Probe| (p.center - center).norm() + p.shape.radius();
-        let radius = probes.iter().map(reach).fold(0.0, f64::max);
+        let fold = |f: fn(f64, f64) -> f64| probes.iter().map(|p| p.center).reduce(|a, b| a.zip_map(&b, f));
+        let (low, high) = (fold(f64::min).unwrap_or_default(), fold(f64::max).unwrap_or_default());
         let Probe { leg, link, .. } = probes[0];
-        self.bounds.push(BoundingSphere { leg, link, center, radius, first, count: probes.len() });
+        self.bounds.push(ProbeBounds {
+            leg,
+            link,
+            center: (low + high) * 0.5,
+            half_extents: (high - low) * 0.5,
+            radius: probes.iter().map(|p| p.shape.radius()).fold(0.0, f64::max),
+            first,
+            count: probes.len(),
+        });
     }
 
     /// Adds to `solver` every point that can touch in the step.
@@ -180,7 +188,7 @@ impl Collider {
     }
 
     /// Upper bound of the speed of any point: |v| + r |w| + l (|dq_1| + |dq_2| + |dq_3|), m/s.
-    fn fastest(&self, v: &GeneralizedVelocity) -> f64 {
+    pub fn fastest(&self, v: &GeneralizedVelocity) -> f64 {
         let (linear, angular) = split(&v.trunk);
         let legs = v.legs.iter().fold(0.0, |most: f64, dq| most.max(dq.abs().sum()));
         linear.norm() + self.extent * (angular.norm() + legs)
@@ -220,17 +228,25 @@ impl Collider {
     ) {
         let up_body = world_from_body.tr_mul(&terrain.normal());
         let base = terrain.clearance(&state.position_world);
+        // Height of a point p of a link: height of its frame's origin + up . p in link axes.
+        let links: PerLeg<[(f64, Vector3<f64>); 3]> = std::array::from_fn(|leg| {
+            let leg: &LegDynamics = &legs[leg];
+            let up_links = leg.in_links(&up_body);
+            std::array::from_fn(|link| (base + up_body.dot(&leg.origin_body[link]), up_links[link]))
+        });
         for bound in &self.bounds {
-            // Height of a point p of the link: height of its frame's origin + up . p in link axes.
-            let (origin_body, up_link) = match bound.leg {
-                TRUNK => (Vector3::zeros(), up_body),
-                leg => (legs[leg].origin_body[bound.link], legs[leg].in_link(bound.link, &up_body)),
+            let (height, up_link) = match bound.leg {
+                TRUNK => (base, up_body),
+                leg => links[leg][bound.link],
             };
-            let height = base + up_body.dot(&origin_body);
-            if height + up_link.dot(&bound.center) > bound.radius + reach {
+            // Height of the box's lowest corner, less the radius about it.
+            let half = &bound.half_extents;
+            let depth = up_link.x.abs() * half.x + up_link.y.abs() * half.y + up_link.z.abs() * half.z;
+            if height + up_link.dot(&bound.center) - depth > bound.radius + reach {
                 continue;
             }
-            for (i, probe) in self.probes.iter().enumerate().skip(bound.first).take(bound.count) {
+            let probes = &self.probes[bound.first..bound.first + bound.count];
+            for (i, probe) in (bound.first..).zip(probes) {
                 if height + up_link.dot(&probe.center) > probe.shape.radius() + reach {
                     continue;
                 }

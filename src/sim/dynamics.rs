@@ -93,7 +93,8 @@ pub(super) struct Dynamics {
 /// Returns the joints of all legs as lanes.
 #[inline]
 fn joint_lanes(x: &Joints) -> [Lanes; 3] {
-    [0, 1, 2].map(|i| Lanes::from([x[i], x[3 + i], x[6 + i], x[9 + i]]))
+    let lanes = |i: usize| Lanes::from([x[i], x[3 + i], x[6 + i], x[9 + i]]);
+    [lanes(0), lanes(1), lanes(2)]
 }
 
 impl LegLanes {
@@ -138,12 +139,9 @@ impl LegLanes {
         a1.linear -= hip.unrotate_x(gravity_body);
         let a2 = a1.plus(&c2);
         let a3 = a2.plus(&c3);
-        let force = |link: &SpatialInertia<Lanes>, v: &SpatialMotion<Lanes>, a| {
-            link.times(a).plus(&v.cross_force(&link.times(v)))
-        };
-        let p3 = force(&link_calf, &v3, &a3);
-        let p2 = force(&link_thigh, &v2, &a2).plus(&p3);
-        let p1 = force(&link_hip, &v1, &a1).plus(&p2);
+        let p3 = link_calf.force(&v3, &a3);
+        let p2 = link_thigh.force(&v2, &a2).plus(&p3);
+        let p1 = link_hip.force(&v1, &a1).plus(&p2);
 
         let column = |f: &SpatialForce<Lanes>| {
             let f = f.in_parent(hip, &origin_hip);
@@ -183,13 +181,14 @@ impl LegLanes {
     /// Accelerations of the joints for an acceleration `trunk`: `free` - G a_0.
     #[inline]
     fn follow(&self, free: &[Lanes; 3], trunk: &Six) -> [Lanes; 3] {
-        [0, 1, 2].map(|j| {
-            let mut joint = free[j];
-            for (g, t) in self.gain[j].iter().zip(trunk) {
-                joint -= *g * Lanes::splat(*t);
+        let mut joint = *free;
+        for (k, t) in trunk.iter().enumerate() {
+            let t = Lanes::splat(*t);
+            for (joint, gain) in joint.iter_mut().zip(&self.gain) {
+                *joint -= gain[k] * t;
             }
-            joint
-        })
+        }
+        joint
     }
 }
 
@@ -247,15 +246,11 @@ impl LegDynamics {
         self.origin_body[link] + self.hip.rotate_x(&turned)
     }
 
-    /// Rotates a vector from the trunk's axes to the axes of link `link`.
+    /// Rotates a vector from the trunk's axes to the axes of each link.
     #[inline]
-    pub fn in_link(&self, link: usize, v_body: &Vector3<f64>) -> Vector3<f64> {
+    pub fn in_links(&self, v_body: &Vector3<f64>) -> [Vector3<f64>; 3] {
         let v = self.hip.unrotate_x(v_body);
-        match link {
-            0 => v,
-            1 => self.thigh.unrotate_y(&v),
-            _ => self.calf.unrotate_y(&v),
-        }
+        [v, self.thigh.unrotate_y(&v), self.calf.unrotate_y(&v)]
     }
 }
 
@@ -276,7 +271,7 @@ impl Dynamics {
 
         // f_0 = I_0 a_0 + v_0 x* I_0 v_0 of the trunk alone, plus the forces of the legs.
         let up = SpatialMotion { linear: -gravity_body, angular: Vector3::zeros() };
-        let own = model.trunk.times(&up).plus(&velocity.cross_force(&model.trunk.times(&velocity)));
+        let own = model.trunk.force(&velocity, &up);
         let bias = own.plus(&SpatialForce { linear: sums(&leg_force.linear), angular: sums(&leg_force.angular) });
         let composite = model.trunk.plus(&SpatialInertia {
             mass: sum(leg_inertia.mass),
@@ -300,8 +295,8 @@ impl Dynamics {
     /// a = M^-1 ([0; tau] - b).
     pub fn acceleration(&self, torque: &Joints) -> Acceleration {
         // z_l = H_l^-1 (tau_l - c_l);  I_A a_0 = -b_0 - sum F_l z_l;  ddq_l = z_l - G_l a_0
-        let torque = joint_lanes(torque);
-        let free = self.legs.solve(&[0, 1, 2].map(|j| torque[j] - self.legs.bias[j]));
+        let ([t1, t2, t3], [c1, c2, c3]) = (joint_lanes(torque), self.legs.bias);
+        let free = self.legs.solve(&[t1 - c1, t2 - c2, t3 - c3]);
         let [f1, f2, f3] = &self.legs.coupling;
         let mut trunk = self.bias;
         for (i, trunk) in trunk.iter_mut().enumerate() {
@@ -309,21 +304,47 @@ impl Dynamics {
         }
         self.solve_lower(&mut trunk);
         self.solve_upper(&mut trunk);
-        let joint = self.legs.follow(&free, &trunk);
+        let [hip, thigh, calf] = self.legs.follow(&free, &trunk);
+        let joint: [[f64; LEGS]; 3] = [hip.into(), thigh.into(), calf.into()];
         Acceleration {
             linear_body: Vector3::new(trunk[0], trunk[1], trunk[2]),
             angular_body: Vector3::new(trunk[3], trunk[4], trunk[5]),
-            joint: std::array::from_fn(|i| joint[i % 3].extract(i / 3)),
+            joint: std::array::from_fn(|i| joint[i % 3][i / 3]),
         }
+    }
+
+    /// Centre of mass, body axes, m.
+    pub fn com_body(&self) -> Vector3<f64> {
+        self.composite.first / self.composite.mass
+    }
+
+    /// Momentum of the whole robot about the trunk's origin, body axes: the first six rows of M v.
+    pub fn momentum(&self, trunk: &SpatialMotion<f64>, joint_velocity: &Joints) -> SpatialForce<f64> {
+        self.composite.times(trunk).plus(&self.joint_momentum(joint_velocity))
+    }
+
+    /// Returns the velocity of the trunk at which the robot has `momentum`.
+    pub fn trunk_velocity(&self, momentum: &SpatialForce<f64>, joint_velocity: &Joints) -> SpatialMotion<f64> {
+        self.composite.velocity(&momentum.minus(&self.joint_momentum(joint_velocity)))
+    }
+
+    /// sum F_l dq_l: momentum due to the joints alone.
+    fn joint_momentum(&self, joint_velocity: &Joints) -> SpatialForce<f64> {
+        let dq = joint_lanes(joint_velocity);
+        let [f1, f2, f3] = &self.legs.coupling;
+        let row = |i: usize| sum(f1[i] * dq[0] + f2[i] * dq[1] + f3[i] * dq[2]);
+        SpatialForce { linear: Vector3::new(row(0), row(1), row(2)), angular: Vector3::new(row(3), row(4), row(5)) }
     }
 
     /// Change of the joint velocities by impulses: C_l^-T y_l - G_l dv_0, with y_l = sum U^T p.
     pub fn joint_change(&self, sums: &PerLeg<Vector3<f64>>, trunk: &Six) -> PerLeg<Vector3<f64>> {
-        let y = [0, 1, 2].map(|i| Lanes::from(sums.map(|sum| sum[i])));
+        let lanes = |i: usize| Lanes::from([sums[0][i], sums[1][i], sums[2][i], sums[3][i]]);
+        let y = [lanes(0), lanes(1), lanes(2)];
         let [i11, i21, i22, i31, i32, i33] = self.legs.factor_inverse;
         let own = [i11 * y[0] + i21 * y[1] + i31 * y[2], i22 * y[1] + i32 * y[2], i33 * y[2]];
-        let change = self.legs.follow(&own, trunk);
-        std::array::from_fn(|l| Vector3::from_fn(|j, _| change[j].extract(l)))
+        let [hip, thigh, calf] = self.legs.follow(&own, trunk);
+        let [hip, thigh, calf]: [[f64; LEGS]; 3] = [hip.into(), thigh.into(), calf.into()];
+        std::array::from_fn(|l| Vector3::new(hip[l], thigh[l], calf[l]))
     }
 
     /// The legs one by one.

@@ -12,6 +12,7 @@ mod contact;
 mod dynamics;
 pub mod emulator;
 pub mod ensemble;
+mod flight;
 mod integrate;
 mod joint_stop;
 mod model;
@@ -44,6 +45,7 @@ use actuator::Actuator;
 use collision::Collider;
 use contact::ContactSolver;
 use dynamics::Dynamics;
+use flight::FlightMemory;
 use sensors::Sensors;
 use state::PeriodContacts;
 use terrain::Terrain;
@@ -60,6 +62,8 @@ pub struct Simulator {
     actuator: Actuator,
     solver: ContactSolver,
     state: SimState,
+    /// Present if the last step was one of free flight.
+    flight: Option<FlightMemory>,
     contacts: PeriodContacts,
     /// Mean acceleration of the inertial unit over the last period, less gravity; body axes, m/s^2.
     specific_force_body: Vector3<f64>,
@@ -92,6 +96,7 @@ impl Simulator {
             imu_origin: description.imu_origin,
             collider,
             state: SimState::default(),
+            flight: None,
             contacts: PeriodContacts::default(),
             specific_force_body: Vector3::new(0.0, 0.0, GRAVITY),
             ticks: 0,
@@ -116,6 +121,7 @@ impl Simulator {
     /// Sets the state; resets contact impulses and motor lag.
     pub fn set_state(&mut self, state: &SimState) {
         self.state = *state;
+        self.flight = None;
         self.contacts = PeriodContacts::default();
         self.specific_force_body = state.world_from_body.inverse_transform_vector(&Vector3::new(0.0, 0.0, GRAVITY));
         self.solver.reset();

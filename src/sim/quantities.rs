@@ -6,9 +6,9 @@
 
 use nalgebra::{SMatrix, SVector, Vector3};
 
-use super::dynamics::{Dynamics, Six, add_scaled, columns};
+use super::dynamics::{Dynamics, Six, columns};
 use super::model::RobotModel;
-use super::spatial::SpatialMotion;
+use super::spatial::{SpatialForce, SpatialMotion};
 use super::state::{Acceleration, SimState};
 use crate::robot::{GRAVITY, JOINTS, Joints, LEGS, PerLeg, leg_of};
 
@@ -95,17 +95,10 @@ impl RobotModel {
     /// Centre of mass, its velocity, and the angular momentum about it.
     pub fn momentum(&self, state: &SimState) -> Momentum {
         let dynamics = self.dynamics(state);
-        // The first six rows of M v are the momentum about the trunk's origin.
         let velocity = SpatialMotion { linear: state.velocity_body, angular: state.angular_velocity_body };
-        let trunk = dynamics.composite.times(&velocity);
-        let mut momentum = stack(&trunk.linear, &trunk.angular);
-        let columns = (0..LEGS).flat_map(|leg| dynamics.coupling(leg));
-        for (column, speed) in columns.zip(&state.joint_velocity) {
-            add_scaled(&mut momentum, &column, *speed);
-        }
-        let (linear, angular) = split(&momentum);
+        let SpatialForce { linear, angular } = dynamics.momentum(&velocity, &state.joint_velocity);
         let mass = dynamics.composite.mass;
-        let com_body = dynamics.composite.first / mass;
+        let com_body = dynamics.com_body();
         let to_world = &state.world_from_body;
         Momentum {
             com_world: state.position_world + to_world * com_body,

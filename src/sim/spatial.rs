@@ -90,6 +90,21 @@ impl<T: Real> SymmetricMatrix<T> {
             self.xz * v.x + self.yz * v.y + self.zz * v.z,
         )
     }
+
+    /// A^-1 v of a positive matrix, by cofactors.
+    #[inline]
+    fn inverse_times(&self, v: &Vector3<T>) -> Vector3<T> {
+        let SymmetricMatrix { xx, xy, xz, yy, yz, zz } = *self;
+        let cofactors = SymmetricMatrix {
+            xx: yy * zz - yz * yz,
+            xy: xz * yz - xy * zz,
+            xz: xy * yz - xz * yy,
+            yy: xx * zz - xz * xz,
+            yz: xy * xz - xx * yz,
+            zz: xx * yy - xy * xy,
+        };
+        cofactors.times(v) / (xx * cofactors.xx + xy * cofactors.xy + xz * cofactors.xz)
+    }
 }
 
 /// A body's spatial inertia about the origin of the frame that it is expressed in (Featherstone eq. 2.63).
@@ -190,6 +205,37 @@ impl<T: Real> SpatialInertia<T> {
         }
     }
 
+    /// I a + v x* I v (eq. 5.9): force for the acceleration `a` at the velocity `v`.
+    #[inline]
+    pub fn force(&self, v: &SpatialMotion<T>, a: &SpatialMotion<T>) -> SpatialForce<T> {
+        // With the acceleration of the body's point at the origin a_O = a + w x v:
+        //   f = m a_O + w' x h + w x (w x h),  n = I w' + h x a_O + w x I w.
+        let (h, w) = (&self.first, &v.angular);
+        let at_origin = a.linear + w.cross(&v.linear);
+        SpatialForce {
+            linear: at_origin * self.mass + a.angular.cross(h) + w.cross(&w.cross(h)),
+            angular: self.second.times(&a.angular) + h.cross(&at_origin) + w.cross(&self.second.times(w)),
+        }
+    }
+
+    /// Returns the velocity at which the momentum is `momentum`: I^-1 f.
+    #[inline]
+    pub fn velocity(&self, momentum: &SpatialForce<T>) -> SpatialMotion<T> {
+        // With c = h / m:  v = f / m + c x w,  (I + h x c x) w = n - c x f.
+        let center = self.first / self.mass;
+        let (c, h, i) = (&center, &self.first, &self.second);
+        let about_com = SymmetricMatrix {
+            xx: i.xx - (c.y * h.y + c.z * h.z),
+            xy: i.xy + c.x * h.y,
+            xz: i.xz + c.x * h.z,
+            yy: i.yy - (c.x * h.x + c.z * h.z),
+            yz: i.yz + c.y * h.z,
+            zz: i.zz - (c.x * h.x + c.y * h.y),
+        };
+        let angular = about_com.inverse_times(&(momentum.angular - center.cross(&momentum.linear)));
+        SpatialMotion { linear: momentum.linear / self.mass + center.cross(&angular), angular }
+    }
+
     /// I s for the joint s = [x; 0] about x through the origin.
     #[inline]
     pub fn times_x(&self) -> SpatialForce<T> {
@@ -256,21 +302,17 @@ impl<T: Real> SpatialMotion<T> {
     pub fn plus(&self, o: &SpatialMotion<T>) -> SpatialMotion<T> {
         SpatialMotion { linear: self.linear + o.linear, angular: self.angular + o.angular }
     }
-
-    /// v x* f (eq. 2.34).
-    #[inline]
-    pub fn cross_force(&self, f: &SpatialForce<T>) -> SpatialForce<T> {
-        SpatialForce {
-            linear: self.angular.cross(&f.linear),
-            angular: self.angular.cross(&f.angular) + self.linear.cross(&f.linear),
-        }
-    }
 }
 
 impl<T: Real> SpatialForce<T> {
     #[inline]
     pub fn plus(&self, o: &SpatialForce<T>) -> SpatialForce<T> {
         SpatialForce { linear: self.linear + o.linear, angular: self.angular + o.angular }
+    }
+
+    #[inline]
+    pub fn minus(&self, o: &SpatialForce<T>) -> SpatialForce<T> {
+        SpatialForce { linear: self.linear - o.linear, angular: self.angular - o.angular }
     }
 
     /// s . f for the joint about y through `o`: the joint's torque.

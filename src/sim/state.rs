@@ -2,7 +2,7 @@
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-use crate::robot::{Joints, PerLeg};
+use crate::robot::{JOINTS, Joints, PerLeg};
 
 /// Position and velocity of every part.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -41,6 +41,23 @@ pub struct Acceleration {
     pub angular_body: Vector3<f64>,
     /// Joint accelerations, rad/s^2.
     pub joint: Joints,
+}
+
+impl Acceleration {
+    pub(super) const ZERO: Acceleration = Acceleration {
+        linear_body: Vector3::new(0.0, 0.0, 0.0),
+        angular_body: Vector3::new(0.0, 0.0, 0.0),
+        joint: [0.0; JOINTS],
+    };
+
+    /// Returns the difference to `other`.
+    pub(super) fn minus(&self, other: &Acceleration) -> Acceleration {
+        Acceleration {
+            linear_body: self.linear_body - other.linear_body,
+            angular_body: self.angular_body - other.angular_body,
+            joint: std::array::from_fn(|i| self.joint[i] - other.joint[i]),
+        }
+    }
 }
 
 /// Contact with the ground during one control period.

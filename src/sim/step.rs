@@ -5,7 +5,8 @@ use nalgebra::Matrix3;
 use super::Simulator;
 use super::collision::Collider;
 use super::dynamics::{Dynamics, add_scaled};
-use super::integrate::{free_velocity, runge_kutta_4, semi_implicit_euler};
+use super::flight::flight_step;
+use super::integrate::{free_velocity, semi_implicit_euler};
 use super::joint_stop::add_joint_constraints;
 use super::motion::{GeneralizedVelocity, StepContext};
 use super::state::PeriodContacts;
@@ -44,20 +45,30 @@ impl Simulator {
             self.actuator = before;
             return false;
         }
-        let dynamics = Dynamics::new(&self.model, &self.state, &self.model.rotor_inertia);
+        let last = self.flight.take();
+        let evaluated;
+        let dynamics = match &last {
+            Some(last) => &last.dynamics,
+            None => {
+                evaluated = Dynamics::new(&self.model, &self.state, &self.model.rotor_inertia);
+                &evaluated
+            }
+        };
         let acceleration = dynamics.acceleration(&drive.torque);
-        self.find_contacts(&dynamics, &free_velocity(&self.state, &acceleration, h), &drive.dry_friction, h);
+        self.find_contacts(dynamics, &free_velocity(&self.state, &acceleration, h), &drive.dry_friction, h);
         if !self.solver.is_empty() {
             self.actuator = before;
             return false;
         }
-        self.state = runge_kutta_4(&self.model, &self.state, acceleration, &drive.torque, h);
+        let equations = (dynamics, &acceleration);
+        self.flight = Some(flight_step(&self.model, &mut self.state, equations, last.as_ref(), &drive.torque, h));
         self.terrain.advance(h);
         true
     }
 
     /// Makes a step with contacts, joint stops and friction.
     fn contact_step(&mut self, command: &JointCommand, h: f64) {
+        self.flight = None;
         let drive = self.actuator.drive(command, &self.state.joint_position, &self.state.joint_velocity, h);
         // (M + h D) (v' - v) = h (tau - b): damping at the velocity of the end of the step.
         let added = std::array::from_fn(|i| self.model.rotor_inertia[i] + h * drive.damping[i]);

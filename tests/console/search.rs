@@ -167,6 +167,7 @@ fn insight() -> ProposalInsight {
             bad: bump(1.5),
             at,
         }],
+        ..ProposalInsight::default()
     }
 }
 

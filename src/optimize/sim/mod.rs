@@ -10,13 +10,13 @@ pub mod model;
 pub mod safeguard;
 pub mod search;
 
-use super::ask::{Ask, Candidate, Direction, Expectation, Streams};
+use super::ask::{Ask, Candidate, Direction, Expectation, Prediction as TrialPrediction, Streams};
 use super::gp;
 use super::mt19937::Mt19937;
 use super::prior::PriorModel;
 use super::prior::terms::{CANDIDATES, Ensemble, Features};
 use super::sobol::Sobol;
-use history::History;
+use history::{History, Jump};
 use libm::sqrt;
 use model::{StandingModel, ValueModel};
 use search::{Acquisition, Prediction};
@@ -26,6 +26,34 @@ pub fn propose(ask: &Ask<'_>, streams: &mut Streams) -> Candidate {
     let covering = ask.prior.filter(|prior| prior.covers(ask.space).is_ok());
     let proposal = covering.and_then(|prior| about_prior(ask, prior, prior.ensemble()?, streams));
     proposal.unwrap_or_else(|| gp::propose(ask, streams))
+}
+
+/// Returns what the model expects of a trial at `values`, in the order of the space.
+pub fn expect(ask: &Ask<'_>, values: &[f64]) -> Option<Expectation> {
+    let fixed: Vec<(String, f64)> =
+        ask.space.parameters().iter().zip(values).map(|(p, value)| (p.name.clone(), *value)).collect();
+    let given = Ask { fixed: &fixed, ..*ask };
+    // With all parameters given no random number is drawn.
+    propose(&given, &mut Streams::new(0)).expected.or_else(|| gp::expect(ask, values))
+}
+
+/// Returns what the model says of the finished trials.
+pub fn predict(ask: &Ask<'_>) -> Vec<TrialPrediction> {
+    let covering = ask.prior.filter(|prior| prior.covers(ask.space).is_ok());
+    let about = |prior: &PriorModel| {
+        let ensemble = prior.ensemble()?;
+        let history = History::gather(prior, ensemble, ask.trials, ask.direction);
+        let models = (ValueModel::fit(ensemble, &history)?, StandingModel::fit(ensemble, &history)?);
+        let acquisition = Acquisition::new((prior.prior(), ensemble), models, &history, &[])?;
+        let prediction = |jump: &Jump| {
+            let prediction = acquisition.predict(&jump.point, &jump.features);
+            let Expectation { value, deviation, p_stand, .. } =
+                expectation(ask.direction, ensemble, &jump.point, &prediction, true);
+            TrialPrediction { trial: jump.number, stood: jump.stood, value, deviation, p_stand }
+        };
+        Some(history.jumps.iter().map(prediction).collect())
+    };
+    covering.and_then(about).unwrap_or_else(|| gp::predict(ask))
 }
 
 /// The proposal of the model; `None` if a covariance cannot be factored.

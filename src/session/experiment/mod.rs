@@ -33,7 +33,7 @@ use crate::optimize::ask::Direction;
 use crate::optimize::exchange::TableTrial;
 use crate::optimize::journal::JournalWait;
 use crate::optimize::repeats::{RepeatedPoint, improvements, points};
-use crate::optimize::study::{Outcome, Study, StudyError};
+use crate::optimize::study::{ModelBest, Outcome, Study, StudyError};
 use crate::optimize::trial::TrialState;
 use crate::recording::record::{LogLevel, LogRecord, Record, StageRecord};
 use crate::telemetry::TrialSpec;
@@ -80,6 +80,8 @@ pub struct Experiment {
     published_search: Option<SearchStatus>,
     /// Share of the force bounds that the next trial may use.
     hop_share: Option<f64>,
+    /// The best trial by the sampler's model, the pending verdict included.
+    model_best: Option<ModelBest>,
 }
 
 impl Experiment {
@@ -99,6 +101,7 @@ impl Experiment {
             outbox: Vec::new(),
             published_search: None,
             hop_share: None,
+            model_best: None,
         };
         let log = experiment.queue.close_interrupted(&mut experiment.study)?;
         experiment.log_all(log);
@@ -139,9 +142,17 @@ impl Experiment {
         }
     }
 
-    /// Returns the accepted trial whose point has the greatest value, the earliest of equals. The value of a repeated point
-    /// is the mean of its repeats ([`crate::optimize::repeats`]).
+    /// Returns the best trial by the sampler's model and what that says of it; none for a sampler without a model.
+    pub fn model_best(&self) -> Option<ModelBest> {
+        self.model_best
+    }
+
+    /// Returns the best trial by the sampler's model; without a model the accepted trial whose point has the greatest value,
+    /// the earliest of equals. The value of a repeated point is the mean of its repeats ([`crate::optimize::repeats`]).
     pub fn best(&self) -> Option<&TrialRecord> {
+        if let Some(best) = self.model_best.and_then(|best| self.row(best.trial)) {
+            return Some(best);
+        }
         let points = points(self.study.trials());
         let mean = |number| points.iter().find(|point| point.trials.contains(&number)).map(RepeatedPoint::mean);
         let accepted = self.rows.values().filter(|row| row.verdict == Some(Verdict::Accept));

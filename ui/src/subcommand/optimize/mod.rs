@@ -235,7 +235,7 @@ fn run_one(
     if let Some(error) = failed {
         return Err(error.into());
     }
-    printer.finished(study, &experiment.rows().cloned().collect::<Vec<_>>(), experiment.best(), &options);
+    printer.finished(study, &experiment, &options);
     Ok(())
 }
 
