@@ -28,6 +28,11 @@ impl Hyperparameters {
         Hyperparameters { lengthscale, signal: exp(theta[d]), noise: exp(theta[d + 1]) }
     }
 
+    /// theta = ln (l_1 .. l_d, s^2, noise)
+    pub fn to_log(&self) -> Vec<f64> {
+        self.lengthscale.iter().chain([&self.signal, &self.noise]).map(|value| log(*value)).collect()
+    }
+
     /// k(x, x') = s^2 (1 + sqrt(5) r + 5/3 r^2) exp(-sqrt(5) r),  r^2 = sum ((x_d - x'_d) / l_d)^2   (R&W 4.17)
     pub fn kernel(&self, a: &[f64], b: &[f64]) -> f64 {
         let r2: f64 = a.iter().zip(b).zip(&self.lengthscale).map(|((a, b), l)| ((a - b) / l) * ((a - b) / l)).sum();
@@ -73,8 +78,7 @@ impl HyperPrior {
 
     /// ln p(theta) up to a constant, plus `log_likelihood` of theta, at given hyperparameters.
     pub fn log_posterior(&self, hyper: &Hyperparameters, log_likelihood: impl Fn(&[f64]) -> f64) -> f64 {
-        let values = hyper.lengthscale.iter().chain([&hyper.signal, &hyper.noise]);
-        let theta: Vec<f64> = values.map(|value| log(*value)).collect();
+        let theta = hyper.to_log();
         let squares = theta.iter().zip(self.coordinates(hyper.lengthscale.len())).map(|(theta, prior)| {
             let z = (theta - prior.median) / prior.width;
             z * z

@@ -162,7 +162,7 @@ fn fit_series(prior: &Prior, series: &[Series]) -> Option<Vec<f64>> {
         sum
     };
     let (hyper, _) = hyper_prior().maximize(d, ITERATIONS, likelihood)?;
-    Some(hyper.lengthscale.iter().chain([&hyper.signal, &hyper.noise]).map(|value| log(*value)).collect())
+    Some(hyper.to_log())
 }
 
 fn hyper_prior() -> HyperPrior {

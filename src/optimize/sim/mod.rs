@@ -5,7 +5,9 @@
 //! ([`PriorModel::covers`]), the sampler proposes as `gp`.
 
 pub mod history;
+pub mod insight;
 pub mod model;
+pub mod safeguard;
 pub mod search;
 
 use super::ask::{Ask, Candidate, Direction, Expectation, Prediction as TrialPrediction, Streams};
@@ -58,10 +60,11 @@ pub fn predict(ask: &Ask<'_>) -> Vec<TrialPrediction> {
 fn about_prior(ask: &Ask<'_>, prior: &PriorModel, ensemble: &Ensemble, streams: &mut Streams) -> Option<Candidate> {
     let history = History::gather(prior, ensemble, ask.trials, ask.direction);
     let search = SearchBox::of(ask, prior);
-    let models = (ValueModel::fit(ensemble, &history)?, StandingModel::fit(ensemble, &history)?);
+    let value = safeguard::check(ValueModel::fit(ensemble, &history)?, ensemble, &history)?.value;
+    let standing = StandingModel::fit(ensemble, &history)?;
     let all_given = ask.space.parameters().iter().all(|p| ask.given(p).is_some());
     let candidates = if all_given { Vec::new() } else { search.candidates(prior, ensemble) };
-    let acquisition = Acquisition::new((prior.prior(), ensemble), models, &history, &candidates)?;
+    let acquisition = Acquisition::new((prior.prior(), ensemble), (value, standing), &history, &candidates)?;
     let (unit, worth_the_risk) = if all_given {
         (search.bounds.iter().map(|(low, _)| *low).collect(), true)
     } else {

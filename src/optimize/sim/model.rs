@@ -22,6 +22,8 @@ const SCALE: f64 = 0.3;
 const COMPONENTS: f64 = 2.0;
 /// Factor of these variances for the label's components: an odds ratio a unit of the label.
 const LABEL_COMPONENTS: f64 = 4.0;
+/// ln of the median variance of delta.
+const DELTA: f64 = -2.0;
 /// Lengthscale and variance of delta_c.
 const STANDING: (f64, f64) = (0.4, 3.0);
 /// Observations from which hyperparameters are fitted: the cost grows with their cube.
@@ -52,7 +54,7 @@ impl ValueModel {
             terms: history.stood().map(|jump| jump.features.value.clone()).collect(),
             values: history.stood().map(|jump| (jump.value - ensemble.offset) / ensemble.scale).collect(),
         };
-        ValueModel::about(observed, linear, &hyper_prior(-2.0), history.dimensions)
+        ValueModel::about(observed, linear, &hyper_prior(DELTA), history.dimensions)
     }
 
     /// Fits a model without prior: a constant of variance 1 and a signal of the prior's scale.
@@ -64,6 +66,20 @@ impl ValueModel {
         };
         let linear = LinearPrior { mean: vec![0.0], variance: vec![1.0] };
         ValueModel::about(observed, linear, &hyper_prior(0.0), history.dimensions)
+    }
+
+    /// ln p of the values about a single simulated robot, given as a function of the point in scaled units, with the bias and the
+    /// median hyperparameters.
+    pub fn log_likelihood_about(ensemble: &Ensemble, history: &History, simulated: impl Fn(&[f64]) -> f64) -> f64 {
+        let linear = LinearPrior { mean: vec![0.0, 1.0], variance: vec![BIAS * BIAS, 0.0] };
+        let observed = Observations {
+            points: history.stood().map(|jump| jump.point.clone()).collect(),
+            terms: history.stood().map(|jump| vec![1.0, simulated(&jump.point)]).collect(),
+            values: history.stood().map(|jump| (jump.value - ensemble.offset) / ensemble.scale).collect(),
+        };
+        let theta = hyper_prior(DELTA).median(history.dimensions).to_log();
+        let covariance = observed.linear_covariance(&linear);
+        log_likelihood(&theta, &observed.points, &observed.residual(&linear), Some(&covariance)).0
     }
 
     fn about(observed: Observations, linear: LinearPrior, prior: &HyperPrior, d: usize) -> Option<ValueModel> {
