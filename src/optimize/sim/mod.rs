@@ -43,8 +43,7 @@ pub fn predict(ask: &Ask<'_>) -> Vec<TrialPrediction> {
     let about = |prior: &PriorModel| {
         let ensemble = prior.ensemble()?;
         let history = History::gather(prior, ensemble, ask.trials, ask.direction);
-        let models = (ValueModel::fit(ensemble, &history)?, StandingModel::fit(ensemble, &history)?);
-        let acquisition = Acquisition::new((prior.prior(), ensemble), models, &history, &[])?;
+        let acquisition = Acquisition::new((prior.prior(), ensemble), models(ensemble, &history)?, &history, &[])?;
         let prediction = |jump: &Jump| {
             let prediction = acquisition.predict(&jump.point, &jump.features);
             let Expectation { value, deviation, p_stand, .. } =
@@ -56,15 +55,20 @@ pub fn predict(ask: &Ask<'_>) -> Vec<TrialPrediction> {
     covering.and_then(about).unwrap_or_else(|| gp::predict(ask))
 }
 
+/// The models of value and standing. `None` if a covariance cannot be factored.
+fn models(ensemble: &Ensemble, history: &History) -> Option<(ValueModel, StandingModel)> {
+    let value = safeguard::check(ValueModel::fit(ensemble, history)?, ensemble, history)?.value;
+    Some((value, StandingModel::fit(ensemble, history)?))
+}
+
 /// The proposal of the model; `None` if a covariance cannot be factored.
 fn about_prior(ask: &Ask<'_>, prior: &PriorModel, ensemble: &Ensemble, streams: &mut Streams) -> Option<Candidate> {
     let history = History::gather(prior, ensemble, ask.trials, ask.direction);
     let search = SearchBox::of(ask, prior);
-    let value = safeguard::check(ValueModel::fit(ensemble, &history)?, ensemble, &history)?.value;
-    let standing = StandingModel::fit(ensemble, &history)?;
+    let models = models(ensemble, &history)?;
     let all_given = ask.space.parameters().iter().all(|p| ask.given(p).is_some());
     let candidates = if all_given { Vec::new() } else { search.candidates(prior, ensemble) };
-    let acquisition = Acquisition::new((prior.prior(), ensemble), (value, standing), &history, &candidates)?;
+    let acquisition = Acquisition::new((prior.prior(), ensemble), models, &history, &candidates)?;
     let (unit, worth_the_risk) = if all_given {
         (search.bounds.iter().map(|(low, _)| *low).collect(), true)
     } else {
