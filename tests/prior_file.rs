@@ -90,7 +90,7 @@ fn a_damaged_or_foreign_file_is_made_again_with_a_notice() {
     let mut changed = whole.clone().into_bytes();
     changed[digit] += 1;
     for (text, expected) in [
-        (whole[..whole.len() / 2].as_bytes(), "is no prior of this program"),
+        (&whole.as_bytes()[..whole.len() / 2], "is no prior of this program"),
         (&changed, "the prior is damaged: its checksum is"),
         (b"", "is no prior of this program"),
         (b"{\"name\":\"x\"}", "is no prior of this program"),

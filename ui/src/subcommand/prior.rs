@@ -31,7 +31,7 @@ pub struct PriorArguments {
     /// Robot model: go1, a1, or a folder with a URDF and a robot.toml
     #[arg(long, value_name = "MODEL", default_value = "go1")]
     model: String,
-    /// File of the prior [default: in recordings/priors, where studies in recordings/ find it]
+    /// File of the prior [default: in the folder priors of recordings, where new studies find it]
     #[arg(long, value_name = "FILE")]
     output: Option<PathBuf>,
     /// Jumps at the same time; the prior does not depend on it [default: the number of cores]
