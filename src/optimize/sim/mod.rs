@@ -1,8 +1,8 @@
 //! The sampler `sim`: a Gaussian process about the results of simulated robots, for some five jumps of a robot.
 //!
 //! The value and the standing of the robot are learned about those of the ensemble ([`model`]); the next point maximizes the
-//! expected gain less the price of a fall ([`search`]). Without a prior, or with one of other parameters
-//! ([`PriorModel::covers`]), the sampler proposes as `gp`.
+//! expected gain less the price of a fall ([`search`]). A simulator that the values contradict is left
+//! ([`safeguard`]). Without a prior, or with one of other parameters ([`PriorModel::covers`]), the sampler proposes as `gp`.
 
 pub mod history;
 pub mod insight;
@@ -10,7 +10,7 @@ pub mod model;
 pub mod safeguard;
 pub mod search;
 
-use super::ask::{Ask, Candidate, Direction, Expectation, Prediction as TrialPrediction, Streams};
+use super::ask::{Ask, Candidate, Direction, Expectation, Prediction, Streams};
 use super::gp;
 use super::mt19937::Mt19937;
 use super::prior::PriorModel;
@@ -19,7 +19,7 @@ use super::sobol::Sobol;
 use history::{History, Jump};
 use libm::sqrt;
 use model::{StandingModel, ValueModel};
-use search::{Acquisition, Prediction};
+use search::{Acquisition, PointPrediction};
 
 /// Proposes the next point for the given parameters.
 pub fn propose(ask: &Ask<'_>, streams: &mut Streams) -> Candidate {
@@ -38,33 +38,36 @@ pub fn expect(ask: &Ask<'_>, values: &[f64]) -> Option<Expectation> {
 }
 
 /// Returns what the model says of the finished trials.
-pub fn predict(ask: &Ask<'_>) -> Vec<TrialPrediction> {
+pub fn predict(ask: &Ask<'_>) -> Vec<Prediction> {
     let covering = ask.prior.filter(|prior| prior.covers(ask.space).is_ok());
     let about = |prior: &PriorModel| {
         let ensemble = prior.ensemble()?;
         let history = History::gather(prior, ensemble, ask.trials, ask.direction);
-        let models = (ValueModel::fit(ensemble, &history)?, StandingModel::fit(ensemble, &history)?);
-        let acquisition = Acquisition::new((prior.prior(), ensemble), models, &history, &[])?;
+        let acquisition = Acquisition::new((prior.prior(), ensemble), models(ensemble, &history)?, &history, &[])?;
         let prediction = |jump: &Jump| {
             let prediction = acquisition.predict(&jump.point, &jump.features);
             let Expectation { value, deviation, p_stand, .. } =
                 expectation(ask.direction, ensemble, &jump.point, &prediction, true);
-            TrialPrediction { trial: jump.number, stood: jump.stood, value, deviation, p_stand }
+            Prediction { trial: jump.number, stood: jump.stood, value, deviation, p_stand }
         };
         Some(history.jumps.iter().map(prediction).collect())
     };
     covering.and_then(about).unwrap_or_else(|| gp::predict(ask))
 }
 
+/// The models of value and standing; `None` if a covariance cannot be factored.
+fn models(ensemble: &Ensemble, history: &History) -> Option<(ValueModel, StandingModel)> {
+    let value = safeguard::check(ValueModel::fit(ensemble, history)?, ensemble, history)?.value;
+    Some((value, StandingModel::fit(ensemble, history)?))
+}
+
 /// The proposal of the model; `None` if a covariance cannot be factored.
 fn about_prior(ask: &Ask<'_>, prior: &PriorModel, ensemble: &Ensemble, streams: &mut Streams) -> Option<Candidate> {
     let history = History::gather(prior, ensemble, ask.trials, ask.direction);
     let search = SearchBox::of(ask, prior);
-    let value = safeguard::check(ValueModel::fit(ensemble, &history)?, ensemble, &history)?.value;
-    let standing = StandingModel::fit(ensemble, &history)?;
     let all_given = ask.space.parameters().iter().all(|p| ask.given(p).is_some());
     let candidates = if all_given { Vec::new() } else { search.candidates(prior, ensemble) };
-    let acquisition = Acquisition::new((prior.prior(), ensemble), (value, standing), &history, &candidates)?;
+    let acquisition = Acquisition::new((prior.prior(), ensemble), models(ensemble, &history)?, &history, &candidates)?;
     let (unit, worth_the_risk) = if all_given {
         (search.bounds.iter().map(|(low, _)| *low).collect(), true)
     } else {
@@ -89,7 +92,7 @@ fn expectation(
     direction: Direction,
     ensemble: &Ensemble,
     unit: &[f64],
-    prediction: &Prediction,
+    prediction: &PointPrediction,
     worth_the_risk: bool,
 ) -> Expectation {
     let own_sign = |value: f64| if direction == Direction::Maximize { value } else { -value };
