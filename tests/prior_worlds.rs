@@ -9,7 +9,7 @@ use quadfrog::engine::{fingerprint, prior_plan};
 use quadfrog::optimize::prior::Prior;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::session::evaluation::evaluate;
-use quadfrog::session::prior::{PriorError, PriorPlan, PriorProgress, draw_robot, ensemble, simulate};
+use quadfrog::session::prior::{EnsembleError, PriorPlan, PriorProgress, draw_robot, ensemble, simulate};
 use quadfrog::session::rollout::Rollout;
 use quadfrog::sim::{ActuatorKind, SimConfig, Simulator};
 use quadfrog::telemetry::TrialSpec;
@@ -132,7 +132,7 @@ fn progress_counts_every_jump_and_an_interrupt_ends_the_work() {
         *jumps.lock().unwrap() += 1;
         interrupt.store(done >= 3, Ordering::Relaxed);
     };
-    assert_eq!(simulate(&plan, 1, &stop, &interrupt), Err(PriorError::Interrupted));
+    assert_eq!(simulate(&plan, 1, &stop, &interrupt), Err(EnsembleError::Interrupted));
     assert_eq!(jumps.into_inner().unwrap(), 3, "no jump begins after the interrupt");
 }
 

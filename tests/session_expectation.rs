@@ -4,7 +4,13 @@
 #[path = "support/experiment.rs"]
 mod support;
 
+use std::sync::Arc;
+
 use quadfrog::optimize::ask::{SamplerConfig, SamplerKind};
+use quadfrog::optimize::mt19937::Mt19937;
+use quadfrog::optimize::prior::{Prior, PriorModel, World};
+use quadfrog::optimize::sobol::Sobol;
+use quadfrog::optimize::space::{Parameter, Range};
 use quadfrog::optimize::study::{Storage, Study, StudyOptions};
 use quadfrog::recording::record::Record;
 use quadfrog::session::experiment::Experiment;
@@ -103,6 +109,44 @@ fn a_stored_study_has_the_best_of_its_model_until_another_trial_ends() {
     stored.tell(number, quadfrog::optimize::study::Outcome::Complete(value)).unwrap();
     assert_eq!(stored.model_best(), None);
     assert_eq!(stored.best().unwrap().number, 2, "by value, since the model has not learned the newest trial");
+}
+
+/// Three simulated robots that jump as the test's robot does, times a factor.
+fn prior(factors: [f64; 3]) -> Arc<PriorModel> {
+    let sobol = Sobol::new(3, &mut Mt19937::new(1));
+    let points: Vec<Vec<f64>> = (0..96).map(|index| sobol.point(index)).collect();
+    let parameters =
+        support::BOUNDS.map(|(name, low, high)| Parameter { name: name.into(), range: Range::linear(low, high) });
+    let value = |point: &Vec<f64>| {
+        let at = |i: usize| parameters[i].range.unscale(point[i]);
+        let (f, x, z) = (at(0) - 1.2, at(1) / 150.0 - 0.7, at(2) / 350.0 - 0.6);
+        0.7 - f * f - x * x - z * z
+    };
+    let world = |(index, factor): (usize, f64)| World {
+        name: format!("world {index}"),
+        values: points.iter().map(|point| Some(factor * value(point))).collect(),
+    };
+    let worlds = factors.into_iter().enumerate().map(world).collect();
+    Arc::new(PriorModel::new(Prior::new(parameters.to_vec(), points, worlds, None)))
+}
+
+#[test]
+fn the_sampler_sim_expects_from_the_first_jump_on_and_compares_robot_and_simulator() {
+    let mut study = study(SamplerKind::Sim, Storage::Memory);
+    study.use_prior(prior([0.8, 1.0, 1.6]));
+    let mut experiment = Experiment::open(plan(12), study).unwrap();
+    let expected = experiment.proposal().unwrap().expected.expect("the prior knows before the first jump");
+    let (least, most) = (expected.simulated_least.unwrap(), expected.simulated_most.unwrap());
+    assert!(least < most && (least..=most).contains(&expected.value), "{expected:?}");
+    run(&mut experiment, 6, None);
+    let insight = newest_insight(&mut experiment);
+    let simulator = insight.simulator.unwrap();
+    assert!(!simulator.contradicted && simulator.ratio_deviation > 0.0 && simulator.bias_deviation > 0.0);
+    assert_eq!(simulator.worlds[0].name, "world 1", "the robot is that of factor 1: {simulator:?}");
+    let sum: f64 = simulator.worlds.iter().map(|world| world.weight).sum();
+    assert!((sum - 1.0).abs() < 1e-9, "{sum}");
+    let best = experiment.best().unwrap();
+    assert!(best.value.unwrap() > 0.66, "six jumps reach {best:?} of 0.7 m");
 }
 
 #[test]

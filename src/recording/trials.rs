@@ -152,6 +152,7 @@ fn simulator(way: Way, ours: &mut SimulatorComparison, m: &mut frog::insight::Si
     way.number(&mut ours.ratio_deviation, &mut m.ratio_deviation);
     way.number(&mut ours.bias, &mut m.bias);
     way.number(&mut ours.bias_deviation, &mut m.bias_deviation);
+    way.copy(&mut ours.contradicted, &mut m.contradicted);
     way.list(&mut ours.worlds, &mut m.worlds, world)
 }
 

@@ -1,6 +1,7 @@
 //! The session: the experiment with its trials, the requests of the operator, the checks before arming.
 
 pub mod arming_checklist;
+pub mod ask_tell;
 pub mod automatic;
 pub mod effort;
 pub mod evaluation;

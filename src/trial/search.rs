@@ -89,6 +89,8 @@ pub struct SimulatorComparison {
     pub bias_deviation: f64,
     /// The simulated robots, the most alike first.
     pub worlds: Vec<WorldResemblance>,
+    /// Whether the robot's values contradict the simulated ones, so that the sampler does not use them.
+    pub contradicted: bool,
 }
 
 /// One simulated robot beside the real one.

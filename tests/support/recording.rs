@@ -358,6 +358,7 @@ impl Draw {
                     bias: d.number(),
                     bias_deviation: d.number(),
                     worlds: d.several(|d| WorldResemblance { name: d.string(), weight: d.number() }),
+                    contradicted: d.yes(),
                 }),
             }),
             _ => Record::Points(self.several(|d| PointRecord {

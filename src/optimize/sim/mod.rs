@@ -55,7 +55,7 @@ pub fn predict(ask: &Ask<'_>) -> Vec<Prediction> {
     covering.and_then(about).unwrap_or_else(|| gp::predict(ask))
 }
 
-/// The models of value and standing; `None` if a covariance cannot be factored.
+/// The models of value and standing. `None` if a covariance cannot be factored.
 fn models(ensemble: &Ensemble, history: &History) -> Option<(ValueModel, StandingModel)> {
     let value = safeguard::check(ValueModel::fit(ensemble, history)?, ensemble, history)?.value;
     Some((value, StandingModel::fit(ensemble, history)?))
@@ -65,9 +65,10 @@ fn models(ensemble: &Ensemble, history: &History) -> Option<(ValueModel, Standin
 fn about_prior(ask: &Ask<'_>, prior: &PriorModel, ensemble: &Ensemble, streams: &mut Streams) -> Option<Candidate> {
     let history = History::gather(prior, ensemble, ask.trials, ask.direction);
     let search = SearchBox::of(ask, prior);
+    let models = models(ensemble, &history)?;
     let all_given = ask.space.parameters().iter().all(|p| ask.given(p).is_some());
     let candidates = if all_given { Vec::new() } else { search.candidates(prior, ensemble) };
-    let acquisition = Acquisition::new((prior.prior(), ensemble), models(ensemble, &history)?, &history, &candidates)?;
+    let acquisition = Acquisition::new((prior.prior(), ensemble), models, &history, &candidates)?;
     let (unit, worth_the_risk) = if all_given {
         (search.bounds.iter().map(|(low, _)| *low).collect(), true)
     } else {

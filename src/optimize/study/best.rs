@@ -1,9 +1,10 @@
 //! The best trial of a study: by the sampler's model where it has one, else by the values of the trials.
 
 use super::{Study, StudyError};
-use crate::optimize::ask::Prediction;
+use crate::optimize::ask::{Prediction, SamplerKind};
 use crate::optimize::repeats;
 use crate::optimize::sampler;
+use crate::optimize::sim::insight::{PriorInsight, insight};
 use crate::optimize::trial::{Trial, TrialState};
 use serde::{Deserialize, Serialize};
 
@@ -31,6 +32,8 @@ pub struct ModelPredictions {
     pub trials: Vec<Prediction>,
     /// The best of those that stood.
     pub best: Option<ModelBest>,
+    /// What the sampler `sim` has learned of robot and simulator; none for another sampler and without a prior.
+    pub simulator: Option<PriorInsight>,
 }
 
 impl Study {
@@ -52,7 +55,9 @@ impl Study {
             predicted_deviation: best.deviation,
             learned: self.observed(),
         });
-        ModelPredictions { trials, best }
+        let prior = self.prior.as_ref().filter(|_| self.options.sampler.kind == SamplerKind::Sim);
+        let simulator = prior.and_then(|prior| insight(prior, self.trials(), self.options.direction));
+        ModelPredictions { trials, best, simulator }
     }
 
     /// The stored best trial by the sampler's model; none if trials have finished since.

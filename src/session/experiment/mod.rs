@@ -22,6 +22,7 @@ mod trial_changes;
 pub use self::plan::{ExperimentPlan, RequestRefusal};
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use self::between_repeats::BetweenRepeats;
 use self::confirmation::{BestConfirmation, NextRepeat};
@@ -32,6 +33,7 @@ use self::search::SearchSettings;
 use crate::optimize::ask::Direction;
 use crate::optimize::exchange::TableTrial;
 use crate::optimize::journal::JournalWait;
+use crate::optimize::prior::PriorModel;
 use crate::optimize::repeats::{RepeatedPoint, improvements, points};
 use crate::optimize::study::{ModelBest, Outcome, Study, StudyError};
 use crate::optimize::trial::TrialState;
@@ -61,6 +63,8 @@ enum ExperimentState {
     BetweenRepeats(BetweenRepeats),
     /// The budget is used up.
     Finished,
+    /// The sampler has no prior yet: nothing is proposed.
+    AwaitsPrior,
 }
 
 /// The trials of one study and the state of the current one.
@@ -105,8 +109,22 @@ impl Experiment {
         };
         let log = experiment.queue.close_interrupted(&mut experiment.study)?;
         experiment.log_all(log);
-        experiment.propose()?;
+        if experiment.plan.needs_prior {
+            experiment.take_rows();
+            experiment.enter(ExperimentState::AwaitsPrior, experiment.study.trials().len() as u32);
+        } else {
+            experiment.propose()?;
+        }
         Ok(experiment)
+    }
+
+    /// Gives the sampler its prior. An experiment that has waited for it makes its first proposal.
+    ///
+    /// # Errors
+    /// When the study cannot be read or written.
+    pub fn use_prior(&mut self, prior: Arc<PriorModel>) -> Result<(), StudyError> {
+        self.study.use_prior(prior);
+        if matches!(self.state, ExperimentState::AwaitsPrior) { self.propose() } else { Ok(()) }
     }
 
     /// Takes the records since the last call, for the console and the recording.
@@ -117,7 +135,9 @@ impl Experiment {
     /// Returns the stage of the current trial.
     pub fn stage(&self) -> ExperimentStage {
         match self.state {
-            ExperimentState::Proposed(_) | ExperimentState::BetweenRepeats(_) => ExperimentStage::Proposed,
+            ExperimentState::Proposed(_) | ExperimentState::BetweenRepeats(_) | ExperimentState::AwaitsPrior => {
+                ExperimentStage::Proposed
+            }
             ExperimentState::Running(_) => ExperimentStage::Running,
             ExperimentState::Review(_) => ExperimentStage::Review,
             ExperimentState::Finished => ExperimentStage::Finished,

@@ -5,11 +5,12 @@ use std::collections::BTreeMap;
 use super::attributes::Origin;
 use crate::optimize::ask::{Prediction, SamplerKind};
 use crate::optimize::insight;
+use crate::optimize::sim::insight::{PriorInsight, WorldWeight};
 use crate::optimize::study::{ModelPredictions, Study, TrialDraft};
 use crate::optimize::trial::Trial;
 use crate::trial::{
     ExpectedResult, FallRisk, Gains, ParameterInsight, ParameterValues, PredictedTrial, Proposal, ProposalInsight,
-    ProposalSource, ProposedParameter, Verdict,
+    ProposalSource, ProposedParameter, SimulatorComparison, Verdict, WorldResemblance,
 };
 
 /// Values at which the densities are given: the width of a chart in a terminal.
@@ -231,7 +232,22 @@ pub fn model_insight(model: &ModelPredictions) -> ProposalInsight {
     ProposalInsight {
         predicted: model.trials.iter().map(predicted).collect(),
         best: model.best.map(|best| best.trial),
+        simulator: model.simulator.as_ref().map(comparison),
         ..ProposalInsight::default()
+    }
+}
+
+fn comparison(insight: &PriorInsight) -> SimulatorComparison {
+    let world = |world: &WorldWeight| WorldResemblance { name: world.name.clone(), weight: world.weight };
+    let mut worlds: Vec<WorldResemblance> = insight.worlds.iter().map(world).collect();
+    worlds.sort_by(|a, b| b.weight.total_cmp(&a.weight));
+    SimulatorComparison {
+        ratio: insight.rho.mean,
+        ratio_deviation: insight.rho.deviation,
+        bias: insight.bias.mean,
+        bias_deviation: insight.bias.deviation,
+        worlds,
+        contradicted: !insight.trusted,
     }
 }
 

@@ -207,6 +207,9 @@ impl Experiment {
 
     /// Refuses while a trial runs or is under review.
     pub fn must_be_idle(&self) -> Result<(), RequestRefusal> {
+        if matches!(self.state, ExperimentState::AwaitsPrior) {
+            return not_now("the sampler has no prior yet; wait until its robots are simulated");
+        }
         if self.is_idle() { Ok(()) } else { not_now("finish the present trial first") }
     }
 

@@ -2,7 +2,11 @@
 //!
 //! Robots, points and noise follow from the seed of `config/prior.toml` alone: the same bits on any number of threads.
 
+mod work;
+
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
+pub use work::PriorWork;
 
 use super::objective;
 use super::parallel::in_parallel;
@@ -46,10 +50,10 @@ pub struct PriorProgress {
     pub total: usize,
 }
 
-/// Error of a prior.
+/// Error of the simulation of an ensemble.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[expect(missing_docs, reason = "the message has the meaning of each variant")]
-pub enum PriorError {
+pub enum EnsembleError {
     #[error("a robot of the ensemble cannot be simulated: {0}; narrow the ranges in prior.toml")]
     Simulator(#[from] SimError),
     #[error("the prior was interrupted before it was complete")]
@@ -69,7 +73,7 @@ pub fn simulate(
     jobs: usize,
     progress: &(dyn Fn(PriorProgress) + Sync),
     interrupt: &AtomicBool,
-) -> Result<Prior, PriorError> {
+) -> Result<Prior, EnsembleError> {
     let EnsembleSettings { points, seed, .. } = plan.ensemble;
     let robots = ensemble(&plan.ensemble);
     let range = |parameter: &ParameterInfo| Range::linear(parameter.low, parameter.high);
@@ -83,7 +87,7 @@ pub fn simulate(
     let done = AtomicUsize::new(0);
     let jump = |rollout: &mut Option<(usize, Rollout<Simulator>)>, &(robot, point): &(usize, usize)| {
         if interrupt.load(Ordering::Relaxed) {
-            return Err(PriorError::Interrupted);
+            return Err(EnsembleError::Interrupted);
         }
         let ready = match rollout.take() {
             Some((of, ready)) if of == robot => ready,

@@ -50,7 +50,7 @@ pub fn render(frame: &mut Frame, area: Rect, session: &SessionModel, theme: &The
 /// The robot beside the simulated robots of the prior.
 fn render_simulator(frame: &mut Frame, area: Rect, simulator: &SimulatorComparison, unit: &str, theme: &Theme) {
     let body = heading(frame, area, theme, "Robot beside the simulated robots", "mean and standard deviation");
-    let SimulatorComparison { ratio, ratio_deviation, bias, bias_deviation, worlds } = simulator;
+    let SimulatorComparison { ratio, ratio_deviation, bias, bias_deviation, worlds, contradicted } = simulator;
     let mut lines = vec![
         Line::from(format!(
             " the robot jumps {} of what is simulated",
@@ -59,6 +59,10 @@ fn render_simulator(frame: &mut Frame, area: Rect, simulator: &SimulatorComparis
         Line::from(format!(" and adds {}", with_deviation(theme, *bias, *bias_deviation, unit))),
         Line::from(span(theme, Role::Quiet, " most like")),
     ];
+    if *contradicted {
+        let text = " the robot's values contradict the simulated ones: the sampler does not use them";
+        lines.insert(0, Line::from(span(theme, Role::Warning, text)));
+    }
     lines.extend(worlds.iter().map(|world| {
         let share = scale(theme, world.weight, 0.0, 1.0, 20);
         Line::from(vec![
