@@ -3,31 +3,17 @@
 //! The value has the jumps that stood, scaled to mean 0 and variance 1; the label is +1 for a jump that stood and -1 for a fall.
 //! The worlds are changes of one robot, so they share lengthscales, signal and noise: the maximum of the sum of their likelihoods.
 
-use super::{Prior, PriorError, World};
+use super::data::{LEAST_STOOD, Prior, PriorModelError, SurfaceHyperparameters, World};
 use crate::optimize::gp::regression::{
     HyperPrior, Hyperparameters, LinearPrior, LogNormal, Observations, Regression, log_likelihood,
 };
 use libm::{exp, log, sqrt};
 use nalgebra::{DMatrix, DVector};
-use serde::{Deserialize, Serialize};
 
-/// Least number of points of a prior.
-pub const LEAST_POINTS: usize = 16;
-/// Jumps that a world must have stood for a surface of its value.
-pub const LEAST_STOOD: usize = 8;
 /// Points of a world from which the hyperparameters are fitted: the cost grows with their cube, and all worlds count together.
 const FITTED_POINTS: usize = 96;
 /// Steps of the ascent.
 const ITERATIONS: usize = 30;
-
-/// Hyperparameters of the surfaces, shared by the worlds.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct SurfaceHyperparameters {
-    /// ln (l_1 .. l_d, s^2, noise) of the values, in units of each world's standard deviation.
-    pub value: Vec<f64>,
-    /// ln (l_1 .. l_d, s^2, noise) of the labels.
-    pub label: Vec<f64>,
-}
 
 /// A function of the point, for each world.
 #[derive(Debug, Clone)]
@@ -93,7 +79,7 @@ pub fn surfaces(prior: &Prior, hyper: &SurfaceHyperparameters) -> Option<(Vec<us
 }
 
 /// Fits the hyperparameters of values and labels, each on a thread of its own.
-pub fn fit(prior: &Prior) -> Result<SurfaceHyperparameters, PriorError> {
+pub fn fit(prior: &Prior) -> Result<SurfaceHyperparameters, PriorModelError> {
     let values = || {
         let known = prior.worlds.iter().filter(|world| world.stood() >= LEAST_STOOD);
         fit_series(prior, &known.map(Series::value).collect::<Vec<_>>())
@@ -105,7 +91,7 @@ pub fn fit(prior: &Prior) -> Result<SurfaceHyperparameters, PriorError> {
         (value.join(), label)
     });
     let value = value.unwrap_or_else(|panic| std::panic::resume_unwind(panic));
-    Ok(SurfaceHyperparameters { value: value.ok_or(PriorError::Fit)?, label: label.ok_or(PriorError::Fit)? })
+    Ok(SurfaceHyperparameters { value: value.ok_or(PriorModelError::Fit)?, label: label.ok_or(PriorModelError::Fit)? })
 }
 
 /// One quantity of one world, scaled.
@@ -144,14 +130,12 @@ fn constant() -> LinearPrior {
 /// theta of the largest sum of the likelihoods of all series, each at its first [`FITTED_POINTS`] points.
 fn fit_series(prior: &Prior, series: &[Series]) -> Option<Vec<f64>> {
     let d = prior.parameters.len();
-    let prepared: Vec<(Vec<Vec<f64>>, DVector<f64>, DMatrix<f64>)> = series
-        .iter()
-        .map(|series| {
-            let n = series.at.len().min(FITTED_POINTS);
-            let points = series.at[..n].iter().map(|i| prior.points[*i].clone()).collect();
-            (points, DVector::from_row_slice(&series.values[..n]), DMatrix::from_element(n, n, 1.0))
-        })
-        .collect();
+    let prepare = |series: &Series| {
+        let n = series.at.len().min(FITTED_POINTS);
+        let points: Vec<Vec<f64>> = series.at[..n].iter().map(|i| prior.points[*i].clone()).collect();
+        (points, DVector::from_row_slice(&series.values[..n]), DMatrix::from_element(n, n, 1.0))
+    };
+    let prepared: Vec<_> = series.iter().map(prepare).collect();
     let likelihood = |theta: &[f64]| {
         let mut sum = (0.0, vec![0.0; theta.len()]);
         for (points, y, linear) in &prepared {

@@ -4,9 +4,9 @@
 //! the principal components of their differences from it. Standing: h = (1, g, z, psi_1 ..), g the mean of the clipped labels, z the
 //! reserve of friction and psi_j the components of the labels.
 
+use super::data::{Prior, PriorModelError};
 use super::standing::{LogisticPrior, leave_one_world_out};
 use super::surface::{Surfaces, surfaces};
-use super::{Prior, PriorError};
 use crate::optimize::mt19937::Mt19937;
 use crate::optimize::sobol::Sobol;
 use libm::sqrt;
@@ -57,9 +57,9 @@ pub struct Ensemble {
 
 impl Ensemble {
     /// Computes surfaces, components and candidates. The hyperparameters of `prior` are known.
-    pub fn new(prior: &Prior) -> Result<Ensemble, PriorError> {
-        let hyper = prior.hyperparameters.as_ref().ok_or(PriorError::Fit)?;
-        let (known, values, labels) = surfaces(prior, hyper).ok_or(PriorError::Fit)?;
+    pub fn new(prior: &Prior) -> Result<Ensemble, PriorModelError> {
+        let hyper = prior.hyperparameters.as_ref().ok_or(PriorModelError::Fit)?;
+        let (known, values, labels) = surfaces(prior, hyper).ok_or(PriorModelError::Fit)?;
         let sobol = Sobol::new(prior.parameters.len(), &mut Mt19937::new(CANDIDATE_SEED));
         let points: Vec<Vec<f64>> = (0..CANDIDATES).map(|i| sobol.point(i)).collect();
         let at = |surfaces: &Surfaces| -> Vec<Vec<f64>> { points.iter().map(|x| surfaces.at(x)).collect() };
@@ -74,8 +74,8 @@ impl Ensemble {
         let scale = (0..known.len()).map(deviation).sum::<f64>() / known.len() as f64;
         let scale = if scale > 0.0 { scale } else { 1.0 };
         let lowest = v.iter().flatten().copied().fold(f64::INFINITY, f64::min);
-        let value_components = components(&v, scale).ok_or(PriorError::Fit)?;
-        let label_components = components(&l, 1.0).ok_or(PriorError::Fit)?;
+        let value_components = components(&v, scale).ok_or(PriorModelError::Fit)?;
+        let label_components = components(&l, 1.0).ok_or(PriorModelError::Fit)?;
         let reserve: Vec<f64> = points.iter().map(|x| prior.slip_reserve(x)).collect();
         let standing = leave_one_world_out(&l, &reserve);
         let mut ensemble = Ensemble {

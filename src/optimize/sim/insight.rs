@@ -16,7 +16,7 @@ const LEAST_PROBABILITY: f64 = 0.02;
 
 /// Mean and standard deviation.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Estimate {
+pub struct MeanAndDeviation {
     /// Mean.
     pub mean: f64,
     /// Standard deviation.
@@ -38,7 +38,7 @@ pub struct ObservedPrediction {
     /// Number of the trial.
     pub number: u32,
     /// Value, if the robot stands, in the objective's unit and sign, without the noise of a trial.
-    pub value: Estimate,
+    pub value: MeanAndDeviation,
     /// Probability of standing from all trials, the trial itself among them, 0..1.
     pub p_stand: f64,
 }
@@ -47,9 +47,9 @@ pub struct ObservedPrediction {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PriorInsight {
     /// rho: how much of the simulated change over the points the robot shows; 1 for a robot as simulated.
-    pub rho: Estimate,
+    pub rho: MeanAndDeviation,
     /// b: by how much the robot differs from the simulated robots' mean everywhere, in the objective's unit and sign.
-    pub bias: Estimate,
+    pub bias: MeanAndDeviation,
     /// The simulated robots in their order.
     pub worlds: Vec<WorldWeight>,
     /// The finished trials in order.
@@ -76,11 +76,11 @@ pub fn insight(prior: &PriorModel, trials: &[Trial], direction: Direction) -> Op
         let left_out = if jump.stood { left_out.next() } else { None };
         let (mean, variance) = left_out.unwrap_or_else(|| checked.value.predict(&jump.point, &jump.features.value));
         let mean = sign * (ensemble.offset + ensemble.scale * mean);
-        let value = Estimate { mean, deviation: ensemble.scale * sqrt(variance) };
+        let value = MeanAndDeviation { mean, deviation: ensemble.scale * sqrt(variance) };
         let p_stand = standing.probability(&jump.point, &jump.features.standing);
         ObservedPrediction { number: jump.number, value, p_stand }
     });
-    let estimate = |(mean, variance): (f64, f64), unit: f64| Estimate {
+    let estimate = |(mean, variance): (f64, f64), unit: f64| MeanAndDeviation {
         mean: unit * mean,
         deviation: unit.abs() * sqrt(variance),
     };

@@ -1,8 +1,8 @@
 //! The sampler `sim`: a Gaussian process about the results of simulated robots, for some five jumps of a robot.
 //!
 //! The value and the standing of the robot are learned about those of the ensemble ([`model`]); the next point maximizes the
-//! expected gain less the price of a fall ([`search`]). Without a prior, or with one of other parameters
-//! ([`PriorModel::covers`]), the sampler proposes as `gp`.
+//! expected gain less the price of a fall ([`search`]). A simulator that the values contradict is left
+//! ([`safeguard`]). Without a prior, or with one of other parameters ([`PriorModel::covers`]), the sampler proposes as `gp`.
 
 pub mod history;
 pub mod insight;
@@ -10,7 +10,7 @@ pub mod model;
 pub mod safeguard;
 pub mod search;
 
-use super::ask::{Ask, Candidate, Direction, Expectation, Prediction as TrialPrediction, Streams};
+use super::ask::{Ask, Candidate, Direction, Expectation, Prediction, Streams};
 use super::gp;
 use super::mt19937::Mt19937;
 use super::prior::PriorModel;
@@ -19,7 +19,7 @@ use super::sobol::Sobol;
 use history::{History, Jump};
 use libm::sqrt;
 use model::{StandingModel, ValueModel};
-use search::{Acquisition, Prediction};
+use search::{Acquisition, PointPrediction};
 
 /// Proposes the next point for the given parameters.
 pub fn propose(ask: &Ask<'_>, streams: &mut Streams) -> Candidate {
@@ -38,7 +38,7 @@ pub fn expect(ask: &Ask<'_>, values: &[f64]) -> Option<Expectation> {
 }
 
 /// Returns what the model says of the finished trials.
-pub fn predict(ask: &Ask<'_>) -> Vec<TrialPrediction> {
+pub fn predict(ask: &Ask<'_>) -> Vec<Prediction> {
     let covering = ask.prior.filter(|prior| prior.covers(ask.space).is_ok());
     let about = |prior: &PriorModel| {
         let ensemble = prior.ensemble()?;
@@ -48,7 +48,7 @@ pub fn predict(ask: &Ask<'_>) -> Vec<TrialPrediction> {
             let prediction = acquisition.predict(&jump.point, &jump.features);
             let Expectation { value, deviation, p_stand, .. } =
                 expectation(ask.direction, ensemble, &jump.point, &prediction, true);
-            TrialPrediction { trial: jump.number, stood: jump.stood, value, deviation, p_stand }
+            Prediction { trial: jump.number, stood: jump.stood, value, deviation, p_stand }
         };
         Some(history.jumps.iter().map(prediction).collect())
     };
@@ -93,7 +93,7 @@ fn expectation(
     direction: Direction,
     ensemble: &Ensemble,
     unit: &[f64],
-    prediction: &Prediction,
+    prediction: &PointPrediction,
     worth_the_risk: bool,
 ) -> Expectation {
     let own_sign = |value: f64| if direction == Direction::Maximize { value } else { -value };

@@ -26,9 +26,9 @@ const LOCAL: u32 = 100;
 /// Best candidates around which the first local round searches.
 const CENTRES: usize = 4;
 
-/// Prediction at a point.
+/// PointPrediction at a point.
 #[derive(Debug, Clone, Copy)]
-pub struct Prediction {
+pub struct PointPrediction {
     /// Mean of the value, scaled.
     pub mean: f64,
     /// Its variance, without noise.
@@ -65,8 +65,8 @@ pub struct Scored {
     pub point: Vec<f64>,
     /// Larger is better; above 0 the gain is worth its risk.
     pub score: f64,
-    /// Prediction there.
-    pub prediction: Prediction,
+    /// PointPrediction there.
+    pub prediction: PointPrediction,
 }
 
 impl<'a> Acquisition<'a> {
@@ -98,16 +98,16 @@ impl<'a> Acquisition<'a> {
     }
 
     /// Predicts at a point with its terms.
-    pub fn predict(&self, x: &[f64], features: &Features) -> Prediction {
+    pub fn predict(&self, x: &[f64], features: &Features) -> PointPrediction {
         let (mean, variance) = self.value.predict(x, &features.value);
-        Prediction { mean, variance, p_stand: self.standing.probability(x, &features.standing) }
+        PointPrediction { mean, variance, p_stand: self.standing.probability(x, &features.standing) }
     }
 
     /// U = P EI - lambda 3^c J* (1 - P); before the first jump that stood the gain is J itself. Where U <= 0 the score is negative:
     /// the gain among the sure points, else the surest first. Near void points it is reduced.
     fn score(&self, x: &[f64], features: &Features) -> Scored {
         let prediction = self.predict(x, features);
-        let Prediction { mean, variance, p_stand } = prediction;
+        let PointPrediction { mean, variance, p_stand } = prediction;
         let gain = match self.incumbent {
             None => (mean - self.origin).max(0.0),
             Some(incumbent) => {
