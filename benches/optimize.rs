@@ -3,11 +3,17 @@
 #[path = "../tests/support/optimize.rs"]
 mod support;
 
+#[path = "../tests/support/simulated.rs"]
+mod simulated;
+
 use criterion::{Criterion, criterion_group, criterion_main};
 use quadfrog::optimize::ask::{SamplerConfig, SamplerKind};
 use quadfrog::optimize::journal::Durability;
+use quadfrog::optimize::prior::PriorModel;
 use quadfrog::optimize::study::{Storage, Study, StudyOptions};
+use simulated::{Formula, prior_of, space};
 use std::hint::black_box;
+use std::sync::Arc;
 use support::{in_memory, sideways};
 
 fn options(sampler: SamplerConfig) -> StudyOptions {
@@ -49,6 +55,39 @@ fn ask(c: &mut Criterion) {
     }
 }
 
+/// One ask about a prior of eight worlds and 320 points, and the preparation of such a prior.
+fn ask_sim(c: &mut Criterion) {
+    let worlds: Vec<Formula> = (0..8)
+        .map(|k| Formula {
+            gain: 0.9 + 0.04 * f64::from(k),
+            best: 0.4 + 0.03 * f64::from(k),
+            grip: 0.58 - 0.02 * f64::from(k),
+        })
+        .collect();
+    let mut group = c.benchmark_group("sim, 8 worlds of 320 points");
+    group.sample_size(10);
+    group.bench_function("hyperparameters", |b| {
+        b.iter(|| prior_of(&worlds, 320).fit().expect("a prior"));
+    });
+    let mut prior = prior_of(&worlds, 320);
+    prior.fit().expect("a prior");
+    group.bench_function("model of a fitted prior", |b| b.iter(|| black_box(PriorModel::new(prior.clone()))));
+    let prior = Arc::new(PriorModel::new(prior));
+    for trials in [0, 5, 20, 100] {
+        let sampler = SamplerConfig { kind: SamplerKind::Sobol, ..SamplerConfig::default() };
+        let mut points = in_memory(support::options(space(), sampler));
+        let sampler = SamplerConfig { kind: SamplerKind::Sim, ..SamplerConfig::default() };
+        let mut study = in_memory(support::options(space(), sampler));
+        for _ in 0..trials {
+            let number = support::run(&mut points, |_| 0.0);
+            study.enqueue(&points.trial(number).expect("begun").parameters, &[]).expect("queued");
+            simulated::jump(&mut study, &worlds[3]);
+        }
+        study.use_prior(prior.clone());
+        group.bench_function(format!("ask, {trials} trials"), |b| b.iter(|| black_box(study.draft())));
+    }
+}
+
 fn study_on_disk(c: &mut Criterion) {
     let mut group = c.benchmark_group("study of 20 trials on disk");
     group.sample_size(10);
@@ -70,5 +109,5 @@ fn study_on_disk(c: &mut Criterion) {
     let _ = std::fs::remove_dir_all(&folder);
 }
 
-criterion_group!(benches, ask, study_on_disk);
+criterion_group!(benches, ask, ask_sim, study_on_disk);
 criterion_main!(benches);

@@ -476,11 +476,30 @@ fn the_engine_depends_on_no_terminal() {
     }
 }
 
+/// Every block, function, implementation or trait that begins with `unsafe` has a row in docs/safety.md, and no row is left over.
 #[test]
-fn unsafe_code_is_in_realtime_alone() {
-    let outside = |file: &PathBuf| !file.starts_with(root().join("src/realtime"));
-    let sources = ["src", "ui/src"].into_iter().flat_map(|folder| files(&root().join(folder), "rs"));
-    let unsafe_files = sources.filter(outside).filter(|file| words(file).iter().any(|word| word == "unsafe"));
-    let violations: Vec<_> = unsafe_files.map(|file| short(&file)).collect();
-    assert_none(&violations, "Move the unsafe code to src/realtime, behind a safe function.");
+fn unsafe_code_is_that_of_the_table_in_the_safety_document() {
+    let safety = fs::read_to_string(root().join("docs/safety.md")).unwrap();
+    let rows = safety.lines().filter_map(|line| line.strip_prefix("| `")?.split_once("` | `unsafe "));
+    let code = |rest: &str| {
+        let mut words = Vec::new();
+        flatten(rest.split('`').next().unwrap().parse().unwrap(), &mut words);
+        words.concat()
+    };
+    let mut documented: Vec<String> = rows.map(|(file, rest)| format!("{file} unsafe{}", code(rest))).collect();
+    let mut found = Vec::new();
+    for file in ["src", "ui/src"].into_iter().flat_map(|folder| files(&root().join(folder), "rs")) {
+        let words = words(&file);
+        for (at, _) in words.iter().enumerate().filter(|(_, word)| *word == "unsafe") {
+            let end = words[at..].iter().position(|word| word == "}").map_or(words.len(), |end| at + end + 1);
+            found.push(format!("{} {}", short(&file), words[at..end].concat()));
+        }
+    }
+    documented.sort();
+    found.sort();
+    assert!(!found.is_empty() && found.iter().all(|use_| use_.starts_with("src/realtime/")), "{found:?}");
+    assert_eq!(
+        found, documented,
+        "left: the sources; right: the table under \"Real-time code and `unsafe`\" of docs/safety.md"
+    );
 }

@@ -19,14 +19,16 @@ use crate::robot::GRAVITY;
 use crate::robot::Leg;
 use crate::robot::description::{RobotDescription, read_text};
 use crate::sim::SimConfig;
+use crate::sim::ensemble::EnsembleSettings;
 use crate::trial::{Backend, GAIN_UNITS, HopEnvelope, ParameterInfo, ParameterValues, Task, parameter_unit};
 
 /// The files of a configuration folder and their defaults.
-const FILES: [(&str, &str); 5] = [
+const FILES: [(&str, &str); 6] = [
     ("control.toml", include_str!("../../config/control.toml")),
     ("safety.toml", include_str!("../../config/safety.toml")),
     ("optimize.toml", include_str!("../../config/optimize.toml")),
     ("simulator.toml", include_str!("../../config/simulator.toml")),
+    ("prior.toml", include_str!("../../config/prior.toml")),
     ("console.toml", include_str!("../../config/console.toml")),
 ];
 
@@ -85,6 +87,7 @@ pub struct Config {
     pub safety: SafetyFile,
     pub optimize: OptimizeFile,
     pub simulator: SimConfig,
+    pub prior: EnsembleSettings,
     /// `console.toml`, read by the console.
     pub console: Table,
     /// Name and text of every file as in force, kept with the study that it produced.
@@ -137,6 +140,7 @@ impl Config {
             safety: parse("safety.toml", &tables, &origins)?,
             optimize: parse("optimize.toml", &tables, &origins)?,
             simulator: parse("simulator.toml", &tables, &origins)?,
+            prior: parse("prior.toml", &tables, &origins)?,
             console: tables["console.toml"].clone(),
             as_run,
             origins,

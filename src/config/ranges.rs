@@ -237,12 +237,27 @@ const OPTIMIZE: &[Row] = &[
     (&["bounds.*", "first.*.*"], within!(-10000, 10000)),
 ];
 
+/// `prior.toml`: beyond, a robot of an ensemble has nothing in common with the configured one, or a prior takes hours.
+const PRIOR: &[Row] = &[
+    (&["worlds"], within!(2, 64, "robots")),
+    (&["points"], within!(16, 4096, "points")),
+    (&["seed"], within!(0, 4294967295.0)),
+    (&["ranges.mass", "ranges.inertia", "ranges.torque_limit"], within!(0.2, 5, "times the description's value")),
+    (&["ranges.full_torque_speed_share"], within!(0, 0.99)),
+    (&["ranges.friction"], within!(0, 10)),
+    (&["ranges.delay_ms"], within!(0, 20, "ms")),
+    (&["ranges.torque_lag_s"], within!(0, 1, "s")),
+    (&["ranges.dry_friction_nm"], within!(0, 100, "N m")),
+    (&["ranges.viscous_friction_nm_s"], within!(0, 100, "N m s/rad")),
+];
+
 /// Returns the ranges of a file's numbers on every backend; the first row that fits applies.
 fn rows(file: &str) -> &'static [Row] {
     match file {
         "control.toml" => CONTROL,
         "safety.toml" => SAFETY,
         "optimize.toml" => OPTIMIZE,
+        "prior.toml" => PRIOR,
         _ => &[],
     }
 }
@@ -305,10 +320,11 @@ mod tests {
     use super::*;
     use crate::sim::ranges::{numbers, range};
 
-    const FILES: [(&str, &str); 3] = [
+    const FILES: [(&str, &str); 4] = [
         ("control.toml", include_str!("../../config/control.toml")),
         ("safety.toml", include_str!("../../config/safety.toml")),
         ("optimize.toml", include_str!("../../config/optimize.toml")),
+        ("prior.toml", include_str!("../../config/prior.toml")),
     ];
 
     /// Calls `check` with each number of the files: its name, its value, its range on every backend and on hardware.

@@ -13,6 +13,7 @@ use crate::trial::{Backend, ParameterInfo, Task, is_gain, parameter_unit};
 const CONTROL: &str = "control.toml";
 const SAFETY: &str = "safety.toml";
 const OPTIMIZE: &str = "optimize.toml";
+const PRIOR: &str = "prior.toml";
 
 /// Least frequency between jumps in a row, Hz: a pause of 10 s.
 const LEAST_F1_HZ: f64 = 0.05;
@@ -22,6 +23,7 @@ impl Config {
         self.check_control()?;
         self.check_safety()?;
         self.check_optimize()?;
+        self.check_prior()?;
         self.simulator.check().map_err(|error| match error {
             SimError::Value { key, value, remedy } => self.refuse("simulator.toml", &key, value, remedy),
             SimError::Syntax { reason } => {
@@ -144,6 +146,13 @@ impl Config {
             }
         }
         Task::ALL.into_iter().try_for_each(|task| self.check_first(task))
+    }
+
+    fn check_prior(&self) -> Result<(), ConfigError> {
+        let inverted = |(_, [low, high]): &(&str, [f64; 2])| low > high;
+        let Some((name, [low, high])) = self.prior.ranges.named().into_iter().find(inverted) else { return Ok(()) };
+        let reason = "must be [lowest, highest] with lowest <= highest; equal values give every robot the same";
+        Err(self.refuse(PRIOR, &format!("ranges.{name}"), format!("[{low}, {high}]"), reason))
     }
 
     /// Checks that the first point of `task` is within the bounds.

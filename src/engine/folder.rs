@@ -115,7 +115,11 @@ pub fn attachments(options: &Options) -> Vec<(&str, &str, &[u8])> {
 /// Returns a short name of the configuration and of the robot's files, for an operator to compare: FNV-1a of all files, 64
 /// bits (Fowler, Noll and Vo, draft-eastlake-fnv).
 pub fn fingerprint(config: &Config, robot: &RobotDescription) -> String {
-    let texts = config.as_run.iter().chain(&robot.files).flat_map(|(name, text)| [name.as_bytes(), text.as_bytes()]);
+    fnv1a(config.as_run.iter().chain(&robot.files).flat_map(|(name, text)| [name.as_bytes(), text.as_bytes()]))
+}
+
+/// Returns the FNV-1a hash of texts one after the other, 64 bits, as hexadecimal digits.
+pub(super) fn fnv1a<'a>(texts: impl Iterator<Item = &'a [u8]>) -> String {
     let hash = texts
         .flatten()
         .fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01b3));

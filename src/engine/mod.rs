@@ -4,6 +4,7 @@ mod control_thread;
 mod folder;
 mod guard;
 mod options;
+mod prior;
 mod session_thread;
 mod stored;
 mod study;
@@ -11,8 +12,9 @@ mod study;
 pub use folder::{STUDY_FILE, attachments, fingerprint, newest_config, prepare_folder, study_files, utc_ns};
 pub use guard::{GUARD, GuardError, GuardOutcome, run_guard};
 pub use options::{EngineError, Options};
+pub use prior::{PRIOR_FILE, PriorFileError, PriorMaker, ReadyPrior, prior_plan};
 pub use stored::{Opened, StoredStudy, open_stored, stored_studies, stored_study};
-pub use study::{check_backend, open_experiment, session_info, study_name};
+pub use study::{check_backend, open_experiment, open_study, session_info, study_name};
 
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -23,6 +25,8 @@ use std::thread::JoinHandle;
 
 use self::folder::LockedFolder;
 use self::guard::Guard;
+use self::study::open_without_prior;
+use crate::optimize::ask::SamplerKind;
 use crate::optimize::journal::Durability;
 use crate::realtime::channel::{ConsolePorts, Heartbeat, Lowering, StopLatch, channels};
 use crate::realtime::clock::{Clock, MonotonicClock};
@@ -35,6 +39,7 @@ use crate::robot::go1::Go1;
 use crate::robot::{Placement, Robot};
 use crate::session::arming_checklist::ArmingChecklist;
 use crate::session::operator_request::{OperatorRequest, StampedRequest};
+use crate::session::parallel::cores;
 use crate::session::storage::{StorageWait, StorageWatch};
 use crate::session::supervisor::{RecordSinks, Supervisor, SupervisorParts};
 use crate::sim::Simulator;
@@ -75,7 +80,7 @@ pub fn start(options: Options) -> Result<EngineHandle, EngineError> {
     let recording = folder.recording.clone();
     let recording_name =
         recording.as_ref().and_then(|path| path.file_name()).map(|name| name.to_string_lossy().into_owned());
-    let experiment = open_experiment(&options, Durability::Synced, recording_name.as_deref().unwrap_or_default())?;
+    let experiment = open_without_prior(&options, Durability::Synced, recording_name.as_deref().unwrap_or_default())?;
     let info = session_info(&options, &recording.as_ref().map(|p| p.display().to_string()).unwrap_or_default());
     let (guard, guard_heartbeat) = guard.unzip();
     let clock = MonotonicClock::start();
@@ -136,6 +141,10 @@ pub fn start(options: Options) -> Result<EngineHandle, EngineError> {
         .sitting_down_for_review(review_sits_down && !options.observe)
         .with_storage_thread()
         .map_err(system("storage thread"))?;
+    if options.config.optimize.sampler.kind == SamplerKind::Sim && options.prior.is_none() {
+        let maker = PriorMaker::new(&options.config, &options.robot, options.task)?;
+        make_prior(&mut supervisor, maker, &options, clock.now_ns());
+    }
     let storage = supervisor.storage_watch();
     if let Ok((granted, denied)) = scheduled.recv() {
         supervisor.report_scheduling(&granted, &denied, clock.now_ns());
@@ -169,6 +178,31 @@ pub fn start(options: Options) -> Result<EngineHandle, EngineError> {
         session: Some(session),
         recorder: Some(recorder),
     })
+}
+
+/// Finds or makes the prior of the sampler behind the session. One core is left to the control thread. An observer makes no
+/// proposals and simulates nothing.
+fn make_prior(supervisor: &mut Supervisor, maker: PriorMaker, options: &Options, time_ns: u64) {
+    if options.observe {
+        let message = "this session only observes: without a prior the sampler sim proposes nothing";
+        return supervisor.report_warning(message.to_owned(), time_ns);
+    }
+    let files = maker.files(options);
+    supervisor.make_prior(time_ns, move |work| {
+        let mut messages = Vec::new();
+        let progress = |progress| work.report(progress);
+        let jobs = cores().saturating_sub(1).max(1);
+        let found = maker.find_or_make(&files, jobs, &progress, work.interrupted(), &mut |text| messages.push(text));
+        let ready = found.map_err(|error| error.to_string())?;
+        messages.push(match &ready.from {
+            Some(file) => format!("the prior of the sampler sim is that of {}", file.display()),
+            None => "the prior of the sampler sim is made".to_owned(),
+        });
+        if let Err(error) = ready.keep(&files) {
+            messages.push(format!("{error}; the prior is used, and made again by the next session"));
+        }
+        Ok((ready.model, messages))
+    });
 }
 
 /// Checks that the session will not run out of file descriptors while it drives a robot.

@@ -1,14 +1,17 @@
 //! Settings and errors of an engine's start.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use crate::config::{Config, ConfigError};
+use crate::optimize::prior::PriorModel;
 use crate::optimize::space::SpaceError;
 use crate::optimize::study::{Storage, StudyError};
 use crate::recording::RecordingError;
 use crate::robot::description::RobotDescription;
 use crate::robot::go1::Network;
 use crate::robot::go1::link::LinkError;
+use crate::session::prior::EnsembleError;
 use crate::sim::SimError;
 use crate::trial::{Approval, Backend, Task};
 
@@ -30,6 +33,8 @@ pub struct Options {
     pub approve: Approval,
     /// The journal of a study that this engine joins as one more worker, instead of the study of the folder.
     pub join: Option<Storage>,
+    /// Results of simulated robots, for the sampler `sim`; the console's session finds or makes them itself.
+    pub prior: Option<Arc<PriorModel>>,
     /// The program that guards a real robot when it is run with [`GUARD`](super::GUARD): it damps the robot when this process
     /// sends no heartbeat. None: no guard.
     pub guard: Option<PathBuf>,
@@ -54,6 +59,7 @@ impl Options {
             observe: false,
             approve: Approval::Each,
             join: None,
+            prior: None,
             guard: None,
             accept_backend_change: false,
             unseen_connection: None,
@@ -111,6 +117,14 @@ pub enum EngineError {
         "{study}: it was made on {made}, this session runs on {asked}: its points and verdicts are those of another machine. Begin a new study, or give --accept-backend-change to continue it"
     )]
     OtherBackend { study: String, made: String, asked: String },
+    #[error(transparent)]
+    Prior(#[from] EnsembleError),
+    #[error(
+        "the sampler sim cannot use its prior: {0}. Choose another sampler, or other bounds or ranges of prior.toml"
+    )]
+    UnusablePrior(String),
+    #[error("the sampler sim needs a prior: make it with `quadfrog prior`, or choose another sampler with --sampler")]
+    NoPrior,
     #[error("{what}: {source}")]
     System { what: String, source: std::io::Error },
 }

@@ -1,10 +1,11 @@
 //! The study of a session: opened as an experiment, described for the recording.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use super::folder::STUDY_FILE;
 use super::options::{EngineError, Options};
-use crate::optimize::ask::Direction;
+use crate::optimize::ask::{Direction, SamplerKind};
 use crate::optimize::journal::Durability;
 use crate::optimize::space::{Range, Space};
 use crate::optimize::study::{Storage, Study, StudyError, StudyOptions};
@@ -20,13 +21,61 @@ use crate::trial::{Backend, Task};
 /// # Errors
 /// When the study cannot be read, or is of another task.
 pub fn open_experiment(options: &Options, durability: Durability, recording: &str) -> Result<Experiment, EngineError> {
+    if options.config.optimize.sampler.kind == SamplerKind::Sim && options.prior.is_none() {
+        return Err(EngineError::NoPrior);
+    }
+    open_without_prior(options, durability, recording)
+}
+
+/// [`open_experiment`] in which a study of the sampler `sim` waits for its prior, unless the options have it.
+pub(super) fn open_without_prior(
+    options: &Options,
+    durability: Durability,
+    recording: &str,
+) -> Result<Experiment, EngineError> {
     check_backend(options)?;
+    let mut study = open_study(options, durability)?;
+    let budget = options.budget();
+    let worker = if options.join.is_some() { study.join()? } else { 0 };
+    if worker == 0 && StudyAttributes::of(study.attributes()).budget != Some(budget) {
+        study.annotate_study(&attributes::write(&BudgetAttribute { budget }))?;
+    }
+    let backend = options.backend.name();
+    if made_on(&StudyAttributes::of(study.attributes())) != backend {
+        study.annotate_study(&attributes::write(&BackendAttribute { backend }))?;
+    }
+    let plan = ExperimentPlan {
+        task: options.task,
+        control: *options.config.task(options.task),
+        parameters: options.config.parameters(options.task),
+        seed: u64::from(options.seed),
+        budget,
+        recording: recording.to_owned(),
+        widest: options.config.widest(options.task),
+        gains: options.config.gains(),
+        contenders: options.config.optimize.confirm.contenders,
+        confidence: options.config.optimize.confirm.confidence,
+        worker,
+        abandoned: Duration::from_secs_f64(options.config.optimize.workers.abandoned_s),
+        backend: options.backend,
+        terrain: (options.backend == Backend::Simulator).then_some(options.config.simulator.terrain),
+        envelope: options.config.hop_envelope(options.backend),
+        needs_prior: options.config.optimize.sampler.kind == SamplerKind::Sim && options.prior.is_none(),
+    };
+    Ok(Experiment::open(plan, study)?)
+}
+
+/// Opens the study of `options`, created if it does not exist, with the prior of the options and the first point of the
+/// configuration.
+///
+/// # Errors
+/// When the study cannot be read, or is of another task.
+pub fn open_study(options: &Options, durability: Durability) -> Result<Study, EngineError> {
     let parameters = options.config.parameters(options.task);
     let space = Space::new(parameters.iter().map(|p| (p.name.clone(), Range::linear(p.low, p.high))))?;
     let mut sampler = options.config.optimize.sampler.clone();
     sampler.seed = options.seed;
     let storage = storage(options);
-    let budget = options.budget();
     let mut study = Study::open(
         storage,
         StudyOptions {
@@ -41,42 +90,20 @@ pub fn open_experiment(options: &Options, durability: Durability, recording: &st
                 seed: options.seed,
                 sampler: &options.config.optimize.sampler,
                 version: env!("CARGO_PKG_VERSION"),
-                budget,
+                budget: options.budget(),
                 backend: options.backend.name(),
                 unit: Some(options.unit()).filter(|unit| *unit != options.task.unit()),
             }),
             durability,
         },
     )?;
+    if let Some(prior) = &options.prior {
+        study.use_prior(Arc::clone(prior));
+    }
     if options.join.is_none() && study.trials().is_empty() {
         enqueue_first(&mut study, &options.config.first(options.task))?;
     }
-    let worker = if options.join.is_some() { study.join()? } else { 0 };
-    if worker == 0 && StudyAttributes::of(study.attributes()).budget != Some(budget) {
-        study.annotate_study(&attributes::write(&BudgetAttribute { budget }))?;
-    }
-    let backend = options.backend.name();
-    if made_on(&StudyAttributes::of(study.attributes())) != backend {
-        study.annotate_study(&attributes::write(&BackendAttribute { backend }))?;
-    }
-    let plan = ExperimentPlan {
-        task: options.task,
-        control: *options.config.task(options.task),
-        parameters,
-        seed: u64::from(options.seed),
-        budget,
-        recording: recording.to_owned(),
-        widest: options.config.widest(options.task),
-        gains: options.config.gains(),
-        contenders: options.config.optimize.confirm.contenders,
-        confidence: options.config.optimize.confirm.confidence,
-        worker,
-        abandoned: Duration::from_secs_f64(options.config.optimize.workers.abandoned_s),
-        backend: options.backend,
-        terrain: (options.backend == Backend::Simulator).then_some(options.config.simulator.terrain),
-        envelope: options.config.hop_envelope(options.backend),
-    };
-    Ok(Experiment::open(plan, study)?)
+    Ok(study)
 }
 
 fn storage(options: &Options) -> Storage {

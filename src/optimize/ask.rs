@@ -183,3 +183,18 @@ pub struct Expectation {
     /// to confirm the best.
     pub worth_the_risk: bool,
 }
+
+/// What a model says of a finished trial, after it has learned from all of them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Prediction {
+    /// Number of the trial.
+    pub trial: u32,
+    /// Whether it stood.
+    pub stood: bool,
+    /// Mean of the objective at its point if the robot stands, in the objective's unit.
+    pub value: f64,
+    /// Standard deviation of this mean, without the noise of a trial, in the objective's unit.
+    pub deviation: f64,
+    /// Probability of standing at its point, 0..1.
+    pub p_stand: f64,
+}

@@ -14,6 +14,7 @@ pub mod parzen;
 pub mod prior;
 pub mod repeats;
 pub mod sampler;
+pub mod sim;
 pub mod sobol;
 pub mod space;
 pub mod study;

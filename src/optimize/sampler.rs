@@ -1,8 +1,8 @@
 //! Dispatch to the sampler of the configuration. No sampler proposes the point of a void trial again.
 
-use super::ask::{Ask, Candidate, SamplerKind, Streams};
+use super::ask::{Ask, Candidate, Expectation, Prediction, SamplerKind, Streams};
 use super::trial::TrialState;
-use super::{gp, model_free, tpe};
+use super::{gp, model_free, sim, tpe};
 
 /// Distance in every parameter, as a share of its range, below which a proposal repeats a void trial.
 const SAME_POINT: f64 = 1e-3;
@@ -31,10 +31,30 @@ pub fn propose(ask: &Ask<'_>, streams: &mut Streams) -> Candidate {
 fn propose_once(ask: &Ask<'_>, streams: &mut Streams) -> Candidate {
     match ask.config.kind {
         SamplerKind::Tpe => tpe::propose(ask, streams),
-        // The sampler `sim` without a prior is `gp`.
-        SamplerKind::Gp | SamplerKind::Sim => gp::propose(ask, streams),
+        SamplerKind::Gp => gp::propose(ask, streams),
+        SamplerKind::Sim => sim::propose(ask, streams),
         SamplerKind::Random => model_free::random(ask, streams),
         SamplerKind::Sobol => model_free::sobol(ask, streams),
+    }
+}
+
+/// Returns what the sampler's model expects of a trial at `values`, in the order of the space; none for a sampler without a model
+/// of the objective, or before the model has enough trials.
+pub fn expect(ask: &Ask<'_>, values: &[f64]) -> Option<Expectation> {
+    match ask.config.kind {
+        SamplerKind::Gp => gp::expect(ask, values),
+        SamplerKind::Sim => sim::expect(ask, values),
+        SamplerKind::Tpe | SamplerKind::Random | SamplerKind::Sobol => None,
+    }
+}
+
+/// Returns what the sampler's model says of the finished trials, in the order of their numbers; empty where [`expect`] has
+/// nothing.
+pub fn predict(ask: &Ask<'_>) -> Vec<Prediction> {
+    match ask.config.kind {
+        SamplerKind::Gp => gp::predict(ask),
+        SamplerKind::Sim => sim::predict(ask),
+        SamplerKind::Tpe | SamplerKind::Random | SamplerKind::Sobol => Vec::new(),
     }
 }
 

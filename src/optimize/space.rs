@@ -58,8 +58,13 @@ impl Range {
 
     /// The value at position `unit` (0..1), clamped to the range against rounding.
     pub fn unscale(&self, unit: f64) -> f64 {
+        self.extrapolate(unit).clamp(self.low, self.high)
+    }
+
+    /// The value at position `unit`, which may lie beyond 0..1.
+    pub fn extrapolate(&self, unit: f64) -> f64 {
         let (low, high) = self.inner_bounds();
-        self.outer(low + (high - low) * unit).clamp(self.low, self.high)
+        self.outer(low + (high - low) * unit)
     }
 }
 

@@ -3,8 +3,9 @@
 use super::frog;
 use super::wire::{DecodeError, Way};
 use crate::trial::{
-    Displacement, FallRisk, FixedParameter, JumpRow, MeasuredJump, ParameterInsight, PointRecord, Proposal,
-    ProposalInsight, ProposedParameter, RepeatRecord, SearchStatus, SearchedParameter, TrialRecord,
+    Displacement, ExpectedResult, FallRisk, FixedParameter, JumpRow, MeasuredJump, ParameterInsight, PointRecord,
+    PredictedTrial, Proposal, ProposalInsight, ProposedParameter, RepeatRecord, SearchStatus, SearchedParameter,
+    SimulatorComparison, TrialRecord, WorldResemblance,
 };
 
 type Done = Result<(), DecodeError>;
@@ -19,7 +20,7 @@ pub fn proposal(way: Way, ours: &mut Proposal, m: &mut frog::Proposal) -> Done {
     way.list(&mut ours.gains, &mut m.gains, proposed)?;
     way.copy(&mut ours.repeat, &mut m.repeat);
     way.copy(&mut ours.repeats, &mut m.repeats);
-    Ok(())
+    way.option(&mut ours.expected, &mut m.expected, expected)
 }
 
 fn proposed(way: Way, ours: &mut ProposedParameter, m: &mut frog::proposal::Parameter) -> Done {
@@ -43,7 +44,8 @@ pub fn trial(way: Way, ours: &mut TrialRecord, m: &mut frog::Trial) -> Done {
     way.copy(&mut ours.note, &mut m.note);
     way.option(&mut ours.risk, &mut m.risk, risk)?;
     way.values(&mut ours.gains, &mut m.gains);
-    way.list(&mut ours.repeats, &mut m.repeats, repeat)
+    way.list(&mut ours.repeats, &mut m.repeats, repeat)?;
+    way.option(&mut ours.expected, &mut m.expected, expected)
 }
 
 fn repeat(way: Way, ours: &mut RepeatRecord, m: &mut frog::trial::Repeat) -> Done {
@@ -96,6 +98,16 @@ fn risk(way: Way, ours: &mut FallRisk, m: &mut frog::Risk) -> Done {
     Ok(())
 }
 
+fn expected(way: Way, ours: &mut ExpectedResult, m: &mut frog::Expected) -> Done {
+    way.number(&mut ours.value, &mut m.value);
+    way.number(&mut ours.deviation, &mut m.deviation);
+    way.number(&mut ours.p_stand, &mut m.p_stand);
+    way.copy(&mut ours.simulated_least, &mut m.simulated_least);
+    way.copy(&mut ours.simulated_most, &mut m.simulated_most);
+    way.copy(&mut ours.advises_to_stop, &mut m.advises_to_stop);
+    Ok(())
+}
+
 pub fn search(way: Way, ours: &mut SearchStatus, m: &mut frog::Search) -> Done {
     way.copy(&mut ours.budget, &mut m.budget);
     way.copy(&mut ours.counted, &mut m.counted);
@@ -122,7 +134,32 @@ fn fixed(way: Way, ours: &mut FixedParameter, m: &mut frog::search::Fixed) -> Do
 
 pub fn insight(way: Way, ours: &mut ProposalInsight, m: &mut frog::Insight) -> Done {
     way.copy(&mut ours.trial, &mut m.trial);
-    way.list(&mut ours.parameters, &mut m.parameters, reasons)
+    way.list(&mut ours.parameters, &mut m.parameters, reasons)?;
+    way.list(&mut ours.predicted, &mut m.predicted, predicted)?;
+    way.copy(&mut ours.best, &mut m.best);
+    way.option(&mut ours.simulator, &mut m.simulator, simulator)
+}
+
+fn predicted(way: Way, ours: &mut PredictedTrial, m: &mut frog::insight::Predicted) -> Done {
+    way.copy(&mut ours.trial, &mut m.trial);
+    way.number(&mut ours.value, &mut m.value);
+    way.number(&mut ours.deviation, &mut m.deviation);
+    Ok(())
+}
+
+fn simulator(way: Way, ours: &mut SimulatorComparison, m: &mut frog::insight::Simulator) -> Done {
+    way.number(&mut ours.ratio, &mut m.ratio);
+    way.number(&mut ours.ratio_deviation, &mut m.ratio_deviation);
+    way.number(&mut ours.bias, &mut m.bias);
+    way.number(&mut ours.bias_deviation, &mut m.bias_deviation);
+    way.copy(&mut ours.contradicted, &mut m.contradicted);
+    way.list(&mut ours.worlds, &mut m.worlds, world)
+}
+
+fn world(way: Way, ours: &mut WorldResemblance, m: &mut frog::insight::World) -> Done {
+    way.copy(&mut ours.name, &mut m.name);
+    way.number(&mut ours.weight, &mut m.weight);
+    Ok(())
 }
 
 fn reasons(way: Way, ours: &mut ParameterInsight, m: &mut frog::insight::Parameter) -> Done {

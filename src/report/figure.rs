@@ -257,7 +257,7 @@ impl Style {
         let style = |colour, dash, marker| Style { colour, dash, marker };
         match number % 7 {
             0 => style((0, 114, 178), None, PointMarker::Circle),
-            1 => style((213, 94, 0), Some((7, 4)), PointMarker::Cross),
+            1 => style((213, 94, 0), Some((16, 8)), PointMarker::Cross),
             2 => style((0, 158, 115), Some((2, 3)), PointMarker::Triangle),
             3 => style((204, 121, 167), Some((14, 4)), PointMarker::Square),
             4 => style((230, 159, 0), Some((4, 4)), PointMarker::Ring),

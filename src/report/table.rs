@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 use std::fmt::Write;
 
+use crate::optimize::study::ModelBest;
 use crate::trial::{JumpRow, ParameterInfo, TrialRecord, Verdict};
 
 /// One trial as a line: number, parameters with their units, value, verdict with its cause.
@@ -18,9 +19,22 @@ pub fn line(row: &TrialRecord, unit: &str, units: &HashMap<String, String>) -> S
     text + "  " + &verdict(row)
 }
 
-/// The best trial as a line, or a line about its absence.
-pub fn best_line(best: Option<&TrialRecord>, unit: &str, units: &HashMap<String, String>) -> String {
-    best.map_or_else(|| "No trial was accepted.\n".to_owned(), |best| format!("Best: {}\n", line(best, unit, units)))
+/// The best trial as a line, with what the sampler's model says of it, or a line about its absence.
+pub fn best_line(
+    best: Option<&TrialRecord>,
+    model: Option<ModelBest>,
+    unit: &str,
+    units: &HashMap<String, String>,
+) -> String {
+    let Some(best) = best else { return "No trial was accepted.\n".to_owned() };
+    let mut text = format!("Best: {}\n", line(best, unit, units));
+    if let Some(ModelBest { predicted, predicted_deviation, .. }) = model.filter(|model| model.trial == best.trial) {
+        let _ = writeln!(
+            text,
+            "      mean by the sampler's model {predicted:.3} {unit}, deviation {predicted_deviation:.3} {unit}"
+        );
+    }
+    text
 }
 
 /// Verdict of a trial with its cause.
@@ -36,6 +50,11 @@ fn verdict(row: &TrialRecord) -> String {
 pub fn table(rows: &[TrialRecord], best: Option<u32>, parameters: &[ParameterInfo], unit: &str) -> String {
     let mut header: Vec<String> = vec!["trial".into()];
     header.extend(parameters.iter().map(|p| format!("{} ({})", p.name, p.unit)));
+    // A sampler without a model expects nothing.
+    let expects = rows.iter().any(|row| row.expected.is_some());
+    if expects {
+        header.extend([format!("expected ({unit})"), "stands (%)".to_owned()]);
+    }
     header.extend([format!("J ({unit})"), "rise (m)".into(), "air (s)".into(), "source".into(), "verdict".into()]);
     let columns = header.len();
     let mut lines = vec![header];
@@ -45,6 +64,11 @@ pub fn table(rows: &[TrialRecord], best: Option<u32>, parameters: &[ParameterInf
         for parameter in parameters {
             let value = row.parameters.get(&parameter.name);
             cells.push(value.map_or_else(String::new, |v| format!("{v:.*}", digits(&parameter.unit))));
+        }
+        if expects {
+            let cell = |text: Option<String>| text.unwrap_or_else(|| "-".to_owned());
+            cells.push(cell(row.expected.map(|expected| format!("{:.3}", expected.value))));
+            cells.push(cell(row.expected.map(|expected| format!("{:.0}", 100.0 * expected.p_stand))));
         }
         let measured = row.measured.as_ref();
         let numbers = [row.value, measured.map(|measured| measured.apex_m), measured.map(|measured| measured.air_s)];

@@ -16,7 +16,8 @@ pub fn padded(values: &[f64], share: f64) -> [f64; 2] {
     [low - share * width, high + share * width]
 }
 
-/// Returns the multiples of 1, 2 or 5 times a power of ten within the range, at most `most`.
+/// Returns the multiples of 1, 2 or 5 times a power of ten within the range, about `most` of them: those of the smallest step
+/// that gives no more, or of the next smaller one where it would give one tick, which shows no scale.
 pub fn round_ticks([low, high]: [f64; 2], most: usize) -> Vec<f64> {
     let width = high - low;
     if width.is_nan() || width <= 0.0 || !width.is_finite() {
@@ -24,11 +25,15 @@ pub fn round_ticks([low, high]: [f64; 2], most: usize) -> Vec<f64> {
     }
     let rough = width / most.max(1) as f64;
     let power = 10f64.powf(rough.log10().floor());
-    let step =
-        [1.0, 2.0, 5.0, 10.0].map(|factor| factor * power).into_iter().find(|step| *step >= rough * (1.0 - 1e-9));
-    let step = step.unwrap_or(10.0 * power);
-    let (first, last) = ((low / step - 1e-9).ceil() as i64, (high / step + 1e-9).floor() as i64);
-    (first..=last).map(|count| count as f64 * step).collect()
+    let multiples = |factor: f64| -> Vec<f64> {
+        let step = factor * power;
+        let (first, last) = ((low / step - 1e-9).ceil() as i64, (high / step + 1e-9).floor() as i64);
+        (first..=last).map(|count| count as f64 * step).collect()
+    };
+    let steps = [0.2, 0.5, 1.0, 2.0, 5.0, 10.0];
+    let fits = steps.iter().position(|factor| factor * power >= rough * (1.0 - 1e-9)).unwrap_or(steps.len() - 1);
+    let ticks = multiples(steps[fits]);
+    if ticks.len() < 2 && fits > 0 { multiples(steps[fits - 1]) } else { ticks }
 }
 
 /// Returns the decimal places that tell the ticks apart.
@@ -48,6 +53,15 @@ mod tests {
         assert_eq!(decimals(&round_ticks([0.0, 1.0], 5)), 1);
         assert_eq!(decimals(&round_ticks([0.0, 300.0], 5)), 0);
         assert!(round_ticks([1.0, 1.0], 5).is_empty());
+    }
+
+    /// Regression: an axis from -0.39 to -0.1 had the one label "-0".
+    #[test]
+    fn an_axis_has_two_ticks() {
+        for most in 2..8 {
+            let ticks = round_ticks([-0.39, -0.1], most);
+            assert!(ticks.len() >= 2 && decimals(&ticks) > 0, "{most}: {ticks:?}");
+        }
     }
 
     #[test]

@@ -11,6 +11,7 @@ use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
 use std::time::Duration;
 
 use super::experiment::{Experiment, RequestRefusal};
+use super::prior::{PriorProgress, PriorWork};
 use crate::optimize::journal::{JournalWait, WaitedFor};
 use crate::recording::record::Record;
 use crate::telemetry::TrialSpec;
@@ -29,6 +30,8 @@ pub enum JobOutput {
     Approved(Result<TrialSpec, String>),
     /// A trial was measured or withdrawn, or the study was read or closed.
     Done(Result<(), RequestRefusal>),
+    /// The sampler has its prior: messages for the operator; or the reason why it has none.
+    Prior(Result<Vec<String>, String>),
 }
 
 /// A job that was carried out.
@@ -63,6 +66,9 @@ impl ExperimentView {
     }
 }
 
+/// What is waited for while the prior of the sampler `sim` is made.
+const PRIOR: &str = "the simulated robots of the sampler sim";
+
 /// Wait of the session for the storage of its study.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StorageWait {
@@ -70,15 +76,18 @@ pub struct StorageWait {
     pub waited: Duration,
     /// What the journal waits for; none where the disk is slow.
     pub journal: Option<WaitedFor>,
+    /// Progress of the prior of the sampler, where that is what is waited for.
+    pub prior: Option<PriorProgress>,
 }
 
 impl StorageWait {
     /// Returns what is waited for.
     pub fn place(&self) -> &'static str {
-        match self.journal {
-            Some(WaitedFor::Lock) => "the study's lock",
-            Some(WaitedFor::Server) => "the study's server",
-            None => "the disk",
+        match (self.prior, self.journal) {
+            (Some(_), _) => PRIOR,
+            (None, Some(WaitedFor::Lock)) => "the study's lock",
+            (None, Some(WaitedFor::Server)) => "the study's server",
+            (None, None) => "the disk",
         }
     }
 }
@@ -89,6 +98,7 @@ pub struct StorageWatch {
     /// Time at which the oldest unfinished job was given, ns; 0 without one.
     since_ns: Arc<AtomicU64>,
     journal: JournalWait,
+    prior: PriorWork,
 }
 
 /// Jobs that take less are not shown as a wait.
@@ -99,7 +109,8 @@ impl StorageWatch {
     pub fn get(&self, now_ns: u64) -> Option<StorageWait> {
         let since_ns = self.since_ns.load(Ordering::Acquire);
         let waited = Duration::from_nanos(now_ns.saturating_sub(since_ns));
-        (since_ns > 0 && waited >= SHOWN_AFTER).then(|| StorageWait { waited, journal: self.journal.waits_for() })
+        let wait = || StorageWait { waited, journal: self.journal.waits_for(), prior: self.prior.progress() };
+        (since_ns > 0 && waited >= SHOWN_AFTER).then(wait)
     }
 }
 
@@ -125,7 +136,8 @@ enum JobPlace {
 impl ExperimentQueue {
     /// Carries out the jobs in the calling thread.
     pub fn here(experiment: Experiment) -> ExperimentQueue {
-        let watch = StorageWatch { since_ns: Arc::default(), journal: experiment.journal_wait() };
+        let watch =
+            StorageWatch { since_ns: Arc::default(), journal: experiment.journal_wait(), prior: PriorWork::default() };
         ExperimentQueue {
             view: ExperimentView::of(&experiment),
             place: JobPlace::Here(Box::new(experiment), VecDeque::new()),
@@ -198,7 +210,15 @@ impl ExperimentQueue {
 
     /// Returns what an unfinished job waits for.
     pub fn waits_for(&self) -> &'static str {
+        if self.watch.prior.progress().is_some() {
+            return PRIOR;
+        }
         self.watch.journal.waits_for().map_or("the disk", WaitedFor::words)
+    }
+
+    /// Returns the progress and the interrupt of the work on a prior, for a job that makes one.
+    pub fn prior_work(&self) -> PriorWork {
+        self.watch.prior.clone()
     }
 
     /// Ends the wait of job `number` for the journal: it fails, with nothing written.
@@ -235,6 +255,7 @@ impl Drop for ExperimentQueue {
     /// A thread that waits for a lock must not write after the session has ended: the folder is free then.
     fn drop(&mut self) {
         self.watch.journal.interrupt_all();
+        self.watch.prior.interrupt();
     }
 }
 

@@ -11,6 +11,7 @@ mod config;
 mod contact;
 mod dynamics;
 pub mod emulator;
+pub mod ensemble;
 mod flight;
 mod integrate;
 mod joint_stop;

@@ -5,7 +5,8 @@ mod search;
 
 pub use self::measured::{BounceRule, Displacement, JumpRow, MeasuredJump, ObjectiveRule, RepeatRecord};
 pub use self::search::{
-    FixedParameter, ParameterInsight, PointRecord, ProposalInsight, SearchStatus, SearchedParameter,
+    FixedParameter, ParameterInsight, PointRecord, PredictedTrial, ProposalInsight, SearchStatus, SearchedParameter,
+    SimulatorComparison, WorldResemblance,
 };
 
 use serde::{Deserialize, Serialize};
@@ -323,6 +324,8 @@ pub struct Proposal {
     pub parameters: Vec<ProposedParameter>,
     /// Distance to earlier falls; none before the first judged trial.
     pub risk: Option<FallRisk>,
+    /// What the sampler's model expects of the values that run; none for a sampler without a model.
+    pub expected: Option<ExpectedResult>,
     /// The controller's gains, in table order; `proposed` is the configured value.
     pub gains: Vec<ProposedParameter>,
     /// Number of the rollout within the trial, from 1; 0 for a trial that is one rollout.
@@ -353,6 +356,28 @@ pub struct FallRisk {
     pub falls: u32,
     /// Number of nearest judged trials that were compared, at most 5.
     pub neighbours: u32,
+}
+
+/// What the sampler's model expects of a trial before it runs.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct ExpectedResult {
+    /// Mean objective if the robot stands, in the study's unit.
+    #[serde(rename = "predicted")]
+    pub value: f64,
+    /// Standard deviation of this mean, without the noise of a trial, in the study's unit.
+    #[serde(rename = "predicted_deviation")]
+    pub deviation: f64,
+    /// Probability that the robot stands, 0 to 1.
+    pub p_stand: f64,
+    /// Smallest mean of the simulated robots, in the study's unit; none for a sampler without them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub simulated_least: Option<f64>,
+    /// Largest mean of the simulated robots.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub simulated_most: Option<f64>,
+    /// Whether no point is worth its risk of a fall any more: the sampler advises to end the search and to confirm the best.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub advises_to_stop: bool,
 }
 
 /// Decision of the operator, or of the automatic rule, on a trial.
@@ -405,6 +430,8 @@ pub struct TrialRecord {
     pub note: String,
     /// Distance to earlier falls at its approval.
     pub risk: Option<FallRisk>,
+    /// What the sampler's model expected at its approval.
+    pub expected: Option<ExpectedResult>,
     /// The controller's gains that it ran with; empty for a trial of another program.
     pub gains: ParameterValues,
     /// Judged rollouts, in order, void ones included; empty for a trial that is one rollout.

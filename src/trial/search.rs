@@ -50,6 +50,56 @@ pub struct ProposalInsight {
     pub trial: u32,
     /// Every parameter, in table order.
     pub parameters: Vec<ParameterInsight>,
+    /// What the sampler's model says of the finished trials, in the order of their numbers; empty without a model.
+    pub predicted: Vec<PredictedTrial>,
+    /// The trial that is the best by the model: the largest mean among those that stood, since a single jump may be lucky.
+    pub best: Option<u32>,
+    /// Comparison of the robot with the simulator; none for a sampler without a prior.
+    pub simulator: Option<SimulatorComparison>,
+}
+
+impl ProposalInsight {
+    /// Returns what the model says of the trial that it takes for the best.
+    pub fn predicted_best(&self) -> Option<&PredictedTrial> {
+        self.predicted.iter().find(|predicted| Some(predicted.trial) == self.best)
+    }
+}
+
+/// What a model says of a finished trial.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct PredictedTrial {
+    /// Its number.
+    pub trial: u32,
+    /// Mean objective at its point if the robot stands, in the study's unit.
+    pub value: f64,
+    /// Standard deviation of this mean, without the noise of a trial, in the study's unit.
+    pub deviation: f64,
+}
+
+/// The robot as the sampler `sim` sees it beside its simulated robots.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct SimulatorComparison {
+    /// rho: ratio of the robot's values to the simulated ones, 1 for a robot that jumps as simulated.
+    pub ratio: f64,
+    /// Standard deviation of the ratio.
+    pub ratio_deviation: f64,
+    /// b: what the robot adds to that, in the study's unit.
+    pub bias: f64,
+    /// Standard deviation of the bias, in the study's unit.
+    pub bias_deviation: f64,
+    /// The simulated robots, the most alike first.
+    pub worlds: Vec<WorldResemblance>,
+    /// Whether the robot's values contradict the simulated ones, so that the sampler does not use them.
+    pub contradicted: bool,
+}
+
+/// One simulated robot beside the real one.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct WorldResemblance {
+    /// Its name.
+    pub name: String,
+    /// Probability that the robot's results are those of this one rather than of another, 0 to 1, all together 1.
+    pub weight: f64,
 }
 
 /// Reasons of one parameter's proposed value, and its importance.

@@ -10,6 +10,7 @@ use quadfrog::recording::record::{ArmingCheckRecord, HealthLimits, Record, Sessi
 use quadfrog::recording::recorder::RecorderStatus;
 use quadfrog::robot::{Battery, LinkStatus};
 use quadfrog::session::operator_request::{OperatorCheck, OperatorRequest};
+use quadfrog::session::prior::PriorProgress;
 use quadfrog::session::storage::StorageWait;
 use quadfrog::telemetry::{ArmingCheck, ArmingCheckState, Counters, Mode, Snapshot, Tick};
 use quadfrog::trial::{
@@ -167,6 +168,7 @@ fn insight() -> ProposalInsight {
             bad: bump(1.5),
             at,
         }],
+        ..ProposalInsight::default()
     }
 }
 
@@ -495,10 +497,13 @@ fn details_that_do_not_fit_are_reached_with_the_paging_keys() {
 fn a_wait_for_the_storage_is_shown_until_it_ends() {
     let mut console = Console::ready();
     let waited = Duration::from_secs(14);
-    console.update(Msg::Storage(Some(StorageWait { waited, journal: Some(WaitedFor::Lock) })));
+    console.update(Msg::Storage(Some(StorageWait { waited, journal: Some(WaitedFor::Lock), prior: None })));
     assert_shows(&console.screen(80, 24), &["Waiting for the study's lock, 14 s"]);
-    console.update(Msg::Storage(Some(StorageWait { waited, journal: None })));
+    console.update(Msg::Storage(Some(StorageWait { waited, journal: None, prior: None })));
     assert_shows(&console.screen(80, 24), &["Waiting for the disk, 14 s"]);
+    let prior = Some(PriorProgress { done: 640, total: 2560 });
+    console.update(Msg::Storage(Some(StorageWait { waited, journal: None, prior })));
+    assert_shows(&console.screen(80, 24), &["Simulating the prior, 640 of 2560 jumps, 14 s"]);
     console.update(Msg::Storage(None));
     assert!(!console.screen(80, 24).contains("Waiting for"));
 }

@@ -34,6 +34,7 @@ pub fn study(storage: Storage) -> Study {
 
 pub fn plan(budget: u32) -> ExperimentPlan {
     ExperimentPlan {
+        needs_prior: false,
         task: Task::Forward,
         control: TaskControl {
             kp: 400.0,

@@ -166,6 +166,17 @@ impl Draw {
         }
     }
 
+    fn expected(&mut self) -> ExpectedResult {
+        ExpectedResult {
+            value: self.number(),
+            deviation: self.number(),
+            p_stand: self.number(),
+            simulated_least: self.option(Draw::number),
+            simulated_most: self.option(Draw::number),
+            advises_to_stop: self.yes(),
+        }
+    }
+
     fn risk(&mut self) -> Option<FallRisk> {
         self.option(|d| FallRisk {
             nearest_fall: d.option(Draw::number),
@@ -224,9 +235,7 @@ impl Draw {
                 robot: self.string(),
                 task: self.option(|d| d.one_of(&Task::ALL)),
                 unit: self.string(),
-                sampler: self.option(|d| {
-                    d.one_of(&[SamplerKind::Tpe, SamplerKind::Gp, SamplerKind::Random, SamplerKind::Sobol])
-                }),
+                sampler: self.option(|d| d.one_of(SamplerKind::ALL)),
                 seed: self.word(),
                 budget: self.word() as u32,
                 parameters: self.several(Draw::bounds),
@@ -263,6 +272,7 @@ impl Draw {
                 parent: self.option(|d| d.word() as u32),
                 parameters: self.several(Draw::proposed),
                 risk: self.risk(),
+                expected: self.option(Draw::expected),
                 gains: self.several(Draw::proposed),
                 repeat: self.word() as u32,
                 repeats: self.word() as u32,
@@ -280,6 +290,7 @@ impl Draw {
                 verdict: self.option(|d| d.one_of(&Verdict::ALL)),
                 note: self.string(),
                 risk: self.risk(),
+                expected: self.option(Draw::expected),
                 gains: self.several(|d| (d.string(), d.number())).into(),
                 repeats: self.several(|d| RepeatRecord {
                     seed: d.word(),
@@ -334,6 +345,20 @@ impl Draw {
                     at: d.several(Draw::number),
                     good: d.several(Draw::number),
                     bad: d.several(Draw::number),
+                }),
+                predicted: self.several(|d| PredictedTrial {
+                    trial: d.word() as u32,
+                    value: d.number(),
+                    deviation: d.number(),
+                }),
+                best: self.option(|d| d.word() as u32),
+                simulator: self.option(|d| SimulatorComparison {
+                    ratio: d.number(),
+                    ratio_deviation: d.number(),
+                    bias: d.number(),
+                    bias_deviation: d.number(),
+                    worlds: d.several(|d| WorldResemblance { name: d.string(), weight: d.number() }),
+                    contradicted: d.yes(),
                 }),
             }),
             _ => Record::Points(self.several(|d| PointRecord {

@@ -61,7 +61,11 @@ fn main() {
         console.update(Msg::Tick(Box::new(sample(time_ms))));
     }
     console.press(&["c"]);
-    console.record(Record::Insight(ProposalInsight { trial: 0, parameters: ["f0", "Fx", "Fz"].map(insight).to_vec() }));
+    console.record(Record::Insight(ProposalInsight {
+        trial: 0,
+        parameters: ["f0", "Fx", "Fz"].map(insight).to_vec(),
+        ..ProposalInsight::default()
+    }));
     let mut terminal = Terminal::new(TestBackend::new(200, 60)).expect("a screen in memory");
     let mut time_ms = 60_000;
     for view in View::VARIANTS.iter().copied() {

@@ -15,9 +15,11 @@
 
 pub mod ascent;
 pub mod falls;
+pub mod laplace;
 pub mod process;
+pub mod regression;
 
-use super::ask::{Ask, Candidate, Direction, Streams};
+use super::ask::{Ask, Candidate, Direction, Expectation, Prediction, Streams};
 use super::model_free;
 use super::sobol::Sobol;
 use super::space::Parameter;
@@ -36,7 +38,15 @@ const CLOUD_WIDTHS: [f64; 3] = [0.2, 0.05, 0.01];
 /// Number of best trials that are centres.
 const CENTRES: usize = 3;
 /// Distance from a void trial, in units of the cube, at which the acquisition is reduced to 0.39 of its value.
-const VOID_RADIUS: f64 = 0.1;
+pub const VOID_RADIUS: f64 = 0.1;
+/// Finished trials from which on a proposal must stand with [`LEAST_P_STAND`]. Before, the classifier knows little, and the search
+/// would stay among the careful points.
+const CAREFUL_FROM: usize = 10;
+/// Least probability of standing of a proposal: about 1.5 falls of 20 jumps fewer at no loss of value
+/// (`src/optimize/README.md`).
+const LEAST_P_STAND: f64 = 0.8;
+/// Reduction of the acquisition per unit of missing probability: among points that are all too risky the surest is chosen.
+const TOO_RISKY: f64 = 1e3;
 /// Number of best points from which the gradient ascent starts.
 const CLIMBS: usize = 6;
 
@@ -47,17 +57,33 @@ pub fn propose(ask: &Ask<'_>, streams: &mut Streams) -> Candidate {
     if given.iter().all(Option::is_some) {
         return given.into_iter().flatten().collect::<Vec<f64>>().into();
     }
-    let training = TrainingSet::gather(ask);
-    let enough = training.points.len() >= ask.config.startup_trials(ask.space) && training.values.len() >= 2;
-    let model = enough.then(|| Acquisition::new(&training)).flatten();
-    let Some(model) = model else { return model_free::sobol(ask, streams) };
+    let Some(model) = Acquisition::of(ask) else { return model_free::sobol(ask, streams) };
     let bound =
         |(p, given): (&Parameter, &Option<f64>)| given.map_or((0.0, 1.0), |v| (p.range.scale(v), p.range.scale(v)));
     let bounds: Vec<(f64, f64)> = parameters.iter().zip(&given).map(bound).collect();
     let unit = model.best_point(&bounds, streams);
+    let expected = Some(model.expectation(&unit, ask.direction));
     let values =
         parameters.iter().zip(&given).zip(unit).map(|((p, given), u)| given.unwrap_or_else(|| p.range.unscale(u)));
-    values.collect::<Vec<f64>>().into()
+    Candidate { expected, ..values.collect::<Vec<f64>>().into() }
+}
+
+/// Returns what the model expects of a trial at `values`; none before the model proposes.
+pub fn expect(ask: &Ask<'_>, values: &[f64]) -> Option<Expectation> {
+    let model = Acquisition::of(ask)?;
+    let point: Vec<f64> = ask.space.parameters().iter().zip(values).map(|(p, v)| p.range.scale(*v)).collect();
+    Some(model.expectation(&point, ask.direction))
+}
+
+/// Returns what the model says of the finished trials; empty before the model proposes.
+pub fn predict(ask: &Ask<'_>) -> Vec<Prediction> {
+    let Some(model) = Acquisition::of(ask) else { return Vec::new() };
+    let training = TrainingSet::gather(ask);
+    let prediction = |((trial, stood), point): ((&u32, &bool), &Vec<f64>)| {
+        let Expectation { value, deviation, p_stand, .. } = model.expectation(point, ask.direction);
+        Prediction { trial: *trial, stood: *stood, value, deviation, p_stand }
+    };
+    training.numbers.iter().zip(&training.stood).zip(&training.points).map(prediction).collect()
 }
 
 /// The trials as points of the unit cube.
@@ -65,6 +91,8 @@ pub fn propose(ask: &Ask<'_>, streams: &mut Streams) -> Candidate {
 struct TrainingSet {
     /// Points of all observed trials.
     points: Vec<Vec<f64>>,
+    /// Numbers of these trials.
+    numbers: Vec<u32>,
     /// Whether each trial ended without a fall.
     stood: Vec<bool>,
     /// Values of the trials without a fall, larger is better.
@@ -88,6 +116,7 @@ impl TrainingSet {
                 (TrialState::Fail, _) => set.void.push(point),
                 (TrialState::Complete, Some(value)) if value.is_finite() && trial.violation() <= 0.0 => {
                     set.points.push(point);
+                    set.numbers.push(trial.number);
                     set.stood.push(!trial.is_fall());
                     if !trial.is_fall() {
                         set.values.push(if ask.direction == Direction::Maximize { value } else { -value });
@@ -120,9 +149,18 @@ struct Acquisition {
     centres: Vec<Vec<f64>>,
     /// Points of void trials.
     void: Vec<Vec<f64>>,
+    /// Least probability of standing.
+    least_p_stand: f64,
 }
 
 impl Acquisition {
+    /// Learns from the trials of a study; none before there are enough.
+    fn of(ask: &Ask<'_>) -> Option<Self> {
+        let training = TrainingSet::gather(ask);
+        let enough = training.points.len() >= ask.config.startup_trials(ask.space) && training.values.len() >= 2;
+        enough.then(|| Acquisition::new(&training)).flatten()
+    }
+
     fn new(training: &TrainingSet) -> Option<Self> {
         let process = GaussianProcess::fit(training.points.clone(), &training.values_with_falls())?;
         let mut ranked: Vec<(f64, &Vec<f64>)> = process.points().iter().map(|p| (process.predict(p).0, p)).collect();
@@ -130,15 +168,18 @@ impl Acquisition {
         let incumbent = ranked.first()?.0;
         let centres = ranked.iter().take(CENTRES).map(|(_, p)| (*p).clone()).collect();
         let stand_probability = StandProbability::fit(&training.points, &training.stood);
+        let least_p_stand = if training.points.len() >= CAREFUL_FROM { LEAST_P_STAND } else { 0.0 };
         let process = process.believing(&training.pending)?;
-        Some(Acquisition { process, stand_probability, incumbent, centres, void: training.void.clone() })
+        Some(Acquisition { process, stand_probability, incumbent, centres, void: training.void.clone(), least_p_stand })
     }
 
-    /// ln EI(x) + ln P(stands at x) + sum over void points v of ln(1 - exp(-|x - v|^2 / 2 r^2))
+    /// ln EI(x) + ln P(stands at x) - c max(p - P(stands at x), 0) + sum over void points v of ln(1 - exp(-|x - v|^2 / 2 r^2))
     fn value(&self, x: &[f64]) -> f64 {
         let (mean, deviation) = self.process.predict(x);
         let probability = self.stand_probability.as_ref().map_or(1.0, |s| s.probability(x));
-        log(deviation) + log_improvement((mean - self.incumbent) / deviation) + log(probability) + self.log_distance(x)
+        let missing = (self.least_p_stand - probability).max(0.0);
+        log(deviation) + log_improvement((mean - self.incumbent) / deviation) + log(probability) - TOO_RISKY * missing
+            + self.log_distance(x)
     }
 
     fn log_distance(&self, x: &[f64]) -> f64 {
@@ -147,6 +188,15 @@ impl Acquisition {
             log((-expm1(-0.5 * squared / (VOID_RADIUS * VOID_RADIUS))).max(1e-300))
         };
         self.void.iter().map(away).sum()
+    }
+
+    /// The prediction at `x` in the objective's own sign. Falls count with the padding of the regression; before the first fall the
+    /// probability of standing is 1.
+    fn expectation(&self, x: &[f64], direction: Direction) -> Expectation {
+        let (mean, deviation) = self.process.predict(x);
+        let value = if direction == Direction::Maximize { mean } else { -mean };
+        let p_stand = self.stand_probability.as_ref().map_or(1.0, |s| s.probability(x));
+        Expectation { value, deviation, p_stand, worlds: None, worth_the_risk: true }
     }
 
     /// Returns the point of the box with the largest acquisition. Takes one double per coordinate.

@@ -3,7 +3,7 @@
 use super::{Study, StudyError, StudyOptions, user_attributes};
 use crate::optimize::ask::{Ask, Draws, Expectation};
 use crate::optimize::journal::{AttributeKind, Operation};
-use crate::optimize::sampler::propose;
+use crate::optimize::sampler::{self, propose};
 use crate::optimize::space::{Parameter, Range};
 use crate::optimize::trial::{Distribution, FIXED_PARAMS, Trial, TrialState, announcement, value_of};
 use jiff::Timestamp;
@@ -76,16 +76,8 @@ impl Study {
         let given = merged(waiting.map(Trial::fixed).unwrap_or_default(), fixed);
         let before = self.streams.draws();
         let mut streams = self.streams.clone();
-        let StudyOptions { sampler, space, direction, .. } = &self.options;
-        let inside = self.inside.as_ref().unwrap_or(space);
-        let ask = Ask {
-            config: sampler,
-            trials,
-            space: inside,
-            fixed: &given,
-            direction: *direction,
-            prior: self.prior.as_deref(),
-        };
+        let space = &self.options.space;
+        let ask = self.ask(&given);
         let candidate = propose(&ask, &mut streams);
         let suggest = |(p, value): (&Parameter, f64)| SuggestedParameter {
             name: p.name.clone(),
@@ -100,11 +92,33 @@ impl Study {
             attributes: waiting.map(|t| t.user_attributes.clone()).unwrap_or_default(),
             joint: candidate.joint,
             expected: candidate.expected,
-            seed: sampler.seed,
+            seed: self.options.sampler.seed,
             before,
             after: streams.draws(),
             waiting: waiting.map(|t| t.id),
         }
+    }
+
+    /// The question to the sampler with some parameters given.
+    pub(super) fn ask<'a>(&'a self, given: &'a [(String, f64)]) -> Ask<'a> {
+        let StudyOptions { sampler, space, direction, .. } = &self.options;
+        let space = self.inside.as_ref().unwrap_or(space);
+        Ask {
+            config: sampler,
+            trials: self.trials(),
+            space,
+            fixed: given,
+            direction: *direction,
+            prior: self.prior.as_deref(),
+        }
+    }
+
+    /// Returns what the sampler's model expects of a trial at `point`, which has a value for each parameter; none without a model
+    /// or before it has enough trials.
+    pub fn expect(&self, point: &[(String, f64)]) -> Option<Expectation> {
+        let values: Option<Vec<f64>> =
+            self.options.space.parameters().iter().map(|p| value_of(point, &p.name)).collect();
+        sampler::expect(&self.ask(&[]), &values?)
     }
 
     /// The draft with another waiting trial: for a trial that was queued in a fork and then in this study.

@@ -5,6 +5,7 @@
 //! in the journal. A study that was killed continues where it stopped: the positions of the random streams are stored
 //! with each trial.
 
+mod best;
 mod check;
 mod draft;
 mod error;
@@ -14,6 +15,7 @@ mod results;
 mod storage;
 mod workers;
 
+pub use best::{ModelBest, ModelPredictions};
 pub use draft::{DRAWS, SuggestedParameter, TrialDraft};
 pub use error::StudyError;
 pub use storage::Storage;
@@ -24,7 +26,6 @@ use crate::optimize::journal::{
     Applied, AttributeKind, Durability, Journal, JournalError, JournalWait, Operation, StudyRecord,
 };
 use crate::optimize::prior::PriorModel;
-use crate::optimize::repeats;
 use crate::optimize::space::Space;
 use crate::optimize::trial::{Trial, TrialState};
 use serde_json::Value;
@@ -156,11 +157,6 @@ impl Study {
     pub fn trial(&self, number: u32) -> Result<&Trial, StudyError> {
         let (study, count) = (self.options.name.clone(), self.trials().len());
         self.trials().get(number as usize).ok_or(StudyError::UnknownTrial { study, trial: number, count })
-    }
-
-    /// The best trial, repeats averaged ([`repeats::best`]).
-    pub fn best(&self) -> Option<&Trial> {
-        repeats::best(self.trials(), self.options.direction)
     }
 
     /// Running trials: of this session, of other workers, or of a session that was killed.

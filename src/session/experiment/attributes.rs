@@ -13,8 +13,8 @@ use crate::optimize::ask::SamplerConfig;
 use crate::optimize::study::{DRAWS, Outcome};
 use crate::optimize::trial::{Trial, TrialState};
 use crate::trial::{
-    Backend, FallRisk, MeasuredJump, ParameterInfo, ParameterValues, Proposal, ProposalSource, RepeatRecord, Task,
-    TrialRecord, Verdict,
+    Backend, ExpectedResult, FallRisk, MeasuredJump, ParameterInfo, ParameterValues, Proposal, ProposalSource,
+    RepeatRecord, Task, TrialRecord, Verdict,
 };
 
 /// Attributes in the order in which they are written.
@@ -186,6 +186,9 @@ pub struct BeganAttributes {
     recording: String,
     #[serde(skip_serializing_if = "Option::is_none")]
     risk: Option<FallRisk>,
+    /// Numeric columns of their own: `predicted`, `predicted_deviation`, `p_stand`.
+    #[serde(flatten)]
+    expected: Option<ExpectedResult>,
     #[serde(skip_serializing_if = "is_empty", serialize_with = "as_object")]
     fixed: ParameterValues,
     /// Coulomb coefficient of the ground; none where it is not drawn for each trial.
@@ -218,6 +221,7 @@ impl BeganAttributes {
             backend: (plan.backend != Backend::Simulator).then(|| plan.backend.name()),
             recording: plan.recording.clone(),
             risk: proposal.risk,
+            expected: proposal.expected,
             fixed,
             friction: drawn.map(|terrain| terrain.friction_of(seed)),
         }
@@ -356,6 +360,7 @@ pub fn row_of(trial: &Trial, note: String, order: &[ParameterInfo]) -> TrialReco
         verdict: kept.verdict.filter(fits).or(of_state),
         note,
         risk: kept.risk,
+        expected: parse(&trial.user_attributes, |_| true),
         gains,
         repeats,
     }

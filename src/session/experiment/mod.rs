@@ -22,6 +22,7 @@ mod trial_changes;
 pub use self::plan::{ExperimentPlan, RequestRefusal};
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use self::between_repeats::BetweenRepeats;
 use self::confirmation::{BestConfirmation, NextRepeat};
@@ -32,8 +33,9 @@ use self::search::SearchSettings;
 use crate::optimize::ask::Direction;
 use crate::optimize::exchange::TableTrial;
 use crate::optimize::journal::JournalWait;
+use crate::optimize::prior::PriorModel;
 use crate::optimize::repeats::{RepeatedPoint, improvements, points};
-use crate::optimize::study::{Outcome, Study, StudyError};
+use crate::optimize::study::{ModelBest, Outcome, Study, StudyError};
 use crate::optimize::trial::TrialState;
 use crate::recording::record::{LogLevel, LogRecord, Record, StageRecord};
 use crate::telemetry::TrialSpec;
@@ -61,6 +63,8 @@ enum ExperimentState {
     BetweenRepeats(BetweenRepeats),
     /// The budget is used up.
     Finished,
+    /// The sampler has no prior yet: nothing is proposed.
+    AwaitsPrior,
 }
 
 /// The trials of one study and the state of the current one.
@@ -80,6 +84,8 @@ pub struct Experiment {
     published_search: Option<SearchStatus>,
     /// Share of the force bounds that the next trial may use.
     hop_share: Option<f64>,
+    /// The best trial by the sampler's model, the pending verdict included.
+    model_best: Option<ModelBest>,
 }
 
 impl Experiment {
@@ -99,11 +105,26 @@ impl Experiment {
             outbox: Vec::new(),
             published_search: None,
             hop_share: None,
+            model_best: None,
         };
         let log = experiment.queue.close_interrupted(&mut experiment.study)?;
         experiment.log_all(log);
-        experiment.propose()?;
+        if experiment.plan.needs_prior {
+            experiment.take_rows();
+            experiment.enter(ExperimentState::AwaitsPrior, experiment.study.trials().len() as u32);
+        } else {
+            experiment.propose()?;
+        }
         Ok(experiment)
+    }
+
+    /// Gives the sampler its prior. An experiment that has waited for it makes its first proposal.
+    ///
+    /// # Errors
+    /// When the study cannot be read or written.
+    pub fn use_prior(&mut self, prior: Arc<PriorModel>) -> Result<(), StudyError> {
+        self.study.use_prior(prior);
+        if matches!(self.state, ExperimentState::AwaitsPrior) { self.propose() } else { Ok(()) }
     }
 
     /// Takes the records since the last call, for the console and the recording.
@@ -114,7 +135,9 @@ impl Experiment {
     /// Returns the stage of the current trial.
     pub fn stage(&self) -> ExperimentStage {
         match self.state {
-            ExperimentState::Proposed(_) | ExperimentState::BetweenRepeats(_) => ExperimentStage::Proposed,
+            ExperimentState::Proposed(_) | ExperimentState::BetweenRepeats(_) | ExperimentState::AwaitsPrior => {
+                ExperimentStage::Proposed
+            }
             ExperimentState::Running(_) => ExperimentStage::Running,
             ExperimentState::Review(_) => ExperimentStage::Review,
             ExperimentState::Finished => ExperimentStage::Finished,
@@ -139,9 +162,17 @@ impl Experiment {
         }
     }
 
-    /// Returns the accepted trial whose point has the greatest value, the earliest of equals. The value of a repeated point
-    /// is the mean of its repeats ([`crate::optimize::repeats`]).
+    /// Returns the best trial by the sampler's model and what that says of it; none for a sampler without a model.
+    pub fn model_best(&self) -> Option<ModelBest> {
+        self.model_best
+    }
+
+    /// Returns the best trial by the sampler's model; without a model the accepted trial whose point has the greatest value,
+    /// the earliest of equals. The value of a repeated point is the mean of its repeats ([`crate::optimize::repeats`]).
     pub fn best(&self) -> Option<&TrialRecord> {
+        if let Some(best) = self.model_best.and_then(|best| self.row(best.trial)) {
+            return Some(best);
+        }
         let points = points(self.study.trials());
         let mean = |number| points.iter().find(|point| point.trials.contains(&number)).map(RepeatedPoint::mean);
         let accepted = self.rows.values().filter(|row| row.verdict == Some(Verdict::Accept));

@@ -3,13 +3,14 @@
 use std::collections::BTreeMap;
 
 use super::attributes::Origin;
-use crate::optimize::ask::SamplerKind;
+use crate::optimize::ask::{Prediction, SamplerKind};
 use crate::optimize::insight;
-use crate::optimize::study::{Study, TrialDraft};
+use crate::optimize::sim::insight::{PriorInsight, WorldWeight};
+use crate::optimize::study::{ModelPredictions, Study, TrialDraft};
 use crate::optimize::trial::Trial;
 use crate::trial::{
-    FallRisk, Gains, ParameterInsight, ParameterValues, Proposal, ProposalInsight, ProposalSource, ProposedParameter,
-    Verdict,
+    ExpectedResult, FallRisk, Gains, ParameterInsight, ParameterValues, PredictedTrial, Proposal, ProposalInsight,
+    ProposalSource, ProposedParameter, SimulatorComparison, Verdict, WorldResemblance,
 };
 
 /// Values at which the densities are given: the width of a chart in a terminal.
@@ -166,6 +167,7 @@ impl OpenProposal {
             source: if self.changes().is_some() { ProposalSource::Operator } else { origin.source },
             parent: origin.parent,
             risk: self.risk(&parameters),
+            expected: self.expected(&parameters),
             parameters,
             gains,
             repeat: 0,
@@ -185,7 +187,21 @@ impl OpenProposal {
         })
     }
 
-    pub fn insight(&self) -> ProposalInsight {
+    /// Returns what the sampler's model expects of the values that run, after overrides as well.
+    fn expected(&self, point: &[ProposedParameter]) -> Option<ExpectedResult> {
+        let drafted = self.draft.expected.filter(|_| point.iter().all(|p| p.value == p.proposed));
+        let point: Vec<_> = point.iter().map(|p| (p.name.clone(), p.value)).collect();
+        drafted.or_else(|| self.study.expect(&point)).map(|expected| ExpectedResult {
+            value: expected.value,
+            deviation: expected.deviation,
+            p_stand: expected.p_stand,
+            simulated_least: expected.worlds.map(|(least, _)| least),
+            simulated_most: expected.worlds.map(|(_, most)| most),
+            advises_to_stop: !expected.worth_the_risk,
+        })
+    }
+
+    pub fn insight(&self, model: &ModelPredictions) -> ProposalInsight {
         let (trials, options) = (self.study.trials(), self.study.options());
         let densities = match options.sampler.kind {
             SamplerKind::Tpe => {
@@ -206,7 +222,32 @@ impl OpenProposal {
             }
         };
         let parameters = self.draft.parameters.iter().map(|p| (p.name.clone(), p.value)).map(parameter).collect();
-        ProposalInsight { trial: self.number(), parameters }
+        ProposalInsight { trial: self.number(), parameters, ..model_insight(model) }
+    }
+}
+
+/// Returns what the sampler's model says of the finished trials.
+pub fn model_insight(model: &ModelPredictions) -> ProposalInsight {
+    let predicted = |p: &Prediction| PredictedTrial { trial: p.trial, value: p.value, deviation: p.deviation };
+    ProposalInsight {
+        predicted: model.trials.iter().map(predicted).collect(),
+        best: model.best.map(|best| best.trial),
+        simulator: model.simulator.as_ref().map(comparison),
+        ..ProposalInsight::default()
+    }
+}
+
+fn comparison(insight: &PriorInsight) -> SimulatorComparison {
+    let world = |world: &WorldWeight| WorldResemblance { name: world.name.clone(), weight: world.weight };
+    let mut worlds: Vec<WorldResemblance> = insight.worlds.iter().map(world).collect();
+    worlds.sort_by(|a, b| b.weight.total_cmp(&a.weight));
+    SimulatorComparison {
+        ratio: insight.rho.mean,
+        ratio_deviation: insight.rho.deviation,
+        bias: insight.bias.mean,
+        bias_deviation: insight.bias.deviation,
+        worlds,
+        contradicted: !insight.trusted,
     }
 }
 

@@ -57,6 +57,8 @@ pub struct ExperimentPlan {
     pub terrain: Option<TerrainConfig>,
     /// Growth of the largest forces; none where the whole bounds are open.
     pub envelope: Option<HopEnvelope>,
+    /// Whether nothing is proposed before the study is given the prior of its sampler.
+    pub needs_prior: bool,
 }
 
 impl ExperimentPlan {

@@ -3,7 +3,7 @@
 use super::attributes::{self, BeganAttributes, Origin};
 use super::confirmation::{self, NextRepeat};
 use super::envelope;
-use super::open_proposal::{ApprovedProposal, OpenProposal};
+use super::open_proposal::{ApprovedProposal, OpenProposal, model_insight};
 use super::plan::{ExperimentPlan, RequestRefusal, not_now};
 use super::search::SearchSettings;
 use super::trial_changes::must_be_within;
@@ -13,7 +13,8 @@ use crate::optimize::trial::Trial;
 use crate::recording::record::Record;
 use crate::telemetry::TrialSpec;
 use crate::trial::{
-    JumpParameters, ParameterInfo, ParameterValues, ProposalSource, ProposedParameter, SearchStatus, TrialRecord,
+    JumpParameters, ParameterInfo, ParameterValues, ProposalInsight, ProposalSource, ProposedParameter, SearchStatus,
+    TrialRecord,
 };
 
 impl Experiment {
@@ -42,6 +43,8 @@ impl Experiment {
         if self.pending_verdict.is_none() {
             self.confirmation.write_conclusion(&mut self.study)?;
         }
+        let model = study.predict();
+        self.model_best = model.best;
         self.hop_share = envelope::share(&self.plan, study.trials());
         if let Some(inside) =
             self.hop_share.and_then(|share| envelope::inside(&study.options().space, &self.plan, share))
@@ -53,6 +56,7 @@ impl Experiment {
         let confirms = study.waiting().next().is_some_and(attributes::confirms);
         if !confirms && self.queue.occupied(study.trials()) >= self.plan.budget {
             let last = self.rows.keys().next_back().copied().unwrap_or(0);
+            self.outbox.push(Record::Insight(ProposalInsight { trial: last, ..model_insight(&model) }));
             self.enter(ExperimentState::Finished, last);
             return Ok(());
         }
@@ -61,7 +65,7 @@ impl Experiment {
         let revision = self.next_revision();
         let open = OpenProposal::new(study, in_study, &fixed, &self.plan.control.gains(), revision);
         let number = open.number();
-        self.outbox.push(Record::Insight(open.insight()));
+        self.outbox.push(Record::Insight(open.insight(&model)));
         self.outbox.push(Record::Proposal(open.proposal()));
         self.enter(ExperimentState::Proposed(Box::new(open)), number);
         if let Some(refusal) = self.refusal() {
@@ -160,6 +164,7 @@ impl Experiment {
             parameters: proposal.parameters.iter().map(|p| (p.name.clone(), p.value)).collect(),
             note: gains_note(&gains, &self.plan),
             risk: proposal.risk,
+            expected: proposal.expected,
             gains,
             repeats: origin.repeats,
             ..TrialRecord::default()
@@ -193,12 +198,18 @@ impl Experiment {
             // Only now: after an error above it is still to be reported.
             self.pending_verdict = None;
         }
+        if let Some(best) = self.model_best {
+            self.study.store_best(best)?;
+        }
         self.confirmation.write_conclusion(&mut self.study)?;
         Ok(queued)
     }
 
     /// Refuses while a trial runs or is under review.
     pub fn must_be_idle(&self) -> Result<(), RequestRefusal> {
+        if matches!(self.state, ExperimentState::AwaitsPrior) {
+            return not_now("the sampler has no prior yet; wait until its robots are simulated");
+        }
         if self.is_idle() { Ok(()) } else { not_now("finish the present trial first") }
     }
 

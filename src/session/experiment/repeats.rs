@@ -26,6 +26,7 @@ impl Experiment {
             parent: row.parent,
             parameters: values(&row.parameters),
             risk: row.risk,
+            expected: row.expected,
             gains: values(&row.gains),
             repeat: row.counted_repeats() + 1,
             repeats: self.plan.control.repeats,

@@ -1,10 +1,14 @@
 //! Jobs on the experiment: given without waiting; their answers are published when they are finished.
 
+use std::sync::Arc;
+
 use super::Supervisor;
 use super::unfinished::{ApprovalState, Asker, JobPurpose, UnfinishedJob};
+use crate::optimize::prior::PriorModel;
 use crate::recording::record::{LogLevel, Record, RequestRecord};
 use crate::session::experiment::Experiment;
 use crate::session::operator_request::StampedRequest;
+use crate::session::prior::PriorWork;
 use crate::session::storage::{FinishedJob, JobOutput, StorageWatch};
 use crate::telemetry::{Command, CommandRefusal, Mode, TrialSpec};
 use crate::trial::ExperimentStage;
@@ -26,6 +30,25 @@ impl Supervisor {
     /// Shows a screen whether the session waits for the storage of its study.
     pub fn storage_watch(&self) -> StorageWatch {
         self.experiment.watch()
+    }
+
+    /// Makes the prior of the sampler behind the session: requests to the study are answered after it, STOP, sit down and cancel
+    /// at once. `make` returns the prior and messages for the operator; it ends soon after [`PriorWork::interrupt`], which the end
+    /// of the session calls.
+    pub fn make_prior(
+        &mut self,
+        time_ns: u64,
+        make: impl FnOnce(&PriorWork) -> Result<(Arc<PriorModel>, Vec<String>), String> + Send + 'static,
+    ) {
+        let work = self.experiment.prior_work();
+        self.give(JobPurpose::Prior, time_ns, move |experiment| {
+            let made = make(&work);
+            work.end();
+            let used = made.and_then(|(prior, messages)| {
+                experiment.use_prior(prior).map(|()| messages).map_err(|error| error.to_string())
+            });
+            JobOutput::Prior(used)
+        });
     }
 
     /// Gives a job on the experiment.
@@ -96,6 +119,18 @@ impl Supervisor {
             }
             (JobPurpose::Refresh, JobOutput::Done(Err(error))) => {
                 self.log(LogLevel::Error, format!("the study could not be read: {error}"), time_ns);
+            }
+            (JobPurpose::Prior, JobOutput::Prior(Ok(messages))) => {
+                for message in messages {
+                    self.log(LogLevel::Info, message, time_ns);
+                }
+            }
+            // A session that ends has interrupted it.
+            (JobPurpose::Prior, JobOutput::Prior(Err(reason))) if !self.closing => {
+                let message = format!(
+                    "the sampler sim has no prior: {reason}. Nothing is proposed; quit, and start again or with another --sampler"
+                );
+                self.log(LogLevel::Error, message, time_ns);
             }
             (JobPurpose::Withdraw | JobPurpose::Close, JobOutput::Done(Err(error))) => {
                 self.log(LogLevel::Error, format!("the study could not be written: {error}"), time_ns);

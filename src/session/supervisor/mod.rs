@@ -309,6 +309,7 @@ impl Supervisor {
     /// Complete once [`Supervisor::is_closed`].
     pub fn close(&mut self, time_ns: u64) {
         self.closing = true;
+        self.experiment.prior_work().interrupt();
         self.give(JobPurpose::Close, time_ns, |experiment| {
             let closed = experiment.close_unreviewed().and_then(|()| experiment.close());
             JobOutput::Done(closed.map_err(RequestRefusal::from))

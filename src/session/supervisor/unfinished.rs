@@ -27,6 +27,8 @@ pub enum JobPurpose {
     /// A trial that was approved and not run.
     Withdraw,
     Refresh,
+    /// The prior of the sampler.
+    Prior,
     Close,
 }
 

@@ -279,6 +279,7 @@ pub fn proposal(trial: u32, revision: u32) -> Proposal {
         parent: None,
         parameters: vec![parameter("f0", 1.25), parameter("Fx", 75.0), parameter("Fz", 250.0)],
         risk: None,
+        expected: None,
         gains: vec![
             parameter("kp", 400.0),
             parameter("kd", 8.0),
@@ -317,6 +318,7 @@ pub fn trial(number: u32, verdict: Option<Verdict>, suggested: Option<Verdict>) 
         verdict,
         note: String::new(),
         risk: None,
+        expected: None,
         gains: Vec::new().into(),
         repeats: Vec::new(),
     }

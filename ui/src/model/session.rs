@@ -4,7 +4,7 @@ use quadfrog::recording::record::{ArmingCheckRecord, SessionInfo, StageRecord};
 use quadfrog::session::objective;
 use quadfrog::trial::{
     ExperimentStage, ObjectiveRule, ParameterInfo, Proposal, ProposalInsight, SearchStatus, SearchedParameter,
-    TrialRecord, Verdict,
+    SimulatorComparison, TrialRecord, Verdict,
 };
 
 use super::log::SessionLog;
@@ -32,6 +32,11 @@ pub struct SessionModel {
 }
 
 impl SessionModel {
+    /// The robot beside the simulated robots of the sampler's prior; none for a sampler without one.
+    pub fn simulator(&self) -> Option<&SimulatorComparison> {
+        self.insight.as_ref()?.simulator.as_ref()
+    }
+
     pub(crate) fn stage_is(&self, stage: ExperimentStage) -> bool {
         self.stage.is_some_and(|info| info.stage == stage)
     }

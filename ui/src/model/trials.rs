@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use quadfrog::optimize::ask::Direction;
 use quadfrog::optimize::repeats::improvements;
-use quadfrog::trial::{ParameterInfo, PointRecord, TrialRecord, Verdict};
+use quadfrog::trial::{ParameterInfo, PointRecord, PredictedTrial, TrialRecord, Verdict};
 
 use crate::column::Column;
 
@@ -18,6 +18,8 @@ pub struct Trials {
     pub ran: BTreeMap<u32, RunTime>,
     /// Points that ran more than once.
     pub points: Vec<PointRecord>,
+    /// The best trial by the sampler's model; none for a sampler without one.
+    pub model_best: Option<PredictedTrial>,
 }
 
 /// Run time of a trial, ns since the engine started.
@@ -39,9 +41,17 @@ impl Trials {
         self.records.values().filter(|trial| trial.verdict == Some(verdict)).count()
     }
 
-    /// The best accepted trial: the highest mean over the repeats of its point, the earlier one of equals.
+    /// The best trial by the sampler's model; without one the accepted trial of the highest mean over the repeats of its point,
+    /// the earlier one of equals.
     pub fn best(&self) -> Option<&TrialRecord> {
-        self.best_so_far().last()
+        let by_model = self.model_best.and_then(|best| self.records.get(&best.trial));
+        by_model.or_else(|| self.best_so_far().last())
+    }
+
+    /// The best trial's number and its value: the mean that the sampler's model predicts, without one the trial's own.
+    pub fn best_value(&self) -> Option<(u32, f64)> {
+        let best = self.best()?;
+        Some((best.trial, self.model_best.map(|best| best.value).or(best.value)?))
     }
 
     /// The accepted trials that were better than all before them, in order.

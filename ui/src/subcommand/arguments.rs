@@ -38,7 +38,8 @@ pub fn task() -> impl TypedValueParser<Value = Task> {
     }))
 }
 
-fn sampler() -> impl TypedValueParser<Value = SamplerKind> {
+/// Parses a sampler.
+pub fn sampler() -> impl TypedValueParser<Value = SamplerKind> {
     one_of(SamplerKind::ALL.iter().map(|&kind| {
         let help = match kind {
             SamplerKind::Tpe => "Tree-structured Parzen estimator, as Optuna",
@@ -49,11 +50,6 @@ fn sampler() -> impl TypedValueParser<Value = SamplerKind> {
         };
         (kind, kind.name(), help)
     }))
-}
-
-/// Returns the number of cores that this process may use.
-pub fn cores() -> usize {
-    std::thread::available_parallelism().map_or(1, std::num::NonZero::get)
 }
 
 /// Returns the robot model of a name, or of a folder with a URDF and a robot.toml.
@@ -80,7 +76,7 @@ pub struct StudyArguments {
     sampler: Option<SamplerKind>,
     /// Parent folder of new studies
     #[arg(long, value_name = "DIR", default_value = "recordings")]
-    output: PathBuf,
+    pub output: PathBuf,
 }
 
 impl StudyArguments {

@@ -12,11 +12,11 @@ use quadfrog::config::Config;
 use quadfrog::realtime::scheduling::{ALLOW_LOCKING, ALLOW_PRIORITY, Scheduling};
 use quadfrog::realtime::{system, thread};
 use quadfrog::recording::disk;
+use quadfrog::session::parallel;
 use quadfrog::trial::Backend;
 use quadfrog_console::connection::TerminalLocation;
 use quadfrog_console::put_line;
 
-use super::arguments;
 use super::failure::Failure;
 
 /// Number of wake-ups measured, at 1 kHz.
@@ -117,7 +117,7 @@ fn memory() -> DoctorItem {
 }
 
 fn cores() -> DoctorItem {
-    let count = arguments::cores();
+    let count = parallel::cores();
     let isolated = system::isolated_cores();
     let found = match isolated.as_slice() {
         [] => format!("{count}, none isolated"),

@@ -1,6 +1,7 @@
 //! The command line: one file per subcommand; without a subcommand the console opens.
 
 mod arguments;
+mod ask_tell;
 mod bench;
 mod console;
 mod doctor;
@@ -9,7 +10,7 @@ mod evaluate;
 mod failure;
 mod guard;
 mod optimize;
-mod parallel;
+mod prior;
 mod recover;
 mod replay;
 mod report;
@@ -39,6 +40,11 @@ pub struct Arguments {
 enum Subcommands {
     /// Run a complete study on the simulator without a screen
     Optimize(optimize::OptimizeArguments),
+    /// Simulate the robots of the sampler sim before a study
+    Prior(prior::PriorArguments),
+    /// Run a sampler for any program: JSON lines on standard input and output
+    #[command(name = "ask-tell")]
+    AskTell(ask_tell::AskTellArguments),
     /// Run one point over several seeds on the simulator: falls, value, attitude
     Evaluate(evaluate::EvaluateArguments),
     /// Run the experiments of the paper on the simulator and compare them with its statements
@@ -68,6 +74,8 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
     match arguments.command {
         None => console::run(&arguments.console),
         Some(Subcommands::Optimize(optimize)) => optimize::run(&optimize),
+        Some(Subcommands::Prior(prior)) => prior::run(&prior),
+        Some(Subcommands::AskTell(ask_tell)) => ask_tell::run(&ask_tell),
         Some(Subcommands::Evaluate(evaluate)) => evaluate::run(&evaluate),
         Some(Subcommands::Reproduce(reproduce)) => reproduce::run(&reproduce),
         Some(Subcommands::Replay(replay)) => replay::run(&replay),

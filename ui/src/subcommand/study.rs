@@ -239,7 +239,7 @@ fn show(selector: &StudySelector) -> Result<(), Failure> {
 
 fn best_line(opened: &Opened, rows: &[TrialRecord]) -> String {
     let units = opened.parameters.iter().map(|parameter| (parameter.name.clone(), parameter.unit.clone())).collect();
-    table::best_line(best_row(opened, rows), opened.unit(), &units)
+    table::best_line(best_row(opened, rows), opened.study.model_best(), opened.unit(), &units)
 }
 
 fn export(selector: &StudySelector, format: Option<TableFormat>, output: Option<&Path>) -> Result<(), Failure> {

@@ -80,7 +80,7 @@ pub(super) fn apply(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
                     }
                     ExperimentStage::Running => {}
                     ExperimentStage::Finished => {
-                        let best = model.session.trials.best().and_then(|best| Some((best.trial, best.value?)));
+                        let best = model.session.trials.best_value();
                         let best = best.map_or("no trial was accepted".to_owned(), |(trial, value)| {
                             format!("the best is trial {trial}, J = {value:.3} {}", model.session.info.unit)
                         });
@@ -119,7 +119,10 @@ pub(super) fn apply(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
         }
         Record::ArmingChecks(list) => model.session.arming_checks = list,
         Record::Search(search) => model.session.search = Some(search),
-        Record::Insight(insight) => model.session.insight = Some(insight),
+        Record::Insight(insight) => {
+            model.session.trials.model_best = insight.predicted_best().copied();
+            model.session.insight = Some(insight);
+        }
         Record::Points(points) => model.session.trials.points = points,
         Record::FaultTicks(ticks) => {
             let text = format!("the last {} ticks before the fault are in the recording", ticks.len());

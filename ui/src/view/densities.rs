@@ -15,6 +15,11 @@ pub fn render(frame: &mut Frame, area: Rect, insight: Option<&ProposalInsight>, 
         Some(insight) if area.width >= 36 => format!("TPE {name} (#{})", insight.trial),
         _ => format!("TPE {name}"),
     };
+    let reason = match insight {
+        Some(insight) if !insight.predicted.is_empty() => "the sampler's model has no densities",
+        Some(_) => "sampled without a model",
+        None => "no proposal yet",
+    };
     let insight = insight.and_then(|insight| insight.parameters.iter().find(|p| p.name == *name));
     let importance = insight.and_then(|insight| insight.importance);
     let aside = importance.map_or(String::new(), |share| format!("importance {:.0} %", share * 100.0));
@@ -24,8 +29,7 @@ pub fn render(frame: &mut Frame, area: Rect, insight: Option<&ProposalInsight>, 
         return;
     }
     let Some(insight) = insight.filter(|insight| insight.at.len() > 1) else {
-        let text = if insight.is_some() { "sampled without a model" } else { "no proposal yet" };
-        let text = truncate(text, usize::from(plot.width));
+        let text = truncate(reason, usize::from(plot.width));
         frame.buffer_mut().set_string(plot.x, plot.y, text, theme.style(Role::Quiet));
         return;
     };

@@ -1,6 +1,6 @@
 //! All details of one trial, for their dialog.
 
-use quadfrog::trial::{Displacement, JumpRow, TrialRecord};
+use quadfrog::trial::{Displacement, ExpectedResult, JumpRow, TrialRecord};
 
 use super::draw::clock;
 use super::points;
@@ -75,6 +75,15 @@ pub fn details(session: &SessionModel, theme: &Theme, trial: &TrialRecord) -> Ve
             _ => String::new(),
         };
         row("risk before", format!("{} of the {} nearest fell{nearest}", risk.falls, risk.neighbours));
+    }
+    if let Some(expected) = &trial.expected {
+        let ExpectedResult { value, deviation, p_stand, .. } = expected;
+        let simulated = match (expected.simulated_least, expected.simulated_most) {
+            (Some(least), Some(most)) => format!("; simulated robots {least:.4} to {most:.4} {unit}"),
+            _ => String::new(),
+        };
+        let text = format!("{value:.4} {unit}, deviation {deviation:.4} {unit}, stands with {:.1} %", 100.0 * p_stand);
+        row("expected", text + &simulated);
     }
     if !trial.note.is_empty() {
         row("note", trial.note.clone());

@@ -1,6 +1,6 @@
 //! Parts that several panels draw, and the formats of numbers and times.
 
-use quadfrog::trial::Verdict;
+use quadfrog::trial::{ExpectedResult, Verdict};
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
@@ -35,6 +35,17 @@ pub fn number(value: f64) -> String {
         size if size >= 10.0 => format!("{value:.2}"),
         _ => format!("{value:.3}"),
     }
+}
+
+/// A value with its standard deviation and its unit: `0.612 ±0.031 m`.
+pub fn with_deviation(theme: &Theme, value: f64, deviation: f64, unit: &str) -> String {
+    format!("{} {}{} {unit}", number(value), theme.plus_minus(), number(deviation))
+}
+
+/// What the sampler's model expects of a trial: `expected 0.612 ±0.031 m, stands with 93 %`.
+pub fn expectation(theme: &Theme, expected: &ExpectedResult, unit: &str) -> String {
+    let value = with_deviation(theme, expected.value, expected.deviation, unit);
+    format!("expected {value}, stands with {:.0} %", 100.0 * expected.p_stand)
 }
 
 /// Hours, minutes and seconds of a time in ns; hours only where there are any.

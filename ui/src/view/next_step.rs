@@ -1,6 +1,7 @@
 //! The last line: the operator's next possible step.
 
 use quadfrog::robot::joint_name;
+use quadfrog::session::prior::PriorProgress;
 use quadfrog::telemetry::Mode;
 use quadfrog::trial::{ExperimentStage, Verdict};
 use ratatui::Frame;
@@ -59,8 +60,15 @@ fn live(model: &Model) -> NextStep {
         Mode::Settle => step("Landed; waiting until the robot is quiet.", model, &[]),
         Mode::SitDown => step("Sitting down.", model, &[]),
         mode if model.storage.is_some() && !matches!(mode, Mode::Damped | Mode::Fault) => {
-            let wait =
-                model.storage.map(|wait| format!("Waiting for {}, {:.0} s", wait.place(), wait.waited.as_secs_f64()));
+            let wait = model.storage.map(|wait| {
+                let waited_s = wait.waited.as_secs_f64();
+                match wait.prior {
+                    Some(PriorProgress { done, total }) => {
+                        format!("Simulating the prior, {done} of {total} jumps, {waited_s:.0} s")
+                    }
+                    None => format!("Waiting for {}, {waited_s:.0} s", wait.place()),
+                }
+            });
             let lead = format!("{}: the study answers later.", wait.unwrap_or_default());
             step(lead, model, &[sit_down, quit])
         }

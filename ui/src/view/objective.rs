@@ -1,6 +1,6 @@
 //! The objective over the trials, with the best so far.
 
-use quadfrog::trial::{TrialRecord, Verdict};
+use quadfrog::trial::{PredictedTrial, TrialRecord, Verdict};
 use ratatui::Frame;
 use ratatui::layout::Rect;
 
@@ -13,8 +13,11 @@ const SCALE: u16 = 6;
 
 pub fn render(frame: &mut Frame, area: Rect, session: &SessionModel, theme: &Theme) {
     let best = session.trials.best();
-    let aside = match best.and_then(|trial| Some((trial.trial, trial.value?))) {
-        Some((trial, value)) => format!("best {} {} #{trial}", number(value), session.info.unit),
+    let aside = match session.trials.best_value() {
+        Some((trial, value)) => {
+            let model = if session.trials.model_best.is_some() { ", by the model" } else { "" };
+            format!("best {} {} #{trial}{model}", number(value), session.info.unit)
+        }
         None => "no value yet".to_owned(),
     };
     let plot = heading(frame, area, theme, "J over trials", &aside);
@@ -45,6 +48,14 @@ pub fn render(frame: &mut Frame, area: Rect, session: &SessionModel, theme: &The
         let (from, to) = (column(trial.trial), column(until.max(1) - 1).max(column(trial.trial)));
         let line = theme.line().repeat(usize::from(to - from) + 1);
         buffer.set_string(from, row(value), line, theme.style(Role::Quiet));
+    }
+    // What the sampler's model says of each point: its mean and one standard deviation to both sides.
+    let predicted = session.insight.iter().flat_map(|insight| &insight.predicted);
+    for PredictedTrial { trial, value, deviation } in predicted {
+        let (top, low) = (row(value + deviation), row(value - deviation));
+        for y in top..=low {
+            buffer.set_string(column(*trial), y, theme.bar(), theme.style(Role::Quiet));
+        }
     }
     for trial in session.trials.records.values() {
         let (symbol, role) = sign(trial.verdict);

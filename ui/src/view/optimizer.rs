@@ -1,11 +1,12 @@
 //! View 3, Optimizer: objective over trials and parameters, TPE's densities, landing places.
 
-use quadfrog::trial::Verdict;
+use quadfrog::trial::{SimulatorComparison, Verdict};
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
+use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
 
-use super::draw::{cell_at, heading, number, sign};
+use super::draw::{cell_at, heading, number, scale, sign, span, with_deviation};
 use super::{densities, objective, points};
 use crate::model::session::SessionModel;
 use crate::theme::{Role, Theme};
@@ -37,8 +38,39 @@ pub fn render(frame: &mut Frame, area: Rect, session: &SessionModel, theme: &The
     let (above, below) = (columns(scatters), columns(why));
     for (index, info) in parameters.iter().enumerate() {
         render_scatter(frame, above[index], session, theme, index);
-        densities::render(frame, below[index], session.insight.as_ref(), &info.name, theme);
+        if session.simulator().is_none() {
+            densities::render(frame, below[index], session.insight.as_ref(), &info.name, theme);
+        }
     }
+    if let Some(simulator) = session.simulator() {
+        render_simulator(frame, why, simulator, &session.info.unit, theme);
+    }
+}
+
+/// The robot beside the simulated robots of the prior.
+fn render_simulator(frame: &mut Frame, area: Rect, simulator: &SimulatorComparison, unit: &str, theme: &Theme) {
+    let body = heading(frame, area, theme, "Robot beside the simulated robots", "mean and standard deviation");
+    let SimulatorComparison { ratio, ratio_deviation, bias, bias_deviation, worlds, contradicted } = simulator;
+    let mut lines = vec![
+        Line::from(format!(
+            " the robot jumps {} of what is simulated",
+            with_deviation(theme, *ratio, *ratio_deviation, "times")
+        )),
+        Line::from(format!(" and adds {}", with_deviation(theme, *bias, *bias_deviation, unit))),
+        Line::from(span(theme, Role::Quiet, " most like")),
+    ];
+    if *contradicted {
+        let text = " the robot's values contradict the simulated ones: the sampler does not use them";
+        lines.insert(0, Line::from(span(theme, Role::Warning, text)));
+    }
+    lines.extend(worlds.iter().map(|world| {
+        let share = scale(theme, world.weight, 0.0, 1.0, 20);
+        Line::from(vec![
+            Span::raw(format!(" {:<12}{:>4.0} % ", world.name, 100.0 * world.weight)),
+            span(theme, Role::Quiet, share),
+        ])
+    }));
+    frame.render_widget(Paragraph::new(lines), body);
 }
 
 /// Every judged trial's value over one parameter; the proposal as a line.

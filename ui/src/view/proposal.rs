@@ -1,13 +1,16 @@
 //! The trial panel: the proposal before the jump, the parameters while it runs, the measured values after it, and the
 //! best parameters when the study is finished.
 
-use quadfrog::trial::{ExperimentStage, FallRisk, Proposal, ProposalSource, ProposedParameter, TrialRecord, Verdict};
+use quadfrog::trial::{
+    ExpectedResult, ExperimentStage, FallRisk, PredictedTrial, Proposal, ProposalSource, ProposedParameter,
+    TrialRecord, Verdict,
+};
 use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Paragraph, Wrap};
 
-use super::draw::{heading, number, scale, span};
+use super::draw::{expectation, heading, number, scale, span, with_deviation};
 use super::points;
 use crate::action::Action;
 use crate::model::Model;
@@ -24,7 +27,15 @@ pub fn rows(session: &SessionModel) -> u16 {
         true => session.trials.points.len().min(4) as u16 + u16::from(confirming),
         false => 0,
     };
-    parameters + 4 + gains + repeats
+    let expected = session.under_review().map_or_else(
+        || session.open_proposal().and_then(|proposal| proposal.expected),
+        |trial| trial.expected.map(|expected| ExpectedResult { value: expected.value, ..ExpectedResult::default() }),
+    );
+    let expected = expected.map_or(0, |expected| {
+        1 + u16::from(expected.simulated_least.is_some()) + 2 * u16::from(expected.advises_to_stop)
+    });
+    let model_best = u16::from(session.stage_is(ExperimentStage::Finished) && session.trials.model_best.is_some());
+    parameters + 4 + gains + repeats + expected + model_best
 }
 
 pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
@@ -60,6 +71,7 @@ fn content(model: &Model, width: usize) -> (String, Vec<Line<'static>>) {
                 proposal.parameters.iter().map(|p| parameter(session, theme, p, width)).collect();
             let changed = proposal.gains.iter().filter(|gain| gain.value != gain.proposed);
             lines.extend(changed.map(|gain| parameter(session, theme, gain, width)));
+            lines.extend(expected(session, theme, proposal.expected));
             lines.push(risk(theme, proposal.risk));
             if let Some(share) = session.search.as_ref().and_then(|search| search.hop_share) {
                 let text = format!(" hop envelope: {:.0} % of force", 100.0 * share);
@@ -94,6 +106,23 @@ fn parameter(session: &SessionModel, theme: &Theme, p: &ProposedParameter, width
     Line::from(spans)
 }
 
+/// What the sampler's model expects of the trial, and its advice to end the search.
+fn expected(session: &SessionModel, theme: &Theme, expected: Option<ExpectedResult>) -> Vec<Line<'static>> {
+    let Some(expected) = expected else { return Vec::new() };
+    let role = if expected.p_stand < 0.5 { Role::Warning } else { Role::Quiet };
+    let mut lines =
+        vec![Line::from(span(theme, role, format!(" {}", expectation(theme, &expected, &session.info.unit))))];
+    if let (Some(least), Some(most)) = (expected.simulated_least, expected.simulated_most) {
+        let text = format!(" simulated robots {} to {} {}", number(least), number(most), session.info.unit);
+        lines.push(Line::from(span(theme, Role::Quiet, text)));
+    }
+    if expected.advises_to_stop {
+        let text = " no point is worth its risk of a fall: end the search and confirm the best".to_owned();
+        lines.push(Line::from(span(theme, Role::Warning, text)));
+    }
+    lines
+}
+
 fn risk(theme: &Theme, risk: Option<FallRisk>) -> Line<'static> {
     let Some(risk) = risk.filter(|risk| risk.neighbours > 0) else {
         return Line::from(span(theme, Role::Quiet, " no judged trial near it yet"));
@@ -121,6 +150,9 @@ fn review(session: &SessionModel, theme: &Theme, trial: &TrialRecord) -> Vec<Lin
         }
         None => lines.push(Line::from(label(" nothing was measured"))),
     }
+    if let Some(expected) = &trial.expected {
+        lines.push(Line::from(label(&format!(" {}", expectation(theme, expected, &session.info.unit)))));
+    }
     if let Some(m) = &trial.measured {
         let pair = |a, x, b, y| Line::from(vec![label(a), Span::raw(x), label(b), Span::raw(y)]);
         lines.push(pair(" dx   ", format!("{:+.3} m", m.dx_m), "  dy  ", format!("{:+.3} m", m.dy_m)));
@@ -146,6 +178,10 @@ fn finished(model: &Model, width: usize) -> Vec<Line<'static>> {
         span(theme, Role::Good, format!("{value} {}", session.info.unit)),
         span(theme, Role::Quiet, format!(" (#{})", best.trial)),
     ])];
+    if let Some(PredictedTrial { value, deviation, .. }) = session.trials.model_best {
+        let text = format!(" its mean by the model {}", with_deviation(theme, value, deviation, &session.info.unit));
+        lines.push(Line::from(span(theme, Role::Quiet, text)));
+    }
     for (name, value) in &best.parameters {
         let p = ProposedParameter { name: name.clone(), value: *value, proposed: *value };
         lines.push(parameter(session, theme, &p, width));

@@ -72,11 +72,11 @@ fn identity(model: &Model, width: u16, room: usize) -> Line<'static> {
             false => format!("   trial #{}   {finished} of {budget} judged", info.trial),
         }));
     }
-    if let Some((best, value)) = model.session.trials.best().and_then(|best| Some((best, best.value?))) {
+    if let Some((best, value)) = model.session.trials.best_value() {
         let before = spans.len();
         spans.push(Span::raw(if narrow { "  best " } else { "   best " }));
         spans.push(span(theme, Role::Good, format!("{} {}", number(value), session.unit)));
-        spans.push(span(theme, Role::Quiet, format!(" (#{})", best.trial)));
+        spans.push(span(theme, Role::Quiet, format!(" (#{best})")));
         for kept in [before + 2, before] {
             if spans.iter().map(Span::width).sum::<usize>() > room {
                 spans.truncate(kept);

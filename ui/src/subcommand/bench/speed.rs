@@ -10,8 +10,8 @@ use quadfrog::sim::bench::{BenchScene, BlockTimes, SimulatorBench};
 use quadfrog_console::put_line;
 
 use super::machine;
-use crate::subcommand::arguments::cores;
 use crate::subcommand::failure::Failure;
+use quadfrog::session::parallel::cores;
 
 #[derive(Debug, Args)]
 pub struct SpeedArguments {

@@ -23,7 +23,7 @@ use serde_json::json;
 
 use super::arguments::{self, Seeds, load_model, parse_seeds};
 use super::failure::Failure;
-use super::parallel::in_parallel;
+use quadfrog::session::parallel::{cores, in_parallel};
 use variant::{Variant, on_off};
 
 #[derive(Debug, Args)]
@@ -114,7 +114,7 @@ pub fn run(arguments: &EvaluateArguments) -> Result<(), Failure> {
     }
     let progress = Progress::new(runs.len());
     // A simulator of each variant for each thread, made when the thread needs it.
-    let none = || Ok(simulators.iter().map(|_| None).collect::<Vec<_>>());
+    let none = || Ok::<_, Failure>(simulators.iter().map(|_| None).collect::<Vec<_>>());
     let evaluate_run = |rollouts: &mut Vec<Option<Rollout<Simulator>>>, run: &PlannedRun| {
         let rollout = match &mut rollouts[run.simulator] {
             Some(rollout) => rollout,
@@ -127,7 +127,7 @@ pub fn run(arguments: &EvaluateArguments) -> Result<(), Failure> {
         progress.count(&result);
         Ok(result)
     };
-    let jobs = arguments.jobs.map_or_else(arguments::cores, usize::from);
+    let jobs = arguments.jobs.map_or_else(cores, usize::from);
     let results = in_parallel(jobs, &runs, none, evaluate_run)?;
     drop(progress);
     if arguments.json {

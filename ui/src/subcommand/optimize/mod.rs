@@ -2,21 +2,24 @@
 
 mod printer;
 
-use std::collections::HashSet;
+use std::collections::hash_map::Entry;
+use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use anyhow::anyhow;
 use clap::{Args, ValueEnum};
 use quadfrog::config::Config;
-use quadfrog::engine::{self, EngineError, Options, StoredStudy};
+use quadfrog::engine::{self, EngineError, Options, PRIOR_FILE, ReadyPrior, StoredStudy};
+use quadfrog::optimize::ask::SamplerKind;
 use quadfrog::optimize::journal::Durability;
 use quadfrog::optimize::study::Storage;
 use quadfrog::recording::record::{Record, Stamped};
 use quadfrog::recording::writer::Writer;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::session::automatic::{self, JudgedTrial};
+use quadfrog::session::parallel;
 use quadfrog::session::rollout::Rollout;
 use quadfrog::sim::Simulator;
 use quadfrog::telemetry::Tick;
@@ -26,6 +29,7 @@ use printer::Printer;
 
 use super::arguments::{self, Seeds, StudyArguments, parse_seeds};
 use super::failure::Failure;
+use super::prior;
 use super::selection::{SelectedStudy, parse_storage, study_to_continue, study_to_join};
 
 /// The trials whose ticks are recorded.
@@ -44,8 +48,8 @@ pub struct OptimizeArguments {
     /// Task of the study; several with commas, a study each [default: forward]
     #[arg(long, value_name = "TASK", value_delimiter = ',', value_parser = arguments::task())]
     task: Vec<Task>,
-    /// Seed of the study; several as 0-4 or 0,3,7, a study each [default: from optimize.toml]
-    #[arg(long, value_name = "N", value_parser = parse_seeds)]
+    /// Seed of the study; several as 0-4 or 0,3,7, a study each, on all cores [default: from optimize.toml]
+    #[arg(long, value_name = "N", visible_alias = "seeds", value_parser = parse_seeds)]
     seed: Option<Seeds>,
     #[command(flatten)]
     study: StudyArguments,
@@ -87,16 +91,19 @@ pub fn run(arguments: &OptimizeArguments) -> Result<(), Failure> {
         Some(storage) => workers(arguments, storage, &robot)?,
         None => select(arguments, &config, &robot)?,
     };
+    let priors = priors(arguments, existing, &config, &robot, &studies)?;
     let budgets = studies.iter().map(|study| arguments.study.trials.or(study.budget).unwrap_or(config.optimize.trials));
     let printer = Printer::new(arguments.json, joined.is_some(), &config, &budgets.collect::<Vec<_>>());
     let failures = Mutex::new(Vec::new());
     let next = AtomicUsize::new(0);
-    let cores = if joined.is_some() { 1 } else { arguments::cores() };
+    let cores = if joined.is_some() { 1 } else { parallel::cores() };
     let jobs = arguments.jobs.map_or(cores, usize::from);
     let fail = |failure| failures.lock().unwrap_or_else(PoisonError::into_inner).push(failure);
     let work = || {
         while let Some(study) = studies.get(next.fetch_add(1, Ordering::Relaxed)) {
-            if let Err(failure) = run_one(arguments, joined.as_ref(), &config, &robot, study, &printer) {
+            if let Err(failure) =
+                run_one(arguments, joined.as_ref(), &config, &robot, study, priors.get(&study.task), &printer)
+            {
                 fail(failure);
             }
         }
@@ -163,12 +170,36 @@ fn select(
     Ok(pairs.into_iter().map(new).collect())
 }
 
+/// Returns the prior of each task of the studies, if the sampler is `sim`. Made before the first study, once, on all cores;
+/// `existing` is the folder of a study that is continued or joined.
+fn priors(
+    arguments: &OptimizeArguments,
+    existing: Option<&Path>,
+    config: &Config,
+    robot: &RobotDescription,
+    studies: &[SelectedStudy],
+) -> Result<HashMap<Task, ReadyPrior>, Failure> {
+    let mut priors = HashMap::new();
+    if config.optimize.sampler.kind != SamplerKind::Sim {
+        return Ok(priors);
+    }
+    let own: Vec<PathBuf> = existing.map(|folder| folder.join(PRIOR_FILE)).into_iter().collect();
+    let output = arguments.resume.as_deref().and_then(Path::parent).unwrap_or(&arguments.study.output);
+    for study in studies {
+        if let Entry::Vacant(empty) = priors.entry(study.task) {
+            empty.insert(prior::obtain(config, robot, study.task, &own, output)?);
+        }
+    }
+    Ok(priors)
+}
+
 fn run_one(
     arguments: &OptimizeArguments,
     join: Option<&Storage>,
     config: &Config,
     robot: &RobotDescription,
     study: &SelectedStudy,
+    prior: Option<&ReadyPrior>,
     printer: &Printer,
 ) -> Result<(), Failure> {
     let settings = config.settings(robot, study.task, Backend::Simulator)?;
@@ -181,9 +212,13 @@ fn run_one(
         folder: Some(study.folder.clone()),
         approve: Approval::Auto,
         join: join.cloned(),
+        prior: prior.map(|prior| Arc::clone(&prior.model)),
         ..Options::new(config.clone(), robot.clone(), Backend::Simulator, study.task)
     };
     let prepared = engine::prepare_folder(&options)?;
+    if let Some(prior) = prior {
+        prior.keep(&[study.folder.join(PRIOR_FILE)])?;
+    }
     let recording = prepared.recording.clone().filter(|_| arguments.record != RecordChoice::None);
     // Workers of a shared study have their own folders: the file name alone is ambiguous.
     let name = |path: &PathBuf| {
@@ -234,7 +269,7 @@ fn run_one(
     if let Some(error) = failed {
         return Err(error.into());
     }
-    printer.finished(study, &experiment.rows().cloned().collect::<Vec<_>>(), experiment.best(), &options);
+    printer.finished(study, &experiment, &options);
     Ok(())
 }
 

@@ -8,6 +8,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use quadfrog::config::Config;
 use quadfrog::engine::Options;
 use quadfrog::report::table;
+use quadfrog::session::experiment::Experiment;
 use quadfrog::trial::{MeasuredJump, RepeatRecord, Task, TrialRecord, Verdict};
 use serde::{Serialize, Serializer};
 
@@ -99,7 +100,9 @@ impl Printer {
         }
     }
 
-    pub fn finished(&self, study: &SelectedStudy, rows: &[TrialRecord], best: Option<&TrialRecord>, options: &Options) {
+    pub fn finished(&self, study: &SelectedStudy, experiment: &Experiment, options: &Options) {
+        let rows: Vec<TrialRecord> = experiment.rows().cloned().collect();
+        let best = experiment.best();
         let _output = self.output.lock();
         let falls = rows.iter().filter(|row| row.verdict == Some(Verdict::Fall)).count();
         let value = best.and_then(|best| best.value).unwrap_or(0.0);
@@ -109,8 +112,8 @@ impl Printer {
             text += &format!("{} seed {}\n", study.task.name(), study.seed);
         }
         let (parameters, unit) = (options.config.parameters(study.task), self.unit(study.task));
-        text += &table::table(rows, best.map(|best| best.trial), &parameters, unit);
-        text += &table::best_line(best, unit, &self.units);
+        text += &table::table(&rows, best.map(|best| best.trial), &parameters, unit);
+        text += &table::best_line(best, experiment.model_best(), unit, &self.units);
         let folder = study.folder.display();
         text += &match &options.join {
             Some(storage) => format!("The study is in {storage}; the files of this worker are in {folder}\n"),

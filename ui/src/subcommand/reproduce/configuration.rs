@@ -47,8 +47,10 @@ const EXAMPLES: [ExampleFiles; 7] =
 /// Objective and controller from the estimator, as on a robot.
 const ESTIMATE: ExampleFiles = &[("optimize.toml", "objective = \"estimate\"\n")];
 /// The paper's controller without added terms.
-const PAPER_CONTROLLER: ExampleFiles =
-    &[("control.toml", "[tasks.forward]\nattitude_rate_gain = 0.0\nfoot_placement_s = 0.0\n")];
+const PAPER_CONTROLLER: ExampleFiles = &[(
+    "control.toml",
+    "[tasks.forward]\nattitude_rate_gain = 0.0\nfoot_placement_s = 0.0\ncutoff = \"none\"\ncutoff_lost_s = 0.02\nlanding_spread_m = 0.0\n",
+)];
 /// A flat floor.
 const FLAT: ExampleFiles = &[("simulator.toml", "[terrain]\nkind = \"flat\"\n")];
 /// Five jumps in a row to the left.
@@ -140,6 +142,9 @@ mod tests {
     use std::collections::BTreeSet;
     use std::path::Path;
 
+    use quadfrog::control::settings::TaskControl;
+    use quadfrog::trial::Task;
+
     use super::*;
 
     #[test]
@@ -148,6 +153,17 @@ mod tests {
             let loaded = configuration.load();
             assert!(loaded.is_ok(), "{}: {}", configuration.name(), loaded.unwrap_err());
         }
+    }
+
+    /// Regression: the cut-off of the example stayed on beside the words "the paper's controller".
+    #[test]
+    fn the_papers_controller_over_blocks_has_no_added_term() {
+        let task = |configuration: ExperimentConfiguration| *configuration.load().unwrap().task(Task::Forward);
+        let example = task(ExperimentConfiguration::RoughTerrain);
+        let TaskControl { stance_m, jumps, f1_hz, .. } = example;
+        let paper = TaskControl { stance_m, jumps, f1_hz, ..task(ExperimentConfiguration::Ideal) };
+        assert_eq!(task(ExperimentConfiguration::RoughTerrainPaper), paper);
+        assert_ne!(example, paper);
     }
 
     #[test]

@@ -13,7 +13,7 @@ use super::plan::{F1_HZ, PaperExperiment, RunPoint, THREE_TASKS};
 use super::results::{ReproduceResults, RunResult, Sample, StudyResult, TrialTrace};
 
 /// Pairs of points of a line, at most: a printed line is not wider.
-const LINE_POINTS: usize = 120;
+const LINE_POINTS: usize = 90;
 
 /// Returns the figures of a complete experiment.
 pub fn figures(experiment: PaperExperiment, results: &ReproduceResults) -> Vec<Figure> {

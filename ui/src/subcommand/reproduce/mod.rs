@@ -15,11 +15,11 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use quadfrog::report::page::Page;
 use quadfrog::report::{html, svg, text};
+use quadfrog::session::parallel::cores;
 use quadfrog_console::{notice, output};
 
 use self::plan::{ExperimentSize, PaperExperiment};
 use self::results::ReproduceResults;
-use super::arguments;
 use super::failure::Failure;
 
 /// Name of the results in the output folder.
@@ -74,7 +74,7 @@ pub fn run(arguments: &ReproduceArguments) -> Result<(), Failure> {
             let experiments = chosen(&arguments.only);
             let size = ExperimentSize::new(arguments.seed, arguments.quick);
             let size = arguments.trials.map_or(size, |trials| size.at_most(trials));
-            let threads = arguments.jobs.map_or_else(arguments::cores, usize::from);
+            let threads = arguments.jobs.map_or_else(cores, usize::from);
             schedule::run_experiments(&experiments, size, arguments.quick, threads, &file)?
         }
     };

@@ -9,6 +9,7 @@ use std::time::Instant;
 use anyhow::anyhow;
 use indicatif::{ProgressBar, ProgressStyle};
 use quadfrog::robot::description::RobotDescription;
+use quadfrog::session::parallel::in_parallel;
 use quadfrog_console::notice;
 use tokio::signal::unix::{SignalKind, signal};
 
@@ -16,7 +17,6 @@ use super::plan::{ExperimentSize, PaperExperiment, ReproduceJob, all_jobs};
 use super::results::ReproduceResults;
 use super::work::{JobResult, Workplace};
 use crate::subcommand::failure::Failure;
-use crate::subcommand::parallel::in_parallel;
 
 /// Share of the work after which the rate is known well enough for a time left.
 const ESTIMATE_FROM: f64 = 0.05;
@@ -56,7 +56,7 @@ pub fn run_experiments(
                 JobResult::Study(study) => kept.lock().studies.push(study),
                 JobResult::Run(run) => kept.lock().runs.push(*run),
             }
-            Ok(())
+            Ok::<_, Failure>(())
         };
         in_parallel(threads, &stage, || Ok(()), run)?;
     }

@@ -3,21 +3,24 @@
 use std::panic::resume_unwind;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use super::failure::Failure;
+/// Returns the number of cores that this process may use.
+pub fn cores() -> usize {
+    std::thread::available_parallelism().map_or(1, std::num::NonZero::get)
+}
 
 /// Runs `run` on every item, on at most `threads` threads with a state of `state` each. The order of the results is that of
 /// `items`; items are begun in that order.
 ///
 /// # Errors
-/// The failure of a state or an item; the other threads finish the items that they have begun and begin no others.
-pub fn in_parallel<I: Sync, S, R: Send>(
+/// The error of a state or an item; the other threads finish the items that they have begun and begin no others.
+pub fn in_parallel<I: Sync, S, R: Send, E: Send>(
     threads: usize,
     items: &[I],
-    state: impl Fn() -> Result<S, Failure> + Sync,
-    run: impl Fn(&mut S, &I) -> Result<R, Failure> + Sync,
-) -> Result<Vec<R>, Failure> {
+    state: impl Fn() -> Result<S, E> + Sync,
+    run: impl Fn(&mut S, &I) -> Result<R, E> + Sync,
+) -> Result<Vec<R>, E> {
     let next = AtomicUsize::new(0);
-    let work = || -> Result<Vec<(usize, R)>, Failure> {
+    let work = || -> Result<Vec<(usize, R)>, E> {
         let mut state = state()?;
         let mut results = Vec::new();
         loop {
@@ -27,7 +30,7 @@ pub fn in_parallel<I: Sync, S, R: Send>(
             results.push((index, result));
         }
     };
-    let parts: Result<Vec<_>, Failure> = std::thread::scope(|scope| {
+    let parts: Result<Vec<_>, E> = std::thread::scope(|scope| {
         let workers: Vec<_> = (0..threads.clamp(1, items.len().max(1))).map(|_| scope.spawn(work)).collect();
         workers.into_iter().map(|worker| worker.join().unwrap_or_else(|panic| resume_unwind(panic))).collect()
     });

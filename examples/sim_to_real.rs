@@ -1,0 +1,390 @@
+//! Prints the table "From simulated robots to others" of `src/optimize/README.md`: studies of the samplers on robots that are no
+//! members of the prior's ensemble.
+//!
+//! `cargo run --release --example sim_to_real [KEY=VALUE...]`, keys `tasks`, `samplers` (lists with commas), `robots`, `studies`,
+//! `trials`, `seed`, `jobs`. Twelve robots: nine drawn from the ranges of `config/prior.toml` and three outside of them.
+//!
+//! A robot's value after n jumps is that of the trial that the study then calls its best, repeated [`REPEATS`] times with other
+//! noise, falls as 0.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use quadfrog::config::Config;
+use quadfrog::engine::prior_plan;
+use quadfrog::optimize::ask::{Direction, SamplerConfig, SamplerKind};
+use quadfrog::optimize::journal::Durability;
+use quadfrog::optimize::prior::{Prior, PriorModel};
+use quadfrog::optimize::repeats::student_cdf;
+use quadfrog::optimize::space::{Range, Space};
+use quadfrog::optimize::study::{Outcome, Storage, Study, StudyOptions};
+use quadfrog::optimize::trial::{FALL, VERDICT};
+use quadfrog::robot::description::RobotDescription;
+use quadfrog::session::evaluation::evaluate;
+use quadfrog::session::parallel::{cores, in_parallel};
+use quadfrog::session::prior::{PriorPlan, draw_robot, simulate};
+use quadfrog::session::rollout::Rollout;
+use quadfrog::sim::ensemble::RobotProperties;
+use quadfrog::sim::{SimConfig, Simulator};
+use quadfrog::telemetry::TrialSpec;
+use quadfrog::trial::{JumpParameters, ParameterValues, Task};
+
+/// Repetitions of the best trial.
+const REPEATS: u64 = 4;
+/// Numbers of jumps after which a study is judged.
+const AFTER: [usize; 5] = [1, 3, 5, 10, 20];
+/// Trials of the study whose best is taken for the optimum.
+const LONG: usize = 100;
+/// Share of the optimum that counts as reached.
+const REACHED: f64 = 0.95;
+
+/// What proposes the jumps of a study.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Proposer {
+    /// The sampler about the ensemble.
+    Sim,
+    /// The same with the ensemble's results at the mirrored points: a wrong simulator.
+    SimMirrored,
+    Gp,
+    Tpe,
+    /// First the best point of the configured simulator, then `gp`.
+    IdealFirst,
+}
+
+impl Proposer {
+    const ALL: [(&'static str, Proposer); 5] = [
+        ("sim", Proposer::Sim),
+        ("sim, mirrored simulator", Proposer::SimMirrored),
+        ("gp", Proposer::Gp),
+        ("tpe", Proposer::Tpe),
+        ("ideal best, then gp", Proposer::IdealFirst),
+    ];
+
+    fn name(self) -> &'static str {
+        Proposer::ALL.iter().find(|(_, proposer)| *proposer == self).map_or("", |(name, _)| name)
+    }
+
+    fn kind(self) -> SamplerKind {
+        match self {
+            Proposer::Sim | Proposer::SimMirrored => SamplerKind::Sim,
+            Proposer::Gp | Proposer::IdealFirst => SamplerKind::Gp,
+            Proposer::Tpe => SamplerKind::Tpe,
+        }
+    }
+}
+
+/// A task with what is known of it before the first jump.
+struct KnownTask {
+    name: String,
+    plan: PriorPlan,
+    space: Space,
+    prior: Arc<PriorModel>,
+    mirrored: Arc<PriorModel>,
+    ideal_best: Vec<(String, f64)>,
+}
+
+/// A robot that jumps.
+struct Target {
+    name: String,
+    properties: RobotProperties,
+}
+
+/// A study of one proposer on one robot.
+#[derive(Clone, Copy)]
+struct Job {
+    target: usize,
+    proposer: Option<Proposer>,
+    study: u32,
+}
+
+/// Repeated best values and falls so far after [`AFTER`] jumps.
+#[derive(Debug, Clone, Copy)]
+struct StudyResult {
+    best: [f64; AFTER.len()],
+    falls: [f64; AFTER.len()],
+}
+
+/// Jumps of one robot, with noise of its own for each.
+struct Jumper<'a> {
+    task: &'a KnownTask,
+    rollout: Rollout<Simulator>,
+}
+
+impl<'a> Jumper<'a> {
+    fn new(task: &'a KnownTask, (robot, simulator): (RobotDescription, SimConfig)) -> Jumper<'a> {
+        let simulator = Simulator::new(&robot, &simulator).expect("the robot can be simulated");
+        Jumper { task, rollout: Rollout::new(simulator, &task.plan.settings) }
+    }
+
+    /// The objective of a jump that stands; none for a fall.
+    fn jump(&mut self, point: &[(String, f64)], seed: u64) -> Option<f64> {
+        let control = &self.task.plan.control;
+        let values: ParameterValues = point.iter().cloned().collect();
+        let spec = control.trial(self.task.plan.task, JumpParameters::from_values(&values, control.f1_hz));
+        let run = evaluate(&mut self.rollout, &TrialSpec { gains: control.gains().with(&values), seed, ..spec });
+        run.stood().then_some(run.value)
+    }
+
+    /// Mean of [`REPEATS`] jumps at a point, falls as 0.
+    fn repeated(&mut self, point: &[(String, f64)], seed: u64) -> f64 {
+        (0..REPEATS).map(|i| self.jump(point, seed + i).unwrap_or(0.0)).sum::<f64>() / REPEATS as f64
+    }
+}
+
+fn new_study(task: &KnownTask, proposer: Proposer, seed: u32) -> Study {
+    let sampler = SamplerConfig { kind: proposer.kind(), seed, ..SamplerConfig::default() };
+    let options = StudyOptions {
+        name: proposer.name().to_owned(),
+        direction: Direction::Maximize,
+        metric: "J".to_owned(),
+        space: task.space.clone(),
+        sampler,
+        attributes: Vec::new(),
+        durability: Durability::Buffered,
+    };
+    let mut study = Study::open(Storage::Memory, options).expect("opens in memory");
+    match proposer {
+        Proposer::Sim => study.use_prior(task.prior.clone()),
+        Proposer::SimMirrored => study.use_prior(task.mirrored.clone()),
+        Proposer::IdealFirst => drop(study.enqueue(&task.ideal_best, &[]).expect("within the bounds")),
+        Proposer::Gp | Proposer::Tpe => {}
+    }
+    study
+}
+
+/// Runs one more jump; returns whether the robot stood.
+fn one_jump(study: &mut Study, jumper: &mut Jumper<'_>, seed: u64) -> bool {
+    let draft = study.draft();
+    let point: Vec<(String, f64)> = draft.parameters.iter().map(|p| (p.name.clone(), p.value)).collect();
+    let number = study.begin(&draft, &[], &[]).expect("begins");
+    let value = jumper.jump(&point, seed);
+    if value.is_none() {
+        study.annotate(number, &[(VERDICT.into(), FALL.into())]).expect("running");
+    }
+    study.tell(number, Outcome::Complete(value.unwrap_or(0.0))).expect("reported");
+    value.is_some()
+}
+
+/// Number of the trial that the study calls its best.
+fn best_of(study: &Study) -> Option<u32> {
+    study.predict().best.map(|best| best.trial).or_else(|| study.best().map(|best| best.number))
+}
+
+fn run(task: &KnownTask, targets: &[Target], trials: usize, seed: u64, job: &Job) -> StudyResult {
+    let target = &targets[job.target];
+    let mut jumper = Jumper::new(task, target.properties.apply(&task.plan.robot, &task.plan.simulator));
+    let proposer = job.proposer.unwrap_or(Proposer::Gp);
+    let mut study = new_study(task, proposer, job.study);
+    let mut result = StudyResult { best: [0.0; AFTER.len()], falls: [0.0; AFTER.len()] };
+    // The same noise for all proposers.
+    let noise = seed * 1_000_000 + u64::from(job.study) * 10_000 + job.target as u64 * 100_000_000;
+    let (mut falls, mut known): (f64, BTreeMap<u32, f64>) = (0.0, BTreeMap::new());
+    let trials = if job.proposer.is_none() { LONG } else { trials };
+    for trial in 1..=trials {
+        falls += f64::from(u8::from(!one_jump(&mut study, &mut jumper, noise + trial as u64)));
+        let last = job.proposer.is_none() && trial == trials;
+        let after = AFTER.iter().position(|after| *after == trial).filter(|_| job.proposer.is_some());
+        let Some(index) = after.or(last.then_some(AFTER.len() - 1)) else { continue };
+        let best = best_of(&study).map(|number| {
+            let repeated = || jumper.repeated(&study.trials()[number as usize].parameters, noise + 1_000);
+            *known.entry(number).or_insert_with(repeated)
+        });
+        result.best[index] = best.unwrap_or(0.0);
+        result.falls[index] = falls;
+    }
+    result
+}
+
+/// The robots: `count` - 3 from the ranges of the ensemble, the others outside of them.
+fn targets(plan: &PriorPlan, count: usize, seed: u32) -> Vec<Target> {
+    let drawn = |index: usize| draw_robot(&plan.ensemble.ranges, seed + index as u32);
+    let target = |index: usize| {
+        let (name, properties) = match count - index {
+            1 => ("outside: heavy", RobotProperties { mass: 1.3, inertia: 1.4, ..drawn(index) }),
+            2 => ("outside: slippery and late", RobotProperties { friction: 0.4, delay_ms: 7, ..drawn(index) }),
+            3 => (
+                "outside: weak and sticky",
+                RobotProperties {
+                    torque_limit: 0.65,
+                    full_torque_speed_share: 0.35,
+                    dry_friction_nm: 0.8,
+                    ..drawn(index)
+                },
+            ),
+            _ => ("inside", drawn(index)),
+        };
+        Target { name: format!("{name} {}", index + 1), properties }
+    };
+    (0..count).map(target).collect()
+}
+
+fn known(name: &str, jobs: usize) -> KnownTask {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let continuous = name == "continuous";
+    let mut config = Config::load(continuous.then(|| root.join("examples/continuous")).as_deref()).expect("loads");
+    // With its first point the study would begin at the best.
+    config.optimize.first.clear();
+    let task = if continuous { Task::Forward } else { name.parse().expect("`tasks` are names of tasks or continuous") };
+    let robot = RobotDescription::embedded("go1").expect("embedded");
+    let plan = prior_plan(&config, &robot, task).expect("fits the robot");
+    let begun = std::time::Instant::now();
+    let prior = simulate(&plan, jobs, &|_| {}, &AtomicBool::new(false)).expect("simulates");
+    let simulated_s = begun.elapsed().as_secs_f64();
+    let mirror = |point: &Vec<f64>| point.iter().map(|u| 1.0 - u).collect();
+    let mirrored = prior.points.iter().map(mirror).collect();
+    let mirrored = Prior::new(prior.parameters.clone(), mirrored, prior.worlds.clone(), prior.slip.clone());
+    let space =
+        Space::new(plan.parameters.iter().map(|p| (p.name.clone(), Range::linear(p.low, p.high)))).expect("a space");
+    let mut task = KnownTask {
+        name: name.to_owned(),
+        space,
+        prior: Arc::new(PriorModel::new(prior)),
+        mirrored: Arc::new(PriorModel::new(mirrored)),
+        ideal_best: Vec::new(),
+        plan,
+    };
+    eprintln!("{name}: prior simulated in {simulated_s:.1} s, with its models {:.1} s", begun.elapsed().as_secs_f64());
+    let mut ideal = Jumper::new(&task, (task.plan.robot.clone(), task.plan.simulator.clone()));
+    let mut study = new_study(&task, Proposer::Gp, 0);
+    for trial in 0..LONG as u64 {
+        one_jump(&mut study, &mut ideal, trial);
+    }
+    let best = best_of(&study).map(|number| study.trials()[number as usize].parameters.clone());
+    task.ideal_best = best.expect("the ideal robot stands");
+    task
+}
+
+/// Mean and standard error.
+fn mean(values: &[f64]) -> (f64, f64) {
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    let variance = values.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>() / (n - 1.0).max(1.0);
+    (mean, (variance / n).sqrt())
+}
+
+/// Two-sided p of the paired t-test.
+fn p_value(differences: &[f64]) -> f64 {
+    let (mean, error) = mean(differences);
+    if error > 0.0 { 2.0 * (1.0 - student_cdf((mean / error).abs(), differences.len() - 1)) } else { 1.0 }
+}
+
+fn main() {
+    let mut settings: BTreeMap<String, String> = [
+        ("tasks", "forward,lateral-left,twist-ccw,continuous"),
+        ("samplers", "sim,gp,tpe,ideal best, then gp"),
+        ("robots", "12"),
+        ("studies", "20"),
+        ("trials", "20"),
+        ("seed", "9000"),
+        ("jobs", ""),
+    ]
+    .map(|(key, value)| (key.to_owned(), value.to_owned()))
+    .into();
+    for argument in std::env::args().skip(1) {
+        let known = argument.split_once('=').filter(|(key, _)| settings.contains_key(*key));
+        let (key, value) = known.unwrap_or_else(|| panic!("`{argument}`: write KEY=VALUE, keys {:?}", settings.keys()));
+        settings.insert(key.to_owned(), value.to_owned());
+    }
+    let number = |key: &str| settings[key].parse::<usize>().unwrap_or_else(|_| panic!("`{key}` is a whole number"));
+    let jobs = if settings["jobs"].is_empty() { cores() } else { number("jobs") };
+    let (robots, studies, trials, seed) =
+        (number("robots").max(4), number("studies"), number("trials"), number("seed"));
+    let wanted = &settings["samplers"];
+    let proposers: Vec<Proposer> = Proposer::ALL
+        .iter()
+        .filter(|(name, _)| {
+            wanted == name || wanted.starts_with(&format!("{name},")) || wanted.contains(&format!(",{name}"))
+        })
+        .map(|(_, proposer)| *proposer)
+        .collect();
+    println!(
+        "{robots} robots of seed {seed}, three of them outside the ensemble's ranges; {studies} studies of {trials} jumps of each sampler on \
+         each robot. Value of the best trial, repeated {REPEATS} times, falls as 0: mean and standard error over all studies.\n"
+    );
+    println!(
+        "| task | sampler | {} | falls in 5, 20 | {REACHED} of the optimum within 5 |",
+        AFTER.map(|n| format!("after {n}")).join(" | ")
+    );
+    println!("|---|---|{}---|---|", "---|".repeat(AFTER.len()));
+    let mut notes = String::new();
+    for name in settings["tasks"].split(',') {
+        let task = known(name, jobs);
+        let targets = targets(&task.plan, robots, seed as u32);
+        let mut work = Vec::new();
+        for target in 0..robots {
+            work.push(Job { target, proposer: None, study: 0 });
+            for &proposer in &proposers {
+                work.extend((0..studies as u32).map(|study| Job { target, proposer: Some(proposer), study }));
+            }
+        }
+        let run = |_: &mut (), job: &Job| Ok::<_, ()>(run(&task, &targets, trials, seed as u64, job));
+        let results = in_parallel(jobs, &work, || Ok(()), run).expect("cannot fail");
+        let of = |target: usize, proposer: Option<Proposer>| -> Vec<StudyResult> {
+            let chosen = work.iter().zip(&results).filter(|(job, _)| job.target == target && job.proposer == proposer);
+            chosen.map(|(_, result)| *result).collect()
+        };
+        // The best that is known of each robot.
+        let optimum: Vec<f64> = (0..robots)
+            .map(|target| {
+                let all = work.iter().zip(&results).filter(|(job, _)| job.target == target);
+                all.flat_map(|(_, result)| result.best).fold(0.0, f64::max)
+            })
+            .collect();
+        for &proposer in &proposers {
+            let all: Vec<(usize, StudyResult)> =
+                (0..robots).flat_map(|t| of(t, Some(proposer)).into_iter().map(move |result| (t, result))).collect();
+            let cell = |values: Vec<f64>| {
+                let (mean, error) = mean(&values);
+                format!("{mean:.3} ± {error:.3}")
+            };
+            let values: Vec<String> =
+                (0..AFTER.len()).map(|i| cell(all.iter().map(|(_, r)| r.best[i]).collect())).collect();
+            let falls = |i: usize| all.iter().map(|(_, r)| r.falls[i]).sum::<f64>() / all.len() as f64;
+            let reached =
+                all.iter().filter(|(t, r)| r.best[..3].iter().any(|best| *best >= REACHED * optimum[*t])).count();
+            println!(
+                "| {} | {} | {} | {:.2}, {:.2} | {:.0} % |",
+                task.name,
+                proposer.name(),
+                values.join(" | "),
+                falls(2),
+                falls(4),
+                100.0 * reached as f64 / all.len() as f64
+            );
+        }
+        let compare = |a: (Proposer, usize), b: (Proposer, usize)| {
+            let differences: Vec<f64> = (0..robots)
+                .flat_map(|t| {
+                    let pairs = of(t, Some(a.0)).into_iter().zip(of(t, Some(b.0)));
+                    pairs.map(|(ours, theirs)| ours.best[a.1] - theirs.best[b.1]).collect::<Vec<_>>()
+                })
+                .collect();
+            let (mean, error) = mean(&differences);
+            format!(
+                "- {}: {} after {} less {} after {}: {mean:+.3} ± {error:.3}, p = {:.3}\n",
+                task.name,
+                a.0.name(),
+                AFTER[a.1],
+                b.0.name(),
+                AFTER[b.1],
+                p_value(&differences)
+            )
+        };
+        let has = |proposer| proposers.contains(&proposer);
+        if has(Proposer::Sim) && has(Proposer::Gp) {
+            notes += &compare((Proposer::Sim, 2), (Proposer::Gp, 4));
+        }
+        if has(Proposer::SimMirrored) && has(Proposer::Gp) {
+            notes += &compare((Proposer::SimMirrored, 3), (Proposer::Gp, 3));
+        }
+        if has(Proposer::Gp) && has(Proposer::Tpe) {
+            notes += &compare((Proposer::Gp, 4), (Proposer::Tpe, 4));
+        }
+        for (target, best) in targets.iter().zip(&optimum) {
+            eprintln!("{} {}: best known {best:.3}, {:?}", task.name, target.name, target.properties);
+        }
+    }
+    println!("\nPaired differences over robots and studies, mean, standard error and two-sided t-test:\n\n{notes}");
+}

@@ -1,0 +1,128 @@
+//! What the model has learned of the robot, for the operator; the sampler does not read it.
+
+use super::history::History;
+use super::model::{StandingModel, ValueModel};
+use super::safeguard;
+use crate::optimize::ask::Direction;
+use crate::optimize::gp::laplace::sigmoid;
+use crate::optimize::prior::PriorModel;
+use crate::optimize::prior::terms::Ensemble;
+use crate::optimize::trial::Trial;
+use libm::{exp, log, sqrt};
+use serde::{Deserialize, Serialize};
+
+/// Least probability of a label under a world: a single label does not rule a world out.
+const LEAST_PROBABILITY: f64 = 0.02;
+
+/// Mean and standard deviation.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Estimate {
+    /// Mean.
+    pub mean: f64,
+    /// Standard deviation.
+    pub deviation: f64,
+}
+
+/// How well one simulated robot explains the jumps.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct WorldWeight {
+    /// Name of the world.
+    pub name: String,
+    /// Its likelihood as a share of that of all worlds, 0..1.
+    pub weight: f64,
+}
+
+/// The model's prediction of a finished trial from all others.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct ObservedPrediction {
+    /// Number of the trial.
+    pub number: u32,
+    /// Value, if the robot stands, in the objective's unit and sign, without the noise of a trial.
+    pub value: Estimate,
+    /// Probability of standing from all trials, the trial itself among them, 0..1.
+    pub p_stand: f64,
+}
+
+/// What the model has learned.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PriorInsight {
+    /// rho: how much of the simulated change over the points the robot shows; 1 for a robot as simulated.
+    pub rho: Estimate,
+    /// b: by how much the robot differs from the simulated robots' mean everywhere, in the objective's unit and sign.
+    pub bias: Estimate,
+    /// The simulated robots in their order.
+    pub worlds: Vec<WorldWeight>,
+    /// The finished trials in order.
+    pub observed: Vec<ObservedPrediction>,
+    /// ln of the likelihood of the values with the simulated robots over that without them.
+    pub log_bayes_factor: f64,
+    /// Whether the sampler uses the simulated values; see [`safeguard`].
+    pub trusted: bool,
+}
+
+/// Computes the insight. `None` if the prior cannot be used ([`PriorModel::covers`]) or a covariance cannot be factored.
+pub fn insight(prior: &PriorModel, trials: &[Trial], direction: Direction) -> Option<PriorInsight> {
+    let ensemble = prior.ensemble()?;
+    let history = History::gather(prior, ensemble, trials, direction);
+    let sign = if direction == Direction::Maximize { 1.0 } else { -1.0 };
+    let about = ValueModel::fit(ensemble, &history)?;
+    let standing = StandingModel::fit(ensemble, &history)?;
+    let coefficients = about.coefficients();
+    let worlds = weights(prior, ensemble, &history);
+    let checked = safeguard::check(about, ensemble, &history)?;
+    let scaled: Vec<f64> = history.stood().map(|jump| (jump.value - ensemble.offset) / ensemble.scale).collect();
+    let mut left_out = checked.value.left_out(&scaled).into_iter();
+    let observed = history.jumps.iter().map(|jump| {
+        let left_out = if jump.stood { left_out.next() } else { None };
+        let (mean, variance) = left_out.unwrap_or_else(|| checked.value.predict(&jump.point, &jump.features.value));
+        let mean = sign * (ensemble.offset + ensemble.scale * mean);
+        let value = Estimate { mean, deviation: ensemble.scale * sqrt(variance) };
+        let p_stand = standing.probability(&jump.point, &jump.features.standing);
+        ObservedPrediction { number: jump.number, value, p_stand }
+    });
+    let estimate = |(mean, variance): (f64, f64), unit: f64| Estimate {
+        mean: unit * mean,
+        deviation: unit.abs() * sqrt(variance),
+    };
+    Some(PriorInsight {
+        rho: estimate(coefficients[1], 1.0),
+        bias: estimate(coefficients[0], sign * ensemble.scale),
+        worlds,
+        observed: observed.collect(),
+        log_bayes_factor: checked.log_bayes_factor,
+        trusted: checked.trusted,
+    })
+}
+
+/// Likelihood of values and labels under each world, its value with the robot's bias and difference, its label through the logistic
+/// prior. A world without a value explains no jump that stood.
+fn weights(prior: &PriorModel, ensemble: &Ensemble, history: &History) -> Vec<WorldWeight> {
+    let [b0, b1, b2] = ensemble.standing.mean;
+    let any_stood = history.stood().next().is_some();
+    let log_likelihood = |k: usize| {
+        let labels = history.jumps.iter().map(|jump| {
+            let label = ensemble.world_labels(&jump.point)[k];
+            let p = sigmoid(b0 + b1 * label + b2 * jump.features.standing[2]);
+            log(if jump.stood { p } else { 1.0 - p }.max(LEAST_PROBABILITY))
+        });
+        let values = match ensemble.known.iter().position(|known| *known == k) {
+            Some(at) => {
+                let simulated = |x: &[f64]| (ensemble.world_values(x)[at] - ensemble.offset) / ensemble.scale;
+                ValueModel::log_likelihood_about(ensemble, history, simulated)
+            }
+            None if any_stood => f64::NEG_INFINITY,
+            None => 0.0,
+        };
+        labels.sum::<f64>() + values
+    };
+    let worlds = &prior.prior().worlds;
+    let logs: Vec<f64> = (0..worlds.len()).map(log_likelihood).collect();
+    let largest = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let relative: Vec<f64> = logs.iter().map(|log| exp(log - largest)).collect();
+    let sum: f64 = relative.iter().sum();
+    let weight = |(world, relative): (&crate::optimize::prior::World, f64)| WorldWeight {
+        name: world.name.clone(),
+        weight: relative / sum,
+    };
+    worlds.iter().zip(relative).map(weight).collect()
+}

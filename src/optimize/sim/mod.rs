@@ -1,0 +1,149 @@
+//! The sampler `sim`: a Gaussian process about the results of simulated robots, for some five jumps of a robot.
+//!
+//! The value and the standing of the robot are learned about those of the ensemble ([`model`]); the next point maximizes the
+//! expected gain less the price of a fall ([`search`]). Without a prior, or with one of other parameters
+//! ([`PriorModel::covers`]), the sampler proposes as `gp`.
+
+pub mod history;
+pub mod insight;
+pub mod model;
+pub mod safeguard;
+pub mod search;
+
+use super::ask::{Ask, Candidate, Direction, Expectation, Prediction as TrialPrediction, Streams};
+use super::gp;
+use super::mt19937::Mt19937;
+use super::prior::PriorModel;
+use super::prior::terms::{CANDIDATES, Ensemble, Features};
+use super::sobol::Sobol;
+use history::{History, Jump};
+use libm::sqrt;
+use model::{StandingModel, ValueModel};
+use search::{Acquisition, Prediction};
+
+/// Proposes the next point for the given parameters.
+pub fn propose(ask: &Ask<'_>, streams: &mut Streams) -> Candidate {
+    let covering = ask.prior.filter(|prior| prior.covers(ask.space).is_ok());
+    let proposal = covering.and_then(|prior| about_prior(ask, prior, prior.ensemble()?, streams));
+    proposal.unwrap_or_else(|| gp::propose(ask, streams))
+}
+
+/// Returns what the model expects of a trial at `values`, in the order of the space.
+pub fn expect(ask: &Ask<'_>, values: &[f64]) -> Option<Expectation> {
+    let fixed: Vec<(String, f64)> =
+        ask.space.parameters().iter().zip(values).map(|(p, value)| (p.name.clone(), *value)).collect();
+    let given = Ask { fixed: &fixed, ..*ask };
+    // With all parameters given no random number is drawn.
+    propose(&given, &mut Streams::new(0)).expected.or_else(|| gp::expect(ask, values))
+}
+
+/// Returns what the model says of the finished trials.
+pub fn predict(ask: &Ask<'_>) -> Vec<TrialPrediction> {
+    let covering = ask.prior.filter(|prior| prior.covers(ask.space).is_ok());
+    let about = |prior: &PriorModel| {
+        let ensemble = prior.ensemble()?;
+        let history = History::gather(prior, ensemble, ask.trials, ask.direction);
+        let acquisition = Acquisition::new((prior.prior(), ensemble), models(ensemble, &history)?, &history, &[])?;
+        let prediction = |jump: &Jump| {
+            let prediction = acquisition.predict(&jump.point, &jump.features);
+            let Expectation { value, deviation, p_stand, .. } =
+                expectation(ask.direction, ensemble, &jump.point, &prediction, true);
+            TrialPrediction { trial: jump.number, stood: jump.stood, value, deviation, p_stand }
+        };
+        Some(history.jumps.iter().map(prediction).collect())
+    };
+    covering.and_then(about).unwrap_or_else(|| gp::predict(ask))
+}
+
+/// The models of value and standing. `None` if a covariance cannot be factored.
+fn models(ensemble: &Ensemble, history: &History) -> Option<(ValueModel, StandingModel)> {
+    let value = safeguard::check(ValueModel::fit(ensemble, history)?, ensemble, history)?.value;
+    Some((value, StandingModel::fit(ensemble, history)?))
+}
+
+/// The proposal of the model; `None` if a covariance cannot be factored.
+fn about_prior(ask: &Ask<'_>, prior: &PriorModel, ensemble: &Ensemble, streams: &mut Streams) -> Option<Candidate> {
+    let history = History::gather(prior, ensemble, ask.trials, ask.direction);
+    let search = SearchBox::of(ask, prior);
+    let models = models(ensemble, &history)?;
+    let all_given = ask.space.parameters().iter().all(|p| ask.given(p).is_some());
+    let candidates = if all_given { Vec::new() } else { search.candidates(prior, ensemble) };
+    let acquisition = Acquisition::new((prior.prior(), ensemble), models, &history, &candidates)?;
+    let (unit, worth_the_risk) = if all_given {
+        (search.bounds.iter().map(|(low, _)| *low).collect(), true)
+    } else {
+        let best = acquisition.best_point(&candidates, &search.bounds, streams)?;
+        let worth = best.score > 0.0;
+        (best.point, worth)
+    };
+    let features = ensemble.features(prior.prior(), &unit);
+    let prediction = acquisition.predict(&unit, &features);
+    let value = |p: &super::space::Parameter| {
+        let at = prior.prior().parameters.iter().position(|known| known.name == p.name)?;
+        let proposed = prior.prior().parameters[at].range.extrapolate(unit[at]);
+        Some(ask.given(p).unwrap_or(proposed.clamp(p.range.low, p.range.high)))
+    };
+    let values = ask.space.parameters().iter().map(value).collect::<Option<Vec<f64>>>()?;
+    let expected = Some(expectation(ask.direction, ensemble, &unit, &prediction, worth_the_risk));
+    Some(Candidate { expected, ..Candidate::from(values) })
+}
+
+/// The prediction in the objective's unit and sign.
+fn expectation(
+    direction: Direction,
+    ensemble: &Ensemble,
+    unit: &[f64],
+    prediction: &Prediction,
+    worth_the_risk: bool,
+) -> Expectation {
+    let own_sign = |value: f64| if direction == Direction::Maximize { value } else { -value };
+    let worlds = ensemble.world_values(unit).into_iter().map(own_sign);
+    let worlds = worlds.fold(None, |range: Option<(f64, f64)>, value| {
+        Some(range.map_or((value, value), |(low, high)| (low.min(value), high.max(value))))
+    });
+    Expectation {
+        value: own_sign(ensemble.offset + ensemble.scale * prediction.mean),
+        deviation: ensemble.scale * sqrt(prediction.variance),
+        p_stand: prediction.p_stand,
+        worlds,
+        worth_the_risk,
+    }
+}
+
+/// The part of the prior's unit cube that is searched.
+struct SearchBox {
+    /// Lower and upper bound of each coordinate; equal for a given parameter, and beyond 0..1 where the study's bounds are wider.
+    bounds: Vec<(f64, f64)>,
+}
+
+impl SearchBox {
+    fn of(ask: &Ask<'_>, prior: &PriorModel) -> SearchBox {
+        let bound = |known: &super::space::Parameter| {
+            let searched = ask.space.parameters().iter().find(|p| p.name == known.name);
+            let range = searched.map_or(known.range, |p| p.range);
+            match searched.and_then(|p| ask.given(p)) {
+                Some(value) => (known.range.scale(value), known.range.scale(value)),
+                None => (known.range.scale(range.low), known.range.scale(range.high)),
+            }
+        };
+        SearchBox { bounds: prior.prior().parameters.iter().map(bound).collect() }
+    }
+
+    /// Points over the box with their terms: those of the prior where the box is the cube, else as many of the same sequence.
+    fn candidates(&self, prior: &PriorModel, ensemble: &Ensemble) -> Vec<(Vec<f64>, Features)> {
+        if self.bounds.iter().all(|bounds| *bounds == (0.0, 1.0)) {
+            return ensemble.candidates.clone();
+        }
+        let sobol = Sobol::new(self.bounds.len(), &mut Mt19937::new(super::prior::terms::CANDIDATE_SEED));
+        let point = |i| -> Vec<f64> {
+            sobol.point(i).iter().zip(&self.bounds).map(|(u, (low, high))| low + (high - low) * u).collect()
+        };
+        let points = (0..CANDIDATES).map(point);
+        points
+            .map(|x| {
+                let features = ensemble.features(prior.prior(), &x);
+                (x, features)
+            })
+            .collect()
+    }
+}

@@ -1,0 +1,173 @@
+//! The gain of a jump less the price of its falls, and the search for the point where it is largest.
+
+use super::history::History;
+use super::model::{StandingModel, ValueModel};
+use crate::optimize::ask::Streams;
+use crate::optimize::gp::{VOID_RADIUS, log_improvement};
+use crate::optimize::prior::Prior;
+use crate::optimize::prior::terms::{Ensemble, Features};
+use crate::optimize::sobol::Sobol;
+use libm::{exp, expm1, log, pow, sqrt};
+
+/// lambda: price of a fall, as a share of the incumbent's value.
+const PRICE: f64 = 0.1;
+/// Factor of the price for each fall in a row.
+const ESCALATION: f64 = 3.0;
+/// Probability of standing from which a jump that stood can be the incumbent: one that stood by luck is none.
+const INCUMBENT: f64 = 0.5;
+/// Probability of standing from which a point is sure enough to be proposed where no gain is worth its risk.
+const SURE: f64 = 0.85;
+/// Smallest J*, in scaled units.
+const LEAST_STAR: f64 = 1e-3;
+/// Half widths of the local rounds, as shares of the box.
+const WIDTHS: [f64; 3] = [0.08, 0.03, 0.01];
+/// Points of a local round.
+const LOCAL: u32 = 100;
+/// Best candidates around which the first local round searches.
+const CENTRES: usize = 4;
+
+/// Prediction at a point.
+#[derive(Debug, Clone, Copy)]
+pub struct Prediction {
+    /// Mean of the value, scaled.
+    pub mean: f64,
+    /// Its variance, without noise.
+    pub variance: f64,
+    /// Probability of standing.
+    pub p_stand: f64,
+}
+
+/// The model that scores points.
+pub struct Acquisition<'a> {
+    /// The prior.
+    pub prior: &'a Prior,
+    /// Its surfaces.
+    pub ensemble: &'a Ensemble,
+    /// The robot's value.
+    pub value: ValueModel,
+    /// The robot's standing.
+    pub standing: StandingModel,
+    /// Largest predicted mean of the jumps that stood, scaled; none before one has.
+    incumbent: Option<f64>,
+    /// J*, scaled and counted from [`Acquisition::origin`].
+    star: f64,
+    /// The value of a fall, scaled: 0, or the lowest value of the worlds where values are negative.
+    origin: f64,
+    /// 3^c
+    escalation: f64,
+    void: Vec<Vec<f64>>,
+}
+
+/// A candidate that was scored.
+#[derive(Debug, Clone)]
+pub struct Scored {
+    /// The point, in the prior's unit cube.
+    pub point: Vec<f64>,
+    /// Larger is better; above 0 the gain is worth its risk.
+    pub score: f64,
+    /// Prediction there.
+    pub prediction: Prediction,
+}
+
+impl<'a> Acquisition<'a> {
+    /// Computes incumbent and price from the fitted models. `candidates` count for J* before the first jump that stood.
+    pub fn new(
+        (prior, ensemble): (&'a Prior, &'a Ensemble),
+        (value, standing): (ValueModel, StandingModel),
+        history: &History,
+        candidates: &[(Vec<f64>, Features)],
+    ) -> Option<Self> {
+        let origin = (ensemble.lowest.min(0.0) - ensemble.offset) / ensemble.scale;
+        let at = |x: &[f64], f: &Features| (value.predict(x, &f.value).0, standing.probability(x, &f.standing));
+        let stood: Vec<(f64, f64)> = history.stood().map(|jump| at(&jump.point, &jump.features)).collect();
+        let safe = stood.iter().filter(|(_, p)| *p >= INCUMBENT).map(|(mean, _)| *mean).reduce(f64::max);
+        // All stood by luck: the surest of them, less a unit.
+        let lucky = || stood.iter().copied().reduce(|a, b| if b.1 > a.1 { b } else { a }).map(|(mean, _)| mean - 1.0);
+        let incumbent = safe.or_else(lucky);
+        let star = match incumbent {
+            Some(incumbent) => incumbent - origin,
+            None => {
+                let gains = candidates.iter().map(|(x, f)| at(x, f)).map(|(mean, p)| p * (mean - origin));
+                gains.fold(0.0, f64::max)
+            }
+        };
+        let value = value.believing(&history.pending)?;
+        let escalation = pow(ESCALATION, history.falls_in_a_row() as f64);
+        let (star, void) = (star.max(LEAST_STAR), history.void.clone());
+        Some(Acquisition { prior, ensemble, value, standing, incumbent, star, origin, escalation, void })
+    }
+
+    /// Predicts at a point with its terms.
+    pub fn predict(&self, x: &[f64], features: &Features) -> Prediction {
+        let (mean, variance) = self.value.predict(x, &features.value);
+        Prediction { mean, variance, p_stand: self.standing.probability(x, &features.standing) }
+    }
+
+    /// U = P EI - lambda 3^c J* (1 - P); before the first jump that stood the gain is J itself. Where U <= 0 the score is negative:
+    /// the gain among the sure points, else the surest first. Near void points it is reduced.
+    fn score(&self, x: &[f64], features: &Features) -> Scored {
+        let prediction = self.predict(x, features);
+        let Prediction { mean, variance, p_stand } = prediction;
+        let gain = match self.incumbent {
+            None => (mean - self.origin).max(0.0),
+            Some(incumbent) => {
+                let deviation = sqrt(variance);
+                exp(log(deviation) + log_improvement((mean - incumbent) / deviation))
+            }
+        };
+        let utility = p_stand * gain - PRICE * self.escalation * self.star * (1.0 - p_stand);
+        let away = self.away_from_void(x);
+        let score = if utility > 0.0 {
+            utility * away
+        } else if p_stand >= SURE {
+            -1.0 / (1.0 + p_stand * gain * away)
+        } else {
+            p_stand * away - 3.0
+        };
+        Scored { point: x.to_vec(), score, prediction }
+    }
+
+    /// Product over void points v of 1 - exp(-|x - v|^2 / 2 r^2)
+    fn away_from_void(&self, x: &[f64]) -> f64 {
+        let away = |v: &Vec<f64>| {
+            let squared: f64 = x.iter().zip(v).map(|(x, v)| (x - v) * (x - v)).sum();
+            -expm1(-0.5 * squared / (VOID_RADIUS * VOID_RADIUS))
+        };
+        self.void.iter().map(away).product()
+    }
+
+    /// Searches the box, given as bounds in the prior's unit cube, from the candidates over it, in local rounds. Takes one double per
+    /// coordinate.
+    pub fn best_point(
+        &self,
+        candidates: &[(Vec<f64>, Features)],
+        bounds: &[(f64, f64)],
+        streams: &mut Streams,
+    ) -> Option<Scored> {
+        let scatter = Sobol::new(bounds.len(), &mut streams.model);
+        let mut ranked: Vec<Scored> = candidates.iter().map(|(x, features)| self.score(x, features)).collect();
+        ranked.sort_by(|a, b| b.score.total_cmp(&a.score));
+        ranked.truncate(CENTRES);
+        let mut best = ranked.first()?.clone();
+        let mut centres = ranked;
+        for (round, width) in WIDTHS.iter().enumerate() {
+            let around = |i: u32| {
+                let centre = &centres[i as usize % centres.len()].point;
+                let offsets = scatter.point(round as u32 * LOCAL + i);
+                let place = |((c, o), (low, high)): ((&f64, f64), &(f64, f64))| {
+                    (c + width * (high - low) * (2.0 * o - 1.0)).clamp(*low, *high)
+                };
+                let x: Vec<f64> = centre.iter().zip(offsets).zip(bounds).map(place).collect();
+                let features = self.ensemble.features(self.prior, &x);
+                self.score(&x, &features)
+            };
+            let mut scored: Vec<Scored> = (0..LOCAL).map(around).collect();
+            scored.sort_by(|a, b| b.score.total_cmp(&a.score));
+            if scored[0].score > best.score {
+                best = scored[0].clone();
+            }
+            centres = std::iter::once(best.clone()).chain(scored.into_iter().take(2)).collect();
+        }
+        Some(best)
+    }
+}

@@ -1,0 +1,120 @@
+//! Waits of the program and what ends them: the lock of another program, another worker's trial; and threads that the system
+//! does not grant.
+
+#[path = "support/program.rs"]
+mod program;
+#[path = "support/pty.rs"]
+mod pty;
+
+use std::fs;
+use std::io::{BufRead, BufReader, Write};
+use std::os::unix::fs::{MetadataExt, PermissionsExt, symlink};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+
+use program::{Program, assert_shows};
+use pty::Session;
+
+/// A study of two trials.
+fn study(program: &Program) -> PathBuf {
+    program.text(&["optimize", "--trials", "2", "--record", "none"]);
+    program.study("recordings")
+}
+
+/// Locks the study as a writer does that then ends without releasing it.
+fn lock(study: &Path) -> PathBuf {
+    let lock = study.join("study.log.lock");
+    symlink(study.join("study.log"), &lock).unwrap();
+    lock
+}
+
+/// Starts a command and waits until it prints a wait for `what`.
+fn waiting(program: &Program, arguments: &[&str], what: &str) -> (Child, String) {
+    let mut child = program.command(arguments).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+    let mut printed = String::new();
+    for line in BufReader::new(child.stderr.take().unwrap()).lines() {
+        printed += &(line.unwrap() + "\n");
+        if printed.contains("waiting for") {
+            assert_shows(&printed, &[what]);
+            return (child, printed);
+        }
+    }
+    panic!("{arguments:?} ended without a wait: {printed}");
+}
+
+/// Before its screen the console says what it waits for; Ctrl-C ends the wait, and the screen follows the lock's end.
+#[test]
+fn a_console_that_waits_for_a_lock_says_so_before_its_screen() {
+    let program = Program::new();
+    let study = study(&program);
+    let journal = fs::read(study.join("study.log")).unwrap();
+    // A larger budget is stored before the screen appears.
+    let arguments = ["--trials", "9", "--resume", study.to_str().unwrap()];
+    let start = || Session::start(&program.path("recordings"), (200, 50), &arguments);
+    lock(&study);
+    let mut ended = start();
+    ended.wait_for(&["waiting for", "study.log.lock", "broken after 30 s", "Ctrl-C ends the wait"]);
+    ended.send("\x03");
+    assert!(!ended.wait().success());
+    assert!(ended.restored() && fs::read(study.join("study.log")).unwrap() == journal, "the study changed");
+    let mut session = start();
+    session.wait_for(&["waiting for"]);
+    fs::remove_file(study.join("study.log.lock")).unwrap();
+    session.wait_for(&["Press A to arm"]);
+    session.send("\x03\x03");
+    assert!(session.wait().success() && session.restored());
+}
+
+#[test]
+fn a_command_that_waits_for_a_lock_says_so_and_goes_on_at_its_end() {
+    let program = Program::new();
+    let study = study(&program);
+    let lock = lock(&study);
+    let folder = study.to_str().unwrap();
+    let (mut child, printed) =
+        waiting(&program, &["study", "enqueue", folder, "f0=1.2", "Fx=50", "Fz=250"], "study.log.lock");
+    assert_shows(&printed, &["Ctrl-C ends the wait"]);
+    fs::remove_file(lock).unwrap();
+    assert!(child.wait().unwrap().success());
+}
+
+/// The trial of a worker that does not answer counts for the budget until `workers.abandoned_s`.
+#[test]
+fn a_worker_that_waits_for_another_ones_trial_says_so() {
+    let program = Program::new();
+    let study = study(&program);
+    let running = "{\"op_code\":4,\"worker_id\":\"another\",\"study_id\":0,\"datetime_start\":\"2026-01-01T00:00:00.000000+00:00\"}\n";
+    fs::OpenOptions::new().append(true).open(study.join("study.log")).unwrap().write_all(running.as_bytes()).unwrap();
+    let (mut child, _) =
+        waiting(&program, &["optimize", "--join", study.to_str().unwrap(), "--trials", "3"], "of other workers");
+    child.kill().unwrap();
+    child.wait().unwrap();
+}
+
+/// Regression: the program panicked where the system granted no thread.
+#[test]
+fn threads_that_the_system_does_not_grant_are_an_error() {
+    let program = Program::new();
+    // The superuser has no such limit.
+    fs::set_permissions(program.path(""), fs::Permissions::from_mode(0o777)).unwrap();
+    let superuser = fs::metadata("/proc/self").unwrap().uid() == 0;
+    let mut command = Command::new(if superuser { "setpriv" } else { "env" });
+    if superuser {
+        command.args(["--reuid", "65534", "--regid", "65534", "--clear-groups"]);
+    }
+    // A copy that every user may run.
+    let copy = program.path("quadfrog");
+    fs::copy(env!("CARGO_BIN_EXE_quadfrog"), &copy).unwrap();
+    command
+        .args(["prlimit", "--nproc=1"])
+        .arg(&copy)
+        .args(["optimize", "--trials", "2", "--jobs", "2", "--seed", "0-1"]);
+    let Ok(output) = command.current_dir(program.path("")).output() else {
+        println!("skipped: setpriv is not installed");
+        return;
+    };
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{message}");
+    assert!(!message.contains("panicked") && !message.contains("defect"), "{message}");
+    assert_shows(&message, &["thread"]);
+}

@@ -1,0 +1,156 @@
+//! `quadfrog prior`: the prior of the sampler `sim`, made before a study.
+
+use std::io::IsTerminal;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+use std::time::Instant;
+
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use quadfrog::config::Config;
+use quadfrog::engine::{PriorFileError, PriorMaker, ReadyPrior};
+use quadfrog::optimize::prior::World;
+use quadfrog::robot::description::RobotDescription;
+use quadfrog::session::parallel::cores;
+use quadfrog::session::prior::{PriorProgress, ensemble};
+use quadfrog::trial::Task;
+use quadfrog_console::{notice, output, put_line};
+use serde_json::json;
+
+use super::arguments;
+use super::failure::Failure;
+
+#[derive(Debug, Args)]
+pub struct PriorArguments {
+    /// Task of the jumps
+    #[arg(long, value_name = "TASK", default_value = "forward", value_parser = arguments::task())]
+    task: Task,
+    /// Folder whose TOML files replace those of the configuration, whole or key by key
+    #[arg(long, value_name = "DIR")]
+    config: Option<PathBuf>,
+    /// Robot model: go1, a1, or a folder with a URDF and a robot.toml
+    #[arg(long, value_name = "MODEL", default_value = "go1")]
+    model: String,
+    /// File of the prior [default: in recordings/priors, where studies in recordings/ find it]
+    #[arg(long, value_name = "FILE")]
+    output: Option<PathBuf>,
+    /// Jumps at the same time; the prior does not depend on it [default: the number of cores]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    jobs: Option<u16>,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(arguments: &PriorArguments) -> Result<(), Failure> {
+    let config = Config::load(arguments.config.as_deref())?;
+    let (_, robot) = arguments::load_model(&arguments.model)?;
+    let maker = PriorMaker::new(&config, &robot, arguments.task)?;
+    let given = arguments.output.clone();
+    let file = given.clone().unwrap_or_else(|| maker.shared_file(Path::new("recordings")));
+    if let Some(given) = &given {
+        may_replace(&maker, given)?;
+    }
+    let files = [file.clone()];
+    let ready = find_or_make(&maker, &files, arguments.jobs.map_or_else(cores, usize::from))?;
+    ready.keep(&files)?;
+    let reused = ready.from.is_some();
+    let prior = ready.model.prior();
+    let unit = config.task(arguments.task).unit(arguments.task);
+    let robots = ensemble(&config.prior);
+    if arguments.json {
+        let worlds = prior.worlds.iter().zip(&robots).map(
+            |(world, robot)| json!({ "name": world.name, "falls": falls(world), "best": best(world), "robot": robot }),
+        );
+        let made = json!({
+            "task": arguments.task.name(),
+            "file": file,
+            "key": maker.key(),
+            "reused": reused,
+            "points": prior.points.len(),
+            "worlds": worlds.collect::<Vec<_>>(),
+        });
+        output::line(&made.to_string());
+        return Ok(());
+    }
+    put_line!("prior of {}: {} robots, {} jumps each", arguments.task.name(), prior.worlds.len(), prior.points.len());
+    for (world, robot) in prior.worlds.iter().zip(&robots) {
+        let best = best(world).map_or("none stood".to_owned(), |best| format!("best {best:.3} {unit}"));
+        put_line!(
+            "  {}: {} falls, {best}; mass x {:.2}, torque x {:.2}, friction {:.2}, delay {} ms, lag {:.1} ms, joint friction {:.2} N m",
+            world.name,
+            falls(world),
+            robot.mass,
+            robot.torque_limit,
+            robot.friction,
+            robot.delay_ms,
+            1e3 * robot.torque_lag_s,
+            robot.dry_friction_nm,
+        );
+    }
+    let what = if reused { "nothing has changed: reused" } else { "kept in" };
+    put_line!("{what} {}", file.display());
+    Ok(())
+}
+
+/// Refuses to write over a file that is no prior.
+fn may_replace(maker: &PriorMaker, file: &Path) -> Result<(), Failure> {
+    match maker.read(file) {
+        Err(error @ (PriorFileError::Foreign { .. } | PriorFileError::Newer { .. })) => {
+            Err(Failure::input(format!("--output {error}; give another name or remove it")))
+        }
+        Err(PriorFileError::Read { source, .. }) if source.kind() == std::io::ErrorKind::NotFound => Ok(()),
+        Err(error @ PriorFileError::Read { .. }) => Err(Failure::input(format!("--output {error}; give another name"))),
+        _ => Ok(()),
+    }
+}
+
+/// Returns the prior of a task for a study: from one of `files`, or from the priors in `output`, or made now and kept there.
+pub fn obtain(
+    config: &Config,
+    robot: &RobotDescription,
+    task: Task,
+    files: &[PathBuf],
+    output: &Path,
+) -> Result<ReadyPrior, Failure> {
+    let maker = PriorMaker::new(config, robot, task)?;
+    let shared = maker.shared_file(output);
+    let all: Vec<PathBuf> = files.iter().cloned().chain([shared.clone()]).collect();
+    let ready = find_or_make(&maker, &all, cores())?;
+    ready.keep(&[shared])?;
+    Ok(ready)
+}
+
+fn find_or_make(maker: &PriorMaker, files: &[PathBuf], jobs: usize) -> Result<ReadyPrior, Failure> {
+    let task = maker.plan().task.name();
+    let (begun, bar) = (Instant::now(), std::io::stderr().is_terminal().then(ProgressBar::no_length));
+    if let Some(bar) = &bar {
+        let style = ProgressStyle::with_template("prior of {msg} {bar:30} {pos}/{len} jumps, {eta} left");
+        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+        bar.set_message(task);
+    }
+    let progress = |PriorProgress { total, .. }: PriorProgress| {
+        if let Some(bar) = &bar {
+            bar.set_length(total as u64);
+            bar.inc(1);
+        }
+    };
+    let made = maker.find_or_make(files, jobs, &progress, &AtomicBool::new(false), &mut |text| notice!("{text}"));
+    if let Some(bar) = &bar {
+        bar.finish_and_clear();
+    }
+    let ready = made?;
+    match &ready.from {
+        Some(file) => notice!("the prior of {task} is that of {}", file.display()),
+        None => notice!("the prior of {task} took {:.1} s", begun.elapsed().as_secs_f64()),
+    }
+    Ok(ready)
+}
+
+fn falls(world: &World) -> usize {
+    world.values.iter().filter(|value| value.is_none()).count()
+}
+
+fn best(world: &World) -> Option<f64> {
+    world.values.iter().flatten().copied().max_by(f64::total_cmp)
+}
