@@ -188,7 +188,7 @@ impl Collider {
     }
 
     /// Upper bound of the speed of any point: |v| + r |w| + l (|dq_1| + |dq_2| + |dq_3|), m/s.
-    pub fn fastest(&self, v: &GeneralizedVelocity) -> f64 {
+    fn fastest(&self, v: &GeneralizedVelocity) -> f64 {
         let (linear, angular) = split(&v.trunk);
         let legs = v.legs.iter().fold(0.0, |most: f64, dq| most.max(dq.abs().sum()));
         linear.norm() + self.extent * (angular.norm() + legs)

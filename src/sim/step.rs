@@ -75,49 +75,45 @@ impl Simulator {
         let dynamics = Dynamics::new(&self.model, &self.state, &added);
         let acceleration = dynamics.acceleration(&drive.torque);
         let mut velocity = free_velocity(&self.state, &acceleration, h);
-        self.find_contacts(&dynamics, &velocity, &drive.dry_friction, h);
+        let world_from_body = self.find_contacts(&dynamics, &velocity, &drive.dry_friction, h);
         if !self.solver.is_empty() {
-            let world_from_body = self.world_from_body();
             let change = self.solver.solve(&dynamics, &world_from_body);
             add_scaled(&mut velocity.trunk, &change.trunk, 1.0);
             for (leg, change) in velocity.legs.iter_mut().zip(&change.legs) {
                 *leg += change;
             }
-            self.sum_contacts(&world_from_body, h);
+            self.sum_contacts(h);
         }
         self.terrain.advance(h);
         semi_implicit_euler(&mut self.state, &velocity, h);
     }
 
-    fn world_from_body(&self) -> Matrix3<f64> {
-        self.state.world_from_body.to_rotation_matrix().into_inner()
-    }
-
+    /// Fills the solver with the constraints of a step of `h` seconds; returns the rotation from body axes to world axes.
     fn find_contacts(
         &mut self,
         dynamics: &Dynamics,
         free_velocity: &GeneralizedVelocity,
         dry_friction: &[f64; JOINTS],
         h: f64,
-    ) {
+    ) -> Matrix3<f64> {
         self.solver.start(h);
-        let world_from_body = self.world_from_body();
-        let (state, terrain, world_from_body) = (&self.state, &self.terrain, &world_from_body);
-        let legs = &dynamics.legs();
-        let step = StepContext { dynamics, legs, state, terrain, world_from_body, free_velocity, h };
+        let world_from_body = self.state.world_from_body.to_rotation_matrix().into_inner();
+        let (state, terrain, legs) = (&self.state, &self.terrain, &dynamics.legs());
+        let step = StepContext { dynamics, legs, state, terrain, world_from_body: &world_from_body, free_velocity, h };
         self.collider.find(&step, &mut self.solver);
         add_joint_constraints(&mut self.solver, &step, &self.limits, dry_friction);
+        world_from_body
     }
 
     /// Adds up the contact impulses, and pushes loose blocks.
-    fn sum_contacts(&mut self, world_from_body: &Matrix3<f64>, h: f64) {
+    fn sum_contacts(&mut self, h: f64) {
         self.contacts.foot = [false; 4];
         for contact in self.solver.contacts() {
             let normal = contact.normal_impulse();
             if normal <= 0.0 {
                 continue;
             }
-            let impulse_world = world_from_body * contact.impulse_body();
+            let impulse_world = contact.impulse_world;
             match Collider::foot_of(contact.warm_start_slot) {
                 Some(leg) => {
                     self.contacts.foot[leg as usize] = true;

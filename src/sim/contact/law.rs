@@ -21,18 +21,34 @@ impl LocalProblem {
         LocalProblem { law, friction, delassus, delassus_inverse: symmetric_inverse(&delassus), slip_ratio: 0.0 }
     }
 
-    /// Returns the impulse that satisfies the law when the velocity without it is `c`.
-    pub fn solve(&mut self, c: &Vector3<f64>) -> Vector3<f64> {
-        if c.x >= 0.0 {
-            return Vector3::zeros();
+    /// Returns the impulse that satisfies the law while all other impulses stay, and the largest component of the change of the
+    /// velocity that it makes. `v` is the velocity with the impulse `p` of the last sweep.
+    #[inline]
+    pub fn solve(&mut self, v: &Vector3<f64>, p: &Vector3<f64>) -> (Vector3<f64>, f64) {
+        // c = v - A p: velocity without the impulse.
+        let m = &self.delassus;
+        let c_normal = v.x - (m.m11 * p.x + m.m12 * p.y + m.m13 * p.z);
+        if c_normal < 0.0 {
+            // Sticking: v + A step = 0.
+            let i = &self.delassus_inverse;
+            let stick = Vector3::new(
+                p.x - (i.m11 * v.x + i.m12 * v.y + i.m13 * v.z),
+                p.y - (i.m12 * v.x + i.m22 * v.y + i.m23 * v.z),
+                p.z - (i.m13 * v.x + i.m23 * v.y + i.m33 * v.z),
+            );
+            let limit = self.friction * stick.x;
+            if stick.x >= 0.0 && stick.y * stick.y + stick.z * stick.z <= limit * limit {
+                self.slip_ratio = 0.0;
+                return (stick, largest(v));
+            }
         }
+        let impulse = if c_normal < 0.0 { self.slide(&(v - self.delassus * p)) } else { Vector3::zeros() };
+        (impulse, largest(&(self.delassus * (impulse - p))))
+    }
+
+    /// Returns the impulse of a sliding point when the velocity without it is `c`, with a normal component below zero.
+    fn slide(&mut self, c: &Vector3<f64>) -> Vector3<f64> {
         let friction = self.friction;
-        // Sticking: v = A p + c = 0.
-        let stick = -(self.delassus_inverse * c);
-        if stick.x >= 0.0 && stick.y * stick.y + stick.z * stick.z <= (friction * stick.x).powi(2) {
-            self.slip_ratio = 0.0;
-            return stick;
-        }
         let a_nn = self.delassus.m11;
         if friction < 1e-9 {
             return Vector3::new(-c.x / a_nn, 0.0, 0.0);
@@ -53,13 +69,14 @@ impl LocalProblem {
                 return None;
             }
             let (i22, i23, i33) = (m11 * m33 - m.m13 * m.m13, m.m12 * m.m13 - m11 * m.m23, m11 * m22 - m.m12 * m.m12);
+            let scale = -1.0 / determinant;
             let solve = |v: Vector3<f64>| {
                 let product = Vector3::new(
                     i11 * v.x + i12 * v.y + i13 * v.z,
                     i12 * v.x + i22 * v.y + i23 * v.z,
                     i13 * v.x + i23 * v.y + i33 * v.z,
                 );
-                product / -determinant
+                product * scale
             };
             let p = solve(*c);
             Some((p, solve(Vector3::new(weight * p.x, p.y, p.z))))
@@ -69,7 +86,7 @@ impl LocalProblem {
         let d = Vector2::new(c.y, c.z) - a * (c.x / a_nn);
         let (mut low, mut high) = (0.0, d.norm() * (a_nn + friction * a.norm()) / (friction * -c.x));
         let mut s = if self.slip_ratio > low && self.slip_ratio < high { self.slip_ratio } else { 0.0 };
-        let mut best = stick;
+        let mut best = -(self.delassus_inverse * c);
         for _ in 0..60 {
             let Some((p, dp)) = at(s) else {
                 high = s;
@@ -100,6 +117,13 @@ impl LocalProblem {
     }
 }
 
+/// Returns the largest component without sign.
+#[inline]
+fn largest(v: &Vector3<f64>) -> f64 {
+    let larger = |a: f64, b: f64| if a > b { a } else { b };
+    larger(larger(v.x.abs(), v.y.abs()), v.z.abs())
+}
+
 /// Shortens the tangential part of the impulse to Coulomb's limit; returns zero for an impulse that pulls.
 pub(super) fn into_cone(impulse: &Vector3<f64>, friction: f64) -> Vector3<f64> {
     if impulse.x <= 0.0 {
@@ -121,6 +145,7 @@ fn symmetric_inverse(m: &Matrix3<f64>) -> Matrix3<f64> {
     let i22 = m.m11 * m.m33 - m.m13 * m.m13;
     let i23 = m.m12 * m.m13 - m.m11 * m.m23;
     let i33 = m.m11 * m.m22 - m.m12 * m.m12;
-    let determinant = m.m11 * i11 + m.m12 * i12 + m.m13 * i13;
-    Matrix3::new(i11, i12, i13, i12, i22, i23, i13, i23, i33) / determinant
+    let scale = 1.0 / (m.m11 * i11 + m.m12 * i12 + m.m13 * i13);
+    let (i11, i12, i13, i22, i23, i33) = (i11 * scale, i12 * scale, i13 * scale, i22 * scale, i23 * scale, i33 * scale);
+    Matrix3::new(i11, i12, i13, i12, i22, i23, i13, i23, i33)
 }

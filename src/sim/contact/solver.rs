@@ -34,7 +34,10 @@ pub(in crate::sim) struct ContactConstraint {
     /// Right-hand side: velocity without impulses, less the velocity that may remain after the step.
     rhs: Vector3<f64>,
     local: LocalProblem,
+    /// Normal, tangent, tangent, N s.
     impulse: Vector3<f64>,
+    /// Impulse of the ground on the robot, world, N s; known after [`ContactSolver::solve`].
+    pub impulse_world: Vector3<f64>,
 }
 
 /// The constraint row of a joint's stop or dry friction: an impulse between two bounds.
@@ -172,6 +175,7 @@ impl ContactSolver {
             rhs,
             local: LocalProblem::new(self.law, point.friction, delassus),
             impulse: into_cone(&warm_start, point.friction),
+            impulse_world: Vector3::zeros(),
         });
     }
 
@@ -199,13 +203,11 @@ impl ContactSolver {
         for _ in 0..self.config.max_sweeps {
             let mut change: f64 = 0.0;
             for contact in &mut self.contacts {
-                // Velocity due to all other impulses.
-                let others = contact.velocity(&sums) - contact.local.delassus * contact.impulse;
-                let impulse = contact.local.solve(&others);
+                let (impulse, changed) = contact.local.solve(&contact.velocity(&sums), &contact.impulse);
                 let step = impulse - contact.impulse;
                 contact.impulse = impulse;
                 contact.add(&mut sums, &step);
-                change = change.max((contact.local.delassus * step).amax());
+                change = change.max(changed);
             }
             for row in &mut self.joint_rows {
                 let velocity = row.rhs + dot(&row.trunk_row, &sums.trunk) + row.leg_row.dot(&sums.legs[row.leg]);
@@ -223,8 +225,9 @@ impl ContactSolver {
         for slot in self.warm_slots.drain(..) {
             self.warm_start[slot] = None;
         }
-        for contact in &self.contacts {
-            self.warm_start[contact.warm_start_slot] = Some(world_from_body * contact.impulse_body());
+        for contact in &mut self.contacts {
+            contact.impulse_world = world_from_body * (contact.axes_body * contact.impulse);
+            self.warm_start[contact.warm_start_slot] = Some(contact.impulse_world);
             self.warm_slots.push(contact.warm_start_slot);
         }
         // dv_0 = L^-T y_0,  ddq_l = C^-T y_l - G dv_0
@@ -258,11 +261,6 @@ impl ContactConstraint {
             add_scaled(&mut sums.trunk, row, *p);
         }
         sums.legs[self.leg] += self.leg_rows.tr_mul(p);
-    }
-
-    /// Impulse of the ground on the robot, body axes at the start of the step, N s.
-    pub fn impulse_body(&self) -> Vector3<f64> {
-        self.axes_body * self.impulse
     }
 
     /// Normal component of the impulse, out of the ground, N s.
