@@ -6,7 +6,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use mcap::McapError;
-use mcap::records::{Record, op};
+use mcap::records::Record;
 
 use super::container::Container;
 use super::error::RecordingError;
@@ -98,10 +98,9 @@ impl RecordCopier {
     /// Copies everything, metadata and attachments first.
     fn all(mut self, container: &mut Container) -> Result<CopyCounts, McapError> {
         for span in container.metadata.clone() {
-            let body = container.read_record(span)?;
-            match mcap::parse_record(op::METADATA, &body) {
-                Ok(Record::Metadata(metadata)) => self.out.mcap.write_metadata(&metadata)?,
-                _ => self.done.damaged_extras += 1,
+            match container.read_metadata(span)? {
+                Some(metadata) => self.out.mcap.write_metadata(&metadata)?,
+                None => self.done.damaged_extras += 1,
             }
         }
         for span in container.attachments.clone() {

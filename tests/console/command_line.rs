@@ -9,7 +9,7 @@ use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::process::Stdio;
 
-use program::{Program, assert_shows, hold};
+use program::{Program, assert_shows, hold, journal_trials};
 use quadfrog::recording::player::Player;
 use quadfrog::recording::record::Record;
 use serde_json::Value;
@@ -110,32 +110,6 @@ fn a_killed_study_continues_as_if_it_had_not_been_interrupted() {
         let kept = &table[&trial["trial"].as_u64().unwrap()];
         assert_eq!((&kept["params"], &kept["value"]), (&trial["params"], &trial["value"]), "a judged trial changed");
     }
-}
-
-/// The complete trials of a journal by number, parsed without the project's reader.
-fn journal_trials(path: &Path) -> BTreeMap<u64, Value> {
-    let mut trials: BTreeMap<u64, Value> = BTreeMap::new();
-    let mut created = 0;
-    for line in fs::read_to_string(path).unwrap().lines() {
-        let operation: Value = serde_json::from_str(line).unwrap();
-        let id = operation["trial_id"].as_u64();
-        match operation["op_code"].as_u64().unwrap() {
-            4 => {
-                trials.insert(created, serde_json::json!({"params": {}, "value": null}));
-                created += 1;
-            }
-            5 => {
-                let name = operation["param_name"].as_str().unwrap();
-                trials.get_mut(&id.unwrap()).unwrap()["params"][name] = operation["param_value_internal"].clone();
-            }
-            6 if operation["state"] == 1 => {
-                trials.get_mut(&id.unwrap()).unwrap()["value"] = operation["values"][0].clone();
-            }
-            _ => {}
-        }
-    }
-    trials.retain(|_, trial| !trial["value"].is_null());
-    trials
 }
 
 #[test]

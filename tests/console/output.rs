@@ -8,10 +8,10 @@ mod pty;
 
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 
 use portable_pty::CommandBuilder;
-use program::Program;
+use program::{Program, with_small_files};
 use pty::Session;
 
 /// Sets the title of a terminal, rings, and colours the rest red by an 8-bit control character.
@@ -123,16 +123,6 @@ fn a_full_disk_behind_the_standard_output_is_an_error() {
     let mut child = program.command(&["study", "export", study]).stdout(Stdio::piped()).spawn().unwrap();
     drop(child.stdout.take());
     assert!(child.wait().unwrap().success());
-}
-
-/// Runs the command with files of at most `blocks` of 512 bytes, as on a disk that is full beyond.
-fn with_small_files(program: &Program, blocks: u32, arguments: &[&str]) -> (Option<i32>, String) {
-    // With SIGXFSZ ignored a write beyond the limit fails.
-    let shell = format!("trap '' XFSZ; ulimit -f {blocks}; exec \"$0\" \"$@\"");
-    let mut command = Command::new("sh");
-    command.args(["-c", &shell, env!("CARGO_BIN_EXE_quadfrog")]).args(arguments).current_dir(program.path(""));
-    let output = command.output().unwrap();
-    (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
 }
 
 /// Regression: the message was "attempted another write after a write method failed", with status 2.

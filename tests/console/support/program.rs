@@ -2,6 +2,7 @@
 
 #![allow(dead_code, reason = "each test program uses a part")]
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
@@ -87,4 +88,48 @@ pub fn assert_shows(text: &str, parts: &[&str]) {
     for part in parts {
         assert!(text.contains(part), "no {part}:\n{text}");
     }
+}
+
+/// The complete trials of a journal by number, parsed without the project's reader.
+pub fn journal_trials(path: &Path) -> BTreeMap<u64, Value> {
+    let mut trials: BTreeMap<u64, Value> = BTreeMap::new();
+    let mut created = 0;
+    let text = fs::read_to_string(path).unwrap();
+    // A line without its end is still being written, or was torn by a kill.
+    let whole = text.rfind('\n').map_or("", |end| &text[..end]);
+    for line in whole.lines() {
+        let operation: Value = serde_json::from_str(line).unwrap();
+        let id = operation["trial_id"].as_u64();
+        match operation["op_code"].as_u64().unwrap() {
+            4 => {
+                trials.insert(created, serde_json::json!({"params": {}, "value": null}));
+                created += 1;
+            }
+            5 => {
+                let name = operation["param_name"].as_str().unwrap();
+                trials.get_mut(&id.unwrap()).unwrap()["params"][name] = operation["param_value_internal"].clone();
+            }
+            6 if operation["state"] == 1 => {
+                trials.get_mut(&id.unwrap()).unwrap()["value"] = operation["values"][0].clone();
+            }
+            _ => {}
+        }
+    }
+    trials.retain(|_, trial| !trial["value"].is_null());
+    trials
+}
+
+/// Parameters and values of the complete trials of a journal in their order.
+pub fn counted_trials(path: &Path) -> Vec<(Value, Value)> {
+    journal_trials(path).into_values().map(|trial| (trial["params"].clone(), trial["value"].clone())).collect()
+}
+
+/// Runs the command with files of at most `blocks` of 512 bytes, as on a disk that is full beyond.
+pub fn with_small_files(program: &Program, blocks: u32, arguments: &[&str]) -> (Option<i32>, String) {
+    // With SIGXFSZ ignored a write beyond the limit fails.
+    let shell = format!("trap '' XFSZ; ulimit -f {blocks}; exec \"$0\" \"$@\"");
+    let mut command = Command::new("sh");
+    command.args(["-c", &shell, env!("CARGO_BIN_EXE_quadfrog")]).args(arguments).current_dir(program.path(""));
+    let output = command.output().unwrap();
+    (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
 }

@@ -150,6 +150,15 @@ impl Session {
         }
     }
 
+    /// Waits until `condition` holds, through several jumps in real time.
+    pub fn wait_for_long(&self, what: &str, condition: impl Fn() -> bool) {
+        let begun = Instant::now();
+        while !condition() {
+            assert!(begun.elapsed() < 10 * PATIENCE, "never: {what}\n{}", self.screen());
+            std::thread::sleep(Duration::from_millis(10));
+        }
+    }
+
     /// Sends bytes as typed.
     pub fn send(&mut self, bytes: &str) {
         let writer = self.writer.as_mut().expect("the terminal is there");

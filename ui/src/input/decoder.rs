@@ -2,7 +2,8 @@
 //!
 //! A STOP key is reported with its last byte in every state: after an Esc, inside an unfinished sequence and inside a
 //! begun paste. `Space` (0x20), `Ctrl-C` (0x03) and `Ctrl-Space` (0x00) are one byte, which occurs in no sequence that
-//! this program requests from a terminal; the sequence of `F12` is searched for in the raw bytes.
+//! this program requests from a terminal; the sequence of `F12` is searched for in the raw bytes. In a begun paste `Space`
+//! is text, the others stop.
 //! Sequences: ECMA-48, 5.4; XTerm Control Sequences ("PC-Style Function Keys", "Mouse Tracking").
 
 use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
