@@ -35,11 +35,11 @@ fn run(experiment: &mut Experiment, trials: u32, lucky: Option<u32>) {
 }
 
 fn newest_insight(experiment: &mut Experiment) -> ProposalInsight {
-    let insights = experiment.take_records().into_iter().filter_map(|record| match record {
+    let mut insights = experiment.take_records().into_iter().filter_map(|record| match record {
         Record::Insight(insight) => Some(insight),
         _ => None,
     });
-    insights.last().unwrap()
+    insights.next_back().unwrap()
 }
 
 #[test]
