@@ -45,7 +45,7 @@ pub fn optimize(this: &mut Try<'_>) -> Passed {
     let kills = 1 + this.random.below(3);
     let (mut printed, mut killed) = (Vec::new(), 0);
     for _ in 0..kills {
-        let study = program.studies("broken").into_iter().find(|study| study.join("study.log").exists());
+        let study = program.studies("broken").into_iter().find(|study| begun(study));
         let mut command = program.command(&this.arguments(&["--json", "--record", "all"]).with_optimize());
         match &study {
             None => command.args(["--seed", &seed, "--output", "broken"]).args(&config),
@@ -72,12 +72,18 @@ pub fn optimize(this: &mut Try<'_>) -> Passed {
     Passed::Tried(format!("with {killed} kills"))
 }
 
+/// Whether a folder holds a study: one whole line at least. A disk may be full, or the program killed, before the first one;
+/// such a folder is refused by `--resume` and nothing is lost.
+fn begun(study: &Path) -> bool {
+    fs::read(study.join("study.log")).is_ok_and(|bytes| bytes.contains(&b'\n'))
+}
+
 /// Resumes the study below `folder` to its end, or begins it where none was made before the end of the program.
 pub fn finish(program: &Program, this: &Try<'_>, seed: &str, folder: &str) {
     let config = this.config();
     let config: Vec<&str> = config.iter().map(String::as_str).collect();
     let studies = program.studies(folder);
-    let made = studies.iter().find(|study| study.join("study.log").exists());
+    let made = studies.iter().find(|study| begun(study));
     for empty in studies.iter().filter(|study| Some(*study) != made) {
         fs::remove_dir_all(empty).unwrap();
     }
@@ -110,7 +116,7 @@ pub fn console(this: &mut Try<'_>) -> Passed {
     let wanted = this.random.below(whole.len().min(3));
     let pause = Duration::from_micros(this.random.below(3_000_000) as u64);
     let judged = || {
-        let study = program.studies("broken").into_iter().find(|study| study.join("study.log").exists());
+        let study = program.studies("broken").into_iter().find(|study| begun(study));
         study.map_or(0, |study| counted_trials(&study.join("study.log")).len())
     };
     session.wait_for_long("enough trials", || judged() >= wanted);

@@ -39,7 +39,8 @@ fn waiting(program: &Program, arguments: &[&str], what: &str) -> (Child, String)
             return (child, printed);
         }
     }
-    panic!("{arguments:?} ended without a wait: {printed}");
+    let status = child.wait().unwrap();
+    panic!("{arguments:?} ended without a wait, {status}: {printed}");
 }
 
 /// Before its screen the console says what it waits for; Ctrl-C ends the wait, and the screen follows the lock's end.

@@ -142,7 +142,8 @@ fn a_fault_of_a_target_is_found_and_repeats_by_its_number() {
     let corpus = || vec![b"valid".to_vec()];
     let target = |run: fn(&[u8])| Target { name: "faulty", run, corpus, memory: MB, few: 0 };
     let has = |bytes: &[u8]| bytes.len() > 6 && bytes != b"valid";
-    let faults: [(fn(&[u8]), &str); 2] = [
+    type Act = fn(&[u8]);
+    let faults: [(Act, &str); 2] = [
         (|bytes| assert!(bytes.len() <= 6 || bytes == b"valid"), "panicked"),
         (
             |bytes| {

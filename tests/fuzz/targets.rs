@@ -149,6 +149,8 @@ pub fn keys(bytes: &[u8]) {
 /// Removes the files of this thread's inputs.
 pub fn clean() {
     let _ = fs::remove_dir_all(folder());
+    // The process's folder, once no thread has one in it.
+    let _ = folder().parent().map(fs::remove_dir);
 }
 
 /// The folder of the files of this process's present thread.
