@@ -79,11 +79,11 @@ pub struct PredictedTrial {
 /// The robot as the sampler `sim` sees it beside its simulated robots.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct SimulatorComparison {
-    /// rho: ratio of the robot's values to the simulated ones, 1 for a robot that jumps as simulated.
+    /// rho: ratio of the change of the robot's values over the parameters to the simulated change, 1 for a robot that jumps as simulated.
     pub ratio: f64,
     /// Standard deviation of the ratio.
     pub ratio_deviation: f64,
-    /// b: what the robot adds to that, in the study's unit.
+    /// b: difference of the robot's values from the simulated mean everywhere, in the study's unit.
     pub bias: f64,
     /// Standard deviation of the bias, in the study's unit.
     pub bias_deviation: f64,

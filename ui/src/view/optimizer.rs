@@ -53,10 +53,10 @@ fn render_simulator(frame: &mut Frame, area: Rect, simulator: &SimulatorComparis
     let SimulatorComparison { ratio, ratio_deviation, bias, bias_deviation, worlds, contradicted } = simulator;
     let mut lines = vec![
         Line::from(format!(
-            " the robot jumps {} of what is simulated",
+            " the robot shows {} the change over the parameters that is simulated",
             with_deviation(theme, *ratio, *ratio_deviation, "times")
         )),
-        Line::from(format!(" and adds {}", with_deviation(theme, *bias, *bias_deviation, unit))),
+        Line::from(format!(" and differs everywhere by {}", with_deviation(theme, *bias, *bias_deviation, unit))),
         Line::from(span(theme, Role::Quiet, " most like")),
     ];
     if *contradicted {
