@@ -172,3 +172,28 @@ proptest! {
         prop_assert!(next["number"].is_u64(), "{}", next);
     }
 }
+
+#[test]
+fn the_best_is_that_of_the_model_and_an_error_before_a_trial_has_stood() {
+    for kind in [SamplerKind::Tpe, SamplerKind::Gp] {
+        let mut served = AskTell::new(study(kind));
+        assert!(error(&mut served, r#"{"best":{}}"#).contains("no trial has stood"));
+        let mut told = Vec::new();
+        for number in 0..14_u32 {
+            let asked = answer(&mut served, r#"{"ask":{}}"#);
+            // The luckiest trial is one of a far point.
+            let value = if number == 1 { 0.9 } else { asked["params"]["Fx"].as_f64().unwrap() / 300.0 };
+            answer(&mut served, &json!({"tell": {"number": number, "value": value, "verdict": "accept"}}).to_string());
+            told.push((asked["params"].clone(), value));
+        }
+        let best = answer(&mut served, r#"{"best":{}}"#);
+        let number = best["number"].as_u64().unwrap() as usize;
+        assert_eq!(best["params"], told[number].0);
+        assert_eq!(best["value"].as_f64(), Some(told[number].1));
+        if kind == SamplerKind::Tpe {
+            assert_eq!((number, best["predicted"].clone()), (1, Value::Null));
+        } else {
+            assert!(best["predicted"].as_f64().is_some(), "{best}");
+        }
+    }
+}

@@ -5,6 +5,7 @@
 //! {"ask":{}}                                             -> {"number":0,"params":{"f0":1.2,...},"p_stand":0.9,"predicted":0.41}
 //! {"tell":{"number":0,"value":0.61,"verdict":"accept"}}  -> {"told":0,"verdict":"accept","value":0.61}
 //! {"tell":{"number":1,"verdict":"fall"}}                 -> {"told":1,"verdict":"fall","value":0.0}
+//! {"best":{}}                                            -> {"number":0,"params":{"f0":1.2,...},"value":0.61,"predicted":0.58}
 //! anything else                                          -> {"error":"..."}
 //! ```
 //!
@@ -22,8 +23,7 @@ use crate::trial::Verdict;
 /// Longest line, bytes, without its end.
 pub const LONGEST_LINE: usize = 65_536;
 
-const FORMS: &str =
-    r#"give {"ask":{}} or {"tell":{"number":N,"value":J,"verdict":"accept"}} with verdict accept, fall or void"#;
+const FORMS: &str = r#"give {"ask":{}}, {"best":{}} or {"tell":{"number":N,"value":J,"verdict":"accept"}} with verdict accept, fall or void"#;
 
 /// One line of input.
 #[derive(Deserialize)]
@@ -31,11 +31,16 @@ const FORMS: &str =
 enum AskTellMessage {
     Ask(AskMessage),
     Tell(TellMessage),
+    Best(BestMessage),
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct AskMessage {}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct BestMessage {}
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -58,6 +63,17 @@ struct AskedPoint {
     predicted: Option<f64>,
 }
 
+/// Answer to the question for the best trial.
+#[derive(Serialize)]
+struct BestPoint {
+    number: u32,
+    params: Map<String, Value>,
+    /// Value that was told.
+    value: Option<f64>,
+    /// Mean of the objective at this point by the sampler's model; none without a model.
+    predicted: Option<f64>,
+}
+
 /// A study behind lines of JSON.
 #[derive(Debug)]
 pub struct AskTell {
@@ -75,6 +91,7 @@ impl AskTell {
         let answer = match serde_json::from_slice(line) {
             Ok(AskTellMessage::Ask(AskMessage {})) => self.ask().map_err(|error| error.to_string()),
             Ok(AskTellMessage::Tell(tell)) => self.tell(&tell),
+            Ok(AskTellMessage::Best(BestMessage {})) => self.best(),
             Err(error) => Err(format!("{error}; {FORMS}")),
         };
         answer.unwrap_or_else(|reason| json!({ "error": reason })).to_string()
@@ -111,6 +128,20 @@ impl AskTell {
             predicted: draft.expected.map(|expected| expected.value),
         };
         Ok(json!(point))
+    }
+
+    /// The best trial by the sampler's model; without a model by value.
+    fn best(&self) -> Result<Value, String> {
+        let model = self.study.predict().best;
+        let number = model.map(|best| best.trial).or_else(|| self.study.best().map(|best| best.number));
+        let number = number.ok_or("no trial has stood yet")?;
+        let trial = self.study.trial(number).map_err(|error| error.to_string())?;
+        Ok(json!(BestPoint {
+            number,
+            params: trial.parameters.iter().map(|(name, value)| (name.clone(), (*value).into())).collect(),
+            value: trial.value,
+            predicted: model.map(|best| best.predicted),
+        }))
     }
 
     fn tell(&mut self, tell: &TellMessage) -> Result<Value, String> {

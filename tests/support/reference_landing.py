@@ -91,7 +91,17 @@ def amplitude(case, leg):
     return np.array([case["Fx_n"], signs[case["task"]] * case["Fy_n"], case["Fz_n"]])
 
 
-def jump(m, limits, case, terms):
+def ideal_motors(demanded, speed, limits):
+    return np.clip(demanded, -limits, limits)
+
+
+def exact_sensors(*state):
+    return state
+
+
+def jump(m, limits, case, terms, motors=ideal_motors, sensors=exact_sensors):
+    """One jump. `motors` gives the torques of a tick from demanded torques and joint speeds; `sensors` what the controller reads of joint
+    positions and speeds and of the trunk's angular and linear velocity in its own frame."""
     landing = terms["landing"]
     d = mujoco.MjData(m)
     d.qpos[:7] = [0, 0, -STANCE[2] + 0.02, 1, 0, 0, 0]
@@ -125,12 +135,12 @@ def jump(m, limits, case, terms):
             swing &= ~contact
             lost = np.where(contact, 0, lost + 1)
             landed = [0 if s else None if n is None else n + 1 for s, n in zip(swing, landed)]
-        omega, velocity = d.qvel[3:6], rotation.T @ d.qvel[:3]
+        q, speed, omega, velocity = sensors(d.qpos[7:], d.qvel[6:], d.qvel[3:6], rotation.T @ d.qvel[:3])
         tau = np.zeros(12)
         for leg in range(4):
             k = slice(3 * leg, 3 * leg + 3)
-            dq = d.qvel[6:][k]
-            position, jacobian = foot(d.qpos[7:][k], SIDE[leg])
+            dq = speed[k]
+            position, jacobian = foot(q[k], SIDE[leg])
             desired = STANCE * [1, SIDE[leg], 1]
             if swing[leg]:
                 desired[:2] += terms["foot_placement_s"] * velocity[:2]
@@ -144,7 +154,7 @@ def jump(m, limits, case, terms):
                 f[2] += K_ATT * (rotation @ CORNERS)[2, leg]
                 f[2] += terms["attitude_rate_gain"] * np.cross(omega, CORNERS[:, leg])[2]
             tau[k] = jacobian.T @ f - KD_JOINT * dq
-        d.ctrl[:] = np.clip(tau, -limits, limits)
+        d.ctrl[:] = motors(tau, d.qvel[6:], limits)
         if origin is not None:
             expect["apex_rise_m"] = max(expect["apex_rise_m"], float(d.qpos[2] - origin[2]))
             if expect["takeoff_s"] is None and not contact.any():

@@ -1,0 +1,109 @@
+#!/usr/bin/env python3
+"""Studies of quadfrog's samplers on robots in MuJoCo: another contact law than that of the prior's simulated robots.
+
+    pip install mujoco numpy
+    python3 tests/support/sim_to_real_mujoco.py target/release/quadfrog --tasks forward,twist-ccw --samplers sim,gp --studies 3
+
+Each study speaks with `quadfrog ask-tell`. Its robot is the Go1 of reference_landing.py with the controller of the paper, motors with
+lag and a torque-speed curve, noise on joints and gyroscope, and a friction and a mass of its own, drawn with the study's seed. Prints a
+JSON line for each study: the value of the best trial after 1, 3, 5, 10 and 20 jumps, jumped three times with other noise, falls
+as 0 and counted. SI units, radians.
+"""
+
+import argparse
+import json
+import subprocess
+
+import numpy as np
+from reference_landing import jump, model
+
+PAPER = dict(
+    attitude_rate_gain=0.0, foot_placement_s=0.0, landing=dict(cutoff="none", cutoff_lost_s=0.02, spread_m=0.0, spread_s=0.3)
+)
+NO_LOAD_SPEED = 30.1
+AFTER = [1, 3, 5, 10, 20]
+
+
+class Robot:
+    """A Go1 in MuJoCo with motors and sensors that are not ideal."""
+
+    def __init__(self, seed):
+        random = np.random.default_rng(seed)
+        self.m, self.limits = model()
+        self.friction, self.mass = random.uniform(0.5, 0.9), random.uniform(0.95, 1.1)
+        self.lag_s, self.full_torque_share = random.uniform(0.002, 0.006), random.uniform(0.5, 0.7)
+        self.m.geom_friction[:, 0] = self.friction
+        self.m.body_mass[:] *= self.mass
+        self.m.body_inertia[:] *= self.mass
+
+    def value(self, task, params, seed):
+        """Objective of a jump, none for a fall."""
+        random, torque = np.random.default_rng(seed), np.zeros(12)
+
+        def motors(demanded, speed, limits):
+            knee = self.full_torque_share * NO_LOAD_SPEED
+            share = np.clip((NO_LOAD_SPEED - np.abs(speed)) / (NO_LOAD_SPEED - knee), 0, 1)
+            # The curve limits the torque that drives, not the one that brakes.
+            most = np.where(demanded * speed > 0, share * limits, limits)
+            torque[:] += (1 - np.exp(-0.001 / self.lag_s)) * (np.clip(demanded, -most, most) - torque)
+            return torque
+
+        def sensors(q, speed, omega, velocity):
+            noise = lambda size, deviation: random.normal(0, deviation, size)
+            return q + noise(12, 0.001), speed + noise(12, 0.1), omega + noise(3, 0.02), velocity
+
+        case = dict(task=task, f0_hz=params["f0"], Fx_n=params.get("Fx", 0.0), Fy_n=params.get("Fy", 0.0), Fz_n=params["Fz"])
+        outcome = jump(self.m, self.limits, case, PAPER, motors, sensors)
+        if outcome["fell"]:
+            return None
+        along = dict(forward=outcome["displacement_m"][0], **{"lateral-left": outcome["displacement_m"][1]})
+        return along.get(task, outcome["yaw_change_rad"])
+
+
+def study(program, task, sampler, seed, config):
+    robot = Robot(seed)
+    command = [program, "ask-tell", "--task", task, "--sampler", sampler, "--seed", str(seed)]
+    talk = subprocess.Popen(command + (["--config", config] if config else []), stdin=-1, stdout=-1, text=True)
+
+    def say(message):
+        talk.stdin.write(json.dumps(message) + "\n")
+        talk.stdin.flush()
+        return json.loads(talk.stdout.readline())
+
+    trials, best, falls, known = [], [], [], {}
+    for number in range(AFTER[-1]):
+        asked = say({"ask": {}})
+        value = robot.value(task, asked["params"], 1000 * seed + number)
+        verdict = "fall" if value is None else "accept"
+        say({"tell": {"number": asked["number"], "value": value or 0.0, "verdict": verdict}})
+        trials.append((asked["params"], value))
+        if number + 1 in AFTER:
+            chosen = say({"best": {}}).get("number", 0)
+            if chosen not in known:
+                again = [robot.value(task, trials[chosen][0], 1000 * seed + 500 + i) for i in range(3)]
+                known[chosen] = float(np.mean([value or 0.0 for value in again]))
+            best.append(round(known[chosen], 4))
+            falls.append(sum(value is None for _, value in trials))
+    talk.stdin.close()
+    talk.wait()
+    robot = dict(friction=robot.friction, mass=robot.mass, lag_s=robot.lag_s, full_torque_share=robot.full_torque_share)
+    return dict(task=task, sampler=sampler, seed=seed, after=AFTER, best=best, falls=falls, robot=robot)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("program")
+    parser.add_argument("--tasks", default="forward,lateral-left,twist-ccw")
+    parser.add_argument("--samplers", default="sim,gp")
+    parser.add_argument("--studies", type=int, default=3)
+    parser.add_argument("--seed", type=int, default=7000)
+    parser.add_argument("--config")
+    arguments = parser.parse_args()
+    for task in arguments.tasks.split(","):
+        for seed in range(arguments.seed, arguments.seed + arguments.studies):
+            for sampler in arguments.samplers.split(","):
+                print(json.dumps(study(arguments.program, task, sampler, seed, arguments.config)), flush=True)
+
+
+if __name__ == "__main__":
+    main()
