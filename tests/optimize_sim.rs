@@ -279,7 +279,7 @@ fn a_search_without_worthwhile_gain_advises_to_end_at_a_sure_point() {
         (!expected.worth_the_risk).then_some(expected)
     });
     let expected = advised.expect("the gain shrinks");
-    assert!(expected.p_stand > 0.8 && expected.value > 0.8 * BEST, "{expected:?}");
+    assert!(expected.p_stand > 0.8 && expected.value > 0.7 * BEST, "{expected:?}");
 }
 
 #[test]

@@ -35,9 +35,14 @@ impl Hyperparameters {
 
     /// k(x, x') = s^2 (1 + sqrt(5) r + 5/3 r^2) exp(-sqrt(5) r),  r^2 = sum ((x_d - x'_d) / l_d)^2   (R&W 4.17)
     pub fn kernel(&self, a: &[f64], b: &[f64]) -> f64 {
-        let r2: f64 = a.iter().zip(b).zip(&self.lengthscale).map(|((a, b), l)| ((a - b) / l) * ((a - b) / l)).sum();
-        let q = sqrt(5.0 * r2);
+        let q = self.distance(a, b);
         self.signal * (1.0 + q + q * q / 3.0) * exp(-q)
+    }
+
+    /// sqrt(5) r
+    fn distance(&self, a: &[f64], b: &[f64]) -> f64 {
+        let r2: f64 = a.iter().zip(b).zip(&self.lengthscale).map(|((a, b), l)| ((a - b) / l) * ((a - b) / l)).sum();
+        sqrt(5.0 * r2)
     }
 }
 
@@ -279,7 +284,18 @@ pub fn log_likelihood(
 ) -> (f64, Vec<f64>) {
     let (n, d) = (points.len(), theta.len() - 2);
     let hyper = Hyperparameters::from_log(theta);
-    let Some(factor) = Cholesky::new(covariance(&hyper, points, |i, j| linear.map_or(0.0, |l| l[(i, j)]))) else {
+    // sqrt(5) r and exp(-sqrt(5) r) below the diagonal, for covariance and gradient
+    let (mut distance, mut decay, mut k) = (DMatrix::zeros(n, n), DMatrix::zeros(n, n), DMatrix::zeros(n, n));
+    for i in 0..n {
+        for j in 0..=i {
+            let q = hyper.distance(&points[i], &points[j]);
+            (distance[(i, j)], decay[(i, j)]) = (q, exp(-q));
+            k[(i, j)] = hyper.signal * (1.0 + q + q * q / 3.0) * decay[(i, j)] + linear.map_or(0.0, |l| l[(i, j)]);
+            k[(j, i)] = k[(i, j)];
+        }
+        k[(i, i)] += hyper.noise;
+    }
+    let Some(factor) = Cholesky::new(k) else {
         return (f64::NEG_INFINITY, vec![0.0; theta.len()]);
     };
     let alpha = factor.solve(y);
@@ -298,9 +314,8 @@ pub fn log_likelihood(
                 continue;
             }
             let scaled = |c: usize| (points[i][c] - points[j][c]) / hyper.lengthscale[c];
-            let r2: f64 = (0..d).map(|c| scaled(c) * scaled(c)).sum();
-            let q = sqrt(5.0 * r2);
-            let decay = hyper.signal * exp(-q);
+            let q = distance[(i, j)];
+            let decay = hyper.signal * decay[(i, j)];
             gradient[d] += weight * decay * (1.0 + q + q * q / 3.0);
             // dk/d ln l_d = 5/3 s^2 (1 + q) exp(-q) ((x_d - x'_d)/l_d)^2
             let slope = weight * 5.0 / 3.0 * decay * (1.0 + q);

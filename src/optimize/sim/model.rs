@@ -27,7 +27,7 @@ const DELTA: f64 = -2.0;
 /// Lengthscale and variance of delta_c.
 const STANDING: (f64, f64) = (0.4, 3.0);
 /// Observations from which hyperparameters are fitted: the cost grows with their cube.
-const FITTED: usize = 40;
+const FITTED: usize = 30;
 /// Steps of the ascent.
 const ITERATIONS: usize = 30;
 
