@@ -45,8 +45,9 @@ const CAREFUL_FROM: usize = 10;
 /// Least probability of standing of a proposal: about 1.5 falls of 20 jumps fewer at no loss of value
 /// (`src/optimize/README.md`).
 const LEAST_P_STAND: f64 = 0.8;
-/// Reduction of the acquisition per unit of missing probability: among points that are all too risky the surest is chosen.
-const TOO_RISKY: f64 = 1e3;
+/// Reduction of the acquisition per unit of missing probability. Among points that are all too risky a sure one is chosen; a larger
+/// reduction would give several workers the same one, whatever the others run.
+const TOO_RISKY: f64 = 100.0;
 /// Number of best points from which the gradient ascent starts.
 const CLIMBS: usize = 6;
 
