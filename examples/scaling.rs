@@ -41,7 +41,9 @@ fn main() -> Result<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     match arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {
         ["worker", url, seed, trials, objective_ms, sampler] => {
-            worker(url, seed.parse()?, trials.parse()?, objective_ms.parse()?, sampler.parse()?)
+            // Its error is a standard one only with a feature of strum that this package does not need.
+            let kind: SamplerKind = sampler.parse().map_err(|error| format!("{sampler}: {error}"))?;
+            worker(url, seed.parse()?, trials.parse()?, objective_ms.parse()?, kind)
         }
         [workers, trials, objective_ms, sampler] => measure(workers.parse()?, trials.parse()?, objective_ms, sampler),
         _ => Err("usage: scaling WORKERS TRIALS OBJECTIVE_MS SAMPLER".into()),
