@@ -11,9 +11,10 @@ use serde::{Deserialize, Serialize};
 
 use super::folder::fnv1a;
 use super::options::{EngineError, Options};
+use super::study::space_of;
 use crate::config::Config;
 use crate::optimize::prior::{Prior, PriorModel};
-use crate::optimize::space::{Range, Space};
+use crate::optimize::space::Space;
 use crate::robot::description::RobotDescription;
 use crate::session::prior::{PriorPlan, PriorProgress, simulate};
 use crate::trial::{Backend, ParameterInfo, Task};
@@ -108,7 +109,7 @@ impl PriorMaker {
     /// When the task's settings do not fit the robot.
     pub fn new(config: &Config, robot: &RobotDescription, task: Task) -> Result<PriorMaker, EngineError> {
         let plan = prior_plan(config, robot, task)?;
-        let space = Space::new(plan.parameters.iter().map(|p| (p.name.clone(), Range::linear(p.low, p.high))))?;
+        let space = space_of(&plan.parameters)?;
         Ok(PriorMaker { plan, space, key: key(config, robot, task) })
     }
 

@@ -7,14 +7,14 @@ use super::folder::STUDY_FILE;
 use super::options::{EngineError, Options};
 use crate::optimize::ask::{Direction, SamplerKind};
 use crate::optimize::journal::Durability;
-use crate::optimize::space::{Range, Space};
+use crate::optimize::space::{Range, Space, SpaceError};
 use crate::optimize::study::{Storage, Study, StudyError, StudyOptions};
 use crate::recording::record::SessionInfo;
 use crate::session::experiment::attributes::{
     self, BackendAttribute, BudgetAttribute, NewStudyAttributes, Origin, StudyAttributes,
 };
 use crate::session::experiment::{Experiment, ExperimentPlan};
-use crate::trial::{Backend, Task};
+use crate::trial::{Backend, ParameterInfo, Task};
 
 /// Opens the study of `options` as an experiment, for the console and for `optimize`.
 ///
@@ -72,7 +72,7 @@ pub(super) fn open_without_prior(
 /// When the study cannot be read, or is of another task.
 pub fn open_study(options: &Options, durability: Durability) -> Result<Study, EngineError> {
     let parameters = options.config.parameters(options.task);
-    let space = Space::new(parameters.iter().map(|p| (p.name.clone(), Range::linear(p.low, p.high))))?;
+    let space = space_of(&parameters)?;
     let mut sampler = options.config.optimize.sampler.clone();
     sampler.seed = options.seed;
     let storage = storage(options);
@@ -187,4 +187,9 @@ pub fn session_info(options: &Options, recording: &str) -> SessionInfo {
         approve: options.approve,
         limits: options.config.health_limits(),
     }
+}
+
+/// Returns the search space of a task's parameters.
+pub(super) fn space_of(parameters: &[ParameterInfo]) -> Result<Space, SpaceError> {
+    Space::new(parameters.iter().map(|p| (p.name.clone(), Range::linear(p.low, p.high))))
 }

@@ -195,6 +195,4 @@ pub struct Prediction {
     pub value: f64,
     /// Standard deviation of this mean, without the noise of a trial, in the objective's unit.
     pub deviation: f64,
-    /// Probability of standing at its point, 0..1.
-    pub p_stand: f64,
 }

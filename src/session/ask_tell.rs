@@ -9,7 +9,7 @@
 //! anything else                                          -> {"error":"..."}
 //! ```
 //!
-//! Every line of input has one line of output. Several points may be asked for before the first is told.
+//! Every line of input has one line of output. Several points may be open before the first result is reported.
 
 use std::io::{BufRead, Read as _};
 
@@ -68,7 +68,7 @@ struct AskedPoint {
 struct BestPoint {
     number: u32,
     params: Map<String, Value>,
-    /// Value that was told.
+    /// Value that was reported.
     value: Option<f64>,
     /// Mean of the objective at this point by the sampler's model; none without a model.
     predicted: Option<f64>,

@@ -58,7 +58,8 @@ pub fn propose(ask: &Ask<'_>, streams: &mut Streams) -> Candidate {
     if given.iter().all(Option::is_some) {
         return given.into_iter().flatten().collect::<Vec<f64>>().into();
     }
-    let Some(model) = Acquisition::of(ask) else { return model_free::sobol(ask, streams) };
+    let model = Acquisition::of(ask, &TrainingSet::gather(ask));
+    let Some(model) = model else { return model_free::sobol(ask, streams) };
     let bound =
         |(p, given): (&Parameter, &Option<f64>)| given.map_or((0.0, 1.0), |v| (p.range.scale(v), p.range.scale(v)));
     let bounds: Vec<(f64, f64)> = parameters.iter().zip(&given).map(bound).collect();
@@ -71,18 +72,18 @@ pub fn propose(ask: &Ask<'_>, streams: &mut Streams) -> Candidate {
 
 /// Returns what the model expects of a trial at `values`; none before the model proposes.
 pub fn expect(ask: &Ask<'_>, values: &[f64]) -> Option<Expectation> {
-    let model = Acquisition::of(ask)?;
+    let model = Acquisition::of(ask, &TrainingSet::gather(ask))?;
     let point: Vec<f64> = ask.space.parameters().iter().zip(values).map(|(p, v)| p.range.scale(*v)).collect();
     Some(model.expectation(&point, ask.direction))
 }
 
 /// Returns what the model says of the finished trials; empty before the model proposes.
 pub fn predict(ask: &Ask<'_>) -> Vec<Prediction> {
-    let Some(model) = Acquisition::of(ask) else { return Vec::new() };
     let training = TrainingSet::gather(ask);
+    let Some(model) = Acquisition::of(ask, &training) else { return Vec::new() };
     let prediction = |((trial, stood), point): ((&u32, &bool), &Vec<f64>)| {
-        let Expectation { value, deviation, p_stand, .. } = model.expectation(point, ask.direction);
-        Prediction { trial: *trial, stood: *stood, value, deviation, p_stand }
+        let Expectation { value, deviation, .. } = model.expectation(point, ask.direction);
+        Prediction { trial: *trial, stood: *stood, value, deviation }
     };
     training.numbers.iter().zip(&training.stood).zip(&training.points).map(prediction).collect()
 }
@@ -156,10 +157,9 @@ struct Acquisition {
 
 impl Acquisition {
     /// Learns from the trials of a study; none before there are enough.
-    fn of(ask: &Ask<'_>) -> Option<Self> {
-        let training = TrainingSet::gather(ask);
+    fn of(ask: &Ask<'_>, training: &TrainingSet) -> Option<Self> {
         let enough = training.points.len() >= ask.config.startup_trials(ask.space) && training.values.len() >= 2;
-        enough.then(|| Acquisition::new(&training)).flatten()
+        enough.then(|| Acquisition::new(training)).flatten()
     }
 
     fn new(training: &TrainingSet) -> Option<Self> {

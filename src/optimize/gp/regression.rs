@@ -20,6 +20,11 @@ pub struct Hyperparameters {
     pub noise: f64,
 }
 
+/// Matern 5/2 of a signal variance at q = sqrt(5) r.
+pub fn matern(signal: f64, q: f64) -> f64 {
+    signal * (1.0 + q + q * q / 3.0) * exp(-q)
+}
+
 impl Hyperparameters {
     /// The hyperparameters of theta = ln (l_1 .. l_d, s^2, noise).
     pub fn from_log(theta: &[f64]) -> Self {
@@ -35,8 +40,7 @@ impl Hyperparameters {
 
     /// k(x, x') = s^2 (1 + sqrt(5) r + 5/3 r^2) exp(-sqrt(5) r),  r^2 = sum ((x_d - x'_d) / l_d)^2   (R&W 4.17)
     pub fn kernel(&self, a: &[f64], b: &[f64]) -> f64 {
-        let q = self.distance(a, b);
-        self.signal * (1.0 + q + q * q / 3.0) * exp(-q)
+        matern(self.signal, self.distance(a, b))
     }
 
     /// sqrt(5) r

@@ -5,9 +5,9 @@
 
 use super::data::{LEAST_STOOD, Prior, PriorModelError, SurfaceHyperparameters, World};
 use crate::optimize::gp::regression::{
-    HyperPrior, Hyperparameters, LinearPrior, LogNormal, Observations, Regression, log_likelihood,
+    HyperPrior, Hyperparameters, LinearPrior, LogNormal, Observations, Regression, log_likelihood, matern,
 };
-use libm::{exp, log, sqrt};
+use libm::{log, sqrt};
 use nalgebra::{DMatrix, DVector};
 
 /// Points of a world from which the hyperparameters are fitted: the cost grows with their cube, and all worlds count together.
@@ -31,10 +31,8 @@ impl Surfaces {
     pub fn at(&self, x: &[f64]) -> Vec<f64> {
         let x: Vec<f64> = x.iter().zip(&self.inverse_lengthscale).map(|(x, l)| x * l).collect();
         let kernel = |p: &Vec<f64>| {
-            // Matern 5/2, as `Hyperparameters::kernel` with s^2 = 1
             let r2: f64 = p.iter().zip(&x).map(|(p, x)| (p - x) * (p - x)).sum();
-            let q = sqrt(5.0 * r2);
-            (1.0 + q + q * q / 3.0) * exp(-q)
+            matern(1.0, sqrt(5.0 * r2))
         };
         let kernels: Vec<f64> = self.points.iter().map(kernel).collect();
         let value = |(mean, weights): &(f64, Vec<f64>)| {

@@ -98,8 +98,7 @@ impl Ensemble {
 
     /// The linear terms at a point of the unit cube.
     pub fn features(&self, prior: &Prior, x: &[f64]) -> Features {
-        let labels: Vec<f64> = self.labels.at(x).into_iter().map(clipped).collect();
-        self.combine(&self.values.at(x), &labels, prior.slip_reserve(x))
+        self.combine(&self.world_values(x), &self.world_labels(x), prior.slip_reserve(x))
     }
 
     /// The value of each world that has one at a point of the unit cube, in the task's unit.

@@ -46,9 +46,9 @@ pub fn predict(ask: &Ask<'_>) -> Vec<Prediction> {
         let acquisition = Acquisition::new((prior.prior(), ensemble), models(ensemble, &history)?, &history, &[])?;
         let prediction = |jump: &Jump| {
             let prediction = acquisition.predict(&jump.point, &jump.features);
-            let Expectation { value, deviation, p_stand, .. } =
+            let Expectation { value, deviation, .. } =
                 expectation(ask.direction, ensemble, &jump.point, &prediction, true);
-            Prediction { trial: jump.number, stood: jump.stood, value, deviation, p_stand }
+            Prediction { trial: jump.number, stood: jump.stood, value, deviation }
         };
         Some(history.jumps.iter().map(prediction).collect())
     };

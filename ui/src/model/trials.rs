@@ -51,7 +51,8 @@ impl Trials {
     /// The best trial's number and its value: the mean that the sampler's model predicts, without one the trial's own.
     pub fn best_value(&self) -> Option<(u32, f64)> {
         let best = self.best()?;
-        Some((best.trial, self.model_best.map(|best| best.value).or(best.value)?))
+        let by_model = self.model_best.filter(|model| model.trial == best.trial);
+        Some((best.trial, by_model.map(|model| model.value).or(best.value)?))
     }
 
     /// The accepted trials that were better than all before them, in order.

@@ -27,13 +27,12 @@ pub fn rows(session: &SessionModel) -> u16 {
         true => session.trials.points.len().min(4) as u16 + u16::from(confirming),
         false => 0,
     };
-    let expected = session.under_review().map_or_else(
-        || session.open_proposal().and_then(|proposal| proposal.expected),
-        |trial| trial.expected.map(|expected| ExpectedResult { value: expected.value, ..ExpectedResult::default() }),
-    );
-    let expected = expected.map_or(0, |expected| {
-        1 + u16::from(expected.simulated_least.is_some()) + 2 * u16::from(expected.advises_to_stop)
-    });
+    let expected = match session.under_review() {
+        Some(trial) => u16::from(trial.expected.is_some()),
+        None => session.open_proposal().and_then(|proposal| proposal.expected).map_or(0, |expected| {
+            1 + u16::from(expected.simulated_least.is_some()) + 2 * u16::from(expected.advises_to_stop)
+        }),
+    };
     let model_best = u16::from(session.stage_is(ExperimentStage::Finished) && session.trials.model_best.is_some());
     parameters + 4 + gains + repeats + expected + model_best
 }
