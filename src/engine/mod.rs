@@ -5,6 +5,7 @@ mod folder;
 mod guard;
 mod options;
 mod prior;
+mod recording;
 mod session_thread;
 mod stored;
 mod study;
@@ -13,6 +14,7 @@ pub use folder::{STUDY_FILE, attachments, fingerprint, newest_config, prepare_fo
 pub use guard::{GUARD, GuardError, GuardOutcome, run_guard};
 pub use options::{EngineError, Options};
 pub use prior::{PRIOR_FILE, PriorFileError, PriorMaker, ReadyPrior, prior_plan};
+pub use recording::create_recording;
 pub use stored::{Opened, StoredStudy, open_stored, stored_studies, stored_study};
 pub use study::{check_backend, open_experiment, open_study, session_info, study_name};
 
@@ -34,7 +36,6 @@ use crate::realtime::sleep_lock::{ALLOW_INHIBITOR, INHIBITOR, SleepLock};
 use crate::realtime::system::descriptors;
 use crate::recording::record::{Record, Stamped};
 use crate::recording::recorder::{Recorder, RecorderHandle, RecorderStatus};
-use crate::recording::writer::Writer;
 use crate::robot::go1::Go1;
 use crate::robot::{Placement, Robot};
 use crate::session::arming_checklist::ArmingChecklist;
@@ -85,7 +86,7 @@ pub fn start(options: Options) -> Result<EngineHandle, EngineError> {
     let (guard, guard_heartbeat) = guard.unzip();
     let clock = MonotonicClock::start();
     let writer = match &recording {
-        Some(path) => Some(Writer::create(path, &info, utc_ns(), &attachments(&options))?),
+        Some(path) => Some(create_recording(path, &options)?),
         None => None,
     };
 

@@ -13,6 +13,8 @@ pub mod player;
 pub mod record;
 pub mod recorder;
 pub mod recover;
+
+pub mod scene;
 mod schema;
 mod tick;
 mod topic;

@@ -15,6 +15,7 @@ use prost::Message;
 use super::record::{Record, SessionInfo};
 use super::schema;
 use super::topic::Topic;
+use crate::robot::description::RobotDescription;
 
 /// Uncompressed bytes at which a chunk is closed: an eighth of a second of ticks. A crash loses at most the open chunk.
 const CHUNK_BYTES: usize = 256 * 1024;
@@ -77,13 +78,7 @@ impl Output {
         let metadata = fields.into_iter().map(|(key, value)| (key.to_string(), value)).collect();
         self.mcap.write_metadata(&Metadata { name: "session".into(), metadata })?;
         for (name, media_type, bytes) in attachments {
-            self.mcap.attach(&mcap::Attachment {
-                log_time: start_utc_ns,
-                create_time: start_utc_ns,
-                name: name.to_string(),
-                media_type: media_type.to_string(),
-                data: Cow::Borrowed(bytes),
-            })?;
+            self.attach(name, media_type, bytes, start_utc_ns)?;
         }
         for (index, topic) in Topic::ALL.iter().enumerate() {
             let schema = topic.schema();
@@ -92,6 +87,34 @@ impl Output {
             debug_assert_eq!(usize::from(channel), index + 1);
         }
         Ok(())
+    }
+
+    /// Writes the URDF with primitive shapes, and the metadata that names it.
+    pub fn robot(&mut self, robot: &RobotDescription, start_utc_ns: u64) -> Result<(), McapError> {
+        let mut metadata = BTreeMap::from([
+            ("name".to_string(), robot.name.clone()),
+            ("root_link".to_string(), robot.trunk.name.clone()),
+            ("joints".to_string(), robot.joint_names.join(" ")),
+        ]);
+        if let Some((name, _)) = robot.urdf() {
+            metadata.insert("urdf".to_string(), name.to_string());
+        }
+        if let Some(text) = robot.urdf_with_visual_shapes() {
+            let name = format!("{}.visual.urdf", robot.name);
+            self.attach(&name, "application/xml", text.as_bytes(), start_utc_ns)?;
+            metadata.insert("urdf_with_shapes".to_string(), name);
+        }
+        self.mcap.write_metadata(&Metadata { name: "robot".into(), metadata })
+    }
+
+    fn attach(&mut self, name: &str, media_type: &str, bytes: &[u8], time: u64) -> Result<(), McapError> {
+        self.mcap.attach(&mcap::Attachment {
+            log_time: time,
+            create_time: time,
+            name: name.to_string(),
+            media_type: media_type.to_string(),
+            data: Cow::Borrowed(bytes),
+        })
     }
 
     pub fn message(

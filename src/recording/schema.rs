@@ -103,7 +103,14 @@ pub fn decode(topic: Topic, data: &[u8]) -> Result<Option<Record>, DecodeError> 
         Topic::Search => Record::Search(decoded(trials::search, frog::Search::decode(data)?)?),
         Topic::Insight => Record::Insight(decoded(trials::insight, frog::Insight::decode(data)?)?),
         Topic::Points => Record::Points(decoded(trials::points, frog::Points::decode(data)?)?),
-        Topic::JointStates | Topic::JointCommand | Topic::Tick | Topic::Pose | Topic::Tf | Topic::Marker => {
+        Topic::JointStates
+        | Topic::JointCommand
+        | Topic::Tick
+        | Topic::Pose
+        | Topic::Tf
+        | Topic::Marker
+        | Topic::RobotScene
+        | Topic::GroundScene => {
             return Ok(None);
         }
     }))

@@ -11,13 +11,18 @@ use super::error::RecordingError;
 pub use super::output::Sink;
 use super::output::{Output, with_suffix};
 use super::record::{Record, SessionInfo, Stamped};
+use super::scene::{self, Ground};
 use super::topic::Topic;
 use super::{coordinate_frames, frog, tick};
 use crate::robot::description::RobotDescription;
 use crate::telemetry::{Mode, Tick};
+use crate::trial::TrialRecord;
 
 /// Period of `/robot/pose` and `/tf`, for viewers; both follow from the ticks.
 const FRAMES_PERIOD_NS: u64 = 10_000_000;
+
+/// Returns the ground of a trial that begins, or with none that of the start; none where it is not known.
+pub type GroundOf = Box<dyn Fn(Option<&TrialRecord>) -> Option<Ground> + Send>;
 
 /// Writer of one recording. Dropped without [`finish`](Writer::finish), it leaves the file as `*.mcap.part` with everything
 /// written so far.
@@ -25,6 +30,9 @@ pub struct Writer {
     out: Output,
     joints: JointStates,
     robot: Option<RobotDescription>,
+    ground_of: Option<GroundOf>,
+    /// The ground written last.
+    ground: Option<Ground>,
     start_utc_ns: u64,
     /// Trial and mode of the last tick: a change may be a marker.
     last: Option<(Option<u32>, Mode)>,
@@ -95,8 +103,10 @@ impl Writer {
     ) -> Result<Writer, RecordingError> {
         let mut writer = Writer {
             out: Output::new(sink).map_err(|error| error_at(&part, error))?,
-            joints: tick::named_joints(),
+            joints: tick::named_joints(None),
             robot: None,
+            ground_of: None,
+            ground: None,
             start_utc_ns,
             last: None,
             last_frames: None,
@@ -112,9 +122,34 @@ impl Writer {
         Ok(writer)
     }
 
-    /// Adds `/tf` to the following ticks: the frames of this robot's links, for 3D viewers.
-    pub fn show_links_of(&mut self, robot: RobotDescription) {
+    /// Adds the robot for viewers in three dimensions: its URDF with primitive shapes as an attachment, named in the metadata
+    /// `robot`; its shapes and the ground; the frames of its links with the following ticks; its joint names. `ground` returns
+    /// the ground of a trial that begins, and with none that of the start.
+    ///
+    /// # Errors
+    /// When the disk fails.
+    pub fn show(&mut self, robot: RobotDescription, ground: GroundOf) -> Result<(), RecordingError> {
+        self.joints = tick::named_joints(Some(&robot));
+        self.out
+            .robot(&robot, self.start_utc_ns)
+            .and_then(|()| {
+                self.out.message(Topic::RobotScene, 0, self.start_utc_ns, &scene::robot(&robot, self.start_utc_ns))
+            })
+            .map_err(|error| self.failure(error))?;
         self.robot = Some(robot);
+        self.ground_of = Some(ground);
+        self.write_ground(None, self.start_utc_ns).map_err(|error| self.failure(error))?;
+        self.sync()
+    }
+
+    /// Writes the ground of a trial that begins, or of the start, if it differs from the one before.
+    fn write_ground(&mut self, trial: Option<&TrialRecord>, log_time: u64) -> Result<(), McapError> {
+        let Some(ground) = self.ground_of.as_ref().and_then(|ground| ground(trial)) else { return Ok(()) };
+        if self.ground.as_ref() != Some(&ground) {
+            self.out.message(Topic::GroundScene, 0, log_time, &scene::ground(&ground, log_time))?;
+            self.ground = Some(ground);
+        }
+        Ok(())
     }
 
     /// Writes one tick.
@@ -166,6 +201,11 @@ impl Writer {
     pub fn record(&mut self, stamped: &Stamped) -> Result<(), RecordingError> {
         let log_time = self.start_utc_ns.saturating_add(stamped.time_ns);
         self.records = self.records.wrapping_add(1);
+        if let Record::Trial(row) = &stamped.record
+            && row.verdict.is_none()
+        {
+            self.write_ground(Some(row), log_time).map_err(|error| self.failure(error))?;
+        }
         self.out
             .record(&stamped.record, self.start_utc_ns, self.records, log_time)
             .and_then(|()| self.out.close_full_chunk())

@@ -292,6 +292,7 @@ impl Draw {
                 risk: self.risk(),
                 expected: self.option(Draw::expected),
                 gains: self.several(|d| (d.string(), d.number())).into(),
+                seed: self.option(Draw::word),
                 repeats: self.several(|d| RepeatRecord {
                     seed: d.word(),
                     verdict: d.option(|d| d.one_of(&Verdict::ALL)),

@@ -170,6 +170,8 @@ impl RobotFiles {
             lying_position,
             rotor_inertia,
             imu_origin: parts.imu_origin.unwrap_or_else(Vector3::zeros),
+            joint_names: parts.joint_names,
+            links: parts.links,
             files: vec![("robot.toml".to_owned(), self.toml.to_string()), (urdf_name, urdf.into_owned())],
         })
     }
