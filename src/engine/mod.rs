@@ -12,7 +12,7 @@ mod study;
 
 pub use folder::{STUDY_FILE, attachments, fingerprint, newest_config, prepare_folder, study_files, utc_ns};
 pub use guard::{GUARD, GuardError, GuardOutcome, run_guard};
-pub use options::{EngineError, Options};
+pub use options::{EngineError, Options, Provenance};
 pub use prior::{PRIOR_FILE, PriorFileError, PriorMaker, ReadyPrior, prior_plan};
 pub use recording::create_recording;
 pub use stored::{Opened, StoredStudy, open_stored, stored_studies, stored_study};

@@ -4,6 +4,7 @@
 //! A recording is an MCAP file of protobuf messages; `recordings/README.md` lists its topics, `proto/frog.proto` its
 //! fields. While it grows it is named `*.mcap.part`; only a finished one is named `*.mcap`.
 
+mod comments;
 mod container;
 mod coordinate_frames;
 pub mod disk;
@@ -18,6 +19,7 @@ pub mod scene;
 mod schema;
 mod tick;
 mod topic;
+mod trial_table;
 mod trials;
 mod wire;
 pub mod writer;

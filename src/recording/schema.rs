@@ -144,6 +144,9 @@ fn session(way: Way, ours: &mut SessionInfo, m: &mut frog::Session) -> Result<()
     way.copy(&mut ours.started, &mut m.started);
     way.copy(&mut ours.observe, &mut m.observe);
     way.list(&mut ours.gains, &mut m.gains, bounds)?;
+    way.copy(&mut ours.commit, &mut m.commit);
+    way.copy(&mut ours.host, &mut m.host);
+    way.copy(&mut ours.operator, &mut m.operator);
     match way {
         Way::Encode => {
             m.backend = ours.backend_name().to_owned();

@@ -1,5 +1,6 @@
 //! Writer of a recording: a live session, or a single rollout at once.
 
+use std::collections::BTreeMap;
 use std::fs::{self, OpenOptions};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -13,7 +14,9 @@ use super::output::{Output, with_suffix};
 use super::record::{Record, SessionInfo, Stamped};
 use super::scene::{self, Ground};
 use super::topic::Topic;
-use super::{coordinate_frames, frog, tick};
+use super::trial_table::{self, TrialSpan};
+use super::wire::encoded;
+use super::{coordinate_frames, frog, tick, trials};
 use crate::robot::description::RobotDescription;
 use crate::telemetry::{Mode, Tick};
 use crate::trial::TrialRecord;
@@ -34,6 +37,10 @@ pub struct Writer {
     /// The ground written last.
     ground: Option<Ground>,
     start_utc_ns: u64,
+    /// Log times of the first and last tick of each trial in this file.
+    spans: BTreeMap<u32, TrialSpan>,
+    /// The newest row of each trial.
+    rows: BTreeMap<u32, TrialRecord>,
     /// Trial and mode of the last tick: a change may be a marker.
     last: Option<(Option<u32>, Mode)>,
     last_frames: Option<u64>,
@@ -108,6 +115,8 @@ impl Writer {
             ground_of: None,
             ground: None,
             start_utc_ns,
+            spans: BTreeMap::new(),
+            rows: BTreeMap::new(),
             last: None,
             last_frames: None,
             records: 0,
@@ -178,6 +187,9 @@ impl Writer {
                 )?;
             }
         }
+        if let Some(trial) = tick.trial {
+            self.spans.entry(trial).or_insert((log_time, log_time)).1 = log_time;
+        }
         self.ticks += 1;
         // Not between the messages of a tick: a chunk holds whole ticks.
         self.out.close_full_chunk()
@@ -206,10 +218,17 @@ impl Writer {
         {
             self.write_ground(Some(row), log_time).map_err(|error| self.failure(error))?;
         }
-        self.out
-            .record(&stamped.record, self.start_utc_ns, self.records, log_time)
-            .and_then(|()| self.out.close_full_chunk())
-            .map_err(|error| self.failure(error))
+        let written = match &stamped.record {
+            Record::Trial(row) => {
+                let span = self.spans.get(&row.trial);
+                let (start_ns, end_ns) = (span.map(|(start, _)| *start), span.map(|(_, end)| *end));
+                let message = frog::Trial { start_ns, end_ns, ..encoded(trials::trial, row) };
+                self.rows.insert(row.trial, row.clone());
+                self.out.message(Topic::Trial, self.records, log_time, &message)
+            }
+            record => self.out.record(record, self.start_utc_ns, self.records, log_time),
+        };
+        written.and_then(|()| self.out.close_full_chunk()).map_err(|error| self.failure(error))
     }
 
     /// Passes everything to the operating system: it then survives a crash of the program.
@@ -223,12 +242,18 @@ impl Writer {
         self.out.sync().map_err(|error| self.failure(error))
     }
 
-    /// Completes the file with its index, waits until it is on the disk, renames it and returns its final name.
+    /// Completes the file with the trial table as an attachment and with its index, waits until it is on the disk, renames it and returns its final name.
     ///
     /// # Errors
     /// When the disk fails, or when a file of the final name exists by now; the recording then keeps the name `*.part`.
     pub fn finish(mut self) -> Result<PathBuf, RecordingError> {
-        self.out.finish().map_err(|error| self.failure(error))?;
+        let attached = if self.rows.is_empty() {
+            Ok(())
+        } else {
+            let table = trial_table::csv(&self.rows, &self.spans);
+            self.out.attach(trial_table::NAME, "text/csv", &table, self.start_utc_ns)
+        };
+        attached.and_then(|()| self.out.finish()).map_err(|error| self.failure(error))?;
         if self.part != self.path {
             if self.path.exists() {
                 return Err(RecordingError::Exists { path: self.path.clone() });

@@ -2,13 +2,19 @@
 
 #[path = "support/program.rs"]
 mod program;
+#[path = "support/pty.rs"]
+mod pty;
 
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::process::Command;
 
 use program::Program;
+use pty::Session;
 use quadfrog::robot::description::RobotDescription;
 use serde_json::Value;
+
+const SIZE: (u16, u16) = (100, 30);
 
 /// Reads a recording with Python; none where Python or its packages are absent.
 fn inspected(path: &Path) -> Option<Value> {
@@ -58,9 +64,10 @@ fn shows_a_robot(found: &Value, root: &str, hip: &str) {
     children.sort_unstable();
     assert_eq!(children, names(&kept["links"]));
     assert_eq!(found["frames_change"], false);
+    // One with each pose, and none twice within 10 ms.
     let times: Vec<u64> = found["tf_times"].as_array().unwrap().iter().map(|time| time.as_u64().unwrap()).collect();
-    let span_ms = (times[times.len() - 1] - times[0]) / 1_000_000;
-    assert!(times.len() as u64 >= span_ms / 10, "{} frames in {span_ms} ms", times.len());
+    assert_eq!(found["counts"]["/robot/pose"], times.len());
+    assert!(times.windows(2).all(|pair| pair[0] < pair[1]));
 
     let [joints] = &found["joints"].as_array().unwrap()[..] else { panic!("one set of joint names") };
     assert_eq!(joints[0], hip);
@@ -80,6 +87,9 @@ fn a_recording_shows_a_moving_robot() {
     program.text(&["optimize", "--trials", "2", "--record", "all"]);
     let Some(found) = inspected(&program.study("recordings").join("session.mcap")) else { return };
     shows_a_robot(&found, "trunk", "FR_hip_joint");
+    // Simulated time has no gaps: 100 Hz.
+    let ticks = found["counts"]["/robot/tick"].as_u64().unwrap();
+    assert!(found["counts"]["/tf"].as_u64().unwrap().abs_diff(ticks / 10) <= 2, "{}", found["counts"]);
     // Flat ground does not change.
     assert_eq!(found["ground"], serde_json::json!([{ "cubes": [1], "tops": [0.0] }]));
 }
@@ -131,4 +141,120 @@ fn rerun_finds_the_transforms() {
     rerun(&["mcap", "convert", recording, "-o", "session.rrd"]);
     let printed = rerun(&["rrd", "print", "-v", "session.rrd"]).unwrap();
     assert!(printed.contains("Transform3D"), "no Transform3D:\n{}", &printed[..printed.len().min(4000)]);
+}
+
+#[test]
+fn a_study_without_a_screen_records_the_topics_of_the_console() {
+    let program = Program::new();
+    program.text(&["optimize", "--trials", "2", "--record", "all"]);
+    let folder = tempfile::tempdir().unwrap();
+    let mut session = Session::start(folder.path(), SIZE, &["--approve", "auto", "--trials", "2"]);
+    session.wait_for_long("two trials", || session.screen().contains("finished"));
+    session.send("qy");
+    session.wait();
+    let study = std::fs::read_dir(folder.path()).unwrap().next().unwrap().unwrap().path();
+    let Some(console) = inspected(&study.join("session.mcap")) else { return };
+    let Some(headless) = inspected(&program.study("recordings").join("session.mcap")) else { return };
+    let topics = |found: &Value| found["counts"].as_object().unwrap().keys().cloned().collect::<BTreeSet<_>>();
+    shows_a_robot(&console, "trunk", "FR_hip_joint");
+    // Nothing is armed in simulated time; the console records arming checks that change their state.
+    let mut of_console = topics(&console);
+    of_console.remove("/safety/pre_arm");
+    assert_eq!(topics(&headless), of_console);
+    // Two trials: mode by mode, counters ten times a second.
+    for found in [&console, &headless] {
+        assert!(found["counts"]["/fsm"].as_u64() >= Some(8), "{}", found["counts"]);
+        assert!(!found["logs"].as_array().unwrap().is_empty());
+    }
+    let per_second = headless["counts"]["/robot/tick"].as_u64().unwrap() / 100;
+    let counters = headless["counts"]["/robot/counters"].as_u64().unwrap();
+    assert!(counters.abs_diff(per_second) <= 2, "{counters} counters in {per_second} tenths of a second");
+}
+
+/// The text of an attachment.
+fn attached<'a>(found: &'a Value, name: &str) -> &'a str {
+    found["attachments"][name].as_str().unwrap_or_else(|| panic!("no {name}: {:?}", found["attachments"]))
+}
+
+#[test]
+fn a_session_can_be_rebuilt_from_its_file_alone() {
+    let program = Program::new();
+    renamed_robot(&program);
+    program.write("config/safety.toml", "[fall]\nroll_rad = 0.97\n");
+    let arguments = ["--model", "robot", "--config", "config", "--operator", "Anna Lindh", "--seed", "5"];
+    let run = ["optimize", "--trials", "2", "--record", "all"];
+    let printed = program.trials(&[&run[..], &["--json"], &arguments].concat());
+    let study = program.study("recordings");
+    let Some(found) = inspected(&study.join("session.mcap")) else { return };
+
+    let session = &found["metadata"]["session"];
+    assert_eq!(session["operator"], "Anna Lindh");
+    assert_eq!(session["version"], env!("CARGO_PKG_VERSION"));
+    let host =
+        std::fs::read_to_string("/proc/sys/kernel/hostname").map_or("unknown".into(), |host| host.trim().to_owned());
+    assert_eq!(session["host"], host.as_str());
+    let commit = session["commit"].as_str().unwrap();
+    let hexadecimal = commit.len() >= 40 && commit.chars().all(|digit| digit.is_ascii_hexdigit());
+    assert!(commit == "unknown" || hexadecimal, "{commit}");
+    assert!(session["parameters"].as_str().unwrap().contains("f0 0.75..1.75 Hz"), "{session}");
+    assert_eq!(found["counts"]["/session"], 1);
+
+    // The whole configuration with the keys of the console, the robot, and the sources of the messages.
+    for name in ["control", "console", "optimize", "prior", "safety", "simulator"] {
+        let kept = std::fs::read_to_string(study.join(format!("config/{name}.toml"))).unwrap();
+        assert_eq!(attached(&found, &format!("{name}.toml")), kept);
+    }
+    assert!(attached(&found, "safety.toml").contains("roll_rad = 0.97"));
+    assert!(attached(&found, "console.toml").contains("[keys"), "the keymap");
+    for (name, path) in [("robot.toml", "robot/robot.toml"), ("go1.urdf", "robot/go1.urdf")] {
+        assert_eq!(attached(&found, name), std::fs::read_to_string(program.path(path)).unwrap());
+    }
+    let proto = concat!(env!("CARGO_MANIFEST_DIR"), "/../proto/frog.proto");
+    assert_eq!(attached(&found, "frog.proto"), std::fs::read_to_string(proto).unwrap());
+
+    // Seeds and times of the trials, in their rows and in the table.
+    let rows = found["trials"].as_array().unwrap();
+    let table = attached(&found, "trials.csv");
+    let mut lines = table.lines();
+    assert!(
+        lines
+            .next()
+            .unwrap()
+            .starts_with("trial,source,parent,verdict,cause,value,hand_value,seed,start_ns,end_ns,f0,")
+    );
+    let mut last_end = 0;
+    for (trial, line) in (0_u64..).zip(lines) {
+        let row = rows.iter().rfind(|row| row[0] == trial).unwrap();
+        let [seed, start, end] = [&row[2], &row[3], &row[4]].map(|value| value.as_u64().unwrap());
+        assert!(start > last_end && end - start > 1_000_000_000 && end - start < 10_000_000_000, "{row}");
+        last_end = end;
+        assert!(line.contains(&format!(",{seed},{start},{end},")), "{line}");
+        let value = printed[trial as usize]["value"].as_f64().unwrap();
+        assert!(line.contains(&format!(",{value},")), "{value}: {line}");
+    }
+    assert_eq!(table.lines().count(), 3);
+}
+
+#[test]
+fn units_are_in_the_file() {
+    let program = Program::new();
+    program.text(&["optimize", "--trials", "1", "--record", "all"]);
+    let Some(found) = inspected(&program.study("recordings").join("session.mcap")) else { return };
+    let unit = |topic: &str, field: &str| found["channels"][topic][field].as_str().unwrap_or_default().to_owned();
+    assert_eq!(unit("/robot/tick", "roll"), "rad");
+    assert_eq!(unit("/robot/tick", "truth.velocity_z"), "world, m/s");
+    assert_eq!(unit("/robot/joint_cmd", "kp"), "N m/rad");
+    assert_eq!(unit("/robot/joint_states", "joints.effort"), "N m");
+    assert_eq!(unit("/opt/trial", "measured.dyaw"), "counterclockwise, unwrapped, rad");
+    assert_eq!(unit("/robot/counters", "link.state_age_ms"), "age of the newest valid state");
+}
+
+#[test]
+fn an_operator_without_a_name_is_refused() {
+    let program = Program::new();
+    for name in ["", " ", "Anna\u{1b}[2J"] {
+        let message = program.refused(&["optimize", "--trials", "1", "--operator", name]);
+        assert!(message.contains("--operator") && !message.contains('\u{1b}'), "{message:?}");
+    }
+    assert!(program.studies("recordings").is_empty());
 }

@@ -178,6 +178,12 @@ impl RobotFiles {
 }
 
 impl RobotDescription {
+    /// Returns the URDF with primitive shapes to look at: a link without a visual shape, or with a mesh as one, has the shapes
+    /// of its collision. For viewers, which do not have the files of meshes.
+    pub fn urdf_with_visual_shapes(&self) -> Option<String> {
+        urdf::with_visual_shapes(self.urdf()?.1)
+    }
+
     /// Names of the embedded robots.
     pub fn embedded_names() -> impl Iterator<Item = &'static str> {
         EMBEDDED.iter().map(|(name, ..)| *name)

@@ -125,12 +125,6 @@ impl RobotDescription {
         self.files.iter().find(|(name, _)| name != "robot.toml").map(|(name, text)| (name.as_str(), text.as_str()))
     }
 
-    /// Returns the URDF with primitive shapes to look at: a link without a visual shape, or with a mesh as one, has the shapes
-    /// of its collision. For viewers, which do not have the files of meshes.
-    pub fn urdf_with_visual_shapes(&self) -> Option<String> {
-        urdf::with_visual_shapes(self.urdf()?.1)
-    }
-
     /// Lowest and highest joint angles that a controller may command, rad: allowed by the URDF and by the maker's
     /// library.
     pub fn allowed_positions(&self) -> (Joints, Joints) {

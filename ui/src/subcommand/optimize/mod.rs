@@ -212,6 +212,7 @@ fn run_one(
         approve: Approval::Auto,
         join: join.cloned(),
         prior: prior.map(|prior| Arc::clone(&prior.model)),
+        provenance: arguments.study.provenance(),
         ..Options::new(config.clone(), robot.clone(), Backend::Simulator, study.task)
     };
     let prepared = engine::prepare_folder(&options)?;
