@@ -9,6 +9,7 @@ mod recording;
 mod session_thread;
 mod stored;
 mod study;
+mod verify;
 
 pub use folder::{STUDY_FILE, attachments, fingerprint, newest_config, prepare_folder, study_files, utc_ns};
 pub use guard::{GUARD, GuardError, GuardOutcome, run_guard};
@@ -17,6 +18,7 @@ pub use prior::{PRIOR_FILE, PriorFileError, PriorMaker, ReadyPrior, prior_plan};
 pub use recording::create_recording;
 pub use stored::{Opened, StoredStudy, open_stored, stored_studies, stored_study};
 pub use study::{check_backend, open_experiment, open_study, session_info, study_name};
+pub use verify::{TickDifference, Verification, VerifyError, verify};
 
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};

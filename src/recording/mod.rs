@@ -7,6 +7,7 @@
 mod comments;
 mod container;
 mod coordinate_frames;
+pub mod difference;
 pub mod disk;
 mod error;
 mod output;

@@ -161,6 +161,9 @@ fn a_study_without_a_screen_records_the_topics_of_the_console() {
     let mut of_console = topics(&console);
     of_console.remove("/safety/pre_arm");
     assert_eq!(topics(&headless), of_console);
+    // The console's robot stood up and waited in real time; its trials are those of the simulator all the same.
+    let verified = program.run(&["verify", study.join("session.mcap").to_str().unwrap()]);
+    assert_eq!(verified.status.code(), Some(0), "{}", String::from_utf8_lossy(&verified.stderr));
     // Two trials: mode by mode, counters ten times a second.
     for found in [&console, &headless] {
         assert!(found["counts"]["/fsm"].as_u64() >= Some(8), "{}", found["counts"]);

@@ -61,7 +61,8 @@ const LARGEST_ANGLE_RAD: f64 = 12.6;
 pub struct RobotFiles {
     folder: PathBuf,
     toml: Cow<'static, str>,
-    embedded_urdf: Option<&'static str>,
+    /// Text of the URDF; none for one that is read from the folder.
+    urdf: Option<Cow<'static, str>>,
 }
 
 impl RobotFiles {
@@ -75,7 +76,7 @@ impl RobotFiles {
             name: name.to_owned(),
             known: RobotDescription::embedded_names().collect::<Vec<_>>().join(", "),
         })?;
-        Ok(RobotFiles { folder: Path::new("robots").join(name), toml: toml.into(), embedded_urdf: Some(urdf) })
+        Ok(RobotFiles { folder: Path::new("robots").join(name), toml: toml.into(), urdf: Some(urdf.into()) })
     }
 
     /// Opens the robot in `folder`: its `robot.toml` and the URDF that `robot.toml` names.
@@ -84,7 +85,12 @@ impl RobotFiles {
     /// `robot.toml` cannot be read.
     pub fn from_folder(folder: &Path) -> Result<RobotFiles, DescriptionError> {
         let toml = read(folder.join("robot.toml"))?;
-        Ok(RobotFiles { folder: folder.to_owned(), toml: toml.into(), embedded_urdf: None })
+        Ok(RobotFiles { folder: folder.to_owned(), toml: toml.into(), urdf: None })
+    }
+
+    /// Opens the robot of two texts, as a recording has them; `origin` is for messages.
+    pub fn from_texts(origin: &Path, toml: String, urdf: String) -> RobotFiles {
+        RobotFiles { folder: origin.to_owned(), toml: toml.into(), urdf: Some(urdf.into()) }
     }
 
     /// Opens the folder `model`, if there is one, or the embedded robot of that name.
@@ -130,8 +136,8 @@ impl RobotFiles {
         }
 
         let file = self.folder.join(&robot.urdf);
-        let urdf = match self.embedded_urdf {
-            Some(text) => Cow::Borrowed(text),
+        let urdf = match &self.urdf {
+            Some(text) => Cow::Borrowed(text.as_ref()),
             None => read(file.clone())?.into(),
         };
         let parts = urdf::parse(&file, &urdf)?;

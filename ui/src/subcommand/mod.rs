@@ -17,6 +17,7 @@ mod report;
 mod reproduce;
 mod selection;
 mod study;
+mod verify;
 
 use clap::{Parser, Subcommand};
 
@@ -53,6 +54,8 @@ enum Subcommands {
     Replay(replay::ReplayArguments),
     /// Repair an incomplete recording
     Recover(recover::RecoverArguments),
+    /// Run a simulated session again from its recording alone and compare every tick
+    Verify(verify::VerifyArguments),
     /// Serve the simulator as a Go1 on the network, with fault injection
     Emulate(emulate::EmulateArguments),
     /// Measure the simulator's speed on this machine
@@ -80,6 +83,7 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
         Some(Subcommands::Reproduce(reproduce)) => reproduce::run(&reproduce),
         Some(Subcommands::Replay(replay)) => replay::run(&replay),
         Some(Subcommands::Recover(recover)) => recover::run(&recover),
+        Some(Subcommands::Verify(verify)) => verify::run(&verify),
         Some(Subcommands::Emulate(emulate)) => emulate::run(&emulate),
         Some(Subcommands::Bench(bench)) => bench::run(&bench),
         Some(Subcommands::Doctor(doctor)) => doctor::run(&doctor),
