@@ -22,6 +22,7 @@ pub struct ControlFile {
     pub contact: ContactSettings,
     pub estimator: EstimatorSettings,
     pub realtime: RealtimeFile,
+    pub recording: RecordingFile,
     pub tasks: BTreeMap<String, TaskControl>,
 }
 
@@ -34,6 +35,13 @@ pub struct RealtimeFile {
     /// Core of the thread; -1 leaves the choice to the system.
     pub core: i64,
     pub lock_memory: bool,
+}
+
+/// Rate of the ticks in a recording.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+pub struct RecordingFile {
+    /// Whether every tick is recorded while the robot is disarmed, too.
+    pub full_rate: bool,
 }
 
 /// Time from approval to impulse, in stance.

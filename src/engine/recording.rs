@@ -19,6 +19,9 @@ use nalgebra::Vector3;
 pub fn create_recording(path: &Path, options: &Options) -> Result<Writer, EngineError> {
     let info = session_info(options, &path.display().to_string());
     let mut writer = Writer::create(path, &info, utc_ns(), &attachments(options))?;
+    if !options.config.control.recording.full_rate {
+        writer.thin_while_disarmed();
+    }
     writer.show(options.robot.clone(), ground_of(options))?;
     Ok(writer)
 }

@@ -24,6 +24,9 @@ use crate::trial::TrialRecord;
 /// Period of `/robot/pose` and `/tf`, for viewers; both follow from the ticks.
 const FRAMES_PERIOD_NS: u64 = 10_000_000;
 
+/// Of the ticks while the robot is disarmed one of so many is kept by [`Writer::thin_while_disarmed`]: ten a second.
+const DISARMED_EVERY: u64 = 100;
+
 /// Returns the ground of a trial that begins, or with none that of the start; none where it is not known.
 pub type GroundOf = Box<dyn Fn(Option<&TrialRecord>) -> Option<Ground> + Send>;
 
@@ -33,6 +36,8 @@ pub struct Writer {
     out: Output,
     joints: JointStates,
     robot: Option<RobotDescription>,
+    /// Whether most ticks are left out while the robot is disarmed.
+    thinned: bool,
     ground_of: Option<GroundOf>,
     /// The ground written last.
     ground: Option<Ground>,
@@ -112,6 +117,7 @@ impl Writer {
             out: Output::new(sink).map_err(|error| error_at(&part, error))?,
             joints: tick::named_joints(None),
             robot: None,
+            thinned: false,
             ground_of: None,
             ground: None,
             start_utc_ns,
@@ -161,12 +167,27 @@ impl Writer {
         Ok(())
     }
 
+    /// From now on keeps ten ticks a second while the robot is disarmed, observed or not connected: the first one of each of
+    /// these modes and those whose number is a multiple of 100.
+    pub fn thin_while_disarmed(&mut self) {
+        self.thinned = true;
+    }
+
+    fn leaves_out(&self, tick: &Tick) -> bool {
+        let disarmed = matches!(tick.mode, Mode::Offline | Mode::Observe | Mode::Disarmed);
+        let begun = self.last == Some((None, tick.mode)) && tick.trial.is_none();
+        self.thinned && disarmed && begun && !tick.number.is_multiple_of(DISARMED_EVERY)
+    }
+
     /// Writes one tick.
     pub fn tick(&mut self, tick: &Tick) -> Result<(), RecordingError> {
         self.write_tick(tick).map_err(|error| self.failure(error))
     }
 
     fn write_tick(&mut self, tick: &Tick) -> Result<(), McapError> {
+        if self.leaves_out(tick) {
+            return Ok(());
+        }
         let log_time = self.start_utc_ns.saturating_add(tick.time_ns);
         let sequence = tick.number as u32; // joins the messages of a tick in the player
         self.write_marker(tick, log_time)?;

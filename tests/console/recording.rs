@@ -11,7 +11,9 @@ use std::process::Command;
 
 use program::Program;
 use pty::Session;
+use quadfrog::recording::player::{Played, Player};
 use quadfrog::robot::description::RobotDescription;
+use quadfrog::telemetry::Mode;
 use serde_json::Value;
 
 const SIZE: (u16, u16) = (100, 30);
@@ -260,4 +262,44 @@ fn an_operator_without_a_name_is_refused() {
         assert!(message.contains("--operator") && !message.contains('\u{1b}'), "{message:?}");
     }
     assert!(program.studies("recordings").is_empty());
+}
+
+/// Modes and numbers of the ticks of a console session in which the robot waits disarmed, stands up and the session ends.
+fn waited_and_stood_up(arguments: &[&str]) -> Vec<(Mode, u64)> {
+    let (folder, mut session) = Session::opened(SIZE, arguments);
+    std::thread::sleep(std::time::Duration::from_secs(1));
+    session.send("A");
+    session.wait_for(&["READY"]);
+    session.send("qy");
+    session.wait();
+    let study = std::fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().path());
+    let study = study.filter(|path| path.join("session.mcap").is_file()).next().expect("a finished recording");
+    Player::open(study.join("session.mcap"))
+        .unwrap()
+        .filter_map(|played| match played {
+            Played::Tick(tick) => Some((tick.mode, tick.number)),
+            Played::Record(_) => None,
+        })
+        .collect()
+}
+
+#[test]
+fn ten_ticks_a_second_are_recorded_while_the_robot_is_disarmed() {
+    let idle = |mode| matches!(mode, Mode::Offline | Mode::Observe | Mode::Disarmed);
+    let ticks = waited_and_stood_up(&[]);
+    let armed = ticks.iter().position(|(mode, _)| !idle(*mode)).expect("the robot stood up");
+    assert!((3..500).contains(&armed), "{armed} ticks while disarmed");
+    for pair in ticks.windows(2) {
+        let [(before, last), (mode, number)] = pair else { continue };
+        if idle(*mode) && before == mode {
+            assert!(number % 100 == 0, "tick {number} of {mode:?} after {last}");
+        } else if !idle(*mode) && !idle(*before) {
+            assert_eq!(*number, last + 1, "no tick is left out while the robot is armed");
+        }
+    }
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("control.toml"), "[recording]\nfull_rate = true\n").unwrap();
+    let whole = waited_and_stood_up(&["--config", folder.path().to_str().unwrap()]);
+    assert!(whole.windows(2).all(|pair| pair[1].1 == pair[0].1 + 1), "every tick with full_rate");
+    assert!(whole.iter().take_while(|(mode, _)| idle(*mode)).count() > 900);
 }

@@ -7,9 +7,11 @@ use std::path::{Path, PathBuf};
 
 use program::{Program, assert_shows};
 use quadfrog::recording::player::{Played, Player};
+use quadfrog::recording::record::SessionInfo;
 use quadfrog::recording::writer::Writer;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::telemetry::Tick;
+use quadfrog::trial::Backend;
 
 /// Attachments from which a session is simulated again.
 const PARTS: [&str; 8] = [
@@ -136,6 +138,14 @@ fn a_file_that_cannot_be_verified_is_refused_with_the_reason() {
     let (status, _, error) = verified(&program, &without);
     assert_eq!(status, Some(2), "{error}");
     assert_shows(&error, &["without.mcap", "go1.urdf is not attached"]);
+
+    let player = Player::open(&file).unwrap();
+    let session = SessionInfo { backend: Some(Backend::Hardware), ..player.session().clone() };
+    let robot = program.path("robot.mcap");
+    Writer::create(&robot, &session, player.start_utc_ns(), &[]).unwrap().finish().unwrap();
+    let (status, _, error) = verified(&program, &robot);
+    assert_eq!(status, Some(2), "{error}");
+    assert_shows(&error, &["robot.mcap", "recorded on a robot"]);
 
     program.write("noise.mcap", "this is no recording");
     assert_eq!(verified(&program, &program.path("noise.mcap")).0, Some(2));
