@@ -10,6 +10,7 @@
 //! | [`text::render`] | a page for a terminal: tables, no figures, control characters replaced |
 //! | [`page::Page::to_json`] | a page as JSON, numbers unrounded |
 
+pub mod columns;
 pub mod configuration;
 pub mod figure;
 pub mod html;
@@ -24,3 +25,4 @@ pub mod svg;
 pub mod table;
 pub mod text;
 mod ticks;
+pub mod trial_columns;

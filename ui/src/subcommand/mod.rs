@@ -17,6 +17,7 @@ mod report;
 mod reproduce;
 mod selection;
 mod study;
+mod table;
 
 use clap::{Parser, Subcommand};
 
