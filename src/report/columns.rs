@@ -139,7 +139,7 @@ impl<W: Write + Send> TableWriter<W> {
         let form = match format {
             TableFormat::Csv => {
                 let mut writer = csv::Writer::from_writer(out);
-                writer.write_record(columns.iter().map(|column| &column.name))?;
+                writer.write_record(columns.iter().map(|column| &column.name)).map_err(csv_error)?;
                 Form::Csv(writer)
             }
             TableFormat::Json => Form::Json { out, rows: 0 },
@@ -160,9 +160,8 @@ impl<W: Write + Send> TableWriter<W> {
             Form::Csv(writer) => {
                 let mut next = vec![0; columns.len()];
                 for row in 0..rows {
-                    writer.write_record(
-                        cells(columns, row, &mut next).map(|cell| cell.map_or_else(String::new, |cell| cell.0)),
-                    )?;
+                    let cells = cells(columns, row, &mut next).map(|cell| cell.map_or_else(String::new, |cell| cell.0));
+                    writer.write_record(cells).map_err(csv_error)?;
                 }
                 Ok(())
             }
@@ -210,6 +209,14 @@ fn cells(columns: &[TypedColumn], row: usize, next: &mut [usize]) -> impl Iterat
             column.cell(*next - 1)
         })
     })
+}
+
+/// Returns the error of the file behind an error of the CSV writer, so that its kind is kept.
+fn csv_error(error: csv::Error) -> io::Error {
+    match error.into_kind() {
+        csv::ErrorKind::Io(source) => source,
+        other => io::Error::other(format!("{other:?}")),
+    }
 }
 
 /// Returns the error of the file behind an error of the encoder, so that its cause, for example a full disk, is named.

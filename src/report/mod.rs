@@ -17,6 +17,7 @@ pub mod html;
 pub mod jump;
 pub mod page;
 pub mod recorded;
+pub mod signals;
 pub mod study;
 pub mod study_figures;
 pub mod study_page;
