@@ -7,6 +7,7 @@ mod console;
 mod doctor;
 mod emulate;
 mod evaluate;
+mod export;
 mod failure;
 mod guard;
 mod optimize;
@@ -17,6 +18,7 @@ mod report;
 mod reproduce;
 mod selection;
 mod study;
+mod table;
 
 use clap::{Parser, Subcommand};
 
@@ -51,6 +53,8 @@ enum Subcommands {
     Reproduce(reproduce::ReproduceArguments),
     /// Play a recorded session in the console's panels
     Replay(replay::ReplayArguments),
+    /// Export the signals of a recording as CSV, JSON or Parquet
+    Export(export::ExportArguments),
     /// Repair an incomplete recording
     Recover(recover::RecoverArguments),
     /// Serve the simulator as a Go1 on the network, with fault injection
@@ -79,6 +83,7 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
         Some(Subcommands::Evaluate(evaluate)) => evaluate::run(&evaluate),
         Some(Subcommands::Reproduce(reproduce)) => reproduce::run(&reproduce),
         Some(Subcommands::Replay(replay)) => replay::run(&replay),
+        Some(Subcommands::Export(export)) => export::run(&export),
         Some(Subcommands::Recover(recover)) => recover::run(&recover),
         Some(Subcommands::Emulate(emulate)) => emulate::run(&emulate),
         Some(Subcommands::Bench(bench)) => bench::run(&bench),
