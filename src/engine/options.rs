@@ -42,6 +42,26 @@ pub struct Options {
     pub accept_backend_change: bool,
     /// Reason why the loss of the operator's connection cannot be detected; none if it can. An arming check on hardware.
     pub unseen_connection: Option<String>,
+    /// Origin of the session, for its recording.
+    pub provenance: Provenance,
+}
+
+/// Origin of a session: program, machine and person.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Provenance {
+    /// Commit of the program's sources; `unknown` where it was built without git.
+    pub commit: String,
+    /// Name of the machine.
+    pub host: String,
+    /// Name of the operator.
+    pub operator: String,
+}
+
+impl Default for Provenance {
+    fn default() -> Provenance {
+        let unknown = || "unknown".to_owned();
+        Provenance { commit: unknown(), host: unknown(), operator: unknown() }
+    }
 }
 
 impl Options {
@@ -63,6 +83,7 @@ impl Options {
             guard: None,
             accept_backend_change: false,
             unseen_connection: None,
+            provenance: Provenance::default(),
         }
     }
 

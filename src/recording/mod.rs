@@ -4,8 +4,10 @@
 //! A recording is an MCAP file of protobuf messages; `recordings/README.md` lists its topics, `proto/frog.proto` its
 //! fields. While it grows it is named `*.mcap.part`; only a finished one is named `*.mcap`.
 
+mod comments;
 mod container;
 mod coordinate_frames;
+pub mod difference;
 pub mod disk;
 mod error;
 mod output;
@@ -13,9 +15,12 @@ pub mod player;
 pub mod record;
 pub mod recorder;
 pub mod recover;
+
+pub mod scene;
 mod schema;
 mod tick;
 mod topic;
+mod trial_table;
 mod trials;
 mod wire;
 pub mod writer;

@@ -439,6 +439,8 @@ pub struct TrialRecord {
     pub gains: ParameterValues,
     /// Judged rollouts, in order, void ones included; empty for a trial that is one rollout.
     pub repeats: Vec<RepeatRecord>,
+    /// Seed of its noise and terrain, of the first rollout if it has several; none for a trial of another program.
+    pub seed: Option<u64>,
 }
 
 impl TrialRecord {

@@ -340,7 +340,9 @@ pub fn confirms(trial: &Trial) -> bool {
 
 /// Returns the row of a trial of the study. A complete trial of another program has no verdict and counts as accepted.
 pub fn row_of(trial: &Trial, note: String, order: &[ParameterInfo]) -> TrialRecord {
-    let Origin { source, parent, gains, repeats, .. } = Origin::of_trial(trial);
+    let origin = Origin::of_trial(trial);
+    let seed = origin.seed();
+    let Origin { source, parent, gains, repeats, .. } = origin;
     let kept = TrialAttributes::of(trial);
     let fits = |verdict: &Verdict| match trial.state {
         TrialState::Complete => *verdict != Verdict::Void,
@@ -370,6 +372,7 @@ pub fn row_of(trial: &Trial, note: String, order: &[ParameterInfo]) -> TrialReco
         expected: parse(&trial.user_attributes, |_| true),
         gains,
         repeats,
+        seed,
     }
 }
 

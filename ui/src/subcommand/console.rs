@@ -134,6 +134,7 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
         guard: Some(PathBuf::from("/proc/self/exe")),
         unseen_connection: TerminalLocation::of(|name| std::env::var(name).ok()).unseen().map(str::to_owned),
         network,
+        provenance: arguments.study.provenance(),
         ..Options::new(config, robot, backend, selected.task)
     };
     engine::check_backend(&options)?;

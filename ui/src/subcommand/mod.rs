@@ -19,6 +19,7 @@ mod reproduce;
 mod selection;
 mod study;
 mod table;
+mod verify;
 
 use clap::{Parser, Subcommand};
 
@@ -57,6 +58,8 @@ enum Subcommands {
     Export(export::ExportArguments),
     /// Repair an incomplete recording
     Recover(recover::RecoverArguments),
+    /// Run a simulated session again from its recording alone and compare every tick
+    Verify(verify::VerifyArguments),
     /// Serve the simulator as a Go1 on the network, with fault injection
     Emulate(emulate::EmulateArguments),
     /// Measure the simulator's speed on this machine
@@ -85,6 +88,7 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
         Some(Subcommands::Replay(replay)) => replay::run(&replay),
         Some(Subcommands::Export(export)) => export::run(&export),
         Some(Subcommands::Recover(recover)) => recover::run(&recover),
+        Some(Subcommands::Verify(verify)) => verify::run(&verify),
         Some(Subcommands::Emulate(emulate)) => emulate::run(&emulate),
         Some(Subcommands::Bench(bench)) => bench::run(&bench),
         Some(Subcommands::Doctor(doctor)) => doctor::run(&doctor),
