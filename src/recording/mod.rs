@@ -4,10 +4,12 @@
 //! A recording is an MCAP file of protobuf messages; `recordings/README.md` lists its topics, `proto/frog.proto` its
 //! fields. While it grows it is named `*.mcap.part`; only a finished one is named `*.mcap`.
 
+mod chunk;
 mod container;
 mod coordinate_frames;
 pub mod disk;
 mod error;
+mod event_index;
 mod output;
 pub mod player;
 pub mod record;
