@@ -354,13 +354,12 @@ fn main() {
                 100.0 * reached as f64 / all.len() as f64
             );
         }
+        // The studies of a robot resemble each other: a robot is one observation.
         let compare = |a: (Proposer, usize), b: (Proposer, usize)| {
-            let differences: Vec<f64> = (0..robots)
-                .flat_map(|t| {
-                    let pairs = of(t, Some(a.0)).into_iter().zip(of(t, Some(b.0)));
-                    pairs.map(|(ours, theirs)| ours.best[a.1] - theirs.best[b.1]).collect::<Vec<_>>()
-                })
-                .collect();
+            let of_robot = |robot: usize, (proposer, after): (Proposer, usize)| {
+                mean(&of(robot, Some(proposer)).iter().map(|result| result.best[after]).collect::<Vec<_>>()).0
+            };
+            let differences: Vec<f64> = (0..robots).map(|robot| of_robot(robot, a) - of_robot(robot, b)).collect();
             let (mean, error) = mean(&differences);
             format!(
                 "- {}: {} after {} less {} after {}: {mean:+.3} ± {error:.3}, p = {:.3}\n",
@@ -386,5 +385,7 @@ fn main() {
             eprintln!("{} {}: best known {best:.3}, {:?}", task.name, target.name, target.properties);
         }
     }
-    println!("\nPaired differences over robots and studies, mean, standard error and two-sided t-test:\n\n{notes}");
+    println!(
+        "\nDifferences of the means of each robot: mean and standard error over the robots, paired two-sided t-test:\n\n{notes}"
+    );
 }

@@ -62,7 +62,8 @@ fn a_value_is_the_objective_of_the_robot_at_the_point() {
     let robots = ensemble(&plan.ensemble);
     let mut stood = 0;
     for (world, robot) in prior.worlds.iter().zip(&robots) {
-        let (description, simulator) = robot.apply(&plan.robot, &plan.simulator);
+        let (description, mut simulator) = robot.apply(&plan.robot, &plan.simulator);
+        simulator.solver.tolerance_m_s = plan.ensemble.solver_tolerance_m_s;
         let mut rollout = Rollout::new(Simulator::new(&description, &simulator).unwrap(), &plan.settings);
         for (index, (point, value)) in prior.points.iter().zip(&world.values).enumerate() {
             let named = prior.parameters.iter().zip(point);

@@ -241,6 +241,7 @@ const OPTIMIZE: &[Row] = &[
 const PRIOR: &[Row] = &[
     (&["worlds"], within!(2, 64, "robots")),
     (&["points"], within!(16, 4096, "points")),
+    (&["solver_tolerance_m_s"], within!(1e-15, 0.01, "m/s")),
     (&["seed"], within!(0, 4294967295.0)),
     (&["ranges.mass", "ranges.inertia", "ranges.torque_limit"], within!(0.2, 5, "times the description's value")),
     (&["ranges.full_torque_speed_share"], within!(0, 0.99)),

@@ -5,7 +5,9 @@ use super::jump::force_angle_rad;
 use super::recorded::{RecordedTrial, Recordings};
 use crate::optimize::ask::Direction;
 use crate::robot::description::RobotDescription;
-use crate::trial::{JumpParameters, ParameterInfo, ProposalSource, Task, TrialRecord, Verdict};
+use crate::trial::{
+    ExpectedResult, JumpParameters, ParameterInfo, PredictedTrial, ProposalSource, Task, TrialRecord, Verdict,
+};
 
 /// A study with everything that its report shows.
 #[derive(Debug, Clone)]
@@ -34,6 +36,8 @@ pub struct ReportedStudy {
     pub rows: Vec<TrialRecord>,
     /// Number of the best trial.
     pub best: Option<u32>,
+    /// The best trial by the sampler's model; none without one.
+    pub model_best: Option<PredictedTrial>,
     /// Largest torque of hip, thigh and calf, N m, and their no-load speeds, rad/s; none for an unknown robot.
     pub limits: Option<[[f64; 3]; 2]>,
     /// Recorded trials.
@@ -74,6 +78,11 @@ impl ReportedStudy {
     pub fn counted(&self) -> impl Iterator<Item = &TrialRecord> {
         let counts = |row: &&TrialRecord| matches!(row.verdict, Some(Verdict::Accept | Verdict::Fall));
         self.rows.iter().filter(counts).filter(|row| row.source != ProposalSource::Confirm)
+    }
+
+    /// Trials of which the sampler's model expected something before they ran.
+    pub fn expecting(&self) -> impl Iterator<Item = (&TrialRecord, &ExpectedResult)> {
+        self.counted().filter_map(|row| Some((row, row.expected.as_ref()?)))
     }
 
     /// Best accepted value after each trial that counts; not a number before the first accepted trial.

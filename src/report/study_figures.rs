@@ -5,7 +5,7 @@ use super::jump::JumpCurves;
 use super::study::{ReportedStudy, TrialChoice, mean_best_so_far};
 use crate::control::force_profile::{Oscillator, amplitudes_leg, force_leg};
 use crate::robot::{JOINT_NAMES, Leg};
-use crate::trial::{TrialRecord, Verdict};
+use crate::trial::{ExpectedResult, TrialRecord, Verdict};
 
 /// Styles of studies or trials, without those of falls and limits.
 const STYLES: [usize; 4] = [0, 2, 3, 4];
@@ -119,6 +119,42 @@ impl<'a> TaskStudies<'a> {
         let over = if several { format!(" over {} studies", self.studies.len()) } else { String::new() };
         let caption = format!("Convergence, {}{over}: value of each trial and best accepted value so far.", self.name);
         Figure::new(self.file("convergence"), caption, 1, [panel])
+    }
+
+    /// What the sampler expected of the trials of each study beside what came: the value with its deviation and the spread of the
+    /// simulated robots, and the probability of standing. None without an expectation.
+    pub fn expectations(&self) -> Option<Figure> {
+        let expecting = self.studies.iter().filter(|study| study.expecting().next().is_some());
+        let panels = expecting.flat_map(|study| {
+            let title = if self.studies.len() > 1 { study.label() } else { String::new() };
+            let mut value = Panel::new(title.clone(), self.trial_axis(), Axis::new("Objective J", self.unit()));
+            let expected = || study.expecting().map(|(row, expected)| (f64::from(row.trial), row, expected));
+            let band = expected().map(|(trial, _, expected)| [trial, expected.value, expected.deviation]);
+            value.series.push(Series::band("expected, mean and standard deviation", 0, band));
+            for (label, of) in [
+                ("least of the simulated robots", (|e| e.simulated_least) as fn(&ExpectedResult) -> Option<f64>),
+                ("greatest of the simulated robots", |e| e.simulated_most),
+            ] {
+                let points: Vec<_> = expected().filter_map(|(trial, _, e)| Some([trial, of(e)?])).collect();
+                if !points.is_empty() {
+                    value.series.push(Series::marks(label, STYLES[3], points));
+                }
+            }
+            let mut stands =
+                Panel::new(title, self.trial_axis(), Axis::new("Probability of standing", "").within(0.0, 1.05));
+            for (label, verdict, style) in
+                [("accepted", Verdict::Accept, STYLES[1]), ("fall", Verdict::Fall, FALL_STYLE)]
+            {
+                let of = || expected().filter(|(_, row, _)| row.verdict == Some(verdict));
+                let values = of().filter_map(|(trial, row, _)| Some([trial, row.value?]));
+                value.series.push(Series::points(label, style, values));
+                stands.series.push(Series::points(label, style, of().map(|(trial, _, e)| [trial, e.p_stand])));
+            }
+            [value, stands]
+        });
+        let panels: Vec<Panel> = panels.collect();
+        let caption = format!("Expectation of the sampler's model before each trial of {}, and what came.", self.name);
+        (!panels.is_empty()).then(|| Figure::new(self.file("expectations"), caption, 2, panels))
     }
 
     /// Each parameter over the trials, between its bounds.

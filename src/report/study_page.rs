@@ -90,6 +90,8 @@ fn results(studies: &[ReportedStudy], groups: &[Vec<&ReportedStudy>]) -> Section
         } else {
             section.blocks.push(Block::Table(best));
         }
+        section.blocks.extend(tables::expectations(group).map(Block::Table));
+        section.blocks.extend(TaskStudies::new(group).expectations().map(Block::Figure));
     }
     section
 }

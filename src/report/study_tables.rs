@@ -81,11 +81,50 @@ pub fn checkpoints(groups: &[Vec<&ReportedStudy>]) -> Table {
     table
 }
 
+/// How the expectations of the sampler's model agree with what came; none without an expectation.
+pub fn expectations(studies: &[&ReportedStudy]) -> Option<Table> {
+    let unit = studies[0].unit.as_str();
+    let columns = [
+        Column::text("study"),
+        Column::number("trials", ""),
+        Column::number("J - expected, mean", unit),
+        Column::number("root mean square", unit),
+        Column::number("expected falls", ""),
+        Column::number("falls", ""),
+    ];
+    let caption = "Trials with an expectation: difference of the value of those accepted and the expected one, sum of their \
+                   probabilities of a fall, and the falls.";
+    let mut table = Table::new(caption, columns);
+    for study in studies {
+        let trials = study.expecting().count();
+        if trials == 0 {
+            continue;
+        }
+        let accepted = study.expecting().filter(|(row, _)| row.verdict == Some(Verdict::Accept));
+        let errors: Vec<f64> = accepted.filter_map(|(row, expected)| Some(row.value? - expected.value)).collect();
+        let (mean, _) = mean_and_deviation(&errors);
+        let (square, _) = mean_and_deviation(&errors.iter().map(|error| error * error).collect::<Vec<_>>());
+        let some = |value: f64| Cell::optional(Some(value).filter(|value| value.is_finite()), 3);
+        table.rows.push(vec![
+            Cell::text(study.label()),
+            Cell::count(trials),
+            some(mean),
+            some(square.sqrt()),
+            Cell::number(study.expecting().map(|(_, expected)| 1.0 - expected.p_stand).sum(), 1),
+            Cell::count(study.expecting().filter(|(row, _)| row.verdict == Some(Verdict::Fall)).count()),
+        ]);
+    }
+    (!table.rows.is_empty()).then_some(table)
+}
+
 /// The best trial of each study of one task.
 pub fn best(group: &[&ReportedStudy]) -> Table {
     let name = group[0].task.map_or(group[0].name.as_str(), |task| task.name());
     let columns = [Column::text("study"), Column::number("trial", ""), Column::number("J", group[0].unit.as_str())];
-    let columns = columns.into_iter().chain(parameter_columns(group[0])).chain([
+    let by_model = group.iter().any(|study| study.model_best.is_some());
+    let model = ["mean by the model", "deviation"].map(|label| Column::number(label, group[0].unit.as_str()));
+    let columns = columns.into_iter().chain(model.into_iter().filter(|_| by_model));
+    let columns = columns.chain(parameter_columns(group[0])).chain([
         Column::number("dx", "m"),
         Column::number("dy", "m"),
         Column::number("dyaw", "rad"),
@@ -98,7 +137,10 @@ pub fn best(group: &[&ReportedStudy]) -> Table {
         let own =
             group[0].parameters.iter().map(|p| Cell::optional(row.parameters.get(&p.name), digits(p.low, p.high)));
         let cells = [Cell::text(study.label()), Cell::count(row.trial as usize), Cell::optional(row.value, 3)];
-        table.rows.push(cells.into_iter().chain(own).chain(measured(row)).collect());
+        let best = study.model_best;
+        let model = [best.map(|best| best.value), best.map(|best| best.deviation)];
+        let model = model.into_iter().filter(|_| by_model).map(|value| Cell::optional(value, 3));
+        table.rows.push(cells.into_iter().chain(model).chain(own).chain(measured(row)).collect());
     }
     table
 }
@@ -171,7 +213,10 @@ pub fn takeoff(study: &ReportedStudy, drawn: &[DrawnTrial]) -> Option<Table> {
 
 /// All trials of a study.
 pub fn trials(study: &ReportedStudy) -> Table {
-    let columns = [Column::number("trial", "")].into_iter().chain(parameter_columns(study)).chain([
+    let expects = study.expecting().next().is_some();
+    let expected = [Column::number("expected J", study.unit.as_str()), Column::number("P(stand)", "")];
+    let columns = [Column::number("trial", "")].into_iter().chain(parameter_columns(study));
+    let columns = columns.chain(expected.into_iter().filter(|_| expects)).chain([
         Column::number("J", study.unit.as_str()),
         Column::number("dx", "m"),
         Column::number("dy", "m"),
@@ -189,6 +234,9 @@ pub fn trials(study: &ReportedStudy) -> Table {
         let verdict = row.verdict.map_or("none", Verdict::name);
         let verdict = if study.best == Some(row.trial) { format!("{verdict}, best") } else { verdict.to_owned() };
         let cells = std::iter::once(Cell::count(row.trial as usize)).chain(parameter_cells(study, row));
+        let expected = [row.expected.map(|expected| expected.value), row.expected.map(|expected| expected.p_stand)];
+        let expected = expected.into_iter().zip([3, 2]).filter(|_| expects);
+        let cells = cells.chain(expected.map(|(value, digits)| Cell::optional(value, digits)));
         let cells = cells.chain([Cell::optional(row.value, 3)]).chain(measured(row));
         let texts = [Cell::text(verdict), Cell::text(row.source.name())];
         table.rows.push(cells.chain(texts).chain(known.then(|| Cell::text(ticks))).collect());

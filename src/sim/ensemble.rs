@@ -15,6 +15,8 @@ pub struct EnsembleSettings {
     pub points: u32,
     /// Seed of robots, points and sensor noise.
     pub seed: u32,
+    /// Least tolerance of the robots' contact solver, m/s.
+    pub solver_tolerance_m_s: f64,
     /// Ranges of the robots' properties.
     pub ranges: PropertyRanges,
 }

@@ -25,12 +25,11 @@ pub(super) fn add_joint_constraints(
             // gap + h v >= 0
             if gap + h * sign * free < MARGIN_RAD {
                 let rhs = sign * free + solver.gap_velocity(gap, h);
-                solver.add_joint(step, joint, sign, rhs, [0.0, f64::INFINITY]);
+                solver.add_joint_stop(step, joint, sign, rhs);
             }
         }
         if dry_friction[joint] > 0.0 {
-            let most = dry_friction[joint] * h;
-            solver.add_joint(step, joint, 1.0, free, [-most, most]);
+            solver.add_joint_friction(step, joint, free, dry_friction[joint] * h);
         }
     }
 }

@@ -2,6 +2,8 @@
 
 #[path = "support/program.rs"]
 mod program;
+#[path = "support/pty.rs"]
+mod pty;
 
 use std::fs;
 use std::os::unix::process::ExitStatusExt as _;
@@ -9,6 +11,7 @@ use std::path::PathBuf;
 use std::process::Command;
 
 use program::{Program, assert_shows};
+use pty::Session;
 use serde_json::Value;
 
 /// The program with a configuration of a small prior in `mine`.
@@ -196,4 +199,56 @@ fn a_python_program_optimizes_its_own_function() {
     let found = run("3");
     assert!(found["best"].as_f64().unwrap() > 0.95, "{found}");
     assert_eq!(run("3"), found, "the same seed, the same points");
+}
+
+/// The console on a pseudo-terminal: the prior is made behind the session; the card has the expectation, the review also what
+/// came, the Optimizer view the simulated robots, and the journal both.
+#[test]
+fn the_console_makes_the_prior_and_shows_what_it_expects_and_what_came() {
+    let program = Program::new();
+    program.write("mine/prior.toml", "worlds = 2\npoints = 64\n");
+    let mut console = Session::start(&program.path(""), (120, 40), &["--sampler", "sim", "--config", "mine"]);
+    console.wait_for(&["Simulating the prior, ", " of 128 jumps"]);
+    let card = ["Trial #0", " expected ", "stands with", "simulated robots"];
+    console.wait_for_long("a proposal after the prior", || {
+        let screen = console.screen();
+        card.iter().all(|text| screen.contains(text)) && screen.contains("Press A to arm")
+    });
+    console.send("A");
+    console.wait_for(&["Press g twice"]);
+    console.approve();
+    console.wait_for(&["judge it", "stands with"]);
+    console.send("a");
+    console.wait_for(&["Trial #1"]);
+    console.send("3");
+    console.wait_for(&["Robot beside the simulated robots", "times", "world 1", "world 2"]);
+    console.send("qy");
+    assert!(console.wait().success());
+
+    let study = program.studies("").into_iter().find(|path| path.join("study.log").exists()).unwrap();
+    let place = study.to_str().unwrap();
+    let trials: Value = serde_json::from_str(&program.text(&["study", "export", place, "--format", "json"])).unwrap();
+    let (judged, attributes) = (&trials[0], &trials[0]["user_attrs"]);
+    assert_eq!(attributes["verdict"], "accept", "{judged}");
+    let expected = attributes["predicted"].as_f64().unwrap();
+    let worlds = ["least", "most"].map(|end| attributes[format!("simulated_{end}")].as_f64().unwrap());
+    assert!(worlds[0] < worlds[1] && expected > 0.0, "{judged}");
+    assert!(attributes["p_stand"].as_f64().is_some_and(|p| (0.0..=1.0).contains(&p)));
+    // The report has the same numbers.
+    let page: Value = serde_json::from_str(&program.text(&["report", "--json", place])).unwrap();
+    let tables = page["sections"].as_array().unwrap().iter().flat_map(|section| section["blocks"].as_array().unwrap());
+    let table = |caption: &str| {
+        let mut tables = tables.clone().filter_map(|block| block.get("table"));
+        tables.find(|table| table["caption"].as_str().unwrap().starts_with(caption)).unwrap()
+    };
+    let cell = |table: &Value, name: &str| {
+        let columns = table["columns"].as_array().unwrap();
+        table["rows"][0][columns.iter().position(|column| column["name"] == name).unwrap()].clone()
+    };
+    assert_eq!(cell(table("Trials of"), "expected J").as_f64(), Some(expected));
+    let value = judged["value"].as_f64().unwrap();
+    let difference = cell(table("Trials with an expectation"), "J - expected, mean").as_f64().unwrap();
+    assert!((difference - (value - expected)).abs() < 1e-9, "{difference} is not {value} - {expected}");
+    let figures: Vec<&Value> = tables.filter_map(|block| block.get("figure")).collect();
+    assert!(figures.iter().any(|figure| figure["name"] == "forward-expectations"), "{figures:?}");
 }

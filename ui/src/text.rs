@@ -40,6 +40,7 @@ pub fn report(session: &SessionModel) -> Vec<String> {
         f1_hz: 0.0,
         parameters: info.parameters.iter().filter_map(|parameter| session.parameter(&parameter.name)).collect(),
         best: session.trials.best().map(|best| best.trial),
+        model_best: session.trials.model_best,
         limits: None,
         recordings: Recordings::default(),
         changed: Vec::new(),

@@ -92,7 +92,9 @@ pub fn simulate(
         let ready = match rollout.take() {
             Some((of, ready)) if of == robot => ready,
             _ => {
-                let (description, simulator) = robots[robot].apply(&plan.robot, &plan.simulator);
+                let (description, mut simulator) = robots[robot].apply(&plan.robot, &plan.simulator);
+                let tolerance_m_s = &mut simulator.solver.tolerance_m_s;
+                *tolerance_m_s = tolerance_m_s.max(plan.ensemble.solver_tolerance_m_s);
                 Rollout::new(Simulator::new(&description, &simulator)?, &plan.settings)
             }
         };

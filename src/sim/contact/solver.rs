@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::ContactPoint;
 use super::law::{LocalProblem, into_cone};
-use crate::robot::{JOINTS, LEGS};
+use crate::robot::{JOINTS, Joints, LEGS};
 use crate::sim::config::{ContactConfig, ContactLaw, SolverConfig};
 use crate::sim::dynamics::{Dynamics, Six, add_scaled, dot};
 use crate::sim::motion::{GeneralizedVelocity, StepContext, TRUNK};
@@ -44,6 +44,8 @@ pub(in crate::sim) struct ContactConstraint {
 #[derive(Debug, Clone, Copy)]
 struct JointConstraint {
     leg: usize,
+    /// Joint of a friction row, whose impulse is kept for the next step; none for a stop.
+    friction_of: Option<usize>,
     trunk_row: Six,
     leg_row: Vector3<f64>,
     /// Diagonal element of the Delassus matrix.
@@ -67,6 +69,8 @@ pub(in crate::sim) struct ContactSolver {
     warm_start: Vec<Option<Vector3<f64>>>,
     /// Slots of `warm_start` that hold an impulse.
     warm_slots: Vec<usize>,
+    /// Impulses of the joints' dry friction in the last step, N m s.
+    friction_warm_start: Joints,
     /// Share of a slip velocity that the convex law keeps over this step.
     kept_slip: f64,
 }
@@ -79,6 +83,7 @@ impl ContactSolver {
             joint_rows: Vec::with_capacity(MAX_JOINT_ROWS),
             warm_start: vec![None; warm_start_slots],
             warm_slots: Vec::with_capacity(MAX_CONTACTS),
+            friction_warm_start: [0.0; JOINTS],
             law: contact.law,
             slip_time_s: contact.slip_time_s,
             kept_slip: 0.0,
@@ -91,6 +96,7 @@ impl ContactSolver {
         self.joint_rows.clear();
         self.warm_start.fill(None);
         self.warm_slots.clear();
+        self.friction_warm_start = [0.0; JOINTS];
     }
 
     /// Starts a step of `h` seconds.
@@ -179,9 +185,23 @@ impl ContactSolver {
         });
     }
 
-    /// Adds the row of a joint's stop or friction that acts on joint `joint` in the direction `sign`. `rhs` is the
-    /// velocity in that direction, to be taken to zero or above; `bounds` are those of the impulse, N m s.
-    pub fn add_joint(&mut self, step: &StepContext, joint: usize, sign: f64, rhs: f64, bounds: [f64; 2]) {
+    /// Adds the row of the stop of joint `joint` that pushes in the direction `sign`. `rhs` is the velocity in that direction, to
+    /// be taken to zero or above.
+    pub fn add_joint_stop(&mut self, step: &StepContext, joint: usize, sign: f64, rhs: f64) {
+        self.add_joint(step, joint, sign, rhs, [0.0, f64::INFINITY]);
+    }
+
+    /// Adds the row of the dry friction of joint `joint`: it takes the velocity `rhs` to zero with an impulse of at most `most`,
+    /// N m s.
+    pub fn add_joint_friction(&mut self, step: &StepContext, joint: usize, rhs: f64, most: f64) {
+        self.add_joint(step, joint, 1.0, rhs, [-most, most]);
+        if let Some(row) = self.joint_rows.last_mut() {
+            row.friction_of = Some(joint);
+            row.impulse = self.friction_warm_start[joint].clamp(-most, most);
+        }
+    }
+
+    fn add_joint(&mut self, step: &StepContext, joint: usize, sign: f64, rhs: f64, bounds: [f64; 2]) {
         let (leg, part) = (joint / 3, joint % 3);
         let mut u = Vector3::zeros();
         u[part] = sign;
@@ -191,7 +211,18 @@ impl ContactSolver {
         let leg_row = l.factor_inverse * u;
         let delassus = dot(&trunk_row, &trunk_row) + leg_row.norm_squared();
         let [lowest, highest] = bounds;
-        self.joint_rows.push(JointConstraint { leg, trunk_row, leg_row, delassus, rhs, lowest, highest, impulse: 0.0 });
+        let (friction_of, impulse) = (None, 0.0);
+        self.joint_rows.push(JointConstraint {
+            leg,
+            friction_of,
+            trunk_row,
+            leg_row,
+            delassus,
+            rhs,
+            lowest,
+            highest,
+            impulse,
+        });
     }
 
     /// Solves for all impulses; returns the change of velocity that they make.
@@ -199,6 +230,9 @@ impl ContactSolver {
         let mut sums = ImpulseSums { trunk: [0.0; 6], legs: [Vector3::zeros(); LEGS + 1] };
         for contact in &self.contacts {
             contact.add(&mut sums, &contact.impulse);
+        }
+        for row in &self.joint_rows {
+            row.add(&mut sums, row.impulse);
         }
         for _ in 0..self.config.max_sweeps {
             let mut change: f64 = 0.0;
@@ -214,8 +248,7 @@ impl ContactSolver {
                 let impulse = (row.impulse - velocity / row.delassus).clamp(row.lowest, row.highest);
                 let step = impulse - row.impulse;
                 row.impulse = impulse;
-                add_scaled(&mut sums.trunk, &row.trunk_row, step);
-                sums.legs[row.leg] += row.leg_row * step;
+                row.add(&mut sums, step);
                 change = change.max((row.delassus * step).abs());
             }
             if change < self.config.tolerance_m_s {
@@ -230,6 +263,11 @@ impl ContactSolver {
             self.warm_start[contact.warm_start_slot] = Some(contact.impulse_world);
             self.warm_slots.push(contact.warm_start_slot);
         }
+        for row in &self.joint_rows {
+            if let Some(joint) = row.friction_of {
+                self.friction_warm_start[joint] = row.impulse;
+            }
+        }
         // dv_0 = L^-T y_0,  ddq_l = C^-T y_l - G dv_0
         let mut trunk = sums.trunk;
         dynamics.solve_upper(&mut trunk);
@@ -243,6 +281,15 @@ impl ContactSolver {
 struct ImpulseSums {
     trunk: Six,
     legs: [Vector3<f64>; LEGS + 1],
+}
+
+impl JointConstraint {
+    /// Adds the impulse `p` to the sums.
+    #[inline]
+    fn add(&self, sums: &mut ImpulseSums, p: f64) {
+        add_scaled(&mut sums.trunk, &self.trunk_row, p);
+        sums.legs[self.leg] += self.leg_row * p;
+    }
 }
 
 impl ContactConstraint {

@@ -11,7 +11,7 @@ use quadfrog::report::recorded::Recordings;
 use quadfrog::report::study::{ReportedStudy, limits_of};
 use quadfrog::robot::description::{RobotDescription, RobotFiles};
 use quadfrog::session::experiment::rows_of;
-use quadfrog::trial::Backend;
+use quadfrog::trial::{Backend, PredictedTrial};
 use serde_json::Value;
 
 use crate::subcommand::failure::Failure;
@@ -95,6 +95,11 @@ fn reported(
         parameters: opened.parameters.clone(),
         rows,
         best: study.best().map(|best| best.number),
+        model_best: study.model_best().map(|best| PredictedTrial {
+            trial: best.trial,
+            value: best.predicted,
+            deviation: best.predicted_deviation,
+        }),
         limits: robot.as_ref().map(limits_of),
         recordings,
         changed: kept.map_or_else(Vec::new, |_| configuration::differences(&defaults.as_run, &config.as_run)),
