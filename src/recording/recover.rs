@@ -10,6 +10,7 @@ use mcap::records::Record;
 
 use super::container::Container;
 use super::error::RecordingError;
+use super::event_index;
 use super::output::{Output, with_suffix};
 use super::topic::Topic;
 
@@ -94,8 +95,7 @@ pub fn recover_to(path: &Path, target: &Path) -> Result<Recovered, RecordingErro
 struct RecordCopier {
     out: Output,
     schemas: HashMap<u16, u16>,
-    channels: HashMap<u16, u16>,
-    tick_channel: Option<u16>,
+    channels: HashMap<u16, (u16, Option<Topic>)>,
     done: CopyCounts,
 }
 
@@ -111,7 +111,7 @@ struct CopyCounts {
 impl RecordCopier {
     fn new(out: Output) -> RecordCopier {
         let (schemas, channels) = (HashMap::new(), HashMap::new());
-        RecordCopier { out, schemas, channels, tick_channel: None, done: CopyCounts::default() }
+        RecordCopier { out, schemas, channels, done: CopyCounts::default() }
     }
 
     /// Copies everything, metadata and attachments first.
@@ -124,6 +124,8 @@ impl RecordCopier {
         }
         for span in container.attachments.clone() {
             match container.read_attachment(span) {
+                // The new file has an index of its own events.
+                Ok(attachment) if attachment.name == event_index::NAME => {}
                 Ok(attachment) => self.out.mcap.attach(&attachment)?,
                 Err(_) => self.done.damaged_extras += 1,
             }
@@ -154,16 +156,16 @@ impl RecordCopier {
             Record::Channel(channel) => {
                 let schema = self.schemas.get(&channel.schema_id).copied().unwrap_or_default();
                 let id = mcap.add_channel(schema, &channel.topic, &channel.message_encoding, &BTreeMap::new())?;
-                self.channels.insert(channel.id, id);
-                if channel.topic == Topic::Tick.name() {
-                    self.tick_channel = Some(channel.id);
-                }
+                self.channels.insert(channel.id, (id, Topic::from_name(&channel.topic)));
             }
             Record::Message { mut header, data } => {
-                if let Some(&id) = self.channels.get(&header.channel_id) {
+                if let Some(&(id, topic)) = self.channels.get(&header.channel_id) {
                     self.done.messages += 1;
-                    self.done.ticks += u64::from(self.tick_channel == Some(header.channel_id));
+                    self.done.ticks += u64::from(topic == Some(Topic::Tick));
                     header.channel_id = id;
+                    if let Some(topic) = topic {
+                        self.out.events.add(topic, id, header.log_time, &data);
+                    }
                     mcap.write_to_known_channel(&header, &data)?;
                 }
             }
