@@ -270,3 +270,203 @@ fn a_file_that_is_no_recording_is_rejected_with_its_name() {
     let missing = Player::open(folder.path().join("missing.mcap")).err().unwrap();
     assert!(matches!(missing, RecordingError::Io { .. }) && missing.to_string().contains("missing.mcap"), "{missing}");
 }
+
+/// The bytes of the attachment with the copies of the events.
+fn copies(finished: &[u8]) -> std::ops::Range<usize> {
+    let summary = mcap::Summary::read(finished).unwrap().unwrap();
+    let index = summary.attachment_indexes.iter().find(|index| index.name == "events.binpb").unwrap();
+    index.offset as usize..(index.offset + index.length) as usize
+}
+
+#[test]
+fn a_finished_file_lists_its_events_without_its_chunks() {
+    // Every chunk but the first, which holds the channels, is destroyed: the events are still all there.
+    let Whole { finished, everything, .. } = whole();
+    let mut bytes = finished.clone();
+    let summary = mcap::Summary::read(finished).unwrap().unwrap();
+    for chunk in &summary.chunk_indexes[1..] {
+        let from = chunk.chunk_start_offset as usize + 64;
+        bytes[from..from + 64].iter_mut().for_each(|byte| *byte ^= 0x55);
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let whole = Player::open(file(folder.path(), "whole.mcap", finished)).unwrap();
+    let player = Player::open(file(folder.path(), "session.mcap", &bytes)).unwrap();
+    assert!(player.events().len() > 10 && player.markers().len() > 1);
+    assert_eq!(player.events(), whole.events());
+    assert_eq!(player.markers(), whole.markers());
+    let recorded =
+        |played: &&Played| matches!(played, Played::Record(stamped) if !matches!(stamped.record, Record::Counters(_)));
+    assert_eq!(player.events().len() - 1, everything.iter().filter(recorded).count(), "and the session's own record");
+}
+
+#[test]
+fn copies_of_events_that_are_missing_or_damaged_or_of_another_file_are_not_used() {
+    let Whole { finished, part, .. } = whole();
+    let folder = tempfile::tempdir().unwrap();
+    let expected = Player::open(file(folder.path(), "whole.mcap", finished)).unwrap();
+    let at = copies(finished);
+    let (mut flipped, mut unguarded) = (finished.clone(), finished.clone());
+    flipped[at.start + 200] ^= 1;
+    // Without its checksum an attachment could say anything.
+    unguarded[at.start + 200] ^= 1;
+    unguarded[at.end - 4..at.end].fill(0);
+    let other = folder.path().join("other.mcap");
+    let (ticks, records) = study(2);
+    write(&other, &in_order(&ticks, &records));
+    let other = fs::read(other).unwrap();
+    let foreign = [part, &other[copies(&other)]].concat();
+    for (name, bytes) in [("flipped", &flipped), ("unguarded", &unguarded), ("missing", part), ("foreign", &foreign)] {
+        let player = Player::open(file(folder.path(), name, bytes)).unwrap();
+        assert_eq!(player.events(), expected.events(), "{name}");
+        assert_eq!(player.markers(), expected.markers(), "{name}");
+    }
+}
+
+#[test]
+fn a_recovered_file_lists_its_own_events() {
+    let folder = tempfile::tempdir().unwrap();
+    let finished = &whole().finished;
+    let recovered = recover(file(folder.path(), "session.mcap", finished)).unwrap();
+    let bytes = fs::read(&recovered.path).unwrap();
+    let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
+    assert_eq!(summary.attachment_indexes.iter().filter(|index| index.name == "events.binpb").count(), 1);
+    let mut damaged = bytes.clone();
+    for chunk in &summary.chunk_indexes[1..] {
+        damaged[chunk.chunk_start_offset as usize + 100] ^= 1;
+    }
+    let expected = Player::open(&recovered.path).unwrap();
+    let player = Player::open(file(folder.path(), "damaged.mcap", &damaged)).unwrap();
+    assert_eq!(player.events(), expected.events());
+}
+
+/// The bytes of the chunk with the most data, and of its checksum: after opcode, length, two times and its length.
+fn largest_chunk(finished: &[u8]) -> (std::ops::Range<usize>, std::ops::Range<usize>) {
+    let summary = mcap::Summary::read(finished).unwrap().unwrap();
+    let chunk = summary.chunk_indexes.iter().max_by_key(|chunk| chunk.chunk_length).unwrap();
+    let start = chunk.chunk_start_offset as usize;
+    (start..start + chunk.chunk_length as usize, start + 9 + 24..start + 9 + 28)
+}
+
+#[test]
+fn a_chunk_without_a_checksum_is_decoded_before_it_is_believed() {
+    let Whole { finished, everything, .. } = whole();
+    let folder = tempfile::tempdir().unwrap();
+    let (chunk, checksum) = largest_chunk(finished);
+    // Only the checksum is gone: everything is there, and the missing checksum is reported.
+    let mut bytes = finished.clone();
+    bytes[checksum.clone()].fill(0);
+    let (played, damage) = play_damaged(&file(folder.path(), "unguarded.mcap", &bytes)).unwrap();
+    assert!(damage.unwrap().contains("1 chunks without a checksum"));
+    assert_equal(&played, everything);
+    // Flips anywhere in it, too: what cannot be decoded is left out, and nothing of it is played.
+    let data = checksum.end + 4 + 4 + 8..chunk.end;
+    let mut found = 0;
+    for place in 0..20 {
+        let at = data.start + (data.len() - 1) * place / 20;
+        bytes[at..at + 2].iter_mut().for_each(|byte| *byte ^= 0xff);
+        let mut player = Player::open(file(folder.path(), "session.mcap", &bytes)).unwrap();
+        let missing = everything.len() + 1 - player.by_ref().count();
+        assert!(player.damage().is_some());
+        let lost: Vec<_> = player.lost().collect();
+        assert_eq!(lost.len(), usize::from(missing > 0));
+        if let [lost] = lost.as_slice() {
+            assert!((50..300).contains(&missing), "{missing} are missing");
+            assert_eq!(player.lost_ns(), lost.to_ns - lost.from_ns);
+            found += 1;
+        }
+        bytes[at..at + 2].iter_mut().for_each(|byte| *byte ^= 0xff);
+    }
+    assert!(found >= 10, "{found} of 20 flips make the chunk undecodable");
+}
+
+#[test]
+fn a_summary_without_a_checksum_is_not_believed() {
+    let Whole { finished, everything, .. } = whole();
+    let folder = tempfile::tempdir().unwrap();
+    let mut bytes = finished.clone();
+    let footer = bytes.len() - 8 - 20;
+    let summary = u64::from_le_bytes(bytes[footer..footer + 8].try_into().unwrap()) as usize;
+    bytes[footer + 16..footer + 20].fill(0);
+    // The times of the chunks in the index.
+    for at in (summary..footer - 40).filter(|&at| finished[at] == 8 && finished[at + 3..at + 9] == [0; 6]) {
+        bytes[at + 9..at + 25].fill(0x11);
+    }
+    assert_ne!(bytes[summary..footer], finished[summary..footer]);
+    let (played, damage) = play_damaged(&file(folder.path(), "session.mcap", &bytes)).unwrap();
+    assert_eq!(damage, None, "all of the data is there");
+    assert_equal(&played, everything);
+}
+
+#[test]
+fn wrong_times_of_a_chunk_without_an_index_reach_no_years() {
+    let Whole { part, finished, everything } = whole();
+    let folder = tempfile::tempdir().unwrap();
+    let whole = Player::open(file(folder.path(), "whole.mcap", finished)).unwrap();
+    let (chunk, _) = largest_chunk(finished);
+    for time in [9, 17] {
+        let mut bytes = part.clone();
+        bytes[chunk.start + time + 7] ^= 0x40;
+        let path = file(folder.path(), "session.mcap.part", &bytes);
+        assert_eq!(Player::open(&path).unwrap().duration_ns(), whole.duration_ns());
+        assert_equal(&play_damaged(&path).unwrap().0, everything);
+        // Its content is damaged, too.
+        bytes[chunk.start + 200] ^= 1;
+        let path = file(folder.path(), "session.mcap.part", &bytes);
+        let mut player = Player::open(&path).unwrap();
+        assert_eq!(player.duration_ns(), whole.duration_ns());
+        assert!(player.by_ref().count() < everything.len() + 1);
+        assert_eq!(player.lost().len(), 1);
+    }
+}
+
+#[test]
+fn the_time_of_lost_chunks_is_counted() {
+    let Whole { finished, everything, .. } = whole();
+    let folder = tempfile::tempdir().unwrap();
+    let mut bytes = finished.clone();
+    let summary = mcap::Summary::read(finished).unwrap().unwrap();
+    for chunk in &summary.chunk_indexes[10..13] {
+        bytes[(chunk.chunk_start_offset + chunk.chunk_length / 2) as usize] ^= 1;
+    }
+    let mut player = Player::open(file(folder.path(), "session.mcap", &bytes)).unwrap();
+    assert_eq!((player.lost().len(), player.lost_ns()), (0, 0), "found when they are played");
+    let ticks = |played: &Played| matches!(played, Played::Tick(_));
+    let played = player.by_ref().filter(ticks).count();
+    let missing = everything.iter().filter(|played| ticks(played)).count() - played;
+    assert_eq!(player.lost().len(), 3);
+    // A tick lasts 1 ms.
+    let lost_ms = player.lost_ns() / 1_000_000;
+    assert!(lost_ms.abs_diff(missing as u64) <= 5, "{lost_ms} ms and {missing} ticks");
+    player.seek(0);
+    player.by_ref().for_each(drop);
+    assert_eq!(player.lost().len(), 3, "each is counted once");
+    let damage = player.damage().unwrap();
+    assert!(damage.contains(&format!("{:.3} s", player.lost_ns() as f64 / 1e9)), "{damage}");
+}
+
+#[test]
+fn a_pipe_and_a_device_are_refused_at_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let pipe = folder.path().join("pipe.mcap");
+    nix::unistd::mkfifo(&pipe, nix::sys::stat::Mode::S_IRWXU).unwrap();
+    for path in [pipe.as_path(), Path::new("/dev/zero"), folder.path()] {
+        for error in [Player::open(path).err().unwrap(), recover(path).err().unwrap()] {
+            assert!(matches!(error, RecordingError::NotAFile { .. }), "{error}");
+            assert!(error.to_string().contains("not a regular file"), "{error}");
+        }
+    }
+}
+
+#[test]
+fn a_sparse_seek_gives_every_fifth_tick_before_its_end_and_every_one_after_it() {
+    let Whole { finished, everything, .. } = whole();
+    let folder = tempfile::tempdir().unwrap();
+    let mut player = Player::open(file(folder.path(), "session.mcap", finished)).unwrap();
+    player.seek_sparse(1_000 * MS, 3_000 * MS, 5);
+    let played: Vec<_> = player.collect();
+    let expected = everything.iter().filter(|played| match played {
+        Played::Tick(tick) => tick.time_ns >= 1_000 * MS && (tick.number % 5 == 0 || tick.time_ns >= 3_000 * MS),
+        Played::Record(stamped) => stamped.time_ns >= 1_000 * MS,
+    });
+    assert_equal(&played, &expected.cloned().collect::<Vec<_>>());
+}

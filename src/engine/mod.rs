@@ -11,7 +11,9 @@ mod stored;
 mod study;
 mod verify;
 
-pub use folder::{STUDY_FILE, attachments, fingerprint, newest_config, prepare_folder, study_files, utc_ns};
+pub use folder::{
+    STUDY_FILE, attachments, fingerprint, newest_config, prepare_folder, running_session, study_files, utc_ns,
+};
 pub use guard::{GUARD, GuardError, GuardOutcome, run_guard};
 pub use options::{EngineError, Options, Provenance};
 pub use prior::{PRIOR_FILE, PriorFileError, PriorMaker, ReadyPrior, prior_plan};
@@ -37,7 +39,7 @@ use crate::realtime::clock::{Clock, MonotonicClock};
 use crate::realtime::sleep_lock::{ALLOW_INHIBITOR, INHIBITOR, SleepLock};
 use crate::realtime::system::descriptors;
 use crate::recording::record::{Record, Stamped};
-use crate::recording::recorder::{Recorder, RecorderHandle, RecorderStatus};
+use crate::recording::recorder::{Recorder, RecorderHandle, RecorderStatus, RecorderWatch};
 use crate::robot::go1::Go1;
 use crate::robot::{Placement, Robot};
 use crate::session::arming_checklist::ArmingChecklist;
@@ -261,6 +263,11 @@ impl EngineHandle {
     /// Returns the recorder's status; none where nothing is kept.
     pub fn recorder(&self) -> Option<RecorderStatus> {
         self.recording.as_ref().and(self.recorder.as_ref()).map(|recorder| recorder.status())
+    }
+
+    /// Returns a view of the recorder's status that outlives the session; none where nothing is kept.
+    pub fn recorder_watch(&self) -> Option<RecorderWatch> {
+        self.recording.as_ref().and(self.recorder.as_ref()).map(RecorderHandle::watch)
     }
 
     /// Returns the wait of the session for the storage of its study; none while there is none worth showing.

@@ -126,14 +126,12 @@ pub enum EngineError {
     WhichStudy { journal: String, names: String },
     #[error("{journal}: there is no such study in it{}", if names.is_empty() { String::new() } else { format!("; its studies: {names}") })]
     NoSuchStudy { journal: String, names: String },
-    #[error(
-        "{journal}: study {name} has no real-valued parameter yet, or several objectives; this program supports neither"
-    )]
-    Unusable { journal: String, name: String },
+    #[error("{journal}: study {name} cannot be used: {reason}")]
+    Unusable { journal: String, name: String, reason: String },
     #[error("{}: holds no study that this program made", file.display())]
     NoStudy { file: PathBuf },
-    #[error("{}: another session is running in this folder; end it first, or view the study with optuna-dashboard", folder.display())]
-    InUse { folder: PathBuf },
+    #[error("{}: another session is running in this folder ({owner}); end it first, or view the study with optuna-dashboard", folder.display())]
+    InUse { folder: PathBuf, owner: String },
     #[error(
         "{study}: it was made on {made}, this session runs on {asked}: its points and verdicts are those of another machine. Begin a new study, or give --accept-backend-change to continue it"
     )]

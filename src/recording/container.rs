@@ -9,6 +9,7 @@ use mcap::McapError;
 use mcap::records::{Record, op};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
+use super::chunk::ChunkRecords;
 use super::error::RecordingError;
 use super::topic::Topic;
 
@@ -52,6 +53,10 @@ pub struct Container {
     pub metadata: Vec<RecordSpan>,
     /// Description of the missing end of the file; none for a finished file.
     pub cut: Option<String>,
+    /// Whether the chunks were found by scanning: their times are those of their heads, which no checksum guards.
+    pub scanned: bool,
+    /// Offset of the first record that the scan has not passed.
+    unscanned: u64,
     topics: Vec<Option<Topic>>,
 }
 
@@ -74,6 +79,11 @@ impl Container {
         find: impl FnOnce(&mut Container, u64) -> Result<(), McapError>,
     ) -> Result<Container, RecordingError> {
         let io = |doing| move |source| RecordingError::Io { path: path.into(), doing, source };
+        // Opening a pipe would wait for its writer.
+        let kind = std::fs::metadata(path).map_err(io("open the file"))?.file_type();
+        if !kind.is_file() {
+            return Err(RecordingError::NotAFile { path: path.into() });
+        }
         let mut file = File::open(path).map_err(io("open the file"))?;
         let bytes = file.seek(SeekFrom::End(0)).map_err(io("read its length"))?;
         check_magic(&mut file, bytes, path)?;
@@ -84,6 +94,8 @@ impl Container {
             attachments: Vec::new(),
             metadata: Vec::new(),
             cut: None,
+            scanned: false,
+            unscanned: mcap::MAGIC.len() as u64,
             topics: Vec::new(),
         };
         find(&mut container, bytes).map_err(|error| container.error(error))?;
@@ -108,7 +120,8 @@ impl Container {
         let Record::Footer(footer) = mcap::parse_record(footer[0], &footer[RECORD_HEAD as usize..])? else {
             return Ok(false);
         };
-        if footer.summary_start == 0 || footer.summary_start > footer_at {
+        // Without a checksum nothing tells a damaged index: the scan finds the chunks themselves.
+        if footer.summary_start == 0 || footer.summary_start > footer_at || footer.summary_crc == 0 {
             return Ok(false);
         }
         // From the record before the index to the end of the file: needed to verify the checksum.
@@ -137,9 +150,17 @@ impl Container {
         Ok(true)
     }
 
-    /// Scans from record to record up to the first incomplete one.
+    /// Scans what was appended since the last scan; only of a file whose chunks were found by scanning.
+    pub fn scan_appended(&mut self) -> Result<(), RecordingError> {
+        let end = self.file.seek(SeekFrom::End(0)).map_err(McapError::Io);
+        end.and_then(|bytes| self.scan(bytes)).map_err(|error| self.error(error))
+    }
+
+    /// Scans from record to record up to the first incomplete one, from where the last scan ended.
     fn scan(&mut self, bytes: u64) -> Result<(), McapError> {
-        let mut at = mcap::MAGIC.len() as u64;
+        self.scanned = true;
+        self.cut = None;
+        let mut at = self.unscanned;
         while bytes - at >= RECORD_HEAD {
             let head = self.read_at(at, RECORD_HEAD)?;
             let length = u64::from_le_bytes(head[1..].try_into().expect("eight bytes"));
@@ -156,8 +177,11 @@ impl Container {
                 }
                 op::MESSAGE_INDEX => {
                     let id = self.read_at(at + RECORD_HEAD, 2.min(length))?;
-                    let (Some(chunk), &[low, high]) = (self.chunks.last_mut(), id.as_slice()) else { break };
-                    chunk.channels.get_or_insert_default().push(u16::from_le_bytes([low, high]));
+                    let &[low, high] = id.as_slice() else { break };
+                    // A chunk that was the last of an earlier scan has no list: part of its index was missing then.
+                    if let Some(channels) = self.chunks.last_mut().and_then(|chunk| chunk.channels.as_mut()) {
+                        channels.push(u16::from_le_bytes([low, high]));
+                    }
                 }
                 op::ATTACHMENT => self.attachments.push(span),
                 op::METADATA => self.metadata.push(span),
@@ -166,6 +190,7 @@ impl Container {
                     if self.read_at(bytes - 8, 8)? != mcap::MAGIC || left < FOOTER_BYTES {
                         self.cut = Some("its index at the end is missing; all of its data is there".into());
                     }
+                    self.unscanned = at;
                     return Ok(());
                 }
                 0 => break, // no record: zeros left by a crashed file system
@@ -173,6 +198,7 @@ impl Container {
             }
             at += RECORD_HEAD + length;
         }
+        self.unscanned = at;
         if let Some(last) = self.chunks.last_mut() {
             last.channels = None;
         }
@@ -201,6 +227,15 @@ impl Container {
             }
         }
         Ok(records)
+    }
+
+    /// Returns the records of a chunk without a copy of each, after verifying its checksum.
+    ///
+    /// # Errors
+    /// When the checksum or the length of a record is wrong; nothing of such a chunk is used.
+    pub fn read_chunk_records(&mut self, chunk: &Chunk) -> Result<ChunkRecords, McapError> {
+        let body = self.read_record(chunk.span)?;
+        ChunkRecords::of(&body, LARGEST_CHUNK)
     }
 
     /// Returns an attached file after verifying its checksum.

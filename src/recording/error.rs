@@ -13,6 +13,8 @@ pub enum RecordingError {
     Exists { path: PathBuf },
     #[error("{}: a recording's name must end in .mcap", path.display())]
     Name { path: PathBuf },
+    #[error("{}: not a regular file; a recording is a file that can be read from any place", path.display())]
+    NotAFile { path: PathBuf },
     #[error("{}: the file is empty; nothing was recorded in it", path.display())]
     Empty { path: PathBuf },
     #[error("{}: not an MCAP file: it begins with {found}; recordings end in .mcap or .mcap.part", path.display())]

@@ -4,12 +4,14 @@
 //! A recording is an MCAP file of protobuf messages; `recordings/README.md` lists its topics, `proto/frog.proto` its
 //! fields. While it grows it is named `*.mcap.part`; only a finished one is named `*.mcap`.
 
+mod chunk;
 mod comments;
 mod container;
 mod coordinate_frames;
 pub mod difference;
 pub mod disk;
 mod error;
+mod event_index;
 mod output;
 pub mod player;
 pub mod record;

@@ -12,6 +12,7 @@ use mcap::write::NoSeek;
 use mcap::{McapError, WriteOptions};
 use prost::Message;
 
+use super::event_index::EventIndexBuilder;
 use super::record::{Record, SessionInfo};
 use super::topic::Topic;
 use super::{comments, schema};
@@ -40,6 +41,8 @@ impl Sink for File {
 pub struct Output {
     pub mcap: mcap::Writer<NoSeek<SharedSink>>,
     disk: SharedSink,
+    /// Copies of the events, for the end of the file.
+    pub events: EventIndexBuilder,
     buffer: Vec<u8>,
     open_bytes: usize,
 }
@@ -57,7 +60,7 @@ impl Output {
             .compression_level(1)
             .compression_threads(0)
             .create(NoSeek::new(disk.clone()))?;
-        Ok(Output { mcap, disk, buffer: Vec::new(), open_bytes: 0 })
+        Ok(Output { mcap, disk, events: EventIndexBuilder::default(), buffer: Vec::new(), open_bytes: 0 })
     }
 
     /// Writes metadata, attachments and all channels, at the beginning, where they survive a truncation.
@@ -154,12 +157,16 @@ impl Output {
     fn put(&mut self, topic: Topic, sequence: u32, log_time: u64) -> Result<(), McapError> {
         let channel_id = topic as u16 + 1;
         self.open_bytes += self.buffer.len();
+        self.events.add(topic, channel_id, log_time, &self.buffer);
         let header = MessageHeader { channel_id, sequence, log_time, publish_time: log_time };
         self.mcap.write_to_known_channel(&header, &self.buffer)
     }
 
-    /// Writes the index and waits until everything is on the disk.
+    /// Writes the copies of the events and the index, and waits until everything is on the disk.
     pub fn finish(&mut self) -> Result<(), McapError> {
+        self.close_chunk()?;
+        let offset = self.bytes();
+        self.mcap.attach(&self.events.attachment(offset))?;
         self.mcap.finish()?;
         self.sync()
     }

@@ -3,20 +3,27 @@
 //! In memory are the index and the events (everything but ticks and counters); ticks are decoded chunk by chunk while they
 //! are played.
 
-use std::collections::VecDeque;
+mod damage;
+mod events;
+
+use std::collections::{BTreeSet, VecDeque};
 use std::path::{Path, PathBuf};
 
 use foxglove::messages::JointStates;
-use mcap::records::{MessageHeader, Record as McapRecord};
+use mcap::records::MessageHeader;
 use prost::Message;
 
 use super::container::{Chunk, Container};
 use super::error::RecordingError;
+use super::event_index;
 use super::record::{Record, SessionInfo, Stamped};
 use super::topic::Topic;
 use super::wire::DecodeError;
 use super::{frog, schema, tick};
 use crate::telemetry::Tick;
+
+use damage::DamagedChunk;
+pub use damage::LostPart;
 
 /// A played tick or record.
 #[allow(clippy::large_enum_variant, reason = "nearly all are ticks; a box for each costs more than it saves")]
@@ -60,6 +67,8 @@ pub struct Marker {
 pub struct Player {
     container: Container,
     path: PathBuf,
+    /// Chunks with messages, in the order of time.
+    chunks: Vec<Chunk>,
     session: SessionInfo,
     start_utc_ns: u64,
     duration_ns: u64,
@@ -70,7 +79,11 @@ pub struct Player {
     /// The next chunk to read; all before it are played or in the queue.
     next_chunk: usize,
     from_ns: u64,
-    damaged_chunks: Vec<usize>,
+    /// Time before which only the ticks are played whose number the second value divides.
+    sparse_until: Option<(u64, u32)>,
+    damaged: Vec<DamagedChunk>,
+    /// Offsets of the chunks that were played without a checksum.
+    unguarded: BTreeSet<u64>,
     first_trouble: Option<String>,
 }
 
@@ -79,15 +92,13 @@ impl Player {
     /// describes the rest.
     ///
     /// # Errors
-    /// When nothing can be played: missing or empty file, no MCAP file, file of another program.
+    /// When nothing can be played: missing or empty file, pipe or device, no MCAP file, file of another program.
     pub fn open(path: impl AsRef<Path>) -> Result<Player, RecordingError> {
         let path = path.as_ref();
-        let mut container = Container::open(path)?;
-        container.chunks.retain(|chunk| chunk.channels.as_ref().is_none_or(|channels| !channels.is_empty()));
-        container.chunks.sort_by_key(|chunk| chunk.start);
         let mut player = Player {
-            container,
+            container: Container::open(path)?,
             path: path.into(),
+            chunks: Vec::new(),
             session: SessionInfo::default(),
             start_utc_ns: 0,
             duration_ns: 0,
@@ -96,18 +107,57 @@ impl Player {
             queue: VecDeque::new(),
             next_chunk: 0,
             from_ns: 0,
-            damaged_chunks: Vec::new(),
+            sparse_until: None,
+            damaged: Vec::new(),
+            unguarded: BTreeSet::new(),
             first_trouble: None,
         };
-        player.read_events()?;
-        let end = player.container.chunks.iter().map(|chunk| chunk.end).max().unwrap_or_default();
-        player.duration_ns = end.saturating_sub(player.start_utc_ns);
+        let (found, copies) = (player.new_chunks(), event_index::read(&mut player.container));
+        let start_utc_ns = player.read_events(&found, copies);
+        player.add_chunks(found);
+        player.start_utc_ns = start_utc_ns.ok_or_else(|| player.no_session())?;
+        player.shift_events(0, 0);
+        let info = player.events.iter().find_map(|event| match &event.record {
+            Record::Session(info) => Some(info.clone()),
+            _ => None,
+        });
+        player.session = info.ok_or_else(|| player.no_session())?;
         Ok(player)
+    }
+
+    /// Reads what another process has appended since the file was opened or refreshed; returns whether there was anything.
+    /// A file that was complete when it was opened does not grow.
+    ///
+    /// # Errors
+    /// When the file cannot be read any more.
+    pub fn refresh(&mut self) -> Result<bool, RecordingError> {
+        if !self.container.scanned {
+            return Ok(false);
+        }
+        self.container.scan_appended()?;
+        let found = self.new_chunks();
+        if found.is_empty() {
+            return Ok(false);
+        }
+        let (events, markers) = (self.events.len(), self.markers.len());
+        self.read_events(&found, None);
+        self.shift_events(events, markers);
+        // Everything that is played already is in chunks before these.
+        let next = self.chunks.get(self.next_chunk).map(|chunk| chunk.span.offset);
+        self.add_chunks(found);
+        let place = |offset| self.chunks.iter().position(|chunk| chunk.span.offset == offset);
+        self.next_chunk = next.and_then(place).unwrap_or(self.next_chunk);
+        Ok(true)
     }
 
     /// Returns the facts of the session.
     pub fn session(&self) -> &SessionInfo {
         &self.session
+    }
+
+    /// Returns the file's path as it was given.
+    pub fn path(&self) -> &Path {
+        &self.path
     }
 
     /// Returns the UTC time of engine time 0, ns since 1970.
@@ -120,6 +170,14 @@ impl Player {
         self.duration_ns
     }
 
+    /// Returns the time of the first message since the engine started, ns, without the session's own record.
+    pub fn first_ns(&self) -> u64 {
+        let other = |channel: &u16| self.container.topic(*channel) != Some(Topic::Session);
+        let holds_others = |chunk: &&Chunk| chunk.channels.as_ref().is_none_or(|channels| channels.iter().any(other));
+        let first = self.chunks.iter().filter(holds_others).map(|chunk| chunk.start).min();
+        first.unwrap_or(self.start_utc_ns).saturating_sub(self.start_utc_ns)
+    }
+
     /// Returns the begins of trials and faults, in the order of time.
     pub fn markers(&self) -> &[Marker] {
         &self.markers
@@ -130,29 +188,21 @@ impl Player {
         &self.events
     }
 
-    /// Returns a description of the missing parts found so far: a truncated end is found on opening, a chunk with a wrong
-    /// checksum when it is played. None for an intact file.
-    pub fn damage(&self) -> Option<String> {
-        let chunks = match (self.damaged_chunks.len(), &self.first_trouble) {
-            (0, None) => None,
-            (0, Some(trouble)) => Some(format!("a message cannot be read: {trouble}")),
-            (count, trouble) => Some(format!(
-                "{count} of {} chunks are damaged and left out{}",
-                self.container.chunks.len(),
-                trouble.as_ref().map(|trouble| format!(" ({trouble})")).unwrap_or_default()
-            )),
-        };
-        let parts: Vec<_> = self.container.cut.iter().chain(&chunks).map(String::as_str).collect();
-        (!parts.is_empty()).then(|| format!("{}: {}", self.path.display(), parts.join("; ")))
-    }
-
     /// Continues at `time_ns`, forward or back, with the first tick or record not before it.
     pub fn seek(&mut self, time_ns: u64) {
         self.queue.clear();
         self.from_ns = time_ns;
+        self.sparse_until = None;
         let log_time = self.start_utc_ns.saturating_add(time_ns);
-        let chunks = &self.container.chunks;
+        let chunks = &self.chunks;
         self.next_chunk = chunks.iter().position(|chunk| chunk.end >= log_time).unwrap_or(chunks.len());
+    }
+
+    /// Continues at `from_ns` like [`seek`](Player::seek); of the ticks before `to_ns` only those whose number is a multiple of
+    /// `every` are played.
+    pub fn seek_sparse(&mut self, from_ns: u64, to_ns: u64, every: u32) {
+        self.seek(from_ns);
+        self.sparse_until = Some((to_ns, every.max(1)));
     }
 
     /// Returns the bytes of an attached file, for example `config.toml`; none if no file has that name.
@@ -169,87 +219,21 @@ impl Player {
         Ok(None)
     }
 
-    /// Reads the session, the markers and all events from the chunks that hold any.
-    fn read_events(&mut self) -> Result<(), RecordingError> {
-        let container = &self.container;
-        let known = |channel: &u16| container.topic(*channel);
-        let may_hold_events = |chunk: &Chunk| {
-            chunk.channels.as_ref().is_none_or(|channels| channels.iter().filter_map(known).any(Topic::is_event))
-        };
-        let with_events: Vec<_> =
-            (0..container.chunks.len()).filter(|&index| may_hold_events(&container.chunks[index])).collect();
-        let mut session = None;
-        let (mut events, mut markers) = (Vec::new(), Vec::new());
-        for index in with_events {
-            for (topic, header, data) in self.messages_of(index) {
-                if !topic.is_event() {
-                    continue;
-                }
-                let log_time = header.log_time;
-                if topic == Topic::Session && session.is_none() {
-                    session = frog::Session::decode(&*data).ok().map(|message| message.start_utc_ns);
-                }
-                if topic == Topic::Marker {
-                    match marker(&data) {
-                        Ok(kind) => markers.push((log_time, kind)),
-                        Err(error) => self.note(&error),
-                    }
-                } else {
-                    match schema::decode(topic, &data) {
-                        Ok(record) => events.extend(record.map(|record| (log_time, record))),
-                        Err(error) => self.note(&error),
-                    }
-                }
-            }
+    /// Takes the chunks that the container has found since the last call.
+    fn new_chunks(&mut self) -> Vec<Chunk> {
+        let mut found = std::mem::take(&mut self.container.chunks);
+        if self.container.scanned {
+            self.prove_times(&mut found);
         }
-        let Some(start_utc_ns) = session else { return Err(self.no_session()) };
-        self.start_utc_ns = start_utc_ns;
-        events.sort_by_key(|(log_time, _)| *log_time);
-        markers.sort_by_key(|(log_time, _)| *log_time);
-        let time_ns = |log_time: u64| log_time.saturating_sub(start_utc_ns);
-        self.events = events.into_iter().map(|(at, record)| Stamped { time_ns: time_ns(at), record }).collect();
-        self.markers = markers.into_iter().map(|(at, kind)| Marker { time_ns: time_ns(at), kind }).collect();
-        let info = self.events.iter().find_map(|event| match &event.record {
-            Record::Session(info) => Some(info.clone()),
-            _ => None,
-        });
-        self.session = info.ok_or_else(|| self.no_session())?;
-        Ok(())
+        found.retain(|chunk| chunk.channels.as_ref().is_none_or(|channels| !channels.is_empty()));
+        found
     }
 
-    /// Returns the error of a file without session: truncated before it, or of another program.
-    fn no_session(&self) -> RecordingError {
-        let path = self.path.clone();
-        let bytes = std::fs::metadata(&path).map(|metadata| metadata.len()).unwrap_or_default();
-        if self.container.chunks.is_empty() && self.container.cut.is_some() {
-            RecordingError::TooShort { path, bytes }
-        } else {
-            RecordingError::NoSession { path }
-        }
-    }
-
-    /// Returns the messages of a chunk on known topics; none of a damaged chunk, which is noted.
-    fn messages_of(&mut self, index: usize) -> Vec<(Topic, MessageHeader, Vec<u8>)> {
-        let chunk = self.container.chunks[index].clone();
-        let records = match self.container.read_chunk(&chunk) {
-            Ok(records) => records,
-            Err(error) => {
-                if !self.damaged_chunks.contains(&index) {
-                    self.damaged_chunks.push(index);
-                    self.note(&error);
-                }
-                return Vec::new();
-            }
-        };
-        let mut messages = Vec::with_capacity(records.len());
-        for record in records {
-            if let McapRecord::Message { header, data } = record
-                && let Some(topic) = self.container.topic(header.channel_id)
-            {
-                messages.push((topic, header, data.into_owned()));
-            }
-        }
-        messages
+    fn add_chunks(&mut self, found: Vec<Chunk>) {
+        self.chunks.extend(found);
+        self.chunks.sort_by_key(|chunk| chunk.start);
+        let end = self.chunks.iter().map(|chunk| chunk.end).max().unwrap_or_default();
+        self.duration_ns = end.saturating_sub(self.start_utc_ns);
     }
 
     fn note(&mut self, trouble: &dyn std::error::Error) {
@@ -258,27 +242,34 @@ impl Player {
 
     /// Reads the next chunk into the queue.
     fn read_chunk(&mut self) {
-        let messages = self.messages_of(self.next_chunk);
+        let chunk = self.chunks[self.next_chunk].clone();
         self.next_chunk += 1;
+        let Some(records) = self.records_of(&chunk) else { return };
         // The messages of a tick are adjacent and share sequence and log time: joints, command, the rest.
         let mut joints: Option<(MessageHeader, JointStates)> = None;
         let mut command: Option<(MessageHeader, frog::JointCommand)> = None;
-        for (topic, header, data) in messages {
+        for (header, data) in records.messages().flatten() {
+            let Some(topic) = self.container.topic(header.channel_id) else { continue };
             let time_ns = header.log_time.saturating_sub(self.start_utc_ns);
             if time_ns < self.from_ns {
                 continue;
             }
+            let of_tick = matches!(topic, Topic::JointStates | Topic::JointCommand | Topic::Tick);
+            let left_out = |(until_ns, every)| of_tick && time_ns < until_ns && header.sequence % every != 0;
+            if self.sparse_until.is_some_and(left_out) {
+                continue;
+            }
             let played = match topic {
-                Topic::JointStates => JointStates::decode(&*data).map_err(DecodeError::from).map(|message| {
+                Topic::JointStates => JointStates::decode(data).map_err(DecodeError::from).map(|message| {
                     joints = Some((header, message));
                     None
                 }),
-                Topic::JointCommand => frog::JointCommand::decode(&*data).map_err(DecodeError::from).map(|message| {
+                Topic::JointCommand => frog::JointCommand::decode(data).map_err(DecodeError::from).map(|message| {
                     command = Some((header, message));
                     None
                 }),
-                Topic::Tick => join(&header, &data, joints.take(), command.take()).map(|tick| Some(Played::Tick(tick))),
-                _ => schema::decode(topic, &data)
+                Topic::Tick => join(&header, data, joints.take(), command.take()).map(|tick| Some(Played::Tick(tick))),
+                _ => schema::decode(topic, data)
                     .map(|record| record.map(|record| Played::Record(Stamped { time_ns, record }))),
             };
             match played {
@@ -297,7 +288,7 @@ impl Iterator for Player {
     /// Returns the next tick or record in the order of time; none at the end.
     fn next(&mut self) -> Option<Played> {
         // An unread chunk may hold something earlier than the queue.
-        while let Some(chunk) = self.container.chunks.get(self.next_chunk) {
+        while let Some(chunk) = self.chunks.get(self.next_chunk) {
             let starts = chunk.start.saturating_sub(self.start_utc_ns);
             if self.queue.front().is_some_and(|first| first.time_ns() < starts) {
                 break;
@@ -305,17 +296,6 @@ impl Iterator for Player {
             self.read_chunk();
         }
         self.queue.pop_front()
-    }
-}
-
-fn marker(data: &[u8]) -> Result<MarkerKind, DecodeError> {
-    let message = frog::Marker::decode(data)?;
-    match frog::marker::Kind::try_from(message.kind) {
-        Ok(frog::marker::Kind::Trial) => {
-            Ok(MarkerKind::Trial(message.trial.ok_or(DecodeError::Missing("a trial's number"))?))
-        }
-        Ok(frog::marker::Kind::Fault) => Ok(MarkerKind::Fault),
-        Err(_) => Err(DecodeError::Unknown("marker", message.kind)),
     }
 }
 

@@ -319,6 +319,12 @@ pub fn elsewhere(mut attributes: Map<String, Value>) -> Map<String, Value> {
     for name in ["parent", "worker", "backend", "rerun", "interrupted"] {
         attributes.remove(name);
     }
+    // A table has no types: a text of digits is a number there.
+    if let Some(seed) = attributes.get_mut("seed")
+        && let Some(number) = seed.as_u64()
+    {
+        *seed = number.to_string().into();
+    }
     attributes
 }
 
@@ -348,9 +354,10 @@ pub fn row_of(trial: &Trial, note: String, order: &[ParameterInfo]) -> TrialReco
         TrialState::Fail | TrialState::Pruned => Some(Verdict::Void),
         TrialState::Running | TrialState::Waiting => None,
     };
+    let elsewhere = !trial.user_attributes.contains_key("source") && worker_of(trial).is_none();
     TrialRecord {
         trial: trial.number,
-        source,
+        source: if elsewhere && trial.state != TrialState::Waiting { ProposalSource::OtherProgram } else { source },
         parent,
         parameters: order.iter().filter_map(|p| Some((p.name.clone(), trial.parameter(&p.name)?))).collect(),
         measured: parse(&trial.user_attributes, |_| true),

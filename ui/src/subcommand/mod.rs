@@ -7,6 +7,7 @@ mod console;
 mod doctor;
 mod emulate;
 mod evaluate;
+mod export;
 mod failure;
 mod guard;
 mod optimize;
@@ -17,6 +18,7 @@ mod report;
 mod reproduce;
 mod selection;
 mod study;
+mod table;
 mod verify;
 
 use clap::{Parser, Subcommand};
@@ -52,6 +54,8 @@ enum Subcommands {
     Reproduce(reproduce::ReproduceArguments),
     /// Play a recorded session in the console's panels
     Replay(replay::ReplayArguments),
+    /// Export the signals of a recording as CSV, JSON or Parquet
+    Export(export::ExportArguments),
     /// Repair an incomplete recording
     Recover(recover::RecoverArguments),
     /// Run a simulated session again from its recording alone and compare every tick
@@ -82,6 +86,7 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
         Some(Subcommands::Evaluate(evaluate)) => evaluate::run(&evaluate),
         Some(Subcommands::Reproduce(reproduce)) => reproduce::run(&reproduce),
         Some(Subcommands::Replay(replay)) => replay::run(&replay),
+        Some(Subcommands::Export(export)) => export::run(&export),
         Some(Subcommands::Recover(recover)) => recover::run(&recover),
         Some(Subcommands::Verify(verify)) => verify::run(&verify),
         Some(Subcommands::Emulate(emulate)) => emulate::run(&emulate),

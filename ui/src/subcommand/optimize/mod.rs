@@ -276,8 +276,9 @@ fn run_one(
             failed.map_or_else(String::new, |error| format!("; and the recording is not complete: {error}"));
         return Err(Failure::Other(anyhow!("{place}: {refusal}{recording}")));
     }
+    // Also a finished file that another program put in its place: what was judged is there, the recording is not complete.
     if let Some(error) = failed {
-        return Err(error.into());
+        return Err(Failure::Other(anyhow!("the recording is not complete: {error}")));
     }
     printer.finished(study, &experiment, &options);
     Ok(())

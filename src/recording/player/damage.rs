@@ -1,0 +1,160 @@
+//! Damage of a recording: chunks that cannot be read, and the time that they take.
+
+use foxglove::messages::JointStates;
+use prost::Message;
+
+use super::Player;
+use crate::recording::chunk::ChunkRecords;
+use crate::recording::container::Chunk;
+use crate::recording::topic::Topic;
+use crate::recording::wire::DecodeError;
+use crate::recording::{frog, schema};
+
+/// A part of a recording that cannot be read.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LostPart {
+    /// Its begin since the engine started, ns.
+    pub from_ns: u64,
+    /// Its end, ns.
+    pub to_ns: u64,
+    /// Reason for which it cannot be read.
+    pub reason: String,
+}
+
+/// A chunk that cannot be read; times are log times, ns UTC.
+pub(super) struct DamagedChunk {
+    offset: u64,
+    start: u64,
+    end: u64,
+    reason: String,
+}
+
+/// Period of the ticks, ns.
+const TICK_NS: u64 = 1_000_000;
+
+/// Longest time between the messages of a chunk, and between chunks, that needs no proof, ns: a session flushes every second.
+const USUAL_SPAN_NS: u64 = 60_000_000_000;
+
+impl Player {
+    /// Returns a description of the missing parts found so far: a truncated end is found on opening, a chunk with a wrong
+    /// checksum when it is played. None for an intact file.
+    pub fn damage(&self) -> Option<String> {
+        let chunks = match (self.damaged.first(), &self.first_trouble) {
+            (None, None) => None,
+            (None, Some(trouble)) => Some(format!("a message cannot be read: {trouble}")),
+            (Some(first), _) => Some(format!(
+                "{} of {} chunks are damaged and left out, {:.3} s ({})",
+                self.damaged.len(),
+                self.chunks.len(),
+                self.lost_ns() as f64 / 1e9,
+                first.reason
+            )),
+        };
+        let unguarded = (!self.unguarded.is_empty()).then(|| {
+            let count = self.unguarded.len();
+            format!(
+                "{count} chunks without a checksum are played as they were decoded; a wrong number in them is not seen"
+            )
+        });
+        let parts: Vec<_> = self.container.cut.iter().chain(&chunks).chain(&unguarded).map(String::as_str).collect();
+        (!parts.is_empty()).then(|| format!("{}: {}", self.path.display(), parts.join("; ")))
+    }
+
+    /// Returns whether the file was completed: it has an end, though perhaps a damaged one.
+    pub fn is_complete(&self) -> bool {
+        self.container.cut.is_none()
+    }
+
+    /// Returns the parts found so far that cannot be read, in the order in which they were found.
+    pub fn lost(&self) -> impl ExactSizeIterator<Item = LostPart> + '_ {
+        self.damaged.iter().map(|chunk| LostPart {
+            from_ns: chunk.start.saturating_sub(self.start_utc_ns),
+            to_ns: chunk.end.saturating_sub(self.start_utc_ns),
+            reason: chunk.reason.clone(),
+        })
+    }
+
+    /// Returns the time that the parts found so far take together, ns.
+    pub fn lost_ns(&self) -> u64 {
+        let mut parts: Vec<_> = self.damaged.iter().map(|chunk| (chunk.start, chunk.end)).collect();
+        parts.sort_unstable();
+        let mut until = 0;
+        let new = |(start, end): (u64, u64)| {
+            let from = start.max(until);
+            until = until.max(end);
+            end.saturating_sub(from)
+        };
+        parts.into_iter().map(new).sum()
+    }
+
+    /// Takes the times of chunks with unusual ones from their messages. Without the file's index no checksum guards them: a wrong
+    /// one would reach years.
+    pub(super) fn prove_times(&mut self, chunks: &mut [Chunk]) {
+        let mut before = self.chunks.iter().map(|chunk| chunk.end).max();
+        for chunk in chunks {
+            let span = chunk.end.checked_sub(chunk.start);
+            let usual = span.is_some_and(|span| span <= USUAL_SPAN_NS)
+                && before.is_some_and(|before| chunk.start.abs_diff(before) <= USUAL_SPAN_NS);
+            if !usual {
+                let records = self.container.read_chunk_records(chunk);
+                let times = records.iter().flat_map(|records| records.messages().flatten());
+                let times = times.map(|(header, _)| header.log_time);
+                let first_and_last = times.fold(None, |found: Option<(u64, u64)>, time| {
+                    let (first, last) = found.unwrap_or((time, time));
+                    Some((first.min(time), last.max(time)))
+                });
+                let unknown = before.unwrap_or(chunk.start);
+                (chunk.start, chunk.end) = first_and_last.unwrap_or((unknown, unknown));
+            }
+            before = Some(chunk.end);
+        }
+    }
+
+    /// Returns the records of a chunk; none of a damaged one, which is noted.
+    pub(super) fn records_of(&mut self, chunk: &Chunk) -> Option<ChunkRecords> {
+        let records = self.container.read_chunk_records(chunk).map_err(|error| error.to_string());
+        let proved = records.and_then(|records| match records.checked {
+            true => Ok(records),
+            false => self.decodable(chunk, &records).map(|()| records),
+        });
+        match proved {
+            Ok(records) => {
+                if !records.checked {
+                    self.unguarded.insert(chunk.span.offset);
+                }
+                Some(records)
+            }
+            Err(reason) => {
+                let Chunk { span, start, end, .. } = *chunk;
+                if !self.damaged.iter().any(|known| known.offset == span.offset) {
+                    // A tick lasts 1 ms: the last one of the chunk is lost, too.
+                    self.damaged.push(DamagedChunk { offset: span.offset, start, end: end + TICK_NS, reason });
+                }
+                None
+            }
+        }
+    }
+
+    /// Decodes every message of a chunk without a checksum.
+    ///
+    /// # Errors
+    /// The reason when a message cannot be decoded, or is not of the chunk's time or of a channel that its index names.
+    fn decodable(&self, chunk: &Chunk, records: &ChunkRecords) -> Result<(), String> {
+        for message in records.messages() {
+            let (header, data) = message.map_err(|error| error.to_string())?;
+            let known = chunk.channels.as_ref().is_none_or(|channels| channels.contains(&header.channel_id));
+            if !known || !(chunk.start..=chunk.end).contains(&header.log_time) {
+                return Err("no checksum, and a message that does not belong to it".into());
+            }
+            let decoded = match self.container.topic(header.channel_id) {
+                Some(Topic::JointStates) => JointStates::decode(data).map(drop).map_err(DecodeError::from),
+                Some(Topic::JointCommand) => frog::JointCommand::decode(data).map(drop).map_err(DecodeError::from),
+                Some(Topic::Tick) => frog::ControlTick::decode(data).map(drop).map_err(DecodeError::from),
+                Some(topic) => schema::decode(topic, data).map(drop),
+                None => Ok(()),
+            };
+            decoded.map_err(|error| format!("no checksum, and a message that cannot be read: {error}"))?;
+        }
+        Ok(())
+    }
+}
