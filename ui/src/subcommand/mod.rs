@@ -12,6 +12,7 @@ mod guard;
 mod optimize;
 mod prior;
 mod recover;
+mod rejudge;
 mod replay;
 mod report;
 mod reproduce;
@@ -51,6 +52,8 @@ enum Subcommands {
     Reproduce(reproduce::ReproduceArguments),
     /// Play a recorded session in the console's panels
     Replay(replay::ReplayArguments),
+    /// Judge recorded trials by another configuration, old beside new
+    Rejudge(rejudge::RejudgeArguments),
     /// Repair an incomplete recording
     Recover(recover::RecoverArguments),
     /// Serve the simulator as a Go1 on the network, with fault injection
@@ -79,6 +82,7 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
         Some(Subcommands::Evaluate(evaluate)) => evaluate::run(&evaluate),
         Some(Subcommands::Reproduce(reproduce)) => reproduce::run(&reproduce),
         Some(Subcommands::Replay(replay)) => replay::run(&replay),
+        Some(Subcommands::Rejudge(rejudge)) => rejudge::run(&rejudge),
         Some(Subcommands::Recover(recover)) => recover::run(&recover),
         Some(Subcommands::Emulate(emulate)) => emulate::run(&emulate),
         Some(Subcommands::Bench(bench)) => bench::run(&bench),
