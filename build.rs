@@ -3,16 +3,53 @@
 use std::path::PathBuf;
 
 use prost::Message as _;
+use prost_types::{FieldDescriptorProto, FileDescriptorProto};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     println!("cargo::rerun-if-changed=proto");
     let out = PathBuf::from(std::env::var("OUT_DIR")?);
     let mut descriptors = protox::compile(["frog.proto"], ["proto"])?;
-    prost_build::Config::new().compile_fds(descriptors.clone())?;
+    std::fs::write(out.join("frog.v1.comments.rs"), comments(&descriptors.file[0]))?;
+    let mut config = prost_build::Config::new();
+    // A tick by the names of its fields, for `quadfrog verify`.
+    for message in ["ControlTick", "Battery", "Truth", "JointCommand", "FaultTicks.Whole"] {
+        config.message_attribute(format!(".frog.v1.{message}"), "#[derive(serde::Serialize)]");
+    }
+    config.compile_fds(descriptors.clone())?;
     // Every schema of a recording contains the descriptor: without comments it has a third of the length.
     for file in &mut descriptors.file {
         file.source_code_info = None;
     }
     std::fs::write(out.join("frog.v1.bin"), descriptors.encode_to_vec())?;
     Ok(())
+}
+
+/// Returns a table in Rust: name of each message, and name, nested message and comment of each of its fields.
+fn comments(file: &FileDescriptorProto) -> String {
+    let info = file.source_code_info.as_ref();
+    let text = |path: &[i32]| {
+        let found = info.iter().flat_map(|info| &info.location).find(|location| location.path == path)?;
+        Some(found.trailing_comments().trim().replace('\n', " ")).filter(|text| !text.is_empty())
+    };
+    // Message (4), nested message (3) and field (2) of `descriptor.proto`.
+    let mut messages = Vec::new();
+    for (index, message) in (0..).zip(&file.message_type) {
+        messages.push((message.name().to_owned(), message, vec![4, index]));
+    }
+    let mut next = 0;
+    while let Some((name, message, path)) = messages.get(next).cloned() {
+        for (index, nested) in (0..).zip(&message.nested_type) {
+            messages.push((format!("{name}.{}", nested.name()), nested, [&path[..], &[3, index]].concat()));
+        }
+        next += 1;
+    }
+    let rows = messages.iter().map(|(name, message, path)| {
+        let field = |(index, field): (i32, &FieldDescriptorProto)| {
+            let comment = text(&[&path[..], &[2, index]].concat()).unwrap_or_default();
+            format!("({:?}, {:?}, {comment:?})", field.name(), field.type_name())
+        };
+        let fields: Vec<_> = (0..).zip(&message.field).map(field).collect();
+        format!("({name:?}, &[{}])", fields.join(", "))
+    });
+    format!("&[{}]", rows.collect::<Vec<_>>().join(",\n"))
 }

@@ -4,7 +4,7 @@
 mod support;
 
 use quadfrog::optimize::ask::{Ask, Direction, SamplerConfig, Streams};
-use quadfrog::optimize::journal::{Durability, Journal, JournalFile, LOCK_GRACE, Operation};
+use quadfrog::optimize::journal::{Durability, Journal, JournalFile, JournalLine, LOCK_GRACE, Operation};
 use quadfrog::optimize::sampler::propose;
 use quadfrog::optimize::space::Space;
 use quadfrog::optimize::trial::{Distribution, Trial, TrialState};
@@ -89,9 +89,9 @@ fn suggested_again(trials: &[Trial], expected: &Value, direction: Direction, com
 fn lines_are_written_as_they_were_read() {
     let text = std::fs::read_to_string(golden("journal.log")).unwrap();
     for line in text.lines() {
-        let (worker, operation) = Operation::parse(line).unwrap();
-        let ours = operation.to_line(&worker);
-        let (again, reread) = Operation::parse(ours.trim_end()).unwrap();
+        let JournalLine { worker, operation, times } = Operation::parse(line).unwrap();
+        let ours = operation.to_line(&worker, times);
+        let JournalLine { worker: again, operation: reread, .. } = Operation::parse(ours.trim_end()).unwrap();
         assert_eq!((again, reread), (worker, operation), "{line}");
         // And equal member by member to the line of Python.
         let value = |text: &str| serde_json::from_str::<Value>(text).unwrap();

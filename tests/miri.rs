@@ -3,7 +3,7 @@
 
 use std::thread;
 
-use quadfrog::optimize::journal::{JournalState, Operation};
+use quadfrog::optimize::journal::{JournalLine, JournalState, Operation};
 use quadfrog::realtime::channel::{COMMANDS, channels};
 use quadfrog::robot::JointCommand;
 use quadfrog::robot::go1::convert::{decode_motor, low_cmd, low_state, robot_state};
@@ -72,9 +72,10 @@ fn commands_ticks_and_latches_cross_between_threads() {
 fn lines_of_the_journal_are_parsed_applied_and_written_back() {
     let mut state = JournalState::default();
     for line in include_str!("golden/tpe/journal.log").lines().take(40) {
-        let (worker, operation) = Operation::parse(line).unwrap();
-        let again = Operation::parse(&operation.to_line(&worker)).unwrap();
-        assert_eq!(again, (worker.clone(), operation.clone()));
+        let parsed = Operation::parse(line).unwrap();
+        let again = Operation::parse(&parsed.operation.to_line(&parsed.worker, parsed.times)).unwrap();
+        assert_eq!(again, parsed);
+        let JournalLine { worker, operation, .. } = parsed;
         state.apply(operation, &worker);
     }
     assert!(!state.studies()[0].trials.is_empty());

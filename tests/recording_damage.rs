@@ -210,7 +210,8 @@ fn a_damaged_index_is_ignored() {
 #[test]
 fn a_damaged_beginning_is_reported() {
     let mut bytes = whole().part.clone();
-    bytes[2000] ^= 0x10; // in the first chunk, after metadata and attachment
+    let proto = include_str!("../proto/frog.proto");
+    bytes[2000 + proto.len()] ^= 0x10; // in the first chunk, after metadata and attachments
     let folder = tempfile::tempdir().unwrap();
     let path = file(folder.path(), "session.mcap.part", &bytes);
     let error = Player::open(&path).err().expect("its channels are not known");

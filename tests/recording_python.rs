@@ -44,7 +44,7 @@ fn python_reads_every_topic() {
     records.push(stamped(3996, Record::FaultTicks(ticks[3900..3990].to_vec())));
     let attachment: [(&str, &str, &[u8]); 1] = [("config.toml", "application/toml", b"kp = 400.0\n")];
     let mut writer = Writer::create(&path, &session(), START_UTC_NS, &attachment).unwrap();
-    writer.show_links_of(RobotDescription::embedded("go1").unwrap());
+    writer.show(RobotDescription::embedded("go1").unwrap(), Box::new(|_| None)).unwrap();
     let everything = in_order(&ticks, &records);
     write_all(&mut writer, &everything);
     writer.finish().unwrap();
@@ -54,7 +54,7 @@ fn python_reads_every_topic() {
     let of = |wanted: fn(&Record) -> bool| records.iter().filter(|stamped| wanted(&stamped.record)).count();
     let counts = json!({
         "/robot/joint_states": 4000, "/robot/joint_cmd": 4000, "/robot/tick": 4000,
-        "/robot/pose": 400, "/tf": 400,
+        "/robot/pose": 400, "/tf": 400, "/scene/robot": 1,
         "/robot/counters": of(|record| matches!(record, Record::Counters(_))),
         "/session": 1, "/log": 1, "/fault": 1,
         "/opt/stage": of(|record| matches!(record, Record::Stage(_))),
@@ -78,7 +78,7 @@ fn python_reads_every_topic() {
     for (topic, schema) in schemas {
         assert_eq!(found["schemas"][topic], schema, "{topic}");
     }
-    assert_eq!(found["attachments"], json!({ "config.toml": "kp = 400.0\n" }));
+    assert_eq!(found["attachments"]["config.toml"], "kp = 400.0\n");
     assert_eq!(found["metadata"]["session"]["task"], "forward");
     assert_eq!(found["metadata"]["session"]["start_utc_ns"], START_UTC_NS.to_string());
     assert_eq!(
@@ -95,7 +95,13 @@ fn python_reads_every_topic() {
         let [roll, foot_z] = [tick.estimate.roll_pitch_yaw.x, tick.estimate.foot_position_leg[3].z];
         let expected = json!([START_UTC_NS + tick.time_ns, tick.number, roll, foot_z, force, mode]);
         assert_eq!(found["ticks"][index], expected);
-        let joint = |i: usize| json!([joint_name(i), tick.state.joint_position_rad[i], tick.state.joint_torque_n_m[i]]);
+        let joint = |i: usize| {
+            json!([
+                format!("{}_joint", joint_name(i)),
+                tick.state.joint_position_rad[i],
+                tick.state.joint_torque_n_m[i]
+            ])
+        };
         assert_eq!(found["joints"][index], (0..JOINTS).map(joint).collect::<Value>());
         assert_eq!(found["commands"][index], json!(tick.torque_demanded));
     }
@@ -117,25 +123,28 @@ fn python_reads_every_topic() {
 fn frames_reach_the_feet(frames: &Value, tick: &Tick) {
     use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
     let frames = frames.as_array().unwrap();
-    assert_eq!(frames.len(), 17);
+    let robot = RobotDescription::embedded("go1").unwrap();
+    // The world's child is the trunk; the inertial unit and the feet are fixed links.
+    assert_eq!(frames.len(), 1 + robot.links.len());
     let number = |value: &Value| value.as_f64().unwrap();
-    let mut leg_frames = frames[1..].iter();
-    assert_eq!((&frames[0][0], &frames[0][1]), (&json!("world"), &json!("base")));
-    for (leg, description) in Leg::ALL.into_iter().zip(RobotDescription::embedded("go1").unwrap().legs) {
+    let frame_of = |child: &str| frames.iter().find(|frame| frame[1] == child).unwrap();
+    assert_eq!(frame_of("trunk")[0], "world");
+    assert_eq!(frame_of("imu_link")[0], "trunk");
+    for (leg, description) in Leg::ALL.into_iter().zip(&robot.legs) {
         let mut foot = Isometry3::identity();
-        let mut parent = json!("base");
+        let mut parent = "trunk".to_owned();
         for name in ["hip", "thigh", "calf", "foot"] {
-            let frame = leg_frames.next().unwrap();
-            assert_eq!((&frame[0], &frame[1]), (&parent, &json!(format!("{}_{name}", leg.name()))));
-            parent = frame[1].clone();
+            let child = format!("{}_{name}", leg.name());
+            let frame = frame_of(&child);
+            assert_eq!(frame[0], parent.as_str());
+            parent = child;
             let at = |i: usize| number(&frame[2][i]);
             let q = |i: usize| number(&frame[3][i]);
             let rotation = UnitQuaternion::from_quaternion(Quaternion::new(q(3), q(0), q(1), q(2)));
             foot *= Isometry3::from_parts(Translation3::new(at(0), at(1), at(2)), rotation);
         }
         let angles = quadfrog::robot::leg_of(&tick.state.joint_position_rad, leg as usize);
-        let position_leg =
-            RobotDescription::embedded("go1").unwrap().leg_geometry.foot(&angles, leg.left_sign()).position_leg;
+        let position_leg = robot.leg_geometry.foot(&angles, leg.left_sign()).position_leg;
         let difference = foot.translation.vector - (description.joint_origin[0] + position_leg);
         assert!(difference.norm() < 1e-12, "{}: {difference:?}", leg.name());
     }

@@ -96,6 +96,17 @@ pub struct Config {
 }
 
 impl Config {
+    /// Names of all files.
+    pub const FILE_NAMES: [&str; FILES.len()] = {
+        let mut names = [""; FILES.len()];
+        let mut next = 0;
+        while next < FILES.len() {
+            names[next] = FILES[next].0;
+            next += 1;
+        }
+        names
+    };
+
     /// Loads the defaults, with the files of `folder` laid over them.
     pub fn load(folder: Option<&Path>) -> Result<Config, ConfigError> {
         let Some(folder) = folder else { return Config::layered(&[]) };

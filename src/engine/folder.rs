@@ -1,5 +1,7 @@
 //! The folder of a study: its lock, the configuration that ran, the recordings.
 
+use std::fs::{File, OpenOptions, TryLockError};
+use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
 use super::options::{EngineError, Options};
@@ -8,6 +10,10 @@ use crate::robot::description::RobotDescription;
 
 /// Name of the study's journal in its folder.
 pub const STUDY_FILE: &str = "study.log";
+/// Name of the lock in a study's folder. A session that runs holds it and has written itself into it.
+const LOCK_FILE: &str = "session.lock";
+/// Most bytes of the lock that are read, for its owner.
+const OWNER_BYTES: usize = 200;
 /// Name of the folder of the robot's files in a kept configuration.
 const ROBOT_FOLDER: &str = "robot";
 
@@ -20,16 +26,7 @@ pub fn prepare_folder(options: &Options) -> Result<LockedFolder, EngineError> {
     let Some(folder) = &options.folder else { return Ok(LockedFolder { recording: None, _lock: None }) };
     let system = |what: String| move |source| EngineError::System { what, source };
     std::fs::create_dir_all(folder).map_err(system(format!("{}: cannot be made", folder.display())))?;
-    // The operating system releases the lock however the session ends.
-    let path = folder.join("session.lock");
-    let lock = std::fs::File::create(&path).map_err(system(format!("{}: cannot be made", path.display())))?;
-    match lock.try_lock() {
-        Ok(()) => {}
-        Err(std::fs::TryLockError::WouldBlock) => return Err(EngineError::InUse { folder: folder.clone() }),
-        Err(std::fs::TryLockError::Error(source)) => {
-            return Err(system(format!("{}: cannot be locked", path.display()))(source));
-        }
-    }
+    let lock = lock_folder(folder)?;
     keep_config(options, folder)?;
     let taken = |path: &PathBuf| path.exists() || path.with_extension("mcap.part").exists();
     let names = std::iter::once("session.mcap".to_owned()).chain((2..).map(|n| format!("session-{n}.mcap")));
@@ -37,11 +34,61 @@ pub fn prepare_folder(options: &Options) -> Result<LockedFolder, EngineError> {
     Ok(LockedFolder { recording, _lock: Some(lock) })
 }
 
+/// Locks a study's folder and writes this process into the lock. The operating system releases the lock however the session
+/// ends.
+fn lock_folder(folder: &Path) -> Result<File, EngineError> {
+    let path = folder.join(LOCK_FILE);
+    let system = |what: &str| {
+        let what = format!("{}: cannot be {what}", path.display());
+        move |source| EngineError::System { what, source }
+    };
+    // Not truncated: it names its owner until it is locked.
+    let mut lock = OpenOptions::new().write(true).create(true).truncate(false).open(&path).map_err(system("made"))?;
+    match lock.try_lock() {
+        Ok(()) => {}
+        Err(TryLockError::WouldBlock) => {
+            return Err(EngineError::InUse { folder: folder.to_owned(), owner: lock_owner(&path) });
+        }
+        Err(TryLockError::Error(source)) => return Err(system("locked")(source)),
+    }
+    let host = nix::unistd::gethostname().map(|host| format!(" on {}", host.to_string_lossy())).unwrap_or_default();
+    let owner = format!("process {}{host}, since {:.0}\n", std::process::id(), jiff::Timestamp::now());
+    lock.set_len(0).and_then(|()| lock.write_all(owner.as_bytes())).map_err(system("written"))?;
+    Ok(lock)
+}
+
+/// Returns the owner that a lock names; a lock of an older version names none.
+fn lock_owner(path: &Path) -> String {
+    let text = std::fs::read(path).unwrap_or_default();
+    let text = String::from_utf8_lossy(&text[..text.len().min(OWNER_BYTES)]);
+    let line = text.lines().next().unwrap_or_default();
+    if line.is_empty() { "a process that is not known".to_owned() } else { line.to_owned() }
+}
+
+/// Returns the session that runs in the folder of a study: the owner of its lock, as text; none if the lock is free or
+/// missing, or on a file system without locks, where no session runs.
+///
+/// # Errors
+/// When the lock cannot be opened or asked.
+pub fn running_session(folder: &Path) -> io::Result<Option<String>> {
+    let path = folder.join(LOCK_FILE);
+    let lock = match File::open(&path) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+        lock => lock?,
+    };
+    match lock.try_lock_shared() {
+        Ok(()) => Ok(None),
+        Err(TryLockError::WouldBlock) => Ok(Some(lock_owner(&path))),
+        Err(TryLockError::Error(error)) if error.kind() == io::ErrorKind::Unsupported => Ok(None),
+        Err(TryLockError::Error(error)) => Err(error),
+    }
+}
+
 /// A study's folder, locked for this session until this is dropped.
 pub struct LockedFolder {
     /// Path of the recording.
     pub recording: Option<PathBuf>,
-    _lock: Option<std::fs::File>,
+    _lock: Option<File>,
 }
 
 /// Keeps the running configuration in `config/`, or in `config-2/`, ... if the session before ran with another one: the
@@ -94,7 +141,7 @@ pub fn newest_config(folder: &Path) -> Option<(u32, PathBuf)> {
 }
 
 /// Returns the study files of `folder` and of the folders in it, in the order of their names.
-pub fn study_files(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
+pub fn study_files(folder: &Path) -> io::Result<Vec<PathBuf>> {
     let own = folder.join(STUDY_FILE);
     let mut files: Vec<PathBuf> = std::fs::read_dir(folder)?
         .filter_map(|entry| Some(entry.ok()?.path().join(STUDY_FILE)))

@@ -5,16 +5,22 @@ mod folder;
 mod guard;
 mod options;
 mod prior;
+mod recording;
 mod session_thread;
 mod stored;
 mod study;
+mod verify;
 
-pub use folder::{STUDY_FILE, attachments, fingerprint, newest_config, prepare_folder, study_files, utc_ns};
+pub use folder::{
+    STUDY_FILE, attachments, fingerprint, newest_config, prepare_folder, running_session, study_files, utc_ns,
+};
 pub use guard::{GUARD, GuardError, GuardOutcome, run_guard};
-pub use options::{EngineError, Options};
+pub use options::{EngineError, Options, Provenance};
 pub use prior::{PRIOR_FILE, PriorFileError, PriorMaker, ReadyPrior, prior_plan};
+pub use recording::create_recording;
 pub use stored::{Opened, StoredStudy, open_stored, stored_studies, stored_study};
 pub use study::{check_backend, open_experiment, open_study, session_info, study_name};
+pub use verify::{TickDifference, Verification, VerifyError, verify};
 
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -33,8 +39,7 @@ use crate::realtime::clock::{Clock, MonotonicClock};
 use crate::realtime::sleep_lock::{ALLOW_INHIBITOR, INHIBITOR, SleepLock};
 use crate::realtime::system::descriptors;
 use crate::recording::record::{Record, Stamped};
-use crate::recording::recorder::{Recorder, RecorderHandle, RecorderStatus};
-use crate::recording::writer::Writer;
+use crate::recording::recorder::{Recorder, RecorderHandle, RecorderStatus, RecorderWatch};
 use crate::robot::go1::Go1;
 use crate::robot::{Placement, Robot};
 use crate::session::arming_checklist::ArmingChecklist;
@@ -85,7 +90,7 @@ pub fn start(options: Options) -> Result<EngineHandle, EngineError> {
     let (guard, guard_heartbeat) = guard.unzip();
     let clock = MonotonicClock::start();
     let writer = match &recording {
-        Some(path) => Some(Writer::create(path, &info, utc_ns(), &attachments(&options))?),
+        Some(path) => Some(create_recording(path, &options)?),
         None => None,
     };
 
@@ -258,6 +263,11 @@ impl EngineHandle {
     /// Returns the recorder's status; none where nothing is kept.
     pub fn recorder(&self) -> Option<RecorderStatus> {
         self.recording.as_ref().and(self.recorder.as_ref()).map(|recorder| recorder.status())
+    }
+
+    /// Returns a view of the recorder's status that outlives the session; none where nothing is kept.
+    pub fn recorder_watch(&self) -> Option<RecorderWatch> {
+        self.recording.as_ref().and(self.recorder.as_ref()).map(RecorderHandle::watch)
     }
 
     /// Returns the wait of the session for the storage of its study; none while there is none worth showing.

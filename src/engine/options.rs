@@ -42,6 +42,26 @@ pub struct Options {
     pub accept_backend_change: bool,
     /// Reason why the loss of the operator's connection cannot be detected; none if it can. An arming check on hardware.
     pub unseen_connection: Option<String>,
+    /// Origin of the session, for its recording.
+    pub provenance: Provenance,
+}
+
+/// Origin of a session: program, machine and person.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Provenance {
+    /// Commit of the program's sources; `unknown` where it was built without git.
+    pub commit: String,
+    /// Name of the machine.
+    pub host: String,
+    /// Name of the operator.
+    pub operator: String,
+}
+
+impl Default for Provenance {
+    fn default() -> Provenance {
+        let unknown = || "unknown".to_owned();
+        Provenance { commit: unknown(), host: unknown(), operator: unknown() }
+    }
 }
 
 impl Options {
@@ -63,6 +83,7 @@ impl Options {
             guard: None,
             accept_backend_change: false,
             unseen_connection: None,
+            provenance: Provenance::default(),
         }
     }
 
@@ -105,14 +126,12 @@ pub enum EngineError {
     WhichStudy { journal: String, names: String },
     #[error("{journal}: there is no such study in it{}", if names.is_empty() { String::new() } else { format!("; its studies: {names}") })]
     NoSuchStudy { journal: String, names: String },
-    #[error(
-        "{journal}: study {name} has no real-valued parameter yet, or several objectives; this program supports neither"
-    )]
-    Unusable { journal: String, name: String },
+    #[error("{journal}: study {name} cannot be used: {reason}")]
+    Unusable { journal: String, name: String, reason: String },
     #[error("{}: holds no study that this program made", file.display())]
     NoStudy { file: PathBuf },
-    #[error("{}: another session is running in this folder; end it first, or view the study with optuna-dashboard", folder.display())]
-    InUse { folder: PathBuf },
+    #[error("{}: another session is running in this folder ({owner}); end it first, or view the study with optuna-dashboard", folder.display())]
+    InUse { folder: PathBuf, owner: String },
     #[error(
         "{study}: it was made on {made}, this session runs on {asked}: its points and verdicts are those of another machine. Begin a new study, or give --accept-backend-change to continue it"
     )]

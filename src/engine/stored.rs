@@ -8,6 +8,7 @@ use crate::optimize::ask::{Direction, SamplerConfig};
 use crate::optimize::journal::{Durability, StudyRecord};
 use crate::optimize::space::{Range, Space};
 use crate::optimize::study::{Storage, Study, StudyError, StudyOptions};
+use crate::optimize::trial::{Distribution, Trial};
 use crate::session::experiment::attributes::StudyAttributes;
 use crate::trial::{ParameterInfo, Task};
 
@@ -90,8 +91,13 @@ pub fn open_stored(storage: &Storage, name: Option<&str>, config: &Config) -> Re
         Some(ours) => narrowed(config.parameters(ours.task), record),
         None => newest_bounds(record),
     };
-    if parameters.is_empty() || record.directions.len() != 1 {
-        return Err(EngineError::Unusable { journal: journal_name(), name: record.name.clone() });
+    let reason = match (record.directions.len(), parameters.is_empty()) {
+        (1, false) => None,
+        (1, true) => Some(without_floats(record)),
+        (objectives, _) => Some(format!("it has {objectives} objectives; this program reads studies of one")),
+    };
+    if let Some(reason) = reason {
+        return Err(EngineError::Unusable { journal: journal_name(), name: record.name.clone(), reason });
     }
     let direction =
         if record.directions == [Direction::Minimize as u64] { Direction::Minimize } else { Direction::Maximize };
@@ -110,6 +116,20 @@ pub fn open_stored(storage: &Storage, name: Option<&str>, config: &Config) -> Re
         durability: Durability::Synced,
     };
     Ok(Opened { study: Study::open(storage.clone(), options)?, ours, parameters })
+}
+
+/// Returns the reason for which a study without real-valued parameters is refused.
+fn without_floats(record: &StudyRecord) -> String {
+    let of_trial =
+        |trial: &Trial| trial.parameters.iter().zip(&trial.distributions).next().map(|(p, d)| (p.0.clone(), d.clone()));
+    match record.trials.iter().find_map(of_trial) {
+        Some((name, Distribution::Foreign { kind, .. })) => {
+            format!(
+                "none of its parameters is a real number ({name} has a {kind}); this program reads studies with one"
+            )
+        }
+        _ => "no trial of it has a parameter yet".to_owned(),
+    }
 }
 
 /// Replaces configured bounds by those that the operator set.

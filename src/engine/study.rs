@@ -186,6 +186,9 @@ pub fn session_info(options: &Options, recording: &str) -> SessionInfo {
         gains: options.config.fixed_gains(options.task),
         approve: options.approve,
         limits: options.config.health_limits(),
+        commit: options.provenance.commit.clone(),
+        host: options.provenance.host.clone(),
+        operator: options.provenance.operator.clone(),
     }
 }
 

@@ -46,6 +46,18 @@ pub enum Distribution {
 }
 
 impl Distribution {
+    /// The value that a program set, of its number in the journal: the choice of a categorical distribution, an integer.
+    pub fn external(&self, number: f64) -> Value {
+        let Distribution::Foreign { kind, text } = self else { return Value::from(number) };
+        let whole = number as i64;
+        if kind == "CategoricalDistribution" {
+            let parsed: Option<Value> = serde_json::from_str(text).ok();
+            let choice = parsed.as_ref().and_then(|of| of["attributes"]["choices"].get(usize::try_from(whole).ok()?));
+            return choice.cloned().unwrap_or_else(|| Value::from(number));
+        }
+        if kind.starts_with("Int") && whole as f64 == number { Value::from(whole) } else { Value::from(number) }
+    }
+
     /// The range of a float.
     pub fn range(&self) -> Option<Range> {
         match self {
@@ -103,6 +115,16 @@ impl Trial {
     /// The value of parameter `name`.
     pub fn parameter(&self, name: &str) -> Option<f64> {
         value_of(&self.parameters, name)
+    }
+
+    /// The parameters with the values that the program set; of a waiting trial those that are given.
+    pub fn external_parameters(&self) -> Vec<(String, Value)> {
+        if self.state == TrialState::Waiting {
+            let fixed = self.system_attributes.get(FIXED_PARAMS).and_then(Value::as_object);
+            return fixed.into_iter().flatten().map(|(name, value)| (name.clone(), value.clone())).collect();
+        }
+        let pairs = self.parameters.iter().zip(&self.distributions);
+        pairs.map(|((name, value), distribution)| (name.clone(), distribution.external(*value))).collect()
     }
 
     /// The distribution of parameter `name`.

@@ -1,12 +1,15 @@
-//! The robot as frames, for viewers in three dimensions: world -> base -> hip -> thigh -> calf -> foot.
+//! The robot as frames, for viewers in three dimensions: the world, the trunk and every other link of the URDF by its name.
 
 use foxglove::messages::{FrameTransform, FrameTransforms, Pose, PoseInFrame, Quaternion, Vector3 as Vector};
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::tick::timestamp;
+use crate::robot::JOINT_NAMES;
 use crate::robot::description::RobotDescription;
-use crate::robot::{JOINT_NAMES, Leg};
 use crate::telemetry::Tick;
+
+/// Name of the world's frame.
+pub const WORLD: &str = "world";
 
 /// Returns the trunk's pose in the world: the simulator's truth, else the estimate.
 fn base(tick: &Tick) -> (Vector3<f64>, UnitQuaternion<f64>) {
@@ -21,41 +24,39 @@ pub fn pose(tick: &Tick, log_time: u64) -> PoseInFrame {
     let (position, orientation) = base(tick);
     PoseInFrame {
         timestamp: Some(timestamp(log_time)),
-        frame_id: "world".into(),
-        pose: Some(Pose { position: Some(vector(&position)), orientation: Some(quaternion(&orientation)) }),
+        frame_id: WORLD.into(),
+        pose: Some(pose_of(&position, &orientation)),
     }
 }
 
-/// Returns seventeen frames: the trunk and, of each leg, hip, thigh, calf and foot.
+/// Returns the frames of the trunk and of every other link of the URDF, each in its parent's.
 pub fn transforms(tick: &Tick, robot: &RobotDescription, log_time: u64) -> FrameTransforms {
     let frame =
-        |parent: String, child: String, translation: &Vector3<f64>, rotation: &UnitQuaternion<f64>| FrameTransform {
+        |parent: &str, child: &str, translation: &Vector3<f64>, rotation: &UnitQuaternion<f64>| FrameTransform {
             timestamp: Some(timestamp(log_time)),
-            parent_frame_id: parent,
-            child_frame_id: child,
+            parent_frame_id: parent.into(),
+            child_frame_id: child.into(),
             translation: Some(vector(translation)),
             rotation: Some(quaternion(rotation)),
         };
     let (position, orientation) = base(tick);
-    let mut transforms = vec![frame("world".into(), "base".into(), &position, &orientation)];
-    for leg in Leg::ALL {
-        let link = |name: &str| format!("{}_{name}", leg.name());
-        let description = &robot.legs[leg as usize];
-        let mut parent = String::from("base");
-        for (joint, name) in JOINT_NAMES.iter().enumerate() {
+    let mut transforms = vec![frame(WORLD, &robot.trunk.name, &position, &orientation)];
+    transforms.extend(robot.links.iter().map(|link| {
+        let turned = link.joint.map_or_else(UnitQuaternion::identity, |joint| {
             // Hip about x, thigh and calf about y.
-            let axis = if joint == 0 { Vector3::x_axis() } else { Vector3::y_axis() };
-            let angle = tick.state.joint_position_rad[3 * leg as usize + joint];
-            let rotation = UnitQuaternion::from_axis_angle(&axis, angle);
-            transforms.push(frame(parent, link(name), &description.joint_origin[joint], &rotation));
-            parent = link(name);
-        }
-        transforms.push(frame(parent, link("foot"), &description.foot_origin, &UnitQuaternion::identity()));
-    }
+            let axis = if joint % JOINT_NAMES.len() == 0 { Vector3::x_axis() } else { Vector3::y_axis() };
+            UnitQuaternion::from_axis_angle(&axis, tick.state.joint_position_rad[joint])
+        });
+        frame(&link.parent, &link.name, &link.origin.translation.vector, &(link.origin.rotation * turned))
+    }));
     FrameTransforms { transforms }
 }
 
-fn vector(v: &Vector3<f64>) -> Vector {
+pub fn pose_of(position: &Vector3<f64>, orientation: &UnitQuaternion<f64>) -> Pose {
+    Pose { position: Some(vector(position)), orientation: Some(quaternion(orientation)) }
+}
+
+pub fn vector(v: &Vector3<f64>) -> Vector {
     Vector { x: v.x, y: v.y, z: v.z }
 }
 

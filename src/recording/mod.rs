@@ -5,8 +5,10 @@
 //! fields. While it grows it is named `*.mcap.part`; only a finished one is named `*.mcap`.
 
 mod chunk;
+mod comments;
 mod container;
 mod coordinate_frames;
+pub mod difference;
 pub mod disk;
 mod error;
 mod event_index;
@@ -15,11 +17,14 @@ pub mod player;
 pub mod record;
 pub mod recorder;
 pub mod recover;
+
+pub mod scene;
 mod schema;
 pub mod session_files;
 mod tick;
 pub mod timeline;
 mod topic;
+mod trial_table;
 mod trials;
 mod wire;
 pub mod writer;

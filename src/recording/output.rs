@@ -14,11 +14,16 @@ use prost::Message;
 
 use super::event_index::EventIndexBuilder;
 use super::record::{Record, SessionInfo};
-use super::schema;
 use super::topic::Topic;
+use super::{comments, schema};
+use crate::robot::description::RobotDescription;
+use crate::trial::ParameterInfo;
 
 /// Uncompressed bytes at which a chunk is closed: an eighth of a second of ticks. A crash loses at most the open chunk.
 const CHUNK_BYTES: usize = 256 * 1024;
+
+/// Source of the messages of this program, attached to each recording.
+const PROTO: &str = include_str!("../../proto/frog.proto");
 
 /// Destination of a recording's bytes: a file, or a failing one in a test.
 pub trait Sink: Write + Send {
@@ -44,7 +49,8 @@ pub struct Output {
 
 impl Output {
     pub fn new(sink: Box<dyn Sink>) -> Result<Output, McapError> {
-        let disk = SharedSink(Arc::new(Mutex::new(CountedSink { sink: BufWriter::new(sink), bytes: 0 })));
+        let disk =
+            SharedSink(Arc::new(Mutex::new(BufferedSink { sink: BufWriter::new(CountedSink { sink, bytes: 0 }) })));
         let mcap = WriteOptions::new()
             .profile("")
             .library(concat!("quadfrog ", env!("CARGO_PKG_VERSION")))
@@ -74,27 +80,55 @@ impl Output {
             ("seed", session.seed.to_string()),
             ("budget", session.budget.to_string()),
             ("started", session.started.clone()),
+            ("commit", session.commit.clone()),
+            ("host", session.host.clone()),
+            ("operator", session.operator.clone()),
+            ("parameters", bounds(&session.parameters)),
             ("start_utc_ns", start_utc_ns.to_string()),
             ("clock", "log_time = start_utc_ns + monotonic ns since the engine started".to_string()),
         ];
         let metadata = fields.into_iter().map(|(key, value)| (key.to_string(), value)).collect();
         self.mcap.write_metadata(&Metadata { name: "session".into(), metadata })?;
         for (name, media_type, bytes) in attachments {
-            self.mcap.attach(&mcap::Attachment {
-                log_time: start_utc_ns,
-                create_time: start_utc_ns,
-                name: name.to_string(),
-                media_type: media_type.to_string(),
-                data: Cow::Borrowed(bytes),
-            })?;
+            self.attach(name, media_type, bytes, start_utc_ns)?;
         }
+        self.attach("frog.proto", "text/plain", PROTO.as_bytes(), start_utc_ns)?;
         for (index, topic) in Topic::ALL.iter().enumerate() {
             let schema = topic.schema();
+            let comments = comments::of(&schema.name);
             let schema = self.mcap.add_schema(&schema.name, &schema.encoding, &schema.data)?;
-            let channel = self.mcap.add_channel(schema, topic.name(), "protobuf", &BTreeMap::new())?;
+            let channel = self.mcap.add_channel(schema, topic.name(), "protobuf", &comments)?;
             debug_assert_eq!(usize::from(channel), index + 1);
         }
         Ok(())
+    }
+
+    /// Writes the URDF with primitive shapes, and the metadata that names it.
+    pub fn robot(&mut self, robot: &RobotDescription, start_utc_ns: u64) -> Result<(), McapError> {
+        let mut metadata = BTreeMap::from([
+            ("name".to_string(), robot.name.clone()),
+            ("root_link".to_string(), robot.trunk.name.clone()),
+            ("joints".to_string(), robot.joint_names.join(" ")),
+        ]);
+        if let Some((name, _)) = robot.urdf() {
+            metadata.insert("urdf".to_string(), name.to_string());
+        }
+        if let Some(text) = robot.urdf_with_visual_shapes() {
+            let name = format!("{}.visual.urdf", robot.name);
+            self.attach(&name, "application/xml", text.as_bytes(), start_utc_ns)?;
+            metadata.insert("urdf_with_shapes".to_string(), name);
+        }
+        self.mcap.write_metadata(&Metadata { name: "robot".into(), metadata })
+    }
+
+    pub fn attach(&mut self, name: &str, media_type: &str, bytes: &[u8], time: u64) -> Result<(), McapError> {
+        self.mcap.attach(&mcap::Attachment {
+            log_time: time,
+            create_time: time,
+            name: name.to_string(),
+            media_type: media_type.to_string(),
+            data: Cow::Borrowed(bytes),
+        })
     }
 
     pub fn message(
@@ -141,11 +175,11 @@ impl Output {
     pub fn sync(&mut self) -> Result<(), McapError> {
         let mut disk = self.disk.lock();
         disk.sink.flush()?;
-        Ok(disk.sink.get_mut().sync()?)
+        Ok(disk.sink.get_mut().sink.sync()?)
     }
 
     pub fn bytes(&self) -> u64 {
-        self.disk.lock().bytes
+        self.disk.lock().sink.get_ref().bytes
     }
 
     /// Closes the chunk if it is large enough. Not called between the messages of a tick.
@@ -162,30 +196,50 @@ impl Output {
 
 /// The sink, shared by the MCAP writer, which writes, and [`Output`], which counts and syncs. Both are on one thread.
 #[derive(Clone)]
-pub struct SharedSink(Arc<Mutex<CountedSink>>);
+pub struct SharedSink(Arc<Mutex<BufferedSink>>);
 
+struct BufferedSink {
+    sink: BufWriter<CountedSink>,
+}
+
+/// Counts the bytes that the sink has taken: those in the buffer before it are not on a disk that is full.
 struct CountedSink {
-    sink: BufWriter<Box<dyn Sink>>,
+    sink: Box<dyn Sink>,
     bytes: u64,
 }
 
+impl Write for CountedSink {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let written = self.sink.write(bytes)?;
+        self.bytes += written as u64;
+        Ok(written)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.sink.flush()
+    }
+}
+
 impl SharedSink {
-    fn lock(&self) -> MutexGuard<'_, CountedSink> {
+    fn lock(&self) -> MutexGuard<'_, BufferedSink> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 impl Write for SharedSink {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        let mut counted = self.lock();
-        let written = counted.sink.write(bytes)?;
-        counted.bytes += written as u64;
-        Ok(written)
+        self.lock().sink.write(bytes)
     }
 
     fn flush(&mut self) -> io::Result<()> {
         self.lock().sink.flush()
     }
+}
+
+/// Returns the bounds of parameters as text: `f0 0.75..1.75 Hz, Fx 0..150 N`.
+fn bounds(parameters: &[ParameterInfo]) -> String {
+    let text = |p: &ParameterInfo| format!("{} {}..{} {}", p.name, p.low, p.high, p.unit);
+    parameters.iter().map(text).collect::<Vec<_>>().join(", ")
 }
 
 pub fn with_suffix(path: &Path, suffix: &str) -> PathBuf {

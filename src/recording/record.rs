@@ -97,6 +97,12 @@ pub struct SessionInfo {
     pub approve: Approval,
     /// Limits by which a console colours its values.
     pub limits: HealthLimits,
+    /// Commit of the program's sources: `unknown` where it was built without git; empty in older recordings, as the next two.
+    pub commit: String,
+    /// Name of the machine.
+    pub host: String,
+    /// Name of the operator.
+    pub operator: String,
 }
 
 impl SessionInfo {

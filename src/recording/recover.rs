@@ -34,30 +34,49 @@ pub struct Recovered {
 /// When there is nothing to recover, when the new file exists already, or when the disk fails.
 pub fn recover(path: impl AsRef<Path>) -> Result<Recovered, RecordingError> {
     let path = path.as_ref();
-    let mut container = Container::open_by_scanning(path)?;
     let target = match path.extension() {
         Some(extension) if extension == "part" => path.with_extension(""),
         _ => path.with_extension("recovered.mcap"),
     };
+    recover_to(path, &target)
+}
+
+/// Like [`recover`], into the new file `target` (`*.mcap`).
+///
+/// # Errors
+/// Those of [`recover`], and when the name does not end in `.mcap`.
+pub fn recover_to(path: &Path, target: &Path) -> Result<Recovered, RecordingError> {
+    if target.extension().is_none_or(|extension| extension != "mcap") {
+        return Err(RecordingError::Name { path: target.into() });
+    }
+    let mut container = Container::open_by_scanning(path)?;
+    let exists = || RecordingError::Exists { path: target.into() };
     if target.exists() {
-        return Err(RecordingError::Exists { path: target });
+        return Err(exists());
     }
     if container.chunks.is_empty() {
         let bytes = fs::metadata(path).map(|metadata| metadata.len()).unwrap_or_default();
         return Err(RecordingError::TooShort { path: path.into(), bytes });
     }
-    let unfinished = with_suffix(&target, ".recovering");
+    let unfinished = with_suffix(target, ".recovering");
     let io = |doing, path: &Path| {
         let path = path.to_path_buf();
         move |source: io::Error| RecordingError::Io { path, doing, source }
     };
     let file = File::create(&unfinished).map_err(io("create the file", &unfinished))?;
     let result = Output::new(Box::new(file)).and_then(|out| RecordCopier::new(out).all(&mut container));
-    let copied = result.map_err(|error| match error {
+    let result = result.map_err(|error| match error {
         McapError::Io(source) => RecordingError::Io { path: unfinished.clone(), doing: "write", source },
         source => RecordingError::Mcap { path: path.into(), source },
-    })?;
-    fs::rename(&unfinished, &target).map_err(io("give the file its final name", &unfinished))?;
+    });
+    let named = result.and_then(|copied| {
+        if target.exists() {
+            return Err(exists());
+        }
+        fs::rename(&unfinished, target).map_err(io("give the file its final name", &unfinished)).map(|()| copied)
+    });
+    // The beginning of a copy is of no use, and takes the room that may be short.
+    let copied = named.inspect_err(|_| drop(fs::remove_file(&unfinished)))?;
     let damaged = [
         (copied.damaged_chunks > 0)
             .then(|| format!("{} of {} chunks are damaged", copied.damaged_chunks, container.chunks.len())),
@@ -65,7 +84,7 @@ pub fn recover(path: impl AsRef<Path>) -> Result<Recovered, RecordingError> {
     ];
     let lost: Vec<_> = container.cut.take().into_iter().chain(damaged.into_iter().flatten()).collect();
     Ok(Recovered {
-        path: target,
+        path: target.into(),
         ticks: copied.ticks,
         messages: copied.messages,
         lost: (!lost.is_empty()).then(|| lost.join("; ")),

@@ -103,7 +103,14 @@ pub fn decode(topic: Topic, data: &[u8]) -> Result<Option<Record>, DecodeError> 
         Topic::Search => Record::Search(decoded(trials::search, frog::Search::decode(data)?)?),
         Topic::Insight => Record::Insight(decoded(trials::insight, frog::Insight::decode(data)?)?),
         Topic::Points => Record::Points(decoded(trials::points, frog::Points::decode(data)?)?),
-        Topic::JointStates | Topic::JointCommand | Topic::Tick | Topic::Pose | Topic::Tf | Topic::Marker => {
+        Topic::JointStates
+        | Topic::JointCommand
+        | Topic::Tick
+        | Topic::Pose
+        | Topic::Tf
+        | Topic::Marker
+        | Topic::RobotScene
+        | Topic::GroundScene => {
             return Ok(None);
         }
     }))
@@ -137,6 +144,9 @@ fn session(way: Way, ours: &mut SessionInfo, m: &mut frog::Session) -> Result<()
     way.copy(&mut ours.started, &mut m.started);
     way.copy(&mut ours.observe, &mut m.observe);
     way.list(&mut ours.gains, &mut m.gains, bounds)?;
+    way.copy(&mut ours.commit, &mut m.commit);
+    way.copy(&mut ours.host, &mut m.host);
+    way.copy(&mut ours.operator, &mut m.operator);
     match way {
         Way::Encode => {
             m.backend = ours.backend_name().to_owned();

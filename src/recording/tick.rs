@@ -5,6 +5,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 use super::frog;
 use super::wire::{DecodeError, Way, encoded};
+use crate::robot::description::RobotDescription;
 use crate::robot::{Battery, JOINTS, Joints, LEGS, MotorCommand, PerLeg, RobotState, Truth, joint_name};
 use crate::telemetry::Tick;
 
@@ -16,9 +17,11 @@ pub fn timestamp(log_time: u64) -> Timestamp {
     Timestamp::new(u32::try_from(seconds).unwrap_or(u32::MAX), nanoseconds as u32)
 }
 
-/// Returns a message for [`joint_states`] to fill, with the URDF's joint names.
-pub fn named_joints() -> JointStates {
-    let joint = |index| JointState { name: joint_name(index), ..JointState::default() };
+/// Returns a message for [`joint_states`] to fill, with the URDF's joint names; of an unknown robot `FR_hip_joint` and so on.
+pub fn named_joints(robot: Option<&RobotDescription>) -> JointStates {
+    let name =
+        |index| robot.map_or_else(|| format!("{}_joint", joint_name(index)), |robot| robot.joint_names[index].clone());
+    let joint = |index| JointState { name: name(index), ..JointState::default() };
     JointStates { timestamp: None, joints: (0..JOINTS).map(joint).collect() }
 }
 

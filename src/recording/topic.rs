@@ -1,6 +1,6 @@
 //! The topics of a recording.
 
-use foxglove::messages::{FrameTransforms, JointStates, Log, PoseInFrame};
+use foxglove::messages::{FrameTransforms, JointStates, Log, PoseInFrame, SceneUpdate};
 use foxglove::{Encode, Schema};
 use strum::{EnumString, IntoStaticStr, VariantArray};
 
@@ -48,6 +48,10 @@ pub enum Topic {
     Insight,
     #[strum(serialize = "/opt/points")]
     Points,
+    #[strum(serialize = "/scene/robot")]
+    RobotScene,
+    #[strum(serialize = "/scene/ground")]
+    GroundScene,
 }
 
 impl Topic {
@@ -66,7 +70,14 @@ impl Topic {
     pub const fn is_event(self) -> bool {
         !matches!(
             self,
-            Topic::JointStates | Topic::JointCommand | Topic::Tick | Topic::Pose | Topic::Tf | Topic::Counters
+            Topic::JointStates
+                | Topic::JointCommand
+                | Topic::Tick
+                | Topic::Pose
+                | Topic::Tf
+                | Topic::Counters
+                | Topic::RobotScene
+                | Topic::GroundScene
         )
     }
 
@@ -76,6 +87,9 @@ impl Topic {
             Topic::JointStates => JointStates::get_schema().expect("a message of foxglove has a schema"),
             Topic::Pose => PoseInFrame::get_schema().expect("a message of foxglove has a schema"),
             Topic::Tf => FrameTransforms::get_schema().expect("a message of foxglove has a schema"),
+            Topic::RobotScene | Topic::GroundScene => {
+                SceneUpdate::get_schema().expect("a message of foxglove has a schema")
+            }
             Topic::Log => Log::get_schema().expect("a message of foxglove has a schema"),
             Topic::JointCommand => own("JointCommand"),
             Topic::Tick => own("ControlTick"),

@@ -45,6 +45,7 @@ pub fn trial(way: Way, ours: &mut TrialRecord, m: &mut frog::Trial) -> Done {
     way.option(&mut ours.risk, &mut m.risk, risk)?;
     way.values(&mut ours.gains, &mut m.gains);
     way.list(&mut ours.repeats, &mut m.repeats, repeat)?;
+    way.copy(&mut ours.seed, &mut m.seed);
     way.option(&mut ours.expected, &mut m.expected, expected)
 }
 

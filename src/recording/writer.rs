@@ -1,5 +1,6 @@
 //! Writer of a recording: a live session, or a single rollout at once.
 
+use std::collections::BTreeMap;
 use std::fs::{self, OpenOptions};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -11,13 +12,20 @@ use super::error::RecordingError;
 pub use super::output::Sink;
 use super::output::{Output, with_suffix};
 use super::record::{Record, SessionInfo, Stamped};
+use super::scene::{self, Ground};
 use super::topic::Topic;
-use super::{coordinate_frames, frog, tick};
+use super::trial_table::{self, TrialSpan};
+use super::wire::encoded;
+use super::{coordinate_frames, frog, tick, trials};
 use crate::robot::description::RobotDescription;
 use crate::telemetry::{Mode, Tick};
+use crate::trial::TrialRecord;
 
 /// Period of `/robot/pose` and `/tf`, for viewers; both follow from the ticks.
 const FRAMES_PERIOD_NS: u64 = 10_000_000;
+
+/// Returns the ground of a trial that begins, or with none that of the start; none where it is not known.
+pub type GroundOf = Box<dyn Fn(Option<&TrialRecord>) -> Option<Ground> + Send>;
 
 /// Writer of one recording. Dropped without [`finish`](Writer::finish), it leaves the file as `*.mcap.part` with everything
 /// written so far.
@@ -25,7 +33,14 @@ pub struct Writer {
     out: Output,
     joints: JointStates,
     robot: Option<RobotDescription>,
+    ground_of: Option<GroundOf>,
+    /// The ground written last.
+    ground: Option<Ground>,
     start_utc_ns: u64,
+    /// Log times of the first and last tick of each trial in this file.
+    spans: BTreeMap<u32, TrialSpan>,
+    /// The newest row of each trial.
+    rows: BTreeMap<u32, TrialRecord>,
     /// Trial and mode of the last tick: a change may be a marker.
     last: Option<(Option<u32>, Mode)>,
     last_frames: Option<u64>,
@@ -95,9 +110,13 @@ impl Writer {
     ) -> Result<Writer, RecordingError> {
         let mut writer = Writer {
             out: Output::new(sink).map_err(|error| error_at(&part, error))?,
-            joints: tick::named_joints(),
+            joints: tick::named_joints(None),
             robot: None,
+            ground_of: None,
+            ground: None,
             start_utc_ns,
+            spans: BTreeMap::new(),
+            rows: BTreeMap::new(),
             last: None,
             last_frames: None,
             records: 0,
@@ -112,9 +131,34 @@ impl Writer {
         Ok(writer)
     }
 
-    /// Adds `/tf` to the following ticks: the frames of this robot's links, for 3D viewers.
-    pub fn show_links_of(&mut self, robot: RobotDescription) {
+    /// Adds the robot for viewers in three dimensions: its URDF with primitive shapes as an attachment, named in the metadata
+    /// `robot`; its shapes and the ground; the frames of its links with the following ticks; its joint names. `ground` returns
+    /// the ground of a trial that begins, and with none that of the start.
+    ///
+    /// # Errors
+    /// When the disk fails.
+    pub fn show(&mut self, robot: RobotDescription, ground: GroundOf) -> Result<(), RecordingError> {
+        self.joints = tick::named_joints(Some(&robot));
+        self.out
+            .robot(&robot, self.start_utc_ns)
+            .and_then(|()| {
+                self.out.message(Topic::RobotScene, 0, self.start_utc_ns, &scene::robot(&robot, self.start_utc_ns))
+            })
+            .map_err(|error| self.failure(error))?;
         self.robot = Some(robot);
+        self.ground_of = Some(ground);
+        self.write_ground(None, self.start_utc_ns).map_err(|error| self.failure(error))?;
+        self.sync()
+    }
+
+    /// Writes the ground of a trial that begins, or of the start, if it differs from the one before.
+    fn write_ground(&mut self, trial: Option<&TrialRecord>, log_time: u64) -> Result<(), McapError> {
+        let Some(ground) = self.ground_of.as_ref().and_then(|ground| ground(trial)) else { return Ok(()) };
+        if self.ground.as_ref() != Some(&ground) {
+            self.out.message(Topic::GroundScene, 0, log_time, &scene::ground(&ground, log_time))?;
+            self.ground = Some(ground);
+        }
+        Ok(())
     }
 
     /// Writes one tick.
@@ -143,6 +187,9 @@ impl Writer {
                 )?;
             }
         }
+        if let Some(trial) = tick.trial {
+            self.spans.entry(trial).or_insert((log_time, log_time)).1 = log_time;
+        }
         self.ticks += 1;
         // Not between the messages of a tick: a chunk holds whole ticks.
         self.out.close_full_chunk()
@@ -166,10 +213,22 @@ impl Writer {
     pub fn record(&mut self, stamped: &Stamped) -> Result<(), RecordingError> {
         let log_time = self.start_utc_ns.saturating_add(stamped.time_ns);
         self.records = self.records.wrapping_add(1);
-        self.out
-            .record(&stamped.record, self.start_utc_ns, self.records, log_time)
-            .and_then(|()| self.out.close_full_chunk())
-            .map_err(|error| self.failure(error))
+        if let Record::Trial(row) = &stamped.record
+            && row.verdict.is_none()
+        {
+            self.write_ground(Some(row), log_time).map_err(|error| self.failure(error))?;
+        }
+        let written = match &stamped.record {
+            Record::Trial(row) => {
+                let span = self.spans.get(&row.trial);
+                let (start_ns, end_ns) = (span.map(|(start, _)| *start), span.map(|(_, end)| *end));
+                let message = frog::Trial { start_ns, end_ns, ..encoded(trials::trial, row) };
+                self.rows.insert(row.trial, row.clone());
+                self.out.message(Topic::Trial, self.records, log_time, &message)
+            }
+            record => self.out.record(record, self.start_utc_ns, self.records, log_time),
+        };
+        written.and_then(|()| self.out.close_full_chunk()).map_err(|error| self.failure(error))
     }
 
     /// Passes everything to the operating system: it then survives a crash of the program.
@@ -183,12 +242,18 @@ impl Writer {
         self.out.sync().map_err(|error| self.failure(error))
     }
 
-    /// Completes the file with its index, waits until it is on the disk, renames it and returns its final name.
+    /// Completes the file with the trial table as an attachment and with its index, waits until it is on the disk, renames it and returns its final name.
     ///
     /// # Errors
     /// When the disk fails, or when a file of the final name exists by now; the recording then keeps the name `*.part`.
     pub fn finish(mut self) -> Result<PathBuf, RecordingError> {
-        self.out.finish().map_err(|error| self.failure(error))?;
+        let attached = if self.rows.is_empty() {
+            Ok(())
+        } else {
+            let table = trial_table::csv(&self.rows, &self.spans);
+            self.out.attach(trial_table::NAME, "text/csv", &table, self.start_utc_ns)
+        };
+        attached.and_then(|()| self.out.finish()).map_err(|error| self.failure(error))?;
         if self.part != self.path {
             if self.path.exists() {
                 return Err(RecordingError::Exists { path: self.path.clone() });

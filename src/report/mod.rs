@@ -10,12 +10,14 @@
 //! | [`text::render`] | a page for a terminal: tables, no figures, control characters replaced |
 //! | [`page::Page::to_json`] | a page as JSON, numbers unrounded |
 
+pub mod columns;
 pub mod configuration;
 pub mod figure;
 pub mod html;
 pub mod jump;
 pub mod page;
 pub mod recorded;
+pub mod signals;
 pub mod study;
 pub mod study_figures;
 pub mod study_page;
@@ -24,3 +26,4 @@ pub mod svg;
 pub mod table;
 pub mod text;
 mod ticks;
+pub mod trial_columns;

@@ -231,7 +231,7 @@ pub fn trials(study: &ReportedStudy) -> Table {
     let mut table = Table::new(format!("Trials of {}.", title(study)), columns);
     for row in &study.rows {
         let ticks = if study.recorded(row.trial).is_some() { "yes" } else { "no" };
-        let verdict = row.verdict.map_or("none", Verdict::name);
+        let verdict = row.verdict_name().unwrap_or("none");
         let verdict = if study.best == Some(row.trial) { format!("{verdict}, best") } else { verdict.to_owned() };
         let cells = std::iter::once(Cell::count(row.trial as usize)).chain(parameter_cells(study, row));
         let expected = [row.expected.map(|expected| expected.value), row.expected.map(|expected| expected.p_stand)];
@@ -255,7 +255,7 @@ pub fn remarks(studies: &[ReportedStudy]) -> Option<Table> {
                 table.rows.push(vec![
                     Cell::text(title(study)),
                     Cell::text(row.trial.to_string()),
-                    Cell::text(row.verdict.map_or("none", Verdict::name)),
+                    Cell::text(row.verdict_name().unwrap_or("none")),
                     Cell::text(if failed { row.cause.clone() } else { String::new() }),
                     Cell::text(row.note.clone()),
                 ]);

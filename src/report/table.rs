@@ -4,6 +4,7 @@ use std::collections::HashMap;
 use std::fmt::Write;
 
 use crate::optimize::study::ModelBest;
+use crate::optimize::trial::Trial;
 use crate::trial::{JumpRow, ParameterInfo, TrialRecord, Verdict};
 
 /// One trial as a line: number, parameters with their units, value, verdict with its cause.
@@ -39,11 +40,38 @@ pub fn best_line(
 
 /// Verdict of a trial with its cause.
 fn verdict(row: &TrialRecord) -> String {
-    match row.verdict {
+    match row.verdict_name() {
         None => "not judged".to_owned(),
-        Some(verdict) if verdict == Verdict::Accept || row.cause.is_empty() => verdict.name().to_owned(),
-        Some(verdict) => format!("{}: {}", verdict.name(), row.cause),
+        Some(name) if row.verdict == Some(Verdict::Accept) || row.cause.is_empty() => name.to_owned(),
+        Some(name) => format!("{name}: {}", row.cause),
     }
+}
+
+/// The trials of a study of another program as an aligned table, with parameters of every kind; the trial of number `best`
+/// has an asterisk.
+pub fn other_program(trials: &[Trial], best: Option<u32>) -> String {
+    let mut names: Vec<String> = Vec::new();
+    for (name, _) in trials.iter().flat_map(Trial::external_parameters) {
+        if !names.contains(&name) {
+            names.push(name);
+        }
+    }
+    let mut lines = vec![[&["trial".to_owned()][..], &names, &["value", "state"].map(str::to_owned)].concat()];
+    for trial in trials {
+        let asterisk = if best == Some(trial.number) { "*" } else { "" };
+        let mut cells = vec![format!("{asterisk}{}", trial.number)];
+        let parameters = trial.external_parameters();
+        cells.extend(names.iter().map(|name| {
+            let value = parameters.iter().find(|(of, _)| of == name).map(|(_, value)| value);
+            value
+                .map_or_else(|| "-".to_owned(), |value| value.as_str().map_or_else(|| value.to_string(), str::to_owned))
+        }));
+        cells.push(trial.value.map_or_else(|| "-".to_owned(), |value| value.to_string()));
+        cells.push(<&str>::from(trial.state).to_lowercase());
+        lines.push(cells);
+    }
+    let columns = names.len() + 3;
+    aligned(&lines, |column| column + 1 == columns)
 }
 
 /// All trials as an aligned table; the trial of number `best` has an asterisk.

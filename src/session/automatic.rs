@@ -10,6 +10,7 @@ use super::experiment::{Experiment, RequestRefusal};
 use super::rollout::Rollout;
 use crate::control::limit_key::{LimitKey, limit_key};
 use crate::optimize::journal::LongWait;
+use crate::recording::record::{Record, Transition};
 use crate::robot::Robot;
 use crate::telemetry::Tick;
 use crate::trial::{ExperimentStage, TrialRecord, Verdict};
@@ -28,8 +29,16 @@ pub struct JudgedTrial<'a> {
     pub experiment: &'a Experiment,
     /// Its row.
     pub row: &'a TrialRecord,
-    /// Its ticks.
+    /// Ticks of its last rollout, countdown included.
     pub ticks: &'a [Tick],
+    /// Changes of mode during these ticks, with their times on the ticks' clock, ns.
+    pub transitions: &'a [(u64, Transition)],
+    /// Records up to the begin of the rollout.
+    pub before: &'a [Record],
+    /// Records from the end of the rollout on, with the next proposal.
+    pub after: &'a [Record],
+    /// Reason of its end, with the key of the limit that ended it.
+    pub cause: &'a str,
     /// Warning: the same limit has ended many trials in a row.
     pub warning: Option<&'a str>,
 }
@@ -83,8 +92,6 @@ pub fn run_watched<R: Robot>(
     let mut same = SameLimit::default();
     let mut waited: Option<LongWait> = None;
     loop {
-        // There is neither a console nor a recording of them.
-        experiment.take_records();
         let Some(proposal) = experiment.proposal().filter(|_| experiment.stage() == ExperimentStage::Proposed) else {
             // The pending verdict must be reported before this worker waits: the others wait for it.
             experiment.close()?;
@@ -115,6 +122,7 @@ pub fn run_watched<R: Robot>(
             Err(RequestRefusal::Overtaken(_)) => continue,
             approved => approved?,
         };
+        let before = experiment.take_records();
         let settings = *rollout.settings();
         let (end, ticks) = rollout.run(&spec);
         experiment.ended(spec.trial, &end, ticks, ticks.len() as u64);
@@ -123,6 +131,7 @@ pub fn run_watched<R: Robot>(
             Err(RequestRefusal::EndedElsewhere(_)) => continue,
             judged => judged?,
         }
+        let after = experiment.take_records();
         voids = if suggested == Verdict::Void { voids + 1 } else { 0 };
         let repeated = same.count(limit_key(&end, &settings));
         if let Some(row) = experiment.row(spec.trial) {
@@ -131,7 +140,16 @@ pub fn run_watched<R: Robot>(
                 format!("{count} trials in a row ended by the same limit, the last because: {cause}. Change the limit, or the bounds in optimize.toml")
             });
             // Between the rollouts of a trial its row has no verdict.
-            each(&JudgedTrial { experiment, row, ticks, warning: warning.as_deref() });
+            each(&JudgedTrial {
+                experiment,
+                row,
+                ticks: rollout.ticks(),
+                transitions: rollout.transitions(),
+                before: &before,
+                after: &after,
+                cause: &cause,
+                warning: warning.as_deref(),
+            });
             if voids >= VOIDS_IN_A_ROW {
                 experiment.close()?;
                 return Err(RequestRefusal::NotNow(format!(

@@ -4,6 +4,7 @@
 use crate::control::cycle::{Cycle, TickInputs};
 use crate::control::settings::ControlSettings;
 use crate::realtime::clock::SimulatedClock;
+use crate::recording::record::Transition;
 use crate::robot::ticks_in;
 use crate::robot::{CONTROL_PERIOD_S, Placement, Robot};
 use crate::telemetry::{Command, CommandRefusal, Event, Fault, Permit, Tick, TrialEnd, TrialSpec};
@@ -13,17 +14,24 @@ pub struct Rollout<R: Robot> {
     robot: R,
     settings: ControlSettings,
     ticks: Vec<Tick>,
+    /// Changes of mode of the last trial, with their times on the ticks' clock, ns.
+    transitions: Vec<(u64, Transition)>,
 }
 
 impl<R: Robot> Rollout<R> {
     /// A rollout of `robot`, which must support [`Robot::place`].
     pub fn new(robot: R, settings: &ControlSettings) -> Rollout<R> {
-        Rollout { robot, settings: *settings, ticks: Vec::new() }
+        Rollout { robot, settings: *settings, ticks: Vec::new(), transitions: Vec::new() }
     }
 
     /// Ticks of the last trial, countdown included.
     pub fn ticks(&self) -> &[Tick] {
         &self.ticks
+    }
+
+    /// Changes of mode of the last trial, with their times on the ticks' clock, ns.
+    pub fn transitions(&self) -> &[(u64, Transition)] {
+        &self.transitions
     }
 
     /// The settings of the control cycle.
@@ -39,6 +47,7 @@ impl<R: Robot> Rollout<R> {
         let mut inputs =
             TickInputs { command: Some(Command::RunTrial(*spec, Permit::default())), ..TickInputs::default() };
         self.ticks.clear();
+        self.transitions.clear();
         // The cycle ends a trial `cap_s` after its last impulse at the latest; a longer one is an error of this program.
         let pause_s = 0.5 / spec.jump.f1_hz.max(0.05) + spec.landing_wait_s;
         let profile_s = f64::from(spec.jumps) * (0.5 / spec.jump.f0_hz + pause_s);
@@ -47,6 +56,12 @@ impl<R: Robot> Rollout<R> {
             inputs.time_ns = u64::from(number) * (CONTROL_PERIOD_S * 1e9) as u64;
             self.ticks.push(*cycle.tick(&inputs, &SimulatedClock, &mut self.robot));
             inputs.command = None;
+            self.transitions.extend(cycle.events().iter().filter_map(|event| match event {
+                Event::Mode { from, to, cause, time_ns } => {
+                    Some((time_ns, Transition { from, to, cause: cause.to_string() }))
+                }
+                _ => None,
+            }));
             let ended = cycle.events().iter().find_map(|event| match event {
                 Event::TrialEnded { end, .. } => Some(end),
                 Event::Refused { because: CommandRefusal::Inhibited(inhibit), .. } => Some(TrialEnd::NotReady(inhibit)),

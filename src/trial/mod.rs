@@ -297,6 +297,9 @@ pub enum ProposalSource {
     Queued,
     /// A repeat of one of the best points, to confirm the best; beyond the budget.
     Confirm,
+    /// Another program ran the trial.
+    #[strum(serialize = "other program")]
+    OtherProgram,
 }
 
 impl ProposalSource {
@@ -436,6 +439,20 @@ pub struct TrialRecord {
     pub gains: ParameterValues,
     /// Judged rollouts, in order, void ones included; empty for a trial that is one rollout.
     pub repeats: Vec<RepeatRecord>,
+    /// Seed of its noise and terrain, of the first rollout if it has several; none for a trial of another program.
+    pub seed: Option<u64>,
+}
+
+impl TrialRecord {
+    /// Returns the name of its verdict on screens and in reports; a trial of another program was not judged: it is complete
+    /// or has failed. None while it runs or waits.
+    pub fn verdict_name(&self) -> Option<&'static str> {
+        Some(match (self.verdict?, self.source) {
+            (Verdict::Accept, ProposalSource::OtherProgram) => "complete",
+            (Verdict::Void, ProposalSource::OtherProgram) => "failed",
+            (verdict, _) => verdict.name(),
+        })
+    }
 }
 
 /// Growth of the largest forces on a robot: section `[hop_envelope]` of `config/safety.toml`.

@@ -106,12 +106,20 @@ fn a_full_disk_behind_the_standard_output_is_an_error() {
     let study = program.study("recordings");
     let study = study.to_str().unwrap();
     let evaluate: &[&str] = &["evaluate", "--point", "f0=1.3,Fx=40,Fz=210", "--json"];
+    // Of a small ensemble.
+    program.write("small/prior.toml", "worlds = 2\npoints = 16\n");
     for arguments in [
         &["optimize", "--trials", "1", "--record", "none", "--json"][..],
         &["optimize", "--trials", "1", "--record", "none"],
         &["study", "show", study],
         &["study", "export", study],
         evaluate,
+        &["report", study, "--json"],
+        &["prior", "--json", "--config", "small"],
+        &["doctor"],
+        &["--help"],
+        &["study", "--help"],
+        &["--version"],
     ] {
         let full = fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
         let output = program.command(arguments).stdout(full).output().unwrap();

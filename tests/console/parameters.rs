@@ -41,8 +41,7 @@ fn gains_and_a_second_direction_are_searched_continued_and_exported() {
     let study = study.to_str().unwrap();
     assert_eq!(run(&["--resume", study, "--trials", "8"]), first[5..]);
 
-    let trials: Vec<Value> =
-        serde_json::from_str(&program.text(&["study", "export", study, "--format", "json"])).unwrap();
+    let trials = program.exported(study);
     assert_eq!(trials.len(), 8);
     for trial in &trials {
         let (point, gains) = (&trial["params"], &trial["user_attrs"]["gains"]);

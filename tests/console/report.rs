@@ -21,7 +21,7 @@ fn study(more: &[&str]) -> (Program, String) {
 
 /// The exported trials of a study.
 fn exported(program: &Program, study: &str) -> Vec<Value> {
-    serde_json::from_str(&program.text(&["study", "export", study, "--format", "json"])).unwrap()
+    program.exported(study)
 }
 
 /// The page of `--json`.

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::sync::OnceLock;
 
 use quadfrog::config::{Config, ConfigLayer};
-use quadfrog::optimize::journal::{JournalState, Operation};
+use quadfrog::optimize::journal::{JournalLine, JournalState, Operation};
 use quadfrog::realtime::channel::StopLatch;
 use quadfrog::recording::player::Player;
 use quadfrog::recording::recover::recover;
@@ -60,10 +60,11 @@ fn read_packets(bytes: &[u8]) {
 pub fn journal(bytes: &[u8]) {
     let mut state = JournalState::default();
     for line in String::from_utf8_lossy(bytes).split('\n') {
-        let Ok((worker, operation)) = Operation::parse(line) else { continue };
-        let written = operation.to_line(&worker);
-        let (reader, read) = Operation::parse(written.trim_end()).expect("a written line is readable");
-        assert_eq!((&reader, read.to_line(&reader)), (&worker, written), "a line changed by being read");
+        let Ok(JournalLine { worker, operation, times }) = Operation::parse(line) else { continue };
+        let written = operation.to_line(&worker, times);
+        let JournalLine { worker: reader, operation: read, .. } =
+            Operation::parse(written.trim_end()).expect("a written line is readable");
+        assert_eq!((&reader, read.to_line(&reader, times)), (&worker, written), "a line changed by being read");
         state.apply(operation, &worker);
     }
     for study in state.studies() {

@@ -243,6 +243,9 @@ impl Draw {
                 recording: self.string(),
                 started: self.string(),
                 observe: self.yes(),
+                commit: self.string(),
+                host: self.string(),
+                operator: self.string(),
                 gains: self.several(Draw::bounds),
                 approve: self.one_of(&Approval::ALL),
                 limits: HealthLimits {
@@ -292,6 +295,7 @@ impl Draw {
                 risk: self.risk(),
                 expected: self.option(Draw::expected),
                 gains: self.several(|d| (d.string(), d.number())).into(),
+                seed: self.option(Draw::word),
                 repeats: self.several(|d| RepeatRecord {
                     seed: d.word(),
                     verdict: d.option(|d| d.one_of(&Verdict::ALL)),
@@ -412,6 +416,9 @@ pub fn session() -> SessionInfo {
         gains: vec![parameter("kp", "N/m", 100.0, 1000.0)],
         approve: Approval::Each,
         limits: HealthLimits::default(),
+        commit: "0123456789abcdef".into(),
+        host: "lab".into(),
+        operator: "anna".into(),
     }
 }
 

@@ -33,8 +33,13 @@ fn main() -> ExitCode {
 /// Prints an error of the command line without what its arguments may hold; help and version as they are.
 fn refuse(error: &clap::Error) -> ExitCode {
     if matches!(error.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion) {
-        let _ = error.print();
-        return ExitCode::SUCCESS;
+        return match error.print() {
+            Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
+                output::notice(&format!("standard output: {error}; the output is not complete"));
+                ExitCode::FAILURE
+            }
+            _ => ExitCode::SUCCESS,
+        };
     }
     output::message(&error.render().to_string());
     ExitCode::from(2)

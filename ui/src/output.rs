@@ -41,6 +41,25 @@ pub fn data(data: &str) {
     if io::stdout().is_terminal() { text(data) } else { write(data.as_bytes()) }
 }
 
+/// Standard output for data that is written in pieces, as [`data`]; errors are returned.
+pub struct Data;
+
+impl Write for Data {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let mut output = io::stdout().lock();
+        if output.is_terminal() {
+            output.write_all(printable(&String::from_utf8_lossy(bytes)).as_bytes())?;
+        } else {
+            output.write_all(bytes)?;
+        }
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        io::stdout().flush()
+    }
+}
+
 fn write(bytes: &[u8]) {
     let mut output = io::stdout().lock();
     if let Err(error) = output.write_all(bytes).and_then(|()| output.flush())

@@ -58,7 +58,7 @@ pub fn as_text(trial: &TrialRecord, model: &Model) -> String {
         text.push_str(&format!("\t{name}={value}"));
     }
     let value = trial.value.map_or("-".to_owned(), |value| value.to_string());
-    let verdict = trial.verdict.map_or("-", Verdict::name);
+    let verdict = trial.verdict_name().unwrap_or("-");
     let (unit, source, remark) = (&model.session.info.unit, trial.source.name(), remark(trial));
     text + &format!("\tJ={value} {unit}\t{verdict}\t{source}\t{remark}")
 }

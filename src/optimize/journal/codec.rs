@@ -1,20 +1,33 @@
 //! One line of the journal: an operation and the identity of its writer, to and from JSON text.
 
-use super::json::{LineFields, number, numbers, parse_json, text, time};
+use super::json::{LineFields, TimeForm, number, numbers, parse_json, text, time};
 use super::operation::{AttributeKind, Operation};
 use crate::optimize::space::Range;
 use crate::optimize::trial::{Distribution, Trial, TrialState, number_of};
 use serde_json::{Map, Value};
+use std::cell::Cell;
 use std::collections::BTreeMap;
+
+/// A line of a journal.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JournalLine {
+    /// Identity of its writer.
+    pub worker: String,
+    /// Operation.
+    pub operation: Operation,
+    /// Form of its times; UTC without times.
+    pub times: TimeForm,
+}
 
 impl Operation {
     /// The operation as a line of JSON, with its line end.
-    pub fn to_line(&self, worker: &str) -> String {
-        let (code, fields) = self.fields();
+    pub fn to_line(&self, worker: &str, times: TimeForm) -> String {
+        let (code, fields) = self.fields(times);
         format!("{{\"op_code\":{code},\"worker_id\":{}{fields}}}\n", text(worker))
     }
 
-    fn fields(&self) -> (u8, String) {
+    fn fields(&self, times: TimeForm) -> (u8, String) {
+        let time = |at| time(at, times);
         let attribute = |kind: &AttributeKind, key: &str, value: &Value| {
             format!(",\"{}\":{{{}:{value}}}", kind.member(), text(key))
         };
@@ -27,7 +40,7 @@ impl Operation {
                 (2 + *kind as u8, format!(",\"study_id\":{study}{}", attribute(kind, key, value)))
             }
             Operation::CreateTrial { study, started, template } => {
-                let template = template.as_ref().map_or_else(String::new, |t| template_fields(t));
+                let template = template.as_ref().map_or_else(String::new, |t| template_fields(t, times));
                 (4, format!(",\"study_id\":{study},\"datetime_start\":{}{template}", time(*started)))
             }
             Operation::SetParameter { trial, name, value, distribution } => {
@@ -54,10 +67,11 @@ impl Operation {
         }
     }
 
-    /// Parses a line into the identity of the writer and the operation. The error can follow "line 12: ".
-    pub fn parse(line: &str) -> Result<(String, Operation), String> {
+    /// Parses a line. The error can follow "line 12: ".
+    pub fn parse(line: &str) -> Result<JournalLine, String> {
         let value = parse_json(line)?;
-        let fields = LineFields(value.as_object().ok_or("not a JSON object")?);
+        let members = value.as_object().ok_or("not a JSON object")?;
+        let fields = LineFields { members, times: Cell::default() };
         let worker = fields.text("worker_id")?.to_owned();
         let trial = || fields.index("trial_id");
         let study = || fields.index("study_id").map(|s| s as usize);
@@ -79,7 +93,7 @@ impl Operation {
             }
             4 => {
                 let started = fields.time("datetime_start")?;
-                let template = fields.0.contains_key("state").then(|| read_template(&fields)).transpose()?;
+                let template = fields.members.contains_key("state").then(|| read_template(&fields)).transpose()?;
                 Operation::CreateTrial { study: study()?, started, template: template.map(Box::new) }
             }
             5 => Operation::SetParameter {
@@ -101,15 +115,16 @@ impl Operation {
             10 => Operation::Nothing,
             other => return Err(format!("op_code {other} is not one of 0 to 10")),
         };
-        Ok((worker, operation))
+        Ok(JournalLine { worker, operation, times: fields.times.get() })
     }
 }
 
 /// The members of a new trial's contents.
-fn template_fields(trial: &Trial) -> String {
+fn template_fields(trial: &Trial, times: TimeForm) -> String {
     let Trial { state, user_attributes, system_attributes, .. } = trial;
     let value = trial.value.map_or_else(|| "null".to_owned(), number);
-    let completed = trial.completed.map_or_else(String::new, |at| format!(",\"datetime_complete\":{}", time(Some(at))));
+    let completed =
+        trial.completed.map_or_else(String::new, |at| format!(",\"datetime_complete\":{}", time(Some(at), times)));
     let object = |members: Vec<String>| format!("{{{}}}", members.join(","));
     let pair = |(name, value): (&String, String)| format!("{}:{value}", text(name));
     let names = || trial.parameters.iter().map(|(name, _)| name);
@@ -130,12 +145,12 @@ fn template_fields(trial: &Trial) -> String {
 
 /// Reads the contents of a new trial.
 fn read_template(fields: &LineFields<'_>) -> Result<Trial, String> {
-    let object = |key: &str| match fields.0.get(key) {
+    let object = |key: &str| match fields.members.get(key) {
         None | Some(Value::Null) => Ok(Map::new()),
         Some(Value::Object(map)) => Ok(map.clone()),
         Some(_) => Err(format!("`{key}` is not an object")),
     };
-    let value = match fields.0.get("value") {
+    let value = match fields.members.get("value") {
         Some(value) if !value.is_null() => Some(number_of(value).ok_or("`value` is not a number")?),
         _ => fields.optional("values", LineFields::numbers)?.and_then(|values| values.first().copied()),
     };

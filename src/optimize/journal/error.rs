@@ -14,6 +14,15 @@ pub enum JournalError {
     )]
     Line { path: PathBuf, line: usize, fault: String },
     #[error(
+        "{path} is an SQLite database, not a journal. If Optuna keeps studies in it, copy them into a journal: python3 -c \
+         \"import optuna; from optuna.storages import JournalStorage; from optuna.storages.journal import JournalFileBackend; \
+         storage = 'sqlite:///{path}'; to = JournalStorage(JournalFileBackend('study.log')); \
+         [optuna.copy_study(from_study_name=name, from_storage=storage, to_storage=to) \
+         for name in optuna.get_all_study_names(storage)]\"",
+        path = path.display()
+    )]
+    Sqlite { path: PathBuf },
+    #[error(
         "{} has {has} bytes, after {had} were read: it was shortened or replaced; open the study again",
         path.display()
     )]

@@ -16,6 +16,9 @@ const LONGEST_PAUSE: Duration = Duration::from_millis(50);
 /// Longest line, bytes: a thousand times the longest that this program writes; room for the attributes of other programs.
 const LONGEST_LINE: usize = 16 << 20;
 
+/// Beginning of an SQLite database (<https://www.sqlite.org/fileformat.html>, "The Database Header").
+const SQLITE_MAGIC: &[u8] = b"SQLite format 3\0";
+
 fn too_long(length: usize) -> String {
     format!("the line has {length} bytes, more than {LONGEST_LINE}")
 }
@@ -86,6 +89,9 @@ impl JournalFile {
         file.seek(SeekFrom::Start(self.offset)).map_err(io)?;
         let mut bytes = Vec::with_capacity((length - self.offset) as usize);
         file.take(length - self.offset).read_to_end(&mut bytes).map_err(io)?;
+        if self.offset == 0 && bytes.starts_with(SQLITE_MAGIC) {
+            return Err(JournalError::Sqlite { path: self.path.clone() });
+        }
         let mut start = 0;
         while let Some(end) = bytes[start..].iter().position(|b| *b == b'\n').map(|i| start + i + 1) {
             let line = match end - start {

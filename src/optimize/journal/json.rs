@@ -2,15 +2,32 @@
 
 use crate::optimize::trial::{TrialState, number_of};
 use jiff::Timestamp;
+use jiff::tz::TimeZone;
 use serde_json::{Map, Value};
+use std::cell::Cell;
 use std::fmt::Write as _;
 
+/// Form of the times in a journal.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum TimeForm {
+    /// UTC with its offset, as Optuna 5 writes.
+    #[default]
+    Utc,
+    /// Local time without an offset, as Optuna 4 writes. Optuna 5 reads both forms. Optuna 4 reads both, too, but does not
+    /// subtract a time of one form from one of the other: its `plot_timeline` fails on a journal of both.
+    Local,
+}
+
 /// The members of a line; errors name the member.
-pub struct LineFields<'a>(pub &'a Map<String, Value>);
+pub struct LineFields<'a> {
+    pub members: &'a Map<String, Value>,
+    /// Form of the times read so far.
+    pub times: Cell<TimeForm>,
+}
 
 impl LineFields<'_> {
     pub fn get(&self, key: &str) -> Result<&Value, String> {
-        self.0.get(key).ok_or_else(|| format!("`{key}` is missing"))
+        self.members.get(key).ok_or_else(|| format!("`{key}` is missing"))
     }
 
     pub fn text(&self, key: &str) -> Result<&str, String> {
@@ -39,7 +56,13 @@ impl LineFields<'_> {
     pub fn time(&self, key: &str) -> Result<Option<Timestamp>, String> {
         match self.get(key)? {
             Value::Null => Ok(None),
-            Value::String(text) => text.parse().map(Some).map_err(|e| format!("`{key}`: {e}")),
+            Value::String(text) => {
+                let (at, form) = moment(text).map_err(|e| format!("`{key}`: {e}"))?;
+                if form == TimeForm::Local {
+                    self.times.set(form);
+                }
+                Ok(Some(at))
+            }
             _ => Err(format!("`{key}` is neither a time nor null")),
         }
     }
@@ -50,7 +73,7 @@ impl LineFields<'_> {
         key: &str,
         read: impl Fn(&Self, &str) -> Result<Option<T>, String>,
     ) -> Result<Option<T>, String> {
-        if self.0.contains_key(key) { read(self, key) } else { Ok(None) }
+        if self.members.contains_key(key) { read(self, key) } else { Ok(None) }
     }
 
     pub fn state(&self) -> Result<TrialState, String> {
@@ -90,8 +113,22 @@ pub fn numbers(values: Option<&[f64]>) -> String {
     }
 }
 
-pub fn time(at: Option<Timestamp>) -> String {
-    at.map_or_else(|| "null".to_owned(), |at| format!("\"{}\"", at.strftime("%Y-%m-%dT%H:%M:%S.%6f+00:00")))
+pub fn time(at: Option<Timestamp>, form: TimeForm) -> String {
+    let text = |at: Timestamp| match form {
+        TimeForm::Utc => at.strftime("%Y-%m-%dT%H:%M:%S.%6f+00:00").to_string(),
+        TimeForm::Local => at.to_zoned(TimeZone::system()).strftime("%Y-%m-%dT%H:%M:%S.%6f").to_string(),
+    };
+    at.map_or_else(|| "null".to_owned(), |at| format!("\"{}\"", text(at)))
+}
+
+/// Reads a time with its offset, or without one as Optuna 4 writes it, which means local time; of a time that the change to
+/// winter time repeats the earlier, as Python does.
+pub fn moment(text: &str) -> Result<(Timestamp, TimeForm), jiff::Error> {
+    let with_offset = text.parse().map(|at| (at, TimeForm::Utc));
+    with_offset.or_else(|_| {
+        let local: jiff::civil::DateTime = text.parse()?;
+        Ok((local.to_zoned(TimeZone::system())?.timestamp(), TimeForm::Local))
+    })
 }
 
 /// Parses JSON of Python's `json`: the bare tokens Infinity, -Infinity and NaN become text, unpaired surrogates become

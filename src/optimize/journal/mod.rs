@@ -14,9 +14,12 @@ mod state;
 mod wait;
 
 pub(super) use self::redis::{JournalRedis, public_address};
+pub use codec::JournalLine;
 pub use error::JournalError;
 use file::UnreadTail;
 pub use file::{Durability, JournalFile, LOCK_GRACE};
+pub use json::TimeForm;
+pub(super) use json::moment;
 pub use operation::{AttributeKind, Operation};
 pub use state::{Applied, JournalState, StudyRecord};
 pub use wait::{JournalWait, LongWait, WaitedFor, notice_waits};
@@ -35,6 +38,8 @@ pub struct Journal {
     backend: JournalBackend,
     worker: String,
     state: JournalState,
+    /// Form of the times that are written: local once a line with local times was read.
+    times: TimeForm,
 }
 
 impl Journal {
@@ -52,7 +57,8 @@ impl Journal {
     }
 
     fn new(backend: JournalBackend) -> Self {
-        Journal { backend, worker: uuid::Uuid::new_v4().to_string(), state: JournalState::default() }
+        let worker = uuid::Uuid::new_v4().to_string();
+        Journal { backend, worker, state: JournalState::default(), times: TimeForm::default() }
     }
 
     fn read(backend: JournalBackend) -> Result<Self, JournalError> {
@@ -62,7 +68,8 @@ impl Journal {
 
     /// Copies the state to a journal in memory.
     pub fn fork(&self) -> Self {
-        Journal { backend: JournalBackend::Memory, worker: self.worker.clone(), state: self.state.clone() }
+        let (worker, state) = (self.worker.clone(), self.state.clone());
+        Journal { backend: JournalBackend::Memory, worker, state, times: self.times }
     }
 
     /// The state as of the last refresh or commit.
@@ -93,7 +100,10 @@ impl Journal {
     fn apply_lines(&mut self) -> Result<(Vec<Applied>, UnreadTail), JournalError> {
         let mut own = Vec::new();
         let accept = |line: &str| {
-            let (worker, operation) = Operation::parse(line)?;
+            let JournalLine { worker, operation, times } = Operation::parse(line)?;
+            if times == TimeForm::Local {
+                self.times = times;
+            }
             let result = self.state.apply(operation, &worker);
             own.extend((worker == self.worker).then_some(result));
             Ok(())
@@ -119,8 +129,8 @@ impl Journal {
             let lock = if let JournalBackend::File(file) = &self.backend { Some(file.lock()?) } else { None };
             let (_, tail) = self.apply_lines()?;
             let operations = decide(&self.state)?;
-            let worker = &self.worker;
-            let lines = operations.iter().map(|operation| operation.to_line(worker));
+            let (worker, times) = (&self.worker, self.times);
+            let lines = operations.iter().map(|operation| operation.to_line(worker, times));
             let appended = match (&mut self.backend, &lock) {
                 _ if operations.is_empty() => return Ok(Vec::new()),
                 (JournalBackend::Redis(redis), _) => redis.append(&lines.collect::<Vec<_>>())?,

@@ -174,6 +174,12 @@ impl Study {
         &self.options
     }
 
+    /// Name of the objective; empty where the study names none.
+    pub fn metric_name(&self) -> &str {
+        let names = self.record().system_attributes.get(METRIC_NAMES).and_then(Value::as_array);
+        names.and_then(|names| names.first()?.as_str()).unwrap_or_default()
+    }
+
     /// User attributes of the study.
     pub fn attributes(&self) -> &BTreeMap<String, Value> {
         &self.record().user_attributes

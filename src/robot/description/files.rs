@@ -61,7 +61,8 @@ const LARGEST_ANGLE_RAD: f64 = 12.6;
 pub struct RobotFiles {
     folder: PathBuf,
     toml: Cow<'static, str>,
-    embedded_urdf: Option<&'static str>,
+    /// Text of the URDF; none for one that is read from the folder.
+    urdf: Option<Cow<'static, str>>,
 }
 
 impl RobotFiles {
@@ -75,7 +76,7 @@ impl RobotFiles {
             name: name.to_owned(),
             known: RobotDescription::embedded_names().collect::<Vec<_>>().join(", "),
         })?;
-        Ok(RobotFiles { folder: Path::new("robots").join(name), toml: toml.into(), embedded_urdf: Some(urdf) })
+        Ok(RobotFiles { folder: Path::new("robots").join(name), toml: toml.into(), urdf: Some(urdf.into()) })
     }
 
     /// Opens the robot in `folder`: its `robot.toml` and the URDF that `robot.toml` names.
@@ -84,7 +85,12 @@ impl RobotFiles {
     /// `robot.toml` cannot be read.
     pub fn from_folder(folder: &Path) -> Result<RobotFiles, DescriptionError> {
         let toml = read(folder.join("robot.toml"))?;
-        Ok(RobotFiles { folder: folder.to_owned(), toml: toml.into(), embedded_urdf: None })
+        Ok(RobotFiles { folder: folder.to_owned(), toml: toml.into(), urdf: None })
+    }
+
+    /// Opens the robot of two texts, as a recording has them; `origin` is for messages.
+    pub fn from_texts(origin: &Path, toml: String, urdf: String) -> RobotFiles {
+        RobotFiles { folder: origin.to_owned(), toml: toml.into(), urdf: Some(urdf.into()) }
     }
 
     /// Opens the folder `model`, if there is one, or the embedded robot of that name.
@@ -130,8 +136,8 @@ impl RobotFiles {
         }
 
         let file = self.folder.join(&robot.urdf);
-        let urdf = match self.embedded_urdf {
-            Some(text) => Cow::Borrowed(text),
+        let urdf = match &self.urdf {
+            Some(text) => Cow::Borrowed(text.as_ref()),
             None => read(file.clone())?.into(),
         };
         let parts = urdf::parse(&file, &urdf)?;
@@ -170,12 +176,20 @@ impl RobotFiles {
             lying_position,
             rotor_inertia,
             imu_origin: parts.imu_origin.unwrap_or_else(Vector3::zeros),
+            joint_names: parts.joint_names,
+            links: parts.links,
             files: vec![("robot.toml".to_owned(), self.toml.to_string()), (urdf_name, urdf.into_owned())],
         })
     }
 }
 
 impl RobotDescription {
+    /// Returns the URDF with primitive shapes to look at: a link without a visual shape, or with a mesh as one, has the shapes
+    /// of its collision. For viewers, which do not have the files of meshes.
+    pub fn urdf_with_visual_shapes(&self) -> Option<String> {
+        urdf::with_visual_shapes(self.urdf()?.1)
+    }
+
     /// Names of the embedded robots.
     pub fn embedded_names() -> impl Iterator<Item = &'static str> {
         EMBEDDED.iter().map(|(name, ..)| *name)

@@ -11,7 +11,7 @@ mod urdf_checks;
 
 use std::path::PathBuf;
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Isometry3, Matrix3, Vector3};
 
 pub use files::{LARGEST_FILE, RobotFiles, read_text};
 
@@ -58,6 +58,19 @@ pub struct LegDescription {
     pub foot_radius: f64,
 }
 
+/// A link of the URDF with the joint to its parent, for viewers: links that are fixed to another one included.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LinkFrame {
+    /// Name of the link.
+    pub name: String,
+    /// Name of the parent link.
+    pub parent: String,
+    /// Frame at joint angle zero in the parent's frame.
+    pub origin: Isometry3<f64>,
+    /// Joint that turns it, in motor order; none for a fixed one.
+    pub joint: Option<usize>,
+}
+
 /// Hard limits of the twelve joints.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JointLimits {
@@ -93,6 +106,10 @@ pub struct RobotDescription {
     pub rotor_inertia: Joints,
     /// Position of the inertial unit, trunk frame, m; its axes are the trunk's.
     pub imu_origin: Vector3<f64>,
+    /// Names of the joints in the URDF.
+    pub joint_names: [String; JOINTS],
+    /// All links but the trunk, each after its parent.
+    pub links: Vec<LinkFrame>,
     /// Name and text of the files: `robot.toml` and the URDF.
     pub files: Vec<(String, String)>,
 }
@@ -101,6 +118,11 @@ impl RobotDescription {
     /// Total mass, kg.
     pub fn total_mass(&self) -> f64 {
         self.trunk.mass + self.legs.iter().flat_map(|leg| &leg.bodies).map(|body| body.mass).sum::<f64>()
+    }
+
+    /// Returns name and text of the URDF.
+    pub fn urdf(&self) -> Option<(&str, &str)> {
+        self.files.iter().find(|(name, _)| name != "robot.toml").map(|(name, text)| (name.as_str(), text.as_str()))
     }
 
     /// Lowest and highest joint angles that a controller may command, rad: allowed by the URDF and by the maker's

@@ -7,7 +7,7 @@ use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
 use urdf_rs::{Geometry, Joint, JointType, Link, Pose, Robot};
 
 use super::urdf_checks;
-use super::{CollisionShape, DescriptionError, JointLimits, LegDescription, RigidBody};
+use super::{CollisionShape, DescriptionError, JointLimits, LegDescription, LinkFrame, RigidBody};
 use crate::robot::kinematics::LegGeometry;
 use crate::robot::{JOINT_NAMES, JOINTS, Joints, Leg, PerLeg};
 
@@ -19,6 +19,8 @@ pub(super) struct UrdfContents {
     pub limits: JointLimits,
     /// Origin of a link whose name contains "imu", trunk frame, m.
     pub imu_origin: Option<Vector3<f64>>,
+    pub joint_names: [String; JOINTS],
+    pub links: Vec<LinkFrame>,
 }
 
 /// Tolerance for lengths and directions that must be equal or zero, m: the precision of a drawing.
@@ -82,6 +84,7 @@ impl<'a> UrdfDocument<'a> {
             return self.invalid(&format!("link {}", trunk.body.name), problem, "a quadruped has four, its hips");
         }
         let mut legs = [const { None }; 4];
+        let mut joint_names = [const { String::new() }; JOINTS];
         let mut limits = JointLimits {
             min_position: Joints::default(),
             max_position: Joints::default(),
@@ -100,12 +103,42 @@ impl<'a> UrdfDocument<'a> {
                 let problem = format!("a second hip in the place of {}", leg.name());
                 return self.invalid(&joint.name, problem, "put the trunk's origin between the four hips");
             }
-            legs[leg as usize] = Some(self.leg(leg, joint, origin, &mut limits)?);
+            legs[leg as usize] = Some(self.leg(leg, joint, origin, &mut limits, &mut joint_names)?);
         }
         // Four hips, each in another quadrant.
         let legs = legs.map(|leg| leg.expect("four distinct legs"));
         let leg_geometry = self.geometry(&legs)?;
-        Ok(UrdfContents { trunk: trunk.body, legs, leg_geometry, limits, imu_origin: trunk.imu_origin })
+        let links = self.link_frames(&trunk.body.name, &joint_names);
+        let imu_origin = trunk.imu_origin;
+        Ok(UrdfContents { trunk: trunk.body, legs, leg_geometry, limits, imu_origin, joint_names, links })
+    }
+
+    /// Returns all links but `root`, each once and after its parent.
+    fn link_frames(&self, root: &str, joint_names: &[String; JOINTS]) -> Vec<LinkFrame> {
+        let frame = |joint: &Joint| LinkFrame {
+            name: joint.child.link.clone(),
+            parent: joint.parent.link.clone(),
+            origin: isometry(&joint.origin),
+            joint: joint_names.iter().position(|name| *name == joint.name),
+        };
+        let children = |parent: &str| {
+            let parent = parent.to_owned();
+            self.robot.joints.iter().filter(move |joint| joint.parent.link == parent).map(frame)
+        };
+        let mut links: Vec<LinkFrame> = Vec::new();
+        let mut known = vec![root.to_owned()];
+        let mut next = 0;
+        while let Some(parent) = known.get(next).cloned() {
+            for link in children(&parent) {
+                // A second joint to the same link is no tree; the first one counts.
+                if !known.contains(&link.name) {
+                    known.push(link.name.clone());
+                    links.push(link);
+                }
+            }
+            next += 1;
+        }
+        links
     }
 
     /// Converts the chain of three joints that starts with `hip`.
@@ -115,6 +148,7 @@ impl<'a> UrdfDocument<'a> {
         hip: &'a Joint,
         origin: Isometry3<f64>,
         limits: &mut JointLimits,
+        joint_names: &mut [String; JOINTS],
     ) -> Result<LegDescription, DescriptionError> {
         let mut chain = Vec::with_capacity(3);
         let mut joint_origin = [Vector3::zeros(); 3];
@@ -123,6 +157,7 @@ impl<'a> UrdfDocument<'a> {
             self.check_joint(joint, &origin, part)?;
             joint_origin[part] = origin.translation.vector;
             let i = 3 * leg as usize + part;
+            joint_names[i].clone_from(&joint.name);
             limits.min_position[i] = joint.limit.lower;
             limits.max_position[i] = joint.limit.upper;
             limits.max_torque[i] = joint.limit.effort;
@@ -320,6 +355,25 @@ impl<'a> UrdfDocument<'a> {
         }
         Ok(())
     }
+}
+
+/// Returns the URDF in `text` with primitive shapes to look at: a link without a visual shape, or with a mesh as one, gets the
+/// shapes of its collision. None for a text that is no URDF.
+pub(super) fn with_visual_shapes(text: &str) -> Option<String> {
+    let mut robot = urdf_rs::read_from_string(text).ok()?;
+    for link in &mut robot.links {
+        let shown = |visual: &urdf_rs::Visual| !matches!(visual.geometry, Geometry::Mesh { .. });
+        if link.visual.is_empty() || !link.visual.iter().all(shown) {
+            let shape = |collision: &urdf_rs::Collision| urdf_rs::Visual {
+                name: None,
+                origin: collision.origin.clone(),
+                geometry: collision.geometry.clone(),
+                material: None,
+            };
+            link.visual = link.collision.iter().map(shape).collect();
+        }
+    }
+    urdf_rs::write_to_string(&robot).ok()
 }
 
 /// Adds mass and inertia of a part to `body` by the parallel-axis theorem.

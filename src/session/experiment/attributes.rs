@@ -319,6 +319,12 @@ pub fn elsewhere(mut attributes: Map<String, Value>) -> Map<String, Value> {
     for name in ["parent", "worker", "backend", "rerun", "interrupted"] {
         attributes.remove(name);
     }
+    // A table has no types: a text of digits is a number there.
+    if let Some(seed) = attributes.get_mut("seed")
+        && let Some(number) = seed.as_u64()
+    {
+        *seed = number.to_string().into();
+    }
     attributes
 }
 
@@ -334,7 +340,9 @@ pub fn confirms(trial: &Trial) -> bool {
 
 /// Returns the row of a trial of the study. A complete trial of another program has no verdict and counts as accepted.
 pub fn row_of(trial: &Trial, note: String, order: &[ParameterInfo]) -> TrialRecord {
-    let Origin { source, parent, gains, repeats, .. } = Origin::of_trial(trial);
+    let origin = Origin::of_trial(trial);
+    let seed = origin.seed();
+    let Origin { source, parent, gains, repeats, .. } = origin;
     let kept = TrialAttributes::of(trial);
     let fits = |verdict: &Verdict| match trial.state {
         TrialState::Complete => *verdict != Verdict::Void,
@@ -346,9 +354,10 @@ pub fn row_of(trial: &Trial, note: String, order: &[ParameterInfo]) -> TrialReco
         TrialState::Fail | TrialState::Pruned => Some(Verdict::Void),
         TrialState::Running | TrialState::Waiting => None,
     };
+    let elsewhere = !trial.user_attributes.contains_key("source") && worker_of(trial).is_none();
     TrialRecord {
         trial: trial.number,
-        source,
+        source: if elsewhere && trial.state != TrialState::Waiting { ProposalSource::OtherProgram } else { source },
         parent,
         parameters: order.iter().filter_map(|p| Some((p.name.clone(), trial.parameter(&p.name)?))).collect(),
         measured: parse(&trial.user_attributes, |_| true),
@@ -363,6 +372,7 @@ pub fn row_of(trial: &Trial, note: String, order: &[ParameterInfo]) -> TrialReco
         expected: parse(&trial.user_attributes, |_| true),
         gains,
         repeats,
+        seed,
     }
 }
 

@@ -20,6 +20,7 @@ mod search;
 mod trial_changes;
 
 pub use self::plan::{ExperimentPlan, RequestRefusal};
+pub use self::proposal_start::next_seed;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;

@@ -167,6 +167,7 @@ impl Experiment {
             expected: proposal.expected,
             gains,
             repeats: origin.repeats,
+            seed: Some(seed),
             ..TrialRecord::default()
         };
         if !row.note.is_empty() {
@@ -282,6 +283,11 @@ fn gains_note(gains: &ParameterValues, plan: &ExperimentPlan) -> String {
 /// other.
 fn trial_seed(study: u64, worker: u32, trial: u32) -> u64 {
     mixed(study, (u64::from(worker) << 32) + u64::from(trial) + 1)
+}
+
+/// Returns the seed of the rollout of a trial that begins next or runs; none for a trial of another program.
+pub fn next_seed(row: &TrialRecord) -> Option<u64> {
+    Some(repeat_seed(row.seed?, row.repeats.len() as u64))
 }
 
 /// Returns the seed of a trial's rollout after `before` judged ones, void ones included: that of the trial for the first.

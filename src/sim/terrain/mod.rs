@@ -267,6 +267,14 @@ impl Terrain {
 }
 
 impl TerrainConfig {
+    /// Returns the ground of a trial with `seed`, for displays: the normal of the plane through the world's origin, and the steps
+    /// or blocks where they are at the start.
+    pub fn ground(&self, seed: u64) -> (Vector3<f64>, Vec<TerrainBox>) {
+        let mut terrain = Terrain::new(self);
+        terrain.reset(seed);
+        (terrain.normal, terrain.boxes().collect())
+    }
+
     /// Returns the Coulomb coefficient of the ground in a trial with `seed`, blocks excepted.
     pub fn friction_of(&self, seed: u64) -> f64 {
         match self.friction_range {

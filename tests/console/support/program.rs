@@ -51,6 +51,26 @@ impl Program {
         self.text(arguments).lines().map(|line| serde_json::from_str(line).unwrap()).collect()
     }
 
+    /// The exported trials of a study: `number`, `state`, `value`, `params`, `user_attrs`.
+    #[track_caller]
+    pub fn exported(&self, study: &str) -> Vec<Value> {
+        let rows: Vec<serde_json::Map<String, Value>> =
+            serde_json::from_str(&self.text(&["study", "export", study, "--format", "json"])).unwrap();
+        let nested = |row: &serde_json::Map<String, Value>, prefix: &str| -> Value {
+            let cells =
+                row.iter().filter_map(|(name, cell)| Some((name.strip_prefix(prefix)?.to_owned(), cell.clone())));
+            cells.collect::<serde_json::Map<_, _>>().into()
+        };
+        let trial = |row: &serde_json::Map<String, Value>| {
+            let value = row.iter().find(|(name, _)| name.starts_with("value")).map(|(_, value)| value);
+            serde_json::json!({
+                "number": row["number"], "state": row["state"], "value": value,
+                "params": nested(row, "params_"), "user_attrs": nested(row, "user_attrs_"),
+            })
+        };
+        rows.iter().map(trial).collect()
+    }
+
     /// The message of a run that must end with status 2.
     #[track_caller]
     pub fn refused(&self, arguments: &[&str]) -> String {

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use quadfrog::config::Config;
-use quadfrog::engine::newest_config;
+use quadfrog::engine::{Provenance, newest_config};
 use quadfrog::optimize::ask::SamplerKind;
 use quadfrog::robot::description::{RobotDescription, RobotFiles};
 use quadfrog::trial::Task;
@@ -77,9 +77,35 @@ pub struct StudyArguments {
     /// Parent folder of new studies
     #[arg(long, value_name = "DIR", default_value = "recordings")]
     pub output: PathBuf,
+    /// Name of the operator, for the recording [default: the user's name]
+    #[arg(long, value_name = "NAME", value_parser = operator)]
+    operator: Option<String>,
+}
+
+/// Longest name of an operator, characters.
+const LONGEST_NAME: usize = 100;
+
+fn operator(text: &str) -> Result<String, String> {
+    let length = text.chars().count();
+    if text.trim().is_empty() || length > LONGEST_NAME || text.chars().any(char::is_control) {
+        return Err(format!("a name has 1 to {LONGEST_NAME} characters, none of them a control character"));
+    }
+    Ok(text.to_owned())
 }
 
 impl StudyArguments {
+    /// Returns the origin of a session of this program, on this machine.
+    pub fn provenance(&self) -> Provenance {
+        let of_user = || ["USER", "LOGNAME"].iter().find_map(|name| operator(&std::env::var(name).ok()?).ok());
+        let unknown = || "unknown".to_owned();
+        let host = std::fs::read_to_string("/proc/sys/kernel/hostname").ok();
+        Provenance {
+            commit: env!("QUADFROG_COMMIT").to_owned(),
+            host: host.and_then(|host| operator(host.trim()).ok()).unwrap_or_else(unknown),
+            operator: self.operator.clone().or_else(of_user).unwrap_or_else(unknown),
+        }
+    }
+
     /// Loads the configuration: that of `--config`, else the last one that the study in `resume` ran with.
     pub fn load_config(&self, resume: Option<&Path>) -> Result<Config, Failure> {
         let own = resume.filter(|_| self.config.is_none()).and_then(newest_config).map(|(_, config)| config);

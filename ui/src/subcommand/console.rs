@@ -3,6 +3,7 @@
 use std::net::{SocketAddr, ToSocketAddrs};
 use std::path::{Path, PathBuf};
 
+use anyhow::anyhow;
 use clap::Args;
 use clap::builder::TypedValueParser;
 use quadfrog::config::Config;
@@ -133,6 +134,7 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
         guard: Some(PathBuf::from("/proc/self/exe")),
         unseen_connection: TerminalLocation::of(|name| std::env::var(name).ok()).unseen().map(str::to_owned),
         network,
+        provenance: arguments.study.provenance(),
         ..Options::new(config, robot, backend, selected.task)
     };
     engine::check_backend(&options)?;
@@ -143,10 +145,18 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
     options.folder = (!arguments.observe).then(|| folder.clone());
     let handle = engine::start(options)?;
     let recording = handle.recording().map(Path::to_owned);
+    let recorder = handle.recorder_watch();
     notice_waits(None);
     let exit = app::run(Feed::live(handle), console)?;
+    let unfinished = recorder.map(|recorder| recorder.get()).filter(|status| !status.finished);
+    // With an error the recording keeps the name of one that is written.
+    let recording = recording.map(|path| if unfinished.is_some() { part_of(&path) } else { path });
+    let failure = unfinished.map(|status| {
+        let cause = status.error.unwrap_or_else(|| "the recorder ended early; please report it".to_owned());
+        Failure::Other(anyhow!("the recording is not complete: {cause}"))
+    });
     if exit == ConsoleExit::HungUp || arguments.observe {
-        return Ok(());
+        return failure.map_or(Ok(()), Err);
     }
     put_line!("The study and its recording are in {}", folder.display());
     put_line!("  continue the study:  quadfrog --resume {}", folder.display());
@@ -156,7 +166,12 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
     for part in incomplete {
         put_line!("  repair an incomplete recording:  quadfrog recover {}", part.display());
     }
-    Ok(())
+    failure.map_or(Ok(()), Err)
+}
+
+/// Returns the name of a recording while it is written.
+fn part_of(recording: &Path) -> PathBuf {
+    recording.with_extension("mcap.part")
 }
 
 /// Resolves `HOST:PORT`.

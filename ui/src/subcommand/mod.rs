@@ -7,6 +7,7 @@ mod console;
 mod doctor;
 mod emulate;
 mod evaluate;
+mod export;
 mod failure;
 mod guard;
 mod optimize;
@@ -18,6 +19,8 @@ mod report;
 mod reproduce;
 mod selection;
 mod study;
+mod table;
+mod verify;
 
 use clap::{Parser, Subcommand};
 
@@ -54,8 +57,12 @@ enum Subcommands {
     Replay(replay::ReplayArguments),
     /// Judge recorded trials by another configuration, old beside new
     Rejudge(rejudge::RejudgeArguments),
+    /// Export the signals of a recording as CSV, JSON or Parquet
+    Export(export::ExportArguments),
     /// Repair an incomplete recording
     Recover(recover::RecoverArguments),
+    /// Run a simulated session again from its recording alone and compare every tick
+    Verify(verify::VerifyArguments),
     /// Serve the simulator as a Go1 on the network, with fault injection
     Emulate(emulate::EmulateArguments),
     /// Measure the simulator's speed on this machine
@@ -83,7 +90,9 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
         Some(Subcommands::Reproduce(reproduce)) => reproduce::run(&reproduce),
         Some(Subcommands::Replay(replay)) => replay::run(&replay),
         Some(Subcommands::Rejudge(rejudge)) => rejudge::run(&rejudge),
+        Some(Subcommands::Export(export)) => export::run(&export),
         Some(Subcommands::Recover(recover)) => recover::run(&recover),
+        Some(Subcommands::Verify(verify)) => verify::run(&verify),
         Some(Subcommands::Emulate(emulate)) => emulate::run(&emulate),
         Some(Subcommands::Bench(bench)) => bench::run(&bench),
         Some(Subcommands::Doctor(doctor)) => doctor::run(&doctor),

@@ -1,9 +1,11 @@
 //! `quadfrog recover`: repairs an incomplete recording.
 
+use std::io::ErrorKind;
 use std::path::PathBuf;
 
 use clap::Args;
-use quadfrog::recording::recover;
+use quadfrog::engine::{EngineError, running_session};
+use quadfrog::recording::{RecordingError, recover};
 use quadfrog_console::put_line;
 
 use super::failure::Failure;
@@ -12,15 +14,56 @@ use super::failure::Failure;
 pub struct RecoverArguments {
     /// A session.mcap.part left by a killed program, or a damaged session.mcap
     file: PathBuf,
+    /// The new file, *.mcap [default: session.mcap for session.mcap.part, session.recovered.mcap for session.mcap]
+    #[arg(long, short, value_name = "FILE")]
+    output: Option<PathBuf>,
 }
 
 pub fn run(arguments: &RecoverArguments) -> Result<(), Failure> {
-    let recovered = recover::recover(&arguments.file).map_err(Failure::input)?;
+    let RecoverArguments { file, output } = arguments;
+    refuse_running(arguments)?;
+    let recovered = match output {
+        Some(output) => recover::recover_to(file, output),
+        None => recover::recover(file),
+    };
+    let recovered = recovered.map_err(failure)?;
     put_line!("{}: {} ticks, {} messages", recovered.path.display(), recovered.ticks, recovered.messages);
     match recovered.lost {
         Some(lost) => put_line!("Lost: {lost}"),
         None => put_line!("Nothing was lost."),
     }
-    put_line!("{} is unchanged.", arguments.file.display());
+    put_line!("{} is unchanged.", file.display());
     Ok(())
+}
+
+/// Refuses a recording that a session still writes: the session needs the name of the finished file.
+fn refuse_running(RecoverArguments { file, .. }: &RecoverArguments) -> Result<(), Failure> {
+    if file.extension().is_none_or(|extension| extension != "part") {
+        return Ok(());
+    }
+    let folder = file.parent().unwrap_or(file);
+    let owner = running_session(folder).map_err(|source| {
+        Failure::from(EngineError::System { what: format!("{}: its lock cannot be read", folder.display()), source })
+    })?;
+    match owner {
+        None => Ok(()),
+        Some(owner) => Err(Failure::input(format!(
+            "{}: a session runs in its folder ({owner}) and may still write it; end the session, then recover. Until then \
+             `quadfrog replay` plays it",
+            file.display()
+        ))),
+    }
+}
+
+/// Returns unusable input for a file that cannot be recovered, another error for a disk that fails.
+fn failure(error: RecordingError) -> Failure {
+    use ErrorKind::{IsADirectory, NotADirectory, NotFound, PermissionDenied};
+    match &error {
+        RecordingError::Io { source, .. }
+            if !matches!(source.kind(), NotFound | PermissionDenied | IsADirectory | NotADirectory) =>
+        {
+            Failure::Other(error.into())
+        }
+        _ => Failure::input(error),
+    }
 }

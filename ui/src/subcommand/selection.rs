@@ -58,7 +58,8 @@ pub fn parse_storage(place: &str) -> Storage {
     if place.starts_with("redis://") || place.starts_with("rediss://") {
         return Storage::Redis(place.to_owned());
     }
-    let path = Path::new(place);
+    // A file either way; that it is no journal, and the remedy, is in the error.
+    let path = Path::new(place.strip_prefix("sqlite:///").unwrap_or(place));
     Storage::File(if path.is_dir() { path.join(STUDY_FILE) } else { path.to_owned() })
 }
 

@@ -4,14 +4,15 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use clap::{Args, Subcommand, ValueEnum};
+use clap::{Args, Subcommand};
 use quadfrog::config::Config;
 use quadfrog::engine::{Opened, StoredStudy, newest_config, open_stored, stored_studies, study_files, study_name};
 use quadfrog::optimize::exchange::{self, TableTrial};
 use quadfrog::optimize::repeats;
 use quadfrog::optimize::study::Storage;
 use quadfrog::optimize::trial::TrialState;
-use quadfrog::report::table;
+use quadfrog::report::columns::{TableFormat, TableWriter};
+use quadfrog::report::{table, trial_columns};
 use quadfrog::session::experiment::{self, rows_of};
 use quadfrog::trial::TrialRecord;
 use quadfrog_console::{notice, output};
@@ -19,6 +20,7 @@ use serde_json::Value;
 
 use super::failure::Failure;
 use super::selection::parse_storage;
+use super::table::{format_of_name, table_format, write_file, written_format};
 
 #[derive(Debug, Args)]
 pub struct StudyCommand {
@@ -43,10 +45,10 @@ enum StudySubcommand {
     Export {
         #[command(flatten)]
         study: StudySelector,
-        /// Format of the table [default: by the file's name, else csv]
-        #[arg(long, value_name = "FORM")]
+        /// Format of the table [default: by the file's name; csv on standard output]
+        #[arg(long, value_name = "FORM", value_parser = table_format())]
         format: Option<TableFormat>,
-        /// Output file [default: standard output]
+        /// Output file, *.csv, *.json or *.parquet [default: standard output]
         #[arg(long, short, value_name = "FILE")]
         output: Option<PathBuf>,
     },
@@ -58,7 +60,7 @@ enum StudySubcommand {
         #[arg(value_name = "FILE")]
         table: PathBuf,
         /// Format of the table [default: by the file's name, else csv]
-        #[arg(long, value_name = "FORM")]
+        #[arg(long, value_name = "FORM", value_parser = table_format())]
         format: Option<TableFormat>,
         /// Queue the points to be run instead; their results are ignored
         #[arg(long)]
@@ -90,20 +92,6 @@ struct StudySelector {
     /// Name of the study, if the journal holds several
     #[arg(long, value_name = "NAME")]
     name: Option<String>,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum TableFormat {
-    Csv,
-    Json,
-}
-
-impl TableFormat {
-    /// Returns the given format, else that of the file's extension.
-    fn of(given: Option<TableFormat>, file: Option<&Path>) -> TableFormat {
-        let json = file.is_some_and(|file| file.extension().is_some_and(|extension| extension == "json"));
-        given.unwrap_or(if json { TableFormat::Json } else { TableFormat::Csv })
-    }
 }
 
 fn parse_setting(text: &str) -> Result<(String, f64), String> {
@@ -212,7 +200,11 @@ fn show(selector: &StudySelector) -> Result<(), Failure> {
     text.push('\n');
     let rows: Vec<TrialRecord> = rows_of(study, parameters);
     let unit = if ours.is_some() { opened.unit() } else { "value" };
-    text += &table::table(&rows, study.best().map(|best| best.number), parameters, unit);
+    let best = study.best().map(|best| best.number);
+    text += &match ours {
+        Some(_) => table::table(&rows, best, parameters, unit),
+        None => table::other_program(study.trials(), best),
+    };
     for row in rows.iter().filter(|row| !row.note.is_empty()) {
         let _ = writeln!(text, "Note on trial {}: {}", row.trial, row.note);
     }
@@ -243,29 +235,34 @@ fn best_line(opened: &Opened, rows: &[TrialRecord]) -> String {
 }
 
 fn export(selector: &StudySelector, format: Option<TableFormat>, output: Option<&Path>) -> Result<(), Failure> {
+    let format = written_format(format, output)?;
     let opened = selector.open()?;
-    let note = |number| opened.study.note_of(number);
-    let text = match TableFormat::of(format, output) {
-        TableFormat::Csv => exchange::to_csv(opened.study.trials(), note),
-        TableFormat::Json => exchange::to_json(opened.study.trials(), note),
-    };
-    match output {
-        None => {
-            output::data(&text);
-            Ok(())
-        }
-        Some(path) => std::fs::write(path, text)
-            .with_context(|| format!("{}: cannot be written", path.display()))
-            .map_err(Failure::Other),
+    let study = &opened.study;
+    let columns = trial_columns::of(study.trials(), study.metric_name(), |number| study.note_of(number));
+    if let Some(path) = output {
+        return write_file(path, |file| {
+            let mut table = TableWriter::new(format, file, &columns)?;
+            table.write(&columns)?;
+            table.finish()
+        });
     }
+    let mut table = TableWriter::new(format, Vec::new(), &columns).context("the table")?;
+    table.write(&columns).context("the table")?;
+    let bytes = table.finish().context("the table")?;
+    output::data(&String::from_utf8_lossy(&bytes));
+    Ok(())
 }
 
 fn import(selector: &StudySelector, table: &Path, format: Option<TableFormat>, queue: bool) -> Result<(), Failure> {
     let refuse = |error: &dyn std::fmt::Display| Failure::input(format!("{}: {error}", table.display()));
+    let format = format.or_else(|| format_of_name(table)).unwrap_or(TableFormat::Csv);
+    if format == TableFormat::Parquet {
+        return Err(refuse(&"a Parquet table is not imported; convert it: pandas.read_parquet(...).to_csv(...)"));
+    }
     let text = std::fs::read_to_string(table).map_err(|error| refuse(&error))?;
-    let trials = match TableFormat::of(format, Some(table)) {
-        TableFormat::Csv => exchange::from_csv(&text),
+    let trials = match format {
         TableFormat::Json => exchange::from_json(&text),
+        _ => exchange::from_csv(&text),
     }
     .map_err(|error| refuse(&error))?;
     let mut study = selector.open()?.study;

@@ -11,7 +11,7 @@ pub fn details(session: &SessionModel, theme: &Theme, trial: &TrialRecord) -> Ve
     let unit = &session.info.unit;
     let mut rows: Vec<(String, String)> = Vec::new();
     let mut row = |name: &str, value: String| rows.push((name.to_owned(), value));
-    let verdict = trial.verdict.map_or("not judged".to_owned(), |verdict| verdict.name().to_owned());
+    let verdict = trial.verdict_name().unwrap_or("not judged").to_owned();
     row("verdict", verdict);
     if let Some(suggested) = trial.suggested {
         let cause = if trial.cause.is_empty() { String::new() } else { format!(": {}", trial.cause) };

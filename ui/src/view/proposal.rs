@@ -60,6 +60,7 @@ fn content(model: &Model, width: usize) -> (String, Vec<Line<'static>>) {
                 (ProposalSource::Rerun, None) => ", a re-run".to_owned(),
                 (ProposalSource::Confirm, _) => ", to confirm the best".to_owned(),
                 (ProposalSource::Queued, _) => ", from the queue".to_owned(),
+                (ProposalSource::OtherProgram, _) => ", by another program".to_owned(),
             };
             let repeat = match proposal.repeats {
                 0 => String::new(),

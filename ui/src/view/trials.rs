@@ -195,7 +195,7 @@ fn cell(model: &Model, trial: &TrialRecord, column: &ShownColumn, best: bool) ->
         }
         Column::Verdict => {
             let verdict = match (trial.verdict, trial.suggested) {
-                (Some(verdict), _) => verdict.name().to_owned(),
+                (Some(verdict), _) => trial.verdict_name().unwrap_or(verdict.name()).to_owned(),
                 (None, Some(suggested)) => format!("{}?", suggested.name()),
                 (None, None) => "runs".to_owned(),
             };

@@ -1,6 +1,7 @@
 //! `quadfrog optimize`: complete studies on the simulator without a screen, or a worker on a shared study.
 
 mod printer;
+mod recorder;
 
 use std::collections::hash_map::Entry;
 use std::collections::{HashMap, HashSet};
@@ -15,17 +16,15 @@ use quadfrog::engine::{self, EngineError, Options, PRIOR_FILE, ReadyPrior, Store
 use quadfrog::optimize::ask::SamplerKind;
 use quadfrog::optimize::journal::Durability;
 use quadfrog::optimize::study::Storage;
-use quadfrog::recording::record::{Record, Stamped};
-use quadfrog::recording::writer::Writer;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::session::automatic::{self, JudgedTrial};
 use quadfrog::session::parallel;
 use quadfrog::session::rollout::Rollout;
 use quadfrog::sim::Simulator;
-use quadfrog::telemetry::Tick;
-use quadfrog::trial::{Approval, Backend, Task, TrialRecord, Verdict};
+use quadfrog::trial::{Approval, Backend, Task, Verdict};
 
 use printer::Printer;
+use recorder::{RecordedRollout, StudyRecorder};
 
 use super::arguments::{self, Seeds, StudyArguments, parse_seeds};
 use super::failure::Failure;
@@ -213,6 +212,7 @@ fn run_one(
         approve: Approval::Auto,
         join: join.cloned(),
         prior: prior.map(|prior| Arc::clone(&prior.model)),
+        provenance: arguments.study.provenance(),
         ..Options::new(config.clone(), robot.clone(), Backend::Simulator, study.task)
     };
     let prepared = engine::prepare_folder(&options)?;
@@ -229,35 +229,45 @@ fn run_one(
     let mut experiment = engine::open_experiment(&options, Durability::Synced, &name.to_string_lossy())?;
     let mut recorder = recording.as_ref().map(|path| StudyRecorder::create(path, &options)).transpose()?;
     let mut failed = None;
-    let mut best: Option<(TrialRecord, Vec<Tick>)> = None;
+    // The rollouts of the best trial, and of the present one.
+    let mut best: Option<(f64, Vec<RecordedRollout>)> = None;
+    let mut present = Vec::new();
     let ran = automatic::run_watched(&mut experiment, &mut rollout, |trial| {
-        let JudgedTrial { experiment, row, ticks, warning } = *trial;
+        let JudgedTrial { experiment, row, warning, .. } = *trial;
         if row.verdict.is_some() {
             printer.trial(study, row, experiment.counted());
         }
         if let Some(warning) = warning {
             printer.warn(study, warning);
         }
-        let accepted = row.verdict == Some(Verdict::Accept);
-        let better = |best: &(TrialRecord, Vec<Tick>)| row.value > best.0.value;
         match arguments.record {
+            RecordChoice::None => {}
             RecordChoice::All => {
-                if let Some(Err(error)) = recorder.as_mut().map(|recorder| recorder.trial(row, ticks)) {
+                let recorded = recorder.as_mut().map(|recorder| recorder.rollout(&RecordedRollout::of(trial)));
+                if let Some(Err(error)) = recorded {
                     failed.get_or_insert(error);
                 }
             }
-            RecordChoice::Best if accepted && best.as_ref().is_none_or(better) => {
-                best = Some((row.clone(), ticks.to_vec()))
+            RecordChoice::Best => {
+                present.push(RecordedRollout::of(trial));
+                if let Some(verdict) = row.verdict {
+                    let rollouts = std::mem::take(&mut present);
+                    let value = row.value.filter(|_| verdict == Verdict::Accept);
+                    if let Some(value) = value.filter(|value| best.as_ref().is_none_or(|(best, _)| value > best)) {
+                        best = Some((value, rollouts));
+                    }
+                }
             }
-            RecordChoice::Best | RecordChoice::None => {}
         }
     });
-    if let Some(recorder) = recorder {
-        let finished = match failed {
-            None => recorder.finish(best.as_ref(), experiment.rows()),
+    if let Some(mut recorder) = recorder {
+        let rollouts = best.iter().flat_map(|(_, rollouts)| rollouts);
+        let recorded = match failed {
+            None => rollouts.map(|rollout| recorder.rollout(rollout)).collect(),
             Some(error) => Err(error),
         };
-        failed = finished.err();
+        let last = experiment.take_records();
+        failed = recorded.and_then(|()| recorder.finish(&last, experiment.rows())).err();
     }
     // A full disk fails the journal and the recording: the journal, with every verdict, is named first.
     if let Err(refusal) = ran {
@@ -266,52 +276,10 @@ fn run_one(
             failed.map_or_else(String::new, |error| format!("; and the recording is not complete: {error}"));
         return Err(Failure::Other(anyhow!("{place}: {refusal}{recording}")));
     }
+    // Also a finished file that another program put in its place: what was judged is there, the recording is not complete.
     if let Some(error) = failed {
-        return Err(error.into());
+        return Err(Failure::Other(anyhow!("the recording is not complete: {error}")));
     }
     printer.finished(study, &experiment, &options);
     Ok(())
-}
-
-/// A recording of trials that ran in simulated time, one after the other on the recording's clock.
-struct StudyRecorder {
-    writer: Writer,
-    time_ns: u64,
-}
-
-impl StudyRecorder {
-    fn create(path: &Path, options: &Options) -> Result<StudyRecorder, EngineError> {
-        let info = engine::session_info(options, &path.display().to_string());
-        let writer = Writer::create(path, &info, engine::utc_ns(), &engine::attachments(options))?;
-        Ok(StudyRecorder { writer, time_ns: 0 })
-    }
-
-    fn trial(&mut self, row: &TrialRecord, ticks: &[Tick]) -> Result<(), EngineError> {
-        let start_ns = self.time_ns;
-        for tick in ticks {
-            let time_ns = start_ns + tick.time_ns;
-            self.writer.tick(&Tick { time_ns, ..*tick })?;
-            self.time_ns = time_ns + 1_000_000;
-        }
-        self.row(row)
-    }
-
-    /// Adds the best trial, where only that one is recorded, and the whole table, and completes the file.
-    fn finish<'a>(
-        mut self,
-        best: Option<&(TrialRecord, Vec<Tick>)>,
-        rows: impl Iterator<Item = &'a TrialRecord>,
-    ) -> Result<(), EngineError> {
-        if let Some((row, ticks)) = best {
-            self.trial(row, ticks)?;
-        }
-        for row in rows {
-            self.row(row)?;
-        }
-        Ok(self.writer.finish().map(drop)?)
-    }
-
-    fn row(&mut self, row: &TrialRecord) -> Result<(), EngineError> {
-        Ok(self.writer.record(&Stamped { time_ns: self.time_ns, record: Record::Trial(row.clone()) })?)
-    }
 }

@@ -1,0 +1,145 @@
+//! `quadfrog export` on recordings of the running program, read by pandas, polars and Python's mcap reader; `.ci/run` installs
+//! them, and the comparison is skipped with a message where they are missing.
+
+#[path = "support/program.rs"]
+mod program;
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+use program::{Program, assert_shows, with_small_files};
+use quadfrog::recording::player::{Played, Player};
+use quadfrog::telemetry::Tick;
+use serde_json::Value;
+
+/// A recording of two trials of the program, as an argument.
+fn recording(program: &Program) -> String {
+    program.text(&["optimize", "--trials", "2", "--record", "all"]);
+    program.study("recordings").join("session.mcap").to_str().unwrap().to_owned()
+}
+
+fn ticks(recording: &str) -> Vec<Tick> {
+    let tick = |played| if let Played::Tick(tick) = played { Some(tick) } else { None };
+    Player::open(recording).unwrap().filter_map(tick).collect()
+}
+
+/// Header and rows of a table.
+fn csv(text: &str) -> (Vec<&str>, Vec<Vec<&str>>) {
+    let mut lines = text.lines().map(|line| line.split(',').collect::<Vec<_>>());
+    (lines.next().unwrap(), lines.collect())
+}
+
+#[test]
+fn pandas_and_polars_read_what_the_mcap_reader_gives() {
+    let check = "import pandas, polars, pyarrow, mcap_protobuf";
+    let found = Command::new("python3").args(["-c", check]).output().is_ok_and(|output| output.status.success());
+    if !found {
+        println!("skipped: python3 has no pandas, polars, pyarrow and mcap-protobuf-support");
+        return;
+    }
+    let program = Program::new();
+    let recording = recording(&program);
+    for file in ["all.csv", "all.json", "all.parquet"] {
+        program.text(&["export", &recording, "-o", file]);
+    }
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/support/compare_export.py");
+    let python = Command::new("python3")
+        .arg(script)
+        .args([&recording, "all.csv", "all.json", "all.parquet"])
+        .current_dir(program.path(""))
+        .output()
+        .unwrap();
+    assert!(python.status.success(), "{}", String::from_utf8_lossy(&python.stderr));
+    let compared: Value = serde_json::from_slice(&python.stdout).unwrap();
+    assert_eq!(compared["rows"], ticks(&recording).len());
+    let columns: Vec<&str> = compared["columns"].as_array().unwrap().iter().filter_map(Value::as_str).collect();
+    for column in
+        ["mode", "trial", "roll", "position_z", "foot_z_fr", "position_FR_hip", "effort_RL_calf", "truth_position_z"]
+    {
+        assert!(columns.contains(&column), "{column} was not compared: {columns:?}");
+    }
+    assert!(columns.len() >= 100, "{columns:?}");
+}
+
+#[test]
+fn a_trial_a_time_and_a_topic_are_selected() {
+    let program = Program::new();
+    let recording = recording(&program);
+    let ticks = ticks(&recording);
+    let export = |more: &[&str]| program.text(&[&["export", recording.as_str()], more].concat());
+
+    let text = export(&["--trial", "1"]);
+    let (header, rows) = csv(&text);
+    let of_trial: Vec<&Tick> = ticks.iter().filter(|tick| tick.trial == Some(1)).collect();
+    assert!(of_trial.len() > 1000 && of_trial.len() < ticks.len(), "{}", of_trial.len());
+    assert_eq!(rows.len(), of_trial.len());
+    let column = |name: &str| header.iter().position(|of| *of == name).unwrap();
+    assert!(rows.iter().all(|row| row[column("trial")] == "1" && row.len() == header.len()));
+    let number = |row: &[&str]| row[column("number")].parse::<u64>().unwrap();
+    assert_eq!(
+        (number(&rows[0]), number(&rows[rows.len() - 1])),
+        (of_trial[0].number, of_trial[of_trial.len() - 1].number)
+    );
+    for (row, tick) in rows.iter().zip(&of_trial) {
+        assert_eq!(row[column("roll")].parse::<f64>().unwrap(), tick.estimate.roll_pitch_yaw[0]);
+        assert_eq!(row[column("mode")], tick.mode.name());
+    }
+
+    let text = export(&["--time", "0.5..1.25"]);
+    let (_, rows) = csv(&text);
+    let within = |tick: &&Tick| (500_000_000..1_250_000_000).contains(&tick.time_ns);
+    assert_eq!(rows.len(), ticks.iter().filter(within).count());
+    assert_eq!(csv(&export(&["--time", "0.5.."])).1.len() + csv(&export(&["--time", "..0.5"])).1.len(), ticks.len());
+
+    let rows: Vec<Value> =
+        serde_json::from_str(&export(&["--topic", "/robot/joint_cmd", "--format", "json", "--time", "..0.1"])).unwrap();
+    assert_eq!(rows.len(), ticks.iter().filter(|tick| tick.time_ns < 100_000_000).count());
+    assert_eq!(rows[0].as_object().unwrap().len(), 1 + 7 * 12);
+    assert_eq!(rows[9]["command_kd_FR_hip"].as_f64(), Some(ticks[9].command.motor[0].kd_joint));
+}
+
+#[test]
+fn unusable_arguments_are_refused_with_the_remedy() {
+    let program = Program::new();
+    let recording = recording(&program);
+    let refused = |more: &[&str]| program.refused(&[&["export", recording.as_str()], more].concat());
+    assert_shows(&refused(&["--trial", "9"]), &["session.mcap", "no tick of trial 9", "0, 1"]);
+    assert_shows(&refused(&["--time", "3..1"]), &["--time", "not after the beginning"]);
+    assert_shows(&refused(&["--time", "now"]), &["A..B", "12.5..30"]);
+    assert_shows(&refused(&["--topic", "/tf"]), &["/robot/joint_states"]);
+    assert_shows(&refused(&["-o", "t.parquet", "--format", "csv"]), &["t.parquet", "another name"]);
+    assert_shows(&refused(&["-o", "t.dat"]), &["t.dat", ".parquet"]);
+    assert_shows(&refused(&["--format", "parquet"]), &["--output"]);
+    assert_shows(&program.refused(&["export", "nothing.mcap"]), &["nothing.mcap"]);
+    assert!(!program.path("t.parquet").exists() && !program.path("t.dat").exists());
+}
+
+#[test]
+fn damage_and_a_full_disk_are_errors_and_a_closed_pipe_is_none() {
+    let program = Program::new();
+    let recording = recording(&program);
+    let whole = fs::read(&recording).unwrap();
+    // Cut off: the beginning is exported, and the exit status says that the rest is missing.
+    fs::write(program.path("cut.mcap.part"), &whole[..whole.len() / 2]).unwrap();
+    let output = program.run(&["export", "cut.mcap.part", "-o", "cut.csv"]);
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{message}");
+    assert_shows(&message, &["cut.mcap.part", "cut off", "what can be read is exported"]);
+    let rows = fs::read_to_string(program.path("cut.csv")).unwrap().lines().count() - 1;
+    assert_eq!(rows, ticks(program.path("cut.mcap.part").to_str().unwrap()).len());
+    assert!(rows > 1000);
+
+    let (status, message) = with_small_files(&program, 200, &["export", &recording, "-o", "all.parquet"]);
+    assert_eq!(status, Some(1), "{message}");
+    assert_shows(&message, &["all.parquet", "File too large"]);
+    assert!(!program.path("all.parquet").exists() && !program.path("all.parquet.part").exists());
+    let full = fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+    let output = program.command(&["export", &recording, "--format", "json"]).stdout(full).output().unwrap();
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.code() == Some(1) && message.contains("No space left on device"), "{message}");
+
+    let mut child = program.command(&["export", &recording]).stdout(Stdio::piped()).spawn().unwrap();
+    drop(child.stdout.take());
+    assert!(child.wait().unwrap().success());
+}

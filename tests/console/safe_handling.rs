@@ -1,0 +1,155 @@
+//! Recordings that are still written, cannot be finished or do not fit on the disk: `quadfrog recover`, the console and
+//! `quadfrog optimize`.
+
+#[path = "support/program.rs"]
+mod program;
+#[path = "support/pty.rs"]
+mod pty;
+
+use std::fs;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+use std::process::Stdio;
+
+use nix::fcntl::{FcntlArg, fcntl};
+use portable_pty::CommandBuilder;
+use program::{Program, assert_shows, with_small_files};
+use pty::Session;
+use quadfrog::recording::player::Player;
+
+const SIZE: (u16, u16) = (100, 30);
+
+/// A console that runs in the folder `recordings` of the program, and the folder of its study.
+fn console(program: &Program) -> (Session, PathBuf) {
+    let folder = program.path("recordings");
+    fs::create_dir(&folder).unwrap();
+    let session = Session::start(&folder, SIZE, &[]);
+    session.wait_for(&["Press A to arm"]);
+    (session, program.study("recordings"))
+}
+
+/// Ends a console; returns its exit status and its last output.
+fn quit(session: &mut Session) -> (u32, String) {
+    session.send("q");
+    session.wait_until("quitting asks or ends", || session.screen().contains("Quit?") || session.restored());
+    session.send("y");
+    let status = session.wait().exit_code();
+    // Lines are wrapped at the width of the terminal.
+    (status, session.screen().replace('\n', ""))
+}
+
+#[test]
+fn a_recording_of_a_running_session_is_not_recovered() {
+    let program = Program::new();
+    let (mut session, study) = console(&program);
+    let part = study.join("session.mcap.part");
+    let owner = format!("process {}", session.pid());
+    let refused = program.refused(&["recover", part.to_str().unwrap()]);
+    assert_shows(&refused, &["session.mcap.part", "a session runs", &owner, "end the session"]);
+    // Also into another file, and by the name alone.
+    assert!(program.refused(&["recover", part.to_str().unwrap(), "--output", "copy.mcap"]).contains(&owner));
+    let output = program.command(&["recover", "session.mcap.part"]).current_dir(&study).output().unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    assert!(!study.join("session.mcap").exists() && !program.path("copy.mcap").exists());
+    // A second session in the folder names the first one, too.
+    let second = program.refused(&["optimize", "--resume", study.to_str().unwrap()]);
+    assert_shows(&second, &["another session is running", &owner]);
+    let (status, screen) = quit(&mut session);
+    assert_eq!(status, 0, "{screen}");
+    assert!(study.join("session.mcap").exists() && !part.exists());
+}
+
+/// Regression: the console ended with status 0 and named the other file as its recording.
+#[test]
+fn a_console_that_cannot_finish_its_recording_ends_with_status_1() {
+    let program = Program::new();
+    let (mut session, study) = console(&program);
+    fs::write(study.join("session.mcap"), "another file").unwrap();
+    let (status, screen) = quit(&mut session);
+    assert_eq!(status, 1, "{screen}");
+    assert_shows(&screen, &["the recording is not complete", "exists already", "quadfrog replay", "session.mcap.part"]);
+    assert_eq!(fs::read_to_string(study.join("session.mcap")).unwrap(), "another file");
+    let player = Player::open(study.join("session.mcap.part")).unwrap();
+    assert!(player.duration_ns() > 0);
+}
+
+#[test]
+fn a_console_whose_disk_is_full_ends_with_status_1_and_the_cause() {
+    let program = Program::new();
+    // With SIGXFSZ ignored a write beyond the limit, 512 kB, fails as on a full disk.
+    let shell = "trap '' XFSZ; ulimit -f 1000; exec \"$0\" \"$@\"";
+    let mut command = CommandBuilder::new("sh");
+    command.args(["-c", shell, env!("CARGO_BIN_EXE_quadfrog"), "--output", "recordings"]);
+    // Wide: the line with the cause is long.
+    let mut session = Session::run(&program.path(""), (240, 40), command);
+    session.wait_for(&["DISARMED"]);
+    session.send("5");
+    session.wait_for(&["File too large"]);
+    let (status, screen) = quit(&mut session);
+    assert_eq!(status, 1, "{screen}");
+    assert_shows(&screen, &["the recording is not complete", "File too large"]);
+}
+
+#[test]
+fn a_study_that_cannot_finish_its_recording_ends_with_status_1() {
+    let program = Program::new();
+    let mut child = program
+        .command(&["optimize", "--trials", "12", "--record", "all", "--json"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    // The program waits in the middle of its study until its lines are read.
+    let mut lines = child.stdout.take().unwrap();
+    fcntl(&lines, FcntlArg::F_SETPIPE_SZ(4096)).unwrap();
+    lines.read_exact(&mut [0]).unwrap();
+    let recording = program.study("recordings").join("session.mcap");
+    assert!(recording.with_extension("mcap.part").exists());
+    fs::write(&recording, "another file").unwrap();
+    let mut rest = Vec::new();
+    lines.read_to_end(&mut rest).unwrap();
+    assert!(rest.len() > 4096 + 1000, "the program did not wait: {} bytes", rest.len());
+    let output = child.wait_with_output().unwrap();
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{message}");
+    assert_shows(&message, &["the recording is not complete", "session.mcap", "exists already"]);
+    assert_eq!(fs::read_to_string(&recording).unwrap(), "another file");
+}
+
+/// An unfinished recording: the beginning of a whole one.
+fn cut(program: &Program) -> (PathBuf, u64) {
+    program.text(&["optimize", "--trials", "2", "--record", "all"]);
+    let whole = fs::read(program.study("recordings").join("session.mcap")).unwrap();
+    let part = program.path("cut.mcap.part");
+    fs::write(&part, &whole[..whole.len() * 2 / 3]).unwrap();
+    (part, whole.len() as u64)
+}
+
+#[test]
+fn a_recording_is_recovered_into_the_file_that_is_given() {
+    let program = Program::new();
+    let (part, _) = cut(&program);
+    let printed = program.text(&["recover", "cut.mcap.part", "--output", "found.mcap"]);
+    assert_shows(&printed, &["found.mcap", "ticks", "Lost:", "cut.mcap.part is unchanged"]);
+    assert!(!program.path("cut.mcap").exists());
+    assert_eq!(Player::open(program.path("found.mcap")).unwrap().damage(), None);
+    // Nothing is overwritten, the name says what the file is, and a lock without a session does not count.
+    assert!(program.refused(&["recover", "cut.mcap.part", "--output", "found.mcap"]).contains("exists already"));
+    assert!(program.refused(&["recover", "cut.mcap.part", "--output", "found"]).contains("must end in .mcap"));
+    assert!(program.refused(&["recover", "cut.mcap.part", "--output", "nowhere/found.mcap"]).contains("nowhere"));
+    program.write("session.lock", "process 1\n");
+    program.text(&["recover", part.to_str().unwrap()]);
+    assert!(program.path("cut.mcap").exists());
+}
+
+#[test]
+fn a_recovery_that_does_not_fit_names_its_cause_and_leaves_nothing() {
+    let program = Program::new();
+    let (_, bytes) = cut(&program);
+    let blocks = (bytes / 3 / 512) as u32;
+    let (status, message) = with_small_files(&program, blocks, &["recover", "cut.mcap.part"]);
+    assert_eq!(status, Some(1), "{message}");
+    assert_shows(&message, &["cut.mcap.recovering", "could not write", "File too large"]);
+    let left = |name: &str| Path::new(&program.path(name)).exists();
+    assert!(!left("cut.mcap") && !left("cut.mcap.recovering") && left("cut.mcap.part"));
+}

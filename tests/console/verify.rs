@@ -1,0 +1,143 @@
+//! `quadfrog verify` on files that the program itself wrote, whole and altered.
+
+#[path = "support/program.rs"]
+mod program;
+
+use std::path::{Path, PathBuf};
+
+use program::{Program, assert_shows};
+use quadfrog::recording::player::{Played, Player};
+use quadfrog::recording::writer::Writer;
+use quadfrog::robot::description::RobotDescription;
+use quadfrog::telemetry::Tick;
+
+/// Attachments from which a session is simulated again.
+const PARTS: [&str; 8] = [
+    "control.toml",
+    "safety.toml",
+    "optimize.toml",
+    "simulator.toml",
+    "prior.toml",
+    "console.toml",
+    "robot.toml",
+    "go1.urdf",
+];
+
+/// Copies a recording with the given attachments and with ticks changed by `change`; one without a result is left out.
+fn copied(from: &Path, to: PathBuf, parts: &[&str], mut change: impl FnMut(Tick) -> Option<Tick>) -> PathBuf {
+    let mut player = Player::open(from).unwrap();
+    let attached: Vec<_> = parts.iter().map(|name| (*name, player.attachment(name).unwrap().unwrap())).collect();
+    let attachments: Vec<(&str, &str, &[u8])> =
+        attached.iter().map(|(name, bytes)| (*name, "text/plain", bytes.as_slice())).collect();
+    let (session, start_utc_ns) = (player.session().clone(), player.start_utc_ns());
+    let mut writer = Writer::create(&to, &session, start_utc_ns, &attachments).unwrap();
+    for played in player {
+        match played {
+            Played::Tick(tick) => change(tick).iter().for_each(|tick| writer.tick(tick).unwrap()),
+            Played::Record(stamped) => writer.record(&stamped).unwrap(),
+        }
+    }
+    writer.finish().unwrap()
+}
+
+/// Exit status, standard output and standard error of a verification.
+fn verified(program: &Program, file: &Path) -> (Option<i32>, String, String) {
+    let output = program.run(&["verify", file.to_str().unwrap()]);
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    (output.status.code(), text(&output.stdout), text(&output.stderr))
+}
+
+fn ticks_of_trials(file: &Path) -> usize {
+    Player::open(file).unwrap().filter(|played| matches!(played, Played::Tick(tick) if tick.trial.is_some())).count()
+}
+
+#[test]
+fn a_fresh_recording_is_simulated_again_bit_for_bit() {
+    let program = Program::new();
+    program.text(&["optimize", "--trials", "3", "--record", "all"]);
+    let file = program.study("recordings").join("session.mcap");
+    let (status, out, error) = verified(&program, &file);
+    assert_eq!(status, Some(0), "{error}");
+    assert_shows(&out, &[&format!("{} ticks of 3 trials", ticks_of_trials(&file)), "bit for bit"]);
+}
+
+#[test]
+fn blocks_sensor_errors_repeats_and_a_model_folder_are_simulated_again() {
+    let program = Program::new();
+    for (name, text) in &RobotDescription::embedded("go1").unwrap().files {
+        program
+            .write(&format!("robot/{name}"), &text.replace("\"go1\"", "\"pony\"").replace("5.561079999999999", "5.4"));
+    }
+    program.write(
+        "config/simulator.toml",
+        "[terrain]\nkind = \"blocks\"\n[terrain.blocks]\ncount = 20\n[sensors]\nenabled = true\n",
+    );
+    program.write("config/control.toml", "[tasks.forward]\nrepeats = 2\n");
+    program.text(&["optimize", "--trials", "3", "--record", "all", "--config", "config", "--model", "robot"]);
+    // Nothing but the file is needed.
+    let file = program.study("recordings").join("session.mcap");
+    let elsewhere = Program::new();
+    let (status, out, error) = verified(&elsewhere, &file);
+    assert_eq!(status, Some(0), "{error}");
+    assert_shows(&out, &["of 3 trials", "bit for bit"]);
+}
+
+#[test]
+fn a_flipped_bit_is_found() {
+    let program = Program::new();
+    program.text(&["optimize", "--trials", "2", "--record", "all"]);
+    let file = program.study("recordings").join("session.mcap");
+    let same = copied(&file, program.path("same.mcap"), &PARTS, Some);
+    assert_eq!(verified(&program, &same).0, Some(0));
+
+    let mut altered = None;
+    let flipped = copied(&file, program.path("flipped.mcap"), &PARTS, |mut tick| {
+        if tick.trial == Some(1) && tick.trial_time_s >= 0.1 && altered.is_none() {
+            let value = &mut tick.state.joint_velocity_rad_s[7];
+            let before = *value;
+            *value = f64::from_bits(value.to_bits() ^ 1);
+            altered = Some((tick.number, before, *value));
+        }
+        Some(tick)
+    });
+    let (number, before, after) = altered.unwrap();
+    let (status, _, error) = verified(&program, &flipped);
+    assert_eq!(status, Some(1), "{error}");
+    assert_shows(
+        &error,
+        &["trial 1", &format!("number {number}"), "velocity[7]", &before.to_string(), &after.to_string()],
+    );
+
+    // A tick that is missing, and a last one.
+    for last in [false, true] {
+        let name = program.path(if last { "short.mcap" } else { "gap.mcap" });
+        let total = ticks_of_trials(&file);
+        let mut seen = 0;
+        let missing = copied(&file, name, &PARTS, |tick| {
+            seen += usize::from(tick.trial.is_some());
+            let left_out = tick.trial.is_some() && seen == if last { total } else { 100 };
+            (!left_out).then_some(tick)
+        });
+        assert_eq!(verified(&program, &missing).0, Some(1), "last: {last}");
+    }
+}
+
+#[test]
+fn a_file_that_cannot_be_verified_is_refused_with_the_reason() {
+    let program = Program::new();
+    let old = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/console/session.mcap"));
+    let (status, _, error) = verified(&program, old);
+    assert_eq!(status, Some(2), "{error}");
+    assert_shows(&error, &["session.mcap", "not verifiable", "older version"]);
+
+    program.text(&["optimize", "--trials", "1", "--record", "all"]);
+    let file = program.study("recordings").join("session.mcap");
+    let without = copied(&file, program.path("without.mcap"), &PARTS[..7], Some);
+    let (status, _, error) = verified(&program, &without);
+    assert_eq!(status, Some(2), "{error}");
+    assert_shows(&error, &["without.mcap", "go1.urdf is not attached"]);
+
+    program.write("noise.mcap", "this is no recording");
+    assert_eq!(verified(&program, &program.path("noise.mcap")).0, Some(2));
+    assert_eq!(verified(&program, &program.path("nothing.mcap")).0, Some(2));
+}

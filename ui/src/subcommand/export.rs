@@ -1,0 +1,99 @@
+//! `quadfrog export`: signals of a recording as a table.
+
+use std::collections::BTreeSet;
+use std::io::{ErrorKind, Write};
+use std::path::PathBuf;
+
+use anyhow::anyhow;
+use clap::Args;
+use quadfrog::recording::player::{MarkerKind, Player};
+use quadfrog::report::columns::TableFormat;
+use quadfrog::report::signals::{SignalRange, SignalTopic, Signals};
+use quadfrog_console::{notice, output};
+
+use super::arguments::one_of;
+use super::failure::Failure;
+use super::table::{table_format, write_file, written_format};
+
+#[derive(Debug, Args)]
+pub struct ExportArguments {
+    /// A recording: session.mcap, or session.mcap.part of a session that runs or was cut off
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
+    /// Export the ticks of one trial
+    #[arg(long, value_name = "N", conflicts_with = "time")]
+    trial: Option<u32>,
+    /// Export the ticks from time A to before time B, s since the session began; both may be left out, as in 12.5..
+    #[arg(long, value_name = "A..B", value_parser = parse_times)]
+    time: Option<(u64, u64)>,
+    /// Export the signals of one topic [default: all]
+    #[arg(long, value_name = "TOPIC", value_parser = one_of(SignalTopic::ALL.map(|topic| (topic, topic.name(), ""))))]
+    topic: Option<SignalTopic>,
+    /// Format of the table [default: by the file's name; csv on standard output]
+    #[arg(long, value_name = "FORM", value_parser = table_format())]
+    format: Option<TableFormat>,
+    /// Output file, *.csv, *.json or *.parquet [default: standard output]
+    #[arg(long, short, value_name = "OUT")]
+    output: Option<PathBuf>,
+}
+
+/// Parses `A..B` in seconds into nanoseconds.
+fn parse_times(text: &str) -> Result<(u64, u64), String> {
+    let (from, until) = text.split_once("..").ok_or("write it as A..B in seconds, for example 12.5..30")?;
+    let ns = |text: &str, missing: u64| match text.trim() {
+        "" => Ok(missing),
+        text => match text.parse::<f64>() {
+            Ok(seconds) if seconds >= 0.0 && seconds.is_finite() => Ok((seconds * 1e9).round() as u64),
+            _ => Err(format!("`{text}` is no time; write A..B in seconds, for example 12.5..30")),
+        },
+    };
+    let (from, until) = (ns(from, 0)?, ns(until, u64::MAX)?);
+    if from < until { Ok((from, until)) } else { Err("the end is not after the beginning".to_owned()) }
+}
+
+pub fn run(arguments: &ExportArguments) -> Result<(), Failure> {
+    let file = &arguments.file;
+    let format = written_format(arguments.format, arguments.output.as_deref())?;
+    let mut player = Player::open(file).map_err(Failure::input)?;
+    if let Some(trial) = arguments.trial {
+        require_trial(&player, trial).map_err(|refusal| Failure::input(format!("{}: {refusal}", file.display())))?;
+    }
+    let (from_ns, until_ns) = arguments.time.unwrap_or((0, u64::MAX));
+    let range = SignalRange { trial: arguments.trial, from_ns, until_ns };
+    let signals = Signals::of(arguments.topic);
+    match &arguments.output {
+        Some(path) => {
+            let mut rows = 0;
+            write_file(path, |out| {
+                let (out, written) = signals.export(&mut player, range, format, out)?;
+                rows = written;
+                Ok(out)
+            })?;
+            notice!("{rows} rows: {}", path.display());
+        }
+        None => match signals.export(&mut player, range, format, output::Data).and_then(|(mut out, _)| out.flush()) {
+            // A reader that has read enough is no error.
+            Err(error) if error.kind() == ErrorKind::BrokenPipe => return Ok(()),
+            written => written.map_err(|error| Failure::Other(anyhow!("standard output: {error}")))?,
+        },
+    }
+    match player.damage() {
+        None => Ok(()),
+        Some(damage) => Err(Failure::Other(anyhow!("{damage}; what can be read is exported"))),
+    }
+}
+
+/// Refuses a trial of which no tick is recorded.
+fn require_trial(player: &Player, trial: u32) -> Result<(), String> {
+    let number = |kind| match kind {
+        MarkerKind::Trial(number) => Some(number),
+        MarkerKind::Fault => None,
+    };
+    let trials: BTreeSet<u32> = player.markers().iter().filter_map(|marker| number(marker.kind)).collect();
+    if trials.contains(&trial) {
+        return Ok(());
+    }
+    let known = trials.iter().map(u32::to_string).collect::<Vec<_>>().join(", ");
+    let known = if known.is_empty() { "none".to_owned() } else { known };
+    Err(format!("no tick of trial {trial} is recorded; trials with ticks: {known}"))
+}

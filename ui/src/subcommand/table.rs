@@ -1,0 +1,78 @@
+//! Tables that commands write: their format, by `--format` or the name of the file, and the file itself.
+
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, BufWriter};
+use std::path::{Path, PathBuf};
+
+use anyhow::anyhow;
+use clap::builder::TypedValueParser;
+use quadfrog::report::columns::TableFormat;
+
+use super::arguments::one_of;
+use super::failure::Failure;
+
+/// Value of an argument that selects a format.
+pub fn table_format() -> impl TypedValueParser<Value = TableFormat> {
+    one_of([
+        (TableFormat::Csv, "csv", "Comma-separated values"),
+        (TableFormat::Json, "json", "An array of objects"),
+        (TableFormat::Parquet, "parquet", "Apache Parquet, for pandas and polars"),
+    ])
+}
+
+/// Returns the format that the extension of a name says.
+pub fn format_of_name(file: &Path) -> Option<TableFormat> {
+    file.extension()?.to_str()?.to_ascii_lowercase().parse().ok()
+}
+
+/// Returns the format of a table that is written to `file`, or to standard output: the given one, else that of the name. CSV
+/// where neither is given.
+///
+/// # Errors
+/// When name and given format differ, when the name says no format and none is given, or Parquet for standard output.
+pub fn written_format(given: Option<TableFormat>, file: Option<&Path>) -> Result<TableFormat, Failure> {
+    let Some(file) = file else {
+        return match given {
+            Some(TableFormat::Parquet) => Err(Failure::input("--format parquet: give a file, --output FILE.parquet")),
+            given => Ok(given.unwrap_or(TableFormat::Csv)),
+        };
+    };
+    match (given, format_of_name(file)) {
+        (Some(given), Some(named)) if given != named => Err(Failure::input(format!(
+            "--format {}: the name {} says {}; give another name or another format",
+            <&str>::from(given),
+            file.display(),
+            <&str>::from(named)
+        ))),
+        (Some(format), _) | (None, Some(format)) => Ok(format),
+        (None, None) => Err(Failure::input(format!(
+            "{}: the name says no format; end it in .csv, .json or .parquet, or give --format",
+            file.display()
+        ))),
+    }
+}
+
+/// Writes a file: under another name, FILE.part, until it is complete, so that an error leaves no beginning of a table. A
+/// device, a pipe or a link is written in place.
+///
+/// # Errors
+/// When it cannot be written, with the cause.
+pub fn write_file(
+    file: &Path,
+    write: impl FnOnce(BufWriter<File>) -> io::Result<BufWriter<File>>,
+) -> Result<(), Failure> {
+    let whole = |file: File| write(BufWriter::new(file))?.into_inner().map_err(io::IntoInnerError::into_error);
+    let failed = |error: io::Error| Failure::Other(anyhow!("{}: cannot be written: {error}", file.display()));
+    if fs::symlink_metadata(file).is_ok_and(|about| !about.is_file()) {
+        let opened = OpenOptions::new().write(true).truncate(true).open(file);
+        return opened.and_then(whole).map(drop).map_err(failed);
+    }
+    let mut part = file.as_os_str().to_owned();
+    part.push(".part");
+    let part = PathBuf::from(part);
+    let synced = File::create(&part).and_then(whole).and_then(|file| file.sync_all());
+    synced.and_then(|()| fs::rename(&part, file)).map_err(|error| {
+        let _ = fs::remove_file(&part);
+        failed(error)
+    })
+}
