@@ -16,7 +16,7 @@ const SHORTENED_PAUSE_NS: u64 = 1_000_000_000;
 
 /// The time of a trial in a recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct TrialSpan {
+pub struct TrialRun {
     /// Its number.
     pub trial: u32,
     /// Its first tick, the countdown's, ns.
@@ -66,7 +66,7 @@ pub struct Timeline {
     /// End and number of a sparse seek.
     sparse_until: Option<(u64, u32)>,
     markers: Vec<Marker>,
-    trials: Vec<TrialSpan>,
+    trials: Vec<TrialRun>,
 }
 
 impl From<Player> for Timeline {
@@ -177,11 +177,11 @@ impl Timeline {
         self.markers = self.parts.iter().flat_map(markers).collect();
         let begins: Vec<(u32, u64)> = self.markers.iter().filter_map(trial_begin).collect();
         let duration_ns = self.duration_ns();
-        let mut spans: Vec<TrialSpan> = Vec::with_capacity(begins.len());
+        let mut spans: Vec<TrialRun> = Vec::with_capacity(begins.len());
         let mut ended = vec![false; begins.len()];
         for (index, &(trial, begin_ns)) in begins.iter().enumerate() {
             let end_ns = begins.get(index + 1).map_or(duration_ns, |next| next.1);
-            spans.push(TrialSpan { trial, begin_ns, impulse_ns: None, end_ns });
+            spans.push(TrialRun { trial, begin_ns, impulse_ns: None, end_ns });
         }
         for part in &self.parts {
             for event in part.player.events() {
@@ -227,7 +227,7 @@ impl Timeline {
     }
 
     /// Returns the runs of trials, in the order of time. A trial that ran more than once has several.
-    pub fn trials(&self) -> &[TrialSpan] {
+    pub fn trials(&self) -> &[TrialRun] {
         &self.trials
     }
 

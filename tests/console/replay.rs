@@ -15,7 +15,7 @@ use program::{Program, assert_shows};
 use pty::Session;
 use quadfrog::recording::player::{Played, Player};
 use quadfrog::recording::session_files::recordings_in;
-use quadfrog::recording::timeline::{Timeline, TrialSpan};
+use quadfrog::recording::timeline::{Timeline, TrialRun};
 use quadfrog::telemetry::Phase;
 use quadfrog::trial::Verdict;
 use quadfrog_console::feed::Feed;
@@ -41,7 +41,7 @@ fn timeline() -> Timeline {
     Timeline::open(&[recording()]).unwrap()
 }
 
-fn span(trial: u32) -> TrialSpan {
+fn span(trial: u32) -> TrialRun {
     *timeline().trials().iter().find(|span| span.trial == trial).unwrap()
 }
 

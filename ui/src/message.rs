@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use quadfrog::recording::record::Stamped;
 use quadfrog::recording::recorder::RecorderStatus;
-use quadfrog::recording::timeline::TrialSpan;
+use quadfrog::recording::timeline::TrialRun;
 use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::session::storage::StorageWait;
 use quadfrog::telemetry::{Snapshot, Tick};
@@ -147,7 +147,7 @@ pub struct ReplayStatus {
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ReplayTimeline {
     /// Runs of trials, in the order of time.
-    pub trials: Vec<TrialSpan>,
+    pub trials: Vec<TrialRun>,
     /// Begins of faults, ns.
     pub faults_ns: Vec<u64>,
     /// Begin and end of the parts found so far that cannot be read, ns.

@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use quadfrog::recording::player::{MarkerKind, Played};
 use quadfrog::recording::record::{LogLevel, LogRecord, Record, Stamped};
-use quadfrog::recording::timeline::{Timeline, TrialSpan};
+use quadfrog::recording::timeline::{Timeline, TrialRun};
 use quadfrog::telemetry::{Counters, Phase, Snapshot};
 
 use crate::message::{Msg, ReplayCommand, ReplayStatus, ReplayStep, ReplayTimeline};
@@ -35,7 +35,7 @@ pub struct ReplayFeed {
     /// Index in [`SPEEDS`].
     speed: usize,
     slow_motion: bool,
-    looping: Option<TrialSpan>,
+    looping: Option<TrialRun>,
     /// Time until the next look at a followed file, ns; none for one that is not followed.
     follow_in_ns: Option<u64>,
     time_ns: u64,
@@ -321,7 +321,7 @@ fn before(times: impl DoubleEndedIterator<Item = u64>, time_ns: u64) -> Option<u
 }
 
 /// The begin of a loop: shortly before the impulse, or the begin of a trial whose impulse is not recorded as an event.
-fn loop_begin(span: &TrialSpan) -> u64 {
+fn loop_begin(span: &TrialRun) -> u64 {
     span.impulse_ns.map_or(span.begin_ns, |impulse| impulse.saturating_sub(BEFORE_IMPULSE_NS).max(span.begin_ns))
 }
 
