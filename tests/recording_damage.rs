@@ -14,7 +14,7 @@ use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use proptest::prelude::*;
 use quadfrog::recording::RecordingError;
 use quadfrog::recording::player::{Played, Player};
-use quadfrog::recording::record::Record;
+use quadfrog::recording::record::{Record, Stamped};
 use quadfrog::recording::recover::recover;
 use quadfrog::recording::writer::Writer;
 use support::*;
@@ -402,6 +402,7 @@ fn wrong_times_of_a_chunk_without_an_index_reach_no_years() {
     let Whole { part, finished, everything } = whole();
     let folder = tempfile::tempdir().unwrap();
     let whole = Player::open(file(folder.path(), "whole.mcap", finished)).unwrap();
+    assert_eq!(whole.duration_ns() / MS, 3_999);
     let (chunk, _) = largest_chunk(finished);
     for time in [9, 17] {
         let mut bytes = part.clone();
@@ -469,4 +470,22 @@ fn a_sparse_seek_gives_every_fifth_tick_before_its_end_and_every_one_after_it() 
         Played::Record(stamped) => stamped.time_ns >= 1_000 * MS,
     });
     assert_equal(&played, &expected.cloned().collect::<Vec<_>>());
+}
+
+#[test]
+fn an_event_that_is_too_large_for_a_copy_is_read_from_its_chunk() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("session.mcap");
+    let (ticks, mut records) = study(2);
+    records.push(Stamped { time_ns: 1_500 * MS, record: Record::FaultTicks(ticks[1_000..1_200].to_vec()) });
+    let everything = in_order(&ticks, &records);
+    write(&path, &everything);
+    let bytes = fs::read(&path).unwrap();
+    assert!(copies(&bytes).len() < 200 * 1000, "the ticks of the fault are not in the copies");
+    let player = Player::open(&path).unwrap();
+    let events = everything.iter().filter_map(|played| match played {
+        Played::Record(stamped) if !matches!(stamped.record, Record::Counters(_)) => Some(stamped),
+        _ => None,
+    });
+    assert!(player.events()[1..].iter().eq(events), "each once, in the order of time");
 }

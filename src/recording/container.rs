@@ -55,6 +55,8 @@ pub struct Container {
     pub cut: Option<String>,
     /// Whether the chunks were found by scanning: their times are those of their heads, which no checksum guards.
     pub scanned: bool,
+    /// Offset of the record that ends the data; none of a file that was not finished.
+    pub data_end: Option<u64>,
     /// Offset of the first record that the scan has not passed.
     unscanned: u64,
     topics: Vec<Option<Topic>>,
@@ -95,6 +97,7 @@ impl Container {
             metadata: Vec::new(),
             cut: None,
             scanned: false,
+            data_end: None,
             unscanned: mcap::MAGIC.len() as u64,
             topics: Vec::new(),
         };
@@ -147,6 +150,7 @@ impl Container {
             }
         }
         (self.chunks, self.attachments, self.metadata) = (chunks, attachments, metadata);
+        self.data_end = Some(from);
         Ok(true)
     }
 
@@ -190,7 +194,7 @@ impl Container {
                     if self.read_at(bytes - 8, 8)? != mcap::MAGIC || left < FOOTER_BYTES {
                         self.cut = Some("its index at the end is missing; all of its data is there".into());
                     }
-                    self.unscanned = at;
+                    (self.unscanned, self.data_end) = (at, Some(at));
                     return Ok(());
                 }
                 0 => break, // no record: zeros left by a crashed file system
@@ -258,6 +262,23 @@ impl Container {
             }),
             _ => unreachable!("parsed by its opcode"),
         }
+    }
+
+    /// Returns whether the checksum of all data, from the start of the file to the end of its data, is right; none without one.
+    pub fn verify_data(&mut self) -> Result<Option<bool>, McapError> {
+        let Some(data_end) = self.data_end else { return Ok(None) };
+        let end = self.read_at(data_end, DATA_END_BYTES)?;
+        let saved = u32::from_le_bytes(*end.last_chunk().expect("13 bytes"));
+        if saved == 0 {
+            return Ok(None);
+        }
+        let (mut hasher, mut at) = (crc32fast::Hasher::new(), 0);
+        while at < data_end {
+            let bytes = self.read_at(at, (1 << 20).min(data_end - at))?;
+            hasher.update(&bytes);
+            at += bytes.len() as u64;
+        }
+        Ok(Some(hasher.finalize() == saved))
     }
 
     /// Returns a metadata record; none of a damaged one.

@@ -15,6 +15,10 @@ pub enum RecordingError {
     Name { path: PathBuf },
     #[error("{}: not a regular file; a recording is a file that can be read from any place", path.display())]
     NotAFile { path: PathBuf },
+    #[error("{}: no recording there: no session.mcap in it or in the folders below it; name a file or a study's folder", path.display())]
+    NoRecording { path: PathBuf },
+    #[error("{}: not of the study of {}: {reason}; replay them one by one", path.display(), first.display())]
+    OtherStudy { path: PathBuf, first: PathBuf, reason: String },
     #[error("{}: the file is empty; nothing was recorded in it", path.display())]
     Empty { path: PathBuf },
     #[error("{}: not an MCAP file: it begins with {found}; recordings end in .mcap or .mcap.part", path.display())]

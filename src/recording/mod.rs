@@ -1,4 +1,4 @@
-//! Sessions on disk: the records (`record`), writing (`writer`, `recorder`), playing (`player`) and recovery after a crash
+//! Sessions on disk: the records (`record`), writing (`writer`, `recorder`), playing (`player`, `timeline`) and recovery after a crash
 //! (`recover`).
 //!
 //! A recording is an MCAP file of protobuf messages; `recordings/README.md` lists its topics, `proto/frog.proto` its
@@ -20,7 +20,9 @@ pub mod recover;
 
 pub mod scene;
 mod schema;
+pub mod session_files;
 mod tick;
+pub mod timeline;
 mod topic;
 mod trial_table;
 mod trials;

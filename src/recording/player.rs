@@ -5,6 +5,7 @@
 
 mod damage;
 mod events;
+mod lost;
 
 use std::collections::{BTreeSet, VecDeque};
 use std::path::{Path, PathBuf};
@@ -22,8 +23,8 @@ use super::wire::DecodeError;
 use super::{frog, schema, tick};
 use crate::telemetry::Tick;
 
-use damage::DamagedChunk;
-pub use damage::LostPart;
+use lost::DamagedChunk;
+pub use lost::LostPart;
 
 /// A played tick or record.
 #[allow(clippy::large_enum_variant, reason = "nearly all are ticks; a box for each costs more than it saves")]
@@ -114,8 +115,11 @@ impl Player {
         };
         let (found, copies) = (player.new_chunks(), event_index::read(&mut player.container));
         let start_utc_ns = player.read_events(&found, copies);
+        player.start_utc_ns = start_utc_ns.unwrap_or_default();
         player.add_chunks(found);
-        player.start_utc_ns = start_utc_ns.ok_or_else(|| player.no_session())?;
+        if start_utc_ns.is_none() {
+            return Err(player.no_session());
+        }
         player.shift_events(0, 0);
         let info = player.events.iter().find_map(|event| match &event.record {
             Record::Session(info) => Some(info.clone()),

@@ -10,6 +10,7 @@ pub mod objective;
 pub mod operator_request;
 pub mod parallel;
 pub mod prior;
+pub mod rejudge;
 pub mod rollout;
 pub mod storage;
 pub mod supervisor;

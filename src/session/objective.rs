@@ -9,6 +9,8 @@ use crate::trial::{BounceRule, Displacement, JumpRow, MeasuredJump, ObjectiveRul
 
 /// Beginning of the cause of a trial that tripped a limit.
 const LIMIT: &str = "limit: ";
+/// Beginning of the cause of a trial that bounced on under a rule for that.
+const BOUNCED: &str = "bounced: ";
 
 /// Shortest further flight that counts as a bounce, s: a free flight of this time rises by g t^2 / 8 = 3 mm. In 270 random jumps
 /// that settled, ideal and hardware-like, all feet were off the ground for at most 4 ms after the touchdown.
@@ -190,9 +192,9 @@ pub fn suggest_measured(end: &TrialEnd, measured: Option<&MeasuredJump>, bounce:
     match (flights, bounce) {
         (Some(flights), BounceRule::FirstLanding) => (
             Verdict::Accept,
-            format!("bounced: {flights} flights after the impulse; J at the end of the first landing"),
+            format!("{BOUNCED}{flights} flights after the impulse; J at the end of the first landing"),
         ),
-        (Some(flights), BounceRule::Zero) => (Verdict::Fall, format!("bounced: {flights} flights after the impulse")),
+        (Some(flights), BounceRule::Zero) => (Verdict::Fall, format!("{BOUNCED}{flights} flights after the impulse")),
         _ => suggest(end),
     }
 }
@@ -226,4 +228,15 @@ pub fn trips_limit(end: &TrialEnd) -> bool {
 /// Whether the trial under review tripped a limit of the motion; to judge it void the operator gives a reason.
 pub fn tripped_limit(row: &TrialRecord) -> bool {
     row.suggested == Some(Verdict::Fall) && row.cause.starts_with(LIMIT)
+}
+
+/// Whether a trial ended at rest, with or without a bounce.
+pub fn ended_at_rest(row: &TrialRecord) -> bool {
+    row.cause == suggest(&TrialEnd::Settled).1 || row.cause.starts_with(BOUNCED)
+}
+
+/// Whether the detection of a fall ended a trial.
+pub fn ended_by_fall(row: &TrialRecord) -> bool {
+    let other = ended_at_rest(row) || tripped_limit(row) || row.cause == suggest(&TrialEnd::NotQuiet).1;
+    row.suggested == Some(Verdict::Fall) && !other
 }

@@ -302,6 +302,7 @@ fn an_observer_and_a_replay_send_nothing() {
         speed: 1.0,
         time_ns: 0,
         duration_ns: 1,
+        ..Default::default()
     }));
     for (name, console) in [("observer", &mut observer), ("replay", &mut replay)] {
         for &mode in Mode::ALL {

@@ -70,6 +70,17 @@ pub enum Action {
     Faster,
     PreviousMarker,
     NextMarker,
+    Seek,
+    PreviousFall,
+    NextFall,
+    ReplayStart,
+    ReplayEnd,
+    TickBack,
+    TickForward,
+    SecondBack,
+    SecondForward,
+    LoopJump,
+    SlowMotion,
     Palette,
     Help,
     Mouse,
@@ -130,7 +141,7 @@ const fn fixed(info: ActionInfo) -> ActionInfo {
 
 /// Every action, in the order of [`Action`].
 #[rustfmt::skip]
-pub static ACTIONS: [ActionInfo; 70] = {
+pub static ACTIONS: [ActionInfo; 81] = {
     use Action as A;
     use ActionGroup as G;
     [
@@ -177,7 +188,7 @@ pub static ACTIONS: [ActionInfo; 70] = {
         row(A::PageDown, "page-down", &["PgDn"], G::Views, "a page down"),
         row(A::First, "first", &["Home"], G::Views, "to the first"),
         row(A::Last, "last", &["End"], G::Views, "to the last"),
-        row(A::Open, "open", &["Enter"], G::Views, "details; acknowledges while DAMPED or FAULT; never starts motion"),
+        row(A::Open, "open", &["Enter"], G::Views, "details; acknowledges a stop; never starts motion; Trials of a replay: to the trial"),
         row(A::Report, "report", &["R"], G::Views, "tables of the study, as quadfrog report prints them"),
 
         row(A::Freeze, "freeze", &["z"], G::Charts, "freeze the charts; recording goes on"),
@@ -198,12 +209,23 @@ pub static ACTIONS: [ActionInfo; 70] = {
         row(A::Export, "export", &["e"], G::Tables, "write the table as CSV and Markdown beside the study"),
 
         row(A::PlayPause, "play-pause", &["p"], G::Replay, "play or pause"),
-        row(A::StepForward, "step-forward", &["."], G::Replay, "a step forward"),
-        row(A::StepBack, "step-back", &[","], G::Replay, "a step back"),
+        row(A::StepForward, "step-forward", &["."], G::Replay, "a sample of the charts forward, 5 ms"),
+        row(A::StepBack, "step-back", &[","], G::Replay, "a sample of the charts back"),
         row(A::Slower, "slower", &["<"], G::Replay, "half the speed"),
         row(A::Faster, "faster", &[">"], G::Replay, "twice the speed"),
         row(A::PreviousMarker, "previous-marker", &["["], G::Replay, "to the previous trial or fault"),
         row(A::NextMarker, "next-marker", &["]"], G::Replay, "to the next trial or fault"),
+        row(A::Seek, "go-to", &["G"], G::Replay, "to a time, 12:34 or 75.5 s, or a trial, #7"),
+        row(A::PreviousFall, "previous-fall", &["{"], G::Replay, "to the previous fall or fault"),
+        row(A::NextFall, "next-fall", &["}"], G::Replay, "to the next fall or fault"),
+        row(A::ReplayStart, "replay-start", &["("], G::Replay, "to the start"),
+        row(A::ReplayEnd, "replay-end", &[")"], G::Replay, "to the end"),
+        row(A::TickBack, "tick-back", &[";"], G::Replay, "a tick back, 1 ms"),
+        row(A::TickForward, "tick-forward", &["'"], G::Replay, "a tick forward"),
+        row(A::SecondBack, "second-back", &["j"], G::Replay, "a second back"),
+        row(A::SecondForward, "second-forward", &["l"], G::Replay, "a second forward"),
+        row(A::LoopJump, "loop-jump", &["i"], G::Replay, "repeat the jump at the playhead; again: play on"),
+        row(A::SlowMotion, "slow-motion", &["H"], G::Replay, "impulse and flight at an eighth of the speed, on or off"),
 
         row(A::Palette, "palette", &[":"], G::Program, "all actions, and why some are not possible now"),
         row(A::Help, "help", &["?"], G::Program, "this help"),

@@ -284,7 +284,7 @@ impl Console {
     }
 
     fn copy_trial(&mut self, trial: u32) {
-        let Some(trial) = self.model.session.trials.records.get(&trial) else { return };
+        let Some(trial) = self.model.trial(trial) else { return };
         let mut bytes = Vec::new();
         // Writing to memory does not fail.
         let _ = crossterm::queue!(bytes, CopyToClipboard::to_clipboard_from(text::as_text(trial, &self.model)));

@@ -16,25 +16,28 @@ pub struct Areas {
     pub frame: Rect,
     pub tabs: Rect,
     pub body: Rect,
+    /// The trials of a replay over time; without height in a live session.
+    pub timeline: Rect,
     /// The newest answer to the operator.
     pub message: Rect,
     pub next_step: Rect,
 }
 
 /// The parts of a screen of that size; none if it is too small.
-pub fn areas(size: Size) -> Option<Areas> {
+pub fn areas(size: Size, replay: bool) -> Option<Areas> {
     if size.width < MIN_COLUMNS || size.height < MIN_ROWS {
         return None;
     }
-    let [frame, tabs, body, message, next_step] = Layout::vertical([
+    let [frame, tabs, body, timeline, message, next_step] = Layout::vertical([
         Constraint::Length(2),
         Constraint::Length(1),
         Constraint::Fill(1),
+        Constraint::Length(u16::from(replay)),
         Constraint::Length(1),
         Constraint::Length(1),
     ])
     .areas(Rect::from(((0, 0).into(), size)));
-    Some(Areas { frame, tabs, body, message, next_step })
+    Some(Areas { frame, tabs, body, timeline, message, next_step })
 }
 
 /// The rows of the trial table in view Trials: the body below its heading and the column titles.

@@ -4,7 +4,7 @@ use quadfrog::control::mode::{self, Trigger};
 use quadfrog::telemetry::Mode;
 use quadfrog::trial::{ExperimentStage, Proposal, Verdict};
 
-use crate::action::{ACTIONS, Action, ActionInfo};
+use crate::action::{ACTIONS, Action, ActionGroup, ActionInfo};
 use crate::layout::{MIN_COLUMNS, MIN_ROWS};
 use crate::model::{Model, View};
 
@@ -57,9 +57,7 @@ pub fn legal(action: Action, model: &Model) -> Legality {
         A::Filter | A::Search => {
             require(matches!(model.view, View::Trials | View::Log), "only in the views Trials and Log")
         }
-        A::PlayPause | A::StepForward | A::StepBack | A::Slower | A::Faster | A::PreviousMarker | A::NextMarker => {
-            require(model.replay.is_some(), "only in a replay")
-        }
+        _ if action.info().group == ActionGroup::Replay => require(model.replay.is_some(), "only in a replay"),
         A::Suspend => may_suspend(model),
         _ => Ok(()),
     }

@@ -1,12 +1,15 @@
 //! Messages into the model and effects out of it.
 
+use std::collections::BTreeMap;
 use std::time::Duration;
 
 use quadfrog::recording::record::Stamped;
 use quadfrog::recording::recorder::RecorderStatus;
+use quadfrog::recording::timeline::TrialRun;
 use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::session::storage::StorageWait;
 use quadfrog::telemetry::{Snapshot, Tick};
+use quadfrog::trial::{TrialRecord, Verdict};
 
 use crate::keymap::Key;
 
@@ -33,6 +36,8 @@ pub enum Msg {
     Tick(Box<Tick>),
     Record(Stamped),
     Replay(ReplayStatus),
+    /// The trials, faults and lost parts of the whole recording; again when they change.
+    Timeline(Box<ReplayTimeline>),
     /// The replay jumped to another time; the records up to that time follow from the start.
     Rewound,
     /// SIGTSTP or its key.
@@ -83,18 +88,42 @@ pub enum Effect {
 #[expect(missing_docs, reason = "the names say the rest")]
 pub enum ReplayCommand {
     PlayPause,
-    /// One chart tick forward; pauses.
-    StepForward,
-    /// One chart tick back; pauses.
-    StepBack,
+    /// Forward; pauses.
+    Forward(ReplayStep),
+    /// Back; pauses.
+    Back(ReplayStep),
     Slower,
     Faster,
     PreviousMarker,
     NextMarker,
+    /// The previous fall, or trial that tripped a limit, or fault.
+    PreviousFall,
+    NextFall,
+    Start,
+    End,
+    /// To a time, ns since the recording began.
+    Time(u64),
+    /// To the begin of a trial.
+    Trial(u32),
+    /// Repeat the jump at the playhead, or the last one before it; again: play on.
+    Loop,
+    /// Slow motion in impulse and flight on or off.
+    SlowMotion,
+}
+
+/// Length of a single step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ReplayStep {
+    /// A tick of the controller, 1 ms.
+    Tick,
+    /// A sample of the charts, 5 ms.
+    Frame,
+    /// A second.
+    Second,
 }
 
 /// State of the replay.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 #[expect(missing_docs, reason = "the names say the rest")]
 pub struct ReplayStatus {
     pub playing: bool,
@@ -104,4 +133,42 @@ pub struct ReplayStatus {
     pub time_ns: u64,
     /// Length of the recording, ns.
     pub duration_ns: u64,
+    /// Whether impulse and flight are played in slow motion.
+    pub slow_motion: bool,
+    /// The trial whose jump is repeated.
+    pub looping: Option<u32>,
+    /// Whether the recording is being written and is followed.
+    pub following: bool,
+    /// Time that the parts found so far take that cannot be read, ns.
+    pub lost_ns: u64,
+}
+
+/// The whole recording, wherever the playhead is.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ReplayTimeline {
+    /// Runs of trials, in the order of time.
+    pub trials: Vec<TrialRun>,
+    /// Begins of faults, ns.
+    pub faults_ns: Vec<u64>,
+    /// Begin and end of the parts found so far that cannot be read, ns.
+    pub lost_ns: Vec<(u64, u64)>,
+    /// The newest row of each trial.
+    pub rows: BTreeMap<u32, TrialRecord>,
+}
+
+impl ReplayTimeline {
+    /// Whether the recording has ticks of a trial: a continued study shows rows of earlier ones, too.
+    pub fn has_ticks_of(&self, trial: u32) -> bool {
+        self.trials.iter().any(|span| span.trial == trial)
+    }
+
+    /// Whether a trial fell or tripped a limit, by its verdict or else its suggestion.
+    pub fn fell(&self, trial: u32) -> bool {
+        self.verdict(trial) == Some(Verdict::Fall)
+    }
+
+    /// The verdict of a trial, or else its suggestion.
+    pub fn verdict(&self, trial: u32) -> Option<Verdict> {
+        self.rows.get(&trial).and_then(|row| row.verdict.or(row.suggested))
+    }
 }

@@ -4,30 +4,13 @@ use foxglove::messages::JointStates;
 use prost::Message;
 
 use super::Player;
+use super::lost::{DamagedChunk, LostPart};
 use crate::recording::chunk::ChunkRecords;
 use crate::recording::container::Chunk;
+use crate::recording::error::RecordingError;
 use crate::recording::topic::Topic;
 use crate::recording::wire::DecodeError;
 use crate::recording::{frog, schema};
-
-/// A part of a recording that cannot be read.
-#[derive(Debug, Clone, PartialEq)]
-pub struct LostPart {
-    /// Its begin since the engine started, ns.
-    pub from_ns: u64,
-    /// Its end, ns.
-    pub to_ns: u64,
-    /// Reason for which it cannot be read.
-    pub reason: String,
-}
-
-/// A chunk that cannot be read; times are log times, ns UTC.
-pub(super) struct DamagedChunk {
-    offset: u64,
-    start: u64,
-    end: u64,
-    reason: String,
-}
 
 /// Period of the ticks, ns.
 const TICK_NS: u64 = 1_000_000;
@@ -60,6 +43,38 @@ impl Player {
         (!parts.is_empty()).then(|| format!("{}: {}", self.path.display(), parts.join("; ")))
     }
 
+    /// Verifies what playing does not read: attachments, metadata, index and the checksum of all data. Returns what is damaged.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub fn check_extras(&mut self) -> Result<Vec<String>, RecordingError> {
+        let (attachments, metadata) = (self.container.attachments.clone(), self.container.metadata.clone());
+        let mut found = Vec::new();
+        let bad = attachments.into_iter().filter(|span| self.container.read_attachment(*span).is_err()).count();
+        if bad > 0 {
+            found.push(format!("{bad} attachments are damaged"));
+        }
+        let bad =
+            metadata.into_iter().filter(|span| !matches!(self.container.read_metadata(*span), Ok(Some(_)))).count();
+        if bad > 0 {
+            found.push(format!("{bad} metadata records are damaged"));
+        }
+        if self.container.scanned && self.is_complete() {
+            found.push("its index is damaged; its chunks were found one by one".into());
+        }
+        let path = self.path.clone();
+        let whole = self.container.verify_data().map_err(|source| RecordingError::Mcap { path, source })?;
+        if whole == Some(false) && found.is_empty() && self.damaged.is_empty() && self.unguarded.is_empty() {
+            found.push("bytes between its chunks are damaged; every message is there".into());
+        }
+        Ok(found)
+    }
+
+    /// Returns the reason for which the end of the file is missing; none for a finished file.
+    pub fn cut(&self) -> Option<&str> {
+        self.container.cut.as_deref()
+    }
+
     /// Returns whether the file was completed: it has an end, though perhaps a damaged one.
     pub fn is_complete(&self) -> bool {
         self.container.cut.is_none()
@@ -84,7 +99,7 @@ impl Player {
             until = until.max(end);
             end.saturating_sub(from)
         };
-        parts.into_iter().map(new).sum()
+        parts.into_iter().map(new).fold(0, u64::saturating_add)
     }
 
     /// Takes the times of chunks with unusual ones from their messages. Without the file's index no checksum guards them: a wrong
@@ -128,7 +143,12 @@ impl Player {
                 let Chunk { span, start, end, .. } = *chunk;
                 if !self.damaged.iter().any(|known| known.offset == span.offset) {
                     // A tick lasts 1 ms: the last one of the chunk is lost, too.
-                    self.damaged.push(DamagedChunk { offset: span.offset, start, end: end + TICK_NS, reason });
+                    self.damaged.push(DamagedChunk {
+                        offset: span.offset,
+                        start,
+                        end: end.saturating_add(TICK_NS),
+                        reason,
+                    });
                 }
                 None
             }

@@ -3,9 +3,10 @@
 mod replay;
 
 use quadfrog::engine::EngineHandle;
-use quadfrog::recording::player::Player;
+use quadfrog::recording::timeline::Timeline;
 
 use crate::message::{Msg, ReplayCommand};
+pub use replay::DamageWatch;
 use replay::ReplayFeed;
 
 /// Maximum number of records, and of ticks, per call of [`Feed::poll`]: bounds the delay of the next key.
@@ -25,8 +26,21 @@ impl Feed {
     }
 
     /// Creates the feed of a recording, playing from the start.
-    pub fn replay(player: Player) -> Feed {
-        Feed::Replay(Box::new(ReplayFeed::new(player)))
+    pub fn replay(recording: impl Into<Timeline>) -> Feed {
+        Feed::Replay(Box::new(ReplayFeed::new(recording.into(), false)))
+    }
+
+    /// Creates the feed of a recording that is being written, playing from its present end.
+    pub fn follow(recording: impl Into<Timeline>) -> Feed {
+        Feed::Replay(Box::new(ReplayFeed::new(recording.into(), true)))
+    }
+
+    /// Returns the damage of the recording that a replay has found, also after the feed has ended.
+    pub fn damage(&self) -> DamageWatch {
+        match self {
+            Feed::Live(_) => DamageWatch::default(),
+            Feed::Replay(replay) => replay.damage(),
+        }
     }
 
     /// Returns the running engine; none in a replay, which nothing commands.

@@ -1,92 +1,158 @@
-//! Playback of a recording: speeds, single steps, jumps between markers.
+//! Playback of a recording: speeds, slow motion, loops, single steps, jumps to times, trials, falls and faults.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeSet, VecDeque};
+use std::sync::{Arc, Mutex, PoisonError};
 
-use quadfrog::recording::player::{Played, Player};
-use quadfrog::recording::record::{Record, Stamped};
-use quadfrog::telemetry::{Counters, Snapshot};
+use quadfrog::recording::player::{MarkerKind, Played};
+use quadfrog::recording::record::{LogLevel, LogRecord, Record, Stamped};
+use quadfrog::recording::timeline::{Timeline, TrialRun};
+use quadfrog::telemetry::{Counters, Phase, Snapshot};
 
-use crate::message::{Msg, ReplayCommand, ReplayStatus};
+use crate::message::{Msg, ReplayCommand, ReplayStatus, ReplayStep, ReplayTimeline};
 
 /// Ticks per tick of the charts: 200 per second, as live.
 const SHOWN_EVERY: u64 = quadfrog::realtime::channel::SHOWN_EVERY;
-/// Length of a single step: one tick of the charts.
-const STEP_NS: u64 = SHOWN_EVERY * 1_000_000;
+const TICK_NS: u64 = 1_000_000;
+const FRAME_NS: u64 = SHOWN_EVERY * TICK_NS;
 /// Length of the past that fills the charts after a jump.
 const PAST_NS: u64 = 8_000_000_000;
 /// Speeds relative to the recording.
 const SPEEDS: [f64; 9] = [0.0625, 0.125, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0];
+/// Speed of impulse and flight in slow motion, relative to the chosen one: a jump of 0.6 s takes 5 s.
+const SLOW_MOTION: f64 = 0.125;
+/// Time before the impulse at which a loop begins: the robot stands still.
+const BEFORE_IMPULSE_NS: u64 = 500_000_000;
+/// Period of looking for what was appended to a followed file.
+const FOLLOW_NS: u64 = 250_000_000;
+
+/// Descriptions of the damage found so far, file by file; they outlive the feed.
+pub type DamageWatch = Arc<Mutex<Vec<String>>>;
 
 pub struct ReplayFeed {
-    player: Player,
+    recording: Timeline,
+    whole: ReplayTimeline,
     playing: bool,
     /// Index in [`SPEEDS`].
     speed: usize,
+    slow_motion: bool,
+    looping: Option<TrialRun>,
+    /// Time until the next look at a followed file, ns; none for one that is not followed.
+    follow_in_ns: Option<u64>,
     time_ns: u64,
     /// Items read that are later than `time_ns`.
     next: VecDeque<Played>,
     snapshot: Snapshot,
+    /// Begins of the lost parts that are in the log.
+    logged: BTreeSet<u64>,
+    damage: DamageWatch,
     /// Messages of a jump or a step that were not taken yet.
     jumped: Vec<Msg>,
 }
 
 impl ReplayFeed {
-    pub fn new(player: Player) -> ReplayFeed {
+    pub fn new(recording: Timeline, follow: bool) -> ReplayFeed {
         let mut replay = ReplayFeed {
-            player,
+            recording,
+            whole: ReplayTimeline::default(),
             playing: true,
             speed: SPEEDS.iter().position(|speed| *speed == 1.0).unwrap_or(0),
+            slow_motion: false,
+            looping: None,
+            follow_in_ns: follow.then_some(FOLLOW_NS),
             time_ns: 0,
             next: VecDeque::new(),
             snapshot: Snapshot::default(),
+            logged: BTreeSet::new(),
+            damage: DamageWatch::default(),
             jumped: Vec::new(),
         };
-        replay.jump(0);
+        replay.list();
+        replay.jump(if follow { replay.recording.duration_ns() } else { 0 });
         replay
     }
 
+    pub fn damage(&self) -> DamageWatch {
+        self.damage.clone()
+    }
+
     pub fn control_replay(&mut self, command: ReplayCommand) {
+        let end_ns = self.recording.duration_ns();
+        let at = self.time_ns;
         match command {
-            ReplayCommand::PlayPause => {
-                if self.time_ns >= self.player.duration_ns() {
-                    self.jump(0);
-                    self.playing = true;
-                } else {
-                    self.playing = !self.playing;
-                }
+            ReplayCommand::PlayPause if at >= end_ns && self.follow_in_ns.is_none() => {
+                self.jump(0);
+                self.playing = true;
             }
+            ReplayCommand::PlayPause => self.playing = !self.playing,
             ReplayCommand::Slower => self.speed = self.speed.saturating_sub(1),
             ReplayCommand::Faster => self.speed = (self.speed + 1).min(SPEEDS.len() - 1),
-            ReplayCommand::StepForward => {
+            ReplayCommand::SlowMotion => self.slow_motion = !self.slow_motion,
+            ReplayCommand::Forward(step) => {
                 self.playing = false;
-                let mut messages = Vec::new();
-                self.advance(STEP_NS, &mut messages);
-                self.jumped.extend(messages);
+                let mut messages = std::mem::take(&mut self.jumped);
+                self.advance(length_ns(step), &mut messages);
+                self.jumped = messages;
             }
-            ReplayCommand::StepBack => {
+            ReplayCommand::Back(step) => {
                 self.playing = false;
-                self.jump(self.time_ns.saturating_sub(STEP_NS));
+                self.go_to(at.saturating_sub(length_ns(step)));
             }
-            ReplayCommand::NextMarker => {
-                let next = self.player.markers().iter().map(|marker| marker.time_ns).find(|time| *time > self.time_ns);
-                self.jump(next.unwrap_or(self.player.duration_ns()));
+            ReplayCommand::NextMarker => self.go_to(after(self.markers(), at).unwrap_or(end_ns)),
+            ReplayCommand::PreviousMarker => self.go_to(before(self.markers(), self.passed()).unwrap_or(0)),
+            ReplayCommand::NextFall => self.go_to(after(self.falls(), at).unwrap_or(end_ns)),
+            ReplayCommand::PreviousFall => self.go_to(before(self.falls(), self.passed()).unwrap_or(0)),
+            ReplayCommand::Start => self.go_to(0),
+            ReplayCommand::End => self.go_to(end_ns),
+            ReplayCommand::Time(time_ns) => self.go_to(time_ns),
+            ReplayCommand::Trial(trial) => {
+                if let Some(span) = self.whole.trials.iter().rev().find(|span| span.trial == trial) {
+                    self.go_to(span.begin_ns);
+                }
             }
-            ReplayCommand::PreviousMarker => {
-                // During playback a marker passed less than 1 s ago is skipped.
-                let before = self.time_ns.saturating_sub(if self.playing { 1_000_000_000 } else { 0 });
-                let markers = self.player.markers().iter().rev();
-                let previous = markers.map(|marker| marker.time_ns).find(|time| *time < before);
-                self.jump(previous.unwrap_or(0));
+            ReplayCommand::Loop if self.looping.is_some() => self.looping = None,
+            ReplayCommand::Loop => {
+                let begun = self.whole.trials.iter().rev().find(|span| span.begin_ns <= at).copied();
+                self.looping = begun.or(self.whole.trials.first().copied());
+                if let Some(span) = self.looping {
+                    self.jump(loop_begin(&span));
+                    self.playing = true;
+                }
             }
         }
+    }
+
+    /// Goes to a time; a loop ends where the time is not in it.
+    fn go_to(&mut self, time_ns: u64) {
+        self.looping = self.looping.filter(|span| (span.begin_ns..=span.end_ns).contains(&time_ns));
+        self.jump(time_ns);
+    }
+
+    fn markers(&self) -> impl DoubleEndedIterator<Item = u64> + '_ {
+        self.recording.markers().iter().map(|marker| marker.time_ns)
+    }
+
+    /// Begins of faults and of trials that fell.
+    fn falls(&self) -> impl DoubleEndedIterator<Item = u64> + '_ {
+        let falls = self.recording.markers().iter().filter(|marker| match marker.kind {
+            MarkerKind::Trial(trial) => self.whole.fell(trial),
+            MarkerKind::Fault => true,
+        });
+        falls.map(|marker| marker.time_ns)
+    }
+
+    /// The time before which a place counts as previous: during playback one passed less than 1 s ago is skipped.
+    fn passed(&self) -> u64 {
+        self.time_ns.saturating_sub(if self.playing { 1_000_000_000 } else { 0 })
     }
 
     /// Appends the messages of `elapsed_ns` of real time.
     pub fn poll(&mut self, elapsed_ns: u64, messages: &mut Vec<Msg>) {
         messages.append(&mut self.jumped);
+        self.follow(elapsed_ns, messages);
         if self.playing {
-            self.advance((elapsed_ns as f64 * SPEEDS[self.speed]) as u64, messages);
-            if self.time_ns >= self.player.duration_ns() {
+            self.play(elapsed_ns, messages);
+            messages.append(&mut self.jumped);
+            if self.time_ns >= self.recording.duration_ns() && self.looping.is_none() && self.follow_in_ns.is_none() {
                 self.playing = false;
             }
         }
@@ -95,24 +161,82 @@ impl ReplayFeed {
             playing: self.playing,
             speed: SPEEDS[self.speed],
             time_ns: self.time_ns,
-            duration_ns: self.player.duration_ns(),
+            duration_ns: self.recording.duration_ns(),
+            slow_motion: self.slow_motion,
+            looping: self.looping.map(|span| span.trial),
+            following: self.follow_in_ns.is_some(),
+            lost_ns: self.recording.lost_ns(),
         }));
+    }
+
+    /// Plays `elapsed_ns` of real time; in slow motion and in a loop in parts, since speed and place change on the way.
+    fn play(&mut self, elapsed_ns: u64, messages: &mut Vec<Msg>) {
+        if !self.slow_motion && self.looping.is_none() {
+            return self.advance((elapsed_ns as f64 * SPEEDS[self.speed]) as u64, messages);
+        }
+        let mut left_ns = elapsed_ns as f64;
+        while left_ns >= 1.0 {
+            let jumping = matches!(self.snapshot.tick.phase, Phase::Impulse | Phase::Flight);
+            let slowed = if self.slow_motion && jumping { SLOW_MOTION } else { 1.0 };
+            let speed = SPEEDS[self.speed] * slowed;
+            let by_ns = (left_ns * speed).min(FRAME_NS as f64);
+            left_ns -= by_ns / speed;
+            self.advance(by_ns.ceil() as u64, messages);
+            if let Some(span) = self.looping.filter(|span| self.time_ns >= span.end_ns) {
+                self.jump(loop_begin(&span));
+                // What follows belongs to the time after the jump.
+                messages.append(&mut self.jumped);
+            }
+            if self.time_ns >= self.recording.duration_ns() {
+                break;
+            }
+        }
+    }
+
+    /// Reads what was appended to a followed file.
+    fn follow(&mut self, elapsed_ns: u64, messages: &mut Vec<Msg>) {
+        let Some(left_ns) = self.follow_in_ns else { return };
+        self.follow_in_ns = Some(left_ns.saturating_sub(elapsed_ns));
+        if left_ns > elapsed_ns {
+            return;
+        }
+        self.follow_in_ns = Some(FOLLOW_NS);
+        match self.recording.refresh() {
+            Ok(true) => {
+                self.list();
+                messages.append(&mut self.jumped);
+            }
+            Ok(false) => {}
+            Err(error) => {
+                self.follow_in_ns = None;
+                messages.push(logged(self.time_ns, format!("not followed any longer: {error}")));
+            }
+        }
+    }
+
+    /// Lists the whole recording anew.
+    fn list(&mut self) {
+        let faults = self.recording.markers().iter().filter(|marker| marker.kind == MarkerKind::Fault);
+        self.whole = ReplayTimeline {
+            trials: self.recording.trials().to_vec(),
+            faults_ns: faults.map(|marker| marker.time_ns).collect(),
+            lost_ns: self.recording.lost().iter().map(|lost| (lost.from_ns, lost.to_ns)).collect(),
+            rows: self.recording.rows(),
+        };
+        self.jumped.push(Msg::Timeline(Box::new(self.whole.clone())));
     }
 
     /// Plays the next `by_ns` of the recording.
     fn advance(&mut self, by_ns: u64, messages: &mut Vec<Msg>) {
-        self.time_ns = (self.time_ns + by_ns).min(self.player.duration_ns());
-        loop {
-            let played = match self.next.pop_front().or_else(|| self.player.next()) {
-                Some(played) if played.time_ns() <= self.time_ns => played,
-                Some(later) => {
-                    self.next.push_front(later);
-                    return;
-                }
-                None => return,
-            };
+        self.time_ns = self.time_ns.saturating_add(by_ns).min(self.recording.duration_ns());
+        while let Some(played) = self.next.pop_front().or_else(|| self.recording.next()) {
+            if played.time_ns() > self.time_ns {
+                self.next.push_front(played);
+                break;
+            }
             self.show(played, messages);
         }
+        self.report_damage(messages);
     }
 
     fn show(&mut self, played: Played, messages: &mut Vec<Msg>) {
@@ -132,22 +256,77 @@ impl ReplayFeed {
         }
     }
 
+    /// Logs lost parts that were not known before.
+    fn report_damage(&mut self, messages: &mut Vec<Msg>) {
+        if self.recording.lost_count() > self.whole.lost_ns.len() {
+            let lost = self.recording.lost();
+            self.whole.lost_ns = lost.iter().map(|lost| (lost.from_ns, lost.to_ns)).collect();
+            messages.push(Msg::Timeline(Box::new(self.whole.clone())));
+        }
+        if self.logged.len() < self.whole.lost_ns.len() {
+            for lost in self.recording.lost() {
+                if lost.from_ns <= self.time_ns && self.logged.insert(lost.from_ns) {
+                    let lost_s = lost.to_ns.saturating_sub(lost.from_ns) as f64 / 1e9;
+                    messages.push(logged(
+                        lost.from_ns,
+                        format!("{lost_s:.3} s of the recording are lost: {}", lost.reason),
+                    ));
+                }
+            }
+        }
+        let mut damage = self.recording.damage();
+        if self.follow_in_ns.is_some() && self.recording.lost_count() == 0 {
+            damage.clear(); // a file that is being written has no end
+        }
+        *self.damage.lock().unwrap_or_else(PoisonError::into_inner) = damage;
+    }
+
     /// Jumps to a time: replays all events before it, and the ticks of the last seconds for the charts.
     fn jump(&mut self, time_ns: u64) {
-        let time_ns = time_ns.min(self.player.duration_ns());
+        let time_ns = time_ns.min(self.recording.duration_ns());
         let from_ns = time_ns.saturating_sub(PAST_NS);
-        let mut messages = vec![Msg::Rewound];
-        messages.extend(self.log_until(from_ns).map(Msg::Record));
+        // What a jump before this one has left is out of date, but for the list of trials.
+        let mut messages: Vec<Msg> =
+            self.jumped.drain(..).filter(|message| matches!(message, Msg::Timeline(_))).collect();
+        messages.push(Msg::Rewound);
+        if self.follow_in_ns.is_none() {
+            messages.extend(self.recording.cuts().into_iter().map(|cut| logged(0, cut)));
+        }
+        messages.extend(self.recording.events_before(from_ns).map(Msg::Record));
         self.snapshot.counters = Counters::default();
+        self.logged.clear();
         self.next.clear();
-        self.player.seek(from_ns);
+        // The charts show every fifth tick; the newest one is shown in numbers.
+        self.recording.seek_sparse(from_ns, time_ns.saturating_sub(2 * FRAME_NS), SHOWN_EVERY as u32);
         self.time_ns = from_ns;
         self.advance(time_ns - from_ns, &mut messages);
         self.jumped = messages;
     }
+}
 
-    /// Returns all events before a time; the model of the session is folded from them.
-    fn log_until(&self, time_ns: u64) -> impl Iterator<Item = Stamped> + '_ {
-        self.player.events().iter().take_while(move |event| event.time_ns < time_ns).cloned()
+fn length_ns(step: ReplayStep) -> u64 {
+    match step {
+        ReplayStep::Tick => TICK_NS,
+        ReplayStep::Frame => FRAME_NS,
+        ReplayStep::Second => 1_000_000_000,
     }
+}
+
+fn after(mut times: impl Iterator<Item = u64>, time_ns: u64) -> Option<u64> {
+    times.find(|time| *time > time_ns)
+}
+
+fn before(times: impl DoubleEndedIterator<Item = u64>, time_ns: u64) -> Option<u64> {
+    times.rev().find(|time| *time < time_ns)
+}
+
+/// The begin of a loop: shortly before the impulse, or the begin of a trial whose impulse is not recorded as an event.
+fn loop_begin(span: &TrialRun) -> u64 {
+    span.impulse_ns.map_or(span.begin_ns, |impulse| impulse.saturating_sub(BEFORE_IMPULSE_NS).max(span.begin_ns))
+}
+
+/// A line of the log about the recording itself.
+fn logged(time_ns: u64, message: String) -> Msg {
+    let record = Record::Log(LogRecord { level: LogLevel::Error, source: "recording".to_owned(), message });
+    Msg::Record(Stamped { time_ns, record })
 }

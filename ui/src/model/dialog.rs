@@ -94,6 +94,8 @@ pub enum Purpose {
     },
     TrialNumber,
     LogSearch,
+    /// A time or a trial of a replay.
+    Seek,
 }
 
 /// Subject of a list of switches.

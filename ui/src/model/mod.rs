@@ -21,7 +21,7 @@ use strum::{IntoStaticStr, VariantArray};
 
 use crate::column::Column;
 use crate::keymap::Keymap;
-use crate::message::ReplayStatus;
+use crate::message::{ReplayStatus, ReplayTimeline};
 use crate::series::Series;
 use crate::settings::{BellCause, ConsoleSettings};
 use crate::theme::Theme;
@@ -100,6 +100,8 @@ pub struct Model {
     pub log_view: LogView,
     /// State of the replay; none in a live session.
     pub replay: Option<ReplayStatus>,
+    /// The whole recording of the replay.
+    pub timeline: Option<Box<ReplayTimeline>>,
     /// Whole seconds left of a countdown, as the bell last rang them.
     pub countdown_s: Option<u32>,
     /// Time of the last Ctrl-C.
@@ -147,6 +149,7 @@ impl Model {
             override_row: 0,
             log_view: LogView::default(),
             replay: None,
+            timeline: None,
             countdown_s: None,
             interrupted_at: None,
             size: (0, 0),
@@ -209,12 +212,32 @@ impl Model {
 
     /// The rows of the trial table, sorted and filtered.
     pub fn trial_rows(&self) -> Vec<&TrialRecord> {
-        self.trial_table.rows(&self.session.trials, &self.session.info.parameters)
+        self.trial_table.rows(&self.session.trials, self.later_trials(), &self.session.info.parameters)
+    }
+
+    /// The trials of a replay that are not proposed yet at the playhead, as they will be at the end.
+    pub fn later_trials(&self) -> impl Iterator<Item = &TrialRecord> + '_ {
+        let rows = self.timeline.iter().flat_map(|timeline| timeline.rows.values());
+        rows.filter(|row| !self.session.trials.records.contains_key(&row.trial))
+    }
+
+    /// Whether a trial lies after the playhead of a replay.
+    pub fn is_later(&self, trial: u32) -> bool {
+        !self.session.trials.records.contains_key(&trial)
+    }
+
+    /// The row of a trial: as of the playhead in a replay, of a later trial as it will be.
+    pub fn trial(&self, trial: u32) -> Option<&TrialRecord> {
+        let later = || self.timeline.as_ref().and_then(|timeline| timeline.rows.get(&trial));
+        self.session.trials.records.get(&trial).or_else(later)
     }
 
     /// The trial that actions of the trial table apply to: the selected one, or the newest.
     pub fn selected_trial(&self) -> Option<&TrialRecord> {
-        self.trial_table.selected(&self.session.trials)
+        match self.trial_table.selected {
+            Some(number) => self.trial(number),
+            None => self.session.trials.newest().or_else(|| self.later_trials().next()),
+        }
     }
 
     /// The trial that a note and the details apply to.

@@ -116,20 +116,18 @@ pub struct TrialTable {
 }
 
 impl TrialTable {
-    /// The selected row, or the newest.
-    pub fn selected<'a>(&self, trials: &'a Trials) -> Option<&'a TrialRecord> {
-        match self.selected {
-            Some(number) => trials.records.get(&number),
-            None => trials.newest(),
-        }
-    }
-
-    /// The rows, sorted and filtered.
-    pub fn rows<'a>(&self, trials: &'a Trials, parameters: &[ParameterInfo]) -> Vec<&'a TrialRecord> {
+    /// The rows, sorted and filtered; `later` are those of a replay that follow after the playhead.
+    pub fn rows<'a>(
+        &self,
+        trials: &'a Trials,
+        later: impl Iterator<Item = &'a TrialRecord>,
+        parameters: &[ParameterInfo],
+    ) -> Vec<&'a TrialRecord> {
         let mut rows: Vec<&TrialRecord> = if self.best_only {
             trials.best_so_far().collect()
         } else {
-            trials.records.values().filter(|trial| self.filter.is_none() || trial.verdict == self.filter).collect()
+            let all = trials.records.values().chain(later);
+            all.filter(|trial| self.filter.is_none() || trial.verdict == self.filter).collect()
         };
         let sort_value = |trial: &TrialRecord| {
             let value = match self.sort {

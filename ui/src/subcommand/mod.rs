@@ -13,6 +13,7 @@ mod guard;
 mod optimize;
 mod prior;
 mod recover;
+mod rejudge;
 mod replay;
 mod report;
 mod reproduce;
@@ -54,6 +55,8 @@ enum Subcommands {
     Reproduce(reproduce::ReproduceArguments),
     /// Play a recorded session in the console's panels
     Replay(replay::ReplayArguments),
+    /// Judge recorded trials by another configuration, old beside new
+    Rejudge(rejudge::RejudgeArguments),
     /// Export the signals of a recording as CSV, JSON or Parquet
     Export(export::ExportArguments),
     /// Repair an incomplete recording
@@ -86,6 +89,7 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
         Some(Subcommands::Evaluate(evaluate)) => evaluate::run(&evaluate),
         Some(Subcommands::Reproduce(reproduce)) => reproduce::run(&reproduce),
         Some(Subcommands::Replay(replay)) => replay::run(&replay),
+        Some(Subcommands::Rejudge(rejudge)) => rejudge::run(&rejudge),
         Some(Subcommands::Export(export)) => export::run(&export),
         Some(Subcommands::Recover(recover)) => recover::run(&recover),
         Some(Subcommands::Verify(verify)) => verify::run(&verify),

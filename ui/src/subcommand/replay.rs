@@ -1,22 +1,39 @@
-//! `quadfrog replay`: the console on a recorded session.
+//! `quadfrog replay`: the console on a recorded session, or a check of the files without a screen.
 
-use std::path::PathBuf;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+use std::sync::PoisonError;
 
+use anyhow::anyhow;
 use clap::Args;
 use quadfrog::config::Config;
-use quadfrog::recording::player::Player;
+use quadfrog::recording::RecordingError;
+use quadfrog::recording::player::{Played, Player};
+use quadfrog::recording::session_files::recordings_of;
+use quadfrog::recording::timeline::Timeline;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog_console::app::{self, ConsoleExit};
 use quadfrog_console::feed::Feed;
-use quadfrog_console::terminal;
+use quadfrog_console::{put_line, terminal};
 
 use super::console::{ScreenArguments, options};
 use super::failure::Failure;
 
+/// Folder of the studies, where no file is named.
+const RECORDINGS: &str = "recordings";
+
 #[derive(Debug, Args)]
 pub struct ReplayArguments {
-    /// The recording: a session.mcap, complete or incomplete
-    file: PathBuf,
+    /// Recordings (session.mcap, complete or incomplete) or study folders; several of one study are played as one. Without: the
+    /// newest session in recordings
+    #[arg(value_name = "FILE")]
+    files: Vec<PathBuf>,
+    /// Show a session that is being written, from its present end on
+    #[arg(long, conflicts_with = "check")]
+    follow: bool,
+    /// Read the files whole without a screen and print what is lost; exit status 1 if anything is
+    #[arg(long)]
+    check: bool,
     /// Folder with your own console.toml
     #[arg(long, value_name = "DIR")]
     config: Option<PathBuf>,
@@ -27,23 +44,100 @@ pub struct ReplayArguments {
 pub fn run(arguments: &ReplayArguments) -> Result<(), Failure> {
     let config = Config::load(arguments.config.as_deref())?;
     let console = options(&arguments.screen, &config)?;
-    let player = Player::open(&arguments.file).map_err(Failure::input)?;
-    // An incomplete recording is played as far as it goes; the exit status reports the damage.
-    let damage = player.damage().map(|damage| {
-        let file = arguments.file.display();
-        format!("{damage}; the rest can be played; quadfrog recover {file} repairs it")
-    });
-    terminal::check().map_err(|error| match &damage {
-        Some(damage) => Failure::Input(format!("{damage}\n{error}")),
-        None => Failure::input(error),
+    let newest = [PathBuf::from(RECORDINGS)];
+    let named = if arguments.files.is_empty() { &newest[..] } else { &arguments.files };
+    if arguments.files.is_empty() && !newest[0].is_dir() {
+        let [path] = newest;
+        return Err(RecordingError::NoRecording { path }.into());
+    }
+    let mut files = Vec::new();
+    for path in named {
+        files.extend(recordings_of(path)?);
+    }
+    if arguments.check {
+        return check(&files);
+    }
+    let recording = Timeline::open(&files)?;
+    let repair = |damage: Vec<String>| {
+        let damage = damage.iter().map(|damage| format!("{damage}; the rest can be played"));
+        let files =
+            files.iter().map(|file| file.display().to_string()).collect::<Vec<_>>().join(" and quadfrog recover ");
+        Failure::Other(anyhow!("{}\nquadfrog recover {files} repairs it", damage.collect::<Vec<_>>().join("\n")))
+    };
+    terminal::check().map_err(|error| match recording.damage() {
+        damage if damage.is_empty() => Failure::input(error),
+        damage => Failure::Input(format!("{}\n{error}", message(repair(damage)))),
     })?;
-    let console = match RobotDescription::embedded(&player.session().robot) {
+    let console = match RobotDescription::embedded(&recording.session().robot) {
         Ok(robot) => console.with_robot(robot),
         // A model of the operator's own: the panels that need its limits say so.
         Err(_) => console,
     };
-    match (app::run(Feed::replay(player), console)?, damage) {
-        (ConsoleExit::HungUp, _) | (_, None) => Ok(()),
-        (_, Some(damage)) => Err(Failure::Input(damage)),
+    let feed = if arguments.follow { Feed::follow(recording) } else { Feed::replay(recording) };
+    let damage = feed.damage();
+    let ended = app::run(feed, console)?;
+    let damage = std::mem::take(&mut *damage.lock().unwrap_or_else(PoisonError::into_inner));
+    if ended == ConsoleExit::HungUp || damage.is_empty() { Ok(()) } else { Err(repair(damage)) }
+}
+
+fn message(failure: Failure) -> String {
+    match failure {
+        Failure::Input(message) => message,
+        Failure::Other(error) => error.to_string(),
     }
+}
+
+impl From<RecordingError> for Failure {
+    fn from(error: RecordingError) -> Failure {
+        match &error {
+            // A missing file is unusable input, a failing disk is not.
+            RecordingError::Io { source, .. }
+                if !matches!(source.kind(), ErrorKind::NotFound | ErrorKind::PermissionDenied) =>
+            {
+                Failure::Other(error.into())
+            }
+            _ => Failure::input(error),
+        }
+    }
+}
+
+/// Reads every message of the files and prints what is lost.
+fn check(files: &[PathBuf]) -> Result<(), Failure> {
+    let mut damaged = 0;
+    for file in files {
+        damaged += usize::from(!check_file(file)?);
+    }
+    match damaged {
+        0 => Ok(()),
+        count => {
+            Err(anyhow!("{count} of {} files are damaged; quadfrog recover FILE keeps what can be read", files.len())
+                .into())
+        }
+    }
+}
+
+/// Returns whether a file is whole.
+fn check_file(file: &Path) -> Result<bool, Failure> {
+    let mut player = Player::open(file)?;
+    let (mut ticks, mut records) = (0_u64, 0_u64);
+    for played in player.by_ref() {
+        match played {
+            Played::Tick(_) => ticks += 1,
+            Played::Record(_) => records += 1,
+        }
+    }
+    let extras = player.check_extras()?;
+    let seconds = player.duration_ns() as f64 / 1e9;
+    put_line!("{}: {seconds:.3} s, {ticks} ticks, {records} records", file.display());
+    for lost in player.lost() {
+        let [from_s, to_s] = [lost.from_ns, lost.to_ns].map(|time_ns| time_ns as f64 / 1e9);
+        put_line!("  lost: {:.3} s from {from_s:.3} s to {to_s:.3} s ({})", (to_s - from_s).max(0.0), lost.reason);
+    }
+    let damage = player.damage();
+    for line in damage.iter().chain(&extras) {
+        put_line!("  {line}");
+    }
+    let whole = damage.is_none() && extras.is_empty();
+    put_line!("  {}", if whole { "whole".to_owned() } else { format!("{:.3} s lost", player.lost_ns() as f64 / 1e9) });
+    Ok(whole)
 }

@@ -58,6 +58,7 @@ pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
             model.history.push(&tick);
         }
         Msg::Replay(status) => model.replay = Some(status),
+        Msg::Timeline(timeline) => model.timeline = Some(timeline),
         Msg::Rewound => {
             model.session = SessionModel::default();
             model.history.clear();

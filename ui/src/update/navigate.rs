@@ -20,10 +20,14 @@ pub(super) fn move_by(model: &mut Model, step: isize) {
         View::Trials | View::Live => {
             let rows: Vec<u32> = model.trial_rows().iter().map(|trial| trial.trial).collect();
             let Some(last) = rows.len().checked_sub(1) else { return };
-            let at = model.trial_table.selected.and_then(|n| rows.iter().position(|row| *row == n)).unwrap_or(last);
+            let selected = model.selected_trial().map(|trial| trial.trial);
+            let at = selected.and_then(|n| rows.iter().position(|row| *row == n)).unwrap_or(last);
             let to = at.saturating_add_signed(step).min(last);
-            // The newest row is followed.
-            let follow = to == last && model.trial_table.sort == SortBy::Number && !model.trial_table.reversed;
+            // The newest row is followed, but not one after the playhead of a replay.
+            let follow = to == last
+                && !model.is_later(rows[to])
+                && model.trial_table.sort == SortBy::Number
+                && !model.trial_table.reversed;
             model.trial_table.selected = if follow { None } else { Some(rows[to]) };
         }
         View::Log => {

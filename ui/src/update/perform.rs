@@ -11,7 +11,7 @@ use super::navigate::{filter, freeze, ghost, move_by, move_cursor, next_mode, ne
 use super::request::{interrupt, request, say, stop};
 use crate::action::Action;
 use crate::legal::{legal, may_acknowledge, may_request};
-use crate::message::{Effect, ReplayCommand};
+use crate::message::{Effect, ReplayCommand, ReplayStep};
 use crate::model::dialog::{Choice, Dialog, OverrideForm, Purpose};
 use crate::model::{Model, View};
 use crate::text::report;
@@ -112,13 +112,24 @@ pub(super) fn perform(model: &mut Model, action: Action) -> Vec<Effect> {
             }
         }
         Action::Export => return vec![Effect::Export],
+        Action::Seek => open(model, Dialog::field(Purpose::Seek, "")),
         Action::PlayPause => return vec![Effect::Replay(ReplayCommand::PlayPause)],
-        Action::StepForward => return vec![Effect::Replay(ReplayCommand::StepForward)],
-        Action::StepBack => return vec![Effect::Replay(ReplayCommand::StepBack)],
+        Action::StepForward => return vec![Effect::Replay(ReplayCommand::Forward(ReplayStep::Frame))],
+        Action::StepBack => return vec![Effect::Replay(ReplayCommand::Back(ReplayStep::Frame))],
+        Action::TickForward => return vec![Effect::Replay(ReplayCommand::Forward(ReplayStep::Tick))],
+        Action::TickBack => return vec![Effect::Replay(ReplayCommand::Back(ReplayStep::Tick))],
+        Action::SecondForward => return vec![Effect::Replay(ReplayCommand::Forward(ReplayStep::Second))],
+        Action::SecondBack => return vec![Effect::Replay(ReplayCommand::Back(ReplayStep::Second))],
         Action::Slower => return vec![Effect::Replay(ReplayCommand::Slower)],
         Action::Faster => return vec![Effect::Replay(ReplayCommand::Faster)],
         Action::PreviousMarker => return vec![Effect::Replay(ReplayCommand::PreviousMarker)],
         Action::NextMarker => return vec![Effect::Replay(ReplayCommand::NextMarker)],
+        Action::PreviousFall => return vec![Effect::Replay(ReplayCommand::PreviousFall)],
+        Action::NextFall => return vec![Effect::Replay(ReplayCommand::NextFall)],
+        Action::ReplayStart => return vec![Effect::Replay(ReplayCommand::Start)],
+        Action::ReplayEnd => return vec![Effect::Replay(ReplayCommand::End)],
+        Action::LoopJump => return vec![Effect::Replay(ReplayCommand::Loop)],
+        Action::SlowMotion => return vec![Effect::Replay(ReplayCommand::SlowMotion)],
         Action::Palette => open(model, Dialog::Palette { input: Default::default(), selected: 0 }),
         Action::Help => open(model, Dialog::Help { scroll: 0 }),
         Action::Report => {
@@ -185,10 +196,17 @@ fn queue_point(model: &mut Model) -> Vec<Effect> {
     request(model, OperatorRequest::Enqueue(point))
 }
 
-/// Enter: acknowledges, overrides or opens the details; it never starts motion.
+/// Enter: acknowledges, overrides, goes to the trial of a replay or opens the details; it never starts motion.
 fn open_details(model: &mut Model) -> Vec<Effect> {
     if may_acknowledge(model).is_ok() {
         return request(model, OperatorRequest::Acknowledge);
+    }
+    if model.view == View::Trials
+        && let Some(trial) = model.selected_trial().map(|trial| trial.trial)
+        && model.timeline.as_ref().is_some_and(|timeline| timeline.has_ticks_of(trial))
+        && model.snapshot.tick.trial != Some(trial)
+    {
+        return vec![Effect::Replay(ReplayCommand::Trial(trial))];
     }
     if model.view == View::Override && legal(Action::Override, model).is_ok() {
         open_override(model);

@@ -276,6 +276,7 @@ fn field_title(model: &Model, purpose: Purpose) -> String {
         Purpose::VoidReason { trial, .. } => format!("Why is trial #{trial} void?"),
         Purpose::TrialNumber => "Go to trial".to_owned(),
         Purpose::LogSearch => "Search the log".to_owned(),
+        Purpose::Seek => "Go to a time or a trial".to_owned(),
     }
 }
 
@@ -298,6 +299,7 @@ fn field(model: &Model, purpose: Purpose, input: &Input, problem: Option<&str>) 
             "the best points run again until one leads; each repeat is approved like any other".to_owned()
         }
         Purpose::LogSearch => "empty: all lines".to_owned(),
+        Purpose::Seek => "12:34 or 1:02:03.5, seconds as 75.5, a trial as #7".to_owned(),
         Purpose::Note(_) if model.space_bar_must_stop() => {
             "the robot is energised: Space is STOP, _ writes a space".to_owned()
         }

@@ -7,6 +7,7 @@
 //! ┌─────────────────────────────────────────────────────────────────────────────────────┐
 //! │ the open view, with dialogs over it                                                  │
 //! └─────────────────────────────────────────────────────────────────────────────────────┘
+//!  ──o──x──o───│────o──!──────                       <- in a replay: its trials, faults and the playhead
 //!  override Fx = 120 N: done                                                  <- the newest answer
 //!  Press g twice to jump  ·  o override  ·  n skip  ·  D sit down             <- the next possible step
 //! ```
@@ -30,6 +31,7 @@ mod points;
 mod proposal;
 mod series_style;
 mod status_bar;
+mod timeline;
 mod trials;
 mod wireframe;
 
@@ -40,7 +42,9 @@ use crate::model::{Model, View};
 
 /// Draws everything.
 pub fn render(frame: &mut Frame, model: &Model) {
-    let Some(Areas { frame: top, tabs, body, message, next_step }) = areas(frame.area().as_size()) else {
+    let size = frame.area().as_size();
+    let Some(Areas { frame: top, tabs, body, timeline, message, next_step }) = areas(size, model.replay.is_some())
+    else {
         return status_bar::render_small(frame, frame.area(), model);
     };
     status_bar::render(frame, top, model);
@@ -54,6 +58,7 @@ pub fn render(frame: &mut Frame, model: &Model) {
         View::Log => log::render(frame, body, model),
     }
     dialogs::render(frame, body, model);
+    timeline::render(frame, timeline, model);
     status_bar::render_message(frame, message, model);
     next_step::render(frame, next_step, model);
 }

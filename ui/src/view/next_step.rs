@@ -146,10 +146,11 @@ fn replay(model: &Model) -> NextStep {
         format!("{key} {}", if playing { "pauses" } else { "plays" }),
         model,
         &[
-            (Action::StepBack, "step back"),
-            (Action::StepForward, "step"),
+            (Action::Seek, "go to"),
             (Action::PreviousMarker, "previous trial"),
             (Action::NextMarker, "next trial"),
+            (Action::NextFall, "next fall"),
+            (Action::StepForward, "step"),
             (Action::Slower, "slower"),
             (Action::Faster, "faster"),
             (Action::Quit, "quit"),

@@ -163,6 +163,19 @@ fn condition(model: &Model, width: u16) -> Vec<Span<'static>> {
         let name = if narrow { "bat " } else { "battery " };
         part(name, bad(charge < limits.battery_percent), format!("{charge:.0} %"));
     }
+    if let Some(replay) = &model.replay {
+        if replay.lost_ns > 0 {
+            part("", Role::Bad, format!("LOST {:.3} s", replay.lost_ns as f64 / 1e9));
+        }
+        if let Some(trial) = replay.looping {
+            part("", Role::Warning, format!("LOOP #{trial}"));
+        }
+        for (shown, text) in [(replay.slow_motion, "SLOW JUMPS"), (replay.following, "FOLLOWING")] {
+            if shown {
+                part("", Role::Warning, text.to_owned());
+            }
+        }
+    }
     let age_ms = model.clock.saturating_sub(model.snapshot_at).as_millis();
     if age_ms > STALE_MS && model.replay.is_none() {
         part("", Role::Bad, format!("OLD: nothing new for {:.1} s", age_ms as f64 / 1e3));

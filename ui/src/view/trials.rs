@@ -17,7 +17,9 @@ use crate::text::remark;
 use crate::theme::Role;
 
 pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
-    let body = heading(frame, area, &model.theme, "Trials", &summary(model));
+    let later = model.later_trials().count();
+    let title = if later > 0 { format!("Trials, {later} after the playhead (+)") } else { "Trials".to_owned() };
+    let body = heading(frame, area, &model.theme, &title, &summary(model));
     render_table(frame, body, model, true);
 }
 
@@ -118,14 +120,17 @@ pub fn render_table(frame: &mut Frame, area: Rect, model: &Model, full: bool) {
         let style = if selected { theme.style(Role::Selected) } else { Style::new() };
         let area = Rect { y: area.y + 1 + line as u16, height: 1, ..area };
         let ghost = [model.live.ghost, model.live.comparison.as_ref().map(|c| c.b)].contains(&Some(trial.trial));
-        let mut spans = vec![Span::raw(format!(
-            "{}{:>3}{}",
-            if selected { ">" } else { " " },
-            trial.trial,
-            if ghost { "~" } else { " " }
-        ))];
+        let later = model.is_later(trial.trial);
+        let mark = match (later, ghost) {
+            (true, _) => "+",
+            (false, true) => "~",
+            (false, false) => " ",
+        };
+        let number = format!("{}{:>3}{mark}", if selected { ">" } else { " " }, trial.trial);
+        let mut spans = vec![span(theme, if later { Role::Quiet } else { Role::Text }, number)];
         for column in &columns {
             let (text, role) = cell(model, trial, column, best == Some(trial.trial));
+            let role = if later { Role::Quiet } else { role };
             spans.push(span(theme, role, padded(&text, column.width)));
             spans.push(Span::raw(" "));
         }

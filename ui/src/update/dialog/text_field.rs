@@ -5,7 +5,7 @@ use quadfrog::session::operator_request::OperatorRequest;
 use tui_input::{Input, InputRequest};
 
 use crate::keymap::Key;
-use crate::message::Effect;
+use crate::message::{Effect, ReplayCommand};
 use crate::model::Model;
 use crate::model::dialog::{Dialog, Purpose};
 use crate::update::request::{cancelled, request};
@@ -58,12 +58,13 @@ fn submit(model: &mut Model, purpose: Purpose, text: &str) -> Result<Vec<Effect>
         Purpose::VoidReason { rerun, .. } => OperatorRequest::VoidBecause { reason: text.to_owned(), rerun },
         Purpose::TrialNumber => {
             let number = text.parse::<u32>().map_err(|_| format!("`{text}` is not the number of a trial"))?;
-            if !model.session.trials.records.contains_key(&number) {
+            if model.trial(number).is_none() {
                 return Err(format!("there is no trial {number}"));
             }
             model.trial_table.selected = Some(number);
             return Ok(Vec::new());
         }
+        Purpose::Seek => return seek(model, text).map(|command| vec![Effect::Replay(command)]),
         Purpose::LogSearch => {
             model.log_view.search = text.to_owned();
             model.log_view.back = 0;
@@ -71,6 +72,39 @@ fn submit(model: &mut Model, purpose: Purpose, text: &str) -> Result<Vec<Effect>
         }
     };
     Ok(request(model, wanted))
+}
+
+/// The place that a text names: a time or a trial.
+fn seek(model: &Model, text: &str) -> Result<ReplayCommand, String> {
+    if let Some(number) = text.strip_prefix('#') {
+        let trial =
+            number.trim().parse().map_err(|_| format!("`{text}` is not the number of a trial; write it as #7"))?;
+        let known = model.timeline.as_ref().is_some_and(|timeline| timeline.has_ticks_of(trial));
+        return if known {
+            Ok(ReplayCommand::Trial(trial))
+        } else {
+            Err(format!("trial {trial} is not in this recording"))
+        };
+    }
+    let refused = || format!("`{text}` is no time; write it as 12:34, 75.5 (seconds) or #7 (a trial)");
+    let mut time_s = 0.0;
+    let parts: Vec<&str> = text.split(':').collect();
+    for (index, part) in parts.iter().enumerate() {
+        let number =
+            part.trim().replace(',', ".").parse::<f64>().ok().filter(|number| number.is_finite() && *number >= 0.0);
+        let whole = index + 1 == parts.len() || number.is_some_and(|number| number.fract() == 0.0);
+        let number = number.filter(|number| whole && (index == 0 || *number < 60.0)).ok_or_else(refused)?;
+        time_s = 60.0 * time_s + number;
+    }
+    if parts.len() > 3 {
+        return Err(refused());
+    }
+    let duration_ns = model.replay.as_ref().map_or(0, |replay| replay.duration_ns);
+    let time_ns = (time_s * 1e9).round() as u64;
+    if time_ns > duration_ns {
+        return Err(format!("`{text}` is after the end, {:.3} s", duration_ns as f64 / 1e9));
+    }
+    Ok(ReplayCommand::Time(time_ns))
 }
 
 fn count(text: &str, things: &str) -> Result<u32, String> {

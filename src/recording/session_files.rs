@@ -1,0 +1,51 @@
+//! The recordings in a folder: `session.mcap`, `session-2.mcap`, ...; while they are written, with the ending `.part`.
+
+use std::path::{Path, PathBuf};
+use std::time::SystemTime;
+
+use super::error::RecordingError;
+
+/// Returns the number of a recording by its name: 1 for `session.mcap`, N for `session-N.mcap`; none for another file.
+fn number(path: &Path) -> Option<u32> {
+    let name = path.file_name()?.to_str()?;
+    match name.strip_suffix(".part").unwrap_or(name).strip_suffix(".mcap")? {
+        "session" => Some(1),
+        other => other.strip_prefix("session-")?.parse().ok(),
+    }
+}
+
+/// Returns the recordings in a folder, by their number; none of a folder that cannot be read. Of a file with and without the
+/// ending `.part` only the finished one: the other was recovered.
+pub fn recordings_in(folder: &Path) -> Vec<PathBuf> {
+    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    let entries = std::fs::read_dir(folder).into_iter().flatten().filter_map(|entry| Some(entry.ok()?.path()));
+    let mut files: Vec<(u32, bool, PathBuf)> = entries
+        .filter_map(|path| Some((number(&path)?, path.extension().is_some_and(|end| end == "part"), path)))
+        .collect();
+    files.sort();
+    files.dedup_by_key(|(number, ..)| *number);
+    files.into_iter().map(|(.., path)| path).collect()
+}
+
+/// Returns the files that a path names: itself, the recordings of a folder, or those of the newest study in it.
+///
+/// # Errors
+/// When a folder and the folders in it have no recording.
+pub fn recordings_of(path: &Path) -> Result<Vec<PathBuf>, RecordingError> {
+    if !path.is_dir() {
+        return Ok(vec![path.into()]);
+    }
+    let own = recordings_in(path);
+    if !own.is_empty() {
+        return Ok(own);
+    }
+    let entries = std::fs::read_dir(path).into_iter().flatten().filter_map(|entry| Some(entry.ok()?.path()));
+    let newest = entries.map(|folder| recordings_in(&folder)).max_by_key(|files| changed(files));
+    newest.filter(|files| !files.is_empty()).ok_or_else(|| RecordingError::NoRecording { path: path.into() })
+}
+
+/// Returns the time of the last change of the files, with the first name to decide between equal ones.
+fn changed(files: &[PathBuf]) -> Option<(SystemTime, PathBuf)> {
+    let time = |file: &PathBuf| std::fs::metadata(file).and_then(|metadata| metadata.modified()).ok();
+    Some((files.iter().filter_map(time).max()?, files.first()?.clone()))
+}

@@ -1,0 +1,123 @@
+//! `quadfrog rejudge` on a file that the program itself wrote.
+
+#[path = "support/program.rs"]
+mod program;
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::PathBuf;
+use std::sync::OnceLock;
+
+use program::{Program, assert_shows};
+use quadfrog::recording::player::{Played, Player};
+use quadfrog::telemetry::Tick;
+use serde_json::Value;
+
+/// A study of six trials, every tick recorded; the fifth falls.
+fn recorded() -> &'static (Program, PathBuf) {
+    static STUDY: OnceLock<(Program, PathBuf)> = OnceLock::new();
+    STUDY.get_or_init(|| {
+        let program = Program::new();
+        program.text(&["optimize", "--trials", "6", "--seed", "0", "--record", "all"]);
+        let study = program.study("recordings");
+        (program, study)
+    })
+}
+
+fn rejudged(config: &str) -> Vec<Value> {
+    let (program, study) = recorded();
+    program.trials(&["rejudge", study.to_str().unwrap(), "--config", config, "--json"])
+}
+
+/// The ticks of each trial.
+fn ticks() -> BTreeMap<u32, Vec<Tick>> {
+    let mut trials: BTreeMap<u32, Vec<Tick>> = BTreeMap::new();
+    for played in Player::open(recorded().1.join("session.mcap")).unwrap() {
+        if let Played::Tick(tick) = played
+            && let Some(trial) = tick.trial
+        {
+            trials.entry(trial).or_default().push(tick);
+        }
+    }
+    trials
+}
+
+#[test]
+fn the_same_configuration_gives_the_same_judgement_bit_for_bit_and_leaves_the_file() {
+    let (program, study) = recorded();
+    let before = fs::read(study.join("session.mcap")).unwrap();
+    let rows = rejudged(study.join("config").to_str().unwrap());
+    assert_eq!(rows.len(), 6);
+    assert!(
+        rows.iter().any(|row| row["old"]["verdict"] == "fall")
+            && rows.iter().any(|row| row["old"]["verdict"] == "accept")
+    );
+    for row in &rows {
+        assert_eq!(row["old"], row["new"], "every number as it was written");
+        assert!(row["old"]["value"].is_f64());
+        assert_eq!(row["difference"], 0.0);
+    }
+    let table = program.text(&["rejudge", study.to_str().unwrap(), "--config", study.join("config").to_str().unwrap()]);
+    assert_shows(&table, &["old J", "new J", "difference", "0 of 6 trials change"]);
+    assert_eq!(fs::read(study.join("session.mcap")).unwrap(), before, "the file is not changed");
+}
+
+#[test]
+fn another_objective_gives_the_values_of_an_independent_computation() {
+    let (program, _) = recorded();
+    program.write("rate/control.toml", "[tasks.forward]\nrate = true\n");
+    let rows = rejudged("rate");
+    for row in &rows {
+        // Displacement by the time from the first impulse to the first touchdown after the last one, from the file's own row.
+        let measured = &row["old"]["measured"];
+        let time_s = measured["touchdown"]["time_s"].as_f64().or(measured["end_s"].as_f64()).unwrap();
+        let expected = measured["dx_m"].as_f64().unwrap() / time_s;
+        assert_eq!(row["new"]["value"].as_f64().unwrap().to_bits(), expected.to_bits(), "{row}");
+        assert_ne!(row["new"]["value"], row["old"]["value"]);
+        assert_eq!(row["new"]["verdict"], row["old"]["verdict"]);
+    }
+}
+
+#[test]
+fn another_limit_of_a_fall_ends_the_trial_where_an_independent_computation_does() {
+    let (program, _) = recorded();
+    let limit = 0.2;
+    program.write("strict/safety.toml", &format!("[fall]\nroll_rad = {limit}\npitch_rad = {limit}\n"));
+    let (rows, ticks) = (rejudged("strict"), ticks());
+    let mut falls = 0;
+    for row in &rows {
+        let ticks = &ticks[&(row["trial"].as_u64().unwrap() as u32)];
+        let tilted = |tick: &Tick| {
+            let [roll, pitch, _] = tick.estimate.roll_pitch_yaw.into();
+            roll.abs() > limit || pitch.abs() > limit
+        };
+        let Some(end) = ticks.iter().position(tilted) else {
+            assert_eq!(row["new"], row["old"], "{row}");
+            continue;
+        };
+        falls += 1;
+        assert_eq!(row["new"]["verdict"], "fall", "{row}");
+        assert_shows(row["new"]["cause"].as_str().unwrap(), &["exceeds 0.2"]);
+        // x in the frame of the start.
+        let (start, last) = (ticks.iter().find(|tick| tick.trial_time_s >= 0.0).unwrap(), &ticks[end]);
+        let moved = last.estimate.position_world - start.estimate.position_world;
+        let yaw = start.estimate.roll_pitch_yaw.z;
+        let dx_m = moved.x * yaw.cos() + moved.y * yaw.sin();
+        assert!((row["new"]["value"].as_f64().unwrap() - dx_m).abs() < 1e-12, "{row}");
+    }
+    assert!(falls >= 2, "{falls} of {} tilt by more than {limit} rad", rows.len());
+}
+
+#[test]
+fn a_trial_that_fell_and_would_not_fall_has_no_verdict() {
+    let (program, _) = recorded();
+    let wide = "[fall]\nroll_rad = 1.4\npitch_rad = 1.4\nbody_contact_s = 5.0\nsimulator_flight_rad = 1.4\n";
+    program.write("wide/safety.toml", &format!("{wide}[watchdog]\ntilt_rad = 1.5\n"));
+    let rows = rejudged("wide");
+    let fell: Vec<_> = rows.iter().filter(|row| row["old"]["verdict"] == "fall").collect();
+    assert!(!fell.is_empty());
+    for row in fell {
+        assert_eq!(row["new"]["verdict"], Value::Null, "{row}");
+        assert_shows(row["new"]["cause"].as_str().unwrap(), &["the recording ends where it fell before"]);
+    }
+}
