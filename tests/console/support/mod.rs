@@ -321,6 +321,7 @@ pub fn trial(number: u32, verdict: Option<Verdict>, suggested: Option<Verdict>) 
         expected: None,
         gains: Vec::new().into(),
         repeats: Vec::new(),
+        seed: None,
     }
 }
 
