@@ -125,7 +125,7 @@ pub struct TableWriter<W: Write + Send> {
 }
 
 enum Form<W: Write + Send> {
-    Csv(csv::Writer<W>),
+    Csv(Box<csv::Writer<W>>),
     Json { out: W, rows: usize },
     Parquet(Box<SerializedFileWriter<W>>),
 }
@@ -140,7 +140,7 @@ impl<W: Write + Send> TableWriter<W> {
             TableFormat::Csv => {
                 let mut writer = csv::Writer::from_writer(out);
                 writer.write_record(columns.iter().map(|column| &column.name)).map_err(csv_error)?;
-                Form::Csv(writer)
+                Form::Csv(Box::new(writer))
             }
             TableFormat::Json => Form::Json { out, rows: 0 },
             TableFormat::Parquet => Form::Parquet(Box::new(begin_parquet(out, columns).map_err(io_error)?)),

@@ -289,7 +289,8 @@ impl Signals {
     }
 
     fn add_joint_command(&mut self) {
-        let parts: [(&str, fn(&MotorCommand) -> f64); 5] = [
+        type Part = fn(&MotorCommand) -> f64;
+        let parts: [(&str, Part); 5] = [
             ("position", |motor| motor.position_rad),
             ("velocity", |motor| motor.velocity_rad_s),
             ("kp", |motor| motor.kp_joint),

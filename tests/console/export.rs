@@ -143,3 +143,75 @@ fn damage_and_a_full_disk_are_errors_and_a_closed_pipe_is_none() {
     drop(child.stdout.take());
     assert!(child.wait().unwrap().success());
 }
+
+/// The strings of a JSON document.
+fn strings(value: &Value) -> Vec<&str> {
+    match value {
+        Value::String(text) => vec![text],
+        Value::Array(list) => list.iter().flat_map(strings).collect(),
+        Value::Object(members) => members.values().flat_map(strings).collect(),
+        _ => Vec::new(),
+    }
+}
+
+#[test]
+fn the_layout_of_foxglove_names_topics_and_fields_of_a_recording() {
+    let program = Program::new();
+    program.text(&["export", "--layout", "foxglove", "-o", "layout.json"]);
+    let text = fs::read_to_string(program.path("layout.json")).unwrap();
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    assert_eq!(text, fs::read_to_string(root.join("docs/foxglove-layout.json")).unwrap());
+    assert_eq!(program.text(&["export", "--layout", "foxglove"]), text);
+    let layout: Value = serde_json::from_str(&text).unwrap();
+    let panels = layout["configById"].as_object().unwrap();
+    let shown = strings(&layout["layout"]);
+    assert!(panels.keys().all(|panel| shown.contains(&panel.as_str())), "{shown:?}");
+    for kind in ["3D!", "Plot!", "StateTransitions!", "RosOut!"] {
+        assert!(panels.keys().any(|panel| panel.starts_with(kind)), "{kind}");
+    }
+    // The end of a recording lists its channels uncompressed, and the schemas name every field.
+    let recording = fs::read(recording(&program)).unwrap();
+    let holds = |name: &str| recording.windows(name.len()).any(|window| window == name.as_bytes());
+    let schema = fs::read_to_string(root.join("proto/frog.proto")).unwrap();
+    let topics = panels["3D!robot"]["topics"].as_object().unwrap().keys().map(String::as_str);
+    let mut fields = 0;
+    for name in strings(&layout).into_iter().chain(topics).filter(|text| text.starts_with('/')) {
+        let (topic, field) = name.split_once('.').map_or((name, None), |(topic, field)| (topic, Some(field)));
+        assert!(holds(topic), "{topic} is not recorded");
+        if let Some(field) = field {
+            let field = field.split('[').next().unwrap();
+            assert!(schema.contains(&format!(" {field} = ")), "{name}: no such field");
+            fields += 1;
+        }
+    }
+    assert!(fields >= 20, "{fields}");
+    assert_shows(&program.refused(&["export", "--layout", "foxglove", "--trial", "1"]), &["--layout", "--trial"]);
+    assert_shows(&program.refused(&["export"]), &["FILE"]);
+}
+
+#[test]
+fn rerun_takes_the_blueprint_that_the_script_writes() {
+    let found = Command::new("python3").args(["-c", "import rerun.blueprint"]).output();
+    if !found.is_ok_and(|output| output.status.success()) {
+        println!("skipped: python3 has no rerun-sdk");
+        return;
+    }
+    let program = Program::new();
+    program.text(&["export", "--layout", "rerun", "-o", "blueprint.py"]);
+    let run = |command: &str| {
+        let done = Command::new("sh").args(["-c", command]).current_dir(program.path("")).output().unwrap();
+        assert!(done.status.success(), "{command}: {}", String::from_utf8_lossy(&done.stderr));
+        String::from_utf8_lossy(&done.stdout).into_owned()
+    };
+    run("python3 blueprint.py view.rbl");
+    let blueprint = run("python3 -m rerun rrd print view.rbl");
+    assert_shows(&blueprint, &["Blueprint", "\"quadfrog\""]);
+    // Every topic of the blueprint is one of a recording.
+    let recording = fs::read(recording(&program)).unwrap();
+    let script = fs::read_to_string(program.path("blueprint.py")).unwrap();
+    let topics: Vec<&str> = script.split('"').filter(|text| text.starts_with('/') && text.len() > 1).collect();
+    assert!(topics.len() >= 7, "{topics:?}");
+    for topic in topics {
+        assert!(recording.windows(topic.len()).any(|window| window == topic.as_bytes()), "{topic} is not recorded");
+    }
+}

@@ -1,11 +1,11 @@
-//! `quadfrog export`: signals of a recording as a table.
+//! `quadfrog export`: signals of a recording as a table; layouts of viewers.
 
 use std::collections::BTreeSet;
 use std::io::{ErrorKind, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::anyhow;
-use clap::Args;
+use clap::{Args, ValueEnum};
 use quadfrog::recording::player::{MarkerKind, Player};
 use quadfrog::report::columns::TableFormat;
 use quadfrog::report::signals::{SignalRange, SignalTopic, Signals};
@@ -15,11 +15,32 @@ use super::arguments::one_of;
 use super::failure::Failure;
 use super::table::{table_format, write_file, written_format};
 
+/// Viewer with a layout for recordings.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum LayoutOf {
+    /// Foxglove and Lichtblick: a JSON file to import
+    Foxglove,
+    /// rerun: a Python script that writes a blueprint with rerun's SDK
+    Rerun,
+}
+
+impl LayoutOf {
+    fn contents(self) -> &'static str {
+        match self {
+            LayoutOf::Foxglove => include_str!("../../../docs/foxglove-layout.json"),
+            LayoutOf::Rerun => include_str!("../../../docs/rerun_blueprint.py"),
+        }
+    }
+}
+
 #[derive(Debug, Args)]
 pub struct ExportArguments {
     /// A recording: session.mcap, or session.mcap.part of a session that runs or was cut off
-    #[arg(value_name = "FILE")]
-    file: PathBuf,
+    #[arg(value_name = "FILE", required_unless_present = "layout")]
+    file: Option<PathBuf>,
+    /// Write the layout of a viewer instead: 3D view, plots, changes of mode, log
+    #[arg(long, value_name = "VIEWER", conflicts_with_all = ["file", "trial", "time", "topic", "format"])]
+    layout: Option<LayoutOf>,
     /// Export the ticks of one trial
     #[arg(long, value_name = "N", conflicts_with = "time")]
     trial: Option<u32>,
@@ -52,7 +73,23 @@ fn parse_times(text: &str) -> Result<(u64, u64), String> {
 }
 
 pub fn run(arguments: &ExportArguments) -> Result<(), Failure> {
-    let file = &arguments.file;
+    match (&arguments.file, arguments.layout) {
+        (_, Some(layout)) => export_layout(layout, arguments.output.as_deref()),
+        (Some(file), None) => export_signals(file, arguments),
+        // The command line requires one of them.
+        (None, None) => Err(Failure::input("give a recording or --layout")),
+    }
+}
+
+fn export_layout(layout: LayoutOf, output: Option<&Path>) -> Result<(), Failure> {
+    let Some(path) = output else {
+        output::data(layout.contents());
+        return Ok(());
+    };
+    write_file(path, |mut file| file.write_all(layout.contents().as_bytes()).map(|()| file))
+}
+
+fn export_signals(file: &Path, arguments: &ExportArguments) -> Result<(), Failure> {
     let format = written_format(arguments.format, arguments.output.as_deref())?;
     let mut player = Player::open(file).map_err(Failure::input)?;
     if let Some(trial) = arguments.trial {
