@@ -138,7 +138,7 @@ pub fn verify(path: &Path) -> Result<Verification, VerifyError> {
     let mut present: Option<ExpectedTicks> = None;
     // The trial of the last tick that had one, compared or left out.
     let mut last = None;
-    while let Some(played) = player.next() {
+    for played in player.by_ref() {
         let Played::Tick(tick) = played else { continue };
         let Some(trial) = tick.trial else { continue };
         if last != Some(trial) {
