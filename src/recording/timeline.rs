@@ -190,21 +190,17 @@ impl Timeline {
                     continue;
                 };
                 let span = &mut spans[index];
-                match &event.record {
+                let ends = match &event.record {
                     Record::Transition(change) if change.to == Mode::Jump => {
                         span.impulse_ns.get_or_insert(time_ns);
+                        false
                     }
-                    Record::Stage(stage) if stage.stage == ExperimentStage::Review && stage.trial == span.trial => {
-                        if !std::mem::replace(&mut ended[index], true) {
-                            span.end_ns = time_ns;
-                        }
-                    }
-                    Record::Trial(row) if row.trial == span.trial && row.suggested.is_some() => {
-                        if !std::mem::replace(&mut ended[index], true) {
-                            span.end_ns = time_ns;
-                        }
-                    }
-                    _ => {}
+                    Record::Stage(stage) => stage.stage == ExperimentStage::Review && stage.trial == span.trial,
+                    Record::Trial(row) => row.trial == span.trial && row.suggested.is_some(),
+                    _ => false,
+                };
+                if ends && !std::mem::replace(&mut ended[index], true) {
+                    span.end_ns = time_ns;
                 }
             }
         }

@@ -186,7 +186,7 @@ impl ArmingChecklist {
             (None, None) if self.hardware => (ArmingCheckState::Failed, "no recording".to_owned()),
             (None, None) => (ArmingCheckState::NotNeeded, "no recording requested".to_owned()),
         };
-        self.item(ArmingCheck::Recorder, state, found, "every tick is recorded".to_owned())
+        self.item(ArmingCheck::Recorder, state, found, "every tick from here on is recorded".to_owned())
     }
 
     fn disk(&self) -> ArmingCheckRecord {

@@ -261,9 +261,9 @@ fn run_one(
         }
     });
     if let Some(mut recorder) = recorder {
-        let rollouts = best.iter().flat_map(|(_, rollouts)| rollouts);
+        let mut rollouts = best.iter().flat_map(|(_, rollouts)| rollouts);
         let recorded = match failed {
-            None => rollouts.map(|rollout| recorder.rollout(rollout)).collect(),
+            None => rollouts.try_for_each(|rollout| recorder.rollout(rollout)),
             Some(error) => Err(error),
         };
         let last = experiment.take_records();
