@@ -272,8 +272,8 @@ fn waited_and_stood_up(arguments: &[&str]) -> Vec<(Mode, u64)> {
     session.wait_for(&["READY"]);
     session.send("qy");
     session.wait();
-    let study = std::fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().path());
-    let study = study.filter(|path| path.join("session.mcap").is_file()).next().expect("a finished recording");
+    let mut studies = std::fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().path());
+    let study = studies.find(|path| path.join("session.mcap").is_file()).expect("a finished recording");
     Player::open(study.join("session.mcap"))
         .unwrap()
         .filter_map(|played| match played {
