@@ -228,12 +228,13 @@ fn the_console_makes_the_prior_and_shows_what_it_expects_and_what_came() {
     let study = program.studies("").into_iter().find(|path| path.join("study.log").exists()).unwrap();
     let place = study.to_str().unwrap();
     let trials: Value = serde_json::from_str(&program.text(&["study", "export", place, "--format", "json"])).unwrap();
-    let (judged, attributes) = (&trials[0], &trials[0]["user_attrs"]);
-    assert_eq!(attributes["verdict"], "accept", "{judged}");
-    let expected = attributes["predicted"].as_f64().unwrap();
-    let worlds = ["least", "most"].map(|end| attributes[format!("simulated_{end}")].as_f64().unwrap());
+    let judged = &trials[0];
+    let attribute = |name: &str| &judged[format!("user_attrs_{name}")];
+    assert_eq!(attribute("verdict"), "accept", "{judged}");
+    let expected = attribute("predicted").as_f64().unwrap();
+    let worlds = ["simulated_least", "simulated_most"].map(|name| attribute(name).as_f64().unwrap());
     assert!(worlds[0] < worlds[1] && expected > 0.0, "{judged}");
-    assert!(attributes["p_stand"].as_f64().is_some_and(|p| (0.0..=1.0).contains(&p)));
+    assert!(attribute("p_stand").as_f64().is_some_and(|p| (0.0..=1.0).contains(&p)));
     // The report has the same numbers.
     let page: Value = serde_json::from_str(&program.text(&["report", "--json", place])).unwrap();
     let tables = page["sections"].as_array().unwrap().iter().flat_map(|section| section["blocks"].as_array().unwrap());
