@@ -22,7 +22,7 @@ def main(path):
         header = reader.get_header()
         summary = reader.get_summary()
         metadata = {record.name: dict(record.metadata) for record in reader.iter_metadata()}
-        attachments = {record.name: record.data.decode() for record in reader.iter_attachments()}
+        attachments = {record.name: record.data.decode(errors="replace") for record in reader.iter_attachments()}
         for schema, channel, message, decoded in reader.iter_decoded_messages():
             topic = channel.topic
             counts[topic] = counts.get(topic, 0) + 1
