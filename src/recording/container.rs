@@ -20,7 +20,7 @@ const FOOTER_BYTES: u64 = RECORD_HEAD + 8 + 8 + 4;
 /// The record that ends the data: head and a checksum.
 const DATA_END_BYTES: u64 = RECORD_HEAD + 4;
 /// Largest accepted chunk, bytes: a larger length is damage, and must not decide how much memory is allocated.
-const LARGEST_CHUNK: usize = 256 * 1024 * 1024;
+const LARGEST_CHUNK: usize = 32 * 1024 * 1024;
 
 /// Position of a record in the file, bytes.
 #[derive(Debug, Clone, Copy)]

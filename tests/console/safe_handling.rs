@@ -76,10 +76,11 @@ fn a_console_that_cannot_finish_its_recording_ends_with_status_1() {
 #[test]
 fn a_console_whose_disk_is_full_ends_with_status_1_and_the_cause() {
     let program = Program::new();
+    program.write("mine/control.toml", "[recording]\nfull_rate = true\n");
     // With SIGXFSZ ignored a write beyond the limit, 512 kB, fails as on a full disk.
     let shell = "trap '' XFSZ; ulimit -f 1000; exec \"$0\" \"$@\"";
     let mut command = CommandBuilder::new("sh");
-    command.args(["-c", shell, env!("CARGO_BIN_EXE_quadfrog"), "--output", "recordings"]);
+    command.args(["-c", shell, env!("CARGO_BIN_EXE_quadfrog"), "--output", "recordings", "--config", "mine"]);
     // Wide: the line with the cause is long.
     let mut session = Session::run(&program.path(""), (240, 40), command);
     session.wait_for(&["DISARMED"]);

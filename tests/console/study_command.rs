@@ -7,7 +7,7 @@ use std::fs;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use program::{Program, assert_shows, hold};
+use program::{Program, assert_shows, counted_trials, hold};
 use serde_json::Value;
 
 /// A finished study of six trials, and its folder.
@@ -267,4 +267,49 @@ fn a_mistyped_place_to_join_is_refused_and_a_worker_is_named_after_its_study() {
     let names: Vec<String> = program.studies("recordings").iter().map(|path| path.display().to_string()).collect();
     assert_eq!(names.len(), 2);
     assert!(names.iter().all(|name| name.contains("twist-cw-seed5-joined-")), "{names:?}");
+}
+
+/// Regression: the point of the interrupted trial, which is run again, reduced the acquisition of `gp` around it, and the last
+/// digits of later proposals differed from those of an unbroken study.
+#[test]
+fn a_study_of_gp_that_ended_within_a_trial_continues_with_the_same_bits() {
+    let program = Program::new();
+    let gp = ["optimize", "--sampler", "gp", "--seed", "1", "--trials", "9", "--record", "none"];
+    program.text(&[&gp[..], &["--output", "whole"]].concat());
+    let whole = program.study("whole").join("study.log");
+    let lines = fs::read_to_string(&whole).unwrap();
+    for interrupted in [2, 5, 6] {
+        // As SIGKILL leaves it: without the result of the running trial and all that follows.
+        let result = format!("\"trial_id\":{interrupted},\"state\":1,");
+        let broken = format!("broken{interrupted}");
+        program.text(&[
+            "optimize",
+            "--sampler",
+            "gp",
+            "--seed",
+            "1",
+            "--trials",
+            "1",
+            "--record",
+            "none",
+            "--output",
+            &broken,
+        ]);
+        let study = program.study(&broken);
+        let kept: Vec<&str> = lines.lines().take_while(|line| !line.contains(&result)).collect();
+        assert!(kept.len() < lines.lines().count(), "trial {interrupted} has no result: {lines}");
+        fs::write(study.join("study.log"), kept.join("\n") + "\n").unwrap();
+        program.text(&[
+            "optimize",
+            "--resume",
+            study.to_str().unwrap(),
+            "--sampler",
+            "gp",
+            "--trials",
+            "9",
+            "--record",
+            "none",
+        ]);
+        assert_eq!(counted_trials(&study.join("study.log")), counted_trials(&whole), "trial {interrupted}");
+    }
 }

@@ -127,6 +127,8 @@ impl TrainingSet {
                 _ => {}
             }
         }
+        // A point that was run again has a result: the interrupted trial leaves no trace.
+        set.void.retain(|point| !set.points.contains(point) && !set.pending.contains(point));
         set
     }
 

@@ -56,6 +56,12 @@ impl History {
                 _ => {}
             }
         }
+        // A point that was run again has a result: the interrupted trial leaves no trace.
+        let (jumps, pending) = (&history.jumps, &history.pending);
+        let again = |point: &Vec<f64>| {
+            jumps.iter().any(|jump| jump.point == *point) || pending.iter().any(|(other, _)| other == point)
+        };
+        history.void.retain(|point| !again(point));
         history
     }
 
