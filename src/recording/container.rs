@@ -130,6 +130,12 @@ impl Container {
         // From the record before the index to the end of the file: needed to verify the checksum.
         let from = footer.summary_start.saturating_sub(DATA_END_BYTES);
         let summary = self.read_at(from, bytes - from)?;
+        // Before anything is parsed: a damaged length would decide how much memory is allocated. The checksum covers the footer
+        // up to itself.
+        let covered = &summary[(footer.summary_start - from) as usize..summary.len() - mcap::MAGIC.len() - 4];
+        if crc32fast::hash(covered) != footer.summary_crc {
+            return Ok(false);
+        }
         let options = LinearReaderOptions::default()
             .with_skip_start_magic(true)
             .with_validate_summary_section_crc(true)
