@@ -247,7 +247,7 @@ fn the_console_makes_the_prior_and_shows_what_it_expects_and_what_came() {
         table["rows"][0][columns.iter().position(|column| column["name"] == name).unwrap()].clone()
     };
     assert_eq!(cell(table("Trials of"), "expected J").as_f64(), Some(expected));
-    let value = judged["value"].as_f64().unwrap();
+    let value = attribute("value").as_f64().unwrap();
     let difference = cell(table("Trials with an expectation"), "J - expected, mean").as_f64().unwrap();
     assert!((difference - (value - expected)).abs() < 1e-9, "{difference} is not {value} - {expected}");
     let figures: Vec<&Value> = tables.filter_map(|block| block.get("figure")).collect();

@@ -37,7 +37,7 @@ def main(path):
         reader = make_reader(file, validate_crcs=True, decoder_factories=[DecoderFactory()])
         summary = reader.get_summary()
         metadata = {record.name: dict(record.metadata) for record in reader.iter_metadata()}
-        attachments = {record.name: record.data.decode() for record in reader.iter_attachments()}
+        attachments = {record.name: record.data.decode(errors="replace") for record in reader.iter_attachments()}
         channels = {channel.topic: dict(channel.metadata) for channel in summary.channels.values()}
         for schema, channel, message, decoded in reader.iter_decoded_messages():
             topic = channel.topic
