@@ -1,36 +1,18 @@
 //! A recording read by the independent Python reader: every topic, its count and its values agree.
 
+#[path = "support/python_reader.rs"]
+mod python_reader;
 #[path = "support/recording.rs"]
 mod support;
 
-use std::process::Command;
-
+use python_reader::read_by_python;
 use quadfrog::recording::record::{LogLevel, LogRecord, Record, Stamped};
 use quadfrog::recording::writer::Writer;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::robot::{JOINTS, Leg, joint_name};
 use quadfrog::telemetry::{Mode, Tick};
-use serde_json::{Value, json};
+use serde_json::json;
 use support::*;
-
-/// Runs the reader; none without Python or its packages.
-fn python_reads(path: &std::path::Path) -> Option<Value> {
-    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/support/read_mcap.py");
-    let output = match Command::new("python3").arg(script).arg(path).output() {
-        Ok(output) => output,
-        Err(error) => {
-            println!("skipped: python3 cannot be started: {error}");
-            return None;
-        }
-    };
-    let stderr = String::from_utf8_lossy(&output.stderr);
-    if output.status.code() == Some(77) {
-        println!("skipped: pip install mcap mcap-protobuf-support ({})", stderr.trim());
-        return None;
-    }
-    assert!(output.status.success(), "{stderr}");
-    Some(serde_json::from_slice(&output.stdout).unwrap())
-}
 
 #[test]
 fn python_reads_every_topic() {
@@ -49,7 +31,7 @@ fn python_reads_every_topic() {
     write_all(&mut writer, &everything);
     writer.finish().unwrap();
     assert_same(&play(&path), &everything);
-    let Some(found) = python_reads(&path) else { return };
+    let Some(found) = read_by_python("read_mcap.py", &path) else { return };
 
     let of = |wanted: fn(&Record) -> bool| records.iter().filter(|stamped| wanted(&stamped.record)).count();
     let counts = json!({

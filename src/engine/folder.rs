@@ -1,7 +1,7 @@
 //! The folder of a study: its lock, the configuration that ran, the recordings.
 
 use std::fs::{File, OpenOptions, TryLockError};
-use std::io::{self, Write as _};
+use std::io::{self, Read as _, Write as _};
 use std::path::{Path, PathBuf};
 
 use super::options::{EngineError, Options};
@@ -13,7 +13,7 @@ pub const STUDY_FILE: &str = "study.log";
 /// Name of the lock in a study's folder. A session that runs holds it and has written itself into it.
 const LOCK_FILE: &str = "session.lock";
 /// Most bytes of the lock that are read, for its owner.
-const OWNER_BYTES: usize = 200;
+const OWNER_BYTES: u64 = 200;
 /// Name of the folder of the robot's files in a kept configuration.
 const ROBOT_FOLDER: &str = "robot";
 
@@ -59,8 +59,10 @@ fn lock_folder(folder: &Path) -> Result<File, EngineError> {
 
 /// Returns the owner that a lock names; a lock of an older version names none.
 fn lock_owner(path: &Path) -> String {
-    let text = std::fs::read(path).unwrap_or_default();
-    let text = String::from_utf8_lossy(&text[..text.len().min(OWNER_BYTES)]);
+    let mut text = Vec::new();
+    // What cannot be read names no owner.
+    let _ = File::open(path).and_then(|lock| lock.take(OWNER_BYTES).read_to_end(&mut text));
+    let text = String::from_utf8_lossy(&text);
     let line = text.lines().next().unwrap_or_default();
     if line.is_empty() { "a process that is not known".to_owned() } else { line.to_owned() }
 }

@@ -4,7 +4,19 @@ use mcap::McapError;
 use mcap::records::{MessageHeader, Record, op};
 
 /// Opcode (1 byte) and length (8 bytes) before each record.
-const RECORD_HEAD: usize = 9;
+pub const RECORD_HEAD: usize = 9;
+
+/// Returns opcode and body of each record in `bytes`, up to the first whose length does not fit.
+pub fn records_in(bytes: &[u8]) -> impl Iterator<Item = (u8, &[u8])> {
+    let mut unread = bytes;
+    std::iter::from_fn(move || {
+        let (head, rest) = unread.split_first_chunk::<RECORD_HEAD>()?;
+        let length = u64::from_le_bytes(*head.last_chunk()?);
+        let (body, rest) = rest.split_at_checked(usize::try_from(length).ok()?)?;
+        unread = rest;
+        Some((head[0], body))
+    })
+}
 
 /// The records of a chunk. Their lengths fit.
 pub struct ChunkRecords {
@@ -45,14 +57,7 @@ impl ChunkRecords {
 
     /// Returns opcode and body of each record.
     pub fn records(&self) -> impl Iterator<Item = (u8, &[u8])> {
-        let mut unread = self.bytes.as_slice();
-        std::iter::from_fn(move || {
-            let (head, rest) = unread.split_first_chunk::<RECORD_HEAD>()?;
-            let length = u64::from_le_bytes(*head.last_chunk()?);
-            let (body, rest) = rest.split_at_checked(usize::try_from(length).ok()?)?;
-            unread = rest;
-            Some((head[0], body))
-        })
+        records_in(&self.bytes)
     }
 
     /// Returns head and content of each message.

@@ -7,14 +7,13 @@ use std::path::{Path, PathBuf};
 
 use mcap::McapError;
 use mcap::records::{Record, op};
-use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
-use super::chunk::ChunkRecords;
+use super::chunk::{self, ChunkRecords, records_in};
 use super::error::RecordingError;
 use super::topic::Topic;
 
-/// Opcode (1 byte) and length (8 bytes) before each record.
-const RECORD_HEAD: u64 = 9;
+/// Opcode and length before each record.
+const RECORD_HEAD: u64 = chunk::RECORD_HEAD as u64;
 /// The footer record: head, two offsets and a checksum.
 const FOOTER_BYTES: u64 = RECORD_HEAD + 8 + 8 + 4;
 /// The record that ends the data: head and a checksum.
@@ -127,22 +126,15 @@ impl Container {
         if footer.summary_start == 0 || footer.summary_start > footer_at || footer.summary_crc == 0 {
             return Ok(false);
         }
-        // From the record before the index to the end of the file: needed to verify the checksum.
-        let from = footer.summary_start.saturating_sub(DATA_END_BYTES);
-        let summary = self.read_at(from, bytes - from)?;
+        let index = self.read_at(footer.summary_start, bytes - footer.summary_start)?;
         // Before anything is parsed: a damaged length would decide how much memory is allocated. The checksum covers the footer
         // up to itself.
-        let covered = &summary[(footer.summary_start - from) as usize..summary.len() - mcap::MAGIC.len() - 4];
-        if crc32fast::hash(covered) != footer.summary_crc {
+        if crc32fast::hash(&index[..index.len() - mcap::MAGIC.len() - 4]) != footer.summary_crc {
             return Ok(false);
         }
-        let options = LinearReaderOptions::default()
-            .with_skip_start_magic(true)
-            .with_validate_summary_section_crc(true)
-            .with_record_length_limit(summary.len());
         let (mut chunks, mut attachments, mut metadata) = (Vec::new(), Vec::new(), Vec::new());
-        for record in records(&summary, options)? {
-            match record {
+        for (opcode, body) in records_in(&index) {
+            match mcap::parse_record(opcode, body)? {
                 Record::Channel(channel) => self.add_channel(channel.id, &channel.topic),
                 Record::ChunkIndex(index) => chunks.push(Chunk {
                     span: span(index.chunk_start_offset, index.chunk_length),
@@ -156,7 +148,7 @@ impl Container {
             }
         }
         (self.chunks, self.attachments, self.metadata) = (chunks, attachments, metadata);
-        self.data_end = Some(from);
+        self.data_end = Some(footer.summary_start.saturating_sub(DATA_END_BYTES));
         Ok(true)
     }
 
@@ -219,33 +211,19 @@ impl Container {
         Ok(())
     }
 
-    /// Returns the records of a chunk after verifying its checksum.
+    /// Returns the records of a chunk after verifying its checksum, and knows its channels from then on.
     ///
     /// # Errors
-    /// When the checksum or a record is wrong; nothing of such a chunk is used.
-    pub fn read_chunk(&mut self, chunk: &Chunk) -> Result<Vec<Record<'static>>, McapError> {
-        let bytes = self.read_at(chunk.span.offset, RECORD_HEAD + chunk.span.bytes)?;
-        let options = LinearReaderOptions::default()
-            .with_skip_start_magic(true)
-            .with_skip_end_magic(true)
-            .with_prevalidate_chunk_crcs(true)
-            .with_record_length_limit(LARGEST_CHUNK);
-        let records = records(&bytes, options)?;
-        for record in &records {
-            if let Record::Channel(channel) = record {
+    /// When the checksum, the length of a record or a channel is wrong; nothing of such a chunk is used.
+    pub fn read_chunk(&mut self, chunk: &Chunk) -> Result<ChunkRecords, McapError> {
+        let body = self.read_record(chunk.span)?;
+        let records = ChunkRecords::of(&body, LARGEST_CHUNK)?;
+        for (opcode, body) in records.records().filter(|(opcode, _)| *opcode == op::CHANNEL) {
+            if let Record::Channel(channel) = mcap::parse_record(opcode, body)? {
                 self.add_channel(channel.id, &channel.topic);
             }
         }
         Ok(records)
-    }
-
-    /// Returns the records of a chunk without a copy of each, after verifying its checksum.
-    ///
-    /// # Errors
-    /// When the checksum or the length of a record is wrong; nothing of such a chunk is used.
-    pub fn read_chunk_records(&mut self, chunk: &Chunk) -> Result<ChunkRecords, McapError> {
-        let body = self.read_record(chunk.span)?;
-        ChunkRecords::of(&body, LARGEST_CHUNK)
     }
 
     /// Returns an attached file after verifying its checksum.
@@ -335,27 +313,6 @@ impl Container {
             source => RecordingError::Mcap { path, source },
         }
     }
-}
-
-/// Returns the records in `bytes`, with the records of a chunk in place of it.
-fn records(bytes: &[u8], options: LinearReaderOptions) -> Result<Vec<Record<'static>>, McapError> {
-    let mut reader = LinearReader::new_with_options(options);
-    let mut unread = bytes;
-    let mut records = Vec::new();
-    while let Some(event) = reader.next_event() {
-        match event? {
-            LinearReadEvent::ReadRequest(wanted) => {
-                let (now, later) = unread.split_at(wanted.min(unread.len()));
-                reader.insert(now.len()).copy_from_slice(now);
-                reader.notify_read(now.len());
-                unread = later;
-            }
-            LinearReadEvent::Record { data, opcode } => {
-                records.push(mcap::parse_record(opcode, data)?.into_owned());
-            }
-        }
-    }
-    Ok(records)
 }
 
 /// Returns the position of a record from the index, whose length includes the head.

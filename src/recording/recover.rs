@@ -1,6 +1,6 @@
 //! Recovery of a recording that was not finished or is damaged.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::HashMap;
 use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -131,22 +131,25 @@ impl RecordCopier {
             }
         }
         for chunk in container.chunks.clone() {
-            match container.read_chunk(&chunk) {
-                Ok(records) => {
+            let chunk = container.read_chunk(&chunk);
+            let parsed =
+                chunk.as_ref().map(|chunk| chunk.records().map(|(opcode, body)| mcap::parse_record(opcode, body)));
+            match parsed.map(Iterator::collect::<Result<Vec<_>, _>>) {
+                Ok(Ok(records)) => {
                     for record in records {
                         self.record(record)?;
                     }
                     // The new file has the chunks of the old one: each holds whole ticks.
                     self.out.mcap.flush()?;
                 }
-                Err(_) => self.done.damaged_chunks += 1,
+                Ok(Err(_)) | Err(_) => self.done.damaged_chunks += 1,
             }
         }
         self.out.finish()?;
         Ok(self.done)
     }
 
-    fn record(&mut self, record: Record<'static>) -> Result<(), McapError> {
+    fn record(&mut self, record: Record<'_>) -> Result<(), McapError> {
         let mcap = &mut self.out.mcap;
         match record {
             Record::Schema { header, data } => {
@@ -155,7 +158,7 @@ impl RecordCopier {
             }
             Record::Channel(channel) => {
                 let schema = self.schemas.get(&channel.schema_id).copied().unwrap_or_default();
-                let id = mcap.add_channel(schema, &channel.topic, &channel.message_encoding, &BTreeMap::new())?;
+                let id = mcap.add_channel(schema, &channel.topic, &channel.message_encoding, &channel.metadata)?;
                 self.channels.insert(channel.id, (id, Topic::from_name(&channel.topic)));
             }
             Record::Message { mut header, data } => {

@@ -36,13 +36,25 @@ fn hostile_study(program: &Program) -> String {
     named.to_str().unwrap().to_owned()
 }
 
-/// Runs a command in a terminal to its end.
-fn in_terminal(program: &Program, arguments: &[&str]) -> Session {
+/// Starts a command in a terminal.
+fn begin_in_terminal(program: &Program, arguments: &[&str]) -> Session {
     let mut command = CommandBuilder::new(env!("CARGO_BIN_EXE_quadfrog"));
     command.args(arguments);
-    let mut session = Session::run(&program.path(""), (120, 40), command);
+    Session::run(&program.path(""), (120, 40), command)
+}
+
+/// Runs a command in a terminal to its end.
+fn in_terminal(program: &Program, arguments: &[&str]) -> Session {
+    let mut session = begin_in_terminal(program, arguments);
     session.wait();
     session
+}
+
+/// Checks that a command printed no part of [`HOSTILE`] raw.
+fn assert_clean(session: &Session, command: &[&str]) {
+    for part in ["\u{1b}]0;", "\u{7}", "\u{9b}"] {
+        assert!(!session.sent(part.as_bytes()), "{command:?} prints {part:?}:\n{}", session.screen());
+    }
 }
 
 #[test]
@@ -56,6 +68,7 @@ fn no_control_character_of_a_file_a_name_or_an_argument_reaches_the_terminal() {
     let mcap = Path::new(&study).join("session.mcap");
     let mcap = mcap.to_str().unwrap();
     let log = format!("{study}/study.log");
+    let missing = format!("{HOSTILE}.mcap");
     let commands: &[&[&str]] = &[
         &["study", "list"],
         &["study", "show", &study],
@@ -77,7 +90,7 @@ fn no_control_character_of_a_file_a_name_or_an_argument_reaches_the_terminal() {
         &["optimize", "--trials", HOSTILE],
         &["evaluate", "--point", HOSTILE],
         &["evaluate", "--config", HOSTILE],
-        &["replay", HOSTILE],
+        &["replay", &missing],
         &["replay", &log],
         &["recover", HOSTILE],
         &["recover", mcap],
@@ -91,11 +104,14 @@ fn no_control_character_of_a_file_a_name_or_an_argument_reaches_the_terminal() {
         &[HOSTILE],
     ];
     for command in commands {
-        let session = in_terminal(&program, command);
-        for part in ["\u{1b}]0;", "\u{7}", "\u{9b}"] {
-            assert!(!session.sent(part.as_bytes()), "{command:?} prints {part:?}:\n{}", session.screen());
-        }
+        assert_clean(&in_terminal(&program, command), command);
     }
+    let replay = &["replay", &study][..];
+    let mut session = begin_in_terminal(&program, replay);
+    session.wait_for(&["REPLAY"]);
+    session.send("q");
+    session.wait();
+    assert_clean(&session, replay);
     assert!(in_terminal(&program, &["study", "list"]).sent(br"\u001b]0;owned"), "what was removed is not shown");
 }
 

@@ -4,6 +4,8 @@
 mod program;
 #[path = "support/pty.rs"]
 mod pty;
+#[path = "../support/python_reader.rs"]
+mod python_reader;
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -11,6 +13,7 @@ use std::process::Command;
 
 use program::Program;
 use pty::Session;
+use python_reader::read_by_python;
 use quadfrog::recording::player::{Played, Player};
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::telemetry::Mode;
@@ -18,23 +21,9 @@ use serde_json::Value;
 
 const SIZE: (u16, u16) = (100, 30);
 
-/// Reads a recording with Python; none where Python or its packages are absent.
+/// Returns what viewers need of a recording; none without Python or its packages.
 fn inspected(path: &Path) -> Option<Value> {
-    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/support/inspect_recording.py");
-    let output = match Command::new("python3").arg(script).arg(path).output() {
-        Ok(output) => output,
-        Err(error) => {
-            println!("skipped: python3 cannot be started: {error}");
-            return None;
-        }
-    };
-    let stderr = String::from_utf8_lossy(&output.stderr);
-    if output.status.code() == Some(77) {
-        println!("skipped: pip install mcap mcap-protobuf-support ({})", stderr.trim());
-        return None;
-    }
-    assert!(output.status.success(), "{stderr}");
-    Some(serde_json::from_slice(&output.stdout).unwrap())
+    read_by_python("inspect_recording.py", path)
 }
 
 /// Writes the robot `go1` with other names of links and joints as the model folder `robot`.
@@ -302,4 +291,15 @@ fn ten_ticks_a_second_are_recorded_while_the_robot_is_disarmed() {
     let whole = waited_and_stood_up(&["--config", folder.path().to_str().unwrap()]);
     assert!(whole.windows(2).all(|pair| pair[1].1 == pair[0].1 + 1), "every tick with full_rate");
     assert!(whole.iter().take_while(|(mode, _)| idle(*mode)).count() > 900);
+}
+
+#[test]
+fn a_recovered_recording_keeps_its_units() {
+    let program = Program::new();
+    program.text(&["optimize", "--trials", "1", "--record", "all"]);
+    let whole = std::fs::read(program.study("recordings").join("session.mcap")).unwrap();
+    std::fs::write(program.path("cut.mcap.part"), &whole[..whole.len() * 2 / 3]).unwrap();
+    program.text(&["recover", "cut.mcap.part"]);
+    let Some(found) = inspected(&program.path("cut.mcap")) else { return };
+    assert_eq!(found["channels"]["/robot/tick"]["roll"], "rad");
 }

@@ -111,7 +111,7 @@ impl Player {
             let usual = span.is_some_and(|span| span <= USUAL_SPAN_NS)
                 && before.is_some_and(|before| chunk.start.abs_diff(before) <= USUAL_SPAN_NS);
             if !usual {
-                let records = self.container.read_chunk_records(chunk);
+                let records = self.container.read_chunk(chunk);
                 let times = records.iter().flat_map(|records| records.messages().flatten());
                 let times = times.map(|(header, _)| header.log_time);
                 let first_and_last = times.fold(None, |found: Option<(u64, u64)>, time| {
@@ -127,7 +127,7 @@ impl Player {
 
     /// Returns the records of a chunk; none of a damaged one, which is noted.
     pub(super) fn records_of(&mut self, chunk: &Chunk) -> Option<ChunkRecords> {
-        let records = self.container.read_chunk_records(chunk).map_err(|error| error.to_string());
+        let records = self.container.read_chunk(chunk).map_err(|error| error.to_string());
         let proved = records.and_then(|records| match records.checked {
             true => Ok(records),
             false => self.decodable(chunk, &records).map(|()| records),
