@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 
 use foxglove::messages::JointStates;
 use mcap::McapError;
+use prost::Message as _;
 
 use super::error::RecordingError;
 pub use super::output::Sink;
@@ -21,7 +22,7 @@ use crate::robot::description::RobotDescription;
 use crate::telemetry::{Mode, Tick};
 use crate::trial::TrialRecord;
 
-/// Period of `/robot/pose` and `/tf`, for viewers; both follow from the ticks.
+/// Period of `/robot/pose`, `/tf` and `/robot/joint_states`, for viewers; all follow from the ticks.
 const FRAMES_PERIOD_NS: u64 = 10_000_000;
 
 /// Of the ticks while the robot is disarmed one of so many is kept by [`Writer::thin_while_disarmed`]: ten a second.
@@ -51,6 +52,8 @@ pub struct Writer {
     /// Trial and mode of the last tick: a change may be a marker.
     last: Option<(Option<u32>, Mode)>,
     last_frames: Option<u64>,
+    /// The last joint command, encoded, and the number of its chunk.
+    command: Option<(u64, Vec<u8>)>,
     records: u32,
     ticks: u64,
     part: PathBuf,
@@ -154,6 +157,7 @@ impl Writer {
             rows: BTreeMap::new(),
             last: None,
             last_frames: None,
+            command: None,
             records: 0,
             ticks: 0,
             part,
@@ -249,13 +253,19 @@ impl Writer {
         let log_time = self.start_utc_ns.saturating_add(tick.time_ns);
         let sequence = tick.number as u32; // joins the messages of a tick in the player
         self.write_marker(tick, log_time)?;
-        tick::joint_states(&tick.state, log_time, &mut self.joints);
-        self.out.message(Topic::JointStates, sequence, log_time, &self.joints)?;
-        self.out.message(Topic::JointCommand, sequence, log_time, &tick::joint_command(tick))?;
-        self.out.message(Topic::Tick, sequence, log_time, &tick::control_tick(tick))?;
+        let (command, control) = tick::split(tick);
+        // Each chunk is played by itself.
+        let command_of_chunk = (self.out.closed_chunks, command.encode_to_vec());
+        if self.command.as_ref() != Some(&command_of_chunk) {
+            self.out.message(Topic::JointCommand, sequence, log_time, &command)?;
+            self.command = Some(command_of_chunk);
+        }
+        self.out.message(Topic::Tick, sequence, log_time, &control)?;
         let period = tick.time_ns / FRAMES_PERIOD_NS;
         if self.last_frames != Some(period) {
             self.last_frames = Some(period);
+            tick::joint_states(&tick.state, log_time, &mut self.joints);
+            self.out.message(Topic::JointStates, sequence, log_time, &self.joints)?;
             self.out.message(Topic::Pose, sequence, log_time, &coordinate_frames::pose(tick, log_time))?;
             if let Some(robot) = &self.robot {
                 self.out.message(

@@ -6,6 +6,9 @@ use crate::control::settings::ControlSettings;
 use crate::telemetry::{Tick, TrialEnd};
 use crate::trial::{MeasuredJump, ObjectiveRule, TrialRecord, Verdict};
 
+/// Largest difference of two objectives, m or rad (with `rate` a second), that the single precision of recorded ticks explains.
+const RECORDED_PRECISION: f64 = 1e-5;
+
 /// The rules' result for a trial, before a person's verdict.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Judgement {
@@ -26,6 +29,18 @@ impl Judgement {
     /// Returns the measured objective, before any verdict.
     pub fn value(&self) -> Option<f64> {
         self.measured.as_ref()?.measured_value
+    }
+
+    /// Returns by how much the value exceeds that of `old`; 0 within the precision of recorded ticks, none where one is missing.
+    pub fn difference(&self, old: &Judgement) -> Option<f64> {
+        let difference = self.value()? - old.value()?;
+        Some(if difference.abs() <= RECORDED_PRECISION { 0.0 } else { difference })
+    }
+
+    /// Whether verdict, reason or value differ from those of `old`.
+    pub fn differs(&self, old: &Judgement) -> bool {
+        let same_value = self.difference(old).map_or(self.value() == old.value(), |difference| difference == 0.0);
+        self.verdict != old.verdict || self.cause != old.cause || !same_value
     }
 
     fn unknown(cause: String) -> Judgement {

@@ -36,12 +36,6 @@ struct Rejudged {
     new: Judgement,
 }
 
-impl Rejudged {
-    fn difference(&self) -> Option<f64> {
-        Some(self.new.value()? - self.old.value()?)
-    }
-}
-
 pub fn run(arguments: &RejudgeArguments) -> Result<(), Failure> {
     let config = Config::load(arguments.config.as_deref())?;
     let mut files = Vec::new();
@@ -113,14 +107,15 @@ fn print(results: &[Rejudged], unit: &str) {
     let number = |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{value:.4}"));
     for result in results {
         let Rejudged { trial, old, new } = result;
-        let difference = result.difference().map_or("-".to_owned(), |difference| format!("{difference:+.4}"));
+        let difference =
+            result.new.difference(&result.old).map_or("-".to_owned(), |difference| format!("{difference:+.4}"));
         let (old_value, new_value) = (number(old.value()), number(new.value()));
         let (old_name, new_name, cause) = (name(old.verdict), name(new.verdict), &new.cause);
         put_line!(
             "{trial:>5}  {old_value:>10}  {old_name:<7}  {new_value:>10}  {new_name:<7}  {difference:>11}  {cause}"
         );
     }
-    let changed = results.iter().filter(|result| result.old != result.new).count();
+    let changed = results.iter().filter(|result| result.new.differs(&result.old)).count();
     put_line!(
         "{changed} of {} trials change. J in {unit}, as measured, before the verdict; a fall counts as 0.",
         results.len()
@@ -137,5 +132,5 @@ fn json_of(result: &Rejudged) -> Value {
         })
     };
     let Rejudged { trial, old, new } = result;
-    json!({ "trial": trial, "old": judgement(old), "new": judgement(new), "difference": result.difference() })
+    json!({ "trial": trial, "old": judgement(old), "new": judgement(new), "difference": result.new.difference(&result.old) })
 }
