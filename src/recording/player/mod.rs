@@ -171,11 +171,12 @@ impl Player {
         self.duration_ns
     }
 
-    /// Returns the time of the first message since the engine started, ns, without the session's own record.
+    /// Returns the time of the first message since the engine started, ns, without the session's own record unless there is no other.
     pub fn first_ns(&self) -> u64 {
         let other = |channel: &u16| self.container.topic(*channel) != Some(Topic::Session);
         let holds_others = |chunk: &&Chunk| chunk.channels.as_ref().is_none_or(|channels| channels.iter().any(other));
         let first = self.chunks.iter().filter(holds_others).map(|chunk| chunk.start).min();
+        let first = first.or_else(|| self.chunks.iter().map(|chunk| chunk.start).min());
         first.unwrap_or(self.start_utc_ns).saturating_sub(self.start_utc_ns)
     }
 
