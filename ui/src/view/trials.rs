@@ -119,7 +119,8 @@ pub fn render_table(frame: &mut Frame, area: Rect, model: &Model, full: bool) {
         let selected = selected_trial == Some(trial.trial);
         let style = if selected { theme.style(Role::Selected) } else { Style::new() };
         let area = Rect { y: area.y + 1 + line as u16, height: 1, ..area };
-        let ghost = [model.live.ghost, model.live.comparison.as_ref().map(|c| c.b)].contains(&Some(trial.trial));
+        let beside = model.live.comparison.as_ref().map(|compared| &compared.b).filter(|b| b.recording.is_none());
+        let ghost = [model.live.ghost, beside.map(|b| b.trial)].contains(&Some(trial.trial));
         let later = model.is_later(trial.trial);
         let mark = match (later, ghost) {
             (true, _) => "+",
