@@ -91,6 +91,8 @@ const REPLAY: &[Row] = &[
     row(Action::SecondForward, "l", Changes, ("", "")),
     row(Action::SlowMotion, "H", Shows("SLOW JUMPS"), ("H", "")),
     row(Action::LoopJump, "i", Shows("LOOP #2"), ("i)", "Trial #2: judge it")),
+    row(Action::Beside, "|", Shows("Which trial beside #2?"), ("1\r", "A #2 line, B #1 dotted")),
+    row(Action::EndComparison, "Esc", Hides("dotted"), ("", "8 s sweep")),
     row(Action::StepBack, ",", Changes, ("", "")),
     row(Action::StepForward, ".", Changes, ("", "")),
     row(Action::Slower, "<", Shows("x0.5"), ("", "")),

@@ -1,5 +1,6 @@
 //! The source of the screen's messages: a running engine or a recording. Both give the same messages.
 
+mod beside;
 mod replay;
 
 use quadfrog::engine::EngineHandle;
@@ -27,12 +28,17 @@ impl Feed {
 
     /// Creates the feed of a recording, playing from the start.
     pub fn replay(recording: impl Into<Timeline>) -> Feed {
-        Feed::Replay(Box::new(ReplayFeed::new(recording.into(), false)))
+        Feed::Replay(Box::new(ReplayFeed::new(recording.into(), None, false)))
+    }
+
+    /// Creates the feed of a recording with another one beside it: from its present end if it is being written.
+    pub fn beside(recording: Timeline, second: Option<Timeline>, follow: bool) -> Feed {
+        Feed::Replay(Box::new(ReplayFeed::new(recording, second, follow)))
     }
 
     /// Creates the feed of a recording that is being written, playing from its present end.
     pub fn follow(recording: impl Into<Timeline>) -> Feed {
-        Feed::Replay(Box::new(ReplayFeed::new(recording.into(), true)))
+        Feed::Replay(Box::new(ReplayFeed::new(recording.into(), None, true)))
     }
 
     /// Returns the damage of the recording that a replay has found, also after the feed has ended.

@@ -96,6 +96,8 @@ pub enum Purpose {
     LogSearch,
     /// A time or a trial of a replay.
     Seek,
+    /// The trial beside the one at the playhead of a replay.
+    Beside,
 }
 
 /// Subject of a list of switches.

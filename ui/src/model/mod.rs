@@ -232,6 +232,12 @@ impl Model {
         self.session.trials.records.get(&trial).or_else(later)
     }
 
+    /// The row of a trial as it is at the end of the recording; in a live session the present one.
+    pub fn final_row(&self, trial: u32) -> Option<&TrialRecord> {
+        let last = self.timeline.as_ref().and_then(|timeline| timeline.rows.get(&trial));
+        last.or_else(|| self.session.trials.records.get(&trial))
+    }
+
     /// The trial that actions of the trial table apply to: the selected one, or the newest.
     pub fn selected_trial(&self) -> Option<&TrialRecord> {
         match self.trial_table.selected {

@@ -31,6 +31,9 @@ pub struct ReplayArguments {
     /// Show a session that is being written, from its present end on
     #[arg(long, conflicts_with = "check")]
     follow: bool,
+    /// Another recording (or study folder): its trials are laid beside those at the playhead, aligned where the impulses begin
+    #[arg(long, value_name = "FILE", conflicts_with = "check")]
+    beside: Option<PathBuf>,
     /// Read the files whole without a screen and print what is lost; exit status 1 if anything is
     #[arg(long)]
     check: bool,
@@ -58,6 +61,12 @@ pub fn run(arguments: &ReplayArguments) -> Result<(), Failure> {
         return check(&files);
     }
     let recording = Timeline::open(&files)?;
+    let mut second = None;
+    if let Some(path) = &arguments.beside {
+        let of_second = recordings_of(path)?;
+        second = Some(Timeline::open(&of_second)?);
+        files.extend(of_second);
+    }
     let repair = |damage: Vec<String>| {
         let damage = damage.iter().map(|damage| format!("{damage}; the rest can be played"));
         let files =
@@ -73,7 +82,7 @@ pub fn run(arguments: &ReplayArguments) -> Result<(), Failure> {
         // A model of the operator's own: the panels that need its limits say so.
         Err(_) => console,
     };
-    let feed = if arguments.follow { Feed::follow(recording) } else { Feed::replay(recording) };
+    let feed = Feed::beside(recording, second, arguments.follow);
     let damage = feed.damage();
     let ended = app::run(feed, console)?;
     let damage = std::mem::take(&mut *damage.lock().unwrap_or_else(PoisonError::into_inner));

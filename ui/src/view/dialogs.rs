@@ -277,6 +277,10 @@ fn field_title(model: &Model, purpose: Purpose) -> String {
         Purpose::TrialNumber => "Go to trial".to_owned(),
         Purpose::LogSearch => "Search the log".to_owned(),
         Purpose::Seek => "Go to a time or a trial".to_owned(),
+        Purpose::Beside => {
+            let present = model.replay.as_ref().and_then(|replay| replay.present);
+            format!("Which trial beside {}?", present.map_or("it".to_owned(), |trial| format!("#{trial}")))
+        }
     }
 }
 
@@ -300,6 +304,10 @@ fn field(model: &Model, purpose: Purpose, input: &Input, problem: Option<&str>) 
         }
         Purpose::LogSearch => "empty: all lines".to_owned(),
         Purpose::Seek => "12:34 or 1:02:03.5, seconds as 75.5, a trial as #7".to_owned(),
+        Purpose::Beside => match model.timeline.as_ref().and_then(|timeline| timeline.second.as_ref()) {
+            Some(second) => format!("its number in {}", second.name),
+            None => "its number in this recording".to_owned(),
+        },
         Purpose::Note(_) if model.space_bar_must_stop() => {
             "the robot is energised: Space is STOP, _ writes a space".to_owned()
         }

@@ -94,7 +94,7 @@ fn shown_columns(model: &Model, width: usize) -> Vec<ShownColumn> {
 /// Width of the trial's number and the space behind it.
 const NUMBER_WIDTH: usize = 5;
 
-/// The table, scrolled so that the selected row is seen. `full` shows the choice; without it the newest rows are shown.
+/// The table, scrolled so that the selected row is seen. `full` shows the choice; without it the rows around the newest trial.
 pub fn render_table(frame: &mut Frame, area: Rect, model: &Model, full: bool) {
     if area.height < 2 {
         return;
@@ -105,21 +105,31 @@ pub fn render_table(frame: &mut Frame, area: Rect, model: &Model, full: bool) {
     let titles: Vec<String> = columns.iter().map(|column| padded(&column.title, column.width)).collect();
     let title = format!("{:>4} {}", "#", titles.join(" "));
     frame.render_widget(Line::from(span(theme, Role::Heading, truncate(&title, width))), Rect { height: 1, ..area });
-    let rows: Vec<&TrialRecord> =
-        if full { model.trial_rows() } else { model.session.trials.records.values().collect() };
+    let rows: Vec<&TrialRecord> = match full {
+        true => model.trial_rows(),
+        false => {
+            let mut rows: Vec<_> = model.session.trials.records.values().chain(model.later_trials()).collect();
+            rows.sort_by_key(|row| row.trial);
+            rows
+        }
+    };
     if rows.is_empty() {
         let below = Rect { y: area.y + 1, height: area.height - 1, ..area };
         return render_empty(frame, below, model);
     }
     let selected_trial = if full { model.selected_trial().map(|trial| trial.trial) } else { None };
-    let position = selected_trial.and_then(|number| rows.iter().position(|row| row.trial == number));
+    // The rows around the newest trial at the playhead are shown, where there are later ones.
+    let newest = || model.session.trials.newest().or(rows.first().copied()).map(|trial| trial.trial);
+    let middle = if full { selected_trial } else { newest() };
+    let position = middle.and_then(|number| rows.iter().position(|row| row.trial == number));
     let first = first_row(rows.len(), position, usize::from(area.height) - 1);
     let best = model.session.trials.best().map(|trial| trial.trial);
     for (line, trial) in rows.iter().skip(first).take(usize::from(area.height) - 1).enumerate() {
         let selected = selected_trial == Some(trial.trial);
         let style = if selected { theme.style(Role::Selected) } else { Style::new() };
         let area = Rect { y: area.y + 1 + line as u16, height: 1, ..area };
-        let ghost = [model.live.ghost, model.live.comparison.as_ref().map(|c| c.b)].contains(&Some(trial.trial));
+        let beside = model.live.comparison.as_ref().map(|compared| &compared.b).filter(|b| b.recording.is_none());
+        let ghost = [model.live.ghost, beside.map(|b| b.trial)].contains(&Some(trial.trial));
         let later = model.is_later(trial.trial);
         let mark = match (later, ghost) {
             (true, _) => "+",
