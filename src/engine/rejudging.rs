@@ -133,7 +133,7 @@ impl Rejudging {
     }
 
     /// Returns the number of trials that were measured.
-    pub fn count(&self) -> usize {
+    pub fn measured_trials(&self) -> usize {
         self.rows.values().filter(|row| row.suggested.is_some()).count()
     }
 

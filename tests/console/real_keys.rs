@@ -106,6 +106,8 @@ const REPLAY: &[Row] = &[
     row(Action::Series, "t", Shows("FL force"), ("tt", "FL foot")),
     row(Action::ChooseSeries, "T", Shows("Series of the charts"), ("\x1b", "8 s sweep")),
     row(Action::TrialsView, "2", Shows("by number"), ("", "")),
+    row(Action::Rejudge, "J", Shows("Judge all trials again"), ("\r", " change")),
+    row(Action::Rejudge, "J", Hides(" change"), ("", "by number")),
     row(Action::First, "Home", Changes, ("", "")),
     row(Action::Down, "Down", Changes, ("", "")),
     row(Action::Up, "Up", Changes, ("", "")),

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
+use quadfrog::engine::RejudgedTrial;
 use quadfrog::recording::record::Stamped;
 use quadfrog::recording::recorder::RecorderStatus;
 use quadfrog::recording::timeline::TrialRun;
@@ -38,6 +39,8 @@ pub enum Msg {
     Replay(ReplayStatus),
     /// The trials, faults and lost parts of the whole recording; again when they change.
     Timeline(Box<ReplayTimeline>),
+    /// A result of judging the trials of a replay again.
+    Rejudged(RejudgeNews),
     /// Two trials of a replay, or of two recordings, to lay over each other.
     SideBySide(Box<SideBySide>),
     /// The replay jumped to another time; the records up to that time follow from the start.
@@ -72,6 +75,10 @@ pub enum Effect {
     Bell,
     /// Put the row of this trial on the clipboard of the operator's terminal.
     CopyTrial(u32),
+    /// Judge the trials of the replay again by the configuration in a folder; empty: by the defaults.
+    Rejudge(String),
+    /// No longer.
+    EndRejudge,
     /// Write the trial table to files beside the study.
     Export,
     /// Write the best parameters as a configuration beside the study.
@@ -83,6 +90,26 @@ pub enum Effect {
     Suspend,
     /// Sit the robot down and end.
     Quit,
+}
+
+/// Results of judging the trials of a replay again.
+#[derive(Debug, Clone)]
+pub enum RejudgeNews {
+    /// It begins.
+    Begun {
+        /// The folder of the configuration.
+        configuration: String,
+        /// Unit of the new objective.
+        unit: String,
+        /// Trials that will be judged.
+        trials: usize,
+    },
+    /// A judged trial; the last one of a number counts.
+    Trial(Box<RejudgedTrial>),
+    /// All trials are judged.
+    Done,
+    /// The reason for which they cannot be judged.
+    Failed(String),
 }
 
 /// A command to the replay.

@@ -1,7 +1,10 @@
 //! The source of the screen's messages: a running engine or a recording. Both give the same messages.
 
 mod beside;
+mod rejudge;
 mod replay;
+
+use std::path::PathBuf;
 
 use quadfrog::engine::EngineHandle;
 use quadfrog::recording::timeline::Timeline;
@@ -61,6 +64,20 @@ impl Feed {
     pub fn control_replay(&mut self, command: ReplayCommand) {
         if let Feed::Replay(replay) = self {
             replay.control_replay(command);
+        }
+    }
+
+    /// Judges the trials of a replay again by the configuration in a folder, or by the defaults; the results follow as messages.
+    pub fn rejudge(&mut self, folder: Option<PathBuf>) {
+        if let Feed::Replay(replay) = self {
+            replay.rejudge(folder);
+        }
+    }
+
+    /// Ends judging the trials again.
+    pub fn end_rejudge(&mut self) {
+        if let Feed::Replay(replay) = self {
+            replay.end_rejudge();
         }
     }
 

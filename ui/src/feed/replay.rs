@@ -1,6 +1,8 @@
 //! Playback of a recording: speeds, slow motion, loops, single steps, jumps to times, trials, falls and faults.
 
 use std::collections::{BTreeSet, VecDeque};
+use std::path::PathBuf;
+use std::sync::mpsc::Receiver;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use quadfrog::realtime::channel::SHOWN_EVERY;
@@ -10,8 +12,11 @@ use quadfrog::recording::timeline::{Timeline, TrialRun};
 use quadfrog::telemetry::{Counters, Phase, Snapshot};
 
 use super::beside::TrialPair;
-use crate::message::{Msg, ReplayCommand, ReplayStatus, ReplayStep, ReplayTimeline};
+use super::rejudge::rejudge;
+use crate::message::{Msg, RejudgeNews, ReplayCommand, ReplayStatus, ReplayStep, ReplayTimeline};
 
+/// Most results of judging again per call.
+const BATCH: usize = 256;
 const TICK_NS: u64 = 1_000_000;
 const FRAME_NS: u64 = SHOWN_EVERY * TICK_NS;
 /// Length of the past that fills the charts after a jump.
@@ -46,6 +51,8 @@ pub struct ReplayFeed {
     logged: BTreeSet<u64>,
     damage: DamageWatch,
     pair: TrialPair,
+    /// Results of judging the trials again.
+    rejudged: Option<Receiver<RejudgeNews>>,
     /// Messages of a jump or a step that were not taken yet.
     jumped: Vec<Msg>,
 }
@@ -67,6 +74,7 @@ impl ReplayFeed {
             logged: BTreeSet::new(),
             damage: DamageWatch::default(),
             pair: TrialPair::new(second),
+            rejudged: None,
             jumped: Vec::new(),
         };
         replay.list();
@@ -76,6 +84,14 @@ impl ReplayFeed {
 
     pub fn damage(&self) -> DamageWatch {
         self.damage.clone()
+    }
+
+    pub fn rejudge(&mut self, folder: Option<PathBuf>) {
+        self.rejudged = Some(rejudge(self.recording.paths(), folder));
+    }
+
+    pub fn end_rejudge(&mut self) {
+        self.rejudged = None;
     }
 
     pub fn control_replay(&mut self, command: ReplayCommand) {
@@ -159,6 +175,7 @@ impl ReplayFeed {
     pub fn poll(&mut self, elapsed_ns: u64, messages: &mut Vec<Msg>) {
         messages.append(&mut self.jumped);
         self.follow(elapsed_ns, messages);
+        messages.extend(self.rejudged.iter().flat_map(|news| news.try_iter().take(BATCH)).map(Msg::Rejudged));
         if self.playing {
             self.play(elapsed_ns, messages);
             messages.append(&mut self.jumped);

@@ -9,6 +9,7 @@ use strum::VariantArray;
 
 use super::beside;
 use super::navigate::{filter, freeze, ghost, move_by, move_cursor, next_mode, next_series, next_sort, no_ghost, zoom};
+use super::rejudged;
 use super::request::{interrupt, request, say, stop};
 use crate::action::Action;
 use crate::legal::{legal, may_acknowledge, may_request};
@@ -134,6 +135,7 @@ pub(super) fn perform(model: &mut Model, action: Action) -> Vec<Effect> {
         Action::ReplayEnd => return vec![Effect::Replay(ReplayCommand::End)],
         Action::LoopJump => return vec![Effect::Replay(ReplayCommand::Loop)],
         Action::SlowMotion => return vec![Effect::Replay(ReplayCommand::SlowMotion)],
+        Action::Rejudge => return rejudged::toggle(model),
         Action::Beside => return beside::begin(model),
         Action::EndComparison => {
             no_ghost(model);

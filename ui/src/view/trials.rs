@@ -23,8 +23,14 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     render_table(frame, body, model, true);
 }
 
-/// The number of each verdict, and the order and filter of the table.
+/// The number of each verdict, and the order and filter of the table; where the trials are judged again, the result of that.
 fn summary(model: &Model) -> String {
+    if let Some(table) = &model.rejudged {
+        // The end of a path names the folder.
+        let skipped = table.configuration.chars().count().saturating_sub(24);
+        let name: String = table.configuration.chars().skip(skipped).collect();
+        return format!("new by {name}: {}", table.summary());
+    }
     let trials = &model.session.trials;
     let counts = Verdict::ALL.map(|verdict| format!("{} {}", trials.count(verdict), verdict.name())).join(", ");
     let view = &model.trial_table;
@@ -54,10 +60,13 @@ struct ShownColumn {
 enum CellContent {
     Parameter(String),
     Of(Column),
+    NewValue,
+    NewVerdict,
 }
 
-/// The columns as the operator has chosen them, as far as `width` characters take them.
-fn shown_columns(model: &Model, width: usize) -> Vec<ShownColumn> {
+/// The columns as the operator has chosen them, as far as `width` characters take them; in the whole table with the new
+/// judgements after the verdict.
+fn shown_columns(model: &Model, width: usize, full: bool) -> Vec<ShownColumn> {
     let mut shown = Vec::new();
     for column in &model.trial_table.columns {
         let (title, width) = match column {
@@ -82,6 +91,14 @@ fn shown_columns(model: &Model, width: usize) -> Vec<ShownColumn> {
         };
         shown.push(ShownColumn { title, width, cell: CellContent::Of(*column) });
     }
+    if let Some(table) = model.rejudged.as_ref().filter(|_| full) {
+        let verdict = |column: &ShownColumn| matches!(column.cell, CellContent::Of(Column::Verdict));
+        let at = shown.iter().position(verdict).map_or(0, |at| at + 1);
+        let value = format!("{:>9}", format!("new {}", table.unit));
+        let new = [(value, CellContent::NewValue), ("  new".to_owned(), CellContent::NewVerdict)];
+        let columns = new.map(|(title, cell)| ShownColumn { title, width: 9, cell });
+        shown.splice(at..at, columns);
+    }
     let mut left = width.saturating_sub(NUMBER_WIDTH);
     for column in &mut shown {
         column.width = column.width.min(left);
@@ -101,7 +118,7 @@ pub fn render_table(frame: &mut Frame, area: Rect, model: &Model, full: bool) {
     }
     let theme = &model.theme;
     let width = usize::from(area.width);
-    let columns = shown_columns(model, width);
+    let columns = shown_columns(model, width, full);
     let titles: Vec<String> = columns.iter().map(|column| padded(&column.title, column.width)).collect();
     let title = format!("{:>4} {}", "#", titles.join(" "));
     frame.render_widget(Line::from(span(theme, Role::Heading, truncate(&title, width))), Rect { height: 1, ..area });
@@ -192,6 +209,18 @@ fn cell(model: &Model, trial: &TrialRecord, column: &ShownColumn, best: bool) ->
             return (format!("{:>7}", value.map_or("-".to_owned(), number)), Role::Text);
         }
         CellContent::Of(column) => *column,
+        CellContent::NewValue => {
+            let value = model.rejudged.as_ref().and_then(|table| table.value(trial.trial));
+            return (format!("{:>9}", value.map_or("-".to_owned(), number)), Role::Text);
+        }
+        CellContent::NewVerdict => {
+            let Some(again) = model.rejudged.as_ref().and_then(|table| table.trials.get(&trial.trial)) else {
+                return (String::new(), Role::Quiet);
+            };
+            let (symbol, role) = sign(again.new.verdict);
+            let changed = if again.old.verdict == again.new.verdict { "" } else { " !" };
+            return (format!("{symbol} {}{changed}", again.new.verdict.map_or("open", Verdict::name)), role);
+        }
     };
     match column {
         Column::Parameters => (String::new(), Role::Text),

@@ -9,6 +9,7 @@ use crate::message::{Effect, ReplayCommand};
 use crate::model::Model;
 use crate::model::dialog::{Dialog, Purpose};
 use crate::update::beside::chosen;
+use crate::update::rejudged;
 use crate::update::request::{cancelled, request};
 
 pub(super) fn key(model: &mut Model, key: Key, purpose: Purpose, mut input: Input) -> Vec<Effect> {
@@ -66,6 +67,7 @@ fn submit(model: &mut Model, purpose: Purpose, text: &str) -> Result<Vec<Effect>
             return Ok(Vec::new());
         }
         Purpose::Seek => return seek(model, text).map(|command| vec![Effect::Replay(command)]),
+        Purpose::Rejudge => return Ok(rejudged::chosen(model, text)),
         Purpose::Beside => {
             let number = text.strip_prefix('#').unwrap_or(text).trim();
             let trial = number.parse().map_err(|_| format!("`{text}` is not the number of a trial"))?;
