@@ -234,7 +234,7 @@ fn begin_parquet<W: Write + Send>(out: W, columns: &[TypedColumn]) -> Result<Ser
     let mut properties = WriterProperties::builder()
         .set_created_by(concat!("quadfrog ", env!("CARGO_PKG_VERSION")).to_owned())
         .set_compression(Compression::ZSTD(ZstdLevel::try_new(1)?))
-        .set_statistics_enabled(EnabledStatistics::Chunk);
+        .set_statistics_enabled(EnabledStatistics::None);
     let mut fields = Vec::with_capacity(columns.len());
     for column in columns {
         let (physical, logical) = match &column.cells {

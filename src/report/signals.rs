@@ -3,7 +3,7 @@
 //! command begin with `command_`, the simulator's true state with `truth_`, the battery with `battery_`.
 
 use std::io::{self, Write};
-use std::sync::mpsc::sync_channel;
+use std::sync::mpsc::{SyncSender, sync_channel};
 
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -14,6 +14,12 @@ use crate::telemetry::Tick;
 
 /// Rows of a batch: some 30 MB of memory for all signals.
 const BATCH_ROWS: usize = 16_384;
+
+/// Ticks of a block: few enough for the processor's cache.
+const BLOCK_TICKS: usize = 128;
+
+/// Log time, ns UTC since 1970, and tick.
+type Stamped = (u64, Tick);
 
 /// Topic whose signals are exported.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -102,7 +108,9 @@ impl Signals {
         let mut columns = self.columns();
         let mut writer = TableWriter::new(format, out, &columns)?;
         std::thread::scope(|scope| {
-            // Reading and encoding at the same time; two batches go round.
+            // Reading, filling columns and encoding at the same time; two batches go round.
+            let (read, blocks) = sync_channel(2);
+            scope.spawn(move || range.read(players, &read));
             let (full, batches) = sync_channel::<Vec<TypedColumn>>(0);
             let (emptied, empty) = sync_channel::<Vec<TypedColumn>>(2);
             let encoder = scope.spawn(move || {
@@ -116,29 +124,19 @@ impl Signals {
             });
             let mut spare = Some(self.columns());
             let mut rows = 0;
-            'files: for player in players {
-                let start_utc_ns = player.start_utc_ns();
-                let Some(first_ns) = range.first_ns(player) else { continue };
-                player.seek(first_ns);
-                for played in player.by_ref() {
-                    if played.time_ns() >= range.until_ns {
+            for block in &blocks {
+                rows += block.len() as u64;
+                self.push(&mut columns, &block);
+                if columns[0].rows() >= BATCH_ROWS {
+                    let Some(next) = spare.take().or_else(|| empty.recv().ok()) else { break };
+                    // The encoder has ended with an error.
+                    if full.send(std::mem::replace(&mut columns, next)).is_err() {
                         break;
-                    }
-                    let Played::Tick(tick) = played else { continue };
-                    if range.trial.is_some() && tick.trial != range.trial {
-                        continue;
-                    }
-                    rows += 1;
-                    self.push(&mut columns, start_utc_ns.saturating_add(tick.time_ns), &tick);
-                    if columns[0].rows() == BATCH_ROWS {
-                        let Some(next) = spare.take().or_else(|| empty.recv().ok()) else { break 'files };
-                        // The encoder has ended with an error.
-                        if full.send(std::mem::replace(&mut columns, next)).is_err() {
-                            break 'files;
-                        }
                     }
                 }
             }
+            // The reader ends.
+            drop(blocks);
             let _ = full.send(columns);
             drop(full);
             let out =
@@ -152,11 +150,12 @@ impl Signals {
         std::iter::once(time).chain(self.signals.iter().map(|signal| signal.column.clone())).collect()
     }
 
-    fn push(&self, columns: &mut [TypedColumn], log_time: u64, tick: &Tick) {
+    /// Adds the rows of a block, column by column.
+    fn push(&self, columns: &mut [TypedColumn], block: &[Stamped]) {
         let Some((time, columns)) = columns.split_first_mut() else { return };
-        add(time, Scalar::Whole(log_time as i64));
+        block.iter().for_each(|(log_time, _)| add(time, Scalar::Whole(*log_time as i64)));
         for (column, signal) in columns.iter_mut().zip(&self.signals) {
-            add(column, (signal.read)(tick));
+            block.iter().for_each(|(_, tick)| add(column, (signal.read)(tick)));
         }
     }
 
@@ -332,6 +331,31 @@ fn add(column: &mut TypedColumn, value: Scalar) {
 }
 
 impl SignalRange {
+    /// Sends the ticks in blocks until their end or that of the receiver.
+    fn read(&self, players: &mut [Player], read: &SyncSender<Vec<Stamped>>) {
+        for player in players {
+            let start_utc_ns = player.start_utc_ns();
+            let Some(first_ns) = self.first_ns(player) else { continue };
+            player.seek(first_ns);
+            let within = player.by_ref().take_while(|played| played.time_ns() < self.until_ns);
+            let mut ticks = within.filter_map(|played| match played {
+                Played::Tick(tick) if self.trial.is_none() || tick.trial == self.trial => {
+                    Some((start_utc_ns.saturating_add(tick.time_ns), tick))
+                }
+                _ => None,
+            });
+            loop {
+                let block: Vec<Stamped> = ticks.by_ref().take(BLOCK_TICKS).collect();
+                if block.is_empty() {
+                    break;
+                }
+                if read.send(block).is_err() {
+                    return;
+                }
+            }
+        }
+    }
+
     /// Returns the time at which playing begins: that of the range, or of the trial's first tick; none of a file without it.
     fn first_ns(&self, player: &Player) -> Option<u64> {
         let begins = |trial| player.markers().iter().find(|marker| marker.kind == MarkerKind::Trial(trial));
