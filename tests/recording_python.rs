@@ -11,7 +11,7 @@ use quadfrog::recording::writer::Writer;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::robot::{JOINTS, Leg, joint_name};
 use quadfrog::telemetry::{Mode, Tick};
-use serde_json::json;
+use serde_json::{Value, json};
 use support::*;
 
 #[test]
@@ -35,8 +35,8 @@ fn python_reads_every_topic() {
 
     let of = |wanted: fn(&Record) -> bool| records.iter().filter(|stamped| wanted(&stamped.record)).count();
     let counts = json!({
-        "/robot/joint_states": 4000, "/robot/joint_cmd": 4000, "/robot/tick": 4000,
-        "/robot/pose": 400, "/tf": 400, "/scene/robot": 1,
+        "/robot/tick": 4000, "/robot/joint_cmd": found["counts"]["/robot/joint_cmd"],
+        "/robot/joint_states": 400, "/robot/pose": 400, "/tf": 400, "/scene/robot": 1,
         "/robot/counters": of(|record| matches!(record, Record::Counters(_))),
         "/session": 1, "/log": 1, "/fault": 1,
         "/opt/stage": of(|record| matches!(record, Record::Stage(_))),
@@ -77,16 +77,16 @@ fn python_reads_every_topic() {
         let [roll, foot_z] = [tick.estimate.roll_pitch_yaw.x, tick.estimate.foot_position_leg[3].z];
         let expected = json!([START_UTC_NS + tick.time_ns, tick.number, roll, foot_z, force, mode]);
         assert_eq!(found["ticks"][index], expected);
-        let joint = |i: usize| {
-            json!([
-                format!("{}_joint", joint_name(i)),
-                tick.state.joint_position_rad[i],
-                tick.state.joint_torque_n_m[i]
-            ])
-        };
-        assert_eq!(found["joints"][index], (0..JOINTS).map(joint).collect::<Value>());
+        assert_eq!(found["positions"][index], json!(tick.state.joint_position_rad));
         assert_eq!(found["commands"][index], json!(tick.torque_demanded));
     }
+    let state = &ticks[0].state;
+    let joint =
+        |i: usize| json!([format!("{}_joint", joint_name(i)), state.joint_position_rad[i], state.joint_torque_n_m[i]]);
+    assert_eq!(found["joints"], (0..JOINTS).map(joint).collect::<Value>());
+    // Once in each chunk with ticks: nothing but the torques changes.
+    let commands = found["counts"]["/robot/joint_cmd"].as_u64().unwrap();
+    assert!((1..=found["chunks"].as_u64().unwrap()).contains(&commands), "{commands}");
     let trials = json!([
         [0, { "f0": 1.25, "Fx": 100.0, "Fz": 250.0 }, null, null],
         [0, { "f0": 1.25, "Fx": 100.0, "Fz": 250.0 }, 0.0, 0],
@@ -101,7 +101,7 @@ fn python_reads_every_topic() {
     println!("Python read {total} messages on {} topics and agrees", found["counts"].as_object().unwrap().len());
 }
 
-/// Asserts that the frames, chained from the trunk, give the feet of the closed-form kinematics.
+/// Asserts that the frames, chained from the trunk, give the feet of the closed-form kinematics up to their single precision.
 fn frames_reach_the_feet(frames: &Value, tick: &Tick) {
     use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
     let frames = frames.as_array().unwrap();
@@ -128,6 +128,6 @@ fn frames_reach_the_feet(frames: &Value, tick: &Tick) {
         let angles = quadfrog::robot::leg_of(&tick.state.joint_position_rad, leg as usize);
         let position_leg = robot.leg_geometry.foot(&angles, leg.left_sign()).position_leg;
         let difference = foot.translation.vector - (description.joint_origin[0] + position_leg);
-        assert!(difference.norm() < 1e-12, "{}: {difference:?}", leg.name());
+        assert!(difference.norm() < 2e-7, "{}: {difference:?}", leg.name());
     }
 }

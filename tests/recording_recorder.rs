@@ -19,7 +19,7 @@ fn record(writer: Option<Writer>, ticks: &[Tick], records: &[Stamped]) -> (Recor
     let (mut ring, consumer) = rtrb::RingBuffer::new(64);
     let (sender, receiver) = mpsc::channel();
     let (trial_sender, trials) = mpsc::channel();
-    let handle = Recorder::spawn(consumer, receiver, writer, trial_sender).unwrap();
+    let handle = Recorder::spawn(consumer, receiver, writer.map(Into::into), trial_sender).unwrap();
     let mut records = records.iter().peekable();
     for tick in ticks {
         while let Some(stamped) = records.next_if(|stamped| stamped.time_ns <= tick.time_ns) {
@@ -159,7 +159,7 @@ fn a_recording_of_a_session_that_runs_can_be_played() {
     let (mut ring, consumer) = rtrb::RingBuffer::new(2048);
     let (sender, receiver) = mpsc::channel();
     let (trial_sender, _trials) = mpsc::channel();
-    let handle = Recorder::spawn(consumer, receiver, Some(writer), trial_sender).unwrap();
+    let handle = Recorder::spawn(consumer, receiver, Some(writer.into()), trial_sender).unwrap();
     for number in 0..500 {
         ring.push(moving_tick(number)).unwrap();
     }

@@ -1,4 +1,4 @@
-//! Every recorded field is played back bit for bit, in the order of time, from any moment.
+//! Every recorded field is played back bit for bit, those of ticks with single precision, in the order of time, from any moment.
 
 #[path = "support/recording.rs"]
 mod support;
@@ -87,6 +87,67 @@ fn shared_study() -> (&'static std::path::Path, &'static [Played]) {
         (folder, path, everything)
     });
     (path, everything)
+}
+
+/// Neighbouring ticks with the same commands but for the sign of a zero, a torque that was limited, and more.
+#[test]
+fn a_command_that_changes_in_its_smallest_part_comes_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("commands.mcap");
+    let mut ticks: Vec<Tick> = (0..3000).map(moving_tick).collect();
+    for (index, tick) in ticks.iter_mut().enumerate() {
+        tick.command.motor[2].position_rad = if index % 700 < 350 { 0.0 } else { -0.0 };
+        tick.command.motor[5].kp_joint = [20.0, f64::NAN, 30.0][index / 1000];
+        tick.torque_demanded[1] = single(tick.torque_demanded[1] + f64::from(u8::from(index % 3 == 0)));
+        tick.limited = u16::from(index % 3 == 0);
+    }
+    let expected = in_order(&ticks, &[]);
+    write(&path, &expected);
+    assert_same(&play(&path), &expected);
+    // From any moment, and with ticks left out.
+    let mut player = Player::open(&path).unwrap();
+    for start in [1, 349, 350, 1001, 2345] {
+        player.seek(start * MS);
+        assert_same(&[player.next().unwrap()], &[Played::Tick(ticks[start as usize])]);
+        player.seek_sparse(start * MS, 2_900 * MS, 7);
+        let wanted = ticks[start as usize..].iter().filter(|tick| tick.number % 7 == 0 || tick.number >= 2900);
+        assert_same(&player.by_ref().collect::<Vec<_>>(), &wanted.copied().map(Played::Tick).collect::<Vec<_>>());
+    }
+}
+
+#[test]
+fn numbers_of_a_tick_have_single_precision() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("rounded.mcap");
+    let huge = 1.234_567_890_123_456_7e300;
+    let numbers = [
+        0.1,
+        -1.0 / 3.0,
+        f64::from(f32::MAX),
+        16_777_217.0,
+        f64::MAX,
+        huge,
+        1e-42_f32.into(),
+        1.0,
+        2.5,
+        0.0,
+        -0.0,
+        3.0,
+    ];
+    let mut tick = Tick::default();
+    tick.state.joint_velocity_rad_s = numbers;
+    tick.torque_demanded = numbers;
+    tick.estimate.roll_pitch_yaw.z = 0.1;
+    write(&path, &[Played::Tick(tick)]);
+    let [Played::Tick(found)] = play(&path)[..] else { panic!("one tick was written") };
+    for found in [found.state.joint_velocity_rad_s, found.torque_demanded] {
+        for (found, number) in found.into_iter().zip(numbers) {
+            let expected = if number.abs() <= f64::from(f32::MAX) { single(number) } else { found };
+            assert_eq!(found.to_bits(), expected.to_bits(), "{number}");
+            assert!((found / number - 1.0).abs() <= 2_f64.powi(-24) || number == 0.0, "{number} is {found}");
+        }
+    }
+    assert_eq!(found.estimate.roll_pitch_yaw.z, single(0.1));
 }
 
 #[test]

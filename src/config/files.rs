@@ -37,11 +37,14 @@ pub struct RealtimeFile {
     pub lock_memory: bool,
 }
 
-/// Rate of the ticks in a recording.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+/// Rate of the ticks in a recording, and the limits of its files.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 pub struct RecordingFile {
     /// Whether every tick is recorded while the robot is disarmed, too.
     pub full_rate: bool,
+    /// Size after which a recording continues in the next file, MB (10^6 bytes).
+    pub rotate_mb: u32,
+    pub rotate_minutes: f64,
 }
 
 /// Time from approval to impulse, in stance.

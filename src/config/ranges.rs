@@ -31,6 +31,9 @@ const CONTROL: &[Row] = &[
     (&["estimator.*"], within!(1e-9, 1000)),
     (&["realtime.hardware_priority", "realtime.simulator_priority"], within!(0, 99, "(0 requests none)")),
     (&["realtime.core"], within!(-1, 1023, "(-1 is any core)")),
+    // A trial takes about 1 MB. A file of 100 GB is beyond the memory of a reader.
+    (&["recording.rotate_mb"], within!(1, 100_000, "MB")),
+    (&["recording.rotate_minutes"], within!(0.01, 1440, "min")),
     (&["tasks.*.stance_m"], within!(-2, 2, "m")),
     (&["tasks.*.jumps"], within!(1, 100, "jumps")),
     (&["tasks.*.repeats"], within!(1, 50, "rollouts")),

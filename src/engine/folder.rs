@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::options::{EngineError, Options};
 use crate::config::Config;
+use crate::recording::session_files::next_recording;
 use crate::robot::description::RobotDescription;
 
 /// Name of the study's journal in its folder.
@@ -28,10 +29,7 @@ pub fn prepare_folder(options: &Options) -> Result<LockedFolder, EngineError> {
     std::fs::create_dir_all(folder).map_err(system(format!("{}: cannot be made", folder.display())))?;
     let lock = lock_folder(folder)?;
     keep_config(options, folder)?;
-    let taken = |path: &PathBuf| path.exists() || path.with_extension("mcap.part").exists();
-    let names = std::iter::once("session.mcap".to_owned()).chain((2..).map(|n| format!("session-{n}.mcap")));
-    let recording = names.map(|name| folder.join(name)).find(|path| !taken(path));
-    Ok(LockedFolder { recording, _lock: Some(lock) })
+    Ok(LockedFolder { recording: next_recording(folder, None), _lock: Some(lock) })
 }
 
 /// Locks a study's folder and writes this process into the lock. The operating system releases the lock however the session

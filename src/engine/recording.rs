@@ -1,39 +1,66 @@
 //! The recording of a session: created with everything that describes it.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use super::folder::{attachments, utc_ns};
 use super::options::{EngineError, Options};
 use super::study::session_info;
+use crate::recording::record::SessionInfo;
 use crate::recording::scene::{Ground, GroundBox};
-use crate::recording::writer::{GroundOf, Writer};
+use crate::recording::session_writer::{BeginFile, RotationLimits, SessionWriter};
+use crate::recording::writer::Writer;
 use crate::session::experiment::next_seed;
 use crate::sim::TerrainKind;
 use crate::trial::{Backend, TrialRecord};
 use nalgebra::Vector3;
 
-/// Creates the recording `path` of a session with `options`: facts, configuration, robot with its shapes, ground.
+/// Ground of a trial that begins, or with none of the start; for every file of a session.
+type SharedGround = Arc<dyn Fn(Option<&TrialRecord>) -> Option<Ground> + Send + Sync>;
+
+/// Creates the recording `path` of a session with `options`: facts, configuration, robot with its shapes, ground. It continues
+/// in the next numbered file of its folder at the limits of `control.toml`, [recording].
 ///
 /// # Errors
 /// As of [`Writer::create`].
-pub fn create_recording(path: &Path, options: &Options) -> Result<Writer, EngineError> {
-    let info = session_info(options, &path.display().to_string());
-    let mut writer = Writer::create(path, &info, utc_ns(), &attachments(options))?;
-    if !options.config.control.recording.full_rate {
-        writer.thin_while_disarmed();
-    }
-    writer.show(options.robot.clone(), ground_of(options))?;
-    Ok(writer)
+pub fn create_recording(path: &Path, options: &Options) -> Result<SessionWriter, EngineError> {
+    let settings = options.config.control.recording;
+    let limits = RotationLimits {
+        bytes: u64::from(settings.rotate_mb) * 1_000_000,
+        duration_ns: (settings.rotate_minutes * 60e9) as u64,
+    };
+    Ok(SessionWriter::create(path, limits, files_of(options))?)
+}
+
+/// Returns a function that begins a file of the session. All have the same facts but their name.
+fn files_of(options: &Options) -> BeginFile {
+    let (info, start_utc_ns) = (session_info(options, ""), utc_ns());
+    let thinned = !options.config.control.recording.full_rate;
+    let owned = |(name, media, bytes): (&str, &str, &[u8])| (name.to_owned(), media.to_owned(), bytes.to_vec());
+    let attached: Vec<_> = attachments(options).into_iter().map(owned).collect();
+    let (robot, ground) = (options.robot.clone(), ground_of(options));
+    Box::new(move |path, begin_ns| {
+        let info = SessionInfo { recording: path.display().to_string(), ..info.clone() };
+        let attached: Vec<_> =
+            attached.iter().map(|(name, media, bytes)| (name.as_str(), media.as_str(), &bytes[..])).collect();
+        let mut writer = Writer::create_from(path, &info, start_utc_ns, begin_ns, &attached)?;
+        if thinned {
+            writer.thin_while_disarmed();
+        }
+        let ground = Arc::clone(&ground);
+        writer.show(robot.clone(), Box::new(move |trial| ground(trial)))?;
+        Ok(writer)
+    })
 }
 
 /// Returns the ground of simulated trials by their seeds; under a real robot a plane.
-fn ground_of(options: &Options) -> GroundOf {
+fn ground_of(options: &Options) -> SharedGround {
     if options.backend == Backend::Hardware {
-        return Box::new(|_| Some(Ground { normal_world: Vector3::z(), boxes: Vec::new() }));
+        return Arc::new(|_: Option<&TrialRecord>| Some(Ground { normal_world: Vector3::z(), boxes: Vec::new() }));
     }
     let terrain = options.config.simulator.terrain;
     let start = u64::from(options.seed);
-    Box::new(move |trial: Option<&TrialRecord>| {
+    Arc::new(move |trial: Option<&TrialRecord>| {
         let seed = match trial {
             Some(row) => next_seed(row)?,
             None => start,

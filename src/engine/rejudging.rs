@@ -31,13 +31,6 @@ pub struct RejudgedTrial {
     pub estimate: Option<EstimateChange>,
 }
 
-impl RejudgedTrial {
-    /// Returns the new value less the old one.
-    pub fn difference(&self) -> Option<f64> {
-        Some(self.new.value? - self.old.value?)
-    }
-}
-
 /// The recomputed estimate of a trial beside the recorded one; of several rollouts the largest numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct EstimateChange {

@@ -56,6 +56,8 @@ pub struct TickDifference {
 pub enum VerifyError {
     #[error(transparent)]
     Recording(#[from] RecordingError),
+    #[error("{}: not verifiable: it has no tick of a trial that came to its own end", path.display())]
+    NoTrial { path: PathBuf },
     #[error("{}: not verifiable: {reason}", path.display())]
     NotVerifiable { path: PathBuf, reason: String },
 }
@@ -177,7 +179,7 @@ pub fn verify(path: &Path) -> Result<Verification, VerifyError> {
         ticks += ended.compared;
     }
     if trials == 0 {
-        return Err(refuse("it has no tick of a trial that came to its own end".into()));
+        return Err(VerifyError::NoTrial { path: path.into() });
     }
     Ok(Verification::Equal { trials, ticks, left_out })
 }

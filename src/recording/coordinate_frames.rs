@@ -4,6 +4,7 @@ use foxglove::messages::{FrameTransform, FrameTransforms, Pose, PoseInFrame, Qua
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::tick::timestamp;
+use super::wire::to_single_precision;
 use crate::robot::JOINT_NAMES;
 use crate::robot::description::RobotDescription;
 use crate::telemetry::Tick;
@@ -57,10 +58,11 @@ pub fn pose_of(position: &Vector3<f64>, orientation: &UnitQuaternion<f64>) -> Po
 }
 
 pub fn vector(v: &Vector3<f64>) -> Vector {
-    Vector { x: v.x, y: v.y, z: v.z }
+    let [x, y, z] = v.data.0[0].map(to_single_precision);
+    Vector { x, y, z }
 }
 
 fn quaternion(q: &UnitQuaternion<f64>) -> Quaternion {
-    let q = q.coords;
-    Quaternion { x: q.x, y: q.y, z: q.z, w: q.w }
+    let [x, y, z, w] = q.coords.data.0[0].map(to_single_precision);
+    Quaternion { x, y, z, w }
 }

@@ -21,6 +21,7 @@ pub mod recover;
 pub mod scene;
 mod schema;
 pub mod session_files;
+pub mod session_writer;
 mod tick;
 pub mod timeline;
 mod topic;

@@ -1,6 +1,7 @@
-//! The recorder thread: writes ticks and records into one file, and delivers each trial's ticks to the session.
+//! The recorder thread: writes ticks and records into the session's files, and delivers each trial's ticks to the session.
 
 use std::collections::VecDeque;
+use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, Sender, TryRecvError};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
@@ -10,7 +11,7 @@ use rtrb::Consumer;
 
 use super::error::RecordingError;
 use super::record::{Record, Stamped};
-use super::writer::Writer;
+use super::session_writer::SessionWriter;
 use crate::telemetry::{Mode, Tick};
 
 /// Sleep of the thread when there is nothing to write; the ring holds several seconds.
@@ -42,13 +43,18 @@ pub enum CollectedTicks {
 /// State of the recording.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct RecorderStatus {
-    /// Bytes passed to the disk, without the open chunk.
+    /// Bytes passed to the disk in all files, without the open chunk.
     pub bytes: u64,
-    /// Ticks written.
+    /// Ticks written in all files.
     pub ticks: u64,
-    /// Error that ended the recording, which keeps its name `*.mcap.part`; none without an error.
+    /// Final name of the present file; empty without a recording.
+    pub file: PathBuf,
+    /// Number of files begun.
+    pub files: u32,
+    /// First error. One of the present file ended the recording, which keeps its name `*.mcap.part`; after one of the next file,
+    /// or of the file before, the recording goes on. None without an error.
     pub error: Option<String>,
-    /// Whether the file is complete and has its final name.
+    /// Whether the last file is complete and has its final name.
     pub finished: bool,
 }
 
@@ -67,7 +73,9 @@ impl RecorderWatch {
 pub struct Recorder {
     ticks: Consumer<Tick>,
     records: Receiver<Stamped>,
-    writer: Option<Writer>,
+    writer: Option<SessionWriter>,
+    /// The writer after an error.
+    failed: Option<SessionWriter>,
     handed: Sender<CollectedTicks>,
     trial: Option<TrialTicks>,
     /// The last ticks.
@@ -94,7 +102,7 @@ impl Recorder {
     pub fn spawn(
         ticks: Consumer<Tick>,
         records: Receiver<Stamped>,
-        writer: Option<Writer>,
+        writer: Option<SessionWriter>,
         handed: Sender<CollectedTicks>,
     ) -> std::io::Result<RecorderHandle> {
         let status = Arc::new(Mutex::new(RecorderStatus::default()));
@@ -102,6 +110,7 @@ impl Recorder {
             ticks,
             records,
             writer,
+            failed: None,
             handed,
             trial: None,
             last: VecDeque::with_capacity(FAULT_TICKS),
@@ -109,7 +118,7 @@ impl Recorder {
             flushed: Instant::now(),
             status: status.clone(),
         };
-        recorder.publish();
+        recorder.publish_present();
         let thread = std::thread::Builder::new().name("recorder".into()).spawn(move || recorder.run())?;
         Ok(RecorderHandle { status, thread })
     }
@@ -122,9 +131,9 @@ impl Recorder {
             let idle = self.write_new();
             if self.flushed.elapsed() >= FLUSH_PERIOD {
                 self.flushed = Instant::now();
-                self.write(Writer::flush);
+                self.write(SessionWriter::flush);
             }
-            self.publish();
+            self.publish_present();
             if no_more_ticks && no_more_records && self.ticks.is_empty() {
                 break;
             }
@@ -134,15 +143,14 @@ impl Recorder {
         }
         self.deliver_trial();
         if let Some(writer) = self.writer.take() {
-            let (bytes, ticks) = (writer.bytes(), writer.ticks());
-            let finished = writer.finish();
+            self.publish(&writer);
+            let (finished, trouble) = writer.finish();
             let mut status = self.status.lock().unwrap_or_else(PoisonError::into_inner);
-            *status = RecorderStatus {
-                bytes,
-                ticks,
-                finished: finished.is_ok(),
-                error: finished.err().map(|error| error.to_string()),
-            };
+            status.finished = finished.is_ok();
+            status.error = finished.err().or(trouble).map(|error| error.to_string());
+        }
+        if let Some(failed) = self.failed.take() {
+            failed.abandon();
         }
     }
 
@@ -179,25 +187,37 @@ impl Recorder {
         let Some(stamped) = self.waiting.pop_front() else { return };
         self.write(|writer| writer.record(&stamped));
         if matches!(&stamped.record, Record::Trial(row) if row.verdict.is_some()) {
-            self.write(Writer::sync);
+            self.write(SessionWriter::sync);
         }
     }
 
-    /// Calls the writer; drops it after an error.
-    fn write(&mut self, act: impl FnOnce(&mut Writer) -> Result<(), RecordingError>) {
+    /// Calls the writer; no more after an error.
+    fn write(&mut self, act: impl FnOnce(&mut SessionWriter) -> Result<(), RecordingError>) {
         let Some(writer) = &mut self.writer else { return };
         if let Err(error) = act(writer) {
-            self.publish();
-            self.writer = None;
+            self.publish_present();
+            self.failed = self.writer.take();
             self.status.lock().unwrap_or_else(PoisonError::into_inner).error = Some(error.to_string());
         }
     }
 
-    fn publish(&self) {
-        let Some(writer) = &self.writer else { return };
+    fn publish_present(&self) {
+        if let Some(writer) = &self.writer {
+            self.publish(writer);
+        }
+    }
+
+    fn publish(&self, writer: &SessionWriter) {
         let mut status = self.status.lock().unwrap_or_else(PoisonError::into_inner);
         status.bytes = writer.bytes();
         status.ticks = writer.ticks();
+        status.files = writer.files();
+        if status.file != writer.path() {
+            status.file = writer.path().to_path_buf();
+        }
+        if status.error.is_none() {
+            status.error = writer.trouble().map(ToString::to_string);
+        }
     }
 
     fn collect(&mut self, tick: &Tick) {

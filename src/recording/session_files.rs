@@ -14,6 +14,18 @@ fn number(path: &Path) -> Option<u32> {
     }
 }
 
+/// Returns the name of a recording by its number.
+fn name(number: u32) -> String {
+    if number == 1 { "session.mcap".to_owned() } else { format!("session-{number}.mcap") }
+}
+
+/// Returns the path of the next recording in a folder: the first free name after that of `last`, or of all.
+pub fn next_recording(folder: &Path, last: Option<&Path>) -> Option<PathBuf> {
+    let first = last.and_then(number).map_or(1, |number| number.saturating_add(1));
+    let taken = |path: &PathBuf| path.exists() || path.with_extension("mcap.part").exists();
+    (first..=u32::MAX).map(|number| folder.join(name(number))).find(|path| !taken(path))
+}
+
 /// Returns the recordings in a folder, by their number; none of a folder that cannot be read. Of a file with and without the
 /// ending `.part` only the finished one: the other was recovered.
 pub fn recordings_in(folder: &Path) -> Vec<PathBuf> {

@@ -1,10 +1,12 @@
-//! A tick as the messages of its three topics, and back, bit for bit.
+//! A tick as messages, and back, with numbers of single precision.
+
+use std::mem::take;
 
 use foxglove::messages::{JointState, JointStates, Timestamp};
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::frog;
-use super::wire::{DecodeError, Way, encoded};
+use super::wire::{DecodeError, Way, encoded, to_single_precision};
 use crate::robot::description::RobotDescription;
 use crate::robot::{Battery, JOINTS, Joints, LEGS, MotorCommand, PerLeg, RobotState, Truth, joint_name};
 use crate::telemetry::Tick;
@@ -29,20 +31,53 @@ pub fn named_joints(robot: Option<&RobotDescription>) -> JointStates {
 pub fn joint_states(state: &RobotState, log_time: u64, message: &mut JointStates) {
     message.timestamp = Some(timestamp(log_time));
     for (index, joint) in message.joints.iter_mut().enumerate() {
-        joint.position = Some(state.joint_position_rad[index]);
-        joint.velocity = Some(state.joint_velocity_rad_s[index]);
-        joint.effort = Some(state.joint_torque_n_m[index]);
+        joint.position = Some(to_single_precision(state.joint_position_rad[index]));
+        joint.velocity = Some(to_single_precision(state.joint_velocity_rad_s[index]));
+        joint.effort = Some(to_single_precision(state.joint_torque_n_m[index]));
     }
 }
 
-/// Returns the joint command as sent, with the torque before the limits.
-pub fn joint_command(tick: &Tick) -> frog::JointCommand {
-    encoded(joint_command_fields, tick)
+/// Returns a tick as two messages: what is commanded beside the torques, which rarely changes, and everything else.
+pub fn split(tick: &Tick) -> (frog::JointCommand, frog::ControlTick) {
+    let frog::fault_ticks::Whole { tick, command, position, velocity, torque } = whole(tick);
+    let (mut command, control) = (command.unwrap_or_default(), tick.unwrap_or_default());
+    let torque_command = take(&mut command.torque);
+    let torque_demanded =
+        Some(take(&mut command.torque_demanded)).filter(|demanded| !same_bits(demanded, &torque_command));
+    let control = frog::ControlTick {
+        joint_position: position,
+        joint_velocity: velocity,
+        joint_torque: torque,
+        torque_command,
+        torque_demanded: torque_demanded.unwrap_or_default(),
+        limited: take(&mut command.limited),
+        ..control
+    };
+    (command, control)
 }
 
-/// Returns everything else of a tick.
-pub fn control_tick(tick: &Tick) -> frog::ControlTick {
-    encoded(control_tick_fields, tick)
+/// The inverse of [`split`].
+pub fn join(command: &frog::JointCommand, mut control: frog::ControlTick) -> Result<Tick, DecodeError> {
+    let torque = take(&mut control.torque_command);
+    let demanded = take(&mut control.torque_demanded);
+    let mut command = frog::JointCommand {
+        torque_demanded: if demanded.is_empty() { torque.clone() } else { demanded },
+        torque,
+        limited: control.limited,
+        ..command.clone()
+    };
+    let measured = [&mut control.joint_position, &mut control.joint_velocity, &mut control.joint_torque].map(take);
+    joined(&mut control, &mut command, measured)
+}
+
+/// Whether the joints of a tick are in its message, as [`split`] writes it.
+pub fn has_joints(control: &frog::ControlTick) -> bool {
+    !control.joint_position.is_empty()
+}
+
+/// Whether two lists are the same bit for bit: 0.0 is not -0.0 here, and a NaN is like itself.
+fn same_bits(one: &[f64], other: &[f64]) -> bool {
+    one.iter().map(|number| number.to_bits()).eq(other.iter().map(|number| number.to_bits()))
 }
 
 fn joint_command_fields(way: Way, tick: &mut Tick, m: &mut frog::JointCommand) -> Result<(), DecodeError> {
@@ -78,8 +113,8 @@ fn control_tick_fields(way: Way, tick: &mut Tick, m: &mut frog::ControlTick) -> 
     way.variant(&mut tick.mode, &mut m.mode, "mode")?;
     way.variant(&mut tick.phase, &mut m.phase, "phase")?;
     way.copy(&mut tick.trial, &mut m.trial);
-    way.number(&mut tick.trial_time_s, &mut m.trial_time);
-    way.number(&mut tick.theta_rad, &mut m.theta);
+    way.single(&mut tick.trial_time_s, &mut m.trial_time);
+    way.single(&mut tick.theta_rad, &mut m.theta);
 
     let estimate = &mut tick.estimate;
     vector(way, &mut estimate.roll_pitch_yaw, [&mut m.roll, &mut m.pitch, &mut m.yaw]);
@@ -103,7 +138,7 @@ fn control_tick_fields(way: Way, tick: &mut Tick, m: &mut frog::ControlTick) -> 
     vector(way, &mut state.imu.gyro_body, [&mut m.gyro_x, &mut m.gyro_y, &mut m.gyro_z]);
     vector(way, &mut state.imu.accel_body, [&mut m.acc_x, &mut m.acc_y, &mut m.acc_z]);
     let force = [&mut m.force_fr, &mut m.force_fl, &mut m.force_rr, &mut m.force_rl];
-    way.numbers(state.foot_force_n.each_mut(), force);
+    way.singles(state.foot_force_n.each_mut(), force);
     way.array(&mut state.motor_temperature_c, &mut m.motor_temperature, JOINT_VALUES)?;
     let mut enabled = (0..JOINTS).map(|motor| u32::from(state.motor_enabled[motor]) << motor).sum();
     way.copy(&mut enabled, &mut m.motor_enabled);
@@ -119,9 +154,9 @@ fn control_tick_fields(way: Way, tick: &mut Tick, m: &mut frog::ControlTick) -> 
 }
 
 fn battery(way: Way, ours: &mut Battery, m: &mut frog::Battery) -> Result<(), DecodeError> {
-    way.number(&mut ours.charge_percent, &mut m.charge);
-    way.number(&mut ours.voltage_v, &mut m.voltage);
-    way.number(&mut ours.current_a, &mut m.current);
+    way.single(&mut ours.charge_percent, &mut m.charge);
+    way.single(&mut ours.voltage_v, &mut m.voltage);
+    way.single(&mut ours.current_a, &mut m.current);
     way.array(&mut ours.cell_v, &mut m.cell, "cells")
 }
 
@@ -143,8 +178,8 @@ fn truth(way: Way, ours: &mut Truth, m: &mut frog::Truth) -> Result<(), DecodeEr
     Ok(())
 }
 
-/// A tick from its three messages.
-pub fn join(
+/// Returns a tick from the three messages of an older recording.
+pub fn join_three(
     mut control: frog::ControlTick,
     joints: &JointStates,
     mut command: frog::JointCommand,
@@ -159,11 +194,11 @@ pub fn join(
 /// A whole tick of a fault, in one message.
 pub fn whole(tick: &Tick) -> frog::fault_ticks::Whole {
     frog::fault_ticks::Whole {
-        tick: Some(control_tick(tick)),
-        command: Some(joint_command(tick)),
-        position: tick.state.joint_position_rad.to_vec(),
-        velocity: tick.state.joint_velocity_rad_s.to_vec(),
-        torque: tick.state.joint_torque_n_m.to_vec(),
+        tick: Some(encoded(control_tick_fields, tick)),
+        command: Some(encoded(joint_command_fields, tick)),
+        position: tick.state.joint_position_rad.map(to_single_precision).to_vec(),
+        velocity: tick.state.joint_velocity_rad_s.map(to_single_precision).to_vec(),
+        torque: tick.state.joint_torque_n_m.map(to_single_precision).to_vec(),
     }
 }
 
@@ -195,10 +230,10 @@ fn contacts(way: Way, ours: &mut PerLeg<bool>, theirs: [&mut bool; LEGS]) {
 }
 
 fn vector(way: Way, ours: &mut Vector3<f64>, theirs: [&mut Option<f64>; 3]) {
-    way.numbers(ours.data.0[0].each_mut(), theirs);
+    way.singles(ours.data.0[0].each_mut(), theirs);
 }
 
 /// x, y, z, w. Not normalized: that would change the last bits.
 fn rotation(way: Way, ours: &mut UnitQuaternion<f64>, theirs: [&mut Option<f64>; 4]) {
-    way.numbers(ours.as_mut_unchecked().coords.data.0[0].each_mut(), theirs);
+    way.singles(ours.as_mut_unchecked().coords.data.0[0].each_mut(), theirs);
 }

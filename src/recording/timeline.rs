@@ -102,6 +102,13 @@ impl Timeline {
         let (Some(first), Some(last)) = (self.parts.first(), self.parts.last()) else { return Ok(()) };
         self.check_same_study(&player)?;
         let end_ns = last.end_ns();
+        if player.start_utc_ns() == last.player.start_utc_ns() {
+            // The next file of the same session: on one clock, and no pause is shortened.
+            let shift_ns = last.shift_ns;
+            let begin_ns = player.first_ns().saturating_add_signed(shift_ns).max(end_ns);
+            self.parts.push(Part { player, begin_ns, shift_ns });
+            return Ok(());
+        }
         let since_first = i128::from(player.start_utc_ns()) - i128::from(first.player.start_utc_ns());
         let real_ns = since_first + i128::from(player.first_ns());
         let pause_ns = (real_ns - i128::from(end_ns)).max(0);

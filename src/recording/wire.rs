@@ -28,6 +28,20 @@ pub enum Way {
     Decode,
 }
 
+/// Bits of a double that single precision does not have.
+const DROPPED_BITS: u32 = f64::MANTISSA_DIGITS - f32::MANTISSA_DIGITS;
+
+/// Returns a number rounded to the 24 significant bits of single precision, to even where two are equally near; a number of
+/// single precision is unchanged, and so is what is not finite. Unlike a conversion to `f32` it keeps the range of a double: a
+/// number that a defect made huge is recorded as it was. Three of its eight bytes are zero, which costs nothing in a chunk.
+pub fn to_single_precision(number: f64) -> f64 {
+    let bits = number.to_bits();
+    let odd = bits >> DROPPED_BITS & 1;
+    let up = bits.wrapping_add((1 << (DROPPED_BITS - 1)) - 1 + odd);
+    let rounded = f64::from_bits(up >> DROPPED_BITS << DROPPED_BITS);
+    if number.is_finite() && rounded.is_finite() { rounded } else { number }
+}
+
 /// Copies every field between our type and its message.
 pub type Fields<T, M> = fn(Way, &mut T, &mut M) -> Result<(), DecodeError>;
 
@@ -73,13 +87,21 @@ impl Way {
         }
     }
 
-    pub fn numbers<const N: usize>(self, ours: [&mut f64; N], theirs: [&mut Option<f64>; N]) {
-        for (ours, theirs) in ours.into_iter().zip(theirs) {
-            self.number(ours, theirs);
+    /// Copies a number of a tick like [`number`](Way::number), rounded to single precision.
+    pub fn single(self, ours: &mut f64, theirs: &mut Option<f64>) {
+        self.number(ours, theirs);
+        if self == Way::Encode {
+            *theirs = theirs.map(to_single_precision);
         }
     }
 
-    /// Copies a list of exactly `N` numbers; `name` is for the message.
+    pub fn singles<const N: usize>(self, ours: [&mut f64; N], theirs: [&mut Option<f64>; N]) {
+        for (ours, theirs) in ours.into_iter().zip(theirs) {
+            self.single(ours, theirs);
+        }
+    }
+
+    /// Copies a list of exactly `N` numbers of a tick, rounded to single precision; `name` is for the message.
     pub fn array<const N: usize>(
         self,
         ours: &mut [f64; N],
@@ -87,7 +109,7 @@ impl Way {
         name: &'static str,
     ) -> Result<(), DecodeError> {
         match self {
-            Way::Encode => *theirs = ours.to_vec(),
+            Way::Encode => *theirs = ours.map(to_single_precision).to_vec(),
             Way::Decode => *ours = theirs.as_slice().try_into().map_err(|_| DecodeError::Length(name, theirs.len()))?,
         }
         Ok(())

@@ -1,12 +1,13 @@
 //! Writer of a recording: a live session, or a single rollout at once.
 
 use std::collections::BTreeMap;
-use std::fs::{self, OpenOptions};
+use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
 
 use foxglove::messages::JointStates;
 use mcap::McapError;
+use prost::Message as _;
 
 use super::error::RecordingError;
 pub use super::output::Sink;
@@ -21,7 +22,7 @@ use crate::robot::description::RobotDescription;
 use crate::telemetry::{Mode, Tick};
 use crate::trial::TrialRecord;
 
-/// Period of `/robot/pose` and `/tf`, for viewers; both follow from the ticks.
+/// Period of `/robot/pose`, `/tf` and `/robot/joint_states`, for viewers; all follow from the ticks.
 const FRAMES_PERIOD_NS: u64 = 10_000_000;
 
 /// Of the ticks while the robot is disarmed one of so many is kept by [`Writer::thin_while_disarmed`]: ten a second.
@@ -42,13 +43,17 @@ pub struct Writer {
     /// The ground written last.
     ground: Option<Ground>,
     start_utc_ns: u64,
-    /// Log times of the first and last tick of each trial in this file.
+    /// Log time of the file's first messages.
+    begin_utc_ns: u64,
+    /// Log times of the first and last tick of each trial of the session.
     spans: BTreeMap<u32, TrialSpan>,
     /// The newest row of each trial.
     rows: BTreeMap<u32, TrialRecord>,
     /// Trial and mode of the last tick: a change may be a marker.
     last: Option<(Option<u32>, Mode)>,
     last_frames: Option<u64>,
+    /// The last joint command, encoded, and the number of its chunk.
+    command: Option<(u64, Vec<u8>)>,
     records: u32,
     ticks: u64,
     part: PathBuf,
@@ -59,7 +64,7 @@ pub struct Writer {
 
 impl Writer {
     /// Begins the recording `path` (`*.mcap`), named `*.mcap.part` until it is finished. Creates missing folders. Metadata,
-    /// attachments and the session's first message are on the disk on return.
+    /// attachments and the session's first message are on the disk on return; before, the file is named `*.mcap.new`.
     ///
     /// `start_utc_ns` is the UTC time of engine time 0, ns since 1970; `attachments` are (name, media type, bytes).
     ///
@@ -69,6 +74,20 @@ impl Writer {
         path: impl AsRef<Path>,
         session: &SessionInfo,
         start_utc_ns: u64,
+        attachments: &[(&str, &str, &[u8])],
+    ) -> Result<Writer, RecordingError> {
+        Writer::create_from(path, session, start_utc_ns, 0, attachments)
+    }
+
+    /// Like [`create`](Writer::create), for a file whose first messages have the time `begin_ns` since engine time 0.
+    ///
+    /// # Errors
+    /// As of [`create`](Writer::create).
+    pub fn create_from(
+        path: impl AsRef<Path>,
+        session: &SessionInfo,
+        start_utc_ns: u64,
+        begin_ns: u64,
         attachments: &[(&str, &str, &[u8])],
     ) -> Result<Writer, RecordingError> {
         let path = path.as_ref();
@@ -89,8 +108,20 @@ impl Writer {
             fs::create_dir_all(folder).map_err(io(folder, "make the folder"))?;
         }
         let part = with_suffix(path, ".part");
-        let file = OpenOptions::new().write(true).create_new(true).open(&part).map_err(io(&part, "create the file"))?;
-        Writer::begin(Box::new(file), path, part, session, start_utc_ns, attachments)
+        if part.exists() {
+            return Err(RecordingError::Exists { path: part });
+        }
+        // A recording that a kill or a full disk ends before its head is whole has no name under which it is played.
+        let new = with_suffix(path, ".new");
+        let file = File::create(&new).map_err(io(&part, "create the file"))?;
+        let times = (start_utc_ns, begin_ns);
+        let begun = Writer::begin(Box::new(file), path, part.clone(), session, times, attachments)
+            .and_then(|writer| fs::rename(&new, &part).map(|()| writer).map_err(io(&part, "create the file")));
+        if begun.is_err() {
+            // The first error is the one to report.
+            let _ = fs::remove_file(&new);
+        }
+        begun
     }
 
     /// Like [`create`](Writer::create), into any sink. `path` is for messages only; nothing is renamed.
@@ -102,7 +133,7 @@ impl Writer {
         attachments: &[(&str, &str, &[u8])],
     ) -> Result<Writer, RecordingError> {
         let path = path.as_ref();
-        Writer::begin(sink, path, path.into(), session, start_utc_ns, attachments)
+        Writer::begin(sink, path, path.into(), session, (start_utc_ns, 0), attachments)
     }
 
     fn begin(
@@ -110,7 +141,7 @@ impl Writer {
         path: &Path,
         part: PathBuf,
         session: &SessionInfo,
-        start_utc_ns: u64,
+        (start_utc_ns, begin_ns): (u64, u64),
         attachments: &[(&str, &str, &[u8])],
     ) -> Result<Writer, RecordingError> {
         let mut writer = Writer {
@@ -121,10 +152,12 @@ impl Writer {
             ground_of: None,
             ground: None,
             start_utc_ns,
+            begin_utc_ns: start_utc_ns.saturating_add(begin_ns),
             spans: BTreeMap::new(),
             rows: BTreeMap::new(),
             last: None,
             last_frames: None,
+            command: None,
             records: 0,
             ticks: 0,
             part,
@@ -132,7 +165,7 @@ impl Writer {
             failed: None,
         };
         writer.out.head(session, start_utc_ns, attachments).map_err(|error| error_at(&writer.part, error))?;
-        writer.record(&Stamped { time_ns: 0, record: Record::Session(session.clone()) })?;
+        writer.record(&Stamped { time_ns: begin_ns, record: Record::Session(session.clone()) })?;
         writer.sync()?;
         Ok(writer)
     }
@@ -148,13 +181,42 @@ impl Writer {
         self.out
             .robot(&robot, self.start_utc_ns)
             .and_then(|()| {
-                self.out.message(Topic::RobotScene, 0, self.start_utc_ns, &scene::robot(&robot, self.start_utc_ns))
+                self.out.message(Topic::RobotScene, 0, self.begin_utc_ns, &scene::robot(&robot, self.begin_utc_ns))
             })
             .map_err(|error| self.failure(error))?;
         self.robot = Some(robot);
         self.ground_of = Some(ground);
-        self.write_ground(None, self.start_utc_ns).map_err(|error| self.failure(error))?;
+        self.write_ground(None, self.begin_utc_ns).map_err(|error| self.failure(error))?;
         self.sync()
+    }
+
+    /// Makes this recording the continuation of another one of the session: with its trial table, present ground and numbers.
+    ///
+    /// # Errors
+    /// When the disk fails.
+    pub fn continue_after(&mut self, before: &Writer) -> Result<(), RecordingError> {
+        self.spans.clone_from(&before.spans);
+        for row in before.rows.values() {
+            self.write_row(row, self.begin_utc_ns).map_err(|error| self.failure(error))?;
+        }
+        (self.records, self.last) = (before.records, before.last);
+        let ground = before.ground.clone().filter(|ground| self.ground.as_ref() != Some(ground));
+        if let Some(ground) = &ground {
+            self.out
+                .message(Topic::GroundScene, 0, self.begin_utc_ns, &scene::ground(ground, self.begin_utc_ns))
+                .map_err(|error| self.failure(error))?;
+        }
+        self.ground = ground.or(self.ground.take());
+        self.flush()
+    }
+
+    /// Writes a row of the trial table.
+    fn write_row(&mut self, row: &TrialRecord, log_time: u64) -> Result<(), McapError> {
+        let span = self.spans.get(&row.trial);
+        let (start_ns, end_ns) = (span.map(|(start, _)| *start), span.map(|(_, end)| *end));
+        let message = frog::Trial { start_ns, end_ns, ..encoded(trials::trial, row) };
+        self.rows.insert(row.trial, row.clone());
+        self.out.message(Topic::Trial, self.records, log_time, &message)
     }
 
     /// Writes the ground of a trial that begins, or of the start, if it differs from the one before.
@@ -191,13 +253,19 @@ impl Writer {
         let log_time = self.start_utc_ns.saturating_add(tick.time_ns);
         let sequence = tick.number as u32; // joins the messages of a tick in the player
         self.write_marker(tick, log_time)?;
-        tick::joint_states(&tick.state, log_time, &mut self.joints);
-        self.out.message(Topic::JointStates, sequence, log_time, &self.joints)?;
-        self.out.message(Topic::JointCommand, sequence, log_time, &tick::joint_command(tick))?;
-        self.out.message(Topic::Tick, sequence, log_time, &tick::control_tick(tick))?;
+        let (command, control) = tick::split(tick);
+        // Each chunk is played by itself.
+        let command_of_chunk = (self.out.closed_chunks, command.encode_to_vec());
+        if self.command.as_ref() != Some(&command_of_chunk) {
+            self.out.message(Topic::JointCommand, sequence, log_time, &command)?;
+            self.command = Some(command_of_chunk);
+        }
+        self.out.message(Topic::Tick, sequence, log_time, &control)?;
         let period = tick.time_ns / FRAMES_PERIOD_NS;
         if self.last_frames != Some(period) {
             self.last_frames = Some(period);
+            tick::joint_states(&tick.state, log_time, &mut self.joints);
+            self.out.message(Topic::JointStates, sequence, log_time, &self.joints)?;
             self.out.message(Topic::Pose, sequence, log_time, &coordinate_frames::pose(tick, log_time))?;
             if let Some(robot) = &self.robot {
                 self.out.message(
@@ -240,13 +308,7 @@ impl Writer {
             self.write_ground(Some(row), log_time).map_err(|error| self.failure(error))?;
         }
         let written = match &stamped.record {
-            Record::Trial(row) => {
-                let span = self.spans.get(&row.trial);
-                let (start_ns, end_ns) = (span.map(|(start, _)| *start), span.map(|(_, end)| *end));
-                let message = frog::Trial { start_ns, end_ns, ..encoded(trials::trial, row) };
-                self.rows.insert(row.trial, row.clone());
-                self.out.message(Topic::Trial, self.records, log_time, &message)
-            }
+            Record::Trial(row) => self.write_row(row, log_time),
             record => self.out.record(record, self.start_utc_ns, self.records, log_time),
         };
         written.and_then(|()| self.out.close_full_chunk()).map_err(|error| self.failure(error))

@@ -87,14 +87,14 @@ impl Signals {
         signals
     }
 
-    /// Writes the rows of a recording: `log_time`, ns UTC since 1970, then the signals. Returns the destination and the
+    /// Writes the rows of a recording's files, one after the other: `log_time`, ns UTC since 1970, then the signals. Returns the destination and the
     /// number of rows.
     ///
     /// # Errors
     /// When the destination cannot be written.
     pub fn export<W: Write + Send>(
         &self,
-        player: &mut Player,
+        players: &mut [Player],
         range: SignalRange,
         format: TableFormat,
         out: W,
@@ -116,23 +116,26 @@ impl Signals {
             });
             let mut spare = Some(self.columns());
             let mut rows = 0;
-            let start_utc_ns = player.start_utc_ns();
-            player.seek(range.first_ns(player));
-            for played in player {
-                if played.time_ns() >= range.until_ns {
-                    break;
-                }
-                let Played::Tick(tick) = played else { continue };
-                if range.trial.is_some() && tick.trial != range.trial {
-                    continue;
-                }
-                rows += 1;
-                self.push(&mut columns, start_utc_ns.saturating_add(tick.time_ns), &tick);
-                if columns[0].rows() == BATCH_ROWS {
-                    let Some(next) = spare.take().or_else(|| empty.recv().ok()) else { break };
-                    // The encoder has ended with an error.
-                    if full.send(std::mem::replace(&mut columns, next)).is_err() {
+            'files: for player in players {
+                let start_utc_ns = player.start_utc_ns();
+                let Some(first_ns) = range.first_ns(player) else { continue };
+                player.seek(first_ns);
+                for played in player.by_ref() {
+                    if played.time_ns() >= range.until_ns {
                         break;
+                    }
+                    let Played::Tick(tick) = played else { continue };
+                    if range.trial.is_some() && tick.trial != range.trial {
+                        continue;
+                    }
+                    rows += 1;
+                    self.push(&mut columns, start_utc_ns.saturating_add(tick.time_ns), &tick);
+                    if columns[0].rows() == BATCH_ROWS {
+                        let Some(next) = spare.take().or_else(|| empty.recv().ok()) else { break 'files };
+                        // The encoder has ended with an error.
+                        if full.send(std::mem::replace(&mut columns, next)).is_err() {
+                            break 'files;
+                        }
                     }
                 }
             }
@@ -329,10 +332,13 @@ fn add(column: &mut TypedColumn, value: Scalar) {
 }
 
 impl SignalRange {
-    /// Returns the time at which playing begins: that of the range, or of the trial's first tick.
-    fn first_ns(&self, player: &Player) -> u64 {
+    /// Returns the time at which playing begins: that of the range, or of the trial's first tick; none of a file without it.
+    fn first_ns(&self, player: &Player) -> Option<u64> {
         let begins = |trial| player.markers().iter().find(|marker| marker.kind == MarkerKind::Trial(trial));
-        let of_trial = self.trial.and_then(begins).map_or(0, |marker| marker.time_ns);
-        self.from_ns.max(of_trial)
+        let of_trial = match self.trial {
+            Some(trial) => begins(trial)?.time_ns,
+            None => 0,
+        };
+        Some(self.from_ns.max(of_trial))
     }
 }

@@ -6,6 +6,9 @@ use crate::control::settings::ControlSettings;
 use crate::telemetry::{Tick, TrialEnd};
 use crate::trial::{MeasuredJump, ObjectiveRule, RepeatRecord, TrialRecord, Verdict};
 
+/// Largest difference of two objectives, m or rad (with `rate` a second), that the single precision of recorded ticks explains.
+const RECORDED_PRECISION: f64 = 1e-5;
+
 /// The rules' result for a trial, before a person's verdict.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Judgement {
@@ -33,6 +36,18 @@ impl Judgement {
 
     fn measured(measured: Option<MeasuredJump>, verdict: Option<Verdict>, cause: String) -> Judgement {
         Judgement { value: measured.as_ref().and_then(|measured| measured.measured_value), measured, verdict, cause }
+    }
+
+    /// Returns by how much the value exceeds that of `old`; 0 within the precision of recorded ticks, none where one is missing.
+    pub fn difference(&self, old: &Judgement) -> Option<f64> {
+        let difference = self.value? - old.value?;
+        Some(if difference.abs() <= RECORDED_PRECISION { 0.0 } else { difference })
+    }
+
+    /// Whether verdict, reason or value differ from those of `old`.
+    pub fn differs(&self, old: &Judgement) -> bool {
+        let same_value = self.difference(old).map_or(self.value == old.value, |difference| difference == 0.0);
+        self.verdict != old.verdict || self.cause != old.cause || !same_value
     }
 
     /// Returns the judgement of a trial of several rollouts from theirs.

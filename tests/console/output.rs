@@ -52,7 +52,7 @@ fn in_terminal(program: &Program, arguments: &[&str]) -> Session {
 
 /// Checks that a command printed no part of [`HOSTILE`] raw.
 fn assert_clean(session: &Session, command: &[&str]) {
-    for part in ["\u{1b}]0;", "\u{7}", "\u{9b}"] {
+    for part in ["\u{1b}]0;owned", "owned\u{7}", "\u{9b}"] {
         assert!(!session.sent(part.as_bytes()), "{command:?} prints {part:?}:\n{}", session.screen());
     }
 }

@@ -230,6 +230,21 @@ fn a_session_can_be_rebuilt_from_its_file_alone() {
 }
 
 #[test]
+fn a_tick_of_a_jump_takes_at_most_400_bytes() {
+    let program = Program::new();
+    program.write("noisy/simulator.toml", "[sensors]\nenabled = true\n");
+    // Sensor errors make the simulator's truth another set of numbers than the robot's state.
+    for (arguments, most) in [(&[][..], 400.0), (&["--config", "noisy"], 430.0)] {
+        program.text(&[&["optimize", "--trials", "3", "--record", "all", "--output", "out"], arguments].concat());
+        let study = program.studies("out").pop().unwrap();
+        let Some(found) = inspected(&study.join("session.mcap")) else { return };
+        let bytes = found["bytes_a_tick_of_jumps"].as_f64().unwrap();
+        assert!((100.0..=most).contains(&bytes), "{bytes} bytes");
+        std::fs::remove_dir_all(program.path("out")).unwrap();
+    }
+}
+
+#[test]
 fn units_are_in_the_file() {
     let program = Program::new();
     program.text(&["optimize", "--trials", "1", "--record", "all"]);

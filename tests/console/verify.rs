@@ -97,7 +97,8 @@ fn a_flipped_bit_is_found() {
         if tick.trial == Some(1) && tick.trial_time_s >= 0.1 && altered.is_none() {
             let value = &mut tick.state.joint_velocity_rad_s[7];
             let before = *value;
-            *value = f64::from_bits(value.to_bits() ^ 1);
+            // The last bit that a recording keeps.
+            *value = f64::from_bits(value.to_bits() ^ 1 << 29);
             altered = Some((tick.number, before, *value));
         }
         Some(tick)

@@ -21,40 +21,39 @@ def cells_of(message, prefix=""):
         if field.has_presence and not message.HasField(field.name):
             continue
         name = prefix + field.name
-        if field.name == "motor_enabled":
+        if field.name in ["motor_enabled", "limited"]:
             yield from ((f"{name}_{joint}", bool(value >> i & 1)) for i, joint in enumerate(LEGS))
         elif field.type == FieldDescriptor.TYPE_MESSAGE:
             yield from cells_of(value, f"{name}_")
         elif field.type == FieldDescriptor.TYPE_ENUM:
             yield name, field.enum_type.values_by_number[value].name
-        elif field.name == "motor_temperature":
-            yield from ((f"{name}_{joint}", each) for joint, each in zip(LEGS, value))
+        elif field.name in LISTS:
+            # The controller's torques are left out where they are those of the command.
+            values = value or message.torque_command
+            yield from ((f"{LISTS[field.name]}_{joint}", each) for joint, each in zip(LEGS, values))
         elif field.name != "cell":
             yield name, value
 
 
+# Columns of the lists of a tick.
+LISTS = {
+    "motor_temperature": "motor_temperature", "joint_position": "position", "joint_velocity": "velocity",
+    "joint_torque": "effort", "torque_command": "command_torque", "torque_demanded": "torque_demanded",
+}
+
+
 def expected(path):
-    """Rows by log time."""
-    rows = {}
-    topics = ["/robot/tick", "/robot/joint_states", "/robot/joint_cmd"]
+    """Rows by log time. A joint command holds until the next one."""
+    rows, command = {}, {}
+    topics = ["/robot/tick", "/robot/joint_cmd"]
     with open(path, "rb") as file:
         reader = make_reader(file, decoder_factories=[DecoderFactory()])
         for _, channel, message, content in reader.iter_decoded_messages(topics=topics):
-            row = rows.setdefault(message.log_time, {})
-            if channel.topic == "/robot/tick":
-                row.update(cells_of(content))
-            elif channel.topic == "/robot/joint_states":
-                for joint in content.joints:
-                    name = joint.name.removesuffix("_joint")
-                    row.update({f"{part}_{name}": getattr(joint, part) for part in ["position", "velocity", "effort"]})
+            if channel.topic == "/robot/joint_cmd":
+                for field in ["position", "velocity", "kp", "kd"]:
+                    command.update({f"command_{field}_{j}": value for j, value in zip(LEGS, getattr(content, field))})
             else:
-                for field, values in [(field.name, value) for field, value in content.ListFields()]:
-                    if field == "torque_demanded":
-                        row.update({f"{field}_{joint}": value for joint, value in zip(LEGS, values)})
-                    elif field == "limited":
-                        row.update({f"{field}_{joint}": bool(values >> i & 1) for i, joint in enumerate(LEGS)})
-                    elif field in ["position", "velocity", "kp", "kd", "torque"]:
-                        row.update({f"command_{field}_{joint}": value for joint, value in zip(LEGS, values)})
+                rows[message.log_time] = dict(cells_of(content)) | command
     return rows
 
 

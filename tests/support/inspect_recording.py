@@ -31,8 +31,19 @@ def urdf(text):
     }
 
 
+def bytes_a_tick_of_jumps(summary, modes):
+    """Mean size of a tick in the file, with its share in the index of its chunk, over the chunks within jumps."""
+    total = ticks = 0
+    for chunk in summary.chunk_indexes:
+        inside = [mode for time, mode in modes if chunk.message_start_time <= time <= chunk.message_end_time]
+        if inside and set(inside) <= {"JUMP", "SETTLE"}:
+            total += chunk.chunk_length + chunk.message_index_length
+            ticks += len(inside)
+    return total / ticks if ticks else None
+
+
 def main(path):
-    counts, frames, ground, shapes, joints, times, trials, logs = {}, [], [], {}, set(), [], [], []
+    counts, frames, ground, shapes, joints, times, trials, logs, modes = {}, [], [], {}, set(), [], [], [], []
     with open(path, "rb") as file:
         reader = make_reader(file, validate_crcs=True, decoder_factories=[DecoderFactory()])
         summary = reader.get_summary()
@@ -42,7 +53,10 @@ def main(path):
         for schema, channel, message, decoded in reader.iter_decoded_messages():
             topic = channel.topic
             counts[topic] = counts.get(topic, 0) + 1
-            if topic == "/tf":
+            if topic == "/robot/tick":
+                mode = decoded.DESCRIPTOR.fields_by_name["mode"].enum_type.values_by_number[decoded.mode].name
+                modes.append((message.log_time, mode))
+            elif topic == "/tf":
                 times.append(message.log_time)
                 frames.append(sorted([t.parent_frame_id, t.child_frame_id] for t in decoded.transforms))
             elif topic == "/robot/joint_states":
@@ -65,6 +79,7 @@ def main(path):
         "schemas": {schema.name: schema.data.decode("latin-1") for schema in summary.schemas.values()},
         "frames": frames[0] if frames else [], "frames_change": any(f != frames[0] for f in frames), "tf_times": times,
         "joints": [list(names) for names in joints], "shapes": shapes, "ground": ground, "trials": trials, "logs": logs,
+        "bytes_a_tick_of_jumps": bytes_a_tick_of_jumps(summary, modes),
         "urdf": {name: urdf(text) for name, text in attachments.items() if name.endswith(".urdf")},
     }))
 

@@ -15,7 +15,7 @@ except ImportError as error:
 
 
 def main(path):
-    counts, schemas, ticks, joints, commands = {}, {}, [], [], []
+    counts, schemas, ticks, joints, commands, positions = {}, {}, [], [], [], []
     trials, logs, faults, frames, session, in_order, last = [], [], [], [], None, True, 0
     with open(path, "rb") as file:
         reader = make_reader(file, validate_crcs=True, decoder_factories=[DecoderFactory()])
@@ -31,12 +31,12 @@ def main(path):
             last = message.log_time
             if topic == "/robot/tick":
                 mode = decoded.DESCRIPTOR.fields_by_name["mode"].enum_type.values_by_number[decoded.mode].name
+                commands.append(list(decoded.torque_demanded or decoded.torque_command))
+                positions.append(list(decoded.joint_position))
                 ticks.append([message.log_time, decoded.number, decoded.roll, decoded.foot_z_rl,
                               decoded.truth.force_z_fr, mode])
             elif topic == "/robot/joint_states":
                 joints.append([[joint.name, joint.position, joint.effort] for joint in decoded.joints])
-            elif topic == "/robot/joint_cmd":
-                commands.append(list(decoded.torque_demanded))
             elif topic == "/opt/trial":
                 trials.append([decoded.trial, {p.name: p.value for p in decoded.parameters},
                                decoded.value if decoded.HasField("value") else None,
@@ -58,8 +58,8 @@ def main(path):
         "profile": header.profile, "library": header.library,
         "message_count": summary.statistics.message_count, "chunks": summary.statistics.chunk_count,
         "counts": counts, "schemas": schemas, "in_order": in_order, "session": session, "metadata": metadata,
-        "attachments": attachments, "ticks": [ticks[i] for i in some], "joints": [joints[i] for i in some],
-        "commands": [commands[i] for i in some], "trials": trials, "logs": logs, "faults": faults,
+        "attachments": attachments, "ticks": [ticks[i] for i in some], "commands": [commands[i] for i in some],
+        "positions": [positions[i] for i in some], "joints": joints[0], "trials": trials, "logs": logs, "faults": faults,
         "first_frames": frames[0] if frames else None,
     }))
 

@@ -23,6 +23,13 @@ pub const MS: u64 = 1_000_000;
 struct Draw {
     words: std::vec::IntoIter<u64>,
     text: String,
+    /// Whether numbers have single precision, as in ticks.
+    single: bool,
+}
+
+/// Returns the nearest number of single precision.
+pub fn single(number: f64) -> f64 {
+    f64::from(number as f32)
 }
 
 impl Draw {
@@ -36,6 +43,7 @@ impl Draw {
         match word % 16 {
             0 => 0.0,
             1 => -0.0,
+            4.. if self.single => single(f64::from(f32::from_bits(word as u32))),
             2 => f64::from_bits(0x7ff8_0000_0000_0000 | word >> 13),
             3 => f64::NEG_INFINITY,
             4 => f64::from_bits(1),
@@ -80,6 +88,13 @@ impl Draw {
     }
 
     fn tick(&mut self) -> Tick {
+        self.single = true;
+        let tick = self.any_tick();
+        self.single = false;
+        tick
+    }
+
+    fn any_tick(&mut self) -> Tick {
         Tick {
             number: self.word(),
             time_ns: self.word() >> 2,
@@ -379,8 +394,11 @@ impl Draw {
 }
 
 fn draw(words: usize) -> impl Strategy<Value = Draw> {
-    (prop::collection::vec(any::<u64>(), words), any::<String>())
-        .prop_map(|(words, text)| Draw { words: words.into_iter(), text })
+    (prop::collection::vec(any::<u64>(), words), any::<String>()).prop_map(|(words, text)| Draw {
+        words: words.into_iter(),
+        text,
+        single: false,
+    })
 }
 
 pub fn any_tick() -> impl Strategy<Value = Tick> {
@@ -432,16 +450,17 @@ pub fn moving_tick(number: u64) -> Tick {
         state ^= state << 17;
         (state >> 11) as f64 / (1_u64 << 53) as f64 * 1e-3
     };
-    let mut wave = |phase: f64| (3.0 * time + phase).sin() + noise();
+    let mut wave = |phase: f64| single((3.0 * time + phase).sin() + noise());
     let mut vector = |phase: f64| Vector3::new(wave(phase), wave(phase + 1.0), wave(phase + 2.0));
-    let orientation = UnitQuaternion::from_scaled_axis(vector(0.1) * 0.1);
+    let orientation = UnitQuaternion::from_scaled_axis(vector(0.1) * 0.1).into_inner().coords.map(single);
+    let orientation = UnitQuaternion::new_unchecked(orientation.into());
     let truth = Truth {
         position_world: vector(0.2),
         velocity_world: vector(0.3),
         world_from_body: orientation,
         angular_velocity_body: vector(0.4),
         foot_contact: [true, false, true, false],
-        foot_force_world: std::array::from_fn(|leg| vector(leg as f64) * 30.0),
+        foot_force_world: std::array::from_fn(|leg| (vector(leg as f64) * 30.0).map(single)),
         body_contact: false,
     };
     let estimate = Estimate {

@@ -6,25 +6,22 @@
 mod damage;
 mod events;
 mod lost;
+mod tick_joiner;
 
 use std::collections::{BTreeSet, VecDeque};
 use std::path::{Path, PathBuf};
-
-use foxglove::messages::JointStates;
-use mcap::records::MessageHeader;
-use prost::Message;
 
 use super::container::{Chunk, Container};
 use super::error::RecordingError;
 use super::event_index;
 use super::record::{Record, SessionInfo, Stamped};
+use super::schema;
 use super::topic::Topic;
-use super::wire::DecodeError;
-use super::{frog, schema, tick};
 use crate::telemetry::Tick;
 
 use lost::DamagedChunk;
 pub use lost::LostPart;
+use tick_joiner::TickJoiner;
 
 /// A played tick or record.
 #[allow(clippy::large_enum_variant, reason = "nearly all are ticks; a box for each costs more than it saves")]
@@ -174,11 +171,12 @@ impl Player {
         self.duration_ns
     }
 
-    /// Returns the time of the first message since the engine started, ns, without the session's own record.
+    /// Returns the time of the first message since the engine started, ns, without the session's own record unless there is no other.
     pub fn first_ns(&self) -> u64 {
         let other = |channel: &u16| self.container.topic(*channel) != Some(Topic::Session);
         let holds_others = |chunk: &&Chunk| chunk.channels.as_ref().is_none_or(|channels| channels.iter().any(other));
         let first = self.chunks.iter().filter(holds_others).map(|chunk| chunk.start).min();
+        let first = first.or_else(|| self.chunks.iter().map(|chunk| chunk.start).min());
         first.unwrap_or(self.start_utc_ns).saturating_sub(self.start_utc_ns)
     }
 
@@ -249,30 +247,25 @@ impl Player {
         let chunk = self.chunks[self.next_chunk].clone();
         self.next_chunk += 1;
         let Some(records) = self.records_of(&chunk) else { return };
-        // The messages of a tick are adjacent and share sequence and log time: joints, command, the rest.
-        let mut joints: Option<(MessageHeader, JointStates)> = None;
-        let mut command: Option<(MessageHeader, frog::JointCommand)> = None;
+        let mut joiner = TickJoiner::default();
         for (header, data) in records.messages().flatten() {
             let Some(topic) = self.container.topic(header.channel_id) else { continue };
+            match topic {
+                Topic::JointStates => joiner.joints = Some((header, data)),
+                Topic::JointCommand => joiner.set_command(header, data),
+                _ => {}
+            }
             let time_ns = header.log_time.saturating_sub(self.start_utc_ns);
             if time_ns < self.from_ns {
                 continue;
             }
-            let of_tick = matches!(topic, Topic::JointStates | Topic::JointCommand | Topic::Tick);
-            let left_out = |(until_ns, every)| of_tick && time_ns < until_ns && header.sequence % every != 0;
+            let left_out =
+                |(until_ns, every)| topic == Topic::Tick && time_ns < until_ns && header.sequence % every != 0;
             if self.sparse_until.is_some_and(left_out) {
                 continue;
             }
             let played = match topic {
-                Topic::JointStates => JointStates::decode(data).map_err(DecodeError::from).map(|message| {
-                    joints = Some((header, message));
-                    None
-                }),
-                Topic::JointCommand => frog::JointCommand::decode(data).map_err(DecodeError::from).map(|message| {
-                    command = Some((header, message));
-                    None
-                }),
-                Topic::Tick => join(&header, data, joints.take(), command.take()).map(|tick| Some(Played::Tick(tick))),
+                Topic::Tick => joiner.tick(&header, data).map(|tick| Some(Played::Tick(tick))),
                 _ => schema::decode(topic, data)
                     .map(|record| record.map(|record| Played::Record(Stamped { time_ns, record }))),
             };
@@ -301,19 +294,4 @@ impl Iterator for Player {
         }
         self.queue.pop_front()
     }
-}
-
-/// Joins a tick from its message and the two before it.
-fn join(
-    header: &MessageHeader,
-    control: &[u8],
-    joints: Option<(MessageHeader, JointStates)>,
-    command: Option<(MessageHeader, frog::JointCommand)>,
-) -> Result<Tick, DecodeError> {
-    let same = |other: &MessageHeader| other.sequence == header.sequence && other.log_time == header.log_time;
-    let (_, joints) =
-        joints.filter(|(other, _)| same(other)).ok_or(DecodeError::Missing("/robot/joint_states of a tick"))?;
-    let (_, command) =
-        command.filter(|(other, _)| same(other)).ok_or(DecodeError::Missing("/robot/joint_cmd of a tick"))?;
-    tick::join(frog::ControlTick::decode(control)?, &joints, command)
 }

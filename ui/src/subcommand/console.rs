@@ -9,6 +9,7 @@ use clap::builder::TypedValueParser;
 use quadfrog::config::Config;
 use quadfrog::engine::{self, Options};
 use quadfrog::optimize::journal::notice_waits;
+use quadfrog::recording::recorder::RecorderStatus;
 use quadfrog::robot::go1::Network;
 use quadfrog::trial::{Approval, Backend, Task};
 use quadfrog_console::app::{self, ConsoleExit, ConsoleOptions};
@@ -144,14 +145,17 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
     let folder = selected.folder;
     options.folder = (!arguments.observe).then(|| folder.clone());
     let handle = engine::start(options)?;
-    let recording = handle.recording().map(Path::to_owned);
     let recorder = handle.recorder_watch();
     notice_waits(None);
     let exit = app::run(Feed::live(handle), console)?;
-    let unfinished = recorder.map(|recorder| recorder.get()).filter(|status| !status.finished);
-    // With an error the recording keeps the name of one that is written.
-    let recording = recording.map(|path| if unfinished.is_some() { part_of(&path) } else { path });
-    let failure = unfinished.map(|status| {
+    let recorded = recorder.map(|recorder| recorder.get());
+    let recording = recorded.as_ref().map(|status| match status {
+        RecorderStatus { files: 2.., .. } => folder.clone(),
+        RecorderStatus { finished: true, file, .. } => file.clone(),
+        // With an error the recording keeps the name of one that is written.
+        RecorderStatus { file, .. } => part_of(file),
+    });
+    let failure = recorded.filter(|status| !status.finished || status.error.is_some()).map(|status| {
         let cause = status.error.unwrap_or_else(|| "the recorder ended early; please report it".to_owned());
         Failure::Other(anyhow!("the recording is not complete: {cause}"))
     });

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use anyhow::anyhow;
 use clap::{Args, ValueEnum};
 use quadfrog::recording::player::{MarkerKind, Player};
+use quadfrog::recording::session_files::recordings_of;
 use quadfrog::report::columns::TableFormat;
 use quadfrog::report::signals::{SignalRange, SignalTopic, Signals};
 use quadfrog_console::{notice, output};
@@ -35,7 +36,8 @@ impl LayoutOf {
 
 #[derive(Debug, Args)]
 pub struct ExportArguments {
-    /// A recording: session.mcap, or session.mcap.part of a session that runs or was cut off
+    /// A recording: session.mcap, session.mcap.part of a session that runs or was cut off, or the folder of a study for all its
+    /// files, one after the other
     #[arg(value_name = "FILE", required_unless_present = "layout")]
     file: Option<PathBuf>,
     /// Write the layout of a viewer instead: 3D view, plots, changes of mode, log
@@ -91,9 +93,16 @@ fn export_layout(layout: LayoutOf, output: Option<&Path>) -> Result<(), Failure>
 
 fn export_signals(file: &Path, arguments: &ExportArguments) -> Result<(), Failure> {
     let format = written_format(arguments.format, arguments.output.as_deref())?;
-    let mut player = Player::open(file).map_err(Failure::input)?;
+    let files = recordings_of(file).map_err(Failure::input)?;
+    let mut players = files.iter().map(Player::open).collect::<Result<Vec<_>, _>>().map_err(Failure::input)?;
+    players.sort_by_key(|player| player.start_utc_ns().saturating_add(player.first_ns()));
+    let one_session = players.windows(2).all(|pair| pair[0].start_utc_ns() == pair[1].start_utc_ns());
+    if arguments.time.is_some() && !one_session {
+        let several = "--time: its files are of several sessions, each with its own begin; give one of the files";
+        return Err(Failure::input(format!("{}: {several}", file.display())));
+    }
     if let Some(trial) = arguments.trial {
-        require_trial(&player, trial).map_err(|refusal| Failure::input(format!("{}: {refusal}", file.display())))?;
+        require_trial(&players, trial).map_err(|refusal| Failure::input(format!("{}: {refusal}", file.display())))?;
     }
     let (from_ns, until_ns) = arguments.time.unwrap_or((0, u64::MAX));
     let range = SignalRange { trial: arguments.trial, from_ns, until_ns };
@@ -102,31 +111,32 @@ fn export_signals(file: &Path, arguments: &ExportArguments) -> Result<(), Failur
         Some(path) => {
             let mut rows = 0;
             write_file(path, |out| {
-                let (out, written) = signals.export(&mut player, range, format, out)?;
+                let (out, written) = signals.export(&mut players, range, format, out)?;
                 rows = written;
                 Ok(out)
             })?;
             notice!("{rows} rows: {}", path.display());
         }
-        None => match signals.export(&mut player, range, format, output::Data).and_then(|(mut out, _)| out.flush()) {
+        None => match signals.export(&mut players, range, format, output::Data).and_then(|(mut out, _)| out.flush()) {
             // A reader that has read enough is no error.
             Err(error) if error.kind() == ErrorKind::BrokenPipe => return Ok(()),
             written => written.map_err(|error| Failure::Other(anyhow!("standard output: {error}")))?,
         },
     }
-    match player.damage() {
-        None => Ok(()),
-        Some(damage) => Err(Failure::Other(anyhow!("{damage}; what can be read is exported"))),
+    match players.iter().filter_map(Player::damage).collect::<Vec<_>>() {
+        damage if damage.is_empty() => Ok(()),
+        damage => Err(Failure::Other(anyhow!("{}; what can be read is exported", damage.join("\n")))),
     }
 }
 
 /// Refuses a trial of which no tick is recorded.
-fn require_trial(player: &Player, trial: u32) -> Result<(), String> {
+fn require_trial(players: &[Player], trial: u32) -> Result<(), String> {
     let number = |kind| match kind {
         MarkerKind::Trial(number) => Some(number),
         MarkerKind::Fault => None,
     };
-    let trials: BTreeSet<u32> = player.markers().iter().filter_map(|marker| number(marker.kind)).collect();
+    let trials: BTreeSet<u32> =
+        players.iter().flat_map(Player::markers).filter_map(|marker| number(marker.kind)).collect();
     if trials.contains(&trial) {
         return Ok(());
     }

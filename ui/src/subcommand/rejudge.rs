@@ -70,7 +70,7 @@ fn print(results: &[RejudgedTrial], unit: &str) {
     let number = |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{value:.4}"));
     for result in results {
         let RejudgedTrial { trial, old, new, .. } = result;
-        let difference = result.difference().map_or("-".to_owned(), |difference| format!("{difference:+.4}"));
+        let difference = new.difference(old).map_or("-".to_owned(), |difference| format!("{difference:+.4}"));
         let (old_value, new_value) = (number(old.value), number(new.value));
         let (old_name, new_name, cause) = (name(old.verdict), name(new.verdict), &new.cause);
         put_line!(
@@ -85,7 +85,7 @@ fn print(results: &[RejudgedTrial], unit: &str) {
             "trial {trial}: the estimate is recomputed, at most {distance_m:.4} m from the recorded one; error at the end {old}, now {new}"
         );
     }
-    let changed = results.iter().filter(|result| result.old != result.new).count();
+    let changed = results.iter().filter(|result| result.new.differs(&result.old)).count();
     put_line!(
         "{changed} of {} trials change. J in {unit}, as measured, before the verdict; a fall counts as 0.",
         results.len()
@@ -106,6 +106,6 @@ fn json_of(result: &RejudgedTrial) -> Value {
         let EstimateChange { distance_m, old_error_m, new_error_m } = change;
         json!({ "distance_m": distance_m, "old_error_m": old_error_m, "new_error_m": new_error_m })
     });
-    let difference = result.difference();
+    let difference = new.difference(old);
     json!({ "trial": trial, "old": judgement(old), "new": judgement(new), "difference": difference, "estimate": estimate })
 }

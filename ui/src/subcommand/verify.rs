@@ -1,30 +1,58 @@
 //! `quadfrog verify`: a simulated session run again from its recording alone.
 
 use std::io::ErrorKind;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::anyhow;
 use clap::Args;
 use quadfrog::engine::{self, TickDifference, Verification, VerifyError};
 use quadfrog::recording::RecordingError;
+use quadfrog::recording::session_files::recordings_of;
 use quadfrog_console::put_line;
 
 use super::failure::Failure;
 
 #[derive(Debug, Args)]
 pub struct VerifyArguments {
-    /// The recording: a session.mcap of the simulator
+    /// A session.mcap of the simulator, or the folder of a study for all its files
     file: PathBuf,
 }
 
 /// Exit status 0: every tick is the same; 1: one differs; 2: the file cannot be verified.
 pub fn run(arguments: &VerifyArguments) -> Result<(), Failure> {
-    let file = arguments.file.display();
-    let verified = engine::verify(&arguments.file).map_err(|error| match error {
-        VerifyError::Recording(RecordingError::Io { ref source, .. }) if source.kind() != ErrorKind::NotFound => {
-            Failure::Other(error.into())
+    let mut without_trial = Vec::new();
+    let mut verified = false;
+    for file in recordings_of(&arguments.file)? {
+        match verify(&file) {
+            Ok(()) => verified = true,
+            // Of several files one may hold none, for example the end of a session.
+            Err(VerifyFailure::NoTrial(failure)) => without_trial.push((file, failure)),
+            Err(VerifyFailure::Other(failure)) => return Err(failure),
         }
-        error => Failure::input(error),
+    }
+    if !verified && let Some((_, failure)) = without_trial.pop() {
+        return Err(failure);
+    }
+    for (file, _) in without_trial {
+        put_line!("{}: no trial came to its own end in it", file.display());
+    }
+    Ok(())
+}
+
+/// Reason for which a file is not verified.
+enum VerifyFailure {
+    NoTrial(Failure),
+    Other(Failure),
+}
+
+fn verify(path: &Path) -> Result<(), VerifyFailure> {
+    let file = path.display();
+    let verified = engine::verify(path).map_err(|error| match error {
+        VerifyError::Recording(RecordingError::Io { ref source, .. }) if source.kind() != ErrorKind::NotFound => {
+            VerifyFailure::Other(Failure::Other(error.into()))
+        }
+        VerifyError::NoTrial { .. } => VerifyFailure::NoTrial(Failure::input(error)),
+        error => VerifyFailure::Other(Failure::input(error)),
     })?;
     match verified {
         Verification::Equal { trials, ticks, left_out } => {
@@ -38,9 +66,9 @@ pub fn run(arguments: &VerifyArguments) -> Result<(), Failure> {
         Verification::Different(found) => {
             let TickDifference { trial, tick, number, field, recorded, simulated } = found;
             let number = number.map_or_else(String::new, |number| format!(" (number {number})"));
-            Err(Failure::Other(anyhow!(
+            Err(VerifyFailure::Other(Failure::Other(anyhow!(
                 "{file}: trial {trial}, tick {tick}{number}: {field} is {recorded} in the file, {simulated} in the simulation"
-            )))
+            ))))
         }
     }
 }

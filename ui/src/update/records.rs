@@ -43,8 +43,12 @@ pub(super) fn apply(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
             let (task, robot, backend) = (info.task_name(), &info.robot, info.backend_name());
             let (sampler, version, seed) = (info.sampler_name(), &info.version, info.seed);
             let text = format!("{task} on {robot} ({backend}), {sampler} {version}, seed {seed}");
+            // Each file of a session begins with it.
+            let continued = !info.started.is_empty() && info.started == model.session.info.started;
             model.session.info = info;
-            log(model, time_ns, LogLevel::Info, "session", text, false);
+            if !continued {
+                log(model, time_ns, LogLevel::Info, "session", text, false);
+            }
         }
         Record::Transition(change) => {
             let stopped = matches!(change.to, Mode::Damped | Mode::Fault);

@@ -119,6 +119,9 @@ fn lateness_rows(model: &Model, width: usize) -> Vec<HealthRow> {
 
 fn recorder_rows(model: &Model) -> Vec<HealthRow> {
     let recording = &model.session.info.recording;
+    // The present one of several files.
+    let present = model.recorder.as_ref().map(|status| status.file.display().to_string());
+    let file = present.filter(|file| !file.is_empty()).unwrap_or_else(|| recording.clone());
     let disk = model.session.arming_checks.iter().find(|item| item.check == ArmingCheck::Disk);
     let counters = &model.snapshot.counters;
     let name = |path: &str| match path.rsplit_once('/') {
@@ -128,7 +131,7 @@ fn recorder_rows(model: &Model) -> Vec<HealthRow> {
         None => path.to_owned(),
     };
     vec![
-        row("recording", name(recording), recording.is_empty() && model.replay.is_none()),
+        row("recording", name(&file), recording.is_empty() && model.replay.is_none()),
         row("study", name(&model.session.info.study), false),
         match &model.recorder {
             Some(RecorderStatus { error: Some(error), .. }) => row("writing", error.clone(), true),

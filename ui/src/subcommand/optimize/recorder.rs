@@ -4,7 +4,7 @@ use std::path::Path;
 
 use quadfrog::engine::{self, EngineError, Options};
 use quadfrog::recording::record::{LogLevel, LogRecord, Record, Stamped, Transition};
-use quadfrog::recording::writer::Writer;
+use quadfrog::recording::session_writer::SessionWriter;
 use quadfrog::session::automatic::JudgedTrial;
 use quadfrog::telemetry::{Counters, Tick};
 use quadfrog::trial::{TrialRecord, Verdict};
@@ -43,7 +43,7 @@ impl RecordedRollout {
 
 /// A recording in simulated time.
 pub struct StudyRecorder {
-    writer: Writer,
+    writer: SessionWriter,
     time_ns: u64,
     counters_ns: u64,
 }
@@ -87,7 +87,9 @@ impl StudyRecorder {
         for row in rows {
             self.record(Record::Trial(row.clone()))?;
         }
-        Ok(self.writer.finish().map(drop)?)
+        let (finished, trouble) = self.writer.finish();
+        finished?;
+        Ok(trouble.map_or(Ok(()), Err)?)
     }
 
     fn records(&mut self, records: &[Record]) -> Result<(), EngineError> {
