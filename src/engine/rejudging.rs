@@ -31,6 +31,13 @@ pub struct RejudgedTrial {
     pub estimate: Option<EstimateChange>,
 }
 
+impl RejudgedTrial {
+    /// Returns the new value less the old one; 0 within the precision of recorded ticks.
+    pub fn difference(&self) -> Option<f64> {
+        self.new.difference(&self.old)
+    }
+}
+
 /// The recomputed estimate of a trial beside the recorded one; of several rollouts the largest numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct EstimateChange {

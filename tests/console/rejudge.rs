@@ -1,5 +1,7 @@
 //! `quadfrog rejudge` on a file that the program itself wrote.
 
+#[path = "support/precision.rs"]
+mod precision;
 #[path = "support/program.rs"]
 mod program;
 
@@ -8,7 +10,8 @@ use std::fs;
 use std::path::PathBuf;
 use std::sync::OnceLock;
 
-use program::{PRECISION, Program, assert_same, assert_shows};
+use precision::{PRECISION, assert_same};
+use program::{Program, assert_shows};
 use quadfrog::recording::player::{Played, Player};
 use quadfrog::telemetry::Tick;
 use serde_json::Value;

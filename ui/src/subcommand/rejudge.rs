@@ -70,7 +70,7 @@ fn print(results: &[RejudgedTrial], unit: &str) {
     let number = |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{value:.4}"));
     for result in results {
         let RejudgedTrial { trial, old, new, .. } = result;
-        let difference = new.difference(old).map_or("-".to_owned(), |difference| format!("{difference:+.4}"));
+        let difference = result.difference().map_or("-".to_owned(), |difference| format!("{difference:+.4}"));
         let (old_value, new_value) = (number(old.value), number(new.value));
         let (old_name, new_name, cause) = (name(old.verdict), name(new.verdict), &new.cause);
         put_line!(
@@ -106,6 +106,6 @@ fn json_of(result: &RejudgedTrial) -> Value {
         let EstimateChange { distance_m, old_error_m, new_error_m } = change;
         json!({ "distance_m": distance_m, "old_error_m": old_error_m, "new_error_m": new_error_m })
     });
-    let difference = new.difference(old);
+    let difference = result.difference();
     json!({ "trial": trial, "old": judgement(old), "new": judgement(new), "difference": difference, "estimate": estimate })
 }
