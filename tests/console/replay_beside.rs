@@ -89,7 +89,7 @@ fn paused(size: (u16, u16), arguments: &[&str]) -> Session {
 /// Goes to a time since the impulse of a trial began, s; returns that of the sample there.
 fn go(session: &mut Session, trial: u32, since_impulse_s: f64) -> f64 {
     let ticks = ticks(0, trial);
-    let tick = ticks.iter().find(|tick| tick.trial_time_s >= since_impulse_s - 1e-9 && tick.number % 5 == 0).unwrap();
+    let tick = ticks.iter().find(|tick| tick.trial_time_s >= since_impulse_s - 1e-6 && tick.number % 5 == 0).unwrap();
     let ms = tick.time_ns / 1_000_000;
     session.send(&format!("G{}.{:03}\r", ms / 1000, ms % 1000));
     session.wait_for(&[&format!("{:02}:{:02}.{:03}", ms / 60_000, ms / 1000 % 60, ms % 1000)]);

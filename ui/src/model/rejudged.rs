@@ -23,7 +23,7 @@ pub struct RejudgedTable {
 impl RejudgedTable {
     /// The number of trials that change, and of those judged while they are.
     pub fn summary(&self) -> String {
-        let changed = self.trials.values().filter(|trial| trial.old != trial.new).count();
+        let changed = self.trials.values().filter(|trial| trial.new.differs(&trial.old)).count();
         let (judged, count) = (self.trials.len(), self.count);
         if self.done { format!("{changed} of {judged} change") } else { format!("{judged} of {count} judged again") }
     }
