@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use prost::Message as _;
-use prost_types::{FieldDescriptorProto, FileDescriptorProto};
+use prost_types::{FieldDescriptorProto, FileDescriptorProto, FileDescriptorSet};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     println!("cargo::rerun-if-changed=proto");
@@ -16,12 +16,41 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         config.message_attribute(format!(".frog.v1.{message}"), "#[derive(serde::Serialize)]");
     }
     config.compile_fds(descriptors.clone())?;
-    // Every schema of a recording contains the descriptor: without comments it has a third of the length.
+    // The schema of a topic in a recording: without comments it has a third of the length.
     for file in &mut descriptors.file {
         file.source_code_info = None;
     }
-    std::fs::write(out.join("frog.v1.bin"), descriptors.encode_to_vec())?;
+    let names = descriptors.file[0].message_type.iter().map(|message| message.name().to_owned());
+    let schemas = names.map(|name| {
+        let schema = reduced(&descriptors, &name).encode_to_vec();
+        format!("({name:?}, &{schema:?})")
+    });
+    std::fs::write(out.join("frog.v1.schemas.rs"), format!("&[{}]", schemas.collect::<Vec<_>>().join(",\n")))?;
     Ok(())
+}
+
+/// Returns the descriptors with the message of that name and those that it refers to alone.
+fn reduced(descriptors: &FileDescriptorSet, name: &str) -> FileDescriptorSet {
+    let mut kept = vec![name.to_owned()];
+    let mut next = 0;
+    while let Some(name) = kept.get(next).cloned() {
+        let message = descriptors.file[0].message_type.iter().find(|message| message.name() == name);
+        let mut unread: Vec<_> = message.into_iter().collect();
+        while let Some(message) = unread.pop() {
+            unread.extend(&message.nested_type);
+            // The message that contains the type: `.frog.v1.ControlTick.Mode` is of `ControlTick`.
+            let types = message.field.iter().filter_map(|field| field.type_name().strip_prefix(".frog.v1."));
+            for outer in types.filter_map(|path| path.split('.').next()) {
+                if !kept.iter().any(|known| known == outer) {
+                    kept.push(outer.to_owned());
+                }
+            }
+        }
+        next += 1;
+    }
+    let mut reduced = descriptors.clone();
+    reduced.file[0].message_type.retain(|message| kept.iter().any(|name| name == message.name()));
+    reduced
 }
 
 /// Returns a table in Rust: name of each message, and name, nested message and comment of each of its fields.

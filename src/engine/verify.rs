@@ -185,7 +185,7 @@ pub fn verify(path: &Path) -> Result<Verification, VerifyError> {
 }
 
 /// Returns the configuration and the robot of a recording.
-fn parts(player: &mut Player, path: &Path) -> Result<(Config, RobotDescription), VerifyError> {
+pub(super) fn parts(player: &mut Player, path: &Path) -> Result<(Config, RobotDescription), VerifyError> {
     let refuse = |reason: String| VerifyError::NotVerifiable { path: path.into(), reason };
     let mut text = |name: &str| -> Result<String, VerifyError> {
         let missing =

@@ -113,7 +113,8 @@ fn control_tick_fields(way: Way, tick: &mut Tick, m: &mut frog::ControlTick) -> 
     way.variant(&mut tick.mode, &mut m.mode, "mode")?;
     way.variant(&mut tick.phase, &mut m.phase, "phase")?;
     way.copy(&mut tick.trial, &mut m.trial);
-    way.single(&mut tick.trial_time_s, &mut m.trial_time);
+    // A multiple of the period: exact.
+    way.number(&mut tick.trial_time_s, &mut m.trial_time);
     way.single(&mut tick.theta_rad, &mut m.theta);
 
     let estimate = &mut tick.estimate;

@@ -214,6 +214,11 @@ impl Timeline {
         self.trials = spans;
     }
 
+    /// Returns the paths of the files as they were given, in the order of time.
+    pub fn paths(&self) -> Vec<PathBuf> {
+        self.parts.iter().map(|part| part.player.path().into()).collect()
+    }
+
     /// Returns the facts of the first session.
     pub fn session(&self) -> &SessionInfo {
         self.parts[0].player.session()

@@ -4,8 +4,8 @@ use foxglove::messages::{FrameTransforms, JointStates, Log, PoseInFrame, SceneUp
 use foxglove::{Encode, Schema};
 use strum::{EnumString, IntoStaticStr, VariantArray};
 
-/// Descriptor of `proto/frog.proto`, part of every channel's schema.
-const FROG_DESCRIPTORS: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/frog.v1.bin"));
+/// Schema of each message of `proto/frog.proto`: its descriptor with those of the messages that it refers to.
+const SCHEMAS: &[(&str, &[u8])] = include!(concat!(env!("OUT_DIR"), "/frog.v1.schemas.rs"));
 
 /// A topic. Its order is that of the channels in files written here; readers use the name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, EnumString, IntoStaticStr, VariantArray)]
@@ -82,7 +82,10 @@ impl Topic {
     }
 
     pub fn schema(self) -> Schema {
-        let own = |name: &str| Schema::new(format!("frog.v1.{name}"), "protobuf", FROG_DESCRIPTORS);
+        let own = |name: &str| {
+            let (_, schema) = SCHEMAS.iter().find(|(known, _)| *known == name).expect("a message of frog.proto");
+            Schema::new(format!("frog.v1.{name}"), "protobuf", *schema)
+        };
         match self {
             Topic::JointStates => JointStates::get_schema().expect("a message of foxglove has a schema"),
             Topic::Pose => PoseInFrame::get_schema().expect("a message of foxglove has a schema"),

@@ -4,7 +4,7 @@ use super::objective;
 use crate::control::running_trial::FallWatch;
 use crate::control::settings::ControlSettings;
 use crate::telemetry::{Tick, TrialEnd};
-use crate::trial::{MeasuredJump, ObjectiveRule, TrialRecord, Verdict};
+use crate::trial::{MeasuredJump, ObjectiveRule, RepeatRecord, TrialRecord, Verdict};
 
 /// Largest difference of two objectives, m or rad (with `rate` a second), that the single precision of recorded ticks explains.
 const RECORDED_PRECISION: f64 = 1e-5;
@@ -12,6 +12,9 @@ const RECORDED_PRECISION: f64 = 1e-5;
 /// The rules' result for a trial, before a person's verdict.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Judgement {
+    /// The objective, as measured; of a trial with several rollouts the mean of those that count, with 0 for a fall. None where it
+    /// is not known.
+    pub value: Option<f64>,
     /// Measured values with the objective; none where nothing was measured.
     pub measured: Option<MeasuredJump>,
     /// Suggested verdict; none where the recording does not show it.
@@ -23,38 +26,74 @@ pub struct Judgement {
 impl Judgement {
     /// Returns the suggestion that a row holds.
     pub fn of(row: &TrialRecord) -> Judgement {
-        Judgement { measured: row.measured.clone(), verdict: row.suggested, cause: row.cause.clone() }
+        let single = Judgement::measured(row.measured.clone(), row.suggested, row.cause.clone());
+        if row.repeats.is_empty() {
+            return single;
+        }
+        let values = row.repeats.iter().filter_map(|repeat| repeat.value);
+        Judgement { value: mean(values), ..single }
     }
 
-    /// Returns the measured objective, before any verdict.
-    pub fn value(&self) -> Option<f64> {
-        self.measured.as_ref()?.measured_value
+    fn measured(measured: Option<MeasuredJump>, verdict: Option<Verdict>, cause: String) -> Judgement {
+        Judgement { value: measured.as_ref().and_then(|measured| measured.measured_value), measured, verdict, cause }
     }
 
     /// Returns by how much the value exceeds that of `old`; 0 within the precision of recorded ticks, none where one is missing.
     pub fn difference(&self, old: &Judgement) -> Option<f64> {
-        let difference = self.value()? - old.value()?;
+        let difference = self.value? - old.value?;
         Some(if difference.abs() <= RECORDED_PRECISION { 0.0 } else { difference })
     }
 
     /// Whether verdict, reason or value differ from those of `old`.
     pub fn differs(&self, old: &Judgement) -> bool {
-        let same_value = self.difference(old).map_or(self.value() == old.value(), |difference| difference == 0.0);
+        let same_value = self.difference(old).map_or(self.value == old.value, |difference| difference == 0.0);
         self.verdict != old.verdict || self.cause != old.cause || !same_value
     }
 
-    fn unknown(cause: String) -> Judgement {
-        Judgement { measured: None, verdict: None, cause }
+    /// Returns the judgement of a trial of several rollouts from theirs.
+    pub fn of_repeats(repeats: &[Judgement]) -> Judgement {
+        if let Some((index, open)) = repeats.iter().enumerate().find(|(_, repeat)| repeat.verdict.is_none()) {
+            return Judgement::unknown(format!("repeat {}: {}", index + 1, open.cause));
+        }
+        let counted = || repeats.iter().filter(|repeat| repeat.verdict != Some(Verdict::Void));
+        let falls = counted().filter(|repeat| repeat.verdict == Some(Verdict::Fall)).count();
+        let of_one = |repeat: &Judgement| if repeat.verdict == Some(Verdict::Fall) { Some(0.0) } else { repeat.value };
+        let verdict = if falls == counted().count() { Verdict::Fall } else { Verdict::Accept };
+        Judgement {
+            value: mean(counted().filter_map(of_one)),
+            measured: repeats.last().and_then(|repeat| repeat.measured.clone()),
+            verdict: Some(verdict),
+            cause: format!("mean of {} repeats, {falls} fell", counted().count()),
+        }
+    }
+
+    /// Returns a judgement without a verdict, for a reason.
+    pub fn unknown(cause: String) -> Judgement {
+        Judgement { value: None, measured: None, verdict: None, cause }
     }
 }
 
-/// Judges the ticks of one run of a trial again. A fall under `settings` ends the run where it is detected. A trial that fell when
+fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let values: Vec<f64> = values.collect();
+    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+}
+
+/// Returns the row of a rollout of a trial with several, as if it were a trial of its own.
+pub fn row_of_repeat(row: &TrialRecord, repeat: &RepeatRecord) -> TrialRecord {
+    TrialRecord {
+        suggested: repeat.verdict,
+        cause: repeat.cause.clone(),
+        measured: repeat.measured.clone(),
+        repeats: Vec::new(),
+        ..row.clone()
+    }
+}
+
+/// Judges the ticks of one rollout again; `row` is that of its trial, of a trial with several that of
+/// [`row_of_repeat`]. A fall under `settings` ends the run where it is detected. A trial that fell when
 /// it ran and does not fall under `settings` has no verdict: what would have followed is not recorded. Of the other ends (stop,
 /// fault, rest) the recorded one holds.
 pub fn rejudge(row: &TrialRecord, ticks: &[Tick], rule: &ObjectiveRule, settings: &ControlSettings) -> Judgement {
-    if !row.repeats.is_empty() {
-        return Judgement::unknown("several rollouts: only single ones are judged again".into());
-    }
     let missing = ticks.windows(2).filter(|pair| pair[1].number != pair[0].number + 1).count();
     if missing > 0 || ticks.is_empty() {
         return Judgement::unknown("some of its ticks cannot be read".into());
@@ -67,15 +106,15 @@ pub fn rejudge(row: &TrialRecord, ticks: &[Tick], rule: &ObjectiveRule, settings
     if let Some((index, cause)) = fall {
         let measured = objective::measure(rule, &ticks[..=index]);
         let (verdict, cause) = objective::suggest(&TrialEnd::Fell(cause));
-        return Judgement { measured, verdict: Some(verdict), cause };
+        return Judgement::measured(measured, Some(verdict), cause);
     }
     let measured = objective::measure(rule, ticks);
     if objective::ended_at_rest(row) {
         let (verdict, cause) = objective::suggest_measured(&TrialEnd::Settled, measured.as_ref(), rule.bounce);
-        return Judgement { measured, verdict: Some(verdict), cause };
+        return Judgement::measured(measured, Some(verdict), cause);
     }
     if objective::ended_by_fall(row) {
-        return Judgement { measured, verdict: None, cause: "no fall; the recording ends where it fell before".into() };
+        return Judgement::measured(measured, None, "no fall; the recording ends where it fell before".into());
     }
-    Judgement { measured, ..Judgement::of(row) }
+    Judgement::measured(measured, row.suggested, row.cause.clone())
 }

@@ -120,6 +120,27 @@ fn the_table_of_the_whole_file_is_there_from_the_start_and_enter_goes_to_a_trial
 }
 
 #[test]
+fn the_live_view_shows_the_trials_of_the_whole_file_from_the_start() {
+    let file = recording();
+    for size in [(80, 24), (120, 40)] {
+        let mut session = replay(file.parent().unwrap(), size, &[file.to_str().unwrap()]);
+        session.send("p(");
+        session.wait_for(&["00:00.000", "8 s sweep"]);
+        let rows = timeline().rows();
+        // The table is at the lower end; at 80x24 it has four rows.
+        for (trial, row) in rows.range(1..if size.1 > 24 { 6 } else { 3 }) {
+            let line = line_of(&session, *trial).unwrap_or_else(|| panic!("no row {trial}:\n{}", session.screen()));
+            assert!(line.contains(&format!("{trial}+")) && line.contains(row.verdict.unwrap().name()), "{line}");
+        }
+        // The rows around the playhead stay in view.
+        session.send(")");
+        session.wait_until("no later row", || line_of(&session, 5).is_some_and(|line| !line.contains("5+")));
+        session.send("q");
+        assert!(session.wait().success());
+    }
+}
+
+#[test]
 fn the_timeline_shows_verdicts_and_the_playhead() {
     for size in [(80, 24), (120, 40)] {
         let file = recording();

@@ -171,7 +171,7 @@ fn any_two_trials_are_compared_in_live() {
     assert!(line_with(&console.screen(80, 24), "   0~").contains("accept"));
     console.press(&["1"]);
     let screen = console.screen(120, 40);
-    assert!(screen.contains("A #0 coloured, B #2 green, at +0.00 s"), "{screen}");
+    assert!(screen.contains("A #0 line, B #2 dotted, at +0.00 s"), "{screen}");
     // At the start of the impulse, 0.2 s in: 0.1 sin 1 = 0.084; B is 0.02 above A.
     assert!(line_with(&screen, "roll").contains("A +0.084 B +0.104 rad"), "{screen}");
     // 1 s of both is the window; a step is a hundredth of it.
@@ -179,7 +179,7 @@ fn any_two_trials_are_compared_in_live() {
     let screen = console.screen(120, 40);
     assert!(screen.contains("at +0.20 s"), "{screen}");
     console.press(&["c"]);
-    assert!(!console.screen(120, 40).contains("coloured"));
+    assert!(!console.screen(120, 40).contains("dotted"));
     // The same trial twice is no comparison.
     console.press(&["2", "End", "c", "c"]);
     assert_eq!(console.said(), "no trial is laid under the charts");

@@ -81,6 +81,9 @@ pub enum Action {
     SecondForward,
     LoopJump,
     SlowMotion,
+    Beside,
+    EndComparison,
+    Rejudge,
     Palette,
     Help,
     Mouse,
@@ -141,7 +144,7 @@ const fn fixed(info: ActionInfo) -> ActionInfo {
 
 /// Every action, in the order of [`Action`].
 #[rustfmt::skip]
-pub static ACTIONS: [ActionInfo; 81] = {
+pub static ACTIONS: [ActionInfo; 84] = {
     use Action as A;
     use ActionGroup as G;
     [
@@ -226,6 +229,9 @@ pub static ACTIONS: [ActionInfo; 81] = {
         row(A::SecondForward, "second-forward", &["l"], G::Replay, "a second forward"),
         row(A::LoopJump, "loop-jump", &["i"], G::Replay, "repeat the jump at the playhead; again: play on"),
         row(A::SlowMotion, "slow-motion", &["H"], G::Replay, "impulse and flight at an eighth of the speed, on or off"),
+        row(A::Beside, "beside", &["|"], G::Replay, "another trial (Trials: the selected one) beside the one at the playhead"),
+        row(A::EndComparison, "end-comparison", &["Esc"], G::Replay, "no trial beside or under another any longer"),
+        row(A::Rejudge, "rejudge", &["J"], G::Replay, "Trials judged again by another configuration, beside the old; again: without"),
 
         row(A::Palette, "palette", &[":"], G::Program, "all actions, and why some are not possible now"),
         row(A::Help, "help", &["?"], G::Program, "this help"),

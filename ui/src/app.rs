@@ -258,6 +258,10 @@ impl Console {
                 self.feed.handle().into_iter().for_each(|handle| handle.request(request.clone()))
             }
             Effect::Replay(command) => self.feed.control_replay(command),
+            Effect::Rejudge(folder) => {
+                self.feed.rejudge(Some(folder).filter(|folder| !folder.is_empty()).map(PathBuf::from));
+            }
+            Effect::EndRejudge => self.feed.end_rejudge(),
             Effect::Bell => self.send(b"\x07"),
             Effect::CopyTrial(trial) => self.copy_trial(trial),
             // A failure of these two is reported with the next frame.

@@ -57,6 +57,15 @@ pub fn legal(action: Action, model: &Model) -> Legality {
         A::Filter | A::Search => {
             require(matches!(model.view, View::Trials | View::Log), "only in the views Trials and Log")
         }
+        A::EndComparison => {
+            let live = &model.live;
+            require(live.comparison.is_some() || live.ghost.is_some(), "no trial is beside or under another")
+        }
+        A::Beside => {
+            require(model.replay.is_some(), "only in a replay")?;
+            let present = model.replay.as_ref().and_then(|replay| replay.present);
+            require(present.is_some(), "the recording has no trial")
+        }
         _ if action.info().group == ActionGroup::Replay => require(model.replay.is_some(), "only in a replay"),
         A::Suspend => may_suspend(model),
         _ => Ok(()),

@@ -1,8 +1,9 @@
 //! Messages into the model and effects out of it.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
+use quadfrog::engine::RejudgedTrial;
 use quadfrog::recording::record::Stamped;
 use quadfrog::recording::recorder::RecorderStatus;
 use quadfrog::recording::timeline::TrialRun;
@@ -38,6 +39,10 @@ pub enum Msg {
     Replay(ReplayStatus),
     /// The trials, faults and lost parts of the whole recording; again when they change.
     Timeline(Box<ReplayTimeline>),
+    /// A result of judging the trials of a replay again.
+    Rejudged(RejudgeNews),
+    /// Two trials of a replay, or of two recordings, to lay over each other.
+    SideBySide(Box<SideBySide>),
     /// The replay jumped to another time; the records up to that time follow from the start.
     Rewound,
     /// SIGTSTP or its key.
@@ -70,6 +75,10 @@ pub enum Effect {
     Bell,
     /// Put the row of this trial on the clipboard of the operator's terminal.
     CopyTrial(u32),
+    /// Judge the trials of the replay again by the configuration in a folder; empty: by the defaults.
+    Rejudge(String),
+    /// No longer.
+    EndRejudge,
     /// Write the trial table to files beside the study.
     Export,
     /// Write the best parameters as a configuration beside the study.
@@ -81,6 +90,26 @@ pub enum Effect {
     Suspend,
     /// Sit the robot down and end.
     Quit,
+}
+
+/// Results of judging the trials of a replay again.
+#[derive(Debug, Clone)]
+pub enum RejudgeNews {
+    /// It begins.
+    Begun {
+        /// The folder of the configuration.
+        configuration: String,
+        /// Unit of the new objective.
+        unit: String,
+        /// Trials that will be judged.
+        trials: usize,
+    },
+    /// A judged trial; the last one of a number counts.
+    Trial(Box<RejudgedTrial>),
+    /// All trials are judged.
+    Done,
+    /// The reason for which they cannot be judged.
+    Failed(String),
 }
 
 /// A command to the replay.
@@ -109,6 +138,10 @@ pub enum ReplayCommand {
     Loop,
     /// Slow motion in impulse and flight on or off.
     SlowMotion,
+    /// Lay a trial beside the one at the playhead: of the second recording where there is one.
+    Beside(u32),
+    /// No trial beside another any longer.
+    EndBeside,
 }
 
 /// Length of a single step.
@@ -137,6 +170,8 @@ pub struct ReplayStatus {
     pub slow_motion: bool,
     /// The trial whose jump is repeated.
     pub looping: Option<u32>,
+    /// The trial at the playhead, or else the last one before it, or the first one.
+    pub present: Option<u32>,
     /// Whether the recording is being written and is followed.
     pub following: bool,
     /// Time that the parts found so far take that cannot be read, ns.
@@ -154,12 +189,56 @@ pub struct ReplayTimeline {
     pub lost_ns: Vec<(u64, u64)>,
     /// The newest row of each trial.
     pub rows: BTreeMap<u32, TrialRecord>,
+    /// The second recording; none without one.
+    pub second: Option<SecondRecording>,
+}
+
+/// The recording whose trials are laid beside those of the first one.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct SecondRecording {
+    /// Its first file.
+    pub name: String,
+    /// Numbers of the trials that have ticks.
+    pub trials: BTreeSet<u32>,
+}
+
+/// Two trials with their ticks: A at the playhead, B beside it.
+#[derive(Debug, Clone)]
+#[expect(missing_docs, reason = "the names say the rest")]
+pub struct SideBySide {
+    pub a: ComparedTrial,
+    pub b: ComparedTrial,
+    /// Every fifth tick of A, on the clock of the replay.
+    pub ticks_a: Vec<Tick>,
+    /// Every fifth tick of B, on its own recording's clock.
+    pub ticks_b: Vec<Tick>,
+}
+
+/// One of two compared trials.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ComparedTrial {
+    /// Its number.
+    pub trial: u32,
+    /// Its newest row in the whole recording; none where it is not recorded.
+    pub row: Option<TrialRecord>,
+    /// Unit of its objective.
+    pub unit: String,
+    /// The other recording that holds it; none for the one that is replayed.
+    pub recording: Option<String>,
 }
 
 impl ReplayTimeline {
     /// Whether the recording has ticks of a trial: a continued study shows rows of earlier ones, too.
     pub fn has_ticks_of(&self, trial: u32) -> bool {
         self.trials.iter().any(|span| span.trial == trial)
+    }
+
+    /// Whether a trial can be laid beside another: it is in the second recording, or without one in this.
+    pub fn has_beside(&self, trial: u32) -> bool {
+        match &self.second {
+            Some(second) => second.trials.contains(&trial),
+            None => self.has_ticks_of(trial),
+        }
     }
 
     /// Whether a trial fell or tripped a limit, by its verdict or else its suggestion.

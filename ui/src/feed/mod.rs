@@ -1,6 +1,10 @@
 //! The source of the screen's messages: a running engine or a recording. Both give the same messages.
 
+mod beside;
+mod rejudge;
 mod replay;
+
+use std::path::PathBuf;
 
 use quadfrog::engine::EngineHandle;
 use quadfrog::recording::timeline::Timeline;
@@ -27,12 +31,17 @@ impl Feed {
 
     /// Creates the feed of a recording, playing from the start.
     pub fn replay(recording: impl Into<Timeline>) -> Feed {
-        Feed::Replay(Box::new(ReplayFeed::new(recording.into(), false)))
+        Feed::Replay(Box::new(ReplayFeed::new(recording.into(), None, false)))
+    }
+
+    /// Creates the feed of a recording with another one beside it: from its present end if it is being written.
+    pub fn beside(recording: Timeline, second: Option<Timeline>, follow: bool) -> Feed {
+        Feed::Replay(Box::new(ReplayFeed::new(recording, second, follow)))
     }
 
     /// Creates the feed of a recording that is being written, playing from its present end.
     pub fn follow(recording: impl Into<Timeline>) -> Feed {
-        Feed::Replay(Box::new(ReplayFeed::new(recording.into(), true)))
+        Feed::Replay(Box::new(ReplayFeed::new(recording.into(), None, true)))
     }
 
     /// Returns the damage of the recording that a replay has found, also after the feed has ended.
@@ -55,6 +64,20 @@ impl Feed {
     pub fn control_replay(&mut self, command: ReplayCommand) {
         if let Feed::Replay(replay) = self {
             replay.control_replay(command);
+        }
+    }
+
+    /// Judges the trials of a replay again by the configuration in a folder, or by the defaults; the results follow as messages.
+    pub fn rejudge(&mut self, folder: Option<PathBuf>) {
+        if let Feed::Replay(replay) = self {
+            replay.rejudge(folder);
+        }
+    }
+
+    /// Ends judging the trials again.
+    pub fn end_rejudge(&mut self) {
+        if let Feed::Replay(replay) = self {
+            replay.end_rejudge();
         }
     }
 

@@ -1,17 +1,22 @@
 //! Playback of a recording: speeds, slow motion, loops, single steps, jumps to times, trials, falls and faults.
 
 use std::collections::{BTreeSet, VecDeque};
+use std::path::PathBuf;
+use std::sync::mpsc::Receiver;
 use std::sync::{Arc, Mutex, PoisonError};
 
+use quadfrog::realtime::channel::SHOWN_EVERY;
 use quadfrog::recording::player::{MarkerKind, Played};
 use quadfrog::recording::record::{LogLevel, LogRecord, Record, Stamped};
 use quadfrog::recording::timeline::{Timeline, TrialRun};
 use quadfrog::telemetry::{Counters, Phase, Snapshot};
 
-use crate::message::{Msg, ReplayCommand, ReplayStatus, ReplayStep, ReplayTimeline};
+use super::beside::TrialPair;
+use super::rejudge::rejudge;
+use crate::message::{Msg, RejudgeNews, ReplayCommand, ReplayStatus, ReplayStep, ReplayTimeline};
 
-/// Ticks per tick of the charts: 200 per second, as live.
-const SHOWN_EVERY: u64 = quadfrog::realtime::channel::SHOWN_EVERY;
+/// Most results of judging again per call.
+const BATCH: usize = 256;
 const TICK_NS: u64 = 1_000_000;
 const FRAME_NS: u64 = SHOWN_EVERY * TICK_NS;
 /// Length of the past that fills the charts after a jump.
@@ -45,12 +50,16 @@ pub struct ReplayFeed {
     /// Begins of the lost parts that are in the log.
     logged: BTreeSet<u64>,
     damage: DamageWatch,
+    pair: TrialPair,
+    /// Results of judging the trials again.
+    rejudged: Option<Receiver<RejudgeNews>>,
     /// Messages of a jump or a step that were not taken yet.
     jumped: Vec<Msg>,
 }
 
 impl ReplayFeed {
-    pub fn new(recording: Timeline, follow: bool) -> ReplayFeed {
+    /// Creates the feed of a recording; `second` is one whose trials are laid beside its own.
+    pub fn new(recording: Timeline, second: Option<Timeline>, follow: bool) -> ReplayFeed {
         let mut replay = ReplayFeed {
             recording,
             whole: ReplayTimeline::default(),
@@ -64,6 +73,8 @@ impl ReplayFeed {
             snapshot: Snapshot::default(),
             logged: BTreeSet::new(),
             damage: DamageWatch::default(),
+            pair: TrialPair::new(second),
+            rejudged: None,
             jumped: Vec::new(),
         };
         replay.list();
@@ -73,6 +84,14 @@ impl ReplayFeed {
 
     pub fn damage(&self) -> DamageWatch {
         self.damage.clone()
+    }
+
+    pub fn rejudge(&mut self, folder: Option<PathBuf>) {
+        self.rejudged = Some(rejudge(self.recording.paths(), folder));
+    }
+
+    pub fn end_rejudge(&mut self) {
+        self.rejudged = None;
     }
 
     pub fn control_replay(&mut self, command: ReplayCommand) {
@@ -111,14 +130,21 @@ impl ReplayFeed {
             }
             ReplayCommand::Loop if self.looping.is_some() => self.looping = None,
             ReplayCommand::Loop => {
-                let begun = self.whole.trials.iter().rev().find(|span| span.begin_ns <= at).copied();
-                self.looping = begun.or(self.whole.trials.first().copied());
+                self.looping = self.present();
                 if let Some(span) = self.looping {
                     self.jump(loop_begin(&span));
                     self.playing = true;
                 }
             }
+            ReplayCommand::Beside(trial) => self.pair.choose(trial),
+            ReplayCommand::EndBeside => self.pair.end(),
         }
+    }
+
+    /// The run at the playhead, or else the last one before it, or the first one.
+    fn present(&self) -> Option<TrialRun> {
+        let runs = &self.whole.trials;
+        runs.iter().rev().find(|run| run.begin_ns <= self.time_ns).or(runs.first()).copied()
     }
 
     /// Goes to a time; a loop ends where the time is not in it.
@@ -149,12 +175,22 @@ impl ReplayFeed {
     pub fn poll(&mut self, elapsed_ns: u64, messages: &mut Vec<Msg>) {
         messages.append(&mut self.jumped);
         self.follow(elapsed_ns, messages);
+        messages.extend(self.rejudged.iter().flat_map(|news| news.try_iter().take(BATCH)).map(Msg::Rejudged));
         if self.playing {
             self.play(elapsed_ns, messages);
             messages.append(&mut self.jumped);
             if self.time_ns >= self.recording.duration_ns() && self.looping.is_none() && self.follow_in_ns.is_none() {
                 self.playing = false;
             }
+        }
+        let present = self.present();
+        match self.pair.changed(&self.recording, present.as_ref()) {
+            Ok(Some(both)) => {
+                messages.push(Msg::SideBySide(Box::new(both)));
+                self.report_damage(messages);
+            }
+            Ok(None) => {}
+            Err(reason) => messages.push(logged(self.time_ns, reason)),
         }
         messages.push(Msg::Snapshot(Box::new(self.snapshot)));
         messages.push(Msg::Replay(ReplayStatus {
@@ -164,6 +200,7 @@ impl ReplayFeed {
             duration_ns: self.recording.duration_ns(),
             slow_motion: self.slow_motion,
             looping: self.looping.map(|span| span.trial),
+            present: present.map(|run| run.trial),
             following: self.follow_in_ns.is_some(),
             lost_ns: self.recording.lost_ns(),
         }));
@@ -222,6 +259,7 @@ impl ReplayFeed {
             faults_ns: faults.map(|marker| marker.time_ns).collect(),
             lost_ns: self.recording.lost().iter().map(|lost| (lost.from_ns, lost.to_ns)).collect(),
             rows: self.recording.rows(),
+            second: self.pair.second(),
         };
         self.jumped.push(Msg::Timeline(Box::new(self.whole.clone())));
     }
@@ -278,6 +316,7 @@ impl ReplayFeed {
         if self.follow_in_ns.is_some() && self.recording.lost_count() == 0 {
             damage.clear(); // a file that is being written has no end
         }
+        damage.extend(self.pair.damage());
         *self.damage.lock().unwrap_or_else(PoisonError::into_inner) = damage;
     }
 

@@ -1,12 +1,15 @@
 //! Two trials laid over each other, aligned where their impulses begin.
 
+use quadfrog::telemetry::Tick;
+
 use super::history::{ChartSample, SignalHistory};
+use crate::message::{ComparedTrial, SideBySide};
 
 /// Trials A and B on one axis, aligned where their impulses begin.
 #[derive(Debug, Clone)]
 pub struct Comparison {
-    pub a: u32,
-    pub b: u32,
+    pub a: ComparedTrial,
+    pub b: ComparedTrial,
     pub history_a: SignalHistory,
     pub trace_b: Vec<ChartSample>,
     /// Start of A's impulse, ns, on A's clock.
@@ -17,10 +20,32 @@ pub struct Comparison {
 
 impl Comparison {
     /// The traces of two trials; none where one of them has no recorded signals.
-    pub fn new(history: &SignalHistory, a: u32, b: u32) -> Option<Comparison> {
-        let (trace_a, trace_b) = (history.trace(a)?, history.trace(b)?.to_vec());
+    pub fn new(history: &SignalHistory, a: ComparedTrial, b: ComparedTrial) -> Option<Comparison> {
+        Comparison::of(history.trace(a.trial)?, history.trace(b.trial)?.to_vec(), a, b)
+    }
+
+    /// The traces of the ticks of two recorded trials; none without ticks of A.
+    pub fn side_by_side(both: &SideBySide) -> Option<Comparison> {
+        let trace = |ticks: &[Tick]| ticks.iter().map(ChartSample::from).collect::<Vec<_>>();
+        Comparison::of(&trace(&both.ticks_a), trace(&both.ticks_b), both.a.clone(), both.b.clone())
+    }
+
+    fn of(
+        trace_a: &[ChartSample],
+        trace_b: Vec<ChartSample>,
+        a: ComparedTrial,
+        b: ComparedTrial,
+    ) -> Option<Comparison> {
         let start_ns = impulse_start_ns(trace_a.last()?);
         Some(Comparison { a, b, history_a: SignalHistory::of_trace(trace_a), trace_b, start_ns, cursor_ns: start_ns })
+    }
+
+    /// Puts the cursor to a time at which A ran; another time leaves it.
+    pub fn follow(&mut self, time_ns: u64) {
+        let begin_ns = self.history_a.samples().next().map_or(u64::MAX, |sample| sample.time_ns);
+        if (begin_ns..=self.history_a.newest_ns()).contains(&time_ns) {
+            self.cursor_ns = time_ns;
+        }
     }
 
     /// First and last time of both, ns, on A's clock.

@@ -96,6 +96,10 @@ pub enum Purpose {
     LogSearch,
     /// A time or a trial of a replay.
     Seek,
+    /// The trial beside the one at the playhead of a replay.
+    Beside,
+    /// The folder of the configuration by which the trials of a replay are judged again.
+    Rejudge,
 }
 
 /// Subject of a list of switches.
@@ -116,7 +120,7 @@ impl Dialog {
     pub fn takes_spaces(&self) -> bool {
         match self {
             Dialog::Field { purpose, .. } => {
-                matches!(purpose, Purpose::Note(_) | Purpose::VoidReason { .. } | Purpose::LogSearch)
+                matches!(purpose, Purpose::Note(_) | Purpose::VoidReason { .. } | Purpose::LogSearch | Purpose::Rejudge)
             }
             Dialog::Palette { .. } => true,
             _ => false,

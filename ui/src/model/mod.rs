@@ -6,6 +6,7 @@ pub(crate) mod history;
 pub mod jump_series;
 pub(crate) mod live;
 pub(crate) mod log;
+pub(crate) mod rejudged;
 pub mod session;
 pub(crate) mod trials;
 
@@ -30,6 +31,7 @@ use history::SignalHistory;
 use jump_series::JumpSeries;
 use live::{LiveView, Panel};
 use log::LogView;
+use rejudged::RejudgedTable;
 use session::SessionModel;
 use trials::TrialTable;
 
@@ -102,6 +104,8 @@ pub struct Model {
     pub replay: Option<ReplayStatus>,
     /// The whole recording of the replay.
     pub timeline: Option<Box<ReplayTimeline>>,
+    /// The trials of the replay as another configuration judges them; none without one.
+    pub rejudged: Option<RejudgedTable>,
     /// Whole seconds left of a countdown, as the bell last rang them.
     pub countdown_s: Option<u32>,
     /// Time of the last Ctrl-C.
@@ -150,6 +154,7 @@ impl Model {
             log_view: LogView::default(),
             replay: None,
             timeline: None,
+            rejudged: None,
             countdown_s: None,
             interrupted_at: None,
             size: (0, 0),
@@ -230,6 +235,12 @@ impl Model {
     pub fn trial(&self, trial: u32) -> Option<&TrialRecord> {
         let later = || self.timeline.as_ref().and_then(|timeline| timeline.rows.get(&trial));
         self.session.trials.records.get(&trial).or_else(later)
+    }
+
+    /// The row of a trial as it is at the end of the recording; in a live session the present one.
+    pub fn final_row(&self, trial: u32) -> Option<&TrialRecord> {
+        let last = self.timeline.as_ref().and_then(|timeline| timeline.rows.get(&trial));
+        last.or_else(|| self.session.trials.records.get(&trial))
     }
 
     /// The trial that actions of the trial table apply to: the selected one, or the newest.

@@ -7,6 +7,7 @@ use std::sync::PoisonError;
 use anyhow::anyhow;
 use clap::Args;
 use quadfrog::config::Config;
+use quadfrog::engine::Rejudging;
 use quadfrog::recording::RecordingError;
 use quadfrog::recording::player::{Played, Player};
 use quadfrog::recording::session_files::recordings_of;
@@ -31,6 +32,12 @@ pub struct ReplayArguments {
     /// Show a session that is being written, from its present end on
     #[arg(long, conflicts_with = "check")]
     follow: bool,
+    /// Another recording (or study folder): its trials are laid beside those at the playhead, aligned where the impulses begin
+    #[arg(long, value_name = "FILE", conflicts_with = "check")]
+    beside: Option<PathBuf>,
+    /// Show in Trials, beside the recorded judgements, those by the configuration in this folder; the file is not changed
+    #[arg(long, value_name = "DIR", conflicts_with = "check")]
+    rejudge: Option<PathBuf>,
     /// Read the files whole without a screen and print what is lost; exit status 1 if anything is
     #[arg(long)]
     check: bool,
@@ -58,6 +65,16 @@ pub fn run(arguments: &ReplayArguments) -> Result<(), Failure> {
         return check(&files);
     }
     let recording = Timeline::open(&files)?;
+    if let Some(folder) = &arguments.rejudge {
+        // What cannot be judged is refused before the screen opens.
+        Rejudging::open(&files, &Config::load(Some(folder))?).map_err(Failure::input)?;
+    }
+    let mut second = None;
+    if let Some(path) = &arguments.beside {
+        let of_second = recordings_of(path)?;
+        second = Some(Timeline::open(&of_second)?);
+        files.extend(of_second);
+    }
     let repair = |damage: Vec<String>| {
         let damage = damage.iter().map(|damage| format!("{damage}; the rest can be played"));
         let files =
@@ -73,7 +90,10 @@ pub fn run(arguments: &ReplayArguments) -> Result<(), Failure> {
         // A model of the operator's own: the panels that need its limits say so.
         Err(_) => console,
     };
-    let feed = if arguments.follow { Feed::follow(recording) } else { Feed::replay(recording) };
+    let mut feed = Feed::beside(recording, second, arguments.follow);
+    if let Some(folder) = &arguments.rejudge {
+        feed.rejudge(Some(folder.clone()));
+    }
     let damage = feed.damage();
     let ended = app::run(feed, console)?;
     let damage = std::mem::take(&mut *damage.lock().unwrap_or_else(PoisonError::into_inner));

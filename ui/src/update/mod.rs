@@ -1,13 +1,15 @@
 //! The only code that changes the [`Model`]: messages in, effects out.
 //!
 //! `perform` carries out an action, `navigate` moves within views, `dialog` handles keys while a dialog is open, `records`
-//! folds the session's records, `mouse` handles the mouse, `request` writes the message line and makes requests.
+//! folds the session's records, `beside` lays two trials over each other, `rejudged` judges trials again, `mouse` handles the mouse, `request` writes the message line and makes requests.
 
+mod beside;
 mod dialog;
 mod mouse;
 mod navigate;
 mod perform;
 mod records;
+mod rejudged;
 mod request;
 
 use quadfrog::recording::record::LogLevel;
@@ -57,7 +59,12 @@ pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
             model.jump_series.push(&tick);
             model.history.push(&tick);
         }
-        Msg::Replay(status) => model.replay = Some(status),
+        Msg::Replay(status) => {
+            beside::follow(model, &status);
+            model.replay = Some(status);
+        }
+        Msg::Rejudged(news) => rejudged::apply(model, news),
+        Msg::SideBySide(both) => beside::show(model, &both),
         Msg::Timeline(timeline) => model.timeline = Some(timeline),
         Msg::Rewound => {
             model.session = SessionModel::default();

@@ -7,6 +7,7 @@ use strum::VariantArray;
 use super::request::say;
 use crate::action::Action;
 use crate::column::Column;
+use crate::message::ComparedTrial;
 use crate::model::comparison::Comparison;
 use crate::model::live::Panel;
 use crate::model::trials::SortBy;
@@ -97,7 +98,7 @@ pub(super) fn ghost(model: &mut Model) {
     say(model, LogLevel::Info, text);
 }
 
-fn no_ghost(model: &mut Model) -> String {
+pub(super) fn no_ghost(model: &mut Model) -> String {
     model.live.ghost = None;
     model.live.comparison = None;
     "no trial is laid under the charts".to_owned()
@@ -120,7 +121,13 @@ fn no_signals(trial: u32) -> String {
 
 fn second_ghost(model: &mut Model, a: u32) -> String {
     let Some(b) = model.selected_trial().map(|trial| trial.trial).filter(|b| *b != a) else { return no_ghost(model) };
-    model.live.comparison = Comparison::new(&model.history, a, b);
+    let compared = |trial: u32| ComparedTrial {
+        trial,
+        row: model.final_row(trial).cloned(),
+        unit: model.session.info.unit.clone(),
+        recording: None,
+    };
+    model.live.comparison = Comparison::new(&model.history, compared(a), compared(b));
     match model.live.comparison {
         Some(_) => {
             let live = model.keymap.key(Action::LiveView);

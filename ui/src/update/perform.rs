@@ -7,7 +7,9 @@ use quadfrog::telemetry::Mode;
 use quadfrog::trial::{ExperimentStage, Proposal, Verdict};
 use strum::VariantArray;
 
-use super::navigate::{filter, freeze, ghost, move_by, move_cursor, next_mode, next_series, next_sort, zoom};
+use super::beside;
+use super::navigate::{filter, freeze, ghost, move_by, move_cursor, next_mode, next_series, next_sort, no_ghost, zoom};
+use super::rejudged;
 use super::request::{interrupt, request, say, stop};
 use crate::action::Action;
 use crate::legal::{legal, may_acknowledge, may_request};
@@ -95,7 +97,10 @@ pub(super) fn perform(model: &mut Model, action: Action) -> Vec<Effect> {
         Action::ChartMode => next_mode(model),
         Action::Series => next_series(model),
         Action::ChooseSeries => open(model, Dialog::Choose { subject: Choice::Series, selected: 0 }),
-        Action::Ghost => ghost(model),
+        Action::Ghost => {
+            ghost(model);
+            return beside::ended(model);
+        }
         Action::Sort => next_sort(model),
         Action::Reverse => model.trial_table.reversed = !model.trial_table.reversed,
         Action::Filter => filter(model),
@@ -130,6 +135,13 @@ pub(super) fn perform(model: &mut Model, action: Action) -> Vec<Effect> {
         Action::ReplayEnd => return vec![Effect::Replay(ReplayCommand::End)],
         Action::LoopJump => return vec![Effect::Replay(ReplayCommand::Loop)],
         Action::SlowMotion => return vec![Effect::Replay(ReplayCommand::SlowMotion)],
+        Action::Rejudge => return rejudged::toggle(model),
+        Action::Beside => return beside::begin(model),
+        Action::EndComparison => {
+            no_ghost(model);
+            say(model, LogLevel::Info, "no trial is beside another any longer");
+            return beside::ended(model);
+        }
         Action::Palette => open(model, Dialog::Palette { input: Default::default(), selected: 0 }),
         Action::Help => open(model, Dialog::Help { scroll: 0 }),
         Action::Report => {

@@ -83,7 +83,7 @@ impl Chart<'_> {
         let mut dots = DotGrid::new(plot, self.theme.glyphs);
         let samples =
             self.history.window(self.axis.window_ns).map(|sample| (sample.time_ns, (self.style.value)(sample)));
-        self.trace(&mut dots, samples, (low, high));
+        self.trace(&mut dots, samples, (low, high), false);
         dots.draw(buffer, plot, self.theme.style(self.style.role));
         self.shade(buffer, plot);
         self.draw_cursor(buffer, plot);
@@ -123,22 +123,31 @@ impl Chart<'_> {
             (Some(_), None) => " ",
             (None, _) => "",
         };
-        let value = sample.map_or("-".to_owned(), |sample| self.number(sample));
+        let value = |decimals| sample.map_or("-".to_owned(), |sample| self.number(sample, decimals));
         let ghost = self.ghost.filter(|ghost| ghost.named).zip(self.cursor_ns).map(|(ghost, time_ns)| {
             let time_s = (time_ns as f64 - ghost.start_ns as f64) / 1e9;
-            let sample = at_trial_time(ghost.trace, time_s as f32);
-            (sample.map_or("-".to_owned(), |sample| self.number(sample)), ghost.role)
+            (at_trial_time(ghost.trace, time_s as f32), ghost.role)
         });
         let unit = self.style.series.unit();
         let mut pieces = vec![(format!("{}{contact} ", self.style.series.name()), self.style.role)];
+        let width = usize::from(area.width);
         match ghost {
             Some((other, role)) => {
-                pieces.push((format!("A {value} "), Role::Text));
-                pieces.push((format!("B {other} {unit}"), role));
+                let other = |decimals| other.map_or("-".to_owned(), |sample| self.number(sample, decimals));
+                // The longest form for which there is room.
+                let forms = [
+                    (format!("A {} ", value(3)), format!("B {} {unit}", other(3))),
+                    (format!("A {} ", value(3)), format!("B {}", other(3))),
+                    (value(3), format!("/{}", other(3))),
+                    (value(2), format!("/{}", other(2))),
+                ];
+                let room = width.saturating_sub(pieces[0].0.chars().count());
+                let fits = |form: &&(String, String)| form.0.chars().count() + form.1.chars().count() <= room;
+                let (a, b) = forms.iter().find(fits).unwrap_or(&forms[3]).clone();
+                pieces.extend([(a, Role::Text), (b, role)]);
             }
-            None => pieces.push((format!("{value} {unit}"), Role::Text)),
+            None => pieces.push((format!("{} {unit}", value(3)), Role::Text)),
         }
-        let width = usize::from(area.width);
         let mut used = 0;
         for (text, role) in pieces {
             let text = truncate(&text, width - used);
@@ -152,16 +161,22 @@ impl Chart<'_> {
         }
     }
 
-    /// The value to three decimals, or none from 100 on.
-    fn number(&self, sample: &ChartSample) -> String {
+    /// The value to some decimals, or none from 100 on.
+    fn number(&self, sample: &ChartSample, decimals: usize) -> String {
         let value = (self.style.value)(sample);
         // Otherwise the text would alternate between -0.000 and +0.000.
-        let value = if value.abs() < 0.0005 { 0.0 } else { value };
-        if value.abs() >= 100.0 { format!("{value:+.0}") } else { format!("{value:+.3}") }
+        let value = if value.abs() < 0.5 * 0.1_f32.powi(decimals as i32) { 0.0 } else { value };
+        if value.abs() >= 100.0 { format!("{value:+.0}") } else { format!("{value:+.decimals$}") }
     }
 
-    /// Sets the dots of a line through the points, as far as the axis shows them.
-    fn trace(&self, dots: &mut DotGrid, points: impl Iterator<Item = (u64, f32)>, (low, high): (f32, f32)) {
+    /// Sets the dots of a line through the points, as far as the axis shows them; `dotted` leaves out two columns of four.
+    fn trace(
+        &self,
+        dots: &mut DotGrid,
+        points: impl Iterator<Item = (u64, f32)>,
+        (low, high): (f32, f32),
+        dotted: bool,
+    ) {
         let (across, down) = dots.size;
         if across == 0 || down == 0 {
             return;
@@ -174,7 +189,8 @@ impl Chart<'_> {
                 let y = y.clamp(0, down as i64 - 1);
                 // Joined to the sample before, unless that one is at the other end of the chart.
                 let from = before.filter(|(x0, _)| x.wrapping_sub(*x0) <= 1).map_or(y, |(_, y0)| y0);
-                for y in from.min(y)..=from.max(y) {
+                let drawn = !dotted || x % 4 < 2;
+                for y in (from.min(y)..=from.max(y)).filter(|_| drawn) {
                     dots.set(x as i64, y);
                 }
                 (x, y)
@@ -189,7 +205,7 @@ impl Chart<'_> {
             .trace
             .iter()
             .map(|sample| (time_after(ghost.start_ns, sample.trial_time_s), (self.style.value)(sample)));
-        self.trace(&mut dots, points, range);
+        self.trace(&mut dots, points, range, ghost.named);
         dots.draw(buffer, plot, self.theme.style(ghost.role));
     }
 

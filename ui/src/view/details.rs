@@ -1,5 +1,6 @@
 //! All details of one trial, for their dialog.
 
+use quadfrog::engine::{EstimateChange, RejudgedTrial};
 use quadfrog::trial::{Displacement, ExpectedResult, JumpRow, TrialRecord};
 
 use super::draw::clock;
@@ -87,6 +88,21 @@ pub fn details(session: &SessionModel, theme: &Theme, trial: &TrialRecord) -> Ve
     }
     if !trial.note.is_empty() {
         row("note", trial.note.clone());
+    }
+    rows
+}
+
+/// The new judgement of a trial, and the change of its estimate.
+pub fn rejudged(again: Option<&RejudgedTrial>) -> Vec<(String, String)> {
+    let Some(RejudgedTrial { old, new, estimate, .. }) = again else { return Vec::new() };
+    let number = |value: Option<f64>| value.map_or("none".to_owned(), |value| format!("{value:.4}"));
+    let verdict = new.verdict.map_or("no verdict", |verdict| verdict.name());
+    let (before, now) = (number(old.value), number(new.value));
+    let mut rows = vec![("judged again".to_owned(), format!("{verdict}: {}; measured {before}, now {now}", new.cause))];
+    if let Some(EstimateChange { distance_m, old_error_m, new_error_m }) = estimate {
+        let (old, new) = (number(*old_error_m), number(*new_error_m));
+        let text = format!("at most {distance_m:.4} m from the recorded one; error at the end {old} m, now {new} m");
+        rows.push(("estimate".to_owned(), text));
     }
     rows
 }

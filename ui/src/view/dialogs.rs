@@ -19,7 +19,7 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::{Block, Clear, Paragraph, Wrap};
 use tui_input::Input;
 
-use super::details::details;
+use super::details::{details, rejudged};
 use super::draw::{number, scale, span, truncate};
 use super::{arming, help};
 use crate::action::Action;
@@ -68,7 +68,8 @@ fn render_details(frame: &mut Frame, area: Rect, model: &Model, trial: u32, scro
     const WIDTH: u16 = 76;
     let inside = usize::from(WIDTH - 4);
     let mut lines: Vec<Line> = Vec::new();
-    for (name, value) in details(&model.session, &model.theme, record) {
+    let again = model.rejudged.as_ref().and_then(|table| table.trials.get(&trial));
+    for (name, value) in details(&model.session, &model.theme, record).into_iter().chain(rejudged(again)) {
         // Long values continue on the next line.
         let chars: Vec<char> = value.chars().collect();
         let mut pieces = chars.chunks(inside - 15);
@@ -277,6 +278,11 @@ fn field_title(model: &Model, purpose: Purpose) -> String {
         Purpose::TrialNumber => "Go to trial".to_owned(),
         Purpose::LogSearch => "Search the log".to_owned(),
         Purpose::Seek => "Go to a time or a trial".to_owned(),
+        Purpose::Rejudge => "Judge all trials again by the configuration in".to_owned(),
+        Purpose::Beside => {
+            let present = model.replay.as_ref().and_then(|replay| replay.present);
+            format!("Which trial beside {}?", present.map_or("it".to_owned(), |trial| format!("#{trial}")))
+        }
     }
 }
 
@@ -300,6 +306,11 @@ fn field(model: &Model, purpose: Purpose, input: &Input, problem: Option<&str>) 
         }
         Purpose::LogSearch => "empty: all lines".to_owned(),
         Purpose::Seek => "12:34 or 1:02:03.5, seconds as 75.5, a trial as #7".to_owned(),
+        Purpose::Rejudge => "a folder as for --config; empty: the defaults; the file is not changed".to_owned(),
+        Purpose::Beside => match model.timeline.as_ref().and_then(|timeline| timeline.second.as_ref()) {
+            Some(second) => format!("its number in {}", second.name),
+            None => "its number in this recording".to_owned(),
+        },
         Purpose::Note(_) if model.space_bar_must_stop() => {
             "the robot is energised: Space is STOP, _ writes a space".to_owned()
         }

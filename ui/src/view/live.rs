@@ -8,7 +8,7 @@ use ratatui::text::{Line, Span};
 use super::chart::{Chart, Ghost, TimeAxis, draw_phases, phases};
 use super::draw::{bar, heading, span};
 use super::series_style::style;
-use super::{objective, proposal, trials, wireframe};
+use super::{beside, objective, proposal, trials, wireframe};
 use crate::model::Model;
 use crate::model::comparison::{Comparison, impulse_start_ns};
 use crate::model::history::SignalHistory;
@@ -26,7 +26,12 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let side = if area.width >= 120 { SIDE + 10 } else { SIDE };
     let [charts, _, side] =
         Layout::horizontal([Constraint::Fill(1), Constraint::Length(1), Constraint::Length(side)]).areas(upper);
-    let card_rows = proposal::rows(&model.session).min(side.height.saturating_sub(5));
+    // A live session shows its proposal in any case: the operator approves it.
+    let compared = model.live.comparison.as_ref().filter(|_| model.replay.is_some());
+    let card_rows = match compared {
+        Some(comparison) => beside::rows(comparison).min(side.height),
+        None => proposal::rows(&model.session).min(side.height.saturating_sub(5)),
+    };
     let joints_only = model.live.panel == Panel::Joints;
     let room = side.height - card_rows;
     // Without room for both, the panel of the joints shows the robot and the others the objective.
@@ -47,7 +52,10 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     } else {
         render_charts(frame, charts, model);
     }
-    proposal::render(frame, card, model);
+    match compared {
+        Some(comparison) => beside::render(frame, card, comparison, model),
+        None => proposal::render(frame, card, model),
+    }
     objective::render(frame, objective_area, &model.session, &model.theme);
     if picture_rows > 0 {
         wireframe::render(frame, picture, model.robot.as_ref(), &model.snapshot.tick, &model.theme);
@@ -126,8 +134,10 @@ fn render_axis(frame: &mut Frame, strip: Rect, model: &Model, without_room: usiz
     let live = &model.live;
     let (role, mut text) = match (&live.comparison, &live.frozen) {
         (Some(c), _) => {
-            let at_s = (c.cursor_ns as f64 - c.start_ns as f64) / 1e9;
-            (Role::Warning, format!(" A #{} coloured, B #{} green, at {at_s:+.2} s ", c.a, c.b))
+            // In hundredths, so that no -0.00 is shown.
+            let hundredths = ((c.cursor_ns as f64 - c.start_ns as f64) / 1e7).round() as i64;
+            let at_s = hundredths as f64 / 100.0;
+            (Role::Warning, format!(" A #{} line, B #{} dotted, at {at_s:+.2} s ", c.a.trial, c.b.trial))
         }
         (None, Some((history, _))) => {
             let back = (history.newest_ns().saturating_sub(live.cursor_ns)) as f64 / 1e9;

@@ -13,6 +13,7 @@
 //! ```
 
 mod arming;
+mod beside;
 mod chart;
 mod densities;
 mod details;

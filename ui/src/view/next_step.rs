@@ -146,6 +146,7 @@ fn replay(model: &Model) -> NextStep {
         format!("{key} {}", if playing { "pauses" } else { "plays" }),
         model,
         &[
+            (Action::EndComparison, "end comparison"),
             (Action::Seek, "go to"),
             (Action::PreviousMarker, "previous trial"),
             (Action::NextMarker, "next trial"),

@@ -23,8 +23,14 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     render_table(frame, body, model, true);
 }
 
-/// The number of each verdict, and the order and filter of the table.
+/// The number of each verdict, and the order and filter of the table; where the trials are judged again, the result of that.
 fn summary(model: &Model) -> String {
+    if let Some(table) = &model.rejudged {
+        // The end of a path names the folder.
+        let skipped = table.configuration.chars().count().saturating_sub(24);
+        let name: String = table.configuration.chars().skip(skipped).collect();
+        return format!("new by {name}: {}", table.summary());
+    }
     let trials = &model.session.trials;
     let counts = Verdict::ALL.map(|verdict| format!("{} {}", trials.count(verdict), verdict.name())).join(", ");
     let view = &model.trial_table;
@@ -54,10 +60,13 @@ struct ShownColumn {
 enum CellContent {
     Parameter(String),
     Of(Column),
+    NewValue,
+    NewVerdict,
 }
 
-/// The columns as the operator has chosen them, as far as `width` characters take them.
-fn shown_columns(model: &Model, width: usize) -> Vec<ShownColumn> {
+/// The columns as the operator has chosen them, as far as `width` characters take them; in the whole table with the new
+/// judgements after the verdict.
+fn shown_columns(model: &Model, width: usize, full: bool) -> Vec<ShownColumn> {
     let mut shown = Vec::new();
     for column in &model.trial_table.columns {
         let (title, width) = match column {
@@ -82,6 +91,14 @@ fn shown_columns(model: &Model, width: usize) -> Vec<ShownColumn> {
         };
         shown.push(ShownColumn { title, width, cell: CellContent::Of(*column) });
     }
+    if let Some(table) = model.rejudged.as_ref().filter(|_| full) {
+        let verdict = |column: &ShownColumn| matches!(column.cell, CellContent::Of(Column::Verdict));
+        let at = shown.iter().position(verdict).map_or(0, |at| at + 1);
+        let value = format!("{:>9}", format!("new {}", table.unit));
+        let new = [(value, CellContent::NewValue), ("  new".to_owned(), CellContent::NewVerdict)];
+        let columns = new.map(|(title, cell)| ShownColumn { title, width: 9, cell });
+        shown.splice(at..at, columns);
+    }
     let mut left = width.saturating_sub(NUMBER_WIDTH);
     for column in &mut shown {
         column.width = column.width.min(left);
@@ -94,32 +111,42 @@ fn shown_columns(model: &Model, width: usize) -> Vec<ShownColumn> {
 /// Width of the trial's number and the space behind it.
 const NUMBER_WIDTH: usize = 5;
 
-/// The table, scrolled so that the selected row is seen. `full` shows the choice; without it the newest rows are shown.
+/// The table, scrolled so that the selected row is seen. `full` shows the choice; without it the rows around the newest trial.
 pub fn render_table(frame: &mut Frame, area: Rect, model: &Model, full: bool) {
     if area.height < 2 {
         return;
     }
     let theme = &model.theme;
     let width = usize::from(area.width);
-    let columns = shown_columns(model, width);
+    let columns = shown_columns(model, width, full);
     let titles: Vec<String> = columns.iter().map(|column| padded(&column.title, column.width)).collect();
     let title = format!("{:>4} {}", "#", titles.join(" "));
     frame.render_widget(Line::from(span(theme, Role::Heading, truncate(&title, width))), Rect { height: 1, ..area });
-    let rows: Vec<&TrialRecord> =
-        if full { model.trial_rows() } else { model.session.trials.records.values().collect() };
+    let rows: Vec<&TrialRecord> = match full {
+        true => model.trial_rows(),
+        false => {
+            let mut rows: Vec<_> = model.session.trials.records.values().chain(model.later_trials()).collect();
+            rows.sort_by_key(|row| row.trial);
+            rows
+        }
+    };
     if rows.is_empty() {
         let below = Rect { y: area.y + 1, height: area.height - 1, ..area };
         return render_empty(frame, below, model);
     }
     let selected_trial = if full { model.selected_trial().map(|trial| trial.trial) } else { None };
-    let position = selected_trial.and_then(|number| rows.iter().position(|row| row.trial == number));
+    // The rows around the newest trial at the playhead are shown, where there are later ones.
+    let newest = || model.session.trials.newest().or(rows.first().copied()).map(|trial| trial.trial);
+    let middle = if full { selected_trial } else { newest() };
+    let position = middle.and_then(|number| rows.iter().position(|row| row.trial == number));
     let first = first_row(rows.len(), position, usize::from(area.height) - 1);
     let best = model.session.trials.best().map(|trial| trial.trial);
     for (line, trial) in rows.iter().skip(first).take(usize::from(area.height) - 1).enumerate() {
         let selected = selected_trial == Some(trial.trial);
         let style = if selected { theme.style(Role::Selected) } else { Style::new() };
         let area = Rect { y: area.y + 1 + line as u16, height: 1, ..area };
-        let ghost = [model.live.ghost, model.live.comparison.as_ref().map(|c| c.b)].contains(&Some(trial.trial));
+        let beside = model.live.comparison.as_ref().map(|compared| &compared.b).filter(|b| b.recording.is_none());
+        let ghost = [model.live.ghost, beside.map(|b| b.trial)].contains(&Some(trial.trial));
         let later = model.is_later(trial.trial);
         let mark = match (later, ghost) {
             (true, _) => "+",
@@ -182,6 +209,18 @@ fn cell(model: &Model, trial: &TrialRecord, column: &ShownColumn, best: bool) ->
             return (format!("{:>7}", value.map_or("-".to_owned(), number)), Role::Text);
         }
         CellContent::Of(column) => *column,
+        CellContent::NewValue => {
+            let value = model.rejudged.as_ref().and_then(|table| table.value(trial.trial));
+            return (format!("{:>9}", value.map_or("-".to_owned(), number)), Role::Text);
+        }
+        CellContent::NewVerdict => {
+            let Some(again) = model.rejudged.as_ref().and_then(|table| table.trials.get(&trial.trial)) else {
+                return (String::new(), Role::Quiet);
+            };
+            let (symbol, role) = sign(again.new.verdict);
+            let changed = if again.old.verdict == again.new.verdict { "" } else { " !" };
+            return (format!("{symbol} {}{changed}", again.new.verdict.map_or("open", Verdict::name)), role);
+        }
     };
     match column {
         Column::Parameters => (String::new(), Role::Text),

@@ -8,6 +8,8 @@ use crate::keymap::Key;
 use crate::message::{Effect, ReplayCommand};
 use crate::model::Model;
 use crate::model::dialog::{Dialog, Purpose};
+use crate::update::beside::chosen;
+use crate::update::rejudged;
 use crate::update::request::{cancelled, request};
 
 pub(super) fn key(model: &mut Model, key: Key, purpose: Purpose, mut input: Input) -> Vec<Effect> {
@@ -65,6 +67,12 @@ fn submit(model: &mut Model, purpose: Purpose, text: &str) -> Result<Vec<Effect>
             return Ok(Vec::new());
         }
         Purpose::Seek => return seek(model, text).map(|command| vec![Effect::Replay(command)]),
+        Purpose::Rejudge => return Ok(rejudged::chosen(model, text)),
+        Purpose::Beside => {
+            let number = text.strip_prefix('#').unwrap_or(text).trim();
+            let trial = number.parse().map_err(|_| format!("`{text}` is not the number of a trial"))?;
+            return chosen(model, trial);
+        }
         Purpose::LogSearch => {
             model.log_view.search = text.to_owned();
             model.log_view.back = 0;

@@ -1,0 +1,55 @@
+//! The samples of `recordings/samples`: whole, small, of the present format, and played.
+
+#[path = "support/program.rs"]
+mod program;
+#[path = "support/pty.rs"]
+mod pty;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use portable_pty::CommandBuilder;
+use program::{Program, assert_shows};
+use pty::Session;
+use quadfrog::recording::player::Player;
+
+fn samples() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../recordings/samples")
+}
+
+fn recording(name: &str) -> String {
+    samples().join(name).join("session.mcap").to_str().unwrap().to_owned()
+}
+
+fn bytes_below(folder: &Path) -> u64 {
+    let entries = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    entries.map(|path| if path.is_dir() { bytes_below(&path) } else { fs::metadata(path).unwrap().len() }).sum()
+}
+
+#[test]
+fn the_samples_are_small_whole_and_of_the_present_format() {
+    assert!(bytes_below(&samples()) < 2_000_000, "{} bytes", bytes_below(&samples()));
+    let program = Program::new();
+    for (name, ticks) in [("forward", "2255 ticks"), ("fall", "1278 ticks")] {
+        assert_shows(&program.text(&["replay", "--check", &recording(name)]), &[ticks, "whole"]);
+        let proto = Player::open(recording(name)).unwrap().attachment("frog.proto").unwrap().unwrap();
+        let present = include_str!("../../proto/frog.proto");
+        assert_eq!(String::from_utf8(proto).unwrap(), present, "make the samples again: sh recordings/samples/make.sh");
+    }
+    let best = program.text(&["study", "best", samples().join("forward").to_str().unwrap()]);
+    assert_shows(&best, &["0.721"]);
+}
+
+#[test]
+fn the_samples_are_replayed() {
+    for (name, shown) in [("forward", ["of 20 judged", "best 0.721 m (#12)"]), ("fall", ["fall", "pitch 1.0004 rad"])] {
+        let folder = tempfile::tempdir().unwrap();
+        let mut command = CommandBuilder::new(env!("CARGO_BIN_EXE_quadfrog"));
+        command.args(["replay", &recording(name)]);
+        let mut session = Session::run(folder.path(), (120, 40), command);
+        session.wait_for(&["REPLAY"]);
+        session.wait_for(&shown);
+        session.send("q");
+        assert!(session.wait().success());
+    }
+}

@@ -1,0 +1,102 @@
+//! Parameters, values and verdicts of two compared trials, in two columns.
+
+use quadfrog::trial::TrialRecord;
+use ratatui::Frame;
+use ratatui::layout::Rect;
+use ratatui::text::Line;
+use ratatui::widgets::{Paragraph, Wrap};
+
+use super::draw::{heading, number, sign, span};
+use crate::column::Column;
+use crate::message::ComparedTrial;
+use crate::model::Model;
+use crate::model::comparison::Comparison;
+use crate::model::trials::measured;
+use crate::theme::Role;
+
+/// Measured values with their labels.
+const MEASURED: [(Column, &str); 5] = [
+    (Column::Dx, "dx m"),
+    (Column::Dy, "dy m"),
+    (Column::Yaw, "yaw rad"),
+    (Column::Rise, "rise m"),
+    (Column::Air, "air s"),
+];
+/// Heading, numbers, value, verdict, measured values, and two lines for each cause.
+const FIXED_ROWS: usize = 4 + MEASURED.len() + 4;
+const LABEL: usize = 8;
+
+/// Rows that the panel fills.
+pub fn rows(comparison: &Comparison) -> u16 {
+    let recording = usize::from(comparison.b.recording.is_some());
+    (FIXED_ROWS + recording + parameters(comparison).len()) as u16
+}
+
+/// Names of the parameters of A, then the further ones of B.
+fn parameters(comparison: &Comparison) -> Vec<&str> {
+    let mut names = Vec::new();
+    for (name, _) in [&comparison.a.row, &comparison.b.row].into_iter().flatten().flat_map(|row| row.parameters.iter())
+    {
+        if !names.contains(&name.as_str()) {
+            names.push(name);
+        }
+    }
+    names
+}
+
+pub fn render(frame: &mut Frame, area: Rect, comparison: &Comparison, model: &Model) {
+    let (theme, Comparison { a, b, .. }) = (&model.theme, comparison);
+    let body = heading(frame, area, theme, "Two trials", "");
+    let width = (usize::from(body.width).saturating_sub(LABEL + 1) / 2).min(12);
+    let line = |label: &str, cells: [(String, Role); 2]| {
+        let mut spans = vec![span(theme, Role::Quiet, format!(" {label:<LABEL$}"))];
+        spans.extend(cells.map(|(text, role)| span(theme, role, format!("{text:>width$}"))));
+        Line::from(spans)
+    };
+    let both = |cell: &dyn Fn(&ComparedTrial, &TrialRecord) -> (String, Role)| {
+        [a, b].map(|trial| match &trial.row {
+            Some(row) => cell(trial, row),
+            None => ("-".to_owned(), Role::Quiet),
+        })
+    };
+    let value = |value: Option<f64>| (value.map_or("-".to_owned(), number), Role::Text);
+    let signed = |value: Option<f64>| (value.map_or("-".to_owned(), |value| format!("{value:+.3}")), Role::Text);
+    let mut lines = Vec::new();
+    lines.push(line("", [format!("A #{}", a.trial), format!("B #{}", b.trial)].map(|text| (text, Role::Key))));
+    if let Some(name) = &b.recording {
+        // The end of a path names the study and the file.
+        let room = usize::from(body.width).saturating_sub(7);
+        let skipped = name.chars().count().saturating_sub(room);
+        let text = format!(" B of {}", name.chars().skip(skipped).collect::<String>());
+        lines.push(Line::from(span(theme, Role::Quiet, text)));
+    }
+    let unit = if a.unit == b.unit { format!("J {}", a.unit) } else { format!("J {},{}", a.unit, b.unit) };
+    let of_row =
+        |_: &ComparedTrial, row: &TrialRecord| value(row.value.or_else(|| model.session.measured_objective(row)));
+    lines.push(line(&unit, both(&of_row)));
+    lines.push(line("verdict", both(&|_, row| verdict(row))));
+    for name in parameters(comparison) {
+        let unit = model.session.parameter(name).map_or(String::new(), |info| info.unit);
+        lines.push(line(&format!("{name} {unit}"), both(&|_, row| value(row.parameters.get(name)))));
+    }
+    for (column, label) in MEASURED {
+        lines.push(line(label, both(&|_, row| signed(measured(row, column)))));
+    }
+    for (name, trial) in [("A", a), ("B", b)] {
+        if let Some(row) = trial.row.as_ref().filter(|row| !row.cause.is_empty()) {
+            lines.push(Line::from(span(theme, Role::Quiet, format!(" {name}: {}", row.cause))));
+        }
+    }
+    frame.render_widget(Paragraph::new(lines).wrap(Wrap { trim: false }), body);
+}
+
+/// The verdict, or else the suggested one with a question mark.
+fn verdict(row: &TrialRecord) -> (String, Role) {
+    let (symbol, role) = sign(row.verdict);
+    let name = match (row.verdict, row.suggested) {
+        (Some(verdict), _) => row.verdict_name().unwrap_or(verdict.name()).to_owned(),
+        (None, Some(suggested)) => format!("{}?", suggested.name()),
+        (None, None) => "none".to_owned(),
+    };
+    (format!("{symbol} {name}"), role)
+}
