@@ -33,6 +33,7 @@ use std::thread::JoinHandle;
 
 use self::folder::LockedFolder;
 use self::guard::Guard;
+use self::recording::show_unrecorded;
 use self::study::open_without_prior;
 use crate::optimize::ask::SamplerKind;
 use crate::optimize::journal::Durability;
@@ -40,6 +41,7 @@ use crate::realtime::channel::{ConsolePorts, Heartbeat, Lowering, StopLatch, cha
 use crate::realtime::clock::{Clock, MonotonicClock};
 use crate::realtime::sleep_lock::{ALLOW_INHIBITOR, INHIBITOR, SleepLock};
 use crate::realtime::system::descriptors;
+use crate::recording::live::{LiveServer, LiveStatus};
 use crate::recording::record::{Record, Stamped};
 use crate::recording::recorder::{Recorder, RecorderHandle, RecorderStatus, RecorderWatch};
 use crate::robot::go1::Go1;
@@ -93,6 +95,7 @@ pub fn start(options: Options) -> Result<EngineHandle, EngineError> {
     let clock = MonotonicClock::start();
     let writer = match &recording {
         Some(path) => Some(create_recording(path, &options)?),
+        None if options.live.is_some() => Some(show_unrecorded(&options)?),
         None => None,
     };
 
@@ -176,6 +179,7 @@ pub fn start(options: Options) -> Result<EngineHandle, EngineError> {
         observe: options.observe,
         storage,
         recording,
+        live: options.live,
         _folder: folder,
         requests: Some(to_supervisor),
         clock,
@@ -236,6 +240,7 @@ pub struct EngineHandle {
     observe: bool,
     storage: StorageWatch,
     recording: Option<PathBuf>,
+    live: Option<LiveServer>,
     _folder: LockedFolder,
     requests: Option<Sender<StampedRequest>>,
     clock: MonotonicClock,
@@ -270,6 +275,11 @@ impl EngineHandle {
     /// Returns a view of the recorder's status that outlives the session; none where nothing is kept.
     pub fn recorder_watch(&self) -> Option<RecorderWatch> {
         self.recording.as_ref().and(self.recorder.as_ref()).map(RecorderHandle::watch)
+    }
+
+    /// Returns the state of the live view; none without one.
+    pub fn live(&self) -> Option<LiveStatus> {
+        self.live.as_ref().map(LiveServer::status)
     }
 
     /// Returns the wait of the session for the storage of its study; none while there is none worth showing.

@@ -8,6 +8,7 @@ use crate::optimize::prior::PriorModel;
 use crate::optimize::space::SpaceError;
 use crate::optimize::study::{Storage, StudyError};
 use crate::recording::RecordingError;
+use crate::recording::live::LiveServer;
 use crate::robot::description::RobotDescription;
 use crate::robot::go1::Network;
 use crate::robot::go1::link::LinkError;
@@ -42,6 +43,8 @@ pub struct Options {
     pub accept_backend_change: bool,
     /// Reason why the loss of the operator's connection cannot be detected; none if it can. An arming check on hardware.
     pub unseen_connection: Option<String>,
+    /// Server of the live view, which receives the recording's messages; none without one.
+    pub live: Option<LiveServer>,
     /// Origin of the session, for its recording.
     pub provenance: Provenance,
 }
@@ -83,6 +86,7 @@ impl Options {
             guard: None,
             accept_backend_change: false,
             unseen_connection: None,
+            live: None,
             provenance: Provenance::default(),
         }
     }

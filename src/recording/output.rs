@@ -13,6 +13,7 @@ use mcap::{McapError, WriteOptions};
 use prost::Message;
 
 use super::event_index::EventIndexBuilder;
+use super::live::LiveFeed;
 use super::record::{Record, SessionInfo};
 use super::topic::Topic;
 use super::{comments, schema};
@@ -34,6 +35,13 @@ pub trait Sink: Write + Send {
     fn sync(&mut self) -> io::Result<()>;
 }
 
+/// Discards everything.
+impl Sink for io::Sink {
+    fn sync(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
 impl Sink for File {
     fn sync(&mut self) -> io::Result<()> {
         self.sync_data()
@@ -48,6 +56,8 @@ pub struct Output {
     pub events: EventIndexBuilder,
     /// Chunks closed so far.
     pub closed_chunks: u64,
+    /// Viewers of the running session.
+    pub live: Option<LiveFeed>,
     buffer: Vec<u8>,
     open_bytes: usize,
 }
@@ -71,6 +81,7 @@ impl Output {
             disk,
             events: EventIndexBuilder::default(),
             closed_chunks: 0,
+            live: None,
             buffer: Vec::new(),
             open_bytes: 0,
         })
@@ -169,10 +180,20 @@ impl Output {
         self.put(topic, sequence, log_time)
     }
 
+    /// Sends every message from here on to the viewers, too, and the session's own now.
+    pub fn show_live(&mut self, live: LiveFeed, session: &SessionInfo, start_utc_ns: u64, log_time: u64) {
+        let topic = schema::encode(&Record::Session(session.clone()), start_utc_ns, log_time, &mut self.buffer);
+        live.send(topic, log_time, &self.buffer);
+        self.live = Some(live);
+    }
+
     fn put(&mut self, topic: Topic, sequence: u32, log_time: u64) -> Result<(), McapError> {
         let channel_id = topic as u16 + 1;
         self.open_bytes += self.buffer.len();
         self.events.add(topic, channel_id, log_time, &self.buffer);
+        if let Some(live) = &self.live {
+            live.send(topic, log_time, &self.buffer);
+        }
         let header = MessageHeader { channel_id, sequence, log_time, publish_time: log_time };
         self.mcap.write_to_known_channel(&header, &self.buffer)
     }

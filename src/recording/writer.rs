@@ -10,6 +10,7 @@ use mcap::McapError;
 use prost::Message as _;
 
 use super::error::RecordingError;
+use super::live::LiveFeed;
 pub use super::output::Sink;
 use super::output::{Output, with_suffix};
 use super::record::{Record, SessionInfo, Stamped};
@@ -188,6 +189,11 @@ impl Writer {
         self.ground_of = Some(ground);
         self.write_ground(None, self.begin_utc_ns).map_err(|error| self.failure(error))?;
         self.sync()
+    }
+
+    /// Sends the session and everything written from here on to the viewers of the running session, too.
+    pub fn show_live(&mut self, live: LiveFeed, session: &SessionInfo) {
+        self.out.show_live(live, session, self.start_utc_ns, self.begin_utc_ns);
     }
 
     /// Makes this recording the continuation of another one of the session: with its trial table, present ground and numbers.

@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
 use quadfrog::engine::RejudgedTrial;
+use quadfrog::recording::live::LiveStatus;
 use quadfrog::recording::record::Stamped;
 use quadfrog::recording::recorder::RecorderStatus;
 use quadfrog::recording::timeline::TrialRun;
@@ -31,6 +32,8 @@ pub enum Msg {
     /// The newest tick and counters, for numbers and the mode.
     Snapshot(Box<Snapshot>),
     Recorder(RecorderStatus),
+    /// State of the live view.
+    Viewers(LiveStatus),
     /// The wait of the session for the storage of its study; none while there is none.
     Storage(Option<StorageWait>),
     /// One of the ticks for the charts.

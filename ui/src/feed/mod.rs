@@ -93,6 +93,7 @@ impl Feed {
                 );
                 messages.push(Msg::Snapshot(Box::new(handle.snapshot())));
                 messages.extend(handle.recorder().map(Msg::Recorder));
+                messages.extend(handle.live().map(Msg::Viewers));
                 messages.push(Msg::Storage(handle.storage_wait()));
             }
             Feed::Replay(replay) => replay.poll(elapsed_ns, &mut messages),

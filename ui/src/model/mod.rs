@@ -12,6 +12,7 @@ pub(crate) mod trials;
 
 use std::time::Duration;
 
+use quadfrog::recording::live::LiveStatus;
 use quadfrog::recording::record::LogLevel;
 use quadfrog::recording::recorder::RecorderStatus;
 use quadfrog::robot::description::RobotDescription;
@@ -87,6 +88,8 @@ pub struct Model {
     pub snapshot_at: Duration,
     /// State of the recorder; none in a replay.
     pub recorder: Option<RecorderStatus>,
+    /// State of the live view; none without one.
+    pub viewers: Option<LiveStatus>,
     /// Wait of the session for the storage of its study.
     pub storage: Option<StorageWait>,
     pub history: SignalHistory,
@@ -132,6 +135,7 @@ impl Model {
             snapshot: Snapshot::default(),
             snapshot_at: Duration::ZERO,
             recorder: None,
+            viewers: None,
             storage: None,
             history: SignalHistory::default(),
             jump_series: JumpSeries::default(),

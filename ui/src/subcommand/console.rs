@@ -22,6 +22,7 @@ use quadfrog_console::theme::ColourChoice;
 
 use super::arguments::{self, StudyArguments, one_of};
 use super::failure::Failure;
+use super::live;
 use super::selection::{SelectedStudy, study_to_continue};
 
 fn colour() -> impl TypedValueParser<Value = ColourChoice> {
@@ -96,6 +97,9 @@ pub struct ConsoleArguments {
     /// Jumps that wait for the operator's approval and verdict
     #[arg(long, value_name = "WHAT", default_value = "each", value_parser = approval())]
     approve: Approval,
+    /// Show the session to Foxglove on this machine, view only: open a connection to ws://127.0.0.1:8765 there
+    #[arg(long, value_name = "ADDR", num_args = 0..=1, default_missing_value = live::DEFAULT)]
+    live: Option<String>,
     #[command(flatten)]
     screen: ScreenArguments,
 }
@@ -140,6 +144,7 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
     };
     engine::check_backend(&options)?;
     terminal::check().map_err(Failure::input)?;
+    options.live = arguments.live.as_deref().map(live::start).transpose()?;
     // An observer writes no files.
     let selected = if arguments.observe { selected } else { selected.with_folder()? };
     let folder = selected.folder;

@@ -10,6 +10,7 @@ mod evaluate;
 mod export;
 mod failure;
 mod guard;
+mod live;
 mod optimize;
 mod prior;
 mod recover;

@@ -54,6 +54,7 @@ pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
             return count_down(model);
         }
         Msg::Recorder(status) => model.recorder = Some(status),
+        Msg::Viewers(status) => model.viewers = Some(status),
         Msg::Storage(wait) => model.storage = wait,
         Msg::Tick(tick) => {
             model.jump_series.push(&tick);

@@ -43,8 +43,11 @@ pub(super) fn apply(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
             let (task, robot, backend) = (info.task_name(), &info.robot, info.backend_name());
             let (sampler, version, seed) = (info.sampler_name(), &info.version, info.seed);
             let text = format!("{task} on {robot} ({backend}), {sampler} {version}, seed {seed}");
-            // Each file of a session begins with it.
-            let continued = !info.started.is_empty() && info.started == model.session.info.started;
+            // The next file of the same session begins with it, too.
+            let known = &model.session.info;
+            let continued = !known.recording.is_empty()
+                && (&info.started, info.started.is_empty()) == (&known.started, false)
+                && info.recording != known.recording;
             model.session.info = info;
             if !continued {
                 log(model, time_ns, LogLevel::Info, "session", text, false);

@@ -1,5 +1,6 @@
 //! View 5, Health: loop timing, recorder, link, motors, battery, arming checks.
 
+use quadfrog::recording::live::LiveStatus;
 use quadfrog::recording::record::HealthLimits;
 use quadfrog::recording::recorder::RecorderStatus;
 use quadfrog::robot::{JOINTS, LinkStatus, joint_name};
@@ -21,10 +22,11 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     // The histogram needs rows that 80x24 does not have.
     let lateness_rows_shown = if area.height >= 30 { 9 } else { 0 };
     let timing_rows = timing_rows(model);
+    let recorder_rows = recorder_rows(model);
     let [timing, lateness, recording, robot] = Layout::vertical([
         Constraint::Length(timing_rows.len() as u16 + 1),
         Constraint::Length(lateness_rows_shown),
-        Constraint::Length(8),
+        Constraint::Length(recorder_rows.len() as u16 + 1),
         Constraint::Fill(1),
     ])
     .areas(left);
@@ -33,7 +35,7 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
         let rows = lateness_rows(model, usize::from(lateness.width));
         panel(frame, lateness, model, ("Wake-up latency, last minute", NAME_WIDTH), rows);
     }
-    panel(frame, recording, model, ("Recorder and screen", NAME_WIDTH), recorder_rows(model));
+    panel(frame, recording, model, ("Recorder and screen", NAME_WIDTH), recorder_rows);
     panel(frame, robot, model, ("Link and battery", NAME_WIDTH), robot_rows(model));
     let [motors, checks] = Layout::vertical([Constraint::Length(JOINTS as u16 + 1), Constraint::Fill(1)]).areas(right);
     panel(frame, motors, model, ("Motors", MOTOR_NAME_WIDTH), motor_rows(model));
@@ -130,7 +132,7 @@ fn recorder_rows(model: &Model) -> Vec<HealthRow> {
         None if path.is_empty() => "none".to_owned(),
         None => path.to_owned(),
     };
-    vec![
+    let mut rows = vec![
         row("recording", name(&file), recording.is_empty() && model.replay.is_none()),
         row("study", name(&model.session.info.study), false),
         match &model.recorder {
@@ -142,7 +144,11 @@ fn recorder_rows(model: &Model) -> Vec<HealthRow> {
         row("not recorded", format!("{} ticks", counters.ticks_not_recorded), counters.ticks_not_recorded > 0),
         row("not shown", format!("{} ticks", counters.ticks_not_shown), false),
         row("refused", format!("{} commands", counters.commands_refused), false),
-    ]
+    ];
+    if let Some(LiveStatus { address, viewers, dropped }) = model.viewers {
+        rows.push(row("live view", format!("{address}, {viewers} viewers, {dropped} messages left out"), false));
+    }
+    rows
 }
 
 fn robot_rows(model: &Model) -> Vec<HealthRow> {
