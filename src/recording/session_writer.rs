@@ -120,12 +120,12 @@ impl SessionWriter {
     fn rotate_if_due(&mut self, time_ns: u64) {
         let Some((limits, _)) = &self.rotation else { return };
         let due = time_ns.saturating_sub(self.begun_ns) >= limits.duration_ns || self.writer.bytes() >= limits.bytes;
-        if !due {
+        if !due || !self.between_trials() {
             return;
         }
         let last = self.writer.path();
         let folder = last.parent().unwrap_or(Path::new(""));
-        let Some(path) = next_recording(folder, Some(last)).filter(|_| self.between_trials()) else { return };
+        let Some(path) = next_recording(folder, Some(last)) else { return };
         let Some((_, begin_file)) = &mut self.rotation else { return };
         match begin(begin_file, &path, time_ns, &self.writer, &self.state) {
             Ok(next) => {
