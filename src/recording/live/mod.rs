@@ -3,26 +3,21 @@
 //! The recorder's thread hands each message over and never waits for a viewer: each viewer has a queue of bounded length and a
 //! thread of its own. A message that finds a queue full is left out for that viewer and counted.
 
+mod audience;
 mod protocol;
 mod viewer;
 
-use std::collections::BTreeMap;
 use std::io;
 use std::net::{SocketAddr, TcpListener, TcpStream};
-use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
-use std::sync::mpsc::{SyncSender, TrySendError, sync_channel};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
 use std::time::Duration;
 
-use self::protocol::message_data;
+use self::audience::Shared;
 use super::topic::Topic;
 
 /// Most viewers at a time; further ones are refused.
 const MOST_VIEWERS: usize = 8;
-/// Most subscriptions of a viewer: one of each topic, and some that are replaced.
-const MOST_SUBSCRIPTIONS: usize = 64;
-/// Messages that wait for a viewer: two seconds of ticks.
-const QUEUE: usize = 2048;
 /// Period in which new viewers are looked for.
 const ACCEPT_PERIOD: Duration = Duration::from_millis(20);
 
@@ -37,67 +32,6 @@ pub struct LiveStatus {
     pub dropped: u64,
 }
 
-/// A viewer's subscriptions (number by topic) and the queue to its thread.
-struct Viewer {
-    number: u64,
-    subscriptions: BTreeMap<u32, Topic>,
-    queue: SyncSender<Vec<u8>>,
-}
-
-/// Viewers, and the newest message of each topic that a new subscription begins with.
-#[derive(Default)]
-struct Audience {
-    viewers: Vec<Viewer>,
-    newest: BTreeMap<Topic, (u64, Vec<u8>)>,
-    /// Number of the next viewer.
-    next: u64,
-}
-
-struct Shared {
-    audience: Mutex<Audience>,
-    viewers: AtomicUsize,
-    dropped: AtomicU64,
-    closing: AtomicBool,
-}
-
-impl Shared {
-    /// Never held while anything is sent or received.
-    fn audience(&self) -> MutexGuard<'_, Audience> {
-        self.audience.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    fn put(&self, viewer: &Viewer, message: Vec<u8>) {
-        if let Err(TrySendError::Full(_)) = viewer.queue.try_send(message) {
-            self.dropped.fetch_add(1, Ordering::Relaxed);
-        }
-    }
-
-    /// Subscribes a viewer to a topic, and sends it the newest message if the topic has seldom one.
-    fn subscribe(&self, number: u64, subscription: u32, topic: Topic) {
-        let mut audience = self.audience();
-        let newest = audience.newest.get(&topic).cloned();
-        let Some(viewer) = audience.viewers.iter_mut().find(|viewer| viewer.number == number) else { return };
-        if viewer.subscriptions.len() >= MOST_SUBSCRIPTIONS {
-            return;
-        }
-        viewer.subscriptions.insert(subscription, topic);
-        if let Some((log_time, data)) = newest {
-            let message = message_data(subscription, log_time, &data);
-            self.put(viewer, message);
-        }
-    }
-
-    fn unsubscribe(&self, number: u64, subscription: u32) {
-        if let Some(viewer) = self.audience().viewers.iter_mut().find(|viewer| viewer.number == number) {
-            viewer.subscriptions.remove(&subscription);
-        }
-    }
-
-    fn remove(&self, number: u64) {
-        self.audience().viewers.retain(|viewer| viewer.number != number);
-    }
-}
-
 /// The recording's end: hands messages to the viewers.
 #[derive(Clone)]
 pub struct LiveFeed(Arc<Shared>);
@@ -105,15 +39,7 @@ pub struct LiveFeed(Arc<Shared>);
 impl LiveFeed {
     /// Hands an encoded message to all viewers that have subscribed to its topic. Neither waits nor fails.
     pub(super) fn send(&self, topic: Topic, log_time: u64, data: &[u8]) {
-        let mut audience = self.0.audience();
-        if topic.is_event() || matches!(topic, Topic::RobotScene | Topic::GroundScene) {
-            audience.newest.insert(topic, (log_time, data.to_vec()));
-        }
-        for viewer in &audience.viewers {
-            for (subscription, _) in viewer.subscriptions.iter().filter(|(_, wanted)| **wanted == topic) {
-                self.0.put(viewer, message_data(*subscription, log_time, data));
-            }
-        }
+        self.0.publish(topic, log_time, data);
     }
 }
 
@@ -136,12 +62,7 @@ impl LiveServer {
         let listener = TcpListener::bind(address)?;
         listener.set_nonblocking(true)?;
         let address = listener.local_addr()?;
-        let shared = Arc::new(Shared {
-            audience: Mutex::default(),
-            viewers: AtomicUsize::new(0),
-            dropped: AtomicU64::new(0),
-            closing: AtomicBool::new(false),
-        });
+        let shared = Arc::new(Shared::default());
         let of_thread = Arc::clone(&shared);
         std::thread::Builder::new().name("live".into()).spawn(move || accept(&listener, &of_thread))?;
         Ok(LiveServer { address, shared })
@@ -194,14 +115,4 @@ fn admit(stream: TcpStream, shared: &Arc<Shared>) {
     if started.is_err() {
         shared.viewers.fetch_sub(1, Ordering::Relaxed);
     }
-}
-
-/// Adds a viewer; returns its number and the end of its queue.
-fn join(shared: &Shared) -> (u64, std::sync::mpsc::Receiver<Vec<u8>>) {
-    let (queue, messages) = sync_channel(QUEUE);
-    let mut audience = shared.audience();
-    let number = audience.next;
-    audience.next += 1;
-    audience.viewers.push(Viewer { number, subscriptions: BTreeMap::new(), queue });
-    (number, messages)
 }

@@ -1,4 +1,4 @@
-//! Foxglove's WebSocket protocol, version 1 (github.com/foxglove/ws-protocol, docs/spec.md; foxglove 0.30, `protocol/v1`): a
+//! Foxglove's WebSocket protocol, version 1 (specification of github.com/foxglove/ws-protocol; foxglove 0.30, module `protocol::v1`): a
 //! server without capabilities, which announces its channels and sends the messages of subscriptions.
 
 use data_encoding::BASE64;

@@ -12,8 +12,8 @@ use tungstenite::http::{HeaderValue, StatusCode};
 use tungstenite::protocol::WebSocketConfig;
 use tungstenite::{Error, Message, WebSocket, accept_hdr_with_config};
 
+use super::audience::Shared;
 use super::protocol::{SUBPROTOCOLS, ViewerRequest, advertise, refusal, request, server_info};
-use super::{Shared, join};
 
 /// Longest pause of a viewer in the handshake.
 const HANDSHAKE: Duration = Duration::from_secs(5);
@@ -38,7 +38,7 @@ pub fn serve(stream: TcpStream, shared: &Shared) -> Result<(), Box<Error>> {
     socket.get_ref().set_read_timeout(Some(REQUEST_WAIT)).map_err(boxed)?;
     socket.send(Message::text(server_info()))?;
     socket.send(Message::text(advertise()))?;
-    let (number, messages) = join(shared);
+    let (number, messages) = shared.join();
     let ended = exchange(&mut socket, shared, number, &messages);
     shared.remove(number);
     ended
