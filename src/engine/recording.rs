@@ -20,7 +20,7 @@ use nalgebra::Vector3;
 type SharedGround = Arc<dyn Fn(Option<&TrialRecord>) -> Option<Ground> + Send + Sync>;
 
 /// Creates the recording `path` of a session with `options`: facts, configuration, robot with its shapes, ground. It continues
-/// in the next numbered file of its folder at the limits of `control.toml`, [recording].
+/// in the next numbered file of its folder at the limits of `control.toml` (`[recording]`).
 ///
 /// # Errors
 /// As of [`Writer::create`].
