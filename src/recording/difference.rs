@@ -60,9 +60,9 @@ mod tests {
         let tick = Tick::default();
         assert_eq!(difference(&tick, &Tick { number: 7, time_ns: 9, ..tick }), None);
         let mut other = tick;
-        other.command.motor[3].kp_joint = 1.0 + f64::EPSILON;
+        other.command.motor[3].kp_joint = 1.0 + f64::from(f32::EPSILON);
         let found = difference(&tick, &other).unwrap();
-        assert_eq!((found.field.as_str(), found.values[1].as_str()), ("command.kp[3]", "1.0000000000000002"));
+        assert_eq!((found.field.as_str(), found.values[1].as_str()), ("command.kp[3]", "1.0000001192092896"));
         let mut other = tick;
         other.estimate.roll_pitch_yaw.x = -0.0;
         let found = difference(&tick, &other).unwrap();
