@@ -48,14 +48,7 @@ fn the_next_file_of_the_folder_is_followed_after_the_first_one() {
         follower.wait_for_long("the trials of the first file", || judged(&follower, trial));
     }
     live.wait_for_long("the study is finished", || live.screen().contains("Study finished"));
-    live.send("q");
-    live.wait_until("it asks or ends", || {
-        ["Quit?", "recording are in"].iter().any(|text| live.screen().contains(text))
-    });
-    if live.screen().contains("Quit?") {
-        live.send("y");
-    }
-    assert!(live.wait().success());
+    assert!(live.quit().success());
     assert!(!file.exists() && study.join("session.mcap").exists(), "finished under its own name");
     assert!(!judged(&follower, 2));
     // The study goes on in another program.

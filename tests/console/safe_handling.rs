@@ -30,10 +30,7 @@ fn console(program: &Program) -> (Session, PathBuf) {
 
 /// Ends a console; returns its exit status and its last output.
 fn quit(session: &mut Session) -> (u32, String) {
-    session.send("q");
-    session.wait_until("quitting asks or ends", || session.screen().contains("Quit?") || session.restored());
-    session.send("y");
-    let status = session.wait().exit_code();
+    let status = session.quit().exit_code();
     // Lines are wrapped at the width of the terminal.
     (status, session.screen().replace('\n', ""))
 }

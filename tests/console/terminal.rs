@@ -93,10 +93,7 @@ fn a_session_by_keys_agrees_with_the_recording_and_the_study() {
     session.wait_for(&["Trial #1: judge it"]);
     session.send("r");
     session.wait_for(&["Trial #2, re-run of #1"]);
-    session.send("q");
-    session.wait_until("quitting asks or ends", || session.screen().contains("Quit?") || session.restored());
-    session.send("y");
-    assert!(session.wait().success(), "{}", session.screen());
+    assert!(session.quit().success(), "{}", session.screen());
     assert!(session.restored() && session.cooked(), "the terminal is not as before");
 
     let player = player(folder.path());

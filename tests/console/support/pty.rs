@@ -166,6 +166,16 @@ impl Session {
         writer.flush().expect("typed");
     }
 
+    /// Ends a console, which asks while the robot is armed.
+    pub fn quit(&mut self) -> ExitStatus {
+        self.send("q");
+        self.wait_until("quitting asks or ends", || self.screen().contains("Quit?") || self.restored());
+        if !self.restored() {
+            self.send("y");
+        }
+        self.wait()
+    }
+
     /// Approves the jump: two presses, a second apart.
     pub fn approve(&mut self) {
         self.send("g");
