@@ -155,7 +155,7 @@ impl Console {
 
     async fn run(mut self) -> anyhow::Result<ConsoleExit> {
         let (input, mut inputs) = unbounded_channel();
-        let stop = self.feed.handle().map(EngineHandle::stop_latch);
+        let stop = self.feed.stop_latch();
         read_input(input.clone(), KeyReader::new(stop.is_none(), stop, self.space_bar_is_text.clone()))?;
         terminal::watch_for_hang_up(move || drop(input.send(None))).context("hang-up watcher")?;
         let mut interrupted = signal(SignalKind::interrupt())?;
@@ -253,7 +253,7 @@ impl Console {
 
     fn perform_effect(&mut self, effect: Effect) {
         match effect {
-            Effect::Stop => self.feed.handle().into_iter().for_each(EngineHandle::stop),
+            Effect::Stop => self.feed.stop_latch().into_iter().for_each(|stop| stop.set()),
             Effect::Request(request) => {
                 self.feed.handle().into_iter().for_each(|handle| handle.request(request.clone()))
             }

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
-use quadfrog::engine::RejudgedTrial;
+use quadfrog::engine::{ObserverStatus, RejudgedTrial};
 use quadfrog::recording::live::LiveStatus;
 use quadfrog::recording::record::Stamped;
 use quadfrog::recording::recorder::RecorderStatus;
@@ -34,6 +34,8 @@ pub enum Msg {
     Recorder(RecorderStatus),
     /// State of the live view.
     Viewers(LiveStatus),
+    /// Observers that watch this session.
+    Observers(usize),
     /// The wait of the session for the storage of its study; none while there is none.
     Storage(Option<StorageWait>),
     /// One of the ticks for the charts.
@@ -175,8 +177,10 @@ pub struct ReplayStatus {
     pub looping: Option<u32>,
     /// The trial at the playhead, or else the last one before it, or the first one.
     pub present: Option<u32>,
-    /// Whether the recording is being written and is followed.
-    pub following: bool,
+    /// Time since the recording grew, ns, if it is being written and is followed.
+    pub silent_ns: Option<u64>,
+    /// The session that writes it, if its STOP can be reached.
+    pub observer: Option<ObserverStatus>,
     /// Time that the parts found so far take that cannot be read, ns.
     pub lost_ns: u64,
 }

@@ -12,6 +12,7 @@ pub(crate) mod trials;
 
 use std::time::Duration;
 
+use quadfrog::engine::ObserverStatus;
 use quadfrog::recording::live::LiveStatus;
 use quadfrog::recording::record::LogLevel;
 use quadfrog::recording::recorder::RecorderStatus;
@@ -90,6 +91,8 @@ pub struct Model {
     pub recorder: Option<RecorderStatus>,
     /// State of the live view; none without one.
     pub viewers: Option<LiveStatus>,
+    /// Number of observers of this session; none where it cannot be watched.
+    pub observers: Option<usize>,
     /// Wait of the session for the storage of its study.
     pub storage: Option<StorageWait>,
     pub history: SignalHistory,
@@ -136,6 +139,7 @@ impl Model {
             snapshot_at: Duration::ZERO,
             recorder: None,
             viewers: None,
+            observers: None,
             storage: None,
             history: SignalHistory::default(),
             jump_series: JumpSeries::default(),
@@ -170,6 +174,16 @@ impl Model {
     /// The robot's mode, from the newest tick.
     pub fn mode(&self) -> Mode {
         self.snapshot.tick.mode
+    }
+
+    /// The session that another process runs and this console watches; none otherwise.
+    pub fn observer(&self) -> Option<ObserverStatus> {
+        self.replay.as_ref()?.observer
+    }
+
+    /// Whether STOP reaches a robot: not in the replay of a recording, nor after the end of a watched session.
+    pub fn can_stop(&self) -> bool {
+        self.replay.is_none() || self.observer().is_some_and(|observer| !observer.ended)
     }
 
     /// Whether the robot is energised and this console commands it.

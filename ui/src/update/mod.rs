@@ -55,6 +55,7 @@ pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
         }
         Msg::Recorder(status) => model.recorder = Some(status),
         Msg::Viewers(status) => model.viewers = Some(status),
+        Msg::Observers(count) => model.observers = Some(count),
         Msg::Storage(wait) => model.storage = wait,
         Msg::Tick(tick) => {
             model.jump_series.push(&tick);
