@@ -134,6 +134,7 @@ const REPLAY: &[Row] = &[
     row(Action::Palette, ":", Shows("Actions"), ("\x1b", "8 s sweep")),
     row(Action::Report, "R", Shows("J_forward = x_final"), ("\x1b", "8 s sweep")),
     row(Action::Help, "?", Shows("Keys (1"), ("\x1b", "8 s sweep")),
+    row(Action::Theme, "W", Shows("colours for a light background"), ("W", "colours for a dark background")),
     row(Action::Mouse, "M", Shows("mouse on"), ("M", "mouse off")),
     row(Action::Redraw, "Ctrl-L", Shows("the screen was drawn again"), ("", "")),
 ];

@@ -248,7 +248,7 @@ fn columns_are_chosen_in_a_dialog_and_in_the_settings() {
     table.insert("trial_columns".into(), vec!["apex", "value"].into());
     table.insert("chart_series".into(), vec!["height"].into());
     let settings = ConsoleSettings::from_table(&table).expect("columns that exist");
-    let mut console = Console::with(settings, Theme { colours: Colours::None, glyphs: Glyphs::Ascii });
+    let mut console = Console::with(settings, Theme::new(Colours::None, Glyphs::Ascii));
     console.record(Record::Trial(trial(0, Some(Verdict::Accept), None)));
     console.press(&["2"]);
     let screen = console.screen(80, 24);

@@ -24,8 +24,8 @@ use crate::input::{KeyReader, NumberedEvent, SpaceBarIsText, TerminalEvent, read
 use crate::message::{Effect, Msg};
 use crate::model::Model;
 use crate::settings::{ChartMode, ConsoleSettings};
-use crate::terminal::{self, TerminalScreen};
-use crate::theme::{ColourChoice, GlyphChoice, Theme};
+use crate::terminal::{self, TerminalProtocol, TerminalScreen};
+use crate::theme::{ColourChoice, GlyphChoice, Theme, ThemeChoice};
 use crate::update::{say, update};
 use crate::{export, text, view};
 
@@ -33,6 +33,9 @@ use crate::{export, text, view};
 const PULSE: Duration = Duration::from_millis(50);
 /// Maximum frames per second over a slow link.
 const LOW_BANDWIDTH_FRAMES: u32 = 2;
+
+/// Longest wait of the first frame for the terminal's report of its background. A later report changes the colours.
+const BACKGROUND_WAIT: Duration = Duration::from_millis(200);
 
 /// Options of the console.
 #[derive(Debug, Clone)]
@@ -48,6 +51,7 @@ impl ConsoleOptions {
     pub fn new(
         mut settings: ConsoleSettings,
         colours: Option<ColourChoice>,
+        theme: ThemeChoice,
         ascii: bool,
         low_bandwidth: bool,
     ) -> ConsoleOptions {
@@ -61,6 +65,9 @@ impl ConsoleOptions {
         }
         if let Some(colours) = colours {
             settings.colours = colours;
+        }
+        if theme != ThemeChoice::Auto {
+            settings.theme = theme;
         }
         if ascii {
             settings.glyphs = GlyphChoice::Ascii;
@@ -113,6 +120,8 @@ struct Console {
     last_frame: Option<Instant>,
     last_feed: Instant,
     redraw: bool,
+    /// End of the wait for the terminal's report of its background.
+    background_due: Option<Instant>,
     ended: Option<ConsoleExit>,
 }
 
@@ -121,11 +130,20 @@ impl Console {
         let settings = options.settings;
         let theme = Theme::detect(settings.colours, settings.glyphs, |name| std::env::var(name).ok());
         let frame_period = Duration::from_secs(1) / settings.frames_per_second.max(1);
+        let low_bandwidth = settings.low_bandwidth;
         let mut model = Model::new(settings, theme, options.robot);
         let (columns, rows) = crossterm::terminal::size().context("the terminal's size")?;
         update(&mut model, Msg::Resize(columns, rows));
-        let mut screen =
-            TerminalScreen::enter(matches!(feed, Feed::Replay(_))).context("the terminal cannot be used")?;
+        // The kernel's console has no such report.
+        let asks = model.follow_background
+            && theme.follows_background()
+            && std::env::var("TERM").is_ok_and(|term| term != "linux");
+        let protocol = TerminalProtocol {
+            pastes: matches!(feed, Feed::Replay(_)),
+            asks_background: asks,
+            synchronized: !low_bandwidth,
+        };
+        let mut screen = TerminalScreen::enter(protocol).context("the terminal cannot be used")?;
         screen.mouse(model.mouse).context("the terminal cannot be used")?;
         terminal::stop_on_panic(feed.handle().map(EngineHandle::stop_latch));
         let connection = match &feed {
@@ -149,6 +167,7 @@ impl Console {
             last_frame: None,
             last_feed: now,
             redraw: true,
+            background_due: asks.then(|| now + BACKGROUND_WAIT),
             ended: None,
         })
     }
@@ -212,10 +231,14 @@ impl Console {
             match input {
                 Some(NumberedEvent { event, keys }) => {
                     self.keys = keys;
+                    if matches!(event, TerminalEvent::Background(_)) {
+                        self.background_due = None;
+                    }
                     self.update_with([match event {
                         TerminalEvent::Key(key) => Msg::Key(key),
                         TerminalEvent::Paste(text) => Msg::Paste(text),
                         TerminalEvent::Mouse(event) => Msg::Mouse(event),
+                        TerminalEvent::Background(background) => Msg::Background(background),
                     }]);
                 }
                 None => self.hang_up(),
@@ -327,7 +350,8 @@ impl Console {
     fn draw_if_due(&mut self) -> anyhow::Result<()> {
         // A quarter of the loop period early, so that a frame is not delayed by one whole period.
         let due = self.redraw || self.last_frame.is_none_or(|last| last.elapsed() + PULSE / 4 >= self.frame_period);
-        if !due || !self.screen.ready() || self.ended == Some(ConsoleExit::HungUp) {
+        let waits = self.background_due.is_some_and(|due| Instant::now() < due);
+        if !due || waits || !self.screen.ready() || self.ended == Some(ConsoleExit::HungUp) {
             return Ok(());
         }
         if self.screen.broken() {

@@ -26,7 +26,7 @@ use crate::keymap::Keymap;
 use crate::message::{ReplayStatus, ReplayTimeline};
 use crate::series::Series;
 use crate::settings::{BellCause, ConsoleSettings};
-use crate::theme::Theme;
+use crate::theme::{Background, Theme, ThemeChoice};
 use dialog::{Choice, Dialog};
 use history::SignalHistory;
 use jump_series::JumpSeries;
@@ -73,6 +73,8 @@ pub struct Notice {
 #[expect(missing_docs, reason = "the names say the rest")]
 pub struct Model {
     pub theme: Theme,
+    /// Whether the theme follows the background that the terminal reports.
+    pub follow_background: bool,
     pub keymap: Keymap,
     pub bell: Vec<BellCause>,
     /// Whether Space stops an energised robot in a text field, too.
@@ -123,9 +125,15 @@ pub struct Model {
 
 impl Model {
     /// An empty screen.
-    pub fn new(settings: ConsoleSettings, theme: Theme, robot: Option<RobotDescription>) -> Model {
+    pub fn new(settings: ConsoleSettings, mut theme: Theme, robot: Option<RobotDescription>) -> Model {
+        match settings.theme {
+            ThemeChoice::Auto => {}
+            ThemeChoice::Dark => theme.background = Background::Dark,
+            ThemeChoice::Light => theme.background = Background::Light,
+        }
         Model {
             theme,
+            follow_background: settings.theme == ThemeChoice::Auto,
             keymap: settings.keymap,
             bell: settings.bell,
             space_always_stops: settings.space_always_stops,
