@@ -44,6 +44,8 @@ pub struct ConsoleOptions {
     pub settings: ConsoleSettings,
     /// The robot model, for limits; none if unknown.
     pub robot: Option<RobotDescription>,
+    /// Largest roll and pitch before a trial is a fall, rad; none where the configuration of the trials is not known.
+    pub fall_tilt_rad: Option<[f64; 2]>,
 }
 
 impl ConsoleOptions {
@@ -72,7 +74,14 @@ impl ConsoleOptions {
         if ascii {
             settings.glyphs = GlyphChoice::Ascii;
         }
-        ConsoleOptions { settings, robot: None }
+        ConsoleOptions { settings, robot: None, fall_tilt_rad: None }
+    }
+
+    /// Adds the largest roll and pitch before a trial is a fall, rad.
+    #[must_use]
+    pub fn with_fall_tilt_rad(mut self, fall_tilt_rad: [f64; 2]) -> ConsoleOptions {
+        self.fall_tilt_rad = Some(fall_tilt_rad);
+        self
     }
 
     /// Adds the robot model.
@@ -132,6 +141,7 @@ impl Console {
         let frame_period = Duration::from_secs(1) / settings.frames_per_second.max(1);
         let low_bandwidth = settings.low_bandwidth;
         let mut model = Model::new(settings, theme, options.robot);
+        model.fall_tilt_rad = options.fall_tilt_rad;
         let (columns, rows) = crossterm::terminal::size().context("the terminal's size")?;
         update(&mut model, Msg::Resize(columns, rows));
         // The kernel's console has no such report.

@@ -274,6 +274,11 @@ impl Theme {
         self.pick("|", "│")
     }
 
+    /// A piece of a limit's line.
+    pub fn limit(&self) -> &'static str {
+        self.pick("-", "╌")
+    }
+
     /// Separator of two items on one line.
     pub fn dot(&self) -> &'static str {
         self.pick("-", "·")

@@ -81,6 +81,8 @@ pub struct Model {
     pub space_always_stops: bool,
     /// The robot's limits and geometry; none where they are not known.
     pub robot: Option<RobotDescription>,
+    /// Largest roll and pitch before a trial is a fall, rad; none where they are not known.
+    pub fall_tilt_rad: Option<[f64; 2]>,
     /// Time since the console started.
     pub clock: Duration,
     pub session: SessionModel,
@@ -138,6 +140,7 @@ impl Model {
             bell: settings.bell,
             space_always_stops: settings.space_always_stops,
             robot,
+            fall_tilt_rad: None,
             clock: Duration::ZERO,
             session: SessionModel::default(),
             snapshot: Snapshot::default(),

@@ -129,7 +129,9 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
     if let (Some(text), Some(network)) = (&arguments.address, &mut network) {
         network.address = address(text)?;
     }
-    let console = options(&arguments.screen, &config)?.with_robot(robot.clone());
+    let console = options(&arguments.screen, &config)?
+        .with_robot(robot.clone())
+        .with_fall_tilt_rad([config.safety.fall.roll_rad, config.safety.fall.pitch_rad]);
     let selected = match &arguments.resume {
         Some(folder) => study_to_continue(folder, arguments.task, arguments.seed, &robot)?,
         None => {
