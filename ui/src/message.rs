@@ -14,6 +14,7 @@ use quadfrog::telemetry::{Snapshot, Tick};
 use quadfrog::trial::{TrialRecord, Verdict};
 
 use crate::keymap::Key;
+use crate::theme::Background;
 
 /// An input of the console: keys, mouse, signals, the feed, the clock.
 #[expect(clippy::large_enum_variant, reason = "records are few; the many ticks are boxed")]
@@ -27,6 +28,8 @@ pub enum Msg {
     Key(Key),
     /// Pasted text of the terminal of a replay. In a live session a paste arrives as keys.
     Paste(String),
+    /// The background that the terminal reports.
+    Background(Background),
     /// Mouse input, while the mouse is on.
     Mouse(Mouse),
     /// The newest tick and counters, for numbers and the mode.

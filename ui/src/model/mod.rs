@@ -27,7 +27,7 @@ use crate::keymap::Keymap;
 use crate::message::{ReplayStatus, ReplayTimeline};
 use crate::series::Series;
 use crate::settings::{BellCause, ConsoleSettings};
-use crate::theme::Theme;
+use crate::theme::{Background, Theme, ThemeChoice};
 use dialog::{Choice, Dialog};
 use history::SignalHistory;
 use jump_series::JumpSeries;
@@ -74,12 +74,16 @@ pub struct Notice {
 #[expect(missing_docs, reason = "the names say the rest")]
 pub struct Model {
     pub theme: Theme,
+    /// Whether the theme follows the background that the terminal reports.
+    pub follow_background: bool,
     pub keymap: Keymap,
     pub bell: Vec<BellCause>,
     /// Whether Space stops an energised robot in a text field, too.
     pub space_always_stops: bool,
     /// The robot's limits and geometry; none where they are not known.
     pub robot: Option<RobotDescription>,
+    /// Largest roll and pitch before a trial is a fall, rad; none where they are not known.
+    pub fall_tilt_rad: Option<[f64; 2]>,
     /// Time since the console started.
     pub clock: Duration,
     pub session: SessionModel,
@@ -126,13 +130,20 @@ pub struct Model {
 
 impl Model {
     /// An empty screen.
-    pub fn new(settings: ConsoleSettings, theme: Theme, robot: Option<RobotDescription>) -> Model {
+    pub fn new(settings: ConsoleSettings, mut theme: Theme, robot: Option<RobotDescription>) -> Model {
+        match settings.theme {
+            ThemeChoice::Auto => {}
+            ThemeChoice::Dark => theme.background = Background::Dark,
+            ThemeChoice::Light => theme.background = Background::Light,
+        }
         Model {
             theme,
+            follow_background: settings.theme == ThemeChoice::Auto,
             keymap: settings.keymap,
             bell: settings.bell,
             space_always_stops: settings.space_always_stops,
             robot,
+            fall_tilt_rad: None,
             clock: Duration::ZERO,
             session: SessionModel::default(),
             snapshot: Snapshot::default(),
