@@ -34,7 +34,7 @@ const CONSOLE: [&[&str]; 9] = [
     &["layout", "text"],
     &["legal"],
     &["update", "view", "feed", "export", "terminal", "input"],
-    &["app"],
+    &["app", "screenshot"],
     &["subcommand"],
 ];
 

@@ -23,6 +23,7 @@ mod legal;
 pub mod message;
 pub mod model;
 pub mod output;
+pub mod screenshot;
 pub mod series;
 pub mod settings;
 pub mod terminal;

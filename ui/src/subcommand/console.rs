@@ -35,7 +35,8 @@ fn colour() -> impl TypedValueParser<Value = ColourChoice> {
     ])
 }
 
-fn theme() -> impl TypedValueParser<Value = ThemeChoice> {
+/// Parses the background that colours suit.
+pub fn theme() -> impl TypedValueParser<Value = ThemeChoice> {
     one_of([
         (ThemeChoice::Auto, "auto", "As console.toml says, or as the terminal reports its background"),
         (ThemeChoice::Dark, "dark", "For a dark background"),

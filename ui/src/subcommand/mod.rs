@@ -19,6 +19,7 @@ mod rejudge;
 mod replay;
 mod report;
 mod reproduce;
+mod screenshot;
 mod selection;
 mod study;
 mod table;
@@ -65,6 +66,8 @@ enum Subcommands {
     Rejudge(rejudge::RejudgeArguments),
     /// Export the signals of a recording as CSV, JSON or Parquet
     Export(export::ExportArguments),
+    /// Draw the screen of a replay as an SVG picture
+    Screenshot(screenshot::ScreenshotArguments),
     /// Repair an incomplete recording
     Recover(recover::RecoverArguments),
     /// Run a simulated session again from its recording alone and compare every tick
@@ -99,6 +102,7 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
         Some(Subcommands::Sessions) => attach::list(),
         Some(Subcommands::Rejudge(rejudge)) => rejudge::run(&rejudge),
         Some(Subcommands::Export(export)) => export::run(&export),
+        Some(Subcommands::Screenshot(screenshot)) => screenshot::run(&screenshot),
         Some(Subcommands::Recover(recover)) => recover::run(&recover),
         Some(Subcommands::Verify(verify)) => verify::run(&verify),
         Some(Subcommands::Emulate(emulate)) => emulate::run(&emulate),

@@ -1,0 +1,93 @@
+//! `quadfrog screenshot`: the picture has the characters of the screen at their places.
+
+#[path = "support/program.rs"]
+mod program;
+#[path = "support/pty.rs"]
+mod pty;
+
+use std::path::{Path, PathBuf};
+
+use portable_pty::CommandBuilder;
+use program::{Program, assert_shows};
+use pty::Session;
+use xml::attribute::OwnedAttribute;
+use xml::reader::{EventReader, XmlEvent};
+
+fn sample() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../recordings/samples/forward")
+}
+
+/// The texts of a picture, put into the cells of a terminal by their places and widths, and its background.
+fn cells(svg: &str, rows: usize) -> (Vec<String>, String) {
+    let mut lines = vec![Vec::new(); rows];
+    let (mut place, mut background) = (None, None);
+    for event in EventReader::from_str(svg) {
+        match event.expect("well-formed") {
+            XmlEvent::StartElement { name, attributes, .. } => {
+                let find = |name: &str| {
+                    let found = attributes.iter().find(|attribute: &&OwnedAttribute| attribute.name.local_name == name);
+                    found.map(|attribute| attribute.value.clone())
+                };
+                let number = |name: &str| find(name).and_then(|value| value.parse::<f64>().ok());
+                place = (name.local_name == "text").then(|| {
+                    let [x, y, width] = ["x", "y", "textLength"].map(|name| number(name).expect("a number"));
+                    (((x - 8.0) / 8.4).round() as usize, ((y - 8.0) / 17.0) as usize, (width / 8.4).round() as usize)
+                });
+                if name.local_name == "rect" {
+                    background = background.or(find("fill"));
+                }
+            }
+            XmlEvent::Characters(text) if place.is_some() => {
+                let (column, row, width) = place.take().unwrap();
+                let line: &mut Vec<char> = &mut lines[row];
+                assert_eq!(text.chars().count(), width, "{text}");
+                line.resize(line.len().max(column + width), ' ');
+                line.splice(column..column + width, text.chars().map(|c| if c == '\u{a0}' { ' ' } else { c }));
+            }
+            _ => {}
+        }
+    }
+    let lines = lines.into_iter().map(|line| line.into_iter().collect::<String>().trim_end().to_owned());
+    (lines.collect(), background.expect("a background"))
+}
+
+#[test]
+fn the_picture_is_the_screen_of_the_replay() {
+    let program = Program::new();
+    let svg = program.text(&["screenshot", sample().to_str().unwrap(), "--keys", "2", "--size", "100x30"]);
+    let (drawn, background) = cells(&svg, 30);
+    assert_eq!(background, "#101010");
+    let folder = tempfile::tempdir().unwrap();
+    let mut command = CommandBuilder::new(env!("CARGO_BIN_EXE_quadfrog"));
+    command.args(["replay", sample().to_str().unwrap()]);
+    let mut session = Session::run(folder.path(), (100, 30), command);
+    session.wait_for(&["REPLAY"]);
+    session.send("p2)");
+    session.wait_until("the screens agree", || session.screen().lines().map(str::trim_end).eq(drawn.iter()));
+    session.send("q");
+    session.wait();
+}
+
+#[test]
+fn a_picture_for_paper_has_a_light_background_and_the_end_of_a_trial() {
+    let program = Program::new();
+    let sample = sample();
+    let best = ["screenshot", sample.to_str().unwrap(), "--trial", "12", "--theme", "light", "--output", "a.svg"];
+    program.text(&best);
+    let (drawn, background) = cells(&std::fs::read_to_string(program.path("a.svg")).unwrap(), 40);
+    assert_eq!(background, "#ffffff");
+    assert!(drawn[38].contains("trial #12, suggested verdict: accept"), "{drawn:?}");
+}
+
+#[test]
+fn wrong_input_is_refused_with_the_remedy() {
+    let program = Program::new();
+    let sample = sample();
+    let refused =
+        |arguments: &[&str]| program.refused(&[&["screenshot", sample.to_str().unwrap()], arguments].concat());
+    assert_shows(&refused(&["--trial", "99"]), &["no trial 99", "its trials: 12"]);
+    assert_shows(&refused(&["--size", "120"]), &["COLUMNSxROWS", "for example 120x40"]);
+    assert_shows(&refused(&["--size", "9999x9999"]), &["to 400x200"]);
+    assert_shows(&refused(&["--keys", "2 Entr"]), &["`Entr` is no key"]);
+    assert_shows(&refused(&["--time=-1"]), &["not a time in s"]);
+}

@@ -1,0 +1,128 @@
+//! `quadfrog screenshot`: the screen of a replay as a picture.
+
+use std::io::Write;
+use std::path::PathBuf;
+
+use clap::Args;
+use quadfrog::config::Config;
+use quadfrog::recording::session_files::recordings_of;
+use quadfrog::recording::timeline::Timeline;
+use quadfrog::robot::description::RobotDescription;
+use quadfrog_console::feed::Feed;
+use quadfrog_console::keymap::Key;
+use quadfrog_console::message::{Effect, Msg, ReplayCommand};
+use quadfrog_console::model::Model;
+use quadfrog_console::settings::ConsoleSettings;
+use quadfrog_console::theme::{Colours, Glyphs, Theme, ThemeChoice};
+use quadfrog_console::update::update;
+use quadfrog_console::{output, screenshot};
+
+use super::console::theme;
+use super::failure::Failure;
+use super::table::write_file;
+
+#[derive(Debug, Args)]
+pub struct ScreenshotArguments {
+    /// A recording, or the folder of a study
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
+    /// Show the end of this trial [default: the end of the recording]
+    #[arg(long, value_name = "N", conflicts_with = "time")]
+    trial: Option<u32>,
+    /// Show this time, s since the recording began
+    #[arg(long, value_name = "S", value_parser = parse_time)]
+    time: Option<u64>,
+    /// Keys pressed before, as in a replay: 2 for Trials, Enter for its details; separated by spaces
+    #[arg(long, value_name = "KEYS", default_value = "1", value_parser = parse_keys)]
+    keys: Keys,
+    /// Size of the terminal
+    #[arg(long, value_name = "COLUMNSxROWS", default_value = "120x40", value_parser = parse_size)]
+    size: (u16, u16),
+    /// Background of the picture
+    #[arg(long, value_name = "WHICH", default_value = "dark", value_parser = theme())]
+    theme: ThemeChoice,
+    /// Folder with your own console.toml
+    #[arg(long, value_name = "DIR")]
+    config: Option<PathBuf>,
+    /// Picture, *.svg [default: standard output]
+    #[arg(long, short, value_name = "OUT")]
+    output: Option<PathBuf>,
+}
+
+#[derive(Debug, Clone)]
+struct Keys(Vec<Key>);
+
+fn parse_keys(text: &str) -> Result<Keys, String> {
+    let keys = text.split_whitespace().map(|name| name.parse::<Key>().map_err(|error| error.to_string()));
+    keys.collect::<Result<_, _>>().map(Keys)
+}
+
+fn parse_time(text: &str) -> Result<u64, String> {
+    match text.parse::<f64>() {
+        Ok(seconds) if seconds.is_finite() && seconds >= 0.0 => Ok((seconds * 1e9) as u64),
+        _ => Err("not a time in s from 0".to_owned()),
+    }
+}
+
+fn parse_size(text: &str) -> Result<(u16, u16), String> {
+    let wanted = || "write it as COLUMNSxROWS, from 20x6 to 400x200, for example 120x40".to_owned();
+    let (columns, rows) = text.split_once('x').ok_or_else(wanted)?;
+    match (columns.parse(), rows.parse()) {
+        (Ok(columns @ 20..=400), Ok(rows @ 6..=200)) => Ok((columns, rows)),
+        _ => Err(wanted()),
+    }
+}
+
+/// Plays the recording up to the moment without a terminal, presses the keys and draws the screen.
+pub fn run(arguments: &ScreenshotArguments) -> Result<(), Failure> {
+    let config = Config::load(arguments.config.as_deref())?;
+    let settings = ConsoleSettings::from_table(&config.console)
+        .map_err(|error| config.refuse("console.toml", &error.key, &error.value, &error.reason))?;
+    let recording = Timeline::open(&recordings_of(&arguments.file)?)?;
+    let time_ns = match (arguments.trial, arguments.time) {
+        (Some(trial), _) => end_of(trial, &recording)
+            .map_err(|reason| Failure::input(format!("{}: {reason}", arguments.file.display())))?,
+        (None, time) => time.unwrap_or(u64::MAX),
+    };
+    // A model of the operator's own: the panels that need its limits say so.
+    let robot = RobotDescription::embedded(&recording.session().robot).ok();
+    let settings = ConsoleSettings { theme: arguments.theme, ..settings };
+    let mut model = Model::new(settings, Theme::new(Colours::True, Glyphs::Braille), robot);
+    let mut feed = Feed::replay(recording);
+    let (columns, rows) = arguments.size;
+    update(&mut model, Msg::Resize(columns, rows));
+    // It plays from its beginning; stopped, it stays at the moment.
+    feed.control_replay(ReplayCommand::PlayPause);
+    feed.control_replay(ReplayCommand::Time(time_ns));
+    show(&mut model, &mut feed);
+    for key in &arguments.keys.0 {
+        for effect in update(&mut model, Msg::Key(*key)) {
+            if let Effect::Replay(command) = effect {
+                feed.control_replay(command);
+            }
+        }
+        show(&mut model, &mut feed);
+    }
+    let picture = screenshot::svg(&model);
+    match &arguments.output {
+        Some(path) => write_file(path, |mut file| file.write_all(picture.as_bytes()).map(|()| file)),
+        None => {
+            output::data(&picture);
+            Ok(())
+        }
+    }
+}
+
+fn show(model: &mut Model, feed: &mut Feed) {
+    for message in feed.poll(0) {
+        update(model, message);
+    }
+}
+
+fn end_of(trial: u32, recording: &Timeline) -> Result<u64, String> {
+    let runs = recording.trials();
+    runs.iter().rev().find(|run| run.trial == trial).map(|run| run.end_ns).ok_or_else(|| {
+        let known = runs.iter().map(|run| run.trial.to_string()).collect::<Vec<_>>().join(", ");
+        format!("no trial {trial}; its trials: {}", if known.is_empty() { "none" } else { &known })
+    })
+}
