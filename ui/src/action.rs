@@ -162,12 +162,12 @@ pub static ACTIONS: [ActionInfo; 84] = {
         row(A::Fix, "fix", &["X"], G::Proposal, "Override: fix the parameter for the next trials, or search it again"),
         row(A::Bounds, "bounds", &["B"], G::Proposal, "Override: search the parameter within other bounds"),
         row(A::QueuePoint, "queue-point", &["Q"], G::Proposal, "queue this point ahead of the sampler's"),
-        row(A::Skip, "skip", &["n"], G::Proposal, "refuse the proposal; another follows"),
+        row(A::Skip, "skip", &["n"], G::Proposal, "refuse the proposal, after a question; another follows"),
         row(A::Continue, "continue", &["C"], G::Proposal, "give a finished study more trials"),
         row(A::ConfirmBest, "confirm-best", &["K"], G::Proposal, "repeat the best points until one leads; again: end the repeats"),
         row(A::ExportBest, "export-best", &["E"], G::Proposal, "write the best parameters as a configuration beside the study"),
 
-        row(A::Accept, "accept", &["a"], G::Verdict, "accept: it counts with its value"),
+        row(A::Accept, "accept", &["a"], G::Verdict, "accept: it counts with its value; a suggested fall only after a question"),
         row(A::Fall, "fall", &["f"], G::Verdict, "fall: it counts as J = 0"),
         row(A::Void, "void", &["v"], G::Verdict, "void: cause outside the parameters; hidden from the sampler"),
         row(A::Rerun, "re-run", &["r"], G::Verdict, "re-run: void, and the same parameters again (Trials: queue the row)"),
@@ -194,7 +194,7 @@ pub static ACTIONS: [ActionInfo; 84] = {
         row(A::Open, "open", &["Enter"], G::Views, "details; acknowledges a stop; never starts motion; Trials of a replay: to the trial"),
         row(A::Report, "report", &["R"], G::Views, "tables of the study, as quadfrog report prints them"),
 
-        row(A::Freeze, "freeze", &["z"], G::Charts, "freeze the charts; recording goes on"),
+        row(A::Freeze, "freeze", &["z"], G::Charts, "freeze the charts; while a trial waits for its verdict: that trial or the present"),
         row(A::ZoomIn, "zoom-in", &["+"], G::Charts, "shorter time window"),
         row(A::ZoomOut, "zoom-out", &["-"], G::Charts, "longer time window"),
         row(A::ChartMode, "chart-mode", &["w"], G::Charts, "sweep or scroll"),

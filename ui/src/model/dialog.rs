@@ -38,6 +38,8 @@ pub enum Dialog {
     ArmingChecks {
         selected: usize,
     },
+    /// A question that `y` answers; every other key cancels.
+    Confirm(Question),
     /// Confirmation of quitting while the robot is armed or a trial waits.
     Quit,
     Override(OverrideForm),
@@ -68,6 +70,16 @@ pub enum Dialog {
         trial: u32,
         scroll: usize,
     },
+}
+
+/// A question before an action that a single key would carry out by accident.
+#[derive(Debug, Clone, PartialEq)]
+#[expect(missing_docs, reason = "the names say the rest")]
+pub enum Question {
+    /// Refuse this proposal.
+    Skip { trial: u32, revision: u32 },
+    /// Accept a trial whose suggested verdict is a fall.
+    AcceptFall { trial: u32 },
 }
 
 /// Purpose of a text field. A parameter is its index in the session's list.

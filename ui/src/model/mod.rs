@@ -4,6 +4,7 @@ pub(crate) mod comparison;
 pub mod dialog;
 pub(crate) mod history;
 pub mod jump_series;
+pub(crate) mod landed;
 pub(crate) mod live;
 pub(crate) mod log;
 pub(crate) mod rejudged;
@@ -30,6 +31,7 @@ use crate::theme::Theme;
 use dialog::{Choice, Dialog};
 use history::SignalHistory;
 use jump_series::JumpSeries;
+use landed::LandedTrial;
 use live::{LiveView, Panel};
 use log::LogView;
 use rejudged::RejudgedTable;
@@ -152,6 +154,8 @@ impl Model {
                 cursor_ns: 0,
                 ghost: None,
                 comparison: None,
+                present_in_review: false,
+                landed_cursor_ns: None,
             },
             trial_table: TrialTable { columns: settings.trial_columns, ..TrialTable::default() },
             override_row: 0,
@@ -262,6 +266,16 @@ impl Model {
         } else {
             self.session.under_review().or(self.session.trials.newest())
         }
+    }
+
+    /// The trial that waits for its verdict, as the charts of Live draw it; none where they draw something else.
+    pub fn landed(&self) -> Option<LandedTrial<'_>> {
+        let live = &self.live;
+        let elsewhere = live.present_in_review || live.frozen.is_some() || live.comparison.is_some();
+        let trial = self.session.under_review().filter(|_| !elsewhere && self.replay.is_none())?.trial;
+        let best = self.session.trials.best().map(|best| best.trial);
+        let under = live.ghost.or(best).filter(|under| *under != trial);
+        LandedTrial::of(&self.history, trial, under)
     }
 
     /// The samples that the charts draw: the running history, or the frozen one.

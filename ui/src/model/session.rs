@@ -50,6 +50,11 @@ impl SessionModel {
         self.trials.records.get(&self.trial_in(ExperimentStage::Review)?)
     }
 
+    /// The trial that waits for its verdict, if its suggested one is a fall.
+    pub fn suggested_fall(&self) -> Option<&TrialRecord> {
+        self.under_review().filter(|trial| trial.suggested == Some(Verdict::Fall))
+    }
+
     /// The proposal that waits for approval.
     pub fn open_proposal(&self) -> Option<&Proposal> {
         let trial = self.trial_in(ExperimentStage::Proposed)?;

@@ -14,7 +14,7 @@ use super::request::{interrupt, request, say, stop};
 use crate::action::Action;
 use crate::legal::{legal, may_acknowledge, may_request};
 use crate::message::{Effect, ReplayCommand, ReplayStep};
-use crate::model::dialog::{Choice, Dialog, OverrideForm, Purpose};
+use crate::model::dialog::{Choice, Dialog, OverrideForm, Purpose, Question};
 use crate::model::{Model, View};
 use crate::text::report;
 
@@ -51,13 +51,22 @@ pub(super) fn perform(model: &mut Model, action: Action) -> Vec<Effect> {
         Action::Fix => return fix(model),
         Action::Bounds => bounds(model),
         Action::QueuePoint => return queue_point(model),
-        Action::Skip => return request(model, OperatorRequest::Skip),
+        Action::Skip => {
+            if let Some(&Proposal { trial, revision, .. }) = model.session.open_proposal() {
+                open(model, Dialog::Confirm(Question::Skip { trial, revision }));
+            }
+        }
         Action::Continue => open(model, Dialog::field(Purpose::Continue, "20")),
         Action::ConfirmBest if model.session.confirming().is_some() => {
             return request(model, OperatorRequest::ConfirmBest { repeats: 0 });
         }
         Action::ConfirmBest => open(model, Dialog::field(Purpose::ConfirmBest, "10")),
         Action::ExportBest => return vec![Effect::ExportBest],
+        Action::Accept if model.session.suggested_fall().is_some() => {
+            if let Some(trial) = model.session.suggested_fall().map(|row| row.trial) {
+                open(model, Dialog::Confirm(Question::AcceptFall { trial }));
+            }
+        }
         Action::Accept => return request(model, OperatorRequest::Judge(Verdict::Accept)),
         Action::Fall => return request(model, OperatorRequest::Judge(Verdict::Fall)),
         Action::Void => return void(model, false),

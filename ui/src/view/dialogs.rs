@@ -25,7 +25,7 @@ use super::{arming, help};
 use crate::action::Action;
 use crate::legal::palette;
 use crate::model::Model;
-use crate::model::dialog::{APPROVAL_PAUSE, Choice, Dialog, OverrideForm, Purpose};
+use crate::model::dialog::{APPROVAL_PAUSE, Choice, Dialog, OverrideForm, Purpose, Question};
 use crate::theme::{Glyphs, Role, Theme};
 
 pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
@@ -42,6 +42,10 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
             let lines =
                 arming::lines(&model.session, &model.theme, 74, usize::from(area.height.saturating_sub(2)), chosen);
             popup(frame, area, model, &format!("Arming checks: {}", arming::summary(&model.session)), 78, lines);
+        }
+        Dialog::Confirm(question) => {
+            let (title, lines) = confirm(model, question);
+            popup(frame, area, model, title, 66, lines);
         }
         Dialog::Quit => popup(frame, area, model, "Quit?", 58, quit(model)),
         Dialog::Override(form) => {
@@ -212,6 +216,30 @@ fn quit(model: &Model) -> Vec<Line<'static>> {
     lines.push(Line::default());
     lines.push(answers(&model.theme, "y", "quit"));
     lines
+}
+
+fn confirm(model: &Model, question: &Question) -> (&'static str, Vec<Line<'static>>) {
+    match question {
+        Question::Skip { trial, .. } => {
+            let text = format!("Trial #{trial} is not run; the sampler does not see it. Another proposal follows.");
+            let answer = answers(&model.theme, "y", "skip");
+            ("Skip the proposal?", vec![Line::from(text), Line::default(), answer])
+        }
+        Question::AcceptFall { trial } => {
+            let row = model.session.under_review();
+            let cause = row.map_or("", |row| row.cause.as_str());
+            let value = row.and_then(|row| row.hand_value.or_else(|| model.session.measured_objective(row)));
+            let unit = &model.session.info.unit;
+            let value = value.map_or("no value".to_owned(), |value| format!("J = {} {unit}", number(value)));
+            let lines = vec![
+                Line::from(format!("The suggested verdict of trial #{trial} is fall: {cause}.")),
+                Line::from(format!("Accept reports {value} to the optimizer, fall reports 0.")),
+                Line::default(),
+                answers(&model.theme, "y", "accept"),
+            ];
+            ("Accept a fall?", lines)
+        }
+    }
 }
 
 fn overrides(model: &Model, form: &OverrideForm) -> Vec<Line<'static>> {

@@ -15,6 +15,7 @@
 mod arming;
 mod beside;
 mod chart;
+mod countdown;
 mod densities;
 mod details;
 mod dialogs;
@@ -59,6 +60,7 @@ pub fn render(frame: &mut Frame, model: &Model) {
         View::Log => log::render(frame, body, model),
     }
     dialogs::render(frame, body, model);
+    countdown::render(frame, body, model);
     timeline::render(frame, timeline, model);
     status_bar::render_message(frame, message, model);
     next_step::render(frame, next_step, model);

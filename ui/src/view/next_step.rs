@@ -12,7 +12,7 @@ use super::draw::span;
 use crate::action::Action;
 use crate::legal::legal;
 use crate::model::Model;
-use crate::model::dialog::{Dialog, Purpose};
+use crate::model::dialog::{Dialog, Purpose, Question};
 use crate::theme::Role;
 
 /// The most likely next step, and the others.
@@ -53,7 +53,10 @@ fn live(model: &Model) -> NextStep {
     let (sit_down, undo, quit) = ((Action::SitDown, "sit down"), (Action::Undo, "undo"), (Action::Quit, "quit"));
     let change = (Action::Override, "override");
     match model.mode() {
-        Mode::Countdown => step("Countdown to the jump: any key cancels it.", model, &[]),
+        Mode::Countdown => {
+            let left = model.countdown_s.map_or(String::new(), |seconds| format!(" in {seconds} s"));
+            step(format!("Jump{left}: any key cancels it."), model, &[])
+        }
         Mode::StandUp => step("Standing up.", model, &[sit_down]),
         Mode::Jump if session.jumps_in_a_row() > 1 => step(model.jump_series.line(session), model, &[sit_down]),
         Mode::Jump => step("Jumping.", model, &[]),
@@ -182,6 +185,12 @@ fn in_dialog(model: &Model, dialog: &Dialog) -> NextStep {
         }
         Dialog::Override(_) => "Enter takes the value and applies. Esc drops it.".to_owned(),
         Dialog::TakeControl => "Press y to take control. Any other key cancels.".to_owned(),
+        Dialog::Confirm(Question::Skip { trial, .. }) => {
+            format!("Press y to skip trial #{trial}. Any other key cancels.")
+        }
+        Dialog::Confirm(Question::AcceptFall { trial }) => {
+            format!("Press y to accept trial #{trial}. Any other key cancels.")
+        }
         Dialog::Quit => "Press y to quit. Any other key cancels.".to_owned(),
         Dialog::Field { purpose: Purpose::Note(_) | Purpose::VoidReason { .. }, .. } if model.space_bar_must_stop() => {
             "Enter saves the text, Esc cancels. Energised: Space is STOP, _ writes a space.".to_owned()

@@ -4,13 +4,14 @@ use std::time::Duration;
 
 use crossterm::event::KeyCode;
 use quadfrog::session::operator_request::{OperatorCheck, OperatorRequest};
+use quadfrog::trial::Verdict;
 
 use crate::action::Action;
 use crate::keymap::Key;
 use crate::legal::legal;
 use crate::message::Effect;
 use crate::model::Model;
-use crate::model::dialog::{APPROVAL_PAUSE, ARMING_TIME, Dialog};
+use crate::model::dialog::{APPROVAL_PAUSE, ARMING_TIME, Dialog, Question};
 use crate::update::request::{cancelled, refused, request};
 
 /// The second press of an approval. Only the approving key approves, and only after a pause: a bounced or held key starts
@@ -65,6 +66,19 @@ pub(super) fn take_control_key(model: &mut Model, key: Key) -> Vec<Effect> {
     match key.typed() {
         Some('y' | 'Y') => request_if_legal(model, Action::TakeControl, OperatorRequest::TakeControl, "not taken"),
         _ => cancelled(model, "nothing was sent to the robot"),
+    }
+}
+
+/// `y` carries the action out; every other key cancels.
+pub(super) fn question_key(model: &mut Model, key: Key, question: &Question) -> Vec<Effect> {
+    let yes = matches!(key.typed(), Some('y' | 'Y'));
+    match question {
+        Question::Skip { .. } if yes => request_if_legal(model, Action::Skip, OperatorRequest::Skip, "not skipped"),
+        Question::Skip { .. } => cancelled(model, "not skipped"),
+        Question::AcceptFall { .. } if yes => {
+            request_if_legal(model, Action::Accept, OperatorRequest::Judge(Verdict::Accept), "not accepted")
+        }
+        Question::AcceptFall { .. } => cancelled(model, "not accepted"),
     }
 }
 

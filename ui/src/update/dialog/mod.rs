@@ -37,6 +37,7 @@ pub(super) fn key(model: &mut Model, dialog: Dialog, key: Key) -> KeyOutcome {
         Dialog::TakeControl => confirm::take_control_key(model, key),
         Dialog::Arm { typed, opened_at } => confirm::arm_key(model, key, (typed, opened_at)),
         Dialog::ArmingChecks { selected } => confirm::arming_checks_key(model, key, selected),
+        Dialog::Confirm(question) => confirm::question_key(model, key, &question),
         Dialog::Quit => confirm::quit_key(model, key),
         Dialog::Override(form) => override_form::key(model, key, form),
         Dialog::Field { purpose, input, .. } => text_field::key(model, key, purpose, input),
