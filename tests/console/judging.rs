@@ -202,3 +202,29 @@ fn letters_typed_without_a_dialog_never_skip_a_proposal() {
         assert_eq!(console.requests(&["y"]), [], "another proposal than the one of the question");
     }
 }
+
+#[test]
+fn the_verdict_of_a_selected_row_is_changed_with_a_reason() {
+    let mut console = Console::ready();
+    console.record(Record::Trial(trial(0, Some(Verdict::Accept), None)));
+    console.record(Record::Trial(trial(1, Some(Verdict::Fall), None)));
+    assert_eq!(console.requests(&["f"]), []);
+    assert_shows(console.said(), &["no trial waits for a verdict; in Trials, select a judged one"]);
+    console.press(&["2", "Up", "a"]);
+    assert_shows(console.said(), &["accept: trial 0 is accept already"]);
+    console.press(&["f"]);
+    assert_shows(&console.screen(80, 24), &["Trial #0: accept becomes fall. Why?", "the journal keeps the"]);
+    assert_eq!(console.requests(&["Enter"]), [], "a change needs a reason");
+    assert_shows(&console.screen(80, 24), &["give the reason of the change"]);
+    console.enter("it");
+    console.press(&["Space"]);
+    console.enter("lay");
+    let change = OperatorRequest::ChangeVerdict { trial: 0, verdict: Verdict::Fall, reason: "it lay".into() };
+    assert_eq!(console.requests(&["Enter"]), [change]);
+    // While a trial waits for its verdict the keys are for that one.
+    console.stage(ExperimentStage::Running, 2);
+    assert_eq!(console.requests(&["f"]), [], "during a trial");
+    console.record(Record::Trial(trial(2, None, Some(Verdict::Accept))));
+    console.stage(ExperimentStage::Review, 2);
+    assert_eq!(console.requests(&["v"]), [OperatorRequest::Judge(Verdict::Void)]);
+}

@@ -181,6 +181,11 @@ impl Model {
         self.replay.is_none() && self.mode().energised()
     }
 
+    /// Whether the arming checks are those of an earlier time: they run while the robot is disarmed.
+    pub fn arming_checks_are_past(&self) -> bool {
+        self.mode() != Mode::Disarmed
+    }
+
     /// Whether an observer's STOP is in force.
     pub fn stop_requested(&self) -> bool {
         self.replay.is_none() && matches!(self.mode(), Mode::Damped | Mode::Fault)
@@ -226,6 +231,13 @@ impl Model {
     /// The rows of the trial table, sorted and filtered.
     pub fn trial_rows(&self) -> Vec<&TrialRecord> {
         self.trial_table.rows(&self.session.trials, self.later_trials(), &self.session.info.parameters)
+    }
+
+    /// Every trial, by number: also those that the table does not show.
+    pub fn every_trial(&self) -> Vec<&TrialRecord> {
+        let mut rows: Vec<&TrialRecord> = self.session.trials.records.values().chain(self.later_trials()).collect();
+        rows.sort_by_key(|row| row.trial);
+        rows
     }
 
     /// The trials of a replay that are not proposed yet at the playhead, as they will be at the end.

@@ -21,6 +21,8 @@ pub struct SessionModel {
     pub proposal: Option<Proposal>,
     /// The newest arming checks; empty before the robot was disarmed for the first time.
     pub arming_checks: Vec<ArmingCheckRecord>,
+    /// Time of the newest arming checks, ns since the engine started.
+    pub arming_checked_ns: u64,
     /// Present bounds, fixed parameters and budget.
     pub search: Option<SearchStatus>,
     /// Densities and importances behind the sampler's newest proposal.

@@ -132,7 +132,10 @@ pub(super) fn apply(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
             }
             log(model, time_ns, line.level, &line.source, line.message, false);
         }
-        Record::ArmingChecks(list) => model.session.arming_checks = list,
+        Record::ArmingChecks(list) => {
+            model.session.arming_checks = list;
+            model.session.arming_checked_ns = time_ns;
+        }
         Record::Search(search) => model.session.search = Some(search),
         Record::Insight(insight) => {
             model.session.trials.model_best = insight.predicted_best().copied();
@@ -161,7 +164,10 @@ fn show_landed(model: &mut Model) {
 fn note_time(model: &mut Model, info: StageRecord, time_ns: u64) {
     match info.stage {
         ExperimentStage::Running => {
-            model.session.trials.ran.insert(info.trial, RunTime { begun_ns: time_ns, ended_ns: None });
+            let session = &mut model.session;
+            let present = session.info.parameters.iter().filter_map(|info| session.parameter(&info.name));
+            let bounds = present.map(|info| (info.low, info.high)).collect();
+            session.trials.ran.insert(info.trial, RunTime { begun_ns: time_ns, ended_ns: None, bounds });
         }
         ExperimentStage::Review => {
             if let Some(ran) = model.session.trials.ran.get_mut(&info.trial) {

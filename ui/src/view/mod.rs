@@ -31,11 +31,13 @@ mod optimizer;
 mod overrides;
 mod points;
 mod proposal;
+mod questions;
 mod series_style;
 mod status_bar;
 mod timeline;
 mod trials;
 mod wireframe;
+mod wrap;
 
 use ratatui::Frame;
 
