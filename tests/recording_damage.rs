@@ -88,10 +88,14 @@ fn file(folder: &Path, name: &str, bytes: &[u8]) -> PathBuf {
     path
 }
 
+fn is_session(played: &Played) -> bool {
+    matches!(played, Played::Record(stamped) if matches!(stamped.record, Record::Session(_)))
+}
+
 fn play_damaged(path: &Path) -> Result<(Vec<Played>, Option<String>), RecordingError> {
     let mut player = Player::open(path)?;
     let mut played: Vec<_> = player.by_ref().collect();
-    assert!(matches!(&played.remove(0), Played::Record(stamped) if matches!(stamped.record, Record::Session(_))));
+    assert!(is_session(&played.remove(0)));
     Ok((played, player.damage()))
 }
 
@@ -157,15 +161,33 @@ proptest! {
         }
         let folder = tempfile::tempdir().unwrap();
         let path = file(folder.path(), "session.mcap", &bytes);
-        if let Ok((played, _)) = play_damaged(&path) {
-            // In the order of time, as everything is, with holes.
+        if let Ok(player) = Player::open(&path) {
+            prop_assert_eq!(player.session(), &session());
+            // In the order of time, as everything is, with holes. Of the session's own message the event index has a copy.
             let mut everything = whole().everything.iter();
-            for played in &played {
-                prop_assert!(everything.any(|recorded| recorded == played), "{played:?} was never recorded");
+            for played in player.filter(|played| !is_session(played)) {
+                prop_assert!(everything.any(|recorded| *recorded == played), "{played:?} was never recorded");
             }
         }
         let _ = recover(&path); // must not panic
     }
+}
+
+#[test]
+fn a_session_whose_own_chunk_is_damaged_opens_from_the_event_index() {
+    let Whole { finished, everything, .. } = whole();
+    let summary = mcap::Summary::read(finished).unwrap().unwrap();
+    let chunk = summary.chunk_indexes.iter().min_by_key(|chunk| chunk.message_start_time).unwrap();
+    let mut bytes = finished.clone();
+    bytes[(chunk.chunk_start_offset + chunk.chunk_length - 8) as usize] ^= 0x55;
+    let folder = tempfile::tempdir().unwrap();
+    let mut player = Player::open(file(folder.path(), "session.mcap", &bytes)).unwrap();
+    assert_eq!(player.session(), &session());
+    let played: Vec<_> = player.by_ref().collect();
+    assert!(!played.iter().any(is_session));
+    assert_equal(&played[played.len() - 500..], &everything[everything.len() - 500..]);
+    let damage = player.damage().unwrap();
+    assert!(damage.contains("1 of ") && damage.contains("chunks are damaged and left out"), "{damage}");
 }
 
 #[test]

@@ -214,7 +214,7 @@ impl Iterator for Rejudging {
     fn next(&mut self) -> Option<RejudgedTrial> {
         while let Some(played) = self.recording.next() {
             if let Played::Tick(tick) = played
-                && let Some(ended) = self.take(tick)
+                && let Some(ended) = self.take(*tick)
             {
                 return Some(ended);
             }

@@ -56,18 +56,19 @@ pub fn split(tick: &Tick) -> (frog::JointCommand, frog::ControlTick) {
     (command, control)
 }
 
-/// The inverse of [`split`].
-pub fn join(command: &frog::JointCommand, mut control: frog::ControlTick) -> Result<Tick, DecodeError> {
-    let torque = take(&mut control.torque_command);
-    let demanded = take(&mut control.torque_demanded);
-    let mut command = frog::JointCommand {
-        torque_demanded: if demanded.is_empty() { torque.clone() } else { demanded },
-        torque,
-        limited: control.limited,
-        ..command.clone()
-    };
-    let measured = [&mut control.joint_position, &mut control.joint_velocity, &mut control.joint_torque].map(take);
-    joined(&mut control, &mut command, measured)
+/// The inverse of [`split`]. Of `command` the parts that rarely change are read and the torques are overwritten; `control` is as
+/// before.
+pub fn join(command: &mut frog::JointCommand, control: &mut frog::ControlTick) -> Result<Tick, DecodeError> {
+    let torque = &control.torque_command;
+    let demanded = if control.torque_demanded.is_empty() { torque } else { &control.torque_demanded };
+    command.torque.clone_from(torque);
+    command.torque_demanded.clone_from(demanded);
+    command.limited = control.limited;
+    let mut measured = [&mut control.joint_position, &mut control.joint_velocity, &mut control.joint_torque].map(take);
+    let tick = joined(control, command, &mut measured);
+    // Their memory serves the next tick.
+    [control.joint_position, control.joint_velocity, control.joint_torque] = measured;
+    tick
 }
 
 /// Whether the joints of a tick are in its message, as [`split`] writes it.
@@ -181,15 +182,15 @@ fn truth(way: Way, ours: &mut Truth, m: &mut frog::Truth) -> Result<(), DecodeEr
 
 /// Returns a tick from the three messages of an older recording.
 pub fn join_three(
-    mut control: frog::ControlTick,
+    control: &mut frog::ControlTick,
     joints: &JointStates,
     mut command: frog::JointCommand,
 ) -> Result<Tick, DecodeError> {
     let each = |value: fn(&JointState) -> Option<f64>| {
         joints.joints.iter().map(|joint| value(joint).unwrap_or_default()).collect::<Vec<_>>()
     };
-    let measured = [each(|joint| joint.position), each(|joint| joint.velocity), each(|joint| joint.effort)];
-    joined(&mut control, &mut command, measured)
+    let mut measured = [each(|joint| joint.position), each(|joint| joint.velocity), each(|joint| joint.effort)];
+    joined(control, &mut command, &mut measured)
 }
 
 /// A whole tick of a fault, in one message.
@@ -207,20 +208,20 @@ pub fn whole(tick: &Tick) -> frog::fault_ticks::Whole {
 pub fn from_whole(message: frog::fault_ticks::Whole) -> Result<Tick, DecodeError> {
     let mut control = message.tick.ok_or(DecodeError::Missing("a fault's tick"))?;
     let mut command = message.command.ok_or(DecodeError::Missing("a fault's joint command"))?;
-    joined(&mut control, &mut command, [message.position, message.velocity, message.torque])
+    joined(&mut control, &mut command, &mut [message.position, message.velocity, message.torque])
 }
 
 fn joined(
     control: &mut frog::ControlTick,
     command: &mut frog::JointCommand,
-    [mut position, mut velocity, mut torque]: [Vec<f64>; 3],
+    [position, velocity, torque]: &mut [Vec<f64>; 3],
 ) -> Result<Tick, DecodeError> {
     let mut tick = Tick::default();
     control_tick_fields(Way::Decode, &mut tick, control)?;
     joint_command_fields(Way::Decode, &mut tick, command)?;
-    Way::Decode.array(&mut tick.state.joint_position_rad, &mut position, JOINT_VALUES)?;
-    Way::Decode.array(&mut tick.state.joint_velocity_rad_s, &mut velocity, JOINT_VALUES)?;
-    Way::Decode.array(&mut tick.state.joint_torque_n_m, &mut torque, JOINT_VALUES)?;
+    Way::Decode.array(&mut tick.state.joint_position_rad, position, JOINT_VALUES)?;
+    Way::Decode.array(&mut tick.state.joint_velocity_rad_s, velocity, JOINT_VALUES)?;
+    Way::Decode.array(&mut tick.state.joint_torque_n_m, torque, JOINT_VALUES)?;
     Ok(tick)
 }
 

@@ -61,7 +61,7 @@ impl Recordings {
                 self.end(&mut ticks, robot);
             }
             if tick.trial.is_some() {
-                ticks.push(tick);
+                ticks.push(*tick);
             }
         }
         self.end(&mut ticks, robot);

@@ -9,7 +9,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 use super::columns::{Cells, TableFormat, TableWriter, TypedColumn};
 use crate::recording::player::{MarkerKind, Played, Player};
-use crate::robot::{Battery, JOINTS, Leg, MotorCommand, Truth, joint_name};
+use crate::robot::{Battery, JOINTS, Leg, Truth, joint_name};
 use crate::telemetry::Tick;
 
 /// Rows of a batch: some 30 MB of memory for all signals.
@@ -57,21 +57,36 @@ pub struct SignalRange {
     pub until_ns: u64,
 }
 
-/// Value of a signal at a tick.
-enum Scalar {
-    Missing,
-    Number(f64),
-    Whole(i64),
-    Flag(bool),
-    Name(&'static str),
+/// A value of a signal: the type of its column.
+trait Cell: Sized {
+    /// Cells of this type, none yet.
+    const NONE: Cells;
+
+    /// Returns the cells of this type; none of a column with another.
+    fn of(cells: &mut Cells) -> Option<&mut Vec<Self>>;
 }
 
-type Read = Box<dyn Fn(&Tick) -> Scalar>;
+macro_rules! cell {
+    ($type:ty, $kind:ident) => {
+        impl Cell for $type {
+            const NONE: Cells = Cells::$kind(Vec::new());
 
-/// A signal: an empty column and its value at a tick.
+            fn of(cells: &mut Cells) -> Option<&mut Vec<Self>> {
+                if let Cells::$kind(cells) = cells { Some(cells) } else { None }
+            }
+        }
+    };
+}
+
+cell!(f64, Number);
+cell!(i64, Whole);
+cell!(bool, Flag);
+cell!(&'static str, Name);
+
+/// A signal: an empty column, and what adds its values at the ticks of a block.
 struct Signal {
     column: TypedColumn,
-    read: Read,
+    push: Box<dyn Fn(&mut TypedColumn, &[Stamped])>,
 }
 
 /// The signals of a topic, or of all.
@@ -153,135 +168,119 @@ impl Signals {
     /// Adds the rows of a block, column by column.
     fn push(&self, columns: &mut [TypedColumn], block: &[Stamped]) {
         let Some((time, columns)) = columns.split_first_mut() else { return };
-        block.iter().for_each(|(log_time, _)| add(time, Scalar::Whole(*log_time as i64)));
+        extend(time, block.iter().map(|(log_time, _)| *log_time as i64));
         for (column, signal) in columns.iter_mut().zip(&self.signals) {
-            block.iter().for_each(|(_, tick)| add(column, (signal.read)(tick)));
+            (signal.push)(column, block);
         }
     }
 
-    fn add(&mut self, name: impl Into<String>, cells: Cells, read: impl Fn(&Tick) -> Scalar + 'static) {
-        self.signals.push(Signal { column: TypedColumn::new(name, cells), read: Box::new(read) });
-    }
-
-    fn number(&mut self, name: impl Into<String>, read: impl Fn(&Tick) -> f64 + 'static) {
-        self.add(name, Cells::Number(Vec::new()), move |tick| Scalar::Number(read(tick)));
-    }
-
-    fn whole(&mut self, name: impl Into<String>, read: impl Fn(&Tick) -> i64 + 'static) {
-        self.add(name, Cells::Whole(Vec::new()), move |tick| Scalar::Whole(read(tick)));
-    }
-
-    fn flag(&mut self, name: impl Into<String>, read: impl Fn(&Tick) -> bool + 'static) {
-        self.add(name, Cells::Flag(Vec::new()), move |tick| Scalar::Flag(read(tick)));
+    fn add<T: Cell>(&mut self, name: impl Into<String>, read: impl Fn(&Tick) -> T + 'static) {
+        let push = move |column: &mut TypedColumn, block: &[Stamped]| {
+            extend(column, block.iter().map(|(_, tick)| read(tick)));
+        };
+        self.signals.push(Signal { column: TypedColumn::new(name, T::NONE), push: Box::new(push) });
     }
 
     /// Adds a signal that may be missing.
-    fn optional(&mut self, name: impl Into<String>, cells: Cells, read: impl Fn(&Tick) -> Option<Scalar> + 'static) {
-        self.add(name, cells, move |tick| read(tick).unwrap_or(Scalar::Missing));
-        if let Some(signal) = self.signals.last_mut() {
-            signal.column.there = Some(Vec::new());
-        }
+    fn optional<T: Cell>(&mut self, name: impl Into<String>, read: impl Fn(&Tick) -> Option<T> + 'static) {
+        let push = move |column: &mut TypedColumn, block: &[Stamped]| {
+            extend(column, block.iter().filter_map(|(_, tick)| read(tick)));
+            let there = block.iter().map(|(_, tick)| i16::from(read(tick).is_some()));
+            column.there.get_or_insert_default().extend(there);
+        };
+        let column = TypedColumn { there: Some(Vec::new()), ..TypedColumn::new(name, T::NONE) };
+        self.signals.push(Signal { column, push: Box::new(push) });
     }
 
-    fn vector(&mut self, names: [&str; 3], read: fn(&Tick) -> Vector3<f64>) {
+    fn vector(&mut self, names: [&str; 3], read: impl Fn(&Tick) -> &Vector3<f64> + Copy + 'static) {
         for (axis, name) in names.into_iter().enumerate() {
-            self.number(name, move |tick| read(tick)[axis]);
+            self.add(name, move |tick| read(tick)[axis]);
         }
     }
 
-    fn rotation(&mut self, name: &str, read: fn(&Tick) -> UnitQuaternion<f64>) {
+    fn rotation(&mut self, name: &str, read: impl Fn(&Tick) -> &UnitQuaternion<f64> + Copy + 'static) {
         for (part, letter) in ["x", "y", "z", "w"].into_iter().enumerate() {
-            self.number(format!("{name}_{letter}"), move |tick| read(tick).coords[part]);
+            self.add(format!("{name}_{letter}"), move |tick| read(tick).coords[part]);
         }
     }
 
-    fn joints(&mut self, name: &str, read: fn(&Tick, usize) -> f64) {
+    fn joints<T: Cell>(&mut self, name: &str, read: impl Fn(&Tick, usize) -> T + Copy + 'static) {
         for joint in 0..JOINTS {
-            self.number(format!("{name}_{}", joint_name(joint)), move |tick| read(tick, joint));
+            self.add(format!("{name}_{}", joint_name(joint)), move |tick| read(tick, joint));
         }
     }
 
-    fn battery(&mut self, name: &str, read: fn(&Battery) -> f64) {
-        let value = move |tick: &Tick| Some(Scalar::Number(read(tick.state.battery.as_ref()?)));
-        self.optional(format!("battery_{name}"), Cells::Number(Vec::new()), value);
+    fn battery(&mut self, name: &str, read: impl Fn(&Battery) -> f64 + 'static) {
+        self.optional(format!("battery_{name}"), move |tick| tick.state.battery.as_ref().map(&read));
     }
 
-    fn truth(&mut self, name: &str, read: impl Fn(&Truth) -> f64 + 'static) {
-        let value = move |tick: &Tick| Some(Scalar::Number(read(tick.state.truth.as_ref()?)));
-        self.optional(format!("truth_{name}"), Cells::Number(Vec::new()), value);
+    fn truth<T: Cell>(&mut self, name: &str, read: impl Fn(&Truth) -> T + 'static) {
+        self.optional(format!("truth_{name}"), move |tick| tick.state.truth.as_ref().map(&read));
     }
 
-    fn true_flag(&mut self, name: &str, read: impl Fn(&Truth) -> bool + 'static) {
-        let value = move |tick: &Tick| Some(Scalar::Flag(read(tick.state.truth.as_ref()?)));
-        self.optional(format!("truth_{name}"), Cells::Flag(Vec::new()), value);
-    }
-
-    fn true_vector(&mut self, name: &str, read: fn(&Truth) -> Vector3<f64>) {
+    fn true_vector(&mut self, name: &str, read: impl Fn(&Truth) -> &Vector3<f64> + Copy + 'static) {
         for (axis, letter) in ["x", "y", "z"].into_iter().enumerate() {
             self.truth(&format!("{name}_{letter}"), move |truth| read(truth)[axis]);
         }
     }
 
     fn add_tick(&mut self) {
-        self.whole("number", |tick| tick.number as i64);
-        self.whole("time_ns", |tick| tick.time_ns as i64);
-        self.add("mode", Cells::Name(Vec::new()), |tick| Scalar::Name(tick.mode.name()));
-        self.add("phase", Cells::Name(Vec::new()), |tick| Scalar::Name(tick.phase.name()));
-        self.optional("trial", Cells::Whole(Vec::new()), |tick| Some(Scalar::Whole(tick.trial?.into())));
-        self.number("trial_time", |tick| tick.trial_time_s);
-        self.number("theta", |tick| tick.theta_rad);
-        self.vector(["roll", "pitch", "yaw"], |tick| tick.estimate.roll_pitch_yaw);
-        self.vector(["position_x", "position_y", "position_z"], |tick| tick.estimate.position_world);
-        self.vector(["velocity_x", "velocity_y", "velocity_z"], |tick| tick.estimate.velocity_world);
-        self.rotation("orientation", |tick| tick.estimate.world_from_body);
+        self.add("number", |tick| tick.number as i64);
+        self.add("time_ns", |tick| tick.time_ns as i64);
+        self.add("mode", |tick| tick.mode.name());
+        self.add("phase", |tick| tick.phase.name());
+        self.optional("trial", |tick| tick.trial.map(i64::from));
+        self.add("trial_time", |tick| tick.trial_time_s);
+        self.add("theta", |tick| tick.theta_rad);
+        self.vector(["roll", "pitch", "yaw"], |tick| &tick.estimate.roll_pitch_yaw);
+        self.vector(["position_x", "position_y", "position_z"], |tick| &tick.estimate.position_world);
+        self.vector(["velocity_x", "velocity_y", "velocity_z"], |tick| &tick.estimate.velocity_world);
+        self.rotation("orientation", |tick| &tick.estimate.world_from_body);
         let turning = ["angular_velocity_x", "angular_velocity_y", "angular_velocity_z"];
-        self.vector(turning, |tick| tick.estimate.angular_velocity_body);
+        self.vector(turning, |tick| &tick.estimate.angular_velocity_body);
         for (leg, name) in legs() {
-            self.flag(format!("contact_{name}"), move |tick| tick.estimate.contact[leg]);
+            self.add(format!("contact_{name}"), move |tick| tick.estimate.contact[leg]);
         }
         for (leg, name) in legs() {
             for (axis, letter) in ["x", "y", "z"].into_iter().enumerate() {
-                self.number(format!("foot_{letter}_{name}"), move |tick| tick.estimate.foot_position_leg[leg][axis]);
+                self.add(format!("foot_{letter}_{name}"), move |tick| tick.estimate.foot_position_leg[leg][axis]);
             }
         }
-        self.whole("robot_time_ms", |tick| tick.state.robot_time_ms.into());
-        self.rotation("imu", |tick| tick.state.imu.world_from_body);
-        self.vector(["gyro_x", "gyro_y", "gyro_z"], |tick| tick.state.imu.gyro_body);
-        self.vector(["acc_x", "acc_y", "acc_z"], |tick| tick.state.imu.accel_body);
+        self.add("robot_time_ms", |tick| i64::from(tick.state.robot_time_ms));
+        self.rotation("imu", |tick| &tick.state.imu.world_from_body);
+        self.vector(["gyro_x", "gyro_y", "gyro_z"], |tick| &tick.state.imu.gyro_body);
+        self.vector(["acc_x", "acc_y", "acc_z"], |tick| &tick.state.imu.accel_body);
         for (leg, name) in legs() {
-            self.number(format!("force_{name}"), move |tick| tick.state.foot_force_n[leg]);
+            self.add(format!("force_{name}"), move |tick| tick.state.foot_force_n[leg]);
         }
         self.joints("motor_temperature", |tick, joint| tick.state.motor_temperature_c[joint]);
-        for joint in 0..JOINTS {
-            let name = format!("motor_enabled_{}", joint_name(joint));
-            self.flag(name, move |tick| tick.state.motor_enabled[joint]);
-        }
+        self.joints("motor_enabled", |tick, joint| tick.state.motor_enabled[joint]);
         self.battery("charge", |battery| battery.charge_percent);
         self.battery("voltage", |battery| battery.voltage_v);
         self.battery("current", |battery| battery.current_a);
         self.add_truth();
-        self.whole("lateness_ns", |tick| tick.stages.lateness_ns.into());
-        self.whole("read_ns", |tick| tick.stages.read_ns.into());
-        self.whole("decide_ns", |tick| tick.stages.decide_ns.into());
-        self.whole("write_ns", |tick| tick.stages.write_ns.into());
+        self.add("lateness_ns", |tick| i64::from(tick.stages.lateness_ns));
+        self.add("read_ns", |tick| i64::from(tick.stages.read_ns));
+        self.add("decide_ns", |tick| i64::from(tick.stages.decide_ns));
+        self.add("write_ns", |tick| i64::from(tick.stages.write_ns));
     }
 
     fn add_truth(&mut self) {
-        self.true_vector("position", |truth| truth.position_world);
-        self.true_vector("velocity", |truth| truth.velocity_world);
+        self.true_vector("position", |truth| &truth.position_world);
+        self.true_vector("velocity", |truth| &truth.velocity_world);
         for (part, letter) in ["x", "y", "z", "w"].into_iter().enumerate() {
             self.truth(&format!("orientation_{letter}"), move |truth| truth.world_from_body.coords[part]);
         }
-        self.true_vector("angular_velocity", |truth| truth.angular_velocity_body);
+        self.true_vector("angular_velocity", |truth| &truth.angular_velocity_body);
         for (leg, name) in legs() {
-            self.true_flag(&format!("contact_{name}"), move |truth| truth.foot_contact[leg]);
+            self.truth(&format!("contact_{name}"), move |truth| truth.foot_contact[leg]);
         }
         for (leg, name) in legs() {
             for (axis, letter) in ["x", "y", "z"].into_iter().enumerate() {
                 self.truth(&format!("force_{letter}_{name}"), move |truth| truth.foot_force_world[leg][axis]);
             }
         }
-        self.true_flag("body_contact", |truth| truth.body_contact);
+        self.truth("body_contact", |truth| truth.body_contact);
     }
 
     fn add_joint_states(&mut self) {
@@ -291,24 +290,13 @@ impl Signals {
     }
 
     fn add_joint_command(&mut self) {
-        type Part = fn(&MotorCommand) -> f64;
-        let parts: [(&str, Part); 5] = [
-            ("position", |motor| motor.position_rad),
-            ("velocity", |motor| motor.velocity_rad_s),
-            ("kp", |motor| motor.kp_joint),
-            ("kd", |motor| motor.kd_joint),
-            ("torque", |motor| motor.torque_n_m),
-        ];
-        for (part, read) in parts {
-            for joint in 0..JOINTS {
-                let name = format!("command_{part}_{}", joint_name(joint));
-                self.number(name, move |tick| read(&tick.command.motor[joint]));
-            }
-        }
+        self.joints("command_position", |tick, joint| tick.command.motor[joint].position_rad);
+        self.joints("command_velocity", |tick, joint| tick.command.motor[joint].velocity_rad_s);
+        self.joints("command_kp", |tick, joint| tick.command.motor[joint].kp_joint);
+        self.joints("command_kd", |tick, joint| tick.command.motor[joint].kd_joint);
+        self.joints("command_torque", |tick, joint| tick.command.motor[joint].torque_n_m);
         self.joints("torque_demanded", |tick, joint| tick.torque_demanded[joint]);
-        for joint in 0..JOINTS {
-            self.flag(format!("limited_{}", joint_name(joint)), move |tick| tick.limited & (1 << joint) != 0);
-        }
+        self.joints("limited", |tick, joint| tick.limited & (1 << joint) != 0);
     }
 }
 
@@ -317,16 +305,11 @@ fn legs() -> impl Iterator<Item = (usize, String)> {
     Leg::ALL.iter().enumerate().map(|(index, leg)| (index, leg.name().to_lowercase()))
 }
 
-fn add(column: &mut TypedColumn, value: Scalar) {
-    if let Some(there) = &mut column.there {
-        there.push(i16::from(!matches!(value, Scalar::Missing)));
-    }
-    match (&mut column.cells, value) {
-        (Cells::Number(cells), Scalar::Number(value)) => cells.push(value),
-        (Cells::Whole(cells), Scalar::Whole(value)) => cells.push(value),
-        (Cells::Flag(cells), Scalar::Flag(value)) => cells.push(value),
-        (Cells::Name(cells), Scalar::Name(value)) => cells.push(value),
-        (_, value) => debug_assert!(matches!(value, Scalar::Missing), "{}: a value of another type", column.name),
+/// Adds cells to a column of their type.
+fn extend<T: Cell>(column: &mut TypedColumn, values: impl Iterator<Item = T>) {
+    match T::of(&mut column.cells) {
+        Some(cells) => cells.extend(values),
+        None => debug_assert!(false, "{}: values of another type", column.name),
     }
 }
 
@@ -340,12 +323,13 @@ impl SignalRange {
             let within = player.by_ref().take_while(|played| played.time_ns() < self.until_ns);
             let mut ticks = within.filter_map(|played| match played {
                 Played::Tick(tick) if self.trial.is_none() || tick.trial == self.trial => {
-                    Some((start_utc_ns.saturating_add(tick.time_ns), tick))
+                    Some((start_utc_ns.saturating_add(tick.time_ns), *tick))
                 }
                 _ => None,
             });
             loop {
-                let block: Vec<Stamped> = ticks.by_ref().take(BLOCK_TICKS).collect();
+                let mut block = Vec::with_capacity(BLOCK_TICKS);
+                block.extend(ticks.by_ref().take(BLOCK_TICKS));
                 if block.is_empty() {
                     break;
                 }

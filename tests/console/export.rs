@@ -20,7 +20,7 @@ fn recording(program: &Program) -> String {
 }
 
 fn ticks(recording: &str) -> Vec<Tick> {
-    let tick = |played| if let Played::Tick(tick) = played { Some(tick) } else { None };
+    let tick = |played| if let Played::Tick(tick) = played { Some(*tick) } else { None };
     Player::open(recording).unwrap().filter_map(tick).collect()
 }
 

@@ -39,7 +39,7 @@ fn ticks() -> BTreeMap<u32, Vec<Tick>> {
         if let Played::Tick(tick) = played
             && let Some(trial) = tick.trial
         {
-            trials.entry(trial).or_default().push(tick);
+            trials.entry(trial).or_default().push(*tick);
         }
     }
     trials

@@ -63,8 +63,8 @@ fn rollouts(trial: u32) -> Vec<Vec<Tick>> {
             continue;
         }
         match rollouts.last_mut().filter(|ticks| ticks.last().unwrap().trial_time_s < tick.trial_time_s) {
-            Some(ticks) => ticks.push(tick),
-            None => rollouts.push(vec![tick]),
+            Some(ticks) => ticks.push(*tick),
+            None => rollouts.push(vec![*tick]),
         }
     }
     rollouts

@@ -47,7 +47,7 @@ fn row(study: usize, trial: u32) -> TrialRecord {
 /// The ticks of a trial, read here and not by the console.
 fn ticks(study: usize, trial: u32) -> Vec<Tick> {
     let of_trial = |played: Played| match played {
-        Played::Tick(tick) => Some(tick).filter(|tick| tick.trial == Some(trial)),
+        Played::Tick(tick) => Some(*tick).filter(|tick| tick.trial == Some(trial)),
         Played::Record(_) => None,
     };
     timeline(study).filter_map(of_trial).collect()

@@ -41,7 +41,7 @@ fn recorded() -> (Program, PathBuf, Vec<PathBuf>) {
 fn ticks(played: impl Iterator<Item = Played>) -> Vec<Tick> {
     played
         .filter_map(|played| match played {
-            Played::Tick(tick) => Some(tick),
+            Played::Tick(tick) => Some(*tick),
             Played::Record(_) => None,
         })
         .collect()

@@ -35,7 +35,7 @@ fn copied(from: &Path, to: PathBuf, parts: &[&str], mut change: impl FnMut(Tick)
     let mut writer = Writer::create(&to, &session, start_utc_ns, &attachments).unwrap();
     for played in player {
         match played {
-            Played::Tick(tick) => change(tick).iter().for_each(|tick| writer.tick(tick).unwrap()),
+            Played::Tick(tick) => change(*tick).iter().for_each(|tick| writer.tick(tick).unwrap()),
             Played::Record(stamped) => writer.record(&stamped).unwrap(),
         }
     }

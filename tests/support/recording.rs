@@ -537,7 +537,7 @@ pub fn study(seconds: u64) -> (Vec<Tick>, Vec<Stamped>) {
 /// Both in the order of time; a record stands before a tick of the same time.
 pub fn in_order(ticks: &[Tick], records: &[Stamped]) -> Vec<Played> {
     let mut all: Vec<_> = records.iter().cloned().map(Played::Record).collect();
-    all.extend(ticks.iter().copied().map(Played::Tick));
+    all.extend(ticks.iter().copied().map(Box::new).map(Played::Tick));
     all.sort_by_key(Played::time_ns);
     all
 }

@@ -17,6 +17,8 @@ pub struct TickJoiner<'a> {
     command: Option<(MessageHeader, &'a [u8])>,
     /// The same, decoded.
     decoded: Option<frog::JointCommand>,
+    /// The message of the last tick, whose memory serves the next one.
+    control: frog::ControlTick,
 }
 
 impl<'a> TickJoiner<'a> {
@@ -28,14 +30,19 @@ impl<'a> TickJoiner<'a> {
 
     /// Returns the tick of a message on `/robot/tick`.
     pub fn tick(&mut self, header: &MessageHeader, data: &[u8]) -> Result<Tick, DecodeError> {
-        let control = frog::ControlTick::decode(data)?;
+        let control = &mut self.control;
+        control.clear();
+        control.merge(data)?;
         let no_command = || DecodeError::Missing("/robot/joint_cmd of a tick");
-        if tick::has_joints(&control) {
-            if self.decoded.is_none() {
-                let (_, command) = self.command.as_ref().ok_or_else(no_command)?;
-                self.decoded = Some(frog::JointCommand::decode(*command)?);
-            }
-            return tick::join(self.decoded.as_ref().ok_or_else(no_command)?, control);
+        if tick::has_joints(control) {
+            let command = match &mut self.decoded {
+                Some(command) => command,
+                none => {
+                    let (_, command) = self.command.as_ref().ok_or_else(no_command)?;
+                    none.insert(frog::JointCommand::decode(*command)?)
+                }
+            };
+            return tick::join(command, control);
         }
         let same = |other: &MessageHeader| other.sequence == header.sequence && other.log_time == header.log_time;
         let (_, joints) = self

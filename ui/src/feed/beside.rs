@@ -129,7 +129,7 @@ fn ticks(recording: &mut Timeline, run: &TrialRun) -> Vec<Tick> {
     let mut ticks = Vec::new();
     for played in recording.by_ref() {
         match played {
-            Played::Tick(tick) if tick.trial == Some(run.trial) => ticks.push(tick),
+            Played::Tick(tick) if tick.trial == Some(run.trial) => ticks.push(*tick),
             played if played.time_ns() > run.end_ns => break,
             _ => {}
         }

@@ -280,9 +280,9 @@ impl ReplayFeed {
     fn show(&mut self, played: Played, messages: &mut Vec<Msg>) {
         match played {
             Played::Tick(tick) => {
-                self.snapshot.tick = tick;
+                self.snapshot.tick = *tick;
                 if tick.number % SHOWN_EVERY == 0 {
-                    messages.push(Msg::Tick(Box::new(tick)));
+                    messages.push(Msg::Tick(tick));
                 }
             }
             Played::Record(stamped) => {
