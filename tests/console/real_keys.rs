@@ -126,7 +126,7 @@ const REPLAY: &[Row] = &[
     row(Action::Copy, "y", Sends(b"\x1b]52;c;"), ("", "")),
     row(Action::Export, "e", Shows("written: "), ("", "")),
     row(Action::OptimizerView, "3", Shows("Landings"), ("", "")),
-    row(Action::OverrideView, "4", Shows("Nothing can be changed now"), ("", "")),
+    row(Action::OverrideView, "4", Shows("Nothing can be changed: this is a replay"), ("", "")),
     row(Action::HealthView, "5", Shows("Recorder"), ("", "")),
     row(Action::LogView, "6", Shows("all levels"), ("", "")),
     row(Action::NextView, "Tab", Shows("8 s sweep"), ("", "")),

@@ -3,8 +3,9 @@
 mod support;
 
 use quadfrog::recording::record::{ArmingCheckRecord, Record};
-use quadfrog::telemetry::{ArmingCheck, ArmingCheckState, Mode, Snapshot, Tick};
+use quadfrog::telemetry::{ArmingCheck, ArmingCheckState, Mode, Snapshot, Tick, TrialInhibit};
 use quadfrog::trial::{ExperimentStage, SearchStatus, SearchedParameter, Verdict};
+use quadfrog_console::message::{Msg, ReplayStatus};
 use quadfrog_console::theme::Role;
 use support::{Console, assert_shows, line_with, trial};
 
@@ -86,4 +87,28 @@ fn details_show_the_bounds_with_which_a_trial_ran() {
     assert_shows(&line_with(&console.screen(120, 40), "75.00000 N"), &["(searched from 20 to 130)"]);
     console.press(&["Down"]);
     assert!(!line_with(&console.screen(120, 40), "75.00000 N").contains("searched"), "its bounds are not known here");
+}
+
+/// The control thread says of every tick whether a trial could be approved.
+#[test]
+fn the_next_step_offers_a_jump_only_while_one_is_accepted() {
+    let mut console = Console::ready();
+    assert_shows(&console.next_step(), &["Press g twice to jump."]);
+    let warm = TrialInhibit::MotorWarm { joint: 0, measured_c: 71.0, allowed_c: 70.0 };
+    console.update(Msg::Snapshot(Box::new(Snapshot { unready: Some(warm), ..console.model.snapshot })));
+    assert_shows(&console.next_step(), &["No jump now: motor FR_hip at 71 degrees Celsius, a jump needs less than 70"]);
+    let last = console.screen(120, 40).lines().last().unwrap().to_owned();
+    assert!(!last.contains("Press g") && last.contains("D sit down"), "{last}");
+    console.update(Msg::Snapshot(Box::new(Snapshot { unready: None, ..console.model.snapshot })));
+    assert_shows(&console.next_step(), &["Press g twice to jump."]);
+}
+
+#[test]
+fn a_replay_says_once_that_nothing_can_be_changed() {
+    let mut console = Console::proposed();
+    console.press(&["4"]);
+    console.update(Msg::Replay(ReplayStatus::default()));
+    let screen = console.screen(120, 40);
+    assert_eq!(screen.matches("this is a replay").count(), 1, "{screen}");
+    assert_shows(&screen, &["Nothing can be changed: this is a replay"]);
 }

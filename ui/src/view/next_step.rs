@@ -109,6 +109,10 @@ fn live(model: &Model) -> NextStep {
             };
             step(lead, model, &[change, undo, (Action::Help, "help"), quit])
         }
+        Mode::Ready if session.open_proposal().is_some() && model.snapshot.unready.is_some() => {
+            let reason = model.snapshot.unready.map(|reason| reason.to_string()).unwrap_or_default();
+            step(format!("No jump now: {reason}."), model, &[sit_down, change, (Action::Skip, "skip"), undo])
+        }
         Mode::Ready if session.open_proposal().is_some() => {
             let lead = format!("Press {} twice to jump.", key(Action::Approve));
             step(lead, model, &[change, (Action::Skip, "skip"), undo, sit_down])
