@@ -3,6 +3,7 @@
 mod control_thread;
 mod folder;
 mod guard;
+mod observers;
 mod options;
 mod prior;
 mod recording;
@@ -16,6 +17,9 @@ pub use folder::{
     STUDY_FILE, attachments, fingerprint, newest_config, prepare_folder, running_session, study_files, utc_ns,
 };
 pub use guard::{GUARD, GuardError, GuardOutcome, run_guard};
+pub use observers::{
+    Observer, ObserverServer, ObserverStatus, RunningSession, SessionFacts, SessionNews, running_sessions,
+};
 pub use options::{EngineError, Options, Provenance};
 pub use prior::{PRIOR_FILE, PriorFileError, PriorMaker, ReadyPrior, prior_plan};
 pub use recording::create_recording;
@@ -160,6 +164,15 @@ pub fn start(options: Options) -> Result<EngineHandle, EngineError> {
         supervisor.report_scheduling(&granted, &denied, clock.now_ns());
     }
     let sits_down = options.backend == Backend::Hardware;
+    let (report, news) = channel();
+    let observers = match folder.recording.is_some().then(|| admit_observers(&options, &console_end.stop, report)) {
+        Some(Err(error)) => {
+            let message = format!("{error}: this session cannot be watched with quadfrog attach");
+            supervisor.report_warning(message, clock.now_ns());
+            None
+        }
+        server => server.transpose().unwrap_or_default(),
+    };
     let inhibits = sits_down && !options.observe && SleepLock::available();
     let sleep_lock = match inhibits.then(|| SleepLock::take(Path::new(INHIBITOR))).transpose() {
         Ok(lock) => lock,
@@ -171,7 +184,7 @@ pub fn start(options: Options) -> Result<EngineHandle, EngineError> {
     };
     let session = std::thread::Builder::new()
         .name("session".into())
-        .spawn(move || session_thread::run(supervisor, guard, sleep_lock, &requests, &clock, sits_down))
+        .spawn(move || session_thread::run(supervisor, guard, sleep_lock, &requests, &news, &clock, sits_down))
         .map_err(system("session thread"))?;
 
     Ok(EngineHandle {
@@ -180,6 +193,7 @@ pub fn start(options: Options) -> Result<EngineHandle, EngineError> {
         storage,
         recording,
         live: options.live,
+        observers,
         _folder: folder,
         requests: Some(to_supervisor),
         clock,
@@ -216,6 +230,25 @@ fn make_prior(supervisor: &mut Supervisor, maker: PriorMaker, options: &Options,
     });
 }
 
+/// Opens the socket for observers of the session.
+fn admit_observers(
+    options: &Options,
+    stop: &StopLatch,
+    report: Sender<SessionNews>,
+) -> std::io::Result<ObserverServer> {
+    let folder = std::path::absolute(options.folder.as_deref().unwrap_or(Path::new(".")))?;
+    let facts = SessionFacts {
+        process: std::process::id(),
+        folder,
+        robot: options.robot.name.clone(),
+        backend: options.backend.name().to_owned(),
+        task: options.task.name().to_owned(),
+        operator: options.provenance.operator.clone(),
+        since: format!("{:.0}", jiff::Timestamp::now()),
+    };
+    ObserverServer::start(facts, stop.clone(), report)
+}
+
 /// Checks that the session will not run out of file descriptors while it drives a robot.
 fn require_descriptors() -> Result<(), EngineError> {
     let lacking = |source| EngineError::System { what: "too few file descriptors".to_owned(), source };
@@ -241,6 +274,7 @@ pub struct EngineHandle {
     storage: StorageWatch,
     recording: Option<PathBuf>,
     live: Option<LiveServer>,
+    observers: Option<ObserverServer>,
     _folder: LockedFolder,
     requests: Option<Sender<StampedRequest>>,
     clock: MonotonicClock,
@@ -280,6 +314,11 @@ impl EngineHandle {
     /// Returns the state of the live view; none without one.
     pub fn live(&self) -> Option<LiveStatus> {
         self.live.as_ref().map(LiveServer::status)
+    }
+
+    /// Returns the number of observers that watch this session with the recording; none where it cannot be watched.
+    pub fn observers(&self) -> Option<usize> {
+        self.observers.as_ref().map(ObserverServer::observers)
     }
 
     /// Returns the wait of the session for the storage of its study; none while there is none worth showing.
@@ -345,6 +384,8 @@ impl EngineHandle {
         if let Some(control) = self.control.take() {
             let _ = control.join();
         }
+        // A STOP has no effect from here on, and none is confirmed.
+        self.observers = None;
         if let Some(Ok((supervisor, guard))) = session {
             // The last sender to the recorder.
             drop(supervisor);

@@ -4,6 +4,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::Duration;
 
 use super::guard::{Guard, GuardState};
+use super::observers::SessionNews;
 use crate::optimize::journal::LOCK_GRACE;
 use crate::realtime::clock::{Clock, MonotonicClock};
 use crate::realtime::sleep_lock::{ALLOW_INHIBITOR, SleepLock};
@@ -24,7 +25,7 @@ const LONGEST_STOP: Duration = Duration::from_secs(2);
 /// stored then was judged and is on disk, and is reported when the study is opened again.
 const LONGEST_CLOSE: Duration = Duration::from_secs(LOCK_GRACE.as_secs() + 5);
 
-/// Runs the session until the console drops its handle. Returns the supervisor with the session's channel ends, because a
+/// Runs the session until the console drops its handle; `news` of its observers go to the log. Returns the supervisor with the session's channel ends, because a
 /// control thread takes their loss for a crash of the session, and the guard, because the control thread commands the
 /// robot until its own end.
 pub fn run(
@@ -32,6 +33,7 @@ pub fn run(
     mut guard: Option<Guard>,
     mut sleep_lock: Option<SleepLock>,
     requests: &Receiver<StampedRequest>,
+    news: &Receiver<SessionNews>,
     clock: &MonotonicClock,
     sits_down: bool,
 ) -> (Supervisor, Option<Guard>) {
@@ -50,6 +52,9 @@ pub fn run(
             let message =
                 format!("systemd refused the sleep lock or ended it: the computer may suspend; {ALLOW_INHIBITOR}");
             supervisor.report_warning(message, clock.now_ns());
+        }
+        for (level, message) in news.try_iter() {
+            supervisor.report(level, message, clock.now_ns());
         }
         // A real robot is taken control of with a key: another program may command it.
         if supervisor.mode() == Mode::Observe && (!sits_down || supervisor.control_wanted()) {

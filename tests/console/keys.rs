@@ -472,6 +472,7 @@ fn settings_out_of_range_are_refused_by_name() {
         ("chart_window_s", 0.5.into()),
         ("colours", "pink".into()),
         ("glyphs", "runes".into()),
+        ("theme", "grey".into()),
         ("bell", vec!["noon"].into()),
     ] {
         let message = with(key, value).expect_err(key);

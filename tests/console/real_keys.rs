@@ -104,7 +104,7 @@ const REPLAY: &[Row] = &[
     row(Action::ZoomIn, "+", Shows("4 s sweep"), ("", "")),
     row(Action::ZoomOut, "-", Shows("8 s sweep"), ("", "")),
     row(Action::ChartMode, "w", Shows("8 s scroll"), ("w", "8 s sweep")),
-    row(Action::Series, "t", Shows("FL force"), ("tt", "FL foot")),
+    row(Action::Series, "t", Shows("FL force"), ("tttt", "FL foot")),
     row(Action::ChooseSeries, "T", Shows("Series of the charts"), ("\x1b", "8 s sweep")),
     row(Action::TrialsView, "2", Shows("by number"), ("", "")),
     row(Action::Rejudge, "J", Shows("Judge all trials again"), ("\r", " change")),
@@ -135,6 +135,7 @@ const REPLAY: &[Row] = &[
     row(Action::Palette, ":", Shows("Actions"), ("\x1b", "8 s sweep")),
     row(Action::Report, "R", Shows("J_forward = x_final"), ("\x1b", "8 s sweep")),
     row(Action::Help, "?", Shows("Keys (1"), ("\x1b", "8 s sweep")),
+    row(Action::Theme, "W", Shows("colours for a light background"), ("W", "colours for a dark background")),
     row(Action::Mouse, "M", Shows("mouse on"), ("M", "mouse off")),
     row(Action::Redraw, "Ctrl-L", Shows("the screen was drawn again"), ("", "")),
 ];

@@ -27,7 +27,7 @@ fn recording() -> PathBuf {
 
 /// A console at the end of the recorded session: two trials judged, the third under review.
 fn console(colours: Colours, glyphs: Glyphs) -> Console {
-    let mut console = Console::with(ConsoleSettings::built_in(), Theme { colours, glyphs });
+    let mut console = Console::with(ConsoleSettings::built_in(), Theme::new(colours, glyphs));
     let player = Player::open(recording()).expect("the recorded session");
     let robot = quadfrog::robot::description::RobotDescription::embedded(&player.session().robot).expect("its robot");
     console.model.robot = Some(robot);

@@ -82,7 +82,7 @@ fn a_small_terminal_shows_mode_stop_and_the_size_needed() {
 fn no_size_makes_drawing_fail() {
     for glyphs in [Glyphs::Braille, Glyphs::Ascii] {
         for view in VIEWS {
-            let mut console = Console::with(ConsoleSettings::built_in(), Theme { colours: Colours::None, glyphs });
+            let mut console = Console::with(ConsoleSettings::built_in(), Theme::new(Colours::None, glyphs));
             console.ticks(0..9000, |time_ms| (time_ms as f64 / 300.0).sin());
             console.record(Record::Session(support::session()));
             console.judged(30);
@@ -98,7 +98,7 @@ fn no_size_makes_drawing_fail() {
 fn ascii_is_ascii_on_every_screen() {
     for view in VIEWS {
         for opening in ["", "g", "o", ":", "?"] {
-            let theme = Theme { colours: Colours::None, glyphs: Glyphs::Ascii };
+            let theme = Theme::new(Colours::None, Glyphs::Ascii);
             let mut console = Console::with(ConsoleSettings::built_in(), theme);
             console.record(Record::Session(support::session()));
             console.record(Record::Proposal(support::proposal(3, 0)));
@@ -179,8 +179,7 @@ fn colours_follow_the_terminal_and_no_color() {
 #[test]
 fn without_colours_no_cell_is_coloured() {
     use ratatui::style::Color;
-    let mut console =
-        Console::with(ConsoleSettings::built_in(), Theme { colours: Colours::None, glyphs: Glyphs::Braille });
+    let mut console = Console::with(ConsoleSettings::built_in(), Theme::new(Colours::None, Glyphs::Braille));
     console.record(Record::Session(support::session()));
     console.mode(Mode::Fault);
     for cell in console.draw(120, 40).content() {

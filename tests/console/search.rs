@@ -14,8 +14,8 @@ use quadfrog::session::prior::PriorProgress;
 use quadfrog::session::storage::StorageWait;
 use quadfrog::telemetry::{ArmingCheck, ArmingCheckState, Counters, Mode, Snapshot, Tick};
 use quadfrog::trial::{
-    Backend, ExperimentStage, FixedParameter, ParameterInsight, PointRecord, ProposalInsight, SearchStatus,
-    SearchedParameter, Task, TrialRecord, Verdict,
+    Backend, ExperimentStage, FixedParameter, ParameterInsight, PointRecord, PredictedTrial, ProposalInsight,
+    SearchStatus, SearchedParameter, Task, TrialRecord, Verdict,
 };
 use quadfrog_console::export;
 use quadfrog_console::message::{Effect, ExportedRows, Msg};
@@ -184,14 +184,14 @@ fn densities_say_why_a_point_was_proposed_without_colours_too() {
         assert_eq!(why.contains("(#12)"), columns > 80, "{why}");
         assert!(why.contains("importance 62 %"), "{why}");
         assert!(why.contains("Fx") && why.contains("Fz"), "{why}");
-        // Peak and proposal of l are at a quarter of the panel, g's peak at three quarters.
+        // Peak and proposal of the good trials are at a quarter of the panel, the peak of the rest at three quarters.
         let width = why.find("Fx").map(|_| usize::from(columns) / 3).expect("three panels");
         let letter = |letter: &str| {
             let at = screen.lines().skip_while(|line| !line.contains("TPE ")).skip(1);
-            at.filter_map(|line| line.chars().take(width).position(|c| c.to_string() == letter)).next()
+            at.filter_map(|line| line.find(letter).map(|at| line[..at].chars().count()).filter(|at| *at < width)).next()
         };
-        let g = letter("g").expect("g");
-        assert!(g > width / 2 && g < width, "{g} of {width}:\n{screen}");
+        let (good, rest) = (letter("good").expect("good"), letter("rest").expect("rest"));
+        assert!(good < width / 2 && rest > width / 2, "{good}, {rest} of {width}:\n{screen}");
         assert!(letter("│").expect("the proposal") < width / 2, "{screen}");
     }
 }
@@ -205,7 +205,53 @@ fn before_the_first_trials_both_densities_are_the_prior() {
     console.record(Record::Insight(insight));
     console.press(&["3"]);
     let screen = console.screen(120, 40);
-    assert!(screen.contains("l = g") && !screen.contains("importance"), "{screen}");
+    assert!(screen.contains("good = rest") && !screen.contains("importance"), "{screen}");
+}
+
+#[test]
+fn panels_of_one_parameter_have_the_same_axis_when_the_search_is_narrowed() {
+    let mut console = Console::proposed();
+    console.judged(4);
+    let mut narrowed = insight();
+    let parameter = &mut narrowed.parameters[0];
+    parameter.at = (0..=40).map(|i| 0.9 + 0.2 * f64::from(i) / 40.0).collect();
+    console.record(Record::Insight(narrowed));
+    console.press(&["3"]);
+    let screen = console.screen(120, 40);
+    let axes: Vec<&str> = screen.lines().filter(|line| line.contains("0.750")).collect();
+    let ends = |line: &str| [line.find("0.750"), line.find("1.750")];
+    let [scatter, densities] = axes[..] else { panic!("two axes of f0: {axes:?}\n{screen}") };
+    assert_eq!(ends(scatter), ends(densities), "{screen}");
+}
+
+#[test]
+fn a_sampler_with_a_model_shows_its_mean_and_deviation() {
+    let mut console = Console::proposed();
+    console.judged(4);
+    let mut insight = insight();
+    insight.parameters[0].at.clear();
+    insight.predicted = vec![PredictedTrial { trial: 0, value: 0.4, deviation: 0.2 }];
+    insight.best = Some(0);
+    console.record(Record::Insight(insight));
+    console.press(&["3"]);
+    let wide = console.screen(200, 60);
+    assert_shows(&wide, &["Predicted J over f0 (#12): mean and deviation", "importance 62 %", "proposal, deviation"]);
+    assert!(!wide.contains("TPE"), "{wide}");
+    let rows: Vec<&str> = wide.lines().skip_while(|line| !line.contains("Predicted J")).collect();
+    let mean = rows.iter().position(|line| line.chars().take(66).any(|c| c == '*')).expect("the mean");
+    assert!(rows[mean - 1].contains('│') && rows[mean + 1].contains('│'), "{wide}");
+    assert_shows(&console.screen(80, 24), &["Model f0"]);
+}
+
+#[test]
+fn the_signs_of_the_optimizer_are_explained_at_every_size() {
+    for (columns, rows) in [(80, 24), (120, 40), (200, 60)] {
+        let mut console = Console::proposed();
+        console.judged(4);
+        console.press(&["3"]);
+        let signs = ["o accept", "x fall", "v void", "? not judged", "* best", "─ best so far", "│ proposal"];
+        assert_shows(&line_with(&console.screen(columns, rows), "o accept  x"), &signs);
+    }
 }
 
 /// A finished study of four trials; trial 2 is the best.

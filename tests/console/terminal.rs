@@ -18,6 +18,7 @@ use quadfrog::trial::{ProposalSource, TrialRecord, Verdict};
 use quadfrog_console::app::{self, ConsoleOptions};
 use quadfrog_console::feed::Feed;
 use quadfrog_console::settings::ConsoleSettings;
+use quadfrog_console::theme::ThemeChoice;
 
 const SIZE: (u16, u16) = (100, 30);
 
@@ -311,7 +312,7 @@ fn a_panic_in_any_thread_restores_the_terminal_and_names_the_thread() {
 fn a_console_one_of_whose_threads_panics() {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/console/session.mcap");
     let player = Player::open(file).expect("the recorded session");
-    let options = ConsoleOptions::new(ConsoleSettings::built_in(), None, false, false);
+    let options = ConsoleOptions::new(ConsoleSettings::built_in(), None, ThemeChoice::Auto, false, false);
     let defect = || {
         std::thread::sleep(Duration::from_secs(1));
         panic!("an injected defect");

@@ -105,6 +105,10 @@ fn the_keys_of_the_series_change_what_is_drawn() {
     console.press(&["t"]);
     shows(&console, &["height ", "oscillator ", "FL force", "RR force"]);
     console.press(&["t"]);
+    shows(&console, &["x ", "x velocity ", "yaw ", "z velocity "]);
+    console.press(&["t"]);
+    shows(&console, &["FR_hip torque", "FL_calf torque"]);
+    console.press(&["t"]);
     shows(&console, &["Joints", "limits are not known", "Robot"]);
     console.press(&["t"]);
     shows(&console, &["roll "]);
@@ -115,7 +119,7 @@ fn the_keys_of_the_series_change_what_is_drawn() {
     let screen = console.screen(80, 24);
     assert!(!screen.contains("roll ") && screen.contains("height "), "{screen}");
     // The last one cannot be switched off.
-    let all_off = ["x", "Down"].repeat(12);
+    let all_off = ["x", "Down"].repeat(73);
     console.press(&[&["T"], &all_off[..], &["Home"], &all_off, &["Enter"]].concat());
     assert!(!console.model.live.series.is_empty());
 }
@@ -140,7 +144,7 @@ fn joints_contact_and_wireframe_are_there_at_every_size() {
         newest.limited = 0b10;
         newest.estimate.contact = [true, false, true, false];
         console.update(Msg::Snapshot(Box::new(Snapshot { tick: newest, ..console.model.snapshot })));
-        console.press(&["t", "t"]);
+        console.press(&["t"; 4]);
         let screen = console.screen(columns, rows);
         assert!(screen.contains("FR● FL○ RR● RL○"), "{screen}");
         let thigh = line_with(&screen, "FR_thigh");
@@ -248,7 +252,7 @@ fn columns_are_chosen_in_a_dialog_and_in_the_settings() {
     table.insert("trial_columns".into(), vec!["apex", "value"].into());
     table.insert("chart_series".into(), vec!["height"].into());
     let settings = ConsoleSettings::from_table(&table).expect("columns that exist");
-    let mut console = Console::with(settings, Theme { colours: Colours::None, glyphs: Glyphs::Ascii });
+    let mut console = Console::with(settings, Theme::new(Colours::None, Glyphs::Ascii));
     console.record(Record::Trial(trial(0, Some(Verdict::Accept), None)));
     console.press(&["2"]);
     let screen = console.screen(80, 24);

@@ -86,6 +86,7 @@ pub enum Action {
     Rejudge,
     Palette,
     Help,
+    Theme,
     Mouse,
     Redraw,
     Suspend,
@@ -144,7 +145,7 @@ const fn fixed(info: ActionInfo) -> ActionInfo {
 
 /// Every action, in the order of [`Action`].
 #[rustfmt::skip]
-pub static ACTIONS: [ActionInfo; 84] = {
+pub static ACTIONS: [ActionInfo; 85] = {
     use Action as A;
     use ActionGroup as G;
     [
@@ -198,7 +199,7 @@ pub static ACTIONS: [ActionInfo; 84] = {
         row(A::ZoomIn, "zoom-in", &["+"], G::Charts, "shorter time window"),
         row(A::ZoomOut, "zoom-out", &["-"], G::Charts, "longer time window"),
         row(A::ChartMode, "chart-mode", &["w"], G::Charts, "sweep or scroll"),
-        row(A::Series, "series", &["t"], G::Charts, "next set: attitude and feet, forces, joints"),
+        row(A::Series, "series", &["t"], G::Charts, "next set: attitude, forces, motion, torques, joints"),
         row(A::ChooseSeries, "choose-series", &["T"], G::Charts, "choose the series of the charts"),
         row(A::Ghost, "ghost", &["c"], G::Charts, "best (Trials: selected) trial under the charts; a second one: compare both"),
 
@@ -235,6 +236,7 @@ pub static ACTIONS: [ActionInfo; 84] = {
 
         row(A::Palette, "palette", &[":"], G::Program, "all actions, and why some are not possible now"),
         row(A::Help, "help", &["?"], G::Program, "this help"),
+        row(A::Theme, "theme", &["W"], G::Program, "colours for a dark or for a light background"),
         row(A::Mouse, "mouse", &["M"], G::Program, "mouse on or off: tabs, rows, wheel"),
         row(A::Redraw, "redraw", &["Ctrl-L"], G::Program, "draw the whole screen again"),
         row(A::Suspend, "suspend", &["Ctrl-Z"], G::Program, "suspend the program (only while the robot is not armed)"),

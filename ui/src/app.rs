@@ -24,8 +24,8 @@ use crate::input::{KeyReader, NumberedEvent, SpaceBarIsText, TerminalEvent, read
 use crate::message::{Effect, ExportedRows, Msg};
 use crate::model::Model;
 use crate::settings::{ChartMode, ConsoleSettings};
-use crate::terminal::{self, TerminalScreen};
-use crate::theme::{ColourChoice, GlyphChoice, Theme};
+use crate::terminal::{self, TerminalProtocol, TerminalScreen};
+use crate::theme::{ColourChoice, GlyphChoice, Theme, ThemeChoice};
 use crate::update::{say, update};
 use crate::{export, text, view};
 
@@ -34,6 +34,9 @@ const PULSE: Duration = Duration::from_millis(50);
 /// Maximum frames per second over a slow link.
 const LOW_BANDWIDTH_FRAMES: u32 = 2;
 
+/// Longest wait of the first frame for the terminal's report of its background. A later report changes the colours.
+const BACKGROUND_WAIT: Duration = Duration::from_millis(200);
+
 /// Options of the console.
 #[derive(Debug, Clone)]
 pub struct ConsoleOptions {
@@ -41,6 +44,8 @@ pub struct ConsoleOptions {
     pub settings: ConsoleSettings,
     /// The robot model, for limits; none if unknown.
     pub robot: Option<RobotDescription>,
+    /// Largest roll and pitch before a trial is a fall, rad; none where the configuration of the trials is not known.
+    pub fall_tilt_rad: Option<[f64; 2]>,
 }
 
 impl ConsoleOptions {
@@ -48,6 +53,7 @@ impl ConsoleOptions {
     pub fn new(
         mut settings: ConsoleSettings,
         colours: Option<ColourChoice>,
+        theme: ThemeChoice,
         ascii: bool,
         low_bandwidth: bool,
     ) -> ConsoleOptions {
@@ -62,10 +68,20 @@ impl ConsoleOptions {
         if let Some(colours) = colours {
             settings.colours = colours;
         }
+        if theme != ThemeChoice::Auto {
+            settings.theme = theme;
+        }
         if ascii {
             settings.glyphs = GlyphChoice::Ascii;
         }
-        ConsoleOptions { settings, robot: None }
+        ConsoleOptions { settings, robot: None, fall_tilt_rad: None }
+    }
+
+    /// Adds the largest roll and pitch before a trial is a fall, rad.
+    #[must_use]
+    pub fn with_fall_tilt_rad(mut self, fall_tilt_rad: [f64; 2]) -> ConsoleOptions {
+        self.fall_tilt_rad = Some(fall_tilt_rad);
+        self
     }
 
     /// Adds the robot model.
@@ -113,6 +129,8 @@ struct Console {
     last_frame: Option<Instant>,
     last_feed: Instant,
     redraw: bool,
+    /// End of the wait for the terminal's report of its background.
+    background_due: Option<Instant>,
     ended: Option<ConsoleExit>,
 }
 
@@ -121,11 +139,21 @@ impl Console {
         let settings = options.settings;
         let theme = Theme::detect(settings.colours, settings.glyphs, |name| std::env::var(name).ok());
         let frame_period = Duration::from_secs(1) / settings.frames_per_second.max(1);
+        let low_bandwidth = settings.low_bandwidth;
         let mut model = Model::new(settings, theme, options.robot);
+        model.fall_tilt_rad = options.fall_tilt_rad;
         let (columns, rows) = crossterm::terminal::size().context("the terminal's size")?;
         update(&mut model, Msg::Resize(columns, rows));
-        let mut screen =
-            TerminalScreen::enter(matches!(feed, Feed::Replay(_))).context("the terminal cannot be used")?;
+        // The kernel's console has no such report.
+        let asks = model.follow_background
+            && theme.follows_background()
+            && std::env::var("TERM").is_ok_and(|term| term != "linux");
+        let protocol = TerminalProtocol {
+            pastes: matches!(feed, Feed::Replay(_)),
+            asks_background: asks,
+            synchronized: !low_bandwidth,
+        };
+        let mut screen = TerminalScreen::enter(protocol).context("the terminal cannot be used")?;
         screen.mouse(model.mouse).context("the terminal cannot be used")?;
         terminal::stop_on_panic(feed.handle().map(EngineHandle::stop_latch));
         let connection = match &feed {
@@ -149,13 +177,14 @@ impl Console {
             last_frame: None,
             last_feed: now,
             redraw: true,
+            background_due: asks.then(|| now + BACKGROUND_WAIT),
             ended: None,
         })
     }
 
     async fn run(mut self) -> anyhow::Result<ConsoleExit> {
         let (input, mut inputs) = unbounded_channel();
-        let stop = self.feed.handle().map(EngineHandle::stop_latch);
+        let stop = self.feed.stop_latch();
         read_input(input.clone(), KeyReader::new(stop.is_none(), stop, self.space_bar_is_text.clone()))?;
         terminal::watch_for_hang_up(move || drop(input.send(None))).context("hang-up watcher")?;
         let mut interrupted = signal(SignalKind::interrupt())?;
@@ -212,10 +241,14 @@ impl Console {
             match input {
                 Some(NumberedEvent { event, keys }) => {
                     self.keys = keys;
+                    if matches!(event, TerminalEvent::Background(_)) {
+                        self.background_due = None;
+                    }
                     self.update_with([match event {
                         TerminalEvent::Key(key) => Msg::Key(key),
                         TerminalEvent::Paste(text) => Msg::Paste(text),
                         TerminalEvent::Mouse(event) => Msg::Mouse(event),
+                        TerminalEvent::Background(background) => Msg::Background(background),
                     }]);
                 }
                 None => self.hang_up(),
@@ -253,7 +286,7 @@ impl Console {
 
     fn perform_effect(&mut self, effect: Effect) {
         match effect {
-            Effect::Stop => self.feed.handle().into_iter().for_each(EngineHandle::stop),
+            Effect::Stop => self.feed.stop_latch().into_iter().for_each(|stop| stop.set()),
             Effect::Request(request) => {
                 self.feed.handle().into_iter().for_each(|handle| handle.request(request.clone()))
             }
@@ -334,7 +367,8 @@ impl Console {
     fn draw_if_due(&mut self) -> anyhow::Result<()> {
         // A quarter of the loop period early, so that a frame is not delayed by one whole period.
         let due = self.redraw || self.last_frame.is_none_or(|last| last.elapsed() + PULSE / 4 >= self.frame_period);
-        if !due || !self.screen.ready() || self.ended == Some(ConsoleExit::HungUp) {
+        let waits = self.background_due.is_some_and(|due| Instant::now() < due);
+        if !due || waits || !self.screen.ready() || self.ended == Some(ConsoleExit::HungUp) {
             return Ok(());
         }
         if self.screen.broken() {

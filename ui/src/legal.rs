@@ -89,6 +89,7 @@ pub fn palette(filter: &str, model: &Model) -> Vec<(&'static ActionInfo, Legalit
 
 /// Whether this session accepts requests.
 pub fn may_request(model: &Model) -> Legality {
+    require(model.observer().is_none(), "this console only watches; of its keys STOP alone reaches the session")?;
     require(model.replay.is_none(), "this is a replay: there is nothing to command")?;
     require(!model.session.info.observe, "this session only observes")
 }

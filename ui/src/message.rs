@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
-use quadfrog::engine::RejudgedTrial;
+use quadfrog::engine::{ObserverStatus, RejudgedTrial};
 use quadfrog::recording::live::LiveStatus;
 use quadfrog::recording::record::Stamped;
 use quadfrog::recording::recorder::RecorderStatus;
@@ -14,6 +14,7 @@ use quadfrog::telemetry::{Snapshot, Tick};
 use quadfrog::trial::{TrialRecord, Verdict};
 
 use crate::keymap::Key;
+use crate::theme::Background;
 
 /// An input of the console: keys, mouse, signals, the feed, the clock.
 #[expect(clippy::large_enum_variant, reason = "records are few; the many ticks are boxed")]
@@ -27,6 +28,8 @@ pub enum Msg {
     Key(Key),
     /// Pasted text of the terminal of a replay. In a live session a paste arrives as keys.
     Paste(String),
+    /// The background that the terminal reports.
+    Background(Background),
     /// Mouse input, while the mouse is on.
     Mouse(Mouse),
     /// The newest tick and counters, for numbers and the mode.
@@ -34,6 +37,8 @@ pub enum Msg {
     Recorder(RecorderStatus),
     /// State of the live view.
     Viewers(LiveStatus),
+    /// Observers that watch this session.
+    Observers(usize),
     /// The wait of the session for the storage of its study; none while there is none.
     Storage(Option<StorageWait>),
     /// One of the ticks for the charts.
@@ -184,8 +189,10 @@ pub struct ReplayStatus {
     pub looping: Option<u32>,
     /// The trial at the playhead, or else the last one before it, or the first one.
     pub present: Option<u32>,
-    /// Whether the recording is being written and is followed.
-    pub following: bool,
+    /// Time since the recording grew, ns, if it is being written and is followed.
+    pub silent_ns: Option<u64>,
+    /// The session that writes it, if its STOP can be reached.
+    pub observer: Option<ObserverStatus>,
     /// Time that the parts found so far take that cannot be read, ns.
     pub lost_ns: u64,
 }

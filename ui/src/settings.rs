@@ -12,7 +12,7 @@ use toml::{Table, Value};
 use crate::column::Column;
 use crate::keymap::Keymap;
 use crate::series::Series;
-use crate::theme::{ColourChoice, GlyphChoice};
+use crate::theme::{ColourChoice, GlyphChoice, ThemeChoice};
 
 /// The defaults, and the documentation of every key.
 pub const DEFAULT: &str = include_str!("../../config/console.toml");
@@ -25,6 +25,8 @@ pub struct ConsoleSettings {
     pub frames_per_second: u32,
     pub colours: ColourChoice,
     pub glyphs: GlyphChoice,
+    /// Background that the colours suit.
+    pub theme: ThemeChoice,
     /// Whether charts sweep or scroll.
     pub chart_mode: ChartMode,
     /// Time that a chart shows, s.
@@ -106,6 +108,7 @@ impl ConsoleSettings {
             frames_per_second,
             colours: read(table, "colours")?,
             glyphs: read(table, "glyphs")?,
+            theme: read(table, "theme")?,
             chart_mode: read(table, "chart_mode")?,
             chart_window_s,
             chart_series: named(table, "chart_series")?,

@@ -18,7 +18,8 @@ use crossterm::event::{DisableBracketedPaste, DisableMouseCapture, EnableBracket
 use crossterm::queue;
 use crossterm::style::ResetColor;
 use crossterm::terminal::{
-    Clear, ClearType, EnterAlternateScreen, LeaveAlternateScreen, disable_raw_mode, enable_raw_mode, size,
+    Clear, ClearType, EndSynchronizedUpdate, EnterAlternateScreen, LeaveAlternateScreen, disable_raw_mode,
+    enable_raw_mode, size,
 };
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use quadfrog::realtime::channel::StopLatch;
@@ -33,6 +34,23 @@ use crate::layout::{MIN_COLUMNS, MIN_ROWS};
 const LEAVE_TIMEOUT: Duration = Duration::from_millis(500);
 /// Time-out of each wait for a hang-up.
 const HANG_UP_PERIOD_MS: u16 = 200;
+
+/// Begin and end of a synchronized update (DEC private mode 2026). A terminal without it ignores both.
+const BEGIN_SYNCHRONIZED: &[u8] = b"\x1b[?2026h";
+const END_SYNCHRONIZED: &[u8] = b"\x1b[?2026l";
+/// Question for the colour of the background (XTerm Control Sequences, OSC 11). The answer arrives among the keys.
+const ASK_BACKGROUND: &[u8] = b"\x1b]11;?\x1b\\";
+
+/// The parts of the terminal's protocol that the console uses.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct TerminalProtocol {
+    /// Bracketed paste.
+    pub pastes: bool,
+    /// The question for the background.
+    pub asks_background: bool,
+    /// Synchronized updates. Not over a slow link, where a frame is better seen as it arrives.
+    pub synchronized: bool,
+}
 
 /// The reason for which the console cannot open.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -82,12 +100,17 @@ struct WriterState {
 /// Collects the bytes of a frame and sends the complete frame to the writing thread.
 struct FrameWriter {
     frame: Vec<u8>,
+    /// Whether each frame is a synchronized update: the terminal then shows no half of one.
+    synchronized: bool,
     frames: Sender<Vec<u8>>,
     state: Arc<WriterState>,
 }
 
 impl Write for FrameWriter {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        if self.synchronized && self.frame.is_empty() && !bytes.is_empty() {
+            self.frame.extend_from_slice(BEGIN_SYNCHRONIZED);
+        }
         self.frame.extend_from_slice(bytes);
         Ok(bytes.len())
     }
@@ -95,6 +118,9 @@ impl Write for FrameWriter {
     /// Ends the frame.
     fn flush(&mut self) -> io::Result<()> {
         if !self.frame.is_empty() {
+            if self.synchronized {
+                self.frame.extend_from_slice(END_SYNCHRONIZED);
+            }
             self.state.waiting.fetch_add(1, Ordering::AcqRel);
             let gone = |_| io::Error::from(io::ErrorKind::BrokenPipe);
             self.frames.send(std::mem::take(&mut self.frame)).map_err(gone)?;
@@ -127,11 +153,14 @@ impl Backend for WriteOnlyBackend {
     where
         I: Iterator<Item = (u16, u16, &'a Cell)>,
     {
-        self.0.draw(content)
+        let mut content = content.peekable();
+        // The library resets the colours also after no cell.
+        if content.peek().is_none() { Ok(()) } else { self.0.draw(content) }
     }
 
+    /// Does nothing: ratatui hides the cursor after every frame, and it is hidden since the terminal was configured.
     fn hide_cursor(&mut self) -> io::Result<()> {
-        self.0.hide_cursor()
+        Ok(())
     }
 
     fn show_cursor(&mut self) -> io::Result<()> {
@@ -191,8 +220,7 @@ pub(crate) struct TerminalScreen {
     state: Arc<WriterState>,
     writer: Option<JoinHandle<()>>,
     mouse: bool,
-    /// Whether bracketed paste is on.
-    pastes: bool,
+    protocol: TerminalProtocol,
     hung_up: bool,
 }
 
@@ -200,7 +228,7 @@ impl TerminalScreen {
     /// Enters raw mode and the alternate screen, and hides the cursor. Bracketed paste is on with `pastes` only: text that
     /// begins with its first mark and never ends would hide the keys behind it. From now on a panic in any thread restores the
     /// terminal before it is reported.
-    pub fn enter(pastes: bool) -> io::Result<TerminalScreen> {
+    pub fn enter(protocol: TerminalProtocol) -> io::Result<TerminalScreen> {
         let terminal = own_file()?;
         let state = Arc::new(WriterState::default());
         // Holds at most one frame: the caller checks `ready` before it draws.
@@ -210,7 +238,8 @@ impl TerminalScreen {
             .name("frame-writer".into())
             .spawn(move || write_frames(&received, &for_writer, terminal))?;
         install_panic_hook();
-        let writer_end = FrameWriter { frame: Vec::new(), frames, state: state.clone() };
+        let writer_end =
+            FrameWriter { frame: Vec::new(), synchronized: protocol.synchronized, frames, state: state.clone() };
         let backend = WriteOnlyBackend(CrosstermBackend::new(writer_end));
         let terminal = Terminal::with_options(backend, TerminalOptions { viewport: Viewport::Fullscreen })?;
         let mut screen = TerminalScreen {
@@ -218,7 +247,7 @@ impl TerminalScreen {
             state,
             writer: Some(writer),
             mouse: false,
-            pastes,
+            protocol,
             hung_up: false,
         };
         screen.configure()?;
@@ -232,10 +261,13 @@ impl TerminalScreen {
         if let Some(terminal) = &mut self.terminal {
             let writer = &mut terminal.backend_mut().0;
             queue!(writer, EnterAlternateScreen, Hide, Clear(ClearType::All))?;
-            match self.pastes {
+            match self.protocol.pastes {
                 true => queue!(writer, EnableBracketedPaste)?,
                 // An earlier program may have left it on.
                 false => queue!(writer, DisableBracketedPaste)?,
+            }
+            if self.protocol.asks_background {
+                writer.write_all(ASK_BACKGROUND)?;
             }
             terminal.clear()?;
         }
@@ -342,7 +374,15 @@ fn restore() {
         if let Ok(mut terminal) = own_file() {
             let mut bytes = Vec::new();
             // Writing to memory cannot fail.
-            let _ = queue!(bytes, ResetColor, DisableMouseCapture, DisableBracketedPaste, LeaveAlternateScreen, Show);
+            let _ = queue!(
+                bytes,
+                EndSynchronizedUpdate,
+                ResetColor,
+                DisableMouseCapture,
+                DisableBracketedPaste,
+                LeaveAlternateScreen,
+                Show
+            );
             let _output = OUTPUT.lock().unwrap_or_else(PoisonError::into_inner);
             let _ = terminal.write_all(&bytes);
         }

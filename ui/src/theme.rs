@@ -21,6 +21,44 @@ pub enum ColourChoice {
     None,
 }
 
+/// Brightness of the background by the settings.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ThemeChoice {
+    /// As the terminal reports its background.
+    Auto,
+    Dark,
+    Light,
+}
+
+/// Brightness of the terminal's background.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Background {
+    #[default]
+    Dark,
+    Light,
+}
+
+impl Background {
+    /// The background of a colour, each part 0 to 1: light where black text has more contrast than white text
+    /// (WCAG 2.2, relative luminance and contrast ratio).
+    pub fn of_rgb(rgb: [f64; 3]) -> Background {
+        let linear = rgb.map(|part| if part <= 0.04045 { part / 12.92 } else { ((part + 0.055) / 1.055).powf(2.4) });
+        let luminance = 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2];
+        // (L + 0.05) / 0.05 exceeds 1.05 / (L + 0.05).
+        if (luminance + 0.05).powi(2) > 0.05 * 1.05 { Background::Light } else { Background::Dark }
+    }
+
+    /// The background that `COLORFGBG` names (rxvt, Konsole): the last of its colours.
+    fn of_variable(value: &str) -> Option<Background> {
+        match value.rsplit(';').next()?.parse::<u8>().ok()? {
+            7 | 9..=15 => Some(Background::Light),
+            0..=6 | 8 => Some(Background::Dark),
+            _ => None,
+        }
+    }
+}
+
 /// Characters of charts and lines by the settings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -91,29 +129,61 @@ pub enum Role {
 pub struct Theme {
     pub colours: Colours,
     pub glyphs: Glyphs,
+    pub background: Background,
 }
 
-/// One colour in the three palettes.
+/// One colour of 24 bits, of the 256 and of the 16.
+#[derive(Clone, Copy)]
 struct Shade {
     rgb: (u8, u8, u8),
     index: u8,
     named: Color,
 }
 
+/// The colours for one background. Text has a contrast of 4.5:1 at least, also on usual backgrounds beside black and white
+/// and on the shaded phases (WCAG 2.2, criterion 1.4.3). The 16 colours are the terminal's own.
+struct Palette {
+    cyan: Shade,
+    green: Shade,
+    amber: Shade,
+    red: Shade,
+    violet: Shade,
+    grey: Shade,
+    /// Text on amber and red.
+    on_alarm: Shade,
+    impulse: Shade,
+    flight: Shade,
+    landing: Shade,
+}
+
 const fn shade(rgb: (u8, u8, u8), index: u8, named: Color) -> Shade {
     Shade { rgb, index, named }
 }
 
-const CYAN: Shade = shade((86, 182, 194), 73, Color::Cyan);
-const GREEN: Shade = shade((120, 190, 110), 107, Color::Green);
-const AMBER: Shade = shade((229, 180, 80), 179, Color::Yellow);
-const RED: Shade = shade((224, 92, 92), 167, Color::Red);
-const VIOLET: Shade = shade((190, 140, 220), 140, Color::Magenta);
-const GREY: Shade = shade((140, 145, 152), 245, Color::Reset);
-const BLACK: Shade = shade((20, 20, 20), 16, Color::Black);
-const NIGHT_IMPULSE: Shade = shade((58, 48, 20), 58, Color::Reset);
-const NIGHT_FLIGHT: Shade = shade((20, 44, 58), 23, Color::Reset);
-const NIGHT_LANDING: Shade = shade((42, 34, 52), 53, Color::Reset);
+const DARK: Palette = Palette {
+    cyan: shade((86, 182, 194), 73, Color::Cyan),
+    green: shade((120, 190, 110), 107, Color::Green),
+    amber: shade((229, 180, 80), 179, Color::Yellow),
+    red: shade((240, 120, 115), 210, Color::Red),
+    violet: shade((200, 155, 228), 141, Color::Magenta),
+    grey: shade((160, 165, 172), 248, Color::Reset),
+    on_alarm: shade((20, 20, 20), 16, Color::Black),
+    impulse: shade((58, 48, 20), 52, Color::Reset),
+    flight: shade((20, 44, 58), 17, Color::Reset),
+    landing: shade((42, 34, 52), 235, Color::Reset),
+};
+const LIGHT: Palette = Palette {
+    cyan: shade((0, 95, 115), 24, Color::Cyan),
+    green: shade((25, 100, 35), 22, Color::Green),
+    amber: shade((130, 75, 0), 94, Color::Yellow),
+    red: shade((170, 25, 30), 124, Color::Red),
+    violet: shade((120, 50, 150), 91, Color::Magenta),
+    grey: shade((85, 90, 98), 240, Color::Reset),
+    on_alarm: shade((255, 255, 255), 231, Color::Black),
+    impulse: shade((250, 235, 200), 230, Color::Reset),
+    flight: shade((213, 235, 248), 195, Color::Reset),
+    landing: shade((235, 225, 245), 255, Color::Reset),
+};
 
 impl Theme {
     /// Chooses the theme from the settings and the environment; `variable` returns an environment variable.
@@ -146,28 +216,47 @@ impl Theme {
             GlyphChoice::Auto if term == "linux" => Glyphs::Dots,
             GlyphChoice::Auto => Glyphs::Braille,
         };
-        Theme { colours, glyphs }
+        let background = filled("COLORFGBG").and_then(|value| Background::of_variable(&value)).unwrap_or_default();
+        Theme { colours, glyphs, background }
+    }
+
+    /// A theme for a dark background.
+    pub fn new(colours: Colours, glyphs: Glyphs) -> Theme {
+        Theme { colours, glyphs, background: Background::Dark }
+    }
+
+    /// Whether the colours depend on the background: the 16 colours are the terminal's own.
+    pub fn follows_background(&self) -> bool {
+        matches!(self.colours, Colours::True | Colours::Indexed)
+    }
+
+    fn palette(&self) -> &'static Palette {
+        match self.background {
+            Background::Dark => &DARK,
+            Background::Light => &LIGHT,
+        }
     }
 
     pub fn style(&self, role: Role) -> Style {
         let plain = Style::new();
+        let palette = self.palette();
         match role {
             Role::Text => plain,
             Role::Quiet | Role::Ghost if self.colours == Colours::Named => plain.add_modifier(Modifier::DIM),
-            Role::Quiet | Role::Ghost => self.fg(GREY),
-            Role::Heading => self.fg(CYAN).add_modifier(Modifier::BOLD),
+            Role::Quiet | Role::Ghost => self.fg(palette.grey),
+            Role::Heading => self.fg(palette.cyan).add_modifier(Modifier::BOLD),
             Role::Key => plain.add_modifier(Modifier::BOLD),
-            Role::Good => self.fg(GREEN),
-            Role::Warning => self.fg(AMBER).add_modifier(Modifier::BOLD),
-            Role::Bad => self.fg(RED).add_modifier(Modifier::BOLD),
-            Role::Alarm => self.reverse(RED),
+            Role::Good => self.fg(palette.green),
+            Role::Warning => self.fg(palette.amber).add_modifier(Modifier::BOLD),
+            Role::Bad => self.fg(palette.red).add_modifier(Modifier::BOLD),
+            Role::Alarm => self.reverse(palette.red),
             Role::Selected => plain.add_modifier(Modifier::REVERSED),
-            Role::Hardware => self.reverse(AMBER),
-            Role::SeriesA => self.fg(CYAN),
-            Role::SeriesB => self.fg(VIOLET),
-            Role::ShadeImpulse => self.bg(NIGHT_IMPULSE),
-            Role::ShadeFlight => self.bg(NIGHT_FLIGHT),
-            Role::ShadeLanding => self.bg(NIGHT_LANDING),
+            Role::Hardware => self.reverse(palette.amber),
+            Role::SeriesA => self.fg(palette.cyan),
+            Role::SeriesB => self.fg(palette.violet),
+            Role::ShadeImpulse => self.bg(palette.impulse),
+            Role::ShadeFlight => self.bg(palette.flight),
+            Role::ShadeLanding => self.bg(palette.landing),
         }
     }
 
@@ -183,6 +272,11 @@ impl Theme {
 
     pub fn bar(&self) -> &'static str {
         self.pick("|", "│")
+    }
+
+    /// A piece of a limit's line.
+    pub fn limit(&self) -> &'static str {
+        self.pick("-", "╌")
     }
 
     /// Separator of two items on one line.
@@ -224,11 +318,11 @@ impl Theme {
         self.colour(shade).map_or_else(Style::new, |colour| Style::new().bg(colour))
     }
 
-    /// Dark text on the colour; reversed where there are no colours.
+    /// Text on the colour; reversed where there are no colours.
     fn reverse(&self, shade: Shade) -> Style {
         match self.colours {
             Colours::None => Style::new().add_modifier(Modifier::REVERSED | Modifier::BOLD),
-            _ => self.bg(shade).patch(self.fg(BLACK)).add_modifier(Modifier::BOLD),
+            _ => self.bg(shade).patch(self.fg(self.palette().on_alarm)).add_modifier(Modifier::BOLD),
         }
     }
 }

@@ -229,6 +229,11 @@ impl Supervisor {
         self.log(LogLevel::Warning, message, time_ns);
     }
 
+    /// Writes a message to the log.
+    pub fn report(&mut self, level: LogLevel, message: String, time_ns: u64) {
+        self.log(level, message, time_ns);
+    }
+
     /// Returns the mode that was reported to the session last.
     pub fn mode(&self) -> Mode {
         self.mode

@@ -38,7 +38,7 @@ pub struct Console {
 impl Console {
     /// Braille, 16 colours, no session.
     pub fn new() -> Console {
-        Console::with(ConsoleSettings::built_in(), Theme { colours: Colours::Named, glyphs: Glyphs::Braille })
+        Console::with(ConsoleSettings::built_in(), Theme::new(Colours::Named, Glyphs::Braille))
     }
 
     pub fn with(settings: ConsoleSettings, theme: Theme) -> Console {

@@ -107,6 +107,11 @@ impl Session {
         self.output().bytes.len()
     }
 
+    /// The bytes sent to the terminal.
+    pub fn sent_bytes(&self) -> Vec<u8> {
+        self.output().bytes.clone()
+    }
+
     /// Whether the output contains these bytes.
     pub fn sent(&self, bytes: &[u8]) -> bool {
         self.output().bytes.windows(bytes.len()).any(|window| window == bytes)

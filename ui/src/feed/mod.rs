@@ -6,7 +6,8 @@ mod replay;
 
 use std::path::PathBuf;
 
-use quadfrog::engine::EngineHandle;
+use quadfrog::engine::{EngineHandle, Observer};
+use quadfrog::realtime::channel::StopLatch;
 use quadfrog::recording::timeline::Timeline;
 
 use crate::message::{Msg, ReplayCommand};
@@ -42,6 +43,19 @@ impl Feed {
     /// Creates the feed of a recording that is being written, playing from its present end.
     pub fn follow(recording: impl Into<Timeline>) -> Feed {
         Feed::Replay(Box::new(ReplayFeed::new(recording.into(), None, true)))
+    }
+
+    /// Creates the feed of a session that another process runs, from its recording, with STOP.
+    pub fn attached(recording: Timeline, observer: Observer) -> Feed {
+        Feed::Replay(Box::new(ReplayFeed::new(recording, None, true).with_observer(observer)))
+    }
+
+    /// Returns the latch that stops the robot; none in the replay of a recording.
+    pub fn stop_latch(&self) -> Option<StopLatch> {
+        match self {
+            Feed::Live(handle) => Some(handle.stop_latch()),
+            Feed::Replay(replay) => replay.stop_latch(),
+        }
     }
 
     /// Returns the damage of the recording that a replay has found, also after the feed has ended.
@@ -94,6 +108,7 @@ impl Feed {
                 messages.push(Msg::Snapshot(Box::new(handle.snapshot())));
                 messages.extend(handle.recorder().map(Msg::Recorder));
                 messages.extend(handle.live().map(Msg::Viewers));
+                messages.extend(handle.observers().map(Msg::Observers));
                 messages.push(Msg::Storage(handle.storage_wait()));
             }
             Feed::Replay(replay) => replay.poll(elapsed_ns, &mut messages),

@@ -5,7 +5,8 @@ use std::path::PathBuf;
 use std::sync::mpsc::Receiver;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use quadfrog::realtime::channel::SHOWN_EVERY;
+use quadfrog::engine::Observer;
+use quadfrog::realtime::channel::{SHOWN_EVERY, StopLatch};
 use quadfrog::recording::player::{MarkerKind, Played};
 use quadfrog::recording::record::{LogLevel, LogRecord, Record, Stamped};
 use quadfrog::recording::timeline::{Timeline, TrialRun};
@@ -43,6 +44,10 @@ pub struct ReplayFeed {
     looping: Option<TrialRun>,
     /// Time until the next look at a followed file, ns; none for one that is not followed.
     follow_in_ns: Option<u64>,
+    /// Time since the followed file grew, ns.
+    silent_ns: u64,
+    /// The end of a session that another process runs.
+    observer: Option<Observer>,
     time_ns: u64,
     /// Items read that are later than `time_ns`.
     next: VecDeque<Played>,
@@ -68,6 +73,8 @@ impl ReplayFeed {
             slow_motion: false,
             looping: None,
             follow_in_ns: follow.then_some(FOLLOW_NS),
+            silent_ns: 0,
+            observer: None,
             time_ns: 0,
             next: VecDeque::new(),
             snapshot: Snapshot::default(),
@@ -80,6 +87,15 @@ impl ReplayFeed {
         replay.list();
         replay.jump(if follow { replay.recording.duration_ns() } else { 0 });
         replay
+    }
+
+    /// The same with the session that writes the recording.
+    pub fn with_observer(self, observer: Observer) -> ReplayFeed {
+        ReplayFeed { observer: Some(observer), ..self }
+    }
+
+    pub fn stop_latch(&self) -> Option<StopLatch> {
+        self.observer.as_ref().map(Observer::stop_latch)
     }
 
     pub fn damage(&self) -> DamageWatch {
@@ -201,7 +217,8 @@ impl ReplayFeed {
             slow_motion: self.slow_motion,
             looping: self.looping.map(|span| span.trial),
             present: present.map(|run| run.trial),
-            following: self.follow_in_ns.is_some(),
+            silent_ns: self.follow_in_ns.map(|_| self.silent_ns),
+            observer: self.observer.as_ref().map(Observer::status),
             lost_ns: self.recording.lost_ns(),
         }));
     }
@@ -233,6 +250,7 @@ impl ReplayFeed {
     /// Reads what was appended to a followed file.
     fn follow(&mut self, elapsed_ns: u64, messages: &mut Vec<Msg>) {
         let Some(left_ns) = self.follow_in_ns else { return };
+        self.silent_ns = self.silent_ns.saturating_add(elapsed_ns);
         self.follow_in_ns = Some(left_ns.saturating_sub(elapsed_ns));
         if left_ns > elapsed_ns {
             return;
@@ -240,6 +258,7 @@ impl ReplayFeed {
         self.follow_in_ns = Some(FOLLOW_NS);
         match self.recording.refresh() {
             Ok(true) => {
+                self.silent_ns = 0;
                 self.list();
                 messages.append(&mut self.jumped);
             }

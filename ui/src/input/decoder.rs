@@ -10,6 +10,7 @@ use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 
 use crate::keymap::Key;
 use crate::message::Mouse;
+use crate::theme::Background;
 
 /// One input of the terminal.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -18,6 +19,8 @@ pub enum TerminalEvent {
     Key(Key),
     Paste(String),
     Mouse(Mouse),
+    /// The answer to the question for the background, OSC 11.
+    Background(Background),
 }
 
 /// Longest control sequence, bytes; a longer one is dropped.
@@ -42,6 +45,10 @@ enum State {
     /// Inside a mouse report of the old form, with the number of bytes left.
     OldMouse(u8),
     Paste,
+    /// After ESC ]: the answer to a question about a colour.
+    Report,
+    /// After ESC in such an answer.
+    ReportEnd,
 }
 
 /// Decoder of the terminal's bytes.
@@ -86,7 +93,13 @@ impl Decoder {
             inputs.push(TerminalEvent::Key(key));
             return;
         }
+        self.dispatch(byte, inputs);
+    }
+
+    /// Takes a byte that is no STOP key.
+    fn dispatch(&mut self, byte: u8, inputs: &mut Vec<TerminalEvent>) {
         match self.state {
+            State::Report if byte == 0x1b && !self.bytes.is_empty() => self.state = State::ReportEnd,
             State::Paste => self.paste(byte, inputs),
             // A new sequence ends an unfinished one; two in a row are the key Esc and a sequence.
             _ if byte == 0x1b => {
@@ -100,6 +113,7 @@ impl Decoder {
             State::Escape => match byte {
                 b'[' => self.enter(State::Control),
                 b'O' => self.enter(State::Function),
+                b']' => self.enter(State::Report),
                 _ => {
                     self.reset();
                     self.alt = true;
@@ -119,6 +133,12 @@ impl Decoder {
             State::OldMouse(left) if left > 1 => self.state = State::OldMouse(left - 1),
             State::OldMouse(_) => self.reset(),
             State::Control => self.control(byte, inputs),
+            State::Report => self.report(byte, inputs),
+            State::ReportEnd if byte == b'\\' => self.finish_report(inputs),
+            State::ReportEnd => {
+                self.enter(State::Escape);
+                self.dispatch(byte, inputs);
+            }
         }
     }
 
@@ -128,6 +148,8 @@ impl Decoder {
             State::Escape => inputs.push(TerminalEvent::Key(named(KeyCode::Esc))),
             State::Control if self.bytes.is_empty() => inputs.push(TerminalEvent::Key(alt('['))),
             State::Function => inputs.push(TerminalEvent::Key(alt('O'))),
+            State::Report if self.bytes.is_empty() => inputs.push(TerminalEvent::Key(alt(']'))),
+            State::ReportEnd => inputs.push(TerminalEvent::Key(named(KeyCode::Esc))),
             State::Paste => inputs.push(TerminalEvent::Paste(String::from_utf8_lossy(&self.bytes).into_owned())),
             _ => {}
         }
@@ -251,6 +273,28 @@ impl Decoder {
         }
     }
 
+    /// Collects an answer to OSC. It begins with a number; another byte is a key after Alt-].
+    fn report(&mut self, byte: u8, inputs: &mut Vec<TerminalEvent>) {
+        match byte {
+            _ if self.bytes.is_empty() && !byte.is_ascii_digit() => {
+                inputs.push(TerminalEvent::Key(alt(']')));
+                self.reset();
+                self.dispatch(byte, inputs);
+            }
+            0x07 => self.finish_report(inputs),
+            0x21..=0x7e if self.bytes.len() < LONGEST_SEQUENCE => self.bytes.push(byte),
+            _ => {
+                self.reset();
+                self.ground(byte, inputs);
+            }
+        }
+    }
+
+    fn finish_report(&mut self, inputs: &mut Vec<TerminalEvent>) {
+        inputs.extend(background(&self.bytes).map(TerminalEvent::Background));
+        self.reset();
+    }
+
     fn paste(&mut self, byte: u8, inputs: &mut Vec<TerminalEvent>) {
         self.bytes.push(byte);
         if let Some(text) = self.bytes.strip_suffix(PASTE_END) {
@@ -351,6 +395,20 @@ fn sequence(parameters: &[u8], end: u8) -> Option<TerminalEvent> {
         _ => (letter(end)?, held),
     };
     Some(TerminalEvent::Key(key(code, held)))
+}
+
+/// The background of an answer `11;rgb:R/G/B` or `11;rgba:R/G/B/A`, with 1 to 4 hexadecimal digits for each part (XParseColor).
+fn background(report: &[u8]) -> Option<Background> {
+    let text = std::str::from_utf8(report).ok()?.strip_prefix("11;")?;
+    let parts = text.strip_prefix("rgb:").or_else(|| text.strip_prefix("rgba:"))?;
+    let mut rgb = [0.0; 3];
+    let mut digits = parts.split('/');
+    for part in &mut rgb {
+        let digits = digits.next().filter(|digits| (1..=4).contains(&digits.len()))?;
+        let full_scale = f64::from(16_u32.pow(digits.len() as u32) - 1);
+        *part = f64::from(u32::from_str_radix(digits, 16).ok()?) / full_scale;
+    }
+    Some(Background::of_rgb(rgb))
 }
 
 /// A mouse report of the form `button;column;row`. Moves, releases and other buttons are ignored.

@@ -1,14 +1,16 @@
 //! Samples of the charts: the last minute of telemetry, and a short trace of each trial.
 
 use std::collections::{BTreeMap, VecDeque};
+use std::sync::Arc;
 
-use quadfrog::robot::PerLeg;
+use nalgebra::Vector3;
+use quadfrog::robot::{JOINTS, PerLeg};
 use quadfrog::telemetry::{Phase, Tick};
 
 /// Samples that are kept: a minute at 200 a second.
 const CAPACITY: usize = 12_000;
-/// Traces of trials that are kept; the oldest go first.
-const TRACES: usize = 256;
+/// Traces of trials that are kept; the oldest go first, except that of the best trial.
+const TRACES: usize = 64;
 /// Samples of one trace: ten seconds at 200 a second.
 const TRACE_CAPACITY: usize = 2_000;
 
@@ -41,11 +43,62 @@ pub struct ChartSample {
     pub foot_force: PerLeg<f32>,
     /// Whether each foot is on the ground.
     pub contact: PerLeg<bool>,
+    /// Yaw, rad; full turns count.
+    pub yaw: f32,
+    /// Position of the trunk's origin, world, x and y, m.
+    pub position_world: [f32; 2],
+    /// Velocity of the trunk's origin, world, m/s.
+    pub velocity_world: [f32; 3],
+    /// Angular velocity as the inertial unit measures it, body axes, rad/s.
+    pub gyro_body: [f32; 3],
+    /// Specific force as the inertial unit measures it, body axes, m/s^2.
+    pub accel_body: [f32; 3],
+    pub joints: JointSample,
+}
+
+/// The joints in a sample, FR FL RR RL, hip thigh calf.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct JointSample {
+    /// Angles, rad.
+    pub angle: [f32; JOINTS],
+    /// Desired angles, rad; no number while no stiffness acts on them.
+    pub commanded_angle: [f32; JOINTS],
+    /// Torques as the motors estimate them, N m.
+    pub torque: [f32; JOINTS],
+    /// Torques that the command as sent demands at the measured angles and speeds, N m.
+    pub commanded_torque: [f32; JOINTS],
+    /// Speeds, rad/s.
+    pub speed: [f32; JOINTS],
+    /// Temperatures of the motors, degrees Celsius.
+    pub temperature: [f32; JOINTS],
+}
+
+impl From<&Tick> for JointSample {
+    fn from(tick: &Tick) -> JointSample {
+        let (state, motor) = (&tick.state, &tick.command.motor);
+        let single = |values: &[f64; JOINTS]| values.map(|value| value as f32);
+        let stiff = |joint: usize| motor[joint].kp_joint > 0.0;
+        JointSample {
+            angle: single(&state.joint_position_rad),
+            commanded_angle: std::array::from_fn(|joint| match stiff(joint) {
+                true => motor[joint].position_rad as f32,
+                false => f32::NAN,
+            }),
+            torque: single(&state.joint_torque_n_m),
+            commanded_torque: std::array::from_fn(|joint| {
+                motor[joint].torque_at(state.joint_position_rad[joint], state.joint_velocity_rad_s[joint]) as f32
+            }),
+            speed: single(&state.joint_velocity_rad_s),
+            temperature: single(&state.motor_temperature_c),
+        }
+    }
 }
 
 impl From<&Tick> for ChartSample {
     fn from(tick: &Tick) -> ChartSample {
         let rpy = tick.estimate.roll_pitch_yaw;
+        let (position, imu) = (tick.estimate.position_world, &tick.state.imu);
+        let axes = |v: Vector3<f64>| [v.x as f32, v.y as f32, v.z as f32];
         ChartSample {
             time_ns: tick.time_ns,
             phase: tick.phase,
@@ -53,13 +106,19 @@ impl From<&Tick> for ChartSample {
             trial_time_s: tick.trial_time_s as f32,
             roll: rpy.x as f32,
             pitch: rpy.y as f32,
-            height: tick.estimate.position_world.z as f32,
+            height: position.z as f32,
             lateness_ns: tick.stages.lateness_ns,
             busy_ns: tick.stages.read_ns.saturating_add(tick.stages.decide_ns).saturating_add(tick.stages.write_ns),
             theta: tick.theta_rad as f32,
             foot_z: tick.estimate.foot_position_leg.map(|foot| foot.z as f32),
             foot_force: tick.state.foot_force_n.map(|force| force as f32),
             contact: tick.estimate.contact,
+            yaw: rpy.z as f32,
+            position_world: [position.x as f32, position.y as f32],
+            velocity_world: axes(tick.estimate.velocity_world),
+            gyro_body: axes(imu.gyro_body),
+            accel_body: axes(imu.accel_body),
+            joints: JointSample::from(tick),
         }
     }
 }
@@ -74,7 +133,10 @@ pub fn at_trial_time(trace: &[ChartSample], trial_time_s: f32) -> Option<&ChartS
 #[derive(Debug, Clone, Default)]
 pub struct SignalHistory {
     samples: VecDeque<ChartSample>,
-    traces: BTreeMap<u32, Vec<ChartSample>>,
+    /// Shared with frozen copies of this history.
+    traces: BTreeMap<u32, Arc<Vec<ChartSample>>>,
+    /// The trial whose trace is kept however old it is.
+    kept: Option<u32>,
 }
 
 impl SignalHistory {
@@ -89,7 +151,7 @@ impl SignalHistory {
         }
         self.samples.push_back(sample);
         if let Some(trial) = sample.trial {
-            let trace = self.traces.entry(trial).or_default();
+            let trace = Arc::make_mut(self.traces.entry(trial).or_default());
             // A trial that starts again (a cancelled countdown, a replay) replaces its trace.
             if trace
                 .last()
@@ -101,14 +163,20 @@ impl SignalHistory {
                 trace.push(sample);
             }
             if self.traces.len() > TRACES {
-                self.traces.pop_first();
+                let oldest = self.traces.keys().copied().find(|trial| self.kept != Some(*trial));
+                oldest.map(|trial| self.traces.remove(&trial));
             }
         }
     }
 
+    /// Keeps the trace of a trial, the best, however old it is.
+    pub fn keep(&mut self, trial: Option<u32>) {
+        self.kept = trial;
+    }
+
     /// The samples of one trace.
     pub fn of_trace(trace: &[ChartSample]) -> SignalHistory {
-        SignalHistory { samples: trace.iter().copied().collect(), traces: BTreeMap::new() }
+        SignalHistory { samples: trace.iter().copied().collect(), ..SignalHistory::default() }
     }
 
     /// Clears the samples, not the traces: time has jumped.
@@ -143,7 +211,7 @@ impl SignalHistory {
 
     /// The trace of a trial, countdown to end.
     pub fn trace(&self, trial: u32) -> Option<&[ChartSample]> {
-        self.traces.get(&trial).map(Vec::as_slice)
+        self.traces.get(&trial).map(|trace| trace.as_slice())
     }
 
     /// The trials that have a trace.

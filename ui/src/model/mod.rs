@@ -13,6 +13,7 @@ pub(crate) mod trials;
 
 use std::time::Duration;
 
+use quadfrog::engine::ObserverStatus;
 use quadfrog::recording::live::LiveStatus;
 use quadfrog::recording::record::LogLevel;
 use quadfrog::recording::recorder::RecorderStatus;
@@ -27,7 +28,7 @@ use crate::keymap::Keymap;
 use crate::message::{ReplayStatus, ReplayTimeline};
 use crate::series::Series;
 use crate::settings::{BellCause, ConsoleSettings};
-use crate::theme::Theme;
+use crate::theme::{Background, Theme, ThemeChoice};
 use dialog::{Choice, Dialog};
 use history::SignalHistory;
 use jump_series::JumpSeries;
@@ -75,12 +76,16 @@ pub struct Notice {
 #[expect(missing_docs, reason = "the names say the rest")]
 pub struct Model {
     pub theme: Theme,
+    /// Whether the theme follows the background that the terminal reports.
+    pub follow_background: bool,
     pub keymap: Keymap,
     pub bell: Vec<BellCause>,
     /// Whether Space stops an energised robot in a text field, too.
     pub space_always_stops: bool,
     /// The robot's limits and geometry; none where they are not known.
     pub robot: Option<RobotDescription>,
+    /// Largest roll and pitch before a trial is a fall, rad; none where they are not known.
+    pub fall_tilt_rad: Option<[f64; 2]>,
     /// Time since the console started.
     pub clock: Duration,
     pub session: SessionModel,
@@ -92,6 +97,8 @@ pub struct Model {
     pub recorder: Option<RecorderStatus>,
     /// State of the live view; none without one.
     pub viewers: Option<LiveStatus>,
+    /// Number of observers of this session; none where it cannot be watched.
+    pub observers: Option<usize>,
     /// Wait of the session for the storage of its study.
     pub storage: Option<StorageWait>,
     pub history: SignalHistory,
@@ -125,19 +132,27 @@ pub struct Model {
 
 impl Model {
     /// An empty screen.
-    pub fn new(settings: ConsoleSettings, theme: Theme, robot: Option<RobotDescription>) -> Model {
+    pub fn new(settings: ConsoleSettings, mut theme: Theme, robot: Option<RobotDescription>) -> Model {
+        match settings.theme {
+            ThemeChoice::Auto => {}
+            ThemeChoice::Dark => theme.background = Background::Dark,
+            ThemeChoice::Light => theme.background = Background::Light,
+        }
         Model {
             theme,
+            follow_background: settings.theme == ThemeChoice::Auto,
             keymap: settings.keymap,
             bell: settings.bell,
             space_always_stops: settings.space_always_stops,
             robot,
+            fall_tilt_rad: None,
             clock: Duration::ZERO,
             session: SessionModel::default(),
             snapshot: Snapshot::default(),
             snapshot_at: Duration::ZERO,
             recorder: None,
             viewers: None,
+            observers: None,
             storage: None,
             history: SignalHistory::default(),
             jump_series: JumpSeries::default(),
@@ -174,6 +189,16 @@ impl Model {
     /// The robot's mode, from the newest tick.
     pub fn mode(&self) -> Mode {
         self.snapshot.tick.mode
+    }
+
+    /// The session that another process runs and this console watches; none otherwise.
+    pub fn observer(&self) -> Option<ObserverStatus> {
+        self.replay.as_ref()?.observer
+    }
+
+    /// Whether STOP reaches a robot: not in the replay of a recording, nor after the end of a watched session.
+    pub fn can_stop(&self) -> bool {
+        self.replay.is_none() || self.observer().is_some_and(|observer| !observer.ended)
     }
 
     /// Whether the robot is energised and this console commands it.

@@ -85,7 +85,8 @@ pub struct StudyArguments {
 /// Longest name of an operator, characters.
 const LONGEST_NAME: usize = 100;
 
-fn operator(text: &str) -> Result<String, String> {
+/// Parses the name of an operator.
+pub fn operator(text: &str) -> Result<String, String> {
     let length = text.chars().count();
     if text.trim().is_empty() || length > LONGEST_NAME || text.chars().any(char::is_control) {
         return Err(format!("a name has 1 to {LONGEST_NAME} characters, none of them a control character"));
@@ -93,16 +94,24 @@ fn operator(text: &str) -> Result<String, String> {
     Ok(text.to_owned())
 }
 
+/// Returns the name of the operator: the given one, or else the user's.
+pub fn operator_or_user(given: Option<&String>) -> String {
+    let of_user = || ["USER", "LOGNAME"].iter().find_map(|name| operator(&std::env::var(name).ok()?).ok());
+    given.cloned().or_else(of_user).unwrap_or_else(unknown)
+}
+
+fn unknown() -> String {
+    "unknown".to_owned()
+}
+
 impl StudyArguments {
     /// Returns the origin of a session of this program, on this machine.
     pub fn provenance(&self) -> Provenance {
-        let of_user = || ["USER", "LOGNAME"].iter().find_map(|name| operator(&std::env::var(name).ok()?).ok());
-        let unknown = || "unknown".to_owned();
         let host = std::fs::read_to_string("/proc/sys/kernel/hostname").ok();
         Provenance {
             commit: env!("QUADFROG_COMMIT").to_owned(),
             host: host.and_then(|host| operator(host.trim()).ok()).unwrap_or_else(unknown),
-            operator: self.operator.clone().or_else(of_user).unwrap_or_else(unknown),
+            operator: operator_or_user(self.operator.as_ref()),
         }
     }
 

@@ -18,7 +18,7 @@ use quadfrog_console::feed::Feed;
 use quadfrog_console::put_line;
 use quadfrog_console::settings::ConsoleSettings;
 use quadfrog_console::terminal;
-use quadfrog_console::theme::ColourChoice;
+use quadfrog_console::theme::{ColourChoice, ThemeChoice};
 
 use super::arguments::{self, StudyArguments, one_of};
 use super::failure::Failure;
@@ -32,6 +32,14 @@ fn colour() -> impl TypedValueParser<Value = ColourChoice> {
         (ColourChoice::Indexed, "256", "256 colours"),
         (ColourChoice::True, "true", "24 bits"),
         (ColourChoice::None, "never", "None"),
+    ])
+}
+
+fn theme() -> impl TypedValueParser<Value = ThemeChoice> {
+    one_of([
+        (ThemeChoice::Auto, "auto", "As console.toml says, or as the terminal reports its background"),
+        (ThemeChoice::Dark, "dark", "For a dark background"),
+        (ThemeChoice::Light, "light", "For a light background"),
     ])
 }
 
@@ -64,6 +72,9 @@ pub struct ScreenArguments {
     /// Colours
     #[arg(long, value_name = "WHICH", default_value = "auto", value_parser = colour())]
     pub color: ColourChoice,
+    /// Background that the colours suit
+    #[arg(long, value_name = "WHICH", default_value = "auto", value_parser = theme())]
+    pub theme: ThemeChoice,
     /// Draw fewer frames and colours, for a slow link
     #[arg(long)]
     pub low_bandwidth: bool,
@@ -118,7 +129,9 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
     if let (Some(text), Some(network)) = (&arguments.address, &mut network) {
         network.address = address(text)?;
     }
-    let console = options(&arguments.screen, &config)?.with_robot(robot.clone());
+    let console = options(&arguments.screen, &config)?
+        .with_robot(robot.clone())
+        .with_fall_tilt_rad([config.safety.fall.roll_rad, config.safety.fall.pitch_rad]);
     let selected = match &arguments.resume {
         Some(folder) => study_to_continue(folder, arguments.task, arguments.seed, &robot)?,
         None => {
@@ -204,5 +217,5 @@ pub fn options(screen: &ScreenArguments, config: &Config) -> Result<ConsoleOptio
     let settings = ConsoleSettings::from_table(&config.console)
         .map_err(|error| config.refuse("console.toml", &error.key, &error.value, &error.reason))?;
     let colours = (screen.color != ColourChoice::Auto).then_some(screen.color);
-    Ok(ConsoleOptions::new(settings, colours, screen.ascii, screen.low_bandwidth))
+    Ok(ConsoleOptions::new(settings, colours, screen.theme, screen.ascii, screen.low_bandwidth))
 }

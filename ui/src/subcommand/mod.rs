@@ -2,6 +2,7 @@
 
 mod arguments;
 mod ask_tell;
+mod attach;
 mod bench;
 mod console;
 mod doctor;
@@ -56,6 +57,10 @@ enum Subcommands {
     Reproduce(reproduce::ReproduceArguments),
     /// Play a recorded session in the console's panels
     Replay(replay::ReplayArguments),
+    /// Watch a session that runs on this machine, with STOP
+    Attach(attach::AttachArguments),
+    /// List the sessions that run on this machine under this user
+    Sessions,
     /// Judge recorded trials by another configuration, old beside new
     Rejudge(rejudge::RejudgeArguments),
     /// Export the signals of a recording as CSV, JSON or Parquet
@@ -90,6 +95,8 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
         Some(Subcommands::Evaluate(evaluate)) => evaluate::run(&evaluate),
         Some(Subcommands::Reproduce(reproduce)) => reproduce::run(&reproduce),
         Some(Subcommands::Replay(replay)) => replay::run(&replay),
+        Some(Subcommands::Attach(attach)) => attach::run(&attach),
+        Some(Subcommands::Sessions) => attach::list(),
         Some(Subcommands::Rejudge(rejudge)) => rejudge::run(&rejudge),
         Some(Subcommands::Export(export)) => export::run(&export),
         Some(Subcommands::Recover(recover)) => recover::run(&recover),

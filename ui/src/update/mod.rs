@@ -43,6 +43,8 @@ pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
             // The frame, the tabs, a heading and the two lines below are not part of a page.
             model.page = usize::from(rows.saturating_sub(7)).max(1);
         }
+        Msg::Background(background) if model.follow_background => model.theme.background = background,
+        Msg::Background(_) => {}
         Msg::Paste(text) => paste(model, &text),
         Msg::Snapshot(snapshot) => {
             // The newest tick is read again until there is another: only that is news.
@@ -55,6 +57,7 @@ pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
         }
         Msg::Recorder(status) => model.recorder = Some(status),
         Msg::Viewers(status) => model.viewers = Some(status),
+        Msg::Observers(count) => model.observers = Some(count),
         Msg::Storage(wait) => model.storage = wait,
         Msg::Tick(tick) => {
             model.jump_series.push(&tick);

@@ -12,7 +12,7 @@ use crate::model::comparison::Comparison;
 use crate::model::live::Panel;
 use crate::model::trials::SortBy;
 use crate::model::{Model, View};
-use crate::series::Series;
+use crate::series::SETS;
 use crate::settings::ChartMode;
 
 /// Moves through the rows of the open view; `isize::MIN` and `MAX` go to the ends.
@@ -163,14 +163,18 @@ fn second_ghost(model: &mut Model, a: u32) -> String {
     }
 }
 
-/// The next set of series: attitude and feet, forces, joints.
+/// The next set of series: attitude and feet, forces, motion of the trunk, torques of the joints, and the joints in numbers.
 pub(super) fn next_series(model: &mut Model) {
     let live = &mut model.live;
-    (live.panel, live.series) = match (live.panel, live.series == Series::ATTITUDE) {
-        (Panel::Charts, true) => (Panel::Charts, Series::FORCES.to_vec()),
-        (Panel::Charts, false) if live.series == Series::FORCES => (Panel::Joints, live.series.clone()),
-        _ => (Panel::Charts, Series::ATTITUDE.to_vec()),
+    let shown = SETS.iter().position(|set| live.series == *set);
+    let next = match (live.panel, shown) {
+        (Panel::Charts, Some(set)) => SETS.get(set + 1),
+        _ => SETS.first(),
     };
+    match next {
+        Some(set) => (live.panel, live.series) = (Panel::Charts, set.to_vec()),
+        None => live.panel = Panel::Joints,
+    }
 }
 
 pub(super) fn next_mode(model: &mut Model) {

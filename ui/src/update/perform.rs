@@ -17,6 +17,7 @@ use crate::message::{Effect, ExportedRows, ReplayCommand, ReplayStep};
 use crate::model::dialog::{Choice, Dialog, OverrideForm, Purpose, Question};
 use crate::model::{Model, View};
 use crate::text::report;
+use crate::theme::Background;
 
 /// Performs an action, or reports why it is not possible.
 pub(super) fn perform(model: &mut Model, action: Action) -> Vec<Effect> {
@@ -162,6 +163,16 @@ pub(super) fn perform(model: &mut Model, action: Action) -> Vec<Effect> {
         Action::Report => {
             let lines = report(&model.session);
             open(model, Dialog::Report { lines, scroll: 0 });
+        }
+        Action::Theme => {
+            model.follow_background = false;
+            let (background, text) = match model.theme.background {
+                Background::Dark => (Background::Light, "colours for a light background"),
+                Background::Light => (Background::Dark, "colours for a dark background"),
+            };
+            model.theme.background = background;
+            say(model, LogLevel::Info, text);
+            return vec![Effect::Redraw];
         }
         Action::Mouse => {
             model.mouse = !model.mouse;

@@ -120,6 +120,7 @@ pub(super) fn apply(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
             log_trial(model, time_ns, &trial);
             let number = trial.trial;
             model.session.trials.records.insert(number, trial);
+            model.history.keep(model.session.trials.best().map(|best| best.trial));
             if model.session.under_review().is_some_and(|trial| trial.trial == number && trial.hand_value.is_none()) {
                 say_suggestion(model, number);
             }

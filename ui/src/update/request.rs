@@ -46,6 +46,17 @@ pub(super) fn request(model: &mut Model, request: OperatorRequest) -> Vec<Effect
 
 /// Stops the robot. The dialog closes, so that the robot is visible; a half-written text stays.
 pub(super) fn stop(model: &mut Model) -> Vec<Effect> {
+    match model.observer() {
+        Some(observer) if observer.ended => {
+            say(model, LogLevel::Error, "the session has ended: its robot cannot be stopped from here");
+            return Vec::new();
+        }
+        Some(_) => {
+            say_stop(model, "STOP demanded from the session");
+            return vec![Effect::Stop];
+        }
+        None => {}
+    }
     if model.replay.is_some() {
         say(model, LogLevel::Info, "this is a replay: there is no robot to stop");
         return Vec::new();

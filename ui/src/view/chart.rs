@@ -22,6 +22,20 @@ pub struct TimeAxis {
     pub newest_ns: u64,
 }
 
+/// Columns of a vertical axis with its values.
+const AXIS: u16 = 6;
+
+/// Columns of the vertical axis of a chart; a narrow chart has none, and its range in the heading.
+fn axis_width(width: u16) -> u16 {
+    if width >= 30 { AXIS } else { 0 }
+}
+
+/// The part of a chart's area in which the curves are.
+pub fn plot_columns(area: Rect) -> Rect {
+    let axis = axis_width(area.width);
+    Rect { x: area.x + axis, width: area.width - axis, ..area }
+}
+
 /// Share of the window that stays empty before the sweep's cursor, so that new and old do not touch.
 const GAP: f64 = 0.06;
 
@@ -73,16 +87,24 @@ impl Chart<'_> {
         if area.height < 2 || area.width < 8 {
             return;
         }
-        let plot = Rect { y: area.y + 1, height: area.height - 1, ..area };
+        let plot = plot_columns(Rect { y: area.y + 1, height: area.height - 1, ..area });
         let (low, high) = self.range();
         self.draw_heading(buffer, Rect { height: 1, ..area }, (low, high));
+        if axis_width(area.width) > 0 {
+            self.draw_ticks(buffer, plot, (low, high));
+        }
         self.draw_zero(buffer, plot, (low, high));
+        self.draw_limits(buffer, plot, (low, high));
         if let Some(ghost) = self.ghost {
             self.draw_ghost(buffer, plot, ghost, (low, high));
         }
+        let commanded = self.history.window(self.axis.window_ns);
+        let commanded = commanded.filter_map(|sample| Some((sample.time_ns, self.style.commanded(sample)?)));
         let mut dots = DotGrid::new(plot, self.theme.glyphs);
-        let samples =
-            self.history.window(self.axis.window_ns).map(|sample| (sample.time_ns, (self.style.value)(sample)));
+        self.trace(&mut dots, commanded, (low, high), true);
+        dots.draw(buffer, plot, self.theme.style(Role::Ghost));
+        let mut dots = DotGrid::new(plot, self.theme.glyphs);
+        let samples = self.history.window(self.axis.window_ns).map(|sample| (sample.time_ns, self.style.value(sample)));
         self.trace(&mut dots, samples, (low, high), false);
         dots.draw(buffer, plot, self.theme.style(self.style.role));
         self.shade(buffer, plot);
@@ -92,13 +114,44 @@ impl Chart<'_> {
     /// The first of the series' ranges that holds what is drawn.
     fn range(&self) -> (f32, f32) {
         let ghost = self.ghost.iter().flat_map(|ghost| ghost.trace);
-        let values = self.history.window(self.axis.window_ns).chain(ghost).map(|sample| (self.style.value)(sample));
+        let samples = self.history.window(self.axis.window_ns).chain(ghost);
+        let values = samples.flat_map(|sample| [Some(self.style.value(sample)), self.style.commanded(sample)]);
         let (low, high) = values
+            .flatten()
             .filter(|value| value.is_finite())
             .fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
         let ranges = self.style.ranges;
         let widest = ranges.last().copied().unwrap_or((-1.0, 1.0));
         ranges.iter().find(|range| low >= range.0 && high <= range.1).copied().unwrap_or(widest)
+    }
+
+    /// The values at the ends and in the middle of the vertical axis.
+    fn draw_ticks(&self, buffer: &mut Buffer, plot: Rect, (low, high): (f32, f32)) {
+        let x = plot.x.saturating_sub(AXIS);
+        let mut tick = |row: u16, value: f32| {
+            let digits = format!("{value:.2}");
+            let digits = digits.trim_end_matches('0').trim_end_matches('.');
+            let text = format!("{digits:>width$}", width = usize::from(AXIS) - 1);
+            buffer.set_string(x, plot.y + row, text, self.theme.style(Role::Quiet));
+        };
+        tick(0, high);
+        if plot.height > 1 {
+            tick(plot.height - 1, low);
+        }
+        // An even number of rows has no middle one.
+        if plot.height % 2 == 1 && plot.height > 2 {
+            tick(plot.height / 2, (low + high) / 2.0);
+        }
+    }
+
+    /// Lines at the limits that lie within the axis; they stay below the curve.
+    fn draw_limits(&self, buffer: &mut Buffer, plot: Rect, (low, high): (f32, f32)) {
+        for limit in self.style.limits.into_iter().filter(|limit| (low..=high).contains(limit)) {
+            let row = (((high - limit) / (high - low) * f32::from(plot.height)) as u16).min(plot.height - 1);
+            for x in (plot.x..plot.right()).step_by(2) {
+                buffer.set_string(x, plot.y + row, self.theme.limit(), self.theme.style(Role::Bad));
+            }
+        }
     }
 
     /// A dotted line at zero where zero is the middle; it stays below the curve.
@@ -156,14 +209,14 @@ impl Chart<'_> {
         }
         let range = if low == -high { format!("{}{high}", theme.plus_minus()) } else { format!("{low} to {high}") };
         let range_width = range.chars().count();
-        if used + range_width + 2 <= width {
+        if used + range_width + 2 <= width && axis_width(area.width) == 0 {
             buffer.set_string(area.right() - range_width as u16, area.y, range, theme.style(Role::Quiet));
         }
     }
 
     /// The value to some decimals, or none from 100 on.
     fn number(&self, sample: &ChartSample, decimals: usize) -> String {
-        let value = (self.style.value)(sample);
+        let value = self.style.value(sample);
         // Otherwise the text would alternate between -0.000 and +0.000.
         let value = if value.abs() < 0.5 * 0.1_f32.powi(decimals as i32) { 0.0 } else { value };
         if value.abs() >= 100.0 { format!("{value:+.0}") } else { format!("{value:+.decimals$}") }
@@ -204,7 +257,7 @@ impl Chart<'_> {
         let points = ghost
             .trace
             .iter()
-            .map(|sample| (time_after(ghost.start_ns, sample.trial_time_s), (self.style.value)(sample)));
+            .map(|sample| (time_after(ghost.start_ns, sample.trial_time_s), self.style.value(sample)));
         self.trace(&mut dots, points, range, ghost.named);
         dots.draw(buffer, plot, self.theme.style(ghost.role));
     }
@@ -228,6 +281,36 @@ impl Chart<'_> {
         let Some(column) = column else { return };
         for y in plot.y..plot.bottom() {
             buffer.set_string(plot.x + column as u16, y, self.theme.bar(), self.theme.style(role));
+        }
+    }
+}
+
+/// Distances of the marks on the time axis, s, and columns between two of them at least.
+const STEPS_S: [f64; 8] = [0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0];
+const STEP_COLUMNS: f64 = 6.0;
+
+/// Draws the marks of the time axis, s: of a sweep from the left end, else from `origin_ns`, without one from the newest sample.
+pub fn draw_time_axis(buffer: &mut Buffer, area: Rect, axis: &TimeAxis, origin_ns: Option<u64>, theme: &Theme) {
+    let window_s = axis.window_ns as f64 / 1e9;
+    let least_s = STEP_COLUMNS * window_s / f64::from(area.width.max(1));
+    let step_s = STEPS_S.into_iter().find(|step| *step >= least_s).unwrap_or(window_s);
+    let newest_s = match (axis.mode, origin_ns) {
+        (ChartMode::Sweep, _) => window_s,
+        (ChartMode::Scroll, Some(origin_ns)) => (axis.newest_ns as f64 - origin_ns as f64) / 1e9,
+        (ChartMode::Scroll, None) => 0.0,
+    };
+    let first_s = newest_s - window_s;
+    let decimals = usize::from(step_s < 1.0);
+    let mut free = area.x;
+    for mark in (first_s / step_s).ceil() as i64..=(newest_s / step_s).floor() as i64 {
+        let time_s = mark as f64 * step_s;
+        let column = (time_s - first_s) / window_s * f64::from(area.width);
+        let unit = if mark == 0 { " s" } else { "" };
+        let text = format!("{time_s:.decimals$}{unit}");
+        let x = area.x + (column as u16).min(area.width.saturating_sub(text.len() as u16));
+        if x >= free && x + text.len() as u16 <= area.right() {
+            buffer.set_string(x, area.y, &text, theme.style(Role::Quiet));
+            free = x + text.len() as u16 + 1;
         }
     }
 }

@@ -1,75 +1,117 @@
-//! TPE's two densities along a parameter, l(x) of the good trials and g(x) of the others, with the proposed value: TPE
-//! proposes where l is high and g is low.
+//! The reason for the proposed value of a parameter. TPE: the density of the good trials and that of the rest; it proposes where the
+//! first is high and the second is low. A sampler with a model of the objective: its mean and standard deviation at the
+//! points of the finished trials.
 
-use quadfrog::trial::ProposalInsight;
+use quadfrog::trial::{ParameterInfo, ParameterInsight, ProposalInsight};
 use ratatui::Frame;
-use ratatui::layout::{Constraint, Layout, Rect};
+use ratatui::layout::Rect;
 
 use super::dots::DotGrid;
-use super::draw::{cell_at, heading, number, truncate};
+use super::draw::{cell_at, heading, truncate};
+use super::parameter_axes::ParameterAxes;
+use crate::model::session::SessionModel;
 use crate::theme::{Role, Theme};
 
-pub fn render(frame: &mut Frame, area: Rect, insight: Option<&ProposalInsight>, name: &str, theme: &Theme) {
-    let title = match insight {
-        Some(insight) if area.width >= 58 => format!("TPE density of {name} (#{}): l good, g rest", insight.trial),
-        Some(insight) if area.width >= 36 => format!("TPE {name} (#{})", insight.trial),
-        _ => format!("TPE {name}"),
-    };
-    let reason = match insight {
-        Some(insight) if !insight.predicted.is_empty() => "the sampler's model has no densities",
-        Some(_) => "sampled without a model",
-        None => "no proposal yet",
-    };
-    let insight = insight.and_then(|insight| insight.parameters.iter().find(|p| p.name == *name));
-    let importance = insight.and_then(|insight| insight.importance);
+pub fn render(frame: &mut Frame, area: Rect, session: &SessionModel, info: &ParameterInfo, theme: &Theme) {
+    let insight = session.insight.as_ref();
+    let modelled = insight.is_some_and(|insight| !insight.predicted.is_empty());
+    let parameter = insight.and_then(|insight| insight.parameters.iter().find(|p| p.name == info.name));
+    let importance = parameter.and_then(|parameter| parameter.importance);
     let aside = importance.map_or(String::new(), |share| format!("importance {:.0} %", share * 100.0));
-    let body = heading(frame, area, theme, &title, &aside);
-    let [plot, scale] = Layout::vertical([Constraint::Fill(1), Constraint::Length(1)]).areas(body);
-    if plot.height < 2 || plot.width < 8 {
-        return;
-    }
-    let Some(insight) = insight.filter(|insight| insight.at.len() > 1) else {
-        let text = truncate(reason, usize::from(plot.width));
-        frame.buffer_mut().set_string(plot.x, plot.y, text, theme.style(Role::Quiet));
-        return;
+    let body = heading(frame, area, theme, &title(insight, modelled, &info.name, area.width), &aside);
+    let drawn = match insight {
+        Some(insight) if modelled => render_prediction(frame, body, session, insight, info, theme),
+        _ => parameter.is_some_and(|parameter| render_densities(frame, body, parameter, info, theme)),
     };
-    let (low, high) = (insight.at[0], insight.at[insight.at.len() - 1]);
-    let top = insight.good.iter().chain(&insight.bad).copied().fold(0.0, f64::max);
+    if !drawn && body.height > 0 {
+        let reason = if insight.is_some() { "sampled without a model" } else { "no proposal yet" };
+        let text = truncate(reason, usize::from(body.width));
+        frame.buffer_mut().set_string(body.x, body.y, text, theme.style(Role::Quiet));
+    }
+}
+
+/// The longest title for which there is room.
+fn title(insight: Option<&ProposalInsight>, modelled: bool, name: &str, width: u16) -> String {
+    let trial = insight.map(|insight| insight.trial);
+    match (trial, modelled, width) {
+        (Some(trial), false, 58..) => format!("TPE densities of {name} (#{trial}): good and rest"),
+        (Some(trial), false, 36..) => format!("TPE {name} (#{trial})"),
+        (_, false, _) => format!("TPE {name}"),
+        (Some(trial), true, 58..) => format!("Predicted J over {name} (#{trial}): mean and deviation"),
+        (_, true, 36..) => format!("Predicted J over {name}"),
+        (_, true, _) => format!("Model {name}"),
+    }
+}
+
+/// Mean and one standard deviation to both sides at each finished trial's value of the parameter.
+fn render_prediction(
+    frame: &mut Frame,
+    area: Rect,
+    session: &SessionModel,
+    insight: &ProposalInsight,
+    info: &ParameterInfo,
+    theme: &Theme,
+) -> bool {
+    let ends = insight.predicted.iter().flat_map(|p| [p.value - p.deviation, p.value + p.deviation]);
+    let (low, high) = ends.fold((0.0_f64, 1e-3_f64), |(low, high), value| (low.min(value), high.max(value)));
+    let Some(axes) = ParameterAxes::new(info, area, (low, high)) else { return false };
     let buffer = frame.buffer_mut();
+    let proposed = insight.parameters.iter().find(|p| p.name == info.name).map(|p| p.proposed);
+    axes.draw(buffer, proposed, theme);
+    let points = || {
+        insight.predicted.iter().filter_map(|predicted| {
+            let trial = session.trials.records.get(&predicted.trial)?;
+            Some((axes.column(trial.parameters.get(&info.name)?), predicted))
+        })
+    };
+    for (column, predicted) in points() {
+        for y in axes.row(predicted.value + predicted.deviation)..=axes.row(predicted.value - predicted.deviation) {
+            buffer.set_string(column, y, theme.bar(), theme.style(Role::Quiet));
+        }
+    }
+    // The best by the model last: its repeats lie at the same place.
+    for best in [false, true] {
+        for (column, predicted) in points().filter(|(_, p)| (insight.best == Some(p.trial)) == best) {
+            let symbol = if best { "*" } else { "o" };
+            buffer.set_string(column, axes.row(predicted.value), symbol, theme.style(Role::SeriesA));
+        }
+    }
+    true
+}
+
+fn render_densities(
+    frame: &mut Frame,
+    area: Rect,
+    insight: &ParameterInsight,
+    info: &ParameterInfo,
+    theme: &Theme,
+) -> bool {
+    if insight.at.len() < 2 {
+        return false;
+    }
+    let top = insight.good.iter().chain(&insight.bad).copied().fold(0.0, f64::max).max(f64::MIN_POSITIVE);
+    let Some(axes) = ParameterAxes::new(info, area, (0.0, top)) else { return false };
+    let (buffer, plot) = (frame.buffer_mut(), axes.plot);
     // Before the first trials both equal the prior.
-    let equal = insight.good.iter().zip(&insight.bad).all(|(l, g)| (l - g).abs() <= 1e-9 * top);
-    let good_label = if equal { "l = g" } else { "l" };
-    let curves = [(&insight.bad, Role::SeriesB, "g"), (&insight.good, Role::Good, good_label)];
+    let equal = insight.good.iter().zip(&insight.bad).all(|(good, rest)| (good - rest).abs() <= 1e-9 * top);
+    let good_label = if equal { "good = rest" } else { "good" };
+    let curves = [(&insight.bad, Role::SeriesB, "rest"), (&insight.good, Role::Good, good_label)];
     for (density, role, _) in curves {
         let mut dots = DotGrid::new(plot, theme.glyphs);
         let (across, down) = (dots.size.0 as f64 - 1.0, dots.size.1 as f64 - 1.0);
-        let place = |(x, y): (f64, f64)| ((x - low) / (high - low) * across, (1.0 - y / top) * down);
+        let place = |(x, y): (f64, f64)| (axes.share(x) * across, (1.0 - y / top) * down);
         let points: Vec<(f64, f64)> = insight.at.iter().copied().zip(density.iter().copied()).map(place).collect();
-        if top > 0.0 {
-            points.windows(2).for_each(|pair| dots.line(pair[0], pair[1]));
-        }
+        points.windows(2).for_each(|pair| dots.line(pair[0], pair[1]));
         dots.draw(buffer, plot, theme.style(role));
     }
-    let column = cell_at((insight.proposed - low) / (high - low), plot.width);
-    for y in plot.y..plot.bottom() {
-        buffer.set_string(plot.x + column, y, theme.bar(), theme.style(Role::Key));
-    }
-    // A letter at each curve's peak distinguishes the curves without colours.
+    axes.draw(buffer, Some(insight.proposed), theme);
+    // A word at each curve's peak distinguishes the curves without colours.
     for (density, role, label) in curves {
         let Some((x, y)) = insight.at.iter().zip(density).max_by(|a, b| a.1.total_cmp(b.1)) else { continue };
-        let column = cell_at((x - low) / (high - low), plot.width).min(plot.width.saturating_sub(label.len() as u16));
-        let row = cell_at(1.0 - y / top.max(f64::MIN_POSITIVE), plot.height);
-        buffer.set_string(plot.x + column, plot.y + row, label, theme.style(role));
+        let length = label.len() as u16;
+        let column = axes.column(*x).min(plot.right().saturating_sub(length)).max(plot.x);
+        let row = plot.y + cell_at(1.0 - y / top, plot.height);
+        buffer.set_string(column, row, truncate(label, usize::from(plot.width)), theme.style(role));
     }
-    let (left, right) = (number(low), number(high));
-    buffer.set_string(scale.x, scale.y, &left, theme.style(Role::Quiet));
-    let at = scale.right().saturating_sub(right.len() as u16);
-    buffer.set_string(at, scale.y, &right, theme.style(Role::Quiet));
-    let now = number(insight.proposed);
-    let free = scale.width.saturating_sub((left.len() + right.len() + now.len()) as u16 + 2);
-    if free > 0 {
-        let x = (scale.x + column).saturating_sub(now.len() as u16 / 2);
-        let x = x.clamp(scale.x + left.len() as u16 + 1, at.saturating_sub(now.len() as u16 + 1));
-        buffer.set_string(x, scale.y, now, theme.style(Role::Key));
-    }
+    true
 }

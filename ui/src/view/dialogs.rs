@@ -287,6 +287,7 @@ fn render_choice(frame: &mut Frame, area: Rect, model: &Model, subject: Choice, 
         Choice::Columns => "Columns of the trial table",
     };
     let rows = model.choices(subject);
+    let name_width = rows.iter().map(|(name, ..)| name.chars().count()).max().unwrap_or_default().max(11);
     let inner = open_box(frame, area, model, title, 66, rows.len() as u16 + 2);
     // A terminal that is too low shows the lines around the chosen one.
     let first = (selected + 1).saturating_sub(usize::from(inner.height));
@@ -295,7 +296,7 @@ fn render_choice(frame: &mut Frame, area: Rect, model: &Model, subject: Choice, 
     {
         let area = Rect { y: inner.y + line as u16, height: 1, ..inner };
         let symbol = if *on { "[x]" } else { "[ ]" };
-        let text = truncate(&format!("{symbol} {name:<11} {help}"), usize::from(inner.width));
+        let text = truncate(&format!("{symbol} {name:<name_width$} {help}"), usize::from(inner.width));
         let role = match (index == selected, on) {
             (true, _) => Role::Selected,
             (false, true) => Role::Text,

@@ -148,6 +148,9 @@ fn recorder_rows(model: &Model) -> Vec<HealthRow> {
     if let Some(LiveStatus { address, viewers, dropped }) = model.viewers {
         rows.push(row("live view", format!("{address}, {viewers} viewers, {dropped} messages left out"), false));
     }
+    if let Some(observers) = model.observers {
+        rows.push(row("observers", format!("{observers} with quadfrog attach"), false));
+    }
     rows
 }
 

@@ -7,7 +7,7 @@ use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
 
-use super::chart::{Chart, Ghost, TimeAxis, draw_phases, phases};
+use super::chart::{Chart, Ghost, TimeAxis, draw_phases, draw_time_axis, phases, plot_columns};
 use super::draw::{bar, heading, span};
 use super::series_style::style;
 use super::{beside, objective, proposal, trials, wireframe};
@@ -24,6 +24,10 @@ const SIDE: u16 = 32;
 const WIDE: u16 = 120;
 /// Rows of a chart with its heading, at least.
 const CHART_ROWS: u16 = 3;
+/// Rows of the charts from which the time axis has one of its own.
+const TIMES_FROM_ROWS: u16 = 16;
+/// Columns of the joints' panel from which two joints stand side by side.
+const TWO_JOINTS_FROM: u16 = 72;
 
 pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let joints_only = model.live.panel == Panel::Joints;
@@ -54,7 +58,8 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     if joints_only {
         render_joints(frame, charts, model);
     } else if area.width >= WIDE && charts.height >= 24 {
-        let [charts, joints] = Layout::vertical([Constraint::Fill(1), Constraint::Length(9)]).areas(charts);
+        let joint_rows = JOINTS as u16 / if charts.width >= TWO_JOINTS_FROM { 2 } else { 1 } + 1;
+        let [charts, joints] = Layout::vertical([Constraint::Fill(1), Constraint::Length(joint_rows)]).areas(charts);
         render_charts(frame, charts, model);
         render_joints(frame, joints, model);
     } else {
@@ -133,18 +138,23 @@ impl<'a> ChartSource<'a> {
 
 fn render_charts(frame: &mut Frame, area: Rect, model: &Model) {
     let theme = model.theme;
-    let [charts, strip] = Layout::vertical([Constraint::Fill(1), Constraint::Length(1)]).areas(area);
+    let times_rows = u16::from(area.height >= TIMES_FROM_ROWS);
+    let [charts, strip, times] =
+        Layout::vertical([Constraint::Fill(1), Constraint::Length(1), Constraint::Length(times_rows)]).areas(area);
     let source = ChartSource::of(model);
     let series = &model.live.series;
     let across = if series.len() == 1 { 1 } else { 2 };
     let down = series.len().div_ceil(across).min(usize::from(charts.height / CHART_ROWS)).max(1);
     let columns = |area: Rect| Layout::horizontal(vec![Constraint::Fill(1); across]).spacing(1).split(area);
-    let of_columns: Vec<_> =
-        columns(strip).iter().map(|cell| (*cell, phases(&source.axis, &source.history, cell.width))).collect();
+    let of_columns: Vec<_> = columns(strip)
+        .iter()
+        .map(|cell| plot_columns(*cell))
+        .map(|cell| (cell, phases(&source.axis, &source.history, cell.width)))
+        .collect();
     let rows = Layout::vertical(vec![Constraint::Fill(1); down]).split(charts);
     for (index, series) in series.iter().enumerate().take(across * down) {
         let chart = Chart {
-            style: style(*series),
+            style: style(*series, model),
             axis: source.axis,
             history: &source.history,
             phases: &of_columns[index % across].1,
@@ -157,6 +167,14 @@ fn render_charts(frame: &mut Frame, area: Rect, model: &Model) {
     }
     for (cell, phases) in &of_columns {
         draw_phases(frame.buffer_mut(), *cell, phases, &theme);
+    }
+    if times_rows > 0 {
+        // Two trials, and the landed one, count from the begin of the impulse.
+        let compared = source.ghost.filter(|_| source.cursor_ns.is_some()).map(|ghost| ghost.start_ns);
+        let origin_ns = model.landed().map(|landed| landed.start_ns).or(compared);
+        for cell in columns(times).iter() {
+            draw_time_axis(frame.buffer_mut(), plot_columns(*cell), &source.axis, origin_ns, &theme);
+        }
     }
     render_axis(frame, strip, model, series.len().saturating_sub(across * down));
 }
@@ -212,7 +230,7 @@ fn render_joints(frame: &mut Frame, area: Rect, model: &Model) {
         return;
     };
     // Two legs beside the other two where the bars stay long enough to read.
-    let across = if body.width >= 90 { 2 } else { 1 };
+    let across = if body.width >= TWO_JOINTS_FROM { 2 } else { 1 };
     let columns = Layout::horizontal(vec![Constraint::Fill(1); across]).spacing(2).split(body);
     let down = JOINTS / across;
     for joint in 0..JOINTS {
@@ -228,9 +246,14 @@ fn render_joints(frame: &mut Frame, area: Rect, model: &Model) {
         let limited = if tick.limited & (1 << joint) != 0 { "!" } else { " " };
         let mut spans = vec![span(theme, Role::Quiet, format!("{:<9}", joint_name(joint)))];
         spans.extend(bar(theme, torque / limits.max_torque[joint], width));
-        spans.push(Span::raw(format!("{torque:6.1}{limited} ")));
+        spans.push(Span::raw(format!("{:6.1}{limited} ", without_sign_of_zero(torque))));
         spans.extend(bar(theme, speed / limits.max_velocity[joint], width));
-        spans.push(Span::raw(format!("{speed:6.1}")));
+        spans.push(Span::raw(format!("{:6.1}", without_sign_of_zero(speed))));
         frame.render_widget(Line::from(spans), Rect { y: column.y + row, height: 1, ..column });
     }
+}
+
+/// The value as one decimal shows it, never -0.0.
+fn without_sign_of_zero(value: f64) -> f64 {
+    if value.abs() < 0.05 { 0.0 } else { value }
 }

@@ -29,6 +29,7 @@ pub mod next_step;
 mod objective;
 mod optimizer;
 mod overrides;
+mod parameter_axes;
 mod points;
 mod proposal;
 mod questions;

@@ -155,6 +155,17 @@ fn review(model: &Model) -> NextStep {
 }
 
 fn replay(model: &Model) -> NextStep {
+    if let Some(observer) = model.observer() {
+        let lead = match observer.ended {
+            true => "The session has ended. STOP does not reach its robot any longer.",
+            false => "Watching, about 1 s behind. STOP reaches the robot of this session at once.",
+        };
+        return step(
+            lead,
+            model,
+            &[(Action::PlayPause, "pause or play"), (Action::ReplayEnd, "newest"), (Action::Quit, "quit")],
+        );
+    }
     let playing = model.replay.as_ref().is_some_and(|replay| replay.playing);
     let key = model.keymap.key(Action::PlayPause);
     step(

@@ -2,7 +2,7 @@
 
 use quadfrog::trial::{PredictedTrial, TrialRecord, Verdict};
 use ratatui::Frame;
-use ratatui::layout::Rect;
+use ratatui::layout::{Constraint, Layout, Rect};
 
 use super::draw::{cell_at, heading, number, sign};
 use crate::model::session::SessionModel;
@@ -10,6 +10,8 @@ use crate::model::trials::accepted_value;
 use crate::theme::{Role, Theme};
 
 const SCALE: u16 = 6;
+/// Rows of the plot from which the numbers of the trials have one.
+const NUMBERS_FROM_ROWS: u16 = 6;
 
 pub fn render(frame: &mut Frame, area: Rect, session: &SessionModel, theme: &Theme) {
     let best = session.trials.best();
@@ -21,6 +23,8 @@ pub fn render(frame: &mut Frame, area: Rect, session: &SessionModel, theme: &The
         None => "no value yet".to_owned(),
     };
     let plot = heading(frame, area, theme, "J over trials", &aside);
+    let numbers = u16::from(plot.height >= NUMBERS_FROM_ROWS);
+    let [plot, trials] = Layout::vertical([Constraint::Fill(1), Constraint::Length(numbers)]).areas(plot);
     if plot.height < 2 || plot.width <= SCALE || session.trials.records.is_empty() {
         return;
     }
@@ -34,12 +38,17 @@ pub fn render(frame: &mut Frame, area: Rect, session: &SessionModel, theme: &The
     let last = session.trials.records.keys().next_back().map_or(0, |trial| trial + 1);
     let slots = usize::try_from(last.max(session.budget()).max(1)).unwrap_or(1);
     let width = usize::from(plot.width - SCALE);
-    // Whole columns per trial while they fit, so that the distance between points does not wobble.
+    // From the left to the right end of the plot.
     let column = |trial: u32| {
-        let at = if slots <= width { trial as usize * (width / slots) } else { trial as usize * width / slots };
+        let at = trial as usize * (width - 1) / slots.saturating_sub(1).max(1);
         plot.x + SCALE + at.min(width - 1) as u16
     };
     let row = |value: f64| plot.y + cell_at((high - value) / (high - low), plot.height);
+    if numbers > 0 {
+        let last = format!("#{}", slots - 1);
+        buffer.set_string(plot.x + SCALE, trials.y, "#0", theme.style(Role::Quiet));
+        buffer.set_string(trials.right().saturating_sub(last.len() as u16), trials.y, last, theme.style(Role::Quiet));
+    }
     // Best so far: a level line from each new best to the next.
     let bests: Vec<&TrialRecord> = session.trials.best_so_far().collect();
     for (index, trial) in bests.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! View 3, Optimizer: objective over trials and parameters, TPE's densities, landing places.
+//! View 3, Optimizer: objective over trials and parameters, the sampler's reasons, landing places.
 
 use quadfrog::trial::{SimulatorComparison, Verdict};
 use ratatui::Frame;
@@ -6,7 +6,8 @@ use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
 
-use super::draw::{cell_at, heading, number, scale, sign, span, with_deviation};
+use super::draw::{heading, scale, sign, span, with_deviation};
+use super::parameter_axes::ParameterAxes;
 use super::{densities, objective, points};
 use crate::model::session::SessionModel;
 use crate::theme::{Role, Theme};
@@ -15,15 +16,18 @@ pub fn render(frame: &mut Frame, area: Rect, session: &SessionModel, theme: &The
     let repeated = points::lines(session, theme, usize::from(area.width));
     // Repeats have rows of their own where there are any to spare.
     let repeat_rows = if repeated.is_empty() || area.height < 30 { 0 } else { repeated.len().min(5) as u16 + 1 };
-    let [upper, repeats, scatters, why] = Layout::vertical([
+    let [upper, repeats, scatters, why, legend] = Layout::vertical([
         Constraint::Fill(1),
         Constraint::Length(repeat_rows),
         Constraint::Fill(1),
         Constraint::Fill(1),
+        Constraint::Length(1),
     ])
     .areas(area);
     let [history, _, landings] =
         Layout::horizontal([Constraint::Fill(3), Constraint::Length(2), Constraint::Fill(2)]).areas(upper);
+    let modelled = session.insight.as_ref().is_some_and(|insight| !insight.predicted.is_empty());
+    render_legend(frame, legend, modelled, theme);
     objective::render(frame, history, session, theme);
     render_landings(frame, landings, session, theme);
     if repeat_rows > 0 {
@@ -39,7 +43,7 @@ pub fn render(frame: &mut Frame, area: Rect, session: &SessionModel, theme: &The
     for (index, info) in parameters.iter().enumerate() {
         render_scatter(frame, above[index], session, theme, index);
         if session.simulator().is_none() {
-            densities::render(frame, below[index], session.insight.as_ref(), &info.name, theme);
+            densities::render(frame, below[index], session, info, theme);
         }
     }
     if let Some(simulator) = session.simulator() {
@@ -78,21 +82,12 @@ fn render_scatter(frame: &mut Frame, area: Rect, session: &SessionModel, theme: 
     // The study's own bounds: past trials stay where they were when the search is narrowed.
     let info = &session.info.parameters[index];
     let body = heading(frame, area, theme, &format!("J over {}", info.name), &info.unit);
-    let [plot, scale] = Layout::vertical([Constraint::Fill(1), Constraint::Length(1)]).areas(body);
-    if plot.height == 0 || plot.width < 8 {
-        return;
-    }
-    let high = session.trials.records.values().filter_map(|trial| trial.value).fold(1e-3, f64::max);
-    let low = session.trials.records.values().filter_map(|trial| trial.value).fold(0.0, f64::min);
-    let column = |value: f64| plot.x + cell_at((value - info.low) / (info.high - info.low), plot.width);
-    let row = |value: f64| plot.y + cell_at((high - value) / (high - low), plot.height);
+    let values = || session.trials.records.values().filter_map(|trial| trial.value);
+    let (low, high) = (values().fold(0.0, f64::min), values().fold(1e-3, f64::max));
+    let Some(axes) = ParameterAxes::new(info, body, (low, high)) else { return };
     let buffer = frame.buffer_mut();
     let proposed = session.open_proposal().and_then(|p| p.parameters.iter().find(|p| p.name == info.name));
-    if let Some(proposed) = proposed {
-        for y in plot.y..plot.bottom() {
-            buffer.set_string(column(proposed.value), y, theme.bar(), theme.style(Role::Quiet));
-        }
-    }
+    axes.draw(buffer, proposed.map(|proposed| proposed.value), theme);
     let best = session.trials.best().map(|trial| trial.trial);
     // The best last: its repeats lie at the same place.
     let mut trials: Vec<_> =
@@ -103,20 +98,30 @@ fn render_scatter(frame: &mut Frame, area: Rect, session: &SessionModel, theme: 
         let Some(objective) = trial.value else { continue };
         let (symbol, role) = sign(trial.verdict);
         let symbol = if best == Some(trial.trial) { "*" } else { symbol };
-        buffer.set_string(column(value), row(objective), symbol, theme.style(role));
+        buffer.set_string(axes.column(value), axes.row(objective), symbol, theme.style(role));
     }
-    let (low, high) = (number(info.low), number(info.high));
-    buffer.set_string(scale.x, scale.y, &low, theme.style(Role::Quiet));
-    let right = scale.right().saturating_sub(high.len() as u16);
-    buffer.set_string(right, scale.y, high, theme.style(Role::Quiet));
-    if let Some(proposed) = proposed {
-        let text = format!("{} now", number(proposed.value));
-        let at = (column(proposed.value).saturating_sub(text.len() as u16 / 2)).clamp(
-            scale.x + low.len() as u16 + 1,
-            right.saturating_sub(text.len() as u16 + 1).max(scale.x + low.len() as u16 + 1),
-        );
-        buffer.set_string(at, scale.y, text, theme.style(Role::Text));
+}
+
+/// The signs of all panels.
+fn render_legend(frame: &mut Frame, area: Rect, modelled: bool, theme: &Theme) {
+    let mut spans = vec![Span::raw(" ")];
+    let mut item = |symbol: &'static str, role, text: &'static str| {
+        spans.push(span(theme, role, symbol));
+        spans.push(span(theme, Role::Quiet, format!(" {text}  ")));
+    };
+    for (verdict, text) in [
+        (Some(Verdict::Accept), "accept"),
+        (Some(Verdict::Fall), "fall"),
+        (Some(Verdict::Void), "void"),
+        (None, "not judged"),
+    ] {
+        let (symbol, role) = sign(verdict);
+        item(symbol, role, text);
     }
+    item("*", Role::Good, "best");
+    item(theme.line(), Role::Quiet, "best so far");
+    item(theme.bar(), Role::Key, if modelled { "proposal, deviation" } else { "proposal" });
+    frame.render_widget(Line::from(spans), area);
 }
 
 /// Where the trunk came to rest, from above: forward is up, left is left, the start is `+`.
@@ -127,7 +132,6 @@ fn render_landings(frame: &mut Frame, area: Rect, session: &SessionModel, theme:
         return;
     }
     // A character is about twice as high as wide; the same metres per length both ways.
-    let reach = landed().fold(0.2_f64, |reach, (_, m)| reach.max(m.dx_m.abs()).max(m.dy_m.abs()));
     let ahead = landed().fold(0.1_f64, |ahead, (_, m)| ahead.max(m.dx_m));
     let behind = landed().fold(0.1_f64, |behind, (_, m)| behind.max(-m.dx_m));
     let sideways = landed().fold(0.1_f64, |side, (_, m)| side.max(m.dy_m.abs()));
@@ -151,6 +155,14 @@ fn render_landings(frame: &mut Frame, area: Rect, session: &SessionModel, theme:
         let (x, y) = place(m.dx_m, m.dy_m);
         buffer.set_string(x, y, symbol, theme.style(role));
     }
-    let text = if landed().next().is_none() { "none yet".to_owned() } else { format!("scale {} m", number(reach)) };
-    buffer.set_string(body.x, body.y, text, theme.style(Role::Quiet));
+    if landed().next().is_none() {
+        buffer.set_string(body.x, body.y, "none yet", theme.style(Role::Quiet));
+        return;
+    }
+    // The same metres per length to the side.
+    let axis = [(body.y, ahead), (y, 0.0), (body.bottom() - 1, -behind)];
+    for (row, dx_m) in axis.into_iter().filter(|(row, dx_m)| *dx_m >= 0.0 || *row > y) {
+        let text = if dx_m == 0.0 { "0 m".to_owned() } else { format!("{dx_m:+.2} m") };
+        buffer.set_string(body.x, row, text, theme.style(Role::Quiet));
+    }
 }

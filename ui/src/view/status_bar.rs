@@ -18,6 +18,9 @@ use crate::theme::Role;
 /// Age of the newest tick from which the numbers count as old, ms.
 const STALE_MS: u128 = 500;
 
+/// Time without growth from which a followed recording counts as old, ns: it grows every second.
+const SILENT_NS: u64 = 2_500_000_000;
+
 pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let [first, second] = Layout::vertical([Constraint::Length(1); 2]).areas(area);
     let recording = Line::from(recording(model));
@@ -42,6 +45,10 @@ pub fn mode_span(model: &Model) -> Span<'static> {
 fn backend(model: &Model) -> Span<'static> {
     let theme = &model.theme;
     match model.session.info.backend {
+        _ if let Some(observer) = model.observer() => match observer.ended {
+            true => span(theme, Role::Bad, "ENDED"),
+            false => span(theme, Role::Warning, "WATCHING"),
+        },
         _ if model.replay.is_some() => span(theme, Role::Heading, "REPLAY"),
         None => span(theme, Role::Quiet, "starting"),
         Some(Backend::Simulator) => span(theme, Role::Heading, "SIM"),
@@ -118,12 +125,15 @@ fn stop_keys(model: &Model) -> String {
 fn condition(model: &Model, width: u16) -> Vec<Span<'static>> {
     let theme = &model.theme;
     let narrow = width < 100;
-    let mut spans = vec![
-        Span::raw(" "),
-        span(theme, Role::Alarm, " STOP "),
-        Span::raw(" "),
-        span(theme, Role::Key, stop_keys(model)),
-    ];
+    let mut spans = match model.can_stop() {
+        true => vec![
+            Span::raw(" "),
+            span(theme, Role::Alarm, " STOP "),
+            Span::raw(" "),
+            span(theme, Role::Key, stop_keys(model)),
+        ],
+        false => vec![span(theme, Role::Quiet, " recorded: no robot to stop")],
+    };
     let gap = if narrow { "  " } else { "   " };
     let mut part = |name: &str, role, value: String| {
         spans.push(span(theme, Role::Quiet, format!("{gap}{name}")));
@@ -170,11 +180,19 @@ fn condition(model: &Model, width: u16) -> Vec<Span<'static>> {
         if let Some(trial) = replay.looping {
             part("", Role::Warning, format!("LOOP #{trial}"));
         }
-        for (shown, text) in [(replay.slow_motion, "SLOW JUMPS"), (replay.following, "FOLLOWING")] {
+        for (shown, text) in [(replay.slow_motion, "SLOW JUMPS"), (replay.silent_ns.is_some(), "FOLLOWING")] {
             if shown {
                 part("", Role::Warning, text.to_owned());
             }
         }
+    }
+    match model.observer() {
+        Some(observer) if observer.demanded > observer.stopped => part("", Role::Bad, "STOP NOT CONFIRMED".to_owned()),
+        _ => {}
+    }
+    let silent_ns = model.replay.as_ref().and_then(|replay| replay.silent_ns).filter(|ns| *ns > SILENT_NS);
+    if let Some(silent_ns) = silent_ns.filter(|_| model.observer().is_none_or(|observer| !observer.ended)) {
+        part("", Role::Bad, format!("OLD: nothing new for {:.0} s", silent_ns as f64 / 1e9));
     }
     let age_ms = model.clock.saturating_sub(model.snapshot_at).as_millis();
     if age_ms > STALE_MS && model.replay.is_none() {
@@ -244,7 +262,10 @@ pub fn render_small(frame: &mut Frame, area: Rect, model: &Model) {
     };
     let lines = vec![
         Line::from(vec![mode_span(model), Span::raw(" "), backend(model)]),
-        Line::from(vec![span(theme, Role::Alarm, " STOP "), Span::raw(" "), span(theme, Role::Key, keys)]),
+        match model.can_stop() {
+            true => Line::from(vec![span(theme, Role::Alarm, " STOP "), Span::raw(" "), span(theme, Role::Key, keys)]),
+            false => Line::from(span(theme, Role::Quiet, "no robot to stop")),
+        },
         Line::from(link),
         Line::from(format!("terminal {}x{}", area.width, area.height)),
         Line::from(format!("needed {MIN_COLUMNS}x{MIN_ROWS}")),

@@ -83,6 +83,8 @@ pub(super) fn choice_key(model: &mut Model, key: Key, subject: Choice, mut selec
         KeyCode::Esc | KeyCode::Enter => return Vec::new(),
         KeyCode::Up => selected = selected.saturating_sub(1),
         KeyCode::Down => selected = (selected + 1).min(last),
+        KeyCode::PageUp => selected = selected.saturating_sub(model.page),
+        KeyCode::PageDown => selected = (selected + model.page).min(last),
         KeyCode::Home => selected = 0,
         KeyCode::End => selected = last,
         KeyCode::Left | KeyCode::Right | KeyCode::Char('x') => match subject {

@@ -1,0 +1,153 @@
+//! The observer's end: finds running sessions, watches one, passes STOP on.
+
+use std::io::{self, BufRead, BufReader, ErrorKind, Read, Write};
+use std::os::unix::net::UnixStream;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::time::Duration;
+
+use super::{Answer, Demand, LONGEST_LINE, SessionFacts, line, socket_folders};
+use crate::realtime::channel::StopLatch;
+
+/// Longest wait for the facts of a session.
+const LONGEST_WAIT: Duration = Duration::from_secs(2);
+/// Period in which a STOP is looked for.
+const STOP_PERIOD: Duration = Duration::from_millis(10);
+
+/// A session that runs on this machine under this user.
+#[derive(Debug)]
+pub struct RunningSession {
+    /// What it is.
+    pub facts: SessionFacts,
+    reader: BufReader<UnixStream>,
+}
+
+/// Returns the sessions that run on this machine under this user, by the number of their process, and the sockets that do not
+/// answer, with the reason. The sockets of sessions that were killed are removed.
+///
+/// # Errors
+/// When a folder of sockets cannot be read.
+pub fn running_sessions() -> io::Result<(Vec<RunningSession>, Vec<(PathBuf, io::Error)>)> {
+    let (mut sessions, mut silent) = (Vec::new(), Vec::new());
+    for folder in socket_folders() {
+        let entries = match std::fs::read_dir(&folder) {
+            Err(error) if error.kind() == ErrorKind::NotFound => continue,
+            Err(error) => return Err(io::Error::new(error.kind(), format!("{}: {error}", folder.display()))),
+            Ok(entries) => entries,
+        };
+        let sockets = entries.filter_map(|entry| Some(entry.ok()?.path()));
+        for socket in sockets.filter(|path| path.extension().is_some_and(|extension| extension == "sock")) {
+            match connect(&socket) {
+                Ok(session) => sessions.push(session),
+                Err(error) if error.kind() == ErrorKind::ConnectionRefused => drop(std::fs::remove_file(&socket)),
+                Err(error) => silent.push((socket, error)),
+            }
+        }
+    }
+    sessions.sort_by_key(|session| session.facts.process);
+    Ok((sessions, silent))
+}
+
+fn connect(socket: &PathBuf) -> io::Result<RunningSession> {
+    let stream = UnixStream::connect(socket)?;
+    stream.set_read_timeout(Some(LONGEST_WAIT))?;
+    let mut reader = BufReader::new(stream);
+    let mut received = Vec::new();
+    reader.by_ref().take(LONGEST_LINE).read_until(b'\n', &mut received).map_err(|error| match error.kind() {
+        ErrorKind::WouldBlock => io::Error::new(ErrorKind::TimedOut, "the session does not answer"),
+        _ => error,
+    })?;
+    match serde_json::from_slice(&received)? {
+        Answer::Session(facts) => Ok(RunningSession { facts, reader }),
+        Answer::Stopped => Err(io::Error::new(ErrorKind::InvalidData, "an answer without a demand")),
+    }
+}
+
+/// State of an observer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct ObserverStatus {
+    /// Whether the session has ended or closed the connection.
+    pub ended: bool,
+    /// STOPs demanded.
+    pub demanded: u64,
+    /// STOPs that the session has set.
+    pub stopped: u64,
+}
+
+#[derive(Default)]
+struct Connection {
+    stop: StopLatch,
+    stopped: AtomicU64,
+    ended: AtomicBool,
+    closing: AtomicBool,
+}
+
+/// An observer of a session; it leaves when it is dropped.
+pub struct Observer(Arc<Connection>);
+
+impl Observer {
+    /// Watches a session under a name. STOPs of [`stop_latch`](Observer::stop_latch) are passed on by a thread of its own.
+    ///
+    /// # Errors
+    /// When the session has ended meanwhile, or the system cannot start a thread.
+    pub fn join(session: RunningSession, name: &str) -> io::Result<Observer> {
+        let RunningSession { mut reader, .. } = session;
+        reader.get_mut().write_all(&line(&Demand::Watch(name.to_owned()))?)?;
+        reader.get_mut().set_read_timeout(Some(STOP_PERIOD))?;
+        let connection = Arc::new(Connection::default());
+        let of_thread = Arc::clone(&connection);
+        std::thread::Builder::new().name("observer".into()).spawn(move || {
+            // Whatever ends it, nothing is passed on any longer.
+            let _ = pass_on(&mut reader, &of_thread);
+            of_thread.ended.store(true, Ordering::Release);
+        })?;
+        Ok(Observer(connection))
+    }
+
+    /// Returns the latch whose STOPs are passed on.
+    pub fn stop_latch(&self) -> StopLatch {
+        self.0.stop.clone()
+    }
+
+    /// Returns the present state.
+    pub fn status(&self) -> ObserverStatus {
+        ObserverStatus {
+            ended: self.0.ended.load(Ordering::Acquire),
+            demanded: self.0.stop.count(),
+            stopped: self.0.stopped.load(Ordering::Acquire),
+        }
+    }
+}
+
+impl Drop for Observer {
+    fn drop(&mut self) {
+        self.0.closing.store(true, Ordering::Release);
+    }
+}
+
+fn pass_on(reader: &mut BufReader<UnixStream>, connection: &Connection) -> io::Result<()> {
+    let mut sent = 0;
+    let mut received = Vec::new();
+    while !connection.closing.load(Ordering::Acquire) {
+        let demanded = connection.stop.count();
+        while sent < demanded {
+            reader.get_mut().write_all(&line(&Demand::Stop)?)?;
+            sent += 1;
+        }
+        match reader.by_ref().take(LONGEST_LINE).read_until(b'\n', &mut received) {
+            Ok(0) => return Ok(()),
+            Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => continue,
+            result => result?,
+        };
+        if received.ends_with(b"\n") {
+            if serde_json::from_slice::<Answer>(&received)? == Answer::Stopped {
+                connection.stopped.fetch_add(1, Ordering::AcqRel);
+            }
+            received.clear();
+        } else if received.len() as u64 >= LONGEST_LINE {
+            return Err(io::Error::new(ErrorKind::InvalidData, "a line without an end"));
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,100 @@
+//! Observers of a running session on the same machine: they read the recording while it is written, and reach the session over a
+//! Unix socket, where they learn what runs and may set STOP. Nothing else is accepted.
+//!
+//! The socket is in a folder that this user alone may enter, one for each process. A line of JSON each way: the session sends
+//! [`Answer`]s, an observer sends [`Demand`]s.
+
+mod client;
+mod server;
+
+use std::fs::DirBuilder;
+use std::io;
+use std::os::unix::fs::{DirBuilderExt, MetadataExt};
+use std::path::{Path, PathBuf};
+
+use nix::unistd::geteuid;
+use serde::{Deserialize, Serialize};
+
+use crate::recording::record::LogLevel;
+
+pub use client::{Observer, ObserverStatus, RunningSession, running_sessions};
+pub use server::ObserverServer;
+
+/// Longest line either end accepts, bytes.
+const LONGEST_LINE: u64 = 16_384;
+
+/// What observers do, for the session's log.
+pub type SessionNews = (LogLevel, String);
+
+/// Facts of a running session, for those who want to observe it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SessionFacts {
+    /// Number of its process.
+    pub process: u32,
+    /// Folder of its study and recording, absolute.
+    pub folder: PathBuf,
+    /// Name of the robot.
+    pub robot: String,
+    /// Name of the backend, `sim` or `go1`.
+    pub backend: String,
+    /// Name of the task.
+    pub task: String,
+    /// Name of the operator.
+    pub operator: String,
+    /// Begin, UTC, to the second (RFC 3339).
+    pub since: String,
+}
+
+/// What an observer sends.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum Demand {
+    /// It watches from now on, under this name.
+    Watch(String),
+    /// STOP.
+    Stop,
+}
+
+/// What the session sends.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum Answer {
+    /// At the begin of a connection.
+    Session(SessionFacts),
+    /// STOP is set.
+    Stopped,
+}
+
+/// Returns a message as a line.
+fn line(message: &impl Serialize) -> io::Result<Vec<u8>> {
+    let mut line = serde_json::to_vec(message)?;
+    line.push(b'\n');
+    Ok(line)
+}
+
+/// Returns the folders that may hold sockets, the one for new ones first: over SSH, sudo or cron the environment may lack the
+/// first.
+fn socket_folders() -> Vec<PathBuf> {
+    let runtime = std::env::var_os("XDG_RUNTIME_DIR").filter(|folder| !folder.is_empty());
+    let of_user = runtime.map(|folder| Path::new(&folder).join("quadfrog"));
+    of_user.into_iter().chain([PathBuf::from(format!("/tmp/quadfrog-{}", geteuid()))]).collect()
+}
+
+/// Makes the folder for new sockets, which only this user may enter.
+///
+/// # Errors
+/// When it cannot be made, or is another user's or open to others.
+fn make_socket_folder() -> io::Result<PathBuf> {
+    let folder = socket_folders().swap_remove(0);
+    let named = |error: io::Error| io::Error::new(error.kind(), format!("{}: {error}", folder.display()));
+    match DirBuilder::new().mode(0o700).create(&folder) {
+        Err(error) if error.kind() != io::ErrorKind::AlreadyExists => return Err(named(error)),
+        _ => {}
+    }
+    let found = folder.symlink_metadata().map_err(named)?;
+    if found.is_dir() && found.uid() == geteuid().as_raw() && found.mode() & 0o077 == 0 {
+        return Ok(folder);
+    }
+    let reason = "not a folder of this user alone; remove it, or give its permissions to its owner alone";
+    Err(named(io::Error::new(io::ErrorKind::PermissionDenied, reason)))
+}

@@ -1,0 +1,224 @@
+//! A second person on the same machine: `quadfrog sessions` lists what runs, `quadfrog attach` watches it and passes STOP on.
+
+#[path = "support/program.rs"]
+mod program;
+#[path = "support/pty.rs"]
+mod pty;
+
+use std::io::{BufRead, BufReader, Error, ErrorKind, Read, Write};
+use std::os::unix::fs::PermissionsExt;
+use std::os::unix::net::{UnixListener, UnixStream};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use std::time::Duration;
+
+use nix::sys::signal::Signal;
+use portable_pty::CommandBuilder;
+use pty::Session;
+
+const SIZE: (u16, u16) = (120, 40);
+
+/// A lab's machine: a folder for studies, and one for what runs.
+struct Lab {
+    folder: tempfile::TempDir,
+}
+
+impl Lab {
+    fn new() -> Lab {
+        Lab { folder: tempfile::tempdir().unwrap() }
+    }
+
+    fn runtime(&self) -> PathBuf {
+        self.folder.path().join("run")
+    }
+
+    fn open(&self, arguments: &[&str]) -> Session {
+        let _ = std::fs::create_dir(self.runtime());
+        let mut command = CommandBuilder::new(env!("CARGO_BIN_EXE_quadfrog"));
+        command.args(arguments);
+        command.env("XDG_RUNTIME_DIR", self.runtime());
+        Session::run(self.folder.path(), SIZE, command)
+    }
+
+    /// A session that can be armed.
+    fn session(&self, output: &str, arguments: &[&str]) -> Session {
+        let session = self.open(&[&["--output", output, "--operator", "Ada"], arguments].concat());
+        session.wait_for(&["Press A to arm"]);
+        session
+    }
+
+    fn command(&self, arguments: &[&str]) -> Output {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_quadfrog"));
+        command.args(arguments).current_dir(self.folder.path()).env("XDG_RUNTIME_DIR", self.runtime());
+        command.output().unwrap()
+    }
+
+    /// The lines of `quadfrog sessions`.
+    fn listed(&self) -> Vec<String> {
+        let output = self.command(&["sessions"]);
+        assert!(output.status.success());
+        String::from_utf8(output.stdout).unwrap().lines().map(str::to_owned).collect()
+    }
+
+    fn sockets(&self) -> Vec<PathBuf> {
+        std::fs::read_dir(self.runtime().join("quadfrog")).unwrap().map(|entry| entry.unwrap().path()).collect()
+    }
+}
+
+fn refusal(output: &Output) -> String {
+    assert_eq!(output.status.code(), Some(2), "{output:?}");
+    String::from_utf8(output.stderr.clone()).unwrap()
+}
+
+#[test]
+fn a_colleague_watches_a_session_and_stops_its_robot() {
+    let lab = Lab::new();
+    let mut session = lab.session("studies", &[]);
+    let listed = lab.listed();
+    assert_eq!(listed.len(), 1, "{listed:?}");
+    for part in [" sim go1 ", " forward ", " Ada, since 2", "-forward-seed"] {
+        assert!(listed[0].contains(part), "{listed:?}");
+    }
+    session.send("A");
+    session.wait_for(&["READY"]);
+    let mut watcher = lab.open(&["attach", "--operator", "Grace"]);
+    watcher.wait_for(&["WATCHING", "FOLLOWING", "READY"]);
+    session.send("6");
+    session.wait_for(&["Grace watches this session"]);
+    session.send("5");
+    session.wait_for(&["1 with quadfrog attach"]);
+    // Nothing but STOP reaches the session.
+    watcher.send("k");
+    watcher.wait_for(&["this console only watches"]);
+    watcher.send(" ");
+    session.wait_for(&["DAMPED"]);
+    session.send("6");
+    session.wait_for(&["STOP by Grace, who watches this session"]);
+    watcher.wait_for(&["DAMPED"]);
+    assert!(!watcher.screen().contains("NOT CONFIRMED"), "{}", watcher.screen());
+    watcher.send("q");
+    assert!(watcher.wait().success());
+    session.wait_for(&["Grace does not watch any longer"]);
+    assert!(session.quit().success());
+    assert!(lab.sockets().is_empty() && lab.listed().is_empty());
+}
+
+#[test]
+fn an_observer_sees_that_its_session_was_killed() {
+    let lab = Lab::new();
+    let mut session = lab.session("studies", &[]);
+    let mut watcher = lab.open(&["attach"]);
+    watcher.wait_for(&["WATCHING"]);
+    session.signal(Signal::SIGKILL);
+    session.wait();
+    watcher.wait_for(&["ENDED", "STOP does not reach its robot any longer", "no robot to stop"]);
+    watcher.send(" ");
+    watcher.wait_for(&["its robot cannot be stopped from here"]);
+    watcher.send("q");
+    watcher.wait();
+    assert_eq!(lab.sockets().len(), 1, "a killed process removes nothing");
+    assert!(lab.listed().is_empty() && lab.sockets().is_empty(), "its socket is removed");
+}
+
+#[test]
+fn a_stopped_session_looks_old_and_its_stop_unconfirmed() {
+    let lab = Lab::new();
+    let mut session = lab.session("studies", &[]);
+    let mut watcher = lab.open(&["attach"]);
+    watcher.wait_for(&["WATCHING"]);
+    session.signal(Signal::SIGSTOP);
+    watcher.wait_for(&["OLD: nothing new for"]);
+    watcher.send(" ");
+    watcher.wait_for(&["STOP NOT CONFIRMED"]);
+    session.signal(Signal::SIGCONT);
+    watcher.wait_until("it is confirmed", || !watcher.screen().contains("NOT CONFIRMED"));
+    watcher.send("q");
+    watcher.wait();
+    session.quit();
+}
+
+#[test]
+fn of_several_sessions_one_is_named() {
+    let lab = Lab::new();
+    let none = refusal(&lab.command(&["attach"]));
+    assert!(none.contains("no session runs on this machine"), "{none}");
+    let mut first = lab.session("one", &["--task", "lateral-left"]);
+    let mut second = lab.session("two", &[]);
+    let several = refusal(&lab.command(&["attach"]));
+    assert!(several.contains("several sessions run") && several.lines().count() == 3, "{several}");
+    let unknown = refusal(&lab.command(&["attach", "one"]));
+    assert!(unknown.contains("one: no session of that number or folder runs"), "{unknown}");
+    let study = std::fs::read_dir(lab.folder.path().join("one")).unwrap().next().unwrap().unwrap().path();
+    let mut by_folder = lab.open(&["attach", study.to_str().unwrap()]);
+    by_folder.wait_for(&["WATCHING", "lateral-left"]);
+    let number =
+        lab.listed().iter().find(|line| line.contains(" forward ")).unwrap().split(' ').next().unwrap().to_owned();
+    let mut by_number = lab.open(&["attach", &number]);
+    by_number.wait_for(&["WATCHING", "forward"]);
+    for session in [&mut by_folder, &mut by_number] {
+        session.send("q");
+        session.wait();
+    }
+    first.quit();
+    second.quit();
+}
+
+#[test]
+fn a_hostile_observer_harms_no_session() {
+    let lab = Lab::new();
+    let mut session = lab.session("studies", &[]);
+    let socket = lab.sockets().remove(0);
+    let closed = |mut stream: UnixStream| {
+        stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
+        // A reset is an end, too.
+        let end = stream.read_to_end(&mut Vec::new());
+        assert!(end.as_ref().map_err(Error::kind) != Err(ErrorKind::WouldBlock), "still open: {end:?}");
+    };
+    for hostile in [&b"{\"stop\":1}\n"[..], b"\xff\xfe\n", b"{}\n", b"[[[[[[[[\n", &[b'a'; 40_000]] {
+        let mut stream = UnixStream::connect(&socket).unwrap();
+        let _ = stream.write_all(hostile);
+        closed(stream);
+    }
+    // Those that say nothing take no place of the ninth for ever, and hold up nothing.
+    let silent: Vec<UnixStream> = (0..8).map(|_| UnixStream::connect(&socket).unwrap()).collect();
+    for stream in &silent {
+        BufReader::new(stream).read_line(&mut String::new()).unwrap();
+    }
+    closed(UnixStream::connect(&socket).unwrap());
+    drop(silent);
+    session.wait_until("there is room again", || lab.listed().len() == 1);
+    // A name cannot write to the operator's terminal.
+    let mut named = UnixStream::connect(&socket).unwrap();
+    named.write_all(b"{\"watch\":\"\\u001b[2Jeve\"}\n").unwrap();
+    session.send("6");
+    session.wait_for(&["[2Jeve watches this session"]);
+    session.send("A");
+    session.wait_for(&["READY"]);
+    session.quit();
+}
+
+#[test]
+fn a_folder_of_others_is_not_used_for_the_socket() {
+    let lab = Lab::new();
+    std::fs::create_dir_all(lab.runtime().join("quadfrog")).unwrap();
+    std::fs::set_permissions(lab.runtime().join("quadfrog"), PermissionsExt::from_mode(0o777)).unwrap();
+    let mut session = lab.session("studies", &[]);
+    session.send("6");
+    session.wait_for(&["not a folder of this user alone"]);
+    assert!(lab.sockets().is_empty());
+    session.quit();
+}
+
+#[test]
+fn a_socket_of_another_program_is_named_and_left_alone() {
+    let lab = Lab::new();
+    let folder = lab.runtime().join("quadfrog");
+    std::fs::create_dir_all(&folder).unwrap();
+    let listener = UnixListener::bind(folder.join("1.sock")).unwrap();
+    let answer = std::thread::spawn(move || listener.accept().unwrap().0.write_all(b"220 mail\n").unwrap());
+    let output = lab.command(&["sessions"]);
+    answer.join().unwrap();
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert!(message.contains("1.sock: ") && message.contains("no session runs"), "{message}");
+    assert!(Path::exists(&folder.join("1.sock")));
+}

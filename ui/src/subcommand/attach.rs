@@ -1,0 +1,103 @@
+//! `quadfrog attach` and `quadfrog sessions`: running sessions on this machine, seen by a second person.
+
+use std::path::PathBuf;
+
+use anyhow::{Context, anyhow};
+use clap::Args;
+use quadfrog::config::Config;
+use quadfrog::engine::{Observer, RunningSession, SessionFacts, running_sessions};
+use quadfrog::recording::session_files::recordings_of;
+use quadfrog::recording::timeline::Timeline;
+use quadfrog::robot::description::RobotDescription;
+use quadfrog_console::feed::Feed;
+use quadfrog_console::{app, notice, put_line, terminal};
+
+use super::arguments;
+use super::console::{ScreenArguments, options};
+use super::failure::Failure;
+
+#[derive(Debug, Args)]
+pub struct AttachArguments {
+    /// The session: number of its process or folder of its study, as `quadfrog sessions` lists them [default: the only one]
+    #[arg(value_name = "SESSION")]
+    session: Option<String>,
+    /// Your name in the session's log [default: the user's name]
+    #[arg(long, value_name = "NAME", value_parser = arguments::operator)]
+    operator: Option<String>,
+    /// Folder with your own console.toml
+    #[arg(long, value_name = "DIR")]
+    config: Option<PathBuf>,
+    #[command(flatten)]
+    screen: ScreenArguments,
+}
+
+/// Watches a running session: what its recording shows, at most some 1.3 s later, and STOP.
+pub fn run(arguments: &AttachArguments) -> Result<(), Failure> {
+    let config = Config::load(arguments.config.as_deref())?;
+    let console = options(&arguments.screen, &config)?;
+    let session = choose(arguments.session.as_deref(), sessions()?)?;
+    let files = recordings_of(&session.facts.folder)?;
+    let recording = Timeline::open(&files)?;
+    terminal::check().map_err(Failure::input)?;
+    let console = match RobotDescription::embedded(&recording.session().robot) {
+        Ok(robot) => console.with_robot(robot),
+        // A model of the operator's own: the panels that need its limits say so.
+        Err(_) => console,
+    };
+    let name = arguments::operator_or_user(arguments.operator.as_ref());
+    let observer = Observer::join(session, &name).context("the session ended")?;
+    app::run(Feed::attached(recording, observer), console)?;
+    Ok(())
+}
+
+/// Lists the sessions that run.
+pub fn list() -> Result<(), Failure> {
+    let sessions = sessions()?;
+    if sessions.is_empty() {
+        notice!("no session runs on this machine under this user");
+    }
+    for session in &sessions {
+        put_line!("{}", described(&session.facts));
+    }
+    Ok(())
+}
+
+fn sessions() -> Result<Vec<RunningSession>, Failure> {
+    let (sessions, silent) = running_sessions().map_err(|error| Failure::Other(anyhow!("sessions: {error}")))?;
+    for (socket, error) in silent {
+        notice!("{}: {error}", socket.display());
+    }
+    Ok(sessions)
+}
+
+fn described(facts: &SessionFacts) -> String {
+    let SessionFacts { process, folder, robot, backend, task, operator, since } = facts;
+    format!("{process}  {backend} {robot}  {task}  {operator}, since {since}  {}", folder.display())
+}
+
+/// Returns the session that is meant.
+fn choose(named: Option<&str>, sessions: Vec<RunningSession>) -> Result<RunningSession, Failure> {
+    let known: Vec<String> = sessions.iter().map(|session| described(&session.facts)).collect();
+    let meant = |session: &RunningSession| {
+        let Some(named) = named else { return true };
+        let folder = std::fs::canonicalize(named).ok();
+        named.parse() == Ok(session.facts.process)
+            || folder.is_some() && std::fs::canonicalize(&session.facts.folder).ok() == folder
+    };
+    let mut found: Vec<RunningSession> = sessions.into_iter().filter(meant).collect();
+    let of_named = named.map(|named| format!("{named}: ")).unwrap_or_default();
+    match (found.pop(), found.is_empty()) {
+        (Some(session), true) => Ok(session),
+        (Some(_), false) => Err(Failure::input(format!(
+            "{of_named}several sessions run; give the number or the folder of one:\n{}",
+            known.join("\n")
+        ))),
+        (None, _) if known.is_empty() => {
+            Err(Failure::input(format!("{of_named}no session runs on this machine under this user")))
+        }
+        (None, _) => Err(Failure::input(format!(
+            "{of_named}no session of that number or folder runs; these run:\n{}",
+            known.join("\n")
+        ))),
+    }
+}
