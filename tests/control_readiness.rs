@@ -9,9 +9,15 @@ mod emulated;
 mod go1;
 
 use emulated::{EmulatedBench, emulated, emulated_on, hardware_like};
+use quadfrog::control::control_loop::ControlLoop;
+use quadfrog::realtime::channel::channels;
+use quadfrog::realtime::clock::SimulatedClock;
+use quadfrog::realtime::thread::TickStart;
 use quadfrog::robot::RobotState;
 use quadfrog::sim::SimConfig;
-use quadfrog::telemetry::{Command, CommandRefusal, Event, Mode, TransitionCause, TrialEnd, TrialSpec};
+use quadfrog::telemetry::{
+    Command, CommandRefusal, Event, Mode, Permit, TransitionCause, TrialEnd, TrialInhibit, TrialSpec,
+};
 use quadfrog::trial::{Backend, Gains};
 
 /// A defect: injected at the emulator as its prompt parses it, or by the test.
@@ -165,4 +171,41 @@ fn a_simulated_robot_needs_no_readiness() {
     assert_eq!(bench.cycle.readiness().unready, None);
     bench.command(bench.approved());
     assert_eq!(bench.cycle.mode(), Mode::Countdown);
+}
+
+/// The screen reads from the control thread whether an approval would be refused, before one is given.
+#[test]
+fn the_console_reads_why_no_trial_would_be_approved() {
+    let (config, _, settings) = bench::shipped(Backend::Hardware);
+    let (mut emulator, mut robot) = go1::pair(&config.simulator, 1);
+    let (control, mut session, mut screen, mut recorder) = channels();
+    let mut body = ControlLoop::new(&settings, control);
+    let (mut changes, mut reasons) = (0, Vec::new());
+    for ms in 0..9000 {
+        screen.heartbeat.beat();
+        let command = match body.mode() {
+            Mode::Observe if ms == 100 => Some(Command::TakeControl),
+            Mode::Disarmed if ms == 2000 => {
+                Some(Command::Arm(Permit { mode_changes: changes, given_ns: ms * 1_000_000 }))
+            }
+            _ => None,
+        };
+        if let Some(command) = command {
+            session.commands.push(command).unwrap();
+        }
+        if ms == 7000 {
+            emulator.apply("hot RL_hip 72".parse().unwrap());
+        }
+        body.tick(TickStart { planned_ns: ms * 1_000_000, lateness_ns: 0 }, &SimulatedClock, &mut robot);
+        let _ = recorder.pop();
+        let events = std::iter::from_fn(|| session.events.pop().ok());
+        changes += events.filter(|event| matches!(event, Event::Mode { .. })).count() as u64;
+        emulator.step();
+        if [6900, 8900].contains(&ms) {
+            assert_eq!(body.mode(), Mode::Ready, "at {ms} ms");
+            reasons.push(screen.snapshot.read().unready);
+        }
+    }
+    assert_eq!(reasons[0], None, "a robot at rest in READY");
+    assert!(matches!(reasons[1], Some(TrialInhibit::MotorWarm { .. })), "{:?}", reasons[1]);
 }

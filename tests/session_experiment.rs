@@ -6,12 +6,14 @@ mod support;
 use std::time::Duration;
 
 use quadfrog::optimize::exchange::TableTrial;
+use quadfrog::optimize::study::Storage;
 use quadfrog::optimize::trial::{Trial, TrialState};
 use quadfrog::recording::record::Record;
 use quadfrog::session::experiment::{Experiment, import};
+use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::telemetry::{FallCause, TrialEnd};
-use quadfrog::trial::{ExperimentStage, ProposalSource, Verdict};
-use support::{accept, approve, experiment, far, joined, open, parameters, run, study_in, ticks};
+use quadfrog::trial::{ExperimentStage, ProposalSource, TrialRecord, Verdict};
+use support::{accept, approve, experiment, far, joined, open, parameters, plan, run, study, study_in, ticks};
 
 const PATIENT: Duration = Duration::from_secs(3600);
 
@@ -128,6 +130,84 @@ fn a_hand_measured_value_replaces_the_measured_one_and_both_are_kept() {
     let row = experiment.row(spec.trial).unwrap();
     assert_eq!((row.value, row.hand_value), (Some(0.5), Some(0.5)));
     assert_eq!(row.measured.as_ref().unwrap().dx_m, far(&spec));
+}
+
+/// The change is in the history from which the sampler proposes and in the journal, with the verdict before it.
+#[test]
+fn a_final_verdict_can_be_changed_and_the_journal_keeps_both() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("study.log");
+    let mut experiment = Experiment::open(plan(6), study(Storage::File(path.clone()))).unwrap();
+    let first = accept(&mut experiment).trial;
+    let refused = |experiment: &mut Experiment, trial, verdict, reason: &str, expected: &str| {
+        let error = experiment.change_verdict(trial, verdict, reason).unwrap_err().to_string();
+        assert!(error.contains(expected), "{error}");
+    };
+    refused(&mut experiment, first, Verdict::Fall, "it lay", "undo takes it back");
+    let second = accept(&mut experiment).trial;
+    let value = experiment.row(first).unwrap().value;
+    refused(&mut experiment, first, Verdict::Accept, "it lay", "is accept already");
+    refused(&mut experiment, first, Verdict::Fall, " ", "give the reason");
+    refused(&mut experiment, 9, Verdict::Fall, "it lay", "there is no trial 9");
+    let before = experiment.proposal().unwrap();
+    assert_eq!(experiment.change_verdict(first, Verdict::Fall, "it lay on its back").unwrap(), Verdict::Accept);
+    let after = experiment.proposal().unwrap();
+    assert!(after.revision > before.revision, "the approval of an earlier card would be refused");
+    let row = experiment.row(first).unwrap();
+    assert_eq!((row.verdict, row.value), (Some(Verdict::Fall), Some(0.0)));
+    assert!(row.cause.starts_with("changed by the operator, was accept: it lay on its back; "), "{}", row.cause);
+    assert_eq!(experiment.best().unwrap().trial, second);
+    experiment.change_verdict(first, Verdict::Void, "the mat slid").unwrap();
+    assert_eq!((experiment.counted(), experiment.row(first).unwrap().value), (1, None));
+    experiment.change_verdict(first, Verdict::Accept, "the video shows a landing").unwrap();
+    assert_eq!((experiment.counted(), experiment.row(first).unwrap().value), (2, value));
+    experiment.change_verdict(first, Verdict::Fall, "it lay").unwrap();
+    let shown = |row: &TrialRecord| (row.verdict, row.value, row.cause.clone());
+    let rows: Vec<_> = experiment.rows().map(shown).collect();
+    experiment.close().unwrap();
+    drop(experiment);
+
+    let opened = study(Storage::File(path.clone()));
+    let stored = opened.trial(first).unwrap();
+    assert_eq!((stored.value, stored.is_fall()), (Some(0.0), true));
+    let changes = opened.attributes()[&format!("verdict:{first}")].as_array().unwrap();
+    let verdicts: Vec<_> = changes.iter().map(|c| (c["old_verdict"].as_str(), c["verdict"].as_str())).collect();
+    let expected = [("accept", "fall"), ("fall", "void"), ("void", "accept"), ("accept", "fall")];
+    assert_eq!(verdicts, expected.map(|(old, new)| (Some(old), Some(new))));
+    assert_eq!(changes[0]["old_value"].as_f64(), value);
+    assert_eq!(changes[0]["reason"], "it lay on its back");
+    let reopened = Experiment::open(plan(6), opened).unwrap();
+    assert_eq!(
+        reopened.rows().map(shown).collect::<Vec<_>>(),
+        rows,
+        "a session that continues shows the changed table"
+    );
+    // The lines of the trial itself are as they were: Optuna shows its first value.
+    let text = std::fs::read_to_string(&path).unwrap();
+    let told = text.lines().filter(|line| line.contains("\"op_code\": 6") || line.contains("\"op_code\":6"));
+    assert!(told.clone().any(|line| line.contains(&value.unwrap().to_string())), "{text}");
+}
+
+#[test]
+fn a_verdict_cannot_be_changed_during_a_trial() {
+    let mut experiment = experiment(5);
+    let first = accept(&mut experiment).trial;
+    let second = approve(&mut experiment);
+    assert!(experiment.change_verdict(first, Verdict::Fall, "it lay").is_err(), "running");
+    experiment.ended(second.trial, &TrialEnd::Settled, &[], 0);
+    assert!(experiment.change_verdict(first, Verdict::Fall, "it lay").is_err(), "under review");
+}
+
+/// Six digits name a value; 17 hide it.
+#[test]
+fn requests_name_numbers_with_six_digits() {
+    let value = 1.549_158_564_216_723_6;
+    let fix = OperatorRequest::Fix { parameter: "f0".into(), value, trials: 5 };
+    assert_eq!(fix.to_string(), "fix f0 = 1.54916 for 5 trials");
+    let point = vec![("f0".to_owned(), value), ("Fx".to_owned(), 90.0), ("Fz".to_owned(), 242.295_872_450_586_4)];
+    assert_eq!(OperatorRequest::Enqueue(point).to_string(), "queue f0 = 1.54916, Fx = 90, Fz = 242.296");
+    let zero = OperatorRequest::Override { parameter: "Fx".into(), value: 0.0 };
+    assert_eq!(zero.to_string(), "override Fx = 0");
 }
 
 #[test]

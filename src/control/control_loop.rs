@@ -13,7 +13,7 @@ use crate::realtime::channel::{ControlPorts, Lowering, LoweringLatch, SHOWN_EVER
 use crate::realtime::clock::{Clock, SuspendWatch};
 use crate::realtime::thread::TickStart;
 use crate::robot::{CONTROL_PERIOD_S, JointCommand, LinkStatus, Placement, Robot, RobotError, RobotState};
-use crate::telemetry::{Command, Counters, Event, Mode, Snapshot, Tick};
+use crate::telemetry::{Command, Counters, Event, Mode, Snapshot, Tick, TrialInhibit};
 
 /// Ticks between two updates of counters and readiness for the session; every event causes one too.
 const COUNTERS_EVERY: u64 = 100;
@@ -23,6 +23,8 @@ pub struct ControlLoop {
     cycle: Cycle,
     end: ControlPorts,
     counters: Counters,
+    /// The reason for which a trial would not be approved, as of the last readiness.
+    unready: Option<TrialInhibit>,
     heartbeat: HeartbeatWatch,
     lowering: LoweringWatch,
     events_lost: bool,
@@ -40,6 +42,7 @@ impl ControlLoop {
             cycle: Cycle::new(settings),
             end,
             counters: Counters::default(),
+            unready: None,
             heartbeat: HeartbeatWatch::default(),
             lowering: LoweringWatch::default(),
             events_lost: false,
@@ -88,13 +91,15 @@ impl ControlLoop {
         if has_events || tick.number.is_multiple_of(COUNTERS_EVERY) {
             // Before the events, so that a session that receives DISARMED reads current findings.
             end.counters.write(*counters);
-            end.readiness.write(cycle.readiness());
+            let readiness = cycle.readiness();
+            self.unready = readiness.inhibit.or(readiness.unready);
+            end.readiness.write(readiness);
         }
         for event in cycle.events().iter() {
             counters.commands_refused += u64::from(matches!(event, Event::Refused { .. }));
             self.events_lost |= end.events.push(event).is_err();
         }
-        end.snapshot.write(Snapshot { tick, counters: *counters });
+        end.snapshot.write(Snapshot { tick, counters: *counters, unready: self.unready });
         cycle.last()
     }
 

@@ -142,6 +142,21 @@ impl Trial {
         self.user_attributes.get(VERDICT).and_then(Value::as_str) == Some(FALL)
     }
 
+    /// Applies a change of its verdict after its end; a value without a known verdict changes nothing. The members are those
+    /// of [`VerdictChange`].
+    pub(super) fn change_verdict(&mut self, change: &Value) {
+        let value = change.get("value").and_then(Value::as_f64);
+        let state = match (change.get(VERDICT).and_then(Value::as_str), value) {
+            (Some("void"), _) => TrialState::Fail,
+            (Some("accept" | FALL), Some(_)) => TrialState::Complete,
+            _ => return,
+        };
+        (self.state, self.value) = (state, value.filter(|_| state == TrialState::Complete));
+        for name in [VERDICT, "value", "cause"] {
+            self.user_attributes.insert(name.to_owned(), change.get(name).cloned().unwrap_or_default());
+        }
+    }
+
     /// The joint sample announced to other workers, empty without one. Optuna stores it as JSON text in pieces.
     pub fn announced(&self) -> Vec<(String, f64)> {
         let text: String =
@@ -162,6 +177,29 @@ impl Trial {
 pub const VERDICT: &str = "verdict";
 /// The verdict of a trial that ended with a fall. Its value shows the sampler a region to avoid.
 pub const FALL: &str = "fall";
+/// Study user attribute of a verdict that was changed after the trial's end: this prefix and the number of the trial. An array
+/// of [`VerdictChange`], the newest last.
+pub const CHANGED_VERDICT: &str = "verdict:";
+
+/// A verdict that was changed after the trial's end, and the one before.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct VerdictChange {
+    /// Time of the change, ISO 8601.
+    pub at: String,
+    /// The new verdict: `accept`, `fall` or `void`.
+    pub verdict: String,
+    /// The new value; none for void.
+    pub value: Option<f64>,
+    /// The new cause.
+    pub cause: String,
+    /// The reason of the operator.
+    pub reason: String,
+    /// The verdict before.
+    pub old_verdict: String,
+    /// The value before; none for void.
+    pub old_value: Option<f64>,
+}
+
 /// Trial user attribute: gains of the controller, an object. Trials with different gains are not repeats.
 pub const GAINS: &str = "gains";
 /// Trial system attribute: the fixed parameters, an object.

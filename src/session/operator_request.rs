@@ -4,7 +4,7 @@
 use std::fmt;
 
 use crate::telemetry::ArmingCheck;
-use crate::trial::Verdict;
+use crate::trial::{Verdict, six_digits};
 
 /// Arming check that only the operator can confirm.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -109,6 +109,8 @@ pub enum OperatorRequest {
     /// Void the trial under review for this reason, with `rerun` also queue the parameters again. Needed where the trial
     /// tripped a limit.
     VoidBecause { reason: String, rerun: bool },
+    /// Change the final verdict of a trial, for this reason.
+    ChangeVerdict { trial: u32, verdict: Verdict, reason: String },
     /// Take control of a real robot: the first commands are sent to it.
     TakeControl,
 }
@@ -123,15 +125,17 @@ impl fmt::Display for OperatorRequest {
             OperatorRequest::Approve { trial, .. } => write!(f, "approve trial {trial}"),
             OperatorRequest::Cancel => f.write_str("cancel the countdown"),
             OperatorRequest::Skip => f.write_str("skip the proposal"),
-            OperatorRequest::Override { parameter, value } => write!(f, "override {parameter} = {value}"),
-            OperatorRequest::OverrideGain { gain, value } => write!(f, "set the gain {gain} = {value}"),
+            OperatorRequest::Override { parameter, value } => {
+                write!(f, "override {parameter} = {}", six_digits(*value))
+            }
+            OperatorRequest::OverrideGain { gain, value } => write!(f, "set the gain {gain} = {}", six_digits(*value)),
             OperatorRequest::ClearOverrides => f.write_str("clear the overrides"),
             OperatorRequest::Fix { parameter, value, trials } => {
-                write!(f, "fix {parameter} = {value} for {trials} trials")
+                write!(f, "fix {parameter} = {} for {trials} trials", six_digits(*value))
             }
             OperatorRequest::Unfix { parameter } => write!(f, "search {parameter} again"),
             OperatorRequest::NarrowBounds { parameter, low, high } => {
-                write!(f, "search {parameter} from {low} to {high}")
+                write!(f, "search {parameter} from {} to {}", six_digits(*low), six_digits(*high))
             }
             OperatorRequest::ConfirmBest { repeats: 0 } => f.write_str("end the repeats"),
             OperatorRequest::ConfirmBest { repeats } => write!(f, "confirm the best with {repeats} repeats"),
@@ -139,16 +143,20 @@ impl fmt::Display for OperatorRequest {
             OperatorRequest::Rerun { trial: None } => f.write_str("re-run"),
             OperatorRequest::Rerun { trial: Some(trial) } => write!(f, "re-run trial {trial}"),
             OperatorRequest::Undo => f.write_str("undo the verdict"),
-            OperatorRequest::HandValue(Some(value)) => write!(f, "value measured by hand {value}"),
+            OperatorRequest::HandValue(Some(value)) => write!(f, "value measured by hand {}", six_digits(*value)),
             OperatorRequest::HandValue(None) => f.write_str("no value measured by hand"),
             OperatorRequest::Note { trial, text } => write!(f, "note on trial {trial}: {text}"),
             OperatorRequest::Enqueue(point) => {
-                let values: Vec<_> = point.iter().map(|(name, value)| format!("{name} = {value}")).collect();
+                let values: Vec<_> =
+                    point.iter().map(|(name, value)| format!("{name} = {}", six_digits(*value))).collect();
                 write!(f, "queue {}", values.join(", "))
             }
             OperatorRequest::Continue(trials) => write!(f, "continue for {trials} trials"),
             OperatorRequest::VoidBecause { reason, rerun: false } => write!(f, "void because: {reason}"),
             OperatorRequest::VoidBecause { reason, rerun: true } => write!(f, "re-run because: {reason}"),
+            OperatorRequest::ChangeVerdict { trial, verdict, reason } => {
+                write!(f, "change the verdict of trial {trial} to {}: {reason}", verdict.name())
+            }
             OperatorRequest::TakeControl => f.write_str("take control"),
         }
     }

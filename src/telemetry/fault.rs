@@ -205,7 +205,7 @@ fn exceeds(measured: f64, limit: f64, unit: &str, digits: usize) -> String {
 }
 
 /// Least number of decimals, from `digits` on, at which both numbers print differently.
-fn digits_apart(measured: f64, limit: f64, digits: usize) -> usize {
+pub(crate) fn digits_apart(measured: f64, limit: f64, digits: usize) -> usize {
     let alike = |digits: &usize| format!("{:.digits$}", measured.abs()) == format!("{:.digits$}", limit.abs());
     (digits..9).find(|digits| !alike(digits)).unwrap_or(digits)
 }

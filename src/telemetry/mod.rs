@@ -11,6 +11,7 @@ mod tick;
 pub use arming::{ArmingCheck, ArmingCheckSet, ArmingCheckState, ArmingFinding, ArmingFindings};
 pub use command::{Command, Permit, TrialSpec};
 pub use event::{CommandRefusal, Event, Readiness, TrialEnd};
+pub(crate) use fault::digits_apart;
 pub use fault::{CommanderSign, FailsafeWarning, FallCause, Fault, SensorCheck, TrialInhibit};
 pub use landing_terms::{Cutoff, LandingTerms};
 pub use mode::{Mode, Phase, TransitionCause};

@@ -2,7 +2,7 @@
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-use super::{Mode, Phase};
+use super::{Mode, Phase, TrialInhibit};
 use crate::robot::{JointCommand, Joints, LinkStatus, PerLeg, RobotState};
 
 /// Estimate of the base and the feet.
@@ -94,4 +94,6 @@ pub struct Snapshot {
     pub tick: Tick,
     /// Counters up to that tick.
     pub counters: Counters,
+    /// The reason for which a trial would not be approved at present; none while one could be.
+    pub unready: Option<TrialInhibit>,
 }

@@ -21,7 +21,7 @@ use crate::connection::{ConnectionMonitor, TerminalLocation};
 
 use crate::feed::Feed;
 use crate::input::{KeyReader, NumberedEvent, SpaceBarIsText, TerminalEvent, read_terminal};
-use crate::message::{Effect, Msg};
+use crate::message::{Effect, ExportedRows, Msg};
 use crate::model::Model;
 use crate::settings::{ChartMode, ConsoleSettings};
 use crate::terminal::{self, TerminalProtocol, TerminalScreen};
@@ -300,9 +300,16 @@ impl Console {
             // A failure of these two is reported with the next frame.
             Effect::Mouse(on) => drop(self.screen.mouse(on)),
             Effect::Redraw => drop(self.screen.clear()),
-            Effect::Export => {
-                let written = export::table(&self.model);
-                self.say_written(written, |path| format!("written: {} and trials.md beside it", path.display()));
+            Effect::Export(rows) => {
+                let written = export::table(&self.model, rows);
+                let (shown, all) = (self.model.trial_rows().len(), self.model.every_trial().len());
+                let count = match rows {
+                    ExportedRows::All => format!("all {all} trials"),
+                    ExportedRows::Shown => format!("{shown} of {all} trials, {} left out", all - shown.min(all)),
+                };
+                self.say_written(written, |path| {
+                    format!("written: {count}, {} and trials.md beside it", path.display())
+                });
             }
             Effect::ExportBest => {
                 let written = export::best(&self.model);

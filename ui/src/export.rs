@@ -6,6 +6,7 @@ use anyhow::{Context, anyhow};
 use quadfrog::config::Config;
 use quadfrog::engine::newest_config;
 
+use crate::message::ExportedRows;
 use crate::model::Model;
 use crate::text;
 
@@ -19,14 +20,14 @@ fn folder(model: &Model) -> PathBuf {
     folder.map_or_else(PathBuf::new, Path::to_owned)
 }
 
-/// Writes the trial table as shown, `trials.csv` and `trials.md`; returns the first.
+/// Writes the trial table, `trials.csv` and `trials.md`; returns the first.
 ///
 /// # Errors
 /// When one of them cannot be written.
-pub fn table(model: &Model) -> anyhow::Result<PathBuf> {
+pub fn table(model: &Model, rows: ExportedRows) -> anyhow::Result<PathBuf> {
     let csv = folder(model).join("trials.csv");
-    write(&csv, &text::as_csv(model))?;
-    write(&csv.with_extension("md"), &text::as_markdown(model))?;
+    write(&csv, &text::as_csv(model, rows))?;
+    write(&csv.with_extension("md"), &text::as_markdown(model, rows))?;
     Ok(csv)
 }
 

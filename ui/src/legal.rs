@@ -37,7 +37,10 @@ pub fn legal(action: Action, model: &Model) -> Legality {
             require(model.session.trials.best().is_some(), "no trial was accepted yet")?;
             require(!model.session.info.study.is_empty(), "this session keeps no study")
         }
-        A::Accept | A::Fall | A::Void | A::HandValue => {
+        A::Accept => may_judge(model, Verdict::Accept),
+        A::Fall => may_judge(model, Verdict::Fall),
+        A::Void => may_judge(model, Verdict::Void),
+        A::HandValue => {
             may_request(model)?;
             require(model.session.stage_is(ExperimentStage::Review), "no trial waits for a verdict")
         }
@@ -224,6 +227,20 @@ fn may_clear_overrides(model: &Model) -> Legality {
     let changed =
         |proposal: &Proposal| proposal.parameters.iter().chain(&proposal.gains).any(|p| p.value != p.proposed);
     require(model.session.open_proposal().is_some_and(changed), "nothing was overridden")
+}
+
+/// Under review, or in Trials a judged row that has another verdict.
+fn may_judge(model: &Model, verdict: Verdict) -> Legality {
+    may_request(model)?;
+    if model.session.stage_is(ExperimentStage::Review) {
+        return Ok(());
+    }
+    let row = model.selected_trial().filter(|_| model.view == View::Trials);
+    let Some((trial, before)) = row.and_then(|row| Some((row.trial, row.verdict?))) else {
+        return refuse("no trial waits for a verdict; in Trials, select a judged one to change it");
+    };
+    require(!model.session.stage_is(ExperimentStage::Running), "a trial is running")?;
+    require(before != verdict, &format!("trial {trial} is {} already", verdict.name()))
 }
 
 fn may_rerun(model: &Model) -> Legality {

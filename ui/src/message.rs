@@ -88,7 +88,7 @@ pub enum Effect {
     /// No longer.
     EndRejudge,
     /// Write the trial table to files beside the study.
-    Export,
+    Export(ExportedRows),
     /// Write the best parameters as a configuration beside the study.
     ExportBest,
     Redraw,
@@ -98,6 +98,15 @@ pub enum Effect {
     Suspend,
     /// Sit the robot down and end.
     Quit,
+}
+
+/// Rows of an exported table.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ExportedRows {
+    /// Every trial, by number.
+    All,
+    /// The table as shown: filtered and sorted.
+    Shown,
 }
 
 /// Results of judging the trials of a replay again.

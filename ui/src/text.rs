@@ -4,9 +4,10 @@ use quadfrog::optimize::ask::Direction;
 use quadfrog::report::recorded::Recordings;
 use quadfrog::report::study::ReportedStudy;
 use quadfrog::report::{study_page, text};
-use quadfrog::trial::{Displacement, TrialRecord, Verdict};
+use quadfrog::trial::{Displacement, TrialRecord, Verdict, six_digits};
 
 use crate::column::Column;
+use crate::message::ExportedRows;
 use crate::model::Model;
 use crate::model::session::SessionModel;
 use crate::model::trials::measured;
@@ -63,15 +64,15 @@ pub fn as_text(trial: &TrialRecord, model: &Model) -> String {
     text + &format!("\tJ={value} {unit}\t{verdict}\t{source}\t{remark}")
 }
 
-/// The names of the exported columns and the rows of the table as shown.
-fn export_cells(model: &Model) -> (Vec<String>, Vec<Vec<String>>) {
+/// The names of the exported columns and the rows, numbers written by `write`.
+fn export_cells(model: &Model, rows: ExportedRows, write: fn(f64) -> String) -> (Vec<String>, Vec<Vec<String>>) {
     let mut names = vec!["trial".to_owned()];
     names.extend(model.session.info.parameters.iter().map(|info| info.name.clone()));
     let rest = ["value", "hand_value", "verdict", "suggested", "cause", "source", "parent", "attempt"];
     names.extend(rest.map(str::to_owned));
     names.extend(["dx_m", "dy_m", "dyaw_rad", "apex_m", "air_s", "note"].map(str::to_owned));
     names.extend(["flights", "touchdown_dx_m", "touchdown_dy_m", "touchdown_dyaw_rad", "jumps"].map(str::to_owned));
-    let optional = |value: Option<f64>| value.map(|value| value.to_string()).unwrap_or_default();
+    let optional = |value: Option<f64>| value.map(write).unwrap_or_default();
     let row = |trial: &&TrialRecord| {
         let mut cells = vec![trial.trial.to_string()];
         cells.extend(model.session.info.parameters.iter().map(|info| optional(trial.parameters.get(&info.name))));
@@ -97,12 +98,16 @@ fn export_cells(model: &Model) -> (Vec<String>, Vec<Vec<String>>) {
         cells.push(measured.and_then(|m| serde_json::to_string(&m.jumps).ok()).unwrap_or_default());
         cells
     };
-    (names, model.trial_rows().iter().map(row).collect())
+    let rows = match rows {
+        ExportedRows::All => model.every_trial(),
+        ExportedRows::Shown => model.trial_rows(),
+    };
+    (names, rows.iter().map(row).collect())
 }
 
-/// The table as shown, as comma-separated values (RFC 4180).
-pub fn as_csv(model: &Model) -> String {
-    let (names, rows) = export_cells(model);
+/// The table as comma-separated values (RFC 4180), numbers with all digits.
+pub fn as_csv(model: &Model, rows: ExportedRows) -> String {
+    let (names, rows) = export_cells(model, rows, |value| value.to_string());
     let quote = |cell: &String| {
         if cell.contains([',', '"', '\n', '\r']) { format!("\"{}\"", cell.replace('"', "\"\"")) } else { cell.clone() }
     };
@@ -110,9 +115,9 @@ pub fn as_csv(model: &Model) -> String {
     std::iter::once(&names).chain(&rows).map(line).collect()
 }
 
-/// The table as shown, as a Markdown table.
-pub fn as_markdown(model: &Model) -> String {
-    let (names, rows) = export_cells(model);
+/// The table as a Markdown table, for reading: numbers with six digits.
+pub fn as_markdown(model: &Model, rows: ExportedRows) -> String {
+    let (names, rows) = export_cells(model, rows, six_digits);
     let line = |cells: &Vec<String>| {
         let cells: Vec<String> = cells.iter().map(|cell| cell.replace('|', "\\|").replace('\n', " ")).collect();
         format!("| {} |\n", cells.join(" | "))

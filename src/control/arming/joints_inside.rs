@@ -1,6 +1,7 @@
 //! Every joint is inside its limits, with a margin.
 
 use super::check::*;
+use crate::telemetry::digits_apart;
 
 pub(super) const CHECK: ControlCheck = ControlCheck {
     check: ArmingCheck::JointsInside,
@@ -12,7 +13,10 @@ pub(super) const CHECK: ControlCheck = ControlCheck {
         })
     },
     found: |finding| match finding.measured {
-        beyond if beyond > 0.0 => format!("{} {beyond:.2} rad beyond", joint_of(finding)),
+        beyond if beyond > 0.0 => {
+            let digits = digits_apart(beyond, finding.allowed, 2);
+            format!("{} {beyond:.digits$} rad beyond", joint_of(finding))
+        }
         _ => "all".to_owned(),
     },
     needed: |limits| format!("at most {:.2} rad beyond", limits.joint_margin_rad),

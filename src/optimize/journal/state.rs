@@ -1,7 +1,7 @@
 //! The state of a journal: the result of all its lines by Optuna's rules of acceptance (`docs/journal.md`).
 
-use super::operation::Operation;
-use crate::optimize::trial::{Distribution, Trial, TrialState};
+use super::operation::{AttributeKind, Operation};
+use crate::optimize::trial::{CHANGED_VERDICT, Distribution, Trial, TrialState};
 use serde_json::Value;
 use std::collections::BTreeMap;
 
@@ -20,6 +20,20 @@ pub struct StudyRecord {
     pub system_attributes: BTreeMap<String, Value>,
     /// Trials in the order of their numbers.
     pub trials: Vec<Trial>,
+}
+
+impl StudyRecord {
+    /// Sets an attribute. One that changes the verdict of a finished trial changes that trial, too.
+    fn set(&mut self, kind: AttributeKind, key: String, value: Value) {
+        let number = key.strip_prefix(CHANGED_VERDICT).filter(|_| kind == AttributeKind::User);
+        let trial = number.and_then(|number| self.trials.get_mut(number.parse::<usize>().ok()?));
+        if let (Some(trial), Some(newest)) = (trial, value.as_array().and_then(|changes| changes.last()))
+            && trial.state.is_finished()
+        {
+            trial.change_verdict(newest);
+        }
+        kind.of(&mut self.user_attributes, &mut self.system_attributes).insert(key, value);
+    }
 }
 
 /// All studies of a journal.
@@ -76,7 +90,7 @@ impl JournalState {
             Operation::DeleteStudy { study } => self.study(study).map(|s| s.deleted = true).is_some(),
             Operation::StudyAttribute { study, kind, key, value } => {
                 let study = self.study(study);
-                study.map(|s| kind.of(&mut s.user_attributes, &mut s.system_attributes).insert(key, value)).is_some()
+                study.map(|s| s.set(kind, key, value)).is_some()
             }
             Operation::CreateTrial { study, started, template } => {
                 let id = self.trials.len() as u64;

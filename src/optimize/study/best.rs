@@ -9,7 +9,7 @@ use crate::optimize::trial::{Trial, TrialState};
 use serde::{Deserialize, Serialize};
 
 /// User attribute of a study: the best trial by the sampler's model, a [`ModelBest`].
-const MODEL_BEST: &str = "model_best";
+pub(super) const MODEL_BEST: &str = "model_best";
 
 /// The trial of the largest predicted mean among those that stood. The largest value of a noisy objective is that of a lucky
 /// jump, and is not reached again.

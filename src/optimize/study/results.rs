@@ -1,11 +1,12 @@
 //! Changes of trials: attributes, outcomes, the queue.
 
 use jiff::Timestamp;
-use serde_json::{Map, Value};
+use serde_json::{Map, Value, json};
 
+use super::best::MODEL_BEST;
 use super::{Outcome, Study, StudyError, TellOutcome, study_attributes, user_attributes};
 use crate::optimize::journal::{Applied, JournalError, Operation};
-use crate::optimize::trial::{FIXED_PARAMS, Trial, TrialState};
+use crate::optimize::trial::{CHANGED_VERDICT, FIXED_PARAMS, Trial, TrialState, VerdictChange};
 
 impl Study {
     /// Sets user attributes of a running or waiting trial: verdict, cause, measured terms. A finished trial is immutable
@@ -64,6 +65,27 @@ impl Study {
         })?;
         let recorded = applied.last() == Some(&Applied::Accepted);
         Ok(if recorded { TellOutcome::Recorded } else { TellOutcome::AlreadyFinished })
+    }
+
+    /// Changes the verdict of a finished trial. The trial itself is immutable: the change is appended to an attribute of the
+    /// study, from which this program takes state, value, verdict and cause of the trial. The stored best trial by the
+    /// sampler's model becomes invalid. [`StudyError::State`] if the trial is not finished.
+    pub fn change_verdict(&mut self, trial: u32, change: &VerdictChange) -> Result<(), StudyError> {
+        let id = self.trial(trial)?.id;
+        let (study, key) = (self.id, format!("{CHANGED_VERDICT}{trial}"));
+        self.journal.commit(|journal| match journal.trial(id) {
+            Some(t) if !t.state.is_finished() => {
+                Err(StudyError::State { trial, state: t.state, action: "its verdict is not final: judge it" })
+            }
+            _ => {
+                let attributes = journal.studies().get(study).map(|record| &record.user_attributes);
+                let before = attributes.and_then(|of| of.get(&key)).and_then(Value::as_array);
+                let changes: Vec<Value> = before.into_iter().flatten().cloned().chain([json!(change)]).collect();
+                Ok(study_attributes(study, &[(key.clone(), changes.into()), (MODEL_BEST.to_owned(), Value::Null)])
+                    .collect())
+            }
+        })?;
+        Ok(())
     }
 
     /// Enqueues a trial with the given parameters; the others are suggested when it begins. Returns its number, or

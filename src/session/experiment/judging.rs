@@ -197,7 +197,7 @@ impl Experiment {
 
 /// Returns the value of a row with a verdict: 0 for a fall (paper, section II-D), none for void, else the value measured by
 /// hand or by the robot.
-fn value_of(row: &TrialRecord, verdict: Verdict, plan: &ExperimentPlan) -> Option<f64> {
+pub(super) fn value_of(row: &TrialRecord, verdict: Verdict, plan: &ExperimentPlan) -> Option<f64> {
     match verdict {
         Verdict::Fall => Some(0.0),
         Verdict::Void => None,

@@ -18,6 +18,7 @@ mod queue;
 mod repeats;
 mod search;
 mod trial_changes;
+mod verdict_change;
 
 pub use self::plan::{ExperimentPlan, RequestRefusal};
 pub use self::proposal_start::next_seed;

@@ -5,7 +5,7 @@ use super::attributes::{self, BudgetAttribute, Origin};
 use super::open_proposal::OpenProposal;
 use super::plan::{RequestRefusal, not_now};
 use super::{Experiment, ExperimentState, confirmation, envelope};
-use crate::trial::{ParameterInfo, ProposalSource};
+use crate::trial::{ParameterInfo, ProposalSource, six_digits};
 
 impl Experiment {
     /// Sets one parameter of the proposal.
@@ -225,6 +225,7 @@ pub fn must_be_within(all: &[ParameterInfo], what: &str, name: &str, value: f64)
     if value >= *low && value <= *high {
         Ok(())
     } else {
+        let value = six_digits(value);
         not_now(format!("{name} = {value} {unit} is outside its bounds {low} to {high} {unit}"))
     }
 }

@@ -3,7 +3,7 @@
 use crate::session::experiment::{Experiment, RequestRefusal};
 use crate::session::operator_request::OperatorRequest;
 use crate::session::storage::JobOutput;
-use crate::trial::Verdict;
+use crate::trial::{Verdict, six_digits};
 
 /// Carries out a request. One that is not of the study is refused.
 pub fn carry_out(experiment: &mut Experiment, request: &OperatorRequest) -> JobOutput {
@@ -36,7 +36,7 @@ fn change(experiment: &mut Experiment, request: &OperatorRequest) -> Result<Stri
         }
         OperatorRequest::Override { parameter, value } => {
             experiment.set_parameter(parameter, *value)?;
-            format!("{parameter} will be {value}")
+            format!("{parameter} will be {}", six_digits(*value))
         }
         OperatorRequest::ClearOverrides => {
             experiment.clear_overrides()?;
@@ -44,11 +44,11 @@ fn change(experiment: &mut Experiment, request: &OperatorRequest) -> Result<Stri
         }
         OperatorRequest::OverrideGain { gain, value } => {
             experiment.set_gain(gain, *value)?;
-            format!("{gain} will be {value} in this trial")
+            format!("{gain} will be {} in this trial", six_digits(*value))
         }
         OperatorRequest::Fix { parameter, value, trials } => {
             experiment.fix(parameter, *value, *trials)?;
-            format!("{parameter} is {value} for the next {trials} trials that count")
+            format!("{parameter} is {} for the next {trials} trials that count", six_digits(*value))
         }
         OperatorRequest::Unfix { parameter } => {
             experiment.unfix(parameter)?;
@@ -56,7 +56,7 @@ fn change(experiment: &mut Experiment, request: &OperatorRequest) -> Result<Stri
         }
         OperatorRequest::NarrowBounds { parameter, low, high } => {
             experiment.narrow_bounds(parameter, *low, *high)?;
-            format!("{parameter} is searched from {low} to {high}")
+            format!("{parameter} is searched from {} to {}", six_digits(*low), six_digits(*high))
         }
         OperatorRequest::ConfirmBest { repeats } => {
             let trials: Vec<String> = experiment.confirm_best(*repeats)?.iter().map(u32::to_string).collect();
@@ -73,10 +73,14 @@ fn change(experiment: &mut Experiment, request: &OperatorRequest) -> Result<Stri
             experiment.undo()?;
             "the verdict is taken back".to_owned()
         }
+        OperatorRequest::ChangeVerdict { trial, verdict, reason } => {
+            let before = experiment.change_verdict(*trial, *verdict, reason)?;
+            format!("trial {trial} is {} now, was {}; the journal keeps both", verdict.name(), before.name())
+        }
         OperatorRequest::HandValue(value) => {
             experiment.set_hand_value(*value)?;
             match value {
-                Some(value) => format!("{value} counts instead of the measured value"),
+                Some(value) => format!("{} counts instead of the measured value", six_digits(*value)),
                 None => "the measured value counts".to_owned(),
             }
         }

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use quadfrog::trial::{ParameterInfo, Proposal, ProposedParameter};
+use quadfrog::trial::{ParameterInfo, Proposal, ProposedParameter, Verdict};
 use tui_input::Input;
 
 use super::session::SessionModel;
@@ -37,7 +37,11 @@ pub enum Dialog {
     /// The arming checks; those of the operator can be selected.
     ArmingChecks {
         selected: usize,
+        /// One more than the lines above the shown ones; 0 shows the selected item.
+        scroll: usize,
     },
+    /// A question that `y` answers; every other key cancels.
+    Confirm(Question),
     /// Confirmation of quitting while the robot is armed or a trial waits.
     Quit,
     Override(OverrideForm),
@@ -45,7 +49,14 @@ pub enum Dialog {
     Field {
         purpose: Purpose,
         input: Input,
+        /// Whether the whole text is selected: the first character typed replaces it.
+        replaces: bool,
         problem: Option<String>,
+    },
+    /// The table does not show all trials: which of them to write.
+    Export {
+        shown: usize,
+        all: usize,
     },
     /// All actions with a filter.
     Palette {
@@ -70,6 +81,16 @@ pub enum Dialog {
     },
 }
 
+/// A question before an action that a single key would carry out by accident.
+#[derive(Debug, Clone, PartialEq)]
+#[expect(missing_docs, reason = "the names say the rest")]
+pub enum Question {
+    /// Refuse this proposal.
+    Skip { trial: u32, revision: u32 },
+    /// Accept a trial whose suggested verdict is a fall.
+    AcceptFall { trial: u32 },
+}
+
 /// Purpose of a text field. A parameter is its index in the session's list.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[expect(missing_docs, reason = "the names say the rest")]
@@ -92,6 +113,11 @@ pub enum Purpose {
         trial: u32,
         rerun: bool,
     },
+    /// The reason to change the final verdict of a trial.
+    ChangeVerdict {
+        trial: u32,
+        verdict: Verdict,
+    },
     TrialNumber,
     LogSearch,
     /// A time or a trial of a replay.
@@ -100,6 +126,28 @@ pub enum Purpose {
     Beside,
     /// The folder of the configuration by which the trials of a replay are judged again.
     Rejudge,
+}
+
+impl Purpose {
+    /// The characters that its text may hold; none for any.
+    pub fn characters(self) -> Option<&'static str> {
+        match self {
+            Purpose::HandValue(_) | Purpose::Bounds { .. } => Some("0123456789.,+-e"),
+            Purpose::Continue | Purpose::Fix { .. } | Purpose::ConfirmBest | Purpose::TrialNumber => Some("0123456789"),
+            Purpose::Beside => Some("0123456789#"),
+            Purpose::Seek => Some("0123456789.,:#"),
+            Purpose::Note(_)
+            | Purpose::VoidReason { .. }
+            | Purpose::ChangeVerdict { .. }
+            | Purpose::LogSearch
+            | Purpose::Rejudge => None,
+        }
+    }
+
+    /// Whether its text is a remark of the operator.
+    pub fn is_remark(self) -> bool {
+        matches!(self, Purpose::Note(_) | Purpose::VoidReason { .. } | Purpose::ChangeVerdict { .. })
+    }
 }
 
 /// Subject of a list of switches.
@@ -111,17 +159,16 @@ pub enum Choice {
 }
 
 impl Dialog {
-    /// A text field with an initial text.
+    /// A text field with an initial text. A number is selected, so that typing replaces it; other text is not.
     pub fn field(purpose: Purpose, text: &str) -> Dialog {
-        Dialog::Field { purpose, input: Input::new(text.to_owned()), problem: None }
+        let replaces = purpose.characters().is_some() && !text.is_empty();
+        Dialog::Field { purpose, input: Input::new(text.to_owned()), replaces, problem: None }
     }
 
     /// Whether a space is text here: not where a number is typed.
     pub fn takes_spaces(&self) -> bool {
         match self {
-            Dialog::Field { purpose, .. } => {
-                matches!(purpose, Purpose::Note(_) | Purpose::VoidReason { .. } | Purpose::LogSearch | Purpose::Rejudge)
-            }
+            Dialog::Field { purpose, .. } => purpose.characters().is_none(),
             Dialog::Palette { .. } => true,
             _ => false,
         }

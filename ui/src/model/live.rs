@@ -27,6 +27,10 @@ pub struct LiveView {
     pub ghost: Option<u32>,
     /// Two trials in place of the present; none shows the present.
     pub comparison: Option<Comparison>,
+    /// Whether the charts show the present although a trial waits for its verdict.
+    pub present_in_review: bool,
+    /// Time under the cursor on the trial that waits for its verdict, ns; none without a cursor.
+    pub landed_cursor_ns: Option<u64>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -4,6 +4,7 @@ pub(crate) mod comparison;
 pub mod dialog;
 pub(crate) mod history;
 pub mod jump_series;
+pub(crate) mod landed;
 pub(crate) mod live;
 pub(crate) mod log;
 pub(crate) mod rejudged;
@@ -31,6 +32,7 @@ use crate::theme::{Background, Theme, ThemeChoice};
 use dialog::{Choice, Dialog};
 use history::SignalHistory;
 use jump_series::JumpSeries;
+use landed::LandedTrial;
 use live::{LiveView, Panel};
 use log::LogView;
 use rejudged::RejudgedTable;
@@ -167,6 +169,8 @@ impl Model {
                 cursor_ns: 0,
                 ghost: None,
                 comparison: None,
+                present_in_review: false,
+                landed_cursor_ns: None,
             },
             trial_table: TrialTable { columns: settings.trial_columns, ..TrialTable::default() },
             override_row: 0,
@@ -200,6 +204,11 @@ impl Model {
     /// Whether the robot is energised and this console commands it.
     pub fn robot_is_energised(&self) -> bool {
         self.replay.is_none() && self.mode().energised()
+    }
+
+    /// Whether the arming checks are those of an earlier time: they run while the robot is disarmed.
+    pub fn arming_checks_are_past(&self) -> bool {
+        self.mode() != Mode::Disarmed
     }
 
     /// Whether an observer's STOP is in force.
@@ -249,6 +258,13 @@ impl Model {
         self.trial_table.rows(&self.session.trials, self.later_trials(), &self.session.info.parameters)
     }
 
+    /// Every trial, by number: also those that the table does not show.
+    pub fn every_trial(&self) -> Vec<&TrialRecord> {
+        let mut rows: Vec<&TrialRecord> = self.session.trials.records.values().chain(self.later_trials()).collect();
+        rows.sort_by_key(|row| row.trial);
+        rows
+    }
+
     /// The trials of a replay that are not proposed yet at the playhead, as they will be at the end.
     pub fn later_trials(&self) -> impl Iterator<Item = &TrialRecord> + '_ {
         let rows = self.timeline.iter().flat_map(|timeline| timeline.rows.values());
@@ -287,6 +303,16 @@ impl Model {
         } else {
             self.session.under_review().or(self.session.trials.newest())
         }
+    }
+
+    /// The trial that waits for its verdict, as the charts of Live draw it; none where they draw something else.
+    pub fn landed(&self) -> Option<LandedTrial<'_>> {
+        let live = &self.live;
+        let elsewhere = live.present_in_review || live.frozen.is_some() || live.comparison.is_some();
+        let trial = self.session.under_review().filter(|_| !elsewhere && self.replay.is_none())?.trial;
+        let best = self.session.trials.best().map(|best| best.trial);
+        let under = live.ghost.or(best).filter(|under| *under != trial);
+        LandedTrial::of(&self.history, trial, under)
     }
 
     /// The samples that the charts draw: the running history, or the frozen one.

@@ -21,6 +21,8 @@ pub struct SessionModel {
     pub proposal: Option<Proposal>,
     /// The newest arming checks; empty before the robot was disarmed for the first time.
     pub arming_checks: Vec<ArmingCheckRecord>,
+    /// Time of the newest arming checks, ns since the engine started.
+    pub arming_checked_ns: u64,
     /// Present bounds, fixed parameters and budget.
     pub search: Option<SearchStatus>,
     /// Densities and importances behind the sampler's newest proposal.
@@ -48,6 +50,11 @@ impl SessionModel {
     /// The trial that waits for its verdict.
     pub fn under_review(&self) -> Option<&TrialRecord> {
         self.trials.records.get(&self.trial_in(ExperimentStage::Review)?)
+    }
+
+    /// The trial that waits for its verdict, if its suggested one is a fall.
+    pub fn suggested_fall(&self) -> Option<&TrialRecord> {
+        self.under_review().filter(|trial| trial.suggested == Some(Verdict::Fall))
     }
 
     /// The proposal that waits for approval.

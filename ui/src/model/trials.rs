@@ -23,12 +23,14 @@ pub struct Trials {
 }
 
 /// Run time of a trial, ns since the engine started.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct RunTime {
     /// Its approval.
     pub begun_ns: u64,
     /// The end of its measurement; none while it runs.
     pub ended_ns: Option<u64>,
+    /// The bounds within which it was proposed, in table order of the parameters.
+    pub bounds: Vec<(f64, f64)>,
 }
 
 impl Trials {

@@ -59,6 +59,11 @@ pub(super) fn move_cursor(model: &mut Model, step: i64) {
         comparison.cursor_ns = comparison.cursor_ns.saturating_add_signed(step_ns).clamp(first, last);
         return;
     }
+    if let Some(landed) = model.landed() {
+        let cursor_ns = landed.moved_cursor_ns(model.live.landed_cursor_ns, step);
+        model.live.landed_cursor_ns = Some(cursor_ns);
+        return;
+    }
     if model.live.frozen.is_none() {
         freeze(model);
     }
@@ -69,7 +74,22 @@ pub(super) fn move_cursor(model: &mut Model, step: i64) {
     model.live.cursor_ns = model.live.cursor_ns.saturating_add_signed(step_ns).clamp(oldest, newest);
 }
 
+/// Freezes the charts, or goes on with them. While a trial waits for its verdict: between that trial and the present.
 pub(super) fn freeze(model: &mut Model) {
+    let landed = model.landed().map(|landed| landed.trial);
+    let reviewed = model.session.under_review().map(|row| row.trial);
+    let key = model.keymap.key(Action::Freeze);
+    if let Some(trial) = landed {
+        model.live.present_in_review = true;
+        say(model, LogLevel::Info, format!("the charts show the present; {key} shows trial {trial} again"));
+        return;
+    }
+    if model.live.present_in_review && model.live.frozen.is_none() && reviewed.is_some() {
+        model.live.present_in_review = false;
+        if model.landed().is_some() {
+            return;
+        }
+    }
     model.live.frozen = match model.live.frozen.take() {
         Some(_) => None,
         None => {
@@ -80,6 +100,12 @@ pub(super) fn freeze(model: &mut Model) {
 }
 
 pub(super) fn zoom(model: &mut Model, factor: f64) {
+    if let Some(trial) = model.landed().map(|landed| landed.trial) {
+        let key = model.keymap.key(Action::Freeze);
+        let text = format!("trial {trial} is fitted to the charts; {key} returns to the present, which can be zoomed");
+        say(model, LogLevel::Info, text);
+        return;
+    }
     model.live.window_s = (model.live.window_s * factor).clamp(1.0, 60.0);
 }
 

@@ -4,7 +4,7 @@ use quadfrog::recording::record::LogLevel;
 use quadfrog::session::objective;
 use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::telemetry::Mode;
-use quadfrog::trial::{ExperimentStage, Proposal, Verdict};
+use quadfrog::trial::{ExperimentStage, Proposal, Verdict, six_digits};
 use strum::VariantArray;
 
 use super::beside;
@@ -13,8 +13,8 @@ use super::rejudged;
 use super::request::{interrupt, request, say, stop};
 use crate::action::Action;
 use crate::legal::{legal, may_acknowledge, may_request};
-use crate::message::{Effect, ReplayCommand, ReplayStep};
-use crate::model::dialog::{Choice, Dialog, OverrideForm, Purpose};
+use crate::message::{Effect, ExportedRows, ReplayCommand, ReplayStep};
+use crate::model::dialog::{Choice, Dialog, OverrideForm, Purpose, Question};
 use crate::model::{Model, View};
 use crate::text::report;
 use crate::theme::Background;
@@ -26,7 +26,7 @@ pub(super) fn perform(model: &mut Model, action: Action) -> Vec<Effect> {
         // All failed arming checks are shown at once.
         let shown = action == Action::Arm && model.mode() == Mode::Disarmed && model.session.failing_checks() > 0;
         if shown && may_request(model).is_ok() {
-            open(model, Dialog::ArmingChecks { selected: 0 });
+            open(model, Dialog::ArmingChecks { selected: 0, scroll: 0 });
         }
         return Vec::new();
     }
@@ -39,7 +39,7 @@ pub(super) fn perform(model: &mut Model, action: Action) -> Vec<Effect> {
             open(model, Dialog::Arm { typed: 0, opened_at: model.clock })
         }
         Action::Arm => return request(model, OperatorRequest::Arm),
-        Action::ArmingChecks => open(model, Dialog::ArmingChecks { selected: 0 }),
+        Action::ArmingChecks => open(model, Dialog::ArmingChecks { selected: 0, scroll: 0 }),
         Action::SitDown => return request(model, OperatorRequest::SitDown),
         Action::Acknowledge => return request(model, OperatorRequest::Acknowledge),
         Action::Approve => {
@@ -52,21 +52,30 @@ pub(super) fn perform(model: &mut Model, action: Action) -> Vec<Effect> {
         Action::Fix => return fix(model),
         Action::Bounds => bounds(model),
         Action::QueuePoint => return queue_point(model),
-        Action::Skip => return request(model, OperatorRequest::Skip),
+        Action::Skip => {
+            if let Some(&Proposal { trial, revision, .. }) = model.session.open_proposal() {
+                open(model, Dialog::Confirm(Question::Skip { trial, revision }));
+            }
+        }
         Action::Continue => open(model, Dialog::field(Purpose::Continue, "20")),
         Action::ConfirmBest if model.session.confirming().is_some() => {
             return request(model, OperatorRequest::ConfirmBest { repeats: 0 });
         }
         Action::ConfirmBest => open(model, Dialog::field(Purpose::ConfirmBest, "10")),
         Action::ExportBest => return vec![Effect::ExportBest],
-        Action::Accept => return request(model, OperatorRequest::Judge(Verdict::Accept)),
-        Action::Fall => return request(model, OperatorRequest::Judge(Verdict::Fall)),
-        Action::Void => return void(model, false),
+        Action::Accept if model.session.suggested_fall().is_some() => {
+            if let Some(trial) = model.session.suggested_fall().map(|row| row.trial) {
+                open(model, Dialog::Confirm(Question::AcceptFall { trial }));
+            }
+        }
+        Action::Accept => return judge(model, Verdict::Accept),
+        Action::Fall => return judge(model, Verdict::Fall),
+        Action::Void => return judge(model, Verdict::Void),
         Action::Rerun => return rerun(model),
         Action::Undo => return request(model, OperatorRequest::Undo),
         Action::HandValue => {
             if let Some(trial) = model.session.under_review() {
-                let text = trial.hand_value.map(|value| value.to_string()).unwrap_or_default();
+                let text = trial.hand_value.map(six_digits).unwrap_or_default();
                 open(model, Dialog::field(Purpose::HandValue(trial.trial), &text));
             }
         }
@@ -117,7 +126,13 @@ pub(super) fn perform(model: &mut Model, action: Action) -> Vec<Effect> {
                 return vec![Effect::CopyTrial(trial)];
             }
         }
-        Action::Export => return vec![Effect::Export],
+        Action::Export => {
+            let (shown, all) = (model.trial_rows().len(), model.every_trial().len());
+            if shown == all {
+                return vec![Effect::Export(ExportedRows::All)];
+            }
+            open(model, Dialog::Export { shown, all });
+        }
         Action::Seek => open(model, Dialog::field(Purpose::Seek, "")),
         Action::PlayPause => return vec![Effect::Replay(ReplayCommand::PlayPause)],
         Action::StepForward => return vec![Effect::Replay(ReplayCommand::Forward(ReplayStep::Frame))],
@@ -207,7 +222,7 @@ fn fix(model: &mut Model) -> Vec<Effect> {
 
 fn bounds(model: &mut Model) {
     if let Some(info) = model.override_parameter().and_then(|info| model.session.parameter(&info.name)) {
-        let text = format!("{}..{}", info.low, info.high);
+        let text = format!("{}..{}", six_digits(info.low), six_digits(info.high));
         open(model, Dialog::field(Purpose::Bounds { parameter: model.override_row }, &text));
     }
 }
@@ -237,6 +252,21 @@ fn open_details(model: &mut Model) -> Vec<Effect> {
         open(model, Dialog::Details { trial, scroll: 0 });
     } else {
         say(model, LogLevel::Info, "there is no trial yet");
+    }
+    Vec::new()
+}
+
+/// Judges the trial under review. Without one the selected row of Trials: asks for the reason of the change.
+fn judge(model: &mut Model, verdict: Verdict) -> Vec<Effect> {
+    if model.session.stage_is(ExperimentStage::Review) {
+        return if verdict == Verdict::Void {
+            void(model, false)
+        } else {
+            request(model, OperatorRequest::Judge(verdict))
+        };
+    }
+    if let Some(trial) = model.selected_trial().map(|row| row.trial) {
+        open(model, Dialog::field(Purpose::ChangeVerdict { trial, verdict }, ""));
     }
     Vec::new()
 }

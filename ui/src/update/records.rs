@@ -9,7 +9,7 @@ use crate::action::Action;
 use crate::legal::legal;
 use crate::message::Effect;
 use crate::model::Model;
-use crate::model::dialog::Dialog;
+use crate::model::dialog::{Dialog, Question};
 use crate::model::log::LogLine;
 use crate::model::trials::RunTime;
 use crate::settings::BellCause;
@@ -20,6 +20,13 @@ pub(super) fn close_stale_dialog(model: &mut Model) {
         Some(Dialog::Approve { trial, revision, .. }) => {
             let shown = model.session.proposal.as_ref().map(|p| (p.trial, p.revision));
             shown != Some((*trial, *revision)) || legal(Action::Approve, model).is_err()
+        }
+        Some(Dialog::Confirm(Question::Skip { trial, revision })) => {
+            let shown = model.session.open_proposal().map(|p| (p.trial, p.revision));
+            shown != Some((*trial, *revision)) || legal(Action::Skip, model).is_err()
+        }
+        Some(Dialog::Confirm(Question::AcceptFall { trial })) => {
+            model.session.suggested_fall().is_none_or(|row| row.trial != *trial)
         }
         Some(Dialog::TakeControl) => legal(Action::TakeControl, model).is_err(),
         Some(Dialog::Arm { .. }) => legal(Action::Arm, model).is_err(),
@@ -83,6 +90,7 @@ pub(super) fn apply(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
                     ExperimentStage::Proposed => bells.push(BellCause::Proposal),
                     ExperimentStage::Review => {
                         bells.push(BellCause::Verdict);
+                        show_landed(model);
                         say_suggestion(model, info.trial);
                     }
                     ExperimentStage::Running => {}
@@ -125,7 +133,10 @@ pub(super) fn apply(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
             }
             log(model, time_ns, line.level, &line.source, line.message, false);
         }
-        Record::ArmingChecks(list) => model.session.arming_checks = list,
+        Record::ArmingChecks(list) => {
+            model.session.arming_checks = list;
+            model.session.arming_checked_ns = time_ns;
+        }
         Record::Search(search) => model.session.search = Some(search),
         Record::Insight(insight) => {
             model.session.trials.model_best = insight.predicted_best().copied();
@@ -142,10 +153,22 @@ pub(super) fn apply(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
     if rings { vec![Effect::Bell] } else { Vec::new() }
 }
 
+/// Puts the charts of a live session on the trial that waits for its verdict.
+fn show_landed(model: &mut Model) {
+    if model.replay.is_none() {
+        let live = &mut model.live;
+        (live.frozen, live.comparison) = (None, None);
+        (live.present_in_review, live.landed_cursor_ns) = (false, None);
+    }
+}
+
 fn note_time(model: &mut Model, info: StageRecord, time_ns: u64) {
     match info.stage {
         ExperimentStage::Running => {
-            model.session.trials.ran.insert(info.trial, RunTime { begun_ns: time_ns, ended_ns: None });
+            let session = &mut model.session;
+            let present = session.info.parameters.iter().filter_map(|info| session.parameter(&info.name));
+            let bounds = present.map(|info| (info.low, info.high)).collect();
+            session.trials.ran.insert(info.trial, RunTime { begun_ns: time_ns, ended_ns: None, bounds });
         }
         ExperimentStage::Review => {
             if let Some(ran) = model.session.trials.ran.get_mut(&info.trial) {

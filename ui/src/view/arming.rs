@@ -1,13 +1,21 @@
 //! The arming checks: each with the found value and the limit, all failing ones at once.
 
+use std::ops::Range;
+
 use quadfrog::recording::record::ArmingCheckRecord;
 use quadfrog::session::operator_request::OperatorCheck;
 use quadfrog::telemetry::ArmingCheckState;
 use ratatui::text::{Line, Span};
 
-use super::draw::{span, truncate};
-use crate::model::session::SessionModel;
-use crate::theme::{Role, Theme};
+use super::draw::{span, truncate, wall_clock};
+use super::wrap::wrap;
+use crate::model::Model;
+use crate::theme::Role;
+
+/// Columns of the longest name.
+const NAME_WIDTH: usize = 27;
+/// Columns from which found value and limit stand side by side.
+const WIDE: usize = 60;
 
 fn label(state: ArmingCheckState) -> (&'static str, Role) {
     match state {
@@ -18,55 +26,85 @@ fn label(state: ArmingCheckState) -> (&'static str, Role) {
     }
 }
 
-/// One line for each item; with room for `few` lines only, failing ones first. `selected` is the item that the operator
-/// can confirm.
-pub fn lines(
-    session: &SessionModel,
-    theme: &Theme,
-    width: usize,
-    few: usize,
-    selected: Option<OperatorCheck>,
-) -> Vec<Line<'static>> {
-    let mut items: Vec<&ArmingCheckRecord> = session.arming_checks.iter().collect();
+/// One line for each item, cut at `width`; with room for `few` lines only, failing ones first.
+pub fn lines(model: &Model, width: usize, few: usize) -> Vec<Line<'static>> {
+    let mut items: Vec<&ArmingCheckRecord> = model.session.arming_checks.iter().collect();
     if items.len() > few {
         items.sort_by_key(|item| item.state.allows());
         items.truncate(few);
     }
-    // Half of a narrow terminal has room for the found value alone.
-    let wide = width >= 60;
-    let name_width = if wide { 27 } else { 1 };
-    let line = |item: &ArmingCheckRecord| {
-        let (state, role) = label(item.state);
-        let selected = selected.is_some_and(|check| check.check() == item.check);
-        let name = item.check.name();
-        let gap = name_width.max(name.chars().count() + 1) - name.chars().count();
-        let text = match (item.found.as_str(), item.needed.as_str()) {
-            (found, needed) if wide && item.state != ArmingCheckState::NotNeeded && !needed.is_empty() => {
-                format!("{found:<20} {needed}")
-            }
-            ("", text) | (text, _) => text.to_owned(),
-        };
-        let text = truncate(&text, width.saturating_sub(6 + name.chars().count() + gap));
-        Line::from(vec![
-            Span::raw(if selected { ">" } else { " " }),
-            span(theme, role, format!("{state:<5}")),
-            span(theme, if selected { Role::Selected } else { Role::Text }, name),
-            Span::raw(" ".repeat(gap)),
-            span(theme, Role::Quiet, text),
-        ])
-    };
     if items.is_empty() {
         let text = " not checked yet: the checks run while the robot is disarmed";
-        return vec![Line::from(span(theme, Role::Quiet, truncate(text, width)))];
+        return vec![Line::from(span(&model.theme, Role::Quiet, truncate(text, width)))];
     }
-    items.into_iter().map(line).collect()
+    // Half of a narrow terminal has room for the found value alone.
+    let name_width = if width >= WIDE { NAME_WIDTH } else { 1 };
+    items.into_iter().map(|item| line(model, item, (name_width, Some(width)), false)).collect()
 }
 
-/// The number of items that forbid arming, in words.
-pub fn summary(session: &SessionModel) -> String {
-    match (session.arming_checks.is_empty(), session.failing_checks()) {
-        (true, _) => String::new(),
+/// All items, whole: each continues on further lines where `width` is too small. Returns also the lines of `selected`, the
+/// item that the operator can confirm.
+pub fn whole(model: &Model, width: usize, selected: Option<OperatorCheck>) -> (Vec<Line<'static>>, Range<usize>) {
+    if model.session.arming_checks.is_empty() {
+        return (lines(model, width, 1), 0..1);
+    }
+    let (mut all, mut of_selected) = (Vec::new(), 0..0);
+    for item in &model.session.arming_checks {
+        let chosen = selected.is_some_and(|check| check.check() == item.check);
+        let pieces = wrap(&line(model, item, (NAME_WIDTH, None), chosen), width, 6 + NAME_WIDTH);
+        if chosen {
+            of_selected = all.len()..all.len() + pieces.len();
+        }
+        all.extend(pieces);
+    }
+    (all, of_selected)
+}
+
+/// State, name, found value and limit of an item. Once the robot is armed they are those of an earlier time: grey.
+fn line(
+    model: &Model,
+    item: &ArmingCheckRecord,
+    (name_width, width): (usize, Option<usize>),
+    selected: bool,
+) -> Line<'static> {
+    let theme = &model.theme;
+    let past = model.arming_checks_are_past();
+    let (state, role) = label(item.state);
+    let role = if past { Role::Quiet } else { role };
+    let name = item.check.name();
+    let gap = name_width.max(name.chars().count() + 1) - name.chars().count();
+    let wide = width.is_none_or(|width| width >= WIDE);
+    let text = match (item.found.as_str(), item.needed.as_str()) {
+        (found, needed) if wide && item.state != ArmingCheckState::NotNeeded && !needed.is_empty() => {
+            format!("{found:<20} {needed}")
+        }
+        ("", text) | (text, _) => text.to_owned(),
+    };
+    let room = width.map_or(usize::MAX, |width| width.saturating_sub(6 + name.chars().count() + gap));
+    let name_role = match (selected, past) {
+        (true, _) => Role::Selected,
+        (false, true) => Role::Quiet,
+        (false, false) => Role::Text,
+    };
+    Line::from(vec![
+        Span::raw(if selected { ">" } else { " " }),
+        span(theme, role, format!("{state:<5}")),
+        span(theme, name_role, name),
+        Span::raw(" ".repeat(gap)),
+        span(theme, Role::Quiet, truncate(&text, room)),
+    ])
+}
+
+/// The number of items that forbid arming, in words, with the time of the checks once the robot is armed.
+pub fn summary(model: &Model) -> String {
+    let session = &model.session;
+    let result = match (session.arming_checks.is_empty(), session.failing_checks()) {
+        (true, _) => return String::new(),
         (false, 0) => "all passed".to_owned(),
         (false, count) => format!("{count} of {} not yet", session.arming_checks.len()),
+    };
+    match model.arming_checks_are_past() {
+        true => format!("checked at {}: {result}", wall_clock(session, session.arming_checked_ns)),
+        false => result,
     }
 }

@@ -1,7 +1,7 @@
 //! All details of one trial, for their dialog.
 
 use quadfrog::engine::{EstimateChange, RejudgedTrial};
-use quadfrog::trial::{Displacement, ExpectedResult, JumpRow, TrialRecord};
+use quadfrog::trial::{Displacement, ExpectedResult, JumpRow, TrialRecord, six_digits};
 
 use super::draw::clock;
 use super::points;
@@ -41,13 +41,18 @@ pub fn details(session: &SessionModel, theme: &Theme, trial: &TrialRecord) -> Ve
         row("ran", format!("at {} of the session, {took}", clock(ran.begun_ns)));
     }
     for (name, value) in &trial.parameters {
-        let info = session.parameter(name);
-        let unit = info.as_ref().map_or("", |info| info.unit.as_str());
-        let bounds = info.as_ref().map_or(String::new(), |info| format!("  ({} to {})", info.low, info.high));
+        let index = session.info.parameters.iter().position(|info| info.name == *name);
+        let unit = index.map_or("", |index| session.info.parameters[index].unit.as_str());
+        // Those of a trial of an earlier session are not recorded here: the present ones may be others.
+        let ran = session.trials.ran.get(&trial.trial);
+        let bounds = ran.zip(index).and_then(|(ran, index)| ran.bounds.get(index));
+        let bounds = bounds.map_or(String::new(), |(low, high)| {
+            format!("  (searched from {} to {})", six_digits(*low), six_digits(*high))
+        });
         row(name, format!("{value:.5} {unit}{bounds}"));
     }
     if !trial.gains.is_empty() {
-        let gain = |(name, value): &(String, f64)| format!("{name} {value}");
+        let gain = |(name, value): &(String, f64)| format!("{name} {}", six_digits(*value));
         row("gains", trial.gains.iter().map(gain).collect::<Vec<_>>().join(", "));
     }
     if let Some(m) = &trial.measured {

@@ -10,82 +10,89 @@
 //! ```
 
 use quadfrog::session::operator_request::OperatorCheck;
-use quadfrog::telemetry::Mode;
-use quadfrog::trial::ProposedParameter;
+use quadfrog::trial::six_digits;
 use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::symbols::border;
 use ratatui::text::{Line, Span};
-use ratatui::widgets::{Block, Clear, Paragraph, Wrap};
+use ratatui::widgets::{Block, Clear, Paragraph};
 use tui_input::Input;
 
 use super::details::{details, rejudged};
 use super::draw::{number, scale, span, truncate};
-use super::{arming, help};
-use crate::action::Action;
+use super::wrap::{wrap, wrap_all};
+use super::{arming, help, questions};
 use crate::legal::palette;
 use crate::model::Model;
 use crate::model::dialog::{APPROVAL_PAUSE, Choice, Dialog, OverrideForm, Purpose};
 use crate::theme::{Glyphs, Role, Theme};
+
+/// Most columns of a dialog: longer lines are hard to read.
+const MAX_WIDTH: u16 = 120;
 
 pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let Some(dialog) = &model.dialog else { return };
     match dialog {
         Dialog::Approve { trial, pressed_at, area_clear, .. } => {
             let waited = model.clock.saturating_sub(*pressed_at) >= APPROVAL_PAUSE;
-            popup(frame, area, model, "Jump?", 60, approve(model, *trial, waited, *area_clear));
+            popup(frame, area, model, "Jump?", 60, questions::approve(model, *trial, waited, *area_clear));
         }
-        Dialog::TakeControl => popup(frame, area, model, "Take control?", 66, take_control(model)),
-        Dialog::Arm { typed, .. } => popup(frame, area, model, "Arm?", 60, arm(model, *typed)),
-        Dialog::ArmingChecks { selected } => {
-            let chosen = OperatorCheck::ALL.get(*selected).copied();
-            let lines =
-                arming::lines(&model.session, &model.theme, 74, usize::from(area.height.saturating_sub(2)), chosen);
-            popup(frame, area, model, &format!("Arming checks: {}", arming::summary(&model.session)), 78, lines);
+        Dialog::TakeControl => popup(frame, area, model, "Take control?", 66, questions::take_control(model)),
+        Dialog::Arm { typed, .. } => popup(frame, area, model, "Arm?", 60, questions::arm(model, *typed)),
+        Dialog::ArmingChecks { selected, scroll } => render_checks(frame, area, model, *selected, *scroll),
+        Dialog::Confirm(question) => {
+            let (title, lines) = questions::confirm(model, question);
+            popup(frame, area, model, title, 66, lines);
         }
-        Dialog::Quit => popup(frame, area, model, "Quit?", 58, quit(model)),
+        Dialog::Export { shown, all } => {
+            popup(frame, area, model, "Export", 66, questions::export(model, *shown, *all))
+        }
+        Dialog::Quit => popup(frame, area, model, "Quit?", 58, questions::quit(model)),
         Dialog::Override(form) => {
             popup(frame, area, model, &format!("Override trial #{}", form.trial), 78, overrides(model, form))
         }
-        Dialog::Field { purpose, input, problem } => {
-            let lines = field(model, *purpose, input, problem.as_deref());
+        Dialog::Field { purpose, input, replaces, problem } => {
+            let lines = field(model, *purpose, (input, *replaces), problem.as_deref());
             popup(frame, area, model, &field_title(model, *purpose), 64, lines);
         }
         Dialog::Palette { input, selected } => render_palette(frame, area, model, input, *selected),
         Dialog::Choose { subject, selected } => render_choice(frame, area, model, *subject, *selected),
-        Dialog::Help { scroll } => render_lines(frame, area, model, "Keys", help::lines(model), *scroll),
+        Dialog::Help { scroll } => {
+            render_lines(frame, area, model, ("Keys", 78, "Up Down"), help::lines(model), *scroll)
+        }
         Dialog::Report { lines, scroll } => {
             let lines = lines.iter().cloned().map(Line::from).collect();
-            render_lines(frame, area, model, "Study", lines, *scroll);
+            render_lines(frame, area, model, ("Study", 78, "Up Down"), lines, *scroll);
         }
         Dialog::Details { trial, scroll } => render_details(frame, area, model, *trial, *scroll),
     }
 }
 
+/// The arming checks, each whole; those of the operator can be selected.
+fn render_checks(frame: &mut Frame, area: Rect, model: &Model, selected: usize, scroll: usize) {
+    let width = area.width.min(MAX_WIDTH);
+    let chosen = OperatorCheck::ALL.get(selected).copied();
+    let (lines, of_chosen) = arming::whole(model, usize::from(width.saturating_sub(4)), chosen);
+    let room = usize::from(area.height.saturating_sub(2));
+    // Until the list is paged, the chosen item is visible.
+    let scroll = scroll.checked_sub(1).unwrap_or(of_chosen.end.saturating_sub(room));
+    let title = format!("Arming checks: {}", arming::summary(model));
+    render_lines(frame, area, model, (&title, width, "PgUp PgDn"), lines, scroll);
+}
+
 /// The details of a trial; the paging keys scroll.
 fn render_details(frame: &mut Frame, area: Rect, model: &Model, trial: u32, scroll: usize) {
     let Some(record) = model.session.trials.records.get(&trial) else { return };
-    const WIDTH: u16 = 76;
-    let inside = usize::from(WIDTH - 4);
+    let width = area.width.min(MAX_WIDTH);
+    let inside = usize::from(width.saturating_sub(4));
     let mut lines: Vec<Line> = Vec::new();
     let again = model.rejudged.as_ref().and_then(|table| table.trials.get(&trial));
     for (name, value) in details(&model.session, &model.theme, record).into_iter().chain(rejudged(again)) {
         // Long values continue on the next line.
-        let chars: Vec<char> = value.chars().collect();
-        let mut pieces = chars.chunks(inside - 15);
-        let first: String = pieces.next().unwrap_or_default().iter().collect();
-        lines.push(Line::from(vec![span(&model.theme, Role::Quiet, format!("{name:<15}")), Span::raw(first)]));
-        lines.extend(pieces.map(|piece| Line::from(format!("{:15}{}", "", piece.iter().collect::<String>()))));
+        let line = Line::from(vec![span(&model.theme, Role::Quiet, format!("{name:<15}")), Span::raw(value)]);
+        lines.extend(wrap(&line, inside, 15));
     }
-    let room = usize::from(area.height.saturating_sub(2));
-    let more = lines.len().saturating_sub(room);
-    let title = match more {
-        0 => format!("Trial #{trial}"),
-        _ => format!("Trial #{trial} (PgUp PgDn: {} lines)", lines.len()),
-    };
-    let shown: Vec<Line> = lines.into_iter().skip(scroll.min(more)).take(room).collect();
-    let inner = open_box(frame, area, model, &title, WIDTH, shown.len() as u16 + 2);
-    frame.render_widget(Paragraph::new(shown), inner);
+    render_lines(frame, area, model, (&format!("Trial #{trial}"), width, "PgUp PgDn"), lines, scroll);
 }
 
 /// Draws an empty bordered box; returns its inside. Where Space types although the robot is energised, the frame has the
@@ -117,101 +124,13 @@ fn open_box(frame: &mut Frame, area: Rect, model: &Model, title: &str, width: u1
     Rect { x: inner.x + 1, width: inner.width.saturating_sub(2), ..inner }
 }
 
+/// Draws a box that is at least `width` wide, and wider for a longer line as far as the terminal goes.
 fn popup(frame: &mut Frame, area: Rect, model: &Model, title: &str, width: u16, lines: Vec<Line<'static>>) {
-    let inside = usize::from(width.saturating_sub(4)).max(1);
-    let rows: usize = lines.iter().map(|line| line.width().div_ceil(inside).max(1)).sum();
-    let inner = open_box(frame, area, model, title, width, rows as u16 + 2);
-    frame.render_widget(Paragraph::new(lines).wrap(Wrap { trim: false }), inner);
-}
-
-/// The two answers; Cancel is the default and comes first.
-fn answers(theme: &Theme, key: &str, text: &str) -> Line<'static> {
-    Line::from(vec![
-        span(theme, Role::Selected, " Cancel "),
-        span(theme, Role::Quiet, " Enter, or any other key     "),
-        span(theme, Role::Key, key.to_owned()),
-        span(theme, Role::Text, format!(" {text}")),
-    ])
-}
-
-fn take_control(model: &Model) -> Vec<Line<'static>> {
-    let heard = match model.mode() {
-        Mode::Offline => {
-            "The robot has sent nothing since the start: it answers only after a command. This console then sends braking \
-             commands without a target, and damping once the robot answers."
-        }
-        _ => {
-            "States arrive although this console has sent nothing: another program may command the robot. Damping is \
-             sent from now on."
-        }
-    };
-    vec![
-        Line::from(heard),
-        Line::from("A robot that another program drives at present falls."),
-        Line::default(),
-        answers(&model.theme, "y", "take control"),
-    ]
-}
-
-fn arm(model: &Model, typed: usize) -> Vec<Line<'static>> {
-    let theme = &model.theme;
-    let letters = model.session.arming_confirmation();
-    let mut lines = vec![Line::from("The robot will stand up. Is the area clear?"), Line::default()];
-    if letters.len() == 1 {
-        lines.push(answers(&model.theme, letters, "stand up"));
-    } else {
-        let (done, left) = letters.split_at(typed.min(letters.len()));
-        lines.push(Line::from(vec![
-            span(theme, Role::Selected, " Cancel "),
-            span(theme, Role::Quiet, " Enter, or any other key     type "),
-            span(theme, Role::Good, done),
-            span(theme, Role::Key, left),
-            span(theme, Role::Text, " to arm"),
-        ]));
-    }
-    lines
-}
-
-fn approve(model: &Model, trial: u32, waited: bool, area_clear: bool) -> Vec<Line<'static>> {
-    let theme = &model.theme;
-    let key = model.keymap.key(Action::Approve);
-    let mut lines = Vec::new();
-    if let Some(proposal) = &model.session.proposal {
-        let value = |p: &ProposedParameter| {
-            let unit = model.session.parameter(&p.name).map_or(String::new(), |info| info.unit);
-            format!("{} {} {unit}", p.name, number(p.value))
-        };
-        let values: Vec<String> = proposal.parameters.iter().map(value).collect();
-        lines.push(Line::from(format!("Trial #{trial}: {}", values.join(", "))));
-    }
-    lines.push(Line::from(match area_clear {
-        true => "The area is clear, confirmed for this jump.",
-        false => "Is the area clear of people and objects?",
-    }));
-    lines.push(Line::default());
-    let area_asked = model.session.info.is_hardware() && !area_clear;
-    let mut answer = match area_asked {
-        true => answers(&model.theme, "y", "the area is clear"),
-        false => answers(&model.theme, &key, "jump"),
-    };
-    if !area_asked && !waited {
-        answer.push_span(span(theme, Role::Quiet, " (after 0.8 s)"));
-    }
-    lines.push(answer);
-    lines
-}
-
-fn quit(model: &Model) -> Vec<Line<'static>> {
-    let mut lines = Vec::new();
-    if model.robot_is_energised() {
-        lines.push(Line::from("The robot is armed: it will sit down before the program ends."));
-    }
-    if let Some(trial) = model.session.under_review() {
-        lines.push(Line::from(format!("Trial #{} has no verdict yet.", trial.trial)));
-    }
-    lines.push(Line::default());
-    lines.push(answers(&model.theme, "y", "quit"));
-    lines
+    let longest = lines.iter().map(Line::width).max().unwrap_or(0) as u16 + 4;
+    let width = longest.clamp(width, MAX_WIDTH.max(width)).min(area.width);
+    let lines = wrap_all(&lines, usize::from(width.saturating_sub(4)), 0);
+    let inner = open_box(frame, area, model, title, width, lines.len() as u16 + 2);
+    frame.render_widget(Paragraph::new(lines), inner);
 }
 
 fn overrides(model: &Model, form: &OverrideForm) -> Vec<Line<'static>> {
@@ -275,6 +194,10 @@ fn field_title(model: &Model, purpose: Purpose) -> String {
         }
         Purpose::ConfirmBest => "How many repeats at most, to confirm the best?".to_owned(),
         Purpose::VoidReason { trial, .. } => format!("Why is trial #{trial} void?"),
+        Purpose::ChangeVerdict { trial, verdict } => {
+            let before = model.session.trials.records.get(&trial).and_then(|row| row.verdict_name()).unwrap_or("-");
+            format!("Trial #{trial}: {before} becomes {}. Why?", verdict.name())
+        }
         Purpose::TrialNumber => "Go to trial".to_owned(),
         Purpose::LogSearch => "Search the log".to_owned(),
         Purpose::Seek => "Go to a time or a trial".to_owned(),
@@ -286,9 +209,17 @@ fn field_title(model: &Model, purpose: Purpose) -> String {
     }
 }
 
-fn field(model: &Model, purpose: Purpose, input: &Input, problem: Option<&str>) -> Vec<Line<'static>> {
+fn field(
+    model: &Model,
+    purpose: Purpose,
+    (input, replaces): (&Input, bool),
+    problem: Option<&str>,
+) -> Vec<Line<'static>> {
     let theme = &model.theme;
-    let mut spans = edited(theme, input);
+    let mut spans = match replaces {
+        true => vec![span(theme, Role::Selected, input.value())],
+        false => edited(theme, input),
+    };
     if matches!(purpose, Purpose::HandValue(_)) {
         spans.push(span(theme, Role::Quiet, format!(" {}", model.session.info.unit)));
     }
@@ -297,7 +228,9 @@ fn field(model: &Model, purpose: Purpose, input: &Input, problem: Option<&str>) 
         Purpose::Bounds { parameter } => {
             let info = model.session.info.parameters.get(parameter);
             let searched = info.and_then(|info| model.session.searched(&info.name));
-            let allowed = searched.map_or(String::new(), |p| format!("; safety.toml allows {} to {}", p.least, p.most));
+            let allowed = searched.map_or(String::new(), |p| {
+                format!("; safety.toml allows {} to {}", six_digits(p.least), six_digits(p.most))
+            });
             format!("write it as 50..120{allowed}; past trials stay")
         }
         Purpose::Fix { .. } => "the others are still proposed by the sampler".to_owned(),
@@ -311,10 +244,13 @@ fn field(model: &Model, purpose: Purpose, input: &Input, problem: Option<&str>) 
             Some(second) => format!("its number in {}", second.name),
             None => "its number in this recording".to_owned(),
         },
-        Purpose::Note(_) if model.space_bar_must_stop() => {
+        purpose if purpose.is_remark() && model.space_bar_must_stop() => {
             "the robot is energised: Space is STOP, _ writes a space".to_owned()
         }
         Purpose::VoidReason { .. } => "it tripped a limit: by the rules that is a fall of its parameters".to_owned(),
+        Purpose::ChangeVerdict { .. } => {
+            "the sampler proposes again from the changed trials; the journal keeps the old verdict".to_owned()
+        }
         Purpose::Note(_) | Purpose::Continue | Purpose::TrialNumber => String::new(),
     };
     let below = problem.map_or_else(|| span(theme, Role::Quiet, hint), |problem| span(theme, Role::Bad, problem));
@@ -370,17 +306,24 @@ fn render_choice(frame: &mut Frame, area: Rect, model: &Model, subject: Choice, 
     }
 }
 
-/// Draws lines that scroll.
-fn render_lines(frame: &mut Frame, area: Rect, model: &Model, title: &str, lines: Vec<Line>, scroll: usize) {
+/// Draws lines that scroll in a box with a title and a width; `keys` scroll.
+fn render_lines(
+    frame: &mut Frame,
+    area: Rect,
+    model: &Model,
+    (title, width, keys): (&str, u16, &str),
+    lines: Vec<Line>,
+    scroll: usize,
+) {
     let height = usize::from(area.height).min(lines.len() + 2) as u16;
     let room = usize::from(height.saturating_sub(2));
     let scroll = scroll.min(lines.len().saturating_sub(room));
     let title = if lines.len() > room {
-        format!("{title} ({}-{} of {}, Up Down)", scroll + 1, scroll + room, lines.len())
+        format!("{title} ({}-{} of {}, {keys})", scroll + 1, scroll + room, lines.len())
     } else {
         title.to_owned()
     };
-    let inner = open_box(frame, area, model, &title, 78, height);
+    let inner = open_box(frame, area, model, &title, width, height);
     let shown: Vec<Line> = lines.into_iter().skip(scroll).take(room).collect();
     frame.render_widget(Paragraph::new(shown), inner);
 }

@@ -39,9 +39,9 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     panel(frame, robot, model, ("Link and battery", NAME_WIDTH), robot_rows(model));
     let [motors, checks] = Layout::vertical([Constraint::Length(JOINTS as u16 + 1), Constraint::Fill(1)]).areas(right);
     panel(frame, motors, model, ("Motors", MOTOR_NAME_WIDTH), motor_rows(model));
-    let aside = format!("{} ({})", arming::summary(&model.session), model.keymap.key(Action::ArmingChecks));
+    let aside = format!("{} ({})", arming::summary(model), model.keymap.key(Action::ArmingChecks));
     let body = heading(frame, checks, &model.theme, "Arming checks", &aside);
-    let lines = arming::lines(&model.session, &model.theme, usize::from(body.width), usize::from(body.height), None);
+    let lines = arming::lines(model, usize::from(body.width), usize::from(body.height));
     frame.render_widget(Paragraph::new(lines), body);
 }
 

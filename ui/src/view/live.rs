@@ -1,5 +1,7 @@
 //! View 1, Live: charts of the robot's state, the present proposal and the last trials.
 
+use std::borrow::Cow;
+
 use quadfrog::robot::{JOINTS, joint_name};
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
@@ -12,11 +14,14 @@ use super::{beside, objective, proposal, trials, wireframe};
 use crate::model::Model;
 use crate::model::comparison::{Comparison, impulse_start_ns};
 use crate::model::history::SignalHistory;
+use crate::model::landed::LandedTrial;
 use crate::model::live::Panel;
 use crate::settings::ChartMode;
 use crate::theme::Role;
 
 const SIDE: u16 = 32;
+/// Columns from which there is room for more than charts, the trial and the table.
+const WIDE: u16 = 120;
 /// Rows of a chart with its heading, at least.
 const CHART_ROWS: u16 = 3;
 /// Rows of the charts from which the time axis has one of its own.
@@ -25,9 +30,13 @@ const TIMES_FROM_ROWS: u16 = 16;
 const TWO_JOINTS_FROM: u16 = 72;
 
 pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
+    let joints_only = model.live.panel == Panel::Joints;
+    if area.width < WIDE && !joints_only && model.landed().is_some() {
+        return render_landed(frame, area, model);
+    }
     let table_rows = (area.height / 4).clamp(5, 14);
     let [upper, table] = Layout::vertical([Constraint::Fill(1), Constraint::Length(table_rows)]).areas(area);
-    let side = if area.width >= 120 { SIDE + 10 } else { SIDE };
+    let side = if area.width >= WIDE { SIDE + 10 } else { SIDE };
     let [charts, _, side] =
         Layout::horizontal([Constraint::Fill(1), Constraint::Length(1), Constraint::Length(side)]).areas(upper);
     // A live session shows its proposal in any case: the operator approves it.
@@ -36,7 +45,6 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
         Some(comparison) => beside::rows(comparison).min(side.height),
         None => proposal::rows(&model.session).min(side.height.saturating_sub(5)),
     };
-    let joints_only = model.live.panel == Panel::Joints;
     let room = side.height - card_rows;
     // Without room for both, the panel of the joints shows the robot and the others the objective.
     let picture_rows = match joints_only {
@@ -49,7 +57,7 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
             .areas(side);
     if joints_only {
         render_joints(frame, charts, model);
-    } else if area.width >= 120 && charts.height >= 24 {
+    } else if area.width >= WIDE && charts.height >= 24 {
         let joint_rows = JOINTS as u16 / if charts.width >= TWO_JOINTS_FROM { 2 } else { 1 } + 1;
         let [charts, joints] = Layout::vertical([Constraint::Fill(1), Constraint::Length(joint_rows)]).areas(charts);
         render_charts(frame, charts, model);
@@ -68,18 +76,32 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     trials::render_table(frame, table, model, false);
 }
 
+/// The landed trial over the whole width of a narrow terminal; its measured values and the table share the rows below.
+fn render_landed(frame: &mut Frame, area: Rect, model: &Model) {
+    let card_rows = proposal::rows(&model.session).min(area.height / 2);
+    let [charts, lower] = Layout::vertical([Constraint::Fill(1), Constraint::Length(card_rows)]).areas(area);
+    let [card, _, table] =
+        Layout::horizontal([Constraint::Length(SIDE), Constraint::Length(1), Constraint::Fill(1)]).areas(lower);
+    render_charts(frame, charts, model);
+    proposal::render(frame, card, model);
+    trials::render_table(frame, table, model, false);
+}
+
 struct ChartSource<'a> {
-    history: &'a SignalHistory,
+    history: Cow<'a, SignalHistory>,
     axis: TimeAxis,
     ghost: Option<Ghost<'a>>,
     cursor_ns: Option<u64>,
 }
 
 impl<'a> ChartSource<'a> {
-    /// Two trials, or the present, or the frozen history.
+    /// Two trials, the landed trial, the present, or the frozen history.
     fn of(model: &'a Model) -> ChartSource<'a> {
         if let Some(comparison) = &model.live.comparison {
             return ChartSource::compared(comparison);
+        }
+        if let Some(landed) = model.landed() {
+            return ChartSource::landed(&landed, model.live.landed_cursor_ns);
         }
         let history = model.charted();
         let axis = TimeAxis {
@@ -92,7 +114,16 @@ impl<'a> ChartSource<'a> {
         let ghost =
             trace.zip(under).map(|(trace, start_ns)| Ghost { trace, start_ns, role: Role::Ghost, named: false });
         let cursor_ns = model.live.frozen.is_some().then_some(model.live.cursor_ns);
-        ChartSource { history, axis, ghost, cursor_ns }
+        ChartSource { history: Cow::Borrowed(history), axis, ghost, cursor_ns }
+    }
+
+    /// The landed trial over the whole width, with another one under it.
+    fn landed(landed: &LandedTrial<'a>, cursor_ns: Option<u64>) -> ChartSource<'a> {
+        let (first, last) = landed.span_ns();
+        let axis = TimeAxis { mode: ChartMode::Scroll, window_ns: last - first + 1, newest_ns: last };
+        let under = |(_, trace)| Ghost { trace, start_ns: landed.start_ns, role: Role::Ghost, named: false };
+        let history = Cow::Owned(SignalHistory::of_trace(landed.samples));
+        ChartSource { history, axis, ghost: landed.under.map(under), cursor_ns }
     }
 
     /// Two trials, from the first sample to the last.
@@ -100,7 +131,8 @@ impl<'a> ChartSource<'a> {
         let (first, last) = comparison.span_ns();
         let axis = TimeAxis { mode: ChartMode::Scroll, window_ns: last - first + 1, newest_ns: last };
         let ghost = Ghost { trace: &comparison.trace_b, start_ns: comparison.start_ns, role: Role::Good, named: true };
-        ChartSource { history: &comparison.history_a, axis, ghost: Some(ghost), cursor_ns: Some(comparison.cursor_ns) }
+        let history = Cow::Borrowed(&comparison.history_a);
+        ChartSource { history, axis, ghost: Some(ghost), cursor_ns: Some(comparison.cursor_ns) }
     }
 }
 
@@ -117,14 +149,14 @@ fn render_charts(frame: &mut Frame, area: Rect, model: &Model) {
     let of_columns: Vec<_> = columns(strip)
         .iter()
         .map(|cell| plot_columns(*cell))
-        .map(|cell| (cell, phases(&source.axis, source.history, cell.width)))
+        .map(|cell| (cell, phases(&source.axis, &source.history, cell.width)))
         .collect();
     let rows = Layout::vertical(vec![Constraint::Fill(1); down]).split(charts);
     for (index, series) in series.iter().enumerate().take(across * down) {
         let chart = Chart {
             style: style(*series, model),
             axis: source.axis,
-            history: source.history,
+            history: &source.history,
             phases: &of_columns[index % across].1,
             ghost: source.ghost,
             cursor_ns: source.cursor_ns,
@@ -137,8 +169,9 @@ fn render_charts(frame: &mut Frame, area: Rect, model: &Model) {
         draw_phases(frame.buffer_mut(), *cell, phases, &theme);
     }
     if times_rows > 0 {
-        // Two trials are aligned where their impulses begin.
-        let origin_ns = source.ghost.filter(|_| source.cursor_ns.is_some()).map(|ghost| ghost.start_ns);
+        // Two trials, and the landed one, count from the begin of the impulse.
+        let compared = source.ghost.filter(|_| source.cursor_ns.is_some()).map(|ghost| ghost.start_ns);
+        let origin_ns = model.landed().map(|landed| landed.start_ns).or(compared);
         for cell in columns(times).iter() {
             draw_time_axis(frame.buffer_mut(), plot_columns(*cell), &source.axis, origin_ns, &theme);
         }
@@ -149,18 +182,31 @@ fn render_charts(frame: &mut Frame, area: Rect, model: &Model) {
 /// Describes the time axis at the right end of the strip under the charts, and counts the charts without room.
 fn render_axis(frame: &mut Frame, strip: Rect, model: &Model, without_room: usize) {
     let live = &model.live;
-    let (role, mut text) = match (&live.comparison, &live.frozen) {
-        (Some(c), _) => {
+    let (role, mut text) = match (&live.comparison, &live.frozen, model.landed()) {
+        (Some(c), _, _) => {
             // In hundredths, so that no -0.00 is shown.
             let hundredths = ((c.cursor_ns as f64 - c.start_ns as f64) / 1e7).round() as i64;
             let at_s = hundredths as f64 / 100.0;
             (Role::Warning, format!(" A #{} line, B #{} dotted, at {at_s:+.2} s ", c.a.trial, c.b.trial))
         }
-        (None, Some((history, _))) => {
+        (None, Some((history, _)), _) => {
             let back = (history.newest_ns().saturating_sub(live.cursor_ns)) as f64 / 1e9;
             (Role::Warning, format!(" cursor -{back:.2} s "))
         }
-        (None, None) => {
+        (None, None, Some(landed)) => {
+            let under = landed.under.map_or(String::new(), |(under, _)| format!(", #{under} under it"));
+            // In hundredths, so that no -0.00 is shown.
+            let at_s = |time_ns| (landed.trial_time_s(time_ns) * 100.0).round() / 100.0 + 0.0;
+            let text = match live.landed_cursor_ns {
+                Some(cursor_ns) => format!(" #{}{under}, at {:+.2} s ", landed.trial, at_s(cursor_ns)),
+                None => {
+                    let (first, last) = landed.span_ns();
+                    format!(" #{}{under}, {:+.1} to {:+.1} s ", landed.trial, at_s(first), at_s(last))
+                }
+            };
+            (Role::Warning, text)
+        }
+        (None, None, None) => {
             let mode = if live.mode == ChartMode::Sweep { "sweep" } else { "scroll" };
             (Role::Quiet, format!(" {} s {mode} ", live.window_s))
         }

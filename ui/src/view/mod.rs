@@ -15,6 +15,7 @@
 mod arming;
 mod beside;
 mod chart;
+mod countdown;
 mod densities;
 mod details;
 mod dialogs;
@@ -31,11 +32,13 @@ mod overrides;
 mod parameter_axes;
 mod points;
 mod proposal;
+mod questions;
 mod series_style;
 mod status_bar;
 mod timeline;
 mod trials;
 mod wireframe;
+mod wrap;
 
 use ratatui::Frame;
 
@@ -60,6 +63,7 @@ pub fn render(frame: &mut Frame, model: &Model) {
         View::Log => log::render(frame, body, model),
     }
     dialogs::render(frame, body, model);
+    countdown::render(frame, body, model);
     timeline::render(frame, timeline, model);
     status_bar::render_message(frame, message, model);
     next_step::render(frame, next_step, model);

@@ -12,7 +12,7 @@ use super::draw::span;
 use crate::action::Action;
 use crate::legal::legal;
 use crate::model::Model;
-use crate::model::dialog::{Dialog, Purpose};
+use crate::model::dialog::{Dialog, Question};
 use crate::theme::Role;
 
 /// The most likely next step, and the others.
@@ -53,7 +53,10 @@ fn live(model: &Model) -> NextStep {
     let (sit_down, undo, quit) = ((Action::SitDown, "sit down"), (Action::Undo, "undo"), (Action::Quit, "quit"));
     let change = (Action::Override, "override");
     match model.mode() {
-        Mode::Countdown => step("Countdown to the jump: any key cancels it.", model, &[]),
+        Mode::Countdown => {
+            let left = model.countdown_s.map_or(String::new(), |seconds| format!(" in {seconds} s"));
+            step(format!("Jump{left}: any key cancels it."), model, &[])
+        }
         Mode::StandUp => step("Standing up.", model, &[sit_down]),
         Mode::Jump if session.jumps_in_a_row() > 1 => step(model.jump_series.line(session), model, &[sit_down]),
         Mode::Jump => step("Jumping.", model, &[]),
@@ -72,14 +75,17 @@ fn live(model: &Model) -> NextStep {
             let lead = format!("{}: the study answers later.", wait.unwrap_or_default());
             step(lead, model, &[sit_down, quit])
         }
-        _ if stage == Some(ExperimentStage::Review) => review(model),
+        mode if stage == Some(ExperimentStage::Review) && mode != Mode::Fault => review(model),
         mode @ (Mode::Damped | Mode::Fault) => {
             let stopped = if mode == Mode::Fault { "FAULT" } else { "STOPPED" };
             let cause = &session.stopped_because;
             let because = if cause.is_empty() { String::new() } else { format!(": {cause}") };
             // The key first: a long reason may be cut.
             let lead = format!("{stopped}; check the robot, then {} acknowledges{because}", key(Action::Acknowledge));
-            step(lead, model, &[undo, quit])
+            // A verdict can be given before the acknowledgement.
+            let review = session.stage_is(ExperimentStage::Review);
+            let verdicts = [(Action::Accept, "accept"), (Action::Fall, "fall"), (Action::Void, "void")];
+            step(lead, model, &[if review { &verdicts[..] } else { &[] }, &[undo, quit]].concat())
         }
         mode @ (Mode::Offline | Mode::Observe) if session.info.is_hardware() => {
             let heard = if mode == Mode::Offline { "The robot is silent" } else { "The robot sends states" };
@@ -102,6 +108,10 @@ fn live(model: &Model) -> NextStep {
                 }
             };
             step(lead, model, &[change, undo, (Action::Help, "help"), quit])
+        }
+        Mode::Ready if session.open_proposal().is_some() && model.snapshot.unready.is_some() => {
+            let reason = model.snapshot.unready.map(|reason| reason.to_string()).unwrap_or_default();
+            step(format!("No jump now: {reason}."), model, &[sit_down, change, (Action::Skip, "skip"), undo])
         }
         Mode::Ready if session.open_proposal().is_some() => {
             let lead = format!("Press {} twice to jump.", key(Action::Approve));
@@ -135,7 +145,12 @@ fn review(model: &Model) -> NextStep {
         None => "Judge it".to_owned(),
     };
     let mut others: Vec<_> = others.into_iter().map(|(action, verdict)| (action, verdict.name())).collect();
-    others.extend([(Action::Rerun, "re-run"), (Action::HandValue, "value by hand"), (Action::Note, "note")]);
+    others.extend([
+        (Action::Acknowledge, "acknowledge"),
+        (Action::Rerun, "re-run"),
+        (Action::HandValue, "value by hand"),
+        (Action::Note, "note"),
+    ]);
     step(lead, model, &others)
 }
 
@@ -185,7 +200,7 @@ fn in_dialog(model: &Model, dialog: &Dialog) -> NextStep {
         }
         Dialog::ArmingChecks { .. } => {
             let arms = legal(Action::Arm, model).map_or(String::new(), |()| format!(" {} arms.", key(Action::Arm)));
-            format!("Up Down choose an item, x confirms it, Enter closes.{arms}")
+            format!("Up Down choose, x confirms, PgUp PgDn scroll, Enter closes.{arms}")
         }
         Dialog::Override(form) if form.typing.is_none() => {
             let queue = key(Action::QueuePoint);
@@ -193,15 +208,22 @@ fn in_dialog(model: &Model, dialog: &Dialog) -> NextStep {
         }
         Dialog::Override(_) => "Enter takes the value and applies. Esc drops it.".to_owned(),
         Dialog::TakeControl => "Press y to take control. Any other key cancels.".to_owned(),
+        Dialog::Confirm(Question::Skip { trial, .. }) => {
+            format!("Press y to skip trial #{trial}. Any other key cancels.")
+        }
+        Dialog::Confirm(Question::AcceptFall { trial }) => {
+            format!("Press y to accept trial #{trial}. Any other key cancels.")
+        }
         Dialog::Quit => "Press y to quit. Any other key cancels.".to_owned(),
-        Dialog::Field { purpose: Purpose::Note(_) | Purpose::VoidReason { .. }, .. } if model.space_bar_must_stop() => {
+        Dialog::Field { purpose, .. } if purpose.is_remark() && model.space_bar_must_stop() => {
             "Enter saves the text, Esc cancels. Energised: Space is STOP, _ writes a space.".to_owned()
         }
+        Dialog::Export { .. } => "Press a for all trials, s for those shown. Any other key cancels.".to_owned(),
         Dialog::Field { .. } => "Enter confirms, Esc cancels.".to_owned(),
         Dialog::Palette { .. } => "Type to filter, Up Down choose, Enter does it, Esc closes.".to_owned(),
         Dialog::Choose { .. } => "Up Down choose, x switches it on or off, Enter closes.".to_owned(),
         Dialog::Report { .. } | Dialog::Help { .. } => "Up Down scroll, any other key closes.".to_owned(),
-        Dialog::Details { .. } => "Up Down other trials, Esc closes.".to_owned(),
+        Dialog::Details { .. } => "Up Down other trials, PgUp PgDn scroll, Esc closes.".to_owned(),
     };
     NextStep { lead, others: Vec::new() }
 }

@@ -8,7 +8,7 @@ use ratatui::widgets::Paragraph;
 
 use super::draw::{heading, number, scale, span, truncate};
 use crate::action::Action;
-use crate::legal::legal;
+use crate::legal::{legal, may_request};
 use crate::model::Model;
 use crate::theme::Role;
 
@@ -111,9 +111,12 @@ fn actions(model: &Model, width: usize) -> Vec<Line<'static>> {
         (Action::QueuePoint, help(Action::QueuePoint)),
         (Action::Skip, help(Action::Skip)),
     ];
+    // A replay and an observer change nothing: one line says so for all.
+    let commands = may_request(model);
     let line = |(action, text): (Action, String)| {
         let key = model.keymap.key(action);
         match legal(action, model) {
+            Err(_) if commands.is_err() => Line::from(span(theme, Role::Quiet, format!("  {key:<3}{text}"))),
             Ok(()) => Line::from(vec![span(theme, Role::Key, format!("  {key:<3}")), Span::raw(text)]),
             Err(reason) => {
                 let text = truncate(&format!("  {key:<3}{text} ({reason})"), width);
@@ -122,8 +125,10 @@ fn actions(model: &Model, width: usize) -> Vec<Line<'static>> {
         }
     };
     let mut lines: Vec<Line> = offered.into_iter().map(line).collect();
-    if let Err(reason) = legal(Action::Override, model) {
-        lines.push(Line::from(span(theme, Role::Quiet, format!("  Nothing can be changed now: {reason}."))));
+    if let Err(reason) = commands {
+        lines.push(Line::from(span(theme, Role::Quiet, format!("  Nothing can be changed: {reason}."))));
+    } else if let Err(reason) = legal(Action::Override, model) {
+        lines.push(Line::from(span(theme, Role::Quiet, format!("  The proposal cannot be changed now: {reason}."))));
     }
     lines
 }

@@ -12,7 +12,7 @@ use ratatui::widgets::Paragraph;
 use super::draw::{clock, clock_ms, number, span, truncate};
 use crate::action::Action;
 use crate::layout::{MIN_COLUMNS, MIN_ROWS, tabs};
-use crate::model::Model;
+use crate::model::{Model, View};
 use crate::theme::Role;
 
 /// Age of the newest tick from which the numbers count as old, ms.
@@ -209,22 +209,28 @@ fn bad(condition: bool) -> Role {
     if condition { Role::Bad } else { Role::Text }
 }
 
-/// The tabs, and at the right the keys of the help, or that the charts are frozen.
+/// The tabs, and at the right the keys of the help, or that the charts do not show the present.
 pub fn render_tabs(frame: &mut Frame, area: Rect, model: &Model) {
     let theme = &model.theme;
     let spans: Vec<Span> = tabs(&model.keymap)
         .map(|(view, _, text)| span(theme, if view == model.view { Role::Selected } else { Role::Quiet }, text))
         .collect();
     frame.render_widget(Line::from(spans), area);
-    let aside = match &model.live.frozen {
-        Some((_, at)) => {
+    let landed = model.landed().filter(|_| model.view == View::Live).map(|landed| landed.trial);
+    let aside = match (&model.live.frozen, landed) {
+        (Some((_, at)), _) => {
             let ago_s = model.clock.saturating_sub(*at).as_secs_f64();
             vec![
                 span(theme, Role::Hardware, format!(" VIEW FROZEN -{ago_s:.1} s ")),
                 span(theme, Role::Key, format!(" {}", model.keymap.key(Action::Freeze))),
             ]
         }
-        None => vec![
+        (None, Some(trial)) => vec![
+            span(theme, Role::Hardware, format!(" TRIAL #{trial} ")),
+            span(theme, Role::Key, format!(" {}", model.keymap.key(Action::Freeze))),
+            span(theme, Role::Quiet, " live "),
+        ],
+        (None, None) => vec![
             span(theme, Role::Key, model.keymap.key(Action::Help)),
             span(theme, Role::Quiet, " help  "),
             span(theme, Role::Key, model.keymap.key(Action::Palette)),

@@ -4,14 +4,19 @@ use std::time::Duration;
 
 use crossterm::event::KeyCode;
 use quadfrog::session::operator_request::{OperatorCheck, OperatorRequest};
+use quadfrog::trial::Verdict;
 
 use crate::action::Action;
 use crate::keymap::Key;
 use crate::legal::legal;
-use crate::message::Effect;
+use crate::message::{Effect, ExportedRows};
 use crate::model::Model;
-use crate::model::dialog::{APPROVAL_PAUSE, ARMING_TIME, Dialog};
+use crate::model::dialog::{APPROVAL_PAUSE, ARMING_TIME, Dialog, Question};
 use crate::update::request::{cancelled, refused, request};
+
+/// Lines that a page of the arming checks moves by, and the most that they can have.
+const CHECKS_PAGE: usize = 8;
+const CHECKS_LINES: usize = 200;
 
 /// The second press of an approval. Only the approving key approves, and only after a pause: a bounced or held key starts
 /// the pause again. On hardware `y` confirms before that the area is clear. Every other key, Enter included, cancels.
@@ -68,6 +73,19 @@ pub(super) fn take_control_key(model: &mut Model, key: Key) -> Vec<Effect> {
     }
 }
 
+/// `y` carries the action out; every other key cancels.
+pub(super) fn question_key(model: &mut Model, key: Key, question: &Question) -> Vec<Effect> {
+    let yes = matches!(key.typed(), Some('y' | 'Y'));
+    match question {
+        Question::Skip { .. } if yes => request_if_legal(model, Action::Skip, OperatorRequest::Skip, "not skipped"),
+        Question::Skip { .. } => cancelled(model, "not skipped"),
+        Question::AcceptFall { .. } if yes => {
+            request_if_legal(model, Action::Accept, OperatorRequest::Judge(Verdict::Accept), "not accepted")
+        }
+        Question::AcceptFall { .. } => cancelled(model, "not accepted"),
+    }
+}
+
 pub(super) fn quit_key(model: &mut Model, key: Key) -> Vec<Effect> {
     match key.typed() {
         Some('y' | 'Y') => vec![Effect::Quit],
@@ -82,18 +100,35 @@ pub(super) fn action_over_checks(model: &Model, key: Key) -> Option<Action> {
     arms.then_some(Action::Arm)
 }
 
-pub(super) fn arming_checks_key(model: &mut Model, key: Key, mut selected: usize) -> Vec<Effect> {
+/// `a` writes all trials, `s` those of the table as shown; every other key cancels.
+pub(super) fn export_key(model: &mut Model, key: Key) -> Vec<Effect> {
+    match key.typed() {
+        Some('a' | 'A') => vec![Effect::Export(ExportedRows::All)],
+        Some('s' | 'S') => vec![Effect::Export(ExportedRows::Shown)],
+        _ => cancelled(model, "nothing was written"),
+    }
+}
+
+pub(super) fn arming_checks_key(
+    model: &mut Model,
+    key: Key,
+    (mut selected, mut scroll): (usize, usize),
+) -> Vec<Effect> {
     let last = OperatorCheck::ALL.len() - 1;
     let mut effects = Vec::new();
     match key.code() {
         KeyCode::Esc | KeyCode::Enter => return effects,
-        KeyCode::Up => selected = selected.saturating_sub(1),
-        KeyCode::Down => selected = (selected + 1).min(last),
+        KeyCode::Up => (selected, scroll) = (selected.saturating_sub(1), 0),
+        KeyCode::Down => (selected, scroll) = ((selected + 1).min(last), 0),
+        KeyCode::PageUp => scroll = scroll.saturating_sub(CHECKS_PAGE).max(1),
+        // The first page begins at the top. The drawing stops at the last line.
+        KeyCode::PageDown if scroll == 0 => scroll = 1,
+        KeyCode::PageDown => scroll = (scroll + CHECKS_PAGE).min(CHECKS_LINES),
         KeyCode::Char('x') => {
             effects = request(model, OperatorRequest::Confirm(OperatorCheck::ALL[selected.min(last)]))
         }
         _ => {}
     }
-    model.dialog = Some(Dialog::ArmingChecks { selected });
+    model.dialog = Some(Dialog::ArmingChecks { selected, scroll });
     effects
 }

@@ -36,10 +36,14 @@ pub(super) fn key(model: &mut Model, dialog: Dialog, key: Key) -> KeyOutcome {
         }
         Dialog::TakeControl => confirm::take_control_key(model, key),
         Dialog::Arm { typed, opened_at } => confirm::arm_key(model, key, (typed, opened_at)),
-        Dialog::ArmingChecks { selected } => confirm::arming_checks_key(model, key, selected),
+        Dialog::ArmingChecks { selected, scroll } => confirm::arming_checks_key(model, key, (selected, scroll)),
+        Dialog::Confirm(question) => confirm::question_key(model, key, &question),
         Dialog::Quit => confirm::quit_key(model, key),
         Dialog::Override(form) => override_form::key(model, key, form),
-        Dialog::Field { purpose, input, .. } => text_field::key(model, key, purpose, input),
+        Dialog::Field { purpose, input, replaces, problem } => {
+            text_field::key(model, key, purpose, (input, replaces, problem))
+        }
+        Dialog::Export { .. } => confirm::export_key(model, key),
         Dialog::Palette { input, selected } => lists::palette_key(model, key, input, selected),
         Dialog::Help { scroll } => lists::help_key(model, key, scroll),
         Dialog::Report { lines, scroll } => lists::report_key(model, key, lines, scroll),

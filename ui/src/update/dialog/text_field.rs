@@ -2,6 +2,7 @@
 
 use crossterm::event::KeyCode;
 use quadfrog::session::operator_request::OperatorRequest;
+use quadfrog::trial::six_digits;
 use tui_input::{Input, InputRequest};
 
 use crate::keymap::Key;
@@ -12,25 +13,47 @@ use crate::update::beside::chosen;
 use crate::update::rejudged;
 use crate::update::request::{cancelled, request};
 
-pub(super) fn key(model: &mut Model, key: Key, purpose: Purpose, mut input: Input) -> Vec<Effect> {
-    let mut problem = None;
+/// End of the message about a character that is not part of a number.
+const NOT_OF_A_NUMBER: &str = " does not belong here: a number is typed";
+
+pub(super) fn key(
+    model: &mut Model,
+    key: Key,
+    purpose: Purpose,
+    (mut input, replaces, before): (Input, bool, Option<String>),
+) -> Vec<Effect> {
+    // The message about a character that was not taken stays until it is acknowledged: 1.5 would become 15 unseen.
+    let mut problem = before.filter(|text| text.ends_with(NOT_OF_A_NUMBER));
+    let refused = key.typed().filter(|c| purpose.characters().is_some_and(|allowed| !allowed.contains(*c)));
+    // The selection ends with the first key; one that types or deletes takes the text with it.
+    let takes = key.typed().is_some() || matches!(key.code(), KeyCode::Backspace | KeyCode::Delete);
+    if replaces && takes && refused.is_none() {
+        input.reset();
+        if key.typed().is_none() {
+            model.dialog = Some(Dialog::Field { purpose, input, replaces: false, problem });
+            return Vec::new();
+        }
+    }
     match key.code() {
         KeyCode::Esc => return cancelled(model, "nothing was changed"),
+        KeyCode::Enter if problem.is_some() => {
+            problem = Some(format!("a character was not taken; Enter again confirms {}", input.value()));
+        }
         KeyCode::Enter => match submit(model, purpose, input.value().trim()) {
             Ok(effects) => return effects,
             Err(reason) => problem = Some(reason),
         },
         // Where Space is always STOP, a note needs another key for it.
-        KeyCode::Char('_')
-            if key.typed().is_some()
-                && model.space_bar_must_stop()
-                && matches!(purpose, Purpose::Note(_) | Purpose::VoidReason { .. }) =>
-        {
+        KeyCode::Char('_') if key.typed().is_some() && model.space_bar_must_stop() && purpose.is_remark() => {
             input.handle(InputRequest::InsertChar(' '));
         }
-        _ => edit(&mut input, key),
+        _ => match refused {
+            Some(c) => problem = Some(format!("`{c}`{NOT_OF_A_NUMBER}")),
+            None => edit(&mut input, key),
+        },
     }
-    model.dialog = Some(Dialog::Field { purpose, input, problem });
+    let replaces = replaces && refused.is_some();
+    model.dialog = Some(Dialog::Field { purpose, input, replaces, problem });
     Vec::new()
 }
 
@@ -58,6 +81,12 @@ fn submit(model: &mut Model, purpose: Purpose, text: &str) -> Result<Vec<Effect>
             return Err("give the reason why the parameters did not cause it".to_owned());
         }
         Purpose::VoidReason { rerun, .. } => OperatorRequest::VoidBecause { reason: text.to_owned(), rerun },
+        Purpose::ChangeVerdict { .. } if text.is_empty() => {
+            return Err("give the reason of the change; the journal keeps it with the old verdict".to_owned());
+        }
+        Purpose::ChangeVerdict { trial, verdict } => {
+            OperatorRequest::ChangeVerdict { trial, verdict, reason: text.to_owned() }
+        }
         Purpose::TrialNumber => {
             let number = text.parse::<u32>().map_err(|_| format!("`{text}` is not the number of a trial"))?;
             if model.trial(number).is_none() {
@@ -124,7 +153,7 @@ fn count(text: &str, things: &str) -> Result<u32, String> {
 fn bounds(model: &Model, parameter: usize, text: &str) -> Result<OperatorRequest, String> {
     let info = model.session.info.parameters.get(parameter).ok_or("there is no such parameter")?;
     let (name, unit) = (&info.name, &info.unit);
-    let number = |text: &str| text.trim().parse::<f64>().ok().filter(|value| value.is_finite());
+    let number = |text: &str| text.trim().replace(',', ".").parse::<f64>().ok().filter(|value| value.is_finite());
     let ends = text.split_once("..").and_then(|(low, high)| Some((number(low)?, number(high)?)));
     let Some((low, high)) = ends else { return Err(format!("`{text}` is no range; write it as 50..120")) };
     if low >= high {
@@ -132,7 +161,8 @@ fn bounds(model: &Model, parameter: usize, text: &str) -> Result<OperatorRequest
     }
     match model.session.searched(name) {
         Some(p) if low < p.least || high > p.most => {
-            Err(format!("{name} may be searched from {} to {} {unit} (safety.toml)", p.least, p.most))
+            let (least, most) = (six_digits(p.least), six_digits(p.most));
+            Err(format!("{name} may be searched from {least} to {most} {unit} (safety.toml)"))
         }
         _ => Ok(OperatorRequest::NarrowBounds { parameter: name.clone(), low, high }),
     }

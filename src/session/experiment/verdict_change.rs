@@ -1,0 +1,58 @@
+//! Changes of a verdict after it has become final.
+
+use jiff::Timestamp;
+
+use super::Experiment;
+use super::judging::value_of;
+use super::plan::{RequestRefusal, not_now};
+use crate::optimize::trial::VerdictChange;
+use crate::trial::Verdict;
+
+impl Experiment {
+    /// Changes the final verdict of a trial for a reason of the operator; returns the one before. The journal keeps both. The
+    /// sampler proposes again from the changed history; the operator's changes of the open proposal stay.
+    /// Refused during a trial, without a reason, for a trial without a final verdict or with several rollouts, for the verdict
+    /// that it has, and for an accepted trial without a value.
+    pub fn change_verdict(&mut self, trial: u32, verdict: Verdict, reason: &str) -> Result<Verdict, RequestRefusal> {
+        self.must_be_idle()?;
+        let reason = reason.trim();
+        let Some(row) = self.rows.get(&trial) else { return not_now(format!("there is no trial {trial}")) };
+        if self.pending_verdict.as_ref().is_some_and(|pending| pending.suggestion.trial == trial) {
+            return not_now("its verdict is the last one: undo takes it back");
+        }
+        let Some(before) = row.verdict else { return not_now(format!("trial {trial} has no verdict yet")) };
+        if before == verdict {
+            return not_now(format!("trial {trial} is {} already", verdict.name()));
+        }
+        if !row.repeats.is_empty() {
+            return not_now(format!("trial {trial} has {} rollouts, each with its verdict", row.repeats.len()));
+        }
+        if reason.is_empty() {
+            return not_now("give the reason of the change");
+        }
+        let value = value_of(row, verdict, &self.plan);
+        if verdict != Verdict::Void && value.is_none() {
+            return not_now(format!("nothing was measured in trial {trial}: it cannot be accepted"));
+        }
+        let cause = format!("changed by the operator, was {}: {reason}; {}", before.name(), row.cause);
+        let change = VerdictChange {
+            at: Timestamp::now().to_string(),
+            verdict: verdict.name().to_owned(),
+            value,
+            cause: cause.clone(),
+            reason: reason.to_owned(),
+            old_verdict: before.name().to_owned(),
+            old_value: row.value,
+        };
+        self.study.change_verdict(trial, &change)?;
+        if let Some(row) = self.rows.get_mut(&trial) {
+            (row.verdict, row.value, row.cause) = (Some(verdict), value, cause);
+        }
+        self.publish_row(trial);
+        self.repropose()?;
+        if let Some(best) = self.model_best.filter(|_| self.pending_verdict.is_none()) {
+            self.study.store_best(best)?;
+        }
+        Ok(before)
+    }
+}

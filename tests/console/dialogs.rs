@@ -1,0 +1,159 @@
+//! Sentences that a person confirms are never cut.
+
+mod support;
+
+use quadfrog::recording::record::{ArmingCheckRecord, Record};
+use quadfrog::telemetry::{ArmingCheck, ArmingCheckState, Mode};
+use quadfrog::trial::Verdict;
+use quadfrog_console::message::{Effect, ExportedRows};
+use quadfrog_console::text::{as_csv, as_markdown};
+use strum::VariantArray;
+use support::{Console, assert_shows, trial};
+
+const SENTENCE: &str = "no person within 2 m of the robot, the remote control in the hand of the operator, and its stop \
+                        combination known to everybody who is in the room and who has read the page on safe handling";
+
+/// Every check with a long sentence, as hardware has them.
+fn long_checks() -> Console {
+    let mut console = Console::proposed();
+    let item = |check: &ArmingCheck| ArmingCheckRecord {
+        check: *check,
+        found: String::new(),
+        needed: format!("{} begins, {SENTENCE}, {} ends", check.name(), check.name()),
+        state: ArmingCheckState::Waiting,
+    };
+    console.record(Record::ArmingChecks(ArmingCheck::VARIANTS.iter().map(item).collect()));
+    console
+}
+
+/// The words inside the box of a dialog, in their order.
+fn words_of_the_dialog(screen: &str) -> String {
+    let inside = |line: &str| {
+        let (from, to) = (line.find('│')?, line.rfind('│')?);
+        (from < to).then(|| line[from + '│'.len_utf8()..to].to_owned())
+    };
+    screen.lines().filter_map(inside).collect::<Vec<_>>().join(" ").split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+#[test]
+fn every_arming_check_can_be_read_whole_at_every_size() {
+    for (columns, rows) in [(80, 24), (120, 40), (200, 60)] {
+        let mut console = long_checks();
+        console.update(quadfrog_console::message::Msg::Resize(columns, rows));
+        console.press(&["6", "P"]);
+        let mut read = String::new();
+        for _ in 0..40 {
+            read.push_str(&words_of_the_dialog(&console.screen(columns, rows)));
+            read.push(' ');
+            console.press(&["PgDn"]);
+        }
+        assert!(!read.contains(".."), "a sentence is cut");
+        for check in ArmingCheck::VARIANTS {
+            for part in ["begins,", "ends"] {
+                assert!(
+                    read.contains(&format!("{} {part}", check.name())),
+                    "{} {part} at {columns}x{rows}",
+                    check.name()
+                );
+            }
+        }
+        let widest = console
+            .screen(columns, rows)
+            .lines()
+            .filter(|line| line.contains('┌'))
+            .map(|l| l.trim().chars().count())
+            .max();
+        assert!(widest >= Some(usize::from(columns.min(120)) - 4), "the width of the terminal is used: {widest:?}");
+    }
+}
+
+/// A page of 80x24 holds fewer lines than the checks have: the item that `x` would confirm is visible without paging.
+#[test]
+fn the_chosen_check_is_visible() {
+    let mut console = long_checks();
+    console.press(&["6", "P"]);
+    for _ in 0..6 {
+        let screen = console.screen(80, 24);
+        assert!(screen.lines().any(|line| line.contains("│ >")), "{screen}");
+        console.press(&["Down"]);
+    }
+}
+
+#[test]
+fn long_notes_and_causes_continue_at_a_word() {
+    let mut console = Console::ready();
+    let mut row = trial(0, Some(Verdict::Accept), None);
+    row.note = SENTENCE.split_whitespace().collect::<Vec<_>>().join(" ");
+    console.record(Record::Trial(row.clone()));
+    for keys in [&["2", "Enter"][..], &["m"]] {
+        console.press(keys);
+        for (columns, rows) in [(80, 24), (120, 40), (200, 60)] {
+            for _ in 0..3 {
+                console.press(&["PgDn"]);
+            }
+            let words = words_of_the_dialog(&console.screen(columns, rows));
+            assert!(words.contains(&row.note), "{columns}x{rows}: {words}");
+        }
+        console.press(&["Esc"]);
+    }
+}
+
+/// The answers are the last line of a question: a long cause may not push them out.
+#[test]
+fn a_long_cause_leaves_the_answers_visible() {
+    let mut console = Console::review(Mode::Damped, Verdict::Fall);
+    let mut row = trial(0, None, Some(Verdict::Fall));
+    row.cause = SENTENCE.into();
+    console.record(Record::Trial(row));
+    console.press(&["a"]);
+    for (columns, rows) in [(80, 24), (120, 40)] {
+        let screen = console.screen(columns, rows);
+        let words = words_of_the_dialog(&screen);
+        let cause = SENTENCE.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(words.contains(&cause), "{screen}");
+        assert_shows(&screen, &["Cancel  Enter, or any other key     y accept"]);
+    }
+}
+
+fn table() -> Console {
+    let mut console = Console::ready();
+    console.judged(9);
+    console.press(&["2"]);
+    console
+}
+
+#[test]
+fn an_export_of_a_filtered_table_says_what_it_leaves_out_and_offers_all() {
+    let mut console = table();
+    assert_eq!(console.press(&["e"]), [Effect::Export(ExportedRows::All)], "nothing is left out");
+    console.press(&["F"]);
+    assert_eq!(console.press(&["e"]), []);
+    let screen = console.screen(80, 24);
+    assert_shows(
+        &screen,
+        &["The table shows 3 of 9 trials", "write all 9 trials", "write the 3 as shown and leave 6 out"],
+    );
+    assert_eq!(console.press(&["a"]), [Effect::Export(ExportedRows::All)]);
+    assert_eq!(console.press(&["e", "s"]), [Effect::Export(ExportedRows::Shown)]);
+    assert_eq!(console.press(&["e", "Enter"]), []);
+    assert_eq!(console.said(), "cancelled: nothing was written");
+    assert_eq!(as_csv(&console.model, ExportedRows::All).lines().count(), 10);
+    assert_eq!(as_csv(&console.model, ExportedRows::Shown).lines().count(), 4);
+    // All trials are in the order of their numbers, whatever the table is sorted by.
+    console.press(&["F", "F", "F", "S"]);
+    let all = as_csv(&console.model, ExportedRows::All);
+    let numbers: Vec<&str> = all.lines().skip(1).filter_map(|line| line.split(',').next()).collect();
+    assert_eq!(numbers, ["0", "1", "2", "3", "4", "5", "6", "7", "8"]);
+}
+
+/// The CSV is data, the Markdown is read.
+#[test]
+fn the_markdown_has_six_digits_and_the_csv_all() {
+    let mut console = table();
+    let mut row = trial(0, Some(Verdict::Accept), None);
+    row.value = Some(1.549_158_564_216_723_6);
+    console.record(Record::Trial(row));
+    assert_shows(&as_csv(&console.model, ExportedRows::All), &["1.5491585642167236"]);
+    let markdown = as_markdown(&console.model, ExportedRows::All);
+    assert!(markdown.contains("| 1.54916 |") && !markdown.contains("1.549158"), "{markdown}");
+}

@@ -1,0 +1,230 @@
+//! From the landing to the verdict: the trial on the charts, the countdown, the questions before what cannot be meant.
+
+mod support;
+
+use quadfrog::recording::record::Record;
+use quadfrog::session::operator_request::OperatorRequest;
+use quadfrog::telemetry::{Mode, Phase, Snapshot, Tick};
+use quadfrog::trial::{ExperimentStage, Verdict};
+use quadfrog_console::message::{Effect, Msg, ReplayStatus};
+use quadfrog_console::theme::Role;
+use ratatui::buffer::Cell;
+use support::{Console, assert_shows, line_with, proposal, tick, trial};
+
+/// A trial runs: countdown of 1 s, impulse, flight, landing until 1.2 s after the impulse began.
+fn run(console: &mut Console, number: u32, from_ms: u64) {
+    console.stage(ExperimentStage::Running, number);
+    for time_ms in (0..2_200).step_by(5) {
+        let phase = match time_ms {
+            0..1_000 => Phase::Stance,
+            1_000..1_200 => Phase::Impulse,
+            1_200..1_500 => Phase::Flight,
+            _ => Phase::Landing,
+        };
+        let roll = 0.1 * f64::from(number) + 0.1 * (time_ms as f64 / 200.0).sin();
+        console.tick(tick(from_ms + time_ms, roll, Some((number, time_ms as f64 / 1e3 - 1.0, phase))));
+    }
+}
+
+/// Trial 0 was accepted, trial 1 waits for its verdict; `after_ms` later.
+fn landed(after_ms: u64) -> Console {
+    let mut console = Console::ready();
+    run(&mut console, 0, 1_000);
+    console.record(Record::Trial(trial(0, Some(Verdict::Accept), None)));
+    run(&mut console, 1, 5_000);
+    console.record(Record::Trial(trial(1, None, Some(Verdict::Accept))));
+    console.stage(ExperimentStage::Review, 1);
+    console.mode(Mode::Review);
+    console.ticks(7_200..7_200 + after_ms, |_| 0.0);
+    console
+}
+
+/// The letters of a phase in the line under the charts.
+fn columns_of(screen: &str, letter: char) -> usize {
+    let line = screen.lines().find(|line| line.contains("iii")).unwrap_or_default();
+    line.chars().filter(|c| *c == letter).count()
+}
+
+#[test]
+fn the_landed_trial_stays_on_the_charts_until_its_verdict() {
+    for size in [(80, 24), (120, 40), (200, 60)] {
+        let at_once = landed(0).screen(size.0, size.1);
+        let mut console = landed(40_000);
+        let later = console.screen(size.0, size.1);
+        assert_shows(&later, &["TRIAL #1", "#1, #0 under it, -0.3 to +1.2 s"]);
+        let charts = |screen: &str| screen.lines().skip(3).take(9).map(str::to_owned).collect::<Vec<_>>();
+        assert_eq!(charts(&at_once), charts(&later), "40 s later the charts have changed at {size:?}");
+        console.record(Record::Trial(trial(1, Some(Verdict::Accept), None)));
+        console.stage(ExperimentStage::Proposed, 2);
+        let judged = console.screen(size.0, size.1);
+        assert!(!judged.contains("TRIAL #1") && judged.contains(" 8 s sweep"), "{judged}");
+        assert_eq!(columns_of(&judged, 'i'), 0, "the jump left the live charts long ago:\n{judged}");
+    }
+}
+
+/// The impulse takes 0.2 s of 1.5 s: of two columns of charts over 80 columns it takes five each.
+#[test]
+fn the_jump_fills_the_charts_and_at_80_columns_these_the_terminal() {
+    let screen = landed(20_000).screen(80, 24);
+    let line = screen.lines().find(|line| line.contains("iii")).unwrap_or_default();
+    assert!(columns_of(&screen, 'i') >= 5 && columns_of(&screen, 'f') >= 7, "{screen}");
+    assert!(line.chars().count() >= 79, "the letters end at the right edge of the terminal: {line}");
+    assert_shows(&screen, &["suggested verdict: accept", "rise", "#", "verdict"]);
+}
+
+/// A series under the samples is the best trial; the one chosen by its key replaces it.
+#[test]
+fn the_best_trial_lies_under_the_landed_one() {
+    let console = landed(1_000);
+    let buffer = console.draw(120, 40);
+    let dim = console.model.theme.style(Role::Ghost).add_modifier;
+    let dots = |cell: &&Cell| ("\u{2801}".."\u{2900}").contains(&cell.symbol()) && cell.modifier == dim;
+    let count = buffer.content().iter().filter(dots).count();
+    assert!(count > 20, "{count} cells of the ghost");
+}
+
+#[test]
+fn a_key_returns_to_the_present_and_back_to_the_landed_trial() {
+    let mut console = landed(20_000);
+    console.press(&["z"]);
+    let present = console.screen(80, 24);
+    assert!(present.contains(" 8 s sweep") && !present.contains("TRIAL #1"), "{present}");
+    assert_shows(&present, &["the charts show the present; z shows trial 1 again"]);
+    console.press(&["z"]);
+    assert_shows(&console.screen(80, 24), &["TRIAL #1", "#0 under it"]);
+    console.press(&["2"]);
+    assert!(!console.screen(80, 24).contains("TRIAL #1"), "the other views show the present");
+}
+
+#[test]
+fn the_cursor_reads_the_landed_trial() {
+    let mut console = landed(20_000);
+    console.press(&["Right", "Right"]);
+    assert_shows(&console.screen(80, 24), &["at +0.03 s"]);
+    // 5 ms steps; the impulse of trial 1 begins at 6 s.
+    let roll = 0.1 + 0.1 * (1_030_f64 / 200.0).sin();
+    assert_shows(&line_with(&console.screen(80, 24), "roll"), &[&format!("{roll:+.3} rad")]);
+    console.press(&["+"]);
+    assert_shows(console.said(), &["trial 1 is fitted to the charts"]);
+}
+
+#[test]
+fn charts_that_were_frozen_before_the_jump_show_the_landed_trial() {
+    let mut console = Console::ready();
+    console.ticks(0..1_000, |_| 0.3);
+    console.press(&["z"]);
+    run(&mut console, 0, 1_000);
+    console.record(Record::Trial(trial(0, None, Some(Verdict::Accept))));
+    console.stage(ExperimentStage::Review, 0);
+    let screen = console.screen(80, 24);
+    assert!(screen.contains("TRIAL #0") && !screen.contains("VIEW FROZEN"), "{screen}");
+}
+
+#[test]
+fn a_replay_and_a_trial_without_signals_show_the_playhead() {
+    let mut console = landed(1_000);
+    console.update(Msg::Replay(ReplayStatus { playing: true, speed: 1.0, ..ReplayStatus::default() }));
+    assert!(!console.screen(80, 24).contains("TRIAL #1"));
+    let console = Console::review(Mode::Review, Verdict::Accept);
+    assert!(!console.screen(80, 24).contains("TRIAL #0"), "no signals of it");
+}
+
+fn count_down(console: &mut Console, left_s: f64) -> Vec<Effect> {
+    let number = console.model.snapshot.tick.number + 1;
+    let tick = Tick { number, mode: Mode::Countdown, trial_time_s: -left_s, ..console.model.snapshot.tick };
+    console.update(Msg::Snapshot(Box::new(Snapshot { tick, ..console.model.snapshot })))
+}
+
+#[test]
+fn the_countdown_counts_in_large_digits_with_the_bell() {
+    let mut console = Console::ready();
+    for (left_s, seconds) in [(3.0, 3), (2.01, 3), (1.99, 2), (0.7, 1)] {
+        let rings = count_down(&mut console, left_s) == [Effect::Bell];
+        assert_eq!(rings, left_s != 2.01, "{left_s}");
+        for (columns, rows) in [(80, 24), (120, 40), (200, 60)] {
+            let screen = console.screen(columns, rows);
+            let lead = format!("Jump in {seconds} s: any key cancels it.");
+            assert_eq!(screen.matches(&lead).count(), 2, "beside the digits and as the next step:\n{screen}");
+            let lines: Vec<&str> = screen.lines().collect();
+            assert!(lines[1].contains("STOP"), "{screen}");
+        }
+    }
+    // The five rows of the digit 1.
+    let screen = console.screen(80, 24);
+    let full = console.model.theme.fill().0;
+    let rows: Vec<usize> = screen.lines().map(|line| line.matches(&full.repeat(2)).count()).collect();
+    let digit: Vec<usize> = rows.iter().copied().filter(|count| *count > 0).collect();
+    assert!(digit.ends_with(&[3]) && digit.len() >= 5, "{digit:?}\n{screen}");
+    console.mode(Mode::Jump);
+    assert!(!console.screen(80, 24).contains("any key cancels"));
+}
+
+#[test]
+fn accepting_a_suggested_fall_asks_once_more() {
+    let accept = [OperatorRequest::Judge(Verdict::Accept)];
+    for mode in [Mode::Review, Mode::Damped, Mode::Disarmed] {
+        let mut console = Console::review(mode, Verdict::Fall);
+        assert_eq!(console.requests(&["a"]), [], "{mode:?}");
+        let screen = console.screen(80, 24);
+        assert_shows(&screen, &["Accept a fall?", "fall: roll 1.200 rad", "exceeds 1.000 rad.", "J = 0.420 m"]);
+        assert_eq!(console.requests(&["y"]), accept);
+        for key in ["a", "Enter", "Esc", "f", "n"] {
+            assert_eq!(console.requests(&["a", key]), [], "{key} in {mode:?}");
+            assert_eq!(console.said(), "cancelled: not accepted");
+        }
+        assert_eq!(console.requests(&["f"]), [OperatorRequest::Judge(Verdict::Fall)]);
+    }
+    let mut console = Console::review(Mode::Review, Verdict::Accept);
+    assert_eq!(console.requests(&["a"]), accept, "a suggested accept needs one key");
+}
+
+#[test]
+fn the_question_closes_when_the_trial_is_judged_elsewhere() {
+    let mut console = Console::review(Mode::Review, Verdict::Fall);
+    console.press(&["a"]);
+    console.record(Record::Trial(trial(0, Some(Verdict::Fall), None)));
+    console.stage(ExperimentStage::Proposed, 1);
+    assert_eq!(console.requests(&["y"]), []);
+}
+
+/// The letters of the arming confirmation, typed where its dialog did not open, contain the key that skips.
+#[test]
+fn letters_typed_without_a_dialog_never_skip_a_proposal() {
+    for console in [Console::ready(), Console::proposed()] {
+        let mut console = console;
+        assert_eq!(console.requests(&["s", "t", "a", "n", "d"]), []);
+        assert_eq!(console.said(), "cancelled: not skipped");
+        assert_eq!(console.requests(&["n"]), []);
+        assert_shows(&console.screen(80, 24), &["Skip the proposal?", "Trial #0", "Press y to skip trial #0"]);
+        assert_eq!(console.requests(&["y"]), [OperatorRequest::Skip]);
+        console.press(&["n"]);
+        console.record(Record::Proposal(proposal(0, 1)));
+        assert_eq!(console.requests(&["y"]), [], "another proposal than the one of the question");
+    }
+}
+
+#[test]
+fn the_verdict_of_a_selected_row_is_changed_with_a_reason() {
+    let mut console = Console::ready();
+    console.record(Record::Trial(trial(0, Some(Verdict::Accept), None)));
+    console.record(Record::Trial(trial(1, Some(Verdict::Fall), None)));
+    assert_eq!(console.requests(&["f"]), []);
+    assert_shows(console.said(), &["no trial waits for a verdict; in Trials, select a judged one"]);
+    console.press(&["2", "Up", "a"]);
+    assert_shows(console.said(), &["accept: trial 0 is accept already"]);
+    console.press(&["f"]);
+    assert_shows(&console.screen(80, 24), &["Trial #0: accept becomes fall. Why?", "the journal keeps the"]);
+    assert_eq!(console.requests(&["Enter"]), [], "a change needs a reason");
+    assert_shows(&console.screen(80, 24), &["give the reason of the change"]);
+    console.enter("it");
+    console.press(&["Space"]);
+    console.enter("lay");
+    let change = OperatorRequest::ChangeVerdict { trial: 0, verdict: Verdict::Fall, reason: "it lay".into() };
+    assert_eq!(console.requests(&["Enter"]), [change]);
+    // While a trial waits for its verdict the keys are for that one.
+    console.stage(ExperimentStage::Running, 2);
+    assert_eq!(console.requests(&["f"]), [], "during a trial");
+    console.record(Record::Trial(trial(2, None, Some(Verdict::Accept))));
+    console.stage(ExperimentStage::Review, 2);
+    assert_eq!(console.requests(&["v"]), [OperatorRequest::Judge(Verdict::Void)]);
+}

@@ -1,0 +1,114 @@
+//! Text fields: what a key does to the text that is there.
+
+mod support;
+
+use quadfrog::recording::record::{Record, SessionInfo};
+use quadfrog::session::operator_request::OperatorRequest;
+use quadfrog::telemetry::Mode;
+use quadfrog::trial::{ExperimentStage, SearchStatus, SearchedParameter, Verdict};
+use quadfrog_console::theme::Role;
+use support::{Console, assert_shows, session, trial};
+
+/// A finished study.
+fn finished() -> Console {
+    let mut console = Console::ready();
+    console.record(Record::Trial(trial(0, Some(Verdict::Accept), None)));
+    console.stage(ExperimentStage::Finished, 0);
+    console
+}
+
+#[test]
+fn typing_replaces_the_default_of_a_number() {
+    let mut console = finished();
+    assert_eq!(console.requests(&["C", "3", "Enter"]), [OperatorRequest::Continue(3)]);
+    assert_eq!(console.requests(&["C", "Enter"]), [OperatorRequest::Continue(20)], "the default itself");
+    assert_eq!(console.requests(&["C", "End", "1", "Enter"]), [OperatorRequest::Continue(201)], "after the selection");
+    assert_eq!(console.requests(&["C", "Backspace", "7", "Enter"]), [OperatorRequest::Continue(7)]);
+    let mut console = Console::ready();
+    let fixed = console.requests(&["4", "X", "3", "Enter"]);
+    assert_eq!(fixed, [OperatorRequest::Fix { parameter: "f0".into(), value: 1.25, trials: 3 }]);
+    console.press(&["B"]);
+    console.enter("0,8..1.5");
+    let bounds = console.requests(&["Enter"]);
+    assert_eq!(bounds, [OperatorRequest::NarrowBounds { parameter: "f0".into(), low: 0.8, high: 1.5 }]);
+}
+
+/// The selected default has the colours of a selection; it loses them with the first key.
+#[test]
+fn the_default_of_a_number_is_drawn_as_selected() {
+    let mut console = finished();
+    let selected = |console: &Console| {
+        let style = console.model.theme.style(Role::Selected);
+        let buffer = console.draw(80, 24);
+        let marked = buffer.content().iter().skip(80 * 3).filter(|cell| {
+            (Some(cell.fg), Some(cell.bg)) == (style.fg.or(Some(cell.fg)), style.bg.or(Some(cell.bg)))
+                && cell.modifier == style.add_modifier
+        });
+        marked.map(|cell| cell.symbol().to_owned()).collect::<String>()
+    };
+    console.press(&["C"]);
+    assert!(selected(&console).contains("20"), "{}", selected(&console));
+    console.press(&["3"]);
+    assert!(!selected(&console).contains('3'), "{}", selected(&console));
+}
+
+#[test]
+fn a_field_of_a_number_takes_no_other_characters_and_says_so() {
+    let mut console = finished();
+    console.press(&["C", "1", "0"]);
+    for key in ["A", "x", ".", "-"] {
+        console.press(&[key]);
+        assert_shows(&console.screen(80, 24), &[&format!("`{key}` does not belong here")]);
+    }
+    // 1.5 does not become 15 unseen.
+    assert_eq!(console.requests(&["5", "Enter"]), []);
+    assert_shows(&console.screen(80, 24), &["a character was not taken; Enter again confirms 105"]);
+    assert_eq!(console.requests(&["Backspace", "Enter"]), [OperatorRequest::Continue(10)]);
+    // A refused character leaves the selected default as it is.
+    assert_eq!(console.requests(&["C", "x", "Enter", "Enter"]), [OperatorRequest::Continue(20)]);
+    let mut console = Console::review(Mode::Review, Verdict::Accept);
+    assert_eq!(console.requests(&["=", "0", ",", "2", "Enter"]), [OperatorRequest::HandValue(Some(0.2))]);
+}
+
+#[test]
+fn a_note_is_continued_and_takes_every_character() {
+    let mut console = Console::ready();
+    let mut row = trial(0, Some(Verdict::Accept), None);
+    row.note = "slid".into();
+    console.record(Record::Trial(row));
+    console.press(&["m", "Space", "5", "Enter"]);
+    let noted = console.requests(&["m", "Space", "5", "Enter"]);
+    assert_eq!(noted, [OperatorRequest::Note { trial: 0, text: "slid 5".into() }]);
+}
+
+/// Bounds of a search on a logarithmic scale, or computed ones, have up to 17 digits.
+#[test]
+fn no_dialog_and_no_message_has_a_number_of_17_digits() {
+    let mut console = Console::new();
+    let mut info: SessionInfo = session();
+    let (low, high) = (0.1 + 0.2, 1.549_158_564_216_723_6);
+    (info.parameters[0].low, info.parameters[0].high) = (low, high);
+    console.record(Record::Session(info));
+    let searched = |name: &str| SearchedParameter { name: name.into(), low, high, least: low, most: high, fixed: None };
+    let search = SearchStatus { parameters: vec![searched("f0")], ..SearchStatus::default() };
+    console.record(Record::Search(search));
+    console.record(Record::Proposal(support::proposal(0, 0)));
+    console.stage(ExperimentStage::Proposed, 0);
+    console.mode(Mode::Ready);
+    console.stage(ExperimentStage::Running, 0);
+    let mut row = trial(0, Some(Verdict::Accept), None);
+    row.gains = vec![("kp".to_owned(), high)].into();
+    row.hand_value = Some(high);
+    console.record(Record::Trial(row));
+    console.stage(ExperimentStage::Proposed, 0);
+    for keys in [&["4", "B"][..], &["4", "X"], &["4", "o"], &["2", "Enter"], &["1"], &["3"]] {
+        console.press(keys);
+        let screen = console.screen(200, 60);
+        let longest = screen.split(|c: char| !c.is_ascii_digit()).map(str::len).max();
+        assert!(longest <= Some(6), "{keys:?}\n{screen}");
+        console.press(&["Esc"]);
+    }
+    console.press(&["4", "B", "1"]);
+    console.press(&["Enter"]);
+    assert_shows(&console.screen(80, 24), &["write it as 50..120"]);
+}

@@ -1,0 +1,73 @@
+//! The running program: a verdict that has become final is changed, and the files that the session leaves hold both.
+
+#[path = "support/pty.rs"]
+mod pty;
+
+use std::path::Path;
+use std::process::Command;
+
+use pty::Session;
+
+/// Output of `quadfrog` with these arguments.
+fn quadfrog(folder: &Path, arguments: &[&str]) -> String {
+    let output =
+        Command::new(env!("CARGO_BIN_EXE_quadfrog")).args(arguments).current_dir(folder).output().expect("it runs");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+#[test]
+fn a_changed_verdict_is_in_the_table_the_journal_and_the_exports() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut session = Session::start(folder.path(), (120, 40), &["--seed", "3"]);
+    session.wait_for(&["Press A to arm"]);
+    session.send("A");
+    session.wait_for(&["Press g twice"]);
+    session.approve();
+    session.wait_for(&["Trial #0: judge it", "TRIAL #0"]);
+    session.send("a");
+    session.wait_for(&["Trial #1"]);
+    session.send("2");
+    session.send("f");
+    session.wait_for(&["accept becomes fall. Why?"]);
+    session.send("too early\r");
+    session.wait_for(&["its verdict is the last one: undo takes it back"]);
+    // The verdict becomes final with the next decision.
+    session.send("n");
+    session.wait_for(&["Skip the proposal?"]);
+    session.send("y");
+    session.wait_for(&["skipped; a new proposal follows"]);
+    session.send("\x1b[H");
+    session.send("f");
+    session.wait_for(&["Trial #0: accept becomes fall. Why?"]);
+    session.send("it lay on its back\r");
+    session.wait_for(&["trial 0 is fall now, was accept; the journal keeps both"]);
+    session.wait_for(&["changed by the operator, was accept"]);
+    // The table shows one of two trials: the export asks.
+    session.send("F");
+    session.send("F");
+    session.wait_for(&["only fall"]);
+    session.send("e");
+    session.wait_for(&["The table shows 1 of 2 trials"]);
+    session.send("s");
+    session.wait_for(&["written: 1 of 2 trials, 1 left out"]);
+    session.send("e");
+    session.wait_for(&["The table shows 1 of 2 trials"]);
+    session.send("a");
+    session.wait_for(&["written: all 2 trials"]);
+    assert!(session.quit().success());
+
+    let study = std::fs::read_dir(folder.path()).expect("the folder").map(|entry| entry.expect("an entry").path());
+    let study = study.into_iter().find(|path| path.join("study.log").exists()).expect("a study");
+    let table = std::fs::read_to_string(study.join("trials.csv")).expect("trials.csv");
+    let row = table.lines().nth(1).expect("trial 0");
+    assert!(row.contains(",fall,") && row.contains("was accept: it lay on its back"), "{table}");
+    let journal = std::fs::read_to_string(study.join("study.log")).expect("the journal");
+    let change = journal.lines().find(|line| line.contains("verdict:0")).expect("the change");
+    for part in ["\"old_verdict\"", "\"accept\"", "it lay on its back", "\"old_value\""] {
+        assert!(change.contains(part), "no {part} in {change}");
+    }
+    let exported = quadfrog(folder.path(), &["study", "export", study.to_str().expect("a path")]);
+    let row = exported.lines().find(|line| line.contains("it lay on its back"));
+    assert!(row.is_some_and(|row| row.contains("fall")), "{exported}");
+}
