@@ -68,6 +68,10 @@ pub enum Dialog {
         trial: u32,
         scroll: usize,
     },
+    /// The selected line of the log, whole.
+    LogLine {
+        scroll: usize,
+    },
 }
 
 /// Purpose of a text field. A parameter is its index in the session's list.

@@ -2,6 +2,7 @@
 
 pub(crate) mod comparison;
 pub mod dialog;
+pub(crate) mod health_history;
 pub(crate) mod history;
 pub mod jump_series;
 pub(crate) mod live;
@@ -28,6 +29,7 @@ use crate::series::Series;
 use crate::settings::{BellCause, ConsoleSettings};
 use crate::theme::{Background, Theme, ThemeChoice};
 use dialog::{Choice, Dialog};
+use health_history::HealthHistory;
 use history::SignalHistory;
 use jump_series::JumpSeries;
 use live::{LiveView, Panel};
@@ -97,6 +99,9 @@ pub struct Model {
     /// Wait of the session for the storage of its study.
     pub storage: Option<StorageWait>,
     pub history: SignalHistory,
+    pub health_history: HealthHistory,
+    /// Whether view Health shows its history in place of the numbers.
+    pub health_history_shown: bool,
     /// The jumps of the running trial.
     pub jump_series: JumpSeries,
     pub message: Option<Notice>,
@@ -149,6 +154,8 @@ impl Model {
             viewers: None,
             storage: None,
             history: SignalHistory::default(),
+            health_history: HealthHistory::default(),
+            health_history_shown: false,
             jump_series: JumpSeries::default(),
             message: None,
             view: View::Live,

@@ -1,10 +1,15 @@
 //! Parts that several panels draw, and the formats of numbers and times.
 
+use std::time::Duration;
+
+use jiff::Timestamp;
+use jiff::tz::TimeZone;
 use quadfrog::trial::{ExpectedResult, Verdict};
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
 
+use crate::model::session::SessionModel;
 use crate::theme::{Role, Theme};
 
 pub fn span(theme: &Theme, role: Role, text: impl Into<String>) -> Span<'static> {
@@ -53,6 +58,14 @@ pub fn clock(time_ns: u64) -> String {
     let seconds = time_ns / 1_000_000_000;
     let (h, m, s) = (seconds / 3600, seconds / 60 % 60, seconds % 60);
     if h > 0 { format!("{h}:{m:02}:{s:02}") } else { format!("{m:02}:{s:02}") }
+}
+
+/// The time of day, `14:03:12`, of a time in ns since the session began, in the time zone of the system; without a known
+/// begin the time since then.
+pub fn wall_clock(session: &SessionModel, time_ns: u64) -> String {
+    let begun = session.info.started.parse::<Timestamp>().ok();
+    let at = begun.and_then(|begun| begun.checked_add(Duration::from_nanos(time_ns)).ok());
+    at.map_or_else(|| clock(time_ns), |at| at.to_zoned(TimeZone::system()).strftime("%H:%M:%S").to_string())
 }
 
 pub fn clock_ms(time_ns: u64) -> String {

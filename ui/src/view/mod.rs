@@ -21,6 +21,7 @@ mod dialogs;
 mod dots;
 mod draw;
 mod health;
+mod health_history;
 mod help;
 mod live;
 mod log;
@@ -36,6 +37,7 @@ mod status_bar;
 mod timeline;
 mod trials;
 mod wireframe;
+mod wrap;
 
 use ratatui::Frame;
 

@@ -1,0 +1,46 @@
+//! Lines that continue at a word, so that no sentence is cut.
+
+use ratatui::style::Style;
+use ratatui::text::{Line, Span};
+
+/// The line in pieces of at most `width` characters, broken at spaces, or inside a word that is longer than a line. Further
+/// pieces begin with `indent` spaces. Styles stay with their characters.
+pub fn wrap(line: &Line, width: usize, indent: usize) -> Vec<Line<'static>> {
+    let cells: Vec<(char, Style)> =
+        line.spans.iter().flat_map(|span| span.content.chars().map(|c| (c, span.style))).collect();
+    let width = width.max(1);
+    let indent = if indent + 8 > width { 0 } else { indent };
+    let mut pieces = Vec::new();
+    let mut rest = &cells[..];
+    while !rest.is_empty() || pieces.is_empty() {
+        let before = if pieces.is_empty() { 0 } else { indent };
+        let room = width - before;
+        let taken = match rest.get(room) {
+            None => rest.len(),
+            Some((' ', _)) => room,
+            // The break is after the last space; spaces at the begin of the line are no break.
+            Some(_) => {
+                let first = rest.iter().position(|(c, _)| *c != ' ').unwrap_or(0);
+                rest[..room].iter().rposition(|(c, _)| *c == ' ').filter(|at| *at > first).unwrap_or(room)
+            }
+        };
+        let (piece, after) = rest.split_at(taken);
+        pieces.push(restyled(piece, before));
+        let spaces = after.iter().take_while(|(c, _)| *c == ' ').count();
+        rest = &after[spaces.min(after.len())..];
+    }
+    pieces
+}
+
+/// All lines, each wrapped.
+pub fn wrap_all(lines: &[Line], width: usize, indent: usize) -> Vec<Line<'static>> {
+    lines.iter().flat_map(|line| wrap(line, width, indent)).collect()
+}
+
+fn restyled(cells: &[(char, Style)], indent: usize) -> Line<'static> {
+    let mut spans = if indent > 0 { vec![Span::raw(" ".repeat(indent))] } else { Vec::new() };
+    for run in cells.chunk_by(|a, b| a.1 == b.1) {
+        spans.push(Span::styled(run.iter().map(|(c, _)| *c).collect::<String>(), run[0].1));
+    }
+    Line::from(spans)
+}
