@@ -18,7 +18,7 @@ pub use folder::{
 };
 pub use guard::{GUARD, GuardError, GuardOutcome, run_guard};
 pub use observers::{
-    Observer, ObserverServer, ObserverStatus, RunningSession, SessionFacts, SessionNews, running_sessions,
+    FoundSessions, Observer, ObserverServer, ObserverStatus, RunningSession, SessionFacts, SessionNews, find_sessions,
 };
 pub use options::{EngineError, Options, Provenance};
 pub use prior::{PRIOR_FILE, PriorFileError, PriorMaker, ReadyPrior, prior_plan};

@@ -83,10 +83,13 @@ cell!(i64, Whole);
 cell!(bool, Flag);
 cell!(&'static str, Name);
 
+/// Adds the values of a signal at the ticks of a block.
+type Push = Box<dyn Fn(&mut TypedColumn, &[Stamped])>;
+
 /// A signal: an empty column, and what adds its values at the ticks of a block.
 struct Signal {
     column: TypedColumn,
-    push: Box<dyn Fn(&mut TypedColumn, &[Stamped])>,
+    push: Push,
 }
 
 /// The signals of a topic, or of all.

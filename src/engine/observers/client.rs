@@ -23,13 +23,21 @@ pub struct RunningSession {
     reader: BufReader<UnixStream>,
 }
 
-/// Returns the sessions that run on this machine under this user, by the number of their process, and the sockets that do not
-/// answer, with the reason. The sockets of sessions that were killed are removed.
+/// What was found in the folders of sockets.
+#[derive(Debug, Default)]
+pub struct FoundSessions {
+    /// The sessions that run, by the number of their process.
+    pub running: Vec<RunningSession>,
+    /// The sockets that do not answer as a session does, with the reason.
+    pub silent: Vec<(PathBuf, io::Error)>,
+}
+
+/// Finds the sessions that run on this machine under this user. The sockets of sessions that were killed are removed.
 ///
 /// # Errors
 /// When a folder of sockets cannot be read.
-pub fn running_sessions() -> io::Result<(Vec<RunningSession>, Vec<(PathBuf, io::Error)>)> {
-    let (mut sessions, mut silent) = (Vec::new(), Vec::new());
+pub fn find_sessions() -> io::Result<FoundSessions> {
+    let mut found = FoundSessions::default();
     for folder in socket_folders() {
         let entries = match std::fs::read_dir(&folder) {
             Err(error) if error.kind() == ErrorKind::NotFound => continue,
@@ -39,14 +47,14 @@ pub fn running_sessions() -> io::Result<(Vec<RunningSession>, Vec<(PathBuf, io::
         let sockets = entries.filter_map(|entry| Some(entry.ok()?.path()));
         for socket in sockets.filter(|path| path.extension().is_some_and(|extension| extension == "sock")) {
             match connect(&socket) {
-                Ok(session) => sessions.push(session),
+                Ok(session) => found.running.push(session),
                 Err(error) if error.kind() == ErrorKind::ConnectionRefused => drop(std::fs::remove_file(&socket)),
-                Err(error) => silent.push((socket, error)),
+                Err(error) => found.silent.push((socket, error)),
             }
         }
     }
-    sessions.sort_by_key(|session| session.facts.process);
-    Ok((sessions, silent))
+    found.running.sort_by_key(|session| session.facts.process);
+    Ok(found)
 }
 
 fn connect(socket: &PathBuf) -> io::Result<RunningSession> {

@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::recording::record::LogLevel;
 
-pub use client::{Observer, ObserverStatus, RunningSession, running_sessions};
+pub use client::{FoundSessions, Observer, ObserverStatus, RunningSession, find_sessions};
 pub use server::ObserverServer;
 
 /// Longest line either end accepts, bytes.

@@ -24,6 +24,7 @@ pub use lost::LostPart;
 use tick_joiner::TickJoiner;
 
 /// A played tick or record.
+#[expect(clippy::large_enum_variant, reason = "records are few; the many ticks are boxed")]
 #[derive(Debug, Clone, PartialEq)]
 pub enum Played {
     /// A control tick; of 2.4 kB, so that it is not copied on its way.

@@ -79,6 +79,10 @@ pub enum Dialog {
         trial: u32,
         scroll: usize,
     },
+    /// The selected line of the log, whole.
+    LogLine {
+        scroll: usize,
+    },
 }
 
 /// A question before an action that a single key would carry out by accident.

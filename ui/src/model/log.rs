@@ -39,7 +39,7 @@ impl SessionLog {
 /// State of the log view.
 #[derive(Debug, Clone, Default)]
 pub struct LogView {
-    /// Lines above the newest; 0 follows.
+    /// The selected line, counted back from the newest; 0 follows.
     pub back: usize,
     /// The lowest level shown.
     pub level: Option<LogLevel>,
@@ -48,6 +48,11 @@ pub struct LogView {
 }
 
 impl LogView {
+    /// Returns the line that a key opens; none in an empty log.
+    pub fn selected<'a>(&'a self, log: &'a SessionLog) -> Option<&'a LogLine> {
+        self.lines(log).rev().nth(self.back).or_else(|| self.lines(log).next())
+    }
+
     /// Returns the lines that pass the filter, oldest first.
     pub fn lines<'a>(&'a self, log: &'a SessionLog) -> impl DoubleEndedIterator<Item = &'a LogLine> + 'a {
         let search = self.search.to_lowercase();

@@ -2,6 +2,7 @@
 
 pub(crate) mod comparison;
 pub mod dialog;
+pub(crate) mod health_history;
 pub(crate) mod history;
 pub mod jump_series;
 pub(crate) mod landed;
@@ -30,6 +31,7 @@ use crate::series::Series;
 use crate::settings::{BellCause, ConsoleSettings};
 use crate::theme::{Background, Theme, ThemeChoice};
 use dialog::{Choice, Dialog};
+use health_history::HealthHistory;
 use history::SignalHistory;
 use jump_series::JumpSeries;
 use landed::LandedTrial;
@@ -102,6 +104,9 @@ pub struct Model {
     /// Wait of the session for the storage of its study.
     pub storage: Option<StorageWait>,
     pub history: SignalHistory,
+    pub health_history: HealthHistory,
+    /// Whether view Health shows its history in place of the numbers.
+    pub health_history_shown: bool,
     /// The jumps of the running trial.
     pub jump_series: JumpSeries,
     pub message: Option<Notice>,
@@ -155,6 +160,8 @@ impl Model {
             observers: None,
             storage: None,
             history: SignalHistory::default(),
+            health_history: HealthHistory::default(),
+            health_history_shown: false,
             jump_series: JumpSeries::default(),
             message: None,
             view: View::Live,

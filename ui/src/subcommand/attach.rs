@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use anyhow::{Context, anyhow};
 use clap::Args;
 use quadfrog::config::Config;
-use quadfrog::engine::{Observer, RunningSession, SessionFacts, running_sessions};
+use quadfrog::engine::{FoundSessions, Observer, RunningSession, SessionFacts, find_sessions};
 use quadfrog::recording::session_files::recordings_of;
 use quadfrog::recording::timeline::Timeline;
 use quadfrog::robot::description::RobotDescription;
@@ -63,11 +63,12 @@ pub fn list() -> Result<(), Failure> {
 }
 
 fn sessions() -> Result<Vec<RunningSession>, Failure> {
-    let (sessions, silent) = running_sessions().map_err(|error| Failure::Other(anyhow!("sessions: {error}")))?;
+    let FoundSessions { running, silent } =
+        find_sessions().map_err(|error| Failure::Other(anyhow!("sessions: {error}")))?;
     for (socket, error) in silent {
         notice!("{}: {error}", socket.display());
     }
-    Ok(sessions)
+    Ok(running)
 }
 
 fn described(facts: &SessionFacts) -> String {

@@ -62,6 +62,7 @@ pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
         Msg::Tick(tick) => {
             model.jump_series.push(&tick);
             model.history.push(&tick);
+            model.health_history.push(&tick, &model.snapshot.counters);
         }
         Msg::Replay(status) => {
             beside::follow(model, &status);
@@ -73,6 +74,7 @@ pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
         Msg::Rewound => {
             model.session = SessionModel::default();
             model.history.clear();
+            model.health_history.clear();
             model.log_view.back = 0;
         }
         Msg::Resumed => model.session.arming_checks.clear(),

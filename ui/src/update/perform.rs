@@ -105,6 +105,7 @@ pub(super) fn perform(model: &mut Model, action: Action) -> Vec<Effect> {
         Action::ZoomIn => zoom(model, 0.5),
         Action::ZoomOut => zoom(model, 2.0),
         Action::ChartMode => next_mode(model),
+        Action::Series if model.view == View::Health => model.health_history_shown = !model.health_history_shown,
         Action::Series => next_series(model),
         Action::ChooseSeries => open(model, Dialog::Choose { subject: Choice::Series, selected: 0 }),
         Action::Ghost => {
@@ -245,6 +246,13 @@ fn open_details(model: &mut Model) -> Vec<Effect> {
         && model.snapshot.tick.trial != Some(trial)
     {
         return vec![Effect::Replay(ReplayCommand::Trial(trial))];
+    }
+    if model.view == View::Log {
+        match model.log_view.selected(&model.session.log) {
+            Some(_) => open(model, Dialog::LogLine { scroll: 0 }),
+            None => say(model, LogLevel::Info, "the log has no line"),
+        }
+        return Vec::new();
     }
     if model.view == View::Override && legal(Action::Override, model).is_ok() {
         open_override(model);

@@ -286,7 +286,7 @@ impl Chart<'_> {
 }
 
 /// Distances of the marks on the time axis, s, and columns between two of them at least.
-const STEPS_S: [f64; 8] = [0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0];
+const STEPS_S: [f64; 10] = [0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 60.0, 120.0];
 const STEP_COLUMNS: f64 = 6.0;
 
 /// Draws the marks of the time axis, s: of a sweep from the left end, else from `origin_ns`, without one from the newest sample.

@@ -21,7 +21,7 @@ use tui_input::Input;
 use super::details::{details, rejudged};
 use super::draw::{number, scale, span, truncate};
 use super::wrap::{wrap, wrap_all};
-use super::{arming, help, questions};
+use super::{arming, help, log, questions};
 use crate::legal::palette;
 use crate::model::Model;
 use crate::model::dialog::{APPROVAL_PAUSE, Choice, Dialog, OverrideForm, Purpose};
@@ -65,6 +65,15 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
             render_lines(frame, area, model, ("Study", 78, "Up Down"), lines, *scroll);
         }
         Dialog::Details { trial, scroll } => render_details(frame, area, model, *trial, *scroll),
+        Dialog::LogLine { scroll } => {
+            // Margins on both sides, and a readable length of a line.
+            let width = area.width.saturating_sub(4).min(120);
+            let Some(lines) = log::whole_line(model, usize::from(width.saturating_sub(4))) else { return };
+            let rows = u16::try_from(lines.len()).unwrap_or(u16::MAX);
+            let inner = open_box(frame, area, model, "Line of the log", width, rows.saturating_add(2).min(area.height));
+            let scroll = (*scroll).min(lines.len().saturating_sub(usize::from(inner.height)));
+            frame.render_widget(Paragraph::new(lines.into_iter().skip(scroll).collect::<Vec<_>>()), inner);
+        }
     }
 }
 

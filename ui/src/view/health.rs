@@ -10,14 +10,37 @@ use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
 
-use super::arming;
-use super::draw::{heading, span};
+use super::draw::{heading, span, truncate};
+use super::{arming, health_history};
 use crate::action::Action;
 use crate::model::Model;
 use crate::model::history::ChartSample;
 use crate::theme::Role;
 
+/// Rows and columns from which the history is below or beside the numbers; a smaller terminal shows one of the two.
+const HISTORY_BELOW: u16 = 46;
+const HISTORY_BESIDE: u16 = 170;
+/// Rows of the numbers where the history is below them.
+const NUMBER_ROWS: u16 = 34;
+
 pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
+    let key = model.keymap.key(Action::Series);
+    // Where there is no room for both.
+    let mut loop_aside = String::new();
+    let area = if area.height >= HISTORY_BELOW {
+        let [numbers, history] = Layout::vertical([Constraint::Length(NUMBER_ROWS), Constraint::Fill(1)]).areas(area);
+        health_history::render(frame, history, model, false);
+        numbers
+    } else if area.width >= HISTORY_BESIDE {
+        let [numbers, history] = Layout::horizontal([Constraint::Fill(2), Constraint::Fill(1)]).spacing(2).areas(area);
+        health_history::render(frame, history, model, false);
+        numbers
+    } else if model.health_history_shown {
+        return health_history::render(frame, area, model, true);
+    } else {
+        loop_aside = format!("history ({key})");
+        area
+    };
     let [left, right] = Layout::horizontal([Constraint::Fill(1); 2]).spacing(2).areas(area);
     // The histogram needs rows that 80x24 does not have.
     let lateness_rows_shown = if area.height >= 30 { 9 } else { 0 };
@@ -30,15 +53,15 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
         Constraint::Fill(1),
     ])
     .areas(left);
-    panel(frame, timing, model, ("Loop", NAME_WIDTH), timing_rows);
+    panel(frame, timing, model, ("Loop", &loop_aside, NAME_WIDTH), timing_rows);
     if lateness_rows_shown > 0 {
         let rows = lateness_rows(model, usize::from(lateness.width));
-        panel(frame, lateness, model, ("Wake-up latency, last minute", NAME_WIDTH), rows);
+        panel(frame, lateness, model, ("Wake-up latency, last minute", "", NAME_WIDTH), rows);
     }
-    panel(frame, recording, model, ("Recorder and screen", NAME_WIDTH), recorder_rows);
-    panel(frame, robot, model, ("Link and battery", NAME_WIDTH), robot_rows(model));
+    panel(frame, recording, model, ("Recorder and screen", "", NAME_WIDTH), recorder_rows);
+    panel(frame, robot, model, ("Link and battery", "", NAME_WIDTH), robot_rows(model));
     let [motors, checks] = Layout::vertical([Constraint::Length(JOINTS as u16 + 1), Constraint::Fill(1)]).areas(right);
-    panel(frame, motors, model, ("Motors", MOTOR_NAME_WIDTH), motor_rows(model));
+    panel(frame, motors, model, ("Motors", "", MOTOR_NAME_WIDTH), motor_rows(model));
     let aside = format!("{} ({})", arming::summary(model), model.keymap.key(Action::ArmingChecks));
     let body = heading(frame, checks, &model.theme, "Arming checks", &aside);
     let lines = arming::lines(model, usize::from(body.width), usize::from(body.height));
@@ -51,10 +74,18 @@ const MOTOR_NAME_WIDTH: usize = 9;
 /// A line of a panel: name, value, and whether it is beyond its limit.
 type HealthRow = (String, String, bool);
 
-fn panel(frame: &mut Frame, area: Rect, model: &Model, (title, name_width): (&str, usize), rows: Vec<HealthRow>) {
+fn panel(
+    frame: &mut Frame,
+    area: Rect,
+    model: &Model,
+    (title, aside, name_width): (&str, &str, usize),
+    rows: Vec<HealthRow>,
+) {
     let theme = &model.theme;
-    let body = heading(frame, area, theme, title, "");
+    let body = heading(frame, area, theme, title, aside);
+    let room = usize::from(body.width).saturating_sub(name_width + 2);
     let line = |(name, value, beyond): HealthRow| {
+        let value = truncate(&value, room);
         let value = if beyond { span(theme, Role::Warning, format!("{value} !")) } else { Span::raw(value) };
         Line::from(vec![span(theme, Role::Quiet, format!("{name:<name_width$}")), value])
     };

@@ -22,6 +22,7 @@ mod dialogs;
 mod dots;
 mod draw;
 mod health;
+mod health_history;
 mod help;
 mod live;
 mod log;

@@ -224,6 +224,7 @@ fn in_dialog(model: &Model, dialog: &Dialog) -> NextStep {
         Dialog::Choose { .. } => "Up Down choose, x switches it on or off, Enter closes.".to_owned(),
         Dialog::Report { .. } | Dialog::Help { .. } => "Up Down scroll, any other key closes.".to_owned(),
         Dialog::Details { .. } => "Up Down other trials, PgUp PgDn scroll, Esc closes.".to_owned(),
+        Dialog::LogLine { .. } => "Up Down other lines, PgUp PgDn scroll, any other key closes.".to_owned(),
     };
     NextStep { lead, others: Vec::new() }
 }

@@ -12,10 +12,13 @@ use crate::message::Effect;
 use crate::model::Model;
 use crate::model::dialog::{Choice, Dialog};
 use crate::model::live::Panel;
+use crate::update::navigate::move_by;
 use crate::update::request::cancelled;
 
 /// Lines that a page of a trial's details moves by; there are never more than two pages of them.
 const DETAILS_PAGE: usize = 10;
+/// Lines that a page of a line of the log moves by.
+const LOG_PAGE: usize = 10;
 
 /// The action that Enter chooses in the palette. Arming is not among them: it is confirmed first.
 pub(super) fn chosen_action(model: &Model, key: Key, filter: &str, selected: usize) -> Option<Action> {
@@ -107,6 +110,26 @@ fn toggle<T: Copy + PartialEq + VariantArray>(on: &mut Vec<T>, index: usize) {
     if !switched.is_empty() {
         *on = switched;
     }
+}
+
+/// Opens the neighbours of a line of the log, and scrolls a long one.
+pub(super) fn log_line_key(model: &mut Model, key: Key, scroll: usize) -> Vec<Effect> {
+    let scroll = match key.code() {
+        KeyCode::Up => {
+            move_by(model, -1);
+            0
+        }
+        KeyCode::Down => {
+            move_by(model, 1);
+            0
+        }
+        KeyCode::PageUp => scroll.saturating_sub(LOG_PAGE),
+        // The longest text of a line fills fewer pages.
+        KeyCode::PageDown => (scroll + LOG_PAGE).min(20 * LOG_PAGE),
+        _ => return Vec::new(),
+    };
+    model.dialog = Some(Dialog::LogLine { scroll });
+    Vec::new()
 }
 
 /// The action of a key over the details: verdicts and others work while the details are read.

@@ -49,5 +49,6 @@ pub(super) fn key(model: &mut Model, dialog: Dialog, key: Key) -> KeyOutcome {
         Dialog::Report { lines, scroll } => lists::report_key(model, key, lines, scroll),
         Dialog::Choose { subject, selected } => lists::choice_key(model, key, subject, selected),
         Dialog::Details { trial, scroll } => lists::details_key(model, key, trial, scroll),
+        Dialog::LogLine { scroll } => lists::log_line_key(model, key, scroll),
     })
 }

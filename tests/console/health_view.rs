@@ -1,0 +1,105 @@
+//! View Health: the history of temperature, battery, link and lateness.
+
+mod support;
+
+use quadfrog::recording::record::Record;
+use quadfrog::robot::{Battery, LinkStatus};
+use quadfrog::telemetry::{Counters, Snapshot};
+use quadfrog_console::message::Msg;
+use support::{Console, assert_shows, line_with, session, tick};
+
+/// Ten minutes of a robot: a tick a second, with the values of each second.
+fn ran(temperature_c: f64, battery_percent: Option<f64>, link: bool) -> Console {
+    let mut console = Console::new();
+    console.record(Record::Session(session()));
+    let link = link.then(|| LinkStatus { state_age_ms: 3, ..LinkStatus::default() });
+    for second in 0..500 {
+        let mut tick = tick(1000 * second, 0.0, None);
+        tick.state.motor_temperature_c = [temperature_c; 12];
+        tick.state.battery = battery_percent.map(|charge_percent| Battery { charge_percent, ..Battery::default() });
+        // The last second is late by 2 ms.
+        tick.stages.lateness_ns = if second == 499 { 2_000_000 } else { 100_000 };
+        let counters = Counters { link, ..Counters::default() };
+        console.update(Msg::Snapshot(Box::new(Snapshot { tick, counters, ..Snapshot::default() })));
+        console.tick(tick);
+    }
+    console.press(&["5"]);
+    console
+}
+
+#[test]
+fn a_key_shows_the_history_in_place_of_the_numbers() {
+    for (columns, rows) in [(80, 24), (120, 40)] {
+        let mut console = ran(45.0, Some(80.0), true);
+        assert!(!console.screen(columns, rows).contains("Health of the last"), "{columns}");
+        assert_shows(&console.screen(columns, rows), &["history (t)"]);
+        console.press(&["t"]);
+        let screen = console.screen(columns, rows);
+        assert_shows(
+            &screen,
+            &[
+                "Health of the last 10 minutes",
+                "numbers (t)",
+                "hottest motor 45.00 C, limit 60.00 C",
+                "battery 80.00 %, limit 30.00 %",
+                "age of the state 3.000 ms",
+                "lateness 2.000 ms",
+                "0 s",
+            ],
+        );
+        assert!(screen.contains('╌'), "no limit:\n{screen}");
+        console.press(&["t"]);
+        assert_shows(&console.screen(columns, rows), &["Motors"]);
+    }
+}
+
+#[test]
+fn a_large_terminal_shows_numbers_and_history() {
+    for (columns, rows) in [(200, 60), (200, 40), (120, 60)] {
+        let console = ran(45.0, Some(80.0), true);
+        assert_shows(
+            &console.screen(columns, rows),
+            &["Motors", "RL_calf", "Health of the last 10 minutes", "lateness"],
+        );
+    }
+}
+
+#[test]
+fn values_beyond_their_limits_are_marked() {
+    let mut console = ran(71.0, Some(12.0), true);
+    console.press(&["t"]);
+    let screen = console.screen(120, 40);
+    assert_shows(&line_with(&screen, "hottest motor"), &["71.00 C !", "12.00 % !"]);
+    assert!(!line_with(&screen, "age of the state").contains('!'), "{screen}");
+}
+
+#[test]
+fn what_a_robot_does_not_report_is_said_and_not_drawn_as_zero() {
+    let mut console = ran(0.0, None, false);
+    console.press(&["t"]);
+    let screen = console.screen(120, 40);
+    assert_shows(&screen, &["the robot reports no temperatures", "the robot has no battery", "SIM: no link"]);
+    assert_shows(&line_with(&screen, "lateness"), &["2.000 ms"]);
+}
+
+#[test]
+fn a_second_costs_a_few_cells() {
+    let mut console = ran(45.0, Some(80.0), true);
+    console.press(&["t"]);
+    let before = console.draw(120, 40);
+    let mut next = tick(500_000, 0.0, None);
+    next.state.motor_temperature_c = [45.0; 12];
+    next.state.battery = Some(Battery { charge_percent: 80.0, ..Battery::default() });
+    next.stages.lateness_ns = 2_000_000;
+    console.tick(next);
+    let changed = before.diff(&console.draw(120, 40)).len();
+    assert!(changed <= 40, "{changed} cells");
+}
+
+#[test]
+fn a_rewound_replay_forgets_the_health_after_the_playhead() {
+    let mut console = ran(45.0, Some(80.0), true);
+    console.press(&["t"]);
+    console.update(Msg::Rewound);
+    assert!(!console.screen(120, 40).contains("45.00 C"));
+}
