@@ -28,15 +28,15 @@ impl Lab {
         Lab { folder: tempfile::tempdir().unwrap() }
     }
 
-    fn runtime(&self) -> PathBuf {
-        self.folder.path().join("run")
+    /// The folder of the sockets: the sessions of the machine that runs the tests are not seen.
+    fn sessions(&self) -> PathBuf {
+        self.folder.path().join("sessions")
     }
 
     fn open(&self, arguments: &[&str]) -> Session {
-        let _ = std::fs::create_dir(self.runtime());
         let mut command = CommandBuilder::new(env!("CARGO_BIN_EXE_quadfrog"));
         command.args(arguments);
-        command.env("XDG_RUNTIME_DIR", self.runtime());
+        command.env("QUADFROG_SESSIONS", self.sessions());
         Session::run(self.folder.path(), SIZE, command)
     }
 
@@ -49,7 +49,7 @@ impl Lab {
 
     fn command(&self, arguments: &[&str]) -> Output {
         let mut command = Command::new(env!("CARGO_BIN_EXE_quadfrog"));
-        command.args(arguments).current_dir(self.folder.path()).env("XDG_RUNTIME_DIR", self.runtime());
+        command.args(arguments).current_dir(self.folder.path()).env("QUADFROG_SESSIONS", self.sessions());
         command.output().unwrap()
     }
 
@@ -61,7 +61,7 @@ impl Lab {
     }
 
     fn sockets(&self) -> Vec<PathBuf> {
-        std::fs::read_dir(self.runtime().join("quadfrog")).unwrap().map(|entry| entry.unwrap().path()).collect()
+        std::fs::read_dir(self.sessions()).unwrap().map(|entry| entry.unwrap().path()).collect()
     }
 }
 
@@ -200,8 +200,8 @@ fn a_hostile_observer_harms_no_session() {
 #[test]
 fn a_folder_of_others_is_not_used_for_the_socket() {
     let lab = Lab::new();
-    std::fs::create_dir_all(lab.runtime().join("quadfrog")).unwrap();
-    std::fs::set_permissions(lab.runtime().join("quadfrog"), PermissionsExt::from_mode(0o777)).unwrap();
+    std::fs::create_dir_all(lab.sessions()).unwrap();
+    std::fs::set_permissions(lab.sessions(), PermissionsExt::from_mode(0o777)).unwrap();
     let mut session = lab.session("studies", &[]);
     session.send("6");
     session.wait_for(&["not a folder of this user alone"]);
@@ -212,7 +212,7 @@ fn a_folder_of_others_is_not_used_for_the_socket() {
 #[test]
 fn a_socket_of_another_program_is_named_and_left_alone() {
     let lab = Lab::new();
-    let folder = lab.runtime().join("quadfrog");
+    let folder = lab.sessions();
     std::fs::create_dir_all(&folder).unwrap();
     let listener = UnixListener::bind(folder.join("1.sock")).unwrap();
     let answer = std::thread::spawn(move || listener.accept().unwrap().0.write_all(b"220 mail\n").unwrap());

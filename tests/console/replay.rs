@@ -163,9 +163,12 @@ fn places_are_typed_as_times_seconds_and_trials() {
     go(&mut session, "0:05", "00:05.000");
     go(&mut session, "7.25", "00:07.250");
     go(&mut session, "#3", &shown(span(3).begin_ns));
-    for (place, problem) in
-        [("99:00", "is after the end"), ("soon", "is no time"), ("1:75", "is no time"), ("#77", "trial 77 is not in")]
-    {
+    for (place, problem) in [
+        ("99:00", "is after the end"),
+        ("soon", "a character was not taken"),
+        ("1:75", "is no time"),
+        ("#77", "trial 77 is not in"),
+    ] {
         session.send(&format!("G{place}\r"));
         session.wait_for(&[problem]);
         session.send("\x1b");

@@ -6,6 +6,7 @@ mod program;
 mod pty;
 
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 use portable_pty::CommandBuilder;
 use program::{Program, assert_shows};
@@ -90,4 +91,24 @@ fn wrong_input_is_refused_with_the_remedy() {
     assert_shows(&refused(&["--size", "9999x9999"]), &["to 400x200"]);
     assert_shows(&refused(&["--keys", "2 Entr"]), &["`Entr` is no key"]);
     assert_shows(&refused(&["--time=-1"]), &["not a time in s"]);
+}
+
+#[test]
+fn the_pictures_of_the_manual_are_those_of_this_program() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let folder = tempfile::tempdir().unwrap();
+    let mut draw = Command::new("sh");
+    draw.arg(root.join("docs/pictures/draw.sh")).arg(folder.path());
+    assert!(draw.env("QUADFROG", env!("CARGO_BIN_EXE_quadfrog")).status().unwrap().success());
+    let manual = std::fs::read_to_string(root.join("docs/operator.md")).unwrap();
+    let mut drawn = 0;
+    for entry in std::fs::read_dir(folder.path()).unwrap() {
+        let entry = entry.unwrap();
+        let name = entry.file_name().into_string().unwrap();
+        assert!(manual.contains(&format!("(pictures/{name})")), "{name} is in the manual");
+        let [now, kept] = [entry.path(), root.join("docs/pictures").join(&name)].map(std::fs::read_to_string);
+        assert!(now.unwrap() == kept.unwrap(), "{name} is out of date: run docs/pictures/draw.sh");
+        drawn += 1;
+    }
+    assert_eq!(drawn, manual.matches("](pictures/").count());
 }

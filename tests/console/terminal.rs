@@ -301,7 +301,7 @@ fn a_panic_in_any_thread_restores_the_terminal_and_names_the_thread() {
     let mut command = CommandBuilder::new(std::env::current_exe().expect("this program"));
     command.args(["--ignored", "--exact", "a_console_one_of_whose_threads_panics", "--nocapture"]);
     let mut session = Session::run(folder.path(), (100, 30), command);
-    session.wait_for(&["REPLAY", "STOP"]);
+    session.wait_for(&["REPLAY", "no robot to stop"]);
     assert!(!session.wait().success());
     assert!(session.restored() && session.cooked());
     assert!(session.sent(b"an injected defect") && session.sent(b"`injected` panicked"), "{}", session.screen());

@@ -10,7 +10,7 @@ mod server;
 use std::fs::DirBuilder;
 use std::io;
 use std::os::unix::fs::{DirBuilderExt, MetadataExt};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use nix::unistd::geteuid;
 use serde::{Deserialize, Serialize};
@@ -72,11 +72,14 @@ fn line(message: &impl Serialize) -> io::Result<Vec<u8>> {
     Ok(line)
 }
 
-/// Returns the folders that may hold sockets, the one for new ones first: over SSH, sudo or cron the environment may lack the
-/// first.
+/// Returns the folders that may hold sockets, the one for new ones first: `QUADFROG_SESSIONS` alone where it is set; else over SSH,
+/// sudo or cron the environment may lack the first.
 fn socket_folders() -> Vec<PathBuf> {
-    let runtime = std::env::var_os("XDG_RUNTIME_DIR").filter(|folder| !folder.is_empty());
-    let of_user = runtime.map(|folder| Path::new(&folder).join("quadfrog"));
+    let variable = |name| std::env::var_os(name).filter(|folder| !folder.is_empty()).map(PathBuf::from);
+    if let Some(folder) = variable("QUADFROG_SESSIONS") {
+        return vec![folder];
+    }
+    let of_user = variable("XDG_RUNTIME_DIR").map(|folder| folder.join("quadfrog"));
     of_user.into_iter().chain([PathBuf::from(format!("/tmp/quadfrog-{}", geteuid()))]).collect()
 }
 
