@@ -1,13 +1,13 @@
 //! The observer's end: finds running sessions, watches one, passes STOP on.
 
-use std::io::{self, BufRead, BufReader, ErrorKind, Read, Write};
+use std::io::{self, BufReader, ErrorKind, Write};
 use std::os::unix::net::UnixStream;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
-use super::{Answer, Demand, LONGEST_LINE, SessionFacts, line, socket_folders};
+use super::{Answer, Demand, SessionFacts, line, read_message, socket_folders};
 use crate::realtime::channel::StopLatch;
 
 /// Longest wait for the facts of a session.
@@ -61,14 +61,10 @@ fn connect(socket: &PathBuf) -> io::Result<RunningSession> {
     let stream = UnixStream::connect(socket)?;
     stream.set_read_timeout(Some(LONGEST_WAIT))?;
     let mut reader = BufReader::new(stream);
-    let mut received = Vec::new();
-    reader.by_ref().take(LONGEST_LINE).read_until(b'\n', &mut received).map_err(|error| match error.kind() {
-        ErrorKind::WouldBlock => io::Error::new(ErrorKind::TimedOut, "the session does not answer"),
-        _ => error,
-    })?;
-    match serde_json::from_slice(&received)? {
-        Answer::Session(facts) => Ok(RunningSession { facts, reader }),
-        Answer::Stopped => Err(io::Error::new(ErrorKind::InvalidData, "an answer without a demand")),
+    match read_message(&mut reader, &mut Vec::new())? {
+        Some(Answer::Session(facts)) => Ok(RunningSession { facts, reader }),
+        Some(Answer::Stopped) => Err(io::Error::new(ErrorKind::InvalidData, "an answer without a demand")),
+        None => Err(io::Error::new(ErrorKind::TimedOut, "the session does not answer")),
     }
 }
 
@@ -143,18 +139,8 @@ fn pass_on(reader: &mut BufReader<UnixStream>, connection: &Connection) -> io::R
             reader.get_mut().write_all(&line(&Demand::Stop)?)?;
             sent += 1;
         }
-        match reader.by_ref().take(LONGEST_LINE).read_until(b'\n', &mut received) {
-            Ok(0) => return Ok(()),
-            Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => continue,
-            result => result?,
-        };
-        if received.ends_with(b"\n") {
-            if serde_json::from_slice::<Answer>(&received)? == Answer::Stopped {
-                connection.stopped.fetch_add(1, Ordering::AcqRel);
-            }
-            received.clear();
-        } else if received.len() as u64 >= LONGEST_LINE {
-            return Err(io::Error::new(ErrorKind::InvalidData, "a line without an end"));
+        if read_message(reader, &mut received)? == Some(Answer::Stopped) {
+            connection.stopped.fetch_add(1, Ordering::AcqRel);
         }
     }
     Ok(())

@@ -8,11 +8,12 @@ mod client;
 mod server;
 
 use std::fs::DirBuilder;
-use std::io;
+use std::io::{self, BufRead, Read};
 use std::os::unix::fs::{DirBuilderExt, MetadataExt};
 use std::path::PathBuf;
 
 use nix::unistd::geteuid;
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 use crate::recording::record::LogLevel;
@@ -70,6 +71,28 @@ fn line(message: &impl Serialize) -> io::Result<Vec<u8>> {
     let mut line = serde_json::to_vec(message)?;
     line.push(b'\n');
     Ok(line)
+}
+
+/// Reads on in a message, of which `received` has the beginning: none while its line is not complete, at the end of the read
+/// timeout too.
+///
+/// # Errors
+/// When the other end has closed the connection, or sent something else.
+fn read_message<T: DeserializeOwned>(reader: &mut impl BufRead, received: &mut Vec<u8>) -> io::Result<Option<T>> {
+    match reader.by_ref().take(LONGEST_LINE).read_until(b'\n', received) {
+        Ok(0) => return Err(io::ErrorKind::UnexpectedEof.into()),
+        Err(error) if !matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted) => {
+            return Err(error);
+        }
+        _ => {}
+    }
+    if received.ends_with(b"\n") {
+        return Ok(Some(serde_json::from_slice(&std::mem::take(received))?));
+    }
+    match received.len() as u64 >= LONGEST_LINE {
+        true => Err(io::Error::new(io::ErrorKind::InvalidData, "a line without an end")),
+        false => Ok(None),
+    }
 }
 
 /// Returns the folders that may hold sockets, the one for new ones first: `QUADFROG_SESSIONS` alone where it is set; else over SSH,

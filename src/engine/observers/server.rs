@@ -1,6 +1,6 @@
 //! The session's end: accepts observers, sets STOP when one demands it.
 
-use std::io::{self, BufRead, BufReader, ErrorKind, Read, Write};
+use std::io::{self, BufReader, ErrorKind, Write};
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::Sender;
 use std::time::Duration;
 
-use super::{Answer, Demand, LONGEST_LINE, SessionFacts, SessionNews, line, make_socket_folder};
+use super::{Answer, Demand, SessionFacts, SessionNews, line, make_socket_folder, read_message};
 use crate::realtime::channel::StopLatch;
 use crate::recording::record::LogLevel;
 
@@ -127,19 +127,8 @@ fn converse(stream: &UnixStream, shared: &Shared, name: &mut Option<String>) -> 
     let mut reader = BufReader::new(stream);
     let mut received = Vec::new();
     while !shared.closing.load(Ordering::Relaxed) {
-        match reader.by_ref().take(LONGEST_LINE).read_until(b'\n', &mut received) {
-            Ok(0) => return Ok(()),
-            Ok(_) => {}
-            Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => {}
-            Err(error) => return Err(error),
-        }
-        if !received.ends_with(b"\n") {
-            if received.len() as u64 >= LONGEST_LINE {
-                return Err(io::Error::new(ErrorKind::InvalidData, "a line without an end"));
-            }
-            continue;
-        }
-        match serde_json::from_slice(&received)? {
+        let Some(demand) = read_message(&mut reader, &mut received)? else { continue };
+        match demand {
             Demand::Stop => {
                 shared.stop.set();
                 let by = name.as_deref().unwrap_or("an observer");
@@ -154,7 +143,6 @@ fn converse(stream: &UnixStream, shared: &Shared, name: &mut Option<String>) -> 
             }
             Demand::Watch(_) => {}
         }
-        received.clear();
     }
     Ok(())
 }

@@ -8,13 +8,14 @@ use quadfrog::config::Config;
 use quadfrog::engine::{FoundSessions, Observer, RunningSession, SessionFacts, find_sessions};
 use quadfrog::recording::session_files::recordings_of;
 use quadfrog::recording::timeline::Timeline;
-use quadfrog::robot::description::RobotDescription;
+use quadfrog_console::app::{self, ConsoleOptions};
 use quadfrog_console::feed::Feed;
-use quadfrog_console::{app, notice, put_line, terminal};
+use quadfrog_console::{notice, put_line, terminal};
 
 use super::arguments;
 use super::console::{ScreenArguments, options};
 use super::failure::Failure;
+use super::replay::recorded_robot;
 
 #[derive(Debug, Args)]
 pub struct AttachArguments {
@@ -39,11 +40,7 @@ pub fn run(arguments: &AttachArguments) -> Result<(), Failure> {
     let files = recordings_of(&session.facts.folder)?;
     let recording = Timeline::open(&files)?;
     terminal::check().map_err(Failure::input)?;
-    let console = match RobotDescription::embedded(&recording.session().robot) {
-        Ok(robot) => console.with_robot(robot),
-        // A model of the operator's own: the panels that need its limits say so.
-        Err(_) => console,
-    };
+    let console = ConsoleOptions { robot: recorded_robot(&recording), ..console };
     let name = arguments::operator_or_user(arguments.operator.as_ref());
     let observer = Observer::join(session, &name).context("the session ended")?;
     app::run(Feed::attached(recording, observer), console)?;

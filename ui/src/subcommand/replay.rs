@@ -13,7 +13,7 @@ use quadfrog::recording::player::{Played, Player};
 use quadfrog::recording::session_files::recordings_of;
 use quadfrog::recording::timeline::Timeline;
 use quadfrog::robot::description::RobotDescription;
-use quadfrog_console::app::{self, ConsoleExit};
+use quadfrog_console::app::{self, ConsoleExit, ConsoleOptions};
 use quadfrog_console::feed::Feed;
 use quadfrog_console::{put_line, terminal};
 
@@ -85,11 +85,7 @@ pub fn run(arguments: &ReplayArguments) -> Result<(), Failure> {
         damage if damage.is_empty() => Failure::input(error),
         damage => Failure::Input(format!("{}\n{error}", message(repair(damage)))),
     })?;
-    let console = match RobotDescription::embedded(&recording.session().robot) {
-        Ok(robot) => console.with_robot(robot),
-        // A model of the operator's own: the panels that need its limits say so.
-        Err(_) => console,
-    };
+    let console = ConsoleOptions { robot: recorded_robot(&recording), ..console };
     let mut feed = Feed::beside(recording, second, arguments.follow);
     if let Some(folder) = &arguments.rejudge {
         feed.rejudge(Some(folder.clone()));
@@ -98,6 +94,11 @@ pub fn run(arguments: &ReplayArguments) -> Result<(), Failure> {
     let ended = app::run(feed, console)?;
     let damage = std::mem::take(&mut *damage.lock().unwrap_or_else(PoisonError::into_inner));
     if ended == ConsoleExit::HungUp || damage.is_empty() { Ok(()) } else { Err(repair(damage)) }
+}
+
+/// Returns the robot of a recording; none for a model of the operator's own: the panels that need its limits say so.
+pub fn recorded_robot(recording: &Timeline) -> Option<RobotDescription> {
+    RobotDescription::embedded(&recording.session().robot).ok()
 }
 
 fn message(failure: Failure) -> String {

@@ -7,7 +7,6 @@ use clap::Args;
 use quadfrog::config::Config;
 use quadfrog::recording::session_files::recordings_of;
 use quadfrog::recording::timeline::Timeline;
-use quadfrog::robot::description::RobotDescription;
 use quadfrog_console::feed::Feed;
 use quadfrog_console::keymap::Key;
 use quadfrog_console::message::{Effect, Msg, ReplayCommand};
@@ -19,6 +18,7 @@ use quadfrog_console::{output, screenshot};
 
 use super::console::theme;
 use super::failure::Failure;
+use super::replay::recorded_robot;
 use super::table::write_file;
 
 #[derive(Debug, Args)]
@@ -84,10 +84,8 @@ pub fn run(arguments: &ScreenshotArguments) -> Result<(), Failure> {
             .map_err(|reason| Failure::input(format!("{}: {reason}", arguments.file.display())))?,
         (None, time) => time.unwrap_or(u64::MAX),
     };
-    // A model of the operator's own: the panels that need its limits say so.
-    let robot = RobotDescription::embedded(&recording.session().robot).ok();
     let settings = ConsoleSettings { theme: arguments.theme, ..settings };
-    let mut model = Model::new(settings, Theme::new(Colours::True, Glyphs::Braille), robot);
+    let mut model = Model::new(settings, Theme::new(Colours::True, Glyphs::Braille), recorded_robot(&recording));
     let mut feed = Feed::replay(recording);
     let (columns, rows) = arguments.size;
     update(&mut model, Msg::Resize(columns, rows));
