@@ -7,6 +7,7 @@ use serde::de::DeserializeOwned;
 use toml::Table;
 
 use super::ConfigError;
+use super::defaults::{FILES, OPTIONAL, template};
 use super::files::{ControlFile, OptimizeFile, SafetyFile};
 use super::merge::{FileOrigin, lookup, merge};
 use super::ranges;
@@ -21,52 +22,6 @@ use crate::robot::description::{RobotDescription, read_text};
 use crate::sim::SimConfig;
 use crate::sim::ensemble::EnsembleSettings;
 use crate::trial::{Backend, GAIN_UNITS, HopEnvelope, ParameterInfo, ParameterValues, Task, parameter_unit};
-
-/// The files of a configuration folder and their defaults.
-const FILES: [(&str, &str); 6] = [
-    ("control.toml", include_str!("../../config/control.toml")),
-    ("safety.toml", include_str!("../../config/safety.toml")),
-    ("optimize.toml", include_str!("../../config/optimize.toml")),
-    ("simulator.toml", include_str!("../../config/simulator.toml")),
-    ("prior.toml", include_str!("../../config/prior.toml")),
-    ("console.toml", include_str!("../../config/console.toml")),
-];
-
-/// Optional keys, which the defaults leave out, each with an example of its kind.
-const OPTIONAL: [(&str, &str); 3] = [
-    (
-        "simulator.toml",
-        "[terrain]
-friction_range = [1.0, 1.0]
-[terrain.blocks]
-area_m = [0.0, 0.0, 0.0, 0.0]
-friction_range = [1.0, 1.0]
-",
-    ),
-    (
-        "control.toml",
-        "[tasks]
-forward = { duration_s = 1.0 }
-lateral-left = { duration_s = 1.0 }
-lateral-right = { duration_s = 1.0 }
-twist-ccw = { duration_s = 1.0 }
-twist-cw = { duration_s = 1.0 }
-",
-    ),
-    (
-        "optimize.toml",
-        "objective = \"truth\"
-[sampler]
-startup_trials = 10
-[first]
-forward = { f0 = 1.0, f1 = 1.0, Fx = 1.0, Fy = 1.0, Fz = 1.0, kp = 1.0, kd = 1.0, kd_joint = 1.0, k_att = 1.0 }
-lateral-left = { f0 = 1.0, f1 = 1.0, Fx = 1.0, Fy = 1.0, Fz = 1.0, kp = 1.0, kd = 1.0, kd_joint = 1.0, k_att = 1.0 }
-lateral-right = { f0 = 1.0, f1 = 1.0, Fx = 1.0, Fy = 1.0, Fz = 1.0, kp = 1.0, kd = 1.0, kd_joint = 1.0, k_att = 1.0 }
-twist-ccw = { f0 = 1.0, f1 = 1.0, Fx = 1.0, Fy = 1.0, Fz = 1.0, kp = 1.0, kd = 1.0, kd_joint = 1.0, k_att = 1.0 }
-twist-cw = { f0 = 1.0, f1 = 1.0, Fx = 1.0, Fy = 1.0, Fz = 1.0, kp = 1.0, kd = 1.0, kd_joint = 1.0, k_att = 1.0 }
-",
-    ),
-];
 
 /// A text laid over the file of a name.
 #[derive(Debug, Clone, Copy)]
@@ -138,7 +93,8 @@ impl Config {
         for (name, default_text) in FILES {
             let optional = OPTIONAL.iter().find(|(file, _)| *file == name).map_or("", |(_, example)| example);
             let optional = template(optional);
-            let default = merge(&format!("config/{name}"), default_text, &template(default_text), &optional)?;
+            let mut default = merge(&format!("config/{name}"), default_text, &template(default_text), &optional)?;
+            default.1.built_in = true;
             let mut of_file = layers.iter().filter(|layer| layer.file == name);
             let (table, origin) =
                 of_file.try_fold(default, |(under, _), layer| merge(layer.origin, layer.text, &under, &optional))?;
@@ -366,6 +322,13 @@ impl Config {
         }
     }
 
+    /// Returns where the value of a key is from: path and line of the file that gives it; none for a default.
+    pub fn origin(&self, file: &str, key: &str) -> Option<String> {
+        let origin = self.origins.get(file).filter(|origin| !origin.built_in)?;
+        let line = origin.lines.get(key)?;
+        Some(format!("{}:{line}", origin.file))
+    }
+
     /// Whether the loaded file itself gives a key, by its name with its tables.
     pub(super) fn gives(&self, file: &'static str, key: &str) -> bool {
         self.origins[file].lines.contains_key(key)
@@ -387,11 +350,6 @@ fn without_unused_jumps(table: &Table) -> Table {
         }
     }
     table
-}
-
-/// Parses a default file; its keys are the known keys.
-fn template(text: &str) -> Table {
-    text.parse().unwrap_or_default()
 }
 
 fn parse<T: DeserializeOwned>(

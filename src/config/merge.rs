@@ -13,6 +13,8 @@ pub struct FileOrigin {
     pub file: String,
     /// Line of every key that the file gave, by the key with its tables, joined by dots.
     pub lines: HashMap<String, usize>,
+    /// Whether it is an embedded default.
+    pub built_in: bool,
 }
 
 impl FileOrigin {
@@ -38,7 +40,7 @@ pub fn merge(file: &str, text: &str, default: &Table, optional: &Table) -> Resul
     let mut lines = HashMap::new();
     let overlay = Overlay { file, line_of: &line_of };
     overlay.lay(parsed.get_ref(), &mut table, optional, "", &mut lines)?;
-    Ok((table, FileOrigin { file: file.to_owned(), lines }))
+    Ok((table, FileOrigin { file: file.to_owned(), lines, built_in: false }))
 }
 
 struct Overlay<'a> {

@@ -2,15 +2,19 @@
 //! their keys. A key that the defaults do not have is rejected with file, line and the nearest known key.
 
 mod checked;
+mod defaults;
 mod export;
 mod files;
 mod kneeling;
 mod merge;
 mod ranges;
+mod reference;
 mod rules;
 
+pub use crate::sim::ranges::NumberRange;
 pub use checked::{Config, ConfigLayer};
 pub use files::{ConfirmFile, ControlFile, OptimizeFile, SafetyFile, WorkersFile};
+pub use reference::{FileReference, KeyReference, SectionReference, range_of, reference};
 
 use std::path::PathBuf;
 

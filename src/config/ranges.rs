@@ -9,7 +9,7 @@ use super::ConfigError;
 use super::merge::{FileOrigin, lookup};
 use crate::robot::description::RobotDescription;
 use crate::robot::joint_name;
-use crate::sim::ranges::{NumberRange, Row, first_outside, within};
+use crate::sim::ranges::{NumberRange, Row, SIMULATOR, first_outside, range, within};
 
 const CONTROL: &[Row] = &[
     (&["stand_up.duration_s", "sit_down.duration_s"], within!(0.1, 60, "s")),
@@ -275,6 +275,12 @@ fn hardware_rows(file: &str) -> &'static [Row] {
     }
 }
 
+/// Returns the ranges of a number of `file`: on every backend, and the narrower one on hardware.
+pub fn of_key(file: &str, key: &str) -> (Option<&'static NumberRange>, Option<&'static NumberRange>) {
+    let wide = if file == "simulator.toml" { SIMULATOR } else { rows(file) };
+    (range(wide, key), range(hardware_rows(file), key))
+}
+
 /// Checks every number of `file`.
 pub fn check(file: &str, table: &Table, default: &Table, origin: &FileOrigin) -> Result<(), ConfigError> {
     check_rows(rows(file), "", table, default, origin)
@@ -294,7 +300,7 @@ pub fn check_motors(robot: &RobotDescription) -> Result<(), ConfigError> {
     let limits = &robot.limits;
     let quantities = [("effort", &limits.max_torque, MOTOR_TORQUE), ("velocity", &limits.max_velocity, MOTOR_VELOCITY)];
     for (name, values, range) in quantities {
-        if let Some(joint) = values.iter().position(|value| !(range.allows)(*value)) {
+        if let Some(joint) = values.iter().position(|value| !range.allows(*value)) {
             return Err(ConfigError::Value {
                 file: format!("URDF of {}", robot.name),
                 key: format!("{} limit {name}", joint_name(joint)),
@@ -322,7 +328,7 @@ fn check_rows(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sim::ranges::{numbers, range};
+    use crate::sim::ranges::numbers;
 
     const FILES: [(&str, &str); 4] = [
         ("control.toml", include_str!("../../config/control.toml")),
@@ -345,14 +351,14 @@ mod tests {
     #[test]
     fn every_number_of_the_defaults_has_a_range_and_is_inside() {
         each(|name, value, wide, narrow| {
-            assert!((wide.allows)(value) && narrow.is_none_or(|narrow| (narrow.allows)(value)), "{name}");
+            assert!(wide.allows(value) && narrow.is_none_or(|narrow| narrow.allows(value)), "{name}");
         });
     }
 
     /// No limit of a robot can be so large that it limits nothing.
     #[test]
     fn every_number_has_a_ceiling_on_hardware() {
-        each(|name, _, wide, narrow| assert!(!(narrow.unwrap_or(wide).allows)(1e12), "{name}"));
+        each(|name, _, wide, narrow| assert!(!narrow.unwrap_or(wide).allows(1e12), "{name}"));
     }
 
     #[test]
@@ -360,7 +366,7 @@ mod tests {
         let grid: Vec<f64> = (-60..=60).flat_map(|i| [1.0, 2.5, 5.0].map(|d| d * 10_f64.powi(i / 5))).collect();
         each(|name, _, wide, narrow| {
             let Some(narrow) = narrow else { return };
-            let outside = grid.iter().find(|value| (narrow.allows)(**value) && !(wide.allows)(**value));
+            let outside = grid.iter().find(|value| narrow.allows(**value) && !wide.allows(**value));
             assert_eq!(outside, None, "{name}");
         });
     }

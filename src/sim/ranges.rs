@@ -2,26 +2,41 @@
 
 use toml::{Table, Value};
 
-/// Allowed numbers, all finite, and their description for the message.
-#[derive(Debug, Clone, Copy)]
+/// Allowed numbers: finite ones from a least to a greatest, both included.
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NumberRange {
-    /// Whether a number is allowed.
-    pub allows: fn(f64) -> bool,
-    /// Description of the range.
+    /// Least number.
+    pub least: f64,
+    /// Greatest number.
+    pub most: f64,
+    /// Unit, with a remark in parentheses where one is needed; empty without one.
+    pub unit: &'static str,
+    /// Description for a message.
     pub text: &'static str,
+}
+
+impl NumberRange {
+    /// Whether a number is allowed.
+    pub fn allows(&self, value: f64) -> bool {
+        (self.least..=self.most).contains(&value)
+    }
 }
 
 /// A range from a least to a greatest number, both included, with their unit.
 macro_rules! within {
     ($least:expr, $most:expr) => {
         $crate::sim::ranges::NumberRange {
-            allows: |value| ($least as f64..=$most as f64).contains(&value),
+            least: $least as f64,
+            most: $most as f64,
+            unit: "",
             text: concat!("must be ", stringify!($least), " to ", stringify!($most)),
         }
     };
     ($least:expr, $most:expr, $unit:literal) => {
         $crate::sim::ranges::NumberRange {
-            allows: |value| ($least as f64..=$most as f64).contains(&value),
+            least: $least as f64,
+            most: $most as f64,
+            unit: $unit,
             text: concat!("must be ", stringify!($least), " to ", stringify!($most), " ", $unit),
         }
     };
@@ -75,7 +90,7 @@ pub const SIMULATOR: &[Row] = &[
 pub fn first_outside(rows: &'static [Row], table: &Table) -> Option<(String, f64, &'static str)> {
     numbers(table, "").into_iter().find_map(|(key, value)| {
         let range = range(rows, &key)?;
-        (!(value.is_finite() && (range.allows)(value))).then_some((key, value, range.text))
+        (!range.allows(value)).then_some((key, value, range.text))
     })
 }
 
@@ -114,15 +129,15 @@ mod tests {
     #[test]
     fn every_number_of_the_simulator_has_a_range() {
         for (key, value) in numbers(&include_str!("../../config/simulator.toml").parse().unwrap(), "") {
-            assert!(range(SIMULATOR, &key).is_some_and(|range| (range.allows)(value)), "{key}");
+            assert!(range(SIMULATOR, &key).is_some_and(|range| range.allows(value)), "{key}");
         }
     }
 
     #[test]
     fn a_range_includes_its_ends_and_no_other_number() {
         let range = within!(0.5, 2, "s");
-        assert!([0.5, 1.0, 2.0].into_iter().all(range.allows));
-        assert!(![0.49, 2.01, f64::NAN, f64::INFINITY, f64::NEG_INFINITY].into_iter().any(range.allows));
+        assert!([0.5, 1.0, 2.0].into_iter().all(|value| range.allows(value)));
+        assert!(![0.49, 2.01, f64::NAN, f64::INFINITY, f64::NEG_INFINITY].into_iter().any(|value| range.allows(value)));
         assert_eq!(range.text, "must be 0.5 to 2 s");
     }
 }

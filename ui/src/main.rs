@@ -7,13 +7,14 @@ mod subcommand;
 
 use std::process::ExitCode;
 
-use clap::Parser;
 use clap::error::ErrorKind;
+use clap::{CommandFactory as _, Parser};
 use quadfrog_console::output;
-use subcommand::{Arguments, Failure};
+use subcommand::{Arguments, Failure, VERSION};
 
 fn main() -> ExitCode {
     std::panic::set_hook(Box::new(|info| output::message(&defect_report(&info.to_string()))));
+    subcommand::answer_shell(Arguments::command);
     let arguments = match Arguments::try_parse() {
         Ok(arguments) => arguments,
         Err(error) => return refuse(&error),
@@ -48,7 +49,7 @@ fn refuse(error: &clap::Error) -> ExitCode {
 /// Returns the text about a defect of the program: what it is, and what a report of it needs.
 fn defect_report(panic: &str) -> String {
     let thread = std::thread::current();
-    let (name, version) = (thread.name().unwrap_or("unnamed"), env!("CARGO_PKG_VERSION"));
+    let (name, version) = (thread.name().unwrap_or("unnamed"), VERSION);
     let command = std::env::args().collect::<Vec<_>>().join(" ");
     format!(
         "\nquadfrog: a defect of the program, in thread `{name}`: {panic}\n\

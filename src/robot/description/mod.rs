@@ -5,6 +5,7 @@
 //! four chains of three revolute joints are the legs, identified by the position of the hip (front or rear, left or
 //! right).
 
+mod draft;
 mod files;
 mod urdf;
 mod urdf_checks;
@@ -13,6 +14,7 @@ use std::path::PathBuf;
 
 use nalgebra::{Isometry3, Matrix3, Vector3};
 
+pub use draft::Draft;
 pub use files::{LARGEST_FILE, RobotFiles, read_text};
 
 use super::kinematics::LegGeometry;

@@ -30,6 +30,8 @@ impl Program {
     pub fn command(&self, arguments: &[&str]) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_quadfrog"));
         command.args(arguments).current_dir(&self.0).stdin(Stdio::null()).env("NO_COLOR", "1");
+        // Not the configuration of the user who runs the tests.
+        command.env("XDG_CONFIG_HOME", self.path("no-configuration"));
         command
     }
 

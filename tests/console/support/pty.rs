@@ -63,6 +63,8 @@ impl Session {
             command.env(name, value);
         }
         command.env_remove("NO_COLOR");
+        // Not the configuration of the user who runs the tests.
+        command.env("XDG_CONFIG_HOME", folder.join("no-configuration"));
         let child = pair.slave.spawn_command(command).expect("started");
         drop(pair.slave);
         let parser = vt100::Parser::new(nonzero(rows), nonzero(columns), 0);

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use clap_complete::ArgValueCandidates;
 use quadfrog::config::Config;
 use quadfrog::engine::{Provenance, newest_config};
 use quadfrog::optimize::ask::SamplerKind;
@@ -11,6 +12,7 @@ use quadfrog::robot::description::{RobotDescription, RobotFiles};
 use quadfrog::trial::Task;
 use quadfrog_console::notice;
 
+use super::completion;
 use super::failure::Failure;
 
 /// Parses one of several named values; each row is a value, its name and its line of help.
@@ -59,17 +61,36 @@ pub fn load_model(model: &str) -> Result<(RobotFiles, RobotDescription), Failure
     Ok((files, description))
 }
 
+/// Loads the configuration of a command: that of `--config`, else the user's own, else the built-in one.
+pub fn load_config(given: Option<&Path>) -> Result<Config, Failure> {
+    let own = if given.is_none() { user_folder().filter(|folder| folder.is_dir()) } else { None };
+    if let Some(own) = &own {
+        notice!("configuration: {}", own.display());
+    }
+    Ok(Config::load(given.or(own.as_deref()))?)
+}
+
+/// Returns the place of the user's own configuration, by the XDG Base Directory Specification: `$XDG_CONFIG_HOME/quadfrog`, where the
+/// variable is an absolute path, else `~/.config/quadfrog`.
+pub fn user_folder() -> Option<PathBuf> {
+    let absolute = |path: &PathBuf| path.is_absolute();
+    let of_variable = |name| std::env::var_os(name).map(PathBuf::from).filter(absolute);
+    let base = of_variable("XDG_CONFIG_HOME").or_else(|| Some(of_variable("HOME")?.join(".config")))?;
+    Some(base.join("quadfrog"))
+}
+
 /// Arguments of the console and of `optimize`.
 #[derive(Debug, Clone, Args)]
 pub struct StudyArguments {
     /// Budget: number of trials that count [default: from optimize.toml]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub trials: Option<u32>,
-    /// Folder whose TOML files replace those of the configuration, whole or key by key
+    /// Folder whose TOML files replace those of the configuration, whole or key by key [default: ~/.config/quadfrog if it
+    /// exists]
     #[arg(long, value_name = "DIR")]
     config: Option<PathBuf>,
     /// Robot model: go1, a1, or a folder with a URDF and a robot.toml
-    #[arg(long, value_name = "MODEL", default_value = "go1")]
+    #[arg(long, value_name = "MODEL", default_value = "go1", add = ArgValueCandidates::new(completion::robots))]
     pub model: String,
     /// Sampler that proposes the parameters [default: from optimize.toml]
     #[arg(long, value_name = "SAMPLER", value_parser = sampler())]
@@ -115,13 +136,14 @@ impl StudyArguments {
         }
     }
 
-    /// Loads the configuration: that of `--config`, else the last one that the study in `resume` ran with.
+    /// Loads the configuration: that of `--config`, else the last one that the study in `resume` ran with, else as
+    /// [`load_config`].
     pub fn load_config(&self, resume: Option<&Path>) -> Result<Config, Failure> {
         let own = resume.filter(|_| self.config.is_none()).and_then(newest_config).map(|(_, config)| config);
         if let Some(own) = &own {
             notice!("continuing with the last configuration of the study, {}", own.display());
         }
-        let mut config = Config::load(self.config.as_deref().or(own.as_deref()))?;
+        let mut config = load_config(self.config.as_deref().or(own.as_deref()))?;
         if let Some(sampler) = self.sampler {
             config.choose_sampler(sampler);
         }

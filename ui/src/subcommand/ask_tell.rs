@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::Context as _;
 use clap::Args;
-use quadfrog::config::Config;
+use clap_complete::ArgValueCandidates;
 use quadfrog::engine::{self, Options};
 use quadfrog::optimize::ask::SamplerKind;
 use quadfrog::optimize::journal::Durability;
@@ -13,6 +13,7 @@ use quadfrog::trial::{Backend, Task};
 use quadfrog_console::output;
 
 use super::arguments;
+use super::completion;
 use super::failure::Failure;
 use super::prior;
 
@@ -31,7 +32,7 @@ pub struct AskTellArguments {
     #[arg(long, value_name = "DIR")]
     config: Option<PathBuf>,
     /// Robot model, for the prior of the sampler sim: go1, a1, or a folder with a URDF and a robot.toml
-    #[arg(long, value_name = "MODEL", default_value = "go1")]
+    #[arg(long, value_name = "MODEL", default_value = "go1", add = ArgValueCandidates::new(completion::robots))]
     model: String,
     /// Folder whose priors/ holds the priors of the sampler sim
     #[arg(long, value_name = "DIR", default_value = "recordings")]
@@ -39,7 +40,7 @@ pub struct AskTellArguments {
 }
 
 pub fn run(arguments: &AskTellArguments) -> Result<(), Failure> {
-    let mut config = Config::load(arguments.config.as_deref())?;
+    let mut config = arguments::load_config(arguments.config.as_deref())?;
     if let Some(sampler) = arguments.sampler {
         config.choose_sampler(sampler);
     }

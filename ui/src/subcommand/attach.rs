@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::{Context, anyhow};
 use clap::Args;
-use quadfrog::config::Config;
+use clap_complete::ArgValueCandidates;
 use quadfrog::engine::{FoundSessions, Observer, RunningSession, SessionFacts, find_sessions};
 use quadfrog::recording::session_files::recordings_of;
 use quadfrog::recording::timeline::Timeline;
@@ -13,6 +13,7 @@ use quadfrog_console::feed::Feed;
 use quadfrog_console::{notice, put_line, terminal};
 
 use super::arguments;
+use super::completion;
 use super::console::{ScreenArguments, options};
 use super::failure::Failure;
 use super::replay::recorded_robot;
@@ -20,7 +21,7 @@ use super::replay::recorded_robot;
 #[derive(Debug, Args)]
 pub struct AttachArguments {
     /// The session: number of its process or folder of its study, as `quadfrog sessions` lists them [default: the only one]
-    #[arg(value_name = "SESSION")]
+    #[arg(value_name = "SESSION", add = ArgValueCandidates::new(completion::sessions))]
     session: Option<String>,
     /// Your name in the session's log [default: the user's name]
     #[arg(long, value_name = "NAME", value_parser = arguments::operator)]
@@ -34,7 +35,7 @@ pub struct AttachArguments {
 
 /// Watches a running session: what its recording shows, at most some 1.3 s later, and STOP.
 pub fn run(arguments: &AttachArguments) -> Result<(), Failure> {
-    let config = Config::load(arguments.config.as_deref())?;
+    let config = arguments::load_config(arguments.config.as_deref())?;
     let console = options(&arguments.screen, &config)?;
     let session = choose(arguments.session.as_deref(), sessions()?)?;
     let files = recordings_of(&session.facts.folder)?;

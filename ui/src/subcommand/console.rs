@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 use anyhow::anyhow;
 use clap::Args;
 use clap::builder::TypedValueParser;
-use quadfrog::config::Config;
+use clap_complete::ArgValueCandidates;
+use quadfrog::config::{Config, ConfigError};
 use quadfrog::engine::{self, Options};
 use quadfrog::optimize::journal::notice_waits;
 use quadfrog::recording::recorder::RecorderStatus;
@@ -21,6 +22,7 @@ use quadfrog_console::terminal;
 use quadfrog_console::theme::{ColourChoice, ThemeChoice};
 
 use super::arguments::{self, StudyArguments, one_of};
+use super::completion;
 use super::failure::Failure;
 use super::live;
 use super::selection::{SelectedStudy, study_to_continue};
@@ -98,7 +100,7 @@ pub struct ConsoleArguments {
     #[command(flatten)]
     study: StudyArguments,
     /// Continue the study in this folder
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", add = ArgValueCandidates::new(completion::studies))]
     resume: Option<PathBuf>,
     /// Continue on the robot a study that was made on the simulator or on another robot
     #[arg(long, requires = "resume")]
@@ -213,10 +215,14 @@ fn incomplete_recordings(folder: &Path) -> Vec<PathBuf> {
     paths.filter(|path| path.extension().is_some_and(|extension| extension == "part")).collect()
 }
 
+/// Returns the settings of `console.toml`.
+pub fn settings(config: &Config) -> Result<ConsoleSettings, ConfigError> {
+    ConsoleSettings::from_table(&config.console)
+        .map_err(|error| config.refuse("console.toml", &error.key, &error.value, &error.reason))
+}
+
 /// Returns the console's options from the arguments and `console.toml`.
 pub fn options(screen: &ScreenArguments, config: &Config) -> Result<ConsoleOptions, Failure> {
-    let settings = ConsoleSettings::from_table(&config.console)
-        .map_err(|error| config.refuse("console.toml", &error.key, &error.value, &error.reason))?;
     let colours = (screen.color != ColourChoice::Auto).then_some(screen.color);
-    Ok(ConsoleOptions::new(settings, colours, screen.theme, screen.ascii, screen.low_bandwidth))
+    Ok(ConsoleOptions::new(settings(config)?, colours, screen.theme, screen.ascii, screen.low_bandwidth))
 }

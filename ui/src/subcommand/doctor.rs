@@ -8,7 +8,6 @@ use std::time::Duration;
 
 use anyhow::anyhow;
 use clap::Args;
-use quadfrog::config::Config;
 use quadfrog::realtime::scheduling::{ALLOW_LOCKING, ALLOW_PRIORITY, Scheduling};
 use quadfrog::realtime::{system, thread};
 use quadfrog::recording::disk;
@@ -17,6 +16,7 @@ use quadfrog::trial::Backend;
 use quadfrog_console::connection::TerminalLocation;
 use quadfrog_console::put_line;
 
+use super::arguments;
 use super::failure::Failure;
 
 /// Number of wake-ups measured, at 1 kHz.
@@ -72,7 +72,7 @@ impl fmt::Display for DoctorItem {
 }
 
 pub fn run(arguments: &DoctorArguments) -> Result<(), Failure> {
-    let config = Config::load(arguments.config.as_deref())?;
+    let config = arguments::load_config(arguments.config.as_deref())?;
     let scheduling = config.scheduling(Backend::Hardware);
     let mut items = vec![kernel(), priority(scheduling), memory(), cores(), governor(), timer()];
     items.extend(wake_up(scheduling));

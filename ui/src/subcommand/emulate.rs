@@ -10,8 +10,8 @@ use std::time::Duration;
 
 use anyhow::{Context, anyhow};
 use clap::Args;
+use clap_complete::ArgValueCandidates;
 use nix::sys::signal::{SigSet, Signal};
-use quadfrog::config::Config;
 use quadfrog::engine::EngineError;
 use quadfrog::realtime::thread::pace;
 use quadfrog::robot::CONTROL_PERIOD_S;
@@ -19,7 +19,8 @@ use quadfrog::robot::go1::Network;
 use quadfrog::sim::emulator::{self, Emulator, EmulatorFault, EmulatorHandle, EmulatorStatus};
 use quadfrog_console::{notice, put, put_line};
 
-use super::arguments::load_model;
+use super::arguments::{self, load_model};
+use super::completion;
 use super::failure::Failure;
 
 /// Period of the status report.
@@ -34,7 +35,7 @@ pub struct EmulateArguments {
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
     /// Robot model: go1, or a folder with a URDF and a robot.toml that has a network
-    #[arg(long, value_name = "MODEL", default_value = "go1")]
+    #[arg(long, value_name = "MODEL", default_value = "go1", add = ArgValueCandidates::new(completion::robots))]
     model: String,
     /// Folder whose simulator.toml sets terrain, motors, sensors and time-outs
     #[arg(long, value_name = "DIR")]
@@ -45,7 +46,7 @@ pub struct EmulateArguments {
 }
 
 pub fn run(arguments: &EmulateArguments) -> Result<(), Failure> {
-    let config = Config::load(arguments.config.as_deref())?;
+    let config = arguments::load_config(arguments.config.as_deref())?;
     let (files, description) = load_model(&arguments.model)?;
     let no_network = || EngineError::NoNetwork { robot: description.name.clone() };
     let network = Network::read(&files).map_err(Failure::input)?.ok_or_else(no_network)?;

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::anyhow;
 use clap::{Args, ValueEnum};
+use clap_complete::ArgValueCandidates;
 use quadfrog::recording::player::{MarkerKind, Player};
 use quadfrog::recording::session_files::recordings_of;
 use quadfrog::report::columns::TableFormat;
@@ -13,6 +14,7 @@ use quadfrog::report::signals::{SignalRange, SignalTopic, Signals};
 use quadfrog_console::{notice, output};
 
 use super::arguments::one_of;
+use super::completion;
 use super::failure::Failure;
 use super::table::{table_format, write_file, written_format};
 
@@ -44,7 +46,7 @@ pub struct ExportArguments {
     #[arg(long, value_name = "VIEWER", conflicts_with_all = ["file", "trial", "time", "topic", "format"])]
     layout: Option<LayoutOf>,
     /// Export the ticks of one trial
-    #[arg(long, value_name = "N", conflicts_with = "time")]
+    #[arg(long, value_name = "N", conflicts_with = "time", add = ArgValueCandidates::new(completion::trials))]
     trial: Option<u32>,
     /// Export the ticks from time A to before time B, s since the session began; both may be left out, as in 12.5..
     #[arg(long, value_name = "A..B", value_parser = parse_times)]

@@ -4,6 +4,8 @@ mod arguments;
 mod ask_tell;
 mod attach;
 mod bench;
+mod completion;
+mod configuration;
 mod console;
 mod doctor;
 mod emulate;
@@ -11,7 +13,9 @@ mod evaluate;
 mod export;
 mod failure;
 mod guard;
+mod init;
 mod live;
+mod man;
 mod optimize;
 mod prior;
 mod recover;
@@ -25,17 +29,21 @@ mod study;
 mod table;
 mod verify;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory as _, Parser, Subcommand};
 
+pub use completion::answer_shell;
 pub use failure::Failure;
 use quadfrog::optimize::journal::notice_waits;
 use quadfrog_console::output;
+
+/// Version of the program and commit of its sources.
+pub const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), " (", env!("QUADFROG_COMMIT"), ")");
 
 /// Optimize the jumps of a quadruped, on the robot or on the built-in simulator.
 ///
 /// Without a subcommand the console opens on the simulator; its last line names the next key.
 #[derive(Debug, Parser)]
-#[command(name = "quadfrog", version, max_term_width = 100, args_conflicts_with_subcommands = true)]
+#[command(name = "quadfrog", version = VERSION, max_term_width = 100, args_conflicts_with_subcommands = true)]
 pub struct Arguments {
     #[command(subcommand)]
     command: Option<Subcommands>,
@@ -83,6 +91,14 @@ enum Subcommands {
     Guard,
     /// List, show, export, import and extend studies
     Study(study::StudyCommand),
+    /// Show, compare, check and begin configurations
+    Config(configuration::ConfigCommand),
+    /// Begin the description of a new robot from its URDF
+    Init(init::InitArguments),
+    /// Print the script with which a shell completes command lines: source <(quadfrog completions bash)
+    Completions(completion::CompletionsArguments),
+    /// Write the manual pages
+    Man(man::ManArguments),
     /// Report studies: tables on the terminal, one HTML file with figures, SVG files, JSON
     Report(report::ReportArguments),
 }
@@ -110,6 +126,10 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
         Some(Subcommands::Doctor(doctor)) => doctor::run(&doctor),
         Some(Subcommands::Guard) => guard::run(),
         Some(Subcommands::Study(study)) => study::run(&study),
+        Some(Subcommands::Config(config)) => configuration::run(&config),
+        Some(Subcommands::Init(init)) => init::run(&init),
+        Some(Subcommands::Completions(completions)) => completion::run(&completions),
+        Some(Subcommands::Man(man)) => man::run(&man, Arguments::command()),
         Some(Subcommands::Report(report)) => report::run(&report),
     }
 }

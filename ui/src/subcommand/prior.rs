@@ -6,6 +6,7 @@ use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use clap::Args;
+use clap_complete::ArgValueCandidates;
 use indicatif::{ProgressBar, ProgressStyle};
 use quadfrog::config::Config;
 use quadfrog::engine::{PriorFileError, PriorMaker, ReadyPrior};
@@ -18,6 +19,7 @@ use quadfrog_console::{notice, output, put_line};
 use serde_json::json;
 
 use super::arguments;
+use super::completion;
 use super::failure::Failure;
 
 #[derive(Debug, Args)]
@@ -29,7 +31,7 @@ pub struct PriorArguments {
     #[arg(long, value_name = "DIR")]
     config: Option<PathBuf>,
     /// Robot model: go1, a1, or a folder with a URDF and a robot.toml
-    #[arg(long, value_name = "MODEL", default_value = "go1")]
+    #[arg(long, value_name = "MODEL", default_value = "go1", add = ArgValueCandidates::new(completion::robots))]
     model: String,
     /// File of the prior [default: in the folder priors of recordings, where new studies find it]
     #[arg(long, value_name = "FILE")]
@@ -43,7 +45,7 @@ pub struct PriorArguments {
 }
 
 pub fn run(arguments: &PriorArguments) -> Result<(), Failure> {
-    let config = Config::load(arguments.config.as_deref())?;
+    let config = arguments::load_config(arguments.config.as_deref())?;
     let (_, robot) = arguments::load_model(&arguments.model)?;
     let maker = PriorMaker::new(&config, &robot, arguments.task)?;
     let given = arguments.output.clone();

@@ -3,7 +3,6 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use quadfrog::config::Config;
 use quadfrog::engine::{EstimateChange, RejudgeError, RejudgedTrial, Rejudging};
 use quadfrog::recording::session_files::recordings_of;
 use quadfrog::session::rejudge::Judgement;
@@ -11,6 +10,7 @@ use quadfrog::trial::Verdict;
 use quadfrog_console::put_line;
 use serde_json::{Value, json};
 
+use super::arguments;
 use super::failure::Failure;
 
 #[derive(Debug, Args)]
@@ -27,7 +27,7 @@ pub struct RejudgeArguments {
 }
 
 pub fn run(arguments: &RejudgeArguments) -> Result<(), Failure> {
-    let config = Config::load(arguments.config.as_deref())?;
+    let config = arguments::load_config(arguments.config.as_deref())?;
     let mut files = Vec::new();
     for path in &arguments.files {
         files.extend(recordings_of(path)?);

@@ -17,6 +17,7 @@ use quadfrog_console::app::{self, ConsoleExit, ConsoleOptions};
 use quadfrog_console::feed::Feed;
 use quadfrog_console::{put_line, terminal};
 
+use super::arguments;
 use super::console::{ScreenArguments, options};
 use super::failure::Failure;
 
@@ -49,7 +50,7 @@ pub struct ReplayArguments {
 }
 
 pub fn run(arguments: &ReplayArguments) -> Result<(), Failure> {
-    let config = Config::load(arguments.config.as_deref())?;
+    let config = arguments::load_config(arguments.config.as_deref())?;
     let console = options(&arguments.screen, &config)?;
     let newest = [PathBuf::from(RECORDINGS)];
     let named = if arguments.files.is_empty() { &newest[..] } else { &arguments.files };

@@ -4,7 +4,6 @@ use std::io::Write;
 use std::path::PathBuf;
 
 use clap::Args;
-use quadfrog::config::Config;
 use quadfrog::recording::session_files::recordings_of;
 use quadfrog::recording::timeline::Timeline;
 use quadfrog_console::feed::Feed;
@@ -16,6 +15,7 @@ use quadfrog_console::theme::{Colours, Glyphs, Theme, ThemeChoice};
 use quadfrog_console::update::update;
 use quadfrog_console::{output, screenshot};
 
+use super::arguments;
 use super::console::theme;
 use super::failure::Failure;
 use super::replay::recorded_robot;
@@ -75,7 +75,7 @@ fn parse_size(text: &str) -> Result<(u16, u16), String> {
 
 /// Plays the recording up to the moment without a terminal, presses the keys and draws the screen.
 pub fn run(arguments: &ScreenshotArguments) -> Result<(), Failure> {
-    let config = Config::load(arguments.config.as_deref())?;
+    let config = arguments::load_config(arguments.config.as_deref())?;
     let settings = ConsoleSettings::from_table(&config.console)
         .map_err(|error| config.refuse("console.toml", &error.key, &error.value, &error.reason))?;
     let recording = Timeline::open(&recordings_of(&arguments.file)?)?;

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::{Args, Subcommand};
+use clap_complete::ArgValueCandidates;
 use quadfrog::config::Config;
 use quadfrog::engine::{Opened, StoredStudy, newest_config, open_stored, stored_studies, study_files, study_name};
 use quadfrog::optimize::exchange::{self, TableTrial};
@@ -18,6 +19,7 @@ use quadfrog::trial::TrialRecord;
 use quadfrog_console::{notice, output};
 use serde_json::Value;
 
+use super::completion;
 use super::failure::Failure;
 use super::selection::parse_storage;
 use super::table::{format_of_name, table_format, write_file, written_format};
@@ -87,7 +89,7 @@ enum StudySubcommand {
 #[derive(Debug, Args)]
 struct StudySelector {
     /// Folder of a study, its study.log, any Optuna journal, or redis://HOST:PORT/DB
-    #[arg(value_name = "STUDY")]
+    #[arg(value_name = "STUDY", add = ArgValueCandidates::new(completion::studies))]
     place: String,
     /// Name of the study, if the journal holds several
     #[arg(long, value_name = "NAME")]

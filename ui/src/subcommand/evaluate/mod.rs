@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use clap::Args;
+use clap_complete::ArgValueCandidates;
 use indicatif::{ProgressBar, ProgressStyle};
 use quadfrog::config::Config;
 use quadfrog::engine::{EngineError, STUDY_FILE, newest_config, open_stored, stored_study};
@@ -21,7 +22,8 @@ use quadfrog::trial::{Backend, JumpParameters, ParameterValues, Task};
 use quadfrog_console::output;
 use serde_json::json;
 
-use super::arguments::{self, Seeds, load_model, parse_seeds};
+use super::arguments::{self, Seeds, load_config, load_model, parse_seeds};
+use super::completion;
 use super::failure::Failure;
 use quadfrog::session::parallel::{cores, in_parallel};
 use variant::{Variant, on_off};
@@ -36,7 +38,7 @@ pub struct EvaluateArguments {
     #[arg(long, value_name = "DIR")]
     config: Option<PathBuf>,
     /// Robot model: go1, a1, or a folder with a URDF and a robot.toml [default: that of the study in --config, else go1]
-    #[arg(long, value_name = "MODEL")]
+    #[arg(long, value_name = "MODEL", add = ArgValueCandidates::new(completion::robots))]
     model: Option<String>,
     /// Point as f0=1.3,Fx=40,Fz=210, or `best`: the best trial of the study in --config or whose configuration that is
     /// [default: that of optimize.toml, [first.TASK]]
@@ -176,7 +178,7 @@ impl Source {
             (None, Some(file)) if best => stored_study(file)?.task,
             (None, _) => Task::Forward,
         };
-        Ok(Source { config: Config::load(folder)?, robot: load_model(&model)?.1, task, study })
+        Ok(Source { config: load_config(folder)?, robot: load_model(&model)?.1, task, study })
     }
 }
 

@@ -7,10 +7,12 @@ use std::io::IsTerminal;
 use std::path::PathBuf;
 
 use clap::Args;
+use clap_complete::ArgValueCandidates;
 use quadfrog::report::study::TrialChoice;
 use quadfrog::report::{html, study_page, svg, text};
 use quadfrog_console::{notice, output};
 
+use super::completion;
 use super::failure::Failure;
 pub use load::load;
 pub use write::{write_figures, write_page};
@@ -21,7 +23,7 @@ const WIDTH: usize = 80;
 #[derive(Debug, Args)]
 pub struct ReportArguments {
     /// Folders of studies, folders that hold them, study.log files, Optuna journals, or redis://HOST:PORT/DB
-    #[arg(value_name = "STUDY", required = true)]
+    #[arg(value_name = "STUDY", required = true, add = ArgValueCandidates::new(completion::studies))]
     places: Vec<String>,
     /// Write one HTML file with tables and figures that opens without a network
     #[arg(long, short, value_name = "FILE.html")]

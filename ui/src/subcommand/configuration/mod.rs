@@ -1,0 +1,223 @@
+//! `quadfrog config`: the configuration in force, its differences, a check, a beginning, and its schema for editors.
+
+mod page;
+mod schema;
+
+use std::fs::OpenOptions;
+use std::io::{ErrorKind, Write as _};
+use std::path::{Path, PathBuf};
+
+use anyhow::Context as _;
+use clap::{Args, Subcommand};
+use clap_complete::ArgValueCandidates;
+use quadfrog::config::{Config, reference};
+use quadfrog::trial::{Backend, Task};
+use quadfrog_console::{output, put_line};
+use toml::{Table, Value};
+
+use super::arguments::{load_config, load_model, user_folder};
+use super::completion;
+use super::console::settings;
+use super::failure::Failure;
+
+#[derive(Debug, Args)]
+pub struct ConfigCommand {
+    #[command(subcommand)]
+    command: ConfigSubcommand,
+}
+
+#[derive(Debug, Subcommand)]
+enum ConfigSubcommand {
+    /// Show every value in force and where it is from
+    Show {
+        /// Names of files or beginnings of keys, for example safety.toml or watchdog. [default: all]
+        #[arg(value_name = "WHAT")]
+        what: Vec<String>,
+        /// Folder whose TOML files replace those of the configuration, whole or key by key [default: ~/.config/quadfrog if it
+        /// exists]
+        #[arg(long, value_name = "DIR")]
+        config: Option<PathBuf>,
+    },
+    /// Show the values that differ: of the configuration in force from the built-in one, or of two folders
+    Diff {
+        /// Folder of a configuration [default: the configuration in force]
+        #[arg(value_name = "DIR")]
+        folder: Option<PathBuf>,
+        /// Folder to compare with [default: the built-in configuration]
+        #[arg(value_name = "OTHER")]
+        other: Option<PathBuf>,
+    },
+    /// Check a configuration for all tasks: exit status 2 after the file, the key and the remedy of the first error
+    Check {
+        /// Folder of the configuration [default: the configuration in force]
+        #[arg(value_name = "DIR")]
+        folder: Option<PathBuf>,
+        /// Robot model: go1, a1, or a folder with a URDF and a robot.toml
+        #[arg(long, value_name = "MODEL", default_value = "go1", add = ArgValueCandidates::new(completion::robots))]
+        model: String,
+        /// Refuse a configuration that is for the simulator only
+        #[arg(long)]
+        hardware: bool,
+    },
+    /// Write the built-in files, with their comments, into a folder to be edited; no file is replaced
+    Init {
+        /// The folder [default: ~/.config/quadfrog]
+        #[arg(value_name = "DIR")]
+        folder: Option<PathBuf>,
+    },
+    /// Print the JSON schema of a file, for editors, or write those of all files into a folder
+    Schema {
+        /// File of the configuration, for example safety.toml
+        #[arg(value_name = "FILE", required_unless_present = "output", value_parser = Config::FILE_NAMES)]
+        file: Option<String>,
+        /// Folder for safety.schema.json and so on
+        #[arg(long, short, value_name = "DIR", conflicts_with = "file")]
+        output: Option<PathBuf>,
+    },
+    /// Print the reference of all keys as Markdown: default, range, range on hardware, meaning
+    Reference,
+}
+
+pub fn run(command: &ConfigCommand) -> Result<(), Failure> {
+    match &command.command {
+        ConfigSubcommand::Show { what, config } => show(what, config.as_deref()),
+        ConfigSubcommand::Diff { folder, other } => differences(folder.as_deref(), other.as_deref()),
+        ConfigSubcommand::Check { folder, model, hardware } => check(folder.as_deref(), model, *hardware),
+        ConfigSubcommand::Init { folder } => init(folder.as_deref()),
+        ConfigSubcommand::Schema { file, output } => write_schemas(file.as_deref(), output.as_deref()),
+        ConfigSubcommand::Reference => {
+            output::data(&page::reference_page());
+            Ok(())
+        }
+    }
+}
+
+/// A value in force: file, key with its tables, value.
+struct Setting {
+    file: String,
+    key: String,
+    value: Value,
+}
+
+/// Returns all values of a configuration in the order of its files.
+fn values(config: &Config) -> Result<Vec<Setting>, Failure> {
+    let mut found = Vec::new();
+    for (file, text) in &config.as_run {
+        let table = text.parse::<Table>().with_context(|| format!("{file}: cannot be read again"))?;
+        collect(file, "", &table, &mut found);
+    }
+    Ok(found)
+}
+
+fn collect(file: &str, tables: &str, table: &Table, found: &mut Vec<Setting>) {
+    for (name, value) in table {
+        let key = format!("{tables}{name}");
+        match value {
+            Value::Table(inner) => collect(file, &format!("{key}."), inner, found),
+            value => found.push(Setting { file: file.to_owned(), key, value: value.clone() }),
+        }
+    }
+}
+
+fn show(what: &[String], folder: Option<&Path>) -> Result<(), Failure> {
+    let config = load_config(folder)?;
+    let all = values(&config)?;
+    let wanted = |setting: &&Setting| {
+        what.is_empty() || what.iter().any(|what| *what == setting.file || setting.key.starts_with(what.as_str()))
+    };
+    let shown: Vec<_> = all.iter().filter(wanted).collect();
+    if shown.is_empty() {
+        let what = what.join(" ");
+        let files = Config::FILE_NAMES.join(", ");
+        return Err(Failure::input(format!(
+            "{what}: no key of the configuration begins so; the files are {files}, and `quadfrog config show` shows all keys"
+        )));
+    }
+    for Setting { file, key, value } in shown {
+        let origin = config.origin(file, key).unwrap_or_else(|| "built-in".to_owned());
+        put_line!("{file}  {key} = {value}  # {origin}");
+    }
+    Ok(())
+}
+
+fn differences(folder: Option<&Path>, other: Option<&Path>) -> Result<(), Failure> {
+    let new = load_config(folder)?;
+    let old = Config::load(other)?;
+    let (new_values, old_values) = (values(&new)?, values(&old)?);
+    let mut equal = true;
+    for Setting { file, key, value } in &new_values {
+        let before = old_values.iter().find(|setting| setting.file == *file && setting.key == *key);
+        if before.is_none_or(|before| before.value != *value) {
+            let before = before.map_or("not given".to_owned(), |before| before.value.to_string());
+            put_line!("{file}  {key}: {before} -> {value}");
+            equal = false;
+        }
+    }
+    for Setting { file, key, value } in &old_values {
+        if !new_values.iter().any(|setting| setting.file == *file && setting.key == *key) {
+            put_line!("{file}  {key}: {value} -> not given");
+            equal = false;
+        }
+    }
+    if equal {
+        put_line!("no value differs");
+    }
+    Ok(())
+}
+
+/// Checks a configuration as the commands do that use it: for every task on the simulator, and for hardware.
+fn check(folder: Option<&Path>, model: &str, hardware: bool) -> Result<(), Failure> {
+    let config = load_config(folder)?;
+    let (_, robot) = load_model(model)?;
+    settings(&config)?;
+    for task in Task::ALL {
+        config.settings(&robot, task, Backend::Simulator)?;
+    }
+    put_line!("simulator: all values are valid for {}", robot.name);
+    match Task::ALL.into_iter().find_map(|task| config.settings(&robot, task, Backend::Hardware).err()) {
+        None => put_line!("hardware: all limits are inside their ranges"),
+        Some(refusal) if hardware => return Err(refusal.into()),
+        Some(refusal) => put_line!("hardware: refused: {refusal}"),
+    }
+    Ok(())
+}
+
+fn init(folder: Option<&Path>) -> Result<(), Failure> {
+    let remedy = || Failure::input("HOME and XDG_CONFIG_HOME are not set to absolute paths; give a folder");
+    let folder = folder.map(Path::to_owned).or_else(user_folder).ok_or_else(remedy)?;
+    let files = reference();
+    let paths: Vec<_> = files.iter().map(|file| folder.join(file.name)).collect();
+    if let Some(path) = paths.iter().find(|path| path.exists()) {
+        let message = format!("{}: exists already; give a new folder, or remove the file first", path.display());
+        return Err(Failure::input(message));
+    }
+    std::fs::create_dir_all(&folder).with_context(|| format!("{}: cannot be made", folder.display()))?;
+    for (file, path) in files.iter().zip(&paths) {
+        let write = || OpenOptions::new().write(true).create_new(true).open(path)?.write_all(file.text.as_bytes());
+        write().with_context(|| format!("{}: cannot be written", path.display()))?;
+        put_line!("{}", path.display());
+    }
+    put_line!("Keys that are left out have their built-in values: a file may be cut to the keys that differ.");
+    Ok(())
+}
+
+fn write_schemas(file: Option<&str>, folder: Option<&Path>) -> Result<(), Failure> {
+    for reference in reference() {
+        if file.is_some_and(|file| file != reference.name) {
+            continue;
+        }
+        let text = format!("{:#}\n", schema::schema(&reference));
+        let Some(folder) = folder else {
+            output::data(&text);
+            continue;
+        };
+        let path = folder.join(reference.name).with_extension("schema.json");
+        let write = || match std::fs::create_dir_all(folder) {
+            Err(error) if error.kind() != ErrorKind::AlreadyExists => Err(error),
+            _ => std::fs::write(&path, &text),
+        };
+        write().with_context(|| format!("{}: cannot be written", path.display()))?;
+        put_line!("{}", path.display());
+    }
+    Ok(())
+}

@@ -1,0 +1,80 @@
+//! `quadfrog init`: a folder for a new robot, made from its URDF.
+
+use std::fs::OpenOptions;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+use anyhow::Context as _;
+use clap::Args;
+use quadfrog::config::Config;
+use quadfrog::robot::description::{Draft, read_text};
+use quadfrog::trial::{Backend, Task};
+use quadfrog_console::put_line;
+
+use super::arguments::load_config;
+use super::failure::Failure;
+
+#[derive(Debug, Args)]
+pub struct InitArguments {
+    /// URDF of the robot: a quadruped with three joints per leg
+    #[arg(value_name = "URDF")]
+    urdf: PathBuf,
+    /// New folder: the URDF, and a robot.toml to be completed
+    #[arg(value_name = "FOLDER")]
+    folder: PathBuf,
+    /// Name of the robot [default: that of the folder]
+    #[arg(long, value_name = "NAME")]
+    name: Option<String>,
+}
+
+/// Writes the folder and says what is missing.
+pub fn run(arguments: &InitArguments) -> Result<(), Failure> {
+    let InitArguments { urdf, folder, name } = arguments;
+    let config = load_config(None)?;
+    let refuse = |reason: &dyn std::fmt::Display| Failure::input(format!("{}: {reason}", urdf.display()));
+    let text =
+        read_text(urdf).map_err(|error| refuse(&format!("cannot be read: {error}; give the URDF of a robot")))?;
+    let of_folder = || folder.file_name().map(|name| name.to_string_lossy().into_owned());
+    let name = name.clone().or_else(of_folder).unwrap_or_else(|| "robot".to_owned());
+    let draft = Draft::of_urdf(&name, urdf, &text).map_err(Failure::input)?;
+    let urdf_name = urdf.file_name().unwrap_or_default();
+    let files = [(folder.join("robot.toml"), &draft.toml), (folder.join(urdf_name), &text)];
+    if let Some((path, _)) = files.iter().find(|(path, _)| path.exists()) {
+        return Err(Failure::input(format!("{}: exists already; give a new folder", path.display())));
+    }
+    std::fs::create_dir_all(folder).with_context(|| format!("{}: cannot be made", folder.display()))?;
+    for (path, text) in &files {
+        write_new(path, text).with_context(|| format!("{}: cannot be written", path.display()))?;
+        put_line!("{}", path.display());
+    }
+    let robot = &draft.robot;
+    put_line!(
+        "\n{}: {:.2} kg, legs of {:.3} m and {:.3} m",
+        robot.name,
+        robot.total_mass(),
+        robot.leg_geometry.thigh,
+        robot.leg_geometry.calf
+    );
+    put_line!("\nNot known from the URDF:");
+    for missing in &draft.missing {
+        put_line!("  {missing}");
+    }
+    put_line!("\nWith the present configuration:");
+    for task in Task::ALL {
+        put_line!("  {}: {}", task.name(), fitness(&config, &draft, task));
+    }
+    put_line!("\nNext: quadfrog --model {}", folder.display());
+    Ok(())
+}
+
+/// Returns whether a task can run on the simulated robot, in words.
+fn fitness(config: &Config, draft: &Draft, task: Task) -> String {
+    match config.settings(&draft.robot, task, Backend::Simulator) {
+        Ok(_) => "the stance is in reach".to_owned(),
+        Err(error) => error.to_string(),
+    }
+}
+
+fn write_new(path: &Path, text: &str) -> std::io::Result<()> {
+    OpenOptions::new().write(true).create_new(true).open(path)?.write_all(text.as_bytes())
+}

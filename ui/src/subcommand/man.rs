@@ -1,0 +1,28 @@
+//! `quadfrog man`: manual pages of the program and its commands.
+
+use std::path::PathBuf;
+
+use anyhow::Context as _;
+use clap::{Args, Command};
+use quadfrog_console::put_line;
+
+use super::failure::Failure;
+
+#[derive(Debug, Args)]
+pub struct ManArguments {
+    /// Folder of the pages: quadfrog.1 and one for each command. `man -l FOLDER/quadfrog.1` shows a page
+    #[arg(value_name = "FOLDER")]
+    folder: PathBuf,
+}
+
+/// Writes the manual pages of `program`.
+pub fn run(arguments: &ManArguments, program: Command) -> Result<(), Failure> {
+    let folder = &arguments.folder;
+    let write = || {
+        std::fs::create_dir_all(folder)?;
+        clap_mangen::generate_to(program, folder)
+    };
+    write().with_context(|| format!("{}: the manual pages cannot be written", folder.display()))?;
+    put_line!("manual pages written to {}", folder.display());
+    Ok(())
+}
