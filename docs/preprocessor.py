@@ -22,7 +22,11 @@ OUTSIDE = re.compile(r"(?<!!)\[([^\]]+)\]\(((?:\.\./)+[^)]*)\)")
 
 def equation(source, display):
     """Returns an equation as MathML on one line: a blank line would end the HTML block."""
-    return convert(source.strip(), display=display).replace("\n", " ")
+    converted = convert(source.strip(), display=display).replace("\n", " ")
+    unknown = re.search(r">(?:\\\w+|&)<", converted)
+    if unknown:
+        sys.exit(f"no MathML for {unknown[0][1:-1]} in the equation {source.strip()}")
+    return converted
 
 
 def prose(text, page, pages):
