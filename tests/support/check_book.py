@@ -135,7 +135,8 @@ def check_build():
 
 
 def check_links():
-    named = set(re.findall(r"\]\(([^)]+\.md)\)", (DOCS / "SUMMARY.md").read_text(encoding="utf-8")))
+    summary = COMMENT.sub("", (DOCS / "SUMMARY.md").read_text(encoding="utf-8"))
+    named = set(re.findall(r"\]\(([^)]+\.md)\)", summary))
     for page in DOCS.rglob("*.md"):
         name = str(page.relative_to(DOCS))
         if name != "SUMMARY.md" and name not in named:
