@@ -254,7 +254,7 @@ def check_keys():
                 count += 1
                 if not (section_exists(dotted[1], dotted[2]) or section_exists(f"{dotted[1]}.{dotted[2]}")):
                     report(page, f"no key `{code}` in config/ or robots/")
-        for file, rows in re.findall(r"^\| *key of `(?:[\w/]*/)?([\w.]+)`.*\n\|[-| :]+\n((?:\|.*\n)+)", text, re.M):
+        for file, rows in re.findall(r"^ *\| *key of `(?:[\w/]*/)?([\w.]+)`.*\n *\|[-| :]+\n((?: *\|.*\n)+)", text, re.M):
             for row in rows.strip().split("\n"):
                 for key in re.findall(r"`([^`]+)`", row.split("|")[1]):
                     count += 1
