@@ -4,8 +4,8 @@ use super::frog;
 use super::wire::{DecodeError, Way};
 use crate::trial::{
     Displacement, ExpectedResult, FallRisk, FixedParameter, JumpRow, MeasuredJump, ParameterInsight, PointRecord,
-    PredictedTrial, Proposal, ProposalInsight, ProposedParameter, RepeatRecord, SearchStatus, SearchedParameter,
-    SimulatorComparison, TrialRecord, WorldResemblance,
+    PredictedTrial, Proposal, ProposalInsight, ProposedParameter, QueuedPoint, RepeatRecord, SearchStatus,
+    SearchedParameter, SimulatorComparison, TrialRecord, WorldResemblance,
 };
 
 type Done = Result<(), DecodeError>;
@@ -115,6 +115,15 @@ pub fn search(way: Way, ours: &mut SearchStatus, m: &mut frog::Search) -> Done {
     way.list(&mut ours.parameters, &mut m.parameters, searched)?;
     way.copy(&mut ours.hop_share, &mut m.hop_share);
     way.copy(&mut ours.confirming, &mut m.confirming);
+    way.list(&mut ours.queue, &mut m.queue, queued)
+}
+
+fn queued(way: Way, ours: &mut QueuedPoint, m: &mut frog::search::Queued) -> Done {
+    way.copy(&mut ours.trial, &mut m.trial);
+    way.variant(&mut ours.source, &mut m.source, "source")?;
+    way.copy(&mut ours.parent, &mut m.parent);
+    way.values(&mut ours.parameters, &mut m.parameters);
+    way.values(&mut ours.gains, &mut m.gains);
     Ok(())
 }
 

@@ -104,6 +104,10 @@ pub enum OperatorRequest {
     Note { trial: u32, text: String },
     /// Queue a point, in table order of the parameters.
     Enqueue(Vec<(String, f64)>),
+    /// Remove a queued point: it never runs.
+    RemoveQueued { trial: u32 },
+    /// Exchange a queued point with the one before it, or after it.
+    MoveQueued { trial: u32, earlier: bool },
     /// Raise the budget by this many trials.
     Continue(u32),
     /// Void the trial under review for this reason, with `rerun` also queue the parameters again. Needed where the trial
@@ -151,6 +155,9 @@ impl fmt::Display for OperatorRequest {
                     point.iter().map(|(name, value)| format!("{name} = {}", six_digits(*value))).collect();
                 write!(f, "queue {}", values.join(", "))
             }
+            OperatorRequest::RemoveQueued { trial } => write!(f, "remove trial {trial} from the queue"),
+            OperatorRequest::MoveQueued { trial, earlier: true } => write!(f, "run queued trial {trial} earlier"),
+            OperatorRequest::MoveQueued { trial, earlier: false } => write!(f, "run queued trial {trial} later"),
             OperatorRequest::Continue(trials) => write!(f, "continue for {trials} trials"),
             OperatorRequest::VoidBecause { reason, rerun: false } => write!(f, "void because: {reason}"),
             OperatorRequest::VoidBecause { reason, rerun: true } => write!(f, "re-run because: {reason}"),

@@ -5,8 +5,8 @@ mod search;
 
 pub use self::measured::{BounceRule, Displacement, JumpRow, MeasuredJump, ObjectiveRule, RepeatRecord};
 pub use self::search::{
-    FixedParameter, ParameterInsight, PointRecord, PredictedTrial, ProposalInsight, SearchStatus, SearchedParameter,
-    SimulatorComparison, WorldResemblance,
+    FixedParameter, ParameterInsight, PointRecord, PredictedTrial, ProposalInsight, QueuedPoint, SearchStatus,
+    SearchedParameter, SimulatorComparison, WorldResemblance,
 };
 
 use serde::{Deserialize, Serialize};

@@ -1,6 +1,6 @@
 //! Search space, reasons of a proposal and statistics of repeated points, as they are shown.
 
-use super::ParameterValues;
+use super::{ParameterValues, ProposalSource};
 
 /// The present search space and the progress of the study.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -15,6 +15,23 @@ pub struct SearchStatus {
     pub confirming: Option<u32>,
     /// Share of the force bounds that trials on the robot may use; none where the whole bounds are open.
     pub hop_share: Option<f64>,
+    /// Points that run before the sampler's, the next one first.
+    pub queue: Vec<QueuedPoint>,
+}
+
+/// A point that was queued.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct QueuedPoint {
+    /// The trial that it will be.
+    pub trial: u32,
+    /// Why it was queued.
+    pub source: ProposalSource,
+    /// The trial that it repeats.
+    pub parent: Option<u32>,
+    /// Parameters that are given, in their units; the others are proposed when it is its turn.
+    pub parameters: ParameterValues,
+    /// Gains that differ from the configured ones.
+    pub gains: ParameterValues,
 }
 
 /// One parameter as it is searched at present.

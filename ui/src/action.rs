@@ -19,6 +19,7 @@ pub enum Action {
     Fix,
     Bounds,
     QueuePoint,
+    Queue,
     Skip,
     Continue,
     ConfirmBest,
@@ -145,7 +146,7 @@ const fn fixed(info: ActionInfo) -> ActionInfo {
 
 /// Every action, in the order of [`Action`].
 #[rustfmt::skip]
-pub static ACTIONS: [ActionInfo; 85] = {
+pub static ACTIONS: [ActionInfo; 86] = {
     use Action as A;
     use ActionGroup as G;
     [
@@ -163,6 +164,7 @@ pub static ACTIONS: [ActionInfo; 85] = {
         row(A::Fix, "fix", &["X"], G::Proposal, "Override: fix the parameter for the next trials, or search it again"),
         row(A::Bounds, "bounds", &["B"], G::Proposal, "Override: search the parameter within other bounds"),
         row(A::QueuePoint, "queue-point", &["Q"], G::Proposal, "queue this point ahead of the sampler's"),
+        row(A::Queue, "queue", &["N"], G::Proposal, "the queue: see, move and remove the points that run next"),
         row(A::Skip, "skip", &["n"], G::Proposal, "refuse the proposal, after a question; another follows"),
         row(A::Continue, "continue", &["C"], G::Proposal, "give a finished study more trials"),
         row(A::ConfirmBest, "confirm-best", &["K"], G::Proposal, "repeat the best points until one leads; again: end the repeats"),

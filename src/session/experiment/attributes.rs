@@ -276,6 +276,13 @@ pub struct InterruptedAttributes<'a> {
     pub interrupted: bool,
 }
 
+/// Attributes of a queued trial that was removed before it began.
+#[derive(Debug, Serialize)]
+pub struct RemovedAttributes<'a> {
+    pub verdict: Verdict,
+    pub cause: &'a str,
+}
+
 /// Attributes of a trial besides its [`Origin`].
 #[derive(Debug, Clone, PartialEq, Default, Deserialize)]
 #[serde(default)]

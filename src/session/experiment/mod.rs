@@ -15,6 +15,7 @@ mod open_proposal;
 mod plan;
 mod proposal_start;
 mod queue;
+mod queue_changes;
 mod repeats;
 mod search;
 mod trial_changes;

@@ -5,6 +5,7 @@ use super::confirmation::{self, NextRepeat};
 use super::envelope;
 use super::open_proposal::{ApprovedProposal, OpenProposal, model_insight};
 use super::plan::{ExperimentPlan, RequestRefusal, not_now};
+use super::queue_changes::queued_points;
 use super::search::SearchSettings;
 use super::trial_changes::must_be_within;
 use super::{Experiment, ExperimentState, queue};
@@ -219,6 +220,7 @@ impl Experiment {
         let confirming = self.confirmation.repeats_left(study);
         let search = SearchStatus {
             hop_share: self.hop_share,
+            queue: queued_points(study),
             ..self.search.status(&self.plan, self.counted(), study.trials(), confirming)
         };
         if self.published_search.as_ref() != Some(&search) {

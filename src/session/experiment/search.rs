@@ -114,6 +114,6 @@ impl SearchSettings {
             }
         };
         let parameters = self.parameters(plan).into_iter().map(searched).collect();
-        SearchStatus { budget: plan.budget, counted, parameters, confirming, hop_share: None }
+        SearchStatus { budget: plan.budget, counted, parameters, confirming, hop_share: None, queue: Vec::new() }
     }
 }

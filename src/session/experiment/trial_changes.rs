@@ -4,8 +4,9 @@
 use super::attributes::{self, BudgetAttribute, Origin};
 use super::open_proposal::OpenProposal;
 use super::plan::{RequestRefusal, not_now};
+use super::queue_changes::queued_points;
 use super::{Experiment, ExperimentState, confirmation, envelope};
-use crate::trial::{ParameterInfo, ProposalSource, six_digits};
+use crate::trial::{ParameterInfo, ParameterValues, ProposalSource, QueuedPoint, six_digits};
 
 impl Experiment {
     /// Sets one parameter of the proposal.
@@ -131,14 +132,19 @@ impl Experiment {
     }
 
     /// Queues a point, which may hold gains, too; the parameters that it lacks are proposed when it is its turn.
+    /// Returns the queued trial of the same point, if there is one: two are run all the same.
     /// Refused when a value is outside its bounds or a trial is under way.
-    pub fn enqueue(&mut self, point: &[(String, f64)]) -> Result<(), RequestRefusal> {
+    pub fn enqueue(&mut self, point: &[(String, f64)]) -> Result<Option<u32>, RequestRefusal> {
         let is_gain = |(name, _): &(String, f64)| {
             !self.plan.optimizes(name) && self.plan.gains.iter().any(|gain| gain.name == *name)
         };
         let (gains, parameters): (Vec<_>, Vec<_>) = point.iter().cloned().partition(is_gain);
         self.must_be_allowed(&parameters, &gains)?;
-        self.queue(&parameters, &Origin { gains: gains.into(), ..Origin::new(ProposalSource::Queued) })
+        let (parameters, gains) = (ParameterValues::from(parameters), ParameterValues::from(gains));
+        let twin = |queued: &QueuedPoint| queued.parameters == parameters && queued.gains == gains;
+        let same = queued_points(&self.study).into_iter().find(twin).map(|queued| queued.trial);
+        self.queue(&parameters, &Origin { gains, ..Origin::new(ProposalSource::Queued) })?;
+        Ok(same)
     }
 
     /// Refuses a point with a value outside its present bounds.

@@ -88,9 +88,17 @@ fn change(experiment: &mut Experiment, request: &OperatorRequest) -> Result<Stri
             experiment.note(*trial, text)?;
             "noted".to_owned()
         }
-        OperatorRequest::Enqueue(parameters) => {
-            experiment.enqueue(parameters)?;
-            "queued".to_owned()
+        OperatorRequest::Enqueue(parameters) => match experiment.enqueue(parameters)? {
+            None => "queued".to_owned(),
+            Some(same) => format!("queued once more: trial {same} is the same point and waits, too"),
+        },
+        OperatorRequest::RemoveQueued { trial } => {
+            experiment.remove_queued(*trial)?;
+            format!("trial {trial} is removed from the queue")
+        }
+        OperatorRequest::MoveQueued { trial, earlier } => {
+            experiment.move_queued(*trial, *earlier)?;
+            format!("it runs {} now", if *earlier { "earlier" } else { "later" })
         }
         OperatorRequest::Continue(trials) => {
             experiment.extend(*trials)?;

@@ -75,6 +75,10 @@ pub enum Dialog {
         subject: Choice,
         selected: usize,
     },
+    /// The queued points.
+    Queue {
+        selected: usize,
+    },
     Details {
         trial: u32,
         scroll: usize,

@@ -3,8 +3,8 @@
 use quadfrog::recording::record::{ArmingCheckRecord, SessionInfo, StageRecord};
 use quadfrog::session::objective;
 use quadfrog::trial::{
-    ExperimentStage, ObjectiveRule, ParameterInfo, Proposal, ProposalInsight, SearchStatus, SearchedParameter,
-    SimulatorComparison, TrialRecord, Verdict,
+    ExperimentStage, ObjectiveRule, ParameterInfo, Proposal, ProposalInsight, QueuedPoint, SearchStatus,
+    SearchedParameter, SimulatorComparison, TrialRecord, Verdict,
 };
 
 use super::log::SessionLog;
@@ -90,6 +90,11 @@ impl SessionModel {
     /// The gain of that name with its allowed range.
     pub fn gain(&self, name: &str) -> Option<&ParameterInfo> {
         self.info.gains.iter().find(|gain| gain.name == name)
+    }
+
+    /// Returns the queued points, the next one first.
+    pub fn queue(&self) -> &[QueuedPoint] {
+        self.search.as_ref().map_or(&[], |search| &search.queue)
     }
 
     /// The parameter of that name as the search treats it at present.

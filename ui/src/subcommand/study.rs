@@ -15,7 +15,7 @@ use quadfrog::optimize::trial::TrialState;
 use quadfrog::report::columns::{TableFormat, TableWriter};
 use quadfrog::report::{table, trial_columns};
 use quadfrog::session::experiment::{self, rows_of};
-use quadfrog::trial::TrialRecord;
+use quadfrog::trial::{ParameterInfo, ParameterValues, TrialRecord, six_digits};
 use quadfrog_console::{notice, output};
 use serde_json::Value;
 
@@ -221,6 +221,12 @@ fn show(selector: &StudySelector) -> Result<(), Failure> {
     let (running, waiting) = (count(TrialState::Running), count(TrialState::Waiting));
     if running + waiting > 0 {
         let _ = writeln!(text, "{running} running, {waiting} queued");
+        for queued in study.waiting() {
+            let given = ParameterValues::from(queued.fixed());
+            let value = |p: &ParameterInfo| Some(format!("{} {}", p.name, six_digits(given.get(&p.name)?)));
+            let values: Vec<_> = parameters.iter().filter_map(value).collect();
+            let _ = writeln!(text, "  #{} {}", queued.number, values.join(", "));
+        }
     }
     text += &best_line(&opened, &rows);
     let jumps = best_row(&opened, &rows).and_then(|best| best.measured.as_ref()).map(|measured| &measured.jumps);

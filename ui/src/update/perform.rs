@@ -52,6 +52,7 @@ pub(super) fn perform(model: &mut Model, action: Action) -> Vec<Effect> {
         Action::Fix => return fix(model),
         Action::Bounds => bounds(model),
         Action::QueuePoint => return queue_point(model),
+        Action::Queue => open(model, Dialog::Queue { selected: 0 }),
         Action::Skip => {
             if let Some(&Proposal { trial, revision, .. }) = model.session.open_proposal() {
                 open(model, Dialog::Confirm(Question::Skip { trial, revision }));

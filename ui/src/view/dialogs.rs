@@ -21,7 +21,7 @@ use tui_input::Input;
 use super::details::{details, rejudged};
 use super::draw::{number, scale, span, truncate};
 use super::wrap::{wrap, wrap_all};
-use super::{arming, help, log, questions};
+use super::{arming, help, log, questions, queue};
 use crate::legal::palette;
 use crate::model::Model;
 use crate::model::dialog::{APPROVAL_PAUSE, Choice, Dialog, OverrideForm, Purpose};
@@ -29,6 +29,9 @@ use crate::theme::{Glyphs, Role, Theme};
 
 /// Most columns of a dialog: longer lines are hard to read.
 const MAX_WIDTH: u16 = 120;
+
+/// Columns of the queue: number, source and five values.
+const QUEUE_WIDTH: u16 = 90;
 
 pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let Some(dialog) = &model.dialog else { return };
@@ -57,6 +60,14 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
         }
         Dialog::Palette { input, selected } => render_palette(frame, area, model, input, *selected),
         Dialog::Choose { subject, selected } => render_choice(frame, area, model, *subject, *selected),
+        Dialog::Queue { selected } => {
+            // Within the border and its margins.
+            let width = usize::from(area.width.min(QUEUE_WIDTH).saturating_sub(4));
+            let lines = queue::lines(model, *selected, width);
+            // The selected line stays in sight.
+            let scroll = (*selected + 3).saturating_sub(usize::from(area.height));
+            render_lines(frame, area, model, ("Queue", QUEUE_WIDTH, "Up Down"), lines, scroll);
+        }
         Dialog::Help { scroll } => {
             render_lines(frame, area, model, ("Keys", 78, "Up Down"), help::lines(model), *scroll)
         }

@@ -34,6 +34,7 @@ mod parameter_axes;
 mod points;
 mod proposal;
 mod questions;
+mod queue;
 mod series_style;
 mod status_bar;
 mod timeline;

@@ -222,6 +222,8 @@ fn in_dialog(model: &Model, dialog: &Dialog) -> NextStep {
         Dialog::Field { .. } => "Enter confirms, Esc cancels.".to_owned(),
         Dialog::Palette { .. } => "Type to filter, Up Down choose, Enter does it, Esc closes.".to_owned(),
         Dialog::Choose { .. } => "Up Down choose, x switches it on or off, Enter closes.".to_owned(),
+        Dialog::Queue { .. } if model.session.queue().is_empty() => "Enter closes.".to_owned(),
+        Dialog::Queue { .. } => "Up Down choose, Left earlier, Right later, x removes, Enter closes.".to_owned(),
         Dialog::Report { .. } | Dialog::Help { .. } => "Up Down scroll, any other key closes.".to_owned(),
         Dialog::Details { .. } => "Up Down other trials, PgUp PgDn scroll, Esc closes.".to_owned(),
         Dialog::LogLine { .. } => "Up Down other lines, PgUp PgDn scroll, any other key closes.".to_owned(),

@@ -1,6 +1,7 @@
 //! Keys of the lists: palette, help, switches, details of a trial.
 
 use crossterm::event::KeyCode;
+use quadfrog::session::operator_request::OperatorRequest;
 use strum::VariantArray;
 use tui_input::Input;
 
@@ -13,7 +14,7 @@ use crate::model::Model;
 use crate::model::dialog::{Choice, Dialog};
 use crate::model::live::Panel;
 use crate::update::navigate::move_by;
-use crate::update::request::cancelled;
+use crate::update::request::{cancelled, request};
 
 /// Lines that a page of a trial's details moves by; there are never more than two pages of them.
 const DETAILS_PAGE: usize = 10;
@@ -110,6 +111,32 @@ fn toggle<T: Copy + PartialEq + VariantArray>(on: &mut Vec<T>, index: usize) {
     if !switched.is_empty() {
         *on = switched;
     }
+}
+
+/// Moves and removes queued points; the list stays open and shows what the session answers.
+pub(super) fn queue_key(model: &mut Model, key: Key, selected: usize) -> Vec<Effect> {
+    let queue = model.session.queue();
+    let last = queue.len().saturating_sub(1);
+    let selected = selected.min(last);
+    let trial = queue.get(selected).map(|point| point.trial);
+    // A moved point changes places with its neighbour, whose number it has then.
+    let (selected, change) = match (key.code(), trial) {
+        (KeyCode::Up, _) => (selected.saturating_sub(1), None),
+        (KeyCode::Down, _) => ((selected + 1).min(last), None),
+        (KeyCode::Left, Some(trial)) => {
+            (selected.saturating_sub(1), Some(OperatorRequest::MoveQueued { trial, earlier: true }))
+        }
+        (KeyCode::Right, Some(trial)) => {
+            ((selected + 1).min(last), Some(OperatorRequest::MoveQueued { trial, earlier: false }))
+        }
+        (KeyCode::Char('x') | KeyCode::Delete, Some(trial)) => {
+            (selected, Some(OperatorRequest::RemoveQueued { trial }))
+        }
+        (KeyCode::Esc | KeyCode::Enter, _) => return Vec::new(),
+        _ => (selected, None),
+    };
+    model.dialog = Some(Dialog::Queue { selected });
+    change.map_or_else(Vec::new, |change| request(model, change))
 }
 
 /// Opens the neighbours of a line of the log, and scrolls a long one.

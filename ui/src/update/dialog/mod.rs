@@ -48,6 +48,7 @@ pub(super) fn key(model: &mut Model, dialog: Dialog, key: Key) -> KeyOutcome {
         Dialog::Help { scroll } => lists::help_key(model, key, scroll),
         Dialog::Report { lines, scroll } => lists::report_key(model, key, lines, scroll),
         Dialog::Choose { subject, selected } => lists::choice_key(model, key, subject, selected),
+        Dialog::Queue { selected } => lists::queue_key(model, key, selected),
         Dialog::Details { trial, scroll } => lists::details_key(model, key, trial, scroll),
         Dialog::LogLine { scroll } => lists::log_line_key(model, key, scroll),
     })

@@ -1,0 +1,68 @@
+//! Changes of the queue by the operator: the order of queued points, and their removal.
+
+use super::Experiment;
+use super::attributes::{self, Origin, RemovedAttributes};
+use super::plan::{RequestRefusal, not_now};
+use crate::optimize::study::{Outcome, Study, TellOutcome};
+use crate::optimize::trial::{Trial, TrialState};
+use crate::trial::{ParameterValues, QueuedPoint, Verdict};
+
+impl Experiment {
+    /// Removes a queued point: its trial becomes void, which the sampler does not see, and it never runs.
+    /// Refused during a trial, for a trial that is not queued, and for a repeat that confirms the best.
+    pub fn remove_queued(&mut self, trial: u32) -> Result<(), RequestRefusal> {
+        self.must_be_queued(trial)?;
+        let cause = "removed from the queue by the operator";
+        // Another program may have queued it, without an origin.
+        let mut removed = Origin::of_trial(self.study.trial(trial)?).attributes();
+        removed.extend(attributes::write(&RemovedAttributes { verdict: Verdict::Void, cause }));
+        let waits = |trial: &Trial| trial.state == TrialState::Waiting;
+        if self.study.tell_if(trial, Outcome::Fail, &removed, waits)? != TellOutcome::Recorded {
+            return not_now(format!("trial {trial} has just begun elsewhere"));
+        }
+        Ok(self.repropose()?)
+    }
+
+    /// Exchanges a queued point with the one before it, or after it. Trials run in the order of their numbers: the points
+    /// change places, the numbers stay.
+    /// Refused during a trial, for a trial that is not queued, at the ends of the queue, and for a repeat that confirms the best.
+    pub fn move_queued(&mut self, trial: u32, earlier: bool) -> Result<(), RequestRefusal> {
+        self.must_be_queued(trial)?;
+        let waiting: Vec<u32> = self.study.waiting().map(|trial| trial.number).collect();
+        let place = waiting.iter().position(|number| *number == trial);
+        let other = place.and_then(|place| if earlier { place.checked_sub(1) } else { Some(place + 1) });
+        let Some(&other) = other.and_then(|other| waiting.get(other)) else {
+            return not_now(format!("trial {trial} is the {} of the queue", if earlier { "first" } else { "last" }));
+        };
+        self.must_be_queued(other)?;
+        if !self.study.exchange_waiting(trial, other)? {
+            return not_now(format!("trial {trial} or {other} has just begun elsewhere"));
+        }
+        Ok(self.repropose()?)
+    }
+
+    fn must_be_queued(&mut self, trial: u32) -> Result<(), RequestRefusal> {
+        self.must_be_idle()?;
+        self.study.refresh()?;
+        let Some(queued) = self.study.waiting().find(|waiting| waiting.number == trial) else {
+            return not_now(format!("trial {trial} is not in the queue, or only once the last verdict is final"));
+        };
+        if attributes::confirms(queued) {
+            return not_now(format!("trial {trial} confirms the best; end the repeats instead"));
+        }
+        Ok(())
+    }
+}
+
+/// Returns the queue of `study`, the next point first.
+pub fn queued_points(study: &Study) -> Vec<QueuedPoint> {
+    let point = |trial: &Trial| {
+        let Origin { source, parent, gains, .. } = Origin::of_trial(trial);
+        // In table order: the journal has them by name.
+        let given = ParameterValues::from(trial.fixed());
+        let space = study.options().space.parameters();
+        let parameters = space.iter().filter_map(|p| Some((p.name.clone(), given.get(&p.name)?))).collect();
+        QueuedPoint { trial: trial.number, source, parent, parameters, gains }
+    };
+    study.waiting().map(point).collect()
+}

@@ -1,0 +1,138 @@
+//! The running program: the queue as the operator sees, orders and shortens it, and as Python Optuna reads it afterwards.
+
+#[path = "support/pty.rs"]
+mod pty;
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use pty::Session;
+
+fn quadfrog(folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_quadfrog")).args(arguments).current_dir(folder).output().expect("it runs")
+}
+
+fn text(output: &Output) -> String {
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+/// A session with an armed robot and three queued points, and the folder of its study.
+fn session_with_queue(folder: &Path) -> (Session, PathBuf) {
+    let mut session = Session::start(folder, (120, 40), &["--seed", "3", "--sampler", "random"]);
+    session.wait_for(&["Press A to arm"]);
+    let mut entries = std::fs::read_dir(folder).expect("the folder").map(|entry| entry.expect("an entry").path());
+    let study = entries.find(|path| path.join("study.log").exists()).expect("a study");
+    for f0 in ["1.1", "1.2", "1.3"] {
+        let point = [&format!("f0={f0}"), "Fx=60", "Fz=240"];
+        text(&quadfrog(
+            folder,
+            &[&["study", "enqueue", study.to_str().unwrap()][..], &point.map(|p| p as &str)].concat(),
+        ));
+    }
+    session.send("N");
+    session.wait_for(&["Queue", "#0    queued          f0 1.1, Fx 60, Fz 240", "#1", "#2    queued          f0 1.3"]);
+    (session, study)
+}
+
+#[test]
+fn queued_points_are_seen_moved_and_removed() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (mut session, study) = session_with_queue(folder.path());
+    // The last point becomes the first one, and the proposal follows.
+    session.send("\x1b[B\x1b[B");
+    session.send("\x1b[D");
+    session.wait_for(&["#1    queued          f0 1.3", "#2    queued          f0 1.2"]);
+    session.send("\x1b[D");
+    session.wait_for(&["#0    queued          f0 1.3", "#1    queued          f0 1.1"]);
+    session.send("\x1b[D");
+    session.wait_for(&["trial 0 is the first of the queue"]);
+    session.send("\r");
+    session.wait_for(&["1.300"]);
+    // The middle one is removed; its trial is void and never runs.
+    session.send("N");
+    session.wait_for(&["#1    queued          f0 1.1"]);
+    session.send("\x1b[Bx");
+    session.wait_for(&["trial 1 is removed from the queue", "#2    queued          f0 1.2"]);
+    assert!(!session.screen().contains("#1    queued"), "{}", session.screen());
+    session.send("\r");
+    session.send("2");
+    session.wait_for(&["v void", "queued", "removed from the queue"]);
+    session.send("1");
+    assert!(session.quit().success());
+
+    let shown = text(&quadfrog(folder.path(), &["study", "show", study.to_str().unwrap()]));
+    assert!(shown.contains("0 running, 2 queued\n  #0 f0 1.3, Fx 60, Fz 240\n  #2 f0 1.2, Fx 60, Fz 240"), "{shown}");
+    // A resumed session has the same queue.
+    let mut session = Session::start(folder.path(), (80, 24), &["--resume", study.to_str().unwrap()]);
+    session.wait_for(&["Press A to arm"]);
+    session.send("N");
+    session.wait_for(&["#0    queued          f0 1.3", "#2    queued          f0 1.2"]);
+    session.send("\r");
+    assert!(session.quit().success());
+
+    let script = "import sys, optuna\n\
+                  from optuna.storages.journal import JournalFileBackend\n\
+                  storage = optuna.storages.JournalStorage(JournalFileBackend(sys.argv[1]))\n\
+                  study = optuna.load_study(study_name=None, storage=storage)\n\
+                  for t in study.get_trials():\n    print(t.number, t.state.name, t.system_attrs.get('fixed_params', {}).get('f0'))\n\
+                  print(study.ask().number)\n";
+    let read = Command::new("python3").args(["-c", script]).arg(study.join("study.log")).output();
+    match read {
+        Ok(read) if read.status.success() => {
+            // Optuna takes the points in the same order, and never the removed one.
+            let read = String::from_utf8_lossy(&read.stdout).into_owned();
+            assert_eq!(read, "0 WAITING 1.3\n1 FAIL 1.1\n2 WAITING 1.2\n0\n");
+        }
+        Ok(read) => assert!(String::from_utf8_lossy(&read.stderr).contains("No module named"), "{read:?}"),
+        Err(error) => println!("skipped: python3 cannot be started: {error}"),
+    }
+}
+
+/// The first point of the queue is the proposal: when it is moved or removed, the next one is proposed, and STOP works over the list.
+#[test]
+fn the_proposal_follows_the_queue_and_stop_works_over_it() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (mut session, _) = session_with_queue(folder.path());
+    session.send("x");
+    session.wait_for(&["trial 0 is removed from the queue", "#1    queued          f0 1.2"]);
+    session.send("\r");
+    session.wait_for(&["Trial #1", "1.200"]);
+    session.send("A");
+    session.wait_for(&["Press g twice"]);
+    session.send("N");
+    session.wait_for(&["Left earlier"]);
+    session.send(" ");
+    session.wait_for(&["DAMPED"]);
+    session.send("k");
+    session.wait_for(&["Press A to arm"]);
+    // Nothing is changed while a trial runs.
+    session.send("A");
+    session.wait_for(&["Press g twice"]);
+    session.approve();
+    session.wait_for(&["judge it"]);
+    session.send("N");
+    session.wait_for(&["#2    queued          f0 1.3"]);
+    session.send("x");
+    session.wait_for(&["finish the present trial first"]);
+    session.send("\r");
+    session.send("a");
+    session.wait_for(&["Trial #2"]);
+    session.send("N");
+    session.wait_for(&["#2    queued          f0 1.3"]);
+    session.send("x");
+    session.wait_for(&["Nothing is queued: the sampler proposes."]);
+    session.send("\r");
+    session.wait_for(&["Trial #3"]);
+}
+
+#[test]
+fn a_point_that_is_queued_twice_is_said_to_be() {
+    let (_folder, mut session) = Session::opened((80, 24), &["--seed", "3", "--sampler", "random"]);
+    session.send("Q");
+    session.wait_for(&["queued"]);
+    session.send("Q");
+    session.wait_for(&["queued once more"]);
+    session.send("N");
+    session.wait_for(&["#0    queued", "#1    queued"]);
+}
