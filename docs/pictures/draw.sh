@@ -1,5 +1,5 @@
 #!/bin/sh
-# Draws the pictures of the manual from the recordings in `recordings/samples`: `sh docs/pictures/draw.sh [FOLDER]`, by default
+# Draws the pictures of the README and of the manual from the recordings in `recordings/samples`: `sh docs/pictures/draw.sh [FOLDER]`, by default
 # into this folder. QUADFROG names the program; by default it is built.
 set -eu
 here=$(cd "$(dirname "$0")" && pwd)
@@ -17,6 +17,7 @@ draw() {
 }
 best=$root/recordings/samples/forward
 fall=$root/recordings/samples/fall
+draw jump "$best" --trial 12 --animate 2.5 --frames-per-second 6 --keys "+ +"
 draw live "$best" --trial 12
 draw trials "$best" --keys 2 --size 100x30
 draw optimizer "$best" --keys 3

@@ -100,15 +100,54 @@ fn the_pictures_of_the_manual_are_those_of_this_program() {
     let mut draw = Command::new("sh");
     draw.arg(root.join("docs/pictures/draw.sh")).arg(folder.path());
     assert!(draw.env("QUADFROG", env!("CARGO_BIN_EXE_quadfrog")).status().unwrap().success());
-    let manual = std::fs::read_to_string(root.join("docs/operator.md")).unwrap();
+    let [manual, readme] =
+        ["docs/operator.md", "README.md"].map(|page| std::fs::read_to_string(root.join(page)).unwrap());
     let mut drawn = 0;
     for entry in std::fs::read_dir(folder.path()).unwrap() {
         let entry = entry.unwrap();
         let name = entry.file_name().into_string().unwrap();
-        assert!(manual.contains(&format!("(pictures/{name})")), "{name} is in the manual");
+        let shown =
+            manual.contains(&format!("(pictures/{name})")) || readme.contains(&format!("(docs/pictures/{name})"));
+        assert!(shown, "{name} is in the manual or the README");
         let [now, kept] = [entry.path(), root.join("docs/pictures").join(&name)].map(std::fs::read_to_string);
         assert!(now.unwrap() == kept.unwrap(), "{name} is out of date: run docs/pictures/draw.sh");
         drawn += 1;
     }
-    assert_eq!(drawn, manual.matches("](pictures/").count());
+    let shown = manual.matches("](pictures/").count() + readme.matches("](docs/pictures/").count();
+    assert_eq!(drawn, shown);
+}
+
+/// A moving picture: each frame is the still picture of its moment.
+#[test]
+fn a_moving_picture_shows_the_screens_one_after_the_other() {
+    let program = Program::new();
+    let sample = sample();
+    let draw = |arguments: &[&str]| {
+        program.text(&[&["screenshot", sample.to_str().unwrap(), "--size", "80x24"], arguments].concat())
+    };
+    let moving = draw(&["--trial", "12", "--animate", "2", "--frames-per-second", "4"]);
+    // The rows that stay need no animation, and each other row is in a group with the frames that show it.
+    let shown_in = |frame: usize| {
+        let mut kept = String::new();
+        let mut shown = true;
+        for line in moving.lines() {
+            if let Some(span) = line.strip_prefix("<g class=\"f").and_then(|rest| rest.strip_suffix("\">")) {
+                let (first, end) = span.split_once('-').unwrap();
+                shown = (first.parse::<usize>().unwrap()..end.parse().unwrap()).contains(&frame);
+            } else if line == "</g>" {
+                shown = true;
+            } else if shown && !line.contains("@keyframes") {
+                kept += &format!("{line}\n");
+            }
+        }
+        kept.replace("<style>\n</style>\n", "")
+    };
+    assert_eq!(cells(&shown_in(7), 24), cells(&draw(&["--trial", "12"]), 24), "the last frame is the end of the trial");
+    assert_ne!(cells(&shown_in(0), 24), cells(&shown_in(7), 24), "the robot moves");
+    assert_eq!(moving.matches("@keyframes").count(), moving.matches("step-end infinite").count());
+    assert!(moving.contains("2.000s step-end infinite"), "8 frames at 4 a second");
+    let one = draw(&["--trial", "12"]);
+    assert!(moving.len() < 8 * one.len(), "{} bytes for 8 frames of {}", moving.len(), one.len());
+
+    assert_shows(&program.refused(&["screenshot", sample.to_str().unwrap(), "--animate", "0"]), &["at most 30 s"]);
 }

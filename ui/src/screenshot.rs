@@ -1,5 +1,6 @@
 //! Pictures of a screen: the cells of the terminal as SVG.
 
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 use ratatui::Terminal;
@@ -21,10 +22,85 @@ const MARGIN: f64 = 8.0;
 
 /// Draws the screen of a model at its size and returns it as an SVG document.
 pub fn svg(model: &Model) -> String {
-    let (columns, rows) = model.size;
-    let mut terminal = Terminal::new(TestBackend::new(columns, rows)).unwrap_or_else(|never| match never {});
-    terminal.draw(|frame| view::render(frame, model)).unwrap_or_else(|never| match never {});
-    document(terminal.backend().buffer(), model.theme.background)
+    let mut film = Film::default();
+    film.add(model);
+    film.svg(1.0)
+}
+
+/// Screens one after the other, of the same size: a moving picture.
+#[derive(Debug, Default)]
+pub struct Film {
+    frames: usize,
+    /// Columns and rows of a screen.
+    size: (u16, u16),
+    background: Background,
+    /// For each row of the screen its pictures: the first frame that shows it, and its elements.
+    rows: Vec<Vec<(usize, String)>>,
+}
+
+impl Film {
+    /// Adds the screen of a model. Rows that stay as they are take no room.
+    pub fn add(&mut self, model: &Model) {
+        (self.size, self.background) = (model.size, model.theme.background);
+        let (columns, rows) = model.size;
+        let mut terminal = Terminal::new(TestBackend::new(columns, rows)).unwrap_or_else(|never| match never {});
+        terminal.draw(|frame| view::render(frame, model)).unwrap_or_else(|never| match never {});
+        self.rows.resize_with(usize::from(rows), Vec::new);
+        for (pictures, row) in self.rows.iter_mut().zip(0..) {
+            let picture = row_picture(terminal.backend().buffer(), row, terminal_colours(self.background));
+            if pictures.last().is_none_or(|(_, last)| *last != picture) {
+                pictures.push((self.frames, picture));
+            }
+        }
+        self.frames += 1;
+    }
+
+    /// Returns an SVG document that shows so many frames in a second, again and again; a single frame stands still.
+    pub fn svg(&self, frames_per_s: f64) -> String {
+        let [foreground, behind] = terminal_colours(self.background);
+        let (width, height) = (CELL.0 * f64::from(self.size.0), CELL.1 * f64::from(self.size.1));
+        let mut svg = format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {w:.1} {h:.1}\" width=\"{w:.0}\" height=\"{h:.0}\" \
+             font-family=\"DejaVu Sans Mono, Menlo, Consolas, monospace\" font-size=\"{TEXT}\" fill=\"{foreground}\">\n",
+            w = width + 2.0 * MARGIN,
+            h = height + 2.0 * MARGIN,
+        );
+        let mut spans = BTreeSet::new();
+        let mut pictures = String::new();
+        for row in &self.rows {
+            for (index, (first, picture)) in row.iter().enumerate() {
+                let end = row.get(index + 1).map_or(self.frames, |(next, _)| *next);
+                if (*first, end) == (0, self.frames) {
+                    pictures.push_str(picture);
+                } else {
+                    spans.insert((*first, end));
+                    let _ = writeln!(pictures, "<g class=\"f{first}-{end}\">\n{picture}</g>");
+                }
+            }
+        }
+        if !spans.is_empty() {
+            svg.push_str("<style>\n");
+            let duration_s = self.frames as f64 / frames_per_s;
+            let percent = |frame: usize| 100.0 * frame as f64 / self.frames as f64;
+            for (first, end) in spans {
+                let before = if first > 0 { "0% {visibility: hidden} " } else { "" };
+                let after = if end < self.frames {
+                    format!("{:.3}% {{visibility: hidden}}", percent(end))
+                } else {
+                    String::new()
+                };
+                let _ = writeln!(
+                    svg,
+                    ".f{first}-{end} {{animation: f{first}-{end} {duration_s:.3}s step-end infinite}} \
+                     @keyframes f{first}-{end} {{{before}{:.3}% {{visibility: visible}} {after}}}",
+                    percent(first)
+                );
+            }
+            svg.push_str("</style>\n");
+        }
+        let _ = writeln!(svg, "<rect width=\"100%\" height=\"100%\" fill=\"{behind}\"/>");
+        svg + &pictures + "</svg>\n"
+    }
 }
 
 /// Foreground and background of a terminal, as web colours.
@@ -35,28 +111,18 @@ fn terminal_colours(background: Background) -> [&'static str; 2] {
     }
 }
 
-fn document(buffer: &Buffer, background: Background) -> String {
-    let area = buffer.area;
-    let [foreground, behind] = terminal_colours(background);
-    let (width, height) = (CELL.0 * f64::from(area.width), CELL.1 * f64::from(area.height));
-    let mut svg = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {w:.1} {h:.1}\" width=\"{w:.0}\" height=\"{h:.0}\" \
-         font-family=\"DejaVu Sans Mono, Menlo, Consolas, monospace\" font-size=\"{TEXT}\" fill=\"{foreground}\">\n<rect width=\"100%\" height=\"100%\" fill=\"{behind}\"/>\n",
-        w = width + 2.0 * MARGIN,
-        h = height + 2.0 * MARGIN,
-    );
-    for row in area.rows() {
-        let cells: Vec<&Cell> = row.columns().filter_map(|place| buffer.cell(place.as_position())).collect();
-        let top = MARGIN + CELL.1 * f64::from(row.y);
-        let mut column = 0;
-        for run in cells.chunk_by(|one, next| one.style() == next.style()) {
-            let left = MARGIN + CELL.0 * column as f64;
-            column += run.len();
-            put_run(&mut svg, run, left, top, [foreground, behind]);
-        }
+/// Returns the elements of a row of the screen.
+fn row_picture(buffer: &Buffer, row: u16, colours: [&str; 2]) -> String {
+    let cells: Vec<&Cell> = (0..buffer.area.width).filter_map(|column| buffer.cell((column, row))).collect();
+    let top = MARGIN + CELL.1 * f64::from(row);
+    let mut picture = String::new();
+    let mut column = 0;
+    for run in cells.chunk_by(|one, next| one.style() == next.style()) {
+        let left = MARGIN + CELL.0 * column as f64;
+        column += run.len();
+        put_run(&mut picture, run, left, top, colours);
     }
-    svg.push_str("</svg>\n");
-    svg
+    picture
 }
 
 /// Appends cells of one style: their background, then their text. Each run has its width, whatever font is there.

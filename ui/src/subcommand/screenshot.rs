@@ -10,10 +10,11 @@ use quadfrog_console::feed::Feed;
 use quadfrog_console::keymap::Key;
 use quadfrog_console::message::{Effect, Msg, ReplayCommand};
 use quadfrog_console::model::Model;
+use quadfrog_console::output;
+use quadfrog_console::screenshot::Film;
 use quadfrog_console::settings::ConsoleSettings;
 use quadfrog_console::theme::{Colours, Glyphs, Theme, ThemeChoice};
 use quadfrog_console::update::update;
-use quadfrog_console::{output, screenshot};
 
 use super::arguments;
 use super::console::theme;
@@ -32,6 +33,12 @@ pub struct ScreenshotArguments {
     /// Show this time, s since the recording began
     #[arg(long, value_name = "S", value_parser = parse_time)]
     time: Option<u64>,
+    /// Show so many seconds up to that moment as a moving picture
+    #[arg(long, value_name = "S", value_parser = parse_length)]
+    animate: Option<f64>,
+    /// Frames of a moving picture in a second
+    #[arg(long, value_name = "N", default_value_t = 8, requires = "animate", value_parser = clap::value_parser!(u8).range(1..=30))]
+    frames_per_second: u8,
     /// Keys pressed before, as in a replay: 2 for Trials, Enter for its details; separated by spaces
     #[arg(long, value_name = "KEYS", default_value = "1", value_parser = parse_keys)]
     keys: Keys,
@@ -64,6 +71,11 @@ fn parse_time(text: &str) -> Result<u64, String> {
     }
 }
 
+fn parse_length(text: &str) -> Result<f64, String> {
+    let seconds = text.parse::<f64>().ok().filter(|seconds| *seconds > 0.0 && *seconds <= 30.0);
+    seconds.ok_or_else(|| "not a time above 0 and at most 30 s".to_owned())
+}
+
 fn parse_size(text: &str) -> Result<(u16, u16), String> {
     let wanted = || "write it as COLUMNSxROWS, from 20x6 to 400x200, for example 120x40".to_owned();
     let (columns, rows) = text.split_once('x').ok_or_else(wanted)?;
@@ -82,16 +94,19 @@ pub fn run(arguments: &ScreenshotArguments) -> Result<(), Failure> {
     let time_ns = match (arguments.trial, arguments.time) {
         (Some(trial), _) => end_of(trial, &recording)
             .map_err(|reason| Failure::input(format!("{}: {reason}", arguments.file.display())))?,
-        (None, time) => time.unwrap_or(u64::MAX),
+        (None, time) => time.unwrap_or(u64::MAX).min(recording.duration_ns()),
     };
     let settings = ConsoleSettings { theme: arguments.theme, ..settings };
     let mut model = Model::new(settings, Theme::new(Colours::True, Glyphs::Braille), recorded_robot(&recording));
     let mut feed = Feed::replay(recording);
     let (columns, rows) = arguments.size;
     update(&mut model, Msg::Resize(columns, rows));
+    let rate = f64::from(arguments.frames_per_second);
+    let frames = arguments.animate.map_or(1, |seconds| (seconds * rate).ceil() as u32);
+    let time_of = |frame: u32| time_ns.saturating_sub((f64::from(frames - 1 - frame) / rate * 1e9) as u64);
     // It plays from its beginning; stopped, it stays at the moment.
     feed.control_replay(ReplayCommand::PlayPause);
-    feed.control_replay(ReplayCommand::Time(time_ns));
+    feed.control_replay(ReplayCommand::Time(time_of(0)));
     show(&mut model, &mut feed);
     for key in &arguments.keys.0 {
         for effect in update(&mut model, Msg::Key(*key)) {
@@ -101,7 +116,14 @@ pub fn run(arguments: &ScreenshotArguments) -> Result<(), Failure> {
         }
         show(&mut model, &mut feed);
     }
-    let picture = screenshot::svg(&model);
+    let mut film = Film::default();
+    film.add(&model);
+    for frame in 1..frames {
+        feed.control_replay(ReplayCommand::Time(time_of(frame)));
+        show(&mut model, &mut feed);
+        film.add(&model);
+    }
+    let picture = film.svg(rate);
     match &arguments.output {
         Some(path) => write_file(path, |mut file| file.write_all(picture.as_bytes()).map(|()| file)),
         None => {
