@@ -2,9 +2,10 @@
 
 mod support;
 
-use quadfrog::recording::record::Record;
+use quadfrog::recording::record::{LogLevel, Record};
 use quadfrog::telemetry::{Mode, Phase};
 use quadfrog::trial::{ExperimentStage, Verdict};
+use quadfrog_console::model::Notice;
 use quadfrog_console::settings::ConsoleSettings;
 use quadfrog_console::theme::{Colours, Glyphs, Theme};
 use support::{Console, VIEWS, assert_shows, tick, trial};
@@ -72,9 +73,36 @@ fn no_dialog_covers_the_frame_the_answer_or_the_next_step() {
 #[test]
 fn a_small_terminal_shows_mode_stop_and_the_size_needed() {
     let console = Console::ready();
-    for (columns, rows) in [(79, 24), (80, 23), (40, 10), (20, 6)] {
+    for (columns, rows) in [(59, 24), (80, 19), (40, 10), (20, 6)] {
         let screen = console.screen(columns, rows);
-        assert_shows(&screen, &["READY", "STOP", "Space F12", "needed 80x24"]);
+        assert_shows(&screen, &["READY", "STOP", "Space F12", "needed 60x20"]);
+    }
+}
+
+/// Too small for the views, the terminal still has room for a jump: the whole proposal, the answer and the next step.
+#[test]
+fn a_compact_terminal_shows_the_trial_the_answer_and_the_next_step_whole() {
+    for (columns, rows) in [(60, 20), (79, 24), (80, 23), (200, 20)] {
+        let mut console = Console::ready();
+        console.model.size = (columns, rows);
+        let long = "a long answer, of which no word may be missing: ".repeat(2) + "the end";
+        console.model.message = Some(Notice { level: LogLevel::Warning, text: long.clone(), stop: false });
+        let screen = console.screen(columns, rows);
+        assert_shows(
+            &screen,
+            &["READY", "STOP", "Space F12", "Trial #0", "f0", "Fx", "Fz", "Press g twice to jump", "skip"],
+        );
+        let words: String = screen.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(words.contains(&long), "{columns}x{rows}: {screen}");
+        console.press(&["g"]);
+        assert_shows(&console.screen(columns, rows), &["Jump?", "Press g again to jump"]);
+        console.press(&["Esc"]);
+        // A proposal that is longer than the panel cannot be approved.
+        let info = &mut console.model.session.info;
+        let one = info.parameters[0].clone();
+        info.parameters.extend(std::iter::repeat_n(one, 12));
+        console.press(&["g"]);
+        assert!(console.said().contains("the proposal must be visible"), "{columns}x{rows}: {}", console.said());
     }
 }
 

@@ -44,6 +44,7 @@ fn search(fx: (f64, f64), fixed: Option<FixedParameter>) -> SearchStatus {
         ],
         confirming: None,
         hop_share: None,
+        queue: Vec::new(),
     }
 }
 

@@ -177,9 +177,29 @@ fn resizing_at_any_moment_is_safe() {
     }
     session.send("\x1b1");
     session.resize(40, 10);
-    session.wait_for(&["needed 80x24"]);
+    session.wait_for(&["needed 60x20"]);
     session.resize(80, 24);
     session.wait_for(&["READY", "Press g twice"]);
+    session.send("qy");
+    assert!(session.wait().success());
+}
+
+/// A whole trial on the smallest terminal.
+#[test]
+fn a_trial_runs_on_a_terminal_of_60_columns_and_20_rows() {
+    let folder = folder();
+    let mut session = Session::start(folder.path(), (60, 20), &["--seed", "3"]);
+    session.wait_for(&["Press A to arm"]);
+    session.send("A");
+    session.wait_for(&["Press g twice", "f0", "Fx", "Fz"]);
+    session.approve();
+    session.wait_for(&["Trial #0: judge it", "suggested verdict", "a accept", "f fall"]);
+    session.send("a");
+    session.wait_for(&["Trial #1", "Press g twice"]);
+    session.resize(59, 20);
+    session.wait_for(&["needed 60x20", "STOP"]);
+    session.resize(80, 24);
+    session.wait_for(&["1 Live", "Trial #1"]);
     session.send("qy");
     assert!(session.wait().success());
 }
@@ -328,7 +348,7 @@ fn a_small_terminal_and_none_are_refused_with_status_2() {
     let mut session = Session::start(folder.path(), (40, 10), &[]);
     assert_eq!(session.wait().exit_code(), 2);
     let printed: String = session.screen().split_whitespace().collect::<Vec<_>>().join(" ");
-    assert!(printed.replace(' ', "").contains("40x10") && printed.replace(' ', "").contains("80x24"), "{printed}");
+    assert!(printed.replace(' ', "").contains("40x10") && printed.replace(' ', "").contains("60x20"), "{printed}");
     let output = std::process::Command::new(env!("CARGO_BIN_EXE_quadfrog"))
         .current_dir(folder.path())
         .stdin(std::process::Stdio::null())

@@ -354,6 +354,13 @@ impl Draw {
                 }),
                 confirming: self.option(|d| d.word() as u32),
                 hop_share: self.option(|d| d.number()),
+                queue: self.several(|d| QueuedPoint {
+                    trial: d.word() as u32,
+                    source: d.one_of(&ProposalSource::ALL),
+                    parent: d.option(|d| d.word() as u32),
+                    parameters: d.several(|d| (d.string(), d.number())).into(),
+                    gains: d.several(|d| (d.string(), d.number())).into(),
+                }),
             }),
             11 => Record::Insight(ProposalInsight {
                 trial: self.word() as u32,

@@ -7,8 +7,47 @@ use crate::action::Action;
 use crate::keymap::Keymap;
 use crate::model::View;
 
+/// The smallest terminal with views.
 pub const MIN_COLUMNS: u16 = 80;
 pub const MIN_ROWS: u16 = 24;
+
+/// The smallest terminal with which trials can be run: mode, STOP, the trial, the newest answer and the next step.
+pub const COMPACT_COLUMNS: u16 = 60;
+pub const COMPACT_ROWS: u16 = 20;
+
+/// The parts of the screen of a terminal that is too small for the views, from the top.
+#[derive(Debug, Clone, Copy)]
+pub struct CompactAreas {
+    pub frame: Rect,
+    /// The proposal, or the trial that runs or waits for its verdict.
+    pub trial: Rect,
+    /// That larger terminals show more.
+    pub hint: Rect,
+    pub message: Rect,
+    pub next_step: Rect,
+}
+
+/// The parts of a compact screen of that size; none if it is too small.
+pub fn compact_areas(size: Size) -> Option<CompactAreas> {
+    if size.width < COMPACT_COLUMNS || size.height < COMPACT_ROWS {
+        return None;
+    }
+    let [frame, trial, hint, message, next_step] = Layout::vertical([
+        Constraint::Length(2),
+        Constraint::Fill(1),
+        Constraint::Length(1),
+        Constraint::Length(2),
+        Constraint::Length(2),
+    ])
+    .areas(Rect::from(((0, 0).into(), size)));
+    Some(CompactAreas { frame, trial, hint, message, next_step })
+}
+
+/// Whether a terminal of that size shows a panel of the trial with so many rows whole.
+pub fn shows_trial(size: Size, rows: u16) -> bool {
+    let whole = size.width >= MIN_COLUMNS && size.height >= MIN_ROWS;
+    whole || compact_areas(size).is_some_and(|areas| rows <= areas.trial.height)
+}
 
 /// The parts of the screen, from the top.
 #[derive(Debug, Clone, Copy)]

@@ -3,9 +3,10 @@
 use quadfrog::control::mode::{self, Trigger};
 use quadfrog::telemetry::Mode;
 use quadfrog::trial::{ExperimentStage, Proposal, Verdict};
+use ratatui::layout::Size;
 
 use crate::action::{ACTIONS, Action, ActionGroup, ActionInfo};
-use crate::layout::{MIN_COLUMNS, MIN_ROWS};
+use crate::layout::{MIN_COLUMNS, MIN_ROWS, shows_trial};
 use crate::model::{Model, View};
 
 /// Whether an action is possible now; the reason if it is not.
@@ -169,7 +170,9 @@ fn may_sit_down(model: &Model) -> Legality {
 /// Energising the robot requires a screen that shows it.
 fn must_be_visible(model: &Model) -> Legality {
     let (columns, rows) = model.size;
-    if columns >= MIN_COLUMNS && rows >= MIN_ROWS {
+    // A line that is wider than the terminal takes two rows: at most what is expected and the distance to falls.
+    let needed = model.session.trial_rows() + if columns < MIN_COLUMNS { 2 } else { 0 };
+    if shows_trial(Size::new(columns, rows), needed) {
         return Ok(());
     }
     refuse(format!("enlarge the terminal to {MIN_COLUMNS}x{MIN_ROWS}: the proposal must be visible"))

@@ -28,7 +28,7 @@ use ratatui::buffer::Cell;
 use ratatui::layout::{Position, Size};
 use ratatui::{Terminal, TerminalOptions, Viewport};
 
-use crate::layout::{MIN_COLUMNS, MIN_ROWS};
+use crate::layout::{COMPACT_COLUMNS, COMPACT_ROWS};
 
 /// Time limit of the restoration of a terminal that does not read.
 const LEAVE_TIMEOUT: Duration = Duration::from_millis(500);
@@ -60,10 +60,10 @@ pub enum TerminalError {
         "the console needs a terminal, but {0} is not one; over SSH use `ssh -t`, for a study without a screen use `quadfrog optimize`"
     )]
     NoTerminal(&'static str),
-    #[error("the size of the terminal is unknown; set it with `stty rows {MIN_ROWS} columns {MIN_COLUMNS}`")]
+    #[error("the size of the terminal is unknown; set it with `stty rows {COMPACT_ROWS} columns {COMPACT_COLUMNS}`")]
     NoSize,
     #[error(
-        "the terminal has {columns}x{rows} characters, the console needs at least {MIN_COLUMNS}x{MIN_ROWS}; enlarge it"
+        "the terminal has {columns}x{rows} characters, the console needs at least {COMPACT_COLUMNS}x{COMPACT_ROWS}; enlarge it"
     )]
     TooSmall { columns: u16, rows: u16 },
 }
@@ -81,7 +81,7 @@ pub fn check() -> Result<(), TerminalError> {
     }
     match size() {
         Ok((0, _) | (_, 0)) | Err(_) => Err(TerminalError::NoSize),
-        Ok((columns, rows)) if columns < MIN_COLUMNS || rows < MIN_ROWS => {
+        Ok((columns, rows)) if columns < COMPACT_COLUMNS || rows < COMPACT_ROWS => {
             Err(TerminalError::TooSmall { columns, rows })
         }
         Ok(_) => Ok(()),

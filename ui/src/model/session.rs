@@ -92,6 +92,27 @@ impl SessionModel {
         self.info.gains.iter().find(|gain| gain.name == name)
     }
 
+    /// Returns the rows of the panel of the trial: its heading, parameters and gains, what is expected, the repeats.
+    pub fn trial_rows(&self) -> u16 {
+        let parameters = self.info.parameters.len().max(3) as u16;
+        let changed = |proposal: &Proposal| proposal.gains.iter().filter(|gain| gain.value != gain.proposed).count();
+        let gains = self.open_proposal().map_or(0, changed) as u16;
+        // Repeats are shown while the best is being confirmed and when the study is finished.
+        let confirming = self.confirming().is_some();
+        let repeats = match confirming || self.stage_is(ExperimentStage::Finished) {
+            true => self.trials.points.len().min(4) as u16 + u16::from(confirming),
+            false => 0,
+        };
+        let expected = match self.under_review() {
+            Some(trial) => u16::from(trial.expected.is_some()),
+            None => self.open_proposal().and_then(|proposal| proposal.expected).map_or(0, |expected| {
+                1 + u16::from(expected.simulated_least.is_some()) + 2 * u16::from(expected.advises_to_stop)
+            }),
+        };
+        let model_best = u16::from(self.stage_is(ExperimentStage::Finished) && self.trials.model_best.is_some());
+        parameters + 4 + gains + repeats + expected + model_best
+    }
+
     /// Returns the queued points, the next one first.
     pub fn queue(&self) -> &[QueuedPoint] {
         self.search.as_ref().map_or(&[], |search| &search.queue)

@@ -43,7 +43,7 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let compared = model.live.comparison.as_ref().filter(|_| model.replay.is_some());
     let card_rows = match compared {
         Some(comparison) => beside::rows(comparison).min(side.height),
-        None => proposal::rows(&model.session).min(side.height.saturating_sub(5)),
+        None => model.session.trial_rows().min(side.height.saturating_sub(5)),
     };
     let room = side.height - card_rows;
     // Without room for both, the panel of the joints shows the robot and the others the objective.
@@ -78,7 +78,7 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
 
 /// The landed trial over the whole width of a narrow terminal; its measured values and the table share the rows below.
 fn render_landed(frame: &mut Frame, area: Rect, model: &Model) {
-    let card_rows = proposal::rows(&model.session).min(area.height / 2);
+    let card_rows = model.session.trial_rows().min(area.height / 2);
     let [charts, lower] = Layout::vertical([Constraint::Fill(1), Constraint::Length(card_rows)]).areas(area);
     let [card, _, table] =
         Layout::horizontal([Constraint::Length(SIDE), Constraint::Length(1), Constraint::Fill(1)]).areas(lower);

@@ -15,6 +15,7 @@
 mod arming;
 mod beside;
 mod chart;
+mod compact;
 mod countdown;
 mod densities;
 mod details;
@@ -44,7 +45,7 @@ mod wrap;
 
 use ratatui::Frame;
 
-use crate::layout::{Areas, areas};
+use crate::layout::{Areas, areas, compact_areas};
 use crate::model::{Model, View};
 
 /// Draws everything.
@@ -52,7 +53,10 @@ pub fn render(frame: &mut Frame, model: &Model) {
     let size = frame.area().as_size();
     let Some(Areas { frame: top, tabs, body, timeline, message, next_step }) = areas(size, model.replay.is_some())
     else {
-        return status_bar::render_small(frame, frame.area(), model);
+        return match compact_areas(size) {
+            Some(areas) => compact::render(frame, areas, model),
+            None => status_bar::render_small(frame, frame.area(), model),
+        };
     };
     status_bar::render(frame, top, model);
     status_bar::render_tabs(frame, tabs, model);

@@ -232,9 +232,14 @@ fn in_dialog(model: &Model, dialog: &Dialog) -> NextStep {
 }
 
 pub(super) fn render(frame: &mut Frame, area: Rect, model: &Model) {
+    frame.render_widget(line_within(model, usize::from(area.width)), area);
+}
+
+/// Returns the next step, whole, and as many other keys as `width` columns have room for.
+pub(super) fn line_within(model: &Model, width: usize) -> Line<'static> {
     let theme = &model.theme;
     let next = next_step(model);
-    let mut left = usize::from(area.width).saturating_sub(next.lead.chars().count() + 1);
+    let mut left = width.saturating_sub(next.lead.chars().count() + 1);
     let mut spans = vec![Span::raw(" "), span(theme, Role::Key, next.lead)];
     for (key, text) in next.others {
         let width = key.chars().count() + text.chars().count() + 4;
@@ -246,5 +251,5 @@ pub(super) fn render(frame: &mut Frame, area: Rect, model: &Model) {
             span(theme, Role::Quiet, format!(" {text}")),
         ]);
     }
-    frame.render_widget(Line::from(spans), area);
+    Line::from(spans)
 }

@@ -2,8 +2,7 @@
 //! best parameters when the study is finished.
 
 use quadfrog::trial::{
-    ExpectedResult, ExperimentStage, FallRisk, PredictedTrial, Proposal, ProposalSource, ProposedParameter,
-    TrialRecord, Verdict,
+    ExpectedResult, ExperimentStage, FallRisk, PredictedTrial, ProposalSource, ProposedParameter, TrialRecord, Verdict,
 };
 use ratatui::Frame;
 use ratatui::layout::Rect;
@@ -16,26 +15,6 @@ use crate::action::Action;
 use crate::model::Model;
 use crate::model::session::SessionModel;
 use crate::theme::{Role, Theme};
-
-pub fn rows(session: &SessionModel) -> u16 {
-    let parameters = session.info.parameters.len().clamp(3, 6) as u16;
-    let changed = |proposal: &Proposal| proposal.gains.iter().filter(|gain| gain.value != gain.proposed).count();
-    let gains = session.open_proposal().map_or(0, changed) as u16;
-    // Repeats are shown while the best is being confirmed and when the study is finished.
-    let confirming = session.confirming().is_some();
-    let repeats = match confirming || session.stage_is(ExperimentStage::Finished) {
-        true => session.trials.points.len().min(4) as u16 + u16::from(confirming),
-        false => 0,
-    };
-    let expected = match session.under_review() {
-        Some(trial) => u16::from(trial.expected.is_some()),
-        None => session.open_proposal().and_then(|proposal| proposal.expected).map_or(0, |expected| {
-            1 + u16::from(expected.simulated_least.is_some()) + 2 * u16::from(expected.advises_to_stop)
-        }),
-    };
-    let model_best = u16::from(session.stage_is(ExperimentStage::Finished) && session.trials.model_best.is_some());
-    parameters + 4 + gains + repeats + expected + model_best
-}
 
 pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let (title, lines) = content(model, usize::from(area.width));

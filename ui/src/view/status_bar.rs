@@ -11,8 +11,8 @@ use ratatui::widgets::Paragraph;
 
 use super::draw::{clock, clock_ms, number, span, truncate};
 use crate::action::Action;
-use crate::layout::{MIN_COLUMNS, MIN_ROWS, tabs};
-use crate::model::{Model, View};
+use crate::layout::{COMPACT_COLUMNS, COMPACT_ROWS, tabs};
+use crate::model::{Model, Notice, View};
 use crate::theme::Role;
 
 /// Age of the newest tick from which the numbers count as old, ms.
@@ -240,15 +240,25 @@ pub fn render_tabs(frame: &mut Frame, area: Rect, model: &Model) {
     frame.render_widget(Line::from(aside).alignment(Alignment::Right), area);
 }
 
+/// Draws the newest answer to the operator in one line, cut at the end.
 pub fn render_message(frame: &mut Frame, area: Rect, model: &Model) {
     let Some(message) = &model.message else { return };
-    let role = match message.level {
+    let text = truncate(&message.text, usize::from(area.width).saturating_sub(1));
+    frame.render_widget(Line::from(vec![Span::raw(" "), span(&model.theme, message_role(message), text)]), area);
+}
+
+/// Returns the newest answer to the operator, whole.
+pub fn message_line(model: &Model) -> Option<Line<'static>> {
+    let message = model.message.as_ref()?;
+    Some(Line::from(span(&model.theme, message_role(message), message.text.clone())))
+}
+
+fn message_role(message: &Notice) -> Role {
+    match message.level {
         LogLevel::Info => Role::Text,
         LogLevel::Warning => Role::Warning,
         LogLevel::Error => Role::Bad,
-    };
-    let text = truncate(&message.text, usize::from(area.width).saturating_sub(1));
-    frame.render_widget(Line::from(vec![Span::raw(" "), span(&model.theme, role, text)]), area);
+    }
 }
 
 /// The reduced form on a terminal that is too small: mode, STOP, link, needed size.
@@ -268,7 +278,7 @@ pub fn render_small(frame: &mut Frame, area: Rect, model: &Model) {
         },
         Line::from(link),
         Line::from(format!("terminal {}x{}", area.width, area.height)),
-        Line::from(format!("needed {MIN_COLUMNS}x{MIN_ROWS}")),
+        Line::from(format!("needed {COMPACT_COLUMNS}x{COMPACT_ROWS}")),
         Line::from(span(theme, Role::Quiet, "keys still work")),
     ];
     frame.render_widget(Paragraph::new(lines), area);

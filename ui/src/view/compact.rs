@@ -1,0 +1,31 @@
+//! The screen of a terminal that is too small for the views: all that a jump and its verdict need.
+
+use ratatui::Frame;
+use ratatui::text::Line;
+use ratatui::widgets::{Paragraph, Wrap};
+
+use super::draw::span;
+use super::{countdown, dialogs, next_step, proposal, status_bar};
+use crate::layout::{CompactAreas, MIN_COLUMNS, MIN_ROWS};
+use crate::model::Model;
+use crate::theme::Role;
+
+/// Columns of the longest key with its text, which is not broken.
+const LONGEST_KEY: usize = 16;
+
+pub fn render(frame: &mut Frame, areas: CompactAreas, model: &Model) {
+    let CompactAreas { frame: top, trial, hint, message, next_step } = areas;
+    status_bar::render(frame, top, model);
+    proposal::render(frame, trial, model);
+    let text = format!(" the views need {MIN_COLUMNS}x{MIN_ROWS}; all keys work");
+    frame.render_widget(Line::from(span(&model.theme, Role::Quiet, text)), hint);
+    dialogs::render(frame, trial, model);
+    countdown::render(frame, trial, model);
+    let wrapped = |line: Line<'static>| Paragraph::new(line).wrap(Wrap { trim: true });
+    if let Some(line) = status_bar::message_line(model) {
+        frame.render_widget(wrapped(line), message);
+    }
+    // Two rows, less what is lost where the first one is broken between words.
+    let width = 2 * usize::from(next_step.width) - LONGEST_KEY;
+    frame.render_widget(wrapped(next_step::line_within(model, width)), next_step);
+}
