@@ -3,6 +3,7 @@
 mod support;
 
 use quadfrog::recording::record::{ArmingCheckRecord, Record};
+use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::telemetry::{ArmingCheck, ArmingCheckState, Mode, Snapshot, Tick, TrialInhibit};
 use quadfrog::trial::{ExperimentStage, SearchStatus, SearchedParameter, Verdict};
 use quadfrog_console::message::{Msg, ReplayStatus};
@@ -49,7 +50,7 @@ fn arming_checks_of_an_earlier_time_are_grey_and_say_when_they_were_made() {
 }
 
 #[test]
-fn a_fault_comes_before_a_pending_verdict() {
+fn a_fault_and_a_stop_come_before_a_pending_verdict() {
     for suggested in [Verdict::Fall, Verdict::Accept] {
         let mut console = Console::review(Mode::Fault, suggested);
         console.model.session.stopped_because = "the link is silent for 52 ms".into();
@@ -59,9 +60,19 @@ fn a_fault_comes_before_a_pending_verdict() {
         assert!(!screen.contains("FAULT: fault"), "{screen}");
     }
     let mut console = Console::review(Mode::Damped, Verdict::Fall);
-    assert_shows(&console.next_step(), &["Judge it: f fall (suggested)"]);
-    assert_shows(console.screen(120, 40).lines().last().unwrap(), &["k acknowledge"]);
+    for (columns, rows) in [(80, 24), (120, 40)] {
+        let screen = console.screen(columns, rows);
+        let last = screen.lines().last().unwrap();
+        assert_shows(last, &["STOPPED; check the robot, then k acknowledges", "f fall (suggested)"]);
+    }
+    assert_eq!(console.requests(&["f"]), [OperatorRequest::Judge(Verdict::Fall)], "it is offered and it acts");
+    // STOP after the landing has a cause of its own.
+    let mut stopped = Console::review(Mode::Damped, Verdict::Accept);
+    stopped.model.session.stopped_because = "operator pressed STOP".into();
+    let screen = stopped.screen(120, 40);
+    assert_shows(screen.lines().last().unwrap(), &["k acknowledges: operator pressed STOP", "a accept (suggested)"]);
     console.mode(Mode::Review);
+    assert_shows(&console.next_step(), &["Judge it: f fall (suggested)"]);
     assert!(!console.screen(120, 40).lines().last().unwrap().contains("acknowledge"), "nothing was stopped");
 }
 

@@ -75,17 +75,31 @@ fn live(model: &Model) -> NextStep {
             let lead = format!("{}: the study answers later.", wait.unwrap_or_default());
             step(lead, model, &[sit_down, quit])
         }
-        mode if stage == Some(ExperimentStage::Review) && mode != Mode::Fault => review(model),
+        // What a stopped robot needs comes before the verdict.
+        mode if stage == Some(ExperimentStage::Review) && !matches!(mode, Mode::Damped | Mode::Fault) => review(model),
         mode @ (Mode::Damped | Mode::Fault) => {
             let stopped = if mode == Mode::Fault { "FAULT" } else { "STOPPED" };
             let cause = &session.stopped_because;
-            let because = if cause.is_empty() { String::new() } else { format!(": {cause}") };
+            let review = session.stage_is(ExperimentStage::Review);
+            // The cause of a fall stands beside its suggested verdict.
+            let because = match cause.is_empty() || mode == Mode::Damped && session.suggested_fall().is_some() {
+                true => String::new(),
+                false => format!(": {cause}"),
+            };
             // The key first: a long reason may be cut.
             let lead = format!("{stopped}; check the robot, then {} acknowledges{because}", key(Action::Acknowledge));
-            // A verdict can be given before the acknowledgement.
-            let review = session.stage_is(ExperimentStage::Review);
-            let verdicts = [(Action::Accept, "accept"), (Action::Fall, "fall"), (Action::Void, "void")];
-            step(lead, model, &[if review { &verdicts[..] } else { &[] }, &[undo, quit]].concat())
+            // A verdict can be given before the acknowledgement; the suggested one comes first.
+            let suggested = session.under_review().and_then(|trial| trial.suggested);
+            let mut verdicts = [
+                (Action::Fall, Verdict::Fall, "fall", "fall (suggested)"),
+                (Action::Accept, Verdict::Accept, "accept", "accept (suggested)"),
+                (Action::Void, Verdict::Void, "void", "void (suggested)"),
+            ];
+            verdicts.sort_by_key(|(_, verdict, ..)| Some(*verdict) != suggested);
+            let shown =
+                |(action, verdict, name, first)| (action, if Some(verdict) == suggested { first } else { name });
+            let verdicts: Vec<_> = verdicts.into_iter().filter(|_| review).map(shown).collect();
+            step(lead, model, &[&verdicts[..], &[undo, quit]].concat())
         }
         mode @ (Mode::Offline | Mode::Observe) if session.info.is_hardware() => {
             let heard = if mode == Mode::Offline { "The robot is silent" } else { "The robot sends states" };
@@ -145,12 +159,7 @@ fn review(model: &Model) -> NextStep {
         None => "Judge it".to_owned(),
     };
     let mut others: Vec<_> = others.into_iter().map(|(action, verdict)| (action, verdict.name())).collect();
-    others.extend([
-        (Action::Acknowledge, "acknowledge"),
-        (Action::Rerun, "re-run"),
-        (Action::HandValue, "value by hand"),
-        (Action::Note, "note"),
-    ]);
+    others.extend([(Action::Rerun, "re-run"), (Action::HandValue, "value by hand"), (Action::Note, "note")]);
     step(lead, model, &others)
 }
 
