@@ -444,3 +444,28 @@ fn workers_together_run_no_more_repeats_than_were_asked_for() {
     let completed: Vec<bool> = repeats.map(|trial| trial.value.is_some()).collect();
     assert_eq!(completed, [false, true]);
 }
+
+/// Regression: the values that the operator had given to one queued point were given to the point that took its place.
+#[test]
+fn an_override_stays_with_its_queued_point() {
+    let fx = |experiment: &Experiment| value(experiment, "Fx");
+    let overridden = |experiment: &Experiment| {
+        let proposal = experiment.proposal().unwrap();
+        proposal.parameters.iter().filter(|p| p.value != p.proposed).map(|p| (p.name.clone(), p.value)).collect()
+    };
+    let mut experiment = experiment(20);
+    for fx_n in [10.0, 20.0, 30.0] {
+        experiment.enqueue(&[("Fx".into(), fx_n), ("Fz".into(), 300.0)]).unwrap();
+    }
+    let fz: Vec<(String, f64)> = vec![("Fz".into(), 200.0)];
+    experiment.set_parameter("Fz", 200.0).unwrap();
+    // Behind the proposal.
+    experiment.move_queued(2, true).unwrap();
+    assert_eq!((fx(&experiment), overridden(&experiment)), (10.0, fz));
+    // The proposal itself.
+    experiment.move_queued(0, false).unwrap();
+    assert_eq!((fx(&experiment), overridden(&experiment)), (30.0, Vec::new()));
+    experiment.set_parameter("Fz", 200.0).unwrap();
+    experiment.remove_queued(0).unwrap();
+    assert_eq!((fx(&experiment), overridden(&experiment)), (10.0, Vec::new()));
+}

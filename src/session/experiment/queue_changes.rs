@@ -12,6 +12,7 @@ impl Experiment {
     /// Refused during a trial, for a trial that is not queued, and for a repeat that confirms the best.
     pub fn remove_queued(&mut self, trial: u32) -> Result<(), RequestRefusal> {
         self.must_be_queued(trial)?;
+        let proposed = self.is_next(trial);
         let cause = "removed from the queue by the operator";
         // Another program may have queued it, without an origin.
         let mut removed = Origin::of_trial(self.study.trial(trial)?).attributes();
@@ -20,7 +21,7 @@ impl Experiment {
         if self.study.tell_if(trial, Outcome::Fail, &removed, waits)? != TellOutcome::Recorded {
             return not_now(format!("trial {trial} has just begun elsewhere"));
         }
-        Ok(self.repropose()?)
+        self.propose_after_change(proposed)
     }
 
     /// Exchanges a queued point with the one before it, or after it. Trials run in the order of their numbers: the points
@@ -35,10 +36,26 @@ impl Experiment {
             return not_now(format!("trial {trial} is the {} of the queue", if earlier { "first" } else { "last" }));
         };
         self.must_be_queued(other)?;
+        let proposed = self.is_next(trial) || self.is_next(other);
         if !self.study.exchange_waiting(trial, other)? {
             return not_now(format!("trial {trial} or {other} has just begun elsewhere"));
         }
-        Ok(self.repropose()?)
+        self.propose_after_change(proposed)
+    }
+
+    /// Whether `trial` is the next one of the queue: the open proposal.
+    fn is_next(&self, trial: u32) -> bool {
+        self.study.waiting().next().is_some_and(|next| next.number == trial)
+    }
+
+    /// Makes a new proposal. The operator's changes of the open one stay, unless another point is `proposed` now.
+    fn propose_after_change(&mut self, proposed: bool) -> Result<(), RequestRefusal> {
+        if proposed {
+            self.propose()?;
+        } else {
+            self.repropose()?;
+        }
+        Ok(())
     }
 
     fn must_be_queued(&mut self, trial: u32) -> Result<(), RequestRefusal> {
