@@ -469,3 +469,37 @@ fn an_override_stays_with_its_queued_point() {
     experiment.remove_queued(0).unwrap();
     assert_eq!((fx(&experiment), overridden(&experiment)), (10.0, Vec::new()));
 }
+
+/// A journal that ends at any byte of a change, as that of a killed program may: each point waits once, or is removed.
+#[test]
+fn a_change_of_the_queue_that_was_cut_off_loses_and_doubles_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let journal = |folder: &Path| std::fs::read(folder.join("study.log")).unwrap();
+    let mut experiment = open(folder.path());
+    for (fx_n, gain) in [(10.0, None), (20.0, Some(500.0)), (30.0, None)] {
+        let gain = gain.map(|kp| ("kp".to_owned(), kp));
+        experiment.enqueue(&[("Fx".to_owned(), fx_n)].into_iter().chain(gain).collect::<Vec<_>>()).unwrap();
+    }
+    let begin = journal(folder.path()).len();
+    experiment.move_queued(2, true).unwrap();
+    experiment.move_queued(0, false).unwrap();
+    experiment.remove_queued(0).unwrap();
+    let whole = journal(folder.path());
+    drop(experiment);
+    let mut seen: Vec<Vec<(f64, bool)>> = Vec::new();
+    for end in begin..=whole.len() {
+        let cut = tempfile::tempdir().unwrap();
+        std::fs::write(cut.path().join("study.log"), &whole[..end]).unwrap();
+        let mut later = open(cut.path());
+        let queue = search(&mut later).queue;
+        let points: Vec<_> = queue
+            .iter()
+            .map(|point| (point.parameters.get("Fx").unwrap(), point.gains.get("kp") == Some(500.0)))
+            .collect();
+        if seen.last() != Some(&points) {
+            seen.push(points);
+        }
+    }
+    let [a, b, c] = [(10.0, false), (20.0, true), (30.0, false)];
+    assert_eq!(seen, [vec![a, b, c], vec![a, c, b], vec![c, a, b], vec![a, b]]);
+}

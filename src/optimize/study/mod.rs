@@ -9,6 +9,7 @@ mod best;
 mod check;
 mod draft;
 mod error;
+mod exchange;
 mod import;
 mod notes;
 mod results;
@@ -101,6 +102,7 @@ impl Study {
         let streams = Streams::new(options.sampler.seed);
         let mut study = Study { journal, id, options, streams, inside: None, prior: None };
         study.check_compatible()?;
+        study.complete_exchange()?;
         study.streams.advance_to(study.draws_so_far());
         Ok(study)
     }

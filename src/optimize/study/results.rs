@@ -1,13 +1,11 @@
 //! Changes of trials: attributes, outcomes, the queue.
 
-use std::collections::BTreeMap;
-
 use jiff::Timestamp;
 use serde_json::{Map, Value, json};
 
 use super::best::MODEL_BEST;
 use super::{Outcome, Study, StudyError, TellOutcome, study_attributes, user_attributes};
-use crate::optimize::journal::{Applied, AttributeKind, JournalError, Operation};
+use crate::optimize::journal::{Applied, JournalError, Operation};
 use crate::optimize::trial::{CHANGED_VERDICT, FIXED_PARAMS, Trial, TrialState, VerdictChange};
 
 impl Study {
@@ -120,34 +118,6 @@ impl Study {
             Ok::<_, JournalError>(if needed { vec![create.clone()] } else { Vec::new() })
         })?;
         Ok(self.created(&applied).next())
-    }
-
-    /// Exchanges the points of two enqueued trials with their user attributes, in one commit. Returns whether both were still
-    /// waiting; otherwise nothing is changed. An attribute that one of them lacks becomes null: the journal removes none.
-    pub fn exchange_waiting(&mut self, one: u32, other: u32) -> Result<bool, StudyError> {
-        let (one, other) = (self.trial(one)?.id, self.trial(other)?.id);
-        let applied = self.journal.commit(|journal| {
-            let waiting = |id| journal.trial(id).filter(|trial| trial.state == TrialState::Waiting);
-            let (Some(first), Some(second)) = (waiting(one), waiting(other)) else {
-                return Ok::<_, JournalError>(Vec::new());
-            };
-            let mut operations = Vec::new();
-            for (id, now, new) in [(one, first, second), (other, second, first)] {
-                let point = new.system_attributes.get(FIXED_PARAMS).cloned().unwrap_or_else(|| json!({}));
-                operations.push(Operation::trial_attribute(id, AttributeKind::System, FIXED_PARAMS, point));
-                let mut attributes: BTreeMap<&String, &Value> =
-                    now.user_attributes.keys().map(|key| (key, &Value::Null)).collect();
-                attributes.extend(&new.user_attributes);
-                operations.extend(
-                    attributes
-                        .into_iter()
-                        .filter(|(key, value)| now.user_attributes.get(*key) != Some(*value))
-                        .map(|(key, value)| Operation::trial_attribute(id, AttributeKind::User, key, value.clone())),
-                );
-            }
-            Ok(operations)
-        })?;
-        Ok(!applied.is_empty())
     }
 
     /// Sets user attributes of the study.
