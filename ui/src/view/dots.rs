@@ -59,9 +59,14 @@ impl DotGrid {
     }
 
     /// A straight line of dots (in steps along the longer side).
-    pub fn line(&mut self, (x0, y0): (f64, f64), (x1, y1): (f64, f64)) {
+    pub fn line(&mut self, from: (f64, f64), to: (f64, f64)) {
+        self.dotted(from, to, 1);
+    }
+
+    /// A straight line of which every `step`-th dot is set.
+    pub fn dotted(&mut self, (x0, y0): (f64, f64), (x1, y1): (f64, f64), step: usize) {
         let steps = (x1 - x0).abs().max((y1 - y0).abs()).ceil().clamp(1.0, 4096.0) as usize;
-        for i in 0..=steps {
+        for i in (0..=steps).step_by(step.max(1)) {
             let s = i as f64 / steps as f64;
             self.set((x0 + s * (x1 - x0)).round() as i64, (y0 + s * (y1 - y0)).round() as i64);
         }

@@ -48,7 +48,7 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let room = side.height - card_rows;
     // Without room for both, the panel of the joints shows the robot and the others the objective.
     let picture_rows = match joints_only {
-        _ if room >= 18 => 12,
+        _ if room >= 18 => (room / 2).clamp(12, 20),
         true => room,
         false => 0,
     };
@@ -71,7 +71,7 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     }
     objective::render(frame, objective_area, &model.session, &model.theme);
     if picture_rows > 0 {
-        wireframe::render(frame, picture, model.robot.as_ref(), &model.snapshot.tick, &model.theme);
+        wireframe::render(frame, picture, model);
     }
     trials::render_table(frame, table, model, false);
 }

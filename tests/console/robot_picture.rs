@@ -1,0 +1,129 @@
+//! The picture of the robot in view Live: legs, attitude, path and landing spots.
+
+#[path = "support/mod.rs"]
+mod support;
+
+use quadfrog::recording::record::Record;
+use quadfrog::robot::description::RobotDescription;
+use quadfrog::telemetry::{Mode, Phase, Tick};
+use quadfrog::trial::{ExperimentStage, Verdict};
+use quadfrog_console::settings::ConsoleSettings;
+use quadfrog_console::theme::{Colours, Glyphs, Theme};
+use ratatui::buffer::{Buffer, Cell};
+use support::{Console, tick, trial};
+
+/// Stance of the Go1, rad: hip, thigh, calf.
+const STANCE_RAD: [f64; 3] = [0.0, 0.8, -1.6];
+
+fn console(glyphs: Glyphs) -> Console {
+    let mut console = Console::with(ConsoleSettings::built_in(), Theme::new(Colours::True, glyphs));
+    console.model.robot = Some(RobotDescription::embedded("go1").expect("the robot"));
+    show(&mut console, standing(1, [0.0, 0.0, 0.3], None));
+    console
+}
+
+fn standing(time_ms: u64, position: [f64; 3], in_trial: Option<(u32, f64, Phase)>) -> Tick {
+    let mut tick = tick(time_ms, 0.0, in_trial);
+    tick.estimate.position_world = position.into();
+    tick.state.joint_position_rad = std::array::from_fn(|joint| STANCE_RAD[joint % 3]);
+    tick
+}
+
+/// Shows a tick as the newest one, and in the history.
+fn show(console: &mut Console, tick: Tick) {
+    console.tick(tick);
+    console.model.snapshot.tick = tick;
+}
+
+/// The cells below the heading of the picture, row by row.
+fn picture(console: &Console) -> Vec<Vec<Cell>> {
+    let buffer: Buffer = console.draw(120, 40);
+    let text = |row: u16| (0..120).map(|column| buffer.cell((column, row)).unwrap().symbol()).collect::<String>();
+    let place = (0..40).find_map(|row| {
+        Some((row, text(row).split("Robot ").next().filter(|_| text(row).contains("Robot "))?.chars().count()))
+    });
+    let (top, left) = place.expect("the picture of the robot");
+    let below = (top + 1..40).take_while(|row| !text(*row).trim_start().starts_with('#'));
+    below.map(|row| (left as u16..120).map(|column| buffer.cell((column, row)).unwrap().clone()).collect()).collect()
+}
+
+fn symbols(picture: &[Vec<Cell>]) -> String {
+    picture.iter().map(|row| row.iter().map(Cell::symbol).collect::<String>() + "\n").collect()
+}
+
+/// First row with a cell for which `wanted` holds.
+fn first_row(picture: &[Vec<Cell>], wanted: impl Fn(&Cell) -> bool) -> usize {
+    picture.iter().position(|row| row.iter().any(&wanted)).expect("such a cell")
+}
+
+#[test]
+fn near_and_far_legs_differ_and_a_robot_that_stands_does_not_change_the_picture() {
+    for glyphs in [Glyphs::Braille, Glyphs::Ascii] {
+        let mut console = console(glyphs);
+        let before = picture(&console);
+        let colours: std::collections::BTreeSet<String> =
+            before.iter().flatten().filter(|cell| cell.symbol() != " ").map(|cell| format!("{:?}", cell.fg)).collect();
+        assert!(colours.len() >= 3, "trunk, near legs, far legs and ground: {colours:?}");
+        // The noise of an estimator moves no cell.
+        show(&mut console, standing(2, [0.0004, -0.0003, 0.3002], None));
+        assert_eq!(symbols(&picture(&console)), symbols(&before));
+    }
+}
+
+#[test]
+fn a_robot_on_its_back_has_its_feet_above_the_trunk() {
+    let mut console = console(Glyphs::Braille);
+    let theme = console.model.theme;
+    let trunk = theme.style(quadfrog_console::theme::Role::SeriesA).fg.unwrap();
+    let legs = theme.style(quadfrog_console::theme::Role::Text).fg;
+    let is_leg = |cell: &Cell| cell.symbol() != " " && Some(cell.fg) == legs.or(Some(ratatui::style::Color::Reset));
+    let upright = picture(&console);
+    let lowest = |picture: &[Vec<Cell>], wanted: &dyn Fn(&Cell) -> bool| {
+        picture.iter().rposition(|row| row.iter().any(wanted)).expect("such a cell")
+    };
+    let is_trunk = |cell: &Cell| cell.fg == trunk;
+    assert!(lowest(&upright, &is_leg) > lowest(&upright, &is_trunk), "{}", console.screen(120, 40));
+    let mut fallen = standing(2, [0.0, 0.0, 0.06], None);
+    fallen.estimate.roll_pitch_yaw.x = std::f64::consts::PI;
+    show(&mut console, fallen);
+    let on_its_back = picture(&console);
+    assert!(
+        first_row(&on_its_back, is_leg) < first_row(&on_its_back, |cell| cell.fg == trunk),
+        "{}",
+        symbols(&on_its_back)
+    );
+}
+
+/// Two trials: the second lands shorter than the first, which is the best.
+#[test]
+fn the_path_and_both_landing_spots_are_shown_after_the_landing() {
+    let mut console = Console::ready();
+    console.model.robot = Some(RobotDescription::embedded("go1").expect("the robot"));
+    let jump = |console: &mut Console, number: u32, from_ms: u64, length_m: f64| {
+        console.stage(ExperimentStage::Running, number);
+        for step in 0..200_u64 {
+            let share = step as f64 / 199.0;
+            let height = 0.3 + 1.6 * share * (1.0 - share);
+            let in_trial = Some((number, share, Phase::Flight));
+            show(console, standing(from_ms + 5 * step, [length_m * share, 0.0, height], in_trial));
+        }
+        console.record(Record::Trial(trial(number, None, Some(Verdict::Accept))));
+        console.stage(ExperimentStage::Review, number);
+        console.mode(Mode::Review);
+        show(console, standing(from_ms + 1001, [length_m, 0.0, 0.3], None));
+    };
+    jump(&mut console, 0, 1000, 0.6);
+    let alone = symbols(&picture(&console));
+    assert!(alone.contains('x') && !alone.contains('o'), "no best trial yet:\n{alone}");
+    console.record(Record::Trial(trial(0, Some(Verdict::Accept), Some(Verdict::Accept))));
+    jump(&mut console, 1, 5000, 0.3);
+    let picture = picture(&console);
+    let column = |wanted: &str| picture.iter().find_map(|row| row.iter().position(|cell| cell.symbol() == wanted));
+    let (landed, best) = (column("x").expect("the landing"), column("o").expect("the best landing"));
+    assert!(best > landed + 2, "the best trial landed farther to the right:\n{}", symbols(&picture));
+    // The path rises above the robot that stands at its end.
+    let theme = console.model.theme;
+    let path = theme.style(quadfrog_console::theme::Role::SeriesB).fg.unwrap();
+    let trunk = theme.style(quadfrog_console::theme::Role::SeriesA).fg.unwrap();
+    assert!(first_row(&picture, |cell| cell.fg == path) < first_row(&picture, |cell| cell.fg == trunk));
+}
