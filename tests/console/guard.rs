@@ -20,7 +20,7 @@ use pty::Session;
 use quadfrog::config::Config;
 use quadfrog::robot::go1::convert::{low_cmd, low_state};
 use quadfrog::robot::go1::packet::CrcForm;
-use quadfrog::robot::{JointCommand, RobotState};
+use quadfrog::robot::{JOINTS, JointCommand, RobotState};
 use tempfile::TempDir;
 
 /// Time without a datagram after which the sender counts as ended.
@@ -42,7 +42,9 @@ impl RecordingRobot {
         let (received, ending) = (Arc::new(Mutex::new(Vec::new())), Arc::new(AtomicBool::new(false)));
         let (kept, flag) = (received.clone(), ending.clone());
         let answer = move || {
-            let (mut datagram, mut state) = ([0; 2048], RobotState::default());
+            let mut datagram = [0; 2048];
+            // Its motors follow commands: otherwise the console faults, and only a line of its log says that it was disarmed.
+            let mut state = RobotState { motor_enabled: [true; JOINTS], ..RobotState::default() };
             while !flag.load(Ordering::Acquire) {
                 let Ok((length, from)) = socket.recv_from(&mut datagram) else { continue };
                 kept.lock().unwrap().push(datagram[..length].to_vec());
