@@ -17,7 +17,7 @@ use quadfrog_console::theme::{Colours, Glyphs, Theme, ThemeChoice};
 use quadfrog_console::update::update;
 
 use super::arguments;
-use super::console::theme;
+use super::console::{settings, theme};
 use super::failure::Failure;
 use super::replay::recorded_robot;
 use super::table::write_file;
@@ -88,15 +88,13 @@ fn parse_size(text: &str) -> Result<(u16, u16), String> {
 /// Plays the recording up to the moment without a terminal, presses the keys and draws the screen.
 pub fn run(arguments: &ScreenshotArguments) -> Result<(), Failure> {
     let config = arguments::load_config(arguments.config.as_deref())?;
-    let settings = ConsoleSettings::from_table(&config.console)
-        .map_err(|error| config.refuse("console.toml", &error.key, &error.value, &error.reason))?;
     let recording = Timeline::open(&recordings_of(&arguments.file)?)?;
     let time_ns = match (arguments.trial, arguments.time) {
         (Some(trial), _) => end_of(trial, &recording)
             .map_err(|reason| Failure::input(format!("{}: {reason}", arguments.file.display())))?,
         (None, time) => time.unwrap_or(u64::MAX).min(recording.duration_ns()),
     };
-    let settings = ConsoleSettings { theme: arguments.theme, ..settings };
+    let settings = ConsoleSettings { theme: arguments.theme, ..settings(&config)? };
     let mut model = Model::new(settings, Theme::new(Colours::True, Glyphs::Braille), recorded_robot(&recording));
     let mut feed = Feed::replay(recording);
     let (columns, rows) = arguments.size;

@@ -6,7 +6,6 @@ use ratatui::text::Line;
 use super::draw::{span, truncate};
 use crate::action::Action;
 use crate::model::Model;
-
 use crate::theme::Role;
 
 /// Returns a line for each queued point, `selected` marked, at most `width` columns wide; for an empty queue how to fill it.

@@ -4,7 +4,7 @@ mod page;
 mod schema;
 
 use std::fs::OpenOptions;
-use std::io::{ErrorKind, Write as _};
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
@@ -212,10 +212,7 @@ fn write_schemas(file: Option<&str>, folder: Option<&Path>) -> Result<(), Failur
             continue;
         };
         let path = folder.join(reference.name).with_extension("schema.json");
-        let write = || match std::fs::create_dir_all(folder) {
-            Err(error) if error.kind() != ErrorKind::AlreadyExists => Err(error),
-            _ => std::fs::write(&path, &text),
-        };
+        let write = || std::fs::create_dir_all(folder).and_then(|()| std::fs::write(&path, &text));
         write().with_context(|| format!("{}: cannot be written", path.display()))?;
         put_line!("{}", path.display());
     }

@@ -51,8 +51,7 @@ fn member<'a>(table: &'a mut Json, name: &str, new: impl FnOnce() -> Json) -> &'
 
 fn of_key(file: &FileReference, path: &str, key: &KeyReference) -> Json {
     let mut schema = of_value(file, path, &key.default, key.range);
-    let default = serde_json::to_value(&key.default).unwrap_or_default();
-    schema["default"] = default;
+    schema["default"] = json!(key.default);
     let hardware = key.hardware_range.map(|range| format!("On hardware it {}.", range.text)).unwrap_or_default();
     let comment = [key.comment.as_str(), &hardware].iter().filter(|text| !text.is_empty()).copied().collect::<Vec<_>>();
     describe(&mut schema, &comment.join(" "));
