@@ -269,6 +269,33 @@ fn a_robot_whose_clock_steps_is_not_armed() {
     assert_eq!(bench.failing(), []);
 }
 
+/// A robot whose computer stood still while disarmed: its clock lags behind for good, so the failsafe for the link's delay would
+/// sit it down at once, after each arming.
+#[test]
+fn a_robot_whose_clock_lags_behind_is_not_armed() {
+    let mut bench = in_mode(Mode::Disarmed);
+    let _ = bench.reaction("freeze", 300);
+    bench.ticks(1500);
+    bench.inject("clear");
+    bench.ticks(100);
+    bench.command(Command::Acknowledge { stops: 0 });
+    bench.ticks(12_000);
+    assert_eq!(bench.cycle.mode(), Mode::Disarmed, "{:?}", bench.events);
+    assert_eq!(bench.failing(), [ArmingCheck::LinkDelay]);
+}
+
+/// A link that has become slower, and one that recovers.
+#[test]
+fn a_robot_behind_a_slower_link_is_not_armed() {
+    let mut bench = in_mode(Mode::Disarmed);
+    bench.inject("delay-states 15");
+    bench.ticks(6000);
+    assert_eq!(bench.failing(), [ArmingCheck::LinkDelay]);
+    bench.inject("clear");
+    bench.ticks(6000);
+    assert_eq!(bench.failing(), []);
+}
+
 /// Faults of an energised robot: injected fault, mode, longest time to damping in ms, and words of the cause, of which one is
 /// enough.
 type Row = (&'static str, Mode, u32, &'static [&'static str]);

@@ -57,13 +57,16 @@ pub enum ArmingCheck {
     LockedMemory,
     #[strum(serialize = "operator's connection")]
     Connection,
+    #[strum(serialize = "link delay")]
+    LinkDelay,
 }
 
 impl ArmingCheck {
     /// The checks of the control thread, in the order of the list.
-    pub const CONTROL: [ArmingCheck; 18] = [
+    pub const CONTROL: [ArmingCheck; 19] = [
         ArmingCheck::StateFresh,
         ArmingCheck::Loss,
+        ArmingCheck::LinkDelay,
         ArmingCheck::Checksums,
         ArmingCheck::Upright,
         ArmingCheck::JointsInside,

@@ -29,6 +29,8 @@ pub struct ArmingInputs<'a> {
     pub state_age_ms: u32,
     /// The link; none for a machine without one.
     pub link: Option<LinkStatus>,
+    /// Growth of the link's delay, ms.
+    pub delay_growth_ms: f64,
     /// Late ticks and stillness up to now.
     pub history: &'a ArmingHistory,
     /// Consistency of sensors, clocks and commands.

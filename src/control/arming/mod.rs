@@ -10,6 +10,7 @@ mod gyro_still;
 mod inertial_live;
 mod joint_velocity;
 mod joints_inside;
+mod link_delay;
 mod loss;
 mod lying_down;
 mod motors_cool;
@@ -31,6 +32,7 @@ use check::{ControlCheck, Reading};
 const CHECKS: [ControlCheck; ArmingCheck::CONTROL.len()] = [
     state_fresh::CHECK,
     loss::CHECK,
+    link_delay::CHECK,
     checksums::CHECK,
     upright::CHECK,
     joints_inside::CHECK,

@@ -316,6 +316,7 @@ impl Cycle {
                 estimate: &self.tick.estimate,
                 state_age_ms: self.state_age_ms,
                 link: robot.link(),
+                delay_growth_ms: self.link_quality.delay_growth_ms(),
                 history: &self.arming_history,
                 consistency: &self.consistency,
             };
