@@ -2,6 +2,7 @@
 
 mod control_thread;
 mod folder;
+mod ground;
 mod guard;
 mod observers;
 mod options;
@@ -16,6 +17,7 @@ mod verify;
 pub use folder::{
     STUDY_FILE, attachments, fingerprint, newest_config, prepare_folder, running_session, study_files, utc_ns,
 };
+pub use ground::TrialGround;
 pub use guard::{GUARD, GuardError, GuardOutcome, run_guard};
 pub use observers::{
     FoundSessions, Observer, ObserverServer, ObserverStatus, RunningSession, SessionFacts, SessionNews, find_sessions,
@@ -26,7 +28,7 @@ pub use recording::create_recording;
 pub use rejudging::{EstimateChange, RejudgeError, RejudgedTrial, Rejudging};
 pub use stored::{Opened, StoredStudy, open_stored, stored_studies, stored_study};
 pub use study::{check_backend, open_experiment, open_study, session_info, study_name};
-pub use verify::{TickDifference, Verification, VerifyError, verify};
+pub use verify::{TickDifference, Verification, VerifyError, attached_configuration, verify};
 
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};

@@ -5,13 +5,13 @@ use std::path::PathBuf;
 
 use nalgebra::Vector3;
 
-use super::verify::parts;
+use super::verify::attached_configuration;
 use crate::config::{Config, ConfigError};
 use crate::control::estimator::Estimator;
 use crate::control::leg;
 use crate::control::settings::ControlSettings;
 use crate::recording::RecordingError;
-use crate::recording::player::{Played, Player};
+use crate::recording::player::Played;
 use crate::recording::timeline::Timeline;
 use crate::robot::description::RobotDescription;
 use crate::session::rejudge::{Judgement, rejudge, row_of_repeat};
@@ -91,14 +91,14 @@ impl Rejudging {
     /// # Errors
     /// When a file cannot be played, `config` does not fit its robot, or the robot, the task or the backend is not known.
     pub fn open(files: &[PathBuf], config: &Config) -> Result<Rejudging, RejudgeError> {
-        let recording = Timeline::open(files)?;
+        let mut recording = Timeline::open(files)?;
         let path = recording.paths().into_iter().next().unwrap_or_default();
         let refuse = |reason: String| RejudgeError::NotRejudgeable { path: path.clone(), reason };
         let info = recording.session().clone();
         let (Some(task), Some(backend)) = (info.task, info.backend) else {
             return Err(refuse("it names a task or a backend that this version does not know".into()));
         };
-        let attached = parts(&mut Player::open(&path)?, &path);
+        let attached = attached_configuration(recording.first_player());
         let robot = match (&attached, RobotDescription::embedded(&info.robot)) {
             (Ok((_, robot)), _) => robot.clone(),
             // An older recording has no robot of its own.

@@ -127,7 +127,7 @@ pub fn verify(path: &Path) -> Result<Verification, VerifyError> {
         None => return Err(refuse("its backend is not known to this version".into())),
     }
     let Some(task) = session.task else { return Err(refuse("its task is not known to this version".into())) };
-    let (config, robot) = parts(&mut player, path)?;
+    let (config, robot) = attached_configuration(&mut player)?;
     let rows = rows(&player);
     let damaged =
         |player: &Player| player.damage().map_or(Ok(()), |damage| Err(refuse(format!("it is damaged: {damage}"))));
@@ -184,8 +184,12 @@ pub fn verify(path: &Path) -> Result<Verification, VerifyError> {
     Ok(Verification::Equal { trials, ticks, left_out })
 }
 
-/// Returns the configuration and the robot of a recording.
-pub(super) fn parts(player: &mut Player, path: &Path) -> Result<(Config, RobotDescription), VerifyError> {
+/// Returns the configuration and the robot that are attached to a recording.
+///
+/// # Errors
+/// When one of their files is missing, damaged or not valid any more.
+pub fn attached_configuration(player: &mut Player) -> Result<(Config, RobotDescription), VerifyError> {
+    let path = &player.path().to_owned();
     let refuse = |reason: String| VerifyError::NotVerifiable { path: path.into(), reason };
     let mut text = |name: &str| -> Result<String, VerifyError> {
         let missing =

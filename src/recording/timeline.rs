@@ -120,6 +120,11 @@ impl Timeline {
         Ok(())
     }
 
+    /// The first file.
+    pub fn first_player(&mut self) -> &mut Player {
+        &mut self.parts[0].player
+    }
+
     /// Files of two studies would mix their trials.
     fn check_same_study(&self, player: &Player) -> Result<(), RecordingError> {
         let (ours, theirs) = (self.session(), player.session());

@@ -1,4 +1,4 @@
-//! All views of a recorded session of the simulator, as text, at three sizes.
+//! All views of a recorded session of the simulator, as text, at five sizes, and in colours for a dark and a light background.
 //! `cargo test -p quadfrog-console --test recorded -- --ignored` renews the recording, then
 //! `INSTA_UPDATE=always cargo test -p quadfrog-console --test recorded` the expected screens.
 
@@ -15,7 +15,7 @@ use quadfrog::recording::record::Record;
 use quadfrog::recording::writer::Writer;
 use quadfrog_console::feed::Feed;
 use quadfrog_console::settings::ConsoleSettings;
-use quadfrog_console::theme::{Colours, Glyphs, Theme};
+use quadfrog_console::theme::{Background, Colours, Glyphs, Theme};
 use support::Console;
 
 const VIEWS: [(&str, &str); 6] =
@@ -26,8 +26,8 @@ fn recording() -> PathBuf {
 }
 
 /// A console at the end of the recorded session: two trials judged, the third under review.
-fn console(colours: Colours, glyphs: Glyphs) -> Console {
-    let mut console = Console::with(ConsoleSettings::built_in(), Theme::new(colours, glyphs));
+fn console(theme: Theme) -> Console {
+    let mut console = Console::with(ConsoleSettings::built_in(), theme);
     let player = Player::open(recording()).expect("the recorded session");
     let robot = quadfrog::robot::description::RobotDescription::embedded(&player.session().robot).expect("its robot");
     console.model.robot = Some(robot);
@@ -51,12 +51,14 @@ fn without_time_of_day(screen: &str) -> String {
     screen.lines().map(line).collect::<Vec<_>>().join("\n")
 }
 
-const SIZES: [(u16, u16); 3] = [(80, 24), (120, 40), (200, 60)];
+const SIZES: [(u16, u16); 5] = [(60, 20), (80, 24), (100, 30), (120, 40), (200, 60)];
 
-fn compare(colours: Colours, glyphs: Glyphs, kind: &str, draw: impl Fn(&Console, u16, u16) -> String) {
+fn compare(theme: Theme, kind: &str, draw: impl Fn(&Console, u16, u16) -> String) {
     for (columns, rows) in SIZES {
-        let mut console = console(colours, glyphs);
-        for (key, name) in VIEWS {
+        let mut console = console(theme);
+        // Below 80x24 one screen takes the place of all views.
+        let views = if columns < 80 { &VIEWS[..1] } else { &VIEWS };
+        for (key, name) in views {
             console.press(&[key]);
             let screen = without_time_of_day(&draw(&console, columns, rows));
             insta::assert_snapshot!(format!("{name}-{columns}x{rows}{kind}"), screen);
@@ -66,12 +68,12 @@ fn compare(colours: Colours, glyphs: Glyphs, kind: &str, draw: impl Fn(&Console,
 
 #[test]
 fn views_of_a_recorded_session() {
-    compare(Colours::Named, Glyphs::Braille, "", Console::screen);
+    compare(Theme::new(Colours::Named, Glyphs::Braille), "", Console::screen);
 }
 
 #[test]
 fn the_tables_of_a_recorded_study_open_scroll_and_close() {
-    let mut console = console(Colours::Named, Glyphs::Braille);
+    let mut console = console(Theme::new(Colours::Named, Glyphs::Braille));
     console.press(&["R"]);
     let first = console.screen(80, 24);
     assert!(first.contains("Study (1-") && first.contains("J_forward = x_final - x_init"), "{first}");
@@ -86,7 +88,7 @@ fn the_tables_of_a_recorded_study_open_scroll_and_close() {
 
 #[test]
 fn views_of_a_recorded_session_in_ascii() {
-    compare(Colours::None, Glyphs::Ascii, "-ascii", |console, columns, rows| {
+    compare(Theme::new(Colours::None, Glyphs::Ascii), "-ascii", |console, columns, rows| {
         let screen = console.screen(columns, rows);
         assert!(screen.is_ascii(), "{columns}x{rows}:\n{screen}");
         screen
@@ -95,7 +97,9 @@ fn views_of_a_recorded_session_in_ascii() {
 
 #[test]
 fn views_of_a_recorded_session_in_colour() {
-    compare(Colours::True, Glyphs::Braille, "-colour", Console::colours);
+    let dark = Theme::new(Colours::True, Glyphs::Braille);
+    compare(dark, "-colour", Console::colours);
+    compare(Theme { background: Background::Light, ..dark }, "-light", Console::colours);
 }
 
 #[test]

@@ -3,10 +3,13 @@
 #[path = "support/mod.rs"]
 mod support;
 
+use quadfrog::config::Config;
 use quadfrog::recording::record::Record;
 use quadfrog::robot::description::RobotDescription;
+use quadfrog::sim::TerrainKind;
 use quadfrog::telemetry::{Mode, Phase, Tick};
-use quadfrog::trial::{ExperimentStage, Verdict};
+use quadfrog::trial::{Backend, ExperimentStage, TrialRecord, Verdict};
+use quadfrog_console::model::{Model, RobotFacts};
 use quadfrog_console::settings::ConsoleSettings;
 use quadfrog_console::theme::{Colours, Glyphs, Theme};
 use ratatui::buffer::{Buffer, Cell};
@@ -126,4 +129,78 @@ fn the_path_and_both_landing_spots_are_shown_after_the_landing() {
     let path = theme.style(quadfrog_console::theme::Role::SeriesB).fg.unwrap();
     let trunk = theme.style(quadfrog_console::theme::Role::SeriesA).fg.unwrap();
     assert!(first_row(&picture, |cell| cell.fg == path) < first_row(&picture, |cell| cell.fg == trunk));
+}
+
+/// A console on a ground, before the first trial.
+fn on_ground(change: impl Fn(&mut Config)) -> Console {
+    let mut config = Config::load(None).expect("the built-in configuration");
+    change(&mut config);
+    let robot = RobotDescription::embedded("go1").expect("the robot");
+    let facts = RobotFacts::new(robot, &config, Backend::Simulator, 0);
+    let theme = Theme::new(Colours::True, Glyphs::Braille);
+    let mut console = Console { model: Model::new(ConsoleSettings::built_in(), theme, facts) };
+    show(&mut console, standing(1, [0.0, 0.0, 0.3], None));
+    console
+}
+
+/// The picture moves with the robot along a slope, so that its feet stay on the ground that is drawn.
+#[test]
+fn the_ground_follows_a_slope() {
+    let angle_rad = 0.2_f64;
+    let mut console = on_ground(|config| {
+        config.simulator.terrain.kind = TerrainKind::Slope;
+        config.simulator.terrain.slope.angle_rad = angle_rad;
+        config.simulator.terrain.slope.heading_rad = 0.0;
+    });
+    let begin = symbols(&picture(&console));
+    assert_ne!(begin, symbols(&picture(&on_ground(|_| {}))), "the slope is drawn");
+    show(&mut console, standing(2, [3.0, 0.0, 0.3 + 3.0 * angle_rad.tan()], None));
+    assert_eq!(symbols(&picture(&console)), begin);
+}
+
+/// Steps and blocks of the trial's seed are drawn; another seed has other blocks.
+#[test]
+fn steps_and_blocks_are_drawn() {
+    let flat = symbols(&picture(&on_ground(|_| {})));
+    let steps = symbols(&picture(&on_ground(|config| config.simulator.terrain.kind = TerrainKind::Steps)));
+    assert_ne!(steps, flat);
+    let mut console = on_ground(|config| config.simulator.terrain.kind = TerrainKind::Blocks);
+    let before = symbols(&picture(&console));
+    assert!(before != flat && before != steps);
+    let row = TrialRecord { seed: Some(77), ..trial(0, None, None) };
+    console.record(Record::Trial(row));
+    console.stage(ExperimentStage::Running, 0);
+    assert_ne!(symbols(&picture(&console)), before, "the blocks of the trial's seed");
+}
+
+/// The path of each foot is drawn while the foot is in the air.
+#[test]
+fn the_feet_leave_a_path_in_the_air() {
+    let mut console = on_ground(|_| {});
+    console.stage(ExperimentStage::Running, 0);
+    let jump = |console: &mut Console, contact: bool| {
+        for step in 0..100_u64 {
+            let share = step as f64 / 99.0;
+            let height = 0.3 + 1.2 * share * (1.0 - share);
+            let phase = Phase::Flight;
+            let mut tick =
+                standing(1000 + 5 * step, [0.6 * share, 0.0, height], Some((u32::from(contact), share, phase)));
+            tick.estimate.contact = [contact; 4];
+            show(console, tick);
+        }
+        picture(console).iter().flatten().filter(|cell| cell.symbol() != " ").count()
+    };
+    let (in_air, on_ground) = (jump(&mut console, false), jump(&mut console, true));
+    assert!(in_air > on_ground + 10, "{in_air} cells with paths of feet, {on_ground} without");
+}
+
+/// The last set of the charts' key shows the picture over the whole width.
+#[test]
+fn the_picture_fills_the_view() {
+    let mut console = console(Glyphs::Braille);
+    let cells = |console: &Console| picture(console).iter().flatten().filter(|cell| cell.symbol() != " ").count();
+    let small = cells(&console);
+    console.press(&["t"; 5]);
+    let large = cells(&console);
+    assert!(large > 2 * small, "{large} cells, {small} before:\n{}", console.screen(120, 40));
 }

@@ -111,6 +111,9 @@ fn the_keys_of_the_series_change_what_is_drawn() {
     console.press(&["t"]);
     shows(&console, &["Joints", "limits are not known", "Robot"]);
     console.press(&["t"]);
+    shows(&console, &["Robot"]);
+    assert!(!console.screen(80, 24).contains("Joints"));
+    console.press(&["t"]);
     shows(&console, &["roll "]);
     // The dialog: roll off, height on; the charts behind it follow at once.
     console.press(&["T"]);

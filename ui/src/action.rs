@@ -201,7 +201,7 @@ pub static ACTIONS: [ActionInfo; 86] = {
         row(A::ZoomIn, "zoom-in", &["+"], G::Charts, "shorter time window"),
         row(A::ZoomOut, "zoom-out", &["-"], G::Charts, "longer time window"),
         row(A::ChartMode, "chart-mode", &["w"], G::Charts, "sweep or scroll"),
-        row(A::Series, "series", &["t"], G::Charts, "next set: attitude, forces, motion, torques, joints; Health: history"),
+        row(A::Series, "series", &["t"], G::Charts, "next set: attitude, forces, motion, torques, joints, robot; Health: history"),
         row(A::ChooseSeries, "choose-series", &["T"], G::Charts, "choose the series of the charts"),
         row(A::Ghost, "ghost", &["c"], G::Charts, "best (Trials: selected) trial under the charts; a second one: compare both"),
 

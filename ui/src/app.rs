@@ -11,7 +11,6 @@ use crossterm::clipboard::CopyToClipboard;
 use nix::sys::signal::{Signal, raise};
 use quadfrog::engine::EngineHandle;
 use quadfrog::recording::record::LogLevel;
-use quadfrog::robot::description::RobotDescription;
 use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
 use tokio::time::{MissedTickBehavior, interval};
@@ -22,7 +21,7 @@ use crate::connection::{ConnectionMonitor, TerminalLocation};
 use crate::feed::Feed;
 use crate::input::{KeyReader, NumberedEvent, SpaceBarIsText, TerminalEvent, read_terminal};
 use crate::message::{Effect, ExportedRows, Msg};
-use crate::model::Model;
+use crate::model::{Model, RobotFacts};
 use crate::settings::{ChartMode, ConsoleSettings};
 use crate::terminal::{self, TerminalProtocol, TerminalScreen};
 use crate::theme::{ColourChoice, GlyphChoice, Theme, ThemeChoice};
@@ -42,10 +41,8 @@ const BACKGROUND_WAIT: Duration = Duration::from_millis(200);
 pub struct ConsoleOptions {
     /// `console.toml`.
     pub settings: ConsoleSettings,
-    /// The robot model, for limits; none if unknown.
-    pub robot: Option<RobotDescription>,
-    /// Largest roll and pitch before a trial is a fall, rad; none where the configuration of the trials is not known.
-    pub fall_tilt_rad: Option<[f64; 2]>,
+    /// The robot, its limits and its ground.
+    pub robot: RobotFacts,
 }
 
 impl ConsoleOptions {
@@ -74,21 +71,13 @@ impl ConsoleOptions {
         if ascii {
             settings.glyphs = GlyphChoice::Ascii;
         }
-        ConsoleOptions { settings, robot: None, fall_tilt_rad: None }
+        ConsoleOptions { settings, robot: RobotFacts::default() }
     }
 
-    /// Adds the largest roll and pitch before a trial is a fall, rad.
+    /// Adds the robot.
     #[must_use]
-    pub fn with_fall_tilt_rad(mut self, fall_tilt_rad: [f64; 2]) -> ConsoleOptions {
-        self.fall_tilt_rad = Some(fall_tilt_rad);
-        self
-    }
-
-    /// Adds the robot model.
-    #[must_use]
-    pub fn with_robot(mut self, robot: RobotDescription) -> ConsoleOptions {
-        self.robot = Some(robot);
-        self
+    pub fn with_robot(self, robot: RobotFacts) -> ConsoleOptions {
+        ConsoleOptions { robot, ..self }
     }
 }
 
@@ -141,7 +130,6 @@ impl Console {
         let frame_period = Duration::from_secs(1) / settings.frames_per_second.max(1);
         let low_bandwidth = settings.low_bandwidth;
         let mut model = Model::new(settings, theme, options.robot);
-        model.fall_tilt_rad = options.fall_tilt_rad;
         let (columns, rows) = crossterm::terminal::size().context("the terminal's size")?;
         update(&mut model, Msg::Resize(columns, rows));
         // The kernel's console has no such report.

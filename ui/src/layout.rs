@@ -1,11 +1,13 @@
 //! The places of the screen's parts, for drawing and for the mouse.
 
 use ratatui::layout::{Constraint, Layout, Rect, Size};
+use ratatui::text::Line;
 use strum::VariantArray;
 
 use crate::action::Action;
 use crate::keymap::Keymap;
-use crate::model::View;
+use crate::model::{Model, View};
+use crate::wrap::wrap;
 
 /// The smallest terminal with views.
 pub const MIN_COLUMNS: u16 = 80;
@@ -62,17 +64,27 @@ pub struct Areas {
     pub next_step: Rect,
 }
 
+/// Most rows of the newest answer to the operator.
+const MESSAGE_ROWS: usize = 3;
+
+/// The newest answer to the operator in rows of a terminal, each with a space before it.
+pub fn message_rows(model: &Model, columns: u16) -> Vec<Line<'static>> {
+    let text = model.message.as_ref().map(|message| Line::from(format!(" {}", message.text)));
+    text.map_or_else(Vec::new, |text| wrap(&text, usize::from(columns).saturating_sub(1), 1))
+}
+
 /// The parts of a screen of that size; none if it is too small.
-pub fn areas(size: Size, replay: bool) -> Option<Areas> {
+pub fn areas(size: Size, model: &Model) -> Option<Areas> {
     if size.width < MIN_COLUMNS || size.height < MIN_ROWS {
         return None;
     }
+    let message_rows = message_rows(model, size.width).len().clamp(1, MESSAGE_ROWS);
     let [frame, tabs, body, timeline, message, next_step] = Layout::vertical([
         Constraint::Length(2),
         Constraint::Length(1),
         Constraint::Fill(1),
-        Constraint::Length(u16::from(replay)),
-        Constraint::Length(1),
+        Constraint::Length(u16::from(model.replay.is_some())),
+        Constraint::Length(message_rows as u16),
         Constraint::Length(1),
     ])
     .areas(Rect::from(((0, 0).into(), size)));

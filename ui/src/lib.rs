@@ -31,3 +31,4 @@ pub mod text;
 pub mod theme;
 pub mod update;
 pub mod view;
+mod wrap;

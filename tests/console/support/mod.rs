@@ -17,7 +17,7 @@ use quadfrog::trial::{
 };
 use quadfrog_console::keymap::Key;
 use quadfrog_console::message::{Effect, Msg};
-use quadfrog_console::model::Model;
+use quadfrog_console::model::{Model, RobotFacts};
 use quadfrog_console::settings::ConsoleSettings;
 use quadfrog_console::theme::{Colours, Glyphs, Theme};
 use quadfrog_console::update::update;
@@ -42,7 +42,7 @@ impl Console {
     }
 
     pub fn with(settings: ConsoleSettings, theme: Theme) -> Console {
-        let mut model = Model::new(settings, theme, None);
+        let mut model = Model::new(settings, theme, RobotFacts::default());
         model.size = (80, 24);
         Console { model }
     }

@@ -9,10 +9,16 @@ use quadfrog::telemetry::{Phase, Tick};
 
 /// Samples that are kept: a minute at 200 a second.
 const CAPACITY: usize = 12_000;
-/// Traces of trials that are kept; the oldest go first, except that of the best trial.
-const TRACES: usize = 64;
 /// Samples of one trace: ten seconds at 200 a second.
 const TRACE_CAPACITY: usize = 2_000;
+/// Samples of all traces, 4.5 MB; where there are more, the trace farthest from the running trial goes first, except that of the
+/// best trial.
+const TRACES_CAPACITY: usize = 10_000;
+/// Time between two samples of a thinned trace in its jump, and before and after it, ns.
+const THINNED_JUMP_NS: u64 = 10_000_000;
+pub const THINNED_NS: u64 = 50_000_000;
+/// Time before the impulse at which the jump begins, s.
+pub const BEFORE_IMPULSE_S: f32 = 0.3;
 
 /// The part of one tick that the charts draw; single precision is finer than any screen.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -137,6 +143,25 @@ pub struct SignalHistory {
     traces: BTreeMap<u32, Arc<Vec<ChartSample>>>,
     /// The trial whose trace is kept however old it is.
     kept: Option<u32>,
+    /// The trial of the newest sample that has one.
+    running: Option<u32>,
+}
+
+/// A trace with fewer samples, its ends among them; none where it has no more than that.
+fn thinned(trace: &[ChartSample]) -> Option<Vec<ChartSample>> {
+    let mut kept_ns = None;
+    let (last, others) = trace.split_last()?;
+    let kept = others.iter().filter(|sample| {
+        let jumps = sample.phase != Phase::Stance || (-BEFORE_IMPULSE_S..=0.0).contains(&sample.trial_time_s);
+        let step_ns = if jumps { THINNED_JUMP_NS } else { THINNED_NS };
+        let keep = kept_ns.is_none_or(|kept_ns| sample.time_ns >= kept_ns + step_ns);
+        if keep {
+            kept_ns = Some(sample.time_ns);
+        }
+        keep
+    });
+    let thin: Vec<_> = kept.chain([last]).copied().collect();
+    (thin.len() < trace.len()).then_some(thin)
 }
 
 impl SignalHistory {
@@ -151,6 +176,9 @@ impl SignalHistory {
         }
         self.samples.push_back(sample);
         if let Some(trial) = sample.trial {
+            if self.running != Some(trial) {
+                self.begin(trial);
+            }
             let trace = Arc::make_mut(self.traces.entry(trial).or_default());
             // A trial that starts again (a cancelled countdown, a replay) replaces its trace.
             if trace
@@ -162,10 +190,22 @@ impl SignalHistory {
             if trace.len() < TRACE_CAPACITY {
                 trace.push(sample);
             }
-            if self.traces.len() > TRACES {
-                let oldest = self.traces.keys().copied().find(|trial| self.kept != Some(*trial));
-                oldest.map(|trial| self.traces.remove(&trial));
+        }
+    }
+
+    /// Makes room for the trace of a trial: those of the others are thinned, and the farthest ones removed.
+    fn begin(&mut self, trial: u32) {
+        self.running = Some(trial);
+        for (_, trace) in self.traces.iter_mut().filter(|(other, _)| **other != trial) {
+            if let Some(thin) = thinned(trace) {
+                *trace = Arc::new(thin);
             }
+        }
+        let mut samples: usize = self.traces.values().map(|trace| trace.len()).sum();
+        while samples + TRACE_CAPACITY > TRACES_CAPACITY {
+            let removable = self.traces.keys().copied().filter(|other| *other != trial && self.kept != Some(*other));
+            let Some(farthest) = removable.max_by_key(|other| other.abs_diff(trial)) else { break };
+            samples -= self.traces.remove(&farthest).map_or(0, |trace| trace.len());
         }
     }
 

@@ -1,10 +1,7 @@
 //! The trial that has just landed, fitted to the charts until it has its verdict.
 
 use super::comparison::{impulse_start_ns, time_after};
-use super::history::{ChartSample, SignalHistory};
-
-/// Time before the impulse that is shown, s.
-const BEFORE_S: f32 = 0.3;
+use super::history::{BEFORE_IMPULSE_S, ChartSample, SignalHistory};
 
 /// The samples of a landed trial, from shortly before its impulse to rest.
 #[derive(Debug, Clone, Copy)]
@@ -50,5 +47,5 @@ impl<'a> LandedTrial<'a> {
 
 /// The part of a trace from shortly before the impulse on.
 fn fitted(trace: &[ChartSample]) -> &[ChartSample] {
-    &trace[trace.partition_point(|sample| sample.trial_time_s < -BEFORE_S)..]
+    &trace[trace.partition_point(|sample| sample.trial_time_s < -BEFORE_IMPULSE_S)..]
 }

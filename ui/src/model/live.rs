@@ -38,4 +38,6 @@ pub enum Panel {
     Charts,
     /// Torque and speed of the joints, and the robot as a wireframe.
     Joints,
+    /// The robot, as large as there is room.
+    Robot,
 }

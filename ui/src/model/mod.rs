@@ -14,14 +14,16 @@ pub(crate) mod trials;
 
 use std::time::Duration;
 
-use quadfrog::engine::ObserverStatus;
+use quadfrog::config::Config;
+use quadfrog::engine::{ObserverStatus, TrialGround};
 use quadfrog::recording::live::LiveStatus;
 use quadfrog::recording::record::LogLevel;
 use quadfrog::recording::recorder::RecorderStatus;
+use quadfrog::recording::scene::Ground;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::session::storage::StorageWait;
 use quadfrog::telemetry::{Mode, Snapshot};
-use quadfrog::trial::{ParameterInfo, TrialRecord};
+use quadfrog::trial::{Backend, ParameterInfo, TrialRecord};
 use strum::{IntoStaticStr, VariantArray};
 
 use crate::column::Column;
@@ -73,6 +75,29 @@ pub struct Notice {
     pub stop: bool,
 }
 
+/// The robot, its limits and its ground, as far as they are known: by default nothing is.
+#[derive(Debug, Clone, Default)]
+pub struct RobotFacts {
+    /// The robot's limits and geometry.
+    pub description: Option<RobotDescription>,
+    /// Largest roll and pitch before a trial is a fall, rad.
+    pub fall_tilt_rad: Option<[f64; 2]>,
+    /// The ground of the trials.
+    pub ground: Option<TrialGround>,
+}
+
+impl RobotFacts {
+    /// The facts of a session with a configuration and the seed of its study.
+    pub fn new(description: RobotDescription, config: &Config, backend: Backend, seed: u64) -> RobotFacts {
+        let fall = &config.safety.fall;
+        RobotFacts {
+            description: Some(description),
+            fall_tilt_rad: Some([fall.roll_rad, fall.pitch_rad]),
+            ground: Some(TrialGround::new(config, backend, seed)),
+        }
+    }
+}
+
 /// The content of the screen.
 #[derive(Debug, Clone)]
 #[expect(missing_docs, reason = "the names say the rest")]
@@ -88,6 +113,10 @@ pub struct Model {
     pub robot: Option<RobotDescription>,
     /// Largest roll and pitch before a trial is a fall, rad; none where they are not known.
     pub fall_tilt_rad: Option<[f64; 2]>,
+    /// The ground of every trial; none where it is not known.
+    pub trial_ground: Option<TrialGround>,
+    /// The ground of the running trial, or of the last one.
+    pub ground: Option<Ground>,
     /// Time since the console started.
     pub clock: Duration,
     pub session: SessionModel,
@@ -137,7 +166,7 @@ pub struct Model {
 
 impl Model {
     /// An empty screen.
-    pub fn new(settings: ConsoleSettings, mut theme: Theme, robot: Option<RobotDescription>) -> Model {
+    pub fn new(settings: ConsoleSettings, mut theme: Theme, facts: RobotFacts) -> Model {
         match settings.theme {
             ThemeChoice::Auto => {}
             ThemeChoice::Dark => theme.background = Background::Dark,
@@ -149,8 +178,10 @@ impl Model {
             keymap: settings.keymap,
             bell: settings.bell,
             space_always_stops: settings.space_always_stops,
-            robot,
-            fall_tilt_rad: None,
+            robot: facts.description,
+            fall_tilt_rad: facts.fall_tilt_rad,
+            trial_ground: facts.ground,
+            ground: facts.ground.and_then(|ground| ground.of(None)),
             clock: Duration::ZERO,
             session: SessionModel::default(),
             snapshot: Snapshot::default(),

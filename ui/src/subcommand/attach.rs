@@ -8,7 +8,7 @@ use clap_complete::ArgValueCandidates;
 use quadfrog::engine::{FoundSessions, Observer, RunningSession, SessionFacts, find_sessions};
 use quadfrog::recording::session_files::recordings_of;
 use quadfrog::recording::timeline::Timeline;
-use quadfrog_console::app::{self, ConsoleOptions};
+use quadfrog_console::app;
 use quadfrog_console::feed::Feed;
 use quadfrog_console::{notice, put_line, terminal};
 
@@ -39,9 +39,9 @@ pub fn run(arguments: &AttachArguments) -> Result<(), Failure> {
     let console = options(&arguments.screen, &config)?;
     let session = choose(arguments.session.as_deref(), sessions()?)?;
     let files = recordings_of(&session.facts.folder)?;
-    let recording = Timeline::open(&files)?;
+    let mut recording = Timeline::open(&files)?;
     terminal::check().map_err(Failure::input)?;
-    let console = ConsoleOptions { robot: recorded_robot(&recording), ..console };
+    let console = console.with_robot(recorded_robot(&mut recording));
     let name = arguments::operator_or_user(arguments.operator.as_ref());
     let observer = Observer::join(session, &name).context("the session ended")?;
     app::run(Feed::attached(recording, observer), console)?;

@@ -16,6 +16,7 @@ use quadfrog::trial::{Approval, Backend, Task};
 use quadfrog_console::app::{self, ConsoleExit, ConsoleOptions};
 use quadfrog_console::connection::TerminalLocation;
 use quadfrog_console::feed::Feed;
+use quadfrog_console::model::RobotFacts;
 use quadfrog_console::put_line;
 use quadfrog_console::settings::ConsoleSettings;
 use quadfrog_console::terminal;
@@ -132,9 +133,7 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
     if let (Some(text), Some(network)) = (&arguments.address, &mut network) {
         network.address = address(text)?;
     }
-    let console = options(&arguments.screen, &config)?
-        .with_robot(robot.clone())
-        .with_fall_tilt_rad([config.safety.fall.roll_rad, config.safety.fall.pitch_rad]);
+    let console = options(&arguments.screen, &config)?;
     let selected = match &arguments.resume {
         Some(folder) => study_to_continue(folder, arguments.task, arguments.seed, &robot)?,
         None => {
@@ -143,6 +142,7 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
             SelectedStudy { task, seed, folder: arguments.study.new_folder(task, seed), new: true, budget: None }
         }
     };
+    let console = console.with_robot(RobotFacts::new(robot.clone(), &config, backend, selected.seed.into()));
     let incomplete = incomplete_recordings(&selected.folder);
     let mut options = Options {
         seed: selected.seed,

@@ -7,14 +7,15 @@ use std::sync::PoisonError;
 use anyhow::anyhow;
 use clap::Args;
 use quadfrog::config::Config;
-use quadfrog::engine::Rejudging;
+use quadfrog::engine::{Rejudging, attached_configuration};
 use quadfrog::recording::RecordingError;
 use quadfrog::recording::player::{Played, Player};
 use quadfrog::recording::session_files::recordings_of;
 use quadfrog::recording::timeline::Timeline;
 use quadfrog::robot::description::RobotDescription;
-use quadfrog_console::app::{self, ConsoleExit, ConsoleOptions};
+use quadfrog_console::app::{self, ConsoleExit};
 use quadfrog_console::feed::Feed;
+use quadfrog_console::model::RobotFacts;
 use quadfrog_console::{put_line, terminal};
 
 use super::arguments;
@@ -65,7 +66,7 @@ pub fn run(arguments: &ReplayArguments) -> Result<(), Failure> {
     if arguments.check {
         return check(&files);
     }
-    let recording = Timeline::open(&files)?;
+    let mut recording = Timeline::open(&files)?;
     if let Some(folder) = &arguments.rejudge {
         // What cannot be judged is refused before the screen opens.
         Rejudging::open(&files, &Config::load(Some(folder))?).map_err(Failure::input)?;
@@ -86,7 +87,7 @@ pub fn run(arguments: &ReplayArguments) -> Result<(), Failure> {
         damage if damage.is_empty() => Failure::input(error),
         damage => Failure::Input(format!("{}\n{error}", message(repair(damage)))),
     })?;
-    let console = ConsoleOptions { robot: recorded_robot(&recording), ..console };
+    let console = console.with_robot(recorded_robot(&mut recording));
     let mut feed = Feed::beside(recording, second, arguments.follow);
     if let Some(folder) = &arguments.rejudge {
         feed.rejudge(Some(folder.clone()));
@@ -97,9 +98,15 @@ pub fn run(arguments: &ReplayArguments) -> Result<(), Failure> {
     if ended == ConsoleExit::HungUp || damage.is_empty() { Ok(()) } else { Err(repair(damage)) }
 }
 
-/// Returns the robot of a recording; none for a model of the operator's own: the panels that need its limits say so.
-pub fn recorded_robot(recording: &Timeline) -> Option<RobotDescription> {
-    RobotDescription::embedded(&recording.session().robot).ok()
+/// Returns what a recording tells of its robot. Of an older one, without its files: the built-in robot of that name, or nothing;
+/// the panels that need the robot's limits say so.
+pub fn recorded_robot(recording: &mut Timeline) -> RobotFacts {
+    let attached = attached_configuration(recording.first_player());
+    let session = recording.session();
+    match (attached, session.backend) {
+        (Ok((config, robot)), Some(backend)) => RobotFacts::new(robot, &config, backend, session.seed),
+        _ => RobotFacts { description: RobotDescription::embedded(&session.robot).ok(), ..RobotFacts::default() },
+    }
 }
 
 fn message(failure: Failure) -> String {

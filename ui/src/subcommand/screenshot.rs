@@ -88,14 +88,15 @@ fn parse_size(text: &str) -> Result<(u16, u16), String> {
 /// Plays the recording up to the moment without a terminal, presses the keys and draws the screen.
 pub fn run(arguments: &ScreenshotArguments) -> Result<(), Failure> {
     let config = arguments::load_config(arguments.config.as_deref())?;
-    let recording = Timeline::open(&recordings_of(&arguments.file)?)?;
+    let mut recording = Timeline::open(&recordings_of(&arguments.file)?)?;
     let time_ns = match (arguments.trial, arguments.time) {
         (Some(trial), _) => end_of(trial, &recording)
             .map_err(|reason| Failure::input(format!("{}: {reason}", arguments.file.display())))?,
         (None, time) => time.unwrap_or(u64::MAX).min(recording.duration_ns()),
     };
     let settings = ConsoleSettings { theme: arguments.theme, ..settings(&config)? };
-    let mut model = Model::new(settings, Theme::new(Colours::True, Glyphs::Braille), recorded_robot(&recording));
+    let theme = Theme::new(Colours::True, Glyphs::Braille);
+    let mut model = Model::new(settings, theme, recorded_robot(&mut recording));
     let mut feed = Feed::replay(recording);
     let (columns, rows) = arguments.size;
     update(&mut model, Msg::Resize(columns, rows));

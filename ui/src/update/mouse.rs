@@ -19,7 +19,7 @@ pub(super) fn handle(model: &mut Model, event: Mouse) -> Vec<Effect> {
         Mouse::WheelUp => move_by(model, -NOTCH),
         Mouse::WheelDown => move_by(model, NOTCH),
         Mouse::Click { column, row } => {
-            let Some(areas) = areas(Size::from(model.size), model.replay.is_some()) else { return Vec::new() };
+            let Some(areas) = areas(Size::from(model.size), model) else { return Vec::new() };
             if row == areas.tabs.y {
                 return tab_at(&model.keymap, column).map_or_else(Vec::new, |action| perform(model, action));
             }

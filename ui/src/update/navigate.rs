@@ -169,6 +169,10 @@ pub(super) fn next_series(model: &mut Model) {
     let shown = SETS.iter().position(|set| live.series == *set);
     let next = match (live.panel, shown) {
         (Panel::Charts, Some(set)) => SETS.get(set + 1),
+        (Panel::Joints, _) => {
+            live.panel = Panel::Robot;
+            return;
+        }
         _ => SETS.first(),
     };
     match next {

@@ -93,7 +93,7 @@ pub(super) fn apply(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
                         show_landed(model);
                         say_suggestion(model, info.trial);
                     }
-                    ExperimentStage::Running => {}
+                    ExperimentStage::Running => lay_ground(model, info.trial),
                     ExperimentStage::Finished => {
                         let best = model.session.trials.best_value();
                         let best = best.map_or("no trial was accepted".to_owned(), |(trial, value)| {
@@ -121,6 +121,9 @@ pub(super) fn apply(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
             let number = trial.trial;
             model.session.trials.records.insert(number, trial);
             model.history.keep(model.session.trials.best().map(|best| best.trial));
+            if model.session.stage.is_some_and(|now| (now.stage, now.trial) == (ExperimentStage::Running, number)) {
+                lay_ground(model, number);
+            }
             if model.session.under_review().is_some_and(|trial| trial.trial == number && trial.hand_value.is_none()) {
                 say_suggestion(model, number);
             }
@@ -151,6 +154,12 @@ pub(super) fn apply(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
     close_stale_dialog(model);
     let rings = bells.iter().any(|cause| model.bell.contains(cause)) && model.replay.is_none();
     if rings { vec![Effect::Bell] } else { Vec::new() }
+}
+
+/// Lays the ground of a trial that runs.
+fn lay_ground(model: &mut Model, trial: u32) {
+    let row = model.session.trials.records.get(&trial);
+    model.ground = model.trial_ground.zip(row).and_then(|(ground, row)| ground.of(Some(row)));
 }
 
 /// Puts the charts of a live session on the trial that waits for its verdict.

@@ -8,9 +8,9 @@ use quadfrog::telemetry::ArmingCheckState;
 use ratatui::text::{Line, Span};
 
 use super::draw::{span, truncate, wall_clock};
-use super::wrap::wrap;
 use crate::model::Model;
 use crate::theme::Role;
+use crate::wrap::wrap;
 
 /// Columns of the longest name.
 const NAME_WIDTH: usize = 27;

@@ -8,7 +8,7 @@ use super::dots::DotGrid;
 use super::draw::truncate;
 use super::series_style::SeriesStyle;
 use crate::model::comparison::time_after;
-use crate::model::history::{ChartSample, SignalHistory, at_trial_time};
+use crate::model::history::{ChartSample, SignalHistory, THINNED_NS, at_trial_time};
 use crate::settings::ChartMode;
 use crate::theme::{Glyphs, Role, Theme};
 
@@ -234,19 +234,28 @@ impl Chart<'_> {
         if across == 0 || down == 0 {
             return;
         }
-        let mut before: Option<(usize, i64)> = None;
+        let mut before: Option<(u64, usize, i64)> = None;
         for (time_ns, value) in points {
             let at = self.axis.column(time_ns, across).filter(|_| value.is_finite());
             before = at.map(|x| {
                 let y = ((high - value) / (high - low) * down as f32) as i64;
                 let y = y.clamp(0, down as i64 - 1);
-                // Joined to the sample before, unless that one is at the other end of the chart.
-                let from = before.filter(|(x0, _)| x.wrapping_sub(*x0) <= 1).map_or(y, |(_, y0)| y0);
-                let drawn = !dotted || x % 4 < 2;
-                for y in (from.min(y)..=from.max(y)).filter(|_| drawn) {
-                    dots.set(x as i64, y);
+                // Joined to the sample before in this or the next column, or in a thinned trace; not to one at the other end of
+                // the chart, nor over a gap in which nothing was received.
+                let joined = |(t0, x0, _): &(u64, usize, i64)| {
+                    x.wrapping_sub(*x0) <= 1 || x > *x0 && time_ns.saturating_sub(*t0) <= THINNED_NS
+                };
+                let (x0, y0) = before.filter(joined).map_or((x, y), |(_, x0, y0)| (x0, y0));
+                for column in (x0 + 1).min(x)..=x {
+                    // The part of the line in this column.
+                    let at = |column: usize| y0 + (y - y0) * (column - x0) as i64 / (x - x0).max(1) as i64;
+                    let (from, to) = if x > x0 { (at(column - 1), at(column)) } else { (y0, y) };
+                    let drawn = !dotted || column % 4 < 2;
+                    for y in (from.min(to)..=from.max(to)).filter(|_| drawn) {
+                        dots.set(column as i64, y);
+                    }
                 }
-                (x, y)
+                (time_ns, x, y)
             });
         }
     }

@@ -21,11 +21,9 @@ pub fn render(frame: &mut Frame, areas: CompactAreas, model: &Model) {
     frame.render_widget(Line::from(span(&model.theme, Role::Quiet, text)), hint);
     dialogs::render(frame, trial, model);
     countdown::render(frame, trial, model);
-    let wrapped = |line: Line<'static>| Paragraph::new(line).wrap(Wrap { trim: true });
-    if let Some(line) = status_bar::message_line(model) {
-        frame.render_widget(wrapped(line), message);
-    }
+    status_bar::render_message(frame, message, model);
     // Two rows, less what is lost where the first one is broken between words.
     let width = 2 * usize::from(next_step.width) - LONGEST_KEY;
-    frame.render_widget(wrapped(next_step::line_within(model, width)), next_step);
+    let line = next_step::line_within(model, width);
+    frame.render_widget(Paragraph::new(line).wrap(Wrap { trim: true }), next_step);
 }

@@ -20,12 +20,12 @@ use tui_input::Input;
 
 use super::details::{details, rejudged};
 use super::draw::{number, scale, span, truncate};
-use super::wrap::{wrap, wrap_all};
 use super::{arming, help, log, questions, queue};
 use crate::legal::palette;
 use crate::model::Model;
 use crate::model::dialog::{APPROVAL_PAUSE, Choice, Dialog, OverrideForm, Purpose};
 use crate::theme::{Glyphs, Role, Theme};
+use crate::wrap::{wrap, wrap_all};
 
 /// Most columns of a dialog: longer lines are hard to read.
 const MAX_WIDTH: u16 = 120;

@@ -31,7 +31,7 @@ const TWO_JOINTS_FROM: u16 = 72;
 
 pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let joints_only = model.live.panel == Panel::Joints;
-    if area.width < WIDE && !joints_only && model.landed().is_some() {
+    if area.width < WIDE && model.live.panel == Panel::Charts && model.landed().is_some() {
         return render_landed(frame, area, model);
     }
     let table_rows = (area.height / 4).clamp(5, 14);
@@ -47,16 +47,19 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     };
     let room = side.height - card_rows;
     // Without room for both, the panel of the joints shows the robot and the others the objective.
-    let picture_rows = match joints_only {
+    let picture_rows = match model.live.panel {
+        Panel::Robot => 0,
         _ if room >= 18 => (room / 2).clamp(12, 20),
-        true => room,
-        false => 0,
+        Panel::Joints => room,
+        Panel::Charts => 0,
     };
     let [card, objective_area, picture] =
         Layout::vertical([Constraint::Length(card_rows), Constraint::Fill(1), Constraint::Length(picture_rows)])
             .areas(side);
     if joints_only {
         render_joints(frame, charts, model);
+    } else if model.live.panel == Panel::Robot {
+        wireframe::render(frame, charts, model);
     } else if area.width >= WIDE && charts.height >= 24 {
         let joint_rows = JOINTS as u16 / if charts.width >= TWO_JOINTS_FROM { 2 } else { 1 } + 1;
         let [charts, joints] = Layout::vertical([Constraint::Fill(1), Constraint::Length(joint_rows)]).areas(charts);

@@ -6,11 +6,11 @@ use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 
 use super::draw::{heading, span, truncate, wall_clock};
-use super::wrap::wrap_all;
 use crate::action::Action;
 use crate::model::Model;
 use crate::model::log::LogLine;
 use crate::theme::Role;
+use crate::wrap::wrap_all;
 
 pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let lines: Vec<&LogLine> = model.log_view.lines(&model.session.log).collect();

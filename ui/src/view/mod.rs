@@ -8,7 +8,7 @@
 //! │ the open view, with dialogs over it                                                  │
 //! └─────────────────────────────────────────────────────────────────────────────────────┘
 //!  ──o──x──o───│────o──!──────                       <- in a replay: its trials, faults and the playhead
-//!  override Fx = 120 N: done                                                  <- the newest answer
+//!  override Fx = 120 N: done                                                  <- the newest answer, up to three rows
 //!  Press g twice to jump  ·  o override  ·  n skip  ·  D sit down             <- the next possible step
 //! ```
 
@@ -36,12 +36,13 @@ mod points;
 mod proposal;
 mod questions;
 mod queue;
+mod robot_shape;
+mod scene;
 mod series_style;
 mod status_bar;
 mod timeline;
 mod trials;
 mod wireframe;
-mod wrap;
 
 use ratatui::Frame;
 
@@ -51,8 +52,7 @@ use crate::model::{Model, View};
 /// Draws everything.
 pub fn render(frame: &mut Frame, model: &Model) {
     let size = frame.area().as_size();
-    let Some(Areas { frame: top, tabs, body, timeline, message, next_step }) = areas(size, model.replay.is_some())
-    else {
+    let Some(Areas { frame: top, tabs, body, timeline, message, next_step }) = areas(size, model) else {
         return match compact_areas(size) {
             Some(areas) => compact::render(frame, areas, model),
             None => status_bar::render_small(frame, frame.area(), model),

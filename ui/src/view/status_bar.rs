@@ -11,8 +11,8 @@ use ratatui::widgets::Paragraph;
 
 use super::draw::{clock, clock_ms, number, span, truncate};
 use crate::action::Action;
-use crate::layout::{COMPACT_COLUMNS, COMPACT_ROWS, tabs};
-use crate::model::{Model, Notice, View};
+use crate::layout::{COMPACT_COLUMNS, COMPACT_ROWS, message_rows, tabs};
+use crate::model::{Model, View};
 use crate::theme::Role;
 
 /// Age of the newest tick from which the numbers count as old, ms.
@@ -240,25 +240,21 @@ pub fn render_tabs(frame: &mut Frame, area: Rect, model: &Model) {
     frame.render_widget(Line::from(aside).alignment(Alignment::Right), area);
 }
 
-/// Draws the newest answer to the operator in one line, cut at the end.
+/// Draws the newest answer to the operator; one with more rows than the area ends with the mark of a cut.
 pub fn render_message(frame: &mut Frame, area: Rect, model: &Model) {
     let Some(message) = &model.message else { return };
-    let text = truncate(&message.text, usize::from(area.width).saturating_sub(1));
-    frame.render_widget(Line::from(vec![Span::raw(" "), span(&model.theme, message_role(message), text)]), area);
-}
-
-/// Returns the newest answer to the operator, whole.
-pub fn message_line(model: &Model) -> Option<Line<'static>> {
-    let message = model.message.as_ref()?;
-    Some(Line::from(span(&model.theme, message_role(message), message.text.clone())))
-}
-
-fn message_role(message: &Notice) -> Role {
-    match message.level {
+    let role = match message.level {
         LogLevel::Info => Role::Text,
         LogLevel::Warning => Role::Warning,
         LogLevel::Error => Role::Bad,
+    };
+    let mut rows = message_rows(model, area.width);
+    let shown = usize::from(area.height);
+    if rows.len() > shown && shown > 0 {
+        let cut = format!("{}..", rows[shown - 1]);
+        rows[shown - 1] = Line::from(truncate(&cut, usize::from(area.width)));
     }
+    frame.render_widget(Paragraph::new(rows).style(model.theme.style(role)), area);
 }
 
 /// The reduced form on a terminal that is too small: mode, STOP, link, needed size.

@@ -1,20 +1,17 @@
 //! The robot in perspective, from behind on its right, on the ground where the trial began: near legs bright, far legs dim, the
-//! front crossed, the path of the trunk, and where this and the best trial landed.
+//! front crossed, the paths of the trunk and of feet in the air, and where this and the best trial landed.
 
-use nalgebra::{Point2, Rotation3, UnitQuaternion, Vector3};
-use quadfrog::robot::description::{CollisionShape, RobotDescription};
-use quadfrog::robot::kinematics::LegGeometry;
+use nalgebra::{Point2, UnitQuaternion, Vector3};
 use quadfrog::robot::{Leg, leg_of};
-use quadfrog::telemetry::Tick;
-use quadfrog::trial::Task;
 use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::style::Style;
 
 use super::dots::DotGrid;
 use super::draw::heading;
+use super::robot_shape::{leg_points, trunk_edges};
+use super::scene::{Scene, steady};
 use crate::model::Model;
-use crate::model::history::ChartSample;
 use crate::theme::{Role, Theme};
 
 /// Half of the picture's width without a jump, m: the robot with its legs stretched.
@@ -29,91 +26,10 @@ const AZIMUTH: f64 = 0.45;
 const ELEVATION: f64 = 0.35;
 /// Distance of the camera, in halves of the picture's width.
 const DISTANCE: f64 = 4.0;
-/// Distance between the lines on the ground, m.
-const GRID: f64 = 0.5;
-/// A robot farther from the begin of its trial has been carried, m.
-const CARRIED: f64 = 2.0;
-/// Samples between two dots of the path.
-const PATH_STEP: usize = 6;
-
 /// Steps in which the robot is drawn, m and rad: smaller than a dot, and larger than the noise of an estimator, which would change
 /// cells of a robot that stands.
 const SMALLEST_LENGTH: f64 = 0.005;
 const SMALLEST_ANGLE: f64 = 0.01;
-
-fn steady(value: f64, step: f64) -> f64 {
-    (value / step).round() * step
-}
-
-/// Place and heading of a robot on the ground at the begin of a trial: the frame of the picture, x forward, z up.
-struct Start {
-    x_world: f64,
-    y_world: f64,
-    yaw: f64,
-}
-
-impl Start {
-    fn of(sample: &ChartSample) -> Start {
-        let [x_world, y_world] = sample.position_world.map(f64::from);
-        Start { x_world, y_world, yaw: f64::from(sample.yaw) }
-    }
-
-    /// The present place, rounded: a robot that stands does not move in the picture.
-    fn present(tick: &Tick) -> Start {
-        let position = tick.estimate.position_world;
-        let [x_world, y_world] = [position.x, position.y].map(|value| steady(value, 0.1));
-        Start { x_world, y_world, yaw: steady(tick.estimate.roll_pitch_yaw.z, 0.1) }
-    }
-
-    /// A place of the world in the picture's frame, m.
-    fn place(&self, x_world: f64, y_world: f64, z_world: f64) -> Vector3<f64> {
-        let from_start = Vector3::new(x_world - self.x_world, y_world - self.y_world, z_world);
-        Rotation3::from_axis_angle(&Vector3::z_axis(), -self.yaw) * from_start
-    }
-
-    fn place_of(&self, sample: &ChartSample) -> Vector3<f64> {
-        let [x, y] = sample.position_world;
-        self.place(x.into(), y.into(), sample.height.into())
-    }
-}
-
-/// What the picture shows beside the robot, in its frame.
-struct Scene {
-    start: Start,
-    /// The trunk since the impulse began; empty without a trial.
-    path: Vec<Vector3<f64>>,
-    /// Displacement of the best trial.
-    best: Option<Vector3<f64>>,
-    /// Highest trunk of the best trial over the ground, m; 0 without one.
-    apex: f64,
-}
-
-impl Scene {
-    fn of(model: &Model) -> Scene {
-        let tick = &model.snapshot.tick;
-        let trial = tick.trial.or_else(|| model.session.under_review().map(|trial| trial.trial));
-        let trace = trial.and_then(|trial| model.history.trace(trial)).and_then(from_impulse);
-        let best = model.session.trials.best().and_then(|best| model.history.trace(best.trial)).and_then(from_impulse);
-        let apex = best.into_iter().flatten().map(|sample| f64::from(sample.height)).fold(0.0, f64::max);
-        let best = best.and_then(|trace| Some(Start::of(trace.first()?).place_of(trace.last()?)));
-        let present = Start::present(tick);
-        let start = trace.and_then(|trace| trace.first()).map(Start::of);
-        let near = |start: &Start| (start.x_world - present.x_world).hypot(start.y_world - present.y_world) < CARRIED;
-        match (start.filter(near), trace) {
-            (Some(start), Some(trace)) => {
-                let path = trace.iter().step_by(PATH_STEP).map(|sample| start.place_of(sample)).collect();
-                Scene { start, path, best, apex }
-            }
-            _ => Scene { start: present, path: Vec::new(), best, apex },
-        }
-    }
-}
-
-/// The samples since the impulse began.
-fn from_impulse(trace: &[ChartSample]) -> Option<&[ChartSample]> {
-    let begun = &trace[trace.partition_point(|sample| sample.trial_time_s < 0.0)..];
-    (!begun.is_empty()).then_some(begun)
-}
 
 /// A camera that looks at a point of the picture's frame.
 struct Camera {
@@ -193,8 +109,8 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     if area.height < 4 || area.width < 20 {
         return;
     }
-    let scene = Scene::of(model);
-    let jump = framed_jump(&scene, model.session.info.task);
+    let scene = Scene::of(model, robot);
+    let jump = scene.framed_jump(model.session.info.task);
     let half_width = REACH + jump.xy().norm() / 2.0;
     let top = TOP.max(scene.apex + ABOVE_TRUNK);
     let target = Vector3::new(jump.x / 2.0, jump.y / 2.0, (top + BOTTOM) / 2.0);
@@ -202,89 +118,27 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let per_metre = (width / (2.0 * half_width)).min(height / (top - BOTTOM));
     let canvas = Canvas { area, theme, camera: Camera::at(target, half_width), per_metre };
 
-    canvas.lines(frame, Role::Quiet, 4, &ground(&jump));
+    canvas.lines(frame, Role::Quiet, 4, &scene.floor_lines(&jump));
+    canvas.lines(frame, Role::Quiet, 2, &scene.box_lines(&jump));
     let rpy = tick.estimate.roll_pitch_yaw.map(|angle| steady(angle, SMALLEST_ANGLE));
     let turned = UnitQuaternion::from_euler_angles(rpy.x, rpy.y, rpy.z - scene.start.yaw);
-    let position = tick.estimate.position_world.map(|length| steady(length, SMALLEST_LENGTH));
-    let trunk = scene.start.place(position.x, position.y, position.z);
+    let trunk = scene.start.place(tick.estimate.position_world).map(|length| steady(length, SMALLEST_LENGTH));
     let of_body = |point: Vector3<f64>| turned * point + trunk;
     let legs_of = |legs: [Leg; 2]| -> Vec<[Vector3<f64>; 2]> {
         let angles = |leg| leg_of(&tick.state.joint_position_rad, leg).map(|angle| steady(angle, SMALLEST_ANGLE));
         let points = legs.map(|leg| leg_points(robot, leg, &angles(leg as usize)));
         points.iter().flat_map(|leg| leg.windows(2).map(|pair| [of_body(pair[0]), of_body(pair[1])])).collect()
     };
+    let dots = |points: &[Vector3<f64>]| -> Vec<_> { points.iter().map(|point| [*point, *point]).collect() };
     canvas.lines(frame, Role::Quiet, 1, &legs_of([Leg::FL, Leg::RL]));
-    let path: Vec<_> = scene.path.iter().map(|point| [*point, *point]).collect();
-    canvas.lines(frame, Role::SeriesB, 1, &path);
+    canvas.lines(frame, Role::Ghost, 1, &dots(&scene.feet));
+    canvas.lines(frame, Role::SeriesB, 1, &dots(&scene.path));
     canvas.lines(frame, Role::SeriesA, 1, &trunk_edges(robot).map(|edge| edge.map(of_body)));
     canvas.lines(frame, Role::Text, 1, &legs_of([Leg::FR, Leg::RR]));
-    let on_ground = |point: &Vector3<f64>| Vector3::new(point.x, point.y, 0.0);
     if let Some(best) = &scene.best {
-        canvas.mark(frame, Role::Good, &on_ground(best), 'o');
+        canvas.mark(frame, Role::Good, &scene.floor(best.x, best.y), 'o');
     }
     if let Some(landed) = scene.path.last().filter(|_| tick.trial.is_none()) {
-        canvas.mark(frame, Role::Key, &on_ground(landed), 'x');
+        canvas.mark(frame, Role::Key, &scene.floor(landed.x, landed.y), 'x');
     }
-}
-
-/// The displacement for which there is room in the picture: of the best trial, before there is one a usual one, or of the present
-/// trial if that is longer.
-fn framed_jump(scene: &Scene, task: Option<Task>) -> Vector3<f64> {
-    let usual = match task {
-        Some(Task::Forward) => Vector3::new(0.5, 0.0, 0.0),
-        Some(Task::LateralLeft) => Vector3::new(0.0, 0.3, 0.0),
-        Some(Task::LateralRight) => Vector3::new(0.0, -0.3, 0.0),
-        Some(Task::TwistCcw | Task::TwistCw) | None => Vector3::zeros(),
-    };
-    let expected = scene.best.unwrap_or(usual);
-    let present = scene.path.last().copied().unwrap_or_default();
-    if present.xy().norm() > expected.xy().norm() { present } else { expected }
-}
-
-/// Hip, thigh joint, knee and foot of a leg in the body frame, m: the forward kinematics with the links beyond a joint
-/// left out.
-fn leg_points(robot: &RobotDescription, leg: Leg, q: &Vector3<f64>) -> [Vector3<f64>; 4] {
-    let geometry = &robot.leg_geometry;
-    let hip = robot.legs[leg as usize].joint_origin[0];
-    let end = |thigh, calf| hip + LegGeometry { thigh, calf, ..*geometry }.foot(q, leg.left_sign()).position_leg;
-    [hip, end(0.0, 0.0), end(geometry.thigh, 0.0), end(geometry.thigh, geometry.calf)]
-}
-
-/// The edges of the trunk's box in the body frame, and a cross on its front. Without a box, of the plane of the hips.
-fn trunk_edges(robot: &RobotDescription) -> [[Vector3<f64>; 2]; 14] {
-    let shape = robot.trunk.collision.iter().find_map(|shape| match shape {
-        CollisionShape::Box { center, rotation, half_extents } => Some((*center, *rotation, *half_extents)),
-        _ => None,
-    });
-    let hip = robot.legs[Leg::FL as usize].joint_origin[0];
-    let flat = || (Vector3::zeros(), nalgebra::Matrix3::identity(), Vector3::new(hip.x, hip.y, 0.0));
-    let (center, rotation, half) = shape.unwrap_or_else(flat);
-    let corner = |x: f64, y: f64, z: f64| center + rotation * half.component_mul(&Vector3::new(x, y, z));
-    let ends = [(-1.0, -1.0), (-1.0, 1.0), (1.0, 1.0), (1.0, -1.0)];
-    std::array::from_fn(|edge| {
-        let (a, b) = ends[edge % 4];
-        match edge / 4 {
-            0 => [corner(-1.0, a, b), corner(1.0, a, b)],
-            1 => [corner(a, -1.0, b), corner(a, 1.0, b)],
-            2 => [corner(a, b, -1.0), corner(a, b, 1.0)],
-            // The diagonals of the front.
-            _ => [corner(1.0, a, -1.0), corner(1.0, -a, 1.0)]
-                .map(|end| if edge == 12 { end } else { mirrored(end, &center) }),
-        }
-    })
-}
-
-/// The point on the other side of the middle plane of the trunk.
-fn mirrored(point: Vector3<f64>, center: &Vector3<f64>) -> Vector3<f64> {
-    Vector3::new(point.x, 2.0 * center.y - point.y, point.z)
-}
-
-/// Lines on the ground around a jump.
-fn ground(jump: &Vector3<f64>) -> Vec<[Vector3<f64>; 2]> {
-    let range = |end: f64| ((end.min(0.0) / GRID).floor() - 1.0, (end.max(0.0) / GRID).ceil() + 1.0);
-    let ((left, right), (near, far)) = (range(jump.x), range(jump.y));
-    let steps = |from: f64, to: f64| (from as i64..=to as i64).map(|index| index as f64 * GRID);
-    let along = steps(near, far).map(|y| [Vector3::new(left * GRID, y, 0.0), Vector3::new(right * GRID, y, 0.0)]);
-    let across = steps(left, right).map(|x| [Vector3::new(x, near * GRID, 0.0), Vector3::new(x, far * GRID, 0.0)]);
-    along.chain(across).collect()
 }
