@@ -3,8 +3,8 @@
 use super::frog;
 use super::wire::{DecodeError, Way};
 use crate::trial::{
-    Displacement, ExpectedResult, FallRisk, FixedParameter, JumpRow, MeasuredJump, ParameterInsight, PointRecord,
-    PredictedTrial, Proposal, ProposalInsight, ProposedParameter, QueuedPoint, RepeatRecord, SearchStatus,
+    Displacement, DrawnRange, ExpectedResult, FallRisk, FixedParameter, JumpRow, MeasuredJump, ParameterInsight,
+    PointRecord, PredictedTrial, Proposal, ProposalInsight, ProposedParameter, QueuedPoint, RepeatRecord, SearchStatus,
     SearchedParameter, SimulatorComparison, TrialRecord, WorldResemblance,
 };
 
@@ -46,7 +46,15 @@ pub fn trial(way: Way, ours: &mut TrialRecord, m: &mut frog::Trial) -> Done {
     way.values(&mut ours.gains, &mut m.gains);
     way.list(&mut ours.repeats, &mut m.repeats, repeat)?;
     way.copy(&mut ours.seed, &mut m.seed);
+    way.list(&mut ours.ranges, &mut m.ranges, drawn_range)?;
     way.option(&mut ours.expected, &mut m.expected, expected)
+}
+
+fn drawn_range(way: Way, ours: &mut DrawnRange, m: &mut frog::trial::Range) -> Done {
+    way.copy(&mut ours.name, &mut m.name);
+    way.number(&mut ours.low, &mut m.low);
+    way.number(&mut ours.high, &mut m.high);
+    Ok(())
 }
 
 fn repeat(way: Way, ours: &mut RepeatRecord, m: &mut frog::trial::Repeat) -> Done {

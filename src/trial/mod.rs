@@ -5,8 +5,8 @@ mod search;
 
 pub use self::measured::{BounceRule, Displacement, JumpRow, MeasuredJump, ObjectiveRule, RepeatRecord};
 pub use self::search::{
-    FixedParameter, ParameterInsight, PointRecord, PredictedTrial, ProposalInsight, QueuedPoint, SearchStatus,
-    SearchedParameter, SimulatorComparison, WorldResemblance,
+    DrawnRange, FixedParameter, ParameterInsight, PointRecord, PredictedTrial, ProposalInsight, QueuedPoint,
+    SearchStatus, SearchedParameter, SimulatorComparison, WorldResemblance,
 };
 
 use serde::{Deserialize, Serialize};
@@ -446,6 +446,8 @@ pub struct TrialRecord {
     pub repeats: Vec<RepeatRecord>,
     /// Seed of its noise and terrain, of the first rollout if it has several; none for a trial of another program.
     pub seed: Option<u64>,
+    /// The ranges from which its parameters were drawn; empty in older recordings.
+    pub ranges: Vec<DrawnRange>,
 }
 
 impl TrialRecord {

@@ -51,6 +51,17 @@ pub struct SearchedParameter {
     pub fixed: Option<FixedParameter>,
 }
 
+/// The range from which a parameter of one trial was drawn.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct DrawnRange {
+    /// Name of the parameter.
+    pub name: String,
+    /// Lower end, in the parameter's unit.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+}
+
 /// A parameter that is fixed for some trials.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct FixedParameter {

@@ -5,7 +5,7 @@ mod support;
 use quadfrog::recording::record::{ArmingCheckRecord, Record};
 use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::telemetry::{ArmingCheck, ArmingCheckState, Mode, Snapshot, Tick, TrialInhibit};
-use quadfrog::trial::{ExperimentStage, SearchStatus, SearchedParameter, Verdict};
+use quadfrog::trial::{DrawnRange, ExperimentStage, SearchStatus, SearchedParameter, TrialRecord, Verdict};
 use quadfrog_console::message::{Msg, ReplayStatus};
 use quadfrog_console::theme::Role;
 use support::{Console, assert_shows, line_with, trial};
@@ -79,18 +79,14 @@ fn a_fault_and_a_stop_come_before_a_pending_verdict() {
 #[test]
 fn details_show_the_bounds_with_which_a_trial_ran() {
     let mut console = Console::ready();
-    let search = |low, high| {
-        let searched = SearchedParameter { name: "Fx".into(), low, high, least: 0.0, most: 200.0, fixed: None };
-        Record::Search(SearchStatus { parameters: vec![searched], ..SearchStatus::default() })
-    };
     for (number, low, high) in [(0, 0.0, 150.0), (1, 20.0, 130.0)] {
-        console.record(search(low, high));
-        console.stage(ExperimentStage::Running, number);
-        console.record(Record::Trial(trial(number, Some(Verdict::Accept), None)));
+        let ranges = vec![DrawnRange { name: "Fx".into(), low, high }];
+        console.record(Record::Trial(TrialRecord { ranges, ..trial(number, Some(Verdict::Accept), None) }));
     }
-    // A trial of an earlier session.
+    // A trial of an older recording.
     console.record(Record::Trial(trial(2, Some(Verdict::Accept), None)));
-    console.record(search(40.0, 60.0));
+    let searched = SearchedParameter { name: "Fx".into(), low: 40.0, high: 60.0, least: 0.0, most: 200.0, fixed: None };
+    console.record(Record::Search(SearchStatus { parameters: vec![searched], ..SearchStatus::default() }));
     console.stage(ExperimentStage::Proposed, 3);
     console.press(&["2", "Home", "Enter"]);
     assert_shows(&line_with(&console.screen(120, 40), "75.00000 N"), &["(searched from 0 to 150)"]);

@@ -311,6 +311,7 @@ impl Draw {
                 expected: self.option(Draw::expected),
                 gains: self.several(|d| (d.string(), d.number())).into(),
                 seed: self.option(Draw::word),
+                ranges: self.several(|d| DrawnRange { name: d.string(), low: d.number(), high: d.number() }),
                 repeats: self.several(|d| RepeatRecord {
                     seed: d.word(),
                     verdict: d.option(|d| d.one_of(&Verdict::ALL)),

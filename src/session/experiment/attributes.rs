@@ -13,8 +13,8 @@ use crate::optimize::ask::SamplerConfig;
 use crate::optimize::study::{DRAWS, Outcome};
 use crate::optimize::trial::{Trial, TrialState};
 use crate::trial::{
-    Backend, ExpectedResult, FallRisk, MeasuredJump, ParameterInfo, ParameterValues, Proposal, ProposalSource,
-    RepeatRecord, Task, TrialRecord, Verdict,
+    Backend, DrawnRange, ExpectedResult, FallRisk, MeasuredJump, ParameterInfo, ParameterValues, Proposal,
+    ProposalSource, RepeatRecord, Task, TrialRecord, Verdict,
 };
 
 /// Attributes in the order in which they are written.
@@ -380,7 +380,18 @@ pub fn row_of(trial: &Trial, note: String, order: &[ParameterInfo]) -> TrialReco
         gains,
         repeats,
         seed,
+        ranges: ranges_of(trial),
     }
+}
+
+/// Returns the ranges from which the parameters of a trial were drawn.
+pub fn ranges_of(trial: &Trial) -> Vec<DrawnRange> {
+    let pairs = trial.parameters.iter().zip(&trial.distributions);
+    let ranges = pairs.filter_map(|((name, _), distribution)| {
+        let range = distribution.range()?;
+        Some(DrawnRange { name: name.clone(), low: range.low, high: range.high })
+    });
+    ranges.collect()
 }
 
 /// Reads attributes; those of another type are left out.

@@ -169,6 +169,7 @@ impl Experiment {
             gains,
             repeats: origin.repeats,
             seed: Some(seed),
+            ranges: self.study.trial(number).map(attributes::ranges_of).unwrap_or_default(),
             ..TrialRecord::default()
         };
         if !row.note.is_empty() {

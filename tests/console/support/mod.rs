@@ -322,6 +322,7 @@ pub fn trial(number: u32, verdict: Option<Verdict>, suggested: Option<Verdict>) 
         gains: Vec::new().into(),
         repeats: Vec::new(),
         seed: None,
+        ranges: Vec::new(),
     }
 }
 

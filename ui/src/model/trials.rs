@@ -29,8 +29,6 @@ pub struct RunTime {
     pub begun_ns: u64,
     /// The end of its measurement; none while it runs.
     pub ended_ns: Option<u64>,
-    /// The bounds within which it was proposed, in table order of the parameters.
-    pub bounds: Vec<(f64, f64)>,
 }
 
 impl Trials {

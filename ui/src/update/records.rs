@@ -174,10 +174,7 @@ fn show_landed(model: &mut Model) {
 fn note_time(model: &mut Model, info: StageRecord, time_ns: u64) {
     match info.stage {
         ExperimentStage::Running => {
-            let session = &mut model.session;
-            let present = session.info.parameters.iter().filter_map(|info| session.parameter(&info.name));
-            let bounds = present.map(|info| (info.low, info.high)).collect();
-            session.trials.ran.insert(info.trial, RunTime { begun_ns: time_ns, ended_ns: None, bounds });
+            model.session.trials.ran.insert(info.trial, RunTime { begun_ns: time_ns, ended_ns: None });
         }
         ExperimentStage::Review => {
             if let Some(ran) = model.session.trials.ran.get_mut(&info.trial) {

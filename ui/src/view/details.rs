@@ -43,11 +43,9 @@ pub fn details(session: &SessionModel, theme: &Theme, trial: &TrialRecord) -> Ve
     for (name, value) in &trial.parameters {
         let index = session.info.parameters.iter().position(|info| info.name == *name);
         let unit = index.map_or("", |index| session.info.parameters[index].unit.as_str());
-        // Those of a trial of an earlier session are not recorded here: the present ones may be others.
-        let ran = session.trials.ran.get(&trial.trial);
-        let bounds = ran.zip(index).and_then(|(ran, index)| ran.bounds.get(index));
-        let bounds = bounds.map_or(String::new(), |(low, high)| {
-            format!("  (searched from {} to {})", six_digits(*low), six_digits(*high))
+        let range = trial.ranges.iter().find(|range| range.name == *name);
+        let bounds = range.map_or(String::new(), |range| {
+            format!("  (searched from {} to {})", six_digits(range.low), six_digits(range.high))
         });
         row(name, format!("{value:.5} {unit}{bounds}"));
     }
