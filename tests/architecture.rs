@@ -27,7 +27,7 @@ const ENGINE: [(&str, &[&str]); 12] = [
 
 /// Layers of the console, lowest first: a module uses modules of lower layers only.
 const CONSOLE: [&[&str]; 9] = [
-    &["action", "column", "series", "connection", "wrap"],
+    &["action", "cell_encoder", "column", "series", "connection", "wrap"],
     &["keymap", "output", "theme"],
     &["settings", "message"],
     &["model"],

@@ -51,10 +51,27 @@ fn minute(name: &str, size: (u16, u16), arguments: &[&str]) {
 }
 
 #[test]
-#[ignore = "a measurement of two minutes"]
+#[ignore = "a measurement of four minutes"]
 fn bytes_on_the_wire_and_processor() {
     minute("80x24 sweep", (80, 24), &[]);
+    minute("120x40 sweep", (120, 40), &[]);
+    minute("200x60 sweep", (200, 60), &[]);
     minute("80x24 low bandwidth", (80, 24), &["--low-bandwidth"]);
+}
+
+#[test]
+#[ignore = "a measurement"]
+fn bytes_of_the_first_frame() {
+    for arguments in [&[][..], &["--low-bandwidth"]] {
+        for size in [(80, 24), (120, 40), (200, 60)] {
+            let (_folder, mut session) = Session::opened(size, arguments);
+            let bytes = session.bytes();
+            let seconds = bytes as f64 * 8.0 / 20e3;
+            println!("{}x{} {arguments:?}: {bytes} bytes, {seconds:.1} s at 20 kbit/s", size.0, size.1);
+            session.send("q");
+            session.wait();
+        }
+    }
 }
 
 #[test]

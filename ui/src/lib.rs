@@ -12,6 +12,7 @@
 
 pub mod action;
 pub mod app;
+pub mod cell_encoder;
 mod column;
 pub mod connection;
 pub mod export;

@@ -28,6 +28,7 @@ use ratatui::buffer::Cell;
 use ratatui::layout::{Position, Size};
 use ratatui::{Terminal, TerminalOptions, Viewport};
 
+use crate::cell_encoder::encode;
 use crate::layout::{COMPACT_COLUMNS, COMPACT_ROWS};
 
 /// Time limit of the restoration of a terminal that does not read.
@@ -153,9 +154,8 @@ impl Backend for WriteOnlyBackend {
     where
         I: Iterator<Item = (u16, u16, &'a Cell)>,
     {
-        let mut content = content.peekable();
-        // The library resets the colours also after no cell.
-        if content.peek().is_none() { Ok(()) } else { self.0.draw(content) }
+        let cells: Vec<_> = content.collect();
+        self.0.write_all(&encode(&cells))
     }
 
     /// Does nothing: ratatui hides the cursor after every frame, and it is hidden since the terminal was configured.
