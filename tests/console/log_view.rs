@@ -27,11 +27,12 @@ fn logged(texts: &[&str]) -> Console {
 
 #[test]
 fn a_line_opens_whole_and_shows_its_neighbours() {
-    let long =
-        "the first words of a line that no terminal shows in one row, ".repeat(6) + "and its last word: amphibian";
-    let words: Vec<&str> = long.split_whitespace().collect();
-    let mut console = logged(&["the line before", &long]);
-    for (columns, rows) in [(80, 24), (120, 40), (200, 60)] {
+    // Longer than the three rows of the message at each width.
+    for (columns, rows, repeats) in [(80, 24, 6), (120, 40, 7), (200, 60, 11)] {
+        let long = "the first words of a line that no terminal shows in one row, ".repeat(repeats)
+            + "and its last word: amphibian";
+        let words: Vec<&str> = long.split_whitespace().collect();
+        let mut console = logged(&["the line before", &long]);
         assert!(!console.screen(columns, rows).contains("amphibian"), "{columns}");
         console.press(&["Enter"]);
         let screen = console.screen(columns, rows);

@@ -105,7 +105,7 @@ const REPLAY: &[Row] = &[
     row(Action::ZoomIn, "+", Shows("4 s sweep"), ("", "")),
     row(Action::ZoomOut, "-", Shows("8 s sweep"), ("", "")),
     row(Action::ChartMode, "w", Shows("8 s scroll"), ("w", "8 s sweep")),
-    row(Action::Series, "t", Shows("FL force"), ("tttt", "FL foot")),
+    row(Action::Series, "t", Shows("FL force"), ("ttttt", "FL foot")),
     row(Action::ChooseSeries, "T", Shows("Series of the charts"), ("\x1b", "8 s sweep")),
     row(Action::TrialsView, "2", Shows("by number"), ("", "")),
     row(Action::Rejudge, "J", Shows("Judge all trials again"), ("\r", " change")),

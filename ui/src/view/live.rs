@@ -6,6 +6,7 @@ use quadfrog::robot::{JOINTS, joint_name};
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
+use ratatui::widgets::Paragraph;
 
 use super::chart::{Chart, Ghost, TimeAxis, draw_phases, draw_time_axis, phases, plot_columns};
 use super::draw::{bar, heading, span};
@@ -22,6 +23,8 @@ use crate::theme::Role;
 const SIDE: u16 = 32;
 /// Columns from which there is room for more than charts, the trial and the table.
 const WIDE: u16 = 120;
+/// Columns from which the whole table fits beside the trial.
+const ROOMY: u16 = 160;
 /// Rows of a chart with its heading, at least.
 const CHART_ROWS: u16 = 3;
 /// Rows of the charts from which the time axis has one of its own.
@@ -35,10 +38,27 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
         return render_landed(frame, area, model);
     }
     let table_rows = (area.height / 4).clamp(5, 14);
-    let [upper, table] = Layout::vertical([Constraint::Fill(1), Constraint::Length(table_rows)]).areas(area);
-    let side = if area.width >= WIDE { SIDE + 10 } else { SIDE };
-    let [charts, _, side] =
-        Layout::horizontal([Constraint::Fill(1), Constraint::Length(1), Constraint::Length(side)]).areas(upper);
+    let above_table = |area: Rect| Layout::vertical([Constraint::Fill(1), Constraint::Length(table_rows)]).areas(area);
+    let side_columns = if area.width >= WIDE { (SIDE + 10).max(area.width * 3 / 10) } else { SIDE };
+    let beside = |area: Rect| {
+        let gap = if area.width >= WIDE { 2 } else { 1 };
+        let columns = [Constraint::Fill(1), Constraint::Length(gap), Constraint::Length(side_columns)];
+        Layout::horizontal(columns).areas(area)
+    };
+    // Where the table has room beside it, the side with the picture of the robot takes the whole height.
+    let ([charts, gap, side], table) = if area.width >= ROOMY {
+        let [left, gap, side] = beside(area);
+        let [charts, table] = above_table(left);
+        ([charts, gap, side], table)
+    } else {
+        let [upper, table] = above_table(area);
+        (beside(upper), table)
+    };
+    if area.width >= WIDE {
+        let bar = model.theme.bar();
+        let lines = (0..gap.height).map(|_| Line::from(span(&model.theme, Role::Quiet, bar))).collect::<Vec<_>>();
+        frame.render_widget(Paragraph::new(lines), gap);
+    }
     // A live session shows its proposal in any case: the operator approves it.
     let compared = model.live.comparison.as_ref().filter(|_| model.replay.is_some());
     let card_rows = match compared {
@@ -49,7 +69,7 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     // Without room for both, the panel of the joints shows the robot and the others the objective.
     let picture_rows = match model.live.panel {
         Panel::Robot => 0,
-        _ if room >= 18 => (room / 2).clamp(12, 20),
+        _ if room >= 18 => (room / 2).clamp(12, 24),
         Panel::Joints => room,
         Panel::Charts => 0,
     };
