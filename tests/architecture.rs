@@ -26,14 +26,16 @@ const ENGINE: [(&str, &[&str]); 12] = [
 ];
 
 /// Layers of the console, lowest first: a module uses modules of lower layers only.
-const CONSOLE: [&[&str]; 9] = [
+const CONSOLE: [&[&str]; 11] = [
     &["action", "cell_encoder", "column", "series", "connection", "wrap"],
     &["keymap", "output", "theme"],
+    &["graphics"],
     &["settings", "message"],
     &["model"],
     &["layout", "text"],
     &["legal"],
     &["update", "view", "feed", "export", "terminal", "input"],
+    &["picture"],
     &["app", "screenshot"],
     &["subcommand"],
 ];

@@ -11,6 +11,8 @@ use crossterm::clipboard::CopyToClipboard;
 use nix::sys::signal::{Signal, raise};
 use quadfrog::engine::EngineHandle;
 use quadfrog::recording::record::LogLevel;
+use ratatui::Frame;
+use ratatui::widgets::Clear;
 use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
 use tokio::time::{MissedTickBehavior, interval};
@@ -19,9 +21,11 @@ use crate::action::Action;
 use crate::connection::{ConnectionMonitor, TerminalLocation};
 
 use crate::feed::Feed;
+use crate::graphics::GraphicsSupport;
 use crate::input::{KeyReader, NumberedEvent, SpaceBarIsText, TerminalEvent, read_terminal};
 use crate::message::{Effect, ExportedRows, Msg};
 use crate::model::{Model, RobotFacts};
+use crate::picture::PictureSchedule;
 use crate::settings::{ChartMode, ConsoleSettings};
 use crate::terminal::{self, TerminalProtocol, TerminalScreen};
 use crate::theme::{ColourChoice, GlyphChoice, Theme, ThemeChoice};
@@ -113,6 +117,7 @@ struct Console {
     space_bar_is_text: SpaceBarIsText,
     keys: u64,
     screen: TerminalScreen,
+    pictures: PictureSchedule,
     started: Instant,
     frame_period: Duration,
     last_frame: Option<Instant>,
@@ -129,16 +134,21 @@ impl Console {
         let theme = Theme::detect(settings.colours, settings.glyphs, |name| std::env::var(name).ok());
         let frame_period = Duration::from_secs(1) / settings.frames_per_second.max(1);
         let low_bandwidth = settings.low_bandwidth;
+        let variable = |name: &str| std::env::var(name).ok();
+        let support = GraphicsSupport::detect(settings.graphics, &theme, low_bandwidth, variable);
+        let mut pictures = PictureSchedule::new(support);
+        pictures.resize(crossterm::terminal::window_size().ok());
         let mut model = Model::new(settings, theme, options.robot);
         let (columns, rows) = crossterm::terminal::size().context("the terminal's size")?;
         update(&mut model, Msg::Resize(columns, rows));
         // The kernel's console has no such report.
         let asks = model.follow_background
-            && theme.follows_background()
+            && (theme.follows_background() || pictures.possible())
             && std::env::var("TERM").is_ok_and(|term| term != "linux");
         let protocol = TerminalProtocol {
             pastes: matches!(feed, Feed::Replay(_)),
             asks_background: asks,
+            asks_attributes: pictures.asks(),
             synchronized: !low_bandwidth,
         };
         let mut screen = TerminalScreen::enter(protocol).context("the terminal cannot be used")?;
@@ -160,6 +170,7 @@ impl Console {
             space_bar_is_text: SpaceBarIsText::default(),
             keys: 0,
             screen,
+            pictures,
             started: now,
             frame_period,
             last_frame: None,
@@ -232,12 +243,17 @@ impl Console {
                     if matches!(event, TerminalEvent::Background(_)) {
                         self.background_due = None;
                     }
-                    self.update_with([match event {
-                        TerminalEvent::Key(key) => Msg::Key(key),
-                        TerminalEvent::Paste(text) => Msg::Paste(text),
-                        TerminalEvent::Mouse(event) => Msg::Mouse(event),
-                        TerminalEvent::Background(background) => Msg::Background(background),
-                    }]);
+                    let message = match event {
+                        TerminalEvent::Key(key) => Some(Msg::Key(key)),
+                        TerminalEvent::Paste(text) => Some(Msg::Paste(text)),
+                        TerminalEvent::Mouse(event) => Some(Msg::Mouse(event)),
+                        TerminalEvent::Background(background) => Some(Msg::Background(background)),
+                        TerminalEvent::Sixel(sixel) => {
+                            self.pictures.answer(sixel);
+                            None
+                        }
+                    };
+                    self.update_with(message);
                 }
                 None => self.hang_up(),
             }
@@ -267,6 +283,7 @@ impl Console {
 
     fn resize(&mut self) {
         if let Ok((columns, rows)) = crossterm::terminal::size() {
+            self.pictures.resize(crossterm::terminal::window_size().ok());
             self.update_with([Msg::Resize(columns, rows)]);
             self.redraw = true;
         }
@@ -365,8 +382,14 @@ impl Console {
         }
         self.redraw = false;
         self.last_frame = Some(Instant::now());
-        let model = &self.model;
-        self.screen.draw(|frame| view::render(frame, model)).context("drawing")
+        let (model, pictures) = (&self.model, &mut self.pictures);
+        let draw = |frame: &mut Frame| {
+            view::render(frame, model);
+            let size = frame.area().as_size();
+            // The cells below stay blank: a character there would be in the picture, or erase a part of it.
+            pictures.picture(model, size, Instant::now()).inspect(|picture| frame.render_widget(Clear, picture.area))
+        };
+        self.screen.draw(draw).context("drawing")
     }
 
     /// Ends the session. Sitting down takes seconds: the screen stays, and STOP keeps working.

@@ -10,6 +10,7 @@ use strum::VariantArray;
 use toml::{Table, Value};
 
 use crate::column::Column;
+use crate::graphics::GraphicsChoice;
 use crate::keymap::Keymap;
 use crate::series::Series;
 use crate::theme::{ColourChoice, GlyphChoice, ThemeChoice};
@@ -25,6 +26,8 @@ pub struct ConsoleSettings {
     pub frames_per_second: u32,
     pub colours: ColourChoice,
     pub glyphs: GlyphChoice,
+    /// Pictures of pixels.
+    pub graphics: GraphicsChoice,
     /// Background that the colours suit.
     pub theme: ThemeChoice,
     /// Whether charts sweep or scroll.
@@ -108,6 +111,7 @@ impl ConsoleSettings {
             frames_per_second,
             colours: read(table, "colours")?,
             glyphs: read(table, "glyphs")?,
+            graphics: read(table, "graphics")?,
             theme: read(table, "theme")?,
             chart_mode: read(table, "chart_mode")?,
             chart_window_s,

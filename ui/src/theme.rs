@@ -143,6 +143,8 @@ struct Shade {
 /// The colours for one background. Text has a contrast of 4.5:1 at least, also on usual backgrounds beside black and white
 /// and on the shaded phases (WCAG 2.2, criterion 1.4.3). The 16 colours are the terminal's own.
 struct Palette {
+    /// The terminal's own colour of text, about, in pictures of pixels.
+    text: (u8, u8, u8),
     cyan: Shade,
     green: Shade,
     amber: Shade,
@@ -161,6 +163,7 @@ const fn shade(rgb: (u8, u8, u8), index: u8, named: Color) -> Shade {
 }
 
 const DARK: Palette = Palette {
+    text: (230, 230, 230),
     cyan: shade((86, 182, 194), 73, Color::Cyan),
     green: shade((120, 190, 110), 107, Color::Green),
     amber: shade((229, 180, 80), 179, Color::Yellow),
@@ -173,6 +176,7 @@ const DARK: Palette = Palette {
     landing: shade((42, 34, 52), 235, Color::Reset),
 };
 const LIGHT: Palette = Palette {
+    text: (25, 25, 25),
     cyan: shade((0, 95, 115), 24, Color::Cyan),
     green: shade((25, 100, 35), 22, Color::Green),
     amber: shade((130, 75, 0), 94, Color::Yellow),
@@ -257,6 +261,23 @@ impl Theme {
             Role::ShadeImpulse => self.bg(palette.impulse),
             Role::ShadeFlight => self.bg(palette.flight),
             Role::ShadeLanding => self.bg(palette.landing),
+        }
+    }
+
+    /// Red, green and blue of what has a role in a picture of pixels.
+    pub fn rgb(&self, role: Role) -> (u8, u8, u8) {
+        let palette = self.palette();
+        match role {
+            Role::Text | Role::Key | Role::Selected => palette.text,
+            Role::Quiet | Role::Ghost => palette.grey.rgb,
+            Role::Heading | Role::SeriesA => palette.cyan.rgb,
+            Role::Good => palette.green.rgb,
+            Role::Warning | Role::Hardware => palette.amber.rgb,
+            Role::Bad | Role::Alarm => palette.red.rgb,
+            Role::SeriesB => palette.violet.rgb,
+            Role::ShadeImpulse => palette.impulse.rgb,
+            Role::ShadeFlight => palette.flight.rgb,
+            Role::ShadeLanding => palette.landing.rgb,
         }
     }
 

@@ -30,10 +30,25 @@ pub struct Session {
     output: Arc<Mutex<Output>>,
     reading: Arc<AtomicBool>,
     closed: Arc<AtomicBool>,
+    cell: (u16, u16),
+}
+
+/// Terminal and environment of a program.
+pub struct Setup<'a> {
+    /// Columns and rows.
+    pub size: (u16, u16),
+    /// Width and height of a cell as the terminal reports them, pixels; zeros where it does not.
+    pub cell: (u16, u16),
+    /// Variables of the environment.
+    pub variables: &'a [(&'a str, &'a str)],
 }
 
 fn nonzero(value: u16) -> NonZeroU16 {
     NonZeroU16::new(value).expect("a size")
+}
+
+fn pty_size((columns, rows): (u16, u16), cell: (u16, u16)) -> PtySize {
+    PtySize { rows, cols: columns, pixel_width: columns * cell.0, pixel_height: rows * cell.1 }
 }
 
 impl Session {
@@ -55,14 +70,23 @@ impl Session {
     }
 
     /// Starts any command.
-    pub fn run(folder: &Path, (columns, rows): (u16, u16), mut command: CommandBuilder) -> Session {
-        let size = PtySize { rows, cols: columns, pixel_width: 0, pixel_height: 0 };
-        let pair = native_pty_system().openpty(size).expect("a pseudo-terminal");
+    pub fn run(folder: &Path, size: (u16, u16), command: CommandBuilder) -> Session {
+        Session::run_in(folder, &Setup { size, cell: (0, 0), variables: &[] }, command)
+    }
+
+    /// Starts any command in a terminal and an environment.
+    pub fn run_in(folder: &Path, setup: &Setup, mut command: CommandBuilder) -> Session {
+        let (columns, rows) = setup.size;
+        let pair = native_pty_system().openpty(pty_size(setup.size, setup.cell)).expect("a pseudo-terminal");
         command.cwd(folder);
-        for (name, value) in [("TERM", "xterm-256color"), ("LANG", "C.UTF-8"), ("LC_ALL", "C.UTF-8")] {
+        // Not the terminal of the user who runs the tests.
+        for name in ["NO_COLOR", "COLORFGBG", "TMUX", "STY", "ZELLIJ", "TERM_PROGRAM", "LC_TERMINAL"] {
+            command.env_remove(name);
+        }
+        let usual = [("TERM", "xterm-256color"), ("LANG", "C.UTF-8"), ("LC_ALL", "C.UTF-8")];
+        for (name, value) in usual.iter().chain(setup.variables) {
             command.env(name, value);
         }
-        command.env_remove("NO_COLOR");
         // Not the configuration of the user who runs the tests.
         command.env("XDG_CONFIG_HOME", folder.join("no-configuration"));
         let child = pair.slave.spawn_command(command).expect("started");
@@ -92,7 +116,7 @@ impl Session {
             }
         });
         let writer = Some(pair.master.take_writer().expect("a writer"));
-        Session { master: Some(pair.master), writer, child, output, reading, closed }
+        Session { master: Some(pair.master), writer, child, output, reading, closed, cell: setup.cell }
     }
 
     fn output(&self) -> MutexGuard<'_, Output> {
@@ -192,7 +216,7 @@ impl Session {
     }
 
     pub fn resize(&self, columns: u16, rows: u16) {
-        let size = PtySize { rows, cols: columns, pixel_width: 0, pixel_height: 0 };
+        let size = pty_size((columns, rows), self.cell);
         self.output().parser.set_size(nonzero(rows), nonzero(columns));
         self.master.as_ref().expect("the terminal is there").resize(size).expect("resized");
     }

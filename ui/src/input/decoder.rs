@@ -21,6 +21,8 @@ pub enum TerminalEvent {
     Mouse(Mouse),
     /// The answer to the question for the background, OSC 11.
     Background(Background),
+    /// The answer to the question for the primary device attributes: whether the terminal shows sixel.
+    Sixel(bool),
 }
 
 /// Longest control sequence, bytes; a longer one is dropped.
@@ -371,6 +373,9 @@ fn sequence(parameters: &[u8], end: u8) -> Option<TerminalEvent> {
     if let Some(report) = text.strip_prefix('<') {
         return mouse(report, end).map(TerminalEvent::Mouse);
     }
+    if let Some(attributes) = text.strip_prefix('?').filter(|_| end == b'c') {
+        return Some(TerminalEvent::Sixel(reports_sixel(attributes)));
+    }
     // Sub-parameters follow a colon: of the modifiers the kind of the event.
     let mut fields = text.split(';').map(|field| field.split(':').map(|part| part.parse::<u32>().ok()));
     let mut field = || fields.next().map(|mut parts| (parts.next().flatten(), parts.next().flatten()));
@@ -409,6 +414,11 @@ fn background(report: &[u8]) -> Option<Background> {
         *part = f64::from(u32::from_str_radix(digits, 16).ok()?) / full_scale;
     }
     Some(Background::of_rgb(rgb))
+}
+
+/// Whether primary device attributes (XTerm Control Sequences, DA1) name sixel: `62;4;22`, after the class of the terminal.
+fn reports_sixel(attributes: &str) -> bool {
+    attributes.split(';').skip(1).any(|attribute| attribute == "4")
 }
 
 /// A mouse report of the form `button;column;row`. Moves, releases and other buttons are ignored.

@@ -16,6 +16,7 @@ use quadfrog::trial::{Approval, Backend, Task};
 use quadfrog_console::app::{self, ConsoleExit, ConsoleOptions};
 use quadfrog_console::connection::TerminalLocation;
 use quadfrog_console::feed::Feed;
+use quadfrog_console::graphics::GraphicsChoice;
 use quadfrog_console::model::RobotFacts;
 use quadfrog_console::put_line;
 use quadfrog_console::settings::ConsoleSettings;
@@ -44,6 +45,16 @@ pub fn theme() -> impl TypedValueParser<Value = ThemeChoice> {
         (ThemeChoice::Auto, "auto", "As console.toml says, or as the terminal reports its background"),
         (ThemeChoice::Dark, "dark", "For a dark background"),
         (ThemeChoice::Light, "light", "For a light background"),
+    ])
+}
+
+fn graphics() -> impl TypedValueParser<Value = GraphicsChoice> {
+    one_of([
+        (GraphicsChoice::Auto, "auto", "As console.toml says, or as the terminal is known to show or reports"),
+        (GraphicsChoice::Cells, "cells", "Characters"),
+        (GraphicsChoice::Kitty, "kitty", "Pixels by the graphics protocol of kitty"),
+        (GraphicsChoice::Sixel, "sixel", "Pixels by sixel"),
+        (GraphicsChoice::Iterm2, "iterm2", "Pixels by the inline images of iTerm2"),
     ])
 }
 
@@ -79,6 +90,9 @@ pub struct ScreenArguments {
     /// Background that the colours suit
     #[arg(long, value_name = "WHICH", default_value = "auto", value_parser = theme())]
     pub theme: ThemeChoice,
+    /// Picture of the robot
+    #[arg(long, value_name = "WHICH", default_value = "auto", value_parser = graphics())]
+    pub graphics: GraphicsChoice,
     /// Draw fewer frames and colours, for a slow link
     #[arg(long)]
     pub low_bandwidth: bool,
@@ -224,5 +238,9 @@ pub fn settings(config: &Config) -> Result<ConsoleSettings, ConfigError> {
 /// Returns the console's options from the arguments and `console.toml`.
 pub fn options(screen: &ScreenArguments, config: &Config) -> Result<ConsoleOptions, Failure> {
     let colours = (screen.color != ColourChoice::Auto).then_some(screen.color);
-    Ok(ConsoleOptions::new(settings(config)?, colours, screen.theme, screen.ascii, screen.low_bandwidth))
+    let mut settings = settings(config)?;
+    if screen.graphics != GraphicsChoice::Auto {
+        settings.graphics = screen.graphics;
+    }
+    Ok(ConsoleOptions::new(settings, colours, screen.theme, screen.ascii, screen.low_bandwidth))
 }

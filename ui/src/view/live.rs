@@ -32,10 +32,23 @@ const TIMES_FROM_ROWS: u16 = 16;
 /// Columns of the joints' panel from which two joints stand side by side.
 const TWO_JOINTS_FROM: u16 = 72;
 
-pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
-    let joints_only = model.live.panel == Panel::Joints;
+/// The places of the panels.
+struct Places {
+    /// The charts, or what the operator chose in place of them.
+    main: Rect,
+    /// Between these and the side, with a rule on a wide screen.
+    gap: Rect,
+    card: Rect,
+    objective: Rect,
+    /// The robot; none without room.
+    picture: Option<Rect>,
+    table: Rect,
+}
+
+/// The places of the panels in the body; none where a landed trial takes the whole width.
+fn places(area: Rect, model: &Model) -> Option<Places> {
     if area.width < WIDE && model.live.panel == Panel::Charts && model.landed().is_some() {
-        return render_landed(frame, area, model);
+        return None;
     }
     let table_rows = (area.height / 4).clamp(5, 14);
     let above_table = |area: Rect| Layout::vertical([Constraint::Fill(1), Constraint::Length(table_rows)]).areas(area);
@@ -46,22 +59,15 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
         Layout::horizontal(columns).areas(area)
     };
     // Where the table has room beside it, the side with the picture of the robot takes the whole height.
-    let ([charts, gap, side], table) = if area.width >= ROOMY {
+    let ([main, gap, side], table) = if area.width >= ROOMY {
         let [left, gap, side] = beside(area);
-        let [charts, table] = above_table(left);
-        ([charts, gap, side], table)
+        let [main, table] = above_table(left);
+        ([main, gap, side], table)
     } else {
         let [upper, table] = above_table(area);
         (beside(upper), table)
     };
-    if area.width >= WIDE {
-        let bar = model.theme.bar();
-        let lines = (0..gap.height).map(|_| Line::from(span(&model.theme, Role::Quiet, bar))).collect::<Vec<_>>();
-        frame.render_widget(Paragraph::new(lines), gap);
-    }
-    // A live session shows its proposal in any case: the operator approves it.
-    let compared = model.live.comparison.as_ref().filter(|_| model.replay.is_some());
-    let card_rows = match compared {
+    let card_rows = match compared(model) {
         Some(comparison) => beside::rows(comparison).min(side.height),
         None => model.session.trial_rows().min(side.height.saturating_sub(5)),
     };
@@ -73,27 +79,49 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
         Panel::Joints => room,
         Panel::Charts => 0,
     };
-    let [card, objective_area, picture] =
+    let [card, objective, picture] =
         Layout::vertical([Constraint::Length(card_rows), Constraint::Fill(1), Constraint::Length(picture_rows)])
             .areas(side);
-    if joints_only {
-        render_joints(frame, charts, model);
-    } else if model.live.panel == Panel::Robot {
-        wireframe::render(frame, charts, model);
-    } else if area.width >= WIDE && charts.height >= 24 {
-        let joint_rows = JOINTS as u16 / if charts.width >= TWO_JOINTS_FROM { 2 } else { 1 } + 1;
-        let [charts, joints] = Layout::vertical([Constraint::Fill(1), Constraint::Length(joint_rows)]).areas(charts);
+    let picture = if model.live.panel == Panel::Robot { main } else { picture };
+    Some(Places { main, gap, card, objective, picture: Some(picture).filter(|picture| picture.height > 0), table })
+}
+
+/// The trials side by side in place of the proposal: in a replay only, because a live session shows its proposal in any
+/// case for the operator to approve.
+fn compared(model: &Model) -> Option<&Comparison> {
+    model.live.comparison.as_ref().filter(|_| model.replay.is_some())
+}
+
+/// The panel of the robot; none without room.
+pub fn robot_panel(area: Rect, model: &Model) -> Option<Rect> {
+    places(area, model)?.picture
+}
+
+pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
+    let Some(Places { main, gap, card, objective, picture, table }) = places(area, model) else {
+        return render_landed(frame, area, model);
+    };
+    if model.live.panel == Panel::Joints {
+        render_joints(frame, main, model);
+    } else if model.live.panel == Panel::Charts && area.width >= WIDE && main.height >= 24 {
+        let joint_rows = JOINTS as u16 / if main.width >= TWO_JOINTS_FROM { 2 } else { 1 } + 1;
+        let [charts, joints] = Layout::vertical([Constraint::Fill(1), Constraint::Length(joint_rows)]).areas(main);
         render_charts(frame, charts, model);
         render_joints(frame, joints, model);
-    } else {
-        render_charts(frame, charts, model);
+    } else if model.live.panel == Panel::Charts {
+        render_charts(frame, main, model);
     }
-    match compared {
+    if area.width >= WIDE {
+        let bar = model.theme.bar();
+        let lines = (0..gap.height).map(|_| Line::from(span(&model.theme, Role::Quiet, bar))).collect::<Vec<_>>();
+        frame.render_widget(Paragraph::new(lines), gap);
+    }
+    match compared(model) {
         Some(comparison) => beside::render(frame, card, comparison, model),
         None => proposal::render(frame, card, model),
     }
-    objective::render(frame, objective_area, &model.session, &model.theme);
-    if picture_rows > 0 {
+    objective::render(frame, objective, &model.session, &model.theme);
+    if let Some(picture) = picture {
         wireframe::render(frame, picture, model);
     }
     trials::render_table(frame, table, model, false);

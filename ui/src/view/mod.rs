@@ -22,6 +22,7 @@ mod details;
 mod dialogs;
 mod dots;
 mod draw;
+mod drawing;
 mod health;
 mod health_history;
 mod help;
@@ -45,9 +46,22 @@ mod trials;
 mod wireframe;
 
 use ratatui::Frame;
+use ratatui::layout::{Rect, Size};
 
 use crate::layout::{Areas, areas, compact_areas};
 use crate::model::{Model, View};
+pub(crate) use drawing::Drawing;
+
+/// The cells of the robot's picture on a screen of that size; none where the picture is not shown or something may cover it.
+pub(crate) fn robot_area(size: Size, model: &Model) -> Option<Rect> {
+    let body = areas(size, model).filter(|_| model.view == View::Live && model.dialog.is_none())?.body;
+    wireframe::picture_area(live::robot_panel(body, model)?)
+}
+
+/// The robot's picture for an area whose rows are as high as `row_height` columns are wide; none where the robot is not known.
+pub(crate) fn robot_drawing(area: Rect, row_height: f64, model: &Model) -> Option<Drawing> {
+    wireframe::drawing(area, row_height, model)
+}
 
 /// Draws everything.
 pub fn render(frame: &mut Frame, model: &Model) {

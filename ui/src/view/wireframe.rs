@@ -5,14 +5,13 @@ use nalgebra::{Point2, UnitQuaternion, Vector3};
 use quadfrog::robot::{Leg, leg_of};
 use ratatui::Frame;
 use ratatui::layout::Rect;
-use ratatui::style::Style;
 
-use super::dots::DotGrid;
 use super::draw::heading;
+use super::drawing::Drawing;
 use super::robot_shape::{leg_points, trunk_edges};
 use super::scene::{Scene, steady};
 use crate::model::Model;
-use crate::theme::{Role, Theme};
+use crate::theme::Role;
 
 /// Half of the picture's width without a jump, m: the robot with its legs stretched.
 const REACH: f64 = 0.45;
@@ -57,69 +56,69 @@ impl Camera {
     }
 }
 
-/// The area of the picture with its camera.
-struct Canvas<'a> {
-    area: Rect,
-    theme: &'a Theme,
+/// Collects the picture: lines and marks of the scene, as the camera shows them.
+struct Canvas {
+    drawing: Drawing,
     camera: Camera,
-    /// Columns for a metre in the plane of the target; a row is as high as two columns are wide.
-    per_metre: f64,
+    /// The width and the height of the area, m in the plane of the target.
+    extent_m: (f64, f64),
 }
 
-impl Canvas<'_> {
-    /// Draws lines, of whose dots every `step`-th is set, over what is there.
-    fn lines(&self, frame: &mut Frame, role: Role, step: usize, lines: &[[Vector3<f64>; 2]]) {
-        let mut dots = DotGrid::new(self.area, self.theme.glyphs);
-        for [from, to] in lines {
-            if let (Some(from), Some(to)) = (self.place(from, dots.size), self.place(to, dots.size)) {
-                dots.dotted(from, to, step);
-            }
-        }
-        // Over other lines: nothing of their style stays.
-        dots.draw(frame.buffer_mut(), self.area, Style::reset().patch(self.theme.style(role)));
+impl Canvas {
+    /// Adds lines, of whose dots every `step`-th is set.
+    fn lines(&mut self, role: Role, step: usize, lines: &[[Vector3<f64>; 2]]) {
+        let placed = |[from, to]: &[Vector3<f64>; 2]| Some([self.place(from)?, self.place(to)?]);
+        let lines = lines.iter().filter_map(placed).collect();
+        self.drawing.lines(role, step, lines);
     }
 
-    /// Writes a character at a place.
-    fn mark(&self, frame: &mut Frame, role: Role, at: &Vector3<f64>, character: char) {
-        let size = (usize::from(self.area.width), usize::from(self.area.height));
-        let Some((x, y)) = self.place(at, size) else { return };
-        let inside = x >= 0.0 && y >= 0.0 && x < f64::from(self.area.width) && y < f64::from(self.area.height);
-        let cell = (self.area.x.saturating_add(x as u16), self.area.y.saturating_add(y as u16));
-        if let Some(cell) = frame.buffer_mut().cell_mut(cell).filter(|_| inside) {
-            cell.set_char(character).set_style(Style::reset().patch(self.theme.style(role)));
+    /// Adds a character at a place.
+    fn mark(&mut self, role: Role, at: &Vector3<f64>, character: char) {
+        if let Some(at) = self.place(at) {
+            self.drawing.mark(role, at, character);
         }
     }
 
-    /// The place of a point in a grid of `size` over the area.
-    fn place(&self, point: &Vector3<f64>, size: (usize, usize)) -> Option<(f64, f64)> {
+    /// The place of a point in shares of the area.
+    fn place(&self, point: &Vector3<f64>) -> Option<Point2<f64>> {
         let at = self.camera.project(point)?;
-        let (width, height) = (f64::from(self.area.width), 2.0 * f64::from(self.area.height));
-        let x = (0.5 * width + at.x * self.per_metre) / width * size.0 as f64;
-        let y = (0.5 * height - at.y * self.per_metre) / height * size.1 as f64;
-        Some((x, y))
+        Some(Point2::new(0.5 + at.x / self.extent_m.0, 0.5 - at.y / self.extent_m.1))
     }
 }
 
-pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
+/// The part of the panel below its heading, where the picture is; none without room.
+pub fn picture_area(panel: Rect) -> Option<Rect> {
+    let area = Rect { y: panel.y.saturating_add(1), height: panel.height.saturating_sub(1), ..panel };
+    (area.height >= 4 && area.width >= 20).then_some(area)
+}
+
+pub fn render(frame: &mut Frame, panel: Rect, model: &Model) {
     let (theme, tick) = (&model.theme, &model.snapshot.tick);
     let contacts =
         Leg::ALL.map(|leg| format!("{}{}", leg.name(), theme.contact_indicator(tick.estimate.contact[leg as usize])));
-    let area = heading(frame, area, theme, "Robot", &contacts.join(" "));
-    let Some(robot) = &model.robot else { return };
-    if area.height < 4 || area.width < 20 {
-        return;
+    heading(frame, panel, theme, "Robot", &contacts.join(" "));
+    let Some(area) = picture_area(panel) else { return };
+    if let Some(drawing) = drawing(area, 2.0, model) {
+        drawing.draw_cells(frame, area, theme);
     }
+}
+
+/// The picture for an area whose rows are as high as `row_height` columns are wide; none where the robot is not known.
+pub fn drawing(area: Rect, row_height: f64, model: &Model) -> Option<Drawing> {
+    let (tick, robot) = (&model.snapshot.tick, model.robot.as_ref()?);
     let scene = Scene::of(model, robot);
     let jump = scene.framed_jump(model.session.info.task);
     let half_width = REACH + jump.xy().norm() / 2.0;
     let top = TOP.max(scene.apex + ABOVE_TRUNK);
     let target = Vector3::new(jump.x / 2.0, jump.y / 2.0, (top + BOTTOM) / 2.0);
-    let (width, height) = (f64::from(area.width), 2.0 * f64::from(area.height));
+    let (width, height) = (f64::from(area.width), row_height * f64::from(area.height));
+    // Columns for a metre in the plane of the target.
     let per_metre = (width / (2.0 * half_width)).min(height / (top - BOTTOM));
-    let canvas = Canvas { area, theme, camera: Camera::at(target, half_width), per_metre };
+    let camera = Camera::at(target, half_width);
+    let mut canvas = Canvas { drawing: Drawing::default(), camera, extent_m: (width / per_metre, height / per_metre) };
 
-    canvas.lines(frame, Role::Quiet, 4, &scene.floor_lines(&jump));
-    canvas.lines(frame, Role::Quiet, 2, &scene.box_lines(&jump));
+    canvas.lines(Role::Quiet, 4, &scene.floor_lines(&jump));
+    canvas.lines(Role::Quiet, 2, &scene.box_lines(&jump));
     let rpy = tick.estimate.roll_pitch_yaw.map(|angle| steady(angle, SMALLEST_ANGLE));
     let turned = UnitQuaternion::from_euler_angles(rpy.x, rpy.y, rpy.z - scene.start.yaw);
     let trunk = scene.start.place(tick.estimate.position_world).map(|length| steady(length, SMALLEST_LENGTH));
@@ -130,15 +129,16 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
         points.iter().flat_map(|leg| leg.windows(2).map(|pair| [of_body(pair[0]), of_body(pair[1])])).collect()
     };
     let dots = |points: &[Vector3<f64>]| -> Vec<_> { points.iter().map(|point| [*point, *point]).collect() };
-    canvas.lines(frame, Role::Quiet, 1, &legs_of([Leg::FL, Leg::RL]));
-    canvas.lines(frame, Role::Ghost, 1, &dots(&scene.feet));
-    canvas.lines(frame, Role::SeriesB, 1, &dots(&scene.path));
-    canvas.lines(frame, Role::SeriesA, 1, &trunk_edges(robot).map(|edge| edge.map(of_body)));
-    canvas.lines(frame, Role::Text, 1, &legs_of([Leg::FR, Leg::RR]));
+    canvas.lines(Role::Quiet, 1, &legs_of([Leg::FL, Leg::RL]));
+    canvas.lines(Role::Ghost, 1, &dots(&scene.feet));
+    canvas.lines(Role::SeriesB, 1, &dots(&scene.path));
+    canvas.lines(Role::SeriesA, 1, &trunk_edges(robot).map(|edge| edge.map(of_body)));
+    canvas.lines(Role::Text, 1, &legs_of([Leg::FR, Leg::RR]));
     if let Some(best) = &scene.best {
-        canvas.mark(frame, Role::Good, &scene.floor(best.x, best.y), 'o');
+        canvas.mark(Role::Good, &scene.floor(best.x, best.y), 'o');
     }
     if let Some(landed) = scene.path.last().filter(|_| tick.trial.is_none()) {
-        canvas.mark(frame, Role::Key, &scene.floor(landed.x, landed.y), 'x');
+        canvas.mark(Role::Key, &scene.floor(landed.x, landed.y), 'x');
     }
+    Some(canvas.drawing)
 }

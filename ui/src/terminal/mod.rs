@@ -3,44 +3,40 @@
 //! A thread writes the frames. A terminal that does not read (a stalled SSH connection, a paused pty) then costs frames,
 //! but delays neither keys nor STOP nor the operator heartbeat.
 
-use crate::output;
-use std::fs::File;
+mod restore;
+mod writer;
+
 use std::io::{self, IsTerminal, Write};
 use std::os::fd::AsFd;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::mpsc::{Receiver, Sender, channel};
+use std::rc::Rc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::channel;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use crossterm::cursor::{Hide, Show};
+use crossterm::cursor::Hide;
 use crossterm::event::{DisableBracketedPaste, DisableMouseCapture, EnableBracketedPaste, EnableMouseCapture};
 use crossterm::queue;
-use crossterm::style::ResetColor;
-use crossterm::terminal::{
-    Clear, ClearType, EndSynchronizedUpdate, EnterAlternateScreen, LeaveAlternateScreen, disable_raw_mode,
-    enable_raw_mode, size,
-};
+use crossterm::terminal::{Clear, ClearType, EnterAlternateScreen, enable_raw_mode, size};
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use quadfrog::realtime::channel::StopLatch;
-use ratatui::backend::{self, Backend, CrosstermBackend, WindowSize};
-use ratatui::buffer::Cell;
-use ratatui::layout::{Position, Size};
-use ratatui::{Terminal, TerminalOptions, Viewport};
+use ratatui::backend::{Backend, CrosstermBackend};
+use ratatui::{Frame, Terminal, TerminalOptions, Viewport};
 
-use crate::cell_encoder::encode;
+use crate::graphics::EncodedPicture;
 use crate::layout::{COMPACT_COLUMNS, COMPACT_ROWS};
+use crate::output;
+use restore::{ENTERED, LEAVE_TIMEOUT, REMOVE_PICTURE, own_file, restore};
+use writer::{FrameWriter, WriteOnlyBackend, WriterState, write_frames};
 
-/// Time limit of the restoration of a terminal that does not read.
-const LEAVE_TIMEOUT: Duration = Duration::from_millis(500);
 /// Time-out of each wait for a hang-up.
 const HANG_UP_PERIOD_MS: u16 = 200;
 
-/// Begin and end of a synchronized update (DEC private mode 2026). A terminal without it ignores both.
-const BEGIN_SYNCHRONIZED: &[u8] = b"\x1b[?2026h";
-const END_SYNCHRONIZED: &[u8] = b"\x1b[?2026l";
 /// Question for the colour of the background (XTerm Control Sequences, OSC 11). The answer arrives among the keys.
 const ASK_BACKGROUND: &[u8] = b"\x1b]11;?\x1b\\";
+/// Question for the primary device attributes (XTerm Control Sequences, DA1). The answer arrives among the keys.
+const ASK_ATTRIBUTES: &[u8] = b"\x1b[c";
 
 /// The parts of the terminal's protocol that the console uses.
 #[derive(Debug, Clone, Copy)]
@@ -49,6 +45,8 @@ pub(crate) struct TerminalProtocol {
     pub pastes: bool,
     /// The question for the background.
     pub asks_background: bool,
+    /// The question for the primary device attributes.
+    pub asks_attributes: bool,
     /// Synchronized updates. Not over a slow link, where a frame is better seen as it arrives.
     pub synchronized: bool,
 }
@@ -89,118 +87,6 @@ pub fn check() -> Result<(), TerminalError> {
     }
 }
 
-/// State shared by the writing thread and its owner.
-#[derive(Default)]
-struct WriterState {
-    /// Number of frames not written yet.
-    waiting: AtomicUsize,
-    /// Writing to the terminal failed.
-    broken: AtomicBool,
-}
-
-/// Collects the bytes of a frame and sends the complete frame to the writing thread.
-struct FrameWriter {
-    frame: Vec<u8>,
-    /// Whether each frame is a synchronized update: the terminal then shows no half of one.
-    synchronized: bool,
-    frames: Sender<Vec<u8>>,
-    state: Arc<WriterState>,
-}
-
-impl Write for FrameWriter {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        if self.synchronized && self.frame.is_empty() && !bytes.is_empty() {
-            self.frame.extend_from_slice(BEGIN_SYNCHRONIZED);
-        }
-        self.frame.extend_from_slice(bytes);
-        Ok(bytes.len())
-    }
-
-    /// Ends the frame.
-    fn flush(&mut self) -> io::Result<()> {
-        if !self.frame.is_empty() {
-            if self.synchronized {
-                self.frame.extend_from_slice(END_SYNCHRONIZED);
-            }
-            self.state.waiting.fetch_add(1, Ordering::AcqRel);
-            let gone = |_| io::Error::from(io::ErrorKind::BrokenPipe);
-            self.frames.send(std::mem::take(&mut self.frame)).map_err(gone)?;
-        }
-        Ok(())
-    }
-}
-
-/// Writes frames until their sender is dropped.
-fn write_frames(frames: &Receiver<Vec<u8>>, state: &WriterState, mut terminal: File) {
-    while let Ok(frame) = frames.recv() {
-        let _output = OUTPUT.lock().unwrap_or_else(PoisonError::into_inner);
-        // A frame drawn while another thread panicked would hide the cursor of a restored terminal.
-        let drop_frame = !ENTERED.load(Ordering::Acquire) || state.broken.load(Ordering::Acquire);
-        if !drop_frame && terminal.write_all(&frame).is_err() {
-            state.broken.store(true, Ordering::Release);
-        }
-        state.waiting.fetch_sub(1, Ordering::AcqRel);
-    }
-}
-
-/// A backend that never queries the terminal. ratatui asks for the cursor position whenever it clears; the answer would
-/// arrive in the thread that reads keys, and late over a slow link.
-struct WriteOnlyBackend(CrosstermBackend<FrameWriter>);
-
-impl Backend for WriteOnlyBackend {
-    type Error = io::Error;
-
-    fn draw<'a, I>(&mut self, content: I) -> io::Result<()>
-    where
-        I: Iterator<Item = (u16, u16, &'a Cell)>,
-    {
-        let cells: Vec<_> = content.collect();
-        self.0.write_all(&encode(&cells))
-    }
-
-    /// Does nothing: ratatui hides the cursor after every frame, and it is hidden since the terminal was configured.
-    fn hide_cursor(&mut self) -> io::Result<()> {
-        Ok(())
-    }
-
-    fn show_cursor(&mut self) -> io::Result<()> {
-        self.0.show_cursor()
-    }
-
-    /// Returns the origin: the cursor is hidden and every write moves it.
-    fn get_cursor_position(&mut self) -> io::Result<Position> {
-        Ok(Position::ORIGIN)
-    }
-
-    fn set_cursor_position<P: Into<Position>>(&mut self, position: P) -> io::Result<()> {
-        self.0.set_cursor_position(position)
-    }
-
-    fn clear(&mut self) -> io::Result<()> {
-        self.0.clear()
-    }
-
-    fn clear_region(&mut self, region: backend::ClearType) -> io::Result<()> {
-        self.0.clear_region(region)
-    }
-
-    fn size(&self) -> io::Result<Size> {
-        self.0.size()
-    }
-
-    fn window_size(&mut self) -> io::Result<WindowSize> {
-        self.0.window_size()
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        Backend::flush(&mut self.0)
-    }
-}
-
-/// Set while the console has the terminal. The thread that clears it restores the terminal.
-static ENTERED: AtomicBool = AtomicBool::new(false);
-/// Held while a whole frame, or the restoration, is written.
-static OUTPUT: Mutex<()> = Mutex::new(());
 /// STOP latch that a panic in any thread sets, before anything else.
 static STOP: Mutex<Option<StopLatch>> = Mutex::new(None);
 /// Name of the first thread that panicked; the loop then ends instead of leaving a dead screen.
@@ -219,6 +105,8 @@ pub(crate) struct TerminalScreen {
     terminal: Option<Terminal<WriteOnlyBackend>>,
     state: Arc<WriterState>,
     writer: Option<JoinHandle<()>>,
+    /// The picture that the terminal shows.
+    picture: Option<Rc<EncodedPicture>>,
     mouse: bool,
     protocol: TerminalProtocol,
     hung_up: bool,
@@ -246,6 +134,7 @@ impl TerminalScreen {
             terminal: Some(terminal),
             state,
             writer: Some(writer),
+            picture: None,
             mouse: false,
             protocol,
             hung_up: false,
@@ -269,6 +158,11 @@ impl TerminalScreen {
             if self.protocol.asks_background {
                 writer.write_all(ASK_BACKGROUND)?;
             }
+            if self.protocol.asks_attributes {
+                writer.write_all(ASK_ATTRIBUTES)?;
+            }
+            // The restoration removed it.
+            self.picture = None;
             terminal.clear()?;
         }
         Ok(())
@@ -290,17 +184,41 @@ impl TerminalScreen {
         self.state.broken.load(Ordering::Acquire)
     }
 
-    /// Draws a frame.
-    pub fn draw(&mut self, render: impl FnOnce(&mut ratatui::Frame)) -> io::Result<()> {
-        match &mut self.terminal {
-            Some(terminal) => terminal.draw(render).map(|_| ()),
-            None => Ok(()),
+    /// Draws a frame, and the picture that `render` returns over its cells. A picture that the terminal shows already is not
+    /// sent again; another one is removed before the cells are drawn.
+    pub fn draw(&mut self, render: impl FnOnce(&mut Frame) -> Option<Rc<EncodedPicture>>) -> io::Result<()> {
+        let Some(terminal) = &mut self.terminal else { return Ok(()) };
+        let columns_and_rows = |terminal: &mut Terminal<_>| terminal.get_frame().area();
+        let before = columns_and_rows(terminal);
+        // Clears a screen whose size changed.
+        terminal.autoresize()?;
+        let resized = columns_and_rows(terminal) != before;
+        let picture = render(&mut terminal.get_frame());
+        let shown = self.picture.as_ref().filter(|_| !resized);
+        let same = shown.zip(picture.as_ref()).is_some_and(|(shown, picture)| Rc::ptr_eq(shown, picture));
+        let writer = &mut terminal.backend_mut().0;
+        if !same && let Some(shown) = self.picture.take() {
+            writer.write_all(&shown.remove)?;
         }
+        terminal.flush()?;
+        let writer = &mut terminal.backend_mut().0;
+        if let Some(picture) = picture.filter(|_| !same) {
+            writer.write_all(&picture.show)?;
+            self.picture = Some(picture);
+        }
+        let remove = self.picture.as_ref().map_or_else(Vec::new, |picture| picture.remove.clone());
+        *REMOVE_PICTURE.lock().unwrap_or_else(PoisonError::into_inner) = remove;
+        terminal.swap_buffers();
+        Backend::flush(terminal.backend_mut())
     }
 
     /// Clears the screen, so that the next frame draws all cells.
     pub fn clear(&mut self) -> io::Result<()> {
-        self.terminal.as_mut().map_or(Ok(()), Terminal::clear)
+        let Some(terminal) = &mut self.terminal else { return Ok(()) };
+        if let Some(picture) = self.picture.take() {
+            terminal.backend_mut().0.write_all(&picture.remove)?;
+        }
+        terminal.clear()
     }
 
     /// Starts or ends the capture of mouse events.
@@ -356,43 +274,6 @@ impl Drop for TerminalScreen {
             let _ = writer.join();
         }
     }
-}
-
-/// Duplicates standard output, without the lock of the library that a blocked write would hold.
-fn own_file() -> io::Result<File> {
-    Ok(File::from(io::stdout().as_fd().try_clone_to_owned()?))
-}
-
-/// Restores screen, cursor and cooked mode, if the terminal was configured. Times out on a terminal that does not read.
-fn restore() {
-    if !ENTERED.swap(false, Ordering::AcqRel) {
-        return;
-    }
-    let (done, finished): (Sender<()>, Receiver<()>) = channel();
-    // In a thread, because the write may block for ever.
-    let writing = std::thread::Builder::new().name("leave".into()).spawn(move || {
-        if let Ok(mut terminal) = own_file() {
-            let mut bytes = Vec::new();
-            // Writing to memory cannot fail.
-            let _ = queue!(
-                bytes,
-                EndSynchronizedUpdate,
-                ResetColor,
-                DisableMouseCapture,
-                DisableBracketedPaste,
-                LeaveAlternateScreen,
-                Show
-            );
-            let _output = OUTPUT.lock().unwrap_or_else(PoisonError::into_inner);
-            let _ = terminal.write_all(&bytes);
-        }
-        let _ = done.send(());
-    });
-    if writing.is_ok() {
-        // After a time-out the bytes are written when the terminal reads again.
-        let _ = finished.recv_timeout(LEAVE_TIMEOUT);
-    }
-    let _ = disable_raw_mode();
 }
 
 fn install_panic_hook() {
