@@ -54,6 +54,19 @@
 //!
 //! `tests/architecture.rs` checks these rules. `docs/architecture.md` explains the structure and how to add a task, a robot, a
 //! sampler, a view or a failsafe.
+//!
+//! # Examples
+//!
+//! The engine runs without the console. `cargo run --release --example NAME` in the repository:
+//!
+//! | name | shows |
+//! |---|---|
+//! | `study` | a study in 30 lines: configuration, robot, simulator, sampler, trials |
+//! | `drive_robot` | joint commands to a simulated robot, without the controller |
+//! | `own_task` | an objective and a force profile of one's own |
+//! | `own_sampler` | proposals of one's own in a study |
+//! | `own_robot` | an implementation of [`robot::Robot`] under the controller |
+//! | `read_recording` | trials and ticks of a recording |
 
 pub mod config;
 pub mod control;

@@ -16,7 +16,7 @@ use crate::series::Series;
 use crate::theme::{ColourChoice, GlyphChoice, ThemeChoice};
 
 /// The defaults, and the documentation of every key.
-pub const DEFAULT: &str = include_str!("../../config/console.toml");
+pub const DEFAULT: &str = include_str!("../data/console.toml");
 
 /// The console's settings, checked.
 #[derive(Debug, Clone, PartialEq)]

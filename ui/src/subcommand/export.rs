@@ -30,8 +30,8 @@ enum LayoutOf {
 impl LayoutOf {
     fn contents(self) -> &'static str {
         match self {
-            LayoutOf::Foxglove => include_str!("../../../docs/foxglove-layout.json"),
-            LayoutOf::Rerun => include_str!("../../../docs/rerun_blueprint.py"),
+            LayoutOf::Foxglove => include_str!("../../data/foxglove-layout.json"),
+            LayoutOf::Rerun => include_str!("../../data/rerun_blueprint.py"),
         }
     }
 }

@@ -1,4 +1,5 @@
 //! The configurations of the experiments: the folders of `examples/`, compiled in, and what an experiment adds to them.
+//! `ui/data` has links to the files of the repository that this package contains.
 
 use quadfrog::config::{Config, ConfigError, ConfigLayer};
 use serde::{Deserialize, Serialize};
@@ -9,7 +10,7 @@ type ExampleFiles = &'static [(&'static str, &'static str)];
 
 macro_rules! example {
     ($($path:literal),+) => {
-        &[$(($path, include_str!(concat!("../../../../", $path)))),+]
+        &[$(($path, include_str!(concat!("../../../data/", $path)))),+]
     };
 }
 

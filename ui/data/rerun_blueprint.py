@@ -1,0 +1,1 @@
+../../docs/rerun_blueprint.py
