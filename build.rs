@@ -1,15 +1,17 @@
-//! Compiles `proto/frog.proto` to Rust types and to the descriptor that a recording carries.
+//! Compiles `proto/frog.proto` to Rust types, to the descriptor that a recording carries, and to its page of documentation.
 
 use std::path::PathBuf;
 
 use prost::Message as _;
-use prost_types::{FieldDescriptorProto, FileDescriptorProto, FileDescriptorSet};
+use prost_types::field_descriptor_proto::{Label, Type};
+use prost_types::{DescriptorProto, EnumDescriptorProto, FieldDescriptorProto, FileDescriptorProto, FileDescriptorSet};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     println!("cargo::rerun-if-changed=proto");
     let out = PathBuf::from(std::env::var("OUT_DIR")?);
     let mut descriptors = protox::compile(["frog.proto"], ["proto"])?;
     std::fs::write(out.join("frog.v1.comments.rs"), comments(&descriptors.file[0]))?;
+    std::fs::write(out.join("messages.md"), Page { file: &descriptors.file[0] }.text())?;
     let mut config = prost_build::Config::new();
     // A tick by the names of its fields, for `quadfrog verify`.
     for message in ["ControlTick", "Battery", "Truth", "JointCommand", "FaultTicks.Whole"] {
@@ -81,4 +83,90 @@ fn comments(file: &FileDescriptorProto) -> String {
         format!("({name:?}, &[{}])", fields.join(", "))
     });
     format!("&[{}]", rows.collect::<Vec<_>>().join(",\n"))
+}
+
+/// `docs/reference/messages.md`: the messages as tables of Markdown. Paths are those of `descriptor.proto`.
+struct Page<'a> {
+    file: &'a FileDescriptorProto,
+}
+
+impl Page<'_> {
+    /// Comments before and behind the element at `path`.
+    fn comments(&self, path: &[i32]) -> [&str; 2] {
+        let found = self.file.source_code_info.iter().flat_map(|info| &info.location).find(|at| at.path == path);
+        found.map_or(["", ""], |at| [at.leading_comments().trim(), at.trailing_comments().trim()])
+    }
+
+    /// The page.
+    fn text(&self) -> String {
+        // 12: the line `syntax`, behind the comment of the file.
+        let [about, _] = self.comments(&[12]);
+        let mut page = String::from(
+            "# Messages of a recording\n\n\
+             Made from `proto/frog.proto` by the build of the engine; `QUADFROG_WRITE=1 cargo test --test messages_page` writes it.\n\
+             `recordings/README.md` describes the container, its topics and its attachments; each recording has this file inside.\n",
+        );
+        page += &format!("\n{}\n", about.lines().map(str::trim).collect::<Vec<_>>().join("\n"));
+        for (index, message) in (0..).zip(&self.file.message_type) {
+            self.message(message, message.name(), &[4, index], &mut page);
+        }
+        page
+    }
+
+    fn message(&self, message: &DescriptorProto, name: &str, path: &[i32], page: &mut String) {
+        let level = if path.len() == 2 { "##" } else { "###" };
+        *page += &format!("\n{level} {name}\n");
+        let [about, _] = self.comments(path);
+        if !about.is_empty() {
+            *page += &format!("\n{}\n", about.lines().map(str::trim).collect::<Vec<_>>().join("\n"));
+        }
+        *page += "\n| number | field | type | meaning |\n|---|---|---|---|\n";
+        for (index, field) in (0..).zip(&message.field) {
+            let [before, behind] = self.comments(&[path, &[2, index]].concat()).map(cell);
+            if !before.is_empty() {
+                *page += &format!("| | | | *{before}* |\n");
+            }
+            *page += &format!("| {} | `{}` | {} | {behind} |\n", field.number(), field.name(), kind(field));
+        }
+        for (index, choice) in (0..).zip(&message.enum_type) {
+            self.choices(choice, &[path, &[4, index]].concat(), page);
+        }
+        for (index, nested) in (0..).zip(&message.nested_type) {
+            self.message(nested, &format!("{name}.{}", nested.name()), &[path, &[3, index]].concat(), page);
+        }
+    }
+
+    fn choices(&self, choice: &EnumDescriptorProto, path: &[i32], page: &mut String) {
+        let [about, _] = self.comments(path).map(cell);
+        let value = |(index, value): (i32, &prost_types::EnumValueDescriptorProto)| {
+            let [before, behind] = self.comments(&[path, &[2, index]].concat()).map(cell);
+            let meaning = if behind.is_empty() { before } else { behind };
+            let meaning = if meaning.is_empty() { meaning } else { format!(" ({meaning})") };
+            format!("{} `{}`{meaning}", value.number(), value.name())
+        };
+        let values: Vec<_> = (0..).zip(&choice.value).map(value).collect();
+        let about = about.trim_end_matches('.');
+        let about = if about.is_empty() { String::new() } else { format!(" ({about})") };
+        *page += &format!("\n`{}`{about}: {}.\n", choice.name(), values.join(", "));
+    }
+}
+
+/// A comment in a cell of a table.
+fn cell(comment: &str) -> String {
+    comment.split_whitespace().collect::<Vec<_>>().join(" ").replace('|', "\\|")
+}
+
+/// The type of a field as in the source: `optional double`, `repeated Item`.
+fn kind(field: &FieldDescriptorProto) -> String {
+    let label = match (field.label(), field.proto3_optional()) {
+        (Label::Repeated, _) => "repeated ",
+        (_, true) => "optional ",
+        _ => "",
+    };
+    let plain = field.r#type().as_str_name().trim_start_matches("TYPE_").to_lowercase();
+    let name = match field.r#type() {
+        Type::Message | Type::Enum => field.type_name().trim_start_matches(".frog.v1."),
+        _ => &plain,
+    };
+    format!("{label}{name}")
 }

@@ -143,12 +143,12 @@ fn chosen_trials_are_found_or_left_out() {
 fn a_page_of_a_study_names_missing_ticks_and_draws_the_others() {
     let mut study = study(0, rows());
     let choices = [TrialChoice::Best, TrialChoice::First, TrialChoice::LastFall];
-    let without = study_page::page(std::slice::from_ref(&study), &choices);
+    let without = study_page::page(std::slice::from_ref(&study), &choices, "0.1.0 (test)");
     assert!(text::render(&without, 80).contains("No recording of this study exists"));
     let robot = RobotDescription::embedded("go1").unwrap();
     study.recordings.files.push("session.mcap".into());
     study.recordings.trials.insert(1, RecordedTrial::of(&ticks(), &robot).unwrap());
-    let page = study_page::page(std::slice::from_ref(&study), &choices);
+    let page = study_page::page(std::slice::from_ref(&study), &choices, "0.1.0 (test)");
     let shown = text::render(&page, 80).replace('\n', " ");
     assert!(shown.contains("Ticks of 1 of 6 trials are recorded; those of trial 0 are missing"), "{shown}");
     let motion = page.figures().find(|figure| figure.name == "forward-motion").unwrap();

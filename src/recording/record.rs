@@ -106,6 +106,11 @@ pub struct SessionInfo {
 }
 
 impl SessionInfo {
+    /// Returns the version of the program with the commit of its sources, where it is known: "0.1.0 (9fceb02d…)".
+    pub fn program_version(&self) -> String {
+        if self.commit.is_empty() { self.version.clone() } else { format!("{} ({})", self.version, self.commit) }
+    }
+
     /// Returns whether the session drives a robot.
     pub fn is_hardware(&self) -> bool {
         self.backend == Some(Backend::Hardware)

@@ -1,6 +1,6 @@
 //! Recorded trials of a study, read from its recordings.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
 use super::jump::{JumpCurves, JumpQuantities};
@@ -35,6 +35,8 @@ pub struct Recordings {
     pub trials: BTreeMap<u32, RecordedTrial>,
     /// Recordings that were read.
     pub files: Vec<PathBuf>,
+    /// Versions of quadfrog that wrote them, each with its commit.
+    pub programs: BTreeSet<String>,
     /// Damaged and unreadable recordings, as sentences.
     pub damages: Vec<String>,
 }
@@ -54,6 +56,7 @@ impl Recordings {
     }
 
     fn play(&mut self, mut player: Player, robot: &RobotDescription) {
+        self.programs.insert(player.session().program_version());
         let mut ticks: Vec<Tick> = Vec::new();
         for played in player.by_ref() {
             let Played::Tick(tick) = played else { continue };

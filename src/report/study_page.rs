@@ -7,15 +7,15 @@ use super::study_tables::{self as tables, title};
 use crate::optimize::ask::Direction;
 use crate::trial::Task;
 
-/// Returns the report of `studies`, at least one; `choices`: the trials whose ticks are drawn.
-pub fn page(studies: &[ReportedStudy], choices: &[TrialChoice]) -> Page {
+/// Returns the report of `studies`, at least one; `choices`: the trials whose ticks are drawn; `version`: that of the program
+/// that writes the report, with its commit.
+pub fn page(studies: &[ReportedStudy], choices: &[TrialChoice], version: &str) -> Page {
     let groups = by_task(studies);
     let name = match studies {
         [only] => format!("Study {}", title(only)),
         several => format!("{} studies", several.len()),
     };
     let places: Vec<&str> = studies.iter().map(|study| study.place.as_str()).collect();
-    let version = env!("CARGO_PKG_VERSION");
     let mut page = Page::new(format!("quadfrog report: {name}"), format!("{}; quadfrog {version}", places.join(", ")));
     page.sections.push(objective(&groups));
     page.sections.push(results(studies, &groups));
@@ -189,6 +189,10 @@ fn recordings(studies: &[ReportedStudy]) -> Section {
         let files: Vec<String> = study.recordings.files.iter().map(|file| file.display().to_string()).collect();
         let read = if files.is_empty() { "no recording exists".to_owned() } else { files.join(", ") };
         section.paragraph(format!("{}: {} with {read}.", title(study), study.place));
+        let programs: Vec<&str> = study.recordings.programs.iter().map(String::as_str).collect();
+        if !programs.is_empty() {
+            section.paragraph(format!("{}: recorded by quadfrog {}.", title(study), programs.join(", ")));
+        }
         for damage in &study.recordings.damages {
             section.paragraph(format!("{}: {damage}.", title(study)));
         }

@@ -88,6 +88,9 @@ fn a_page_is_well_formed_opens_offline_and_has_the_numbers_of_the_export() {
     for reference in ["<script", "http:", "https:", "src=", "href=", "url(", "@import"] {
         assert!(!html.contains(reference), "the page contains {reference}");
     }
+    // The program that wrote the report, and the one that recorded.
+    let version = program.text(&["--version"]);
+    assert_eq!(html.matches(version.trim()).count(), 2, "{version}");
     let page = page(&program, &[&study]);
     let figures = blocks(&page, "figure");
     assert_eq!(names.iter().filter(|name| *name == "svg").count(), figures.len());

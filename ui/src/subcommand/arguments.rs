@@ -15,6 +15,9 @@ use quadfrog_console::notice;
 use super::completion;
 use super::failure::Failure;
 
+/// Version of the program and commit of its sources.
+pub const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), " (", env!("QUADFROG_COMMIT"), ")");
+
 /// Parses one of several named values; each row is a value, its name and its line of help.
 pub fn one_of<T: Copy + Send + Sync + 'static>(
     rows: impl IntoIterator<Item = (T, &'static str, &'static str)>,

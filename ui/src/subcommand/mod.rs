@@ -31,13 +31,11 @@ mod verify;
 
 use clap::{CommandFactory as _, Parser, Subcommand};
 
+pub use arguments::VERSION;
 pub use completion::answer_shell;
 pub use failure::Failure;
 use quadfrog::optimize::journal::notice_waits;
 use quadfrog_console::output;
-
-/// Version of the program and commit of its sources.
-pub const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), " (", env!("QUADFROG_COMMIT"), ")");
 
 /// Optimize the jumps of a quadruped, on the robot or on the built-in simulator.
 ///

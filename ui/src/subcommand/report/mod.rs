@@ -12,6 +12,7 @@ use quadfrog::report::study::TrialChoice;
 use quadfrog::report::{html, study_page, svg, text};
 use quadfrog_console::{notice, output};
 
+use super::arguments::VERSION;
 use super::completion;
 use super::failure::Failure;
 pub use load::load;
@@ -67,7 +68,7 @@ pub fn run(arguments: &ReportArguments) -> Result<(), Failure> {
             return Err(Failure::input(message));
         }
     }
-    let page = study_page::page(&studies, &arguments.trials);
+    let page = study_page::page(&studies, &arguments.trials, VERSION);
     if let Some(file) = &arguments.output {
         write_page(file, &html::render(&page))?;
         notice!("report: {}", file.display());
