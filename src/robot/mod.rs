@@ -5,8 +5,10 @@
 //! hip joint, axes of the body. Legs are always in the order FR, FL, RR, RL; joints hip (abduction, about x),
 //! thigh (about y), calf (about y). SI units and radians throughout.
 
+pub mod crc;
 pub mod description;
 pub mod go1;
+pub mod go2;
 pub mod kinematics;
 pub mod recent_count;
 pub mod remote;

@@ -12,11 +12,8 @@ use super::packet::{
     CommandError, CrcForm, LowCmd, LowState, MODE_BRAKE, MODE_SERVO, MotorRecord, MotorTarget, POSITION_STOP,
     RemoteRecord, VELOCITY_STOP,
 };
-use crate::robot::remote::{Remote, RemoteButtons};
 use crate::robot::{Battery, Imu, JOINTS, JointCommand, MotorCommand, RobotState};
 
-/// Head of the remote control's bytes that the emulator sends. Assumption: not zero while the remote control answers.
-const REMOTE_HEAD: [u8; 2] = [0x55, 0x51];
 /// Largest deviation of the norm of a reported orientation from 1.
 const QUATERNION_TOLERANCE: f32 = 0.1;
 
@@ -100,18 +97,7 @@ pub fn robot_state(state: &LowState, foot_step_n: f64) -> RobotState {
             cell_v,
         }),
         truth: None,
-        remote: state.remote.answers().then(|| remote(&state.remote)),
-    }
-}
-
-fn remote(record: &RemoteRecord) -> Remote {
-    let [left_x, right_x, right_y, l2, left_y] =
-        [record.left_x, record.right[0], record.right[1], record.l2, record.left_y].map(|axis| axis.get().into());
-    Remote {
-        buttons: RemoteButtons(record.buttons.get()),
-        left_stick: [left_x, left_y],
-        right_stick: [right_x, right_y],
-        l2_travel: l2,
+        remote: state.remote.decode(),
     }
 }
 
@@ -144,15 +130,7 @@ pub fn low_state(state: &RobotState, foot_step_n: f64) -> LowState {
     datagram.foot_force = state.foot_force_n.map(|force| ((force / foot_step_n).round() as i16).into());
     datagram.foot_force_estimated = datagram.foot_force;
     if let Some(remote) = &state.remote {
-        datagram.remote = RemoteRecord {
-            head: REMOTE_HEAD,
-            buttons: remote.buttons.0.into(),
-            left_x: float(remote.left_stick[0]),
-            right: remote.right_stick.map(float),
-            l2: float(remote.l2_travel),
-            left_y: float(remote.left_stick[1]),
-            idle: [0; 16],
-        };
+        datagram.remote = RemoteRecord::encode(remote);
     }
     datagram
 }

@@ -13,9 +13,11 @@ mod state;
 use zerocopy::little_endian::{U16, U32};
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout, Unaligned};
 
+pub use crate::robot::crc::crc;
+pub use crate::robot::remote::RemoteRecord;
 pub use command::{COMMAND_LENGTH, LowCmd, MODE_BRAKE, MODE_SERVO, MotorTarget, POSITION_STOP, VELOCITY_STOP};
-pub use crc::{CrcForm, crc};
-pub use state::{BatteryRecord, ImuRecord, LowState, MotorRecord, RemoteRecord, STATE_LENGTH};
+pub use crc::CrcForm;
+pub use state::{BatteryRecord, ImuRecord, LowState, MotorRecord, STATE_LENGTH};
 
 /// Number of motor records in a datagram; the Go1 uses the first twelve.
 pub const MOTORS: usize = 20;

@@ -3,7 +3,7 @@
 use zerocopy::little_endian::{F32, I16, I32, U16, U32};
 use zerocopy::{FromBytes, FromZeros, Immutable, IntoBytes, KnownLayout, Unaligned};
 
-use super::{CrcForm, HEAD, HIGH_LEVEL, Header, MOTORS, Rejection, crc};
+use super::{CrcForm, HEAD, HIGH_LEVEL, Header, MOTORS, Rejection, RemoteRecord, crc};
 
 /// Bytes of a state that are read; a real robot is reported to send 13 more of unknown meaning.
 pub const STATE_LENGTH: usize = 807;
@@ -102,33 +102,6 @@ impl BatteryRecord {
     }
 }
 
-/// Record of the remote control, 40 bytes: Unitree's `xRockerBtnDataStruct` (joystick.h of unitree_legged_sdk).
-#[derive(Debug, Clone, Copy, PartialEq, FromBytes, IntoBytes, Immutable, KnownLayout, Unaligned)]
-#[repr(C)]
-pub struct RemoteRecord {
-    /// Head; its value is not established.
-    pub head: [u8; 2],
-    /// Pressed buttons, one bit each.
-    pub buttons: U16,
-    /// Left stick, x.
-    pub left_x: F32,
-    /// Right stick, x and y.
-    pub right: [F32; 2],
-    /// Travel of L2.
-    pub l2: F32,
-    /// Left stick, y.
-    pub left_y: F32,
-    /// Unused.
-    pub idle: [u8; 16],
-}
-
-impl RemoteRecord {
-    /// Whether the remote control answers: a byte is not zero.
-    pub fn answers(&self) -> bool {
-        self.as_bytes().iter().any(|byte| *byte != 0)
-    }
-}
-
 /// The state datagram, 807 bytes.
 #[derive(Debug, Clone, Copy, PartialEq, FromBytes, IntoBytes, Immutable, KnownLayout, Unaligned)]
 #[repr(C)]
@@ -196,7 +169,7 @@ fn form_of(level: u8) -> CrcForm {
     if level == HIGH_LEVEL { CrcForm::Sealed } else { CrcForm::Plain }
 }
 
-const _: () = assert!(size_of::<LowState>() == STATE_LENGTH && size_of::<RemoteRecord>() == 40);
+const _: () = assert!(size_of::<LowState>() == STATE_LENGTH);
 const _: () = assert!(std::mem::offset_of!(LowState, remote) == 759);
 const _: () =
     assert!(std::mem::offset_of!(LowState, motor) == 75 && std::mem::offset_of!(LowState, robot_time_ms) == 755);

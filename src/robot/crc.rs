@@ -1,0 +1,42 @@
+//! Checksum of Unitree's messages: a 32-bit register, start FFFFFFFF, polynomial 04C11DB7, not reflected, no final xor,
+//! over little-endian words, each from bit 31 to bit 0 (`docs/go1-wire.md`, section 3; `docs/go2-wire.md`, section 4).
+
+/// Words that are reflected at a time: a datagram of the Go1 or a command of the Go2 whole.
+const BLOCK: usize = 256;
+
+/// Computes the checksum of the whole words in `data`; remaining bytes are not covered.
+///
+/// Uses the common CRC-32, which has the same polynomial and start but is reflected and inverts the register at the
+/// end: the words are bit-reversed before, the result after.
+pub fn crc(data: &[u8]) -> u32 {
+    let (words, _) = data.as_chunks::<4>();
+    let mut common = crc32fast::Hasher::new();
+    for block in words.chunks(BLOCK) {
+        let mut mirrored = [[0; 4]; BLOCK];
+        for (mirrored, word) in mirrored.iter_mut().zip(block) {
+            *mirrored = u32::from_le_bytes(*word).reverse_bits().to_le_bytes();
+        }
+        common.update(mirrored[..block.len()].as_flattened());
+    }
+    (!common.finalize()).reverse_bits()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The worked examples of `docs/go1-wire.md`, section 3, and `docs/go2-wire.md`, section 4.
+    #[test]
+    fn the_documented_examples() {
+        assert_eq!(crc(&[0; 4]), 0xC704_DD7B);
+        assert_eq!(crc(&[0xFE, 0xEF, 0xFF, 0]), 0x9BF0_26DF);
+        assert_eq!(crc(&[0; 608]), 0xE7CD_1C3B);
+        assert_eq!(crc(&[0; 808]), 0x4B5A_4880);
+        assert_eq!(crc(&[0; 1176]), 0x85F1_1EA6);
+    }
+
+    #[test]
+    fn an_incomplete_word_is_not_covered() {
+        assert_eq!(crc(&[1, 2, 3, 4, 5, 6, 7]), crc(&[1, 2, 3, 4]));
+    }
+}
