@@ -180,6 +180,7 @@ fn in_words(value: &Value, between: &str) -> String {
     match value {
         Value::Null => "none".to_owned(),
         Value::String(text) => text.clone(),
+        Value::Object(members) if members.is_empty() => "none".to_owned(),
         Value::Array(list) => join(&mut list.iter().map(|value| in_words(value, between)), between),
         Value::Object(members) => {
             join(&mut members.iter().map(|(name, value)| format!("{name} {}", in_words(value, between))), ", ")
