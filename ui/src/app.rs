@@ -139,6 +139,7 @@ impl Console {
         let mut pictures = PictureSchedule::new(support);
         pictures.resize(crossterm::terminal::window_size().ok());
         let mut model = Model::new(settings, theme, options.robot);
+        model.first_frame = true;
         let (columns, rows) = crossterm::terminal::size().context("the terminal's size")?;
         update(&mut model, Msg::Resize(columns, rows));
         // The kernel's console has no such report.
@@ -389,7 +390,10 @@ impl Console {
             // The cells below stay blank: a character there would be in the picture, or erase a part of it.
             pictures.picture(model, size, Instant::now()).inspect(|picture| frame.render_widget(Clear, picture.area))
         };
-        self.screen.draw(draw).context("drawing")
+        self.screen.draw(draw).context("drawing")?;
+        // The rest of the screen follows at once.
+        self.redraw = std::mem::take(&mut self.model.first_frame);
+        Ok(())
     }
 
     /// Ends the session. Sitting down takes seconds: the screen stays, and STOP keeps working.

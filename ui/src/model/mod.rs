@@ -158,6 +158,9 @@ pub struct Model {
     pub interrupted_at: Option<Duration>,
     /// The terminal's columns and rows.
     pub size: (u16, u16),
+    /// Whether the screen is drawn for the first time: joints and picture follow in the second frame, because over a slow link
+    /// each takes a second and nothing is decided by them.
+    pub first_frame: bool,
     /// Rows that page up and page down move by, from the terminal's height.
     pub page: usize,
     /// Whether the console receives clicks and the wheel; otherwise the terminal keeps them for selecting and copying.
@@ -219,6 +222,7 @@ impl Model {
             countdown_s: None,
             interrupted_at: None,
             size: (0, 0),
+            first_frame: false,
             page: 10,
             mouse: settings.mouse,
         }

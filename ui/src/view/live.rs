@@ -121,7 +121,7 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
         None => proposal::render(frame, card, model),
     }
     objective::render(frame, objective, &model.session, &model.theme);
-    if let Some(picture) = picture {
+    if let Some(picture) = picture.filter(|_| !model.first_frame) {
         wireframe::render(frame, picture, model);
     }
     trials::render_table(frame, table, model, false);
@@ -272,6 +272,9 @@ fn render_axis(frame: &mut Frame, strip: Rect, model: &Model, without_room: usiz
 
 /// Torque and speed of each joint with bars of their share of the limit; `!` where the last gate changed the command.
 fn render_joints(frame: &mut Frame, area: Rect, model: &Model) {
+    if model.first_frame {
+        return;
+    }
     let theme = &model.theme;
     let tick = &model.snapshot.tick;
     let aside = if area.width >= 60 { "torque in N m, speed in rad/s; bars: share of the limit" } else { "N m, rad/s" };
