@@ -4,7 +4,7 @@ use std::fs;
 use std::path::PathBuf;
 
 use quadfrog::config::{Config, ConfigLayer};
-use quadfrog::robot::description::RobotDescription;
+use quadfrog::robot::description::{RobotDescription, RobotFiles};
 use quadfrog::trial::{Backend, JumpParameters, Task};
 
 /// Asserts that a folder with one file is refused, and that the message names the file and has all `words`.
@@ -19,9 +19,9 @@ fn refuses(name: &str, text: &str, words: &[&str]) {
 
 #[test]
 fn the_defaults_are_fit_for_use() {
-    let config = Config::load(None).unwrap();
-    for name in ["go1", "a1"] {
-        let robot = RobotDescription::embedded(name).unwrap();
+    for name in RobotDescription::embedded_names() {
+        let files = RobotFiles::embedded(name).unwrap();
+        let (robot, config) = (files.description().unwrap(), Config::load_for(&files, None).unwrap());
         for task in Task::ALL {
             let settings = config.settings(&robot, task, Backend::Simulator).unwrap();
             assert!(settings.weight_n > 50.0);
@@ -37,6 +37,46 @@ fn the_folder_of_the_repository_gives_the_defaults() {
     let given = Config::load(Some(&folder)).unwrap();
     let embedded = Config::load(None).unwrap();
     assert_eq!(given.as_run, embedded.as_run);
+}
+
+/// The built-in values, the robot's own over them, those of `--config` over both; messages name the file that gives the value.
+#[test]
+fn a_robots_own_configuration_lies_under_the_given_one() {
+    let go2 = RobotFiles::embedded("go2").unwrap();
+    let own = Config::load_for(&go2, None).unwrap();
+    assert_eq!(own.task(Task::Forward).stance_m, [0.0, 0.1555, -0.25]);
+    assert_eq!(own.optimize.bounds["Fz"], [180.0, 400.0]);
+    assert_eq!(own.optimize.bounds["f0"], Config::load(None).unwrap().optimize.bounds["f0"]);
+    let place = own.origin("optimize.toml", "bounds.Fz").unwrap();
+    assert!(place.starts_with("robots/go2/config/optimize.toml:"), "{place}");
+
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("optimize.toml"), "[bounds]\nFx = [10, 140]\n").unwrap();
+    let given = Config::load_for(&go2, Some(folder.path())).unwrap();
+    assert_eq!((given.optimize.bounds["Fx"], given.optimize.bounds["Fz"]), ([10.0, 140.0], [180.0, 400.0]));
+    assert!(given.origin("optimize.toml", "bounds.Fx").unwrap().ends_with("optimize.toml:2"));
+    assert_eq!(given.origin("optimize.toml", "bounds.Fz").unwrap(), place);
+    assert_eq!(given.origin("optimize.toml", "bounds.f0"), None);
+
+    // A file that no configuration has, and a wrong value, are refused with the robot's file.
+    let robot = folder.path().join("robot");
+    fs::create_dir_all(robot.join("config")).unwrap();
+    fs::write(robot.join("robot.toml"), include_str!("../robots/go2/robot.toml")).unwrap();
+    fs::write(robot.join("config/saftey.toml"), "").unwrap();
+    let refusal = || Config::load_for(&RobotFiles::from_folder(&robot).unwrap(), None).unwrap_err().to_string();
+    let error = refusal();
+    assert!(error.contains("saftey.toml") && error.contains("safety.toml"), "{error}");
+    fs::rename(robot.join("config/saftey.toml"), robot.join("config/optimize.toml")).unwrap();
+    fs::write(robot.join("config/optimize.toml"), "\n[bounds]\nFz = [300.0, 200.0]\n").unwrap();
+    let error = refusal();
+    assert!(error.contains("robot/config/optimize.toml:3") && error.contains("bounds.Fz"), "{error}");
+
+    // A configuration that cannot be read is refused, not left out.
+    fs::remove_dir_all(robot.join("config")).unwrap();
+    assert!(Config::load_for(&RobotFiles::from_folder(&robot).unwrap(), None).is_ok(), "there is none");
+    fs::write(robot.join("config"), "").unwrap();
+    let error = RobotFiles::from_folder(&robot).unwrap_err().to_string();
+    assert!(error.contains("robot/config"), "{error}");
 }
 
 #[test]

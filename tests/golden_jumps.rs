@@ -1,7 +1,8 @@
 //! Whole jumps against MuJoCo, by the protocol of the reference: only feet and trunk collide, friction 1.0, ideal motors, 1.0 s of
 //! settling, one impulse or several, 1.5 s until the outcome is read. `golden/jumps.json` holds jumps of the paper's controller,
 //! `golden/jumps_terms.json` jumps with the attitude rate term and the foot placement, `golden/jumps_landing.json` with the landing
-//! terms as well (written by `tests/support/reference_landing.py`), `golden/jumps_continuous.json` jumps in a row.
+//! terms as well (written by `tests/support/reference_landing.py`), `golden/jumps_continuous.json` jumps in a row,
+//! `golden/jumps_go2.json` jumps of the Go2 (written by `tests/support/reference_go2.py`).
 
 mod support;
 
@@ -238,10 +239,15 @@ fn compare(robot: &RobotDescription, config: &SimConfig, file: &File) -> Differe
 
 /// The Go1 and a simulator set up as the reference is.
 fn reference_setup(file: &File) -> (RobotDescription, SimConfig) {
+    robot_setup("go1", file)
+}
+
+/// A robot and a simulator set up as the reference is.
+fn robot_setup(name: &str, file: &File) -> (RobotDescription, SimConfig) {
     let mut config = SimConfig::default();
     config.terrain.friction = file.floor_friction;
     config.contact.bodies = vec![BodyKind::Trunk];
-    (RobotDescription::embedded("go1").unwrap(), config)
+    (RobotDescription::embedded(name).unwrap(), config)
 }
 
 /// The joint damping in the motors, evaluated at each step of the simulator instead of each tick, is the same law with 0.75 in place of
@@ -284,6 +290,20 @@ fn golden_jumps() {
     assert!(coulomb.apex <= 1.5 && coulomb.apex_95 <= 4.0, "apex with Coulomb's law");
     assert!(coulomb.landing_cm <= 4.0, "landing with Coulomb's law");
     assert!(coulomb.agreement >= 75.0, "falls with Coulomb's law");
+}
+
+/// The Go2, whose head collides with the ground as well, with the paper's controller and its own stance and bounds.
+#[test]
+fn golden_jumps_of_the_go2() {
+    let file: File = support::golden("jumps_go2.json");
+    let (robot, config) = robot_setup("go2", &file);
+    let found = compare(&robot, &config, &file);
+    println!("golden_jumps: {} cases of the Go2: {found}", file.cases.len());
+    assert!(found.apex <= 1.0 && found.apex_95 <= 4.0, "apex");
+    assert!(found.takeoff_ms <= 5.0, "take-off");
+    assert!(found.landing_cm <= 3.0, "landing");
+    assert!(found.twist <= 5.0, "yaw of twists");
+    assert!(found.agreement >= 90.0, "falls");
 }
 
 /// The attitude rate term and the foot placement do in this simulator what they do in MuJoCo.

@@ -3,6 +3,8 @@
 use std::path::Path;
 
 use nalgebra::Vector3;
+use quadfrog::config::Config;
+use quadfrog::robot::description::RobotFiles;
 use quadfrog::robot::description::{DescriptionError, RobotDescription};
 use quadfrog::robot::{GRAVITY, JointCommand, Leg, MotorCommand, Placement, Robot};
 use quadfrog::sim::{SimConfig, Simulator};
@@ -44,10 +46,71 @@ fn the_go1_is_what_its_maker_says() {
 }
 
 #[test]
+#[expect(clippy::approx_constant, reason = "the maker's figures")]
+fn the_go2_is_what_its_maker_says() {
+    let robot = RobotDescription::embedded("go2").unwrap();
+    assert!((robot.total_mass() - 16.087).abs() < 1e-9, "{} kg", robot.total_mass());
+    assert_eq!(robot.leg_geometry.abduction, 0.0955);
+    assert_eq!((robot.leg_geometry.thigh, robot.leg_geometry.calf), (0.213, 0.213));
+    assert_eq!((robot.limits.max_torque[2], robot.limits.max_velocity[2]), (45.43, 15.7));
+    assert_eq!(robot.imu_origin, Vector3::new(-0.02557, 0.0, 0.04232));
+    for leg in Leg::ALL {
+        let (part, thigh) = (&robot.legs[leg as usize], 3 * leg as usize + 1);
+        assert_eq!((part.bodies[1].name.as_str(), part.foot_radius), (&*format!("{}_thigh", leg.name()), 0.022));
+        let limits = if leg.front_sign() > 0.0 { (-1.5708, 3.4907) } else { (-0.5236, 4.5379) };
+        assert_eq!((robot.limits.min_position[thigh], robot.limits.max_position[thigh]), limits, "{leg:?}");
+    }
+    assert!((robot.rotor_inertia[2] - 0.016456).abs() < 1e-6);
+}
+
+#[test]
 fn a_folder_gives_the_same_as_the_embedded_copy() {
     for name in RobotDescription::embedded_names() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots").join(name);
         assert_eq!(RobotDescription::from_folder(&folder).unwrap(), RobotDescription::embedded(name).unwrap());
+        let texts = |files: RobotFiles| -> Vec<(String, String)> {
+            let name = |path: &Path| path.file_name().unwrap().to_string_lossy().into_owned();
+            files.config().map(|(path, text)| (name(path), text.to_owned())).collect()
+        };
+        let embedded = texts(RobotFiles::embedded(name).unwrap());
+        assert_eq!(texts(RobotFiles::from_folder(&folder).unwrap()), embedded, "{name}");
+    }
+}
+
+/// The ramp of the joint targets with the gains of the robot's own configuration, from lying to the stance and back.
+#[test]
+fn every_robot_stands_up_and_sits_down_with_its_own_gains() {
+    for name in RobotDescription::embedded_names() {
+        let files = RobotFiles::embedded(name).unwrap();
+        let (robot, config) = (files.description().unwrap(), Config::load_for(&files, None).unwrap());
+        let mut simulator = Simulator::new(&robot, &SimConfig::default()).unwrap();
+        simulator.place(&Placement { joint_position: robot.lying_position, lying: true, seed: 0 });
+        for _ in 0..1000 {
+            simulator.write(&JointCommand::damping(3.0)).unwrap();
+        }
+        let lying = simulator.state().joint_position;
+        let [x, y, z] = config.control.tasks["forward"].stance_m;
+        let stance = robot.leg_geometry.stance(&Vector3::new(x, y, z), &robot.lying_position);
+        for (what, from, to, ramp) in [
+            ("stands up", &lying, &stance, &config.control.stand_up),
+            ("sits down", &stance, &robot.lying_position, &config.control.sit_down),
+        ] {
+            for tick in 0..(1000.0 * (ramp.duration_s + 0.5)) as u32 {
+                let share = (f64::from(tick) * 0.001 / ramp.duration_s).min(1.0);
+                let target = std::array::from_fn(|i| from[i] + share * (to[i] - from[i]));
+                simulator.write(&JointCommand::hold(&target, ramp.kp, ramp.kd)).unwrap();
+            }
+            let reached = simulator.state().joint_position;
+            let error = reached.iter().zip(to).map(|(reached, to)| (reached - to).abs()).fold(0.0, f64::max);
+            let truth = simulator.read().unwrap().truth.unwrap();
+            let (roll, pitch, _) = truth.world_from_body.euler_angles();
+            println!(
+                "{name} {what}: {error:.3} rad from the target, height {:.3} m, roll {roll:.3}, pitch {pitch:.3} rad",
+                truth.position_world.z
+            );
+            assert!(error < ramp.tolerance_rad, "{name} {what}: {error} rad");
+            assert!(roll.abs() < 0.2 && pitch.abs() < 0.2, "{name} {what}: {roll} {pitch}");
+        }
     }
 }
 

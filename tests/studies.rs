@@ -3,7 +3,7 @@
 use quadfrog::config::Config;
 use quadfrog::engine::{Options, open_experiment};
 use quadfrog::optimize::journal::Durability;
-use quadfrog::robot::description::RobotDescription;
+use quadfrog::robot::description::RobotFiles;
 use quadfrog::session::automatic;
 use quadfrog::session::rollout::Rollout;
 use quadfrog::sim::Simulator;
@@ -11,10 +11,15 @@ use quadfrog::trial::{Backend, Task, TrialRecord};
 
 const TRIALS: u32 = 20;
 
-/// Runs a study of 20 trials without a screen; returns its rows and its best value.
+/// Runs a study of 20 trials of the Go1 without a screen; returns its rows and its best value.
 fn study(task: Task, seed: u32) -> (Vec<TrialRecord>, f64) {
-    let config = Config::load(None).unwrap();
-    let robot = RobotDescription::embedded("go1").unwrap();
+    study_of("go1", task, seed)
+}
+
+/// The same of a robot with its own configuration.
+fn study_of(robot: &str, task: Task, seed: u32) -> (Vec<TrialRecord>, f64) {
+    let files = RobotFiles::embedded(robot).unwrap();
+    let (robot, config) = (files.description().unwrap(), Config::load_for(&files, None).unwrap());
     let options = Options { seed, trials: Some(TRIALS), ..Options::new(config, robot, Backend::Simulator, task) };
     let settings = options.config.settings(&options.robot, task, Backend::Simulator).unwrap();
     let simulator = Simulator::new(&options.robot, &options.config.simulator).unwrap();
@@ -57,6 +62,16 @@ fn the_mirrored_tasks_learn_too() {
     let (_, clockwise) = study(Task::TwistCw, 0);
     assert!(right >= 0.2, "lateral-right {right}");
     assert!(clockwise >= 2.0, "twist-cw {clockwise}");
+}
+
+/// Aims of the Go2: 0.6 m, 0.3 m, 2.5 rad. `robots/go2/README.md` has five seeds of every task.
+#[test]
+fn the_go2_reaches_its_aims() {
+    for (task, aim) in [(Task::Forward, 0.6), (Task::LateralLeft, 0.3), (Task::TwistCcw, 2.5)] {
+        let (_, best) = study_of("go2", task, 0);
+        println!("go2 {}: best of {TRIALS} trials {best:.3} {}", task.name(), task.unit());
+        assert!(best >= aim, "{} {best}", task.name());
+    }
 }
 
 #[test]

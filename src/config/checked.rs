@@ -18,7 +18,7 @@ use crate::realtime::scheduling::Scheduling;
 use crate::recording::record::HealthLimits;
 use crate::robot::GRAVITY;
 use crate::robot::Leg;
-use crate::robot::description::{RobotDescription, read_text};
+use crate::robot::description::{RobotDescription, RobotFiles, read_text};
 use crate::sim::SimConfig;
 use crate::sim::ensemble::EnsembleSettings;
 use crate::trial::{Backend, GAIN_UNITS, HopEnvelope, ParameterInfo, ParameterValues, Task, parameter_unit};
@@ -64,14 +64,26 @@ impl Config {
 
     /// Loads the defaults, with the files of `folder` laid over them.
     pub fn load(folder: Option<&Path>) -> Result<Config, ConfigError> {
-        let Some(folder) = folder else { return Config::layered(&[]) };
-        refuse_unknown_files(folder)?;
-        let mut texts = Vec::new();
-        for (name, _) in FILES {
-            let path = folder.join(name);
-            if path.exists() {
-                let text = read_text(&path).map_err(|source| ConfigError::Read { path: path.clone(), source })?;
-                texts.push((name, path.display().to_string(), text));
+        Config::load_over(Vec::new(), folder)
+    }
+
+    /// Loads the defaults, with the robot's own configuration laid over them, and the files of `folder` over both.
+    pub fn load_for(robot: &RobotFiles, folder: Option<&Path>) -> Result<Config, ConfigError> {
+        let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let own = robot.config().map(|(path, text)| (name(path), path.display().to_string(), text.to_owned()));
+        Config::load_over(own.collect(), folder)
+    }
+
+    /// Loads the defaults, with texts (name, origin, text) laid over them, and the files of `folder` over both.
+    fn load_over(mut texts: Vec<(String, String, String)>, folder: Option<&Path>) -> Result<Config, ConfigError> {
+        if let Some(folder) = folder {
+            refuse_unknown_files(folder)?;
+            for (name, _) in FILES {
+                let path = folder.join(name);
+                if path.exists() {
+                    let text = read_text(&path).map_err(|source| ConfigError::Read { path: path.clone(), source })?;
+                    texts.push((name.to_owned(), path.display().to_string(), text));
+                }
             }
         }
         let layers = texts.iter().map(|(file, origin, text)| ConfigLayer { file, origin, text });
@@ -96,8 +108,10 @@ impl Config {
             let mut default = merge(&format!("config/{name}"), default_text, &template(default_text), &optional)?;
             default.1.built_in = true;
             let mut of_file = layers.iter().filter(|layer| layer.file == name);
-            let (table, origin) =
-                of_file.try_fold(default, |(under, _), layer| merge(layer.origin, layer.text, &under, &optional))?;
+            let (table, origin) = of_file.try_fold(default, |(under, below), layer| {
+                let (table, origin) = merge(layer.origin, layer.text, &under, &optional)?;
+                Ok((table, FileOrigin { under: Some(Box::new(below)), ..origin }))
+            })?;
             as_run.push((name.to_owned(), without_unused_jumps(&table).to_string()));
             origins.insert(name, origin);
             tables.insert(name, table);
@@ -325,8 +339,7 @@ impl Config {
     /// Returns where the value of a key is from: path and line of the file that gives it; none for a default.
     pub fn origin(&self, file: &str, key: &str) -> Option<String> {
         let origin = self.origins.get(file).filter(|origin| !origin.built_in)?;
-        let line = origin.lines.get(key)?;
-        Some(format!("{}:{line}", origin.file))
+        origin.place(key)
     }
 
     /// Whether the loaded file itself gives a key, by its name with its tables.

@@ -15,15 +15,20 @@ pub struct FileOrigin {
     pub lines: HashMap<String, usize>,
     /// Whether it is an embedded default.
     pub built_in: bool,
+    /// Origin of the values that the file does not give.
+    pub under: Option<Box<FileOrigin>>,
 }
 
 impl FileOrigin {
+    /// Returns file and line of a key: in this file, else in one under it that is not built in.
+    pub fn place(&self, key: &str) -> Option<String> {
+        let under = || self.under.as_deref().filter(|under| !under.built_in)?.place(key);
+        self.lines.get(key).map(|line| format!("{}:{line}", self.file)).or_else(under)
+    }
+
     /// Returns the error of a value: file, line, key, value and reason.
     pub fn refuse(&self, key: &str, value: impl ToString, reason: impl ToString) -> ConfigError {
-        let file = match self.lines.get(key) {
-            Some(line) => format!("{}:{line}", self.file),
-            None => self.file.clone(),
-        };
+        let file = self.place(key).unwrap_or_else(|| self.file.clone());
         ConfigError::Value { file, key: key.to_owned(), value: value.to_string(), reason: reason.to_string() }
     }
 }
@@ -40,7 +45,7 @@ pub fn merge(file: &str, text: &str, default: &Table, optional: &Table) -> Resul
     let mut lines = HashMap::new();
     let overlay = Overlay { file, line_of: &line_of };
     overlay.lay(parsed.get_ref(), &mut table, optional, "", &mut lines)?;
-    Ok((table, FileOrigin { file: file.to_owned(), lines, built_in: false }))
+    Ok((table, FileOrigin { file: file.to_owned(), lines, built_in: false, under: None }))
 }
 
 struct Overlay<'a> {

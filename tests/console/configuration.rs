@@ -230,7 +230,7 @@ fn a_shell_completes_studies_robots_and_trials() {
     assert_shows(&completed("quadfrog study show "), &[study.as_str()]);
     assert_shows(&completed("quadfrog --resume "), &[study.as_str()]);
     assert_shows(&completed("quadfrog optimize --task "), &["forward", "twist-ccw"]);
-    assert_shows(&completed("quadfrog optimize --model "), &["go1", "a1", "robots/pony"]);
+    assert_shows(&completed("quadfrog optimize --model "), &["go1", "a1", "go2", "robots/pony"]);
     assert_shows(&completed("quadfrog optimize --sampler "), &["tpe", "gp", "sim"]);
     let trials = completed(&format!("quadfrog export {study}/session.mcap --trial "));
     assert_eq!(trials.lines().collect::<Vec<_>>(), ["0", "1"]);

@@ -7,6 +7,8 @@ use quadfrog::recording::writer::Writer;
 use quadfrog::robot::JointCommand;
 use quadfrog::robot::go1::convert::low_cmd;
 use quadfrog::robot::go1::packet::{CrcForm, LowCmd, LowState};
+use quadfrog::robot::go2::convert::low_command;
+use quadfrog::robot::go2::message::{ResponseMessage, StateMessage, motion_switcher};
 use quadfrog::telemetry::{Mode, Tick};
 
 use super::targets::CONFIG_FILES;
@@ -22,6 +24,10 @@ pub fn packets() -> Vec<Vec<u8>> {
         LowState::zero().bytes().to_vec(),
         command.bytes().to_vec(),
         LowCmd::braking(CrcForm::Sealed).bytes().to_vec(),
+        StateMessage::zero().encode().to_vec(),
+        low_command(&JointCommand::damping(2.0)).unwrap().bytes().to_vec(),
+        motion_switcher::select_mode(7, "normal").encode(),
+        ResponseMessage { id: 7, api: 1001, code: 0, data: "{\"name\":\"\"}".into(), binary: vec![1, 2] }.encode(),
     ]
 }
 

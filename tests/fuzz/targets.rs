@@ -13,6 +13,9 @@ use quadfrog::recording::recover::recover;
 use quadfrog::robot::description::{RobotDescription, RobotFiles};
 use quadfrog::robot::go1::convert::{decode_motor, low_cmd, low_state, robot_state};
 use quadfrog::robot::go1::packet::{COMMAND_LENGTH, CrcForm, HEAD, LowCmd, LowState, MOTORS, STATE_LENGTH, crc};
+use quadfrog::robot::go2::message::{
+    self as go2, CommandMessage, MessageRejection, RequestMessage, ResponseMessage, StateMessage,
+};
 use quadfrog_console::input::{KeyReader, NumberedEvent, SpaceBarIsText, TerminalEvent};
 use quadfrog_console::settings::ConsoleSettings;
 
@@ -20,8 +23,9 @@ use quadfrog_console::settings::ConsoleSettings;
 pub const CONFIG_FILES: [&str; 6] =
     ["control.toml", "safety.toml", "optimize.toml", "simulator.toml", "console.toml", "robot.toml"];
 
-/// Datagrams of the Go1, as they came and with a right head and checksum.
+/// Datagrams of the Go1, as they came and with a right head and checksum, and messages of the Go2.
 pub fn packets(bytes: &[u8]) {
+    read_messages(bytes);
     read_packets(bytes);
     for (length, covered, sum_at) in [(STATE_LENGTH, 800, 803), (COMMAND_LENGTH, 608, 610)] {
         let mut repaired = bytes.to_vec();
@@ -52,6 +56,33 @@ fn read_packets(bytes: &[u8]) {
         }
         if let Ok(command) = low_cmd(&command, CrcForm::Plain) {
             assert_eq!(command.bytes()[562], 0, "no command switches the battery off");
+        }
+    }
+}
+
+/// Messages of the Go2, as they came and with a right checksum: what is accepted is encoded again, or refused.
+fn read_messages(bytes: &[u8]) {
+    let mut repaired = bytes.to_vec();
+    repaired.resize(go2::STATE_LENGTH, 0);
+    if let Err(MessageRejection::Checksum { computed, .. }) = StateMessage::decode(&repaired) {
+        repaired[go2::STATE_LENGTH - 4..].copy_from_slice(&computed.to_le_bytes());
+    }
+    let state = StateMessage::decode(&repaired).expect("the checksum is right");
+    let again = StateMessage::decode(&state.encode()).expect("a state that was encoded");
+    assert_eq!((again.tick, again.foot_force, again.battery), (state.tick, state.foot_force, state.battery));
+    repaired.truncate(go2::COMMAND_LENGTH);
+    if let Err(MessageRejection::Checksum { computed, .. }) = CommandMessage::decode(&repaired) {
+        repaired[go2::COMMAND_LENGTH - 4..].copy_from_slice(&computed.to_le_bytes());
+    }
+    if let Ok(command) = CommandMessage::decode(&repaired).expect("the checksum is right").encode() {
+        assert_eq!(command.bytes()[740..744], [0; 4], "no command switches the battery off");
+    }
+    for part in [Some(bytes), go2::payload(bytes).ok()].into_iter().flatten() {
+        if let Ok(request) = RequestMessage::decode(part) {
+            assert_eq!(RequestMessage::decode(&request.encode()), Ok(request));
+        }
+        if let Ok(response) = ResponseMessage::decode(part) {
+            assert_eq!(ResponseMessage::decode(&response.encode()), Ok(response));
         }
     }
 }

@@ -19,7 +19,7 @@ import numpy as np
 
 URDF = pathlib.Path(__file__).resolve().parents[2] / "robots/go1/go1.urdf"
 LEGS, SIDE, FRONT = ["FR", "FL", "RR", "RL"], np.array([-1, 1, -1, 1.0]), np.array([1, 1, -1, -1.0])
-ABDUCTION, THIGH, CALF = 0.08, 0.213, 0.213
+ABDUCTION, THIGH, CALF, FOOT_RADIUS = 0.08, 0.213, 0.213, 0.02
 STANCE = np.array([0.0, 0.14, -0.25])
 KP, KD, KD_JOINT, K_ATT = 400.0, 8.0, 0.8, 200.0
 CORNERS = np.array([FRONT, SIDE, np.zeros(4)])
@@ -28,6 +28,7 @@ TERMS = dict(
     foot_placement_s=0.08,
     landing=dict(cutoff="foot", cutoff_lost_s=0.02, spread_m=0.04, spread_s=0.3),
 )
+BOUNDS = dict(f0_hz=(0.75, 1.75), along_n=(0, 150), up_n=(150, 350))
 TASKS = ["forward", "lateral-left", "twist-ccw"]
 
 
@@ -43,6 +44,15 @@ def model():
         origin, mass = found.find("origin").get("xyz"), found.find("mass").get("value")
         return f'<inertial pos="{origin}" mass="{mass}" fullinertia="{full}"/>'
 
+    def shape(collision):
+        origin, geometry = collision.find("origin").get("xyz"), collision.find("geometry")[0]
+        if geometry.tag == "box":
+            half = " ".join(str(float(side) / 2) for side in geometry.get("size").split())
+            return f'<geom type="box" pos="{origin}" size="{half}"/>'
+        radius, length = geometry.get("radius"), geometry.get("length")
+        half = f"{radius} {float(length) / 2}" if length else radius
+        return f'<geom type="{geometry.tag}" pos="{origin}" size="{half}"/>'
+
     legs, motors, torques = "", "", []
     for leg in LEGS:
         names = [f"{leg}_{part}" for part in ("hip", "thigh", "calf")]
@@ -54,13 +64,13 @@ def model():
             legs += f'<joint name="{name}" axis="{joint.find("axis").get("xyz")}" range="{bounds}"/>'
             motors += f'<motor joint="{name}"/>'
             torques.append(float(limit.get("effort")))
-        legs += f'<geom name="{leg}" type="sphere" size="0.02" pos="0 0 -{CALF}"/></body></body></body>'
-    half = " ".join(str(float(side) / 2) for side in links["trunk"].find("collision/geometry/box").get("size").split())
+        legs += f'<geom name="{leg}" type="sphere" size="{FOOT_RADIUS}" pos="0 0 -{CALF}"/></body></body></body>'
+    trunk = "".join(shape(collision) for collision in links["trunk"].findall("collision"))
     text = f"""<mujoco><compiler angle="radian" autolimits="true"/>
 <option timestep="0.00025" cone="elliptic" impratio="10" gravity="0 0 -9.81"/>
 <default><geom friction="1 0 0" condim="3" solref="0.002 1" solimp="0.98 0.999 0.0005"/><joint solreflimit="0.004 1"/></default>
 <worldbody><geom type="plane" size="50 50 .1"/><body name="trunk" pos="0 0 1">{inertial("trunk")}<freejoint/>
-<geom type="box" size="{half}"/>{legs}</body></worldbody><actuator>{motors}</actuator></mujoco>"""
+{trunk}{legs}</body></worldbody><actuator>{motors}</actuator></mujoco>"""
     return mujoco.MjModel.from_xml_string(text), np.array(torques)
 
 
@@ -104,7 +114,7 @@ def jump(m, limits, case, terms, motors=ideal_motors, sensors=exact_sensors):
     positions and speeds and of the trunk's angular and linear velocity in its own frame."""
     landing = terms["landing"]
     d = mujoco.MjData(m)
-    d.qpos[:7] = [0, 0, -STANCE[2] + 0.02, 1, 0, 0, 0]
+    d.qpos[:7] = [0, 0, -STANCE[2] + FOOT_RADIUS, 1, 0, 0, 0]
     d.qpos[7:] = stance()
     mujoco.mj_forward(m, d)
     leg_of = {m.geom(name).id: leg for leg, name in enumerate(LEGS)}
@@ -175,7 +185,7 @@ def main():
     random, cases = np.random.default_rng(arguments.seed), []
     for number in range(arguments.cases):
         task = TASKS[number % 3]
-        f0, along, up = random.uniform(0.75, 1.75), random.uniform(0, 150), random.uniform(150, 350)
+        f0, along, up = (random.uniform(*BOUNDS[name]) for name in ("f0_hz", "along_n", "up_n"))
         case = dict(task=task, f0_hz=f0, Fx_n=along * (task == "forward"), Fy_n=along * (task != "forward"), Fz_n=up)
         case.update(terms=TERMS, expect=jump(m, limits, case, TERMS))
         cases.append(case)

@@ -12,10 +12,39 @@ use serde::de::{DeserializeOwned, IgnoredAny};
 use super::{DescriptionError, RobotDescription, urdf};
 use crate::robot::{JOINTS, Joints, Leg};
 
-/// Embedded robots: name, `robot.toml`, URDF.
-const EMBEDDED: &[(&str, &str, &str)] = &[
-    ("go1", include_str!("../../../robots/go1/robot.toml"), include_str!("../../../robots/go1/go1.urdf")),
-    ("a1", include_str!("../../../robots/a1/robot.toml"), include_str!("../../../robots/a1/a1.urdf")),
+/// A robot in the program.
+struct EmbeddedRobot {
+    name: &'static str,
+    toml: &'static str,
+    urdf: &'static str,
+    /// Name and text of the files in its folder `config`.
+    config: &'static [(&'static str, &'static str)],
+}
+
+/// Embedded robots.
+const EMBEDDED: &[EmbeddedRobot] = &[
+    EmbeddedRobot {
+        name: "go1",
+        toml: include_str!("../../../robots/go1/robot.toml"),
+        urdf: include_str!("../../../robots/go1/go1.urdf"),
+        config: &[],
+    },
+    EmbeddedRobot {
+        name: "a1",
+        toml: include_str!("../../../robots/a1/robot.toml"),
+        urdf: include_str!("../../../robots/a1/a1.urdf"),
+        config: &[],
+    },
+    EmbeddedRobot {
+        name: "go2",
+        toml: include_str!("../../../robots/go2/robot.toml"),
+        urdf: include_str!("../../../robots/go2/go2.urdf"),
+        config: &[
+            ("control.toml", include_str!("../../../robots/go2/config/control.toml")),
+            ("optimize.toml", include_str!("../../../robots/go2/config/optimize.toml")),
+            ("safety.toml", include_str!("../../../robots/go2/config/safety.toml")),
+        ],
+    },
 ];
 
 /// `robot.toml`.
@@ -53,6 +82,9 @@ struct PoseToml {
     lying_rad: [f64; 3],
 }
 
+/// Folder beside `robot.toml` with the robot's own configuration.
+const CONFIG: &str = "config";
+
 /// Largest angle of a joint's limit, rad: two turns.
 const LARGEST_ANGLE_RAD: f64 = 12.6;
 
@@ -63,6 +95,7 @@ pub struct RobotFiles {
     toml: Cow<'static, str>,
     /// Text of the URDF; none for one that is read from the folder.
     urdf: Option<Cow<'static, str>>,
+    config: Vec<(PathBuf, Cow<'static, str>)>,
 }
 
 impl RobotFiles {
@@ -71,26 +104,44 @@ impl RobotFiles {
     /// # Errors
     /// There is none of that name.
     pub fn embedded(name: &str) -> Result<RobotFiles, DescriptionError> {
-        let found = EMBEDDED.iter().find(|(known, ..)| *known == name);
-        let &(_, toml, urdf) = found.ok_or_else(|| DescriptionError::Unknown {
+        let found = EMBEDDED.iter().find(|robot| robot.name == name);
+        let robot = found.ok_or_else(|| DescriptionError::Unknown {
             name: name.to_owned(),
             known: RobotDescription::embedded_names().collect::<Vec<_>>().join(", "),
         })?;
-        Ok(RobotFiles { folder: Path::new("robots").join(name), toml: toml.into(), urdf: Some(urdf.into()) })
+        let folder = Path::new("robots").join(name);
+        let config = robot.config.iter().map(|(file, text)| (folder.join(CONFIG).join(file), Cow::Borrowed(*text)));
+        let config = config.collect();
+        Ok(RobotFiles { folder, toml: robot.toml.into(), urdf: Some(robot.urdf.into()), config })
     }
 
-    /// Opens the robot in `folder`: its `robot.toml` and the URDF that `robot.toml` names.
+    /// Opens the robot in `folder`: its `robot.toml`, the URDF that `robot.toml` names, and the TOML files of its folder `config`, if
+    /// there is one.
     ///
     /// # Errors
-    /// `robot.toml` cannot be read.
+    /// `robot.toml`, the folder `config` or a file in it cannot be read.
     pub fn from_folder(folder: &Path) -> Result<RobotFiles, DescriptionError> {
         let toml = read(folder.join("robot.toml"))?;
-        Ok(RobotFiles { folder: folder.to_owned(), toml: toml.into(), urdf: None })
+        let mut config = Vec::new();
+        let own = folder.join(CONFIG);
+        let unread = |e: io::Error| DescriptionError::Read { file: own.clone(), reason: e.to_string() };
+        let entries = match std::fs::read_dir(&own) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => None,
+            entries => Some(entries.map_err(unread)?),
+        };
+        for entry in entries.into_iter().flatten() {
+            let path = entry.map_err(unread)?.path();
+            if path.extension().is_some_and(|extension| extension == "toml") {
+                config.push((path.clone(), read(path)?.into()));
+            }
+        }
+        config.sort();
+        Ok(RobotFiles { folder: folder.to_owned(), toml: toml.into(), urdf: None, config })
     }
 
     /// Opens the robot of two texts, as a recording has them; `origin` is for messages.
     pub fn from_texts(origin: &Path, toml: String, urdf: String) -> RobotFiles {
-        RobotFiles { folder: origin.to_owned(), toml: toml.into(), urdf: Some(urdf.into()) }
+        RobotFiles { folder: origin.to_owned(), toml: toml.into(), urdf: Some(urdf.into()), config: Vec::new() }
     }
 
     /// Opens the folder `model`, if there is one, or the embedded robot of that name.
@@ -100,6 +151,12 @@ impl RobotFiles {
     pub fn open(model: &str) -> Result<RobotFiles, DescriptionError> {
         let folder = Path::new(model);
         if folder.is_dir() { RobotFiles::from_folder(folder) } else { RobotFiles::embedded(model) }
+    }
+
+    /// The robot's own configuration: path and text of files with the names of those of a configuration folder. Their keys replace
+    /// the built-in ones.
+    pub fn config(&self) -> impl Iterator<Item = (&Path, &str)> {
+        self.config.iter().map(|(path, text)| (path.as_path(), text.as_ref()))
     }
 
     /// Parses `robot.toml`.
@@ -192,7 +249,7 @@ impl RobotDescription {
 
     /// Names of the embedded robots.
     pub fn embedded_names() -> impl Iterator<Item = &'static str> {
-        EMBEDDED.iter().map(|(name, ..)| *name)
+        EMBEDDED.iter().map(|robot| robot.name)
     }
 
     /// Reads the description of an embedded robot, for example `go1`.

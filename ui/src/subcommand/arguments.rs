@@ -63,11 +63,19 @@ pub fn load_model(model: &str) -> Result<(RobotFiles, RobotDescription), Failure
 
 /// Loads the configuration of a command: that of `--config`, else the user's own, else the built-in one.
 pub fn load_config(given: Option<&Path>) -> Result<Config, Failure> {
-    let own = if given.is_none() { user_folder().filter(|folder| folder.is_dir()) } else { None };
-    if let Some(own) = &own {
-        notice!("configuration: {}", own.display());
-    }
-    Ok(Config::load(given.or(own.as_deref()))?)
+    Ok(Config::load(given.map(Path::to_owned).or_else(user_config).as_deref())?)
+}
+
+/// Loads the configuration of a command with a robot: as [`load_config`], laid over the robot's own.
+pub fn load_config_for(robot: &RobotFiles, given: Option<&Path>) -> Result<Config, Failure> {
+    Ok(Config::load_for(robot, given.map(Path::to_owned).or_else(user_config).as_deref())?)
+}
+
+/// Returns the user's own configuration, if there is one, and reports that it is used.
+fn user_config() -> Option<PathBuf> {
+    let own = user_folder().filter(|folder| folder.is_dir())?;
+    notice!("configuration: {}", own.display());
+    Some(own)
 }
 
 /// Returns the place of the user's own configuration, by the XDG Base Directory Specification: `$XDG_CONFIG_HOME/quadfrog`, where the
@@ -89,7 +97,7 @@ pub struct StudyArguments {
     /// exists]
     #[arg(long, value_name = "DIR")]
     config: Option<PathBuf>,
-    /// Robot model: go1, a1, or a folder with a URDF and a robot.toml
+    /// Robot model: go1, a1, go2, or a folder with a URDF and a robot.toml
     #[arg(long, value_name = "MODEL", default_value = "go1", add = ArgValueCandidates::new(completion::robots))]
     pub model: String,
     /// Sampler that proposes the parameters [default: from optimize.toml]
@@ -137,13 +145,13 @@ impl StudyArguments {
     }
 
     /// Loads the configuration: that of `--config`, else the last one that the study in `resume` ran with, else as
-    /// [`load_config`].
-    pub fn load_config(&self, resume: Option<&Path>) -> Result<Config, Failure> {
+    /// [`load_config_for`].
+    pub fn load_config(&self, robot: &RobotFiles, resume: Option<&Path>) -> Result<Config, Failure> {
         let own = resume.filter(|_| self.config.is_none()).and_then(newest_config).map(|(_, config)| config);
         if let Some(own) = &own {
             notice!("continuing with the last configuration of the study, {}", own.display());
         }
-        let mut config = load_config(self.config.as_deref().or(own.as_deref()))?;
+        let mut config = load_config_for(robot, self.config.as_deref().or(own.as_deref()))?;
         if let Some(sampler) = self.sampler {
             config.choose_sampler(sampler);
         }

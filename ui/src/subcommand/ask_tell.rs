@@ -31,7 +31,7 @@ pub struct AskTellArguments {
     /// Folder whose TOML files replace those of the configuration, whole or key by key
     #[arg(long, value_name = "DIR")]
     config: Option<PathBuf>,
-    /// Robot model, for the prior of the sampler sim: go1, a1, or a folder with a URDF and a robot.toml
+    /// Robot model, for the prior of the sampler sim: go1, a1, go2, or a folder with a URDF and a robot.toml
     #[arg(long, value_name = "MODEL", default_value = "go1", add = ArgValueCandidates::new(completion::robots))]
     model: String,
     /// Folder whose priors/ holds the priors of the sampler sim
@@ -40,11 +40,11 @@ pub struct AskTellArguments {
 }
 
 pub fn run(arguments: &AskTellArguments) -> Result<(), Failure> {
-    let mut config = arguments::load_config(arguments.config.as_deref())?;
+    let (files, robot) = arguments::load_model(&arguments.model)?;
+    let mut config = arguments::load_config_for(&files, arguments.config.as_deref())?;
     if let Some(sampler) = arguments.sampler {
         config.choose_sampler(sampler);
     }
-    let (_, robot) = arguments::load_model(&arguments.model)?;
     let task = arguments.task;
     let needs_prior = config.optimize.sampler.kind == SamplerKind::Sim;
     let ready = needs_prior.then(|| prior::obtain(&config, &robot, task, &[], &arguments.output)).transpose()?;

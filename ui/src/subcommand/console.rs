@@ -120,8 +120,8 @@ pub struct ConsoleArguments {
 }
 
 pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
-    let config = arguments.study.load_config(arguments.resume.as_deref())?;
     let (files, robot) = arguments::load_model(&arguments.study.model)?;
+    let config = arguments.study.load_config(&files, arguments.resume.as_deref())?;
     let backend = arguments.robot;
     let mut network = None;
     if backend == Backend::Hardware {

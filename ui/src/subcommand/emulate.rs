@@ -46,8 +46,8 @@ pub struct EmulateArguments {
 }
 
 pub fn run(arguments: &EmulateArguments) -> Result<(), Failure> {
-    let config = arguments::load_config(arguments.config.as_deref())?;
     let (files, description) = load_model(&arguments.model)?;
+    let config = arguments::load_config_for(&files, arguments.config.as_deref())?;
     let no_network = || EngineError::NoNetwork { robot: description.name.clone() };
     let network = Network::read(&files).map_err(Failure::input)?.ok_or_else(no_network)?;
     let emulator = Emulator::bind(arguments.bind, &description, &network, &config.simulator, arguments.seed);

@@ -30,7 +30,7 @@ pub struct PriorArguments {
     /// Folder whose TOML files replace those of the configuration, whole or key by key
     #[arg(long, value_name = "DIR")]
     config: Option<PathBuf>,
-    /// Robot model: go1, a1, or a folder with a URDF and a robot.toml
+    /// Robot model: go1, a1, go2, or a folder with a URDF and a robot.toml
     #[arg(long, value_name = "MODEL", default_value = "go1", add = ArgValueCandidates::new(completion::robots))]
     model: String,
     /// File of the prior [default: in the folder priors of recordings, where new studies find it]
@@ -45,8 +45,8 @@ pub struct PriorArguments {
 }
 
 pub fn run(arguments: &PriorArguments) -> Result<(), Failure> {
-    let config = arguments::load_config(arguments.config.as_deref())?;
-    let (_, robot) = arguments::load_model(&arguments.model)?;
+    let (files, robot) = arguments::load_model(&arguments.model)?;
+    let config = arguments::load_config_for(&files, arguments.config.as_deref())?;
     let maker = PriorMaker::new(&config, &robot, arguments.task)?;
     let given = arguments.output.clone();
     let file = given.clone().unwrap_or_else(|| maker.shared_file(Path::new("recordings")));

@@ -15,7 +15,7 @@ use quadfrog::trial::{Backend, Task};
 use quadfrog_console::{output, put_line};
 use toml::{Table, Value};
 
-use super::arguments::{load_config, load_model, user_folder};
+use super::arguments::{load_config, load_config_for, load_model, user_folder};
 use super::completion;
 use super::console::settings;
 use super::failure::Failure;
@@ -52,7 +52,7 @@ enum ConfigSubcommand {
         /// Folder of the configuration [default: the configuration in force]
         #[arg(value_name = "DIR")]
         folder: Option<PathBuf>,
-        /// Robot model: go1, a1, or a folder with a URDF and a robot.toml
+        /// Robot model: go1, a1, go2, or a folder with a URDF and a robot.toml
         #[arg(long, value_name = "MODEL", default_value = "go1", add = ArgValueCandidates::new(completion::robots))]
         model: String,
         /// Refuse a configuration that is for the simulator only
@@ -167,8 +167,8 @@ fn differences(folder: Option<&Path>, other: Option<&Path>) -> Result<(), Failur
 
 /// Checks a configuration as the commands do that use it: for every task on the simulator, and for hardware.
 fn check(folder: Option<&Path>, model: &str, hardware: bool) -> Result<(), Failure> {
-    let config = load_config(folder)?;
-    let (_, robot) = load_model(model)?;
+    let (files, robot) = load_model(model)?;
+    let config = load_config_for(&files, folder)?;
     settings(&config)?;
     for task in Task::ALL {
         config.settings(&robot, task, Backend::Simulator)?;

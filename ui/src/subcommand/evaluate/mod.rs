@@ -22,7 +22,7 @@ use quadfrog::trial::{Backend, JumpParameters, ParameterValues, Task};
 use quadfrog_console::output;
 use serde_json::json;
 
-use super::arguments::{self, Seeds, load_config, load_model, parse_seeds};
+use super::arguments::{self, Seeds, load_config_for, load_model, parse_seeds};
 use super::completion;
 use super::failure::Failure;
 use quadfrog::session::parallel::{cores, in_parallel};
@@ -37,7 +37,7 @@ pub struct EvaluateArguments {
     /// configuration that it ran with last
     #[arg(long, value_name = "DIR")]
     config: Option<PathBuf>,
-    /// Robot model: go1, a1, or a folder with a URDF and a robot.toml [default: that of the study in --config, else go1]
+    /// Robot model: go1, a1, go2, or a folder with a URDF and a robot.toml [default: that of the study in --config, else go1]
     #[arg(long, value_name = "MODEL", add = ArgValueCandidates::new(completion::robots))]
     model: Option<String>,
     /// Point as f0=1.3,Fx=40,Fz=210, or `best`: the best trial of the study in --config or whose configuration that is
@@ -178,7 +178,8 @@ impl Source {
             (None, Some(file)) if best => stored_study(file)?.task,
             (None, _) => Task::Forward,
         };
-        Ok(Source { config: load_config(folder)?, robot: load_model(&model)?.1, task, study })
+        let (files, robot) = load_model(&model)?;
+        Ok(Source { config: load_config_for(&files, folder)?, robot, task, study })
     }
 }
 

@@ -84,8 +84,8 @@ pub fn run(arguments: &OptimizeArguments) -> Result<(), Failure> {
         Some(Storage::File(file)) => file.parent(),
         _ => arguments.resume.as_deref(),
     };
-    let config = arguments.study.load_config(existing)?;
-    let (_, robot) = arguments::load_model(&arguments.study.model)?;
+    let (files, robot) = arguments::load_model(&arguments.study.model)?;
+    let config = arguments.study.load_config(&files, existing)?;
     let studies = match &joined {
         Some(storage) => workers(arguments, storage, &robot)?,
         None => select(arguments, &config, &robot)?,
