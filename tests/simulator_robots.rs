@@ -46,6 +46,7 @@ fn the_go1_is_what_its_maker_says() {
 }
 
 #[test]
+#[expect(clippy::approx_constant, reason = "the maker's figures")]
 fn the_go2_is_what_its_maker_says() {
     let robot = RobotDescription::embedded("go2").unwrap();
     assert!((robot.total_mass() - 16.087).abs() < 1e-9, "{} kg", robot.total_mass());

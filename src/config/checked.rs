@@ -110,7 +110,8 @@ impl Config {
             let mut of_file = layers.iter().filter(|layer| layer.file == name);
             let (table, origin) = of_file.try_fold(default, |(under, below), layer| {
                 let (table, origin) = merge(layer.origin, layer.text, &under, &optional)?;
-                Ok((table, FileOrigin { under: Some(Box::new(below)), ..origin }))
+                let origin = origin.over(below, &table, &under);
+                Ok((table, origin))
             })?;
             as_run.push((name.to_owned(), without_unused_jumps(&table).to_string()));
             origins.insert(name, origin);
@@ -340,6 +341,11 @@ impl Config {
     pub fn origin(&self, file: &str, key: &str) -> Option<String> {
         let origin = self.origins.get(file).filter(|origin| !origin.built_in)?;
         origin.place(key)
+    }
+
+    /// Returns the keys of a file of the robot's own configuration for which the given configuration has another value.
+    pub fn replaced(&self, file: &str) -> &[String] {
+        self.origins.get(file).map_or(&[], |origin| &origin.replaced)
     }
 
     /// Whether the loaded file itself gives a key, by its name with its tables.

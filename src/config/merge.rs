@@ -17,6 +17,8 @@ pub struct FileOrigin {
     pub built_in: bool,
     /// Origin of the values that the file does not give.
     pub under: Option<Box<FileOrigin>>,
+    /// Keys of the file under it, unless that is built in, whose value is another one here.
+    pub replaced: Vec<String>,
 }
 
 impl FileOrigin {
@@ -24,6 +26,18 @@ impl FileOrigin {
     pub fn place(&self, key: &str) -> Option<String> {
         let under = || self.under.as_deref().filter(|under| !under.built_in)?.place(key);
         self.lines.get(key).map(|line| format!("{}:{line}", self.file)).or_else(under)
+    }
+
+    /// Lays the file over another: `table` are the values in force, `table_below` those without this file.
+    pub fn over(mut self, below: FileOrigin, table: &Table, table_below: &Table) -> FileOrigin {
+        if !below.built_in {
+            let is_value = |key: &&String| lookup(table_below, key).is_some_and(|value| !value.is_table());
+            let is_other = |key: &&String| lookup(table, key) != lookup(table_below, key);
+            self.replaced = below.lines.keys().filter(is_value).filter(is_other).cloned().collect();
+            self.replaced.sort();
+        }
+        self.under = Some(Box::new(below));
+        self
     }
 
     /// Returns the error of a value: file, line, key, value and reason.
@@ -45,7 +59,7 @@ pub fn merge(file: &str, text: &str, default: &Table, optional: &Table) -> Resul
     let mut lines = HashMap::new();
     let overlay = Overlay { file, line_of: &line_of };
     overlay.lay(parsed.get_ref(), &mut table, optional, "", &mut lines)?;
-    Ok((table, FileOrigin { file: file.to_owned(), lines, built_in: false, under: None }))
+    Ok((table, FileOrigin { file: file.to_owned(), lines, built_in: false, under: None, replaced: Vec::new() }))
 }
 
 struct Overlay<'a> {

@@ -39,6 +39,30 @@ fn every_value_is_shown_with_the_file_and_line_that_gives_it() {
     assert_shows(&program.refused(&["config", "show", "flal"]), &["flal", "quadfrog config show"]);
 }
 
+/// A robot's own configuration lies under the given one; whole files of the built-in values are reported to replace it.
+#[test]
+fn the_values_of_a_robots_own_configuration_are_shown() {
+    let program = Program::new();
+    let own = "optimize.toml  bounds.Fz = [180.0, 400.0]  # robots/go2/config/optimize.toml:6\n";
+    assert_shows(
+        &program.text(&["config", "show", "bounds.", "--model", "go2"]),
+        &[own, "bounds.f0 = [0.75, 1.75]  # built-in"],
+    );
+    assert_shows(
+        &program.text(&["config", "diff", "--model", "go2"]),
+        &["bounds.Fz: [150.0, 350.0] -> [180.0, 400.0]\n"],
+    );
+    program.text(&["config", "init", "whole"]);
+    let output = program.command(&["config", "diff", "whole", "--model", "go2"]).output().unwrap();
+    assert_eq!(String::from_utf8(output.stdout).unwrap(), "no value differs\n");
+    let noticed = String::from_utf8(output.stderr).unwrap();
+    assert_shows(
+        &noticed,
+        &["whole/optimize.toml replaces values of the robot's own configuration: bounds.Fx, bounds.Fy, bounds.Fz\n"],
+    );
+    assert!(!noticed.contains("safety.toml"), "{noticed}");
+}
+
 #[test]
 fn the_configuration_of_the_user_is_in_force_unless_another_one_is_given() {
     let program = Program::new();

@@ -69,9 +69,18 @@ pub fn load_config(given: Option<&Path>) -> Result<Config, Failure> {
     Ok(Config::load(given.map(Path::to_owned).or_else(user_config).as_deref())?)
 }
 
-/// Loads the configuration of a command with a robot: as [`load_config`], laid over the robot's own.
+/// Loads the configuration of a command with a robot: as [`load_config`], laid over the robot's own. Reports the values of the
+/// robot's own that do not apply, as when the user's own holds whole files for another robot.
 pub fn load_config_for(robot: &RobotFiles, given: Option<&Path>) -> Result<Config, Failure> {
-    Ok(Config::load_for(robot, given.map(Path::to_owned).or_else(user_config).as_deref())?)
+    let given = given.map(Path::to_owned).or_else(user_config);
+    let config = Config::load_for(robot, given.as_deref())?;
+    for (folder, file) in given.iter().flat_map(|folder| Config::FILE_NAMES.map(|file| (folder, file))) {
+        if let replaced @ [_, ..] = config.replaced(file) {
+            let (file, keys) = (folder.join(file), replaced.join(", "));
+            notice!("{} replaces values of the robot's own configuration: {keys}", file.display());
+        }
+    }
+    Ok(config)
 }
 
 /// Returns the user's own configuration, if there is one, and reports that it is used.

@@ -15,7 +15,7 @@ use quadfrog::trial::{Backend, Task};
 use quadfrog_console::{output, put_line};
 use toml::{Table, Value};
 
-use super::arguments::{load_config, load_config_for, load_model, user_folder};
+use super::arguments::{load_config_for, load_model, user_folder};
 use super::completion;
 use super::console::settings;
 use super::failure::Failure;
@@ -37,6 +37,9 @@ enum ConfigSubcommand {
         /// exists]
         #[arg(long, value_name = "DIR")]
         config: Option<PathBuf>,
+        /// Robot model whose own configuration lies under that of DIR: go1, a1, go2, or a folder with a URDF and a robot.toml
+        #[arg(long, value_name = "MODEL", default_value = "go1", add = ArgValueCandidates::new(completion::robots))]
+        model: String,
     },
     /// Show the values that differ: of the configuration in force from the built-in one, or of two folders
     Diff {
@@ -46,6 +49,9 @@ enum ConfigSubcommand {
         /// Folder to compare with [default: the built-in configuration]
         #[arg(value_name = "OTHER")]
         other: Option<PathBuf>,
+        /// Robot model whose own configuration lies under that of DIR: go1, a1, go2, or a folder with a URDF and a robot.toml
+        #[arg(long, value_name = "MODEL", default_value = "go1", add = ArgValueCandidates::new(completion::robots))]
+        model: String,
     },
     /// Check a configuration for all tasks: exit status 2 after the file, the key and the remedy of the first error
     Check {
@@ -80,8 +86,8 @@ enum ConfigSubcommand {
 
 pub fn run(command: &ConfigCommand) -> Result<(), Failure> {
     match &command.command {
-        ConfigSubcommand::Show { what, config } => show(what, config.as_deref()),
-        ConfigSubcommand::Diff { folder, other } => differences(folder.as_deref(), other.as_deref()),
+        ConfigSubcommand::Show { what, config, model } => show(what, config.as_deref(), model),
+        ConfigSubcommand::Diff { folder, other, model } => differences(folder.as_deref(), other.as_deref(), model),
         ConfigSubcommand::Check { folder, model, hardware } => check(folder.as_deref(), model, *hardware),
         ConfigSubcommand::Init { folder } => init(folder.as_deref()),
         ConfigSubcommand::Schema { file, output } => write_schemas(file.as_deref(), output.as_deref()),
@@ -119,8 +125,8 @@ fn collect(file: &str, tables: &str, table: &Table, found: &mut Vec<Setting>) {
     }
 }
 
-fn show(what: &[String], folder: Option<&Path>) -> Result<(), Failure> {
-    let config = load_config(folder)?;
+fn show(what: &[String], folder: Option<&Path>, model: &str) -> Result<(), Failure> {
+    let config = load_config_for(&load_model(model)?.0, folder)?;
     let all = values(&config)?;
     let wanted = |setting: &&Setting| {
         what.is_empty() || what.iter().any(|what| *what == setting.file || setting.key.starts_with(what.as_str()))
@@ -140,8 +146,8 @@ fn show(what: &[String], folder: Option<&Path>) -> Result<(), Failure> {
     Ok(())
 }
 
-fn differences(folder: Option<&Path>, other: Option<&Path>) -> Result<(), Failure> {
-    let new = load_config(folder)?;
+fn differences(folder: Option<&Path>, other: Option<&Path>, model: &str) -> Result<(), Failure> {
+    let new = load_config_for(&load_model(model)?.0, folder)?;
     let old = Config::load(other)?;
     let (new_values, old_values) = (values(&new)?, values(&old)?);
     let mut equal = true;
