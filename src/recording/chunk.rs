@@ -3,6 +3,8 @@
 use mcap::McapError;
 use mcap::records::{MessageHeader, Record, op};
 
+use super::lengths::texts_fit;
+
 /// Opcode (1 byte) and length (8 bytes) before each record.
 pub const RECORD_HEAD: usize = 9;
 
@@ -31,6 +33,9 @@ impl ChunkRecords {
     /// # Errors
     /// When the chunk is longer than `largest` bytes, cannot be decompressed, or is damaged.
     pub fn of(body: &[u8], largest: usize) -> Result<ChunkRecords, McapError> {
+        if !texts_fit(op::CHUNK, body) {
+            return Err(McapError::UnexpectedEoc);
+        }
         let Record::Chunk { header, data } = mcap::parse_record(op::CHUNK, body)? else {
             unreachable!("parsed by its opcode");
         };
@@ -52,7 +57,8 @@ impl ChunkRecords {
         }
         let records = ChunkRecords { bytes, checked: saved != 0 };
         let read: usize = records.records().map(|(_, body)| RECORD_HEAD + body.len()).sum();
-        if read == records.bytes.len() { Ok(records) } else { Err(McapError::UnexpectedEoc) }
+        let fit = records.records().all(|(opcode, body)| texts_fit(opcode, body));
+        if fit && read == records.bytes.len() { Ok(records) } else { Err(McapError::UnexpectedEoc) }
     }
 
     /// Returns opcode and body of each record.

@@ -10,6 +10,7 @@ use mcap::records::{Record, op};
 
 use super::chunk::{self, ChunkRecords, records_in};
 use super::error::RecordingError;
+use super::lengths::{length, texts_fit};
 use super::topic::Topic;
 
 /// Opcode and length before each record.
@@ -268,7 +269,7 @@ impl Container {
     /// Returns a metadata record; none of a damaged one.
     pub fn read_metadata(&mut self, span: RecordSpan) -> Result<Option<mcap::records::Metadata>, McapError> {
         let body = self.read_record(span)?;
-        if !metadata_fits(&body) {
+        if !texts_fit(op::METADATA, &body) {
             return Ok(None);
         }
         match mcap::parse_record(op::METADATA, &body) {
@@ -318,26 +319,6 @@ impl Container {
 /// Returns the position of a record from the index, whose length includes the head.
 fn span(offset: u64, length: u64) -> RecordSpan {
     RecordSpan { offset, bytes: length.saturating_sub(RECORD_HEAD) }
-}
-
-/// Returns the length of a string; the largest number beyond the end of `bytes`.
-fn length(bytes: &[u8], at: u64) -> u32 {
-    let bytes = usize::try_from(at).ok().and_then(|at| bytes.get(at..at + 4)).and_then(|bytes| bytes.try_into().ok());
-    bytes.map_or(u32::MAX, u32::from_le_bytes)
-}
-
-/// Returns whether the texts of a metadata record fit in it. The record has no checksum, and the MCAP library allocates the
-/// length that a text names before it reads the text.
-fn metadata_fits(body: &[u8]) -> bool {
-    // A text is its length and its bytes. Name, length of the map, keys and values.
-    let after_text = |at: u64| at + 4 + u64::from(length(body, at));
-    let map = after_text(0);
-    let end = map + 4 + u64::from(length(body, map));
-    let mut at = map + 4;
-    while at < end {
-        at = after_text(at);
-    }
-    at == end && end == body.len() as u64
 }
 
 fn number(bytes: &[u8], at: usize) -> Option<u64> {

@@ -12,6 +12,7 @@ pub mod difference;
 pub mod disk;
 mod error;
 mod event_index;
+mod lengths;
 pub mod live;
 mod output;
 pub mod player;

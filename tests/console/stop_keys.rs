@@ -208,7 +208,12 @@ fn keys_clicks_and_pastes_are_decoded_as_terminals_send_them() {
         decoded(b"\x1b[<64;1;1M\x1b[<65;1;1M"),
         [TerminalEvent::Mouse(WheelUp), TerminalEvent::Mouse(WheelDown)]
     );
-    assert_eq!(decoded(b"\x1b[<0;3;4m\x1b[<35;3;4M\x1b[I\x1b[?1;2c"), [], "a release, a move, focus, an answer");
+    assert_eq!(decoded(b"\x1b[<0;3;4m\x1b[<35;3;4M\x1b[I\x1b[4;768;1024t"), [], "a release, a move, focus, an answer");
+    // Primary device attributes: 4 is sixel.
+    assert_eq!(
+        decoded(b"\x1b[?1;2c\x1b[?62;4;22c\x1b[?4c"),
+        [TerminalEvent::Sixel(false), TerminalEvent::Sixel(true), TerminalEvent::Sixel(false)]
+    );
     assert_eq!(decoded(b"\x1b[200~g g\x1b[A\r\x1b[201~"), [TerminalEvent::Paste("g g\x1b[A\r".into())]);
     let mut inputs = Vec::new();
     let mut lone = KeyReader::new(false, None, SpaceBarIsText::default());

@@ -8,7 +8,7 @@ use quadfrog::recording::player::Player;
 use quadfrog::recording::record::{Record, StageRecord, Transition};
 use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::telemetry::{Mode, Phase, Snapshot};
-use quadfrog::trial::{Displacement, ExperimentStage, JumpRow, TrialRecord, Verdict};
+use quadfrog::trial::{Displacement, DrawnRange, ExperimentStage, JumpRow, TrialRecord, Verdict};
 use quadfrog_console::feed::Feed;
 use quadfrog_console::message::{Effect, ExportedRows, Mouse, Msg};
 use quadfrog_console::model::View;
@@ -295,7 +295,9 @@ fn details_show_all_values_of_a_trial() {
     let mut console = Console::ready();
     let first = TrialRecord { note: "slid on the mat".into(), ..trial(0, Some(Verdict::Void), Some(Verdict::Fall)) };
     console.record(Record::Trial(first));
-    let again = TrialRecord { parent: Some(0), hand_value: Some(0.37), ..trial(1, Some(Verdict::Accept), None) };
+    let ranges = vec![DrawnRange { name: "Fx".into(), low: 0.0, high: 150.0 }];
+    let again =
+        TrialRecord { parent: Some(0), hand_value: Some(0.37), ranges, ..trial(1, Some(Verdict::Accept), None) };
     for (time_ns, stage) in [(61_000_000_000, ExperimentStage::Running), (64_500_000_000, ExperimentStage::Review)] {
         console.model.snapshot.tick.time_ns = time_ns;
         console.stage(stage, 1);

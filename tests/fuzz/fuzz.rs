@@ -136,6 +136,19 @@ fn a_damaged_length_in_the_metadata_of_a_recording_is_not_allocated() {
     targets::clean();
 }
 
+/// Regression: the head of a chunk, which has no checksum, names its compression; a length of 1.7 GB was allocated by every reader.
+#[test]
+fn a_damaged_length_in_the_head_of_a_chunk_is_not_allocated() {
+    for whole in corpus::player() {
+        let at = whole.windows(8).position(|bytes| bytes == b"\x04\0\0\0zstd").expect("the compression of a chunk");
+        let mut damaged = whole.clone();
+        damaged[at..at + 4].copy_from_slice(b"\0\x04te");
+        let ((), memory) = count_alloc::most_memory(|| targets::player(&damaged));
+        assert!(memory < 16 * MB, "{memory} bytes");
+    }
+    targets::clean();
+}
+
 /// Tests the runner: a panic, endless memory and endless work are each found, with an input that repeats.
 #[test]
 fn a_fault_of_a_target_is_found_and_repeats_by_its_number() {
