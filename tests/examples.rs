@@ -18,7 +18,7 @@ fn output_of(name: &str) -> String {
 
 /// The first number after `before` in the last line that contains it.
 fn number_after(text: &str, before: &str) -> f64 {
-    let rest = text.lines().filter_map(|line| line.split_once(before)).last().map(|(_, rest)| rest);
+    let rest = text.lines().rev().find_map(|line| line.split_once(before)).map(|(_, rest)| rest);
     let number = rest.and_then(|rest| rest.split_whitespace().next()?.trim_end_matches(',').parse().ok());
     number.unwrap_or_else(|| panic!("no number after '{before}' in:\n{text}"))
 }

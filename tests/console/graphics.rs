@@ -396,7 +396,8 @@ fn auto_takes_sixel_where_the_terminal_reports_it() {
 fn characters_stay_where_pixels_are_not_known_to_be_shown_or_not_wanted() {
     let kitty = [COLOURS, ("TERM", "xterm-kitty")];
     let within = |name: &'static str, value: &'static str| [&kitty[..], &[(name, value)]].concat();
-    let cases: [(&[&str], (u16, u16), Vec<(&str, &str)>); 8] = [
+    type Case<'a> = (&'a [&'a str], (u16, u16), Vec<(&'a str, &'a str)>);
+    let cases: [Case; 8] = [
         (&[], CELL, within("TMUX", "/tmp/tmux-0/default,1,0")),
         (&[], CELL, within("STY", "1.session")),
         (&[], CELL, within("TERM", "tmux-256color")),

@@ -76,7 +76,7 @@ impl Raster {
     /// The index of a colour; none when the palette is full.
     fn colour(&mut self, rgb: (u8, u8, u8)) -> Option<usize> {
         let known = self.colours.iter().position(|colour| *colour == rgb);
-        let room = 1 + (self.colours.len() + 1) * usize::from(OPACITIES) <= LARGEST_PALETTE;
+        let room = (self.colours.len() + 1) * usize::from(OPACITIES) < LARGEST_PALETTE;
         known.or_else(|| {
             room.then(|| {
                 self.colours.push(rgb);
