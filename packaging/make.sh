@@ -36,7 +36,7 @@ missing() {
 # Builds the program of a target; prints its path.
 program() {
     local target=$1 folder=$build
-    local arguments=(--locked --quiet -p quadfrog-console --profile "$profile")
+    local arguments=(--locked --quiet -p quadfrog-console --features go2 --profile "$profile")
     if [ "$target" != "$host" ]; then
         arguments+=(--target "$target")
         folder=$build/$target

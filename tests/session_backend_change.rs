@@ -35,7 +35,7 @@ fn a_simulated_study_is_continued_on_hardware_by_the_flag_alone() {
     let hardware = options(folder.path(), Backend::Hardware);
     for refusal in [check_backend(&hardware).unwrap_err(), open(&hardware).err().unwrap()] {
         let text = refusal.to_string();
-        for part in ["forward-seed0", "made on sim (go1)", "runs on go1 (go1)", "--accept-backend-change"] {
+        for part in ["forward-seed0", "made on sim (go1)", "runs on hardware (go1)", "--accept-backend-change"] {
             assert!(text.contains(part), "{part}: {text}");
         }
     }
@@ -62,9 +62,13 @@ fn a_study_of_an_earlier_version_counts_as_simulated_and_another_robot_is_refuse
     let a1 = RobotDescription::embedded("a1").unwrap();
     let other = Options { robot: a1, ..options(folder.path(), Backend::Hardware) };
     let refusal = check_backend(&other).unwrap_err().to_string();
-    assert!(refusal.contains("made on go1 (go1)") && refusal.contains("runs on go1 (a1)"), "{refusal}");
+    assert!(refusal.contains("made on hardware (go1)") && refusal.contains("runs on hardware (a1)"), "{refusal}");
     let journal = folder.path().join("study.log");
     let lines = std::fs::read_to_string(&journal).unwrap();
+    // The name of the hardware before there was a second robot.
+    std::fs::write(&journal, lines.replace("\"hardware\"", "\"go1\"")).unwrap();
+    assert_ne!(std::fs::read_to_string(&journal).unwrap(), lines);
+    check_backend(&options(folder.path(), Backend::Hardware)).expect("its own study, by its earlier name");
     let earlier: String =
         lines.lines().filter(|line| !line.contains("\"backend\"")).map(|l| format!("{l}\n")).collect();
     assert_ne!(lines, earlier);

@@ -291,21 +291,25 @@ pub fn check_hardware(file: &str, table: &Table, default: &Table, origin: &FileO
     check_rows(hardware_rows(file), " on hardware", table, default, origin)
 }
 
-/// Limits of the motors on hardware: the Go1's largest are 35.6 N m and 30.1 rad/s.
-const MOTOR_TORQUE: NumberRange = within!(1, 40, "N m");
-const MOTOR_VELOCITY: NumberRange = within!(1, 40, "rad/s");
+/// Largest speed of a motor on hardware, rad/s: the Go1's and the Go2's largest is 30.1 rad/s.
+const LARGEST_SPEED_RAD_S: f64 = 40.0;
 
 /// Checks the limits of the robot's motors for hardware.
 pub fn check_motors(robot: &RobotDescription) -> Result<(), ConfigError> {
     let limits = &robot.limits;
-    let quantities = [("effort", &limits.max_torque, MOTOR_TORQUE), ("velocity", &limits.max_velocity, MOTOR_VELOCITY)];
-    for (name, values, range) in quantities {
-        if let Some(joint) = values.iter().position(|value| !range.allows(*value)) {
+    let quantities = [
+        ("effort", &limits.max_torque, robot.largest_torque_n_m, "N m"),
+        ("velocity", &limits.max_velocity, LARGEST_SPEED_RAD_S, "rad/s"),
+    ];
+    for (name, values, largest, unit) in quantities {
+        if let Some(joint) = values.iter().position(|value| !(1.0..=largest).contains(value)) {
             return Err(ConfigError::Value {
                 file: format!("URDF of {}", robot.name),
                 key: format!("{} limit {name}", joint_name(joint)),
                 value: values[joint].to_string(),
-                reason: format!("{} on hardware; give the value of the motor's data sheet", range.text),
+                reason: format!(
+                    "must be within 1 to {largest} {unit} on hardware; give the value of the motor's data sheet"
+                ),
             });
         }
     }

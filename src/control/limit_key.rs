@@ -118,7 +118,7 @@ fn fault_key(fault: &Fault, settings: &ControlSettings) -> Option<KeyValue> {
         | Fault::OperatorLeft
         | Fault::Send { .. }
         | Fault::EventsLost
-        | Fault::OtherCommander { sign: CommanderSign::ForeignMode, .. }
+        | Fault::OtherCommander { sign: CommanderSign::ForeignMode | CommanderSign::ForeignCommands, .. }
         | Fault::RemoteStop => return None,
     })
 }

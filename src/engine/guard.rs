@@ -1,7 +1,8 @@
-//! The guard: a second process that shares the robot's socket and damps the robot when the heartbeat of this process stops.
+//! The guard: a second process that damps the robot, over a shared socket or its own DDS writer, when the heartbeat of this
+//! process stops.
 //!
 //! A control thread that ends sends damping, also after a panic. A process that is killed or stopped sends nothing, and the
-//! robot's reaction to silence is not established (`robots/go1/README.md`). The guard holds one datagram, and the control
+//! robot's reaction to silence is not established (`robots/go1/README.md`). The guard holds one command, and the control
 //! thread sends it a heartbeat every few ticks. Without heartbeats, and after a suspension of the computer, the guard damps
 //! a commanded robot. It stops when they resume, because the control thread then finds itself late, or the computer
 //! suspended, and damps the robot.
@@ -9,8 +10,8 @@
 //! The guard answers every heartbeat, so that a stopped guard is noticed: without answers the robot lands and sits down
 //! (`src/control/failsafe.rs`), and nothing energises it.
 //!
-//! On the connection to the guard: the damping datagram, the longest silence in ms (two bytes, little endian), then the
-//! heartbeats, [`COMMANDED`] or [`LEFT_ALONE`]. On the connection from the guard: one byte after each read of heartbeats.
+//! On the connection to the guard: the length of [`GuardOrders`] (two bytes, little endian), these as JSON, then the heartbeats,
+//! [`COMMANDED`] or [`LEFT_ALONE`]. On the connection from the guard: one byte after each read of heartbeats.
 
 use std::io::{ErrorKind, Read, Write};
 use std::net::UdpSocket;
@@ -28,9 +29,7 @@ use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 
 use crate::control::settings::ControlSettings;
 use crate::realtime::clock::{SuspendWatch, suspended_ns};
-use crate::robot::JOINTS;
-use crate::robot::go1::Go1;
-use crate::robot::go1::packet::{COMMAND_LENGTH, CrcForm, LowCmd, MODE_SERVO};
+use crate::robot::hardware::DampingRoute;
 
 /// Argument that runs the program as the guard.
 pub const GUARD: &str = "guard";
@@ -43,7 +42,7 @@ const HEARTBEAT_TICKS: u32 = 10;
 const ALLOWED_SILENCE_MS: f64 = 50.0;
 /// Allowed silence where late ticks have no limit, ms.
 const LONGEST_ALLOWED_SILENCE_MS: f64 = 1000.0;
-/// Damping datagrams, one per millisecond, after the pipe has ended: several times the duration of sinking.
+/// Damping commands, one per millisecond, after the pipe has ended: several times the duration of sinking.
 const DAMPINGS: u32 = 3000;
 /// Longest time to the first answer of a guard that starts, ms: it loads the program and locks its memory.
 const LONGEST_START_MS: u32 = 5000;
@@ -93,28 +92,39 @@ pub struct GuardHeartbeat {
     answered: bool,
 }
 
+/// What the guard is to do.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+struct GuardOrders {
+    /// Longest silence of the control thread, ms.
+    silence_ms: u16,
+    damping: DampingRoute,
+}
+
 impl Guard {
-    /// Starts `program guard` over `robot`.
-    pub fn start(program: &Path, robot: &Go1, settings: &ControlSettings) -> std::io::Result<(Guard, GuardHeartbeat)> {
-        let (socket, damping) = (robot.socket()?, robot.damping(settings.gate.damping_kd));
-        let damping = damping.map_err(std::io::Error::other)?;
+    /// Starts `program guard`, which damps the robot as `damping` says, where that needs one over `socket`.
+    pub fn start(
+        program: &Path,
+        (damping, socket): (DampingRoute, Option<UdpSocket>),
+        settings: &ControlSettings,
+    ) -> std::io::Result<(Guard, GuardHeartbeat)> {
         let allowed_ms = if settings.late_ms > 0.0 {
             2.0 * settings.late_ms + ALLOWED_SILENCE_MS
         } else {
             LONGEST_ALLOWED_SILENCE_MS
         };
         let (theirs, mut connection) = UnixStream::pair()?;
+        let orders = serde_json::to_vec(&GuardOrders { silence_ms: allowed_ms as u16, damping })?;
         let process = Command::new(program)
             .arg0("quadfrog-guard")
             .arg(GUARD)
             .stdin(OwnedFd::from(theirs))
-            .stdout(OwnedFd::from(socket))
+            .stdout(socket.map_or_else(Stdio::null, |socket| Stdio::from(OwnedFd::from(socket))))
             .stderr(Stdio::inherit())
             // Signals of the terminal must not reach the guard.
             .process_group(0)
             .spawn()?;
-        connection.write_all(damping.bytes())?;
-        connection.write_all(&(allowed_ms as u16).to_le_bytes())?;
+        connection.write_all(&(orders.len() as u16).to_le_bytes())?;
+        connection.write_all(&orders)?;
         connection.set_nonblocking(true)?;
         let findings = Arc::<GuardFindings>::default();
         let allowed_silent_ms = settings.failsafe.guard_silent_ms;
@@ -216,8 +226,11 @@ pub enum GuardOutcome {
     },
 }
 
-/// Runs the guard until `connection` ends.
-pub fn run_guard(connection: impl Read + Write + AsFd, socket: &UdpSocket) -> Result<GuardOutcome, GuardError> {
+/// Runs the guard until `connection` ends. `socket` is its standard output, which only a Go1's damping uses.
+///
+/// # Errors
+/// The input is no guard's, its command does not damp, or the way to the robot cannot be opened.
+pub fn run_guard(connection: impl Read + Write + AsFd, socket: UdpSocket) -> Result<GuardOutcome, GuardError> {
     let mut watch = SuspendWatch::default();
     guard_with(connection, socket, || suspended_ns().map_or(0, |bounds| watch.observe(bounds)))
 }
@@ -225,17 +238,15 @@ pub fn run_guard(connection: impl Read + Write + AsFd, socket: &UdpSocket) -> Re
 /// As [`run_guard`]; `suspended_ms` returns the time for which the computer was suspended since its last call.
 fn guard_with(
     mut connection: impl Read + Write + AsFd,
-    socket: &UdpSocket,
+    socket: UdpSocket,
     mut suspended_ms: impl FnMut() -> u32,
 ) -> Result<GuardOutcome, GuardError> {
-    let refused = |reason: &dyn ToString| GuardError { reason: reason.to_string() };
-    let (mut damping, mut silence_ms) = ([0; COMMAND_LENGTH], [0; 2]);
-    connection.read_exact(&mut damping).map_err(|error| refused(&error))?;
-    connection.read_exact(&mut silence_ms).map_err(|error| refused(&error))?;
-    check_damping(&damping)?;
+    let orders = read_orders(&mut connection)?;
+    let silence = PollTimeout::from(orders.silence_ms);
+    let opened = orders.damping.open(socket, LEAST_DAMPING);
+    let mut send = opened.map_err(|error| GuardError { reason: error.to_string() })?;
     // An answer that does not fit is left out; the guard never waits for the console. A pipe takes no answers.
     let _ = fcntl(&connection, FcntlArg::F_SETFL(OFlag::O_NONBLOCK));
-    let silence = PollTimeout::from(u16::from_le_bytes(silence_ms));
     let (mut timeout, mut signs) = (PollTimeout::NONE, [0; 64]);
     loop {
         let woken = poll(&mut [PollFd::new(connection.as_fd(), PollFlags::POLLIN)], timeout);
@@ -243,9 +254,9 @@ fn guard_with(
         let resumed = suspended_ms() > SUSPENDED_MS && timeout != PollTimeout::NONE;
         match woken {
             Err(nix::Error::EINTR) => {}
-            // Silence: a datagram now, and one every millisecond until the next heartbeat.
+            // Silence: a command now, and one every millisecond until the next heartbeat.
             Ok(0) => {
-                let _ = socket.send(&damping);
+                let _ = send();
                 timeout = PollTimeout::from(1_u16);
             }
             // After an error of poll, the read tells the state of the connection.
@@ -260,7 +271,7 @@ fn guard_with(
             },
         }
         if resumed {
-            let _ = socket.send(&damping);
+            let _ = send();
             timeout = PollTimeout::from(1_u16);
         }
     }
@@ -269,30 +280,32 @@ fn guard_with(
     }
     let mut sent = 0;
     for _ in 0..DAMPINGS {
-        // A lost datagram is followed by the next.
-        sent += u32::from(socket.send(&damping).is_ok());
+        // A lost command is followed by the next.
+        sent += u32::from(send().is_ok());
         // Slept, not paced: the clock may be what failed.
         std::thread::sleep(Duration::from_millis(1));
     }
     Ok(GuardOutcome::Damped { sent })
 }
 
-/// Checks that the datagram passes the checks of the packets and damps every joint.
-fn check_damping(datagram: &[u8]) -> Result<(), GuardError> {
-    let refused = |reason: String| GuardError { reason };
-    let command = LowCmd::parse(datagram, CrcForm::Plain)
-        .or_else(|_| LowCmd::parse(datagram, CrcForm::Sealed))
-        .map_err(|rejection| refused(rejection.to_string()))?;
-    let limp = (0..JOINTS).map(|joint| command.motor(joint)).find(|m| m.mode != MODE_SERVO || m.kd < LEAST_DAMPING);
-    limp.map_or(Ok(()), |m| Err(refused(format!("kd {} N m s/rad does not damp; at least {LEAST_DAMPING}", m.kd))))
+fn read_orders(connection: &mut impl Read) -> Result<GuardOrders, GuardError> {
+    let refused = |reason: &dyn ToString| GuardError { reason: reason.to_string() };
+    let mut length = [0; 2];
+    connection.read_exact(&mut length).map_err(|error| refused(&error))?;
+    let mut orders = vec![0; usize::from(u16::from_le_bytes(length))];
+    connection.read_exact(&mut orders).map_err(|error| refused(&error))?;
+    serde_json::from_slice(&orders).map_err(|error| refused(&error))
 }
 
 #[cfg(test)]
 mod tests {
+    use std::net::Ipv4Addr;
+
     use super::*;
     use crate::control::settings::ControlSettings;
     use crate::robot::JointCommand;
     use crate::robot::go1::convert::low_cmd;
+    use crate::robot::go1::packet::{CrcForm, LowCmd};
 
     fn settings() -> ControlSettings {
         let robot = crate::robot::description::RobotDescription::embedded("go1").unwrap();
@@ -352,6 +365,12 @@ mod tests {
         low_cmd(&JointCommand::damping(kd), CrcForm::Plain).unwrap().bytes().to_vec()
     }
 
+    /// Bytes of the orders with their length.
+    fn orders(silence_ms: u16, damping: DampingRoute) -> Vec<u8> {
+        let orders = serde_json::to_vec(&GuardOrders { silence_ms, damping }).unwrap();
+        [&(orders.len() as u16).to_le_bytes()[..], &orders].concat()
+    }
+
     /// Two sockets in place of the robot and of the connection to it.
     fn robot() -> (UdpSocket, UdpSocket) {
         let robot = UdpSocket::bind(("127.0.0.1", 0)).unwrap();
@@ -367,10 +386,11 @@ mod tests {
         let ((robot, socket), (mut ours, theirs)) = (robot(), UnixStream::pair().unwrap());
         // One more than it reads at once.
         let heartbeats = [COMMANDED; 65];
-        ours.write_all(&[&command(3.0)[..], &60_000_u16.to_le_bytes(), &heartbeats].concat()).unwrap();
+        ours.write_all(&[&orders(60_000, DampingRoute::Go1 { command: command(3.0) })[..], &heartbeats].concat())
+            .unwrap();
         let last = if suspended_ms > SUSPENDED_MS { 6 } else { 2 };
         let mut wakes = 0;
-        let outcome = guard_with(theirs, &socket, || {
+        let outcome = guard_with(theirs, socket, || {
             wakes += 1;
             if wakes == last {
                 ours.write_all(&[LEFT_ALONE]).unwrap();
@@ -394,14 +414,21 @@ mod tests {
         let guard = |input: &[u8]| {
             let (mut ours, theirs) = UnixStream::pair().unwrap();
             ours.write_all(input).unwrap();
-            run_guard(theirs, &robot().1)
+            drop(ours);
+            run_guard(theirs, robot().1)
         };
+        let go2 = |command| DampingRoute::Go2 { command, domain: 1, address: Ipv4Addr::LOCALHOST, reliable: false };
         for kd in [0.03, 0.9] {
-            let start = [command(kd), 70_u16.to_le_bytes().to_vec()].concat();
-            let error = guard(&start).unwrap_err().to_string();
-            assert!(error.contains("does not damp"), "{error}");
+            let to_go2 = go2(crate::robot::go2::link::damping(kd).unwrap().bytes().to_vec());
+            for start in [orders(70, DampingRoute::Go1 { command: command(kd) }), orders(70, to_go2)] {
+                let error = guard(&start).unwrap_err().to_string();
+                assert!(error.contains("does not damp"), "{error}");
+            }
         }
-        let braking = [LowCmd::braking(CrcForm::Plain).bytes(), &[70, 0]].concat();
-        assert!(guard(&braking).is_err());
+        let braking = LowCmd::braking(CrcForm::Plain).bytes().to_vec();
+        assert!(guard(&orders(70, DampingRoute::Go1 { command: braking })).is_err());
+        assert!(guard(&orders(70, go2(command(3.0)))).is_err(), "a command of the other robot");
+        assert!(guard(b"\x02\x00{}").is_err(), "no orders");
+        assert!(guard(b"\xff\xff{").is_err(), "orders that end");
     }
 }

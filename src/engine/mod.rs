@@ -45,12 +45,13 @@ use crate::optimize::ask::SamplerKind;
 use crate::optimize::journal::Durability;
 use crate::realtime::channel::{ConsolePorts, Heartbeat, Lowering, StopLatch, channels};
 use crate::realtime::clock::{Clock, MonotonicClock};
+use crate::realtime::scheduling::set_priority;
 use crate::realtime::sleep_lock::{ALLOW_INHIBITOR, INHIBITOR, SleepLock};
 use crate::realtime::system::descriptors;
 use crate::recording::live::{LiveServer, LiveStatus};
 use crate::recording::record::{Record, Stamped};
 use crate::recording::recorder::{Recorder, RecorderHandle, RecorderStatus, RecorderWatch};
-use crate::robot::go1::Go1;
+use crate::robot::hardware::{HardwareError, Network, OpenedRobot};
 use crate::robot::{Placement, Robot};
 use crate::session::arming_checklist::ArmingChecklist;
 use crate::session::operator_request::{OperatorRequest, StampedRequest};
@@ -63,6 +64,9 @@ use crate::trial::{Approval, Backend};
 
 /// File descriptors of a session: some twenty for files, sockets, the terminal and the guard.
 const NEEDED_DESCRIPTORS: u64 = 32;
+
+/// Distance of the priority of a robot's own threads to that of the control thread.
+const BELOW_CONTROL: u8 = 10;
 
 /// Starts the control, recorder and session threads.
 ///
@@ -83,10 +87,12 @@ pub fn start(options: Options) -> Result<EngineHandle, EngineError> {
         Backend::Simulator => (Box::new(Simulator::new(&options.robot, &options.config.simulator)?), None),
         Backend::Hardware => {
             let no_network = || EngineError::NoNetwork { robot: options.robot.name.clone() };
-            let go1 = Go1::open(&options.network.ok_or_else(no_network)?, true)?;
-            let post = |program: &PathBuf| Guard::start(program, &go1, &settings);
+            let network = options.network.as_ref().ok_or_else(no_network)?;
+            let priority = options.config.scheduling(options.backend).priority;
+            let (robot, route) = open_robot(network, settings.gate.damping_kd, priority)?;
+            let post = |program: &PathBuf| Guard::start(program, route, &settings);
             let guard = options.guard.as_ref().map(post).transpose().map_err(system("guard"))?;
-            (Box::new(go1), guard)
+            (robot, guard)
         }
     };
     // A simulated robot begins like a real one: lying folded on its belly.
@@ -138,7 +144,8 @@ pub fn start(options: Options) -> Result<EngineHandle, EngineError> {
     let (to_supervisor, requests) = channel();
     let recorded_in = recording.as_ref().and(options.folder.clone());
     let checklist = ArmingChecklist::new(&settings, fingerprint(&options.config, &options.robot), recorded_in)
-        .with_unseen_connection(options.unseen_connection.clone());
+        .with_unseen_connection(options.unseen_connection.clone())
+        .with_low_level(options.network.as_ref().map_or("none in the simulator", Network::low_level));
     let parts = SupervisorParts {
         experiment,
         control: session_end,
@@ -205,6 +212,18 @@ pub fn start(options: Options) -> Result<EngineHandle, EngineError> {
         session: Some(session),
         recorder: Some(recorder),
     })
+}
+
+/// Opens the robot in a thread below the control thread's `priority`: threads that a robot's library starts inherit it. The
+/// arming check of the control thread reports a denied priority.
+fn open_robot(network: &Network, damping_kd: f64, priority: u8) -> Result<OpenedRobot, HardwareError> {
+    let open = || {
+        if priority > BELOW_CONTROL {
+            let _denied = set_priority(priority - BELOW_CONTROL);
+        }
+        network.open(damping_kd)
+    };
+    std::thread::scope(|scope| scope.spawn(open).join()).unwrap_or_else(|panic| std::panic::resume_unwind(panic))
 }
 
 /// Finds or makes the prior of the sampler behind the session. One core is left to the control thread. An observer makes no

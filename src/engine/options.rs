@@ -10,8 +10,7 @@ use crate::optimize::study::{Storage, StudyError};
 use crate::recording::RecordingError;
 use crate::recording::live::LiveServer;
 use crate::robot::description::RobotDescription;
-use crate::robot::go1::Network;
-use crate::robot::go1::link::LinkError;
+use crate::robot::hardware::{HardwareError, Network};
 use crate::session::prior::EnsembleError;
 use crate::sim::SimError;
 use crate::trial::{Approval, Backend, Task};
@@ -111,8 +110,10 @@ pub enum EngineError {
     #[error(transparent)]
     Simulator(#[from] SimError),
     #[error(transparent)]
-    Link(#[from] LinkError),
-    #[error("{robot}: its robot.toml has no section [network]; only a robot with one can be driven or emulated")]
+    Hardware(#[from] HardwareError),
+    #[error(
+        "{robot}: its robot.toml has no section [network] or [dds]; only a robot with one can be driven or emulated"
+    )]
     NoNetwork { robot: String },
     #[error(transparent)]
     Space(#[from] SpaceError),

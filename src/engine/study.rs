@@ -1,5 +1,6 @@
 //! The study of a session: opened as an experiment, described for the recording.
 
+use std::str::FromStr;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -116,7 +117,8 @@ fn storage(options: &Options) -> Storage {
 
 /// Returns the backend of a study. One of an earlier version, without the attribute, counts as simulated.
 fn made_on(attributes: &StudyAttributes) -> &str {
-    attributes.backend.as_deref().unwrap_or(Backend::Simulator.name())
+    let made = attributes.backend.as_deref().unwrap_or(Backend::Simulator.name());
+    Backend::from_str(made).map_or(made, |backend| backend.name())
 }
 
 /// Refuses to continue on hardware a study that was made or continued on another backend or robot, unless the options accept

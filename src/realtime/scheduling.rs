@@ -131,8 +131,12 @@ fn prefault_stack() {
     std::hint::black_box(&stack);
 }
 
+/// Requests SCHED_FIFO at `priority` for the calling thread and the threads that it will start.
+///
+/// # Errors
+/// The system's reason for a denial.
 #[allow(unsafe_code, reason = "nix has no call for the scheduling policy")]
-fn set_priority(priority: u8) -> Result<(), String> {
+pub fn set_priority(priority: u8) -> Result<(), String> {
     // SAFETY: an all-zero `sched_param` is a valid value of this plain C struct.
     let mut parameters: libc::sched_param = unsafe { std::mem::zeroed() };
     parameters.sched_priority = priority.into();

@@ -210,6 +210,7 @@ fn link(way: Way, ours: &mut LinkStatus, m: &mut frog::Link) -> Result<(), Decod
     way.copy(&mut ours.recent_received, &mut m.recent_received);
     way.copy(&mut ours.recent_lost, &mut m.recent_lost);
     way.copy(&mut ours.recent_corrupt, &mut m.recent_corrupt);
+    way.copy(&mut ours.foreign_commands, &mut m.foreign_commands);
     Ok(())
 }
 

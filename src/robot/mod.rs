@@ -9,9 +9,12 @@ pub mod crc;
 pub mod description;
 pub mod go1;
 pub mod go2;
+pub mod hardware;
 pub mod kinematics;
 pub mod recent_count;
 pub mod remote;
+pub mod servo_grace;
+pub mod state_counter;
 
 use nalgebra::{UnitQuaternion, Vector3};
 use remote::Remote;
@@ -293,6 +296,8 @@ pub struct LinkStatus {
     pub recent_corrupt: u32,
     /// Age of the last rejected older state against the newest one, ms.
     pub older_by_ms: u32,
+    /// Commands of other programs to the same robot, where the link shows them (DDS).
+    pub foreign_commands: u64,
 }
 
 impl LinkStatus {

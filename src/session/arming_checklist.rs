@@ -44,6 +44,8 @@ pub struct ArmingChecklist {
     denied: Vec<DeniedSetting>,
     /// Reason why the loss of the operator's connection cannot be detected; none if it can.
     unseen_connection: Option<String>,
+    /// Way to the robot's low-level mode.
+    low_level: &'static str,
 }
 
 impl ArmingChecklist {
@@ -63,7 +65,14 @@ impl ArmingChecklist {
             granted: Vec::new(),
             denied: Vec::new(),
             unseen_connection: None,
+            low_level: "the robot's low-level mode",
         }
+    }
+
+    /// Sets the way to low-level mode that the operator confirms.
+    pub fn with_low_level(mut self, way: &'static str) -> ArmingChecklist {
+        self.low_level = way;
+        self
     }
 
     /// Records the real-time settings of the control thread.
@@ -148,7 +157,7 @@ impl ArmingChecklist {
             self.confirmation(
                 OperatorCheck::LowLevel,
                 String::new(),
-                "remote L2+A, L2+A, L2+B, L1+L2+START; the operator's confirmation",
+                &format!("{}; the operator's confirmation", self.low_level),
             ),
             self.confirmation(
                 OperatorCheck::Configuration,

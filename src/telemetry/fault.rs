@@ -161,6 +161,8 @@ pub enum CommanderSign {
     LostStates,
     /// A motor reports another torque than that of the command, N m.
     ForeignTorque,
+    /// Commands of another program on the robot's topic.
+    ForeignCommands,
 }
 
 impl CommanderSign {
@@ -168,6 +170,7 @@ impl CommanderSign {
         match self {
             CommanderSign::ForeignMode => "no motor is in servo mode".to_owned(),
             CommanderSign::LostStates => format!("{measured:.1} % of the states lost in 1 s, limit {allowed:.1} %"),
+            CommanderSign::ForeignCommands => format!("{measured:.0} commands of another program, limit {allowed:.0}"),
             CommanderSign::ForeignTorque => {
                 format!("a torque differs from the command by {measured:.1} N m, limit {allowed:.1} N m")
             }

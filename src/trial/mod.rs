@@ -23,8 +23,8 @@ pub enum Backend {
     /// The built-in simulator.
     #[strum(serialize = "sim")]
     Simulator,
-    /// A robot over its network.
-    #[strum(serialize = "go1")]
+    /// A robot over its network; `go1` in files of earlier versions.
+    #[strum(serialize = "hardware", serialize = "go1")]
     Hardware,
 }
 

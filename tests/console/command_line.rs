@@ -247,7 +247,10 @@ fn a_simulated_study_is_not_continued_on_the_robot_without_the_flag() {
     let study = program.study("recordings");
     let study = study.to_str().unwrap();
     let message = program.refused(&["--robot", "go1", "--resume", study]);
-    assert_shows(&message, &["forward-seed0", "made on sim (go1)", "runs on go1 (go1)", "--accept-backend-change"]);
+    assert_shows(
+        &message,
+        &["forward-seed0", "made on sim (go1)", "runs on hardware (go1)", "--accept-backend-change"],
+    );
     let accepted = program.refused(&["--robot", "go1", "--resume", study, "--accept-backend-change"]);
     assert_shows(&accepted, &["terminal"]);
 }

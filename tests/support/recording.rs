@@ -176,6 +176,7 @@ impl Draw {
             recent_received: self.word() as u32,
             recent_lost: self.word() as u32,
             recent_corrupt: self.word() as u32,
+            foreign_commands: self.word(),
             // Not recorded.
             older_by_ms: 0,
         }

@@ -1,4 +1,4 @@
-//! Signs of another program that commands the robot: lost states, torques that are not ours, motors in another mode.
+//! Signs of another program that commands the robot: its commands, lost states, torques that are not ours, motors in another mode.
 
 use super::inputs::ConsistencyInputs;
 use super::leaky::kept;
@@ -12,6 +12,8 @@ const STATES_S: f64 = 1.0;
 const TORQUE_S: f64 = 0.1;
 /// Least number of states within the time constant from which a share is known: less is a missing link.
 const LEAST_STATES: f64 = 100.0;
+/// Most commands of other programs within the time constant. A program that looks once at the topic sends none.
+const FOREIGN_COMMANDS: f64 = 2.0;
 
 /// History of the link and the motors.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -20,6 +22,9 @@ pub(super) struct CommandEcho {
     counted: Option<[u64; 2]>,
     /// Received and lost states within the time constant.
     recent: [f64; 2],
+    /// Commands of other programs up to the last tick, and within the time constant.
+    foreign_counted: Option<u64>,
+    foreign: f64,
     /// Averaged reported torque less that of the last command, N m.
     torque_error_n_m: Joints,
 }
@@ -35,6 +40,8 @@ impl CommandEcho {
             // A state that arrives late is no longer lost.
             *recent = (*recent * share + (now as f64 - before as f64)).max(0.0);
         }
+        let before = self.foreign_counted.replace(link.foreign_commands).unwrap_or(link.foreign_commands);
+        self.foreign = self.foreign * share + link.foreign_commands.saturating_sub(before) as f64;
     }
 
     /// Compares the reported torques with those of the last command, in modes in which the robot stands.
@@ -62,6 +69,9 @@ impl CommandEcho {
     ) -> Option<(CommanderSign, f64, f64)> {
         if mode.energised() && state.motor_enabled == [false; JOINTS] {
             return Some((CommanderSign::ForeignMode, JOINTS as f64, 0.0));
+        }
+        if mode.energised() && self.foreign > FOREIGN_COMMANDS {
+            return Some((CommanderSign::ForeignCommands, self.foreign, FOREIGN_COMMANDS));
         }
         let [received, lost] = self.recent;
         let loss_share = if received + lost < LEAST_STATES { 0.0 } else { lost / (received + lost) };

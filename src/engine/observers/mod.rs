@@ -36,7 +36,7 @@ pub struct SessionFacts {
     pub folder: PathBuf,
     /// Name of the robot.
     pub robot: String,
-    /// Name of the backend, `sim` or `go1`.
+    /// Name of the backend, `sim` or `hardware`.
     pub backend: String,
     /// Name of the task.
     pub task: String,

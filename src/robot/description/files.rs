@@ -43,6 +43,7 @@ const EMBEDDED: &[EmbeddedRobot] = &[
             ("control.toml", include_str!("../../../robots/go2/config/control.toml")),
             ("optimize.toml", include_str!("../../../robots/go2/config/optimize.toml")),
             ("safety.toml", include_str!("../../../robots/go2/config/safety.toml")),
+            ("simulator.toml", include_str!("../../../robots/go2/config/simulator.toml")),
         ],
     },
 ];
@@ -56,9 +57,10 @@ struct RobotToml {
     motor: MotorToml,
     pose: PoseToml,
     maker_limits: Option<MakerLimitsToml>,
-    /// Read by the module of the robot's protocol, see `robot::go1`.
+    /// Read by the modules of the robots' protocols, see `robot::hardware`.
     #[serde(rename = "network")]
     _network: Option<IgnoredAny>,
+    dds: Option<IgnoredAny>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -84,6 +86,11 @@ struct PoseToml {
 
 /// Folder beside `robot.toml` with the robot's own configuration.
 const CONFIG: &str = "config";
+
+/// Largest torque of a motor on hardware, N m: above that of the Go1's calf (35.55), and of the Go2's (45.43), whose `robot.toml`
+/// has a section `[dds]`.
+const LARGEST_TORQUE_N_M: f64 = 40.0;
+const LARGEST_TORQUE_GO2_N_M: f64 = 50.0;
 
 /// Largest angle of a joint's limit, rad: two turns.
 const LARGEST_ANGLE_RAD: f64 = 12.6;
@@ -232,6 +239,7 @@ impl RobotFiles {
             limits: parts.limits,
             lying_position,
             rotor_inertia,
+            largest_torque_n_m: if robot.dds.is_some() { LARGEST_TORQUE_GO2_N_M } else { LARGEST_TORQUE_N_M },
             imu_origin: parts.imu_origin.unwrap_or_else(Vector3::zeros),
             joint_names: parts.joint_names,
             links: parts.links,

@@ -106,6 +106,8 @@ pub struct RobotDescription {
     pub lying_position: Joints,
     /// Inertia of each motor's rotor at the joint (gear ratio squared times rotor inertia), kg m^2.
     pub rotor_inertia: Joints,
+    /// Largest torque that a file may allow a motor of this robot on hardware, N m.
+    pub largest_torque_n_m: f64,
     /// Position of the inertial unit, trunk frame, m; its axes are the trunk's.
     pub imu_origin: Vector3<f64>,
     /// Names of the joints in the URDF.

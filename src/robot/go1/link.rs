@@ -3,15 +3,14 @@
 //! The official endpoint reads the queue to its end and checks the last datagram alone, so one corrupt datagram hides
 //! all valid ones before it. Here each datagram is checked, and the newest valid state is kept.
 //!
-//! Time is counted in calls of [`Link::receive`], one per millisecond, so the ages in a test do not depend on the
-//! machine's speed. A late control thread is detected by the watchdog, not here.
+//! Time is counted in calls of [`Link::receive`], one per millisecond.
 
 use std::io::ErrorKind;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, UdpSocket};
 
 use super::packet::{LOW_LEVEL, LowCmd, LowState, Rejection};
-use crate::robot::recent_count::RecentCount;
-use crate::robot::{LinkStatus, robot_time_passed};
+use crate::robot::LinkStatus;
+use crate::robot::state_counter::{StateClock, StateCounter};
 
 /// Most datagrams read in one call, so that a flood cannot delay the tick; the rest is read in the next calls. A robot
 /// sends one per millisecond.
@@ -45,10 +44,8 @@ pub struct LinkOptions {
     pub address: SocketAddr,
     /// Local port; 0 takes any free one.
     pub local_port: u16,
-    /// Time between two states on the robot's clock, ms.
-    pub state_period_ms: u32,
-    /// A state older than the newest by more than this means that the robot has restarted, ms.
-    pub restart_ms: u32,
+    /// How the robot's clock is read.
+    pub clock: StateClock,
 }
 
 /// UDP link to a robot.
@@ -57,23 +54,11 @@ pub struct Link {
     socket: UdpSocket,
     /// Socket connected to itself, for the cache warm-up.
     loopback: Option<UdpSocket>,
-    options: LinkOptions,
     newest: Option<LowState>,
-    /// Bit k is set if the state of k ms before the newest one has arrived.
-    arrived: u64,
-    status: LinkStatus,
+    counter: StateCounter,
     /// Consecutive commands that the system refused to send.
     refused: u32,
-    recent: RecentCounts,
     buffer: [u8; BUFFER],
-}
-
-/// Counts of the last five seconds.
-#[derive(Debug, Default)]
-struct RecentCounts {
-    received: RecentCount,
-    lost: RecentCount,
-    corrupt: RecentCount,
 }
 
 impl Link {
@@ -93,12 +78,9 @@ impl Link {
         Ok(Link {
             socket,
             loopback: loopback_socket().ok(),
-            options: *options,
             newest: None,
-            arrived: 0,
-            status: LinkStatus::default(),
+            counter: StateCounter::new(options.clock),
             refused: 0,
-            recent: RecentCounts::default(),
             buffer: [0; BUFFER],
         })
     }
@@ -121,7 +103,7 @@ impl Link {
 
     /// Returns the statistics.
     pub fn status(&self) -> &LinkStatus {
-        &self.status
+        &self.counter.status
     }
 
     /// Whether a valid state has ever arrived.
@@ -132,11 +114,7 @@ impl Link {
     /// Reads all datagrams since the last call, a millisecond ago. Returns the newest valid state, or none if there is
     /// no new one.
     pub fn receive(&mut self) -> Option<&LowState> {
-        let RecentCounts { received, lost, corrupt } = &mut self.recent;
-        for count in [received, lost, corrupt] {
-            count.advance();
-        }
-        self.status.state_age_ms = self.status.state_age_ms.saturating_add(1);
+        self.counter.advance();
         let mut is_new = false;
         for _ in 0..MOST_PER_CALL {
             match self.socket.recv(&mut self.buffer) {
@@ -147,10 +125,7 @@ impl Link {
                 Err(_) => {}
             }
         }
-        self.status.recent_received = self.recent.received.sum();
-        self.status.recent_lost = self.recent.lost.sum();
-        self.status.recent_corrupt = self.recent.corrupt.sum();
-        self.status.rate_hz = self.recent.received.in_a_second();
+        self.counter.sum_recent();
         if is_new { self.newest.as_ref() } else { None }
     }
 
@@ -160,66 +135,23 @@ impl Link {
             Ok(state) => *state,
             Err(rejection) => {
                 match rejection {
-                    Rejection::Length { .. } => self.status.wrong_length += 1,
-                    Rejection::Crc { .. } => {
-                        self.status.corrupt += 1;
-                        self.recent.corrupt.add(1);
-                    }
-                    Rejection::Head { .. } | Rejection::BatteryOff => self.status.foreign += 1,
+                    Rejection::Length { .. } => self.counter.status.wrong_length += 1,
+                    Rejection::Crc { .. } => self.counter.count_corrupt(),
+                    Rejection::Head { .. } | Rejection::BatteryOff => self.counter.status.foreign += 1,
                 }
                 return false;
             }
         };
         // A high-level state has another layout.
         if state.header.level != LOW_LEVEL {
-            self.status.foreign += 1;
+            self.counter.status.foreign += 1;
             return false;
         }
-        if !self.classify(state.robot_time_ms.get()) {
-            return false;
+        let is_new = self.counter.count_state(state.robot_time_ms.get());
+        if is_new {
+            self.newest = Some(state);
         }
-        self.newest = Some(state);
-        self.status.received += 1;
-        self.status.state_age_ms = 0;
-        self.recent.received.add(1);
-        true
-    }
-
-    /// Counts a valid state of the robot's time `tick` as new, lost, late, duplicate or reboot. Returns true if it is
-    /// newer.
-    fn classify(&mut self, robot_time_ms: u32) -> bool {
-        let Some(newest) = &self.newest else {
-            self.arrived = 1;
-            return true;
-        };
-        let newer_by = robot_time_passed(robot_time_ms, newest.robot_time_ms.get());
-        let older_by = newer_by.unsigned_abs();
-        if newer_by > 0 {
-            let gap = (older_by / self.options.state_period_ms).saturating_sub(1);
-            self.status.lost += u64::from(gap);
-            self.recent.lost.add(gap);
-            self.arrived = self.arrived.checked_shl(older_by).unwrap_or(0) | 1;
-            true
-        } else if older_by > self.options.restart_ms {
-            self.status.reboots += 1;
-            self.arrived = 1;
-            true
-        } else {
-            self.status.older_by_ms = older_by;
-            let bit = 1u64.checked_shl(older_by).unwrap_or(0);
-            if self.arrived & bit != 0 {
-                self.status.duplicate += 1;
-            } else {
-                self.status.out_of_order += 1;
-                if bit != 0 {
-                    // It was counted as lost when a newer state arrived.
-                    self.arrived |= bit;
-                    self.status.lost = self.status.lost.saturating_sub(1);
-                    self.recent.lost.take_back();
-                }
-            }
-            false
-        }
+        is_new
     }
 
     /// Sends a command.
@@ -259,11 +191,11 @@ impl Link {
     /// Counts the result of sending a command.
     fn count_sent(&mut self, sent: std::io::Result<usize>) -> Result<(), i32> {
         let Err(error) = sent else {
-            self.status.sent += 1;
+            self.counter.status.sent += 1;
             self.refused = 0;
             return Ok(());
         };
-        self.status.send_errors += 1;
+        self.counter.status.send_errors += 1;
         self.refused = self.refused.saturating_add(1);
         let tolerable = matches!(error.kind(), ErrorKind::ConnectionRefused | ErrorKind::WouldBlock);
         if tolerable && self.refused <= TOLERATED_REFUSALS { Ok(()) } else { Err(error.raw_os_error().unwrap_or(0)) }
@@ -283,25 +215,26 @@ mod tests {
     use super::*;
     use crate::robot::go1::packet::CrcForm;
 
+    const CLOCK: StateClock = StateClock { state_period_ms: 1, restart_ms: 100 };
+
     /// (`tests/control_warm_up.rs` checks that a warm-up changes nothing.)
     #[test]
     fn a_warm_up_sends_an_invalid_datagram_to_itself() {
         let address = (Ipv4Addr::LOCALHOST, 9).into();
-        let mut link =
-            Link::open(&LinkOptions { address, local_port: 0, state_period_ms: 1, restart_ms: 100 }).unwrap();
+        let mut link = Link::open(&LinkOptions { address, local_port: 0, clock: CLOCK }).unwrap();
         let command = LowCmd::braking(CrcForm::Plain);
         assert_eq!(link.warm_up(command), None, "there is no state yet");
         let received = &link.buffer[..command.bytes().len()];
         assert_eq!(received[2..], command.bytes()[2..]);
         assert!(LowCmd::parse(received, CrcForm::Plain).is_err());
-        assert_eq!(link.status, LinkStatus::default());
+        assert_eq!(link.counter.status, LinkStatus::default());
     }
 
     /// No socket can be made to refuse every send, so the system's answer is injected.
     #[test]
     fn refused_sends_become_an_error_after_five() {
         let address = (Ipv4Addr::LOCALHOST, 9).into();
-        let options = LinkOptions { address, local_port: 0, state_period_ms: 1, restart_ms: 100 };
+        let options = LinkOptions { address, local_port: 0, clock: CLOCK };
         let mut link = Link::open(&options).unwrap();
         let full = nix::errno::Errno::EAGAIN as i32;
         let refused = || Err(std::io::Error::from_raw_os_error(full));
@@ -313,6 +246,6 @@ mod tests {
             assert_eq!(link.count_sent(refused()), Err(full), "until one is sent");
             assert_eq!(link.count_sent(Ok(614)), Ok(()), "the first one that is sent ends the error");
         }
-        assert_eq!((link.status.sent, link.status.send_errors), (2, 14), "each is counted");
+        assert_eq!((link.counter.status.sent, link.counter.status.send_errors), (2, 14), "each is counted");
     }
 }

@@ -10,7 +10,9 @@ pub mod packet;
 use std::net::{SocketAddr, UdpSocket};
 
 use super::description::{DescriptionError, RobotFiles};
-use super::{JOINTS, JointCommand, LinkStatus, Placement, Robot, RobotError, RobotState};
+use super::servo_grace::ServoGrace;
+use super::state_counter::StateClock;
+use super::{JointCommand, LinkStatus, Placement, Robot, RobotError, RobotState};
 use link::{Link, LinkError, LinkOptions};
 use packet::{CommandError, CrcForm, LowCmd};
 
@@ -79,10 +81,7 @@ pub struct Go1 {
     sends_hello: bool,
     /// Time since the last hello command, ms.
     since_hello_ms: u32,
-    /// Time since servo mode was first commanded after the robot's last boot, ms.
-    servo_ms: Option<u32>,
-    /// Reboots of the robot at the last update of `servo_ms`.
-    reboots: u64,
+    servo: ServoGrace,
     /// The last sent command that damps every joint.
     damping: Option<LowCmd>,
 }
@@ -96,16 +95,14 @@ impl Go1 {
         let link = Link::open(&LinkOptions {
             address: network.address,
             local_port: network.local_port,
-            state_period_ms: network.state_period_ms,
-            restart_ms: network.restart_ms,
+            clock: StateClock { state_period_ms: network.state_period_ms, restart_ms: network.restart_ms },
         })?;
         Ok(Go1 {
             link,
             network: *network,
             sends_hello: !listen_only,
             since_hello_ms: network.hello_ms,
-            servo_ms: None,
-            reboots: 0,
+            servo: ServoGrace::new(network.servo_grace_ms),
             damping: None,
         })
     }
@@ -148,24 +145,14 @@ impl Go1 {
 impl Robot for Go1 {
     /// Returns the newest state if one arrived since the last call, its age otherwise.
     fn read(&mut self) -> Result<RobotState, RobotError> {
-        if let Some(servo_ms) = &mut self.servo_ms {
-            *servo_ms = servo_ms.saturating_add(1);
-        }
+        self.servo.advance();
         let Some(state) = self.link.receive() else {
             let age_ms = self.link.status().state_age_ms;
             self.hello();
             return Err(RobotError::NoNewState { age_ms });
         };
         let mut state = convert::robot_state(state, self.network.foot_force_n);
-        let reboots = self.link.status().reboots;
-        if reboots != self.reboots {
-            self.reboots = reboots;
-            self.servo_ms = None;
-        }
-        // A motor can leave servo mode only after it was commanded and had the time to enter it.
-        if self.servo_ms.is_none_or(|ms| ms <= self.network.servo_grace_ms) {
-            state.motor_enabled = [true; JOINTS];
-        }
+        self.servo.apply(&mut state, self.link.status().reboots);
         Ok(state)
     }
 
@@ -181,7 +168,7 @@ impl Robot for Go1 {
             self.link.send(datagram).map_err(|errno| RobotError::Send { errno })?;
         }
         encoded.map_err(|_| RobotError::Send { errno: nix::errno::Errno::EINVAL as i32 })?;
-        self.servo_ms.get_or_insert(0);
+        self.servo.command();
         Ok(())
     }
 

@@ -12,7 +12,7 @@ pub fn share(plan: &ExperimentPlan, trials: &[Trial]) -> Option<f64> {
     let HopEnvelope { start, step } = plan.envelope?;
     let accepted = |trial: &&Trial| {
         let kept = TrialAttributes::of(trial);
-        let here = kept.backend.as_deref() == Some(plan.backend.name());
+        let here = kept.backend.as_deref().and_then(|name| name.parse().ok()) == Some(plan.backend);
         here && trial.state == TrialState::Complete && kept.verdict == Some(Verdict::Accept)
     };
     let share = start + step * trials.iter().filter(accepted).count() as f64;

@@ -1,33 +1,35 @@
-//! The simulator served as a Go1 over UDP: commands are received, the motors' control law is simulated, states are sent
+//! The simulator served as a Go1 over UDP, or with the feature `go2` as a Go2 over DDS: commands are received, the motors' control law is simulated, states are sent
 //! at 1 kHz, and faults are injected on demand. One [`Emulator::step`] is one millisecond of the robot: called at 1 kHz
 //! it is a robot in real time, called in turn with a control cycle it repeats bit for bit.
 //!
 //! Unknown properties of the real robot are keys of `[emulator]` in `config/simulator.toml`, with the assumption.
 
+mod endpoint;
 mod fault;
+#[cfg(feature = "go2")]
+mod go2;
 mod network;
 mod robot;
 
-use std::net::{SocketAddr, UdpSocket};
+use std::net::SocketAddr;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 
+pub use endpoint::EmulatorClient;
 pub use fault::{EmulatorFault, EmulatorFaultError, help};
 
 use super::{EmulatorConfig, SimConfig, SimError};
 use crate::robot::description::RobotDescription;
-use crate::robot::go1::packet::{CrcForm, LowCmd};
-use crate::robot::go1::{Network, convert};
+use crate::robot::go1::Network;
+use crate::robot::hardware::{self, HardwareError};
 use crate::robot::{JOINTS, JointCommand, Placement, Truth};
 use crate::sim::terrain::unit_interval;
+use endpoint::{Endpoint, Go1Endpoint};
 use network::{NetworkConditions, NetworkPath};
 use robot::{EmulatedRobot, RobotDefects};
-
-/// Size of the receive buffer.
-const BUFFER: usize = 2048;
 
 /// Error of starting an emulator.
 #[derive(Debug, thiserror::Error)]
@@ -36,6 +38,13 @@ pub enum EmulatorError {
     /// The address is not available.
     #[error("{address}: {source}; give an address of this machine and a free port, for example 127.0.0.1:8007")]
     Bind { address: SocketAddr, source: std::io::Error },
+    /// The DDS domain cannot be joined.
+    #[cfg(feature = "go2")]
+    #[error(transparent)]
+    Dds(#[from] crate::robot::go2::dds::DdsError),
+    /// The interface of a Go2, or a program without it.
+    #[error(transparent)]
+    Hardware(#[from] HardwareError),
     /// The simulator's configuration.
     #[error(transparent)]
     Simulator(#[from] SimError),
@@ -44,8 +53,8 @@ pub enum EmulatorError {
 /// Status of an emulated robot.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct EmulatorStatus {
-    /// Source of the last command; states are sent there.
-    pub client: Option<SocketAddr>,
+    /// Source of the last command; a Go1 sends its states there.
+    pub client: Option<EmulatorClient>,
     /// Executed commands.
     pub commands: u64,
     /// Received datagrams that were no command.
@@ -88,17 +97,17 @@ struct SecondCommander {
     takes_states: bool,
 }
 
-/// An emulated Go1.
+/// An emulated robot.
 #[derive(Debug)]
 pub struct Emulator {
     robot: EmulatedRobot,
     config: EmulatorConfig,
-    crc: CrcForm,
-    socket: UdpSocket,
+    endpoint: Box<dyn Endpoint>,
+    local_address: Option<SocketAddr>,
     /// Time since the emulator's start, ms. The robot's own clock restarts when it reboots.
     now_ms: u64,
-    to_robot: NetworkPath<SocketAddr>,
-    from_robot: NetworkPath<SocketAddr>,
+    to_robot: NetworkPath<EmulatorClient>,
+    from_robot: NetworkPath<Option<EmulatorClient>>,
     conditions: NetworkConditions,
     second: Option<SecondCommander>,
     /// Whether the state of this millisecond goes to the second program.
@@ -113,7 +122,7 @@ pub struct Emulator {
 }
 
 impl Emulator {
-    /// Starts a robot that lies folded on its belly and receives on `address` (port 0 takes any free one).
+    /// Starts a Go1 that lies folded on its belly and receives on `address` (port 0 takes any free one).
     ///
     /// # Errors
     /// The address is taken, or a value of `config` is out of range.
@@ -124,19 +133,67 @@ impl Emulator {
         config: &SimConfig,
         seed: u64,
     ) -> Result<Emulator, EmulatorError> {
-        let robot = EmulatedRobot::new(description, network.foot_force_n, config, seed)?;
-        let socket = UdpSocket::bind(address).and_then(|socket| {
-            socket.set_nonblocking(true)?;
-            Ok(socket)
-        });
+        let bound = Go1Endpoint::bind(address, network, config.emulator.state_length);
+        let endpoint = bound.map_err(|source| EmulatorError::Bind { address, source })?;
+        let local_address = endpoint.local_address().ok();
+        Emulator::new(Box::new(endpoint), local_address, description, config, seed)
+    }
+
+    /// Starts a Go2 that lies folded on its belly, in a DDS domain at the interface with `address`.
+    ///
+    /// # Errors
+    /// The domain cannot be joined, or a value of `config` is out of range.
+    #[cfg(feature = "go2")]
+    pub fn join(
+        domain: u16,
+        address: std::net::Ipv4Addr,
+        description: &RobotDescription,
+        network: &crate::robot::go2::network::Network,
+        config: &SimConfig,
+        seed: u64,
+    ) -> Result<Emulator, EmulatorError> {
+        let endpoint = go2::Go2Endpoint::join(domain, address, network.foot_force_n, &description.lying_position)?;
+        Emulator::new(Box::new(endpoint), None, description, config, seed)
+    }
+
+    /// Starts the robot of `network`: a Go1 on `address`, or a Go2 in the domain and at the interface of `network`.
+    ///
+    /// # Errors
+    /// The address or the domain is not available, a value of `config` is out of range, or the program was built without the Go2.
+    pub fn serve(
+        network: &hardware::Network,
+        address: SocketAddr,
+        description: &RobotDescription,
+        config: &SimConfig,
+        seed: u64,
+    ) -> Result<Emulator, EmulatorError> {
+        match network {
+            hardware::Network::Go1(network) => Emulator::bind(address, description, network, config, seed),
+            #[cfg(feature = "go2")]
+            hardware::Network::Go2(network) => {
+                let address = network.address().map_err(HardwareError::from)?;
+                Emulator::join(network.domain, address, description, network, config, seed)
+            }
+            #[cfg(not(feature = "go2"))]
+            hardware::Network::Go2(_) => Err(HardwareError::WithoutGo2.into()),
+        }
+    }
+
+    fn new(
+        endpoint: Box<dyn Endpoint>,
+        local_address: Option<SocketAddr>,
+        description: &RobotDescription,
+        config: &SimConfig,
+        seed: u64,
+    ) -> Result<Emulator, EmulatorError> {
         // Not the streams of the simulator's sensors and terrain, which have the same seed.
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         random.set_stream(2);
         Ok(Emulator {
-            robot,
+            robot: EmulatedRobot::new(description, config, seed)?,
             config: config.emulator,
-            crc: network.crc,
-            socket: socket.map_err(|source| EmulatorError::Bind { address, source })?,
+            endpoint,
+            local_address,
             now_ms: 0,
             to_robot: NetworkPath::new(),
             from_robot: NetworkPath::new(),
@@ -152,12 +209,9 @@ impl Emulator {
         })
     }
 
-    /// Returns the address on which the robot receives.
-    ///
-    /// # Errors
-    /// Error of the operating system.
-    pub fn local_address(&self) -> std::io::Result<SocketAddr> {
-        self.socket.local_addr()
+    /// Returns the address on which a Go1 receives; none for a Go2.
+    pub fn local_address(&self) -> Option<SocketAddr> {
+        self.local_address
     }
 
     /// Returns a handle for another thread.
@@ -233,6 +287,9 @@ impl Emulator {
             self.apply(fault);
         }
         self.now_ms += 1;
+        if self.is_awake() {
+            self.endpoint.advance();
+        }
         self.receive_commands();
         self.robot.step();
         self.send_state();
@@ -246,10 +303,9 @@ impl Emulator {
     }
 
     fn receive_commands(&mut self) {
-        let mut buffer = [0; BUFFER];
-        while let Ok((length, from)) = self.socket.recv_from(&mut buffer) {
+        while let Some((from, command)) = self.endpoint.receive() {
             let conditions = self.conditions.of_commands();
-            self.to_robot.send(self.now_ms, from, &buffer[..length], &conditions, &mut self.random);
+            self.to_robot.send(self.now_ms, from, &command, &conditions, &mut self.random);
         }
         self.since_command_ms = self.since_command_ms.saturating_add(1);
         for (from, datagram) in self.to_robot.arrived(self.now_ms) {
@@ -277,12 +333,12 @@ impl Emulator {
         }
     }
 
-    fn execute(&mut self, from: SocketAddr, datagram: &[u8]) {
-        let Ok(command) = LowCmd::parse(datagram, self.crc) else {
+    fn execute(&mut self, from: EmulatorClient, datagram: &[u8]) {
+        let Some(motors) = self.endpoint.decode(datagram) else {
             self.status.rejected += 1;
             return;
         };
-        self.robot.motors = std::array::from_fn(|i| convert::decode_motor(&command.motor(i)));
+        self.robot.motors = motors;
         self.since_command_ms = 0;
         self.status.client = Some(from);
         self.status.commands += 1;
@@ -291,15 +347,16 @@ impl Emulator {
     fn send_state(&mut self) {
         if self.is_awake() {
             let state = self.robot.next_state();
-            if let Some(client) = self.status.client.filter(|_| !self.state_taken) {
+            let client = self.status.client.filter(|_| !self.state_taken);
+            if client.is_some() || self.endpoint.sends_to_all() {
                 let conditions = self.conditions.of_states();
-                self.from_robot.send(self.now_ms, client, state, &conditions, &mut self.random);
+                let bytes = self.endpoint.encode(&state);
+                self.from_robot.send(self.now_ms, client, &bytes, &conditions, &mut self.random);
                 self.status.states += 1;
             }
         }
         for (client, datagram) in self.from_robot.arrived(self.now_ms) {
-            // The robot goes on if the controller's port is closed.
-            let _ = self.socket.send_to(&datagram, client);
+            self.endpoint.send(&datagram, client);
         }
     }
 }

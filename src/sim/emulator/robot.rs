@@ -3,7 +3,6 @@
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use crate::robot::description::RobotDescription;
-use crate::robot::go1::convert;
 use crate::robot::remote::{Remote, RemoteButtons};
 use crate::robot::{
     Battery, CONTROL_PERIOD_S, Imu, JOINTS, JointCommand, Joints, LEGS, MotorCommand, Placement, Robot, RobotState,
@@ -50,7 +49,6 @@ pub(super) struct RobotDefects {
 pub(super) struct EmulatedRobot {
     simulator: Simulator,
     config: EmulatorConfig,
-    foot_force_n: f64,
     lying_position: Joints,
     seed: u64,
     /// Number of times that the robot was laid down.
@@ -60,7 +58,7 @@ pub(super) struct EmulatedRobot {
     pub defects: RobotDefects,
     /// Command of each motor; none if it brakes.
     pub motors: [Option<MotorCommand>; JOINTS],
-    last_state: Vec<u8>,
+    last_state: Option<RobotState>,
     /// The last reported measurement of the inertial unit.
     last_imu: Imu,
     /// Fraction of a millisecond by which the robot's clock is ahead.
@@ -68,23 +66,17 @@ pub(super) struct EmulatedRobot {
 }
 
 impl EmulatedRobot {
-    pub fn new(
-        description: &RobotDescription,
-        foot_force_n: f64,
-        config: &SimConfig,
-        seed: u64,
-    ) -> Result<EmulatedRobot, SimError> {
+    pub fn new(description: &RobotDescription, config: &SimConfig, seed: u64) -> Result<EmulatedRobot, SimError> {
         let mut robot = EmulatedRobot {
             simulator: Simulator::new(description, config)?,
             config: config.emulator,
-            foot_force_n,
             lying_position: description.lying_position,
             seed,
             placed: 0,
             time_ms: 0,
             defects: RobotDefects::default(),
             motors: [None; JOINTS],
-            last_state: Vec::new(),
+            last_state: None,
             last_imu: Imu::default(),
             clock_ahead_ms: 0.0,
         };
@@ -133,16 +125,19 @@ impl EmulatedRobot {
         let _ = self.simulator.write(&drive);
     }
 
-    /// Advances the robot's clock, and returns the next state datagram.
-    pub fn next_state(&mut self) -> &[u8] {
+    /// Advances the robot's clock, and returns the state that it reports.
+    pub fn next_state(&mut self) -> RobotState {
         self.time_ms = self.time_ms.wrapping_add(1);
         self.clock_ahead_ms += self.defects.clock_drift_ms_per_s * CONTROL_PERIOD_S;
         self.step_clock(self.clock_ahead_ms.trunc());
         self.clock_ahead_ms = self.clock_ahead_ms.fract();
-        if !self.defects.repeating || self.last_state.is_empty() {
-            self.last_state = self.state();
+        match self.last_state.filter(|_| self.defects.repeating) {
+            Some(repeated) => repeated,
+            None => {
+                let state = self.state();
+                *self.last_state.insert(state)
+            }
         }
-        &self.last_state
     }
 
     /// Steps the robot's clock by whole milliseconds.
@@ -155,8 +150,8 @@ impl EmulatedRobot {
         self.motors[joint].is_some() && !self.defects.servo_off[joint]
     }
 
-    /// Encodes the reported state.
-    fn state(&mut self) -> Vec<u8> {
+    /// Returns the state with its defects.
+    fn state(&mut self) -> RobotState {
         let mut state = self.simulator.read().unwrap_or_default();
         state.robot_time_ms = self.time_ms;
         state.motor_enabled = std::array::from_fn(|joint| self.in_servo(joint));
@@ -184,11 +179,7 @@ impl EmulatedRobot {
         state.foot_force_n = self.defects.foot_force_n.map_or(state.foot_force_n, |newtons| [newtons; LEGS]);
         let buttons = self.defects.remote_buttons;
         state.remote = (!self.defects.remote_off).then_some(Remote { buttons, ..Remote::default() });
-        let mut datagram = convert::low_state(&state, self.foot_force_n);
-        datagram.write_crc();
-        let mut bytes = datagram.bytes().to_vec();
-        bytes.resize(self.config.state_length, 0);
-        bytes
+        state
     }
 
     /// Adds the least noise of an inertial unit: one that is alive never repeats a measurement.

@@ -9,6 +9,7 @@ use quadfrog::config::Config;
 use quadfrog::engine::{Provenance, newest_config};
 use quadfrog::optimize::ask::SamplerKind;
 use quadfrog::robot::description::{RobotDescription, RobotFiles};
+use quadfrog::robot::hardware::Network;
 use quadfrog::trial::Task;
 use quadfrog_console::notice;
 
@@ -109,9 +110,9 @@ pub struct StudyArguments {
     /// exists]
     #[arg(long, value_name = "DIR")]
     config: Option<PathBuf>,
-    /// Robot model: go1, a1, go2, or a folder with a URDF and a robot.toml
-    #[arg(long, value_name = "MODEL", default_value = "go1", add = ArgValueCandidates::new(completion::robots))]
-    pub model: String,
+    /// Robot model: go1, a1, go2, or a folder with a URDF and a robot.toml [default: the robot that is driven, else go1]
+    #[arg(long, value_name = "MODEL", add = ArgValueCandidates::new(completion::robots))]
+    pub model: Option<String>,
     /// Sampler that proposes the parameters [default: from optimize.toml]
     #[arg(long, value_name = "SAMPLER", value_parser = sampler())]
     sampler: Option<SamplerKind>,
@@ -121,6 +122,75 @@ pub struct StudyArguments {
     /// Name of the operator, for the recording [default: the user's name]
     #[arg(long, value_name = "NAME", value_parser = operator)]
     operator: Option<String>,
+}
+
+/// Model of a robot that no argument names.
+pub const DEFAULT_MODEL: &str = "go1";
+
+/// A robot with a network that can be driven or emulated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RealRobot {
+    /// Unitree Go1 over UDP.
+    Go1,
+    /// Unitree Go2 over DDS.
+    Go2,
+}
+
+impl RealRobot {
+    /// Returns its name, which is also that of its model.
+    pub const fn name(self) -> &'static str {
+        match self {
+            RealRobot::Go1 => "go1",
+            RealRobot::Go2 => "go2",
+        }
+    }
+
+    /// Reads the settings of its network from the files of a model.
+    pub fn network(self, files: &RobotFiles, model: &str) -> Result<Network, Failure> {
+        let network = Network::read(files).map_err(Failure::input)?;
+        let section = match (self, network) {
+            (RealRobot::Go1, Some(network @ Network::Go1(_))) | (RealRobot::Go2, Some(network @ Network::Go2(_))) => {
+                return Ok(network);
+            }
+            (RealRobot::Go1, _) => "[network]",
+            (RealRobot::Go2, _) => "[dds]",
+        };
+        let name = self.name();
+        Err(Failure::input(format!(
+            "--model {model}: its robot.toml has no section {section}, so it is no robot for --robot {name}; give the model of the robot that is driven"
+        )))
+    }
+}
+
+/// Way to a Go2.
+#[derive(Debug, Clone, Args)]
+pub struct DdsArguments {
+    /// Network interface to a Go2, or its IPv4 address [default: the only one in the network of its robot.toml; lo for an
+    /// emulated robot]
+    #[arg(long, value_name = "NAME")]
+    pub interface: Option<String>,
+    /// DDS domain of a Go2 [default: from its robot.toml; 1 for an emulated robot]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(0..=232))]
+    pub domain: Option<u16>,
+}
+
+impl DdsArguments {
+    /// Puts the arguments into the settings of a network; refused for one that is not DDS.
+    pub fn apply(&self, network: &mut Network) -> Result<(), Failure> {
+        let settings = match (network, &self.interface, self.domain) {
+            (Network::Go2(settings), ..) => settings,
+            (Network::Go1(_), None, None) => return Ok(()),
+            (Network::Go1(_), Some(name), _) => {
+                return Err(Failure::input(format!("--interface {name}: only a Go2 has one; add --robot go2")));
+            }
+            (Network::Go1(_), None, Some(domain)) => {
+                return Err(Failure::input(format!("--domain {domain}: only a Go2 has one; add --robot go2")));
+            }
+        };
+        settings.interface = self.interface.clone().unwrap_or_else(|| settings.interface.clone());
+        settings.domain = self.domain.unwrap_or(settings.domain);
+        Ok(())
+    }
 }
 
 /// Longest name of an operator, characters.

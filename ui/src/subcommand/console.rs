@@ -3,7 +3,7 @@
 use std::net::{SocketAddr, ToSocketAddrs};
 use std::path::{Path, PathBuf};
 
-use anyhow::anyhow;
+use anyhow::{Context, anyhow};
 use clap::Args;
 use clap::builder::TypedValueParser;
 use clap_complete::ArgValueCandidates;
@@ -11,7 +11,8 @@ use quadfrog::config::{Config, ConfigError};
 use quadfrog::engine::{self, Options};
 use quadfrog::optimize::journal::notice_waits;
 use quadfrog::recording::recorder::RecorderStatus;
-use quadfrog::robot::go1::Network;
+use quadfrog::robot::description::{RobotDescription, RobotFiles};
+use quadfrog::robot::hardware::Network;
 use quadfrog::trial::{Approval, Backend, Task};
 use quadfrog_console::app::{self, ConsoleExit, ConsoleOptions};
 use quadfrog_console::connection::TerminalLocation;
@@ -23,7 +24,7 @@ use quadfrog_console::settings::ConsoleSettings;
 use quadfrog_console::terminal;
 use quadfrog_console::theme::{ColourChoice, ThemeChoice};
 
-use super::arguments::{self, StudyArguments, one_of};
+use super::arguments::{self, DEFAULT_MODEL, DdsArguments, RealRobot, StudyArguments, one_of};
 use super::completion;
 use super::failure::Failure;
 use super::live;
@@ -58,10 +59,19 @@ fn graphics() -> impl TypedValueParser<Value = GraphicsChoice> {
     ])
 }
 
-fn backend() -> impl TypedValueParser<Value = Backend> {
+/// The machine behind the console.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Machine {
+    Simulator,
+    Robot(RealRobot),
+}
+
+fn machine() -> impl TypedValueParser<Value = Machine> {
+    let robot = |robot: RealRobot, help| (Machine::Robot(robot), robot.name(), help);
     one_of([
-        (Backend::Simulator, Backend::Simulator.name(), "The built-in simulator"),
-        (Backend::Hardware, Backend::Hardware.name(), "A Unitree Go1 over its network, or `quadfrog emulate`"),
+        (Machine::Simulator, Backend::Simulator.name(), "The built-in simulator"),
+        robot(RealRobot::Go1, "A Unitree Go1 over UDP, or `quadfrog emulate`"),
+        robot(RealRobot::Go2, "A Unitree Go2 over DDS, or `quadfrog emulate --robot go2`"),
     ])
 }
 
@@ -101,11 +111,13 @@ pub struct ScreenArguments {
 #[derive(Debug, Args)]
 pub struct ConsoleArguments {
     /// Robot to drive
-    #[arg(long, value_name = "WHICH", default_value = "sim", value_parser = backend())]
-    robot: Backend,
+    #[arg(long, value_name = "WHICH", default_value = "sim", value_parser = machine())]
+    robot: Machine,
     /// Address of the robot, with `--robot go1` [default: from its robot.toml]
     #[arg(long, value_name = "HOST:PORT")]
     address: Option<String>,
+    #[command(flatten)]
+    dds: DdsArguments,
     /// Task of the study [default: forward]
     #[arg(long, value_name = "TASK", value_parser = arguments::task())]
     task: Option<Task>,
@@ -134,19 +146,14 @@ pub struct ConsoleArguments {
 }
 
 pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
-    let (files, robot) = arguments::load_model(&arguments.study.model)?;
+    let (backend, model) = match arguments.robot {
+        Machine::Simulator => (Backend::Simulator, DEFAULT_MODEL),
+        Machine::Robot(robot) => (Backend::Hardware, robot.name()),
+    };
+    let model = arguments.study.model.as_deref().unwrap_or(model);
+    let (files, robot) = arguments::load_model(model)?;
     let config = arguments.study.load_config(&files, arguments.resume.as_deref())?;
-    let backend = arguments.robot;
-    let mut network = None;
-    if backend == Backend::Hardware {
-        network = Network::read(&files).map_err(Failure::input)?;
-    } else if let Some(text) = &arguments.address {
-        return Err(Failure::input(format!("--address {text}: the simulator has none; add --robot go1")));
-    }
-    // The engine refuses a robot without a network.
-    if let (Some(text), Some(network)) = (&arguments.address, &mut network) {
-        network.address = address(text)?;
-    }
+    let network = network(arguments, &files, model)?;
     let console = options(&arguments.screen, &config)?;
     let selected = match &arguments.resume {
         Some(folder) => study_to_continue(folder, arguments.task, arguments.seed, &robot)?,
@@ -179,6 +186,10 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
     let selected = if arguments.observe { selected } else { selected.with_folder()? };
     let folder = selected.folder;
     options.folder = (!arguments.observe).then(|| folder.clone());
+    let released = match &options.network {
+        Some(network) if !arguments.observe => take_over(network, &options.robot)?,
+        _ => None,
+    };
     let handle = engine::start(options)?;
     let recorder = handle.recorder_watch();
     notice_waits(None);
@@ -197,6 +208,15 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
     if exit == ConsoleExit::HungUp || arguments.observe {
         return failure.map_or(Ok(()), Err);
     }
+    if let Some(controller) = released {
+        let DdsArguments { interface, domain } = &arguments.dds;
+        let interface = interface.as_ref().map_or_else(String::new, |name| format!(" --interface {name}"));
+        let domain = domain.map_or_else(String::new, |domain| format!(" --domain {domain}"));
+        put_line!(
+            "The robot's own controller {controller} is released, the legs are not supported. To start it again, lying:"
+        );
+        put_line!("  quadfrog give-back --controller {controller}{interface}{domain}");
+    }
     put_line!("The study and its recording are in {}", folder.display());
     put_line!("  continue the study:  quadfrog --resume {}", folder.display());
     if let Some(recording) = recording {
@@ -206,6 +226,53 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
         put_line!("  repair an incomplete recording:  quadfrog recover {}", part.display());
     }
     failure.map_or(Ok(()), Err)
+}
+
+/// Returns the settings of the network to the robot; none for the simulator, which takes no address.
+fn network(arguments: &ConsoleArguments, files: &RobotFiles, model: &str) -> Result<Option<Network>, Failure> {
+    let Machine::Robot(robot) = arguments.robot else {
+        let DdsArguments { interface, domain } = &arguments.dds;
+        return match (&arguments.address, interface, domain) {
+            (None, None, None) => Ok(None),
+            (Some(text), ..) => {
+                Err(Failure::input(format!("--address {text}: the simulator has none; add --robot go1")))
+            }
+            (_, Some(name), _) => {
+                Err(Failure::input(format!("--interface {name}: the simulator has none; add --robot go2")))
+            }
+            (.., Some(domain)) => {
+                Err(Failure::input(format!("--domain {domain}: the simulator has none; add --robot go2")))
+            }
+        };
+    };
+    let mut network = robot.network(files, model)?;
+    match (&arguments.address, &mut network) {
+        (Some(text), Network::Go1(network)) => network.address = address(text)?,
+        (Some(text), Network::Go2(_)) => {
+            return Err(Failure::input(format!(
+                "--address {text}: a Go2 is found in its DDS domain; give --interface and --domain"
+            )));
+        }
+        (None, _) => {}
+    }
+    arguments.dds.apply(&mut network)?;
+    Ok(Some(network))
+}
+
+/// Takes the robot over from its own controller, once the operator has agreed. Returns the name of the released controller.
+fn take_over(network: &Network, robot: &RobotDescription) -> Result<Option<String>, Failure> {
+    if matches!(network, Network::Go1(_)) {
+        return Ok(None);
+    }
+    put_line!("The robot is asked to lie down, then its own controller is released: its legs lose their support.");
+    put_line!("Keep clear of it, and hold its remote: L2+B damps it. Type yes to go on:");
+    let mut answer = String::new();
+    std::io::stdin().read_line(&mut answer).context("the answer cannot be read")?;
+    if answer.trim() != "yes" {
+        return Err(Failure::input("the robot was not taken over: the answer was not yes"));
+    }
+    let released = network.take_over(&robot.lying_position, &mut |step| put_line!("  {step}"));
+    released.map_err(Failure::input)
 }
 
 /// Returns the name of a recording while it is written.

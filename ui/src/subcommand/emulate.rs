@@ -1,4 +1,4 @@
-//! `quadfrog emulate`: serves the simulator as a Go1 on the network; faults come from arguments and standard input.
+//! `quadfrog emulate`: serves the simulator as a Go1 or Go2 on the network; faults come from arguments and standard input.
 
 use std::io::BufRead;
 use std::net::SocketAddr;
@@ -10,33 +10,50 @@ use std::time::Duration;
 
 use anyhow::{Context, anyhow};
 use clap::Args;
+use clap::builder::TypedValueParser;
 use clap_complete::ArgValueCandidates;
 use nix::sys::signal::{SigSet, Signal};
-use quadfrog::engine::EngineError;
 use quadfrog::realtime::thread::pace;
 use quadfrog::robot::CONTROL_PERIOD_S;
-use quadfrog::robot::go1::Network;
+use quadfrog::robot::go2::network::Network as Go2Network;
+use quadfrog::robot::hardware::Network;
 use quadfrog::sim::emulator::{self, Emulator, EmulatorFault, EmulatorHandle, EmulatorStatus};
 use quadfrog_console::{notice, put, put_line};
 
-use super::arguments::{self, load_model};
+use super::arguments::{self, DdsArguments, RealRobot, load_model, one_of};
 use super::completion;
 use super::failure::Failure;
 
 /// Period of the status report.
 const REPORT_PERIOD: Duration = Duration::from_millis(200);
 
+/// DDS domain and interface of an emulated Go2 that no argument names. A real one is in domain 0.
+const EMULATED_DOMAIN: u16 = 1;
+const LOOPBACK: &str = "lo";
+
+fn robot() -> impl TypedValueParser<Value = RealRobot> {
+    one_of([
+        (RealRobot::Go1, RealRobot::Go1.name(), "Unitree Go1 over UDP"),
+        (RealRobot::Go2, RealRobot::Go2.name(), "Unitree Go2 over DDS"),
+    ])
+}
+
 #[derive(Debug, Args)]
 pub struct EmulateArguments {
-    /// Address on which the robot listens
+    /// Address on which a Go1 listens
     #[arg(long, value_name = "HOST:PORT", default_value = "127.0.0.1:8007")]
     bind: SocketAddr,
     /// Seed of all random numbers: sensors, terrain, network
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
-    /// Robot model: go1, or a folder with a URDF and a robot.toml that has a network
-    #[arg(long, value_name = "MODEL", default_value = "go1", add = ArgValueCandidates::new(completion::robots))]
-    model: String,
+    /// Robot to emulate
+    #[arg(long, value_name = "WHICH", default_value = "go1", value_parser = robot())]
+    robot: RealRobot,
+    /// Robot model: a folder with a URDF and a robot.toml that has a network [default: that of the robot]
+    #[arg(long, value_name = "MODEL", add = ArgValueCandidates::new(completion::robots))]
+    model: Option<String>,
+    #[command(flatten)]
+    dds: DdsArguments,
     /// Folder whose simulator.toml sets terrain, motors, sensors and time-outs
     #[arg(long, value_name = "DIR")]
     config: Option<PathBuf>,
@@ -46,18 +63,36 @@ pub struct EmulateArguments {
 }
 
 pub fn run(arguments: &EmulateArguments) -> Result<(), Failure> {
-    let (files, description) = load_model(&arguments.model)?;
+    let model = arguments.model.as_deref().unwrap_or(arguments.robot.name());
+    let (files, description) = load_model(model)?;
     let config = arguments::load_config_for(&files, arguments.config.as_deref())?;
-    let no_network = || EngineError::NoNetwork { robot: description.name.clone() };
-    let network = Network::read(&files).map_err(Failure::input)?.ok_or_else(no_network)?;
-    let emulator = Emulator::bind(arguments.bind, &description, &network, &config.simulator, arguments.seed);
+    let mut network = arguments.robot.network(&files, model)?;
+    if let Network::Go2(settings) = &mut network {
+        // So that an emulated robot never reaches a real one's domain.
+        (settings.domain, settings.interface) = (EMULATED_DOMAIN, LOOPBACK.to_owned());
+    }
+    arguments.dds.apply(&mut network)?;
+    let emulator = Emulator::serve(&network, arguments.bind, &description, &config.simulator, arguments.seed);
     let mut emulator = emulator.map_err(Failure::input)?;
     arguments.faults.iter().for_each(|&fault| emulator.apply(fault));
     // Before the threads start, so that all of them inherit the blocked signals and only `wait` receives them.
     let ends = SigSet::from_iter([Signal::SIGINT, Signal::SIGTERM]);
     ends.thread_block().context("blocking signals")?;
-    let address = emulator.local_address().context("the address of the socket")?;
-    put_line!("A {} listens on {address}. Drive it:  quadfrog --robot go1 --address {address}", description.name);
+    match (&network, emulator.local_address()) {
+        (Network::Go2(Go2Network { domain, interface, .. }), _) => {
+            put_line!(
+                "A {} is in DDS domain {domain} at {interface}. Drive it:  quadfrog --robot go2 --interface {interface} --domain {domain}",
+                description.name
+            );
+        }
+        (Network::Go1(_), address) => {
+            let address = address.context("the address of the socket")?;
+            put_line!(
+                "A {} listens on {address}. Drive it:  quadfrog --robot go1 --address {address}",
+                description.name
+            );
+        }
+    }
     put_line!("Type a fault, help, or Ctrl-C.");
 
     let handle = emulator.handle();

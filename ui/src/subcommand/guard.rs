@@ -1,5 +1,5 @@
 //! `quadfrog guard`: the process that a console with a robot starts to damp it if the console dies. Standard input is the
-//! pipe from the console, standard output the robot's socket.
+//! pipe from the console, standard output the socket of a Go1.
 
 use std::fs::File;
 use std::io::{IsTerminal, Write};
@@ -30,9 +30,7 @@ pub fn run() -> Result<(), Failure> {
     // has reported denied settings.
     let _granted = Scheduling { priority: 1, core: None, lock_memory: true }.apply();
     // Unbuffered: poll(2) does not report bytes that a buffer has read ahead.
-    let watch = run_guard(File::from(pipe.as_fd().try_clone_to_owned().context("standard input")?), &socket);
-    // Frees the port before the terminal may delay the report.
-    drop(socket);
+    let watch = run_guard(File::from(pipe.as_fd().try_clone_to_owned().context("standard input")?), socket);
     if let GuardOutcome::Damped { sent } = watch.map_err(Failure::input)? {
         let result = match sent {
             0 => "damping could not be sent to the robot: cut its power".to_owned(),

@@ -12,6 +12,7 @@ mod emulate;
 mod evaluate;
 mod export;
 mod failure;
+mod give_back;
 mod guard;
 mod init;
 mod live;
@@ -78,8 +79,11 @@ enum Subcommands {
     Recover(recover::RecoverArguments),
     /// Run a simulated session again from its recording alone and compare every tick
     Verify(verify::VerifyArguments),
-    /// Serve the simulator as a Go1 on the network, with fault injection
+    /// Serve the simulator as a Go1 or Go2 on the network, with fault injection
     Emulate(emulate::EmulateArguments),
+    /// Start the own controller of a Go2 again, which a session has released
+    #[command(name = "give-back")]
+    GiveBack(give_back::GiveBackArguments),
     /// Measure the simulator's speed on this machine
     Bench(bench::BenchArguments),
     /// Check whether this machine can run the console and control a robot, with remedies
@@ -120,6 +124,7 @@ pub fn run(arguments: Arguments) -> Result<(), Failure> {
         Some(Subcommands::Recover(recover)) => recover::run(&recover),
         Some(Subcommands::Verify(verify)) => verify::run(&verify),
         Some(Subcommands::Emulate(emulate)) => emulate::run(&emulate),
+        Some(Subcommands::GiveBack(give_back)) => give_back::run(&give_back),
         Some(Subcommands::Bench(bench)) => bench::run(&bench),
         Some(Subcommands::Doctor(doctor)) => doctor::run(&doctor),
         Some(Subcommands::Guard) => guard::run(),

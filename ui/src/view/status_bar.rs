@@ -52,7 +52,9 @@ fn backend(model: &Model) -> Span<'static> {
         _ if model.replay.is_some() => span(theme, Role::Heading, "REPLAY"),
         None => span(theme, Role::Quiet, "starting"),
         Some(Backend::Simulator) => span(theme, Role::Heading, "SIM"),
-        Some(hardware) => span(theme, Role::Hardware, format!(" {} ", hardware.name().to_uppercase())),
+        Some(Backend::Hardware) => {
+            span(theme, Role::Hardware, format!(" {} ", model.session.info.robot.to_uppercase()))
+        }
     }
 }
 

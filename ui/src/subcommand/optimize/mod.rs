@@ -84,7 +84,7 @@ pub fn run(arguments: &OptimizeArguments) -> Result<(), Failure> {
         Some(Storage::File(file)) => file.parent(),
         _ => arguments.resume.as_deref(),
     };
-    let (files, robot) = arguments::load_model(&arguments.study.model)?;
+    let (files, robot) = arguments::load_model(arguments.study.model.as_deref().unwrap_or(arguments::DEFAULT_MODEL))?;
     let config = arguments.study.load_config(&files, existing)?;
     let studies = match &joined {
         Some(storage) => workers(arguments, storage, &robot)?,

@@ -80,8 +80,8 @@ fn reported(
         Some(robot) => Recordings::read(&recordings(opened, folder), robot),
         None => Recordings::default(),
     };
-    let backend = study.attributes().get("backend").and_then(Value::as_str);
-    let machine = if backend == Some(Backend::Hardware.name()) { "hardware" } else { "simulated" };
+    let backend = study.attributes().get("backend").and_then(Value::as_str).and_then(|name| name.parse().ok());
+    let machine = if backend == Some(Backend::Hardware) { "hardware" } else { "simulated" };
     Ok(ReportedStudy {
         place: folder.map_or_else(|| storage.to_string(), |folder| folder.display().to_string()),
         name: study.options().name.clone(),

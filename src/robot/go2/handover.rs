@@ -1,0 +1,406 @@
+//! Takes the robot over from its own controller, in the order of Unitree's example (`docs/go2-wire.md`, section 6): states
+//! arrive, the robot lies, the active controller is read, released, and read again until there is none.
+//!
+//! No DDS and no clock here: the caller gives the time, the newest joint positions and the responses, and sends the requests.
+//! Every request is repeated until it is answered, because the first one after the start may be lost. A repetition has an
+//! identity of its own, so a late response to an earlier one is not taken for the answer of a later step.
+
+use super::message::{RequestMessage, ResponseMessage, motion_switcher, sport};
+use crate::robot::{JOINTS, Joints, joint_name};
+
+/// Time without a response after which a request is repeated, ms. The official server answers within 3 ms.
+const REPEAT_MS: u64 = 500;
+/// Time without a response after which the handover fails, ms.
+const UNANSWERED_MS: u64 = 5000;
+/// Time without a state after the start that fails the handover, ms. The first one was seen after 100 to 700 ms; participants
+/// announce themselves again after 10 s, should the first announcement be lost.
+const NO_STATE_MS: u64 = 12_000;
+/// Time that the robot may take to lie down, ms.
+const LIE_DOWN_MS: u64 = 10_000;
+/// Time that the robot must lie still before its controller is released, ms.
+const LIES_MS: u64 = 1000;
+/// Wait between a release and the next reading of the active controller, ms; 1 to 5 s in Unitree's example.
+const SETTLE_MS: u64 = 2000;
+/// Releases after which a controller that is still active fails the handover.
+const RELEASES: u32 = 3;
+/// Largest distance of a joint from the lying pose, rad.
+const LYING_RAD: f64 = 0.5;
+
+/// Cause of a failed handover.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[expect(missing_docs, reason = "the message describes a variant and its fields")]
+pub enum HandoverError {
+    #[error(
+        "no state of the robot for {after_ms} ms; check the interface, the DDS domain and that the robot is switched on"
+    )]
+    NoState { after_ms: u64 },
+    #[error(
+        "the service {service} has not answered request {api} for {after_ms} ms; only the EDU version of the robot accepts low-level commands"
+    )]
+    Unanswered { service: &'static str, api: i64, after_ms: u64 },
+    #[error("the service {service} answered request {api} with the code {code}, data {data:?}")]
+    Refused { service: &'static str, api: i64, code: i32, data: String },
+    #[error(
+        "the robot does not lie: {joint} is {off_rad:.2} rad from the lying pose, the limit is {LYING_RAD} rad; lay the robot down with its remote"
+    )]
+    NotLying { joint: String, off_rad: f64 },
+    #[error(
+        "the robot's controller {name:?} is still active after {RELEASES} releases; end the programs that select it"
+    )]
+    StillActive { name: String },
+}
+
+/// A request and the service that receives it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ServiceRequest {
+    /// Name of the service, which is in the name of the topic.
+    pub service: &'static str,
+    /// Message.
+    pub message: RequestMessage,
+}
+
+/// Progress of a handover.
+#[derive(Debug, Clone, PartialEq)]
+pub enum HandoverStatus {
+    /// No state has arrived.
+    AwaitingState,
+    /// The active controller is being read.
+    Checking,
+    /// The robot is to lie down.
+    LyingDown,
+    /// The active controller is being released.
+    Releasing,
+    /// No controller is active. The name is that of the released one, to give the robot back; none if none was active.
+    Done(Option<String>),
+    /// Nothing more is requested.
+    Failed(HandoverError),
+}
+
+/// Function of a request.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Function {
+    CheckMode,
+    StandDown,
+    ReleaseMode,
+}
+
+impl Function {
+    fn request(self, id: i64) -> ServiceRequest {
+        let (service, message) = match self {
+            Function::CheckMode => (motion_switcher::SERVICE, motion_switcher::check_mode(id)),
+            Function::StandDown => (sport::SERVICE, sport::request(id, sport::STAND_DOWN)),
+            Function::ReleaseMode => (motion_switcher::SERVICE, motion_switcher::release_mode(id)),
+        };
+        ServiceRequest { service, message }
+    }
+}
+
+/// Step of a handover.
+#[derive(Debug, Clone, PartialEq)]
+enum Step {
+    AwaitState {
+        since_ms: u64,
+    },
+    /// Requests are repeated until one of them is answered. The identities are those from `first_id` to `next_id`.
+    Request {
+        function: Function,
+        since_ms: u64,
+        sent_ms: Option<u64>,
+        first_id: i64,
+    },
+    /// The robot lies down; `lies_since_ms` is the time since which it lies.
+    LieDown {
+        since_ms: u64,
+        lies_since_ms: Option<u64>,
+    },
+    Settle {
+        since_ms: u64,
+    },
+    Done,
+    Failed(HandoverError),
+}
+
+/// A handover from the robot's own controller to this program.
+#[derive(Debug)]
+pub struct Handover {
+    step: Step,
+    lying_rad: Joints,
+    next_id: i64,
+    releases: u32,
+    /// First controller that was found active.
+    own_controller: Option<String>,
+}
+
+impl Handover {
+    /// Begins at `now_ms`. `lying_rad` is the lying pose; `first_id` an identity above those of earlier requests of any
+    /// program (the official library counts monotonic nanoseconds).
+    pub fn begin(now_ms: u64, lying_rad: &Joints, first_id: i64) -> Handover {
+        Handover {
+            step: Step::AwaitState { since_ms: now_ms },
+            lying_rad: *lying_rad,
+            next_id: first_id,
+            releases: 0,
+            own_controller: None,
+        }
+    }
+
+    /// Returns the progress.
+    pub fn status(&self) -> HandoverStatus {
+        match &self.step {
+            Step::AwaitState { .. } => HandoverStatus::AwaitingState,
+            Step::Request { function: Function::CheckMode, .. } => HandoverStatus::Checking,
+            Step::Request { function: Function::StandDown, .. } | Step::LieDown { .. } => HandoverStatus::LyingDown,
+            Step::Request { function: Function::ReleaseMode, .. } | Step::Settle { .. } => HandoverStatus::Releasing,
+            Step::Done => HandoverStatus::Done(self.own_controller.clone()),
+            Step::Failed(error) => HandoverStatus::Failed(error.clone()),
+        }
+    }
+
+    /// Advances to `now_ms` with the joint positions of the newest state, none before the first; returns the request to send.
+    pub fn advance(&mut self, now_ms: u64, joint_position_rad: Option<&Joints>) -> Option<ServiceRequest> {
+        match &mut self.step {
+            Step::AwaitState { since_ms } => {
+                let after_ms = now_ms.saturating_sub(*since_ms);
+                if joint_position_rad.is_some() {
+                    self.request(Function::CheckMode, now_ms);
+                } else if after_ms >= NO_STATE_MS {
+                    self.fail(HandoverError::NoState { after_ms });
+                }
+                None
+            }
+            Step::Request { function, since_ms, sent_ms, .. } => {
+                let (function, after_ms) = (*function, now_ms.saturating_sub(*since_ms));
+                if after_ms >= UNANSWERED_MS {
+                    let ServiceRequest { service, message } = function.request(0);
+                    self.fail(HandoverError::Unanswered { service, api: message.api, after_ms });
+                    return None;
+                }
+                if sent_ms.is_some_and(|sent_ms| now_ms.saturating_sub(sent_ms) < REPEAT_MS) {
+                    return None;
+                }
+                *sent_ms = Some(now_ms);
+                let id = self.next_id;
+                self.next_id += 1;
+                Some(function.request(id))
+            }
+            Step::LieDown { since_ms, lies_since_ms } => {
+                let after_ms = now_ms.saturating_sub(*since_ms);
+                let (joint, off_rad) = farthest(joint_position_rad?, &self.lying_rad);
+                // A position that is not finite is none of a lying robot.
+                if off_rad <= LYING_RAD {
+                    let lies_since_ms = *lies_since_ms.get_or_insert(now_ms);
+                    if now_ms.saturating_sub(lies_since_ms) >= LIES_MS {
+                        self.request(Function::ReleaseMode, now_ms);
+                    }
+                } else {
+                    *lies_since_ms = None;
+                    if after_ms >= LIE_DOWN_MS {
+                        self.fail(HandoverError::NotLying { joint: joint_name(joint), off_rad });
+                    }
+                }
+                None
+            }
+            Step::Settle { since_ms } => {
+                if now_ms.saturating_sub(*since_ms) >= SETTLE_MS {
+                    self.request(Function::CheckMode, now_ms);
+                }
+                None
+            }
+            Step::Done | Step::Failed(_) => None,
+        }
+    }
+
+    /// Takes a response of `service`. Those to other programs, and to requests of earlier steps, are ignored.
+    pub fn answer(&mut self, now_ms: u64, service: &str, response: &ResponseMessage) {
+        let Step::Request { function, first_id, .. } = self.step else { return };
+        let asked = function.request(response.id);
+        let ours = (first_id..self.next_id).contains(&response.id);
+        if !ours || asked.service != service || asked.message.api != response.api {
+            return;
+        }
+        let refused = || HandoverError::Refused {
+            service: asked.service,
+            api: response.api,
+            code: response.code,
+            data: response.data.clone(),
+        };
+        match function {
+            Function::CheckMode => match response.active_mode() {
+                None => self.fail(refused()),
+                Some(name) if name.is_empty() => self.step = Step::Done,
+                Some(name) if self.releases >= RELEASES => self.fail(HandoverError::StillActive { name }),
+                Some(name) => {
+                    self.own_controller.get_or_insert(name);
+                    self.request(Function::StandDown, now_ms);
+                }
+            },
+            // A controller without this function refuses it; the joints decide whether the robot lies.
+            Function::StandDown => self.step = Step::LieDown { since_ms: now_ms, lies_since_ms: None },
+            Function::ReleaseMode if response.code != 0 => self.fail(refused()),
+            Function::ReleaseMode => {
+                self.releases += 1;
+                self.step = Step::Settle { since_ms: now_ms };
+            }
+        }
+    }
+
+    fn request(&mut self, function: Function, now_ms: u64) {
+        self.step = Step::Request { function, since_ms: now_ms, sent_ms: None, first_id: self.next_id };
+    }
+
+    fn fail(&mut self, error: HandoverError) {
+        self.step = Step::Failed(error);
+    }
+}
+
+/// Returns the joint that is farthest from `pose`, and its distance, rad; infinite if a position is not finite.
+fn farthest(position_rad: &Joints, pose: &Joints) -> (usize, f64) {
+    let off = |joint: usize| {
+        let off_rad = (position_rad[joint] - pose[joint]).abs();
+        if off_rad.is_finite() { off_rad } else { f64::INFINITY }
+    };
+    // The first of equal ones.
+    (0..JOINTS).rev().map(|joint| (joint, off(joint))).max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::VecDeque;
+
+    const LYING: Joints = [0.35; JOINTS];
+    const STANDING: Joints = [1.0; JOINTS];
+
+    /// Services of a robot, with their faults.
+    struct Services {
+        active: String,
+        /// First requests that are lost.
+        lost: u32,
+        /// Releases that change nothing.
+        deaf_releases: u32,
+        release_code: i32,
+        lies_down: bool,
+        position_rad: Option<Joints>,
+        /// Requests that arrived: service and function.
+        arrived: Vec<(&'static str, i64)>,
+        /// Released while the robot did not lie.
+        dropped: bool,
+    }
+
+    impl Services {
+        fn new(active: &str) -> Services {
+            Services {
+                active: active.to_owned(),
+                lost: 0,
+                deaf_releases: 0,
+                release_code: 0,
+                lies_down: true,
+                position_rad: Some(STANDING),
+                arrived: Vec::new(),
+                dropped: false,
+            }
+        }
+
+        fn serve(&mut self, request: &ServiceRequest) -> Option<ResponseMessage> {
+            if self.lost > 0 {
+                self.lost -= 1;
+                return None;
+            }
+            let ServiceRequest { service, message } = request;
+            self.arrived.push((service, message.api));
+            let mut response = ResponseMessage {
+                id: message.id,
+                api: message.api,
+                code: 0,
+                data: format!("{{\"form\":\"0\",\"name\":\"{}\"}}", self.active),
+                binary: Vec::new(),
+            };
+            match (*service, message.api) {
+                (sport::SERVICE, sport::STAND_DOWN) if self.lies_down => self.position_rad = Some(LYING),
+                (motion_switcher::SERVICE, motion_switcher::RELEASE_MODE) => {
+                    self.dropped |= self.position_rad != Some(LYING);
+                    response.code = self.release_code;
+                    if self.deaf_releases > 0 {
+                        self.deaf_releases -= 1;
+                    } else {
+                        self.active.clear();
+                    }
+                }
+                _ => {}
+            }
+            Some(response)
+        }
+    }
+
+    /// Steps of 10 ms until the handover ends, with responses after 20 ms; returns its end and the time, ms.
+    fn run(services: &mut Services) -> (HandoverStatus, u64) {
+        let mut handover = Handover::begin(0, &LYING, 1000);
+        let mut late: VecDeque<(u64, &str, ResponseMessage)> = VecDeque::new();
+        let mut ids = Vec::new();
+        for now_ms in (0..120_000).step_by(10) {
+            while late.front().is_some_and(|(at_ms, ..)| *at_ms <= now_ms) {
+                let (_, service, response) = late.pop_front().unwrap();
+                // A response to another program, and one of another function, come first.
+                handover.answer(now_ms, service, &ResponseMessage { id: 5, ..response.clone() });
+                handover.answer(now_ms, service, &ResponseMessage { api: 77, ..response.clone() });
+                handover.answer(now_ms, service, &response);
+            }
+            if let Some(request) = handover.advance(now_ms, services.position_rad.as_ref()) {
+                assert!(!ids.contains(&request.message.id), "an identity is used once");
+                ids.push(request.message.id);
+                late.extend(services.serve(&request).map(|response| (now_ms + 20, request.service, response)));
+            }
+            if let done @ (HandoverStatus::Done(_) | HandoverStatus::Failed(_)) = handover.status() {
+                return (done, now_ms);
+            }
+        }
+        panic!("no end in two minutes: {:?}", handover.status());
+    }
+
+    const CHECK: (&str, i64) = (motion_switcher::SERVICE, motion_switcher::CHECK_MODE);
+    const RELEASE: (&str, i64) = (motion_switcher::SERVICE, motion_switcher::RELEASE_MODE);
+    const DOWN: (&str, i64) = (sport::SERVICE, sport::STAND_DOWN);
+
+    #[test]
+    fn the_robot_lies_before_its_controller_is_released_and_the_release_is_verified() {
+        let mut services = Services::new("normal");
+        let (end, ms) = run(&mut services);
+        assert_eq!(end, HandoverStatus::Done(Some("normal".to_owned())));
+        assert_eq!(services.arrived, [CHECK, DOWN, RELEASE, CHECK]);
+        assert!(!services.dropped && (3000..4000).contains(&ms), "{ms} ms");
+    }
+
+    #[test]
+    fn a_robot_without_a_controller_is_only_checked() {
+        let mut services = Services::new("");
+        assert_eq!(run(&mut services).0, HandoverStatus::Done(None));
+        assert_eq!(services.arrived, [CHECK]);
+    }
+
+    #[test]
+    fn a_lost_request_is_repeated_and_a_failed_release_too() {
+        let mut services = Services { lost: 3, deaf_releases: 2, ..Services::new("mcf") };
+        assert_eq!(run(&mut services).0, HandoverStatus::Done(Some("mcf".to_owned())));
+        assert_eq!(services.arrived, [CHECK, DOWN, RELEASE, CHECK, DOWN, RELEASE, CHECK, DOWN, RELEASE, CHECK]);
+    }
+
+    #[test]
+    fn each_cause_of_a_failure_is_named() {
+        let failure = |mut services: Services| match run(&mut services).0 {
+            HandoverStatus::Failed(error) if !services.dropped => error.to_string(),
+            other => panic!("{other:?}"),
+        };
+        let error = failure(Services { position_rad: None, ..Services::new("normal") });
+        assert!(error.contains("no state of the robot for 12000 ms"), "{error}");
+        let error = failure(Services { lost: u32::MAX, ..Services::new("normal") });
+        assert!(error.contains("motion_switcher has not answered request 1001 for 5000 ms"), "{error}");
+        let error = failure(Services { lies_down: false, ..Services::new("normal") });
+        assert!(error.contains("FR_hip is 0.65 rad from the lying pose"), "{error}");
+        let error = failure(Services { lies_down: false, position_rad: Some([f64::NAN; 12]), ..Services::new("ai") });
+        assert!(error.contains("inf rad from the lying pose"), "{error}");
+        let error = failure(Services { release_code: 7008, ..Services::new("normal") });
+        assert!(error.contains("request 1003 with the code 7008"), "{error}");
+        let error = failure(Services { deaf_releases: 9, ..Services::new("advanced") });
+        assert!(error.contains("\"advanced\" is still active after 3 releases"), "{error}");
+    }
+}

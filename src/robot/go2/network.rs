@@ -1,0 +1,195 @@
+//! Section `[dds]` of `robot.toml`, and the choice of the interface to the robot.
+
+use std::net::Ipv4Addr;
+
+use nix::ifaddrs::getifaddrs;
+use nix::net::if_::InterfaceFlags;
+
+use crate::robot::description::{DescriptionError, RobotFiles};
+use crate::robot::state_counter::StateClock;
+
+/// Largest DDS domain whose ports exist.
+const LARGEST_DOMAIN: u16 = 232;
+
+/// Section `[dds]` of `robot.toml`, which explains every key.
+#[derive(Debug, Clone, PartialEq, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Network {
+    /// DDS domain.
+    pub domain: u16,
+    /// Network interface to the robot, or its IPv4 address; empty: the only one in `subnet`.
+    pub interface: String,
+    /// Addresses of the robot's network, as ADDRESS/BITS.
+    pub subnet: String,
+    /// Whether commands are sent reliably: only for a robot whose reader demands that.
+    pub reliable_commands: bool,
+    /// Time between two states on the robot's clock, ms.
+    pub state_period_ms: u32,
+    /// A state older than the newest by more than this means that the robot has restarted, ms.
+    pub restart_ms: u32,
+    /// Time that a motor may take to report servo mode after the first command, ms.
+    pub servo_grace_ms: u32,
+    /// Force per count of a foot sensor, N.
+    pub foot_force_n: f64,
+}
+
+/// Error of choosing the interface to the robot.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[expect(missing_docs, reason = "the message describes a variant and its fields")]
+pub enum InterfaceError {
+    #[error("the network interfaces of this machine cannot be listed: {reason}")]
+    Unlisted { reason: String },
+    #[error(
+        "--interface {name}: this machine has none of that name or address that is up and has an IPv4 address; it has {known}"
+    )]
+    Unknown { name: String, known: String },
+    #[error("--interface {name}: it has several addresses ({addresses}); give one of them in its place")]
+    SeveralAddresses { name: String, addresses: String },
+    #[error(
+        "no interface of this machine has an address in the robot's network {subnet} (it has {known}); give one with --interface"
+    )]
+    None { subnet: String, known: String },
+    #[error("several interfaces have an address in the robot's network {subnet}: {found}; give one with --interface")]
+    Several { subnet: String, found: String },
+}
+
+/// An interface of this machine that is up, with one of its addresses.
+#[derive(Debug, Clone, PartialEq, Eq)]
+struct Interface {
+    name: String,
+    address: Ipv4Addr,
+}
+
+impl Network {
+    /// Reads and checks the section `[dds]` of the robot's `robot.toml`; none if there is none.
+    ///
+    /// # Errors
+    /// A key is unknown or missing, or a value is out of range.
+    pub fn read(files: &RobotFiles) -> Result<Option<Network>, DescriptionError> {
+        #[derive(serde::Deserialize)]
+        struct DdsToml {
+            dds: Option<Network>,
+        }
+        let Some(network) = files.toml::<DdsToml>()?.dds else { return Ok(None) };
+        if network.domain > LARGEST_DOMAIN {
+            return Err(files.invalid("dds.domain", network.domain.to_string(), "give 0 to 232"));
+        }
+        if parse_subnet(&network.subnet).is_none() {
+            return Err(files.invalid("dds.subnet", network.subnet, "give ADDRESS/BITS, for example 192.168.123.0/24"));
+        }
+        let times = [
+            ("dds.state_period_ms", network.state_period_ms, 1..=20, "give 1 to 20 milliseconds"),
+            ("dds.restart_ms", network.restart_ms, 20..=10_000, "give 20 to 10000 milliseconds"),
+            ("dds.servo_grace_ms", network.servo_grace_ms, 0..=2000, "give 0 to 2000 milliseconds"),
+        ];
+        for (key, ms, range, remedy) in times {
+            if !range.contains(&ms) {
+                return Err(files.invalid(key, format!("{ms} ms"), remedy));
+            }
+        }
+        let force = network.foot_force_n;
+        if !(0.01..=100.0).contains(&force) {
+            return Err(files.invalid("dds.foot_force_n", format!("{force} N"), "give 0.01 to 100 N a count"));
+        }
+        Ok(Some(network))
+    }
+
+    /// Returns how the robot's clock is read.
+    pub fn clock(&self) -> StateClock {
+        StateClock { state_period_ms: self.state_period_ms, restart_ms: self.restart_ms }
+    }
+
+    /// Returns the address of the interface to the robot: of `interface`, or of the only one in `subnet`.
+    ///
+    /// # Errors
+    /// No interface or several fit, or they cannot be listed.
+    pub fn address(&self) -> Result<Ipv4Addr, InterfaceError> {
+        choose(&interfaces()?, &self.interface, &self.subnet)
+    }
+}
+
+/// Lists the interfaces that are up, each address of them once.
+fn interfaces() -> Result<Vec<Interface>, InterfaceError> {
+    let listed = getifaddrs().map_err(|errno| InterfaceError::Unlisted { reason: errno.to_string() })?;
+    let up = listed.filter(|found| found.flags.contains(InterfaceFlags::IFF_UP));
+    let addressed = up.filter_map(|found| {
+        let address = found.address?.as_sockaddr_in()?.ip();
+        Some(Interface { name: found.interface_name, address })
+    });
+    Ok(addressed.collect())
+}
+
+/// Chooses among `all` the interface with that name or address, or, without one, the only one in `subnet`.
+fn choose(all: &[Interface], wanted: &str, subnet: &str) -> Result<Ipv4Addr, InterfaceError> {
+    let list = |found: &[&Interface]| {
+        let named: Vec<_> = found.iter().map(|one| format!("{} {}", one.name, one.address)).collect();
+        if named.is_empty() { "none".to_owned() } else { named.join(", ") }
+    };
+    let known = || list(&all.iter().collect::<Vec<_>>());
+    if wanted.is_empty() {
+        let (network, mask) = parse_subnet(subnet).unwrap_or_default();
+        let found: Vec<_> = all.iter().filter(|one| u32::from(one.address) & mask == network).collect();
+        return match found[..] {
+            [one] => Ok(one.address),
+            [] => Err(InterfaceError::None { subnet: subnet.to_owned(), known: known() }),
+            _ => Err(InterfaceError::Several { subnet: subnet.to_owned(), found: list(&found) }),
+        };
+    }
+    let is_wanted = |one: &&Interface| one.name == wanted || one.address.to_string() == wanted;
+    let found: Vec<_> = all.iter().filter(is_wanted).collect();
+    match found[..] {
+        [one] => Ok(one.address),
+        [] => Err(InterfaceError::Unknown { name: wanted.to_owned(), known: known() }),
+        _ => Err(InterfaceError::SeveralAddresses { name: wanted.to_owned(), addresses: list(&found) }),
+    }
+}
+
+/// Parses ADDRESS/BITS to network and mask; none if it is not that, or not a network.
+fn parse_subnet(text: &str) -> Option<(u32, u32)> {
+    let (address, bits) = text.split_once('/')?;
+    let (address, bits): (Ipv4Addr, u32) = (address.parse().ok()?, bits.parse().ok()?);
+    let mask = u32::MAX.checked_shl(32_u32.checked_sub(bits)?).unwrap_or(0);
+    let network = u32::from(address);
+    (bits > 0 && network & mask == network).then_some((network, mask))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn chosen(all: &[(&str, [u8; 4])], wanted: &str) -> Result<Ipv4Addr, String> {
+        let all: Vec<_> =
+            all.iter().map(|(name, address)| Interface { name: (*name).into(), address: (*address).into() }).collect();
+        choose(&all, wanted, "192.168.123.0/24").map_err(|error| error.to_string())
+    }
+
+    /// The machine's own interfaces differ from test to test, so the list is given.
+    #[test]
+    fn an_interface_is_used_only_where_it_is_the_only_one_that_fits() {
+        let wired = ("eth0", [192, 168, 123, 99]);
+        let wireless = ("wlan0", [192, 168, 123, 7]);
+        let lo = ("lo", [127, 0, 0, 1]);
+        assert_eq!(chosen(&[lo, wired], "").unwrap(), Ipv4Addr::from(wired.1));
+        let two = chosen(&[lo, wired, wireless], "").unwrap_err();
+        assert!(two.contains("eth0 192.168.123.99, wlan0 192.168.123.7") && two.contains("--interface"), "{two}");
+        let none = chosen(&[lo], "").unwrap_err();
+        assert!(none.contains("192.168.123.0/24") && none.contains("lo 127.0.0.1"), "{none}");
+        for wanted in ["eth0", "192.168.123.99"] {
+            assert_eq!(chosen(&[lo, wired, wireless], wanted).unwrap(), Ipv4Addr::from(wired.1));
+        }
+        let unknown = chosen(&[lo], "eth7").unwrap_err();
+        assert!(unknown.contains("eth7") && unknown.contains("lo 127.0.0.1"), "{unknown}");
+        let both = [wired, ("eth0", [10, 0, 0, 1])];
+        assert!(chosen(&both, "eth0").unwrap_err().contains("several addresses"));
+        assert_eq!(chosen(&both, "10.0.0.1").unwrap(), Ipv4Addr::new(10, 0, 0, 1));
+    }
+
+    #[test]
+    fn a_subnet_is_a_network_and_its_bits() {
+        for wrong in ["", "192.168.123.0", "192.168.123.1/24", "192.168.123.0/33", "192.168.123.0/0", "a/24"] {
+            assert_eq!(parse_subnet(wrong), None, "{wrong}");
+        }
+        assert_eq!(parse_subnet("192.168.123.0/24"), Some((0xC0A8_7B00, 0xFFFF_FF00)));
+        assert_eq!(parse_subnet("10.0.0.1/32"), Some((0x0A00_0001, u32::MAX)));
+    }
+}

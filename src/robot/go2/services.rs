@@ -1,0 +1,206 @@
+//! The robot's services over DDS: takes the robot over from its own controller, and gives it back.
+
+use std::time::{Duration, Instant};
+
+use super::dds::{DdsError, FoundEndpoint, Participant, Reader, TopicType, Writer};
+use super::handover::{Handover, HandoverError, HandoverStatus, ServiceRequest};
+use super::message::{ResponseMessage, StateMessage, motion_switcher, sport};
+use crate::robot::{JOINTS, Joints};
+
+/// Wait between two looks at the topics.
+const LOOK: Duration = Duration::from_millis(10);
+/// Time after which an endpoint that is not found is reported.
+const DISCOVERY: Duration = Duration::from_secs(2);
+/// Time without a response after which a request is repeated.
+const REPEAT: Duration = Duration::from_millis(500);
+/// Time without a response after which giving the robot back fails.
+const UNANSWERED: Duration = Duration::from_secs(5);
+
+/// Error of taking the robot over or giving it back.
+#[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the message describes a variant and its fields")]
+pub enum TakeoverError {
+    #[error(transparent)]
+    Dds(#[from] DdsError),
+    #[error("{0}{1}")]
+    Handover(HandoverError, String),
+    #[error("the robot's reader of commands demands reliable delivery: set dds.reliable_commands = true in robot.toml")]
+    DemandsReliable,
+    #[error("the robot does not read commands: {0}")]
+    NoReader(String),
+    #[error("the robot's controller {name:?} was not started: code {code}, {data:?}")]
+    NotStarted { name: String, code: i32, data: String },
+    #[error(
+        "no response of the service motion_switcher within 5 s; check the interface, the domain and that the robot is switched on"
+    )]
+    Unanswered,
+}
+
+/// Request and response topics of one service.
+struct Service {
+    name: &'static str,
+    requests: Writer,
+    responses: Reader,
+}
+
+impl Service {
+    fn open(participant: &Participant, name: &'static str) -> Result<Service, DdsError> {
+        let responses = participant.reader(&TopicType::response(name))?;
+        Ok(Service { name, requests: participant.writer(&TopicType::request(name))?, responses })
+    }
+
+    /// Takes the oldest response that can be decoded.
+    fn response(&mut self) -> Option<ResponseMessage> {
+        std::iter::from_fn(|| self.responses.take()).find_map(|sample| ResponseMessage::decode(&sample.payload).ok())
+    }
+}
+
+/// Returns an identity for requests above those of earlier programs: the library of Unitree counts nanoseconds, too.
+fn first_id() -> i64 {
+    std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).map_or(1, |time| time.as_nanos() as i64)
+}
+
+/// Takes the robot over: waits for states, lets it lie down, and releases its own controller. `lying_rad` is the lying pose;
+/// `reliable` whether commands will be sent reliably; `report` receives each new step, and once, after 2 s without states, what was found in the domain instead. Returns the name of the released controller; none if none was active.
+///
+/// # Errors
+/// The handover failed; no command has been sent to a motor.
+pub fn take_over(
+    participant: &Participant,
+    lying_rad: &Joints,
+    reliable: bool,
+    report: &mut dyn FnMut(&str),
+) -> Result<Option<String>, TakeoverError> {
+    let mut states = participant.reader(&TopicType::low_state())?;
+    let mut services =
+        [Service::open(participant, motion_switcher::SERVICE)?, Service::open(participant, sport::SERVICE)?];
+    let begun = Instant::now();
+    let mut handover = Handover::begin(0, lying_rad, first_id());
+    let (mut position_rad, mut reported, mut is_late) = (None, None, false);
+    loop {
+        states.wait(LOOK);
+        while let Some(sample) = states.take() {
+            if let Ok(state) = StateMessage::decode(&sample.payload) {
+                position_rad = Some(std::array::from_fn::<f64, JOINTS, _>(|i| state.motor[i].position.into()));
+            }
+        }
+        let now_ms = begun.elapsed().as_millis() as u64;
+        for service in &mut services {
+            while let Some(response) = service.response() {
+                handover.answer(now_ms, service.name, &response);
+            }
+        }
+        if let Some(ServiceRequest { service, message }) = handover.advance(now_ms, position_rad.as_ref()) {
+            for found in services.iter().filter(|found| found.name == service) {
+                // A lost request is repeated.
+                let _ = found.requests.write(&message.encode());
+            }
+        }
+        if position_rad.is_none() && begun.elapsed() > DISCOVERY && !is_late {
+            is_late = true;
+            report(&format!("no state yet: {}", found_for(&TopicType::low_state(), &participant.writers(), "writes")));
+        }
+        let status = handover.status();
+        match &status {
+            HandoverStatus::Done(name) => {
+                wait_for_reader(participant, reliable)?;
+                return Ok(name.clone());
+            }
+            HandoverStatus::Failed(error) => {
+                let found = match error {
+                    HandoverError::NoState { .. } => {
+                        format!("; {}", found_for(&TopicType::low_state(), &participant.writers(), "writes"))
+                    }
+                    _ => String::new(),
+                };
+                return Err(TakeoverError::Handover(error.clone(), found));
+            }
+            step if reported.as_ref() != Some(step) => report(words(step)),
+            _ => {}
+        }
+        reported = Some(status);
+    }
+}
+
+const fn words(step: &HandoverStatus) -> &'static str {
+    match step {
+        HandoverStatus::AwaitingState => "waiting for the robot's states",
+        HandoverStatus::Checking => "asking for the robot's active controller",
+        HandoverStatus::LyingDown => "the robot is to lie down",
+        HandoverStatus::Releasing => "releasing the robot's own controller: its legs lose their support",
+        HandoverStatus::Done(_) => "the robot's own controller is released",
+        HandoverStatus::Failed(_) => "the robot was not taken over",
+    }
+}
+
+/// Waits until a reader of commands is found that takes ours.
+fn wait_for_reader(participant: &Participant, reliable: bool) -> Result<(), TakeoverError> {
+    let (commands, begun) = (TopicType::low_command(), Instant::now());
+    loop {
+        let readers = participant.readers();
+        let fits = |found: &&FoundEndpoint| found.topic == commands.topic && found.type_name == commands.type_name;
+        let found: Vec<_> = readers.iter().filter(fits).collect();
+        if found.iter().any(|found| reliable || !found.reliable) {
+            return Ok(());
+        }
+        if begun.elapsed() > DISCOVERY && !found.is_empty() {
+            return Err(TakeoverError::DemandsReliable);
+        }
+        if begun.elapsed() > DISCOVERY {
+            return Err(TakeoverError::NoReader(found_for(&commands, &readers, "reads")));
+        }
+        std::thread::sleep(LOOK);
+    }
+}
+
+/// Says which endpoints on a topic were found in place of the wanted one. `does` is what they do.
+fn found_for(wanted: &TopicType, found: &[FoundEndpoint], does: &str) -> String {
+    let types: Vec<_> =
+        found.iter().filter(|found| found.topic == wanted.topic).map(|f| f.type_name.as_str()).collect();
+    let TopicType { topic, type_name, .. } = wanted;
+    if found.is_empty() {
+        format!("no other program was found in this DDS domain, none {does} {topic}; check --interface and --domain")
+    } else if types.is_empty() {
+        format!(
+            "programs were found in this DDS domain, but none {does} {topic}; check --domain, and that the robot has started"
+        )
+    } else if types.iter().all(|found| found != type_name) {
+        format!("a program {does} {topic} with the type {}, expected {type_name}", types.join(", "))
+    } else {
+        format!(
+            "a program {does} {topic} with the right type, but nothing arrives; check the network and the quality of service"
+        )
+    }
+}
+
+/// Starts the robot's own controller `name` again; the robot must lie, and no program command it.
+///
+/// # Errors
+/// The service does not answer within 5 s, or refuses.
+pub fn give_back(participant: &Participant, name: &str) -> Result<(), TakeoverError> {
+    let mut switcher = Service::open(participant, motion_switcher::SERVICE)?;
+    let (begun, first) = (Instant::now(), first_id());
+    let (mut next, mut sent) = (first, None::<Instant>);
+    loop {
+        if begun.elapsed() > UNANSWERED {
+            return Err(TakeoverError::Unanswered);
+        }
+        if sent.is_none_or(|sent| sent.elapsed() >= REPEAT) {
+            sent = Some(Instant::now());
+            // A lost request is repeated.
+            let _ = switcher.requests.write(&motion_switcher::select_mode(next, name).encode());
+            next += 1;
+        }
+        switcher.responses.wait(LOOK);
+        while let Some(response) = switcher.response() {
+            if !(first..next).contains(&response.id) || response.api != motion_switcher::SELECT_MODE {
+                continue;
+            }
+            if response.code == 0 {
+                return Ok(());
+            }
+            let ResponseMessage { code, data, .. } = response;
+            return Err(TakeoverError::NotStarted { name: name.to_owned(), code, data });
+        }
+    }
+}

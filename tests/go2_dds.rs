@@ -1,0 +1,259 @@
+//! The Go2 over DDS against other people's code: types, checksum and RPC messages of Unitree's Python SDK over Cyclone DDS
+//! (`tests/support/go2_peer.py`) in place of the robot, and in place of the program that commands ours. With the feature `go2`.
+#![cfg(feature = "go2")]
+#![allow(
+    unsafe_code,
+    reason = "an allocator can only be written with unsafe; this one hands everything to the system's"
+)]
+
+#[path = "support/no_alloc.rs"]
+mod no_alloc;
+
+use std::net::Ipv4Addr;
+use std::ops::ControlFlow;
+use std::process::{Child, Command, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU16, Ordering};
+use std::time::{Duration, Instant};
+
+use no_alloc::without_allocation;
+use quadfrog::config::Config;
+use quadfrog::realtime::thread::pace;
+use quadfrog::robot::description::{RobotDescription, RobotFiles};
+use quadfrog::robot::go2::dds::Participant;
+use quadfrog::robot::hardware::{DampingRoute, Network};
+use quadfrog::robot::{JointCommand, LinkStatus, Robot, RobotState};
+use quadfrog::sim::emulator::{Emulator, EmulatorFault, EmulatorHandle};
+use serde_json::Value;
+
+/// Time within which a peer must have been found.
+const PATIENCE: Duration = Duration::from_secs(30);
+
+/// A domain of its own for each test, so that they do not hear each other. Their ports lie below those of outgoing connections.
+fn domain() -> u16 {
+    static NEXT: AtomicU16 = AtomicU16::new(0);
+    10 + (std::process::id() % 10) as u16 * 8 + NEXT.fetch_add(1, Ordering::Relaxed)
+}
+
+fn files() -> RobotFiles {
+    RobotFiles::embedded("go2").unwrap()
+}
+
+/// The way to a robot in `domain`. The robot of the Python SDK sends a state every 2 ms of its clock, ours every one.
+fn network(domain: u16, state_period_ms: u32) -> Network {
+    let Some(Network::Go2(mut network)) = Network::read(&files()).unwrap() else { panic!("the Go2's network is DDS") };
+    (network.domain, network.interface) = (domain, "127.0.0.1".to_owned());
+    network.state_period_ms = state_period_ms;
+    Network::Go2(network)
+}
+
+fn lying() -> RobotDescription {
+    files().description().unwrap()
+}
+
+/// The peer in Python.
+struct Peer(Child);
+
+impl Peer {
+    fn start(mode: &str, domain: u16, seconds: u32) -> Peer {
+        let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/support/go2_peer.py");
+        let mut python = Command::new("python3");
+        python.args([script, mode, &domain.to_string(), &seconds.to_string()]).stdout(Stdio::piped());
+        Peer(python.spawn().unwrap())
+    }
+
+    /// What it counted, at its end.
+    fn counts(self) -> Value {
+        let output = self.0.wait_with_output().unwrap();
+        let text = String::from_utf8(output.stdout).unwrap();
+        assert!(output.status.success(), "{text}");
+        serde_json::from_str(text.lines().last().unwrap()).unwrap()
+    }
+}
+
+/// An emulated Go2 in real time.
+struct Emulated {
+    handle: EmulatorHandle,
+    ending: Arc<AtomicBool>,
+    thread: Option<std::thread::JoinHandle<()>>,
+}
+
+impl Emulated {
+    fn start(domain: u16) -> Emulated {
+        let config = Config::load_for(&files(), None).unwrap();
+        let address = "127.0.0.1:0".parse().unwrap();
+        let mut emulator = Emulator::serve(&network(domain, 1), address, &lying(), &config.simulator, 0).unwrap();
+        let (handle, ending) = (emulator.handle(), Arc::<AtomicBool>::default());
+        let flag = ending.clone();
+        let step = move || {
+            pace(Duration::from_millis(1), Duration::ZERO, |_| {
+                emulator.step();
+                if flag.load(Ordering::Acquire) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            })
+            .unwrap();
+        };
+        Emulated { handle, ending, thread: Some(std::thread::spawn(step)) }
+    }
+}
+
+impl Drop for Emulated {
+    fn drop(&mut self) {
+        self.ending.store(true, Ordering::Release);
+        self.thread.take().unwrap().join().unwrap();
+    }
+}
+
+/// Ticks of 1 ms: reads, and writes `command` if there is one; returns the newest state and the link.
+fn tick(robot: &mut dyn Robot, ms: u32, command: Option<JointCommand>) -> (Option<RobotState>, LinkStatus) {
+    let mut newest = None;
+    for _ in 0..ms {
+        newest = without_allocation(|| {
+            let state = robot.read().ok();
+            if let Some(command) = &command {
+                robot.write(command).unwrap();
+            }
+            state
+        })
+        .or(newest);
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    (newest, robot.link().unwrap())
+}
+
+/// Ticks until `done`, which sees the link.
+fn tick_until(robot: &mut dyn Robot, command: Option<JointCommand>, done: impl Fn(&LinkStatus) -> bool) -> LinkStatus {
+    let begun = Instant::now();
+    loop {
+        let (_, link) = tick(robot, 50, command);
+        if done(&link) {
+            return link;
+        }
+        assert!(begun.elapsed() < PATIENCE, "{link:?}");
+    }
+}
+
+/// The order of the specification: states, CheckMode, StandDown, ReleaseMode, CheckMode; then our commands, with the checksum of
+/// Unitree's code; and back. No tick allocates.
+#[test]
+fn a_robot_of_the_python_sdk_is_taken_over_commanded_and_given_back() {
+    let domain = domain();
+    let peer = Peer::start("robot", domain, 25);
+    let network = network(domain, 2);
+    let mut steps = Vec::new();
+    let released = network.take_over(&lying().lying_position, &mut |step| steps.push(step.to_owned())).unwrap();
+    assert_eq!(released.as_deref(), Some("normal"), "{steps:?}");
+    let (mut robot, _) = network.open(3.0).unwrap();
+    tick_until(&mut *robot, None, |link| link.received > 50);
+    let (state, link) = tick(&mut *robot, 1500, Some(JointCommand::damping(3.0)));
+    let state = state.unwrap();
+    assert!((state.joint_position_rad[1] - 1.36).abs() < 1e-6 && (state.joint_position_rad[5] + 2.65).abs() < 1e-6);
+    assert_eq!(state.motor_temperature_c[11], 41.0);
+    assert_eq!(state.battery.unwrap().charge_percent, 87.0);
+    assert_eq!(state.foot_force_n, [10.0, 20.0, 30.0, 40.0]);
+    assert_eq!((link.corrupt, link.wrong_length, link.foreign, link.foreign_commands), (0, 0, 0, 0), "{link:?}");
+    assert!(link.sent > 500, "{link:?}");
+    drop(robot);
+    network.give_back("normal").unwrap();
+    let counts = peer.counts();
+    let asked: Vec<(&str, i64)> = counts["asked"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|asked| (asked[0].as_str().unwrap(), asked[1].as_i64().unwrap()))
+        .collect();
+    let mut order = asked.clone();
+    order.dedup();
+    let switcher = "motion_switcher";
+    assert_eq!(order, [(switcher, 1001), ("sport", 1005), (switcher, 1003), (switcher, 1001), (switcher, 1002)]);
+    assert_eq!(counts["active"], "normal");
+    assert!(counts["commands"].as_u64().unwrap() > 100, "{counts}");
+    assert_eq!(counts["bad_checksums"], 0, "{counts}");
+    assert_eq!(counts["last"]["mode"], 1);
+    assert_eq!((counts["last"]["kp"].as_f64(), counts["last"]["kd"].as_f64()), (Some(0.0), Some(3.0)), "{counts}");
+    assert_eq!((counts["last"]["dq"].as_f64(), counts["battery_off"].as_u64()), (Some(0.0), Some(0)), "{counts}");
+}
+
+/// The emulator answers as the robot: services, states with the right checksum, motors that enter servo mode.
+#[test]
+fn a_program_of_the_python_sdk_commands_the_emulated_robot() {
+    let domain = domain();
+    let emulated = Emulated::start(domain);
+    let counts = Peer::start("host", domain, 3).counts();
+    assert_eq!(counts["bad_checksums"], 0, "{counts}");
+    assert!(counts["states"].as_u64().unwrap() > 100, "{counts}");
+    assert_eq!(counts["modes"], serde_json::json!(vec![1; 12]), "{counts}");
+    let answers: Vec<(i64, i64)> = counts["answers"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|answer| (answer[0].as_i64().unwrap(), answer[1].as_i64().unwrap()))
+        .collect();
+    assert_eq!(answers, [(1001, 0), (1003, 0), (1001, 0), (1002, 7004), (1002, 0), (1001, 0)], "{counts}");
+    let name = |index: usize| counts["answers"][index][2].as_str().unwrap().to_owned();
+    assert!(name(0).contains("\"normal\"") && name(2).contains("\"\"") && name(5).contains("\"ai\""), "{counts}");
+    let status = emulated.handle.status();
+    assert!(status.commands > 100 && status.rejected == 0, "{status:?}");
+}
+
+/// The robot's own controller, or a program beside ours, is seen by its commands; ours and the guard's are not.
+#[test]
+fn commands_of_other_programs_are_counted() {
+    let domain = domain();
+    let emulated = Emulated::start(domain);
+    let (mut robot, (route, _)) = network(domain, 1).open(3.0).unwrap();
+    let DampingRoute::Go2 { command, .. } = route else { panic!("{route:?}") };
+    // Not released: the robot's own controller commands.
+    let link = tick_until(&mut *robot, Some(JointCommand::damping(3.0)), |link| link.foreign_commands > 100);
+    assert!(link.sent > 0, "{link:?}");
+    network(domain, 1).take_over(&lying().lying_position, &mut |_| {}).unwrap();
+    tick(&mut *robot, 500, None);
+    let before = tick(&mut *robot, 10, None).1.foreign_commands;
+    let guard = Participant::join(domain, Ipv4Addr::LOCALHOST).unwrap();
+    let writer = guard.writer(&quadfrog::robot::go2::dds::TopicType::low_command()).unwrap();
+    let commands = emulated.handle.status().commands;
+    let begun = Instant::now();
+    while emulated.handle.status().commands < commands + 100 {
+        writer.write(&command).unwrap();
+        tick(&mut *robot, 5, None);
+        assert!(begun.elapsed() < PATIENCE, "the robot hears the guard");
+    }
+    let after = tick(&mut *robot, 100, None).1.foreign_commands;
+    assert_eq!(after, before, "neither ours nor the guard's, and the controller is released");
+    let peer = Peer::start("commander", domain, 8);
+    tick_until(&mut *robot, None, |link| link.foreign_commands > before + 20);
+    assert!(peer.counts()["sent"].as_u64().unwrap() > 100);
+}
+
+/// Losses and damage of the network are counted as the Go1's; a robot that restarts is seen.
+#[test]
+fn losses_damage_and_a_restart_are_counted() {
+    let domain = domain();
+    let emulated = Emulated::start(domain);
+    let (mut robot, _) = network(domain, 1).open(3.0).unwrap();
+    tick_until(&mut *robot, None, |link| link.received > 100);
+    emulated.handle.apply(EmulatorFault::Corrupt(20.0));
+    tick_until(&mut *robot, None, |link| link.corrupt > 10);
+    emulated.handle.apply(EmulatorFault::Clear);
+    emulated.handle.apply(EmulatorFault::Reboot);
+    let link = tick_until(&mut *robot, None, |link| link.reboots == 1);
+    assert!(link.lost > 0, "{link:?}");
+}
+
+#[test]
+fn a_silent_domain_and_a_wrong_type_are_said() {
+    let empty = domain();
+    let begun = Instant::now();
+    let mut steps = Vec::new();
+    let mut report = |step: &str| steps.push((begun.elapsed(), step.to_owned()));
+    let error = network(empty, 1).take_over(&lying().lying_position, &mut report).unwrap_err().to_string();
+    assert!(error.contains("no state") && error.contains("--domain"), "{error}");
+    let (said, words) = steps.iter().find(|(_, step)| step.contains("no state yet")).unwrap();
+    assert!(words.contains("no other program"), "{words}");
+    println!("an empty domain was said after {said:?}");
+
+    let other = domain();
+    let peer = Peer::start("wrong-type", other, 16);
+    let error = network(other, 1).take_over(&lying().lying_position, &mut |_| {}).unwrap_err().to_string();
+    assert!(error.contains("LowCmd_, expected unitree_go::msg::dds_::LowState_"), "{error}");
+    peer.counts();
+}
