@@ -8,7 +8,7 @@ use quadfrog::config::{Config, ConfigError};
 use quadfrog::engine::{self, EngineError, Options, open_experiment};
 use quadfrog::optimize::journal::Durability;
 use quadfrog::robot::description::{RobotDescription, RobotFiles};
-use quadfrog::robot::go1::Network;
+use quadfrog::robot::hardware::Network;
 use quadfrog::session::rollout::Rollout;
 use quadfrog::sim::Simulator;
 use quadfrog::telemetry::{Tick, TrialEnd};
@@ -164,25 +164,30 @@ fn every_accepted_number_of_optimize_toml_runs_a_study() {
 #[test]
 fn every_accepted_number_of_robot_toml_runs_a_trial() {
     let config = Config::load(None).unwrap();
-    let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("go1.urdf"), include_str!("../robots/go1/go1.urdf")).unwrap();
-    let (mut tried, mut refused) = (0, 0);
-    for (mutation, text) in mutants(include_str!("../robots/go1/robot.toml")) {
-        fs::write(folder.path().join("robot.toml"), &text).unwrap();
-        let files = RobotFiles::from_folder(folder.path()).unwrap();
-        match files.description().and_then(|robot| Ok((robot, Network::read(&files)?))) {
-            Err(error) => {
-                refused += 1;
-                assert!(error.to_string().contains("robot.toml"), "{mutation}: {error}");
-            }
-            Ok((robot, _)) => {
-                println!("{mutation} is accepted");
-                tried += 1;
-                drop(trial(&config, &robot));
+    for (name, urdf, toml) in [
+        ("go1", include_str!("../robots/go1/go1.urdf"), include_str!("../robots/go1/robot.toml")),
+        ("go2", include_str!("../robots/go2/go2.urdf"), include_str!("../robots/go2/robot.toml")),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join(format!("{name}.urdf")), urdf).unwrap();
+        let (mut tried, mut refused) = (0, 0);
+        for (mutation, text) in mutants(toml) {
+            fs::write(folder.path().join("robot.toml"), &text).unwrap();
+            let files = RobotFiles::from_folder(folder.path()).unwrap();
+            match files.description().and_then(|robot| Ok((robot, Network::read(&files)?))) {
+                Err(error) => {
+                    refused += 1;
+                    assert!(error.to_string().contains("robot.toml"), "{name}, {mutation}: {error}");
+                }
+                Ok((robot, _)) => {
+                    println!("{name}: {mutation} is accepted");
+                    tried += 1;
+                    drop(trial(&config, &robot));
+                }
             }
         }
+        assert!(tried > 0 && refused > tried, "{name}: {tried} tried, {refused} refused");
     }
-    assert!(tried > 0 && refused > tried, "{tried} tried, {refused} refused");
 }
 
 /// (Defects once: all of these were accepted with a robot, and the arming checks passed.)

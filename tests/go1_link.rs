@@ -8,7 +8,7 @@ use std::net::UdpSocket;
 
 use go1::{ANY_PORT, description, network, pair};
 use quadfrog::robot::go1::packet::{CrcForm, HIGH_LEVEL, LowCmd, LowState, MODE_BRAKE, MODE_SERVO};
-use quadfrog::robot::go1::{Go1, Network};
+use quadfrog::robot::go1::{Go1, Go1Network};
 use quadfrog::robot::{JOINTS, JointCommand, LinkStatus, Robot, RobotError};
 use quadfrog::sim::SimConfig;
 use quadfrog::sim::emulator::{Emulator, EmulatorFault};
@@ -331,6 +331,6 @@ fn a_restart_gives_the_motors_their_time_to_servo_mode_again() {
 fn a_taken_local_port_is_reported_with_the_remedy() {
     let taken = UdpSocket::bind("0.0.0.0:0").unwrap();
     let local_port = taken.local_addr().unwrap().port();
-    let error = Go1::open(&Network { local_port, ..network(ANY_PORT) }, false).unwrap_err().to_string();
+    let error = Go1::open(&Go1Network { local_port, ..network(ANY_PORT) }, false).unwrap_err().to_string();
     assert!(error.contains("network.local_port"), "{error}");
 }

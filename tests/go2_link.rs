@@ -7,7 +7,7 @@ use quadfrog::robot::description::RobotFiles;
 use quadfrog::robot::go2::convert::low_state;
 use quadfrog::robot::go2::link::{Go2, Transport, TransportCounts, damping};
 use quadfrog::robot::go2::message::{COMMAND_LENGTH, CommandMessage, STATE_LENGTH, VELOCITY_STOP};
-use quadfrog::robot::go2::network::Network;
+use quadfrog::robot::go2::network::Go2Network;
 use quadfrog::robot::{JOINTS, JointCommand, MotorCommand, Robot, RobotError, RobotState};
 
 /// Payloads in memory; a test holds the other end.
@@ -43,7 +43,7 @@ impl Transport for InMemory {
 }
 
 fn robot() -> (Go2<InMemory>, InMemory) {
-    let network = Network::read(&RobotFiles::embedded("go2").unwrap()).unwrap().unwrap();
+    let network = Go2Network::read(&RobotFiles::embedded("go2").unwrap()).unwrap().unwrap();
     let wire = InMemory::default();
     (Go2::new(wire.clone(), &network), wire)
 }

@@ -12,9 +12,9 @@ use super::{JOINTS, Joints, Robot};
 #[derive(Debug, Clone, PartialEq)]
 pub enum Network {
     /// Section `[network]`: a Go1 over UDP.
-    Go1(go1::Network),
+    Go1(go1::Go1Network),
     /// Section `[dds]`: a Go2 over DDS.
-    Go2(go2::network::Network),
+    Go2(go2::network::Go2Network),
 }
 
 /// Error of opening a robot.
@@ -122,7 +122,7 @@ impl Network {
     /// # Errors
     /// A key is unknown or missing, a value is out of range, or there are two sections.
     pub fn read(files: &RobotFiles) -> Result<Option<Network>, DescriptionError> {
-        match (go1::Network::read(files)?, go2::network::Network::read(files)?) {
+        match (go1::Go1Network::read(files)?, go2::network::Go2Network::read(files)?) {
             (Some(_), Some(_)) => {
                 Err(files.invalid("dds", "beside [network]".to_owned(), "keep the section of the robot's protocol"))
             }
@@ -181,7 +181,7 @@ impl Network {
 
 #[cfg(feature = "go2")]
 fn take_over_go2(
-    network: &go2::network::Network,
+    network: &go2::network::Go2Network,
     lying_rad: &Joints,
     report: &mut dyn FnMut(&str),
 ) -> Result<Option<String>, HardwareError> {
@@ -191,7 +191,7 @@ fn take_over_go2(
 
 #[cfg(not(feature = "go2"))]
 fn take_over_go2(
-    _: &go2::network::Network,
+    _: &go2::network::Go2Network,
     _: &Joints,
     _: &mut dyn FnMut(&str),
 ) -> Result<Option<String>, HardwareError> {
@@ -199,18 +199,18 @@ fn take_over_go2(
 }
 
 #[cfg(feature = "go2")]
-fn give_back_go2(network: &go2::network::Network, name: &str) -> Result<(), HardwareError> {
+fn give_back_go2(network: &go2::network::Go2Network, name: &str) -> Result<(), HardwareError> {
     let participant = go2::dds::Participant::join(network.domain, network.address()?)?;
     Ok(go2::services::give_back(&participant, name)?)
 }
 
 #[cfg(not(feature = "go2"))]
-fn give_back_go2(_: &go2::network::Network, _: &str) -> Result<(), HardwareError> {
+fn give_back_go2(_: &go2::network::Go2Network, _: &str) -> Result<(), HardwareError> {
     Err(HardwareError::WithoutGo2)
 }
 
 #[cfg(feature = "go2")]
-fn open_go2(network: &go2::network::Network, damping_kd: f64) -> Result<OpenedRobot, HardwareError> {
+fn open_go2(network: &go2::network::Go2Network, damping_kd: f64) -> Result<OpenedRobot, HardwareError> {
     let address = network.address()?;
     let command = go2::link::damping(damping_kd).map_err(|error| HardwareError::Damping(error.to_string()))?;
     let participant = go2::dds::Participant::join(network.domain, address)?;
@@ -223,6 +223,6 @@ fn open_go2(network: &go2::network::Network, damping_kd: f64) -> Result<OpenedRo
 }
 
 #[cfg(not(feature = "go2"))]
-fn open_go2(_: &go2::network::Network, _: f64) -> Result<OpenedRobot, HardwareError> {
+fn open_go2(_: &go2::network::Go2Network, _: f64) -> Result<OpenedRobot, HardwareError> {
     Err(HardwareError::WithoutGo2)
 }

@@ -279,6 +279,16 @@ fn guard(given: &[u8], socket: UdpSocket) -> Output {
     process.wait_with_output().unwrap()
 }
 
+/// The orders of a console with a Go1, as it writes them: their length and JSON.
+fn orders(command: &[u8]) -> Vec<u8> {
+    let damping = serde_json::json!({ "Go1": { "command": command } });
+    framed(serde_json::json!({ "silence_ms": 70, "damping": damping }).to_string().as_bytes())
+}
+
+fn framed(orders: &[u8]) -> Vec<u8> {
+    [&(orders.len() as u16).to_le_bytes(), orders].concat()
+}
+
 #[test]
 fn a_guard_sends_nothing_to_a_robot_without_commands_and_no_invalid_command() {
     let robot = RecordingRobot::start();
@@ -288,22 +298,25 @@ fn a_guard_sends_nothing_to_a_robot_without_commands_and_no_invalid_command() {
     spoilt[30] ^= 1;
     // 0.03 N m s/rad is the word 0.
     let limp = low_cmd(&JointCommand::damping(0.03), CrcForm::Plain).unwrap().bytes().to_vec();
-    for (given, after, status) in [
-        (damping(), "\x46\0", 0),
-        (damping(), "\x46\0+-", 0),
-        (damping(), "\x46", 2),
-        (spoilt, "\x46\0+", 2),
-        (limp, "\x46\0+", 2),
-        (damping()[..600].to_vec(), "", 2),
-        (b"quadfrog\n".to_vec(), "", 2),
+    let whole = orders(&damping());
+    for (name, given, after, status) in [
+        ("no heartbeat", whole.clone(), "", 0),
+        ("left alone", whole.clone(), "+-", 0),
+        ("cut", whole[..whole.len() - 1].to_vec(), "", 2),
+        ("length alone", whole[..2].to_vec(), "", 2),
+        ("wrong checksum", orders(&spoilt), "+", 2),
+        ("without damping", orders(&limp), "+", 2),
+        ("cut command", orders(&damping()[..600]), "+", 2),
+        ("unknown way", framed(br#"{"silence_ms":70,"damping":{"Go9":{"command":[]}}}"#), "+", 2),
+        ("text", b"quadfrog\n".to_vec(), "", 2),
     ] {
         let output = guard(&[&given, after.as_bytes()].concat(), socket.try_clone().unwrap());
         let printed = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(output.status.code(), Some(status), "{after:?}: {printed}");
+        assert_eq!(output.status.code(), Some(status), "{name}: {printed}");
         assert_eq!(printed.contains("is not a valid command"), status == 2, "{printed}");
     }
     assert_eq!(robot.rest(0), Vec::<Vec<u8>>::new());
-    let output = guard(&[&damping()[..], b"\x46\0-+"].concat(), socket);
+    let output = guard(&[&whole[..], b"-+"].concat(), socket);
     let printed = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success() && printed.contains("the robot was damped, 3000 times"), "{printed}");
     assert_damped(&robot.rest(0));

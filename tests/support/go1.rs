@@ -4,7 +4,7 @@
 use std::net::{Ipv4Addr, SocketAddr};
 
 use quadfrog::robot::description::{RobotDescription, RobotFiles};
-use quadfrog::robot::go1::{Go1, Network};
+use quadfrog::robot::go1::{Go1, Go1Network};
 use quadfrog::robot::{JointCommand, LinkStatus, Placement, Robot, RobotError, RobotState};
 use quadfrog::sim::SimConfig;
 use quadfrog::sim::emulator::Emulator;
@@ -20,9 +20,9 @@ pub fn description() -> RobotDescription {
 }
 
 /// Network settings for a robot at `address`, with any local port.
-pub fn network(address: SocketAddr) -> Network {
-    let network = Network::read(&RobotFiles::embedded("go1").unwrap()).unwrap().unwrap();
-    Network { address, local_port: 0, ..network }
+pub fn network(address: SocketAddr) -> Go1Network {
+    let network = Go1Network::read(&RobotFiles::embedded("go1").unwrap()).unwrap().unwrap();
+    Go1Network { address, local_port: 0, ..network }
 }
 
 /// An emulated robot on a port of its own.

@@ -19,7 +19,7 @@ use packet::{CommandError, CrcForm, LowCmd};
 /// Section `[network]` of `robot.toml`, which explains every key.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Network {
+pub struct Go1Network {
     /// Address of the robot's low-level controller.
     pub address: SocketAddr,
     /// Local port; 0 takes any free one.
@@ -38,15 +38,15 @@ pub struct Network {
     pub foot_force_n: f64,
 }
 
-impl Network {
+impl Go1Network {
     /// Reads and checks the section `[network]` of the robot's `robot.toml`; none if there is none.
     ///
     /// # Errors
     /// A key is unknown or missing, or a value is out of range.
-    pub fn read(files: &RobotFiles) -> Result<Option<Network>, DescriptionError> {
+    pub fn read(files: &RobotFiles) -> Result<Option<Go1Network>, DescriptionError> {
         #[derive(serde::Deserialize)]
         struct NetworkToml {
-            network: Option<Network>,
+            network: Option<Go1Network>,
         }
         let Some(network) = files.toml::<NetworkToml>()?.network else { return Ok(None) };
         let times = [
@@ -76,7 +76,7 @@ impl Network {
 #[derive(Debug)]
 pub struct Go1 {
     link: Link,
-    network: Network,
+    network: Go1Network,
     /// Whether hello commands are sent.
     sends_hello: bool,
     /// Time since the last hello command, ms.
@@ -91,7 +91,7 @@ impl Go1 {
     ///
     /// # Errors
     /// The local port is taken, or there is no route to the address.
-    pub fn open(network: &Network, listen_only: bool) -> Result<Go1, LinkError> {
+    pub fn open(network: &Go1Network, listen_only: bool) -> Result<Go1, LinkError> {
         let link = Link::open(&LinkOptions {
             address: network.address,
             local_port: network.local_port,

@@ -185,19 +185,19 @@ impl Participant {
     ///
     /// # Errors
     /// The library refuses it.
-    pub fn writer(&self, topic: &TopicType) -> Result<Writer, DdsError> {
+    pub fn writer(&self, topic: &TopicType) -> Result<TopicWriter, DdsError> {
         let failed = |error: rustdds::dds::CreateError| topic_error(topic, &error);
         let qos = topic.qos(1);
         let found = self.topic(topic, &qos)?;
         let publisher = self.participant.create_publisher(&qos).map_err(failed)?;
-        Ok(Writer { writer: publisher.create_datawriter_no_key(&found, Some(qos)).map_err(failed)? })
+        Ok(TopicWriter { writer: publisher.create_datawriter_no_key(&found, Some(qos)).map_err(failed)? })
     }
 
     /// Opens a reader.
     ///
     /// # Errors
     /// The library refuses it.
-    pub fn reader(&self, topic: &TopicType) -> Result<Reader, DdsError> {
+    pub fn reader(&self, topic: &TopicType) -> Result<TopicReader, DdsError> {
         let failed = |error: rustdds::dds::CreateError| topic_error(topic, &error);
         let qos = topic.qos(READER_DEPTH);
         let found = self.topic(topic, &qos)?;
@@ -206,7 +206,7 @@ impl Participant {
         let waiting = |error: std::io::Error| DdsError::Topic { topic: topic.topic.clone(), reason: error.to_string() };
         let poll = Poll::new().map_err(waiting)?;
         poll.registry().register(&mut reader, Token(0), Interest::READABLE).map_err(waiting)?;
-        Ok(Reader { reader, poll, events: Events::with_capacity(4), foreign: 0 })
+        Ok(TopicReader { reader, poll, events: Events::with_capacity(4), foreign: 0 })
     }
 
     /// Returns the readers of other programs.
@@ -258,11 +258,11 @@ fn identity(guid: GUID) -> ParticipantIdentity {
 }
 
 /// Writes payloads to one topic.
-pub struct Writer {
+pub struct TopicWriter {
     writer: DataWriter<Payload, AsItIs>,
 }
 
-impl Writer {
+impl TopicWriter {
     /// Puts a payload on the network; allocates, and may wait for milliseconds.
     ///
     /// # Errors
@@ -275,7 +275,7 @@ impl Writer {
 
 /// A received payload.
 #[derive(Debug, Clone)]
-pub struct Sample {
+pub struct ReceivedSample {
     /// Bytes, without the encapsulation header.
     pub payload: Bytes,
     /// The program that wrote it.
@@ -283,7 +283,7 @@ pub struct Sample {
 }
 
 /// Reads payloads of one topic.
-pub struct Reader {
+pub struct TopicReader {
     reader: DataReader<Payload, AsItIs>,
     poll: Poll,
     events: Events,
@@ -291,7 +291,7 @@ pub struct Reader {
     pub foreign: u64,
 }
 
-impl Reader {
+impl TopicReader {
     /// Waits until samples may have arrived, at most `longest`.
     pub fn wait(&mut self, longest: Duration) {
         // An interrupted wait is a short one.
@@ -299,13 +299,13 @@ impl Reader {
     }
 
     /// Takes the oldest sample that waits; none if there is none.
-    pub fn take(&mut self) -> Option<Sample> {
+    pub fn take(&mut self) -> Option<ReceivedSample> {
         loop {
             match self.reader.take_next_sample() {
                 Ok(None) => return None,
                 Ok(Some(sample)) => {
                     let participant = identity(sample.sample_info().writer_guid());
-                    return Some(Sample { payload: sample.into_value().0, participant });
+                    return Some(ReceivedSample { payload: sample.into_value().0, participant });
                 }
                 // It is taken all the same.
                 Err(_) => self.foreign += 1,
@@ -420,7 +420,7 @@ impl Drop for DdsTransport {
 
 /// Writes the newest command whenever there is one, the last one also at the end.
 fn write_commands(
-    writer: &Writer,
+    writer: &TopicWriter,
     mut newest: triple_buffer::Output<[u8; COMMAND_LENGTH]>,
     counts: &SharedCounts,
     ending: &AtomicBool,
@@ -449,8 +449,8 @@ struct Ours {
 
 /// Passes states on, and counts the commands of other programs.
 fn take_samples(
-    mut states: Reader,
-    mut commands: Reader,
+    mut states: TopicReader,
+    mut commands: TopicReader,
     mut waiting: rtrb::Producer<WaitingState>,
     ours: &Ours,
     counts: &SharedCounts,

@@ -2,7 +2,7 @@
 
 use super::convert;
 use super::message::{COMMAND_LENGTH, CommandPayload, EncodeError, MessageRejection, STATE_LENGTH, StateMessage};
-use super::network::Network;
+use super::network::Go2Network;
 use crate::robot::servo_grace::ServoGrace;
 use crate::robot::state_counter::StateCounter;
 use crate::robot::{JointCommand, LinkStatus, Placement, Robot, RobotError, RobotState};
@@ -64,7 +64,7 @@ pub fn damping(kd: f64) -> Result<CommandPayload, EncodeError> {
 
 impl<T: Transport> Go2<T> {
     /// Puts a robot behind `transport`.
-    pub fn new(transport: T, network: &Network) -> Go2<T> {
+    pub fn new(transport: T, network: &Go2Network) -> Go2<T> {
         Go2 {
             transport,
             counter: StateCounter::new(network.clock()),

@@ -14,10 +14,10 @@ const LARGEST_DOMAIN: u16 = 232;
 /// Section `[dds]` of `robot.toml`, which explains every key.
 #[derive(Debug, Clone, PartialEq, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Network {
+pub struct Go2Network {
     /// DDS domain.
     pub domain: u16,
-    /// Network interface to the robot, or its IPv4 address; empty: the only one in `subnet`.
+    /// Go2Network interface to the robot, or its IPv4 address; empty: the only one in `subnet`.
     pub interface: String,
     /// Addresses of the robot's network, as ADDRESS/BITS.
     pub subnet: String,
@@ -60,15 +60,15 @@ struct Interface {
     address: Ipv4Addr,
 }
 
-impl Network {
+impl Go2Network {
     /// Reads and checks the section `[dds]` of the robot's `robot.toml`; none if there is none.
     ///
     /// # Errors
     /// A key is unknown or missing, or a value is out of range.
-    pub fn read(files: &RobotFiles) -> Result<Option<Network>, DescriptionError> {
+    pub fn read(files: &RobotFiles) -> Result<Option<Go2Network>, DescriptionError> {
         #[derive(serde::Deserialize)]
         struct DdsToml {
-            dds: Option<Network>,
+            dds: Option<Go2Network>,
         }
         let Some(network) = files.toml::<DdsToml>()?.dds else { return Ok(None) };
         if network.domain > LARGEST_DOMAIN {

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use super::dds::{DdsError, FoundEndpoint, Participant, Reader, TopicType, Writer};
+use super::dds::{DdsError, FoundEndpoint, Participant, TopicReader, TopicType, TopicWriter};
 use super::handover::{Handover, HandoverError, HandoverStatus, ServiceRequest};
 use super::message::{ResponseMessage, StateMessage, motion_switcher, sport};
 use crate::robot::{JOINTS, Joints};
@@ -39,8 +39,8 @@ pub enum TakeoverError {
 /// Request and response topics of one service.
 struct Service {
     name: &'static str,
-    requests: Writer,
-    responses: Reader,
+    requests: TopicWriter,
+    responses: TopicReader,
 }
 
 impl Service {

@@ -64,7 +64,7 @@ pub(super) struct Go1Endpoint {
 
 impl Go1Endpoint {
     /// Receives on `address`; port 0 takes any free one.
-    pub fn bind(address: SocketAddr, network: &go1::Network, state_length: usize) -> std::io::Result<Go1Endpoint> {
+    pub fn bind(address: SocketAddr, network: &go1::Go1Network, state_length: usize) -> std::io::Result<Go1Endpoint> {
         let socket = UdpSocket::bind(address)?;
         socket.set_nonblocking(true)?;
         let (crc, foot_force_n) = (network.crc, network.foot_force_n);

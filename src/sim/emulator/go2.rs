@@ -10,7 +10,7 @@ use std::time::Duration;
 
 use super::endpoint::{EmulatorClient, Endpoint};
 use crate::robot::go2::convert;
-use crate::robot::go2::dds::{DdsError, Participant, Reader, TopicType, Writer};
+use crate::robot::go2::dds::{DdsError, Participant, TopicReader, TopicType, TopicWriter};
 use crate::robot::go2::message::{CommandMessage, RequestMessage, ResponseMessage, motion_switcher, sport};
 use crate::robot::{JOINTS, JointCommand, Joints, MotorCommand, RobotState};
 
@@ -29,7 +29,7 @@ const WAKE: Duration = Duration::from_millis(50);
 
 /// The services' end of an emulator.
 struct Services {
-    switcher: [Option<(Reader, Writer)>; 2],
+    switcher: [Option<(TopicReader, TopicWriter)>; 2],
     /// Active controller; empty if released.
     active: String,
 }
@@ -37,9 +37,9 @@ struct Services {
 /// DDS endpoint of a Go2.
 pub(super) struct Go2Endpoint {
     commands: Receiver<(EmulatorClient, Vec<u8>)>,
-    states: Writer,
+    states: TopicWriter,
     services: Services,
-    own: Writer,
+    own: TopicWriter,
     own_command: Vec<u8>,
     /// Time since the start, ms.
     now_ms: u64,
@@ -105,7 +105,7 @@ impl Drop for Go2Endpoint {
 }
 
 /// Passes the commands of all programs on.
-fn take_commands(mut reader: Reader, to_robot: &Sender<(EmulatorClient, Vec<u8>)>, ending: &AtomicBool) {
+fn take_commands(mut reader: TopicReader, to_robot: &Sender<(EmulatorClient, Vec<u8>)>, ending: &AtomicBool) {
     while !ending.load(Ordering::Acquire) {
         reader.wait(WAKE);
         while let Some(sample) = reader.take() {

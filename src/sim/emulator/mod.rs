@@ -23,7 +23,7 @@ pub use fault::{EmulatorFault, EmulatorFaultError, help};
 
 use super::{EmulatorConfig, SimConfig, SimError};
 use crate::robot::description::RobotDescription;
-use crate::robot::go1::Network;
+use crate::robot::go1::Go1Network;
 use crate::robot::hardware::{self, HardwareError};
 use crate::robot::{JOINTS, JointCommand, Placement, Truth};
 use crate::sim::terrain::unit_interval;
@@ -129,7 +129,7 @@ impl Emulator {
     pub fn bind(
         address: SocketAddr,
         description: &RobotDescription,
-        network: &Network,
+        network: &Go1Network,
         config: &SimConfig,
         seed: u64,
     ) -> Result<Emulator, EmulatorError> {
@@ -148,7 +148,7 @@ impl Emulator {
         domain: u16,
         address: std::net::Ipv4Addr,
         description: &RobotDescription,
-        network: &crate::robot::go2::network::Network,
+        network: &crate::robot::go2::network::Go2Network,
         config: &SimConfig,
         seed: u64,
     ) -> Result<Emulator, EmulatorError> {

@@ -15,7 +15,7 @@ use clap_complete::ArgValueCandidates;
 use nix::sys::signal::{SigSet, Signal};
 use quadfrog::realtime::thread::pace;
 use quadfrog::robot::CONTROL_PERIOD_S;
-use quadfrog::robot::go2::network::Network as Go2Network;
+use quadfrog::robot::go2::network::Go2Network;
 use quadfrog::robot::hardware::Network;
 use quadfrog::sim::emulator::{self, Emulator, EmulatorFault, EmulatorHandle, EmulatorStatus};
 use quadfrog_console::{notice, put, put_line};

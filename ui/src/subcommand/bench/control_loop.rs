@@ -18,7 +18,7 @@ use quadfrog::realtime::scheduling::{GrantedSettings, Scheduling};
 use quadfrog::realtime::system::isolated_cores;
 use quadfrog::realtime::thread::{CONTROL_TICK_OFFSET, PeriodicTask, TickStart, WARM_UP_LEAD, pace, pace_with_warm_up};
 use quadfrog::robot::description::RobotFiles;
-use quadfrog::robot::go1::{Go1, Network};
+use quadfrog::robot::go1::{Go1, Go1Network};
 use quadfrog::robot::{Placement, Robot};
 use quadfrog::sim::Simulator;
 use quadfrog::sim::emulator::Emulator;
@@ -222,11 +222,11 @@ fn measure(
         });
     }
     let any_port = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
-    let network = Network::read(&files).map_err(Failure::input)?.expect("the embedded go1 has a network");
+    let network = Go1Network::read(&files).map_err(Failure::input)?.expect("the embedded go1 has a network");
     let mut emulator =
         Emulator::bind(any_port, &description, &network, &config.simulator, 0).map_err(Failure::input)?;
     let address = emulator.local_address().context("the address of the emulator")?;
-    let mut robot = Go1::open(&Network { address, local_port: 0, ..network }, false).map_err(Failure::input)?;
+    let mut robot = Go1::open(&Go1Network { address, local_port: 0, ..network }, false).map_err(Failure::input)?;
     let ending = Arc::new(AtomicBool::new(false));
     let flag = ending.clone();
     let emulated = std::thread::spawn(move || {
