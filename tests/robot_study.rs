@@ -160,6 +160,8 @@ struct Operator {
     /// The mode in which something was wished last: once a mode is enough.
     wished_in: Option<(Mode, Option<ExperimentStage>, u32)>,
     stops: u32,
+    /// A jump was refused because the robot does not stand as it should.
+    sits_down: bool,
     stop_tested: bool,
     lies_since: Option<Instant>,
 }
@@ -177,7 +179,10 @@ impl Operator {
                     self.stops += 1;
                     println!("{} -> {}: {}", change.from.name(), change.to.name(), change.cause);
                 }
-                Record::Request(command) if !command.accepted => println!("{}: {}", command.request, command.answer),
+                Record::Request(command) if !command.accepted => {
+                    self.sits_down |= command.request.starts_with("approve") && command.answer.contains("sit down");
+                    println!("{}: {}", command.request, command.answer);
+                }
                 Record::Log(line) => println!("{}", line.message),
                 _ => {}
             }
@@ -221,6 +226,9 @@ impl Operator {
                 }
                 let still = self.lies_since.is_some_and(|since| since.elapsed() > STILL);
                 still.then_some(OperatorRequest::Arm)
+            }
+            (Mode::Ready, Some(ExperimentStage::Proposed)) if std::mem::take(&mut self.sits_down) => {
+                Some(OperatorRequest::SitDown)
             }
             (Mode::Ready, Some(ExperimentStage::Proposed)) => {
                 let proposal = self.proposal.as_ref()?;
@@ -271,6 +279,7 @@ fn over_the_network(kind: Kind, seed: u32, trials: u32, late_ms: f64) -> Outcome
         in_truth: BTreeMap::default(),
         wished_in: None,
         stops: 0,
+        sits_down: false,
         stop_tested: false,
         lies_since: None,
     };
@@ -386,25 +395,28 @@ fn three_trials(kind: Kind) {
     assert!(outcome.link.received > 5_000, "{:?}", outcome.link);
 }
 
-/// Twenty trials on each of five robots at once: the median of the best jumps is the simulator's within 10 %.
 #[test]
 #[ignore = "takes three minutes in real time; .ci/run runs it"]
 fn a_study_in_real_time_ends_as_one_in_the_simulator() {
-    five_studies(Kind::Go1);
+    five_studies(Kind::Go1, 5);
 }
 
-/// The same of Go2s over DDS.
 #[cfg(feature = "go2")]
 #[test]
-#[ignore = "takes three minutes in real time; .ci/run runs it"]
+#[ignore = "takes eight minutes in real time"]
 fn a_study_of_a_go2_in_real_time_ends_as_one_in_the_simulator() {
-    five_studies(Kind::Go2);
+    // A robot, its DDS and a console keep a core busy; with five of them on two cores no state is on time.
+    five_studies(Kind::Go2, 2);
 }
 
-fn five_studies(kind: Kind) {
-    let study = |seed| std::thread::spawn(move || (seed, over_the_network(kind, seed, TRIALS, LATE_MS)));
-    let studies: Vec<_> = (0..5).map(study).collect();
-    let outcomes: Vec<_> = studies.into_iter().map(|study| study.join().unwrap()).collect();
+/// Twenty trials on each of five robots, `at_once` of them at a time: the median of the best jumps is the simulator's within 10 %.
+fn five_studies(kind: Kind, at_once: usize) {
+    let study = |&seed: &u32| std::thread::spawn(move || (seed, over_the_network(kind, seed, TRIALS, LATE_MS)));
+    let outcomes = [0, 1, 2, 3, 4].chunks(at_once).flat_map(|seeds| {
+        let studies: Vec<_> = seeds.iter().map(study).collect();
+        studies.into_iter().map(|study| study.join().unwrap())
+    });
+    let outcomes: Vec<_> = outcomes.collect();
     for (seed, outcome) in &outcomes {
         print_outcome(*seed, outcome);
     }
