@@ -34,7 +34,10 @@ pub enum HardwareError {
     Dds(#[from] go2::dds::DdsError),
     #[cfg(feature = "go2")]
     #[error("the robot was not taken over: {0}")]
-    Takeover(#[from] go2::services::TakeoverError),
+    Takeover(go2::services::TakeoverError),
+    #[cfg(feature = "go2")]
+    #[error("the robot's own controller was not started: {0}")]
+    GiveBack(go2::services::TakeoverError),
     #[error("this program was built without the Go2: build it with `cargo build --release --features go2`")]
     WithoutGo2,
     #[error("a {robot} has no controller of its own to give it back to")]
@@ -186,7 +189,8 @@ fn take_over_go2(
     report: &mut dyn FnMut(&str),
 ) -> Result<Option<String>, HardwareError> {
     let participant = go2::dds::Participant::join(network.domain, network.address()?)?;
-    Ok(go2::services::take_over(&participant, lying_rad, network.reliable_commands, report)?)
+    go2::services::take_over(&participant, lying_rad, network.reliable_commands, report)
+        .map_err(HardwareError::Takeover)
 }
 
 #[cfg(not(feature = "go2"))]
@@ -201,7 +205,7 @@ fn take_over_go2(
 #[cfg(feature = "go2")]
 fn give_back_go2(network: &go2::network::Go2Network, name: &str) -> Result<(), HardwareError> {
     let participant = go2::dds::Participant::join(network.domain, network.address()?)?;
-    Ok(go2::services::give_back(&participant, name)?)
+    go2::services::give_back(&participant, name).map_err(HardwareError::GiveBack)
 }
 
 #[cfg(not(feature = "go2"))]

@@ -28,7 +28,7 @@ pub enum TakeoverError {
     DemandsReliable,
     #[error("the robot does not read commands: {0}")]
     NoReader(String),
-    #[error("the robot's controller {name:?} was not started: code {code}, {data:?}")]
+    #[error("the service motion_switcher answered {name:?} with code {code}, data {data:?}")]
     NotStarted { name: String, code: i32, data: String },
     #[error(
         "no response of the service motion_switcher within 5 s; check the interface, the domain and that the robot is switched on"
