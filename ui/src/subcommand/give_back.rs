@@ -13,7 +13,7 @@ pub struct GiveBackArguments {
     /// Controller to start: the one that the session released
     #[arg(long, value_name = "NAME", default_value = "normal")]
     controller: String,
-    /// Robot model: go2, or a folder with a URDF and a robot.toml that has a section [dds]
+    /// Robot model: go2, or a folder with a URDF and the robot.toml of a robot over DDS
     #[arg(long, value_name = "MODEL", default_value = "go2", add = ArgValueCandidates::new(completion::robots))]
     model: String,
     #[command(flatten)]
