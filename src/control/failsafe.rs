@@ -195,7 +195,8 @@ const TABLE: [FailsafeRow; 24] = [
         |s| {
             let [loss, torque] = [100.0 * s.consistency.loss_share, s.consistency.torque_n_m];
             format!(
-                "{loss} % of the states of 1 s lost, no motor in servo mode, or a torque {torque} N m off, on hardware"
+                "{loss} % of the states of 1 s lost, over DDS more than two commands of another program in 1 s, no motor in servo \
+                 mode, or a torque {torque} N m off, on hardware"
             )
         },
         other_commander,
