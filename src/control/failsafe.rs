@@ -3,6 +3,7 @@
 //!
 //! A fall during a trial is an outcome of the trial, detected by `running_trial::FallWatch`; it damps as well.
 
+use super::consistency::FOREIGN_COMMANDS;
 use super::failsafe_causes::{
     body_not_finite, corrupt, delay, events_lost, guard_silent, hottest, joint_position, joint_torque, joint_velocity,
     joints_not_finite, late, link_lost, motor_hot, motor_mode, operator_silent, other_commander, reboot, remote_stop,
@@ -195,7 +196,7 @@ const TABLE: [FailsafeRow; 24] = [
         |s| {
             let [loss, torque] = [100.0 * s.consistency.loss_share, s.consistency.torque_n_m];
             format!(
-                "{loss} % of the states of 1 s lost, over DDS more than two commands of another program in 1 s, no motor in servo \
+                "{loss} % of the states of 1 s lost, over DDS more than {FOREIGN_COMMANDS} commands of another program in 1 s, no motor in servo \
                  mode, or a torque {torque} N m off, on hardware"
             )
         },

@@ -11,6 +11,7 @@ pub mod go1;
 pub mod go2;
 pub mod hardware;
 pub mod kinematics;
+pub mod link_settings;
 pub mod recent_count;
 pub mod remote;
 pub mod servo_grace;

@@ -13,7 +13,7 @@ const TORQUE_S: f64 = 0.1;
 /// Least number of states within the time constant from which a share is known: less is a missing link.
 const LEAST_STATES: f64 = 100.0;
 /// Most commands of other programs within the time constant. A program that looks once at the topic sends none.
-const FOREIGN_COMMANDS: f64 = 2.0;
+pub(in crate::control) const FOREIGN_COMMANDS: f64 = 2.0;
 
 /// History of the link and the motors.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

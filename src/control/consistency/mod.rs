@@ -13,6 +13,7 @@ mod inputs;
 mod joints;
 mod leaky;
 
+pub(super) use commander::FOREIGN_COMMANDS;
 pub use inputs::ConsistencyInputs;
 
 use super::command_gate;

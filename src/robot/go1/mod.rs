@@ -10,6 +10,7 @@ pub mod packet;
 use std::net::{SocketAddr, UdpSocket};
 
 use super::description::{DescriptionError, RobotFiles};
+use super::link_settings::LinkSettings;
 use super::servo_grace::ServoGrace;
 use super::state_counter::StateClock;
 use super::{JointCommand, LinkStatus, Placement, Robot, RobotError, RobotState};
@@ -49,22 +50,21 @@ impl Go1Network {
             network: Option<Go1Network>,
         }
         let Some(network) = files.toml::<NetworkToml>()?.network else { return Ok(None) };
-        let times = [
-            ("network.state_period_ms", network.state_period_ms, 1..=20, "give 1 to 20 milliseconds"),
-            ("network.restart_ms", network.restart_ms, 20..=10_000, "give 20 to 10000 milliseconds"),
-            ("network.hello_ms", network.hello_ms, 10..=10_000, "give 10 to 10000 milliseconds"),
-            ("network.servo_grace_ms", network.servo_grace_ms, 0..=2000, "give 0 to 2000 milliseconds"),
-        ];
-        for (key, ms, range, remedy) in times {
-            if !range.contains(&ms) {
-                return Err(files.invalid(key, format!("{ms} ms"), remedy));
-            }
-        }
-        let force = network.foot_force_n;
-        if !(0.01..=100.0).contains(&force) {
-            return Err(files.invalid("network.foot_force_n", format!("{force} N"), "give 0.01 to 100 N a step"));
+        network.link_settings().check(files, "network")?;
+        let hello_ms = network.hello_ms;
+        if !(10..=10_000).contains(&hello_ms) {
+            return Err(files.invalid("network.hello_ms", format!("{hello_ms} ms"), "give 10 to 10000 milliseconds"));
         }
         Ok(Some(network))
+    }
+
+    /// Returns the settings that every robot has.
+    fn link_settings(&self) -> LinkSettings {
+        LinkSettings {
+            clock: StateClock { state_period_ms: self.state_period_ms, restart_ms: self.restart_ms },
+            servo_grace_ms: self.servo_grace_ms,
+            foot_force_n: self.foot_force_n,
+        }
     }
 }
 
@@ -95,7 +95,7 @@ impl Go1 {
         let link = Link::open(&LinkOptions {
             address: network.address,
             local_port: network.local_port,
-            clock: StateClock { state_period_ms: network.state_period_ms, restart_ms: network.restart_ms },
+            clock: network.link_settings().clock,
         })?;
         Ok(Go1 {
             link,

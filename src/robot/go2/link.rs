@@ -3,6 +3,7 @@
 use super::convert;
 use super::message::{COMMAND_LENGTH, CommandPayload, EncodeError, MessageRejection, STATE_LENGTH, StateMessage};
 use super::network::Go2Network;
+use crate::robot::link_settings::LinkSettings;
 use crate::robot::servo_grace::ServoGrace;
 use crate::robot::state_counter::StateCounter;
 use crate::robot::{JointCommand, LinkStatus, Placement, Robot, RobotError, RobotState};
@@ -65,11 +66,12 @@ pub fn damping(kd: f64) -> Result<CommandPayload, EncodeError> {
 impl<T: Transport> Go2<T> {
     /// Puts a robot behind `transport`.
     pub fn new(transport: T, network: &Go2Network) -> Go2<T> {
+        let LinkSettings { clock, servo_grace_ms, foot_force_n } = network.link_settings();
         Go2 {
             transport,
-            counter: StateCounter::new(network.clock()),
-            servo: ServoGrace::new(network.servo_grace_ms),
-            foot_force_n: network.foot_force_n,
+            counter: StateCounter::new(clock),
+            servo: ServoGrace::new(servo_grace_ms),
+            foot_force_n,
             newest: None,
             damping: None,
             waits: false,

@@ -6,6 +6,7 @@ use nix::ifaddrs::getifaddrs;
 use nix::net::if_::InterfaceFlags;
 
 use crate::robot::description::{DescriptionError, RobotFiles};
+use crate::robot::link_settings::LinkSettings;
 use crate::robot::state_counter::StateClock;
 
 /// Largest DDS domain whose ports exist.
@@ -17,7 +18,7 @@ const LARGEST_DOMAIN: u16 = 232;
 pub struct Go2Network {
     /// DDS domain.
     pub domain: u16,
-    /// Go2Network interface to the robot, or its IPv4 address; empty: the only one in `subnet`.
+    /// Network interface to the robot, or its IPv4 address; empty: the only one in `subnet`.
     pub interface: String,
     /// Addresses of the robot's network, as ADDRESS/BITS.
     pub subnet: String,
@@ -77,26 +78,17 @@ impl Go2Network {
         if parse_subnet(&network.subnet).is_none() {
             return Err(files.invalid("dds.subnet", network.subnet, "give ADDRESS/BITS, for example 192.168.123.0/24"));
         }
-        let times = [
-            ("dds.state_period_ms", network.state_period_ms, 1..=20, "give 1 to 20 milliseconds"),
-            ("dds.restart_ms", network.restart_ms, 20..=10_000, "give 20 to 10000 milliseconds"),
-            ("dds.servo_grace_ms", network.servo_grace_ms, 0..=2000, "give 0 to 2000 milliseconds"),
-        ];
-        for (key, ms, range, remedy) in times {
-            if !range.contains(&ms) {
-                return Err(files.invalid(key, format!("{ms} ms"), remedy));
-            }
-        }
-        let force = network.foot_force_n;
-        if !(0.01..=100.0).contains(&force) {
-            return Err(files.invalid("dds.foot_force_n", format!("{force} N"), "give 0.01 to 100 N a count"));
-        }
+        network.link_settings().check(files, "dds")?;
         Ok(Some(network))
     }
 
-    /// Returns how the robot's clock is read.
-    pub fn clock(&self) -> StateClock {
-        StateClock { state_period_ms: self.state_period_ms, restart_ms: self.restart_ms }
+    /// Returns the settings that every robot has.
+    pub fn link_settings(&self) -> LinkSettings {
+        LinkSettings {
+            clock: StateClock { state_period_ms: self.state_period_ms, restart_ms: self.restart_ms },
+            servo_grace_ms: self.servo_grace_ms,
+            foot_force_n: self.foot_force_n,
+        }
     }
 
     /// Returns the address of the interface to the robot: of `interface`, or of the only one in `subnet`.

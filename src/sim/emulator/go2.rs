@@ -27,9 +27,16 @@ const OWN_GAINS: [f64; 2] = [40.0, 1.0];
 /// Longest wait of a thread until it looks whether the emulator has ended.
 const WAKE: Duration = Duration::from_millis(50);
 
-/// The services' end of an emulator.
+/// The robot's end of one service.
+struct EmulatedService {
+    requests: TopicReader,
+    responses: TopicWriter,
+}
+
+/// The robot's services.
 struct Services {
-    switcher: [Option<(TopicReader, TopicWriter)>; 2],
+    switcher: EmulatedService,
+    sport: EmulatedService,
     /// Active controller; empty if released.
     active: String,
 }
@@ -72,17 +79,12 @@ impl Go2Endpoint {
         let failed = |error: std::io::Error| DdsError::Thread { reason: error.to_string() };
         let hold = JointCommand::hold(lying_rad, OWN_GAINS[0], OWN_GAINS[1]);
         let own_command = convert::low_command(&hold).map(|command| command.bytes().to_vec()).unwrap_or_default();
-        let open = |service| {
-            Ok::<_, DdsError>(Some((
-                robot.reader(&TopicType::request(service))?,
-                robot.writer(&TopicType::response(service))?,
-            )))
-        };
         Ok(Go2Endpoint {
             commands,
             states: robot.writer(&TopicType::low_state())?,
             services: Services {
-                switcher: [open(motion_switcher::SERVICE)?, open(sport::SERVICE)?],
+                switcher: EmulatedService::open(&robot, motion_switcher::SERVICE)?,
+                sport: EmulatedService::open(&robot, sport::SERVICE)?,
                 active: NORMAL.to_owned(),
             },
             own: controller.writer(&TopicType::low_command())?,
@@ -115,47 +117,55 @@ fn take_commands(mut reader: TopicReader, to_robot: &Sender<(EmulatorClient, Vec
     }
 }
 
+impl EmulatedService {
+    fn open(robot: &Participant, name: &str) -> Result<EmulatedService, DdsError> {
+        let requests = robot.reader(&TopicType::request(name))?;
+        Ok(EmulatedService { requests, responses: robot.writer(&TopicType::response(name))? })
+    }
+
+    /// Answers all requests that wait.
+    fn answer(&mut self, mut answer_to: impl FnMut(&RequestMessage) -> ResponseMessage) {
+        while let Some(sample) = self.requests.take() {
+            let Ok(request) = RequestMessage::decode(&sample.payload) else { continue };
+            let response = answer_to(&request);
+            if !request.no_reply {
+                // A lost response is asked for again.
+                let _ = self.responses.write(&response.encode());
+            }
+        }
+    }
+}
+
 impl Services {
     /// Answers all requests that wait.
     fn answer(&mut self) {
-        for index in 0..self.switcher.len() {
-            let Some((mut requests, responses)) = self.switcher[index].take() else { continue };
-            while let Some(sample) = requests.take() {
-                if let Ok(request) = RequestMessage::decode(&sample.payload) {
-                    let response = if index == 0 { self.switch(&request) } else { respond(&request, 0, String::new()) };
-                    if !request.no_reply {
-                        // A lost response is asked for again.
-                        let _ = responses.write(&response.encode());
-                    }
-                }
-            }
-            self.switcher[index] = Some((requests, responses));
-        }
+        self.switcher.answer(|request| switch(&mut self.active, request));
+        self.sport.answer(|request| respond(request, 0, String::new()));
     }
+}
 
-    /// Answers a request to the motion switcher.
-    fn switch(&mut self, request: &RequestMessage) -> ResponseMessage {
-        match request.api {
-            motion_switcher::CHECK_MODE => {
-                let name = serde_json::Value::from(self.active.as_str());
-                respond(request, 0, format!("{{\"form\":\"0\",\"name\":{name}}}"))
-            }
-            motion_switcher::RELEASE_MODE => {
-                self.active.clear();
-                respond(request, 0, String::new())
-            }
-            motion_switcher::SELECT_MODE => {
-                let parameter: serde_json::Value = serde_json::from_str(&request.parameter).unwrap_or_default();
-                let name = parameter.get("name").and_then(|name| name.as_str()).unwrap_or_default();
-                if CONTROLLERS.contains(&name) {
-                    self.active = name.to_owned();
-                    respond(request, 0, String::new())
-                } else {
-                    respond(request, UNKNOWN_NAME, String::new())
-                }
-            }
-            _ => respond(request, UNKNOWN_NAME, String::new()),
+/// Answers a request to the motion switcher, whose active controller is `active`.
+fn switch(active: &mut String, request: &RequestMessage) -> ResponseMessage {
+    match request.api {
+        motion_switcher::CHECK_MODE => {
+            let name = serde_json::Value::from(active.as_str());
+            respond(request, 0, format!("{{\"form\":\"0\",\"name\":{name}}}"))
         }
+        motion_switcher::RELEASE_MODE => {
+            active.clear();
+            respond(request, 0, String::new())
+        }
+        motion_switcher::SELECT_MODE => {
+            let parameter: serde_json::Value = serde_json::from_str(&request.parameter).unwrap_or_default();
+            let name = parameter.get("name").and_then(|name| name.as_str()).unwrap_or_default();
+            if CONTROLLERS.contains(&name) {
+                name.clone_into(active);
+                respond(request, 0, String::new())
+            } else {
+                respond(request, UNKNOWN_NAME, String::new())
+            }
+        }
+        _ => respond(request, UNKNOWN_NAME, String::new()),
     }
 }
 

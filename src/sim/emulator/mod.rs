@@ -1,5 +1,5 @@
-//! The simulator served as a Go1 over UDP, or with the feature `go2` as a Go2 over DDS: commands are received, the motors' control law is simulated, states are sent
-//! at 1 kHz, and faults are injected on demand. One [`Emulator::step`] is one millisecond of the robot: called at 1 kHz
+//! The simulator served as a Go1 over UDP, or with the feature `go2` as a Go2 over DDS: commands are received, the motors' control
+//! law is simulated, states are sent at 1 kHz, and faults are injected on demand. One [`Emulator::step`] is one millisecond of the robot: called at 1 kHz
 //! it is a robot in real time, called in turn with a control cycle it repeats bit for bit.
 //!
 //! Unknown properties of the real robot are keys of `[emulator]` in `config/simulator.toml`, with the assumption.

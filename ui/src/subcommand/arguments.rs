@@ -177,19 +177,26 @@ pub struct DdsArguments {
 impl DdsArguments {
     /// Puts the arguments into the settings of a network; refused for one that is not DDS.
     pub fn apply(&self, network: &mut Network) -> Result<(), Failure> {
-        let settings = match (network, &self.interface, self.domain) {
-            (Network::Go2(settings), ..) => settings,
-            (Network::Go1(_), None, None) => return Ok(()),
-            (Network::Go1(_), Some(name), _) => {
-                return Err(Failure::input(format!("--interface {name}: only a Go2 has one; add --robot go2")));
+        match network {
+            Network::Go2(settings) => {
+                settings.domain = self.domain.unwrap_or(settings.domain);
+                if let Some(name) = &self.interface {
+                    settings.interface.clone_from(name);
+                }
+                Ok(())
             }
-            (Network::Go1(_), None, Some(domain)) => {
-                return Err(Failure::input(format!("--domain {domain}: only a Go2 has one; add --robot go2")));
-            }
+            Network::Go1(_) => self.refuse("only a Go2 has one"),
+        }
+    }
+
+    /// Refuses the arguments, if there are any, for `reason`.
+    pub fn refuse(&self, reason: &str) -> Result<(), Failure> {
+        let given = match (&self.interface, self.domain) {
+            (None, None) => return Ok(()),
+            (Some(name), _) => format!("--interface {name}"),
+            (None, Some(domain)) => format!("--domain {domain}"),
         };
-        settings.interface = self.interface.clone().unwrap_or_else(|| settings.interface.clone());
-        settings.domain = self.domain.unwrap_or(settings.domain);
-        Ok(())
+        Err(Failure::input(format!("{given}: {reason}; add --robot go2")))
     }
 }
 

@@ -231,19 +231,11 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
 /// Returns the settings of the network to the robot; none for the simulator, which takes no address.
 fn network(arguments: &ConsoleArguments, files: &RobotFiles, model: &str) -> Result<Option<Network>, Failure> {
     let Machine::Robot(robot) = arguments.robot else {
-        let DdsArguments { interface, domain } = &arguments.dds;
-        return match (&arguments.address, interface, domain) {
-            (None, None, None) => Ok(None),
-            (Some(text), ..) => {
-                Err(Failure::input(format!("--address {text}: the simulator has none; add --robot go1")))
-            }
-            (_, Some(name), _) => {
-                Err(Failure::input(format!("--interface {name}: the simulator has none; add --robot go2")))
-            }
-            (.., Some(domain)) => {
-                Err(Failure::input(format!("--domain {domain}: the simulator has none; add --robot go2")))
-            }
-        };
+        if let Some(text) = &arguments.address {
+            return Err(Failure::input(format!("--address {text}: the simulator has none; add --robot go1")));
+        }
+        arguments.dds.refuse("the simulator has none")?;
+        return Ok(None);
     };
     let mut network = robot.network(files, model)?;
     match (&arguments.address, &mut network) {
