@@ -109,6 +109,23 @@ fn a_verdict_can_be_undone_until_the_next_trial_begins() {
     assert!(experiment.undo().is_err(), "the verdict was told when the next trial began");
 }
 
+/// Regression: the count of judged trials and the best kept the verdict that was taken back.
+#[test]
+fn an_undone_verdict_is_neither_counted_nor_the_best() {
+    let mut experiment = experiment(5);
+    let first = accept(&mut experiment);
+    accept(&mut experiment);
+    experiment.take_records();
+    experiment.undo().unwrap();
+    let records = experiment.take_records();
+    let counted = records.iter().rev().find_map(|record| match record {
+        Record::Search(search) => Some(search.counted),
+        _ => None,
+    });
+    assert_eq!((counted, experiment.counted()), (Some(1), 1));
+    assert_eq!(experiment.best().map(|best| best.trial), Some(first.trial));
+}
+
 #[test]
 fn a_trial_in_which_nothing_was_measured_cannot_be_accepted_without_a_hand_measured_value() {
     let mut experiment = experiment(5);

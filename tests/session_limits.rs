@@ -102,9 +102,10 @@ fn voiding_a_tripped_limit_needs_a_reason_that_is_kept() {
         assert_eq!(experiment.under_review().cloned(), before, "a refusal changes nothing");
         experiment.void_because("the tether held it", rerun).unwrap();
         let row = experiment.row(spec.trial).unwrap();
+        let by = if rerun { "re-run by the operator" } else { "by the operator" };
         assert_eq!((row.verdict, row.value), (Some(Verdict::Void), None));
         assert!(
-            row.cause.starts_with("by the operator: the tether held it; looked like fall: limit: "),
+            row.cause.starts_with(&format!("{by}: the tether held it; looked like fall: limit: ")),
             "{}",
             row.cause
         );

@@ -66,7 +66,7 @@ impl<R: Robot> Rollout<R> {
                 Event::TrialEnded { end, .. } => Some(end),
                 Event::Refused { because: CommandRefusal::Inhibited(inhibit), .. } => Some(TrialEnd::NotReady(inhibit)),
                 Event::Refused { .. } => Some(TrialEnd::Cancelled),
-                Event::Mode { .. } => None,
+                Event::Mode { .. } | Event::SetUpright => None,
             });
             if let Some(end) = ended {
                 return (end, &self.ticks);

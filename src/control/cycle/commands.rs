@@ -16,8 +16,6 @@ impl Cycle {
             Command::SitDown => Trigger::SitDown,
             Command::RunTrial(..) => Trigger::Approve,
             Command::Cancel => Trigger::Cancel,
-            // The verdict on a fall acknowledges it; the robot still has to be armed again.
-            Command::EndReview if matches!(self.cause, TransitionCause::Fell(_)) => Trigger::Acknowledge,
             Command::EndReview => Trigger::EndReview,
             Command::Acknowledge { .. } => Trigger::Acknowledge,
             // No trigger: the mode changes when the robot answers.
@@ -62,7 +60,9 @@ impl Cycle {
                 self.estimate();
                 if self.needs_placing() {
                     let lying = Placement { joint_position: self.settings.lying_position, lying: true, seed: 0 };
-                    self.place(robot, &lying);
+                    if self.place(robot, &lying) {
+                        self.events.push(Event::SetUpright);
+                    }
                 }
             }
             _ => {}

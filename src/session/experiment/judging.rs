@@ -73,7 +73,8 @@ impl Experiment {
         let repeats = self.plan.control.repeats;
         if let Some(suggested) = row.suggested.filter(|suggested| *suggested != verdict) {
             let given = if reason.is_empty() { String::new() } else { format!(": {reason}") };
-            row.cause = format!("by the operator{given}; looked like {}: {}", suggested.name(), row.cause);
+            let by = if rerun { "re-run by the operator" } else { "by the operator" };
+            row.cause = format!("{by}{given}; looked like {}: {}", suggested.name(), row.cause);
         } else if !reason.is_empty() {
             row.cause = format!("by the operator: {reason}; {}", row.cause);
         }
@@ -127,6 +128,7 @@ impl Experiment {
         self.rows.insert(trial, row);
         self.publish_row(trial);
         self.enter(ExperimentState::Review(trial), trial);
+        self.publish_model(trial);
         Ok(())
     }
 

@@ -203,6 +203,11 @@ impl Experiment {
         self.rows.values().filter(counts).count() as u32
     }
 
+    /// Returns the unit of the objective.
+    pub fn unit(&self) -> &'static str {
+        self.plan.control.unit(self.plan.task)
+    }
+
     /// Returns the number of trials that are to count.
     pub fn budget(&self) -> u32 {
         self.plan.budget

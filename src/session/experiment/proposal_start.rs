@@ -230,6 +230,15 @@ impl Experiment {
         }
     }
 
+    /// Publishes the search and the model's predictions without a verdict that was taken back; `trial` waits for another.
+    pub fn publish_model(&mut self, trial: u32) {
+        let study = self.study.fork();
+        let model = study.predict();
+        self.model_best = model.best;
+        self.publish_search(&study);
+        self.outbox.push(Record::Insight(ProposalInsight { trial, ..model_insight(&model) }));
+    }
+
     /// Returns a revision that no proposal had.
     pub fn next_revision(&mut self) -> u32 {
         self.revisions += 1;

@@ -43,6 +43,23 @@ impl Experiment {
         Ok(())
     }
 
+    /// Returns in words what the operator has changed in the proposal, with units.
+    pub fn overrides_in_words(&self) -> String {
+        let Some(proposal) = self.proposal() else { return String::new() };
+        let units: Vec<&ParameterInfo> = self.plan.parameters.iter().chain(&self.plan.gains).collect();
+        let changed = proposal.parameters.iter().chain(&proposal.gains).filter(|p| p.value != p.proposed);
+        let words: Vec<String> = changed
+            .map(|p| {
+                let unit = units.iter().find(|info| info.name == p.name).map_or("", |info| &info.unit);
+                format!("{} {} {unit}", p.name, six_digits(p.value)).trim_end().to_owned()
+            })
+            .collect();
+        match words.is_empty() {
+            true => "as it was proposed".to_owned(),
+            false => format!("trial {} will run with {}", proposal.trial, words.join(", ")),
+        }
+    }
+
     fn change_open(&mut self) -> Result<&mut OpenProposal, RequestRefusal> {
         match &mut self.state {
             ExperimentState::Proposed(open) => Ok(open),

@@ -99,7 +99,7 @@ impl Supervisor {
                 self.respond(&stamped, asker, answer, time_ns);
             }
             (JobPurpose::Request(stamped, asker), JobOutput::Judged(answer, over)) => {
-                let ended = if over { self.end_review() } else { Ok(()) };
+                let ended = if over { self.end_review(asker) } else { Ok(()) };
                 self.respond(&stamped, asker, ended.and(answer), time_ns);
             }
             (JobPurpose::Approve(stamped, asker, state), JobOutput::Approved(approved)) => {

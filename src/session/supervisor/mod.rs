@@ -22,7 +22,7 @@ use crate::realtime::scheduling::{DeniedSetting, RealtimeSetting};
 use crate::recording::record::{ArmingCheckRecord, LogLevel, LogRecord, Record, SessionInfo, Stamped, Transition};
 use crate::recording::recorder::{CollectedTicks, RecorderWatch, TrialTicks};
 use crate::telemetry::{Command, CommandRefusal, Event, Mode, TransitionCause, TrialEnd};
-use crate::trial::ExperimentStage;
+use crate::trial::{Approval, ExperimentStage};
 use unattended::Unattended;
 use unfinished::{Asker, JobPurpose, UnfinishedJob};
 
@@ -388,6 +388,11 @@ impl Supervisor {
             Event::TrialEnded { trial, ticks, end } => {
                 self.log_limit(trial, &end, time_ns);
                 self.ended = Some(Ended { trial, end, ticks, time_ns });
+            }
+            Event::SetUpright => {
+                let message = "the simulated robot lay fallen: it was turned upright; a real one is turned by hand";
+                let level = if self.unattended.approval == Approval::Auto { LogLevel::Info } else { LogLevel::Warning };
+                self.log(level, message.to_owned(), time_ns);
             }
             Event::Refused { command, mode, because } => {
                 let message = format!("the control thread refused {command} while {}: {because}", mode.name());

@@ -144,10 +144,15 @@ impl Supervisor {
         Permit { mode_changes: self.mode_changes, given_ns: stamped.time_ns }
     }
 
-    /// Ends the review: a standing robot is ready again, a fallen one is disarmed.
-    pub(super) fn end_review(&mut self) -> Result<(), String> {
-        let fallen = self.mode == Mode::Damped && matches!(self.cause, TransitionCause::Fell(_));
-        if self.mode == Mode::Review || fallen { self.command(Command::EndReview) } else { Ok(()) }
+    /// Ends the review: a standing robot is ready again. A person acknowledges a fall like any other stop; the automatic rule
+    /// does it with its verdict, and leaves a STOP after the fall set.
+    pub(super) fn end_review(&mut self, asker: Asker) -> Result<(), String> {
+        let fell = self.mode == Mode::Damped && matches!(self.cause, TransitionCause::Fell(_));
+        match self.mode {
+            Mode::Review => self.command(Command::EndReview),
+            _ if fell && asker == Asker::Rule => self.command(Command::Acknowledge { stops: 0 }),
+            _ => Ok(()),
+        }
     }
 }
 

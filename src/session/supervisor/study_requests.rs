@@ -36,15 +36,15 @@ fn change(experiment: &mut Experiment, request: &OperatorRequest) -> Result<Stri
         }
         OperatorRequest::Override { parameter, value } => {
             experiment.set_parameter(parameter, *value)?;
-            format!("{parameter} will be {}", six_digits(*value))
+            experiment.overrides_in_words()
         }
         OperatorRequest::ClearOverrides => {
             experiment.clear_overrides()?;
-            "as it was proposed".to_owned()
+            experiment.overrides_in_words()
         }
         OperatorRequest::OverrideGain { gain, value } => {
             experiment.set_gain(gain, *value)?;
-            format!("{gain} will be {} in this trial", six_digits(*value))
+            experiment.overrides_in_words()
         }
         OperatorRequest::Fix { parameter, value, trials } => {
             experiment.fix(parameter, *value, *trials)?;
@@ -80,7 +80,9 @@ fn change(experiment: &mut Experiment, request: &OperatorRequest) -> Result<Stri
         OperatorRequest::HandValue(value) => {
             experiment.set_hand_value(*value)?;
             match value {
-                Some(value) => format!("{} counts instead of the measured value", six_digits(*value)),
+                Some(value) => {
+                    format!("{} {} counts instead of the measured value", six_digits(*value), experiment.unit())
+                }
                 None => "the measured value counts".to_owned(),
             }
         }
