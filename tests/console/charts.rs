@@ -8,7 +8,7 @@ use quadfrog::telemetry::{Snapshot, Tick};
 use quadfrog_console::message::Msg;
 use quadfrog_console::settings::{ConsoleSettings, DEFAULT};
 use quadfrog_console::theme::{Colours, Glyphs, Theme};
-use support::{Console, assert_shows, line_with, tick};
+use support::{Console, assert_shows, tick};
 
 /// A console whose charts are these.
 fn charting(series: &[&str]) -> Console {
@@ -136,11 +136,17 @@ fn a_wide_chart_has_ticks_on_both_axes() {
 }
 
 #[test]
-fn a_narrow_chart_keeps_its_range_in_the_heading() {
-    let mut console = charting(&["roll", "pitch"]);
+fn every_chart_of_the_smallest_terminal_has_a_scale() {
+    let mut console = charting(&["roll", "pitch", "FR foot z", "FL foot z", "RR foot z", "RL foot z"]);
     (0..400).for_each(|step| drop(console.update(Msg::Tick(Box::new(distinct(5 * step))))));
     let screen = console.screen(80, 24);
-    assert!(line_with(&screen, "roll ").contains("±0.25"), "{screen}");
+    let lines: Vec<&str> = screen.lines().collect();
+    for series in ["roll", "pitch", "FR foot z", "FL foot z", "RR foot z", "RL foot z"] {
+        let row = lines.iter().position(|line| line.contains(series)).expect("its heading");
+        let column = lines[row][..lines[row].find(series).expect("its heading")].chars().count();
+        let axis: String = lines[row + 1].chars().skip(column).take(5).collect();
+        assert!(axis.trim().parse::<f64>().is_ok(), "{series} has no scale: `{axis}`\n{screen}");
+    }
 }
 
 #[test]

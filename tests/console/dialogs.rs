@@ -2,13 +2,13 @@
 
 mod support;
 
-use quadfrog::recording::record::{ArmingCheckRecord, Record};
+use quadfrog::recording::record::{ArmingCheckRecord, Record, SessionInfo};
 use quadfrog::telemetry::{ArmingCheck, ArmingCheckState, Mode};
-use quadfrog::trial::Verdict;
+use quadfrog::trial::{Backend, Verdict};
 use quadfrog_console::message::{Effect, ExportedRows};
 use quadfrog_console::text::{as_csv, as_markdown};
 use strum::VariantArray;
-use support::{Console, assert_shows, trial};
+use support::{Console, assert_shows, session, trial};
 
 const SENTENCE: &str = "no person within 2 m of the robot, the remote control in the hand of the operator, and its stop \
                         combination known to everybody who is in the room and who has read the page on safe handling";
@@ -16,6 +16,7 @@ const SENTENCE: &str = "no person within 2 m of the robot, the remote control in
 /// Every check with a long sentence, as hardware has them.
 fn long_checks() -> Console {
     let mut console = Console::proposed();
+    console.record(Record::Session(SessionInfo { backend: Some(Backend::Hardware), ..session() }));
     let item = |check: &ArmingCheck| ArmingCheckRecord {
         check: *check,
         found: String::new(),

@@ -5,7 +5,7 @@ mod support;
 use quadfrog::recording::record::Record;
 use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::telemetry::{Mode, Phase, Snapshot, Tick};
-use quadfrog::trial::{ExperimentStage, Verdict};
+use quadfrog::trial::{ExperimentStage, TrialRecord, Verdict};
 use quadfrog_console::message::{Effect, Msg, ReplayStatus};
 use quadfrog_console::theme::Role;
 use ratatui::buffer::Cell;
@@ -39,10 +39,12 @@ fn landed(after_ms: u64) -> Console {
     console
 }
 
-/// The letters of a phase in the line under the charts.
-fn columns_of(screen: &str, letter: char) -> usize {
-    let line = screen.lines().find(|line| line.contains("iii")).unwrap_or_default();
-    line.chars().filter(|c| *c == letter).count()
+/// The columns of impulse and flight in the line under the charts; none without a jump in it.
+fn impulse_and_flight(screen: &str) -> Option<(usize, usize)> {
+    let line = screen.lines().find(|line| line.contains("flight"))?;
+    let column = |name: &str| line.find(name).map(|at| line[..at].chars().count());
+    let (impulse, flight, landing) = (column("i")?, column("flight")?, column("landing")?);
+    Some((flight - impulse, landing - flight))
 }
 
 #[test]
@@ -58,17 +60,18 @@ fn the_landed_trial_stays_on_the_charts_until_its_verdict() {
         console.stage(ExperimentStage::Proposed, 2);
         let judged = console.screen(size.0, size.1);
         assert!(!judged.contains("TRIAL #1") && judged.contains(" 8 s sweep"), "{judged}");
-        assert_eq!(columns_of(&judged, 'i'), 0, "the jump left the live charts long ago:\n{judged}");
+        assert_eq!(impulse_and_flight(&judged), None, "the jump left the live charts long ago:\n{judged}");
     }
 }
 
-/// The impulse takes 0.2 s of 1.5 s: of two columns of charts over 80 columns it takes five each.
+/// The impulse takes 0.2 s of 1.5 s and the flight 0.3 s: of the 34 columns of the left charts over 80 columns four and seven.
 #[test]
 fn the_jump_fills_the_charts_and_at_80_columns_these_the_terminal() {
     let screen = landed(20_000).screen(80, 24);
-    let line = screen.lines().find(|line| line.contains("iii")).unwrap_or_default();
-    assert!(columns_of(&screen, 'i') >= 5 && columns_of(&screen, 'f') >= 7, "{screen}");
-    assert!(line.chars().count() >= 79, "the letters end at the right edge of the terminal: {line}");
+    let (impulse, flight) = impulse_and_flight(&screen).unwrap_or_else(|| panic!("no phases:\n{screen}"));
+    assert!((4..=5).contains(&impulse) && (6..=8).contains(&flight), "{impulse} and {flight} columns:\n{screen}");
+    // The description under the right charts covers no name.
+    assert_shows(&line_with(&screen, "flight"), &["landing", "#1, #0 under it, -0.3 to +1.2 s"]);
     assert_shows(&screen, &["suggested verdict: accept", "rise", "#", "verdict"]);
 }
 
@@ -160,7 +163,7 @@ fn the_countdown_counts_in_large_digits_with_the_bell() {
 }
 
 #[test]
-fn accepting_a_suggested_fall_asks_once_more() {
+fn accepting_what_was_not_suggested_asks_once_more() {
     let accept = [OperatorRequest::Judge(Verdict::Accept)];
     for mode in [Mode::Review, Mode::Damped, Mode::Disarmed] {
         let mut console = Console::review(mode, Verdict::Fall);
@@ -174,8 +177,78 @@ fn accepting_a_suggested_fall_asks_once_more() {
         }
         assert_eq!(console.requests(&["f"]), [OperatorRequest::Judge(Verdict::Fall)]);
     }
+    let mut console = Console::review(Mode::Damped, Verdict::Void);
+    assert_eq!(console.requests(&["a"]), []);
+    let screen = console.screen(80, 24);
+    assert_shows(
+        &screen,
+        &["Accept a void trial?", "The suggested verdict of trial #0 is void", "void hides the trial"],
+    );
+    assert_eq!(console.requests(&["y"]), accept);
     let mut console = Console::review(Mode::Review, Verdict::Accept);
     assert_eq!(console.requests(&["a"]), accept, "a suggested accept needs one key");
+}
+
+/// Regression: a cancelled countdown offered to accept the trial, and the session refused it.
+#[test]
+fn a_trial_without_a_value_cannot_be_accepted_before_one_is_given() {
+    let mut console = Console::review(Mode::Review, Verdict::Void);
+    console.record(Record::Trial(TrialRecord { measured: None, ..trial(0, None, Some(Verdict::Void)) }));
+    assert!(!console.screen(120, 40).contains("a accept"), "it is not offered");
+    assert_eq!(console.requests(&["a"]), []);
+    assert_shows(console.said(), &["a is not possible: nothing was measured: = gives a value measured by hand"]);
+    assert!(console.model.dialog.is_none());
+}
+
+/// Regression: 99 m for a jump was taken without a question, and became the best of the study.
+#[test]
+fn a_value_by_hand_far_from_the_measured_one_is_asked_about() {
+    for (typed, value) in [("99", 99.0), ("-5", -5.0), ("0.042", 0.042), ("4.2", 4.2)] {
+        let mut console = Console::review(Mode::Review, Verdict::Accept);
+        console.press(&["="]);
+        console.enter(typed);
+        assert_eq!(console.requests(&["Enter"]), [], "{typed}");
+        let text = format!("Trial #0: {value} m by hand, but the robot measured 0.420 m.");
+        assert_shows(&console.screen(80, 24), &["Is this value right?", &text, "Press y to use the value"]);
+        assert_eq!(console.requests(&["n"]), []);
+        console.press(&["="]);
+        console.enter(typed);
+        assert_eq!(console.requests(&["Enter", "y"]), [OperatorRequest::HandValue(Some(value))]);
+    }
+    let mut console = Console::review(Mode::Review, Verdict::Accept);
+    console.press(&["="]);
+    console.enter("0.45");
+    assert_eq!(console.requests(&["Enter"]), [OperatorRequest::HandValue(Some(0.45))], "a tape measure's correction");
+}
+
+/// Regression: after an undone verdict the header said READY while the trial waited for its verdict.
+#[test]
+fn a_standing_robot_with_a_trial_to_judge_is_in_review() {
+    let console = Console::review(Mode::Ready, Verdict::Accept);
+    assert!(console.screen(80, 24).starts_with(" REVIEW "), "{}", console.screen(80, 24));
+    let console = Console::review(Mode::Disarmed, Verdict::Accept);
+    assert!(console.screen(80, 24).starts_with(" DISARMED "), "a robot that lies is disarmed in any case");
+}
+
+/// Regression: a jump that leaves the ground while its impulse acts showed no flight, although its time in the air was given.
+#[test]
+fn the_flight_on_the_charts_is_that_of_the_feet() {
+    let mut console = Console::ready();
+    console.stage(ExperimentStage::Running, 0);
+    for time_ms in (0..2_200).step_by(5) {
+        let phase = if time_ms < 1_000 { Phase::Stance } else { Phase::Impulse };
+        let mut tick = tick(1_000 + time_ms, 0.0, Some((0, time_ms as f64 / 1e3 - 1.0, phase)));
+        // The feet flicker for 10 ms, too short for a flight.
+        let airborne = matches!(time_ms, 1_050..1_060 | 1_200..1_600);
+        tick.estimate.contact = [!airborne; 4];
+        console.tick(tick);
+    }
+    console.record(Record::Trial(trial(0, None, Some(Verdict::Accept))));
+    console.stage(ExperimentStage::Review, 0);
+    let screen = console.screen(80, 24);
+    let line = screen.lines().find(|line| line.contains("flight")).unwrap_or_else(|| panic!("no flight:\n{screen}"));
+    let (flight, landing) = (line.find("flight"), line.find("landing"));
+    assert!(flight < landing && line.find('i') < flight, "impulse, flight, landing: {line}");
 }
 
 #[test]
@@ -211,7 +284,7 @@ fn the_verdict_of_a_selected_row_is_changed_with_a_reason() {
     assert_eq!(console.requests(&["f"]), []);
     assert_shows(console.said(), &["no trial waits for a verdict; in Trials, select a judged one"]);
     console.press(&["2", "Up", "a"]);
-    assert_shows(console.said(), &["accept: trial 0 is accept already"]);
+    assert_shows(console.said(), &["a is not possible: trial 0 is accept already"]);
     console.press(&["f"]);
     assert_shows(&console.screen(80, 24), &["Trial #0: accept becomes fall. Why?", "the journal keeps the"]);
     assert_eq!(console.requests(&["Enter"]), [], "a change needs a reason");

@@ -11,7 +11,6 @@ use std::time::Duration;
 use portable_pty::CommandBuilder;
 use pty::Session;
 
-const UP: &str = "\x1b[A";
 const DOWN: &str = "\x1b[B";
 const ESCAPE: &str = "\x1b";
 
@@ -77,9 +76,9 @@ fn judge_as_suggested(session: &mut Session, trial: u32) {
 fn override_by(session: &mut Session, [f0, fx, fz]: [&str; 3]) {
     session.send("o");
     session.wait_for(&["Override trial"]);
-    // It begins with the row of the last override.
-    session.send(&format!("{UP}{UP}{f0}{DOWN}{fx}{DOWN}{fz}\r"));
-    session.wait_for(&[&format!("override Fz = {fz}: Fz will be {fz}")]);
+    session.send(&format!("{f0}{DOWN}{fx}{DOWN}{fz}\r"));
+    let f0 = f0.replace(',', ".");
+    session.wait_for(&[&format!("will run with f0 {f0} Hz, Fx {fx} N, Fz {fz} N")]);
 }
 
 #[test]
@@ -97,7 +96,7 @@ fn a_study_with_every_mistake_of_the_review_is_complete() {
     session.wait_for(&["Press g twice", "Trial #0, by the sampler"]);
     // Suspending an armed robot is refused.
     session.send("\x1a");
-    session.wait_for(&["suspend: "]);
+    session.wait_for(&["Ctrl-Z is not possible: "]);
 
     // The jump stays on the charts while the operator measures; a note with spaces stops no robot.
     let trial = jump(&mut session);
@@ -117,7 +116,9 @@ fn a_study_with_every_mistake_of_the_review_is_complete() {
     session.send("0.235m\r");
     session.wait_for(&["a character was not taken; Enter again confirms 0.235"]);
     session.send("\r");
-    session.wait_until("the field closes", || !session.screen().contains("measured by hand"));
+    session.wait_for(&["0.235 m by hand, but the robot measured"]);
+    session.send("y");
+    session.wait_for(&["0.235 m counts instead of the measured value"]);
     judge(&mut session, trial, "a");
 
     // The first override; a point that is queued twice is said to be, and one of both is removed again.
@@ -153,6 +154,12 @@ fn a_study_with_every_mistake_of_the_review_is_complete() {
     session.wait_for(&["cancelled: not accepted"]);
     judge(&mut session, trial, "f");
     let fell = trial;
+    // A verdict acknowledges nothing, and the simulator says that it turns the robot over.
+    session.wait_for(&[" DAMPED", "k acknowledges"]);
+    session.send("k");
+    session.wait_for(&["Press A to arm"]);
+    session.send("A");
+    session.wait_for(&["the simulated robot lay fallen"]);
 
     // A re-run; the terminal shrinks and grows meanwhile.
     let trial = jump(&mut session);

@@ -47,7 +47,7 @@ const LIVE: &[Row] = &[
     row(Action::TakeControl, "L", Shows("the simulator is under control"), ("", "")),
     row(Action::Override, "o", Shows("Override trial #0"), ("\x1b[B120\r", "was 106.2")),
     row(Action::ClearOverrides, "O", Hides("was 106.2"), ("", "")),
-    row(Action::ArmingChecks, "P", Shows("Arming checks: all passed"), ("\x1b", "Press A to arm")),
+    row(Action::ArmingChecks, "P", Shows("Arming checks: 3 passed"), ("\x1b", "Press A to arm")),
     row(Action::Skip, "n", Shows("Skip the proposal?"), ("y", "skipped; a new proposal follows")),
     row(Action::Suspend, "Ctrl-Z", Suspends, ("", "Press A to arm")),
     row(Action::Arm, "A", Shows("STAND UP"), ("", "READY")),

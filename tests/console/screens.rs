@@ -86,7 +86,8 @@ fn a_compact_terminal_shows_the_trial_the_answer_and_the_next_step_whole() {
         let mut console = Console::ready();
         console.model.size = (columns, rows);
         let long = "a long answer, of which no word may be missing: ".repeat(2) + "the end";
-        console.model.message = Some(Notice { level: LogLevel::Warning, text: long.clone(), stop: false });
+        console.model.message =
+            Some(Notice { level: LogLevel::Warning, text: long.clone(), stop: false, at: console.model.clock });
         let screen = console.screen(columns, rows);
         assert_shows(
             &screen,
@@ -170,7 +171,7 @@ fn a_sweeping_chart_changes_only_near_its_cursor() {
 }
 
 #[test]
-fn a_jump_is_marked_in_letters_under_the_charts() {
+fn the_phases_of_a_jump_are_named_under_the_charts() {
     let mut console = Console::ready();
     for time_ms in (0..7_000).step_by(5) {
         let jump = match time_ms {
@@ -183,7 +184,7 @@ fn a_jump_is_marked_in_letters_under_the_charts() {
         console.tick(tick(time_ms, 0.0, trial));
     }
     let screen = console.screen(120, 40);
-    assert!(screen.lines().any(|line| line.contains("iif") && line.contains("ffl")), "{screen}");
+    assert!(screen.lines().any(|line| line.contains("i─f─l")), "{screen}");
 }
 
 #[test]

@@ -83,7 +83,7 @@ fn a_parameter_is_fixed_for_some_trials_and_searched_again() {
     assert!(line_with(&screen, "Fx  ").contains("fixed at 75.00, 3 more"), "{screen}");
     assert!(line_with(&screen, "  X  ").contains("search Fx again"), "{screen}");
     assert_eq!(console.requests(&["X"]), [OperatorRequest::Unfix { parameter: "Fx".into() }]);
-    let refusals = [("0", "is not a number of trials"), ("-1", "was not taken"), ("many", "was not taken")];
+    let refusals = [("0", "is not a number of trials"), ("-1", "was not taken"), ("many", "nothing was typed yet")];
     for (wrong, refusal) in refusals {
         let mut console = overriding();
         console.press(&["X", "Backspace"]);
@@ -152,9 +152,9 @@ fn the_search_cannot_be_changed_while_a_trial_is_under_way() {
     // Gains are not searched.
     let mut console = overriding();
     console.press(&["End", "X"]);
-    assert_eq!(console.said(), "fix: gains are not searched");
+    assert_eq!(console.said(), "X is not possible: gains are not searched");
     console.press(&["1", "B"]);
-    assert_eq!(console.said(), "bounds: only in the view Override");
+    assert_eq!(console.said(), "B is not possible: only in the view Override");
 }
 
 fn insight() -> ProposalInsight {
@@ -191,7 +191,8 @@ fn densities_say_why_a_point_was_proposed_without_colours_too() {
             let at = screen.lines().skip_while(|line| !line.contains("TPE ")).skip(1);
             at.filter_map(|line| line.find(letter).map(|at| line[..at].chars().count()).filter(|at| *at < width)).next()
         };
-        let (good, rest) = (letter("good").expect("good"), letter("rest").expect("rest"));
+        let (good, rest) = (letter("g").expect("good"), letter("r").expect("rest"));
+        assert_shows(&line_with(&screen, "o accept  x"), &["g good", "r rest"]);
         assert!(good < width / 2 && rest > width / 2, "{good}, {rest} of {width}:\n{screen}");
         assert!(letter("│").expect("the proposal") < width / 2, "{screen}");
     }
@@ -206,7 +207,7 @@ fn before_the_first_trials_both_densities_are_the_prior() {
     console.record(Record::Insight(insight));
     console.press(&["3"]);
     let screen = console.screen(120, 40);
-    assert!(screen.contains("good = rest") && !screen.contains("importance"), "{screen}");
+    assert!(screen.contains("g=r") && !screen.contains("importance"), "{screen}");
 }
 
 #[test]
@@ -250,8 +251,14 @@ fn the_signs_of_the_optimizer_are_explained_at_every_size() {
         let mut console = Console::proposed();
         console.judged(4);
         console.press(&["3"]);
-        let signs = ["o accept", "x fall", "v void", "? not judged", "* best", "─ best so far", "│ proposal"];
+        let signs = ["o accept", "x fall", "v void", "* best", "│ proposal", "─ best so far"];
         assert_shows(&line_with(&console.screen(columns, rows), "o accept  x"), &signs);
+        console.record(Record::Insight(insight()));
+        console.record(Record::Trial(trial(4, None, Some(Verdict::Accept))));
+        let legend = line_with(&console.screen(columns, rows), "o accept  x");
+        assert_shows(&legend, &[&signs[..5], &["? not judged", "g good", "r rest"]].concat());
+        let last = legend.split("  ").last().unwrap_or_default();
+        assert!(["r rest", "─ best so far"].contains(&last.trim()), "a sign is whole or left out: {legend}");
     }
 }
 

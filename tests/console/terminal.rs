@@ -234,7 +234,7 @@ fn suspending_gives_the_terminal_back_and_continuing_takes_it() {
     session.send("A");
     session.wait_for(&["Press g twice"]);
     session.signal(Signal::SIGTSTP);
-    session.wait_for(&["suspend: the robot is armed"]);
+    session.wait_for(&["Ctrl-Z is not possible: the robot is armed"]);
     session.send("qy");
     assert!(session.wait().success());
     assert!(session.restored() && session.cooked());

@@ -67,7 +67,14 @@ fn a_field_of_a_number_takes_no_other_characters_and_says_so() {
     // A refused character leaves the selected default as it is.
     assert_eq!(console.requests(&["C", "x", "Enter", "Enter"]), [OperatorRequest::Continue(20)]);
     let mut console = Console::review(Mode::Review, Verdict::Accept);
-    assert_eq!(console.requests(&["=", "0", ",", "2", "Enter"]), [OperatorRequest::HandValue(Some(0.2))]);
+    assert_eq!(console.requests(&["=", "0", ",", "3", "Enter"]), [OperatorRequest::HandValue(Some(0.3))]);
+    // With nothing typed there is nothing to confirm.
+    assert_eq!(console.requests(&["=", "x", "Enter"]), []);
+    assert_shows(&console.screen(80, 24), &["nothing was typed yet; Esc cancels"]);
+    // The form of the overrides refuses a letter aloud, too.
+    let mut console = Console::ready();
+    assert_eq!(console.requests(&["o", "x"]), []);
+    assert_shows(&console.screen(80, 24), &["`x` does not belong here: a number is typed"]);
 }
 
 #[test]

@@ -93,7 +93,7 @@ fn sweep_and_scroll_draw_the_same_samples_at_different_places() {
     console.press(&["w"]);
     let scroll = console.screen(120, 40);
     assert!(sweep.contains("8 s sweep") && scroll.contains("8 s scroll"));
-    let newest = |screen: &str| line_with(screen, "fll").find("fll");
+    let newest = |screen: &str| line_with(screen, "f─l").find("f─l");
     assert!(newest(&sweep) < newest(&scroll), "a jump just seen is at the right edge when scrolling:\n{scroll}");
 }
 
@@ -307,7 +307,14 @@ fn details_show_all_values_of_a_trial() {
     let screen = console.screen(80, 24);
     assert_shows(
         &screen,
-        &["Trial #0", "void", "suggested", "fall: roll 1.200 rad exceeds 1.000 rad", "75.00000 N", "slid on the mat"],
+        &[
+            "Trial #0",
+            "void",
+            "suggested      fall",
+            "cause          roll 1.200 rad exceeds 1.000 rad",
+            "75.00000 N",
+            "slid on the mat",
+        ],
     );
     console.press(&["Down"]);
     let screen = console.screen(80, 24);

@@ -67,9 +67,12 @@ pub struct Areas {
 /// Most rows of the newest answer to the operator.
 const MESSAGE_ROWS: usize = 3;
 
-/// The newest answer to the operator in rows of a terminal, each with a space before it.
+/// The newest answer to the operator in rows of a terminal, each with a space before it; an old one begins with its age.
 pub fn message_rows(model: &Model, columns: u16) -> Vec<Line<'static>> {
-    let text = model.message.as_ref().map(|message| Line::from(format!(" {}", message.text)));
+    let text = model.message.as_ref().map(|message| match message.age_min(model.clock) {
+        0 => Line::from(format!(" {}", message.text)),
+        minutes => Line::from(format!(" {minutes} min ago: {}", message.text)),
+    });
     text.map_or_else(Vec::new, |text| wrap(&text, usize::from(columns).saturating_sub(1), 1))
 }
 

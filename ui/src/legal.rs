@@ -236,7 +236,10 @@ fn may_clear_overrides(model: &Model) -> Legality {
 fn may_judge(model: &Model, verdict: Verdict) -> Legality {
     may_request(model)?;
     if model.session.stage_is(ExperimentStage::Review) {
-        return Ok(());
+        let value = model.session.under_review().and_then(|row| model.session.value_if_accepted(row));
+        let key = model.keymap.key(Action::HandValue);
+        let reason = format!("nothing was measured: {key} gives a value measured by hand, or judge it otherwise");
+        return require(verdict != Verdict::Accept || value.is_some(), &reason);
     }
     let row = model.selected_trial().filter(|_| model.view == View::Trials);
     let Some((trial, before)) = row.and_then(|row| Some((row.trial, row.verdict?))) else {

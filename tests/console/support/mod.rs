@@ -337,6 +337,7 @@ pub fn tick(time_ms: u64, roll: f64, trial: Option<(u32, f64, Phase)>) -> Tick {
         tick.trial = Some(number);
         tick.trial_time_s = time_s;
         tick.phase = phase;
+        tick.estimate.contact = [phase != Phase::Flight; 4];
     }
     tick
 }

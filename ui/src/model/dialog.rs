@@ -95,8 +95,10 @@ pub enum Dialog {
 pub enum Question {
     /// Refuse this proposal.
     Skip { trial: u32, revision: u32 },
-    /// Accept a trial whose suggested verdict is a fall.
-    AcceptFall { trial: u32 },
+    /// Accept a trial whose suggested verdict is another.
+    AcceptAnyway { trial: u32 },
+    /// Use a value measured by hand that lies far from the robot's own measurement.
+    HandValue { trial: u32, value: f64 },
 }
 
 /// Purpose of a text field. A parameter is its index in the session's list.
@@ -143,7 +145,7 @@ impl Purpose {
             Purpose::HandValue(_) | Purpose::Bounds { .. } => Some("0123456789.,+-e"),
             Purpose::Continue | Purpose::Fix { .. } | Purpose::ConfirmBest | Purpose::TrialNumber => Some("0123456789"),
             Purpose::Beside => Some("0123456789#"),
-            Purpose::Seek => Some("0123456789.,:#"),
+            Purpose::Seek => Some("0123456789.,:#best"),
             Purpose::Note(_)
             | Purpose::VoidReason { .. }
             | Purpose::ChangeVerdict { .. }

@@ -73,6 +73,15 @@ pub struct Notice {
     pub text: String,
     /// Whether it answers the STOP key.
     pub stop: bool,
+    /// When it was shown, on the console's clock.
+    pub at: Duration,
+}
+
+impl Notice {
+    /// Its age in whole minutes at `clock`.
+    pub fn age_min(&self, clock: Duration) -> u64 {
+        clock.saturating_sub(self.at).as_secs() / 60
+    }
 }
 
 /// The robot, its limits and its ground, as far as they are known: by default nothing is.

@@ -52,9 +52,9 @@ impl SessionModel {
         self.trials.records.get(&self.trial_in(ExperimentStage::Review)?)
     }
 
-    /// The trial that waits for its verdict, if its suggested one is a fall.
-    pub fn suggested_fall(&self) -> Option<&TrialRecord> {
-        self.under_review().filter(|trial| trial.suggested == Some(Verdict::Fall))
+    /// The trial that waits for its verdict, if another one than accept is suggested.
+    pub fn not_to_accept(&self) -> Option<&TrialRecord> {
+        self.under_review().filter(|trial| trial.suggested.is_some_and(|verdict| verdict != Verdict::Accept))
     }
 
     /// The proposal that waits for approval.
@@ -138,6 +138,11 @@ impl SessionModel {
 
     pub(crate) fn budget(&self) -> u32 {
         self.search.as_ref().map_or(self.info.budget, |search| search.budget)
+    }
+
+    /// The value that a trial reports if it is accepted: by hand, or else as measured; none without either.
+    pub fn value_if_accepted(&self, trial: &TrialRecord) -> Option<f64> {
+        trial.hand_value.or_else(|| self.measured_objective(trial))
     }
 
     /// The measured objective of a trial, before any verdict.

@@ -22,7 +22,8 @@ use crate::theme::Background;
 /// Performs an action, or reports why it is not possible.
 pub(super) fn perform(model: &mut Model, action: Action) -> Vec<Effect> {
     if let Err(reason) = legal(action, model) {
-        say(model, LogLevel::Warning, format!("{}: {reason}", action.info().name));
+        let key = model.keymap.key(action);
+        say(model, LogLevel::Warning, format!("{key} is not possible: {reason}"));
         // All failed arming checks are shown at once.
         let shown = action == Action::Arm && model.mode() == Mode::Disarmed && model.session.failing_checks() > 0;
         if shown && may_request(model).is_ok() {
@@ -64,9 +65,9 @@ pub(super) fn perform(model: &mut Model, action: Action) -> Vec<Effect> {
         }
         Action::ConfirmBest => open(model, Dialog::field(Purpose::ConfirmBest, "10")),
         Action::ExportBest => return vec![Effect::ExportBest],
-        Action::Accept if model.session.suggested_fall().is_some() => {
-            if let Some(trial) = model.session.suggested_fall().map(|row| row.trial) {
-                open(model, Dialog::Confirm(Question::AcceptFall { trial }));
+        Action::Accept if model.session.not_to_accept().is_some() => {
+            if let Some(trial) = model.session.not_to_accept().map(|row| row.trial) {
+                open(model, Dialog::Confirm(Question::AcceptAnyway { trial }));
             }
         }
         Action::Accept => return judge(model, Verdict::Accept),
@@ -206,8 +207,10 @@ fn open(model: &mut Model, dialog: Dialog) {
 }
 
 fn open_override(model: &mut Model) {
+    // The row that the view Override shows as chosen; elsewhere nothing is.
+    let row = if model.view == View::Override { model.override_row } else { 0 };
     if let Some(proposal) = model.session.open_proposal() {
-        model.dialog = Some(Dialog::Override(OverrideForm::new(proposal, &model.session, model.override_row)));
+        model.dialog = Some(Dialog::Override(OverrideForm::new(proposal, &model.session, row)));
     }
 }
 

@@ -25,8 +25,11 @@ pub(super) fn close_stale_dialog(model: &mut Model) {
             let shown = model.session.open_proposal().map(|p| (p.trial, p.revision));
             shown != Some((*trial, *revision)) || legal(Action::Skip, model).is_err()
         }
-        Some(Dialog::Confirm(Question::AcceptFall { trial })) => {
-            model.session.suggested_fall().is_none_or(|row| row.trial != *trial)
+        Some(Dialog::Confirm(Question::AcceptAnyway { trial })) => {
+            model.session.not_to_accept().is_none_or(|row| row.trial != *trial)
+        }
+        Some(Dialog::Confirm(Question::HandValue { trial, .. })) => {
+            model.session.under_review().is_none_or(|row| row.trial != *trial)
         }
         Some(Dialog::TakeControl) => legal(Action::TakeControl, model).is_err(),
         Some(Dialog::Arm { .. }) => legal(Action::Arm, model).is_err(),
@@ -141,8 +144,12 @@ pub(super) fn apply(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
             model.session.arming_checked_ns = time_ns;
         }
         Record::Search(search) => model.session.search = Some(search),
-        Record::Insight(insight) => {
+        Record::Insight(mut insight) => {
             model.session.trials.model_best = insight.predicted_best().copied();
+            // Without a proposal, as at the end of a study, the reasons for the last one stay, with the number of its trial.
+            if let Some(before) = model.session.insight.take().filter(|_| insight.parameters.is_empty()) {
+                (insight.trial, insight.parameters) = (before.trial, before.parameters);
+            }
             model.session.insight = Some(insight);
         }
         Record::Points(points) => model.session.trials.points = points,

@@ -15,12 +15,12 @@ const INTERRUPT_WINDOW: Duration = Duration::from_secs(2);
 
 /// Shows a line to the operator.
 pub fn say(model: &mut Model, level: LogLevel, text: impl Into<String>) {
-    model.message = Some(Notice { level, text: text.into(), stop: false });
+    model.message = Some(Notice { level, text: text.into(), stop: false, at: model.clock });
 }
 
 /// Answers the STOP key.
 fn say_stop(model: &mut Model, text: &str) {
-    model.message = Some(Notice { level: LogLevel::Warning, text: text.to_owned(), stop: true });
+    model.message = Some(Notice { level: LogLevel::Warning, text: text.to_owned(), stop: true, at: model.clock });
 }
 
 /// Reports that a dialog ended without effect.

@@ -8,6 +8,7 @@ use quadfrog::telemetry::ArmingCheckState;
 use ratatui::text::{Line, Span};
 
 use super::draw::{span, truncate, wall_clock};
+use crate::action::Action;
 use crate::model::Model;
 use crate::theme::Role;
 use crate::wrap::wrap;
@@ -22,16 +23,32 @@ fn label(state: ArmingCheckState) -> (&'static str, Role) {
         ArmingCheckState::Passed => ("ok", Role::Good),
         ArmingCheckState::Failed => ("FAIL", Role::Bad),
         ArmingCheckState::Waiting => ("you", Role::Warning),
-        ArmingCheckState::NotNeeded => ("-", Role::Quiet),
+        ArmingCheckState::NotNeeded => ("n/a", Role::Quiet),
     }
 }
 
-/// One line for each item, cut at `width`; with room for `few` lines only, failing ones first.
-pub fn lines(model: &Model, width: usize, few: usize) -> Vec<Line<'static>> {
+/// The items in the order in which they matter: failing ones, those that the operator confirms, the others, and last those that
+/// are not needed. A confirmation moves no item.
+fn ordered(model: &Model) -> Vec<&ArmingCheckRecord> {
+    let confirms = |item: &ArmingCheckRecord| OperatorCheck::ALL.iter().any(|check| check.check() == item.check);
+    let rank = |item: &&ArmingCheckRecord| match item.state {
+        ArmingCheckState::Failed => 0,
+        ArmingCheckState::NotNeeded => 3,
+        _ if confirms(item) => 1,
+        _ => 2,
+    };
     let mut items: Vec<&ArmingCheckRecord> = model.session.arming_checks.iter().collect();
+    items.sort_by_key(rank);
+    items
+}
+
+/// One line for each item, cut at `width`, in `few` lines: the last one counts those without room.
+pub fn lines(model: &Model, width: usize, few: usize) -> Vec<Line<'static>> {
+    let mut items = ordered(model);
+    let mut without_room = 0;
     if items.len() > few {
-        items.sort_by_key(|item| item.state.allows());
-        items.truncate(few);
+        without_room = items.len() + 1 - few;
+        items.truncate(few.saturating_sub(1));
     }
     if items.is_empty() {
         let text = " not checked yet: the checks run while the robot is disarmed";
@@ -39,7 +56,13 @@ pub fn lines(model: &Model, width: usize, few: usize) -> Vec<Line<'static>> {
     }
     // Half of a narrow terminal has room for the found value alone.
     let name_width = if width >= WIDE { NAME_WIDTH } else { 1 };
-    items.into_iter().map(|item| line(model, item, (name_width, Some(width)), false)).collect()
+    let mut lines: Vec<Line> =
+        items.into_iter().map(|item| line(model, item, (name_width, Some(width)), false)).collect();
+    if without_room > 0 {
+        let text = format!(" {without_room} more: {} shows all", model.keymap.key(Action::ArmingChecks));
+        lines.push(Line::from(span(&model.theme, Role::Quiet, truncate(&text, width))));
+    }
+    lines
 }
 
 /// All items, whole: each continues on further lines where `width` is too small. Returns also the lines of `selected`, the
@@ -49,7 +72,7 @@ pub fn whole(model: &Model, width: usize, selected: Option<OperatorCheck>) -> (V
         return (lines(model, width, 1), 0..1);
     }
     let (mut all, mut of_selected) = (Vec::new(), 0..0);
-    for item in &model.session.arming_checks {
+    for item in ordered(model) {
         let chosen = selected.is_some_and(|check| check.check() == item.check);
         let pieces = wrap(&line(model, item, (NAME_WIDTH, None), chosen), width, 6 + NAME_WIDTH);
         if chosen {
@@ -98,10 +121,11 @@ fn line(
 /// The number of items that forbid arming, in words, with the time of the checks once the robot is armed.
 pub fn summary(model: &Model) -> String {
     let session = &model.session;
+    let needed = session.arming_checks.iter().filter(|item| item.state != ArmingCheckState::NotNeeded).count();
     let result = match (session.arming_checks.is_empty(), session.failing_checks()) {
         (true, _) => return String::new(),
-        (false, 0) => "all passed".to_owned(),
-        (false, count) => format!("{count} of {} not yet", session.arming_checks.len()),
+        (false, 0) => format!("{needed} passed"),
+        (false, count) => format!("{count} of {needed} not yet"),
     };
     match model.arming_checks_are_past() {
         true => format!("checked at {}: {result}", wall_clock(session, session.arming_checked_ns)),

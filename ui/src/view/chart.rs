@@ -1,5 +1,6 @@
 //! A chart of one series over time, in sweep or scroll mode.
 
+use quadfrog::control::foot_placement::SHORTEST_FLIGHT_S;
 use quadfrog::telemetry::Phase;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
@@ -25,14 +26,9 @@ pub struct TimeAxis {
 /// Columns of a vertical axis with its values.
 const AXIS: u16 = 6;
 
-/// Columns of the vertical axis of a chart; a narrow chart has none, and its range in the heading.
-fn axis_width(width: u16) -> u16 {
-    if width >= 30 { AXIS } else { 0 }
-}
-
 /// The part of a chart's area in which the curves are.
 pub fn plot_columns(area: Rect) -> Rect {
-    let axis = axis_width(area.width);
+    let axis = AXIS.min(area.width);
     Rect { x: area.x + axis, width: area.width - axis, ..area }
 }
 
@@ -84,15 +80,13 @@ pub struct Chart<'a> {
 
 impl Chart<'_> {
     pub fn draw(&self, buffer: &mut Buffer, area: Rect) {
-        if area.height < 2 || area.width < 8 {
+        if area.height < 2 || area.width < AXIS + 8 {
             return;
         }
         let plot = plot_columns(Rect { y: area.y + 1, height: area.height - 1, ..area });
         let (low, high) = self.range();
-        self.draw_heading(buffer, Rect { height: 1, ..area }, (low, high));
-        if axis_width(area.width) > 0 {
-            self.draw_ticks(buffer, plot, (low, high));
-        }
+        self.draw_heading(buffer, Rect { height: 1, ..area });
+        self.draw_ticks(buffer, plot, (low, high));
         self.draw_zero(buffer, plot, (low, high));
         self.draw_limits(buffer, plot, (low, high));
         if let Some(ghost) = self.ghost {
@@ -164,8 +158,8 @@ impl Chart<'_> {
         }
     }
 
-    /// Name, contact indicator, value and, where there is room, the range.
-    fn draw_heading(&self, buffer: &mut Buffer, area: Rect, (low, high): (f32, f32)) {
+    /// Name, contact indicator and value.
+    fn draw_heading(&self, buffer: &mut Buffer, area: Rect) {
         let theme = &self.theme;
         let sample = match self.cursor_ns {
             Some(time_ns) => self.history.at(time_ns),
@@ -206,11 +200,6 @@ impl Chart<'_> {
             let text = truncate(&text, width - used);
             buffer.set_string(area.x + used as u16, area.y, &text, theme.style(role));
             used += text.chars().count();
-        }
-        let range = if low == -high { format!("{}{high}", theme.plus_minus()) } else { format!("{low} to {high}") };
-        let range_width = range.chars().count();
-        if used + range_width + 2 <= width && axis_width(area.width) == 0 {
-            buffer.set_string(area.right() - range_width as u16, area.y, range, theme.style(Role::Quiet));
         }
     }
 
@@ -324,13 +313,35 @@ pub fn draw_time_axis(buffer: &mut Buffer, area: Rect, axis: &TimeAxis, origin_n
     }
 }
 
-/// The phase that is drawn in each column; the one of a jump wins over stance.
+/// The phase that each column shows, as the robot moved: it is in flight while no foot is on the ground, also where the impulse
+/// still acts. Of several in a column flight comes first, stance last.
 pub fn phases(axis: &TimeAxis, history: &SignalHistory, width: u16) -> Vec<Option<Phase>> {
     let mut phases = vec![None; usize::from(width)];
+    let (mut flew, mut airborne_since_ns, mut before) = (false, None, Phase::Stance);
     for sample in history.window(axis.window_ns) {
+        let commanded = if sample.trial.is_some() { sample.phase } else { Phase::Stance };
+        // Each impulse begins a jump.
+        flew &= !(commanded == Phase::Impulse && before != Phase::Impulse);
+        before = commanded;
+        let airborne = commanded != Phase::Stance && !sample.contact.iter().any(|&down| down);
+        airborne_since_ns = airborne.then(|| airborne_since_ns.unwrap_or(sample.time_ns));
+        // A shorter flight may be a foot that slips or a sensor that flickers.
+        flew |= airborne_since_ns
+            .is_some_and(|since_ns| sample.time_ns.saturating_sub(since_ns) as f64 >= SHORTEST_FLIGHT_S * 1e9);
+        let phase = match commanded {
+            Phase::Stance => Phase::Stance,
+            _ if airborne => Phase::Flight,
+            _ if flew => Phase::Landing,
+            _ => Phase::Impulse,
+        };
         if let Some(column) = axis.column(sample.time_ns, usize::from(width)) {
-            let phase = if sample.trial.is_some() { sample.phase } else { Phase::Stance };
-            if phase != Phase::Stance || phases[column].is_none() {
+            let rank = |phase| match phase {
+                Phase::Flight => 3,
+                Phase::Impulse => 2,
+                Phase::Landing => 1,
+                Phase::Stance => 0,
+            };
+            if phases[column].is_none_or(|drawn| rank(drawn) < rank(phase)) {
                 phases[column] = Some(phase);
             }
         }
@@ -338,19 +349,27 @@ pub fn phases(axis: &TimeAxis, history: &SignalHistory, width: u16) -> Vec<Optio
     phases
 }
 
-/// The columns of a jump's phases, each with its role and its letter.
+/// The columns of a jump's phases, each with its role and its name.
 fn jump_columns(phases: &[Option<Phase>], width: u16) -> impl Iterator<Item = (u16, (Role, &'static str))> {
     (0..width).zip(phases).filter_map(|(column, phase)| match phase {
-        Some(Phase::Impulse) => Some((column, (Role::ShadeImpulse, "i"))),
-        Some(Phase::Flight) => Some((column, (Role::ShadeFlight, "f"))),
-        Some(Phase::Landing) => Some((column, (Role::ShadeLanding, "l"))),
+        Some(Phase::Impulse) => Some((column, (Role::ShadeImpulse, "impulse"))),
+        Some(Phase::Flight) => Some((column, (Role::ShadeFlight, "flight"))),
+        Some(Phase::Landing) => Some((column, (Role::ShadeLanding, "landing"))),
         Some(Phase::Stance) | None => None,
     })
 }
 
-/// A line of letters under charts: `i` impulse, `f` flight, `l` landing.
+/// Letters of a phase's name that are shown at least, beyond the first one: fewer would run into the next name.
+const SHORT_NAME: usize = 4;
+
+/// A line under charts with the name of each phase of a jump, or its first letter where the phase is narrow: `i--flight--landing`.
 pub fn draw_phases(buffer: &mut Buffer, area: Rect, phases: &[Option<Phase>], theme: &Theme) {
-    for (column, (_, letter)) in jump_columns(phases, area.width) {
-        buffer.set_string(area.x + column, area.y, letter, theme.style(Role::Quiet));
+    let columns: Vec<_> = jump_columns(phases, area.width).collect();
+    let joined = |a: &(u16, (Role, &str)), b: &(u16, (Role, &str))| a.1.1 == b.1.1 && b.0 == a.0 + 1;
+    for run in columns.chunk_by(joined) {
+        let letters = if run.len() > SHORT_NAME { run.len() - 1 } else { 1 };
+        let name: String = run[0].1.1.chars().take(letters).collect();
+        let line = theme.line().repeat(run.len() - name.len());
+        buffer.set_string(area.x + run[0].0, area.y, name + &line, theme.style(Role::Quiet));
     }
 }

@@ -34,7 +34,7 @@ pub fn render(frame: &mut Frame, area: Rect, session: &SessionModel, info: &Para
 fn title(insight: Option<&ProposalInsight>, modelled: bool, name: &str, width: u16) -> String {
     let trial = insight.map(|insight| insight.trial);
     match (trial, modelled, width) {
-        (Some(trial), false, 58..) => format!("TPE densities of {name} (#{trial}): good and rest"),
+        (Some(trial), false, 58..) => format!("TPE densities of {name} (#{trial})"),
         (Some(trial), false, 36..) => format!("TPE {name} (#{trial})"),
         (_, false, _) => format!("TPE {name}"),
         (Some(trial), true, 58..) => format!("Predicted J over {name} (#{trial}): mean and deviation"),
@@ -94,8 +94,7 @@ fn render_densities(
     let (buffer, plot) = (frame.buffer_mut(), axes.plot);
     // Before the first trials both equal the prior.
     let equal = insight.good.iter().zip(&insight.bad).all(|(good, rest)| (good - rest).abs() <= 1e-9 * top);
-    let good_label = if equal { "good = rest" } else { "good" };
-    let curves = [(&insight.bad, Role::SeriesB, "rest"), (&insight.good, Role::Good, good_label)];
+    let curves = [(&insight.bad, Role::SeriesB, "r"), (&insight.good, Role::Good, if equal { "g=r" } else { "g" })];
     for (density, role, _) in curves {
         let mut dots = DotGrid::new(plot, theme.glyphs);
         let (across, down) = (dots.size.0 as f64 - 1.0, dots.size.1 as f64 - 1.0);
@@ -105,13 +104,11 @@ fn render_densities(
         dots.draw(buffer, plot, theme.style(role));
     }
     axes.draw(buffer, Some(insight.proposed), theme);
-    // A word at each curve's peak distinguishes the curves without colours.
-    for (density, role, label) in curves {
+    // A letter at each curve's peak distinguishes the curves without colours; the legend explains the letters.
+    for (density, role, letter) in curves {
         let Some((x, y)) = insight.at.iter().zip(density).max_by(|a, b| a.1.total_cmp(b.1)) else { continue };
-        let length = label.len() as u16;
-        let column = axes.column(*x).min(plot.right().saturating_sub(length)).max(plot.x);
-        let row = plot.y + cell_at(1.0 - y / top, plot.height);
-        buffer.set_string(column, row, truncate(label, usize::from(plot.width)), theme.style(role));
+        let column = axes.column(*x).min(plot.right().saturating_sub(letter.len() as u16));
+        buffer.set_string(column, plot.y + cell_at(1.0 - y / top, plot.height), letter, theme.style(role));
     }
     true
 }

@@ -15,13 +15,16 @@ pub fn details(session: &SessionModel, theme: &Theme, trial: &TrialRecord) -> Ve
     let verdict = trial.verdict_name().unwrap_or("not judged").to_owned();
     row("verdict", verdict);
     if let Some(suggested) = trial.suggested {
-        let cause = if trial.cause.is_empty() { String::new() } else { format!(": {}", trial.cause) };
-        row("suggested", format!("{}{cause}", suggested.name()));
+        row("suggested", suggested.name().to_owned());
     }
-    row(
-        "value",
-        trial.value.map_or("none".to_owned(), |value| format!("{value:.4} {unit}, reported to the optimizer")),
-    );
+    if !trial.cause.is_empty() {
+        row("cause", trial.cause.clone());
+    }
+    let use_of = |value: f64| match trial.verdict {
+        Some(_) => format!("{value:.4} {unit}, reported to the optimizer"),
+        None => format!("{value:.4} {unit} if it is judged as suggested"),
+    };
+    row("value", trial.value.map_or("none".to_owned(), use_of));
     if let Some(value) = trial.hand_value {
         row("by hand", format!("{value:.4} {unit}"));
     }

@@ -69,7 +69,9 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
             render_lines(frame, area, model, ("Queue", QUEUE_WIDTH, "Up Down"), lines, scroll);
         }
         Dialog::Help { scroll } => {
-            render_lines(frame, area, model, ("Keys", 78, "Up Down"), help::lines(model), *scroll)
+            let width = area.width.min(MAX_WIDTH);
+            let lines = wrap_all(&help::lines(model), usize::from(width.saturating_sub(4)), help::INDENT);
+            render_lines(frame, area, model, ("Keys", width, "Up Down"), lines, *scroll)
         }
         Dialog::Report { lines, scroll } => {
             let lines = lines.iter().cloned().map(Line::from).collect();
@@ -91,7 +93,7 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
 /// The arming checks, each whole; those of the operator can be selected.
 fn render_checks(frame: &mut Frame, area: Rect, model: &Model, selected: usize, scroll: usize) {
     let width = area.width.min(MAX_WIDTH);
-    let chosen = OperatorCheck::ALL.get(selected).copied();
+    let chosen = OperatorCheck::ALL.get(selected).copied().filter(|_| model.session.info.is_hardware());
     let (lines, of_chosen) = arming::whole(model, usize::from(width.saturating_sub(4)), chosen);
     let room = usize::from(area.height.saturating_sub(2));
     // Until the list is paged, the chosen item is visible.
@@ -258,7 +260,7 @@ fn field(
             "the best points run again until one leads; each repeat is approved like any other".to_owned()
         }
         Purpose::LogSearch => "empty: all lines".to_owned(),
-        Purpose::Seek => "12:34 or 1:02:03.5, seconds as 75.5, a trial as #7".to_owned(),
+        Purpose::Seek => "12:34 or 1:02:03.5, seconds as 75.5, a trial as #7, or best".to_owned(),
         Purpose::Rejudge => "a folder as for --config; empty: the defaults; the file is not changed".to_owned(),
         Purpose::Beside => match model.timeline.as_ref().and_then(|timeline| timeline.second.as_ref()) {
             Some(second) => format!("its number in {}", second.name),

@@ -113,3 +113,8 @@ pub fn scale(theme: &Theme, value: f64, low: f64, high: f64, width: usize) -> St
     let at = (share * (inner - 1) as f64).round() as usize;
     format!("[{}o{}]", theme.line().repeat(at), theme.line().repeat(inner - 1 - at))
 }
+
+/// The value as one decimal shows it, never -0.0.
+pub fn without_sign_of_zero(value: f64) -> f64 {
+    if value.abs() < 0.05 { 0.0 } else { value }
+}

@@ -10,7 +10,7 @@ use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
 
-use super::draw::{heading, span, truncate};
+use super::draw::{heading, span, truncate, without_sign_of_zero};
 use super::{arming, health_history};
 use crate::action::Action;
 use crate::model::Model;
@@ -63,10 +63,17 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let [motors, checks] = Layout::vertical([Constraint::Length(JOINTS as u16 + 1), Constraint::Fill(1)]).areas(right);
     panel(frame, motors, model, ("Motors", "", MOTOR_NAME_WIDTH), motor_rows(model));
     let aside = format!("{} ({})", arming::summary(model), model.keymap.key(Action::ArmingChecks));
-    let body = heading(frame, checks, &model.theme, "Arming checks", &aside);
+    let (title, aside) = match checks.width < WHOLE_TITLE_FROM {
+        true => ("Arming", aside.trim_start_matches("checked ")),
+        false => ("Arming checks", aside.as_str()),
+    };
+    let body = heading(frame, checks, &model.theme, title, aside);
     let lines = arming::lines(model, usize::from(body.width), usize::from(body.height));
     frame.render_widget(Paragraph::new(lines), body);
 }
+
+/// Columns from which the heading of the arming checks has room for its whole title beside their time.
+const WHOLE_TITLE_FROM: u16 = 44;
 
 const NAME_WIDTH: usize = 13;
 const MOTOR_NAME_WIDTH: usize = 9;
@@ -243,12 +250,16 @@ fn link_rows(link: &LinkStatus, limits: &HealthLimits) -> Vec<HealthRow> {
 fn motor_rows(model: &Model) -> Vec<HealthRow> {
     let tick = &model.snapshot.tick;
     let mut rows = Vec::new();
+    // A robot that reports no temperatures, as the simulator, sends zeros.
+    let measured = tick.state.motor_temperature_c.iter().any(|temperature| *temperature > 0.0);
     for joint in 0..JOINTS {
         let temperature = tick.state.motor_temperature_c[joint];
+        let degrees = if measured { format!("{temperature:3.0} C") } else { "  - C".to_owned() };
         let state = if tick.state.motor_enabled[joint] { "on" } else { "off" };
         let limited = if tick.limited & (1 << joint) != 0 { " limited" } else { "" };
-        let (q, torque) = (tick.state.joint_position_rad[joint], tick.state.joint_torque_n_m[joint]);
-        let text = format!("{temperature:3.0} C {state:<3}{q:+6.2} rad{torque:+6.1} N m{limited}");
+        let q = tick.state.joint_position_rad[joint];
+        let torque = without_sign_of_zero(tick.state.joint_torque_n_m[joint]);
+        let text = format!("{degrees} {state:<3}{q:+5.2} rad {torque:+5.1} N m{limited}");
         rows.push((joint_name(joint), text, temperature >= model.session.info.limits.motor_c));
     }
     rows

@@ -9,15 +9,21 @@ use crate::legal::legal;
 use crate::model::Model;
 use crate::theme::Role;
 
+/// Columns before the text of an action.
+pub const INDENT: usize = 13;
+
+/// The keys by group, in a replay those of the replay first.
 pub fn lines(model: &Model) -> Vec<Line<'static>> {
     let theme = &model.theme;
     let mut lines = Vec::new();
-    for group in ActionGroup::VARIANTS {
+    let mut groups = ActionGroup::VARIANTS.to_vec();
+    groups.sort_by_key(|group| model.replay.is_some() && *group != ActionGroup::Replay);
+    for group in groups {
         if !lines.is_empty() {
             lines.push(Line::default());
         }
         lines.push(Line::from(span(theme, Role::Heading, <&str>::from(group))));
-        for info in ACTIONS.iter().filter(|info| info.group == *group) {
+        for info in ACTIONS.iter().filter(|info| info.group == group) {
             let legal = legal(info.action, model).is_ok();
             let (key, text) = if legal { (Role::Key, Role::Text) } else { (Role::Quiet, Role::Quiet) };
             lines.push(Line::from(vec![

@@ -9,7 +9,7 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
 
 use super::chart::{Chart, Ghost, TimeAxis, draw_phases, draw_time_axis, phases, plot_columns};
-use super::draw::{bar, heading, span};
+use super::draw::{bar, heading, span, without_sign_of_zero};
 use super::series_style::style;
 use super::{beside, objective, proposal, trials, wireframe};
 use crate::model::Model;
@@ -216,7 +216,8 @@ fn render_charts(frame: &mut Frame, area: Rect, model: &Model) {
         };
         chart.draw(frame.buffer_mut(), columns(rows[index / across])[index % across]);
     }
-    for (cell, phases) in &of_columns {
+    // The charts side by side have the same times: the names stand under the left ones, the description under the right ones.
+    for (cell, phases) in of_columns.iter().take(1) {
         draw_phases(frame.buffer_mut(), *cell, phases, &theme);
     }
     if times_rows > 0 {
@@ -305,9 +306,4 @@ fn render_joints(frame: &mut Frame, area: Rect, model: &Model) {
         spans.push(Span::raw(format!("{:6.1}", without_sign_of_zero(speed))));
         frame.render_widget(Line::from(spans), Rect { y: column.y + row, height: 1, ..column });
     }
-}
-
-/// The value as one decimal shows it, never -0.0.
-fn without_sign_of_zero(value: f64) -> f64 {
-    if value.abs() < 0.05 { 0.0 } else { value }
 }

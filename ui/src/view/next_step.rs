@@ -81,8 +81,9 @@ fn live(model: &Model) -> NextStep {
             let stopped = if mode == Mode::Fault { "FAULT" } else { "STOPPED" };
             let cause = &session.stopped_because;
             let review = session.stage_is(ExperimentStage::Review);
+            let fell = session.under_review().is_some_and(|trial| trial.suggested == Some(Verdict::Fall));
             // The cause of a fall stands beside its suggested verdict.
-            let because = match cause.is_empty() || mode == Mode::Damped && session.suggested_fall().is_some() {
+            let because = match cause.is_empty() || mode == Mode::Damped && fell {
                 true => String::new(),
                 false => format!(": {cause}"),
             };
@@ -209,7 +210,10 @@ fn in_dialog(model: &Model, dialog: &Dialog) -> NextStep {
         }
         Dialog::ArmingChecks { .. } => {
             let arms = legal(Action::Arm, model).map_or(String::new(), |()| format!(" {} arms.", key(Action::Arm)));
-            format!("Up Down choose, x confirms, PgUp PgDn scroll, Enter closes.{arms}")
+            match model.session.info.is_hardware() {
+                true => format!("Up Down choose, x confirms, PgUp PgDn scroll, Enter closes.{arms}"),
+                false => format!("Up Down scroll, Enter closes.{arms}"),
+            }
         }
         Dialog::Override(form) if form.typing.is_none() => {
             let queue = key(Action::QueuePoint);
@@ -220,9 +224,10 @@ fn in_dialog(model: &Model, dialog: &Dialog) -> NextStep {
         Dialog::Confirm(Question::Skip { trial, .. }) => {
             format!("Press y to skip trial #{trial}. Any other key cancels.")
         }
-        Dialog::Confirm(Question::AcceptFall { trial }) => {
+        Dialog::Confirm(Question::AcceptAnyway { trial }) => {
             format!("Press y to accept trial #{trial}. Any other key cancels.")
         }
+        Dialog::Confirm(Question::HandValue { .. }) => "Press y to use the value. Any other key cancels.".to_owned(),
         Dialog::Quit => "Press y to quit. Any other key cancels.".to_owned(),
         Dialog::Field { purpose, .. } if purpose.is_remark() && model.space_bar_must_stop() => {
             "Enter saves the text, Esc cancels. Energised: Space is STOP, _ writes a space.".to_owned()
@@ -244,16 +249,23 @@ pub(super) fn render(frame: &mut Frame, area: Rect, model: &Model) {
     frame.render_widget(line_within(model, usize::from(area.width)), area);
 }
 
-/// Returns the next step, whole, and as many other keys as `width` columns have room for.
+/// Returns the next step, whole, and as many other keys as `width` columns have room for; the key of the help stands for the
+/// others.
 pub(super) fn line_within(model: &Model, width: usize) -> Line<'static> {
     let theme = &model.theme;
     let next = next_step(model);
-    let mut left = width.saturating_sub(next.lead.chars().count() + 1);
+    let room = width.saturating_sub(next.lead.chars().count() + 1);
+    let columns = |(key, text): &(String, &str)| key.chars().count() + text.chars().count() + 4;
+    let more = (model.keymap.key(Action::Help), "more");
+    let mut shown = next.others;
+    if shown.iter().map(columns).sum::<usize>() > room {
+        while !shown.is_empty() && shown.iter().chain([&more]).map(columns).sum::<usize>() > room {
+            shown.pop();
+        }
+        shown.extend(Some(more).filter(|more| columns(more) <= room));
+    }
     let mut spans = vec![Span::raw(" "), span(theme, Role::Key, next.lead)];
-    for (key, text) in next.others {
-        let width = key.chars().count() + text.chars().count() + 4;
-        let Some(rest) = left.checked_sub(width) else { break };
-        left = rest;
+    for (key, text) in shown {
         spans.extend([
             span(theme, Role::Quiet, format!(" {} ", theme.dot())),
             span(theme, Role::Key, key),

@@ -26,8 +26,7 @@ pub fn render(frame: &mut Frame, area: Rect, session: &SessionModel, theme: &The
     .areas(area);
     let [history, _, landings] =
         Layout::horizontal([Constraint::Fill(3), Constraint::Length(2), Constraint::Fill(2)]).areas(upper);
-    let modelled = session.insight.as_ref().is_some_and(|insight| !insight.predicted.is_empty());
-    render_legend(frame, legend, modelled, theme);
+    render_legend(frame, legend, session, theme);
     objective::render(frame, history, session, theme);
     render_landings(frame, landings, session, theme);
     if repeat_rows > 0 {
@@ -102,25 +101,34 @@ fn render_scatter(frame: &mut Frame, area: Rect, session: &SessionModel, theme: 
     }
 }
 
-/// The signs of all panels.
-fn render_legend(frame: &mut Frame, area: Rect, modelled: bool, theme: &Theme) {
-    let mut spans = vec![Span::raw(" ")];
-    let mut item = |symbol: &'static str, role, text: &'static str| {
-        spans.push(span(theme, role, symbol));
-        spans.push(span(theme, Role::Quiet, format!(" {text}  ")));
-    };
-    for (verdict, text) in [
-        (Some(Verdict::Accept), "accept"),
-        (Some(Verdict::Fall), "fall"),
-        (Some(Verdict::Void), "void"),
-        (None, "not judged"),
-    ] {
+/// The signs of all panels, each whole, as far as there is room.
+fn render_legend(frame: &mut Frame, area: Rect, session: &SessionModel, theme: &Theme) {
+    let modelled = session.insight.as_ref().is_some_and(|insight| !insight.predicted.is_empty());
+    let densities = session.insight.as_ref().is_some_and(|insight| insight.parameters.iter().any(|p| !p.at.is_empty()));
+    let mut items = Vec::new();
+    for (verdict, text) in
+        [(Some(Verdict::Accept), "accept"), (Some(Verdict::Fall), "fall"), (Some(Verdict::Void), "void")]
+    {
         let (symbol, role) = sign(verdict);
-        item(symbol, role, text);
+        items.push((symbol, role, text));
     }
-    item("*", Role::Good, "best");
-    item(theme.line(), Role::Quiet, "best so far");
-    item(theme.bar(), Role::Key, if modelled { "proposal, deviation" } else { "proposal" });
+    if session.trials.records.values().any(|trial| trial.verdict.is_none()) {
+        let (symbol, role) = sign(None);
+        items.push((symbol, role, "not judged"));
+    }
+    items.push(("*", Role::Good, "best"));
+    items.push((theme.bar(), Role::Key, if modelled { "proposal, deviation" } else { "proposal" }));
+    if densities && !modelled {
+        items.extend([("g", Role::Good, "good"), ("r", Role::SeriesB, "rest")]);
+    }
+    items.push((theme.line(), Role::Quiet, "best so far"));
+    let mut spans = vec![Span::raw(" ")];
+    let mut left = usize::from(area.width.saturating_sub(1));
+    for (symbol, role, text) in items {
+        let Some(rest) = left.checked_sub(text.len() + 4) else { break };
+        left = rest;
+        spans.extend([span(theme, role, symbol), span(theme, Role::Quiet, format!(" {text}  "))]);
+    }
     frame.render_widget(Line::from(spans), area);
 }
 

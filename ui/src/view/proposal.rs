@@ -7,7 +7,7 @@ use quadfrog::trial::{
 use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
-use ratatui::widgets::{Paragraph, Wrap};
+use ratatui::widgets::Paragraph;
 
 use super::draw::{expectation, heading, number, scale, span, with_deviation};
 use super::points;
@@ -15,11 +15,12 @@ use crate::action::Action;
 use crate::model::Model;
 use crate::model::session::SessionModel;
 use crate::theme::{Role, Theme};
+use crate::wrap::wrap_all;
 
 pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let (title, lines) = content(model, usize::from(area.width));
     let body = heading(frame, area, &model.theme, &title, "");
-    frame.render_widget(Paragraph::new(lines).wrap(Wrap { trim: false }), body);
+    frame.render_widget(Paragraph::new(wrap_all(&lines, usize::from(body.width), 1)), body);
 }
 
 fn content(model: &Model, width: usize) -> (String, Vec<Line<'static>>) {

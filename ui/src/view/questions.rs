@@ -1,7 +1,7 @@
 //! The texts of the questions: each says what follows, and Cancel is the default and comes first.
 
 use quadfrog::telemetry::Mode;
-use quadfrog::trial::ProposedParameter;
+use quadfrog::trial::{ProposedParameter, Verdict, six_digits};
 use ratatui::text::Line;
 
 use super::draw::{number, span};
@@ -107,19 +107,36 @@ pub fn confirm(model: &Model, question: &Question) -> (&'static str, Vec<Line<'s
             let answer = answers(&model.theme, "y", "skip");
             ("Skip the proposal?", vec![Line::from(text), Line::default(), answer])
         }
-        Question::AcceptFall { trial } => {
-            let row = model.session.under_review();
-            let cause = row.map_or("", |row| row.cause.as_str());
-            let value = row.and_then(|row| row.hand_value.or_else(|| model.session.measured_objective(row)));
+        Question::AcceptAnyway { trial } => {
+            let Some(row) = model.session.not_to_accept() else { return ("Accept?", Vec::new()) };
+            let value = model.session.value_if_accepted(row);
             let unit = &model.session.info.unit;
             let value = value.map_or("no value".to_owned(), |value| format!("J = {} {unit}", number(value)));
+            let (suggested, title, otherwise) = match row.suggested {
+                Some(Verdict::Void) => ("void", "Accept a void trial?", "void hides the trial from it"),
+                _ => ("fall", "Accept a fall?", "fall reports 0"),
+            };
             let lines = vec![
-                Line::from(format!("The suggested verdict of trial #{trial} is fall: {cause}.")),
-                Line::from(format!("Accept reports {value} to the optimizer, fall reports 0.")),
+                Line::from(format!("The suggested verdict of trial #{trial} is {suggested}: {}.", row.cause)),
+                Line::from(format!("Accept reports {value} to the optimizer, {otherwise}.")),
                 Line::default(),
                 answers(&model.theme, "y", "accept"),
             ];
-            ("Accept a fall?", lines)
+            (title, lines)
+        }
+        Question::HandValue { trial, value } => {
+            let unit = &model.session.info.unit;
+            let measured = model.session.under_review().and_then(|row| model.session.measured_objective(row));
+            let measured = measured.map_or("the robot measured nothing".to_owned(), |measured| {
+                format!("the robot measured {} {unit}", number(measured))
+            });
+            let lines = vec![
+                Line::from(format!("Trial #{trial}: {} {unit} by hand, but {measured}.", six_digits(*value))),
+                Line::from("An accepted trial reports the value by hand to the optimizer."),
+                Line::default(),
+                answers(&model.theme, "y", "use it"),
+            ];
+            ("Is this value right?", lines)
         }
     }
 }

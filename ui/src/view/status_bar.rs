@@ -31,8 +31,12 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     frame.render_widget(Line::from(condition(model, area.width)), second);
 }
 
+/// The mode. A robot that stands ready while a trial waits for its verdict, as after an undone one, is in review for the operator.
 pub fn mode_span(model: &Model) -> Span<'static> {
-    let mode = model.mode();
+    let mode = match model.mode() {
+        Mode::Ready if model.session.under_review().is_some() => Mode::Review,
+        mode => mode,
+    };
     let role = match mode {
         Mode::Damped | Mode::Fault => Role::Alarm,
         Mode::Ready | Mode::Review => Role::Good,
@@ -246,6 +250,7 @@ pub fn render_tabs(frame: &mut Frame, area: Rect, model: &Model) {
 pub fn render_message(frame: &mut Frame, area: Rect, model: &Model) {
     let Some(message) = &model.message else { return };
     let role = match message.level {
+        LogLevel::Info | LogLevel::Warning if message.age_min(model.clock) > 0 => Role::Quiet,
         LogLevel::Info => Role::Text,
         LogLevel::Warning => Role::Warning,
         LogLevel::Error => Role::Bad,

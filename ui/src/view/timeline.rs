@@ -43,12 +43,15 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
         put(cell(*time_ns), Mark::Fault { later: *time_ns > replay.time_ns });
     }
     put(cell(replay.time_ns), Mark::Playhead);
+    let best = model.session.trials.best().map(|best| best.trial);
     let role_at = |later: bool, role: Role| if later { Role::Quiet } else { role };
     let spans = marks.into_iter().map(|mark| match mark {
         Mark::Nothing => span(theme, Role::Quiet, theme.line()),
         Mark::Looped => span(theme, Role::Warning, "="),
         Mark::Trial { later, index, .. } => {
-            let (symbol, role) = sign(timeline.verdict(timeline.trials[index].trial));
+            let trial = timeline.trials[index].trial;
+            let (symbol, role) = sign(timeline.verdict(trial));
+            let symbol = if best == Some(trial) { "*" } else { symbol };
             span(theme, role_at(later, role), symbol)
         }
         Mark::Lost => span(theme, Role::Bad, "#"),

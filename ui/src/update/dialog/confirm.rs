@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use crossterm::event::KeyCode;
+use quadfrog::recording::record::LogLevel;
 use quadfrog::session::operator_request::{OperatorCheck, OperatorRequest};
 use quadfrog::trial::Verdict;
 
@@ -12,7 +13,7 @@ use crate::legal::legal;
 use crate::message::{Effect, ExportedRows};
 use crate::model::Model;
 use crate::model::dialog::{APPROVAL_PAUSE, ARMING_TIME, Dialog, Question};
-use crate::update::request::{cancelled, refused, request};
+use crate::update::request::{cancelled, refused, request, say};
 
 /// Lines that a page of the arming checks moves by, and the most that they can have.
 const CHECKS_PAGE: usize = 8;
@@ -79,10 +80,14 @@ pub(super) fn question_key(model: &mut Model, key: Key, question: &Question) -> 
     match question {
         Question::Skip { .. } if yes => request_if_legal(model, Action::Skip, OperatorRequest::Skip, "not skipped"),
         Question::Skip { .. } => cancelled(model, "not skipped"),
-        Question::AcceptFall { .. } if yes => {
+        Question::AcceptAnyway { .. } if yes => {
             request_if_legal(model, Action::Accept, OperatorRequest::Judge(Verdict::Accept), "not accepted")
         }
-        Question::AcceptFall { .. } => cancelled(model, "not accepted"),
+        Question::AcceptAnyway { .. } => cancelled(model, "not accepted"),
+        Question::HandValue { value, .. } if yes => {
+            request_if_legal(model, Action::HandValue, OperatorRequest::HandValue(Some(*value)), "not used")
+        }
+        Question::HandValue { .. } => cancelled(model, "nothing was changed"),
     }
 }
 
@@ -115,9 +120,16 @@ pub(super) fn arming_checks_key(
     (mut selected, mut scroll): (usize, usize),
 ) -> Vec<Effect> {
     let last = OperatorCheck::ALL.len() - 1;
+    let simulated = !model.session.info.is_hardware();
     let mut effects = Vec::new();
     match key.code() {
         KeyCode::Esc | KeyCode::Enter => return effects,
+        // In simulation nothing is confirmed, so that nothing is chosen.
+        KeyCode::Up if simulated => scroll = scroll.saturating_sub(1).max(1),
+        KeyCode::Down if simulated => scroll = (scroll.max(1) + 1).min(CHECKS_LINES),
+        KeyCode::Char('x') if simulated => {
+            say(model, LogLevel::Info, "the simulator needs no confirmation");
+        }
         KeyCode::Up => (selected, scroll) = (selected.saturating_sub(1), 0),
         KeyCode::Down => (selected, scroll) = ((selected + 1).min(last), 0),
         KeyCode::PageUp => scroll = scroll.saturating_sub(CHECKS_PAGE).max(1),

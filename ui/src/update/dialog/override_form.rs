@@ -3,7 +3,7 @@
 use crossterm::event::KeyCode;
 use quadfrog::session::operator_request::OperatorRequest;
 
-use super::text_field::edit;
+use super::text_field::{NOT_OF_A_NUMBER, edit};
 use crate::action::Action;
 use crate::keymap::Key;
 use crate::message::Effect;
@@ -89,6 +89,8 @@ pub(super) fn key(model: &mut Model, key: Key, mut form: OverrideForm) -> Vec<Ef
             if digit || form.typing.is_some() && key.typed().is_none() {
                 form.problem = None;
                 edit(form.typing.get_or_insert_default(), key);
+            } else if let Some(c) = key.typed() {
+                form.problem = Some(format!("`{c}`{NOT_OF_A_NUMBER}"));
             }
         }
     }

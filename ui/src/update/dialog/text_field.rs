@@ -8,13 +8,18 @@ use tui_input::{Input, InputRequest};
 use crate::keymap::Key;
 use crate::message::{Effect, ReplayCommand};
 use crate::model::Model;
-use crate::model::dialog::{Dialog, Purpose};
+use crate::model::dialog::{Dialog, Purpose, Question};
 use crate::update::beside::chosen;
 use crate::update::rejudged;
 use crate::update::request::{cancelled, request};
 
+/// Share of the robot's measurement, and distance from it in m or rad, beyond which a value measured by hand is asked about: more
+/// than the estimator drifts in a jump, less than a lost or a shifted decimal point.
+const DOUBTED_SHARE: f64 = 0.5;
+const DOUBTED_DISTANCE: f64 = 0.2;
+
 /// End of the message about a character that is not part of a number.
-const NOT_OF_A_NUMBER: &str = " does not belong here: a number is typed";
+pub(super) const NOT_OF_A_NUMBER: &str = " does not belong here: a number is typed";
 
 pub(super) fn key(
     model: &mut Model,
@@ -37,7 +42,10 @@ pub(super) fn key(
     match key.code() {
         KeyCode::Esc => return cancelled(model, "nothing was changed"),
         KeyCode::Enter if problem.is_some() => {
-            problem = Some(format!("a character was not taken; Enter again confirms {}", input.value()));
+            problem = Some(match input.value() {
+                "" => "nothing was typed yet; Esc cancels".to_owned(),
+                number => format!("a character was not taken; Enter again confirms {number}"),
+            });
         }
         KeyCode::Enter => match submit(model, purpose, input.value().trim()) {
             Ok(effects) => return effects,
@@ -66,6 +74,11 @@ fn submit(model: &mut Model, purpose: Purpose, text: &str) -> Result<Vec<Effect>
         Purpose::Note(trial) => OperatorRequest::Note { trial, text: text.to_owned() },
         Purpose::HandValue(_) if text.is_empty() => OperatorRequest::HandValue(None),
         Purpose::HandValue(_) => match text.replace(',', ".").parse::<f64>() {
+            Ok(value) if value.is_finite() && is_doubted(model, value) => {
+                let trial = model.session.under_review().map(|row| row.trial).ok_or("no trial waits for a verdict")?;
+                model.dialog = Some(Dialog::Confirm(Question::HandValue { trial, value }));
+                return Ok(Vec::new());
+            }
             Ok(value) if value.is_finite() => OperatorRequest::HandValue(Some(value)),
             _ => return Err(format!("`{text}` is not a number")),
         },
@@ -111,8 +124,19 @@ fn submit(model: &mut Model, purpose: Purpose, text: &str) -> Result<Vec<Effect>
     Ok(request(model, wanted))
 }
 
+/// Whether a value measured by hand for the trial under review is far from the robot's own, or cannot be compared.
+fn is_doubted(model: &Model, value: f64) -> bool {
+    let measured = model.session.under_review().and_then(|row| model.session.measured_objective(row));
+    let doubted = |measured: f64| (value - measured).abs() > DOUBTED_DISTANCE.max(DOUBTED_SHARE * measured.abs());
+    measured.is_none_or(doubted)
+}
+
 /// The place that a text names: a time or a trial.
 fn seek(model: &Model, text: &str) -> Result<ReplayCommand, String> {
+    if text == "best" {
+        let best = model.session.trials.best().map(|best| best.trial);
+        return best.map(ReplayCommand::Trial).ok_or("no trial was accepted up to here".to_owned());
+    }
     if let Some(number) = text.strip_prefix('#') {
         let trial =
             number.trim().parse().map_err(|_| format!("`{text}` is not the number of a trial; write it as #7"))?;
@@ -123,7 +147,7 @@ fn seek(model: &Model, text: &str) -> Result<ReplayCommand, String> {
             Err(format!("trial {trial} is not in this recording"))
         };
     }
-    let refused = || format!("`{text}` is no time; write it as 12:34, 75.5 (seconds) or #7 (a trial)");
+    let refused = || format!("`{text}` is no time; write it as 12:34, 75.5 (seconds), #7 (a trial) or best");
     let mut time_s = 0.0;
     let parts: Vec<&str> = text.split(':').collect();
     for (index, part) in parts.iter().enumerate() {
