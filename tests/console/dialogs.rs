@@ -5,6 +5,7 @@ mod support;
 use quadfrog::recording::record::{ArmingCheckRecord, Record, SessionInfo};
 use quadfrog::telemetry::{ArmingCheck, ArmingCheckState, Mode};
 use quadfrog::trial::{Backend, Verdict};
+use quadfrog_console::action::ACTIONS;
 use quadfrog_console::message::{Effect, ExportedRows};
 use quadfrog_console::text::{as_csv, as_markdown};
 use strum::VariantArray;
@@ -157,4 +158,50 @@ fn the_markdown_has_six_digits_and_the_csv_all() {
     assert_shows(&as_csv(&console.model, ExportedRows::All), &["1.5491585642167236"]);
     let markdown = as_markdown(&console.model, ExportedRows::All);
     assert!(markdown.contains("| 1.54916 |") && !markdown.contains("1.549158"), "{markdown}");
+}
+
+/// Regression: at every width eight sentences of the help were cut.
+#[test]
+fn the_help_shows_every_sentence_whole() {
+    for (columns, rows) in [(80, 24), (120, 40), (200, 60)] {
+        let mut console = Console::ready();
+        console.model.size = (columns, rows);
+        console.press(&["?"]);
+        let mut read = String::new();
+        for _ in 0..200 {
+            read.push_str(&words_of_the_dialog(&console.screen(columns, rows)));
+            read.push(' ');
+            console.press(&["Down"]);
+        }
+        for action in &ACTIONS {
+            let words = action.help.split_whitespace().collect::<Vec<_>>().join(" ");
+            assert!(read.contains(&words), "{words} at {columns}x{rows}");
+        }
+    }
+}
+
+/// Regression: the list opened at its end, and in a simulation it offered to confirm what nobody asks for.
+#[test]
+fn the_checks_of_a_simulation_begin_at_the_top_and_confirm_nothing() {
+    let mut console = Console::proposed();
+    let state = |check: &ArmingCheck| match check.needed_in_simulation() {
+        true => ArmingCheckState::Passed,
+        false => ArmingCheckState::NotNeeded,
+    };
+    let item = |check: &ArmingCheck| ArmingCheckRecord {
+        check: *check,
+        found: String::new(),
+        needed: "not needed in simulation".to_owned(),
+        state: state(check),
+    };
+    console.record(Record::ArmingChecks(ArmingCheck::VARIANTS.iter().map(item).collect()));
+    console.press(&["P"]);
+    let screen = console.screen(80, 24);
+    let first = screen.lines().position(|line| line.contains("Arming checks: 3 passed (1-")).expect("its first page");
+    assert!(screen.lines().nth(first + 1).is_some_and(|line| line.contains("ok   ")), "{screen}");
+    assert!(!screen.contains("│ >") && screen.contains("n/a"), "{screen}");
+    assert_eq!(console.requests(&["x"]), []);
+    assert_eq!(console.said(), "the simulator needs no confirmation");
+    console.press(&["Down", "Esc", "5"]);
+    assert_shows(&console.screen(80, 24), &["3 passed (P)", "24 more: P shows all"]);
 }

@@ -5,10 +5,11 @@ mod support;
 use quadfrog::recording::record::{LogLevel, Record};
 use quadfrog::telemetry::{Mode, Phase};
 use quadfrog::trial::{ExperimentStage, Verdict};
+use quadfrog_console::message::{Msg, ReplayStatus};
 use quadfrog_console::model::Notice;
 use quadfrog_console::settings::ConsoleSettings;
-use quadfrog_console::theme::{Colours, Glyphs, Theme};
-use support::{Console, VIEWS, assert_shows, tick, trial};
+use quadfrog_console::theme::{Colours, Glyphs, Role, Theme};
+use support::{Console, VIEWS, assert_shows, line_with, tick, trial};
 
 const SIZES: [(u16, u16); 3] = [(80, 24), (120, 40), (200, 60)];
 
@@ -214,4 +215,29 @@ fn without_colours_no_cell_is_coloured() {
     for cell in console.draw(120, 40).content() {
         assert_eq!((cell.fg, cell.bg), (Color::Reset, Color::Reset));
     }
+}
+
+/// Regression: an answer of twenty minutes ago looked like the newest event.
+#[test]
+fn an_old_answer_is_grey_and_has_its_age() {
+    let mut console = Console::ready();
+    console.answer("skip the proposal", true, "skipped");
+    let shown = |console: &Console| line_with(&console.screen(80, 24), "skipped");
+    assert_eq!(shown(&console).trim(), "skip the proposal: skipped");
+    console.wait(59_000);
+    assert_eq!(shown(&console).trim(), "skip the proposal: skipped");
+    console.wait(125_000);
+    assert_eq!(shown(&console).trim(), "3 min ago: skip the proposal: skipped");
+    let (buffer, row) = (console.draw(80, 24), 22);
+    assert_eq!(buffer[(1, row)].modifier, console.model.theme.style(Role::Quiet).add_modifier);
+}
+
+/// Regression: the keys that had no room were left out without a mark.
+#[test]
+fn the_line_of_keys_says_where_the_others_are() {
+    let mut console = Console::ready();
+    console.update(Msg::Replay(ReplayStatus::default()));
+    let last = |console: &Console, columns| console.screen(columns, 24).lines().last().unwrap_or_default().to_owned();
+    assert!(last(&console, 80).ends_with("? more"), "{}", last(&console, 80));
+    assert!(last(&console, 200).ends_with("q quit"), "{}", last(&console, 200));
 }

@@ -210,6 +210,16 @@ fn before_the_first_trials_both_densities_are_the_prior() {
     assert!(screen.contains("g=r") && !screen.contains("importance"), "{screen}");
 }
 
+/// Regression: after the last trial the view said "sampled without a model".
+#[test]
+fn the_reasons_for_the_last_proposal_stay_when_the_study_is_finished() {
+    let mut console = Console::proposed();
+    console.record(Record::Insight(insight()));
+    console.record(Record::Insight(ProposalInsight { trial: 19, ..ProposalInsight::default() }));
+    console.press(&["3"]);
+    assert_shows(&console.screen(120, 40), &["TPE f0 (#12)", "importance 62 %", "g good"]);
+}
+
 #[test]
 fn panels_of_one_parameter_have_the_same_axis_when_the_search_is_narrowed() {
     let mut console = Console::proposed();
