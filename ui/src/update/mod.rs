@@ -73,6 +73,8 @@ pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
         Msg::Timeline(timeline) => model.timeline = Some(timeline),
         Msg::Rewound => {
             model.session = SessionModel::default();
+            // It was about a later time of the recording.
+            model.message = None;
             model.history.clear();
             model.health_history.clear();
             model.log_view.back = 0;
