@@ -240,4 +240,7 @@ fn the_line_of_keys_says_where_the_others_are() {
     let last = |console: &Console, columns| console.screen(columns, 24).lines().last().unwrap_or_default().to_owned();
     assert!(last(&console, 80).ends_with("? more"), "{}", last(&console, 80));
     assert!(last(&console, 200).ends_with("q quit"), "{}", last(&console, 200));
+    // The suggested verdict of a stopped trial comes before the key of the help.
+    let stopped = Console::review(Mode::Damped, Verdict::Void);
+    assert!(last(&stopped, 80).ends_with("k acknowledges: test · v void (suggested)"), "{}", last(&stopped, 80));
 }

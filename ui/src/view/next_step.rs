@@ -8,7 +8,7 @@ use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 
-use super::draw::span;
+use super::draw::{span, truncate};
 use crate::action::Action;
 use crate::legal::legal;
 use crate::model::Model;
@@ -258,13 +258,19 @@ pub(super) fn line_within(model: &Model, width: usize) -> Line<'static> {
     let columns = |(key, text): &(String, &str)| key.chars().count() + text.chars().count() + 4;
     let more = (model.keymap.key(Action::Help), "more");
     let mut shown = next.others;
-    if shown.iter().map(columns).sum::<usize>() > room {
-        while !shown.is_empty() && shown.iter().chain([&more]).map(columns).sum::<usize>() > room {
+    let width_of = |shown: &[(String, &'static str)]| shown.iter().map(columns).sum::<usize>();
+    if width_of(&shown) > room {
+        // The first key is worth more than the one of the help.
+        while shown.len() > 1 && width_of(&shown) + columns(&more) > room {
             shown.pop();
         }
-        shown.extend(Some(more).filter(|more| columns(more) <= room));
+        shown.push(more);
+        while width_of(&shown) > room {
+            shown.pop();
+        }
     }
-    let mut spans = vec![Span::raw(" "), span(theme, Role::Key, next.lead)];
+    let lead = truncate(&next.lead, width.saturating_sub(1));
+    let mut spans = vec![Span::raw(" "), span(theme, Role::Key, lead)];
     for (key, text) in shown {
         spans.extend([
             span(theme, Role::Quiet, format!(" {} ", theme.dot())),
