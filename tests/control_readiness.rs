@@ -64,7 +64,7 @@ impl EmulatedBench {
 /// operator sees.
 const CONDITIONS: [(Defect, u32, &str); 8] = [
     // A link that loses states (with 40 % lost an earlier version jumped).
-    (Defect::Emulator("loss 3"), 700, "% of the states of the last second lost, a jump needs at most 1 %"),
+    (Defect::Emulator("loss 3"), 700, "%, a jump needs at most 1.0 %; check the cable"),
     // Foot sensors of another scale (jumped by an earlier version, without Virtual Model Control).
     (
         Defect::State(|state| state.foot_force_n.iter_mut().for_each(|force| *force *= 0.05)),
@@ -76,7 +76,7 @@ const CONDITIONS: [(Defect, u32, &str); 8] = [
     (Defect::State(|state| state.imu.gyro_body.z = 0.5), 20, "at rest for 0.0 s, a jump needs 0.3 s"),
     (Defect::Silence(14), 100, "ms old within the last second, a jump needs at most 10 ms"),
     // Every other tick late (5465 of 9000 were late in an earlier version, which jumped).
-    (Defect::LateTicks(2), 300, "% of the control ticks of the last second late, a jump needs at most 1 %"),
+    (Defect::LateTicks(2), 300, "%, a jump needs at most 1.0 %; end other programs"),
     (Defect::Emulator("battery 12"), 20, "battery at 12 %"),
 ];
 

@@ -106,6 +106,25 @@ fn a_delayed_link_keeps_its_rate() {
     assert_eq!(link.rate_hz, 1000);
 }
 
+/// A stopped process or a machine that slept: the clock of a real robot would have gone on, and a console that compares it with its
+/// own refused to arm for good.
+#[test]
+fn an_emulator_that_was_stopped_keeps_its_clock() {
+    let (mut emulator, mut go1) = pair(&SimConfig::default(), 3);
+    let mut time_ns = 7_000_000_000;
+    let mut live = |go1: &mut Go1, pause_ms: u64| {
+        time_ns += (pause_ms + 1) * 1_000_000;
+        go1.write(&JointCommand::damping(3.0)).unwrap();
+        emulator.step_at(time_ns);
+        (go1.read().map_or(0, |state| state.robot_time_ms), emulator.status().timed_out)
+    };
+    (0..10).for_each(|_| drop(live(&mut go1, 0)));
+    let (before_ms, _) = live(&mut go1, 0);
+    let (after_ms, _) = live(&mut go1, 3000);
+    assert_eq!(after_ms - before_ms, 3001);
+    assert_eq!(live(&mut go1, 0), (after_ms + 1, false));
+}
+
 #[test]
 fn a_restart_is_noticed_once() {
     let (mut emulator, mut go1) = pair(&SimConfig::default(), 3);

@@ -86,8 +86,8 @@ impl Emulated {
         let (handle, ending) = (emulator.handle(), Arc::<AtomicBool>::default());
         let flag = ending.clone();
         let step = move || {
-            pace(Duration::from_millis(1), Duration::ZERO, |_| {
-                emulator.step();
+            pace(Duration::from_millis(1), Duration::ZERO, |start| {
+                emulator.step_at(start.planned_ns);
                 if flag.load(Ordering::Acquire) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
             })
             .unwrap();

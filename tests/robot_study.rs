@@ -34,8 +34,8 @@ const TRIALS: u32 = 20;
 const STILL: Duration = Duration::from_millis(1300);
 /// Lateness of the control thread that is no fault here, ms: five robots share the machine.
 const LATE_MS: f64 = 10.0;
-/// Time limit of a study.
-const PATIENCE: Duration = Duration::from_secs(1200);
+/// Longest time in which neither the mode nor the stage of the study changes.
+const PATIENCE: Duration = Duration::from_secs(180);
 
 /// A robot that can be emulated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -117,8 +117,8 @@ impl LivingRobot {
         let ending = Arc::new(AtomicBool::new(false));
         let flag = ending.clone();
         let thread = std::thread::spawn(move || {
-            pace(Duration::from_millis(1), Duration::ZERO, |_| {
-                emulator.step();
+            pace(Duration::from_millis(1), Duration::ZERO, |start| {
+                emulator.step_at(start.planned_ns);
                 if flag.load(Ordering::Acquire) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
             })
             .unwrap();
@@ -164,6 +164,8 @@ struct Operator {
     sits_down: bool,
     stop_tested: bool,
     lies_since: Option<Instant>,
+    /// The last request that was refused, and why.
+    refused: String,
 }
 
 impl Operator {
@@ -182,6 +184,7 @@ impl Operator {
                 Record::Request(command) if !command.accepted => {
                     self.sits_down |= command.request.starts_with("approve") && command.answer.contains("sit down");
                     println!("{}: {}", command.request, command.answer);
+                    self.refused = format!("{}: {}", command.request, command.answer);
                 }
                 Record::Log(line) => println!("{}", line.message),
                 _ => {}
@@ -240,15 +243,18 @@ impl Operator {
     }
 
     fn run(&mut self) -> LinkStatus {
-        let begun = Instant::now();
-        let mut wished_at = begun;
+        let mut wished_at = Instant::now();
+        let mut changed = (None, wished_at);
         loop {
             let (mode, link) = self.look();
             if self.stage.is_some_and(|stage| stage.stage == ExperimentStage::Finished) {
                 return link;
             }
-            assert!(begun.elapsed() < PATIENCE, "still {} at {:?} after {PATIENCE:?}", mode.name(), self.stage);
             let here = (mode, self.stage.map(|stage| stage.stage), self.stage.map_or(0, |stage| stage.trial));
+            if changed.0 != Some(here) {
+                changed = (Some(here), Instant::now());
+            }
+            assert!(changed.1.elapsed() < PATIENCE, "{here:?} for {PATIENCE:?}; refused last: {}", self.refused);
             // Once is enough, unless nothing comes of it.
             let wishes = self.wished_in != Some(here) || wished_at.elapsed() > Duration::from_secs(3);
             if wishes && let Some(wanted) = self.act(mode) {
@@ -282,6 +288,7 @@ fn over_the_network(kind: Kind, seed: u32, trials: u32, late_ms: f64) -> Outcome
         sits_down: false,
         stop_tested: false,
         lies_since: None,
+        refused: String::new(),
     };
     let link = operator.run();
     let accepted = operator.rows.values().filter(|row| row.verdict == Some(Verdict::Accept));

@@ -217,7 +217,7 @@ pub(crate) fn digits_apart(measured: f64, limit: f64, digits: usize) -> usize {
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[expect(missing_docs, reason = "the message describes a variant, the name of a field holds its unit")]
 pub enum TrialInhibit {
-    #[error("battery at {measured_percent:.0} %, a jump needs {allowed_percent:.0} %; charge or change it")]
+    #[error("battery at {}; charge or change it", needs(*.measured_percent, *.allowed_percent, "%", 0))]
     BatteryLow { measured_percent: f64, allowed_percent: f64 },
     #[error("motor {} at {measured_c:.0} degrees Celsius, a jump needs less than {allowed_c:.0}; sit down and wait", joint_name(*.joint as usize))]
     MotorWarm { joint: u8, measured_c: f64, allowed_c: f64 },
@@ -228,28 +228,34 @@ pub enum TrialInhibit {
     )]
     FootForces { measured_n: f64, least_n: f64, most_n: f64 },
     /// The larger of roll and pitch.
-    #[error("tilt {}; put the robot on level ground", at_most(*.measured_rad, *.allowed_rad, "rad"))]
+    #[error("tilt {}; put the robot on level ground", at_most(*.measured_rad, *.allowed_rad, "rad", 3))]
     NotLevel { measured_rad: f64, allowed_rad: f64 },
-    #[error("{} off its stance by {}; sit down and stand up again", joint_name(*.joint as usize), at_most(*.measured_rad, *.allowed_rad, "rad"))]
+    #[error("{} off its stance by {}; sit down and stand up again", joint_name(*.joint as usize), at_most(*.measured_rad, *.allowed_rad, "rad", 3))]
     NotAtStance { joint: u8, measured_rad: f64, allowed_rad: f64 },
-    #[error("all feet down and the trunk at rest for {measured_s:.1} s, a jump needs {needed_s} s; wait")]
+    #[error("all feet down and the trunk at rest for {}; wait", needs(*.measured_s, *.needed_s, "s", 1))]
     NotQuiet { measured_s: f64, needed_s: f64 },
     #[error(
         "a state was {age_ms} ms old within the last second, a jump needs at most {allowed_ms} ms; check the cable"
     )]
     StatesOld { age_ms: u32, allowed_ms: u32 },
-    #[error("{:.1} % of the states of the last second lost, a jump needs at most {} %; check the cable", 100.0 * .measured_share, 100.0 * .allowed_share)]
+    #[error("states of the last second lost: {}; check the cable", at_most(100.0 * .measured_share, 100.0 * .allowed_share, "%", 1))]
     StatesLost { measured_share: f64, allowed_share: f64 },
-    #[error("{:.1} % of the control ticks of the last second late, a jump needs at most {} %; end other programs", 100.0 * .measured_share, 100.0 * .allowed_share)]
+    #[error("control ticks of the last second late: {}; end other programs", at_most(100.0 * .measured_share, 100.0 * .allowed_share, "%", 1))]
     TicksLate { measured_share: f64, allowed_share: f64 },
-    #[error("the link's delay grew by {measured_ms:.1} ms, a jump needs at most {allowed_ms} ms; check the cable")]
+    #[error("the link's delay grew by {}; check the cable", at_most(*.measured_ms, *.allowed_ms, "ms", 1))]
     LinkDelay { measured_ms: f64, allowed_ms: f64 },
 }
 
 /// "0.120 rad, a jump needs at most 0.100 rad": more decimals where both numbers would print alike.
-fn at_most(measured: f64, limit: f64, unit: &str) -> String {
-    let digits = digits_apart(measured, limit, 3);
+fn at_most(measured: f64, limit: f64, unit: &str, digits: usize) -> String {
+    let digits = digits_apart(measured, limit, digits);
     format!("{measured:.digits$} {unit}, a jump needs at most {limit:.digits$} {unit}")
+}
+
+/// "0.28 s, a jump needs 0.30 s": more decimals where both numbers would print alike.
+fn needs(measured: f64, limit: f64, unit: &str, digits: usize) -> String {
+    let digits = digits_apart(measured, limit, digits);
+    format!("{measured:.digits$} {unit}, a jump needs {limit:.digits$} {unit}")
 }
 
 /// Warning before a failsafe trips.
@@ -277,5 +283,8 @@ mod tests {
         let fall = |measured_rad| FallCause::Pitch { measured_rad, allowed_rad: 1.0 }.to_string();
         assert_eq!(fall(1.004), "pitch 1.004 rad exceeds 1.000 rad");
         assert_eq!(fall(-1.000_04), "pitch -1.00004 rad exceeds 1.00000 rad");
+        let quiet = |measured_s| TrialInhibit::NotQuiet { measured_s, needed_s: 0.3 }.to_string();
+        assert_eq!(quiet(0.1), "all feet down and the trunk at rest for 0.1 s, a jump needs 0.3 s; wait");
+        assert_eq!(quiet(0.299), "all feet down and the trunk at rest for 0.299 s, a jump needs 0.300 s; wait");
     }
 }

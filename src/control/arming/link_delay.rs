@@ -6,6 +6,6 @@ use super::check::*;
 pub(super) const CHECK: ControlCheck = ControlCheck {
     check: ArmingCheck::LinkDelay,
     measure: |inputs, settings| Reading::at_most(inputs.delay_growth_ms, settings.failsafe.delay_land_ms),
-    found: |finding| format!("{:.0} ms, limit {} ms", finding.measured, finding.allowed),
-    needed: |_| "as at first: check the cable, or restart this program".to_owned(),
+    found: |finding| format!("grown by {:.0} ms, limit {} ms", finding.measured, finding.allowed),
+    needed: |_| "the delay of the start: check the cable, or restart this program".to_owned(),
 };

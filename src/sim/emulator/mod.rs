@@ -1,6 +1,7 @@
 //! The simulator served as a Go1 over UDP, or with the feature `go2` as a Go2 over DDS: commands are received, the motors' control
-//! law is simulated, states are sent at 1 kHz, and faults are injected on demand. One [`Emulator::step`] is one millisecond of the robot: called at 1 kHz
-//! it is a robot in real time, called in turn with a control cycle it repeats bit for bit.
+//! law is simulated, states are sent at 1 kHz, and faults are injected on demand. One [`Emulator::step`] is one millisecond of
+//! the robot: called in turn with a control cycle it repeats bit for bit. [`Emulator::step_at`], called at 1 kHz, is a robot in
+//! real time.
 //!
 //! Unknown properties of the real robot are keys of `[emulator]` in `config/simulator.toml`, with the assumption.
 
@@ -30,6 +31,8 @@ use crate::sim::terrain::unit_interval;
 use endpoint::{Endpoint, Go1Endpoint};
 use network::{NetworkConditions, NetworkPath};
 use robot::{EmulatedRobot, RobotDefects};
+
+const MILLISECOND_NS: u64 = 1_000_000;
 
 /// Error of starting an emulator.
 #[derive(Debug, thiserror::Error)]
@@ -106,6 +109,8 @@ pub struct Emulator {
     local_address: Option<SocketAddr>,
     /// Time since the emulator's start, ms. The robot's own clock restarts when it reboots.
     now_ms: u64,
+    /// This computer's time of the next millisecond in real time, ns.
+    due_ns: Option<u64>,
     to_robot: NetworkPath<EmulatorClient>,
     from_robot: NetworkPath<Option<EmulatorClient>>,
     conditions: NetworkConditions,
@@ -195,6 +200,7 @@ impl Emulator {
             endpoint,
             local_address,
             now_ms: 0,
+            due_ns: None,
             to_robot: NetworkPath::new(),
             from_robot: NetworkPath::new(),
             conditions: NetworkConditions::default(),
@@ -279,6 +285,21 @@ impl Emulator {
     /// Places the robot.
     pub fn place(&mut self, placement: &Placement) {
         self.robot.place(placement);
+    }
+
+    /// Emulates the millisecond that begins at `time_ns` of this computer's clock, whose zero is any.
+    ///
+    /// Milliseconds that were left out since the last call (this process was stopped, the machine slept) pass on the robot's
+    /// clock, which does not depend on this computer; its body stands still in them.
+    pub fn step_at(&mut self, time_ns: u64) {
+        let missed_ms = time_ns.saturating_sub(self.due_ns.unwrap_or(time_ns)) / MILLISECOND_NS;
+        if missed_ms > 0 {
+            self.now_ms += missed_ms;
+            self.since_command_ms = self.since_command_ms.saturating_add(u32::try_from(missed_ms).unwrap_or(u32::MAX));
+            self.robot.step_clock(missed_ms as f64);
+        }
+        self.due_ns = Some(time_ns + MILLISECOND_NS);
+        self.step();
     }
 
     /// Emulates one millisecond: receives commands, simulates, sends a state.

@@ -99,8 +99,8 @@ pub fn run(arguments: &EmulateArguments) -> Result<(), Failure> {
     let ending = Arc::new(AtomicBool::new(false));
     let flag = ending.clone();
     let robot = std::thread::spawn(move || {
-        pace(Duration::from_secs_f64(CONTROL_PERIOD_S), Duration::ZERO, |_| {
-            emulator.step();
+        pace(Duration::from_secs_f64(CONTROL_PERIOD_S), Duration::ZERO, |start| {
+            emulator.step_at(start.planned_ns);
             if flag.load(Ordering::Acquire) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         })
     });

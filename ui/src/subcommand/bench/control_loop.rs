@@ -211,8 +211,6 @@ fn measure(
     let mut settings = config.settings(&description, Task::Forward, backend)?;
     // Neither a late tick nor a long stand may end the measurement.
     (settings.late_ms, settings.idle_s) = (0.0, 0.0);
-    // Nor a stall of the emulated robot, whose clock then stands still.
-    settings.consistency.clock_step_ms = f64::INFINITY;
     let lead = arguments.lead();
     if !arguments.with_link {
         let mut robot = Simulator::new(&description, &config.simulator).map_err(Failure::input)?;
@@ -233,8 +231,8 @@ fn measure(
         // Another core: the emulated robot must keep its period without the core of the measured thread.
         let core = scheduling.core.map(|core| usize::from(core == 0));
         let _granted = Scheduling { priority: scheduling.priority.saturating_sub(1), core, ..scheduling }.apply();
-        pace(PERIOD, Duration::ZERO, |_| {
-            emulator.step();
+        pace(PERIOD, Duration::ZERO, |start| {
+            emulator.step_at(start.planned_ns);
             if flag.load(Ordering::Acquire) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         })
     });
