@@ -180,6 +180,28 @@ fn the_help_shows_every_sentence_whole() {
     }
 }
 
+/// Regression: at 80 columns the ends of the sentences were cut, and with them the reasons for which an action is refused.
+#[test]
+fn the_list_of_actions_shows_every_sentence_whole() {
+    for (columns, rows) in [(80, 24), (120, 40), (200, 60)] {
+        let mut console = Console::ready();
+        console.press(&[":"]);
+        let mut read = String::new();
+        for _ in 0..ACTIONS.len() {
+            read.push_str(&words_of_the_dialog(&console.screen(columns, rows)));
+            read.push(' ');
+            console.press(&["Down"]);
+        }
+        assert!(!read.contains(".."), "a sentence is cut at {columns}x{rows}");
+        for action in &ACTIONS {
+            let help = action.help.split_whitespace().collect::<Vec<_>>().join(" ");
+            // In place of the help of an action that is not possible stands the reason.
+            let whole = [help.as_str(), "("].iter().any(|text| read.contains(&format!("{} {text}", action.name)));
+            assert!(whole, "{} at {columns}x{rows}:\n{read}", action.name);
+        }
+    }
+}
+
 /// Regression: the list opened at its end, and in a simulation it offered to confirm what nobody asks for.
 #[test]
 fn the_checks_of_a_simulation_begin_at_the_top_and_confirm_nothing() {

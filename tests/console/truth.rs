@@ -3,12 +3,13 @@
 mod support;
 
 use quadfrog::recording::record::{ArmingCheckRecord, Record};
+use quadfrog::robot::{Battery, LinkStatus};
 use quadfrog::session::operator_request::OperatorRequest;
-use quadfrog::telemetry::{ArmingCheck, ArmingCheckState, Mode, Snapshot, Tick, TrialInhibit};
-use quadfrog::trial::{DrawnRange, ExperimentStage, SearchStatus, SearchedParameter, TrialRecord, Verdict};
+use quadfrog::telemetry::{ArmingCheck, ArmingCheckState, Counters, Mode, Snapshot, Tick, TrialInhibit};
+use quadfrog::trial::{Backend, DrawnRange, ExperimentStage, SearchStatus, SearchedParameter, TrialRecord, Verdict};
 use quadfrog_console::message::{Msg, ReplayStatus};
 use quadfrog_console::theme::Role;
-use support::{Console, assert_shows, line_with, trial};
+use support::{Console, assert_shows, line_with, tick, trial};
 
 fn at_time(console: &mut Console, time_s: u64) {
     let tick = Tick { time_ns: time_s * 1_000_000_000, ..console.model.snapshot.tick };
@@ -118,4 +119,79 @@ fn a_replay_says_once_that_nothing_can_be_changed() {
     let screen = console.screen(120, 40);
     assert_eq!(screen.matches("this is a replay").count(), 1, "{screen}");
     assert_shows(&screen, &["Nothing can be changed: this is a replay"]);
+}
+
+fn hardware() -> Console {
+    let mut console = Console::ready();
+    console.model.session.info.backend = Some(Backend::Hardware);
+    console.model.session.info.recording = "recordings/2026-11-23T19-01-28-forward-seed0/session.mcap".into();
+    console.model.session.info.study = "recordings/2026-11-23T19-01-28-forward-seed0/study.log".into();
+    console
+}
+
+/// A tick whose newest state has this time of the robot's clock.
+fn state_of(time_ms: u64, robot_time_ms: u32, mode: Mode) -> Tick {
+    let mut tick = Tick { mode, ..tick(time_ms, 0.1, None) };
+    tick.state.robot_time_ms = robot_time_ms;
+    tick
+}
+
+/// Regression: before the first state the charts drew zeros, and after a lost link the last values went on as if they were new.
+#[test]
+fn a_silent_robot_has_no_values() {
+    let mut console = hardware();
+    let shows = |console: &mut Console, heard: bool| {
+        console.press(&["1"]);
+        for (columns, rows) in [(80, 24), (120, 40), (200, 60)] {
+            let screen = console.screen(columns, rows);
+            assert_eq!(screen.contains("roll +0.100 rad"), heard, "{screen}");
+            assert_eq!(screen.contains("roll - rad"), !heard, "{screen}");
+            assert_eq!(screen.contains("foot z● -0.200 m") || screen.contains("foot z○ -0.200 m"), heard, "{screen}");
+            assert_eq!(screen.contains("no state from the robot"), !heard && columns > 80, "{screen}");
+        }
+        console.press(&["5"]);
+        let screen = console.screen(80, 24);
+        assert_eq!(screen.contains("FR_hip"), heard, "{screen}");
+        assert_eq!(screen.contains("no state from the robot"), !heard, "{screen}");
+    };
+    console.tick(state_of(5, 0, Mode::Offline));
+    shows(&mut console, false);
+    for time_ms in (10..500).step_by(5) {
+        console.tick(state_of(time_ms, time_ms as u32, Mode::Ready));
+    }
+    shows(&mut console, true);
+    (500..590).step_by(5).for_each(|time_ms| console.tick(state_of(time_ms, 495, Mode::Ready)));
+    shows(&mut console, true);
+    (590..700).step_by(5).for_each(|time_ms| console.tick(state_of(time_ms, 495, Mode::Fault)));
+    shows(&mut console, false);
+    console.tick(state_of(700, 700, Mode::Fault));
+    shows(&mut console, true);
+}
+
+/// Regression: battery and restarts had no room at 80x24 and at 120x40, and long values ended with two dots.
+#[test]
+fn health_of_a_robot_is_whole_at_every_size() {
+    let mut console = hardware();
+    let battery = Battery { charge_percent: 71.0, voltage_v: 24.1, cell_v: [3.9; 10], ..Battery::default() };
+    let mut tick = state_of(5, 5, Mode::Ready);
+    tick.state.battery = Some(battery);
+    tick.state.motor_temperature_c = [88.0; 12];
+    (tick.state.motor_enabled, tick.limited) = ([true; 12], 1);
+    let link = LinkStatus { rate_hz: 1000, lost: 12_345, corrupt: 12_345, recent_corrupt: 12, ..LinkStatus::default() };
+    let counters = Counters { link: Some(link), ticks_not_shown: 3, ..console.model.snapshot.counters };
+    console.tick(tick);
+    console.update(Msg::Snapshot(Box::new(Snapshot { tick, counters, ..console.model.snapshot })));
+    console.press(&["5"]);
+    for (columns, rows) in [(80, 24), (100, 30), (120, 40), (200, 60)] {
+        let screen = console.screen(columns, rows);
+        let always =
+            ["71 %, 24.1 V, 0.0 A", "3.900 to 3.900 V", "restarts     0", "12 in 5 s, 12345 in all", "88 C max"];
+        assert_shows(&screen, &always);
+        assert_shows(
+            &screen,
+            &["session.mcap", "in 2026-11-23T19-01-28-forward-seed0", "max: limited by the gate", "N m !"],
+        );
+        assert!(!screen.contains(".."), "{screen}");
+        assert_eq!(screen.contains("robot clock"), rows >= 40, "the last detail, where there is room\n{screen}");
+    }
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 use quadfrog::robot::{JOINTS, PerLeg};
-use quadfrog::telemetry::{Phase, Tick};
+use quadfrog::telemetry::{Mode, Phase, Tick};
 
 /// Samples that are kept: a minute at 200 a second.
 const CAPACITY: usize = 12_000;
@@ -17,6 +17,8 @@ const TRACES_CAPACITY: usize = 10_000;
 /// Time between two samples of a thinned trace in its jump, and before and after it, ns.
 const THINNED_JUMP_NS: u64 = 10_000_000;
 pub const THINNED_NS: u64 = 50_000_000;
+/// Time after which a state that does not change is none, ns.
+const SILENT_NS: u64 = 100_000_000;
 /// Time before the impulse at which the jump begins, s.
 pub const BEFORE_IMPULSE_S: f32 = 0.3;
 
@@ -29,6 +31,8 @@ pub struct ChartSample {
     pub phase: Phase,
     /// The running trial.
     pub trial: Option<u32>,
+    /// Whether the robot sends states: without them the values below are of an earlier time, or none at all.
+    pub heard: bool,
     /// Time since the impulse began, s.
     pub trial_time_s: f32,
     /// Roll, rad.
@@ -109,6 +113,7 @@ impl From<&Tick> for ChartSample {
             time_ns: tick.time_ns,
             phase: tick.phase,
             trial: tick.trial,
+            heard: tick.mode != Mode::Offline,
             trial_time_s: tick.trial_time_s as f32,
             roll: rpy.x as f32,
             pitch: rpy.y as f32,
@@ -145,6 +150,8 @@ pub struct SignalHistory {
     kept: Option<u32>,
     /// The trial of the newest sample that has one.
     running: Option<u32>,
+    /// The robot's clock, ms, and when the newest state arrived, ns.
+    state: (u32, u64),
 }
 
 /// A trace with fewer samples, its ends among them; none where it has no more than that.
@@ -167,7 +174,13 @@ fn thinned(trace: &[ChartSample]) -> Option<Vec<ChartSample>> {
 impl SignalHistory {
     /// Appends one tick. A tick older than the newest one (a replay was rewound) clears the samples first.
     pub fn push(&mut self, tick: &Tick) {
-        let sample = ChartSample::from(tick);
+        let mut sample = ChartSample::from(tick);
+        let rewound = tick.time_ns < self.state.1;
+        if tick.state.robot_time_ms != self.state.0 || rewound {
+            self.state = (tick.state.robot_time_ms, tick.time_ns);
+        }
+        // A recording without the robot's clock has zeros.
+        sample.heard &= self.state.0 == 0 || tick.time_ns - self.state.1 <= SILENT_NS;
         if self.samples.back().is_some_and(|newest| newest.time_ns >= sample.time_ns) {
             self.samples.clear();
         }
@@ -234,6 +247,11 @@ impl SignalHistory {
         let from = self.newest_ns().saturating_sub(window_ns);
         let start = self.samples.partition_point(|sample| sample.time_ns <= from && from > 0);
         self.samples.range(start..)
+    }
+
+    /// Whether the robot sends no state at the newest sample.
+    pub fn is_silent(&self) -> bool {
+        self.samples.back().is_some_and(|sample| !sample.heard)
     }
 
     /// Time of the newest sample, ns; 0 without any.

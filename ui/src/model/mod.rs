@@ -237,6 +237,11 @@ impl Model {
         }
     }
 
+    /// Whether the robot sends no states: what is known of it is of an earlier time, or nothing.
+    pub fn robot_is_silent(&self) -> bool {
+        self.history.is_silent()
+    }
+
     /// The robot's mode, from the newest tick.
     pub fn mode(&self) -> Mode {
         self.snapshot.tick.mode

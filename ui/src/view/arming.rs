@@ -52,7 +52,7 @@ pub fn lines(model: &Model, width: usize, few: usize) -> Vec<Line<'static>> {
     }
     if items.is_empty() {
         let text = " not checked yet: the checks run while the robot is disarmed";
-        return vec![Line::from(span(&model.theme, Role::Quiet, truncate(text, width)))];
+        return wrap(&Line::from(span(&model.theme, Role::Quiet, text)), width, 1);
     }
     // Half of a narrow terminal has room for the found value alone.
     let name_width = if width >= WIDE { NAME_WIDTH } else { 1 };

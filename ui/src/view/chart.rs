@@ -166,8 +166,8 @@ impl Chart<'_> {
             None => self.history.samples().next_back(),
         };
         let contact = match (self.style.foot, sample) {
-            (Some(leg), Some(sample)) => theme.contact_indicator(sample.contact[leg as usize]),
-            (Some(_), None) => " ",
+            (Some(leg), Some(sample)) if sample.heard => theme.contact_indicator(sample.contact[leg as usize]),
+            (Some(_), _) => " ",
             (None, _) => "",
         };
         let value = |decimals| sample.map_or("-".to_owned(), |sample| self.number(sample, decimals));
@@ -203,9 +203,12 @@ impl Chart<'_> {
         }
     }
 
-    /// The value to some decimals, or none from 100 on.
+    /// The value to some decimals, or none from 100 on; `-` for no number.
     fn number(&self, sample: &ChartSample, decimals: usize) -> String {
         let value = self.style.value(sample);
+        if !value.is_finite() {
+            return "-".to_owned();
+        }
         // Otherwise the text would alternate between -0.000 and +0.000.
         let value = if value.abs() < 0.5 * 0.1_f32.powi(decimals as i32) { 0.0 } else { value };
         if value.abs() >= 100.0 { format!("{value:+.0}") } else { format!("{value:+.decimals$}") }

@@ -30,6 +30,9 @@ use crate::wrap::{wrap, wrap_all};
 /// Most columns of a dialog: longer lines are hard to read.
 const MAX_WIDTH: u16 = 120;
 
+/// Columns before the text of an action: its key and its name.
+const PALETTE_INDENT: usize = 26;
+
 /// Columns of the queue: number, source and five values.
 const QUEUE_WIDTH: u16 = 90;
 
@@ -281,25 +284,30 @@ fn field(
 
 fn render_palette(frame: &mut Frame, area: Rect, model: &Model, input: &Input, selected: usize) {
     let theme = &model.theme;
-    let inner = open_box(frame, area, model, "Actions", 80, area.height.min(24));
+    let inner = open_box(frame, area, model, "Actions", area.width.min(MAX_WIDTH), area.height.min(24));
     let mut spans = vec![span(theme, Role::Key, ":")];
     spans.extend(edited(theme, input));
     frame.render_widget(Line::from(spans), Rect { height: 1, ..inner });
-    let rows = palette(input.value(), model);
-    let space = usize::from(inner.height.saturating_sub(2)).max(1);
-    let first = selected.saturating_sub(space - 1);
-    for (line, (index, (info, legal))) in rows.iter().enumerate().skip(first).take(space).enumerate() {
-        let area = Rect { y: inner.y + 2 + line as u16, height: 1, ..inner };
+    let list = Rect { y: inner.y + 2, height: inner.height.saturating_sub(2), ..inner };
+    let mut lines = Vec::new();
+    let mut end_of_selected = 0;
+    for (index, (info, legal)) in palette(input.value(), model).into_iter().enumerate() {
         let (key, name) = (model.keymap.key(info.action), info.name);
-        let text = match legal {
+        let text = match &legal {
             Ok(()) => info.help.to_owned(),
             Err(reason) => format!("({reason})"),
         };
         let role = if legal.is_ok() { Role::Text } else { Role::Quiet };
-        let text = truncate(&format!("{key:<9} {name:<16}{text}"), usize::from(inner.width));
         let style = if index == selected { theme.style(Role::Selected) } else { theme.style(role) };
-        frame.render_widget(Line::from(Span::styled(text, style)), area);
+        let row = Line::from(Span::styled(format!("{key:<9} {name:<16}{text}"), style));
+        lines.extend(wrap(&row, usize::from(list.width), PALETTE_INDENT));
+        if index == selected {
+            end_of_selected = lines.len();
+        }
     }
+    // The selected action stays in sight.
+    let first = end_of_selected.saturating_sub(usize::from(list.height));
+    frame.render_widget(Paragraph::new(lines.into_iter().skip(first).collect::<Vec<_>>()), list);
 }
 
 fn render_choice(frame: &mut Frame, area: Rect, model: &Model, subject: Choice, selected: usize) {

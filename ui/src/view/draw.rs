@@ -16,6 +16,9 @@ pub fn span(theme: &Theme, role: Role, text: impl Into<String>) -> Span<'static>
     Span::styled(text.into(), theme.style(role))
 }
 
+/// In place of what is not known of a robot that sends no states.
+pub const NO_STATE: &str = "no state from the robot";
+
 /// A heading with a line to the right edge; returns the area below it.
 pub fn heading(frame: &mut Frame, area: Rect, theme: &Theme, title: &str, aside: &str) -> Rect {
     let [top, rest] = Layout::vertical([Constraint::Length(1), Constraint::Fill(1)]).areas(area);

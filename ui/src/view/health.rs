@@ -3,19 +3,20 @@
 use quadfrog::recording::live::LiveStatus;
 use quadfrog::recording::record::HealthLimits;
 use quadfrog::recording::recorder::RecorderStatus;
-use quadfrog::robot::{JOINTS, LinkStatus, joint_name};
+use quadfrog::robot::{Battery, JOINTS, LinkStatus, joint_name};
 use quadfrog::telemetry::ArmingCheck;
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
 
-use super::draw::{heading, span, truncate, without_sign_of_zero};
+use super::draw::{NO_STATE, heading, span, without_sign_of_zero};
 use super::{arming, health_history};
 use crate::action::Action;
 use crate::model::Model;
 use crate::model::history::ChartSample;
 use crate::theme::Role;
+use crate::wrap::wrap_all;
 
 /// Rows and columns from which the history is below or beside the numbers; a smaller terminal shows one of the two.
 const HISTORY_BELOW: u16 = 46;
@@ -41,27 +42,13 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
         loop_aside = format!("history ({key})");
         area
     };
-    let [left, right] = Layout::horizontal([Constraint::Fill(1); 2]).spacing(2).areas(area);
-    // The histogram needs rows that 80x24 does not have.
-    let lateness_rows_shown = if area.height >= 30 { 9 } else { 0 };
-    let timing_rows = timing_rows(model);
-    let recorder_rows = recorder_rows(model);
-    let [timing, lateness, recording, robot] = Layout::vertical([
-        Constraint::Length(timing_rows.len() as u16 + 1),
-        Constraint::Length(lateness_rows_shown),
-        Constraint::Length(recorder_rows.len() as u16 + 1),
-        Constraint::Fill(1),
-    ])
-    .areas(left);
-    panel(frame, timing, model, ("Loop", &loop_aside, NAME_WIDTH), timing_rows);
-    if lateness_rows_shown > 0 {
-        let rows = lateness_rows(model, usize::from(lateness.width));
-        panel(frame, lateness, model, ("Wake-up latency, last minute", "", NAME_WIDTH), rows);
-    }
-    panel(frame, recording, model, ("Recorder and screen", "", NAME_WIDTH), recorder_rows);
-    panel(frame, robot, model, ("Link and battery", "", NAME_WIDTH), robot_rows(model));
+    let right_width = MOTOR_WIDTH.max(area.width.saturating_sub(2) / 2);
+    let [left, right] =
+        Layout::horizontal([Constraint::Fill(1), Constraint::Length(right_width)]).spacing(2).areas(area);
+    render_numbers(frame, left, model, &loop_aside);
     let [motors, checks] = Layout::vertical([Constraint::Length(JOINTS as u16 + 1), Constraint::Fill(1)]).areas(right);
-    panel(frame, motors, model, ("Motors", "", MOTOR_NAME_WIDTH), motor_rows(model));
+    let limited = if model.snapshot.tick.limited != 0 { "max: limited by the gate" } else { "" };
+    panel(frame, motors, model, ("Motors", limited), lines(model, right.width, MOTOR_NAME_WIDTH, &motor_rows(model)));
     let aside = format!("{} ({})", arming::summary(model), model.keymap.key(Action::ArmingChecks));
     let (title, aside) = match checks.width < WHOLE_TITLE_FROM {
         true => ("Arming", aside.trim_start_matches("checked ")),
@@ -77,31 +64,84 @@ const WHOLE_TITLE_FROM: u16 = 44;
 
 const NAME_WIDTH: usize = 13;
 const MOTOR_NAME_WIDTH: usize = 9;
+/// Columns of a motor beyond its limit.
+const MOTOR_WIDTH: u16 = 40;
 
-/// A line of a panel: name, value, and whether it is beyond its limit.
-type HealthRow = (String, String, bool);
-
-fn panel(
-    frame: &mut Frame,
-    area: Rect,
-    model: &Model,
-    (title, aside, name_width): (&str, &str, usize),
-    rows: Vec<HealthRow>,
-) {
-    let theme = &model.theme;
-    let body = heading(frame, area, theme, title, aside);
-    let room = usize::from(body.width).saturating_sub(name_width + 2);
-    let line = |(name, value, beyond): HealthRow| {
-        let value = truncate(&value, room);
-        let value = if beyond { span(theme, Role::Warning, format!("{value} !")) } else { Span::raw(value) };
-        Line::from(vec![span(theme, Role::Quiet, format!("{name:<name_width$}")), value])
-    };
-    frame.render_widget(Paragraph::new(rows.into_iter().map(line).collect::<Vec<_>>()), body);
+/// A row of a panel.
+struct HealthRow {
+    name: String,
+    value: String,
+    /// Whether it is beyond its limit.
+    beyond: bool,
+    /// Left out where it has no room, unless it is beyond its limit.
+    detail: bool,
 }
 
 fn row(name: &str, value: String, beyond: bool) -> HealthRow {
-    (name.to_owned(), value, beyond)
+    HealthRow { name: name.to_owned(), value, beyond, detail: false }
 }
+
+fn detail(name: &str, value: String, beyond: bool) -> HealthRow {
+    HealthRow { detail: true, ..row(name, value, beyond) }
+}
+
+/// The rows as lines of `width`; a long value continues on the next line.
+fn lines(model: &Model, width: u16, name_width: usize, rows: &[HealthRow]) -> Vec<Line<'static>> {
+    let theme = &model.theme;
+    let line = |row: &HealthRow| {
+        let HealthRow { name, value, beyond, .. } = row;
+        let value = match beyond {
+            true => span(theme, Role::Warning, format!("{value} !")),
+            false => Span::raw(value.clone()),
+        };
+        Line::from(vec![span(theme, Role::Quiet, format!("{name:<name_width$}")), value])
+    };
+    wrap_all(&rows.iter().map(line).collect::<Vec<_>>(), usize::from(width), name_width)
+}
+
+fn panel(frame: &mut Frame, area: Rect, model: &Model, (title, aside): (&str, &str), lines: Vec<Line<'static>>) {
+    let body = heading(frame, area, &model.theme, title, aside);
+    frame.render_widget(Paragraph::new(lines), body);
+}
+
+/// Loop, recorder and robot below each other, with as many details as have room; the histogram if it has room besides.
+fn render_numbers(frame: &mut Frame, area: Rect, model: &Model, loop_aside: &str) {
+    let titles = [("Loop", loop_aside), ("Recorder and screen", ""), ("Link and battery", "")];
+    let mut rows = [timing_rows(model), recorder_rows(model, usize::from(area.width)), robot_rows(model)];
+    let as_lines = |rows: &[Vec<HealthRow>; 3]| rows.each_ref().map(|rows| lines(model, area.width, NAME_WIDTH, rows));
+    let height = |panels: &[Vec<Line>; 3]| panels.iter().map(|lines| lines.len() + 1).sum::<usize>();
+    let room = usize::from(area.height);
+    let mut shown = as_lines(&rows);
+    let histogram = height(&shown) + HISTOGRAM_ROWS <= room;
+    while height(&shown) > room {
+        let last_detail = |rows: &mut Vec<HealthRow>| {
+            let at = rows.iter().rposition(|row| row.detail && !row.beyond);
+            at.map(|at| rows.remove(at))
+        };
+        if rows.iter_mut().rev().find_map(last_detail).is_none() {
+            break;
+        }
+        shown = as_lines(&rows);
+    }
+    let mut rest = area;
+    for (at, (title, lines)) in titles.into_iter().zip(shown).enumerate() {
+        let [place, below] =
+            Layout::vertical([Constraint::Length(lines.len() as u16 + 1), Constraint::Fill(1)]).areas(rest);
+        panel(frame, place, model, title, lines);
+        rest = below;
+        if at == 0 && histogram {
+            let [place, below] =
+                Layout::vertical([Constraint::Length(HISTOGRAM_ROWS as u16), Constraint::Fill(1)]).areas(rest);
+            let rows = lateness_rows(model, usize::from(place.width));
+            let lines = self::lines(model, place.width, NAME_WIDTH, &rows);
+            panel(frame, place, model, ("Wake-up latency, last minute", ""), lines);
+            rest = below;
+        }
+    }
+}
+
+/// Rows of the histogram of the wake-up latency, with its title and an empty one.
+const HISTOGRAM_ROWS: usize = 9;
 
 /// Upper ends of the histogram's classes, microseconds; the last class has none.
 const CLASSES_US: [u32; 6] = [20, 50, 100, 200, 500, 1000];
@@ -131,12 +171,12 @@ fn timing_rows(model: &Model) -> Vec<HealthRow> {
     let stages = &tick.stages;
     let [read, decide, write] = [stages.read_ns, stages.decide_ns, stages.write_ns].map(|ns| f64::from(ns) / 1e3);
     vec![
-        row("ticks", tick.number.to_string(), false),
+        detail("ticks", tick.number.to_string(), false),
         row("late ticks", format!("{} ({:.3} %)", counters.late_ticks, share * 100.0), share > limits.late_share),
         row("worst", format!("{worst_ms:.2} ms late"), worst_ms > limits.late_ms),
         row("wake-up", micro(&late), percentile(&late, 0.99) > 5e5),
         row("tick takes", micro(&busy), percentile(&busy, 0.99) > 5e5),
-        row("stages, us", format!("read {read:.0}, decide {decide:.0}, write {write:.0}"), false),
+        detail("stages, us", format!("read {read:.0}, decide {decide:.0}, write {write:.0}"), false),
     ]
 }
 
@@ -152,27 +192,37 @@ fn lateness_rows(model: &Model, width: usize) -> Vec<HealthRow> {
     let bar = |(class, count): (usize, u32)| {
         let name = CLASSES_US.get(class).map_or("1 ms or more".to_owned(), |limit| format!("< {limit} us"));
         let share = f64::from(count) / total;
-        (name, format!("{:5.1} % {}", share * 100.0, full.repeat((share * room) as usize)), false)
+        row(&name, format!("{:5.1} % {}", share * 100.0, full.repeat((share * room) as usize)), false)
     };
     counts.into_iter().enumerate().map(bar).collect()
 }
 
-fn recorder_rows(model: &Model) -> Vec<HealthRow> {
+fn recorder_rows(model: &Model, width: usize) -> Vec<HealthRow> {
     let recording = &model.session.info.recording;
     // The present one of several files.
     let present = model.recorder.as_ref().map(|status| status.file.display().to_string());
     let file = present.filter(|file| !file.is_empty()).unwrap_or_else(|| recording.clone());
     let disk = model.session.arming_checks.iter().find(|item| item.check == ArmingCheck::Disk);
     let counters = &model.snapshot.counters;
+    // The end of the path identifies the study and the recording. Where both have no room in a row, the folder has one of its own.
     let name = |path: &str| match path.rsplit_once('/') {
-        // The end of the path identifies the study and the recording; more has no room.
-        Some((folder, file)) => format!("{file} in {}", folder.rsplit('/').next().unwrap_or_default()),
-        None if path.is_empty() => "none".to_owned(),
-        None => path.to_owned(),
+        Some((folder, file)) => (file.to_owned(), format!("in {}", folder.rsplit('/').next().unwrap_or_default())),
+        None if path.is_empty() => ("none".to_owned(), String::new()),
+        None => (path.to_owned(), String::new()),
     };
-    let mut rows = vec![
-        row("recording", name(&file), recording.is_empty() && model.replay.is_none()),
-        row("study", name(&model.session.info.study), false),
+    let (recorded, folder) = name(&file);
+    let (stored, study_folder) = name(&model.session.info.study);
+    let beside = |file: &str, folder: &str| format!("{file} {folder}").trim_end().to_owned();
+    let fits = NAME_WIDTH + beside(&recorded, &folder).chars().count() <= width;
+    let not_recording = recording.is_empty() && model.replay.is_none();
+    let mut rows = vec![row("recording", if fits { beside(&recorded, &folder) } else { recorded }, not_recording)];
+    if !fits {
+        rows.push(row(&folder, String::new(), false));
+    }
+    // That of a recording in the same folder has been named.
+    let same = !fits && folder == study_folder;
+    rows.extend([
+        detail("study", if same { stored } else { beside(&stored, &study_folder) }, false),
         match &model.recorder {
             Some(RecorderStatus { error: Some(error), .. }) => row("writing", error.clone(), true),
             Some(status) => row("written", written(status, model.snapshot.tick.time_ns), false),
@@ -180,14 +230,14 @@ fn recorder_rows(model: &Model) -> Vec<HealthRow> {
         },
         disk.map_or(row("disk", "-".to_owned(), false), |d| row("disk", d.found.clone(), !d.state.allows())),
         row("not recorded", format!("{} ticks", counters.ticks_not_recorded), counters.ticks_not_recorded > 0),
-        row("not shown", format!("{} ticks", counters.ticks_not_shown), false),
-        row("refused", format!("{} commands", counters.commands_refused), false),
-    ];
+        detail("not shown", format!("{} ticks", counters.ticks_not_shown), false),
+        detail("refused", format!("{} commands", counters.commands_refused), false),
+    ]);
     if let Some(LiveStatus { address, viewers, dropped }) = model.viewers {
         rows.push(row("live view", format!("{address}, {viewers} viewers, {dropped} messages left out"), false));
     }
     if let Some(observers) = model.observers {
-        rows.push(row("observers", format!("{observers} with quadfrog attach"), false));
+        rows.push(detail("observers", format!("{observers} with quadfrog attach"), false));
     }
     rows
 }
@@ -205,19 +255,20 @@ fn robot_rows(model: &Model) -> Vec<HealthRow> {
         }
         None => rows.push(row("link", "SIM: no link".to_owned(), false)),
     }
-    rows.push(row("robot clock", format!("{:.1} s", f64::from(tick.state.robot_time_ms) / 1e3), false));
+    rows.push(detail("robot clock", format!("{:.1} s", f64::from(tick.state.robot_time_ms) / 1e3), false));
     match tick.state.battery {
         Some(battery) => {
             let cells: Vec<f64> = battery.cell_v.into_iter().filter(|v| *v > 0.0).collect();
             let low = cells.iter().copied().fold(f64::INFINITY, f64::min);
             let high = cells.iter().copied().fold(0.0, f64::max);
             let low_charge = battery.charge_percent < limits.battery_percent;
-            rows.push(row("battery", format!("{:.0} %", battery.charge_percent), low_charge));
-            rows.push(row("", format!("{:.1} V, {:.1} A", battery.voltage_v, battery.current_a), false));
+            let Battery { charge_percent, voltage_v, current_a, .. } = battery;
+            rows.push(row("battery", format!("{charge_percent:.0} %, {voltage_v:.1} V, {current_a:.1} A"), low_charge));
             if !cells.is_empty() {
                 rows.push(row("cells", format!("{low:.3} to {high:.3} V",), high - low > 0.1));
             }
         }
+        None if model.robot_is_silent() => rows.push(row("battery", "-".to_owned(), false)),
         None => rows.push(row("battery", "none".to_owned(), false)),
     }
     rows
@@ -226,41 +277,43 @@ fn robot_rows(model: &Model) -> Vec<HealthRow> {
 fn written(status: &RecorderStatus, time_ns: u64) -> String {
     let megabytes = status.bytes as f64 / 1e6;
     let rate = status.bytes as f64 / 1e3 / (time_ns as f64 / 1e9).max(1.0);
-    format!("{megabytes:.1} MB, {rate:.0} kB/s, {} ticks", status.ticks)
+    format!("{megabytes:.1} MB, {rate:.0} kB/s")
 }
 
 fn link_rows(link: &LinkStatus, limits: &HealthLimits) -> Vec<HealthRow> {
     let loss = 100.0 * link.loss_share();
-    let states = format!("{} Hz, newest {} ms old", link.rate_hz, link.state_age_ms);
-    let unusual = format!(
-        "{} out of order, {} duplicate, {} with another header",
-        link.out_of_order, link.duplicate, link.foreign
-    );
-    let broken = format!("{} corrupt ({} in 5 s), {} short", link.corrupt, link.recent_corrupt, link.wrong_length);
+    let states = format!("{} Hz, {} ms old", link.rate_hz, link.state_age_ms);
     vec![
         row("states", states, link.state_age_ms > limits.state_age_ms),
-        row("lost", format!("{loss:.2} % of 5 s, {} in all", link.lost), loss >= 100.0 * limits.loss_share),
-        row("unusual", unusual, false),
-        row("broken", broken, link.recent_corrupt > 0),
-        row("sent", format!("{}, failed {}", link.sent, link.send_errors), link.send_errors > 0),
+        row("lost in 5 s", format!("{loss:.2} %, {} in all", link.lost), loss >= 100.0 * limits.loss_share),
+        row("corrupt", format!("{} in 5 s, {} in all", link.recent_corrupt, link.corrupt), link.recent_corrupt > 0),
         row("restarts", link.reboots.to_string(), link.reboots > 0),
+        detail("out of order", format!("{}, duplicate {}", link.out_of_order, link.duplicate), false),
+        detail("other header", format!("{}, other length {}", link.foreign, link.wrong_length), false),
+        detail("sent", format!("{}, failed {}", link.sent, link.send_errors), link.send_errors > 0),
     ]
 }
 
 fn motor_rows(model: &Model) -> Vec<HealthRow> {
     let tick = &model.snapshot.tick;
+    if model.robot_is_silent() {
+        return vec![row(NO_STATE, String::new(), false)];
+    }
     let mut rows = Vec::new();
     // A robot that reports no temperatures, as the simulator, sends zeros.
     let measured = tick.state.motor_temperature_c.iter().any(|temperature| *temperature > 0.0);
     for joint in 0..JOINTS {
         let temperature = tick.state.motor_temperature_c[joint];
         let degrees = if measured { format!("{temperature:3.0} C") } else { "  - C".to_owned() };
-        let state = if tick.state.motor_enabled[joint] { "on" } else { "off" };
-        let limited = if tick.limited & (1 << joint) != 0 { " limited" } else { "" };
+        let state = match (tick.state.motor_enabled[joint], tick.limited & (1 << joint) != 0) {
+            (false, _) => "off",
+            (true, false) => "on",
+            (true, true) => "max",
+        };
         let q = tick.state.joint_position_rad[joint];
         let torque = without_sign_of_zero(tick.state.joint_torque_n_m[joint]);
-        let text = format!("{degrees} {state:<3}{q:+5.2} rad {torque:+5.1} N m{limited}");
-        rows.push((joint_name(joint), text, temperature >= model.session.info.limits.motor_c));
+        let text = format!("{degrees} {state:<3} {q:+5.2} rad {torque:+5.1} N m");
+        rows.push(row(&joint_name(joint), text, temperature >= model.session.info.limits.motor_c));
     }
     rows
 }

@@ -9,7 +9,7 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
 
 use super::chart::{Chart, Ghost, TimeAxis, draw_phases, draw_time_axis, phases, plot_columns};
-use super::draw::{bar, heading, span, without_sign_of_zero};
+use super::draw::{NO_STATE, bar, heading, span, without_sign_of_zero};
 use super::series_style::style;
 use super::{beside, objective, proposal, trials, wireframe};
 use crate::model::Model;
@@ -21,6 +21,8 @@ use crate::settings::ChartMode;
 use crate::theme::Role;
 
 const SIDE: u16 = 32;
+/// The same below the charts of a landed trial: the table beside them has whole verdicts at 80 columns.
+const LANDED_SIDE: u16 = 30;
 /// Columns from which there is room for more than charts, the trial and the table.
 const WIDE: u16 = 120;
 /// Columns from which the whole table fits beside the trial.
@@ -132,7 +134,7 @@ fn render_landed(frame: &mut Frame, area: Rect, model: &Model) {
     let card_rows = model.session.trial_rows().min(area.height / 2);
     let [charts, lower] = Layout::vertical([Constraint::Fill(1), Constraint::Length(card_rows)]).areas(area);
     let [card, _, table] =
-        Layout::horizontal([Constraint::Length(SIDE), Constraint::Length(1), Constraint::Fill(1)]).areas(lower);
+        Layout::horizontal([Constraint::Length(LANDED_SIDE), Constraint::Length(1), Constraint::Fill(1)]).areas(lower);
     render_charts(frame, charts, model);
     proposal::render(frame, card, model);
     trials::render_table(frame, table, model, false);
@@ -280,6 +282,9 @@ fn render_joints(frame: &mut Frame, area: Rect, model: &Model) {
     let tick = &model.snapshot.tick;
     let aside = if area.width >= 60 { "torque in N m, speed in rad/s; bars: share of the limit" } else { "N m, rad/s" };
     let body = heading(frame, area, theme, "Joints", aside);
+    if model.robot_is_silent() {
+        return frame.render_widget(Line::from(span(theme, Role::Quiet, NO_STATE)), body);
+    }
     let Some(robot) = &model.robot else {
         frame.render_widget(Line::from(span(theme, Role::Quiet, "the robot's limits are not known here")), body);
         return;

@@ -21,8 +21,11 @@ pub struct SeriesStyle {
 }
 
 impl SeriesStyle {
-    /// Its value in a sample.
+    /// Its value in a sample; no number while the robot sends no states.
     pub fn value(&self, sample: &ChartSample) -> f32 {
+        if !sample.heard {
+            return f32::NAN;
+        }
         let joints = &sample.joints;
         match self.series.kind() {
             SeriesKind::Tilt(axis) => [sample.roll, sample.pitch][axis],
@@ -42,13 +45,14 @@ impl SeriesStyle {
         }
     }
 
-    /// The command for its value in a sample; none for a series that is not commanded.
+    /// The command for its value in a sample, no number while the robot sends no states; none for a series that is not commanded.
     pub fn commanded(&self, sample: &ChartSample) -> Option<f32> {
-        match self.series.kind() {
-            SeriesKind::Angle(joint) => Some(sample.joints.commanded_angle[joint]),
-            SeriesKind::Torque(joint) => Some(sample.joints.commanded_torque[joint]),
-            _ => None,
-        }
+        let commanded = match self.series.kind() {
+            SeriesKind::Angle(joint) => sample.joints.commanded_angle[joint],
+            SeriesKind::Torque(joint) => sample.joints.commanded_torque[joint],
+            _ => return None,
+        };
+        Some(if sample.heard { commanded } else { f32::NAN })
     }
 }
 

@@ -5,8 +5,9 @@ use nalgebra::{Point2, UnitQuaternion, Vector3};
 use quadfrog::robot::{Leg, leg_of};
 use ratatui::Frame;
 use ratatui::layout::Rect;
+use ratatui::text::Line;
 
-use super::draw::heading;
+use super::draw::{NO_STATE, heading, span};
 use super::drawing::Drawing;
 use super::robot_shape::{leg_points, trunk_edges};
 use super::scene::{Scene, steady};
@@ -96,16 +97,21 @@ pub fn render(frame: &mut Frame, panel: Rect, model: &Model) {
     let (theme, tick) = (&model.theme, &model.snapshot.tick);
     let contacts =
         Leg::ALL.map(|leg| format!("{}{}", leg.name(), theme.contact_indicator(tick.estimate.contact[leg as usize])));
-    heading(frame, panel, theme, "Robot", &contacts.join(" "));
+    let contacts = if model.robot_is_silent() { String::new() } else { contacts.join(" ") };
+    heading(frame, panel, theme, "Robot", &contacts);
     let Some(area) = picture_area(panel) else { return };
+    if model.robot_is_silent() {
+        frame.render_widget(Line::from(span(theme, Role::Quiet, NO_STATE)), area);
+    }
     if let Some(drawing) = drawing(area, 2.0, model) {
         drawing.draw_cells(frame, area, theme);
     }
 }
 
-/// The picture for an area whose rows are as high as `row_height` columns are wide; none where the robot is not known.
+/// The picture for an area whose rows are as high as `row_height` columns are wide; none where the robot is not known or sends no
+/// states.
 pub fn drawing(area: Rect, row_height: f64, model: &Model) -> Option<Drawing> {
-    let (tick, robot) = (&model.snapshot.tick, model.robot.as_ref()?);
+    let (tick, robot) = (&model.snapshot.tick, model.robot.as_ref().filter(|_| !model.robot_is_silent())?);
     let scene = Scene::of(model, robot);
     let jump = scene.framed_jump(model.session.info.task);
     let half_width = REACH + jump.xy().norm() / 2.0;
