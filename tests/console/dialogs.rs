@@ -9,7 +9,7 @@ use quadfrog_console::action::ACTIONS;
 use quadfrog_console::message::{Effect, ExportedRows};
 use quadfrog_console::text::{as_csv, as_markdown};
 use strum::VariantArray;
-use support::{Console, assert_shows, session, trial};
+use support::{Console, assert_shows, line_with, session, trial};
 
 const SENTENCE: &str = "no person within 2 m of the robot, the remote control in the hand of the operator, and its stop \
                         combination known to everybody who is in the room and who has read the page on safe handling";
@@ -226,4 +226,21 @@ fn the_checks_of_a_simulation_begin_at_the_top_and_confirm_nothing() {
     assert_eq!(console.said(), "the simulator needs no confirmation");
     console.press(&["Down", "Esc", "5"]);
     assert_shows(&console.screen(80, 24), &["3 passed (P)", "24 more: P shows all"]);
+}
+
+/// Regression: "2 not yet" stood over a page on which one was seen; the test of STOP came last.
+#[test]
+fn what_the_operator_has_to_do_is_on_the_first_page() {
+    let mut console = Console::proposed();
+    console.model.session.info = SessionInfo { backend: Some(Backend::Hardware), ..session() };
+    let item = |check: &ArmingCheck| ArmingCheckRecord {
+        check: *check,
+        found: "found".into(),
+        needed: "something".into(),
+        state: if *check == ArmingCheck::StopTested { ArmingCheckState::Waiting } else { ArmingCheckState::Passed },
+    };
+    console.record(Record::ArmingChecks(ArmingCheck::VARIANTS.iter().map(item).collect()));
+    console.press(&["P"]);
+    let line = line_with(&console.screen(80, 24), "STOP tested");
+    assert_shows(&line, &["you  STOP tested", "found (needed: something)"]);
 }

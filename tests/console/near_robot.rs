@@ -22,9 +22,11 @@ fn on_hardware(mut console: Console) -> Console {
 #[test]
 fn a_jump_on_hardware_needs_a_clear_area_each_time() {
     let mut console = on_hardware(Console::ready());
+    assert!(console.next_step().starts_with("Press g to jump: y confirms the area, g again jumps."));
     console.press(&["g"]);
     console.wait(1000);
     assert_eq!(console.press(&["g"]), [], "the area was not confirmed");
+    assert_eq!(console.said(), "not yet: type y first if the area is clear");
     assert!(console.next_step().contains("Type y if the area is clear"), "{}", console.next_step());
     console.wait(1000);
     assert_eq!(console.press(&["y"]), []);

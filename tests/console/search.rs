@@ -482,7 +482,7 @@ fn the_frame_says_how_link_battery_and_the_hottest_motor_are_at_every_size() {
     }
     console.model.view = View::Health;
     let screen = console.screen(120, 40);
-    assert_shows(&screen, &["998 Hz, newest 3 ms old", "2.00 % of 5 s, 123 in all", "4 corrupt", "restarts     1 !"]);
+    assert_shows(&screen, &["998 Hz, 3 ms old", "2.00 %, 123 in all", "4 in all", "restarts     1 !"]);
     let motor = screen.lines().skip(3).find(|line| line.contains("FL_calf")).expect("the motor").to_owned();
     assert!(motor.contains("63 C") && motor.contains('!'), "{motor}");
     // Too small for anything else, the link is still there.
@@ -531,7 +531,7 @@ fn health_says_what_the_recorder_writes_and_why_it_stopped() {
     let disk = item(ArmingCheck::Disk, ArmingCheckState::Failed, "812 MB", "at least 1000 MB");
     console.record(Record::ArmingChecks(vec![disk]));
     let screen = console.screen(120, 40);
-    assert_shows(&screen, &["4.0 MB, 400 kB/s, 10000 ticks", "812 MB !", "12 ticks !"]);
+    assert_shows(&screen, &["4.0 MB, 400 kB/s", "812 MB !", "12 ticks !"]);
     let error = Some("no space left on device".to_owned());
     console.update(Msg::Recorder(RecorderStatus { error, ..RecorderStatus::default() }));
     assert!(console.screen(120, 40).contains("no space left on device !"));

@@ -149,6 +149,7 @@ fn may_arm(model: &Model) -> Legality {
     require(!model.session.arming_checks.is_empty(), "the arming checks are not finished")?;
     match model.session.failing_checks() {
         0 => Ok(()),
+        1 => refuse(format!("1 arming check has not passed: {} shows it", model.keymap.key(Action::ArmingChecks))),
         count => refuse(format!(
             "{count} arming checks have not passed: {} shows them",
             model.keymap.key(Action::ArmingChecks)

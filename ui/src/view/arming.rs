@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use quadfrog::recording::record::ArmingCheckRecord;
 use quadfrog::session::operator_request::OperatorCheck;
-use quadfrog::telemetry::ArmingCheckState;
+use quadfrog::telemetry::{ArmingCheck, ArmingCheckState};
 use ratatui::text::{Line, Span};
 
 use super::draw::{span, truncate, wall_clock};
@@ -27,14 +27,16 @@ fn label(state: ArmingCheckState) -> (&'static str, Role) {
     }
 }
 
-/// The items in the order in which they matter: failing ones, those that the operator confirms, the others, and last those that
+/// The items in the order in which they matter: failing ones, those that the operator fulfils, the others, and last those that
 /// are not needed. A confirmation moves no item.
 fn ordered(model: &Model) -> Vec<&ArmingCheckRecord> {
-    let confirms = |item: &ArmingCheckRecord| OperatorCheck::ALL.iter().any(|check| check.check() == item.check);
+    let of_operator = |item: &ArmingCheckRecord| {
+        item.check == ArmingCheck::StopTested || OperatorCheck::ALL.iter().any(|check| check.check() == item.check)
+    };
     let rank = |item: &&ArmingCheckRecord| match item.state {
         ArmingCheckState::Failed => 0,
         ArmingCheckState::NotNeeded => 3,
-        _ if confirms(item) => 1,
+        _ if of_operator(item) => 1,
         _ => 2,
     };
     let mut items: Vec<&ArmingCheckRecord> = model.session.arming_checks.iter().collect();
@@ -99,7 +101,7 @@ fn line(
     let wide = width.is_none_or(|width| width >= WIDE);
     let text = match (item.found.as_str(), item.needed.as_str()) {
         (found, needed) if wide && item.state != ArmingCheckState::NotNeeded && !needed.is_empty() => {
-            format!("{found:<20} {needed}")
+            format!("{found} (needed: {needed})")
         }
         ("", text) | (text, _) => text.to_owned(),
     };

@@ -117,6 +117,7 @@ fn live(model: &Model) -> NextStep {
             let lead = match session.failing_checks() {
                 _ if session.arming_checks.is_empty() => "Checking the robot.".to_owned(),
                 0 => format!("Press {} to arm: the robot stands up.", key(Action::Arm)),
+                1 => format!("Not ready to arm: 1 check has not passed. {} shows it.", key(Action::ArmingChecks)),
                 failing => {
                     let shows = key(Action::ArmingChecks);
                     format!("Not ready to arm: {failing} checks have not passed. {shows} shows them.")
@@ -129,7 +130,11 @@ fn live(model: &Model) -> NextStep {
             step(format!("No jump now: {reason}."), model, &[sit_down, change, (Action::Skip, "skip"), undo])
         }
         Mode::Ready if session.open_proposal().is_some() => {
-            let lead = format!("Press {} twice to jump.", key(Action::Approve));
+            let approve = key(Action::Approve);
+            let lead = match session.info.is_hardware() {
+                true => format!("Press {approve} to jump: y confirms the area, {approve} again jumps."),
+                false => format!("Press {approve} twice to jump."),
+            };
             step(lead, model, &[change, (Action::Skip, "skip"), undo, sit_down])
         }
         _ => step("The sampler is choosing the next trial.", model, &[sit_down]),

@@ -35,6 +35,9 @@ pub(super) fn approve_key(
     if model.keymap.action(key) != Some(Action::Approve) {
         return cancelled(model, "no jump");
     }
+    if area_asked {
+        say(model, LogLevel::Warning, "not yet: type y first if the area is clear");
+    }
     if area_asked || model.clock.saturating_sub(pressed_at) < APPROVAL_PAUSE {
         model.dialog = Some(Dialog::Approve { trial, revision, pressed_at: model.clock, area_clear });
         return Vec::new();
