@@ -9,7 +9,7 @@ use quadfrog::telemetry::{ArmingCheck, ArmingCheckState, Counters, Mode, Snapsho
 use quadfrog::trial::{Backend, DrawnRange, ExperimentStage, SearchStatus, SearchedParameter, TrialRecord, Verdict};
 use quadfrog_console::message::{Msg, ReplayStatus};
 use quadfrog_console::theme::Role;
-use support::{Console, assert_shows, line_with, tick, trial};
+use support::{Console, assert_shows, line_with, session, tick, trial};
 
 fn at_time(console: &mut Console, time_s: u64) {
     let tick = Tick { time_ns: time_s * 1_000_000_000, ..console.model.snapshot.tick };
@@ -193,5 +193,19 @@ fn health_of_a_robot_is_whole_at_every_size() {
         );
         assert!(!screen.contains(".."), "{screen}");
         assert_eq!(screen.contains("robot clock"), rows >= 40, "the last detail, where there is room\n{screen}");
+    }
+}
+
+/// Regression: the sample of the README begins within its jump, and the card said "none yet" beside a trial that ran.
+#[test]
+fn a_recording_that_begins_within_a_trial_shows_what_runs() {
+    let mut console = Console::new();
+    console.record(Record::Session(session()));
+    console.record(Record::Trial(trial(12, None, None)));
+    console.update(Msg::Replay(ReplayStatus::default()));
+    for (columns, rows) in [(80, 24), (120, 40), (200, 60)] {
+        let screen = console.screen(columns, rows);
+        assert_shows(&screen, &["Trial #12 runs", "Fx    75.00 N"]);
+        assert!(!screen.contains("none yet"), "{screen}");
     }
 }

@@ -6,6 +6,7 @@ use quadfrog::recording::record::{Record, SessionInfo};
 use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::telemetry::Mode;
 use quadfrog::trial::{ExperimentStage, SearchStatus, SearchedParameter, Verdict};
+use quadfrog_console::message::{Msg, ReplayStatus};
 use quadfrog_console::theme::Role;
 use support::{Console, assert_shows, session, trial};
 
@@ -118,4 +119,16 @@ fn no_dialog_and_no_message_has_a_number_of_17_digits() {
     console.press(&["4", "B", "1"]);
     console.press(&["Enter"]);
     assert_shows(&console.screen(80, 24), &["write it as 50..120"]);
+}
+
+/// Regression: the field for a time, a trial or the best said that a number is typed.
+#[test]
+fn the_field_of_a_place_in_a_recording_says_what_it_takes() {
+    let mut console = Console::ready();
+    console.update(Msg::Replay(ReplayStatus::default()));
+    console.press(&["G", "p"]);
+    let screen = console.screen(80, 24);
+    assert_shows(&screen, &["`p` does not belong here: a time, a trial as #7, or best is typed"]);
+    console.press(&["Enter"]);
+    assert_shows(&console.screen(80, 24), &["nothing was typed yet; Esc cancels"]);
 }

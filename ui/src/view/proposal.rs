@@ -29,6 +29,15 @@ fn content(model: &Model, width: usize) -> (String, Vec<Line<'static>>) {
     if let Some(trial) = session.under_review() {
         return (format!("Trial #{}: judge it", trial.trial), review(session, theme, trial));
     }
+    // A recording that begins within a trial.
+    if session.proposal.is_none()
+        && let Some(trial) = session.trials.newest().filter(|trial| trial.suggested.or(trial.verdict).is_none())
+    {
+        let as_run =
+            |(name, value): &(String, f64)| ProposedParameter { name: name.clone(), value: *value, proposed: *value };
+        let lines = trial.parameters.iter().map(|p| parameter(session, theme, &as_run(p), width)).collect();
+        return (format!("Trial #{} runs", trial.trial), lines);
+    }
     match (stage, &session.proposal) {
         (Some(ExperimentStage::Finished), _) => ("Study finished".to_owned(), finished(model, width)),
         (_, Some(proposal)) => {

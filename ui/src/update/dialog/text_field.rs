@@ -18,8 +18,9 @@ use crate::update::request::{cancelled, request};
 const DOUBTED_SHARE: f64 = 0.5;
 const DOUBTED_DISTANCE: f64 = 0.2;
 
-/// End of the message about a character that is not part of a number.
+/// End of the message about a character that is not part of a number, or of a place in a recording.
 pub(super) const NOT_OF_A_NUMBER: &str = " does not belong here: a number is typed";
+const NOT_OF_A_PLACE: &str = " does not belong here: a time, a trial as #7, or best is typed";
 
 pub(super) fn key(
     model: &mut Model,
@@ -28,7 +29,8 @@ pub(super) fn key(
     (mut input, replaces, before): (Input, bool, Option<String>),
 ) -> Vec<Effect> {
     // The message about a character that was not taken stays until it is acknowledged: 1.5 would become 15 unseen.
-    let mut problem = before.filter(|text| text.ends_with(NOT_OF_A_NUMBER));
+    let not_of_it = if purpose == Purpose::Seek { NOT_OF_A_PLACE } else { NOT_OF_A_NUMBER };
+    let mut problem = before.filter(|text| text.ends_with(not_of_it));
     let refused = key.typed().filter(|c| purpose.characters().is_some_and(|allowed| !allowed.contains(*c)));
     // The selection ends with the first key; one that types or deletes takes the text with it.
     let takes = key.typed().is_some() || matches!(key.code(), KeyCode::Backspace | KeyCode::Delete);
@@ -56,7 +58,7 @@ pub(super) fn key(
             input.handle(InputRequest::InsertChar(' '));
         }
         _ => match refused {
-            Some(c) => problem = Some(format!("`{c}`{NOT_OF_A_NUMBER}")),
+            Some(c) => problem = Some(format!("`{c}`{not_of_it}")),
             None => edit(&mut input, key),
         },
     }
