@@ -209,3 +209,12 @@ fn a_recording_that_begins_within_a_trial_shows_what_runs() {
         assert!(!screen.contains("none yet"), "{screen}");
     }
 }
+
+/// Regression: the axis of J ended at 0.001 m where a fall was all that had happened.
+#[test]
+fn a_study_of_falls_alone_has_no_scale_of_its_values() {
+    let mut console = Console::ready();
+    console.record(Record::Trial(TrialRecord { value: Some(0.0), ..trial(0, Some(Verdict::Fall), None) }));
+    let screen = console.screen(80, 24);
+    assert!(screen.contains("no value yet") && !screen.contains("0.001"), "{screen}");
+}

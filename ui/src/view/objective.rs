@@ -13,6 +13,9 @@ const SCALE: u16 = 6;
 /// Rows of the plot from which the numbers of the trials have one.
 const NUMBERS_FROM_ROWS: u16 = 6;
 
+/// Span of the vertical axis at least, m or rad.
+const LEAST_SPAN: f64 = 1e-3;
+
 pub fn render(frame: &mut Frame, area: Rect, session: &SessionModel, theme: &Theme) {
     let best = session.trials.best();
     let aside = match session.trials.best_value() {
@@ -30,9 +33,12 @@ pub fn render(frame: &mut Frame, area: Rect, session: &SessionModel, theme: &The
     }
     let values = || session.trials.records.values().filter_map(|trial| trial.value);
     let low = values().fold(0.0, f64::min);
-    let high = values().fold(0.0, f64::max).max(low + 1e-3);
+    let high = values().fold(0.0, f64::max).max(low + LEAST_SPAN);
     let buffer = frame.buffer_mut();
-    buffer.set_string(plot.x, plot.y, number(high), theme.style(Role::Quiet));
+    // Falls and void trials alone have no scale.
+    if high > low + LEAST_SPAN {
+        buffer.set_string(plot.x, plot.y, number(high), theme.style(Role::Quiet));
+    }
     let bottom = plot.bottom() - 1;
     buffer.set_string(plot.x, bottom, if low < 0.0 { number(low) } else { "0".to_owned() }, theme.style(Role::Quiet));
     let last = session.trials.records.keys().next_back().map_or(0, |trial| trial + 1);
