@@ -105,3 +105,20 @@ fn control_of_a_real_robot_is_taken_with_a_key_after_a_second_of_listening() {
     console.wait(2000);
     assert_eq!(console.press(&["L", "y"]), []);
 }
+
+/// Regression: a second press approved however long ago the first one was.
+#[test]
+fn a_forgotten_first_press_does_not_jump() {
+    for hardware in [false, true] {
+        let mut console = if hardware { on_hardware(Console::ready()) } else { Console::ready() };
+        console.press(&["g"]);
+        console.wait(1000);
+        if hardware {
+            console.press(&["y"]);
+        }
+        (0..20).for_each(|_| console.wait(1000));
+        assert_eq!(console.requests(&["g"]), []);
+        assert_eq!(console.said(), "cancelled: no jump, the question was 21 s old");
+        assert!(console.next_step().starts_with("Press g"), "{}", console.next_step());
+    }
+}

@@ -12,7 +12,7 @@ use crate::keymap::Key;
 use crate::legal::legal;
 use crate::message::{Effect, ExportedRows};
 use crate::model::Model;
-use crate::model::dialog::{APPROVAL_PAUSE, ARMING_TIME, Dialog, Question};
+use crate::model::dialog::{APPROVAL_PAUSE, APPROVAL_TIME, ARMING_TIME, Dialog, Question};
 use crate::update::request::{cancelled, refused, request, say};
 
 /// Lines that a page of the arming checks moves by, and the most that they can have.
@@ -27,6 +27,10 @@ pub(super) fn approve_key(
     (trial, revision, pressed_at): (u32, u32, Duration),
     area_clear: bool,
 ) -> Vec<Effect> {
+    let waited = model.clock.saturating_sub(pressed_at);
+    if waited > APPROVAL_TIME {
+        return cancelled(model, &format!("no jump, the question was {} s old", waited.as_secs()));
+    }
     let area_asked = model.session.info.is_hardware() && !area_clear;
     if area_asked && key.is(KeyCode::Char('y')) {
         model.dialog = Some(Dialog::Approve { trial, revision, pressed_at, area_clear: true });
@@ -38,7 +42,7 @@ pub(super) fn approve_key(
     if area_asked {
         say(model, LogLevel::Warning, "not yet: type y first if the area is clear");
     }
-    if area_asked || model.clock.saturating_sub(pressed_at) < APPROVAL_PAUSE {
+    if area_asked || waited < APPROVAL_PAUSE {
         model.dialog = Some(Dialog::Approve { trial, revision, pressed_at: model.clock, area_clear });
         return Vec::new();
     }
