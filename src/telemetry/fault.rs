@@ -248,14 +248,17 @@ pub enum TrialInhibit {
 
 /// "0.120 rad, a jump needs at most 0.100 rad": more decimals where both numbers would print alike.
 fn at_most(measured: f64, limit: f64, unit: &str, digits: usize) -> String {
-    let digits = digits_apart(measured, limit, digits);
-    format!("{measured:.digits$} {unit}, a jump needs at most {limit:.digits$} {unit}")
+    needed("at most ", measured, limit, unit, digits)
 }
 
-/// "0.28 s, a jump needs 0.30 s": more decimals where both numbers would print alike.
+/// "0.28 s, a jump needs 0.30 s", as [`at_most`].
 fn needs(measured: f64, limit: f64, unit: &str, digits: usize) -> String {
+    needed("", measured, limit, unit, digits)
+}
+
+fn needed(bound: &str, measured: f64, limit: f64, unit: &str, digits: usize) -> String {
     let digits = digits_apart(measured, limit, digits);
-    format!("{measured:.digits$} {unit}, a jump needs {limit:.digits$} {unit}")
+    format!("{measured:.digits$} {unit}, a jump needs {bound}{limit:.digits$} {unit}")
 }
 
 /// Warning before a failsafe trips.

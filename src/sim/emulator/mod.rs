@@ -296,7 +296,9 @@ impl Emulator {
         if missed_ms > 0 {
             self.now_ms += missed_ms;
             self.since_command_ms = self.since_command_ms.saturating_add(u32::try_from(missed_ms).unwrap_or(u32::MAX));
-            self.robot.step_clock(missed_ms as f64);
+            if self.is_awake() {
+                self.robot.step_clock(missed_ms as f64);
+            }
         }
         self.due_ns = Some(time_ns + MILLISECOND_NS);
         self.step();
