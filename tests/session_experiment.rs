@@ -109,6 +109,59 @@ fn a_verdict_can_be_undone_until_the_next_trial_begins() {
     assert!(experiment.undo().is_err(), "the verdict was told when the next trial began");
 }
 
+/// Regression: a session that ended in the review made the measured jump void, and the value by hand was lost with it.
+#[test]
+fn a_measured_trial_waits_for_its_verdict_across_sessions() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut session = open(folder.path());
+    accept(&mut session);
+    let spec = run(&mut session, TrialEnd::Settled);
+    session.keep_measurement().unwrap();
+    session.set_hand_value(Some(0.5)).unwrap();
+    // The journal holds the gains in another order.
+    let measured = |row: Option<&TrialRecord>| row.map(|row| TrialRecord { gains: Default::default(), ..row.clone() });
+    let before = measured(session.row(spec.trial));
+    session.close_unreviewed().and_then(|()| session.close()).unwrap();
+    drop(session);
+
+    let mut session = open(folder.path());
+    assert_eq!(session.stage(), ExperimentStage::Review);
+    assert_eq!(measured(session.under_review()), before, "measured, value by hand and suggestion as before");
+    let records = session.take_records();
+    let log = records.iter().find_map(|record| match record {
+        Record::Log(line) if line.message.contains("waits for its verdict") => Some(&line.message),
+        _ => None,
+    });
+    assert!(log.is_some(), "the operator is shown why it waits");
+    assert!(records.iter().any(|record| matches!(record, Record::Search(search) if search.counted == 1)));
+    session.judge(Verdict::Accept, false).unwrap();
+    session.undo().unwrap();
+    drop(session);
+
+    // Killed after the verdict was taken back.
+    let mut session = open(folder.path());
+    assert_eq!(measured(session.under_review()), before);
+    session.judge(Verdict::Accept, false).unwrap();
+    accept(&mut session);
+    let values: Vec<_> = session.rows().map(|row| (row.verdict, row.hand_value)).collect();
+    let accepted = Some(Verdict::Accept);
+    assert_eq!(values, [(accepted, None), (accepted, Some(0.5)), (accepted, None)]);
+}
+
+/// A stopped trial is void and comes again, as its suggestion says.
+#[test]
+fn a_stopped_trial_does_not_wait_for_its_verdict_across_sessions() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut session = open(folder.path());
+    let spec = run(&mut session, TrialEnd::Stopped);
+    session.keep_measurement().unwrap();
+    drop(session);
+    let session = open(folder.path());
+    assert_eq!(session.stage(), ExperimentStage::Proposed);
+    assert_eq!(session.row(spec.trial).unwrap().verdict, Some(Verdict::Void));
+    assert_eq!(session.proposal().unwrap().parent, Some(spec.trial));
+}
+
 /// Regression: the count of judged trials and the best kept the verdict that was taken back.
 #[test]
 fn an_undone_verdict_is_neither_counted_nor_the_best() {

@@ -91,6 +91,10 @@ pub fn run_watched<R: Robot>(
     let mut voids = 0;
     let mut same = SameLimit::default();
     let mut waited: Option<LongWait> = None;
+    // A person has left it without a verdict.
+    if let Some(suggested) = experiment.under_review().and_then(|row| row.suggested) {
+        experiment.judge(suggested, false)?;
+    }
     loop {
         let Some(proposal) = experiment.proposal().filter(|_| experiment.stage() == ExperimentStage::Proposed) else {
             // The pending verdict must be reported before this worker waits: the others wait for it.

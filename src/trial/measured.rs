@@ -5,6 +5,9 @@ use strum::{IntoStaticStr, VariantArray};
 
 use super::{Task, TrialRecord, Verdict};
 
+/// Beginning of the cause of a verdict that was changed after it had become final.
+pub const CHANGED: &str = "changed by the operator";
+
 /// Rule for a trial in which the robot bounces on after its landing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, IntoStaticStr, VariantArray)]
 #[serde(rename_all = "kebab-case")]
@@ -138,6 +141,18 @@ mod seed_as_text {
 }
 
 impl TrialRecord {
+    /// Returns whether it counts with a value measured by hand.
+    pub fn counts_by_hand(&self) -> bool {
+        self.verdict == Some(Verdict::Accept) && self.hand_value.is_some()
+    }
+
+    /// Returns whether the operator has judged it otherwise than suggested, or has changed its verdict later.
+    pub fn is_overruled(&self) -> bool {
+        let otherwise =
+            self.verdict.is_some() && self.suggested.is_some_and(|suggested| Some(suggested) != self.verdict);
+        otherwise || self.cause.starts_with(CHANGED)
+    }
+
     /// Returns the number of repeats that count.
     pub fn counted_repeats(&self) -> u32 {
         self.repeats.iter().filter(|repeat| repeat.verdict != Some(Verdict::Void)).count() as u32

@@ -3,7 +3,7 @@
 mod measured;
 mod search;
 
-pub use self::measured::{BounceRule, Displacement, JumpRow, MeasuredJump, ObjectiveRule, RepeatRecord};
+pub use self::measured::{BounceRule, CHANGED, Displacement, JumpRow, MeasuredJump, ObjectiveRule, RepeatRecord};
 pub use self::search::{
     DrawnRange, FixedParameter, ParameterInsight, PointRecord, PredictedTrial, ProposalInsight, QueuedPoint,
     SearchStatus, SearchedParameter, SimulatorComparison, WorldResemblance,

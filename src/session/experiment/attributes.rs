@@ -234,7 +234,8 @@ pub struct RepeatsAttribute<'a> {
     pub repeats: &'a [RepeatRecord],
 }
 
-/// Attributes that are written when a trial is judged; a verdict that was taken back is null.
+/// Attributes that are written when a trial was measured, and when it is judged; before the verdict, and after it was taken back,
+/// the verdict is null.
 #[derive(Debug, Serialize)]
 pub struct JudgedAttributes<'a> {
     verdict: Option<Verdict>,
@@ -310,6 +311,13 @@ pub struct TrialAttributes {
 impl TrialAttributes {
     pub fn of(trial: &Trial) -> TrialAttributes {
         read(&trial.user_attributes)
+    }
+
+    /// Whether a running trial was measured and has no verdict. A trial that is void by the rules is not among them, unless a value
+    /// was entered by hand.
+    pub fn is_unjudged(&self) -> bool {
+        let counts = matches!(self.suggested, Some(Verdict::Accept | Verdict::Fall)) || self.hand_value.is_some();
+        self.verdict.is_none() && counts
     }
 
     /// Returns the outcome of a running trial whose verdict was on disk when the program ended; none without a verdict.

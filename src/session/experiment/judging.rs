@@ -37,6 +37,20 @@ impl Experiment {
         self.enter(ExperimentState::Review(trial), trial);
     }
 
+    /// Writes the measurement of the trial under review to the study: if the program ends before the verdict, the session that
+    /// continues the study judges it. The rollouts of a trial of several are kept with their verdicts alone.
+    pub fn keep_measurement(&mut self) -> Result<(), StudyError> {
+        let ExperimentState::Review(trial) = self.state else { return Ok(()) };
+        if self.plan.control.repeats > 1 {
+            return Ok(());
+        }
+        match self.write_judgement(trial, false) {
+            // Ended by another program; the verdict reports it.
+            Err(StudyError::State { .. }) => Ok(()),
+            written => written,
+        }
+    }
+
     /// Judges the trial under review; with `rerun` its parameters are queued again.
     /// Refused when no trial is under review, an accepted trial has no value, or a trial that tripped a limit is judged void
     /// without a reason.
@@ -144,12 +158,12 @@ impl Experiment {
             row.value = row.suggested.and_then(|suggested| value_of(row, suggested, &self.plan));
         }
         self.publish_row(trial);
-        Ok(())
+        Ok(self.keep_measurement()?)
     }
 
     /// Ends the session during a review: a trial that is to be void by the rules (stopped, or its operator is gone) is void
-    /// with its cause, and its parameters are queued again as after a crash. A trial that tripped a limit is a fall and is not
-    /// queued. Any other waits for its verdict until the study is opened again.
+    /// with its cause, and its parameters are queued again as after a crash; one with a value by hand is not. A trial that
+    /// tripped a limit is a fall and is not queued. Any other waits for its verdict until the study is opened again.
     pub fn close_unreviewed(&mut self) -> Result<(), StudyError> {
         let ExperimentState::Review(trial) = self.state else { return Ok(()) };
         let Some(row) = self.rows.get_mut(&trial) else { return Ok(()) };
@@ -162,7 +176,7 @@ impl Experiment {
             return self.report_verdict().map(drop);
         }
         let verdict = if limit { Verdict::Fall } else { Verdict::Void };
-        if row.suggested != Some(verdict) {
+        if row.suggested != Some(verdict) || verdict == Verdict::Void && row.hand_value.is_some() {
             return Ok(());
         }
         row.verdict = Some(verdict);

@@ -92,8 +92,8 @@ pub struct Experiment {
 }
 
 impl Experiment {
-    /// Opens a study, new or not. A trial that a crash left running counts if it was judged; otherwise it is void and its
-    /// parameters are queued again.
+    /// Opens a study, new or not. Of the trials that an earlier session left running one that was judged counts, one that was
+    /// measured waits for its verdict again, and any other is void and its parameters are queued again.
     pub fn open(plan: ExperimentPlan, study: Study) -> Result<Experiment, StudyError> {
         let mut experiment = Experiment {
             queue: TrialQueue::new(plan.worker, plan.abandoned),
@@ -110,13 +110,13 @@ impl Experiment {
             hop_share: None,
             model_best: None,
         };
-        let log = experiment.queue.close_interrupted(&mut experiment.study)?;
+        // The rollouts of a trial of several are kept one by one, see `repeats`.
+        let unjudged = experiment.queue.unjudged(&experiment.study).filter(|_| experiment.plan.control.repeats <= 1);
+        let log = experiment.queue.close_interrupted(&mut experiment.study, unjudged)?;
         experiment.log_all(log);
-        if experiment.plan.needs_prior {
-            experiment.take_rows();
-            experiment.enter(ExperimentState::AwaitsPrior, experiment.study.trials().len() as u32);
-        } else {
-            experiment.propose()?;
+        match unjudged {
+            Some(trial) => experiment.review_again(trial)?,
+            None => experiment.propose()?,
         }
         Ok(experiment)
     }
@@ -127,6 +127,7 @@ impl Experiment {
     /// When the study cannot be read or written.
     pub fn use_prior(&mut self, prior: Arc<PriorModel>) -> Result<(), StudyError> {
         self.study.use_prior(prior);
+        self.plan.needs_prior = false;
         if matches!(self.state, ExperimentState::AwaitsPrior) { self.propose() } else { Ok(()) }
     }
 

@@ -3,6 +3,7 @@
 use super::attributes::{self, BeganAttributes, Origin};
 use super::confirmation::{self, NextRepeat};
 use super::envelope;
+use super::judging::value_of;
 use super::open_proposal::{ApprovedProposal, OpenProposal, model_insight};
 use super::plan::{ExperimentPlan, RequestRefusal, not_now};
 use super::queue_changes::queued_points;
@@ -11,7 +12,7 @@ use super::trial_changes::must_be_within;
 use super::{Experiment, ExperimentState, queue};
 use crate::optimize::study::{Study, StudyError, TellOutcome};
 use crate::optimize::trial::Trial;
-use crate::recording::record::Record;
+use crate::recording::record::{LogLevel, LogRecord, Record};
 use crate::telemetry::TrialSpec;
 use crate::trial::{
     JumpParameters, ParameterInfo, ParameterValues, ProposalInsight, ProposalSource, ProposedParameter, SearchStatus,
@@ -21,13 +22,11 @@ use crate::trial::{
 impl Experiment {
     /// Makes the next proposal, or finishes.
     pub fn propose(&mut self) -> Result<(), StudyError> {
-        self.study.refresh()?;
-        let log = self.queue.close_abandoned(&mut self.study)?;
-        self.log_all(log);
-        self.take_rows();
-        self.search = SearchSettings::of(&self.study, &self.plan);
-        self.search.apply(&self.plan, &mut self.study)?;
-        self.confirmation.reopen();
+        self.read_study()?;
+        if self.plan.needs_prior {
+            self.enter(ExperimentState::AwaitsPrior, self.study.trials().len() as u32);
+            return Ok(());
+        }
         let mut study = self.study_with_verdict()?;
         if study.waiting().next().is_none() {
             match self.confirmation.next(&study) {
@@ -72,6 +71,39 @@ impl Experiment {
         if let Some(refusal) = self.refusal() {
             self.log(format!("trial {number} cannot run as it was queued: {refusal}"));
         }
+        Ok(())
+    }
+
+    /// Reads the trials and the search of the study.
+    fn read_study(&mut self) -> Result<(), StudyError> {
+        self.study.refresh()?;
+        let log = self.queue.close_abandoned(&mut self.study)?;
+        self.log_all(log);
+        self.take_rows();
+        self.search = SearchSettings::of(&self.study, &self.plan);
+        self.search.apply(&self.plan, &mut self.study)?;
+        self.confirmation.reopen();
+        Ok(())
+    }
+
+    /// Puts a trial under review that an earlier session has measured and left without a verdict.
+    pub(super) fn review_again(&mut self, trial: u32) -> Result<(), StudyError> {
+        self.read_study()?;
+        if let Some(row) = self.rows.get_mut(&trial) {
+            row.value = row.suggested.and_then(|suggested| value_of(row, suggested, &self.plan));
+        }
+        self.publish_row(trial);
+        self.outbox.extend(self.confirmation.changed_points(&self.study).map(Record::Points));
+        self.enter(ExperimentState::Review(trial), trial);
+        // Without its prior the sampler knows nothing to show.
+        match self.plan.needs_prior {
+            true => self.publish_search(&self.study.fork()),
+            false => self.publish_model(trial),
+        }
+        let message = format!(
+            "trial {trial} waits for its verdict since the last session: it was measured, its jump is in that session's recording"
+        );
+        self.outbox.push(Record::Log(LogRecord { level: LogLevel::Warning, source: "study".to_owned(), message }));
         Ok(())
     }
 

@@ -3,7 +3,8 @@
 //! The session that has the study's folder (worker 0) closes at its start the trials that worker 0 began, because it is
 //! the only one. A trial of a joined worker is closed by any session that has seen it run for longer than any simulated
 //! trial takes (`[workers] abandoned_s`). Trials of other programs are left to those programs. A closed trial with a
-//! verdict counts; one without is void, and its parameters are queued again.
+//! verdict counts; one without is void, and its parameters are queued again. Not closed is the trial that was measured and
+//! waited for its verdict: the session that continues the study judges it.
 
 use std::time::Duration;
 
@@ -25,10 +26,15 @@ impl TrialQueue {
         TrialQueue { worker, liveness: Liveness::new(abandoned) }
     }
 
-    /// Closes the trials that an earlier session of the folder left running. Returns lines for the log.
-    pub fn close_interrupted(&self, study: &mut Study) -> Result<Vec<String>, StudyError> {
-        let left = |trial: &&Trial| self.worker == 0 && attributes::worker_of(trial) == Some(0);
-        let running: Vec<Trial> = study.running().filter(left).cloned().collect();
+    /// The newest trial that an earlier session of the folder has measured and left without a verdict.
+    pub fn unjudged(&self, study: &Study) -> Option<u32> {
+        let unjudged = |trial: &&Trial| TrialAttributes::of(trial).is_unjudged();
+        self.left(study).filter(unjudged).last().map(|trial| trial.number)
+    }
+
+    /// Closes the trials that an earlier session of the folder left running, except `kept`. Returns lines for the log.
+    pub fn close_interrupted(&self, study: &mut Study, kept: Option<u32>) -> Result<Vec<String>, StudyError> {
+        let running: Vec<Trial> = self.left(study).filter(|trial| Some(trial.number) != kept).cloned().collect();
         let log = close_all(study, &running, "interrupted: the program ended before the verdict")?;
         queue_owed(study)?;
         Ok(log)
@@ -56,6 +62,11 @@ impl TrialQueue {
         let log = close_all(study, &[trial], cause)?;
         queue_owed(study)?;
         Ok(log)
+    }
+
+    /// The trials that an earlier session of the folder left running.
+    fn left<'a>(&'a self, study: &'a Study) -> impl Iterator<Item = &'a Trial> {
+        study.running().filter(|trial| self.worker == 0 && attributes::worker_of(trial) == Some(0))
     }
 
     pub fn others_run(&self, study: &Study) -> bool {

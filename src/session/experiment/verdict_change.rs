@@ -6,7 +6,7 @@ use super::Experiment;
 use super::judging::value_of;
 use super::plan::{RequestRefusal, not_now};
 use crate::optimize::trial::VerdictChange;
-use crate::trial::Verdict;
+use crate::trial::{CHANGED, Verdict};
 
 impl Experiment {
     /// Changes the final verdict of a trial for a reason of the operator; returns the one before. The journal keeps both. The
@@ -34,7 +34,7 @@ impl Experiment {
         if verdict != Verdict::Void && value.is_none() {
             return not_now(format!("nothing was measured in trial {trial}: it cannot be accepted"));
         }
-        let cause = format!("changed by the operator, was {}: {reason}; {}", before.name(), row.cause);
+        let cause = format!("{CHANGED}, was {}: {reason}; {}", before.name(), row.cause);
         let change = VerdictChange {
             at: Timestamp::now().to_string(),
             verdict: verdict.name().to_owned(),

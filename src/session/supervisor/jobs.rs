@@ -117,6 +117,11 @@ impl Supervisor {
                     self.log(LogLevel::Warning, message, time_ns);
                 }
             }
+            (JobPurpose::KeepMeasurement(trial), JobOutput::Done(Err(error))) => {
+                let message =
+                    format!("the measurement of trial {trial} is not in the study yet: {error}; its verdict writes it");
+                self.log(LogLevel::Warning, message, time_ns);
+            }
             (JobPurpose::Refresh, JobOutput::Done(Err(error))) => {
                 self.log(LogLevel::Error, format!("the study could not be read: {error}"), time_ns);
             }
@@ -150,7 +155,7 @@ impl Supervisor {
         let trial = spec.trial;
         self.in_a_row = spec.jumps > 1;
         match holds.and_then(|()| self.command(Command::RunTrial(*spec, state.permit))) {
-            Ok(()) => Ok(format!("trial {trial} runs")),
+            Ok(()) => Ok("the countdown begins".to_owned()),
             Err(reason) => {
                 let cause = format!("not run: {reason}");
                 self.give(JobPurpose::Withdraw, time_ns, move |experiment| {

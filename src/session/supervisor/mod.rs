@@ -434,6 +434,10 @@ impl Supervisor {
             experiment.ended(trial, &end, &ticks, whole);
             JobOutput::Done(Ok(()))
         });
+        // By itself: the screen shows the trial even while another program holds the journal.
+        self.give(JobPurpose::KeepMeasurement(trial), time_ns, |experiment| {
+            JobOutput::Done(experiment.keep_measurement().map_err(RequestRefusal::from))
+        });
     }
 
     fn publish(&mut self, record: Record, time_ns: u64) {

@@ -24,6 +24,7 @@ pub enum JobPurpose {
     Request(StampedRequest, Asker),
     Approve(StampedRequest, Asker, ApprovalState),
     Measure(u32),
+    KeepMeasurement(u32),
     /// A trial that was approved and not run.
     Withdraw,
     Refresh,
